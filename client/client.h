@@ -1,0 +1,64 @@
+// Client: asks a service for pictures. The library behind the command line; also what tests and other programs use.
+//
+//   auto client = Client::Connect(context, "tcp://127.0.0.1:7420");        // Unavailable within 5 s if nobody answers
+//   RequestId id = client->Submit(request);
+//   while (true) { auto event = client->Next(1s); ... }                     // progress, previews, the picture, or the failure
+// One thread at a time.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+
+#include "common/base/status.h"
+#include "common/image/local_image.h"
+#include "common/transport/socket.h"
+#include "common/wire/client_messages.h"
+
+namespace slabstream {
+
+// A picture: premultiplied float RGBA (and depth) on its bounds within `size`; everything outside is empty.
+struct Picture {
+  ImageSize size;
+  LocalImage image;
+  bool final = true;
+  std::uint32_t groups_done = 1, group_count = 1;
+  FrameStatistics statistics;          // final only
+  Duration latency{};                  // request to last byte, measured here; final only
+};
+
+struct ClientEvent {
+  RequestId request = 0;
+  std::variant<FrameProgress, Picture, Status> what;  // Status: the request failed
+};
+
+class Client {
+ public:
+  static Result<Client> Connect(Context& context, const std::string& endpoint, Duration timeout = std::chrono::seconds(5));
+  Client(Client&&) noexcept;
+  Client& operator=(Client&&) noexcept;
+  ~Client();
+
+  RequestId Submit(const FrameRequest& request, Duration deadline = std::chrono::minutes(10));
+  void Cancel(RequestId request);
+
+  // The next event of any open request; nullopt when the timeout is over. If the service stops answering, every open request
+  // gets an Unavailable event.
+  std::optional<ClientEvent> Next(Duration timeout);
+
+  // Submit and wait for the end.
+  Result<Picture> Render(const FrameRequest& request, Duration deadline = std::chrono::minutes(10));
+
+  Result<StatusReply> QueryStatus(Duration timeout = std::chrono::seconds(5));
+  Status ShutDownService(Duration timeout = std::chrono::seconds(5));
+
+  Wakeup& wakeup();  // Notify ends a Next early, from any thread or a signal handler
+
+ private:
+  struct Impl;
+  explicit Client(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace slabstream

@@ -1,0 +1,37 @@
+// EmbeddedService: the same coordinator and workers as threads of this process, over inproc. For `--local` and for tests.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "common/base/status.h"
+#include "common/transport/socket.h"
+#include "coordinator/service.h"
+#include "worker/service.h"
+
+namespace slabstream {
+
+struct EmbeddedOptions {
+  int workers = 1;                   // [1, 256]
+  CoordinatorOptions coordinator;    // endpoints are filled in; catalogue and machine timings count
+  WorkerConfig worker;               // timings and budgets count
+};
+
+class EmbeddedService {
+ public:
+  static Result<std::unique_ptr<EmbeddedService>> Start(Context& context, EmbeddedOptions options);
+  ~EmbeddedService();
+
+  const std::string& endpoint() const;       // for Client::Connect with the same context
+  WorkerService& worker(int index);          // tests: RequestStop makes it leave
+  Status AddWorker();                        // joins the running service
+
+ private:
+  struct Impl;
+  explicit EmbeddedService(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace slabstream

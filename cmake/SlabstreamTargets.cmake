@@ -1,0 +1,56 @@
+# One target a folder. Warnings, optimisation and sanitizers come with the interface target below, never from global flags.
+
+add_library(slabstream_options INTERFACE)
+target_compile_features(slabstream_options INTERFACE cxx_std_20)
+target_include_directories(slabstream_options INTERFACE ${CMAKE_SOURCE_DIR})
+target_compile_options(slabstream_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual)
+if(SLABSTREAM_WERROR)
+  target_compile_options(slabstream_options INTERFACE -Werror)
+endif()
+if(SLABSTREAM_SANITIZE)
+  target_compile_options(slabstream_options INTERFACE -fsanitize=${SLABSTREAM_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  target_link_options(slabstream_options INTERFACE -fsanitize=${SLABSTREAM_SANITIZE})
+endif()
+
+# slabstream_library(NAME [SOURCES file...] [LINKS slabstream::target... | any target])
+# Makes slabstream_NAME with the alias slabstream::NAME. Without sources it is a header-only (interface) library.
+function(slabstream_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
+  set(target slabstream_${name})
+  if(ARG_SOURCES)
+    add_library(${target} STATIC ${ARG_SOURCES})
+    target_link_libraries(${target} PUBLIC slabstream_options ${ARG_LINKS} PRIVATE ${ARG_PRIVATE_LINKS})
+  else()
+    add_library(${target} INTERFACE)
+    target_link_libraries(${target} INTERFACE slabstream_options ${ARG_LINKS})
+  endif()
+  add_library(slabstream::${name} ALIAS ${target})
+endfunction()
+
+# slabstream_program(NAME SOURCES file... LINKS target...): an executable in build/bin.
+function(slabstream_program name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE slabstream_options ${ARG_LINKS})
+endfunction()
+
+# slabstream_test(NAME SOURCES file... LINKS target... [TIMEOUT seconds] [LABELS label...]): a GoogleTest program, one ctest a program.
+function(slabstream_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LINKS;LABELS" ${ARGN})
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 300)
+  endif()
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE slabstream_options ${ARG_LINKS} GTest::gmock GTest::gtest_main)
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
+  add_test(NAME ${name} COMMAND ${name})
+  set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}")
+endfunction()
+
+# slabstream_benchmark(NAME SOURCES file... LINKS target...): a Google Benchmark program in build/bench.
+function(slabstream_benchmark name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE slabstream_options ${ARG_LINKS} benchmark::benchmark benchmark::benchmark_main)
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bench)
+endfunction()

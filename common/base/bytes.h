@@ -1,0 +1,32 @@
+// Bytes: an immutable run of bytes with shared ownership, so that payloads pass between threads, sockets and images without a copy.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace slabstream {
+
+class Bytes {
+ public:
+  Bytes() = default;
+  // `owner` keeps `data` alive.
+  Bytes(std::shared_ptr<const void> owner, std::span<const std::byte> data) : owner_(std::move(owner)), data_(data) {}
+  explicit Bytes(std::vector<std::byte> data) {
+    auto owned = std::make_shared<const std::vector<std::byte>>(std::move(data));
+    data_ = *owned;
+    owner_ = std::move(owned);
+  }
+
+  std::span<const std::byte> span() const { return data_; }
+  std::size_t size() const { return data_.size(); }
+  bool empty() const { return data_.empty(); }
+
+ private:
+  std::shared_ptr<const void> owner_;
+  std::span<const std::byte> data_;
+};
+
+}  // namespace slabstream

@@ -1,0 +1,43 @@
+#include "common/base/log.h"
+
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <string>
+
+namespace slabstream {
+namespace {
+
+spdlog::level::level_enum ToSpdlog(LogLevel level) {
+  switch (level) {
+    case LogLevel::kDebug: return spdlog::level::debug;
+    case LogLevel::kInfo: return spdlog::level::info;
+    case LogLevel::kWarning: return spdlog::level::warn;
+    case LogLevel::kError: return spdlog::level::err;
+    case LogLevel::kOff: return spdlog::level::off;
+  }
+  return spdlog::level::info;
+}
+
+// Until InitLog, only warnings and errors are written, so that a library user sees no chatter.
+spdlog::logger& Logger() {
+  static spdlog::logger logger = [] {
+    spdlog::logger fresh("slabstream", std::make_shared<spdlog::sinks::stderr_sink_mt>());
+    fresh.set_level(spdlog::level::warn);
+    return fresh;
+  }();
+  return logger;
+}
+
+}  // namespace
+
+void InitLog(std::string_view process, LogLevel level) {
+  Logger().set_pattern("%H:%M:%S.%e %L [" + std::string(process) + "] %v");
+  Logger().set_level(ToSpdlog(level));
+}
+
+void Log(LogLevel level, std::string_view message) {
+  Logger().log(ToSpdlog(level), spdlog::string_view_t(message.data(), message.size()));
+}
+
+}  // namespace slabstream

@@ -1,0 +1,20 @@
+// Log lines go to stderr, one a line, with time and level. A small front so that only log.cpp pays for the logging library.
+// Thread-safe.
+#pragma once
+
+#include <string_view>
+
+namespace slabstream {
+
+enum class LogLevel { kDebug, kInfo, kWarning, kError, kOff };
+
+// `process` names the writer in each line ("coordinator", "worker 3"). Called once, by main.
+void InitLog(std::string_view process, LogLevel level);
+
+void Log(LogLevel level, std::string_view message);
+inline void LogDebug(std::string_view message) { Log(LogLevel::kDebug, message); }
+inline void LogInfo(std::string_view message) { Log(LogLevel::kInfo, message); }
+inline void LogWarning(std::string_view message) { Log(LogLevel::kWarning, message); }
+inline void LogError(std::string_view message) { Log(LogLevel::kError, message); }
+
+}  // namespace slabstream

@@ -1,0 +1,35 @@
+// ClassificationTable: the transfer function sampled once per frame setup, so that renderers classify a stored sample by one look-up.
+//
+// Bin of a stored sample s: BinOf(s), in [0, size). For 8-bit volumes each stored value has its own bin; for 16-bit volumes with at most kMaxBins
+// distinct values too; otherwise the value range is divided into kMaxBins equal bins, each represented by its centre. Bin 0 .. size-1 ascend
+// with the stored value. Samples that are not finite have no bin: they are empty.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/classification/transfer_function.h"
+
+namespace slabstream {
+
+inline constexpr int kMaxBins = 4096;
+
+struct ClassificationTable {
+  double bin_from_stored_scale = 1;   // bin = clamp(floor((stored - origin) * scale + 0.5))
+  double stored_origin = 0;
+  std::vector<float> opacity;         // by bin: of opacity_distance voxel lengths, in [0, 1]
+  std::vector<Rgb> color;             // by bin: straight
+  double opacity_distance = 1;        // voxel lengths
+  float max_opacity = 0;              // over all bins
+
+  int size() const { return int(opacity.size()); }
+  int BinOf(double stored) const {
+    const double bin = (stored - stored_origin) * bin_from_stored_scale + 0.5;
+    return bin <= 0 ? 0 : bin >= size() - 1 ? size() - 1 : int(bin);
+  }
+};
+
+// `range` is in data values and comes from the volume's summary, so that all workers build the same table.
+ClassificationTable Classify(const TransferFunction& transfer, const VolumeDescription& description, ValueRange range);
+
+}  // namespace slabstream

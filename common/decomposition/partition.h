@@ -1,0 +1,50 @@
+// Partition: a kd-tree whose leaves are half-open boxes that tile the volume. It answers "where are the boxes"; who owns them is another question
+// (common/planning/assignment.h).
+//
+// Leaves are numbered by a BoxId. For slabs the ids ascend along the axis.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/view/camera.h"
+#include "common/volume/box.h"
+
+namespace slabstream {
+
+using BoxId = std::uint32_t;
+
+class Partition {
+ public:
+  // A node of the kd-tree: a leaf (box), or a plane `axis = position` (position is the first index of the upper side) with two children.
+  struct Node {
+    bool leaf = true;
+    Axis axis = Axis::kX;
+    std::int32_t position = 0;
+    std::uint32_t lower = 0, upper = 0;  // node numbers
+    BoxId box = 0;
+    friend bool operator==(const Node&, const Node&) = default;
+  };
+
+  Partition() = default;
+  // `nodes[0]` is the root. CHECKs that the leaves tile `bounds`.
+  Partition(const Box& bounds, std::vector<Node> nodes);
+
+  const Box& bounds() const { return bounds_; }
+  std::span<const Box> boxes() const { return boxes_; }  // by BoxId
+  std::span<const Node> nodes() const { return nodes_; }
+  friend bool operator==(const Partition&, const Partition&) = default;
+
+ private:
+  Box bounds_;
+  std::vector<Node> nodes_;
+  std::vector<Box> boxes_;
+};
+
+// Boxes nearest first: no ray of the camera enters a later box before an earlier one. One traversal of the tree: at each plane the eye's side comes
+// first; an orthographic eye lies at infinity against the view direction. Where the eye lies in the plane itself, or the rays are
+// parallel to it, no ray crosses from one side to the other, and the lower side comes first.
+std::vector<BoxId> VisibilityOrder(const Partition& partition, const Camera& camera);
+
+}  // namespace slabstream

@@ -1,0 +1,12 @@
+// From the supersampled frame to final pixels: each final pixel is the mean of supersample x supersample fine ones (premultiplied RGBA), its depth
+// the smallest. Sums run in a fixed order, so the result is the same wherever it is computed.
+#pragma once
+
+#include "common/image/local_image.h"
+
+namespace slabstream {
+
+// `supersample` is a power of two, 1 returns the image as it is. Bounds of the result are in final pixels, grown to whole ones.
+LocalImage Resolve(LocalImage image, int supersample);
+
+}  // namespace slabstream

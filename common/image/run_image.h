@@ -1,0 +1,53 @@
+// RunImage: a local image with its empty pixels left out, the form that travels.
+//
+// Runs are maximal spans of non-empty pixels within a row, in row-major order; the pixels of all runs follow each other without gaps.
+// Payload layout (little endian), also written down in docs/wire.md:
+//   run_count * { u32 row offset from bounds.y_begin, u32 column offset from bounds.x_begin, u32 pixel count }
+//   pixel_count * 4 * f32 RGBA
+//   kDepth only: pixel_count * f32 depth, then pixel_count * u32 voxel
+// Empty: alpha == 0 (kRgba; colour is then 0 too), depth == +infinity (kDepth).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/base/status.h"
+#include "common/image/local_image.h"
+
+namespace slabstream {
+
+// Half-open range of linear pixel indices y * frame_width + x of the (supersampled) frame.
+struct PixelRange {
+  std::uint64_t begin = 0, end = 0;
+  friend constexpr bool operator==(const PixelRange&, const PixelRange&) = default;
+  friend constexpr auto operator<=>(const PixelRange&, const PixelRange&) = default;
+};
+
+struct RunImageHeader {
+  PixelFormat format = PixelFormat::kRgba;
+  PixelBounds bounds;              // within the frame
+  std::uint32_t run_count = 0;
+  std::uint64_t pixel_count = 0;   // in all runs
+  friend bool operator==(const RunImageHeader&, const RunImageHeader&) = default;
+};
+
+std::size_t PayloadBytes(const RunImageHeader& header);
+
+struct RunImage {
+  RunImageHeader header;
+  std::vector<std::byte> payload;  // PayloadBytes(header)
+};
+
+// The pixels of `image` that lie in `range` of a frame `frame_width` wide; bounds are cut to the rows that the range touches.
+RunImage EncodeRuns(const LocalImage& image, PixelRange range, std::int32_t frame_width);
+
+// InvalidArgument unless header and payload agree, runs ascend without touching, stay inside the bounds, and no pixel is NaN. After this check
+// the functions below may trust the image. `frame` is the frame's whole rectangle.
+Status ValidateRuns(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame);
+
+// Dense form. The image must be valid.
+LocalImage DecodeRuns(const RunImageHeader& header, std::span<const std::byte> payload);
+
+}  // namespace slabstream

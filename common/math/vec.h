@@ -1,0 +1,51 @@
+// Small fixed-size vectors: Vec3 (double, points and directions), Index3 (voxel indices), Axis. No I/O, no allocation.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+namespace slabstream {
+
+enum class Axis : std::uint8_t { kX = 0, kY = 1, kZ = 2 };
+inline constexpr std::array<Axis, 3> kAxes = {Axis::kX, Axis::kY, Axis::kZ};
+constexpr int Number(Axis axis) { return static_cast<int>(axis); }
+constexpr char Letter(Axis axis) { return static_cast<char>('x' + Number(axis)); }
+
+struct Vec3 {
+  double x = 0, y = 0, z = 0;
+
+  constexpr double operator[](int i) const { return i == 0 ? x : i == 1 ? y : z; }
+  constexpr double& operator[](int i) { return i == 0 ? x : i == 1 ? y : z; }
+  constexpr double operator[](Axis a) const { return (*this)[Number(a)]; }
+  constexpr double& operator[](Axis a) { return (*this)[Number(a)]; }
+  friend constexpr bool operator==(const Vec3&, const Vec3&) = default;
+};
+
+constexpr Vec3 operator+(const Vec3& a, const Vec3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+constexpr Vec3 operator-(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+constexpr Vec3 operator-(const Vec3& a) { return {-a.x, -a.y, -a.z}; }
+constexpr Vec3 operator*(double s, const Vec3& a) { return {s * a.x, s * a.y, s * a.z}; }
+constexpr Vec3 operator*(const Vec3& a, const Vec3& b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }  // by component
+constexpr Vec3 operator/(const Vec3& a, const Vec3& b) { return {a.x / b.x, a.y / b.y, a.z / b.z}; }  // by component
+constexpr double Dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+constexpr Vec3 Cross(const Vec3& a, const Vec3& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+inline double Length(const Vec3& a) { return std::sqrt(Dot(a, a)); }
+inline Vec3 Normalized(const Vec3& a) { return (1.0 / Length(a)) * a; }
+
+struct Index3 {
+  std::int32_t x = 0, y = 0, z = 0;
+
+  constexpr std::int32_t operator[](int i) const { return i == 0 ? x : i == 1 ? y : z; }
+  constexpr std::int32_t& operator[](int i) { return i == 0 ? x : i == 1 ? y : z; }
+  constexpr std::int32_t operator[](Axis a) const { return (*this)[Number(a)]; }
+  constexpr std::int32_t& operator[](Axis a) { return (*this)[Number(a)]; }
+  friend constexpr bool operator==(const Index3&, const Index3&) = default;
+  friend constexpr auto operator<=>(const Index3&, const Index3&) = default;
+};
+
+constexpr Vec3 ToVec3(const Index3& i) { return {double(i.x), double(i.y), double(i.z)}; }
+
+}  // namespace slabstream

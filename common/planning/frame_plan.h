@@ -1,0 +1,98 @@
+// FramePlan: everything that a frame will do, as a value. Built by pure functions; the service, the embedded executor and the simulator run it.
+//
+//   request + volume summary + roster + cost model  --PlanFrame-->  FramePlan  --executor-->  image + reports
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/base/status.h"
+#include "common/combining/schedule.h"
+#include "common/decomposition/partition.h"
+#include "common/planning/frame_request.h"
+#include "common/volume/summary.h"
+
+namespace slabstream {
+
+using WorkerId = std::uint32_t;   // an identity within one coordinator's life; never given twice. 0: nobody
+using DatasetId = std::uint32_t;  // one loaded volume within one coordinator's life. 0: none
+
+// What every worker needs to render its part, fixed at the start of a frame: a re-plan after a lost worker changes who does what and nothing here.
+struct FrameSetup {
+  DatasetId dataset = 0;
+  VolumeDescription description;
+  ValueRange range;             // data values: what the classification table is made for
+  RendererKind renderer = RendererKind::kSplat;
+  Camera camera;
+  TransferFunction transfer;
+  Shading shading;
+  double termination = kDefaultTermination;
+  std::int32_t halo = kHaloStep;  // voxels that are kept round a box
+  friend bool operator==(const FrameSetup&, const FrameSetup&) = default;
+};
+
+inline PixelFormat FormatOf(RendererKind renderer) {
+  return renderer == RendererKind::kSplat ? PixelFormat::kRgba : PixelFormat::kDepth;
+}
+
+// One rank of a group: which box, and who renders it. A worker may hold several ranks of a group (after another one was lost).
+struct Placement {
+  BoxId id = 0;
+  Box box;
+  WorkerId worker = 0;
+  friend bool operator==(const Placement&, const Placement&) = default;
+};
+
+struct GroupPlan {
+  std::vector<Placement> placements;  // by rank, nearest first; boxes that show nothing are left out, so it may be empty
+  Schedule schedule;                  // over these ranks
+  friend bool operator==(const GroupPlan&, const GroupPlan&) = default;
+};
+
+struct FramePlan {
+  FrameSetup setup;
+  Partition partition;
+  std::uint32_t slots = 1;         // p: owner slots the partition was made for
+  Axis slab_axis = Axis::kZ;
+  std::string combine;             // name of the combining scheme
+  std::vector<GroupPlan> groups;   // nearest first; at least one
+  WorkerId display = 0;            // accumulates the groups and hands the frame over; holds a rank wherever possible
+  friend bool operator==(const FramePlan&, const FramePlan&) = default;
+};
+
+// Slot s of the roster owns the boxes i with i mod slots == s. A slot may be vacant (0) after a loss: its boxes are then lent to the others, round
+// robin, and everybody else keeps their own, so that only the lost voxels travel again.
+struct Roster {
+  std::vector<WorkerId> slots;
+  friend bool operator==(const Roster&, const Roster&) = default;
+};
+
+// Constants of the paper's Eq. 20 and 25, in seconds a unit, fitted on this machine; the planner uses them to choose groups.
+struct CostModel {
+  double transform = 1e-9;   // c_t: a voxel
+  double splat = 2e-8;       // (c_sh + c_sp k^2) : an occupied voxel
+  double composite = 1e-9;   // c_cp: a pixel and slice
+  double combine = 4e-9;     // c_co: a pixel and round
+  std::int64_t slab_bytes_target = std::int64_t{256} << 20;  // voxels of one slab at most, where slices allow it
+};
+
+// Pure. Errors: InvalidArgument (an unknown name, a preset that does not exist), Unavailable (no worker in the roster).
+// The request must be valid (Validate). Boxes whose bricks show nothing under the transfer function get no placement.
+Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, const Roster& roster,
+                            const CostModel& cost);
+
+// The same frame over another roster with the same number of slots: same setup, partition and groups; placements, schedules and display change.
+// `keep_display` is used again if it is still in the roster. Unavailable if nobody is.
+Result<FramePlan> Replan(const FramePlan& plan, const Roster& roster);
+
+// Owner of a box: its slot's worker, or the one it is lent to. 0 if the roster is empty of workers.
+WorkerId OwnerOf(BoxId box, const Roster& roster);
+
+// Voxels that a worker must hold to render `box`: the box and its halo, cut to the volume.
+inline Box SlabBox(const Box& box, const FrameSetup& setup) {
+  return Grown(box, setup.halo, setup.description.geometry.bounds());
+}
+
+}  // namespace slabstream

@@ -1,0 +1,54 @@
+// FrameRequest: one picture, as a client asks for it. Policy: how the service is to make it; it can never change the picture.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <variant>
+
+#include "common/base/status.h"
+#include "common/classification/transfer_function.h"
+#include "common/view/camera.h"
+#include "common/view/shading.h"
+
+namespace slabstream {
+
+enum class RendererKind : std::uint8_t { kSplat = 1, kZBuffer = 2 };
+
+inline constexpr int kMaxGroups = 1024;
+inline constexpr double kDefaultTermination = 1.0 / 1024;
+inline constexpr std::size_t kMaxNameBytes = 256;
+
+enum class AxisChoice : std::uint8_t { kX = 0, kY = 1, kZ = 2, kAuto = 3 };
+
+struct Policy {
+  std::string decomposition = "slab";  // a name of Decompositions()
+  AxisChoice axis = AxisChoice::kAuto; // auto: the volume's longest axis, so that turning the view never moves voxels
+  int groups = 0;                      // [1, kMaxGroups]; 0: the planner chooses
+  std::string combine = "fan-in";      // a name of CombiningSchemes()
+  friend bool operator==(const Policy&, const Policy&) = default;
+};
+
+// A preset's name (resolved by the coordinator, which knows the volume) or the function itself.
+struct TransferChoice {
+  std::variant<std::string, TransferFunction> choice = std::string("auto");
+  double opacity_distance = 1;  // voxel lengths; replaces that of a preset or function
+  friend bool operator==(const TransferChoice&, const TransferChoice&) = default;
+};
+
+struct FrameRequest {
+  std::string dataset;  // a name of the catalogue, 1 ... kMaxNameBytes
+  RendererKind renderer = RendererKind::kSplat;
+  ImageSize size;
+  ViewParameters view;
+  TransferChoice transfer;
+  Shading shading;
+  double termination = kDefaultTermination;  // [0, 0.5]: transmittance below which what lies behind is skipped; 0: never
+  Policy policy;
+  bool previews = false;                     // a picture after each group
+  friend bool operator==(const FrameRequest&, const FrameRequest&) = default;
+};
+
+// InvalidArgument naming field, value and limit.
+Status Validate(const FrameRequest& request);
+
+}  // namespace slabstream

@@ -1,0 +1,52 @@
+// What a worker measured while it rendered and combined one rank of one group. Reports travel with the partial images, so that the display
+// worker has all of them when the frame is complete, without another message that could be lost.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+namespace slabstream {
+
+enum class Stage : std::uint8_t {
+  kFetch = 0,      // waiting for voxels (from the first chunk request to the last chunk stored)
+  kPrepare = 1,    // classification, normals, occupied runs: once per slab and transfer function
+  kTransform = 2,
+  kShade = 3,
+  kSplat = 4,
+  kComposite = 5,  // sheets into the local image
+  kZBuffer = 6,
+  kCombine = 7,    // local images of ranks into the group image
+  kEncode = 8,     // images into runs and payload bytes
+  kResolve = 9,    // supersampled frame to final pixels
+  kRender = 10,    // one rank from start to end: contains kPrepare ... kZBuffer
+};
+inline constexpr int kStageCount = 11;
+std::string_view ToString(Stage stage);  // "transform": names of --stats and --trace
+
+using StageTimes = std::array<std::int64_t, kStageCount>;  // ns, worker time by stage
+
+// One stretch of time on one thread of a worker. On the clock of MonotonicNow().
+struct Span {
+  Stage stage = Stage::kRender;
+  std::int64_t begin_ns = 0, end_ns = 0;
+  friend bool operator==(const Span&, const Span&) = default;
+};
+
+struct RankReport {
+  std::uint32_t worker = 0;
+  std::uint32_t group = 0;
+  std::uint32_t rank = 0;
+  std::uint32_t box = 0;
+  StageTimes stage_ns{};
+  std::vector<Span> spans;                   // at most kMaxSpans
+  std::uint64_t occupied_voxels = 0;         // in the box, under this transfer function
+  std::uint64_t drawn_voxels = 0;            // that went through splat or Z-buffer
+  std::uint64_t voxel_bytes = 0;             // received for this group since the last report (0: all was cached)
+  std::uint64_t image_bytes = 0;             // payload sent to other workers
+  friend bool operator==(const RankReport&, const RankReport&) = default;
+};
+inline constexpr int kMaxSpans = 64;
+
+}  // namespace slabstream

@@ -1,0 +1,93 @@
+// ROUTER and DEALER sockets that move frames of bytes. cppzmq and its exceptions stay inside socket.cpp.
+//
+//   1. One Context a process (inproc endpoints meet within one context).
+//   2. Socket::Router / Socket::Dealer, then Bind or Connect.
+//   3. A loop: Wait(sockets, wakeup, timeout), then TryReceive until empty, then Send.
+// A socket belongs to the thread that uses it; it may be made in one thread and handed to another before its first use. Context and Wakeup are thread-safe.
+// No call blocks but Wait. Routers are MANDATORY: sending to an identity that is not connected fails with Unavailable.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/base/bytes.h"
+#include "common/base/status.h"
+#include "common/base/time.h"
+
+namespace slabstream {
+
+class Context {
+ public:
+  Context();
+  ~Context();  // all sockets must be gone
+  Context(const Context&) = delete;
+  Context& operator=(const Context&) = delete;
+  struct Impl;
+  Impl& impl() const { return *impl_; }
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+struct Incoming {
+  std::string identity;      // routers: who sent it
+  std::vector<Bytes> parts;  // 1 or 2: header, payload; the bytes are the message's own memory, not a copy
+};
+
+struct SocketOptions {
+  int send_high_water_mark = 4096;     // messages; a backstop, credits bound the bytes
+  int receive_high_water_mark = 4096;
+  Duration linger = std::chrono::milliseconds(500);  // how long unsent messages outlive the socket
+  std::int64_t max_message_bytes = std::int64_t{2} << 30;  // a larger frame closes the connection
+};
+
+class Socket {
+ public:
+  static Result<Socket> Router(Context& context, const SocketOptions& options = {});
+  static Result<Socket> Dealer(Context& context, const SocketOptions& options = {});
+  Socket(Socket&&) noexcept;
+  Socket& operator=(Socket&&) noexcept;
+  ~Socket();
+
+  // The endpoint with the port that was chosen. Unavailable (in use, no permission) names the endpoint.
+  Result<std::string> Bind(const std::string& endpoint);
+  Status Connect(const std::string& endpoint);
+
+  // Sends header and, if not empty, payload as one message, without copying the payload. `identity` is ignored by dealers.
+  // Unavailable: nobody with this identity (router); ResourceExhausted: the high-water mark is reached.
+  Status Send(const std::string& identity, std::vector<std::byte> header, const Bytes& payload = {});
+
+  // The next whole message, if there is one. Messages with no part or more than two parts are dropped.
+  std::optional<Incoming> TryReceive();
+
+  struct Impl;
+  Impl& impl() const { return *impl_; }
+
+ private:
+  explicit Socket(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+// Lets other threads end a Wait early. Any thread may Notify; the waiting thread's Wait consumes all notifications.
+class Wakeup {
+ public:
+  Wakeup();
+  ~Wakeup();
+  Wakeup(const Wakeup&) = delete;
+  Wakeup& operator=(const Wakeup&) = delete;
+  void Notify();
+  int file_descriptor() const { return file_descriptor_; }
+  void Drain();
+
+ private:
+  int file_descriptor_ = -1;  // an eventfd
+};
+
+// Returns when a socket may have a message, the wakeup was notified, or the timeout is over (zero: at once).
+void Wait(std::span<Socket* const> sockets, Wakeup* wakeup, Duration timeout);
+
+}  // namespace slabstream

@@ -1,0 +1,87 @@
+// From what a user asks for (ViewParameters) to how the renderers project (Camera).
+//
+// Physical space: data-space voxel coordinates times spacing, the origin moved to the volume's centre. Bounding sphere: centre 0, radius R = half
+// the diagonal of size * spacing. At zoom 1 the sphere touches the shorter side of the picture. Azimuth 0, elevation 0 looks along +y, +x to
+// the right, +z up; azimuth turns the eye about +z, counter-clockwise seen from +z; elevation lifts it towards +z; roll turns
+// the picture clockwise (the camera counter-clockwise). Perspective: the eye stands at R / sin(fov / 2), so that the sphere fits the cone of `fov`
+// exactly at zoom 1; zoom magnifies the picture and leaves the eye where it is.
+//
+// Image space: x to the right and y downwards in pixels, origin at the upper left corner, so pixel (column, row) has its centre at
+// (column + 0.5, row + 0.5). Depth: distance from the eye plane along the view direction in physical units; for an orthographic camera the
+// eye plane is 2 R before the centre. Depth is positive for everything in the volume.
+//
+// Supersampling: where more than kMaxVoxelsPerPixel voxels would fall on one pixel's width, everything is rendered on a grid `supersample`
+// (a power of two) times finer in x and y, and box-filtered at the end, so that minified pictures do not alias and the halo that a
+// worker needs stays bounded. Camera and all pixel bounds are then in that finer grid.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "common/base/status.h"
+#include "common/volume/volume.h"
+
+namespace slabstream {
+
+enum class Projection : std::uint8_t { kOrthographic = 1, kPerspective = 2 };
+
+inline constexpr double kMaxVoxelsPerPixel = 2;
+inline constexpr double kMinZoom = 1e-3, kMaxZoom = 1e4;
+inline constexpr double kMinFovDegrees = 1, kMaxFovDegrees = 60;
+inline constexpr double kMaxAngleDegrees = 1e6;      // of azimuth, elevation and roll, either sign
+inline constexpr int kMaxImageSide = 16384;          // pixels
+inline constexpr int kMaxSupersample = 1024;
+
+struct ImageSize {
+  int width = 512, height = 512;  // pixels, [1, kMaxImageSide]
+  friend bool operator==(const ImageSize&, const ImageSize&) = default;
+};
+
+struct ViewParameters {
+  Projection projection = Projection::kOrthographic;
+  double azimuth_degrees = 0, elevation_degrees = 0, roll_degrees = 0;
+  double zoom = 1;
+  double fov_degrees = 30;  // perspective only
+  friend bool operator==(const ViewParameters&, const ViewParameters&) = default;
+};
+
+// InvalidArgument naming field, value and limits; NaN is never valid.
+Status Validate(const ViewParameters& view);
+Status Validate(const ImageSize& size);
+
+// Everything about one view of one volume, in double precision. p is a data-space point.
+//   w = Dot(w_row, (p, 1)); x = Dot(x_row, (p, 1)) / w; y = Dot(y_row, (p, 1)) / w; depth = Dot(depth_row, (p, 1))
+// Orthographic: w_row = (0, 0, 0, 1). Perspective: w_row = depth_row.
+struct Camera {
+  Projection projection = Projection::kOrthographic;
+  std::array<double, 4> x_row{}, y_row{}, w_row{}, depth_row{};
+  Vec3 eye;                // data space; orthographic: the point of the eye plane on the central ray
+  Vec3 view_direction;     // physical space, unit, away from the eye
+  Vec3 right, up;          // physical space, unit
+  Vec3 spacing;            // of the volume: physical = spacing * data
+  int width = 0, height = 0;  // pixels of the (supersampled) grid
+  int supersample = 1;        // power of two
+  // The traversal: slices perpendicular to `traversal_axis` (the data axis nearest to the view direction in physical space; ties go to the
+  // higher axis), from index 0 up if `ascending`, else from the last one down: nearest slice first.
+  Axis traversal_axis = Axis::kY;
+  bool ascending = true;
+
+  struct ImagePoint { double x, y, depth; };
+  ImagePoint Project(const Vec3& data_point) const;  // the point must lie before the eye (perspective)
+
+  // Ray of a point of the image: data-space origin (eye or eye-plane point) and direction, scaled so that depth grows by 1 per unit.
+  struct Ray { Vec3 origin, direction; };
+  Ray RayAt(double x, double y) const;
+
+  friend bool operator==(const Camera&, const Camera&) = default;
+};
+
+// `view` and `size` valid.
+Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry);
+
+// Smallest halo, in voxels, that lets a worker compute all its own samples exactly for this view (kernel reach on the
+// tilted slice plus one voxel for gradients), rounded up to a multiple of kHaloStep so that turning the view rarely asks for more.
+inline constexpr int kHaloStep = 8;
+int RequiredHalo(const Camera& camera, const VolumeGeometry& geometry);
+
+}  // namespace slabstream

@@ -1,0 +1,23 @@
+// How surfaces are lit: Phong (1975) with white lights at infinity, or not at all.
+#pragma once
+
+#include <vector>
+
+#include "common/base/status.h"
+#include "common/math/vec.h"
+
+namespace slabstream {
+
+inline constexpr int kMaxLights = 8;
+
+struct Shading {
+  bool phong = true;
+  std::vector<Vec3> lights;  // directions towards the lights in volume axes (physical), not zero; empty: a headlight
+  float ambient = 0.3F, diffuse = 0.6F, specular = 0.3F;  // [0, 1]
+  float shininess = 20;                                   // [1, 1000]
+  friend bool operator==(const Shading&, const Shading&) = default;
+};
+
+Status Validate(const Shading& shading);
+
+}  // namespace slabstream

@@ -1,0 +1,95 @@
+// What a volume is: geometry (dimensions, spacing), how stored samples map to data values, and the voxels of a box.
+//
+// Order: x fastest, then y, then z. A voxel's centre has integer data-space coordinates; the volume fills
+// [-0.5, size - 0.5) along each axis. Spacing is the distance of neighbouring centres, in the unit of the file (mm for scans).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/base/aligned_buffer.h"
+#include "common/volume/box.h"
+
+namespace slabstream {
+
+inline constexpr std::int32_t kMaxVolumeSide = 65535;  // voxels along an axis: in-slice positions fit 16 bits
+
+enum class ScalarType : std::uint8_t { kUint8 = 1, kUint16 = 2, kFloat32 = 3 };
+
+constexpr std::size_t BytesPerSample(ScalarType type) {
+  return type == ScalarType::kUint8 ? 1 : type == ScalarType::kUint16 ? 2 : 4;
+}
+
+struct VolumeGeometry {
+  Index3 size;                 // voxels, each in [1, kMaxVolumeSide]
+  Vec3 spacing = {1, 1, 1};    // > 0, finite
+
+  Box bounds() const { return {{0, 0, 0}, size}; }
+  friend bool operator==(const VolumeGeometry&, const VolumeGeometry&) = default;
+};
+
+// Data value = scale * stored sample + offset. Transfer functions, ranges and histograms are in data values.
+struct ValueMapping {
+  double scale = 1;
+  double offset = 0;
+
+  double FromStored(double stored) const { return scale * stored + offset; }
+  friend bool operator==(const ValueMapping&, const ValueMapping&) = default;
+};
+
+// Everything about a volume but its voxels.
+struct VolumeDescription {
+  VolumeGeometry geometry;
+  ScalarType type = ScalarType::kUint8;
+  ValueMapping mapping;
+
+  std::int64_t voxel_bytes() const { return geometry.bounds().voxel_count() * std::int64_t(BytesPerSample(type)); }
+  friend bool operator==(const VolumeDescription&, const VolumeDescription&) = default;
+};
+
+// The samples of one box, owned. Sample of voxel v: byte offset BytesPerSample(type) * (((v.z - b.z) * sy + (v.y - b.y)) * sx + v.x - b.x)
+// with b = box.begin and (sx, sy, sz) = box.size(). Immutable once shared between threads.
+struct VoxelBlock {
+  Box box;
+  ScalarType type = ScalarType::kUint8;
+  AlignedVector<std::byte> bytes;
+
+  // Sample offset (in samples) of a voxel inside `box`.
+  std::int64_t Offset(const Index3& v) const {
+    const Index3 s = box.size();
+    return (std::int64_t(v.z - box.begin.z) * s.y + (v.y - box.begin.y)) * s.x + (v.x - box.begin.x);
+  }
+  template <class T>
+  const T* samples() const {
+    return reinterpret_cast<const T*>(bytes.data());
+  }
+  template <class T>
+  T* samples() {
+    return reinterpret_cast<T*>(bytes.data());
+  }
+};
+
+// A block with zeroed samples.
+VoxelBlock MakeVoxelBlock(const Box& box, ScalarType type);
+
+// Calls `function` with a null pointer of the sample's C++ type: const std::uint8_t*, const std::uint16_t* or const float*.
+template <class Function>
+decltype(auto) VisitScalarType(ScalarType type, Function&& function) {
+  switch (type) {
+    case ScalarType::kUint8: return function(static_cast<const std::uint8_t*>(nullptr));
+    case ScalarType::kUint16: return function(static_cast<const std::uint16_t*>(nullptr));
+    case ScalarType::kFloat32: break;
+  }
+  return function(static_cast<const float*>(nullptr));
+}
+
+// A whole volume in memory: block.box is the geometry's bounds.
+struct Volume {
+  VolumeDescription description;
+  VoxelBlock block;
+};
+
+}  // namespace slabstream

@@ -1,0 +1,42 @@
+// Volume files to volumes, through ITK: NIfTI (.nii, .nii.gz), NRRD (.nrrd; .nhdr with a detached raw or gzip data file), MetaImage (.mhd, .mha), and a
+// directory of TIFF slices (one file a slice, in natural order of their names) or one multi-page TIFF.
+//
+// Samples are kept as uint8, uint16 or float32, without losing what was in the file: int8 and int16 are shifted into the unsigned type (ValueMapping.offset);
+// uint32, int32, uint64, int64 and float64 become uint16 if all their values are integers that fit after a shift, else float32 - and where float32 cannot hold a value
+// exactly the reader says so in a warning of the log. A rescale slope and intercept (NIfTI scl_slope, scl_inter) goes into ValueMapping.
+// Axes: x, y, z are the file's own index axes, first index fastest; direction cosines are read for `info` and do not turn the picture.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <string>
+
+#include "common/base/status.h"
+#include "common/volume/volume.h"
+
+namespace slabstream {
+
+struct VolumeFileInfo {
+  VolumeDescription description;
+  std::string file_type;              // sample type in the file, such as "int16"
+  std::string format;                 // "NIfTI", "NRRD", "MetaImage", "TIFF"
+  Vec3 origin;
+  std::array<Vec3, 3> directions;     // of the x, y and z axes (physical, ITK's LPS convention)
+};
+
+struct LoadedVolume {
+  VolumeFileInfo info;
+  std::shared_ptr<const Volume> volume;
+};
+
+// NotFound (no such file), InvalidArgument (not a volume, more than three dimensions, several components, a side above kMaxVolumeSide), DataLoss (truncated),
+// ResourceExhausted (does not fit the memory). Messages name the path.
+Result<LoadedVolume> ReadVolume(const std::string& path);
+
+// Whether ReadVolume would try this path, by its ending or, for directories, by the TIFF files in it.
+bool LooksLikeVolume(const std::string& path);
+
+// Writes NRRD (gzip) or MetaImage by the ending. InvalidArgument for other endings.
+Status WriteVolume(const Volume& volume, const std::string& path);
+
+}  // namespace slabstream

@@ -1,0 +1,139 @@
+// The client plane: coordinator (ROUTER) and clients (DEALER).
+//
+//   client                                  coordinator
+//   SubmitFrame -------------------------->            a request id that the client chose; sent again it changes nothing
+//               <--------------------------  FrameProgress          whenever something happens
+//               <--------------------------  FrameReply + payload   per group if previews were asked for; the last one ends the request
+//               <--------------------------  FrameFailed            ends the request
+//   CancelFrame -------------------------->            ends the request; answered by FrameFailed (cancelled)
+//   ClientPing  -------------------------->            every second while requests are open; silence of client_timeout frees them
+//               <--------------------------  ClientPong             which of them are still known
+//   StatusQuery -------------------------->  StatusReply
+//   ShutDown    -------------------------->  ShutDownReply          the service and its workers end
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/planning/frame_request.h"
+#include "common/wire/control_messages.h"
+#include "common/wire/ids.h"
+
+namespace slabstream {
+
+inline constexpr std::size_t kMaxOpenRequests = 256;  // of one client
+
+struct SubmitFrame {
+  RequestId request = 0;
+  std::uint32_t deadline_ms = 600000;  // [1, 86400000], from arrival at the coordinator
+  FrameRequest frame;
+  friend bool operator==(const SubmitFrame&, const SubmitFrame&) = default;
+};
+
+enum class FramePhase : std::uint8_t { kQueued = 1, kLoading = 2, kRunning = 3 };
+
+struct FrameProgress {
+  RequestId request = 0;
+  FramePhase phase = FramePhase::kQueued;
+  std::uint32_t queue_position = 0;  // frames before this one, while queued
+  std::uint32_t groups_done = 0, group_count = 0;
+  std::uint32_t attempt = 0;         // above 1: workers were lost
+  std::uint32_t workers = 0;
+  friend bool operator==(const FrameProgress&, const FrameProgress&) = default;
+};
+
+// What the frame's plan was and what it cost; reports of all groups.
+struct FrameStatistics {
+  std::uint32_t workers = 0, groups = 0, attempts = 0;
+  std::string decomposition, axis, combine;   // axis: "x", "y" or "z"
+  std::int64_t queued_ns = 0;                 // arrival to plan
+  std::int64_t begin_ns = 0, end_ns = 0;      // plan to last byte at the coordinator, MonotonicNow() clock
+  std::vector<RankReport> reports;            // at most kMaxReports
+  friend bool operator==(const FrameStatistics&, const FrameStatistics&) = default;
+};
+
+struct FrameReply {  // payload: the runs
+  RequestId request = 0;
+  ImageSize size;                          // of the whole picture
+  std::uint32_t groups_done = 0, group_count = 1;  // equal: final
+  EncodedRuns runs;
+  FrameStatistics statistics;              // final only
+  friend bool operator==(const FrameReply&, const FrameReply&) = default;
+};
+
+struct FrameFailed {
+  RequestId request = 0;
+  Status status;  // not ok
+  friend bool operator==(const FrameFailed&, const FrameFailed&) = default;
+};
+
+struct CancelFrame {
+  RequestId request = 0;
+  friend bool operator==(const CancelFrame&, const CancelFrame&) = default;
+};
+
+struct ClientPing {
+  std::uint64_t nonce = 0;
+  std::vector<RequestId> open;  // at most kMaxOpenRequests
+  friend bool operator==(const ClientPing&, const ClientPing&) = default;
+};
+
+struct ClientPong {
+  Epoch epoch = 0;
+  std::uint64_t nonce = 0;      // echoed
+  std::vector<RequestId> known; // of those asked about: queued, running, or with a reply kept
+  friend bool operator==(const ClientPong&, const ClientPong&) = default;
+};
+
+struct StatusQuery {
+  std::uint64_t nonce = 0;
+  friend bool operator==(const StatusQuery&, const StatusQuery&) = default;
+};
+
+struct WorkerStatus {
+  WorkerId worker = 0;
+  std::uint32_t pid = 0;
+  std::string host;
+  std::uint32_t threads = 1;
+  std::uint32_t slot = 0;
+  std::uint64_t cached_bytes = 0, fetched_bytes = 0;
+  std::uint32_t rendered_ranks = 0;
+  std::uint32_t silent_ms = 0;  // since it was last heard
+  friend bool operator==(const WorkerStatus&, const WorkerStatus&) = default;
+};
+
+enum class DatasetState : std::uint8_t { kUnloaded = 1, kLoading = 2, kReady = 3, kFailed = 4 };
+
+struct DatasetStatus {
+  std::string name;
+  DatasetState state = DatasetState::kUnloaded;
+  VolumeDescription description;  // kReady only
+  ValueRange range;               // kReady only
+  std::string error;              // kFailed only
+  friend bool operator==(const DatasetStatus&, const DatasetStatus&) = default;
+};
+
+struct StatusReply {
+  Epoch epoch = 0;
+  std::uint64_t nonce = 0;
+  std::uint32_t pid = 0;
+  std::uint64_t uptime_ms = 0;
+  std::uint32_t clients = 0, queued = 0, running = 0;
+  std::uint64_t frames_done = 0, frames_failed = 0, workers_lost = 0;
+  std::vector<WorkerStatus> workers;
+  std::vector<DatasetStatus> datasets;
+  friend bool operator==(const StatusReply&, const StatusReply&) = default;
+};
+
+struct ShutDown {
+  std::uint64_t nonce = 0;
+  friend bool operator==(const ShutDown&, const ShutDown&) = default;
+};
+
+struct ShutDownReply {
+  std::uint64_t nonce = 0;
+  friend bool operator==(const ShutDownReply&, const ShutDownReply&) = default;
+};
+
+}  // namespace slabstream

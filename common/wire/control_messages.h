@@ -1,0 +1,148 @@
+// The control plane: coordinator (ROUTER) and workers (DEALER).
+//
+//   worker                               coordinator
+//   Register  ------------------------>            every second until Welcome (or Refused)
+//             <------------------------  Welcome
+//   Heartbeat ------------------------>            every heartbeat interval; Ping answers (also sent unasked)
+//             <------------------------  Ping
+//             <------------------------  GroupAssignment       one message has all that a group needs: order of arrival does not matter
+//   GroupDone ------------------------>            display worker only; opens the window for the next group
+//   FrameImage + payload ------------->            display worker only; a preview or the finished frame
+//   WorkerTrouble -------------------->            something failed for this group
+//   Leave     ------------------------>            a worker goes in an orderly way
+//             <------------------------  Retire    you are not (or no longer) known: register again
+//             <------------------------  Stop      end the process
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/base/status.h"
+#include "common/image/run_image.h"
+#include "common/planning/frame_plan.h"
+#include "common/stats/report.h"
+#include "common/wire/ids.h"
+
+namespace slabstream {
+
+inline constexpr std::size_t kMaxEndpointBytes = 512;
+inline constexpr std::size_t kMaxTextBytes = 4096;
+
+struct Register {
+  Incarnation incarnation = 0;
+  std::uint32_t pid = 0;
+  std::string host;             // at most kMaxNameBytes
+  std::string images_endpoint;  // where other workers reach this one's image plane
+  std::uint32_t threads = 1;    // render threads, [1, 1024]
+  std::uint64_t memory_bytes = 0;  // budget for cached slabs; 0: none stated
+  friend bool operator==(const Register&, const Register&) = default;
+};
+
+struct Welcome {
+  Epoch epoch = 0;
+  Incarnation incarnation = 0;   // echoed
+  WorkerId worker = 0;
+  std::string slabs_endpoint;
+  std::uint32_t heartbeat_ms = 500;  // [10, 60000]
+  std::uint32_t timeout_ms = 6000;   // silence after which the other side is taken for dead, [100, 600000]
+  friend bool operator==(const Welcome&, const Welcome&) = default;
+};
+
+struct Heartbeat {
+  Epoch epoch = 0;
+  Incarnation incarnation = 0;
+  WorkerId worker = 0;
+  std::uint64_t cached_bytes = 0;   // voxels and what was made from them
+  std::uint64_t fetched_bytes = 0;  // voxels received since the process began
+  std::uint32_t rendered_ranks = 0; // since the process began: progress, even while a long group runs
+  friend bool operator==(const Heartbeat&, const Heartbeat&) = default;
+};
+
+struct Ping {
+  Epoch epoch = 0;
+  FrameId finished_before = 0;         // all frames with a smaller id are over: forget them
+  std::vector<FrameId> cancelled;      // over too, though their id is not smaller; at most kMaxCancelled
+  friend bool operator==(const Ping&, const Ping&) = default;
+};
+inline constexpr std::size_t kMaxCancelled = 1024;
+
+struct Peer {
+  WorkerId worker = 0;
+  std::string images_endpoint;
+  friend bool operator==(const Peer&, const Peer&) = default;
+};
+
+struct GroupAssignment {
+  Epoch epoch = 0;
+  GroupKey key;
+  FrameId finished_before = 0;
+  std::uint32_t group_count = 1;       // [1, kMaxGroups]
+  std::uint32_t first_group = 0;       // of this attempt: earlier groups are already accumulated by `display`
+  bool previews = false;
+  WorkerId display = 0;
+  FrameSetup setup;
+  GroupPlan group;
+  std::vector<Peer> peers;             // every worker of the group, and the display worker
+  friend bool operator==(const GroupAssignment&, const GroupAssignment&) = default;
+};
+
+struct GroupDone {
+  Epoch epoch = 0;
+  WorkerId worker = 0;
+  GroupKey key;
+  std::vector<RankReport> reports;  // of every rank of this group
+  friend bool operator==(const GroupDone&, const GroupDone&) = default;
+};
+
+// How a payload is packed. kZstd: bytes of each 32-bit word grouped by significance (all first bytes, then all second, ...), then zstd.
+enum class Codec : std::uint8_t { kRaw = 1, kZstd = 2 };
+
+struct EncodedRuns {
+  RunImageHeader image;
+  Codec codec = Codec::kRaw;
+  std::uint64_t encoded_bytes = 0;  // length of the payload frame
+  std::uint64_t digest = 0;         // XXH3-64 of the payload frame
+  friend bool operator==(const EncodedRuns&, const EncodedRuns&) = default;
+};
+
+// Final pixels (supersampling resolved), premultiplied; payload: the runs.
+struct FrameImage {
+  Epoch epoch = 0;
+  WorkerId worker = 0;
+  FrameId frame = 0;
+  std::uint32_t attempt = 0;
+  std::uint32_t groups_done = 0, group_count = 1;  // equal: the finished frame
+  EncodedRuns runs;
+  std::vector<RankReport> reports;  // resolve and encode times of the display worker; at most kMaxReports
+  friend bool operator==(const FrameImage&, const FrameImage&) = default;
+};
+
+struct WorkerTrouble {
+  Epoch epoch = 0;
+  WorkerId worker = 0;
+  GroupKey key;
+  WorkerId unreachable = 0;  // a peer that does not answer, or 0
+  Status status;             // not ok
+  friend bool operator==(const WorkerTrouble&, const WorkerTrouble&) = default;
+};
+
+struct Leave {
+  Epoch epoch = 0;
+  WorkerId worker = 0;
+  friend bool operator==(const Leave&, const Leave&) = default;
+};
+
+struct Retire {
+  Epoch epoch = 0;
+  friend bool operator==(const Retire&, const Retire&) = default;
+};
+
+struct Stop {
+  Epoch epoch = 0;
+  friend bool operator==(const Stop&, const Stop&) = default;
+};
+
+inline constexpr std::size_t kMaxReports = 65536;
+
+}  // namespace slabstream

@@ -1,0 +1,25 @@
+// Identities that appear in many messages.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "common/planning/frame_plan.h"
+
+namespace slabstream {
+
+using Epoch = std::uint64_t;         // random; one coordinator incarnation
+using Incarnation = std::uint64_t;   // random; one worker process' life
+using RequestId = std::uint64_t;     // chosen by the client, unique within its connection
+using FrameId = std::uint64_t;       // ascending within an epoch
+
+// One group of one attempt at a frame. A re-plan raises `attempt`; messages of an older attempt are dropped.
+struct GroupKey {
+  FrameId frame = 0;
+  std::uint32_t attempt = 0;
+  std::uint32_t group = 0;
+  friend bool operator==(const GroupKey&, const GroupKey&) = default;
+  friend auto operator<=>(const GroupKey&, const GroupKey&) = default;
+};
+
+}  // namespace slabstream

@@ -1,0 +1,54 @@
+// The contract of a rendering pipeline, and the data that it renders from.
+//
+// A pipeline turns the voxels of a box (with their halo) into the box's local image: the samples that the box owns, for a frame's camera, transfer
+// function and shading. It must give the same samples however the volume is divided (docs/rendering.md): nothing that it computes may depend on
+// where the box begins or ends, but for which samples it owns.
+#pragma once
+
+#include <atomic>
+#include <memory>
+
+#include "common/base/status.h"
+#include "common/image/local_image.h"
+#include "common/planning/frame_plan.h"
+#include "common/stats/report.h"
+#include "common/volume/volume.h"
+
+namespace slabstream {
+
+// The voxels of one slab with its halo, and what pipelines made from them: classification, normals, occupied runs by traversal axis. What was made is kept as
+// long as it fits the transfer function at hand. Used by one thread at a time.
+class SlabData {
+ public:
+  explicit SlabData(VoxelBlock voxels);
+  ~SlabData();
+  SlabData(const SlabData&) = delete;
+  SlabData& operator=(const SlabData&) = delete;
+
+  const VoxelBlock& voxels() const { return voxels_; }
+
+  // Memory of voxels and everything derived.
+  std::size_t bytes() const;
+
+  struct Derived;  // worker/render/derived.h
+  Derived& derived() { return *derived_; }
+
+ private:
+  VoxelBlock voxels_;
+  std::unique_ptr<Derived> derived_;
+};
+
+class Renderer {
+ public:
+  virtual ~Renderer() = default;
+
+  // Local image of `box`, whose voxels and halo (SlabBox) lie in `slab`. Adds stage times, spans and counts to `report`. If `cancelled` becomes true
+  // it stops soon and returns Cancelled.
+  virtual Result<LocalImage> Render(SlabData& slab, const Box& box, const FrameSetup& setup, const std::atomic<bool>& cancelled,
+                                    RankReport& report) = 0;
+};
+
+// pipelines.cpp, the only list.
+std::unique_ptr<Renderer> MakeRenderer(RendererKind kind);
+
+}  // namespace slabstream

@@ -1,0 +1,37 @@
+// WorkerService: runs a WorkerMachine over ZeroMQ.
+//
+// Threads: one owns all sockets and runs the machine; one renders; one combines, encodes and unpacks chunks. So rendering of one group goes on beside the
+// combining of another, and heartbeats are on time whatever is computed.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "common/base/status.h"
+#include "common/transport/socket.h"
+#include "worker/worker_machine.h"
+
+namespace slabstream {
+
+struct WorkerOptions {
+  std::string coordinator_endpoint;  // its worker endpoint
+  std::string images_endpoint;       // bound; empty: any port of the coordinator's scheme (tcp), a path of its own (ipc), a name (inproc)
+  WorkerConfig machine;              // incarnation, pid, host, images_endpoint are filled in by Start
+};
+
+class WorkerService {
+ public:
+  static Result<std::unique_ptr<WorkerService>> Start(Context& context, WorkerOptions options);
+  ~WorkerService();  // stops and joins
+
+  void RequestStop();
+  void WaitUntilStopped();
+  bool stopped() const;
+
+ private:
+  struct Impl;
+  explicit WorkerService(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace slabstream
