@@ -79,6 +79,14 @@ struct Camera {
 // `view` and `size` valid.
 Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry);
 
+// The footprint of a voxel, as far as the halo depends on it (docs/rendering.md defines it): an axis-aligned Gaussian in image space whose variance is
+// the projected variance of the voxel plus that of the pixel, cut off. Under perspective its shape is taken once for each cell of
+// kFootprintCell x kFootprintCell voxels of a slice (at global multiples), at the centre of the part of the cell that lies in the volume.
+inline constexpr double kFootprintVoxelVariance = 0.36;  // voxels^2, along each data axis
+inline constexpr double kFootprintPixelVariance = 0.2;   // pixels^2
+inline constexpr double kFootprintCut = 3;               // standard deviations
+inline constexpr int kFootprintCell = 32;                // voxels
+
 // Smallest halo, in voxels, that lets a worker compute all its own samples exactly for this view (kernel reach on the
 // tilted slice plus one voxel for gradients), rounded up to a multiple of kHaloStep so that turning the view rarely asks for more.
 inline constexpr int kHaloStep = 8;
