@@ -1,0 +1,57 @@
+// RunPayload: reads the payload of a run image whose header fits it (run_image.h has the layout). Payload bytes arrive in message buffers
+// of any alignment, so everything is copied out, never pointed into.
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+
+#include "common/image/run_image.h"
+
+namespace slabstream {
+
+static_assert(std::endian::native == std::endian::little, "payloads are little endian and are copied as they are");
+
+struct Run {
+  std::uint32_t row = 0, column = 0;  // from the upper left corner of the bounds
+  std::uint32_t pixel_count = 0;
+};
+static_assert(sizeof(Run) == 12);
+
+inline constexpr std::size_t kRgbaBytes = 4 * sizeof(float);  // a pixel
+
+class RunPayload {
+ public:
+  // payload.size() is PayloadBytes(header).
+  RunPayload(const RunImageHeader& header, std::span<const std::byte> payload)
+      : runs_(payload.data()),
+        rgba_(runs_ + sizeof(Run) * header.run_count),
+        depth_(rgba_ + kRgbaBytes * header.pixel_count),
+        voxel_(depth_ + sizeof(float) * header.pixel_count) {}
+
+  Run ReadRun(std::size_t index) const {
+    Run run;
+    std::memcpy(&run, runs_ + sizeof(Run) * index, sizeof(Run));
+    return run;
+  }
+  // Pixels [first, first + count) of all runs.
+  void ReadRgba(std::size_t first, std::size_t count, float* out) const {
+    std::memcpy(out, rgba_ + kRgbaBytes * first, kRgbaBytes * count);
+  }
+  void ReadDepth(std::size_t first, std::size_t count, float* out) const {
+    std::memcpy(out, depth_ + sizeof(float) * first, sizeof(float) * count);
+  }
+  void ReadVoxel(std::size_t first, std::size_t count, std::uint32_t* out) const {
+    std::memcpy(out, voxel_ + sizeof(std::uint32_t) * first, sizeof(std::uint32_t) * count);
+  }
+
+ private:
+  const std::byte* runs_;
+  const std::byte* rgba_;
+  const std::byte* depth_;  // kDepth only
+  const std::byte* voxel_;  // kDepth only
+};
+
+}  // namespace slabstream

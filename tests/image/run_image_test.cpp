@@ -1,0 +1,201 @@
+#include "common/image/run_image.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <limits>
+
+#include "tests/support/random_image.h"
+
+namespace slabstream {
+namespace {
+
+constexpr PixelBounds kFrame = {0, 0, 23, 17};
+constexpr PixelRange kWhole = {0, 23 * 17};
+constexpr PixelFormat kFormats[] = {PixelFormat::kRgba, PixelFormat::kDepth};
+
+std::uint64_t LinearIndex(std::int32_t x, std::int32_t y) { return std::uint64_t(y) * std::uint64_t(kFrame.width()) + std::uint64_t(x); }
+
+// Compares a pixel of two images; outside its bounds an image is empty.
+void ExpectSamePixel(const LocalImage& a, const LocalImage& b, std::int32_t x, std::int32_t y) {
+  struct Pixel {
+    float rgba[4] = {0, 0, 0, 0};
+    float depth = std::numeric_limits<float>::infinity();
+    std::uint32_t voxel = 0;
+  };
+  const auto read = [&](const LocalImage& image) {
+    Pixel pixel;
+    if (!image.bounds.Contains(PixelBounds{x, y, x + 1, y + 1})) return pixel;
+    const auto i = std::size_t(y - image.bounds.y_begin) * std::size_t(image.bounds.width()) + std::size_t(x - image.bounds.x_begin);
+    std::memcpy(pixel.rgba, &image.rgba[4 * i], sizeof(pixel.rgba));
+    if (image.format == PixelFormat::kDepth) pixel.depth = image.depth[i], pixel.voxel = image.voxel[i];
+    return pixel;
+  };
+  const Pixel p = read(a), q = read(b);
+  EXPECT_EQ(std::memcmp(&p, &q, sizeof(p)), 0) << "at " << x << ", " << y;
+}
+
+TEST(RunImage, EncodesExactlyThePixelsOfTheRange) {
+  Random random(31);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 400; ++i) {
+    const PixelFormat format = kFormats[i % 2];
+    const LocalImage image = RandomImage(random, format, RandomBounds(random, kFrame));
+    const std::uint64_t begin = random.Integer<std::uint64_t>(0, kWhole.end), end = random.Integer<std::uint64_t>(begin, kWhole.end);
+    const PixelRange range = i % 4 < 2 ? kWhole : PixelRange{begin, end};
+    const RunImage runs = EncodeRuns(image, range, kFrame.width());
+    ASSERT_EQ(ValidateRuns(runs.header, runs.payload, kFrame), Status::Ok());
+    const LocalImage decoded = DecodeRuns(runs.header, runs.payload);
+    const LocalImage nothing = MakeLocalImage(format, {});
+    for (std::int32_t y = 0; y < kFrame.height(); ++y) {
+      for (std::int32_t x = 0; x < kFrame.width(); ++x) {
+        const bool inside = LinearIndex(x, y) >= range.begin && LinearIndex(x, y) < range.end;
+        ExpectSamePixel(decoded, inside ? image : nothing, x, y);
+      }
+    }
+  }
+}
+
+TEST(RunImage, LeavesEmptyPixelsAndRowsOut) {
+  LocalImage image = MakeLocalImage(PixelFormat::kRgba, {2, 3, 12, 9});
+  image.rgba[4 * (2 * 10 + 4) + 3] = 0.5F;  // (6, 5)
+  image.rgba[4 * (2 * 10 + 5) + 3] = 0.5F;  // (7, 5)
+  const RunImage runs = EncodeRuns(image, {LinearIndex(0, 4), LinearIndex(0, 7)}, kFrame.width());
+  EXPECT_EQ(runs.header.bounds, (PixelBounds{2, 4, 12, 7}));  // rows of the range
+  EXPECT_EQ(runs.header.run_count, 1U);
+  EXPECT_EQ(runs.header.pixel_count, 2U);
+  EXPECT_EQ(runs.payload.size(), 12U + 2 * 16U);
+  std::uint32_t run[3];
+  std::memcpy(run, runs.payload.data(), sizeof(run));
+  EXPECT_EQ(run[0], 1U);  // row
+  EXPECT_EQ(run[1], 4U);  // column
+  EXPECT_EQ(run[2], 2U);  // pixels
+}
+
+TEST(RunImage, NothingEncodesToNothing) {
+  for (PixelFormat format : kFormats) {
+    const RunImage empty = EncodeRuns(MakeLocalImage(format, {}), kWhole, kFrame.width());
+    EXPECT_EQ(empty.header, (RunImageHeader{format, {}, 0, 0}));
+    EXPECT_TRUE(empty.payload.empty());
+    EXPECT_TRUE(ValidateRuns(empty.header, empty.payload, kFrame).ok());
+    EXPECT_TRUE(DecodeRuns(empty.header, empty.payload).bounds.empty());
+    // The range lies above the image.
+    const RunImage outside = EncodeRuns(MakeLocalImage(format, {0, 8, 4, 12}), {0, LinearIndex(0, 8)}, kFrame.width());
+    EXPECT_EQ(outside.header, empty.header);
+  }
+}
+
+TEST(RunImage, RangeMayGoBeyondTheFrame) {
+  Random random(32);
+  SCOPED_TRACE(random.trace());
+  const LocalImage image = RandomImage(random, PixelFormat::kRgba, kFrame);
+  const RunImage all = EncodeRuns(image, {0, std::numeric_limits<std::uint64_t>::max()}, kFrame.width());
+  EXPECT_EQ(all.payload, EncodeRuns(image, kWhole, kFrame.width()).payload);
+}
+
+// ---- hostile input
+
+struct Corruption {
+  const char* what;
+  void (*apply)(RunImageHeader&, std::vector<std::byte>&);
+  const char* message;
+};
+
+void Poke(std::vector<std::byte>& payload, std::size_t offset, std::uint32_t value) {
+  std::memcpy(&payload[offset], &value, sizeof(value));
+}
+void PokeFloat(std::vector<std::byte>& payload, std::size_t offset, float value) { std::memcpy(&payload[offset], &value, sizeof(value)); }
+
+// Two runs of two pixels each: (row 0, columns 1 and 2), (row 0, columns 4 and 5), in bounds of 8 x 2.
+RunImage TwoRuns(PixelFormat format) {
+  LocalImage image = MakeLocalImage(format, {3, 4, 11, 6});
+  for (std::size_t x : {1, 2, 4, 5}) {
+    image.rgba[4 * x + 3] = 1;
+    if (format == PixelFormat::kDepth) image.depth[x] = 2;
+  }
+  return EncodeRuns(image, kWhole, kFrame.width());
+}
+
+constexpr std::int32_t kMin = std::numeric_limits<std::int32_t>::min(), kMax = std::numeric_limits<std::int32_t>::max();
+constexpr std::uint32_t kHuge = std::numeric_limits<std::uint32_t>::max();
+
+const Corruption kCorruptions[] = {
+    {"format", [](auto& h, auto&) { h.format = PixelFormat{7}; }, "format is 7"},
+    {"bounds leave the frame", [](auto& h, auto&) { h.bounds.x_end = 24; }, "do not lie in the frame"},
+    {"bounds begin before the frame", [](auto& h, auto&) { h.bounds.y_begin = -1; }, "do not lie in the frame"},
+    {"bounds of overflowing size",
+     [](auto& h, auto&) {
+       h.bounds = {kMin, kMin, kMax, kMax};
+     },
+     "do not lie in the frame"},
+    {"negative bounds",
+     [](auto& h, auto&) {
+       h.bounds = {kMax, kMax, kMin, kMin};
+     },
+     "do not lie in the frame"},
+    {"empty bounds with pixels", [](auto& h, auto&) { h.bounds = {}; }, "pixel_count"},
+    {"more pixels than bounds", [](auto& h, auto&) { h.pixel_count = 17; }, "pixel_count is 17"},
+    {"absurd pixel count", [](auto& h, auto&) { h.pixel_count = std::uint64_t{1} << 60; }, "pixel_count"},
+    {"more runs than pixels", [](auto& h, auto&) { h.run_count = kHuge; }, "run_count"},
+    {"truncated", [](auto&, auto& p) { p.pop_back(); }, "payload has"},
+    {"too long", [](auto&, auto& p) { p.emplace_back(); }, "payload has"},
+    {"empty payload", [](auto&, auto& p) { p.clear(); }, "payload has"},
+    {"empty run", [](auto&, auto& p) { Poke(p, 8, 0); }, "run 0"},
+    {"run of huge length", [](auto&, auto& p) { Poke(p, 8, kHuge); }, "run 0"},
+    {"run past the row's end", [](auto&, auto& p) { Poke(p, 16, 7); }, "run 1"},
+    {"run past the last row", [](auto&, auto& p) { Poke(p, 12, 2); }, "run 1"},
+    {"runs touch", [](auto&, auto& p) { Poke(p, 16, 3); }, "touches"},
+    {"runs overlap", [](auto&, auto& p) { Poke(p, 16, 2); }, "overlaps"},
+    {"runs descend", [](auto&, auto& p) { Poke(p, 0, 1); }, "precedes"},
+    {"runs hold fewer pixels", [](auto&, auto& p) { Poke(p, 20, 1); }, "runs hold 3 pixels"},
+    {"NaN colour", [](auto&, auto& p) { PokeFloat(p, 24 + 4, std::numeric_limits<float>::quiet_NaN()); }, "not finite"},
+    {"infinite alpha", [](auto&, auto& p) { PokeFloat(p, 24 + 16 * 3 + 12, std::numeric_limits<float>::infinity()); }, "not finite"},
+};
+
+TEST(ValidateRuns, RefusesWhatDoesNotFit) {
+  for (PixelFormat format : kFormats) {
+    for (const Corruption& corruption : kCorruptions) {
+      SCOPED_TRACE(corruption.what);
+      RunImage image = TwoRuns(format);
+      ASSERT_TRUE(ValidateRuns(image.header, image.payload, kFrame).ok());
+      corruption.apply(image.header, image.payload);
+      const Status status = ValidateRuns(image.header, image.payload, kFrame);
+      EXPECT_EQ(status.code(), StatusCode::kInvalidArgument);
+      EXPECT_NE(status.message().find(corruption.message), std::string::npos) << status.message();
+    }
+  }
+  RunImage image = TwoRuns(PixelFormat::kDepth);
+  PokeFloat(image.payload, 24 + 16 * 4 + 4, std::numeric_limits<float>::quiet_NaN());
+  EXPECT_NE(ValidateRuns(image.header, image.payload, kFrame).message().find("depth"), std::string::npos);
+}
+
+TEST(ValidateRuns, WhatItAcceptsCanBeDecoded) {
+  Random random(33);
+  SCOPED_TRACE(random.trace());
+  int accepted = 0;
+  for (int i = 0; i < 20000; ++i) {
+    RunImage image = TwoRuns(kFormats[i % 2]);
+    for (int flips = random.Integer(1, 3); flips > 0; --flips) {
+      auto& byte = image.payload[random.Integer<std::size_t>(0, image.payload.size() - 1)];
+      byte ^= std::byte(1 << random.Integer(0, 7));
+    }
+    if (random.Chance(0.3)) image.header.bounds.x_begin = random.Integer(-2, 25);
+    if (random.Chance(0.3)) image.header.bounds.y_end = random.Integer(-2, 25);
+    if (!ValidateRuns(image.header, image.payload, kFrame).ok()) continue;
+    ++accepted;
+    EXPECT_EQ(DecodeRuns(image.header, image.payload).bounds, image.header.bounds);
+  }
+  EXPECT_GT(accepted, 100);  // most bits are those of pixels
+}
+
+TEST(ValidateRuns, ReadsPayloadsAtAnyAddress) {
+  const RunImage image = TwoRuns(PixelFormat::kDepth);
+  std::vector<std::byte> shifted(image.payload.size() + 1);
+  std::memcpy(shifted.data() + 1, image.payload.data(), image.payload.size());
+  const auto payload = std::span<const std::byte>(shifted).subspan(1);
+  ASSERT_TRUE(ValidateRuns(image.header, payload, kFrame).ok());
+  EXPECT_EQ(DecodeRuns(image.header, payload).rgba, DecodeRuns(image.header, image.payload).rgba);
+}
+
+}  // namespace
+}  // namespace slabstream

@@ -1,0 +1,128 @@
+#include "common/kernels/combine.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <vector>
+
+#include "tests/support/random_image.h"
+
+namespace slabstream {
+namespace {
+
+constexpr PixelBounds kFrame = {0, 0, 37, 13};
+constexpr PixelRange kWhole = {0, 37 * 13};
+
+template <class Vector>
+bool SameBits(const Vector& a, const Vector& b) {
+  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(a[0])) == 0);
+}
+
+void ExpectSameBits(const LocalImage& a, const LocalImage& b) {
+  EXPECT_EQ(a.bounds, b.bounds);
+  EXPECT_TRUE(SameBits(a.rgba, b.rgba));
+  EXPECT_TRUE(SameBits(a.depth, b.depth));
+  EXPECT_TRUE(SameBits(a.voxel, b.voxel));
+}
+
+LocalImage Combined(LocalImage image, const LocalImage& other, Side side) {
+  Combine(image, other, side);
+  return image;
+}
+
+// The same, with `other` as it travels, at an odd address.
+LocalImage CombinedRuns(LocalImage image, const LocalImage& other, Side side) {
+  const RunImage runs = EncodeRuns(other, kWhole, kFrame.width());
+  std::vector<std::byte> shifted(runs.payload.size() + 1);
+  std::copy(runs.payload.begin(), runs.payload.end(), shifted.begin() + 1);
+  CombineRuns(image, runs.header, std::span<const std::byte>(shifted).subspan(1), side);
+  return image;
+}
+
+class CombineFormats : public testing::TestWithParam<PixelFormat> {};
+INSTANTIATE_TEST_SUITE_P(All, CombineFormats, testing::Values(PixelFormat::kRgba, PixelFormat::kDepth),
+                         [](const auto& format) { return format.param == PixelFormat::kRgba ? "Rgba" : "Depth"; });
+
+TEST_P(CombineFormats, OrderOfOperandsDoesNotMatter) {
+  Random random(51);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 300; ++i) {
+    const LocalImage front = RandomImage(random, GetParam(), RandomBounds(random, kFrame));
+    const LocalImage back = RandomImage(random, GetParam(), RandomBounds(random, kFrame));
+    const LocalImage dense = Combined(front, back, Side::kBack);
+    ExpectSameBits(dense, Combined(back, front, Side::kFront));
+    EXPECT_EQ(dense.bounds, Union(front.bounds, back.bounds));
+  }
+}
+
+TEST_P(CombineFormats, RunsGiveTheBitsOfDenseImages) {
+  Random random(52);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 300; ++i) {
+    const LocalImage a = RandomImage(random, GetParam(), RandomBounds(random, kFrame));
+    const LocalImage b = RandomImage(random, GetParam(), RandomBounds(random, kFrame));
+    for (Side side : {Side::kFront, Side::kBack}) {
+      const LocalImage dense = Combined(a, b, side), runs = CombinedRuns(a, b, side);
+      if (runs.bounds != dense.bounds) {  // nothing but empty pixels: the runs leave the bounds as they are
+        EXPECT_EQ(EncodeRuns(b, kWhole, kFrame.width()).header.run_count, 0U);
+      } else {
+        ExpectSameBits(runs, dense);
+      }
+    }
+  }
+}
+
+TEST_P(CombineFormats, EmptyImagesAreNeutral) {
+  Random random(53);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 50; ++i) {
+    const LocalImage image = RandomImage(random, GetParam(), RandomBounds(random, kFrame));
+    const LocalImage transparent = MakeLocalImage(GetParam(), image.bounds), nothing = MakeLocalImage(GetParam(), {});
+    for (Side side : {Side::kFront, Side::kBack}) {
+      ExpectSameBits(Combined(image, transparent, side), image);
+      ExpectSameBits(Combined(transparent, image, side), image);
+      ExpectSameBits(Combined(image, nothing, side), image);
+      ExpectSameBits(Combined(nothing, image, side), image);
+    }
+  }
+}
+
+TEST_P(CombineFormats, IsAssociativeUpToRounding) {
+  Random random(54);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 100; ++i) {
+    const LocalImage a = RandomImage(random, GetParam(), kFrame), b = RandomImage(random, GetParam(), kFrame),
+                     c = RandomImage(random, GetParam(), kFrame);
+    const LocalImage left = Combined(Combined(a, b, Side::kBack), c, Side::kBack);
+    const LocalImage right = Combined(a, Combined(b, c, Side::kBack), Side::kBack);
+    if (GetParam() == PixelFormat::kDepth) {
+      ExpectSameBits(left, right);
+    } else {
+      for (std::size_t k = 0; k < left.rgba.size(); ++k)
+        ASSERT_NEAR(left.rgba[k], right.rgba[k], 3e-7F);  // a few roundings of numbers up to 1
+    }
+  }
+}
+
+TEST(Combine, OpaqueHidesAndOverDoesNotCommute) {
+  const auto one_pixel = [](float r, float alpha) {
+    LocalImage image = MakeLocalImage(PixelFormat::kRgba, {0, 0, 1, 1});
+    image.rgba = {r, 0, 0, alpha};
+    return image;
+  };
+  const LocalImage opaque = one_pixel(0.75F, 1), half = one_pixel(0.25F, 0.5F);
+  ExpectSameBits(Combined(opaque, half, Side::kBack), opaque);
+  EXPECT_EQ(Combined(half, opaque, Side::kBack).rgba, (AlignedVector<float>{0.625F, 0, 0, 1}));  // by hand: 0.25 + 0.5 * 0.75
+}
+
+TEST(Combine, DepthTiesGoToTheLowerVoxelAcrossTheWrap) {
+  EXPECT_TRUE(NearerDepth(1, 9, 2, 3));
+  EXPECT_TRUE(NearerDepth(1, 3, 1, 9));
+  EXPECT_FALSE(NearerDepth(1, 9, 1, 3));
+  EXPECT_TRUE(NearerDepth(1, 0xFFFFFFFFU, 1, 0));  // neighbours on both sides of 2^32
+  EXPECT_FALSE(NearerDepth(1, 0, 1, 0xFFFFFFFFU));
+  EXPECT_FALSE(NearerDepth(1, 7, 1, 7));
+}
+
+}  // namespace
+}  // namespace slabstream
