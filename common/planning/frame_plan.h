@@ -47,7 +47,7 @@ struct Placement {
 
 struct GroupPlan {
   std::vector<Placement> placements;  // by rank, nearest first; boxes that show nothing are left out, so it may be empty
-  Schedule schedule;                  // over these ranks
+  Schedule schedule;                  // over these ranks; ranks == 0 if there are none
   friend bool operator==(const GroupPlan&, const GroupPlan&) = default;
 };
 
@@ -63,7 +63,7 @@ struct FramePlan {
 };
 
 // Slot s of the roster owns the boxes i with i mod slots == s. A slot may be vacant (0) after a loss: its boxes are then lent to the others, round
-// robin, and everybody else keeps their own, so that only the lost voxels travel again.
+// robin, and everybody else keeps their own, so that only the lost voxels travel again. No worker holds two slots.
 struct Roster {
   std::vector<WorkerId> slots;
   friend bool operator==(const Roster&, const Roster&) = default;
@@ -78,13 +78,13 @@ struct CostModel {
   std::int64_t slab_bytes_target = std::int64_t{256} << 20;  // voxels of one slab at most, where slices allow it
 };
 
-// Pure. Errors: InvalidArgument (an unknown name, a preset that does not exist), Unavailable (no worker in the roster).
+// Pure. Errors: InvalidArgument (an unknown name of a decomposition or combining scheme), NotFound (no such preset), Unavailable (no worker in the roster).
 // The request must be valid (Validate). Boxes whose bricks show nothing under the transfer function get no placement.
 Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, const Roster& roster,
                             const CostModel& cost);
 
-// The same frame over another roster with the same number of slots: same setup, partition and groups; placements, schedules and display change.
-// `keep_display` is used again if it is still in the roster. Unavailable if nobody is.
+// The same frame over another roster with the same number of slots: same setup, partition and groups; workers of placements, schedules and display
+// change. The display worker is kept if it is still in the roster: it holds what was accumulated. Unavailable if nobody is.
 Result<FramePlan> Replan(const FramePlan& plan, const Roster& roster);
 
 // Owner of a box: its slot's worker, or the one it is lent to. 0 if the roster is empty of workers.

@@ -15,7 +15,7 @@ namespace slabstream {
 enum class RendererKind : std::uint8_t { kSplat = 1, kZBuffer = 2 };
 
 inline constexpr int kMaxGroups = 1024;
-inline constexpr double kDefaultTermination = 1.0 / 1024;
+inline constexpr double kDefaultTermination = 1.0 / 1024, kMaxTermination = 0.5;
 inline constexpr std::size_t kMaxNameBytes = 256;
 
 enum class AxisChoice : std::uint8_t { kX = 0, kY = 1, kZ = 2, kAuto = 3 };
@@ -42,7 +42,7 @@ struct FrameRequest {
   ViewParameters view;
   TransferChoice transfer;
   Shading shading;
-  double termination = kDefaultTermination;  // [0, 0.5]: transmittance below which what lies behind is skipped; 0: never
+  double termination = kDefaultTermination;  // [0, kMaxTermination]: transmittance below which what lies behind is skipped; 0: never
   Policy policy;
   bool previews = false;                     // a picture after each group
   friend bool operator==(const FrameRequest&, const FrameRequest&) = default;

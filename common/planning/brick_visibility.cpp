@@ -1,0 +1,47 @@
+#include "common/planning/brick_visibility.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace slabstream {
+
+BrickVisibility::BrickVisibility(const VolumeSummary& summary, const TransferFunction& transfer)
+    : summary_(summary), table_(Classify(transfer, summary.description, summary.range)), next_visible_(table_.opacity.size()) {
+  int next = table_.size();
+  for (int bin = table_.size() - 1; bin >= 0; --bin) {
+    if (table_.opacity[std::size_t(bin)] > 0) next = bin;
+    next_visible_[std::size_t(bin)] = next;
+  }
+}
+
+bool BrickVisibility::AnyVisible(const Box& box) const {
+  const auto brick_of = [](std::int32_t voxel) { return voxel / kSummaryBrick; };
+  for (std::int32_t z = brick_of(box.begin.z); z <= brick_of(box.end.z - 1); ++z) {
+    for (std::int32_t y = brick_of(box.begin.y); y <= brick_of(box.end.y - 1); ++y) {
+      const std::size_t row =
+          (std::size_t(z) * std::size_t(summary_.brick_counts.y) + std::size_t(y)) * std::size_t(summary_.brick_counts.x);
+      for (std::int32_t x = brick_of(box.begin.x); x <= brick_of(box.end.x - 1); ++x) {
+        if (Visible(summary_.bricks[row + std::size_t(x)])) return true;
+      }
+    }
+  }
+  return false;
+}
+
+bool BrickVisibility::Visible(const ValueRange& brick) const {
+  if (brick.min > brick.max) return false;
+  // The range was rounded to float; one more bin on both sides makes up for the way back to stored samples.
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  const int a = table_.BinOf(StoredFromData(double(std::nextafter(brick.min, -kInfinity))));
+  const int b = table_.BinOf(StoredFromData(double(std::nextafter(brick.max, kInfinity))));
+  const int low = std::max(std::min(a, b) - 1, 0), high = std::min(std::max(a, b) + 1, table_.size() - 1);
+  return next_visible_[std::size_t(low)] <= high;
+}
+
+double BrickVisibility::StoredFromData(double value) const {
+  const ValueMapping& mapping = summary_.description.mapping;
+  return mapping.scale == 0 ? 0 : (value - mapping.offset) / mapping.scale;  // a scale of 0: every sample has the same value
+}
+
+}  // namespace slabstream

@@ -1,0 +1,31 @@
+// BrickVisibility: can a box of voxels show anything under a transfer function? Answered from the summary's bricks, without voxels.
+//
+// The answer is exact but for rounding on the safe side: what is called empty holds no voxel whose bin in the renderers' classification
+// table has an opacity above zero.
+#pragma once
+
+#include <vector>
+
+#include "common/classification/classification_table.h"
+#include "common/volume/summary.h"
+
+namespace slabstream {
+
+class BrickVisibility {
+ public:
+  // `summary` must outlive this.
+  BrickVisibility(const VolumeSummary& summary, const TransferFunction& transfer);
+
+  // True if a brick that touches `box` (not empty, inside the volume) can be visible.
+  bool AnyVisible(const Box& box) const;
+
+ private:
+  bool Visible(const ValueRange& brick) const;
+  double StoredFromData(double value) const;
+
+  const VolumeSummary& summary_;
+  ClassificationTable table_;
+  std::vector<int> next_visible_;  // by bin: the lowest bin from it on with an opacity above zero; table_.size(): none
+};
+
+}  // namespace slabstream

@@ -1,0 +1,48 @@
+#include "common/planning/frame_request.h"
+
+#include <fmt/format.h>
+
+#include "common/view/range_status.h"
+
+namespace slabstream {
+namespace {
+
+Status ValidateName(std::string_view field, std::string_view name) {
+  if (!name.empty() && name.size() <= kMaxNameBytes) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("{} has {} bytes, but must have 1 to {}", field, name.size(), kMaxNameBytes));
+}
+
+Status Validate(const TransferChoice& transfer) {
+  if (const auto* preset = std::get_if<std::string>(&transfer.choice)) {
+    if (Status s = ValidateName("transfer.preset", *preset); !s.ok()) return s;
+  } else if (Status s = Validate(std::get<TransferFunction>(transfer.choice)); !s.ok()) {
+    return s;
+  }
+  if (transfer.opacity_distance > 0 && transfer.opacity_distance <= kMaxOpacityDistance) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("transfer.opacity_distance is {}, but must lie in (0, {}] voxel lengths",
+                                             transfer.opacity_distance, kMaxOpacityDistance));
+}
+
+Status Validate(const Policy& policy) {
+  if (Status s = ValidateName("policy.decomposition", policy.decomposition); !s.ok()) return s;
+  if (Status s = InRange("policy.axis", int(policy.axis), int(AxisChoice::kX), int(AxisChoice::kAuto)); !s.ok()) return s;
+  if (Status s = InRange("policy.groups", policy.groups, 0, kMaxGroups); !s.ok()) return s;
+  return ValidateName("policy.combine", policy.combine);
+}
+
+}  // namespace
+
+Status Validate(const FrameRequest& request) {
+  if (Status s = ValidateName("dataset", request.dataset); !s.ok()) return s;
+  if (request.renderer != RendererKind::kSplat && request.renderer != RendererKind::kZBuffer) {
+    return Status::InvalidArgument(fmt::format("renderer is {}, but must be 1 (splat) or 2 (zbuffer)", int(request.renderer)));
+  }
+  if (Status s = Validate(request.size); !s.ok()) return s;
+  if (Status s = Validate(request.view); !s.ok()) return s;
+  if (Status s = Validate(request.transfer); !s.ok()) return s;
+  if (Status s = Validate(request.shading); !s.ok()) return s;
+  if (Status s = InRange("termination", request.termination, 0, kMaxTermination); !s.ok()) return s;
+  return Validate(request.policy);
+}
+
+}  // namespace slabstream

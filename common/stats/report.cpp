@@ -1,0 +1,25 @@
+#include "common/stats/report.h"
+
+#include "common/base/check.h"
+
+namespace slabstream {
+
+std::string_view ToString(Stage stage) {
+  switch (stage) {
+    case Stage::kFetch: return "fetch";
+    case Stage::kPrepare: return "prepare";
+    case Stage::kTransform: return "transform";
+    case Stage::kShade: return "shade";
+    case Stage::kSplat: return "splat";
+    case Stage::kComposite: return "composite";
+    case Stage::kZBuffer: return "z_buffer";
+    case Stage::kCombine: return "combine";
+    case Stage::kEncode: return "encode";
+    case Stage::kResolve: return "resolve";
+    case Stage::kRender: return "render";
+  }
+  CHECK(false) << "no such stage: " << int(stage);
+  return "";
+}
+
+}  // namespace slabstream

@@ -1,0 +1,328 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <vector>
+
+#include "common/decomposition/decomposition.h"
+#include "common/planning/frame_plan.h"
+#include "tests/planning/support.h"
+#include "tests/support/random.h"
+
+namespace slabstream {
+namespace {
+
+FramePlan Plan(const FrameRequest& request, const VolumeSummary& summary, const Roster& roster) {
+  Result<FramePlan> plan = PlanFrame(request, 7, summary, roster, {});
+  EXPECT_TRUE(plan.ok()) << plan.status().message();
+  return *plan;
+}
+
+// What every plan must be, whatever it was made for.
+void ExpectSound(const FramePlan& plan, const Roster& roster) {
+  const std::vector<BoxId> order = VisibilityOrder(plan.partition, plan.setup.camera);
+  ASSERT_FALSE(plan.groups.empty());
+  EXPECT_EQ(plan.groups.size(), (order.size() + plan.slots - 1) / plan.slots);
+
+  // The placements of all groups are boxes in visibility order, each in the group where it belongs.
+  std::map<BoxId, std::size_t> position;
+  for (std::size_t i = 0; i < order.size(); ++i) position[order[i]] = i;
+  const PixelRange frame = {0, std::uint64_t(plan.setup.camera.width) * std::uint64_t(plan.setup.camera.height)};
+  for (std::size_t g = 0; g < plan.groups.size(); ++g) {
+    const GroupPlan& group = plan.groups[g];
+    for (std::size_t rank = 0; rank < group.placements.size(); ++rank) {
+      const Placement& placement = group.placements[rank];
+      EXPECT_EQ(placement.box, plan.partition.boxes()[placement.id]);
+      EXPECT_EQ(position[placement.id] / plan.slots, g);
+      if (rank > 0) {
+        EXPECT_LT(position[group.placements[rank - 1].id], position[placement.id]);
+      }
+      EXPECT_EQ(placement.worker, OwnerOf(placement.id, roster));
+      EXPECT_NE(placement.worker, 0U);
+    }
+    EXPECT_EQ(group.schedule.ranks, group.placements.size());
+    EXPECT_EQ(CheckSchedule(group.schedule, frame), Status::Ok());
+    // The display worker gets the group's image without another message if it has a rank.
+    const bool has_rank = std::any_of(group.placements.begin(), group.placements.end(), [&](auto& p) { return p.worker == plan.display; });
+    if (has_rank) {
+      EXPECT_EQ(group.placements[group.schedule.root].worker, plan.display);
+    }
+  }
+  EXPECT_NE(plan.display, 0U);
+  EXPECT_NE(std::find(roster.slots.begin(), roster.slots.end(), plan.display), roster.slots.end());
+}
+
+std::vector<BoxId> PlacedBoxes(const FramePlan& plan) {
+  std::vector<BoxId> boxes;
+  for (const GroupPlan& group : plan.groups) {
+    for (const Placement& placement : group.placements) boxes.push_back(placement.id);
+  }
+  return boxes;
+}
+
+TEST(PlanFrame, IsSoundForAnyWorkersGroupsAndSizes) {
+  for (const Index3& size : {Index3{1, 1, 1}, Index3{40, 40, 1}, Index3{33, 70, 20}, Index3{128, 64, 100}}) {
+    const VolumeSummary summary = FullSummary(size);
+    for (int workers : {1, 2, 3, 5, 8, 13, 64}) {
+      for (int groups : {0, 1, 2, 7, 40}) {
+        for (AxisChoice axis : {AxisChoice::kX, AxisChoice::kY, AxisChoice::kZ, AxisChoice::kAuto}) {
+          SCOPED_TRACE(testing::Message() << size.x << "x" << size.y << "x" << size.z << ", " << workers << " workers, " << groups
+                                          << " groups, axis " << int(axis));
+          FrameRequest request = SomeRequest();
+          request.policy.groups = groups;
+          request.policy.axis = axis;
+          request.view.azimuth_degrees = 200;
+          const Roster roster = FullRoster(workers);
+          const FramePlan plan = Plan(request, summary, roster);
+          ExpectSound(plan, roster);
+          EXPECT_EQ(PlacedBoxes(plan).size(), plan.partition.boxes().size());  // everything is visible
+          if (groups > 0 && groups * workers <= size[plan.slab_axis]) {
+            EXPECT_EQ(plan.groups.size(), std::size_t(groups));
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(PlanFrame, UsesEveryCombiningSchemeAndDecomposition) {
+  const VolumeSummary summary = FullSummary({40, 40, 40});
+  for (const CombiningEntry& scheme : CombiningSchemes()) {
+    for (const DecompositionEntry& decomposition : Decompositions()) {
+      FrameRequest request = SomeRequest();
+      request.policy.combine = scheme.name;
+      request.policy.decomposition = decomposition.name;
+      request.policy.groups = 2;
+      const Roster roster = FullRoster(5);
+      ExpectSound(Plan(request, summary, roster), roster);
+    }
+  }
+}
+
+TEST(PlanFrame, TurningTheViewReversesRanksButNeverOwnership) {
+  Random random(91);
+  SCOPED_TRACE(random.trace());
+  const VolumeSummary summary = FullSummary({40, 90, 50});
+  const Roster roster = FullRoster(4);
+  FrameRequest request = SomeRequest();
+  request.policy.groups = 3;
+  const FramePlan first = Plan(request, summary, roster);
+  for (int i = 0; i < 50; ++i) {
+    request.view = RandomView(random);
+    const FramePlan plan = Plan(request, summary, roster);
+    EXPECT_EQ(plan.partition, first.partition);
+    std::vector<BoxId> forward = PlacedBoxes(first), boxes = PlacedBoxes(plan);
+    if (plan.setup.camera.view_direction.y < 0 && request.view.projection == Projection::kOrthographic) {
+      std::reverse(forward.begin(), forward.end());
+      EXPECT_EQ(boxes, forward);
+    }
+    for (const GroupPlan& group : plan.groups) {
+      std::set<WorkerId> workers;
+      for (const Placement& placement : group.placements) {
+        EXPECT_EQ(placement.worker, roster.slots[placement.id % 4]);
+        workers.insert(placement.worker);
+      }
+      EXPECT_EQ(workers.size(), group.placements.size());  // nobody renders two slabs of a group
+    }
+  }
+}
+
+TEST(PlanFrame, AutomaticChoicesDoNotDependOnTheView) {
+  Random random(92);
+  SCOPED_TRACE(random.trace());
+  const VolumeSummary summary = FullSummary({100, 300, 300});
+  CostModel cost;
+  cost.slab_bytes_target = 1 << 20;
+  FrameRequest request = SomeRequest();
+  const Result<FramePlan> first = PlanFrame(request, 7, summary, FullRoster(2), cost);
+  ASSERT_TRUE(first.ok());
+  EXPECT_EQ(first->slab_axis, Axis::kZ);  // the longest side, the higher axis of two
+  EXPECT_GT(first->groups.size(), 1U);
+  for (int i = 0; i < 50; ++i) {
+    request.view = RandomView(random);
+    const Result<FramePlan> plan = PlanFrame(request, 7, summary, FullRoster(2), cost);
+    ASSERT_TRUE(plan.ok());
+    EXPECT_EQ(plan->partition, first->partition);
+  }
+}
+
+TEST(PlanFrame, ChoosesTheFewestGroupsWhoseSlabsStayUnderTheTarget) {
+  const VolumeSummary summary = FullSummary({64, 64, 1000});
+  const std::int64_t slice_bytes = 64 * 64;
+  const auto groups = [&](std::int64_t target_slices, int workers) {
+    CostModel cost;
+    cost.slab_bytes_target = target_slices * slice_bytes;
+    return PlanFrame(SomeRequest(), 7, summary, FullRoster(workers), cost)->groups.size();
+  };
+  EXPECT_EQ(groups(1000, 1), 1U);  // all of it fits
+  EXPECT_EQ(groups(999, 1), 2U);   // halves and their halos
+  EXPECT_EQ(groups(500 + 2 * kHaloStep, 1), 2U);
+  EXPECT_EQ(groups(500 + 2 * kHaloStep - 1, 1), 3U);
+  EXPECT_EQ(groups(250 + 2 * kHaloStep, 2), 2U);
+  EXPECT_EQ(groups(1, 1), 1000U / kHaloStep);  // not thinner than a halo
+  EXPECT_EQ(groups(1, 1000), 1U);
+}
+
+TEST(PlanFrame, LeavesOutBoxesThatShowNothing) {
+  // Visible are the bricks at z in [64, 80) only.
+  VolumeSummary summary = FullSummary({32, 32, 160});
+  for (std::size_t brick = 0; brick < summary.bricks.size(); ++brick) {
+    if (brick / 4 != 4) summary.bricks[brick] = {0, 0};
+  }
+  FrameRequest request = SomeRequest();  // opacity from 100 on
+  request.policy.groups = 5;
+  request.view.elevation_degrees = -90;  // along +z
+  const Roster roster = FullRoster(2);
+  const FramePlan plan = Plan(request, summary, roster);
+  ExpectSound(plan, roster);
+  ASSERT_EQ(plan.setup.halo, 8);
+  EXPECT_EQ(plan.groups.size(), 5U);
+  EXPECT_TRUE(plan.groups[0].placements.empty());
+  // Slabs are 16 slices thick; the neighbours of [64, 80) see it through their halo.
+  EXPECT_EQ(PlacedBoxes(plan), (std::vector<BoxId>{3, 4, 5}));
+  EXPECT_EQ(plan.groups[0].schedule, (Schedule{0, 0, {}}));
+  // The nearest box that shows anything is the display worker's.
+  EXPECT_EQ(plan.display, roster.slots[3 % 2]);
+}
+
+TEST(PlanFrame, AnEmptyVolumeHasAPlanOfEmptyGroups) {
+  VolumeSummary summary = FullSummary({32, 32, 32});
+  for (ValueRange& brick : summary.bricks) brick = {0, 0};
+  summary.bricks.front() = kNoFiniteValue;
+  const Roster roster = FullRoster(3);
+  const FramePlan plan = Plan(SomeRequest(), summary, roster);
+  ExpectSound(plan, roster);
+  EXPECT_TRUE(PlacedBoxes(plan).empty());
+  EXPECT_EQ(plan.display, roster.slots[0]);
+}
+
+TEST(PlanFrame, SetupHoldsWhatTheRequestAsksFor) {
+  FrameRequest request = SomeRequest();
+  request.renderer = RendererKind::kZBuffer;
+  request.termination = 0.25;
+  request.transfer.opacity_distance = 3;
+  request.shading.phong = false;
+  request.size = {100, 50};
+  const VolumeSummary summary = FullSummary({40, 41, 42});
+  const FrameSetup setup = Plan(request, summary, FullRoster(2)).setup;
+  EXPECT_EQ(setup.dataset, 7U);
+  EXPECT_EQ(setup.description, summary.description);
+  EXPECT_EQ(setup.range, summary.range);
+  EXPECT_EQ(setup.renderer, RendererKind::kZBuffer);
+  EXPECT_EQ(setup.camera, MakeCamera(request.view, request.size, summary.description.geometry));
+  EXPECT_EQ(setup.transfer.opacity_distance, 3);
+  EXPECT_EQ(setup.shading, request.shading);
+  EXPECT_EQ(setup.termination, 0.25);
+  EXPECT_EQ(setup.halo, RequiredHalo(setup.camera, summary.description.geometry));
+}
+
+TEST(PlanFrame, ResolvesPresets) {
+  FrameRequest request = SomeRequest();
+  request.transfer = {"auto", 2.5};
+  const VolumeSummary summary = FullSummary({40, 41, 42});
+  TransferFunction expected = *MakePreset("auto", summary);
+  expected.opacity_distance = 2.5;
+  EXPECT_EQ(Plan(request, summary, FullRoster(1)).setup.transfer, expected);
+}
+
+TEST(PlanFrame, NamesWhatItDoesNotKnow) {
+  const VolumeSummary summary = FullSummary({8, 8, 8});
+  const auto status = [&](auto change, const Roster& roster) {
+    FrameRequest request = SomeRequest();
+    change(request);
+    return PlanFrame(request, 7, summary, roster, {}).status();
+  };
+  EXPECT_EQ(status([](auto& r) { r.policy.decomposition = "cake"; }, FullRoster(1)),
+            Status::InvalidArgument("policy.decomposition is 'cake', but must be one of: slab"));
+  EXPECT_EQ(status([](auto& r) { r.policy.combine = "mix"; }, FullRoster(1)),
+            Status::InvalidArgument("policy.combine is 'mix', but must be one of: fan-in, centralized"));
+  EXPECT_EQ(status([](auto& r) { r.transfer.choice = "no-such-preset"; }, FullRoster(1)).code(), StatusCode::kNotFound);
+  for (const Roster& nobody : {Roster{}, Roster{{0}}, Roster{{0, 0, 0}}}) {
+    EXPECT_EQ(status([](auto&) {}, nobody).code(), StatusCode::kUnavailable);
+  }
+}
+
+// ---- lost workers
+
+TEST(Replan, ReassignsLostBoxesAndChangesNothingElse) {
+  const VolumeSummary summary = FullSummary({40, 40, 120});
+  for (const CombiningEntry& scheme : CombiningSchemes()) {
+    for (int workers : {2, 3, 5, 8}) {
+      FrameRequest request = SomeRequest();
+      request.policy.groups = 3;
+      request.policy.combine = scheme.name;
+      const FramePlan plan = Plan(request, summary, FullRoster(workers));
+      for (int lost = 0; lost < workers; ++lost) {
+        SCOPED_TRACE(testing::Message() << scheme.name << ", " << workers << " workers, lost " << lost);
+        Roster rest = FullRoster(workers);
+        rest.slots[std::size_t(lost)] = 0;
+        const Result<FramePlan> again = Replan(plan, rest);
+        ASSERT_TRUE(again.ok());
+        ExpectSound(*again, rest);
+        EXPECT_EQ(again->setup, plan.setup);
+        EXPECT_EQ(again->partition, plan.partition);
+        EXPECT_EQ(PlacedBoxes(*again), PlacedBoxes(plan));
+        ASSERT_EQ(again->groups.size(), plan.groups.size());
+        std::set<WorkerId> lenders;
+        for (std::size_t g = 0; g < plan.groups.size(); ++g) {
+          ASSERT_EQ(again->groups[g].placements.size(), plan.groups[g].placements.size());
+          for (std::size_t rank = 0; rank < plan.groups[g].placements.size(); ++rank) {
+            const WorkerId before = plan.groups[g].placements[rank].worker, after = again->groups[g].placements[rank].worker;
+            if (before == WorkerId(lost + 1)) {
+              lenders.insert(after);
+            } else {
+              EXPECT_EQ(after, before);
+            }
+          }
+        }
+        EXPECT_EQ(lenders.size(), std::size_t(std::min(3, workers - 1)));  // its three boxes go to different workers
+        if (plan.display != WorkerId(lost + 1)) {
+          EXPECT_EQ(again->display, plan.display);
+        }
+        // Back again, or another in its place: everything as it was.
+        Roster back = FullRoster(workers);
+        EXPECT_EQ(PlacedBoxes(*Replan(*again, back)), PlacedBoxes(plan));
+      }
+    }
+  }
+}
+
+TEST(Replan, SurvivesAllButOne) {
+  Random random(93);
+  SCOPED_TRACE(random.trace());
+  const VolumeSummary summary = FullSummary({40, 40, 120});
+  FrameRequest request = SomeRequest();
+  request.policy.groups = 4;
+  FramePlan plan = Plan(request, summary, FullRoster(9));
+  Roster roster = FullRoster(9);
+  for (int left = 8; left >= 1; --left) {
+    std::size_t lost = random.Integer<std::size_t>(0, 8);
+    while (roster.slots[lost] == 0) lost = (lost + 1) % 9;
+    roster.slots[lost] = 0;
+    const Result<FramePlan> next = Replan(plan, roster);
+    ASSERT_TRUE(next.ok());
+    ExpectSound(*next, roster);
+    plan = *next;
+  }
+  EXPECT_EQ(Replan(plan, Roster{std::vector<WorkerId>(9)}).status().code(), StatusCode::kUnavailable);
+}
+
+TEST(OwnerOf, LendsTheBoxesOfVacantSlotsEvenly) {
+  const Roster roster = {{11, 0, 13, 0, 15}};
+  std::map<WorkerId, int> lent;
+  for (BoxId box = 0; box < 5 * 30; ++box) {
+    const WorkerId owner = OwnerOf(box, roster);
+    if (roster.slots[box % 5] != 0) {
+      EXPECT_EQ(owner, roster.slots[box % 5]);
+    } else {
+      ++lent[owner];
+    }
+  }
+  EXPECT_EQ(lent, (std::map<WorkerId, int>{{11, 20}, {13, 20}, {15, 20}}));
+  EXPECT_EQ(OwnerOf(3, Roster{}), 0U);
+  EXPECT_EQ(OwnerOf(3, Roster{{0, 0}}), 0U);
+}
+
+}  // namespace
+}  // namespace slabstream
