@@ -1,11 +1,12 @@
-// The only list of messages. A service visits the variant without a default branch, so that the compiler asks for the handler of a new one, and
-// the codec tests run over every member.
+// The only list of messages. A service visits the variant without a default branch, so that the compiler asks for the handler of a new one,
+// and the codec tests run over every member.
 //
 // On the wire a message is one ZeroMQ frame with a Protobuf Envelope {version, one of the messages below} and, where the message has a
 // payload, one more frame of raw bytes. docs/wire.md writes it down byte by byte.
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <variant>
@@ -22,16 +23,18 @@ namespace slabstream {
 inline constexpr std::uint32_t kWireVersion = 1;
 inline constexpr std::size_t kMaxHeaderBytes = std::size_t{64} << 20;
 
-using AnyMessage =
-    std::variant<Register, Welcome, Heartbeat, Ping, GroupAssignment, GroupDone, FrameImage, WorkerTrouble, Leave, Retire, Stop,
-                 ChunkRequest, Chunk, ChunkRefused, PartialImage, SubmitFrame, FrameProgress, FrameReply, FrameFailed, CancelFrame,
-                 ClientPing, ClientPong, StatusQuery, StatusReply, ShutDown, ShutDownReply>;
+using AnyMessage = std::variant<Register, Welcome, Heartbeat, Ping, GroupAssignment, GroupDone, FrameImage, WorkerTrouble, Leave, Retire,
+                                Stop, ChunkRequest, Chunk, ChunkRefused, PartialImage, SubmitFrame, FrameProgress, FrameReply, FrameFailed,
+                                CancelFrame, ClientPing, ClientPong, StatusQuery, StatusReply, ShutDown, ShutDownReply>;
 
 std::vector<std::byte> Encode(const AnyMessage& message);
 
-// InvalidArgument naming the message, the field, the value and the limit: wrong version, unknown enum value, NaN, a size out of bounds, undecodable
-// bytes. What is returned holds everything that the structs' comments promise; nobody checks again.
+// InvalidArgument naming the message, the field, the value and the limit: wrong version, unknown enum value, NaN, a size out of bounds,
+// undecodable bytes. What is returned holds everything that the structs' comments promise; nobody checks again.
 Result<AnyMessage> Decode(std::span<const std::byte> header);
+
+// The answer to a SubmitFrame that Decode has refused, so that its client hears why; nullopt for every other header.
+std::optional<FrameFailed> RefusalOf(std::span<const std::byte> header, const Status& why);
 
 // "GroupAssignment": for logs and messages.
 std::string_view NameOf(const AnyMessage& message);

@@ -23,6 +23,8 @@
 namespace slabstream {
 
 inline constexpr std::size_t kMaxOpenRequests = 256;  // of one client
+inline constexpr std::int64_t kMaxRequestBytes =
+    1 << 20;  // any header that a client sends fits: what the coordinator's client socket takes at most
 
 struct SubmitFrame {
   RequestId request = 0;
@@ -38,7 +40,7 @@ struct FrameProgress {
   FramePhase phase = FramePhase::kQueued;
   std::uint32_t queue_position = 0;  // frames before this one, while queued
   std::uint32_t groups_done = 0, group_count = 0;
-  std::uint32_t attempt = 0;         // above 1: workers were lost
+  std::uint32_t attempt = 0;  // above 1: workers were lost
   std::uint32_t workers = 0;
   friend bool operator==(const FrameProgress&, const FrameProgress&) = default;
 };
@@ -46,19 +48,19 @@ struct FrameProgress {
 // What the frame's plan was and what it cost; reports of all groups.
 struct FrameStatistics {
   std::uint32_t workers = 0, groups = 0, attempts = 0;
-  std::string decomposition, axis, combine;   // axis: "x", "y" or "z"
-  std::int64_t queued_ns = 0;                 // arrival to plan
-  std::int64_t begin_ns = 0, end_ns = 0;      // plan to last byte at the coordinator, MonotonicNow() clock
-  std::vector<RankReport> reports;            // at most kMaxReports
+  std::string decomposition, axis, combine;  // axis: "x", "y" or "z"
+  std::int64_t queued_ns = 0;                // arrival to plan
+  std::int64_t begin_ns = 0, end_ns = 0;     // plan to last byte at the coordinator, MonotonicNow() clock
+  std::vector<RankReport> reports;           // at most kMaxReports
   friend bool operator==(const FrameStatistics&, const FrameStatistics&) = default;
 };
 
 struct FrameReply {  // payload: the runs
   RequestId request = 0;
-  ImageSize size;                          // of the whole picture
+  ImageSize size;                                  // of the whole picture
   std::uint32_t groups_done = 0, group_count = 1;  // equal: final
   EncodedRuns runs;
-  FrameStatistics statistics;              // final only
+  FrameStatistics statistics;  // final only
   friend bool operator==(const FrameReply&, const FrameReply&) = default;
 };
 
@@ -81,8 +83,8 @@ struct ClientPing {
 
 struct ClientPong {
   Epoch epoch = 0;
-  std::uint64_t nonce = 0;      // echoed
-  std::vector<RequestId> known; // of those asked about: queued, running, or with a reply kept
+  std::uint64_t nonce = 0;       // echoed
+  std::vector<RequestId> known;  // of those asked about: queued, running, or with a reply kept
   friend bool operator==(const ClientPong&, const ClientPong&) = default;
 };
 

@@ -28,20 +28,21 @@ namespace slabstream {
 
 inline constexpr std::size_t kMaxEndpointBytes = 512;
 inline constexpr std::size_t kMaxTextBytes = 4096;
+inline constexpr std::uint32_t kMaxThreads = 1024;  // of one worker
 
 struct Register {
   Incarnation incarnation = 0;
   std::uint32_t pid = 0;
-  std::string host;             // at most kMaxNameBytes
-  std::string images_endpoint;  // where other workers reach this one's image plane
-  std::uint32_t threads = 1;    // render threads, [1, 1024]
+  std::string host;                // at most kMaxNameBytes
+  std::string images_endpoint;     // where other workers reach this one's image plane
+  std::uint32_t threads = 1;       // render threads, [1, kMaxThreads]
   std::uint64_t memory_bytes = 0;  // budget for cached slabs; 0: none stated
   friend bool operator==(const Register&, const Register&) = default;
 };
 
 struct Welcome {
   Epoch epoch = 0;
-  Incarnation incarnation = 0;   // echoed
+  Incarnation incarnation = 0;  // echoed
   WorkerId worker = 0;
   std::string slabs_endpoint;
   std::uint32_t heartbeat_ms = 500;  // [10, 60000]
@@ -53,16 +54,16 @@ struct Heartbeat {
   Epoch epoch = 0;
   Incarnation incarnation = 0;
   WorkerId worker = 0;
-  std::uint64_t cached_bytes = 0;   // voxels and what was made from them
-  std::uint64_t fetched_bytes = 0;  // voxels received since the process began
-  std::uint32_t rendered_ranks = 0; // since the process began: progress, even while a long group runs
+  std::uint64_t cached_bytes = 0;    // voxels and what was made from them
+  std::uint64_t fetched_bytes = 0;   // voxels received since the process began
+  std::uint32_t rendered_ranks = 0;  // since the process began: progress, even while a long group runs
   friend bool operator==(const Heartbeat&, const Heartbeat&) = default;
 };
 
 struct Ping {
   Epoch epoch = 0;
-  FrameId finished_before = 0;         // all frames with a smaller id are over: forget them
-  std::vector<FrameId> cancelled;      // over too, though their id is not smaller; at most kMaxCancelled
+  FrameId finished_before = 0;     // all frames with a smaller id are over: forget them
+  std::vector<FrameId> cancelled;  // over too, though their id is not smaller; at most kMaxCancelled
   friend bool operator==(const Ping&, const Ping&) = default;
 };
 inline constexpr std::size_t kMaxCancelled = 1024;
@@ -77,13 +78,13 @@ struct GroupAssignment {
   Epoch epoch = 0;
   GroupKey key;
   FrameId finished_before = 0;
-  std::uint32_t group_count = 1;       // [1, kMaxGroups]
-  std::uint32_t first_group = 0;       // of this attempt: earlier groups are already accumulated by `display`
+  std::uint32_t group_count = 1;  // [1, kMaxGroups]
+  std::uint32_t first_group = 0;  // of this attempt: earlier groups are already accumulated by `display`
   bool previews = false;
   WorkerId display = 0;
   FrameSetup setup;
   GroupPlan group;
-  std::vector<Peer> peers;             // every worker of the group, and the display worker
+  std::vector<Peer> peers;  // every worker of the group, and the display worker
   friend bool operator==(const GroupAssignment&, const GroupAssignment&) = default;
 };
 

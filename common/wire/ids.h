@@ -8,10 +8,10 @@
 
 namespace slabstream {
 
-using Epoch = std::uint64_t;         // random; one coordinator incarnation
-using Incarnation = std::uint64_t;   // random; one worker process' life
-using RequestId = std::uint64_t;     // chosen by the client, unique within its connection
-using FrameId = std::uint64_t;       // ascending within an epoch
+using Epoch = std::uint64_t;        // random; one coordinator incarnation
+using Incarnation = std::uint64_t;  // random; one registration of a worker process: what it held before is gone
+using RequestId = std::uint64_t;    // chosen by the client, unique within its connection
+using FrameId = std::uint64_t;      // ascending within an epoch
 
 // One group of one attempt at a frame. A re-plan raises `attempt`; messages of an older attempt are dropped.
 struct GroupKey {

@@ -1,8 +1,8 @@
 // The slabs plane: voxels, from the coordinator (ROUTER) to workers (DEALER), pulled chunk by chunk.
 //
-// The samples of a box (x fastest) are cut into chunks of kChunkBytes; the last one is shorter. A worker asks for chunks one by one and never has more
-// bytes outstanding than its credit: each request is the credit for its answer, so bytes in flight are bounded at both ends and
-// a lost message is asked for again. The coordinator keeps no state about it.
+// The samples of a box (x fastest) are cut into chunks of kChunkBytes; the last one is shorter. A worker asks for chunks one by one and
+// never has more bytes outstanding than its credit: each request is the credit for its answer, so bytes in flight are bounded at both ends
+// and a lost message is asked for again. The coordinator keeps no state about it.
 #pragma once
 
 #include <cstdint>
@@ -24,8 +24,8 @@ struct ChunkRequest {
   Epoch epoch = 0;
   WorkerId worker = 0;
   DatasetId dataset = 0;
-  Box box;                   // not empty
-  std::uint32_t chunk = 0;   // [0, ChunkCount)
+  Box box;                  // not empty
+  std::uint32_t chunk = 0;  // [0, ChunkCount)
   friend bool operator==(const ChunkRequest&, const ChunkRequest&) = default;
 };
 

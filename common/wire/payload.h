@@ -1,0 +1,35 @@
+// Payload frames: how the runs of an image and the samples of a chunk are packed into bytes, and back.
+//
+// A packer fills the fields of the header that describe the payload; the unpacker checks the payload against them. Compression is zstd,
+// level 1. Where it does not make the payload smaller, or Codec::kRaw was asked for, the bytes are passed on as they are, without a copy.
+// Digests are XXH3-64 (seed 0). Unpacking takes memory only after the sizes that header and frame state have been found to agree.
+// All functions may be called from any thread.
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include "common/base/bytes.h"
+#include "common/base/status.h"
+#include "common/wire/control_messages.h"
+#include "common/wire/slab_messages.h"
+
+namespace slabstream {
+
+// Packs the runs of an image (RunImage::payload; PayloadBytes(runs.image) bytes, runs.image is set already). Fills codec, encoded_bytes and
+// digest of `runs`. kZstd groups the bytes of each 32-bit word by significance first: exponents and high bits of neighbouring pixels are
+// alike.
+Bytes PackRuns(Bytes payload, Codec codec, EncodedRuns& runs);
+
+// The runs' payload of PayloadBytes(runs.image) bytes. `runs` has come through Decode. DataLoss naming both values: the payload's length,
+// its digest or its unpacked length is not what `runs` says, or zstd cannot read it. What the runs hold is for ValidateRuns to check.
+Result<Bytes> UnpackRuns(const EncodedRuns& runs, const Bytes& payload);
+
+// Packs the samples of one chunk, 1 ... kChunkBytes bytes. Fills codec, raw_bytes, encoded_bytes and digest of `chunk`.
+Bytes PackChunk(Bytes samples, Codec codec, Chunk& chunk);
+
+// Unpacks into `samples`, which has room for exactly chunk.raw_bytes. `chunk` has come through Decode. InvalidArgument: `samples` has
+// another size; DataLoss: as UnpackRuns. After a failure the content of `samples` is undefined.
+Status UnpackChunk(const Chunk& chunk, std::span<const std::byte> payload, std::span<std::byte> samples);
+
+}  // namespace slabstream

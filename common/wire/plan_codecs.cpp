@@ -1,0 +1,198 @@
+#include <array>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "common/wire/codecs.h"
+#include "common/wire/limits.h"
+
+namespace slabstream {
+namespace {
+
+using Row = std::array<double, 4>;
+
+void WriteRow(const Row& in, google::protobuf::RepeatedField<double>* out) { out->Add(in.begin(), in.end()); }
+
+Row ReadRow(std::string_view field, const google::protobuf::RepeatedField<double>& in, Checker& check) {
+  Row out{};
+  if (in.size() != static_cast<int>(out.size())) {
+    check.Fail(field, std::to_string(in.size()) + " values, expected " + std::to_string(out.size()));
+    return out;
+  }
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const auto scope = check.In(field, i);
+    out[i] = check.Finite("", in[static_cast<int>(i)]);
+  }
+  return out;
+}
+
+// A direction of unit length.
+Vec3 ReadUnit(std::string_view field, const v1::Vec3& in, Checker& check) {
+  constexpr double kTolerance = 1e-6;
+  const Vec3 out = Read(field, in, check);
+  check.That(std::abs(Length(out) - 1) <= kTolerance, field, "not a unit vector");
+  return out;
+}
+
+// A side of the fine grid: whole final pixels, as many as a picture may have.
+int ReadSide(std::string_view field, std::uint32_t value, std::uint32_t supersample, Checker& check) {
+  const std::uint32_t side = check.Range(field, value, 1, std::uint64_t{kMaxImageSide} * supersample);
+  if (side % supersample != 0)
+    check.Fail(field, std::to_string(side) + " is not a multiple of supersample, " + std::to_string(supersample));
+  return static_cast<int>(side);
+}
+
+}  // namespace
+
+v1::Camera ToProto(const Camera& in) {
+  v1::Camera out;
+  out.set_projection(WireEnum<v1::Projection>(in.projection, Projection::kOrthographic));
+  WriteRow(in.x_row, out.mutable_x_row());
+  WriteRow(in.y_row, out.mutable_y_row());
+  WriteRow(in.w_row, out.mutable_w_row());
+  WriteRow(in.depth_row, out.mutable_depth_row());
+  *out.mutable_eye() = ToProto(in.eye);
+  *out.mutable_view_direction() = ToProto(in.view_direction);
+  *out.mutable_right() = ToProto(in.right);
+  *out.mutable_up() = ToProto(in.up);
+  *out.mutable_spacing() = ToProto(in.spacing);
+  out.set_width(static_cast<std::uint32_t>(in.width));
+  out.set_height(static_cast<std::uint32_t>(in.height));
+  out.set_supersample(static_cast<std::uint32_t>(in.supersample));
+  out.set_traversal_axis(WireEnum<v1::Axis>(in.traversal_axis, Axis::kX));
+  out.set_ascending(in.ascending);
+  return out;
+}
+
+Camera FromProto(const v1::Camera& in, Checker& check) {
+  Camera out;
+  out.projection = check.OneOf("projection", in.projection(), Projection::kOrthographic, Projection::kPerspective);
+  out.x_row = ReadRow("x_row", in.x_row(), check);
+  out.y_row = ReadRow("y_row", in.y_row(), check);
+  out.w_row = ReadRow("w_row", in.w_row(), check);
+  out.depth_row = ReadRow("depth_row", in.depth_row(), check);
+  out.eye = Read("eye", in.eye(), check);
+  out.view_direction = ReadUnit("view_direction", in.view_direction(), check);
+  out.right = ReadUnit("right", in.right(), check);
+  out.up = ReadUnit("up", in.up(), check);
+  out.spacing = PositiveFromProto("spacing", in.spacing(), check);
+  const std::uint32_t supersample = check.Range("supersample", in.supersample(), 1, kMaxSupersample);
+  check.That(std::has_single_bit(supersample), "supersample", std::to_string(supersample) + " is not a power of two");
+  out.supersample = static_cast<int>(supersample);
+  out.width = ReadSide("width", in.width(), supersample, check);
+  out.height = ReadSide("height", in.height(), supersample, check);
+  out.traversal_axis = check.OneOf("traversal_axis", in.traversal_axis(), Axis::kX, Axis::kZ);
+  out.ascending = in.ascending();
+  return out;
+}
+
+v1::FrameSetup ToProto(const FrameSetup& in) {
+  v1::FrameSetup out;
+  out.set_dataset(in.dataset);
+  *out.mutable_description() = ToProto(in.description);
+  *out.mutable_range() = ToProto(in.range);
+  out.set_renderer(WireEnum<v1::RendererKind>(in.renderer, RendererKind::kSplat));
+  *out.mutable_camera() = ToProto(in.camera);
+  *out.mutable_transfer() = ToProto(in.transfer);
+  *out.mutable_shading() = ToProto(in.shading);
+  out.set_termination(in.termination);
+  out.set_halo(static_cast<std::uint32_t>(in.halo));
+  return out;
+}
+
+FrameSetup FromProto(const v1::FrameSetup& in, Checker& check) {
+  FrameSetup out;
+  out.dataset = check.Range("dataset", in.dataset(), 1, std::numeric_limits<DatasetId>::max());
+  out.description = Read("description", in.description(), check);
+  out.range = Read("range", in.range(), check);
+  out.renderer = check.OneOf("renderer", in.renderer(), RendererKind::kSplat, RendererKind::kZBuffer);
+  out.camera = Read("camera", in.camera(), check);
+  out.transfer = Read("transfer", in.transfer(), check);
+  out.shading = Read("shading", in.shading(), check);
+  out.termination = check.Between("termination", in.termination(), 0, kMaxTermination);
+  out.halo = static_cast<std::int32_t>(check.Range("halo", in.halo(), 0, kMaxVolumeSide));
+  if (check.ok()) check.Adopt(Validate(out.transfer));
+  if (check.ok()) check.Adopt(Validate(out.shading));
+  return out;
+}
+
+v1::Placement ToProto(const Placement& in) {
+  v1::Placement out;
+  out.set_id(in.id);
+  *out.mutable_box() = ToProto(in.box);
+  out.set_worker(in.worker);
+  return out;
+}
+
+Placement FromProto(const v1::Placement& in, Checker& check) {
+  Placement out;
+  out.id = in.id();
+  out.box = Read("box", in.box(), check);
+  out.worker = check.Range("worker", in.worker(), 1, std::numeric_limits<WorkerId>::max());
+  return out;
+}
+
+v1::Step ToProto(const Step& in) {
+  v1::Step out;
+  out.set_round(in.round);
+  out.set_from(in.from);
+  out.set_to(in.to);
+  *out.mutable_pixels() = ToProto(in.pixels);
+  return out;
+}
+
+Step FromProto(const v1::Step& in, Checker& check) {
+  Step out;
+  out.round = in.round();
+  out.from = in.from();
+  out.to = in.to();
+  out.pixels = Read("pixels", in.pixels(), check);
+  return out;
+}
+
+v1::Schedule ToProto(const Schedule& in) {
+  v1::Schedule out;
+  out.set_ranks(in.ranks);
+  out.set_root(in.root);
+  WriteAll(in.steps, out.mutable_steps());
+  return out;
+}
+
+Schedule FromProto(const v1::Schedule& in, Checker& check) {
+  Schedule out;
+  out.ranks = check.Range("ranks", in.ranks(), 0, kMaxRanks);
+  out.root = in.root();
+  out.steps = ReadAll("steps", in.steps(), kMaxSteps, check);
+  return out;
+}
+
+v1::GroupPlan ToProto(const GroupPlan& in) {
+  v1::GroupPlan out;
+  WriteAll(in.placements, out.mutable_placements());
+  *out.mutable_schedule() = ToProto(in.schedule);
+  return out;
+}
+
+GroupPlan FromProto(const v1::GroupPlan& in, Checker& check) {
+  GroupPlan out;
+  out.placements = ReadAll("placements", in.placements(), kMaxRanks, check);
+  out.schedule = Read("schedule", in.schedule(), check);
+  return out;
+}
+
+void CheckFits(const GroupPlan& group, const FrameSetup& setup, Checker& check) {
+  const Box volume = setup.description.geometry.bounds();
+  for (std::size_t i = 0; i < group.placements.size(); ++i) {
+    const auto scope = check.In("placements", i);
+    check.That(volume.Contains(group.placements[i].box), "box", "not inside the volume");
+  }
+  if (group.schedule.ranks != group.placements.size()) {
+    check.Fail("schedule.ranks",
+               std::to_string(group.schedule.ranks) + ", but there are " + std::to_string(group.placements.size()) + " placements");
+  }
+  const std::uint64_t frame_pixels = std::uint64_t(setup.camera.width) * std::uint64_t(setup.camera.height);
+  if (check.ok()) check.Adopt(CheckSchedule(group.schedule, {0, frame_pixels}));
+}
+
+}  // namespace slabstream

@@ -1,0 +1,212 @@
+// What the structs' comments promise, one broken promise at a time: the error names field, value and limit.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "common/wire/any_message.h"
+#include "common/wire/limits.h"
+#include "slabstream/v1/envelope.pb.h"
+#include "tests/wire/samples.h"
+
+namespace slabstream {
+namespace {
+
+template <class Message>
+v1::Envelope EnvelopeOf(std::size_t sample = 0) {
+  v1::Envelope envelope;
+  const std::vector<std::byte> header = Encode(Samples<Message>()[sample]);
+  EXPECT_TRUE(envelope.ParseFromArray(header.data(), int(header.size())));
+  return envelope;
+}
+
+std::string ErrorOf(const v1::Envelope& envelope) {
+  const std::string bytes = envelope.SerializeAsString();
+  return Decode({reinterpret_cast<const std::byte*>(bytes.data()), bytes.size()}).status().message();
+}
+
+struct Case {
+  std::function<void(v1::Envelope&)> alter;
+  std::string error;  // a part of it; empty: still valid
+};
+
+template <class Message>
+void Check(const std::vector<Case>& cases) {
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    v1::Envelope envelope = EnvelopeOf<Message>();
+    cases[i].alter(envelope);
+    if (cases[i].error.empty()) {
+      EXPECT_EQ(ErrorOf(envelope), "") << "case " << i;
+    } else {
+      EXPECT_THAT(ErrorOf(envelope), testing::HasSubstr(cases[i].error)) << "case " << i;
+    }
+  }
+}
+
+TEST(FieldChecks, Workers) {
+  Check<Register>({
+      {[](auto& e) { e.mutable_register_worker()->set_threads(0); }, "Register.threads: 0 is not in [1, 1024]"},
+      {[](auto& e) { e.mutable_register_worker()->set_threads(1025); }, "Register.threads: 1025 is not in [1, 1024]"},
+      {[](auto& e) { e.mutable_register_worker()->clear_images_endpoint(); },
+       "Register.images_endpoint: a text of 0 bytes, expected 1 to 512"},
+      {[](auto& e) { e.mutable_register_worker()->set_host(std::string(257, 'h')); },
+       "Register.host: a text of 257 bytes, expected 0 to 256"},
+  });
+  Check<Welcome>({
+      {[](auto& e) { e.mutable_welcome()->set_worker(0); }, "Welcome.worker: 0 is not in [1, 4294967295]"},
+      {[](auto& e) { e.mutable_welcome()->set_heartbeat_ms(9); }, "Welcome.heartbeat_ms: 9 is not in [10, 60000]"},
+      {[](auto& e) { e.mutable_welcome()->set_timeout_ms(600001); }, "Welcome.timeout_ms: 600001 is not in [100, 600000]"},
+  });
+  Check<WorkerTrouble>({
+      {[](auto& e) { e.mutable_worker_trouble()->clear_status(); }, "WorkerTrouble.status.code: not set"},
+      {[](auto& e) { e.mutable_worker_trouble()->mutable_key()->set_group(1024); }, "WorkerTrouble.key.group: 1024 is not in [0, 1023]"},
+  });
+}
+
+TEST(FieldChecks, Groups) {
+  using E = v1::Envelope;
+  const auto group = [](E& e) { return e.mutable_group_assignment(); };
+  const auto setup = [](E& e) { return e.mutable_group_assignment()->mutable_setup(); };
+  const auto camera = [](E& e) { return e.mutable_group_assignment()->mutable_setup()->mutable_camera(); };
+  const auto plan = [](E& e) { return e.mutable_group_assignment()->mutable_group(); };
+  const auto schedule = [](E& e) { return e.mutable_group_assignment()->mutable_group()->mutable_schedule(); };
+  Check<GroupAssignment>({
+      {[&](E& e) { group(e)->set_group_count(3); }, "GroupAssignment.group_count: 3 is not in [4, 1024]"},
+      {[&](E& e) { group(e)->set_group_count(1025); }, "GroupAssignment.group_count: 1025 is not in [4, 1024]"},
+      {[&](E& e) { group(e)->set_first_group(4); }, "GroupAssignment.first_group: 4 is not in [0, 3]"},
+      {[&](E& e) { group(e)->set_display(0); }, "GroupAssignment.display: 0 is not in [1, "},
+      {[&](E& e) { group(e)->clear_peers(); }, "GroupAssignment.peers: worker 4294967295 is missing"},
+      {[&](E& e) { group(e)->mutable_peers(0)->set_worker(77); }, "GroupAssignment.peers: worker 1 is missing"},
+      {[&](E& e) { *group(e)->add_peers() = group(e)->peers(0); }, "GroupAssignment.peers: a worker appears twice"},
+      {[&](E& e) { setup(e)->set_dataset(0); }, "GroupAssignment.setup.dataset: 0 is not in [1, "},
+      {[&](E& e) { setup(e)->set_halo(65536); }, "GroupAssignment.setup.halo: 65536 is not in [0, 65535]"},
+      {[&](E& e) { setup(e)->set_termination(0.6); }, "GroupAssignment.setup.termination: 0.6 is not in [0, 0.5]"},
+      {[&](E& e) { setup(e)->set_termination(-1e-9); }, "GroupAssignment.setup.termination: -1e-09 is not in [0, 0.5]"},
+      {[&](E& e) { setup(e)->mutable_description()->mutable_size()->set_x(0); },
+       "GroupAssignment.setup.description.size.x: 0 is not in [1, 65535]"},
+      {[&](E& e) { setup(e)->mutable_description()->mutable_spacing()->set_z(0); },
+       "setup.description.spacing.z: 0 is not a finite number above 0"},
+      {[&](E& e) { setup(e)->mutable_range()->set_min(1e31F); }, "GroupAssignment.setup.range: min is above max"},
+      {[&](E& e) { setup(e)->mutable_transfer()->clear_colors(); }, "GroupAssignment.setup: "},
+      {[&](E& e) { setup(e)->mutable_shading()->mutable_lights(0)->CopyFrom(v1::Vec3()); }, "GroupAssignment.setup: "},
+      {[&](E& e) { camera(e)->mutable_x_row()->RemoveLast(); }, "GroupAssignment.setup.camera.x_row: 3 values, expected 4"},
+      {[&](E& e) { camera(e)->set_supersample(3); }, "GroupAssignment.setup.camera.supersample: 3 is not a power of two"},
+      {[&](E& e) { camera(e)->set_supersample(2048); }, "GroupAssignment.setup.camera.supersample: 2048 is not in [1, 1024]"},
+      {[&](E& e) { camera(e)->set_width(0); }, "GroupAssignment.setup.camera.width: 0 is not in [1, "},
+      {[&](E& e) { camera(e)->set_height(16385 * camera(e)->supersample()); }, "GroupAssignment.setup.camera.height: "},
+      {[&](E& e) { camera(e)->mutable_up()->set_x(camera(e)->up().x() + 2); }, "GroupAssignment.setup.camera.up: not a unit vector"},
+      {[&](E& e) { camera(e)->mutable_spacing()->set_x(-1); }, "GroupAssignment.setup.camera.spacing.x: -1 is not a finite number above 0"},
+      {[&](E& e) { plan(e)->mutable_placements(2)->mutable_box()->mutable_end()->set_z(317); },
+       "GroupAssignment.group.placements[2].box: not inside the volume"},
+      {[&](E& e) { plan(e)->mutable_placements(0)->mutable_box()->mutable_end()->set_y(0); },
+       "GroupAssignment.group.placements[0].box: an empty box"},
+      {[&](E& e) { plan(e)->mutable_placements(0)->mutable_box()->mutable_end()->set_y(0xFFFFFFFF); },
+       "GroupAssignment.group.placements[0].box.end.y: 4294967295 is not in [0, 65535]"},
+      {[&](E& e) { plan(e)->mutable_placements(1)->set_worker(0); }, "GroupAssignment.group.placements[1].worker: 0 is not in [1, "},
+      {[&](E& e) { plan(e)->mutable_placements()->RemoveLast(); }, "GroupAssignment.group.schedule.ranks: 3, but there are 2 placements"},
+      {[&](E& e) { schedule(e)->set_ranks(65537); }, "GroupAssignment.group.schedule.ranks: 65537 is not in [0, 65536]"},
+      {[&](E& e) { schedule(e)->set_root(3); }, "GroupAssignment.group: schedule.root"},
+      {[&](E& e) { schedule(e)->mutable_steps(0)->set_from(3); }, "GroupAssignment.group: schedule.steps[0]"},
+      {[&](E& e) { schedule(e)->mutable_steps(0)->set_to(schedule(e)->steps(0).from()); }, "GroupAssignment.group: schedule.steps[0]"},
+      {[&](E& e) { schedule(e)->mutable_steps(0)->set_round(99); }, "GroupAssignment.group: schedule.steps[1]"},
+      {[&](E& e) { schedule(e)->mutable_steps(0)->mutable_pixels()->set_end(std::uint64_t{1} << 48U); },
+       "GroupAssignment.group: schedule.steps[0]"},
+      {[&](E& e) { schedule(e)->mutable_steps(0)->mutable_pixels()->set_end(~std::uint64_t{0}); },
+       "GroupAssignment.group.schedule.steps[0].pixels.end: 18446744073709551615 is not in [0, 281474976710656]"},
+      {[&](E& e) { schedule(e)->mutable_steps()->RemoveLast(); }, "GroupAssignment.group: schedule"},
+  });
+}
+
+TEST(FieldChecks, Chunks) {
+  Check<ChunkRequest>({
+      {[](auto& e) { e.mutable_chunk_request()->clear_box(); }, "ChunkRequest.box: an empty box"},
+      {[](auto& e) { e.mutable_chunk_request()->mutable_box()->mutable_end()->set_x(65536); },
+       "ChunkRequest.box.end.x: 65536 is not in [0, 65535]"},
+      {[](auto& e) { e.mutable_chunk_request()->set_chunk(1); }, "ChunkRequest.chunk: 1 is not in [0, 0]"},
+  });
+  Check<Chunk>({
+      {[](auto& e) { e.mutable_chunk()->set_raw_bytes(0); }, "Chunk.raw_bytes: 0 is not in [1, 1048576]"},
+      {[](auto& e) { e.mutable_chunk()->set_raw_bytes(kChunkBytes + 1); }, "Chunk.raw_bytes: 1048577 is not in [1, 1048576]"},
+      {[](auto& e) { e.mutable_chunk()->set_encoded_bytes(2); }, "Chunk.encoded_bytes: 2 is not in [1, 1]"},
+      {[](auto& e) { e.mutable_chunk()->set_encoded_bytes(0); }, "Chunk.encoded_bytes: 0 is not in [1, 1]"},
+  });
+  Check<ChunkRefused>({{[](auto& e) { e.mutable_chunk_refused()->clear_status(); }, "ChunkRefused.status.code: not set"}});
+}
+
+TEST(FieldChecks, Images) {
+  // 30 x 40 = 1200 pixels at (0, 0).
+  const auto image = [](v1::Envelope& e) {
+    v1::RunImageHeader* header = e.mutable_partial_image()->mutable_image();
+    header->mutable_bounds()->set_x_end(30);
+    header->mutable_bounds()->set_y_end(40);
+    header->set_run_count(10);
+    header->set_pixel_count(1200);
+    return header;
+  };
+  Check<PartialImage>({
+      {[&](auto& e) { image(e); }, ""},
+      {[&](auto& e) { image(e)->set_pixel_count(1201); }, "PartialImage.image.pixel_count: 1201 is not in [0, 1200]"},
+      {[&](auto& e) { image(e)->set_run_count(1201); }, "PartialImage.image.run_count: 1201 is not in [1, 1200]"},
+      {[&](auto& e) { image(e)->set_run_count(0); }, "PartialImage.image.run_count: 0 is not in [1, 1200]"},
+      {[&](auto& e) { image(e)->set_pixel_count(0); }, "PartialImage.image.run_count: 10 is not in [0, 0]"},
+      {[&](auto& e) { image(e)->mutable_bounds()->set_x_begin(31); }, "PartialImage.image.bounds.x_end: 30 is not in [31, 16777216]"},
+      {[&](auto& e) { image(e)->mutable_bounds()->set_y_end(1U << 25U); },
+       "PartialImage.image.bounds.y_end: 33554432 is not in [0, 16777216]"},
+      {[&](auto& e) {
+         v1::RunImageHeader* header = image(e);
+         header->mutable_bounds()->set_x_end(1U << 24U);
+         header->mutable_bounds()->set_y_end(1U << 24U);
+         header->set_pixel_count(std::uint64_t{1} << 48U);
+       },
+       "PartialImage.image.pixel_count: a payload of 4503599627370616 bytes, at most 2147483648"},
+      {[](auto& e) { e.mutable_partial_image()->set_interval_end(0); }, "PartialImage.interval_end: 0 is not in [1, 65536]"},
+      {[](auto& e) { e.mutable_partial_image()->set_step((1U << 20U) + 1); }, "PartialImage.step: 1048577 is not in [0, 1048576]"},
+      {[](auto& e) { e.mutable_partial_image()->mutable_pixels()->set_begin(1); }, "PartialImage.pixels.end: 0 is not in [1, "},
+  });
+  Check<FrameImage>({
+      {[](auto& e) { e.mutable_frame_image()->set_group_count(0); }, "FrameImage.group_count: 0 is not in [1, 1024]"},
+      {[](auto& e) { e.mutable_frame_image()->set_groups_done(2); }, "FrameImage.groups_done: 2 is not in [0, 1]"},
+      {[](auto& e) { e.mutable_frame_image()->mutable_runs()->set_encoded_bytes(1); }, "FrameImage.runs.encoded_bytes: 1 is not in [0, 0]"},
+      {[](auto& e) { e.mutable_frame_image()->mutable_runs()->set_codec(v1::CODEC_ZSTD); },
+       "FrameImage.runs.encoded_bytes: 0 is not in [1, 0]"},
+  });
+}
+
+TEST(FieldChecks, Clients) {
+  const auto frame = [](v1::Envelope& e) { return e.mutable_submit_frame()->mutable_frame(); };
+  Check<SubmitFrame>({
+      {[](auto& e) { e.mutable_submit_frame()->set_deadline_ms(0); }, "SubmitFrame.deadline_ms: 0 is not in [1, 86400000]"},
+      {[](auto& e) { e.mutable_submit_frame()->clear_frame(); }, "SubmitFrame.frame.dataset: a text of 0 bytes, expected 1 to 256"},
+      {[&](auto& e) { frame(e)->mutable_size()->set_width(0); }, "SubmitFrame.frame.size.width: 0 is not in [1, 16384]"},
+      {[&](auto& e) { frame(e)->mutable_size()->set_height(0x80000000); },
+       "SubmitFrame.frame.size.height: 2147483648 is not in [1, 16384]"},
+      {[&](auto& e) { frame(e)->mutable_view()->set_fov_degrees(90); }, "SubmitFrame.frame: view.fov"},
+      {[&](auto& e) { frame(e)->mutable_transfer()->clear_choice(); },
+       "SubmitFrame.frame.transfer.choice: not set, expected preset or function"},
+      {[&](auto& e) { frame(e)->mutable_transfer()->mutable_function(); }, "SubmitFrame.frame"},  // without points
+      {[&](auto& e) { frame(e)->mutable_transfer()->set_opacity_distance(0); }, "SubmitFrame.frame: transfer.opacity_distance"},
+      {[&](auto& e) { frame(e)->mutable_shading()->set_shininess(0); }, "SubmitFrame.frame: shading.shininess"},
+      {[&](auto& e) { frame(e)->set_termination(0.75); }, "SubmitFrame.frame: termination"},
+      {[&](auto& e) { frame(e)->mutable_policy()->set_groups(1025); }, "SubmitFrame.frame.policy.groups: 1025 is not in [0, 1024]"},
+      {[&](auto& e) { frame(e)->mutable_policy()->clear_combine(); },
+       "SubmitFrame.frame.policy.combine: a text of 0 bytes, expected 1 to 256"},
+  });
+  Check<FrameReply>({
+      {[](auto& e) { e.mutable_frame_reply()->clear_size(); }, "FrameReply.size.width: 0 is not in [1, 16384]"},
+      {[](auto& e) {
+         v1::EncodedRuns* runs = e.mutable_frame_reply()->mutable_runs();
+         runs->mutable_image()->mutable_bounds()->set_x_end(2);
+         runs->mutable_image()->mutable_bounds()->set_y_end(1);
+       },
+       "FrameReply.runs.image.bounds: not inside the picture"},
+  });
+  Check<FrameProgress>(
+      {{[](auto& e) { e.mutable_frame_progress()->set_groups_done(1); }, "FrameProgress.groups_done: 1 is not in [0, 0]"}});
+  Check<FrameFailed>({{[](auto& e) { e.mutable_frame_failed()->mutable_status()->set_code(v1::StatusCode(9)); },
+                       "FrameFailed.status.code: unknown value 9"}});
+}
+
+}  // namespace
+}  // namespace slabstream

@@ -1,0 +1,239 @@
+#include "tests/wire/samples.h"
+
+#include <limits>
+#include <string>
+
+namespace slabstream {
+namespace {
+
+constexpr std::uint32_t kMax32 = std::numeric_limits<std::uint32_t>::max();
+constexpr std::uint64_t kMax64 = std::numeric_limits<std::uint64_t>::max();
+constexpr std::int64_t kMaxTime = std::numeric_limits<std::int64_t>::max();
+
+const std::string kLongName(kMaxNameBytes, 'n');
+const std::string kLongText(kMaxTextBytes, 't');
+const std::string kLongEndpoint(kMaxEndpointBytes, 'e');
+const std::string kOddEndpoint = "ipc:///tmp/not\xFFutf-8";  // paths are bytes
+const std::string kUmlaut = "B\xC3\xBCro";
+
+RankReport FullReport() {
+  RankReport report{.worker = kMax32, .group = 1023, .rank = 65535, .box = kMax32};
+  for (int i = 0; i < kStageCount; ++i) report.stage_ns[static_cast<std::size_t>(i)] = i % 2 == 0 ? kMaxTime - i : -i;
+  for (int i = 0; i < kMaxSpans; ++i) report.spans.push_back({Stage(i % kStageCount), kMaxTime - i, -kMaxTime});
+  report.occupied_voxels = report.drawn_voxels = report.voxel_bytes = report.image_bytes = kMax64;
+  return report;
+}
+
+VolumeDescription Description() { return {{{301, 370, 316}, {0.5, 1, 2.25}}, ScalarType::kUint16, {-0.125, 1e300}}; }
+
+TransferFunction Curve() {
+  return {{{-1e308, {0, 0.25F, 1}}, {0, {1, 1, 1}}, {0, {0, 0, 0}}, {1e308, {0.5F, 0.5F, 0.5F}}},
+          {{-1, 0, 0.5, 0}, {7, 1, 0.001, 1}},
+          kMaxOpacityDistance};
+}
+
+Shading ManyLights() {
+  Shading shading{.phong = false, .lights = {}, .ambient = 0, .diffuse = 1, .specular = 0.5F, .shininess = 1000};
+  for (int i = 0; i < kMaxLights; ++i) shading.lights.push_back({-1.0 * i, 1e-3, 1e3});
+  return shading;
+}
+
+// A group of `ranks` slabs along z, combined by fan-in.
+GroupAssignment Assignment(Rank ranks, const ViewParameters& view, RendererKind renderer) {
+  GroupAssignment message{.epoch = kMax64, .key = {.frame = kMax64, .attempt = kMax32, .group = 3}, .finished_before = kMax64 - 1};
+  message.group_count = 1024;
+  message.first_group = 3;
+  message.previews = true;
+  message.display = kMax32;
+  FrameSetup& setup = message.setup;
+  setup.dataset = kMax32;
+  setup.description = Description();
+  setup.range = {-1, 1e30F};
+  setup.renderer = renderer;
+  setup.camera = MakeCamera(view, {640, 480}, setup.description.geometry);
+  setup.transfer = Curve();
+  setup.shading = ManyLights();
+  setup.termination = 0;
+  setup.halo = 16;
+  const std::uint64_t pixels = std::uint64_t(setup.camera.width) * std::uint64_t(setup.camera.height);
+  const Index3 size = setup.description.geometry.size;
+  for (Rank rank = 0; rank < ranks; ++rank) {
+    const auto z = std::int32_t(rank);
+    message.group.placements.push_back({rank, {{0, 0, z}, {size.x, size.y, z + 1}}, rank + 1});
+    message.peers.push_back({rank + 1, "tcp://127.0.0.1:" + std::to_string(5000 + rank)});
+  }
+  message.group.schedule = ranks == 0 ? Schedule{.ranks = 0, .root = 0, .steps = {}} : MakeFanIn({ranks, ranks / 2, {0, pixels}});
+  message.peers.push_back({kMax32, kOddEndpoint});
+  return message;
+}
+
+EncodedRuns NoRuns() { return {{PixelFormat::kRgba, {}, 0, 0}, Codec::kRaw, 0, kMax64}; }
+EncodedRuns SomeRuns() { return {{PixelFormat::kDepth, {1, 2, 30, 40}, 7, 900}, Codec::kZstd, 12 * 7 + 24 * 900, 1}; }
+
+constexpr Box kWholeBox = {{0, 0, 0}, {kMaxVolumeSide, kMaxVolumeSide, kMaxVolumeSide}};
+constexpr Box kOneVoxel = {{9, 8, 7}, {10, 9, 8}};
+
+FrameRequest Request() {
+  FrameRequest request;
+  request.dataset = "brain";
+  return request;
+}
+
+}  // namespace
+
+template <>
+std::vector<Register> Samples() {
+  return {{1, 2, "host", "tcp://127.0.0.1:1", 1, 0},
+          {kMax64, kMax32, kLongName, kLongEndpoint, kMaxThreads, kMax64},
+          {0, 0, kUmlaut, kOddEndpoint}};
+}
+
+template <>
+std::vector<Welcome> Samples() {
+  return {{1, 2, 3, "inproc://slabs", 10, 100}, {kMax64, kMax64, kMax32, kLongEndpoint, 60000, 600000}};
+}
+
+template <>
+std::vector<Heartbeat> Samples() {
+  return {{}, {kMax64, kMax64, kMax32, kMax64, kMax64, kMax32}};
+}
+
+template <>
+std::vector<Ping> Samples() {
+  return {{}, {kMax64, kMax64, {0, 1, kMax64}}};
+}
+
+template <>
+std::vector<GroupAssignment> Samples() {
+  const ViewParameters oblique{Projection::kPerspective, 1e6, -33, 12.5, 0.01, 60};
+  return {Assignment(3, {}, RendererKind::kSplat), Assignment(0, oblique, RendererKind::kZBuffer),
+          Assignment(16, oblique, RendererKind::kSplat)};
+}
+
+template <>
+std::vector<GroupDone> Samples() {
+  return {{1, 2, {3, 4, 1023}, {}}, {kMax64, kMax32, {}, {RankReport{}, FullReport()}}};
+}
+
+template <>
+std::vector<FrameImage> Samples() {
+  return {{1, 2, 3, 4, 0, 1, NoRuns(), {}}, {kMax64, kMax32, kMax64, kMax32, 1024, 1024, SomeRuns(), {FullReport()}}};
+}
+
+template <>
+std::vector<WorkerTrouble> Samples() {
+  return {{1, 2, {3, 4, 5}, 0, Status::Internal("")}, {kMax64, kMax32, {}, kMax32, Status::InvalidArgument(kLongText)}};
+}
+
+template <>
+std::vector<Leave> Samples() {
+  return {{}, {kMax64, kMax32}};
+}
+
+template <>
+std::vector<Retire> Samples() {
+  return {{}, {kMax64}};
+}
+
+template <>
+std::vector<Stop> Samples() {
+  return {{}, {kMax64}};
+}
+
+template <>
+std::vector<ChunkRequest> Samples() {
+  return {{1, 2, 3, kOneVoxel, 0}, {kMax64, kMax32, kMax32, kWholeBox, ChunkCount(kWholeBox, ScalarType::kFloat32) - 1}};
+}
+
+template <>
+std::vector<Chunk> Samples() {
+  return {{1, 2, kOneVoxel, 0, Codec::kRaw, 1, 1, 0}, {kMax64, kMax32, kWholeBox, 1, Codec::kZstd, kChunkBytes, 9, kMax64}};
+}
+
+template <>
+std::vector<ChunkRefused> Samples() {
+  return {{1, 2, kOneVoxel, 0, Status::NotFound("no dataset 2")}, {kMax64, kMax32, kWholeBox, 5, Status::Cancelled(kLongText)}};
+}
+
+template <>
+std::vector<PartialImage> Samples() {
+  return {{1, 2, {3, 4, 5}, 0, {0, 1}, {0, 0}, NoRuns().image, {}},
+          {kMax64, kMax32, {}, 1U << 20U, {65535, 65536}, {17, std::uint64_t{1} << 48U}, SomeRuns().image, {RankReport{}, FullReport()}}};
+}
+
+template <>
+std::vector<SubmitFrame> Samples() {
+  FrameRequest full;
+  full.dataset = kLongName;
+  full.renderer = RendererKind::kZBuffer;
+  full.size = {kMaxImageSide, 1};
+  full.view = {Projection::kPerspective, kMaxAngleDegrees, -kMaxAngleDegrees, -0.0, kMinZoom, kMinFovDegrees};
+  full.transfer = {Curve(), 1e-6};
+  full.shading = ManyLights();
+  full.termination = 0.5;
+  full.policy = {kUmlaut, AxisChoice::kX, kMaxGroups, kLongName};
+  full.previews = true;
+  return {{0, 1, Request()}, {kMax64, 86400000, full}};
+}
+
+template <>
+std::vector<FrameProgress> Samples() {
+  return {{}, {kMax64, FramePhase::kRunning, kMax32, 1024, 1024, kMax32, kMax32}, {1, FramePhase::kLoading, 0, 0, 7, 1, 2}};
+}
+
+template <>
+std::vector<FrameReply> Samples() {
+  const FrameStatistics statistics{kMax32, kMax32, kMax32, "slab", "x", kLongName, -kMaxTime, kMaxTime, kMaxTime, {FullReport()}};
+  return {{1, {1, 1}, 0, 1, NoRuns(), {}}, {kMax64, {30, 40}, 1024, 1024, SomeRuns(), statistics}};
+}
+
+template <>
+std::vector<FrameFailed> Samples() {
+  return {{1, Status::DeadlineExceeded("")},
+          {kMax64, Status::DataLoss(kUmlaut)},
+          {2, Status::Unavailable("x")},
+          {3, Status::ResourceExhausted("y")}};
+}
+
+template <>
+std::vector<CancelFrame> Samples() {
+  return {{}, {kMax64}};
+}
+
+template <>
+std::vector<ClientPing> Samples() {
+  return {{}, {kMax64, {0, kMax64}}};
+}
+
+template <>
+std::vector<ClientPong> Samples() {
+  return {{}, {kMax64, kMax64, {kMax64, 0}}};
+}
+
+template <>
+std::vector<StatusQuery> Samples() {
+  return {{}, {kMax64}};
+}
+
+template <>
+std::vector<StatusReply> Samples() {
+  StatusReply full{kMax64, kMax64, kMax32, kMax64, kMax32, kMax32, kMax32, kMax64, kMax64, kMax64, {}, {}};
+  full.workers = {{1, 2, "", 1, 0, 0, 0, 0, 0}, {kMax32, kMax32, kLongName, kMaxThreads, kMax32, kMax64, kMax64, kMax32, kMax32}};
+  full.datasets = {{"a", DatasetState::kUnloaded, {}, {}, ""},
+                   {kLongName, DatasetState::kLoading, {}, {}, ""},
+                   {kUmlaut, DatasetState::kReady, Description(), {-3, 4}, ""},
+                   {"b", DatasetState::kFailed, {}, {}, kLongText}};
+  return {{}, full};
+}
+
+template <>
+std::vector<ShutDown> Samples() {
+  return {{}, {kMax64}};
+}
+
+template <>
+std::vector<ShutDownReply> Samples() {
+  return {{}, {kMax64}};
+}
+
+}  // namespace slabstream
