@@ -16,15 +16,16 @@ struct Endpoint {
   Scheme scheme = Scheme::kTcp;
   std::string host;      // tcp: "127.0.0.1"
   int port = 0;          // tcp: [1, 65535]; 0 stands for "*", any free port (binding only)
-  std::string path;      // ipc: absolute path; inproc: name
+  std::string path;      // ipc: absolute path, at most 107 bytes; inproc: name
 
   std::string ToString() const;  // as ZeroMQ takes it
 };
 
-// InvalidArgument naming the text and what is expected. `allow_wildcard`: "*" as port is fine (binding).
+// InvalidArgument naming the text and what is expected. At most 512 printable bytes without spaces. `allow_wildcard`: "*" as port is fine (binding).
 Result<Endpoint> ParseEndpoint(std::string_view text, bool allow_wildcard);
 
-// Where the coordinator listens for workers when only the client endpoint is given: the next tcp port (any for any), or the path with ".workers".
+// Where the coordinator listens for workers when only the client endpoint is given: the next tcp port (any for any; the one before
+// 65535, which has no next), or the path with ".workers".
 Endpoint WorkerEndpointFor(const Endpoint& client_endpoint);
 
 }  // namespace slabstream

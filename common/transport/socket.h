@@ -4,7 +4,11 @@
 //   2. Socket::Router / Socket::Dealer, then Bind or Connect.
 //   3. A loop: Wait(sockets, wakeup, timeout), then TryReceive until empty, then Send.
 // A socket belongs to the thread that uses it; it may be made in one thread and handed to another before its first use. Context and Wakeup are thread-safe.
-// No call blocks but Wait. Routers are MANDATORY: sending to an identity that is not connected fails with Unavailable.
+// No call blocks but Wait. Routers are MANDATORY: sending to an identity that is not connected fails with Unavailable, which is also how a router notices that
+// a peer has gone; identities are ZeroMQ's, never given twice. A dealer queues what it sends until its connection is up, and again while it is broken, up to the
+// high-water mark: tcp and ipc reconnect by themselves (every 100 ms), and what was queued then reaches whoever listens there now. So receivers go by epochs, and
+// a dealer whose peer is known to be dead is closed, which drops the queue after the linger time. inproc does not reconnect: after its peer has closed, sending
+// ends in ResourceExhausted.
 #pragma once
 
 #include <cstdint>
@@ -53,8 +57,10 @@ class Socket {
   Socket& operator=(Socket&&) noexcept;
   ~Socket();
 
-  // The endpoint with the port that was chosen. Unavailable (in use, no permission) names the endpoint.
+  // The endpoint with the port that was chosen. Unavailable (in use, no permission) names the endpoint; InvalidArgument: as ParseEndpoint. An ipc socket file that
+  // a dead process left is replaced. Closing frees inproc names and ipc files at once, a tcp port a moment later.
   Result<std::string> Bind(const std::string& endpoint);
+  // Ok does not mean that anybody listens there. InvalidArgument: as ParseEndpoint.
   Status Connect(const std::string& endpoint);
 
   // Sends header and, if not empty, payload as one message, without copying the payload. `identity` is ignored by dealers.
@@ -72,7 +78,7 @@ class Socket {
   std::unique_ptr<Impl> impl_;
 };
 
-// Lets other threads end a Wait early. Any thread may Notify; the waiting thread's Wait consumes all notifications.
+// Lets other threads and signal handlers end a Wait early. Any thread may Notify; the waiting thread's Wait consumes all notifications.
 class Wakeup {
  public:
   Wakeup();
@@ -87,7 +93,7 @@ class Wakeup {
   int file_descriptor_ = -1;  // an eventfd
 };
 
-// Returns when a socket may have a message, the wakeup was notified, or the timeout is over (zero: at once).
+// Returns when a socket may have a message, the wakeup was notified, a signal was handled, or the timeout is over (zero: at once).
 void Wait(std::span<Socket* const> sockets, Wakeup* wakeup, Duration timeout);
 
 }  // namespace slabstream

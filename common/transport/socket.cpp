@@ -1,0 +1,260 @@
+#include "common/transport/socket.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <utility>
+#include <zmq.hpp>
+
+#include "common/base/check.h"
+#include "common/transport/endpoint.h"
+#include "common/transport/ipc_listener.h"
+
+#ifdef __SANITIZE_THREAD__
+#include <sanitizer/tsan_interface.h>
+#endif
+
+namespace slabstream {
+
+struct Context::Impl {
+  zmq::context_t context{1};  // one I/O thread moves 4 to 6 GB/s, more than a machine's workers make
+};
+
+Context::Context() : impl_(std::make_unique<Impl>()) {
+  constexpr int kMaxSockets = 65535;  // the usual 1023 would bound the embedded workers: each has a socket to each other one
+  impl_->context.set(zmq::ctxopt::max_sockets, kMaxSockets);
+}
+
+Context::~Context() = default;
+
+struct Socket::Impl {
+  Impl(zmq::context_t& context, zmq::socket_type type) : socket(context, type), router(type == zmq::socket_type::router) {}
+
+  zmq::socket_t socket;
+  bool router;
+  std::vector<std::string> names;      // inproc endpoints bound here
+  std::vector<IpcListener> listeners;  // ipc files bound here
+
+  // Names and files are free again when the socket is gone; ZeroMQ alone would free them some time later.
+  ~Impl() {
+    for (const std::string& name : names) {
+      try {
+        socket.unbind(name);
+      } catch (const zmq::error_t&) {  // nothing to free
+      }
+    }
+    for (IpcListener& listener : listeners) listener.Remove();
+  }
+};
+
+namespace {
+
+Status Failed(const std::string& endpoint, const zmq::error_t& error) {
+  return Status::Unavailable("endpoint \"" + endpoint + "\": " + (error.num() == EADDRINUSE ? "already in use" : error.what()));
+}
+
+Result<std::unique_ptr<Socket::Impl>> MakeSocket(Context& context, zmq::socket_type type, const SocketOptions& options) {
+  try {
+    auto impl = std::make_unique<Socket::Impl>(context.impl().context, type);
+    impl->socket.set(zmq::sockopt::sndhwm, options.send_high_water_mark);
+    impl->socket.set(zmq::sockopt::rcvhwm, options.receive_high_water_mark);
+    impl->socket.set(zmq::sockopt::linger, static_cast<int>(std::chrono::ceil<std::chrono::milliseconds>(options.linger).count()));
+    impl->socket.set(zmq::sockopt::maxmsgsize, options.max_message_bytes);
+    if (impl->router) {
+      impl->socket.set(zmq::sockopt::router_mandatory, true);
+      impl->socket.set(zmq::sockopt::router_handover, false);  // nobody takes over another's identity
+    }
+    return impl;
+  } catch (const zmq::error_t& error) {
+    return Status::ResourceExhausted(std::string("socket: ") + error.what());
+  }
+}
+
+// [::1] needs it; with it on always, ZeroMQ would report IPv4 endpoints in their mapped form.
+void AllowAddressFamily(zmq::socket_t& socket, const Endpoint& endpoint) { socket.set(zmq::sockopt::ipv6, endpoint.host.starts_with('[')); }
+
+// Hands a listening descriptor to the socket, which owns it from then on.
+void BindDescriptor(zmq::socket_t& socket, const std::string& endpoint, IpcListener& listener) {
+  constexpr int kNone = -1;
+  const int descriptor = listener.Release();
+  socket.set(zmq::sockopt::use_fd, descriptor);
+  socket.bind(endpoint);
+  socket.set(zmq::sockopt::use_fd, kNone);
+}
+
+// ZeroMQ orders what a thread did before it sent a message before what another does after receiving or freeing it. ThreadSanitizer does not
+// see that inside an uninstrumented library, so it is told.
+void BeforeHandOver([[maybe_unused]] const void* data) {
+#ifdef __SANITIZE_THREAD__
+  __tsan_release(const_cast<void*>(data));
+#endif
+}
+void AfterHandOver([[maybe_unused]] const void* data) {
+#ifdef __SANITIZE_THREAD__
+  __tsan_acquire(const_cast<void*>(data));
+#endif
+}
+
+void LetGo(void* data, void* owner) {
+  AfterHandOver(data);
+  delete static_cast<Bytes*>(owner);
+}
+
+// A message that shares the bytes and lets go of them when ZeroMQ has sent it, from whatever thread.
+zmq::message_t Share(Bytes bytes) {
+  if (bytes.empty()) return {};
+  auto owner = std::make_unique<Bytes>(std::move(bytes));
+  const std::span<const std::byte> data = owner->span();
+  zmq::message_t message(const_cast<std::byte*>(data.data()), data.size(), LetGo, owner.get());
+  BeforeHandOver(data.data());
+  (void)owner.release();  // the message's now
+  return message;
+}
+
+// The memory of a received message as Bytes.
+Bytes Adopt(zmq::message_t message) {
+  auto owner = std::make_shared<zmq::message_t>(std::move(message));
+  const std::span<const std::byte> data(static_cast<const std::byte*>(owner->data()), owner->size());
+  AfterHandOver(data.data());
+  return Bytes(std::move(owner), data);
+}
+
+// 0, or the error number.
+int SendPart(zmq::socket_t& socket, zmq::message_t message, bool more) {
+  const zmq::send_flags flags = more ? zmq::send_flags::dontwait | zmq::send_flags::sndmore : zmq::send_flags::dontwait;
+  while (true) {
+    try {
+      return socket.send(message, flags) ? 0 : EAGAIN;
+    } catch (const zmq::error_t& error) {
+      if (error.num() != EINTR) return error.num();
+    }
+  }
+}
+
+// False: nothing is there.
+bool ReceivePart(zmq::socket_t& socket, zmq::message_t& message) {
+  while (true) {
+    try {
+      return socket.recv(message, zmq::recv_flags::dontwait).has_value();
+    } catch (const zmq::error_t& error) {
+      if (error.num() != EINTR) return false;
+    }
+  }
+}
+
+}  // namespace
+
+Result<Socket> Socket::Router(Context& context, const SocketOptions& options) {
+  auto impl = MakeSocket(context, zmq::socket_type::router, options);
+  if (!impl.ok()) return impl.status();
+  return Socket(*std::move(impl));
+}
+
+Result<Socket> Socket::Dealer(Context& context, const SocketOptions& options) {
+  auto impl = MakeSocket(context, zmq::socket_type::dealer, options);
+  if (!impl.ok()) return impl.status();
+  return Socket(*std::move(impl));
+}
+
+Socket::Socket(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Socket::Socket(Socket&&) noexcept = default;
+Socket& Socket::operator=(Socket&&) noexcept = default;
+Socket::~Socket() = default;
+
+Result<std::string> Socket::Bind(const std::string& text) {
+  const Result<Endpoint> endpoint = ParseEndpoint(text, true);
+  if (!endpoint.ok()) return endpoint.status();
+  const std::string name = endpoint->ToString();
+  zmq::socket_t& socket = impl_->socket;
+  try {
+    switch (endpoint->scheme) {
+      case Scheme::kTcp: {
+        AllowAddressFamily(socket, *endpoint);
+        socket.bind(name);
+        return socket.get(zmq::sockopt::last_endpoint);
+      }
+      case Scheme::kIpc: {
+        Result<IpcListener> listener = IpcListener::Listen(endpoint->path);
+        if (!listener.ok()) return listener.status();
+        impl_->listeners.push_back(*std::move(listener));
+        BindDescriptor(socket, name, impl_->listeners.back());
+        return name;
+      }
+      case Scheme::kInproc: {
+        socket.bind(name);
+        impl_->names.push_back(name);
+        return name;
+      }
+    }
+  } catch (const zmq::error_t& error) {
+    return Failed(name, error);
+  }
+  return Status::Internal("endpoint \"" + name + "\": unknown scheme");
+}
+
+Status Socket::Connect(const std::string& text) {
+  const Result<Endpoint> endpoint = ParseEndpoint(text, false);
+  if (!endpoint.ok()) return endpoint.status();
+  try {
+    AllowAddressFamily(impl_->socket, *endpoint);
+    impl_->socket.connect(endpoint->ToString());
+    return Status::Ok();
+  } catch (const zmq::error_t& error) {
+    return Failed(endpoint->ToString(), error);
+  }
+}
+
+Status Socket::Send(const std::string& identity, std::vector<std::byte> header, const Bytes& payload) {
+  zmq::socket_t& socket = impl_->socket;
+  int error = impl_->router ? SendPart(socket, zmq::message_t(identity.data(), identity.size()), true) : 0;
+  if (error == 0) error = SendPart(socket, Share(Bytes(std::move(header))), !payload.empty());
+  if (error == 0 && !payload.empty()) error = SendPart(socket, Share(payload), false);
+  switch (error) {
+    case 0: return Status::Ok();
+    case EAGAIN: return Status::ResourceExhausted("send: the high-water mark is reached or nobody is connected");
+    case EHOSTUNREACH: return Status::Unavailable("send: the peer is not connected");
+    default: return Status::Unavailable(std::string("send: ") + zmq_strerror(error));
+  }
+}
+
+std::optional<Incoming> Socket::TryReceive() {
+  zmq::message_t part;
+  while (ReceivePart(impl_->socket, part)) {
+    Incoming incoming;
+    bool more = part.more();
+    if (impl_->router) {
+      incoming.identity = part.to_string();
+    } else {
+      incoming.parts.push_back(Adopt(std::move(part)));
+    }
+    // The parts of a message arrive together: none of them is waited for.
+    std::size_t surplus = 0;
+    while (more && ReceivePart(impl_->socket, part)) {
+      more = part.more();
+      if (incoming.parts.size() < 2) {
+        incoming.parts.push_back(Adopt(std::move(part)));
+      } else {
+        ++surplus;
+      }
+    }
+    if (!incoming.parts.empty() && surplus == 0) return incoming;
+  }
+  return std::nullopt;
+}
+
+void Wait(std::span<Socket* const> sockets, Wakeup* wakeup, Duration timeout) {
+  std::vector<zmq::pollitem_t> items;
+  items.reserve(sockets.size() + 1);
+  for (Socket* socket : sockets) items.push_back({socket->impl().socket.handle(), 0, ZMQ_POLLIN, 0});
+  if (wakeup != nullptr) items.push_back({nullptr, wakeup->file_descriptor(), ZMQ_POLLIN, 0});
+  // Rounded up: a wait that ends before its time would be called again and again.
+  const auto milliseconds = std::chrono::ceil<std::chrono::milliseconds>(std::max(timeout, Duration::zero()));
+  try {
+    zmq::poll(items, milliseconds);
+  } catch (const zmq::error_t& error) {
+    CHECK_EQ(error.num(), EINTR);  // a signal: the caller looks round
+  }
+  if (wakeup != nullptr) wakeup->Drain();
+}
+
+}  // namespace slabstream
