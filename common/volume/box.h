@@ -21,8 +21,8 @@ struct Box {
     return v.x >= begin.x && v.x < end.x && v.y >= begin.y && v.y < end.y && v.z >= begin.z && v.z < end.z;
   }
   constexpr bool Contains(const Box& b) const {
-    return b.empty() || (b.begin.x >= begin.x && b.begin.y >= begin.y && b.begin.z >= begin.z && b.end.x <= end.x &&
-                         b.end.y <= end.y && b.end.z <= end.z);
+    return b.empty() || (b.begin.x >= begin.x && b.begin.y >= begin.y && b.begin.z >= begin.z && b.end.x <= end.x && b.end.y <= end.y &&
+                         b.end.z <= end.z);
   }
   friend constexpr bool operator==(const Box&, const Box&) = default;
   friend constexpr auto operator<=>(const Box&, const Box&) = default;
@@ -35,9 +35,9 @@ constexpr Box Intersection(const Box& a, const Box& b) {
 
 // `box` grown by `voxels` on every side and cut to `limit`: the box and its halo.
 constexpr Box Grown(const Box& box, std::int32_t voxels, const Box& limit) {
-  return Intersection({{box.begin.x - voxels, box.begin.y - voxels, box.begin.z - voxels},
-                       {box.end.x + voxels, box.end.y + voxels, box.end.z + voxels}},
-                      limit);
+  return Intersection(
+      {{box.begin.x - voxels, box.begin.y - voxels, box.begin.z - voxels}, {box.end.x + voxels, box.end.y + voxels, box.end.z + voxels}},
+      limit);
 }
 
 }  // namespace slabstream

@@ -4,6 +4,7 @@
 // range of data values of its voxels, so whether a box can hold anything visible under a transfer function is answered from bricks.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -12,7 +13,7 @@
 
 namespace slabstream {
 
-inline constexpr std::int32_t kSummaryBrick = 16;      // voxels
+inline constexpr std::int32_t kSummaryBrick = 16;  // voxels
 inline constexpr int kHistogramBins = 256;
 
 struct ValueRange {
@@ -21,18 +22,29 @@ struct ValueRange {
   friend bool operator==(const ValueRange&, const ValueRange&) = default;
 };
 
+// What a brick without any finite value has for its range: min > max.
+inline constexpr ValueRange kNoFiniteValue = {1, 0};
+
+// The bin of a data value, in [0, kHistogramBins): equal bins over `range`, of which the last includes range.max; values outside go to the
+// nearest bin. Where the range is one value, everything is in bin 0.
+inline int HistogramBin(const ValueRange& range, double value) {
+  const double width = double(range.max) - double(range.min);
+  if (!(width > 0)) return 0;
+  return int(std::clamp((value - double(range.min)) * (kHistogramBins / width), 0.0, kHistogramBins - 1.0));
+}
+
 struct VolumeSummary {
   VolumeDescription description;
-  ValueRange range;                                            // of finite data values; {0, 0} if there is none
-  std::array<std::uint64_t, kHistogramBins> histogram{};       // equal bins over `range`; the last bin includes range.max
-  Index3 brick_counts;                                         // bricks along each axis
-  std::vector<ValueRange> bricks;                              // x fastest; of finite values; min > max: none finite
-  std::int64_t non_finite = 0;                                 // voxels that are NaN or infinite: never visible
+  ValueRange range;                                       // of finite data values; {0, 0} if there is none
+  std::array<std::uint64_t, kHistogramBins> histogram{};  // of finite data values, by HistogramBin(range, value)
+  Index3 brick_counts;                                    // bricks along each axis
+  std::vector<ValueRange> bricks;                         // x fastest; of finite values; kNoFiniteValue: there is none
+  std::int64_t non_finite = 0;                            // voxels that are NaN or infinite: never visible
 
   friend bool operator==(const VolumeSummary&, const VolumeSummary&) = default;
 };
 
-// Reads every voxel once.
+// Reads every voxel once, those of float volumes a second time for the histogram. One thread; about 1 ns a voxel.
 VolumeSummary Summarize(const Volume& volume);
 
 }  // namespace slabstream

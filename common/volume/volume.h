@@ -19,13 +19,11 @@ inline constexpr std::int32_t kMaxVolumeSide = 65535;  // voxels along an axis: 
 
 enum class ScalarType : std::uint8_t { kUint8 = 1, kUint16 = 2, kFloat32 = 3 };
 
-constexpr std::size_t BytesPerSample(ScalarType type) {
-  return type == ScalarType::kUint8 ? 1 : type == ScalarType::kUint16 ? 2 : 4;
-}
+constexpr std::size_t BytesPerSample(ScalarType type) { return type == ScalarType::kUint8 ? 1 : type == ScalarType::kUint16 ? 2 : 4; }
 
 struct VolumeGeometry {
-  Index3 size;                 // voxels, each in [1, kMaxVolumeSide]
-  Vec3 spacing = {1, 1, 1};    // > 0, finite
+  Index3 size;               // voxels, each in [1, kMaxVolumeSide]
+  Vec3 spacing = {1, 1, 1};  // > 0, finite
 
   Box bounds() const { return {{0, 0, 0}, size}; }
   friend bool operator==(const VolumeGeometry&, const VolumeGeometry&) = default;

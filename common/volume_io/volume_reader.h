@@ -1,10 +1,18 @@
-// Volume files to volumes, through ITK: NIfTI (.nii, .nii.gz), NRRD (.nrrd; .nhdr with a detached raw or gzip data file), MetaImage (.mhd, .mha), and a
-// directory of TIFF slices (one file a slice, in natural order of their names) or one multi-page TIFF.
+// Volume files to volumes: NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd; .nhdr with a detached data file; raw or gzip), MetaImage (.mhd, .mha; raw
+// or zlib), and TIFF (a directory of slices, one file a slice, in natural order of their names; or one multi-page file). ITK reads the
+// headers of NIfTI and NRRD and writes; samples are read here, so that truncated and damaged files are found before and while memory is
+// taken for them. During reading a volume needs its bytes in the file and, where samples become narrower, its kept bytes on top.
 //
-// Samples are kept as uint8, uint16 or float32, without losing what was in the file: int8 and int16 are shifted into the unsigned type (ValueMapping.offset);
-// uint32, int32, uint64, int64 and float64 become uint16 if all their values are integers that fit after a shift, else float32 - and where float32 cannot hold a value
-// exactly the reader says so in a warning of the log. A rescale slope and intercept (NIfTI scl_slope, scl_inter) goes into ValueMapping.
+// Samples are kept as uint8, uint16 or float32, without losing what was in the file: int8 and int16 are shifted into the unsigned type
+// (ValueMapping.offset); uint32, int32, uint64, int64 and float64 become uint16 if all their values are integers that fit after a shift,
+// else float32 - and where float32 cannot hold a value exactly the reader says so in a warning of the log. A rescale slope and intercept
+// (NIfTI scl_slope, scl_inter) goes into ValueMapping.
+//
 // Axes: x, y, z are the file's own index axes, first index fastest; direction cosines are read for `info` and do not turn the picture.
+// Spacing is its absolute value; 0 and NaN become 1, with a warning. TIFF knows no distance of slices: spacing is 1 along x and z, and
+// along y by the ratio of the two resolutions.
+//
+// All functions may be called from any thread.
 #pragma once
 
 #include <array>
@@ -18,10 +26,10 @@ namespace slabstream {
 
 struct VolumeFileInfo {
   VolumeDescription description;
-  std::string file_type;              // sample type in the file, such as "int16"
-  std::string format;                 // "NIfTI", "NRRD", "MetaImage", "TIFF"
+  std::string file_type;  // sample type in the file, such as "int16"
+  std::string format;     // "NIfTI", "NRRD", "MetaImage", "TIFF"
   Vec3 origin;
-  std::array<Vec3, 3> directions;     // of the x, y and z axes (physical, ITK's LPS convention)
+  std::array<Vec3, 3> directions;  // of the x, y and z axes (physical, ITK's LPS convention)
 };
 
 struct LoadedVolume {
@@ -29,14 +37,16 @@ struct LoadedVolume {
   std::shared_ptr<const Volume> volume;
 };
 
-// NotFound (no such file), InvalidArgument (not a volume, more than three dimensions, several components, a side above kMaxVolumeSide), DataLoss (truncated),
-// ResourceExhausted (does not fit the memory). Messages name the path.
+// NotFound (no such file), InvalidArgument (not a volume, more than three dimensions, several components, a side above kMaxVolumeSide),
+// DataLoss (truncated), ResourceExhausted (does not fit the memory). Messages name the path.
 Result<LoadedVolume> ReadVolume(const std::string& path);
 
 // Whether ReadVolume would try this path, by its ending or, for directories, by the TIFF files in it.
 bool LooksLikeVolume(const std::string& path);
 
-// Writes NRRD (gzip) or MetaImage by the ending. InvalidArgument for other endings.
+// Writes NRRD (gzip) or MetaImage (raw; .mhd: with a .raw beside it) by the ending. Such files have no value mapping: samples that were
+// read from int8 or int16 become these again, others with a mapping become float32 data values. InvalidArgument: another ending, or a path
+// that cannot be opened.
 Status WriteVolume(const Volume& volume, const std::string& path);
 
 }  // namespace slabstream

@@ -1,0 +1,179 @@
+#include "common/volume/summary.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <type_traits>
+
+namespace slabstream {
+namespace {
+
+template <class T>
+bool IsFinite(T stored) {
+  if constexpr (std::is_floating_point_v<T>) {
+    return std::abs(stored) <= std::numeric_limits<T>::max();
+  } else {
+    return true;
+  }
+}
+
+// The range of stored samples; low > high until a finite one was met.
+template <class T>
+struct StoredRange {
+  T low = std::numeric_limits<T>::max();
+  T high = std::numeric_limits<T>::lowest();
+
+  bool empty() const { return low > high; }
+  void Include(const StoredRange& other) {
+    low = std::min(low, other.low);
+    high = std::max(high, other.high);
+  }
+};
+
+// Data values are kept as float; a mapping that leads out of its range gets the nearest finite one.
+float DataValue(const ValueMapping& mapping, double stored) {
+  constexpr double kLimit = std::numeric_limits<float>::max();
+  return float(std::clamp(mapping.FromStored(stored), -kLimit, kLimit));
+}
+
+template <class T>
+ValueRange ToDataValues(const StoredRange<T>& stored, const ValueMapping& mapping, ValueRange if_empty) {
+  if (stored.empty()) return if_empty;
+  const auto [min, max] = std::minmax({DataValue(mapping, stored.low), DataValue(mapping, stored.high)});  // the scale may be negative
+  return {min, max};
+}
+
+// Ranges of the bricks of one row of bricks along x. Rows of voxels are first folded onto each other, which vectorises for every type, and
+// then into bricks.
+template <class T>
+class BrickRow {
+ public:
+  explicit BrickRow(std::int32_t width) : low_(std::size_t(width)), high_(std::size_t(width)) {}
+
+  void Clear() {
+    std::fill(low_.begin(), low_.end(), std::numeric_limits<T>::max());
+    std::fill(high_.begin(), high_.end(), std::numeric_limits<T>::lowest());
+  }
+
+  void Fold(const T* __restrict row) {
+    T* __restrict low = low_.data();
+    T* __restrict high = high_.data();
+    const std::size_t width = low_.size();
+    for (std::size_t x = 0; x < width; ++x) {
+      const T value = row[x];
+      if constexpr (std::is_floating_point_v<T>) {
+        // Comparisons with NaN are false; infinite values are replaced by what is there.
+        const bool finite = IsFinite(value);
+        const T low_value = finite ? value : low[x], high_value = finite ? value : high[x];
+        low[x] = low_value < low[x] ? low_value : low[x];
+        high[x] = high_value > high[x] ? high_value : high[x];
+      } else {
+        low[x] = std::min(low[x], value);
+        high[x] = std::max(high[x], value);
+      }
+    }
+  }
+
+  StoredRange<T> Brick(std::int32_t brick) const {
+    const std::size_t begin = std::size_t(brick) * kSummaryBrick, end = std::min(begin + kSummaryBrick, low_.size());
+    StoredRange<T> range;
+    for (std::size_t x = begin; x < end; ++x) range.Include({low_[x], high_[x]});
+    return range;
+  }
+
+ private:
+  std::vector<T> low_, high_;
+};
+
+// How often each stored integer occurs. Neighbouring voxels are often equal, and counting them in the same place would make each wait for
+// the one before it: four tables take turns.
+template <class T>
+class StoredCounts {
+ public:
+  static constexpr std::size_t kValues = std::size_t{std::numeric_limits<T>::max()} + 1;
+
+  void Add(const T* row, std::int32_t width) {
+    std::int32_t x = 0;
+    for (; x + kWays <= width; x += kWays) {
+      for (std::size_t way = 0; way < kWays; ++way) ++counts_[way * kValues + row[x + std::int32_t(way)]];
+    }
+    for (; x < width; ++x) ++counts_[row[x]];
+  }
+
+  std::uint64_t operator[](std::size_t value) const {
+    std::uint64_t sum = 0;
+    for (std::size_t way = 0; way < kWays; ++way) sum += counts_[way * kValues + value];
+    return sum;
+  }
+
+ private:
+  static constexpr std::int32_t kWays = 4;
+  std::vector<std::uint64_t> counts_ = std::vector<std::uint64_t>(kWays * kValues);
+};
+
+struct NoCounts {
+  void Add(const float*, std::int32_t) {}
+};
+
+template <class T>
+void FillSummary(const Volume& volume, VolumeSummary& summary) {
+  const ValueMapping& mapping = summary.description.mapping;
+  const Index3 size = summary.description.geometry.size;
+  const auto row_at = [&](std::int32_t y, std::int32_t z) { return volume.block.samples<T>() + volume.block.Offset({0, y, z}); };
+
+  StoredRange<T> whole;
+  std::conditional_t<std::is_integral_v<T>, StoredCounts<T>, NoCounts> counts;
+  BrickRow<T> brick_row(size.x);
+  summary.bricks.reserve(std::size_t(summary.brick_counts.x) * std::size_t(summary.brick_counts.y) * std::size_t(summary.brick_counts.z));
+  for (std::int32_t z_begin = 0; z_begin < size.z; z_begin += kSummaryBrick) {
+    for (std::int32_t y_begin = 0; y_begin < size.y; y_begin += kSummaryBrick) {
+      brick_row.Clear();
+      for (std::int32_t z = z_begin; z < std::min(z_begin + kSummaryBrick, size.z); ++z) {
+        for (std::int32_t y = y_begin; y < std::min(y_begin + kSummaryBrick, size.y); ++y) {
+          brick_row.Fold(row_at(y, z));
+          counts.Add(row_at(y, z), size.x);
+        }
+      }
+      for (std::int32_t brick = 0; brick < summary.brick_counts.x; ++brick) {
+        const StoredRange<T> range = brick_row.Brick(brick);
+        whole.Include(range);
+        summary.bricks.push_back(ToDataValues(range, mapping, kNoFiniteValue));
+      }
+    }
+  }
+  summary.range = ToDataValues(whole, mapping, ValueRange{0, 0});
+
+  if constexpr (std::is_integral_v<T>) {
+    for (std::size_t stored = whole.low; stored <= whole.high; ++stored) {
+      summary.histogram[std::size_t(HistogramBin(summary.range, DataValue(mapping, double(stored))))] += counts[stored];
+    }
+  } else {
+    // Bins need the range first, so these voxels are read a second time.
+    for (std::int32_t z = 0; z < size.z; ++z) {
+      for (std::int32_t y = 0; y < size.y; ++y) {
+        const T* row = row_at(y, z);
+        for (std::int32_t x = 0; x < size.x; ++x) {
+          if (IsFinite(row[x])) {
+            ++summary.histogram[std::size_t(HistogramBin(summary.range, DataValue(mapping, double(row[x]))))];
+          } else {
+            ++summary.non_finite;
+          }
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+
+VolumeSummary Summarize(const Volume& volume) {
+  VolumeSummary summary;
+  summary.description = volume.description;
+  const Index3 size = volume.description.geometry.size;
+  const auto bricks_along = [](std::int32_t voxels) { return (voxels + kSummaryBrick - 1) / kSummaryBrick; };
+  summary.brick_counts = {bricks_along(size.x), bricks_along(size.y), bricks_along(size.z)};
+  VisitScalarType(volume.description.type, [&]<class T>(const T*) { FillSummary<T>(volume, summary); });
+  return summary;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,33 @@
+// The samples of a volume file, behind its header: where they lie and how they are packed. Reading them here, and not in ITK's readers,
+// which take a missing end for zeros (NIfTI, MetaImage) and hold the samples twice, finds every truncation and needs no second copy.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+
+#include "common/base/status.h"
+
+namespace slabstream {
+
+struct Payload {
+  std::filesystem::path file;
+  std::int64_t offset = 0;  // bytes of the file before the samples (or before the compressed stream)
+  bool compressed = false;  // gzip or zlib, whichever its first bytes say
+  std::int64_t skip = 0;    // bytes of the decompressed stream before the samples
+  bool big_endian = false;
+};
+
+// DataLoss unless the file is long enough to hold `bytes` of samples - of compressed files: could be, by the largest ratio that deflate
+// reaches. To be asked before memory is taken for them. NotFound if there is no such file.
+Status CheckHolds(const Payload& payload, std::int64_t bytes);
+
+// Fills `out` with the bytes as they are in the file (byte order is not touched). A compressed stream is read to its end, so that its
+// checksum tells of damage. DataLoss: truncated or damaged. NotFound: no such file.
+Status ReadPayload(const Payload& payload, std::span<std::byte> out);
+
+// The same, without looking at what follows: for headers inside a compressed stream.
+Status ReadPayloadStart(const Payload& payload, std::span<std::byte> out);
+
+}  // namespace slabstream

@@ -1,0 +1,51 @@
+// What every format's reader makes of a file: its description and its samples as they are in the file. One function a format.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "common/base/aligned_buffer.h"
+#include "common/base/status.h"
+#include "common/volume/volume.h"
+#include "common/volume_io/payload.h"
+#include "common/volume_io/sample_type.h"
+
+namespace slabstream {
+
+struct RawHeader {
+  Index3 size;
+  Vec3 spacing = {1, 1, 1};  // as in the file: may be negative, zero or NaN
+  Vec3 origin;
+  std::array<Vec3, 3> directions = {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};
+  SampleType type = SampleType::kUint8;
+  ValueMapping rescale;  // from the file's samples to data values
+
+  std::int64_t sample_bytes() const { return VolumeGeometry{size}.bounds().voxel_count() * std::int64_t(BytesPerSample(type)); }
+};
+
+struct RawVolume {
+  RawHeader header;
+  AlignedVector<std::byte> bytes;  // this machine's byte order
+};
+
+// InvalidArgument naming `path`, the axis and the limit, unless every side is in [1, kMaxVolumeSide].
+Status CheckSize(const std::string& path, const std::array<std::int64_t, 3>& size);
+
+// The payload moved so that its samples are the last bytes of its file. NotFound naming `path` and the file, if it does not exist.
+Result<Payload> FromTheEnd(Payload payload, const std::string& path, std::int64_t sample_bytes);
+
+// Takes memory for the samples and reads them, after both the file and the memory were found large enough.
+Result<RawVolume> ReadSamples(const std::string& path, const RawHeader& header, const Payload& payload);
+
+// The formats. Errors as in volume_reader.h.
+Result<RawVolume> ReadNifti(const std::string& path);
+Result<RawVolume> ReadNrrd(const std::string& path);
+Result<RawVolume> ReadMetaImage(const std::string& path);
+Result<RawVolume> ReadTiff(const std::string& path);  // a multi-page file, or a directory of slices
+
+// The TIFF files of a directory in natural order ("s2.tif" before "s10.tif"); empty if there are none or it is no directory.
+std::vector<std::string> TiffFilesIn(const std::string& directory);
+
+}  // namespace slabstream

@@ -1,0 +1,140 @@
+#include "common/volume_io/sample_type.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <span>
+#include <type_traits>
+#include <utility>
+
+namespace slabstream {
+namespace {
+
+template <class Function>
+decltype(auto) Visit(SampleType type, Function&& function) {
+  switch (type) {
+    case SampleType::kInt8: return function(std::int8_t{});
+    case SampleType::kUint8: return function(std::uint8_t{});
+    case SampleType::kInt16: return function(std::int16_t{});
+    case SampleType::kUint16: return function(std::uint16_t{});
+    case SampleType::kInt32: return function(std::int32_t{});
+    case SampleType::kUint32: return function(std::uint32_t{});
+    case SampleType::kInt64: return function(std::int64_t{});
+    case SampleType::kUint64: return function(std::uint64_t{});
+    case SampleType::kFloat32: return function(float{});
+    case SampleType::kFloat64: break;
+  }
+  return function(double{});
+}
+
+template <class T>
+std::span<T> SamplesOf(AlignedVector<std::byte>& bytes) {
+  return {reinterpret_cast<T*>(bytes.data()), bytes.size() / sizeof(T)};
+}
+
+// Adding half of the type's range to a two's complement integer, modulo that range, turns its sign bit around.
+template <class Signed, class Unsigned>
+KeptSamples ShiftSign(AlignedVector<std::byte> bytes, ScalarType type) {
+  constexpr auto kSignBit = Unsigned(Unsigned{1} << (8 * sizeof(Unsigned) - 1));
+  for (Unsigned& sample : SamplesOf<Unsigned>(bytes)) sample = Unsigned(sample ^ kSignBit);
+  return {type, double(std::numeric_limits<Signed>::min()), true, std::move(bytes)};
+}
+
+template <class T>
+bool ExactAsFloat(T value) {
+  const auto rounded = float(value);
+  if constexpr (std::is_floating_point_v<T>) {
+    return double(rounded) == value || std::isnan(value);
+  } else {
+    // Rounding up may lead out of the integer's range, where converting back is undefined.
+    return rounded < std::ldexp(1.0F, std::numeric_limits<T>::digits) && T(rounded) == value;
+  }
+}
+
+template <class T>
+bool IsInteger(T value) {
+  if constexpr (std::is_floating_point_v<T>) {
+    return std::trunc(value) == value;  // false for NaN
+  } else {
+    return true;
+  }
+}
+
+// Narrows samples of 32 and 64 bits: to uint16 where all are integers within a stretch of 65536, else to float.
+template <class T>
+KeptSamples Narrow(AlignedVector<std::byte> bytes) {
+  constexpr T kSpan = 65535;
+  const std::span<T> samples = SamplesOf<T>(bytes);
+  T low = std::numeric_limits<T>::max(), high = std::numeric_limits<T>::lowest();
+  bool integers = true;
+  for (const T sample : samples) {
+    low = std::min(low, sample);
+    high = std::max(high, sample);
+    integers = integers && IsInteger(sample);
+  }
+  KeptSamples kept;
+  // Compared without subtracting, which could overflow.
+  const bool fits = integers && (low >= std::numeric_limits<T>::max() - kSpan || high <= low + kSpan);
+  if (fits) {
+    const T shift = low >= 0 && high <= kSpan ? T{0} : low;
+    kept = {ScalarType::kUint16, double(shift), ExactAsFloat(shift) || std::abs(double(shift)) <= 0x1p53, {}};
+    kept.bytes.resize(samples.size() * sizeof(std::uint16_t));
+    const std::span<std::uint16_t> out = SamplesOf<std::uint16_t>(kept.bytes);
+    for (std::size_t i = 0; i < samples.size(); ++i) out[i] = std::uint16_t(samples[i] - shift);
+  } else {
+    kept.type = ScalarType::kFloat32;
+    kept.bytes.resize(samples.size() * sizeof(float));
+    const std::span<float> out = SamplesOf<float>(kept.bytes);
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      out[i] = float(samples[i]);
+      kept.exact = kept.exact && ExactAsFloat(samples[i]);
+    }
+  }
+  return kept;
+}
+
+}  // namespace
+
+std::string_view ToString(SampleType type) {
+  switch (type) {
+    case SampleType::kInt8: return "int8";
+    case SampleType::kUint8: return "uint8";
+    case SampleType::kInt16: return "int16";
+    case SampleType::kUint16: return "uint16";
+    case SampleType::kInt32: return "int32";
+    case SampleType::kUint32: return "uint32";
+    case SampleType::kInt64: return "int64";
+    case SampleType::kUint64: return "uint64";
+    case SampleType::kFloat32: return "float32";
+    case SampleType::kFloat64: break;
+  }
+  return "float64";
+}
+
+std::size_t BytesPerSample(SampleType type) {
+  return Visit(type, [](auto sample) { return sizeof(sample); });
+}
+
+void SwapByteOrder(SampleType type, AlignedVector<std::byte>& bytes) {
+  const std::size_t size = BytesPerSample(type);
+  for (std::size_t i = 0; i < bytes.size(); i += size) std::reverse(bytes.data() + i, bytes.data() + i + size);
+}
+
+KeptSamples Keep(SampleType type, AlignedVector<std::byte> bytes) {
+  switch (type) {
+    case SampleType::kUint8: return {ScalarType::kUint8, 0, true, std::move(bytes)};
+    case SampleType::kUint16: return {ScalarType::kUint16, 0, true, std::move(bytes)};
+    case SampleType::kFloat32: return {ScalarType::kFloat32, 0, true, std::move(bytes)};
+    case SampleType::kInt8: return ShiftSign<std::int8_t, std::uint8_t>(std::move(bytes), ScalarType::kUint8);
+    case SampleType::kInt16: return ShiftSign<std::int16_t, std::uint16_t>(std::move(bytes), ScalarType::kUint16);
+    case SampleType::kInt32: return Narrow<std::int32_t>(std::move(bytes));
+    case SampleType::kUint32: return Narrow<std::uint32_t>(std::move(bytes));
+    case SampleType::kInt64: return Narrow<std::int64_t>(std::move(bytes));
+    case SampleType::kUint64: return Narrow<std::uint64_t>(std::move(bytes));
+    case SampleType::kFloat64: break;
+  }
+  return Narrow<double>(std::move(bytes));
+}
+
+}  // namespace slabstream

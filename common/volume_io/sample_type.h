@@ -1,0 +1,32 @@
+// The sample types that volume files hold, and how they become the three types that are kept (volume_reader.h says which becomes which).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "common/base/aligned_buffer.h"
+#include "common/volume/volume.h"
+
+namespace slabstream {
+
+enum class SampleType : std::uint8_t { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kInt64, kUint64, kFloat32, kFloat64 };
+
+std::string_view ToString(SampleType type);  // "int16"
+std::size_t BytesPerSample(SampleType type);
+
+// Turns samples between big and little endian, in place. `bytes` holds whole samples.
+void SwapByteOrder(SampleType type, AlignedVector<std::byte>& bytes);
+
+struct KeptSamples {
+  ScalarType type = ScalarType::kUint8;
+  double shift = 0;   // value in the file = stored sample + shift
+  bool exact = true;  // every value of the file is kept exactly
+  AlignedVector<std::byte> bytes;
+};
+
+// `bytes` holds samples of `type` in this machine's byte order, aligned, and is taken over: types of the same size are converted in place,
+// wider ones need the memory of the kept samples on top.
+KeptSamples Keep(SampleType type, AlignedVector<std::byte> bytes);
+
+}  // namespace slabstream

@@ -1,0 +1,64 @@
+#include "common/volume_io/text_header.h"
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <fstream>
+
+namespace slabstream {
+namespace {
+
+std::string Trimmed(const std::string& text) {
+  constexpr const char* kBlanks = " \t\r\n";
+  const std::size_t begin = text.find_first_not_of(kBlanks);
+  return begin == std::string::npos ? "" : text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
+}
+
+}  // namespace
+
+std::optional<std::string> TextHeader::Find(const std::string& key) const {
+  const auto found = fields.find(key);
+  return found == fields.end() ? std::nullopt : std::optional(found->second);
+}
+
+Result<TextHeader> ReadTextHeader(const std::string& path, char separator, KeyCase key_case, const std::string& last_key) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return Status::NotFound(path + ": cannot be opened for reading");
+  // A limit on what is looked at, so that a large binary file is never taken for one endless line.
+  std::string text(kMaxTextHeader, '\0');
+  file.read(text.data(), std::streamsize(text.size()));
+  text.resize(std::size_t(file.gcount()));
+
+  TextHeader header;
+  std::size_t begin = 0;
+  while (begin < text.size()) {
+    const std::size_t newline = text.find('\n', begin);
+    if (newline == std::string::npos && text.size() == kMaxTextHeader) {
+      return Status::InvalidArgument(path + ": the header is longer than " + std::to_string(kMaxTextHeader) + " bytes");
+    }
+    const std::string line = Trimmed(text.substr(begin, newline - begin));
+    begin = newline == std::string::npos ? text.size() : newline + 1;
+    header.end = std::int64_t(begin);
+    if (line.empty()) break;
+    const std::size_t at = line.find(separator);
+    if (line.front() == '#' || at == std::string::npos) continue;
+    const std::string written = Trimmed(line.substr(0, at));
+    const std::string key = key_case == KeyCase::kLower ? ToLower(written) : written;
+    header.fields.emplace(key, Trimmed(line.substr(at + 1)));
+    if (key == last_key) break;
+  }
+  return header;
+}
+
+std::optional<std::int64_t> ToInteger(const std::string& text) {
+  std::int64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && end == text.data() + text.size() ? std::optional(value) : std::nullopt;
+}
+
+std::string ToLower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  return text;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,294 @@
+// TIFF: a multi-page file, or a directory of files, one a slice. Read through libtiff itself: ITK's reader has no 64-bit samples, spoils
+// 32-bit integers and prints to stderr what is wrong.
+//
+// TIFF knows no distance between slices, and its resolution speaks of print: spacing is 1 along x and z, and along y what the two
+// resolutions give.
+#include <tiffio.h>
+
+#include <algorithm>
+#include <cstdarg>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "common/volume/memory_budget.h"
+#include "common/volume_io/raw_volume.h"
+#include "common/volume_io/text_header.h"
+
+namespace slabstream {
+namespace {
+
+// What libtiff complained about first; the rest are consequences.
+struct Complaint {
+  std::string text;
+};
+
+int KeepFirst(TIFF*, void* complaint, const char*, const char* format, va_list arguments) {
+  std::string& text = static_cast<Complaint*>(complaint)->text;
+  if (text.empty()) {
+    std::array<char, 256> buffer{};
+    (void)std::vsnprintf(buffer.data(), buffer.size(), format, arguments);
+    text = buffer.data();
+  }
+  return 1;  // handled: nothing goes to stderr
+}
+
+int Ignore(TIFF*, void*, const char*, const char*, va_list) { return 1; }
+
+// An open file at one of its pages. Errors name the file.
+class TiffFile {
+ public:
+  explicit TiffFile(std::string path) : path_(std::move(path)) {
+    TIFFOpenOptions* options = TIFFOpenOptionsAlloc();
+    TIFFOpenOptionsSetErrorHandlerExtR(options, KeepFirst, complaint_.get());
+    TIFFOpenOptionsSetWarningHandlerExtR(options, Ignore, nullptr);
+    tiff_.reset(TIFFOpenExt(path_.c_str(), "rm", options));  // m: no memory mapping, which a shrinking file would turn into a signal
+    TIFFOpenOptionsFree(options);
+  }
+
+  bool is_open() const { return tiff_ != nullptr; }
+  Status Failed(StatusCode code, const std::string& why) const {
+    return {code, path_ + ": " + why + (complaint_->text.empty() ? "" : ": " + complaint_->text)};
+  }
+  Status Damaged() const { return Failed(StatusCode::kDataLoss, "truncated or damaged"); }
+  Status NotTiff() const { return Failed(StatusCode::kInvalidArgument, "not a TIFF volume"); }
+
+  // Pages to the end of the chain; an end that is broken off is an error.
+  Result<std::int64_t> CountPages() {
+    std::int64_t pages = 1;
+    while (TIFFReadDirectory(tiff_.get()) != 0) {
+      if (++pages > kMaxVolumeSide) break;
+    }
+    if (!complaint_->text.empty()) return Failed(StatusCode::kDataLoss, "truncated or damaged after page " + std::to_string(pages));
+    return pages;
+  }
+  Status GoToFirstPage() { return TIFFSetDirectory(tiff_.get(), 0) != 0 ? Status::Ok() : Damaged(); }
+  Status GoToNextPage() { return TIFFReadDirectory(tiff_.get()) != 0 ? Status::Ok() : Damaged(); }
+
+  // Size (along z: 1), type and spacing of this page. InvalidArgument unless it has one sample a pixel of a type that is supported.
+  Result<RawHeader> ReadPageHeader() const;
+
+  // The samples of this page, `header` being its own, in this machine's byte order. DataLoss: truncated or damaged.
+  Status ReadPage(const RawHeader& header, std::byte* out);
+
+ private:
+  template <class T>
+  T Field(ttag_t tag, T if_absent) const {
+    T value = if_absent;
+    return TIFFGetFieldDefaulted(tiff_.get(), tag, &value) != 0 ? value : if_absent;
+  }
+  Status ReadTiles(const RawHeader& header, std::byte* out);
+
+  std::string path_;
+  std::unique_ptr<Complaint> complaint_ = std::make_unique<Complaint>();  // its address is the handler's
+  struct Close {
+    void operator()(TIFF* tiff) const { TIFFClose(tiff); }
+  };
+  std::unique_ptr<TIFF, Close> tiff_;
+};
+
+std::optional<SampleType> ToSampleType(unsigned bits, unsigned format) {
+  switch (format) {
+    case SAMPLEFORMAT_UINT:
+    case SAMPLEFORMAT_VOID:
+      return bits == 8    ? std::optional(SampleType::kUint8)
+             : bits == 16 ? std::optional(SampleType::kUint16)
+             : bits == 32 ? std::optional(SampleType::kUint32)
+             : bits == 64 ? std::optional(SampleType::kUint64)
+                          : std::nullopt;
+    case SAMPLEFORMAT_INT:
+      return bits == 8    ? std::optional(SampleType::kInt8)
+             : bits == 16 ? std::optional(SampleType::kInt16)
+             : bits == 32 ? std::optional(SampleType::kInt32)
+             : bits == 64 ? std::optional(SampleType::kInt64)
+                          : std::nullopt;
+    case SAMPLEFORMAT_IEEEFP:
+      return bits == 32 ? std::optional(SampleType::kFloat32) : bits == 64 ? std::optional(SampleType::kFloat64) : std::nullopt;
+    default: return std::nullopt;
+  }
+}
+
+Result<RawHeader> TiffFile::ReadPageHeader() const {
+  const auto samples = Field<std::uint16_t>(TIFFTAG_SAMPLESPERPIXEL, 1);
+  if (samples != 1 || Field<std::uint16_t>(TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK) == PHOTOMETRIC_PALETTE) {
+    return Failed(StatusCode::kInvalidArgument,
+                  "a colour image (" + std::to_string(samples) + " samples a pixel or a palette), must have 1 sample");
+  }
+  const auto bits = Field<std::uint16_t>(TIFFTAG_BITSPERSAMPLE, 1), format = Field<std::uint16_t>(TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_UINT);
+  const std::optional<SampleType> type = ToSampleType(bits, format);
+  if (!type) {
+    return Failed(StatusCode::kInvalidArgument, "samples of " + std::to_string(bits) + " bits and format " + std::to_string(format) +
+                                                    " are not supported, integers of 8 to 64 bits and floats of 32 and 64 bits are");
+  }
+  const auto width = Field<std::uint32_t>(TIFFTAG_IMAGEWIDTH, 0), height = Field<std::uint32_t>(TIFFTAG_IMAGELENGTH, 0);
+  if (Status status = CheckSize(path_, {width, height, 1}); !status.ok()) return status;
+
+  RawHeader header;
+  header.size = {std::int32_t(width), std::int32_t(height), 1};
+  header.type = *type;
+  const auto x_resolution = Field<float>(TIFFTAG_XRESOLUTION, 0), y_resolution = Field<float>(TIFFTAG_YRESOLUTION, 0);
+  if (x_resolution > 0 && y_resolution > 0) header.spacing.y = double(x_resolution) / double(y_resolution);
+  return header;
+}
+
+Status TiffFile::ReadPage(const RawHeader& header, std::byte* out) {
+  if (TIFFIsTiled(tiff_.get()) != 0) return ReadTiles(header, out);
+  const std::size_t row_bytes = std::size_t(header.size.x) * BytesPerSample(header.type);
+  // libtiff writes whole scanlines, of a length that it works out itself.
+  if (std::size_t(TIFFScanlineSize64(tiff_.get())) != row_bytes) return Damaged();
+  for (std::int32_t y = 0; y < header.size.y; ++y) {
+    if (TIFFReadScanline(tiff_.get(), out + std::size_t(y) * row_bytes, std::uint32_t(y), 0) < 0) return Damaged();
+  }
+  return Status::Ok();
+}
+
+Status TiffFile::ReadTiles(const RawHeader& header, std::byte* out) {
+  const auto tile_width = Field<std::uint32_t>(TIFFTAG_TILEWIDTH, 0), tile_height = Field<std::uint32_t>(TIFFTAG_TILELENGTH, 0);
+  const std::size_t sample_bytes = BytesPerSample(header.type);
+  const std::uint64_t tile_bytes = TIFFTileSize64(tiff_.get());
+  const std::uint32_t side_limit = std::uint32_t{kMaxVolumeSide} + 1;
+  if (tile_width == 0 || tile_height == 0 || tile_width > side_limit || tile_height > side_limit ||
+      tile_bytes != std::uint64_t{tile_width} * tile_height * sample_bytes) {
+    return Damaged();
+  }
+  if (Status status = CheckFitsMemory(std::int64_t(tile_bytes), path_ + ": one tile"); !status.ok()) return status;
+  std::vector<std::byte> tile(tile_bytes);
+  const auto width = std::uint32_t(header.size.x), height = std::uint32_t(header.size.y);
+  for (std::uint32_t y = 0; y < height; y += tile_height) {
+    for (std::uint32_t x = 0; x < width; x += tile_width) {
+      if (TIFFReadTile(tiff_.get(), tile.data(), x, y, 0, 0) < 0) return Damaged();
+      const std::size_t run_bytes = std::min(tile_width, width - x) * sample_bytes;
+      for (std::uint32_t row = 0; row < std::min(tile_height, height - y); ++row) {
+        std::memcpy(out + ((std::size_t(y) + row) * width + x) * sample_bytes, tile.data() + std::size_t(row) * tile_width * sample_bytes,
+                    run_bytes);
+      }
+    }
+  }
+  return Status::Ok();
+}
+
+// Memory for a whole volume of pages like `page`, after looking whether files of that many bytes can hold it.
+Result<RawVolume> Allocate(const std::string& path, const RawHeader& page, std::int64_t pages, std::int64_t file_bytes) {
+  if (Status status = CheckSize(path, {page.size.x, page.size.y, pages}); !status.ok()) return status;
+  RawVolume raw{page, {}};
+  raw.header.size.z = std::int32_t(pages);
+  const std::int64_t needed = raw.header.sample_bytes();
+  // More than what LZW (1400), deflate (1032) and LZMA (7000) reach; a file that claims more than that is damaged.
+  constexpr std::int64_t kMaxRatio = 8192;
+  if (needed / kMaxRatio > file_bytes) {
+    return Status::DataLoss(path + ": truncated: the header speaks of " + std::to_string(needed) + " bytes of samples, the file has " +
+                            std::to_string(file_bytes));
+  }
+  if (Status status = CheckFitsMemory(needed, path); !status.ok()) return status;
+  raw.bytes.resize(std::size_t(needed));
+  return raw;
+}
+
+std::int64_t FileBytes(const std::string& path) {
+  std::error_code error;
+  const auto bytes = std::filesystem::file_size(path, error);
+  return error ? 0 : std::int64_t(bytes);
+}
+
+bool SamePage(const RawHeader& a, const RawHeader& b) { return a.size == b.size && a.type == b.type; }
+
+Status Differs(const std::string& what, const RawHeader& page, const RawHeader& first) {
+  const auto text = [](const RawHeader& header) {
+    return std::to_string(header.size.x) + " x " + std::to_string(header.size.y) + " " + std::string(ToString(header.type));
+  };
+  return Status::InvalidArgument(what + " is " + text(page) + ", must be " + text(first) + " like the first one");
+}
+
+Result<RawVolume> ReadPages(const std::string& path) {
+  TiffFile file(path);
+  if (!file.is_open()) return file.NotTiff();
+  const Result<RawHeader> first = file.ReadPageHeader();
+  if (!first.ok()) return first.status();
+  const Result<std::int64_t> pages = file.CountPages();
+  if (!pages.ok()) return pages.status();
+  if (*pages == 1) return Status::InvalidArgument(path + ": has 2 dimensions, must have 3 (a page for each slice)");
+  Result<RawVolume> raw = Allocate(path, *first, *pages, FileBytes(path));
+  for (std::int64_t page = 0; raw.ok() && page < *pages; ++page) {
+    if (Status status = page == 0 ? file.GoToFirstPage() : file.GoToNextPage(); !status.ok()) return status;
+    const Result<RawHeader> header = file.ReadPageHeader();
+    if (!header.ok()) return header.status();
+    if (!SamePage(*header, *first)) return Differs(path + ": page " + std::to_string(page + 1), *header, *first);
+    if (Status status = file.ReadPage(*header, raw->bytes.data() + page * header->sample_bytes()); !status.ok()) return status;
+  }
+  return raw;
+}
+
+Result<RawVolume> ReadSlices(const std::string& directory, const std::vector<std::string>& paths) {
+  std::int64_t file_bytes = 0;
+  for (const std::string& path : paths) file_bytes += FileBytes(path);
+  std::optional<RawVolume> raw;
+  RawHeader first;
+  for (std::size_t slice = 0; slice < paths.size(); ++slice) {
+    TiffFile file(paths[slice]);
+    if (!file.is_open()) return file.NotTiff();
+    const Result<RawHeader> header = file.ReadPageHeader();
+    if (!header.ok()) return header.status();
+    if (!raw) {
+      first = *header;
+      Result<RawVolume> allocated = Allocate(directory, first, std::int64_t(paths.size()), file_bytes);
+      if (!allocated.ok()) return allocated.status();
+      raw = std::move(*allocated);
+    }
+    if (!SamePage(*header, first)) return Differs(paths[slice], *header, first);
+    if (Status status = file.ReadPage(*header, raw->bytes.data() + std::int64_t(slice) * first.sample_bytes()); !status.ok()) return status;
+    const Result<std::int64_t> pages = file.CountPages();
+    if (!pages.ok()) return pages.status();
+    if (*pages != 1)
+      return Status::InvalidArgument(paths[slice] + ": has " + std::to_string(*pages) + " pages, must have 1 in a directory of slices");
+  }
+  return std::move(*raw);
+}
+
+// Names with numbers in them by the numbers' values: s2 before s10.
+bool NaturallyBefore(const std::string& a, const std::string& b) {
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  std::size_t i = 0, j = 0;
+  while (i < a.size() && j < b.size()) {
+    if (!is_digit(a[i]) || !is_digit(b[j])) {
+      if (a[i] != b[j]) return a[i] < b[j];
+      ++i, ++j;
+      continue;
+    }
+    const auto number = [&](const std::string& text, std::size_t& at) {
+      const std::size_t begin = at;
+      while (at < text.size() && is_digit(text[at])) ++at;
+      const std::string digits = text.substr(begin, at - begin);
+      return digits.substr(std::min(digits.find_first_not_of('0'), digits.size()));
+    };
+    const std::string m = number(a, i), n = number(b, j);
+    if (m.size() != n.size()) return m.size() < n.size();
+    if (m != n) return m < n;
+  }
+  if (a.size() - i != b.size() - j) return a.size() - i < b.size() - j;
+  return a < b;  // they differ in leading zeros only
+}
+
+}  // namespace
+
+std::vector<std::string> TiffFilesIn(const std::string& directory) {
+  std::vector<std::string> paths;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(directory, error)) {
+    const std::string ending = ToLower(entry.path().extension().string());
+    if ((ending == ".tif" || ending == ".tiff") && entry.is_regular_file(error)) paths.push_back(entry.path().string());
+  }
+  std::sort(paths.begin(), paths.end(), NaturallyBefore);
+  return paths;
+}
+
+Result<RawVolume> ReadTiff(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_directory(path, error)) return ReadPages(path);
+  const std::vector<std::string> slices = TiffFilesIn(path);
+  if (slices.empty()) return Status::InvalidArgument(path + ": a directory without TIFF files is not a volume");
+  return ReadSlices(path, slices);
+}
+
+}  // namespace slabstream

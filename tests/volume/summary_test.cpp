@@ -1,0 +1,145 @@
+#include "common/volume/summary.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "tests/support/random_volume.h"
+
+namespace slabstream {
+namespace {
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr ScalarType kTypes[] = {ScalarType::kUint8, ScalarType::kUint16, ScalarType::kFloat32};
+
+// The definition, voxel by voxel.
+VolumeSummary SummarizeByDefinition(const Volume& volume) {
+  const Index3 size = volume.description.geometry.size;
+  const auto value_at = [&](const Index3& v) {
+    const double stored = VisitScalarType(volume.description.type,
+                                          [&]<class T>(const T*) { return double(volume.block.samples<T>()[volume.block.Offset(v)]); });
+    return std::isfinite(stored) ? float(volume.description.mapping.FromStored(stored)) : float(stored);
+  };
+  const auto range_of = [&](const Box& box, ValueRange if_empty) {
+    ValueRange range = {kInfinity, -kInfinity};
+    for (std::int32_t z = box.begin.z; z < box.end.z; ++z) {
+      for (std::int32_t y = box.begin.y; y < box.end.y; ++y) {
+        for (std::int32_t x = box.begin.x; x < box.end.x; ++x) {
+          const float value = value_at({x, y, z});
+          if (std::isfinite(value)) range = {std::min(range.min, value), std::max(range.max, value)};
+        }
+      }
+    }
+    return range.min > range.max ? if_empty : range;
+  };
+
+  VolumeSummary summary;
+  summary.description = volume.description;
+  const Box bounds = volume.description.geometry.bounds();
+  summary.range = range_of(bounds, {0, 0});
+  const auto bricks = [](std::int32_t side) { return int(std::ceil(side / double(kSummaryBrick))); };
+  summary.brick_counts = {bricks(size.x), bricks(size.y), bricks(size.z)};
+  for (int z = 0; z < summary.brick_counts.z; ++z) {
+    for (int y = 0; y < summary.brick_counts.y; ++y) {
+      for (int x = 0; x < summary.brick_counts.x; ++x) {
+        const Index3 begin = {x * kSummaryBrick, y * kSummaryBrick, z * kSummaryBrick};
+        const Index3 end = {begin.x + kSummaryBrick, begin.y + kSummaryBrick, begin.z + kSummaryBrick};
+        summary.bricks.push_back(range_of(Intersection({begin, end}, bounds), kNoFiniteValue));
+      }
+    }
+  }
+  for (std::int32_t z = 0; z < size.z; ++z) {
+    for (std::int32_t y = 0; y < size.y; ++y) {
+      for (std::int32_t x = 0; x < size.x; ++x) {
+        const float value = value_at({x, y, z});
+        if (std::isfinite(value)) {
+          ++summary.histogram[std::size_t(HistogramBin(summary.range, value))];
+        } else {
+          ++summary.non_finite;
+        }
+      }
+    }
+  }
+  return summary;
+}
+
+void ExpectEqual(const VolumeSummary& found, const VolumeSummary& expected) {
+  EXPECT_EQ(found.range, expected.range);
+  EXPECT_EQ(found.histogram, expected.histogram);
+  EXPECT_EQ(found.brick_counts, expected.brick_counts);
+  EXPECT_EQ(found.bricks, expected.bricks);
+  EXPECT_EQ(found.non_finite, expected.non_finite);
+  EXPECT_EQ(found, expected);
+}
+
+TEST(Summary, IsWhatItsDefinitionSaysForEveryTypeAndOddSizes) {
+  Random random(1);
+  SCOPED_TRACE(random.trace());
+  for (const ScalarType type : kTypes) {
+    for (const Index3& size : {Index3{1, 1, 1}, Index3{16, 16, 16}, Index3{17, 1, 33}, Index3{15, 31, 2}, Index3{40, 19, 21}}) {
+      for (const ValueMapping& mapping : {ValueMapping{}, ValueMapping{1, -32768}, ValueMapping{-0.25, 3}}) {
+        SCOPED_TRACE(testing::Message() << "type " << int(type) << " size " << size.x << " " << size.y << " " << size.z << " scale "
+                                        << mapping.scale);
+        Volume volume = RandomVolume(random, size, type);
+        volume.description.mapping = mapping;
+        ExpectEqual(Summarize(volume), SummarizeByDefinition(volume));
+      }
+    }
+  }
+}
+
+TEST(Summary, LeavesValuesOutThatAreNotFinite) {
+  Random random(2);
+  SCOPED_TRACE(random.trace());
+  const Volume volume = MakeTestVolume({37, 20, 18}, ScalarType::kFloat32, [&](const Index3& v) -> float {
+    if (v.x < 16 && v.y < 16 && v.z < 16) return kNan;  // a brick without any finite value
+    const int kind = random.Integer(0, 9);
+    return kind == 0 ? kNan : kind == 1 ? kInfinity : kind == 2 ? -kInfinity : float(random.Real(-5, 5));
+  });
+  const VolumeSummary summary = Summarize(volume);
+  ExpectEqual(summary, SummarizeByDefinition(volume));
+  EXPECT_EQ(summary.bricks.front(), kNoFiniteValue);
+  EXPECT_GT(summary.bricks.front().min, summary.bricks.front().max);
+}
+
+TEST(Summary, OfNothingFiniteHasAnEmptyHistogram) {
+  const VolumeSummary summary = Summarize(MakeTestVolume({3, 3, 3}, ScalarType::kFloat32, [](const Index3&) { return kNan; }));
+  EXPECT_EQ(summary.range, (ValueRange{0, 0}));
+  EXPECT_EQ(summary.non_finite, 27);
+  EXPECT_THAT(summary.histogram, testing::Each(0));
+}
+
+TEST(Summary, OfOneValueIsOneBin) {
+  for (const ScalarType type : kTypes) {
+    const VolumeSummary summary = Summarize(MakeTestVolume({5, 4, 3}, type, [](const Index3&) { return 7; }));
+    EXPECT_EQ(summary.range, (ValueRange{7, 7}));
+    EXPECT_EQ(summary.histogram.front(), 60U);
+    EXPECT_EQ(std::accumulate(summary.histogram.begin(), summary.histogram.end(), std::uint64_t{0}), 60U);
+  }
+}
+
+TEST(HistogramBin, GivesUpTo256IntegersABinEach) {
+  for (int last = 1; last < kHistogramBins; ++last) {
+    int before = -1;
+    for (int value = 0; value <= last; ++value) {
+      const int bin = HistogramBin({-3.0F, float(last - 3)}, value - 3);
+      EXPECT_GT(bin, before) << value << " of " << last;
+      before = bin;
+    }
+    EXPECT_EQ(before, kHistogramBins - 1);
+  }
+}
+
+TEST(HistogramBin, TakesTheWidestRangeOfFloats) {
+  constexpr float kLargest = std::numeric_limits<float>::max();
+  EXPECT_EQ(HistogramBin({-kLargest, kLargest}, -kLargest), 0);
+  EXPECT_EQ(HistogramBin({-kLargest, kLargest}, 0), kHistogramBins / 2);
+  EXPECT_EQ(HistogramBin({-kLargest, kLargest}, kLargest), kHistogramBins - 1);
+}
+
+}  // namespace
+}  // namespace slabstream

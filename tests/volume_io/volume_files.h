@@ -1,0 +1,61 @@
+// Volume files written byte by byte from the formats' definitions, so that the readers are not tested against ITK's own idea of them.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "common/math/vec.h"
+#include "common/volume_io/sample_type.h"
+
+namespace slabstream {
+
+// A directory of its own for each test, removed at the end.
+class TemporaryDirectory {
+ public:
+  TemporaryDirectory();
+  ~TemporaryDirectory();
+  TemporaryDirectory(const TemporaryDirectory&) = delete;
+  TemporaryDirectory& operator=(const TemporaryDirectory&) = delete;
+
+  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
+  std::string path() const { return path_.string(); }
+
+ private:
+  std::filesystem::path path_;
+};
+
+using FileBytes = std::string;
+
+void WriteFile(const std::string& path, const FileBytes& bytes);
+FileBytes ReadFile(const std::string& path);
+FileBytes Gzip(const FileBytes& bytes);  // one gzip member
+FileBytes Zlib(const FileBytes& bytes);
+
+// Values as samples of a type in the file's byte order; each value must fit.
+FileBytes EncodeSamples(SampleType type, const std::vector<double>& values, bool big_endian = false);
+
+struct FileSpec {
+  Index3 size = {4, 3, 2};
+  SampleType type = SampleType::kUint8;
+  bool big_endian = false;
+  Vec3 spacing = {1, 1, 1};
+  float slope = 1, intercept = 0;        // NIfTI only
+  std::vector<std::int16_t> dimensions;  // NIfTI only: dim[1] ... instead of `size`
+};
+
+FileBytes NiftiHeader(const FileSpec& spec);  // 352 bytes
+FileBytes NrrdHeader(const FileSpec& spec, const std::string& encoding,
+                     const std::string& data_file = "");  // with the empty line if attached
+FileBytes MetaHeader(const FileSpec& spec, const std::string& data_file, std::int64_t compressed_bytes = 0);  // 0: not compressed
+
+// One TIFF page a slice, through libtiff, which takes samples in this machine's byte order.
+struct TiffOptions {
+  int compression = 1;     // a number of tiff.h
+  int tile = 0;            // pixels a side; 0: strips
+  float y_resolution = 0;  // 0: no resolution, else that of x is 100
+};
+void WriteTiff(const std::string& path, const FileSpec& spec, const FileBytes& samples, const TiffOptions& options = {});
+
+}  // namespace slabstream
