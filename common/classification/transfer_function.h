@@ -1,6 +1,6 @@
 // Transfer function: data value -> colour and opacity, as ParaView exports it: a piecewise-linear colour map (RGBPoints) and an opacity
 // curve (Points) whose segments have a midpoint and a sharpness (0: linear, 1: a step at the midpoint; between them a Hermite curve,
-// as in vtkPiecewiseFunction). Outside the first and the last point the end value holds.
+// as in vtkPiecewiseFunction). Outside the first and the last point the end value holds; at a step, the last of the points at that value.
 //
 // Opacity is that of `opacity_distance` voxel lengths of material (the smallest spacing), so a value's extinction per voxel length is
 // -ln(1 - opacity) / opacity_distance; renderers correct it for the distance between their samples.
@@ -17,8 +17,8 @@
 
 namespace slabstream {
 
-inline constexpr int kMaxTransferPoints = 4096;          // of each curve
-inline constexpr double kMaxOpacityDistance = 1e6;       // voxel lengths
+inline constexpr int kMaxTransferPoints = 4096;     // of each curve
+inline constexpr double kMaxOpacityDistance = 1e6;  // voxel lengths
 
 struct Rgb {
   float r = 0, g = 0, b = 0;
@@ -32,10 +32,10 @@ struct ColorPoint {
 };
 
 struct OpacityPoint {
-  double value = 0;      // data value, finite; points ascend
-  double opacity = 0;    // [0, 1]
-  double midpoint = 0.5; // (0, 1): where between this point and the next the curve is half way
-  double sharpness = 0;  // [0, 1]
+  double value = 0;       // data value, finite; points ascend (equal values make a step)
+  double opacity = 0;     // [0, 1]
+  double midpoint = 0.5;  // (0, 1): where between this point and the next the curve is half way
+  double sharpness = 0;   // [0, 1]
   friend bool operator==(const OpacityPoint&, const OpacityPoint&) = default;
 };
 
@@ -52,12 +52,14 @@ struct TransferFunction {
 // InvalidArgument naming the point, the value and the limit, unless everything that is said above holds.
 Status Validate(const TransferFunction& transfer);
 
-// Largest opacity of any value in [low, high] (exact: at curve points and segment ends; the curves are monotone between points).
+// Largest opacity of any value in [low, high] (exact: at curve points and segment ends; the curves are monotone between points; of a step
+// above `low` both sides count). 0 if low > high. Whether a brick can be skipped is asked of the ClassificationTable instead, which is what
+// renderers see.
 double MaxOpacity(const TransferFunction& transfer, double low, double high);
 
 // Parses ParaView's colour-map JSON: an array of presets (the first counts) or one preset object, with "RGBPoints" (x, r, g, b, ...) and
 // optional "Points" (x, opacity, midpoint, sharpness, ...); without "Points" the opacity rises linearly over the colour range.
-// `name` is used in messages.
+// Colours are interpolated in RGB, whatever the map's ColorSpace. Errors: InvalidArgument, beginning with `name`.
 Result<TransferFunction> ParseParaViewColorMap(std::string_view json, std::string_view name);
 
 // Built-in transfer functions, chosen by name; "auto" is made from the histogram of the volume at hand.
@@ -70,8 +72,9 @@ const std::vector<PresetInfo>& TransferPresets();
 // NotFound naming the presets there are.
 Result<TransferFunction> MakePreset(std::string_view name, const VolumeSummary& summary);
 
-// Share of voxels with an opacity above zero, in [0, 1], estimated from the histogram for float volumes (bin centres) and exact when
-// the range has at most kHistogramBins integer values.
+// Share of voxels with an opacity above zero, in [0, 1]: exact for integer samples whose range has at most kHistogramBins values, else
+// estimated from the histogram (the first and the last bin by the ends of the range, the others by their centres). Samples that are not
+// finite are empty.
 double EstimateOccupancy(const VolumeSummary& summary, const TransferFunction& transfer);
 
 }  // namespace slabstream

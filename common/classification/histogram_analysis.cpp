@@ -1,0 +1,128 @@
+#include "common/classification/histogram_analysis.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace slabstream {
+namespace {
+
+// Counts by bin; smoothed ones are no integers.
+using Histogram = std::array<double, kHistogramBins>;
+
+constexpr int kLast = kHistogramBins - 1;
+
+double Sum(const Histogram& histogram, int first, int last) {
+  return first > last ? 0 : std::accumulate(histogram.begin() + first, histogram.begin() + last + 1, 0.0);
+}
+
+constexpr int kRadius = 2;  // bins of smoothing to either side
+
+// Mean of five neighbours: integer samples over fewer or more than 256 values leave gaps and doubled bins that mean nothing.
+Histogram Smoothed(const Histogram& histogram) {
+  Histogram smoothed;
+  for (int bin = 0; bin <= kLast; ++bin) {
+    const int first = std::max(0, bin - kRadius), last = std::min(kLast, bin + kRadius);
+    smoothed[std::size_t(bin)] = Sum(histogram, first, last) / (last - first + 1);
+  }
+  return smoothed;
+}
+
+// Whether the lowest bin is a background of its own that needs no smoothing.
+bool LowestStandsApart(const Histogram& histogram, double total) {
+  constexpr double kShare = 0.05;  // of all voxels
+  constexpr int kNeighbours = 8;
+  constexpr double kDrop = 4;
+  return histogram.front() >= kShare * total && histogram.front() >= kDrop * Sum(histogram, 1, kNeighbours);
+}
+
+int LastFilled(const Histogram& histogram) {
+  int last = kLast;
+  while (last > 0 && histogram[std::size_t(last)] == 0) --last;
+  return last;
+}
+
+// The highest bin; where smoothing spread it over its neighbours, the one that it came from.
+int FindPeak(const Histogram& histogram, const Histogram& smoothed) {
+  const auto spread = std::max_element(smoothed.begin(), smoothed.end()) - smoothed.begin();
+  const auto first = std::max<std::ptrdiff_t>(0, spread - kRadius), last = std::min<std::ptrdiff_t>(kLast, spread + kRadius);
+  return int(std::max_element(histogram.begin() + first, histogram.begin() + last + 1) - histogram.begin());
+}
+
+// The bins from the foot of the peak to the end of the histogram, walking upwards. The foot is where the histogram lies furthest below the
+// line from the peak to the last bin that holds anything, and then on as long as the flank still falls steeply.
+MaterialBins AbovePeak(const Histogram& histogram, int peak) {
+  const auto count = [&](int bin) { return histogram[std::size_t(bin)]; };
+  const int last = LastFilled(histogram);
+  if (last <= peak) return {};
+  int foot = peak + 1;
+  double deepest = -1;
+  for (int bin = peak + 1; bin <= last; ++bin) {
+    const double line = std::lerp(count(peak), count(last), double(bin - peak) / (last - peak));
+    if (line - count(bin) > deepest) {
+      deepest = line - count(bin);
+      foot = bin;
+    }
+  }
+  constexpr double kFootHeight = 0.5;  // of the peak, at most: a peak that is cut off by the end of the range has no foot there
+  if (count(foot) > kFootHeight * count(peak)) return {};
+  constexpr double kSteep = 0.85;  // of the bin before
+  while (foot < last && count(foot) > 0 && count(foot + 1) < kSteep * count(foot)) ++foot;
+  return {foot, last, 0};
+}
+
+Histogram Mirrored(Histogram histogram) {
+  std::reverse(histogram.begin(), histogram.end());
+  return histogram;
+}
+
+}  // namespace
+
+double BinValue(const ValueRange& range, int bin) {
+  if (bin == 0) return range.min;
+  if (bin == kLast) return range.max;
+  return std::lerp(double(range.min), double(range.max), (bin + 0.5) / kHistogramBins);
+}
+
+double BinBorder(const ValueRange& range, int bin) { return std::lerp(double(range.min), double(range.max), bin / double(kHistogramBins)); }
+
+Foreground FindForeground(const VolumeSummary& summary) {
+  constexpr double kNoiseShare = 0.2;  // of the other side
+  Histogram histogram;
+  std::copy(summary.histogram.begin(), summary.histogram.end(), histogram.begin());
+  const double total = Sum(histogram, 0, kLast);
+  if (total == 0) return {};
+
+  Foreground foreground;
+  if (LowestStandsApart(histogram, total)) {
+    foreground.above = {1, LastFilled(histogram), 0};
+  } else {
+    const Histogram smoothed = Smoothed(histogram);
+    const int peak = FindPeak(histogram, smoothed);
+    foreground.above = AbovePeak(smoothed, peak);
+    const MaterialBins below = AbovePeak(Mirrored(smoothed), kLast - peak);
+    if (below.first <= below.last) foreground.below = {kLast - below.last, kLast - below.first, 0};
+  }
+  const auto share = [&](const MaterialBins& bins) { return Sum(histogram, bins.first, bins.last) / total; };
+  foreground.above.share = share(foreground.above);
+  foreground.below.share = share(foreground.below);
+  if (foreground.below.share < kNoiseShare * foreground.above.share) foreground.below = {};
+  if (foreground.above.share < kNoiseShare * foreground.below.share) foreground.above = {};
+  if (foreground.above.share == 0 && foreground.below.share == 0 && summary.range.min < summary.range.max) {
+    foreground.above = {1, kLast, share({1, kLast, 0})};
+  }
+  return foreground;
+}
+
+double Quantile(const VolumeSummary& summary, const MaterialBins& bins, double q) {
+  const auto begin = summary.histogram.begin();
+  const double wanted = q * double(std::accumulate(begin + bins.first, begin + bins.last + 1, std::uint64_t{0}));
+  double below = 0;
+  for (int bin = bins.first; bin < bins.last; ++bin) {
+    below += double(summary.histogram[std::size_t(bin)]);
+    if (below > 0 && below >= wanted) return BinValue(summary.range, bin);
+  }
+  return BinValue(summary.range, bins.last);
+}
+
+}  // namespace slabstream

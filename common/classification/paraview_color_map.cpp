@@ -1,0 +1,78 @@
+// ParaView's colour-map JSON, as Edit Color Map > Choose Preset > Export writes it.
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "common/classification/transfer_function.h"
+
+namespace slabstream {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr std::size_t kNumbersPerPoint = 4;  // of both curves
+
+// The numbers of one curve. Errors name the field; the caller adds the name of the file.
+Result<std::vector<double>> ReadCurve(const Json& preset, const char* field) {
+  const Json& array = preset.at(field);
+  if (!array.is_array()) return Status::InvalidArgument(std::string(field) + " is not an array");
+  if (array.empty() || array.size() % kNumbersPerPoint != 0 || array.size() / kNumbersPerPoint > std::size_t{kMaxTransferPoints}) {
+    return Status::InvalidArgument(std::string(field) + " has " + std::to_string(array.size()) + " numbers, must be 4 a point and 1 to " +
+                                   std::to_string(kMaxTransferPoints) + " points");
+  }
+  std::vector<double> numbers;
+  numbers.reserve(array.size());
+  for (const Json& number : array) {
+    if (!number.is_number()) {
+      return Status::InvalidArgument(std::string(field) + "[" + std::to_string(numbers.size()) + "] is not a number");
+    }
+    numbers.push_back(number.get<double>());
+  }
+  return numbers;
+}
+
+Result<TransferFunction> ReadPreset(const Json& preset) {
+  if (!preset.is_object()) return Status::InvalidArgument("not a colour map: expected an object or an array of objects");
+  if (!preset.contains("RGBPoints")) return Status::InvalidArgument("not a colour map: RGBPoints is missing");
+  TransferFunction transfer;
+
+  Result<std::vector<double>> colors = ReadCurve(preset, "RGBPoints");
+  if (!colors.ok()) return colors.status();
+  for (std::size_t i = 0; i < colors->size(); i += kNumbersPerPoint) {
+    const double* p = colors->data() + i;
+    transfer.colors.push_back({p[0], {float(p[1]), float(p[2]), float(p[3])}});
+  }
+
+  if (preset.contains("Points")) {
+    Result<std::vector<double>> opacities = ReadCurve(preset, "Points");
+    if (!opacities.ok()) return opacities.status();
+    for (std::size_t i = 0; i < opacities->size(); i += kNumbersPerPoint) {
+      const double* p = opacities->data() + i;
+      // VTK takes midpoints of 0 and 1 too, as this close to the end.
+      constexpr double kEdge = 1e-5;
+      const double midpoint = p[2] == 0 ? kEdge : p[2] == 1 ? 1 - kEdge : p[2];
+      transfer.opacities.push_back({p[0], p[1], midpoint, p[3]});
+    }
+  } else {
+    transfer.opacities = {{transfer.colors.front().value, 0}, {transfer.colors.back().value, 1}};
+  }
+  if (Status status = Validate(transfer); !status.ok()) return status;
+  return transfer;
+}
+
+}  // namespace
+
+Result<TransferFunction> ParseParaViewColorMap(std::string_view json, std::string_view name) {
+  const auto failed = [&](const std::string& why) { return Status::InvalidArgument(std::string(name) + ": " + why); };
+  Json document;
+  try {
+    document = Json::parse(json);
+  } catch (const Json::exception& error) {
+    return failed("not JSON: " + std::string(error.what()));
+  }
+  if (document.is_array() && document.empty()) return failed("not a colour map: the array is empty");
+  Result<TransferFunction> transfer = ReadPreset(document.is_array() ? document.front() : document);
+  if (!transfer.ok()) return failed(transfer.status().message());
+  return transfer;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,173 @@
+// The built-in transfer functions. CT has a unit, so its presets are anchored to materials; the others are fitted to the histogram.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+#include "common/classification/automatic_transfer.h"
+#include "common/classification/histogram_analysis.h"
+#include "common/classification/transfer_function.h"
+
+namespace slabstream {
+namespace {
+
+// ---- Everything, and nothing known about it
+
+TransferFunction GrayRamp(const VolumeSummary& summary) {
+  const auto [min, max] = summary.range;
+  return {{{min, {0, 0, 0}}, {max, {1, 1, 1}}}, {{min, 0}, {max, 1}}};
+}
+
+// All but the lowest value is solid: masks, voxelised objects and Z-buffer renderings of them.
+TransferFunction Opaque(const VolumeSummary& summary) {
+  const auto [min, max] = summary.range;
+  constexpr Rgb kCold = {0.55F, 0.63F, 0.73F}, kWarm = {0.97F, 0.93F, 0.85F};
+  if (min == max) return {{{min, kWarm}}, {{min, 1}}};
+  // A step half way to the second of 256 values: between 0 and 1 in an 8-bit volume.
+  const double second = std::lerp(double(min), double(max), 1.0 / 255);
+  return {{{min, kCold}, {max, kWarm}}, {{min, 0, 0.5, 1}, {second, 1}}};
+}
+
+// ---- CT
+
+// Data values of the materials that CT presets speak of.
+struct CtScale {
+  double air, skin, soft_tissue, bone, dense_bone, metal;
+};
+
+// Hounsfield units where air is far below zero; the same plus 1024, as scanners store them, where values begin at zero and go far beyond
+// eight bits; for anything else (8-bit and industrial scans) shares of the range, chosen on 8-bit head scans.
+CtScale FindCtScale(const ValueRange& range) {
+  constexpr CtScale kHounsfield = {-900, -350, 40, 180, 420, 1500};
+  if (range.min <= -500) return kHounsfield;
+  if (range.min >= 0 && range.max >= 2000) {
+    constexpr double kStored = 1024;
+    return {kHounsfield.air + kStored,  kHounsfield.skin + kStored,       kHounsfield.soft_tissue + kStored,
+            kHounsfield.bone + kStored, kHounsfield.dense_bone + kStored, kHounsfield.metal + kStored};
+  }
+  const auto at = [&](double share) { return std::lerp(double(range.min), double(range.max), share); };
+  return {at(0.08), at(0.16), at(0.27), at(0.42), at(0.55), at(0.90)};
+}
+
+constexpr Rgb kSkin = {0.86F, 0.64F, 0.52F}, kMuscle = {0.84F, 0.42F, 0.33F}, kBone = {0.93F, 0.87F, 0.76F}, kDenseBone = {1, 0.98F, 0.94F};
+
+TransferFunction CtBone(const VolumeSummary& summary) {
+  const CtScale ct = FindCtScale(summary.range);
+  return {{{ct.bone, {0.80F, 0.66F, 0.50F}}, {ct.dense_bone, kBone}, {ct.metal, kDenseBone}},
+          {{ct.bone, 0}, {ct.dense_bone, 0.75}, {ct.metal, 0.95}}};
+}
+
+// Muscle as a veil round the bones.
+TransferFunction CtSoftTissue(const VolumeSummary& summary) {
+  const CtScale ct = FindCtScale(summary.range);
+  return {{{ct.skin, kSkin}, {ct.soft_tissue, kMuscle}, {ct.bone, {0.84F, 0.60F, 0.46F}}, {ct.dense_bone, kBone}, {ct.metal, kDenseBone}},
+          {{ct.skin, 0}, {ct.soft_tissue, 0.02}, {ct.bone, 0.06}, {ct.dense_bone, 0.6}, {ct.metal, 0.95}}};
+}
+
+// The outer surface, solid within a few voxels.
+TransferFunction CtSkin(const VolumeSummary& summary) {
+  const CtScale ct = FindCtScale(summary.range);
+  return {{{ct.skin, kSkin}, {ct.soft_tissue, {0.90F, 0.70F, 0.58F}}, {ct.dense_bone, kBone}, {ct.metal, kDenseBone}},
+          {{std::midpoint(ct.air, ct.skin), 0}, {ct.skin, 0.4}, {ct.soft_tissue, 0.9}}};
+}
+
+// ---- Fitted to the values above the background
+
+// The bins above the background, or the upper half of all bins where there are none, so that each preset shows something of any volume.
+MaterialBins Material(const VolumeSummary& summary) {
+  const MaterialBins above = FindForeground(summary).above;
+  return above.share > 0 ? above : MaterialBins{kHistogramBins / 2, kHistogramBins - 1, 0.5};
+}
+
+// Solid within a few voxels of the border of tissue and background. Grey matter at the bottom of the folds shares its voxels with fluid and
+// is darker than that on top: colour makes it darker still, so that the folds stand out.
+TransferFunction MriBrain(const VolumeSummary& summary) {
+  const MaterialBins tissue = Material(summary);
+  const double begin = BinBorder(summary.range, tissue.first), middle = Quantile(summary, tissue, 0.5);
+  const auto at = [&](double q) { return Quantile(summary, tissue, q); };
+  return {{{begin, {0.58F, 0.36F, 0.31F}},
+           {at(0.03), {0.66F, 0.43F, 0.37F}},
+           {at(0.12), {0.80F, 0.57F, 0.50F}},
+           {at(0.35), {0.91F, 0.72F, 0.64F}},
+           {at(0.70), {0.95F, 0.83F, 0.76F}},
+           {at(0.98), {0.99F, 0.94F, 0.88F}}},
+          {{std::lerp(begin, middle, 0.3), 0}, {std::lerp(begin, middle, 0.7), 0.9}, {at(0.98), 0.95}}};
+}
+
+// Skin as a veil, what is brighter shines through it.
+TransferFunction MriHead(const VolumeSummary& summary) {
+  const MaterialBins tissue = Material(summary);
+  const double begin = BinBorder(summary.range, tissue.first);
+  const auto at = [&](double q) { return Quantile(summary, tissue, q); };
+  return {
+      {{begin, {0.55F, 0.38F, 0.32F}}, {at(0.3), {0.80F, 0.58F, 0.48F}}, {at(0.7), {0.93F, 0.80F, 0.68F}}, {at(0.99), {1, 0.96F, 0.88F}}},
+      {{std::lerp(begin, at(0.3), 0.3), 0}, {at(0.3), 0.06}, {at(0.7), 0.25}, {at(0.99), 0.8}}};
+}
+
+// Vessels are the brightest few per cent, or all of the material where everything else was masked out.
+TransferFunction Angiography(const VolumeSummary& summary) {
+  constexpr double kVesselShare = 0.03;  // of all voxels
+  const MaterialBins material = Material(summary);
+  const double share = std::max(material.share, kVesselShare);
+  const double begin =
+      share > kVesselShare ? Quantile(summary, material, 1 - kVesselShare / share) : BinBorder(summary.range, material.first);
+  const auto at = [&](double s) { return std::lerp(begin, double(summary.range.max), s); };
+  return {{{begin, {0.45F, 0.05F, 0.05F}}, {at(0.25), {0.78F, 0.14F, 0.10F}}, {at(0.6), {0.95F, 0.50F, 0.28F}}, {at(1), {1, 0.92F, 0.75F}}},
+          {{begin, 0}, {at(0.15), 0.3}, {at(0.5), 0.8}, {at(1), 0.95}}};
+}
+
+// Like glowing gas: thin where values are low (colours after "plasma" of matplotlib). Stops are quantiles, because the values of plumes and
+// fields often fall off over orders of magnitude.
+TransferFunction Simulation(const VolumeSummary& summary) {
+  const MaterialBins material = Material(summary);
+  const double begin = BinBorder(summary.range, material.first);
+  const auto at = [&](double q) { return Quantile(summary, material, q); };
+  return {{{begin, {0.24F, 0.10F, 0.72F}},
+           {at(0.40), {0.55F, 0.10F, 0.72F}},
+           {at(0.75), {0.86F, 0.32F, 0.48F}},
+           {at(0.93), {0.97F, 0.58F, 0.25F}},
+           {at(0.998), {0.98F, 0.95F, 0.35F}}},
+          {{begin, 0}, {at(0.40), 0.02}, {at(0.75), 0.08}, {at(0.93), 0.25}, {at(0.998), 0.7}}};
+}
+
+struct Preset {
+  PresetInfo info;
+  TransferFunction (*make)(const VolumeSummary&);
+};
+
+// The only list.
+constexpr std::array kPresets = {
+    Preset{{"auto", "from the histogram: whatever differs from the background"}, AutomaticTransfer},
+    Preset{{"gray-ramp", "black to white and clear to opaque over the value range"}, GrayRamp},
+    Preset{{"opaque", "everything above the lowest value, solid: masks, voxelised objects"}, Opaque},
+    Preset{{"ct-bone", "CT: bones"}, CtBone},
+    Preset{{"ct-soft-tissue", "CT: bones in a veil of muscle"}, CtSoftTissue},
+    Preset{{"ct-skin", "CT: the skin, solid"}, CtSkin},
+    Preset{{"mri-brain", "MRI: the surface of a brain whose skull was removed"}, MriBrain},
+    Preset{{"mri-head", "MRI: a whole head, the skin as a veil"}, MriHead},
+    Preset{{"angiography", "CT or MR angiography: the vessels"}, Angiography},
+    Preset{{"simulation", "simulations: glowing gas"}, Simulation},
+};
+
+}  // namespace
+
+const std::vector<PresetInfo>& TransferPresets() {
+  static const std::vector<PresetInfo> infos = [] {
+    std::vector<PresetInfo> list;
+    list.reserve(kPresets.size());
+    for (const Preset& preset : kPresets) list.push_back(preset.info);
+    return list;
+  }();
+  return infos;
+}
+
+Result<TransferFunction> MakePreset(std::string_view name, const VolumeSummary& summary) {
+  std::string names;
+  for (const Preset& preset : kPresets) {
+    if (preset.info.name == name) return preset.make(summary);
+    names += (names.empty() ? "" : ", ") + std::string(preset.info.name);
+  }
+  return Status::NotFound("no transfer function is named '" + std::string(name) + "', there are " + names);
+}
+
+}  // namespace slabstream

@@ -1,0 +1,130 @@
+#include "common/classification/transfer_function.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+namespace slabstream {
+namespace {
+
+std::string Text(double value) {
+  std::array<char, 32> text{};
+  (void)std::snprintf(text.data(), text.size(), "%g", value);
+  return text.data();
+}
+
+Status WrongField(std::string_view curve, std::size_t point, std::string_view field, double value, std::string_view limit) {
+  return Status::InvalidArgument("transfer function: " + std::string(field) + " of " + std::string(curve) + " point " +
+                                 std::to_string(point) + " is " + Text(value) + ", must be " + std::string(limit));
+}
+
+Status CheckCount(std::string_view curve, std::size_t count) {
+  if (count >= 1 && count <= std::size_t{kMaxTransferPoints}) return Status::Ok();
+  return Status::InvalidArgument("transfer function: number of " + std::string(curve) + " points is " + std::to_string(count) +
+                                 ", must be in [1, " + std::to_string(kMaxTransferPoints) + "]");
+}
+
+template <class Point>
+Status CheckValues(std::string_view curve, const std::vector<Point>& points) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!std::isfinite(points[i].value)) return WrongField(curve, i, "value", points[i].value, "finite");
+    if (i > 0 && points[i].value < points[i - 1].value) {
+      return WrongField(curve, i, "value", points[i].value, "at least that of the point before, " + Text(points[i - 1].value));
+    }
+  }
+  return Status::Ok();
+}
+
+// Number of points whose value is at most `value`: the segment that holds it ends at this index. Of points at the same value the last
+// one counts, so a step takes its upper side.
+template <class Point>
+std::size_t SegmentEnd(const std::vector<Point>& points, double value) {
+  const auto after = [](double v, const Point& point) { return v < point.value; };
+  return std::size_t(std::upper_bound(points.begin(), points.end(), value, after) - points.begin());
+}
+
+// Where `value` lies between two values, in [0, 1). The values may be as far apart as doubles go.
+double Fraction(double value, double from, double to) { return (value / 2 - from / 2) / (to / 2 - from / 2); }
+
+// Opacity at fraction s of the segment a ... b, by the definition of vtkPiecewiseFunction (class documentation of VTK 9.1): s is first
+// moved so that the midpoint lies at one half, then a cubic Hermite curve is drawn whose end slopes fall with the sharpness.
+double Interpolate(const OpacityPoint& a, const OpacityPoint& b, double s) {
+  constexpr double kEdge = 1e-5;  // keeps the two halves of a segment from having no width
+  const double midpoint = std::clamp(a.midpoint, kEdge, 1 - kEdge);
+  s = s < midpoint ? 0.5 * s / midpoint : 0.5 + 0.5 * (s - midpoint) / (1 - midpoint);
+
+  // At either end of the range of sharpness the curve is taken to be what it tends to.
+  if (a.sharpness > 0.99) return s < 0.5 ? a.opacity : b.opacity;
+  if (a.sharpness < 0.01) return std::lerp(a.opacity, b.opacity, s);
+
+  const double exponent = 1 + 10 * a.sharpness;
+  s = s < 0.5 ? 0.5 * std::pow(2 * s, exponent) : 1 - 0.5 * std::pow(2 * (1 - s), exponent);
+
+  const double rise = b.opacity - a.opacity;
+  const double end_slope = (1 - a.sharpness) * rise;
+  const double ease = s * s * (3 - 2 * s);       // Hermite: from 0 to 1 with flat ends
+  const double bow = s * (1 - s) * (1 - 2 * s);  // Hermite: what unit slopes at both ends add
+  const auto [low, high] = std::minmax(a.opacity, b.opacity);
+  return std::clamp(a.opacity + ease * rise + bow * end_slope, low, high);
+}
+
+}  // namespace
+
+Rgb TransferFunction::Color(double value) const {
+  const std::size_t end = SegmentEnd(colors, value);
+  if (end == 0) return colors.front().color;
+  if (end == colors.size()) return colors.back().color;
+  const ColorPoint& a = colors[end - 1];
+  const ColorPoint& b = colors[end];
+  const auto s = float(Fraction(value, a.value, b.value));
+  return {std::lerp(a.color.r, b.color.r, s), std::lerp(a.color.g, b.color.g, s), std::lerp(a.color.b, b.color.b, s)};
+}
+
+double TransferFunction::Opacity(double value) const {
+  const std::size_t end = SegmentEnd(opacities, value);
+  if (end == 0) return opacities.front().opacity;
+  if (end == opacities.size()) return opacities.back().opacity;
+  const OpacityPoint& a = opacities[end - 1];
+  const OpacityPoint& b = opacities[end];
+  return Interpolate(a, b, Fraction(value, a.value, b.value));
+}
+
+Status Validate(const TransferFunction& transfer) {
+  // Negated comparisons, so that NaN is never within a limit.
+  const auto outside = [](double value, double low, double high) { return !(value >= low && value <= high); };
+  if (Status status = CheckCount("colour", transfer.colors.size()); !status.ok()) return status;
+  if (Status status = CheckCount("opacity", transfer.opacities.size()); !status.ok()) return status;
+  if (Status status = CheckValues("colour", transfer.colors); !status.ok()) return status;
+  if (Status status = CheckValues("opacity", transfer.opacities); !status.ok()) return status;
+  for (std::size_t i = 0; i < transfer.colors.size(); ++i) {
+    const Rgb& color = transfer.colors[i].color;
+    if (outside(color.r, 0, 1)) return WrongField("colour", i, "red", color.r, "in [0, 1]");
+    if (outside(color.g, 0, 1)) return WrongField("colour", i, "green", color.g, "in [0, 1]");
+    if (outside(color.b, 0, 1)) return WrongField("colour", i, "blue", color.b, "in [0, 1]");
+  }
+  for (std::size_t i = 0; i < transfer.opacities.size(); ++i) {
+    const OpacityPoint& point = transfer.opacities[i];
+    if (outside(point.opacity, 0, 1)) return WrongField("opacity", i, "opacity", point.opacity, "in [0, 1]");
+    if (!(point.midpoint > 0 && point.midpoint < 1)) return WrongField("opacity", i, "midpoint", point.midpoint, "in (0, 1)");
+    if (outside(point.sharpness, 0, 1)) return WrongField("opacity", i, "sharpness", point.sharpness, "in [0, 1]");
+  }
+  if (!(transfer.opacity_distance > 0 && transfer.opacity_distance <= kMaxOpacityDistance)) {
+    return Status::InvalidArgument("transfer function: opacity distance is " + Text(transfer.opacity_distance) +
+                                   " voxel lengths, must be in (0, " + Text(kMaxOpacityDistance) + "]");
+  }
+  return Status::Ok();
+}
+
+double MaxOpacity(const TransferFunction& transfer, double low, double high) {
+  if (!(low <= high)) return 0;
+  double largest = std::max(transfer.Opacity(low), transfer.Opacity(high));
+  // Between its points the curve is monotone, so only points can top the ends of the range. Both sides of a step count.
+  const std::vector<OpacityPoint>& points = transfer.opacities;
+  for (std::size_t i = SegmentEnd(points, low); i < points.size() && points[i].value <= high; ++i) {
+    largest = std::max(largest, points[i].opacity);
+  }
+  return largest;
+}
+
+}  // namespace slabstream

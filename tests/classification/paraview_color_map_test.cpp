@@ -1,0 +1,106 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "common/classification/transfer_function.h"
+#include "tests/support/random.h"
+
+namespace slabstream {
+namespace {
+
+using testing::HasSubstr;
+
+// As ParaView 5.11 exports a preset, with the fields that do not matter here.
+constexpr const char* kExported = R"([
+	{
+		"ColorSpace" : "RGB",
+		"Creator" : "ParaView",
+		"DefaultMap" : true,
+		"Name" : "bone",
+		"NanColor" : [ 1.0, 0.0, 0.0 ],
+		"Points" : [ 0.0, 0.0, 0.5, 0.0, 120.0, 0.25, 1.0, 0.75, 255, 1, 0.5, 0 ],
+		"RGBPoints" : [ 0.0, 0.0, 0.0, 0.0, 255.0, 1.0, 0.5, 0.25 ]
+	}
+])";
+
+TEST(ParaViewColorMap, IsReadAsExported) {
+  const Result<TransferFunction> transfer = ParseParaViewColorMap(kExported, "bone.json");
+  ASSERT_TRUE(transfer.ok()) << transfer.status().message();
+  ASSERT_EQ(transfer->colors.size(), 2U);
+  EXPECT_EQ(transfer->colors[1], (ColorPoint{255, {1, 0.5F, 0.25F}}));
+  ASSERT_EQ(transfer->opacities.size(), 3U);
+  EXPECT_EQ(transfer->opacities[1].value, 120);
+  EXPECT_EQ(transfer->opacities[1].opacity, 0.25);
+  EXPECT_NEAR(transfer->opacities[1].midpoint, 1, 2e-5) << "moved away from the end, as VTK does";
+  EXPECT_EQ(transfer->opacities[1].sharpness, 0.75);
+  EXPECT_EQ(transfer->opacity_distance, 1);
+}
+
+TEST(ParaViewColorMap, WithoutPointsRisesOverTheColours) {
+  const Result<TransferFunction> transfer = ParseParaViewColorMap(R"({"RGBPoints": [-10, 0, 0, 0, 30, 1, 1, 1]})", "ramp");
+  ASSERT_TRUE(transfer.ok());
+  EXPECT_EQ(transfer->Opacity(-10), 0);
+  EXPECT_EQ(transfer->Opacity(10), 0.5);
+  EXPECT_EQ(transfer->Opacity(30), 1);
+}
+
+TEST(ParaViewColorMap, SaysInOneLineWhatIsWrong) {
+  const struct {
+    std::string json, named;
+  } wrong[] = {
+      {"", "not JSON"},
+      {"{", "not JSON"},
+      {R"({"RGBPoints": [NaN, 0, 0, 0]})", "not JSON"},
+      {R"({"RGBPoints": [1e999, 0, 0, 0]})", "not JSON"},
+      {"[]", "the array is empty"},
+      {"[1]", "expected an object"},
+      {"\"text\"", "expected an object"},
+      {"{}", "RGBPoints is missing"},
+      {R"({"RGBPoints": {}})", "RGBPoints is not an array"},
+      {R"({"RGBPoints": []})", "RGBPoints has 0 numbers"},
+      {R"({"RGBPoints": [0, 0, 0]})", "RGBPoints has 3 numbers"},
+      {R"({"RGBPoints": [0, 0, "x", 0]})", "RGBPoints[2] is not a number"},
+      {R"({"RGBPoints": [0, 0, 2, 0]})", "green of colour point 0 is 2"},
+      {R"({"RGBPoints": [1, 0, 0, 0, 0, 0, 0, 0]})", "value of colour point 1 is 0"},
+      {R"({"RGBPoints": [0, 0, 0, 0], "Points": [0, 2, 0.5, 0]})", "opacity of opacity point 0 is 2"},
+      {R"({"RGBPoints": [0, 0, 0, 0], "Points": null})", "Points is not an array"},
+      {R"({"RGBPoints": [)" +
+           [] {
+             std::string s = "0";
+             for (int i = 1; i < 4 * 4097; ++i) s += ",0";
+             return s;
+           }() +
+           "]}",
+       "has 16388 numbers"},
+      {std::string(100000, '['), "not JSON"},
+  };
+  for (const auto& [json, named] : wrong) {
+    const Status status = ParseParaViewColorMap(json, "map.json").status();
+    EXPECT_EQ(status.code(), StatusCode::kInvalidArgument) << named;
+    EXPECT_THAT(status.message(), testing::StartsWith("map.json: "));
+    EXPECT_THAT(status.message(), HasSubstr(named));
+    EXPECT_THAT(status.message(), testing::Not(HasSubstr("\n")));
+  }
+}
+
+TEST(ParaViewColorMap, SurvivesAlteredAndShortenedText) {
+  Random random(7);
+  SCOPED_TRACE(random.trace());
+  const std::string whole = kExported;
+  for (int i = 0; i < 3000; ++i) {
+    std::string text = whole.substr(0, random.Integer<std::size_t>(0, whole.size()));
+    for (int flips = random.Integer(0, 4); flips > 0 && !text.empty(); --flips) {
+      text[random.Integer<std::size_t>(0, text.size() - 1)] = char(random.Integer(0, 255));
+    }
+    const Result<TransferFunction> transfer = ParseParaViewColorMap(text, "map.json");
+    if (transfer.ok()) {
+      EXPECT_TRUE(Validate(*transfer).ok()) << text;
+    } else {
+      EXPECT_THAT(transfer.status().message(), testing::Not(HasSubstr("\n")));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace slabstream

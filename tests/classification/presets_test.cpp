@@ -1,0 +1,179 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "common/classification/classification_table.h"
+#include "common/classification/histogram_analysis.h"
+#include "common/classification/transfer_function.h"
+#include "common/volume/sphere.h"
+#include "tests/support/random_volume.h"
+
+namespace slabstream {
+namespace {
+
+// A ball of tissue (around 90) with a bright core (200) in air (around 5), all noisy.
+Volume NoisyHead(Random& random, ScalarType type, double scale = 1) {
+  return MakeTestVolume({48, 48, 48}, type, [&random, scale](const Index3& v) {
+    const double radius = Length(ToVec3(v) - Vec3{23.5, 23.5, 23.5});
+    return scale * ((radius < 6 ? 200 : radius < 18 ? 90 : 5) + random.Real(-4, 4));
+  });
+}
+
+double OpacityAt(const TransferFunction& transfer, double value) { return transfer.Opacity(value); }
+
+TEST(Presets, AreValidAndNamedOnceEach) {
+  std::vector<std::string_view> names;
+  for (const PresetInfo& info : TransferPresets()) {
+    EXPECT_THAT(names, testing::Not(testing::Contains(info.name)));
+    names.push_back(info.name);
+    EXPECT_FALSE(info.purpose.empty());
+  }
+  EXPECT_GE(names.size(), 7U);
+  EXPECT_THAT(names, testing::Contains("auto"));
+}
+
+TEST(Presets, OfAnUnknownNameListTheNamesThereAre) {
+  const Status status = MakePreset("ct-bones", Summarize(MakeSphere({}).value())).status();
+  EXPECT_EQ(status.code(), StatusCode::kNotFound);
+  EXPECT_THAT(status.message(),
+              testing::AllOf(testing::HasSubstr("'ct-bones'"), testing::HasSubstr("ct-bone,"), testing::HasSubstr("auto")));
+}
+
+// Whatever the histogram: the function is valid and does not depend on anything but the summary.
+TEST(Presets, AreValidForEveryHistogram) {
+  Random random(8);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 400; ++i) {
+    VolumeSummary summary;
+    summary.description = {{{64, 64, 64}, {1, 1, 1}}, ScalarType::kFloat32, {}};
+    const double centre = random.Real(-1, 1) * std::pow(10, random.Real(-3, 37)),
+                 width = random.Chance(0.1) ? 0 : std::pow(10, random.Real(-6, 37));
+    summary.range = {float(centre - width), float(centre + width)};
+    const int filled = random.Integer(0, kHistogramBins);
+    for (int n = 0; n < filled; ++n) {
+      summary.histogram[random.Integer<std::size_t>(0, kHistogramBins - 1)] = random.Integer<std::uint64_t>(0, 1) << random.Integer(0, 40);
+    }
+    for (const PresetInfo& info : TransferPresets()) {
+      const Result<TransferFunction> transfer = MakePreset(info.name, summary);
+      ASSERT_TRUE(transfer.ok());
+      EXPECT_TRUE(Validate(*transfer).ok()) << info.name << ": " << Validate(*transfer).message();
+      EXPECT_EQ(*transfer, *MakePreset(info.name, summary));
+    }
+  }
+}
+
+TEST(Presets, ForAHeadShowTissueAndLeaveAirOut) {
+  Random random(9);
+  SCOPED_TRACE(random.trace());
+  for (const ScalarType type : {ScalarType::kUint8, ScalarType::kUint16, ScalarType::kFloat32}) {
+    const double scale = type == ScalarType::kFloat32 ? 0.01 : 1;
+    const VolumeSummary summary = Summarize(NoisyHead(random, type, scale));
+    const double ball = 4.0 / 3 * 3.14159 * 18 * 18 * 18 / (48 * 48 * 48);
+    for (const char* name : {"auto", "mri-brain", "mri-head"}) {
+      const TransferFunction transfer = MakePreset(name, summary).value();
+      EXPECT_EQ(OpacityAt(transfer, 5 * scale), 0) << name << ": air";
+      EXPECT_GT(OpacityAt(transfer, 90 * scale), 0.01) << name << ": tissue";
+      EXPECT_GE(OpacityAt(transfer, 200 * scale), OpacityAt(transfer, 90 * scale)) << name << ": core";
+      EXPECT_NEAR(EstimateOccupancy(summary, transfer), ball, 0.03) << name;
+    }
+    EXPECT_GT(OpacityAt(MakePreset("mri-brain", summary).value(), 86 * scale), 0.8) << "solid at once";
+  }
+}
+
+TEST(AutoPreset, ShowsWhatLiesBelowTheBackgroundToo) {
+  // Swirls of both signs in still air, and a block of low values in a high background.
+  const Volume swirls = MakeTestVolume({32, 32, 32}, ScalarType::kFloat32,
+                                       [](const Index3& v) { return v.x < 8 ? std::sin(v.y * 0.3) * std::cos(v.z * 0.2) : 0; });
+  const TransferFunction both = MakePreset("auto", Summarize(swirls)).value();
+  EXPECT_EQ(OpacityAt(both, 0), 0);
+  EXPECT_GT(OpacityAt(both, -0.9), 0.1);
+  EXPECT_GT(OpacityAt(both, 0.9), 0.1);
+
+  const Volume pit = MakeTestVolume({32, 32, 32}, ScalarType::kUint8, [](const Index3& v) { return v.x < 8 && v.y < 8 ? 20 + v.z : 250; });
+  const TransferFunction below = MakePreset("auto", Summarize(pit)).value();
+  EXPECT_EQ(OpacityAt(below, 250), 0);
+  EXPECT_GT(OpacityAt(below, 30), 0.05);
+}
+
+TEST(AutoPreset, ShowsMasksAndVolumesOfOneValue) {
+  for (const double share : {0.05, 0.5, 0.8}) {
+    const Volume mask = MakeTestVolume({20, 20, 20}, ScalarType::kUint8, [&](const Index3& v) { return v.x < share * 20 ? 1 : 0; });
+    const TransferFunction transfer = MakePreset("auto", Summarize(mask)).value();
+    EXPECT_EQ(OpacityAt(transfer, 0), 0) << share;
+    EXPECT_GT(OpacityAt(transfer, 1), 0.2) << share;
+  }
+  const Volume constant = MakeTestVolume({20, 20, 20}, ScalarType::kFloat32, [](const Index3&) { return -3.5F; });
+  EXPECT_GT(OpacityAt(MakePreset("auto", Summarize(constant)).value(), -3.5), 0.01);
+}
+
+TEST(OpaquePreset, MakesExactlyTheSphereSolid) {
+  const Volume sphere = MakeSphere({SphereClass::kHollow, 40, 0.05}).value();
+  const VolumeSummary summary = Summarize(sphere);
+  const TransferFunction transfer = MakePreset("opaque", summary).value();
+  EXPECT_EQ(OpacityAt(transfer, 0), 0);
+  EXPECT_EQ(OpacityAt(transfer, 128), 1);
+  EXPECT_DOUBLE_EQ(EstimateOccupancy(summary, transfer), MeasureOccupancy(sphere));
+}
+
+TEST(CtPresets, FindBoneInHounsfieldUnitsStoredUnitsAndEightBits) {
+  const struct {
+    ScalarType type;
+    ValueMapping mapping;
+    double low, high;          // range of data values
+    double air, tissue, bone;  // data values
+  } scans[] = {
+      {ScalarType::kUint16, {1, -32768}, -1024, 3071, -1000, 40, 700},
+      {ScalarType::kUint16, {}, 0, 4095, 24, 1064, 1724},
+      {ScalarType::kUint8, {}, 0, 255, 5, 70, 160},
+  };
+  for (const auto& scan : scans) {
+    VolumeSummary summary;
+    summary.description = {{{10, 10, 10}, {1, 1, 1}}, scan.type, scan.mapping};
+    summary.range = {float(scan.low), float(scan.high)};
+    const TransferFunction bone = MakePreset("ct-bone", summary).value();
+    EXPECT_EQ(OpacityAt(bone, scan.tissue), 0);
+    EXPECT_GT(OpacityAt(bone, scan.bone), 0.5);
+    const TransferFunction veil = MakePreset("ct-soft-tissue", summary).value();
+    EXPECT_EQ(OpacityAt(veil, scan.air), 0);
+    EXPECT_GT(OpacityAt(veil, scan.tissue), 0.005);
+    EXPECT_GT(OpacityAt(veil, scan.bone), 10 * OpacityAt(veil, scan.tissue));
+    const TransferFunction skin = MakePreset("ct-skin", summary).value();
+    EXPECT_EQ(OpacityAt(skin, scan.air), 0);
+    EXPECT_GT(OpacityAt(skin, scan.tissue), 0.8);
+  }
+}
+
+TEST(EstimateOccupancy, IsExactForFewIntegers) {
+  Random random(10);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 30; ++i) {
+    const int base = random.Integer(0, 60000);
+    Volume volume = MakeTestVolume({13, 11, 7}, i % 2 == 0 ? ScalarType::kUint16 : ScalarType::kUint8,
+                                   [&](const Index3&) { return (i % 2 == 0 ? base : 0) + random.Integer(0, 255); });
+    volume.description.mapping = {random.Chance(0.5) ? -0.37 : 0.1, -12.5};
+    const double edge = volume.description.mapping.FromStored((i % 2 == 0 ? base : 0) + random.Integer(0, 255) + 0.5);
+    const TransferFunction transfer = {{{0, {1, 1, 1}}}, {{edge - 1, 0}, {edge, 0}, {edge, 1}}};
+    std::int64_t visible = 0;
+    for (std::int64_t voxel = 0; voxel < 13 * 11 * 7; ++voxel) {
+      const double stored = i % 2 == 0 ? volume.block.samples<std::uint16_t>()[voxel] : volume.block.samples<std::uint8_t>()[voxel];
+      visible += transfer.Opacity(volume.description.mapping.FromStored(stored)) > 0 ? 1 : 0;
+    }
+    EXPECT_DOUBLE_EQ(EstimateOccupancy(Summarize(volume), transfer), double(visible) / (13 * 11 * 7));
+  }
+}
+
+TEST(EstimateOccupancy, OfFloatsCountsABackgroundAtTheFootOfARampAsEmpty) {
+  const Volume volume = MakeTestVolume({10, 10, 10}, ScalarType::kFloat32, [](const Index3& v) { return v.z < 9 ? 0.0 : 2.5; });
+  EXPECT_DOUBLE_EQ(EstimateOccupancy(Summarize(volume), {{{0, {1, 1, 1}}}, {{0, 0}, {2.5, 1}}}), 0.1);
+}
+
+TEST(EstimateOccupancy, CountsWhatIsNotFiniteAsEmpty) {
+  const Volume volume = MakeTestVolume({10, 1, 1}, ScalarType::kFloat32,
+                                       [](const Index3& v) { return v.x < 5 ? 1.0F : std::numeric_limits<float>::quiet_NaN(); });
+  EXPECT_DOUBLE_EQ(EstimateOccupancy(Summarize(volume), {{{0, {1, 1, 1}}}, {{0, 1}}}), 0.5);
+}
+
+}  // namespace
+}  // namespace slabstream
