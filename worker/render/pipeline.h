@@ -1,8 +1,8 @@
 // The contract of a rendering pipeline, and the data that it renders from.
 //
-// A pipeline turns the voxels of a box (with their halo) into the box's local image: the samples that the box owns, for a frame's camera, transfer
-// function and shading. It must give the same samples however the volume is divided (docs/rendering.md): nothing that it computes may depend on
-// where the box begins or ends, but for which samples it owns.
+// A pipeline turns the voxels of a box (with their halo) into the box's local image: the samples that the box owns, for a frame's camera,
+// transfer function and shading. It must give the same samples however the volume is divided (docs/rendering.md): nothing that it computes
+// may depend on where the box begins or ends, but for which samples it owns.
 #pragma once
 
 #include <atomic>
@@ -16,8 +16,8 @@
 
 namespace slabstream {
 
-// The voxels of one slab with its halo, and what pipelines made from them: classification, normals, occupied runs by traversal axis. What was made is kept as
-// long as it fits the transfer function at hand. Used by one thread at a time.
+// The voxels of one slab with its halo, and what pipelines made from them: classification, normals, occupied runs by traversal axis. What
+// was made is kept as long as it fits the transfer function at hand. Used by one thread at a time.
 class SlabData {
  public:
   explicit SlabData(VoxelBlock voxels);
@@ -42,8 +42,8 @@ class Renderer {
  public:
   virtual ~Renderer() = default;
 
-  // Local image of `box`, whose voxels and halo (SlabBox) lie in `slab`. Adds stage times, spans and counts to `report`. If `cancelled` becomes true
-  // it stops soon and returns Cancelled.
+  // Local image of `box`, whose voxels and halo (SlabBox) lie in `slab`. Adds stage times, spans and counts to `report`. If `cancelled`
+  // becomes true it stops soon and returns Cancelled.
   virtual Result<LocalImage> Render(SlabData& slab, const Box& box, const FrameSetup& setup, const std::atomic<bool>& cancelled,
                                     RankReport& report) = 0;
 };

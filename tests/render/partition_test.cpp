@@ -1,0 +1,165 @@
+// However a volume is divided, the combined picture is the one-box picture: the promise of both pipelines.
+#include <gtest/gtest.h>
+
+#include <hwy/highway.h>
+
+#include "tests/render/render_support.h"
+#include "worker/render/splatting/ownership.h"
+
+namespace slabstream {
+namespace {
+
+using namespace slabstream::testing;  // NOLINT(google-build-using-namespace): test support
+
+constexpr Projection kProjections[] = {Projection::kOrthographic, Projection::kPerspective};
+constexpr float kSplatTolerance = 2e-5F;
+
+void ExpectSamePicture(const LocalImage& one, const LocalImage& many, const FrameSetup& setup) {
+  if (setup.renderer == RendererKind::kSplat) {
+    EXPECT_LE(LargestDifference(one, many, setup.camera), kSplatTolerance + float(setup.termination));
+    return;
+  }
+  // Bit for bit on the union of the bounds.
+  LocalImage a = one, b = many;
+  const LocalImage everywhere = MakeLocalImage(PixelFormat::kDepth, Union(one.bounds, many.bounds));
+  const auto spread = [&](const LocalImage& image) {
+    LocalImage wide = everywhere;
+    for (std::int32_t y = image.bounds.y_begin; y < image.bounds.y_end; ++y) {
+      for (std::int32_t x = image.bounds.x_begin; x < image.bounds.x_end; ++x) {
+        const auto from = std::size_t(y - image.bounds.y_begin) * std::size_t(image.bounds.width()) + std::size_t(x - image.bounds.x_begin);
+        const auto to = std::size_t(y - wide.bounds.y_begin) * std::size_t(wide.bounds.width()) + std::size_t(x - wide.bounds.x_begin);
+        for (std::size_t c = 0; c < 4; ++c) wide.rgba[4 * to + c] = image.rgba[4 * from + c];
+        wide.depth[to] = image.depth[from];
+        wide.voxel[to] = image.voxel[from];
+      }
+    }
+    return wide;
+  };
+  a = spread(one);
+  b = spread(many);
+  EXPECT_TRUE(a.rgba == b.rgba);
+  EXPECT_TRUE(a.depth == b.depth);
+  EXPECT_TRUE(a.voxel == b.voxel);
+}
+
+class Partitions : public ::testing::TestWithParam<RendererKind> {};
+
+TEST_P(Partitions, SlabsAlongEveryAxisMakeOnePicture) {
+  const unsigned seed = 11;
+  std::mt19937 random(seed);
+  for (Projection projection : kProjections) {
+    for (int view = 0; view < 3; ++view) {
+      const Volume volume = MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed + unsigned(view));
+      SetupOptions options;
+      options.renderer = GetParam();
+      options.view = RandomView(projection, random);
+      options.size = {72, 60};
+      const FrameSetup setup = MakeSetup(volume, options);
+      const LocalImage one = RenderWhole(volume, setup);
+      for (Axis axis : kAxes) {
+        for (int boxes : {2, 3, 5, 8, 13}) {
+          SCOPED_TRACE(::testing::Message() << "seed " << seed << " view " << view << " axis " << Letter(axis) << " boxes " << boxes);
+          ExpectSamePicture(one, RenderByBoxes(volume, setup, CutIntoSlabs(volume, boxes, axis)), setup);
+        }
+      }
+    }
+  }
+}
+
+TEST_P(Partitions, BoxesOfAnyKindMakeOnePicture) {
+  const unsigned seed = 12;
+  std::mt19937 random(seed);
+  for (Projection projection : kProjections) {
+    for (ScalarType type : {ScalarType::kUint8, ScalarType::kUint16, ScalarType::kFloat32}) {
+      for (double zoom : {0.3, 1.0, 6.0}) {
+        const Volume volume = MakeBlobs({{70, 40, 45}, {1, 1, 1}}, type, seed);
+        SetupOptions options;
+        options.renderer = GetParam();
+        options.view = RandomView(projection, random);
+        options.view.zoom = zoom;
+        options.transfer = Ramp(0.6);
+        options.termination = 1.0 / 1024;
+        const FrameSetup setup = MakeSetup(volume, options);
+        SCOPED_TRACE(::testing::Message() << "seed " << seed << " zoom " << zoom << " type " << int(type));
+        ExpectSamePicture(RenderWhole(volume, setup), RenderByBoxes(volume, setup, CutAtRandom(volume.block.box, 11, random)), setup);
+      }
+    }
+  }
+}
+
+// Axis-parallel views put rays, faces and planes on top of each other.
+TEST_P(Partitions, AxisParallelViewsHaveNoSeams) {
+  const Volume volume = MakeBlobs({{32, 32, 32}, {1, 1, 1}}, ScalarType::kUint8, 5);
+  for (Projection projection : kProjections) {
+    for (auto [azimuth, elevation] : {std::pair(0.0, 0.0), std::pair(90.0, 0.0), std::pair(0.0, 90.0), std::pair(45.0, 0.0)}) {
+      SetupOptions options;
+      options.renderer = GetParam();
+      options.view.projection = projection;
+      options.view.azimuth_degrees = azimuth;
+      options.view.elevation_degrees = elevation;
+      options.size = {111, 111};
+      const FrameSetup setup = MakeSetup(volume, options);
+      const LocalImage one = RenderWhole(volume, setup);
+      for (Axis axis : kAxes) ExpectSamePicture(one, RenderByBoxes(volume, setup, CutIntoSlabs(volume, 4, axis)), setup);
+    }
+  }
+}
+
+TEST_P(Partitions, EveryInstructionSetMakesOnePicture) {
+  const unsigned seed = 13;
+  std::mt19937 random(seed);
+  const Volume volume = MakeBlobs({{45, 45, 45}, {1, 1, 1}}, ScalarType::kUint8, seed);
+  for (Projection projection : kProjections) {
+    SetupOptions options;
+    options.renderer = GetParam();
+    options.view = RandomView(projection, random);
+    const FrameSetup setup = MakeSetup(volume, options);
+    const LocalImage best = RenderWhole(volume, setup);
+    for (auto target : hwy::SupportedAndGeneratedTargets()) {
+      SCOPED_TRACE(hwy::TargetName(target));
+      hwy::SetSupportedTargetsForTest(target);
+      hwy::GetChosenTarget().Update(target);
+      const LocalImage image = RenderWhole(volume, setup);
+      hwy::SetSupportedTargetsForTest(0);
+      hwy::GetChosenTarget().DeInit();
+      ExpectSamePicture(best, image, setup);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Pipelines, Partitions, ::testing::Values(RendererKind::kSplat, RendererKind::kZBuffer),
+                         [](const auto& kind) { return kind.param == RendererKind::kSplat ? "Splatting" : "ZBuffer"; });
+
+// Every pixel of every slice has exactly one owner among the boxes that hold the slice.
+TEST(Ownership, IsAPartitionOfEverySheet) {
+  const unsigned seed = 14;
+  std::mt19937 random(seed);
+  const VolumeGeometry geometry = {{50, 40, 30}, {1, 1, 2}};
+  for (Projection projection : kProjections) {
+    for (int view = 0; view < 8; ++view) {
+      const Camera camera = MakeCamera(RandomView(projection, random), {50, 40}, geometry);
+      const SliceProjection slices(camera, geometry);
+      const Partition partition = CutAtRandom(geometry.bounds(), 17, random);
+      const Axis c = camera.traversal_axis;
+      for (std::int32_t k = 0; k < geometry.size[c]; k += 3) {
+        std::vector<int> owners(std::size_t(camera.width) * std::size_t(camera.height));
+        for (const Box& box : partition.boxes()) {
+          if (k < box.begin[c] || k >= box.end[c]) continue;
+          Ownership ownership(slices, box, geometry);
+          ownership.SetSlice(k);
+          for (std::int32_t y = 0; y < camera.height; ++y) {
+            const ColumnInterval owned = ownership.Row(y);
+            for (std::int32_t x = std::max(0, owned.begin); x < std::min(camera.width, owned.end); ++x) {
+              ++owners[std::size_t(y) * std::size_t(camera.width) + std::size_t(x)];
+              EXPECT_TRUE(ownership.MayOwn({x, y, x + 1, y + 1}));
+            }
+          }
+        }
+        ASSERT_TRUE(std::ranges::all_of(owners, [](int n) { return n == 1; })) << "seed " << seed << " view " << view << " slice " << k;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace slabstream

@@ -1,0 +1,193 @@
+// What is kept of a slab between frames, and the behaviour that both pipelines share.
+#include <gtest/gtest.h>
+
+#include <bit>
+
+#include "tests/render/render_support.h"
+#include "worker/kernels/normal_code.h"
+#include "worker/render/derived.h"
+
+namespace slabstream {
+namespace {
+
+using namespace slabstream::testing;  // NOLINT(google-build-using-namespace): test support
+
+constexpr RendererKind kRenderers[] = {RendererKind::kSplat, RendererKind::kZBuffer};
+
+template <class T>
+double StoredAt(const Volume& volume, const Index3& v) {
+  return double(volume.block.samples<T>()[volume.block.Offset(v)]);
+}
+
+// Every occupied voxel once, in its place, with its bin; nothing else: for every axis, against a plain look at all voxels.
+TEST(OccupiedCells, AreTheOccupiedVoxelsInOrder) {
+  const Volume volume = MakeBlobs({{70, 35, 41}, {1, 1, 1}}, ScalarType::kUint16, 31);
+  const Box slab_box = {{3, 2, 5}, {68, 33, 41}}, box = {{11, 10, 13}, {60, 25, 33}};
+  const auto slab = CutSlab(volume, slab_box);
+  FrameSetup setup = MakeSetup(volume, {});
+  for (Axis axis : kAxes) {
+    setup.camera.traversal_axis = axis;
+    const ClassificationTable table = Classify(setup.transfer, setup.description, setup.range);
+    const OccupiedCells& cells = slab->derived().Occupied(setup, box);
+    const auto [c, u, v] = AxesOf(axis);
+    std::size_t record = 0;
+    std::uint64_t in_box = 0;
+    for (std::int32_t slice = box.begin[c]; slice < box.end[c]; ++slice) {
+      for (std::int32_t row = slab_box.begin[v]; row < slab_box.end[v]; ++row) {
+        const std::size_t beam = cells.Beam(slice, row);
+        ASSERT_EQ(cells.first_record[beam], record);
+        for (std::int32_t at = slab_box.begin[u]; at < slab_box.end[u]; ++at) {
+          Index3 voxel;
+          voxel[c] = slice, voxel[v] = row, voxel[u] = at;
+          const int bin = table.BinOf(StoredAt<std::uint16_t>(volume, voxel));
+          const bool occupied = table.opacity[std::size_t(bin)] > 0;
+          const bool marked = (cells.Masks(beam)[at / 32 - cells.first_cell] >> (at % 32) & 1) != 0;
+          ASSERT_EQ(marked, occupied);
+          if (!occupied) continue;
+          EXPECT_TRUE(cells.occupied.Contains(voxel));
+          ASSERT_EQ(cells.records[record++].bin, bin);
+          in_box += box.Contains(voxel);
+        }
+      }
+    }
+    EXPECT_EQ(record, cells.records.size());
+    EXPECT_EQ(in_box, cells.occupied_in_box);
+  }
+}
+
+// A ramp has the same gradient everywhere, at the border too, whatever the spacing.
+TEST(OccupiedCells, NormalsAreThoseOfTheGradient) {
+  const Vec3 spacing = {0.5, 2, 1};
+  const Volume ramp =
+      MakeVolume({{20, 18, 16}, spacing}, ScalarType::kFloat32, [&](const Index3& v) { return 1 + 2.0 * v.x + 3.0 * v.y + 1.0 * v.z; });
+  const Vec3 expected = Normalized(Vec3{2, 3, 1} / spacing);
+  const auto slab = CutSlab(ramp, ramp.block.box);
+  FrameSetup setup = MakeSetup(ramp, {});
+  for (Axis axis : kAxes) {
+    setup.camera.traversal_axis = axis;
+    for (const VoxelRecord& record : slab->derived().Occupied(setup, ramp.block.box).records) {
+      ASSERT_NE(record.normal, kNoGradient);
+      ASSERT_GT(std::abs(Dot(DecodeNormal(record.normal), expected)), 0.9999);
+    }
+  }
+}
+
+TEST(SurfaceVoxels, AreTheOpaqueVoxelsWithAnOpenFace) {
+  const Volume volume = MakeBlobs({{40, 30, 20}, {1, 1, 1}}, ScalarType::kUint8, 32);
+  const Box box = {{8, 8, 0}, {32, 22, 20}};
+  const auto slab = CutSlab(volume, Grown(box, 8, volume.block.box));
+  const FrameSetup setup = MakeSetup(volume, {});
+  const ClassificationTable table = Classify(setup.transfer, setup.description, setup.range);
+  const float threshold = 0.5F * MaxOpacity(table, setup.description, setup.range);
+  const auto opaque = [&](const Index3& v) {
+    return volume.block.box.Contains(v) && table.opacity[std::size_t(table.BinOf(StoredAt<std::uint8_t>(volume, v)))] >= threshold;
+  };
+  std::size_t found = 0;
+  const std::vector<SurfaceVoxel>& surface = slab->derived().Surface(setup, box);
+  for (Index3 v = box.begin; v.z < box.end.z; ++v.z) {
+    for (v.y = box.begin.y; v.y < box.end.y; ++v.y) {
+      for (v.x = box.begin.x; v.x < box.end.x; ++v.x) {
+        if (!opaque(v)) continue;
+        int open = 0;
+        for (int axis = 0; axis < 3; ++axis) {
+          Index3 below = v, above = v;
+          --below[axis];
+          ++above[axis];
+          open |= (opaque(below) ? 0 : 1 << (2 * axis)) | (opaque(above) ? 0 : 2 << (2 * axis));
+        }
+        if (open == 0) continue;
+        ASSERT_LT(found, surface.size());
+        EXPECT_EQ((Index3{surface[found].x, surface[found].y, surface[found].z}), v);
+        EXPECT_EQ(surface[found++].open_faces, open);
+      }
+    }
+  }
+  EXPECT_EQ(found, surface.size());
+  EXPECT_GT(found, 100U);
+}
+
+TEST(SlabData, KeepsWhatItMadeWhileTheSameVoxelsShow) {
+  const Volume volume = MakeBlobs({{40, 40, 40}, {1, 1, 1}}, ScalarType::kUint8, 33);
+  const auto slab = CutSlab(volume, volume.block.box);
+  const std::size_t before = slab->bytes();
+  SetupOptions options;
+  FrameSetup setup = MakeSetup(volume, options);
+  const OccupiedCells* first = &slab->derived().Occupied(setup, volume.block.box);
+  EXPECT_GE(slab->bytes(), before + first->records.size() * sizeof(VoxelRecord));
+  const VoxelRecord* records = first->records.data();
+
+  // Other opacities and colours of the same voxels, and the same axis again after another one: nothing is made anew.
+  setup.transfer = Ramp(0.7);
+  EXPECT_EQ(slab->derived().Occupied(setup, volume.block.box).records.data(), records);
+  setup.camera.traversal_axis = setup.camera.traversal_axis == Axis::kX ? Axis::kY : Axis::kX;
+  EXPECT_NE(slab->derived().Occupied(setup, volume.block.box).records.data(), records);
+  setup.camera.traversal_axis = MakeSetup(volume, options).camera.traversal_axis;
+  EXPECT_EQ(slab->derived().Occupied(setup, volume.block.box).records.data(), records);
+
+  setup.transfer.opacities = {{100, 0, 0.5, 0}, {200, 1, 0.5, 0}};  // fewer voxels
+  EXPECT_LT(slab->derived().Occupied(setup, volume.block.box).records.size(), first->records.size() + 1);
+  const FrameSetup fresh = setup;
+  EXPECT_EQ(slab->derived().Occupied(setup, volume.block.box).records.size(),
+            CutSlab(volume, volume.block.box)->derived().Occupied(fresh, volume.block.box).records.size());
+}
+
+TEST(Renderers, EmptyVolumesMakeEmptyImages) {
+  const Volume empty = MakeVolume({{9, 8, 7}, {1, 1, 1}}, ScalarType::kUint8, [](const Index3&) { return 0; });
+  for (RendererKind kind : kRenderers) {
+    SetupOptions options;
+    options.renderer = kind;
+    const LocalImage image = RenderWhole(empty, MakeSetup(empty, options));
+    EXPECT_TRUE(image.bounds.empty());
+    EXPECT_EQ(image.format, FormatOf(kind));
+  }
+}
+
+TEST(Renderers, WhatLiesOutsideTheFrameIsNotDrawn) {
+  const Volume block = MakeBlock({{60, 60, 60}, {1, 1, 1}});
+  for (RendererKind kind : kRenderers) {
+    SetupOptions options;
+    options.renderer = kind;
+    options.view.zoom = 100;
+    const FrameSetup setup = MakeSetup(block, options);
+    const auto slab = CutSlab(block, block.block.box);
+    RankReport report;
+    const LocalImage image = MakeRenderer(kind)->Render(*slab, block.block.box, setup, std::atomic<bool>(false), report).value();
+    EXPECT_EQ(image.bounds, (PixelBounds{0, 0, setup.camera.width, setup.camera.height}));
+    EXPECT_LT(report.drawn_voxels, block.block.box.voxel_count() / 20);
+  }
+}
+
+TEST(Renderers, StopWhenCancelled) {
+  const Volume block = MakeBlock({{20, 20, 20}, {1, 1, 1}});
+  for (RendererKind kind : kRenderers) {
+    SetupOptions options;
+    options.renderer = kind;
+    const auto slab = CutSlab(block, block.block.box);
+    RankReport report;
+    const auto result = MakeRenderer(kind)->Render(*slab, block.block.box, MakeSetup(block, options), std::atomic<bool>(true), report);
+    ASSERT_FALSE(result.ok());
+    EXPECT_EQ(result.status().code(), StatusCode::kCancelled);
+  }
+}
+
+TEST(Renderers, ReportTheirStages) {
+  const Volume block = MakeBlock({{20, 20, 20}, {1, 1, 1}});
+  for (RendererKind kind : kRenderers) {
+    SetupOptions options;
+    options.renderer = kind;
+    const auto slab = CutSlab(block, block.block.box);
+    RankReport report;
+    ASSERT_TRUE(MakeRenderer(kind)->Render(*slab, block.block.box, MakeSetup(block, options), std::atomic<bool>(false), report).ok());
+    ASSERT_EQ(report.spans.size(), 1U);
+    EXPECT_EQ(report.spans[0].stage, Stage::kRender);
+    std::int64_t stages = 0;
+    for (Stage stage : {Stage::kPrepare, Stage::kTransform, Stage::kShade, Stage::kSplat, Stage::kComposite, Stage::kZBuffer}) {
+      stages += report.stage_ns[std::size_t(stage)];
+    }
+    EXPECT_GT(stages, 0);
+    EXPECT_LE(stages, report.stage_ns[std::size_t(Stage::kRender)]);
+  }
+}
+
+}  // namespace
+}  // namespace slabstream

@@ -1,0 +1,41 @@
+// Phong (1975) shading with white directional lights and the viewer at infinity, on both sides of a surface:
+//   I = clamp(colour * (ambient + diffuse * sum |N.L|) + specular * sum |R.V|^shininess, 0, 1);   R = 2 (N.L) N - L
+// sums over the lights; V points against the view direction, L towards the light. Without a gradient: colour * (ambient + diffuse), no
+// specular part.
+#pragma once
+
+#include <vector>
+
+#include "common/math/vec.h"
+#include "common/view/shading.h"
+
+namespace slabstream {
+
+// What the normal decides: I = clamp(colour * diffuse + specular).
+struct PhongFactors {
+  float diffuse = 1, specular = 0;
+};
+
+class Phong {
+ public:
+  // `view_direction`: physical, unit, away from the eye.
+  Phong(const Shading& shading, const Vec3& view_direction);
+
+  // The same bits on every machine (for the Z-buffer's promise): only operations that IEEE 754 rounds exactly.
+  PhongFactors AtNormal(const Vec3& unit_normal) const;
+  PhongFactors WithoutGradient() const;
+
+  // By normal code (normal_code.h), kNoGradient included.
+  std::vector<PhongFactors> ByNormalCode() const;
+
+ private:
+  Shading shading_;
+  std::vector<Vec3> lights_;  // unit
+  Vec3 to_viewer_;            // unit
+};
+
+// base^exponent for base in [0, 1] and exponent in [1, 1000], within 1e-9 relative; the same bits everywhere, which std::pow does not
+// promise.
+double PowerOfFraction(double base, double exponent);
+
+}  // namespace slabstream

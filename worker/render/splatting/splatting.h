@@ -1,0 +1,15 @@
+// The splatting pipeline (Westover 1990, one sheet a slice): transform, shade, splat, composite. docs/rendering.md defines what it
+// computes.
+#pragma once
+
+#include "worker/render/pipeline.h"
+
+namespace slabstream {
+
+class SplattingRenderer : public Renderer {
+ public:
+  Result<LocalImage> Render(SlabData& slab, const Box& box, const FrameSetup& setup, const std::atomic<bool>& cancelled,
+                            RankReport& report) override;
+};
+
+}  // namespace slabstream
