@@ -1,17 +1,22 @@
-// WorkerMachine: everything a worker decides, as a pure state machine. (event, now) -> actions. It reads no clock, owns no socket, touches no pixel
-// and no voxel: images have handles, payloads are opaque Bytes. The service (worker/service.h) and the simulator of the tests run it.
+// WorkerMachine: everything a worker decides, as a pure state machine. (event, now) -> actions. It reads no clock, owns no socket, touches
+// no pixel and no voxel: images have handles, payloads are opaque Bytes. The service (worker/service.h) and the simulator of the tests run
+// it.
 //
-// States:  unregistered --Welcome--> registered --silence, Retire--> unregistered (everything but cached slabs is dropped; an epoch change drops those too)
+// States:  unregistered --Welcome--> registered --silence, Retire--> unregistered (everything but cached slabs is dropped; an epoch change
+// drops those too) What was dropped cannot be continued, so it registers again under the next incarnation number: to the coordinator it is
+// a new worker.
 //
 // A group on this worker:
 //   GroupAssignment   voxels of its boxes are fetched (chunk requests within the byte credit) unless they are cached
 //   slab complete     ranks are rendered one after the other, groups in order of frame and group
-//   RenderDone        the rank holds its image; the rank's steps of the schedule are taken in order of rounds: a send goes as soon as everything
+//   RenderDone        the rank holds its image; the rank's steps of the schedule are taken in order of rounds: a send goes as soon as
+//   everything
 //                     before it is in, a receive waits for its PartialImage; ranks of this same worker combine without a message
-//   root is complete  the group image goes to the display worker, which accumulates groups front to back (in order, early ones wait), reports
+//   root is complete  the group image goes to the display worker, which accumulates groups front to back (in order, early ones wait),
+//   reports
 //                     GroupDone, sends a preview if wanted, and after the last group the frame
-// PartialImages that arrive before their assignment are kept, within a byte limit; those of finished frames and older attempts are dropped. Anything that
-// arrives twice changes nothing.
+// PartialImages that arrive before their assignment are kept, within a byte limit; those of finished frames and older attempts are dropped.
+// Anything that arrives twice changes nothing.
 //
 // What the executor must do: run StartRender, StartCombine and StoreChunk on other threads and answer each with exactly one event; run
 // StartCombine, SendPartial and SendFrame in the order in which they were given; call Step(Tick) no later than NextWake().
@@ -37,49 +42,121 @@ struct SlabKey {
   DatasetId dataset = 0;
   Box box;
   ScalarType type = ScalarType::kUint8;
+  std::uint64_t generation = 0;  // named by the machine, never reused: a slab that was dropped and opened again is another one
   friend bool operator==(const SlabKey&, const SlabKey&) = default;
   friend auto operator<=>(const SlabKey&, const SlabKey&) = default;
 };
 
 struct WorkerConfig {
-  Incarnation incarnation = 0;           // random, not 0
+  Incarnation incarnation = 0;  // random, not 0: of the first registration; later ones count on from it
   std::uint32_t pid = 0;
   std::string host;
   std::string images_endpoint;
   std::uint32_t threads = 1;
-  std::uint64_t cache_bytes = std::uint64_t{1} << 40;   // slabs not needed by a current group are dropped, oldest first, above this
-  std::uint64_t credit_bytes = std::uint64_t{16} << 20; // chunk bytes requested and not yet stored
+  std::uint64_t cache_bytes = std::uint64_t{1} << 40;    // slabs not needed by a current group are dropped, oldest first, above this
+  std::uint64_t credit_bytes = std::uint64_t{16} << 20;  // chunk bytes requested and not yet stored
   Duration register_interval = std::chrono::seconds(1);
-  Duration chunk_timeout = std::chrono::seconds(3);     // then a chunk is asked for again
-  int chunk_attempts = 10;                              // then WorkerTrouble
+  Duration chunk_timeout = std::chrono::seconds(3);          // then a chunk is asked for again
+  int chunk_attempts = 10;                                   // then WorkerTrouble
+  std::uint64_t early_image_bytes = std::uint64_t{1} << 30;  // payloads of PartialImages kept before their assignment; then WorkerTrouble
 };
 
 // ---- events
-struct MessageReceived { AnyMessage message; Bytes payload; };  // from any plane; payload lengths and runs are checked already
-struct ChunkStored { SlabKey slab; std::uint32_t chunk = 0; Status status; };
-struct RenderDone { GroupKey key; Rank rank = 0; ImageHandle image = 0; Status status; RankReport report; std::uint64_t slab_bytes = 0; };
-struct CombineDone { GroupKey key; ImageHandle image = 0; Status status; Span span; };
-struct PeerUnreachable { WorkerId worker = 0; };
+struct MessageReceived {
+  AnyMessage message;
+  Bytes payload;
+};  // from any plane; payload lengths and runs are checked already
+struct ChunkStored {
+  SlabKey slab;
+  std::uint32_t chunk = 0;
+  Status status;
+};
+struct RenderDone {
+  GroupKey key;
+  Rank rank = 0;
+  ImageHandle image = 0;
+  Status status;
+  RankReport report;
+  std::uint64_t slab_bytes = 0;
+};
+struct CombineDone {
+  GroupKey key;
+  ImageHandle image = 0;
+  Status status;
+  Span span;
+};
+struct PeerUnreachable {
+  WorkerId worker = 0;
+};
 struct StopRequested {};  // SIGTERM: leave in order
 struct Tick {};
 using WorkerEvent = std::variant<MessageReceived, ChunkStored, RenderDone, CombineDone, PeerUnreachable, StopRequested, Tick>;
 
 // ---- actions
-struct SendControl { AnyMessage message; };
-struct SendChunkRequest { ChunkRequest request; };
-struct ConnectSlabs { std::string endpoint; };  // on Welcome
-struct OpenSlab { SlabKey slab; };              // make room for its voxels
-struct StoreChunk { SlabKey slab; Chunk chunk; Bytes payload; };  // unpack, check the digest -> ChunkStored
-struct DropSlab { SlabKey slab; };
-struct StartRender { GroupKey key; Rank rank = 0; SlabKey slab; Placement placement; std::shared_ptr<const FrameSetup> setup; ImageHandle image = 0; };
-struct CancelRender { GroupKey key; };  // the running one, if it is of this group; RenderDone still comes
-// Combines `other`, or if that is 0 the runs, into `image`. If `image` names no image yet, it becomes the other one. -> CombineDone
-struct StartCombine { GroupKey key; ImageHandle image = 0; ImageHandle other = 0; RunImageHeader header; Bytes payload; Side side = Side::kBack; };
-// Encodes message.pixels of `image`, fills message.image and the byte count and encode time of the last report, sends. No answer.
-struct SendPartial { Peer to; PartialImage message; ImageHandle image = 0; std::int32_t frame_width = 0; };
+struct SendControl {
+  AnyMessage message;
+};
+struct SendChunkRequest {
+  ChunkRequest request;
+};
+struct ConnectSlabs {
+  std::string endpoint;
+};  // on Welcome
+struct OpenSlab {
+  SlabKey slab;
+};  // make room for its voxels
+struct StoreChunk {
+  SlabKey slab;
+  Chunk chunk;
+  Bytes payload;
+};  // unpack, check the digest -> ChunkStored
+struct DropSlab {
+  SlabKey slab;
+};
+// Gives the handle `image` a picture, unless it fails.
+struct StartRender {
+  GroupKey key;
+  Rank rank = 0;
+  SlabKey slab;
+  Placement placement;
+  std::shared_ptr<const FrameSetup> setup;
+  ImageHandle image = 0;
+};
+struct CancelRender {
+  GroupKey key;
+};  // the running one, if it is of this group; RenderDone still comes
+// Combines `other`, or if that is 0 the runs, into `image`. If `image` names no image yet, it becomes a copy of the other one. Of `other`
+// only the pixels of `pixels` count, all if that range is empty: an image may hold pixels that have been passed on. `other` stays as it is
+// and needs its own release. -> CombineDone
+struct StartCombine {
+  GroupKey key;
+  ImageHandle image = 0;
+  ImageHandle other = 0;
+  RunImageHeader header;
+  Bytes payload;
+  Side side = Side::kBack;
+  PixelRange pixels;  // of the frame; with `other` only
+  std::int32_t frame_width = 0;
+};
+// Encodes message.pixels of `image`, fills message.image and the byte count and encode time of the last report (if there is one), sends. No
+// answer.
+struct SendPartial {
+  Peer to;
+  PartialImage message;
+  ImageHandle image = 0;
+  std::int32_t frame_width = 0;
+};
 // Resolves a copy of `image`, encodes it, fills message.runs and a report, sends to the coordinator. No answer.
-struct SendFrame { FrameImage message; ImageHandle image = 0; std::int32_t supersample = 1; };
-struct ReleaseImage { ImageHandle image = 0; };  // after everything that was started before it
+struct SendFrame {
+  FrameImage message;
+  ImageHandle image = 0;
+  std::int32_t supersample = 1;
+};
+// After everything that was started before it. Every handle that is named in a StartRender, or in a StartCombine as an image that is not
+// there yet, is released exactly once, also if its making failed.
+struct ReleaseImage {
+  ImageHandle image = 0;
+};
 struct StopProcess {};
 using WorkerAction = std::variant<SendControl, SendChunkRequest, ConnectSlabs, OpenSlab, StoreChunk, DropSlab, StartRender, CancelRender,
                                   StartCombine, SendPartial, SendFrame, ReleaseImage, StopProcess>;

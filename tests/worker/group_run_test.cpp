@@ -1,0 +1,281 @@
+// Runs one group on several workers with symbols for pixels, messages in any order and some of them twice.
+#include "worker/group_run.h"
+
+#include <gtest/gtest.h>
+
+#include <deque>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tests/support/random.h"
+#include "tests/support/swap_schedules.h"
+#include "tests/support/symbolic_images.h"
+
+namespace slabstream {
+namespace {
+
+constexpr int kWidth = 6, kHeight = 4;
+constexpr PixelRange kFrame{0, kWidth* kHeight};
+
+struct Scheme {
+  std::string name;
+  bool power_of_two = false;  // ranks
+  std::function<Schedule(const ScheduleRequest&)> make;
+};
+
+std::vector<Scheme> Schemes() {
+  std::vector<Scheme> schemes;
+  for (const CombiningEntry& entry : CombiningSchemes()) schemes.push_back({std::string(entry.name), false, entry.make});
+  schemes.push_back({"recursive halving", true, MakeRecursiveHalving});
+  schemes.push_back({"direct send", false, MakeDirectSend});
+  schemes.push_back({"strips", false, [](const ScheduleRequest& request) { return MakeStripChain(request, 5); }});
+  return schemes;
+}
+
+struct Worker {
+  ImageNames names;
+  SymbolicImages images;
+  std::unique_ptr<GroupRun> run;
+  std::deque<CombineDone> combined;
+  std::vector<Rank> to_render;
+  std::optional<GroupImage> group_image;
+};
+
+// The workers of one group (numbered from 1), and the messages between them.
+class Cluster {
+ public:
+  Cluster(Random& random, GroupAssignment assignment, std::size_t workers) : random_(random), workers_(workers) {
+    for (WorkerId id = 1; id <= workers; ++id) assignment.peers.push_back({id, "inproc://" + std::to_string(id)});
+    for (WorkerId id = 1; id <= workers; ++id) {
+      Worker& worker = workers_[id - 1];
+      worker.run = std::make_unique<GroupRun>(assignment, id, worker.names);
+      for (Rank rank = 0; rank < assignment.group.placements.size(); ++rank) {
+        if (assignment.group.placements[rank].worker == id) worker.to_render.push_back(rank);
+      }
+    }
+  }
+
+  // One random thing that may happen next. False: nothing is left to happen.
+  bool Step() {
+    std::vector<std::function<void()>> choices;
+    for (Worker& worker : workers_) {
+      if (!worker.to_render.empty()) choices.emplace_back([this, &worker] { Render(worker); });
+      if (!worker.combined.empty()) choices.emplace_back([this, &worker] { AnswerCombine(worker); });
+    }
+    for (std::size_t i = 0; i < messages_.size(); ++i) choices.emplace_back([this, i] { Deliver(i); });
+    if (choices.empty()) return false;
+    choices[random_.Integer<std::size_t>(0, choices.size() - 1)]();
+    return true;
+  }
+
+  Worker& worker(WorkerId id) { return workers_[id - 1]; }
+  std::vector<Worker>& workers() { return workers_; }
+  std::size_t messages_sent() const { return messages_sent_; }
+
+ private:
+  struct Message {
+    WorkerId to = 0;
+    PartialImage partial;
+    Bytes payload;
+  };
+
+  void Render(Worker& worker) {
+    const std::size_t which = random_.Integer<std::size_t>(0, worker.to_render.size() - 1);
+    const Rank rank = worker.to_render[which];
+    worker.to_render.erase(worker.to_render.begin() + std::ptrdiff_t(which));
+    const ImageHandle image = worker.names.Next();
+    worker.images.Render(image, rank, kFrame.end);
+    RankReport report;
+    report.worker = WorkerId(&worker - workers_.data()) + 1;
+    report.rank = rank;
+    WorkerActions actions;
+    worker.run->OnRendered(rank, image, report, actions);
+    Perform(worker, actions);
+  }
+
+  void AnswerCombine(Worker& worker) {
+    const CombineDone done = worker.combined.front();
+    worker.combined.pop_front();
+    WorkerActions actions;
+    worker.run->OnCombined(done, actions);
+    Perform(worker, actions);
+  }
+
+  void Deliver(std::size_t which) {
+    const Message message = messages_[which];
+    if (random_.Chance(0.7)) messages_.erase(messages_.begin() + std::ptrdiff_t(which));  // else it comes once more
+    WorkerActions actions;
+    worker(message.to).run->OnPartial(message.partial, message.payload, actions);
+    Perform(worker(message.to), actions);
+  }
+
+  void Perform(Worker& worker, const WorkerActions& actions) {
+    for (const WorkerAction& action : actions) {
+      if (const auto* combine = std::get_if<StartCombine>(&action)) {
+        worker.images.Combine(*combine);
+        worker.combined.push_back({combine->key, combine->image, {}, {Stage::kCombine, 0, 10}});
+      } else if (const auto* send = std::get_if<SendPartial>(&action)) {
+        messages_.push_back({send->to.worker, send->message, worker.images.Encode(send->image, send->message.pixels)});
+        ++messages_sent_;
+      } else if (const auto* release = std::get_if<ReleaseImage>(&action)) {
+        worker.images.Release(release->image);
+      } else {
+        ADD_FAILURE() << "a group run starts nothing else; action " << action.index();
+      }
+    }
+    ASSERT_TRUE(worker.run->failure().ok()) << worker.run->failure().message();
+    if (auto image = worker.run->TakeGroupImage()) worker.group_image = std::move(image);
+  }
+
+  Random& random_;
+  std::vector<Worker> workers_;
+  std::vector<Message> messages_;
+  std::size_t messages_sent_ = 0;
+};
+
+GroupAssignment MakeAssignment(Rank ranks, const std::function<Schedule(const ScheduleRequest&)>& make, Rank root) {
+  GroupAssignment assignment;
+  assignment.epoch = 5;
+  assignment.key = {1, 1, 0};
+  assignment.setup.camera.width = kWidth;
+  assignment.setup.camera.height = kHeight;
+  for (Rank rank = 0; rank < ranks; ++rank) assignment.group.placements.push_back({rank, {}, 1});
+  assignment.group.schedule = make({ranks, root, kFrame});
+  return assignment;
+}
+
+TEST(GroupRun, EveryScheduleGivesTheGroupImageOnceInOrder) {
+  Random random(11);
+  SCOPED_TRACE(random.trace());
+  for (const Scheme& scheme : Schemes()) {
+    for (int trial = 0; trial < 60; ++trial) {
+      const Rank ranks = scheme.power_of_two ? 1U << random.Integer(0, 3) : random.Integer<Rank>(1, 9);
+      GroupAssignment assignment = MakeAssignment(ranks, scheme.make, random.Integer<Rank>(0, ranks - 1));
+      SCOPED_TRACE(scheme.name + ", " + std::to_string(ranks) + " ranks, trial " + std::to_string(trial));
+      ASSERT_EQ(CheckSchedule(assignment.group.schedule, kFrame), Status::Ok());
+      const WorkerId workers = random.Integer<WorkerId>(1, 5);
+      for (Placement& placement : assignment.group.placements) placement.worker = random.Integer<WorkerId>(1, workers);
+      assignment.display = random.Integer<WorkerId>(1, workers);
+
+      Cluster cluster(random, assignment, workers);
+      while (cluster.Step()) {
+        if (HasFatalFailure()) return;
+      }
+      if (workers == 1) {
+        EXPECT_EQ(cluster.messages_sent(), 0U) << "ranks of one worker combine without messages";
+      }
+
+      Worker& display = cluster.worker(assignment.display);
+      ASSERT_TRUE(display.group_image.has_value());
+      SymbolicPixel all(ranks);
+      for (Rank rank = 0; rank < ranks; ++rank) all[rank] = rank;
+      SymbolicImage picture;
+      for (const ImagePiece& piece : display.group_image->pieces) {
+        const SymbolicImage source = piece.image == 0 ? UnpackSymbols(piece.payload) : display.images.Get(piece.image);
+        for (std::uint64_t i = piece.pixels.begin; i < piece.pixels.end; ++i) EXPECT_TRUE(picture.emplace(i, source.at(i)).second);
+      }
+      EXPECT_EQ(picture.size(), kFrame.end);
+      for (const auto& [index, pixel] : picture) EXPECT_EQ(pixel, all) << "pixel " << index;
+
+      // Every rank is reported once, and nothing is left behind.
+      std::multiset<Rank> reported;
+      for (const RankReport& report : display.group_image->reports) reported.insert(report.rank);
+      EXPECT_EQ(reported, std::multiset<Rank>(all.begin(), all.end()));
+      std::set<ImageHandle> handed_over;
+      for (const ImagePiece& piece : display.group_image->pieces) handed_over.insert(piece.image);
+      handed_over.erase(0);
+      for (const ImageHandle image : handed_over) display.images.Release(image);
+      for (Worker& worker : cluster.workers()) {
+        EXPECT_TRUE(worker.run->finished());
+        EXPECT_EQ(worker.images.size(), 0U);
+      }
+    }
+  }
+}
+
+TEST(GroupRun, DropReleasesWhateverItHolds) {
+  Random random(12);
+  SCOPED_TRACE(random.trace());
+  for (const Scheme& scheme : Schemes()) {
+    for (int trial = 0; trial < 40; ++trial) {
+      const Rank ranks = scheme.power_of_two ? 1U << random.Integer(0, 3) : random.Integer<Rank>(1, 7);
+      GroupAssignment assignment = MakeAssignment(ranks, scheme.make, random.Integer<Rank>(0, ranks - 1));
+      for (Placement& placement : assignment.group.placements) placement.worker = random.Integer<WorkerId>(1, 3);
+      assignment.display = random.Integer<WorkerId>(1, 3);
+      Cluster cluster(random, assignment, 3);
+      for (int steps = random.Integer(0, 40); steps > 0 && cluster.Step(); --steps) {
+      }
+      for (Worker& worker : cluster.workers()) {
+        WorkerActions actions;
+        worker.run->Drop(actions);
+        std::set<ImageHandle> images;  // a taken group image is no longer the run's
+        if (worker.group_image) {
+          for (const ImagePiece& piece : worker.group_image->pieces) images.insert(piece.image);
+        }
+        images.erase(0);
+        for (const ImageHandle image : images) worker.images.Release(image);
+        for (const WorkerAction& action : actions) worker.images.Release(std::get<ReleaseImage>(action).image);
+        EXPECT_EQ(worker.images.size(), 0U) << scheme.name << ", trial " << trial;
+      }
+    }
+  }
+}
+
+TEST(GroupRun, ImagesOfRanksThatAreNotAdjacentAreAFailure) {
+  GroupAssignment assignment = MakeAssignment(3, MakeFanIn, 0);
+  assignment.group.schedule.steps = {{0, 2, 0, kFrame}, {1, 1, 0, kFrame}};
+  ImageNames names;
+  GroupRun run(assignment, 1, names);
+  WorkerActions actions;
+  for (Rank rank = 0; rank < 3; ++rank) run.OnRendered(rank, names.Next(), {}, actions);
+  EXPECT_EQ(run.failure().code(), StatusCode::kInternal);
+  EXPECT_NE(run.failure().message().find("not adjacent"), std::string::npos) << run.failure().message();
+}
+
+TEST(GroupRun, AScheduleThatDoesNotFitIsAFailure) {
+  ImageNames names;
+  GroupAssignment too_few = MakeAssignment(3, MakeFanIn, 0);
+  too_few.group.placements.pop_back();
+  EXPECT_FALSE(GroupRun(too_few, 1, names).failure().ok());
+  GroupAssignment out_of_range = MakeAssignment(3, MakeFanIn, 0);
+  out_of_range.group.schedule.steps[0].from = 3;
+  EXPECT_FALSE(GroupRun(out_of_range, 1, names).failure().ok());
+}
+
+TEST(GroupRun, ImagesFromWorkersThatDoNotOwnTheRankAreIgnored) {
+  GroupAssignment assignment = MakeAssignment(2, MakeFanIn, 0);
+  assignment.group.placements[1].worker = 2;
+  assignment.display = 1;
+  ImageNames names;
+  GroupRun run(assignment, 1, names);
+  WorkerActions actions;
+  run.OnRendered(0, names.Next(), {}, actions);
+  PartialImage stranger;
+  stranger.key = assignment.key;
+  stranger.from_worker = 3;
+  stranger.interval = {1, 2};
+  stranger.pixels = kFrame;
+  run.OnPartial(stranger, {}, actions);
+  EXPECT_TRUE(actions.empty());
+  stranger.from_worker = 2;
+  run.OnPartial(stranger, {}, actions);
+  EXPECT_EQ(actions.size(), 1U);
+}
+
+TEST(GroupRun, AnEmptyGroupIsDoneAtOnce) {
+  GroupAssignment assignment;
+  assignment.setup.camera.width = kWidth;
+  assignment.setup.camera.height = kHeight;
+  assignment.display = 1;
+  ImageNames names;
+  GroupRun run(assignment, 1, names);
+  const auto image = run.TakeGroupImage();
+  ASSERT_TRUE(image.has_value());
+  EXPECT_TRUE(image->pieces.empty());
+  EXPECT_TRUE(run.finished());
+}
+
+}  // namespace
+}  // namespace slabstream

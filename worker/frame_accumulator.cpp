@@ -1,0 +1,132 @@
+#include "worker/frame_accumulator.h"
+
+#include <algorithm>
+#include <set>
+
+#include "common/base/check.h"
+
+namespace slabstream {
+
+FrameAccumulator::FrameAccumulator(const GroupAssignment& assignment, WorkerId self, ImageNames& names)
+    : epoch_(assignment.epoch),
+      self_(self),
+      frame_(assignment.key.frame),
+      group_count_(assignment.group_count),
+      previews_(assignment.previews),
+      format_(FormatOf(assignment.setup.renderer)),
+      frame_width_(assignment.setup.camera.width),
+      supersample_(assignment.setup.camera.supersample),
+      pixels_{0, std::uint64_t(assignment.setup.camera.width) * std::uint64_t(assignment.setup.camera.height)},
+      names_(names),
+      attempt_(assignment.key.attempt) {}
+
+void FrameAccumulator::Add(GroupImage group, WorkerActions& actions) {
+  CHECK(!Has(group.key.group)) << "group " << group.key.group;
+  const std::uint32_t number = group.key.group;
+  waiting_.emplace(number, std::move(group));
+  Advance(actions);
+}
+
+bool FrameAccumulator::OnCombined(const CombineDone& done, WorkerActions& actions) {
+  if (combining_ == 0 || done.image != image_) return false;
+  --combining_;
+  if (!done.status.ok()) {
+    if (failure_.ok()) failure_ = done.status;
+    return true;
+  }
+  std::vector<RankReport>& reports = reports_.back();
+  const auto own = std::find_if(reports.begin(), reports.end(), [&](const RankReport& report) { return report.worker == self_; });
+  if (own != reports.end()) {
+    own->stage_ns[static_cast<int>(Stage::kCombine)] += done.span.end_ns - done.span.begin_ns;
+    if (own->spans.size() < std::size_t(kMaxSpans)) own->spans.push_back(done.span);
+  }
+  Advance(actions);
+  return true;
+}
+
+void FrameAccumulator::Advance(WorkerActions& actions) {
+  while (failure_.ok() && combining_ == 0) {
+    if (group_started_) {
+      FinishGroup(actions);
+      continue;
+    }
+    const auto next = waiting_.find(groups_done_);
+    if (next == waiting_.end()) return;
+    GroupImage group = std::move(next->second);
+    waiting_.erase(next);
+    StartGroup(std::move(group), actions);
+  }
+}
+
+void FrameAccumulator::StartGroup(GroupImage group, WorkerActions& actions) {
+  group_started_ = true;
+  reports_.push_back(std::move(group.reports));
+  if (group.pieces.empty() && image_ == 0) {  // a frame that begins with an empty group begins with an empty picture
+    RunImageHeader nothing;
+    nothing.format = format_;
+    group.pieces.push_back({pixels_, {}, 0, nothing, {}});
+  }
+  std::set<ImageHandle> used;
+  for (ImagePiece& piece : group.pieces) {
+    if (image_ == 0 && piece.image != 0 && piece.pixels == pixels_) {
+      image_ = piece.image;  // the first group's image becomes the frame's
+      continue;
+    }
+    if (image_ == 0) image_ = names_.Next();
+    StartCombine combine{group.key, image_, piece.image, piece.header, std::move(piece.payload), Side::kBack, {}, 0};
+    if (piece.image != 0 && piece.pixels != pixels_) {
+      combine.pixels = piece.pixels;
+      combine.frame_width = frame_width_;
+    }
+    actions.push_back(std::move(combine));
+    ++combining_;
+    if (piece.image != 0) used.insert(piece.image);
+  }
+  for (const ImageHandle image : used) actions.push_back(ReleaseImage{image});
+}
+
+void FrameAccumulator::FinishGroup(WorkerActions& actions) {
+  group_started_ = false;
+  ++groups_done_;
+  ReportDone(groups_done_ - 1, actions);
+  if (previews_ || groups_done_ == group_count_) SendPicture(actions);
+}
+
+void FrameAccumulator::Confirm(std::uint32_t group, WorkerActions& actions) {
+  if (group >= groups_done_) return;
+  ReportDone(group, actions);
+  if (groups_done_ == group_count_ && frame_sent_attempt_ != attempt_) SendPicture(actions);
+}
+
+void FrameAccumulator::ReportDone(std::uint32_t group, WorkerActions& actions) const {
+  actions.push_back(SendControl{GroupDone{epoch_, self_, {frame_, attempt_, group}, reports_[group]}});
+}
+
+void FrameAccumulator::SendPicture(WorkerActions& actions) {
+  FrameImage message;
+  message.epoch = epoch_;
+  message.worker = self_;
+  message.frame = frame_;
+  message.attempt = attempt_;
+  message.groups_done = groups_done_;
+  message.group_count = group_count_;
+  message.runs.image.format = format_;
+  actions.push_back(SendFrame{std::move(message), image_, supersample_});
+  if (groups_done_ == group_count_) frame_sent_attempt_ = attempt_;
+}
+
+void FrameAccumulator::Drop(WorkerActions& actions) {
+  std::set<ImageHandle> images;
+  if (image_ != 0) images.insert(image_);
+  for (const auto& [number, group] : waiting_) {
+    for (const ImagePiece& piece : group.pieces) {
+      if (piece.image != 0) images.insert(piece.image);
+    }
+  }
+  for (const ImageHandle image : images) actions.push_back(ReleaseImage{image});
+  image_ = 0;
+  waiting_.clear();
+  combining_ = 0;
+}
+
+}  // namespace slabstream

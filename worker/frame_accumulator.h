@@ -1,0 +1,66 @@
+// FrameAccumulator: the frame on its display worker. Group images are put behind each other, nearest first; early ones wait. After each
+// group it reports GroupDone and sends a preview if wanted, after the last one the frame. It outlives attempts: what is accumulated is
+// right whoever rendered it. It keeps the picture until the frame is over, because the coordinator may ask again (Confirm).
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "worker/group_run.h"
+#include "worker/image_names.h"
+
+namespace slabstream {
+
+class FrameAccumulator {
+ public:
+  // Of any group's assignment of the frame. `names` must outlive it.
+  FrameAccumulator(const GroupAssignment& assignment, WorkerId self, ImageNames& names);
+
+  // Here already, whether accumulated, being combined, or waiting.
+  bool Has(std::uint32_t group) const { return group < groups_done_ + (group_started_ ? 1U : 0U) || waiting_.count(group) > 0; }
+  std::uint32_t groups_done() const { return groups_done_; }
+  const Status& failure() const { return failure_; }  // the picture is lost: drop the accumulator
+
+  // Later reports and pictures carry this attempt.
+  void SetAttempt(std::uint32_t attempt) { attempt_ = attempt; }
+
+  void Add(GroupImage group, WorkerActions& actions);                // takes over its images
+  bool OnCombined(const CombineDone& done, WorkerActions& actions);  // false: not one of its combines
+
+  // Says again that the group is done, and sends the finished frame again (once for each attempt), if they are.
+  void Confirm(std::uint32_t group, WorkerActions& actions);
+
+  void Drop(WorkerActions& actions);  // releases what it holds
+
+ private:
+  void Advance(WorkerActions& actions);
+  void StartGroup(GroupImage group, WorkerActions& actions);
+  void FinishGroup(WorkerActions& actions);
+  void ReportDone(std::uint32_t group, WorkerActions& actions) const;
+  void SendPicture(WorkerActions& actions);
+
+  const Epoch epoch_;
+  const WorkerId self_;
+  const FrameId frame_;
+  const std::uint32_t group_count_;
+  const bool previews_;
+  const PixelFormat format_;
+  const std::int32_t frame_width_, supersample_;
+  const PixelRange pixels_;
+  ImageNames& names_;
+
+  std::uint32_t attempt_ = 0;
+  std::uint32_t groups_done_ = 0;                    // accumulated, nearest first
+  std::optional<std::uint32_t> frame_sent_attempt_;  // the latest attempt for which the finished frame was sent
+  ImageHandle image_ = 0;                            // 0: none yet
+  int combining_ = 0;                                // StartCombine into image_ without CombineDone
+  bool group_started_ = false;
+  std::map<std::uint32_t, GroupImage> waiting_;   // complete, in front of them something is missing
+  std::vector<std::vector<RankReport>> reports_;  // of the groups done, and of the one being combined
+  Status failure_;
+};
+
+}  // namespace slabstream

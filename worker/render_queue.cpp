@@ -1,0 +1,76 @@
+#include "worker/render_queue.h"
+
+#include <algorithm>
+
+namespace slabstream {
+
+void RenderQueue::Add(const GroupKey& key, Rank rank, const Placement& placement, const std::shared_ptr<const FrameSetup>& setup,
+                      WorkerActions& actions) {
+  const Box voxels = SlabBox(placement.box, *setup);
+  waiting_[{key, rank}] = {placement, setup, slabs_.Acquire(setup->dataset, voxels, setup->description.type, actions)};
+}
+
+void RenderQueue::DropGroup(const GroupKey& key, WorkerActions& actions) {
+  std::erase_if(waiting_, [&](const auto& entry) {
+    if (entry.first.first != key) return false;
+    slabs_.Release(entry.second.slab);
+    return true;
+  });
+  if (running_ && running_->key == key && !running_->dropped) {
+    running_->dropped = true;
+    actions.push_back(CancelRender{key});
+  }
+}
+
+void RenderQueue::StartNext(WorkerActions& actions) {
+  if (running_) return;
+  const auto next = std::find_if(waiting_.begin(), waiting_.end(), [&](const auto& entry) { return slabs_.complete(entry.second.slab); });
+  if (next == waiting_.end()) return;
+  running_ = Running{next->first.first, next->first.second, std::move(next->second), names_.Next(), false};
+  waiting_.erase(next);
+  actions.push_back(StartRender{running_->key, running_->rank, slabs_.key(running_->job.slab), running_->job.placement, running_->job.setup,
+                                running_->image});
+}
+
+std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId worker, WorkerActions& actions) {
+  if (!running_ || running_->image != done.image) return std::nullopt;
+  const Running job = *std::exchange(running_, std::nullopt);
+  const SlabFetcher::Generation slab = job.job.slab;
+  if (done.status.ok()) slabs_.SetBytes(slab, done.slab_bytes);
+  if (job.dropped) {
+    slabs_.Release(slab);
+    actions.push_back(ReleaseImage{done.image});
+    return std::nullopt;
+  }
+  RankReport report = done.report;
+  report.worker = worker;
+  report.group = job.key.group;
+  report.rank = job.rank;
+  report.box = job.job.placement.id;
+  const SlabFetcher::FetchReport fetched = slabs_.TakeReport(slab);
+  report.voxel_bytes = fetched.voxel_bytes;
+  if (fetched.voxel_bytes > 0) {
+    const Span span{Stage::kFetch, fetched.begin.time_since_epoch().count(), fetched.end.time_since_epoch().count()};
+    report.stage_ns[static_cast<int>(Stage::kFetch)] += span.end_ns - span.begin_ns;
+    if (report.spans.size() < std::size_t(kMaxSpans)) report.spans.push_back(span);
+  }
+  slabs_.Release(slab);
+  if (!done.status.ok()) actions.push_back(ReleaseImage{done.image});
+  return report;
+}
+
+std::vector<SlabFetcher::Generation> RenderQueue::SlabsInOrder() const {
+  std::vector<SlabFetcher::Generation> slabs;
+  for (const auto& [name, job] : waiting_) slabs.push_back(job.slab);
+  return slabs;
+}
+
+std::set<GroupKey> RenderQueue::GroupsOn(SlabFetcher::Generation slab) const {
+  std::set<GroupKey> groups;
+  for (const auto& [name, job] : waiting_) {
+    if (job.slab == slab) groups.insert(name.first);
+  }
+  return groups;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,55 @@
+// RenderQueue: the ranks that this worker has yet to render, in order of frame, group and rank, and the one that is being rendered. The
+// first whose slab is complete goes next; there is never more than one. Each job pins its slab.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "worker/image_names.h"
+#include "worker/slab_fetcher.h"
+
+namespace slabstream {
+
+class RenderQueue {
+ public:
+  // Both must outlive the queue.
+  RenderQueue(SlabFetcher& slabs, ImageNames& names) : slabs_(slabs), names_(names) {}
+
+  void Add(const GroupKey& key, Rank rank, const Placement& placement, const std::shared_ptr<const FrameSetup>& setup,
+           WorkerActions& actions);
+  void DropGroup(const GroupKey& key, WorkerActions& actions);  // its running render is cancelled
+  void StartNext(WorkerActions& actions);                       // if nothing is rendered and a slab is complete
+
+  // The end of the running render: the executor's report with identities and what was fetched filled in, or nothing if its group was
+  // dropped (the image is then released).
+  std::optional<RankReport> Finish(const RenderDone& done, WorkerId worker, WorkerActions& actions);
+
+  std::vector<SlabFetcher::Generation> SlabsInOrder() const;  // of waiting jobs
+  std::set<GroupKey> GroupsOn(SlabFetcher::Generation slab) const;
+
+ private:
+  struct Job {
+    Placement placement;
+    std::shared_ptr<const FrameSetup> setup;
+    SlabFetcher::Generation slab = 0;
+  };
+  struct Running {
+    GroupKey key;
+    Rank rank = 0;
+    Job job;
+    ImageHandle image = 0;
+    bool dropped = false;
+  };
+
+  SlabFetcher& slabs_;
+  ImageNames& names_;
+  std::map<std::pair<GroupKey, Rank>, Job> waiting_;
+  std::optional<Running> running_;
+};
+
+}  // namespace slabstream

@@ -1,0 +1,104 @@
+// SlabFetcher: the slabs of a worker, complete or on their way: which chunks to ask for, within the byte credit, and which slabs to drop.
+//
+//   1. Acquire: a slab that covers the box is pinned, and opened if none is cached or on its way.
+//   2. RequestChunks, in the order in which slabs will be needed; Chunk -> StoreChunk -> ChunkStored. What does not arrive within
+//   chunk_timeout, or
+//      arrives damaged, is asked for again, chunk_attempts times; then the slab is given up (TakeFailures).
+//   3. complete(slab): it can be rendered from. Release when that is done; the slab stays cached.
+// Trim drops unpinned slabs: those that a complete one covers (the same box with a smaller halo), then the least recently used above
+// cache_bytes.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "worker/image_names.h"
+#include "worker/worker_machine.h"
+
+namespace slabstream {
+
+class SlabFetcher {
+ public:
+  using Generation = std::uint64_t;  // SlabKey::generation: names a slab
+
+  struct Failure {
+    Generation slab = 0;
+    Status status;
+  };
+  // What was received for a slab since it was asked last.
+  struct FetchReport {
+    std::uint64_t voxel_bytes = 0;
+    Time begin, end;  // first request, last chunk stored; meaningful if voxel_bytes > 0
+  };
+
+  explicit SlabFetcher(const WorkerConfig& config) : config_(config) {}
+
+  Generation Acquire(DatasetId dataset, const Box& box, ScalarType type, WorkerActions& actions);
+  void Release(Generation slab);  // once for each Acquire
+  bool complete(Generation slab) const;
+  SlabKey key(Generation slab) const;
+  FetchReport TakeReport(Generation slab);
+  void SetBytes(Generation slab, std::uint64_t bytes);  // with what was derived from the voxels
+
+  // Requests missing chunks of these slabs as far as the credit goes (one chunk always goes).
+  void RequestChunks(std::span<const Generation> slabs, Epoch epoch, WorkerId worker, Time now, WorkerActions& actions);
+  void OnChunk(const Chunk& chunk, Bytes payload, WorkerActions& actions);
+  void OnRefused(const ChunkRefused& refused);
+  void OnStored(const ChunkStored& stored, Time now);
+  void ExpireRequests(Time now);
+  Time NextExpiry() const;  // Time::max() if nothing is requested
+
+  // Slabs given up since the last call. They are never complete; whoever acquired them must release them.
+  std::vector<Failure> TakeFailures() { return std::exchange(failures_, {}); }
+
+  void ForgetRequests();  // the coordinator is gone: nothing that was asked for will come
+  void RetireAll();       // another coordinator: no slab may be used again
+  void Trim(WorkerActions& actions);
+
+  std::uint64_t cached_bytes() const;
+  std::uint64_t fetched_bytes() const { return fetched_bytes_; }
+
+ private:
+  struct Slab {
+    SlabKey key;
+    int pins = 0;
+    bool retired = false;  // not to be acquired again; dropped when unpinned
+    std::uint64_t bytes = 0;
+    std::uint64_t last_use = 0;
+    std::vector<std::uint32_t> missing;  // chunks neither stored nor in flight; the next one to ask for is last
+    std::uint32_t stored = 0, chunk_count = 0;
+    std::map<std::uint32_t, int> failures;  // by chunk
+    FetchReport report;
+    bool requested = false;  // since the last report
+
+    bool is_complete() const { return stored == chunk_count; }
+  };
+  struct InFlight {
+    std::uint32_t bytes = 0;
+    Time expiry;
+    bool storing = false;
+  };
+  using ChunkName = std::pair<Generation, std::uint32_t>;
+
+  Slab* Find(Generation slab);
+  const Slab* Find(Generation slab) const;
+  Slab* FindRequested(DatasetId dataset, const Box& box, std::uint32_t chunk);
+  void Retry(Generation slab, std::uint32_t chunk, const Status& why);
+  void GiveUp(Slab& slab, Status status);
+  void RetireCovered(Slab& complete);
+  void Drop(Generation slab, WorkerActions& actions);
+
+  const WorkerConfig config_;
+  std::map<Generation, Slab> slabs_;
+  std::map<ChunkName, InFlight> in_flight_;  // outlives its slab: the credit is used until the chunk is stored or expires
+  std::uint64_t in_flight_bytes_ = 0;
+  Generation last_generation_ = 0;
+  std::uint64_t use_counter_ = 0;
+  std::uint64_t fetched_bytes_ = 0;
+  std::vector<Failure> failures_;
+};
+
+}  // namespace slabstream

@@ -1,0 +1,396 @@
+#include "worker/worker_machine.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "worker/early_images.h"
+#include "worker/frame_accumulator.h"
+#include "worker/group_run.h"
+#include "worker/render_queue.h"
+#include "worker/slab_fetcher.h"
+
+namespace slabstream {
+
+struct WorkerMachine::State {
+  explicit State(WorkerConfig c)
+      : config(std::move(c)), incarnation(config.incarnation), slabs(config), renders(slabs, names), early(config.early_image_bytes) {}
+
+  // One frame, at the latest attempt that was heard of. A group without a run is over here: done, failed, or not needed.
+  struct Frame {
+    std::uint32_t attempt = 0;
+    std::map<std::uint32_t, std::optional<GroupRun>> groups;
+    std::optional<FrameAccumulator> accumulator;  // display worker
+  };
+
+  // ---- what the coordinator and the executor say. `actions` and `now` are those of the running Step.
+  void On(const MessageReceived& event) {
+    std::visit([&](const auto& message) { On(message, event.payload); }, event.message);
+  }
+  void On(const ChunkStored& stored) { slabs.OnStored(stored, now); }
+  void On(const RenderDone& done);
+  void On(const CombineDone& done);
+  void On(const PeerUnreachable& peer);
+  void On(const StopRequested&);
+  void On(const Tick&) {}
+
+  void On(const Welcome& welcome, const Bytes&);
+  void On(const Ping& ping, const Bytes&);
+  void On(const GroupAssignment& assignment, const Bytes&);
+  void On(const Retire&, const Bytes&);
+  void On(const Stop& stop, const Bytes&);
+  void On(const Chunk& chunk, const Bytes& payload);
+  void On(const ChunkRefused& refused, const Bytes&);
+  void On(const PartialImage& partial, const Bytes& payload);
+  // What a worker sends, and the client plane: not for a worker.
+  void On(const Register&, const Bytes&) {}
+  void On(const Heartbeat&, const Bytes&) {}
+  void On(const GroupDone&, const Bytes&) {}
+  void On(const FrameImage&, const Bytes&) {}
+  void On(const WorkerTrouble&, const Bytes&) {}
+  void On(const Leave&, const Bytes&) {}
+  void On(const ChunkRequest&, const Bytes&) {}
+  void On(const SubmitFrame&, const Bytes&) {}
+  void On(const FrameProgress&, const Bytes&) {}
+  void On(const FrameReply&, const Bytes&) {}
+  void On(const FrameFailed&, const Bytes&) {}
+  void On(const CancelFrame&, const Bytes&) {}
+  void On(const ClientPing&, const Bytes&) {}
+  void On(const ClientPong&, const Bytes&) {}
+  void On(const StatusQuery&, const Bytes&) {}
+  void On(const StatusReply&, const Bytes&) {}
+  void On(const ShutDown&, const Bytes&) {}
+  void On(const ShutDownReply&, const Bytes&) {}
+
+  // ---- registration
+  bool Heard(Epoch from);  // false: not from the coordinator that this worker is registered with
+  void Unregister();
+  void End();
+  void KeepTime();
+
+  // ---- frames
+  bool Over(FrameId frame) const { return frame < finished_before || cancelled.count(frame) > 0; }
+  void FinishBefore(FrameId frame);
+  void DropFrame(FrameId id);
+  void BeginAttempt(FrameId id, Frame& frame, const GroupAssignment& assignment);
+  GroupRun* FindRun(const GroupKey& key);
+  void AfterRun(GroupRun& run);  // ends the run if it failed or is finished: `run` is then gone
+  void EndRun(GroupKey key);
+  void AddToFrame(Frame& frame, GroupImage image);
+  void CheckAccumulator(FrameId id, Frame& frame);
+  void Trouble(const GroupKey& key, Status status, WorkerId unreachable = 0);
+  void FailGroup(const GroupKey& key, const Status& status);
+  void ReportSlabFailures();
+
+  const WorkerConfig config;
+  Incarnation incarnation;  // of the present registration
+  Epoch epoch = 0;          // while registered
+  WorkerId worker = 0;      // 0: unregistered
+  Epoch slabs_epoch = 0;    // whose volumes are cached
+  Duration heartbeat{}, timeout{};
+  Time next_heartbeat, last_heard;
+  Time next_register = Time::min();
+  bool ended = false;
+
+  ImageNames names;
+  SlabFetcher slabs;
+  RenderQueue renders;
+  EarlyImages early;
+  std::map<FrameId, Frame> frames;
+  FrameId finished_before = 0;
+  std::set<FrameId> cancelled;  // not below finished_before
+  std::uint32_t rendered_ranks = 0;
+
+  Time now;
+  WorkerActions actions;
+};
+
+// ---------------------------------------------------------------- registration
+
+bool WorkerMachine::State::Heard(Epoch from) {
+  if (worker == 0 || from != epoch) return false;
+  last_heard = now;
+  return true;
+}
+
+void WorkerMachine::State::On(const Welcome& welcome, const Bytes&) {
+  if (worker != 0 || ended || welcome.incarnation != incarnation) return;  // known, or of an earlier registration
+  epoch = welcome.epoch;
+  worker = welcome.worker;
+  heartbeat = std::chrono::milliseconds(welcome.heartbeat_ms);
+  timeout = std::chrono::milliseconds(welcome.timeout_ms);
+  last_heard = now;
+  next_heartbeat = now;
+  if (slabs_epoch != epoch) slabs.RetireAll();
+  slabs_epoch = epoch;
+  actions.push_back(ConnectSlabs{welcome.slabs_endpoint});
+}
+
+void WorkerMachine::State::On(const Retire&, const Bytes&) {
+  if (worker != 0) Unregister();  // also if it comes from another epoch: then the one that this worker knows is gone
+}
+
+void WorkerMachine::State::On(const Stop& stop, const Bytes&) {
+  if (worker == 0 || stop.epoch == epoch) End();
+}
+
+void WorkerMachine::State::On(const StopRequested&) {
+  if (worker != 0) actions.push_back(SendControl{Leave{epoch, worker}});
+  End();
+}
+
+void WorkerMachine::State::Unregister() {
+  while (!frames.empty()) DropFrame(frames.begin()->first);
+  early.Forget([](const GroupKey&) { return true; });
+  finished_before = 0;
+  cancelled.clear();
+  slabs.ForgetRequests();
+  worker = 0;
+  epoch = 0;
+  ++incarnation;
+  next_register = now;
+}
+
+void WorkerMachine::State::End() {
+  if (ended) return;
+  Unregister();
+  ended = true;
+  actions.push_back(StopProcess{});
+}
+
+void WorkerMachine::State::KeepTime() {
+  if (worker != 0 && now >= last_heard + timeout) Unregister();
+  if (worker == 0 && now >= next_register) {
+    actions.push_back(
+        SendControl{Register{incarnation, config.pid, config.host, config.images_endpoint, config.threads, config.cache_bytes}});
+    next_register = now + config.register_interval;
+  }
+  if (worker != 0 && now >= next_heartbeat) {
+    actions.push_back(SendControl{Heartbeat{epoch, incarnation, worker, slabs.cached_bytes(), slabs.fetched_bytes(), rendered_ranks}});
+    next_heartbeat = now + heartbeat;
+  }
+}
+
+// ---------------------------------------------------------------- frames and groups
+
+void WorkerMachine::State::On(const Ping& ping, const Bytes&) {
+  if (!Heard(ping.epoch)) return;
+  for (const FrameId frame : ping.cancelled) {
+    if (frame < finished_before) continue;
+    cancelled.insert(frame);
+    DropFrame(frame);
+  }
+  FinishBefore(ping.finished_before);
+}
+
+void WorkerMachine::State::FinishBefore(FrameId frame) {
+  finished_before = std::max(finished_before, frame);
+  while (!frames.empty() && frames.begin()->first < finished_before) DropFrame(frames.begin()->first);
+  cancelled.erase(cancelled.begin(), cancelled.lower_bound(finished_before));
+  early.Forget([&](const GroupKey& key) { return Over(key.frame); });
+}
+
+void WorkerMachine::State::DropFrame(FrameId id) {
+  const auto found = frames.find(id);
+  if (found == frames.end()) return;
+  for (const auto& [group, run] : found->second.groups) {
+    if (run) EndRun(run->key());
+  }
+  if (found->second.accumulator) found->second.accumulator->Drop(actions);
+  frames.erase(found);
+}
+
+void WorkerMachine::State::On(const GroupAssignment& assignment, const Bytes&) {
+  if (!Heard(assignment.epoch)) return;
+  FinishBefore(assignment.finished_before);
+  const GroupKey key = assignment.key;
+  if (Over(key.frame)) return;
+  Frame& frame = frames[key.frame];
+  if (key.attempt < frame.attempt) return;
+  if (key.attempt > frame.attempt) BeginAttempt(key.frame, frame, assignment);
+  const auto [entry, added] = frame.groups.try_emplace(key.group);
+  if (!added) return;
+
+  if (assignment.display == worker) {
+    if (!frame.accumulator) frame.accumulator.emplace(assignment, worker, names);
+    if (frame.accumulator->groups_done() < assignment.first_group) {
+      return Trouble(key, Status::DataLoss(fmt::format("the display worker holds {} groups of the frame, expected {}",
+                                                       frame.accumulator->groups_done(), assignment.first_group)));
+    }
+    if (frame.accumulator->Has(key.group)) return frame.accumulator->Confirm(key.group, actions);
+  }
+
+  GroupRun& run = entry->second.emplace(assignment, worker, names);
+  const auto setup = std::make_shared<const FrameSetup>(assignment.setup);
+  for (Rank rank = 0; rank < assignment.group.placements.size() && run.failure().ok(); ++rank) {
+    const Placement& placement = assignment.group.placements[rank];
+    if (placement.worker == worker) renders.Add(key, rank, placement, setup, actions);
+  }
+  for (auto& [partial, payload] : early.Take(key)) run.OnPartial(partial, std::move(payload), actions);
+  AfterRun(run);
+}
+
+void WorkerMachine::State::BeginAttempt(FrameId id, Frame& frame, const GroupAssignment& assignment) {
+  for (const auto& [group, run] : frame.groups) {
+    if (run) EndRun(run->key());
+  }
+  frame.groups.clear();
+  frame.attempt = assignment.key.attempt;
+  early.Forget([&](const GroupKey& key) { return key.frame == id && key.attempt < frame.attempt; });
+  if (!frame.accumulator) return;
+  if (assignment.display == worker) {
+    frame.accumulator->SetAttempt(frame.attempt);
+  } else {
+    frame.accumulator->Drop(actions);
+    frame.accumulator.reset();
+  }
+}
+
+void WorkerMachine::State::On(const PartialImage& partial, const Bytes& payload) {
+  if (worker == 0 || partial.epoch != epoch || Over(partial.key.frame)) return;
+  const auto frame = frames.find(partial.key.frame);
+  if (frame != frames.end()) {
+    if (partial.key.attempt < frame->second.attempt) return;
+    if (partial.key.attempt == frame->second.attempt) {
+      if (const auto group = frame->second.groups.find(partial.key.group); group != frame->second.groups.end()) {
+        if (!group->second) return;  // over
+        group->second->OnPartial(partial, payload, actions);
+        return AfterRun(*group->second);
+      }
+    }
+  }
+  if (const Status kept = early.Keep(partial, payload); !kept.ok()) Trouble(partial.key, kept);
+}
+
+void WorkerMachine::State::On(const RenderDone& done) {
+  std::optional<RankReport> report = renders.Finish(done, worker, actions);
+  if (!report) return;
+  if (!done.status.ok()) return FailGroup(done.key, done.status);
+  ++rendered_ranks;
+  GroupRun* run = FindRun(done.key);
+  run->OnRendered(done.rank, done.image, std::move(*report), actions);
+  AfterRun(*run);
+}
+
+void WorkerMachine::State::On(const CombineDone& done) {
+  if (const auto frame = frames.find(done.key.frame); frame != frames.end() && frame->second.accumulator) {
+    if (frame->second.accumulator->OnCombined(done, actions)) return CheckAccumulator(frame->first, frame->second);
+  }
+  if (GroupRun* run = FindRun(done.key)) {
+    run->OnCombined(done, actions);
+    AfterRun(*run);
+  }
+}
+
+void WorkerMachine::State::On(const PeerUnreachable& peer) {
+  for (const auto& [id, frame] : frames) {
+    for (const auto& [group, run] : frame.groups) {
+      if (!run) continue;
+      const std::vector<Peer>& peers = run->assignment().peers;
+      if (std::any_of(peers.begin(), peers.end(), [&](const Peer& p) { return p.worker == peer.worker; })) {
+        Trouble(run->key(), Status::Unavailable(fmt::format("worker {} cannot be reached", peer.worker)), peer.worker);
+      }
+    }
+  }
+}
+
+GroupRun* WorkerMachine::State::FindRun(const GroupKey& key) {
+  const auto frame = frames.find(key.frame);
+  if (frame == frames.end() || frame->second.attempt != key.attempt) return nullptr;
+  const auto group = frame->second.groups.find(key.group);
+  return group == frame->second.groups.end() || !group->second ? nullptr : &*group->second;
+}
+
+void WorkerMachine::State::AfterRun(GroupRun& run) {
+  const GroupKey key = run.key();
+  if (!run.failure().ok()) return FailGroup(key, Status(run.failure()));
+  std::optional<GroupImage> image = run.TakeGroupImage();
+  if (run.finished()) EndRun(key);
+  if (image) AddToFrame(frames.at(key.frame), std::move(*image));
+}
+
+// Ends the run, done or not; late messages of its group find nothing any more.
+void WorkerMachine::State::EndRun(GroupKey key) {
+  renders.DropGroup(key, actions);
+  std::optional<GroupRun>& run = frames.at(key.frame).groups.at(key.group);
+  run->Drop(actions);
+  run.reset();
+}
+
+void WorkerMachine::State::AddToFrame(Frame& frame, GroupImage image) {
+  const FrameId id = image.key.frame;
+  frame.accumulator->Add(std::move(image), actions);
+  CheckAccumulator(id, frame);
+}
+
+void WorkerMachine::State::CheckAccumulator(FrameId id, Frame& frame) {
+  if (frame.accumulator->failure().ok()) return;
+  Trouble({id, frame.attempt, frame.accumulator->groups_done()}, frame.accumulator->failure());
+  frame.accumulator->Drop(actions);
+  frame.accumulator.reset();
+  for (const auto& [group, run] : frame.groups) {
+    if (run) EndRun(run->key());
+  }
+}
+
+void WorkerMachine::State::FailGroup(const GroupKey& key, const Status& status) {
+  Trouble(key, status);
+  if (FindRun(key) != nullptr) EndRun(key);
+}
+
+void WorkerMachine::State::Trouble(const GroupKey& key, Status status, WorkerId unreachable) {
+  actions.push_back(SendControl{WorkerTrouble{epoch, worker, key, unreachable, std::move(status)}});
+}
+
+// ---------------------------------------------------------------- voxels
+
+void WorkerMachine::State::On(const Chunk& chunk, const Bytes& payload) {
+  if (Heard(chunk.epoch)) slabs.OnChunk(chunk, payload, actions);
+}
+
+void WorkerMachine::State::On(const ChunkRefused& refused, const Bytes&) {
+  if (Heard(refused.epoch)) slabs.OnRefused(refused);
+}
+
+void WorkerMachine::State::ReportSlabFailures() {
+  for (const SlabFetcher::Failure& failure : slabs.TakeFailures()) {
+    for (const GroupKey& key : renders.GroupsOn(failure.slab)) FailGroup(key, failure.status);
+  }
+}
+
+// ---------------------------------------------------------------- the machine
+
+WorkerMachine::WorkerMachine(WorkerConfig config) : state_(std::make_unique<State>(std::move(config))) {}
+WorkerMachine::~WorkerMachine() = default;
+WorkerMachine::WorkerMachine(WorkerMachine&&) noexcept = default;
+
+std::vector<WorkerAction> WorkerMachine::Step(const WorkerEvent& event, Time now) {
+  State& s = *state_;
+  s.now = now;
+  std::visit([&](const auto& e) { s.On(e); }, event);
+  s.slabs.ExpireRequests(now);
+  s.ReportSlabFailures();
+  if (!s.ended) s.KeepTime();
+  if (s.worker != 0) {
+    s.slabs.RequestChunks(s.renders.SlabsInOrder(), s.epoch, s.worker, now, s.actions);
+    s.renders.StartNext(s.actions);
+  }
+  s.slabs.Trim(s.actions);
+  return std::exchange(s.actions, {});
+}
+
+Time WorkerMachine::NextWake() const {
+  const State& s = *state_;
+  if (s.ended) return Time::max();
+  if (s.worker == 0) return s.next_register;
+  return std::min({s.next_heartbeat, s.last_heard + s.timeout, s.slabs.NextExpiry()});
+}
+
+bool WorkerMachine::registered() const { return state_->worker != 0; }
+WorkerId WorkerMachine::worker() const { return state_->worker; }
+
+}  // namespace slabstream
