@@ -1,18 +1,30 @@
-// FrameMachine: everything the coordinator decides, as a pure state machine. (event, now) -> actions. No sockets, threads, clocks or voxels.
+// FrameMachine: everything the coordinator decides, as a pure state machine. (event, now) -> actions. No sockets, threads, clocks or
+// voxels.
 //
-//   clients    a request is queued; queues of clients are served in turn, one frame each (fair); progress is told; silence or Cancel frees the work
+//   clients    a request is queued; queues of clients are served in turn, one frame each (fair); progress is told; silence or Cancel frees
+//   the work.
+//              The last answers of a client are kept for it, so that a request that is submitted again costs nothing
 //   datasets   loaded at first use; requests wait for it; a failed load fails them
-//   frames     planned when the window has room (PlanFrame); group after group is handed out, never more than kGroupWindow groups unfinished over all
+//   frames     planned when the window has room (PlanFrame); group after group is handed out, never more than kGroupWindow groups
+//   unfinished over all
 //              frames, so group g+1 renders while g combines, across frames too; a frame ends with its FrameImage or with FrameFailed
-//   workers    Register gives an id and a slot (a vacant one first); silence, an unreachable peer or Leave takes the worker out, and every frame that
-//              it had a part in is re-planned over the rest (attempt + 1) from its first unfinished group, or from the first if the display worker is lost.
-//              Slots that stay vacant for vacancy_grace are given up, and the next frame is partitioned anew.
-//   stalls     a running frame without any progress for stall_timeout is handed out again (attempt + 1); after max_stalls in a row it fails. No worker for
+//   workers    Register gives an id and a slot (a vacant one first); silence, an unreachable peer or Leave takes the worker out, and every
+//   frame that
+//              it had a part in is re-planned over the rest (attempt + 1) from its first unfinished group, or from the first if the display
+//              worker is lost. Slots that stay vacant for vacancy_grace are given up, and the next frame is partitioned anew.
+//   stalls     a running frame without any progress for stall_timeout is handed out again (attempt + 1); after max_stalls in a row it
+//   fails. No worker for
 //              worker_wait fails what waits, saying so. Every request has a deadline.
+//   end        ShutDown ends the service: workers Stop. CoordinatorStopRequested ends the coordinator alone: workers Retire and wait for
+//   another one.
+//              Both fail open requests, then StopService; a stopped machine does nothing more.
+//
+// What the executor must do: call Step(CoordinatorTick) no later than NextWake(), which is Time::max() if nothing can happen by itself;
+// carry the actions out in order; tell WorkerGone or ClientGone when a send finds nobody. Calls that come late are taken for the executor's
+// own sleep: nobody's silence is counted against them for that long.
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <string>
 #include <variant>
@@ -21,12 +33,11 @@
 #include "common/base/bytes.h"
 #include "common/base/time.h"
 #include "common/wire/any_message.h"
+#include "coordinator/peer_token.h"
 
 namespace slabstream {
 
 inline constexpr int kGroupWindow = 2;
-
-using PeerToken = std::uint64_t;  // the executor's name for a connection (a ROUTER identity), never reused
 
 struct CoordinatorConfig {
   Epoch epoch = 0;  // random, not 0
@@ -34,32 +45,62 @@ struct CoordinatorConfig {
   std::string slabs_endpoint;
   std::vector<std::string> datasets;  // names of the catalogue
   CostModel cost;
-  Duration heartbeat = std::chrono::milliseconds(500);       // also the interval of Ping
+  Duration heartbeat = std::chrono::milliseconds(500);  // also the interval of Ping
   Duration worker_timeout = std::chrono::seconds(6);
   Duration client_timeout = std::chrono::seconds(10);
-  Duration worker_wait = std::chrono::seconds(10);           // for the first worker
+  Duration worker_wait = std::chrono::seconds(10);  // for the first worker
   Duration vacancy_grace = std::chrono::seconds(30);
   Duration stall_timeout = std::chrono::seconds(60);
   int max_stalls = 5;
-  std::size_t max_queued = 1024;                             // frames of all clients
+  std::size_t max_queued = 1024;  // frames of all clients
 };
 
 // ---- events
-struct FromWorker { PeerToken from = 0; AnyMessage message; Bytes payload; };
-struct FromClient { PeerToken from = 0; AnyMessage message; };
-struct WorkerGone { PeerToken who = 0; };   // the socket says that nobody is there
-struct ClientGone { PeerToken who = 0; };
-struct DatasetLoaded { std::string name; DatasetId dataset = 0; std::shared_ptr<const VolumeSummary> summary; };
-struct DatasetFailed { std::string name; Status status; };
-struct CoordinatorStopRequested {};         // SIGTERM
+struct FromWorker {
+  PeerToken from = 0;
+  AnyMessage message;
+  Bytes payload;
+};
+struct FromClient {
+  PeerToken from = 0;
+  AnyMessage message;
+};
+// The socket says that nobody is there.
+struct WorkerGone {
+  PeerToken who = 0;
+};
+struct ClientGone {
+  PeerToken who = 0;
+};
+struct DatasetLoaded {
+  std::string name;
+  DatasetId dataset = 0;
+  std::shared_ptr<const VolumeSummary> summary;
+};
+struct DatasetFailed {
+  std::string name;
+  Status status;
+};
+struct CoordinatorStopRequested {};  // SIGTERM
 struct CoordinatorTick {};
-using CoordinatorEvent = std::variant<FromWorker, FromClient, WorkerGone, ClientGone, DatasetLoaded, DatasetFailed,
-                                      CoordinatorStopRequested, CoordinatorTick>;
+using CoordinatorEvent =
+    std::variant<FromWorker, FromClient, WorkerGone, ClientGone, DatasetLoaded, DatasetFailed, CoordinatorStopRequested, CoordinatorTick>;
 
 // ---- actions
-struct ToWorker { PeerToken to = 0; AnyMessage message; };
-struct ToClient { PeerToken to = 0; AnyMessage message; Bytes payload; };
-struct LoadDataset { std::string name; DatasetId dataset = 0; };  // -> DatasetLoaded or DatasetFailed
+struct ToWorker {
+  PeerToken to = 0;
+  AnyMessage message;
+};
+struct ToClient {
+  PeerToken to = 0;
+  AnyMessage message;
+  Bytes payload;
+};
+// -> DatasetLoaded or DatasetFailed
+struct LoadDataset {
+  std::string name;
+  DatasetId dataset = 0;
+};
 struct StopService {};  // everything was told; end
 using CoordinatorAction = std::variant<ToWorker, ToClient, LoadDataset, StopService>;
 

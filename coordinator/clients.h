@@ -1,0 +1,57 @@
+// ClientTable: the clients that have asked for frames, when each was last heard, and the last answers that each was sent. Answers are kept
+// within limits, so that a client that asks for the same request again (its connection broke, say) gets the answer and not the work once
+// more.
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <map>
+#include <vector>
+
+#include "common/base/bytes.h"
+#include "common/base/time.h"
+#include "common/wire/any_message.h"
+#include "coordinator/peer_token.h"
+
+namespace slabstream {
+
+inline constexpr std::size_t kMaxKeptAnswers = 64;                         // of one client
+inline constexpr std::size_t kMaxKeptAnswerBytes = std::size_t{64} << 20;  // payloads of one client's kept answers
+
+// What ended a request: its final FrameReply, or FrameFailed.
+struct Answer {
+  RequestId request = 0;
+  AnyMessage message;
+  Bytes payload;
+  Time sent;
+};
+
+class ClientTable {
+ public:
+  explicit ClientTable(Duration client_timeout) : timeout_(client_timeout) {}
+
+  void Meet(PeerToken client, Time now);   // heard; from now on it has an entry
+  void Touch(PeerToken client, Time now);  // heard, if it has one
+  void Forget(PeerToken client);
+  void Postpone(Duration duration);  // all silences begin later: the listener itself was asleep
+
+  bool Knows(PeerToken client) const { return clients_.contains(client); }
+  std::vector<PeerToken> Silent(Time now) const;
+  std::size_t size() const { return clients_.size(); }
+  Time NextWake() const;  // the next silence
+
+  // Keeps the answer, dropping the oldest ones beyond the limits (this one too if it is too large). The client must be known.
+  void Keep(PeerToken client, Answer answer);
+  Answer* FindAnswer(PeerToken client, RequestId request);  // null: none kept
+
+ private:
+  struct Client {
+    Time last_heard;
+    std::deque<Answer> answers;  // oldest first
+    std::size_t answer_bytes = 0;
+  };
+  Duration timeout_;
+  std::map<PeerToken, Client> clients_;
+};
+
+}  // namespace slabstream

@@ -1,0 +1,67 @@
+#include "coordinator/datasets.h"
+
+#include <utility>
+
+namespace slabstream {
+
+namespace {
+constexpr int kNamesInMessage = 12;
+}
+
+DatasetTable::DatasetTable(const std::vector<std::string>& names) {
+  for (const std::string& name : names) entries_.try_emplace(name);
+}
+
+const DatasetTable::Entry* DatasetTable::Find(const std::string& name) const {
+  const auto entry = entries_.find(name);
+  return entry == entries_.end() ? nullptr : &entry->second;
+}
+
+Status DatasetTable::NoSuchDataset(const std::string& name) const {
+  if (entries_.empty()) return Status::NotFound("no dataset \"" + name + "\": the catalogue is empty");
+  std::string known;
+  int listed = 0;
+  for (const auto& [other, entry] : entries_) {
+    if (listed == kNamesInMessage) break;
+    known += (listed++ == 0 ? "" : ", ") + other;
+  }
+  if (entries_.size() > kNamesInMessage) known += " and " + std::to_string(entries_.size() - kNamesInMessage) + " more";
+  return Status::NotFound("no dataset \"" + name + "\": the catalogue has " + known);
+}
+
+DatasetId DatasetTable::BeginLoad(const std::string& name) {
+  Entry& entry = entries_.at(name);
+  CHECK(entry.state == DatasetState::kUnloaded || entry.state == DatasetState::kFailed) << name;
+  entry = {.state = DatasetState::kLoading, .id = ++last_id_};
+  return entry.id;
+}
+
+bool DatasetTable::Loaded(const std::string& name, DatasetId id, std::shared_ptr<const VolumeSummary> summary) {
+  const auto found = entries_.find(name);
+  if (found == entries_.end() || found->second.state != DatasetState::kLoading || found->second.id != id) return false;
+  CHECK(summary != nullptr) << name;
+  found->second = {.state = DatasetState::kReady, .id = id, .summary = std::move(summary)};
+  return true;
+}
+
+bool DatasetTable::Failed(const std::string& name, const Status& status) {
+  const auto found = entries_.find(name);
+  if (found == entries_.end() || found->second.state != DatasetState::kLoading) return false;
+  found->second = {.state = DatasetState::kFailed, .id = found->second.id, .error = status.message()};
+  return true;
+}
+
+std::vector<DatasetStatus> DatasetTable::Report() const {
+  std::vector<DatasetStatus> report;
+  for (const auto& [name, entry] : entries_) {
+    DatasetStatus status{.name = name, .state = entry.state, .error = entry.error};
+    if (entry.summary) {
+      status.description = entry.summary->description;
+      status.range = entry.summary->range;
+    }
+    report.push_back(std::move(status));
+  }
+  return report;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,140 @@
+#include <algorithm>
+#include <utility>
+
+#include "coordinator/frame_machine_state.h"
+
+namespace slabstream {
+
+namespace {
+
+// Fits the wire's limit for texts, whatever a worker or a file name contributed.
+Status Bounded(const Status& status) {
+  return status.message().size() <= kMaxTextBytes ? status : Status(status.code(), status.message().substr(0, kMaxTextBytes));
+}
+
+}  // namespace
+
+void FrameMachine::State::OnClientMessage(PeerToken client, const SubmitFrame& message) {
+  clients.Meet(client, now);
+  if (IsOpen(client, message.request)) return;
+  if (Answer* answer = clients.FindAnswer(client, message.request)) return SendAnswer(client, *answer);
+
+  const OpenRequest request{.client = client, .submit = message, .arrived = now};
+  const Status admissible = Admissible(client, message);
+  if (!admissible.ok()) return FailRequest(request, admissible);
+  const DatasetState state = datasets.Find(message.frame.dataset)->state;
+  if (state == DatasetState::kUnloaded || state == DatasetState::kFailed) {
+    const DatasetId id = datasets.BeginLoad(message.frame.dataset);
+    actions.emplace_back(LoadDataset{.name = message.frame.dataset, .dataset = id});
+  }
+  queue.Push(request);
+  SendQueued(request);
+}
+
+Status FrameMachine::State::Admissible(PeerToken client, const SubmitFrame& message) const {
+  if (datasets.Find(message.frame.dataset) == nullptr) return datasets.NoSuchDataset(message.frame.dataset);
+  const auto running = std::count_if(frames.begin(), frames.end(), [&](const RunningFrame& f) { return f.request().client == client; });
+  if (queue.CountOf(client) + std::size_t(running) >= kMaxOpenRequests) {
+    return Status::ResourceExhausted("this client has " + std::to_string(kMaxOpenRequests) +
+                                     " open requests, which is the limit of a client");
+  }
+  if (queue.size() >= config.max_queued) {
+    return Status::ResourceExhausted(std::to_string(queue.size()) + " frames are queued, which is the limit of the service");
+  }
+  return Status::Ok();
+}
+
+void FrameMachine::State::OnClientMessage(PeerToken client, const CancelFrame& message) {
+  clients.Meet(client, now);
+  const Status cancelled = Status::Cancelled("the client cancelled the frame");
+  const auto queued = queue.Extract([&](const OpenRequest& request) { return request.Is(client, message.request); });
+  if (!queued.empty()) {
+    FailRequest(queued.front(), cancelled);
+  } else if (const RunningFrame* frame = frames.FindRequest(client, message.request)) {
+    FailFrame(*frame, cancelled);
+  } else if (Answer* answer = clients.FindAnswer(client, message.request)) {
+    SendAnswer(client, *answer);
+  } else {
+    // Not seen yet, perhaps: the answer is kept, so that a SubmitFrame that arrives later ends like this, too.
+    EndRequest(client, message.request, FrameFailed{.request = message.request, .status = cancelled}, {});
+  }
+}
+
+void FrameMachine::State::OnClientMessage(PeerToken client, const ClientPing& message) {
+  ClientPong pong{.epoch = config.epoch, .nonce = message.nonce};
+  for (const RequestId request : message.open) {
+    Answer* answer = clients.FindAnswer(client, request);
+    if (answer == nullptr && !IsOpen(client, request)) continue;
+    pong.known.push_back(request);
+    // Asked about long after it was sent, the answer must have been lost with a connection.
+    if (answer != nullptr && now >= answer->sent + config.client_timeout / 2) SendAnswer(client, *answer);
+  }
+  SendClient(client, std::move(pong));
+}
+
+void FrameMachine::State::OnClientMessage(PeerToken client, const StatusQuery& message) {
+  StatusReply reply{.epoch = config.epoch,
+                    .nonce = message.nonce,
+                    .pid = config.pid,
+                    .uptime_ms = std::uint64_t(std::chrono::duration_cast<std::chrono::milliseconds>(now - *started).count()),
+                    .clients = std::uint32_t(clients.size()),
+                    .queued = std::uint32_t(queue.size()),
+                    .running = std::uint32_t(frames.size()),
+                    .frames_done = frames_done,
+                    .frames_failed = frames_failed,
+                    .workers_lost = workers_lost,
+                    .datasets = datasets.Report()};
+  for (const Member& member : roster.members()) {
+    reply.workers.push_back({.worker = member.id,
+                             .pid = member.description.pid,
+                             .host = member.description.host,
+                             .threads = member.description.threads,
+                             .slot = roster.SlotOf(member.id),
+                             .cached_bytes = member.cached_bytes,
+                             .fetched_bytes = member.fetched_bytes,
+                             .rendered_ranks = member.rendered_ranks,
+                             .silent_ms = Milliseconds(std::max(now - member.last_heard, Duration::zero()))});
+  }
+  SendClient(client, std::move(reply));
+}
+
+void FrameMachine::State::OnClientMessage(PeerToken client, const ShutDown& message) {
+  SendClient(client, ShutDownReply{.nonce = message.nonce});
+  StopAll(Stop{.epoch = config.epoch}, "the service was shut down");
+}
+
+void FrameMachine::State::SendQueued(const OpenRequest& request) {
+  const bool loading = datasets.Find(request.submit.frame.dataset)->state == DatasetState::kLoading;
+  SendClient(request.client, FrameProgress{.request = request.submit.request,
+                                           .phase = loading ? FramePhase::kLoading : FramePhase::kQueued,
+                                           .queue_position = queue.PositionOf(request.client, request.submit.request),
+                                           .workers = std::uint32_t(roster.members().size())});
+}
+
+void FrameMachine::State::SendAnswer(PeerToken client, Answer& answer) {
+  answer.sent = now;
+  SendClient(client, answer.message, answer.payload);
+}
+
+void FrameMachine::State::EndRequest(PeerToken client, RequestId request, AnyMessage message, Bytes payload) {
+  SendClient(client, message, payload);
+  clients.Keep(client, {.request = request, .message = std::move(message), .payload = std::move(payload), .sent = now});
+}
+
+void FrameMachine::State::FailRequest(const OpenRequest& request, const Status& status) {
+  EndRequest(request.client, request.submit.request, FrameFailed{.request = request.submit.request, .status = Bounded(status)}, {});
+  if (status.code() != StatusCode::kCancelled) ++frames_failed;
+}
+
+void FrameMachine::State::FreeClient(PeerToken client) {
+  if (!clients.Knows(client)) return;
+  clients.Forget(client);
+  queue.Extract([client](const OpenRequest& request) { return request.client == client; });
+  std::vector<FrameId> orphans;
+  for (const RunningFrame& frame : frames) {
+    if (frame.request().client == client) orphans.push_back(frame.id());
+  }
+  for (const FrameId id : orphans) EndFrame(id);
+}
+
+}  // namespace slabstream

@@ -1,0 +1,134 @@
+// FrameMachine::State: what the machine knows, and its handlers. Not for executors: only the sources frame_machine*.cpp include it.
+//
+// Every Step: take the event in (On), let time take effect (Expire), then start whatever can start (Advance). Handlers append to `actions`.
+//   frame_machine.cpp           datasets, frames, time, and the Step itself
+//   frame_machine_workers.cpp   messages of workers
+//   frame_machine_clients.cpp   messages of clients and the ends of their requests
+#pragma once
+
+#include <concepts>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "coordinator/clients.h"
+#include "coordinator/datasets.h"
+#include "coordinator/frame_machine.h"
+#include "coordinator/frames_in_flight.h"
+#include "coordinator/request_queue.h"
+#include "coordinator/roster.h"
+
+namespace slabstream {
+
+template <class M, class... Ms>
+concept AnyOf = (std::same_as<M, Ms> || ...);
+
+inline std::uint32_t Milliseconds(Duration duration) {
+  return std::uint32_t(std::chrono::duration_cast<std::chrono::milliseconds>(duration).count());
+}
+
+struct FrameMachine::State {
+  explicit State(CoordinatorConfig c)
+      : config(std::move(c)),
+        roster(config.worker_timeout, config.vacancy_grace),
+        datasets(config.datasets),
+        clients(config.client_timeout),
+        limits{.stall_timeout = config.stall_timeout,
+               .max_stalls = config.max_stalls,
+               .pause = config.heartbeat,
+               .proof_of_life = config.heartbeat,
+               .suspicion = config.worker_timeout} {}
+
+  const CoordinatorConfig config;
+  LiveRoster roster;
+  DatasetTable datasets;
+  ClientTable clients;
+  RequestQueue queue;
+  FramesInFlight frames;
+  const FrameLimits limits;
+
+  Time now;                     // of this Step
+  Time wake = Time::max();      // promised at the end of the last Step
+  std::optional<Time> started;  // the first Step
+  Time next_ping;               // while there are workers
+  bool stopped = false;
+  std::uint64_t frames_done = 0, frames_failed = 0, workers_lost = 0;
+  std::vector<CoordinatorAction> actions;  // of this Step
+
+  // ---- events
+  void On(const FromWorker& event) {
+    std::visit([&](const auto& message) { OnWorkerMessage(event, message); }, event.message);
+  }
+  void On(const FromClient& event) {
+    clients.Touch(event.from, now);
+    std::visit([&](const auto& message) { OnClientMessage(event.from, message); }, event.message);
+  }
+  void On(const WorkerGone& event) {
+    for (const WorkerId worker : roster.At(event.who)) LoseWorker(worker);
+  }
+  void On(const ClientGone& event) { FreeClient(event.who); }
+  void On(const DatasetLoaded& event);
+  void On(const DatasetFailed& event);
+  void On(const CoordinatorStopRequested&) { StopAll(Retire{.epoch = config.epoch}, "the coordinator is going down"); }
+  void On(const CoordinatorTick&) {}
+
+  // ---- messages of workers
+  void OnWorkerMessage(const FromWorker& event, const Register& message);
+  void OnWorkerMessage(const FromWorker& event, const Heartbeat& message);
+  void OnWorkerMessage(const FromWorker& event, const GroupDone& message);
+  void OnWorkerMessage(const FromWorker& event, const FrameImage& message);
+  void OnWorkerMessage(const FromWorker& event, const WorkerTrouble& message);
+  void OnWorkerMessage(const FromWorker& event, const Leave& message);
+  // What no worker sends here is dropped.
+  template <AnyOf<Welcome, Ping, GroupAssignment, Retire, Stop, ChunkRequest, Chunk, ChunkRefused, PartialImage, SubmitFrame, FrameProgress,
+                  FrameReply, FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery, StatusReply, ShutDown, ShutDownReply>
+                Message>
+  void OnWorkerMessage(const FromWorker&, const Message&) {}
+
+  // ---- messages of clients
+  void OnClientMessage(PeerToken client, const SubmitFrame& message);
+  void OnClientMessage(PeerToken client, const CancelFrame& message);
+  void OnClientMessage(PeerToken client, const ClientPing& message);
+  void OnClientMessage(PeerToken client, const StatusQuery& message);
+  void OnClientMessage(PeerToken client, const ShutDown& message);
+  // What no client sends is dropped.
+  template <
+      AnyOf<Register, Welcome, Heartbeat, Ping, GroupAssignment, GroupDone, FrameImage, WorkerTrouble, Leave, Retire, Stop, ChunkRequest,
+            Chunk, ChunkRefused, PartialImage, FrameProgress, FrameReply, FrameFailed, ClientPong, StatusReply, ShutDownReply>
+          Message>
+  void OnClientMessage(PeerToken, const Message&) {}
+
+  // ---- requests
+  bool IsOpen(PeerToken client, RequestId request) { return queue.Contains(client, request) || frames.FindRequest(client, request); }
+  Status Admissible(PeerToken client, const SubmitFrame& message) const;
+  void SendQueued(const OpenRequest& request);
+  void EndRequest(PeerToken client, RequestId request, AnyMessage message, Bytes payload);
+  void FailRequest(const OpenRequest& request, const Status& status);
+  void SendAnswer(PeerToken client, Answer& answer);
+  void FreeClient(PeerToken client);
+
+  // ---- frames and workers
+  void Expire();
+  void Advance();
+  bool StartNextFrame();
+  void HandOut(RunningFrame& frame);
+  void AfterGroupDone(const RunningFrame& frame);
+  void EndFrame(FrameId id);
+  void FailFrame(const RunningFrame& frame, const Status& status);
+  void LoseWorker(WorkerId worker);
+  void RemoveWorker(WorkerId worker);
+  void StopAll(const AnyMessage& goodbye, const std::string& reason);
+  Ping MakePing() const { return {.epoch = config.epoch, .finished_before = frames.finished_before(), .cancelled = frames.cancelled()}; }
+  Time NextWake() const;
+
+  // ---- actions
+  void SendWorker(WorkerId worker, AnyMessage message) {
+    if (const Member* member = roster.Find(worker)) actions.emplace_back(ToWorker{.to = member->peer, .message = std::move(message)});
+  }
+  void SendClient(PeerToken client, AnyMessage message, Bytes payload = {}) {
+    actions.emplace_back(ToClient{.to = client, .message = std::move(message), .payload = std::move(payload)});
+  }
+};
+
+}  // namespace slabstream

@@ -1,0 +1,89 @@
+#include <utility>
+
+#include "coordinator/frame_machine_state.h"
+
+namespace slabstream {
+
+void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const Register& message) {
+  for (const WorkerId dead : roster.ReplacedBy(message, event.from)) LoseWorker(dead);
+  if (roster.empty()) next_ping = now + config.heartbeat;
+  const WorkerId worker = roster.Admit(message, event.from, now);
+  SendWorker(worker, Welcome{.epoch = config.epoch,
+                             .incarnation = message.incarnation,
+                             .worker = worker,
+                             .slabs_endpoint = config.slabs_endpoint,
+                             .heartbeat_ms = Milliseconds(config.heartbeat),
+                             .timeout_ms = Milliseconds(config.worker_timeout)});
+}
+
+void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const Heartbeat& message) {
+  const LiveRoster::News news = message.epoch == config.epoch ? roster.Hear(message, event.from, now) : LiveRoster::News{};
+  if (news.known) {
+    for (RunningFrame& frame : frames) frame.OnHeartbeat(message.worker, news.progressed, now);
+    SendWorker(message.worker, MakePing());
+  } else if (!news.stale) {
+    actions.emplace_back(ToWorker{.to = event.from, .message = Retire{.epoch = config.epoch}});
+  }
+}
+
+void FrameMachine::State::OnWorkerMessage(const FromWorker&, const GroupDone& message) {
+  if (message.epoch != config.epoch) return;
+  roster.Touch(message.worker, now);
+  RunningFrame* frame = frames.Find(message.key.frame);
+  if (frame != nullptr && frame->OnGroupDone(message, now)) AfterGroupDone(*frame);
+}
+
+void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const FrameImage& message) {
+  if (message.epoch != config.epoch) return;
+  roster.Touch(message.worker, now);
+  RunningFrame* frame = frames.Find(message.frame);
+  if (frame == nullptr) return;
+  const std::uint32_t groups_before = frame->groups_done();
+  const RunningFrame::Use use = frame->OnImage(message, now);
+  if (frame->groups_done() > groups_before) AfterGroupDone(*frame);
+  if (use == RunningFrame::Use::kNothing) return;
+
+  const OpenRequest& request = frame->request();
+  FrameReply reply{.request = request.submit.request,
+                   .size = request.submit.frame.size,
+                   .groups_done = message.groups_done,
+                   .group_count = message.group_count,
+                   .runs = message.runs};
+  if (use == RunningFrame::Use::kPreview) {
+    SendClient(request.client, std::move(reply), event.payload);
+    return;
+  }
+  reply.statistics = frame->Statistics(now);
+  EndRequest(request.client, request.submit.request, std::move(reply), event.payload);
+  ++frames_done;
+  EndFrame(message.frame);
+}
+
+void FrameMachine::State::OnWorkerMessage(const FromWorker&, const WorkerTrouble& message) {
+  if (message.epoch != config.epoch || roster.Find(message.worker) == nullptr) return;
+  roster.Touch(message.worker, now);
+  RunningFrame* frame = frames.Find(message.key.frame);
+  if (frame == nullptr) return;
+  if (message.unreachable != 0) {
+    if (roster.Find(message.unreachable) == nullptr) return;  // known to be lost: the frame has been planned anew already
+    SendWorker(message.unreachable, MakePing());              // whose failure would prove the complaint right
+  }
+  const Status status = frame->OnTrouble(message, now);
+  if (!status.ok()) FailFrame(*frame, status);
+}
+
+void FrameMachine::State::OnWorkerMessage(const FromWorker&, const Leave& message) {
+  if (message.epoch == config.epoch) RemoveWorker(message.worker);
+}
+
+void FrameMachine::State::LoseWorker(WorkerId worker) {
+  ++workers_lost;
+  RemoveWorker(worker);
+}
+
+void FrameMachine::State::RemoveWorker(WorkerId worker) {
+  roster.Remove(worker, now);
+  for (RunningFrame& frame : frames) frame.OnLoss(worker, now);
+}
+
+}  // namespace slabstream

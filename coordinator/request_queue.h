@@ -1,0 +1,51 @@
+// RequestQueue: frames that were asked for and do not run yet. Each client has a queue of its own; clients are served in turn, one frame
+// each, so that a turntable of a thousand frames delays another client's picture by one frame and not by a thousand.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <list>
+#include <optional>
+#include <vector>
+
+#include "common/base/time.h"
+#include "common/wire/client_messages.h"
+#include "coordinator/peer_token.h"
+
+namespace slabstream {
+
+struct OpenRequest {
+  PeerToken client = 0;
+  SubmitFrame submit;
+  Time arrived;
+
+  Time deadline() const { return arrived + std::chrono::milliseconds(submit.deadline_ms); }
+  bool Is(PeerToken of_client, RequestId id) const { return client == of_client && submit.request == id; }
+};
+
+class RequestQueue {
+ public:
+  using Predicate = std::function<bool(const OpenRequest&)>;
+
+  void Push(OpenRequest request);
+  // The first request that is `ready` of the first client in turn that has one; that client then goes to the end of the turn.
+  std::optional<OpenRequest> TakeNext(const Predicate& ready);
+  std::vector<OpenRequest> Extract(const Predicate& wanted);  // takes all of them out, wherever they stand
+
+  void ForEach(const std::function<void(const OpenRequest&)>& visit) const;  // in turn of clients, then in order of arrival
+  bool Contains(PeerToken client, RequestId request) const;
+  std::size_t size() const;
+  std::size_t CountOf(PeerToken client) const;
+  // Frames that are served before this one if all are ready. The request must be there.
+  std::uint32_t PositionOf(PeerToken client, RequestId request) const;
+
+ private:
+  struct ClientQueue {
+    PeerToken client = 0;
+    std::deque<OpenRequest> requests;  // never empty
+  };
+  std::list<ClientQueue> turn_;  // the front is served next
+};
+
+}  // namespace slabstream

@@ -1,0 +1,78 @@
+// LiveRoster: which workers there are, which slot each one owns, and when each was last heard. Pure: time is an argument.
+//
+// A worker is an incarnation (one life of one process). It keeps its id while it stays, on whatever connection it speaks; a new incarnation
+// is a new worker. Slots outlive workers: the slot of a lost worker stays vacant for a grace period, so that a replacement takes over its
+// boxes and nobody else's voxels move; then it is given up, and the slots after it move down.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/time.h"
+#include "common/planning/frame_plan.h"
+#include "common/wire/control_messages.h"
+#include "coordinator/peer_token.h"
+
+namespace slabstream {
+
+struct Member {
+  WorkerId id = 0;
+  PeerToken peer = 0;    // the connection that it spoke on last
+  Register description;  // as it registered
+  Time last_heard;
+  std::uint64_t cached_bytes = 0, fetched_bytes = 0;
+  std::uint32_t rendered_ranks = 0;
+};
+
+class LiveRoster {
+ public:
+  LiveRoster(Duration worker_timeout, Duration vacancy_grace) : timeout_(worker_timeout), vacancy_grace_(vacancy_grace) {}
+
+  // Members that this Register proves dead: same connection or same image endpoint, other incarnation. Remove them before Admit, so that
+  // the new worker gets their slot.
+  std::vector<WorkerId> ReplacedBy(const Register& message, PeerToken from) const;
+  // A new worker, or the one that it is already: Registers repeat until the Welcome arrives.
+  WorkerId Admit(const Register& message, PeerToken from, Time now);
+
+  struct News {
+    bool known = false;
+    bool stale = false;       // not known, but its incarnation is a member under another id: an old message, no reason to retire anybody
+    bool progressed = false;  // it has received voxels or rendered ranks since its last heartbeat
+  };
+  News Hear(const Heartbeat& message, PeerToken from, Time now);
+  void Touch(WorkerId worker, Time now);  // any other message of a member; unknown ids are ignored
+
+  void Remove(WorkerId worker, Time now);  // its slot becomes vacant
+  void GiveUpVacancies(Time now);          // drops slots that have been vacant for the grace period
+  void Postpone(Duration duration);        // all silences begin later: the listener itself was asleep
+
+  const Member* Find(WorkerId worker) const;  // null: not a member
+  std::vector<WorkerId> At(PeerToken peer) const;
+  std::vector<WorkerId> Silent(Time now) const;  // not heard for the timeout
+  const std::vector<Member>& members() const { return members_; }
+  bool empty() const { return members_.empty(); }
+  Time empty_since() const { return empty_since_; }  // Time::min(): there never was a worker
+  std::uint32_t SlotOf(WorkerId worker) const;       // of a member
+
+  Roster slots() const;  // 0 where a slot is vacant
+  // The slots of a plan made earlier: workers that are still here keep theirs; the others' go to workers without a slot in it, the present
+  // owner of the same slot first. What is left is vacant.
+  Roster Refill(const Roster& planned) const;
+
+  Time NextWake() const;  // the next silence or end of a grace period; Time::max(): none
+
+ private:
+  struct Slot {
+    WorkerId worker = 0;
+    Time vacant_since;
+  };
+  Duration timeout_, vacancy_grace_;
+  std::vector<Member> members_;  // by ascending id
+  std::vector<Slot> slots_;
+  WorkerId last_id_ = 0;
+  Time empty_since_ = Time::min();
+};
+
+}  // namespace slabstream

@@ -1,0 +1,230 @@
+#include "coordinator/running_frame.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "common/base/check.h"
+
+namespace slabstream {
+
+namespace {
+
+void AddOnce(std::vector<WorkerId>& workers, WorkerId worker) {
+  if (worker != 0 && std::find(workers.begin(), workers.end(), worker) == workers.end()) workers.push_back(worker);
+}
+
+std::string WorkerName(WorkerId worker) { return "worker " + std::to_string(worker); }
+
+std::int64_t Nanoseconds(Time time) { return time.time_since_epoch().count(); }
+
+}  // namespace
+
+RunningFrame::RunningFrame(FrameId id, OpenRequest request, FramePlan plan, Roster roster, const FrameLimits& limits, Time now)
+    : id_(id),
+      request_(std::move(request)),
+      plan_(std::move(plan)),
+      roster_(std::move(roster)),
+      limits_(limits),
+      begin_(now),
+      displays_{plan_.display},
+      last_progress_(now),
+      reports_(plan_.groups.size()) {
+  CHECK(!plan_.groups.empty()) << "frame " << id_;
+}
+
+std::uint32_t RunningFrame::unfinished_groups() const {
+  return attempt_due_ || next_group_ < groups_done_ ? 0 : next_group_ - groups_done_;
+}
+
+bool RunningFrame::waiting() const { return !attempt_due_ && (next_group_ > groups_done_ || groups_done_ == group_count()); }
+
+bool RunningFrame::HasPart(WorkerId worker) const {
+  if (worker == plan_.display) return true;
+  return std::any_of(plan_.groups.begin() + groups_done_, plan_.groups.end(), [worker](const GroupPlan& group) {
+    return std::any_of(group.placements.begin(), group.placements.end(), [worker](const Placement& p) { return p.worker == worker; });
+  });
+}
+
+std::vector<WorkerId> RunningFrame::Renderers(std::uint32_t group) const {
+  std::vector<WorkerId> workers;
+  for (const Placement& placement : plan_.groups[group].placements) AddOnce(workers, placement.worker);
+  return workers;
+}
+
+std::vector<WorkerId> RunningFrame::Participants() const {
+  std::vector<WorkerId> workers = {plan_.display};
+  for (std::uint32_t group = 0; group < group_count(); ++group) {
+    for (const WorkerId worker : Renderers(group)) AddOnce(workers, worker);
+  }
+  return workers;
+}
+
+bool RunningFrame::CanHandOut() const { return !attempt_due_ && next_group_ < group_count(); }
+
+RunningFrame::HandOut RunningFrame::NextGroup(Time now) {
+  CHECK(CanHandOut()) << "frame " << id_;
+  if (unfinished_groups() == 0) last_progress_ = now;  // nothing was out: the wait begins here
+  const std::uint32_t number = next_group_++;
+  moved_on_.clear();
+  HandOut out{.assignment = {.key = {.frame = id_, .attempt = attempt(), .group = number},
+                             .group_count = group_count(),
+                             .first_group = first_group_,
+                             .previews = request_.submit.frame.previews,
+                             .display = plan_.display,
+                             .setup = plan_.setup,
+                             .group = plan_.groups[number]},
+              .workers = Renderers(number)};
+  AddOnce(out.workers, plan_.display);
+  for (const WorkerId worker : out.workers) out.assignment.peers.push_back({.worker = worker});
+  return out;
+}
+
+Status RunningFrame::BeginAttempt(const Roster& roster, Time now) {
+  Result<FramePlan> plan = Replan(plan_, roster);
+  if (!plan.ok()) return plan.status();
+  const bool keeps_accumulated = plan->display == plan_.display && !display_in_doubt_;
+  plan_ = std::move(plan).value();
+  roster_ = roster;
+  displays_.push_back(plan_.display);
+  if (!keeps_accumulated) {
+    groups_done_ = 0;
+    accumulating_since_ = attempt();
+  }
+  // A display worker that has all groups is asked for the last one again: its answer is the picture that did not arrive.
+  first_group_ = next_group_ = std::min(groups_done_, group_count() - 1);
+  groups_done_ = first_group_;
+  attempt_due_.reset();
+  display_in_doubt_ = false;
+  suspicion_.reset();
+  last_progress_ = now;
+  return Status::Ok();
+}
+
+bool RunningFrame::Accept(std::uint32_t of_attempt, WorkerId sender) const {
+  return sender == plan_.display && of_attempt >= accumulating_since_ && of_attempt <= attempt();
+}
+
+bool RunningFrame::Finish(std::uint32_t groups, Time now) {
+  if (groups <= groups_done_) return false;
+  groups_done_ = groups;
+  next_group_ = std::max(next_group_, groups_done_);
+  if (groups_done_ > furthest_done_) {
+    furthest_done_ = groups_done_;
+    stalls_ = 0;
+  }
+  last_progress_ = now;
+  return true;
+}
+
+bool RunningFrame::OnGroupDone(const GroupDone& message, Time now) {
+  if (!Accept(message.key.attempt, message.worker) || message.key.group >= group_count()) return false;
+  if (!message.reports.empty()) reports_[message.key.group] = message.reports;
+  return Finish(message.key.group + 1, now);
+}
+
+RunningFrame::Use RunningFrame::OnImage(const FrameImage& message, Time now) {
+  if (message.attempt == 0 || message.attempt > attempt() || message.worker != displays_[message.attempt - 1]) return Use::kNothing;
+  if (message.group_count != group_count() || message.groups_done > group_count()) return Use::kNothing;
+  if (message.groups_done == group_count()) {
+    groups_done_ = group_count();
+    display_reports_ = message.reports;
+    return Use::kFinal;
+  }
+  if (Accept(message.attempt, message.worker)) Finish(message.groups_done, now);
+  if (!request_.submit.frame.previews || message.groups_done <= groups_shown_) return Use::kNothing;
+  groups_shown_ = message.groups_done;
+  return Use::kPreview;
+}
+
+void RunningFrame::OnHeartbeat(WorkerId worker, bool progressed, Time now) {
+  if (progressed && unfinished_groups() > 0 && HasPart(worker) && !moved_on_.contains(worker)) last_progress_ = now;
+  if (suspicion_ && suspicion_->accused == worker && now > suspicion_->proof_after) suspicion_->until = now;
+}
+
+void RunningFrame::OnOvertaken(const std::vector<WorkerId>& workers) { moved_on_.insert(workers.begin(), workers.end()); }
+
+void RunningFrame::OnLoss(WorkerId worker, Time now) {
+  if (suspicion_ && suspicion_->accused == worker) suspicion_.reset();
+  if (!HasPart(worker)) return;
+  if (worker == plan_.display) display_in_doubt_ = true;
+  attempt_due_ = now;
+}
+
+Status RunningFrame::OnTrouble(const WorkerTrouble& message, Time now) {
+  if (message.key.attempt != attempt() || message.key.group < groups_done_ || attempt_due_) return Status::Ok();
+  if (message.unreachable != 0) {
+    if (!suspicion_) {
+      suspicion_ = {.accused = message.unreachable,
+                    .accuser = message.worker,
+                    .proof_after = now + limits_.proof_of_life,
+                    .until = now + limits_.suspicion};
+    }
+    return Status::Ok();
+  }
+  if (message.worker == plan_.display) display_in_doubt_ = true;
+  return CountStall(Status(message.status.code(), WorkerName(message.worker) + ": " + message.status.message()), limits_.pause * stalls_,
+                    now);
+}
+
+Status RunningFrame::Expire(Time now) {
+  if (attempt_due_) return Status::Ok();
+  if (suspicion_ && now >= suspicion_->until) {
+    return CountStall(
+        Status::Unavailable(WorkerName(suspicion_->accuser) + " cannot reach " + WorkerName(suspicion_->accused) + ", which is alive"),
+        Duration::zero(), now);
+  }
+  if (waiting() && now >= last_progress_ + limits_.stall_timeout) {
+    const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(limits_.stall_timeout).count();
+    return CountStall(Status::Unavailable("no progress for " + std::to_string(seconds) + " s"), Duration::zero(), now);
+  }
+  return Status::Ok();
+}
+
+Status RunningFrame::CountStall(const Status& reason, Duration pause, Time now) {
+  if (++stalls_ >= limits_.max_stalls) {
+    return Status(reason.code(), reason.message() + " (" + std::to_string(groups_done_) + " of " + std::to_string(group_count()) +
+                                     " groups were done at attempt " + std::to_string(attempt()) + "; " + std::to_string(stalls_) +
+                                     " failures in a row is the limit)");
+  }
+  attempt_due_ = now + pause;
+  return Status::Ok();
+}
+
+Time RunningFrame::NextWake() const {
+  if (attempt_due_) return *attempt_due_;
+  Time wake = Time::max();
+  if (waiting()) wake = last_progress_ + limits_.stall_timeout;
+  if (suspicion_) wake = std::min(wake, suspicion_->until);
+  return wake;
+}
+
+FrameProgress RunningFrame::Progress() const {
+  return {.request = request_.submit.request,
+          .phase = FramePhase::kRunning,
+          .groups_done = groups_done_,
+          .group_count = group_count(),
+          .attempt = attempt(),
+          .workers = std::uint32_t(Participants().size())};
+}
+
+FrameStatistics RunningFrame::Statistics(Time now) const {
+  FrameStatistics statistics{.workers = std::uint32_t(Participants().size()),
+                             .groups = group_count(),
+                             .attempts = attempt(),
+                             .decomposition = request_.submit.frame.policy.decomposition,
+                             .axis = std::string(1, Letter(plan_.slab_axis)),
+                             .combine = plan_.combine,
+                             .queued_ns = (begin_ - request_.arrived).count(),
+                             .begin_ns = Nanoseconds(begin_),
+                             .end_ns = Nanoseconds(now)};
+  const auto append = [&](const std::vector<RankReport>& reports) {
+    const std::size_t room = kMaxReports - statistics.reports.size();
+    statistics.reports.insert(statistics.reports.end(), reports.begin(), reports.begin() + std::ptrdiff_t(std::min(room, reports.size())));
+  };
+  for (const auto& reports : reports_) append(reports);
+  append(display_reports_);
+  return statistics;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,123 @@
+// RunningFrame: one frame from its plan to its end. It knows which groups are handed out and which are done, on which attempt, and what was
+// measured.
+//
+// An attempt hands out the groups [first group, group count) of one plan. What ends it before the frame's end, and where the next one
+// begins:
+//   a worker with a part in it is lost                     the first unfinished group, now
+//   no progress for stall_timeout                          the first unfinished group, now; counted
+//   a worker could not do its part                         the first unfinished group, after a pause that grows; counted
+//   a worker cannot reach another that is alive            the first unfinished group, once that is proved; counted
+//   any of these, if the display worker was lost or had the trouble     group 0: what it accumulated is gone or in doubt
+// Counted ones fail the frame when max_stalls of them come in a row, with no group finished between them that had never been finished
+// before. So a frame ends, whatever happens, as long as workers are not lost for ever.
+//
+// A group is done when the display worker has accumulated it, which it does in order: group g done means 0 ... g done. That holds for the
+// display worker's lifetime, not for an attempt, and a picture is right whoever makes it, so news of older attempts counts where its sender
+// proves it.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <set>
+#include <vector>
+
+#include "common/base/status.h"
+#include "common/base/time.h"
+#include "common/planning/frame_plan.h"
+#include "common/wire/client_messages.h"
+#include "coordinator/request_queue.h"
+
+namespace slabstream {
+
+struct FrameLimits {
+  Duration stall_timeout{};
+  int max_stalls = 1;
+  Duration pause{};          // before the second attempt after trouble; each further one waits this much longer
+  Duration proof_of_life{};  // a heartbeat that much later than a complaint about its sender refutes "it is dead"
+  Duration suspicion{};      // that much later the accused worker is lost, or alive for sure
+};
+
+class RunningFrame {
+ public:
+  // `roster` is what `plan` was made for.
+  RunningFrame(FrameId id, OpenRequest request, FramePlan plan, Roster roster, const FrameLimits& limits, Time now);
+
+  FrameId id() const { return id_; }
+  const OpenRequest& request() const { return request_; }
+  const Roster& roster() const { return roster_; }
+  std::uint32_t attempt() const { return std::uint32_t(displays_.size()); }  // from 1
+  WorkerId display() const { return plan_.display; }
+  std::uint32_t group_count() const { return std::uint32_t(plan_.groups.size()); }
+  std::uint32_t groups_done() const { return groups_done_; }
+  std::uint32_t unfinished_groups() const;  // handed out and not done; 0 while a new attempt is due
+  bool HasPart(WorkerId worker) const;      // in what is not done yet
+  std::vector<WorkerId> Renderers(std::uint32_t group) const;
+  std::vector<WorkerId> Participants() const;  // workers with a placement anywhere in the plan, and the display worker
+
+  // ---- handing out
+  bool CanHandOut() const;  // a group is left, and no new attempt is due
+  struct HandOut {
+    GroupAssignment assignment;  // epoch, finished_before and the endpoints of the peers are left to the caller
+    std::vector<WorkerId> workers;
+  };
+  HandOut NextGroup(Time now);  // needs CanHandOut()
+
+  bool AttemptDue(Time now) const { return attempt_due_ && now >= *attempt_due_; }
+  // Begins the next attempt over `roster` (same number of slots). Unavailable if nobody is in it; nothing changes then.
+  Status BeginAttempt(const Roster& roster, Time now);
+
+  // ---- what workers say
+  bool OnGroupDone(const GroupDone& message, Time now);  // true: groups_done() rose
+  enum class Use { kNothing, kPreview, kFinal };
+  Use OnImage(const FrameImage& message, Time now);  // which use the picture is of; a preview tells of groups done, too
+  void OnHeartbeat(WorkerId worker, bool progressed, Time now);
+  // These workers have rendered a younger frame's group. They render in order, so what they do now is no progress of this frame.
+  void OnOvertaken(const std::vector<WorkerId>& workers);
+
+  // ---- what goes wrong. A Status that is not ok: the frame has failed.
+  void OnLoss(WorkerId worker, Time now);  // it is no longer in the roster
+  // Trouble of another attempt or of a group that is done is no news. message.unreachable, if any, must be in the roster.
+  Status OnTrouble(const WorkerTrouble& message, Time now);
+  Status Expire(Time now);  // stalls, suspicions
+
+  Time NextWake() const;  // of Expire and AttemptDue; Time::max(): none
+
+  FrameProgress Progress() const;
+  FrameStatistics Statistics(Time now) const;
+
+ private:
+  struct Suspicion {
+    WorkerId accused = 0, accuser = 0;
+    Time proof_after;  // a heartbeat later than this proves that the accused is alive
+    Time until;        // then it is alive, since it is not lost
+  };
+  bool Accept(std::uint32_t attempt, WorkerId sender) const;
+  bool Finish(std::uint32_t groups, Time now);
+  bool waiting() const;  // for groups that are out, or for the finished picture
+  Status CountStall(const Status& reason, Duration pause, Time now);
+
+  FrameId id_;
+  OpenRequest request_;
+  FramePlan plan_;
+  Roster roster_;
+  FrameLimits limits_;
+  Time begin_;
+
+  std::vector<WorkerId> displays_;        // by attempt - 1
+  std::uint32_t accumulating_since_ = 1;  // the attempt at whose begin the present display worker had nothing
+  std::uint32_t first_group_ = 0;         // of this attempt
+  std::uint32_t next_group_ = 0;          // to be handed out
+  std::uint32_t groups_done_ = 0;         // by the present display worker
+  std::uint32_t furthest_done_ = 0;       // by any
+  std::uint32_t groups_shown_ = 0;        // in the last preview
+  std::optional<Time> attempt_due_;
+  bool display_in_doubt_ = false;  // the next attempt begins with group 0
+  std::optional<Suspicion> suspicion_;
+  int stalls_ = 0;
+  Time last_progress_;
+  std::set<WorkerId> moved_on_;                   // workers that have rendered all that is handed out of this frame
+  std::vector<std::vector<RankReport>> reports_;  // by group
+  std::vector<RankReport> display_reports_;       // that came with the finished picture
+};
+
+}  // namespace slabstream

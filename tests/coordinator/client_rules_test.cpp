@@ -1,0 +1,285 @@
+// What the coordinator owes to clients: fair turns, answers that are not lost, limits, deadlines, and an end to every request.
+#include "coordinator/clients.h"
+#include "tests/coordinator/coordinator_script.h"
+
+namespace slabstream {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+constexpr PeerToken kClient = 21, kOther = 22;
+
+// A service whose one worker is busy with a first frame of another client, so that everything else queues.
+struct BusyScript : CoordinatorScript {
+  BusyScript() {
+    Join(11, 1);
+    first = HandedOut(Submit(99, Frame(1, 2)));
+  }
+  std::vector<GroupAssignment> first;
+};
+
+TEST(CoordinatorClients, ClientsAreServedInTurn) {
+  BusyScript script;
+  for (RequestId id = 1; id <= 4; ++id) script.Submit(kClient, Frame(id));
+  for (RequestId id = 1; id <= 2; ++id) script.Submit(kOther, Frame(id));
+  Actions actions;
+  for (const GroupAssignment& group : script.first) CoordinatorScript::Append(actions, script.Answer(group));
+  std::vector<std::pair<PeerToken, RequestId>> served;
+  for (const auto& reply : ToClients<FrameReply>(script.AnswerAll(actions))) served.emplace_back(reply.to, reply.message.request);
+  const std::vector<std::pair<PeerToken, RequestId>> expected = {{99, 1}, {21, 1}, {22, 1}, {21, 2}, {22, 2}, {21, 3}, {21, 4}};
+  EXPECT_EQ(served, expected);
+}
+
+TEST(CoordinatorClients, ProgressTellsPhasesAndPositions) {
+  BusyScript script;
+  script.Submit(kClient, Frame(1));
+  const Actions queued = script.Submit(kClient, Frame(2));
+  ASSERT_EQ(ToClients<FrameProgress>(queued).size(), 1U);
+  EXPECT_EQ(ToClients<FrameProgress>(queued)[0].message,
+            (FrameProgress{.request = 2, .phase = FramePhase::kQueued, .queue_position = 1, .workers = 1}));
+  const Actions loading = script.Client(kOther, Frame(1, 1, "other"));
+  ASSERT_EQ(ToClients<FrameProgress>(loading).size(), 1U);
+  EXPECT_EQ(ToClients<FrameProgress>(loading)[0].message.phase, FramePhase::kLoading);
+  const auto loaded = ToClients<FrameProgress>(script.Step(DatasetLoaded{"other", script.loads.back().dataset, BlockSummary()}));
+  ASSERT_EQ(loaded.size(), 1U);
+  EXPECT_EQ(loaded[0].to, kOther);
+  EXPECT_EQ(loaded[0].message.phase, FramePhase::kQueued);
+  const auto started = ToClients<FrameProgress>(script.Answer(script.first[0]));
+  EXPECT_TRUE(std::any_of(started.begin(), started.end(), [](const auto& p) {
+    return p.to == kClient &&
+           p.message == FrameProgress{.request = 1, .phase = FramePhase::kRunning, .group_count = 1, .attempt = 1, .workers = 1};
+  }));
+}
+
+TEST(CoordinatorClients, SubmitTwiceIsSubmitOnceAndTheAnswerIsKept) {
+  CoordinatorScript script;
+  script.Join(11, 1);
+  const auto groups = HandedOut(script.Submit(kClient, Frame(1)));
+  EXPECT_TRUE(script.Client(kClient, Frame(1)).empty()) << "running";
+  script.Submit(kClient, Frame(2));
+  const Bytes payload(std::vector<std::byte>(100));
+  script.Done(groups[0]);
+  script.Image(groups[0], 1, payload);
+  const Actions again = script.Client(kClient, Frame(1));
+  ASSERT_EQ(ToClients<FrameReply>(again).size(), 1U);
+  EXPECT_EQ(ToClients<FrameReply>(again)[0].payload.span().data(), payload.span().data());
+  EXPECT_TRUE(HandedOut(again).empty());
+  EXPECT_FALSE(HandedOut(script.Client(kOther, Frame(1))).empty()) << "another client's request 1 is another request";
+}
+
+TEST(CoordinatorClients, KeptAnswersAreBoundedInBytes) {
+  CoordinatorScript script;
+  script.Join(11, 1);
+  const auto big = std::make_shared<std::vector<std::byte>>(kMaxKeptAnswerBytes / 2 + 1);
+  for (RequestId id = 1; id <= 2; ++id) {
+    const auto groups = HandedOut(script.Submit(kClient, Frame(id)));
+    script.Done(groups.at(0));
+    script.Image(groups[0], 1, Bytes(big, *big));
+  }
+  const auto pong = ToClients<ClientPong>(script.Client(kClient, ClientPing{.nonce = 3, .open = {1, 2}}));
+  ASSERT_EQ(pong.size(), 1U);
+  EXPECT_THAT(pong[0].message.known, ElementsAre(2U));
+}
+
+TEST(CoordinatorClients, PongTellsWhatIsKnownAndLostAnswersAreSentAgain) {
+  CoordinatorScript script;
+  script.Join(11, 1);
+  const auto groups = HandedOut(script.Submit(kClient, Frame(1)));
+  script.Answer(groups[0]);
+  script.Submit(kClient, Frame(2));
+  const ClientPing ping{.nonce = 3, .open = {1, 2, 3}};
+  const Actions soon = script.Client(kClient, ping);
+  EXPECT_EQ(ToClients<ClientPong>(soon).at(0).message, (ClientPong{.epoch = 77, .nonce = 3, .known = {1, 2}}));
+  EXPECT_TRUE(ToClients<FrameReply>(soon).empty()) << "it is on its way";
+  script.Pass(seconds(5));
+  EXPECT_EQ(ToClients<FrameReply>(script.Client(kClient, ping)).size(), 1U);
+  EXPECT_TRUE(ToClients<FrameReply>(script.Client(kClient, ping)).empty());
+}
+
+TEST(CoordinatorClients, UnknownDatasetIsRefusedWithTheNamesThereAre) {
+  CoordinatorScript script;
+  const auto failed = ToClients<FrameFailed>(script.Client(kClient, Frame(1, 1, "nonesuch")));
+  ASSERT_EQ(failed.size(), 1U);
+  EXPECT_EQ(failed[0].message.status.code(), StatusCode::kNotFound);
+  EXPECT_EQ(failed[0].message.status.message(), "no dataset \"nonesuch\": the catalogue has block, other");
+  EXPECT_TRUE(script.loads.empty());
+}
+
+TEST(CoordinatorClients, FrameThatCannotBePlannedFailsAndTheNextOneRuns) {
+  CoordinatorScript script;
+  script.Join(11, 1);
+  SubmitFrame bad = Frame(1);
+  bad.frame.policy.decomposition = "nonesuch";
+  const Actions actions = script.Submit(kClient, bad);
+  ASSERT_EQ(ToClients<FrameFailed>(actions).size(), 1U);
+  EXPECT_EQ(ToClients<FrameFailed>(actions)[0].message.status.code(), StatusCode::kInvalidArgument);
+  EXPECT_EQ(ToClients<FrameReply>(script.AnswerAll(script.Submit(kClient, Frame(2)))).size(), 1U);
+}
+
+TEST(CoordinatorClients, OpenRequestsOfAClientAreLimited) {
+  BusyScript script;
+  for (RequestId id = 1; id <= kMaxOpenRequests; ++id) ASSERT_TRUE(ToClients<FrameFailed>(script.Client(kClient, Frame(id))).empty());
+  const auto failed = ToClients<FrameFailed>(script.Client(kClient, Frame(kMaxOpenRequests + 1)));
+  ASSERT_EQ(failed.size(), 1U);
+  EXPECT_EQ(failed[0].message.status.code(), StatusCode::kResourceExhausted);
+  EXPECT_THAT(failed[0].message.status.message(), HasSubstr("256"));
+  EXPECT_TRUE(ToClients<FrameFailed>(script.Client(kOther, Frame(1))).empty()) << "others are not concerned";
+}
+
+TEST(CoordinatorClients, FramesOfAllClientsAreLimited) {
+  CoordinatorConfig config = TestConfig();
+  config.max_queued = 3;
+  CoordinatorScript script(config);
+  for (PeerToken client = 1; client <= 3; ++client) EXPECT_TRUE(ToClients<FrameFailed>(script.Client(client, Frame(1))).empty());
+  const auto failed = ToClients<FrameFailed>(script.Client(4, Frame(1)));
+  ASSERT_EQ(failed.size(), 1U);
+  EXPECT_EQ(failed[0].message.status.code(), StatusCode::kResourceExhausted);
+  EXPECT_THAT(failed[0].message.status.message(), HasSubstr("3 frames are queued"));
+}
+
+TEST(CoordinatorClients, CancelEndsARequestWhereverItIs) {
+  BusyScript script;
+  script.Submit(kClient, Frame(1));
+  const auto queued = ToClients<FrameFailed>(script.Client(kClient, CancelFrame{1}));
+  ASSERT_EQ(queued.size(), 1U);
+  EXPECT_EQ(queued[0].message.status.code(), StatusCode::kCancelled);
+  EXPECT_EQ(script.QueryStatus().queued, 0U);
+
+  // Running: the workers are told at once, and the next frame starts.
+  script.Submit(kClient, Frame(2));
+  const Actions running = script.Client(99, CancelFrame{1});
+  EXPECT_EQ(ToClients<FrameFailed>(running).size(), 1U);
+  EXPECT_EQ(ToWorkers<Ping>(running).at(0).message.finished_before, 2U);
+  EXPECT_EQ(HandedOut(running).at(0).key.frame, 2U);
+
+  // A SubmitFrame that its Cancel has overtaken ends cancelled as well.
+  EXPECT_EQ(ToClients<FrameFailed>(script.Client(kClient, CancelFrame{7})).size(), 1U);
+  const Actions late = script.Client(kClient, Frame(7));
+  ASSERT_EQ(ToClients<FrameFailed>(late).size(), 1U);
+  EXPECT_EQ(ToClients<FrameFailed>(late)[0].message.status.code(), StatusCode::kCancelled);
+  EXPECT_EQ(script.QueryStatus().frames_failed, 0U) << "what was cancelled has not failed";
+}
+
+TEST(CoordinatorClients, ClientThatIsGoneFreesItsWork) {
+  BusyScript script;
+  script.Submit(99, Frame(2));
+  script.Submit(kClient, Frame(1));
+  const Actions actions = script.Step(ClientGone{99});
+  EXPECT_EQ(ToWorkers<Ping>(actions).at(0).message.finished_before, 2U);
+  EXPECT_EQ(HandedOut(actions).at(0).key.frame, 2U) << "the other client's frame starts";
+  const StatusReply status = script.QueryStatus();
+  EXPECT_EQ(status.queued, 0U);
+  EXPECT_EQ(status.clients, 1U);
+}
+
+TEST(CoordinatorClients, SilentClientFreesItsWork) {
+  BusyScript script;
+  script.clients.clear();
+  script.Pass(seconds(10) - Duration(1));
+  EXPECT_EQ(script.QueryStatus().running, 1U);
+  script.Pass(Duration(1));
+  EXPECT_EQ(script.QueryStatus().running, 0U);
+  EXPECT_EQ(script.QueryStatus().clients, 0U);
+}
+
+TEST(CoordinatorClients, DeadlineEndsQueuedAndRunningFrames) {
+  CoordinatorScript script;
+  script.Join(11, 1);
+  SubmitFrame running = Frame(1, 2), queued = Frame(2);
+  running.deadline_ms = 2000;
+  queued.deadline_ms = 1500;
+  script.Submit(kClient, running);
+  script.Submit(kClient, queued);
+  auto failed = ToClients<FrameFailed>(script.Pass(milliseconds(1500)));
+  ASSERT_EQ(failed.size(), 1U);
+  EXPECT_EQ(failed[0].message.request, 2U);
+  EXPECT_EQ(failed[0].message.status.code(), StatusCode::kDeadlineExceeded);
+  EXPECT_THAT(failed[0].message.status.message(), HasSubstr("1500 ms: it was still queued"));
+  failed = ToClients<FrameFailed>(script.Pass(milliseconds(500)));
+  ASSERT_EQ(failed.size(), 1U);
+  EXPECT_EQ(failed[0].message.request, 1U);
+  EXPECT_THAT(failed[0].message.status.message(), HasSubstr("2000 ms: 0 of 2 groups were done"));
+}
+
+TEST(CoordinatorClients, WithoutWorkersARequestWaitsAndThenFails) {
+  CoordinatorScript script;
+  script.Submit(kClient, Frame(1));
+  EXPECT_EQ(script.machine.NextWake(), script.now + seconds(10));
+  EXPECT_TRUE(ToClients<FrameFailed>(script.Pass(seconds(10) - Duration(1))).empty());
+  const auto failed = ToClients<FrameFailed>(script.Pass(Duration(1)));
+  ASSERT_EQ(failed.size(), 1U);
+  EXPECT_EQ(failed[0].message.status.code(), StatusCode::kUnavailable);
+  EXPECT_EQ(failed[0].message.status.message(),
+            "no worker registered within 10 s, at least one is needed; start one with slabstream-worker");
+}
+
+TEST(CoordinatorClients, DatasetIsLoadedOnceAndAFailedLoadIsTriedAgain) {
+  CoordinatorScript script;
+  script.Join(11, 1);
+  script.Client(kClient, Frame(1));
+  script.Client(kClient, Frame(2));
+  ASSERT_EQ(script.loads.size(), 1U);
+  const auto failed = ToClients<FrameFailed>(script.Step(DatasetFailed{"block", Status::DataLoss("block.nrrd: truncated")}));
+  ASSERT_EQ(failed.size(), 2U);
+  EXPECT_EQ(failed[0].message.status, Status::DataLoss("block.nrrd: truncated"));
+  EXPECT_EQ(script.QueryStatus().datasets[0].error, "block.nrrd: truncated");
+
+  script.Client(kClient, Frame(3));
+  ASSERT_EQ(script.loads.size(), 2U);
+  EXPECT_NE(script.loads[1].dataset, script.loads[0].dataset);
+  EXPECT_TRUE(HandedOut(script.Step(DatasetLoaded{"block", script.loads[0].dataset, BlockSummary()})).empty()) << "of the first load";
+  EXPECT_EQ(HandedOut(script.Step(DatasetLoaded{"block", script.loads[1].dataset, BlockSummary()})).size(), 1U);
+  script.Client(kClient, Frame(4));
+  EXPECT_EQ(script.loads.size(), 2U);
+}
+
+TEST(CoordinatorClients, StatusTellsWhatThereIs) {
+  BusyScript script;
+  script.Submit(kClient, Frame(1));
+  script.workers[0].rendered_ranks = 3;
+  script.Pass(milliseconds(1700));
+  const StatusReply status = script.QueryStatus();
+  EXPECT_EQ(status.epoch, 77U);
+  EXPECT_EQ(status.nonce, 5U);
+  EXPECT_EQ(status.pid, 4321U);
+  EXPECT_EQ(status.uptime_ms, 1700U);
+  EXPECT_EQ(status.clients, 2U) << "who only asks for the status is no client";
+  EXPECT_EQ(status.queued, 1U);
+  EXPECT_EQ(status.running, 1U);
+  ASSERT_EQ(status.workers.size(), 1U);
+  EXPECT_EQ(status.workers[0].host, "here");
+  EXPECT_EQ(status.workers[0].rendered_ranks, 3U);
+  EXPECT_EQ(status.workers[0].silent_ms, 200U);
+  ASSERT_EQ(status.datasets.size(), 2U);
+  EXPECT_EQ(status.datasets[0].state, DatasetState::kReady);
+  EXPECT_EQ(status.datasets[0].description, BlockSummary()->description);
+  EXPECT_EQ(status.datasets[1].state, DatasetState::kUnloaded);
+}
+
+TEST(CoordinatorClients, ShutDownTellsEverybodyAndEnds) {
+  BusyScript script;
+  script.Submit(kClient, Frame(1));
+  const Actions actions = script.Client(kOther, ShutDown{.nonce = 8});
+  EXPECT_EQ(ToClients<ShutDownReply>(actions).at(0).message.nonce, 8U);
+  const auto failed = ToClients<FrameFailed>(actions);
+  ASSERT_EQ(failed.size(), 2U);
+  EXPECT_EQ(failed[0].message.status, Status::Unavailable("the service was shut down"));
+  EXPECT_EQ(ToWorkers<Stop>(actions).size(), 1U);
+  ASSERT_FALSE(actions.empty());
+  EXPECT_TRUE(std::holds_alternative<StopService>(actions.back()));
+  EXPECT_EQ(script.machine.NextWake(), Time::max());
+  EXPECT_TRUE(script.Client(kClient, Frame(2)).empty());
+}
+
+TEST(CoordinatorClients, CoordinatorThatIsStoppedLetsItsWorkersWaitForAnother) {
+  BusyScript script;
+  const Actions actions = script.Step(CoordinatorStopRequested{});
+  EXPECT_EQ(ToClients<FrameFailed>(actions).size(), 1U);
+  EXPECT_EQ(ToWorkers<Retire>(actions).size(), 1U);
+  EXPECT_TRUE(ToWorkers<Stop>(actions).empty());
+  EXPECT_EQ(Of<StopService>(actions).size(), 1U);
+}
+
+}  // namespace
+}  // namespace slabstream

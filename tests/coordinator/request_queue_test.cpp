@@ -1,0 +1,82 @@
+#include "coordinator/request_queue.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "tests/support/random.h"
+
+namespace slabstream {
+namespace {
+
+OpenRequest Request(PeerToken client, RequestId id, const std::string& dataset = "d") {
+  OpenRequest request{.client = client};
+  request.submit.request = id;
+  request.submit.frame.dataset = dataset;
+  return request;
+}
+
+bool Any(const OpenRequest&) { return true; }
+
+TEST(RequestQueue, ClientsAreServedInTurn) {
+  RequestQueue queue;
+  for (RequestId id = 1; id <= 3; ++id) queue.Push(Request(1, id));
+  queue.Push(Request(2, 1));
+  queue.Push(Request(2, 2));
+  std::vector<std::pair<PeerToken, RequestId>> served;
+  while (auto next = queue.TakeNext(Any)) served.emplace_back(next->client, next->submit.request);
+  EXPECT_EQ(served, (std::vector<std::pair<PeerToken, RequestId>>{{1, 1}, {2, 1}, {1, 2}, {2, 2}, {1, 3}}));
+}
+
+TEST(RequestQueue, RequestsThatAreNotReadyLetOthersPass) {
+  RequestQueue queue;
+  queue.Push(Request(1, 1, "loading"));
+  queue.Push(Request(1, 2));
+  queue.Push(Request(2, 1, "loading"));
+  const auto ready = [](const OpenRequest& request) { return request.submit.frame.dataset != "loading"; };
+  const auto next = queue.TakeNext(ready);
+  ASSERT_TRUE(next);
+  EXPECT_TRUE(next->Is(1, 2));
+  EXPECT_FALSE(queue.TakeNext(ready));
+  EXPECT_EQ(queue.size(), 2U);
+}
+
+TEST(RequestQueue, PositionsAreTheOrderOfService) {
+  Random random(1);
+  SCOPED_TRACE(random.trace());
+  for (int round = 0; round < 200; ++round) {
+    RequestQueue queue;
+    RequestId id = 0;
+    const int count = random.Integer(1, 30);
+    for (int i = 0; i < count; ++i) {
+      queue.Push(Request(random.Integer<PeerToken>(1, 5), ++id));
+      if (random.Chance(0.2)) queue.TakeNext(Any);  // turns the order of the clients
+    }
+    std::map<std::pair<PeerToken, RequestId>, std::uint32_t> promised;
+    queue.ForEach([&](const OpenRequest& r) { promised[{r.client, r.submit.request}] = queue.PositionOf(r.client, r.submit.request); });
+    ASSERT_EQ(promised.size(), queue.size());
+    for (std::uint32_t position = 0; const auto next = queue.TakeNext(Any); ++position) {
+      EXPECT_EQ((promised[{next->client, next->submit.request}]), position);
+    }
+  }
+}
+
+TEST(RequestQueue, ExtractTakesOutWhatIsWantedAndNothingElse) {
+  RequestQueue queue;
+  for (RequestId id = 1; id <= 4; ++id) queue.Push(Request(1, id));
+  queue.Push(Request(2, 1));
+  const auto odd = queue.Extract([](const OpenRequest& r) { return r.submit.request % 2 == 1; });
+  EXPECT_EQ(odd.size(), 3U);
+  EXPECT_EQ(queue.size(), 2U);
+  EXPECT_EQ(queue.CountOf(1), 2U);
+  EXPECT_EQ(queue.CountOf(2), 0U);
+  EXPECT_TRUE(queue.Contains(1, 2));
+  EXPECT_FALSE(queue.Contains(1, 1));
+  EXPECT_FALSE(queue.Contains(2, 2));
+}
+
+}  // namespace
+}  // namespace slabstream
