@@ -1,0 +1,60 @@
+// ModelClient: a client that submits requests, pings while they are open, submits again what the service does not know any more, and gives
+// up when nobody answers; or cancels, or vanishes. It keeps how each request ended.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <set>
+#include <vector>
+
+#include "common/wire/any_message.h"
+#include "tests/simulator/event_queue.h"
+
+namespace slabstream {
+
+class ModelClient {
+ public:
+  using Send = std::function<void(AnyMessage)>;
+
+  ModelClient(EventQueue& queue, Send send) : queue_(queue), send_(std::move(send)) {}
+
+  struct Ended {
+    Status status;  // ok: the picture arrived
+    FrameStatistics statistics;
+    bool given_up = false;  // by this client, not by the service
+  };
+
+  void Submit(SubmitFrame submit);
+  void Cancel(RequestId request);
+  void Vanish() { vanished_ = true; }
+  void Deliver(const AnyMessage& message);
+
+  bool idle() const { return vanished_ || open_.empty(); }
+  bool vanished() const { return vanished_; }
+  std::size_t open() const { return open_.size(); }
+  const std::map<RequestId, Ended>& ended() const { return ended_; }
+  const std::set<RequestId>& cancelled() const { return cancelled_; }
+
+ private:
+  struct Open {
+    SubmitFrame submit;
+    int unknown = 0;  // pongs in a row that did not know it
+    int submissions = 1;
+  };
+
+  void Ping();
+  void End(RequestId request, Ended how);
+
+  EventQueue& queue_;
+  Send send_;
+  std::map<RequestId, Open> open_;
+  std::map<RequestId, Ended> ended_;
+  std::set<RequestId> cancelled_;
+  bool vanished_ = false;
+  bool pinging_ = false;
+  std::uint64_t nonce_ = 0;
+  std::map<std::uint64_t, std::vector<RequestId>> asked_;  // by nonce
+  Time last_pong_;
+};
+
+}  // namespace slabstream

@@ -1,0 +1,145 @@
+#include "tests/simulator/model_worker.h"
+
+#include <algorithm>
+
+namespace slabstream {
+
+ModelWorker::ModelWorker(int node, WorkerConfig config, const WorkerSpeed& speed, const Faults& faults, Random& random, EventQueue& queue,
+                         WorkerNetwork& network)
+    : node_(node),
+      config_(config),
+      speed_(speed),
+      faults_(faults),
+      random_(random),
+      queue_(queue),
+      network_(network),
+      machine_(std::move(config)),
+      combine_thread_free_(queue.now()) {}
+
+void ModelWorker::Start() { Step(Tick{}); }
+
+void ModelWorker::Step(const WorkerEvent& event) {
+  if (!alive_) return;
+  for (WorkerAction& action : machine_.Step(event, queue_.now())) {
+    std::visit([this](const auto& a) { Perform(a); }, action);
+  }
+  CheckCredit();
+  const Time wake = machine_.NextWake();
+  if (wake != Time::max()) alarm_.Set(queue_, wake, [this] { Wake(); });
+}
+
+void ModelWorker::Wake() {
+  if (!alive_) return;
+  const Time wake = machine_.NextWake();
+  if (wake > queue_.now()) return alarm_.Set(queue_, wake, [this] { Wake(); });
+  Step(Tick{});
+  idle_wakes_ = machine_.NextWake() <= queue_.now() ? idle_wakes_ + 1 : 0;
+  ASSERT_LT(idle_wakes_, 10) << "worker node " << node_ << " spins";
+}
+
+Time ModelWorker::CombineThread(Duration work) {
+  combine_thread_free_ = std::max(combine_thread_free_, queue_.now()) + work;
+  return combine_thread_free_;
+}
+
+void ModelWorker::Perform(const SendControl& action) { network_.ToCoordinator(node_, action.message, {}); }
+
+void ModelWorker::Perform(const SendChunkRequest& action) {
+  const ChunkRequest& request = action.request;
+  const std::uint64_t total = std::uint64_t(request.box.voxel_count());  // the simulated volumes have one byte a voxel
+  const std::uint64_t bytes = std::min<std::uint64_t>(kChunkBytes, total - std::uint64_t(request.chunk) * kChunkBytes);
+  requested_[{request.dataset, request.box, request.chunk}] = {bytes, queue_.now()};
+  network_.ToSlabServer(node_, request);
+}
+
+// The credit bounds what is requested and not stored. A request that has expired no longer counts: its answer is taken for lost.
+void ModelWorker::CheckCredit() {
+  if (!machine_.registered()) requested_.clear();
+  std::erase_if(requested_, [&](const auto& entry) { return entry.second.requested + config_.chunk_timeout <= queue_.now(); });
+  std::uint64_t bytes = 0;
+  for (const auto& [name, outstanding] : requested_) bytes += outstanding.bytes;
+  if (requested_.size() > 1) {
+    EXPECT_LE(bytes, config_.credit_bytes) << "worker node " << node_;
+  }
+}
+
+void ModelWorker::Perform(const OpenSlab& action) {
+  EXPECT_TRUE(slabs_.emplace(action.slab, std::set<std::uint32_t>()).second) << "a slab is opened twice";
+}
+
+void ModelWorker::Perform(const StoreChunk& action) {
+  EXPECT_EQ(slabs_.count(action.slab), 1U) << "a chunk is stored in a slab that is not open";
+  queue_.At(CombineThread(speed_.store), [this, slab = action.slab, chunk = action.chunk.chunk] {
+    requested_.erase({slab.dataset, slab.box, chunk});
+    Status status;
+    if (random_.Chance(faults_.damage_chunk)) {
+      status = Status::DataLoss("digest of a chunk");
+    } else if (const auto open = slabs_.find(slab); open != slabs_.end()) {
+      open->second.insert(chunk);
+    }
+    Step(ChunkStored{slab, chunk, status});
+  });
+}
+
+void ModelWorker::Perform(const DropSlab& action) {
+  EXPECT_EQ(slabs_.erase(action.slab), 1U) << "a slab is dropped that is not open";
+  EXPECT_FALSE(rendering_ && rendering_->slab == action.slab) << "a slab is dropped while it is rendered from";
+}
+
+void ModelWorker::Perform(const StartRender& action) {
+  EXPECT_FALSE(rendering_.has_value()) << "two renders at a time";
+  EXPECT_EQ(slabs_[action.slab].size(), ChunkCount(action.slab.box, action.slab.type)) << "a slab is rendered from before it is complete";
+  EXPECT_TRUE(action.slab.box.Contains(SlabBox(action.placement.box, *action.setup))) << "a slab without the voxels of its box";
+  EXPECT_EQ(action.slab.dataset, action.setup->dataset);
+  rendering_ = action;
+  const std::uint64_t number = ++render_number_;
+  const Status status = random_.Chance(faults_.fail_render) ? Status::ResourceExhausted("no memory to render") : Status::Ok();
+  queue_.After(Duration(random_.Integer<std::int64_t>(speed_.render.count() / 2, speed_.render.count() * 2)),
+               [this, number, status] { FinishRender(number, status); });
+}
+
+void ModelWorker::Perform(const CancelRender& action) {
+  if (!rendering_ || rendering_->key != action.key || random_.Chance(0.3)) return;  // sometimes too late
+  queue_.After(speed_.store, [this, number = render_number_] { FinishRender(number, Status::Cancelled("render")); });
+}
+
+void ModelWorker::FinishRender(std::uint64_t number, Status status) {
+  if (!alive_ || !rendering_ || number != render_number_) return;  // ended already
+  const StartRender render = *std::exchange(rendering_, std::nullopt);
+  if (status.ok()) {
+    images_.Render(render.image, render.placement.id,
+                   std::uint64_t(render.setup->camera.width) * std::uint64_t(render.setup->camera.height));
+  } else {
+    images_.FailRender(render.image);
+  }
+  Step(RenderDone{render.key, render.rank, render.image, std::move(status), {}, std::uint64_t(render.slab.box.voxel_count()) * 2});
+}
+
+void ModelWorker::Perform(const StartCombine& action) {
+  images_.Combine(action);
+  const Status status = random_.Chance(faults_.fail_combine) ? Status::ResourceExhausted("no memory to combine") : Status::Ok();
+  queue_.At(CombineThread(speed_.combine), [this, key = action.key, image = action.image, status] {
+    Step(CombineDone{key, image, status, {Stage::kCombine, 0, 1}});
+  });
+}
+
+void ModelWorker::Perform(const SendPartial& action) {
+  queue_.At(CombineThread(speed_.combine),
+            [this, to = action.to, message = action.message, payload = images_.Encode(action.image, action.message.pixels)] {
+              if (alive_) network_.ToPeer(node_, to, message, payload);
+            });
+}
+
+void ModelWorker::Perform(const SendFrame& action) {
+  queue_.At(CombineThread(speed_.combine), [this, message = action.message, payload = PackSymbols(images_.Get(action.image))] {
+    if (alive_) network_.ToCoordinator(node_, message, payload);
+  });
+}
+
+void ModelWorker::Perform(const StopProcess&) {
+  stopped_ = true;
+  // The process ends when its threads have ended; nothing but the running render may be left.
+  EXPECT_EQ(images_.size(), 0U) << "worker node " << node_ << " keeps images when it stops";
+}
+
+}  // namespace slabstream

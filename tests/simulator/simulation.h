@@ -1,0 +1,122 @@
+// Simulation: one coordinator, some workers and clients, and a network with faults, in virtual time, all of it decided by a seed. What must
+// hold in every world is checked as it goes; failures are failures of the running test.
+//
+//   every request ends, with the right picture or with an error that says why, within a bound of virtual time
+//   a picture (or preview) holds exactly the boxes of its plan (of its first groups), each once, in visibility order
+//   no image is left, read after its release or released twice; no slab is rendered from before it is complete; credits are kept
+//   at most kGroupWindow groups are unfinished at a time
+//   where only workers come and go and few messages are lost, but a worker is always there: every frame is finished
+//   without faults: no frame fails, none needs a second attempt, and voxels that a worker has had do not travel again
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <vector>
+
+#include "coordinator/frame_machine.h"
+#include "tests/simulator/event_queue.h"
+#include "tests/simulator/faults.h"
+#include "tests/simulator/model_client.h"
+#include "tests/simulator/model_worker.h"
+#include "tests/simulator/network.h"
+
+namespace slabstream {
+
+// Counts over all worlds, so that a test can see that it tested something.
+struct Tally {
+  std::uint64_t worlds = 0, requests = 0, pictures = 0, previews = 0, errors = 0, cancelled = 0, retried = 0, cached_frames = 0,
+                workers_killed = 0, coordinator_restarts = 0;
+};
+
+class Simulation : private WorkerNetwork {
+ public:
+  Simulation(std::uint64_t seed, Tally& tally);
+  ~Simulation() override;
+  void Run();
+
+ private:
+  struct Coordinator {
+    FrameMachine machine;
+    Epoch epoch = 0;
+    Alarm alarm;
+    std::uint64_t generation = 0;
+    bool alive = true;
+    int idle_wakes = 0;
+  };
+  // What the coordinator handed out for a frame.
+  struct SeenFrame {
+    std::uint32_t group_count = 0;
+    std::uint32_t attempt = 0;
+    std::uint64_t pixel_count = 0;
+    std::map<std::uint32_t, std::vector<BoxId>> groups;
+    WorkerId display = 0;                      // of this attempt
+    std::set<std::uint32_t> handed_out;        // groups of this attempt
+    std::map<WorkerId, std::uint32_t> done;    // groups that a display worker has said are done: the first so many
+    std::set<std::pair<WorkerId, Box>> slabs;  // who needed which voxels
+    bool all_cached = true;                    // when it was handed out, workers held all voxels that it needs
+    bool over = false;
+    std::size_t unfinished() const {  // handed out, and not done as the display worker sees it
+      const auto known = done.find(display);
+      return std::size_t(std::distance(handed_out.lower_bound(known == done.end() ? 0 : known->second), handed_out.end()));
+    }
+  };
+
+  // ---- the world
+  void MakeVolume();
+  SubmitFrame RandomRequest(RequestId id);
+  void AddWorker(Duration after);
+  void KillWorker();
+  void StartCoordinator();
+  void RestartCoordinator();
+  void PlanTroubles(Duration span);
+  bool Idle() const;
+  void RunUntil(Time bound, bool until_idle);
+  void CheckOutcome();
+  void CheckRest();
+
+  // ---- the coordinator
+  void StepCoordinator(const CoordinatorEvent& event);
+  void WakeCoordinator();
+  void Perform(const CoordinatorEvent& event, const ToWorker& action);
+  void Perform(const CoordinatorEvent& event, const ToClient& action);
+  void Perform(const CoordinatorEvent& event, const LoadDataset& action);
+  void Perform(const CoordinatorEvent& event, const StopService&);
+  void Observe(const GroupAssignment& assignment);
+  void CheckPicture(const FrameImage& image, const Bytes& payload, const FrameReply& reply);
+
+  // ---- messages
+  AnyMessage OnTheWay(const AnyMessage& message) const;
+  void ToCoordinator(int node, AnyMessage message, Bytes payload) override;
+  void ToSlabServer(int node, ChunkRequest request) override;
+  void ToPeer(int node, const Peer& to, PartialImage message, Bytes payload) override;
+  void FromClientNode(int client, AnyMessage message);
+  // Names of connections: a restarted coordinator sees new ones.
+  PeerToken TokenOf(int node) const { return PeerToken(coordinator_->generation) << 32 | std::uint32_t(node); }
+  static int NodeOf(PeerToken token) { return int(token & 0xffffffffU); }
+
+  Random random_;
+  Tally& tally_;
+  EventQueue queue_;
+  Faults faults_;
+  Network network_;
+  const bool encode_messages_;  // in a few worlds messages are encoded and decoded on their way
+  bool workerless_ = false;     // for a moment no worker was alive
+  std::shared_ptr<const VolumeSummary> summary_;
+  std::unique_ptr<Coordinator> coordinator_;
+  std::vector<std::unique_ptr<Coordinator>> dead_coordinators_;  // events that are still planned refer to them
+  std::vector<std::unique_ptr<ModelWorker>> workers_;            // by node
+  std::vector<std::unique_ptr<ModelClient>> clients_;
+  std::set<int> told_dead_;  // worker nodes whose death the sockets notice
+  WorkerConfig worker_config_;
+  WorkerSpeed speed_;
+  Policy policy_;
+  std::size_t requests_planned_ = 0, requests_made_ = 0;
+  std::map<FrameId, SeenFrame> frames_;         // of this epoch
+  std::set<std::pair<WorkerId, Box>> fetched_;  // voxels that workers hold for sure
+  std::optional<StatusReply> status_;
+};
+
+}  // namespace slabstream
