@@ -24,8 +24,8 @@ struct Picture {
   LocalImage image;
   bool final = true;
   std::uint32_t groups_done = 1, group_count = 1;
-  FrameStatistics statistics;          // final only
-  Duration latency{};                  // request to last byte, measured here; final only
+  FrameStatistics statistics;  // final only
+  Duration latency{};          // request to last byte, measured here; final only
 };
 
 struct ClientEvent {
@@ -33,18 +33,26 @@ struct ClientEvent {
   std::variant<FrameProgress, Picture, Status> what;  // Status: the request failed
 };
 
+struct ClientTiming {
+  Duration ping = std::chrono::seconds(1);     // between pings while requests are open
+  Duration silence = std::chrono::seconds(5);  // without an answer to a ping: the service is gone
+};
+
 class Client {
  public:
-  static Result<Client> Connect(Context& context, const std::string& endpoint, Duration timeout = std::chrono::seconds(5));
+  static Result<Client> Connect(Context& context, const std::string& endpoint, Duration timeout = std::chrono::seconds(5),
+                                ClientTiming timing = {});
   Client(Client&&) noexcept;
   Client& operator=(Client&&) noexcept;
-  ~Client();
+  ~Client();  // cancels what is open
 
+  // A deadline counts from the request's arrival at the service; it is cut to what the schema allows.
   RequestId Submit(const FrameRequest& request, Duration deadline = std::chrono::minutes(10));
   void Cancel(RequestId request);
 
-  // The next event of any open request; nullopt when the timeout is over. If the service stops answering, every open request
-  // gets an Unavailable event.
+  // The next event of any open request; nullopt when the timeout is over, or earlier if wakeup() was notified or a signal was handled. If
+  // the service stops answering, every open request gets an Unavailable event. A request that the service has lost is submitted again, a
+  // few times.
   std::optional<ClientEvent> Next(Duration timeout);
 
   // Submit and wait for the end.

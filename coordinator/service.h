@@ -1,40 +1,38 @@
 // CoordinatorService: runs a FrameMachine over ZeroMQ. Binds the client, control and slabs planes, loads datasets, serves voxels.
 //
-// Threads: one owns the client and control sockets and runs the machine; one owns the slabs socket, cuts and packs chunks; one loads datasets.
+// Threads: one owns the client and control sockets and runs the machine; one owns the slabs socket, cuts and packs chunks; one loads
+// datasets.
 #pragma once
 
-#include <functional>
-#include <map>
 #include <memory>
 #include <string>
 
 #include "common/base/status.h"
 #include "common/transport/socket.h"
+#include "coordinator/catalogue.h"
 #include "coordinator/frame_machine.h"
 
 namespace slabstream {
 
-struct Volume;
-
 struct CoordinatorOptions {
-  std::string client_endpoint;   // bound; a wildcard port is read back
-  std::string worker_endpoint;   // bound; empty: WorkerEndpointFor(client_endpoint)
-  std::string slabs_endpoint;    // bound; empty: any port, ".slabs" beside an ipc path or inproc name
-  std::map<std::string, std::function<Result<std::shared_ptr<const Volume>>()>> catalogue;  // name -> how to load it
-  CoordinatorConfig machine;     // epoch, pid, slabs_endpoint and datasets are filled in by Start
+  std::string client_endpoint;  // bound; a wildcard port is read back
+  std::string worker_endpoint;  // bound; empty: WorkerEndpointFor(client_endpoint)
+  std::string slabs_endpoint;   // bound; empty: any port, ".slabs" beside an ipc path or inproc name
+  Catalogue catalogue;          // name -> how to load it
+  CoordinatorConfig machine;    // epoch, pid, slabs_endpoint and datasets are filled in by Start
 };
 
 class CoordinatorService {
  public:
-  // Binds and starts the threads. `context` must outlive the service.
+  // Binds and starts the threads. `context` must outlive the service. InvalidArgument: an endpoint; Unavailable: it is taken.
   static Result<std::unique_ptr<CoordinatorService>> Start(Context& context, CoordinatorOptions options);
   ~CoordinatorService();  // stops and joins
 
   const std::string& client_endpoint() const;  // with the port that was chosen
   const std::string& worker_endpoint() const;
 
-  void RequestStop();        // from any thread or a signal-handling one; returns at once
-  void WaitUntilStopped();   // until RequestStop or a client's ShutDown has been carried out
+  void RequestStop();       // from any thread or a signal-handling one; returns at once
+  void WaitUntilStopped();  // until RequestStop or a client's ShutDown has been carried out
   bool stopped() const;
 
  private:

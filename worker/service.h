@@ -1,7 +1,7 @@
 // WorkerService: runs a WorkerMachine over ZeroMQ.
 //
-// Threads: one owns all sockets and runs the machine; one renders; one combines, encodes and unpacks chunks. So rendering of one group goes on beside the
-// combining of another, and heartbeats are on time whatever is computed.
+// Threads: one owns all sockets and runs the machine; one renders; one combines, encodes and unpacks chunks. So rendering of one group goes
+// on beside the combining of another, and heartbeats are on time whatever is computed.
 #pragma once
 
 #include <memory>

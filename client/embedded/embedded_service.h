@@ -14,9 +14,9 @@
 namespace slabstream {
 
 struct EmbeddedOptions {
-  int workers = 1;                   // [1, 256]
-  CoordinatorOptions coordinator;    // endpoints are filled in; catalogue and machine timings count
-  WorkerConfig worker;               // timings and budgets count
+  int workers = 1;                 // [1, 256]
+  CoordinatorOptions coordinator;  // endpoints are filled in; catalogue and machine timings count
+  WorkerConfig worker;             // timings and budgets count
 };
 
 class EmbeddedService {
@@ -24,9 +24,9 @@ class EmbeddedService {
   static Result<std::unique_ptr<EmbeddedService>> Start(Context& context, EmbeddedOptions options);
   ~EmbeddedService();
 
-  const std::string& endpoint() const;       // for Client::Connect with the same context
-  WorkerService& worker(int index);          // tests: RequestStop makes it leave
-  Status AddWorker();                        // joins the running service
+  const std::string& endpoint() const;  // for Client::Connect with the same context
+  WorkerService& worker(int index);     // tests: RequestStop makes it leave
+  Status AddWorker();                   // joins the running service
 
  private:
   struct Impl;

@@ -31,6 +31,15 @@ spdlog::logger& Logger() {
 
 }  // namespace
 
+const std::map<std::string, LogLevel>& LogLevelNames() {
+  static const std::map<std::string, LogLevel> names = {{"debug", LogLevel::kDebug},
+                                                        {"info", LogLevel::kInfo},
+                                                        {"warning", LogLevel::kWarning},
+                                                        {"error", LogLevel::kError},
+                                                        {"off", LogLevel::kOff}};
+  return names;
+}
+
 void InitLog(std::string_view process, LogLevel level) {
   Logger().set_pattern("%H:%M:%S.%e %L [" + std::string(process) + "] %v");
   Logger().set_level(ToSpdlog(level));

@@ -2,11 +2,16 @@
 // Thread-safe.
 #pragma once
 
+#include <map>
+#include <string>
 #include <string_view>
 
 namespace slabstream {
 
 enum class LogLevel { kDebug, kInfo, kWarning, kError, kOff };
+
+// What --log-level takes.
+const std::map<std::string, LogLevel>& LogLevelNames();
 
 // `process` names the writer in each line ("coordinator", "worker 3"). Called once, by main.
 void InitLog(std::string_view process, LogLevel level);

@@ -1,0 +1,320 @@
+#include "client/client.h"
+
+#include <algorithm>
+#include <array>
+#include <deque>
+#include <iterator>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "common/base/log.h"
+#include "common/wire/any_message.h"
+#include "common/wire/payload.h"
+
+namespace slabstream {
+namespace {
+
+constexpr int kUnknownPongs = 2;  // in a row: then a request is submitted again
+constexpr int kMaxResubmits = 3;  // then it fails
+constexpr std::int64_t kMaxDeadlineMs = 86'400'000;
+
+// A request that has not ended.
+struct OpenRequest {
+  SubmitFrame message;
+  Time submitted;
+  int unknown_pongs = 0;  // in a row
+  int resubmits = 0;
+};
+
+// The picture of a reply, checked: whoever answers at the endpoint may send anything.
+Result<Picture> DecodePicture(FrameReply& reply, const Bytes& payload, ImageSize expected) {
+  if (reply.size != expected) {
+    return Status::DataLoss("FrameReply.size is " + std::to_string(reply.size.width) + "x" + std::to_string(reply.size.height) +
+                            ", asked for was " + std::to_string(expected.width) + "x" + std::to_string(expected.height));
+  }
+  const Result<Bytes> runs = UnpackRuns(reply.runs, payload);
+  if (!runs.ok()) return runs.status();
+  const PixelBounds frame = {0, 0, expected.width, expected.height};
+  if (Status status = ValidateRuns(reply.runs.image, runs->span(), frame); !status.ok()) return Status::DataLoss(status.message());
+  Picture picture;
+  picture.size = reply.size;
+  picture.image = DecodeRuns(reply.runs.image, runs->span());
+  picture.final = reply.groups_done == reply.group_count;
+  picture.groups_done = reply.groups_done;
+  picture.group_count = reply.group_count;
+  picture.statistics = std::move(reply.statistics);
+  return picture;
+}
+
+}  // namespace
+
+struct Client::Impl {
+  Impl(std::string service_endpoint, Socket service_socket, ClientTiming client_timing)
+      : endpoint(std::move(service_endpoint)), socket(std::move(service_socket)), timing(client_timing) {}
+
+  Status Send(const AnyMessage& message) { return socket.Send({}, Encode(message)); }
+
+  void Submit(const SubmitFrame& message);
+
+  // Sends what is due, waits for one of: a message, a wakeup, something else due, `limit`; and handles what has come. True: it was the
+  // wakeup.
+  bool Pump(Time limit);
+
+  Status NoAnswer(Duration timeout) const {
+    return Status::Unavailable("no service answers at " + endpoint + " within " +
+                               std::to_string(std::chrono::duration_cast<std::chrono::milliseconds>(timeout).count()) + " ms");
+  }
+
+  // Pumps until `done()`; false when the time is over.
+  template <class Done>
+  bool PumpUntil(Duration timeout, Done&& done) {
+    const Time limit = MonotonicNow() + timeout;
+    while (!done()) {
+      if (MonotonicNow() >= limit) return false;
+      Pump(limit);
+    }
+    return true;
+  }
+
+  void SendPing(Time now);
+  bool Receive();  // true: something came
+  void Handle(AnyMessage& message, const Bytes& payload);
+  void Handle(FrameReply& reply, const Bytes& payload);
+  void Handle(const ClientPong& pong);
+  void End(RequestId request, Status status);  // with a failure
+  void FailAll(const std::string& reason);
+
+  std::string endpoint;
+  Socket socket;
+  ClientTiming timing;
+  Wakeup wakeup;
+  RequestId last_request = 0;
+  std::uint64_t last_nonce = 0;
+  std::map<RequestId, OpenRequest> open;
+  std::map<std::uint64_t, std::vector<RequestId>> pinged;  // requests of each ping without an answer, by nonce
+  std::deque<ClientEvent> events;
+  std::optional<StatusReply> status_reply;
+  std::optional<ShutDownReply> shut_down_reply;
+  Time next_ping;
+  std::optional<Time> unanswered_since;  // the first ping after which nothing was heard
+};
+
+void Client::Impl::Submit(const SubmitFrame& message) {
+  if (const Status sent = Send(message); !sent.ok()) {
+    End(message.request, Status::Unavailable("no service at " + endpoint + ": " + sent.message()));
+  }
+}
+
+void Client::Impl::SendPing(Time now) {
+  ClientPing ping{.nonce = ++last_nonce, .open = {}};
+  for (const auto& [request, unused] : open) {
+    if (ping.open.size() < kMaxOpenRequests) ping.open.push_back(request);
+  }
+  (void)Send(ping);  // a ping that cannot be queued counts as one without an answer
+  pinged[ping.nonce] = std::move(ping.open);
+  if (!unanswered_since) unanswered_since = now;
+  next_ping = now + timing.ping;
+}
+
+bool Client::Impl::Pump(Time limit) {
+  // What has come already is handled before silence is judged: the caller may have been busy elsewhere for long.
+  const bool received = Receive();
+  Time now = MonotonicNow();
+  if (!open.empty()) {
+    if (unanswered_since && now - *unanswered_since >= timing.silence) {
+      FailAll("the service at " + endpoint + " has not answered for " +
+              std::to_string(std::chrono::duration_cast<std::chrono::milliseconds>(now - *unanswered_since).count()) + " ms");
+      return false;
+    }
+    if (now >= next_ping) SendPing(now);
+    limit = std::min(limit, next_ping);
+    if (unanswered_since) limit = std::min(limit, *unanswered_since + timing.silence);
+  }
+  if (received) return false;  // it may be what the caller waits for
+  const std::array<Socket*, 1> sockets = {&socket};
+  now = MonotonicNow();
+  Wait(sockets, &wakeup, std::max<Duration>(limit - now, Duration::zero()));
+  return !Receive() && MonotonicNow() < limit;
+}
+
+bool Client::Impl::Receive() {
+  bool received = false;
+  while (const std::optional<Incoming> incoming = socket.TryReceive()) {
+    received = true;
+    Result<AnyMessage> message = Decode(incoming->parts[0].span());
+    const Bytes payload = incoming->parts.size() > 1 ? incoming->parts[1] : Bytes();
+    if (!message.ok() || payload.size() != ExpectedPayloadBytes(*message)) {
+      LogWarning("client plane: dropped a message: " +
+                 (message.ok() ? std::string(NameOf(*message)) + " with a payload of " + std::to_string(payload.size()) + " bytes"
+                               : message.status().message()));
+      continue;
+    }
+    unanswered_since.reset();
+    Handle(*message, payload);
+  }
+  return received;
+}
+
+void Client::Impl::Handle(AnyMessage& message, const Bytes& payload) {
+  if (const auto* progress = std::get_if<FrameProgress>(&message)) {
+    if (open.contains(progress->request)) events.push_back({progress->request, *progress});
+  } else if (auto* reply = std::get_if<FrameReply>(&message)) {
+    Handle(*reply, payload);
+  } else if (const auto* failed = std::get_if<FrameFailed>(&message)) {
+    End(failed->request, failed->status);
+  } else if (const auto* pong = std::get_if<ClientPong>(&message)) {
+    Handle(*pong);
+  } else if (const auto* status = std::get_if<StatusReply>(&message)) {
+    status_reply = *status;
+  } else if (const auto* shut_down = std::get_if<ShutDownReply>(&message)) {
+    shut_down_reply = *shut_down;
+  } else {
+    LogWarning("client plane: dropped " + std::string(NameOf(message)) + ", which services do not send to clients");
+  }
+}
+
+void Client::Impl::Handle(FrameReply& reply, const Bytes& payload) {
+  const auto found = open.find(reply.request);
+  if (found == open.end()) return;  // cancelled, or a duplicate
+  Result<Picture> picture = DecodePicture(reply, payload, found->second.message.frame.size);
+  if (!picture.ok()) {
+    End(reply.request, picture.status());
+    return;
+  }
+  if (picture->final) {
+    picture->latency = MonotonicNow() - found->second.submitted;
+    open.erase(found);
+  }
+  events.push_back({reply.request, std::move(*picture)});
+}
+
+void Client::Impl::Handle(const ClientPong& pong) {
+  const auto ping = pinged.find(pong.nonce);
+  if (ping == pinged.end()) return;
+  const std::vector<RequestId> asked = std::move(ping->second);
+  pinged.erase(pinged.begin(), std::next(ping));  // older ones will not be answered any more
+  for (const RequestId request : asked) {
+    const auto found = open.find(request);
+    if (found == open.end()) continue;
+    OpenRequest& state = found->second;
+    if (std::find(pong.known.begin(), pong.known.end(), request) != pong.known.end()) {
+      state.unknown_pongs = 0;
+    } else if (++state.unknown_pongs >= kUnknownPongs) {
+      state.unknown_pongs = 0;
+      if (state.resubmits++ < kMaxResubmits) {
+        const SubmitFrame again = state.message;  // a copy: a failed submit ends the request
+        Submit(again);
+      } else {
+        End(request,
+            Status::Unavailable("the service at " + endpoint + " lost the request " + std::to_string(kMaxResubmits + 1) + " times"));
+      }
+    }
+  }
+}
+
+void Client::Impl::End(RequestId request, Status status) {
+  if (open.erase(request) > 0) events.push_back({request, std::move(status)});
+}
+
+void Client::Impl::FailAll(const std::string& reason) {
+  while (!open.empty()) End(open.begin()->first, Status::Unavailable(reason));
+  pinged.clear();
+  unanswered_since.reset();
+}
+
+Result<Client> Client::Connect(Context& context, const std::string& endpoint, Duration timeout, ClientTiming timing) {
+  Result<Socket> socket = Socket::Dealer(context);
+  if (!socket.ok()) return socket.status();
+  if (Status connected = socket->Connect(endpoint); !connected.ok()) return connected;
+  Client client(std::make_unique<Impl>(endpoint, std::move(*socket), timing));
+  client.impl_->SendPing(MonotonicNow());
+  if (!client.impl_->PumpUntil(timeout, [&] { return client.impl_->pinged.empty(); })) {
+    return client.impl_->NoAnswer(timeout);
+  }
+  return client;
+}
+
+Client::Client(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Client::Client(Client&&) noexcept = default;
+Client& Client::operator=(Client&&) noexcept = default;
+
+Client::~Client() {
+  if (impl_ == nullptr) return;  // moved from
+  for (const auto& [request, unused] : impl_->open) (void)impl_->Send(CancelFrame{request});
+}
+
+RequestId Client::Submit(const FrameRequest& request, Duration deadline) {
+  const RequestId id = ++impl_->last_request;
+  const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(deadline).count();
+  SubmitFrame message{.request = id, .deadline_ms = std::uint32_t(std::clamp<std::int64_t>(ms, 1, kMaxDeadlineMs)), .frame = request};
+  impl_->open.emplace(id, OpenRequest{.message = message, .submitted = MonotonicNow()});
+  if (Status status = Validate(request); !status.ok()) {
+    impl_->End(id, std::move(status));  // the service would drop what it cannot decode
+  } else if (impl_->open.size() > kMaxOpenRequests) {
+    impl_->End(id, Status::ResourceExhausted("at most " + std::to_string(kMaxOpenRequests) + " requests may be open at once"));
+  } else {
+    impl_->Submit(message);
+  }
+  return id;
+}
+
+void Client::Cancel(RequestId request) {
+  if (impl_->open.contains(request)) (void)impl_->Send(CancelFrame{request});
+}
+
+std::optional<ClientEvent> Client::Next(Duration timeout) {
+  const Time limit = MonotonicNow() + timeout;
+  // One round at least, so that a caller who polls without a timeout keeps pinging and receiving.
+  bool woken = false;
+  do {
+    woken = impl_->Pump(impl_->events.empty() ? limit : MonotonicNow());
+  } while (impl_->events.empty() && !woken && MonotonicNow() < limit);
+  if (impl_->events.empty()) return std::nullopt;
+  ClientEvent event = std::move(impl_->events.front());
+  impl_->events.pop_front();
+  return event;
+}
+
+Result<Picture> Client::Render(const FrameRequest& request, Duration deadline) {
+  const RequestId id = Submit(request, deadline);
+  std::deque<ClientEvent> others;  // of requests that somebody else waits for
+  std::optional<Result<Picture>> end;
+  while (!end) {
+    std::optional<ClientEvent> event = Next(impl_->timing.ping);
+    if (!event) continue;
+    if (event->request != id) {
+      others.push_back(std::move(*event));
+    } else if (auto* picture = std::get_if<Picture>(&event->what)) {
+      if (picture->final) end = std::move(*picture);
+    } else if (const auto* failure = std::get_if<Status>(&event->what)) {
+      end = *failure;
+    }
+  }
+  impl_->events.insert(impl_->events.begin(), std::make_move_iterator(others.begin()), std::make_move_iterator(others.end()));
+  return std::move(*end);
+}
+
+Result<StatusReply> Client::QueryStatus(Duration timeout) {
+  impl_->status_reply.reset();
+  const StatusQuery query{.nonce = ++impl_->last_nonce};
+  (void)impl_->Send(query);
+  if (!impl_->PumpUntil(timeout, [&] { return impl_->status_reply && impl_->status_reply->nonce == query.nonce; })) {
+    return impl_->NoAnswer(timeout);
+  }
+  return std::move(*impl_->status_reply);
+}
+
+Status Client::ShutDownService(Duration timeout) {
+  impl_->shut_down_reply.reset();
+  const ShutDown order{.nonce = ++impl_->last_nonce};
+  (void)impl_->Send(order);
+  if (!impl_->PumpUntil(timeout, [&] { return impl_->shut_down_reply && impl_->shut_down_reply->nonce == order.nonce; })) {
+    return impl_->NoAnswer(timeout);
+  }
+  return Status::Ok();
+}
+
+Wakeup& Client::wakeup() { return impl_->wakeup; }
+
+}  // namespace slabstream

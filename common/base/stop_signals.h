@@ -1,0 +1,43 @@
+// SIGINT and SIGTERM as an orderly stop of a service.
+//
+//   1. BlockStopSignals() first of all: threads that are started later inherit the blocked mask, so the handler below runs in the main
+//   thread only.
+//   2. Start the service.
+//   3. WaitUntilStopped(service): returns when the service has ended, by itself or because a signal made it; a signal that came before
+//   counts.
+// For main functions: handlers belong to the process.
+#pragma once
+
+#include <atomic>
+#include <csignal>
+
+namespace slabstream {
+
+inline sigset_t StopSignals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  return signals;
+}
+
+inline void BlockStopSignals() {
+  const sigset_t signals = StopSignals();
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+}
+
+// Service has RequestStop(), which may be called by a signal handler, and WaitUntilStopped().
+template <class Service>
+void WaitUntilStopped(Service& service) {
+  static std::atomic<Service*> target;
+  target = &service;
+  struct sigaction action = {};
+  action.sa_handler = [](int) { target.load()->RequestStop(); };
+  const sigset_t signals = StopSignals();
+  for (const int number : {SIGINT, SIGTERM}) sigaction(number, &action, nullptr);
+  pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
+  service.WaitUntilStopped();
+  BlockStopSignals();  // the service may be destroyed now
+}
+
+}  // namespace slabstream

@@ -1,0 +1,52 @@
+// TaskThread: one thread that runs tasks in the order in which they were posted.
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <stop_token>
+#include <thread>
+#include <utility>
+
+namespace slabstream {
+
+class TaskThread {
+ public:
+  TaskThread() : thread_([this](const std::stop_token& stop) { Run(stop); }) {}
+  // Waits for the running task; tasks that have not begun are dropped.
+  ~TaskThread() = default;
+  TaskThread(const TaskThread&) = delete;
+  TaskThread& operator=(const TaskThread&) = delete;
+
+  // From any thread. Tasks must not throw.
+  void Post(std::function<void()> task) {
+    {
+      const std::lock_guard lock(mutex_);
+      tasks_.push_back(std::move(task));
+    }
+    ready_.notify_one();
+  }
+
+ private:
+  void Run(const std::stop_token& stop) {
+    while (true) {
+      std::function<void()> task;
+      {
+        std::unique_lock lock(mutex_);
+        ready_.wait(lock, stop, [this] { return !tasks_.empty(); });
+        if (stop.stop_requested()) return;
+        task = std::move(tasks_.front());
+        tasks_.pop_front();
+      }
+      task();
+    }
+  }
+
+  std::mutex mutex_;
+  std::condition_variable_any ready_;
+  std::deque<std::function<void()>> tasks_;  // guarded by mutex_
+  std::jthread thread_;                      // last member: ends before the others are destroyed
+};
+
+}  // namespace slabstream

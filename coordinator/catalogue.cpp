@@ -1,0 +1,89 @@
+#include "coordinator/catalogue.h"
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <string_view>
+#include <system_error>
+
+#include "common/planning/frame_request.h"
+#include "common/volume_io/volume_reader.h"
+
+namespace slabstream {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool AllowedInName(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '.' || c == '_' || c == '-'; }
+
+// The file name without its ending; ".nii.gz" is one ending.
+std::string Stem(const fs::path& path) {
+  fs::path name = path.filename();
+  if (name.extension() == ".gz") name = name.stem();
+  return name.stem().string();
+}
+
+VolumeLoader LoaderOf(const std::string& path) {
+  return [path]() -> Result<std::shared_ptr<const Volume>> {
+    Result<LoadedVolume> loaded = ReadVolume(path);
+    if (!loaded.ok()) return loaded.status();
+    return loaded->volume;
+  };
+}
+
+Status Add(Catalogue& catalogue, const std::string& name, const fs::path& path, const std::string& argument) {
+  if (name.empty() || name.size() > kMaxNameBytes || !std::all_of(name.begin(), name.end(), AllowedInName)) {
+    return Status::InvalidArgument("--data " + argument + ": dataset name \"" + name + "\" must have 1 to " +
+                                   std::to_string(kMaxNameBytes) + " letters, digits, '.', '_' or '-'");
+  }
+  if (!catalogue.emplace(name, LoaderOf(path.string())).second) {
+    return Status::InvalidArgument("--data " + argument + ": there is already a dataset named \"" + name + "\"");
+  }
+  return Status::Ok();
+}
+
+Status AddDirectory(Catalogue& catalogue, const fs::path& directory, const std::string& argument) {
+  if (LooksLikeVolume(directory.string())) {
+    const fs::path whole = fs::absolute(directory).lexically_normal();
+    return Add(catalogue, (whole.has_filename() ? whole : whole.parent_path()).filename().string(), directory, argument);
+  }
+  std::vector<fs::path> found;
+  std::error_code error;
+  for (fs::directory_iterator entry(directory, error), end; !error && entry != end; entry.increment(error)) {
+    if (LooksLikeVolume(entry->path().string())) found.push_back(entry->path());
+  }
+  if (error) return Status::NotFound("--data " + argument + ": cannot read the directory: " + error.message());
+  if (found.empty()) return Status::InvalidArgument("--data " + argument + ": no volume file in this directory");
+  std::sort(found.begin(), found.end());
+  for (const fs::path& path : found) {
+    if (Status status = Add(catalogue, Stem(path), path, argument); !status.ok()) return status;
+  }
+  return Status::Ok();
+}
+
+Status AddArgument(Catalogue& catalogue, const std::string& argument) {
+  std::error_code error;
+  const std::size_t equals = argument.find('=');
+  if (equals != std::string::npos) {
+    const std::string path = argument.substr(equals + 1);
+    if (!fs::exists(path, error)) return Status::NotFound("--data " + argument + ": \"" + path + "\" does not exist");
+    return Add(catalogue, argument.substr(0, equals), path, argument);
+  }
+  if (!fs::exists(argument, error)) return Status::NotFound("--data " + argument + ": does not exist");
+  if (!fs::is_directory(argument, error)) {
+    return Status::InvalidArgument("--data " + argument + ": is a file; give it a name as in NAME=" + argument);
+  }
+  return AddDirectory(catalogue, argument, argument);
+}
+
+}  // namespace
+
+Result<Catalogue> MakeCatalogue(const std::vector<std::string>& arguments) {
+  Catalogue catalogue;
+  for (const std::string& argument : arguments) {
+    if (Status status = AddArgument(catalogue, argument); !status.ok()) return status;
+  }
+  return catalogue;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,57 @@
+// slabstream-coordinator: the service's front. It ends on SIGINT, SIGTERM or a client's order, and tells its workers to end.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "common/base/log.h"
+#include "common/base/stop_signals.h"
+#include "common/transport/socket.h"
+#include "coordinator/catalogue.h"
+#include "coordinator/service.h"
+
+namespace {
+
+int Fail(const slabstream::Status& status) {
+  std::fprintf(stderr, "slabstream-coordinator: %s\n", status.message().c_str());
+  const bool bad_input = status.code() == slabstream::StatusCode::kInvalidArgument || status.code() == slabstream::StatusCode::kNotFound;
+  return bad_input ? 2 : 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  slabstream::CoordinatorOptions options;
+  options.client_endpoint = "tcp://127.0.0.1:7420";
+  std::vector<std::string> data;
+  std::string log_level = "warning";
+
+  CLI::App app("Slabstream coordinator: takes requests from clients, plans frames and streams slabs to workers.");
+  app.add_option("--listen", options.client_endpoint, "for clients (default tcp://127.0.0.1:7420; port * is any)");
+  app.add_option("--worker-listen", options.worker_endpoint, "for workers (default: the next port, or the path with .workers)");
+  app.add_option("--slabs-listen", options.slabs_endpoint, "for voxels (default: any port, or the path with .slabs)");
+  app.add_option("--data", data, "a volume as NAME=PATH, or a directory of volumes; any number of times")->allow_extra_args(false);
+  app.add_option("--log-level", log_level, "debug, info, warning, error or off")->check(CLI::IsMember(slabstream::LogLevelNames()));
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    return Fail(slabstream::Status::InvalidArgument(error.what()));
+  }
+  auto catalogue = slabstream::MakeCatalogue(data);
+  if (!catalogue.ok()) return Fail(catalogue.status());
+  options.catalogue = std::move(*catalogue);
+  slabstream::InitLog("coordinator", slabstream::LogLevelNames().at(log_level));
+
+  slabstream::BlockStopSignals();
+  slabstream::Context context;
+  auto service = slabstream::CoordinatorService::Start(context, std::move(options));
+  if (!service.ok()) return Fail(service.status());
+  // Whoever started this process reads the ports that were chosen from this line.
+  std::printf("slabstream-coordinator ready client=%s workers=%s\n", (*service)->client_endpoint().c_str(),
+              (*service)->worker_endpoint().c_str());
+  std::fflush(stdout);
+  slabstream::WaitUntilStopped(**service);
+  return 0;
+}

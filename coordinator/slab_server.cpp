@@ -1,0 +1,112 @@
+#include "coordinator/slab_server.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <sstream>
+#include <utility>
+#include <variant>
+
+#include "common/base/log.h"
+#include "common/transport/endpoint.h"
+#include "common/wire/payload.h"
+#include "coordinator/box_samples.h"
+
+namespace slabstream {
+namespace {
+
+std::string Text(const Box& box) {
+  std::ostringstream text;
+  const auto range = [&](std::int32_t begin, std::int32_t end) { text << '[' << begin << ", " << end << ')'; };
+  range(box.begin.x, box.end.x);
+  text << " x ";
+  range(box.begin.y, box.end.y);
+  text << " x ";
+  range(box.begin.z, box.end.z);
+  return text.str();
+}
+
+// Why the request cannot be met, or ok.
+Status Check(const ChunkRequest& request, Epoch epoch, const Volume* volume) {
+  if (request.epoch != epoch) return Status::NotFound("chunk request: epoch of another coordinator");
+  if (volume == nullptr) return Status::NotFound("chunk request: no dataset " + std::to_string(request.dataset));
+  if (request.box.empty() || !volume->block.box.Contains(request.box)) {
+    return Status::InvalidArgument("chunk request: box " + Text(request.box) + " is not inside the volume " + Text(volume->block.box));
+  }
+  if (const std::uint32_t count = ChunkCount(request.box, volume->block.type); request.chunk >= count) {
+    return Status::InvalidArgument("chunk request: chunk " + std::to_string(request.chunk) + " is not below " + std::to_string(count));
+  }
+  return Status::Ok();
+}
+
+}  // namespace
+
+Result<std::unique_ptr<SlabServer>> SlabServer::Start(Context& context, const std::string& endpoint, Epoch epoch) {
+  Result<Socket> socket = Socket::Router(context);
+  if (!socket.ok()) return socket.status();
+  Result<std::string> bound = socket->Bind(endpoint);
+  if (!bound.ok()) return bound.status();
+  return std::unique_ptr<SlabServer>(new SlabServer(std::move(*socket), std::move(*bound), epoch));
+}
+
+SlabServer::SlabServer(Socket socket, std::string endpoint, Epoch epoch)
+    : endpoint_(std::move(endpoint)),
+      epoch_(epoch),
+      codec_(endpoint_.starts_with("inproc:") ? Codec::kRaw : Codec::kZstd),
+      socket_(std::move(socket)),
+      thread_([this](const std::stop_token& stop) { Run(stop); }) {}
+
+SlabServer::~SlabServer() {
+  thread_.request_stop();
+  wakeup_.Notify();
+  thread_.join();
+}
+
+void SlabServer::Publish(DatasetId dataset, std::shared_ptr<const Volume> volume) {
+  const std::lock_guard lock(mutex_);
+  volumes_.insert_or_assign(dataset, std::move(volume));
+}
+
+std::shared_ptr<const Volume> SlabServer::Find(DatasetId dataset) {
+  const std::lock_guard lock(mutex_);
+  const auto found = volumes_.find(dataset);
+  return found == volumes_.end() ? nullptr : found->second;
+}
+
+void SlabServer::Run(const std::stop_token& stop) {
+  const std::array<Socket*, 1> sockets = {&socket_};
+  while (!stop.stop_requested()) {
+    Wait(sockets, &wakeup_, std::chrono::minutes(1));
+    while (!stop.stop_requested()) {
+      const std::optional<Incoming> incoming = socket_.TryReceive();
+      if (!incoming) break;
+      Answer(*incoming);
+    }
+  }
+}
+
+void SlabServer::Answer(const Incoming& incoming) {
+  const Result<AnyMessage> decoded = Decode(incoming.parts[0].span());
+  const auto* request = decoded.ok() ? std::get_if<ChunkRequest>(&*decoded) : nullptr;
+  if (request == nullptr) {
+    LogWarning("slabs plane: dropped " + (decoded.ok() ? std::string(NameOf(*decoded)) : decoded.status().message()));
+    return;
+  }
+  const std::shared_ptr<const Volume> volume = Find(request->dataset);
+  Status status = Check(*request, epoch_, volume.get());
+  if (!status.ok()) {
+    LogWarning(status.message());
+    const ChunkRefused refused{epoch_, request->dataset, request->box, request->chunk, std::move(status)};
+    (void)socket_.Send(incoming.identity, Encode(refused));  // a worker that has gone needs no refusal
+    return;
+  }
+  const std::uint64_t box_bytes = std::uint64_t(request->box.voxel_count()) * BytesPerSample(volume->block.type);
+  const std::uint64_t begin = std::uint64_t{request->chunk} * kChunkBytes;
+  Chunk chunk{.epoch = epoch_, .dataset = request->dataset, .box = request->box, .chunk = request->chunk};
+  const Bytes payload = PackChunk(BoxSamples(volume, request->box, begin, std::min(begin + kChunkBytes, box_bytes)), codec_, chunk);
+  if (const Status sent = socket_.Send(incoming.identity, Encode(chunk), payload); !sent.ok()) {
+    LogDebug("slabs plane: " + sent.message());  // it has gone, or asks again when its request times out
+  }
+}
+
+}  // namespace slabstream

@@ -1,0 +1,267 @@
+// The client against a service that the test plays: silent, forgetful, hostile.
+#include "client/client.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <atomic>
+#include <functional>
+#include <set>
+#include <thread>
+
+#include "common/transport/socket.h"
+#include "common/wire/any_message.h"
+#include "common/wire/payload.h"
+#include "tests/support/random.h"
+
+namespace slabstream {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using testing::HasSubstr;
+
+struct Answer {
+  AnyMessage message;
+  Bytes payload;
+};
+
+// Binds an endpoint of its own and answers what comes by a function, which is called in the service's thread.
+class FakeService {
+ public:
+  using Handler = std::function<std::vector<Answer>(const AnyMessage&)>;
+
+  FakeService(Context& context, const std::string& endpoint, Handler handler)
+      : handler_(std::move(handler)), socket_(Socket::Router(context).value()) {
+    endpoint_ = socket_.Bind(endpoint).value();
+    thread_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
+  }
+  ~FakeService() {
+    thread_.request_stop();
+    wakeup_.Notify();
+  }
+  const std::string& endpoint() const { return endpoint_; }
+
+ private:
+  void Run(const std::stop_token& stop) {
+    const std::array<Socket*, 1> sockets = {&socket_};
+    while (!stop.stop_requested()) {
+      Wait(sockets, &wakeup_, seconds(60));
+      while (const std::optional<Incoming> incoming = socket_.TryReceive()) {
+        const Result<AnyMessage> message = Decode(incoming->parts[0].span());
+        ASSERT_TRUE(message.ok()) << message.status().message();
+        for (const Answer& answer : handler_(*message)) (void)socket_.Send(incoming->identity, Encode(answer.message), answer.payload);
+      }
+    }
+  }
+
+  Handler handler_;
+  Wakeup wakeup_;
+  Socket socket_;
+  std::string endpoint_;
+  std::jthread thread_;
+};
+
+// Knows every request that it is asked about.
+ClientPong PongTo(const ClientPing& ping) { return {.epoch = 1, .nonce = ping.nonce, .known = ping.open}; }
+
+FrameRequest SmallRequest() {
+  FrameRequest request;
+  request.dataset = "ball";
+  request.size = {32, 24};
+  return request;
+}
+
+// A reply whose picture is half transparent on a rectangle.
+Answer ReplyTo(RequestId request, std::uint32_t groups_done = 1, std::uint32_t group_count = 1, Codec codec = Codec::kZstd) {
+  LocalImage image = MakeLocalImage(PixelFormat::kRgba, {4, 6, 20, 18});
+  for (std::size_t i = 0; i < image.rgba.size(); ++i) image.rgba[i] = i % 4 == 3 ? 0.5F : 0.001F * float(i % 97);
+  RunImage runs = EncodeRuns(image, {0, 32 * 24}, 32);
+  FrameReply reply{.request = request, .size = {32, 24}, .groups_done = groups_done, .group_count = group_count};
+  reply.statistics.decomposition = "slab";
+  reply.statistics.axis = "z";
+  reply.statistics.combine = "fan-in";
+  reply.runs.image = runs.header;
+  const Bytes payload = PackRuns(Bytes(std::move(runs.payload)), codec, reply.runs);
+  return {reply, payload};
+}
+
+class ClientTest : public testing::Test {
+ protected:
+  Context context_;
+  const ClientTiming quick_ = {.ping = milliseconds(20), .silence = milliseconds(400)};
+};
+
+TEST_F(ClientTest, NobodyAnswers) {
+  Socket silent = Socket::Router(context_).value();
+  const std::string endpoint = silent.Bind("tcp://127.0.0.1:*").value();
+  const Result<Client> client = Client::Connect(context_, endpoint, milliseconds(200));
+  EXPECT_EQ(client.status().code(), StatusCode::kUnavailable);
+  EXPECT_THAT(client.status().message(), testing::AllOf(HasSubstr(endpoint), HasSubstr("200 ms")));
+}
+
+TEST_F(ClientTest, BadEndpointIsRefusedAtOnce) {
+  EXPECT_EQ(Client::Connect(context_, "tcp://8.8.8.8:7420").status().code(), StatusCode::kInvalidArgument);
+  EXPECT_EQ(Client::Connect(context_, "here").status().code(), StatusCode::kInvalidArgument);
+}
+
+TEST_F(ClientTest, ProgressPreviewAndPicture) {
+  FakeService service(context_, "inproc://client-test", [](const AnyMessage& message) -> std::vector<Answer> {
+    if (const auto* ping = std::get_if<ClientPing>(&message)) return {{PongTo(*ping), {}}};
+    const auto* submit = std::get_if<SubmitFrame>(&message);
+    if (submit == nullptr) return {};
+    return {{FrameProgress{.request = submit->request, .phase = FramePhase::kRunning, .group_count = 2}, {}},
+            ReplyTo(submit->request, 1, 2, Codec::kRaw),
+            ReplyTo(submit->request, 2, 2)};
+  });
+  Client client = Client::Connect(context_, service.endpoint()).value();
+  const RequestId id = client.Submit(SmallRequest());
+  std::optional<ClientEvent> event = client.Next(seconds(30));
+  ASSERT_TRUE(event && std::holds_alternative<FrameProgress>(event->what));
+  event = client.Next(seconds(30));
+  ASSERT_TRUE(event && std::holds_alternative<Picture>(event->what));
+  EXPECT_FALSE(std::get<Picture>(event->what).final);
+  event = client.Next(seconds(30));
+  ASSERT_TRUE(event && std::holds_alternative<Picture>(event->what));
+  const auto& picture = std::get<Picture>(event->what);
+  EXPECT_EQ(event->request, id);
+  EXPECT_TRUE(picture.final);
+  EXPECT_GT(picture.latency, Duration::zero());
+  EXPECT_EQ(picture.image.bounds, (PixelBounds{4, 6, 20, 18}));
+  EXPECT_EQ(picture.image.rgba[3], 0.5F);
+  EXPECT_FALSE(client.Next(Duration::zero()).has_value());
+}
+
+TEST_F(ClientTest, SilentServiceEndsEveryOpenRequest) {
+  std::atomic<bool> answer = true;
+  FakeService service(context_, "inproc://client-test", [&](const AnyMessage& message) -> std::vector<Answer> {
+    const auto* ping = std::get_if<ClientPing>(&message);
+    if (ping == nullptr || !answer) return {};
+    return {{PongTo(*ping), {}}};
+  });
+  Client client = Client::Connect(context_, service.endpoint(), seconds(5), quick_).value();
+  answer = false;
+  std::set<RequestId> open = {client.Submit(SmallRequest()), client.Submit(SmallRequest())};
+  while (!open.empty()) {
+    const std::optional<ClientEvent> event = client.Next(seconds(30));
+    ASSERT_TRUE(event.has_value());
+    const auto* status = std::get_if<Status>(&event->what);
+    ASSERT_NE(status, nullptr);
+    EXPECT_EQ(status->code(), StatusCode::kUnavailable);
+    EXPECT_THAT(status->message(), HasSubstr(service.endpoint()));
+    EXPECT_EQ(open.erase(event->request), 1U);
+  }
+}
+
+TEST_F(ClientTest, RequestThatTheServiceForgotIsSubmittedAgain) {
+  std::atomic<int> submits = 0;
+  FakeService service(context_, "inproc://client-test", [&](const AnyMessage& message) -> std::vector<Answer> {
+    if (const auto* ping = std::get_if<ClientPing>(&message)) return {{ClientPong{.epoch = 1, .nonce = ping->nonce}, {}}};
+    const auto* submit = std::get_if<SubmitFrame>(&message);
+    if (submit == nullptr || ++submits < 3) return {};  // forgets it twice
+    return {ReplyTo(submit->request)};
+  });
+  Client client = Client::Connect(context_, service.endpoint(), seconds(5), quick_).value();
+  const Result<Picture> picture = client.Render(SmallRequest());
+  EXPECT_TRUE(picture.ok()) << picture.status().message();
+  EXPECT_EQ(submits, 3);
+}
+
+TEST_F(ClientTest, RequestThatTheServiceAlwaysForgetsFails) {
+  std::atomic<int> submits = 0;
+  FakeService service(context_, "inproc://client-test", [&](const AnyMessage& message) -> std::vector<Answer> {
+    if (std::holds_alternative<SubmitFrame>(message)) ++submits;
+    const auto* ping = std::get_if<ClientPing>(&message);
+    if (ping == nullptr) return {};
+    return {{ClientPong{.epoch = 1, .nonce = ping->nonce}, {}}};
+  });
+  Client client = Client::Connect(context_, service.endpoint(), seconds(5), quick_).value();
+  EXPECT_EQ(client.Render(SmallRequest()).status().code(), StatusCode::kUnavailable);
+  EXPECT_EQ(submits, 4);  // once, and three times again
+}
+
+TEST_F(ClientTest, BadRequestFailsBeforeItIsSent) {
+  FakeService service(context_, "inproc://client-test", [&](const AnyMessage& message) -> std::vector<Answer> {
+    EXPECT_FALSE(std::holds_alternative<SubmitFrame>(message));
+    const auto* ping = std::get_if<ClientPing>(&message);
+    if (ping == nullptr) return {};
+    return {{PongTo(*ping), {}}};
+  });
+  Client client = Client::Connect(context_, service.endpoint()).value();
+  FrameRequest request = SmallRequest();
+  request.size.width = 0;
+  const Result<Picture> picture = client.Render(request);
+  EXPECT_EQ(picture.status().code(), StatusCode::kInvalidArgument);
+  EXPECT_THAT(picture.status().message(), HasSubstr("width"));
+}
+
+TEST_F(ClientTest, CancelAsksTheServiceAndItsAnswerEndsTheRequest) {
+  FakeService service(context_, "inproc://client-test", [](const AnyMessage& message) -> std::vector<Answer> {
+    if (const auto* ping = std::get_if<ClientPing>(&message)) return {{PongTo(*ping), {}}};
+    const auto* cancel = std::get_if<CancelFrame>(&message);
+    if (cancel == nullptr) return {};
+    return {{FrameFailed{cancel->request, Status::Cancelled("as the client asked")}, {}}, ReplyTo(cancel->request)};
+  });
+  Client client = Client::Connect(context_, service.endpoint()).value();
+  const RequestId id = client.Submit(SmallRequest());
+  client.Cancel(id);
+  const std::optional<ClientEvent> event = client.Next(seconds(30));
+  ASSERT_TRUE(event && std::holds_alternative<Status>(event->what));
+  EXPECT_EQ(std::get<Status>(event->what).code(), StatusCode::kCancelled);
+  EXPECT_TRUE(client.QueryStatus(milliseconds(50)).status().code() == StatusCode::kUnavailable);
+  EXPECT_FALSE(client.Next(Duration::zero()).has_value()) << "the late picture of an ended request is dropped";
+}
+
+TEST_F(ClientTest, WakeupEndsNext) {
+  FakeService service(context_, "inproc://client-test", [](const AnyMessage& message) -> std::vector<Answer> {
+    const auto* ping = std::get_if<ClientPing>(&message);
+    if (ping == nullptr) return {};
+    return {{PongTo(*ping), {}}};
+  });
+  Client client = Client::Connect(context_, service.endpoint()).value();
+  const std::jthread other([&] { client.wakeup().Notify(); });
+  EXPECT_FALSE(client.Next(std::chrono::hours(1)).has_value());
+}
+
+// Replies whose payload or whose header fields do not fit: the request ends in an error, or in a picture if the damage did no harm; nothing
+// else.
+TEST_F(ClientTest, DamagedRepliesNeverCrash) {
+  Random random(5);
+  SCOPED_TRACE(random.trace());
+  FakeService service(context_, "inproc://client-test", [&](const AnyMessage& message) -> std::vector<Answer> {
+    if (const auto* ping = std::get_if<ClientPing>(&message)) return {{PongTo(*ping), {}}};
+    const auto* submit = std::get_if<SubmitFrame>(&message);
+    if (submit == nullptr) return {};
+    Answer answer = ReplyTo(submit->request, 1, 1, random.Chance(0.5) ? Codec::kRaw : Codec::kZstd);
+    auto& reply = std::get<FrameReply>(answer.message);
+    switch (random.Integer(0, 4)) {
+      case 0: {  // bytes of the payload, with or without a digest that fits
+        std::vector<std::byte> bytes(answer.payload.span().begin(), answer.payload.span().end());
+        for (int i = random.Integer(1, 8); i > 0; --i)
+          bytes[random.Integer<std::size_t>(0, bytes.size() - 1)] = std::byte(random.Integer(0, 255));
+        if (reply.runs.codec == Codec::kRaw && random.Chance(0.5)) {
+          answer.payload = PackRuns(Bytes(std::move(bytes)), Codec::kRaw, reply.runs);
+        } else {
+          answer.payload = Bytes(std::move(bytes));
+        }
+        break;
+      }
+      case 1: reply.size = {32, 25}; break;
+      case 2: reply.runs.image.bounds.x_end += random.Integer(-3, 30); break;
+      case 3: reply.runs.image.pixel_count += random.Integer<std::uint64_t>(1, 5); break;
+      case 4: reply.runs.digest ^= 1; break;
+    }
+    // What the codec itself would refuse, the client drops; then this failure ends the request.
+    return {std::move(answer), {FrameFailed{submit->request, Status::Internal("dropped")}, {}}};
+  });
+  Client client = Client::Connect(context_, service.endpoint()).value();
+  for (int round = 0; round < 500; ++round) {
+    const Result<Picture> picture = client.Render(SmallRequest());
+    if (!picture.ok()) continue;
+    EXPECT_TRUE((PixelBounds{0, 0, 32, 24}).Contains(picture->image.bounds));
+  }
+}
+
+}  // namespace
+}  // namespace slabstream

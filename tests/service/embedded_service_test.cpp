@@ -1,0 +1,258 @@
+// The whole service in this process, over inproc: its pictures are those of one renderer that holds the whole volume, whoever comes and
+// goes meanwhile.
+#include "client/embedded/embedded_service.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <thread>
+
+#include "tests/service/pictures.h"
+
+namespace slabstream {
+namespace {
+
+using std::chrono::seconds;
+
+EmbeddedOptions OptionsFor(std::shared_ptr<const Volume> volume, int workers) {
+  EmbeddedOptions options;
+  options.workers = workers;
+  options.coordinator.catalogue["ball"] = [volume]() -> Result<std::shared_ptr<const Volume>> { return volume; };
+  options.coordinator.catalogue["broken"] = []() -> Result<std::shared_ptr<const Volume>> { return Status::DataLoss("file ends early"); };
+  return options;
+}
+
+class EmbeddedServiceTest : public testing::Test {
+ protected:
+  void Start(int workers) {
+    auto started = EmbeddedService::Start(context_, OptionsFor(volume_, workers));
+    ASSERT_TRUE(started.ok()) << started.status().message();
+    service_ = std::move(*started);
+  }
+  Client Connect() {
+    Result<Client> client = Client::Connect(context_, service_->endpoint());
+    CHECK(client.ok()) << client.status().message();
+    return std::move(*client);
+  }
+  // Asks for the picture and compares it with the direct one.
+  FrameStatistics ExpectRightPicture(Client& client, const FrameRequest& request) {
+    const Result<Picture> picture = client.Render(request, seconds(60));
+    EXPECT_TRUE(picture.ok()) << picture.status().message();
+    if (!picture.ok()) return {};
+    EXPECT_EQ(picture->size, request.size);
+    EXPECT_GT(HighestAlpha(picture->image), 0.5);
+    EXPECT_LE(LargestDifference(picture->image, RenderDirectly(request, *volume_), request.size), AllowedDifference(request));
+    return picture->statistics;
+  }
+
+  Context context_;
+  std::shared_ptr<const Volume> volume_ = TestSphere(40);
+  std::unique_ptr<EmbeddedService> service_;
+};
+
+TEST_F(EmbeddedServiceTest, PictureIsThatOfOneRendererForAnyWorkersAndGroups) {
+  for (const int workers : {1, 3}) {
+    Start(workers);
+    Client client = Connect();
+    for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
+      for (const int groups : {1, 2, 5}) {
+        SCOPED_TRACE(testing::Message() << workers << " workers, " << groups << " groups, renderer " << int(renderer));
+        const FrameStatistics statistics = ExpectRightPicture(client, TestRequest(renderer, 30, groups));
+        EXPECT_EQ(statistics.groups, std::uint32_t(groups));
+        EXPECT_EQ(statistics.attempts, 1U);
+      }
+    }
+  }
+}
+
+TEST_F(EmbeddedServiceTest, SecondFrameMovesNoVoxels) {
+  Start(2);
+  Client client = Connect();
+  EXPECT_GT(VoxelBytes(ExpectRightPicture(client, TestRequest(RendererKind::kSplat, 0))), 0U);
+  EXPECT_EQ(VoxelBytes(ExpectRightPicture(client, TestRequest(RendererKind::kSplat, 137))), 0U);
+  EXPECT_EQ(VoxelBytes(ExpectRightPicture(client, TestRequest(RendererKind::kZBuffer, 251))), 0U);
+}
+
+TEST_F(EmbeddedServiceTest, SeveralClientsAtOnce) {
+  Start(2);
+  std::vector<std::jthread> threads;
+  for (int i = 0; i < 4; ++i) {
+    threads.emplace_back([this, i] {
+      Client client = Connect();
+      for (int frame = 0; frame < 3; ++frame) {
+        ExpectRightPicture(client, TestRequest(i % 2 == 0 ? RendererKind::kSplat : RendererKind::kZBuffer, 100 * i + 40 * frame));
+      }
+    });
+  }
+}
+
+TEST_F(EmbeddedServiceTest, OneClientKeepsSeveralFramesInFlight) {
+  Start(2);
+  Client client = Connect();
+  std::map<RequestId, FrameRequest> open;
+  for (int i = 0; i < 6; ++i) {
+    const FrameRequest request = TestRequest(RendererKind::kSplat, 60 * i);
+    open.emplace(client.Submit(request, seconds(60)), request);
+  }
+  while (!open.empty()) {
+    const std::optional<ClientEvent> event = client.Next(seconds(60));
+    ASSERT_TRUE(event.has_value());
+    ASSERT_FALSE(std::holds_alternative<Status>(event->what)) << std::get<Status>(event->what).message();
+    const auto* picture = std::get_if<Picture>(&event->what);
+    if (picture == nullptr) continue;
+    const FrameRequest& request = open.at(event->request);
+    EXPECT_LE(LargestDifference(picture->image, RenderDirectly(request, *volume_), request.size), AllowedDifference(request));
+    open.erase(event->request);
+  }
+}
+
+TEST_F(EmbeddedServiceTest, PreviewsComeGroupByGroupAndThenThePicture) {
+  Start(2);
+  Client client = Connect();
+  FrameRequest request = TestRequest(RendererKind::kSplat, 75, 4);
+  request.previews = true;
+  const RequestId id = client.Submit(request, seconds(60));
+  std::uint32_t groups_done = 0;
+  double alpha = 0;
+  for (bool final = false; !final;) {
+    const std::optional<ClientEvent> event = client.Next(seconds(60));
+    ASSERT_TRUE(event.has_value());
+    EXPECT_EQ(event->request, id);
+    ASSERT_FALSE(std::holds_alternative<Status>(event->what)) << std::get<Status>(event->what).message();
+    const auto* picture = std::get_if<Picture>(&event->what);
+    if (picture == nullptr) continue;
+    EXPECT_GT(picture->groups_done, groups_done);
+    EXPECT_GE(HighestAlpha(picture->image), alpha - 1e-6);  // what lies behind can only add
+    groups_done = picture->groups_done;
+    alpha = HighestAlpha(picture->image);
+    final = picture->final;
+    EXPECT_EQ(final, groups_done == picture->group_count);
+    if (final) {
+      EXPECT_LE(LargestDifference(picture->image, RenderDirectly(request, *volume_), request.size), AllowedDifference(request));
+    }
+  }
+  EXPECT_EQ(groups_done, 4U);
+}
+
+TEST_F(EmbeddedServiceTest, CancelEndsTheRequestAndFreesTheWorkers) {
+  volume_ = TestSphere(128);
+  Start(2);
+  Client client = Connect();
+  FrameRequest large = TestRequest(RendererKind::kSplat, 10, 8);
+  large.size = {2048, 2048};
+  const RequestId id = client.Submit(large, seconds(60));
+  std::optional<ClientEvent> event = client.Next(seconds(60));
+  ASSERT_TRUE(event.has_value());  // progress: it has arrived
+  client.Cancel(id);
+  while (event && !std::holds_alternative<Status>(event->what)) {
+    if (const auto* picture = std::get_if<Picture>(&event->what); picture != nullptr && picture->final)
+      FAIL() << "rendered before the cancel came";
+    event = client.Next(seconds(60));
+  }
+  ASSERT_TRUE(event.has_value());
+  EXPECT_EQ(event->request, id);
+  EXPECT_EQ(std::get<Status>(event->what).code(), StatusCode::kCancelled);
+  const Result<StatusReply> status = client.QueryStatus();
+  ASSERT_TRUE(status.ok()) << status.status().message();
+  EXPECT_EQ(status->running + status->queued, 0U);
+  ExpectRightPicture(client, TestRequest(RendererKind::kZBuffer, 10));
+}
+
+TEST_F(EmbeddedServiceTest, ClientThatGoesAwayFreesItsWork) {
+  volume_ = TestSphere(128);
+  Start(1);
+  {
+    Client client = Connect();
+    FrameRequest large = TestRequest(RendererKind::kSplat, 10, 8);
+    large.size = {2048, 2048};
+    for (int i = 0; i < 8; ++i) client.Submit(large, std::chrono::minutes(60));
+  }
+  Client client = Connect();
+  ExpectRightPicture(client, TestRequest(RendererKind::kZBuffer, 10));
+  const Result<StatusReply> status = client.QueryStatus();
+  ASSERT_TRUE(status.ok());
+  EXPECT_EQ(status->running + status->queued, 0U);
+}
+
+TEST_F(EmbeddedServiceTest, WorkersLeaveAndJoinWhileFramesRun) {
+  Start(3);
+  Client client = Connect();
+  for (int frame = 0; frame < 4; ++frame) {
+    SCOPED_TRACE(testing::Message() << "frame " << frame);
+    const FrameRequest request = TestRequest(RendererKind::kSplat, 45 * frame, 3);
+    const RequestId id = client.Submit(request, seconds(60));
+    service_->worker(frame).RequestStop();
+    ASSERT_TRUE(service_->AddWorker().ok());
+    bool rendered = false;
+    while (!rendered) {
+      const std::optional<ClientEvent> event = client.Next(seconds(60));
+      ASSERT_TRUE(event.has_value());
+      EXPECT_EQ(event->request, id);
+      ASSERT_FALSE(std::holds_alternative<Status>(event->what)) << std::get<Status>(event->what).message();
+      const auto* picture = std::get_if<Picture>(&event->what);
+      if (picture == nullptr) continue;
+      EXPECT_LE(LargestDifference(picture->image, RenderDirectly(request, *volume_), request.size), AllowedDifference(request));
+      rendered = true;
+    }
+    service_->worker(frame).WaitUntilStopped();
+  }
+}
+
+TEST_F(EmbeddedServiceTest, NothingVisibleIsAnEmptyPicture) {
+  Start(2);
+  Client client = Connect();
+  for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
+    FrameRequest request = TestRequest(renderer, 0);
+    std::get<TransferFunction>(request.transfer.choice).opacities = {{0, 0, 0.5, 0}};
+    const Result<Picture> picture = client.Render(request, seconds(60));
+    ASSERT_TRUE(picture.ok()) << picture.status().message();
+    EXPECT_EQ(HighestAlpha(picture->image), 0);
+  }
+}
+
+TEST_F(EmbeddedServiceTest, FailuresSayWhatWasWrong) {
+  Start(1);
+  Client client = Connect();
+  FrameRequest request = TestRequest(RendererKind::kSplat, 0);
+  request.dataset = "nothing";
+  Result<Picture> picture = client.Render(request);
+  EXPECT_EQ(picture.status().code(), StatusCode::kNotFound);
+  EXPECT_THAT(picture.status().message(), testing::AllOf(testing::HasSubstr("nothing"), testing::HasSubstr("ball")));
+  request.dataset = "broken";
+  picture = client.Render(request);
+  EXPECT_EQ(picture.status().code(), StatusCode::kDataLoss);
+  EXPECT_THAT(picture.status().message(), testing::HasSubstr("file ends early"));
+  request.dataset = "ball";
+  request.view.zoom = -1;
+  picture = client.Render(request);
+  EXPECT_EQ(picture.status().code(), StatusCode::kInvalidArgument);
+  EXPECT_THAT(picture.status().message(), testing::HasSubstr("zoom"));
+  ExpectRightPicture(client, TestRequest(RendererKind::kSplat, 0));
+}
+
+TEST_F(EmbeddedServiceTest, ShutDownEndsServiceAndOpenRequests) {
+  Start(2);
+  const ClientTiming quick = {.ping = std::chrono::milliseconds(50), .silence = std::chrono::milliseconds(500)};
+  Client client = Client::Connect(context_, service_->endpoint(), seconds(5), quick).value();
+  ExpectRightPicture(client, TestRequest(RendererKind::kZBuffer, 0));
+  const Status status = client.ShutDownService();
+  EXPECT_TRUE(status.ok()) << status.message();
+  service_->worker(0).WaitUntilStopped();
+  service_->worker(1).WaitUntilStopped();
+  client.Submit(TestRequest(RendererKind::kZBuffer, 0));
+  const std::optional<ClientEvent> event = client.Next(seconds(60));
+  ASSERT_TRUE(event.has_value());
+  EXPECT_EQ(std::get<Status>(event->what).code(), StatusCode::kUnavailable);
+}
+
+TEST(EmbeddedServiceOptions, WorkerCountIsChecked) {
+  Context context;
+  EmbeddedOptions options;
+  options.workers = 0;
+  const auto started = EmbeddedService::Start(context, std::move(options));
+  EXPECT_EQ(started.status().code(), StatusCode::kInvalidArgument);
+  EXPECT_THAT(started.status().message(), testing::HasSubstr("[1, 256]"));
+}
+
+}  // namespace
+}  // namespace slabstream

@@ -1,0 +1,182 @@
+// The executor against orders as the machine gives them: every order that has an answer gets exactly one, also when what came in is
+// damaged.
+#include "worker/executor.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "common/wire/payload.h"
+#include "tests/service/pictures.h"
+
+namespace slabstream {
+namespace {
+
+constexpr PixelBounds kFrame = {0, 0, 16, 8};
+constexpr GroupKey kKey = {.frame = 3, .attempt = 1, .group = 0};
+
+LocalImage Filled(const PixelBounds& bounds, float value) {
+  LocalImage image = MakeLocalImage(PixelFormat::kRgba, bounds);
+  std::fill(image.rgba.begin(), image.rgba.end(), value);
+  return image;
+}
+
+class ExecutorTest : public testing::Test {
+ protected:
+  ExecutorOutput Next() {
+    while (outputs_.empty()) {
+      Wait({}, &outbox_.wakeup(), std::chrono::seconds(10));
+      outputs_ = outbox_.TakeAll();
+    }
+    ExecutorOutput first = std::move(outputs_.front());
+    outputs_.erase(outputs_.begin());
+    return first;
+  }
+  template <class Event>
+  Event NextEvent() {
+    return std::get<Event>(std::get<WorkerEvent>(Next()));
+  }
+
+  // Orders a combine of an image as it comes from another worker.
+  CombineDone CombineIncoming(ImageHandle into, const LocalImage& image, Side side) {
+    RunImage runs = EncodeRuns(image, {0, 16 * 8}, 16);
+    executor_.Perform(
+        StartCombine{.key = kKey, .image = into, .header = runs.header, .payload = Bytes(std::move(runs.payload)), .side = side}, kFrame);
+    return NextEvent<CombineDone>();
+  }
+  // What the image would be sent as: its pixels.
+  LocalImage PixelsOf(ImageHandle image, PixelRange pixels = {0, 16 * 8}) {
+    executor_.Perform(
+        SendPartial{.message = {.epoch = 1, .from_worker = 1, .key = kKey, .interval = {0, 1}, .pixels = pixels, .reports = {RankReport{}}},
+                    .image = image,
+                    .frame_width = 16});
+    const auto sent = std::get<OutgoingPartial>(Next());
+    const AnyMessage message = Decode(sent.header).value();
+    const auto& partial = std::get<PartialImage>(message);
+    EXPECT_EQ(partial.reports.back().image_bytes, sent.payload.size());
+    return DecodeRuns(partial.image, sent.payload.span());
+  }
+
+  Mailbox<ExecutorOutput> outbox_;
+  std::vector<ExecutorOutput> outputs_;
+  Executor executor_{outbox_, Codec::kZstd};
+};
+
+TEST_F(ExecutorTest, ImagesCombineInOrderAndSourcesStayAsTheyAre) {
+  EXPECT_TRUE(CombineIncoming(1, Filled({0, 0, 8, 4}, 0.5F), Side::kBack).status.ok());
+  EXPECT_TRUE(CombineIncoming(2, Filled({0, 0, 4, 4}, 0.25F), Side::kBack).status.ok());
+  // 3 becomes a copy of the left half of row 0 of 1; then 2 goes behind 1.
+  executor_.Perform(StartCombine{.key = kKey, .image = 3, .other = 1, .pixels = {0, 4}, .frame_width = 16}, kFrame);
+  EXPECT_TRUE(NextEvent<CombineDone>().status.ok());
+  executor_.Perform(StartCombine{.key = kKey, .image = 1, .other = 2, .side = Side::kBack}, kFrame);
+  EXPECT_TRUE(NextEvent<CombineDone>().status.ok());
+
+  const LocalImage combined = PixelsOf(1);
+  EXPECT_FLOAT_EQ(PixelAt(combined, 1, 1).rgba[3], 0.5F + 0.5F * 0.25F);
+  EXPECT_FLOAT_EQ(PixelAt(combined, 6, 1).rgba[3], 0.5F);
+  const LocalImage part = PixelsOf(3);
+  EXPECT_FLOAT_EQ(PixelAt(part, 3, 0).rgba[3], 0.5F);
+  EXPECT_FLOAT_EQ(PixelAt(part, 4, 0).rgba[3], 0.0F);
+  EXPECT_FLOAT_EQ(PixelAt(part, 0, 1).rgba[3], 0.0F);
+  EXPECT_FLOAT_EQ(PixelAt(PixelsOf(2), 1, 1).rgba[3], 0.25F);
+}
+
+TEST_F(ExecutorTest, ReleasedImagesServeTheOrdersThatWereGivenBefore) {
+  EXPECT_TRUE(CombineIncoming(1, Filled({0, 0, 8, 4}, 0.5F), Side::kBack).status.ok());
+  executor_.Perform(StartCombine{.key = kKey, .image = 2, .other = 1}, kFrame);
+  executor_.Perform(ReleaseImage{1});
+  EXPECT_TRUE(NextEvent<CombineDone>().status.ok());
+  EXPECT_FLOAT_EQ(PixelAt(PixelsOf(2), 7, 3).rgba[3], 0.5F);
+  executor_.Perform(ReleaseImage{1});  // again: nothing happens
+}
+
+TEST_F(ExecutorTest, DamagedRunsAreRefused) {
+  EXPECT_TRUE(CombineIncoming(1, Filled({0, 0, 8, 4}, 0.5F), Side::kBack).status.ok());
+  EXPECT_EQ(CombineIncoming(1, Filled({0, 0, 8, 4}, NAN), Side::kBack).status.code(), StatusCode::kInvalidArgument);
+  RunImage runs = EncodeRuns(Filled({0, 0, 8, 4}, 0.5F), {0, 16 * 8}, 16);
+  runs.header.bounds = {0, 0, 1 << 24, 1 << 24};  // would take petabytes
+  executor_.Perform(StartCombine{.key = kKey, .image = 1, .header = runs.header, .payload = Bytes(std::move(runs.payload))}, kFrame);
+  EXPECT_FALSE(NextEvent<CombineDone>().status.ok());
+  EXPECT_FALSE(CombineIncoming(1, MakeLocalImage(PixelFormat::kDepth, {0, 0, 8, 4}), Side::kBack).status.ok());
+  EXPECT_FLOAT_EQ(PixelAt(PixelsOf(1), 7, 3).rgba[3], 0.5F) << "the image is as it was";
+}
+
+TEST_F(ExecutorTest, FinishedFrameIsResolvedAndPacked) {
+  EXPECT_TRUE(CombineIncoming(1, Filled({2, 0, 8, 4}, 0.5F), Side::kBack).status.ok());
+  executor_.Perform(
+      SendFrame{.message = {.epoch = 1, .worker = 1, .frame = 3, .attempt = 1, .groups_done = 1}, .image = 1, .supersample = 2});
+  const auto sent = std::get<OutgoingFrame>(Next());
+  const AnyMessage message = Decode(sent.header).value();
+  const auto& frame = std::get<FrameImage>(message);
+  EXPECT_EQ(frame.runs.image.bounds, (PixelBounds{1, 0, 4, 2}));
+  ASSERT_EQ(frame.reports.size(), 1U);
+  EXPECT_GT(frame.reports[0].stage_ns[std::size_t(Stage::kEncode)], 0);
+  const Result<Bytes> runs = UnpackRuns(frame.runs, sent.payload);
+  ASSERT_TRUE(runs.ok()) << runs.status().message();
+  EXPECT_FLOAT_EQ(PixelAt(DecodeRuns(frame.runs.image, runs->span()), 3, 1).rgba[3], 0.5F);
+}
+
+TEST_F(ExecutorTest, EveryChunkIsAnsweredAndDamageIsFound) {
+  const SlabKey slab{.dataset = 4, .box = {{0, 0, 0}, {10, 10, 5}}, .type = ScalarType::kUint16};
+  Chunk chunk{.epoch = 1, .dataset = 4, .box = slab.box, .chunk = 0};
+  const Bytes payload = PackChunk(Bytes(std::vector<std::byte>(1000, std::byte{7})), Codec::kZstd, chunk);
+  const auto store = [&](const Chunk& header, const Bytes& bytes) {
+    executor_.Perform(StoreChunk{slab, header, bytes});
+    const auto stored = NextEvent<ChunkStored>();
+    EXPECT_EQ(stored.slab, slab);
+    EXPECT_EQ(stored.chunk, header.chunk);
+    return stored.status.code();
+  };
+  EXPECT_EQ(store(chunk, payload), StatusCode::kNotFound) << "no such slab yet";
+  executor_.Perform(OpenSlab{slab});
+  Chunk damaged = chunk;
+  damaged.digest ^= 1;
+  EXPECT_EQ(store(damaged, payload), StatusCode::kDataLoss);
+  damaged = chunk;
+  damaged.chunk = 1;
+  EXPECT_EQ(store(damaged, payload), StatusCode::kDataLoss);
+  damaged = chunk;
+  damaged.box.end.z = 6;
+  EXPECT_EQ(store(damaged, payload), StatusCode::kDataLoss);
+  EXPECT_EQ(store(chunk, payload), StatusCode::kOk);
+  EXPECT_EQ(store(chunk, payload), StatusCode::kOk) << "a duplicate changes nothing";
+  executor_.Perform(DropSlab{slab});
+  EXPECT_EQ(store(chunk, payload), StatusCode::kNotFound);
+}
+
+TEST_F(ExecutorTest, RenderIsAnsweredAlsoWhenItIsCancelled) {
+  const std::shared_ptr<const Volume> volume = TestSphere(96);
+  FrameRequest request = TestRequest(RendererKind::kSplat, 20);
+  request.size = {1024, 1024};
+  const FramePlan plan = PlanFrame(request, 1, Summarize(*volume), Roster{{1}}, CostModel{}).value();
+  const SlabKey slab{.dataset = 1, .box = volume->block.box, .type = volume->block.type};
+  executor_.Perform(OpenSlab{slab});
+  const Bytes samples(volume, volume->block.bytes);
+  ASSERT_LE(samples.size(), kChunkBytes);
+  Chunk chunk{.epoch = 1, .dataset = 1, .box = slab.box, .chunk = 0};
+  const Bytes payload = PackChunk(samples, Codec::kRaw, chunk);
+  executor_.Perform(StoreChunk{slab, chunk, payload});
+  ASSERT_TRUE(NextEvent<ChunkStored>().status.ok());
+
+  const auto setup = std::make_shared<const FrameSetup>(plan.setup);
+  executor_.Perform(StartRender{.key = kKey, .slab = slab, .placement = {.box = slab.box, .worker = 1}, .setup = setup, .image = 1});
+  executor_.Perform(CancelRender{kKey});
+  auto done = NextEvent<RenderDone>();
+  EXPECT_EQ(done.image, 1U);
+  EXPECT_TRUE(done.status.ok() || done.status.code() == StatusCode::kCancelled) << done.status.message();
+
+  executor_.Perform(DropSlab{slab});  // but its last render goes on
+  executor_.Perform(OpenSlab{slab});
+  executor_.Perform(StoreChunk{slab, chunk, payload});
+  ASSERT_TRUE(NextEvent<ChunkStored>().status.ok());
+  executor_.Perform(StartRender{.key = kKey, .slab = slab, .placement = {.box = slab.box, .worker = 1}, .setup = setup, .image = 2});
+  executor_.Perform(DropSlab{slab});
+  done = NextEvent<RenderDone>();
+  EXPECT_TRUE(done.status.ok()) << done.status.message();
+  EXPECT_GT(done.slab_bytes, 0U);
+  EXPECT_GT(done.report.stage_ns[std::size_t(Stage::kRender)], 0);
+}
+
+}  // namespace
+}  // namespace slabstream

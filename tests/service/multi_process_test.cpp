@@ -1,0 +1,220 @@
+// Real processes over tcp: a coordinator and workers that are killed at seeded moments. No frame is lost and no picture changes.
+//
+// SLABSTREAM_SEED=N repeats a run's choices.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <iostream>
+#include <random>
+
+#include "common/volume_io/volume_reader.h"
+#include "tests/service/child_process.h"
+#include "tests/service/pictures.h"
+#include "tests/support/random.h"
+
+namespace slabstream {
+namespace {
+
+using std::chrono::seconds;
+using testing::HasSubstr;
+
+std::string FieldOf(const std::string& line, const std::string& key) {
+  const std::size_t begin = line.find(key + "=");
+  if (begin == std::string::npos) return {};
+  const std::size_t value = begin + key.size() + 1;
+  return line.substr(value, line.find(' ', value) - value);
+}
+
+class MultiProcessTest : public testing::Test {
+ protected:
+  MultiProcessTest() {
+    std::cout << random_.trace() << std::endl;
+    std::string pattern = (std::filesystem::temp_directory_path() / "slabstream-processes-XXXXXX").string();
+    CHECK(::mkdtemp(pattern.data()) != nullptr);
+    directory_ = pattern;
+    const Status written = WriteVolume(*volume_, (directory_ / "ball.nrrd").string());
+    CHECK(written.ok()) << written.message();
+  }
+  ~MultiProcessTest() override {
+    workers_.clear();
+    coordinator_.reset();
+    std::filesystem::remove_all(directory_);
+  }
+
+  void StartCoordinator(const std::string& listen = "tcp://127.0.0.1:*", const std::string& worker_listen = "tcp://127.0.0.1:*") {
+    coordinator_.emplace(std::vector<std::string>{SLABSTREAM_COORDINATOR_PROGRAM, "--listen", listen, "--worker-listen", worker_listen,
+                                                  "--data", "ball=" + (directory_ / "ball.nrrd").string(), "--log-level", "error"});
+    const std::string ready = coordinator_->ReadLine();
+    ASSERT_THAT(ready, HasSubstr("slabstream-coordinator ready"));
+    client_endpoint_ = FieldOf(ready, "client");
+    worker_endpoint_ = FieldOf(ready, "workers");
+  }
+  void StartWorker() {
+    workers_.emplace_back(std::vector<std::string>{SLABSTREAM_WORKER_PROGRAM, "--coordinator", worker_endpoint_, "--log-level", "error"});
+  }
+  void KillWorker(std::size_t index) {
+    workers_[index].Kill(SIGKILL);
+    workers_[index].Wait();
+    workers_.erase(workers_.begin() + std::ptrdiff_t(index));
+  }
+  Client Connect() {
+    Result<Client> client = Client::Connect(context_, client_endpoint_, seconds(30));
+    CHECK(client.ok()) << client.status().message();
+    return std::move(*client);
+  }
+  // Asks the service again and again until so many workers are registered: each answer is an event, nothing sleeps.
+  void AwaitWorkers(Client& client, std::size_t count) {
+    const Time limit = MonotonicNow() + seconds(60);
+    while (MonotonicNow() < limit) {
+      const Result<StatusReply> status = client.QueryStatus(seconds(30));
+      ASSERT_TRUE(status.ok()) << status.status().message();
+      if (status->workers.size() >= count) return;
+    }
+    FAIL() << "fewer than " << count << " workers registered within a minute";
+  }
+  // Waits for the end of a request; counts progress and previews and calls `at_event` at each.
+  template <class Function>
+  Result<Picture> Await(Client& client, RequestId id, Function&& at_event) {
+    while (true) {
+      std::optional<ClientEvent> event = client.Next(seconds(120));
+      if (!event) return Status::DeadlineExceeded("no event for two minutes");
+      if (event->request != id) continue;
+      if (const auto* failure = std::get_if<Status>(&event->what)) return *failure;
+      auto* picture = std::get_if<Picture>(&event->what);
+      if (picture != nullptr && picture->final) return std::move(*picture);
+      at_event();
+    }
+  }
+
+  Random random_{std::random_device{}()};
+  const std::shared_ptr<const Volume> volume_ = TestSphere(64);
+  std::filesystem::path directory_;
+  Context context_;
+  std::optional<ChildProcess> coordinator_;
+  std::vector<ChildProcess> workers_;
+  std::string client_endpoint_, worker_endpoint_;
+};
+
+TEST_F(MultiProcessTest, KilledWorkersCostNoFrameAndChangeNoPicture) {
+  StartCoordinator();
+  for (int i = 0; i < 3; ++i) StartWorker();
+  Client client = Connect();
+  AwaitWorkers(client, 3);
+  for (int round = 0; round < 8; ++round) {
+    FrameRequest request =
+        TestRequest(round % 2 == 0 ? RendererKind::kSplat : RendererKind::kZBuffer, random_.Integer(0, 359), random_.Integer(1, 4));
+    request.size = {320, 300};
+    request.previews = true;
+    const LocalImage expected = RenderDirectly(request, *volume_);
+    const auto victim = std::size_t(random_.Integer(0, int(workers_.size()) - 1));
+    int events_left = random_.Integer(0, 4);
+    SCOPED_TRACE(testing::Message() << "round " << round << ": worker " << victim << " of " << workers_.size() << " killed after "
+                                    << events_left << " events");
+    const RequestId id = client.Submit(request, seconds(100));
+    bool killed = false;
+    const auto maybe_kill = [&] {
+      if (killed || events_left-- > 0) return;
+      KillWorker(victim);
+      killed = true;
+    };
+    maybe_kill();
+    const Result<Picture> picture = Await(client, id, maybe_kill);
+    ASSERT_TRUE(picture.ok()) << picture.status().message();
+    EXPECT_LE(LargestDifference(picture->image, expected, request.size), AllowedDifference(request));
+    if (killed && random_.Integer(0, 2) > 0) StartWorker();  // it joins while later frames run
+    while (workers_.size() < 2) StartWorker();
+  }
+}
+
+TEST_F(MultiProcessTest, OneWorkerThatComesBackSavesTheFrame) {
+  StartCoordinator();
+  StartWorker();
+  StartWorker();
+  Client client = Connect();
+  AwaitWorkers(client, 2);
+  FrameRequest request = TestRequest(RendererKind::kSplat, 33, 4);
+  request.size = {512, 512};
+  const RequestId id = client.Submit(request, seconds(100));
+  bool killed = false;
+  const Result<Picture> picture = Await(client, id, [&] {
+    if (killed) return;
+    KillWorker(0);
+    KillWorker(0);
+    StartWorker();
+    killed = true;
+  });
+  ASSERT_TRUE(picture.ok()) << picture.status().message();
+  EXPECT_LE(LargestDifference(picture->image, RenderDirectly(request, *volume_), request.size), AllowedDifference(request));
+}
+
+TEST_F(MultiProcessTest, WithoutWorkersAFrameEndsInAnErrorThatSaysSo) {
+  StartCoordinator();
+  Client client = Connect();
+  const Result<Picture> picture = client.Render(TestRequest(RendererKind::kSplat, 0), seconds(60));
+  EXPECT_EQ(picture.status().code(), StatusCode::kUnavailable) << picture.status().message();
+  EXPECT_THAT(picture.status().message(), HasSubstr("worker"));
+  StartWorker();
+  const Result<Picture> later = client.Render(TestRequest(RendererKind::kSplat, 0), seconds(60));
+  EXPECT_TRUE(later.ok()) << later.status().message();
+}
+
+TEST_F(MultiProcessTest, KilledCoordinatorEndsClientsAndWorkersComeBackToTheNextOne) {
+  StartCoordinator();
+  StartWorker();
+  StartWorker();
+  const FrameRequest request = TestRequest(RendererKind::kZBuffer, 120, 3);
+  const LocalImage expected = RenderDirectly(request, *volume_);
+  {
+    Client client = Connect();
+    AwaitWorkers(client, 2);
+    const Result<Picture> picture = client.Render(request, seconds(60));
+    ASSERT_TRUE(picture.ok()) << picture.status().message();
+    coordinator_->Kill(SIGKILL);
+    coordinator_->Wait();
+    const Result<Picture> lost = client.Render(request, seconds(60));
+    EXPECT_EQ(lost.status().code(), StatusCode::kUnavailable);
+    EXPECT_THAT(lost.status().message(), HasSubstr(client_endpoint_));
+  }
+  StartCoordinator(client_endpoint_, worker_endpoint_);
+  Client client = Connect();
+  AwaitWorkers(client, 2);
+  const Result<Picture> picture = client.Render(request, seconds(60));
+  ASSERT_TRUE(picture.ok()) << picture.status().message();
+  EXPECT_EQ(LargestDifference(picture->image, expected, request.size), 0);
+}
+
+TEST_F(MultiProcessTest, SigtermEndsEachInOrderAndShutDownEndsAll) {
+  StartCoordinator();
+  StartWorker();
+  StartWorker();
+  {
+    Client client = Connect();
+    AwaitWorkers(client, 2);
+    workers_[0].Kill(SIGTERM);
+    EXPECT_EQ(workers_[0].Wait(), 0);
+    coordinator_->Kill(SIGTERM);
+    EXPECT_EQ(coordinator_->Wait(), 0);
+  }
+  // The other worker waits for a coordinator to come back.
+  StartCoordinator(client_endpoint_, worker_endpoint_);
+  Client client = Connect();
+  AwaitWorkers(client, 1);
+  const Status down = client.ShutDownService();
+  EXPECT_TRUE(down.ok()) << down.message();
+  EXPECT_EQ(coordinator_->Wait(), 0);
+  EXPECT_EQ(workers_[1].Wait(), 0);
+}
+
+TEST_F(MultiProcessTest, BadArgumentsAreRefusedWithExitStatusTwo) {
+  const auto run = [](std::vector<std::string> command) { return ChildProcess(command).Wait(); };
+  EXPECT_EQ(run({SLABSTREAM_COORDINATOR_PROGRAM, "--listen", "tcp://0.0.0.0:*"}), 2);
+  EXPECT_EQ(run({SLABSTREAM_COORDINATOR_PROGRAM, "--listen", "tcp://127.0.0.1:*", "--data", "ball=/missing.nrrd"}), 2);
+  EXPECT_EQ(run({SLABSTREAM_WORKER_PROGRAM, "--coordinator", "elsewhere"}), 2);
+  EXPECT_EQ(run({SLABSTREAM_WORKER_PROGRAM, "--coordinator", "tcp://127.0.0.1:1", "--threads", "2"}), 2);
+  EXPECT_EQ(run({SLABSTREAM_WORKER_PROGRAM}), 2);
+  EXPECT_EQ(run({SLABSTREAM_COORDINATOR_PROGRAM, "--log-level", "loud"}), 2);
+}
+
+}  // namespace
+}  // namespace slabstream

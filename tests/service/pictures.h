@@ -1,0 +1,97 @@
+// What the service tests compare: the picture of a direct rendering of the whole volume as one box, and the difference of two pictures.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/client.h"
+#include "common/image/resolve.h"
+#include "common/planning/frame_plan.h"
+#include "common/volume/sphere.h"
+#include "common/volume/summary.h"
+#include "worker/render/pipeline.h"
+
+namespace slabstream {
+
+inline std::shared_ptr<const Volume> TestSphere(int size) {
+  return std::make_shared<const Volume>(MakeSphere({.sphere_class = SphereClass::kFilled, .size = size, .occupancy = 0.3}).value());
+}
+
+inline FrameRequest TestRequest(RendererKind renderer, double azimuth_degrees, int groups = 2) {
+  FrameRequest request;
+  request.dataset = "ball";
+  request.renderer = renderer;
+  request.size = {96, 80};
+  request.view.azimuth_degrees = azimuth_degrees;
+  request.view.elevation_degrees = 20;
+  request.transfer.choice = TransferFunction{.colors = {{0, {0.2F, 0.4F, 1}}, {255, {1, 0.7F, 0.3F}}},
+                                             .opacities = {{0, 0, 0.5, 0}, {100, 0, 0.5, 0}, {255, 0.2, 0.5, 0}},
+                                             .opacity_distance = 1};
+  request.policy.groups = groups;
+  return request;
+}
+
+// The whole volume as one box, without planner's groups, combining or transport.
+inline LocalImage RenderDirectly(const FrameRequest& request, const Volume& volume) {
+  const Result<FramePlan> plan = PlanFrame(request, 1, Summarize(volume), Roster{{1}}, CostModel{});
+  CHECK(plan.ok()) << plan.status().message();
+  VoxelBlock copy = MakeVoxelBlock(volume.block.box, volume.block.type);
+  copy.bytes = volume.block.bytes;
+  SlabData slab(std::move(copy));
+  const std::atomic<bool> cancelled = false;
+  RankReport report;
+  Result<LocalImage> image = MakeRenderer(request.renderer)->Render(slab, volume.block.box, plan->setup, cancelled, report);
+  CHECK(image.ok()) << image.status().message();
+  return Resolve(std::move(*image), plan->setup.camera.supersample);
+}
+
+struct PixelValue {
+  float rgba[4] = {0, 0, 0, 0};
+  float depth = INFINITY;
+};
+
+inline PixelValue PixelAt(const LocalImage& image, int x, int y) {
+  PixelValue value;
+  if (x < image.bounds.x_begin || x >= image.bounds.x_end || y < image.bounds.y_begin || y >= image.bounds.y_end) return value;
+  const auto index = std::size_t(y - image.bounds.y_begin) * std::size_t(image.bounds.width()) + std::size_t(x - image.bounds.x_begin);
+  std::copy_n(image.rgba.data() + 4 * index, 4, value.rgba);
+  if (image.format == PixelFormat::kDepth) value.depth = image.depth[index];
+  return value;
+}
+
+// Largest difference of a channel (or of depths) over all pixels of the frame; infinite where one has a depth and the other none.
+inline float LargestDifference(const LocalImage& a, const LocalImage& b, ImageSize size) {
+  float largest = 0;
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      const PixelValue p = PixelAt(a, x, y), q = PixelAt(b, x, y);
+      for (int c = 0; c < 4; ++c) largest = std::max(largest, std::abs(p.rgba[c] - q.rgba[c]));
+      if (p.depth != q.depth) largest = std::max(largest, std::abs(p.depth - q.depth));
+    }
+  }
+  return largest;
+}
+
+// The bound of design: Z-buffer pictures are identical, splatting differs by rounding and by what termination hides.
+inline float AllowedDifference(const FrameRequest& request) {
+  return request.renderer == RendererKind::kZBuffer ? 0.0F : 2e-5F + float(request.termination);
+}
+
+inline double HighestAlpha(const LocalImage& image) {
+  float highest = 0;
+  for (std::size_t i = 3; i < image.rgba.size(); i += 4) highest = std::max(highest, image.rgba[i]);
+  return highest;
+}
+
+inline std::uint64_t VoxelBytes(const FrameStatistics& statistics) {
+  std::uint64_t sum = 0;
+  for (const RankReport& report : statistics.reports) sum += report.voxel_bytes;
+  return sum;
+}
+
+}  // namespace slabstream

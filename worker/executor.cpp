@@ -1,0 +1,246 @@
+#include "worker/executor.h"
+
+#include <algorithm>
+#include <exception>
+#include <new>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "common/base/check.h"
+#include "common/base/log.h"
+#include "common/image/resolve.h"
+#include "common/wire/payload.h"
+
+namespace slabstream {
+namespace {
+
+std::int64_t NowNs() { return MonotonicNow().time_since_epoch().count(); }
+
+// Runs `work`, which returns a Status, and turns what it throws into one: a task thread must not end.
+template <class Work>
+Status Guarded(const char* what, Work&& work) {
+  try {
+    return work();
+  } catch (const std::bad_alloc&) {
+    return Status::ResourceExhausted(std::string(what) + ": not enough memory");
+  } catch (const std::length_error&) {  // of a vector beyond every memory
+    return Status::ResourceExhausted(std::string(what) + ": not enough memory");
+  } catch (const std::exception& error) {
+    return Status::Internal(std::string(what) + ": " + error.what());
+  }
+}
+
+// Adds a stretch of time to the report of a message; one of the machine's reports if there is any.
+void AddStage(std::vector<RankReport>& reports, Stage stage, std::int64_t begin_ns, std::int64_t end_ns) {
+  if (reports.empty()) return;
+  RankReport& report = reports.back();
+  report.stage_ns[std::size_t(stage)] += end_ns - begin_ns;
+  if (report.spans.size() < kMaxSpans) report.spans.push_back({stage, begin_ns, end_ns});
+}
+
+bool Covers(PixelRange pixels, const PixelBounds& bounds, std::int32_t frame_width) {
+  if (pixels == PixelRange{} || bounds.empty()) return true;
+  const auto index = [&](std::int32_t x, std::int32_t y) { return std::uint64_t(y) * std::uint64_t(frame_width) + std::uint64_t(x); };
+  return pixels.begin <= index(bounds.x_begin, bounds.y_begin) && index(bounds.x_end - 1, bounds.y_end - 1) < pixels.end;
+}
+
+// StartCombine with another image of this worker. `fresh`: `image` is none yet.
+void CombineImages(LocalImage& image, bool fresh, const std::shared_ptr<LocalImage>& other, const StartCombine& action) {
+  if (!Covers(action.pixels, other->bounds, action.frame_width)) {
+    const RunImage part = EncodeRuns(*other, action.pixels, action.frame_width);
+    if (fresh) {
+      image = DecodeRuns(part.header, part.payload);
+    } else {
+      CombineRuns(image, part.header, part.payload, action.side);
+    }
+  } else if (!fresh) {
+    Combine(image, *other, action.side);
+  } else if (other.use_count() == 1) {
+    image = std::move(*other);  // released already, and this task is the last that holds it: nobody misses it
+  } else {
+    image = *other;
+  }
+}
+
+}  // namespace
+
+// Voxels while they arrive (combining thread), then what renders from them (render thread, from the first StartRender on).
+struct Executor::Slab {
+  explicit Slab(const SlabKey& slab_key) : key(slab_key) {}
+
+  Status Store(const Chunk& chunk, const Bytes& payload) {
+    if (chunk.box != key.box || chunk.dataset != key.dataset) return Status::DataLoss("chunk of another slab");
+    if (data != nullptr) return Status::Ok();  // a duplicate after the slab was complete
+    const std::uint64_t total = std::uint64_t(key.box.voxel_count()) * BytesPerSample(key.type);
+    const std::uint64_t begin = std::uint64_t{chunk.chunk} * kChunkBytes;
+    if (begin >= total || chunk.raw_bytes != std::min<std::uint64_t>(kChunkBytes, total - begin)) {
+      return Status::DataLoss("chunk " + std::to_string(chunk.chunk) + " of " + std::to_string(chunk.raw_bytes) +
+                              " bytes does not fit a slab of " + std::to_string(total));
+    }
+    if (voxels.bytes.empty()) voxels = MakeVoxelBlock(key.box, key.type);
+    return UnpackChunk(chunk, payload.span(), {voxels.bytes.data() + begin, chunk.raw_bytes});
+  }
+
+  const SlabKey key;
+  VoxelBlock voxels;
+  std::unique_ptr<SlabData> data;
+};
+
+Executor::Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec) : outbox_(outbox), frame_codec_(frame_codec) {}
+
+Executor::~Executor() {
+  if (last_render_) *last_render_->cancelled = true;
+}
+
+void Executor::Perform(const OpenSlab& action) { slabs_.insert_or_assign(action.slab, std::make_shared<Slab>(action.slab)); }
+
+void Executor::Perform(const DropSlab& action) { slabs_.erase(action.slab); }
+
+void Executor::Perform(StoreChunk&& action) {
+  const auto found = slabs_.find(action.slab);
+  if (found == slabs_.end()) {
+    outbox_.Post(WorkerEvent(ChunkStored{action.slab, action.chunk.chunk, Status::NotFound("chunk of a slab that was dropped")}));
+    return;
+  }
+  combine_thread_.Post([this, slab = found->second, store = std::move(action)] {
+    Status status = Guarded("slab", [&] { return slab->Store(store.chunk, store.payload); });
+    outbox_.Post(WorkerEvent(ChunkStored{store.slab, store.chunk.chunk, std::move(status)}));
+  });
+}
+
+void Executor::Perform(StartRender&& action) {
+  const auto found = slabs_.find(action.slab);
+  CHECK(found != slabs_.end()) << "the machine renders from slabs that it holds";
+  auto image = images_.insert_or_assign(action.image, std::make_shared<LocalImage>()).first->second;
+  auto cancelled = std::make_shared<std::atomic<bool>>(false);
+  last_render_ = {action.key, cancelled};
+  render_thread_.Post([this, slab = found->second, image = std::move(image), cancelled = std::move(cancelled), render = std::move(action)] {
+    outbox_.Post(WorkerEvent(Render(render, *slab, *cancelled, *image)));
+  });
+}
+
+RenderDone Executor::Render(const StartRender& action, Slab& slab, const std::atomic<bool>& cancelled, LocalImage& image) {
+  RenderDone done;
+  done.key = action.key;
+  done.rank = action.rank;
+  done.image = action.image;
+  RankReport& report = done.report;
+  const std::int64_t begin = NowNs();
+  done.status = Guarded("render", [&] {
+    if (slab.data == nullptr) slab.data = std::make_unique<SlabData>(std::move(slab.voxels));
+    std::unique_ptr<Renderer>& renderer = renderers_[action.setup->renderer];
+    if (renderer == nullptr) renderer = MakeRenderer(action.setup->renderer);
+    Result<LocalImage> rendered = renderer->Render(*slab.data, action.placement.box, *action.setup, cancelled, report);
+    if (!rendered.ok()) return rendered.status();
+    image = std::move(*rendered);
+    return Status::Ok();
+  });
+  if (report.stage_ns[std::size_t(Stage::kRender)] == 0) {
+    const std::int64_t end = NowNs();
+    report.stage_ns[std::size_t(Stage::kRender)] = end - begin;
+    report.spans.insert(report.spans.begin(), {Stage::kRender, begin, end});
+    if (report.spans.size() > kMaxSpans) report.spans.resize(kMaxSpans);
+  }
+  done.slab_bytes = slab.data == nullptr ? 0 : slab.data->bytes();
+  return done;
+}
+
+void Executor::Perform(const CancelRender& action) {
+  if (last_render_ && last_render_->key == action.key) *last_render_->cancelled = true;
+}
+
+std::shared_ptr<LocalImage> Executor::FindImage(ImageHandle image) {
+  const auto found = images_.find(image);
+  return found == images_.end() ? nullptr : found->second;
+}
+
+void Executor::Perform(StartCombine&& action, const PixelBounds& frame) {
+  std::shared_ptr<LocalImage> image = FindImage(action.image);
+  const bool fresh = image == nullptr;
+  if (fresh) image = images_.emplace(action.image, std::make_shared<LocalImage>()).first->second;
+  std::shared_ptr<LocalImage> other = FindImage(action.other);
+  CHECK(action.other == 0 || other != nullptr) << "image " << action.other << " to combine does not exist";
+
+  combine_thread_.Post([this, fresh, frame, image = std::move(image), other = std::move(other), combine = std::move(action)]() mutable {
+    CombineDone done;
+    done.key = combine.key;
+    done.image = combine.image;
+    done.span = {Stage::kCombine, NowNs(), 0};
+    done.status = Guarded("combine", [&] {
+      if (other != nullptr) {
+        CombineImages(*image, fresh, other, combine);
+        return Status::Ok();
+      }
+      if (Status status = ValidateRuns(combine.header, combine.payload.span(), frame); !status.ok()) return status;
+      if (fresh) {
+        *image = DecodeRuns(combine.header, combine.payload.span());
+      } else if (image->format != combine.header.format) {
+        return Status::InvalidArgument("PartialImage.image.format is not that of the frame");
+      } else {
+        CombineRuns(*image, combine.header, combine.payload.span(), combine.side);
+      }
+      return Status::Ok();
+    });
+    done.span.end_ns = NowNs();
+    outbox_.Post(WorkerEvent(std::move(done)));
+  });
+}
+
+void Executor::Perform(SendPartial&& action) {
+  std::shared_ptr<LocalImage> image = FindImage(action.image);
+  CHECK(image != nullptr) << "image " << action.image << " to send does not exist";
+  combine_thread_.Post([this, image = std::move(image), send = std::move(action)]() mutable {
+    const Status status = Guarded("encode", [&] {
+      const std::int64_t begin = NowNs();
+      RunImage runs = EncodeRuns(*image, send.message.pixels, send.frame_width);
+      send.message.image = runs.header;
+      AddStage(send.message.reports, Stage::kEncode, begin, NowNs());
+      if (!send.message.reports.empty()) send.message.reports.back().image_bytes += runs.payload.size();
+      outbox_.Post(OutgoingPartial{std::move(send.to), Encode(send.message), Bytes(std::move(runs.payload))});
+      return Status::Ok();
+    });
+    if (!status.ok()) LogError("partial image not sent: " + status.message());  // the coordinator hands the frame out again when it stalls
+  });
+}
+
+void Executor::Perform(SendFrame&& action) {
+  std::shared_ptr<LocalImage> image = FindImage(action.image);
+  CHECK(image != nullptr) << "image " << action.image << " to send does not exist";
+  combine_thread_.Post([this, image = std::move(image), send = std::move(action)]() mutable {
+    const Status status = Guarded("encode", [&] {
+      std::vector<RankReport>& reports = send.message.reports;
+      if (reports.empty()) {
+        RankReport& report = reports.emplace_back();
+        report.worker = send.message.worker;
+        report.group = std::max(send.message.groups_done, 1U) - 1;
+      }
+      const std::int64_t begin = NowNs();
+      std::int64_t resolved_ns = begin;
+      RunImage runs;
+      const auto encode = [&](const LocalImage& picture) {
+        resolved_ns = NowNs();
+        const PixelBounds& b = picture.bounds;
+        // Any frame width does that holds the bounds: the range is all pixels.
+        const std::int32_t width = std::max(b.x_end, 1);
+        runs = EncodeRuns(picture, {0, std::uint64_t(std::max(b.y_end, 0)) * std::uint64_t(width)}, width);
+      };
+      if (send.supersample == 1) {
+        encode(*image);
+      } else {
+        encode(Resolve(*image, send.supersample));
+        AddStage(reports, Stage::kResolve, begin, resolved_ns);
+      }
+      send.message.runs.image = runs.header;
+      const Bytes payload = PackRuns(Bytes(std::move(runs.payload)), frame_codec_, send.message.runs);
+      AddStage(reports, Stage::kEncode, resolved_ns, NowNs());
+      outbox_.Post(OutgoingFrame{Encode(send.message), payload});
+      return Status::Ok();
+    });
+    if (!status.ok()) LogError("frame not sent: " + status.message());
+  });
+}
+
+void Executor::Perform(const ReleaseImage& action) { images_.erase(action.image); }
+
+}  // namespace slabstream

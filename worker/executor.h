@@ -1,0 +1,76 @@
+// Executor: carries out what a WorkerMachine orders that takes time: renders on one thread, combines, encodes and unpacks chunks on
+// another.
+//
+//   1. The thread that owns the machine calls Perform for each action of the kinds below, in order.
+//   2. What comes of it is posted to the outbox: an event for the machine, or a message that is ready to be sent.
+// Tables of slabs and images belong to the calling thread; tasks share the entries that they need, so nothing is freed under a running task
+// and no lock is held while pixels are touched. An entry's contents are touched by one task at a time: the machine orders the next use of a
+// slab or image only after the event that ends the last one, but for the combining thread's own tasks, which run in order.
+#pragma once
+
+#include <atomic>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "common/base/task_thread.h"
+#include "common/image/local_image.h"
+#include "common/transport/mailbox.h"
+#include "worker/render/pipeline.h"
+#include "worker/worker_machine.h"
+
+namespace slabstream {
+
+// A message of the combining thread, encoded.
+struct OutgoingPartial {
+  Peer to;
+  std::vector<std::byte> header;
+  Bytes payload;
+};
+struct OutgoingFrame {
+  std::vector<std::byte> header;
+  Bytes payload;
+};  // to the coordinator
+using ExecutorOutput = std::variant<WorkerEvent, OutgoingPartial, OutgoingFrame>;
+
+class Executor {
+ public:
+  // `frame_codec` packs finished frames. The outbox must outlive the executor.
+  Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec);
+  ~Executor();  // cancels the running render, drops what has not begun, joins
+
+  void Perform(const OpenSlab& action);
+  void Perform(StoreChunk&& action);
+  void Perform(const DropSlab& action);
+  void Perform(StartRender&& action);
+  void Perform(const CancelRender& action);
+  // `frame`: all pixels of the group's frame, for the check of the runs.
+  void Perform(StartCombine&& action, const PixelBounds& frame);
+  void Perform(SendPartial&& action);
+  void Perform(SendFrame&& action);
+  void Perform(const ReleaseImage& action);
+
+ private:
+  struct Slab;
+  struct RunningRender {
+    GroupKey key;
+    std::shared_ptr<std::atomic<bool>> cancelled;
+  };
+
+  std::shared_ptr<LocalImage> FindImage(ImageHandle image);  // null: no such image
+  RenderDone Render(const StartRender& action, Slab& slab, const std::atomic<bool>& cancelled, LocalImage& image);
+
+  Mailbox<ExecutorOutput>& outbox_;
+  const Codec frame_codec_;
+  std::map<SlabKey, std::shared_ptr<Slab>> slabs_;
+  std::map<ImageHandle, std::shared_ptr<LocalImage>> images_;
+  std::optional<RunningRender> last_render_;
+  std::map<RendererKind, std::unique_ptr<Renderer>> renderers_;  // the render thread's
+  TaskThread combine_thread_;
+  TaskThread render_thread_;
+};
+
+}  // namespace slabstream

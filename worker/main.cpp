@@ -1,0 +1,57 @@
+// slabstream-worker: one worker process. It waits for its coordinator as long as it takes and ends on Stop, SIGINT or SIGTERM.
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <string>
+
+#include "common/base/log.h"
+#include "common/base/stop_signals.h"
+#include "common/transport/socket.h"
+#include "worker/service.h"
+
+namespace {
+
+constexpr std::uint64_t kMaxCacheMib = std::uint64_t{1} << 24;  // 16 TiB
+
+int Fail(int exit_status, const std::string& message) {
+  std::fprintf(stderr, "slabstream-worker: %s\n", message.c_str());
+  return exit_status;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  slabstream::WorkerOptions options;
+  std::uint32_t threads = 1;
+  std::uint64_t cache_mib = 0;
+  std::string log_level = "warning";
+
+  CLI::App app("Slabstream worker: renders slabs and combines images for a coordinator.");
+  app.add_option("--coordinator", options.coordinator_endpoint, "the coordinator's endpoint for workers, such as tcp://127.0.0.1:7421")
+      ->required();
+  app.add_option("--listen", options.images_endpoint, "where other workers send partial images (default: any port beside the coordinator)");
+  app.add_option("--threads", threads, "render threads (this version: 1)");
+  app.add_option("--cache-mib", cache_mib, "MiB of voxels kept between frames (default: no limit)")
+      ->check(CLI::Range(std::uint64_t{1}, kMaxCacheMib));
+  app.add_option("--log-level", log_level, "debug, info, warning, error or off")->check(CLI::IsMember(slabstream::LogLevelNames()));
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    return Fail(2, error.what());
+  }
+  if (threads != 1) {
+    return Fail(2, "--threads " + std::to_string(threads) + " is not 1: this version renders with one thread a worker; start more workers");
+  }
+  if (cache_mib != 0) options.machine.cache_bytes = cache_mib << 20;
+  slabstream::InitLog("worker " + std::to_string(::getpid()), slabstream::LogLevelNames().at(log_level));
+
+  slabstream::BlockStopSignals();
+  slabstream::Context context;
+  auto service = slabstream::WorkerService::Start(context, std::move(options));
+  if (!service.ok()) return Fail(service.status().code() == slabstream::StatusCode::kInvalidArgument ? 2 : 1, service.status().message());
+  slabstream::WaitUntilStopped(**service);
+  return 0;
+}

@@ -1,0 +1,230 @@
+#include "worker/service.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <map>
+#include <optional>
+#include <random>
+#include <thread>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "common/base/log.h"
+#include "common/transport/endpoint.h"
+#include "common/transport/mailbox.h"
+#include "worker/executor.h"
+#include "worker/peer_sockets.h"
+
+namespace slabstream {
+namespace {
+
+constexpr Duration kLongestWait = std::chrono::seconds(1);  // between looks at what is idle
+constexpr Duration kStopGrace = std::chrono::seconds(5);    // for the machine to leave in order
+constexpr int kReceiveBatch = 64;                           // messages of one socket before the others have their turn
+
+Incarnation RandomIncarnation() {
+  std::random_device device;
+  const Incarnation incarnation = (Incarnation{device()} << 32) | device();
+  return incarnation == 0 ? 1 : incarnation;
+}
+
+// Where this worker takes partial images if nobody says: on the coordinator's host and by its scheme.
+std::string ImagesEndpointFor(Endpoint coordinator, Incarnation incarnation) {
+  coordinator.port = 0;
+  coordinator.path += ".images-" + std::to_string(incarnation);
+  return coordinator.ToString();
+}
+
+std::string HostName() {
+  std::array<char, 256> name{};
+  if (::gethostname(name.data(), name.size() - 1) != 0 || name[0] == '\0') return "localhost";
+  return name.data();
+}
+
+}  // namespace
+
+struct WorkerService::Impl {
+  Impl(Context& service_context, WorkerConfig config, Codec frame_codec, Socket control_socket, Socket images_socket)
+      : context(service_context),
+        machine(std::move(config)),
+        control(std::move(control_socket)),
+        images(std::move(images_socket)),
+        peers(service_context),
+        executor(std::in_place, outbox, frame_codec) {}
+
+  void Run();
+  void Receive(Socket& socket, const char* plane);
+  void HandleEvent(const WorkerEvent& event);
+  void HandleOutput(ExecutorOutput& output);
+  void Remember(const AnyMessage& message);
+
+  // One for each kind of action.
+  void Perform(SendControl& action) { Send(control, action.message); }
+  void Perform(SendChunkRequest& action);
+  void Perform(ConnectSlabs& action);
+  void Perform(StartCombine& action);
+  void Perform(StopProcess&) { stop_now = true; }
+  template <class Action>
+  void Perform(Action& action) {
+    executor->Perform(std::move(action));
+  }
+  void Send(Socket& socket, const AnyMessage& message);
+
+  Context& context;
+  WorkerMachine machine;
+  Socket control, images;
+  std::optional<Socket> slabs;  // once the coordinator said where
+  std::string slabs_endpoint;
+  PeerSockets peers;
+  Epoch epoch = 0;
+  std::map<FrameId, PixelBounds> frames;  // pixels of the frames at hand, to check partial images against
+  std::atomic<bool> stop_requested = false;
+  std::atomic<bool> stopped = false;
+  bool stop_now = false;           // the machine said so
+  Mailbox<ExecutorOutput> outbox;  // its wakeup also tells of stop_requested
+  std::optional<Executor> executor;
+  std::jthread thread;  // owns the sockets and the machine; last member: ends first
+};
+
+void WorkerService::Impl::Run() {
+  Time stop_deadline = Time::max();
+  HandleEvent(Tick{});
+  while (!stop_now && MonotonicNow() < stop_deadline) {
+    std::vector<Socket*> sockets = {&control, &images};
+    if (slabs) sockets.push_back(&*slabs);
+    Wait(sockets, &outbox.wakeup(), std::clamp(machine.NextWake() - MonotonicNow(), Duration::zero(), kLongestWait));
+    for (ExecutorOutput& output : outbox.TakeAll()) HandleOutput(output);
+    Receive(control, "control");
+    Receive(images, "images");
+    if (slabs) Receive(*slabs, "slabs");
+    const Time now = MonotonicNow();
+    if (machine.NextWake() <= now) HandleEvent(Tick{});
+    if (stop_requested && stop_deadline == Time::max()) {
+      stop_deadline = now + kStopGrace;
+      HandleEvent(StopRequested{});
+    }
+    peers.CloseIdle(now);
+  }
+  executor.reset();
+  stopped = true;
+  stopped.notify_all();
+}
+
+void WorkerService::Impl::Receive(Socket& socket, const char* plane) {
+  for (int i = 0; i < kReceiveBatch; ++i) {
+    std::optional<Incoming> incoming = socket.TryReceive();
+    if (!incoming) return;
+    Result<AnyMessage> message = Decode(incoming->parts[0].span());
+    Bytes payload = incoming->parts.size() > 1 ? std::move(incoming->parts[1]) : Bytes();
+    if (!message.ok() || payload.size() != ExpectedPayloadBytes(*message)) {
+      LogWarning(std::string(plane) + " plane: dropped a message: " +
+                 (message.ok() ? std::string(NameOf(*message)) + " with a payload of " + std::to_string(payload.size()) + " bytes"
+                               : message.status().message()));
+      continue;
+    }
+    Remember(*message);
+    HandleEvent(MessageReceived{std::move(*message), std::move(payload)});
+  }
+}
+
+// Frame ids begin anew with each epoch.
+void WorkerService::Impl::Remember(const AnyMessage& message) {
+  if (const auto* welcome = std::get_if<Welcome>(&message)) {
+    if (std::exchange(epoch, welcome->epoch) != welcome->epoch) frames.clear();
+  } else if (const auto* assignment = std::get_if<GroupAssignment>(&message); assignment != nullptr && assignment->epoch == epoch) {
+    frames.erase(frames.begin(), frames.lower_bound(assignment->finished_before));
+    frames[assignment->key.frame] = {0, 0, assignment->setup.camera.width, assignment->setup.camera.height};
+  }
+}
+
+void WorkerService::Impl::HandleEvent(const WorkerEvent& event) {
+  for (WorkerAction& action : machine.Step(event, MonotonicNow())) {
+    std::visit([this](auto& each) { Perform(each); }, action);
+  }
+}
+
+void WorkerService::Impl::HandleOutput(ExecutorOutput& output) {
+  if (const auto* event = std::get_if<WorkerEvent>(&output)) {
+    HandleEvent(*event);
+  } else if (auto* frame = std::get_if<OutgoingFrame>(&output)) {
+    if (const Status sent = control.Send({}, std::move(frame->header), frame->payload); !sent.ok()) {
+      LogWarning("frame not sent: " + sent.message());
+    }
+  } else {
+    auto& partial = std::get<OutgoingPartial>(output);
+    const Status sent = peers.Send(partial.to.images_endpoint, std::move(partial.header), partial.payload, MonotonicNow());
+    if (sent.ok()) return;
+    LogWarning("worker " + std::to_string(partial.to.worker) + " is not reached: " + sent.message());
+    HandleEvent(PeerUnreachable{partial.to.worker});
+  }
+}
+
+// The coordinator asks again for what was lost here: registration, heartbeats and requests repeat.
+void WorkerService::Impl::Send(Socket& socket, const AnyMessage& message) {
+  if (const Status sent = socket.Send({}, Encode(message)); !sent.ok())
+    LogDebug(std::string(NameOf(message)) + " not sent: " + sent.message());
+}
+
+void WorkerService::Impl::Perform(SendChunkRequest& action) {
+  if (slabs) Send(*slabs, action.request);
+}
+
+void WorkerService::Impl::Perform(ConnectSlabs& action) {
+  if (slabs && action.endpoint == slabs_endpoint) return;  // the socket reconnects by itself
+  slabs.reset();
+  Result<Socket> socket = Socket::Dealer(context);
+  const Status connected = socket.ok() ? socket->Connect(action.endpoint) : socket.status();
+  if (!connected.ok()) {
+    LogError("slabs plane: " + connected.message());  // chunk requests time out and are reported
+    return;
+  }
+  slabs = std::move(*socket);
+  slabs_endpoint = action.endpoint;
+}
+
+void WorkerService::Impl::Perform(StartCombine& action) {
+  const auto frame = frames.find(action.key.frame);
+  executor->Perform(std::move(action), frame == frames.end() ? PixelBounds{} : frame->second);
+}
+
+Result<std::unique_ptr<WorkerService>> WorkerService::Start(Context& context, WorkerOptions options) {
+  const Result<Endpoint> coordinator = ParseEndpoint(options.coordinator_endpoint, false);
+  if (!coordinator.ok()) return coordinator.status();
+  WorkerConfig& config = options.machine;
+  config.incarnation = RandomIncarnation();
+  if (options.images_endpoint.empty()) options.images_endpoint = ImagesEndpointFor(*coordinator, config.incarnation);
+  if (const Result<Endpoint> parsed = ParseEndpoint(options.images_endpoint, true); !parsed.ok()) return parsed.status();
+
+  Result<Socket> images = Socket::Router(context);
+  if (!images.ok()) return images.status();
+  Result<std::string> images_endpoint = images->Bind(options.images_endpoint);
+  if (!images_endpoint.ok()) return images_endpoint.status();
+  Result<Socket> control = Socket::Dealer(context);
+  if (!control.ok()) return control.status();
+  if (Status connected = control->Connect(options.coordinator_endpoint); !connected.ok()) return connected;
+
+  config.pid = static_cast<std::uint32_t>(::getpid());
+  config.host = HostName();
+  config.images_endpoint = std::move(*images_endpoint);
+  const Codec frame_codec = coordinator->scheme == Scheme::kInproc ? Codec::kRaw : Codec::kZstd;
+  auto impl = std::make_unique<Impl>(context, std::move(config), frame_codec, std::move(*control), std::move(*images));
+  impl->thread = std::jthread([raw = impl.get()] { raw->Run(); });
+  return std::unique_ptr<WorkerService>(new WorkerService(std::move(impl)));
+}
+
+WorkerService::WorkerService(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+WorkerService::~WorkerService() { RequestStop(); }
+
+void WorkerService::RequestStop() {
+  impl_->stop_requested = true;
+  impl_->outbox.wakeup().Notify();
+}
+
+void WorkerService::WaitUntilStopped() { impl_->stopped.wait(false); }
+bool WorkerService::stopped() const { return impl_->stopped; }
+
+}  // namespace slabstream
