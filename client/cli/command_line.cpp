@@ -1,0 +1,172 @@
+#include "client/cli/command_line.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <functional>
+#include <iostream>
+#include <string>
+#include <thread>
+
+#include "client/cli/commands.h"
+#include "client/cli/files.h"
+#include "client/cli/option_groups.h"
+#include "common/base/log.h"
+#include "common/transport/endpoint.h"
+
+namespace slabstream {
+namespace {
+
+constexpr int kExitInterrupted = 130;  // 128 + SIGINT, as shells count
+
+// Every option's value, in one place that outlives the parse.
+struct AllOptions {
+  RenderOptions render;
+  TurntableOptions turntable;
+  InfoOptions info;
+  SphereOptions sphere;
+  UpOptions up;
+  DownOptions down;
+  StatusOptions status;
+};
+
+using Command = std::function<Status()>;
+
+void DeclareRender(CLI::App& app, RenderOptions& options, Command& command) {
+  CLI::App* sub = app.add_subcommand("render", "Render one picture of a volume");
+  AddFrameOptions(*sub, options.frame);
+  sub->add_option("-o,--output", options.output, "The picture: .png or .exr")->required()->type_name("FILE");
+  sub->callback([&] { command = [&] { return RunRender(options); }; });
+}
+
+void DeclareTurntable(CLI::App& app, TurntableOptions& options, Command& command) {
+  CLI::App* sub = app.add_subcommand("turntable", "Render a full turn about the volume's z axis, frame after frame");
+  AddFrameOptions(*sub, options.frame);
+  AddParsed(
+      *sub, "-o,--output", options.output,
+      [](const std::string& option, const std::string& text) { return FramePattern::Parse(option, text); },
+      "The pictures: a name with a place for the number, such as 'frame_%04d.png'")
+      ->required()
+      ->type_name("PATTERN");
+  AddInteger(*sub, "--frames", options.frames, 1, kMaxTurntableFrames, "How many")->required();
+  AddInteger(*sub, "--in-flight", options.in_flight, 1, kMaxInFlight, "Frames that are asked for at the same time");
+  sub->callback([&] { command = [&] { return RunTurntable(options); }; });
+}
+
+void DeclareInfo(CLI::App& app, InfoOptions& options, Command& command) {
+  CLI::App* sub = app.add_subcommand("info", "Tell what a volume file holds");
+  sub->add_option("SOURCE", options.path, "A volume file")->required();
+  AddTransferOptions(*sub, options.transfer);
+  sub->add_flag("--json", options.json, "As JSON");
+  sub->callback([&] { command = [&] { return RunInfo(options); }; });
+}
+
+void DeclareSphere(CLI::App& app, SphereOptions& options, Command& command) {
+  CLI::App* sub = app.add_subcommand("sphere", "Make one of the two test volumes of Yagel and Machiraju");
+  AddParsed(
+      *sub, "--class", options.request.sphere_class,
+      [](const std::string& option, const std::string& text) -> Result<SphereClass> {
+        const Result<int> number = ParseInteger(option, text, 1, 2);
+        if (!number.ok()) return number.status();
+        return SphereClass(*number);
+      },
+      "1: hollow, 2: filled")
+      ->required()
+      ->type_name("1|2");
+  AddInteger(*sub, "--size", options.request.size, 2, 4096, "Voxels a side")->required();
+  AddNumber(*sub, "--occupancy", options.request.occupancy, {0, 1, true}, "Share of voxels that are not empty");
+  sub->add_option("-o,--output", options.output, "The volume: .nrrd, .mhd or .mha")->required()->type_name("FILE");
+  sub->callback([&] { command = [&] { return RunSphere(options); }; });
+}
+
+void DeclareUp(CLI::App& app, UpOptions& options, Command& command) {
+  CLI::App* sub = app.add_subcommand("up", "Start a coordinator and workers on this machine");
+  options.workers = std::clamp(int(std::thread::hardware_concurrency()), 1, kMaxUpWorkers);
+  options.listen = "tcp://127.0.0.1:7420";
+  AddInteger(*sub, "--workers", options.workers, 1, kMaxUpWorkers, "Worker processes (default: one a core)");
+  AddInteger(*sub, "--threads", options.threads, 1, 1024, "Render threads of each worker");
+  sub->add_option("--data", options.data, "Volumes to serve: NAME=PATH, or a directory whose files are named after themselves")
+      ->type_name("NAME=PATH|DIR")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  AddParsed(
+      *sub, "--listen", options.listen,
+      [](const std::string& option, const std::string& text) -> Result<std::string> {
+        const Result<Endpoint> endpoint = ParseEndpoint(text, true);
+        if (!endpoint.ok()) return Status::InvalidArgument(option + " " + endpoint.status().message());
+        return text;
+      },
+      "Where clients reach the service; tcp://127.0.0.1:* takes any free port")
+      ->type_name("ENDPOINT")
+      ->default_str(options.listen);
+  sub->add_flag("--detach", options.detach, "Return when the service is ready; `slabstream down` ends it");
+  sub->callback([&] { command = [&] { return RunUp(options); }; });
+}
+
+void DeclareDown(CLI::App& app, DownOptions& options, Command& command) {
+  CLI::App* sub = app.add_subcommand("down", "End a service that `up` started");
+  AddEndpoint(*sub, options.endpoint);
+  sub->callback([&] { command = [&] { return RunDown(options); }; });
+}
+
+void DeclareStatus(CLI::App& app, StatusOptions& options, Command& command) {
+  CLI::App* sub = app.add_subcommand("status", "Tell what a service does: workers, datasets, frames");
+  AddEndpoint(*sub, options.endpoint);
+  sub->add_flag("--json", options.json, "As JSON");
+  sub->callback([&] { command = [&] { return RunStatus(options); }; });
+}
+
+int ExitStatus(const Status& status) {
+  switch (status.code()) {
+    case StatusCode::kOk: return 0;
+    case StatusCode::kInvalidArgument:
+    case StatusCode::kNotFound: return 2;
+    case StatusCode::kCancelled: return kExitInterrupted;
+    default: return 1;
+  }
+}
+
+std::string SubcommandNames(const CLI::App& app) {
+  std::string names;
+  for (const CLI::App* sub : app.get_subcommands(nullptr)) names += (names.empty() ? "" : ", ") + sub->get_name();
+  return names;
+}
+
+int Complain(const std::string& who, std::string message, int exit_status) {
+  std::replace(message.begin(), message.end(), '\n', ' ');
+  std::cerr << who << ": " << message << std::endl;
+  return exit_status;
+}
+
+}  // namespace
+
+int RunCommandLine(int argc, const char* const* argv) {
+  CLI::App app("Slabstream renders volumes on CPUs, by any number of worker processes.", "slabstream");
+  AllOptions options;
+  Command command;
+  DeclareRender(app, options.render, command);
+  DeclareTurntable(app, options.turntable, command);
+  DeclareInfo(app, options.info, command);
+  DeclareSphere(app, options.sphere, command);
+  DeclareUp(app, options.up, command);
+  DeclareDown(app, options.down, command);
+  DeclareStatus(app, options.status, command);
+
+  const auto name = [&app] {
+    const auto used = app.get_subcommands();
+    return used.empty() ? std::string("slabstream") : "slabstream " + used.front()->get_name();
+  };
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    return Complain(name(), error.what(), 2);
+  }
+  if (!command) return Complain("slabstream", "a subcommand is needed: " + SubcommandNames(app), 2);
+
+  InitLog(name(), LogLevel::kWarning);
+  const Status status = command();
+  return status.ok() ? 0 : Complain(name(), status.message(), ExitStatus(status));
+}
+
+}  // namespace slabstream

@@ -1,0 +1,19 @@
+// The figures of one frame that people compare, out of its reports. Pure.
+#pragma once
+
+#include "common/stats/report.h"
+#include "common/wire/client_messages.h"
+
+namespace slabstream {
+
+struct FrameSummary {
+  StageTimes stage_ns{};          // worker time, summed over ranks
+  std::uint64_t voxel_bytes = 0;  // that travelled to workers
+  std::uint64_t image_bytes = 0;  // that travelled between workers
+  double imbalance = 1;           // most / mean render time of a worker, over all workers of the plan; at least 1
+  double idle_share = 0;          // of the workers' time from plan to last byte, when none of a worker's threads had work; in [0, 1]
+};
+
+FrameSummary Summarize(const FrameStatistics& statistics);
+
+}  // namespace slabstream

@@ -1,0 +1,75 @@
+// What each subcommand was asked to do: plain values, filled by command_line.cpp, valid when a command sees them.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "client/cli/values.h"
+#include "client/image_io/image_writer.h"
+#include "common/planning/frame_request.h"
+#include "common/volume/sphere.h"
+
+namespace slabstream {
+
+// Where the frames are rendered.
+struct ConnectionOptions {
+  int local_workers = 0;  // 0: at the service; else in this process, by this many workers
+  std::string endpoint;   // empty: see DefaultEndpoint (service_state.h)
+};
+
+// What `render` and `turntable` share.
+struct FrameOptions {
+  ConnectionOptions connection;
+  std::string source;    // a name of the catalogue; a path with local_workers > 0
+  FrameRequest request;  // `dataset` is filled in when the connection is open
+  PictureFormat format;
+  std::string stats_path, trace_path;  // empty: not wanted
+  bool progress = false;
+};
+
+struct RenderOptions {
+  FrameOptions frame;
+  std::string output;
+};
+
+inline constexpr int kMaxTurntableFrames = 100000;
+inline constexpr int kMaxInFlight = 64;
+
+struct TurntableOptions {
+  FrameOptions frame;
+  FramePattern output;
+  int frames = 36;    // [1, kMaxTurntableFrames], evenly over a full turn that begins at the request's azimuth
+  int in_flight = 2;  // [1, kMaxInFlight] frames asked for and not yet complete
+};
+
+struct InfoOptions {
+  std::string path;
+  TransferChoice transfer;
+  bool json = false;
+};
+
+struct SphereOptions {
+  SphereRequest request;
+  std::string output;
+};
+
+inline constexpr int kMaxUpWorkers = 256;
+
+struct UpOptions {
+  int workers = 1;                // processes, [1, kMaxUpWorkers]
+  int threads = 1;                // of each worker
+  std::vector<std::string> data;  // NAME=PATH or DIR, as slabstream-coordinator takes them
+  std::string listen;             // endpoint for clients; a wildcard port is fine
+  bool detach = false;
+};
+
+struct DownOptions {
+  std::string endpoint;  // empty: as in ConnectionOptions
+};
+
+struct StatusOptions {
+  std::string endpoint;
+  bool json = false;
+};
+
+}  // namespace slabstream

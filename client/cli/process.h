@@ -1,0 +1,59 @@
+// Child processes, for `up`: start one, learn that it ended.
+#pragma once
+
+#include <sys/types.h>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/status.h"
+#include "common/base/time.h"
+
+namespace slabstream {
+
+// Path of a program that lies beside this one. NotFound if it does not.
+Result<std::string> ProgramBeside(const std::string& name);
+
+struct ChildOptions {
+  std::vector<std::string> command;  // program path and arguments
+  std::string log_path;              // stderr is appended to it
+  bool outlives_us = false;          // else the kernel sends it SIGTERM when this process ends, however that happens
+};
+
+struct ChildEnd {
+  int exit_status = -1;     // -1: a signal ended it
+  std::string description;  // "exited with status 1", "was killed by signal 9"
+};
+
+// A child process in a session of its own, so that Ctrl-C at the terminal reaches only us, with stdin from /dev/null and no signal blocked.
+// Not for processes with threads. Move-only; the destructor leaves the process alone.
+class Child {
+ public:
+  static Result<Child> Start(const ChildOptions& options);
+  Child(Child&& other) noexcept;
+  Child& operator=(Child&&) = delete;
+  ~Child();
+
+  pid_t pid() const { return pid_; }
+
+  // The first line of its stdout. Unavailable if it ends before that; DeadlineExceeded.
+  Result<std::string> ReadLine(Duration timeout);
+
+  // How it ended, if it has; reaps it. The same answer from then on.
+  std::optional<ChildEnd> Ended();
+
+  // Sends SIGTERM, then after `patience` SIGKILL, and reaps it.
+  void Terminate(Duration patience);
+
+ private:
+  Child(pid_t pid, int output) : pid_(pid), output_(output) {}
+  pid_t pid_;
+  int output_;  // reading end of its stdout
+  std::optional<ChildEnd> ended_;
+};
+
+// The last line of a log; empty if there is none.
+std::string LastLogLine(const std::string& log_path);
+
+}  // namespace slabstream

@@ -1,0 +1,17 @@
+// The files beside the pictures (--stats, --trace), for `render` and `turntable`.
+#pragma once
+
+#include <vector>
+
+#include "client/cli/frame_loop.h"
+
+namespace slabstream {
+
+// Before work begins: whether the directories are there.
+Status CheckReportPaths(const FrameOptions& options);
+inline bool WantsReports(const FrameOptions& options) { return !options.stats_path.empty() || !options.trace_path.empty(); }
+
+// Afterwards. Writes what was asked for.
+Status WriteReports(const FrameOptions& options, const std::vector<FrameRecord>& frames);
+
+}  // namespace slabstream

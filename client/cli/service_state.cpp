@@ -1,0 +1,119 @@
+#include "client/cli/service_state.h"
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+#include "client/cli/files.h"
+#include "common/transport/endpoint.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::size_t kMaxStateBytes = std::size_t{1} << 20;
+
+std::string FileFor(const std::string& directory, const std::string& endpoint) {
+  std::string name = endpoint;
+  std::replace_if(
+      name.begin(), name.end(), [](unsigned char c) { return !std::isalnum(c) && c != '.' && c != '-'; }, '_');
+  return directory + "/" + name + ".json";
+}
+
+// nullopt: damaged.
+std::optional<ServiceState> Load(const std::string& path) {
+  const Result<std::string> text = ReadTextFile(path, kMaxStateBytes);
+  if (!text.ok()) return std::nullopt;
+  const nlohmann::json json = nlohmann::json::parse(*text, nullptr, false);
+  try {
+    return ServiceState{json.at("endpoint"), json.at("started_unix"), json.at("coordinator"), json.at("workers"), json.at("log_directory")};
+  } catch (const nlohmann::json::exception&) {
+    return std::nullopt;
+  }
+}
+
+}  // namespace
+
+Result<std::string> StateDirectory() {
+  const char* runtime = std::getenv("XDG_RUNTIME_DIR");
+  const std::string path =
+      runtime != nullptr && runtime[0] == '/' ? fmt::format("{}/slabstream", runtime) : fmt::format("/tmp/slabstream-{}", ::getuid());
+  if (::mkdir(path.c_str(), 0700) != 0 && errno != EEXIST) {
+    return Status::Unavailable(fmt::format("cannot make the directory '{}': {}", path, std::strerror(errno)));
+  }
+  struct stat info {};
+  // lstat: a link that somebody else left in /tmp is not ours, wherever it points.
+  if (::lstat(path.c_str(), &info) != 0 || !S_ISDIR(info.st_mode) || info.st_uid != ::getuid() || (info.st_mode & 077) != 0) {
+    return Status::Unavailable(fmt::format("'{}' must be a directory of this user alone (mode 0700)", path));
+  }
+  return path;
+}
+
+Status SaveState(const ServiceState& state) {
+  const Result<std::string> directory = StateDirectory();
+  if (!directory.ok()) return directory.status();
+  const nlohmann::json json = {{"endpoint", state.endpoint},
+                               {"started_unix", state.started_unix},
+                               {"coordinator", state.coordinator},
+                               {"workers", state.workers},
+                               {"log_directory", state.log_directory}};
+  return WriteTextFile(FileFor(*directory, state.endpoint), json.dump(2) + "\n");
+}
+
+void RemoveState(const ServiceState& state) {
+  const Result<std::string> directory = StateDirectory();
+  if (!directory.ok()) return;
+  std::error_code ignored;
+  std::filesystem::remove(FileFor(*directory, state.endpoint), ignored);
+  if (std::filesystem::path(state.log_directory).parent_path() == *directory) std::filesystem::remove_all(state.log_directory, ignored);
+}
+
+std::optional<ServiceState> FindState(const std::string& endpoint) {
+  const Result<std::string> directory = StateDirectory();
+  if (!directory.ok()) return std::nullopt;
+  std::optional<ServiceState> newest;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(*directory, error)) {
+    if (entry.path().extension() != ".json") continue;
+    const std::optional<ServiceState> state = Load(entry.path());
+    if (!state || !IsRunning(state->coordinator, kCoordinatorProgram)) {
+      if (state) RemoveState(*state);
+      std::filesystem::remove(entry.path(), error);
+      continue;
+    }
+    if (!endpoint.empty() && state->endpoint != endpoint) continue;
+    if (!newest || state->started_unix > newest->started_unix) newest = state;
+  }
+  return newest;
+}
+
+Result<std::string> DefaultEndpoint() {
+  if (const char* text = std::getenv("SLABSTREAM_ENDPOINT"); text != nullptr && text[0] != '\0') {
+    const Result<Endpoint> endpoint = ParseEndpoint(text, false);
+    if (!endpoint.ok()) return Status::InvalidArgument("$SLABSTREAM_ENDPOINT " + endpoint.status().message());
+    return std::string(text);
+  }
+  const std::optional<ServiceState> state = FindState("");
+  return state ? state->endpoint : std::string(kDefaultEndpoint);
+}
+
+bool IsRunning(pid_t pid, const std::string& program) {
+  if (pid <= 0) return false;
+  std::ifstream file(fmt::format("/proc/{}/stat", pid));  // "PID (NAME) STATE ...", and the name may hold anything
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const std::size_t open = text.find('('), close = text.rfind(')');
+  if (open == std::string::npos || close == std::string::npos || close + 2 >= text.size()) return false;
+  const char state = text[close + 2];
+  return text.substr(open + 1, close - open - 1) == program.substr(0, 15) && state != 'Z' && state != 'X';
+}
+
+}  // namespace slabstream

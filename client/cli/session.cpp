@@ -1,0 +1,66 @@
+#include "client/cli/session.h"
+
+#include <fmt/format.h>
+
+#include "client/cli/input_volume.h"
+#include "client/cli/service_state.h"
+#include "client/embedded/embedded_service.h"
+
+namespace slabstream {
+namespace {
+
+constexpr const char* kLocalDataset = "volume";
+
+Result<std::shared_ptr<const Volume>> Load(const std::string& path) {
+  Result<LoadedVolume> loaded = ReadInputVolume(path);
+  if (!loaded.ok()) return loaded.status();
+  return std::move(loaded->volume);
+}
+
+}  // namespace
+
+Session::Session() = default;
+Session::Session(Session&&) noexcept = default;
+Session::~Session() = default;
+
+Result<Session> Session::Open(const ConnectionOptions& connection, const std::string& source) {
+  if (connection.local_workers == 0) {
+    if (source.size() > kMaxNameBytes) {
+      return Status::InvalidArgument(fmt::format("SOURCE has {} bytes, a dataset's name has at most {}", source.size(), kMaxNameBytes));
+    }
+    Result<Session> session = OpenService(connection.endpoint);
+    if (session.ok()) session->dataset_ = source;
+    return session;
+  }
+  if (Status status = CheckVolumePath(source); !status.ok()) return status;
+  Session session;
+  session.context_ = std::make_unique<Context>();
+  EmbeddedOptions options;
+  options.workers = connection.local_workers;
+  options.coordinator.catalogue[kLocalDataset] = [source] { return Load(source); };
+  Result<std::unique_ptr<EmbeddedService>> service = EmbeddedService::Start(*session.context_, std::move(options));
+  if (!service.ok()) return service.status();
+  session.service_ = *std::move(service);
+  Result<Client> client = Client::Connect(*session.context_, session.service_->endpoint());
+  if (!client.ok()) return client.status();
+  session.client_ = std::make_unique<Client>(*std::move(client));
+  session.dataset_ = kLocalDataset;
+  return session;
+}
+
+Result<Session> Session::OpenService(const std::string& endpoint) {
+  Result<std::string> where = endpoint.empty() ? DefaultEndpoint() : Result<std::string>(endpoint);
+  if (!where.ok()) return where.status();
+  Session session;
+  session.context_ = std::make_unique<Context>();
+  Result<Client> client = Client::Connect(*session.context_, *where);
+  if (!client.ok()) {
+    const std::string hint =
+        client.status().code() == StatusCode::kUnavailable ? " (`slabstream up` starts a service, --local needs none)" : "";
+    return Status(client.status().code(), client.status().message() + hint);
+  }
+  session.client_ = std::make_unique<Client>(*std::move(client));
+  return session;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,38 @@
+// Session: a client connected to a service, or to an embedded one of its own (`--local`).
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "client/cli/options.h"
+#include "client/client.h"
+#include "common/base/status.h"
+
+namespace slabstream {
+
+class EmbeddedService;
+
+class Session {
+ public:
+  // At the service `source` is a name of its catalogue; with local workers it is a volume file, which is checked to exist here and read
+  // when the first frame asks for it. Unavailable within 5 s if nobody answers.
+  static Result<Session> Open(const ConnectionOptions& connection, const std::string& source);
+  // The service alone, for `status`. `endpoint` as in ConnectionOptions.
+  static Result<Session> OpenService(const std::string& endpoint);
+  Session(Session&&) noexcept;
+  Session& operator=(Session&&) = delete;
+  ~Session();
+
+  Client& client() { return *client_; }
+  const std::string& dataset() const { return dataset_; }  // what to ask the client for
+
+ private:
+  Session();
+  // Destroyed last to first: the client leaves, the service ends, the context closes.
+  std::unique_ptr<Context> context_;
+  std::unique_ptr<EmbeddedService> service_;
+  std::unique_ptr<Client> client_;
+  std::string dataset_;
+};
+
+}  // namespace slabstream

@@ -1,0 +1,55 @@
+#include "client/cli/stats_json.h"
+
+#include <nlohmann/json.hpp>
+
+#include "client/cli/frame_summary.h"
+
+namespace slabstream {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+double Milliseconds(std::int64_t ns) { return double(ns) / 1e6; }
+
+Json FrameJson(const FrameRecord& frame, const FrameSummary& summary) {
+  Json stages = Json::object();
+  for (int stage = 0; stage < kStageCount; ++stage) {
+    stages[std::string(ToString(Stage(stage)))] = Milliseconds(summary.stage_ns[std::size_t(stage)]);
+  }
+  return {{"output", frame.output},
+          {"latency_ms", Milliseconds(frame.latency.count())},
+          {"queued_ms", Milliseconds(frame.statistics.queued_ns)},
+          {"attempts", frame.statistics.attempts},
+          {"workers", frame.statistics.workers},
+          {"bytes", {{"voxels", summary.voxel_bytes}, {"images", summary.image_bytes}}},
+          {"stages_ms", stages},
+          {"imbalance", summary.imbalance},
+          {"idle_share", summary.idle_share}};
+}
+
+}  // namespace
+
+std::string StatsJson(const FrameOptions& options, const std::vector<FrameRecord>& frames) {
+  Json json = {{"source", options.source},
+               {"renderer", options.request.renderer == RendererKind::kSplat ? "splat" : "zbuffer"},
+               {"size", {options.request.size.width, options.request.size.height}}};
+  std::uint64_t voxel_bytes = 0, image_bytes = 0;
+  Json list = Json::array();
+  for (const FrameRecord& frame : frames) {
+    const FrameSummary summary = Summarize(frame.statistics);
+    voxel_bytes += summary.voxel_bytes;
+    image_bytes += summary.image_bytes;
+    list.push_back(FrameJson(frame, summary));
+  }
+  const FrameStatistics last = frames.empty() ? FrameStatistics() : frames.back().statistics;
+  json["plan"] = {{"workers", last.workers},
+                  {"groups", last.groups},
+                  {"decomposition", last.decomposition},
+                  {"axis", last.axis},
+                  {"combine", last.combine}};
+  json["bytes"] = {{"voxels", voxel_bytes}, {"images", image_bytes}};
+  json["frames"] = std::move(list);
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace slabstream

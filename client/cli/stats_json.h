@@ -1,0 +1,19 @@
+// --stats: what the frames were made of and what they cost.
+//
+//   { "source", "renderer", "size": [w, h],
+//     "plan": {"workers", "groups", "decomposition", "axis", "combine"},    of the last frame: a lost worker changes it
+//     "bytes": {"voxels", "images"},                                        of all frames
+//     "frames": [{"output", "latency_ms", "queued_ms", "attempts", "workers", "bytes": {...}, "stages_ms": {stage: worker time},
+//                 "imbalance", "idle_share"}] }
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "client/cli/frame_loop.h"
+
+namespace slabstream {
+
+std::string StatsJson(const FrameOptions& options, const std::vector<FrameRecord>& frames);
+
+}  // namespace slabstream

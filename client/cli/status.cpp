@@ -1,0 +1,93 @@
+#include <fmt/format.h>
+
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <string_view>
+
+#include "client/cli/commands.h"
+#include "client/cli/session.h"
+
+namespace slabstream {
+namespace {
+
+std::string_view NameOf(DatasetState state) {
+  switch (state) {
+    case DatasetState::kUnloaded: return "unloaded";
+    case DatasetState::kLoading: return "loading";
+    case DatasetState::kReady: return "ready";
+    case DatasetState::kFailed: break;
+  }
+  return "failed";
+}
+
+std::string StatusText(const StatusReply& reply) {
+  std::string text = fmt::format("coordinator  pid {}, up {:.1f} s, {} clients\n", reply.pid, double(reply.uptime_ms) / 1e3, reply.clients);
+  text += fmt::format("frames       {} done, {} failed, {} running, {} queued\n", reply.frames_done, reply.frames_failed, reply.running,
+                      reply.queued);
+  text += fmt::format("workers      {} ({} lost so far)\n", reply.workers.size(), reply.workers_lost);
+  for (const WorkerStatus& worker : reply.workers) {
+    text += fmt::format("  {:<4} pid {} on {}, {} threads, slot {}, {:.1f} MiB cached, {:.1f} MiB fetched, {} ranks rendered\n",
+                        worker.worker, worker.pid, worker.host, worker.threads, worker.slot, double(worker.cached_bytes) / (1 << 20),
+                        double(worker.fetched_bytes) / (1 << 20), worker.rendered_ranks);
+  }
+  text += fmt::format("datasets     {}\n", reply.datasets.size());
+  for (const DatasetStatus& dataset : reply.datasets) {
+    text += fmt::format("  {} {}", dataset.name, NameOf(dataset.state));
+    const Index3& size = dataset.description.geometry.size;
+    if (dataset.state == DatasetState::kReady) text += fmt::format(" {} x {} x {}", size.x, size.y, size.z);
+    if (dataset.state == DatasetState::kFailed) text += fmt::format(": {}", dataset.error);
+    text += '\n';
+  }
+  return text;
+}
+
+std::string StatusJson(const StatusReply& reply) {
+  using Json = nlohmann::ordered_json;
+  Json workers = Json::array(), datasets = Json::array();
+  for (const WorkerStatus& worker : reply.workers) {
+    workers.push_back({{"worker", worker.worker},
+                       {"pid", worker.pid},
+                       {"host", worker.host},
+                       {"threads", worker.threads},
+                       {"slot", worker.slot},
+                       {"cached_bytes", worker.cached_bytes},
+                       {"fetched_bytes", worker.fetched_bytes},
+                       {"rendered_ranks", worker.rendered_ranks},
+                       {"silent_ms", worker.silent_ms}});
+  }
+  for (const DatasetStatus& dataset : reply.datasets) {
+    Json entry = {{"name", dataset.name}, {"state", NameOf(dataset.state)}};
+    if (dataset.state == DatasetState::kReady) {
+      const VolumeGeometry& geometry = dataset.description.geometry;
+      entry["size"] = {geometry.size.x, geometry.size.y, geometry.size.z};
+      entry["spacing"] = {geometry.spacing.x, geometry.spacing.y, geometry.spacing.z};
+      entry["range"] = {{"min", dataset.range.min}, {"max", dataset.range.max}};
+    }
+    if (dataset.state == DatasetState::kFailed) entry["error"] = dataset.error;
+    datasets.push_back(std::move(entry));
+  }
+  const Json json = {{"pid", reply.pid},
+                     {"uptime_ms", reply.uptime_ms},
+                     {"clients", reply.clients},
+                     {"queued", reply.queued},
+                     {"running", reply.running},
+                     {"frames_done", reply.frames_done},
+                     {"frames_failed", reply.frames_failed},
+                     {"workers_lost", reply.workers_lost},
+                     {"workers", std::move(workers)},
+                     {"datasets", std::move(datasets)}};
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace
+
+Status RunStatus(const StatusOptions& options) {
+  Result<Session> session = Session::OpenService(options.endpoint);
+  if (!session.ok()) return session.status();
+  const Result<StatusReply> reply = session->client().QueryStatus();
+  if (!reply.ok()) return reply.status();
+  std::cout << (options.json ? StatusJson(*reply) : StatusText(*reply));
+  return Status::Ok();
+}
+
+}  // namespace slabstream

@@ -1,0 +1,82 @@
+#include "client/cli/trace_json.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <utility>
+
+namespace slabstream {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// Tracks of a worker: its two threads, and its waiting for voxels, which goes on beside both.
+enum Track { kRenderTrack = 1, kCombineTrack = 2, kFetchTrack = 3 };
+constexpr std::pair<Track, const char*> kTracks[] = {{kRenderTrack, "render"}, {kCombineTrack, "combine"}, {kFetchTrack, "fetch"}};
+
+Track TrackOf(Stage stage) {
+  switch (stage) {
+    case Stage::kFetch: return kFetchTrack;
+    case Stage::kCombine:
+    case Stage::kEncode:
+    case Stage::kResolve: return kCombineTrack;
+    default: return kRenderTrack;
+  }
+}
+
+Json Name(const char* what, std::uint32_t process, std::uint32_t thread, const std::string& name) {
+  return {{"name", what}, {"ph", "M"}, {"pid", process}, {"tid", thread}, {"args", {{"name", name}}}};
+}
+
+Json Complete(const std::string& name, std::uint32_t process, std::uint32_t thread, std::int64_t begin_ns, std::int64_t end_ns, Json args) {
+  return {{"name", name},
+          {"ph", "X"},
+          {"pid", process},
+          {"tid", thread},
+          {"ts", double(begin_ns) / 1e3},
+          {"dur", double(end_ns - begin_ns) / 1e3},
+          {"args", std::move(args)}};
+}
+
+}  // namespace
+
+std::string TraceJson(const std::vector<FrameRecord>& frames) {
+  std::int64_t origin = 0;
+  for (const FrameRecord& frame : frames) {
+    origin = origin == 0 ? frame.statistics.begin_ns : std::min(origin, frame.statistics.begin_ns);
+  }
+
+  Json events = Json::array();
+  std::set<std::uint32_t> workers;
+  std::vector<std::int64_t> lanes;  // by track of process 0: when its last frame ended; frames in flight overlap
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const FrameStatistics& frame = frames[i].statistics;
+    std::size_t lane = 0;
+    while (lane < lanes.size() && lanes[lane] > frame.begin_ns) ++lane;
+    if (lane == lanes.size()) lanes.push_back(0);
+    lanes[lane] = frame.end_ns;
+    events.push_back(Complete("frame " + std::to_string(i), 0, std::uint32_t(lane + 1), frame.begin_ns - origin, frame.end_ns - origin,
+                              {{"output", frames[i].output}, {"groups", frame.groups}, {"workers", frame.workers}}));
+    for (const RankReport& report : frame.reports) {
+      workers.insert(report.worker);
+      for (const Span& span : report.spans) {
+        events.push_back(Complete(std::string(ToString(span.stage)), report.worker, TrackOf(span.stage), span.begin_ns - origin,
+                                  span.end_ns - origin,
+                                  {{"frame", i}, {"group", report.group}, {"rank", report.rank}, {"box", report.box}}));
+      }
+    }
+  }
+
+  events.push_back(Name("process_name", 0, 0, "frames"));
+  for (std::size_t lane = 0; lane < lanes.size(); ++lane) {
+    events.push_back(Name("thread_name", 0, std::uint32_t(lane + 1), "in flight " + std::to_string(lane + 1)));
+  }
+  for (const std::uint32_t worker : workers) {
+    events.push_back(Name("process_name", worker, 0, "worker " + std::to_string(worker)));
+    for (const auto& [track, name] : kTracks) events.push_back(Name("thread_name", worker, track, name));
+  }
+  const Json json = {{"displayTimeUnit", "ms"}, {"traceEvents", std::move(events)}};
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace slabstream

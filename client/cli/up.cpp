@@ -1,0 +1,227 @@
+// `up`: one coordinator and N workers as processes of this machine. In the foreground they end with us; with --detach they stay.
+#include <fmt/format.h>
+
+#include <unistd.h>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <ctime>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+
+#include "client/cli/commands.h"
+#include "client/cli/process.h"
+#include "client/cli/service_state.h"
+#include "client/cli/session.h"
+#include "common/transport/endpoint.h"
+
+namespace slabstream {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr Duration kStartTimeout = seconds(30);  // until the coordinator listens, and again until all workers are registered
+constexpr Duration kPatience = seconds(5);       // for an orderly end, then again before SIGKILL
+
+// While it lives SIGINT and SIGTERM wait until they are asked for, in every thread that is started meanwhile too.
+class BlockedSignals {
+ public:
+  BlockedSignals() {
+    sigemptyset(&signals_);
+    sigaddset(&signals_, SIGINT);
+    sigaddset(&signals_, SIGTERM);
+    ::sigprocmask(SIG_BLOCK, &signals_, &before_);
+  }
+  ~BlockedSignals() { ::sigprocmask(SIG_SETMASK, &before_, nullptr); }
+  BlockedSignals(const BlockedSignals&) = delete;
+  BlockedSignals& operator=(const BlockedSignals&) = delete;
+
+  bool Wait(milliseconds timeout) const {
+    const timespec time{timeout.count() / 1000, timeout.count() % 1000 * 1000000};
+    return ::sigtimedwait(&signals_, nullptr, &time) > 0;
+  }
+
+ private:
+  sigset_t signals_, before_;
+};
+
+// The value of "key=value" in the coordinator's ready line; empty if it is not there.
+std::string ValueIn(const std::string& line, const std::string& key) {
+  const std::size_t at = line.find(" " + key + "=");
+  if (at == std::string::npos) return "";
+  const std::size_t begin = at + key.size() + 2;
+  return line.substr(begin, line.find(' ', begin) - begin);
+}
+
+class LocalService {
+ public:
+  LocalService(const UpOptions& options, std::string log_directory) : options_(options) {
+    state_.log_directory = std::move(log_directory);
+    state_.started_unix = std::time(nullptr);
+  }
+
+  // Until every worker is registered. Cancelled: a signal came.
+  Status Start(const BlockedSignals& signals) {
+    if (Status status = StartCoordinator(); !status.ok()) return status;
+    if (Status status = StartWorkers(); !status.ok()) return status;
+    Result<Session> session = Session::OpenService(state_.endpoint);
+    if (!session.ok()) return session.status();
+    for (const Time deadline = MonotonicNow() + kStartTimeout;;) {
+      const Result<StatusReply> reply = session->client().QueryStatus();
+      if (!reply.ok()) return reply.status();
+      if (int(reply->workers.size()) >= options_.workers) return SaveState(state_);
+      for (std::size_t i = 0; i < children_.size(); ++i) {
+        if (const auto end = children_[i].Ended()) return StartFailure(i, *end);
+      }
+      if (signals.Wait(milliseconds(50))) return Status::Cancelled("interrupted");
+      if (MonotonicNow() > deadline) {
+        return Status::DeadlineExceeded(fmt::format("{} of {} workers registered within {} s; logs are in {}", reply->workers.size(),
+                                                    options_.workers, seconds(30).count(), state_.log_directory));
+      }
+    }
+  }
+
+  // Until a signal comes (Ok) or the coordinator ends. Tells on stderr which workers end meanwhile.
+  Status Watch(const BlockedSignals& signals) {
+    std::vector<bool> told(children_.size());
+    while (!signals.Wait(milliseconds(200))) {
+      if (const auto end = children_.front().Ended()) {
+        if (end->exit_status == 0) return Status::Ok();  // `slabstream down`, from another terminal
+        return Status::Unavailable(fmt::format("the coordinator {}; its last words: {}", end->description, LastLogLine(LogOf(0))));
+      }
+      for (std::size_t i = 1; i < children_.size(); ++i) {
+        const auto end = children_[i].Ended();
+        if (!end || told[i]) continue;
+        told[i] = true;
+        if (end->exit_status != 0) std::cerr << fmt::format("worker {} (pid {}) {}", i, children_[i].pid(), end->description) << std::endl;
+      }
+    }
+    return Status::Ok();
+  }
+
+  // Asks the coordinator to end everything, helps where that is not enough, and forgets the service.
+  void Stop() {
+    if (!children_.empty() && !children_.front().Ended() && !state_.endpoint.empty()) {
+      if (Result<Session> session = Session::OpenService(state_.endpoint); session.ok() && session->client().ShutDownService().ok()) {
+        for (const Time deadline = MonotonicNow() + kPatience; !AllEnded() && MonotonicNow() < deadline;) {
+          ::usleep(20000);
+        }
+      }
+    }
+    for (std::size_t i = children_.size(); i-- > 0;) children_[i].Terminate(kPatience);  // workers first
+    RemoveState(state_);
+  }
+
+  const ServiceState& state() const { return state_; }
+
+ private:
+  std::string LogOf(std::size_t child) const {
+    return fmt::format("{}/{}.log", state_.log_directory, child == 0 ? std::string("coordinator") : fmt::format("worker-{}", child));
+  }
+
+  // What a child that ended too early says about itself.
+  Status StartFailure(std::size_t child, const ChildEnd& end) const {
+    const std::string program = child == 0 ? kCoordinatorProgram : kWorkerProgram;
+    std::string line = LastLogLine(LogOf(child));
+    if (line.rfind(program + ": ", 0) == 0) line.erase(0, program.size() + 2);
+    return Status(end.exit_status == 2 ? StatusCode::kInvalidArgument : StatusCode::kUnavailable,
+                  fmt::format("{} {}: {}", program, end.description, line.empty() ? "it says nothing" : line));
+  }
+
+  Result<Child*> StartChild(const char* program, std::vector<std::string> arguments) {
+    const Result<std::string> path = ProgramBeside(program);
+    if (!path.ok()) return path.status();
+    arguments.insert(arguments.begin(), *path);
+    Result<Child> child = Child::Start({std::move(arguments), LogOf(children_.size()), options_.detach});
+    if (!child.ok()) return child.status();
+    children_.push_back(*std::move(child));
+    return &children_.back();
+  }
+
+  Status StartCoordinator() {
+    std::vector<std::string> arguments = {"--listen", options_.listen};
+    for (const std::string& data : options_.data) arguments.insert(arguments.end(), {"--data", data});
+    Result<Child*> child = StartChild(kCoordinatorProgram, std::move(arguments));
+    if (!child.ok()) return child.status();
+    state_.coordinator = (*child)->pid();
+    const Result<std::string> line = (*child)->ReadLine(kStartTimeout);
+    if (!line.ok()) {
+      (*child)->Terminate(kPatience);  // it closed its output: ended, or about to
+      return StartFailure(0, *(*child)->Ended());
+    }
+    state_.endpoint = ValueIn(*line, "client");
+    worker_endpoint_ = ValueIn(*line, "workers");
+    if (!state_.endpoint.empty() && !worker_endpoint_.empty()) return Status::Ok();
+    return Status::Internal(fmt::format("{} said '{}' instead of its endpoints", kCoordinatorProgram, *line));
+  }
+
+  Status StartWorkers() {
+    for (int i = 0; i < options_.workers; ++i) {
+      const Result<Child*> child =
+          StartChild(kWorkerProgram, {"--coordinator", worker_endpoint_, "--threads", std::to_string(options_.threads)});
+      if (!child.ok()) return child.status();
+      state_.workers.push_back((*child)->pid());
+    }
+    return Status::Ok();
+  }
+
+  bool AllEnded() {
+    bool all = true;
+    for (Child& child : children_) all = child.Ended().has_value() && all;
+    return all;
+  }
+
+  const UpOptions& options_;
+  ServiceState state_;
+  std::string worker_endpoint_;
+  std::vector<Child> children_;  // the coordinator, then the workers
+};
+
+Status CheckNotRunning(const std::string& listen) {
+  const std::optional<ServiceState> running = FindState(listen);
+  if (!running || running->endpoint != listen) return Status::Ok();
+  return Status::Unavailable(
+      fmt::format("a service runs at {} already (pid {}); `slabstream down` ends it", running->endpoint, running->coordinator));
+}
+
+void PrintReady(const UpOptions& options, const ServiceState& state) {
+  const bool default_endpoint = state.endpoint == kDefaultEndpoint;
+  const std::string endpoint = default_endpoint ? "" : fmt::format(" --endpoint {}", state.endpoint);
+  std::cout << fmt::format("slabstream is up at {} (coordinator pid {}, {} workers); logs are in {}\n", state.endpoint, state.coordinator,
+                           state.workers.size(), state.log_directory);
+  std::cout << fmt::format("  slabstream render NAME -o picture.png{0}\n  slabstream status{0}\n", endpoint);
+  if (options.detach) {
+    std::cout << fmt::format("  slabstream down{}\n", endpoint);
+  } else {
+    std::cout << "Ctrl-C ends it.\n";
+  }
+  std::cout << std::flush;
+}
+
+}  // namespace
+
+Status RunUp(const UpOptions& options) {
+  const Result<std::string> directory = StateDirectory();
+  if (!directory.ok()) return directory.status();
+  if (Status status = CheckNotRunning(options.listen); !status.ok()) return status;
+  const std::string log_directory = fmt::format("{}/service-{}", *directory, ::getpid());
+  std::error_code error;
+  std::filesystem::create_directory(log_directory, error);
+  if (error) return Status::Unavailable(fmt::format("cannot make the directory '{}': {}", log_directory, error.message()));
+
+  const BlockedSignals signals;
+  LocalService service(options, log_directory);
+  if (Status status = service.Start(signals); !status.ok()) {
+    service.Stop();
+    return status;
+  }
+  PrintReady(options, service.state());
+  if (options.detach) return Status::Ok();
+  Status status = service.Watch(signals);
+  service.Stop();
+  return status;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,135 @@
+#include "client/cli/values.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+namespace slabstream {
+namespace {
+
+// The whole text as a number, or nothing. A leading '+' is fine.
+template <class T>
+std::optional<T> Convert(std::string_view text) {
+  if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
+  T value{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || text.empty()) return std::nullopt;
+  return value;
+}
+
+// Shortest text that reads back the same; {} of fmt does that for doubles ("0.001", not "0.0010000000000000000208").
+std::string RangeText(const NumberRange& range) { return fmt::format("{}{}, {}]", range.min_open ? '(' : '[', range.min, range.max); }
+
+std::vector<std::string_view> Split(std::string_view text, char separator) {
+  std::vector<std::string_view> parts;
+  for (std::size_t begin = 0;;) {
+    const std::size_t end = text.find(separator, begin);
+    parts.push_back(text.substr(begin, end - begin));
+    if (end == std::string_view::npos) return parts;
+    begin = end + 1;
+  }
+}
+
+}  // namespace
+
+Result<double> ParseNumber(std::string_view option, std::string_view text, const NumberRange& range) {
+  const std::optional<double> value = Convert<double>(text);
+  if (!value || std::isnan(*value)) return Status::InvalidArgument(fmt::format("{} '{}' is not a number", option, text));
+  if (*value < range.min || *value > range.max || (range.min_open && *value == range.min)) {
+    return Status::InvalidArgument(fmt::format("{} {} is out of range {}", option, text, RangeText(range)));
+  }
+  return *value;
+}
+
+Result<int> ParseInteger(std::string_view option, std::string_view text, int min, int max) {
+  const std::optional<long long> value = Convert<long long>(text);
+  if (!value) return Status::InvalidArgument(fmt::format("{} '{}' is not a whole number in [{}, {}]", option, text, min, max));
+  if (*value < min || *value > max) {
+    return Status::InvalidArgument(fmt::format("{} {} is out of range [{}, {}]", option, text, min, max));
+  }
+  return int(*value);
+}
+
+Result<std::size_t> ParseChoice(std::string_view option, std::string_view text, std::span<const std::string_view> choices) {
+  const auto found = std::find(choices.begin(), choices.end(), text);
+  if (found != choices.end()) return std::size_t(found - choices.begin());
+  return Status::InvalidArgument(fmt::format("{} '{}' is not one of {}", option, text, fmt::join(choices, ", ")));
+}
+
+Result<ImageSize> ParseImageSize(std::string_view option, std::string_view text) {
+  const std::vector<std::string_view> sides = Split(text, 'x');
+  if (sides.size() > 2) return Status::InvalidArgument(fmt::format("{} '{}' is neither WIDTHxHEIGHT nor one number", option, text));
+  const Result<int> width = ParseInteger(option, sides.front(), 1, kMaxImageSide);
+  if (!width.ok()) return width.status();
+  const Result<int> height = ParseInteger(option, sides.back(), 1, kMaxImageSide);
+  if (!height.ok()) return height.status();
+  return ImageSize{*width, *height};
+}
+
+Result<Vec3> ParseDirection(std::string_view option, std::string_view text) {
+  const std::vector<std::string_view> parts = Split(text, ',');
+  if (parts.size() != 3) return Status::InvalidArgument(fmt::format("{} '{}' is not X,Y,Z", option, text));
+  Vec3 direction;
+  for (int i = 0; i < 3; ++i) {
+    const Result<double> value = ParseNumber(option, parts[std::size_t(i)], {-1e9, 1e9});
+    if (!value.ok()) return value.status();
+    direction[i] = *value;
+  }
+  if (direction == Vec3{}) return Status::InvalidArgument(fmt::format("{} {} has no direction", option, text));
+  return direction;
+}
+
+Result<StraightColor> ParseColor(std::string_view option, std::string_view text) {
+  const std::vector<std::string_view> parts = Split(text, ',');
+  if (parts.size() != 3 && parts.size() != 4) {
+    return Status::InvalidArgument(fmt::format("{} '{}' is neither R,G,B nor R,G,B,A", option, text));
+  }
+  float channels[4] = {0, 0, 0, 1};
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const Result<double> value = ParseNumber(option, parts[i], {0, 1});
+    if (!value.ok()) return value.status();
+    channels[i] = float(*value);
+  }
+  return StraightColor{channels[0], channels[1], channels[2], channels[3]};
+}
+
+Result<FramePattern> FramePattern::Parse(std::string_view option, std::string_view text) {
+  const auto refuse = [&](std::string_view why) {
+    return Status::InvalidArgument(fmt::format("{} '{}' {}; it needs one number such as %04d", option, text, why));
+  };
+  FramePattern pattern;
+  int conversions = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    std::string& side = conversions == 0 ? pattern.before_ : pattern.after_;
+    if (text[i] != '%') {
+      side += text[i];
+      continue;
+    }
+    if (++i < text.size() && text[i] == '%') {
+      side += '%';
+      continue;
+    }
+    if (++conversions > 1) return refuse("has more than one conversion");
+    pattern.zero_ = i < text.size() && text[i] == '0';
+    const std::size_t digits = i;
+    while (i < text.size() && text[i] >= '0' && text[i] <= '9') ++i;
+    if (i == text.size() || (text[i] != 'd' && text[i] != 'i' && text[i] != 'u')) return refuse("has a conversion that is not an integer");
+    if (i > digits) {
+      const Result<int> width = ParseInteger(option, text.substr(digits, i - digits), 0, 20);
+      if (!width.ok()) return width.status();
+      pattern.width_ = *width;
+    }
+  }
+  if (conversions == 0) return refuse("has no place for the frame's number");
+  return pattern;
+}
+
+std::string FramePattern::Name(int index) const {
+  return before_ + (zero_ ? fmt::format("{:0{}}", index, width_) : fmt::format("{:{}}", index, width_)) + after_;
+}
+
+}  // namespace slabstream

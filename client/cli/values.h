@@ -1,0 +1,50 @@
+// Texts of the command line to values. Pure. Every failure is InvalidArgument, one line that names the option, the text and what is
+// expected.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "client/image_io/image_writer.h"
+#include "common/base/status.h"
+#include "common/math/vec.h"
+#include "common/view/camera.h"
+
+namespace slabstream {
+
+// A closed range, or open below.
+struct NumberRange {
+  double min = 0, max = 0;
+  bool min_open = false;  // the value must be above min
+};
+
+Result<double> ParseNumber(std::string_view option, std::string_view text, const NumberRange& range);
+Result<int> ParseInteger(std::string_view option, std::string_view text, int min, int max);
+
+// The index of the text in `choices`.
+Result<std::size_t> ParseChoice(std::string_view option, std::string_view text, std::span<const std::string_view> choices);
+
+// "640x480" or "512" (a square), each side in [1, kMaxImageSide].
+Result<ImageSize> ParseImageSize(std::string_view option, std::string_view text);
+
+// "X,Y,Z", finite and not all zero.
+Result<Vec3> ParseDirection(std::string_view option, std::string_view text);
+
+// "R,G,B" (opaque) or "R,G,B,A", each in [0, 1].
+Result<StraightColor> ParseColor(std::string_view option, std::string_view text);
+
+// A file name with exactly one integer conversion, such as "frame_%04d.png"; "%%" stands for a percent sign.
+class FramePattern {
+ public:
+  static Result<FramePattern> Parse(std::string_view option, std::string_view text);
+  std::string Name(int index) const;  // index >= 0
+
+ private:
+  std::string before_, after_;
+  int width_ = 0;  // digits, filled with zeros if zero_ or else with blanks
+  bool zero_ = false;
+};
+
+}  // namespace slabstream

@@ -1,0 +1,146 @@
+#include "client/image_io/image_writer.h"
+
+#include <OpenImageIO/imageio.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cctype>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "common/base/check.h"
+
+namespace slabstream {
+namespace {
+
+enum class FileType { kPng, kExr, kOther };
+
+FileType TypeOf(const std::string& path) {
+  std::string ending = std::filesystem::path(path).extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  return ending == ".png" ? FileType::kPng : ending == ".exr" ? FileType::kExr : FileType::kOther;
+}
+
+// One row of the whole picture, over the background: width * 4 premultiplied floats, and width depths if `depth` is not empty.
+void ComposeRow(const LocalImage& image, int y, const StraightColor& background, std::span<float> rgba, std::span<float> depth) {
+  const float behind[4] = {background.r * background.a, background.g * background.a, background.b * background.a, background.a};
+  for (std::size_t i = 0; i < rgba.size(); ++i) rgba[i] = behind[i % 4];
+  std::fill(depth.begin(), depth.end(), std::numeric_limits<float>::infinity());
+  const PixelBounds& b = image.bounds;
+  if (b.empty() || y < b.y_begin || y >= b.y_end) return;
+  const std::size_t first = std::size_t(y - b.y_begin) * std::size_t(b.width());
+  for (int x = 0; x < b.width(); ++x) {
+    const float* front = &image.rgba[4 * (first + std::size_t(x))];
+    float* out = &rgba[4 * std::size_t(b.x_begin + x)];
+    for (int c = 0; c < 4; ++c) out[c] = front[c] + (1 - front[3]) * behind[c];
+    if (!depth.empty()) depth[std::size_t(b.x_begin + x)] = image.depth[first + std::size_t(x)];
+  }
+}
+
+template <class Code>
+void ToStraightCodes(std::span<const float> premultiplied, std::span<Code> codes) {
+  constexpr float kMax = std::numeric_limits<Code>::max();
+  const auto code = [](float value) { return Code(std::lround(kMax * std::clamp(value, 0.0F, 1.0F))); };
+  for (std::size_t i = 0; i < codes.size(); i += 4) {
+    const float alpha = premultiplied[i + 3];
+    for (std::size_t c = 0; c < 3; ++c) codes[i + c] = alpha > 0 ? code(premultiplied[i + c] / alpha) : Code(0);
+    codes[i + 3] = code(alpha);
+  }
+}
+
+// Calls write(y, row) for each row, with the row in the file's own sample layout; stops at the first that fails.
+template <class Write>
+bool WritePngRows(const LocalImage& image, ImageSize size, const PictureFormat& format, Write write) {
+  std::vector<float> rgba(4 * std::size_t(size.width));
+  std::vector<std::uint8_t> codes8(format.png_bits == 8 ? rgba.size() : 0);
+  std::vector<std::uint16_t> codes16(format.png_bits == 16 ? rgba.size() : 0);
+  for (int y = 0; y < size.height; ++y) {
+    ComposeRow(image, y, format.background, rgba, {});
+    ToStraightCodes<std::uint8_t>(rgba, codes8);
+    ToStraightCodes<std::uint16_t>(rgba, codes16);
+    if (!(format.png_bits == 8 ? write(y, static_cast<const void*>(codes8.data())) : write(y, codes16.data()))) return false;
+  }
+  return true;
+}
+
+template <class Write>
+bool WriteExrRows(const LocalImage& image, ImageSize size, const PictureFormat& format, Write write) {
+  const bool with_depth = image.format == PixelFormat::kDepth;
+  const std::size_t width = std::size_t(size.width);
+  std::vector<float> rgba(4 * width), depth(with_depth ? width : 0), rgbaz(with_depth ? 5 * width : 0);
+  for (int y = 0; y < size.height; ++y) {
+    ComposeRow(image, y, format.background, rgba, depth);
+    for (std::size_t x = 0; x < depth.size(); ++x) {
+      std::copy_n(&rgba[4 * x], 4, &rgbaz[5 * x]);
+      rgbaz[5 * x + 4] = depth[x];
+    }
+    if (!write(y, static_cast<const void*>(with_depth ? rgbaz.data() : rgba.data()))) return false;
+  }
+  return true;
+}
+
+// A name in the same directory that no other writer uses.
+std::string TemporaryNameFor(const std::string& path) {
+  static std::atomic<unsigned> counter{0};
+  return fmt::format("{}.{}-{}.tmp", path, ::getpid(), counter++);
+}
+
+}  // namespace
+
+Status CheckPicturePath(const std::string& path) {
+  if (TypeOf(path) != FileType::kOther) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("output '{}' must end in .png or .exr", path));
+}
+
+Status WritePicture(const LocalImage& image, ImageSize size, const std::string& path, const PictureFormat& format) {
+  if (Status status = CheckPicturePath(path); !status.ok()) return status;
+  CHECK(format.png_bits == 8 || format.png_bits == 16);
+  CHECK((PixelBounds{0, 0, size.width, size.height}.Contains(image.bounds)));
+
+  const bool png = TypeOf(path) == FileType::kPng;
+  const OIIO::TypeDesc sample = !png ? OIIO::TypeDesc::FLOAT : format.png_bits == 16 ? OIIO::TypeDesc::UINT16 : OIIO::TypeDesc::UINT8;
+  const bool with_depth = !png && image.format == PixelFormat::kDepth;
+  OIIO::ImageSpec spec(size.width, size.height, with_depth ? 5 : 4, sample);
+  spec.channelnames = {"R", "G", "B", "A"};
+  if (with_depth) spec.channelnames.push_back("Z");
+  spec.alpha_channel = 3;
+  spec.z_channel = with_depth ? 4 : -1;
+  if (png) {
+    // Samples are handed over in their final form: nothing is divided by alpha or bent by a transfer curve on the way.
+    spec.attribute("oiio:UnassociatedAlpha", 1);
+    spec.attribute("oiio:ColorSpace", "sRGB");
+  } else {
+    spec.attribute("oiio:ColorSpace", "Linear");
+    spec.attribute("compression", "zip");
+  }
+
+  const std::string temporary = TemporaryNameFor(path);
+  const auto failure = [&](const std::string& reason) {
+    std::error_code ignored;
+    std::filesystem::remove(temporary, ignored);
+    std::string line = reason.substr(0, reason.find('\n'));
+    return Status::Unavailable(fmt::format("cannot write '{}': {}", path, line.empty() ? "unknown reason" : line));
+  };
+  const std::unique_ptr<OIIO::ImageOutput> out = OIIO::ImageOutput::create(png ? "png" : "openexr");
+  if (!out) return failure(OIIO::geterror());
+  if (!out->open(temporary, spec)) return failure(out->geterror());
+  const auto write = [&](int y, const void* row) { return out->write_scanline(y, 0, sample, row); };
+  const bool written = png ? WritePngRows(image, size, format, write) : WriteExrRows(image, size, format, write);
+  if (!written) {
+    out->close();
+    return failure(out->geterror());
+  }
+  if (!out->close()) return failure(out->geterror());
+
+  std::error_code error;
+  std::filesystem::rename(temporary, path, error);
+  return error ? failure(error.message()) : Status::Ok();
+}
+
+}  // namespace slabstream

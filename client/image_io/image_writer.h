@@ -1,0 +1,33 @@
+// Pictures to files. The only place that knows OpenImageIO.
+//
+// PNG: straight alpha, 8 or 16 bit, row 0 at the top; code = round(max * clamp(straight value, 0, 1)), without a transfer curve.
+// EXR: premultiplied linear float R, G, B, A, and Z (camera depth, +infinity where nothing is seen) for images that have depth.
+// The file appears whole or not at all: it is written beside its final place and renamed.
+#pragma once
+
+#include <string>
+
+#include "common/base/status.h"
+#include "common/image/local_image.h"
+#include "common/view/camera.h"
+
+namespace slabstream {
+
+struct StraightColor {
+  float r = 0, g = 0, b = 0, a = 0;  // each in [0, 1]
+  friend bool operator==(const StraightColor&, const StraightColor&) = default;
+};
+
+struct PictureFormat {
+  int png_bits = 8;          // 8 or 16; EXR is always float
+  StraightColor background;  // put behind the picture; the default leaves it as it is
+};
+
+// InvalidArgument naming the path and the endings there are, unless `path` ends in .png or .exr (any case).
+Status CheckPicturePath(const std::string& path);
+
+// `image` is premultiplied, its bounds lie within `size`; pixels outside are empty. Both formats are written row by row, so that a picture
+// costs no more memory than it already has. InvalidArgument: the path's ending. Unavailable: cannot be written; the message names the path.
+Status WritePicture(const LocalImage& image, ImageSize size, const std::string& path, const PictureFormat& format);
+
+}  // namespace slabstream

@@ -1,0 +1,13 @@
+#include <exception>
+#include <iostream>
+
+#include "client/cli/command_line.h"
+
+int main(int argc, char** argv) {
+  try {
+    return slabstream::RunCommandLine(argc, argv);
+  } catch (const std::exception& error) {  // out of memory, mostly: everything that is expected comes back as a Status
+    std::cerr << "slabstream: " << error.what() << "\n";
+    return 1;
+  }
+}

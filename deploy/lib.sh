@@ -1,0 +1,36 @@
+# shellcheck shell=bash
+# Shared by the scripts beside it; sourced, not run.
+
+repository="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
+
+say() { printf '== %s\n' "$*"; }
+fail() {
+  printf '%s: %s\n' "$(basename "$0")" "$*" >&2
+  exit 1
+}
+
+# Names of the packages in deploy/packages that are not installed.
+missing_packages() {
+  local wanted installed
+  wanted="$(awk '!/^ *#/ && NF { print $2 }' "$repository/deploy/packages" | sort)"
+  installed="$(dpkg-query -W -f='${Package} ${db:Status-Status}\n' 2>/dev/null | awk '$2 == "installed" { print $1 }' | sort -u)"
+  comm -23 <(printf '%s\n' "$wanted") <(printf '%s\n' "$installed")
+}
+
+install_packages() {
+  local missing as_root=()
+  missing="$(missing_packages)"
+  if [[ -z "$missing" ]]; then
+    say "Debian packages: all installed"
+    return
+  fi
+  command -v apt-get > /dev/null || fail "needs Debian's apt-get to install: ${missing//$'\n'/ }"
+  if [[ "$(id -u)" != 0 ]]; then
+    command -v sudo > /dev/null || fail "needs root or sudo to install: ${missing//$'\n'/ }"
+    as_root=(sudo)
+  fi
+  say "Debian packages: installing ${missing//$'\n'/ }"
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get update -q < /dev/null
+  # shellcheck disable=SC2086  # one word a package
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends $missing < /dev/null
+}

@@ -1,0 +1,84 @@
+#include "client/cli/service_state.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+namespace slabstream {
+namespace {
+
+class ServiceStateTest : public testing::Test {
+ protected:
+  ServiceStateTest() {
+    char name[] = "/tmp/slabstream-state-XXXXXX";
+    directory_ = ::mkdtemp(name);
+    ::setenv("XDG_RUNTIME_DIR", directory_.c_str(), 1);
+    ::unsetenv("SLABSTREAM_ENDPOINT");
+  }
+  ~ServiceStateTest() override {
+    ::unsetenv("XDG_RUNTIME_DIR");
+    ::unsetenv("SLABSTREAM_ENDPOINT");
+    std::filesystem::remove_all(directory_);
+  }
+
+  std::string directory_;
+};
+
+TEST_F(ServiceStateTest, TheDirectoryIsOursAlone) {
+  const Result<std::string> directory = StateDirectory();
+  ASSERT_TRUE(directory.ok()) << directory.status().message();
+  struct stat info {};
+  ASSERT_EQ(::stat(directory->c_str(), &info), 0);
+  EXPECT_EQ(info.st_mode & 0777, 0700U);
+
+  ASSERT_EQ(::chmod(directory->c_str(), 0755), 0);
+  EXPECT_EQ(StateDirectory().status().code(), StatusCode::kUnavailable);
+}
+
+TEST_F(ServiceStateTest, ALinkInItsPlaceIsRefused) {
+  std::filesystem::create_directory(directory_ + "/elsewhere");
+  ::chmod((directory_ + "/elsewhere").c_str(), 0700);
+  std::filesystem::create_symlink(directory_ + "/elsewhere", directory_ + "/slabstream");
+  EXPECT_EQ(StateDirectory().status().code(), StatusCode::kUnavailable);
+}
+
+TEST_F(ServiceStateTest, AServiceWhoseCoordinatorIsGoneIsForgotten) {
+  ServiceState state{"tcp://127.0.0.1:5000", 100, ::getpid(), {1, 2}, ""};  // this process runs, but is no coordinator
+  ASSERT_EQ(SaveState(state), Status::Ok());
+  EXPECT_EQ(FindState(""), std::nullopt);
+  EXPECT_TRUE(std::filesystem::is_empty(*StateDirectory()));
+  EXPECT_EQ(*DefaultEndpoint(), kDefaultEndpoint);
+}
+
+TEST_F(ServiceStateTest, DamagedFilesAreNoServices) {
+  for (const char* text : {"", "{", "[]", "{\"endpoint\": 3}", "null"}) {
+    std::ofstream(*StateDirectory() + "/x.json") << text;
+    EXPECT_EQ(FindState(""), std::nullopt) << text;
+  }
+}
+
+TEST_F(ServiceStateTest, TheEnvironmentNamesTheEndpoint) {
+  ::setenv("SLABSTREAM_ENDPOINT", "tcp://127.0.0.1:5001", 1);
+  EXPECT_EQ(*DefaultEndpoint(), "tcp://127.0.0.1:5001");
+  ::setenv("SLABSTREAM_ENDPOINT", "nonsense", 1);
+  EXPECT_EQ(DefaultEndpoint().status().code(), StatusCode::kInvalidArgument);
+  EXPECT_THAT(DefaultEndpoint().status().message(), testing::HasSubstr("$SLABSTREAM_ENDPOINT"));
+}
+
+TEST_F(ServiceStateTest, RunningMeansAliveAndOfThatName) {
+  std::ifstream comm("/proc/self/comm");
+  std::string name;
+  std::getline(comm, name);
+  EXPECT_TRUE(IsRunning(::getpid(), name));
+  EXPECT_FALSE(IsRunning(::getpid(), kWorkerProgram));
+  EXPECT_FALSE(IsRunning(0, name));
+  EXPECT_FALSE(IsRunning(-1, name));
+}
+
+}  // namespace
+}  // namespace slabstream

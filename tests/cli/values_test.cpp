@@ -1,0 +1,85 @@
+#include "client/cli/values.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace slabstream {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+TEST(Values, NumbersKeepToTheirRange) {
+  const NumberRange zoom{0.001, 10000};
+  EXPECT_EQ(*ParseNumber("--zoom", "2.5e1", zoom), 25);
+  EXPECT_EQ(*ParseNumber("--zoom", "+0.001", zoom), 0.001);
+  EXPECT_EQ(ParseNumber("--zoom", "0", zoom).status().message(), "--zoom 0 is out of range [0.001, 10000]");
+  EXPECT_EQ(ParseNumber("--occupancy", "0", {0, 1, true}).status().message(), "--occupancy 0 is out of range (0, 1]");
+  for (const char* text : {"", "nan", "-nan", "1x", " 1", "1,5", "0x10", "+-1", "--1", "one"}) {
+    EXPECT_EQ(ParseNumber("--zoom", text, zoom).status().code(), StatusCode::kInvalidArgument) << text;
+  }
+  for (const char* text : {"inf", "-inf", "1e400", "-1e400"}) {
+    EXPECT_FALSE(ParseNumber("--zoom", text, zoom).ok()) << text;
+  }
+}
+
+TEST(Values, IntegersKeepToTheirRange) {
+  EXPECT_EQ(*ParseInteger("--groups", "7", 0, 8), 7);
+  for (const char* text : {"-1", "9", "1.5", "", "99999999999999999999", "7 "}) {
+    const Result<int> value = ParseInteger("--groups", text, 0, 8);
+    ASSERT_FALSE(value.ok()) << text;
+    EXPECT_THAT(value.status().message(), AllOf(HasSubstr("--groups"), HasSubstr("[0, 8]"))) << text;
+  }
+}
+
+TEST(Values, SizesAreSquaresOrPairs) {
+  EXPECT_EQ(*ParseImageSize("--size", "640x480"), (ImageSize{640, 480}));
+  EXPECT_EQ(*ParseImageSize("--size", "512"), (ImageSize{512, 512}));
+  for (const char* text : {"", "x", "0", "640x", "x480", "640x480x3", "640X480", "-1x5", "16385", "1x100000"}) {
+    EXPECT_EQ(ParseImageSize("--size", text).status().code(), StatusCode::kInvalidArgument) << text;
+  }
+}
+
+TEST(Values, DirectionsAndColors) {
+  EXPECT_EQ(*ParseDirection("--light", "1,-2,0.5"), (Vec3{1, -2, 0.5}));
+  EXPECT_EQ(*ParseColor("--background", "0,0.5,1"), (StraightColor{0, 0.5F, 1, 1}));
+  EXPECT_EQ(*ParseColor("--background", "0,0,0,0.25"), (StraightColor{0, 0, 0, 0.25F}));
+  for (const char* text : {"", "1,2", "0,0,0", "1,2,3,4", "1,,2", "nan,0,0", "inf,0,0"}) {
+    EXPECT_EQ(ParseDirection("--light", text).status().code(), StatusCode::kInvalidArgument) << text;
+  }
+  for (const char* text : {"", "1,1", "1,1,1.5", "-0.1,0,0", "0,0,0,0,0", "red"}) {
+    EXPECT_EQ(ParseColor("--background", text).status().code(), StatusCode::kInvalidArgument) << text;
+  }
+}
+
+TEST(Values, ChoicesAreNamedWhenNoneFits) {
+  constexpr std::string_view kNames[] = {"splat", "zbuffer"};
+  EXPECT_EQ(*ParseChoice("--renderer", "zbuffer", kNames), 1U);
+  EXPECT_EQ(ParseChoice("--renderer", "ray", kNames).status().message(), "--renderer 'ray' is not one of splat, zbuffer");
+}
+
+TEST(FramePatternTest, FillsInTheNumberAsPrintfDoes) {
+  for (const char* text : {"frame_%04d.png", "%d.png", "a%%b%3d.exr", "%i", "dir.d/%02u.png"}) {
+    const Result<FramePattern> pattern = FramePattern::Parse("-o", text);
+    ASSERT_TRUE(pattern.ok()) << pattern.status().message();
+    for (const int index : {0, 7, 12345}) {
+      char expected[64];
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wformat-nonliteral"
+      std::snprintf(expected, sizeof expected, text, index);
+#pragma GCC diagnostic pop
+      EXPECT_EQ(pattern->Name(index), expected);
+    }
+  }
+}
+
+TEST(FramePatternTest, RefusesEverythingButOneInteger) {
+  for (const char* text : {"", "frame.png", "%s.png", "%d_%d.png", "%n", "%4.2f", "%", "a%", "%99999d", "%ld", "%*d", "%%"}) {
+    const Result<FramePattern> pattern = FramePattern::Parse("-o", text);
+    ASSERT_FALSE(pattern.ok()) << text;
+    EXPECT_THAT(pattern.status().message(), HasSubstr("-o")) << text;
+  }
+}
+
+}  // namespace
+}  // namespace slabstream

@@ -1,0 +1,146 @@
+// Bad input of every kind: exit status 2, one line on stderr that names what is wrong, nothing on stdout, no picture.
+#include <gmock/gmock.h>
+
+#include <fstream>
+
+#include "tests/end_to_end/program.h"
+
+namespace slabstream {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+class BadInputTest : public EndToEndTest {
+ protected:
+  void ExpectRefused(const std::vector<std::string>& arguments, const std::string& needle) {
+    std::string shown;
+    for (const std::string& argument : arguments) shown += argument + " ";
+    const ProgramResult result = Slabstream(arguments);
+    EXPECT_EQ(result.exit_status, 2) << shown << "\n" << result.err;
+    EXPECT_EQ(result.err_lines().size(), 1U) << shown << "\n" << result.err;
+    EXPECT_THAT(result.err, StartsWith("slabstream")) << shown;
+    EXPECT_THAT(result.err, HasSubstr(needle)) << shown;
+    EXPECT_EQ(result.out, "") << shown;
+    EXPECT_THAT(Files(), testing::Not(testing::Contains("x.png"))) << shown;
+  }
+  void Write(const std::string& name, const std::string& text) { std::ofstream(Path(name), std::ios::binary) << text; }
+};
+
+TEST_F(BadInputTest, CommandLines) {
+  const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
+      {{}, "render, turntable"},
+      {{"rendr"}, "rendr"},
+      {{"render"}, "required"},
+      {{"render", "v", "w", "-o", "x.png"}, "w"},
+      {{"render", "v"}, "--output"},
+      {{"turntable", "v", "-o", "%d.png"}, "--frames"},
+      {{"sphere", "--size", "8", "-o", "s.nrrd"}, "--class"},
+      {{"info"}, "SOURCE"},
+      {{"up", "--workers", "257"}, "--workers 257 is out of range [1, 256]"},
+      {{"up", "--listen", "http://x"}, "--listen"},
+      {{"status", "--endpoint", "tcp://0.0.0.0:1"}, "--endpoint"},
+      {{"down", "--endpoint", "tcp://127.0.0.1:*"}, "--endpoint"},
+      {{"sphere", "--class", "3", "--size", "8", "-o", "s.nrrd"}, "--class 3"},
+      {{"sphere", "--class", "1", "--size", "1", "-o", "s.nrrd"}, "--size 1"},
+      {{"sphere", "--class", "2", "--size", "8", "--occupancy", "0.9", "-o", "s.nrrd"}, "occupancy"},
+      {{"sphere", "--class", "2", "--size", "8", "-o", "s.txt"}, "s.txt"},
+      {{"sphere", "--class", "2", "--size", "8", "-o", "no/s.nrrd"}, "no"},
+      {{"info", "missing.nrrd"}, "missing.nrrd"},
+      {{"turntable", "v", "--frames", "2", "-o", "f.png"}, "f.png"},
+      {{"turntable", "v", "--frames", "2", "-o", "%d_%d.png"}, "%d_%d.png"},
+      {{"turntable", "v", "--frames", "2", "-o", "%d.gif"}, ".gif"},
+      {{"turntable", "v", "--frames", "0", "-o", "%d.png"}, "--frames 0"},
+      {{"turntable", "v", "--frames", "2", "--in-flight", "0", "-o", "%d.png"}, "--in-flight 0"},
+  };
+  for (const auto& [arguments, needle] : cases) ExpectRefused(arguments, needle);
+}
+
+TEST_F(BadInputTest, OptionsOfRender) {
+  MakeSphere("ball.nrrd", 2, 16);
+  Write("empty.json", "");
+  Write("broken.json", "[{\"RGBPoints\": [0, 1");
+  Write("short.json", R"([{"RGBPoints": [0, 1, 1]}])");
+  Write("descending.json", R"([{"RGBPoints": [1, 0, 0, 0, 0, 1, 1, 1]}])");
+  Write("huge.json", R"([{"RGBPoints": [0, 0, 0, 0, 1e999, 1, 1, 1]}])");
+  std::vector<std::string> nine_lights;
+  for (int i = 0; i < 9; ++i) nine_lights.insert(nine_lights.end(), {"--light", "1,0,0"});
+  const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
+      {{"--zoom", "0"}, "slabstream render: --zoom 0 is out of range [0.001, 10000]\n"},
+      {{"--zoom", "nan"}, "--zoom"},
+      {{"--zoom", "-1"}, "--zoom -1"},
+      {{"--zoom", "two"}, "--zoom 'two'"},
+      {{"--zoom"}, "--zoom"},
+      {{"--azimuth", "inf"}, "--azimuth"},
+      {{"--elevation", "1e7"}, "--elevation"},
+      {{"--roll", ""}, "--roll"},
+      {{"--fov", "0.5"}, "--fov 0.5"},
+      {{"--fov", "61"}, "--fov 61"},
+      {{"--size", "0"}, "--size 0"},
+      {{"--size", "100x0"}, "--size 0"},
+      {{"--size", "99999x1"}, "--size 99999"},
+      {{"--size", "1x2x3"}, "--size '1x2x3'"},
+      {{"--projection", "fisheye"}, "orthographic, perspective"},
+      {{"--renderer", "ray"}, "splat, zbuffer"},
+      {{"--shading", "toon"}, "phong, none"},
+      {{"--transfer", "no-such-preset"}, "no-such-preset"},
+      {{"--transfer", "missing.json"}, "missing.json"},
+      {{"--transfer", "empty.json"}, "empty.json"},
+      {{"--transfer", "broken.json"}, "broken.json"},
+      {{"--transfer", "short.json"}, "short.json"},
+      {{"--transfer", "descending.json"}, "descending.json"},
+      {{"--transfer", "huge.json"}, "huge.json"},
+      {{"--opacity-distance", "0"}, "--opacity-distance 0"},
+      {{"--light", "0,0,0"}, "--light 0,0,0"},
+      {{"--light", "1,2"}, "--light '1,2'"},
+      {nine_lights, "at most 8"},
+      {{"--background", "1,1,2"}, "--background 2"},
+      {{"--termination", "0.6"}, "--termination 0.6"},
+      {{"--decomposition", "cheese"}, "--decomposition 'cheese'"},
+      {{"--combine", "glue"}, "--combine 'glue'"},
+      {{"--axis", "w"}, "x, y, z, auto"},
+      {{"--groups", "-1"}, "--groups -1"},
+      {{"--groups", "1025"}, "--groups 1025"},
+      {{"--depth", "12"}, "--depth '12'"},
+      {{"--local=0"}, "--local 0"},
+      {{"--local=many"}, "--local 'many'"},
+      {{"--no-such-option"}, "--no-such-option"},
+      {{"--stats", "no/s.json"}, "--stats"},
+      {{"--trace", "no/t.json"}, "--trace"},
+      {{"--endpoint", "nowhere"}, "--endpoint"},
+  };
+  for (const auto& [more, needle] : cases) {
+    std::vector<std::string> arguments = {"render", "ball.nrrd", "-o", "x.png"};
+    if (more.front().rfind("--local", 0) != 0) arguments.push_back("--local=1");
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    ExpectRefused(arguments, needle);
+  }
+  ExpectRefused({"render", "ball.nrrd", "--local=1", "-o", "x.gif"}, "x.gif");
+  ExpectRefused({"render", "ball.nrrd", "--local=1", "-o", "x"}, "'x'");
+  ExpectRefused({"render", "ball.nrrd", "--local=1", "-o", "no/such/x.png"}, "no/such");
+}
+
+TEST_F(BadInputTest, VolumeFiles) {
+  MakeSphere("ball.nrrd", 2, 16);
+  const std::string whole = ReadFile("ball.nrrd");
+  const std::string header = "NRRD0004\ntype: uint8\ndimension: 3\nencoding: raw\n";
+  Write("empty.nrrd", "");
+  Write("text.nrrd", "this is no volume\n");
+  Write("truncated.nrrd", whole.substr(0, whole.size() / 2));
+  Write("short.nrrd", header + "sizes: 100 100 100\n\nabc");
+  Write("absurd.nrrd", header + "sizes: 2000000000 2000000000 2000000000\n\nabc");
+  Write("wide.nrrd", header + "sizes: 65536 1 1\n\n" + std::string(65536, 'x'));
+  Write("flat.nrrd", header + "sizes: 0 10 10\n\nabc");
+  Write("negative.nrrd", header + "sizes: -5 10 10\n\nabc");
+  Write("empty.nii", "");
+  Write("garbage.nii", std::string(400, '\x7f'));
+  Write("notes.txt", "a volume it is not");
+  for (const char* name : {"missing.nrrd", "empty.nrrd", "text.nrrd", "truncated.nrrd", "short.nrrd", "absurd.nrrd", "wide.nrrd",
+                           "flat.nrrd", "negative.nrrd", "empty.nii", "garbage.nii", "notes.txt", "."}) {
+    ExpectRefused({"render", Path(name), "--local=1", "-o", "x.png"}, name);
+    ExpectRefused({"info", Path(name)}, name);
+  }
+}
+
+}  // namespace
+}  // namespace slabstream

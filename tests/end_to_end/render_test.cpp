@@ -1,0 +1,190 @@
+// `render --local` and `turntable --local`: pictures of balls, whose look is known without a renderer.
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+#include <csignal>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <set>
+
+#include "tests/end_to_end/picture_file.h"
+#include "tests/end_to_end/program.h"
+
+namespace slabstream {
+namespace {
+
+using nlohmann::json;
+using testing::Contains;
+using testing::Each;
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr int kVoxels = 48;  // a side of the ball's volume
+constexpr int kPixels = 96;  // a side of the pictures
+// MakeSphere's ball fills 30 % of the cube; at zoom 1 the picture's side is the diagonal of the cube.
+const double kBallRadius = std::cbrt(0.3 * 3 / (4 * std::numbers::pi)) * kVoxels;  // voxels
+const double kPixelsPerVoxel = kPixels / (kVoxels * std::sqrt(3.0));
+const double kBallPixels = kBallRadius * kPixelsPerVoxel;
+
+class RenderTest : public EndToEndTest {
+ protected:
+  RenderTest() : ball_(MakeSphere("ball.nrrd", 2, kVoxels)) {}
+
+  // Renders the ball, opaque and unshaded.
+  PictureFile Render(const std::string& output, std::vector<std::string> more = {}) {
+    std::vector<std::string> arguments = {"render",     ball_,    "-o",        output, "--size", std::to_string(kPixels),
+                                          "--transfer", "opaque", "--shading", "none"};
+    if (std::none_of(more.begin(), more.end(), [](const std::string& s) { return s.rfind("--local", 0) == 0; }))
+      more.push_back("--local=2");
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    MustRun(arguments);
+    return ReadPicture(Path(output));
+  }
+
+  std::string ball_;
+};
+
+// Distance of a pixel's centre from the picture's.
+double FromCentre(int x, int y) { return std::hypot(x + 0.5 - kPixels / 2.0, y + 0.5 - kPixels / 2.0); }
+
+// Alpha is 1 inside the ball's outline and 0 outside, but for `margin` pixels on either side of it.
+void ExpectSilhouette(const PictureFile& picture, double margin) {
+  ASSERT_EQ(picture.width, kPixels);
+  ASSERT_EQ(picture.height, kPixels);
+  for (int y = 0; y < kPixels; ++y) {
+    for (int x = 0; x < kPixels; ++x) {
+      const double distance = FromCentre(x, y);
+      if (distance < kBallPixels - margin) {
+        ASSERT_GT(picture.At(x, y, 3), 0.98) << x << ", " << y;
+      } else if (distance > kBallPixels + margin) {
+        ASSERT_EQ(picture.At(x, y, 3), 0) << x << ", " << y;
+      }
+    }
+  }
+}
+
+TEST_F(RenderTest, SplattingFillsTheBallsSilhouetteWithItsColours) {
+  const PictureFile picture = Render("ball.png");
+  ExpectSilhouette(picture, 3 * kPixelsPerVoxel);  // a voxel's footprint reaches as far
+  // Values rise along +x, which points to the right, and so does red in this transfer function: 0.55 at 0 to 0.97 at 255.
+  const auto red = [&](double voxels_right) { return picture.At(int(kPixels / 2.0 + voxels_right * kPixelsPerVoxel), kPixels / 2, 0); };
+  EXPECT_NEAR(red(0), 0.55 + (0.97 - 0.55) * 191.5 / 255, 0.03);
+  EXPECT_LT(red(-12) + 0.03, red(0));
+  EXPECT_LT(red(0) + 0.03, red(12));
+}
+
+TEST_F(RenderTest, ZBufferFindsTheBallsSurfaceAtItsDepth) {
+  const PictureFile picture = Render("ball.exr", {"--renderer", "zbuffer"});
+  ASSERT_EQ(picture.channels, (std::vector<std::string>{"R", "G", "B", "A", "Z"}));
+  ExpectSilhouette(picture, 2 * kPixelsPerVoxel);
+  const double bounding_radius = kVoxels * std::sqrt(3.0) / 2;  // the eye plane stands twice that before the centre
+  for (const int x : {kPixels / 2, kPixels / 2 - 12, kPixels / 2 + 12}) {
+    const double aside = FromCentre(x, kPixels / 2) / kPixelsPerVoxel;
+    EXPECT_NEAR(picture.At(x, kPixels / 2, 4), 2 * bounding_radius - std::sqrt(kBallRadius * kBallRadius - aside * aside), 1.5) << x;
+  }
+  EXPECT_EQ(picture.At(0, 0, 4), std::numeric_limits<float>::infinity());
+}
+
+TEST_F(RenderTest, WorkersGroupsAxesAndSchemesDoNotChangeThePicture) {
+  const std::vector<std::vector<std::string>> policies = {{"--local=2", "--groups", "2"},
+                                                          {"--local=3", "--groups", "3", "--axis", "x"},
+                                                          {"--local=5", "--axis", "y", "--combine", "centralized"}};
+  for (const std::string renderer : {"splat", "zbuffer"}) {
+    const PictureFile one = Render("one.exr", {"--local=1", "--renderer", renderer, "--azimuth", "33", "--elevation", "21"});
+    for (std::vector<std::string> policy : policies) {
+      policy.insert(policy.end(), {"--renderer", renderer, "--azimuth", "33", "--elevation", "21"});
+      const PictureFile other = Render("other.exr", policy);
+      EXPECT_LE(LargestDifference(one, other), renderer == "splat" ? 2e-5 + 1.0 / 1024 : 0.0) << renderer << " " << policy[0];
+    }
+  }
+}
+
+TEST_F(RenderTest, AngleOfViewTurnsThePicture) {
+  // From behind, what was on the right is on the left.
+  const PictureFile front = Render("front.exr"), back = Render("back.exr", {"--azimuth", "180"});
+  const int off = int(12 * kPixelsPerVoxel);
+  EXPECT_GT(front.At(kPixels / 2 + off, kPixels / 2, 0), front.At(kPixels / 2 - off, kPixels / 2, 0) + 0.03F);
+  EXPECT_LT(back.At(kPixels / 2 + off, kPixels / 2, 0), back.At(kPixels / 2 - off, kPixels / 2, 0) - 0.03F);
+  // Negative numbers are values, not options.
+  EXPECT_LE(LargestDifference(back, Render("again.exr", {"--azimuth", "-180"})), 1e-5);
+}
+
+TEST_F(RenderTest, BackgroundAndSixteenBitsReachTheFile) {
+  const PictureFile picture = Render("ball.png", {"--background", "0.25,0.5,0.75", "--depth", "16"});
+  EXPECT_NEAR(picture.At(0, 0, 0), 0.25, 1.0 / 65535);
+  EXPECT_NEAR(picture.At(0, 0, 2), 0.75, 1.0 / 65535);
+  EXPECT_EQ(picture.At(0, 0, 3), 1);
+}
+
+TEST_F(RenderTest, APictureWithoutAnythingToSeeIsEmpty) {
+  const PictureFile picture = Render("ball.png", {"--zoom", "0.001"});
+  EXPECT_EQ(picture.width, kPixels);
+  EXPECT_LT(picture.At(0, 0, 3), 0.01);
+}
+
+TEST_F(RenderTest, SaysWhatItDidAndHowFarItIs) {
+  const ProgramResult result = MustRun({"render", ball_, "--local=2", "--groups", "2", "-o", "ball.png", "--size", "40x30", "--progress"});
+  EXPECT_THAT(result.out, HasSubstr("rendered ball.png 40x30 in "));
+  EXPECT_THAT(result.err_lines(), Contains(HasSubstr("frame 1 of 1: done")));
+  EXPECT_EQ(result.err.find('\r'), std::string::npos);  // no terminal, no bar
+}
+
+TEST_F(RenderTest, TurntableFramesAreTheRendersOfTheirAngles) {
+  MustRun({"turntable", ball_, "--local=2", "-o", "t_%02d.exr", "--frames", "3", "--azimuth", "10", "--size", std::to_string(kPixels),
+           "--transfer", "opaque", "--shading", "none"});
+  const std::vector<std::string> angles = {"10", "130", "250"};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const PictureFile frame = ReadPicture(Path("t_0" + std::to_string(i) + ".exr"));
+    EXPECT_LE(LargestDifference(frame, Render("single.exr", {"--azimuth", angles[i]})), 1e-5) << angles[i];
+  }
+}
+
+TEST_F(RenderTest, StatisticsShowThatVoxelsTravelOnce) {
+  MustRun({"turntable", ball_, "--local=2", "--groups", "2", "-o", "t_%d.png", "--frames", "4", "--in-flight", "1", "--size", "64",
+           "--stats", "stats.json", "--trace", "trace.json"});
+  const json stats = json::parse(ReadFile("stats.json"));
+  EXPECT_EQ(stats["plan"]["workers"], 2);
+  EXPECT_EQ(stats["plan"]["groups"], 2);
+  EXPECT_EQ(stats["plan"]["decomposition"], "slab");
+  EXPECT_EQ(stats["plan"]["combine"], "fan-in");
+  ASSERT_EQ(stats["frames"].size(), 4U);
+  EXPECT_GE(stats["bytes"]["voxels"], kVoxels * kVoxels * kVoxels / 4);  // those with something to see, at least
+  EXPECT_EQ(stats["frames"][0]["bytes"]["voxels"], stats["bytes"]["voxels"]);
+  for (std::size_t i = 1; i < 4; ++i) EXPECT_EQ(stats["frames"][i]["bytes"]["voxels"], 0) << i;
+  for (const json& frame : stats["frames"]) {
+    EXPECT_GT(frame["latency_ms"], 0.0);
+    EXPECT_GT(frame["stages_ms"]["render"], 0.0);
+    EXPECT_GE(frame["imbalance"], 1.0);
+    EXPECT_GE(frame["idle_share"], 0.0);
+    EXPECT_LE(frame["idle_share"], 1.0);
+  }
+
+  const json trace = json::parse(ReadFile("trace.json"));
+  std::set<int> processes;
+  std::set<std::string> names;
+  for (const json& event : trace["traceEvents"]) {
+    if (event["ph"] != "X") continue;
+    processes.insert(event["pid"].get<int>());
+    names.insert(event["name"].get<std::string>());
+  }
+  EXPECT_EQ(processes.size(), 3U);  // the frames, and two workers
+  EXPECT_THAT(names, Contains("render"));
+  EXPECT_THAT(names, Contains("combine"));
+}
+
+TEST_F(RenderTest, CtrlCEndsATurntableAndLeavesOnlyWholePictures) {
+  RunningProgram program(Command({"turntable", ball_, "--local=2", "-o", "t_%05d.png", "--frames", "100000", "--size", "64", "--progress"}),
+                         directory_);
+  ASSERT_TRUE(program.WaitForError("frame 3 of 100000: done"));
+  program.Signal(SIGINT);
+  const ProgramResult result = program.Wait();
+  EXPECT_EQ(result.exit_status, 130);
+  EXPECT_EQ(result.err_lines().back(), "slabstream turntable: interrupted");
+  EXPECT_THAT(Files(), Each(Not(HasSubstr(".tmp"))));
+  EXPECT_EQ(ReadPicture(Path("t_00000.png")).width, 64);
+}
+
+}  // namespace
+}  // namespace slabstream

@@ -1,0 +1,175 @@
+// `up`, `status`, `render`, `down`: a service of real processes, on endpoints that no other test can meet.
+#include <gmock/gmock.h>
+#include <signal.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "tests/end_to_end/picture_file.h"
+#include "tests/end_to_end/program.h"
+
+namespace slabstream {
+namespace {
+
+using nlohmann::json;
+using testing::AllOf;
+using testing::HasSubstr;
+
+// A zombie does not run: who started it may be gone, and nobody may be left to reap it.
+bool Runs(pid_t pid) {
+  std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const std::size_t close = text.rfind(')');
+  return close != std::string::npos && text[close + 2] != 'Z' && text[close + 2] != 'X';
+}
+
+class ServiceTest : public EndToEndTest {
+ protected:
+  ServiceTest() : ball_(MakeSphere("ball.nrrd", 2, 32)), endpoint_("ipc://" + Path("s")) {}
+
+  ProgramResult Up(const std::string& endpoint) const {
+    return MustRun({"up", "--detach", "--workers", "2", "--listen", endpoint, "--data", "ball=" + ball_});
+  }
+  std::vector<pid_t> Pids() const {
+    const json status = json::parse(MustRun({"status", "--json"}).out);
+    std::vector<pid_t> pids = {status["pid"].get<pid_t>()};
+    for (const json& worker : status["workers"]) pids.push_back(worker["pid"].get<pid_t>());
+    return pids;
+  }
+
+  std::string ball_, endpoint_;
+};
+
+TEST_F(ServiceTest, RendersTheSamePictureAsThisProcessAlone) {
+  EXPECT_THAT(Up(endpoint_).out, AllOf(HasSubstr("slabstream is up at " + endpoint_), HasSubstr("slabstream render")));
+  const json before = json::parse(MustRun({"status", "--json", "--endpoint", endpoint_}).out);
+  EXPECT_EQ(before["workers"].size(), 2U);
+  EXPECT_EQ(before["datasets"][0]["name"], "ball");
+  EXPECT_EQ(before["datasets"][0]["state"], "unloaded");
+
+  // Without --endpoint the service that was started last is meant.
+  MustRun({"render", "ball", "-o", "service.exr", "--size", "64"});
+  MustRun({"render", ball_, "--local=1", "-o", "local.exr", "--size", "64"});
+  EXPECT_LE(LargestDifference(ReadPicture(Path("service.exr")), ReadPicture(Path("local.exr"))), 2e-5 + 1.0 / 1024);
+
+  const json after = json::parse(MustRun({"status", "--json"}).out);
+  EXPECT_EQ(after["frames_done"], 1);
+  EXPECT_EQ(after["datasets"][0]["size"], (json{32, 32, 32}));
+  EXPECT_THAT(MustRun({"status"}).out, AllOf(HasSubstr("workers      2"), HasSubstr("ball ready 32 x 32 x 32")));
+}
+
+TEST_F(ServiceTest, VoxelsStayWithTheWorkersAcrossClients) {
+  Up(endpoint_);
+  MustRun({"render", "ball", "-o", "a.png", "--size", "64", "--stats", "first.json"});
+  MustRun({"render", "ball", "-o", "b.png", "--size", "64", "--azimuth", "70", "--stats", "second.json"});
+  EXPECT_GT(json::parse(ReadFile("first.json"))["bytes"]["voxels"], 0);
+  EXPECT_EQ(json::parse(ReadFile("second.json"))["bytes"]["voxels"], 0);
+}
+
+TEST_F(ServiceTest, DownLeavesNothingBehind) {
+  Up(endpoint_);
+  const std::vector<pid_t> pids = Pids();
+  ASSERT_EQ(pids.size(), 3U);
+  for (const pid_t pid : pids) EXPECT_TRUE(Runs(pid));
+  EXPECT_THAT(MustRun({"down"}).out, HasSubstr("is down (2 workers)"));
+  for (const pid_t pid : pids) EXPECT_FALSE(Runs(pid)) << pid;
+  EXPECT_TRUE(std::filesystem::is_empty(Path("slabstream")));
+
+  const ProgramResult again = Slabstream({"down", "--endpoint", endpoint_});
+  EXPECT_EQ(again.exit_status, 1);
+  EXPECT_THAT(again.err_lines(), testing::ElementsAre("slabstream down: no service runs at " + endpoint_));
+}
+
+TEST_F(ServiceTest, DownEndsProcessesThatDoNotAnswer) {
+  Up(endpoint_);
+  const std::vector<pid_t> pids = Pids();
+  for (const pid_t pid : pids) ASSERT_EQ(::kill(pid, SIGSTOP), 0);
+  MustRun({"down"});
+  for (const pid_t pid : pids) EXPECT_FALSE(Runs(pid)) << pid;
+}
+
+TEST_F(ServiceTest, TwoServicesLiveSideBySide) {
+  Up(endpoint_);
+  const std::string text = Up("tcp://127.0.0.1:*").out;
+  const std::string prefix = "slabstream is up at ";
+  ASSERT_EQ(text.rfind(prefix, 0), 0U) << text;
+  const std::string second = text.substr(prefix.size(), text.find(' ', prefix.size()) - prefix.size());
+  MustRun({"render", "ball", "--endpoint", second, "-o", "a.png", "--size", "32"});
+  MustRun({"down", "--endpoint", second});
+  EXPECT_EQ(Slabstream({"status", "--endpoint", second}).exit_status, 1);
+  MustRun({"render", "ball", "--endpoint", endpoint_, "-o", "b.png", "--size", "32"});
+}
+
+TEST_F(ServiceTest, ASecondUpOnTheSameEndpointSaysSo) {
+  Up(endpoint_);
+  const std::vector<pid_t> before = Pids();
+  const ProgramResult second = Slabstream({"up", "--detach", "--listen", endpoint_});
+  EXPECT_EQ(second.exit_status, 1);
+  ASSERT_EQ(second.err_lines().size(), 1U) << second.err;
+  EXPECT_THAT(second.err, HasSubstr("a service runs at " + endpoint_ + " already"));
+  EXPECT_EQ(Pids(), before);
+}
+
+TEST_F(ServiceTest, InTheForegroundCtrlCEndsEverything) {
+  RunningProgram up(Command({"up", "--workers", "2", "--listen", endpoint_, "--data", "ball=" + ball_}), directory_);
+  ASSERT_TRUE(up.WaitForOutput("Ctrl-C ends it."));
+  const std::vector<pid_t> pids = Pids();
+  up.Signal(SIGINT);
+  EXPECT_EQ(up.Wait().exit_status, 0);
+  for (const pid_t pid : pids) EXPECT_FALSE(Runs(pid)) << pid;
+  EXPECT_TRUE(std::filesystem::is_empty(Path("slabstream")));
+}
+
+TEST_F(ServiceTest, InTheForegroundItEndsWithDownAndTellsOfLostWorkers) {
+  RunningProgram up(Command({"up", "--workers", "2", "--listen", endpoint_, "--data", "ball=" + ball_}), directory_);
+  ASSERT_TRUE(up.WaitForOutput("Ctrl-C ends it."));
+  ASSERT_EQ(::kill(Pids().back(), SIGKILL), 0);
+  EXPECT_TRUE(up.WaitForError("was killed by signal 9"));
+  MustRun({"render", "ball", "-o", "a.png", "--size", "32"});
+  MustRun({"down"});
+  EXPECT_EQ(up.Wait().exit_status, 0);
+}
+
+TEST_F(ServiceTest, UpThatCannotStartSaysWhyAndLeavesNothingBehind) {
+  const std::vector<std::vector<std::string>> cases = {{"--data", "ball=" + Path("missing.nrrd")},
+                                                       {"--data", "a/b=" + ball_},
+                                                       {"--data", "ball=" + ball_, "--data", "ball=" + ball_},
+                                                       {"--listen", "tcp://10.1.2.3:7420"},
+                                                       {"--workers", "0"}};
+  for (const auto& more : cases) {
+    std::vector<std::string> arguments = {"up", "--detach"};
+    if (more.front() != "--listen") arguments.insert(arguments.end(), {"--listen", endpoint_});
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const ProgramResult result = Slabstream(arguments);
+    EXPECT_EQ(result.exit_status, 2) << more.back() << ": " << result.err;
+    EXPECT_EQ(result.err_lines().size(), 1U) << result.err;
+    EXPECT_TRUE(!std::filesystem::exists(Path("slabstream")) || std::filesystem::is_empty(Path("slabstream"))) << more.back();
+  }
+}
+
+TEST_F(ServiceTest, AnUnknownDatasetIsBadInputAndTheOthersAreNamed) {
+  Up(endpoint_);
+  const ProgramResult result = Slabstream({"render", "brain", "-o", "a.png"});
+  EXPECT_EQ(result.exit_status, 2);
+  ASSERT_EQ(result.err_lines().size(), 1U) << result.err;
+  EXPECT_THAT(result.err, AllOf(HasSubstr("slabstream render: "), HasSubstr("brain"), HasSubstr("ball")));
+}
+
+TEST_F(ServiceTest, AnEndpointWhereNobodyAnswersIsToldSoon) {
+  for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
+           {"render", "ball", "-o", "a.png"}, {"status"}, {"turntable", "ball", "--frames", "2", "-o", "%d.png"}}) {
+    std::vector<std::string> all = arguments;
+    all.insert(all.end(), {"--endpoint", endpoint_});
+    const auto start = std::chrono::steady_clock::now();
+    const ProgramResult result = Slabstream(all);
+    EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(15));
+    EXPECT_EQ(result.exit_status, 1);
+    ASSERT_EQ(result.err_lines().size(), 1U) << result.err;
+    EXPECT_THAT(result.err, HasSubstr(endpoint_));
+  }
+}
+
+}  // namespace
+}  // namespace slabstream

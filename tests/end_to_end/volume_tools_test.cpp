@@ -1,0 +1,68 @@
+// `sphere` and `info`: what one writes the other tells.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "tests/end_to_end/program.h"
+
+namespace slabstream {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+class VolumeToolsTest : public EndToEndTest {
+ protected:
+  json Info(const std::string& name, std::vector<std::string> more = {}) {
+    std::vector<std::string> arguments = {"info", name, "--json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return json::parse(MustRun(arguments).out);
+  }
+};
+
+TEST_F(VolumeToolsTest, InfoTellsWhatSphereMade) {
+  for (const int sphere_class : {1, 2}) {
+    MakeSphere("s.nrrd", sphere_class, 40);
+    const json info = Info("s.nrrd", {"--transfer", "opaque"});
+    EXPECT_EQ(info["size"], (json{40, 40, 40}));
+    EXPECT_EQ(info["type"], "uint8");
+    EXPECT_EQ(info["file_type"], "uint8");
+    EXPECT_EQ(info["format"], "NRRD");
+    EXPECT_EQ(info["spacing"], (json{1.0, 1.0, 1.0}));
+    EXPECT_EQ(info["range"]["min"], 0.0);
+    EXPECT_GT(info["range"]["max"], 200.0);
+    EXPECT_EQ(info["non_finite"], 0);
+    EXPECT_NEAR(info["occupancy"], sphere_class == 1 ? 0.05 : 0.3, 0.01);
+    std::int64_t voxels = 0;
+    for (const json& count : info["histogram"]) voxels += count.get<std::int64_t>();
+    EXPECT_EQ(voxels, 40 * 40 * 40);
+    EXPECT_NEAR(info["histogram"][0], 64000 * (1 - info["occupancy"].get<double>()), 1);
+  }
+}
+
+TEST_F(VolumeToolsTest, SpheresAreDeterministicInEveryFormat) {
+  MakeSphere("a.nrrd", 1, 33);
+  const json reference = Info("a.nrrd");
+  for (const char* name : {"b.nrrd", "b.mha", "b.mhd"}) {
+    MakeSphere(name, 1, 33);
+    const json info = Info(name);
+    for (const char* field : {"size", "type", "range", "histogram", "occupancy"}) EXPECT_EQ(info[field], reference[field]) << name;
+  }
+}
+
+TEST_F(VolumeToolsTest, InfoIsReadable) {
+  MakeSphere("s.nrrd", 1, 20);
+  const std::string text = MustRun({"info", "s.nrrd"}).out;
+  for (const char* part : {"20 x 20 x 20 voxels", "uint8", "spacing      1 1 1", "occupancy", "histogram", "#####"}) {
+    EXPECT_THAT(text, HasSubstr(part));
+  }
+}
+
+TEST_F(VolumeToolsTest, HelpNamesWhatCanBeChosen) {
+  const std::string text = MustRun({"render", "--help"}).out;
+  for (const char* part : {"--local", "--transfer", "auto", "opaque", "slab", "fan-in", "--azimuth"}) EXPECT_THAT(text, HasSubstr(part));
+}
+
+}  // namespace
+}  // namespace slabstream

@@ -1,0 +1,151 @@
+// Files are read back with OpenImageIO, unconverted, and compared with what the format promises.
+#include "client/image_io/image_writer.h"
+
+#include <OpenImageIO/imageio.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <vector>
+
+namespace slabstream {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+struct FileImage {
+  OIIO::ImageSpec spec;
+  std::vector<float> samples;  // width * height * channels; integers scaled to [0, 1]
+  std::vector<float> At(int x, int y) const {
+    const std::size_t n = std::size_t(spec.nchannels), begin = (std::size_t(y) * std::size_t(spec.width) + std::size_t(x)) * n;
+    return {samples.begin() + std::ptrdiff_t(begin), samples.begin() + std::ptrdiff_t(begin + n)};
+  }
+};
+
+FileImage Read(const std::string& path) {
+  OIIO::ImageSpec as_stored;
+  as_stored.attribute("oiio:UnassociatedAlpha", 1);  // or OpenImageIO multiplies by alpha
+  const auto in = OIIO::ImageInput::open(path, &as_stored);
+  if (!in) throw std::runtime_error(OIIO::geterror());
+  FileImage image{in->spec(), {}};
+  image.samples.resize(image.spec.image_pixels() * std::size_t(image.spec.nchannels));
+  in->read_image(0, 0, 0, -1, OIIO::TypeDesc::FLOAT, image.samples.data());
+  return image;
+}
+
+class ImageWriterTest : public testing::Test {
+ protected:
+  ImageWriterTest() {
+    char name[] = "/tmp/slabstream-image-XXXXXX";
+    directory_ = ::mkdtemp(name);
+  }
+  ~ImageWriterTest() override { std::filesystem::remove_all(directory_); }
+  std::string Path(const std::string& name) const { return directory_ + "/" + name; }
+  std::size_t FileCount() const {
+    return std::size_t(std::distance(std::filesystem::directory_iterator(directory_), std::filesystem::directory_iterator()));
+  }
+
+  std::string directory_;
+};
+
+// 6 x 4 pixels, of which (2, 1) and (3, 1) are set.
+LocalImage TwoPixels(PixelFormat format) {
+  LocalImage image = MakeLocalImage(format, {2, 1, 4, 2});
+  image.rgba = {0.25F, 0.125F, 0, 0.5F, 1, 0.5F, 0.25F, 1};
+  if (format == PixelFormat::kDepth) image.depth = {3.5F, std::numeric_limits<float>::infinity()};
+  return image;
+}
+constexpr ImageSize kSize{6, 4};
+
+TEST_F(ImageWriterTest, PngHoldsStraightAlphaWithoutATransferCurve) {
+  ASSERT_EQ(WritePicture(TwoPixels(PixelFormat::kRgba), kSize, Path("a.png"), {}), Status::Ok());
+  const FileImage file = Read(Path("a.png"));
+  EXPECT_EQ(file.spec.width, 6);
+  EXPECT_EQ(file.spec.height, 4);
+  EXPECT_EQ(file.spec.format, OIIO::TypeDesc::UINT8);
+  const auto code = [](double value) { return float(std::lround(255 * value)) / 255.0F; };
+  EXPECT_THAT(file.At(2, 1), ElementsAre(code(0.5), code(0.25), 0, code(0.5)));
+  EXPECT_THAT(file.At(3, 1), ElementsAre(1, code(0.5), code(0.25), 1));
+  EXPECT_THAT(file.At(2, 2), ElementsAre(0, 0, 0, 0));  // row 0 is the top one
+}
+
+TEST_F(ImageWriterTest, PngOf16BitsKeepsFinerSteps) {
+  LocalImage image = MakeLocalImage(PixelFormat::kRgba, {0, 0, 1, 1});
+  image.rgba = {0.5F + 1.0F / 4096, 0.5F, 0, 1};
+  ASSERT_EQ(WritePicture(image, {1, 1}, Path("a.png"), {.png_bits = 16}), Status::Ok());
+  const FileImage file = Read(Path("a.png"));
+  EXPECT_EQ(file.spec.format, OIIO::TypeDesc::UINT16);
+  EXPECT_NEAR(file.At(0, 0)[0], 0.5 + 1.0 / 4096, 0.6 / 65535);
+}
+
+TEST_F(ImageWriterTest, ValuesAboveOneSaturate) {
+  LocalImage image = MakeLocalImage(PixelFormat::kRgba, {0, 0, 1, 1});
+  image.rgba = {1.7F, 0.5F, 0, 1};
+  ASSERT_EQ(WritePicture(image, {1, 1}, Path("a.png"), {}), Status::Ok());
+  EXPECT_EQ(Read(Path("a.png")).At(0, 0)[0], 1);
+}
+
+TEST_F(ImageWriterTest, BackgroundIsPutBehindThePicture) {
+  const PictureFormat format{.background = {0.2F, 0.4F, 0.6F, 1}};
+  ASSERT_EQ(WritePicture(TwoPixels(PixelFormat::kRgba), kSize, Path("a.exr"), format), Status::Ok());
+  const FileImage file = Read(Path("a.exr"));
+  const std::vector<float> over = file.At(2, 1);
+  EXPECT_FLOAT_EQ(over[0], 0.25F + 0.5F * 0.2F);
+  EXPECT_FLOAT_EQ(over[1], 0.125F + 0.5F * 0.4F);
+  EXPECT_FLOAT_EQ(over[3], 1);
+  EXPECT_FLOAT_EQ(file.At(0, 0)[2], 0.6F);
+}
+
+TEST_F(ImageWriterTest, ExrKeepsPremultipliedFloatsExactly) {
+  LocalImage image = TwoPixels(PixelFormat::kRgba);
+  image.rgba[0] = 1e-7F;
+  ASSERT_EQ(WritePicture(image, kSize, Path("a.EXR"), {}), Status::Ok());
+  const FileImage file = Read(Path("a.EXR"));
+  EXPECT_EQ(file.spec.format, OIIO::TypeDesc::FLOAT);
+  EXPECT_THAT(file.spec.channelnames, ElementsAre("R", "G", "B", "A"));
+  EXPECT_THAT(file.At(2, 1), ElementsAre(1e-7F, 0.125F, 0, 0.5F));
+}
+
+TEST_F(ImageWriterTest, ExrOfADepthImageHasInfiniteDepthWhereNothingIsSeen) {
+  ASSERT_EQ(WritePicture(TwoPixels(PixelFormat::kDepth), kSize, Path("a.exr"), {}), Status::Ok());
+  const FileImage file = Read(Path("a.exr"));
+  EXPECT_THAT(file.spec.channelnames, ElementsAre("R", "G", "B", "A", "Z"));
+  EXPECT_EQ(file.At(2, 1)[4], 3.5F);
+  EXPECT_EQ(file.At(0, 0)[4], std::numeric_limits<float>::infinity());
+}
+
+TEST_F(ImageWriterTest, AnImageWithoutPixelsIsAnEmptyPicture) {
+  ASSERT_EQ(WritePicture(MakeLocalImage(PixelFormat::kRgba, {}), kSize, Path("a.png"), {}), Status::Ok());
+  EXPECT_EQ(Read(Path("a.png")).samples, std::vector<float>(6 * 4 * 4, 0.0F));
+}
+
+TEST_F(ImageWriterTest, AFailureNamesThePathAndLeavesNothingBehind) {
+  const Status ending = WritePicture(TwoPixels(PixelFormat::kRgba), kSize, Path("a.gif"), {});
+  EXPECT_EQ(ending.code(), StatusCode::kInvalidArgument);
+  EXPECT_THAT(ending.message(), HasSubstr("a.gif"));
+
+  const Status missing = WritePicture(TwoPixels(PixelFormat::kRgba), kSize, Path("no/a.png"), {});
+  EXPECT_EQ(missing.code(), StatusCode::kUnavailable);
+  EXPECT_THAT(missing.message(), HasSubstr("no/a.png"));
+  EXPECT_EQ(missing.message().find('\n'), std::string::npos);
+
+  // A directory in the way: the picture is complete when the rename fails.
+  std::filesystem::create_directories(Path("a.png/x"));
+  const Status in_the_way = WritePicture(TwoPixels(PixelFormat::kRgba), kSize, Path("a.png"), {});
+  EXPECT_EQ(in_the_way.code(), StatusCode::kUnavailable);
+  EXPECT_EQ(FileCount(), 1U);
+}
+
+TEST_F(ImageWriterTest, AnOlderPictureIsReplacedOnlyByAWholeOne) {
+  std::ofstream(Path("a.png")) << "old";
+  ASSERT_EQ(WritePicture(TwoPixels(PixelFormat::kRgba), kSize, Path("a.png"), {}), Status::Ok());
+  EXPECT_EQ(Read(Path("a.png")).spec.width, 6);
+  EXPECT_EQ(FileCount(), 1U);
+}
+
+}  // namespace
+}  // namespace slabstream
