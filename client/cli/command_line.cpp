@@ -48,6 +48,7 @@ void DeclareTurntable(CLI::App& app, TurntableOptions& options, Command& command
       ->required()
       ->type_name("PATTERN");
   AddInteger(*sub, "--frames", options.frames, 1, kMaxTurntableFrames, "How many")->required();
+  AddInteger(*sub, "--turns", options.turns, 1, kMaxTurns, "Turns of the table that they are spread over");
   AddInteger(*sub, "--in-flight", options.in_flight, 1, kMaxInFlight, "Frames that are asked for at the same time");
   sub->callback([&] { command = [&] { return RunTurntable(options); }; });
 }

@@ -33,12 +33,14 @@ struct RenderOptions {
 };
 
 inline constexpr int kMaxTurntableFrames = 100000;
+inline constexpr int kMaxTurns = 1000;
 inline constexpr int kMaxInFlight = 64;
 
 struct TurntableOptions {
   FrameOptions frame;
   FramePattern output;
-  int frames = 36;    // [1, kMaxTurntableFrames], evenly over a full turn that begins at the request's azimuth
+  int frames = 36;    // [1, kMaxTurntableFrames], evenly over `turns` full turns that begin at the request's azimuth
+  int turns = 1;      // [1, kMaxTurns]
   int in_flight = 2;  // [1, kMaxInFlight] frames asked for and not yet complete
 };
 

@@ -17,7 +17,7 @@ std::vector<FrameJob> MakeJobs(const TurntableOptions& options, const std::strin
     FrameJob job{options.frame.request, options.output.Name(i)};
     job.request.dataset = dataset;
     // Back into one turn, so that a start near the limit of angles stays valid.
-    job.request.view.azimuth_degrees = std::fmod(job.request.view.azimuth_degrees + 360.0 * i / options.frames, 360.0);
+    job.request.view.azimuth_degrees = std::fmod(job.request.view.azimuth_degrees + 360.0 * options.turns * i / options.frames, 360.0);
     jobs.push_back(std::move(job));
   }
   return jobs;

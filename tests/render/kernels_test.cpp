@@ -8,6 +8,7 @@
 #include <random>
 
 #include "worker/kernels/composite.h"
+#include "worker/kernels/cull.h"
 #include "worker/kernels/normal_code.h"
 #include "worker/kernels/shade.h"
 #include "worker/kernels/splat.h"
@@ -115,6 +116,38 @@ TEST(Transform, KeepsItsErrorBound) {
   }
 }
 
+TEST(Cull, DropsExactlyTheVoxelsThatBeginInHiddenTiles) {
+  RandomBatch random(6, 0.7, 0.9, 64), original(6, 0.7, 0.9, 64);
+  TransformPieces(Projection::kPerspective, random.batch);
+  TransformPieces(Projection::kPerspective, original.batch);
+  constexpr std::int32_t kTiles = 64 / kTile;
+  std::vector<std::uint8_t> hidden(std::size_t(kTiles) * kTiles);
+  for (std::size_t i = 0; i < hidden.size(); ++i) hidden[i] = i % 3 == 0;
+  CullHiddenVoxels({hidden.data(), kTiles, kTiles}, random.batch);
+
+  std::size_t kept = 0, n = 0;
+  for (std::size_t p = 0; p < original.batch.pieces.size(); ++p) {
+    const std::size_t kept_before = kept;
+    for (std::int32_t i = 0; i < original.batch.pieces[p].count; ++i, ++n) {
+      const std::int32_t x = std::clamp(original.batch.column[n], 0, 63) / kTile, y = std::clamp(original.batch.row[n], 0, 63) / kTile;
+      if (hidden[std::size_t(y * kTiles + x)] != 0) continue;
+      ASSERT_LT(kept, random.batch.voxel_count);
+      EXPECT_EQ(random.batch.column[kept], original.batch.column[n]);
+      EXPECT_EQ(random.batch.row[kept], original.batch.row[n]);
+      EXPECT_EQ(random.batch.phase_x[kept], original.batch.phase_x[n]);
+      EXPECT_EQ(random.batch.phase_y[kept], original.batch.phase_y[n]);
+      EXPECT_EQ(random.batch.area[kept], original.batch.area[n]);
+      EXPECT_EQ(random.batch.record[kept].bin, original.batch.record[n].bin);
+      EXPECT_EQ(random.batch.record[kept].normal, original.batch.record[n].normal);
+      ++kept;
+    }
+    EXPECT_EQ(std::size_t(random.batch.pieces[p].count), kept - kept_before);
+  }
+  EXPECT_EQ(kept, random.batch.voxel_count);
+  EXPECT_GT(kept, 0U);
+  EXPECT_LT(kept, n);
+}
+
 TEST(Shade, AgreesWithTheReference) {
   ShadeTables tables;
   std::mt19937 generator(3);
@@ -129,6 +162,7 @@ TEST(Shade, AgreesWithTheReference) {
     RandomBatch expected(4, 1, 1, 64), got(4, 1, 1, 64);
     TransformPiecesReference(Projection::kPerspective, expected.batch);
     got.batch.area = expected.batch.area;
+    got.batch.record = expected.batch.record;
     ShadePiecesReference(tables, per_voxel_area, expected.batch);
     ForEachTarget([&] {
       ShadePieces(tables, per_voxel_area, got.batch);

@@ -24,19 +24,18 @@ HWY_INLINE void Shade(const ShadeTables& tables, VoxelBatch& batch) {
   const PhongFactors* HWY_RESTRICT by_normal = tables.by_normal.data();
   const float* HWY_RESTRICT area = batch.area.data();
   float* HWY_RESTRICT out = batch.rgba.data();
-  for (const BeamPiece& piece : batch.pieces) {
-    const VoxelRecord* record = piece.records;
-    for (std::int32_t i = 0; i < piece.count; ++i, ++record, ++area, out += 4) {
-      const PhongFactors factors = by_normal[record->normal];
-      const float* color = colors + 4 * std::size_t(record->bin);
-      const auto opacity = hn::Set(d, kPerVoxelArea ? opacities[record->bin] * *area : opacities[record->bin]);
-      for (std::size_t c = 0; c < 4; c += kLanes) {
-        const auto is_color = hn::Load(d, kIsColor + c);
-        const auto diffuse = hn::MulAdd(hn::Set(d, factors.diffuse), is_color, hn::Load(d, kIsOpacity + c));
-        const auto specular = hn::Mul(hn::Set(d, factors.specular), is_color);
-        const auto shaded = hn::Min(hn::MulAdd(hn::Load(d, color + c), diffuse, specular), hn::Set(d, 1.0F));
-        hn::Store(hn::Mul(shaded, opacity), d, out + c);
-      }
+  const VoxelRecord* HWY_RESTRICT records = batch.record.data();
+  for (std::size_t n = 0; n < batch.voxel_count; ++n, out += 4) {
+    const VoxelRecord record = records[n];
+    const PhongFactors factors = by_normal[record.normal];
+    const float* color = colors + 4 * std::size_t(record.bin);
+    const auto opacity = hn::Set(d, kPerVoxelArea ? opacities[record.bin] * area[n] : opacities[record.bin]);
+    for (std::size_t c = 0; c < 4; c += kLanes) {
+      const auto is_color = hn::Load(d, kIsColor + c);
+      const auto diffuse = hn::MulAdd(hn::Set(d, factors.diffuse), is_color, hn::Load(d, kIsOpacity + c));
+      const auto specular = hn::Mul(hn::Set(d, factors.specular), is_color);
+      const auto shaded = hn::Min(hn::MulAdd(hn::Load(d, color + c), diffuse, specular), hn::Set(d, 1.0F));
+      hn::Store(hn::Mul(shaded, opacity), d, out + c);
     }
   }
 }
@@ -60,18 +59,15 @@ void ShadePieces(const ShadeTables& tables, bool per_voxel_area, VoxelBatch& bat
 }
 
 void ShadePiecesReference(const ShadeTables& tables, bool per_voxel_area, VoxelBatch& batch) {
-  std::size_t n = 0;
-  for (const BeamPiece& piece : batch.pieces) {
-    for (std::int32_t i = 0; i < piece.count; ++i, ++n) {
-      const VoxelRecord& record = piece.records[i];
-      const PhongFactors& factors = tables.by_normal[record.normal];
-      const float opacity = tables.opacity[record.bin] * (per_voxel_area ? batch.area[n] : 1.0F);
-      for (std::size_t c = 0; c < 3; ++c) {
-        const float color = tables.color[4 * std::size_t(record.bin) + c];
-        batch.rgba[4 * n + c] = std::min(color * factors.diffuse + factors.specular, 1.0F) * opacity;
-      }
-      batch.rgba[4 * n + 3] = opacity;
+  for (std::size_t n = 0; n < batch.voxel_count; ++n) {
+    const VoxelRecord& record = batch.record[n];
+    const PhongFactors& factors = tables.by_normal[record.normal];
+    const float opacity = tables.opacity[record.bin] * (per_voxel_area ? batch.area[n] : 1.0F);
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float color = tables.color[4 * std::size_t(record.bin) + c];
+      batch.rgba[4 * n + c] = std::min(color * factors.diffuse + factors.specular, 1.0F) * opacity;
     }
+    batch.rgba[4 * n + 3] = opacity;
   }
 }
 

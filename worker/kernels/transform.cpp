@@ -6,6 +6,7 @@
 // Highway wants this order.
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <bit>
 
 HWY_BEFORE_NAMESPACE();
@@ -35,6 +36,7 @@ HWY_INLINE void Transform(VoxelBatch& batch) {
   std::size_t n = 0;
   for (const BeamPiece& piece : batch.pieces) {
     const int phases_x = piece.kernel_x->phases, phases_y = piece.kernel_y->phases;
+    std::copy_n(piece.records, piece.count, &batch.record[n]);
     std::uint64_t mask = piece.mask;
     while (mask != 0) {
       const int begin = std::countr_zero(mask);

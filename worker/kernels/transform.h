@@ -15,7 +15,7 @@
 
 namespace slabstream {
 
-// Fills column, row, phase_x, phase_y and (perspective only) area of `batch` from its pieces.
+// Fills column, row, phase_x, phase_y, record and (perspective only) area of `batch` from its pieces.
 void TransformPieces(Projection projection, VoxelBatch& batch);
 void TransformPiecesReference(Projection projection, VoxelBatch& batch);
 

@@ -21,6 +21,7 @@ Tap TapOf(float t, std::int32_t origin, int phases) {
 void TransformPiecesReference(Projection projection, VoxelBatch& batch) {
   std::size_t n = 0;
   for (const BeamPiece& piece : batch.pieces) {
+    std::copy_n(piece.records, piece.count, &batch.record[n]);
     for (std::uint32_t mask = piece.mask; mask != 0; mask &= mask - 1, ++n) {
       const auto i = float(std::countr_zero(mask));
       float x = piece.x0 + i * piece.x_step, y = piece.y0 + i * piece.y_step;

@@ -24,7 +24,7 @@ struct VoxelRecord {
 
 struct BeamPiece {
   std::uint32_t mask = 0;                // bit i: voxel i of the cell is occupied (and in this piece); not 0
-  std::int32_t count = 0;                // bits of mask
+  std::int32_t count = 0;                // bits of mask; after culling, how many of these voxels are left in the batch
   const VoxelRecord* records = nullptr;  // of the voxels of `mask`, in order
   const GaussianKernel* kernel_x = nullptr;
   const GaussianKernel* kernel_y = nullptr;
@@ -38,13 +38,14 @@ struct BeamPiece {
 };
 
 // Voxels of all pieces in order, one array a component. Arrays have kBatchSlack elements more than voxels fit, so that vectors may write
-// past the end.
+// past the end. A piece's mask and records are read by the transform; all later stages go by its count.
 struct VoxelBatch {
   static constexpr std::size_t kVoxels = 1024;
   static constexpr std::size_t kBatchSlack = 64;
 
   VoxelBatch() {
     for (auto* ints : {&column, &row, &phase_x, &phase_y}) ints->resize(kVoxels + kBatchSlack);
+    record.resize(kVoxels + kBatchSlack);
     area.resize(kVoxels + kBatchSlack);
     rgba.resize(4 * (kVoxels + kBatchSlack));
   }
@@ -55,7 +56,8 @@ struct VoxelBatch {
   // Written by the transform.
   AlignedVector<std::int32_t> column, row;       // of the sheet: first tap of the footprint
   AlignedVector<std::int32_t> phase_x, phase_y;  // sub-pixel phase
-  AlignedVector<float> area;                     // pixels^2 of the voxel's cell of the slice
+  AlignedVector<float> area;                     // pixels^2 of the voxel's cell of the slice (perspective only)
+  AlignedVector<VoxelRecord> record;
   // Written by shading: premultiplied colour and opacity times area, 4 floats a voxel.
   AlignedVector<float> rgba;
 };

@@ -100,7 +100,7 @@ void MarkOccupied(const VoxelBlock& voxels, const BrickRanges& bricks, const Bin
   });
 }
 
-// Sums of the masks: first_record and the bounding box.
+// Sums of the masks: first_record, record_offsets and the bounding box.
 void CountRecords(OccupiedCells& cells) {
   const auto [c, u, v] = cells.axes;
   constexpr std::int32_t kFar = std::numeric_limits<std::int32_t>::max();
@@ -113,6 +113,7 @@ void CountRecords(OccupiedCells& cells) {
       const std::uint64_t before = total;
       for (std::int32_t cell = 0; cell < cells.cell_count; ++cell) {
         const std::uint32_t mask = cells.Masks(beam)[cell];
+        cells.record_offsets.push_back(std::uint16_t(total - before));  // a beam has at most kMaxVolumeSide
         if (mask == 0) continue;
         total += std::uint64_t(std::popcount(mask));
         const std::int32_t origin = (cells.first_cell + cell) * kCell;
@@ -189,6 +190,7 @@ OccupiedCells FindOccupiedCells(const VoxelBlock& voxels, const BrickRanges& bri
   cells.cell_count = (cells.box.end[u] - 1) / kCell + 1 - cells.first_cell;
   const std::size_t beams = std::size_t(cells.box.size()[traversal]) * std::size_t(cells.box.size()[v]);
   cells.masks.assign(beams * std::size_t(cells.cell_count), 0);
+  cells.record_offsets.reserve(cells.masks.size());
   cells.first_record.reserve(beams + 1);
   VisitScalarType(voxels.type, [&](auto* type) {
     using T = std::remove_cvref_t<decltype(*type)>;

@@ -2,8 +2,8 @@
 // beam.
 //
 // In-slice axes: u, along beams, is the lower of the two axes that are not the traversal axis, v the higher one. A cell is kFootprintCell =
-// 32 voxels of a beam from a global multiple of 32 on: a 32-bit mask of which are occupied. So a beam costs a bit a voxel and four bytes an
-// occupied voxel, dense and sparse data alike, and a cell's voxels are a mask and a pointer.
+// 32 voxels of a beam from a global multiple of 32 on: a 32-bit mask of which are occupied. So a beam costs one and a half bits a voxel and
+// four bytes an occupied voxel, dense and sparse data alike, and a cell's voxels are a mask and a pointer.
 #pragma once
 
 #include <cstdint>
@@ -30,6 +30,7 @@ struct OccupiedCells {
   Box occupied;                                 // bounding box of those found; empty if there are none
   std::int32_t first_cell = 0, cell_count = 0;  // along u: cell i begins at voxel 32 * (first_cell + i)
   std::vector<std::uint32_t> masks;             // [slice][beam][cell], from box.begin on
+  std::vector<std::uint16_t> record_offsets;    // likewise: records of the beam before this cell, so that cells can be skipped unread
   std::vector<std::uint64_t> first_record;      // [slice][beam], and one more: index of the beam's first record
   AlignedVector<VoxelRecord> records;
   std::uint64_t occupied_in_box = 0;  // of those, the ones inside the box, not in its halo
@@ -38,9 +39,10 @@ struct OccupiedCells {
     return std::size_t(slice - box.begin[axes.c]) * std::size_t(box.end[axes.v] - box.begin[axes.v]) + std::size_t(v - box.begin[axes.v]);
   }
   const std::uint32_t* Masks(std::size_t beam) const { return &masks[beam * std::size_t(cell_count)]; }
+  const std::uint16_t* RecordOffsets(std::size_t beam) const { return &record_offsets[beam * std::size_t(cell_count)]; }
   std::size_t bytes() const {
-    return masks.capacity() * sizeof(masks[0]) + first_record.capacity() * sizeof(first_record[0]) +
-           records.capacity() * sizeof(VoxelRecord);
+    return masks.capacity() * sizeof(masks[0]) + record_offsets.capacity() * sizeof(record_offsets[0]) +
+           first_record.capacity() * sizeof(first_record[0]) + records.capacity() * sizeof(VoxelRecord);
   }
 };
 

@@ -7,19 +7,25 @@
 namespace slabstream {
 namespace {
 
+// Beyond this, marking a tile would cost more than what it lets be skipped.
+constexpr std::int32_t kMaxReachTiles = 4;
+
 std::int32_t RoundDown(std::int32_t x) { return x & ~(kTile - 1); }
 static_assert((kTile & (kTile - 1)) == 0);
 
 }  // namespace
 
-SheetBuffer::SheetBuffer(const PixelBounds& wanted, double termination)
+SheetBuffer::SheetBuffer(const PixelBounds& wanted, double termination, double largest_footprint)
     : bounds_{RoundDown(wanted.x_begin), RoundDown(wanted.y_begin), RoundDown(wanted.x_end + kTile - 1),
               RoundDown(wanted.y_end + kTile - 1)},
       saturated_alpha_(termination > 0 ? float(1 - termination) : 2.0F),
       tiles_x_(bounds_.width() / kTile),
       tiles_y_(bounds_.height() / kTile),
+      reach_tiles_(std::int32_t(std::ceil(std::min(largest_footprint, 1e6) / kTile))),
+      culls_voxels_(termination > 0 && reach_tiles_ <= kMaxReachTiles),
       touched_(std::size_t(tiles_x_) * std::size_t(tiles_y_)),
       saturated_(touched_.size()),
+      hidden_(touched_.size()),
       touched_rows_begin_(tiles_y_),
       sheet_(4 * std::size_t(bounds_.pixel_count())),
       accumulated_(sheet_.size()) {}
@@ -49,8 +55,9 @@ SheetBuffer::TileRange SheetBuffer::TilesOf(const PixelBounds& pixels) const {
           (inside.x_end - bounds_.x_begin + kTile - 1) / kTile, (inside.y_end - bounds_.y_begin + kTile - 1) / kTile};
 }
 
-bool SheetBuffer::Saturated(const PixelBounds& pixels) const {
-  const TileRange tiles = TilesOf(pixels);
+bool SheetBuffer::Saturated(const PixelBounds& pixels) const { return AllSaturated(TilesOf(pixels)); }
+
+bool SheetBuffer::AllSaturated(const TileRange& tiles) const {
   for (std::int32_t y = tiles.y_begin; y < tiles.y_end; ++y) {
     const std::uint8_t* row = &saturated_[std::size_t(y) * std::size_t(tiles_x_)];
     for (std::int32_t x = tiles.x_begin; x < tiles.x_end; ++x) {
@@ -58,6 +65,19 @@ bool SheetBuffer::Saturated(const PixelBounds& pixels) const {
     }
   }
   return true;
+}
+
+void SheetBuffer::MarkSaturated(std::int32_t tile_x, std::int32_t tile_y) {
+  std::uint8_t& saturated = saturated_[std::size_t(tile_y) * std::size_t(tiles_x_) + std::size_t(tile_x)];
+  if (saturated != 0) return;
+  saturated = 1;
+  if (!culls_voxels_) return;
+  for (std::int32_t y = std::max(0, tile_y - reach_tiles_); y <= tile_y; ++y) {
+    for (std::int32_t x = std::max(0, tile_x - reach_tiles_); x <= tile_x; ++x) {
+      const TileRange reached = {x, y, std::min(x + reach_tiles_ + 1, tiles_x_), std::min(y + reach_tiles_ + 1, tiles_y_)};
+      hidden_[std::size_t(y) * std::size_t(tiles_x_) + std::size_t(x)] = AllSaturated(reached);
+    }
+  }
 }
 
 void SheetBuffer::Touch(const PixelBounds& pixels) {
@@ -96,7 +116,7 @@ void SheetBuffer::CompositeSlice(const Ownership& ownership) {
         work.owned_begin = owned_begin.data();
         work.owned_end = owned_end.data();
       }
-      saturated_[tile] = CompositeTile(work) >= saturated_alpha_;
+      if (CompositeTile(work) >= saturated_alpha_) MarkSaturated(tile_x, tile_y);
     }
   }
   touched_rows_begin_ = tiles_y_;

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 
+#include "worker/kernels/cull.h"
 #include "worker/kernels/shade.h"
 #include "worker/kernels/splat.h"
 #include "worker/kernels/transform.h"
@@ -20,6 +21,8 @@ namespace {
 
 constexpr std::int32_t kCell = kFootprintCell;
 constexpr double kFar = 1e9;  // pixels: beyond every image
+
+constexpr std::int32_t kRecordsPerLine = 64 / sizeof(VoxelRecord);  // of the cache
 
 // Pieces are cut so that they are at most about this long on the screen: they are culled and mark tiles as a whole.
 constexpr double kPiecePixels = 32;
@@ -46,8 +49,25 @@ ShadeTables MakeShadeTables(const ClassificationTable& table, const SliceProject
   return tables;
 }
 
+// At least the radius, in pixels, of any footprint of `cells` (whose occupied part is not empty). Their shape varies over the volume
+// (perspective): a quarter more than at the corners is enough for what lies between.
+double LargestRadius(const OccupiedCells& cells, const SliceProjection& projection) {
+  const auto [c, u, v] = cells.axes;
+  double sigma = 0;
+  for (std::int32_t at_u : {cells.occupied.begin[u], cells.occupied.end[u] - 1}) {
+    for (std::int32_t at_v : {cells.occupied.begin[v], cells.occupied.end[v] - 1}) {
+      for (std::int32_t at_c : {cells.occupied.begin[c], cells.occupied.end[c] - 1}) {
+        const FootprintSigma at_corner = projection.SigmaAt(at_u, at_v, at_c);
+        sigma = std::max({sigma, at_corner.x, at_corner.y});
+      }
+    }
+  }
+  return 1.25 * kFootprintCut * sigma;
+}
+
 // Pixels that samples of `box` can cover, seen from `cells` (whose occupied part is not empty).
-PixelBounds ScreenBounds(const OccupiedCells& cells, const Box& box, const FrameSetup& setup, const SliceProjection& projection) {
+PixelBounds ScreenBounds(const OccupiedCells& cells, const Box& box, const FrameSetup& setup, const SliceProjection& projection,
+                         double largest_radius) {
   const Camera& camera = setup.camera;
   // Of all points within [low, high], grown by `margin` pixels.
   const auto bounds_of = [&](const Vec3& low, const Vec3& high, double margin) {
@@ -67,20 +87,9 @@ PixelBounds ScreenBounds(const OccupiedCells& cells, const Box& box, const Frame
                        row(std::ceil(y_high + margin))};
   };
 
-  // What footprints reach. Their shape varies over the volume (perspective): a quarter more than at the corners is enough for what lies
-  // between.
   const auto [c, u, v] = cells.axes;
   const Vec3 low = ToVec3(cells.occupied.begin), high = ToVec3(cells.occupied.end) - Vec3{1, 1, 1};
-  double sigma = 0;
-  for (double at_u : {low[u], high[u]}) {
-    for (double at_v : {low[v], high[v]}) {
-      for (double at_c : {low[c], high[c]}) {
-        const FootprintSigma at_corner = projection.SigmaAt(at_u, at_v, at_c);
-        sigma = std::max({sigma, at_corner.x, at_corner.y});
-      }
-    }
-  }
-  const PixelBounds reached = bounds_of(low, high, 1.25 * kFootprintCut * sigma + 2);
+  const PixelBounds reached = bounds_of(low, high, largest_radius + 2);  // what footprints reach
 
   // What the box owns: its own cross-section, and outside the volume without end; samples farther than the halo from any voxel are empty.
   const Index3& size = setup.description.geometry.size;
@@ -102,13 +111,13 @@ PixelBounds ScreenBounds(const OccupiedCells& cells, const Box& box, const Frame
 class Pass {
  public:
   Pass(const OccupiedCells& cells, const Box& box, const FrameSetup& setup, const ShadeTables& tables, const SliceProjection& projection,
-       const PixelBounds& bounds, StageClock& clock, RankReport& report)
+       const PixelBounds& bounds, double largest_radius, StageClock& clock, RankReport& report)
       : cells_(cells),
         tables_(tables),
         projection_(projection),
         footprints_(projection, setup.description.geometry, cells.occupied),
         ownership_(projection, box, setup.description.geometry),
-        sheet_(bounds, setup.termination),
+        sheet_(bounds, setup.termination, 2 * largest_radius + 1),
         clock_(clock),
         report_(report) {
     if (projection.perspective()) sheet_.SetDistanceRatios(setup.camera);
@@ -148,8 +157,7 @@ class Pass {
     const auto ends = [&](std::int32_t cell, Axis axis) {
       return std::array{std::max(cell * kCell, cells_.occupied.begin[axis]), std::min((cell + 1) * kCell, cells_.occupied.end[axis]) - 1};
     };
-    open_blocks_.assign(std::size_t(cells_.cell_count), 0);
-    bool any = false;
+    open_cells_.clear();
     for (std::int32_t cell_u = cells_.occupied.begin[u] / kCell; cell_u * kCell < cells_.occupied.end[u]; ++cell_u) {
       double x_low = kFar, y_low = kFar, x_high = -kFar, y_high = -kFar;
       for (std::int32_t at_u : ends(cell_u, u)) {
@@ -164,11 +172,9 @@ class Pass {
       const double reach_x = footprint.x->radius + 1, reach_y = footprint.y->radius + 1;
       const PixelBounds pixels = {FloorToInt(x_low - reach_x), FloorToInt(y_low - reach_y), FloorToInt(x_high + reach_x) + 1,
                                   FloorToInt(y_high + reach_y) + 1};
-      const bool open = MayShow(pixels);
-      open_blocks_[std::size_t(cell_u - cells_.first_cell)] = open;
-      any |= open;
+      if (MayShow(pixels)) open_cells_.push_back(cell_u - cells_.first_cell);
     }
-    return any;
+    return !open_cells_.empty();
   }
 
   bool MayShow(const PixelBounds& pixels) const {
@@ -181,14 +187,12 @@ class Pass {
     if (cells_.first_record[beam] == cells_.first_record[beam + 1]) return;
     const Homogeneous seed = projection_.SliceOrigin(slice_) + double(row) * projection_.step_v();
     const std::uint32_t* masks = cells_.Masks(beam);
-    const VoxelRecord* records = &cells_.records[cells_.first_record[beam]];
-    for (std::int32_t cell = 0; cell < cells_.cell_count; ++cell) {
+    const std::uint16_t* offsets = cells_.RecordOffsets(beam);
+    const VoxelRecord* beam_records = &cells_.records[cells_.first_record[beam]];
+    for (const std::int32_t cell : open_cells_) {
       const std::uint32_t mask = masks[cell];
       if (mask == 0) continue;
-      if (open_blocks_[std::size_t(cell)] == 0) {
-        records += std::popcount(mask);
-        continue;
-      }
+      const VoxelRecord* records = beam_records + offsets[cell];
       const std::int32_t number = cells_.first_cell + cell;
       BeamPiece piece = CellPiece(seed + double(number * kCell) * projection_.step_u(), footprints_.At(number, row / kCell));
       for (std::int32_t begin = 0; begin < kCell; begin += piece_voxels_) {
@@ -226,11 +230,15 @@ class Pass {
   // Pixels of the frame that footprints of the piece's voxels cover. A line stays a line, so the ends decide.
   PixelBounds PieceBounds(const BeamPiece& piece) const {
     const auto first = float(std::countr_zero(piece.mask)), last = float(31 - std::countl_zero(piece.mask));
-    const float w_first = piece.w0 + first * piece.w_step, w_last = piece.w0 + last * piece.w_step;
-    const std::int32_t xa = FloorToInt((piece.x0 + first * piece.x_step) / w_first),
-                       xb = FloorToInt((piece.x0 + last * piece.x_step) / w_last);
-    const std::int32_t ya = FloorToInt((piece.y0 + first * piece.y_step) / w_first),
-                       yb = FloorToInt((piece.y0 + last * piece.y_step) / w_last);
+    float per_w_first = 1, per_w_last = 1;
+    if (projection_.perspective()) {
+      per_w_first = 1 / (piece.w0 + first * piece.w_step);
+      per_w_last = 1 / (piece.w0 + last * piece.w_step);
+    }
+    const std::int32_t xa = FloorToInt((piece.x0 + first * piece.x_step) * per_w_first),
+                       xb = FloorToInt((piece.x0 + last * piece.x_step) * per_w_last);
+    const std::int32_t ya = FloorToInt((piece.y0 + first * piece.y_step) * per_w_first),
+                       yb = FloorToInt((piece.y0 + last * piece.y_step) * per_w_last);
     const std::int32_t x = piece.column + sheet_.bounds().x_begin, y = piece.row + sheet_.bounds().y_begin;
     const std::int32_t slack = projection_.perspective();  // a division more: the ends may round the other way
     return {x + std::min(xa, xb) - slack, y + std::min(ya, yb) - slack, x + std::max(xa, xb) + piece.kernel_x->taps + slack,
@@ -241,15 +249,17 @@ class Pass {
     const PixelBounds pixels = PieceBounds(piece);
     if (!MayShow(pixels)) return;
     sheet_.Touch(pixels);
+    for (std::int32_t i = 0; i < piece.count; i += kRecordsPerLine) __builtin_prefetch(piece.records + i);  // read by the transform
     if (batch_.voxel_count + std::size_t(piece.count) > VoxelBatch::kVoxels) Flush();
     batch_.pieces.push_back(piece);
     batch_.voxel_count += std::size_t(piece.count);
   }
 
-  // Runs the stages over the batch. Finding pieces counts as transform.
+  // Runs the stages over the batch. Finding pieces and culling count as transform.
   void Flush() {
     if (batch_.voxel_count == 0) return;
     TransformPieces(projection_.perspective() ? Projection::kPerspective : Projection::kOrthographic, batch_);
+    if (sheet_.culls_voxels()) CullHiddenVoxels(sheet_.hidden_tiles(), batch_);
     clock_.Charge(Stage::kTransform);
     ShadePieces(tables_, projection_.perspective(), batch_);
     clock_.Charge(Stage::kShade);
@@ -271,7 +281,7 @@ class Pass {
   RankReport& report_;
   // Of the slice at hand.
   std::int32_t slice_ = 0, piece_voxels_ = kCell;
-  std::vector<std::uint8_t> open_blocks_;  // by cell along u, for the row of blocks at hand
+  std::vector<std::int32_t> open_cells_;  // along u, of the row of blocks at hand
   float area_ = 1;
 };
 
@@ -284,13 +294,14 @@ Result<LocalImage> SplattingRenderer::Render(SlabData& slab, const Box& box, con
   const OccupiedCells& cells = slab.derived().Occupied(setup, box);
   report.occupied_voxels += cells.occupied_in_box;
   const SliceProjection projection(setup.camera, setup.description.geometry);
-  const PixelBounds bounds = cells.occupied.empty() ? PixelBounds{} : ScreenBounds(cells, box, setup, projection);
+  const double largest_radius = cells.occupied.empty() ? 0 : LargestRadius(cells, projection);
+  const PixelBounds bounds = cells.occupied.empty() ? PixelBounds{} : ScreenBounds(cells, box, setup, projection, largest_radius);
   LocalImage image = MakeLocalImage(PixelFormat::kRgba, {});
   clock.Charge(Stage::kPrepare);
   if (!bounds.empty()) {
     const ShadeTables tables = MakeShadeTables(table, projection, setup);
     clock.Charge(Stage::kShade);
-    Pass pass(cells, box, setup, tables, projection, bounds, clock, report);
+    Pass pass(cells, box, setup, tables, projection, bounds, largest_radius, clock, report);
     const std::int32_t begin = cells.occupied.begin[cells.axes.c], end = cells.occupied.end[cells.axes.c];
     for (std::int32_t i = 0; i < end - begin; ++i) {
       if (cancelled) return Status::Cancelled("rendering was cancelled");
