@@ -153,7 +153,11 @@ void CoordinatorService::Impl::ReceiveFromClients() {
     if (!incoming) return;
     Result<AnyMessage> message = Decode(incoming->parts[0].span());
     if (!message.ok()) {
-      LogWarning("client plane: dropped a message: " + message.status().message());
+      LogWarning("client plane: refused a message: " + message.status().message());
+      // A request that can be told by its id gets its answer, so that nobody waits for what will never come.
+      if (const std::optional<AnyMessage> refusal = RefusalOf(incoming->parts[0].span(), message.status())) {
+        (void)clients.Send(incoming->identity, Encode(*refusal));
+      }
       continue;
     }
     HandleEvent(FromClient{client_peers.Heard(incoming->identity, MonotonicNow()), std::move(*message)});
@@ -188,7 +192,9 @@ Result<std::unique_ptr<CoordinatorService>> CoordinatorService::Start(Context& c
     if (const Result<Endpoint> parsed = ParseEndpoint(endpoint, true); !parsed.ok()) return parsed.status();
   }
 
-  Result<Socket> clients = Socket::Router(context);
+  SocketOptions client_options;
+  client_options.max_message_bytes = kMaxRequestBytes;
+  Result<Socket> clients = Socket::Router(context, client_options);
   if (!clients.ok()) return clients.status();
   Result<Socket> control = Socket::Router(context);
   if (!control.ok()) return control.status();

@@ -60,6 +60,7 @@ struct WorkerService::Impl {
   void Receive(Socket& socket, const char* plane);
   void HandleEvent(const WorkerEvent& event);
   void HandleOutput(ExecutorOutput& output);
+  void SetRegistered();
   void Remember(const AnyMessage& message);
 
   // One for each kind of action.
@@ -82,6 +83,7 @@ struct WorkerService::Impl {
   PeerSockets peers;
   Epoch epoch = 0;
   std::map<FrameId, PixelBounds> frames;  // pixels of the frames at hand, to check partial images against
+  std::atomic<bool> registered = false;  // ever, or stopped
   std::atomic<bool> stop_requested = false;
   std::atomic<bool> stopped = false;
   bool stop_now = false;           // the machine said so
@@ -110,6 +112,7 @@ void WorkerService::Impl::Run() {
     peers.CloseIdle(now);
   }
   executor.reset();
+  SetRegistered();
   stopped = true;
   stopped.notify_all();
 }
@@ -145,6 +148,11 @@ void WorkerService::Impl::HandleEvent(const WorkerEvent& event) {
   for (WorkerAction& action : machine.Step(event, MonotonicNow())) {
     std::visit([this](auto& each) { Perform(each); }, action);
   }
+  if (machine.registered()) SetRegistered();
+}
+
+void WorkerService::Impl::SetRegistered() {
+  if (!registered.exchange(true)) registered.notify_all();
 }
 
 void WorkerService::Impl::HandleOutput(ExecutorOutput& output) {
@@ -224,6 +232,7 @@ void WorkerService::RequestStop() {
   impl_->outbox.wakeup().Notify();
 }
 
+void WorkerService::WaitUntilRegistered() { impl_->registered.wait(false); }
 void WorkerService::WaitUntilStopped() { impl_->stopped.wait(false); }
 bool WorkerService::stopped() const { return impl_->stopped; }
 

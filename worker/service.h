@@ -24,6 +24,9 @@ class WorkerService {
   static Result<std::unique_ptr<WorkerService>> Start(Context& context, WorkerOptions options);
   ~WorkerService();  // stops and joins
 
+  // Returns once the coordinator has taken this worker in for the first time, or the service has stopped.
+  void WaitUntilRegistered();
+
   void RequestStop();
   void WaitUntilStopped();
   bool stopped() const;

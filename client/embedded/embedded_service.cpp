@@ -42,6 +42,8 @@ Result<std::unique_ptr<EmbeddedService>> EmbeddedService::Start(Context& context
   for (int i = 0; i < options.workers; ++i) {
     if (Status status = service->AddWorker(); !status.ok()) return status;
   }
+  // The first frame is planned for all of them, not for those that happen to be quick.
+  for (const auto& worker : service->impl_->workers) worker->WaitUntilRegistered();
   return service;
 }
 
