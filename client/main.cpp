@@ -2,8 +2,10 @@
 #include <iostream>
 
 #include "client/cli/command_line.h"
+#include "common/base/large_buffers.h"
 
 int main(int argc, char** argv) {
+  slabstream::MapLargeBuffers();
   try {
     return slabstream::RunCommandLine(argc, argv);
   } catch (const std::exception& error) {  // out of memory, mostly: everything that is expected comes back as a Status

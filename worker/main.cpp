@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <string>
 
+#include "common/base/large_buffers.h"
 #include "common/base/log.h"
 #include "common/base/stop_signals.h"
 #include "common/transport/socket.h"
@@ -22,6 +23,7 @@ int Fail(int exit_status, const std::string& message) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  slabstream::MapLargeBuffers();
   slabstream::WorkerOptions options;
   std::uint32_t threads = 1;
   std::uint64_t cache_mib = 0;

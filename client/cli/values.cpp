@@ -67,6 +67,9 @@ Result<ImageSize> ParseImageSize(std::string_view option, std::string_view text)
   if (!width.ok()) return width.status();
   const Result<int> height = ParseInteger(option, sides.back(), 1, kMaxImageSide);
   if (!height.ok()) return height.status();
+  if (const std::int64_t pixels = std::int64_t{*width} * *height; pixels > kMaxImagePixels) {
+    return Status::InvalidArgument(fmt::format("{} '{}' has {} pixels, at most {} are rendered", option, text, pixels, kMaxImagePixels));
+  }
   return ImageSize{*width, *height};
 }
 

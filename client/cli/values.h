@@ -26,7 +26,7 @@ Result<int> ParseInteger(std::string_view option, std::string_view text, int min
 // The index of the text in `choices`.
 Result<std::size_t> ParseChoice(std::string_view option, std::string_view text, std::span<const std::string_view> choices);
 
-// "640x480" or "512" (a square), each side in [1, kMaxImageSide].
+// "640x480" or "512" (a square), each side in [1, kMaxImageSide], at most kMaxImagePixels in all.
 Result<ImageSize> ParseImageSize(std::string_view option, std::string_view text);
 
 // "X,Y,Z", finite and not all zero.

@@ -80,7 +80,8 @@ Status Validate(const ViewParameters& view) {
 
 Status Validate(const ImageSize& size) {
   if (Status s = InRange("size.width", size.width, 1, kMaxImageSide); !s.ok()) return s;
-  return InRange("size.height", size.height, 1, kMaxImageSide);
+  if (Status s = InRange("size.height", size.height, 1, kMaxImageSide); !s.ok()) return s;
+  return InRange("size.width * size.height", double(size.width) * size.height, 1, double(kMaxImagePixels));
 }
 
 Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry) {

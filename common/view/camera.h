@@ -30,10 +30,11 @@ inline constexpr double kMinZoom = 1e-3, kMaxZoom = 1e4;
 inline constexpr double kMinFovDegrees = 1, kMaxFovDegrees = 60;
 inline constexpr double kMaxAngleDegrees = 1e6;      // of azimuth, elevation and roll, either sign
 inline constexpr int kMaxImageSide = 16384;          // pixels
+inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1} << 26;  // 8192 x 8192: about 2.5 GB of working memory a worker
 inline constexpr int kMaxSupersample = 1024;
 
 struct ImageSize {
-  int width = 512, height = 512;  // pixels, [1, kMaxImageSide]
+  int width = 512, height = 512;  // pixels, [1, kMaxImageSide], and at most kMaxImagePixels in all
   friend bool operator==(const ImageSize&, const ImageSize&) = default;
 };
 

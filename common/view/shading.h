@@ -13,7 +13,8 @@ inline constexpr int kMaxLights = 8;
 struct Shading {
   bool phong = true;
   std::vector<Vec3> lights;  // directions towards the lights in volume axes (physical), not zero; empty: a headlight
-  float ambient = 0.3F, diffuse = 0.6F, specular = 0.3F;  // [0, 1]
+  // Ambient and diffuse add up to 1: what faces a single light has just the colour that the transfer function gives it.
+  float ambient = 0.2F, diffuse = 0.8F, specular = 0.2F;  // [0, 1]
   float shininess = 20;                                   // [1, 1000]
   friend bool operator==(const Shading&, const Shading&) = default;
 };

@@ -226,6 +226,8 @@ TEST(Camera, ValidateNamesTheFieldAndTheLimits) {
   EXPECT_NE(message([](auto& v) { v.projection = Projection{9}; }).find("view.projection is 9"), std::string::npos);
   EXPECT_EQ(Validate(ImageSize{0, 5}).message(), "size.width is 0, but must lie in [1, 16384]");
   EXPECT_EQ(Validate(ImageSize{5, 16385}).message(), "size.height is 16385, but must lie in [1, 16384]");
+  EXPECT_TRUE(Validate(ImageSize{16384, 4096}).ok());
+  EXPECT_EQ(Validate(ImageSize{16384, 4097}).code(), StatusCode::kInvalidArgument);
 }
 
 }  // namespace
