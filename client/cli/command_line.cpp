@@ -35,6 +35,7 @@ void DeclareRender(CLI::App& app, RenderOptions& options, Command& command) {
   CLI::App* sub = app.add_subcommand("render", "Render one picture of a volume");
   AddFrameOptions(*sub, options.frame);
   sub->add_option("-o,--output", options.output, "The picture: .png or .exr")->required()->type_name("FILE");
+  sub->add_flag("--previews", options.frame.request.previews, "Write the picture anew after each group, nearest first (see --groups)");
   sub->callback([&] { command = [&] { return RunRender(options); }; });
 }
 

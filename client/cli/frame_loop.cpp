@@ -24,7 +24,7 @@ class FrameLoop {
     while (next_ < jobs_.size() || !open_.empty()) {
       if (interrupt.interrupted()) return Abandon(Status::Cancelled("interrupted"));
       SubmitAhead();
-      // Short, so that finished writes make room even when the service has nothing to say.
+      // A finished write ends the wait too; the timeout is for one that finishes just as a message arrives.
       if (auto event = client_.Next(milliseconds(50))) {
         if (Status status = Handle(*std::move(event)); !status.ok()) return Abandon(std::move(status));
       }
@@ -63,14 +63,17 @@ class FrameLoop {
       return std::move(*failure);
     }
     auto& picture = std::get<Picture>(event.what);
-    if (!picture.final) return Status::Ok();
+    // Written at once, so that it cannot come after the final picture in the same file.
+    if (!picture.final) return WritePicture(picture.image, picture.size, jobs_[index].output, options_.format);
     open_.erase(found);
     display_.FrameDone(int(index));
     FrameRecord& record = records_[index];
     record = {jobs_[index].output, picture.latency, std::move(picture.statistics)};
     if (!options_.keep_reports) record.statistics.reports = {};
-    writes_.push_back(std::async(std::launch::async, [picture = std::move(picture), output = record.output, format = options_.format] {
-      return WritePicture(picture.image, picture.size, output, format);
+    writes_.push_back(std::async(std::launch::async, [this, picture = std::move(picture), output = record.output] {
+      Status status = WritePicture(picture.image, picture.size, output, options_.format);
+      client_.wakeup().Notify();
+      return status;
     }));
     return Status::Ok();
   }
