@@ -79,19 +79,27 @@ MaterialBins Material(const VolumeSummary& summary) {
   return above.share > 0 ? above : MaterialBins{kHistogramBins / 2, kHistogramBins - 1, 0.5};
 }
 
-// Solid within a few voxels of the border of tissue and background. Grey matter at the bottom of the folds shares its voxels with fluid and
-// is darker than that on top: colour makes it darker still, so that the folds stand out.
+// Opacity, per voxel length, that lets 2 % through a stretch of this share of the volume's side, and of at least four voxels: where a
+// surface is solid within fewer, its voxels show as steps, like the grain of wood.
+double SoftSurfaceOpacity(const VolumeSummary& summary, double share_of_side) {
+  const double side = std::cbrt(double(summary.description.geometry.bounds().voxel_count()));
+  return 1 - std::pow(0.02, 1 / std::max(share_of_side * side, 4.0));
+}
+
+// A soft surface round grey matter. At the bottom of the folds grey matter shares its voxels with fluid and is darker than that on top:
+// colour makes it darker still, so that the folds stand out.
 TransferFunction MriBrain(const VolumeSummary& summary) {
   const MaterialBins tissue = Material(summary);
   const double begin = BinBorder(summary.range, tissue.first), middle = Quantile(summary, tissue, 0.5);
-  const auto at = [&](double q) { return Quantile(summary, tissue, q); };
-  return {{{begin, {0.58F, 0.36F, 0.31F}},
-           {at(0.03), {0.66F, 0.43F, 0.37F}},
-           {at(0.12), {0.80F, 0.57F, 0.50F}},
-           {at(0.35), {0.91F, 0.72F, 0.64F}},
-           {at(0.70), {0.95F, 0.83F, 0.76F}},
-           {at(0.98), {0.99F, 0.94F, 0.88F}}},
-          {{std::lerp(begin, middle, 0.3), 0}, {std::lerp(begin, middle, 0.7), 0.9}, {at(0.98), 0.95}}};
+  const double clear = std::lerp(begin, middle, 0.4), solid = std::lerp(begin, middle, 0.85), opacity = SoftSurfaceOpacity(summary, 0.025);
+  const auto at = [&](double q) { return std::max(clear, Quantile(summary, tissue, q)); };
+  return {{{clear, {0.34F, 0.17F, 0.14F}},
+           {at(0.02), {0.66F, 0.40F, 0.34F}},
+           {at(0.20), {0.87F, 0.60F, 0.52F}},
+           {at(0.45), {0.95F, 0.75F, 0.66F}},
+           {at(0.70), {0.98F, 0.86F, 0.78F}},
+           {at(0.98), {1.00F, 0.95F, 0.90F}}},
+          {{clear, 0}, {solid, opacity}, {std::max(solid, at(0.98)), std::min(1.4 * opacity, 0.95)}}};
 }
 
 // Skin as a veil, what is brighter shines through it.
