@@ -284,8 +284,10 @@ TEST(Phong, LightsBothSidesAndEveryLight) {
   EXPECT_FLOAT_EQ(towards.specular, 0.25F);       // the first one's mirror image is in the eye
   EXPECT_FLOAT_EQ(away.diffuse, towards.diffuse);
   EXPECT_FLOAT_EQ(away.specular, towards.specular);
-  EXPECT_FLOAT_EQ(phong.WithoutGradient().diffuse, 0.6F);
+  EXPECT_FLOAT_EQ(phong.WithoutGradient().diffuse, 0.1F + 2 * 0.25F);  // half of what each light gives head on
   EXPECT_FLOAT_EQ(phong.WithoutGradient().specular, 0.0F);
+  EXPECT_FLOAT_EQ(phong.AtNormal({0, 1, 0}).diffuse, 0.1F);  // both graze: the rim is ambient
+  EXPECT_FLOAT_EQ(phong.AtNormal({0, 1, 0}).specular, 0.0F);
   shading.phong = false;
   EXPECT_FLOAT_EQ(Phong(shading, {0, 0, -1}).AtNormal({1, 0, 0}).diffuse, 1.0F);
 }

@@ -18,19 +18,6 @@ double Stored(const VoxelBlock& block, const Index3& v) {
                          [&](auto* tag) { return double(block.samples<std::remove_cvref_t<decltype(*tag)>>()[block.Offset(v)]); });
 }
 
-Vec3 Gradient(const Volume& volume, const Index3& v) {
-  Vec3 gradient;
-  for (int axis = 0; axis < 3; ++axis) {
-    Index3 below = v, above = v;
-    below[axis] = std::max(v[axis] - 1, 0);
-    above[axis] = std::min(v[axis] + 1, volume.description.geometry.size[axis] - 1);
-    if (above[axis] == below[axis]) continue;
-    gradient[axis] = (Stored(volume.block, above) - Stored(volume.block, below)) /
-                     ((above[axis] - below[axis]) * volume.description.geometry.spacing[axis]);
-  }
-  return gradient;
-}
-
 // d(x, y) / d(data axis) at a data-space point.
 struct Jacobian {
   std::array<double, 3> x{}, y{};
@@ -72,6 +59,31 @@ Sigma FootprintOf(const FrameSetup& setup, const Index3& voxel) {
 
 }  // namespace
 
+Vec3 ReferenceGradient(const Volume& volume, const Index3& voxel) {
+  const VolumeGeometry& geometry = volume.description.geometry;
+  Vec3 gradient;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int below = std::max(voxel[axis] - 1, 0), above = std::min(voxel[axis] + 1, geometry.size[axis] - 1);
+    if (above == below) continue;
+    const int other = (axis + 1) % 3, another = (axis + 2) % 3;
+    double difference = 0;
+    for (int i = -1; i <= 1; ++i) {
+      for (int j = -1; j <= 1; ++j) {
+        Index3 at;
+        at[other] = std::clamp(voxel[other] + i, 0, geometry.size[other] - 1);
+        at[another] = std::clamp(voxel[another] + j, 0, geometry.size[another] - 1);
+        const double weight = (2 - std::abs(i)) * (2 - std::abs(j)) / 16.0;
+        at[axis] = above;
+        difference += weight * Stored(volume.block, at);
+        at[axis] = below;
+        difference -= weight * Stored(volume.block, at);
+      }
+    }
+    gradient[axis] = difference / ((above - below) * geometry.spacing[axis]);
+  }
+  return gradient;
+}
+
 LocalImage ReferenceSplatting(const Volume& volume, const FrameSetup& setup) {
   const Camera& camera = setup.camera;
   const Index3& size = volume.description.geometry.size;
@@ -95,7 +107,7 @@ LocalImage ReferenceSplatting(const Volume& volume, const FrameSetup& setup) {
         const auto bin = std::size_t(table.BinOf(stored));
         if (table.opacity[bin] == 0) continue;
         const double opacity = 1 - std::pow(1 - double(table.opacity[bin]), exponent);
-        const Vec3 gradient = Gradient(volume, q);
+        const Vec3 gradient = ReferenceGradient(volume, q);
         const PhongFactors factors = Length(gradient) > 0 ? phong.AtNormal(Normalized(gradient)) : phong.WithoutGradient();
         const Rgb& color = table.color[bin];
         std::array<double, 4> value = {color.r, color.g, color.b, 1};

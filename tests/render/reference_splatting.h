@@ -9,4 +9,7 @@ namespace slabstream::testing {
 // The whole volume; the image covers the whole frame. setup.termination is not used.
 LocalImage ReferenceSplatting(const Volume& volume, const FrameSetup& setup);
 
+// Of the stored samples at a voxel, in units of the samples by physical distance.
+Vec3 ReferenceGradient(const Volume& volume, const Index3& voxel);
+
 }  // namespace slabstream::testing

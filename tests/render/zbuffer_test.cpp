@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "tests/render/render_support.h"
+#include "worker/render/zbuffer/surface_normal.h"
 
 namespace slabstream {
 namespace {
@@ -93,6 +94,28 @@ TEST(ZBuffer, BallHasItsSilhouetteDepthAndShade) {
           const Vec3 normal = (1 / kRadius) * (ray.origin + hit * direction - middle);
           const double expected = std::abs(Dot(normal, setup.camera.view_direction)) * 1.0;
           ASSERT_NEAR(PixelOf(image, x, y)[0], expected, 0.1) << x << ' ' << y;
+        }
+      }
+    }
+  }
+}
+
+// A ramp has its gradient at every point of every cell, borders included; a constant has none at all, not even by rounding.
+TEST(ZBuffer, GradientsOfRampsAndConstantsAreExact) {
+  const unsigned seed = 12;
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> within(-0.5, 0.5);
+  const Vec3 spacing = {0.5, 2, 1.3};
+  for (Index3 size : {Index3{9, 6, 5}, Index3{2, 3, 1}}) {
+    const Volume ramp = MakeVolume({size, spacing}, ScalarType::kFloat32, [](const Index3& v) { return 2.0 * v.x - 3.0 * v.y + v.z; });
+    const Volume constant = MakeVolume({size, spacing}, ScalarType::kFloat32, [](const Index3&) { return 0.1; });
+    const Vec3 expected = Vec3{size.x > 1 ? 2.0 : 0.0, size.y > 1 ? -3.0 : 0.0, size.z > 1 ? 1.0 : 0.0} / spacing;
+    for (Index3 v; v.z < size.z; ++v.z) {
+      for (v.y = 0; v.y < size.y; ++v.y) {
+        for (v.x = 0; v.x < size.x; ++v.x) {
+          const Vec3 point = ToVec3(v) + Vec3{within(random), within(random), within(random)};
+          ASSERT_LT(Length(GradientAt(ramp.block, spacing, v, point) - expected), 1e-12) << "seed " << seed;
+          ASSERT_EQ(GradientAt(constant.block, spacing, v, point), Vec3{}) << "seed " << seed;
         }
       }
     }

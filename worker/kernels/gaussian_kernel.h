@@ -5,7 +5,7 @@
 //   1
 //
 // The Gaussian is lowered by its value at the cut, so that it ends without a step: summed over a filled slice, the steps of a plain cut
-// make ripples five times larger (0.5 % at one voxel a pixel, against 0.1 %).
+// make ripples 2.4 times larger at one pixel a voxel.
 //
 // A voxel centred at image coordinate x covers the pixels column, column + 1, ... column + taps - 1 of its row, where
 //   t = x - 0.5 - radius;   column = floor(t) + 1;   phase = floor((t - floor(t)) * phases)
@@ -31,7 +31,9 @@ struct GaussianKernel {
   double radius = 0;  // pixels: kFootprintCut * sigma
   std::int32_t taps = 0;
   std::int32_t padded_taps = 0;
-  int phases = 0;  // a power of two; the finer the narrower the kernel: the centre is off by at most sigma / 69 (phases / 2 pixel)
+  // A power of two, the more the narrower the kernel. The centre is off by at most 1 / (2 * phases) pixel: 1/128 pixel up to sigma = 1,
+  // about sigma / 64 above.
+  int phases = 0;
   bool has_tables() const { return !y_weights.empty(); }
 
   // [phase]: taps that are not 0, which is often one less than `taps`; columns are rounded up to kTapPadding.

@@ -45,14 +45,15 @@ PhongFactors Phong::AtNormal(const Vec3& unit_normal) const {
     const double n_l = Dot(unit_normal, light);
     const Vec3 reflected = 2 * n_l * unit_normal - light;
     diffuse += std::abs(n_l);
-    specular += PowerOfFraction(std::abs(Dot(reflected, to_viewer_)), shading_.shininess);
+    specular += PowerOfFraction(Dot(reflected, to_viewer_), shading_.shininess);
   }
   return {float(shading_.ambient + shading_.diffuse * diffuse), float(shading_.specular * specular)};
 }
 
 PhongFactors Phong::WithoutGradient() const {
   if (!shading_.phong) return {};
-  return {shading_.ambient + shading_.diffuse, 0.0F};
+  constexpr double kMean = 0.5;  // of |N.L| over all directions of N
+  return {float(shading_.ambient + shading_.diffuse * kMean * double(lights_.size())), 0.0F};
 }
 
 std::vector<PhongFactors> Phong::ByNormalCode() const {

@@ -1,7 +1,9 @@
 // Phong (1975) shading with white directional lights and the viewer at infinity, on both sides of a surface:
-//   I = clamp(colour * (ambient + diffuse * sum |N.L|) + specular * sum |R.V|^shininess, 0, 1);   R = 2 (N.L) N - L
-// sums over the lights; V points against the view direction, L towards the light. Without a gradient: colour * (ambient + diffuse), no
-// specular part.
+//   I = clamp(colour * (ambient + diffuse * sum |N.L|) + specular * sum max(R.V, 0)^shininess, 0, 1);   R = 2 (N.L) N - L
+// sums over the lights; V points against the view direction, L towards the light. Inside homogeneous material there is no gradient: it is
+// lit as surfaces that face every way are on average, |N.L| = 1/2, without a specular part. (Lit as if it faced the light, it would show
+// as bright rings where footprints reach up from below the steps of a hard-edged surface.) A negative R.V counts as 0: edge-on to a
+// headlight, R points straight away from the viewer, and by its size the rim would be as bright as the highlight.
 #pragma once
 
 #include <vector>

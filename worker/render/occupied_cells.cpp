@@ -5,6 +5,7 @@
 #include <bit>
 #include <limits>
 #include <type_traits>
+#include <utility>
 
 #include "worker/kernels/normal_code.h"
 
@@ -15,7 +16,10 @@ constexpr std::int32_t kCell = kFootprintCell;
 static_assert(kCell == 32, "masks are 32 bits");
 static_assert(kCell % BrickRanges::kBrick == 0, "a brick's row lies in one cell");
 
-// Normal codes of `count` <= kBrick voxels of a row.
+// Normal codes of a row of at most kBrick voxels: the gradient of Zucker and Hummel (1981), along each axis the difference of the two
+// neighbouring slices, smoothed by (1, 2, 1) along the other two. Each of the 3 x 3 rows round the row is read once, column by column: what
+// is shared along y and z is summed before x comes in. Voxels outside are as their nearest ones inside. The smoothing's factor 16 is the
+// same for all axes and left in: only the direction is kept.
 template <class T>
 class RowNormals {
  public:
@@ -25,38 +29,57 @@ class RowNormals {
   }
 
   void Compute(const Index3& first, std::int32_t count, std::uint16_t* codes) const {
-    const T* at = samples_ + (first.z - box_.begin.z) * strides_[2] + (first.y - box_.begin.y) * strides_[1] + (first.x - box_.begin.x);
-    const Difference y = Along(Axis::kY, first), z = Along(Axis::kZ, first);
-    const auto code = [&](std::int32_t i, const Difference& x) {
-      const T* p = at + i;
-      return EncodeNormal(x.scale * (float(p[x.above]) - float(p[x.below])), y.scale * (float(p[y.above]) - float(p[y.below])),
-                          z.scale * (float(p[z.above]) - float(p[z.below])));
+    const Neighbours y = Along(Axis::kY, first), z = Along(Axis::kZ, first);
+    const T* middle = samples_ + (first.z - box_.begin.z) * strides_[2] + (first.y - box_.begin.y) * strides_[1] + (first.x - box_.begin.x);
+    const T* below = middle + z.below;
+    const T* above = middle + z.above;
+
+    // Column i holds what x = first.x + i - 1 adds.
+    Columns smooth, along_y, along_z;
+    const std::int32_t begin = first.x > box_.begin.x ? 0 : 1, end = first.x + count < box_.end.x ? count + 2 : count + 1;
+    for (std::int32_t i = begin; i < end; ++i) {
+      const auto row = [&](const T* centre) {
+        const float a = float(centre[i - 1 + y.below]), b = float(centre[i - 1]), c = float(centre[i - 1 + y.above]);
+        return std::pair(Smooth(a, b, c), c - a);
+      };
+      const auto [smooth_below, y_below] = row(below);
+      const auto [smooth_middle, y_middle] = row(middle);
+      const auto [smooth_above, y_above] = row(above);
+      smooth[std::size_t(i)] = Smooth(smooth_below, smooth_middle, smooth_above);
+      along_y[std::size_t(i)] = Smooth(y_below, y_middle, y_above);
+      along_z[std::size_t(i)] = smooth_above - smooth_below;
+    }
+    for (Columns* columns : {&smooth, &along_y, &along_z}) {
+      if (begin == 1) (*columns)[0] = (*columns)[1];
+      if (end == count + 1) (*columns)[std::size_t(end)] = (*columns)[std::size_t(count)];
+    }
+
+    const auto code = [&](std::size_t i, float x_scale) {
+      return EncodeNormal(x_scale * (smooth[i + 2] - smooth[i]), y.scale * Smooth(along_y[i], along_y[i + 1], along_y[i + 2]),
+                          z.scale * Smooth(along_z[i], along_z[i + 1], along_z[i + 2]));
     };
-    // All but the ends of the whole row have the same differences along x.
-    std::int32_t begin = 0, end = count;
-    if (first.x == box_.begin.x) {
-      codes[0] = code(0, Along(Axis::kX, first));
-      begin = 1;
-    }
-    if (const Index3 last = {first.x + count - 1, first.y, first.z}; last.x == box_.end.x - 1 && count > begin) {
-      codes[count - 1] = code(count - 1, Along(Axis::kX, last));
-      end = count - 1;
-    }
-    const Difference x = {1, -1, float(0.5 / spacing_.x)};
-    for (std::int32_t i = begin; i < end; ++i) codes[i] = code(i, x);
+    const auto inner_scale = float(0.5 / spacing_.x);
+    for (std::size_t i = 0; i < std::size_t(count); ++i) codes[i] = code(i, inner_scale);
+    // The ends of the whole row have one neighbour along x.
+    if (begin == 1) codes[0] = code(0, Along(Axis::kX, first).scale);
+    if (end == count + 1) codes[count - 1] = code(std::size_t(count - 1), Along(Axis::kX, {first.x + count - 1, first.y, first.z}).scale);
   }
 
  private:
-  struct Difference {
+  using Columns = std::array<float, BrickRanges::kBrick + 2>;
+
+  struct Neighbours {
     std::int64_t above, below;  // sample offsets of the two neighbours, or of the voxel itself at a border
-    float scale;                // 1 / physical distance; 0 if both are the voxel itself
+    float scale;                // 1 / physical distance of the two; 0 if both are the voxel itself
   };
-  Difference Along(Axis axis, const Index3& voxel) const {
+  Neighbours Along(Axis axis, const Index3& voxel) const {
     const bool has_above = voxel[axis] + 1 < box_.end[axis], has_below = voxel[axis] > box_.begin[axis];
     const std::int64_t stride = strides_[std::size_t(Number(axis))];
     const int steps = int(has_above) + int(has_below);
     return {has_above ? stride : 0, has_below ? -stride : 0, steps == 0 ? 0.0F : float(1 / (steps * spacing_[axis]))};
   }
+
+  static float Smooth(float below, float middle, float above) { return below + above + 2 * middle; }
 
   Box box_;
   const T* samples_;

@@ -47,8 +47,8 @@ struct OccupiedCells {
 };
 
 // In the slices of `box`, with the halo of each slice. Occupied: `selection` holds the voxel's bin. Normals are those of the data's
-// gradient by central differences over physical spacing, one-sided at the border of the voxels at hand (which is the volume's border, or
-// inside the halo where nothing is read).
+// gradient by smoothed central differences (docs/rendering.md) over physical spacing, one-sided at the border of the voxels at hand (which
+// is the volume's border, or inside the halo where nothing is read).
 OccupiedCells FindOccupiedCells(const VoxelBlock& voxels, const BrickRanges& bricks, const ClassificationTable& table,
                                 const BinSelection& selection, const Vec3& spacing, Axis traversal, const Box& box);
 

@@ -10,6 +10,7 @@
 #include "worker/kernels/splat.h"
 #include "worker/kernels/transform.h"
 #include "worker/render/derived.h"
+#include "worker/render/splatting/cell_piece.h"
 #include "worker/render/splatting/footprints.h"
 #include "worker/render/splatting/ownership.h"
 #include "worker/render/splatting/sheet.h"
@@ -194,7 +195,11 @@ class Pass {
       if (mask == 0) continue;
       const VoxelRecord* records = beam_records + offsets[cell];
       const std::int32_t number = cells_.first_cell + cell;
-      BeamPiece piece = CellPiece(seed + double(number * kCell) * projection_.step_u(), footprints_.At(number, row / kCell));
+      BeamPiece piece =
+          CellPiece(seed + double(number * kCell) * projection_.step_u(), projection_.step_u(), footprints_.At(number, row / kCell));
+      piece.area = area_;
+      piece.column -= sheet_.bounds().x_begin;
+      piece.row -= sheet_.bounds().y_begin;
       for (std::int32_t begin = 0; begin < kCell; begin += piece_voxels_) {
         const std::uint64_t wanted = ((std::uint64_t{1} << piece_voxels_) - 1) << begin;
         piece.mask = mask & std::uint32_t(wanted);
@@ -205,26 +210,6 @@ class Pass {
         AddPiece(piece);
       }
     }
-  }
-
-  // All that voxels of a cell share, from the homogeneous coordinates of the cell's first place.
-  BeamPiece CellPiece(const Homogeneous& first, const FootprintPair& footprint) const {
-    BeamPiece piece;
-    piece.kernel_x = footprint.x;
-    piece.kernel_y = footprint.y;
-    const double margin_x = 0.5 + footprint.x->radius, margin_y = 0.5 + footprint.y->radius;
-    const std::int32_t column = FloorToInt(first.x / first.w - margin_x), row = FloorToInt(first.y / first.w - margin_y);
-    const Homogeneous& step = projection_.step_u();
-    piece.x0 = float(first.x - (column + margin_x) * first.w);
-    piece.x_step = float(step.x - (column + margin_x) * step.w);
-    piece.y0 = float(first.y - (row + margin_y) * first.w);
-    piece.y_step = float(step.y - (row + margin_y) * step.w);
-    piece.w0 = float(first.w);
-    piece.w_step = float(step.w);
-    piece.area = area_;
-    piece.column = column + 1 - sheet_.bounds().x_begin;
-    piece.row = row + 1 - sheet_.bounds().y_begin;
-    return piece;
   }
 
   // Pixels of the frame that footprints of the piece's voxels cover. A line stays a line, so the ends decide.

@@ -7,50 +7,63 @@
 namespace slabstream {
 namespace {
 
-// One of the three places along an axis: its share, and where central differences there read. Offsets are in samples from the voxel.
-struct Place {
-  double weight;
-  std::int64_t offset;
-  std::int64_t below, above;  // from the place
-  double per_distance;        // 1 / physical distance of the two; 0 where the volume is one voxel thick
+// Along one axis, the B-spline over three places and the differences or smoothing at each are one filter over five samples, from two below
+// the voxel to two above it. At the border samples outside have no weight.
+struct Taps {
+  std::array<std::int64_t, 5> offset{};  // samples from the voxel
+  std::array<double, 5> smooth{};        // sums to 1
+  std::array<double, 5> slope{};         // 1 / physical distance; sums to 0
 };
 
-std::array<Place, 3> PlacesAlong(int axis, const Box& box, const Vec3& spacing, const Index3& voxel, const Vec3& point) {
+Taps TapsAlong(int axis, const Box& box, const Vec3& spacing, const Index3& voxel, const Vec3& point) {
   const Index3 size = box.size();
   const std::int64_t stride = axis == 0 ? 1 : axis == 1 ? size.x : std::int64_t{1} * size.x * size.y;
+  const auto inside = [&](std::int32_t at) { return std::clamp(at, box.begin[axis], box.end[axis] - 1); };
+  const auto tap = [&](std::int32_t at) { return std::size_t(at - voxel[axis] + 2); };
+  Taps taps;
+  for (std::int32_t at = voxel[axis] - 2; at <= voxel[axis] + 2; ++at) taps.offset[tap(at)] = (inside(at) - voxel[axis]) * stride;
+
   const double t = point[axis] - voxel[axis];
-  const std::array<double, 3> weights = {0.5 * (0.5 - t) * (0.5 - t), 0.75 - t * t, 0.5 * (0.5 + t) * (0.5 + t)};
-  std::array<Place, 3> places{};
+  const std::array<double, 3> spline = {0.5 * (0.5 - t) * (0.5 - t), 0.75 - t * t, 0.5 * (0.5 + t) * (0.5 + t)};
   for (int i = 0; i < 3; ++i) {
-    const std::int32_t at = std::clamp(voxel[axis] + i - 1, box.begin[axis], box.end[axis] - 1);
-    const std::int32_t below = std::max(at - 1, box.begin[axis]), above = std::min(at + 1, box.end[axis] - 1);
-    places[std::size_t(i)] = {weights[std::size_t(i)], (at - voxel[axis]) * stride, (below - at) * stride, (above - at) * stride,
-                              above == below ? 0.0 : 1 / ((above - below) * spacing[axis])};
+    const std::int32_t at = inside(voxel[axis] + i - 1), below = inside(at - 1), above = inside(at + 1);
+    const double weight = spline[std::size_t(i)];
+    taps.smooth[tap(below)] += 0.25 * weight;
+    taps.smooth[tap(at)] += 0.5 * weight;
+    taps.smooth[tap(above)] += 0.25 * weight;
+    if (above == below) continue;  // the volume is one voxel thick
+    const double per_distance = weight / ((above - below) * spacing[axis]);
+    taps.slope[tap(below)] -= per_distance;
+    taps.slope[tap(above)] += per_distance;
   }
-  return places;
+  return taps;
 }
 
 }  // namespace
 
 Vec3 GradientAt(const VoxelBlock& voxels, const Vec3& spacing, const Index3& voxel, const Vec3& point) {
-  const auto along_x = PlacesAlong(0, voxels.box, spacing, voxel, point);
-  const auto along_y = PlacesAlong(1, voxels.box, spacing, voxel, point);
-  const auto along_z = PlacesAlong(2, voxels.box, spacing, voxel, point);
+  const Taps along_x = TapsAlong(0, voxels.box, spacing, voxel, point);
+  const Taps along_y = TapsAlong(1, voxels.box, spacing, voxel, point);
+  const Taps along_z = TapsAlong(2, voxels.box, spacing, voxel, point);
   return VisitScalarType(voxels.type, [&](auto* type) {
     const auto* centre = voxels.samples<std::remove_cvref_t<decltype(*type)>>() + voxels.Offset(voxel);
-    Vec3 sum;
-    for (const Place& z : along_z) {
-      for (const Place& y : along_y) {
-        for (const Place& x : along_x) {
-          const auto* p = centre + (x.offset + y.offset + z.offset);
-          const double weight = x.weight * y.weight * z.weight;
-          sum.x += weight * x.per_distance * (double(p[x.above]) - double(p[x.below]));
-          sum.y += weight * y.per_distance * (double(p[y.above]) - double(p[y.below]));
-          sum.z += weight * z.per_distance * (double(p[z.above]) - double(p[z.below]));
+    const auto own = double(*centre);  // taken off every sample, so that the gradient of a constant is exactly 0
+    Vec3 gradient;
+    for (std::size_t k = 0; k < 5; ++k) {
+      Vec3 slice;  // d/dx, d/dy and value of the slice
+      for (std::size_t j = 0; j < 5; ++j) {
+        const auto* row = centre + (along_z.offset[k] + along_y.offset[j]);
+        double value = 0, slope = 0;
+        for (std::size_t i = 0; i < 5; ++i) {
+          const double rise = double(row[along_x.offset[i]]) - own;
+          value += along_x.smooth[i] * rise;
+          slope += along_x.slope[i] * rise;
         }
+        slice = slice + Vec3{along_y.smooth[j] * slope, along_y.slope[j] * value, along_y.smooth[j] * value};
       }
+      gradient = gradient + Vec3{along_z.smooth[k] * slice.x, along_z.smooth[k] * slice.y, along_z.slope[k] * slice.z};
     }
-    return sum;
+    return gradient;
   });
 }
 
