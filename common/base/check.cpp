@@ -10,8 +10,8 @@ CheckFailure::CheckFailure(const char* file, int line, const char* condition) {
 }
 
 CheckFailure::~CheckFailure() {
-  std::fprintf(stderr, "%s\n", stream_.str().c_str());
-  std::fflush(stderr);
+  (void)std::fprintf(stderr, "%s\n", stream_.str().c_str());
+  (void)std::fflush(stderr);
   std::abort();
 }
 

@@ -19,7 +19,7 @@ Taps TapsAlong(int axis, const Box& box, const Vec3& spacing, const Index3& voxe
   const Index3 size = box.size();
   const std::int64_t stride = axis == 0 ? 1 : axis == 1 ? size.x : std::int64_t{1} * size.x * size.y;
   const auto inside = [&](std::int32_t at) { return std::clamp(at, box.begin[axis], box.end[axis] - 1); };
-  const auto tap = [&](std::int32_t at) { return std::size_t(at - voxel[axis] + 2); };
+  const auto tap = [&](std::int32_t at) { return std::size_t(at) - std::size_t(voxel[axis]) + 2; };
   Taps taps;
   for (std::int32_t at = voxel[axis] - 2; at <= voxel[axis] + 2; ++at) taps.offset[tap(at)] = (inside(at) - voxel[axis]) * stride;
 
