@@ -1,6 +1,6 @@
 // Client: asks a service for pictures. The library behind the command line; also what tests and other programs use.
 //
-//   auto client = Client::Connect(context, "tcp://127.0.0.1:7420");        // Unavailable within 5 s if nobody answers
+//   auto client = Client::Connect(context, "tcp://127.0.0.1:7420");        // Unavailable if nobody answers within 4 s
 //   RequestId id = client->Submit(request);
 //   while (true) { auto event = client->Next(1s); ... }                     // progress, previews, the picture, or the failure
 // One thread at a time.
@@ -40,7 +40,7 @@ struct ClientTiming {
 
 class Client {
  public:
-  static Result<Client> Connect(Context& context, const std::string& endpoint, Duration timeout = std::chrono::seconds(5),
+  static Result<Client> Connect(Context& context, const std::string& endpoint, Duration timeout = std::chrono::seconds(4),
                                 ClientTiming timing = {});
   Client(Client&&) noexcept;
   Client& operator=(Client&&) noexcept;
