@@ -4,6 +4,7 @@
 
 #include <hwy/highway.h>
 
+#include <array>
 #include <bit>
 #include <cmath>
 
@@ -13,7 +14,7 @@
 namespace slabstream {
 namespace {
 
-constexpr std::int32_t kSide = 512;  // pixels
+constexpr std::int32_t kSide = 520;  // pixels: an odd number of tiles, as sheets have (splatting/sheet.cpp)
 
 struct Scene {
   explicit Scene(double sigma) : kernel(MakeGaussianKernel(sigma)), sheet(4 * std::size_t(kSide) * kSide) {
@@ -21,6 +22,7 @@ struct Scene {
       BeamPiece piece;
       piece.mask = 0xFFFFFFFF;
       piece.count = 32;
+      piece.records = records.data();
       piece.kernel_x = piece.kernel_y = &kernel;
       piece.x_step = 0.9F;
       piece.y_step = 0.2F;
@@ -35,6 +37,7 @@ struct Scene {
   SheetView view() { return {sheet.data(), kSide, kSide}; }
 
   GaussianKernel kernel;
+  std::array<VoxelRecord, 32> records{};
   VoxelBatch batch;
   AlignedVector<float> sheet;
 };

@@ -63,6 +63,7 @@ template <void (*kTransform)(Projection, VoxelBatch&)>
 void Fused(benchmark::State& state) {
   const auto projection = Projection(state.range(0));
   const GaussianKernel kernel = MakeGaussianKernel(0.7);
+  const std::array<VoxelRecord, kFootprintCell> records{};
   VoxelBatch batch;
   for (auto _ : state) {
     for (int z = 0; z < kSide; ++z) {
@@ -71,6 +72,7 @@ void Fused(benchmark::State& state) {
           BeamPiece piece;
           piece.count = std::min(kFootprintCell, kSide - x);
           piece.mask = std::uint32_t((std::uint64_t{1} << piece.count) - 1);
+          piece.records = records.data();
           piece.kernel_x = piece.kernel_y = &kernel;
           piece.x0 = kMatrix[0][0] * float(x) + kMatrix[0][1] * float(y) + kMatrix[0][2] * float(z);
           piece.y0 = kMatrix[1][0] * float(x) + kMatrix[1][1] * float(y) + kMatrix[1][2] * float(z);

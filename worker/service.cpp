@@ -83,7 +83,7 @@ struct WorkerService::Impl {
   PeerSockets peers;
   Epoch epoch = 0;
   std::map<FrameId, PixelBounds> frames;  // pixels of the frames at hand, to check partial images against
-  std::atomic<bool> registered = false;  // ever, or stopped
+  std::atomic<bool> registered = false;   // ever, or stopped
   std::atomic<bool> stop_requested = false;
   std::atomic<bool> stopped = false;
   bool stop_now = false;           // the machine said so

@@ -15,9 +15,7 @@ struct AlignedAllocator {
   AlignedAllocator() = default;
   template <class U>
   AlignedAllocator(const AlignedAllocator<U>&) {}  // NOLINT(google-explicit-constructor): rebinding
-  T* allocate(std::size_t count) {
-    return static_cast<T*>(::operator new(count * sizeof(T), std::align_val_t(kBufferAlignment)));
-  }
+  T* allocate(std::size_t count) { return static_cast<T*>(::operator new(count * sizeof(T), std::align_val_t(kBufferAlignment))); }
   void deallocate(T* data, std::size_t) { ::operator delete(data, std::align_val_t(kBufferAlignment)); }
   friend bool operator==(const AlignedAllocator&, const AlignedAllocator&) { return true; }
 };

@@ -28,7 +28,7 @@ struct Voidify {
 
 }  // namespace slabstream::internal
 
-#define CHECK(condition)          \
+#define CHECK(condition)             \
   (condition) ? static_cast<void>(0) \
               : ::slabstream::internal::Voidify() & ::slabstream::internal::CheckFailure(__FILE__, __LINE__, #condition).stream()
 

@@ -45,8 +45,6 @@ void InitLog(std::string_view process, LogLevel level) {
   Logger().set_level(ToSpdlog(level));
 }
 
-void Log(LogLevel level, std::string_view message) {
-  Logger().log(ToSpdlog(level), spdlog::string_view_t(message.data(), message.size()));
-}
+void Log(LogLevel level, std::string_view message) { Logger().log(ToSpdlog(level), spdlog::string_view_t(message.data(), message.size())); }
 
 }  // namespace slabstream

@@ -60,7 +60,7 @@ class [[nodiscard]] Status {
 template <class T>
 class [[nodiscard]] Result {
  public:
-  Result(T value) : state_(std::move(value)) {}  // NOLINT(google-explicit-constructor): `return value;` reads best
+  Result(T value) : state_(std::move(value)) {}        // NOLINT(google-explicit-constructor): `return value;` reads best
   Result(Status status) : state_(std::move(status)) {  // NOLINT(google-explicit-constructor)
     CHECK(!std::get<Status>(state_).ok()) << "a Result needs a value or a failure";
   }

@@ -1,5 +1,5 @@
-// Partition: a kd-tree whose leaves are half-open boxes that tile the volume. It answers "where are the boxes"; who owns them is another question
-// (OwnerOf in common/planning/frame_plan.h).
+// Partition: a kd-tree whose leaves are half-open boxes that tile the volume. It answers "where are the boxes"; who owns them is another
+// question (OwnerOf in common/planning/frame_plan.h).
 //
 // Leaves are numbered by a BoxId. For slabs the ids ascend along the axis.
 #pragma once
@@ -42,9 +42,9 @@ class Partition {
   std::vector<Box> boxes_;
 };
 
-// Boxes nearest first: no ray of the camera enters a later box before an earlier one. One traversal of the tree: at each plane the eye's side comes
-// first; an orthographic eye lies at infinity against the view direction. Where the eye lies in the plane itself, or the rays are
-// parallel to it, no ray crosses from one side to the other, and the lower side comes first.
+// Boxes nearest first: no ray of the camera enters a later box before an earlier one. One traversal of the tree: at each plane the eye's
+// side comes first; an orthographic eye lies at infinity against the view direction. Where the eye lies in the plane itself, or the rays
+// are parallel to it, no ray crosses from one side to the other, and the lower side comes first.
 std::vector<BoxId> VisibilityOrder(const Partition& partition, const Camera& camera);
 
 }  // namespace slabstream

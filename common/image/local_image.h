@@ -1,9 +1,9 @@
 // LocalImage: the picture of some boxes, on the pixels that they can touch.
 //
 // Two pixel formats. kRgba (splatting): premultiplied float RGBA, interleaved, 16 bytes a pixel; empty is (0, 0, 0, 0).
-// kDepth (Z-buffer): the same RGBA (alpha 0 or 1) with a depth plane (float, camera depth; empty is +infinity) and a voxel plane (the low 32 bits of
-// the linear index of the voxel that is seen), which breaks ties of depth: see NearerDepth.
-// Rows are stored top down without padding; pixel (x, y) is at index (y - bounds.y_begin) * bounds.width() + (x - bounds.x_begin).
+// kDepth (Z-buffer): the same RGBA (alpha 0 or 1) with a depth plane (float, camera depth; empty is +infinity) and a voxel plane (the low
+// 32 bits of the linear index of the voxel that is seen), which breaks ties of depth: see NearerDepth. Rows are stored top down without
+// padding; pixel (x, y) is at index (y - bounds.y_begin) * bounds.width() + (x - bounds.x_begin).
 #pragma once
 
 #include <algorithm>
@@ -40,10 +40,10 @@ constexpr PixelBounds Union(const PixelBounds& a, const PixelBounds& b) {
 
 struct LocalImage {
   PixelFormat format = PixelFormat::kRgba;
-  PixelBounds bounds;                      // within the frame; may be empty
-  AlignedVector<float> rgba;               // 4 * pixel_count
-  AlignedVector<float> depth;              // kDepth: pixel_count; else empty
-  AlignedVector<std::uint32_t> voxel;      // kDepth: pixel_count; else empty
+  PixelBounds bounds;                  // within the frame; may be empty
+  AlignedVector<float> rgba;           // 4 * pixel_count
+  AlignedVector<float> depth;          // kDepth: pixel_count; else empty
+  AlignedVector<std::uint32_t> voxel;  // kDepth: pixel_count; else empty
 };
 
 // All pixels empty.

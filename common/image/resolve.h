@@ -1,5 +1,5 @@
-// From the supersampled frame to final pixels: each final pixel is the mean of supersample x supersample fine ones (premultiplied RGBA), its depth
-// the smallest. Sums run in a fixed order, so the result is the same wherever it is computed.
+// From the supersampled frame to final pixels: each final pixel is the mean of supersample x supersample fine ones (premultiplied RGBA),
+// its depth the smallest. Sums run in a fixed order, so the result is the same wherever it is computed.
 #pragma once
 
 #include "common/image/local_image.h"

@@ -27,9 +27,9 @@ struct PixelRange {
 
 struct RunImageHeader {
   PixelFormat format = PixelFormat::kRgba;
-  PixelBounds bounds;              // within the frame
+  PixelBounds bounds;  // within the frame
   std::uint32_t run_count = 0;
-  std::uint64_t pixel_count = 0;   // in all runs
+  std::uint64_t pixel_count = 0;  // in all runs
   friend bool operator==(const RunImageHeader&, const RunImageHeader&) = default;
 };
 
@@ -43,8 +43,8 @@ struct RunImage {
 // The pixels of `image` that lie in `range` of a frame `frame_width` wide; bounds are cut to the rows that the range touches.
 RunImage EncodeRuns(const LocalImage& image, PixelRange range, std::int32_t frame_width);
 
-// InvalidArgument unless header and payload agree, runs ascend without touching, stay inside the bounds, and no pixel is NaN. After this check
-// the functions below may trust the image. `frame` is the frame's whole rectangle.
+// InvalidArgument unless header and payload agree, runs ascend without touching, stay inside the bounds, and no pixel is NaN. After this
+// check the functions below may trust the image. `frame` is the frame's whole rectangle.
 Status ValidateRuns(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame);
 
 // Dense form. The image must be valid.

@@ -1,4 +1,5 @@
-// FramePlan: everything that a frame will do, as a value. Built by pure functions; the service, the embedded executor and the simulator run it.
+// FramePlan: everything that a frame will do, as a value. Built by pure functions; the service, the embedded executor and the simulator run
+// it.
 //
 //   request + volume summary + roster + cost model  --PlanFrame-->  FramePlan  --executor-->  image + reports
 #pragma once
@@ -19,11 +20,12 @@ namespace slabstream {
 using WorkerId = std::uint32_t;   // an identity within one coordinator's life; never given twice. 0: nobody
 using DatasetId = std::uint32_t;  // one loaded volume within one coordinator's life. 0: none
 
-// What every worker needs to render its part, fixed at the start of a frame: a re-plan after a lost worker changes who does what and nothing here.
+// What every worker needs to render its part, fixed at the start of a frame: a re-plan after a lost worker changes who does what and
+// nothing here.
 struct FrameSetup {
   DatasetId dataset = 0;
   VolumeDescription description;
-  ValueRange range;             // data values: what the classification table is made for
+  ValueRange range;  // data values: what the classification table is made for
   RendererKind renderer = RendererKind::kSplat;
   Camera camera;
   TransferFunction transfer;
@@ -33,9 +35,7 @@ struct FrameSetup {
   friend bool operator==(const FrameSetup&, const FrameSetup&) = default;
 };
 
-inline PixelFormat FormatOf(RendererKind renderer) {
-  return renderer == RendererKind::kSplat ? PixelFormat::kRgba : PixelFormat::kDepth;
-}
+inline PixelFormat FormatOf(RendererKind renderer) { return renderer == RendererKind::kSplat ? PixelFormat::kRgba : PixelFormat::kDepth; }
 
 // One rank of a group: which box, and who renders it. A worker may hold several ranks of a group (after another one was lost).
 struct Placement {
@@ -54,16 +54,16 @@ struct GroupPlan {
 struct FramePlan {
   FrameSetup setup;
   Partition partition;
-  std::uint32_t slots = 1;         // p: owner slots the partition was made for
+  std::uint32_t slots = 1;  // p: owner slots the partition was made for
   Axis slab_axis = Axis::kZ;
-  std::string combine;             // name of the combining scheme
-  std::vector<GroupPlan> groups;   // nearest first; at least one
-  WorkerId display = 0;            // accumulates the groups and hands the frame over; holds a rank wherever possible
+  std::string combine;            // name of the combining scheme
+  std::vector<GroupPlan> groups;  // nearest first; at least one
+  WorkerId display = 0;           // accumulates the groups and hands the frame over; holds a rank wherever possible
   friend bool operator==(const FramePlan&, const FramePlan&) = default;
 };
 
-// Slot s of the roster owns the boxes i with i mod slots == s. A slot may be vacant (0) after a loss: its boxes are then lent to the others, round
-// robin, and everybody else keeps their own, so that only the lost voxels travel again. No worker holds two slots.
+// Slot s of the roster owns the boxes i with i mod slots == s. A slot may be vacant (0) after a loss: its boxes are then lent to the
+// others, round robin, and everybody else keeps their own, so that only the lost voxels travel again. No worker holds two slots.
 struct Roster {
   std::vector<WorkerId> slots;
   friend bool operator==(const Roster&, const Roster&) = default;
@@ -71,28 +71,26 @@ struct Roster {
 
 // Constants of the paper's Eq. 20 and 25, in seconds a unit, fitted on this machine; the planner uses them to choose groups.
 struct CostModel {
-  double transform = 1e-9;   // c_t: a voxel
-  double splat = 2e-8;       // (c_sh + c_sp k^2) : an occupied voxel
-  double composite = 1e-9;   // c_cp: a pixel and slice
-  double combine = 4e-9;     // c_co: a pixel and round
+  double transform = 1e-9;                                   // c_t: a voxel
+  double splat = 2e-8;                                       // (c_sh + c_sp k^2) : an occupied voxel
+  double composite = 1e-9;                                   // c_cp: a pixel and slice
+  double combine = 4e-9;                                     // c_co: a pixel and round
   std::int64_t slab_bytes_target = std::int64_t{256} << 20;  // voxels of one slab at most, where slices allow it
 };
 
-// Pure. Errors: InvalidArgument (an unknown name of a decomposition or combining scheme), NotFound (no such preset), Unavailable (no worker in the roster).
-// The request must be valid (Validate). Boxes whose bricks show nothing under the transfer function get no placement.
+// Pure. Errors: InvalidArgument (an unknown name of a decomposition or combining scheme), NotFound (no such preset), Unavailable (no worker
+// in the roster). The request must be valid (Validate). Boxes whose bricks show nothing under the transfer function get no placement.
 Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, const Roster& roster,
                             const CostModel& cost);
 
-// The same frame over another roster with the same number of slots: same setup, partition and groups; workers of placements, schedules and display
-// change. The display worker is kept if it is still in the roster: it holds what was accumulated. Unavailable if nobody is.
+// The same frame over another roster with the same number of slots: same setup, partition and groups; workers of placements, schedules and
+// display change. The display worker is kept if it is still in the roster: it holds what was accumulated. Unavailable if nobody is.
 Result<FramePlan> Replan(const FramePlan& plan, const Roster& roster);
 
 // Owner of a box: its slot's worker, or the one it is lent to. 0 if the roster is empty of workers.
 WorkerId OwnerOf(BoxId box, const Roster& roster);
 
 // Voxels that a worker must hold to render `box`: the box and its halo, cut to the volume.
-inline Box SlabBox(const Box& box, const FrameSetup& setup) {
-  return Grown(box, setup.halo, setup.description.geometry.bounds());
-}
+inline Box SlabBox(const Box& box, const FrameSetup& setup) { return Grown(box, setup.halo, setup.description.geometry.bounds()); }
 
 }  // namespace slabstream

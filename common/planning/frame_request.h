@@ -21,10 +21,10 @@ inline constexpr std::size_t kMaxNameBytes = 256;
 enum class AxisChoice : std::uint8_t { kX = 0, kY = 1, kZ = 2, kAuto = 3 };
 
 struct Policy {
-  std::string decomposition = "slab";  // a name of Decompositions()
-  AxisChoice axis = AxisChoice::kAuto; // auto: the volume's longest axis, so that turning the view never moves voxels
-  int groups = 0;                      // [1, kMaxGroups]; 0: the planner chooses
-  std::string combine = "fan-in";      // a name of CombiningSchemes()
+  std::string decomposition = "slab";   // a name of Decompositions()
+  AxisChoice axis = AxisChoice::kAuto;  // auto: the volume's longest axis, so that turning the view never moves voxels
+  int groups = 0;                       // [1, kMaxGroups]; 0: the planner chooses
+  std::string combine = "fan-in";       // a name of CombiningSchemes()
   friend bool operator==(const Policy&, const Policy&) = default;
 };
 
@@ -44,7 +44,7 @@ struct FrameRequest {
   Shading shading;
   double termination = kDefaultTermination;  // [0, kMaxTermination]: transmittance below which what lies behind is skipped; 0: never
   Policy policy;
-  bool previews = false;                     // a picture after each group
+  bool previews = false;  // a picture after each group
   friend bool operator==(const FrameRequest&, const FrameRequest&) = default;
 };
 

@@ -10,17 +10,17 @@
 namespace slabstream {
 
 enum class Stage : std::uint8_t {
-  kFetch = 0,      // waiting for voxels (from the first chunk request to the last chunk stored)
-  kPrepare = 1,    // classification, normals, occupied runs: once per slab and transfer function
+  kFetch = 0,    // waiting for voxels (from the first chunk request to the last chunk stored)
+  kPrepare = 1,  // classification, normals, occupied runs: once per slab and transfer function
   kTransform = 2,
   kShade = 3,
   kSplat = 4,
   kComposite = 5,  // sheets into the local image
   kZBuffer = 6,
-  kCombine = 7,    // local images of ranks into the group image
-  kEncode = 8,     // images into runs and payload bytes
-  kResolve = 9,    // supersampled frame to final pixels
-  kRender = 10,    // one rank from start to end: contains kPrepare ... kZBuffer
+  kCombine = 7,  // local images of ranks into the group image
+  kEncode = 8,   // images into runs and payload bytes
+  kResolve = 9,  // supersampled frame to final pixels
+  kRender = 10,  // one rank from start to end: contains kPrepare ... kZBuffer
 };
 inline constexpr int kStageCount = 11;
 std::string_view ToString(Stage stage);  // "transform": names of --stats and --trace
@@ -40,11 +40,11 @@ struct RankReport {
   std::uint32_t rank = 0;
   std::uint32_t box = 0;
   StageTimes stage_ns{};
-  std::vector<Span> spans;                   // at most kMaxSpans
-  std::uint64_t occupied_voxels = 0;         // in the box, under this transfer function
-  std::uint64_t drawn_voxels = 0;            // that went through splat or Z-buffer
-  std::uint64_t voxel_bytes = 0;             // received for this group since the last report (0: all was cached)
-  std::uint64_t image_bytes = 0;             // payload sent to other workers
+  std::vector<Span> spans;            // at most kMaxSpans
+  std::uint64_t occupied_voxels = 0;  // in the box, under this transfer function
+  std::uint64_t drawn_voxels = 0;     // that went through splat or Z-buffer
+  std::uint64_t voxel_bytes = 0;      // received for this group since the last report (0: all was cached)
+  std::uint64_t image_bytes = 0;      // payload sent to other workers
   friend bool operator==(const RankReport&, const RankReport&) = default;
 };
 inline constexpr int kMaxSpans = 64;

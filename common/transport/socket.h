@@ -3,12 +3,12 @@
 //   1. One Context a process (inproc endpoints meet within one context).
 //   2. Socket::Router / Socket::Dealer, then Bind or Connect.
 //   3. A loop: Wait(sockets, wakeup, timeout), then TryReceive until empty, then Send.
-// A socket belongs to the thread that uses it; it may be made in one thread and handed to another before its first use. Context and Wakeup are thread-safe.
-// No call blocks but Wait. Routers are MANDATORY: sending to an identity that is not connected fails with Unavailable, which is also how a router notices that
-// a peer has gone; identities are ZeroMQ's, never given twice. A dealer queues what it sends until its connection is up, and again while it is broken, up to the
-// high-water mark: tcp and ipc reconnect by themselves (every 100 ms), and what was queued then reaches whoever listens there now. So receivers go by epochs, and
-// a dealer whose peer is known to be dead is closed, which drops the queue after the linger time. inproc does not reconnect: after its peer has closed, sending
-// ends in ResourceExhausted.
+// A socket belongs to the thread that uses it; it may be made in one thread and handed to another before its first use. Context and Wakeup
+// are thread-safe. No call blocks but Wait. Routers are MANDATORY: sending to an identity that is not connected fails with Unavailable,
+// which is also how a router notices that a peer has gone; identities are ZeroMQ's, never given twice. A dealer queues what it sends until
+// its connection is up, and again while it is broken, up to the high-water mark: tcp and ipc reconnect by themselves (every 100 ms), and
+// what was queued then reaches whoever listens there now. So receivers go by epochs, and a dealer whose peer is known to be dead is closed,
+// which drops the queue after the linger time. inproc does not reconnect: after its peer has closed, sending ends in ResourceExhausted.
 #pragma once
 
 #include <cstdint>
@@ -43,9 +43,9 @@ struct Incoming {
 };
 
 struct SocketOptions {
-  int send_high_water_mark = 4096;     // messages; a backstop, credits bound the bytes
+  int send_high_water_mark = 4096;  // messages; a backstop, credits bound the bytes
   int receive_high_water_mark = 4096;
-  Duration linger = std::chrono::milliseconds(500);  // how long unsent messages outlive the socket
+  Duration linger = std::chrono::milliseconds(500);        // how long unsent messages outlive the socket
   std::int64_t max_message_bytes = std::int64_t{2} << 30;  // a larger frame closes the connection
 };
 
@@ -57,8 +57,8 @@ class Socket {
   Socket& operator=(Socket&&) noexcept;
   ~Socket();
 
-  // The endpoint with the port that was chosen. Unavailable (in use, no permission) names the endpoint; InvalidArgument: as ParseEndpoint. An ipc socket file that
-  // a dead process left is replaced. Closing frees inproc names and ipc files at once, a tcp port a moment later.
+  // The endpoint with the port that was chosen. Unavailable (in use, no permission) names the endpoint; InvalidArgument: as ParseEndpoint.
+  // An ipc socket file that a dead process left is replaced. Closing frees inproc names and ipc files at once, a tcp port a moment later.
   Result<std::string> Bind(const std::string& endpoint);
   // Ok does not mean that anybody listens there. InvalidArgument: as ParseEndpoint.
   Status Connect(const std::string& endpoint);

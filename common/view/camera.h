@@ -1,10 +1,10 @@
 // From what a user asks for (ViewParameters) to how the renderers project (Camera).
 //
-// Physical space: data-space voxel coordinates times spacing, the origin moved to the volume's centre. Bounding sphere: centre 0, radius R = half
-// the diagonal of size * spacing. At zoom 1 the sphere touches the shorter side of the picture. Azimuth 0, elevation 0 looks along +y, +x to
-// the right, +z up; azimuth turns the eye about +z, counter-clockwise seen from +z; elevation lifts it towards +z; roll turns
-// the picture clockwise (the camera counter-clockwise). Perspective: the eye stands at R / sin(fov / 2), so that the sphere fits the cone of `fov`
-// exactly at zoom 1; zoom magnifies the picture and leaves the eye where it is.
+// Physical space: data-space voxel coordinates times spacing, the origin moved to the volume's centre. Bounding sphere: centre 0, radius R
+// = half the diagonal of size * spacing. At zoom 1 the sphere touches the shorter side of the picture. Azimuth 0, elevation 0 looks along
+// +y, +x to the right, +z up; azimuth turns the eye about +z, counter-clockwise seen from +z; elevation lifts it towards +z; roll turns the
+// picture clockwise (the camera counter-clockwise). Perspective: the eye stands at R / sin(fov / 2), so that the sphere fits the cone of
+// `fov` exactly at zoom 1; zoom magnifies the picture and leaves the eye where it is.
 //
 // Image space: x to the right and y downwards in pixels, origin at the upper left corner, so pixel (column, row) has its centre at
 // (column + 0.5, row + 0.5). Depth: distance from the eye plane along the view direction in physical units; for an orthographic camera the
@@ -28,8 +28,8 @@ enum class Projection : std::uint8_t { kOrthographic = 1, kPerspective = 2 };
 inline constexpr double kMaxVoxelsPerPixel = 2;
 inline constexpr double kMinZoom = 1e-3, kMaxZoom = 1e4;
 inline constexpr double kMinFovDegrees = 1, kMaxFovDegrees = 60;
-inline constexpr double kMaxAngleDegrees = 1e6;      // of azimuth, elevation and roll, either sign
-inline constexpr int kMaxImageSide = 16384;          // pixels
+inline constexpr double kMaxAngleDegrees = 1e6;                         // of azimuth, elevation and roll, either sign
+inline constexpr int kMaxImageSide = 16384;                             // pixels
 inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1} << 26;  // 8192 x 8192: about 2.5 GB of working memory a worker
 inline constexpr int kMaxSupersample = 1024;
 
@@ -56,10 +56,10 @@ Status Validate(const ImageSize& size);
 struct Camera {
   Projection projection = Projection::kOrthographic;
   std::array<double, 4> x_row{}, y_row{}, w_row{}, depth_row{};
-  Vec3 eye;                // data space; orthographic: the point of the eye plane on the central ray
-  Vec3 view_direction;     // physical space, unit, away from the eye
-  Vec3 right, up;          // physical space, unit
-  Vec3 spacing;            // of the volume: physical = spacing * data
+  Vec3 eye;                   // data space; orthographic: the point of the eye plane on the central ray
+  Vec3 view_direction;        // physical space, unit, away from the eye
+  Vec3 right, up;             // physical space, unit
+  Vec3 spacing;               // of the volume: physical = spacing * data
   int width = 0, height = 0;  // pixels of the (supersampled) grid
   int supersample = 1;        // power of two
   // The traversal: slices perpendicular to `traversal_axis` (the data axis nearest to the view direction in physical space; ties go to the
@@ -67,11 +67,15 @@ struct Camera {
   Axis traversal_axis = Axis::kY;
   bool ascending = true;
 
-  struct ImagePoint { double x, y, depth; };
+  struct ImagePoint {
+    double x, y, depth;
+  };
   ImagePoint Project(const Vec3& data_point) const;  // the point must lie before the eye (perspective)
 
   // Ray of a point of the image: data-space origin (eye or eye-plane point) and direction, scaled so that depth grows by 1 per unit.
-  struct Ray { Vec3 origin, direction; };
+  struct Ray {
+    Vec3 origin, direction;
+  };
   Ray RayAt(double x, double y) const;
 
   friend bool operator==(const Camera&, const Camera&) = default;
@@ -80,9 +84,10 @@ struct Camera {
 // `view` and `size` valid.
 Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry);
 
-// The footprint of a voxel, as far as the halo depends on it (docs/rendering.md defines it): an axis-aligned Gaussian in image space whose variance is
-// the projected variance of the voxel plus that of the pixel, cut off. Under perspective its shape is taken once for each cell of
-// kFootprintCell x kFootprintCell voxels of a slice (at global multiples), at the centre of the part of the cell that lies in the volume.
+// The footprint of a voxel, as far as the halo depends on it (docs/rendering.md defines it): an axis-aligned Gaussian in image space whose
+// variance is the projected variance of the voxel plus that of the pixel, cut off. Under perspective its shape is taken once for each cell
+// of kFootprintCell x kFootprintCell voxels of a slice (at global multiples), at the centre of the part of the cell that lies in the
+// volume.
 inline constexpr double kFootprintVoxelVariance = 0.36;  // voxels^2, along each data axis
 inline constexpr double kFootprintPixelVariance = 0.2;   // pixels^2
 inline constexpr double kFootprintCut = 3;               // standard deviations
