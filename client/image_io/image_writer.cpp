@@ -35,11 +35,12 @@ void ComposeRow(const LocalImage& image, int y, const StraightColor& background,
   const PixelBounds& b = image.bounds;
   if (b.empty() || y < b.y_begin || y >= b.y_end) return;
   const std::size_t first = std::size_t(y - b.y_begin) * std::size_t(b.width());
-  for (int x = 0; x < b.width(); ++x) {
-    const float* front = &image.rgba[4 * (first + std::size_t(x))];
-    float* out = &rgba[4 * std::size_t(b.x_begin + x)];
+  const auto left = std::size_t(b.x_begin), width = std::size_t(b.width());
+  for (std::size_t x = 0; x < width; ++x) {
+    const float* front = &image.rgba[4 * (first + x)];
+    float* out = &rgba[4 * (left + x)];
     for (int c = 0; c < 4; ++c) out[c] = front[c] + (1 - front[3]) * behind[c];
-    if (!depth.empty()) depth[std::size_t(b.x_begin + x)] = image.depth[first + std::size_t(x)];
+    if (!depth.empty()) depth[left + x] = image.depth[first + x];
   }
 }
 
