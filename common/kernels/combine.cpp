@@ -97,7 +97,7 @@ void CombineRuns(LocalImage& image, const RunImageHeader& header, std::span<cons
   for (std::uint32_t i = 0; i < header.run_count; ++i) {
     const Run run = runs.ReadRun(i);
     runs.ReadRgba(first, run.pixel_count, pixels.rgba);
-    if (header.format == PixelFormat::kDepth) {
+    if (pixels.depth != nullptr) {
       runs.ReadDepth(first, run.pixel_count, pixels.depth);
       runs.ReadVoxel(first, run.pixel_count, pixels.voxel);
     }
