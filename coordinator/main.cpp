@@ -1,6 +1,7 @@
 // slabstream-coordinator: the service's front. It ends on SIGINT, SIGTERM or a client's order, and tells its workers to end.
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <exception>
 #include <string>
 #include <vector>
 
@@ -13,14 +14,12 @@
 namespace {
 
 int Fail(const slabstream::Status& status) {
-  std::fprintf(stderr, "slabstream-coordinator: %s\n", status.message().c_str());
+  (void)std::fprintf(stderr, "slabstream-coordinator: %s\n", status.message().c_str());
   const bool bad_input = status.code() == slabstream::StatusCode::kInvalidArgument || status.code() == slabstream::StatusCode::kNotFound;
   return bad_input ? 2 : 1;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int Run(int argc, char** argv) {
   slabstream::CoordinatorOptions options;
   options.client_endpoint = "tcp://127.0.0.1:7420";
   std::vector<std::string> data;
@@ -49,9 +48,20 @@ int main(int argc, char** argv) {
   auto service = slabstream::CoordinatorService::Start(context, std::move(options));
   if (!service.ok()) return Fail(service.status());
   // Whoever started this process reads the ports that were chosen from this line.
-  std::printf("slabstream-coordinator ready client=%s workers=%s\n", (*service)->client_endpoint().c_str(),
-              (*service)->worker_endpoint().c_str());
-  std::fflush(stdout);
+  (void)std::printf("slabstream-coordinator ready client=%s workers=%s\n", (*service)->client_endpoint().c_str(),
+                    (*service)->worker_endpoint().c_str());
+  (void)std::fflush(stdout);
   slabstream::WaitUntilStopped(**service);
   return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return Run(argc, argv);
+  } catch (const std::exception& error) {  // out of memory, mostly: everything that is expected comes back as a Status
+    (void)std::fprintf(stderr, "slabstream-coordinator: %s\n", error.what());
+    return 1;
+  }
 }

@@ -290,17 +290,17 @@ void GroupRun::SendFragments(const std::vector<Fragment>& fragments, std::uint32
                              WorkerActions& actions) {
   const Peer* peer = FindPeer(to);
   if (peer == nullptr) return Fail(fmt::format("worker {} takes part in the group but has no endpoint in it", to));
-  for (std::size_t i = 0; i < fragments.size(); ++i) {
+  for (const Fragment& fragment : fragments) {
     PartialImage message;
     message.epoch = assignment_.epoch;
     message.from_worker = self_;
     message.key = key();
     message.step = step;
-    message.interval = fragments[i].ranks;
-    message.pixels = fragments[i].pixels;
-    if (i + 1 == fragments.size()) message.reports = std::move(reports);
-    actions.push_back(SendPartial{*peer, std::move(message), fragments[i].image, assignment_.setup.camera.width});
+    message.interval = fragment.ranks;
+    message.pixels = fragment.pixels;
+    actions.push_back(SendPartial{*peer, std::move(message), fragment.image, assignment_.setup.camera.width});
   }
+  if (!fragments.empty()) std::get<SendPartial>(actions.back()).message.reports = std::move(reports);
 }
 
 // Releases the images of fragments that were taken, once each, unless other fragments still use them.

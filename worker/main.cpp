@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <exception>
 #include <string>
 
 #include "common/base/large_buffers.h"
@@ -16,14 +17,11 @@ namespace {
 constexpr std::uint64_t kMaxCacheMib = std::uint64_t{1} << 24;  // 16 TiB
 
 int Fail(int exit_status, const std::string& message) {
-  std::fprintf(stderr, "slabstream-worker: %s\n", message.c_str());
+  (void)std::fprintf(stderr, "slabstream-worker: %s\n", message.c_str());
   return exit_status;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  slabstream::MapLargeBuffers();
+int Run(int argc, char** argv) {
   slabstream::WorkerOptions options;
   std::uint32_t threads = 1;
   std::uint64_t cache_mib = 0;
@@ -56,4 +54,16 @@ int main(int argc, char** argv) {
   if (!service.ok()) return Fail(service.status().code() == slabstream::StatusCode::kInvalidArgument ? 2 : 1, service.status().message());
   slabstream::WaitUntilStopped(**service);
   return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  slabstream::MapLargeBuffers();
+  try {
+    return Run(argc, argv);
+  } catch (const std::exception& error) {  // out of memory, mostly: everything that is expected comes back as a Status
+    (void)std::fprintf(stderr, "slabstream-worker: %s\n", error.what());
+    return 1;
+  }
 }

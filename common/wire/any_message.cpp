@@ -24,6 +24,8 @@ struct Member {
   const Proto& (Envelope::*get)() const;
   Proto* (Envelope::*mutable_get)();
 };
+template <class Proto>  // what C++20 deduces for an aggregate; clang 14, which clang-tidy parses with, does not yet
+Member(const char*, Envelope::MessageCase, const Proto& (Envelope::*)() const, Proto* (Envelope::*)())->Member<Proto>;
 
 // One line a message, in the order of AnyMessage.
 constexpr auto kMembers =

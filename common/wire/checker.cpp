@@ -8,7 +8,7 @@ namespace {
 
 std::string Number(double value) {
   std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.9g", value);
+  (void)std::snprintf(text.data(), text.size(), "%.9g", value);
   return std::isnan(value) ? "NaN" : text.data();
 }
 
