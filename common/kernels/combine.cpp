@@ -42,8 +42,9 @@ void NearestRow(const SourcePixels& source, const TargetPixels& target, std::siz
   }
 }
 
-void CombineRow(PixelFormat format, const SourcePixels& source, Side side, const TargetPixels& target, std::size_t count) {
-  if (format == PixelFormat::kDepth) {
+// Both have depths, or neither.
+void CombineRow(const SourcePixels& source, Side side, const TargetPixels& target, std::size_t count) {
+  if (source.depth != nullptr && target.depth != nullptr) {
     NearestRow(source, target, count);
   } else if (side == Side::kFront) {
     OverRow(source.rgba, target.rgba, target.rgba, count);
@@ -79,8 +80,8 @@ void Combine(LocalImage& image, const LocalImage& other, Side side) {
   if (other.bounds.empty()) return;
   GrowToHold(image, other.bounds);
   for (std::int32_t y = other.bounds.y_begin; y < other.bounds.y_end; ++y) {
-    CombineRow(image.format, At(other, IndexOf(other.bounds, other.bounds.x_begin, y)), side,
-               At(image, IndexOf(image.bounds, other.bounds.x_begin, y)), std::size_t(other.bounds.width()));
+    CombineRow(At(other, IndexOf(other.bounds, other.bounds.x_begin, y)), side, At(image, IndexOf(image.bounds, other.bounds.x_begin, y)),
+               std::size_t(other.bounds.width()));
   }
 }
 
@@ -103,7 +104,7 @@ void CombineRuns(LocalImage& image, const RunImageHeader& header, std::span<cons
     }
     const std::size_t target =
         IndexOf(image.bounds, header.bounds.x_begin + std::int32_t(run.column), header.bounds.y_begin + std::int32_t(run.row));
-    CombineRow(image.format, {pixels.rgba, pixels.depth, pixels.voxel}, side, At(image, target), run.pixel_count);
+    CombineRow({pixels.rgba, pixels.depth, pixels.voxel}, side, At(image, target), run.pixel_count);
     first += run.pixel_count;
   }
 }
