@@ -1,8 +1,8 @@
 // LiveRoster: which workers there are, which slot each one owns, and when each was last heard. Pure: time is an argument.
 //
-// A worker is an incarnation (one life of one process). It keeps its id while it stays, on whatever connection it speaks; a new incarnation
-// is a new worker. Slots outlive workers: the slot of a lost worker stays vacant for a grace period, so that a replacement takes over its
-// boxes and nobody else's voxels move; then it is given up, and the slots after it move down.
+// A worker is an incarnation (one registration of one process: what it held before is gone). It keeps its id while it stays, on whatever
+// connection it speaks; a new incarnation is a new worker. Slots outlive workers: the slot of a lost worker stays vacant for a grace
+// period, so that a replacement takes over its boxes and nobody else's voxels move; then it is given up, and the slots after it move down.
 #pragma once
 
 #include <cstdint>

@@ -65,7 +65,7 @@ struct WorkerConfig {
 struct MessageReceived {
   AnyMessage message;
   Bytes payload;
-};  // from any plane; payload lengths and runs are checked already
+};  // from any plane; payload lengths are checked already, runs when they are combined
 struct ChunkStored {
   SlabKey slab;
   std::uint32_t chunk = 0;

@@ -1,4 +1,5 @@
 #include "client/cli/service_state.h"
+#include "tests/support/temporary_directory.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,18 +16,16 @@ namespace {
 class ServiceStateTest : public testing::Test {
  protected:
   ServiceStateTest() {
-    char name[] = "/tmp/slabstream-state-XXXXXX";
-    directory_ = ::mkdtemp(name);
     ::setenv("XDG_RUNTIME_DIR", directory_.c_str(), 1);
     ::unsetenv("SLABSTREAM_ENDPOINT");
   }
   ~ServiceStateTest() override {
     ::unsetenv("XDG_RUNTIME_DIR");
     ::unsetenv("SLABSTREAM_ENDPOINT");
-    std::filesystem::remove_all(directory_);
   }
 
-  std::string directory_;
+  TemporaryDirectory temporary_;
+  const std::string directory_ = temporary_.path();
 };
 
 TEST_F(ServiceStateTest, TheDirectoryIsOursAlone) {

@@ -99,16 +99,12 @@ ProgramResult RunningProgram::Wait() {
 }
 
 EndToEndTest::EndToEndTest() {
-  char name[] = "/tmp/slabstream-test-XXXXXX";  // short: paths of ipc sockets have at most 107 bytes
-  CHECK(::mkdtemp(name) != nullptr);
-  directory_ = name;
-  ::setenv("XDG_RUNTIME_DIR", name, 1);
+  ::setenv("XDG_RUNTIME_DIR", directory_.c_str(), 1);
   ::unsetenv("SLABSTREAM_ENDPOINT");
 }
 
 EndToEndTest::~EndToEndTest() {
   if (std::filesystem::exists(directory_ + "/slabstream")) Slabstream({"down"});
-  std::filesystem::remove_all(directory_);
 }
 
 std::vector<std::string> EndToEndTest::Command(std::vector<std::string> arguments) const {

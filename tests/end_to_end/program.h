@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/temporary_directory.h"
+
 namespace slabstream {
 
 struct ProgramResult {
@@ -60,7 +62,8 @@ class EndToEndTest : public testing::Test {
   std::string ReadFile(const std::string& name) const;
   std::vector<std::string> Files() const;  // names of regular files in the directory, sorted
 
-  std::string directory_;
+  TemporaryDirectory temporary_{"/tmp"};
+  const std::string directory_ = temporary_.path();
 };
 
 }  // namespace slabstream

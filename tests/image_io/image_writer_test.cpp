@@ -1,5 +1,6 @@
 // Files are read back with OpenImageIO, unconverted, and compared with what the format promises.
 #include "client/image_io/image_writer.h"
+#include "tests/support/temporary_directory.h"
 
 #include <OpenImageIO/imageio.h>
 #include <gmock/gmock.h>
@@ -39,17 +40,12 @@ FileImage Read(const std::string& path) {
 
 class ImageWriterTest : public testing::Test {
  protected:
-  ImageWriterTest() {
-    char name[] = "/tmp/slabstream-image-XXXXXX";
-    directory_ = ::mkdtemp(name);
-  }
-  ~ImageWriterTest() override { std::filesystem::remove_all(directory_); }
-  std::string Path(const std::string& name) const { return directory_ + "/" + name; }
+  std::string Path(const std::string& name) const { return directory_ / name; }
   std::size_t FileCount() const {
-    return std::size_t(std::distance(std::filesystem::directory_iterator(directory_), std::filesystem::directory_iterator()));
+    return std::size_t(std::distance(std::filesystem::directory_iterator(directory_.path()), std::filesystem::directory_iterator()));
   }
 
-  std::string directory_;
+  TemporaryDirectory directory_;
 };
 
 // 6 x 4 pixels, of which (2, 1) and (3, 1) are set.

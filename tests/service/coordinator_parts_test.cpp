@@ -15,6 +15,7 @@
 #include "coordinator/peer_table.h"
 #include "coordinator/slab_server.h"
 #include "tests/support/random.h"
+#include "tests/support/temporary_directory.h"
 
 namespace slabstream {
 namespace {
@@ -169,12 +170,6 @@ TEST_F(SlabServerTest, RequestsThatCannotBeMetAreRefusedWithTheReason) {
 
 class CatalogueTest : public testing::Test {
  protected:
-  CatalogueTest() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "slabstream-catalogue-XXXXXX").string();
-    CHECK(::mkdtemp(pattern.data()) != nullptr);
-    directory_ = pattern;
-  }
-  ~CatalogueTest() override { std::filesystem::remove_all(directory_); }
   void Touch(const std::string& name) { std::ofstream(directory_ / name) << "x"; }
   void ExpectError(const std::vector<std::string>& arguments, StatusCode code, const std::string& reason) {
     const Result<Catalogue> catalogue = MakeCatalogue(arguments);
@@ -182,7 +177,8 @@ class CatalogueTest : public testing::Test {
     EXPECT_THAT(catalogue.status().message(), HasSubstr(reason));
     EXPECT_THAT(catalogue.status().message(), testing::Not(HasSubstr("\n")));
   }
-  std::filesystem::path directory_;
+  TemporaryDirectory temporary_;
+  const std::filesystem::path directory_ = temporary_.path();
 };
 
 TEST_F(CatalogueTest, NamesComeFromArgumentsAndStems) {

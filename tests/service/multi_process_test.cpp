@@ -12,6 +12,7 @@
 #include "tests/service/child_process.h"
 #include "tests/service/pictures.h"
 #include "tests/support/random.h"
+#include "tests/support/temporary_directory.h"
 
 namespace slabstream {
 namespace {
@@ -30,16 +31,12 @@ class MultiProcessTest : public testing::Test {
  protected:
   MultiProcessTest() {
     std::cout << random_.trace() << std::endl;
-    std::string pattern = (std::filesystem::temp_directory_path() / "slabstream-processes-XXXXXX").string();
-    CHECK(::mkdtemp(pattern.data()) != nullptr);
-    directory_ = pattern;
     const Status written = WriteVolume(*volume_, (directory_ / "ball.nrrd").string());
     CHECK(written.ok()) << written.message();
   }
   ~MultiProcessTest() override {
     workers_.clear();
     coordinator_.reset();
-    std::filesystem::remove_all(directory_);
   }
 
   void StartCoordinator(const std::string& listen = "tcp://127.0.0.1:*", const std::string& worker_listen = "tcp://127.0.0.1:*") {
@@ -89,7 +86,8 @@ class MultiProcessTest : public testing::Test {
 
   Random random_{std::random_device{}()};
   const std::shared_ptr<const Volume> volume_ = TestSphere(64);
-  std::filesystem::path directory_;
+  TemporaryDirectory temporary_;
+  const std::filesystem::path directory_ = temporary_.path();
   Context context_;
   std::optional<ChildProcess> coordinator_;
   std::vector<ChildProcess> workers_;

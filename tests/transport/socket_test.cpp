@@ -20,6 +20,7 @@
 #include <zmq.hpp>
 
 #include "common/transport/mailbox.h"
+#include "tests/support/temporary_directory.h"
 
 namespace slabstream {
 namespace {
@@ -60,27 +61,12 @@ bool Until(StatusCode code, Socket& socket, Send&& send) {
   return false;
 }
 
-class TemporaryDirectory {
- public:
-  TemporaryDirectory() {
-    std::string path = std::filesystem::temp_directory_path() / "slabstream-XXXXXX";
-    if (::mkdtemp(path.data()) != nullptr) path_ = path;
-  }
-  ~TemporaryDirectory() { std::filesystem::remove_all(path_); }
-  TemporaryDirectory(const TemporaryDirectory&) = delete;
-  TemporaryDirectory& operator=(const TemporaryDirectory&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
-
 class SocketTest : public testing::TestWithParam<std::string> {
  protected:
   std::string endpoint() const {
     if (GetParam() == "tcp") return "tcp://127.0.0.1:*";
     if (GetParam() == "tcp6") return "tcp://[::1]:*";
-    return GetParam() == "ipc" ? "ipc://" + (directory_.path() / "socket").string() : "inproc://socket";
+    return GetParam() == "ipc" ? "ipc://" + (directory_ / "socket") : "inproc://socket";
   }
 
   // A router that is bound and a dealer that is connected to it. False: this machine has no such address.
@@ -112,7 +98,7 @@ class SocketTest : public testing::TestWithParam<std::string> {
     return hello ? hello->identity : "";
   }
 
-  TemporaryDirectory directory_;
+  TemporaryDirectory directory_{"/tmp"};
   Context context_;
   std::string bound_;
   std::unique_ptr<Socket> router_, dealer_;
@@ -299,9 +285,9 @@ TEST(Socket, RefusesWhatIsNotLoopback) {
 class IpcFileTest : public testing::Test {
  protected:
   Result<std::string> Bind(Socket& socket) { return socket.Bind("ipc://" + path()); }
-  std::string path() const { return (directory_.path() / "service").string(); }
+  std::string path() const { return directory_ / "service"; }
 
-  TemporaryDirectory directory_;
+  TemporaryDirectory directory_{"/tmp"};
   Context context_;
   Result<Socket> socket_ = Socket::Router(context_);
 };

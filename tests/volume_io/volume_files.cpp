@@ -50,17 +50,6 @@ std::string Numbers(const Vec3& v) { return std::to_string(v.x) + " " + std::to_
 
 }  // namespace
 
-TemporaryDirectory::TemporaryDirectory() {
-  std::string name = (std::filesystem::temp_directory_path() / "slabstream_test_XXXXXX").string();
-  CHECK(mkdtemp(name.data()) != nullptr) << name;
-  path_ = name;
-}
-
-TemporaryDirectory::~TemporaryDirectory() {
-  std::error_code error;
-  std::filesystem::remove_all(path_, error);
-}
-
 void WriteFile(const std::string& path, const FileBytes& bytes) {
   std::filesystem::remove(path);  // some file systems write a file that is overwritten to the disk at once
   std::ofstream file(path, std::ios::binary);

@@ -8,23 +8,9 @@
 
 #include "common/math/vec.h"
 #include "common/volume_io/sample_type.h"
+#include "tests/support/temporary_directory.h"
 
 namespace slabstream {
-
-// A directory of its own for each test, removed at the end.
-class TemporaryDirectory {
- public:
-  TemporaryDirectory();
-  ~TemporaryDirectory();
-  TemporaryDirectory(const TemporaryDirectory&) = delete;
-  TemporaryDirectory& operator=(const TemporaryDirectory&) = delete;
-
-  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
-  std::string path() const { return path_.string(); }
-
- private:
-  std::filesystem::path path_;
-};
 
 using FileBytes = std::string;
 
