@@ -1,0 +1,47 @@
+#include "common/kernels/simd_target.h"
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cstdint>
+#include <cstdlib>
+
+namespace slabstream {
+namespace {
+
+std::string NameOf(std::int64_t target) {
+  if (target == HWY_AVX3) return "avx512";  // Highway's name tells a generation
+  std::string name = hwy::TargetName(target);
+  std::ranges::transform(name, name.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  return name;
+}
+
+}  // namespace
+
+std::vector<std::string> SimdTargets() {
+  std::vector<std::string> names;
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) names.push_back(NameOf(target));  // better ones have lower bits
+  return names;
+}
+
+Status LimitSimdTarget(const std::string& name) {
+  std::string known;
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    if (NameOf(target) == name) {
+      hwy::DisableTargets(target - 1);
+      return Status::Ok();
+    }
+    known += (known.empty() ? "" : ", ") + NameOf(target);
+  }
+  return Status::InvalidArgument("instruction set '" + name + "' is not one of: " + known);
+}
+
+Status LimitSimdTargetByEnvironment() {
+  const char* name = std::getenv("SLABSTREAM_SIMD");
+  if (name == nullptr || *name == '\0') return Status::Ok();
+  const Status status = LimitSimdTarget(name);
+  return status.ok() ? status : Status::InvalidArgument("SLABSTREAM_SIMD: " + status.message());
+}
+
+}  // namespace slabstream
