@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "common/base/check.h"
+#include "common/planning/frame_occlusion.h"
 
 namespace slabstream {
 
@@ -77,6 +78,7 @@ RunningFrame::HandOut RunningFrame::NextGroup(Time now) {
               .workers = Renderers(number)};
   AddOnce(out.workers, plan_.display);
   for (const WorkerId worker : out.workers) out.assignment.peers.push_back({.worker = worker});
+  if (hidden_by_ <= number) out.assignment.hidden = hidden_;
   return out;
 }
 
@@ -90,6 +92,8 @@ Status RunningFrame::BeginAttempt(const Roster& roster, Time now) {
   if (!keeps_accumulated) {
     groups_done_ = 0;
     accumulating_since_ = attempt();
+    hidden_ = {};
+    hidden_by_ = 0;
   }
   // A display worker that has all groups is asked for the last one again: its answer is the picture that did not arrive.
   first_group_ = next_group_ = std::min(groups_done_, group_count() - 1);
@@ -120,7 +124,16 @@ bool RunningFrame::Finish(std::uint32_t groups, Time now) {
 bool RunningFrame::OnGroupDone(const GroupDone& message, Time now) {
   if (!Accept(message.key.attempt, message.worker) || message.key.group >= group_count()) return false;
   if (!message.reports.empty()) reports_[message.key.group] = message.reports;
+  KeepHidden(message);
   return Finish(message.key.group + 1, now);
+}
+
+// News of an older attempt may come late, and so after a mask of more groups.
+void RunningFrame::KeepHidden(const GroupDone& message) {
+  const std::uint32_t groups = message.key.group + 1;
+  if (message.hidden.empty() || groups <= hidden_by_ || !CheckFits(message.hidden, plan_.setup).ok()) return;
+  hidden_ = message.hidden;
+  hidden_by_ = groups;
 }
 
 RunningFrame::Use RunningFrame::OnImage(const FrameImage& message, Time now) {

@@ -14,6 +14,11 @@
 // A group is done when the display worker has accumulated it, which it does in order: group g done means 0 ... g done. That holds for the
 // display worker's lifetime, not for an attempt, and a picture is right whoever makes it, so news of older attempts counts where its sender
 // proves it.
+//
+// What is hidden (common/planning/frame_occlusion.h): each GroupDone of the present display worker may bring the mask of what it has
+// accumulated; the one of most groups is kept. The rule: the assignment of group g, of whatever attempt, carries it only if it was made
+// from groups in front of g. When an attempt begins again with group 0, the mask goes with what was accumulated. A mask that does not come,
+// or not in time, costs work and no more.
 #pragma once
 
 #include <cstdint>
@@ -93,6 +98,7 @@ class RunningFrame {
   };
   bool Accept(std::uint32_t attempt, WorkerId sender) const;
   bool Finish(std::uint32_t groups, Time now);
+  void KeepHidden(const GroupDone& message);
   bool waiting() const;  // for groups that are out, or for the finished picture
   Status CountStall(const Status& reason, Duration pause, Time now);
 
@@ -110,6 +116,8 @@ class RunningFrame {
   std::uint32_t groups_done_ = 0;         // by the present display worker
   std::uint32_t furthest_done_ = 0;       // by any
   std::uint32_t groups_shown_ = 0;        // in the last preview
+  OcclusionMask hidden_;                  // by the groups [0, hidden_by_), as the present display worker accumulated them
+  std::uint32_t hidden_by_ = 0;
   std::optional<Time> attempt_due_;
   bool display_in_doubt_ = false;  // the next attempt begins with group 0
   std::optional<Suspicion> suspicion_;

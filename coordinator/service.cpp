@@ -40,6 +40,12 @@ std::string SlabsEndpointFor(Endpoint client) {
   return client.ToString();
 }
 
+// Whether at least half of the volume's bricks hold one value each.
+bool MostBricksAreEqual(const VolumeSummary& summary) {
+  const auto equal = std::ranges::count_if(summary.bricks, [](const ValueRange& range) { return range.min == range.max; });
+  return 2 * std::size_t(equal) >= summary.bricks.size();
+}
+
 Status LoadFailure(const std::string& name, const std::string& reason) {
   return Status::ResourceExhausted("dataset \"" + name + "\" could not be loaded: " + reason);
 }
@@ -171,7 +177,12 @@ void CoordinatorService::Impl::Load(const LoadDataset& action) {
         const Result<std::shared_ptr<const Volume>> volume = catalogue.at(name)();
         if (!volume.ok()) return DatasetFailed{name, volume.status()};
         auto summary = std::make_shared<const VolumeSummary>(Summarize(**volume));
-        slabs->Publish(dataset, *volume);  // before the machine can send anybody for its voxels
+        // Before the machine can send anybody for its voxels.
+        if (MostBricksAreEqual(*summary)) {
+          slabs->Publish(dataset, std::make_shared<const BrickedVoxels>((*volume)->block));
+        } else {
+          slabs->Publish(dataset, *volume);
+        }
         return DatasetLoaded{name, dataset, std::move(summary)};
       } catch (const std::bad_alloc&) {
         return DatasetFailed{name, LoadFailure(name, "not enough memory")};
@@ -203,7 +214,7 @@ Result<std::unique_ptr<CoordinatorService>> CoordinatorService::Start(Context& c
   Result<std::string> worker_endpoint = control->Bind(options.worker_endpoint);
   if (!worker_endpoint.ok()) return worker_endpoint.status();
   options.machine.epoch = RandomEpoch();
-  Result<std::unique_ptr<SlabServer>> slabs = SlabServer::Start(context, options.slabs_endpoint, options.machine.epoch);
+  Result<std::unique_ptr<SlabServer>> slabs = SlabServer::Start(context, options.slabs_endpoint, options.machine.epoch, options.codec);
   if (!slabs.ok()) return slabs.status();
 
   options.machine.pid = static_cast<std::uint32_t>(::getpid());

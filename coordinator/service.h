@@ -19,6 +19,7 @@ struct CoordinatorOptions {
   std::string worker_endpoint;  // bound; empty: WorkerEndpointFor(client_endpoint)
   std::string slabs_endpoint;   // bound; empty: any port, ".slabs" beside an ipc path or inproc name
   Catalogue catalogue;          // name -> how to load it
+  Codec codec = Codec::kRaw;    // of voxels on their way to workers; zstd pays where the link is slower than it packs
   CoordinatorConfig machine;    // epoch, pid, slabs_endpoint and datasets are filled in by Start
 };
 

@@ -6,6 +6,7 @@
 #include <sstream>
 #include <utility>
 #include <variant>
+#include <vector>
 
 #include "common/base/log.h"
 #include "common/transport/endpoint.h"
@@ -26,33 +27,20 @@ std::string Text(const Box& box) {
   return text.str();
 }
 
-// Why the request cannot be met, or ok.
-Status Check(const ChunkRequest& request, Epoch epoch, const Volume* volume) {
-  if (request.epoch != epoch) return Status::NotFound("chunk request: epoch of another coordinator");
-  if (volume == nullptr) return Status::NotFound("chunk request: no dataset " + std::to_string(request.dataset));
-  if (request.box.empty() || !volume->block.box.Contains(request.box)) {
-    return Status::InvalidArgument("chunk request: box " + Text(request.box) + " is not inside the volume " + Text(volume->block.box));
-  }
-  if (const std::uint32_t count = ChunkCount(request.box, volume->block.type); request.chunk >= count) {
-    return Status::InvalidArgument("chunk request: chunk " + std::to_string(request.chunk) + " is not below " + std::to_string(count));
-  }
-  return Status::Ok();
-}
-
 }  // namespace
 
-Result<std::unique_ptr<SlabServer>> SlabServer::Start(Context& context, const std::string& endpoint, Epoch epoch) {
+Result<std::unique_ptr<SlabServer>> SlabServer::Start(Context& context, const std::string& endpoint, Epoch epoch, Codec codec) {
   Result<Socket> socket = Socket::Router(context);
   if (!socket.ok()) return socket.status();
   Result<std::string> bound = socket->Bind(endpoint);
   if (!bound.ok()) return bound.status();
-  return std::unique_ptr<SlabServer>(new SlabServer(std::move(*socket), std::move(*bound), epoch));
+  return std::unique_ptr<SlabServer>(new SlabServer(std::move(*socket), std::move(*bound), epoch, codec));
 }
 
-SlabServer::SlabServer(Socket socket, std::string endpoint, Epoch epoch)
+SlabServer::SlabServer(Socket socket, std::string endpoint, Epoch epoch, Codec codec)
     : endpoint_(std::move(endpoint)),
       epoch_(epoch),
-      codec_(endpoint_.starts_with("inproc:") ? Codec::kRaw : Codec::kZstd),
+      codec_(codec),
       socket_(std::move(socket)),
       thread_([this](const std::stop_token& stop) { Run(stop); }) {}
 
@@ -64,13 +52,38 @@ SlabServer::~SlabServer() {
 
 void SlabServer::Publish(DatasetId dataset, std::shared_ptr<const Volume> volume) {
   const std::lock_guard lock(mutex_);
-  volumes_.insert_or_assign(dataset, std::move(volume));
+  samples_.insert_or_assign(dataset, Samples{std::move(volume), nullptr});
 }
 
-std::shared_ptr<const Volume> SlabServer::Find(DatasetId dataset) {
+void SlabServer::Publish(DatasetId dataset, std::shared_ptr<const BrickedVoxels> bricks) {
   const std::lock_guard lock(mutex_);
-  const auto found = volumes_.find(dataset);
-  return found == volumes_.end() ? nullptr : found->second;
+  samples_.insert_or_assign(dataset, Samples{nullptr, std::move(bricks)});
+}
+
+SlabServer::Samples SlabServer::Find(DatasetId dataset) {
+  const std::lock_guard lock(mutex_);
+  const auto found = samples_.find(dataset);
+  return found == samples_.end() ? Samples{} : found->second;
+}
+
+Bytes SlabServer::Cut(const Samples& samples, const Box& part, std::uint64_t begin, std::uint64_t end) {
+  if (samples.volume != nullptr) return BoxSamples(samples.volume, part, begin, end);
+  ChunkBuffers::Buffer buffer = buffers_.Take();
+  const std::span<std::byte> cut(buffer->data(), end - begin);
+  samples.bricks->Read(part, begin, cut);
+  return {std::move(buffer), cut};
+}
+
+Status SlabServer::Check(const ChunkRequest& request, Epoch epoch, const Samples& samples) {
+  if (request.epoch != epoch) return Status::NotFound("chunk request: epoch of another coordinator");
+  if (!samples.any()) return Status::NotFound("chunk request: no dataset " + std::to_string(request.dataset));
+  if (request.box.empty() || !samples.box().Contains(request.box)) {
+    return Status::InvalidArgument("chunk request: box " + Text(request.box) + " is not inside the volume " + Text(samples.box()));
+  }
+  if (const std::uint32_t count = ChunkCount(request.box, samples.type()); request.chunk >= count) {
+    return Status::InvalidArgument("chunk request: chunk " + std::to_string(request.chunk) + " is not below " + std::to_string(count));
+  }
+  return Status::Ok();
 }
 
 void SlabServer::Run(const std::stop_token& stop) {
@@ -92,18 +105,18 @@ void SlabServer::Answer(const Incoming& incoming) {
     LogWarning("slabs plane: dropped " + (decoded.ok() ? std::string(NameOf(*decoded)) : decoded.status().message()));
     return;
   }
-  const std::shared_ptr<const Volume> volume = Find(request->dataset);
-  Status status = Check(*request, epoch_, volume.get());
+  const Samples samples = Find(request->dataset);
+  Status status = Check(*request, epoch_, samples);
   if (!status.ok()) {
     LogWarning(status.message());
     const ChunkRefused refused{epoch_, request->dataset, request->box, request->chunk, std::move(status)};
     (void)socket_.Send(incoming.identity, Encode(refused));  // a worker that has gone needs no refusal
     return;
   }
-  const std::uint64_t box_bytes = std::uint64_t(request->box.voxel_count()) * BytesPerSample(volume->block.type);
+  const std::uint64_t box_bytes = std::uint64_t(request->box.voxel_count()) * BytesPerSample(samples.type());
   const std::uint64_t begin = std::uint64_t{request->chunk} * kChunkBytes;
   Chunk chunk{.epoch = epoch_, .dataset = request->dataset, .box = request->box, .chunk = request->chunk};
-  const Bytes payload = PackChunk(BoxSamples(volume, request->box, begin, std::min(begin + kChunkBytes, box_bytes)), codec_, chunk);
+  const Bytes payload = PackChunk(Cut(samples, request->box, begin, std::min(begin + kChunkBytes, box_bytes)), codec_, chunk);
   if (const Status sent = socket_.Send(incoming.identity, Encode(chunk), payload); !sent.ok()) {
     LogDebug("slabs plane: " + sent.message());  // it has gone, or asks again when its request times out
   }

@@ -2,7 +2,7 @@
 // volumes.
 //
 // It keeps no state about workers: each request is the credit for one answer of at most kChunkBytes. A request that cannot be met is
-// refused with a reason. Chunks go out packed, but raw over inproc, where they then are the volume's own memory.
+// refused with a reason. Chunks go out packed, but raw over inproc, where those of a whole volume are its own memory.
 #pragma once
 
 #include <map>
@@ -13,32 +13,46 @@
 
 #include "common/base/status.h"
 #include "common/transport/socket.h"
-#include "common/volume/volume.h"
+#include "common/volume/bricks.h"
 #include "common/wire/any_message.h"
+#include "coordinator/chunk_buffers.h"
 
 namespace slabstream {
 
 class SlabServer {
  public:
-  static Result<std::unique_ptr<SlabServer>> Start(Context& context, const std::string& endpoint, Epoch epoch);
+  static Result<std::unique_ptr<SlabServer>> Start(Context& context, const std::string& endpoint, Epoch epoch, Codec codec = Codec::kRaw);
   ~SlabServer();  // stops and joins
 
   const std::string& endpoint() const { return endpoint_; }
 
-  // From any thread; once an id. The volume is served until the server ends.
+  // From any thread; once an id. The volume is served until the server ends: kept whole, or by bricks where those take much less memory.
   void Publish(DatasetId dataset, std::shared_ptr<const Volume> volume);
+  void Publish(DatasetId dataset, std::shared_ptr<const BrickedVoxels> bricks);
 
  private:
-  SlabServer(Socket socket, std::string endpoint, Epoch epoch);
+  SlabServer(Socket socket, std::string endpoint, Epoch epoch, Codec codec);
   void Run(const std::stop_token& stop);
   void Answer(const Incoming& incoming);
-  std::shared_ptr<const Volume> Find(DatasetId dataset);
+  // One of the two.
+  struct Samples {
+    std::shared_ptr<const Volume> volume;
+    std::shared_ptr<const BrickedVoxels> bricks;
+
+    bool any() const { return volume != nullptr || bricks != nullptr; }
+    const Box& box() const { return volume != nullptr ? volume->block.box : bricks->grid().box; }
+    ScalarType type() const { return volume != nullptr ? volume->block.type : bricks->type(); }
+  };
+  Bytes Cut(const Samples& samples, const Box& part, std::uint64_t begin, std::uint64_t end);  // as BoxSamples
+  static Status Check(const ChunkRequest& request, Epoch epoch, const Samples& samples);       // why it cannot be met, or ok
+  Samples Find(DatasetId dataset);
 
   const std::string endpoint_;
   const Epoch epoch_;
   const Codec codec_;
   std::mutex mutex_;
-  std::map<DatasetId, std::shared_ptr<const Volume>> volumes_;  // guarded by mutex_
+  std::map<DatasetId, Samples> samples_;  // guarded by mutex_
+  ChunkBuffers buffers_;                  // the thread's
   Wakeup wakeup_;
   Socket socket_;        // the thread's
   std::jthread thread_;  // last member

@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "common/base/pooled_vector.h"
+
 namespace slabstream {
 
 class Bytes {
@@ -14,17 +16,21 @@ class Bytes {
   Bytes() = default;
   // `owner` keeps `data` alive.
   Bytes(std::shared_ptr<const void> owner, std::span<const std::byte> data) : owner_(std::move(owner)), data_(data) {}
-  explicit Bytes(std::vector<std::byte> data) {
-    auto owned = std::make_shared<const std::vector<std::byte>>(std::move(data));
-    data_ = *owned;
-    owner_ = std::move(owned);
-  }
+  explicit Bytes(std::vector<std::byte> data) : Bytes(Owning(std::move(data))) {}
+  explicit Bytes(PooledVector<std::byte> data) : Bytes(Owning(std::move(data))) {}
 
   std::span<const std::byte> span() const { return data_; }
   std::size_t size() const { return data_.size(); }
   bool empty() const { return data_.empty(); }
 
  private:
+  template <class Vector>
+  static Bytes Owning(Vector data) {
+    auto owned = std::make_shared<const Vector>(std::move(data));
+    const std::span<const std::byte> span = *owned;
+    return {std::move(owned), span};
+  }
+
   std::shared_ptr<const void> owner_;
   std::span<const std::byte> data_;
 };

@@ -1,5 +1,8 @@
 #include "common/volume/summary.h"
 
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -48,12 +51,8 @@ ValueRange ToDataValues(const StoredRange<T>& stored, const ValueMapping& mappin
 template <class T>
 class BrickRow {
  public:
-  explicit BrickRow(std::int32_t width) : low_(std::size_t(width)), high_(std::size_t(width)) {}
-
-  void Clear() {
-    std::fill(low_.begin(), low_.end(), std::numeric_limits<T>::max());
-    std::fill(high_.begin(), high_.end(), std::numeric_limits<T>::lowest());
-  }
+  explicit BrickRow(std::int32_t width)
+      : low_(std::size_t(width), std::numeric_limits<T>::max()), high_(std::size_t(width), std::numeric_limits<T>::lowest()) {}
 
   void Fold(const T* __restrict row) {
     T* __restrict low = low_.data();
@@ -115,51 +114,70 @@ struct NoCounts {
   void Add(const float*, std::int32_t) {}
 };
 
+// What one thread finds.
+template <class T>
+struct Part {
+  StoredRange<T> range;
+  std::conditional_t<std::is_integral_v<T>, StoredCounts<T>, NoCounts> counts;
+};
+struct FloatPart {
+  std::array<std::uint64_t, kHistogramBins> histogram{};
+  std::int64_t non_finite = 0;
+};
+
 template <class T>
 void FillSummary(const Volume& volume, VolumeSummary& summary) {
   const ValueMapping& mapping = summary.description.mapping;
-  const Index3 size = summary.description.geometry.size;
+  const Index3 size = summary.description.geometry.size, bricks = summary.brick_counts;
   const auto row_at = [&](std::int32_t y, std::int32_t z) { return volume.block.samples<T>() + volume.block.Offset({0, y, z}); };
 
-  StoredRange<T> whole;
-  std::conditional_t<std::is_integral_v<T>, StoredCounts<T>, NoCounts> counts;
-  BrickRow<T> brick_row(size.x);
-  summary.bricks.reserve(std::size_t(summary.brick_counts.x) * std::size_t(summary.brick_counts.y) * std::size_t(summary.brick_counts.z));
-  for (std::int32_t z_begin = 0; z_begin < size.z; z_begin += kSummaryBrick) {
-    for (std::int32_t y_begin = 0; y_begin < size.y; y_begin += kSummaryBrick) {
-      brick_row.Clear();
-      for (std::int32_t z = z_begin; z < std::min(z_begin + kSummaryBrick, size.z); ++z) {
-        for (std::int32_t y = y_begin; y < std::min(y_begin + kSummaryBrick, size.y); ++y) {
-          brick_row.Fold(row_at(y, z));
-          counts.Add(row_at(y, z), size.x);
-        }
-      }
-      for (std::int32_t brick = 0; brick < summary.brick_counts.x; ++brick) {
-        const StoredRange<T> range = brick_row.Brick(brick);
-        whole.Include(range);
-        summary.bricks.push_back(ToDataValues(range, mapping, kNoFiniteValue));
+  tbb::enumerable_thread_specific<Part<T>> parts;
+  summary.bricks.resize(std::size_t(bricks.x) * std::size_t(bricks.y) * std::size_t(bricks.z));
+  tbb::parallel_for(0, bricks.y * bricks.z, [&](std::int32_t row_of_bricks) {
+    Part<T>& part = parts.local();
+    BrickRow<T> brick_row(size.x);
+    const std::int32_t y_begin = row_of_bricks % bricks.y * kSummaryBrick, z_begin = row_of_bricks / bricks.y * kSummaryBrick;
+    for (std::int32_t z = z_begin; z < std::min(z_begin + kSummaryBrick, size.z); ++z) {
+      for (std::int32_t y = y_begin; y < std::min(y_begin + kSummaryBrick, size.y); ++y) {
+        brick_row.Fold(row_at(y, z));
+        part.counts.Add(row_at(y, z), size.x);
       }
     }
-  }
+    ValueRange* out = &summary.bricks[std::size_t(row_of_bricks) * std::size_t(bricks.x)];
+    for (std::int32_t brick = 0; brick < bricks.x; ++brick) {
+      const StoredRange<T> range = brick_row.Brick(brick);
+      part.range.Include(range);
+      *out++ = ToDataValues(range, mapping, kNoFiniteValue);
+    }
+  });
+  StoredRange<T> whole;
+  for (const Part<T>& part : parts) whole.Include(part.range);
   summary.range = ToDataValues(whole, mapping, ValueRange{0, 0});
 
   if constexpr (std::is_integral_v<T>) {
     for (std::size_t stored = whole.low; stored <= whole.high; ++stored) {
-      summary.histogram[std::size_t(HistogramBin(summary.range, DataValue(mapping, double(stored))))] += counts[stored];
+      std::uint64_t& bin = summary.histogram[std::size_t(HistogramBin(summary.range, DataValue(mapping, double(stored))))];
+      for (const Part<T>& part : parts) bin += part.counts[stored];
     }
   } else {
     // Bins need the range first, so these voxels are read a second time.
-    for (std::int32_t z = 0; z < size.z; ++z) {
+    tbb::enumerable_thread_specific<FloatPart> float_parts;
+    tbb::parallel_for(0, size.z, [&](std::int32_t z) {
+      FloatPart& part = float_parts.local();
       for (std::int32_t y = 0; y < size.y; ++y) {
         const T* row = row_at(y, z);
         for (std::int32_t x = 0; x < size.x; ++x) {
           if (IsFinite(row[x])) {
-            ++summary.histogram[std::size_t(HistogramBin(summary.range, DataValue(mapping, double(row[x]))))];
+            ++part.histogram[std::size_t(HistogramBin(summary.range, DataValue(mapping, double(row[x]))))];
           } else {
-            ++summary.non_finite;
+            ++part.non_finite;
           }
         }
       }
+    });
+    for (const FloatPart& part : float_parts) {
+      for (std::size_t bin = 0; bin < part.histogram.size(); ++bin) summary.histogram[bin] += part.histogram[bin];
+      summary.non_finite += part.non_finite;
     }
   }
 }

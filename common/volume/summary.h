@@ -44,7 +44,8 @@ struct VolumeSummary {
   friend bool operator==(const VolumeSummary&, const VolumeSummary&) = default;
 };
 
-// Reads every voxel once, those of float volumes a second time for the histogram. One thread; about 1 ns a voxel.
+// Reads every voxel once, those of float volumes a second time for the histogram. In parallel, with the same result for any number of
+// threads.
 VolumeSummary Summarize(const Volume& volume);
 
 }  // namespace slabstream

@@ -1,6 +1,7 @@
 // BinLookup<T>: from a stored sample to its bin of the classification table, for the bins that were selected (visible ones, opaque ones).
 #pragma once
 
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "common/classification/classification_table.h"
+#include "worker/kernels/select_samples.h"
 
 namespace slabstream {
 
@@ -54,12 +56,55 @@ class BinLookup {
     }
   }
 
+  // The selected samples, finite ones, as disjoint intervals in ascending order.
+  std::vector<SampleInterval<T>> Intervals() const {
+    std::vector<SampleInterval<T>> intervals;
+    const std::vector<std::uint8_t>& selected = selection_->selected;
+    for (std::size_t bin = 0; bin < selected.size(); ++bin) {
+      if (selected[bin] == 0) continue;
+      const std::size_t first = bin;
+      while (bin + 1 < selected.size() && selected[bin + 1] != 0) ++bin;
+      // Where no sample falls into these bins, the first one of a bin further on.
+      const std::int64_t begin = FirstWithBin(int(first)), end = FirstWithBin(int(bin) + 1);
+      if (begin < end) intervals.push_back({SampleAt(begin), SampleAt(end - 1)});
+    }
+    return intervals;
+  }
+
   // False if no sample in [low, high] is selected.
   bool AnyBetween(double low, double high) const {
     return low <= high && selected_before_[std::size_t(table_->BinOf(high)) + 1] > selected_before_[std::size_t(table_->BinOf(low))];
   }
 
  private:
+  // Finite samples by their place in ascending order, [0, kSamples). Floats are ordered as the integers of their bits, negative ones
+  // backwards; -0 has the place of 0.
+  static constexpr std::int64_t kFiniteFloats = 0x7F800000;  // without sign
+  static constexpr std::int64_t kSamples = std::is_integral_v<T> ? std::int64_t{1} << (8 * sizeof(T)) : 2 * kFiniteFloats - 1;
+  static T SampleAt(std::int64_t place) {
+    if constexpr (std::is_integral_v<T>) {
+      return T(place);
+    } else {
+      const std::int64_t signed_place = place - (kFiniteFloats - 1);
+      const auto magnitude = std::bit_cast<float>(std::uint32_t(std::abs(signed_place)));
+      return signed_place < 0 ? -magnitude : magnitude;
+    }
+  }
+
+  // Place of the least sample whose bin is at least `bin`; kSamples: there is none. Bins ascend with samples.
+  std::int64_t FirstWithBin(int bin) const {
+    std::int64_t low = 0, high = kSamples;
+    while (low < high) {
+      const std::int64_t middle = (low + high) / 2;
+      if (bin < table_->size() && table_->BinOf(double(SampleAt(middle))) >= bin) {
+        high = middle;
+      } else {
+        low = middle + 1;
+      }
+    }
+    return low;
+  }
+
   const ClassificationTable* table_;
   const BinSelection* selection_;
   std::vector<std::uint16_t> bins_;

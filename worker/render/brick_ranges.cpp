@@ -1,54 +1,65 @@
 #include "worker/render/brick_ranges.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <type_traits>
 
 namespace slabstream {
 namespace {
 
+// Least and greatest finite sample so far.
 template <class T>
-BrickRanges::Range RangeOf(const T* samples, std::int32_t count, BrickRanges::Range range) {
-  if constexpr (std::is_integral_v<T>) {
-    T low = std::numeric_limits<T>::max(), high = 0;
+struct Extremes {
+  static constexpr T kLargest = std::numeric_limits<T>::max(), kLeast = std::numeric_limits<T>::lowest();
+  T low = kLargest, high = kLeast;
+
+  void Include(const T* samples, std::int32_t count) {
+    T least = low, greatest = high;
     for (std::int32_t i = 0; i < count; ++i) {
-      low = std::min(low, samples[i]);
-      high = std::max(high, samples[i]);
+      if constexpr (std::is_integral_v<T>) {
+        least = std::min(least, samples[i]);
+        greatest = std::max(greatest, samples[i]);
+      } else {
+        const bool finite = samples[i] >= kLeast && samples[i] <= kLargest;  // NaN is neither
+        least = finite && samples[i] < least ? samples[i] : least;
+        greatest = finite && samples[i] > greatest ? samples[i] : greatest;
+      }
     }
-    return {std::min(range.min, float(low)), std::max(range.max, float(high))};
-  } else {
-    for (std::int32_t i = 0; i < count; ++i) {
-      if (std::isfinite(samples[i])) range = {std::min(range.min, samples[i]), std::max(range.max, samples[i])};
-    }
-    return range;
+    low = least;
+    high = greatest;
   }
+};
+
+// Reads what lies together in memory in one go: it vectorises.
+template <class T>
+BrickRanges::Range RangeOf(const BrickView<T>& brick, const Box& box) {
+  const Index3 size = box.size();
+  Extremes<T> extremes;
+  if (brick.y_stride == 0) {
+    extremes.Include(brick.first, 1);
+  } else if (brick.y_stride == size.x && brick.z_stride == std::ptrdiff_t{size.x} * size.y) {
+    extremes.Include(brick.first, size.x * size.y * size.z);
+  } else {
+    for (std::int32_t z = box.begin.z; z < box.end.z; ++z) {
+      for (std::int32_t y = box.begin.y; y < box.end.y; ++y) extremes.Include(brick.Row(y, z), size.x);
+    }
+  }
+  return {float(extremes.low), float(extremes.high)};
 }
 
 }  // namespace
 
-BrickRanges::BrickRanges(const VoxelBlock& voxels) {
-  const Box& box = voxels.box;
-  if (box.empty()) return;
-  for (int axis = 0; axis < 3; ++axis) {
-    first_[axis] = box.begin[axis] / kBrick;
-    counts_[axis] = (box.end[axis] - 1) / kBrick + 1 - first_[axis];
-  }
-  constexpr float kLargest = std::numeric_limits<float>::max();
-  ranges_.assign(std::size_t(counts_.x) * counts_.y * counts_.z, Range{kLargest, -kLargest});
-  VisitScalarType(voxels.type, [&](auto* type) {
-    const auto* samples = voxels.samples<std::remove_cvref_t<decltype(*type)>>();
-    for (std::int32_t z = box.begin.z; z < box.end.z; ++z) {
-      for (std::int32_t y = box.begin.y; y < box.end.y; ++y) {
-        Range* row = &ranges_[(std::size_t(z / kBrick - first_.z) * counts_.y + (y / kBrick - first_.y)) * counts_.x];
-        for (std::int32_t x = box.begin.x; x < box.end.x; ++row) {
-          const std::int32_t end = std::min((x / kBrick + 1) * kBrick, box.end.x);
-          *row = RangeOf(samples, end - x, *row);
-          samples += end - x;
-          x = end;
-        }
+BrickRanges::BrickRanges(const VoxelBricks& voxels) : grid_(voxels.grid()), ranges_(grid_.size()) {
+  VisitScalarType(voxels.type(), [&](auto* type) {
+    using T = std::remove_cvref_t<decltype(*type)>;
+    tbb::parallel_for(0, grid_.counts.y * grid_.counts.z, [&](std::int32_t row) {
+      Index3 brick = {grid_.first.x, grid_.first.y + row % grid_.counts.y, grid_.first.z + row / grid_.counts.y};
+      for (; brick.x < grid_.first.x + grid_.counts.x; ++brick.x) {
+        ranges_[grid_.Number(brick)] = RangeOf(voxels.View<T>(brick), grid_.BoxOf(brick));
       }
-    }
+    });
   });
 }
 

@@ -5,27 +5,26 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/volume/volume.h"
+#include "common/volume/bricks.h"
 
 namespace slabstream {
 
 class BrickRanges {
  public:
-  static constexpr std::int32_t kBrick = 16;
+  static constexpr std::int32_t kBrick = slabstream::kBrick;
 
-  explicit BrickRanges(const VoxelBlock& voxels);
+  explicit BrickRanges(const VoxelBricks& voxels);
 
   struct Range {
     float min, max;  // of finite samples; min > max: there is none
   };
   // Of the brick that holds a voxel.
-  const Range& At(std::int32_t x, std::int32_t y, std::int32_t z) const {
-    return ranges_[(std::size_t(z / kBrick - first_.z) * counts_.y + (y / kBrick - first_.y)) * counts_.x + (x / kBrick - first_.x)];
-  }
+  const Range& At(std::int32_t x, std::int32_t y, std::int32_t z) const { return Of({x / kBrick, y / kBrick, z / kBrick}); }
+  const Range& Of(const Index3& brick) const { return ranges_[grid_.Number(brick)]; }
   std::size_t bytes() const { return ranges_.capacity() * sizeof(Range); }
 
  private:
-  Index3 first_, counts_;  // bricks
+  BrickGrid grid_;
   std::vector<Range> ranges_;
 };
 

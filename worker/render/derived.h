@@ -10,12 +10,12 @@
 
 #include "worker/render/occupied_cells.h"
 #include "worker/render/pipeline.h"
-#include "worker/render/surface_voxels.h"
+#include "worker/render/zbuffer/surface.h"
 
 namespace slabstream {
 
 struct SlabData::Derived {
-  explicit Derived(const VoxelBlock& voxels) : voxels_(voxels) {}
+  explicit Derived(SlabData& slab) : slab_(slab) {}
 
   // The table of this frame's transfer function. Valid until the next call.
   const ClassificationTable& Classification(const FrameSetup& setup);
@@ -23,28 +23,29 @@ struct SlabData::Derived {
   // Occupied voxels for the camera's traversal axis, in the slices of `box`. Valid until the next call of any function but Classification.
   const OccupiedCells& Occupied(const FrameSetup& setup, const Box& box);
 
-  // Opaque voxels of `box`: opacity at least half of the largest that the volume's range of values has.
-  const std::vector<SurfaceVoxel>& Surface(const FrameSetup& setup, const Box& box);
+  // Faces of the opaque voxels of `box`: opacity at least half of the largest that the volume's range of values has.
+  const Surface& OpaqueSurface(const FrameSetup& setup, const Box& box);
 
   std::size_t bytes() const;
 
  private:
   const BrickRanges& Bricks();
+  const CellBeams& Beams(const FrameSetup& setup, Axis u);
 
-  const VoxelBlock& voxels_;
+  SlabData& slab_;
   std::optional<BrickRanges> bricks_;
 
   // What the table was made from.
   std::optional<std::pair<TransferFunction, ValueRange>> classified_;
   ClassificationTable table_;
 
-  // For the axes in use: a turntable visits two.
-  static constexpr std::size_t kKeptAxes = 2;
   BinSelection occupied_bins_;
+  std::optional<CellBeams> along_x_, along_y_;
+  static constexpr std::size_t kKeptViews = 8;
   std::deque<std::pair<Box, OccupiedCells>> occupied_;  // by the box they were made for; last used first
 
   BinSelection opaque_bins_;
-  std::optional<std::pair<Box, std::vector<SurfaceVoxel>>> surface_;
+  std::optional<std::pair<Box, Surface>> surface_;
 };
 
 }  // namespace slabstream

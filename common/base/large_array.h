@@ -1,0 +1,38 @@
+// LargeArray<T>: an array of elements without constructor for what is large and written at once. Its memory is mapped for it alone and goes
+// back to the system when it is freed. It asks for huge pages: taking 4 KiB at a time costs more than what is computed into them. What is
+// never written takes no memory, and reads as 0.
+#pragma once
+
+#include <sys/mman.h>
+
+#include <cstddef>
+#include <memory>
+#include <new>
+#include <type_traits>
+
+namespace slabstream {
+
+struct UnmapArray {
+  std::size_t bytes = 0;
+  template <class T>
+  void operator()(T* data) const {
+    ::munmap(data, bytes);
+  }
+};
+
+template <class T>
+using LargeArray = std::unique_ptr<T[], UnmapArray>;
+
+// Throws std::bad_alloc. No elements: null.
+template <class T>
+LargeArray<T> MakeLargeArray(std::size_t count) {
+  static_assert(std::is_trivially_default_constructible_v<T> && std::is_trivially_destructible_v<T>);
+  if (count == 0) return {};
+  const std::size_t bytes = count * sizeof(T);
+  void* data = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (data == MAP_FAILED) throw std::bad_alloc();
+  (void)::madvise(data, bytes, MADV_HUGEPAGE);  // where there are none it stays as it is
+  return LargeArray<T>(static_cast<T*>(data), UnmapArray{bytes});
+}
+
+}  // namespace slabstream

@@ -1,0 +1,127 @@
+// Bricks: cubes of kBrick voxels a side, at global multiples of kBrick, cut off by the box that they divide. BrickedVoxels keeps the
+// samples of a box brick by brick: where all samples of a brick are equal one row of them is kept, so what is empty takes hardly any
+// memory. That is most of a segmented scan and the surroundings of many simulations; of a volume without such bricks nothing is saved and
+// nothing lost.
+//
+// VoxelBricks reads bricks of either kind of storage, VoxelBlock or BrickedVoxels.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <vector>
+
+#include "common/base/large_array.h"
+#include "common/volume/volume.h"
+
+namespace slabstream {
+
+inline constexpr std::int32_t kBrick = 16;  // voxels
+
+// A brick is named by its begin divided by kBrick, rounded down, in the whole volume.
+struct BrickGrid {
+  BrickGrid() = default;
+  explicit BrickGrid(const Box& divided);
+
+  std::size_t size() const { return std::size_t(counts.x) * std::size_t(counts.y) * std::size_t(counts.z); }
+  std::size_t Number(const Index3& brick) const {
+    return (std::size_t(brick.z - first.z) * std::size_t(counts.y) + std::size_t(brick.y - first.y)) * std::size_t(counts.x) +
+           std::size_t(brick.x - first.x);
+  }
+  Box BoxOf(const Index3& brick) const {
+    return Intersection(box, {{brick.x * kBrick, brick.y * kBrick, brick.z * kBrick},
+                              {(brick.x + 1) * kBrick, (brick.y + 1) * kBrick, (brick.z + 1) * kBrick}});
+  }
+
+  Box box;
+  Index3 first, counts;  // bricks
+};
+
+// Where the samples of a brick are: rows along x. Rows may be one and the same.
+template <class T>
+struct BrickView {
+  const T* first = nullptr;  // sample of the brick's first voxel
+  Index3 begin;
+  std::ptrdiff_t y_stride = 0, z_stride = 0;
+
+  // From the brick's first voxel along x on.
+  const T* Row(std::int32_t y, std::int32_t z) const { return first + (y - begin.y) * y_stride + (z - begin.z) * z_stride; }
+};
+
+class BrickedVoxels {
+ public:
+  // All samples are 0 until the first ones are written; from then on what was not written has any value.
+  BrickedVoxels(const Box& box, ScalarType type);
+  explicit BrickedVoxels(const VoxelBlock& block);
+
+  const BrickGrid& grid() const { return grid_; }
+  ScalarType type() const { return type_; }
+
+  // Samples of the box in order, x fastest, from a byte offset on: whole samples. Several threads may write different bricks.
+  void Write(std::uint64_t begin, std::span<const std::byte> samples);
+  // Likewise those of any `box` inside this one.
+  void Read(const Box& box, std::uint64_t begin, std::span<std::byte> samples) const;
+
+  template <class T>
+  BrickView<T> View(const Index3& brick) const {
+    const std::size_t number = grid_.Number(brick);
+    const Box box = grid_.BoxOf(brick);
+    if (bricks_[number] == nullptr) return {RowOf<T>(number), box.begin, 0, 0};
+    const std::ptrdiff_t width = box.end.x - box.begin.x;
+    return {reinterpret_cast<const T*>(bricks_[number]), box.begin, width, width * (box.end.y - box.begin.y)};
+  }
+
+  std::size_t bytes() const {
+    return equal_rows_.size() + met_.size() + bricks_.size() * sizeof(bricks_[0]) + pools_.size() * kPoolBytes - pool_left_;
+  }
+
+ private:
+  static constexpr std::size_t kPoolBytes = std::size_t{2} << 20;  // a huge page
+
+  template <class T>
+  const T* RowOf(std::size_t number) const {
+    return reinterpret_cast<const T*>(equal_rows_.data()) + number * kBrick;
+  }
+  std::byte* TakeBrick(std::size_t bytes);
+  template <class T>
+  void WriteRun(const Index3& voxel, const T* samples, std::int32_t count);
+
+  BrickGrid grid_;
+  ScalarType type_;
+  AlignedVector<std::byte> equal_rows_;                                      // of each brick without samples of its own
+  std::vector<std::uint8_t> met_;                                            // by brick: 1 once any of its samples was written
+  std::vector<std::byte*> bricks_;                                           // null: all samples are equal
+  std::unique_ptr<std::mutex> pool_mutex_ = std::make_unique<std::mutex>();  // of the rest
+  std::vector<LargeArray<std::byte>> pools_;                                 // that the bricks lie in, one after the other
+  std::size_t pool_left_ = 0;                                                // bytes of the last one
+};
+
+// Neither copies nor owns.
+class VoxelBricks {
+ public:
+  VoxelBricks(const VoxelBlock& block)  // NOLINT(google-explicit-constructor): a block is read brick by brick too
+      : grid_(block.box), type_(block.type), block_(&block) {}
+  VoxelBricks(const BrickedVoxels& bricks)  // NOLINT(google-explicit-constructor)
+      : grid_(bricks.grid()), type_(bricks.type()), bricks_(&bricks) {}
+
+  const BrickGrid& grid() const { return grid_; }
+  const Box& box() const { return grid_.box; }
+  ScalarType type() const { return type_; }
+
+  template <class T>
+  BrickView<T> View(const Index3& brick) const {
+    if (bricks_ != nullptr) return bricks_->View<T>(brick);
+    const Index3 begin = grid_.BoxOf(brick).begin, size = grid_.box.size();
+    return {block_->samples<T>() + block_->Offset(begin), begin, size.x, std::ptrdiff_t{size.x} * size.y};
+  }
+
+ private:
+  BrickGrid grid_;
+  ScalarType type_;
+  const VoxelBlock* block_ = nullptr;
+  const BrickedVoxels* bricks_ = nullptr;
+};
+
+}  // namespace slabstream
