@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "tests/render/render_support.h"
-#include "worker/render/zbuffer/surface_normal.h"
+#include "worker/render/zbuffer/vertex_normals.h"
 
 namespace slabstream {
 namespace {
@@ -28,10 +28,27 @@ SetupOptions Options(Projection projection, unsigned seed) {
   return options;
 }
 
+// Camera depth where a ray meets the cells [first - 0.5, last + 0.5), grown by `margin` voxels on all sides; exit < enter: it misses them.
+struct Span {
+  double enter, exit;
+};
+Span Meet(const Camera::Ray& ray, const Vec3& first, const Vec3& last, double margin) {
+  Span span{-1e30, 1e30};
+  for (Axis axis : kAxes) {
+    const double a = (first[axis] - 0.5 - margin - ray.origin[axis]) / ray.direction[axis];
+    const double b = (last[axis] + 0.5 + margin - ray.origin[axis]) / ray.direction[axis];
+    span = {std::max(span.enter, std::min(a, b)), std::min(span.exit, std::max(a, b))};
+  }
+  return span;
+}
+
+// Faces reach a little beyond their edges (draw_faces.h), so a ray that misses a cell by less may see it.
+constexpr double kBeyond = 0x1p-13;
+
 // A filled volume is one box: covered where the ray meets it, at the depth where it enters, at every zoom, without a hole.
 TEST(ZBuffer, BlockHasExactSilhouetteAndDepth) {
   for (Projection projection : kProjections) {
-    for (double zoom : {0.3, 1.0, 6.0, 50.0}) {
+    for (double zoom : {0.1, 0.3, 1.0, 6.0, 40.0, 500.0}) {
       for (unsigned seed = 1; seed < 5; ++seed) {
         const Volume block = MakeBlock({{14, 9, 11}, {1, 1.5, 0.7}});
         SetupOptions options = Options(projection, seed);
@@ -41,14 +58,10 @@ TEST(ZBuffer, BlockHasExactSilhouetteAndDepth) {
         for (int y = 0; y < setup.camera.height; ++y) {
           for (int x = 0; x < setup.camera.width; ++x) {
             const Camera::Ray ray = setup.camera.RayAt(x + 0.5, y + 0.5);
-            double enter = 0, exit = 1e30;
-            for (Axis axis : kAxes) {
-              const double a = (-0.5 - ray.origin[axis]) / ray.direction[axis];
-              const double b = (block.description.geometry.size[axis] - 0.5 - ray.origin[axis]) / ray.direction[axis];
-              enter = std::max(enter, std::min(a, b));
-              exit = std::min(exit, std::max(a, b));
-            }
-            if (std::abs(exit - enter) < 1e-9) continue;  // through an edge
+            const Vec3 last = ToVec3(block.description.geometry.size) - Vec3{1, 1, 1};
+            const auto [enter, exit] = Meet(ray, {}, last, 0);
+            const auto [reached, left] = Meet(ray, {}, last, kBeyond);
+            if (enter >= exit && reached < left) continue;  // past an edge
             const float depth = DepthOf(image, x, y);
             ASSERT_EQ(std::isfinite(depth), enter < exit) << "seed " << seed << " zoom " << zoom << " pixel " << x << ' ' << y;
             if (enter < exit) {
@@ -100,22 +113,25 @@ TEST(ZBuffer, BallHasItsSilhouetteDepthAndShade) {
   }
 }
 
-// A ramp has its gradient at every point of every cell, borders included; a constant has none at all, not even by rounding.
-TEST(ZBuffer, GradientsOfRampsAndConstantsAreExact) {
-  const unsigned seed = 12;
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<double> within(-0.5, 0.5);
+// A ramp has its gradient at every vertex of every cell, borders included; a constant has none at all, not even
+// by rounding.
+TEST(ZBuffer, GradientsOfRampsAndConstantsAreTheirs) {
   const Vec3 spacing = {0.5, 2, 1.3};
-  for (Index3 size : {Index3{9, 6, 5}, Index3{2, 3, 1}}) {
+  for (Index3 size : {Index3{19, 6, 5}, Index3{2, 3, 1}}) {
     const Volume ramp = MakeVolume({size, spacing}, ScalarType::kFloat32, [](const Index3& v) { return 2.0 * v.x - 3.0 * v.y + v.z; });
     const Volume constant = MakeVolume({size, spacing}, ScalarType::kFloat32, [](const Index3&) { return 0.1; });
     const Vec3 expected = Vec3{size.x > 1 ? 2.0 : 0.0, size.y > 1 ? -3.0 : 0.0, size.z > 1 ? 1.0 : 0.0} / spacing;
-    for (Index3 v; v.z < size.z; ++v.z) {
-      for (v.y = 0; v.y < size.y; ++v.y) {
-        for (v.x = 0; v.x < size.x; ++v.x) {
-          const Vec3 point = ToVec3(v) + Vec3{within(random), within(random), within(random)};
-          ASSERT_LT(Length(GradientAt(ramp.block, spacing, v, point) - expected), 1e-12) << "seed " << seed;
-          ASSERT_EQ(GradientAt(constant.block, spacing, v, point), Vec3{}) << "seed " << seed;
+    for (Index3 brick : {Index3{0, 0, 0}, Index3{16, 0, 0}}) {
+      if (brick.x >= size.x) continue;
+      const auto of_ramp = std::make_unique<VertexNormals>(), of_constant = std::make_unique<VertexNormals>();
+      of_ramp->Compute(ramp.block, spacing, brick);
+      of_constant->Compute(constant.block, spacing, brick);
+      for (Index3 v; v.z <= std::min(16, size.z - brick.z); ++v.z) {
+        for (v.y = 0; v.y <= std::min(16, size.y - brick.y); ++v.y) {
+          for (v.x = 0; v.x <= std::min(16, size.x - brick.x); ++v.x) {
+            ASSERT_LT(Length(of_ramp->Gradient(v) - expected), 1e-4) << v.x << ' ' << v.y << ' ' << v.z;
+            ASSERT_EQ(of_constant->Gradient(v), Vec3{}) << v.x << ' ' << v.y << ' ' << v.z;
+          }
         }
       }
     }
@@ -131,10 +147,10 @@ TEST(ZBuffer, DrawsVoxelsFromHalfTheLargestOpacityOn) {
   const auto slab = CutSlab(volume, volume.block.box);
   RankReport report;
   const LocalImage image =
-      MakeRenderer(RendererKind::kZBuffer)->Render(*slab, volume.block.box, setup, std::atomic<bool>(false), report).value();
+      MakeRenderer(RendererKind::kZBuffer)->Render(*slab, volume.block.box, setup, {}, std::atomic<bool>(false), report).value();
   for (std::size_t i = 0; i < image.depth.size(); ++i) {
     if (std::isfinite(image.depth[i])) {
-      EXPECT_GE(image.voxel[i] % 8, 4U);
+      EXPECT_GE(image.voxel[i] % 8 * 2, 4U);  // FaceIndex ends with x / 2
     }
   }
   EXPECT_GT(report.drawn_voxels, 0U);
@@ -150,32 +166,29 @@ TEST(ZBuffer, NothingIsDrawnWhereNothingIsOpaque) {
 // Ties and nearest voxels by brute force: every voxel of a random cloud against every pixel.
 TEST(ZBuffer, IsTheNearestCellOfEveryPixel) {
   for (Projection projection : kProjections) {
-    for (unsigned seed = 20; seed < 24; ++seed) {
+    for (unsigned seed = 20; seed < 40; ++seed) {
       std::mt19937 random(seed);
       const Volume cloud =
           MakeVolume({{7, 6, 5}, {1, 1, 1}}, ScalarType::kUint8, [&](const Index3&) { return random() % 4 == 0 ? 100 : 0; });
       SetupOptions options = Options(projection, seed);
       options.size = {48, 48};
+      options.view.zoom = std::exp2(int(seed % 5) - 1);
       const FrameSetup setup = MakeSetup(cloud, options);
       const LocalImage image = RenderWhole(cloud, setup);
       for (int y = 0; y < setup.camera.height; ++y) {
         for (int x = 0; x < setup.camera.width; ++x) {
           const Camera::Ray ray = setup.camera.RayAt(x + 0.5, y + 0.5);
-          double nearest = std::numeric_limits<double>::infinity();
+          double nearest = std::numeric_limits<double>::infinity(), nearest_reached = nearest;
           bool edge = false;
           for (Index3 v; v.z < 5; ++v.z) {
             for (v.y = 0; v.y < 6; ++v.y) {
               for (v.x = 0; v.x < 7; ++v.x) {
                 if (cloud.block.samples<std::uint8_t>()[cloud.block.Offset(v)] == 0) continue;
-                double enter = -1e30, exit = 1e30;
-                for (Axis axis : kAxes) {
-                  const double a = (v[axis] - 0.5 - ray.origin[axis]) / ray.direction[axis],
-                               b = (v[axis] + 0.5 - ray.origin[axis]) / ray.direction[axis];
-                  enter = std::max(enter, std::min(a, b));
-                  exit = std::min(exit, std::max(a, b));
-                }
-                edge |= std::abs(exit - enter) < 1e-9;
+                const auto [enter, exit] = Meet(ray, ToVec3(v), ToVec3(v), 0);
+                const auto [reached, left] = Meet(ray, ToVec3(v), ToVec3(v), kBeyond);
+                edge |= enter > exit && reached < left;
                 if (enter <= exit) nearest = std::min(nearest, enter);
+                if (reached <= left) nearest_reached = std::min(nearest_reached, reached);
               }
             }
           }
@@ -183,7 +196,8 @@ TEST(ZBuffer, IsTheNearestCellOfEveryPixel) {
           const float depth = DepthOf(image, x, y);
           ASSERT_EQ(std::isinf(depth), std::isinf(nearest)) << "seed " << seed << " pixel " << x << ' ' << y;
           if (std::isfinite(nearest)) {
-            ASSERT_FLOAT_EQ(depth, float(nearest));
+            ASSERT_LE(depth, nearest + 1e-5 * nearest) << "seed " << seed << " pixel " << x << ' ' << y;
+            ASSERT_GE(depth, nearest_reached - 1e-5 * nearest) << "seed " << seed << " pixel " << x << ' ' << y;
           }
         }
       }

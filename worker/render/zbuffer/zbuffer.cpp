@@ -1,200 +1,165 @@
 #include "worker/render/zbuffer/zbuffer.h"
 
-#include <cmath>
-#include <type_traits>
+#include <hwy/cache_control.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
-#include "common/kernels/combine.h"
-#include "worker/kernels/phong.h"
+#include <algorithm>
+#include <numeric>
+
+#include "worker/kernels/draw_faces.h"
+#include "worker/kernels/shade_faces.h"
 #include "worker/render/derived.h"
 #include "worker/render/stage_clock.h"
-#include "worker/render/zbuffer/pixel_rays.h"
-#include "worker/render/zbuffer/surface_normal.h"
+#include "worker/render/zbuffer/brick_projection.h"
 
 namespace slabstream {
 namespace {
 
-constexpr std::size_t kCancelInterval = 65536;  // voxels or pixels between two looks at the flag
-
-Vec3 Centre(const SurfaceVoxel& voxel) { return {double(voxel.x), double(voxel.y), double(voxel.z)}; }
-
-// Where cells lie on the screen. Half the size of a cell's projection is at most sum_i |x_i - x w_i| / 2, divided by the least w of the
-// cell.
-class CellBounds {
- public:
-  explicit CellBounds(const Camera& camera) : camera_(camera) {}
-
-  // Pixels whose rays may meet the cell: not exact, PixelRays::Meet decides.
-  PixelBounds Of(const Vec3& centre) const {
-    const double w = Apply(camera_.w_row, centre), x = Apply(camera_.x_row, centre) / w, y = Apply(camera_.y_row, centre) / w;
-    double half_x = 0, half_y = 0, half_w = 0;
-    for (std::size_t i = 0; i < 3; ++i) {
-      half_x += 0.5 * std::abs(camera_.x_row[i] - x * camera_.w_row[i]);
-      half_y += 0.5 * std::abs(camera_.y_row[i] - y * camera_.w_row[i]);
-      half_w += 0.5 * std::abs(camera_.w_row[i]);
-    }
-    constexpr double kSlack = 1e-3;  // pixels, for rounding
-    const double least_w = w - half_w;
-    half_x = half_x / least_w + kSlack;
-    half_y = half_y / least_w + kSlack;
-    return {ToPixel(x - half_x - 0.5, camera_.width), ToPixel(y - half_y - 0.5, camera_.height), ToPixel(x + half_x + 0.5, camera_.width),
-            ToPixel(y + half_y + 0.5, camera_.height)};
-  }
-
- private:
-  static double Apply(const std::array<double, 4>& row, const Vec3& p) { return row[0] * p.x + row[1] * p.y + row[2] * p.z + row[3]; }
-  static std::int32_t ToPixel(double x, std::int32_t limit) { return std::int32_t(std::clamp(std::ceil(x), 0.0, double(limit))); }
-
-  const Camera& camera_;
-};
-
-// Faces through which a ray can enter the cell, as bits of SurfaceVoxel::open_faces.
-class EntryFaces {
- public:
-  explicit EntryFaces(const Camera& camera) : perspective_(camera.projection == Projection::kPerspective), eye_(camera.eye) {
-    const Vec3 direction = camera.RayAt(0.5 * camera.width, 0.5 * camera.height).direction;
-    for (int axis = 0; axis < 3; ++axis) {
-      if (direction[axis] > 0) parallel_ |= 1 << (2 * axis);
-      if (direction[axis] < 0) parallel_ |= 2 << (2 * axis);
-    }
-  }
-
-  int Of(const Vec3& centre) const {
-    if (!perspective_) return parallel_;
-    int faces = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      if (eye_[axis] <= centre[axis] - 0.5) faces |= 1 << (2 * axis);
-      if (eye_[axis] >= centre[axis] + 0.5) faces |= 2 << (2 * axis);
-    }
-    return faces;
-  }
-
- private:
-  bool perspective_;
-  Vec3 eye_;
-  int parallel_ = 0;
-};
-
-// Low 32 bits of the linear index in the volume.
-std::uint32_t VoxelIndex(const SurfaceVoxel& voxel, const Index3& size) {
-  return std::uint32_t((std::uint64_t{voxel.z} * std::uint64_t(size.y) + voxel.y) * std::uint64_t(size.x) + voxel.x);
-}
-
-// The image of surface voxels: depth and voxel planes, and for each pixel the number of the voxel that is seen (for shading).
-struct Visible {
-  LocalImage image;
-  std::vector<std::uint32_t> number;  // in the list of surface voxels
-};
-
-// Pixels that any of the cells can cover: the hull of a box round all of them.
-PixelBounds ScreenBounds(const std::vector<SurfaceVoxel>& voxels, const Camera& camera) {
-  if (voxels.empty()) return {};
-  Vec3 low = Centre(voxels.front()), high = low;
-  for (const SurfaceVoxel& voxel : voxels) {
-    for (int axis = 0; axis < 3; ++axis) {
-      low[axis] = std::min(low[axis], Centre(voxel)[axis]);
-      high[axis] = std::max(high[axis], Centre(voxel)[axis]);
-    }
-  }
-  const CellBounds cells(camera);
+// The bricks that may be seen, nearest first, and the pixels that they may touch.
+struct Scene {
+  std::vector<ProjectedBrick> views;  // by brick of the surface
+  std::vector<std::uint32_t> order;   // of those that may be seen
   PixelBounds bounds;
-  bool first = true;
-  for (double x : {low.x, high.x}) {
-    for (double y : {low.y, high.y}) {
-      for (double z : {low.z, high.z}) {
-        const PixelBounds corner = cells.Of({x, y, z});  // may be empty, at a border of the frame
-        bounds = first ? corner
-                       : PixelBounds{std::min(bounds.x_begin, corner.x_begin), std::min(bounds.y_begin, corner.y_begin),
-                                     std::max(bounds.x_end, corner.x_end), std::max(bounds.y_end, corner.y_end)};
-        first = false;
-      }
-    }
-  }
-  return bounds.empty() ? PixelBounds{} : bounds;
-}
+};
 
-Visible DrawCells(const std::vector<SurfaceVoxel>& voxels, const FrameSetup& setup, const PixelRays& rays,
-                  const std::atomic<bool>& cancelled, RankReport& report) {
-  const CellBounds cells(setup.camera);
-  const EntryFaces entry(setup.camera);
-  const auto can_be_seen = [&](const SurfaceVoxel& voxel) { return (entry.Of(Centre(voxel)) & voxel.open_faces) != 0; };
-  const PixelBounds bounds = ScreenBounds(voxels, setup.camera);
-  Visible visible{MakeLocalImage(PixelFormat::kDepth, bounds), {}};
-  visible.number.resize(std::size_t(bounds.pixel_count()));
-  for (std::size_t number = 0; number < voxels.size(); ++number) {
-    if (number % kCancelInterval == 0 && cancelled) break;
-    const SurfaceVoxel& voxel = voxels[number];
-    if (!can_be_seen(voxel)) continue;
-    const Vec3 centre = Centre(voxel);
-    const PixelBounds cell = cells.Of(centre);
-    if (cell.empty()) continue;
-    ++report.drawn_voxels;
-    const std::uint32_t index = VoxelIndex(voxel, setup.description.geometry.size);
-    for (std::int32_t y = cell.y_begin; y < cell.y_end; ++y) {
-      std::size_t pixel = std::size_t(y - bounds.y_begin) * std::size_t(bounds.width()) + std::size_t(cell.x_begin - bounds.x_begin);
-      for (std::int32_t x = cell.x_begin; x < cell.x_end; ++x, ++pixel) {
-        const RaySpan span = PixelRays::Meet(rays.At(x, y), centre);
-        const auto depth = float(span.enter);
-        if (span.enter > span.exit || !NearerDepth(depth, index, visible.image.depth[pixel], visible.image.voxel[pixel])) continue;
-        visible.image.depth[pixel] = depth;
-        visible.image.voxel[pixel] = index;
-        visible.number[pixel] = std::uint32_t(number);
-      }
-    }
-  }
-  return visible;
-}
-
-int BinOfVoxel(const VoxelBlock& voxels, const ClassificationTable& table, const Index3& voxel) {
-  return VisitScalarType(voxels.type, [&](auto* type) {
-    return table.BinOf(double(voxels.samples<std::remove_cvref_t<decltype(*type)>>()[voxels.Offset(voxel)]));
+Scene PlaceBricks(const Surface& surface, const BrickProjection& projection) {
+  constexpr std::size_t kGrain = 256;
+  Scene scene;
+  const std::size_t count = surface.bricks.size();
+  scene.views.resize(count);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kGrain), [&](const tbb::blocked_range<std::size_t>& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) scene.views[i] = projection.View(surface.bricks[i]);
   });
+  float least = std::numeric_limits<float>::infinity(), greatest = 0;
+  for (const ProjectedBrick& view : scene.views) {
+    if (view.pixels.empty()) continue;
+    scene.bounds = Union(scene.bounds, view.pixels);
+    least = std::min(least, view.nearest);
+    greatest = std::max(greatest, view.nearest);
+  }
+  // A counting sort by depth: it decides only how many bricks turn out to be hidden.
+  constexpr std::size_t kClasses = 256;
+  const float scale = greatest > least ? float(kClasses - 1) / (greatest - least) : 0.0F;
+  const auto depth_class = [&](const ProjectedBrick& view) { return std::size_t((view.nearest - least) * scale); };
+  std::array<std::uint32_t, kClasses + 1> begin{};
+  for (const ProjectedBrick& view : scene.views) {
+    if (!view.pixels.empty()) ++begin[depth_class(view) + 1];
+  }
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  scene.order.resize(begin.back());
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!scene.views[i].pixels.empty()) scene.order[begin[depth_class(scene.views[i])]++] = std::uint32_t(i);
+  }
+  return scene;
 }
 
-void ShadePixels(const SlabData& slab, const std::vector<SurfaceVoxel>& voxels, const ClassificationTable& table, const FrameSetup& setup,
-                 const PixelRays& rays, const std::atomic<bool>& cancelled, Visible& visible) {
-  const Phong phong(setup.shading, setup.camera.view_direction);
-  const PixelBounds& bounds = visible.image.bounds;
-  std::size_t pixel = 0;
-  for (std::int32_t y = bounds.y_begin; y < bounds.y_end; ++y) {
-    if (cancelled) return;
-    for (std::int32_t x = bounds.x_begin; x < bounds.x_end; ++x, ++pixel) {
-      if (std::isinf(visible.image.depth[pixel])) continue;
-      const SurfaceVoxel& voxel = voxels[visible.number[pixel]];
-      const Rgb& color = table.color[std::size_t(BinOfVoxel(slab.voxels(), table, {voxel.x, voxel.y, voxel.z}))];
-      PhongFactors factors = phong.WithoutGradient();
-      if (setup.shading.phong) {
-        const PixelRays::Ray ray = rays.At(x, y);
-        const Vec3 centre = Centre(voxel);
-        Vec3 hit = ray.origin + PixelRays::Meet(ray, centre).enter * ray.direction;
-        for (int axis = 0; axis < 3; ++axis) hit[axis] = std::clamp(hit[axis], centre[axis] - 0.5, centre[axis] + 0.5);
-        const Vec3 gradient = GradientAt(slab.voxels(), setup.camera.spacing, {voxel.x, voxel.y, voxel.z}, hit);
-        const double length = Length(gradient);
-        if (length > 0 && std::isfinite(length)) factors = phong.AtNormal((1 / length) * gradient);
-      }
-      float* rgba = &visible.image.rgba[4 * pixel];
-      const float channels[3] = {color.r, color.g, color.b};
-      for (int c = 0; c < 3; ++c) rgba[c] = std::clamp(channels[c] * factors.diffuse + factors.specular, 0.0F, 1.0F);
-      rgba[3] = 1;
+// Rows of the bounds in bands of about equal work, from top to bottom: each band's first row, and the end. At least `bands` of them where
+// there are as many rows, and none with many more than kMostKeys pixels, so that keys stay in a core's cache.
+std::vector<std::int32_t> CutIntoBands(const Surface& surface, const Scene& scene, std::int64_t bands) {
+  constexpr std::int64_t kMostKeys = 1 << 16;
+  const std::int64_t most_rows = std::max<std::int64_t>(1, kMostKeys / std::max(1, scene.bounds.width()));
+  std::vector<std::int64_t> work(std::size_t(scene.bounds.height()), scene.bounds.width());
+  for (std::uint32_t number : scene.order) {
+    const PixelBounds& pixels = scene.views[number].pixels;
+    work[std::size_t((pixels.y_begin + pixels.y_end) / 2 - scene.bounds.y_begin)] += surface.bricks[number].face_count();
+  }
+  const std::int64_t total = std::accumulate(work.begin(), work.end(), std::int64_t{0});
+  std::vector<std::int32_t> begins = {scene.bounds.y_begin};
+  std::int64_t done = 0, part = 1;
+  for (std::size_t row = 0; row < work.size(); ++row) {
+    done += work[row];
+    const std::int32_t next = scene.bounds.y_begin + std::int32_t(row) + 1;
+    if (done * bands < total * part && next - begins.back() < most_rows) continue;
+    begins.push_back(next);
+    part = done * bands / std::max<std::int64_t>(total, 1) + 1;
+  }
+  if (begins.back() < scene.bounds.y_end) begins.push_back(scene.bounds.y_end);
+  return begins;
+}
+
+// Asks for the sites of a brick's sides; they arrive while other bricks are drawn.
+void FetchSites(const Surface& surface, std::uint32_t brick, std::uint32_t sides) {
+  constexpr std::uint32_t kPerLine = 64 / sizeof(FaceSite);
+  const auto& begin = surface.bricks[brick].side_begin;
+  for (std::size_t side = 0; side < kSides; ++side) {
+    if ((sides >> side & 1) == 0) continue;
+    for (std::uint32_t face = begin[side]; face < begin[side + 1]; face += kPerLine) hwy::Prefetch(&surface.sites[face]);
+  }
+}
+
+std::size_t DrawBand(const Surface& surface, const Scene& scene, const BrickProjection& projection, Projection kind,
+                     const std::atomic<bool>& cancelled, const KeyBand& band) {
+  std::fill_n(band.keys, band.stride * std::size_t(band.bounds.height()), kEmptyKey);
+  std::vector<std::uint32_t> bricks;
+  for (std::uint32_t number : scene.order) {
+    if (!Intersection(scene.views[number].pixels, band.bounds).empty()) bricks.push_back(number);
+  }
+  constexpr std::size_t kAhead = 2;  // bricks
+  std::size_t drawn = 0;
+  for (std::size_t i = 0; i < bricks.size() && !cancelled.load(std::memory_order_relaxed); ++i) {
+    if (i + kAhead < bricks.size()) FetchSites(surface, bricks[i + kAhead], scene.views[bricks[i + kAhead]].sides);
+    const ProjectedBrick& view = scene.views[bricks[i]];
+    if (AllNearer(band, Intersection(view.pixels, band.bounds), view.nearest)) continue;
+    const SurfaceBrick& brick = surface.bricks[bricks[i]];
+    for (int side = 0; side < kSides; ++side) {
+      const std::uint32_t first = brick.side_begin[std::size_t(side)], count = brick.side_begin[std::size_t(side) + 1] - first;
+      if ((view.sides >> side & 1) == 0 || count == 0) continue;
+      drawn += DrawFaces(kind, projection.Faces(brick, side), surface.sites.data(), surface.normals.data(), first, count, band);
     }
   }
+  return drawn;
 }
 
 }  // namespace
 
-Result<LocalImage> ZBufferRenderer::Render(SlabData& slab, const Box& box, const FrameSetup& setup, const std::atomic<bool>& cancelled,
-                                           RankReport& report) {
+Result<LocalImage> ZBufferRenderer::Render(SlabData& slab, const Box& box, const FrameSetup& setup, const OcclusionMask& /*hidden*/,
+                                           const std::atomic<bool>& cancelled, RankReport& report) {
   StageClock clock(report);
   const ClassificationTable& table = slab.derived().Classification(setup);
-  const std::vector<SurfaceVoxel>& voxels = slab.derived().Surface(setup, box);
+  const Surface& surface = slab.derived().OpaqueSurface(setup, box);
   clock.Charge(Stage::kPrepare);
-  const PixelRays rays(setup.camera);
-  Visible visible = DrawCells(voxels, setup, rays, cancelled, report);
+
+  const BrickProjection projection(setup.camera, setup.description.geometry.size);
+  const Scene scene = PlaceBricks(surface, projection);
+  LocalImage image = MakeUnwrittenImage(PixelFormat::kDepth, scene.bounds);
+  const std::vector<std::int32_t> begins = CutIntoBands(surface, scene, kBandsPerThread * tbb::this_task_arena::max_concurrency());
+  FaceShading shading = MakeFaceShading(setup.camera, setup.shading, setup.description.geometry.size);
+  shading.sites = surface.sites.data();
+  shading.normals = surface.normals.data();
+  std::vector<float> colors;
+  colors.reserve(4 * table.color.size());
+  for (const Rgb& color : table.color) colors.insert(colors.end(), {color.r, color.g, color.b, 1});
+  shading.colors = colors.data();
   clock.Charge(Stage::kZBuffer);
-  ShadePixels(slab, voxels, table, setup, rays, cancelled, visible);
-  clock.Charge(Stage::kShade);
+
+  std::atomic<std::size_t> drawn = 0;
+  std::atomic<std::int64_t> draw_ns = 0, shade_ns = 0;
+  tbb::parallel_for(std::size_t{1}, begins.size(), [&](std::size_t i) {
+    const Time begin = MonotonicNow();
+    KeyBand band;
+    band.bounds = {scene.bounds.x_begin, begins[i - 1], scene.bounds.x_end, begins[i]};
+    band.stride = std::size_t(band.bounds.width() + kKeyPadding);
+    AlignedVector<std::uint64_t>& keys = keys_.local();
+    keys.resize(std::max(keys.size(), band.stride * std::size_t(band.bounds.height())));
+    band.keys = keys.data();
+    drawn += DrawBand(surface, scene, projection, setup.camera.projection, cancelled, band);
+    const Time middle = MonotonicNow();
+    for (std::int32_t y = band.bounds.y_begin; y < band.bounds.y_end && !cancelled.load(std::memory_order_relaxed); ++y) {
+      const auto width = std::size_t(band.bounds.width()), pixel = std::size_t(y - scene.bounds.y_begin) * width;
+      ShadeFaceRow(shading, band.keys + std::size_t(y - band.bounds.y_begin) * band.stride, band.bounds.x_begin, y, width,
+                   &image.rgba[4 * pixel], &image.depth[pixel], &image.voxel[pixel]);
+    }
+    draw_ns += (middle - begin).count();
+    shade_ns += (MonotonicNow() - middle).count();
+  });
+  report.stage_ns[std::size_t(Stage::kZBuffer)] += draw_ns;
+  report.stage_ns[std::size_t(Stage::kShade)] += shade_ns;
+  report.drawn_voxels += drawn;
   clock.Finish(Stage::kRender);
   if (cancelled) return Status::Cancelled("rendering was cancelled");
-  return std::move(visible.image);
+  return image;
 }
 
 }  // namespace slabstream
