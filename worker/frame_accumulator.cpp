@@ -4,6 +4,7 @@
 #include <set>
 
 #include "common/base/check.h"
+#include "common/planning/frame_occlusion.h"
 
 namespace slabstream {
 
@@ -13,10 +14,8 @@ FrameAccumulator::FrameAccumulator(const GroupAssignment& assignment, WorkerId s
       frame_(assignment.key.frame),
       group_count_(assignment.group_count),
       previews_(assignment.previews),
-      format_(FormatOf(assignment.setup.renderer)),
-      frame_width_(assignment.setup.camera.width),
-      supersample_(assignment.setup.camera.supersample),
-      pixels_{0, std::uint64_t(assignment.setup.camera.width) * std::uint64_t(assignment.setup.camera.height)},
+      setup_(std::make_shared<const FrameSetup>(assignment.setup)),
+      pixels_(WholeFrame(assignment.setup)),
       names_(names),
       attempt_(assignment.key.attempt) {}
 
@@ -44,6 +43,13 @@ bool FrameAccumulator::OnCombined(const CombineDone& done, WorkerActions& action
   return true;
 }
 
+void FrameAccumulator::OnHiddenFound(const HiddenFound& found, WorkerActions& actions) {
+  if (combining_ == 0 || found.image != image_) return;
+  --combining_;
+  hidden_ = found.hidden;
+  Advance(actions);
+}
+
 void FrameAccumulator::Advance(WorkerActions& actions) {
   while (failure_.ok() && combining_ == 0) {
     if (group_started_) {
@@ -63,7 +69,7 @@ void FrameAccumulator::StartGroup(GroupImage group, WorkerActions& actions) {
   reports_.push_back(std::move(group.reports));
   if (group.pieces.empty() && image_ == 0) {  // a frame that begins with an empty group begins with an empty picture
     RunImageHeader nothing;
-    nothing.format = format_;
+    nothing.format = FormatOf(setup_->renderer);
     group.pieces.push_back({pixels_, {}, 0, nothing, {}});
   }
   std::set<ImageHandle> used;
@@ -76,13 +82,17 @@ void FrameAccumulator::StartGroup(GroupImage group, WorkerActions& actions) {
     StartCombine combine{group.key, image_, piece.image, piece.header, std::move(piece.payload), Side::kBack, {}, 0};
     if (piece.image != 0 && piece.pixels != pixels_) {
       combine.pixels = piece.pixels;
-      combine.frame_width = frame_width_;
+      combine.frame_width = FrameBounds(*setup_).width();
     }
     actions.push_back(std::move(combine));
     ++combining_;
     if (piece.image != 0) used.insert(piece.image);
   }
   for (const ImageHandle image : used) actions.push_back(ReleaseImage{image});
+  if (UsesOcclusion(*setup_) && groups_done_ + 1 < group_count_) {
+    actions.push_back(FindHidden{group.key, image_, setup_, hidden_});
+    ++combining_;
+  }
 }
 
 void FrameAccumulator::FinishGroup(WorkerActions& actions) {
@@ -99,7 +109,9 @@ void FrameAccumulator::Confirm(std::uint32_t group, WorkerActions& actions) {
 }
 
 void FrameAccumulator::ReportDone(std::uint32_t group, WorkerActions& actions) const {
-  actions.push_back(SendControl{GroupDone{epoch_, self_, {frame_, attempt_, group}, reports_[group]}});
+  GroupDone done{epoch_, self_, {frame_, attempt_, group}, reports_[group], {}};
+  if (group + 1 == groups_done_ && groups_done_ < group_count_) done.hidden = hidden_;
+  actions.push_back(SendControl{std::move(done)});
 }
 
 void FrameAccumulator::SendPicture(WorkerActions& actions) {
@@ -110,8 +122,8 @@ void FrameAccumulator::SendPicture(WorkerActions& actions) {
   message.attempt = attempt_;
   message.groups_done = groups_done_;
   message.group_count = group_count_;
-  message.runs.image.format = format_;
-  actions.push_back(SendFrame{std::move(message), image_, supersample_});
+  message.runs.image.format = FormatOf(setup_->renderer);
+  actions.push_back(SendFrame{std::move(message), image_, setup_});
   if (groups_done_ == group_count_) frame_sent_attempt_ = attempt_;
 }
 

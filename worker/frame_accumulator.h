@@ -1,10 +1,12 @@
 // FrameAccumulator: the frame on its display worker. Group images are put behind each other, nearest first; early ones wait. After each
-// group it reports GroupDone and sends a preview if wanted, after the last one the frame. It outlives attempts: what is accumulated is
-// right whoever rendered it. It keeps the picture until the frame is over, because the coordinator may ask again (Confirm).
+// group it reports GroupDone and sends a preview if wanted, after the last one the frame. Where frames use occlusion masks, it first has
+// the hidden tiles found, which go with the report; of the last group nobody needs them. It outlives attempts: what is accumulated is right
+// whoever rendered it. It keeps the picture until the frame is over, because the coordinator may ask again (Confirm).
 #pragma once
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -29,6 +31,7 @@ class FrameAccumulator {
 
   void Add(GroupImage group, WorkerActions& actions);                // takes over its images
   bool OnCombined(const CombineDone& done, WorkerActions& actions);  // false: not one of its combines
+  void OnHiddenFound(const HiddenFound& found, WorkerActions& actions);
 
   // Says again that the group is done, and sends the finished frame again (once for each attempt), if they are.
   void Confirm(std::uint32_t group, WorkerActions& actions);
@@ -47,8 +50,7 @@ class FrameAccumulator {
   const FrameId frame_;
   const std::uint32_t group_count_;
   const bool previews_;
-  const PixelFormat format_;
-  const std::int32_t frame_width_, supersample_;
+  const std::shared_ptr<const FrameSetup> setup_;
   const PixelRange pixels_;
   ImageNames& names_;
 
@@ -56,8 +58,9 @@ class FrameAccumulator {
   std::uint32_t groups_done_ = 0;                    // accumulated, nearest first
   std::optional<std::uint32_t> frame_sent_attempt_;  // the latest attempt for which the finished frame was sent
   ImageHandle image_ = 0;                            // 0: none yet
-  int combining_ = 0;                                // StartCombine into image_ without CombineDone
+  int combining_ = 0;                                // StartCombine into image_ and FindHidden in it without their answer
   bool group_started_ = false;
+  OcclusionMask hidden_;                          // by the groups done
   std::map<std::uint32_t, GroupImage> waiting_;   // complete, in front of them something is missing
   std::vector<std::vector<RankReport>> reports_;  // of the groups done, and of the one being combined
   Status failure_;

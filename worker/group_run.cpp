@@ -12,8 +12,6 @@
 namespace slabstream {
 namespace {
 
-PixelRange WholeFrame(const Camera& camera) { return {0, std::uint64_t(camera.width) * std::uint64_t(camera.height)}; }
-
 std::string Text(const RankInterval& ranks) { return fmt::format("[{}, {})", ranks.begin, ranks.end); }
 
 // False if some of `pixels` has been seen: a duplicate.
@@ -30,7 +28,7 @@ void Append(std::vector<RankReport>& reports, std::vector<RankReport> more) {
 }  // namespace
 
 GroupRun::GroupRun(GroupAssignment assignment, WorkerId self, ImageNames& names)
-    : assignment_(std::move(assignment)), self_(self), names_(names), frame_(WholeFrame(assignment_.setup.camera)) {
+    : assignment_(std::move(assignment)), self_(self), names_(names), frame_(WholeFrame(assignment_.setup)) {
   const GroupPlan& group = assignment_.group;
   if (group.placements.empty()) return;
   if (group.schedule.ranks != group.placements.size() || group.schedule.root >= group.schedule.ranks) {
@@ -61,6 +59,16 @@ void GroupRun::OnRendered(Rank rank, ImageHandle image, RankReport report, Worke
   mine->second.fragments.Insert({frame_, {rank, rank + 1}, image});
   mine->second.reports.push_back(std::move(report));
   Advance(actions);
+}
+
+void GroupRun::LeaveOut(Rank rank, RankReport report, WorkerActions& actions) {
+  RunImageHeader nothing;
+  nothing.format = FormatOf(assignment_.setup.renderer);
+  const ImageHandle image = names_.Next();
+  actions.push_back(StartCombine{key(), image, 0, nothing, {}, Side::kBack, {}, 0});
+  combining_.emplace_back(image, rank);
+  ++ranks_.at(rank).combining;
+  OnRendered(rank, image, std::move(report), actions);
 }
 
 void GroupRun::OnPartial(const PartialImage& message, Bytes payload, WorkerActions& actions) {
@@ -240,7 +248,7 @@ void GroupRun::Combine(RankState& to, Rank rank, const Fragment& held, const Ima
   StartCombine combine{key(), held.image, piece.image, piece.header, piece.payload, in_front ? Side::kFront : Side::kBack, {}, 0};
   if (piece.image != 0 && held.pixels != frame_) {
     combine.pixels = held.pixels;
-    combine.frame_width = assignment_.setup.camera.width;
+    combine.frame_width = FrameBounds(assignment_.setup).width();
   }
   actions.push_back(std::move(combine));
   combining_.emplace_back(held.image, rank);
@@ -298,7 +306,7 @@ void GroupRun::SendFragments(const std::vector<Fragment>& fragments, std::uint32
     message.step = step;
     message.interval = fragment.ranks;
     message.pixels = fragment.pixels;
-    actions.push_back(SendPartial{*peer, std::move(message), fragment.image, assignment_.setup.camera.width});
+    actions.push_back(SendPartial{*peer, std::move(message), fragment.image, FrameBounds(assignment_.setup).width()});
   }
   if (!fragments.empty()) std::get<SendPartial>(actions.back()).message.reports = std::move(reports);
 }

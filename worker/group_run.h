@@ -46,6 +46,8 @@ class GroupRun {
 
   // Takes over `image`, the picture of one of this worker's ranks.
   void OnRendered(Rank rank, ImageHandle image, RankReport report, WorkerActions& actions);
+  // One of this worker's ranks shows nothing and is not rendered: its picture is empty.
+  void LeaveOut(Rank rank, RankReport report, WorkerActions& actions);
   void OnPartial(const PartialImage& message, Bytes payload, WorkerActions& actions);
   void OnCombined(const CombineDone& done, WorkerActions& actions);
 

@@ -5,9 +5,9 @@
 namespace slabstream {
 
 void RenderQueue::Add(const GroupKey& key, Rank rank, const Placement& placement, const std::shared_ptr<const FrameSetup>& setup,
-                      WorkerActions& actions) {
+                      const std::shared_ptr<const OcclusionMask>& hidden, WorkerActions& actions) {
   const Box voxels = SlabBox(placement.box, *setup);
-  waiting_[{key, rank}] = {placement, setup, slabs_.Acquire(setup->dataset, voxels, setup->description.type, actions)};
+  waiting_[{key, rank}] = {placement, setup, hidden, slabs_.Acquire(setup->dataset, voxels, setup->description.type, actions)};
 }
 
 void RenderQueue::DropGroup(const GroupKey& key, WorkerActions& actions) {
@@ -29,7 +29,7 @@ void RenderQueue::StartNext(WorkerActions& actions) {
   running_ = Running{next->first.first, next->first.second, std::move(next->second), names_.Next(), false};
   waiting_.erase(next);
   actions.push_back(StartRender{running_->key, running_->rank, slabs_.key(running_->job.slab), running_->job.placement, running_->job.setup,
-                                running_->image});
+                                running_->job.hidden, running_->image});
 }
 
 std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId worker, WorkerActions& actions) {

@@ -21,7 +21,7 @@ class RenderQueue {
   RenderQueue(SlabFetcher& slabs, ImageNames& names) : slabs_(slabs), names_(names) {}
 
   void Add(const GroupKey& key, Rank rank, const Placement& placement, const std::shared_ptr<const FrameSetup>& setup,
-           WorkerActions& actions);
+           const std::shared_ptr<const OcclusionMask>& hidden, WorkerActions& actions);
   void DropGroup(const GroupKey& key, WorkerActions& actions);  // its running render is cancelled
   void StartNext(WorkerActions& actions);                       // if nothing is rendered and a slab is complete
 
@@ -36,6 +36,7 @@ class RenderQueue {
   struct Job {
     Placement placement;
     std::shared_ptr<const FrameSetup> setup;
+    std::shared_ptr<const OcclusionMask> hidden;
     SlabFetcher::Generation slab = 0;
   };
   struct Running {

@@ -8,6 +8,7 @@
 #include <set>
 #include <utility>
 
+#include "common/planning/frame_occlusion.h"
 #include "worker/early_images.h"
 #include "worker/frame_accumulator.h"
 #include "worker/group_run.h"
@@ -34,6 +35,7 @@ struct WorkerMachine::State {
   void On(const ChunkStored& stored) { slabs.OnStored(stored, now); }
   void On(const RenderDone& done);
   void On(const CombineDone& done);
+  void On(const HiddenFound& found);
   void On(const PeerUnreachable& peer);
   void On(const StopRequested&);
   void On(const Tick&) {}
@@ -226,9 +228,16 @@ void WorkerMachine::State::On(const GroupAssignment& assignment, const Bytes&) {
 
   GroupRun& run = entry->second.emplace(assignment, worker, names);
   const auto setup = std::make_shared<const FrameSetup>(assignment.setup);
+  const auto hidden = std::make_shared<const OcclusionMask>(assignment.hidden);
   for (Rank rank = 0; rank < assignment.group.placements.size() && run.failure().ok(); ++rank) {
     const Placement& placement = assignment.group.placements[rank];
-    if (placement.worker == worker) renders.Add(key, rank, placement, setup, actions);
+    if (placement.worker != worker) continue;
+    if (HidesBox(*hidden, placement.box, *setup)) {
+      run.LeaveOut(rank, {.worker = worker, .group = key.group, .rank = rank, .box = placement.id}, actions);
+      ++rendered_ranks;
+    } else {
+      renders.Add(key, rank, placement, setup, hidden, actions);
+    }
   }
   for (auto& [partial, payload] : early.Take(key)) run.OnPartial(partial, std::move(payload), actions);
   AfterRun(run);
@@ -284,6 +293,11 @@ void WorkerMachine::State::On(const CombineDone& done) {
     run->OnCombined(done, actions);
     AfterRun(*run);
   }
+}
+
+void WorkerMachine::State::On(const HiddenFound& found) {
+  const auto frame = frames.find(found.key.frame);
+  if (frame != frames.end() && frame->second.accumulator) frame->second.accumulator->OnHiddenFound(found, actions);
 }
 
 void WorkerMachine::State::On(const PeerUnreachable& peer) {

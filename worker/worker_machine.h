@@ -7,19 +7,21 @@
 // a new worker.
 //
 // A group on this worker:
-//   GroupAssignment   voxels of its boxes are fetched (chunk requests within the byte credit) unless they are cached
+//   GroupAssignment   voxels of its boxes are fetched (chunk requests within the byte credit) unless they are cached; a box that is hidden
+//                     as a whole needs none: its rank holds an empty image at once
 //   slab complete     ranks are rendered one after the other, groups in order of frame and group
 //   RenderDone        the rank holds its image; the rank's steps of the schedule are taken in order of rounds: a send goes as soon as
 //   everything
 //                     before it is in, a receive waits for its PartialImage; ranks of this same worker combine without a message
 //   root is complete  the group image goes to the display worker, which accumulates groups front to back (in order, early ones wait),
 //   reports
-//                     GroupDone, sends a preview if wanted, and after the last group the frame
+//                     GroupDone (with what is hidden by then), sends a preview if wanted, and after the last group the frame
 // PartialImages that arrive before their assignment are kept, within a byte limit; those of finished frames and older attempts are dropped.
 // Anything that arrives twice changes nothing.
 //
-// What the executor must do: run StartRender, StartCombine and StoreChunk on other threads and answer each with exactly one event; run
-// StartCombine, SendPartial and SendFrame in the order in which they were given; call Step(Tick) no later than NextWake().
+// What the executor must do: run StartRender, StartCombine, FindHidden and StoreChunk on other threads and answer each with exactly one
+// event; run StartCombine, FindHidden, SendPartial and SendFrame in the order in which they were given; call Step(Tick) no later than
+// NextWake().
 #pragma once
 
 #include <cstdint>
@@ -52,7 +54,7 @@ struct WorkerConfig {
   std::uint32_t pid = 0;
   std::string host;
   std::string images_endpoint;
-  std::uint32_t threads = 1;
+  std::uint32_t threads = 1;                             // that render: for the coordinator to know
   std::uint64_t cache_bytes = std::uint64_t{1} << 40;    // slabs not needed by a current group are dropped, oldest first, above this
   std::uint64_t credit_bytes = std::uint64_t{16} << 20;  // chunk bytes requested and not yet stored
   Duration register_interval = std::chrono::seconds(1);
@@ -85,12 +87,17 @@ struct CombineDone {
   Status status;
   Span span;
 };
+struct HiddenFound {
+  GroupKey key;
+  ImageHandle image = 0;
+  OcclusionMask hidden;
+};
 struct PeerUnreachable {
   WorkerId worker = 0;
 };
 struct StopRequested {};  // SIGTERM: leave in order
 struct Tick {};
-using WorkerEvent = std::variant<MessageReceived, ChunkStored, RenderDone, CombineDone, PeerUnreachable, StopRequested, Tick>;
+using WorkerEvent = std::variant<MessageReceived, ChunkStored, RenderDone, CombineDone, HiddenFound, PeerUnreachable, StopRequested, Tick>;
 
 // ---- actions
 struct SendControl {
@@ -120,6 +127,7 @@ struct StartRender {
   SlabKey slab;
   Placement placement;
   std::shared_ptr<const FrameSetup> setup;
+  std::shared_ptr<const OcclusionMask> hidden;  // need not be rendered; null: nothing is known to be hidden
   ImageHandle image = 0;
 };
 struct CancelRender {
@@ -138,6 +146,13 @@ struct StartCombine {
   PixelRange pixels;  // of the frame; with `other` only
   std::int32_t frame_width = 0;
 };
+// Finds the hidden tiles of `image`, a frame that groups up to `key` have been accumulated into. `known`: the last ones. -> HiddenFound
+struct FindHidden {
+  GroupKey key;
+  ImageHandle image = 0;
+  std::shared_ptr<const FrameSetup> setup;
+  OcclusionMask known;
+};
 // Encodes message.pixels of `image`, fills message.image and the byte count and encode time of the last report (if there is one), sends. No
 // answer.
 struct SendPartial {
@@ -146,11 +161,11 @@ struct SendPartial {
   ImageHandle image = 0;
   std::int32_t frame_width = 0;
 };
-// Resolves a copy of `image`, encodes it, fills message.runs and a report, sends to the coordinator. No answer.
+// Makes the picture of `image`, a frame, encodes it, fills message.runs and a report, sends to the coordinator. No answer.
 struct SendFrame {
   FrameImage message;
   ImageHandle image = 0;
-  std::int32_t supersample = 1;
+  std::shared_ptr<const FrameSetup> setup;
 };
 // After everything that was started before it. Every handle that is named in a StartRender, or in a StartCombine as an image that is not
 // there yet, is released exactly once, also if its making failed.
@@ -159,7 +174,7 @@ struct ReleaseImage {
 };
 struct StopProcess {};
 using WorkerAction = std::variant<SendControl, SendChunkRequest, ConnectSlabs, OpenSlab, StoreChunk, DropSlab, StartRender, CancelRender,
-                                  StartCombine, SendPartial, SendFrame, ReleaseImage, StopProcess>;
+                                  StartCombine, FindHidden, SendPartial, SendFrame, ReleaseImage, StopProcess>;
 
 class WorkerMachine {
  public:

@@ -186,9 +186,11 @@ class CoordinatorScript {
     return actions;
   }
 
-  Actions Done(const GroupAssignment& group, std::vector<RankReport> reports = {}) {
-    return Worker(WorkerOf(group.display),
-                  GroupDone{.epoch = config.epoch, .worker = group.display, .key = group.key, .reports = std::move(reports)});
+  Actions Done(const GroupAssignment& group, std::vector<RankReport> reports = {}, OcclusionMask hidden = {}) {
+    return Worker(
+        WorkerOf(group.display),
+        GroupDone{
+            .epoch = config.epoch, .worker = group.display, .key = group.key, .reports = std::move(reports), .hidden = std::move(hidden)});
   }
   Actions Image(const GroupAssignment& group, std::uint32_t groups_done, Bytes payload = {}) {
     FrameImage image{.epoch = config.epoch,

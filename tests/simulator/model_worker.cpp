@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "tests/simulator/model_occlusion.h"
+
 namespace slabstream {
 
 ModelWorker::ModelWorker(int node, WorkerConfig config, const WorkerSpeed& speed, const Faults& faults, Random& random, EventQueue& queue,
@@ -107,8 +109,11 @@ void ModelWorker::FinishRender(std::uint64_t number, Status status) {
   if (!alive_ || !rendering_ || number != render_number_) return;  // ended already
   const StartRender render = *std::exchange(rendering_, std::nullopt);
   if (status.ok()) {
-    images_.Render(render.image, render.placement.id,
-                   std::uint64_t(render.setup->camera.width) * std::uint64_t(render.setup->camera.height));
+    const PixelBounds frame = FrameBounds(*render.setup);
+    images_.Render(render.image, render.placement.id, std::uint64_t(frame.pixel_count()), [&](std::uint64_t i) {
+      const auto width = std::uint64_t(frame.width());
+      return render.hidden->Hides(std::int32_t(i % width), std::int32_t(i / width));
+    });
   } else {
     images_.FailRender(render.image);
   }
@@ -121,6 +126,15 @@ void ModelWorker::Perform(const StartCombine& action) {
   queue_.At(CombineThread(speed_.combine), [this, key = action.key, image = action.image, status] {
     Step(CombineDone{key, image, status, {Stage::kCombine, 0, 1}});
   });
+}
+
+void ModelWorker::Perform(const FindHidden& action) {
+  EXPECT_TRUE(UsesOcclusion(*action.setup)) << "nothing may be left out of this frame";
+  HiddenFound found{action.key, action.image, FindOpaqueTiles(images_.Get(action.image), FrameBounds(*action.setup))};
+  ForEachTile(action.known, [&](std::int32_t x, std::int32_t y, bool hidden) {
+    EXPECT_TRUE(!hidden || found.hidden.Hides(x * kOcclusionTile, y * kOcclusionTile)) << "what was hidden is no longer";
+  });
+  queue_.At(CombineThread(speed_.store), [this, found = std::move(found)] { Step(found); });
 }
 
 void ModelWorker::Perform(const SendPartial& action) {

@@ -64,6 +64,7 @@ class ModelWorker {
   void Perform(const StartRender& action);
   void Perform(const CancelRender& action);
   void Perform(const StartCombine& action);
+  void Perform(const FindHidden& action);
   void Perform(const SendPartial& action);
   void Perform(const SendFrame& action);
   void Perform(const ReleaseImage& action) { images_.Release(action.image); }

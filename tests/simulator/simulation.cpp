@@ -6,6 +6,8 @@
 #include <functional>
 #include <string>
 
+#include "tests/simulator/model_occlusion.h"
+
 namespace slabstream {
 namespace {
 
@@ -28,6 +30,20 @@ TransferFunction StepTransfer() {
   transfer.colors = {{0, {0, 0, 0}}, {255, {1, 1, 1}}};
   transfer.opacities = {{0, 0}, {50, 0}, {51, 0.5}, {255, 1}};
   return transfer;
+}
+
+// Whether `seen`, a pixel of the tile, is `expected` without some boxes that lie behind an opaque one or may be left out everywhere.
+bool LacksHiddenBoxesOnly(const SymbolicPixel& seen, const SymbolicPixel& expected, const std::set<BoxId>& left_out, std::int32_t tile_x,
+                          std::int32_t tile_y) {
+  auto at = seen.begin();
+  bool hidden = false;
+  for (const BoxId box : expected) {
+    const bool here = at != seen.end() && *at == box;
+    if (here) ++at;
+    if (!here && !hidden && left_out.count(box) == 0) return false;
+    hidden = hidden || (here && IsOpaque(box, tile_x, tile_y));
+  }
+  return at == seen.end();
 }
 
 // What the other end would decode.
@@ -54,7 +70,7 @@ Simulation::Simulation(std::uint64_t seed, Tally& tally)
   worker_config_.chunk_attempts = 6;
   worker_config_.credit_bytes = std::uint64_t{kChunkBytes} * random_.Integer<std::uint64_t>(1, 4);
   if (!faults_.none() && random_.Chance(0.3)) worker_config_.cache_bytes = std::uint64_t{4} << 20;
-  policy_.groups = random_.Integer(1, 4);
+  policy_.groups = random_.Integer(1, 6);
   policy_.axis = AxisChoice(random_.Integer(0, 3));
   policy_.combine = CombiningSchemes()[random_.Integer<std::size_t>(0, CombiningSchemes().size() - 1)].name;
 }
@@ -84,11 +100,13 @@ SubmitFrame Simulation::RandomRequest(RequestId id) {
   submit.deadline_ms = kDeadlineMs;
   submit.frame.dataset = "volume";
   submit.frame.size = {random_.Integer(1, 3), random_.Integer(1, 2)};
-  submit.frame.view.zoom = 400;  // few pixels, but not minified: no supersampling
+  submit.frame.view.zoom = random_.Chance(0.2) ? 400 : 4000;  // few pixels, but not minified: no supersampling
   submit.frame.view.azimuth_degrees = random_.Integer(0, 7) * 45 + 10;
   submit.frame.view.elevation_degrees = random_.Integer(-80, 80);
   submit.frame.view.projection = random_.Chance(0.5) ? Projection::kOrthographic : Projection::kPerspective;
   submit.frame.transfer.choice = StepTransfer();
+  if (random_.Chance(0.1)) submit.frame.renderer = RendererKind::kZBuffer;
+  if (random_.Chance(0.1)) submit.frame.termination = 0;
   submit.frame.policy = policy_;
   submit.frame.previews = random_.Chance(0.3);
   return submit;
@@ -261,23 +279,47 @@ void Simulation::Observe(const GroupAssignment& assignment) {
   }
   ASSERT_EQ(assignment.setup.camera.supersample, 1);
   frame.group_count = assignment.group_count;
-  frame.pixel_count = std::uint64_t(assignment.setup.camera.width) * std::uint64_t(assignment.setup.camera.height);
+  frame.setup = assignment.setup;
   frame.handed_out.insert(assignment.key.group);
   frame.display = assignment.display;
   std::vector<BoxId> boxes;
   for (const Placement& placement : assignment.group.placements) {
     boxes.push_back(placement.id);
+    if (HidesBox(assignment.hidden, placement.box, assignment.setup)) {
+      frame.left_out.insert(placement.id);
+      ++tally_.hidden_boxes;
+      continue;
+    }
     const std::pair<WorkerId, Box> slab{placement.worker, SlabBox(placement.box, assignment.setup)};
     frame.slabs.insert(slab);
     if (fetched_.count(slab) == 0) frame.all_cached = false;
   }
   const auto [known, added] = frame.groups.emplace(assignment.key.group, boxes);
   EXPECT_EQ(known->second, boxes) << "another attempt has other boxes";
+  if (!assignment.hidden.empty()) CheckHidden(assignment, frame);
 
   std::size_t unfinished = 0;
   for (const auto& [id, other] : frames_) unfinished += other.over ? 0 : other.unfinished();
   // While a frame waits for its next attempt, the groups of the last one are still out but no longer counted.
   EXPECT_LE(unfinished, std::size_t(faults_.none() ? kGroupWindow : 2 * kGroupWindow));
+}
+
+void Simulation::CheckHidden(const GroupAssignment& assignment, const SeenFrame& frame) {
+  ++tally_.masks;
+  if (assignment.key.attempt > 1) ++tally_.masks_of_retries;
+  const Status fits = CheckFits(assignment.hidden, assignment.setup);
+  EXPECT_TRUE(fits.ok()) << fits.message();
+  const auto done = frame.done.find(assignment.display);
+  const std::uint32_t in_front = std::min(assignment.key.group, done == frame.done.end() ? 0 : done->second);
+  std::vector<BoxId> boxes;
+  for (std::uint32_t group = 0; group < in_front; ++group) {
+    const std::vector<BoxId>& more = frame.groups.at(group);
+    boxes.insert(boxes.end(), more.begin(), more.end());
+  }
+  ForEachTile(assignment.hidden, [&](std::int32_t x, std::int32_t y, bool hidden) {
+    EXPECT_TRUE(!hidden || AnyOpaque(boxes, x, y))
+        << "tile " << x << ", " << y << " is not hidden by the " << in_front << " groups in front";
+  });
 }
 
 void Simulation::CheckPicture(const FrameImage& image, const Bytes& payload, const FrameReply& reply) {
@@ -289,11 +331,20 @@ void Simulation::CheckPicture(const FrameImage& image, const Bytes& payload, con
     ASSERT_TRUE(seen != frame->second.groups.end()) << "group " << group << " was never handed out";
     expected.insert(expected.end(), seen->second.begin(), seen->second.end());
   }
-  EXPECT_EQ(std::uint64_t(reply.size.width) * std::uint64_t(reply.size.height), frame->second.pixel_count);
+  const Camera& camera = frame->second.setup.camera;
+  EXPECT_EQ(reply.size, (ImageSize{camera.width, camera.height}));
   const SymbolicImage pixels = UnpackSymbols(payload);
-  for (std::uint64_t i = 0; i < frame->second.pixel_count; ++i) {
+  const PixelBounds bounds = FrameBounds(frame->second.setup);
+  for (std::uint64_t i = 0; i < std::uint64_t(bounds.pixel_count()); ++i) {
     const auto pixel = pixels.find(i);
-    EXPECT_EQ(pixel == pixels.end() ? SymbolicPixel() : pixel->second, expected) << "frame " << image.frame << ", pixel " << i;
+    const SymbolicPixel& seen = pixel == pixels.end() ? SymbolicPixel() : pixel->second;
+    if (seen == expected) continue;
+    const auto x = std::int32_t(i % std::uint64_t(bounds.width())) / kOcclusionTile;
+    const auto y = std::int32_t(i / std::uint64_t(bounds.width())) / kOcclusionTile;
+    EXPECT_TRUE(UsesOcclusion(frame->second.setup) && LacksHiddenBoxesOnly(seen, expected, frame->second.left_out, x, y))
+        << "frame " << image.frame << ", pixel " << i << " shows " << testing::PrintToString(seen) << ", not "
+        << testing::PrintToString(expected);
+    ++tally_.hidden_pixels;
   }
   if (reply.groups_done < reply.group_count) {
     ++tally_.previews;

@@ -2,7 +2,9 @@
 // hold in every world is checked as it goes; failures are failures of the running test.
 //
 //   every request ends, with the right picture or with an error that says why, within a bound of virtual time
-//   a picture (or preview) holds exactly the boxes of its plan (of its first groups), each once, in visibility order
+//   a picture (or preview) holds exactly the boxes of its plan (of its first groups), each once, in visibility order; behind an opaque one
+//   some may be left out, but only where the frame's termination allows it
+//   a mask of hidden tiles tells only of tiles that the groups in front hide, as the display worker at hand has accumulated them
 //   no image is left, read after its release or released twice; no slab is rendered from before it is complete; credits are kept
 //   at most kGroupWindow groups are unfinished at a time
 //   where only workers come and go and few messages are lost, but a worker is always there: every frame is finished
@@ -28,7 +30,7 @@ namespace slabstream {
 // Counts over all worlds, so that a test can see that it tested something.
 struct Tally {
   std::uint64_t worlds = 0, requests = 0, pictures = 0, previews = 0, errors = 0, cancelled = 0, retried = 0, cached_frames = 0,
-                workers_killed = 0, coordinator_restarts = 0;
+                workers_killed = 0, coordinator_restarts = 0, masks = 0, masks_of_retries = 0, hidden_pixels = 0, hidden_boxes = 0;
 };
 
 class Simulation : private WorkerNetwork {
@@ -50,12 +52,13 @@ class Simulation : private WorkerNetwork {
   struct SeenFrame {
     std::uint32_t group_count = 0;
     std::uint32_t attempt = 0;
-    std::uint64_t pixel_count = 0;
+    FrameSetup setup;
     std::map<std::uint32_t, std::vector<BoxId>> groups;
     WorkerId display = 0;                      // of this attempt
     std::set<std::uint32_t> handed_out;        // groups of this attempt
     std::map<WorkerId, std::uint32_t> done;    // groups that a display worker has said are done: the first so many
     std::set<std::pair<WorkerId, Box>> slabs;  // who needed which voxels
+    std::set<BoxId> left_out;                  // boxes that were hidden as a whole, in any attempt
     bool all_cached = true;                    // when it was handed out, workers held all voxels that it needs
     bool over = false;
     std::size_t unfinished() const {  // handed out, and not done as the display worker sees it
@@ -85,6 +88,7 @@ class Simulation : private WorkerNetwork {
   void Perform(const CoordinatorEvent& event, const LoadDataset& action);
   void Perform(const CoordinatorEvent& event, const StopService&);
   void Observe(const GroupAssignment& assignment);
+  void CheckHidden(const GroupAssignment& assignment, const SeenFrame& frame);
   void CheckPicture(const FrameImage& image, const Bytes& payload, const FrameReply& reply);
 
   // ---- messages

@@ -32,7 +32,9 @@ TEST(Simulator, EveryFrameEndsRightOrWithItsError) {
   std::cout << tally.worlds << " worlds, " << tally.requests << " requests: " << tally.pictures << " pictures (" << tally.retried
             << " after more than one attempt), " << tally.previews << " previews, " << tally.errors << " errors (" << tally.cancelled
             << " cancelled); " << tally.cached_frames << " frames from cached voxels, " << tally.workers_killed << " workers killed, "
-            << tally.coordinator_restarts << " coordinator restarts\n";
+            << tally.coordinator_restarts << " coordinator restarts; " << tally.masks << " groups with hidden tiles ("
+            << tally.masks_of_retries << " of them after the first attempt), " << tally.hidden_pixels << " pixels without hidden boxes, "
+            << tally.hidden_boxes << " boxes not rendered\n";
   if (tally.worlds < 1000) return;
   // The worlds must be such that something is tested, and the service such that faults rarely cost a frame.
   EXPECT_GT(tally.pictures, tally.requests * 8 / 10);
@@ -41,6 +43,10 @@ TEST(Simulator, EveryFrameEndsRightOrWithItsError) {
   EXPECT_GT(tally.cached_frames, tally.worlds / 10);
   EXPECT_GT(tally.workers_killed, tally.worlds / 4);
   EXPECT_GT(tally.coordinator_restarts, tally.worlds / 20);
+  EXPECT_GT(tally.masks, tally.worlds);
+  EXPECT_GT(tally.masks_of_retries, tally.worlds / 50);
+  EXPECT_GT(tally.hidden_pixels, tally.worlds);
+  EXPECT_GT(tally.hidden_boxes, tally.worlds);
 }
 
 }  // namespace

@@ -139,8 +139,8 @@ GroupAssignment MakeAssignment(Rank ranks, const std::function<Schedule(const Sc
   GroupAssignment assignment;
   assignment.epoch = 5;
   assignment.key = {1, 1, 0};
-  assignment.setup.camera.width = kWidth;
-  assignment.setup.camera.height = kHeight;
+  assignment.setup.sheets.width = kWidth;
+  assignment.setup.sheets.height = kHeight;
   for (Rank rank = 0; rank < ranks; ++rank) assignment.group.placements.push_back({rank, {}, 1});
   assignment.group.schedule = make({ranks, root, kFrame});
   return assignment;
@@ -266,8 +266,8 @@ TEST(GroupRun, ImagesFromWorkersThatDoNotOwnTheRankAreIgnored) {
 
 TEST(GroupRun, AnEmptyGroupIsDoneAtOnce) {
   GroupAssignment assignment;
-  assignment.setup.camera.width = kWidth;
-  assignment.setup.camera.height = kHeight;
+  assignment.setup.sheets.width = kWidth;
+  assignment.setup.sheets.height = kHeight;
   assignment.display = 1;
   ImageNames names;
   GroupRun run(assignment, 1, names);
