@@ -9,11 +9,13 @@
 
 #include "common/base/check.h"
 #include "common/base/log.h"
-#include "common/image/resolve.h"
 #include "common/wire/payload.h"
+#include "worker/render/finish_picture.h"
 
 namespace slabstream {
 namespace {
+
+const OcclusionMask kNothingHidden;
 
 std::int64_t NowNs() { return MonotonicNow().time_since_epoch().count(); }
 
@@ -78,16 +80,21 @@ struct Executor::Slab {
       return Status::DataLoss("chunk " + std::to_string(chunk.chunk) + " of " + std::to_string(chunk.raw_bytes) +
                               " bytes does not fit a slab of " + std::to_string(total));
     }
-    if (voxels.bytes.empty()) voxels = MakeVoxelBlock(key.box, key.type);
-    return UnpackChunk(chunk, payload.span(), {voxels.bytes.data() + begin, chunk.raw_bytes});
+    if (!voxels) voxels.emplace(key.box, key.type);
+    unpacked.resize(chunk.raw_bytes);
+    if (Status status = UnpackChunk(chunk, payload.span(), unpacked); !status.ok()) return status;
+    voxels->Write(begin, unpacked);
+    return Status::Ok();
   }
 
   const SlabKey key;
-  VoxelBlock voxels;
+  std::optional<BrickedVoxels> voxels;
+  std::vector<std::byte> unpacked;  // a chunk's samples
   std::unique_ptr<SlabData> data;
 };
 
-Executor::Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec) : outbox_(outbox), frame_codec_(frame_codec) {}
+Executor::Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec, int threads)
+    : outbox_(outbox), frame_codec_(frame_codec), threads_(threads), render_arena_(threads), finish_arena_(threads) {}
 
 Executor::~Executor() {
   if (last_render_) *last_render_->cancelled = true;
@@ -116,7 +123,7 @@ void Executor::Perform(StartRender&& action) {
   auto cancelled = std::make_shared<std::atomic<bool>>(false);
   last_render_ = {action.key, cancelled};
   render_thread_.Post([this, slab = found->second, image = std::move(image), cancelled = std::move(cancelled), render = std::move(action)] {
-    outbox_.Post(WorkerEvent(Render(render, *slab, *cancelled, *image)));
+    outbox_.Post(WorkerEvent(render_arena_.execute([&] { return Render(render, *slab, *cancelled, *image); })));
   });
 }
 
@@ -128,10 +135,15 @@ RenderDone Executor::Render(const StartRender& action, Slab& slab, const std::at
   RankReport& report = done.report;
   const std::int64_t begin = NowNs();
   done.status = Guarded("render", [&] {
-    if (slab.data == nullptr) slab.data = std::make_unique<SlabData>(std::move(slab.voxels));
+    if (slab.data == nullptr) {
+      slab.data = std::make_unique<SlabData>(*std::move(slab.voxels));
+      slab.voxels.reset();
+      slab.unpacked = {};
+    }
     std::unique_ptr<Renderer>& renderer = renderers_[action.setup->renderer];
     if (renderer == nullptr) renderer = MakeRenderer(action.setup->renderer);
-    Result<LocalImage> rendered = renderer->Render(*slab.data, action.placement.box, *action.setup, cancelled, report);
+    const OcclusionMask& hidden = action.hidden == nullptr ? kNothingHidden : *action.hidden;
+    Result<LocalImage> rendered = renderer->Render(*slab.data, action.placement.box, *action.setup, hidden, cancelled, report);
     if (!rendered.ok()) return rendered.status();
     image = std::move(*rendered);
     return Status::Ok();
@@ -187,6 +199,22 @@ void Executor::Perform(StartCombine&& action, const PixelBounds& frame) {
   });
 }
 
+void Executor::Perform(FindHidden&& action) {
+  std::shared_ptr<LocalImage> image = FindImage(action.image);
+  CHECK(image != nullptr) << "image " << action.image << " to look through does not exist";
+  combine_thread_.Post([this, image = std::move(image), find = std::move(action)]() mutable {
+    HiddenFound found{find.key, find.image, {}};
+    const Status status = Guarded("hidden tiles", [&] {
+      const PixelBounds frame = FrameBounds(*find.setup);
+      if (image->format != PixelFormat::kRgba) return Status::InvalidArgument("hidden tiles: an image with depth");  // a peer's mistake
+      found.hidden = FindHiddenTiles(*image, frame.width(), frame.height(), find.setup->termination, std::move(find.known));
+      return Status::Ok();
+    });
+    if (!status.ok()) LogWarning(status.message());  // what nobody is told of is rendered
+    outbox_.Post(WorkerEvent(std::move(found)));
+  });
+}
+
 void Executor::Perform(SendPartial&& action) {
   std::shared_ptr<LocalImage> image = FindImage(action.image);
   CHECK(image != nullptr) << "image " << action.image << " to send does not exist";
@@ -225,12 +253,12 @@ void Executor::Perform(SendFrame&& action) {
         const std::int32_t width = std::max(b.x_end, 1);
         runs = EncodeRuns(picture, {0, std::uint64_t(std::max(b.y_end, 0)) * std::uint64_t(width)}, width);
       };
-      if (send.supersample == 1) {
+      if (FrameIsPicture(*send.setup)) {
         encode(*image);
       } else {
-        encode(Resolve(*image, send.supersample));
-        AddStage(reports, Stage::kResolve, begin, resolved_ns);
+        encode(finish_arena_.execute([&] { return FinishPicture(*image, *send.setup); }));
       }
+      AddStage(reports, Stage::kResolve, begin, resolved_ns);
       send.message.runs.image = runs.header;
       const Bytes payload = PackRuns(Bytes(std::move(runs.payload)), frame_codec_, send.message.runs);
       AddStage(reports, Stage::kEncode, resolved_ns, NowNs());

@@ -1,5 +1,5 @@
 // Executor: carries out what a WorkerMachine orders that takes time: renders on one thread, combines, encodes and unpacks chunks on
-// another.
+// another. Rendering, and the making of the picture, are spread over the worker's render threads.
 //
 //   1. The thread that owns the machine calls Perform for each action of the kinds below, in order.
 //   2. What comes of it is posted to the outbox: an event for the machine, or a message that is ready to be sent.
@@ -7,6 +7,8 @@
 // and no lock is held while pixels are touched. An entry's contents are touched by one task at a time: the machine orders the next use of a
 // slab or image only after the event that ends the last one, but for the combining thread's own tasks, which run in order.
 #pragma once
+
+#include <tbb/task_arena.h>
 
 #include <atomic>
 #include <map>
@@ -20,6 +22,7 @@
 #include "common/image/local_image.h"
 #include "common/transport/mailbox.h"
 #include "worker/render/pipeline.h"
+#include "worker/thread_share.h"
 #include "worker/worker_machine.h"
 
 namespace slabstream {
@@ -38,8 +41,8 @@ using ExecutorOutput = std::variant<WorkerEvent, OutgoingPartial, OutgoingFrame>
 
 class Executor {
  public:
-  // `frame_codec` packs finished frames. The outbox must outlive the executor.
-  Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec);
+  // `frame_codec` packs finished frames. `threads` render, at least 1. The outbox must outlive the executor.
+  Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec, int threads);
   ~Executor();  // cancels the running render, drops what has not begun, joins
 
   void Perform(const OpenSlab& action);
@@ -49,6 +52,7 @@ class Executor {
   void Perform(const CancelRender& action);
   // `frame`: all pixels of the group's frame, for the check of the runs.
   void Perform(StartCombine&& action, const PixelBounds& frame);
+  void Perform(FindHidden&& action);
   void Perform(SendPartial&& action);
   void Perform(SendFrame&& action);
   void Perform(const ReleaseImage& action);
@@ -69,6 +73,9 @@ class Executor {
   std::map<ImageHandle, std::shared_ptr<LocalImage>> images_;
   std::optional<RunningRender> last_render_;
   std::map<RendererKind, std::unique_ptr<Renderer>> renderers_;  // the render thread's
+  const ThreadShare threads_;
+  // One for each thread below that enters: in a common arena the last picture would wait for the next one's rendering.
+  tbb::task_arena render_arena_, finish_arena_;
   TaskThread combine_thread_;
   TaskThread render_thread_;
 };

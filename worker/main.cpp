@@ -9,6 +9,7 @@
 #include "common/base/large_buffers.h"
 #include "common/base/log.h"
 #include "common/base/stop_signals.h"
+#include "common/kernels/simd_target.h"
 #include "common/transport/socket.h"
 #include "worker/service.h"
 
@@ -23,17 +24,18 @@ int Fail(int exit_status, const std::string& message) {
 
 int Run(int argc, char** argv) {
   slabstream::WorkerOptions options;
-  std::uint32_t threads = 1;
   std::uint64_t cache_mib = 0;
+  bool compress = false;
   std::string log_level = "warning";
 
   CLI::App app("Slabstream worker: renders slabs and combines images for a coordinator.");
   app.add_option("--coordinator", options.coordinator_endpoint, "the coordinator's endpoint for workers, such as tcp://127.0.0.1:7421")
       ->required();
   app.add_option("--listen", options.images_endpoint, "where other workers send partial images (default: any port beside the coordinator)");
-  app.add_option("--threads", threads, "render threads (this version: 1)");
+  app.add_option("--threads", options.machine.threads, "render threads (default: 1)");
   app.add_option("--cache-mib", cache_mib, "MiB of voxels kept between frames (default: no limit)")
       ->check(CLI::Range(std::uint64_t{1}, kMaxCacheMib));
+  app.add_flag("--compress", compress, "pack pictures with zstd: pays on links slower than about 100 MB/s, not within a machine");
   app.add_option("--log-level", log_level, "debug, info, warning, error or off")->check(CLI::IsMember(slabstream::LogLevelNames()));
   try {
     app.parse(argc, argv);
@@ -42,10 +44,9 @@ int Run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return Fail(2, error.what());
   }
-  if (threads != 1) {
-    return Fail(2, "--threads " + std::to_string(threads) + " is not 1: this version renders with one thread a worker; start more workers");
-  }
+  if (compress) options.codec = slabstream::Codec::kZstd;
   if (cache_mib != 0) options.machine.cache_bytes = cache_mib << 20;
+  if (const auto simd = slabstream::LimitSimdTargetByEnvironment(); !simd.ok()) return Fail(2, simd.message());
   slabstream::InitLog("worker " + std::to_string(::getpid()), slabstream::LogLevelNames().at(log_level));
 
   slabstream::BlockStopSignals();
@@ -59,7 +60,7 @@ int Run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  slabstream::MapLargeBuffers();
+  slabstream::KeepFrameBuffers();
   try {
     return Run(argc, argv);
   } catch (const std::exception& error) {  // out of memory, mostly: everything that is expected comes back as a Status

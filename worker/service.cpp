@@ -48,13 +48,13 @@ std::string HostName() {
 }  // namespace
 
 struct WorkerService::Impl {
-  Impl(Context& service_context, WorkerConfig config, Codec frame_codec, Socket control_socket, Socket images_socket)
+  Impl(Context& service_context, const WorkerConfig& config, Codec frame_codec, Socket control_socket, Socket images_socket)
       : context(service_context),
-        machine(std::move(config)),
+        machine(config),
         control(std::move(control_socket)),
         images(std::move(images_socket)),
         peers(service_context),
-        executor(std::in_place, outbox, frame_codec) {}
+        executor(std::in_place, outbox, frame_codec, int(config.threads)) {}
 
   void Run();
   void Receive(Socket& socket, const char* plane);
@@ -140,7 +140,7 @@ void WorkerService::Impl::Remember(const AnyMessage& message) {
     if (std::exchange(epoch, welcome->epoch) != welcome->epoch) frames.clear();
   } else if (const auto* assignment = std::get_if<GroupAssignment>(&message); assignment != nullptr && assignment->epoch == epoch) {
     frames.erase(frames.begin(), frames.lower_bound(assignment->finished_before));
-    frames[assignment->key.frame] = {0, 0, assignment->setup.camera.width, assignment->setup.camera.height};
+    frames[assignment->key.frame] = FrameBounds(assignment->setup);
   }
 }
 
@@ -203,6 +203,10 @@ Result<std::unique_ptr<WorkerService>> WorkerService::Start(Context& context, Wo
   const Result<Endpoint> coordinator = ParseEndpoint(options.coordinator_endpoint, false);
   if (!coordinator.ok()) return coordinator.status();
   WorkerConfig& config = options.machine;
+  if (config.threads < 1 || config.threads > kMaxThreads) {
+    return Status::InvalidArgument("threads " + std::to_string(config.threads) + " is out of range [1, " + std::to_string(kMaxThreads) +
+                                   "]");
+  }
   config.incarnation = RandomIncarnation();
   if (options.images_endpoint.empty()) options.images_endpoint = ImagesEndpointFor(*coordinator, config.incarnation);
   if (const Result<Endpoint> parsed = ParseEndpoint(options.images_endpoint, true); !parsed.ok()) return parsed.status();
@@ -218,8 +222,7 @@ Result<std::unique_ptr<WorkerService>> WorkerService::Start(Context& context, Wo
   config.pid = static_cast<std::uint32_t>(::getpid());
   config.host = HostName();
   config.images_endpoint = std::move(*images_endpoint);
-  const Codec frame_codec = coordinator->scheme == Scheme::kInproc ? Codec::kRaw : Codec::kZstd;
-  auto impl = std::make_unique<Impl>(context, std::move(config), frame_codec, std::move(*control), std::move(*images));
+  auto impl = std::make_unique<Impl>(context, config, options.codec, std::move(*control), std::move(*images));
   impl->thread = std::jthread([raw = impl.get()] { raw->Run(); });
   return std::unique_ptr<WorkerService>(new WorkerService(std::move(impl)));
 }

@@ -1,7 +1,8 @@
 // WorkerService: runs a WorkerMachine over ZeroMQ.
 //
-// Threads: one owns all sockets and runs the machine; one renders; one combines, encodes and unpacks chunks. So rendering of one group goes
-// on beside the combining of another, and heartbeats are on time whatever is computed.
+// Threads: one owns all sockets and runs the machine; one renders, with as many helpers as WorkerConfig::threads says; one combines,
+// encodes and unpacks chunks. So rendering of one group goes on beside the combining of another, and heartbeats are on time whatever is
+// computed.
 #pragma once
 
 #include <memory>
@@ -16,7 +17,8 @@ namespace slabstream {
 struct WorkerOptions {
   std::string coordinator_endpoint;  // its worker endpoint
   std::string images_endpoint;       // bound; empty: any port of the coordinator's scheme (tcp), a path of its own (ipc), a name (inproc)
-  WorkerConfig machine;              // incarnation, pid, host, images_endpoint are filled in by Start
+  Codec codec = Codec::kRaw;         // of finished frames; zstd pays where the client's link is slower than it packs
+  WorkerConfig machine;              // incarnation, pid, host, images_endpoint are filled in by Start; threads: [1, kMaxThreads]
 };
 
 class WorkerService {

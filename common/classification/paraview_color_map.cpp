@@ -75,4 +75,12 @@ Result<TransferFunction> ParseParaViewColorMap(std::string_view json, std::strin
   return transfer;
 }
 
+std::string FormatParaViewColorMap(const TransferFunction& transfer, std::string_view name) {
+  std::vector<double> colors, opacities;
+  for (const ColorPoint& p : transfer.colors) colors.insert(colors.end(), {p.value, p.color.r, p.color.g, p.color.b});
+  for (const OpacityPoint& p : transfer.opacities) opacities.insert(opacities.end(), {p.value, p.opacity, p.midpoint, p.sharpness});
+  const nlohmann::ordered_json preset = {{"Name", name}, {"ColorSpace", "RGB"}, {"RGBPoints", colors}, {"Points", opacities}};
+  return nlohmann::ordered_json::array({preset}).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+}
+
 }  // namespace slabstream

@@ -62,6 +62,9 @@ double MaxOpacity(const TransferFunction& transfer, double low, double high);
 // Colours are interpolated in RGB, whatever the map's ColorSpace. Errors: InvalidArgument, beginning with `name`.
 Result<TransferFunction> ParseParaViewColorMap(std::string_view json, std::string_view name);
 
+// The inverse, as a preset called `name`. `transfer` valid; its opacity_distance has no place there.
+std::string FormatParaViewColorMap(const TransferFunction& transfer, std::string_view name);
+
 // Built-in transfer functions, chosen by name; "auto" is made from the histogram of the volume at hand.
 struct PresetInfo {
   std::string_view name;     // what --transfer takes

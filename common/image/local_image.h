@@ -2,14 +2,15 @@
 //
 // Two pixel formats. kRgba (splatting): premultiplied float RGBA, interleaved, 16 bytes a pixel; empty is (0, 0, 0, 0).
 // kDepth (Z-buffer): the same RGBA (alpha 0 or 1) with a depth plane (float, camera depth; empty is +infinity) and a voxel plane (the low
-// 32 bits of the linear index of the voxel that is seen), which breaks ties of depth: see NearerDepth. Rows are stored top down without
-// padding; pixel (x, y) is at index (y - bounds.y_begin) * bounds.width() + (x - bounds.x_begin).
+// 32 bits of the index of the voxel's face that is seen: FaceIndex in worker/kernels/surface_face.h), which breaks ties of depth: see
+// NearerDepth. Rows are stored top down without padding; pixel (x, y) is at index
+// (y - bounds.y_begin) * bounds.width() + (x - bounds.x_begin).
 #pragma once
 
 #include <algorithm>
 #include <cstdint>
 
-#include "common/base/aligned_buffer.h"
+#include "common/base/pooled_vector.h"
 
 namespace slabstream {
 
@@ -40,13 +41,15 @@ constexpr PixelBounds Union(const PixelBounds& a, const PixelBounds& b) {
 
 struct LocalImage {
   PixelFormat format = PixelFormat::kRgba;
-  PixelBounds bounds;                  // within the frame; may be empty
-  AlignedVector<float> rgba;           // 4 * pixel_count
-  AlignedVector<float> depth;          // kDepth: pixel_count; else empty
-  AlignedVector<std::uint32_t> voxel;  // kDepth: pixel_count; else empty
+  PixelBounds bounds;                 // within the frame; may be empty
+  PooledVector<float> rgba;           // 4 * pixel_count
+  PooledVector<float> depth;          // kDepth: pixel_count; else empty
+  PooledVector<std::uint32_t> voxel;  // kDepth: pixel_count; else empty
 };
 
 // All pixels empty.
 LocalImage MakeLocalImage(PixelFormat format, const PixelBounds& bounds);
+// Pixels hold anything: for who writes every one of them.
+LocalImage MakeUnwrittenImage(PixelFormat format, const PixelBounds& bounds);
 
 }  // namespace slabstream

@@ -8,7 +8,7 @@
 
 namespace slabstream {
 
-LocalImage Resolve(LocalImage image, int supersample) {
+LocalImage Resolve(const LocalImage& image, int supersample) {
   CHECK(supersample >= 1 && std::has_single_bit(unsigned(supersample))) << supersample;
   if (supersample == 1) return image;
 

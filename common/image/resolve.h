@@ -7,6 +7,6 @@
 namespace slabstream {
 
 // `supersample` is a power of two, 1 returns the image as it is. Bounds of the result are in final pixels, grown to whole ones.
-LocalImage Resolve(LocalImage image, int supersample);
+LocalImage Resolve(const LocalImage& image, int supersample);
 
 }  // namespace slabstream

@@ -1,7 +1,7 @@
 #include "common/image/run_image.h"
 
 #include <algorithm>
-#include <bit>
+#include <cstring>
 #include <limits>
 #include <string>
 
@@ -15,27 +15,13 @@ std::size_t PixelBytes(PixelFormat format) {
   return format == PixelFormat::kDepth ? kRgbaBytes + sizeof(float) + sizeof(std::uint32_t) : kRgbaBytes;
 }
 
-// Tells the pixels of one row of an image apart from empty ones.
-class RowScanner {
- public:
-  explicit RowScanner(const LocalImage& image) : image_(image), depth_(image.format == PixelFormat::kDepth) {}
-
-  bool Empty(std::size_t pixel) const {
-    return depth_ ? image_.depth[pixel] == std::numeric_limits<float>::infinity() : image_.rgba[4 * pixel + 3] == 0;
-  }
-
- private:
-  const LocalImage& image_;
-  const bool depth_;
-};
-
 // One run and where its pixels lie in the image.
 struct PlacedRun {
   Run run;
   std::size_t first_pixel;
 };
 
-void Append(std::vector<std::byte>& out, const void* data, std::size_t bytes) {
+void Append(PooledVector<std::byte>& out, const void* data, std::size_t bytes) {
   const auto* begin = static_cast<const std::byte*>(data);
   out.insert(out.end(), begin, begin + bytes);
 }
@@ -54,22 +40,47 @@ Columns ColumnsInRange(const PixelBounds& bounds, std::int64_t y, PixelRange ran
 
 Status Invalid(const std::string& message) { return Status::InvalidArgument("run image: " + message); }
 
-bool AllFinite(const RunPayload& payload, void (RunPayload::*read)(std::size_t, std::size_t, float*) const, std::size_t pixels,
-               std::size_t floats_a_pixel) {
-  constexpr std::size_t kBatch = 1024;  // pixels
+// Pixels [begin, end).
+void MakeEmpty(LocalImage& image, std::size_t begin, std::size_t end) {
+  std::fill(image.rgba.data() + 4 * begin, image.rgba.data() + 4 * end, 0.0F);
+  if (image.format != PixelFormat::kDepth) return;
+  std::fill(image.depth.data() + begin, image.depth.data() + end, std::numeric_limits<float>::infinity());
+  std::fill(image.voxel.data() + begin, image.voxel.data() + end, 0U);
+}
+
+// `floats`: the bytes of floats, at any address.
+bool AllFinite(std::span<const std::byte> floats) {
+  constexpr std::size_t kBatch = 16384;  // floats between two looks at what was found
   constexpr std::uint32_t kExponentBits = 0x7F800000U;
-  float batch[4 * kBatch];
-  for (std::size_t first = 0; first < pixels; first += kBatch) {
-    const std::size_t count = std::min(kBatch, pixels - first);
-    (payload.*read)(first, count, batch);
-    // All bits of the exponent are set for infinities and NaNs alone.
-    bool finite = true;
-    for (std::size_t i = 0; i < floats_a_pixel * count; ++i) {
-      finite &= (std::bit_cast<std::uint32_t>(batch[i]) & kExponentBits) != kExponentBits;
+  const std::size_t total = floats.size() / sizeof(float);
+  for (std::size_t first = 0; first < total; first += kBatch) {
+    const std::size_t end = std::min(first + kBatch, total);
+    std::uint32_t bad = 0;
+    for (std::size_t i = first; i < end; ++i) {
+      std::uint32_t bits;
+      std::memcpy(&bits, floats.data() + sizeof(bits) * i, sizeof(bits));
+      // All bits of the exponent are set for infinities and NaNs alone.
+      bad |= std::uint32_t{(bits & kExponentBits) == kExponentBits};
     }
-    if (!finite) return false;
+    if (bad != 0) return false;
   }
   return true;
+}
+
+// The pixels of one row, [begin, end), that are not empty, as maximal spans: found(begin, end) for each. Empty is where `plane`, which has
+// a value each `stride`, is `empty`.
+template <std::size_t stride, class Found>
+void ForEachSpan(const float* plane, float empty, std::int64_t begin, std::int64_t end, Found&& found) {
+  const auto is_empty = [&](std::int64_t x) { return plane[stride * std::size_t(x)] == empty; };
+  for (std::int64_t x = begin; x < end;) {
+    // Four at a time without a branch each, then what is left of them.
+    while (x + 4 <= end && (is_empty(x) & is_empty(x + 1) & is_empty(x + 2) & is_empty(x + 3))) x += 4;
+    while (x < end && is_empty(x)) ++x;
+    const std::int64_t first = x;
+    while (x + 4 <= end && !(is_empty(x) | is_empty(x + 1) | is_empty(x + 2) | is_empty(x + 3))) x += 4;
+    while (x < end && !is_empty(x)) ++x;
+    if (x > first) found(first, x);
+  }
 }
 
 }  // namespace
@@ -92,19 +103,19 @@ RunImage EncodeRuns(const LocalImage& image, PixelRange range, std::int32_t fram
   if (first_row >= end_row) return result;
   result.header.bounds = {bounds.x_begin, std::int32_t(first_row), bounds.x_end, std::int32_t(end_row)};
 
-  const RowScanner scanner(image);
   std::vector<PlacedRun> runs;
   std::uint64_t pixel_count = 0;
   for (std::int64_t y = first_row; y < end_row; ++y) {
     const Columns columns = ColumnsInRange(bounds, y, range, width);
     const std::size_t row = std::size_t((y - bounds.y_begin) * bounds.width());
-    for (std::int64_t x = columns.begin; x < columns.end;) {
-      while (x < columns.end && scanner.Empty(row + std::size_t(x))) ++x;
-      const std::int64_t begin = x;
-      while (x < columns.end && !scanner.Empty(row + std::size_t(x))) ++x;
-      if (x == begin) break;
-      runs.push_back({{std::uint32_t(y - first_row), std::uint32_t(begin), std::uint32_t(x - begin)}, row + std::size_t(begin)});
-      pixel_count += std::uint64_t(x - begin);
+    const auto found = [&](std::int64_t begin, std::int64_t end) {
+      runs.push_back({{std::uint32_t(y - first_row), std::uint32_t(begin), std::uint32_t(end - begin)}, row + std::size_t(begin)});
+      pixel_count += std::uint64_t(end - begin);
+    };
+    if (image.format == PixelFormat::kDepth) {
+      ForEachSpan<1>(&image.depth[row], std::numeric_limits<float>::infinity(), columns.begin, columns.end, found);
+    } else {
+      ForEachSpan<4>(&image.rgba[4 * row] + 3, 0, columns.begin, columns.end, found);
     }
   }
   result.header.run_count = std::uint32_t(runs.size());
@@ -165,19 +176,20 @@ Status ValidateRuns(const RunImageHeader& header, std::span<const std::byte> pay
   if (pixels != header.pixel_count) {
     return Invalid("runs hold " + std::to_string(pixels) + " pixels, but pixel_count is " + std::to_string(header.pixel_count));
   }
-  if (!AllFinite(runs, &RunPayload::ReadRgba, pixels, 4)) return Invalid("a pixel's colour is not finite");
-  if (header.format == PixelFormat::kDepth && !AllFinite(runs, &RunPayload::ReadDepth, pixels, 1))
-    return Invalid("a pixel's depth is not finite");
+  if (!AllFinite(runs.rgba(pixels))) return Invalid("a pixel's colour is not finite");
+  if (header.format == PixelFormat::kDepth && !AllFinite(runs.depth(pixels))) return Invalid("a pixel's depth is not finite");
   return Status::Ok();
 }
 
 LocalImage DecodeRuns(const RunImageHeader& header, std::span<const std::byte> payload) {
-  LocalImage image = MakeLocalImage(header.format, header.bounds);
+  LocalImage image = MakeUnwrittenImage(header.format, header.bounds);
   const RunPayload runs(header, payload);
-  std::size_t source = 0;
+  std::size_t source = 0, written = 0;
   for (std::uint32_t i = 0; i < header.run_count; ++i) {
     const Run run = runs.ReadRun(i);
     const std::size_t target = std::size_t{run.row} * std::size_t(header.bounds.width()) + run.column;
+    MakeEmpty(image, written, target);
+    written = target + run.pixel_count;
     runs.ReadRgba(source, run.pixel_count, &image.rgba[4 * target]);
     if (header.format == PixelFormat::kDepth) {
       runs.ReadDepth(source, run.pixel_count, &image.depth[target]);
@@ -185,6 +197,7 @@ LocalImage DecodeRuns(const RunImageHeader& header, std::span<const std::byte> p
     }
     source += run.pixel_count;
   }
+  MakeEmpty(image, written, std::size_t(header.bounds.pixel_count()));
   return image;
 }
 

@@ -11,7 +11,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <vector>
 
 #include "common/base/status.h"
 #include "common/image/local_image.h"
@@ -37,7 +36,7 @@ std::size_t PayloadBytes(const RunImageHeader& header);
 
 struct RunImage {
   RunImageHeader header;
-  std::vector<std::byte> payload;  // PayloadBytes(header)
+  PooledVector<std::byte> payload;  // PayloadBytes(header)
 };
 
 // The pixels of `image` that lie in `range` of a frame `frame_width` wide; bounds are cut to the rows that the range touches.

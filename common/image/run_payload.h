@@ -36,6 +36,9 @@ class RunPayload {
     std::memcpy(&run, runs_ + sizeof(Run) * index, sizeof(Run));
     return run;
   }
+  // The bytes of the first `count` pixels of all runs: four floats or one each.
+  std::span<const std::byte> rgba(std::size_t count) const { return {rgba_, kRgbaBytes * count}; }
+  std::span<const std::byte> depth(std::size_t count) const { return {depth_, sizeof(float) * count}; }
   // Pixels [first, first + count) of all runs.
   void ReadRgba(std::size_t first, std::size_t count, float* out) const {
     std::memcpy(out, rgba_ + kRgbaBytes * first, kRgbaBytes * count);

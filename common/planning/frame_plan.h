@@ -13,6 +13,7 @@
 #include "common/combining/schedule.h"
 #include "common/decomposition/partition.h"
 #include "common/planning/frame_request.h"
+#include "common/view/sheet_grid.h"
 #include "common/volume/summary.h"
 
 namespace slabstream {
@@ -27,13 +28,19 @@ struct FrameSetup {
   VolumeDescription description;
   ValueRange range;  // data values: what the classification table is made for
   RendererKind renderer = RendererKind::kSplat;
-  Camera camera;
+  Camera camera;     // of the picture; Z-buffer: supersampled, and what is rendered
+  SheetGrid sheets;  // splatting: what is rendered
   TransferFunction transfer;
   Shading shading;
   double termination = kDefaultTermination;
-  std::int32_t halo = kHaloStep;  // voxels that are kept round a box
+  std::int32_t halo = kHalo;  // voxels that are kept round a box
   friend bool operator==(const FrameSetup&, const FrameSetup&) = default;
 };
+
+// The frame: all pixels that workers render and combine, from which the picture is made at the end (FinishPicture). Local images, runs and
+// pixel ranges count in it.
+PixelBounds FrameBounds(const FrameSetup& setup);
+inline PixelRange WholeFrame(const FrameSetup& setup) { return {0, std::uint64_t(FrameBounds(setup).pixel_count())}; }
 
 inline PixelFormat FormatOf(RendererKind renderer) { return renderer == RendererKind::kSplat ? PixelFormat::kRgba : PixelFormat::kDepth; }
 

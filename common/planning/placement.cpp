@@ -53,8 +53,7 @@ Status AssignWorkers(const Roster& roster, FramePlan& plan) {
 
   const CombiningEntry* scheme = FindCombiningScheme(plan.combine);
   CHECK(scheme != nullptr) << plan.combine;
-  const Camera& camera = plan.setup.camera;
-  const PixelRange frame = {0, std::uint64_t(camera.width) * std::uint64_t(camera.height)};
+  const PixelRange frame = WholeFrame(plan.setup);
   for (GroupPlan& group : plan.groups) {
     group.schedule = group.placements.empty() ? Schedule{.ranks = 0, .root = 0, .steps = {}}
                                               : scheme->make({Rank(group.placements.size()), RootOf(group, plan.display), frame});

@@ -28,24 +28,25 @@ Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const Vol
   return transfer;
 }
 
-// The longest side of the volume, the higher axis of equal ones: whatever the view, so that turning it moves no voxel.
-Axis LongestAxis(const Index3& size) {
+// z, about which views turn: slabs one above the other hide little of each other from most sides, so none of them is rendered in vain. The
+// longest side where z has less than half as many slices. It depends on the volume alone, so that turning it moves no voxel.
+Axis AutomaticAxis(const Index3& size) {
   Axis longest = Axis::kZ;
   for (Axis axis : {Axis::kY, Axis::kX}) {
-    if (size[axis] > size[longest]) longest = axis;
+    if (size[axis] > 2 * size.z && size[axis] > size[longest]) longest = axis;
   }
   return longest;
 }
 
-// The fewest groups whose slabs stay under the target. It must not depend on the view either, so the usual halo stands for the real one;
-// slabs thinner than that would hold more halo than voxels of their own.
+// The fewest groups whose slabs stay under the target, whatever the view. Slabs thinner than the halo would hold more of it than voxels of
+// their own.
 int ChooseGroups(const VolumeDescription& description, Axis axis, std::int64_t slots, const CostModel& cost) {
   const std::int64_t slices = description.geometry.size[axis];
   const std::int64_t slice_bytes = description.voxel_bytes() / slices;
-  const std::int64_t most = std::clamp<std::int64_t>(slices / (slots * kHaloStep), 1, kMaxGroups);
+  const std::int64_t most = std::clamp<std::int64_t>(slices / (slots * kHalo), 1, kMaxGroups);
   for (std::int64_t groups = 1; groups < most; ++groups) {
     const std::int64_t own_slices = (slices + slots * groups - 1) / (slots * groups);
-    if (std::min(own_slices + 2 * kHaloStep, slices) * slice_bytes <= cost.slab_bytes_target) return int(groups);
+    if (std::min(own_slices + 2 * kHalo, slices) * slice_bytes <= cost.slab_bytes_target) return int(groups);
   }
   return int(most);
 }
@@ -56,15 +57,25 @@ FrameSetup MakeSetup(const FrameRequest& request, DatasetId dataset, const Volum
   setup.description = summary.description;
   setup.range = summary.range;
   setup.renderer = request.renderer;
-  setup.camera = MakeCamera(request.view, request.size, summary.description.geometry);
+  const VolumeGeometry& geometry = summary.description.geometry;
+  if (request.renderer == RendererKind::kSplat) {
+    setup.camera = MakeCamera(request.view, request.size, geometry);
+    setup.sheets = MakeSheetGrid(setup.camera, geometry);
+  } else {
+    setup.camera = MakeSupersampledCamera(request.view, request.size, geometry);
+  }
   setup.transfer = std::move(transfer);
   setup.shading = request.shading;
   setup.termination = request.termination;
-  setup.halo = RequiredHalo(setup.camera, summary.description.geometry);
   return setup;
 }
 
 }  // namespace
+
+PixelBounds FrameBounds(const FrameSetup& setup) {
+  return setup.renderer == RendererKind::kSplat ? PixelBounds{0, 0, setup.sheets.width, setup.sheets.height}
+                                                : PixelBounds{0, 0, setup.camera.width, setup.camera.height};
+}
 
 Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, const Roster& roster,
                             const CostModel& cost) {
@@ -77,10 +88,16 @@ Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, cons
 
   FramePlan plan;
   plan.setup = MakeSetup(request, dataset, summary, *std::move(transfer));
+  if (const SheetGrid& sheets = plan.setup.sheets; std::max(sheets.width, sheets.height) > kMaxGridSide) {
+    return Status::InvalidArgument(
+        fmt::format("an image along the slices of this view has {} x {} pixels, but at most {} a side are possible: "
+                    "the slices lie too far apart for the width of their voxels",
+                    sheets.width, sheets.height, kMaxGridSide));
+  }
   plan.slots = std::uint32_t(roster.slots.size());
   plan.combine = request.policy.combine;
   const VolumeDescription& description = summary.description;
-  plan.slab_axis = request.policy.axis == AxisChoice::kAuto ? LongestAxis(description.geometry.size) : Axis(request.policy.axis);
+  plan.slab_axis = request.policy.axis == AxisChoice::kAuto ? AutomaticAxis(description.geometry.size) : Axis(request.policy.axis);
 
   // Where the boxes are.
   const auto slots = std::max<std::int64_t>(plan.slots, 1);

@@ -84,7 +84,9 @@ Status Validate(const ImageSize& size) {
   return InRange("size.width * size.height", double(size.width) * size.height, 1, double(kMaxImagePixels));
 }
 
-Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry) {
+namespace {
+
+Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry, bool supersampled) {
   const bool perspective = view.projection == Projection::kPerspective;
   const Vec3 spacing = geometry.spacing;
   const Vec3 extent = ToVec3(geometry.size) * spacing;
@@ -102,7 +104,7 @@ Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeomet
   const double pixel_width = (perspective ? distance + radius : 1.0) / scale;
   const double voxel_width = std::min({spacing.x, spacing.y, spacing.z});
   int supersample = 1;
-  while (supersample < kMaxSupersample && pixel_width > kMaxVoxelsPerPixel * voxel_width * supersample) supersample *= 2;
+  while (supersampled && supersample < kMaxSupersample && pixel_width > kMaxVoxelsPerPixel * voxel_width * supersample) supersample *= 2;
   scale *= supersample;
 
   Camera camera;
@@ -130,6 +132,16 @@ Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeomet
   camera.traversal_axis = NearestAxis(frame.forward);
   camera.ascending = frame.forward[camera.traversal_axis] > 0;
   return camera;
+}
+
+}  // namespace
+
+Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry) {
+  return MakeCamera(view, size, geometry, false);
+}
+
+Camera MakeSupersampledCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry) {
+  return MakeCamera(view, size, geometry, true);
 }
 
 Camera::ImagePoint Camera::Project(const Vec3& data_point) const {

@@ -10,9 +10,9 @@
 // (column + 0.5, row + 0.5). Depth: distance from the eye plane along the view direction in physical units; for an orthographic camera the
 // eye plane is 2 R before the centre. Depth is positive for everything in the volume.
 //
-// Supersampling: where more than kMaxVoxelsPerPixel voxels would fall on one pixel's width, everything is rendered on a grid `supersample`
-// (a power of two) times finer in x and y, and box-filtered at the end, so that minified pictures do not alias and the halo that a
-// worker needs stays bounded. Camera and all pixel bounds are then in that finer grid.
+// Supersampling (Z-buffer): where more than kMaxVoxelsPerPixel voxels would fall on one pixel's width, everything is rendered on a grid
+// `supersample` (a power of two) times finer in x and y, and box-filtered at the end, so that minified pictures do not alias. Camera and
+// all pixel bounds are then in that finer grid. Splatting has a grid of its own: sheet_grid.h.
 #pragma once
 
 #include <array>
@@ -81,21 +81,8 @@ struct Camera {
   friend bool operator==(const Camera&, const Camera&) = default;
 };
 
-// `view` and `size` valid.
+// `view` and `size` valid. The first one has supersample 1.
 Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry);
-
-// The footprint of a voxel, as far as the halo depends on it (docs/rendering.md defines it): an axis-aligned Gaussian in image space whose
-// variance is the projected variance of the voxel plus that of the pixel, cut off. Under perspective its shape is taken once for each cell
-// of kFootprintCell x kFootprintCell voxels of a slice (at global multiples), at the centre of the part of the cell that lies in the
-// volume.
-inline constexpr double kFootprintVoxelVariance = 0.36;  // voxels^2, along each data axis
-inline constexpr double kFootprintPixelVariance = 0.2;   // pixels^2
-inline constexpr double kFootprintCut = 3;               // standard deviations
-inline constexpr int kFootprintCell = 32;                // voxels
-
-// Smallest halo, in voxels, that lets a worker compute all its own samples exactly for this view (kernel reach on the
-// tilted slice plus one voxel for gradients), rounded up to a multiple of kHaloStep so that turning the view rarely asks for more.
-inline constexpr int kHaloStep = 8;
-int RequiredHalo(const Camera& camera, const VolumeGeometry& geometry);
+Camera MakeSupersampledCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry);
 
 }  // namespace slabstream

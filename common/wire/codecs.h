@@ -41,6 +41,7 @@ v1::Status ToProto(const Status& in);
 v1::GroupKey ToProto(const GroupKey& in);
 v1::RunImageHeader ToProto(const RunImageHeader& in);
 v1::EncodedRuns ToProto(const EncodedRuns& in);
+v1::OcclusionMask ToProto(const OcclusionMask& in);
 v1::Span ToProto(const Span& in);
 v1::RankReport ToProto(const RankReport& in);
 
@@ -54,6 +55,7 @@ Status FromProto(const v1::Status& in, Checker& check);
 GroupKey FromProto(const v1::GroupKey& in, Checker& check);
 RunImageHeader FromProto(const v1::RunImageHeader& in, Checker& check);
 EncodedRuns FromProto(const v1::EncodedRuns& in, Checker& check);
+OcclusionMask FromProto(const v1::OcclusionMask& in, Checker& check);
 Span FromProto(const v1::Span& in, Checker& check);
 RankReport FromProto(const v1::RankReport& in, Checker& check);
 

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "common/planning/frame_occlusion.h"
 #include "common/wire/codecs.h"
 #include "common/wire/limits.h"
 #include "common/wire/wire_text.h"
@@ -24,6 +25,12 @@ void CheckPeers(const GroupAssignment& in, Checker& check) {
   };
   require(in.display);
   for (const Placement& placement : in.group.placements) require(placement.worker);
+}
+
+void CheckHidden(const GroupAssignment& in, Checker& check) {
+  const auto scope = check.In("hidden");
+  check.That(in.hidden.empty() || in.key.group > 0, "", "a mask for the first group, in front of which there is nothing");
+  check.Adopt(CheckFits(in.hidden, in.setup));
 }
 
 }  // namespace
@@ -132,6 +139,7 @@ v1::GroupAssignment ToProto(const GroupAssignment& in) {
   *out.mutable_setup() = ToProto(in.setup);
   *out.mutable_group() = ToProto(in.group);
   WriteAll(in.peers, out.mutable_peers());
+  *out.mutable_hidden() = ToProto(in.hidden);
   return out;
 }
 
@@ -147,8 +155,10 @@ GroupAssignment FromProto(const v1::GroupAssignment& in, Checker& check) {
   out.setup = Read("setup", in.setup(), check);
   out.group = Read("group", in.group(), check);
   out.peers = ReadAll("peers", in.peers(), kMaxPeers, check);
+  out.hidden = Read("hidden", in.hidden(), check);
   if (!check.ok()) return out;
   CheckPeers(out, check);
+  CheckHidden(out, check);
   const auto scope = check.In("group");
   CheckFits(out.group, out.setup, check);
   return out;
@@ -160,6 +170,7 @@ v1::GroupDone ToProto(const GroupDone& in) {
   out.set_worker(in.worker);
   *out.mutable_key() = ToProto(in.key);
   WriteAll(in.reports, out.mutable_reports());
+  *out.mutable_hidden() = ToProto(in.hidden);
   return out;
 }
 
@@ -169,6 +180,7 @@ GroupDone FromProto(const v1::GroupDone& in, Checker& check) {
   out.worker = in.worker();
   out.key = Read("key", in.key(), check);
   out.reports = ReadAll("reports", in.reports(), kMaxReports, check);
+  out.hidden = Read("hidden", in.hidden(), check);
   return out;
 }
 

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/image/occlusion_mask.h"
 #include "common/image/run_image.h"
 #include "common/planning/frame_plan.h"
 #include "common/stats/report.h"
@@ -29,6 +30,7 @@ namespace slabstream {
 inline constexpr std::size_t kMaxEndpointBytes = 512;
 inline constexpr std::size_t kMaxTextBytes = 4096;
 inline constexpr std::uint32_t kMaxThreads = 1024;  // of one worker
+inline constexpr std::int32_t kMaxOcclusionTiles = OcclusionTiles(kMaxGridSide);
 
 struct Register {
   Incarnation incarnation = 0;
@@ -85,6 +87,7 @@ struct GroupAssignment {
   FrameSetup setup;
   GroupPlan group;
   std::vector<Peer> peers;  // every worker of the group, and the display worker
+  OcclusionMask hidden;     // some of what earlier groups hide (common/planning/frame_occlusion.h); fits the setup
   friend bool operator==(const GroupAssignment&, const GroupAssignment&) = default;
 };
 
@@ -93,6 +96,7 @@ struct GroupDone {
   WorkerId worker = 0;
   GroupKey key;
   std::vector<RankReport> reports;  // of every rank of this group
+  OcclusionMask hidden;             // some of what the groups 0 ... key.group hide; at most kMaxOcclusionTiles along an axis
   friend bool operator==(const GroupDone&, const GroupDone&) = default;
 };
 

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -10,12 +11,14 @@
 namespace slabstream {
 namespace {
 
-using Row = std::array<double, 4>;
+template <std::size_t kSize>
+void WriteRow(const std::array<double, kSize>& in, google::protobuf::RepeatedField<double>* out) {
+  out->Add(in.begin(), in.end());
+}
 
-void WriteRow(const Row& in, google::protobuf::RepeatedField<double>* out) { out->Add(in.begin(), in.end()); }
-
-Row ReadRow(std::string_view field, const google::protobuf::RepeatedField<double>& in, Checker& check) {
-  Row out{};
+template <std::size_t kSize = 4>
+std::array<double, kSize> ReadRow(std::string_view field, const google::protobuf::RepeatedField<double>& in, Checker& check) {
+  std::array<double, kSize> out{};
   if (in.size() != static_cast<int>(out.size())) {
     check.Fail(field, std::to_string(in.size()) + " values, expected " + std::to_string(out.size()));
     return out;
@@ -87,6 +90,44 @@ Camera FromProto(const v1::Camera& in, Checker& check) {
   return out;
 }
 
+v1::SheetGrid ToProto(const SheetGrid& in) {
+  v1::SheetGrid out;
+  out.set_x_u(in.x_u);
+  out.set_x_c(in.x_c);
+  out.set_x_0(in.x_0);
+  out.set_y_v(in.y_v);
+  out.set_y_c(in.y_c);
+  out.set_y_0(in.y_0);
+  out.set_w_c(in.w_c);
+  out.set_w_0(in.w_0);
+  out.set_shear_u(in.shear_u);
+  out.set_shear_v(in.shear_v);
+  out.set_width(static_cast<std::uint32_t>(in.width));
+  out.set_height(static_cast<std::uint32_t>(in.height));
+  WriteRow(in.from_picture, out.mutable_from_picture());
+  return out;
+}
+
+SheetGrid FromProto(const v1::SheetGrid& in, Checker& check) {
+  constexpr double kMost = 1e12;  // keeps sums and products finite
+  SheetGrid out;
+  out.x_u = check.Between("x_u", in.x_u(), 1 / kMost, kMost);
+  out.x_c = check.Between("x_c", in.x_c(), -kMost, kMost);
+  out.x_0 = check.Between("x_0", in.x_0(), -kMost, kMost);
+  out.y_v = check.Between("y_v", in.y_v(), 1 / kMost, kMost);
+  out.y_c = check.Between("y_c", in.y_c(), -kMost, kMost);
+  out.y_0 = check.Between("y_0", in.y_0(), -kMost, kMost);
+  out.w_c = check.Between("w_c", in.w_c(), -kMost, kMost);
+  out.w_0 = check.Between("w_0", in.w_0(), -kMost, kMost);
+  out.shear_u = check.Between("shear_u", in.shear_u(), -kMost, kMost);
+  out.shear_v = check.Between("shear_v", in.shear_v(), -kMost, kMost);
+  out.width = static_cast<std::int32_t>(check.Range("width", in.width(), kGridColumnStep, kMaxGridSide));
+  check.That(out.width % kGridColumnStep == 0, "width", "not a multiple of " + std::to_string(kGridColumnStep));
+  out.height = static_cast<std::int32_t>(check.Range("height", in.height(), 1, kMaxGridSide));
+  out.from_picture = ReadRow<9>("from_picture", in.from_picture(), check);
+  return out;
+}
+
 v1::FrameSetup ToProto(const FrameSetup& in) {
   v1::FrameSetup out;
   out.set_dataset(in.dataset);
@@ -98,6 +139,7 @@ v1::FrameSetup ToProto(const FrameSetup& in) {
   *out.mutable_shading() = ToProto(in.shading);
   out.set_termination(in.termination);
   out.set_halo(static_cast<std::uint32_t>(in.halo));
+  if (in.renderer == RendererKind::kSplat) *out.mutable_sheets() = ToProto(in.sheets);
   return out;
 }
 
@@ -112,6 +154,17 @@ FrameSetup FromProto(const v1::FrameSetup& in, Checker& check) {
   out.shading = Read("shading", in.shading(), check);
   out.termination = check.Between("termination", in.termination(), 0, kMaxTermination);
   out.halo = static_cast<std::int32_t>(check.Range("halo", in.halo(), 0, kMaxVolumeSide));
+  if (out.renderer == RendererKind::kSplat) {
+    out.sheets = Read("sheets", in.sheets(), check);
+    for (const double k : {-0.5, out.description.geometry.size[out.camera.traversal_axis] - 0.5}) {
+      check.That(out.sheets.w_c * k + out.sheets.w_0 > 0, "sheets", "a slice lies behind the eye");
+      if (!check.ok()) break;
+      const SlicePlacement slice = PlaceSlice(out.sheets, k);
+      const FootprintSigma sigma = FootprintIn(out.sheets, slice);
+      check.That(kFootprintCut * std::max(sigma.u, sigma.v) <= kHalo, "sheets", "footprints reach beyond the halo");
+      check.That(std::max(slice.scale_u, slice.scale_v) <= kMaxSliceScale, "sheets", "a voxel is wider than 24 pixels");
+    }
+  }
   if (check.ok()) check.Adopt(Validate(out.transfer));
   if (check.ok()) check.Adopt(Validate(out.shading));
   return out;
@@ -191,7 +244,7 @@ void CheckFits(const GroupPlan& group, const FrameSetup& setup, Checker& check) 
     check.Fail("schedule.ranks",
                std::to_string(group.schedule.ranks) + ", but there are " + std::to_string(group.placements.size()) + " placements");
   }
-  const std::uint64_t frame_pixels = std::uint64_t(setup.camera.width) * std::uint64_t(setup.camera.height);
+  const std::uint64_t frame_pixels = std::uint64_t(FrameBounds(setup).pixel_count());
   if (check.ok()) check.Adopt(CheckSchedule(group.schedule, {0, frame_pixels}));
 }
 

@@ -212,6 +212,34 @@ EncodedRuns FromProto(const v1::EncodedRuns& in, Checker& check) {
   return out;
 }
 
+v1::OcclusionMask ToProto(const OcclusionMask& in) {
+  v1::OcclusionMask out;
+  out.set_tiles_x(static_cast<std::uint32_t>(in.tiles_x));
+  out.set_tiles_y(static_cast<std::uint32_t>(in.tiles_y));
+  std::string& bits = *out.mutable_hidden();
+  bits.resize((in.hidden.size() + 7) / 8);
+  for (std::size_t i = 0; i < in.hidden.size(); ++i) {
+    if (in.hidden[i] != 0) bits[i / 8] = static_cast<char>(bits[i / 8] | 1 << i % 8);
+  }
+  return out;
+}
+
+OcclusionMask FromProto(const v1::OcclusionMask& in, Checker& check) {
+  const std::uint32_t tiles_x = check.Range("tiles_x", in.tiles_x(), 0, kMaxOcclusionTiles);
+  const std::uint32_t tiles_y = check.Range("tiles_y", in.tiles_y(), tiles_x == 0 ? 0 : 1, tiles_x == 0 ? 0 : kMaxOcclusionTiles);
+  const std::size_t tiles = std::size_t{tiles_x} * tiles_y;
+  const std::string bits = check.Text("hidden", in.hidden(), (tiles + 7) / 8, (tiles + 7) / 8);
+  if (!check.ok()) return {};
+  const auto bit = [&](std::size_t i) { return static_cast<std::uint8_t>(static_cast<std::uint8_t>(bits[i / 8]) >> i % 8 & 1); };
+  for (std::size_t i = tiles; i < 8 * bits.size(); ++i) check.That(bit(i) == 0, "hidden", "a bit beyond the last tile");
+  OcclusionMask out;
+  out.tiles_x = static_cast<std::int32_t>(tiles_x);
+  out.tiles_y = static_cast<std::int32_t>(tiles_y);
+  out.hidden.resize(tiles);
+  for (std::size_t i = 0; i < tiles; ++i) out.hidden[i] = bit(i);
+  return out;
+}
+
 // ---- reports
 
 v1::Span ToProto(const Span& in) {

@@ -11,11 +11,11 @@ namespace {
 
 TEST(MakeLocalImage, IsEmptyEverywhere) {
   const LocalImage rgba = MakeLocalImage(PixelFormat::kRgba, {1, 2, 4, 4});
-  EXPECT_EQ(rgba.rgba, AlignedVector<float>(4 * 6));
+  EXPECT_EQ(rgba.rgba, PooledVector<float>(4 * 6, 0.0F));
   EXPECT_TRUE(rgba.depth.empty());
   EXPECT_TRUE(rgba.voxel.empty());
   const LocalImage depth = MakeLocalImage(PixelFormat::kDepth, {1, 2, 4, 4});
-  EXPECT_EQ(depth.depth, AlignedVector<float>(6, std::numeric_limits<float>::infinity()));
+  EXPECT_EQ(depth.depth, PooledVector<float>(6, std::numeric_limits<float>::infinity()));
   EXPECT_EQ(depth.voxel.size(), 6U);
   EXPECT_TRUE(MakeLocalImage(PixelFormat::kDepth, {3, 3, 1, 1}).rgba.empty());
 }

@@ -97,14 +97,14 @@ TEST(RunImage, RangeMayGoBeyondTheFrame) {
 
 struct Corruption {
   const char* what;
-  void (*apply)(RunImageHeader&, std::vector<std::byte>&);
+  void (*apply)(RunImageHeader&, PooledVector<std::byte>&);
   const char* message;
 };
 
-void Poke(std::vector<std::byte>& payload, std::size_t offset, std::uint32_t value) {
+void Poke(PooledVector<std::byte>& payload, std::size_t offset, std::uint32_t value) {
   std::memcpy(&payload[offset], &value, sizeof(value));
 }
-void PokeFloat(std::vector<std::byte>& payload, std::size_t offset, float value) { std::memcpy(&payload[offset], &value, sizeof(value)); }
+void PokeFloat(PooledVector<std::byte>& payload, std::size_t offset, float value) { std::memcpy(&payload[offset], &value, sizeof(value)); }
 
 // Two runs of two pixels each: (row 0, columns 1 and 2), (row 0, columns 4 and 5), in bounds of 8 x 2.
 RunImage TwoRuns(PixelFormat format) {

@@ -112,7 +112,7 @@ TEST(Combine, OpaqueHidesAndOverDoesNotCommute) {
   };
   const LocalImage opaque = one_pixel(0.75F, 1), half = one_pixel(0.25F, 0.5F);
   ExpectSameBits(Combined(opaque, half, Side::kBack), opaque);
-  EXPECT_EQ(Combined(half, opaque, Side::kBack).rgba, (AlignedVector<float>{0.625F, 0, 0, 1}));  // by hand: 0.25 + 0.5 * 0.75
+  EXPECT_EQ(Combined(half, opaque, Side::kBack).rgba, (PooledVector<float>{0.625F, 0, 0, 1}));  // by hand: 0.25 + 0.5 * 0.75
 }
 
 TEST(Combine, DepthTiesGoToTheLowerVoxelAcrossTheWrap) {

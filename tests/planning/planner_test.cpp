@@ -28,7 +28,7 @@ void ExpectSound(const FramePlan& plan, const Roster& roster) {
   // The placements of all groups are boxes in visibility order, each in the group where it belongs.
   std::map<BoxId, std::size_t> position;
   for (std::size_t i = 0; i < order.size(); ++i) position[order[i]] = i;
-  const PixelRange frame = {0, std::uint64_t(plan.setup.camera.width) * std::uint64_t(plan.setup.camera.height)};
+  const PixelRange frame = WholeFrame(plan.setup);
   for (std::size_t g = 0; g < plan.groups.size(); ++g) {
     const GroupPlan& group = plan.groups[g];
     for (std::size_t rank = 0; rank < group.placements.size(); ++rank) {
@@ -107,6 +107,7 @@ TEST(PlanFrame, TurningTheViewReversesRanksButNeverOwnership) {
   const Roster roster = FullRoster(4);
   FrameRequest request = SomeRequest();
   request.policy.groups = 3;
+  request.policy.axis = AxisChoice::kY;
   const FramePlan first = Plan(request, summary, roster);
   for (int i = 0; i < 50; ++i) {
     request.view = RandomView(random);
@@ -137,7 +138,7 @@ TEST(PlanFrame, AutomaticChoicesDoNotDependOnTheView) {
   FrameRequest request = SomeRequest();
   const Result<FramePlan> first = PlanFrame(request, 7, summary, FullRoster(2), cost);
   ASSERT_TRUE(first.ok());
-  EXPECT_EQ(first->slab_axis, Axis::kZ);  // the longest side, the higher axis of two
+  EXPECT_EQ(first->slab_axis, Axis::kZ);  // about which views turn
   EXPECT_GT(first->groups.size(), 1U);
   for (int i = 0; i < 50; ++i) {
     request.view = RandomView(random);
@@ -157,10 +158,10 @@ TEST(PlanFrame, ChoosesTheFewestGroupsWhoseSlabsStayUnderTheTarget) {
   };
   EXPECT_EQ(groups(1000, 1), 1U);  // all of it fits
   EXPECT_EQ(groups(999, 1), 2U);   // halves and their halos
-  EXPECT_EQ(groups(500 + 2 * kHaloStep, 1), 2U);
-  EXPECT_EQ(groups(500 + 2 * kHaloStep - 1, 1), 3U);
-  EXPECT_EQ(groups(250 + 2 * kHaloStep, 2), 2U);
-  EXPECT_EQ(groups(1, 1), 1000U / kHaloStep);  // not thinner than a halo
+  EXPECT_EQ(groups(500 + 2 * kHalo, 1), 2U);
+  EXPECT_EQ(groups(500 + 2 * kHalo - 1, 1), 3U);
+  EXPECT_EQ(groups(250 + 2 * kHalo, 2), 2U);
+  EXPECT_EQ(groups(1, 1), 1000U / kHalo);  // not thinner than a halo
   EXPECT_EQ(groups(1, 1000), 1U);
 }
 
@@ -210,11 +211,41 @@ TEST(PlanFrame, SetupHoldsWhatTheRequestAsksFor) {
   EXPECT_EQ(setup.description, summary.description);
   EXPECT_EQ(setup.range, summary.range);
   EXPECT_EQ(setup.renderer, RendererKind::kZBuffer);
-  EXPECT_EQ(setup.camera, MakeCamera(request.view, request.size, summary.description.geometry));
+  EXPECT_EQ(setup.camera, MakeSupersampledCamera(request.view, request.size, summary.description.geometry));
   EXPECT_EQ(setup.transfer.opacity_distance, 3);
   EXPECT_EQ(setup.shading, request.shading);
   EXPECT_EQ(setup.termination, 0.25);
-  EXPECT_EQ(setup.halo, RequiredHalo(setup.camera, summary.description.geometry));
+  EXPECT_EQ(setup.halo, kHalo);
+}
+
+// Splatting renders a grid along the slices and the display worker makes the picture of it; the Z-buffer renders the supersampled picture.
+TEST(PlanFrame, TheFrameIsWhatThePipelineRenders) {
+  FrameRequest request = SomeRequest();
+  request.view = {.azimuth_degrees = 30, .elevation_degrees = 20, .zoom = 0.2};
+  const VolumeSummary summary = FullSummary({40, 41, 42});
+  const VolumeGeometry& geometry = summary.description.geometry;
+  const FrameSetup splat = Plan(request, summary, FullRoster(2)).setup;
+  EXPECT_EQ(splat.camera, MakeCamera(request.view, request.size, geometry));
+  EXPECT_EQ(splat.sheets, MakeSheetGrid(splat.camera, geometry));
+  EXPECT_EQ(FrameBounds(splat), (PixelBounds{0, 0, splat.sheets.width, splat.sheets.height}));
+
+  request.renderer = RendererKind::kZBuffer;
+  const FrameSetup zbuffer = Plan(request, summary, FullRoster(2)).setup;
+  EXPECT_GT(zbuffer.camera.supersample, 1);
+  EXPECT_EQ(FrameBounds(zbuffer), (PixelBounds{0, 0, zbuffer.camera.width, zbuffer.camera.height}));
+  EXPECT_EQ(WholeFrame(zbuffer).end, std::uint64_t(zbuffer.camera.width) * std::uint64_t(zbuffer.camera.height));
+}
+
+// Seen obliquely, slices that lie far apart for the width of their voxels need absurdly wide images.
+TEST(PlanFrame, RefusesViewsThatCannotBeRendered) {
+  FrameRequest request = SomeRequest();
+  request.view.elevation_degrees = -50;
+  VolumeSummary summary = FullSummary({64, 64, 600});
+  EXPECT_TRUE(PlanFrame(request, 7, summary, FullRoster(1), {}).ok());
+  summary.description.geometry.spacing = {1, 1, 3000};
+  const Status status = PlanFrame(request, 7, summary, FullRoster(1), {}).status();
+  EXPECT_EQ(status.code(), StatusCode::kInvalidArgument);
+  EXPECT_NE(status.message().find("at most 131072 a side"), std::string::npos) << status.message();
 }
 
 TEST(PlanFrame, ResolvesPresets) {

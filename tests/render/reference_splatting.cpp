@@ -3,59 +3,47 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 #include "common/classification/classification_table.h"
-#include "worker/kernels/gaussian_kernel.h"
+#include "common/kernels/resample.h"
 #include "worker/kernels/phong.h"
 
 namespace slabstream::testing {
 namespace {
-
-double Apply(const std::array<double, 4>& row, const Vec3& p) { return row[0] * p.x + row[1] * p.y + row[2] * p.z + row[3]; }
 
 double Stored(const VoxelBlock& block, const Index3& v) {
   return VisitScalarType(block.type,
                          [&](auto* tag) { return double(block.samples<std::remove_cvref_t<decltype(*tag)>>()[block.Offset(v)]); });
 }
 
-// d(x, y) / d(data axis) at a data-space point.
-struct Jacobian {
-  std::array<double, 3> x{}, y{};
-};
-Jacobian JacobianAt(const Camera& camera, const Vec3& p) {
-  const double w = Apply(camera.w_row, p), x = Apply(camera.x_row, p) / w, y = Apply(camera.y_row, p) / w;
-  Jacobian j;
-  for (std::size_t i = 0; i < 3; ++i) {
-    j.x[i] = (camera.x_row[i] - x * camera.w_row[i]) / w;
-    j.y[i] = (camera.y_row[i] - y * camera.w_row[i]) / w;
+// What the voxels of one axis weigh at the pixels of the grid along it, in one slice.
+class Footprint {
+ public:
+  // A pixel is 1 / scale voxels wide and its centre lies `first_place` + pixel / scale voxels from voxel 0; `shear`: of the central ray.
+  Footprint(double shear, double scale, double first_place) : scale_(scale), first_place_(first_place) {
+    shear = std::min(std::abs(shear), 3.0);
+    sigma_ = std::sqrt(std::max(0.36 * (1 + shear * shear), 0.3 / (scale * scale)));
   }
-  return j;
-}
 
-struct Sigma {
-  double x, y;
+  double Weight(int pixel, int voxel) const {
+    const double place = first_place_ + pixel / scale_, weight = Bell(place - voxel);
+    if (weight == 0) return 0;
+    double sum = 0;
+    for (double n = std::ceil(place - 3 * sigma_); n <= place + 3 * sigma_; ++n) sum += Bell(place - n);
+    return weight / sum;
+  }
+  // Pixels that a voxel may reach.
+  int Begin(int voxel) const { return int(std::floor((voxel - 3 * sigma_ - first_place_) * scale_)); }
+  int End(int voxel) const { return int(std::ceil((voxel + 3 * sigma_ - first_place_) * scale_)) + 1; }
+
+ private:
+  double Bell(double distance) const {
+    const double d = distance / sigma_;
+    return std::abs(d) < 3 ? std::exp(-0.5 * d * d) - std::exp(-4.5) : 0;
+  }
+  double scale_, first_place_, sigma_ = 0;
 };
-Sigma FootprintOf(const FrameSetup& setup, const Index3& voxel) {
-  const bool perspective = setup.camera.projection == Projection::kPerspective;
-  Vec3 centre = ToVec3(voxel);
-  for (Axis axis : kAxes) {
-    if (axis == setup.camera.traversal_axis) continue;
-    const int first = voxel[axis] / kFootprintCell * kFootprintCell;
-    centre[axis] = 0.5 * (first + std::min(first + kFootprintCell, setup.description.geometry.size[axis]) - 1);
-  }
-  const Jacobian j = JacobianAt(setup.camera, centre);
-  double xx = 0, yy = 0, xy = 0;
-  for (std::size_t i = 0; i < 3; ++i) {
-    xx += j.x[i] * j.x[i];
-    yy += j.y[i] * j.y[i];
-    xy += j.x[i] * j.y[i];
-  }
-  const auto sigma = [&](double variance) {
-    const double s = std::sqrt(kFootprintVoxelVariance * (variance + std::abs(xy)) + kFootprintPixelVariance);
-    return perspective ? std::exp2(std::round(32 * std::log2(s)) / 32) : s;
-  };
-  return {sigma(xx), sigma(yy)};
-}
 
 }  // namespace
 
@@ -86,66 +74,69 @@ Vec3 ReferenceGradient(const Volume& volume, const Index3& voxel) {
 
 LocalImage ReferenceSplatting(const Volume& volume, const FrameSetup& setup) {
   const Camera& camera = setup.camera;
+  const SheetGrid& grid = setup.sheets;
   const Index3& size = volume.description.geometry.size;
   const Vec3& spacing = camera.spacing;
-  const Axis c = camera.traversal_axis, u = c == Axis::kX ? Axis::kY : Axis::kX, v = c == Axis::kZ ? Axis::kY : Axis::kZ;
+  const auto [c, u, v] = AxesOf(camera.traversal_axis);
   const ClassificationTable table = Classify(setup.transfer, setup.description, setup.range);
   const Phong phong(setup.shading, camera.view_direction);
-  const double central_distance = spacing[c] / std::abs(camera.view_direction[c]);
-  const double exponent = central_distance / (table.opacity_distance * std::min({spacing.x, spacing.y, spacing.z}));
+  const double voxel_length = std::min({spacing.x, spacing.y, spacing.z});
+  const Vec3 central_ray = camera.view_direction / spacing;
 
-  const std::size_t pixels = std::size_t(camera.width) * std::size_t(camera.height);
-  std::vector<std::array<double, 4>> image(pixels), sheet(pixels);
+  using Color = std::array<double, 4>;
+  std::vector<Color> image(std::size_t(grid.width) * std::size_t(grid.height)), sheet(image.size());
   for (int i = 0; i < size[c]; ++i) {
-    std::fill(sheet.begin(), sheet.end(), std::array<double, 4>{});
+    std::fill(sheet.begin(), sheet.end(), Color{});
     Index3 q;
     q[c] = camera.ascending ? i : size[c] - 1 - i;
+    const double w = grid.w_c * q[c] + grid.w_0;
+    const Footprint along_u(central_ray[u] / central_ray[c], grid.x_u / w, (0.5 * w - grid.x_c * q[c] - grid.x_0) / grid.x_u);
+    const Footprint along_v(central_ray[v] / central_ray[c], grid.y_v / w, (0.5 * w - grid.y_c * q[c] - grid.y_0) / grid.y_v);
     for (q[v] = 0; q[v] < size[v]; ++q[v]) {
       for (q[u] = 0; q[u] < size[u]; ++q[u]) {
         const double stored = Stored(volume.block, q);
         if (!std::isfinite(stored)) continue;
         const auto bin = std::size_t(table.BinOf(stored));
         if (table.opacity[bin] == 0) continue;
-        const double opacity = 1 - std::pow(1 - double(table.opacity[bin]), exponent);
+        // Between two sheets the voxel's ray travels that far.
+        const Vec3 ray = camera.projection == Projection::kPerspective ? spacing * (ToVec3(q) - camera.eye) : camera.view_direction;
+        const double distance = spacing[c] * Length(ray) / std::abs(ray[c]);
+        const double opacity = 1 - std::pow(1 - double(table.opacity[bin]), distance / (table.opacity_distance * voxel_length));
         const Vec3 gradient = ReferenceGradient(volume, q);
         const PhongFactors factors = Length(gradient) > 0 ? phong.AtNormal(Normalized(gradient)) : phong.WithoutGradient();
         const Rgb& color = table.color[bin];
-        std::array<double, 4> value = {color.r, color.g, color.b, 1};
+        Color value = {color.r, color.g, color.b, 1};
         for (std::size_t k = 0; k < 3; ++k) value[k] = opacity * std::clamp(value[k] * factors.diffuse + factors.specular, 0.0, 1.0);
         value[3] = opacity;
 
-        const Camera::ImagePoint at = camera.Project(ToVec3(q));
-        const Jacobian j = JacobianAt(camera, ToVec3(q));
-        const auto nu = std::size_t(Number(u)), nv = std::size_t(Number(v));
-        const double area = std::abs(j.x[nu] * j.y[nv] - j.x[nv] * j.y[nu]);
-        const Sigma sigma = FootprintOf(setup, q);
-        for (int y = std::max(0, int(at.y - 3 * sigma.y) - 1); y < std::min(camera.height, int(at.y + 3 * sigma.y) + 2); ++y) {
-          const double wy = GaussianWeight(y + 0.5 - at.y, sigma.y);
-          for (int x = std::max(0, int(at.x - 3 * sigma.x) - 1); x < std::min(camera.width, int(at.x + 3 * sigma.x) + 2); ++x) {
-            const double weight = area * wy * GaussianWeight(x + 0.5 - at.x, sigma.x);
-            for (std::size_t k = 0; k < 4; ++k) sheet[std::size_t(y) * std::size_t(camera.width) + std::size_t(x)][k] += weight * value[k];
+        for (int y = std::max(0, along_v.Begin(q[v])); y < std::min(grid.height, along_v.End(q[v])); ++y) {
+          const double row_weight = along_v.Weight(y, q[v]);
+          if (row_weight == 0) continue;
+          for (int x = std::max(0, along_u.Begin(q[u])); x < std::min(grid.width, along_u.End(q[u])); ++x) {
+            const double weight = row_weight * along_u.Weight(x, q[u]);
+            Color& pixel = sheet[std::size_t(y) * std::size_t(grid.width) + std::size_t(x)];
+            for (std::size_t k = 0; k < 4; ++k) pixel[k] += weight * value[k];
           }
         }
       }
     }
-    for (std::size_t p = 0; p < pixels; ++p) {
-      const std::array<double, 4>& s = sheet[p];
-      if (s[3] == 0) continue;
-      const Vec3 d =
-          spacing * camera.RayAt(double(p % std::size_t(camera.width)) + 0.5, double(p / std::size_t(camera.width)) + 0.5).direction;
-      const double alpha = std::min(s[3], 1.0), distance = spacing[c] * Length(d) / std::abs(d[c]);
-      const double corrected = 1 - std::pow(1 - alpha, distance / central_distance);
+    for (std::size_t p = 0; p < image.size(); ++p) {
       const double rest = 1 - image[p][3];
-      for (std::size_t k = 0; k < 3; ++k) image[p][k] += rest * s[k] * corrected / s[3];
-      image[p][3] += rest * corrected;
+      for (std::size_t k = 0; k < 4; ++k) image[p][k] += rest * sheet[p][k];
     }
   }
 
-  LocalImage result = MakeLocalImage(PixelFormat::kRgba, {0, 0, camera.width, camera.height});
-  for (std::size_t p = 0; p < pixels; ++p) {
+  LocalImage result = MakeLocalImage(PixelFormat::kRgba, FrameBounds(setup));
+  for (std::size_t p = 0; p < image.size(); ++p) {
     for (std::size_t k = 0; k < 4; ++k) result.rgba[4 * p + k] = float(image[p][k]);
   }
   return result;
+}
+
+LocalImage ReferencePicture(const LocalImage& frame, const FrameSetup& setup) {
+  LocalImage picture = MakeLocalImage(PixelFormat::kRgba, {0, 0, setup.camera.width, setup.camera.height});
+  ResampleRowsReference(frame, setup.sheets.from_picture, 0, setup.camera.height, picture);
+  return picture;
 }
 
 }  // namespace slabstream::testing

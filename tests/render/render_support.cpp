@@ -8,6 +8,7 @@
 #include "common/base/check.h"
 #include "common/decomposition/decomposition.h"
 #include "common/kernels/combine.h"
+#include "worker/render/finish_picture.h"
 
 namespace slabstream::testing {
 
@@ -63,11 +64,16 @@ FrameSetup MakeSetup(const Volume& volume, const SetupOptions& options) {
   setup.description = volume.description;
   setup.range = Summarize(volume).range;
   setup.renderer = options.renderer;
-  setup.camera = MakeCamera(options.view, options.size, volume.description.geometry);
+  const VolumeGeometry& geometry = volume.description.geometry;
+  if (options.renderer == RendererKind::kSplat) {
+    setup.camera = MakeCamera(options.view, options.size, geometry);
+    setup.sheets = MakeSheetGrid(setup.camera, geometry);
+  } else {
+    setup.camera = MakeSupersampledCamera(options.view, options.size, geometry);
+  }
   setup.transfer = options.transfer;
   setup.shading = options.shading;
   setup.termination = options.termination;
-  setup.halo = RequiredHalo(setup.camera, volume.description.geometry);
   return setup;
 }
 
@@ -100,7 +106,7 @@ LocalImage RenderWhole(const Volume& volume, const FrameSetup& setup) {
   const Box whole = volume.description.geometry.bounds();
   const auto slab = CutSlab(volume, whole);
   RankReport report;
-  return MakeRenderer(setup.renderer)->Render(*slab, whole, setup, std::atomic<bool>(false), report).value();
+  return MakeRenderer(setup.renderer)->Render(*slab, whole, setup, {}, std::atomic<bool>(false), report).value();
 }
 
 LocalImage RenderByBoxes(const Volume& volume, const FrameSetup& setup, const Partition& partition) {
@@ -109,10 +115,12 @@ LocalImage RenderByBoxes(const Volume& volume, const FrameSetup& setup, const Pa
     const Box& box = partition.boxes()[id];
     const auto slab = CutSlab(volume, SlabBox(box, setup));
     RankReport report;
-    Combine(frame, MakeRenderer(setup.renderer)->Render(*slab, box, setup, std::atomic<bool>(false), report).value(), Side::kBack);
+    Combine(frame, MakeRenderer(setup.renderer)->Render(*slab, box, setup, {}, std::atomic<bool>(false), report).value(), Side::kBack);
   }
   return frame;
 }
+
+LocalImage RenderPicture(const Volume& volume, const FrameSetup& setup) { return FinishPicture(RenderWhole(volume, setup), setup); }
 
 Partition CutIntoSlabs(const Volume& volume, int boxes, Axis axis) {
   const VolumeSummary summary = Summarize(volume);
@@ -158,10 +166,11 @@ std::array<float, 4> PixelOf(const LocalImage& image, int x, int y) {
   return {pixel[0], pixel[1], pixel[2], pixel[3]};
 }
 
-float LargestDifference(const LocalImage& a, const LocalImage& b, const Camera& camera) {
+float LargestDifference(const LocalImage& a, const LocalImage& b) {
   float largest = 0;
-  for (int y = 0; y < camera.height; ++y) {
-    for (int x = 0; x < camera.width; ++x) {
+  const PixelBounds bounds = Union(a.bounds, b.bounds);
+  for (int y = bounds.y_begin; y < bounds.y_end; ++y) {
+    for (int x = bounds.x_begin; x < bounds.x_end; ++x) {
       const auto pa = PixelOf(a, x, y), pb = PixelOf(b, x, y);
       for (std::size_t c = 0; c < 4; ++c) {
         const float difference = std::abs(pa[c] - pb[c]);

@@ -42,19 +42,21 @@ ViewParameters RandomView(Projection projection, std::mt19937& random);
 // The voxels of `box`, which lies in the volume.
 std::unique_ptr<SlabData> CutSlab(const Volume& volume, const Box& box);
 
-// The whole volume as one box.
+// The frame, of the whole volume as one box.
 LocalImage RenderWhole(const Volume& volume, const FrameSetup& setup);
 // Each box of the partition from its own slab, combined in visibility order.
 LocalImage RenderByBoxes(const Volume& volume, const FrameSetup& setup, const Partition& partition);
+// The picture, of the whole volume as one box.
+LocalImage RenderPicture(const Volume& volume, const FrameSetup& setup);
 
 // `boxes` slabs along an axis (fewer where there are not as many slices).
 Partition CutIntoSlabs(const Volume& volume, int boxes, Axis axis);
 // A kd-tree with `boxes` leaves cut at random places.
 Partition CutAtRandom(const Box& bounds, int boxes, std::mt19937& random);
 
-// Four channels of a pixel of the frame; zeros outside the image's bounds.
+// Four channels of a pixel; zeros outside the image's bounds.
 std::array<float, 4> PixelOf(const LocalImage& image, int x, int y);
-// Largest difference of any channel of any pixel of the frame.
-float LargestDifference(const LocalImage& a, const LocalImage& b, const Camera& camera);
+// Largest difference of any channel of any pixel of either image.
+float LargestDifference(const LocalImage& a, const LocalImage& b);
 
 }  // namespace slabstream::testing

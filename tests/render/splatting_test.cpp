@@ -1,10 +1,13 @@
 // The splatting pipeline against its definition and against analytic truth.
 #include <gtest/gtest.h>
+#include <tbb/task_arena.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/render/reference_splatting.h"
 #include "tests/render/render_support.h"
+#include "worker/render/finish_picture.h"
 
 namespace slabstream {
 namespace {
@@ -13,8 +16,17 @@ using namespace slabstream::testing;  // NOLINT(google-build-using-namespace): t
 
 constexpr Projection kProjections[] = {Projection::kOrthographic, Projection::kPerspective};
 
-// Tables of footprint phases and normal codes are what the pipeline has and the definition has not.
+// Tables of footprints, opacities and normal codes are what the pipeline has and the definition has not.
 constexpr float kTableError = 0.012F;
+
+// Frame and picture.
+void ExpectIsItsDefinition(const Volume& volume, const FrameSetup& setup) {
+  const LocalImage frame = RenderWhole(volume, setup), expected = ReferenceSplatting(volume, setup);
+  EXPECT_FALSE(frame.bounds.empty());
+  EXPECT_TRUE(FrameBounds(setup).Contains(frame.bounds));
+  EXPECT_LT(LargestDifference(frame, expected), kTableError);
+  EXPECT_LT(LargestDifference(FinishPicture(frame, setup), ReferencePicture(expected, setup)), kTableError);
+}
 
 TEST(Splatting, IsItsDefinition) {
   unsigned seed = 1;
@@ -29,11 +41,24 @@ TEST(Splatting, IsItsDefinition) {
         options.transfer = Ramp(0.3);
         options.shading.phong = type != ScalarType::kUint16;
         options.shading.lights = {{1, 2, 3}, {-1, 0, 0.5}};
-        const FrameSetup setup = MakeSetup(volume, options);
-        const LocalImage image = RenderWhole(volume, setup);
-        EXPECT_LT(LargestDifference(image, ReferenceSplatting(volume, setup), setup.camera), kTableError);
-        EXPECT_FALSE(image.bounds.empty());
+        ExpectIsItsDefinition(volume, MakeSetup(volume, options));
       }
+    }
+  }
+}
+
+// Footprints as wide as the grid's pixels at one end, at the finest grid at the other.
+TEST(Splatting, IsItsDefinitionAtEveryZoom) {
+  const unsigned seed = 20;
+  std::mt19937 random(seed);
+  const Volume volume = MakeBlobs({{19, 26, 23}, {1, 1, 1.5}}, ScalarType::kUint8, seed);
+  for (Projection projection : kProjections) {
+    for (double zoom : {0.1, 0.25, 0.6, 2.0, 8.0, 40.0}) {
+      SCOPED_TRACE(::testing::Message() << "seed " << seed << " zoom " << zoom);
+      SetupOptions options;
+      options.view = RandomView(projection, random);
+      options.view.zoom = zoom;
+      ExpectIsItsDefinition(volume, MakeSetup(volume, options));
     }
   }
 }
@@ -72,7 +97,7 @@ TEST(Splatting, HomogeneousBlockLooksTheSameFromEverySide) {
         options.view.zoom = 1.5;
         options.transfer = Uniform(kOpacity, {1, 1, 1});
         const FrameSetup setup = MakeSetup(block, options);
-        const LocalImage image = RenderWhole(block, setup);
+        const LocalImage image = RenderPicture(block, setup);
         const double voxel_length = std::min({spacing.x, spacing.y, spacing.z});
         for (int y = 0; y < setup.camera.height; ++y) {
           for (int x = 0; x < setup.camera.width; ++x) {
@@ -102,7 +127,7 @@ TEST(Splatting, HasNoHolesAtAnyZoom) {
       options.view.zoom = zoom;
       options.transfer = Uniform(0.1, {1, 1, 1});
       const FrameSetup setup = MakeSetup(block, options);
-      const LocalImage image = RenderWhole(block, setup);
+      const LocalImage image = RenderPicture(block, setup);
       for (int y = 1; y + 1 < setup.camera.height; ++y) {
         for (int x = 1; x + 1 < setup.camera.width; ++x) {
           if (LengthInside(setup, x, y, 5) == 0) continue;
@@ -122,11 +147,14 @@ TEST(Splatting, TerminationChangesNothingAboveItsThreshold) {
     options.view.projection = projection;
     options.view.azimuth_degrees = 70;
     options.transfer = Ramp(0.9);
-    const LocalImage exact = RenderWhole(volume, MakeSetup(volume, options));
+    const FrameSetup unlimited = MakeSetup(volume, options);
+    const LocalImage exact = RenderWhole(volume, unlimited);
     for (double threshold : {1.0 / 1024, 0.05, 0.5}) {
       options.termination = threshold;
       const FrameSetup setup = MakeSetup(volume, options);
-      EXPECT_LE(LargestDifference(RenderWhole(volume, setup), exact, setup.camera), threshold + 1e-6);
+      const LocalImage frame = RenderWhole(volume, setup);
+      EXPECT_LE(LargestDifference(frame, exact), threshold + 1e-6);
+      EXPECT_LE(LargestDifference(FinishPicture(frame, setup), FinishPicture(exact, unlimited)), threshold + 1e-6);
     }
   }
 }
@@ -141,9 +169,75 @@ TEST(Splatting, TerminationSkipsVoxelsBehindAnOpaqueFront) {
   const FrameSetup setup = MakeSetup(block, options);
   const auto slab = CutSlab(block, block.block.box);
   RankReport report;
-  ASSERT_TRUE(MakeRenderer(RendererKind::kSplat)->Render(*slab, block.block.box, setup, std::atomic<bool>(false), report).ok());
+  ASSERT_TRUE(MakeRenderer(RendererKind::kSplat)->Render(*slab, block.block.box, setup, {}, std::atomic<bool>(false), report).ok());
   EXPECT_EQ(report.occupied_voxels, 48U * 48 * 48);
   EXPECT_LT(report.drawn_voxels, report.occupied_voxels / 2);
+}
+
+// Pixels outside of hidden tiles are the same bits; what is hidden wholly costs nothing.
+TEST(Splatting, HiddenTilesChangeNothingElse) {
+  const unsigned seed = 30;
+  std::mt19937 random(seed);
+  const Volume volume = MakeBlobs({{50, 45, 40}, {1, 1, 1}}, ScalarType::kUint8, seed);
+  const Box box = volume.block.box;
+  for (Projection projection : kProjections) {
+    for (double part : {0.1, 0.6, 1.0}) {
+      SCOPED_TRACE(::testing::Message() << "seed " << seed << " hidden " << part);
+      SetupOptions options;
+      options.view = RandomView(projection, random);
+      options.size = {90, 80};
+      const FrameSetup setup = MakeSetup(volume, options);
+      OcclusionMask mask;
+      mask.tiles_x = (setup.sheets.width + kOcclusionTile - 1) / kOcclusionTile;
+      mask.tiles_y = (setup.sheets.height + kOcclusionTile - 1) / kOcclusionTile;
+      std::bernoulli_distribution hidden(part);
+      for (std::int32_t i = 0; i < mask.tiles_x * mask.tiles_y; ++i) mask.hidden.push_back(hidden(random) ? 1 : 0);
+      const LocalImage whole = RenderWhole(volume, setup);
+      const auto slab = CutSlab(volume, box);
+      RankReport report;
+      const LocalImage masked =
+          MakeRenderer(RendererKind::kSplat)->Render(*slab, box, setup, mask, std::atomic<bool>(false), report).value();
+      for (int y = 0; y < setup.sheets.height; ++y) {
+        for (int x = 0; x < setup.sheets.width; ++x) {
+          if (!mask.Hides(x, y)) {
+            ASSERT_EQ(PixelOf(masked, x, y), PixelOf(whole, x, y)) << x << ' ' << y;
+          }
+        }
+      }
+      if (part == 1) {
+        EXPECT_EQ(report.drawn_voxels, 0U);
+      }
+    }
+  }
+}
+
+TEST(Splatting, IsTheSameBitsForAnyNumberOfThreads) {
+  const unsigned seed = 31;
+  std::mt19937 random(seed);
+  const Volume volume = MakeBlobs({{60, 70, 50}, {1, 1, 1.2}}, ScalarType::kUint8, seed);
+  for (Projection projection : kProjections) {
+    SetupOptions options;
+    options.view = RandomView(projection, random);
+    options.size = {200, 180};  // several bands of rows
+    options.termination = 1.0 / 1024;
+    const FrameSetup setup = MakeSetup(volume, options);
+    LocalImage frame, picture;
+    for (int threads : {1, 2, 3, 4}) {
+      tbb::task_arena arena(threads);
+      LocalImage other_frame, other_picture;
+      arena.execute([&] {
+        other_frame = RenderWhole(volume, setup);
+        other_picture = FinishPicture(other_frame, setup);
+      });
+      if (threads == 1) {
+        frame = other_frame, picture = other_picture;
+        continue;
+      }
+      EXPECT_EQ(other_frame.bounds, frame.bounds);
+      EXPECT_TRUE(std::ranges::equal(other_frame.rgba, frame.rgba)) << "seed " << seed << " threads " << threads;
+      EXPECT_TRUE(std::ranges::equal(other_picture.rgba, picture.rgba)) << "seed " << seed << " threads " << threads;
+    }
+  }
 }
 
 TEST(Splatting, DrawsThinAndTinyVolumes) {
@@ -156,11 +250,8 @@ TEST(Splatting, DrawsThinAndTinyVolumes) {
         options.view.azimuth_degrees = azimuth;
         options.view.elevation_degrees = 25;
         options.transfer = Uniform(0.5, {1, 0.5F, 0.25F});
-        const FrameSetup setup = MakeSetup(volume, options);
-        const LocalImage image = RenderWhole(volume, setup);
-        EXPECT_FALSE(image.bounds.empty());
-        EXPECT_LT(LargestDifference(image, ReferenceSplatting(volume, setup), setup.camera), kTableError)
-            << size.x << ' ' << size.y << ' ' << size.z;
+        SCOPED_TRACE(::testing::Message() << size.x << ' ' << size.y << ' ' << size.z << " azimuth " << azimuth);
+        ExpectIsItsDefinition(volume, MakeSetup(volume, options));
       }
     }
   }
@@ -180,8 +271,8 @@ TEST(Splatting, DrawsAtTheLargestZoom) {
     for (auto* row : {&setup.camera.x_row, &setup.camera.y_row}) {
       for (std::size_t i = 0; i < 4; ++i) (*row)[i] = 600 * ((*row)[i] - 12 * setup.camera.w_row[i]) + 12 * setup.camera.w_row[i];
     }
-    const LocalImage image = RenderWhole(block, setup);
-    EXPECT_NEAR(PixelOf(image, 12, 12)[3], 1 - std::pow(0.8, 3), 0.05);
+    setup.sheets = MakeSheetGrid(setup.camera, block.description.geometry);
+    EXPECT_NEAR(PixelOf(RenderPicture(block, setup), 12, 12)[3], 1 - std::pow(0.8, 3), 0.05);
   }
 }
 
@@ -193,8 +284,8 @@ TEST(Splatting, SamplesThatAreNotFiniteAreEmpty) {
   SetupOptions options;
   options.transfer = Uniform(0.5, {1, 1, 1});
   options.shading.phong = false;
-  FrameSetup setup = MakeSetup(empty, options);
-  EXPECT_EQ(LargestDifference(RenderWhole(holed, setup), RenderWhole(empty, setup), setup.camera), 0);
+  const FrameSetup setup = MakeSetup(empty, options);
+  EXPECT_EQ(LargestDifference(RenderWhole(holed, setup), RenderWhole(empty, setup)), 0);
 }
 
 }  // namespace

@@ -146,16 +146,20 @@ class SlabServerTest : public testing::Test {
 
 TEST_F(SlabServerTest, ChunksPutTogetherAreTheBox) {
   const Box box = volume_->block.box;
-  std::vector<std::byte> samples(std::size_t(box.voxel_count()));
-  for (std::uint32_t i = 0; i < ChunkCount(box, ScalarType::kUint8); ++i) {
-    Bytes payload;
-    const AnyMessage answer = Ask({.epoch = kEpoch, .worker = 1, .dataset = 5, .box = box, .chunk = i}, &payload);
-    const auto* chunk = std::get_if<Chunk>(&answer);
-    ASSERT_NE(chunk, nullptr) << NameOf(answer);
-    const Status status = UnpackChunk(*chunk, payload.span(), std::span(samples).subspan(std::size_t{i} * kChunkBytes, chunk->raw_bytes));
-    ASSERT_TRUE(status.ok()) << status.message();
+  server_->Publish(6, std::make_shared<const BrickedVoxels>(volume_->block));
+  for (DatasetId dataset : {5U, 6U}) {
+    std::vector<Bytes> payloads;
+    std::vector<std::byte> samples(std::size_t(box.voxel_count()));
+    for (std::uint32_t i = 0; i < ChunkCount(box, ScalarType::kUint8); ++i) {
+      Bytes& payload = payloads.emplace_back();  // all are kept: none may change when others are asked for
+      const AnyMessage answer = Ask({.epoch = kEpoch, .worker = 1, .dataset = dataset, .box = box, .chunk = i}, &payload);
+      const auto* chunk = std::get_if<Chunk>(&answer);
+      ASSERT_NE(chunk, nullptr) << NameOf(answer);
+      const Status status = UnpackChunk(*chunk, payload.span(), std::span(samples).subspan(std::size_t{i} * kChunkBytes, chunk->raw_bytes));
+      ASSERT_TRUE(status.ok()) << status.message();
+    }
+    EXPECT_EQ(std::memcmp(samples.data(), volume_->block.bytes.data(), samples.size()), 0) << "dataset " << dataset;
   }
-  EXPECT_EQ(std::memcmp(samples.data(), volume_->block.bytes.data(), samples.size()), 0);
 }
 
 TEST_F(SlabServerTest, RequestsThatCannotBeMetAreRefusedWithTheReason) {

@@ -5,6 +5,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
+#include <optional>
 #include <thread>
 
 #include "tests/service/pictures.h"
@@ -14,9 +17,10 @@ namespace {
 
 using std::chrono::seconds;
 
-EmbeddedOptions OptionsFor(std::shared_ptr<const Volume> volume, int workers) {
+EmbeddedOptions OptionsFor(std::shared_ptr<const Volume> volume, int workers, int threads = 1) {
   EmbeddedOptions options;
   options.workers = workers;
+  options.worker.threads = std::uint32_t(threads);
   options.coordinator.catalogue["ball"] = [volume]() -> Result<std::shared_ptr<const Volume>> { return volume; };
   options.coordinator.catalogue["broken"] = []() -> Result<std::shared_ptr<const Volume>> { return Status::DataLoss("file ends early"); };
   return options;
@@ -24,8 +28,8 @@ EmbeddedOptions OptionsFor(std::shared_ptr<const Volume> volume, int workers) {
 
 class EmbeddedServiceTest : public testing::Test {
  protected:
-  void Start(int workers) {
-    auto started = EmbeddedService::Start(context_, OptionsFor(volume_, workers));
+  void Start(int workers, int threads = 1) {
+    auto started = EmbeddedService::Start(context_, OptionsFor(volume_, workers, threads));
     ASSERT_TRUE(started.ok()) << started.status().message();
     service_ = std::move(*started);
   }
@@ -63,6 +67,80 @@ TEST_F(EmbeddedServiceTest, PictureIsThatOfOneRendererForAnyWorkersAndGroups) {
       }
     }
   }
+}
+
+// What the boxes of groups 2 and later draw if nobody tells them what the groups in front hide.
+std::uint64_t DrawnBehindWithoutMasks(const FrameRequest& request, const Volume& volume, std::uint32_t workers) {
+  Roster roster;
+  for (WorkerId worker = 1; worker <= workers; ++worker) roster.slots.push_back(worker);
+  const FramePlan plan = PlanFrame(request, 1, Summarize(volume), roster, CostModel{}).value();
+  VoxelBlock copy = MakeVoxelBlock(volume.block.box, volume.block.type);
+  copy.bytes = volume.block.bytes;
+  SlabData slab(std::move(copy));
+  const std::atomic<bool> cancelled = false;
+  RankReport report;
+  for (std::size_t group = 2; group < plan.groups.size(); ++group) {
+    for (const Placement& placement : plan.groups[group].placements) {
+      EXPECT_TRUE(MakeRenderer(request.renderer)->Render(slab, placement.box, plan.setup, {}, cancelled, report).ok());
+    }
+  }
+  return report.drawn_voxels;
+}
+
+// The first two groups are handed out together; each later one is told what those in front of it hide, but the one right before it.
+TEST_F(EmbeddedServiceTest, GroupsLeaveOutWhatThoseInFrontHide) {
+  auto block = std::make_shared<Volume>(*TestSphere(64));
+  std::ranges::fill(block->block.bytes, std::byte{255});
+  volume_ = block;
+  FrameRequest request = TestRequest(RendererKind::kSplat, 30, 6);
+  request.view.elevation_degrees = 70;  // slabs are behind each other
+  request.size = {200, 200};
+  std::get<TransferFunction>(request.transfer.choice).opacities = {{0, 0.9, 0.5, 0}};
+  for (const int workers : {1, 2, 3}) {
+    for (const bool close : {false, true}) {
+      SCOPED_TRACE(testing::Message() << workers << " workers, close " << close);
+      Start(workers);
+      Client client = Connect();
+      request.view.zoom = close ? 4 : 1;
+      const FrameStatistics statistics = ExpectRightPicture(client, request);
+      std::uint64_t drawn = 0, fetched = 0;
+      for (const RankReport& report : statistics.reports) {
+        drawn += report.group >= 2 ? report.drawn_voxels : 0;
+        fetched += report.group >= 2 ? report.voxel_bytes : 0;
+      }
+      if (close) {  // the block's front fills the picture
+        EXPECT_EQ(drawn, 0U);
+        EXPECT_EQ(fetched, 0U);
+      } else {
+        EXPECT_LT(drawn, DrawnBehindWithoutMasks(request, *volume_, std::uint32_t(workers)) * 2 / 3);
+      }
+    }
+  }
+}
+
+TEST_F(EmbeddedServiceTest, ThreadsAndWorkersGiveTheSamePicture) {
+  for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
+    const FrameRequest request = TestRequest(renderer, 200, 1);
+    std::optional<Picture> first;
+    const auto difference = [&](int workers, int threads) {
+      Start(workers, threads);
+      Client client = Connect();
+      Picture picture = client.Render(request, seconds(60)).value();
+      if (!first) first = picture;
+      return LargestDifference(first->image, picture.image, request.size);
+    };
+    SCOPED_TRACE(testing::Message() << "renderer " << int(renderer));
+    for (const int threads : {1, 2, 3}) EXPECT_EQ(difference(1, threads), 0) << threads << " threads";
+    EXPECT_LE(difference(2, 1), AllowedDifference(request));
+    EXPECT_LE(difference(2, 3), AllowedDifference(request));
+  }
+}
+
+TEST_F(EmbeddedServiceTest, StatusTellsTheThreadsOfWorkers) {
+  Start(2, 3);
+  const StatusReply status = Connect().QueryStatus().value();
+  ASSERT_EQ(status.workers.size(), 2U);
+  for (const WorkerStatus& worker : status.workers) EXPECT_EQ(worker.threads, 3U);
 }
 
 TEST_F(EmbeddedServiceTest, SecondFrameMovesNoVoxels) {
@@ -252,6 +330,17 @@ TEST(EmbeddedServiceOptions, WorkerCountIsChecked) {
   const auto started = EmbeddedService::Start(context, std::move(options));
   EXPECT_EQ(started.status().code(), StatusCode::kInvalidArgument);
   EXPECT_THAT(started.status().message(), testing::HasSubstr("[1, 256]"));
+}
+
+TEST(EmbeddedServiceOptions, ThreadCountIsChecked) {
+  Context context;
+  EmbeddedOptions options;
+  for (const std::uint32_t threads : {0U, 1025U}) {
+    options.worker.threads = threads;
+    const auto started = EmbeddedService::Start(context, options);
+    EXPECT_EQ(started.status().code(), StatusCode::kInvalidArgument);
+    EXPECT_THAT(started.status().message(), testing::StrEq("threads " + std::to_string(threads) + " is out of range [1, 1024]"));
+  }
 }
 
 }  // namespace

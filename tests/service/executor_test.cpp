@@ -60,7 +60,7 @@ class ExecutorTest : public testing::Test {
 
   Mailbox<ExecutorOutput> outbox_;
   std::vector<ExecutorOutput> outputs_;
-  Executor executor_{outbox_, Codec::kZstd};
+  Executor executor_{outbox_, Codec::kZstd, 2};
 };
 
 TEST_F(ExecutorTest, ImagesCombineInOrderAndSourcesStayAsTheyAre) {
@@ -102,10 +102,42 @@ TEST_F(ExecutorTest, DamagedRunsAreRefused) {
   EXPECT_FLOAT_EQ(PixelAt(PixelsOf(1), 7, 3).rgba[3], 0.5F) << "the image is as it was";
 }
 
+TEST_F(ExecutorTest, HiddenTilesAreThoseOfWhatWasCombinedBefore) {
+  FrameSetup setup;
+  setup.sheets.width = 40;  // 3 x 1 tiles
+  setup.sheets.height = 8;
+  const auto shared = std::make_shared<const FrameSetup>(setup);
+  const PixelBounds frame = FrameBounds(setup);
+  const auto combine = [&](const PixelBounds& bounds, float alpha) {
+    RunImage runs = EncodeRuns(Filled(bounds, alpha), WholeFrame(setup), frame.width());
+    executor_.Perform(StartCombine{.key = kKey, .image = 1, .header = runs.header, .payload = Bytes(std::move(runs.payload))}, frame);
+  };
+  combine({0, 0, 20, 8}, 1);
+  executor_.Perform(FindHidden{kKey, 1, shared, {}});
+  combine({30, 0, 40, 8}, 1);
+  executor_.Perform(FindHidden{kKey, 1, shared, {}});
+  EXPECT_TRUE(NextEvent<CombineDone>().status.ok());
+  const auto first = NextEvent<HiddenFound>();
+  EXPECT_EQ(first.image, 1U);
+  EXPECT_EQ(first.key, kKey);
+  EXPECT_EQ(first.hidden, (OcclusionMask{3, 1, {1, 0, 0}}));
+  EXPECT_TRUE(NextEvent<CombineDone>().status.ok());
+  EXPECT_EQ(NextEvent<HiddenFound>().hidden, (OcclusionMask{3, 1, {1, 0, 1}}));
+}
+
+TEST_F(ExecutorTest, AnImageWithDepthHidesNothing) {
+  EXPECT_TRUE(CombineIncoming(1, MakeLocalImage(PixelFormat::kDepth, {0, 0, 8, 4}), Side::kBack).status.ok());
+  executor_.Perform(FindHidden{kKey, 1, std::make_shared<const FrameSetup>(), {}});
+  EXPECT_TRUE(NextEvent<HiddenFound>().hidden.empty());
+}
+
 TEST_F(ExecutorTest, FinishedFrameIsResolvedAndPacked) {
   EXPECT_TRUE(CombineIncoming(1, Filled({2, 0, 8, 4}, 0.5F), Side::kBack).status.ok());
-  executor_.Perform(
-      SendFrame{.message = {.epoch = 1, .worker = 1, .frame = 3, .attempt = 1, .groups_done = 1}, .image = 1, .supersample = 2});
+  FrameSetup setup{.renderer = RendererKind::kZBuffer};
+  setup.camera.supersample = 2;
+  executor_.Perform(SendFrame{.message = {.epoch = 1, .worker = 1, .frame = 3, .attempt = 1, .groups_done = 1},
+                              .image = 1,
+                              .setup = std::make_shared<const FrameSetup>(setup)});
   const auto sent = std::get<OutgoingFrame>(Next());
   const AnyMessage message = Decode(sent.header).value();
   const auto& frame = std::get<FrameImage>(message);

@@ -209,7 +209,8 @@ TEST_F(MultiProcessTest, BadArgumentsAreRefusedWithExitStatusTwo) {
   EXPECT_EQ(run({SLABSTREAM_COORDINATOR_PROGRAM, "--listen", "tcp://0.0.0.0:*"}), 2);
   EXPECT_EQ(run({SLABSTREAM_COORDINATOR_PROGRAM, "--listen", "tcp://127.0.0.1:*", "--data", "ball=/missing.nrrd"}), 2);
   EXPECT_EQ(run({SLABSTREAM_WORKER_PROGRAM, "--coordinator", "elsewhere"}), 2);
-  EXPECT_EQ(run({SLABSTREAM_WORKER_PROGRAM, "--coordinator", "tcp://127.0.0.1:1", "--threads", "2"}), 2);
+  EXPECT_EQ(run({SLABSTREAM_WORKER_PROGRAM, "--coordinator", "tcp://127.0.0.1:1", "--threads", "0"}), 2);
+  EXPECT_EQ(run({SLABSTREAM_WORKER_PROGRAM, "--coordinator", "tcp://127.0.0.1:1", "--threads", "1025"}), 2);
   EXPECT_EQ(run({SLABSTREAM_WORKER_PROGRAM}), 2);
   EXPECT_EQ(run({SLABSTREAM_COORDINATOR_PROGRAM, "--log-level", "loud"}), 2);
 }

@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "client/client.h"
-#include "common/image/resolve.h"
 #include "common/planning/frame_plan.h"
 #include "common/volume/sphere.h"
 #include "common/volume/summary.h"
+#include "worker/render/finish_picture.h"
 #include "worker/render/pipeline.h"
 
 namespace slabstream {
@@ -45,9 +45,9 @@ inline LocalImage RenderDirectly(const FrameRequest& request, const Volume& volu
   SlabData slab(std::move(copy));
   const std::atomic<bool> cancelled = false;
   RankReport report;
-  Result<LocalImage> image = MakeRenderer(request.renderer)->Render(slab, volume.block.box, plan->setup, cancelled, report);
+  Result<LocalImage> image = MakeRenderer(request.renderer)->Render(slab, volume.block.box, plan->setup, {}, cancelled, report);
   CHECK(image.ok()) << image.status().message();
-  return Resolve(std::move(*image), plan->setup.camera.supersample);
+  return FinishPicture(*std::move(image), plan->setup);
 }
 
 struct PixelValue {

@@ -43,10 +43,17 @@ inline SymbolicImage UnpackSymbols(const Bytes& payload) {
 
 class SymbolicImages {
  public:
-  // StartRender, done: all `pixel_count` pixels show the box.
-  void Render(ImageHandle image, BoxId box, std::uint64_t pixel_count) {
+  // StartRender, done: all `pixel_count` pixels show the box, but for those that `hidden(i)` says are left out.
+  template <class Hidden>
+  void Render(ImageHandle image, BoxId box, std::uint64_t pixel_count, Hidden&& hidden) {
     EXPECT_TRUE(NameIsNew(image)) << "image " << image << " is named twice";
-    for (std::uint64_t i = 0; i < pixel_count; ++i) images_[image][i] = {box};
+    SymbolicImage& pixels = images_[image];
+    for (std::uint64_t i = 0; i < pixel_count; ++i) {
+      if (!hidden(i)) pixels.emplace_hint(pixels.end(), i, SymbolicPixel{box});
+    }
+  }
+  void Render(ImageHandle image, BoxId box, std::uint64_t pixel_count) {
+    Render(image, box, pixel_count, [](std::uint64_t) { return false; });
   }
   // StartRender, failed or cancelled: the name is used up all the same.
   void FailRender(ImageHandle image) {

@@ -74,7 +74,6 @@ TEST(AnyMessage, LargestRequestFitsTheClientPlane) {
 
 TEST(AnyMessage, ManyRanksSurvive) {
   GroupAssignment message = Samples<GroupAssignment>().front();
-  const std::uint64_t pixels = std::uint64_t(message.setup.camera.width) * std::uint64_t(message.setup.camera.height);
   const Box box = message.group.placements.front().box;
   message.group.placements.clear();
   message.peers = {{message.display, "inproc://display"}};
@@ -83,7 +82,7 @@ TEST(AnyMessage, ManyRanksSurvive) {
     message.group.placements.push_back({rank, box, rank + 1});
     message.peers.push_back({rank + 1, "inproc://worker"});
   }
-  message.group.schedule = MakeFanIn({kRanks, 0, {0, pixels}});
+  message.group.schedule = MakeFanIn({kRanks, 0, WholeFrame(message.setup)});
   EXPECT_TRUE(DecodeAnyInput(Encode(message)));
 }
 

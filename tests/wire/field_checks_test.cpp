@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <functional>
 #include <string>
 #include <vector>
@@ -70,6 +72,7 @@ TEST(FieldChecks, Groups) {
   const auto group = [](E& e) { return e.mutable_group_assignment(); };
   const auto setup = [](E& e) { return e.mutable_group_assignment()->mutable_setup(); };
   const auto camera = [](E& e) { return e.mutable_group_assignment()->mutable_setup()->mutable_camera(); };
+  const auto sheets = [](E& e) { return e.mutable_group_assignment()->mutable_setup()->mutable_sheets(); };
   const auto plan = [](E& e) { return e.mutable_group_assignment()->mutable_group(); };
   const auto schedule = [](E& e) { return e.mutable_group_assignment()->mutable_group()->mutable_schedule(); };
   Check<GroupAssignment>({
@@ -98,6 +101,23 @@ TEST(FieldChecks, Groups) {
       {[&](E& e) { camera(e)->set_height(16385 * camera(e)->supersample()); }, "GroupAssignment.setup.camera.height: "},
       {[&](E& e) { camera(e)->mutable_up()->set_x(camera(e)->up().x() + 2); }, "GroupAssignment.setup.camera.up: not a unit vector"},
       {[&](E& e) { camera(e)->mutable_spacing()->set_x(-1); }, "GroupAssignment.setup.camera.spacing.x: -1 is not a finite number above 0"},
+      {[&](E& e) { setup(e)->clear_sheets(); }, "GroupAssignment.setup.sheets.x_u: 0 is not in [1e-12, 1e+12]"},
+      {[&](E& e) { sheets(e)->set_width(0); }, "GroupAssignment.setup.sheets.width: 0 is not in [8, 131072]"},
+      {[&](E& e) { sheets(e)->set_width(131080); }, "GroupAssignment.setup.sheets.width: 131080 is not in [8, 131072]"},
+      {[&](E& e) { sheets(e)->set_width(sheets(e)->width() + 4); }, "GroupAssignment.setup.sheets.width: not a multiple of 8"},
+      {[&](E& e) { sheets(e)->set_height(0); }, "GroupAssignment.setup.sheets.height: 0 is not in [1, 131072]"},
+      {[&](E& e) { sheets(e)->set_y_v(-1); }, "GroupAssignment.setup.sheets.y_v: -1 is not in [1e-12, 1e+12]"},
+      {[&](E& e) { sheets(e)->set_x_0(NAN); }, "GroupAssignment.setup.sheets.x_0: NaN is not in [-1e+12, 1e+12]"},
+      {[&](E& e) { sheets(e)->set_w_c(-1); }, "GroupAssignment.setup.sheets: a slice lies behind the eye"},
+      {[&](E& e) { sheets(e)->set_x_u(1e-6); }, "GroupAssignment.setup.sheets: footprints reach beyond the halo"},
+      {[&](E& e) { sheets(e)->set_y_v(1e3); }, "GroupAssignment.setup.sheets: a voxel is wider than 24 pixels"},
+      {[&](E& e) { sheets(e)->mutable_from_picture()->RemoveLast(); }, "GroupAssignment.setup.sheets.from_picture: 8 values, expected 9"},
+      {[&](E& e) { sheets(e)->set_from_picture(4, INFINITY); }, "GroupAssignment.setup.sheets.from_picture[4]: inf is not a finite number"},
+      {[&](E& e) {
+         sheets(e)->set_width(8);
+         sheets(e)->set_height(1);
+       },
+       "GroupAssignment.group: schedule"},  // of more pixels than the frame
       {[&](E& e) { plan(e)->mutable_placements(2)->mutable_box()->mutable_end()->set_z(317); },
        "GroupAssignment.group.placements[2].box: not inside the volume"},
       {[&](E& e) { plan(e)->mutable_placements(0)->mutable_box()->mutable_end()->set_y(0); },
@@ -116,6 +136,49 @@ TEST(FieldChecks, Groups) {
       {[&](E& e) { schedule(e)->mutable_steps(0)->mutable_pixels()->set_end(~std::uint64_t{0}); },
        "GroupAssignment.group.schedule.steps[0].pixels.end: 18446744073709551615 is not in [0, 281474976710656]"},
       {[&](E& e) { schedule(e)->mutable_steps()->RemoveLast(); }, "GroupAssignment.group: schedule"},
+  });
+}
+
+TEST(FieldChecks, HiddenTiles) {
+  constexpr std::size_t kWithMask = 3, kZBuffer = 1;  // of the assignments' samples
+  const std::vector<GroupAssignment> samples = Samples<GroupAssignment>();
+  const std::int32_t tiles_x = samples[kWithMask].hidden.tiles_x, tiles_y = samples[kWithMask].hidden.tiles_y;
+  ASSERT_GT(std::min(tiles_x, tiles_y), 1);
+  const auto error = [](GroupAssignment message, std::size_t other_tiles_x = 0) {
+    if (other_tiles_x != 0) message.hidden = {std::int32_t(other_tiles_x), 1, std::vector<std::uint8_t>(other_tiles_x)};
+    return Decode(Encode(message)).status().message();
+  };
+  EXPECT_EQ(error(samples[kWithMask]), "");
+  EXPECT_EQ(error(samples[kWithMask], std::size_t(tiles_x)), "GroupAssignment.hidden: " + std::to_string(tiles_x) +
+                                                                 " x 1 tiles, but the frame has " + std::to_string(tiles_x) + " x " +
+                                                                 std::to_string(tiles_y));
+  GroupAssignment without_termination = samples[kWithMask];
+  without_termination.setup.termination = 0;
+  EXPECT_EQ(error(without_termination), "GroupAssignment.hidden: a mask in a frame that uses none");
+  EXPECT_EQ(error(samples[kZBuffer], 40), "GroupAssignment.hidden: a mask in a frame that uses none");
+  GroupAssignment first = samples[kWithMask];
+  first.key.group = first.first_group = 0;
+  EXPECT_EQ(error(first), "GroupAssignment.hidden: a mask for the first group, in front of which there is nothing");
+
+  // 5 x 3 tiles: 15 bits in 2 bytes.
+  const auto mask = [](v1::Envelope& e) {
+    v1::OcclusionMask* hidden = e.mutable_group_done()->mutable_hidden();
+    hidden->set_tiles_x(5);
+    hidden->set_tiles_y(3);
+    hidden->set_hidden(std::string("\xFF\x7F"));
+    return hidden;
+  };
+  Check<GroupDone>({
+      {[&](auto& e) { mask(e); }, ""},
+      {[&](auto& e) { mask(e)->set_hidden("\xFF\xFF"); }, "GroupDone.hidden.hidden: a bit beyond the last tile"},
+      {[&](auto& e) { mask(e)->set_hidden("\xFF"); }, "GroupDone.hidden.hidden: a text of 1 bytes, expected 2 to 2"},
+      {[&](auto& e) { mask(e)->set_hidden("123"); }, "GroupDone.hidden.hidden: a text of 3 bytes, expected 2 to 2"},
+      {[&](auto& e) { mask(e)->clear_hidden(); }, "GroupDone.hidden.hidden: a text of 0 bytes, expected 2 to 2"},
+      {[&](auto& e) { mask(e)->set_tiles_x(8193); }, "GroupDone.hidden.tiles_x: 8193 is not in [0, 8192]"},
+      {[&](auto& e) { mask(e)->set_tiles_y(8193); }, "GroupDone.hidden.tiles_y: 8193 is not in [1, 8192]"},
+      {[&](auto& e) { mask(e)->set_tiles_y(0); }, "GroupDone.hidden.tiles_y: 0 is not in [1, 8192]"},
+      {[&](auto& e) { mask(e)->set_tiles_x(0); }, "GroupDone.hidden.tiles_y: 3 is not in [0, 0]"},
+      {[&](auto& e) { e.mutable_group_done()->clear_hidden(); }, ""},
   });
 }
 

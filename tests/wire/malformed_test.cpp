@@ -175,6 +175,7 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       {"y_row", 4},
       {"w_row", 4},
       {"depth_row", 4},
+      {"from_picture", 9},
       {"stage_ns", kStageCount},
   };
   std::map<std::string, bool> seen;

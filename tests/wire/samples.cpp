@@ -50,20 +50,38 @@ GroupAssignment Assignment(Rank ranks, const ViewParameters& view, RendererKind 
   setup.description = Description();
   setup.range = {-1, 1e30F};
   setup.renderer = renderer;
-  setup.camera = MakeCamera(view, {640, 480}, setup.description.geometry);
+  if (renderer == RendererKind::kSplat) {
+    setup.camera = MakeCamera(view, {640, 480}, setup.description.geometry);
+    setup.sheets = MakeSheetGrid(setup.camera, setup.description.geometry);
+  } else {
+    setup.camera = MakeSupersampledCamera(view, {640, 480}, setup.description.geometry);
+  }
   setup.transfer = Curve();
   setup.shading = ManyLights();
   setup.termination = 0;
   setup.halo = 16;
-  const std::uint64_t pixels = std::uint64_t(setup.camera.width) * std::uint64_t(setup.camera.height);
   const Index3 size = setup.description.geometry.size;
   for (Rank rank = 0; rank < ranks; ++rank) {
     const auto z = std::int32_t(rank);
     message.group.placements.push_back({rank, {{0, 0, z}, {size.x, size.y, z + 1}}, rank + 1});
     message.peers.push_back({rank + 1, "tcp://127.0.0.1:" + std::to_string(5000 + rank)});
   }
-  message.group.schedule = ranks == 0 ? Schedule{.ranks = 0, .root = 0, .steps = {}} : MakeFanIn({ranks, ranks / 2, {0, pixels}});
+  message.group.schedule = ranks == 0 ? Schedule{.ranks = 0, .root = 0, .steps = {}} : MakeFanIn({ranks, ranks / 2, WholeFrame(setup)});
   message.peers.push_back({kMax32, kOddEndpoint});
+  return message;
+}
+
+// Every third tile is hidden; the last byte of bits is used in part.
+OcclusionMask Mask(std::int32_t tiles_x, std::int32_t tiles_y) {
+  OcclusionMask mask{tiles_x, tiles_y, std::vector<std::uint8_t>(std::size_t(tiles_x) * std::size_t(tiles_y))};
+  for (std::size_t i = 0; i < mask.hidden.size(); i += 3) mask.hidden[i] = 1;
+  return mask;
+}
+
+GroupAssignment BehindOthers() {
+  GroupAssignment message = Assignment(2, {}, RendererKind::kSplat);
+  message.setup.termination = 0.5;
+  message.hidden = Mask(OcclusionTiles(message.setup.sheets.width), OcclusionTiles(message.setup.sheets.height));
   return message;
 }
 
@@ -107,12 +125,14 @@ template <>
 std::vector<GroupAssignment> Samples() {
   const ViewParameters oblique{Projection::kPerspective, 1e6, -33, 12.5, 0.01, 60};
   return {Assignment(3, {}, RendererKind::kSplat), Assignment(0, oblique, RendererKind::kZBuffer),
-          Assignment(16, oblique, RendererKind::kSplat)};
+          Assignment(16, oblique, RendererKind::kSplat), BehindOthers()};
 }
 
 template <>
 std::vector<GroupDone> Samples() {
-  return {{1, 2, {3, 4, 1023}, {}}, {kMax64, kMax32, {}, {RankReport{}, FullReport()}}};
+  return {{1, 2, {3, 4, 1023}, {}, {}},
+          {kMax64, kMax32, {}, {RankReport{}, FullReport()}, Mask(5, 3)},
+          {1, 1, {}, {}, Mask(kMaxOcclusionTiles, 1)}};
 }
 
 template <>

@@ -26,6 +26,7 @@ class Phong {
   // The same bits on every machine (for the Z-buffer's promise): only operations that IEEE 754 rounds exactly.
   PhongFactors AtNormal(const Vec3& unit_normal) const;
   PhongFactors WithoutGradient() const;
+  const std::vector<Vec3>& lights() const { return lights_; }  // unit directions towards them; the headlight where none was given
 
   // By normal code (normal_code.h), kNoGradient included.
   std::vector<PhongFactors> ByNormalCode() const;

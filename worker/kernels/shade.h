@@ -1,23 +1,34 @@
-// The shading stage of splatting: what each voxel of a batch adds to its sheet, by two look-ups.
+// The shading stage of splatting: what each occupied voxel adds to its sheet, by look-ups.
 #pragma once
 
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "common/base/aligned_buffer.h"
 #include "worker/kernels/phong.h"
-#include "worker/kernels/voxel_batch.h"
+#include "worker/kernels/voxel_record.h"
 
 namespace slabstream {
 
-// Made once a frame.
+// Made once a frame. The opacity of a voxel is that of its sheet; under perspective it depends on how far apart sheets are along the
+// voxel's own ray, so there are tables for `levels` evenly spaced distances, between which opacities are interpolated linearly.
 struct ShadeTables {
+  int bins = 0, levels = 1;
   AlignedVector<float> color;           // [bin][4]: straight colour, then 1
-  AlignedVector<float> opacity;         // [bin]: of one sheet (orthographic: times the area of a voxel's cell of the slice)
+  AlignedVector<float> opacity;         // [level][bin]
   std::vector<PhongFactors> by_normal;  // by normal code
 };
 
-// Fills batch.rgba: opacity * (shaded colour, 1), times batch.area if `per_voxel_area`.
-void ShadePieces(const ShadeTables& tables, bool per_voxel_area, VoxelBatch& batch);
-void ShadePiecesReference(const ShadeTables& tables, bool per_voxel_area, VoxelBatch& batch);
+// An octet with at least one occupied voxel.
+struct OctetWork {
+  const VoxelRecord* records = nullptr;  // of its occupied voxels, in order
+  float* rgba = nullptr;                 // 4 * kOctet floats; of occupied voxels, opacity * (shaded colour, 1) is written
+  std::uint32_t occupied = 0;            // bit i: voxel i
+  float level = 0, level_step = 0;       // of voxel 0, and from voxel to voxel; in [0, levels - 1) for all of them. One level: not read
+};
+
+void ShadeOctets(const ShadeTables& tables, std::span<const OctetWork> octets);
+void ShadeOctetsReference(const ShadeTables& tables, std::span<const OctetWork> octets);
 
 }  // namespace slabstream

@@ -7,106 +7,130 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <vector>
 
 HWY_BEFORE_NAMESPACE();
 namespace slabstream {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// At most 32 bytes: two pixels. Wider registers make the stores of neighbouring voxels overlap more, which costs more than they save.
-using PixelTag = hn::CappedTag<float, 8>;
+#if HWY_TARGET == HWY_SCALAR
 
-// RGBA of a voxel, repeated over the register; where there are no vectors, the channel of register k.
-HWY_INLINE hn::Vec<PixelTag> Value(const float* rgba, std::size_t k) {
-  if constexpr (hn::MaxLanes(PixelTag()) >= 4) return hn::LoadDup128(PixelTag(), rgba);
-  return hn::LoadU(PixelTag(), rgba + k % 4);
+void Filter(const FootprintTable& footprint, const Lattice& lattice, const BeamWork& work) {
+  FilterBeamReference(footprint, lattice, work);
+}
+void Composite(const RowWork& work) { CompositeRowReference(work); }
+
+#else
+
+constexpr std::ptrdiff_t kSegmentFloats = 4 * std::ptrdiff_t{kSegment};
+
+// Two voxels to a vector where vectors are that long, else one.
+using TapTag = hn::CappedTag<float, 8>;
+
+// Sum over taps of one sample: of the even taps in the lower half of the vector, of the odd ones in the upper half.
+template <std::int32_t kTaps>
+HWY_INLINE hn::Vec<TapTag> SumTaps(const float* HWY_RESTRICT voxels, const float* HWY_RESTRICT weights, std::int32_t taps_given) {
+  const TapTag d;
+  constexpr std::int32_t kStep = std::int32_t(hn::MaxLanes(TapTag()));
+  const std::int32_t floats = 4 * (kTaps > 0 ? kTaps : taps_given);
+  auto sum = hn::Mul(hn::Load(d, weights), hn::LoadU(d, voxels));
+  for (std::int32_t n = kStep; n < floats; n += kStep) sum = hn::MulAdd(hn::Load(d, weights + n), hn::LoadU(d, voxels + n), sum);
+  return sum;
 }
 
-// Columns of a footprint, `kVectors` registers wide, inside the sheet. `wx` points at the x weights of these registers.
-template <std::size_t kVectors>
-HWY_INLINE void SplatColumns(const float* HWY_RESTRICT wx, const float* HWY_RESTRICT wy, std::int32_t rows, const float* HWY_RESTRICT rgba,
-                             float* pixels, std::size_t row_floats) {
-  const PixelTag d;
-  constexpr std::size_t kLanes = hn::MaxLanes(PixelTag());
-  hn::Vec<PixelTag> row_values[kVectors];
-  for (std::size_t k = 0; k < kVectors; ++k) row_values[k] = hn::Mul(hn::LoadU(d, wx + k * kLanes), Value(rgba, k));
-  for (std::int32_t j = 0; j < rows; ++j, pixels += row_floats) {
-    const auto weight = hn::Set(d, wy[j]);
-    for (std::size_t k = 0; k < kVectors; ++k) {
-      float* at = pixels + k * kLanes;
-      hn::StoreU(hn::MulAdd(weight, row_values[k], hn::LoadU(d, at)), d, at);
-    }
-  }
-}
-
-// `taps` columns, a multiple of kTapPadding. Footprints wider than four registers go column block by column block.
-HWY_INLINE void SplatPairs(const float* HWY_RESTRICT wx, const float* HWY_RESTRICT wy, std::int32_t taps, std::int32_t rows,
-                           const float* HWY_RESTRICT rgba, float* pixels, std::size_t row_floats) {
-  constexpr std::size_t kLanes = hn::MaxLanes(PixelTag());
-  std::size_t vectors = std::size_t(taps) * 4 / kLanes;
-  for (; vectors > 4; vectors -= 4, wx += 4 * kLanes, pixels += 4 * kLanes) SplatColumns<4>(wx, wy, rows, rgba, pixels, row_floats);
-  switch (vectors) {
-    case 1: SplatColumns<1>(wx, wy, rows, rgba, pixels, row_floats); break;
-    case 2: SplatColumns<2>(wx, wy, rows, rgba, pixels, row_floats); break;
-    case 3: SplatColumns<3>(wx, wy, rows, rgba, pixels, row_floats); break;
-    case 4: SplatColumns<4>(wx, wy, rows, rgba, pixels, row_floats); break;
-    default: break;
-  }
-}
-
-// The last pixel column of a footprint that the sheet's border cuts to an odd number.
-HWY_INLINE void SplatPixelColumn(const float* wx, const float* wy, std::int32_t rows, const float* rgba, float* pixel,
-                                 std::size_t row_floats) {
-  for (std::int32_t j = 0; j < rows; ++j, pixel += row_floats) {
-    for (int c = 0; c < 4; ++c) pixel[c] += wy[j] * (wx[c] * rgba[c]);
-  }
-}
-
-void SplatAll(const VoxelBatch& batch, const SheetView& view) {
-  // Everything that the loop reads is local: the compiler cannot know that stores to the sheet leave it alone.
-  const SheetView sheet = view;
-  const std::size_t row_floats = 4 * std::size_t(sheet.width);
-  const std::int32_t* HWY_RESTRICT columns = batch.column.data();
-  const std::int32_t* HWY_RESTRICT rows = batch.row.data();
-  const std::int32_t* HWY_RESTRICT phases_x = batch.phase_x.data();
-  const std::int32_t* HWY_RESTRICT phases_y = batch.phase_y.data();
-  const float* HWY_RESTRICT rgba = batch.rgba.data();
-  const BeamPiece* const pieces_end = batch.pieces.data() + batch.pieces.size();
-  std::size_t n = 0;
-  for (const BeamPiece* piece = batch.pieces.data(); piece != pieces_end; ++piece) {
-    if (!piece->kernel_x->has_tables() || !piece->kernel_y->has_tables()) {
-      SplatPieceReference(batch, *piece, n, sheet);
-      n += std::size_t(piece->count);
-      continue;
-    }
-    const float* HWY_RESTRICT x_weights = piece->kernel_x->x_weights.data();
-    const float* HWY_RESTRICT y_weights = piece->kernel_y->y_weights.data();
-    const std::int32_t* HWY_RESTRICT x_taps = piece->kernel_x->phase_columns.data();
-    const std::int32_t* HWY_RESTRICT y_taps = piece->kernel_y->phase_rows.data();
-    const std::size_t x_stride = 4 * std::size_t(piece->kernel_x->padded_taps), y_stride = std::size_t(piece->kernel_y->taps);
-    for (const std::size_t end = n + std::size_t(piece->count); n < end; ++n) {
-      const auto phase_x = std::size_t(phases_x[n]), phase_y = std::size_t(phases_y[n]);
-      const std::int32_t column = columns[n], row = rows[n];
-      const float* wx = x_weights + phase_x * x_stride;
-      const float* wy = y_weights + phase_y * y_stride;
-      const std::int32_t taps_x = x_taps[phase_x], taps_y = y_taps[phase_y];
-      if (column >= 0 && row >= 0 && column + taps_x <= sheet.width && row + taps_y <= sheet.height) {
-        SplatPairs(wx, wy, taps_x, taps_y, rgba + 4 * n, sheet.rgba + std::size_t(row) * row_floats + 4 * std::size_t(column), row_floats);
-        continue;
+// kTaps: padded taps, 0: any number.
+template <std::int32_t kTaps>
+HWY_INLINE void FilterSegments(const FootprintTable& footprint, const Lattice& lattice, const BeamWork& work) {
+  const TapTag d;
+  const std::int32_t taps = kTaps > 0 ? kTaps : footprint.padded_taps;
+  const float* HWY_RESTRICT weights = footprint.channel_weights.data();
+  const float* HWY_RESTRICT voxels = work.voxels;
+  const std::int64_t step = lattice.step;
+  const auto sample = [&](std::int64_t at) HWY_ATTR {
+    return SumTaps<kTaps>(voxels + 4 * std::ptrdiff_t{Lattice::First(at)}, weights + Lattice::Phase(at) * std::size_t(4 * taps), taps);
+  };
+  for (std::int32_t word = 0; word < work.words; ++word) {
+    for (SegmentWord rest = work.wanted[word]; rest != 0; rest &= rest - 1) {
+      const std::int32_t segment = FirstSegment(rest, word);
+      std::int64_t at = lattice.At(work.first_sample + segment * kSegment);
+      float* HWY_RESTRICT out = work.out + segment * kSegmentFloats;
+      if constexpr (hn::MaxLanes(TapTag()) == 8) {
+        for (std::int32_t i = 0; i < kSegment; i += 2, at += 2 * step, out += 8) {
+          const auto left = sample(at), right = sample(at + step);
+          hn::Store(hn::Add(hn::ConcatLowerLower(d, right, left), hn::ConcatUpperUpper(d, right, left)), d, out);
+        }
+      } else {
+        for (std::int32_t i = 0; i < kSegment; ++i, at += step, out += 4) hn::Store(sample(at), d, out);
       }
-      // The part of the footprint that lies on the sheet, in taps.
-      const std::int32_t left = std::max(0, -column), right = std::min(taps_x, sheet.width - column);
-      const std::int32_t top = std::max(0, -row), bottom = std::min(taps_y, sheet.height - row);
-      if (left >= right || top >= bottom) continue;
-      float* pixels = sheet.rgba + std::size_t(row + top) * row_floats + 4 * std::size_t(column + left);
-      const std::int32_t pairs = (right - left) / kTapPadding * kTapPadding;
-      wx += 4 * left;
-      wy += top;
-      SplatPairs(wx, wy, pairs, bottom - top, rgba + 4 * n, pixels, row_floats);
-      if (pairs < right - left) SplatPixelColumn(wx + 4 * pairs, wy, bottom - top, rgba + 4 * n, pixels + 4 * pairs, row_floats);
     }
   }
 }
+
+void Filter(const FootprintTable& footprint, const Lattice& lattice, const BeamWork& work) {
+  switch (footprint.padded_taps) {
+    case 4: FilterSegments<4>(footprint, lattice, work); break;
+    case 6: FilterSegments<6>(footprint, lattice, work); break;
+    default: FilterSegments<0>(footprint, lattice, work); break;
+  }
+}
+
+alignas(64) constexpr float kNothing[kSegmentFloats] = {};
+
+// kTaps 0: any number.
+template <std::int32_t kTaps>
+HWY_INLINE void CompositeSegments(const RowWork& work) {
+  const hn::CappedTag<float, 16> d;  // up to four pixels
+  using V = hn::Vec<decltype(d)>;
+  const std::ptrdiff_t lanes = std::ptrdiff_t(hn::Lanes(d));
+  const std::int32_t taps = kTaps > 0 ? kTaps : work.taps;
+  V weights[kTaps > 0 ? kTaps : 1];
+  if constexpr (kTaps > 0) {
+    for (std::int32_t n = 0; n < kTaps; ++n) weights[n] = hn::Set(d, work.weights[n]);
+  }
+  const auto weight = [&](std::int32_t n) HWY_ATTR {
+    if constexpr (kTaps > 0) return weights[n];
+    return hn::Set(d, work.weights[n]);
+  };
+  std::vector<const float*> many(kTaps > 0 ? 0 : std::size_t(taps));
+  const float* few[kTaps > 0 ? kTaps : 1];
+  const float** const beams = kTaps > 0 ? few : many.data();
+  const auto one = hn::Set(d, 1.0F), opaque = hn::Set(d, work.opaque_alpha);
+  for (std::int32_t word = 0; word < work.words; ++word) {
+    SegmentWord any = 0;
+    for (std::int32_t n = 0; n < taps; ++n) any |= work.filled[n][word];
+    for (SegmentWord rest = any & work.open[word]; rest != 0; rest &= rest - 1) {
+      const std::int32_t segment = FirstSegment(rest, word);
+      const SegmentWord bit = rest & ~(rest - 1);
+      for (std::int32_t n = 0; n < taps; ++n) {
+        const float* filled = work.beams[n] + segment * kSegmentFloats;
+        beams[n] = (work.filled[n][word] & bit) != 0 ? filled : kNothing;
+      }
+      float* HWY_RESTRICT accumulated = work.accumulated + segment * kSegmentFloats;
+      auto least = one;
+      for (std::ptrdiff_t i = 0; i < kSegmentFloats; i += lanes) {
+        auto sheet = hn::Mul(weight(0), hn::Load(d, beams[0] + i));
+        for (std::int32_t n = 1; n < taps; ++n) sheet = hn::MulAdd(weight(n), hn::Load(d, beams[n] + i), sheet);
+        const auto front = hn::Load(d, accumulated + i);
+        const auto sum = hn::MulAdd(hn::Sub(one, hn::Broadcast<3>(front)), sheet, front);
+        hn::Store(sum, d, accumulated + i);
+        least = hn::Min(least, hn::Broadcast<3>(sum));
+      }
+      if (hn::AllTrue(d, hn::Ge(least, opaque))) work.open[word] &= ~bit;
+    }
+  }
+}
+
+void Composite(const RowWork& work) {
+  switch (work.taps) {
+    case 4: CompositeSegments<4>(work); break;
+    case 5: CompositeSegments<5>(work); break;
+    case 6: CompositeSegments<6>(work); break;
+    default: CompositeSegments<0>(work); break;
+  }
+}
+
+#endif
 
 }  // namespace HWY_NAMESPACE
 }  // namespace slabstream
@@ -114,9 +138,13 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace slabstream {
-HWY_EXPORT(SplatAll);
+HWY_EXPORT(Filter);
+HWY_EXPORT(Composite);
 
-void SplatPieces(const VoxelBatch& batch, const SheetView& sheet) { HWY_DYNAMIC_DISPATCH(SplatAll)(batch, sheet); }
+void FilterBeam(const FootprintTable& footprint, const Lattice& lattice, const BeamWork& work) {
+  HWY_DYNAMIC_DISPATCH(Filter)(footprint, lattice, work);
+}
+void CompositeRow(const RowWork& work) { HWY_DYNAMIC_DISPATCH(Composite)(work); }
 
 }  // namespace slabstream
 #endif

@@ -1,24 +1,43 @@
-// The splat stage: adds the footprints of a batch to a sheet (Westover 1990: one sheet a slice).
+// The splatting stage: sheets of a slice from its shaded voxels.
+//
+// A footprint is the product of one along u and one along v, and a slice meets the frame's pixels in straight columns and rows
+// (common/view/sheet_grid.h). So a sheet is made in two passes of one-dimensional sums, in gather form: first each beam is filtered along
+// u to the columns of the frame (FilterBeam); then each row of the frame gathers the few beams that reach it, and goes over what is
+// accumulated at once (CompositeRow), so a sheet is never stored. That is k + k operations a pixel instead of k * k, without a store
+// for each tap.
 #pragma once
 
 #include <cstdint>
 
-#include "worker/kernels/voxel_batch.h"
+#include "worker/kernels/footprint_table.h"
+#include "worker/kernels/segment_set.h"
 
 namespace slabstream {
 
-// Interleaved RGBA, rows of `width` pixels without padding. Not owned.
-struct SheetView {
-  float* rgba = nullptr;
-  std::int32_t width = 0, height = 0;
+// out[i] = sum over n < padded_taps of weight(phase(i), n) * voxels[first(i) + n], for the samples i of the segments in `wanted`; RGBA.
+struct BeamWork {
+  const float* voxels = nullptr;        // of voxel 0 of the volume's beam; only what taps reach is read, it must be finite
+  float* out = nullptr;                 // of the row's first pixel, 64-byte aligned
+  const SegmentWord* wanted = nullptr;  // `words` words
+  std::int32_t words = 0;
+  std::int32_t first_sample = 0;  // the sample of the row's first pixel
 };
+void FilterBeam(const FootprintTable& footprint, const Lattice& lattice, const BeamWork& work);
+void FilterBeamReference(const FootprintTable& footprint, const Lattice& lattice, const BeamWork& work);
 
-// sheet(pixel) += wx(pixel) * wy(pixel) * rgba for every voxel and every pixel of its footprint inside the sheet. Sums are in the order of
-// voxels; kernels for different instruction sets differ in the rounding of each addition only.
-void SplatPieces(const VoxelBatch& batch, const SheetView& sheet);
-void SplatPiecesReference(const VoxelBatch& batch, const SheetView& sheet);
-
-// One piece, whose voxels begin at `first` in the batch: also what SplatPieces does with kernels too wide for tables.
-void SplatPieceReference(const VoxelBatch& batch, const BeamPiece& piece, std::size_t first, const SheetView& sheet);
+// accumulated = accumulated over S, with S = sum over n < taps of weights[n] * beams[n]: premultiplied, front to back (Porter and Duff
+// 1984), in the open segments that any of the beams fills. Where the least alpha of a segment then is opaque_alpha or more, it is closed.
+struct RowWork {
+  std::int32_t taps = 0;
+  const float* weights = nullptr;
+  const float* const* beams = nullptr;         // [taps]: filtered beams, of the row's first pixel, 64-byte aligned
+  const SegmentWord* const* filled = nullptr;  // [taps][words]: segments of the beam that hold something; others are not read
+  float* accumulated = nullptr;                // of the row's first pixel, 64-byte aligned
+  SegmentWord* open = nullptr;                 // [words]
+  std::int32_t words = 0;
+  float opaque_alpha = 2;  // above 1: never
+};
+void CompositeRow(const RowWork& work);
+void CompositeRowReference(const RowWork& work);
 
 }  // namespace slabstream

@@ -3,42 +3,47 @@
 #include "worker/kernels/splat.h"
 
 namespace slabstream {
-namespace {
 
-// Weights of the taps begin ... end - 1 of a phase.
-void TapWeights(const GaussianKernel& kernel, std::int32_t phase, std::int32_t begin, std::int32_t end, std::vector<float>& weights) {
-  weights.clear();
-  for (std::int32_t tap = begin; tap < end; ++tap) {
-    weights.push_back(kernel.has_tables() ? kernel.y_weights[std::size_t(phase) * std::size_t(kernel.taps) + std::size_t(tap)]
-                                          : TapWeight(kernel, phase, tap));
-  }
-}
-
-}  // namespace
-
-void SplatPieceReference(const VoxelBatch& batch, const BeamPiece& piece, std::size_t first, const SheetView& sheet) {
-  std::vector<float> wx, wy;
-  for (std::size_t n = first; n < first + std::size_t(piece.count); ++n) {
-    const std::int32_t column = batch.column[n], row = batch.row[n];
-    const std::int32_t left = std::max(0, -column), right = std::min(piece.kernel_x->taps, sheet.width - column);
-    const std::int32_t top = std::max(0, -row), bottom = std::min(piece.kernel_y->taps, sheet.height - row);
-    if (left >= right || top >= bottom) continue;
-    TapWeights(*piece.kernel_x, batch.phase_x[n], left, right, wx);
-    TapWeights(*piece.kernel_y, batch.phase_y[n], top, bottom, wy);
-    for (std::size_t j = 0; j < wy.size(); ++j) {
-      float* pixel = sheet.rgba + 4 * ((std::size_t(row + top) + j) * std::size_t(sheet.width) + std::size_t(column + left));
-      for (std::size_t i = 0; i < wx.size(); ++i, pixel += 4) {
-        for (std::size_t c = 0; c < 4; ++c) pixel[c] += wy[j] * (wx[i] * batch.rgba[4 * n + c]);
+void FilterBeamReference(const FootprintTable& footprint, const Lattice& lattice, const BeamWork& work) {
+  for (std::int32_t word = 0; word < work.words; ++word) {
+    for (SegmentWord rest = work.wanted[word]; rest != 0; rest &= rest - 1) {
+      const std::int32_t segment = FirstSegment(rest, word);
+      for (std::int32_t i = segment * kSegment; i < (segment + 1) * kSegment; ++i) {
+        const std::int64_t at = lattice.At(work.first_sample + i);
+        const float* voxel = work.voxels + 4 * std::ptrdiff_t{Lattice::First(at)};
+        const float* weights = &footprint.weights[Lattice::Phase(at) * std::size_t(footprint.taps)];
+        for (std::int32_t c = 0; c < 4; ++c) {
+          float sum = 0;
+          for (std::int32_t n = 0; n < footprint.taps; ++n) sum += weights[n] * voxel[4 * n + c];
+          work.out[4 * i + c] = sum;
+        }
       }
     }
   }
 }
 
-void SplatPiecesReference(const VoxelBatch& batch, const SheetView& sheet) {
-  std::size_t first = 0;
-  for (const BeamPiece& piece : batch.pieces) {
-    SplatPieceReference(batch, piece, first, sheet);
-    first += std::size_t(piece.count);
+void CompositeRowReference(const RowWork& work) {
+  for (std::int32_t word = 0; word < work.words; ++word) {
+    SegmentWord any = 0;
+    for (std::int32_t n = 0; n < work.taps; ++n) any |= work.filled[n][word];
+    for (SegmentWord rest = any & work.open[word]; rest != 0; rest &= rest - 1) {
+      const std::int32_t segment = FirstSegment(rest, word);
+      const SegmentWord bit = rest & ~(rest - 1);
+      float least = 1;
+      for (std::int32_t i = segment * kSegment; i < (segment + 1) * kSegment; ++i) {
+        float* pixel = work.accumulated + 4 * i;
+        const float transmittance = 1 - pixel[3];
+        for (std::int32_t c = 0; c < 4; ++c) {
+          float sheet = 0;
+          for (std::int32_t n = 0; n < work.taps; ++n) {
+            if ((work.filled[n][word] & bit) != 0) sheet += work.weights[n] * work.beams[n][4 * i + c];
+          }
+          pixel[c] += transmittance * sheet;
+        }
+        least = std::min(least, pixel[3]);
+      }
+      if (least >= work.opaque_alpha) work.open[word] &= ~bit;
+    }
   }
 }
 

@@ -8,8 +8,8 @@ namespace slabstream {
 
 class SplattingRenderer : public Renderer {
  public:
-  Result<LocalImage> Render(SlabData& slab, const Box& box, const FrameSetup& setup, const std::atomic<bool>& cancelled,
-                            RankReport& report) override;
+  Result<LocalImage> Render(SlabData& slab, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
+                            const std::atomic<bool>& cancelled, RankReport& report) override;
 };
 
 }  // namespace slabstream

@@ -1,0 +1,51 @@
+// FootprintTable: the one-dimensional footprint of a voxel, tabulated for the places that a sample can have between two voxels.
+//
+// A sample at t voxels (from a voxel's centre on) is a weighted mean of the voxels within the radius R = cut * sigma of it:
+//   first = floor(t - R) + 1;   phase = floor(kPhases * frac(t - R));   sum over n < taps of weight(phase, n) * voxel[first + n]
+// with weight(phase, n) = g(d) / (sum of g over the phase's taps) for the distance d of voxel first + n at the middle of the phase,
+//   g(d) = exp(-d^2 / (2 sigma^2)) - exp(-cut^2 / 2) for |d| < R, else 0.
+// Weights of a phase sum to 1, so the samples of a filled slice are what its voxels are. The Gaussian is lowered by its value at the cut,
+// so that it ends without a step. A sample's place is off by at most 1 / (2 kPhases) voxel.
+//
+// Places are counted in fixed point, 32 bits behind the binary point (Lattice): exact from sample to sample and the same everywhere.
+#pragma once
+
+#include <cstdint>
+
+#include "common/base/aligned_buffer.h"
+
+namespace slabstream {
+
+inline constexpr int kPhaseBits = 7, kPhases = 1 << kPhaseBits;
+
+struct FootprintTable {
+  double radius = 0;             // voxels
+  std::int32_t taps = 0;         // ceil(2 radius)
+  AlignedVector<float> weights;  // [phase][taps]
+
+  // The same for pixels of four channels: every weight four times, and an even number of taps, so that two voxels are one vector.
+  std::int32_t padded_taps = 0;
+  AlignedVector<float> channel_weights;  // [phase][padded_taps][4]
+};
+
+// sigma in (0, 1000] voxels; cut: in standard deviations.
+FootprintTable MakeFootprintTable(double sigma, double cut);
+
+// The samples i = 0, 1, ... of a row: sample i lies at t - R + 1 = (start + i * step) / 2^32 voxels, so its first tap is the integer part
+// and its phase the leading bits of the fraction.
+struct Lattice {
+  std::int64_t start = 0, step = 0;
+
+  std::int64_t At(std::int32_t i) const { return start + i * step; }
+  static std::int32_t First(std::int64_t at) { return std::int32_t(at >> 32); }
+  static std::size_t Phase(std::int64_t at) { return std::size_t(std::uint32_t(at) >> (32 - kPhaseBits)); }
+};
+
+// Of samples at column i + 0.5 = scale * u + offset, for a footprint of this radius. Whatever lies farther than 2^30 voxels away is moved
+// there.
+Lattice MakeLattice(double scale, double offset, double radius);
+
+// The first sample whose place u is at or beyond `voxel`, in [begin, end].
+std::int32_t FirstSampleFrom(const Lattice& lattice, double radius, double voxel, std::int32_t begin, std::int32_t end);
+
+}  // namespace slabstream

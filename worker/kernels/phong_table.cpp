@@ -1,0 +1,95 @@
+#include "worker/kernels/phong_table.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "worker/kernels/phong_table.cpp"
+#include <hwy/foreach_target.h>
+// Highway wants this order.
+#include <hwy/highway.h>
+
+#include <hwy/contrib/math/math-inl.h>
+
+#include <array>
+#include <span>
+
+#include "common/base/aligned_buffer.h"
+#include "worker/kernels/normal_code.h"
+
+#ifndef SLABSTREAM_WORKER_KERNELS_PHONG_TABLE_CPP_  // what is shared by all instruction sets
+#define SLABSTREAM_WORKER_KERNELS_PHONG_TABLE_CPP_
+namespace slabstream {
+
+inline constexpr std::size_t kPaddedCodes = (std::size_t{kNoGradient} + 15) / 16 * 16;
+
+// Unit vectors of all codes, component by component.
+struct CodedNormals {
+  std::array<AlignedVector<float>, 3> component;
+};
+inline const CodedNormals& AllNormals() {
+  static const CodedNormals normals = [] {
+    CodedNormals all;
+    for (int axis = 0; axis < 3; ++axis) {
+      all.component[std::size_t(axis)].resize(kPaddedCodes);
+      for (std::uint16_t code = 0; code < kNoGradient; ++code) {
+        all.component[std::size_t(axis)][code] = float(DecodeNormal(code)[axis]);
+      }
+    }
+    return all;
+  }();
+  return normals;
+}
+
+}  // namespace slabstream
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace slabstream {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+// `lights`: unit; factors: kPaddedCodes of them.
+void FillTable(const Shading& shading, std::span<const Vec3> lights, const Vec3& to_viewer, PhongFactors* factors) {
+  const hn::CappedTag<float, 16> d;
+  const CodedNormals& normals = AllNormals();
+  const auto zero = hn::Zero(d), least = hn::Set(d, 1e-30F);
+  const auto shininess = hn::Set(d, shading.shininess);
+  for (std::size_t i = 0; i < kPaddedCodes; i += hn::Lanes(d)) {
+    const auto x = hn::Load(d, &normals.component[0][i]), y = hn::Load(d, &normals.component[1][i]),
+               z = hn::Load(d, &normals.component[2][i]);
+    // Not fused: a high power would show the difference between instruction sets.
+    const auto along = [&](const Vec3& v) HWY_ATTR {
+      return hn::Add(hn::Add(hn::Mul(x, hn::Set(d, float(v.x))), hn::Mul(y, hn::Set(d, float(v.y)))), hn::Mul(z, hn::Set(d, float(v.z))));
+    };
+    const auto viewer = along(to_viewer);
+    auto diffuse = zero, specular = zero;
+    for (const Vec3& light : lights) {
+      const auto cosine = along(light);
+      diffuse = hn::Add(diffuse, hn::Abs(cosine));
+      const auto reflected = hn::Sub(hn::Mul(hn::Add(cosine, cosine), viewer), hn::Set(d, float(Dot(light, to_viewer))));  // R.V
+      const auto power = hn::Exp(d, hn::Mul(shininess, hn::Log(d, hn::Min(hn::Max(reflected, least), hn::Set(d, 1.0F)))));
+      specular = hn::Add(specular, hn::IfThenElse(hn::Gt(reflected, least), power, zero));
+    }
+    hn::StoreInterleaved2(hn::MulAdd(diffuse, hn::Set(d, shading.diffuse), hn::Set(d, shading.ambient)),
+                          hn::Mul(specular, hn::Set(d, shading.specular)), d, &factors[i].diffuse);
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace slabstream
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace slabstream {
+HWY_EXPORT(FillTable);
+
+std::vector<PhongFactors> PhongTable(const Shading& shading, const Vec3& view_direction) {
+  static_assert(sizeof(PhongFactors) == 2 * sizeof(float));
+  const Phong phong(shading, view_direction);
+  std::vector<PhongFactors> factors(kPaddedCodes + 1);
+  if (shading.phong) HWY_DYNAMIC_DISPATCH(FillTable)(shading, phong.lights(), -view_direction, factors.data());
+  factors.resize(kNormalCodes);
+  factors[kNoGradient] = phong.WithoutGradient();
+  return factors;
+}
+
+}  // namespace slabstream
+#endif

@@ -1,0 +1,69 @@
+// Sets of segments of one row of pixels, as bits: which are open, which hold something. A segment is kSegment pixels, from a multiple of
+// kSegment on. Empty and hidden parts of a row cost a few instructions for 64 segments.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+
+namespace slabstream {
+
+inline constexpr std::int32_t kSegment = 8;  // pixels
+
+using SegmentWord = std::uint64_t;
+inline constexpr std::int32_t kWordSegments = 64;
+constexpr std::int32_t SegmentWords(std::int32_t segments) { return (segments + kWordSegments - 1) / kWordSegments; }
+
+// Bits [begin, end) of a word, 0 <= begin <= end <= 64, begin < 64.
+constexpr SegmentWord WordBits(std::int32_t begin, std::int32_t end) {
+  const SegmentWord below_end = end == kWordSegments ? ~SegmentWord{0} : (SegmentWord{1} << end) - 1;
+  return below_end & ~((SegmentWord{1} << begin) - 1);
+}
+
+// Calls function(word number, bits) for the words that hold bits of [begin, end).
+template <class Function>
+void ForEachWord(std::int32_t begin, std::int32_t end, Function&& function) {
+  for (std::int32_t word = begin / kWordSegments; word * kWordSegments < end; ++word) {
+    const std::int32_t origin = word * kWordSegments;
+    function(word, WordBits(std::max(begin - origin, 0), std::min(end - origin, kWordSegments)));
+  }
+}
+
+inline bool AnyOf(const SegmentWord* set, std::int32_t begin, std::int32_t end) {
+  SegmentWord any = 0;
+  ForEachWord(begin, end, [&](std::int32_t word, SegmentWord bits) { any |= set[word] & bits; });
+  return any != 0;
+}
+
+inline void Insert(SegmentWord* set, std::int32_t begin, std::int32_t end) {
+  ForEachWord(begin, end, [&](std::int32_t word, SegmentWord bits) { set[word] |= bits; });
+}
+
+inline void Remove(SegmentWord* set, std::int32_t begin, std::int32_t end) {
+  ForEachWord(begin, end, [&](std::int32_t word, SegmentWord bits) { set[word] &= ~bits; });
+}
+
+// At most 64 neighbouring segments: bits of a word and of the one behind it.
+struct SegmentSpan {
+  std::uint32_t word = 0;
+  SegmentWord first = 0, second = 0;
+};
+constexpr SegmentSpan MakeSpan(std::int32_t begin, std::int32_t end) {
+  const std::int32_t word = begin / kWordSegments, origin = word * kWordSegments;
+  return {std::uint32_t(word), WordBits(begin - origin, std::min(end - origin, kWordSegments)),
+          end - origin > kWordSegments ? WordBits(0, end - origin - kWordSegments) : 0};
+}
+
+// `set` has a word behind those of the row.
+inline bool AnyOf(const SegmentWord* set, const SegmentSpan& span) {
+  return ((set[span.word] & span.first) | (set[span.word + 1] & span.second)) != 0;
+}
+inline void Insert(SegmentWord* set, const SegmentSpan& span) {
+  set[span.word] |= span.first;
+  set[span.word + 1] |= span.second;
+}
+
+// The first segment of a word that is not 0.
+inline std::int32_t FirstSegment(SegmentWord bits, std::int32_t word) { return word * kWordSegments + std::countr_zero(bits); }
+
+}  // namespace slabstream

@@ -1,0 +1,84 @@
+#include "worker/render/splatting/sheet_opacity.h"
+
+#include "worker/kernels/phong_table.h"
+
+#include "worker/kernels/phong_table.h"
+
+namespace slabstream {
+namespace {
+
+constexpr int kLevels = 32;  // interpolation is then off by less than 1e-4 for any opacity and a field of view of 60 degrees
+
+}  // namespace
+
+SheetOpacity::SheetOpacity(const FrameSetup& setup) : setup_(setup), axes_(AxesOf(setup.camera.traversal_axis)) {
+  const Camera& camera = setup.camera;
+  central_distance_ = camera.spacing[axes_.c] / std::abs(camera.view_direction[axes_.c]);
+  if (camera.projection != Projection::kPerspective) return;
+  // The ratio grows with the angle between a ray and the axis: it is largest at a corner of the volume, and least on the ray nearest to
+  // the axis, which meets a face of the volume or passes through the eye's foot point.
+  const Vec3 high = ToVec3(setup.description.geometry.size) - Vec3{1, 1, 1};
+  double largest = 0;
+  least_ratio_ = 1e300;
+  for (const double at_c : {0.0, high[axes_.c]}) {
+    Vec3 nearest;
+    for (Axis axis : kAxes) nearest[axis] = std::clamp(camera.eye[axis], 0.0, high[axis]);
+    nearest[axes_.c] = at_c;
+    least_ratio_ = std::min(least_ratio_, Ratio(nearest));
+    for (int corner = 0; corner < 8; ++corner) {
+      const Vec3 q = {corner & 1 ? high.x : 0, corner & 2 ? high.y : 0, corner & 4 ? high.z : 0};
+      largest = std::max(largest, Ratio(q));
+    }
+  }
+  levels_ = kLevels;
+  levels_per_ratio_ = (kLevels - 1) / std::max(largest - least_ratio_, 1e-9);
+}
+
+double SheetOpacity::Ratio(const Vec3& voxel) const {
+  const Camera& camera = setup_.camera;
+  const Vec3 ray = (voxel - camera.eye) * camera.spacing;
+  return Length(ray) / std::abs(ray[axes_.c]) * camera.spacing[axes_.c] / central_distance_;
+}
+
+SheetOpacity::Beam SheetOpacity::BeamAt(std::int32_t k, std::int32_t v) const {
+  constexpr double kBelowLast = 1e-3;  // there is always a level above
+  const Camera& camera = setup_.camera;
+  const double depth = (k - camera.eye[axes_.c]) * camera.spacing[axes_.c];
+  const double along_v = (v - camera.eye[axes_.v]) * camera.spacing[axes_.v] / depth;
+  Beam beam;
+  beam.slope_0_ = float(-camera.eye[axes_.u] * camera.spacing[axes_.u] / depth);
+  beam.slope_step_ = float(camera.spacing[axes_.u] / depth);
+  beam.rest_ = float(1 + along_v * along_v);
+  beam.scale_ = float(levels_per_ratio_ * camera.spacing[axes_.c] / central_distance_);
+  beam.offset_ = float(levels_per_ratio_ * least_ratio_);
+  beam.last_ = float(levels_ - 1 - kBelowLast);
+  return beam;
+}
+
+ShadeTables SheetOpacity::Tables(const ClassificationTable& table) const {
+  const Camera& camera = setup_.camera;
+  const double voxel_length = std::min({camera.spacing.x, camera.spacing.y, camera.spacing.z});
+  const double exponent = central_distance_ / (table.opacity_distance * voxel_length);
+  ShadeTables tables;
+  tables.bins = table.size();
+  tables.levels = levels_;
+  for (int bin = 0; bin < table.size(); ++bin) {
+    const Rgb& color = table.color[std::size_t(bin)];
+    for (float f : {color.r, color.g, color.b, 1.0F}) tables.color.push_back(f);
+  }
+  // (1 - alpha)^(ratio exponent) for evenly spaced ratios is a geometric sequence.
+  const double step = levels_ == 1 ? 0 : 1 / levels_per_ratio_;
+  tables.opacity.resize(std::size_t(levels_) * std::size_t(table.size()));
+  for (int bin = 0; bin < table.size(); ++bin) {
+    const double log_transmitted = exponent * std::log1p(-double(table.opacity[std::size_t(bin)]));
+    double transmitted = std::exp(least_ratio_ * log_transmitted);
+    const double per_level = std::exp(step * log_transmitted);
+    for (int level = 0; level < levels_; ++level, transmitted *= per_level) {
+      tables.opacity[std::size_t(level * table.size() + bin)] = float(1 - transmitted);
+    }
+  }
+  tables.by_normal = PhongTable(setup_.shading, camera.view_direction);
+  return tables;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,208 @@
+#include "worker/render/splatting/splat_band.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstring>
+
+namespace slabstream {
+namespace {
+
+constexpr std::int32_t kSegmentFloats = 4 * kSegment;
+
+// Occupied voxels of an octet, by its mask: the basic x86-64 instruction set has no such instruction.
+constexpr auto kOctetCount = [] {
+  std::array<std::uint8_t, 1 << kOctet> counts{};
+  for (std::size_t mask = 0; mask < counts.size(); ++mask) counts[mask] = std::uint8_t(std::popcount(mask));
+  return counts;
+}();
+
+}  // namespace
+
+SplatBand::SplatBand(const SplatPass& pass, std::int32_t y_begin, std::int32_t y_end, LocalImage& image, RankReport& report)
+    : pass_(pass),
+      y_begin_(y_begin),
+      y_end_(y_end),
+      image_(image),
+      report_(report),
+      clock_(report),
+      segments_(pass.bounds.width() / kSegment),
+      words_(SegmentWords(segments_)),
+      opaque_alpha_(pass.setup.termination > 0 ? float(1 - pass.setup.termination) : 2.0F),
+      open_(std::size_t(y_end - y_begin) * std::size_t(words_)),
+      owned_(std::size_t(words_)) {
+  static_assert(kOcclusionTile % kSegment == 0);
+  for (std::int32_t row = y_begin; row < y_end; ++row) {
+    Insert(Open(row), 0, segments_);
+    if (pass.hidden.empty()) continue;
+    for (std::int32_t segment = 0; segment < segments_; ++segment) {
+      if (pass.hidden.Hides(pass.bounds.x_begin + segment * kSegment, row)) Remove(Open(row), segment, segment + 1);
+    }
+  }
+}
+
+bool SplatBand::finished() const {
+  return std::ranges::all_of(open_, [](SegmentWord word) { return word == 0; });
+}
+
+void SplatBand::AddSlice(std::int32_t k) {
+  slice_ = k;
+  const SliceSamples& slice = pass_.Slice(k);
+  if (!PlaceBeams(slice)) return;
+  octets_.clear();
+  FindNeeded(slice);
+  clock_.Charge(Stage::kTransform);
+  if (octets_.empty()) return;
+  ShadeOctets(pass_.tables, octets_);
+  clock_.Charge(Stage::kShade);
+  FilterBeams(slice);
+  clock_.Charge(Stage::kSplat);
+  CompositeRows(slice);
+  clock_.Charge(Stage::kComposite);
+}
+
+// Rows and beams of the slice that have to do with each other, and room for them. False if there are none.
+bool SplatBand::PlaceBeams(const SliceSamples& slice) {
+  const Axis v = pass_.cells.axes.v;
+  rows_ = {std::max(y_begin_, slice.owned.y_begin), std::min(y_end_, slice.owned.y_end)};
+  if (rows_.begin >= rows_.end || slice.owned.empty()) return false;
+  first_beam_ = std::max(pass_.cells.occupied.begin[v], Lattice::First(slice.rows.At(rows_.begin)));
+  beam_count_ = std::min(pass_.cells.occupied.end[v], Lattice::First(slice.rows.At(rows_.end - 1)) + slice.along_v->taps) - first_beam_;
+  if (beam_count_ <= 0) return false;
+
+  // A segment's taps reach that far beyond the octet that made it count.
+  const auto segment_voxels = std::int32_t(kSegment * slice.columns.step >> 32) + 1;
+  margin_ = std::max(margin_, (slice.along_u->padded_taps + segment_voxels + kOctet - 1) / kOctet * kOctet);
+  const std::int32_t voxels = pass_.octet_count * kOctet + 2 * margin_;
+  const auto beams = std::size_t(beam_count_);
+  if (voxels != shaded_voxels_ || shaded_.size() < 4 * beams * std::size_t(voxels)) {
+    shaded_voxels_ = voxels;
+    shaded_.assign(4 * beams * std::size_t(voxels), 0.0F);
+  }
+  if (filtered_.size() < 4 * beams * std::size_t(pass_.bounds.width())) filtered_.resize(4 * beams * std::size_t(pass_.bounds.width()));
+  needed_.assign((beams + 1) * std::size_t(words_), 0);  // and a word behind the last beam's, for spans
+  filled_.assign(needed_.size(), 0);
+  return true;
+}
+
+// Beam by beam: which segments are wanted of it, and which of its octets reach them.
+void SplatBand::FindNeeded(const SliceSamples& slice) {
+  std::ranges::fill(owned_, 0);
+  Insert(owned_.data(), (slice.owned.x_begin - pass_.bounds.x_begin) / kSegment,
+         (slice.owned.x_end - pass_.bounds.x_begin + kSegment - 1) / kSegment);
+  for (std::int32_t beam = first_beam_; beam < first_beam_ + beam_count_; ++beam) {
+    const std::size_t number = pass_.cells.Beam(slice_, beam);
+    if (pass_.cells.first_record[number] == pass_.cells.first_record[number + 1]) continue;
+    const std::int32_t row_begin = FirstPixelWithTap(slice.rows, beam - slice.along_v->taps + 1, rows_.begin, rows_.end);
+    const std::int32_t row_end = FirstPixelWithTap(slice.rows, beam + 1, rows_.begin, rows_.end);
+    SegmentWord* needed = &needed_[BeamWord(beam)];
+    SegmentWord any = 0;
+    for (std::int32_t row = row_begin; row < row_end; ++row) {
+      for (std::int32_t word = 0; word < words_; ++word) needed[word] |= Open(row)[word];
+    }
+    for (std::int32_t word = 0; word < words_; ++word) any |= needed[word] &= owned_[std::size_t(word)];
+    if (any != 0) FindOctets(beam);
+  }
+}
+
+void SplatBand::FindOctets(std::int32_t beam) {
+  const OccupiedCells& cells = pass_.cells;
+  const std::size_t number = cells.Beam(slice_, beam);
+  const std::uint32_t* masks = cells.Masks(number);
+  const std::uint16_t* offsets = cells.RecordOffsets(number);
+  const VoxelRecord* records = &cells.records[cells.first_record[number]];
+  const SegmentSpan* reached = pass_.Reached(slice_);
+  const SegmentWord* needed = &needed_[BeamWord(beam)];
+  SegmentWord* filled = &filled_[BeamWord(beam)];
+  float* shaded = ShadedBeam(beam) + 4 * std::ptrdiff_t{margin_};
+  const SheetOpacity::Beam levels = pass_.opacity.BeamAt(slice_, beam);
+  // Cells that hold something of the occupied box, by their number among those of `reached`.
+  const std::int32_t before = pass_.first_octet / kCellOctets - cells.first_cell;
+  for (std::int32_t cell = 0; cell < pass_.octet_count / kCellOctets; ++cell) {
+    const std::uint32_t mask = masks[before + cell];
+    if (mask == 0) continue;
+    const VoxelRecord* record = records + offsets[before + cell];
+    for (std::int32_t i = 0; i < kCellOctets; ++i) {
+      const std::uint32_t occupied = mask >> (i * kOctet) & ((1U << kOctet) - 1);
+      const std::int32_t octet = cell * kCellOctets + i;
+      if (occupied != 0 && AnyOf(needed, reached[octet])) {
+        __builtin_prefetch(record);  // shading comes to it after the slice's other octets
+        Insert(filled, reached[octet]);
+        OctetWork& work = octets_.emplace_back(OctetWork{record, shaded + 4 * std::ptrdiff_t{octet * kOctet}, occupied});
+        if (!pass_.opacity.one_level()) {
+          const std::int32_t u = (pass_.first_octet + octet) * kOctet;
+          work.level = levels.LevelAt(u);
+          work.level_step = (levels.LevelAt(u + kOctet - 1) - work.level) / (kOctet - 1);
+        }
+        report_.drawn_voxels += kOctetCount[occupied];
+      }
+      record += kOctetCount[occupied];
+    }
+  }
+  for (std::int32_t word = 0; word < words_; ++word) filled[word] &= needed[word];
+}
+
+void SplatBand::FilterBeams(const SliceSamples& slice) {
+  for (std::int32_t beam = first_beam_; beam < first_beam_ + beam_count_; ++beam) {
+    const float* voxel_0 = ShadedBeam(beam) + 4 * std::ptrdiff_t{margin_ - pass_.first_octet * kOctet};
+    FilterBeam(*slice.along_u, slice.columns, {voxel_0, FilteredBeam(beam), &filled_[BeamWord(beam)], words_, pass_.bounds.x_begin});
+  }
+  for (const OctetWork& octet : octets_) std::memset(octet.rgba, 0, 4 * kOctet * sizeof(float));
+}
+
+void SplatBand::CompositeRows(const SliceSamples& slice) {
+  const std::int32_t taps = slice.along_v->taps;
+  const bool cut = slice.owned.x_begin % kSegment != 0 || slice.owned.x_end % kSegment != 0;
+  for (std::int32_t row = rows_.begin; row < rows_.end; ++row) {
+    const std::int64_t at = slice.rows.At(row);
+    const std::int32_t first = Lattice::First(at);
+    // Of its taps, those on beams that there are.
+    const std::int32_t begin = std::max(first, first_beam_), end = std::min(first + taps, first_beam_ + beam_count_);
+    if (begin >= end) continue;
+    row_beams_.clear();
+    row_filled_.clear();
+    for (std::int32_t beam = begin; beam < end; ++beam) {
+      row_beams_.push_back(FilteredBeam(beam));
+      row_filled_.push_back(&filled_[BeamWord(beam)]);
+    }
+    RowWork work;
+    work.taps = end - begin;
+    work.weights = &slice.along_v->weights[Lattice::Phase(at) * std::size_t(taps) + std::size_t(begin - first)];
+    work.beams = row_beams_.data();
+    work.filled = row_filled_.data();
+    work.accumulated = &image_.rgba[4 * std::size_t(row - pass_.bounds.y_begin) * std::size_t(pass_.bounds.width())];
+    work.open = Open(row);
+    work.words = words_;
+    work.opaque_alpha = opaque_alpha_;
+    if (cut) {
+      CompositeCutRow(slice, work);
+    } else {
+      CompositeRow(work);
+    }
+  }
+}
+
+// Where the box owns a part of a segment, what belongs to others is put back.
+void SplatBand::CompositeCutRow(const SliceSamples& slice, const RowWork& work) {
+  struct Cut {
+    std::int32_t segment = 0, begin = 0, end = 0;  // pixels of the segment that are not owned
+    bool open = false;
+    std::array<float, kSegmentFloats> kept{};
+  };
+  const std::int32_t left = slice.owned.x_begin - pass_.bounds.x_begin, right = slice.owned.x_end - pass_.bounds.x_begin;
+  std::array<Cut, 2> cuts = {Cut{left / kSegment, 0, left % kSegment}, Cut{right / kSegment, right % kSegment, kSegment}};
+  if (right % kSegment == 0) cuts[1] = {0, 0, 0};
+  for (Cut& cut : cuts) {
+    cut.open = AnyOf(work.open, cut.segment, cut.segment + 1);
+    std::copy_n(work.accumulated + std::ptrdiff_t{cut.segment} * kSegmentFloats, kSegmentFloats, cut.kept.begin());
+  }
+  CompositeRow(work);
+  for (const Cut& cut : cuts) {
+    if (cut.begin == cut.end) continue;
+    float* segment = work.accumulated + std::ptrdiff_t{cut.segment} * kSegmentFloats;
+    std::copy(cut.kept.begin() + 4 * cut.begin, cut.kept.begin() + 4 * cut.end, segment + 4 * cut.begin);
+    if (cut.open) Insert(work.open, cut.segment, cut.segment + 1);  // whether it is opaque was judged with what does not belong here
+  }
+}
+
+}  // namespace slabstream

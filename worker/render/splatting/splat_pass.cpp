@@ -1,0 +1,45 @@
+#include "worker/render/splatting/splat_pass.h"
+
+#include <algorithm>
+
+#include "worker/kernels/segment_set.h"
+
+namespace slabstream {
+namespace {
+
+PixelBounds WholeSegments(const PixelBounds& b) {
+  if (b.empty()) return {};
+  return {b.x_begin / kSegment * kSegment, b.y_begin, (b.x_end + kSegment - 1) / kSegment * kSegment, b.y_end};
+}
+
+}  // namespace
+
+SplatPass::SplatPass(const OccupiedCells& occupied_cells, const ClassificationTable& table, const FrameSetup& frame_setup, const Box& box,
+                     const OcclusionMask& hidden_tiles)
+    : cells(occupied_cells), setup(frame_setup), hidden(hidden_tiles), opacity(frame_setup), tables(opacity.Tables(table)) {
+  const auto [c, u, v] = cells.axes;
+  const Box& occupied = cells.occupied;
+  for (std::int32_t k = occupied.begin[c]; k < occupied.end[c]; ++k) {
+    slices.push_back(SampleSlice(setup, box, occupied, k, footprints));
+    if (!slices.back().owned.empty()) bounds = Union(bounds, slices.back().owned);
+  }
+  bounds = WholeSegments(bounds);
+  if (bounds.empty()) return;
+
+  first_octet = occupied.begin[u] / kCellVoxels * kCellOctets;
+  octet_count = ((occupied.end[u] - 1) / kCellVoxels + 1) * kCellOctets - first_octet;
+  reached.reserve(slices.size() * std::size_t(octet_count));
+  for (const SliceSamples& slice : slices) {
+    const PixelBounds& owned = slice.owned;
+    for (std::int32_t octet = first_octet; octet < first_octet + octet_count; ++octet) {
+      reached.emplace_back();
+      if (owned.empty()) continue;
+      const std::int32_t begin =
+          FirstPixelWithTap(slice.columns, octet * kOctet - slice.along_u->taps + 1, owned.x_begin, owned.x_end) - bounds.x_begin;
+      const std::int32_t end = FirstPixelWithTap(slice.columns, (octet + 1) * kOctet, owned.x_begin, owned.x_end) - bounds.x_begin;
+      if (begin < end) reached.back() = MakeSpan(begin / kSegment, (end + kSegment - 1) / kSegment);
+    }
+  }
+}
+
+}  // namespace slabstream
