@@ -1,11 +1,11 @@
-// The image operators on 512 x 512 pixels: over on rows (vectors and reference), sheets into the image (splatting), whole images by over
-// and by nearest depth.
+// The image operators on 512 x 512 pixels: over on rows (vectors and reference), whole images by over and by nearest depth, and the picture
+// from the frame of splatting.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
 
 #include "common/kernels/combine.h"
-#include "worker/kernels/composite.h"
+#include "common/kernels/resample.h"
 
 namespace slabstream {
 namespace {
@@ -49,29 +49,27 @@ void CombineImages(benchmark::State& state) {
 }
 BENCHMARK(CombineImages)->Arg(1)->Arg(2)->Unit(benchmark::kMicrosecond);
 
-template <float (*kComposite)(const TileWork&)>
-void CompositeSheet(benchmark::State& state) {
-  AlignedVector<float> sheet(4 * std::size_t(kPixels)), accumulated(4 * std::size_t(kPixels));
-  const AlignedVector<float> ratio(std::size_t(kPixels), 1.1F);
+// A picture from a frame of about as many pixels, turned and skewed as by an oblique view, 16 rows a call.
+template <void (*kResample)(const LocalImage&, const ProjectiveMap&, std::int32_t, std::int32_t, LocalImage&)>
+void Resample(benchmark::State& state) {
+  const LocalImage frame = Filled(PixelFormat::kRgba, 0.3F);
+  LocalImage picture = Filled(PixelFormat::kRgba, 0);
+  const double scale = double(state.range(0)) / 100, c = 0.9 * scale, s = 0.43 * scale;
+  const ProjectiveMap map = {c, -s, 256 - 256 * (c - s), s, c, 256 - 256 * (c + s), 0, 0, 1};
   for (auto _ : state) {
-    for (std::int32_t y = 0; y < kSide; y += kTile) {
-      for (std::int32_t x = 0; x < kSide; x += kTile) {
-        const std::size_t pixel = std::size_t(y) * kSide + std::size_t(x);
-        TileWork tile;
-        tile.sheet = &sheet[4 * pixel];
-        tile.accumulated = &accumulated[4 * pixel];
-        tile.row_pixels = kSide;
-        if (state.range(0) == 2) tile.distance_ratio = &ratio[pixel];
-        for (int j = 0; j < kTile; ++j) std::fill_n(tile.sheet + std::size_t(j) * 4 * kSide, 4 * kTile, 0.01F);
-        benchmark::DoNotOptimize(kComposite(tile));
-      }
-    }
+    for (std::int32_t y = 0; y < kSide; y += 16) kResample(frame, map, y, y + 16, picture);
+    benchmark::ClobberMemory();
   }
   state.SetItemsProcessed(state.iterations() * kPixels);
-  state.SetLabel(state.range(0) == 2 ? "perspective" : "orthographic");
 }
-BENCHMARK(CompositeSheet<CompositeTile>)->Name("CompositeSheet")->Arg(1)->Arg(2)->Unit(benchmark::kMicrosecond);
-BENCHMARK(CompositeSheet<CompositeTileReference>)->Name("CompositeSheetReference")->Arg(1)->Arg(2)->Unit(benchmark::kMicrosecond);
+BENCHMARK(Resample<ResampleRows>)->Name("Resample")->ArgName("scale_percent")->Arg(50)->Arg(100)->Arg(400)->Unit(benchmark::kMicrosecond);
+BENCHMARK(Resample<ResampleRowsReference>)
+    ->Name("ResampleReference")
+    ->ArgName("scale_percent")
+    ->Arg(50)
+    ->Arg(100)
+    ->Arg(400)
+    ->Unit(benchmark::kMicrosecond);
 
 }  // namespace
 }  // namespace slabstream

@@ -1,12 +1,16 @@
-// Stage times of whole renderings: the paper's two spheres at N = 200, as one box and as two boxes one after the other (p = 1, 2), both
-// pipelines, second frame on. Counters are milliseconds a frame, summed over boxes.
+// Stage times of whole renderings on one thread: the paper's two spheres at N = 200, as one box and as two boxes one after the other
+// (p = 1, 2), both pipelines, second frame on. Counters are milliseconds a frame, summed over boxes; `finish` is the picture from the
+// frame.
 #include <benchmark/benchmark.h>
+#include <tbb/task_arena.h>
 
 #include <atomic>
+#include <chrono>
 #include <cstring>
 
 #include "common/decomposition/decomposition.h"
 #include "common/volume/sphere.h"
+#include "worker/render/finish_picture.h"
 #include "worker/render/pipeline.h"
 
 namespace slabstream {
@@ -30,8 +34,13 @@ void Stages(benchmark::State& state) {
   ViewParameters view;
   view.azimuth_degrees = 30;
   view.elevation_degrees = 20;
-  setup.camera = MakeCamera(view, {512, 512}, volume.description.geometry);
-  setup.halo = RequiredHalo(setup.camera, volume.description.geometry);
+  const VolumeGeometry& geometry = volume.description.geometry;
+  if (renderer_kind == RendererKind::kSplat) {
+    setup.camera = MakeCamera(view, {512, 512}, geometry);
+    setup.sheets = MakeSheetGrid(setup.camera, geometry);
+  } else {
+    setup.camera = MakeSupersampledCamera(view, {512, 512}, geometry);
+  }
 
   DecompositionRequest request;
   request.summary = &summary;
@@ -47,13 +56,23 @@ void Stages(benchmark::State& state) {
 
   const std::unique_ptr<Renderer> renderer = MakeRenderer(renderer_kind);
   const std::atomic<bool> cancelled{false};
+  tbb::task_arena one_thread(1);
+  std::chrono::duration<double, std::milli> finish{};
   const auto render = [&](RankReport& report) {
-    for (std::size_t i = 0; i < slabs.size(); ++i) {
-      benchmark::DoNotOptimize(renderer->Render(*slabs[i], partition.boxes()[i], setup, cancelled, report).value());
-    }
+    one_thread.execute([&] {
+      LocalImage frame;
+      for (std::size_t i = 0; i < slabs.size(); ++i) {
+        frame = renderer->Render(*slabs[i], partition.boxes()[i], setup, {}, cancelled, report).value();
+        benchmark::DoNotOptimize(frame.rgba.data());
+      }
+      const auto begin = std::chrono::steady_clock::now();
+      benchmark::DoNotOptimize(FinishPicture(std::move(frame), setup));
+      finish += std::chrono::steady_clock::now() - begin;
+    });
   };
   RankReport first, report;
   render(first);
+  finish = {};
   for (auto _ : state) {
     report.spans.clear();
     render(report);
@@ -63,6 +82,7 @@ void Stages(benchmark::State& state) {
   for (Stage stage : {Stage::kTransform, Stage::kShade, Stage::kSplat, Stage::kComposite, Stage::kZBuffer}) {
     if (const auto ns = report.stage_ns[std::size_t(stage)]; ns != 0) state.counters[std::string(ToString(stage))] = double(ns) / frames;
   }
+  state.counters["finish"] = finish.count() / double(state.iterations());
   state.counters["voxels"] = double(first.drawn_voxels);
 }
 BENCHMARK(Stages)->ArgNames({"class", "p", "renderer"})->ArgsProduct({{1, 2}, {1, 2}, {1, 2}})->Unit(benchmark::kMillisecond);

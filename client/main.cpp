@@ -5,7 +5,7 @@
 #include "common/base/large_buffers.h"
 
 int main(int argc, char** argv) {
-  slabstream::MapLargeBuffers();
+  slabstream::KeepFrameBuffers();
   try {
     return slabstream::RunCommandLine(argc, argv);
   } catch (const std::exception& error) {  // out of memory, mostly: everything that is expected comes back as a Status

@@ -1,16 +1,22 @@
 #include "client/cli/command_line.h"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <functional>
 #include <iostream>
 #include <string>
+#include <string_view>
 #include <thread>
 
 #include "client/cli/commands.h"
+#include "client/cli/cores.h"
 #include "client/cli/files.h"
 #include "client/cli/option_groups.h"
 #include "common/base/log.h"
+#include "common/kernels/simd_target.h"
 #include "common/transport/endpoint.h"
 
 namespace slabstream {
@@ -22,6 +28,7 @@ constexpr int kExitInterrupted = 130;  // 128 + SIGINT, as shells count
 struct AllOptions {
   RenderOptions render;
   TurntableOptions turntable;
+  BenchOptions bench;
   InfoOptions info;
   SphereOptions sphere;
   UpOptions up;
@@ -54,6 +61,39 @@ void DeclareTurntable(CLI::App& app, TurntableOptions& options, Command& command
   sub->callback([&] { command = [&] { return RunTurntable(options); }; });
 }
 
+void DeclareBench(CLI::App& app, BenchOptions& options, Command& command) {
+  CLI::App* sub = app.add_subcommand("bench", "Measure the standard cases, or volumes of your own, on turntables of both projections");
+  options.connection.local_workers = 1;
+  sub->add_option("CASE", options.cases, "Standard cases (see --list; default: all), or volumes: FILE[:PRESET|:FILE.json]");
+  sub->add_flag("--list", options.list, "Tell which standard cases there are");
+  AddInteger(*sub, "--size", options.size, 1, kMaxBenchSize, "Pixels a side");
+  AddInteger(*sub, "--frames", options.frames, 1, kMaxTurntableFrames, "Views of a turn of each projection");
+  AddInteger(*sub, "--turns", options.turns, 1, kMaxTurns, "Turns of each projection");
+  CLI::Option* workers = AddInteger(*sub, "--workers", options.connection.local_workers, 1, kMaxLocalWorkers, "Workers in this process");
+  AddThreads(*sub, options.connection.local_threads, "Render threads of each worker");
+  CLI::Option* endpoint = AddEndpoint(*sub, options.connection.endpoint)->excludes(workers);
+  endpoint->description("Instead of one in this process, measure the service there; CASE is then NAME[:PRESET|:FILE.json] of a dataset");
+  AddParsed(
+      *sub, "--renderer", options.renderer,
+      [](const std::string& option, const std::string& text) -> Result<std::optional<RendererKind>> {
+        const Result<std::size_t> index = ParseChoice(option, text, std::array<std::string_view, 2>{"splat", "zbuffer"});
+        if (!index.ok()) return index.status();
+        return std::optional(*index == 0 ? RendererKind::kSplat : RendererKind::kZBuffer);
+      },
+      "Instead of that of each case")
+      ->type_name("splat|zbuffer");
+  sub->add_option("--json", options.json_path, "Write all figures and the machine as JSON")->type_name("FILE");
+  sub->add_option("--pictures", options.pictures_directory, "Write the first view of each projection there, after the measuring")
+      ->type_name("DIR");
+  sub->add_option("--export", options.export_directory, "Measure nothing: write volumes, transfer functions and views for other renderers")
+      ->type_name("DIR")
+      ->excludes(endpoint);
+  sub->callback([&] {
+    if (!options.connection.endpoint.empty()) options.connection.local_workers = 0;
+    command = [&] { return RunBench(options); };
+  });
+}
+
 void DeclareInfo(CLI::App& app, InfoOptions& options, Command& command) {
   CLI::App* sub = app.add_subcommand("info", "Tell what a volume file holds");
   sub->add_option("SOURCE", options.path, "A volume file")->required();
@@ -82,10 +122,10 @@ void DeclareSphere(CLI::App& app, SphereOptions& options, Command& command) {
 
 void DeclareUp(CLI::App& app, UpOptions& options, Command& command) {
   CLI::App* sub = app.add_subcommand("up", "Start a coordinator and workers on this machine");
-  options.workers = std::clamp(int(std::thread::hardware_concurrency()), 1, kMaxUpWorkers);
+  options.workers = std::min(CoreCount(), kMaxUpWorkers);
   options.listen = "tcp://127.0.0.1:7420";
   AddInteger(*sub, "--workers", options.workers, 1, kMaxUpWorkers, "Worker processes (default: one a core)");
-  AddInteger(*sub, "--threads", options.threads, 1, 1024, "Render threads of each worker");
+  AddThreads(*sub, options.threads, "Render threads of each worker");
   sub->add_option("--data", options.data, "Volumes to serve: NAME=PATH, or a directory whose files are named after themselves")
       ->type_name("NAME=PATH|DIR")
       ->expected(1)
@@ -100,6 +140,7 @@ void DeclareUp(CLI::App& app, UpOptions& options, Command& command) {
       "Where clients reach the service; tcp://127.0.0.1:* takes any free port")
       ->type_name("ENDPOINT")
       ->default_str(options.listen);
+  sub->add_flag("--compress", options.compress, "Pack pictures with zstd, for clients behind a slow tunnel");
   sub->add_flag("--detach", options.detach, "Return when the service is ready; `slabstream down` ends it");
   sub->callback([&] { command = [&] { return RunUp(options); }; });
 }
@@ -145,8 +186,10 @@ int RunCommandLine(int argc, const char* const* argv) {
   CLI::App app("Slabstream renders volumes on CPUs, by any number of worker processes.", "slabstream");
   AllOptions options;
   Command command;
+  options.bench.command = fmt::format("{}", fmt::join(argv, argv + argc, " "));
   DeclareRender(app, options.render, command);
   DeclareTurntable(app, options.turntable, command);
+  DeclareBench(app, options.bench, command);
   DeclareInfo(app, options.info, command);
   DeclareSphere(app, options.sphere, command);
   DeclareUp(app, options.up, command);
@@ -167,7 +210,8 @@ int RunCommandLine(int argc, const char* const* argv) {
   if (!command) return Complain("slabstream", "a subcommand is needed: " + SubcommandNames(app), 2);
 
   InitLog(name(), LogLevel::kWarning);
-  const Status status = command();
+  Status status = LimitSimdTargetByEnvironment();
+  if (status.ok()) status = command();
   return status.ok() ? 0 : Complain(name(), status.message(), ExitStatus(status));
 }
 

@@ -9,6 +9,7 @@ namespace slabstream {
 
 Status RunRender(const RenderOptions& options);
 Status RunTurntable(const TurntableOptions& options);
+Status RunBench(const BenchOptions& options);
 Status RunInfo(const InfoOptions& options);
 Status RunSphere(const SphereOptions& options);
 Status RunUp(const UpOptions& options);

@@ -17,7 +17,11 @@ using std::chrono::milliseconds;
 class FrameLoop {
  public:
   FrameLoop(Client& client, const std::vector<FrameJob>& jobs, const FrameLoopOptions& options)
-      : client_(client), jobs_(jobs), options_(options), display_(options.progress, int(jobs.size())), records_(jobs.size()) {}
+      : client_(client),
+        jobs_(jobs),
+        options_(options),
+        display_(options.progress, int(jobs.size()), options.label),
+        records_(jobs.size()) {}
 
   Status Run() {
     const InterruptGuard interrupt(client_.wakeup());
@@ -70,6 +74,7 @@ class FrameLoop {
     FrameRecord& record = records_[index];
     record = {jobs_[index].output, picture.latency, std::move(picture.statistics)};
     if (!options_.keep_reports) record.statistics.reports = {};
+    if (record.output.empty()) return Status::Ok();
     writes_.push_back(std::async(std::launch::async, [this, picture = std::move(picture), output = record.output] {
       Status status = WritePicture(picture.image, picture.size, output, options_.format);
       client_.wakeup().Notify();

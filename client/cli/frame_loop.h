@@ -1,4 +1,4 @@
-// Frames, one after another, with some asked for ahead: what `render` (one frame) and `turntable` share.
+// Frames, one after another, with some asked for ahead: what `render` (one frame), `turntable` and `bench` share.
 #pragma once
 
 #include <string>
@@ -12,7 +12,7 @@ namespace slabstream {
 
 struct FrameJob {
   FrameRequest request;
-  std::string output;  // where the picture goes
+  std::string output;  // where the picture goes; empty: nowhere
 };
 
 // What is remembered of a finished frame.
@@ -27,6 +27,7 @@ struct FrameLoopOptions {
   PictureFormat format;
   bool keep_reports = false;
   bool progress = false;  // on stderr
+  std::string label;      // what the progress begins with
 };
 
 // Renders and writes `jobs`; pictures are encoded beside the frames that follow. The records are in the order of the jobs. The first

@@ -4,38 +4,19 @@
 
 #include <array>
 #include <filesystem>
-#include <thread>
 #include <vector>
 
+#include "client/cli/cores.h"
 #include "client/cli/files.h"
 #include "common/combining/schedule.h"
 #include "common/decomposition/decomposition.h"
 #include "common/transport/endpoint.h"
+#include "common/wire/control_messages.h"
 
 namespace slabstream {
 namespace {
 
-constexpr int kMaxLocalWorkers = 256;  // of EmbeddedOptions
 constexpr std::size_t kMaxTransferFileBytes = std::size_t{16} << 20;
-
-int CoreCount() { return std::max(1, int(std::thread::hardware_concurrency())); }
-
-// A ParaView colour map if the text names a file, else the name of a preset.
-Result<std::variant<std::string, TransferFunction>> ParseTransfer(const std::string& option, const std::string& text) {
-  using Choice = std::variant<std::string, TransferFunction>;
-  if (std::filesystem::path(text).extension() == ".json" || text.find('/') != std::string::npos) {
-    const Result<std::string> json = ReadTextFile(text, kMaxTransferFileBytes);
-    if (!json.ok()) return Status(json.status().code(), fmt::format("{} {}", option, json.status().message()));
-    Result<TransferFunction> transfer = ParseParaViewColorMap(*json, text);
-    if (!transfer.ok()) return Status(transfer.status().code(), fmt::format("{} {}", option, transfer.status().message()));
-    return Choice(*std::move(transfer));
-  }
-  std::vector<std::string_view> names;
-  for (const PresetInfo& preset : TransferPresets()) names.push_back(preset.name);
-  const Result<std::size_t> index = ParseChoice(option, text, names);
-  if (!index.ok()) return Status::InvalidArgument(index.status().message() + ", nor a .json file");
-  return Choice(text);
-}
 
 // An option that takes one of the names of a list such as Decompositions(), whose entries have a name and a purpose.
 template <class T, class Entries>
@@ -72,9 +53,11 @@ void AddConnectionOptions(CLI::App& app, ConnectionOptions& connection) {
     if (text == "true") return std::min(CoreCount(), kMaxLocalWorkers);
     return ParseInteger(option, text, 1, kMaxLocalWorkers);
   };
-  AddParsed(app, "--local", connection.local_workers, parse,
-            fmt::format("Render the file SOURCE in this process; --local=N: by N workers (default: one a core, {} here)", CoreCount()))
-      ->expected(0);
+  CLI::Option* local =
+      AddParsed(app, "--local", connection.local_workers, parse,
+                fmt::format("Render the file SOURCE in this process; --local=N: by N workers (default: one a core, {} here)", CoreCount()))
+          ->expected(0);
+  AddThreads(app, connection.local_threads, "Render threads of each worker of --local")->needs(local);
   AddEndpoint(app, connection.endpoint);
 }
 
@@ -136,6 +119,22 @@ void AddPolicyOptions(CLI::App& app, Policy& policy) {
 
 }  // namespace
 
+Result<std::variant<std::string, TransferFunction>> ParseTransfer(const std::string& option, const std::string& text) {
+  using Choice = std::variant<std::string, TransferFunction>;
+  if (std::filesystem::path(text).extension() == ".json" || text.find('/') != std::string::npos) {
+    const Result<std::string> json = ReadTextFile(text, kMaxTransferFileBytes);
+    if (!json.ok()) return Status(json.status().code(), fmt::format("{} {}", option, json.status().message()));
+    Result<TransferFunction> transfer = ParseParaViewColorMap(*json, text);
+    if (!transfer.ok()) return Status(transfer.status().code(), fmt::format("{} {}", option, transfer.status().message()));
+    return Choice(*std::move(transfer));
+  }
+  std::vector<std::string_view> names;
+  for (const PresetInfo& preset : TransferPresets()) names.push_back(preset.name);
+  const Result<std::size_t> index = ParseChoice(option, text, names);
+  if (!index.ok()) return Status::InvalidArgument(index.status().message() + ", nor a .json file");
+  return Choice(text);
+}
+
 CLI::Option* AddNumber(CLI::App& app, const std::string& names, double& target, NumberRange range, const std::string& help) {
   const auto parse = [range](const std::string& option, const std::string& text) { return ParseNumber(option, text, range); };
   return AddParsed(app, names, target, parse, help)->type_name("NUMBER")->default_str(fmt::format("{}", target));
@@ -146,14 +145,19 @@ CLI::Option* AddInteger(CLI::App& app, const std::string& names, int& target, in
   return AddParsed(app, names, target, parse, help)->type_name("N")->default_str(fmt::format("{}", target));
 }
 
-void AddEndpoint(CLI::App& app, std::string& endpoint) {
+CLI::Option* AddThreads(CLI::App& app, int& threads, const std::string& help) {
+  return AddInteger(app, "--threads", threads, 1, int(kMaxThreads), help + " (default: the cores divided by the workers, at least 1)")
+      ->default_str("");
+}
+
+CLI::Option* AddEndpoint(CLI::App& app, std::string& endpoint) {
   const auto parse = [](const std::string& option, const std::string& text) -> Result<std::string> {
     const Result<Endpoint> parsed = ParseEndpoint(text, false);
     if (!parsed.ok()) return Status::InvalidArgument(fmt::format("{} {}", option, parsed.status().message()));
     return text;
   };
-  AddParsed(app, "--endpoint", endpoint, parse,
-            "Where the service listens (default: $SLABSTREAM_ENDPOINT, the service started last by `up`)")
+  return AddParsed(app, "--endpoint", endpoint, parse,
+                   "Where the service listens (default: $SLABSTREAM_ENDPOINT, the service started last by `up`)")
       ->type_name("ENDPOINT");
 }
 

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <string>
 #include <utility>
+#include <variant>
 
 #include "client/cli/options.h"
 
@@ -26,7 +27,13 @@ CLI::Option* AddParsed(CLI::App& app, const std::string& names, T& target, Parse
 CLI::Option* AddNumber(CLI::App& app, const std::string& names, double& target, NumberRange range, const std::string& help);
 CLI::Option* AddInteger(CLI::App& app, const std::string& names, int& target, int min, int max, const std::string& help);
 
-void AddEndpoint(CLI::App& app, std::string& endpoint);
+CLI::Option* AddEndpoint(CLI::App& app, std::string& endpoint);
+
+// What --transfer takes: a ParaView colour map if the text names a file, else the name of a preset.
+Result<std::variant<std::string, TransferFunction>> ParseTransfer(const std::string& option, const std::string& text);
+
+// --threads, [1, kMaxThreads]; 0 is left where it is not given.
+CLI::Option* AddThreads(CLI::App& app, int& threads, const std::string& help);
 
 // --transfer and --opacity-distance.
 void AddTransferOptions(CLI::App& app, TransferChoice& transfer);

@@ -1,6 +1,7 @@
 // What each subcommand was asked to do: plain values, filled by command_line.cpp, valid when a command sees them.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,9 +12,12 @@
 
 namespace slabstream {
 
+inline constexpr int kMaxLocalWorkers = 256;  // of EmbeddedOptions
+
 // Where the frames are rendered.
 struct ConnectionOptions {
   int local_workers = 0;  // 0: at the service; else in this process, by this many workers
+  int local_threads = 0;  // of each of these; 0: LocalThreads
   std::string endpoint;   // empty: see DefaultEndpoint (service_state.h)
 };
 
@@ -44,6 +48,20 @@ struct TurntableOptions {
   int in_flight = 2;  // [1, kMaxInFlight] frames asked for and not yet complete
 };
 
+inline constexpr int kMaxBenchSize = 8192;
+
+struct BenchOptions {
+  std::vector<std::string> cases;  // as ParseBenchCase takes them; empty: all standard ones
+  ConnectionOptions connection;
+  int size = 512;                                               // pixels a side, [1, kMaxBenchSize]
+  int frames = 12;                                              // of a turn of each projection, [1, kMaxTurntableFrames]
+  int turns = 2;                                                // [1, kMaxTurns]
+  std::optional<RendererKind> renderer;                         // instead of that of each case
+  std::string json_path, pictures_directory, export_directory;  // empty: not wanted
+  bool list = false;
+  std::string command;  // as it was typed
+};
+
 struct InfoOptions {
   std::string path;
   TransferChoice transfer;
@@ -59,9 +77,10 @@ inline constexpr int kMaxUpWorkers = 256;
 
 struct UpOptions {
   int workers = 1;                // processes, [1, kMaxUpWorkers]
-  int threads = 1;                // of each worker
+  int threads = 0;                // of each worker; 0: CoreShare
   std::vector<std::string> data;  // NAME=PATH or DIR, as slabstream-coordinator takes them
   std::string listen;             // endpoint for clients; a wildcard port is fine
+  bool compress = false;          // of pictures
   bool detach = false;
 };
 

@@ -9,8 +9,8 @@
 
 namespace slabstream {
 
-ProgressDisplay::ProgressDisplay(bool wanted, int frame_count)
-    : wanted_(wanted), terminal_(::isatty(STDERR_FILENO) == 1), frame_count_(frame_count) {}
+ProgressDisplay::ProgressDisplay(bool wanted, int frame_count, const std::string& label)
+    : wanted_(wanted), terminal_(::isatty(STDERR_FILENO) == 1), label_(label.empty() ? "" : label + ": "), frame_count_(frame_count) {}
 
 ProgressDisplay::~ProgressDisplay() {
   if (terminal_ && !last_.empty()) std::cerr << "\r\033[K" << std::flush;
@@ -18,12 +18,12 @@ ProgressDisplay::~ProgressDisplay() {
 
 void ProgressDisplay::Show(int frame, const FrameProgress& progress) {
   const double part = progress.group_count == 0 ? 0 : double(progress.groups_done) / progress.group_count;
-  Draw(frames_done_ + part, fmt::format("frame {} of {}: {}", frame + 1, frame_count_, Describe(progress)));
+  Draw(frames_done_ + part, fmt::format("{}frame {} of {}: {}", label_, frame + 1, frame_count_, Describe(progress)));
 }
 
 void ProgressDisplay::FrameDone(int frame) {
   ++frames_done_;
-  Draw(frames_done_, fmt::format("frame {} of {}: done", frame + 1, frame_count_));
+  Draw(frames_done_, fmt::format("{}frame {} of {}: done", label_, frame + 1, frame_count_));
 }
 
 void ProgressDisplay::Draw(double done, const std::string& text) {

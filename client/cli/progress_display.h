@@ -9,8 +9,8 @@ namespace slabstream {
 
 class ProgressDisplay {
  public:
-  ProgressDisplay(bool wanted, int frame_count);
-  ~ProgressDisplay();  // clears the bar
+  ProgressDisplay(bool wanted, int frame_count, const std::string& label = "");  // label: what each text begins with
+  ~ProgressDisplay();                                                            // clears the bar
   ProgressDisplay(const ProgressDisplay&) = delete;
   ProgressDisplay& operator=(const ProgressDisplay&) = delete;
 
@@ -21,6 +21,7 @@ class ProgressDisplay {
   void Draw(double done, const std::string& text);
 
   bool wanted_, terminal_;
+  std::string label_;
   int frame_count_, frames_done_ = 0;
   std::string last_;  // what stands there, so that nothing is said twice
 };

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
+#include "client/cli/cores.h"
 #include "client/cli/input_volume.h"
 #include "client/cli/service_state.h"
 #include "client/embedded/embedded_service.h"
@@ -33,11 +36,16 @@ Result<Session> Session::Open(const ConnectionOptions& connection, const std::st
     return session;
   }
   if (Status status = CheckVolumePath(source); !status.ok()) return status;
+  return OpenLocal(connection, [source] { return Load(source); });
+}
+
+Result<Session> Session::OpenLocal(const ConnectionOptions& connection, std::function<Result<std::shared_ptr<const Volume>>()> load) {
   Session session;
   session.context_ = std::make_unique<Context>();
   EmbeddedOptions options;
   options.workers = connection.local_workers;
-  options.coordinator.catalogue[kLocalDataset] = [source] { return Load(source); };
+  options.coordinator.catalogue[kLocalDataset] = std::move(load);
+  options.worker.threads = std::uint32_t(LocalThreads(connection));
   Result<std::unique_ptr<EmbeddedService>> service = EmbeddedService::Start(*session.context_, std::move(options));
   if (!service.ok()) return service.status();
   session.service_ = *std::move(service);

@@ -1,12 +1,14 @@
 // Session: a client connected to a service, or to an embedded one of its own (`--local`).
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 
 #include "client/cli/options.h"
 #include "client/client.h"
 #include "common/base/status.h"
+#include "common/volume/volume.h"
 
 namespace slabstream {
 
@@ -17,6 +19,9 @@ class Session {
   // At the service `source` is a name of its catalogue; with local workers it is a volume file, which is checked to exist here and read
   // when the first frame asks for it. Unavailable within 5 s if nobody answers.
   static Result<Session> Open(const ConnectionOptions& connection, const std::string& source);
+  // In this process, by connection.local_workers > 0: a volume that `load` gives when the first frame asks for it, from a thread of its
+  // own.
+  static Result<Session> OpenLocal(const ConnectionOptions& connection, std::function<Result<std::shared_ptr<const Volume>>()> load);
   // The service alone, for `status`. `endpoint` as in ConnectionOptions.
   static Result<Session> OpenService(const std::string& endpoint);
   Session(Session&&) noexcept;

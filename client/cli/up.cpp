@@ -11,6 +11,7 @@
 #include <memory>
 
 #include "client/cli/commands.h"
+#include "client/cli/cores.h"
 #include "client/cli/process.h"
 #include "client/cli/service_state.h"
 #include "client/cli/session.h"
@@ -158,9 +159,11 @@ class LocalService {
   }
 
   Status StartWorkers() {
+    const int threads = options_.threads > 0 ? options_.threads : CoreShare(options_.workers);
+    std::vector<std::string> arguments = {"--coordinator", worker_endpoint_, "--threads", std::to_string(threads)};
+    if (options_.compress) arguments.emplace_back("--compress");
     for (int i = 0; i < options_.workers; ++i) {
-      const Result<Child*> child =
-          StartChild(kWorkerProgram, {"--coordinator", worker_endpoint_, "--threads", std::to_string(options_.threads)});
+      const Result<Child*> child = StartChild(kWorkerProgram, arguments);
       if (!child.ok()) return child.status();
       state_.workers.push_back((*child)->pid());
     }

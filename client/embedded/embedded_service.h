@@ -16,7 +16,7 @@ namespace slabstream {
 struct EmbeddedOptions {
   int workers = 1;                 // [1, 256]
   CoordinatorOptions coordinator;  // endpoints are filled in; catalogue and machine timings count
-  WorkerConfig worker;             // timings and budgets count
+  WorkerConfig worker;             // of each; threads, timings and budgets count
 };
 
 class EmbeddedService {

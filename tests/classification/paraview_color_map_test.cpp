@@ -5,6 +5,7 @@
 
 #include "common/classification/transfer_function.h"
 #include "tests/support/random.h"
+#include "tests/support/random_transfer.h"
 
 namespace slabstream {
 namespace {
@@ -81,6 +82,18 @@ TEST(ParaViewColorMap, SaysInOneLineWhatIsWrong) {
     EXPECT_THAT(status.message(), testing::StartsWith("map.json: "));
     EXPECT_THAT(status.message(), HasSubstr(named));
     EXPECT_THAT(status.message(), testing::Not(HasSubstr("\n")));
+  }
+}
+
+TEST(ParaViewColorMap, WhatIsWrittenIsReadAgain) {
+  Random random(8);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 200; ++i) {
+    TransferFunction transfer = RandomTransfer(random);
+    const Result<TransferFunction> read = ParseParaViewColorMap(FormatParaViewColorMap(transfer, "a \"name\"\xff"), "map.json");
+    ASSERT_TRUE(read.ok()) << read.status().message();
+    transfer.opacity_distance = 1;  // not part of a colour map
+    EXPECT_EQ(*read, transfer);
   }
 }
 

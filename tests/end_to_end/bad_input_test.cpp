@@ -37,7 +37,22 @@ TEST_F(BadInputTest, CommandLines) {
       {{"turntable", "v", "-o", "%d.png"}, "--frames"},
       {{"sphere", "--size", "8", "-o", "s.nrrd"}, "--class"},
       {{"info"}, "SOURCE"},
+      {{"bench", "class3-256"}, "CASE 'class3-256'"},
+      {{"bench", "brain", "brain"}, "a case called brain is given before it"},
+      {{"bench", "--size", "8193"}, "--size 8193 is out of range [1, 8192]"},
+      {{"bench", "--frames", "0"}, "--frames 0 is out of range [1, 100000]"},
+      {{"bench", "--turns", "1001"}, "--turns 1001 is out of range [1, 1000]"},
+      {{"bench", "--workers", "0"}, "--workers 0 is out of range [1, 256]"},
+      {{"bench", "--renderer", "ray"}, "--renderer 'ray' is not one of splat, zbuffer"},
+      {{"bench", "--json", "no/r.json"}, "--json 'no/r.json'"},
+      {{"bench", "--pictures", "/proc/no"}, "--pictures '/proc/no'"},
+      {{"bench", "--export", "/proc/no"}, "--export '/proc/no'"},
+      {{"bench", "--endpoint", "tcp://127.0.0.1:1", "--workers", "2"}, "--workers"},
       {{"up", "--workers", "257"}, "--workers 257 is out of range [1, 256]"},
+      {{"up", "--threads", "0"}, "--threads 0 is out of range [1, 1024]"},
+      {{"up", "--threads", "1025"}, "--threads 1025 is out of range [1, 1024]"},
+      {{"render", "v", "--threads", "2", "-o", "x.png"}, "--local"},
+      {{"render", "v", "--local", "--threads", "two", "-o", "x.png"}, "--threads 'two'"},
       {{"up", "--listen", "http://x"}, "--listen"},
       {{"status", "--endpoint", "tcp://0.0.0.0:1"}, "--endpoint"},
       {{"down", "--endpoint", "tcp://127.0.0.1:*"}, "--endpoint"},
@@ -139,6 +154,7 @@ TEST_F(BadInputTest, VolumeFiles) {
                            "flat.nrrd", "negative.nrrd", "empty.nii", "garbage.nii", "notes.txt", "."}) {
     ExpectRefused({"render", Path(name), "--local=1", "-o", "x.png"}, name);
     ExpectRefused({"info", Path(name)}, name);
+    ExpectRefused({"bench", Path(name)}, name);
   }
 }
 

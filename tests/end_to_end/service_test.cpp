@@ -59,6 +59,14 @@ TEST_F(ServiceTest, RendersTheSamePictureAsThisProcessAlone) {
   EXPECT_THAT(MustRun({"status"}).out, AllOf(HasSubstr("workers      2"), HasSubstr("ball ready 32 x 32 x 32")));
 }
 
+TEST_F(ServiceTest, NeitherThreadsNorPackingChangeThePicture) {
+  MustRun({"up", "--detach", "--workers", "1", "--threads", "3", "--compress", "--listen", endpoint_, "--data", "ball=" + ball_});
+  EXPECT_EQ(json::parse(MustRun({"status", "--json"}).out)["workers"][0]["threads"], 3);
+  MustRun({"render", "ball", "-o", "service.exr", "--size", "64"});
+  MustRun({"render", ball_, "--local=1", "--threads", "1", "-o", "local.exr", "--size", "64"});
+  EXPECT_EQ(LargestDifference(ReadPicture(Path("service.exr")), ReadPicture(Path("local.exr"))), 0);
+}
+
 TEST_F(ServiceTest, VoxelsStayWithTheWorkersAcrossClients) {
   Up(endpoint_);
   MustRun({"render", "ball", "-o", "a.png", "--size", "64", "--stats", "first.json"});

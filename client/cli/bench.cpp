@@ -1,0 +1,107 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <iostream>
+
+#include "client/cli/bench_cases.h"
+#include "client/cli/bench_export.h"
+#include "client/cli/bench_report.h"
+#include "client/cli/bench_run.h"
+#include "client/cli/commands.h"
+#include "client/cli/files.h"
+
+namespace slabstream {
+namespace {
+
+// Why a case cannot be measured here; empty: it can.
+std::string WhyNot(const BenchCase& c, const BenchOptions& options) {
+  const auto* path = std::get_if<std::string>(&c.volume);
+  std::error_code error;
+  if (path == nullptr || options.connection.local_workers == 0 || std::filesystem::exists(*path, error)) return "";
+  return fmt::format("'{}' does not exist", *path);
+}
+
+// Those that are named, all of which must be there; or all standard ones, of which some may not.
+Result<std::vector<BenchCase>> ChooseCases(const BenchOptions& options) {
+  std::vector<BenchCase> cases;
+  for (const std::string& text : options.cases) {
+    Result<BenchCase> parsed = ParseBenchCase(text, options.connection.local_workers == 0);
+    if (!parsed.ok()) return parsed.status();
+    if (const std::string why_not = WhyNot(*parsed, options); !why_not.empty()) {
+      return Status::NotFound(fmt::format("CASE '{}': {}", text, why_not));
+    }
+    const auto same_name = [&](const BenchCase& other) { return other.name == parsed->name; };
+    if (std::any_of(cases.begin(), cases.end(), same_name)) {
+      return Status::InvalidArgument(fmt::format("CASE '{}': a case called {} is given before it", text, parsed->name));
+    }
+    cases.push_back(*std::move(parsed));
+  }
+  if (cases.empty()) cases = StandardBenchCases();
+  for (BenchCase& c : cases) c.renderer = options.renderer.value_or(c.renderer);
+  return cases;
+}
+
+Status MakeDirectory(const std::string& option, const std::string& path) {
+  std::error_code error;
+  if (!path.empty()) std::filesystem::create_directories(path, error);
+  if (!error) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("{} '{}' cannot be made: {}", option, path, error.message()));
+}
+
+Status PrepareOutputs(const BenchOptions& options) {
+  if (!options.json_path.empty()) {
+    if (Status status = CheckOutputDirectory("--json", options.json_path); !status.ok()) return status;
+  }
+  if (Status status = MakeDirectory("--pictures", options.pictures_directory); !status.ok()) return status;
+  return MakeDirectory("--export", options.export_directory);
+}
+
+Result<BenchResult> Measure(const BenchCase& c, const BenchOptions& options) {
+  const std::string why_not = WhyNot(c, options);
+  if (why_not.empty()) return RunBenchCase(c, options);
+  BenchResult skipped;
+  skipped.bench_case = c;
+  skipped.skipped = why_not;
+  return skipped;
+}
+
+Status Export(const std::vector<BenchCase>& cases, const BenchOptions& options) {
+  for (const BenchCase& c : cases) {
+    if (const std::string why_not = WhyNot(c, options); !why_not.empty()) {
+      std::cout << fmt::format("{} skipped: {}\n", c.name, why_not);
+      continue;
+    }
+    if (Status status = ExportCase(c, options); !status.ok()) return status;
+    std::cout << fmt::format("wrote {}/{}.scene.json\n", options.export_directory, c.name);
+  }
+  return Status::Ok();
+}
+
+}  // namespace
+
+Status RunBench(const BenchOptions& options) {
+  if (options.list) {
+    for (const BenchCase& c : StandardBenchCases()) std::cout << fmt::format("{:<20} {}\n", c.name, c.purpose);
+    return Status::Ok();
+  }
+  const Result<std::vector<BenchCase>> cases = ChooseCases(options);
+  if (!cases.ok()) return cases.status();
+  if (Status status = PrepareOutputs(options); !status.ok()) return status;
+  if (!options.export_directory.empty()) return Export(*cases, options);
+
+  const BenchRun run{DescribeMachine(), options};
+  std::size_t name_width = 4;
+  for (const BenchCase& c : *cases) name_width = std::max(name_width, c.name.size());
+  std::vector<BenchResult> results;
+  for (const BenchCase& c : *cases) {
+    Result<BenchResult> result = Measure(c, options);
+    if (!result.ok()) return result.status();
+    if (results.empty()) std::cout << BenchHeader(run, name_width);
+    std::cout << BenchRow(*result, name_width) << std::flush;
+    results.push_back(*std::move(result));
+  }
+  return options.json_path.empty() ? Status::Ok() : WriteTextFile(options.json_path, BenchJson(run, results));
+}
+
+}  // namespace slabstream

@@ -1,0 +1,131 @@
+#include "client/cli/bench_cases.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <utility>
+
+#include "client/cli/input_volume.h"
+#include "client/cli/option_groups.h"
+
+namespace slabstream {
+namespace {
+
+constexpr double kTranslucent = 0.05, kOpaque = 0.9;  // opacity of one voxel length
+constexpr double kHollowOccupancy = 0.05, kFilledOccupancy = 0.40;
+
+// Half way to the values of occupied voxels (128 ... 255) everything is as opaque and coloured as those: renderers that interpolate before
+// they classify then show the same surface, without a dark rim. Values rise along x, and the hue with them, so that a mirrored picture
+// would show.
+TransferFunction SphereTransfer(double opacity) {
+  constexpr Rgb kWarm = {0.90F, 0.72F, 0.55F}, kCool = {0.65F, 0.72F, 0.85F};
+  return {{{0, kWarm}, {128, kWarm}, {255, kCool}}, {{0, 0}, {64, opacity}, {255, opacity}}};
+}
+
+// A soft surface that is solid within a few voxels, in the colours of tissue.
+TransferFunction BrainTransfer() {
+  return {{{0, {0.30F, 0.16F, 0.12F}}, {60, {0.62F, 0.38F, 0.30F}}, {120, {0.86F, 0.68F, 0.58F}}, {255, {1, 0.97F, 0.92F}}},
+          {{0, 0}, {40, 0}, {90, 0.35}, {255, 0.6}}};
+}
+
+BenchCase SphereCase(SphereClass sphere_class, int size, double opacity, RendererKind renderer = RendererKind::kSplat) {
+  const bool hollow = sphere_class == SphereClass::kHollow, points = renderer == RendererKind::kZBuffer;
+  const double occupancy = hollow ? kHollowOccupancy : kFilledOccupancy;
+  const std::string dataset = fmt::format("class{}-{}", int(sphere_class), size);
+  return {.name = fmt::format("{}{}{}", points ? "zbuffer-" : "", dataset, opacity == kOpaque && !points ? "-opaque" : ""),
+          .purpose = fmt::format("{} sphere, {} voxels a side, {:g} % occupied, opacity {:g} a voxel, {}", hollow ? "hollow" : "filled",
+                                 size, occupancy * 100, opacity, points ? "Z-buffer" : "splatting"),
+          .dataset = dataset,
+          .volume = SphereRequest{sphere_class, size, occupancy},
+          .renderer = renderer,
+          .transfer = {SphereTransfer(opacity)},
+          .opacity = opacity};
+}
+
+BenchCase BrainCase() {
+  return {.name = "brain",
+          .purpose = "the MRI brain of Debian's package mricron-data, splatting",
+          .dataset = "brain",
+          .volume = std::string("/usr/share/mricron/templates/ch2better.nii.gz"),
+          .transfer = {BrainTransfer()}};
+}
+
+// "volumes/head.nii.gz" is "head", as in the catalogue of a service.
+std::string Stem(const std::string& path) {
+  const std::filesystem::path name = std::filesystem::path(path).lexically_normal().filename();
+  const std::filesystem::path stem = name.extension() == ".gz" ? name.stem().stem() : name.stem();
+  return stem.empty() ? "volume" : stem.string();
+}
+
+}  // namespace
+
+const std::vector<BenchCase>& StandardBenchCases() {
+  static const std::vector<BenchCase> cases = {
+      SphereCase(SphereClass::kHollow, 256, kTranslucent),
+      SphereCase(SphereClass::kFilled, 256, kTranslucent),
+      SphereCase(SphereClass::kHollow, 256, kOpaque),
+      SphereCase(SphereClass::kFilled, 256, kOpaque),
+      SphereCase(SphereClass::kHollow, 512, kTranslucent),
+      SphereCase(SphereClass::kHollow, 256, kOpaque, RendererKind::kZBuffer),
+      BrainCase(),
+  };
+  return cases;
+}
+
+Result<BenchCase> ParseBenchCase(const std::string& text, bool at_service) {
+  for (const BenchCase& standard : StandardBenchCases()) {
+    if (standard.name == text) return standard;
+  }
+  // A colon may belong to the name of a file that is there.
+  std::error_code error;
+  const std::size_t colon = !at_service && std::filesystem::exists(text, error) ? std::string::npos : text.rfind(':');
+  const std::string source = text.substr(0, colon);
+  if (!at_service && !std::filesystem::exists(source, error)) {
+    return Status::NotFound(fmt::format("CASE '{}' is neither a file nor a standard case (--list names them)", text));
+  }
+  if (!at_service && !LooksLikeVolume(source)) return Status::InvalidArgument(fmt::format("CASE '{}' is not a volume file", text));
+
+  BenchCase bench_case;
+  bench_case.volume = source;
+  bench_case.dataset = at_service ? source : Stem(source);
+  std::string transfer = "auto";
+  if (colon != std::string::npos) {
+    transfer = text.substr(colon + 1);
+    auto choice = ParseTransfer(fmt::format("CASE '{}':", text), transfer);
+    if (!choice.ok()) return choice.status();
+    bench_case.transfer.choice = *std::move(choice);
+  }
+  bench_case.name = bench_case.dataset + "-" + Stem(transfer);
+  return bench_case;
+}
+
+Result<std::shared_ptr<const Volume>> LoadBenchVolume(const BenchCase& bench_case) {
+  if (const auto* path = std::get_if<std::string>(&bench_case.volume)) {
+    Result<LoadedVolume> loaded = ReadInputVolume(*path);
+    if (!loaded.ok()) return loaded.status();
+    return std::move(loaded->volume);
+  }
+  Result<Volume> sphere = MakeSphere(std::get<SphereRequest>(bench_case.volume));
+  if (!sphere.ok()) return sphere.status();
+  return std::make_shared<const Volume>(*std::move(sphere));
+}
+
+ViewParameters BenchView(Projection projection, int index, int frames) {
+  return {.projection = projection,
+          .azimuth_degrees = 360.0 * index / frames,
+          .elevation_degrees = kBenchElevationDegrees,
+          .zoom = kBenchZoom,
+          .fov_degrees = kBenchFovDegrees};
+}
+
+FrameRequest BenchRequest(const BenchCase& bench_case, const ViewParameters& view, ImageSize size) {
+  FrameRequest request;
+  request.dataset = bench_case.dataset;
+  request.renderer = bench_case.renderer;
+  request.size = size;
+  request.view = view;
+  request.transfer = bench_case.transfer;
+  return request;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,43 @@
+// What `slabstream bench` renders: volumes, looks and views whose names stay, so that figures of different days and machines compare.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "common/planning/frame_request.h"
+#include "common/volume/sphere.h"
+#include "common/volume/volume.h"
+
+namespace slabstream {
+
+struct BenchCase {
+  std::string name;                                 // what the table calls it; fit for a file's name
+  std::string purpose;                              // one line for --list
+  std::string dataset;                              // the volume's name: cases of one volume share it, and at a service it is the dataset's
+  std::variant<SphereRequest, std::string> volume;  // made here, or a file's path (unused at a service)
+  RendererKind renderer = RendererKind::kSplat;
+  TransferChoice transfer;
+  std::optional<double> opacity;  // of an occupied voxel, where all have the same
+};
+
+const std::vector<BenchCase>& StandardBenchCases();
+
+// A standard case's name, or FILE[:TRANSFER] of a volume file (`at_service`: NAME[:TRANSFER] of a dataset), where TRANSFER is what
+// --transfer takes. NotFound, InvalidArgument: naming the text.
+Result<BenchCase> ParseBenchCase(const std::string& text, bool at_service);
+
+// Its volume, made or read: never that of a service.
+Result<std::shared_ptr<const Volume>> LoadBenchVolume(const BenchCase& bench_case);
+
+// The turntable that every case is seen on: frame `index` of `frames` of one turn. The side of a cube fills the picture's side
+// (orthographic); under perspective it is seen from where the bounding sphere fits a cone of 30 degrees.
+inline constexpr double kBenchElevationDegrees = 20, kBenchZoom = 1.732, kBenchFovDegrees = 30;
+ViewParameters BenchView(Projection projection, int index, int frames);
+
+// Phong by a headlight, one of the views; what is not said here has the default of FrameRequest.
+FrameRequest BenchRequest(const BenchCase& bench_case, const ViewParameters& view, ImageSize size);
+
+}  // namespace slabstream

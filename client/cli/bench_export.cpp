@@ -1,0 +1,50 @@
+#include "client/cli/bench_export.h"
+
+#include <nlohmann/json.hpp>
+
+#include "client/cli/files.h"
+#include "common/volume_io/volume_reader.h"
+
+namespace slabstream {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string SceneJson(const BenchCase& c, const BenchOptions& options) {
+  const Shading shading;
+  const Json json = {
+      {"case", c.name},
+      {"volume", c.dataset + ".mha"},
+      {"transfer", c.name + ".transfer.json"},
+      {"opacity_distance", c.transfer.opacity_distance},
+      {"renderer", c.renderer == RendererKind::kSplat ? "splat" : "zbuffer"},
+      {"size", options.size},
+      {"views",
+       {{"frames", options.frames},
+        {"turns", options.turns},
+        {"elevation_degrees", kBenchElevationDegrees},
+        {"zoom", kBenchZoom},
+        {"fov_degrees", kBenchFovDegrees}}},
+      {"shading",
+       {{"ambient", shading.ambient}, {"diffuse", shading.diffuse}, {"specular", shading.specular}, {"shininess", shading.shininess}}}};
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace
+
+Status ExportCase(const BenchCase& bench_case, const BenchOptions& options) {
+  const Result<std::shared_ptr<const Volume>> volume = LoadBenchVolume(bench_case);
+  if (!volume.ok()) return volume.status();
+  Result<TransferFunction> transfer = std::holds_alternative<TransferFunction>(bench_case.transfer.choice)
+                                          ? Result<TransferFunction>(std::get<TransferFunction>(bench_case.transfer.choice))
+                                          : MakePreset(std::get<std::string>(bench_case.transfer.choice), Summarize(**volume));
+  if (!transfer.ok()) return transfer.status();
+  const std::string directory = options.export_directory + "/", base = directory + bench_case.name;
+  if (Status status = WriteVolume(**volume, directory + bench_case.dataset + ".mha"); !status.ok()) return status;
+  if (Status status = WriteTextFile(base + ".transfer.json", FormatParaViewColorMap(*transfer, bench_case.name)); !status.ok()) {
+    return status;
+  }
+  return WriteTextFile(base + ".scene.json", SceneJson(bench_case, options));
+}
+
+}  // namespace slabstream

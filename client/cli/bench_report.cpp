@@ -1,0 +1,125 @@
+#include "client/cli/bench_report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "client/cli/cores.h"
+#include "client/cli/frame_summary.h"
+#include "common/base/check.h"
+
+namespace slabstream {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string_view NameOf(RendererKind renderer) { return renderer == RendererKind::kSplat ? "splat" : "zbuffer"; }
+
+std::vector<double> BothProjections(const BenchResult& result) {
+  std::vector<double> both = result.orthographic_ms;
+  both.insert(both.end(), result.perspective_ms.begin(), result.perspective_ms.end());
+  return both;
+}
+
+Json SpreadJson(const std::vector<double>& times) {
+  const Spread spread = SpreadOf(times);
+  return {{"frames", spread.count}, {"median", spread.median}, {"p05", spread.p05}, {"p95", spread.p95},
+          {"min", spread.min},      {"max", spread.max},       {"all", times}};
+}
+
+Json CaseJson(const BenchRun& run, const BenchResult& result) {
+  const BenchCase& c = result.bench_case;
+  if (!result.skipped.empty()) return {{"case", c.name}, {"skipped", result.skipped}};
+  Json volume = {{"name", c.dataset}};
+  if (const auto* path = std::get_if<std::string>(&c.volume); path != nullptr && run.options.connection.local_workers > 0)
+    volume["file"] = *path;
+  const Index3& size = result.description.geometry.size;
+  volume["size"] = {size.x, size.y, size.z};
+  volume["raw_bytes"] = result.description.voxel_bytes();
+  const auto* preset = std::get_if<std::string>(&c.transfer.choice);
+  Json stages = Json::object();
+  for (int stage = 0; stage < kStageCount; ++stage) {
+    stages[std::string(ToString(Stage(stage)))] = result.stage_median_ms[std::size_t(stage)];
+  }
+  return {{"case", c.name},
+          {"volume", volume},
+          {"renderer", NameOf(c.renderer)},
+          {"transfer", preset != nullptr ? Json(*preset) : Json("curve")},
+          {"opacity", c.opacity ? Json(*c.opacity) : Json()},
+          {"opacity_distance", c.transfer.opacity_distance},
+          {"first_frame_ms", result.first_frame_ms},
+          {"latency_ms",
+           {{"orthographic", SpreadJson(result.orthographic_ms)},
+            {"perspective", SpreadJson(result.perspective_ms)},
+            {"both", SpreadJson(BothProjections(result))}}},
+          {"stage_median_ms", stages},
+          {"peak_rss_bytes", result.peak_rss_bytes}};
+}
+
+}  // namespace
+
+Spread SpreadOf(std::vector<double> values) {
+  if (values.empty()) return {};
+  std::sort(values.begin(), values.end());
+  const std::size_t count = values.size();
+  const auto rank = [&](double share) { return values[std::size_t(std::max(0.0, std::ceil(share * double(count)) - 1))]; };
+  return {int(count), (values[(count - 1) / 2] + values[count / 2]) / 2, rank(0.05), rank(0.95), values.front(), values.back()};
+}
+
+void SetFrames(BenchResult& result, std::span<const FrameJob> jobs, std::span<const FrameRecord> records) {
+  CHECK_EQ(jobs.size(), records.size());
+  std::array<std::vector<double>, kStageCount> stages;
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    const bool perspective = jobs[i].request.view.projection == Projection::kPerspective;
+    auto& times = perspective ? result.perspective_ms : result.orthographic_ms;
+    times.push_back(double(records[i].latency.count()) / 1e6);
+    const StageTimes stage_ns = Summarize(records[i].statistics).stage_ns;
+    for (std::size_t stage = 0; stage < stages.size(); ++stage) stages[stage].push_back(double(stage_ns[stage]) / 1e6);
+  }
+  for (std::size_t stage = 0; stage < stages.size(); ++stage) result.stage_median_ms[stage] = SpreadOf(std::move(stages[stage])).median;
+}
+
+std::string BenchHeader(const BenchRun& run, std::size_t name_width) {
+  const BenchOptions& o = run.options;
+  const std::string where = o.connection.local_workers > 0 ? fmt::format("workers in this process: {}, threads of each: {}",
+                                                                         o.connection.local_workers, LocalThreads(o.connection))
+                                                           : o.connection.endpoint;
+  return fmt::format("machine: {} cores, {}, {}\n", run.machine.cores, run.machine.cpu, run.machine.simd) +
+         fmt::format("run:     {0}x{0} pixels, {1} turns of {2} views of each projection, {3}; times in ms, memory in MiB\n", o.size,
+                     o.turns, o.frames, where) +
+         fmt::format("{:<{}} {:>15} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>7} {:>7}\n", "case", name_width, "voxels",
+                     "renderer", "ortho", "persp", "both", "p05", "p95", "min", "max", "first", "raw", "peak");
+}
+
+std::string BenchRow(const BenchResult& result, std::size_t name_width) {
+  const BenchCase& c = result.bench_case;
+  if (!result.skipped.empty()) return fmt::format("{:<{}} skipped: {}\n", c.name, name_width, result.skipped);
+  const Index3& size = result.description.geometry.size;
+  const Spread both = SpreadOf(BothProjections(result));
+  const auto mebibytes = [](std::int64_t bytes) { return double(bytes) / (1 << 20); };
+  return fmt::format("{:<{}} {:>15} {:>8} {:>8.2f} {:>8.2f} {:>8.2f} {:>8.2f} {:>8.2f} {:>8.2f} {:>8.2f} {:>8.1f} {:>7.1f} {:>7.1f}\n",
+                     c.name, name_width, fmt::format("{}x{}x{}", size.x, size.y, size.z), NameOf(c.renderer),
+                     SpreadOf(result.orthographic_ms).median, SpreadOf(result.perspective_ms).median, both.median, both.p05, both.p95,
+                     both.min, both.max, result.first_frame_ms, mebibytes(result.description.voxel_bytes()),
+                     mebibytes(result.peak_rss_bytes));
+}
+
+std::string BenchJson(const BenchRun& run, const std::vector<BenchResult>& results) {
+  const BenchOptions& o = run.options;
+  Json json = {{"version", SLABSTREAM_VERSION},
+               {"command", o.command},
+               {"machine", {{"cpu", run.machine.cpu}, {"cores", run.machine.cores}, {"simd", run.machine.simd}}},
+               {"size", o.size},
+               {"frames", o.frames},
+               {"turns", o.turns},
+               {"endpoint", o.connection.endpoint},  // empty: in this process, by so many workers with so many threads each
+               {"workers", o.connection.local_workers},
+               {"threads", o.connection.local_workers > 0 ? LocalThreads(o.connection) : 0},
+               {"cases", Json::array()}};
+  for (const BenchResult& result : results) json["cases"].push_back(CaseJson(run, result));
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace slabstream

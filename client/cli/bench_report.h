@@ -1,0 +1,50 @@
+// What `slabstream bench` measured, as a table for people and JSON for programs. Pure.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "client/cli/bench_cases.h"
+#include "client/cli/bench_machine.h"
+#include "client/cli/frame_loop.h"
+#include "client/cli/options.h"
+#include "common/stats/report.h"
+
+namespace slabstream {
+
+// Of times in ms. Quantiles by nearest rank; the median of an even number is the mean of the two in the middle.
+struct Spread {
+  int count = 0;
+  double median = 0, p05 = 0, p95 = 0, min = 0, max = 0;
+};
+Spread SpreadOf(std::vector<double> values);
+
+struct BenchResult {
+  BenchCase bench_case;
+  std::string skipped;            // why nothing was measured; then the rest is empty
+  VolumeDescription description;  // of the volume
+  double first_frame_ms = 0;      // an embedded service holds nothing yet: a file is read in it
+  // Request to last byte of each frame after the warm-up, in the order they were rendered.
+  std::vector<double> orthographic_ms, perspective_ms;
+  std::array<double, kStageCount> stage_median_ms{};  // worker time, summed over workers
+  std::int64_t peak_rss_bytes = 0;                    // of this process: all of the service if it is embedded
+};
+
+// Sets the times and stages of a result that has none: `records[i]` is of `jobs[i]`.
+void SetFrames(BenchResult& result, std::span<const FrameJob> jobs, std::span<const FrameRecord> records);
+
+struct BenchRun {
+  MachineInfo machine;
+  BenchOptions options;
+};
+
+// The table, line by line. `name_width`: of the longest case.
+std::string BenchHeader(const BenchRun& run, std::size_t name_width);
+std::string BenchRow(const BenchResult& result, std::size_t name_width);
+
+std::string BenchJson(const BenchRun& run, const std::vector<BenchResult>& results);
+
+}  // namespace slabstream

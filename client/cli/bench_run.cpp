@@ -1,0 +1,92 @@
+#include "client/cli/bench_run.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <memory>
+#include <span>
+#include <utility>
+
+#include "client/cli/session.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::size_t kWarmUpFrames = 2;  // one of each projection
+constexpr Projection kProjections[] = {Projection::kOrthographic, Projection::kPerspective};
+
+Result<Session> OpenSession(const BenchCase& c, const ConnectionOptions& connection) {
+  if (connection.local_workers == 0) return Session::Open(connection, c.dataset);
+  if (const auto* path = std::get_if<std::string>(&c.volume)) return Session::Open(connection, *path);
+  // A sphere is made beforehand, so that the first frame's time is the service's own; nobody but the service keeps it.
+  Result<std::shared_ptr<const Volume>> sphere = LoadBenchVolume(c);
+  if (!sphere.ok()) return sphere.status();
+  return Session::OpenLocal(connection, [c, made = *std::move(sphere)]() mutable -> Result<std::shared_ptr<const Volume>> {
+    if (made == nullptr) return LoadBenchVolume(c);
+    return std::exchange(made, nullptr);
+  });
+}
+
+FrameJob MakeJob(const BenchCase& c, const BenchOptions& options, const std::string& dataset, Projection projection, int index) {
+  FrameJob job{BenchRequest(c, BenchView(projection, index, options.frames), {options.size, options.size}), ""};
+  job.request.dataset = dataset;
+  return job;
+}
+
+// One frame of each projection to warm up, then both turntables turn after turn.
+std::vector<FrameJob> MeasuredJobs(const BenchCase& c, const BenchOptions& options, const std::string& dataset) {
+  std::vector<FrameJob> jobs;
+  for (const Projection projection : kProjections) jobs.push_back(MakeJob(c, options, dataset, projection, 0));
+  for (int turn = 0; turn < options.turns; ++turn) {
+    for (const Projection projection : kProjections) {
+      for (int i = 0; i < options.frames; ++i) jobs.push_back(MakeJob(c, options, dataset, projection, i));
+    }
+  }
+  return jobs;
+}
+
+Status WritePictures(Client& client, const BenchCase& c, const BenchOptions& options, const std::string& dataset) {
+  std::vector<FrameJob> jobs;
+  for (const Projection projection : kProjections) {
+    jobs.push_back(MakeJob(c, options, dataset, projection, 0));
+    const std::string_view name = projection == Projection::kPerspective ? "perspective" : "orthographic";
+    jobs.back().output = fmt::format("{}/{}.{}.png", options.pictures_directory, c.name, name);
+  }
+  FrameLoopOptions loop;
+  loop.format.background = {0, 0, 0, 1};
+  const Result<std::vector<FrameRecord>> frames = RenderFrames(client, jobs, loop);
+  return frames.ok() ? Status::Ok() : frames.status();
+}
+
+}  // namespace
+
+Result<BenchResult> RunBenchCase(const BenchCase& bench_case, const BenchOptions& options) {
+  ResetPeakMemory();
+  Result<Session> session = OpenSession(bench_case, options.connection);
+  if (!session.ok()) return session.status();
+  const std::vector<FrameJob> jobs = MeasuredJobs(bench_case, options, session->dataset());
+
+  FrameLoopOptions loop;
+  loop.keep_reports = true;
+  loop.progress = ::isatty(STDERR_FILENO) == 1;  // else the rows of the table tell how far it is
+  loop.label = bench_case.name;
+  const Result<std::vector<FrameRecord>> records = RenderFrames(session->client(), jobs, loop);
+  if (!records.ok()) return records.status();
+
+  BenchResult result;
+  result.bench_case = bench_case;
+  result.peak_rss_bytes = PeakMemoryBytes();
+  result.first_frame_ms = double(records->front().latency.count()) / 1e6;
+  SetFrames(result, std::span(jobs).subspan(kWarmUpFrames), std::span(*records).subspan(kWarmUpFrames));
+  const Result<StatusReply> status = session->client().QueryStatus();
+  if (!status.ok()) return status.status();
+  for (const DatasetStatus& dataset : status->datasets) {
+    if (dataset.name == session->dataset()) result.description = dataset.description;
+  }
+  if (!options.pictures_directory.empty()) {
+    if (Status written = WritePictures(session->client(), bench_case, options, session->dataset()); !written.ok()) return written;
+  }
+  return result;
+}
+
+}  // namespace slabstream
