@@ -2,14 +2,13 @@
 // precision.
 #include <gtest/gtest.h>
 
-#include <hwy/highway.h>
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <random>
 
 #include "tests/render/render_support.h"
+#include "tests/support/simd_targets.h"
 #include "worker/kernels/draw_faces.h"
 #include "worker/kernels/phong.h"
 #include "worker/kernels/shade_faces.h"
@@ -22,19 +21,6 @@ namespace {
 using namespace slabstream::testing;  // NOLINT(google-build-using-namespace): test support
 
 constexpr Projection kProjections[] = {Projection::kOrthographic, Projection::kPerspective};
-
-// Runs `body` once for every instruction set that this machine has.
-template <class Body>
-void ForEachTarget(Body&& body) {
-  for (auto target : hwy::SupportedAndGeneratedTargets()) {
-    SCOPED_TRACE(hwy::TargetName(target));
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(target);
-    body();
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().DeInit();
-}
 
 struct Keys {
   explicit Keys(const PixelBounds& pixels)
