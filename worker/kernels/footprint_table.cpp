@@ -42,11 +42,15 @@ Lattice MakeLattice(double scale, double offset, double radius) {
   return {ToFixed((0.5 - offset) / scale - radius + 1), ToFixed(1 / scale)};
 }
 
-std::int32_t FirstSampleFrom(const Lattice& lattice, double radius, double voxel, std::int32_t begin, std::int32_t end) {
-  const std::int64_t distance = ToFixed(voxel - radius + 1) - lattice.start;  // to be reached by i * step
+std::int32_t FirstSampleAt(const Lattice& lattice, std::int64_t place, std::int32_t begin, std::int32_t end) {
+  const std::int64_t distance = place - lattice.start;  // to be reached by i * step
   if (lattice.step <= 0) return distance <= 0 ? begin : end;
   const std::int64_t i = distance >= 0 ? (distance + lattice.step - 1) / lattice.step : -(-distance / lattice.step);
   return std::int32_t(std::clamp<std::int64_t>(i, begin, end));
+}
+
+std::int32_t FirstSampleFrom(const Lattice& lattice, double radius, double voxel, std::int32_t begin, std::int32_t end) {
+  return FirstSampleAt(lattice, ToFixed(voxel - radius + 1), begin, end);
 }
 
 }  // namespace slabstream

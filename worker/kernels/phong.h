@@ -23,7 +23,8 @@ class Phong {
   // `view_direction`: physical, unit, away from the eye.
   Phong(const Shading& shading, const Vec3& view_direction);
 
-  // The same bits on every machine (for the Z-buffer's promise): only operations that IEEE 754 rounds exactly.
+  // The definition, in double precision, which PhongTable (splatting) and ShadeFaces (Z-buffer) are held to. The same bits on every
+  // machine.
   PhongFactors AtNormal(const Vec3& unit_normal) const;
   PhongFactors WithoutGradient() const;
   const std::vector<Vec3>& lights() const { return lights_; }  // unit directions towards them; the headlight where none was given

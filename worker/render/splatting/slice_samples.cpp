@@ -42,10 +42,7 @@ const FootprintTable& Footprints::Get(double sigma) {
 }
 
 std::int32_t FirstPixelWithTap(const Lattice& lattice, std::int32_t voxel, std::int32_t begin, std::int32_t end) {
-  const std::int64_t distance = (std::int64_t{voxel} << 32) - lattice.start;  // to be reached by i * step
-  if (lattice.step <= 0) return distance <= 0 ? begin : end;
-  const std::int64_t i = distance >= 0 ? (distance + lattice.step - 1) / lattice.step : -(-distance / lattice.step);
-  return std::int32_t(std::clamp<std::int64_t>(i, begin, end));
+  return FirstSampleAt(lattice, std::int64_t{voxel} << 32, begin, end);
 }
 
 SliceSamples SampleSlice(const FrameSetup& setup, const Box& box, const Box& reach, std::int32_t k, Footprints& footprints) {

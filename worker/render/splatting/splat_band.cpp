@@ -115,7 +115,7 @@ void SplatBand::FindOctets(std::int32_t beam) {
   const SegmentWord* needed = &needed_[BeamWord(beam)];
   SegmentWord* filled = &filled_[BeamWord(beam)];
   float* shaded = ShadedBeam(beam) + 4 * std::ptrdiff_t{margin_};
-  const SheetOpacity::Beam levels = pass_.opacity.BeamAt(slice_, beam);
+  const SheetOpacity::Beam levels = pass_.opacity.one_level() ? SheetOpacity::Beam() : pass_.opacity.BeamAt(slice_, beam);
   // Cells that hold something of the occupied box, by their number among those of `reached`.
   const std::int32_t before = pass_.first_octet / kCellOctets - cells.first_cell;
   for (std::int32_t cell = 0; cell < pass_.octet_count / kCellOctets; ++cell) {
