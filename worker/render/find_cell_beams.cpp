@@ -46,7 +46,6 @@ class BeamFinder {
     beams_.cell_count = (box.end.x - 1) / kCellVoxels + 1 - beams_.first_cell;
     beams_.beam_count = std::size_t(box.size().y) * std::size_t(box.size().z);
     beams_.masks = MakeLargeArray<std::uint32_t>(beams_.cells());
-    beams_.record_offsets = MakeLargeArray<std::uint16_t>(beams_.cells());
     beams_.first_record = MakeLargeArray<std::uint64_t>(beams_.beam_count + 1);
     ForEachRowOfBricks([this](const Index3& first) { Mark(first); });
     std::uint64_t total = 0;
@@ -119,10 +118,7 @@ class BeamFinder {
         const std::size_t beam = BeamOf(y, z);
         const std::uint32_t* masks = MasksOf(beam);
         std::uint32_t records = 0;  // a beam has at most kMaxVolumeSide
-        for (std::size_t cell = 0; cell < cell_count; ++cell) {
-          beams_.record_offsets[beam * cell_count + cell] = std::uint16_t(records);
-          records += std::uint32_t(std::popcount(masks[cell]));
-        }
+        for (std::size_t cell = 0; cell < cell_count; ++cell) records += std::uint32_t(std::popcount(masks[cell]));
         beams_.first_record[beam] = records;
       }
     }

@@ -61,8 +61,7 @@ Found FindInSlice(const OccupiedCells& cells, const Box& wanted, std::int32_t sl
 }  // namespace
 
 std::size_t CellBeams::bytes() const {
-  return cells() * (sizeof(masks[0]) + sizeof(record_offsets[0])) + (beam_count + 1) * sizeof(first_record[0]) +
-         record_count() * sizeof(VoxelRecord);
+  return cells() * sizeof(masks[0]) + (beam_count + 1) * sizeof(first_record[0]) + record_count() * sizeof(VoxelRecord);
 }
 
 OccupiedCells CellsOf(const CellBeams& beams, Axis traversal, const Box& wanted) {
@@ -83,7 +82,6 @@ OccupiedCells CellsOf(const CellBeams& beams, Axis traversal, const Box& wanted)
   cells.row_stride = beams.Stride(v);
   cells.first_beam = std::size_t(cells.box.begin[c] - beams.box.begin[c]) * cells.slice_stride;
   cells.masks = beams.masks.get();
-  cells.record_offsets = beams.record_offsets.get();
   cells.first_record = {beams.first_record.get(), beams.beam_count + 1};
   cells.records = {beams.records.get(), beams.record_count()};
 

@@ -2,8 +2,8 @@
 // beam.
 //
 // In-slice axes: u, along beams, is the lower of the two axes that are not the traversal axis, v the higher one. A cell is kCellVoxels =
-// 32 voxels of a beam from a global multiple of 32 on: a 32-bit mask of which are occupied. So a beam costs one and a half bits a voxel and
-// four bytes an occupied voxel, dense and sparse data alike, and a cell's voxels are a mask and a pointer.
+// 32 voxels of a beam from a global multiple of 32 on: a 32-bit mask of which are occupied. So a beam costs a bit a voxel and four bytes an
+// occupied voxel, dense and sparse data alike. Its records are found by counting bits from its first cell on.
 //
 // Traversal along z and along y visits the same beams, those along x, in another order. So CellBeams are kept for two directions only:
 // along x, found in the voxels (FindCellBeams), and along y for traversal along x, made of those (TurnCellBeams).
@@ -29,9 +29,8 @@ struct CellBeams {
   Box box;                                                // all that is occupied, and little else; empty if nothing is
   std::int32_t first_cell = 0, cell_count = 0;            // along u: cell i begins at voxel 32 * (first_cell + i)
   std::size_t beam_count = 0;
-  LargeArray<std::uint32_t> masks;           // [beam][cell]
-  LargeArray<std::uint16_t> record_offsets;  // likewise: records of the beam before this cell, so that cells can be skipped unread
-  LargeArray<std::uint64_t> first_record;    // [beam], and one more: index of the beam's first record
+  LargeArray<std::uint32_t> masks;         // [beam][cell]
+  LargeArray<std::uint64_t> first_record;  // [beam], and one more: index of the beam's first record
   LargeArray<VoxelRecord> records;
 
   std::size_t Stride(Axis axis) const { return axis == inner ? 1 : std::size_t(box.size()[inner]); }  // from beam to beam
@@ -58,7 +57,6 @@ struct OccupiedCells {
   std::size_t slice_stride = 0, row_stride = 0;  // beams
   std::size_t first_beam = 0;
   const std::uint32_t* masks = nullptr;
-  const std::uint16_t* record_offsets = nullptr;
   std::span<const std::uint64_t> first_record;
   std::span<const VoxelRecord> records;
   std::uint64_t occupied_in_box = 0;  // of those found, the ones inside the wanted box, not in its halo
@@ -68,7 +66,6 @@ struct OccupiedCells {
     return first_beam + std::size_t(slice - box.begin[axes.c]) * slice_stride + std::size_t(v - box.begin[axes.v]) * row_stride;
   }
   const std::uint32_t* Masks(std::size_t beam) const { return &masks[beam * std::size_t(cell_count)]; }
-  const std::uint16_t* RecordOffsets(std::size_t beam) const { return &record_offsets[beam * std::size_t(cell_count)]; }
 };
 
 // `beams` lie along the u of `traversal`. In the slices of `wanted`.

@@ -88,7 +88,6 @@ CellBeams TurnCellBeams(const CellBeams& along_x) {
   turned.cell_count = (box.end.y - 1) / kCellVoxels + 1 - turned.first_cell;
   turned.beam_count = std::size_t(box.size().x) * std::size_t(box.size().z);
   turned.masks = MakeLargeArray<std::uint32_t>(turned.cells());
-  turned.record_offsets = MakeLargeArray<std::uint16_t>(turned.cells());
   turned.first_record = MakeLargeArray<std::uint64_t>(turned.beam_count + 1);
   turned.records = MakeLargeArray<VoxelRecord>(along_x.record_count());
 
@@ -103,12 +102,9 @@ CellBeams TurnCellBeams(const CellBeams& along_x) {
   std::uint64_t total = 0;
   for (std::size_t beam = 0; beam < turned.beam_count; ++beam) {
     turned.first_record[beam] = total;
-    std::uint32_t records = 0;
     for (std::size_t cell = beam * std::size_t(turned.cell_count); cell < (beam + 1) * std::size_t(turned.cell_count); ++cell) {
-      turned.record_offsets[cell] = std::uint16_t(records);
-      records += std::uint32_t(std::popcount(turned.masks[cell]));
+      total += std::uint32_t(std::popcount(turned.masks[cell]));
     }
-    total += records;
   }
   turned.first_record[turned.beam_count] = total;
   CHECK(total == along_x.record_count());

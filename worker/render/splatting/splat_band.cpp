@@ -17,6 +17,18 @@ constexpr auto kOctetCount = [] {
   return counts;
 }();
 
+// Octets of up to 16 cells that are not empty: bit i is octet i.
+constexpr std::int32_t kSetCells = 64 / kCellOctets;
+std::uint64_t OccupiedOctets(const std::uint32_t* masks, std::int32_t count) {
+  std::uint64_t set = 0;
+  for (std::int32_t cell = 0; cell < count; ++cell) {
+    // The high bit of every byte that is not 0; a product moves these four together.
+    const std::uint32_t high = (((masks[cell] & 0x7F7F7F7FU) + 0x7F7F7F7FU) | masks[cell]) & 0x80808080U;
+    set |= std::uint64_t{(high >> 7) * 0x10204080U >> 28} << (cell * kCellOctets);
+  }
+  return set;
+}
+
 }  // namespace
 
 SplatBand::SplatBand(const SplatPass& pass, std::int32_t y_begin, std::int32_t y_end, LocalImage& image, RankReport& report)
@@ -87,11 +99,13 @@ bool SplatBand::PlaceBeams(const SliceSamples& slice) {
 
 // Beam by beam: which segments are wanted of it, and which of its octets reach them.
 void SplatBand::FindNeeded(const SliceSamples& slice) {
+  const std::int32_t next_slice = pass_.setup.camera.ascending ? slice_ + 1 : slice_ - 1;
   std::ranges::fill(owned_, 0);
   Insert(owned_.data(), (slice.owned.x_begin - pass_.bounds.x_begin) / kSegment,
          (slice.owned.x_end - pass_.bounds.x_begin + kSegment - 1) / kSegment);
   for (std::int32_t beam = first_beam_; beam < first_beam_ + beam_count_; ++beam) {
     const std::size_t number = pass_.cells.Beam(slice_, beam);
+    PrefetchCells(next_slice, beam);
     if (pass_.cells.first_record[number] == pass_.cells.first_record[number + 1]) continue;
     const std::int32_t row_begin = FirstPixelWithTap(slice.rows, beam - slice.along_v->taps + 1, rows_.begin, rows_.end);
     const std::int32_t row_end = FirstPixelWithTap(slice.rows, beam + 1, rows_.begin, rows_.end);
@@ -108,38 +122,47 @@ void SplatBand::FindNeeded(const SliceSamples& slice) {
 void SplatBand::FindOctets(std::int32_t beam) {
   const OccupiedCells& cells = pass_.cells;
   const std::size_t number = cells.Beam(slice_, beam);
-  const std::uint32_t* masks = cells.Masks(number);
-  const std::uint16_t* offsets = cells.RecordOffsets(number);
-  const VoxelRecord* records = &cells.records[cells.first_record[number]];
+  const std::int32_t cell_count = pass_.octet_count / kCellOctets;
+  // Cells of the occupied box: there is nothing before them.
+  const std::uint32_t* masks = cells.Masks(number) + (pass_.first_octet / kCellOctets - cells.first_cell);
+  const VoxelRecord* record = &cells.records[cells.first_record[number]];
   const SegmentSpan* reached = pass_.Reached(slice_);
   const SegmentWord* needed = &needed_[BeamWord(beam)];
   SegmentWord* filled = &filled_[BeamWord(beam)];
   float* shaded = ShadedBeam(beam) + 4 * std::ptrdiff_t{margin_};
   const SheetOpacity::Beam levels = pass_.opacity.one_level() ? SheetOpacity::Beam() : pass_.opacity.BeamAt(slice_, beam);
-  // Cells that hold something of the occupied box, by their number among those of `reached`.
-  const std::int32_t before = pass_.first_octet / kCellOctets - cells.first_cell;
-  for (std::int32_t cell = 0; cell < pass_.octet_count / kCellOctets; ++cell) {
-    const std::uint32_t mask = masks[before + cell];
-    if (mask == 0) continue;
-    const VoxelRecord* record = records + offsets[before + cell];
-    for (std::int32_t i = 0; i < kCellOctets; ++i) {
-      const std::uint32_t occupied = mask >> (i * kOctet) & ((1U << kOctet) - 1);
-      const std::int32_t octet = cell * kCellOctets + i;
-      if (occupied != 0 && AnyOf(needed, reached[octet])) {
-        __builtin_prefetch(record);  // shading comes to it after the slice's other octets
-        Insert(filled, reached[octet]);
-        OctetWork& work = octets_.emplace_back(OctetWork{record, shaded + 4 * std::ptrdiff_t{octet * kOctet}, occupied});
-        if (!pass_.opacity.one_level()) {
-          const std::int32_t u = (pass_.first_octet + octet) * kOctet;
-          work.level = levels.LevelAt(u);
-          work.level_step = (levels.LevelAt(u + kOctet - 1) - work.level) / (kOctet - 1);
-        }
-        report_.drawn_voxels += kOctetCount[occupied];
-      }
+  std::uint64_t drawn = 0;
+  for (std::int32_t first_cell = 0; first_cell < cell_count; first_cell += kSetCells) {
+    const std::int32_t set_cells = std::min(kSetCells, cell_count - first_cell);
+    for (std::uint64_t rest = OccupiedOctets(masks + first_cell, set_cells); rest != 0; rest &= rest - 1) {
+      const std::int32_t octet = first_cell * kCellOctets + std::countr_zero(rest);
+      const std::uint32_t occupied = masks[octet / kCellOctets] >> (octet % kCellOctets * kOctet) & ((1U << kOctet) - 1);
+      const VoxelRecord* records = record;
       record += kOctetCount[occupied];
+      if (!AnyOf(needed, reached[octet])) continue;
+      __builtin_prefetch(records);  // shading comes to it after the slice's other octets
+      Insert(filled, reached[octet]);
+      OctetWork& work = octets_.emplace_back(OctetWork{records, shaded + 4 * std::ptrdiff_t{octet * kOctet}, occupied});
+      if (!pass_.opacity.one_level()) {
+        const std::int32_t u = (pass_.first_octet + octet) * kOctet;
+        work.level = levels.LevelAt(u);
+        work.level_step = (levels.LevelAt(u + kOctet - 1) - work.level) / (kOctet - 1);
+      }
+      drawn += kOctetCount[occupied];
     }
   }
+  report_.drawn_voxels += drawn;
   for (std::int32_t word = 0; word < words_; ++word) filled[word] &= needed[word];
+}
+
+// Beams of a slice lie together, those of the next one elsewhere.
+void SplatBand::PrefetchCells(std::int32_t slice, std::int32_t beam) const {
+  const OccupiedCells& cells = pass_.cells;
+  if (slice < cells.occupied.begin[cells.axes.c] || slice >= cells.occupied.end[cells.axes.c]) return;
+  const std::size_t number = cells.Beam(slice, beam);
+  __builtin_prefetch(&cells.first_record[number]);
+  constexpr std::int32_t kLineCells = 64 / sizeof(std::uint32_t);
+  for (std::int32_t cell = 0; cell < cells.cell_count; cell += kLineCells) __builtin_prefetch(cells.Masks(number) + cell);
 }
 
 void SplatBand::FilterBeams(const SliceSamples& slice) {

@@ -32,6 +32,7 @@ class SplatBand {
   bool PlaceBeams(const SliceSamples& slice);
   void FindNeeded(const SliceSamples& slice);
   void FindOctets(std::int32_t beam);
+  void PrefetchCells(std::int32_t slice, std::int32_t beam) const;
   void FilterBeams(const SliceSamples& slice);
   void CompositeRows(const SliceSamples& slice);
   void CompositeCutRow(const SliceSamples& slice, const RowWork& work);
