@@ -65,9 +65,9 @@ TEST(ShadeOctets, AgreesWithTheReference) {
     tables.levels = levels;
     for (int bin = 0; bin < tables.bins; ++bin) {
       for (int c = 0; c < 3; ++c) tables.color.push_back(uniform(random));
-      tables.color.push_back(1);
+      for (int level = 0; level < levels; ++level) tables.opacity.push_back(uniform(random));
+      tables.color.push_back(tables.opacity[std::size_t(bin * levels)]);
     }
-    for (int i = 0; i < levels * tables.bins; ++i) tables.opacity.push_back(uniform(random));
     for (int code = 0; code < kNormalCodes; ++code) tables.by_normal.push_back({1.5F * uniform(random), uniform(random)});
     RandomOctets work(levels, random);
     ShadeOctetsReference(tables, work.octets);
@@ -92,7 +92,7 @@ TEST(ShadeOctets, InterpolatesBetweenLevels) {
   ShadeTables tables;
   tables.bins = 1;
   tables.levels = 3;
-  tables.color = {1, 1, 1, 1};
+  tables.color = {1, 1, 1, 0.1F};
   tables.opacity = {0.1F, 0.2F, 0.6F};
   tables.by_normal.resize(kNormalCodes);
   std::vector<VoxelRecord> records(kOctet);

@@ -15,15 +15,15 @@ namespace slabstream {
 // voxel's own ray, so there are tables for `levels` evenly spaced distances, between which opacities are interpolated linearly.
 struct ShadeTables {
   int bins = 0, levels = 1;
-  AlignedVector<float> color;           // [bin][4]: straight colour, then 1
-  AlignedVector<float> opacity;         // [level][bin]
+  AlignedVector<float> color;           // [bin][4]: straight colour, then the opacity of level 0
+  AlignedVector<float> opacity;         // [bin][level]; one level: not read
   std::vector<PhongFactors> by_normal;  // by normal code
 };
 
 // An octet with at least one occupied voxel.
 struct OctetWork {
   const VoxelRecord* records = nullptr;  // of its occupied voxels, in order
-  float* rgba = nullptr;                 // 4 * kOctet floats; of occupied voxels, opacity * (shaded colour, 1) is written
+  float* rgba = nullptr;                 // 4 * kOctet floats, 64-byte aligned: opacity * (shaded colour, 1), or 0 where nothing is
   std::uint32_t occupied = 0;            // bit i: voxel i
   float level = 0, level_step = 0;       // of voxel 0, and from voxel to voxel; in [0, levels - 1) for all of them. One level: not read
 };

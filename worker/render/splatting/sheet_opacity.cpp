@@ -2,8 +2,6 @@
 
 #include "worker/kernels/phong_table.h"
 
-#include "worker/kernels/phong_table.h"
-
 namespace slabstream {
 namespace {
 
@@ -64,7 +62,7 @@ ShadeTables SheetOpacity::Tables(const ClassificationTable& table) const {
   tables.levels = levels_;
   for (int bin = 0; bin < table.size(); ++bin) {
     const Rgb& color = table.color[std::size_t(bin)];
-    for (float f : {color.r, color.g, color.b, 1.0F}) tables.color.push_back(f);
+    for (float f : {color.r, color.g, color.b, 0.0F}) tables.color.push_back(f);
   }
   // (1 - alpha)^(ratio exponent) for evenly spaced ratios is a geometric sequence.
   const double step = levels_ == 1 ? 0 : 1 / levels_per_ratio_;
@@ -74,8 +72,9 @@ ShadeTables SheetOpacity::Tables(const ClassificationTable& table) const {
     double transmitted = std::exp(least_ratio_ * log_transmitted);
     const double per_level = std::exp(step * log_transmitted);
     for (int level = 0; level < levels_; ++level, transmitted *= per_level) {
-      tables.opacity[std::size_t(level * table.size() + bin)] = float(1 - transmitted);
+      tables.opacity[std::size_t(bin * levels_ + level)] = float(1 - transmitted);
     }
+    tables.color[4 * std::size_t(bin) + 3] = tables.opacity[std::size_t(bin * levels_)];
   }
   tables.by_normal = PhongTable(setup_.shading, camera.view_direction);
   return tables;
