@@ -25,43 +25,68 @@ void Composite(const RowWork& work) { CompositeRowReference(work); }
 
 constexpr std::ptrdiff_t kSegmentFloats = 4 * std::ptrdiff_t{kSegment};
 
-// Two voxels to a vector where vectors are that long, else one.
-using TapTag = hn::CappedTag<float, 8>;
+// As many voxels to a vector as fit, up to four.
+using TapTag = hn::CappedTag<float, 16>;
+using TapVec = hn::Vec<TapTag>;
 
-// Sum over taps of one sample: of the even taps in the lower half of the vector, of the odd ones in the upper half.
+// Sum over taps of one sample, not yet over the blocks of 128 bits: tap n is in block n % (blocks of a vector).
 template <std::int32_t kTaps>
-HWY_INLINE hn::Vec<TapTag> SumTaps(const float* HWY_RESTRICT voxels, const float* HWY_RESTRICT weights, std::int32_t taps_given) {
+HWY_INLINE TapVec SumTaps(const float* HWY_RESTRICT voxels, const float* HWY_RESTRICT weights, std::int32_t taps_given) {
   const TapTag d;
-  constexpr std::int32_t kStep = std::int32_t(hn::MaxLanes(TapTag()));
+  constexpr std::int32_t kLanes = std::int32_t(hn::MaxLanes(TapTag()));
   const std::int32_t floats = 4 * (kTaps > 0 ? kTaps : taps_given);
   auto sum = hn::Mul(hn::Load(d, weights), hn::LoadU(d, voxels));
-  for (std::int32_t n = kStep; n < floats; n += kStep) sum = hn::MulAdd(hn::Load(d, weights + n), hn::LoadU(d, voxels + n), sum);
+  std::int32_t n = kLanes;
+  for (; n + kLanes <= floats; n += kLanes) sum = hn::MulAdd(hn::Load(d, weights + n), hn::LoadU(d, voxels + n), sum);
+#if HWY_TARGET <= HWY_AVX3
+  if (n < floats) {  // two more
+    const hn::Half<TapTag> half;
+    sum = hn::MulAdd(hn::ZeroExtendVector(d, hn::Load(half, weights + n)), hn::ZeroExtendVector(d, hn::LoadU(half, voxels + n)), sum);
+  }
+#endif
   return sum;
+}
+
+// Stores as many samples as fit into a vector; sample(i): that of the i-th, by blocks.
+template <class Sample>
+HWY_INLINE void StoreSamples(Sample&& sample, float* HWY_RESTRICT out) {
+  const TapTag d;
+#if HWY_TARGET <= HWY_AVX3
+  // Halves added: of samples 0 and 2, of 1 and 3. Then the two blocks that are left of each.
+  const auto add_halves = [&](TapVec a, TapVec b)
+                              HWY_ATTR { return hn::Add(hn::ConcatUpperLower(d, b, a), hn::ConcatLowerUpper(d, b, a)); };
+  const auto even = add_halves(sample(0), sample(2)), odd = add_halves(sample(1), sample(3));
+  hn::Store(hn::Add(hn::OddEvenBlocks(odd, even), hn::SwapAdjacentBlocks(hn::OddEvenBlocks(even, odd))), d, out);
+#else
+  if constexpr (hn::MaxLanes(TapTag()) == 8) {
+    const auto left = sample(0), right = sample(1);
+    hn::Store(hn::Add(hn::ConcatLowerLower(d, right, left), hn::ConcatUpperUpper(d, right, left)), d, out);
+  } else {
+    hn::Store(sample(0), d, out);
+  }
+#endif
 }
 
 // kTaps: padded taps, 0: any number.
 template <std::int32_t kTaps>
 HWY_INLINE void FilterSegments(const FootprintTable& footprint, const Lattice& lattice, const BeamWork& work) {
-  const TapTag d;
+  constexpr std::int32_t kSamples = std::int32_t(hn::MaxLanes(TapTag())) / 4;
   const std::int32_t taps = kTaps > 0 ? kTaps : footprint.padded_taps;
   const float* HWY_RESTRICT weights = footprint.channel_weights.data();
   const float* HWY_RESTRICT voxels = work.voxels;
   const std::int64_t step = lattice.step;
-  const auto sample = [&](std::int64_t at) HWY_ATTR {
-    return SumTaps<kTaps>(voxels + 4 * std::ptrdiff_t{Lattice::First(at)}, weights + Lattice::Phase(at) * std::size_t(4 * taps), taps);
-  };
   for (std::int32_t word = 0; word < work.words; ++word) {
     for (SegmentWord rest = work.wanted[word]; rest != 0; rest &= rest - 1) {
       const std::int32_t segment = FirstSegment(rest, word);
       std::int64_t at = lattice.At(work.first_sample + segment * kSegment);
       float* HWY_RESTRICT out = work.out + segment * kSegmentFloats;
-      if constexpr (hn::MaxLanes(TapTag()) == 8) {
-        for (std::int32_t i = 0; i < kSegment; i += 2, at += 2 * step, out += 8) {
-          const auto left = sample(at), right = sample(at + step);
-          hn::Store(hn::Add(hn::ConcatLowerLower(d, right, left), hn::ConcatUpperUpper(d, right, left)), d, out);
-        }
-      } else {
-        for (std::int32_t i = 0; i < kSegment; ++i, at += step, out += 4) hn::Store(sample(at), d, out);
+      for (std::int32_t i = 0; i < kSegment; i += kSamples, at += kSamples * step, out += 4 * kSamples) {
+        const auto sample = [&](std::int64_t n) HWY_ATTR {
+          const std::int64_t here = at + n * step;
+          return SumTaps<kTaps>(voxels + 4 * std::ptrdiff_t{Lattice::First(here)}, weights + Lattice::Phase(here) * std::size_t(4 * taps),
+                                taps);
+        };
+        StoreSamples(sample, out);
       }
     }
   }
