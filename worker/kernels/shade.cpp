@@ -155,6 +155,13 @@ void Shade(const ShadeTables& tables, std::span<const OctetWork> octets) {
 
 #endif
 
+void Clear(std::span<const OctetWork> octets) {
+  const hn::CappedTag<float, 16> d;
+  for (const OctetWork& octet : octets) {
+    for (std::size_t i = 0; i < 4 * std::size_t{kOctet}; i += hn::Lanes(d)) hn::Store(hn::Zero(d), d, octet.rgba + i);
+  }
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace slabstream
 HWY_AFTER_NAMESPACE();
@@ -162,8 +169,11 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace slabstream {
 HWY_EXPORT(Shade);
+HWY_EXPORT(Clear);
 
 void ShadeOctets(const ShadeTables& tables, std::span<const OctetWork> octets) { HWY_DYNAMIC_DISPATCH(Shade)(tables, octets); }
+
+void ClearOctets(std::span<const OctetWork> octets) { HWY_DYNAMIC_DISPATCH(Clear)(octets); }
 
 void ShadeOctetsReference(const ShadeTables& tables, std::span<const OctetWork> octets) {
   for (const OctetWork& octet : octets) {

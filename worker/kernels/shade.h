@@ -29,6 +29,8 @@ struct OctetWork {
 };
 
 void ShadeOctets(const ShadeTables& tables, std::span<const OctetWork> octets);
+// Zeroes what ShadeOctets wrote.
+void ClearOctets(std::span<const OctetWork> octets);
 void ShadeOctetsReference(const ShadeTables& tables, std::span<const OctetWork> octets);
 
 }  // namespace slabstream

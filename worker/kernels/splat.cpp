@@ -35,13 +35,13 @@ HWY_INLINE TapVec SumTaps(const float* HWY_RESTRICT voxels, const float* HWY_RES
   const TapTag d;
   constexpr std::int32_t kLanes = std::int32_t(hn::MaxLanes(TapTag()));
   const std::int32_t floats = 4 * (kTaps > 0 ? kTaps : taps_given);
-  auto sum = hn::Mul(hn::Load(d, weights), hn::LoadU(d, voxels));
+  auto sum = hn::Mul(hn::LoadU(d, weights), hn::LoadU(d, voxels));
   std::int32_t n = kLanes;
-  for (; n + kLanes <= floats; n += kLanes) sum = hn::MulAdd(hn::Load(d, weights + n), hn::LoadU(d, voxels + n), sum);
+  for (; n + kLanes <= floats; n += kLanes) sum = hn::MulAdd(hn::LoadU(d, weights + n), hn::LoadU(d, voxels + n), sum);
 #if HWY_TARGET <= HWY_AVX3
   if (n < floats) {  // two more
     const hn::Half<TapTag> half;
-    sum = hn::MulAdd(hn::ZeroExtendVector(d, hn::Load(half, weights + n)), hn::ZeroExtendVector(d, hn::LoadU(half, voxels + n)), sum);
+    sum = hn::MulAdd(hn::ZeroExtendVector(d, hn::LoadU(half, weights + n)), hn::ZeroExtendVector(d, hn::LoadU(half, voxels + n)), sum);
   }
 #endif
   return sum;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cstring>
+#include <span>
 
 namespace slabstream {
 namespace {
@@ -61,14 +61,10 @@ void SplatBand::AddSlice(std::int32_t k) {
   slice_ = k;
   const SliceSamples& slice = pass_.Slice(k);
   if (!PlaceBeams(slice)) return;
-  octets_.clear();
   FindNeeded(slice);
   clock_.Charge(Stage::kTransform);
   if (octets_.empty()) return;
-  ShadeOctets(pass_.tables, octets_);
-  clock_.Charge(Stage::kShade);
-  FilterBeams(slice);
-  clock_.Charge(Stage::kSplat);
+  ShadeAndFilter(slice);
   CompositeRows(slice);
   clock_.Charge(Stage::kComposite);
 }
@@ -86,11 +82,11 @@ bool SplatBand::PlaceBeams(const SliceSamples& slice) {
   const auto segment_voxels = std::int32_t(kSegment * slice.columns.step >> 32) + 1;
   margin_ = std::max(margin_, (slice.along_u->padded_taps + segment_voxels + kOctet - 1) / kOctet * kOctet);
   const std::int32_t voxels = pass_.octet_count * kOctet + 2 * margin_;
-  const auto beams = std::size_t(beam_count_);
-  if (voxels != shaded_voxels_ || shaded_.size() < 4 * beams * std::size_t(voxels)) {
+  if (voxels != shaded_voxels_) {
     shaded_voxels_ = voxels;
-    shaded_.assign(4 * beams * std::size_t(voxels), 0.0F);
+    shaded_.assign(4 * std::size_t{kShadedBeams} * std::size_t(voxels), 0.0F);
   }
+  const auto beams = std::size_t(beam_count_);
   if (filtered_.size() < 4 * beams * std::size_t(pass_.bounds.width())) filtered_.resize(4 * beams * std::size_t(pass_.bounds.width()));
   needed_.assign((beams + 1) * std::size_t(words_), 0);  // and a word behind the last beam's, for spans
   filled_.assign(needed_.size(), 0);
@@ -100,10 +96,13 @@ bool SplatBand::PlaceBeams(const SliceSamples& slice) {
 // Beam by beam: which segments are wanted of it, and which of its octets reach them.
 void SplatBand::FindNeeded(const SliceSamples& slice) {
   const std::int32_t next_slice = pass_.setup.camera.ascending ? slice_ + 1 : slice_ - 1;
+  octets_.clear();
+  octets_before_.clear();
   std::ranges::fill(owned_, 0);
   Insert(owned_.data(), (slice.owned.x_begin - pass_.bounds.x_begin) / kSegment,
          (slice.owned.x_end - pass_.bounds.x_begin + kSegment - 1) / kSegment);
   for (std::int32_t beam = first_beam_; beam < first_beam_ + beam_count_; ++beam) {
+    octets_before_.push_back(octets_.size());
     const std::size_t number = pass_.cells.Beam(slice_, beam);
     PrefetchCells(next_slice, beam);
     if (pass_.cells.first_record[number] == pass_.cells.first_record[number + 1]) continue;
@@ -117,6 +116,7 @@ void SplatBand::FindNeeded(const SliceSamples& slice) {
     for (std::int32_t word = 0; word < words_; ++word) any |= needed[word] &= owned_[std::size_t(word)];
     if (any != 0) FindOctets(beam);
   }
+  octets_before_.push_back(octets_.size());
 }
 
 void SplatBand::FindOctets(std::int32_t beam) {
@@ -165,12 +165,21 @@ void SplatBand::PrefetchCells(std::int32_t slice, std::int32_t beam) const {
   for (std::int32_t cell = 0; cell < cells.cell_count; cell += kLineCells) __builtin_prefetch(cells.Masks(number) + cell);
 }
 
-void SplatBand::FilterBeams(const SliceSamples& slice) {
-  for (std::int32_t beam = first_beam_; beam < first_beam_ + beam_count_; ++beam) {
-    const float* voxel_0 = ShadedBeam(beam) + 4 * std::ptrdiff_t{margin_ - pass_.first_octet * kOctet};
-    FilterBeam(*slice.along_u, slice.columns, {voxel_0, FilteredBeam(beam), &filled_[BeamWord(beam)], words_, pass_.bounds.x_begin});
+void SplatBand::ShadeAndFilter(const SliceSamples& slice) {
+  for (std::int32_t begin = 0; begin < beam_count_; begin += kShadedBeams) {
+    const std::int32_t end = std::min(begin + kShadedBeams, beam_count_);
+    const std::size_t first = octets_before_[std::size_t(begin)];
+    const std::span<const OctetWork> octets(&octets_[first], octets_before_[std::size_t(end)] - first);
+    if (octets.empty()) continue;
+    ShadeOctets(pass_.tables, octets);
+    clock_.Charge(Stage::kShade);
+    for (std::int32_t beam = first_beam_ + begin; beam < first_beam_ + end; ++beam) {
+      const float* voxel_0 = ShadedBeam(beam) + 4 * std::ptrdiff_t{margin_ - pass_.first_octet * kOctet};
+      FilterBeam(*slice.along_u, slice.columns, {voxel_0, FilteredBeam(beam), &filled_[BeamWord(beam)], words_, pass_.bounds.x_begin});
+    }
+    ClearOctets(octets);
+    clock_.Charge(Stage::kSplat);
   }
-  for (const OctetWork& octet : octets_) std::memset(octet.rgba, 0, 4 * kOctet * sizeof(float));
 }
 
 void SplatBand::CompositeRows(const SliceSamples& slice) {

@@ -25,6 +25,9 @@ class SplatBand {
   bool finished() const;  // all is opaque: nothing behind shows
 
  private:
+  // Beams that are shaded before they are filtered: few, so that what was written is in the first-level cache when it is read.
+  static constexpr std::int32_t kShadedBeams = 16;
+
   struct Rows {
     std::int32_t begin = 0, end = 0;
   };
@@ -33,13 +36,16 @@ class SplatBand {
   void FindNeeded(const SliceSamples& slice);
   void FindOctets(std::int32_t beam);
   void PrefetchCells(std::int32_t slice, std::int32_t beam) const;
-  void FilterBeams(const SliceSamples& slice);
+  void ShadeAndFilter(const SliceSamples& slice);
   void CompositeRows(const SliceSamples& slice);
   void CompositeCutRow(const SliceSamples& slice, const RowWork& work);
 
   SegmentWord* Open(std::int32_t row) { return &open_[std::size_t(row - y_begin_) * std::size_t(words_)]; }
   std::size_t BeamWord(std::int32_t beam) const { return std::size_t(beam - first_beam_) * std::size_t(words_); }
-  float* ShadedBeam(std::int32_t beam) { return &shaded_[4 * std::size_t(beam - first_beam_) * std::size_t(shaded_voxels_)]; }
+  // One after the other, beams share kShadedBeams places.
+  float* ShadedBeam(std::int32_t beam) {
+    return &shaded_[4 * std::size_t((beam - first_beam_) % kShadedBeams) * std::size_t(shaded_voxels_)];
+  }
   float* FilteredBeam(std::int32_t beam) { return &filtered_[4 * std::size_t(beam - first_beam_) * std::size_t(pass_.bounds.width())]; }
 
   const SplatPass& pass_;
@@ -58,11 +64,12 @@ class SplatBand {
   std::vector<SegmentWord> owned_;                // [word]: columns that the box owns
   std::vector<SegmentWord> needed_;               // [beam][word]: owned, and open in any row that the beam reaches
   std::vector<SegmentWord> filled_;               // [beam][word]: of them, those that the beam's voxels reach
-  std::vector<OctetWork> octets_;
-  std::int32_t margin_ = 0, shaded_voxels_ = 0;  // voxels beside the occupied ones; voxels in a row of shaded_
-  AlignedVector<float> shaded_;                  // [beam][voxel][4]: zero but for the octets at hand
-  AlignedVector<float> filtered_;                // [beam][column][4]: of `filled` segments
-  std::vector<const float*> row_beams_;          // scratch of CompositeRows
+  std::vector<OctetWork> octets_;                 // beam by beam
+  std::vector<std::size_t> octets_before_;        // [beam], and one more: where the beam's octets begin
+  std::int32_t margin_ = 0, shaded_voxels_ = 0;   // voxels beside the occupied ones; voxels in a row of shaded_
+  AlignedVector<float> shaded_;                   // [kShadedBeams][voxel][4]: zero but for the octets at hand
+  AlignedVector<float> filtered_;                 // [beam][column][4]: of `filled` segments
+  std::vector<const float*> row_beams_;           // scratch of CompositeRows
   std::vector<const SegmentWord*> row_filled_;
 };
 
