@@ -29,7 +29,7 @@ AlignedVector<float> Noise(std::size_t count, std::mt19937& random) {
 
 // Octets with masks of every kind: full, single voxels, noise.
 struct RandomOctets {
-  explicit RandomOctets(int levels, std::mt19937& random) : rgba(4 * kOctet * kCount, -1.0F) {
+  explicit RandomOctets(std::mt19937& random) : rgba(4 * kOctet * kCount, -1.0F) {
     std::uniform_real_distribution<float> uniform(0, 1);
     records.resize(std::size_t{kOctet} * kCount);
     for (VoxelRecord& record : records) record = {std::uint16_t(random() % 7), std::uint16_t(random() % kNormalCodes)};
@@ -40,11 +40,8 @@ struct RandomOctets {
       work.records = next;
       next += std::popcount(work.occupied);
       work.rgba = &rgba[4 * kOctet * i];
-      if (levels > 1) {
-        const float first = 0.999F * float(levels - 1) * uniform(random), last = 0.999F * float(levels - 1) * uniform(random);
-        work.level = first;
-        work.level_step = (last - first) / (kOctet - 1);
-      }
+      work.slope = 2 * uniform(random) - 1;
+      work.across = 1 + uniform(random);
       octets.push_back(work);
     }
   }
@@ -63,14 +60,19 @@ TEST(ShadeOctets, AgreesWithTheReference) {
     ShadeTables tables;
     tables.bins = 7;
     tables.levels = levels;
+    // Some octets are beyond the levels at both ends.
+    constexpr float kSlopeStep = 0.1F;
+    tables.level_scale = 0.8F * float(levels);
+    tables.level_offset = 0.85F * float(levels);
+    tables.last_level = 0.999F * float(levels - 1);
     for (int bin = 0; bin < tables.bins; ++bin) {
       for (int c = 0; c < 3; ++c) tables.color.push_back(uniform(random));
       for (int level = 0; level < levels; ++level) tables.opacity.push_back(uniform(random));
       tables.color.push_back(tables.opacity[std::size_t(bin * levels)]);
     }
     for (int code = 0; code < kNormalCodes; ++code) tables.by_normal.push_back({1.5F * uniform(random), uniform(random)});
-    RandomOctets work(levels, random);
-    ShadeOctetsReference(tables, work.octets);
+    RandomOctets work(random);
+    ShadeOctetsReference(tables, kSlopeStep, work.octets);
     const AlignedVector<float> expected = work.rgba;
     for (const OctetWork& octet : work.octets) {
       for (int i = 0; i < kOctet; ++i) {
@@ -81,8 +83,9 @@ TEST(ShadeOctets, AgreesWithTheReference) {
     }
     ForEachTarget([&] {
       std::fill(work.rgba.begin(), work.rgba.end(), -1.0F);
-      ShadeOctets(tables, work.octets);
-      for (std::size_t i = 0; i < expected.size(); ++i) ASSERT_NEAR(work.rgba[i], expected[i], 1e-6F) << i;
+      ShadeOctets(tables, kSlopeStep, work.octets);
+      // Levels, up to 10 here, are rounded, and opacities differ by up to 1 from level to level.
+      for (std::size_t i = 0; i < expected.size(); ++i) ASSERT_NEAR(work.rgba[i], expected[i], levels == 1 ? 1e-6F : 5e-6F) << i;
     });
   }
 }
@@ -92,13 +95,15 @@ TEST(ShadeOctets, InterpolatesBetweenLevels) {
   ShadeTables tables;
   tables.bins = 1;
   tables.levels = 3;
+  tables.level_scale = 1;
+  tables.last_level = 1.999F;
   tables.color = {1, 1, 1, 0.1F};
   tables.opacity = {0.1F, 0.2F, 0.6F};
   tables.by_normal.resize(kNormalCodes);
   std::vector<VoxelRecord> records(kOctet);
   AlignedVector<float> rgba(4 * kOctet);
-  const std::vector<OctetWork> octets = {{records.data(), rgba.data(), 0xFF, 0, 0.25F}};
-  ShadeOctets(tables, octets);
+  const std::vector<OctetWork> octets = {{records.data(), rgba.data(), 0xFF, 0, 0}};
+  ShadeOctets(tables, 0.25F, octets);
   const float expected[] = {0.1F, 0.125F, 0.15F, 0.175F, 0.2F, 0.3F, 0.4F, 0.5F};
   for (std::size_t i = 0; i < kOctet; ++i) EXPECT_NEAR(rgba[4 * i + 3], expected[i], 1e-6F);
 }

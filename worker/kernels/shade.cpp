@@ -9,6 +9,19 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
+
+#ifndef SLABSTREAM_WORKER_KERNELS_SHADE_CPP_  // what is shared by all instruction sets
+#define SLABSTREAM_WORKER_KERNELS_SHADE_CPP_
+namespace slabstream {
+
+inline float LevelOf(const ShadeTables& tables, const OctetWork& octet, float slope_step, int voxel) {
+  const float slope = octet.slope + float(voxel) * slope_step;
+  return std::clamp(std::sqrt(octet.across + slope * slope) * tables.level_scale - tables.level_offset, 0.0F, tables.last_level);
+}
+
+}  // namespace slabstream
+#endif
 
 HWY_BEFORE_NAMESPACE();
 namespace slabstream {
@@ -17,7 +30,9 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 #if HWY_TARGET == HWY_SCALAR
 
-void Shade(const ShadeTables& tables, std::span<const OctetWork> octets) { ShadeOctetsReference(tables, octets); }
+void Shade(const ShadeTables& tables, float slope_step, std::span<const OctetWork> octets) {
+  ShadeOctetsReference(tables, slope_step, octets);
+}
 
 #else
 
@@ -77,7 +92,7 @@ constexpr auto kQuadLanes = [] {
 }();
 
 template <bool kLevels>
-HWY_INLINE void ShadeAll(const ShadeTables& tables, std::span<const OctetWork> octets) {
+HWY_INLINE void ShadeAll(const ShadeTables& tables, float slope_step, std::span<const OctetWork> octets) {
   const QuadTag d;
   const HalfQuadTag half;
   const hn::FixedTag<std::int32_t, kOctet> whole;
@@ -92,7 +107,11 @@ HWY_INLINE void ShadeAll(const ShadeTables& tables, std::span<const OctetWork> o
     const auto record = [&, of = kRecordOf[octet.occupied].data()](std::size_t i) -> const VoxelRecord& { return octet.records[of[i]]; };
     auto by_level = hn::Zero(half);  // opacities of the voxels
     if constexpr (kLevels) {
-      const auto level = hn::MulAdd(hn::Iota(half, 0.0F), hn::Set(half, octet.level_step), hn::Set(half, octet.level));
+      const auto slope = hn::MulAdd(hn::Iota(half, 0.0F), hn::Set(half, slope_step), hn::Set(half, octet.slope));
+      const auto length = hn::Sqrt(hn::MulAdd(slope, slope, hn::Set(half, octet.across)));
+      const auto level =
+          hn::Min(hn::Max(hn::MulSub(length, hn::Set(half, tables.level_scale), hn::Set(half, tables.level_offset)), hn::Zero(half)),
+                  hn::Set(half, tables.last_level));
       const auto floor = hn::ConvertTo(whole, level);
       alignas(32) std::int32_t below[kOctet];
       hn::Store(floor, whole, below);
@@ -117,7 +136,7 @@ HWY_INLINE void ShadeAll(const ShadeTables& tables, std::span<const OctetWork> o
 #else
 
 template <bool kLevels>
-HWY_INLINE void ShadeAll(const ShadeTables& tables, std::span<const OctetWork> octets) {
+HWY_INLINE void ShadeAll(const ShadeTables& tables, float slope_step, std::span<const OctetWork> octets) {
   const VoxelTag d;
   // The fourth channel is 1 under every light.
   alignas(16) static constexpr float kIsColor[4] = {1, 1, 1, 0}, kIsOpacity[4] = {0, 0, 0, 1};
@@ -135,7 +154,7 @@ HWY_INLINE void ShadeAll(const ShadeTables& tables, std::span<const OctetWork> o
       const auto color = hn::Load(d, colors + 4 * std::size_t{record->bin});
       auto opacity = hn::Broadcast<3>(color);
       if constexpr (kLevels) {
-        const float level = octet.level + float(i) * octet.level_step;
+        const float level = LevelOf(tables, octet, slope_step, i);
         const auto below = std::size_t(std::int32_t(level));
         const float* table = opacities + levels * std::size_t{record->bin} + below;
         opacity = hn::Set(d, table[0] + (level - float(below)) * (table[1] - table[0]));
@@ -149,8 +168,8 @@ HWY_INLINE void ShadeAll(const ShadeTables& tables, std::span<const OctetWork> o
 
 #endif
 
-void Shade(const ShadeTables& tables, std::span<const OctetWork> octets) {
-  tables.levels > 1 ? ShadeAll<true>(tables, octets) : ShadeAll<false>(tables, octets);
+void Shade(const ShadeTables& tables, float slope_step, std::span<const OctetWork> octets) {
+  tables.levels > 1 ? ShadeAll<true>(tables, slope_step, octets) : ShadeAll<false>(tables, slope_step, octets);
 }
 
 #endif
@@ -171,11 +190,13 @@ namespace slabstream {
 HWY_EXPORT(Shade);
 HWY_EXPORT(Clear);
 
-void ShadeOctets(const ShadeTables& tables, std::span<const OctetWork> octets) { HWY_DYNAMIC_DISPATCH(Shade)(tables, octets); }
+void ShadeOctets(const ShadeTables& tables, float slope_step, std::span<const OctetWork> octets) {
+  HWY_DYNAMIC_DISPATCH(Shade)(tables, slope_step, octets);
+}
 
 void ClearOctets(std::span<const OctetWork> octets) { HWY_DYNAMIC_DISPATCH(Clear)(octets); }
 
-void ShadeOctetsReference(const ShadeTables& tables, std::span<const OctetWork> octets) {
+void ShadeOctetsReference(const ShadeTables& tables, float slope_step, std::span<const OctetWork> octets) {
   for (const OctetWork& octet : octets) {
     const VoxelRecord* record = octet.records;
     for (int i = 0; i < kOctet; ++i) {
@@ -188,7 +209,7 @@ void ShadeOctetsReference(const ShadeTables& tables, std::span<const OctetWork> 
       const float* color = &tables.color[4 * std::size_t{record->bin}];
       float opacity = color[3];
       if (tables.levels > 1) {
-        const float level = octet.level + float(i) * octet.level_step;
+        const float level = LevelOf(tables, octet, slope_step, i);
         const int below = int(level);
         const float* table = &tables.opacity[std::size_t(tables.levels) * record->bin + std::size_t(below)];
         opacity = table[0] + (level - float(below)) * (table[1] - table[0]);

@@ -18,6 +18,10 @@ struct ShadeTables {
   AlignedVector<float> color;           // [bin][4]: straight colour, then the opacity of level 0
   AlignedVector<float> opacity;         // [bin][level]; one level: not read
   std::vector<PhongFactors> by_normal;  // by normal code
+
+  // Of a voxel on a ray of slopes s and t along u and v (way along the axis a way along the traversal axis): its level is
+  // clamp(level_scale * sqrt(1 + s^2 + t^2) - level_offset, 0, last_level), with last_level < levels - 1.
+  float level_scale = 0, level_offset = 0, last_level = 0;
 };
 
 // An octet with at least one occupied voxel.
@@ -25,12 +29,13 @@ struct OctetWork {
   const VoxelRecord* records = nullptr;  // of its occupied voxels, in order
   float* rgba = nullptr;                 // 4 * kOctet floats, 64-byte aligned: opacity * (shaded colour, 1), or 0 where nothing is
   std::uint32_t occupied = 0;            // bit i: voxel i
-  float level = 0, level_step = 0;       // of voxel 0, and from voxel to voxel; in [0, levels - 1) for all of them. One level: not read
+  float slope = 0, across = 1;            // s of voxel 0, and 1 + t^2. One level: not read
 };
 
-void ShadeOctets(const ShadeTables& tables, std::span<const OctetWork> octets);
+// slope_step: from voxel to voxel.
+void ShadeOctets(const ShadeTables& tables, float slope_step, std::span<const OctetWork> octets);
 // Zeroes what ShadeOctets wrote.
 void ClearOctets(std::span<const OctetWork> octets);
-void ShadeOctetsReference(const ShadeTables& tables, std::span<const OctetWork> octets);
+void ShadeOctetsReference(const ShadeTables& tables, float slope_step, std::span<const OctetWork> octets);
 
 }  // namespace slabstream

@@ -1,5 +1,8 @@
 #include "worker/render/splatting/sheet_opacity.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "worker/kernels/phong_table.h"
 
 namespace slabstream {
@@ -38,19 +41,13 @@ double SheetOpacity::Ratio(const Vec3& voxel) const {
   return Length(ray) / std::abs(ray[axes_.c]) * camera.spacing[axes_.c] / central_distance_;
 }
 
-SheetOpacity::Beam SheetOpacity::BeamAt(std::int32_t k, std::int32_t v) const {
-  constexpr double kBelowLast = 1e-3;  // there is always a level above
+SheetOpacity::Slopes SheetOpacity::SlopesIn(std::int32_t k) const {
+  if (one_level()) return {};
+  const auto [c, u, v] = axes_;
   const Camera& camera = setup_.camera;
-  const double depth = (k - camera.eye[axes_.c]) * camera.spacing[axes_.c];
-  const double along_v = (v - camera.eye[axes_.v]) * camera.spacing[axes_.v] / depth;
-  Beam beam;
-  beam.slope_0_ = float(-camera.eye[axes_.u] * camera.spacing[axes_.u] / depth);
-  beam.slope_step_ = float(camera.spacing[axes_.u] / depth);
-  beam.rest_ = float(1 + along_v * along_v);
-  beam.scale_ = float(levels_per_ratio_ * camera.spacing[axes_.c] / central_distance_);
-  beam.offset_ = float(levels_per_ratio_ * least_ratio_);
-  beam.last_ = float(levels_ - 1 - kBelowLast);
-  return beam;
+  const double depth = (k - camera.eye[c]) * camera.spacing[c];
+  return {float(-camera.eye[u] * camera.spacing[u] / depth), float(camera.spacing[u] / depth),
+          float(-camera.eye[v] * camera.spacing[v] / depth), float(camera.spacing[v] / depth)};
 }
 
 ShadeTables SheetOpacity::Tables(const ClassificationTable& table) const {
@@ -60,6 +57,11 @@ ShadeTables SheetOpacity::Tables(const ClassificationTable& table) const {
   ShadeTables tables;
   tables.bins = table.size();
   tables.levels = levels_;
+  // In levels, a ray's ratio is its length over the spacing of slices.
+  constexpr double kBelowLast = 1e-3;  // there is always a level above
+  tables.level_scale = float(levels_per_ratio_ * camera.spacing[axes_.c] / central_distance_);
+  tables.level_offset = float(levels_per_ratio_ * least_ratio_);
+  tables.last_level = float(std::max(levels_ - 1 - kBelowLast, 0.0));
   for (int bin = 0; bin < table.size(); ++bin) {
     const Rgb& color = table.color[std::size_t(bin)];
     for (float f : {color.r, color.g, color.b, 0.0F}) tables.color.push_back(f);

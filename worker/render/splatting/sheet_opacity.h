@@ -5,8 +5,6 @@
 // through the voxel, D0 * ratio with the central ray's D0; shading interpolates between tables for a few ratios.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <cstdint>
 
 #include "common/classification/classification_table.h"
@@ -24,22 +22,14 @@ class SheetOpacity {
 
   bool one_level() const { return levels_ == 1; }
 
-  // Places of the ratios of a beam's voxels among the levels, in [0, levels - 1).
-  class Beam {
-   public:
-    float LevelAt(std::int32_t u) const {
-      const float along_u = slope_0_ + float(u) * slope_step_;
-      return std::clamp(std::sqrt(rest_ + along_u * along_u) * scale_ - offset_, 0.0F, last_);
-    }
+  // Slopes of the rays through the voxels of slice k: way along u and v by way along the traversal axis. One level: none.
+  struct Slopes {
+    float u_0 = 0, u_step = 0, v_0 = 0, v_step = 0;  // at voxel 0, and from voxel to voxel
 
-   private:
-    friend class SheetOpacity;
-    float slope_0_ = 0,
-          slope_step_ = 0;  // of the ray through voxel u, along u: physical lengths a physical length along the traversal axis
-    float rest_ = 1;        // 1 + the square of its slope along v
-    float scale_ = 0, offset_ = 0, last_ = 0;
+    float AlongU(std::int32_t u) const { return u_0 + float(u) * u_step; }
+    float AlongV(std::int32_t v) const { return v_0 + float(v) * v_step; }
   };
-  Beam BeamAt(std::int32_t k, std::int32_t v) const;
+  Slopes SlopesIn(std::int32_t k) const;
 
  private:
   double Ratio(const Vec3& voxel) const;

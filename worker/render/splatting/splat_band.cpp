@@ -59,6 +59,7 @@ bool SplatBand::finished() const {
 
 void SplatBand::AddSlice(std::int32_t k) {
   slice_ = k;
+  slopes_ = pass_.opacity.SlopesIn(k);
   const SliceSamples& slice = pass_.Slice(k);
   if (!PlaceBeams(slice)) return;
   FindNeeded(slice);
@@ -101,19 +102,23 @@ void SplatBand::FindNeeded(const SliceSamples& slice) {
   std::ranges::fill(owned_, 0);
   Insert(owned_.data(), (slice.owned.x_begin - pass_.bounds.x_begin) / kSegment,
          (slice.owned.x_end - pass_.bounds.x_begin + kSegment - 1) / kSegment);
+  // Rows that the beam reaches: those whose taps begin at most `taps` - 1 beams before it.
+  Rows reached = {rows_.begin, rows_.begin};
+  const auto first_tap = [&](std::int32_t row) { return Lattice::First(slice.rows.At(row)); };
   for (std::int32_t beam = first_beam_; beam < first_beam_ + beam_count_; ++beam) {
     octets_before_.push_back(octets_.size());
+    while (reached.begin < rows_.end && first_tap(reached.begin) <= beam - slice.along_v->taps) ++reached.begin;
+    while (reached.end < rows_.end && first_tap(reached.end) <= beam) ++reached.end;
     const std::size_t number = pass_.cells.Beam(slice_, beam);
     PrefetchCells(next_slice, beam);
     if (pass_.cells.first_record[number] == pass_.cells.first_record[number + 1]) continue;
-    const std::int32_t row_begin = FirstPixelWithTap(slice.rows, beam - slice.along_v->taps + 1, rows_.begin, rows_.end);
-    const std::int32_t row_end = FirstPixelWithTap(slice.rows, beam + 1, rows_.begin, rows_.end);
     SegmentWord* needed = &needed_[BeamWord(beam)];
     SegmentWord any = 0;
-    for (std::int32_t row = row_begin; row < row_end; ++row) {
-      for (std::int32_t word = 0; word < words_; ++word) needed[word] |= Open(row)[word];
+    for (std::int32_t word = 0; word < words_; ++word) {
+      SegmentWord open = 0;
+      for (std::int32_t row = reached.begin; row < reached.end; ++row) open |= Open(row)[word];
+      any |= needed[word] = open & owned_[std::size_t(word)];
     }
-    for (std::int32_t word = 0; word < words_; ++word) any |= needed[word] &= owned_[std::size_t(word)];
     if (any != 0) FindOctets(beam);
   }
   octets_before_.push_back(octets_.size());
@@ -130,7 +135,7 @@ void SplatBand::FindOctets(std::int32_t beam) {
   const SegmentWord* needed = &needed_[BeamWord(beam)];
   SegmentWord* filled = &filled_[BeamWord(beam)];
   float* shaded = ShadedBeam(beam) + 4 * std::ptrdiff_t{margin_};
-  const SheetOpacity::Beam levels = pass_.opacity.one_level() ? SheetOpacity::Beam() : pass_.opacity.BeamAt(slice_, beam);
+  const float along_v = slopes_.AlongV(beam), across = 1 + along_v * along_v;
   std::uint64_t drawn = 0;
   for (std::int32_t first_cell = 0; first_cell < cell_count; first_cell += kSetCells) {
     const std::int32_t set_cells = std::min(kSetCells, cell_count - first_cell);
@@ -142,12 +147,8 @@ void SplatBand::FindOctets(std::int32_t beam) {
       if (!AnyOf(needed, reached[octet])) continue;
       __builtin_prefetch(records);  // shading comes to it after the slice's other octets
       Insert(filled, reached[octet]);
-      OctetWork& work = octets_.emplace_back(OctetWork{records, shaded + 4 * std::ptrdiff_t{octet * kOctet}, occupied});
-      if (!pass_.opacity.one_level()) {
-        const std::int32_t u = (pass_.first_octet + octet) * kOctet;
-        work.level = levels.LevelAt(u);
-        work.level_step = (levels.LevelAt(u + kOctet - 1) - work.level) / (kOctet - 1);
-      }
+      octets_.push_back(
+          {records, shaded + 4 * std::ptrdiff_t{octet * kOctet}, occupied, slopes_.AlongU((pass_.first_octet + octet) * kOctet), across});
       drawn += kOctetCount[occupied];
     }
   }
@@ -171,7 +172,7 @@ void SplatBand::ShadeAndFilter(const SliceSamples& slice) {
     const std::size_t first = octets_before_[std::size_t(begin)];
     const std::span<const OctetWork> octets(&octets_[first], octets_before_[std::size_t(end)] - first);
     if (octets.empty()) continue;
-    ShadeOctets(pass_.tables, octets);
+    ShadeOctets(pass_.tables, slopes_.u_step, octets);
     clock_.Charge(Stage::kShade);
     for (std::int32_t beam = first_beam_ + begin; beam < first_beam_ + end; ++beam) {
       const float* voxel_0 = ShadedBeam(beam) + 4 * std::ptrdiff_t{margin_ - pass_.first_octet * kOctet};

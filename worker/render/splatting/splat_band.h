@@ -59,6 +59,7 @@ class SplatBand {
 
   // Of the slice at hand.
   std::int32_t slice_ = 0;
+  SheetOpacity::Slopes slopes_;
   Rows rows_;                                     // that it can touch
   std::int32_t first_beam_ = 0, beam_count_ = 0;  // whose footprints reach them
   std::vector<SegmentWord> owned_;                // [word]: columns that the box owns
