@@ -16,7 +16,7 @@
 namespace slabstream {
 
 inline constexpr std::size_t kMaxKeptAnswers = 64;                         // of one client
-inline constexpr std::size_t kMaxKeptAnswerBytes = std::size_t{64} << 20;  // payloads of one client's kept answers
+inline constexpr std::size_t kMaxKeptAnswerBytes = std::size_t{32} << 20;  // payloads of these: eight pictures of 512 x 512 pixels
 
 // What ended a request: its final FrameReply, or FrameFailed.
 struct Answer {
