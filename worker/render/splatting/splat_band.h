@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "common/base/pooled_vector.h"
 #include "worker/kernels/splat.h"
 #include "worker/render/splatting/splat_pass.h"
 #include "worker/render/stage_clock.h"
@@ -69,7 +70,7 @@ class SplatBand {
   std::vector<std::size_t> octets_before_;        // [beam], and one more: where the beam's octets begin
   std::int32_t margin_ = 0, shaded_voxels_ = 0;   // voxels beside the occupied ones; voxels in a row of shaded_
   AlignedVector<float> shaded_;                   // [kShadedBeams][voxel][4]: zero but for the octets at hand
-  AlignedVector<float> filtered_;                 // [beam][column][4]: of `filled` segments
+  PooledVector<float> filtered_;                  // [beam][column][4]: of `filled` segments
   std::vector<const float*> row_beams_;           // scratch of CompositeRows
   std::vector<const SegmentWord*> row_filled_;
 };
