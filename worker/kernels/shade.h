@@ -29,7 +29,7 @@ struct OctetWork {
   const VoxelRecord* records = nullptr;  // of its occupied voxels, in order
   float* rgba = nullptr;                 // 4 * kOctet floats, 64-byte aligned: opacity * (shaded colour, 1), or 0 where nothing is
   std::uint32_t occupied = 0;            // bit i: voxel i
-  float slope = 0, across = 1;            // s of voxel 0, and 1 + t^2. One level: not read
+  float slope = 0, across = 1;           // s of voxel 0, and 1 + t^2. One level: not read
 };
 
 // slope_step: from voxel to voxel.

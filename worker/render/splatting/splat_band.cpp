@@ -170,7 +170,7 @@ void SplatBand::ShadeAndFilter(const SliceSamples& slice) {
   for (std::int32_t begin = 0; begin < beam_count_; begin += kShadedBeams) {
     const std::int32_t end = std::min(begin + kShadedBeams, beam_count_);
     const std::size_t first = octets_before_[std::size_t(begin)];
-    const std::span<const OctetWork> octets(&octets_[first], octets_before_[std::size_t(end)] - first);
+    const auto octets = std::span<const OctetWork>(octets_).subspan(first, octets_before_[std::size_t(end)] - first);
     if (octets.empty()) continue;
     ShadeOctets(pass_.tables, slopes_.u_step, octets);
     clock_.Charge(Stage::kShade);
