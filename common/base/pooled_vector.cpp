@@ -13,17 +13,14 @@ constexpr std::size_t kLeastKept = std::size_t{1} << 17;  // bytes: smaller bloc
 #ifdef __SANITIZE_ADDRESS__
 constexpr std::size_t kMostKept = 0;  // so that the use of a block that was given back is seen
 #else
-constexpr std::size_t kMostKept = std::size_t{1} << 26;  // bytes in all
+constexpr std::size_t kMostKept = std::size_t{96} << 20;  // bytes in all
 #endif
 
 void* Allocate(std::size_t bytes) { return ::operator new(bytes, std::align_val_t(kBufferAlignment)); }
 void Free(void* block) { ::operator delete(block, std::align_val_t(kBufferAlignment)); }
 
-// Images of neighbouring views differ a little in size: blocks are an eighth of a power of two apart, so that one fits the other.
-std::size_t RoundedUp(std::size_t bytes) {
-  const std::size_t step = std::bit_floor(bytes) / 8;
-  return (bytes + step - 1) / step * step;
-}
+// Images of neighbouring views differ in size: one's block is to fit the other. What is never written of a block takes no memory.
+std::size_t RoundedUp(std::size_t bytes) { return std::bit_ceil(bytes); }
 
 class Pool {
  public:
