@@ -181,17 +181,20 @@ void Executor::Perform(StartCombine&& action, const PixelBounds& frame) {
     done.span = {Stage::kCombine, NowNs(), 0};
     done.status = Guarded("combine", [&] {
       if (other != nullptr) {
-        CombineImages(*image, fresh, other, combine);
+        finish_arena_.execute([&] { CombineImages(*image, fresh, other, combine); });
+        return Status::Ok();
+      }
+      if (fresh) {
+        Result<LocalImage> read = finish_arena_.execute([&] { return ReadRuns(combine.header, combine.payload.span(), frame); });
+        if (!read.ok()) return read.status();
+        *image = std::move(*read);
         return Status::Ok();
       }
       if (Status status = ValidateRuns(combine.header, combine.payload.span(), frame); !status.ok()) return status;
-      if (fresh) {
-        *image = DecodeRuns(combine.header, combine.payload.span());
-      } else if (image->format != combine.header.format) {
+      if (image->format != combine.header.format) {
         return Status::InvalidArgument("PartialImage.image.format is not that of the frame");
-      } else {
-        CombineRuns(*image, combine.header, combine.payload.span(), combine.side);
       }
+      CombineRuns(*image, combine.header, combine.payload.span(), combine.side);
       return Status::Ok();
     });
     done.span.end_ns = NowNs();
@@ -221,7 +224,7 @@ void Executor::Perform(SendPartial&& action) {
   combine_thread_.Post([this, image = std::move(image), send = std::move(action)]() mutable {
     const Status status = Guarded("encode", [&] {
       const std::int64_t begin = NowNs();
-      RunImage runs = EncodeRuns(*image, send.message.pixels, send.frame_width);
+      RunImage runs = finish_arena_.execute([&] { return EncodeRuns(*image, send.message.pixels, send.frame_width); });
       send.message.image = runs.header;
       AddStage(send.message.reports, Stage::kEncode, begin, NowNs());
       if (!send.message.reports.empty()) send.message.reports.back().image_bytes += runs.payload.size();
@@ -245,19 +248,12 @@ void Executor::Perform(SendFrame&& action) {
       }
       const std::int64_t begin = NowNs();
       std::int64_t resolved_ns = begin;
-      RunImage runs;
-      const auto encode = [&](const LocalImage& picture) {
+      RunImage runs = finish_arena_.execute([&] {
+        if (FrameIsPicture(*send.setup)) return EncodePicture(*image);
+        const LocalImage picture = FinishPicture(*image, *send.setup);
         resolved_ns = NowNs();
-        const PixelBounds& b = picture.bounds;
-        // Any frame width does that holds the bounds: the range is all pixels.
-        const std::int32_t width = std::max(b.x_end, 1);
-        runs = EncodeRuns(picture, {0, std::uint64_t(std::max(b.y_end, 0)) * std::uint64_t(width)}, width);
-      };
-      if (FrameIsPicture(*send.setup)) {
-        encode(*image);
-      } else {
-        encode(finish_arena_.execute([&] { return FinishPicture(*image, *send.setup); }));
-      }
+        return EncodePicture(picture);
+      });
       AddStage(reports, Stage::kResolve, begin, resolved_ns);
       send.message.runs.image = runs.header;
       const Bytes payload = PackRuns(Bytes(std::move(runs.payload)), frame_codec_, send.message.runs);
