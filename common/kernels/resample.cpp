@@ -4,6 +4,8 @@
 // Highway wants this order.
 #include <hwy/highway.h>
 
+#include <hwy/cache_control.h>
+
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -34,7 +36,8 @@ using PixelsTag = hn::FixedTag<float, HWY_HAVE_SCALABLE ? 4 : HWY_MIN(std::size_
 constexpr std::int32_t kBatch = 16;
 struct Places {
   HWY_ALIGN double x[kBatch], y[kBatch];
-  bool narrow = false;  // all of them, and all taps lie on the image
+  bool narrow = false;  // all of them; what is below holds then
+  bool inside = false;  // what is read of all of them lies on the image
   HWY_ALIGN std::int32_t first_x[kBatch], first_y[kBatch];
   HWY_ALIGN float weight_x[4 * kBatch + 16];  // of the three pixels and a 0, pixel after pixel; then room to read beyond
   HWY_ALIGN float weight_y[3][kBatch];
@@ -54,6 +57,13 @@ HWY_INLINE void NarrowSpline(const double* HWY_RESTRICT at, Store&& store) {
     store(i, hn::Sub(hn::DemoteTo(di, nearest), hn::Set(di, 1)), hn::Mul(half, hn::Mul(left, left)), hn::NegMulAdd(t, t, most),
           hn::Mul(half, hn::Mul(right, right)));
   }
+}
+
+// Whether all that is read of a narrow pixel lies on the image: three pixels and a fourth, which has weight 0.
+HWY_INLINE bool IsInside(const PixelBounds& image, const Places& places, std::int32_t i) {
+  constexpr double kReach = 3;
+  return places.x[i] >= image.x_begin + kReach && places.x[i] <= image.x_end - kReach && places.y[i] >= image.y_begin + kReach &&
+         places.y[i] <= image.y_end - kReach;
 }
 
 // Of the pixels x_begin, x_begin + 1, ... of row y: the places of ResampleAt in vectors.
@@ -81,16 +91,10 @@ HWY_INLINE void FindPlaces(const ProjectiveMap& map, const PixelBounds& image, s
     widest = hn::Max(widest, hn::Max(square(0, at_x), square(1, at_y)));
     least_w = hn::Min(least_w, w);
   }
-  const double* const ends_x[2] = {&places.x[0], &places.x[kBatch - 1]};
-  const double* const ends_y[2] = {&places.y[0], &places.y[kBatch - 1]};
-  constexpr double kReach = 3;  // three pixels and a fourth, which is read too, with weight 0
-  const auto inside = [](const double* const* ends, std::int32_t begin, std::int32_t end) {  // a line stays a line
-    return std::min(*ends[0], *ends[1]) >= begin + kReach && std::max(*ends[0], *ends[1]) <= end - kReach;
-  };
   constexpr double kSteepest = (1 + kSkewSlack) * (1 + kSkewSlack);
-  places.narrow = hn::AllTrue(d, hn::Le(widest, hn::Set(d, kSteepest))) && hn::AllTrue(d, hn::Gt(least_w, zero)) &&
-                  inside(ends_x, image.x_begin, image.x_end) && inside(ends_y, image.y_begin, image.y_end);
+  places.narrow = hn::AllTrue(d, hn::Le(widest, hn::Set(d, kSteepest))) && hn::AllTrue(d, hn::Gt(least_w, zero));
   if (!places.narrow) return;
+  places.inside = IsInside(image, places, 0) && IsInside(image, places, kBatch - 1);  // a line stays a line
   NarrowSpline(places.x, [&](std::int32_t i, auto first, auto left, auto middle, auto right) HWY_ATTR {
     hn::Store(first, di, places.first_x + i);
     hn::StoreInterleaved4(left, middle, right, hn::Zero(df), df, places.weight_x + 4 * i);
@@ -136,6 +140,7 @@ void ResampleOne(const LocalImage& frame, const ResamplePoint& point, Spline& al
   const PixelBounds& b = frame.bounds;
   if (!point.seen || !IsNear(point.x, point.y)) return;
   along_x.Place(point.x, point.scale_x, b.x_begin, b.x_end);
+  if (along_x.taps == 0) return;
   along_y.Place(point.y, point.scale_y, b.y_begin, b.y_end);
   auto sum = hn::Zero(d);
   for (std::int32_t j = 0; j < along_y.taps; ++j) {
@@ -160,14 +165,16 @@ HWY_INLINE hn::Vec<PixelTag> SumOfPixels(Vector pixels) {
   }
 }
 
-HWY_INLINE void ResampleNarrow(const LocalImage& frame, const Places& places, std::int32_t count, float* HWY_RESTRICT out) {
+// Pixels [begin, end) of the batch, all of them inside. `out`: of the batch's first pixel.
+HWY_INLINE void ResampleNarrow(const LocalImage& frame, const Places& places, std::int32_t begin, std::int32_t end,
+                               float* HWY_RESTRICT out) {
   const PixelsTag d;
   constexpr std::size_t kTapFloats = 12;
   HWY_ALIGN static constexpr std::int32_t kPixelOfFloat[16] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
   const PixelBounds& b = frame.bounds;
   const auto row_floats = 4 * std::ptrdiff_t{b.width()};
   const float* const pixels = frame.rgba.data();
-  for (std::int32_t n = 0; n < count; ++n, out += 4) {
+  for (std::int32_t n = begin; n < end; ++n) {
     const float* HWY_RESTRICT first =
         pixels + (places.first_y[n] - b.y_begin) * row_floats + 4 * std::ptrdiff_t{places.first_x[n] - b.x_begin};
     const auto upper = hn::Set(d, places.weight_y[0][n]), middle = hn::Set(d, places.weight_y[1][n]),
@@ -181,7 +188,22 @@ HWY_INLINE void ResampleNarrow(const LocalImage& frame, const Places& places, st
       columns = hn::MulAdd(lower, hn::LoadU(d, pixel + 2 * row_floats), columns);
       sum = hn::MulAdd(hn::TableLookupLanes(weight_x, hn::SetTableIndices(d, kPixelOfFloat + i)), columns, sum);
     }
-    hn::Store(SumOfPixels(sum), PixelTag(), out);
+    hn::Store(SumOfPixels(sum), PixelTag(), out + 4 * n);
+  }
+}
+
+// Asks for what the next batch of the row will read, about.
+HWY_INLINE void FetchNext(const LocalImage& frame, const Places& places) {
+  const PixelBounds& b = frame.bounds;
+  constexpr double kBatchesPerSpan = double(kBatch) / (kBatch - 1);
+  const auto step_x = std::int32_t((places.x[kBatch - 1] - places.x[0]) * kBatchesPerSpan),
+             step_y = std::int32_t((places.y[kBatch - 1] - places.y[0]) * kBatchesPerSpan);
+  for (std::int32_t n = 0; n < kBatch; n += 2) {
+    const std::int32_t column = std::clamp(places.first_x[n] + 2 + step_x, b.x_begin, b.x_end - 1) - b.x_begin;
+    for (std::int32_t row = 0; row < 3; ++row) {
+      const std::int32_t y = std::clamp(places.first_y[n] + row + step_y, b.y_begin, b.y_end - 1) - b.y_begin;
+      hwy::Prefetch(&frame.rgba[4 * (std::size_t(y) * std::size_t(b.width()) + std::size_t(column))]);
+    }
   }
 }
 
@@ -190,17 +212,23 @@ void ResampleRows(const LocalImage& frame, const ProjectiveMap& frame_from_pictu
   const std::int32_t width = picture.bounds.x_end;
   Places places;
   Spline along_x, along_y;
-  for (std::int32_t y = y_begin; y < y_end; ++y) {
-    for (std::int32_t x = 0; x < width; x += kBatch) {
+  // Batch below batch: neighbouring rows read the same lines of the frame, and there is time to fetch those of the next column.
+  for (std::int32_t x = 0; x < width; x += kBatch) {
+    const std::int32_t count = std::min(kBatch, width - x);
+    for (std::int32_t y = y_begin; y < y_end; ++y) {
       FindPlaces(frame_from_picture, frame.bounds, x, y, places);
       float* out = &picture.rgba[4 * (std::size_t(y) * std::size_t(width) + std::size_t(x))];
-      const std::int32_t count = std::min(kBatch, width - x);
-      if (places.narrow) {
-        ResampleNarrow(frame, places, count, out);
+      if (places.narrow && places.inside) {
+        FetchNext(frame, places);
+        ResampleNarrow(frame, places, 0, count, out);
         continue;
       }
       for (std::int32_t n = 0; n < count; ++n) {
-        ResampleOne(frame, ResampleAt(frame_from_picture, x + n + 0.5, y + 0.5), along_x, along_y, out + 4 * n);
+        if (places.narrow && IsInside(frame.bounds, places, n)) {
+          ResampleNarrow(frame, places, n, n + 1, out);
+        } else {
+          ResampleOne(frame, ResampleAt(frame_from_picture, x + n + 0.5, y + 0.5), along_x, along_y, out + 4 * n);
+        }
       }
     }
   }
