@@ -100,6 +100,16 @@ Executor::~Executor() {
   if (last_render_) *last_render_->cancelled = true;
 }
 
+// Within as many threads as all workers of this process have: when a picture is made, the others have rendered their parts of it.
+template <class Work>
+auto Executor::InFinishArena(Work&& work) {
+  if (const int threads = ThreadShare::OfProcess(); finish_arena_.max_concurrency() != threads) {
+    finish_arena_.terminate();
+    finish_arena_.initialize(threads);
+  }
+  return finish_arena_.execute(work);
+}
+
 void Executor::Perform(const OpenSlab& action) { slabs_.insert_or_assign(action.slab, std::make_shared<Slab>(action.slab)); }
 
 void Executor::Perform(const DropSlab& action) { slabs_.erase(action.slab); }
@@ -181,11 +191,11 @@ void Executor::Perform(StartCombine&& action, const PixelBounds& frame) {
     done.span = {Stage::kCombine, NowNs(), 0};
     done.status = Guarded("combine", [&] {
       if (other != nullptr) {
-        finish_arena_.execute([&] { CombineImages(*image, fresh, other, combine); });
+        InFinishArena([&] { CombineImages(*image, fresh, other, combine); });
         return Status::Ok();
       }
       if (fresh) {
-        Result<LocalImage> read = finish_arena_.execute([&] { return ReadRuns(combine.header, combine.payload.span(), frame); });
+        Result<LocalImage> read = InFinishArena([&] { return ReadRuns(combine.header, combine.payload.span(), frame); });
         if (!read.ok()) return read.status();
         *image = std::move(*read);
         return Status::Ok();
@@ -224,7 +234,7 @@ void Executor::Perform(SendPartial&& action) {
   combine_thread_.Post([this, image = std::move(image), send = std::move(action)]() mutable {
     const Status status = Guarded("encode", [&] {
       const std::int64_t begin = NowNs();
-      RunImage runs = finish_arena_.execute([&] { return EncodeRuns(*image, send.message.pixels, send.frame_width); });
+      RunImage runs = InFinishArena([&] { return EncodeRuns(*image, send.message.pixels, send.frame_width); });
       send.message.image = runs.header;
       AddStage(send.message.reports, Stage::kEncode, begin, NowNs());
       if (!send.message.reports.empty()) send.message.reports.back().image_bytes += runs.payload.size();
@@ -248,7 +258,7 @@ void Executor::Perform(SendFrame&& action) {
       }
       const std::int64_t begin = NowNs();
       std::int64_t resolved_ns = begin;
-      RunImage runs = finish_arena_.execute([&] {
+      RunImage runs = InFinishArena([&] {
         if (FrameIsPicture(*send.setup)) return EncodePicture(*image);
         const LocalImage picture = FinishPicture(*image, *send.setup);
         resolved_ns = NowNs();
