@@ -36,10 +36,11 @@ Result<Picture> DecodePicture(FrameReply& reply, const Bytes& payload, ImageSize
   const Result<Bytes> runs = UnpackRuns(reply.runs, payload);
   if (!runs.ok()) return runs.status();
   const PixelBounds frame = {0, 0, expected.width, expected.height};
-  if (Status status = ValidateRuns(reply.runs.image, runs->span(), frame); !status.ok()) return Status::DataLoss(status.message());
+  Result<LocalImage> image = ReadRuns(reply.runs.image, runs->span(), frame);
+  if (!image.ok()) return Status::DataLoss(image.status().message());
   Picture picture;
   picture.size = reply.size;
-  picture.image = DecodeRuns(reply.runs.image, runs->span());
+  picture.image = std::move(*image);
   picture.final = reply.groups_done == reply.group_count;
   picture.groups_done = reply.groups_done;
   picture.group_count = reply.group_count;

@@ -15,8 +15,10 @@
 
 namespace slabstream {
 
-inline constexpr std::size_t kMaxKeptAnswers = 64;                         // of one client
-inline constexpr std::size_t kMaxKeptAnswerBytes = std::size_t{32} << 20;  // payloads of these: eight pictures of 512 x 512 pixels
+inline constexpr std::size_t kMaxKeptAnswers = 64;  // of one client
+// Payloads of one client's kept answers. Few: answers are hardly ever asked for again, and each picture that is kept is a buffer that the
+// next one cannot have while it is still in a cache.
+inline constexpr std::size_t kMaxKeptAnswerBytes = std::size_t{8} << 20;
 
 // What ended a request: its final FrameReply, or FrameFailed.
 struct Answer {

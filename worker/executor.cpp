@@ -100,6 +100,16 @@ Executor::~Executor() {
   if (last_render_) *last_render_->cancelled = true;
 }
 
+// Within as many threads as all workers of this process have: when a picture is made, the others have rendered their parts of it.
+template <class Work>
+auto Executor::InFinishArena(Work&& work) {
+  if (const int threads = ThreadShare::OfProcess(); finish_arena_.max_concurrency() != threads) {
+    finish_arena_.terminate();
+    finish_arena_.initialize(threads);
+  }
+  return finish_arena_.execute(work);
+}
+
 void Executor::Perform(const OpenSlab& action) { slabs_.insert_or_assign(action.slab, std::make_shared<Slab>(action.slab)); }
 
 void Executor::Perform(const DropSlab& action) { slabs_.erase(action.slab); }
@@ -181,17 +191,20 @@ void Executor::Perform(StartCombine&& action, const PixelBounds& frame) {
     done.span = {Stage::kCombine, NowNs(), 0};
     done.status = Guarded("combine", [&] {
       if (other != nullptr) {
-        CombineImages(*image, fresh, other, combine);
+        InFinishArena([&] { CombineImages(*image, fresh, other, combine); });
+        return Status::Ok();
+      }
+      if (fresh) {
+        Result<LocalImage> read = InFinishArena([&] { return ReadRuns(combine.header, combine.payload.span(), frame); });
+        if (!read.ok()) return read.status();
+        *image = std::move(*read);
         return Status::Ok();
       }
       if (Status status = ValidateRuns(combine.header, combine.payload.span(), frame); !status.ok()) return status;
-      if (fresh) {
-        *image = DecodeRuns(combine.header, combine.payload.span());
-      } else if (image->format != combine.header.format) {
+      if (image->format != combine.header.format) {
         return Status::InvalidArgument("PartialImage.image.format is not that of the frame");
-      } else {
-        CombineRuns(*image, combine.header, combine.payload.span(), combine.side);
       }
+      CombineRuns(*image, combine.header, combine.payload.span(), combine.side);
       return Status::Ok();
     });
     done.span.end_ns = NowNs();
@@ -221,7 +234,7 @@ void Executor::Perform(SendPartial&& action) {
   combine_thread_.Post([this, image = std::move(image), send = std::move(action)]() mutable {
     const Status status = Guarded("encode", [&] {
       const std::int64_t begin = NowNs();
-      RunImage runs = EncodeRuns(*image, send.message.pixels, send.frame_width);
+      RunImage runs = InFinishArena([&] { return EncodeRuns(*image, send.message.pixels, send.frame_width); });
       send.message.image = runs.header;
       AddStage(send.message.reports, Stage::kEncode, begin, NowNs());
       if (!send.message.reports.empty()) send.message.reports.back().image_bytes += runs.payload.size();
@@ -245,19 +258,12 @@ void Executor::Perform(SendFrame&& action) {
       }
       const std::int64_t begin = NowNs();
       std::int64_t resolved_ns = begin;
-      RunImage runs;
-      const auto encode = [&](const LocalImage& picture) {
+      RunImage runs = InFinishArena([&] {
+        if (FrameIsPicture(*send.setup)) return EncodePicture(*image);
+        const LocalImage picture = FinishPicture(*image, *send.setup);
         resolved_ns = NowNs();
-        const PixelBounds& b = picture.bounds;
-        // Any frame width does that holds the bounds: the range is all pixels.
-        const std::int32_t width = std::max(b.x_end, 1);
-        runs = EncodeRuns(picture, {0, std::uint64_t(std::max(b.y_end, 0)) * std::uint64_t(width)}, width);
-      };
-      if (FrameIsPicture(*send.setup)) {
-        encode(*image);
-      } else {
-        encode(finish_arena_.execute([&] { return FinishPicture(*image, *send.setup); }));
-      }
+        return EncodePicture(picture);
+      });
       AddStage(reports, Stage::kResolve, begin, resolved_ns);
       send.message.runs.image = runs.header;
       const Bytes payload = PackRuns(Bytes(std::move(runs.payload)), frame_codec_, send.message.runs);

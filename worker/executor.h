@@ -65,6 +65,8 @@ class Executor {
   };
 
   std::shared_ptr<LocalImage> FindImage(ImageHandle image);  // null: no such image
+  template <class Work>
+  auto InFinishArena(Work&& work);  // combine thread only
   RenderDone Render(const StartRender& action, Slab& slab, const std::atomic<bool>& cancelled, LocalImage& image);
 
   Mailbox<ExecutorOutput>& outbox_;
@@ -75,7 +77,8 @@ class Executor {
   std::map<RendererKind, std::unique_ptr<Renderer>> renderers_;  // the render thread's
   const ThreadShare threads_;
   // One for each thread below that enters: in a common arena the last picture would wait for the next one's rendering.
-  tbb::task_arena render_arena_, finish_arena_;
+  tbb::task_arena render_arena_;
+  tbb::task_arena finish_arena_;  // combine thread's
   TaskThread combine_thread_;
   TaskThread render_thread_;
 };

@@ -12,19 +12,25 @@ namespace {
 
 class Pool {
  public:
-  void Change(int threads) {
+  void Change(int workers, int threads) {
     const std::lock_guard lock(mutex_);
+    workers_ += workers;
     threads_ += threads;
-    limit_.reset();  // of several limits oneTBB takes the smallest
-    const int parallelism = threads_ + 1;
+    limit_.reset();                                   // of several limits oneTBB takes the smallest
+    const int parallelism = threads_ - workers_ + 1;  // each worker has one thread of its own
     if (parallelism > tbb::info::default_concurrency()) {
       limit_.emplace(tbb::global_control::max_allowed_parallelism, std::size_t(parallelism));
     }
   }
 
+  int threads() {
+    const std::lock_guard lock(mutex_);
+    return threads_;
+  }
+
  private:
   std::mutex mutex_;
-  int threads_ = 0;  // that the workers of this process want beside their own
+  int workers_ = 0, threads_ = 0;  // of this process
   std::optional<tbb::global_control> limit_;
 };
 
@@ -35,7 +41,9 @@ Pool& ProcessPool() {
 
 }  // namespace
 
-ThreadShare::ThreadShare(int threads) : threads_(threads) { ProcessPool().Change(threads_ - 1); }
-ThreadShare::~ThreadShare() { ProcessPool().Change(1 - threads_); }
+ThreadShare::ThreadShare(int threads) : threads_(threads) { ProcessPool().Change(1, threads_); }
+ThreadShare::~ThreadShare() { ProcessPool().Change(-1, -threads_); }
+
+int ThreadShare::OfProcess() { return ProcessPool().threads(); }
 
 }  // namespace slabstream

@@ -15,6 +15,8 @@ class ThreadShare {
   ThreadShare& operator=(const ThreadShare&) = delete;
 
   int threads() const { return threads_; }
+  // Those of all workers of this process together, as of now.
+  static int OfProcess();
 
  private:
   const int threads_;

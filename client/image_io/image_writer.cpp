@@ -72,7 +72,7 @@ bool WritePngRows(const LocalImage& image, ImageSize size, const PictureFormat& 
 
 template <class Write>
 bool WriteExrRows(const LocalImage& image, ImageSize size, const PictureFormat& format, Write write) {
-  const bool with_depth = image.format == PixelFormat::kDepth;
+  const bool with_depth = HasDepth(image.format);
   const std::size_t width = std::size_t(size.width);
   std::vector<float> rgba(4 * width), depth(with_depth ? width : 0), rgbaz(with_depth ? 5 * width : 0);
   for (int y = 0; y < size.height; ++y) {
@@ -106,7 +106,7 @@ Status WritePicture(const LocalImage& image, ImageSize size, const std::string& 
 
   const bool png = TypeOf(path) == FileType::kPng;
   const OIIO::TypeDesc sample = !png ? OIIO::TypeDesc::FLOAT : format.png_bits == 16 ? OIIO::TypeDesc::UINT16 : OIIO::TypeDesc::UINT8;
-  const bool with_depth = !png && image.format == PixelFormat::kDepth;
+  const bool with_depth = !png && HasDepth(image.format);
   OIIO::ImageSpec spec(size.width, size.height, with_depth ? 5 : 4, sample);
   spec.channelnames = {"R", "G", "B", "A"};
   if (with_depth) spec.channelnames.push_back("Z");

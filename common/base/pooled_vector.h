@@ -12,8 +12,8 @@
 
 namespace slabstream {
 
-// Blocks of at least `bytes` bytes at 64-byte boundaries. Large ones that were given back are kept for the next one who wants more than
-// half as much, up to 64 MiB for the process. Any thread.
+// Blocks of at least `bytes` bytes at 64-byte boundaries. Large ones that were given back are kept for the next one who wants as much, up
+// to 96 MiB for the process. Any thread.
 void* TakeBlock(std::size_t bytes);
 void GiveBackBlock(void* block, std::size_t bytes);  // `bytes` as taken
 

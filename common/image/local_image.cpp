@@ -10,10 +10,8 @@ LocalImage MakeUnwrittenImage(PixelFormat format, const PixelBounds& bounds) {
   image.format = format;
   image.bounds = bounds;
   image.rgba.resize(4 * pixels);
-  if (format == PixelFormat::kDepth) {
-    image.depth.resize(pixels);
-    image.voxel.resize(pixels);
-  }
+  if (HasDepth(format)) image.depth.resize(pixels);
+  if (HasVoxel(format)) image.voxel.resize(pixels);
   return image;
 }
 

@@ -1,10 +1,10 @@
 // LocalImage: the picture of some boxes, on the pixels that they can touch.
 //
-// Two pixel formats. kRgba (splatting): premultiplied float RGBA, interleaved, 16 bytes a pixel; empty is (0, 0, 0, 0).
+// Three pixel formats. kRgba (splatting): premultiplied float RGBA, interleaved, 16 bytes a pixel; empty is (0, 0, 0, 0).
 // kDepth (Z-buffer): the same RGBA (alpha 0 or 1) with a depth plane (float, camera depth; empty is +infinity) and a voxel plane (the low
 // 32 bits of the index of the voxel's face that is seen: FaceIndex in worker/kernels/surface_face.h), which breaks ties of depth: see
-// NearerDepth. Rows are stored top down without padding; pixel (x, y) is at index
-// (y - bounds.y_begin) * bounds.width() + (x - bounds.x_begin).
+// NearerDepth. kRgbaDepth is what is left of kDepth in a finished picture, which meets no other image: it has no voxel plane. Rows are
+// stored top down without padding; pixel (x, y) is at index (y - bounds.y_begin) * bounds.width() + (x - bounds.x_begin).
 #pragma once
 
 #include <algorithm>
@@ -14,7 +14,10 @@
 
 namespace slabstream {
 
-enum class PixelFormat : std::uint8_t { kRgba = 1, kDepth = 2 };
+enum class PixelFormat : std::uint8_t { kRgba = 1, kDepth = 2, kRgbaDepth = 3 };
+
+constexpr bool HasDepth(PixelFormat format) { return format != PixelFormat::kRgba; }
+constexpr bool HasVoxel(PixelFormat format) { return format == PixelFormat::kDepth; }
 
 // Half-open pixel rectangle.
 struct PixelBounds {
@@ -43,8 +46,8 @@ struct LocalImage {
   PixelFormat format = PixelFormat::kRgba;
   PixelBounds bounds;                 // within the frame; may be empty
   PooledVector<float> rgba;           // 4 * pixel_count
-  PooledVector<float> depth;          // kDepth: pixel_count; else empty
-  PooledVector<std::uint32_t> voxel;  // kDepth: pixel_count; else empty
+  PooledVector<float> depth;          // pixel_count if the format has depths; else empty
+  PooledVector<std::uint32_t> voxel;  // pixel_count if the format has voxels; else empty
 };
 
 // All pixels empty.

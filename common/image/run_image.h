@@ -4,8 +4,9 @@
 // Payload layout (little endian), also written down in docs/wire.md:
 //   run_count * { u32 row offset from bounds.y_begin, u32 column offset from bounds.x_begin, u32 pixel count }
 //   pixel_count * 4 * f32 RGBA
-//   kDepth only: pixel_count * f32 depth, then pixel_count * u32 voxel
-// Empty: alpha == 0 (kRgba; colour is then 0 too), depth == +infinity (kDepth).
+//   formats with depths: pixel_count * f32 depth
+//   formats with voxels: pixel_count * u32 voxel
+// Empty: depth == +infinity; where the format has no depths, alpha == 0 (colour is then 0 too).
 #pragma once
 
 #include <cstddef>
@@ -39,14 +40,21 @@ struct RunImage {
   PooledVector<std::byte> payload;  // PayloadBytes(header)
 };
 
-// The pixels of `image` that lie in `range` of a frame `frame_width` wide; bounds are cut to the rows that the range touches.
+// The pixels of `image` that lie in `range` of a frame `frame_width` wide; bounds are cut to the rows that the range touches. Bands of rows
+// are encoded in parallel, within the caller's task arena.
 RunImage EncodeRuns(const LocalImage& image, PixelRange range, std::int32_t frame_width);
 
+// All pixels of a finished picture, for a client: without the voxel plane.
+RunImage EncodePicture(const LocalImage& image);
+
 // InvalidArgument unless header and payload agree, runs ascend without touching, stay inside the bounds, and no pixel is NaN. After this
-// check the functions below may trust the image. `frame` is the frame's whole rectangle.
+// check DecodeRuns and CombineRuns may trust the image. `frame` is the frame's whole rectangle.
 Status ValidateRuns(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame);
 
-// Dense form. The image must be valid.
+// Dense form. The image must be valid. Rows are decoded in parallel, within the caller's task arena.
 LocalImage DecodeRuns(const RunImageHeader& header, std::span<const std::byte> payload);
+
+// Both in one pass over the payload.
+Result<LocalImage> ReadRuns(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame);
 
 }  // namespace slabstream

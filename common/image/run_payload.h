@@ -36,10 +36,11 @@ class RunPayload {
     std::memcpy(&run, runs_ + sizeof(Run) * index, sizeof(Run));
     return run;
   }
-  // The bytes of the first `count` pixels of all runs: four floats or one each.
-  std::span<const std::byte> rgba(std::size_t count) const { return {rgba_, kRgbaBytes * count}; }
-  std::span<const std::byte> depth(std::size_t count) const { return {depth_, sizeof(float) * count}; }
-  // Pixels [first, first + count) of all runs.
+  // Pixels [first, first + count) of all runs: their bytes, four floats or one each; and as numbers.
+  std::span<const std::byte> rgba(std::size_t first, std::size_t count) const { return {rgba_ + kRgbaBytes * first, kRgbaBytes * count}; }
+  std::span<const std::byte> depth(std::size_t first, std::size_t count) const {
+    return {depth_ + sizeof(float) * first, sizeof(float) * count};
+  }
   void ReadRgba(std::size_t first, std::size_t count, float* out) const {
     std::memcpy(out, rgba_ + kRgbaBytes * first, kRgbaBytes * count);
   }
@@ -53,8 +54,8 @@ class RunPayload {
  private:
   const std::byte* runs_;
   const std::byte* rgba_;
-  const std::byte* depth_;  // kDepth only
-  const std::byte* voxel_;  // kDepth only
+  const std::byte* depth_;  // formats with depths only
+  const std::byte* voxel_;  // formats with voxels only
 };
 
 }  // namespace slabstream

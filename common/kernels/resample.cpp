@@ -4,6 +4,8 @@
 // Highway wants this order.
 #include <hwy/highway.h>
 
+#include <hwy/cache_control.h>
+
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -26,35 +28,51 @@ void ResampleRows(const LocalImage& frame, const ProjectiveMap& frame_from_pictu
 #else
 
 using PixelTag = hn::FixedTag<float, 4>;  // one pixel
+// Up to four neighbouring pixels of a row.
+using PixelsTag = hn::FixedTag<float, HWY_HAVE_SCALABLE ? 4 : HWY_MIN(std::size_t{16}, HWY_MAX_BYTES / sizeof(float))>;
 
 // Some neighbouring pixels of a row of the picture: where they lie in the frame, and, if no spline of theirs is wider than 3 pixels, its
 // first pixel and weights.
 constexpr std::int32_t kBatch = 16;
 struct Places {
-  HWY_ALIGN double w[kBatch], x[kBatch], y[kBatch], scale_x[kBatch], scale_y[kBatch];
-  bool narrow = false;  // all of them, and all taps lie on the image
-  std::int32_t first_x[kBatch], first_y[kBatch];
-  float weight_x[3][kBatch], weight_y[3][kBatch];
-
-  ResamplePoint Point(std::int32_t i) const { return {w[i] > 0, x[i], y[i], scale_x[i], scale_y[i]}; }
+  HWY_ALIGN double x[kBatch], y[kBatch];
+  bool narrow = false;  // all of them; what is below holds then
+  bool inside = false;  // what is read of all of them lies on the image
+  HWY_ALIGN std::int32_t first_x[kBatch], first_y[kBatch];
+  HWY_ALIGN float weight_x[4 * kBatch + 16];  // of the three pixels and a 0, pixel after pixel; then room to read beyond
+  HWY_ALIGN float weight_y[3][kBatch];
 };
 
-HWY_INLINE void NarrowSpline(const double* HWY_RESTRICT at, std::int32_t* HWY_RESTRICT first, float (*HWY_RESTRICT weight)[kBatch]) {
-  for (std::int32_t i = 0; i < kBatch; ++i) {  // which the compiler turns into vectors
-    const double nearest = std::floor(at[i]);  // the pixel that holds the point
-    const auto t = float(at[i] - nearest - 0.5);
-    first[i] = std::int32_t(nearest) - 1;
-    weight[0][i] = 0.5F * (0.5F - t) * (0.5F - t);
-    weight[1][i] = 0.75F - t * t;
-    weight[2][i] = 0.5F * (0.5F + t) * (0.5F + t);
+// Of places at + 1/2 pixel: store(i, first pixels, the three weights) for each vector of them.
+template <class Store>
+HWY_INLINE void NarrowSpline(const double* HWY_RESTRICT at, Store&& store) {
+  const hn::CappedTag<double, 8> d;
+  const hn::Rebind<float, decltype(d)> df;
+  const hn::Rebind<std::int32_t, decltype(d)> di;
+  const auto half = hn::Set(df, 0.5F), most = hn::Set(df, 0.75F);
+  for (std::int32_t i = 0; i < kBatch; i += std::int32_t(hn::Lanes(d))) {
+    const auto place = hn::Load(d, at + i), nearest = hn::Floor(place);  // the pixel that holds the point
+    const auto t = hn::Sub(hn::DemoteTo(df, hn::Sub(place, nearest)), half);
+    const auto left = hn::Sub(half, t), right = hn::Add(half, t);
+    store(i, hn::Sub(hn::DemoteTo(di, nearest), hn::Set(di, 1)), hn::Mul(half, hn::Mul(left, left)), hn::NegMulAdd(t, t, most),
+          hn::Mul(half, hn::Mul(right, right)));
   }
 }
 
-// Of the pixels x_begin, x_begin + 1, ... of row y: ResampleAt in vectors.
+// Whether all that is read of a narrow pixel lies on the image: three pixels and a fourth, which has weight 0.
+HWY_INLINE bool IsInside(const PixelBounds& image, const Places& places, std::int32_t i) {
+  constexpr double kReach = 3;
+  return places.x[i] >= image.x_begin + kReach && places.x[i] <= image.x_end - kReach && places.y[i] >= image.y_begin + kReach &&
+         places.y[i] <= image.y_end - kReach;
+}
+
+// Of the pixels x_begin, x_begin + 1, ... of row y: the places of ResampleAt in vectors.
 HWY_INLINE void FindPlaces(const ProjectiveMap& map, const PixelBounds& image, std::int32_t x_begin, std::int32_t y, Places& places) {
   const hn::CappedTag<double, 8> d;
+  const hn::Rebind<float, decltype(d)> df;
+  const hn::Rebind<std::int32_t, decltype(d)> di;
   const auto one = hn::Set(d, 1.0), zero = hn::Zero(d);
-  auto widest = one, least_w = one;
+  auto widest = zero, least_w = one;  // widest: the square of the steepest gradient
   for (std::int32_t i = 0; i < kBatch; i += std::int32_t(hn::Lanes(d))) {
     const auto x = hn::Add(hn::Iota(d, double(i)), hn::Set(d, x_begin + 0.5));
     const auto row = [&](std::size_t r) HWY_ATTR {
@@ -62,32 +80,31 @@ HWY_INLINE void FindPlaces(const ProjectiveMap& map, const PixelBounds& image, s
     };
     const auto w = row(2);
     const auto per_w = hn::Div(one, hn::IfThenElse(hn::Gt(w, zero), w, one));
-    const auto scale = [&](std::size_t r, auto at) HWY_ATTR {
+    const auto square = [&](std::size_t r, auto at) HWY_ATTR {
       const auto dx = hn::Mul(hn::NegMulAdd(at, hn::Set(d, map[6]), hn::Set(d, map[3 * r])), per_w);
       const auto dy = hn::Mul(hn::NegMulAdd(at, hn::Set(d, map[7]), hn::Set(d, map[3 * r + 1])), per_w);
-      return hn::Max(one, hn::Sub(hn::Sqrt(hn::MulAdd(dx, dx, hn::Mul(dy, dy))), hn::Set(d, kSkewSlack)));
+      return hn::MulAdd(dx, dx, hn::Mul(dy, dy));
     };
     const auto at_x = hn::Mul(row(0), per_w), at_y = hn::Mul(row(1), per_w);
-    const auto scale_x = scale(0, at_x), scale_y = scale(1, at_y);
-    hn::Store(w, d, places.w + i);
     hn::Store(at_x, d, places.x + i);
     hn::Store(at_y, d, places.y + i);
-    hn::Store(scale_x, d, places.scale_x + i);
-    hn::Store(scale_y, d, places.scale_y + i);
-    widest = hn::Max(widest, hn::Max(scale_x, scale_y));
+    widest = hn::Max(widest, hn::Max(square(0, at_x), square(1, at_y)));
     least_w = hn::Min(least_w, w);
   }
-  const double* const ends_x[2] = {&places.x[0], &places.x[kBatch - 1]};
-  const double* const ends_y[2] = {&places.y[0], &places.y[kBatch - 1]};
-  constexpr double kReach = 2;
-  const auto inside = [](const double* const* ends, std::int32_t begin, std::int32_t end) {  // a line stays a line
-    return std::min(*ends[0], *ends[1]) >= begin + kReach && std::max(*ends[0], *ends[1]) <= end - kReach;
-  };
-  places.narrow = hn::AllTrue(d, hn::Eq(widest, one)) && hn::AllTrue(d, hn::Gt(least_w, zero)) &&
-                  inside(ends_x, image.x_begin, image.x_end) && inside(ends_y, image.y_begin, image.y_end);
+  constexpr double kSteepest = (1 + kSkewSlack) * (1 + kSkewSlack);
+  places.narrow = hn::AllTrue(d, hn::Le(widest, hn::Set(d, kSteepest))) && hn::AllTrue(d, hn::Gt(least_w, zero));
   if (!places.narrow) return;
-  NarrowSpline(places.x, places.first_x, places.weight_x);
-  NarrowSpline(places.y, places.first_y, places.weight_y);
+  places.inside = IsInside(image, places, 0) && IsInside(image, places, kBatch - 1);  // a line stays a line
+  NarrowSpline(places.x, [&](std::int32_t i, auto first, auto left, auto middle, auto right) HWY_ATTR {
+    hn::Store(first, di, places.first_x + i);
+    hn::StoreInterleaved4(left, middle, right, hn::Zero(df), df, places.weight_x + 4 * i);
+  });
+  NarrowSpline(places.y, [&](std::int32_t i, auto first, auto upper, auto middle, auto lower) HWY_ATTR {
+    hn::Store(first, di, places.first_y + i);
+    hn::Store(upper, df, places.weight_y[0] + i);
+    hn::Store(middle, df, places.weight_y[1] + i);
+    hn::Store(lower, df, places.weight_y[2] + i);
+  });
 }
 
 // The part of a spline that lies on the pixels [low, high): weights of the pixels first, first + 1, ...
@@ -96,14 +113,24 @@ struct Spline {
   std::vector<float> weight;
 
   void Place(double at, double scale, std::int32_t low, std::int32_t high) {
-    const double begin = std::max<double>(low, std::ceil(at - 1.5 * scale - 0.5));
-    const double end = std::min<double>(high, std::floor(at + 1.5 * scale - 0.5) + 1);
+    const double spline_begin = std::ceil(at - 1.5 * scale - 0.5), spline_end = std::floor(at + 1.5 * scale - 0.5) + 1;
+    const double begin = std::max<double>(low, spline_begin), end = std::min<double>(high, spline_end);
     first = std::int32_t(begin);
     taps = std::max(0, std::int32_t(end) - first);
     if (taps == 0) return;
-    const double per_sum = 1 / SplineSum(at, scale);
     weight.resize(std::size_t(taps));
-    for (std::int32_t i = 0; i < taps; ++i) weight[std::size_t(i)] = float(per_sum * QuadraticSpline((begin + i + 0.5 - at) / scale));
+    const double per_scale = 1 / scale;
+    const auto value = [&](double pixel) { return QuadraticSpline((pixel + 0.5 - at) * per_scale); };
+    // The usual case: all of it lies there, so that the weights' sum is at hand.
+    const bool whole = begin == spline_begin && end == spline_end;
+    double sum = 0;
+    for (std::int32_t i = 0; i < taps; ++i) {
+      const double w = value(begin + i);
+      weight[std::size_t(i)] = float(w);
+      sum += w;
+    }
+    const auto per_sum = float(1 / (whole ? sum : SplineSum(at, scale)));
+    for (float& w : weight) w *= per_sum;
   }
 };
 
@@ -113,6 +140,7 @@ void ResampleOne(const LocalImage& frame, const ResamplePoint& point, Spline& al
   const PixelBounds& b = frame.bounds;
   if (!point.seen || !IsNear(point.x, point.y)) return;
   along_x.Place(point.x, point.scale_x, b.x_begin, b.x_end);
+  if (along_x.taps == 0) return;
   along_y.Place(point.y, point.scale_y, b.y_begin, b.y_end);
   auto sum = hn::Zero(d);
   for (std::int32_t j = 0; j < along_y.taps; ++j) {
@@ -126,22 +154,56 @@ void ResampleOne(const LocalImage& frame, const ResamplePoint& point, Spline& al
   hn::StoreU(sum, d, out);
 }
 
-HWY_INLINE void ResampleNarrow(const LocalImage& frame, const Places& places, std::int32_t count, float* HWY_RESTRICT out) {
-  const PixelTag d;
+// The sum of the pixels in a vector.
+template <class Vector>
+HWY_INLINE hn::Vec<PixelTag> SumOfPixels(Vector pixels) {
+  if constexpr (sizeof(pixels) == sizeof(hn::Vec<PixelTag>)) {
+    return pixels;
+  } else {
+    const hn::Half<hn::DFromV<Vector> > half;
+    return SumOfPixels(hn::Add(hn::LowerHalf(half, pixels), hn::UpperHalf(half, pixels)));
+  }
+}
+
+// Pixels [begin, end) of the batch, all of them inside. `out`: of the batch's first pixel.
+HWY_INLINE void ResampleNarrow(const LocalImage& frame, const Places& places, std::int32_t begin, std::int32_t end,
+                               float* HWY_RESTRICT out) {
+  const PixelsTag d;
+  constexpr std::size_t kTapFloats = 12;
+  HWY_ALIGN static constexpr std::int32_t kPixelOfFloat[16] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
   const PixelBounds& b = frame.bounds;
   const auto row_floats = 4 * std::ptrdiff_t{b.width()};
   const float* const pixels = frame.rgba.data();
-  for (std::int32_t n = 0; n < count; ++n, out += 4) {
+  for (std::int32_t n = begin; n < end; ++n) {
     const float* HWY_RESTRICT first =
         pixels + (places.first_y[n] - b.y_begin) * row_floats + 4 * std::ptrdiff_t{places.first_x[n] - b.x_begin};
-    const auto left = hn::Set(d, places.weight_x[0][n]), middle = hn::Set(d, places.weight_x[1][n]),
-               right = hn::Set(d, places.weight_x[2][n]);
-    const auto row_sum = [&](const float* pixel) HWY_ATTR {
-      return hn::MulAdd(right, hn::Load(d, pixel + 8), hn::MulAdd(middle, hn::Load(d, pixel + 4), hn::Mul(left, hn::Load(d, pixel))));
-    };
-    auto sum = hn::Mul(hn::Set(d, places.weight_y[0][n]), row_sum(first));
-    sum = hn::MulAdd(hn::Set(d, places.weight_y[1][n]), row_sum(first + row_floats), sum);
-    hn::Store(hn::MulAdd(hn::Set(d, places.weight_y[2][n]), row_sum(first + 2 * row_floats), sum), d, out);
+    const auto upper = hn::Set(d, places.weight_y[0][n]), middle = hn::Set(d, places.weight_y[1][n]),
+               lower = hn::Set(d, places.weight_y[2][n]);
+    const auto weight_x = hn::LoadU(d, places.weight_x + 4 * n);
+    auto sum = hn::Zero(d);
+    for (std::size_t i = 0; i < kTapFloats; i += hn::Lanes(d)) {
+      const float* const pixel = first + i;
+      auto columns = hn::Mul(upper, hn::LoadU(d, pixel));
+      columns = hn::MulAdd(middle, hn::LoadU(d, pixel + row_floats), columns);
+      columns = hn::MulAdd(lower, hn::LoadU(d, pixel + 2 * row_floats), columns);
+      sum = hn::MulAdd(hn::TableLookupLanes(weight_x, hn::SetTableIndices(d, kPixelOfFloat + i)), columns, sum);
+    }
+    hn::Store(SumOfPixels(sum), PixelTag(), out + 4 * n);
+  }
+}
+
+// Asks for what the next batch of the row will read, about.
+HWY_INLINE void FetchNext(const LocalImage& frame, const Places& places) {
+  const PixelBounds& b = frame.bounds;
+  constexpr double kBatchesPerSpan = double(kBatch) / (kBatch - 1);
+  const auto step_x = std::int32_t((places.x[kBatch - 1] - places.x[0]) * kBatchesPerSpan),
+             step_y = std::int32_t((places.y[kBatch - 1] - places.y[0]) * kBatchesPerSpan);
+  for (std::int32_t n = 0; n < kBatch; n += 2) {
+    const std::int32_t column = std::clamp(places.first_x[n] + 2 + step_x, b.x_begin, b.x_end - 1) - b.x_begin;
+    for (std::int32_t row = 0; row < 3; ++row) {
+      const std::int32_t y = std::clamp(places.first_y[n] + row + step_y, b.y_begin, b.y_end - 1) - b.y_begin;
+      hwy::Prefetch(&frame.rgba[4 * (std::size_t(y) * std::size_t(b.width()) + std::size_t(column))]);
+    }
   }
 }
 
@@ -150,16 +212,24 @@ void ResampleRows(const LocalImage& frame, const ProjectiveMap& frame_from_pictu
   const std::int32_t width = picture.bounds.x_end;
   Places places;
   Spline along_x, along_y;
-  for (std::int32_t y = y_begin; y < y_end; ++y) {
-    for (std::int32_t x = 0; x < width; x += kBatch) {
+  // Batch below batch: neighbouring rows read the same lines of the frame, and there is time to fetch those of the next column.
+  for (std::int32_t x = 0; x < width; x += kBatch) {
+    const std::int32_t count = std::min(kBatch, width - x);
+    for (std::int32_t y = y_begin; y < y_end; ++y) {
       FindPlaces(frame_from_picture, frame.bounds, x, y, places);
       float* out = &picture.rgba[4 * (std::size_t(y) * std::size_t(width) + std::size_t(x))];
-      const std::int32_t count = std::min(kBatch, width - x);
-      if (places.narrow) {
-        ResampleNarrow(frame, places, count, out);
+      if (places.narrow && places.inside) {
+        FetchNext(frame, places);
+        ResampleNarrow(frame, places, 0, count, out);
         continue;
       }
-      for (std::int32_t n = 0; n < count; ++n) ResampleOne(frame, places.Point(n), along_x, along_y, out + 4 * n);
+      for (std::int32_t n = 0; n < count; ++n) {
+        if (places.narrow && IsInside(frame.bounds, places, n)) {
+          ResampleNarrow(frame, places, n, n + 1, out);
+        } else {
+          ResampleOne(frame, ResampleAt(frame_from_picture, x + n + 0.5, y + 0.5), along_x, along_y, out + 4 * n);
+        }
+      }
     }
   }
 }

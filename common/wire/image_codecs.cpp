@@ -27,6 +27,7 @@ PartialImage FromProto(const v1::PartialImage& in, Checker& check) {
   out.interval.end = check.Range("interval_end", in.interval_end(), out.interval.begin + 1, kMaxRanks);
   out.pixels = Read("pixels", in.pixels(), check);
   out.image = Read("image", in.image(), check);
+  check.That(out.image.format != PixelFormat::kRgbaDepth, "image.format", "that of a finished picture, which is not combined any more");
   out.reports = ReadAll("reports", in.reports(), kMaxReports, check);
   return out;
 }

@@ -1,6 +1,5 @@
 #include "common/wire/payload.h"
 
-#include <xxhash.h>
 #include <zstd.h>
 
 #include <cstdint>
@@ -10,14 +9,13 @@
 
 #include "common/base/check.h"
 #include "common/image/run_image.h"
+#include "common/wire/digest.h"
 
 namespace slabstream {
 namespace {
 
 constexpr int kZstdLevel = 1;
 constexpr std::size_t kWordBytes = 4;
-
-std::uint64_t Digest(std::span<const std::byte> bytes) { return XXH3_64bits(bytes.data(), bytes.size()); }
 
 // All first bytes of the words, then all second ones, and so on. bytes.size() is a multiple of kWordBytes.
 std::vector<std::byte> GroupBySignificance(std::span<const std::byte> bytes) {

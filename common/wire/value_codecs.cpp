@@ -11,7 +11,7 @@ namespace slabstream {
 static_assert(v1::Axis_MAX == Number(Axis::kZ) + 1);
 static_assert(v1::ScalarType_MAX == static_cast<int>(ScalarType::kFloat32));
 static_assert(v1::StatusCode_MAX == kStatusCodeCount - 1);
-static_assert(v1::PixelFormat_MAX == static_cast<int>(PixelFormat::kDepth));
+static_assert(v1::PixelFormat_MAX == static_cast<int>(PixelFormat::kRgbaDepth));
 static_assert(v1::Codec_MAX == static_cast<int>(Codec::kZstd));
 static_assert(v1::Stage_MAX == kStageCount);
 
@@ -180,7 +180,7 @@ v1::RunImageHeader ToProto(const RunImageHeader& in) {
 
 RunImageHeader FromProto(const v1::RunImageHeader& in, Checker& check) {
   RunImageHeader out;
-  out.format = check.OneOf("format", in.format(), PixelFormat::kRgba, PixelFormat::kDepth);
+  out.format = check.OneOf("format", in.format(), PixelFormat::kRgba, PixelFormat::kRgbaDepth);
   out.bounds = Read("bounds", in.bounds(), check);
   // At most kMaxFramePixels pixels and 2^32 runs: the payload's length cannot overflow.
   out.pixel_count = check.Range("pixel_count", in.pixel_count(), 0, static_cast<std::uint64_t>(out.bounds.pixel_count()));

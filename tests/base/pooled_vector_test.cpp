@@ -50,23 +50,6 @@ TEST(PooledVector, UsesMemoryAgain) {
   const PooledVector<int> other(1000100);
   EXPECT_NE(other.data(), first);
 }
-
-TEST(PooledVector, UsesMemoryAgainForWhatNeedsMoreThanHalfOfIt) {
-  constexpr std::size_t kInts = 10'000'000;  // more than any other test gives back
-  const int* first = nullptr;
-  {
-    const PooledVector<int> image(kInts);
-    first = image.data();
-  }
-  {
-    const PooledVector<int> smaller(kInts * 6 / 10);
-    EXPECT_EQ(smaller.data(), first);
-  }
-  const PooledVector<int> much_smaller(kInts * 4 / 10);
-  EXPECT_NE(much_smaller.data(), first);
-  const PooledVector<int> as_large(kInts);
-  EXPECT_EQ(as_large.data(), first);
-}
 #endif
 
 TEST(PooledVector, ComesAndGoesOnAnyThread) {

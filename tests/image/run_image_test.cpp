@@ -12,7 +12,7 @@ namespace {
 
 constexpr PixelBounds kFrame = {0, 0, 23, 17};
 constexpr PixelRange kWhole = {0, 23 * 17};
-constexpr PixelFormat kFormats[] = {PixelFormat::kRgba, PixelFormat::kDepth};
+constexpr PixelFormat kFormats[] = {PixelFormat::kRgba, PixelFormat::kDepth, PixelFormat::kRgbaDepth};
 
 std::uint64_t LinearIndex(std::int32_t x, std::int32_t y) { return std::uint64_t(y) * std::uint64_t(kFrame.width()) + std::uint64_t(x); }
 
@@ -28,7 +28,8 @@ void ExpectSamePixel(const LocalImage& a, const LocalImage& b, std::int32_t x, s
     if (!image.bounds.Contains(PixelBounds{x, y, x + 1, y + 1})) return pixel;
     const auto i = std::size_t(y - image.bounds.y_begin) * std::size_t(image.bounds.width()) + std::size_t(x - image.bounds.x_begin);
     std::memcpy(pixel.rgba, &image.rgba[4 * i], sizeof(pixel.rgba));
-    if (image.format == PixelFormat::kDepth) pixel.depth = image.depth[i], pixel.voxel = image.voxel[i];
+    if (HasDepth(image.format)) pixel.depth = image.depth[i];
+    if (HasVoxel(image.format)) pixel.voxel = image.voxel[i];
     return pixel;
   };
   const Pixel p = read(a), q = read(b);
@@ -39,7 +40,7 @@ TEST(RunImage, EncodesExactlyThePixelsOfTheRange) {
   Random random(31);
   SCOPED_TRACE(random.trace());
   for (int i = 0; i < 400; ++i) {
-    const PixelFormat format = kFormats[i % 2];
+    const PixelFormat format = kFormats[i % 3];
     const LocalImage image = RandomImage(random, format, RandomBounds(random, kFrame));
     const std::uint64_t begin = random.Integer<std::uint64_t>(0, kWhole.end), end = random.Integer<std::uint64_t>(begin, kWhole.end);
     const PixelRange range = i % 4 < 2 ? kWhole : PixelRange{begin, end};
@@ -93,6 +94,45 @@ TEST(RunImage, RangeMayGoBeyondTheFrame) {
   EXPECT_EQ(all.payload, EncodeRuns(image, kWhole, kFrame.width()).payload);
 }
 
+TEST(RunImage, TallImagesAreCutIntoBands) {
+  Random random(34);
+  SCOPED_TRACE(random.trace());
+  constexpr PixelBounds kTall = {0, 0, 40, 150};
+  for (const PixelFormat format : kFormats) {
+    LocalImage image = RandomImage(random, format, {3, 5, 33, 147});
+    // A few rows without a pixel, where a band ends, and some that are full.
+    const std::size_t width = 30;
+    std::fill_n(image.rgba.begin() + 4 * 30 * width, 4 * 5 * width, 0.0F);
+    if (HasDepth(format)) std::fill_n(image.depth.begin() + 30 * width, 5 * width, std::numeric_limits<float>::infinity());
+    if (HasVoxel(format)) std::fill_n(image.voxel.begin() + 30 * width, 5 * width, 0U);
+    std::fill_n(image.rgba.begin() + 4 * 62 * width, 4 * 3 * width, 1.0F);
+    if (HasDepth(format)) std::fill_n(image.depth.begin() + 62 * width, 3 * width, 1.0F);
+    const RunImage runs = EncodeRuns(image, {0, 40 * 150}, 40);
+    ASSERT_EQ(ValidateRuns(runs.header, runs.payload, kTall), Status::Ok());
+    const LocalImage decoded = DecodeRuns(runs.header, runs.payload);
+    EXPECT_EQ(decoded.bounds, image.bounds);
+    EXPECT_EQ(decoded.rgba, image.rgba);
+    EXPECT_EQ(decoded.depth, image.depth);
+    EXPECT_EQ(decoded.voxel, image.voxel);
+  }
+}
+
+TEST(RunImage, PicturesLeaveTheVoxelsOut) {
+  Random random(35);
+  SCOPED_TRACE(random.trace());
+  for (const PixelFormat format : {PixelFormat::kRgba, PixelFormat::kDepth}) {
+    const LocalImage image = RandomImage(random, format, {2, 3, 20, 15});
+    const RunImage runs = EncodePicture(image);
+    const LocalImage decoded = DecodeRuns(runs.header, runs.payload);
+    EXPECT_EQ(decoded.format, format == PixelFormat::kRgba ? PixelFormat::kRgba : PixelFormat::kRgbaDepth);
+    EXPECT_EQ(decoded.bounds, image.bounds);
+    EXPECT_EQ(decoded.rgba, image.rgba);
+    EXPECT_EQ(decoded.depth, image.depth);
+    EXPECT_TRUE(decoded.voxel.empty());
+  }
+  EXPECT_EQ(EncodePicture(MakeLocalImage(PixelFormat::kDepth, {})).header.format, PixelFormat::kRgbaDepth);
+}
+
 // ---- hostile input
 
 struct Corruption {
@@ -111,7 +151,7 @@ RunImage TwoRuns(PixelFormat format) {
   LocalImage image = MakeLocalImage(format, {3, 4, 11, 6});
   for (std::size_t x : {1, 2, 4, 5}) {
     image.rgba[4 * x + 3] = 1;
-    if (format == PixelFormat::kDepth) image.depth[x] = 2;
+    if (HasDepth(format)) image.depth[x] = 2;
   }
   return EncodeRuns(image, kWhole, kFrame.width());
 }
@@ -161,6 +201,7 @@ TEST(ValidateRuns, RefusesWhatDoesNotFit) {
       corruption.apply(image.header, image.payload);
       const Status status = ValidateRuns(image.header, image.payload, kFrame);
       EXPECT_EQ(status.code(), StatusCode::kInvalidArgument);
+      EXPECT_EQ(ReadRuns(image.header, image.payload, kFrame).status(), status);
       EXPECT_NE(status.message().find(corruption.message), std::string::npos) << status.message();
     }
   }
@@ -174,16 +215,21 @@ TEST(ValidateRuns, WhatItAcceptsCanBeDecoded) {
   SCOPED_TRACE(random.trace());
   int accepted = 0;
   for (int i = 0; i < 20000; ++i) {
-    RunImage image = TwoRuns(kFormats[i % 2]);
+    RunImage image = TwoRuns(kFormats[i % 3]);
     for (int flips = random.Integer(1, 3); flips > 0; --flips) {
       auto& byte = image.payload[random.Integer<std::size_t>(0, image.payload.size() - 1)];
       byte ^= std::byte(1 << random.Integer(0, 7));
     }
     if (random.Chance(0.3)) image.header.bounds.x_begin = random.Integer(-2, 25);
     if (random.Chance(0.3)) image.header.bounds.y_end = random.Integer(-2, 25);
-    if (!ValidateRuns(image.header, image.payload, kFrame).ok()) continue;
+    const Status status = ValidateRuns(image.header, image.payload, kFrame);
+    const Result<LocalImage> read = ReadRuns(image.header, image.payload, kFrame);
+    ASSERT_EQ(read.ok(), status.ok());
+    if (!status.ok()) continue;
     ++accepted;
-    EXPECT_EQ(DecodeRuns(image.header, image.payload).bounds, image.header.bounds);
+    const LocalImage decoded = DecodeRuns(image.header, image.payload);
+    EXPECT_EQ(decoded.bounds, image.header.bounds);
+    EXPECT_EQ(decoded.rgba, read->rgba);
   }
   EXPECT_GT(accepted, 100);  // most bits are those of pixels
 }

@@ -60,7 +60,7 @@ inline PixelValue PixelAt(const LocalImage& image, int x, int y) {
   if (x < image.bounds.x_begin || x >= image.bounds.x_end || y < image.bounds.y_begin || y >= image.bounds.y_end) return value;
   const auto index = std::size_t(y - image.bounds.y_begin) * std::size_t(image.bounds.width()) + std::size_t(x - image.bounds.x_begin);
   std::copy_n(image.rgba.data() + 4 * index, 4, value.rgba);
-  if (image.format == PixelFormat::kDepth) value.depth = image.depth[index];
+  if (HasDepth(image.format)) value.depth = image.depth[index];
   return value;
 }
 

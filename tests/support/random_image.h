@@ -21,13 +21,11 @@ inline LocalImage RandomImage(Random& random, PixelFormat format, const PixelBou
   for (std::int64_t i = 0; i < bounds.pixel_count(); ++i) {
     if (random.Chance(0.35)) continue;
     const auto pixel = std::size_t(i);
-    const auto alpha = format == PixelFormat::kDepth || random.Chance(0.2) ? 1.0F : float(random.Real(0.01, 1));
+    const auto alpha = HasDepth(format) || random.Chance(0.2) ? 1.0F : float(random.Real(0.01, 1));
     for (std::size_t channel = 0; channel < 3; ++channel) image.rgba[4 * pixel + channel] = alpha * float(random.Real(0, 1));
     image.rgba[4 * pixel + 3] = alpha;
-    if (format == PixelFormat::kDepth) {
-      image.depth[pixel] = float(random.Integer(1, 8));
-      image.voxel[pixel] = std::uint32_t(random.Integer(0, 1 << 30));
-    }
+    if (HasDepth(format)) image.depth[pixel] = float(random.Integer(1, 8));
+    if (HasVoxel(format)) image.voxel[pixel] = std::uint32_t(random.Integer(0, 1 << 30));
   }
   return image;
 }

@@ -226,6 +226,8 @@ TEST(FieldChecks, Images) {
        "PartialImage.image.pixel_count: a payload of 4503599627370616 bytes, at most 2147483648"},
       {[](auto& e) { e.mutable_partial_image()->set_interval_end(0); }, "PartialImage.interval_end: 0 is not in [1, 65536]"},
       {[](auto& e) { e.mutable_partial_image()->set_step((1U << 20U) + 1); }, "PartialImage.step: 1048577 is not in [0, 1048576]"},
+      {[](auto& e) { e.mutable_partial_image()->mutable_image()->set_format(v1::PIXEL_FORMAT_RGBA_DEPTH); },
+       "PartialImage.image.format: that of a finished picture"},
       {[](auto& e) { e.mutable_partial_image()->mutable_pixels()->set_begin(1); }, "PartialImage.pixels.end: 0 is not in [1, "},
   });
   Check<FrameImage>({

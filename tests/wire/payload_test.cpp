@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "common/wire/digest.h"
 #include "common/wire/limits.h"
 #include "tests/support/random.h"
 #include "tests/support/random_image.h"
@@ -48,6 +49,16 @@ TEST(Payload, RunsComeOutAsTheyWentIn) {
         EXPECT_TRUE(Same(unpacked->span(), image.payload));
       }
     }
+  }
+}
+
+TEST(Payload, DigestsAreXxh3OnEveryProcessor) {
+  Random random(4);
+  SCOPED_TRACE(random.trace());
+  std::vector<std::byte> bytes(5000);
+  for (std::byte& byte : bytes) byte = std::byte(random.Integer(0, 255));
+  for (std::size_t size : {0, 1, 16, 17, 128, 129, 240, 241, 1024, 4096, 4999}) {
+    EXPECT_EQ(Digest({bytes.data() + 1, size}), XXH3_64bits(bytes.data() + 1, size)) << size;
   }
 }
 

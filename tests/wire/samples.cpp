@@ -86,7 +86,7 @@ GroupAssignment BehindOthers() {
 }
 
 EncodedRuns NoRuns() { return {{PixelFormat::kRgba, {}, 0, 0}, Codec::kRaw, 0, kMax64}; }
-EncodedRuns SomeRuns() { return {{PixelFormat::kDepth, {1, 2, 30, 40}, 7, 900}, Codec::kZstd, 12 * 7 + 24 * 900, 1}; }
+EncodedRuns SomeRuns() { return {{PixelFormat::kRgbaDepth, {1, 2, 30, 40}, 7, 900}, Codec::kZstd, 12 * 7 + 20 * 900, 1}; }
 
 constexpr Box kWholeBox = {{0, 0, 0}, {kMaxVolumeSide, kMaxVolumeSide, kMaxVolumeSide}};
 constexpr Box kOneVoxel = {{9, 8, 7}, {10, 9, 8}};
@@ -178,7 +178,14 @@ std::vector<ChunkRefused> Samples() {
 template <>
 std::vector<PartialImage> Samples() {
   return {{1, 2, {3, 4, 5}, 0, {0, 1}, {0, 0}, NoRuns().image, {}},
-          {kMax64, kMax32, {}, 1U << 20U, {65535, 65536}, {17, std::uint64_t{1} << 48U}, SomeRuns().image, {RankReport{}, FullReport()}}};
+          {kMax64,
+           kMax32,
+           {},
+           1U << 20U,
+           {65535, 65536},
+           {17, std::uint64_t{1} << 48U},
+           {PixelFormat::kDepth, {1, 2, 30, 40}, 7, 900},
+           {RankReport{}, FullReport()}}};
 }
 
 template <>
