@@ -2,16 +2,25 @@
 
 #include <algorithm>
 #include <chrono>
+#include <memory>
+#include <optional>
 #include <utility>
 
 #include "coordinator/frame_machine_state.h"
 
 namespace slabstream {
 
+namespace {
+constexpr std::size_t kCountAhead = 4;
+static_assert(kCountAhead <= OccupancyTable::kMaxKept);
+}  // namespace
+
 void FrameMachine::State::On(const DatasetLoaded& event) {
   if (!datasets.Loaded(event.name, event.dataset, event.summary)) return;
-  queue.ForEach([&](const OpenRequest& request) {
-    if (request.submit.frame.dataset == event.name) SendQueued(request);
+  queue.Update([&](OpenRequest& request) {
+    if (request.submit.frame.dataset != event.name) return;
+    FindOutCount(request);
+    SendQueued(request);
   });
 }
 
@@ -19,6 +28,44 @@ void FrameMachine::State::On(const DatasetFailed& event) {
   if (!datasets.Failed(event.name, event.status)) return;
   const auto waiting = queue.Extract([&](const OpenRequest& request) { return request.submit.frame.dataset == event.name; });
   for (const OpenRequest& request : waiting) FailRequest(request, event.status);
+}
+
+void FrameMachine::State::On(const OccupiedCounted& event) {
+  if (event.grid.ok()) {
+    occupancy.Counted(event.count, *event.grid);
+  } else if (const std::optional<OccupancyTable::Subject> failed = occupancy.Failed(event.count)) {
+    const auto waits = [&](const OpenRequest& request) {
+      return request.counted_under != nullptr && *request.counted_under == failed->transfer &&
+             datasets.Find(request.submit.frame.dataset)->id == failed->dataset;
+    };
+    for (const OpenRequest& request : queue.Extract(waits)) FailRequest(request, event.grid.status());
+  }
+}
+
+// The dataset must be known; nothing is found out before it is loaded. What is wrong with the request is told when it is planned.
+void FrameMachine::State::FindOutCount(OpenRequest& request) const {
+  const FrameRequest& frame = request.submit.frame;
+  const DatasetTable::Entry& dataset = *datasets.Find(frame.dataset);
+  if (dataset.state != DatasetState::kReady || !CheckNames(frame.policy).ok() || !NeedsOccupancy(frame.policy)) return;
+  Result<TransferFunction> transfer = ResolveTransfer(frame.transfer, *dataset.summary);
+  if (transfer.ok()) request.counted_under = std::make_shared<const TransferFunction>(*std::move(transfer));
+}
+
+// For the next requests in turn. Those behind them wait, so that no grid is dropped before it was used.
+void FrameMachine::State::CountAhead() {
+  std::size_t ahead = 0;
+  queue.ForEach([&](const OpenRequest& request) {
+    if (request.counted_under == nullptr || ahead == kCountAhead) return;
+    ++ahead;
+    const DatasetTable::Entry& dataset = *datasets.Find(request.submit.frame.dataset);
+    const TransferFunction& transfer = *request.counted_under;
+    if (occupancy.Counting(dataset.id, transfer) || occupancy.Find(dataset.id, transfer) != nullptr) return;
+    const VolumeSummary& summary = *dataset.summary;
+    actions.emplace_back(
+        CountDataset{.count = occupancy.Begin(dataset.id, transfer),
+                     .dataset = dataset.id,
+                     .table = std::make_shared<const ClassificationTable>(Classify(transfer, summary.description, summary.range))});
+  });
 }
 
 void FrameMachine::State::AfterGroupDone(const RunningFrame& frame) {
@@ -57,8 +104,11 @@ void FrameMachine::State::Expire() {
                                                " s, at least one is needed; start one with slabstream-worker");
 
   for (const OpenRequest& request : queue.Extract(out_of_time)) {
-    const bool ready = datasets.Find(request.submit.frame.dataset)->state == DatasetState::kReady;
-    FailRequest(request, late(request, ready ? "it was still queued" : "its dataset was still being loaded"));
+    const DatasetTable::Entry& dataset = *datasets.Find(request.submit.frame.dataset);
+    const bool counting = request.counted_under != nullptr && occupancy.Counting(dataset.id, *request.counted_under);
+    FailRequest(request, late(request, dataset.state != DatasetState::kReady ? "its dataset was still being loaded"
+                                       : counting                            ? "the occupied voxels of its dataset were still being counted"
+                                                                             : "it was still queued"));
   }
   for (const OpenRequest& request : queue.Extract(without_workers)) FailRequest(request, no_worker);
   for (auto it = frames.begin(); it != frames.end();) {
@@ -99,22 +149,41 @@ void FrameMachine::State::Advance() {
       break;
     }
   }
+  CountAhead();
 }
 
 // Plans the next frame in turn, as late as possible, so that it is made for the workers that there are. False: nothing can start.
 bool FrameMachine::State::StartNextFrame() {
-  const auto ready = [&](const OpenRequest& request) { return datasets.Find(request.submit.frame.dataset)->state == DatasetState::kReady; };
+  CountAhead();
+  const auto ready = [&](const OpenRequest& request) {
+    const DatasetTable::Entry& dataset = *datasets.Find(request.submit.frame.dataset);
+    return dataset.state == DatasetState::kReady &&
+           (request.counted_under == nullptr || occupancy.Find(dataset.id, *request.counted_under) != nullptr);
+  };
   std::optional<OpenRequest> request = queue.TakeNext(ready);
   if (!request) return false;
-  const DatasetTable::Entry& dataset = *datasets.Find(request->submit.frame.dataset);
+  const FrameRequest& frame = request->submit.frame;
+  const DatasetTable::Entry& dataset = *datasets.Find(frame.dataset);
   const Roster slots = roster.slots();
-  Result<FramePlan> plan = PlanFrame(request->submit.frame, dataset.id, *dataset.summary, slots, config.cost);
+  const Layout* layout = nullptr;
+  const Result<TransferFunction> transfer = ResolveTransfer(frame.transfer, *dataset.summary);
+  if (transfer.ok() && CheckNames(frame.policy).ok()) {
+    layout = &layouts.Find({.frame = &frame,
+                            .dataset = dataset.id,
+                            .summary = dataset.summary.get(),
+                            .transfer = &*transfer,
+                            .occupied = request->counted_under ? occupancy.Find(dataset.id, *request->counted_under) : nullptr,
+                            .slots = std::uint32_t(slots.slots.size()),
+                            .slab_bytes_target = config.cost.slab_bytes_target});
+  }
+  Result<FramePlan> plan = PlanFrame(frame, dataset.id, *dataset.summary, slots, config.cost, layout);
   if (!plan.ok()) {
     FailRequest(*request, plan.status());
     return true;
   }
-  const RunningFrame& frame = frames.Add(RunningFrame(frames.next_id(), *std::move(request), std::move(plan).value(), slots, limits, now));
-  SendClient(frame.request().client, frame.Progress());
+  const RunningFrame& running =
+      frames.Add(RunningFrame(frames.next_id(), *std::move(request), std::move(plan).value(), slots, limits, now));
+  SendClient(running.request().client, running.Progress());
   return true;
 }
 
@@ -122,7 +191,11 @@ void FrameMachine::State::HandOut(RunningFrame& frame) {
   RunningFrame::HandOut out = frame.NextGroup(now);
   out.assignment.epoch = config.epoch;
   out.assignment.finished_before = frames.finished_before();
-  for (Peer& peer : out.assignment.peers) peer.images_endpoint = roster.Find(peer.worker)->description.images_endpoint;
+  for (Peer& peer : out.assignment.peers) {
+    const Register& description = roster.Find(peer.worker)->description;
+    peer.images_endpoint = description.images_endpoint;
+    peer.memory_scope = description.memory_scope;
+  }
   for (const WorkerId worker : out.workers) SendWorker(worker, out.assignment);
 }
 

@@ -5,6 +5,9 @@
 //   the work.
 //              The last answers of a client are kept for it, so that a request that is submitted again costs nothing
 //   datasets   loaded at first use; requests wait for it; a failed load fails them
+//   occupancy  where a policy asks for it, occupied voxels are counted once for each dataset and transfer function;
+//              requests wait for that, and a failed count fails them
+//   layouts    stay while views change, and learn from the render times of frames (LayoutTable)
 //   frames     planned when the window has room (PlanFrame); group after group is handed out, never more than kGroupWindow groups
 //   unfinished over all
 //              frames, so group g+1 renders while g combines, across frames too; a frame ends with its FrameImage or with FrameFailed
@@ -32,12 +35,13 @@
 
 #include "common/base/bytes.h"
 #include "common/base/time.h"
+#include "common/classification/classification_table.h"
+#include "common/planning/frame_window.h"
 #include "common/wire/any_message.h"
+#include "coordinator/occupancy_table.h"
 #include "coordinator/peer_token.h"
 
 namespace slabstream {
-
-inline constexpr int kGroupWindow = 2;
 
 struct CoordinatorConfig {
   Epoch epoch = 0;  // random, not 0
@@ -81,10 +85,15 @@ struct DatasetFailed {
   std::string name;
   Status status;
 };
+// The end of a count.
+struct OccupiedCounted {
+  CountId count = 0;
+  Result<std::shared_ptr<const OccupancyGrid>> grid;  // of the dataset's size
+};
 struct CoordinatorStopRequested {};  // SIGTERM
 struct CoordinatorTick {};
-using CoordinatorEvent =
-    std::variant<FromWorker, FromClient, WorkerGone, ClientGone, DatasetLoaded, DatasetFailed, CoordinatorStopRequested, CoordinatorTick>;
+using CoordinatorEvent = std::variant<FromWorker, FromClient, WorkerGone, ClientGone, DatasetLoaded, DatasetFailed, OccupiedCounted,
+                                      CoordinatorStopRequested, CoordinatorTick>;
 
 // ---- actions
 struct ToWorker {
@@ -101,8 +110,14 @@ struct LoadDataset {
   std::string name;
   DatasetId dataset = 0;
 };
+// -> OccupiedCounted: CountOccupied over the voxels of a dataset that was loaded
+struct CountDataset {
+  CountId count = 0;
+  DatasetId dataset = 0;
+  std::shared_ptr<const ClassificationTable> table;
+};
 struct StopService {};  // everything was told; end
-using CoordinatorAction = std::variant<ToWorker, ToClient, LoadDataset, StopService>;
+using CoordinatorAction = std::variant<ToWorker, ToClient, LoadDataset, CountDataset, StopService>;
 
 class FrameMachine {
  public:

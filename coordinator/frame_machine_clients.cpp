@@ -19,7 +19,7 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const SubmitFrame& m
   if (IsOpen(client, message.request)) return;
   if (Answer* answer = clients.FindAnswer(client, message.request)) return SendAnswer(client, *answer);
 
-  const OpenRequest request{.client = client, .submit = message, .arrived = now};
+  OpenRequest request{.client = client, .submit = message, .arrived = now};
   const Status admissible = Admissible(client, message);
   if (!admissible.ok()) return FailRequest(request, admissible);
   const DatasetState state = datasets.Find(message.frame.dataset)->state;
@@ -27,6 +27,7 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const SubmitFrame& m
     const DatasetId id = datasets.BeginLoad(message.frame.dataset);
     actions.emplace_back(LoadDataset{.name = message.frame.dataset, .dataset = id});
   }
+  FindOutCount(request);
   queue.Push(request);
   SendQueued(request);
 }

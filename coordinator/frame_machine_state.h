@@ -16,6 +16,7 @@
 #include "coordinator/datasets.h"
 #include "coordinator/frame_machine.h"
 #include "coordinator/frames_in_flight.h"
+#include "coordinator/layout_table.h"
 #include "coordinator/request_queue.h"
 #include "coordinator/roster.h"
 
@@ -46,6 +47,8 @@ struct FrameMachine::State {
   ClientTable clients;
   RequestQueue queue;
   FramesInFlight frames;
+  OccupancyTable occupancy;
+  LayoutTable layouts;
   const FrameLimits limits;
 
   Time now;                     // of this Step
@@ -70,6 +73,7 @@ struct FrameMachine::State {
   void On(const ClientGone& event) { FreeClient(event.who); }
   void On(const DatasetLoaded& event);
   void On(const DatasetFailed& event);
+  void On(const OccupiedCounted& event);
   void On(const CoordinatorStopRequested&) { StopAll(Retire{.epoch = config.epoch}, "the coordinator is going down"); }
   void On(const CoordinatorTick&) {}
 
@@ -81,9 +85,10 @@ struct FrameMachine::State {
   void OnWorkerMessage(const FromWorker& event, const WorkerTrouble& message);
   void OnWorkerMessage(const FromWorker& event, const Leave& message);
   // What no worker sends here is dropped.
-  template <AnyOf<Welcome, Ping, GroupAssignment, Retire, Stop, ChunkRequest, Chunk, ChunkRefused, PartialImage, SubmitFrame, FrameProgress,
-                  FrameReply, FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery, StatusReply, ShutDown, ShutDownReply>
-                Message>
+  template <
+      AnyOf<Welcome, Ping, GroupAssignment, Retire, Stop, ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused, SubmitFrame,
+            FrameProgress, FrameReply, FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery, StatusReply, ShutDown, ShutDownReply>
+          Message>
   void OnWorkerMessage(const FromWorker&, const Message&) {}
 
   // ---- messages of clients
@@ -95,7 +100,7 @@ struct FrameMachine::State {
   // What no client sends is dropped.
   template <
       AnyOf<Register, Welcome, Heartbeat, Ping, GroupAssignment, GroupDone, FrameImage, WorkerTrouble, Leave, Retire, Stop, ChunkRequest,
-            Chunk, ChunkRefused, PartialImage, FrameProgress, FrameReply, FrameFailed, ClientPong, StatusReply, ShutDownReply>
+            Chunk, ChunkRefused, PartialImage, ImageRefused, FrameProgress, FrameReply, FrameFailed, ClientPong, StatusReply, ShutDownReply>
           Message>
   void OnClientMessage(PeerToken, const Message&) {}
 
@@ -111,6 +116,8 @@ struct FrameMachine::State {
   // ---- frames and workers
   void Expire();
   void Advance();
+  void FindOutCount(OpenRequest& request) const;
+  void CountAhead();
   bool StartNextFrame();
   void HandOut(RunningFrame& frame);
   void AfterGroupDone(const RunningFrame& frame);

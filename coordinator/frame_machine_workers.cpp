@@ -54,6 +54,7 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const FrameIm
     return;
   }
   reply.statistics = frame->Statistics(now);
+  layouts.Learn(frame->plan(), request.submit.frame.policy, reply.statistics.reports);
   EndRequest(request.client, request.submit.request, std::move(reply), event.payload);
   ++frames_done;
   EndFrame(message.frame);

@@ -1,19 +1,18 @@
-// FramesInFlight: the frames that run now, oldest first, and which earlier ones are over. At most kMaxFrames run, so that the next frame's
-// first group renders while the last one combines.
+// FramesInFlight: the frames that run now, oldest first, and which earlier ones are over. At most kMaxFramesInFlight run, so that the next
+// frame's first group renders while the last one combines.
 #pragma once
 
 #include <list>
 #include <vector>
 
+#include "common/planning/frame_window.h"
 #include "coordinator/running_frame.h"
 
 namespace slabstream {
 
 class FramesInFlight {
  public:
-  static constexpr std::size_t kMaxFrames = 2;
-
-  bool HasRoom() const { return frames_.size() < kMaxFrames; }
+  bool HasRoom() const { return frames_.size() < std::size_t(kMaxFramesInFlight); }
   FrameId next_id() const { return last_id_ + 1; }
   RunningFrame& Add(RunningFrame frame);  // frame.id() == next_id(), HasRoom()
   void Remove(FrameId id);                // it is over

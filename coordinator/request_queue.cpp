@@ -46,6 +46,12 @@ void RequestQueue::ForEach(const std::function<void(const OpenRequest&)>& visit)
   }
 }
 
+void RequestQueue::Update(const std::function<void(OpenRequest&)>& change) {
+  for (ClientQueue& queue : turn_) {
+    for (OpenRequest& request : queue.requests) change(request);
+  }
+}
+
 bool RequestQueue::Contains(PeerToken client, RequestId request) const {
   return std::any_of(turn_.begin(), turn_.end(), [&](const ClientQueue& queue) {
     return queue.client == client &&

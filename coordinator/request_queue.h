@@ -6,6 +6,7 @@
 #include <deque>
 #include <functional>
 #include <list>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -19,6 +20,8 @@ struct OpenRequest {
   PeerToken client = 0;
   SubmitFrame submit;
   Time arrived;
+  // What must be counted before the frame can be planned: voxels occupied under this function. Null: nothing, or not known yet.
+  std::shared_ptr<const TransferFunction> counted_under;
 
   Time deadline() const { return arrived + std::chrono::milliseconds(submit.deadline_ms); }
   bool Is(PeerToken of_client, RequestId id) const { return client == of_client && submit.request == id; }
@@ -34,6 +37,7 @@ class RequestQueue {
   std::vector<OpenRequest> Extract(const Predicate& wanted);  // takes all of them out, wherever they stand
 
   void ForEach(const std::function<void(const OpenRequest&)>& visit) const;  // in turn of clients, then in order of arrival
+  void Update(const std::function<void(OpenRequest&)>& change);              // likewise
   bool Contains(PeerToken client, RequestId request) const;
   std::size_t size() const;
   std::size_t CountOf(PeerToken client) const;

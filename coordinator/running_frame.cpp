@@ -74,7 +74,8 @@ RunningFrame::HandOut RunningFrame::NextGroup(Time now) {
                              .previews = request_.submit.frame.previews,
                              .display = plan_.display,
                              .setup = plan_.setup,
-                             .group = plan_.groups[number]},
+                             .group = plan_.groups[number],
+                             .groups_done = std::min(groups_done_, number)},
               .workers = Renderers(number)};
   AddOnce(out.workers, plan_.display);
   for (const WorkerId worker : out.workers) out.assignment.peers.push_back({.worker = worker});
@@ -226,11 +227,17 @@ FrameStatistics RunningFrame::Statistics(Time now) const {
                              .groups = group_count(),
                              .attempts = attempt(),
                              .decomposition = request_.submit.frame.policy.decomposition,
+                             .split = plan_.split,
                              .axis = std::string(1, Letter(plan_.slab_axis)),
+                             .assignment = request_.submit.frame.policy.assignment,
+                             .balance = request_.submit.frame.policy.balance,
                              .combine = plan_.combine,
                              .queued_ns = (begin_ - request_.arrived).count(),
                              .begin_ns = Nanoseconds(begin_),
-                             .end_ns = Nanoseconds(now)};
+                             .end_ns = Nanoseconds(now),
+                             .reports = {},
+                             .display = plan_.display,
+                             .grid = FrameBounds(plan_.setup)};
   const auto append = [&](const std::vector<RankReport>& reports) {
     const std::size_t room = kMaxReports - statistics.reports.size();
     statistics.reports.insert(statistics.reports.end(), reports.begin(), reports.begin() + std::ptrdiff_t(std::min(room, reports.size())));

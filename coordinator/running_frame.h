@@ -49,6 +49,7 @@ class RunningFrame {
 
   FrameId id() const { return id_; }
   const OpenRequest& request() const { return request_; }
+  const FramePlan& plan() const { return plan_; }
   const Roster& roster() const { return roster_; }
   std::uint32_t attempt() const { return std::uint32_t(displays_.size()); }  // from 1
   WorkerId display() const { return plan_.display; }

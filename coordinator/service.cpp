@@ -67,6 +67,7 @@ struct CoordinatorService::Impl {
   void ReceiveFromWorkers();
   void Send(Socket& socket, PeerTable& peers, PeerToken to, const AnyMessage& message, const Bytes& payload, const CoordinatorEvent& gone);
   void Load(const LoadDataset& action);
+  void Count(const CountDataset& action);
 
   std::string client_endpoint, worker_endpoint;
   const Catalogue catalogue;
@@ -119,8 +120,10 @@ void CoordinatorService::Impl::Perform(CoordinatorAction& action) {
     Send(clients, client_peers, to_client->to, to_client->message, to_client->payload, ClientGone{to_client->to});
   } else if (const auto* load = std::get_if<LoadDataset>(&action)) {
     Load(*load);
+  } else if (const auto* count = std::get_if<CountDataset>(&action)) {
+    Count(*count);
   } else {
-    static_assert(std::variant_size_v<CoordinatorAction> == 4);
+    static_assert(std::variant_size_v<CoordinatorAction> == 5);
     stop_now = true;
   }
 }
@@ -191,6 +194,19 @@ void CoordinatorService::Impl::Load(const LoadDataset& action) {
       }
     };
     inbox.Post(load());
+  });
+}
+
+void CoordinatorService::Impl::Count(const CountDataset& action) {
+  loader.Post([this, action] {
+    const auto count = [&]() -> Result<std::shared_ptr<const OccupancyGrid>> {
+      try {
+        return std::make_shared<const OccupancyGrid>(slabs->CountOccupied(action.dataset, *action.table));
+      } catch (const std::bad_alloc&) {
+        return Status::ResourceExhausted("occupied voxels could not be counted: not enough memory");
+      }
+    };
+    inbox.Post(OccupiedCounted{action.count, count()});
   });
 }
 

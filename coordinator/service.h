@@ -1,7 +1,7 @@
 // CoordinatorService: runs a FrameMachine over ZeroMQ. Binds the client, control and slabs planes, loads datasets, serves voxels.
 //
 // Threads: one owns the client and control sockets and runs the machine; one owns the slabs socket, cuts and packs chunks; one loads
-// datasets.
+// datasets and counts occupied voxels in them.
 #pragma once
 
 #include <memory>

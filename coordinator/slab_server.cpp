@@ -60,6 +60,12 @@ void SlabServer::Publish(DatasetId dataset, std::shared_ptr<const BrickedVoxels>
   samples_.insert_or_assign(dataset, Samples{nullptr, std::move(bricks)});
 }
 
+OccupancyGrid SlabServer::CountOccupied(DatasetId dataset, const ClassificationTable& table) {
+  const Samples samples = Find(dataset);
+  CHECK(samples.any()) << "dataset " << dataset;
+  return slabstream::CountOccupied(samples.volume != nullptr ? VoxelBricks(samples.volume->block) : VoxelBricks(*samples.bricks), table);
+}
+
 SlabServer::Samples SlabServer::Find(DatasetId dataset) {
   const std::lock_guard lock(mutex_);
   const auto found = samples_.find(dataset);

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "common/base/status.h"
+#include "common/classification/count_occupied.h"
 #include "common/transport/socket.h"
 #include "common/volume/bricks.h"
 #include "common/wire/any_message.h"
@@ -29,6 +30,8 @@ class SlabServer {
   // From any thread; once an id. The volume is served until the server ends: kept whole, or by bricks where those take much less memory.
   void Publish(DatasetId dataset, std::shared_ptr<const Volume> volume);
   void Publish(DatasetId dataset, std::shared_ptr<const BrickedVoxels> bricks);
+  // From any thread, of a dataset that was published.
+  OccupancyGrid CountOccupied(DatasetId dataset, const ClassificationTable& table);
 
  private:
   SlabServer(Socket socket, std::string endpoint, Epoch epoch, Codec codec);

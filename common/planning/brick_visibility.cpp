@@ -29,6 +29,22 @@ bool BrickVisibility::AnyVisible(const Box& box) const {
   return false;
 }
 
+OccupancyGrid BrickVisibility::VisibleCells() const {
+  static_assert(kSummaryBrick % kOccupancyCell == 0, "a cell lies in one brick");
+  OccupancyGrid grid{summary_.description.geometry.size, {}};
+  const Index3 cells = OccupancyCells(grid.size);
+  grid.occupied.reserve(std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z));
+  for (Index3 cell; cell.z < cells.z; ++cell.z) {
+    for (cell.y = 0; cell.y < cells.y; ++cell.y) {
+      for (cell.x = 0; cell.x < cells.x; ++cell.x) {
+        const Box box = OccupancyCellBox(cell, grid.size);
+        grid.occupied.push_back(std::uint16_t(AnyVisible(box) ? box.voxel_count() : 0));
+      }
+    }
+  }
+  return grid;
+}
+
 bool BrickVisibility::Visible(const ValueRange& brick) const {
   if (brick.min > brick.max) return false;
   // The range was rounded to float; one more bin on both sides makes up for the way back to stored samples.

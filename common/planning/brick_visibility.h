@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/classification/classification_table.h"
+#include "common/volume/occupancy_grid.h"
 #include "common/volume/summary.h"
 
 namespace slabstream {
@@ -18,6 +19,9 @@ class BrickVisibility {
 
   // True if a brick that touches `box` (not empty, inside the volume) can be visible.
   bool AnyVisible(const Box& box) const;
+
+  // All voxels of bricks that can be visible, as if each of them were: for who has counted none.
+  OccupancyGrid VisibleCells() const;
 
  private:
   bool Visible(const ValueRange& brick) const;

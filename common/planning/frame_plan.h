@@ -11,8 +11,9 @@
 
 #include "common/base/status.h"
 #include "common/combining/schedule.h"
-#include "common/decomposition/partition.h"
+#include "common/planning/cost_model.h"
 #include "common/planning/frame_request.h"
+#include "common/planning/layout.h"
 #include "common/view/sheet_grid.h"
 #include "common/volume/summary.h"
 
@@ -53,49 +54,48 @@ struct Placement {
 };
 
 struct GroupPlan {
-  std::vector<Placement> placements;  // by rank, nearest first; boxes that show nothing are left out, so it may be empty
-  Schedule schedule;                  // over these ranks; ranks == 0 if there are none
+  std::vector<Placement> placements;          // by rank, nearest first; boxes that show nothing are left out, so it may be empty
+  Schedule schedule;                          // over these ranks; ranks == 0 if there are none
+  ColorCoding color = ColorCoding::kFloat32;  // of images between workers, where they are sent as runs
   friend bool operator==(const GroupPlan&, const GroupPlan&) = default;
 };
 
 struct FramePlan {
   FrameSetup setup;
-  Partition partition;
-  std::uint32_t slots = 1;  // p: owner slots the partition was made for
+  Layout layout;
+  std::uint32_t slots = 1;  // p: owner slots the layout was made for
   Axis slab_axis = Axis::kZ;
-  std::string combine;            // name of the combining scheme
+  std::string split;              // what boxes have equal shares of: a name of WorkSplits(), but "auto"
+  double pixel_error = 0;         // as in the policy
+  std::string combine;            // the combining scheme, as in the policy
   std::vector<GroupPlan> groups;  // nearest first; at least one
   WorkerId display = 0;           // accumulates the groups and hands the frame over; holds a rank wherever possible
   friend bool operator==(const FramePlan&, const FramePlan&) = default;
 };
 
-// Slot s of the roster owns the boxes i with i mod slots == s. A slot may be vacant (0) after a loss: its boxes are then lent to the
-// others, round robin, and everybody else keeps their own, so that only the lost voxels travel again. No worker holds two slots.
+// The worker of each slot of a layout. A slot may be vacant (0) after a loss: its boxes are then lent to the others, round robin, and
+// everybody else keeps their own, so that only the lost voxels travel again. No worker holds two slots.
 struct Roster {
   std::vector<WorkerId> slots;
   friend bool operator==(const Roster&, const Roster&) = default;
 };
 
-// Constants of the paper's Eq. 20 and 25, in seconds a unit, fitted on this machine; the planner uses them to choose groups.
-struct CostModel {
-  double transform = 1e-9;                                   // c_t: a voxel
-  double splat = 2e-8;                                       // (c_sh + c_sp k^2) : an occupied voxel
-  double composite = 1e-9;                                   // c_cp: a pixel and slice
-  double combine = 4e-9;                                     // c_co: a pixel and round
-  std::int64_t slab_bytes_target = std::int64_t{256} << 20;  // voxels of one slab at most, where slices allow it
-};
-
-// Pure. Errors: InvalidArgument (an unknown name of a decomposition or combining scheme), NotFound (no such preset), Unavailable (no worker
-// in the roster). The request must be valid (Validate). Boxes whose bricks show nothing under the transfer function get no placement.
+// Pure. Errors: InvalidArgument (an unknown name of the policy), NotFound (no such preset), Unavailable (no worker in the roster). The
+// request must be valid (Validate). Null `layout`: MakeLayout, with what the volume's summary knows; else one that was made for this
+// volume, transfer function and policy and for as many slots as the roster has.
 Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, const Roster& roster,
-                            const CostModel& cost);
+                            const CostModel& cost, const Layout* layout = nullptr);
 
-// The same frame over another roster with the same number of slots: same setup, partition and groups; workers of placements, schedules and
+// The function that a request names or holds, for this volume. NotFound: no such preset.
+Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const VolumeSummary& summary);
+
+// The same frame over another roster with the same number of slots: same setup, layout and groups; workers of placements, schedules and
 // display change. The display worker is kept if it is still in the roster: it holds what was accumulated. Unavailable if nobody is.
 Result<FramePlan> Replan(const FramePlan& plan, const Roster& roster);
 
-// Owner of a box: its slot's worker, or the one it is lent to. 0 if the roster is empty of workers.
-WorkerId OwnerOf(BoxId box, const Roster& roster);
+// Worker of each box: its slot's, or the one it is lent to; 0 of a box that belongs to nobody, and of all if the roster is empty of
+// workers.
+std::vector<WorkerId> OwnersOf(const Layout& layout, const Roster& roster);
 
 // Voxels that a worker must hold to render `box`: the box and its halo, cut to the volume.
 inline Box SlabBox(const Box& box, const FrameSetup& setup) { return Grown(box, setup.halo, setup.description.geometry.bounds()); }

@@ -27,7 +27,11 @@ Status Validate(const Policy& policy) {
   if (Status s = ValidateName("policy.decomposition", policy.decomposition); !s.ok()) return s;
   if (Status s = InRange("policy.axis", int(policy.axis), int(AxisChoice::kX), int(AxisChoice::kAuto)); !s.ok()) return s;
   if (Status s = InRange("policy.groups", policy.groups, 0, kMaxGroups); !s.ok()) return s;
-  return ValidateName("policy.combine", policy.combine);
+  if (Status s = ValidateName("policy.split", policy.split); !s.ok()) return s;
+  if (Status s = ValidateName("policy.assignment", policy.assignment); !s.ok()) return s;
+  if (Status s = ValidateName("policy.balance", policy.balance); !s.ok()) return s;
+  if (Status s = ValidateName("policy.combine", policy.combine); !s.ok()) return s;
+  return InRange("policy.pixel_error", policy.pixel_error, 0, kMaxPixelError);
 }
 
 }  // namespace

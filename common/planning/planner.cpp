@@ -2,54 +2,13 @@
 
 #include <algorithm>
 #include <string>
-#include <string_view>
 #include <utility>
 
-#include "common/decomposition/decomposition.h"
-#include "common/planning/brick_visibility.h"
 #include "common/planning/frame_plan.h"
 #include "common/planning/placement.h"
 
 namespace slabstream {
 namespace {
-
-template <class Entry>
-Status UnknownName(std::string_view field, std::string_view name, const std::vector<Entry>& entries) {
-  std::string known;
-  for (const Entry& entry : entries) known += (known.empty() ? "" : ", ") + std::string(entry.name);
-  return Status::InvalidArgument(fmt::format("{} is '{}', but must be one of: {}", field, name, known));
-}
-
-Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const VolumeSummary& summary) {
-  Result<TransferFunction> transfer = std::holds_alternative<std::string>(choice.choice)
-                                          ? MakePreset(std::get<std::string>(choice.choice), summary)
-                                          : Result<TransferFunction>(std::get<TransferFunction>(choice.choice));
-  if (transfer.ok()) transfer->opacity_distance = choice.opacity_distance;
-  return transfer;
-}
-
-// z, about which views turn: slabs one above the other hide little of each other from most sides, so none of them is rendered in vain. The
-// longest side where z has less than half as many slices. It depends on the volume alone, so that turning it moves no voxel.
-Axis AutomaticAxis(const Index3& size) {
-  Axis longest = Axis::kZ;
-  for (Axis axis : {Axis::kY, Axis::kX}) {
-    if (size[axis] > 2 * size.z && size[axis] > size[longest]) longest = axis;
-  }
-  return longest;
-}
-
-// The fewest groups whose slabs stay under the target, whatever the view. Slabs thinner than the halo would hold more of it than voxels of
-// their own.
-int ChooseGroups(const VolumeDescription& description, Axis axis, std::int64_t slots, const CostModel& cost) {
-  const std::int64_t slices = description.geometry.size[axis];
-  const std::int64_t slice_bytes = description.voxel_bytes() / slices;
-  const std::int64_t most = std::clamp<std::int64_t>(slices / (slots * kHalo), 1, kMaxGroups);
-  for (std::int64_t groups = 1; groups < most; ++groups) {
-    const std::int64_t own_slices = (slices + slots * groups - 1) / (slots * groups);
-    if (std::min(own_slices + 2 * kHalo, slices) * slice_bytes <= cost.slab_bytes_target) return int(groups);
-  }
-  return int(most);
-}
 
 FrameSetup MakeSetup(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, TransferFunction transfer) {
   FrameSetup setup;
@@ -72,17 +31,22 @@ FrameSetup MakeSetup(const FrameRequest& request, DatasetId dataset, const Volum
 
 }  // namespace
 
+Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const VolumeSummary& summary) {
+  Result<TransferFunction> transfer = std::holds_alternative<std::string>(choice.choice)
+                                          ? MakePreset(std::get<std::string>(choice.choice), summary)
+                                          : Result<TransferFunction>(std::get<TransferFunction>(choice.choice));
+  if (transfer.ok()) transfer->opacity_distance = choice.opacity_distance;
+  return transfer;
+}
+
 PixelBounds FrameBounds(const FrameSetup& setup) {
   return setup.renderer == RendererKind::kSplat ? PixelBounds{0, 0, setup.sheets.width, setup.sheets.height}
                                                 : PixelBounds{0, 0, setup.camera.width, setup.camera.height};
 }
 
 Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, const Roster& roster,
-                            const CostModel& cost) {
-  const DecompositionEntry* decomposition = FindDecomposition(request.policy.decomposition);
-  if (decomposition == nullptr) return UnknownName("policy.decomposition", request.policy.decomposition, Decompositions());
-  if (FindCombiningScheme(request.policy.combine) == nullptr)
-    return UnknownName("policy.combine", request.policy.combine, CombiningSchemes());
+                            const CostModel& cost, const Layout* layout) {
+  if (Status status = CheckNames(request.policy); !status.ok()) return status;
   Result<TransferFunction> transfer = ResolveTransfer(request.transfer, summary);
   if (!transfer.ok()) return transfer.status();
 
@@ -95,26 +59,27 @@ Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, cons
                     sheets.width, sheets.height, kMaxGridSide));
   }
   plan.slots = std::uint32_t(roster.slots.size());
+  plan.slab_axis = SlabAxis(request.policy, summary.description.geometry.size);
+  plan.split = SplitOf(request.policy);
   plan.combine = request.policy.combine;
-  const VolumeDescription& description = summary.description;
-  plan.slab_axis = request.policy.axis == AxisChoice::kAuto ? AutomaticAxis(description.geometry.size) : Axis(request.policy.axis);
+  plan.pixel_error = request.policy.pixel_error;
 
-  // Where the boxes are.
-  const auto slots = std::max<std::int64_t>(plan.slots, 1);
-  const std::int64_t groups = request.policy.groups > 0 ? request.policy.groups : ChooseGroups(description, plan.slab_axis, slots, cost);
-  const int boxes = int(std::min<std::int64_t>(groups * slots, description.geometry.bounds().voxel_count()));
-  plan.partition = decomposition->make({&summary, boxes, plan.slab_axis});
+  // Where the boxes are, and whose.
+  const std::uint32_t slots = std::max<std::uint32_t>(plan.slots, 1);
+  plan.layout = layout != nullptr ? *layout
+                                  : MakeLayout({.summary = &summary,
+                                                .transfer = &plan.setup.transfer,
+                                                .policy = &request.policy,
+                                                .slots = slots,
+                                                .slab_bytes_target = cost.slab_bytes_target});
 
-  // Who sees what when: groups of `slots` boxes in visibility order, without those that show nothing.
-  const BrickVisibility visibility(summary, plan.setup.transfer);
-  const std::vector<BoxId> order = VisibilityOrder(plan.partition, plan.setup.camera);
-  for (std::size_t first = 0; first < order.size(); first += std::size_t(slots)) {
-    GroupPlan& group = plan.groups.emplace_back();
-    for (std::size_t i = first; i < std::min(first + std::size_t(slots), order.size()); ++i) {
-      const Box& box = plan.partition.boxes()[order[i]];
-      if (visibility.AnyVisible(SlabBox(box, plan.setup))) group.placements.push_back({order[i], box, 0});
-    }
+  // Who sees what when: groups of `slots` boxes that show something, in visibility order.
+  for (const BoxId id : VisibilityOrder(plan.layout.partition, plan.setup.camera)) {
+    if (plan.layout.owners[id] == kNoSlot) continue;
+    if (plan.groups.empty() || plan.groups.back().placements.size() == slots) plan.groups.emplace_back();
+    plan.groups.back().placements.push_back({id, plan.layout.partition.boxes()[id], 0});
   }
+  if (plan.groups.empty()) plan.groups.emplace_back();
 
   if (Status status = AssignWorkers(roster, plan); !status.ok()) return status;
   return plan;

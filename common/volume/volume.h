@@ -73,6 +73,9 @@ struct VoxelBlock {
 // A block with zeroed samples.
 VoxelBlock MakeVoxelBlock(const Box& box, ScalarType type);
 
+// The samples of `box`, which lies inside the block and is not empty.
+VoxelBlock CutBlock(const VoxelBlock& block, const Box& box);
+
 // Calls `function` with a null pointer of the sample's C++ type: const std::uint8_t*, const std::uint16_t* or const float*.
 template <class Function>
 decltype(auto) VisitScalarType(ScalarType type, Function&& function) {

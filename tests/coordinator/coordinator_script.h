@@ -129,10 +129,12 @@ class CoordinatorScript {
   std::vector<FakeWorker> workers;  // those that send heartbeats while time passes
   std::vector<PeerToken> clients;   // those that send pings
   std::vector<LoadDataset> loads;   // all that were asked for
+  std::vector<CountDataset> counts;
 
   Actions Step(const CoordinatorEvent& event) {
     Actions actions = machine.Step(event, now);
     for (const LoadDataset& load : Of<LoadDataset>(actions)) loads.push_back(load);
+    for (const CountDataset& count : Of<CountDataset>(actions)) counts.push_back(count);
     return actions;
   }
   Actions Worker(const FakeWorker& from, AnyMessage message, Bytes payload = {}) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "common/decomposition/decomposition.h"
@@ -27,24 +28,45 @@ void ExpectTiles(const Partition& partition, const Box& bounds) {
   EXPECT_EQ(voxels, bounds.voxel_count());  // disjoint and of the right size: they cover
 }
 
-VolumeSummary SummaryOf(Index3 size) {
-  VolumeSummary summary;
-  summary.description.geometry.size = size;
-  return summary;
+constexpr std::int32_t kHaloVoxels = 8;
+
+// A few blobs of cells with random numbers of voxels, the rest empty.
+OccupancyGrid RandomGrid(Random& random, const Index3& size) {
+  const Index3 cells = OccupancyCells(size);
+  OccupancyGrid grid{size, std::vector<std::uint16_t>(std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z))};
+  for (int blob = random.Integer(0, 4); blob > 0; --blob) {
+    const Box box = {{random.Integer(0, cells.x - 1), random.Integer(0, cells.y - 1), random.Integer(0, cells.z - 1)}, cells};
+    const std::int32_t side = random.Integer(1, 5);
+    for (std::size_t i = 0; i < grid.occupied.size(); ++i) {
+      const Index3 cell = {std::int32_t(i) % cells.x, std::int32_t(i) / cells.x % cells.y, std::int32_t(i) / cells.x / cells.y};
+      const Box blob_box = {box.begin, {box.begin.x + side, box.begin.y + side, box.begin.z + side}};
+      if (blob_box.Contains(cell))
+        grid.occupied[i] = std::uint16_t(random.Integer<std::int64_t>(1, OccupancyCellBox(cell, size).voxel_count()));
+    }
+  }
+  return grid;
 }
 
 TEST(Decompositions, EveryOneTilesTheVolumeForEveryNumberOfBoxes) {
+  Random random(70);
+  SCOPED_TRACE(random.trace());
   for (const DecompositionEntry& entry : Decompositions()) {
     EXPECT_EQ(FindDecomposition(entry.name), &entry);
-    for (const Index3& size : {Index3{1, 1, 1}, Index3{64, 3, 7}, Index3{13, 17, 31}, Index3{5, 1, 100}}) {
-      const VolumeSummary summary = SummaryOf(size);
-      for (Axis axis : kAxes) {
-        for (int boxes : {1, 2, 3, 5, 7, 8, 13, 31, 64, 97, 1000}) {
-          SCOPED_TRACE(testing::Message() << entry.name << " " << size.x << "x" << size.y << "x" << size.z << " " << Letter(axis) << " "
-                                          << boxes);
-          const Partition partition = entry.make({&summary, boxes, axis});
-          EXPECT_LE(partition.boxes().size(), std::size_t(boxes));
-          ExpectTiles(partition, summary.description.geometry.bounds());
+    for (const Index3& size : {Index3{1, 1, 1}, Index3{64, 3, 7}, Index3{13, 17, 31}, Index3{5, 1, 100}, Index3{90, 80, 70}}) {
+      const WorkField voxels = WorkField::Uniform(size), occupied(RandomGrid(random, size));
+      for (const WorkField* work : {&voxels, &occupied}) {
+        for (Axis axis : kAxes) {
+          for (int boxes : {1, 2, 3, 5, 7, 8, 13, 31, 64, 97, 1000}) {
+            SCOPED_TRACE(testing::Message() << entry.name << " " << size.x << "x" << size.y << "x" << size.z << " " << Letter(axis) << " "
+                                            << boxes << " uniform " << work->uniform());
+            const Partition partition = entry.make({.work = work,
+                                                    .boxes = boxes,
+                                                    .most_boxes = 2000,
+                                                    .together = random.Integer(1, boxes),
+                                                    .axis = axis,
+                                                    .halo = kHaloVoxels});
+            ExpectTiles(partition, {{0, 0, 0}, size});
+          }
         }
       }
     }
@@ -52,22 +74,100 @@ TEST(Decompositions, EveryOneTilesTheVolumeForEveryNumberOfBoxes) {
   EXPECT_EQ(FindDecomposition("nonsense"), nullptr);
 }
 
-TEST(Slabs, DifferByAtMostOneSliceAndAscendAlongTheAxis) {
-  const VolumeSummary summary = SummaryOf({29, 64, 101});
+// Beams and subcubes have as many boxes as are wanted, or as there is room for.
+TEST(Decompositions, MakeAsManyBoxesAsWanted) {
+  const Index3 size = {13, 17, 31};
+  const WorkField voxels = WorkField::Uniform(size);
+  for (int boxes : {1, 2, 3, 7, 13, 64, 300, 3000, 7000}) {
+    EXPECT_EQ(MakeSlabs({.work = &voxels, .boxes = boxes, .axis = Axis::kX}).boxes().size(), std::size_t(std::min(boxes, 13)));
+    EXPECT_EQ(MakeBeams({.work = &voxels, .boxes = boxes, .axis = Axis::kX}).boxes().size(), std::size_t(std::min(boxes, 13 * 31)));
+    EXPECT_EQ(MakeSubcubes({.work = &voxels, .boxes = boxes}).boxes().size(), std::size_t(std::min(boxes, 13 * 17 * 31)));
+  }
+  EXPECT_EQ(MakeOctree({.work = &voxels, .boxes = 9}).boxes().size(), 64U);
+  EXPECT_EQ(MakeOctree({.work = &voxels, .boxes = 9, .most_boxes = 63}).boxes().size(), 8U);
+}
+
+TEST(Slabs, BeginWhereTheirShareOfSlicesDoes) {
+  const Index3 size = {29, 64, 101};
+  const WorkField voxels = WorkField::Uniform(size);
   for (Axis axis : kAxes) {
-    const int slices = summary.description.geometry.size[axis];
+    const int slices = size[axis];
     for (int wanted = 1; wanted <= 130; ++wanted) {
-      const Partition partition = MakeSlabs({&summary, wanted, axis});
-      ASSERT_EQ(partition.boxes().size(), std::size_t(std::min(wanted, slices)));
-      int thinnest = slices, thickest = 0, next = 0;
-      for (const Box& box : partition.boxes()) {
-        EXPECT_EQ(box.begin[axis], next);
-        next = box.end[axis];
-        thinnest = std::min(thinnest, box.size()[axis]);
-        thickest = std::max(thickest, box.size()[axis]);
-      }
-      EXPECT_LE(thickest - thinnest, 1);
+      const Partition partition = MakeSlabs({.work = &voxels, .boxes = wanted, .axis = axis});
+      const int slabs = std::min(wanted, slices);
+      ASSERT_EQ(partition.boxes().size(), std::size_t(slabs));
+      for (int i = 0; i < slabs; ++i) EXPECT_EQ(partition.boxes()[std::size_t(i)].begin[axis], i * slices / slabs);
     }
+  }
+}
+
+// Whatever is cut, no plane is further from its share of the work than a slice.
+TEST(Slabs, OfEqualWorkAreEqualUpToASlice) {
+  Random random(72);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 50; ++i) {
+    const Index3 size = {random.Integer(20, 90), random.Integer(20, 90), random.Integer(20, 90)};
+    const WorkField work(RandomGrid(random, size));
+    const Axis axis = kAxes[random.Integer<std::size_t>(0, 2)];
+    const int boxes = random.Integer(2, 7);
+    const Partition slabs = MakeSlabs({.work = &work, .boxes = boxes, .axis = axis});
+    double before = 0;
+    for (int slab = 0; slab + 1 < boxes; ++slab) {
+      const Box& box = slabs.boxes()[std::size_t(slab)];
+      before += work.Sum(box);
+      Box slice = box;
+      slice.begin[axis] = box.end[axis] - 1;
+      slice.end[axis] = box.end[axis] + 1;
+      if (box.size()[axis] > 1) {
+        EXPECT_LE(std::abs(before - work.total() * (slab + 1) / boxes), work.Sum(slice) + 1e-9 * work.total());
+      }
+    }
+  }
+}
+
+TEST(KdTree, CutsAwayNothingThatAnyBoxNeeds) {
+  Random random(73);
+  SCOPED_TRACE(random.trace());
+  std::size_t cut_away = 0;
+  for (int i = 0; i < 100; ++i) {
+    const Index3 size = {random.Integer(1, 150), random.Integer(1, 150), random.Integer(1, 150)};
+    const Box bounds = {{0, 0, 0}, size};
+    const WorkField work(RandomGrid(random, size));
+    const int boxes = random.Integer(1, 20);
+    const Partition partition = MakeKdTree({.work = &work, .boxes = boxes, .halo = kHaloVoxels});
+    double sum = 0;
+    for (std::size_t box = 0; box < partition.boxes().size(); ++box) {
+      sum += work.Sum(partition.boxes()[box]);
+      if (box < std::size_t(boxes) && work.total() > 0) continue;
+      ++cut_away;
+      EXPECT_TRUE(work.Hull(Grown(partition.boxes()[box], kHaloVoxels, bounds)).empty()) << box << " of " << boxes;
+    }
+    EXPECT_NEAR(sum, work.total(), 1e-9 * work.total());
+  }
+  EXPECT_GT(cut_away, 100U);
+}
+
+TEST(KdTree, HugsWhatIsOccupied) {
+  // One occupied cell in the middle of 160^3 voxels.
+  OccupancyGrid grid{{160, 160, 160}, std::vector<std::uint16_t>(20 * 20 * 20)};
+  grid.occupied[(10 * 20 + 10) * 20 + 10] = 512;
+  const WorkField work(grid);
+  const Partition partition = MakeKdTree({.work = &work, .boxes = 1, .halo = kHaloVoxels});
+  EXPECT_EQ(partition.boxes()[0], (Box{{72, 72, 72}, {96, 96, 96}}));
+  EXPECT_EQ(partition.boxes().size(), 7U);
+}
+
+// The boxes of a group are one subtree, so they follow one another in any view.
+TEST(KdTree, KeepsGroupsTogether) {
+  const WorkField work = WorkField::Uniform({100, 100, 100});
+  Random random(74);
+  SCOPED_TRACE(random.trace());
+  const Partition partition = MakeKdTree({.work = &work, .boxes = 15, .together = 5});
+  for (int i = 0; i < 30; ++i) {
+    const std::vector<BoxId> order = VisibilityOrder(
+        partition,
+        MakeCamera({.azimuth_degrees = random.Real(0, 360), .elevation_degrees = random.Real(-90, 90)}, {64, 64}, {{100, 100, 100}}));
+    for (std::size_t at = 0; at < order.size(); ++at) EXPECT_EQ(order[at] / 5, order[at / 5 * 5] / 5);
   }
 }
 

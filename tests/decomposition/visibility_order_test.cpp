@@ -66,10 +66,10 @@ void ExpectNoRayEntersALaterBoxFirst(const Partition& partition, const Camera& c
 
 // Slabs on each axis and random kd-trees.
 std::vector<Partition> SomePartitions(Random& random) {
-  VolumeSummary summary;
-  summary.description.geometry = kGeometry;
+  const WorkField voxels = WorkField::Uniform(kGeometry.size);
   std::vector<Partition> partitions;
-  for (Axis axis : kAxes) partitions.push_back(MakeSlabs({&summary, 7, axis}));
+  for (const DecompositionEntry& entry : Decompositions()) partitions.push_back(entry.make({.work = &voxels, .boxes = 11}));
+  for (Axis axis : kAxes) partitions.push_back(MakeSlabs({.work = &voxels, .boxes = 7, .axis = axis}));
   for (int i = 0; i < 5; ++i) partitions.push_back(RandomPartition(random, kGeometry.bounds(), 25));
   return partitions;
 }
@@ -124,9 +124,8 @@ TEST(VisibilityOrder, HoldsForEyesInsideTheVolumeAndOnPlanes) {
 }
 
 TEST(VisibilityOrder, TurningRoundReversesTheOrderOfSlabs) {
-  VolumeSummary summary;
-  summary.description.geometry = kGeometry;
-  const Partition slabs = MakeSlabs({&summary, 6, Axis::kY});
+  const WorkField voxels = WorkField::Uniform(kGeometry.size);
+  const Partition slabs = MakeSlabs({.work = &voxels, .boxes = 6, .axis = Axis::kY});
   ViewParameters view;
   const std::vector<BoxId> there = VisibilityOrder(slabs, MakeCamera(view, {64, 64}, kGeometry));
   EXPECT_EQ(there, (std::vector<BoxId>{0, 1, 2, 3, 4, 5}));  // along +y
@@ -136,9 +135,8 @@ TEST(VisibilityOrder, TurningRoundReversesTheOrderOfSlabs) {
 }
 
 TEST(VisibilityOrder, LowerSideComesFirstWhereNoRayCrosses) {
-  VolumeSummary summary;
-  summary.description.geometry = kGeometry;
-  const Partition slabs = MakeSlabs({&summary, 4, Axis::kX});
+  const WorkField voxels = WorkField::Uniform(kGeometry.size);
+  const Partition slabs = MakeSlabs({.work = &voxels, .boxes = 4, .axis = Axis::kX});
   for (double azimuth : {0.0, 180.0, 360.0}) {  // rays parallel to the planes
     ViewParameters view;
     view.azimuth_degrees = azimuth;

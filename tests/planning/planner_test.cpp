@@ -5,8 +5,11 @@
 #include <set>
 #include <vector>
 
+#include "common/combining/schemes.h"
 #include "common/decomposition/decomposition.h"
+#include "common/planning/assignment.h"
 #include "common/planning/frame_plan.h"
+#include "common/planning/policy_names.h"
 #include "tests/planning/support.h"
 #include "tests/support/random.h"
 
@@ -21,11 +24,13 @@ FramePlan Plan(const FrameRequest& request, const VolumeSummary& summary, const 
 
 // What every plan must be, whatever it was made for.
 void ExpectSound(const FramePlan& plan, const Roster& roster) {
-  const std::vector<BoxId> order = VisibilityOrder(plan.partition, plan.setup.camera);
-  ASSERT_FALSE(plan.groups.empty());
-  EXPECT_EQ(plan.groups.size(), (order.size() + plan.slots - 1) / plan.slots);
+  std::vector<BoxId> order = VisibilityOrder(plan.layout.partition, plan.setup.camera);
+  ASSERT_EQ(plan.layout.owners.size(), order.size());
+  std::erase_if(order, [&](BoxId box) { return plan.layout.owners[box] == kNoSlot; });
+  EXPECT_EQ(plan.groups.size(), std::max<std::size_t>(1, (order.size() + plan.slots - 1) / plan.slots));
+  const std::vector<WorkerId> owners = OwnersOf(plan.layout, roster);
 
-  // The placements of all groups are boxes in visibility order, each in the group where it belongs.
+  // The placements of all groups are the boxes that show something, in visibility order, each in the group where it belongs.
   std::map<BoxId, std::size_t> position;
   for (std::size_t i = 0; i < order.size(); ++i) position[order[i]] = i;
   const PixelRange frame = WholeFrame(plan.setup);
@@ -33,12 +38,12 @@ void ExpectSound(const FramePlan& plan, const Roster& roster) {
     const GroupPlan& group = plan.groups[g];
     for (std::size_t rank = 0; rank < group.placements.size(); ++rank) {
       const Placement& placement = group.placements[rank];
-      EXPECT_EQ(placement.box, plan.partition.boxes()[placement.id]);
+      EXPECT_EQ(placement.box, plan.layout.partition.boxes()[placement.id]);
       EXPECT_EQ(position[placement.id] / plan.slots, g);
       if (rank > 0) {
         EXPECT_LT(position[group.placements[rank - 1].id], position[placement.id]);
       }
-      EXPECT_EQ(placement.worker, OwnerOf(placement.id, roster));
+      EXPECT_EQ(placement.worker, owners[placement.id]);
       EXPECT_NE(placement.worker, 0U);
     }
     EXPECT_EQ(group.schedule.ranks, group.placements.size());
@@ -76,7 +81,7 @@ TEST(PlanFrame, IsSoundForAnyWorkersGroupsAndSizes) {
           const Roster roster = FullRoster(workers);
           const FramePlan plan = Plan(request, summary, roster);
           ExpectSound(plan, roster);
-          EXPECT_EQ(PlacedBoxes(plan).size(), plan.partition.boxes().size());  // everything is visible
+          EXPECT_EQ(PlacedBoxes(plan).size(), plan.layout.partition.boxes().size());  // everything is visible
           if (groups > 0 && groups * workers <= size[plan.slab_axis]) {
             EXPECT_EQ(plan.groups.size(), std::size_t(groups));
           }
@@ -86,16 +91,22 @@ TEST(PlanFrame, IsSoundForAnyWorkersGroupsAndSizes) {
   }
 }
 
-TEST(PlanFrame, UsesEveryCombiningSchemeAndDecomposition) {
+TEST(PlanFrame, UsesEveryNameOfAPolicy) {
   const VolumeSummary summary = FullSummary({40, 40, 40});
   for (const CombiningEntry& scheme : CombiningSchemes()) {
     for (const DecompositionEntry& decomposition : Decompositions()) {
       FrameRequest request = SomeRequest();
       request.policy.combine = scheme.name;
       request.policy.decomposition = decomposition.name;
-      request.policy.groups = 2;
-      const Roster roster = FullRoster(5);
-      ExpectSound(Plan(request, summary, roster), roster);
+      for (const AssignmentEntry& assignment : Assignments()) {
+        for (const NamedChoice& split : WorkSplits()) {
+          request.policy.assignment = assignment.name;
+          request.policy.split = split.name;
+          request.policy.groups = 2;
+          const Roster roster = FullRoster(5);
+          ExpectSound(Plan(request, summary, roster), roster);
+        }
+      }
     }
   }
 }
@@ -112,7 +123,7 @@ TEST(PlanFrame, TurningTheViewReversesRanksButNeverOwnership) {
   for (int i = 0; i < 50; ++i) {
     request.view = RandomView(random);
     const FramePlan plan = Plan(request, summary, roster);
-    EXPECT_EQ(plan.partition, first.partition);
+    EXPECT_EQ(plan.layout.partition, first.layout.partition);
     std::vector<BoxId> forward = PlacedBoxes(first), boxes = PlacedBoxes(plan);
     if (plan.setup.camera.view_direction.y < 0 && request.view.projection == Projection::kOrthographic) {
       std::reverse(forward.begin(), forward.end());
@@ -144,7 +155,7 @@ TEST(PlanFrame, AutomaticChoicesDoNotDependOnTheView) {
     request.view = RandomView(random);
     const Result<FramePlan> plan = PlanFrame(request, 7, summary, FullRoster(2), cost);
     ASSERT_TRUE(plan.ok());
-    EXPECT_EQ(plan->partition, first->partition);
+    EXPECT_EQ(plan->layout.partition, first->layout.partition);
   }
 }
 
@@ -178,13 +189,12 @@ TEST(PlanFrame, LeavesOutBoxesThatShowNothing) {
   const FramePlan plan = Plan(request, summary, roster);
   ExpectSound(plan, roster);
   ASSERT_EQ(plan.setup.halo, 8);
-  EXPECT_EQ(plan.groups.size(), 5U);
-  EXPECT_TRUE(plan.groups[0].placements.empty());
   // Slabs are 16 slices thick; the neighbours of [64, 80) see it through their halo.
   EXPECT_EQ(PlacedBoxes(plan), (std::vector<BoxId>{3, 4, 5}));
-  EXPECT_EQ(plan.groups[0].schedule, (Schedule{0, 0, {}}));
-  // The nearest box that shows anything is the display worker's.
-  EXPECT_EQ(plan.display, roster.slots[3 % 2]);
+  EXPECT_EQ(plan.groups.size(), 2U);
+  // Only boxes that show anything are dealt out, and the nearest one is the display worker's.
+  EXPECT_EQ(plan.layout.owners, (std::vector<std::uint32_t>{kNoSlot, kNoSlot, kNoSlot, 0, 1, 0, kNoSlot, kNoSlot, kNoSlot, kNoSlot}));
+  EXPECT_EQ(plan.display, roster.slots[0]);
 }
 
 TEST(PlanFrame, AnEmptyVolumeHasAPlanOfEmptyGroups) {
@@ -195,6 +205,8 @@ TEST(PlanFrame, AnEmptyVolumeHasAPlanOfEmptyGroups) {
   const FramePlan plan = Plan(SomeRequest(), summary, roster);
   ExpectSound(plan, roster);
   EXPECT_TRUE(PlacedBoxes(plan).empty());
+  EXPECT_EQ(plan.groups.size(), 1U);
+  EXPECT_EQ(plan.groups[0].schedule, (Schedule{0, 0, {}}));
   EXPECT_EQ(plan.display, roster.slots[0]);
 }
 
@@ -265,13 +277,50 @@ TEST(PlanFrame, NamesWhatItDoesNotKnow) {
     return PlanFrame(request, 7, summary, roster, {}).status();
   };
   EXPECT_EQ(status([](auto& r) { r.policy.decomposition = "cake"; }, FullRoster(1)),
-            Status::InvalidArgument("policy.decomposition is 'cake', but must be one of: slab"));
-  EXPECT_EQ(status([](auto& r) { r.policy.combine = "mix"; }, FullRoster(1)),
-            Status::InvalidArgument("policy.combine is 'mix', but must be one of: fan-in, centralized"));
+            Status::InvalidArgument("policy.decomposition is 'cake', but must be one of: slab, beam, subcube, octree, kd-tree"));
+  EXPECT_EQ(status([](auto& r) { r.policy.split = "hairs"; }, FullRoster(1)),
+            Status::InvalidArgument("policy.split is 'hairs', but must be one of: auto, voxels, occupied, cost"));
+  EXPECT_EQ(status([](auto& r) { r.policy.assignment = "lots"; }, FullRoster(1)),
+            Status::InvalidArgument("policy.assignment is 'lots', but must be one of: cyclic, contiguous, greedy"));
+  EXPECT_EQ(status([](auto& r) { r.policy.balance = "act"; }, FullRoster(1)),
+            Status::InvalidArgument("policy.balance is 'act', but must be one of: static, dynamic"));
+  EXPECT_EQ(
+      status([](auto& r) { r.policy.combine = "mix"; }, FullRoster(1)),
+      Status::InvalidArgument("policy.combine 'mix' is not one of fan-in, centralized, chain, tree, radix-k, binary-swap, direct-send"));
   EXPECT_EQ(status([](auto& r) { r.transfer.choice = "no-such-preset"; }, FullRoster(1)).code(), StatusCode::kNotFound);
   for (const Roster& nobody : {Roster{}, Roster{{0}}, Roster{{0, 0, 0}}}) {
     EXPECT_EQ(status([](auto&) {}, nobody).code(), StatusCode::kUnavailable);
   }
+}
+
+TEST(PlanFrame, ColoursTravelInAsManyBitsAsTheirErrorAllows) {
+  const VolumeSummary summary = FullSummary({40, 40, 40});
+  FrameRequest request = SomeRequest();
+  request.policy.groups = 1;
+  const auto color = [&](double pixel_error, int workers) {
+    request.policy.pixel_error = pixel_error;
+    const FramePlan plan = Plan(request, summary, FullRoster(workers));
+    for (const GroupPlan& group : plan.groups) {
+      const Travel travel = TravelOf(group.schedule, WholeFrame(plan.setup));
+      EXPECT_LE(CodingError(group.color, travel.hops, travel.transfers), pixel_error);
+    }
+    return plan.groups[0].color;
+  };
+  for (int workers : {2, 5, 8}) {
+    EXPECT_EQ(color(0, workers), ColorCoding::kFloat32);
+    EXPECT_EQ(color(1e-6, workers), ColorCoding::kFloat32);
+    EXPECT_EQ(color(1.0 / 1024, workers), ColorCoding::kFixed16);
+  }
+  request.policy.combine = "centralized";
+  request.policy.groups = 1;
+  const VolumeSummary large = FullSummary({16, 16, 400});
+  request.policy.pixel_error = 1.0 / 1024;
+  const FramePlan plan = Plan(request, large, FullRoster(100));
+  EXPECT_EQ(plan.groups[0].color, ColorCoding::kHalf) << "99 transfers, but one hop";
+  request.renderer = RendererKind::kZBuffer;
+  EXPECT_EQ(color(kMaxPixelError, 5), ColorCoding::kFloat32);
+  request.policy.pixel_error = 0.2;
+  EXPECT_EQ(Validate(request).code(), StatusCode::kInvalidArgument);
 }
 
 // ---- lost workers
@@ -292,7 +341,7 @@ TEST(Replan, ReassignsLostBoxesAndChangesNothingElse) {
         ASSERT_TRUE(again.ok());
         ExpectSound(*again, rest);
         EXPECT_EQ(again->setup, plan.setup);
-        EXPECT_EQ(again->partition, plan.partition);
+        EXPECT_EQ(again->layout.partition, plan.layout.partition);
         EXPECT_EQ(PlacedBoxes(*again), PlacedBoxes(plan));
         ASSERT_EQ(again->groups.size(), plan.groups.size());
         std::set<WorkerId> lenders;
@@ -339,20 +388,27 @@ TEST(Replan, SurvivesAllButOne) {
   EXPECT_EQ(Replan(plan, Roster{std::vector<WorkerId>(9)}).status().code(), StatusCode::kUnavailable);
 }
 
-TEST(OwnerOf, LendsTheBoxesOfVacantSlotsEvenly) {
-  const Roster roster = {{11, 0, 13, 0, 15}};
-  std::map<WorkerId, int> lent;
-  for (BoxId box = 0; box < 5 * 30; ++box) {
-    const WorkerId owner = OwnerOf(box, roster);
-    if (roster.slots[box % 5] != 0) {
-      EXPECT_EQ(owner, roster.slots[box % 5]);
-    } else {
-      ++lent[owner];
+TEST(OwnersOf, LendsTheBoxesOfVacantSlotsEvenly) {
+  for (const AssignmentEntry& assignment : Assignments()) {
+    const Roster roster = {{11, 0, 13, 0, 15}};
+    Layout layout;
+    layout.owners = assignment.assign({std::vector<double>(5 * 30, 1.0), 5});
+    layout.owners.insert(layout.owners.begin() + 7, kNoSlot);
+    const std::vector<WorkerId> owners = OwnersOf(layout, roster);
+    ASSERT_EQ(owners.size(), layout.owners.size());
+    std::map<WorkerId, int> lent;
+    for (std::size_t box = 0; box < owners.size(); ++box) {
+      if (layout.owners[box] == kNoSlot) {
+        EXPECT_EQ(owners[box], 0U);
+      } else if (roster.slots[layout.owners[box]] != 0) {
+        EXPECT_EQ(owners[box], roster.slots[layout.owners[box]]);
+      } else {
+        ++lent[owners[box]];
+      }
     }
+    EXPECT_EQ(lent, (std::map<WorkerId, int>{{11, 20}, {13, 20}, {15, 20}})) << assignment.name;
+    EXPECT_EQ(OwnersOf(layout, Roster{{0, 0, 0, 0, 0}}), std::vector<WorkerId>(layout.owners.size()));
   }
-  EXPECT_EQ(lent, (std::map<WorkerId, int>{{11, 20}, {13, 20}, {15, 20}}));
-  EXPECT_EQ(OwnerOf(3, Roster{}), 0U);
-  EXPECT_EQ(OwnerOf(3, Roster{{0, 0}}), 0U);
 }
 
 }  // namespace

@@ -1,0 +1,93 @@
+#include "common/classification/count_occupied.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <type_traits>
+
+#include "common/base/check.h"
+
+namespace slabstream {
+namespace {
+
+static_assert(kBrick % kOccupancyCell == 0, "a cell lies in one brick");
+
+// Whether a sample is occupied, 0 or 1: of integers by table.
+template <class T>
+class Occupied {
+ public:
+  explicit Occupied(const ClassificationTable& table) : table_(table) {
+    if constexpr (std::is_integral_v<T>) {
+      by_sample_.resize(std::size_t{std::numeric_limits<T>::max()} + 1);
+      for (std::size_t sample = 0; sample < by_sample_.size(); ++sample) by_sample_[sample] = Visible(double(sample));
+    }
+  }
+
+  std::uint8_t operator()(T sample) const {
+    if constexpr (std::is_integral_v<T>) {
+      return by_sample_[sample];
+    } else {
+      return std::uint8_t(std::isfinite(sample) && Visible(double(sample)));
+    }
+  }
+
+ private:
+  bool Visible(double sample) const { return table_.opacity[std::size_t(table_.BinOf(sample))] > 0; }
+
+  const ClassificationTable& table_;
+  std::vector<std::uint8_t> by_sample_;
+};
+
+// Of a cell's row, at most kOccupancyCell samples. Rows of one value, the most frequent ones of sparse data, are one comparison.
+template <class T>
+std::uint16_t CountRow(const T* row, std::int32_t count, const Occupied<T>& occupied) {
+  if (count == kOccupancyCell && std::memcmp(row, row + 1, (kOccupancyCell - 1) * sizeof(T)) == 0) {
+    return std::uint16_t(kOccupancyCell * occupied(row[0]));
+  }
+  std::uint16_t sum = 0;
+  for (std::int32_t i = 0; i < count; ++i) sum = std::uint16_t(sum + occupied(row[i]));
+  return sum;
+}
+
+template <class T>
+std::uint16_t CountCell(const BrickView<T>& brick, const Box& cell, const Occupied<T>& occupied) {
+  if (brick.y_stride == 0) return std::uint16_t(cell.voxel_count() * occupied(*brick.first));
+  std::uint16_t sum = 0;
+  for (std::int32_t z = cell.begin.z; z < cell.end.z; ++z) {
+    for (std::int32_t y = cell.begin.y; y < cell.end.y; ++y) {
+      sum = std::uint16_t(sum + CountRow(brick.Row(y, z) + (cell.begin.x - brick.begin.x), cell.size().x, occupied));
+    }
+  }
+  return sum;
+}
+
+template <class T>
+void Count(const VoxelBricks& voxels, const ClassificationTable& table, OccupancyGrid& grid) {
+  const Occupied<T> occupied(table);
+  const Index3 cells = OccupancyCells(grid.size);
+  constexpr std::int32_t kCellsOfBrick = kBrick / kOccupancyCell;
+  tbb::parallel_for(0, cells.y * cells.z, [&](std::int32_t row) {
+    Index3 cell = {0, row % cells.y, row / cells.y};
+    std::uint16_t* out = &grid.occupied[std::size_t(row) * std::size_t(cells.x)];
+    for (; cell.x < cells.x; ++cell.x) {
+      const Index3 brick = {cell.x / kCellsOfBrick, cell.y / kCellsOfBrick, cell.z / kCellsOfBrick};
+      out[cell.x] = CountCell(voxels.View<T>(brick), OccupancyCellBox(cell, grid.size), occupied);
+    }
+  });
+}
+
+}  // namespace
+
+OccupancyGrid CountOccupied(const VoxelBricks& voxels, const ClassificationTable& table) {
+  const Box& box = voxels.box();
+  CHECK(box.begin == Index3{} && !box.empty());
+  const Index3 cells = OccupancyCells(box.end);
+  OccupancyGrid grid{box.end, std::vector<std::uint16_t>(std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z))};
+  VisitScalarType(voxels.type(), [&](auto* type) { Count<std::remove_cvref_t<decltype(*type)>>(voxels, table, grid); });
+  return grid;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,59 @@
+#include "common/planning/assignment.h"
+
+#include <algorithm>
+#include <functional>
+#include <numeric>
+#include <queue>
+#include <tuple>
+#include <utility>
+
+namespace slabstream {
+
+const std::vector<AssignmentEntry>& Assignments() {
+  static const std::vector<AssignmentEntry> entries = {
+      {"cyclic", "box after box to worker after worker", AssignCyclic},
+      {"contiguous", "neighbouring boxes to one worker", AssignContiguous},
+      {"greedy", "the costliest box left to the worker with least to do", AssignGreedy},
+  };
+  return entries;
+}
+
+const AssignmentEntry* FindAssignment(std::string_view name) {
+  for (const AssignmentEntry& entry : Assignments()) {
+    if (entry.name == name) return &entry;
+  }
+  return nullptr;
+}
+
+std::vector<std::uint32_t> AssignCyclic(const AssignmentRequest& request) {
+  std::vector<std::uint32_t> slots(request.costs.size());
+  for (std::size_t box = 0; box < slots.size(); ++box) slots[box] = std::uint32_t(box % request.slots);
+  return slots;
+}
+
+std::vector<std::uint32_t> AssignContiguous(const AssignmentRequest& request) {
+  std::vector<std::uint32_t> slots(request.costs.size());
+  for (std::size_t box = 0; box < slots.size(); ++box) slots[box] = std::uint32_t(box * request.slots / slots.size());
+  return slots;
+}
+
+std::vector<std::uint32_t> AssignGreedy(const AssignmentRequest& request) {
+  std::vector<std::size_t> costliest_first(request.costs.size());
+  std::iota(costliest_first.begin(), costliest_first.end(), std::size_t{0});
+  std::stable_sort(costliest_first.begin(), costliest_first.end(),
+                   [&](std::size_t a, std::size_t b) { return request.costs[a] > request.costs[b]; });
+  // What slots have to do: time, boxes, number; least first. Boxes, so that those that cost nothing are spread, too.
+  using Load = std::tuple<double, std::uint32_t, std::uint32_t>;
+  std::priority_queue<Load, std::vector<Load>, std::greater<>> loads;
+  for (std::uint32_t slot = 0; slot < request.slots; ++slot) loads.push({0, 0, slot});
+  std::vector<std::uint32_t> slots(request.costs.size());
+  for (const std::size_t box : costliest_first) {
+    const auto [time, boxes, slot] = loads.top();
+    loads.pop();
+    slots[box] = slot;
+    loads.push({time + request.costs[box], boxes + 1, slot});
+  }
+  return slots;
+}
+
+}  // namespace slabstream

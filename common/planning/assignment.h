@@ -1,0 +1,34 @@
+// Assignments: which slot owns which box. Each is one line in Assignments(). Where boxes are is another question (Decompositions()).
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <vector>
+
+namespace slabstream {
+
+struct AssignmentRequest {
+  std::span<const double> costs;  // predicted, by box; >= 0, in any unit
+  std::uint32_t slots = 1;        // >= 1
+};
+
+struct AssignmentEntry {
+  std::string_view name;                                           // what --assignment takes
+  std::string_view purpose;                                        // one line for --help
+  std::vector<std::uint32_t> (*assign)(const AssignmentRequest&);  // by box: its slot, in [0, slots)
+};
+
+// The only list.
+const std::vector<AssignmentEntry>& Assignments();
+const AssignmentEntry* FindAssignment(std::string_view name);  // null: no such name
+
+// Box i belongs to slot i mod slots.
+std::vector<std::uint32_t> AssignCyclic(const AssignmentRequest& request);
+// Boxes that follow one another belong to one slot; numbers differ by at most one.
+std::vector<std::uint32_t> AssignContiguous(const AssignmentRequest& request);
+// The costliest box that is left goes to the slot that has least to do (longest processing time first: Graham, "Bounds on multiprocessing
+// timing anomalies", 1969: at most 4/3 of the best there is). Equal ones in the order of boxes and slots.
+std::vector<std::uint32_t> AssignGreedy(const AssignmentRequest& request);
+
+}  // namespace slabstream

@@ -1,0 +1,103 @@
+#include "common/planning/balance.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "common/base/check.h"
+#include "common/view/sheet_grid.h"
+
+namespace slabstream {
+namespace {
+
+std::vector<double> SlotSeconds(const Layout& layout, std::uint32_t slots, std::span<const double> seconds) {
+  CHECK_EQ(seconds.size(), layout.owners.size());
+  std::vector<double> sums(slots);
+  for (std::size_t box = 0; box < seconds.size(); ++box) {
+    if (layout.owners[box] != kNoSlot) sums[layout.owners[box]] += seconds[box];
+  }
+  return sums;
+}
+
+}  // namespace
+
+std::vector<double> PredictedSeconds(const Layout& layout, const WorkField& cost) {
+  std::vector<double> seconds(layout.owners.size());
+  for (std::size_t box = 0; box < seconds.size(); ++box) {
+    if (layout.owners[box] != kNoSlot) seconds[box] = cost.Sum(layout.partition.boxes()[box]);
+  }
+  return seconds;
+}
+
+double FrameSeconds(const Layout& layout, std::uint32_t slots, std::span<const double> seconds) {
+  const std::vector<double> sums = SlotSeconds(layout, slots, seconds);
+  return *std::max_element(sums.begin(), sums.end());
+}
+
+std::int64_t MovedVoxels(const Layout& from, const Layout& to) {
+  std::set<std::pair<std::uint32_t, Box>> had;
+  for (std::size_t box = 0; box < from.owners.size(); ++box) had.insert({from.owners[box], from.partition.boxes()[box]});
+  std::int64_t moved = 0;
+  for (std::size_t box = 0; box < to.owners.size(); ++box) {
+    const Box& voxels = to.partition.boxes()[box];
+    if (to.owners[box] == kNoSlot || had.contains({to.owners[box], voxels})) continue;
+    moved += Grown(voxels, kHalo, to.partition.bounds()).voxel_count();
+  }
+  return moved;
+}
+
+Layout HandOver(const Layout& layout, std::uint32_t slots, std::span<const double> seconds) {
+  Layout changed = layout;
+  std::vector<double> sums = SlotSeconds(layout, slots, seconds);
+  for (std::size_t moves = 0; moves < seconds.size(); ++moves) {
+    const auto most = std::max_element(sums.begin(), sums.end()), least = std::min_element(sums.begin(), sums.end());
+    // The box that leaves the two of them most alike; it must take less than what is between them.
+    const double half = (*most - *least) / 2;
+    std::optional<std::size_t> best;
+    for (std::size_t box = 0; box < seconds.size(); ++box) {
+      if (changed.owners[box] != std::uint32_t(most - sums.begin()) || seconds[box] <= 0 || seconds[box] >= 2 * half) continue;
+      if (!best || std::abs(seconds[box] - half) < std::abs(seconds[*best] - half)) best = box;
+    }
+    if (!best) break;
+    changed.owners[*best] = std::uint32_t(least - sums.begin());
+    *most -= seconds[*best];
+    *least += seconds[*best];
+  }
+  return changed;
+}
+
+std::optional<Layout> Rebalance(const Layout& now, std::span<const double> seconds, const LayoutRequest& request, int frames_seen,
+                                const BalanceTerms& terms) {
+  CHECK(request.known.cost != nullptr);
+  CHECK_GE(frames_seen, 1);
+  const double voxel_seconds = double(BytesPerSample(request.summary->description.type)) / terms.bytes_per_second;
+  const double least_gain = terms.least_gain * (1 + 1.0 / frames_seen);
+  std::optional<Layout> chosen;
+  double most_won = 0;
+  const auto weigh = [&](Layout candidate, double before, double after) {
+    const double won = terms.frames * (before - after) - double(MovedVoxels(now, candidate)) * voxel_seconds;
+    if (before - after <= least_gain * before || won <= most_won) return;
+    most_won = won;
+    chosen = std::move(candidate);
+  };
+
+  Layout handed_over = HandOver(now, request.slots, seconds);
+  const double after_hand_over = FrameSeconds(handed_over, request.slots, seconds);
+  weigh(std::move(handed_over), FrameSeconds(now, request.slots, seconds), after_hand_over);
+
+  Policy by_cost = *request.policy;
+  by_cost.split = "cost";
+  LayoutRequest anew = request;
+  anew.policy = &by_cost;
+  Layout cut_anew = MakeLayout(anew);
+  const auto predicted = [&](const Layout& layout) {
+    return FrameSeconds(layout, request.slots, PredictedSeconds(layout, *request.known.cost));
+  };
+  const double after_cut = predicted(cut_anew);
+  weigh(std::move(cut_anew), predicted(now), after_cut);
+  return chosen;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,65 @@
+// CostModel: what rendering a box takes, from how much there is to do in it. The paper's Eq. 20 and 25 (Yagel and Machiraju), stage by
+// stage, in the units that our pipelines count:
+//
+//   paper                             here, a box                                  why
+//   c_t N^3/p  transform              kOccupied, kSheetPixel                       empty voxels are not transformed
+//   c_o N^3/p  occupancy test         kBrickTest                                     bricks are tested, not voxels
+//   c_sh C N^3/p  shade (splatting)   kDrawn                                       only what reaches an open pixel is shaded
+//   c_sp C k^2 N^3/p  splat           kDrawn, kSheetPixel                          the filter is separable: beams, then columns
+//   c_cp N I^2/p  composite           kSheetPixel, kDrawn                          only segments that hold something
+//   c_z C N^3/p  Z-buffer             kBrickTest, kDrawn, kPixel                   faces towards the eye
+//   c_sh C I^2  shade (Z-buffer)      kPixel                                       deferred: pixels that show something
+//   c_co I^2 log p  combine           CombiningCosts (common/simulation)           a matter of the schedule, which is simulated
+// and kBox, what any box costs. Constants are seconds of one thread; common/simulation/cost_fit.h finds them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "common/image/local_image.h"
+#include "common/planning/frame_request.h"
+#include "common/stats/report.h"
+#include "common/view/camera.h"
+#include "common/volume/box.h"
+
+namespace slabstream {
+
+enum class WorkUnit : std::uint8_t {
+  kBox = 0,         // 1
+  kBrickTest = 1,   // 16^3 voxels of the box
+  kOccupied = 2,    // occupied voxel of the box (splatting)
+  kDrawn = 3,       // voxel that went through splat or Z-buffer
+  kSheetPixel = 4,  // slices along the traversal axis x pixels of the image's bounds
+  kPixel = 5,       // pixel that is not empty
+};
+inline constexpr int kWorkUnitCount = 6;
+std::string_view ToString(WorkUnit unit);  // "occupied voxel"
+
+using WorkUnits = std::array<double, kWorkUnitCount>;  // how many of each
+
+// Of one box under one view: what a renderer reported of it. `bounds`: of its image.
+WorkUnits CountWork(const Box& box, const Camera& camera, double occupied, double drawn, const PixelBounds& bounds, double pixels);
+
+struct StageCost {
+  Stage stage = Stage::kRender;
+  std::string_view symbol;      // of the paper
+  std::vector<WorkUnit> units;  // that it depends on
+  WorkUnits seconds{};          // of each of them; 0 for the others
+  double Predict(const WorkUnits& work) const;
+};
+
+struct CostModel {
+  std::vector<StageCost> splat, zbuffer;  // stages of a rendering
+
+  // As measured on one core of an AMD EPYC (Zen 5, AVX-512); docs/simulation.md says how.
+  CostModel();
+  const std::vector<StageCost>& stages(RendererKind renderer) const { return renderer == RendererKind::kSplat ? splat : zbuffer; }
+  double PredictRender(RendererKind renderer, const WorkUnits& work) const;  // all stages
+
+  std::int64_t slab_bytes_target = std::int64_t{256} << 20;  // voxels of one slab at most, where slices allow it
+};
+
+}  // namespace slabstream

@@ -1,0 +1,58 @@
+#include "common/planning/learnt_cost.h"
+
+#include <algorithm>
+
+#include "common/base/check.h"
+
+namespace slabstream {
+namespace {
+
+// Calls function(cell number, share of the cell that lies in `box`).
+template <class Function>
+void ForEachCell(const Index3& size, const Box& box, Function&& function) {
+  const Index3 cells = OccupancyCells(size);
+  const auto cell_of = [](std::int32_t voxel) { return voxel / kOccupancyCell; };
+  for (std::int32_t z = cell_of(box.begin.z); z <= cell_of(box.end.z - 1); ++z) {
+    for (std::int32_t y = cell_of(box.begin.y); y <= cell_of(box.end.y - 1); ++y) {
+      const std::size_t row = (std::size_t(z) * std::size_t(cells.y) + std::size_t(y)) * std::size_t(cells.x);
+      for (std::int32_t x = cell_of(box.begin.x); x <= cell_of(box.end.x - 1); ++x) {
+        const Box cell = OccupancyCellBox({x, y, z}, size);
+        function(row + std::size_t(x), double(Intersection(cell, box).voxel_count()) / double(cell.voxel_count()));
+      }
+    }
+  }
+}
+
+}  // namespace
+
+LearntCost::LearntCost(const OccupancyGrid& grid) : size_(grid.size), cost_(CellWork(grid)) {}
+
+void LearntCost::Learn(std::span<const BoxSeconds> boxes, double weight) {
+  CHECK(weight > 0 && weight <= 1) << weight;
+  const auto predicted = [this](const Box& box) {
+    double sum = 0;
+    ForEachCell(size_, box, [&](std::size_t cell, double share) { sum += share * cost_[cell]; });
+    return sum;
+  };
+  if (!any_) {
+    // From units of work to seconds.
+    double seconds = 0, work = 0;
+    for (const BoxSeconds& box : boxes) {
+      seconds += box.seconds;
+      work += predicted(box.box);
+    }
+    if (!(seconds > 0 && work > 0)) return;
+    for (double& cost : cost_) cost *= seconds / work;
+    any_ = true;
+  }
+  for (const BoxSeconds& box : boxes) {
+    const double expected = predicted(box.box);
+    if (!(expected > 0)) continue;  // all it has is beside it
+    const double excess = weight * (std::clamp(box.seconds / expected, kLeastFactor, kMostFactor) - 1);
+    ForEachCell(size_, box.box, [&](std::size_t cell, double share) { cost_[cell] *= 1 + share * excess; });
+  }
+}
+
+WorkField LearntCost::Field() const { return {size_, cost_}; }
+
+}  // namespace slabstream

@@ -1,0 +1,32 @@
+#include "common/planning/policy_names.h"
+
+#include <algorithm>
+
+namespace slabstream {
+
+const std::vector<NamedChoice>& WorkSplits() {
+  static const std::vector<NamedChoice> choices = {
+      {kAutomaticSplit, "what suits the decomposition"},
+      {"voxels", "equal voxels"},
+      {"occupied", "equal work, by what is visible under the transfer function"},
+      {"cost", "equal render time, as earlier frames took it; until there are any, occupied"},
+  };
+  return choices;
+}
+
+std::optional<WorkSplit> FindWorkSplit(std::string_view name) {
+  const std::vector<NamedChoice>& choices = WorkSplits();
+  const auto found = std::find_if(choices.begin() + 1, choices.end(), [name](const NamedChoice& choice) { return choice.name == name; });
+  if (found == choices.end()) return std::nullopt;
+  return WorkSplit(found - choices.begin() - 1);
+}
+
+const std::vector<NamedChoice>& BalanceModes() {
+  static const std::vector<NamedChoice> choices = {
+      {kStaticBalance, "boxes stay as they were made"},
+      {kDynamicBalance, "boxes are cut anew between frames where what is won pays for the voxels that move"},
+  };
+  return choices;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,118 @@
+#include "coordinator/layout_table.h"
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "common/planning/balance.h"
+#include "common/planning/policy_names.h"
+
+namespace slabstream {
+namespace {
+
+// Rendering of each box; what is done once a slab is no cost of the next frame.
+std::map<BoxId, double> SecondsOf(const Layout& layout, std::span<const RankReport> reports) {
+  std::map<BoxId, double> seconds;
+  for (const RankReport& report : reports) {
+    const auto stage = [&report](Stage s) { return report.stage_ns[std::size_t(s)]; };
+    // What travels with a picture tells of no box.
+    if (stage(Stage::kRender) <= 0 || report.box >= layout.owners.size() || layout.owners[report.box] == kNoSlot) continue;
+    seconds[report.box] = 1e-9 * double(std::max<std::int64_t>(stage(Stage::kRender) - stage(Stage::kPrepare), 0));
+  }
+  return seconds;
+}
+
+template <class List>
+void KeepFirst(List& list, std::size_t count) {
+  while (list.size() > count) list.pop_back();
+}
+
+}  // namespace
+
+LayoutTable::Learnt* LayoutTable::FindLearnt(DatasetId dataset, const TransferFunction& transfer, RendererKind renderer) {
+  const auto found = std::find_if(learnt_.begin(), learnt_.end(), [&](const Learnt& learnt) {
+    return learnt.dataset == dataset && learnt.transfer == transfer && learnt.renderer == renderer;
+  });
+  if (found == learnt_.end()) return nullptr;
+  learnt_.splice(learnt_.begin(), learnt_, found);
+  return &*found;
+}
+
+const Layout& LayoutTable::Find(const Request& request) {
+  const FrameRequest& frame = *request.frame;
+  Key key{request.dataset, *request.transfer, frame.renderer, frame.policy, request.slots};
+  key.policy.combine.clear();  // how images are combined moves no box
+
+  Learnt* learnt = nullptr;
+  if (request.occupied != nullptr) {
+    learnt = FindLearnt(key.dataset, key.transfer, key.renderer);
+    if (learnt == nullptr) {
+      learnt = &learnt_.emplace_front(Learnt{key.dataset, key.transfer, key.renderer, LearntCost(*request.occupied)});
+      KeepFirst(learnt_, kMaxLearnt);
+    }
+  }
+  const bool known = learnt != nullptr && learnt->cost.any();
+  LayoutRequest make{.summary = request.summary,
+                     .transfer = request.transfer,
+                     .policy = &frame.policy,
+                     .slots = request.slots,
+                     .slab_bytes_target = request.slab_bytes_target,
+                     .known = {.occupied = request.occupied.get()}};
+  std::optional<WorkField> cost;
+  const auto with_cost = [&]() -> const LayoutRequest& {
+    if (known && !cost) make.known.cost = &cost.emplace(learnt->cost.Field());
+    return make;
+  };
+
+  const auto found = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& entry) { return entry.key == key; });
+  if (found == entries_.end()) {
+    entries_.push_front({std::move(key), MakeLayout(with_cost()), known, 0, 0, {}});
+    KeepFirst(entries_, kMaxKept);
+    return entries_.front().layout;
+  }
+  entries_.splice(entries_.begin(), entries_, found);
+  Entry& entry = *found;
+  std::optional<Layout> better;
+  if (known && frame.policy.balance == kDynamicBalance) {
+    if (entry.frames_seen >= std::clamp(entry.changes, 1, kMostPatience))
+      better = Rebalance(entry.layout, entry.seconds, with_cost(), entry.frames_seen);
+  } else if (known && !entry.by_cost && FindWorkSplit(SplitOf(frame.policy)) == WorkSplit::kCost) {
+    better = MakeLayout(with_cost());
+    entry.by_cost = true;
+  }
+  if (better && !(*better == entry.layout)) {
+    entry.layout = *std::move(better);
+    ++entry.changes;
+    entry.frames_seen = 0;
+    entry.seconds.clear();
+  }
+  return entry.layout;
+}
+
+void LayoutTable::Learn(const FramePlan& plan, const Policy& policy, std::span<const RankReport> reports) {
+  Learnt* const learnt = FindLearnt(plan.setup.dataset, plan.setup.transfer, plan.setup.renderer);
+  if (learnt == nullptr) return;
+  const std::map<BoxId, double> seconds = SecondsOf(plan.layout, reports);
+  if (seconds.empty()) return;
+  Key key{plan.setup.dataset, plan.setup.transfer, plan.setup.renderer, policy, plan.slots};
+  key.policy.combine.clear();
+  const auto entry =
+      std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.key == key && e.layout == plan.layout; });
+  // The first frame of a layout tells most; of a layout that has been changed since, what an average one does.
+  double weight = kLeastWeight;
+  if (entry != entries_.end()) {
+    weight = std::max(weight, 1.0 / ++entry->frames_seen);
+    entry->seconds.resize(plan.layout.owners.size());
+  }
+  std::vector<BoxSeconds> boxes;
+  for (const auto& [box, time] : seconds) {
+    boxes.push_back({plan.layout.partition.boxes()[box], time});
+    if (entry == entries_.end()) continue;
+    double& known = entry->seconds[box];
+    known = known == 0 ? time : known + weight * (time - known);
+  }
+  learnt->cost.Learn(boxes, weight);
+}
+
+}  // namespace slabstream

@@ -1,0 +1,78 @@
+// LayoutTable: the layouts that frames are planned with, and what their render times teach.
+//
+// A layout is made once and stays: for the same volume, transfer function, renderer, policy and number of slots, whatever the view. Two
+// things change it. Where boxes are split by cost, it is made anew once when costs are first known. With dynamic balance it changes between
+// frames when Rebalance says so. Another number of slots (a worker has joined, a vacancy was given up) is another layout; what was learnt
+// holds for all of them.
+//
+// The last few layouts and costs are kept. Those that no frame has asked for longest go first.
+#pragma once
+
+#include <list>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "common/planning/frame_plan.h"
+#include "common/planning/learnt_cost.h"
+#include "common/stats/report.h"
+#include "common/volume/occupancy_grid.h"
+
+namespace slabstream {
+
+class LayoutTable {
+ public:
+  static constexpr std::size_t kMaxKept = 16;   // layouts
+  static constexpr std::size_t kMaxLearnt = 4;  // costs: as large as an OccupancyGrid each, four times over
+  static constexpr double kLeastWeight = 0.2;   // of a frame, however many there were before it: older ones fade by a fifth a frame
+
+  // Quick at first, then patient: before its n-th change a layout must have been measured for n - 1 frames, 1 at least and at most this
+  // many. So noise moves voxels seldom, and a view that moves is still followed.
+  static constexpr int kMostPatience = 8;
+
+  struct Request {
+    const FrameRequest* frame = nullptr;  // with names that there are (CheckNames)
+    DatasetId dataset = 0;
+    const VolumeSummary* summary = nullptr;
+    const TransferFunction* transfer = nullptr;     // of the frame, resolved
+    std::shared_ptr<const OccupancyGrid> occupied;  // null: the policy does not need it
+    std::uint32_t slots = 1;
+    std::int64_t slab_bytes_target = 0;
+  };
+  // What the frame should be planned with. Valid until the next call.
+  const Layout& Find(const Request& request);
+
+  // A finished frame of this request's dataset, transfer function and renderer. Nothing is learnt from frames that were planned without
+  // occupied voxels.
+  void Learn(const FramePlan& plan, const Policy& policy, std::span<const RankReport> reports);
+
+ private:
+  struct Key {
+    DatasetId dataset = 0;
+    TransferFunction transfer;
+    RendererKind renderer = RendererKind::kSplat;
+    Policy policy;
+    std::uint32_t slots = 1;
+    friend bool operator==(const Key&, const Key&) = default;
+  };
+  struct Entry {
+    Key key;
+    Layout layout;
+    bool by_cost = false;         // made when costs were known
+    int changes = 0;              // by dynamic balance
+    int frames_seen = 0;          // of this layout
+    std::vector<double> seconds;  // by box of it, over these frames, newer ones counting more; 0: not rendered yet
+  };
+  struct Learnt {
+    DatasetId dataset = 0;
+    TransferFunction transfer;
+    RendererKind renderer = RendererKind::kSplat;
+    LearntCost cost;
+  };
+  Learnt* FindLearnt(DatasetId dataset, const TransferFunction& transfer, RendererKind renderer);
+
+  std::list<Entry> entries_;  // asked for last first
+  std::list<Learnt> learnt_;  // likewise
+};
+
+}  // namespace slabstream
