@@ -9,6 +9,8 @@
 
 #include "common/base/check.h"
 #include "common/base/log.h"
+#include "common/image/coverage_map.h"
+#include "common/image/image_view.h"
 #include "common/wire/payload.h"
 #include "worker/render/finish_picture.h"
 
@@ -41,28 +43,69 @@ void AddStage(std::vector<RankReport>& reports, Stage stage, std::int64_t begin_
   if (report.spans.size() < kMaxSpans) report.spans.push_back({stage, begin_ns, end_ns});
 }
 
+// The pixels of `view` as runs: the payload, and their header in the message.
+Bytes EncodePixels(const ImageView& view, ColorCoding color, PartialImage& message) {
+  RunImage runs = EncodeRuns(view, color);
+  message.image = runs.header;
+  return Bytes(std::move(runs.payload));
+}
+
+PixelRange AllPixels(const PixelBounds& frame) { return {0, std::uint64_t(frame.pixel_count())}; }
+
 bool Covers(PixelRange pixels, const PixelBounds& bounds, std::int32_t frame_width) {
-  if (pixels == PixelRange{} || bounds.empty()) return true;
+  if (bounds.empty()) return true;
   const auto index = [&](std::int32_t x, std::int32_t y) { return std::uint64_t(y) * std::uint64_t(frame_width) + std::uint64_t(x); };
   return pixels.begin <= index(bounds.x_begin, bounds.y_begin) && index(bounds.x_end - 1, bounds.y_end - 1) < pixels.end;
 }
 
-// StartCombine with another image of this worker. `fresh`: `image` is none yet.
-void CombineImages(LocalImage& image, bool fresh, const std::shared_ptr<LocalImage>& other, const StartCombine& action) {
-  if (!Covers(action.pixels, other->bounds, action.frame_width)) {
-    const RunImage part = EncodeRuns(*other, action.pixels, action.frame_width);
-    if (fresh) {
-      image = DecodeRuns(part.header, part.payload);
-    } else {
-      CombineRuns(image, part.header, part.payload, action.side);
-    }
-  } else if (!fresh) {
-    Combine(image, *other, action.side);
-  } else if (other.use_count() == 1) {
+// What an image grows to: the whole frame, of which only what is written takes memory, unless it is very large.
+PixelBounds RoomFor(const PixelBounds& a, const PixelBounds& b, const PixelBounds& frame) {
+  constexpr std::int64_t kMostPixels = std::int64_t{1} << 22;
+  return frame.pixel_count() <= kMostPixels ? frame : Union(a, b);
+}
+
+// `view` has no pixels but those of `pixels`. `fresh`: `image` is none yet.
+void CombineView(LocalImage& image, bool fresh, const ImageView& view, const StartCombine& action, PixelRange pixels) {
+  if (fresh) {
+    image = CopyOf(view);
+    return;
+  }
+  if (action.replace) Erase(image, pixels, action.frame.width());
+  Combine(image, view, action.side, RoomFor(image.bounds, view.bounds, action.frame));
+}
+
+// With another image of this worker.
+void CombineImages(LocalImage& image, bool fresh, const std::shared_ptr<LocalImage>& other, const StartCombine& action, PixelRange pixels) {
+  const bool whole = Covers(pixels, other->bounds, action.frame.width());
+  if (fresh && whole && other.use_count() == 1) {
     image = std::move(*other);  // released already, and this task is the last that holds it: nobody misses it
   } else {
-    image = *other;
+    CombineView(image, fresh, whole ? ViewOf(*other) : ViewOf(*other, pixels, action.frame.width()), action, pixels);
   }
+}
+
+Status CombineIncoming(LocalImage& image, bool fresh, const StartCombine& action, PixelRange pixels) {
+  const RunImageHeader& header = action.incoming.header;
+  const Bytes& payload = action.incoming.payload;
+  if (!fresh && !action.replace && Covers(pixels, header.bounds, action.frame.width())) {
+    if (Status status = ValidateRuns(header, payload.span(), action.frame); !status.ok()) return status;
+    CombineRuns(image, header, payload.span(), action.side, RoomFor(image.bounds, header.bounds, action.frame));
+    return Status::Ok();
+  }
+  Result<LocalImage> read = ReadRuns(header, payload.span(), action.frame);
+  if (!read.ok()) return read.status();
+  CombineImages(image, fresh, std::make_shared<LocalImage>(*std::move(read)), action, pixels);
+  return Status::Ok();
+}
+
+Status CombineBorrowed(LocalImage& image, bool fresh, const StartCombine& action, PixelRange pixels, PeerMemory& memory) {
+  const IncomingImage& incoming = action.incoming;
+  const Result<BorrowedImage> borrowed =
+      memory.Borrow(*incoming.shared, incoming.header.format, incoming.payload, pixels, action.frame, MonotonicNow());
+  if (!borrowed.ok()) return borrowed.status();
+  CombineView(image, fresh, borrowed->view, action, pixels);
+  // Its owner took the frame for over while it was being read here: `image` may hold anything, and the group fails.
+  return borrowed->Intact() ? Status::Ok() : Status::DataLoss("a lent image was taken back while it was read");
 }
 
 }  // namespace
@@ -93,8 +136,13 @@ struct Executor::Slab {
   std::unique_ptr<SlabData> data;
 };
 
-Executor::Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec, int threads)
-    : outbox_(outbox), frame_codec_(frame_codec), threads_(threads), render_arena_(threads), finish_arena_(threads) {}
+Executor::Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec, int threads, RendererFactory make_renderer)
+    : outbox_(outbox),
+      frame_codec_(frame_codec),
+      make_renderer_(std::move(make_renderer)),
+      threads_(threads),
+      render_arena_(threads),
+      finish_arena_(threads) {}
 
 Executor::~Executor() {
   if (last_render_) *last_render_->cancelled = true;
@@ -151,11 +199,13 @@ RenderDone Executor::Render(const StartRender& action, Slab& slab, const std::at
       slab.unpacked = {};
     }
     std::unique_ptr<Renderer>& renderer = renderers_[action.setup->renderer];
-    if (renderer == nullptr) renderer = MakeRenderer(action.setup->renderer);
+    if (renderer == nullptr) renderer = make_renderer_(action.setup->renderer);
     const OcclusionMask& hidden = action.hidden == nullptr ? kNothingHidden : *action.hidden;
     Result<LocalImage> rendered = renderer->Render(*slab.data, action.placement.box, *action.setup, hidden, cancelled, report);
     if (!rendered.ok()) return rendered.status();
     image = std::move(*rendered);
+    report.image_bounds = image.bounds;
+    report.image_pixels = SamplePixels(image);
     return Status::Ok();
   });
   if (report.stage_ns[std::size_t(Stage::kRender)] == 0) {
@@ -177,35 +227,31 @@ std::shared_ptr<LocalImage> Executor::FindImage(ImageHandle image) {
   return found == images_.end() ? nullptr : found->second;
 }
 
-void Executor::Perform(StartCombine&& action, const PixelBounds& frame) {
+void Executor::Perform(StartCombine&& action) {
   std::shared_ptr<LocalImage> image = FindImage(action.image);
   const bool fresh = image == nullptr;
   if (fresh) image = images_.emplace(action.image, std::make_shared<LocalImage>()).first->second;
   std::shared_ptr<LocalImage> other = FindImage(action.other);
   CHECK(action.other == 0 || other != nullptr) << "image " << action.other << " to combine does not exist";
 
-  combine_thread_.Post([this, fresh, frame, image = std::move(image), other = std::move(other), combine = std::move(action)]() mutable {
+  combine_thread_.Post([this, fresh, image = std::move(image), other = std::move(other), combine = std::move(action)]() mutable {
     CombineDone done;
     done.key = combine.key;
     done.image = combine.image;
     done.span = {Stage::kCombine, NowNs(), 0};
     done.status = Guarded("combine", [&] {
+      const PixelRange pixels = combine.pixels == PixelRange{} ? AllPixels(combine.frame) : combine.pixels;
       if (other != nullptr) {
-        InFinishArena([&] { CombineImages(*image, fresh, other, combine); });
+        InFinishArena([&] { CombineImages(*image, fresh, other, combine, pixels); });
         return Status::Ok();
       }
-      if (fresh) {
-        Result<LocalImage> read = InFinishArena([&] { return ReadRuns(combine.header, combine.payload.span(), frame); });
-        if (!read.ok()) return read.status();
-        *image = std::move(*read);
-        return Status::Ok();
-      }
-      if (Status status = ValidateRuns(combine.header, combine.payload.span(), frame); !status.ok()) return status;
-      if (image->format != combine.header.format) {
+      if (!fresh && image->format != combine.incoming.header.format) {
         return Status::InvalidArgument("PartialImage.image.format is not that of the frame");
       }
-      CombineRuns(*image, combine.header, combine.payload.span(), combine.side);
-      return Status::Ok();
+      return InFinishArena([&] {
+        return combine.incoming.shared ? CombineBorrowed(*image, fresh, combine, pixels, peer_memory_)
+                                       : CombineIncoming(*image, fresh, combine, pixels);
+      });
     });
     done.span.end_ns = NowNs();
     outbox_.Post(WorkerEvent(std::move(done)));
@@ -220,6 +266,7 @@ void Executor::Perform(FindHidden&& action) {
     const Status status = Guarded("hidden tiles", [&] {
       const PixelBounds frame = FrameBounds(*find.setup);
       if (image->format != PixelFormat::kRgba) return Status::InvalidArgument("hidden tiles: an image with depth");  // a peer's mistake
+      FillRows(*image);
       found.hidden = FindHiddenTiles(*image, frame.width(), frame.height(), find.setup->termination, std::move(find.known));
       return Status::Ok();
     });
@@ -228,20 +275,37 @@ void Executor::Perform(FindHidden&& action) {
   });
 }
 
-void Executor::Perform(SendPartial&& action) {
+void Executor::Perform(SendPartial&& action, bool lend) {
   std::shared_ptr<LocalImage> image = FindImage(action.image);
   CHECK(image != nullptr) << "image " << action.image << " to send does not exist";
-  combine_thread_.Post([this, image = std::move(image), send = std::move(action)]() mutable {
+  combine_thread_.Post([this, lend, image = std::move(image), send = std::move(action)]() mutable {
     const Status status = Guarded("encode", [&] {
       const std::int64_t begin = NowNs();
-      RunImage runs = InFinishArena([&] { return EncodeRuns(*image, send.message.pixels, send.frame_width); });
-      send.message.image = runs.header;
+      const ImageView view = ViewOf(*image, send.message.pixels, send.frame.width());
+      std::optional<Bytes> payload;
+      if (lend) payload = lent_.Lend(*image, view, send.to, send.message);
+      if (!payload) payload = InFinishArena([&] { return EncodePixels(view, send.color, send.message); });
       AddStage(send.message.reports, Stage::kEncode, begin, NowNs());
-      if (!send.message.reports.empty()) send.message.reports.back().image_bytes += runs.payload.size();
-      outbox_.Post(OutgoingPartial{std::move(send.to), Encode(send.message), Bytes(std::move(runs.payload))});
+      if (!send.message.reports.empty()) send.message.reports.back().image_bytes += payload->size();
+      outbox_.Post(OutgoingPartial{std::move(send.to), Encode(send.message), *std::move(payload)});
       return Status::Ok();
     });
     if (!status.ok()) LogError("partial image not sent: " + status.message());  // the coordinator hands the frame out again when it stalls
+  });
+}
+
+void Executor::Resend(const ImageRefused& refused) {
+  std::shared_ptr<const LentImage> lent = lent_.Find(refused.key, refused.step, refused.pixels);
+  if (lent == nullptr) return;
+  combine_thread_.Post([this, lent = std::move(lent)] {
+    const Status status = Guarded("encode", [&] {
+      PartialImage message = lent->message;
+      message.shared.reset();
+      Bytes payload = InFinishArena([&] { return EncodePixels(lent->view, ColorCoding::kFloat32, message); });
+      outbox_.Post(OutgoingPartial{lent->to, Encode(message), std::move(payload)});
+      return Status::Ok();
+    });
+    if (!status.ok()) LogError("partial image not sent: " + status.message());
   });
 }
 
@@ -260,6 +324,7 @@ void Executor::Perform(SendFrame&& action) {
       std::int64_t resolved_ns = begin;
       RunImage runs = InFinishArena([&] {
         if (FrameIsPicture(*send.setup)) return EncodePicture(*image);
+        FillRows(*image);
         const LocalImage picture = FinishPicture(*image, *send.setup);
         resolved_ns = NowNs();
         return EncodePicture(picture);

@@ -21,6 +21,8 @@
 #include "common/base/task_thread.h"
 #include "common/image/local_image.h"
 #include "common/transport/mailbox.h"
+#include "worker/lent_images.h"
+#include "worker/peer_memory.h"
 #include "worker/render/pipeline.h"
 #include "worker/thread_share.h"
 #include "worker/worker_machine.h"
@@ -42,7 +44,7 @@ using ExecutorOutput = std::variant<WorkerEvent, OutgoingPartial, OutgoingFrame>
 class Executor {
  public:
   // `frame_codec` packs finished frames. `threads` render, at least 1. The outbox must outlive the executor.
-  Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec, int threads);
+  Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec, int threads, RendererFactory make_renderer = MakeRenderer);
   ~Executor();  // cancels the running render, drops what has not begun, joins
 
   void Perform(const OpenSlab& action);
@@ -50,12 +52,18 @@ class Executor {
   void Perform(const DropSlab& action);
   void Perform(StartRender&& action);
   void Perform(const CancelRender& action);
-  // `frame`: all pixels of the group's frame, for the check of the runs.
-  void Perform(StartCombine&& action, const PixelBounds& frame);
+  void Perform(StartCombine&& action);
   void Perform(FindHidden&& action);
-  void Perform(SendPartial&& action);
+  // `lend`: the receiver can read this process' memory, so that the pixels may stay where they are.
+  void Perform(SendPartial&& action, bool lend);
   void Perform(SendFrame&& action);
   void Perform(const ReleaseImage& action);
+
+  // What was lent and what is borrowed.
+  LentImages& lent() { return lent_; }
+  PeerMemory& peer_memory() { return peer_memory_; }
+  // Sends as runs what was lent, if it still is.
+  void Resend(const ImageRefused& refused);
 
  private:
   struct Slab;
@@ -73,7 +81,10 @@ class Executor {
   const Codec frame_codec_;
   std::map<SlabKey, std::shared_ptr<Slab>> slabs_;
   std::map<ImageHandle, std::shared_ptr<LocalImage>> images_;
+  LentImages lent_;
+  PeerMemory peer_memory_;
   std::optional<RunningRender> last_render_;
+  const RendererFactory make_renderer_;
   std::map<RendererKind, std::unique_ptr<Renderer>> renderers_;  // the render thread's
   const ThreadShare threads_;
   // One for each thread below that enters: in a common arena the last picture would wait for the next one's rendering.

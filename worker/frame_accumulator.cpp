@@ -70,7 +70,7 @@ void FrameAccumulator::StartGroup(GroupImage group, WorkerActions& actions) {
   if (group.pieces.empty() && image_ == 0) {  // a frame that begins with an empty group begins with an empty picture
     RunImageHeader nothing;
     nothing.format = FormatOf(setup_->renderer);
-    group.pieces.push_back({pixels_, {}, 0, nothing, {}});
+    group.pieces.push_back({pixels_, {}, 0, {.header = nothing}});
   }
   std::set<ImageHandle> used;
   for (ImagePiece& piece : group.pieces) {
@@ -79,12 +79,13 @@ void FrameAccumulator::StartGroup(GroupImage group, WorkerActions& actions) {
       continue;
     }
     if (image_ == 0) image_ = names_.Next();
-    StartCombine combine{group.key, image_, piece.image, piece.header, std::move(piece.payload), Side::kBack, {}, 0};
-    if (piece.image != 0 && piece.pixels != pixels_) {
-      combine.pixels = piece.pixels;
-      combine.frame_width = FrameBounds(*setup_).width();
-    }
-    actions.push_back(std::move(combine));
+    actions.push_back(StartCombine{.key = group.key,
+                                   .image = image_,
+                                   .other = piece.image,
+                                   .incoming = std::move(piece.incoming),
+                                   .side = Side::kBack,
+                                   .pixels = piece.pixels == pixels_ ? PixelRange{} : piece.pixels,
+                                   .frame = FrameBounds(*setup_)});
     ++combining_;
     if (piece.image != 0) used.insert(piece.image);
   }

@@ -56,6 +56,7 @@ void GroupRun::OnRendered(Rank rank, ImageHandle image, RankReport report, Worke
   const auto mine = ranks_.find(rank);
   CHECK(mine != ranks_.end() && !mine->second.rendered) << "rank " << rank;
   mine->second.rendered = true;
+  mine->second.own = image;
   mine->second.fragments.Insert({frame_, {rank, rank + 1}, image});
   mine->second.reports.push_back(std::move(report));
   Advance(actions);
@@ -65,9 +66,7 @@ void GroupRun::LeaveOut(Rank rank, RankReport report, WorkerActions& actions) {
   RunImageHeader nothing;
   nothing.format = FormatOf(assignment_.setup.renderer);
   const ImageHandle image = names_.Next();
-  actions.push_back(StartCombine{key(), image, 0, nothing, {}, Side::kBack, {}, 0});
-  combining_.emplace_back(image, rank);
-  ++ranks_.at(rank).combining;
+  Start({.image = image, .incoming = {.header = nothing}}, ranks_.at(rank), rank, actions);
   OnRendered(rank, image, std::move(report), actions);
 }
 
@@ -84,7 +83,7 @@ void GroupRun::OnPartial(const PartialImage& message, Bytes payload, WorkerActio
   if (!Mine(step.to) || Mine(step.from) || group.placements[step.from].worker != message.from_worker || !inside) return;
   Arrivals& arrivals = arrivals_[message.step];
   if (!Remember(arrivals.seen, message.pixels)) return;
-  arrivals.waiting.push_back({message.pixels, message.interval, 0, message.image, std::move(payload)});
+  arrivals.waiting.push_back({message.pixels, message.interval, 0, {message.image, message.shared, std::move(payload)}});
   Append(arrivals.reports, message.reports);
   Advance(actions);
 }
@@ -199,7 +198,7 @@ void GroupRun::MoveLocally(RankState& from, Rank rank, RankState& to, std::uint3
   std::erase(from.open_steps, index);
   std::erase(to.open_steps, index);
   const std::vector<Fragment> parts = from.fragments.Take(step.pixels);
-  for (const Fragment& part : parts) Merge(to, step.to, {part.pixels, part.ranks, part.image, {}, {}}, actions);
+  for (const Fragment& part : parts) Merge(to, step.to, {part.pixels, part.ranks, part.image, {}}, actions);
   ReleaseUnused(parts, actions);
   Append(to.reports, TakeReports(from, rank));
 }
@@ -218,14 +217,13 @@ bool GroupRun::Receive(RankState& to, Rank rank, std::uint32_t index, WorkerActi
 
 void GroupRun::Merge(RankState& to, Rank rank, ImagePiece piece, WorkerActions& actions) {
   const std::vector<Fragment> held = to.fragments.Within(piece.pixels);
-  // The usual case: runs go straight into the one image that is there.
+  // The usual case: it goes straight into the one image that is there.
   if (piece.image == 0 && held.size() == 1 && held[0].pixels == piece.pixels) return Combine(to, rank, held[0], piece, actions);
-  const bool from_runs = piece.image == 0;
-  if (from_runs) {
+  if (held.empty() && ComesHome(to, rank, piece)) return TakeHome(to, rank, std::move(piece), actions);
+  const bool incoming = piece.image == 0;
+  if (incoming) {
     piece.image = names_.Next();
-    actions.push_back(StartCombine{key(), piece.image, 0, piece.header, std::move(piece.payload), Side::kBack, {}, 0});
-    combining_.emplace_back(piece.image, rank);
-    ++to.combining;
+    Start({.image = piece.image, .incoming = std::move(piece.incoming), .pixels = piece.pixels}, to, rank, actions);
   }
   std::uint64_t gap_begin = piece.pixels.begin;
   const auto take_gap = [&](std::uint64_t end) {
@@ -237,7 +235,19 @@ void GroupRun::Merge(RankState& to, Rank rank, ImagePiece piece, WorkerActions& 
     Combine(to, rank, part, piece, actions);
   }
   take_gap(piece.pixels.end);
-  if (from_runs) ReleaseUnused({{piece.pixels, piece.ranks, piece.image}}, actions);
+  if (incoming) ReleaseUnused({{piece.pixels, piece.ranks, piece.image}}, actions);
+}
+
+// True if the rank passed these pixels on before and gets them back now, combined with others': then whoever read them has done so, and
+// their place in the rank's own image is free.
+bool GroupRun::ComesHome(const RankState& to, Rank rank, const ImagePiece& piece) const {
+  return to.own != 0 && piece.image != to.own && piece.ranks.begin <= rank && rank < piece.ranks.end && to.fragments.Uses(to.own);
+}
+
+void GroupRun::TakeHome(RankState& to, Rank rank, ImagePiece piece, WorkerActions& actions) {
+  Start({.image = to.own, .other = piece.image, .incoming = std::move(piece.incoming), .replace = true, .pixels = piece.pixels}, to, rank,
+        actions);
+  to.fragments.Insert({piece.pixels, piece.ranks, to.own});
 }
 
 void GroupRun::Combine(RankState& to, Rank rank, const Fragment& held, const ImagePiece& piece, WorkerActions& actions) {
@@ -245,17 +255,23 @@ void GroupRun::Combine(RankState& to, Rank rank, const Fragment& held, const Ima
   if (!in_front && held.ranks.end != piece.ranks.begin) {
     return Fail(fmt::format("images of ranks {} and {} are to be combined, which are not adjacent", Text(piece.ranks), Text(held.ranks)));
   }
-  StartCombine combine{key(), held.image, piece.image, piece.header, piece.payload, in_front ? Side::kFront : Side::kBack, {}, 0};
-  if (piece.image != 0 && held.pixels != frame_) {
-    combine.pixels = held.pixels;
-    combine.frame_width = FrameBounds(assignment_.setup).width();
-  }
-  actions.push_back(std::move(combine));
-  combining_.emplace_back(held.image, rank);
-  ++to.combining;
+  Start({.image = held.image,
+         .other = piece.image,
+         .incoming = piece.incoming,
+         .side = in_front ? Side::kFront : Side::kBack,
+         .pixels = held.pixels == frame_ ? PixelRange{} : held.pixels},
+        to, rank, actions);
   to.fragments.Take(held.pixels);
   to.fragments.Insert(
       {held.pixels, {std::min(piece.ranks.begin, held.ranks.begin), std::max(piece.ranks.end, held.ranks.end)}, held.image});
+}
+
+void GroupRun::Start(StartCombine combine, RankState& to, Rank rank, WorkerActions& actions) {
+  combine.key = key();
+  combine.frame = FrameBounds(assignment_.setup);
+  combining_.emplace_back(combine.image, rank);
+  ++to.combining;
+  actions.push_back(std::move(combine));
 }
 
 void GroupRun::FinishRoot(WorkerActions& actions) {
@@ -278,7 +294,7 @@ void GroupRun::FinishRoot(WorkerActions& actions) {
     ReleaseUnused(parts, actions);
     return;
   }
-  for (const Fragment& part : parts) group_pieces_.waiting.push_back({part.pixels, part.ranks, part.image, {}, {}});
+  for (const Fragment& part : parts) group_pieces_.waiting.push_back({part.pixels, part.ranks, part.image, {}});
   Append(group_pieces_.reports, TakeReports(rank, root));
   group_pieces_.merged = held;
 }
@@ -289,7 +305,7 @@ void GroupRun::CollectGroupPiece(const PartialImage& message, Bytes payload) {
   const bool whole = message.interval == RankInterval{0, group.schedule.ranks};
   if (assignment_.display != self_ || !from_root || !whole || message.pixels.end > frame_.end) return;
   if (group_image_taken_ || !Remember(group_pieces_.seen, message.pixels)) return;
-  group_pieces_.waiting.push_back({message.pixels, message.interval, 0, message.image, std::move(payload)});
+  group_pieces_.waiting.push_back({message.pixels, message.interval, 0, {message.image, message.shared, std::move(payload)}});
   group_pieces_.merged += PixelCount(message.pixels);
   Append(group_pieces_.reports, message.reports);
 }
@@ -306,7 +322,7 @@ void GroupRun::SendFragments(const std::vector<Fragment>& fragments, std::uint32
     message.step = step;
     message.interval = fragment.ranks;
     message.pixels = fragment.pixels;
-    actions.push_back(SendPartial{*peer, std::move(message), fragment.image, FrameBounds(assignment_.setup).width()});
+    actions.push_back(SendPartial{*peer, std::move(message), fragment.image, FrameBounds(assignment_.setup), assignment_.group.color});
   }
   if (!fragments.empty()) std::get<SendPartial>(actions.back()).message.reports = std::move(reports);
 }

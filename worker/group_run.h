@@ -19,13 +19,12 @@
 
 namespace slabstream {
 
-// Part of an image: pixels of `image`, or if that is 0 the runs.
+// Part of an image: pixels of `image`, or if that is 0 what came from another worker.
 struct ImagePiece {
   PixelRange pixels;
   RankInterval ranks;
   ImageHandle image = 0;
-  RunImageHeader header;
-  Bytes payload;
+  IncomingImage incoming;
 };
 
 // All pixels of a group (no pieces: the group is empty), on the display worker. Who takes it owns the images.
@@ -58,7 +57,8 @@ class GroupRun {
  private:
   struct RankState {
     bool rendered = false;
-    int combining = 0;  // StartCombine without CombineDone
+    ImageHandle own = 0;  // its picture, once rendered
+    int combining = 0;    // StartCombine without CombineDone
     FragmentSet fragments;
     std::vector<std::uint32_t> open_steps;  // not taken yet, in order
     std::vector<RankReport> reports;        // on their way with this rank
@@ -79,6 +79,10 @@ class GroupRun {
   bool Receive(RankState& to, Rank rank, std::uint32_t step, WorkerActions& actions);
   void Merge(RankState& to, Rank rank, ImagePiece piece, WorkerActions& actions);
   void Combine(RankState& to, Rank rank, const Fragment& held, const ImagePiece& piece, WorkerActions& actions);
+  bool ComesHome(const RankState& to, Rank rank, const ImagePiece& piece) const;
+  void TakeHome(RankState& to, Rank rank, ImagePiece piece, WorkerActions& actions);
+  // Fills in key and frame.
+  void Start(StartCombine combine, RankState& to, Rank rank, WorkerActions& actions);
   void FinishRoot(WorkerActions& actions);
   void CollectGroupPiece(const PartialImage& message, Bytes payload);
   void SendFragments(const std::vector<Fragment>& fragments, std::uint32_t step, WorkerId to, std::vector<RankReport> reports,

@@ -36,6 +36,7 @@ int Run(int argc, char** argv) {
   app.add_option("--cache-mib", cache_mib, "MiB of voxels kept between frames (default: no limit)")
       ->check(CLI::Range(std::uint64_t{1}, kMaxCacheMib));
   app.add_flag("--compress", compress, "pack pictures with zstd: pays on links slower than about 100 MB/s, not within a machine");
+  app.add_flag("!--no-shared-memory", options.share_memory, "send images to workers of this host in frames as well");
   app.add_option("--log-level", log_level, "debug, info, warning, error or off")->check(CLI::IsMember(slabstream::LogLevelNames()));
   try {
     app.parse(argc, argv);

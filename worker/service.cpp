@@ -8,12 +8,16 @@
 #include <map>
 #include <optional>
 #include <random>
+#include <set>
+#include <string>
 #include <thread>
 #include <utility>
 #include <variant>
 #include <vector>
 
 #include "common/base/log.h"
+#include "common/base/pooled_vector.h"
+#include "common/base/shared_arena.h"
 #include "common/transport/endpoint.h"
 #include "common/transport/mailbox.h"
 #include "worker/executor.h"
@@ -24,6 +28,7 @@ namespace {
 
 constexpr Duration kLongestWait = std::chrono::seconds(1);  // between looks at what is idle
 constexpr Duration kStopGrace = std::chrono::seconds(5);    // for the machine to leave in order
+constexpr std::size_t kMostRefused = 4096;                  // images that wait for an endpoint
 constexpr int kReceiveBatch = 64;                           // messages of one socket before the others have their turn
 
 Incarnation RandomIncarnation() {
@@ -48,13 +53,15 @@ std::string HostName() {
 }  // namespace
 
 struct WorkerService::Impl {
-  Impl(Context& service_context, const WorkerConfig& config, Codec frame_codec, Socket control_socket, Socket images_socket)
+  Impl(Context& service_context, const WorkerConfig& config, Codec frame_codec, RendererFactory make_renderer, Socket control_socket,
+       Socket images_socket)
       : context(service_context),
         machine(config),
         control(std::move(control_socket)),
         images(std::move(images_socket)),
         peers(service_context),
-        executor(std::in_place, outbox, frame_codec, int(config.threads)) {}
+        scope(config.memory_scope),
+        executor(std::in_place, outbox, frame_codec, int(config.threads), std::move(make_renderer)) {}
 
   void Run();
   void Receive(Socket& socket, const char* plane);
@@ -62,12 +69,14 @@ struct WorkerService::Impl {
   void HandleOutput(ExecutorOutput& output);
   void SetRegistered();
   void Remember(const AnyMessage& message);
+  bool OpenShared(const AnyMessage& message);
+  void Refuse(const PartialImage& partial);
 
   // One for each kind of action.
   void Perform(SendControl& action) { Send(control, action.message); }
   void Perform(SendChunkRequest& action);
   void Perform(ConnectSlabs& action);
-  void Perform(StartCombine& action);
+  void Perform(SendPartial& action);
   void Perform(StopProcess&) { stop_now = true; }
   template <class Action>
   void Perform(Action& action) {
@@ -82,8 +91,11 @@ struct WorkerService::Impl {
   std::string slabs_endpoint;
   PeerSockets peers;
   Epoch epoch = 0;
-  std::map<FrameId, PixelBounds> frames;  // pixels of the frames at hand, to check partial images against
-  std::atomic<bool> registered = false;   // ever, or stopped
+  const std::uint64_t scope;                  // of this process' memory; 0: it is not shared
+  std::map<WorkerId, std::string> endpoints;  // of the epoch's other workers' image planes
+  std::set<WorkerId> takes_frames_only;       // though they have the same scope
+  std::vector<PartialImage> to_refuse;        // by workers whose endpoint is not known yet
+  std::atomic<bool> registered = false;       // ever, or stopped
   std::atomic<bool> stop_requested = false;
   std::atomic<bool> stopped = false;
   bool stop_now = false;           // the machine said so
@@ -110,6 +122,7 @@ void WorkerService::Impl::Run() {
       HandleEvent(StopRequested{});
     }
     peers.CloseIdle(now);
+    executor->peer_memory().CloseIdle(now);
   }
   executor.reset();
   SetRegistered();
@@ -130,18 +143,60 @@ void WorkerService::Impl::Receive(Socket& socket, const char* plane) {
       continue;
     }
     Remember(*message);
-    HandleEvent(MessageReceived{std::move(*message), std::move(payload)});
+    if (OpenShared(*message)) HandleEvent(MessageReceived{std::move(*message), std::move(payload)});
   }
 }
 
-// Frame ids begin anew with each epoch.
+// What concerns memory that is shared between workers: the machine needs to know nothing of it.
 void WorkerService::Impl::Remember(const AnyMessage& message) {
   if (const auto* welcome = std::get_if<Welcome>(&message)) {
-    if (std::exchange(epoch, welcome->epoch) != welcome->epoch) frames.clear();
+    if (std::exchange(epoch, welcome->epoch) == welcome->epoch) return;
+    executor->lent().Forget([](const GroupKey&) { return true; });
+    takes_frames_only.clear();
+    endpoints.clear();
+  } else if (const auto* ping = std::get_if<Ping>(&message); ping != nullptr && ping->epoch == epoch) {
+    executor->lent().Forget([&](const GroupKey& key) {
+      return key.frame < ping->finished_before || std::ranges::find(ping->cancelled, key.frame) != ping->cancelled.end();
+    });
   } else if (const auto* assignment = std::get_if<GroupAssignment>(&message); assignment != nullptr && assignment->epoch == epoch) {
-    frames.erase(frames.begin(), frames.lower_bound(assignment->finished_before));
-    frames[assignment->key.frame] = FrameBounds(assignment->setup);
+    const GroupKey& now = assignment->key;
+    executor->lent().Forget([&](const GroupKey& key) {
+      const bool read = key.frame == now.frame && (key.attempt < now.attempt || key.group < assignment->groups_done);
+      return read || key.frame < assignment->finished_before;
+    });
+    for (const Peer& peer : assignment->peers) endpoints[peer.worker] = peer.images_endpoint;
+    for (const PartialImage& refused : std::exchange(to_refuse, {})) Refuse(refused);
   }
+}
+
+// True if the message is for the machine: a shared image only if it can be read here.
+bool WorkerService::Impl::OpenShared(const AnyMessage& message) {
+  if (const auto* refused = std::get_if<ImageRefused>(&message)) {
+    if (refused->epoch == epoch && takes_frames_only.insert(refused->from_worker).second) {
+      LogWarning("worker " + std::to_string(refused->from_worker) + " cannot read this worker's memory: its images travel in frames");
+    }
+    if (refused->epoch == epoch) executor->Resend(*refused);
+    return false;
+  }
+  const auto* partial = std::get_if<PartialImage>(&message);
+  if (partial == nullptr || !partial->shared) return true;
+  const Status opened = executor->peer_memory().Open(partial->shared->arena, MonotonicNow());
+  if (opened.ok()) return true;
+  if (partial->epoch != epoch) return false;
+  LogInfo("an image of worker " + std::to_string(partial->from_worker) + " is asked for in frames: " + opened.message());
+  Refuse(*partial);
+  return false;
+}
+
+void WorkerService::Impl::Refuse(const PartialImage& partial) {
+  const auto sender = endpoints.find(partial.from_worker);
+  if (sender == endpoints.end()) {  // the group's assignment, which says where it is, has not come yet
+    if (to_refuse.size() < kMostRefused) to_refuse.push_back(partial);
+    return;
+  }
+  const ImageRefused refused = {partial.epoch, machine.worker(), partial.key, partial.step, partial.pixels};
+  const Status sent = peers.Send(sender->second, Encode(refused), {}, MonotonicNow());
+  if (!sent.ok()) LogWarning("worker " + std::to_string(partial.from_worker) + " is not reached: " + sent.message());
 }
 
 void WorkerService::Impl::HandleEvent(const WorkerEvent& event) {
@@ -194,9 +249,9 @@ void WorkerService::Impl::Perform(ConnectSlabs& action) {
   slabs_endpoint = action.endpoint;
 }
 
-void WorkerService::Impl::Perform(StartCombine& action) {
-  const auto frame = frames.find(action.key.frame);
-  executor->Perform(std::move(action), frame == frames.end() ? PixelBounds{} : frame->second);
+void WorkerService::Impl::Perform(SendPartial& action) {
+  const bool lend = scope != 0 && action.to.memory_scope == scope && takes_frames_only.count(action.to.worker) == 0;
+  executor->Perform(std::move(action), lend);
 }
 
 Result<std::unique_ptr<WorkerService>> WorkerService::Start(Context& context, WorkerOptions options) {
@@ -222,7 +277,15 @@ Result<std::unique_ptr<WorkerService>> WorkerService::Start(Context& context, Wo
   config.pid = static_cast<std::uint32_t>(::getpid());
   config.host = HostName();
   config.images_endpoint = std::move(*images_endpoint);
-  auto impl = std::make_unique<Impl>(context, config, options.codec, std::move(*control), std::move(*images));
+  if (options.share_memory) {
+    if (const Status shared = ShareBlocks(); shared.ok()) {
+      config.memory_scope = SharedMemoryScope();
+    } else {
+      LogWarning(shared.message() + ": images travel in frames");
+    }
+  }
+  auto impl =
+      std::make_unique<Impl>(context, config, options.codec, std::move(options.make_renderer), std::move(*control), std::move(*images));
   impl->thread = std::jthread([raw = impl.get()] { raw->Run(); });
   return std::unique_ptr<WorkerService>(new WorkerService(std::move(impl)));
 }

@@ -56,6 +56,7 @@ struct WorkerMachine::State {
   void On(const WorkerTrouble&, const Bytes&) {}
   void On(const Leave&, const Bytes&) {}
   void On(const ChunkRequest&, const Bytes&) {}
+  void On(const ImageRefused&, const Bytes&) {}  // the service's
   void On(const SubmitFrame&, const Bytes&) {}
   void On(const FrameProgress&, const Bytes&) {}
   void On(const FrameReply&, const Bytes&) {}
@@ -167,8 +168,8 @@ void WorkerMachine::State::End() {
 void WorkerMachine::State::KeepTime() {
   if (worker != 0 && now >= last_heard + timeout) Unregister();
   if (worker == 0 && now >= next_register) {
-    actions.push_back(
-        SendControl{Register{incarnation, config.pid, config.host, config.images_endpoint, config.threads, config.cache_bytes}});
+    actions.push_back(SendControl{
+        Register{incarnation, config.pid, config.host, config.images_endpoint, config.threads, config.cache_bytes, config.memory_scope}});
     next_register = now + config.register_interval;
   }
   if (worker != 0 && now >= next_heartbeat) {

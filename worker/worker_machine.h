@@ -26,6 +26,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -54,6 +55,7 @@ struct WorkerConfig {
   std::uint32_t pid = 0;
   std::string host;
   std::string images_endpoint;
+  std::uint64_t memory_scope = 0;                        // as in Register
   std::uint32_t threads = 1;                             // that render: for the coordinator to know
   std::uint64_t cache_bytes = std::uint64_t{1} << 40;    // slabs not needed by a current group are dropped, oldest first, above this
   std::uint64_t credit_bytes = std::uint64_t{16} << 20;  // chunk bytes requested and not yet stored
@@ -61,6 +63,13 @@ struct WorkerConfig {
   Duration chunk_timeout = std::chrono::seconds(3);          // then a chunk is asked for again
   int chunk_attempts = 10;                                   // then WorkerTrouble
   std::uint64_t early_image_bytes = std::uint64_t{1} << 30;  // payloads of PartialImages kept before their assignment; then WorkerTrouble
+};
+
+// The pixels of a PartialImage: runs, or another process' memory.
+struct IncomingImage {
+  RunImageHeader header;
+  std::optional<SharedImage> shared;
+  Bytes payload;
 };
 
 // ---- events
@@ -133,18 +142,18 @@ struct StartRender {
 struct CancelRender {
   GroupKey key;
 };  // the running one, if it is of this group; RenderDone still comes
-// Combines `other`, or if that is 0 the runs, into `image`. If `image` names no image yet, it becomes a copy of the other one. Of `other`
-// only the pixels of `pixels` count, all if that range is empty: an image may hold pixels that have been passed on. `other` stays as it is
-// and needs its own release. -> CombineDone
+// Combines `other`, or if that is 0 the incoming image, into `image`. If `image` names no image yet, it becomes a copy of the other one. Of
+// the other one only the pixels of `pixels` count: an image may hold pixels that have been passed on. `other` stays as it is and needs its
+// own release. -> CombineDone
 struct StartCombine {
   GroupKey key;
   ImageHandle image = 0;
   ImageHandle other = 0;
-  RunImageHeader header;
-  Bytes payload;
+  IncomingImage incoming;
   Side side = Side::kBack;
-  PixelRange pixels;  // of the frame; with `other` only
-  std::int32_t frame_width = 0;
+  bool replace = false;  // instead: `pixels` of `image`, which have been passed on, become those of the other one
+  PixelRange pixels;     // of the frame; empty: all
+  PixelBounds frame;
 };
 // Finds the hidden tiles of `image`, a frame that groups up to `key` have been accumulated into. `known`: the last ones. -> HiddenFound
 struct FindHidden {
@@ -153,13 +162,14 @@ struct FindHidden {
   std::shared_ptr<const FrameSetup> setup;
   OcclusionMask known;
 };
-// Encodes message.pixels of `image`, fills message.image and the byte count and encode time of the last report (if there is one), sends. No
+// Sends message.pixels of `image`: fills in how they travel, and the byte count and encode time of the last report (if there is one). No
 // answer.
 struct SendPartial {
   Peer to;
   PartialImage message;
   ImageHandle image = 0;
-  std::int32_t frame_width = 0;
+  PixelBounds frame;
+  ColorCoding color = ColorCoding::kFloat32;  // if they travel as runs
 };
 // Makes the picture of `image`, a frame, encodes it, fills message.runs and a report, sends to the coordinator. No answer.
 struct SendFrame {

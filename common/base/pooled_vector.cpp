@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <bit>
+#include <memory>
 #include <mutex>
+#include <unordered_map>
 
 #include "common/base/aligned_buffer.h"
 
@@ -16,11 +18,11 @@ constexpr std::size_t kMostKept = 0;  // so that the use of a block that was giv
 constexpr std::size_t kMostKept = std::size_t{96} << 20;  // bytes in all
 #endif
 
-void* Allocate(std::size_t bytes) { return ::operator new(bytes, std::align_val_t(kBufferAlignment)); }
-void Free(void* block) { ::operator delete(block, std::align_val_t(kBufferAlignment)); }
-
 // Images of neighbouring views differ in size: one's block is to fit the other. What is never written of a block takes no memory.
 std::size_t RoundedUp(std::size_t bytes) { return std::bit_ceil(bytes); }
+
+void* AllocatePrivate(std::size_t bytes) { return ::operator new(bytes, std::align_val_t(kBufferAlignment)); }
+void FreePrivate(void* block) { ::operator delete(block, std::align_val_t(kBufferAlignment)); }
 
 class Pool {
  public:
@@ -34,20 +36,53 @@ class Pool {
         bytes_ -= bytes;
         return data;
       }
+      if (arena_ != nullptr) {
+        if (void* const data = arena_->Take(bytes)) return data;
+      }
     }
-    return Allocate(bytes);
+    return AllocatePrivate(bytes);
   }
 
   void GiveBack(void* data, std::size_t bytes) {
-    if (bytes > kMostKept) return Free(data);
     const std::lock_guard lock(mutex_);
-    while (bytes_ + bytes > kMostKept) {  // the ones that were not wanted for longest
-      Free(blocks_.front().data);
-      bytes_ -= blocks_.front().bytes;
-      blocks_.erase(blocks_.begin());
+    const auto pinned = pins_.find(data);
+    if (pinned != pins_.end()) {
+      pinned->second.given_back = bytes;
+    } else {
+      Keep(data, bytes);
     }
-    blocks_.push_back({data, bytes});
-    bytes_ += bytes;
+  }
+
+  Status Share() {
+    const std::lock_guard lock(mutex_);
+    if (arena_ != nullptr) return Status::Ok();
+    Result<std::unique_ptr<SharedArena>> arena = SharedArena::Create();
+    if (!arena.ok()) return arena.status();
+    for (const Block& kept : std::exchange(blocks_, {})) FreePrivate(kept.data);
+    bytes_ = 0;
+    arena_ = *std::move(arena);
+    return Status::Ok();
+  }
+
+  std::optional<ArenaName> arena() {
+    const std::lock_guard lock(mutex_);
+    return arena_ == nullptr ? std::nullopt : std::optional(arena_->name());
+  }
+
+  std::optional<BlockName> Pin(const void* data) {
+    const std::lock_guard lock(mutex_);
+    if (arena_ == nullptr || !arena_->Contains(data)) return std::nullopt;
+    ++pins_[data].count;
+    return arena_->NameOf(data);
+  }
+
+  void Unpin(const void* data) {
+    const std::lock_guard lock(mutex_);
+    const auto pinned = pins_.find(data);
+    if (--pinned->second.count > 0) return;
+    const std::size_t bytes = pinned->second.given_back;
+    pins_.erase(pinned);
+    if (bytes > 0) Keep(const_cast<void*>(data), bytes);
   }
 
  private:
@@ -55,9 +90,36 @@ class Pool {
     void* data;
     std::size_t bytes;
   };
+  struct Pinned {
+    int count = 0;
+    std::size_t given_back = 0;  // bytes; 0: it is in use
+  };
+
+  void Keep(void* data, std::size_t bytes) {
+    if (bytes > kMostKept) return Free(data);
+    while (bytes_ + bytes > kMostKept) {  // the ones that were not wanted for longest
+      Free(blocks_.front().data);
+      bytes_ -= blocks_.front().bytes;
+      blocks_.erase(blocks_.begin());
+    }
+    if (arena_ != nullptr && arena_->Contains(data)) arena_->Renew(data);
+    blocks_.push_back({data, bytes});
+    bytes_ += bytes;
+  }
+
+  void Free(void* data) {
+    if (arena_ != nullptr && arena_->Contains(data)) {
+      arena_->GiveBack(data);
+    } else {
+      FreePrivate(data);
+    }
+  }
+
   std::mutex mutex_;
   std::vector<Block> blocks_;  // given back last comes last; a few hundred at most
   std::size_t bytes_ = 0;
+  std::unique_ptr<SharedArena> arena_;
+  std::unordered_map<const void*, Pinned> pins_;
 };
 
 // Never destroyed: blocks are given back until the very end of the program.
@@ -68,14 +130,27 @@ Pool& TheBlocks() {
 
 }  // namespace
 
-void* TakeBlock(std::size_t bytes) { return bytes < kLeastKept ? Allocate(bytes) : TheBlocks().Take(RoundedUp(bytes)); }
+void* TakeBlock(std::size_t bytes) { return bytes < kLeastKept ? AllocatePrivate(bytes) : TheBlocks().Take(RoundedUp(bytes)); }
 
 void GiveBackBlock(void* block, std::size_t bytes) {
   if (bytes < kLeastKept) {
-    Free(block);
+    FreePrivate(block);
   } else {
     TheBlocks().GiveBack(block, RoundedUp(bytes));
   }
+}
+
+Status ShareBlocks() { return TheBlocks().Share(); }
+std::optional<ArenaName> SharedBlocksArena() { return TheBlocks().arena(); }
+
+std::optional<BlockPin> BlockPin::Pin(const void* block) {
+  const std::optional<BlockName> name = TheBlocks().Pin(block);
+  if (!name) return std::nullopt;
+  return BlockPin(block, *name);
+}
+
+BlockPin::~BlockPin() {
+  if (block_ != nullptr) TheBlocks().Unpin(block_);
 }
 
 }  // namespace slabstream

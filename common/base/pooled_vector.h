@@ -6,9 +6,13 @@
 #include <cstddef>
 #include <memory>
 #include <new>
+#include <optional>
 #include <type_traits>
 #include <utility>
 #include <vector>
+
+#include "common/base/shared_arena.h"
+#include "common/base/status.h"
 
 namespace slabstream {
 
@@ -16,6 +20,30 @@ namespace slabstream {
 // to 96 MiB for the process. Any thread.
 void* TakeBlock(std::size_t bytes);
 void GiveBackBlock(void* block, std::size_t bytes);  // `bytes` as taken
+
+// From now on large blocks are taken from a SharedArena of the process. Unavailable: there is none; blocks stay private. Again: no change.
+Status ShareBlocks();
+std::optional<ArenaName> SharedBlocksArena();  // none: not shared
+
+// Keeps what a block holds at the disposal of other processes, also after it was given back: it is used again when its last pin is gone.
+class BlockPin {
+ public:
+  // `block` as TakeBlock gave it, null allowed. None: the block is private.
+  static std::optional<BlockPin> Pin(const void* block);
+  BlockPin(BlockPin&& other) noexcept : block_(std::exchange(other.block_, nullptr)), name_(other.name_) {}
+  BlockPin& operator=(BlockPin&& other) noexcept {
+    std::swap(block_, other.block_);
+    std::swap(name_, other.name_);
+    return *this;
+  }
+  ~BlockPin();
+  const BlockName& name() const { return name_; }
+
+ private:
+  BlockPin(const void* block, BlockName name) : block_(block), name_(name) {}
+  const void* block_;
+  BlockName name_;
+};
 
 template <class T>
 struct PooledAllocator {

@@ -7,71 +7,11 @@
 #include <optional>
 #include <vector>
 
+#include "common/combining/holdings.h"
 #include "common/combining/schedule.h"
 
 namespace slabstream {
 namespace {
-
-// What a rank holds: disjoint fragments of the frame, each with the interval of ranks that it has combined. By first pixel.
-struct Fragment {
-  std::uint64_t end = 0;
-  RankInterval ranks;
-};
-
-class Holdings {
- public:
-  void Put(PixelRange pixels, RankInterval ranks) { fragments_[pixels.begin] = {pixels.end, ranks}; }
-
-  // Takes out the fragments that lie in `pixels`, cutting those at its ends.
-  std::map<std::uint64_t, Fragment> Take(PixelRange pixels) {
-    CutAt(pixels.begin);
-    CutAt(pixels.end);
-    std::map<std::uint64_t, Fragment> taken;
-    const auto end = fragments_.lower_bound(pixels.end);
-    for (auto it = fragments_.lower_bound(pixels.begin); it != end; it = fragments_.erase(it)) taken.insert(*it);
-    return taken;
-  }
-
-  // Combines a fragment into what is held; where nothing is held it is taken as it is. False if two intervals meet that are not adjacent.
-  bool Combine(PixelRange pixels, RankInterval ranks) {
-    std::uint64_t next = pixels.begin;  // pixels before it are done
-    for (const auto& [begin, held] : Take(pixels)) {
-      if (begin > next) Put({next, begin}, ranks);
-      if (held.ranks.end == ranks.begin) {
-        Put({begin, held.end}, {held.ranks.begin, ranks.end});
-      } else if (ranks.end == held.ranks.begin) {
-        Put({begin, held.end}, {ranks.begin, held.ranks.end});
-      } else {
-        return false;
-      }
-      next = held.end;
-    }
-    if (next < pixels.end) Put({next, pixels.end}, ranks);
-    return true;
-  }
-
-  // True if exactly the pixels of `pixels` are held, all with the interval `ranks`.
-  bool IsWhole(PixelRange pixels, RankInterval ranks) const {
-    std::uint64_t next = pixels.begin;
-    for (const auto& [begin, held] : fragments_) {
-      if (begin != next || held.ranks != ranks) return false;
-      next = held.end;
-    }
-    return next == pixels.end;
-  }
-
- private:
-  void CutAt(std::uint64_t pixel) {
-    auto it = fragments_.lower_bound(pixel);
-    if (it == fragments_.begin()) return;
-    Fragment& before = std::prev(it)->second;
-    if (before.end <= pixel) return;
-    fragments_[pixel] = before;
-    before.end = pixel;
-  }
-
-  std::map<std::uint64_t, Fragment> fragments_;
-};
 
 // Pixels that a rank sends or receives in the current round: these must be disjoint, since the steps of a round have no order.
 class RoundUse {
@@ -96,7 +36,7 @@ class RoundUse {
   std::vector<PerRank> used_;
 };
 
-bool Covers(const std::map<std::uint64_t, Fragment>& fragments, PixelRange pixels) {
+bool Covers(const Holdings::Map& fragments, PixelRange pixels) {
   std::uint64_t next = pixels.begin;
   for (const auto& [begin, fragment] : fragments) {
     if (begin != next) return false;
@@ -147,13 +87,13 @@ Status CheckSchedule(const Schedule& schedule, PixelRange pixels) {
     const auto moved = holdings[step.from].Take(step.pixels);
     if (!Covers(moved, step.pixels)) return Wrong(i, fmt::format("rank {} sends pixels that it does not hold", step.from));
     for (const auto& [begin, fragment] : moved) {
-      if (!holdings[step.to].Combine({begin, fragment.end}, fragment.ranks)) {
-        return Wrong(i, fmt::format("ranks [{}, {}) meet an interval at rank {} that is not adjacent", fragment.ranks.begin,
-                                    fragment.ranks.end, step.to));
+      if (!holdings[step.to].Combine({begin, fragment.end}, fragment.value, Joined)) {
+        return Wrong(i, fmt::format("ranks [{}, {}) meet an interval at rank {} that is not adjacent", fragment.value.begin,
+                                    fragment.value.end, step.to));
       }
     }
   }
-  if (!holdings[schedule.root].IsWhole(pixels, {0, schedule.ranks})) {
+  if (!IsWhole(holdings[schedule.root], pixels, {0, schedule.ranks})) {
     return Status::InvalidArgument(
         fmt::format("schedule: root {} does not end with ranks [0, {}) of every pixel", schedule.root, schedule.ranks));
   }

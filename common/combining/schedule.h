@@ -7,9 +7,9 @@
 // group without images has ranks == 0 and no steps.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
-#include <string>
-#include <string_view>
+#include <span>
 #include <vector>
 
 #include "common/base/status.h"
@@ -19,6 +19,7 @@ namespace slabstream {
 
 using Rank = std::uint32_t;
 inline constexpr Rank kMaxRanks = 65536;
+inline constexpr std::uint32_t kMaxSteps = std::uint32_t{1} << 20;  // of a schedule
 
 // Half-open interval of ranks whose images have been combined.
 struct RankInterval {
@@ -46,22 +47,40 @@ struct ScheduleRequest {
   PixelRange pixels;  // of the whole frame
 };
 
-struct CombiningEntry {
-  std::string_view name;     // what --combine takes
-  std::string_view purpose;  // one line for --help
-  Schedule (*make)(const ScheduleRequest&);
-};
+// The families. Any number of ranks, any root; steps of no pixels are left out.
 
-// The only list.
-const std::vector<CombiningEntry>& CombiningSchemes();
-const CombiningEntry* FindCombiningScheme(std::string_view name);  // null: no such name
+// Both ends send towards the root, each rank what it has got combined with its own, strip after strip: a rank passes one strip on while the
+// next one comes in (the paper's pipeline). `strips` >= 1.
+Schedule MakeChain(const ScheduleRequest& request, std::uint32_t strips);
 
-Schedule MakeFanIn(const ScheduleRequest& request);        // binary tree, log2(ranks) rounds (Yagel and Machiraju, section 2.1, figure 3c)
-Schedule MakeCentralized(const ScheduleRequest& request);  // every rank to the root, in an order that keeps intervals adjacent (figure 3a)
+// A tree in which k neighbouring intervals meet at one rank; the ranks that meet are those that hold the root or come first in an interval.
+// k = 2 is the paper's fan-in, k >= ranks the centralized scheme (Yagel and Machiraju, section 2.1, figures 3c and 3a). `strips` >= 1 as
+// above. k >= 2.
+Schedule MakeTree(const ScheduleRequest& request, std::uint32_t k, std::uint32_t strips);
+
+// Radix-k (Peterka et al. 2009): in round i ranks meet in groups of factors[i] and each takes one share of the pixels that the group holds,
+// from all others of it; then the root collects all shares. All factors 2 is binary swap (recursive halving), one factor of `ranks` is
+// direct send. Factors are used in order as far as ranks and kMaxSteps allow, the last one reduced to what they allow. Where their product
+// is less than `ranks`, neighbours fold their images into one first.
+Schedule MakeSwap(const ScheduleRequest& request, std::span<const std::uint32_t> factors);
+
+// Factors of at most 8 whose product is the largest that is not above `ranks`.
+std::vector<std::uint32_t> DefaultFactors(Rank ranks);
+
+inline Schedule MakeFanIn(const ScheduleRequest& request) { return MakeTree(request, 2, 1); }
+inline Schedule MakeCentralized(const ScheduleRequest& request) { return MakeTree(request, std::max<Rank>(request.ranks, 2), 1); }
 
 // Runs the schedule on intervals and says what is wrong with it, if anything: ranks in range, rounds ascending, no rank touches pixels
 // twice in a round, only adjacent intervals meet, nobody sends what it does not hold, and the root ends with [0, ranks) of every pixel of
 // `pixels`.
 Status CheckSchedule(const Schedule& schedule, PixelRange pixels);
+
+// How often pixels are passed on, at most over all pixels of the result: one after the other on the way of any one rank's colours, and
+// altogether.
+struct Travel {
+  std::uint32_t hops = 0, transfers = 0;
+  friend bool operator==(const Travel&, const Travel&) = default;
+};
+Travel TravelOf(const Schedule& schedule, PixelRange pixels);  // a schedule that CheckSchedule finds sound
 
 }  // namespace slabstream

@@ -1,20 +1,38 @@
-#include "common/combining/schedule.h"
+#include "common/combining/schemes.h"
 
 namespace slabstream {
+namespace {
+
+std::uint32_t OrElse(std::uint32_t value, std::uint32_t otherwise) { return value == 0 ? otherwise : value; }
+
+}  // namespace
 
 const std::vector<CombiningEntry>& CombiningSchemes() {
+  using Request = ScheduleRequest;
+  using Arguments = CombiningArguments;
   static const std::vector<CombiningEntry> entries = {
-      {"fan-in", "binary tree of workers, log2(workers) rounds", MakeFanIn},
-      {"centralized", "every worker sends to one, which combines all", MakeCentralized},
+      {"fan-in", "binary tree of workers, log2(workers) rounds", "", 0, false,
+       [](const Request& request, const Arguments&) { return MakeFanIn(request); }},
+      {"centralized", "every worker sends to one, which combines all", "", 0, false,
+       [](const Request& request, const Arguments&) { return MakeCentralized(request); }},
+      {"chain", "from neighbour to neighbour, in strips (default: one a worker, at most 64)", "strips=S", 0, true,
+       [](const Request& request, const Arguments& arguments) {
+         return MakeChain(request, OrElse(arguments.strips, std::clamp<std::uint32_t>(request.ranks, 1, 64)));
+       }},
+      {"tree", "K (default 4) workers meet at one, in strips (default 1)", "K,strips=S", 1, true,
+       [](const Request& request, const Arguments& arguments) {
+         return MakeTree(request, arguments.factors.empty() ? 4 : arguments.factors[0], OrElse(arguments.strips, 1));
+       }},
+      {"radix-k", "groups of K1, K2, ... workers divide the picture among them, round by round", "K1xK2x...", kMaxFactors, false,
+       [](const Request& request, const Arguments& arguments) {
+         return MakeSwap(request, arguments.factors.empty() ? DefaultFactors(request.ranks) : arguments.factors);
+       }},
+      {"binary-swap", "pairs of workers halve the picture, round by round", "", 0, false,
+       [](const Request& request, const Arguments&) { return MakeSwap(request, std::vector<std::uint32_t>(16, 2)); }},
+      {"direct-send", "every worker combines one share of the picture", "", 0, false,
+       [](const Request& request, const Arguments&) { return MakeSwap(request, std::vector<std::uint32_t>{request.ranks}); }},
   };
   return entries;
-}
-
-const CombiningEntry* FindCombiningScheme(std::string_view name) {
-  for (const CombiningEntry& entry : CombiningSchemes()) {
-    if (entry.name == name) return &entry;
-  }
-  return nullptr;
 }
 
 }  // namespace slabstream

@@ -17,10 +17,23 @@ LocalImage MakeUnwrittenImage(PixelFormat format, const PixelBounds& bounds) {
 
 LocalImage MakeLocalImage(PixelFormat format, const PixelBounds& bounds) {
   LocalImage image = MakeUnwrittenImage(format, bounds);
-  std::ranges::fill(image.rgba, 0.0F);
-  std::ranges::fill(image.depth, std::numeric_limits<float>::infinity());
-  std::ranges::fill(image.voxel, 0U);
+  MakeEmpty(image, 0, std::size_t(bounds.pixel_count()));
   return image;
+}
+
+void FillRows(LocalImage& image) {
+  const auto width = std::size_t(image.bounds.width());
+  for (std::size_t y = 0; y < image.rows.size(); ++y) {
+    MakeEmpty(image, y * width, y * width + image.rows[y].begin);
+    MakeEmpty(image, y * width + image.rows[y].end, (y + 1) * width);
+  }
+  image.rows.clear();
+}
+
+void MakeEmpty(LocalImage& image, std::size_t begin, std::size_t end) {
+  std::fill(image.rgba.data() + 4 * begin, image.rgba.data() + 4 * end, 0.0F);
+  if (HasDepth(image.format)) std::fill(image.depth.data() + begin, image.depth.data() + end, std::numeric_limits<float>::infinity());
+  if (HasVoxel(image.format)) std::fill(image.voxel.data() + begin, image.voxel.data() + end, 0U);
 }
 
 }  // namespace slabstream

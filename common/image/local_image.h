@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <vector>
 
 #include "common/base/pooled_vector.h"
 
@@ -42,16 +43,29 @@ constexpr PixelBounds Union(const PixelBounds& a, const PixelBounds& b) {
   return {std::min(a.x_begin, b.x_begin), std::min(a.y_begin, b.y_begin), std::max(a.x_end, b.x_end), std::max(a.y_end, b.y_end)};
 }
 
+// Columns [begin, end) of one row, from the bounds' x_begin; begin == end: none.
+struct ColumnSpan {
+  std::uint32_t begin = 0, end = 0;
+  friend constexpr bool operator==(const ColumnSpan&, const ColumnSpan&) = default;
+};
+
 struct LocalImage {
   PixelFormat format = PixelFormat::kRgba;
   PixelBounds bounds;                 // within the frame; may be empty
   PooledVector<float> rgba;           // 4 * pixel_count
   PooledVector<float> depth;          // pixel_count if the format has depths; else empty
   PooledVector<std::uint32_t> voxel;  // pixel_count if the format has voxels; else empty
+  // While images are combined: pixels that are not in the span of their row are empty, whatever is stored. No spans: all pixels are stored,
+  // as in all images that renderers make and that pictures are made from.
+  std::vector<ColumnSpan> rows;
 };
 
 // All pixels empty.
 LocalImage MakeLocalImage(PixelFormat format, const PixelBounds& bounds);
+// Pixels [begin, end) by index.
+void MakeEmpty(LocalImage& image, std::size_t begin, std::size_t end);
+// Stores the empty pixels that `rows` left out.
+void FillRows(LocalImage& image);
 // Pixels hold anything: for who writes every one of them.
 LocalImage MakeUnwrittenImage(PixelFormat format, const PixelBounds& bounds);
 

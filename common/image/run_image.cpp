@@ -9,17 +9,18 @@
 #include <string>
 #include <vector>
 
-#include "common/base/check.h"
+#include "common/image/image_view.h"
 #include "common/image/run_payload.h"
 
 namespace slabstream {
 namespace {
 
-std::size_t PixelBytes(PixelFormat format) {
-  return kRgbaBytes + (HasDepth(format) ? sizeof(float) : 0) + (HasVoxel(format) ? sizeof(std::uint32_t) : 0);
+std::size_t PixelBytes(const RunImageHeader& header) {
+  return 4 * BytesPerChannel(header.color) + (HasDepth(header.format) ? sizeof(float) : 0) +
+         (HasVoxel(header.format) ? sizeof(std::uint32_t) : 0);
 }
 
-constexpr std::int64_t kBandRows = 32;  // of one task
+constexpr std::size_t kBandRows = 32;  // of one task
 
 // What one band of rows holds, and what lies in front of it in the payload.
 struct Band {
@@ -31,21 +32,26 @@ struct Band {
 // Writes the payload of a run image: the counterpart of RunPayload.
 class PayloadWriter {
  public:
-  // `payload` has room for PayloadBytes(header).
+  // `payload` has room for PayloadBytes(header); the header must outlive this.
   PayloadWriter(const RunImageHeader& header, std::byte* payload)
       : runs_(payload),
         rgba_(runs_ + sizeof(Run) * header.run_count),
-        depth_(rgba_ + kRgbaBytes * header.pixel_count),
+        depth_(rgba_ + 4 * BytesPerChannel(header.color) * header.pixel_count),
         voxel_(depth_ + sizeof(float) * header.pixel_count),
-        format_(header.format) {}
+        header_(header) {}
 
-  // Run number `index`, whose pixels are those of `image` from `source` on and come after `first` others.
-  void Write(std::size_t index, const Run& run, std::size_t first, const LocalImage& image, std::size_t source) const {
+  // Run number `index`, whose pixels are those of `view` from `source` on and come after `first` others. False: a colour cannot be coded.
+  bool Write(std::size_t index, const Run& run, std::size_t first, const ImageView& view, std::size_t source) const {
     const std::size_t count = run.pixel_count;
     std::memcpy(runs_ + sizeof(Run) * index, &run, sizeof(Run));
-    std::memcpy(rgba_ + kRgbaBytes * first, &image.rgba[4 * source], kRgbaBytes * count);
-    if (HasDepth(format_)) std::memcpy(depth_ + sizeof(float) * first, &image.depth[source], sizeof(float) * count);
-    if (HasVoxel(format_)) std::memcpy(voxel_ + sizeof(std::uint32_t) * first, &image.voxel[source], sizeof(std::uint32_t) * count);
+    if (HasDepth(header_.format)) std::memcpy(depth_ + sizeof(float) * first, view.depth + source, sizeof(float) * count);
+    if (HasVoxel(header_.format)) std::memcpy(voxel_ + sizeof(std::uint32_t) * first, view.voxel + source, sizeof(std::uint32_t) * count);
+    std::byte* const color = rgba_ + 4 * BytesPerChannel(header_.color) * first;
+    if (header_.color == ColorCoding::kFloat32) {
+      std::memcpy(color, view.rgba + 4 * source, kRgbaBytes * count);
+      return true;
+    }
+    return ToCodes(header_.color, view.rgba + 4 * source, reinterpret_cast<std::uint16_t*>(color), 4 * count);
   }
 
  private:
@@ -53,31 +59,14 @@ class PayloadWriter {
   std::byte* rgba_;
   std::byte* depth_;
   std::byte* voxel_;
-  PixelFormat format_;
+  const RunImageHeader& header_;
 };
-
-// Columns [begin, end), relative to bounds.x_begin, of row y that lie in the range; none if begin >= end.
-struct Columns {
-  std::int64_t begin, end;
-};
-
-Columns ColumnsInRange(const PixelBounds& bounds, std::int64_t y, PixelRange range, std::uint64_t frame_width) {
-  const std::uint64_t row_start = std::uint64_t(y) * frame_width;
-  const auto column = [&](std::uint64_t index) { return index <= row_start ? 0 : std::int64_t(std::min(index - row_start, frame_width)); };
-  return {std::max<std::int64_t>(bounds.x_begin, column(range.begin)) - bounds.x_begin,
-          std::min<std::int64_t>(bounds.x_end, column(range.end)) - bounds.x_begin};
-}
 
 Status Invalid(const std::string& message) { return Status::InvalidArgument("run image: " + message); }
-Status ColourNotFinite() { return Invalid("a pixel's colour is not finite"); }
-Status DepthNotFinite() { return Invalid("a pixel's depth is not finite"); }
-
-// Pixels [begin, end).
-void MakeEmpty(LocalImage& image, std::size_t begin, std::size_t end) {
-  std::fill(image.rgba.data() + 4 * begin, image.rgba.data() + 4 * end, 0.0F);
-  if (HasDepth(image.format)) std::fill(image.depth.data() + begin, image.depth.data() + end, std::numeric_limits<float>::infinity());
-  if (HasVoxel(image.format)) std::fill(image.voxel.data() + begin, image.voxel.data() + end, 0U);
+Status BadColour(ColorCoding color) {
+  return Invalid(color == ColorCoding::kFloat32 ? "a pixel's colour is not finite" : "a pixel's colour does not lie in [0, 1]");
 }
+Status DepthNotFinite() { return Invalid("a pixel's depth is not finite"); }
 
 // `floats`: the bytes of floats, at any address.
 bool AllFinite(std::span<const std::byte> floats) {
@@ -98,58 +87,64 @@ bool AllFinite(std::span<const std::byte> floats) {
   return true;
 }
 
+// `codes`: the bytes of codes, at any address.
+bool NoneAbove(std::uint16_t largest, std::span<const std::byte> codes) {
+  bool above = false;
+  for (std::size_t i = 0; i + sizeof(std::uint16_t) <= codes.size(); i += sizeof(std::uint16_t)) {
+    std::uint16_t code;
+    std::memcpy(&code, codes.data() + i, sizeof(code));
+    above |= code > largest;
+  }
+  return !above;
+}
+
+// `colours`: bytes of some pixels.
+bool ColoursAreValid(ColorCoding color, std::span<const std::byte> colours) {
+  return color == ColorCoding::kFloat32 ? AllFinite(colours) : NoneAbove(LargestCode(color), colours);
+}
+
 // The pixels of one row, [begin, end), that are not empty, as maximal spans: found(begin, end) for each. Empty is where `plane`, which has
 // a value each `stride`, is `empty`.
 template <std::size_t stride, class Found>
-void ForEachSpan(const float* plane, float empty, std::int64_t begin, std::int64_t end, Found&& found) {
-  constexpr std::int64_t kBlock = 16;
-  const auto is_empty = [&](std::int64_t x) { return plane[stride * std::size_t(x)] == empty; };
+void ForEachSpan(const float* plane, float empty, std::size_t begin, std::size_t end, Found&& found) {
+  constexpr std::size_t kBlock = 16;
+  const auto is_empty = [&](std::size_t x) { return plane[stride * x] == empty; };
   // Whole blocks are counted in vectors; the compiler sees to that.
-  const auto empty_ones = [&](std::int64_t x) {
-    int count = 0;
-    for (std::int64_t i = 0; i < kBlock; ++i) count += int(is_empty(x + i));
+  const auto empty_ones = [&](std::size_t x) {
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < kBlock; ++i) count += std::size_t(is_empty(x + i));
     return count;
   };
-  for (std::int64_t x = begin; x < end;) {
+  for (std::size_t x = begin; x < end;) {
     while (x + kBlock <= end && empty_ones(x) == kBlock) x += kBlock;
     while (x < end && is_empty(x)) ++x;
-    const std::int64_t first = x;
+    const std::size_t first = x;
     while (x + kBlock <= end && empty_ones(x) == 0) x += kBlock;
     while (x < end && !is_empty(x)) ++x;
     if (x > first) found(first, x);
   }
 }
 
-// `format`: that of the image, or one with fewer planes.
-RunImage Encode(const LocalImage& image, PixelRange range, std::int32_t frame_width, PixelFormat format) {
+// `format`: that of the view, or one with fewer planes. Colours that cannot be coded stay floats, all of them.
+RunImage Encode(const ImageView& view, PixelFormat format, ColorCoding color) {
   RunImage result;
   result.header.format = format;
-  if (image.bounds.empty() || range.begin >= range.end) return result;
+  result.header.bounds = view.bounds;
 
-  // Rows that the range touches.
-  const PixelBounds& bounds = image.bounds;
-  CHECK(bounds.x_begin >= 0 && bounds.y_begin >= 0 && bounds.x_end <= frame_width) << "the image leaves the frame";
-  const auto width = std::uint64_t(frame_width);
-  const auto first_row = std::max<std::int64_t>(bounds.y_begin, std::int64_t(range.begin / width));
-  const auto end_row = std::min<std::int64_t>(bounds.y_end, std::int64_t((range.end - 1) / width) + 1);
-  if (first_row >= end_row) return result;
-  result.header.bounds = {bounds.x_begin, std::int32_t(first_row), bounds.x_end, std::int32_t(end_row)};
-  const auto row_start = [&](std::int64_t y) { return std::size_t(y - bounds.y_begin) * std::size_t(bounds.width()); };
-
-  std::vector<Band> bands(std::size_t((end_row - first_row + kBandRows - 1) / kBandRows));
+  std::vector<Band> bands((view.rows.size() + kBandRows - 1) / kBandRows);
   tbb::parallel_for(std::size_t{0}, bands.size(), [&](std::size_t i) {
     Band& band = bands[i];
-    const std::int64_t begin_row = first_row + std::int64_t(i) * kBandRows;
-    for (std::int64_t y = begin_row; y < std::min(begin_row + kBandRows, end_row); ++y) {
-      const Columns columns = ColumnsInRange(bounds, y, range, width);
-      const auto found = [&](std::int64_t begin, std::int64_t end) {
-        band.runs.push_back({std::uint32_t(y - first_row), std::uint32_t(begin), std::uint32_t(end - begin)});
-        band.pixel_count += std::uint64_t(end - begin);
+    for (std::size_t y = i * kBandRows; y < std::min((i + 1) * kBandRows, view.rows.size()); ++y) {
+      const std::size_t row = y * view.stride;
+      const auto found = [&](std::size_t begin, std::size_t end) {
+        band.runs.push_back({std::uint32_t(y), std::uint32_t(begin), std::uint32_t(end - begin)});
+        band.pixel_count += end - begin;
       };
+      const auto [begin, end] = view.rows[y];
       if (HasDepth(format)) {
-        ForEachSpan<1>(&image.depth[row_start(y)], std::numeric_limits<float>::infinity(), columns.begin, columns.end, found);
+        ForEachSpan<1>(view.depth + row, std::numeric_limits<float>::infinity(), begin, end, found);
       } else {
-        ForEachSpan<4>(&image.rgba[4 * row_start(y)] + 3, 0, columns.begin, columns.end, found);
+        ForEachSpan<4>(view.rgba + 4 * row + 3, 0, begin, end, found);
       }
     }
   });
@@ -161,16 +156,19 @@ RunImage Encode(const LocalImage& image, PixelRange range, std::int32_t frame_wi
     result.header.pixel_count += band.pixel_count;
   }
   result.header.run_count = std::uint32_t(run_count);
+  if (!HasDepth(format)) result.header.color = color;
 
   result.payload.resize(PayloadBytes(result.header));
   const PayloadWriter writer(result.header, result.payload.data());
+  std::atomic<bool> coded = true;
   tbb::parallel_for(std::size_t{0}, bands.size(), [&](std::size_t i) {
     std::size_t index = bands[i].first_run, pixel = bands[i].first_pixel;
     for (const Run& run : bands[i].runs) {
-      writer.Write(index++, run, pixel, image, row_start(first_row + run.row) + run.column);
+      if (!writer.Write(index++, run, pixel, view, run.row * view.stride + run.column)) coded = false;
       pixel += run.pixel_count;
     }
   });
+  if (!coded) return Encode(view, format, ColorCoding::kFloat32);
   return result;
 }
 
@@ -178,6 +176,11 @@ RunImage Encode(const LocalImage& image, PixelRange range, std::int32_t frame_wi
 Status ValidateTable(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame) {
   if (header.format < PixelFormat::kRgba || header.format > PixelFormat::kRgbaDepth) {
     return Invalid("format is " + std::to_string(int(header.format)) + ", but must be 1 (rgba), 2 (depth) or 3 (rgba and depth)");
+  }
+  const bool coded = header.color == ColorCoding::kHalf || header.color == ColorCoding::kFixed16;
+  if (header.color != ColorCoding::kFloat32 && (!coded || header.format != PixelFormat::kRgba)) {
+    return Invalid("color is " + std::to_string(int(header.color)) +
+                   ", but must be 1 (float32), or 2 (half) or 3 (fixed16) without depths");
   }
   const PixelBounds& bounds = header.bounds;
   // Nothing is computed from the bounds before this: differences of hostile numbers may overflow.
@@ -269,24 +272,23 @@ LocalImage Decode(const RunImageHeader& header, const RunPayload& runs, Look&& l
 }  // namespace
 
 std::size_t PayloadBytes(const RunImageHeader& header) {
-  return sizeof(Run) * std::size_t{header.run_count} + PixelBytes(header.format) * std::size_t(header.pixel_count);
+  return sizeof(Run) * std::size_t{header.run_count} + PixelBytes(header) * std::size_t(header.pixel_count);
 }
 
+RunImage EncodeRuns(const ImageView& view, ColorCoding color) { return Encode(view, view.format, color); }
+
 RunImage EncodeRuns(const LocalImage& image, PixelRange range, std::int32_t frame_width) {
-  return Encode(image, range, frame_width, image.format);
+  return EncodeRuns(ViewOf(image, range, frame_width));
 }
 
 RunImage EncodePicture(const LocalImage& image) {
-  // Any frame width does that holds the bounds: the range is all pixels.
-  const std::int32_t width = std::max(image.bounds.x_end, 1);
-  const PixelRange all = {0, std::uint64_t(std::max(image.bounds.y_end, 0)) * std::uint64_t(width)};
-  return Encode(image, all, width, HasDepth(image.format) ? PixelFormat::kRgbaDepth : PixelFormat::kRgba);
+  return Encode(ViewOf(image), HasDepth(image.format) ? PixelFormat::kRgbaDepth : PixelFormat::kRgba, ColorCoding::kFloat32);
 }
 
 Status ValidateRuns(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame) {
   if (Status status = ValidateTable(header, payload, frame); !status.ok()) return status;
   const RunPayload runs(header, payload);
-  if (!AllFinite(runs.rgba(0, header.pixel_count))) return ColourNotFinite();
+  if (!ColoursAreValid(header.color, runs.rgba(0, header.pixel_count))) return BadColour(header.color);
   if (HasDepth(header.format) && !AllFinite(runs.depth(0, header.pixel_count))) return DepthNotFinite();
   return Status::Ok();
 }
@@ -298,12 +300,12 @@ LocalImage DecodeRuns(const RunImageHeader& header, std::span<const std::byte> p
 Result<LocalImage> ReadRuns(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame) {
   if (Status status = ValidateTable(header, payload, frame); !status.ok()) return status;
   const RunPayload runs(header, payload);
-  std::atomic<bool> colour_finite = true, depth_finite = true;
+  std::atomic<bool> colours_valid = true, depth_finite = true;
   LocalImage image = Decode(header, runs, [&](std::size_t first, std::size_t count) {
-    if (!AllFinite(runs.rgba(first, count))) colour_finite = false;
+    if (!ColoursAreValid(header.color, runs.rgba(first, count))) colours_valid = false;
     if (HasDepth(header.format) && !AllFinite(runs.depth(first, count))) depth_finite = false;
   });
-  if (!colour_finite) return ColourNotFinite();
+  if (!colours_valid) return BadColour(header.color);
   if (!depth_finite) return DepthNotFinite();
   return image;
 }

@@ -3,7 +3,7 @@
 // Runs are maximal spans of non-empty pixels within a row, in row-major order; the pixels of all runs follow each other without gaps.
 // Payload layout (little endian), also written down in docs/wire.md:
 //   run_count * { u32 row offset from bounds.y_begin, u32 column offset from bounds.x_begin, u32 pixel count }
-//   pixel_count * 4 * f32 RGBA
+//   pixel_count * 4 * RGBA: f32, or as `color` says (u16)
 //   formats with depths: pixel_count * f32 depth
 //   formats with voxels: pixel_count * u32 voxel
 // Empty: depth == +infinity; where the format has no depths, alpha == 0 (colour is then 0 too).
@@ -14,6 +14,7 @@
 #include <span>
 
 #include "common/base/status.h"
+#include "common/image/color_coding.h"
 #include "common/image/local_image.h"
 
 namespace slabstream {
@@ -29,7 +30,8 @@ struct RunImageHeader {
   PixelFormat format = PixelFormat::kRgba;
   PixelBounds bounds;  // within the frame
   std::uint32_t run_count = 0;
-  std::uint64_t pixel_count = 0;  // in all runs
+  std::uint64_t pixel_count = 0;              // in all runs
+  ColorCoding color = ColorCoding::kFloat32;  // kDepth: always
   friend bool operator==(const RunImageHeader&, const RunImageHeader&) = default;
 };
 

@@ -2,6 +2,8 @@
 // of any alignment, so everything is copied out, never pointed into.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -26,9 +28,11 @@ class RunPayload {
  public:
   // payload.size() is PayloadBytes(header).
   RunPayload(const RunImageHeader& header, std::span<const std::byte> payload)
-      : runs_(payload.data()),
+      : color_(header.color),
+        color_bytes_(4 * BytesPerChannel(header.color)),
+        runs_(payload.data()),
         rgba_(runs_ + sizeof(Run) * header.run_count),
-        depth_(rgba_ + kRgbaBytes * header.pixel_count),
+        depth_(rgba_ + color_bytes_ * header.pixel_count),
         voxel_(depth_ + sizeof(float) * header.pixel_count) {}
 
   Run ReadRun(std::size_t index) const {
@@ -36,13 +40,26 @@ class RunPayload {
     std::memcpy(&run, runs_ + sizeof(Run) * index, sizeof(Run));
     return run;
   }
-  // Pixels [first, first + count) of all runs: their bytes, four floats or one each; and as numbers.
-  std::span<const std::byte> rgba(std::size_t first, std::size_t count) const { return {rgba_ + kRgbaBytes * first, kRgbaBytes * count}; }
+  // Pixels [first, first + count) of all runs: their bytes, four floats or codes, or one float each; and as numbers.
+  std::span<const std::byte> rgba(std::size_t first, std::size_t count) const {
+    return {rgba_ + color_bytes_ * first, color_bytes_ * count};
+  }
   std::span<const std::byte> depth(std::size_t first, std::size_t count) const {
     return {depth_ + sizeof(float) * first, sizeof(float) * count};
   }
   void ReadRgba(std::size_t first, std::size_t count, float* out) const {
-    std::memcpy(out, rgba_ + kRgbaBytes * first, kRgbaBytes * count);
+    const std::byte* const source = rgba_ + color_bytes_ * first;
+    if (color_ == ColorCoding::kFloat32) {
+      std::memcpy(out, source, kRgbaBytes * count);
+      return;
+    }
+    constexpr std::size_t kBatch = 4096;  // channels that are copied out at a time
+    std::array<std::uint16_t, kBatch> codes;
+    for (std::size_t done = 0; done < 4 * count; done += kBatch) {
+      const std::size_t channels = std::min(kBatch, 4 * count - done);
+      std::memcpy(codes.data(), source + sizeof(std::uint16_t) * done, sizeof(std::uint16_t) * channels);
+      FromCodes(color_, codes.data(), out + done, channels);
+    }
   }
   void ReadDepth(std::size_t first, std::size_t count, float* out) const {
     std::memcpy(out, depth_ + sizeof(float) * first, sizeof(float) * count);
@@ -52,6 +69,8 @@ class RunPayload {
   }
 
  private:
+  const ColorCoding color_;
+  const std::size_t color_bytes_;  // a pixel
   const std::byte* runs_;
   const std::byte* rgba_;
   const std::byte* depth_;  // formats with depths only

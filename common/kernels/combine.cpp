@@ -1,5 +1,7 @@
 #include "common/kernels/combine.h"
 
+#include <algorithm>
+#include <array>
 #include <cstring>
 #include <utility>
 
@@ -8,16 +10,6 @@
 
 namespace slabstream {
 namespace {
-
-// A stretch of pixels of one row, to read or to write.
-template <class Float, class Index>
-struct Pixels {
-  Float* rgba;
-  Float* depth;  // kDepth only
-  Index* voxel;  // kDepth only
-};
-using SourcePixels = Pixels<const float, const std::uint32_t>;
-using TargetPixels = Pixels<float, std::uint32_t>;
 
 std::size_t IndexOf(const PixelBounds& bounds, std::int32_t x, std::int32_t y) {
   return std::size_t(y - bounds.y_begin) * std::size_t(bounds.width()) + std::size_t(x - bounds.x_begin);
@@ -28,29 +20,9 @@ TargetPixels At(LocalImage& image, std::size_t pixel) {
   return {&image.rgba[4 * pixel], &image.depth[pixel], &image.voxel[pixel]};
 }
 
-SourcePixels At(const LocalImage& image, std::size_t pixel) {
-  if (image.format == PixelFormat::kRgba) return {&image.rgba[4 * pixel], nullptr, nullptr};
-  return {&image.rgba[4 * pixel], &image.depth[pixel], &image.voxel[pixel]};
-}
-
-void NearestRow(const SourcePixels& source, const TargetPixels& target, std::size_t count) {
-  for (std::size_t i = 0; i < count; ++i) {
-    if (!NearerDepth(source.depth[i], source.voxel[i], target.depth[i], target.voxel[i])) continue;
-    std::memcpy(target.rgba + 4 * i, source.rgba + 4 * i, kRgbaBytes);
-    target.depth[i] = source.depth[i];
-    target.voxel[i] = source.voxel[i];
-  }
-}
-
-// Both have depths, or neither.
-void CombineRow(const SourcePixels& source, Side side, const TargetPixels& target, std::size_t count) {
-  if (source.depth != nullptr && target.depth != nullptr) {
-    NearestRow(source, target, count);
-  } else if (side == Side::kFront) {
-    OverRow(source.rgba, target.rgba, target.rgba, count);
-  } else {
-    OverRow(target.rgba, source.rgba, target.rgba, count);
-  }
+SourcePixels At(const ImageView& view, std::size_t pixel) {
+  if (view.format == PixelFormat::kRgba) return {view.rgba + 4 * pixel, nullptr, nullptr};
+  return {view.rgba + 4 * pixel, view.depth + pixel, view.voxel + pixel};
 }
 
 void CopyRow(const SourcePixels& source, const TargetPixels& target, std::size_t count) {
@@ -60,38 +32,149 @@ void CopyRow(const SourcePixels& source, const TargetPixels& target, std::size_t
   std::memcpy(target.voxel, source.voxel, sizeof(std::uint32_t) * count);
 }
 
-void GrowToHold(LocalImage& image, const PixelBounds& bounds) {
-  if (image.bounds.Contains(bounds)) return;
-  LocalImage grown = MakeLocalImage(image.format, Union(image.bounds, bounds));
-  const LocalImage& old = image;
-  if (!old.bounds.empty()) {
-    for (std::int32_t y = old.bounds.y_begin; y < old.bounds.y_end; ++y) {
-      CopyRow(At(old, IndexOf(old.bounds, old.bounds.x_begin, y)), At(grown, IndexOf(grown.bounds, old.bounds.x_begin, y)),
-              std::size_t(old.bounds.width()));
+// `ours` with `theirs` on its `side`. All have depths, or none. `target` may be `ours`.
+void CombineRow(const SourcePixels& ours, const SourcePixels& theirs, Side side, const TargetPixels& target, std::size_t count) {
+  if (ours.depth != nullptr && theirs.depth != nullptr) {
+    if (target.depth != ours.depth) CopyRow(ours, target, count);
+    NearestRow(theirs, target, count);
+  } else if (side == Side::kFront) {
+    OverRow(theirs.rgba, ours.rgba, target.rgba, count);
+  } else {
+    OverRow(ours.rgba, theirs.rgba, target.rgba, count);
+  }
+}
+
+// Columns [begin, end) of a row of some image; none if begin == end.
+struct Stretch {
+  std::size_t begin = 0, end = 0;
+};
+
+Stretch Hull(const Stretch& a, const Stretch& b) {
+  if (a.begin == a.end) return b;
+  if (b.begin == b.end) return a;
+  return {std::min(a.begin, b.begin), std::max(a.end, b.end)};
+}
+
+// Pixels of one row, where they are stored, and their columns in the image that they are combined into.
+struct RowPixels {
+  SourcePixels first;
+  Stretch columns;
+  SourcePixels At(std::size_t column) const {
+    const std::size_t offset = column - columns.begin;
+    if (first.depth == nullptr) return {first.rgba + 4 * offset, nullptr, nullptr};
+    return {first.rgba + 4 * offset, first.depth + offset, first.voxel + offset};
+  }
+};
+
+// Writes both to the row of `image` that begins at index `row`: each pixel of their hull once, or not at all where `ours` is there already.
+void MergeRow(const RowPixels& ours, const RowPixels& theirs, Side side, LocalImage& image, std::size_t row, bool in_place) {
+  const Stretch a = ours.columns, b = theirs.columns, hull = Hull(a, b);
+  std::array<std::size_t, 4> cuts = {a.begin, a.end, b.begin, b.end};
+  std::ranges::sort(cuts);
+  for (std::size_t i = 0; i + 1 < cuts.size(); ++i) {
+    const std::size_t begin = std::max(cuts[i], hull.begin), end = std::min(cuts[i + 1], hull.end);
+    if (begin >= end) continue;
+    const bool in_ours = begin >= a.begin && end <= a.end, in_theirs = begin >= b.begin && end <= b.end;
+    if (in_ours && in_theirs) {
+      CombineRow(ours.At(begin), theirs.At(begin), side, At(image, row + begin), end - begin);
+    } else if (in_theirs) {
+      CopyRow(theirs.At(begin), At(image, row + begin), end - begin);
+    } else if (!in_ours) {
+      MakeEmpty(image, row + begin, row + end);
+    } else if (!in_place) {
+      CopyRow(ours.At(begin), At(image, row + begin), end - begin);
     }
   }
-  image = std::move(grown);
+}
+
+RowPixels RowOf(const ImageView& view, std::int32_t y, std::int32_t x_begin) {
+  if (y < view.bounds.y_begin || y >= view.bounds.y_end) return {};
+  const ColumnSpan& row = view.rows[std::size_t(y - view.bounds.y_begin)];
+  if (row.begin == row.end) return {};
+  const auto offset = std::size_t(view.bounds.x_begin - x_begin);
+  return {At(view, std::size_t(y - view.bounds.y_begin) * view.stride + row.begin), {offset + row.begin, offset + row.end}};
+}
+
+ColumnSpan AsSpan(const Stretch& columns) { return {std::uint32_t(columns.begin), std::uint32_t(columns.end)}; }
+
+// Adds `theirs` to row y of an image that has room for it.
+void MergeInPlace(LocalImage& image, std::int32_t y, const RowPixels& theirs, Side side) {
+  if (theirs.columns.begin == theirs.columns.end) return;
+  const std::size_t row = IndexOf(image.bounds, image.bounds.x_begin, y);
+  ColumnSpan* const span = image.rows.empty() ? nullptr : &image.rows[std::size_t(y - image.bounds.y_begin)];
+  const Stretch columns = span == nullptr ? Stretch{0, std::size_t(image.bounds.width())} : Stretch{span->begin, span->end};
+  RowPixels ours;
+  if (columns.begin < columns.end) {
+    const TargetPixels here = At(image, row + columns.begin);
+    ours = {{here.rgba, here.depth, here.voxel}, columns};
+  }
+  MergeRow(ours, theirs, side, image, row, true);
+  if (span != nullptr) *span = AsSpan(Hull(columns, theirs.columns));
 }
 
 }  // namespace
 
 void Combine(LocalImage& image, const LocalImage& other, Side side) {
+  Combine(image, ViewOf(other), side, Union(image.bounds, other.bounds));
+  FillRows(image);
+}
+
+void Combine(LocalImage& image, const ImageView& other, Side side, const PixelBounds& room) {
   CHECK_EQ(int(image.format), int(other.format));
   if (other.bounds.empty()) return;
-  GrowToHold(image, other.bounds);
-  for (std::int32_t y = other.bounds.y_begin; y < other.bounds.y_end; ++y) {
-    CombineRow(At(other, IndexOf(other.bounds, other.bounds.x_begin, y)), side, At(image, IndexOf(image.bounds, other.bounds.x_begin, y)),
-               std::size_t(other.bounds.width()));
+  if (image.bounds.Contains(other.bounds)) {
+    for (std::int32_t y = other.bounds.y_begin; y < other.bounds.y_end; ++y) {
+      MergeInPlace(image, y, RowOf(other, y, image.bounds.x_begin), side);
+    }
+    return;
+  }
+  const LocalImage old = std::move(image);
+  const ImageView ours = ViewOf(old);
+  CHECK(room.Contains(ours.bounds) && room.Contains(other.bounds));
+  image = MakeUnwrittenImage(old.format, room);
+  image.rows.resize(std::size_t(room.height()));
+  for (std::int32_t y = room.y_begin; y < room.y_end; ++y) {
+    const RowPixels a = RowOf(ours, y, room.x_begin), b = RowOf(other, y, room.x_begin);
+    MergeRow(a, b, side, image, IndexOf(room, room.x_begin, y), false);
+    image.rows[std::size_t(y - room.y_begin)] = AsSpan(Hull(a.columns, b.columns));
   }
 }
 
-void CombineRuns(LocalImage& image, const RunImageHeader& header, std::span<const std::byte> payload, Side side) {
+void Erase(LocalImage& image, PixelRange pixels, std::int32_t frame_width) {
+  const PixelBounds& bounds = image.bounds;
+  if (bounds.empty()) return;
+  if (image.rows.empty()) image.rows.assign(std::size_t(bounds.height()), {0, std::uint32_t(bounds.width())});
+  const auto width = std::uint64_t(frame_width);
+  for (std::size_t y = 0; y < image.rows.size(); ++y) {
+    const std::uint64_t row = (std::uint64_t(bounds.y_begin) + y) * width;
+    const auto column = [&](std::uint64_t index) {  // of a pixel of this row, cut to the bounds
+      const auto x = index <= row ? 0 : std::int64_t(std::min(index - row, width));
+      return std::uint32_t(std::clamp<std::int64_t>(x, bounds.x_begin, bounds.x_end) - bounds.x_begin);
+    };
+    ColumnSpan& span = image.rows[y];
+    const std::uint32_t begin = std::max(column(pixels.begin), span.begin), end = std::min(column(pixels.end), span.end);
+    if (begin >= end) continue;
+    if (begin > span.begin && end < span.end) {
+      const std::size_t first = y * std::size_t(bounds.width());
+      MakeEmpty(image, first + begin, first + end);
+    } else {
+      span = begin == span.begin ? ColumnSpan{end, span.end} : ColumnSpan{span.begin, begin};
+      if (span.begin == span.end) span = {};
+    }
+  }
+}
+
+void CombineRuns(LocalImage& image, const RunImageHeader& header, std::span<const std::byte> payload, Side side, const PixelBounds& room) {
   CHECK_EQ(int(image.format), int(header.format));
   if (header.run_count == 0) return;
-  GrowToHold(image, header.bounds);
+  if (!image.bounds.Contains(header.bounds)) {  // room for all first
+    LocalImage nothing = MakeUnwrittenImage(header.format, header.bounds);
+    nothing.rows.resize(std::size_t(header.bounds.height()));
+    Combine(image, ViewOf(nothing), side, room);
+  }
 
   // A run is copied to where kernels may read it; it fits the cache.
-  LocalImage scratch = MakeLocalImage(header.format, {0, 0, header.bounds.width(), 1});
+  LocalImage scratch = MakeUnwrittenImage(header.format, {0, 0, header.bounds.width(), 1});
   const TargetPixels pixels = At(scratch, 0);
   const RunPayload runs(header, payload);
   std::size_t first = 0;
@@ -102,9 +185,9 @@ void CombineRuns(LocalImage& image, const RunImageHeader& header, std::span<cons
       runs.ReadDepth(first, run.pixel_count, pixels.depth);
       runs.ReadVoxel(first, run.pixel_count, pixels.voxel);
     }
-    const std::size_t target =
-        IndexOf(image.bounds, header.bounds.x_begin + std::int32_t(run.column), header.bounds.y_begin + std::int32_t(run.row));
-    CombineRow({pixels.rgba, pixels.depth, pixels.voxel}, side, At(image, target), run.pixel_count);
+    const auto column = std::size_t(header.bounds.x_begin - image.bounds.x_begin) + run.column;
+    MergeInPlace(image, header.bounds.y_begin + std::int32_t(run.row),
+                 {{pixels.rgba, pixels.depth, pixels.voxel}, {column, column + run.pixel_count}}, side);
     first += run.pixel_count;
   }
 }

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <span>
 
+#include "common/image/image_view.h"
 #include "common/image/local_image.h"
 #include "common/image/run_image.h"
 
@@ -21,13 +22,33 @@ inline bool NearerDepth(float depth_a, std::uint32_t voxel_a, float depth_b, std
 
 enum class Side : std::uint8_t { kFront, kBack };  // where the second image lies as seen from the first
 
-// Combines `other` into `image`; its bounds grow to the union where needed. `side` tells where `other` lies (kRgba only). Formats must
-// agree. Bit-for-bit: Combine(a, b, kBack) equals Combine(b, a, kFront).
+// Combines `other` into `image`. `side` tells where `other` lies (kRgba only). Formats must agree. Bit-for-bit: Combine(a, b, kBack) equals
+// Combine(b, a, kFront). Where the bounds must grow they become `room`, which holds both: room for all that is still to come saves growing
+// again, and costs nothing, since what is empty is not written (LocalImage::rows).
+void Combine(LocalImage& image, const ImageView& other, Side side, const PixelBounds& room);
+void CombineRuns(LocalImage& image, const RunImageHeader& header, std::span<const std::byte> payload, Side side, const PixelBounds& room);
+// On the union of both bounds, all pixels stored.
 void Combine(LocalImage& image, const LocalImage& other, Side side);
-void CombineRuns(LocalImage& image, const RunImageHeader& header, std::span<const std::byte> payload, Side side);
+
+// Makes the pixels `pixels` of a frame `frame_width` wide empty.
+void Erase(LocalImage& image, PixelRange pixels, std::int32_t frame_width);
 
 // The row kernels. rgba rows hold 4 * pixel_count floats; rows do not alias. out may equal front (first) or back (second).
 void OverRow(const float* front, const float* back, float* out, std::size_t pixel_count);
 void OverRowReference(const float* front, const float* back, float* out, std::size_t pixel_count);
+
+// A stretch of pixels of one row, to read or to write.
+template <class Float, class Index>
+struct RowOfPixels {
+  Float* rgba;
+  Float* depth;  // kDepth only, else null
+  Index* voxel;  // kDepth only, else null
+};
+using SourcePixels = RowOfPixels<const float, const std::uint32_t>;
+using TargetPixels = RowOfPixels<float, std::uint32_t>;
+
+// Pixels of `target` become those of `source` where that is nearer. With depths; rows do not alias.
+void NearestRow(const SourcePixels& source, const TargetPixels& target, std::size_t pixel_count);
+void NearestRowReference(const SourcePixels& source, const TargetPixels& target, std::size_t pixel_count);
 
 }  // namespace slabstream

@@ -141,6 +141,12 @@ ChunkRefused FromProto(const v1::ChunkRefused& in, Checker& check);
 // ---- image_codecs.cpp
 v1::PartialImage ToProto(const PartialImage& in);
 PartialImage FromProto(const v1::PartialImage& in, Checker& check);
+v1::SharedImage ToProto(const SharedImage& in);
+SharedImage FromProto(const v1::SharedImage& in, Checker& check);
+v1::SharedBlock ToProto(const BlockName& in);
+BlockName FromProto(const v1::SharedBlock& in, Checker& check);
+v1::ImageRefused ToProto(const ImageRefused& in);
+ImageRefused FromProto(const v1::ImageRefused& in, Checker& check);
 
 // ---- client_codecs.cpp
 v1::SubmitFrame ToProto(const SubmitFrame& in);

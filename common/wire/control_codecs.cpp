@@ -43,6 +43,7 @@ v1::Register ToProto(const Register& in) {
   out.set_images_endpoint(in.images_endpoint);
   out.set_threads(in.threads);
   out.set_memory_bytes(in.memory_bytes);
+  out.set_memory_scope(in.memory_scope);
   return out;
 }
 
@@ -54,6 +55,7 @@ Register FromProto(const v1::Register& in, Checker& check) {
   out.images_endpoint = check.Text("images_endpoint", in.images_endpoint(), 1, kMaxEndpointBytes);
   out.threads = check.Range("threads", in.threads(), 1, kMaxThreads);
   out.memory_bytes = in.memory_bytes();
+  out.memory_scope = in.memory_scope();
   return out;
 }
 
@@ -119,12 +121,14 @@ v1::Peer ToProto(const Peer& in) {
   v1::Peer out;
   out.set_worker(in.worker);
   out.set_images_endpoint(in.images_endpoint);
+  out.set_memory_scope(in.memory_scope);
   return out;
 }
 
 Peer FromProto(const v1::Peer& in, Checker& check) {
   return {.worker = check.Range("worker", in.worker(), 1, kMaxWorkerId),
-          .images_endpoint = check.Text("images_endpoint", in.images_endpoint(), 1, kMaxEndpointBytes)};
+          .images_endpoint = check.Text("images_endpoint", in.images_endpoint(), 1, kMaxEndpointBytes),
+          .memory_scope = in.memory_scope()};
 }
 
 v1::GroupAssignment ToProto(const GroupAssignment& in) {
@@ -135,6 +139,7 @@ v1::GroupAssignment ToProto(const GroupAssignment& in) {
   out.set_group_count(in.group_count);
   out.set_first_group(in.first_group);
   out.set_previews(in.previews);
+  out.set_groups_done(in.groups_done);
   out.set_display(in.display);
   *out.mutable_setup() = ToProto(in.setup);
   *out.mutable_group() = ToProto(in.group);
@@ -151,6 +156,7 @@ GroupAssignment FromProto(const v1::GroupAssignment& in, Checker& check) {
   out.group_count = check.Range("group_count", in.group_count(), out.key.group + 1, kMaxGroups);
   out.first_group = check.Range("first_group", in.first_group(), 0, out.key.group);
   out.previews = in.previews();
+  out.groups_done = check.Range("groups_done", in.groups_done(), 0, out.key.group);
   out.display = check.Range("display", in.display(), 1, kMaxWorkerId);
   out.setup = Read("setup", in.setup(), check);
   out.group = Read("group", in.group(), check);

@@ -39,6 +39,7 @@ struct Register {
   std::string images_endpoint;     // where other workers reach this one's image plane
   std::uint32_t threads = 1;       // render threads, [1, kMaxThreads]
   std::uint64_t memory_bytes = 0;  // budget for cached slabs; 0: none stated
+  std::uint64_t memory_scope = 0;  // workers of the same scope can read each other's memory (SharedMemoryScope); 0: it takes frames only
   friend bool operator==(const Register&, const Register&) = default;
 };
 
@@ -73,6 +74,7 @@ inline constexpr std::size_t kMaxCancelled = 1024;
 struct Peer {
   WorkerId worker = 0;
   std::string images_endpoint;
+  std::uint64_t memory_scope = 0;  // as it registered
   friend bool operator==(const Peer&, const Peer&) = default;
 };
 
@@ -86,8 +88,9 @@ struct GroupAssignment {
   WorkerId display = 0;
   FrameSetup setup;
   GroupPlan group;
-  std::vector<Peer> peers;  // every worker of the group, and the display worker
-  OcclusionMask hidden;     // some of what earlier groups hide (common/planning/frame_occlusion.h); fits the setup
+  std::vector<Peer> peers;        // every worker of the group, and the display worker
+  OcclusionMask hidden;           // some of what earlier groups hide (common/planning/frame_occlusion.h); fits the setup
+  std::uint32_t groups_done = 0;  // of the frame, at most key.group: accumulated, so that what was lent for them has been read
   friend bool operator==(const GroupAssignment&, const GroupAssignment&) = default;
 };
 

@@ -1,7 +1,51 @@
+#include <algorithm>
+#include <limits>
+#include <string>
+
 #include "common/wire/codecs.h"
 #include "common/wire/limits.h"
 
 namespace slabstream {
+
+v1::SharedImage ToProto(const SharedImage& in) {
+  v1::SharedImage out;
+  out.set_arena(in.arena.id);
+  out.set_pid(in.arena.pid);
+  out.set_file_descriptor(in.arena.file_descriptor);
+  *out.mutable_bounds() = ToProto(in.bounds);
+  out.set_stride(in.stride);
+  out.set_first_pixel(in.first_pixel);
+  WriteAll(in.planes, out.mutable_planes());
+  return out;
+}
+
+SharedImage FromProto(const v1::SharedImage& in, Checker& check) {
+  SharedImage out;
+  out.arena.id = check.Range("arena", in.arena(), 1, std::numeric_limits<std::uint64_t>::max());
+  out.arena.pid = in.pid();
+  out.arena.file_descriptor = in.file_descriptor();
+  out.bounds = Read("bounds", in.bounds(), check);
+  check.That(!out.bounds.empty(), "bounds", "no pixels");
+  out.stride = check.Range("stride", in.stride(), std::uint32_t(std::max(out.bounds.width(), 1)), kMaxFrameSide);
+  out.first_pixel = check.Range("first_pixel", in.first_pixel(), 0, kMaxFramePixels);
+  out.planes = ReadAll("planes", in.planes(), 3, check);
+  return out;
+}
+
+v1::SharedBlock ToProto(const BlockName& in) {
+  v1::SharedBlock out;
+  out.set_offset(in.offset);
+  out.set_generation(in.generation);
+  out.set_slot(in.slot);
+  return out;
+}
+
+BlockName FromProto(const v1::SharedBlock& in, Checker& check) {
+  check.That(in.offset() % kBlockAlignment == 0, "offset", std::to_string(in.offset()) + " is no multiple of a page");
+  return {.offset = check.Range("offset", in.offset(), 0, kArenaBytes),
+          .generation = check.Range("generation", in.generation(), 1, std::numeric_limits<std::uint64_t>::max()),
+          .slot = check.Range("slot", in.slot(), 0, kArenaSlots - 1)};
+}
 
 v1::PartialImage ToProto(const PartialImage& in) {
   v1::PartialImage out;
@@ -14,6 +58,7 @@ v1::PartialImage ToProto(const PartialImage& in) {
   *out.mutable_pixels() = ToProto(in.pixels);
   *out.mutable_image() = ToProto(in.image);
   WriteAll(in.reports, out.mutable_reports());
+  if (in.shared) *out.mutable_shared() = ToProto(*in.shared);
   return out;
 }
 
@@ -29,7 +74,32 @@ PartialImage FromProto(const v1::PartialImage& in, Checker& check) {
   out.image = Read("image", in.image(), check);
   check.That(out.image.format != PixelFormat::kRgbaDepth, "image.format", "that of a finished picture, which is not combined any more");
   out.reports = ReadAll("reports", in.reports(), kMaxReports, check);
+  if (in.has_shared()) {
+    out.shared = Read("shared", in.shared(), check);
+    check.That(out.image.bounds.empty() && out.image.pixel_count == 0, "image", "runs beside a shared image");
+    const std::size_t planes = out.image.format == PixelFormat::kDepth ? 3 : 1;
+    check.That(out.shared->planes.size() == planes, "shared.planes",
+               std::to_string(out.shared->planes.size()) + " of " + std::to_string(planes));
+  }
   return out;
+}
+
+v1::ImageRefused ToProto(const ImageRefused& in) {
+  v1::ImageRefused out;
+  out.set_epoch(in.epoch);
+  out.set_from_worker(in.from_worker);
+  *out.mutable_key() = ToProto(in.key);
+  out.set_step(in.step);
+  *out.mutable_pixels() = ToProto(in.pixels);
+  return out;
+}
+
+ImageRefused FromProto(const v1::ImageRefused& in, Checker& check) {
+  return {.epoch = in.epoch(),
+          .from_worker = in.from_worker(),
+          .key = Read("key", in.key(), check),
+          .step = check.Range("step", in.step(), 0, kMaxSteps),
+          .pixels = Read("pixels", in.pixels(), check)};
 }
 
 }  // namespace slabstream

@@ -224,6 +224,7 @@ v1::GroupPlan ToProto(const GroupPlan& in) {
   v1::GroupPlan out;
   WriteAll(in.placements, out.mutable_placements());
   *out.mutable_schedule() = ToProto(in.schedule);
+  out.set_color(WireEnum<v1::ColorCoding>(in.color, ColorCoding::kFloat32));
   return out;
 }
 
@@ -231,6 +232,7 @@ GroupPlan FromProto(const v1::GroupPlan& in, Checker& check) {
   GroupPlan out;
   out.placements = ReadAll("placements", in.placements(), kMaxRanks, check);
   out.schedule = Read("schedule", in.schedule(), check);
+  out.color = check.OneOf("color", in.color(), ColorCoding::kFloat32, ColorCoding::kFixed16);
   return out;
 }
 

@@ -175,12 +175,15 @@ v1::RunImageHeader ToProto(const RunImageHeader& in) {
   *out.mutable_bounds() = ToProto(in.bounds);
   out.set_run_count(in.run_count);
   out.set_pixel_count(in.pixel_count);
+  out.set_color(WireEnum<v1::ColorCoding>(in.color, ColorCoding::kFloat32));
   return out;
 }
 
 RunImageHeader FromProto(const v1::RunImageHeader& in, Checker& check) {
   RunImageHeader out;
   out.format = check.OneOf("format", in.format(), PixelFormat::kRgba, PixelFormat::kRgbaDepth);
+  out.color = check.OneOf("color", in.color(), ColorCoding::kFloat32, ColorCoding::kFixed16);
+  check.That(out.format == PixelFormat::kRgba || out.color == ColorCoding::kFloat32, "color", "not floats, beside depths");
   out.bounds = Read("bounds", in.bounds(), check);
   // At most kMaxFramePixels pixels and 2^32 runs: the payload's length cannot overflow.
   out.pixel_count = check.Range("pixel_count", in.pixel_count(), 0, static_cast<std::uint64_t>(out.bounds.pixel_count()));
@@ -205,6 +208,7 @@ v1::EncodedRuns ToProto(const EncodedRuns& in) {
 EncodedRuns FromProto(const v1::EncodedRuns& in, Checker& check) {
   EncodedRuns out;
   out.image = Read("image", in.image(), check);
+  check.That(out.image.color == ColorCoding::kFloat32, "image.color", "not floats, to a client");
   out.codec = CodecFromProto(in.codec(), check);
   const std::uint64_t raw_bytes = PayloadBytes(out.image);
   out.encoded_bytes = check.Range("encoded_bytes", in.encoded_bytes(), out.codec == Codec::kRaw ? raw_bytes : 1, raw_bytes);
@@ -266,6 +270,8 @@ v1::RankReport ToProto(const RankReport& in) {
   out.set_drawn_voxels(in.drawn_voxels);
   out.set_voxel_bytes(in.voxel_bytes);
   out.set_image_bytes(in.image_bytes);
+  *out.mutable_image_bounds() = ToProto(in.image_bounds);
+  out.set_image_pixels(in.image_pixels);
   return out;
 }
 
@@ -285,6 +291,8 @@ RankReport FromProto(const v1::RankReport& in, Checker& check) {
   out.drawn_voxels = in.drawn_voxels();
   out.voxel_bytes = in.voxel_bytes();
   out.image_bytes = in.image_bytes();
+  out.image_bounds = FromProto(in.image_bounds(), check);
+  out.image_pixels = in.image_pixels();
   return out;
 }
 

@@ -1,4 +1,5 @@
 #include "common/image/run_image.h"
+#include "common/image/image_view.h"
 
 #include <gtest/gtest.h>
 
@@ -62,14 +63,14 @@ TEST(RunImage, LeavesEmptyPixelsAndRowsOut) {
   image.rgba[4 * (2 * 10 + 4) + 3] = 0.5F;  // (6, 5)
   image.rgba[4 * (2 * 10 + 5) + 3] = 0.5F;  // (7, 5)
   const RunImage runs = EncodeRuns(image, {LinearIndex(0, 4), LinearIndex(0, 7)}, kFrame.width());
-  EXPECT_EQ(runs.header.bounds, (PixelBounds{2, 4, 12, 7}));  // rows of the range
+  EXPECT_EQ(runs.header.bounds, (PixelBounds{6, 5, 8, 6}));
   EXPECT_EQ(runs.header.run_count, 1U);
   EXPECT_EQ(runs.header.pixel_count, 2U);
   EXPECT_EQ(runs.payload.size(), 12U + 2 * 16U);
   std::uint32_t run[3];
   std::memcpy(run, runs.payload.data(), sizeof(run));
-  EXPECT_EQ(run[0], 1U);  // row
-  EXPECT_EQ(run[1], 4U);  // column
+  EXPECT_EQ(run[0], 0U);  // row
+  EXPECT_EQ(run[1], 0U);  // column
   EXPECT_EQ(run[2], 2U);  // pixels
 }
 
@@ -153,7 +154,7 @@ RunImage TwoRuns(PixelFormat format) {
     image.rgba[4 * x + 3] = 1;
     if (HasDepth(format)) image.depth[x] = 2;
   }
-  return EncodeRuns(image, kWhole, kFrame.width());
+  return EncodeRuns(ViewOf(image));
 }
 
 constexpr std::int32_t kMin = std::numeric_limits<std::int32_t>::min(), kMax = std::numeric_limits<std::int32_t>::max();

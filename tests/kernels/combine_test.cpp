@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <vector>
 
@@ -30,12 +31,46 @@ LocalImage Combined(LocalImage image, const LocalImage& other, Side side) {
   return image;
 }
 
+// Either the least or the most that an image may grow to: no difference in the picture.
+PixelBounds Room(const PixelBounds& a, const PixelBounds& b, Side side) { return side == Side::kFront ? Union(a, b) : kFrame; }
+
 // The same, with `other` as it travels, at an odd address.
 LocalImage CombinedRuns(LocalImage image, const LocalImage& other, Side side) {
   const RunImage runs = EncodeRuns(other, kWhole, kFrame.width());
   std::vector<std::byte> shifted(runs.payload.size() + 1);
   std::copy(runs.payload.begin(), runs.payload.end(), shifted.begin() + 1);
-  CombineRuns(image, runs.header, std::span<const std::byte>(shifted).subspan(1), side);
+  CombineRuns(image, runs.header, std::span<const std::byte>(shifted).subspan(1), side, Room(image.bounds, runs.header.bounds, side));
+  return image;
+}
+
+// The same pixels on the whole frame: images without empty rims have smaller bounds.
+LocalImage OnFrame(LocalImage image) {
+  FillRows(image);
+  LocalImage whole = MakeLocalImage(image.format, kFrame);
+  for (std::int32_t y = image.bounds.y_begin; y < image.bounds.y_end; ++y) {
+    for (std::int32_t x = image.bounds.x_begin; x < image.bounds.x_end; ++x) {
+      const auto from = std::size_t((y - image.bounds.y_begin) * image.bounds.width() + x - image.bounds.x_begin);
+      const auto to = std::size_t(y * kFrame.width() + x);
+      std::copy_n(&image.rgba[4 * from], 4, &whole.rgba[4 * to]);
+      if (image.format != PixelFormat::kDepth) continue;
+      whole.depth[to] = image.depth[from];
+      whole.voxel[to] = image.voxel[from];
+    }
+  }
+  return whole;
+}
+
+PixelRange RandomRange(Random& random) {
+  const auto begin = random.Integer<std::uint64_t>(0, kWhole.end);
+  return random.Chance(0.2) ? kWhole : PixelRange{begin, random.Integer<std::uint64_t>(begin, kWhole.end)};
+}
+
+// `image` without the pixels outside of `range`, if `inside`, or else without those in it.
+LocalImage Masked(LocalImage image, PixelRange range, bool inside) {
+  image = OnFrame(image);
+  for (std::uint64_t i = 0; i < kWhole.end; ++i) {
+    if ((i >= range.begin && i < range.end) != inside) MakeEmpty(image, std::size_t(i), std::size_t(i + 1));
+  }
   return image;
 }
 
@@ -63,12 +98,35 @@ TEST_P(CombineFormats, RunsGiveTheBitsOfDenseImages) {
     const LocalImage b = RandomImage(random, GetParam(), RandomBounds(random, kFrame));
     for (Side side : {Side::kFront, Side::kBack}) {
       const LocalImage dense = Combined(a, b, side), runs = CombinedRuns(a, b, side);
-      if (runs.bounds != dense.bounds) {  // nothing but empty pixels: the runs leave the bounds as they are
-        EXPECT_EQ(EncodeRuns(b, kWhole, kFrame.width()).header.run_count, 0U);
-      } else {
-        ExpectSameBits(runs, dense);
-      }
+      ExpectSameBits(OnFrame(runs), OnFrame(dense));
     }
+  }
+}
+
+TEST_P(CombineFormats, ViewsOfARangeGiveTheBitsOfItsPixels) {
+  Random random(54);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 500; ++i) {
+    const LocalImage a = RandomImage(random, GetParam(), RandomBounds(random, kFrame));
+    const LocalImage b = RandomImage(random, GetParam(), RandomBounds(random, kFrame));
+    const PixelRange range = RandomRange(random);
+    const ImageView view = ViewOf(b, range, kFrame.width());
+    ASSERT_TRUE(kFrame.Contains(view.bounds));
+    const LocalImage part = Masked(b, range, true);
+    ExpectSameBits(OnFrame(CopyOf(view)), part);
+    ImageView clipped = ViewOf(b);
+    Clip(clipped, range, kFrame.width());
+    ExpectSameBits(OnFrame(CopyOf(clipped)), part);
+    for (Side side : {Side::kFront, Side::kBack}) {
+      LocalImage image = a;
+      Combine(image, view, side, Room(image.bounds, view.bounds, side));
+      ExpectSameBits(OnFrame(image), OnFrame(Combined(a, part, side)));
+    }
+    LocalImage erased = a;
+    Erase(erased, range, kFrame.width());
+    ExpectSameBits(OnFrame(erased), Masked(a, range, false));
+    Combine(erased, view, Side::kBack, kFrame);
+    ExpectSameBits(OnFrame(erased), Combined(Masked(a, range, false), part, Side::kBack));
   }
 }
 

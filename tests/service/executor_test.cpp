@@ -41,8 +41,11 @@ class ExecutorTest : public testing::Test {
   // Orders a combine of an image as it comes from another worker.
   CombineDone CombineIncoming(ImageHandle into, const LocalImage& image, Side side) {
     RunImage runs = EncodeRuns(image, {0, 16 * 8}, 16);
-    executor_.Perform(
-        StartCombine{.key = kKey, .image = into, .header = runs.header, .payload = Bytes(std::move(runs.payload)), .side = side}, kFrame);
+    executor_.Perform(StartCombine{.key = kKey,
+                                   .image = into,
+                                   .incoming = {.header = runs.header, .payload = Bytes(std::move(runs.payload))},
+                                   .side = side,
+                                   .frame = kFrame});
     return NextEvent<CombineDone>();
   }
   // What the image would be sent as: its pixels.
@@ -50,7 +53,8 @@ class ExecutorTest : public testing::Test {
     executor_.Perform(
         SendPartial{.message = {.epoch = 1, .from_worker = 1, .key = kKey, .interval = {0, 1}, .pixels = pixels, .reports = {RankReport{}}},
                     .image = image,
-                    .frame_width = 16});
+                    .frame = kFrame},
+        false);
     const auto sent = std::get<OutgoingPartial>(Next());
     const AnyMessage message = Decode(sent.header).value();
     const auto& partial = std::get<PartialImage>(message);
@@ -67,9 +71,9 @@ TEST_F(ExecutorTest, ImagesCombineInOrderAndSourcesStayAsTheyAre) {
   EXPECT_TRUE(CombineIncoming(1, Filled({0, 0, 8, 4}, 0.5F), Side::kBack).status.ok());
   EXPECT_TRUE(CombineIncoming(2, Filled({0, 0, 4, 4}, 0.25F), Side::kBack).status.ok());
   // 3 becomes a copy of the left half of row 0 of 1; then 2 goes behind 1.
-  executor_.Perform(StartCombine{.key = kKey, .image = 3, .other = 1, .pixels = {0, 4}, .frame_width = 16}, kFrame);
+  executor_.Perform(StartCombine{.key = kKey, .image = 3, .other = 1, .pixels = {0, 4}, .frame = kFrame});
   EXPECT_TRUE(NextEvent<CombineDone>().status.ok());
-  executor_.Perform(StartCombine{.key = kKey, .image = 1, .other = 2, .side = Side::kBack}, kFrame);
+  executor_.Perform(StartCombine{.key = kKey, .image = 1, .other = 2, .side = Side::kBack, .frame = kFrame});
   EXPECT_TRUE(NextEvent<CombineDone>().status.ok());
 
   const LocalImage combined = PixelsOf(1);
@@ -84,7 +88,7 @@ TEST_F(ExecutorTest, ImagesCombineInOrderAndSourcesStayAsTheyAre) {
 
 TEST_F(ExecutorTest, ReleasedImagesServeTheOrdersThatWereGivenBefore) {
   EXPECT_TRUE(CombineIncoming(1, Filled({0, 0, 8, 4}, 0.5F), Side::kBack).status.ok());
-  executor_.Perform(StartCombine{.key = kKey, .image = 2, .other = 1}, kFrame);
+  executor_.Perform(StartCombine{.key = kKey, .image = 2, .other = 1, .frame = kFrame});
   executor_.Perform(ReleaseImage{1});
   EXPECT_TRUE(NextEvent<CombineDone>().status.ok());
   EXPECT_FLOAT_EQ(PixelAt(PixelsOf(2), 7, 3).rgba[3], 0.5F);
@@ -96,7 +100,8 @@ TEST_F(ExecutorTest, DamagedRunsAreRefused) {
   EXPECT_EQ(CombineIncoming(1, Filled({0, 0, 8, 4}, NAN), Side::kBack).status.code(), StatusCode::kInvalidArgument);
   RunImage runs = EncodeRuns(Filled({0, 0, 8, 4}, 0.5F), {0, 16 * 8}, 16);
   runs.header.bounds = {0, 0, 1 << 24, 1 << 24};  // would take petabytes
-  executor_.Perform(StartCombine{.key = kKey, .image = 1, .header = runs.header, .payload = Bytes(std::move(runs.payload))}, kFrame);
+  executor_.Perform(StartCombine{
+      .key = kKey, .image = 1, .incoming = {.header = runs.header, .payload = Bytes(std::move(runs.payload))}, .frame = kFrame});
   EXPECT_FALSE(NextEvent<CombineDone>().status.ok());
   EXPECT_FALSE(CombineIncoming(1, MakeLocalImage(PixelFormat::kDepth, {0, 0, 8, 4}), Side::kBack).status.ok());
   EXPECT_FLOAT_EQ(PixelAt(PixelsOf(1), 7, 3).rgba[3], 0.5F) << "the image is as it was";
@@ -110,7 +115,8 @@ TEST_F(ExecutorTest, HiddenTilesAreThoseOfWhatWasCombinedBefore) {
   const PixelBounds frame = FrameBounds(setup);
   const auto combine = [&](const PixelBounds& bounds, float alpha) {
     RunImage runs = EncodeRuns(Filled(bounds, alpha), WholeFrame(setup), frame.width());
-    executor_.Perform(StartCombine{.key = kKey, .image = 1, .header = runs.header, .payload = Bytes(std::move(runs.payload))}, frame);
+    executor_.Perform(StartCombine{
+        .key = kKey, .image = 1, .incoming = {.header = runs.header, .payload = Bytes(std::move(runs.payload))}, .frame = frame});
   };
   combine({0, 0, 20, 8}, 1);
   executor_.Perform(FindHidden{kKey, 1, shared, {}});

@@ -5,13 +5,16 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 #include <iostream>
+#include <iterator>
 #include <random>
 
 #include "common/volume_io/volume_reader.h"
 #include "tests/service/child_process.h"
 #include "tests/service/pictures.h"
 #include "tests/support/random.h"
+#include "tests/support/random_combining.h"
 #include "tests/support/temporary_directory.h"
 
 namespace slabstream {
@@ -47,8 +50,10 @@ class MultiProcessTest : public testing::Test {
     client_endpoint_ = FieldOf(ready, "client");
     worker_endpoint_ = FieldOf(ready, "workers");
   }
-  void StartWorker() {
-    workers_.emplace_back(std::vector<std::string>{SLABSTREAM_WORKER_PROGRAM, "--coordinator", worker_endpoint_, "--log-level", "error"});
+  void StartWorker(const std::vector<std::string>& options = {}) {
+    std::vector<std::string> command = {SLABSTREAM_WORKER_PROGRAM, "--coordinator", worker_endpoint_, "--log-level", "error"};
+    command.insert(command.end(), options.begin(), options.end());
+    workers_.emplace_back(command);
   }
   void KillWorker(std::size_t index) {
     workers_[index].Kill(SIGKILL);
@@ -104,6 +109,7 @@ TEST_F(MultiProcessTest, KilledWorkersCostNoFrameAndChangeNoPicture) {
         TestRequest(round % 2 == 0 ? RendererKind::kSplat : RendererKind::kZBuffer, random_.Integer(0, 359), random_.Integer(1, 4));
     request.size = {320, 300};
     request.previews = true;
+    request.policy.combine = RandomCombining(random_);
     const LocalImage expected = RenderDirectly(request, *volume_);
     const auto victim = std::size_t(random_.Integer(0, int(workers_.size()) - 1));
     int events_left = random_.Integer(0, 4);
@@ -122,6 +128,75 @@ TEST_F(MultiProcessTest, KilledWorkersCostNoFrameAndChangeNoPicture) {
     EXPECT_LE(LargestDifference(picture->image, expected, request.size), AllowedDifference(request));
     if (killed && random_.Integer(0, 2) > 0) StartWorker();  // it joins while later frames run
     while (workers_.size() < 2) StartWorker();
+  }
+}
+
+// Images between workers stay in their memory: it is used again and again, and nothing of it is left anywhere.
+TEST_F(MultiProcessTest, ManyFramesTakeNoMoreMemoryAndFilesThanAFew) {
+  const auto entries = [](const std::filesystem::path& path) {
+    return std::distance(std::filesystem::directory_iterator(path), std::filesystem::directory_iterator());
+  };
+  const auto segments = entries("/dev/shm");
+  StartCoordinator();
+  for (int i = 0; i < 4; ++i) StartWorker();
+  Client client = Connect();
+  AwaitWorkers(client, 4);
+  struct Use {
+    std::ptrdiff_t files = 0, kib = 0;
+  };
+  const auto used = [&] {
+    Use use;
+    for (const ChildProcess& worker : workers_) {
+      const std::filesystem::path process = "/proc/" + std::to_string(worker.pid());
+      use.files += entries(process / "fd");
+      std::ifstream status(process / "status");
+      for (std::string line; std::getline(status, line);) {
+        if (line.starts_with("VmRSS:")) use.kib += std::stol(line.substr(6));
+      }
+    }
+    return use;
+  };
+  Use early;
+  for (int i = 0; i < 200; ++i) {
+    FrameRequest request = TestRequest(RendererKind::kSplat, 3 * i, 2);
+    request.size = {320, 300};
+    request.policy.combine = RandomCombining(random_);
+    const Result<Picture> picture = client.Render(request, seconds(60));
+    ASSERT_TRUE(picture.ok()) << picture.status().message();
+    if (i == 60) early = used();
+  }
+  const Use late = used();
+  EXPECT_LE(late.files, early.files + 4);
+#ifndef __SANITIZE_ADDRESS__  // which keeps what is freed for a while, and more of it from frame to frame
+  EXPECT_LE(late.kib, early.kib + early.kib / 2) << "KiB of four workers";
+#endif
+  workers_.clear();  // killed
+  EXPECT_EQ(entries("/dev/shm"), segments);
+}
+
+TEST_F(MultiProcessTest, WorkersThatShareNoMemoryGiveTheSamePicture) {
+  StartCoordinator();
+  StartWorker();
+  StartWorker({"--no-shared-memory"});
+  StartWorker();
+  Client client = Connect();
+  AwaitWorkers(client, 3);
+  for (const CombiningEntry& scheme : CombiningSchemes()) {
+    for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
+      FrameRequest request = TestRequest(renderer, 50, 1);
+      request.size = {320, 300};
+      request.policy.combine = scheme.name;
+      const Result<Picture> picture = client.Render(request, seconds(60));
+      ASSERT_TRUE(picture.ok()) << picture.status().message();
+      const LocalImage expected = RenderDirectly(request, *volume_);
+      EXPECT_LE(LargestDifference(picture->image, expected, request.size), AllowedDifference(request)) << scheme.name;
+
+      request.policy.pixel_error = 1.0 / 1024;
+      const Result<Picture> coded = client.Render(request, seconds(60));
+      ASSERT_TRUE(coded.ok()) << coded.status().message();
+      const double allowed = renderer == RendererKind::kZBuffer ? 0 : request.policy.pixel_error;
+      EXPECT_LE(LargestDifference(coded->image, expected, request.size), AllowedDifference(request) + allowed) << scheme.name;
+    }
   }
 }
 

@@ -96,16 +96,16 @@ void ModelWorker::Perform(const StartRender& action) {
   rendering_ = action;
   const std::uint64_t number = ++render_number_;
   const Status status = random_.Chance(faults_.fail_render) ? Status::ResourceExhausted("no memory to render") : Status::Ok();
-  queue_.After(Duration(random_.Integer<std::int64_t>(speed_.render.count() / 2, speed_.render.count() * 2)),
-               [this, number, status] { FinishRender(number, status); });
+  const Duration time(random_.Integer<std::int64_t>(speed_.render.count() / 2, speed_.render.count() * 2));
+  queue_.After(time, [this, number, status, time] { FinishRender(number, status, time); });
 }
 
 void ModelWorker::Perform(const CancelRender& action) {
   if (!rendering_ || rendering_->key != action.key || random_.Chance(0.3)) return;  // sometimes too late
-  queue_.After(speed_.store, [this, number = render_number_] { FinishRender(number, Status::Cancelled("render")); });
+  queue_.After(speed_.store, [this, number = render_number_] { FinishRender(number, Status::Cancelled("render"), {}); });
 }
 
-void ModelWorker::FinishRender(std::uint64_t number, Status status) {
+void ModelWorker::FinishRender(std::uint64_t number, Status status, Duration time) {
   if (!alive_ || !rendering_ || number != render_number_) return;  // ended already
   const StartRender render = *std::exchange(rendering_, std::nullopt);
   if (status.ok()) {
@@ -117,7 +117,9 @@ void ModelWorker::FinishRender(std::uint64_t number, Status status) {
   } else {
     images_.FailRender(render.image);
   }
-  Step(RenderDone{render.key, render.rank, render.image, std::move(status), {}, std::uint64_t(render.slab.box.voxel_count()) * 2});
+  RankReport report;
+  report.stage_ns[std::size_t(Stage::kRender)] = time.count();
+  Step(RenderDone{render.key, render.rank, render.image, std::move(status), report, std::uint64_t(render.slab.box.voxel_count()) * 2});
 }
 
 void ModelWorker::Perform(const StartCombine& action) {

@@ -70,7 +70,7 @@ class ModelWorker {
   void Perform(const ReleaseImage& action) { images_.Release(action.image); }
   void Perform(const StopProcess&);
 
-  void FinishRender(std::uint64_t number, Status status);
+  void FinishRender(std::uint64_t number, Status status, Duration time);
   void CheckCredit();
 
   const int node_;

@@ -30,7 +30,8 @@ namespace slabstream {
 // Counts over all worlds, so that a test can see that it tested something.
 struct Tally {
   std::uint64_t worlds = 0, requests = 0, pictures = 0, previews = 0, errors = 0, cancelled = 0, retried = 0, cached_frames = 0,
-                workers_killed = 0, coordinator_restarts = 0, masks = 0, masks_of_retries = 0, hidden_pixels = 0, hidden_boxes = 0;
+                workers_killed = 0, coordinator_restarts = 0, masks = 0, masks_of_retries = 0, hidden_pixels = 0, hidden_boxes = 0,
+                counts = 0, moved_boxes = 0;
 };
 
 class Simulation : private WorkerNetwork {
@@ -54,6 +55,7 @@ class Simulation : private WorkerNetwork {
     std::uint32_t attempt = 0;
     FrameSetup setup;
     std::map<std::uint32_t, std::vector<BoxId>> groups;
+    std::map<BoxId, Box> boxes;
     WorkerId display = 0;                      // of this attempt
     std::set<std::uint32_t> handed_out;        // groups of this attempt
     std::map<WorkerId, std::uint32_t> done;    // groups that a display worker has said are done: the first so many
@@ -86,6 +88,7 @@ class Simulation : private WorkerNetwork {
   void Perform(const CoordinatorEvent& event, const ToWorker& action);
   void Perform(const CoordinatorEvent& event, const ToClient& action);
   void Perform(const CoordinatorEvent& event, const LoadDataset& action);
+  void Perform(const CoordinatorEvent& event, const CountDataset& action);
   void Perform(const CoordinatorEvent& event, const StopService&);
   void Observe(const GroupAssignment& assignment);
   void CheckHidden(const GroupAssignment& assignment, const SeenFrame& frame);
@@ -109,6 +112,7 @@ class Simulation : private WorkerNetwork {
   const bool encode_messages_;  // in a few worlds messages are encoded and decoded on their way
   bool workerless_ = false;     // for a moment no worker was alive
   std::shared_ptr<const VolumeSummary> summary_;
+  std::shared_ptr<const OccupancyGrid> occupied_;
   std::unique_ptr<Coordinator> coordinator_;
   std::vector<std::unique_ptr<Coordinator>> dead_coordinators_;  // events that are still planned refer to them
   std::vector<std::unique_ptr<ModelWorker>> workers_;            // by node
@@ -119,6 +123,7 @@ class Simulation : private WorkerNetwork {
   Policy policy_;
   std::size_t requests_planned_ = 0, requests_made_ = 0;
   std::map<FrameId, SeenFrame> frames_;         // of this epoch
+  std::map<BoxId, Box> last_boxes_;             // as they were handed out last
   std::set<std::pair<WorkerId, Box>> fetched_;  // voxels that workers hold for sure
   std::optional<StatusReply> status_;
 };

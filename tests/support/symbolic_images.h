@@ -62,10 +62,11 @@ class SymbolicImages {
   }
 
   void Combine(const StartCombine& combine) {
-    SymbolicImage source = combine.other == 0 ? UnpackSymbols(combine.payload) : Get(combine.other);
+    SymbolicImage source = combine.other == 0 ? UnpackSymbols(combine.incoming.payload) : Get(combine.other);
     if (combine.pixels.begin < combine.pixels.end) source = Within(source, combine.pixels);
     EXPECT_EQ(released_.count(combine.image), 0U) << "image " << combine.image << " is combined into after its release";
     SymbolicImage& image = images_[combine.image];
+    if (combine.replace) image.erase(image.lower_bound(combine.pixels.begin), image.lower_bound(combine.pixels.end));
     for (const auto& [index, pixel] : source) {
       SymbolicPixel& here = image[index];
       here.insert(combine.side == Side::kFront ? here.begin() : here.end(), pixel.begin(), pixel.end());

@@ -155,6 +155,8 @@ TEST(AnyMessage, PayloadLengthsAreThoseOfTheHeader) {
   EXPECT_EQ(ExpectedPayloadBytes(FrameImage{.runs = runs, .reports = {}}), 99U);
   EXPECT_EQ(ExpectedPayloadBytes(FrameReply{.runs = runs, .statistics = {}}), 99U);
   EXPECT_EQ(ExpectedPayloadBytes(PartialImage{.image = runs.image, .reports = {}}), 3U * 12 + 50 * 24);
+  const SharedImage shared = {.arena = {1, 2, 3}, .bounds = {5, 10, 9, 17}, .stride = 4};
+  EXPECT_EQ(ExpectedPayloadBytes(PartialImage{.shared = shared, .reports = {}}), 7U * 8);
   EXPECT_EQ(ExpectedPayloadBytes(Chunk{.encoded_bytes = 17}), 17U);
   EXPECT_EQ(ExpectedPayloadBytes(Stop{}), 0U);
 }

@@ -206,6 +206,7 @@ TEST(FieldChecks, Images) {
     header->mutable_bounds()->set_y_end(40);
     header->set_run_count(10);
     header->set_pixel_count(1200);
+    header->set_color(v1::COLOR_CODING_FLOAT32);
     return header;
   };
   Check<PartialImage>({
@@ -224,6 +225,7 @@ TEST(FieldChecks, Images) {
          header->set_pixel_count(std::uint64_t{1} << 48U);
        },
        "PartialImage.image.pixel_count: a payload of 4503599627370616 bytes, at most 2147483648"},
+      {[](auto& e) { e.mutable_partial_image()->mutable_shared(); }, "PartialImage.shared.arena: 0 is not in [1, 18446744073709551615]"},
       {[](auto& e) { e.mutable_partial_image()->set_interval_end(0); }, "PartialImage.interval_end: 0 is not in [1, 65536]"},
       {[](auto& e) { e.mutable_partial_image()->set_step((1U << 20U) + 1); }, "PartialImage.step: 1048577 is not in [0, 1048576]"},
       {[](auto& e) { e.mutable_partial_image()->mutable_image()->set_format(v1::PIXEL_FORMAT_RGBA_DEPTH); },

@@ -177,6 +177,7 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       {"depth_row", 4},
       {"from_picture", 9},
       {"stage_ns", kStageCount},
+      {"planes", 3},
   };
   std::map<std::string, bool> seen;
   AlterEachField(

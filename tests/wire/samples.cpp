@@ -20,7 +20,8 @@ RankReport FullReport() {
   RankReport report{.worker = kMax32, .group = 1023, .rank = 65535, .box = kMax32};
   for (int i = 0; i < kStageCount; ++i) report.stage_ns[static_cast<std::size_t>(i)] = i % 2 == 0 ? kMaxTime - i : -i;
   for (int i = 0; i < kMaxSpans; ++i) report.spans.push_back({Stage(i % kStageCount), kMaxTime - i, -kMaxTime});
-  report.occupied_voxels = report.drawn_voxels = report.voxel_bytes = report.image_bytes = kMax64;
+  report.occupied_voxels = report.drawn_voxels = report.voxel_bytes = report.image_bytes = report.image_pixels = kMax64;
+  report.image_bounds = {0, 1, 16384, 16384};
   return report;
 }
 
@@ -67,6 +68,7 @@ GroupAssignment Assignment(Rank ranks, const ViewParameters& view, RendererKind 
     message.peers.push_back({rank + 1, "tcp://127.0.0.1:" + std::to_string(5000 + rank)});
   }
   message.group.schedule = ranks == 0 ? Schedule{.ranks = 0, .root = 0, .steps = {}} : MakeFanIn({ranks, ranks / 2, WholeFrame(setup)});
+  message.group.color = renderer == RendererKind::kSplat ? ColorCoding::kFixed16 : ColorCoding::kFloat32;
   message.peers.push_back({kMax32, kOddEndpoint});
   return message;
 }
@@ -177,7 +179,7 @@ std::vector<ChunkRefused> Samples() {
 
 template <>
 std::vector<PartialImage> Samples() {
-  return {{1, 2, {3, 4, 5}, 0, {0, 1}, {0, 0}, NoRuns().image, {}},
+  return {{1, 2, {3, 4, 5}, 0, {0, 1}, {0, 0}, NoRuns().image, {}, {}},
           {kMax64,
            kMax32,
            {},
@@ -185,7 +187,26 @@ std::vector<PartialImage> Samples() {
            {65535, 65536},
            {17, std::uint64_t{1} << 48U},
            {PixelFormat::kDepth, {1, 2, 30, 40}, 7, 900},
-           {RankReport{}, FullReport()}}};
+           {},
+           {RankReport{}, FullReport()}},
+          {1,
+           2,
+           {3, 4, 5},
+           0,
+           {0, 1},
+           {0, 0},
+           {.format = PixelFormat::kDepth},
+           SharedImage{{kMax64, kMax32, kMax32},
+                       {0, 0, 1 << 24, 1},
+                       1U << 24U,
+                       std::uint64_t{1} << 48U,
+                       {{kArenaBytes, kMax64, kArenaSlots - 1}, {0, 1, 0}, {4096, 1, 1}}},
+           {}}};
+}
+
+template <>
+std::vector<ImageRefused> Samples() {
+  return {{}, {kMax64, kMax32, {3, 4, 5}, 1U << 20U, {17, std::uint64_t{1} << 48U}}};
 }
 
 template <>
@@ -198,7 +219,7 @@ std::vector<SubmitFrame> Samples() {
   full.transfer = {Curve(), 1e-6};
   full.shading = ManyLights();
   full.termination = 0.5;
-  full.policy = {kUmlaut, AxisChoice::kX, kMaxGroups, kLongName};
+  full.policy = {kUmlaut, kLongName, AxisChoice::kX, kMaxGroups, kUmlaut, kLongName, kLongName, kMaxPixelError};
   full.previews = true;
   return {{0, 1, Request()}, {kMax64, 86400000, full}};
 }
@@ -210,7 +231,8 @@ std::vector<FrameProgress> Samples() {
 
 template <>
 std::vector<FrameReply> Samples() {
-  const FrameStatistics statistics{kMax32, kMax32, kMax32, "slab", "x", kLongName, -kMaxTime, kMaxTime, kMaxTime, {FullReport()}};
+  const FrameStatistics statistics{kMax32,  kMax32,    kMax32,    "slab",   "occupied", "x",           kLongName,
+                                   kUmlaut, kLongName, -kMaxTime, kMaxTime, kMaxTime,   {FullReport()}};
   return {{1, {1, 1}, 0, 1, NoRuns(), {}}, {kMax64, {30, 40}, 1024, 1024, SomeRuns(), statistics}};
 }
 

@@ -45,6 +45,8 @@ std::vector<ChunkRefused> Samples();
 template <>
 std::vector<PartialImage> Samples();
 template <>
+std::vector<ImageRefused> Samples();
+template <>
 std::vector<SubmitFrame> Samples();
 template <>
 std::vector<FrameProgress> Samples();

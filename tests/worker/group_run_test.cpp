@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "tests/support/random.h"
-#include "tests/support/swap_schedules.h"
+#include "tests/support/random_combining.h"
 #include "tests/support/symbolic_images.h"
 
 namespace slabstream {
@@ -18,21 +18,6 @@ namespace {
 
 constexpr int kWidth = 6, kHeight = 4;
 constexpr PixelRange kFrame{0, kWidth* kHeight};
-
-struct Scheme {
-  std::string name;
-  bool power_of_two = false;  // ranks
-  std::function<Schedule(const ScheduleRequest&)> make;
-};
-
-std::vector<Scheme> Schemes() {
-  std::vector<Scheme> schemes;
-  for (const CombiningEntry& entry : CombiningSchemes()) schemes.push_back({std::string(entry.name), false, entry.make});
-  schemes.push_back({"recursive halving", true, MakeRecursiveHalving});
-  schemes.push_back({"direct send", false, MakeDirectSend});
-  schemes.push_back({"strips", false, [](const ScheduleRequest& request) { return MakeStripChain(request, 5); }});
-  return schemes;
-}
 
 struct Worker {
   ImageNames names;
@@ -135,25 +120,26 @@ class Cluster {
   std::size_t messages_sent_ = 0;
 };
 
-GroupAssignment MakeAssignment(Rank ranks, const std::function<Schedule(const ScheduleRequest&)>& make, Rank root) {
+GroupAssignment MakeAssignment(Rank ranks, const std::string& combining, Rank root) {
   GroupAssignment assignment;
   assignment.epoch = 5;
   assignment.key = {1, 1, 0};
   assignment.setup.sheets.width = kWidth;
   assignment.setup.sheets.height = kHeight;
   for (Rank rank = 0; rank < ranks; ++rank) assignment.group.placements.push_back({rank, {}, 1});
-  assignment.group.schedule = make({ranks, root, kFrame});
+  assignment.group.schedule = MakeSchedule(combining, {ranks, root, kFrame});
   return assignment;
 }
 
 TEST(GroupRun, EveryScheduleGivesTheGroupImageOnceInOrder) {
   Random random(11);
   SCOPED_TRACE(random.trace());
-  for (const Scheme& scheme : Schemes()) {
+  for (const CombiningEntry& scheme : CombiningSchemes()) {
     for (int trial = 0; trial < 60; ++trial) {
-      const Rank ranks = scheme.power_of_two ? 1U << random.Integer(0, 3) : random.Integer<Rank>(1, 9);
-      GroupAssignment assignment = MakeAssignment(ranks, scheme.make, random.Integer<Rank>(0, ranks - 1));
-      SCOPED_TRACE(scheme.name + ", " + std::to_string(ranks) + " ranks, trial " + std::to_string(trial));
+      const auto ranks = random.Integer<Rank>(1, 9);
+      const std::string combining = RandomArguments(scheme, random);
+      GroupAssignment assignment = MakeAssignment(ranks, combining, random.Integer<Rank>(0, ranks - 1));
+      SCOPED_TRACE(combining + ", " + std::to_string(ranks) + " ranks, trial " + std::to_string(trial));
       ASSERT_EQ(CheckSchedule(assignment.group.schedule, kFrame), Status::Ok());
       const WorkerId workers = random.Integer<WorkerId>(1, 5);
       for (Placement& placement : assignment.group.placements) placement.worker = random.Integer<WorkerId>(1, workers);
@@ -173,7 +159,7 @@ TEST(GroupRun, EveryScheduleGivesTheGroupImageOnceInOrder) {
       for (Rank rank = 0; rank < ranks; ++rank) all[rank] = rank;
       SymbolicImage picture;
       for (const ImagePiece& piece : display.group_image->pieces) {
-        const SymbolicImage source = piece.image == 0 ? UnpackSymbols(piece.payload) : display.images.Get(piece.image);
+        const SymbolicImage source = piece.image == 0 ? UnpackSymbols(piece.incoming.payload) : display.images.Get(piece.image);
         for (std::uint64_t i = piece.pixels.begin; i < piece.pixels.end; ++i) EXPECT_TRUE(picture.emplace(i, source.at(i)).second);
       }
       EXPECT_EQ(picture.size(), kFrame.end);
@@ -198,10 +184,10 @@ TEST(GroupRun, EveryScheduleGivesTheGroupImageOnceInOrder) {
 TEST(GroupRun, DropReleasesWhateverItHolds) {
   Random random(12);
   SCOPED_TRACE(random.trace());
-  for (const Scheme& scheme : Schemes()) {
+  for (const CombiningEntry& scheme : CombiningSchemes()) {
     for (int trial = 0; trial < 40; ++trial) {
-      const Rank ranks = scheme.power_of_two ? 1U << random.Integer(0, 3) : random.Integer<Rank>(1, 7);
-      GroupAssignment assignment = MakeAssignment(ranks, scheme.make, random.Integer<Rank>(0, ranks - 1));
+      const auto ranks = random.Integer<Rank>(1, 7);
+      GroupAssignment assignment = MakeAssignment(ranks, RandomArguments(scheme, random), random.Integer<Rank>(0, ranks - 1));
       for (Placement& placement : assignment.group.placements) placement.worker = random.Integer<WorkerId>(1, 3);
       assignment.display = random.Integer<WorkerId>(1, 3);
       Cluster cluster(random, assignment, 3);
@@ -224,7 +210,7 @@ TEST(GroupRun, DropReleasesWhateverItHolds) {
 }
 
 TEST(GroupRun, ImagesOfRanksThatAreNotAdjacentAreAFailure) {
-  GroupAssignment assignment = MakeAssignment(3, MakeFanIn, 0);
+  GroupAssignment assignment = MakeAssignment(3, "fan-in", 0);
   assignment.group.schedule.steps = {{0, 2, 0, kFrame}, {1, 1, 0, kFrame}};
   ImageNames names;
   GroupRun run(assignment, 1, names);
@@ -236,16 +222,16 @@ TEST(GroupRun, ImagesOfRanksThatAreNotAdjacentAreAFailure) {
 
 TEST(GroupRun, AScheduleThatDoesNotFitIsAFailure) {
   ImageNames names;
-  GroupAssignment too_few = MakeAssignment(3, MakeFanIn, 0);
+  GroupAssignment too_few = MakeAssignment(3, "fan-in", 0);
   too_few.group.placements.pop_back();
   EXPECT_FALSE(GroupRun(too_few, 1, names).failure().ok());
-  GroupAssignment out_of_range = MakeAssignment(3, MakeFanIn, 0);
+  GroupAssignment out_of_range = MakeAssignment(3, "fan-in", 0);
   out_of_range.group.schedule.steps[0].from = 3;
   EXPECT_FALSE(GroupRun(out_of_range, 1, names).failure().ok());
 }
 
 TEST(GroupRun, ImagesFromWorkersThatDoNotOwnTheRankAreIgnored) {
-  GroupAssignment assignment = MakeAssignment(2, MakeFanIn, 0);
+  GroupAssignment assignment = MakeAssignment(2, "fan-in", 0);
   assignment.group.placements[1].worker = 2;
   assignment.display = 1;
   ImageNames names;

@@ -367,7 +367,7 @@ TEST_F(WorkerMachineTest, AFrameOfEmptyGroupsIsAnEmptyPicture) {
   const auto combine = All<StartCombine>(Tell(Assignment(1, {})));
   ASSERT_THAT(combine, SizeIs(1));
   EXPECT_EQ(combine[0].other, 0U);
-  EXPECT_EQ(combine[0].header.run_count, 0U);
+  EXPECT_EQ(combine[0].incoming.header.run_count, 0U);
   const Actions done = Combined(combine[0]);
   EXPECT_THAT(Sent<GroupDone>(done), SizeIs(1));
   ASSERT_THAT(All<SendFrame>(done), SizeIs(1));
@@ -569,7 +569,7 @@ TEST_F(HiddenTilesTest, ABoxThatTheyHideAsAWholeIsNeitherFetchedNorRendered) {
   const auto made = All<StartCombine>(told);
   ASSERT_THAT(made, SizeIs(1));
   EXPECT_EQ(made[0].other, 0U);
-  EXPECT_EQ(made[0].header, RunImageHeader{}) << "an empty picture";
+  EXPECT_EQ(made[0].incoming.header, RunImageHeader{}) << "an empty picture";
   const Actions done = Combined(made[0]);
   const auto sent = All<SendPartial>(done);
   ASSERT_THAT(sent, SizeIs(1));

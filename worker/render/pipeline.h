@@ -6,6 +6,7 @@
 #pragma once
 
 #include <atomic>
+#include <functional>
 #include <memory>
 #include <optional>
 
@@ -58,5 +59,7 @@ class Renderer {
 
 // pipelines.cpp, the only list.
 std::unique_ptr<Renderer> MakeRenderer(RendererKind kind);
+
+using RendererFactory = std::function<std::unique_ptr<Renderer>(RendererKind)>;
 
 }  // namespace slabstream

@@ -91,6 +91,7 @@ bool SplatBand::PlaceBeams(const SliceSamples& slice) {
   if (filtered_.size() < 4 * beams * std::size_t(pass_.bounds.width())) filtered_.resize(4 * beams * std::size_t(pass_.bounds.width()));
   needed_.assign((beams + 1) * std::size_t(words_), 0);  // and a word behind the last beam's, for spans
   filled_.assign(needed_.size(), 0);
+  any_filled_.assign(beams, 0);
   return true;
 }
 
@@ -153,7 +154,9 @@ void SplatBand::FindOctets(std::int32_t beam) {
     }
   }
   report_.drawn_voxels += drawn;
-  for (std::int32_t word = 0; word < words_; ++word) filled[word] &= needed[word];
+  SegmentWord any = 0;
+  for (std::int32_t word = 0; word < words_; ++word) any |= filled[word] &= needed[word];
+  any_filled_[std::size_t(beam - first_beam_)] = any != 0;
 }
 
 // Beams of a slice lie together, those of the next one elsewhere.
@@ -175,6 +178,7 @@ void SplatBand::ShadeAndFilter(const SliceSamples& slice) {
     ShadeOctets(pass_.tables, slopes_.u_step, octets);
     clock_.Charge(Stage::kShade);
     for (std::int32_t beam = first_beam_ + begin; beam < first_beam_ + end; ++beam) {
+      if (any_filled_[std::size_t(beam - first_beam_)] == 0) continue;
       const float* voxel_0 = ShadedBeam(beam) + 4 * std::ptrdiff_t{margin_ - pass_.first_octet * kOctet};
       FilterBeam(*slice.along_u, slice.columns, {voxel_0, FilteredBeam(beam), &filled_[BeamWord(beam)], words_, pass_.bounds.x_begin});
     }
@@ -192,6 +196,8 @@ void SplatBand::CompositeRows(const SliceSamples& slice) {
     // Of its taps, those on beams that there are.
     const std::int32_t begin = std::max(first, first_beam_), end = std::min(first + taps, first_beam_ + beam_count_);
     if (begin >= end) continue;
+    const auto filled = std::span<const std::uint8_t>(any_filled_).subspan(std::size_t(begin - first_beam_), std::size_t(end - begin));
+    if (std::ranges::find(filled, 1) == filled.end()) continue;
     row_beams_.clear();
     row_filled_.clear();
     for (std::int32_t beam = begin; beam < end; ++beam) {
@@ -226,6 +232,10 @@ void SplatBand::CompositeCutRow(const SliceSamples& slice, const RowWork& work) 
   std::array<Cut, 2> cuts = {Cut{left / kSegment, 0, left % kSegment}, Cut{right / kSegment, right % kSegment, kSegment}};
   if (right % kSegment == 0) cuts[1] = {0, 0, 0};
   for (Cut& cut : cuts) {
+    // Most rows of a slice have nothing at the box's sides.
+    const auto fills = [&cut](const SegmentWord* filled) { return AnyOf(filled, cut.segment, cut.segment + 1); };
+    if (std::none_of(work.filled, work.filled + work.taps, fills)) cut.begin = cut.end;
+    if (cut.begin == cut.end) continue;
     cut.open = AnyOf(work.open, cut.segment, cut.segment + 1);
     std::copy_n(work.accumulated + std::ptrdiff_t{cut.segment} * kSegmentFloats, kSegmentFloats, cut.kept.begin());
   }

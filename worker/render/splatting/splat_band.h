@@ -66,6 +66,7 @@ class SplatBand {
   std::vector<SegmentWord> owned_;                // [word]: columns that the box owns
   std::vector<SegmentWord> needed_;               // [beam][word]: owned, and open in any row that the beam reaches
   std::vector<SegmentWord> filled_;               // [beam][word]: of them, those that the beam's voxels reach
+  std::vector<std::uint8_t> any_filled_;          // [beam]: 1 if any of them is
   std::vector<OctetWork> octets_;                 // beam by beam
   std::vector<std::size_t> octets_before_;        // [beam], and one more: where the beam's octets begin
   std::int32_t margin_ = 0, shaded_voxels_ = 0;   // voxels beside the occupied ones; voxels in a row of shaded_

@@ -1,0 +1,40 @@
+// CoverageMap: how many pixels of each tile of a frame an image fills. What a cost model needs to know of a picture without its pixels: how
+// much of any pixel range travels, and how images that lie on each other add up.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/image/local_image.h"
+#include "common/image/occlusion_mask.h"
+
+namespace slabstream {
+
+inline constexpr std::int32_t kCoverageTile = kOcclusionTile;  // pixels of the rendered frame, along x and y
+
+struct CoverageMap {
+  std::int32_t frame_width = 0, frame_height = 0;  // pixels
+  // Tile (x, y) covers the pixels [16 x, 16 x + 16) x [16 y, 16 y + 16) of the frame, cut at its border.
+  std::int32_t tiles_x = 0, tiles_y = 0;
+  std::vector<float> share;  // [y][x], of the tile's pixels that are not empty, in [0, 1]
+
+  float at(std::int32_t x, std::int32_t y) const { return share[std::size_t(y) * std::size_t(tiles_x) + std::size_t(x)]; }
+  // Pixels of tile (x, y).
+  std::int32_t TilePixels(std::int32_t x, std::int32_t y) const;
+  double pixels() const;  // not empty, in all
+  friend bool operator==(const CoverageMap&, const CoverageMap&) = default;
+};
+
+// Images as renderers make them: all pixels are stored.
+//
+// Pixels of `image` that are not empty: all are looked at where there are few, one in 32 of larger images, so that asking costs next to
+// nothing.
+std::uint64_t SamplePixels(const LocalImage& image);
+
+// Of `image`, whose bounds lie in a frame of width x height pixels, each at least 1. Exact.
+CoverageMap FindCoverage(const LocalImage& image, std::int32_t width, std::int32_t height);
+
+// `pixels` of them, spread evenly over `bounds`: where no more is known. At most bounds.pixel_count().
+CoverageMap UniformCoverage(const PixelBounds& bounds, double pixels, std::int32_t width, std::int32_t height);
+
+}  // namespace slabstream

@@ -1,0 +1,135 @@
+#include "common/image/image_view.h"
+
+#include <algorithm>
+#include <cstring>
+#include <limits>
+
+#include "common/base/check.h"
+
+namespace slabstream {
+namespace {
+
+// Columns [begin, end), from bounds.x_begin, of row y that lie in the range; none if begin >= end.
+struct Columns {
+  std::int64_t begin, end;
+};
+
+Columns ColumnsInRange(const PixelBounds& bounds, std::int64_t y, PixelRange range, std::uint64_t frame_width) {
+  const std::uint64_t row_start = std::uint64_t(y) * frame_width;
+  const auto column = [&](std::uint64_t index) { return index <= row_start ? 0 : std::int64_t(std::min(index - row_start, frame_width)); };
+  return {std::max<std::int64_t>(bounds.x_begin, column(range.begin)) - bounds.x_begin,
+          std::min<std::int64_t>(bounds.x_end, column(range.end)) - bounds.x_begin};
+}
+
+// `columns` without the empty pixels at both ends. Empty is where `plane`, which has a value each `stride`, is `empty`.
+template <std::size_t stride>
+Columns Narrowed(const float* plane, float empty, Columns columns) {
+  const auto is_empty = [&](std::int64_t x) { return plane[stride * std::size_t(x)] == empty; };
+  // Eight at a time without a branch each, then what is left.
+  const auto are_empty = [&](std::int64_t x) {
+    bool all = true;
+    for (std::int64_t i = 0; i < 8; ++i) all &= is_empty(x + i);
+    return all;
+  };
+  auto [begin, end] = columns;
+  while (begin + 8 <= end && are_empty(begin)) begin += 8;
+  while (begin < end && is_empty(begin)) ++begin;
+  while (begin + 8 <= end && are_empty(end - 8)) end -= 8;
+  while (begin < end && is_empty(end - 1)) --end;
+  return {begin, end};
+}
+
+// Makes the bounds those of the spans.
+void Tighten(ImageView& view) {
+  const auto filled = [](const ColumnSpan& row) { return row.begin < row.end; };
+  const auto first = std::ranges::find_if(view.rows, filled);
+  if (first == view.rows.end()) {
+    const PixelFormat format = view.format;
+    view = {};
+    view.format = format;
+    return;
+  }
+  const auto last = std::find_if(view.rows.rbegin(), view.rows.rend(), filled);
+  const auto above = std::size_t(first - view.rows.begin()), below = std::size_t(last - view.rows.rbegin());
+  view.rows.erase(view.rows.end() - std::ptrdiff_t(below), view.rows.end());
+  view.rows.erase(view.rows.begin(), view.rows.begin() + std::ptrdiff_t(above));
+  std::uint32_t left = std::numeric_limits<std::uint32_t>::max(), right = 0;
+  for (const ColumnSpan& row : view.rows) {
+    if (!filled(row)) continue;
+    left = std::min(left, row.begin);
+    right = std::max(right, row.end);
+  }
+  for (ColumnSpan& row : view.rows) row = filled(row) ? ColumnSpan{row.begin - left, row.end - left} : ColumnSpan{};
+  view.bounds = {view.bounds.x_begin + std::int32_t(left), view.bounds.y_begin + std::int32_t(above),
+                 view.bounds.x_begin + std::int32_t(right), view.bounds.y_end - std::int32_t(below)};
+  const std::size_t first_pixel = above * view.stride + left;
+  view.rgba += 4 * first_pixel;
+  if (HasDepth(view.format)) view.depth += first_pixel;
+  if (HasVoxel(view.format)) view.voxel += first_pixel;
+}
+
+}  // namespace
+
+std::size_t ImageView::pixel_bytes() const {
+  std::size_t pixels = 0;
+  for (const ColumnSpan& row : rows) pixels += row.end - row.begin;
+  return 4 * sizeof(float) * pixels;
+}
+
+ImageView ViewOf(const LocalImage& image) {
+  ImageView view;
+  view.format = image.format;
+  view.bounds = image.bounds;
+  if (image.bounds.empty()) return view;
+  view.rgba = image.rgba.data();
+  if (HasDepth(image.format)) view.depth = image.depth.data();
+  if (HasVoxel(image.format)) view.voxel = image.voxel.data();
+  view.stride = std::size_t(image.bounds.width());
+  view.rows = image.rows;
+  if (view.rows.empty()) view.rows.assign(std::size_t(image.bounds.height()), {0, std::uint32_t(image.bounds.width())});
+  return view;
+}
+
+ImageView ViewOf(const LocalImage& image, PixelRange range, std::int32_t frame_width) {
+  ImageView view = ViewOf(image);
+  const PixelBounds& bounds = image.bounds;
+  CHECK(bounds.empty() || (bounds.x_begin >= 0 && bounds.y_begin >= 0 && bounds.x_end <= frame_width)) << "the image leaves the frame";
+  for (std::size_t y = 0; y < view.rows.size(); ++y) {
+    Columns columns = ColumnsInRange(bounds, bounds.y_begin + std::int64_t(y), range, std::uint64_t(frame_width));
+    columns = {std::max<std::int64_t>(columns.begin, view.rows[y].begin), std::min<std::int64_t>(columns.end, view.rows[y].end)};
+    const std::size_t row = y * view.stride;
+    if (columns.begin < columns.end) {
+      columns = HasDepth(view.format) ? Narrowed<1>(view.depth + row, std::numeric_limits<float>::infinity(), columns)
+                                      : Narrowed<4>(view.rgba + 4 * row + 3, 0, columns);
+    }
+    view.rows[y] = columns.begin < columns.end ? ColumnSpan{std::uint32_t(columns.begin), std::uint32_t(columns.end)} : ColumnSpan{};
+  }
+  Tighten(view);
+  return view;
+}
+
+void Clip(ImageView& view, PixelRange range, std::int32_t frame_width) {
+  for (std::size_t y = 0; y < view.rows.size(); ++y) {
+    const Columns columns = ColumnsInRange(view.bounds, view.bounds.y_begin + std::int64_t(y), range, std::uint64_t(frame_width));
+    ColumnSpan& row = view.rows[y];
+    const std::int64_t begin = std::max<std::int64_t>(row.begin, columns.begin), end = std::min<std::int64_t>(row.end, columns.end);
+    row = begin < end ? ColumnSpan{std::uint32_t(begin), std::uint32_t(end)} : ColumnSpan{};
+  }
+  Tighten(view);
+}
+
+LocalImage CopyOf(const ImageView& view) {
+  LocalImage image = MakeUnwrittenImage(view.format, view.bounds);
+  image.rows = view.rows;
+  const auto width = std::size_t(view.bounds.width());
+  for (std::size_t y = 0; y < view.rows.size(); ++y) {
+    const ColumnSpan& row = view.rows[y];
+    const std::size_t source = y * view.stride + row.begin, target = y * width + row.begin, count = row.end - row.begin;
+    std::memcpy(image.rgba.data() + 4 * target, view.rgba + 4 * source, 4 * sizeof(float) * count);
+    if (HasDepth(view.format)) std::memcpy(image.depth.data() + target, view.depth + source, sizeof(float) * count);
+    if (HasVoxel(view.format)) std::memcpy(image.voxel.data() + target, view.voxel + source, sizeof(std::uint32_t) * count);
+  }
+  return image;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,16 @@
+#include <cstring>
+
+#include "common/kernels/combine.h"
+
+namespace slabstream {
+
+void NearestRowReference(const SourcePixels& source, const TargetPixels& target, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!NearerDepth(source.depth[i], source.voxel[i], target.depth[i], target.voxel[i])) continue;
+    std::memcpy(target.rgba + 4 * i, source.rgba + 4 * i, 4 * sizeof(float));
+    target.depth[i] = source.depth[i];
+    target.voxel[i] = source.voxel[i];
+  }
+}
+
+}  // namespace slabstream

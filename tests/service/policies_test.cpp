@@ -1,0 +1,76 @@
+// Whatever the policy, the picture is that of one renderer that holds the whole volume: every partition, assignment, way to combine and
+// renderer, for any number of workers, in both projections, with boxes that change from frame to frame.
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "client/embedded/embedded_service.h"
+#include "common/combining/schemes.h"
+#include "common/decomposition/decomposition.h"
+#include "common/planning/assignment.h"
+#include "common/planning/policy_names.h"
+#include "tests/service/pictures.h"
+#include "tests/support/random_volume.h"
+
+namespace slabstream {
+namespace {
+
+// Two small balls, far from each other, in a volume that is empty else.
+std::shared_ptr<const Volume> SparseVolume() {
+  return std::make_shared<const Volume>(MakeTestVolume({76, 60, 88}, ScalarType::kUint8, [](const Index3& v) {
+    const auto distance = [&](const Vec3& center) { return Length(ToVec3(v) - center); };
+    return std::max({0.0, 250 - 12 * distance({18, 16, 20}), 250 - 15 * distance({58, 40, 66})});
+  }));
+}
+
+class PoliciesTest : public testing::TestWithParam<int> {};
+
+TEST_P(PoliciesTest, NeverChangeThePicture) {
+  const std::shared_ptr<const Volume> volume = SparseVolume();
+  EmbeddedOptions options;
+  options.workers = GetParam();
+  options.worker.threads = 1;
+  options.coordinator.catalogue["ball"] = [volume]() -> Result<std::shared_ptr<const Volume>> { return volume; };
+  Context context;
+  const auto service = EmbeddedService::Start(context, options);
+  ASSERT_TRUE(service.ok()) << service.status().message();
+  Client client = Client::Connect(context, (*service)->endpoint()).value();
+
+  std::size_t frame = 0;
+  for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
+    for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
+      FrameRequest request = TestRequest(renderer, 120, 1);
+      request.view.projection = projection;
+      const LocalImage expected = RenderDirectly(request, *volume);
+      ASSERT_GT(HighestAlpha(expected), 0.5);
+      for (const DecompositionEntry& decomposition : Decompositions()) {
+        for (const AssignmentEntry& assignment : Assignments()) {
+          // The other lists in turn, so that all pairs come up over all of it.
+          ++frame;
+          request.policy.decomposition = decomposition.name;
+          request.policy.assignment = assignment.name;
+          request.policy.split = WorkSplits()[frame % WorkSplits().size()].name;
+          request.policy.balance = BalanceModes()[frame / 3 % BalanceModes().size()].name;
+          request.policy.combine = CombiningSchemes()[frame % CombiningSchemes().size()].name;
+          request.policy.groups = 1 + int(frame % 3);
+          SCOPED_TRACE(testing::Message() << GetParam() << " workers, renderer " << int(renderer) << ", projection " << int(projection)
+                                          << ", " << request.policy.groups << " groups, " << request.policy.decomposition << ", "
+                                          << request.policy.split << ", " << request.policy.assignment << ", " << request.policy.balance
+                                          << ", " << request.policy.combine);
+          const Result<Picture> picture = client.Render(request, std::chrono::seconds(60));
+          ASSERT_TRUE(picture.ok()) << picture.status().message();
+          EXPECT_LE(LargestDifference(picture->image, expected, request.size), AllowedDifference(request));
+          EXPECT_EQ(picture->statistics.decomposition, request.policy.decomposition);
+          EXPECT_EQ(picture->statistics.assignment, request.policy.assignment);
+          EXPECT_EQ(picture->statistics.balance, request.policy.balance);
+          EXPECT_NE(picture->statistics.split, "auto");
+        }
+      }
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Workers, PoliciesTest, testing::Values(1, 2, 3, 5, 8, 13));
+
+}  // namespace
+}  // namespace slabstream

@@ -1,0 +1,64 @@
+#include "worker/lent_images.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <utility>
+
+namespace slabstream {
+namespace {
+
+// Row spans, as they travel.
+Bytes PayloadOf(const ImageView& view) {
+  std::vector<std::byte> payload(sizeof(ColumnSpan) * view.rows.size());
+  std::memcpy(payload.data(), view.rows.data(), payload.size());
+  return Bytes(std::move(payload));
+}
+
+}  // namespace
+
+std::optional<Bytes> LentImages::Lend(const LocalImage& image, const ImageView& view, const Peer& to, PartialImage& message) {
+  const std::optional<ArenaName> arena = SharedBlocksArena();
+  if (!arena || view.pixel_bytes() < kLeastBytes) return std::nullopt;
+  auto lent = std::make_shared<LentImage>();
+  lent->to = to;
+  lent->view = view;
+  SharedImage shared;
+  shared.arena = *arena;
+  shared.bounds = view.bounds;
+  shared.stride = std::uint32_t(view.stride);
+  shared.first_pixel = std::uint64_t(view.rgba - image.rgba.data()) / 4;
+  const std::array<const void*, 3> planes = {image.rgba.data(), image.depth.data(), image.voxel.data()};
+  for (std::size_t i = 0; i < (view.format == PixelFormat::kDepth ? 3U : 1U); ++i) {
+    std::optional<BlockPin> pin = BlockPin::Pin(planes[i]);
+    if (!pin) return std::nullopt;
+    shared.planes.push_back(pin->name());
+    lent->pins.push_back(*std::move(pin));
+  }
+  message.image = {.format = view.format};
+  message.shared = std::move(shared);
+  lent->message = message;
+
+  const std::lock_guard lock(mutex_);
+  if (bytes_ + view.pixel_bytes() > kMostBytes) {
+    message.shared.reset();
+    return std::nullopt;
+  }
+  bytes_ += view.pixel_bytes();
+  lent_.push_back(std::move(lent));
+  return PayloadOf(view);
+}
+
+std::shared_ptr<const LentImage> LentImages::Find(const GroupKey& key, std::uint32_t step, const PixelRange& pixels) {
+  const std::lock_guard lock(mutex_);
+  const auto found = std::ranges::find_if(
+      lent_, [&](const auto& lent) { return lent->message.key == key && lent->message.step == step && lent->message.pixels == pixels; });
+  return found == lent_.end() ? nullptr : *found;
+}
+
+std::size_t LentImages::bytes() {
+  const std::lock_guard lock(mutex_);
+  return bytes_;
+}
+
+}  // namespace slabstream

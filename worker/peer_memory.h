@@ -1,0 +1,58 @@
+// PeerMemory: the memory of other workers of this host, mapped to read the images that they lend. A mapping is kept while it is used, and a
+// while longer; it keeps the memory of a dead worker, so idle ones are closed. Any thread.
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "common/base/bytes.h"
+#include "common/base/shared_arena.h"
+#include "common/base/status.h"
+#include "common/base/time.h"
+#include "common/image/image_view.h"
+#include "common/wire/image_messages.h"
+
+namespace slabstream {
+
+// A lent image, to be read.
+struct BorrowedImage {
+  ImageView view;
+  std::shared_ptr<const MappedArena> arena;
+  std::vector<BlockName> planes;
+
+  // After the last read: false if what was read may be anything.
+  bool Intact() const;
+};
+
+class PeerMemory {
+ public:
+  static constexpr Duration kIdle = std::chrono::seconds(10);
+
+  // Maps the arena unless it is mapped already. Errors: as MappedArena::Open.
+  Status Open(const ArenaName& name, Time now);
+
+  // The pixels of `image` that lie in `range` of `frame`. Any image and payload (`spans`): nothing outside the arena is ever read.
+  // InvalidArgument: something does not fit; DataLoss: the image is not lent any more; others: as Open, since an image may wait for longer
+  // than a mapping is kept.
+  Result<BorrowedImage> Borrow(const SharedImage& image, PixelFormat format, const Bytes& spans, PixelRange range, const PixelBounds& frame,
+                               Time now);
+
+  void CloseIdle(Time now);
+  std::size_t size();
+
+ private:
+  struct Mapping {
+    ArenaName name;
+    std::shared_ptr<const MappedArena> arena;
+    Time last_used;
+  };
+  Result<std::shared_ptr<const MappedArena>> Map(const ArenaName& name, Time now);
+
+  std::mutex mutex_;
+  std::vector<Mapping> mappings_;  // guarded by mutex_
+};
+
+}  // namespace slabstream
