@@ -6,7 +6,6 @@
 
 #include <atomic>
 #include <chrono>
-#include <cstring>
 
 #include "common/decomposition/decomposition.h"
 #include "common/volume/sphere.h"
@@ -42,16 +41,11 @@ void Stages(benchmark::State& state) {
     setup.camera = MakeSupersampledCamera(view, {512, 512}, geometry);
   }
 
-  DecompositionRequest request;
-  request.summary = &summary;
-  request.boxes = boxes;
-  const Partition partition = MakeSlabs(request);
+  const WorkField voxels = WorkField::Uniform(geometry.size);
+  const Partition partition = MakeSlabs({.work = &voxels, .boxes = boxes});
   std::vector<std::unique_ptr<SlabData>> slabs;
   for (const Box& box : partition.boxes()) {
-    VoxelBlock block = MakeVoxelBlock(SlabBox(box, setup), volume.description.type);
-    // Slabs along z are one run of the volume's memory.
-    std::memcpy(block.bytes.data(), &volume.block.bytes[std::size_t(volume.block.Offset(block.box.begin))], block.bytes.size());
-    slabs.push_back(std::make_unique<SlabData>(std::move(block)));
+    slabs.push_back(std::make_unique<SlabData>(CutBlock(volume.block, SlabBox(box, setup))));
   }
 
   const std::unique_ptr<Renderer> renderer = MakeRenderer(renderer_kind);

@@ -3,13 +3,13 @@
 // instead: places in fixed point along one dimension (Lattice), where a beam is filtered.
 #include <benchmark/benchmark.h>
 
-#include "bench/transform_loops.h"
+#include "client/lab/transform_loops.h"
 #include "worker/kernels/footprint_table.h"
 
 namespace slabstream::bench {
 namespace {
 
-constexpr Matrix kMatrix = {{{0.7F, -0.4F, 0.2F, 80.0F}, {0.1F, 0.6F, -0.7F, 150.0F}, {0.5F, 0.4F, 0.8F, 10.0F}}};
+constexpr TransformMatrix kMatrix = {{{0.7F, -0.4F, 0.2F, 80.0F}, {0.1F, 0.6F, -0.7F, 150.0F}, {0.5F, 0.4F, 0.8F, 10.0F}}};
 
 void CountVoxels(benchmark::State& state, std::int64_t side) {
   const std::int64_t voxels = side * side * side;
@@ -18,21 +18,23 @@ void CountVoxels(benchmark::State& state, std::int64_t side) {
       benchmark::Counter(double(state.iterations() * voxels) * 1e-9, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 
-template <void (*kStore)(const Matrix&, int, Points&)>
+template <void (*kStore)(const TransformMatrix&, const Index3&, TransformedPoints&)>
 void Stored(benchmark::State& state) {
   const auto side = int(state.range(0));
-  Points points(side);
+  const Index3 cube = {side, side, side};
+  TransformedPoints points(cube);
   for (auto _ : state) {
-    kStore(kMatrix, side, points);
+    kStore(kMatrix, cube, points);
     benchmark::ClobberMemory();
   }
   CountVoxels(state, side);
 }
 
-template <std::uint32_t (*kFuse)(const Matrix&, int)>
+template <std::uint32_t (*kFuse)(const TransformMatrix&, const Index3&)>
 void Fused(benchmark::State& state) {
   const auto side = int(state.range(0));
-  for (auto _ : state) benchmark::DoNotOptimize(kFuse(kMatrix, side));
+  const Index3 cube = {side, side, side};
+  for (auto _ : state) benchmark::DoNotOptimize(kFuse(kMatrix, cube));
   CountVoxels(state, side);
 }
 

@@ -11,7 +11,6 @@
 namespace slabstream {
 namespace {
 
-constexpr double kTranslucent = 0.05, kOpaque = 0.9;  // opacity of one voxel length
 constexpr double kHollowOccupancy = 0.05, kFilledOccupancy = 0.40;
 
 // Half way to the values of occupied voxels (128 ... 255) everything is as opaque and coloured as those: renderers that interpolate before
@@ -28,15 +27,35 @@ TransferFunction BrainTransfer() {
           {{0, 0}, {40, 0}, {90, 0.35}, {255, 0.6}}};
 }
 
-BenchCase SphereCase(SphereClass sphere_class, int size, double opacity, RendererKind renderer = RendererKind::kSplat) {
-  const bool hollow = sphere_class == SphereClass::kHollow, points = renderer == RendererKind::kZBuffer;
-  const double occupancy = hollow ? kHollowOccupancy : kFilledOccupancy;
-  const std::string dataset = fmt::format("class{}-{}", int(sphere_class), size);
-  return {.name = fmt::format("{}{}{}", points ? "zbuffer-" : "", dataset, opacity == kOpaque && !points ? "-opaque" : ""),
+double StandardOccupancy(SphereClass sphere_class) { return sphere_class == SphereClass::kHollow ? kHollowOccupancy : kFilledOccupancy; }
+
+// "class1-256"; one of another occupancy than the standard one says so.
+std::string SphereName(const SphereRequest& sphere) {
+  const std::string name = fmt::format("class{}-{}", int(sphere.sphere_class), sphere.size);
+  return sphere.occupancy == StandardOccupancy(sphere.sphere_class) ? name : fmt::format("{}-{:g}", name, sphere.occupancy);
+}
+
+BenchCase StandardSphere(SphereClass sphere_class, int size, double opacity, RendererKind renderer = RendererKind::kSplat) {
+  return SphereCase({sphere_class, size, StandardOccupancy(sphere_class)}, opacity, renderer);
+}
+
+// "volumes/head.nii.gz" is "head", as in the catalogue of a service.
+std::string Stem(const std::string& path) {
+  const std::filesystem::path name = std::filesystem::path(path).lexically_normal().filename();
+  const std::filesystem::path stem = name.extension() == ".gz" ? name.stem().stem() : name.stem();
+  return stem.empty() ? "volume" : stem.string();
+}
+
+}  // namespace
+
+BenchCase SphereCase(const SphereRequest& sphere, double opacity, RendererKind renderer) {
+  const bool hollow = sphere.sphere_class == SphereClass::kHollow, points = renderer == RendererKind::kZBuffer;
+  const std::string dataset = SphereName(sphere);
+  return {.name = fmt::format("{}{}{}", points ? "zbuffer-" : "", dataset, opacity == kOpaqueSphere && !points ? "-opaque" : ""),
           .purpose = fmt::format("{} sphere, {} voxels a side, {:g} % occupied, opacity {:g} a voxel, {}", hollow ? "hollow" : "filled",
-                                 size, occupancy * 100, opacity, points ? "Z-buffer" : "splatting"),
+                                 sphere.size, sphere.occupancy * 100, opacity, points ? "Z-buffer" : "splatting"),
           .dataset = dataset,
-          .volume = SphereRequest{sphere_class, size, occupancy},
+          .volume = sphere,
           .renderer = renderer,
           .transfer = {SphereTransfer(opacity)},
           .opacity = opacity};
@@ -50,23 +69,14 @@ BenchCase BrainCase() {
           .transfer = {BrainTransfer()}};
 }
 
-// "volumes/head.nii.gz" is "head", as in the catalogue of a service.
-std::string Stem(const std::string& path) {
-  const std::filesystem::path name = std::filesystem::path(path).lexically_normal().filename();
-  const std::filesystem::path stem = name.extension() == ".gz" ? name.stem().stem() : name.stem();
-  return stem.empty() ? "volume" : stem.string();
-}
-
-}  // namespace
-
 const std::vector<BenchCase>& StandardBenchCases() {
   static const std::vector<BenchCase> cases = {
-      SphereCase(SphereClass::kHollow, 256, kTranslucent),
-      SphereCase(SphereClass::kFilled, 256, kTranslucent),
-      SphereCase(SphereClass::kHollow, 256, kOpaque),
-      SphereCase(SphereClass::kFilled, 256, kOpaque),
-      SphereCase(SphereClass::kHollow, 512, kTranslucent),
-      SphereCase(SphereClass::kHollow, 256, kOpaque, RendererKind::kZBuffer),
+      StandardSphere(SphereClass::kHollow, 256, kTranslucentSphere),
+      StandardSphere(SphereClass::kFilled, 256, kTranslucentSphere),
+      StandardSphere(SphereClass::kHollow, 256, kOpaqueSphere),
+      StandardSphere(SphereClass::kFilled, 256, kOpaqueSphere),
+      StandardSphere(SphereClass::kHollow, 512, kTranslucentSphere),
+      StandardSphere(SphereClass::kHollow, 256, kOpaqueSphere, RendererKind::kZBuffer),
       BrainCase(),
   };
   return cases;

@@ -25,6 +25,11 @@ struct BenchCase {
 
 const std::vector<BenchCase>& StandardBenchCases();
 
+// What the standard ones are made by: a sphere whose occupied voxels have this opacity, and the MRI brain of Debian's package mricron-data.
+BenchCase SphereCase(const SphereRequest& sphere, double opacity, RendererKind renderer = RendererKind::kSplat);
+BenchCase BrainCase();
+inline constexpr double kTranslucentSphere = 0.05, kOpaqueSphere = 0.9;
+
 // A standard case's name, or FILE[:TRANSFER] of a volume file (`at_service`: NAME[:TRANSFER] of a dataset), where TRANSFER is what
 // --transfer takes. NotFound, InvalidArgument: naming the text.
 Result<BenchCase> ParseBenchCase(const std::string& text, bool at_service);

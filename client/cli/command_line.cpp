@@ -7,6 +7,7 @@
 #include <array>
 #include <functional>
 #include <iostream>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -15,6 +16,8 @@
 #include "client/cli/cores.h"
 #include "client/cli/files.h"
 #include "client/cli/option_groups.h"
+#include "client/experiment/run_experiment.h"
+#include "client/lab/replay.h"
 #include "common/base/log.h"
 #include "common/kernels/simd_target.h"
 #include "common/transport/endpoint.h"
@@ -29,6 +32,8 @@ struct AllOptions {
   RenderOptions render;
   TurntableOptions turntable;
   BenchOptions bench;
+  ExperimentOptions experiment;
+  ReplayOptions replay;
   InfoOptions info;
   SphereOptions sphere;
   UpOptions up;
@@ -91,6 +96,65 @@ void DeclareBench(CLI::App& app, BenchOptions& options, Command& command) {
   sub->callback([&] {
     if (!options.connection.endpoint.empty()) options.connection.local_workers = 0;
     command = [&] { return RunBench(options); };
+  });
+}
+
+std::string LinkList() {
+  std::string list;
+  for (const LinkPreset& preset : LinkPresets()) list += fmt::format("  {:10} {}\n", preset.name, preset.purpose);
+  return list;
+}
+
+void DeclareReplay(CLI::App& experiment, ReplayOptions& options, Command& command) {
+  CLI::App* sub = experiment.add_subcommand("replay", "What another policy or machine would have made of frames that were recorded");
+  sub->add_option("FILE", options.trace_path, "Written by --trace of render or turntable")->required();
+  sub->add_option("--with", options.changes,
+                  "What is to be different: combine=SCHEME (as --combine), link=NAME[:MICROSECONDS,GBIT], workers=N; may be given several "
+                  "times.\nLinks:\n" +
+                      LinkList())
+      ->type_name("KEY=VALUE")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  sub->callback([&options, &command] { command = [&options] { return RunReplay(options, std::cout); }; });
+}
+
+void DeclareExperiment(CLI::App& app, ExperimentOptions& options, ReplayOptions& replay, Command& command) {
+  CLI::App* sub = app.add_subcommand("experiment", "Compare ways of dividing, combining and streaming, and write a report");
+  sub->add_option("NAME", options.name, "Which one:\n" + ExperimentList());
+  sub->add_option("FILE", options.sweep_file, "Of sweep: what to vary (JSON, docs/experiments.md)");
+  CLI::Option* output =
+      sub->add_option("-o,--output", options.folder, "The report and all that was measured; made if need be")->type_name("DIR");
+  sub->add_flag("--quick", options.quick, "A tenth of the time: fewer sizes, workers and repeats");
+  AddNumber(*sub, "--scale", options.scale, {kMinScale, 1}, "Of the sides of spheres and pictures, to try things out");
+  AddInteger(*sub, "--repeats", options.repeats, 1, kMaxRepeats, "Of every measurement (default: the experiment's own)");
+  AddParsed(
+      *sub, "--seed", options.seed,
+      [](const std::string& option, const std::string& text) { return ParseInteger(option, text, 0, std::numeric_limits<int>::max()); },
+      "Of the order of the trials")
+      ->default_str("1");
+  sub->add_option("--volume", options.volumes, "A sparse volume of your own, FILE[:PRESET|:FILE.json]; may be given several times")
+      ->type_name("FILE")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  CLI::Option* resume = sub->add_flag_callback(
+      "--resume", [&options] { options.resume = Resume::kAnyBuild; }, "Continue what DIR holds even if another build or machine began it");
+  sub->add_flag_callback(
+         "--fresh", [&options] { options.resume = Resume::kNever; }, "Forget what DIR holds")
+      ->excludes(resume);
+  sub->add_flag("--list", options.list, "Tell which experiments there are");
+  DeclareReplay(*sub, replay, command);
+  sub->callback([&options, &command, output, sub] {
+    if (!sub->get_subcommands().empty()) return;
+    if (options.list) {
+      command = [] {
+        std::cout << ExperimentList();
+        return Status::Ok();
+      };
+      return;
+    }
+    if (options.name.empty()) throw CLI::ValidationError("NAME is missing (--list names the experiments)");
+    if (output->count() == 0) throw CLI::RequiredError("--output");
+    command = [&options] { return RunExperiment(options); };
   });
 }
 
@@ -186,10 +250,11 @@ int RunCommandLine(int argc, const char* const* argv) {
   CLI::App app("Slabstream renders volumes on CPUs, by any number of worker processes.", "slabstream");
   AllOptions options;
   Command command;
-  options.bench.command = fmt::format("{}", fmt::join(argv, argv + argc, " "));
+  options.bench.command = options.experiment.command = fmt::format("{}", fmt::join(argv, argv + argc, " "));
   DeclareRender(app, options.render, command);
   DeclareTurntable(app, options.turntable, command);
   DeclareBench(app, options.bench, command);
+  DeclareExperiment(app, options.experiment, options.replay, command);
   DeclareInfo(app, options.info, command);
   DeclareSphere(app, options.sphere, command);
   DeclareUp(app, options.up, command);

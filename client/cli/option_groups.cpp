@@ -8,8 +8,10 @@
 
 #include "client/cli/cores.h"
 #include "client/cli/files.h"
-#include "common/combining/schedule.h"
+#include "common/combining/schemes.h"
 #include "common/decomposition/decomposition.h"
+#include "common/planning/assignment.h"
+#include "common/planning/policy_names.h"
 #include "common/transport/endpoint.h"
 #include "common/wire/control_messages.h"
 
@@ -32,7 +34,7 @@ CLI::Option* AddNamed(CLI::App& app, const std::string& name, T& target, const E
     if (!index.ok()) return index.status();
     return value;
   };
-  return AddParsed(app, name, target, parse, text)->type_name("NAME");
+  return AddParsed(app, name, target, parse, text)->type_name(fmt::format("{{{}}}", fmt::join(names, ",")));
 }
 
 // An option that takes one of `names`, which stand for `values`.
@@ -45,6 +47,19 @@ CLI::Option* AddChoice(CLI::App& app, const std::string& name, T& target, const 
     return values[*index];
   };
   return AddParsed(app, name, target, parse, help)->type_name(fmt::format("{}", fmt::join(names, "|")));
+}
+
+void AddCombining(CLI::App& app, std::string& target) {
+  std::string text = "How partial images become one";
+  for (const CombiningEntry& entry : CombiningSchemes()) {
+    text += fmt::format("\n  {}{}{}: {}", entry.name, entry.arguments.empty() ? "" : ":", entry.arguments, entry.purpose);
+  }
+  const auto parse = [](const std::string& option, const std::string& value) -> Result<std::string> {
+    const Result<CombiningChoice> choice = ParseCombining(value);
+    if (!choice.ok()) return Status::InvalidArgument(fmt::format("{} {}", option, choice.status().message()));
+    return value;
+  };
+  AddParsed(app, "--combine", target, parse, text)->type_name("NAME[:ARGUMENTS]")->default_str(target);
 }
 
 void AddConnectionOptions(CLI::App& app, ConnectionOptions& connection) {
@@ -110,11 +125,17 @@ void AddLookOptions(CLI::App& app, FrameRequest& request, PictureFormat& format)
 void AddPolicyOptions(CLI::App& app, Policy& policy) {
   AddNamed(app, "--decomposition", policy.decomposition, Decompositions(), "How the volume is divided")->default_str(policy.decomposition);
   AddChoice<AxisChoice, 4>(app, "--axis", policy.axis, {"x", "y", "z", "auto"},
-                           {AxisChoice::kX, AxisChoice::kY, AxisChoice::kZ, AxisChoice::kAuto}, "Axis that slabs are cut along")
+                           {AxisChoice::kX, AxisChoice::kY, AxisChoice::kZ, AxisChoice::kAuto},
+                           "Axis that slabs are cut along, and other boxes first")
       ->default_str("auto");
+  AddNamed(app, "--split", policy.split, WorkSplits(), "What boxes have equal shares of")->default_str(policy.split);
+  AddNamed(app, "--assignment", policy.assignment, Assignments(), "Who owns which box")->default_str(policy.assignment);
+  AddNamed(app, "--balance", policy.balance, BalanceModes(), "Whether boxes change while frames go by")->default_str(policy.balance);
   AddInteger(app, "--groups", policy.groups, 0, kMaxGroups,
-             "Groups of slabs that are rendered one after the other; 0: chosen by the service");
-  AddNamed(app, "--combine", policy.combine, CombiningSchemes(), "How partial images become one")->default_str(policy.combine);
+             "Groups of boxes that are rendered one after the other; 0: chosen by the service");
+  AddCombining(app, policy.combine);
+  AddNumber(app, "--pixel-error", policy.pixel_error, {0, kMaxPixelError},
+            "How far a colour in [0, 1] may move because workers send each other 16 bits a channel instead of 32");
 }
 
 }  // namespace

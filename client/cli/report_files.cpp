@@ -17,7 +17,7 @@ Status WriteReports(const FrameOptions& options, const std::vector<FrameRecord>&
   if (!options.stats_path.empty()) {
     if (Status status = WriteTextFile(options.stats_path, StatsJson(options, frames)); !status.ok()) return status;
   }
-  return options.trace_path.empty() ? Status::Ok() : WriteTextFile(options.trace_path, TraceJson(frames));
+  return options.trace_path.empty() ? Status::Ok() : WriteTextFile(options.trace_path, TraceJson(options, frames));
 }
 
 }  // namespace slabstream

@@ -1,7 +1,8 @@
 // --stats: what the frames were made of and what they cost.
 //
 //   { "source", "renderer", "size": [w, h],
-//     "plan": {"workers", "groups", "decomposition", "axis", "combine"},    of the last frame: a lost worker changes it
+//     "plan": {"workers", "groups", "decomposition", "split", "axis",       of the last frame: a lost worker changes it
+//              "assignment", "balance", "combine"},
 //     "bytes": {"voxels", "images"},                                        of all frames
 //     "frames": [{"output", "latency_ms", "queued_ms", "attempts", "workers", "bytes": {...}, "stages_ms": {stage: worker time},
 //                 "imbalance", "idle_share"}] }

@@ -5,6 +5,8 @@
 #include <set>
 #include <utility>
 
+#include "client/lab/recording.h"
+
 namespace slabstream {
 namespace {
 
@@ -40,7 +42,7 @@ Json Complete(const std::string& name, std::uint32_t process, std::uint32_t thre
 
 }  // namespace
 
-std::string TraceJson(const std::vector<FrameRecord>& frames) {
+std::string TraceJson(const FrameOptions& options, const std::vector<FrameRecord>& frames) {
   std::int64_t origin = 0;
   for (const FrameRecord& frame : frames) {
     origin = origin == 0 ? frame.statistics.begin_ns : std::min(origin, frame.statistics.begin_ns);
@@ -75,7 +77,9 @@ std::string TraceJson(const std::vector<FrameRecord>& frames) {
     events.push_back(Name("process_name", worker, 0, "worker " + std::to_string(worker)));
     for (const auto& [track, name] : kTracks) events.push_back(Name("thread_name", worker, track, name));
   }
-  const Json json = {{"displayTimeUnit", "ms"}, {"traceEvents", std::move(events)}};
+  std::vector<RecordedFrame> recorded;
+  for (const FrameRecord& frame : frames) recorded.push_back(Record(frame.statistics, options.request.renderer, frame.latency));
+  const Json json = {{"displayTimeUnit", "ms"}, {"traceEvents", std::move(events)}, {kRecordingKey, RecordingJson(recorded)}};
   return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

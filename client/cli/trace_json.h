@@ -2,7 +2,8 @@
 // (https://docs.google.com/document/d/1CvAClvFfyA5R-PhYUmn5OOQtYMH4h6I0nSsKchNAySU), which Perfetto opens.
 //
 // One process a worker with the tracks render, combine and fetch; names are stages, args say frame, group, rank and box. Process 0 has a
-// track of whole frames a frame in flight. Times are microseconds since the first frame was planned.
+// track of whole frames a frame in flight. Times are microseconds since the first frame was planned. Beside the events stands what a replay
+// needs (client/lab/recording.h).
 #pragma once
 
 #include <string>
@@ -12,6 +13,6 @@
 
 namespace slabstream {
 
-std::string TraceJson(const std::vector<FrameRecord>& frames);
+std::string TraceJson(const FrameOptions& options, const std::vector<FrameRecord>& frames);
 
 }  // namespace slabstream

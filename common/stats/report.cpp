@@ -22,4 +22,14 @@ std::string_view ToString(Stage stage) {
   return "";
 }
 
+std::int64_t PictureNs(const RankReport& report) {
+  std::int64_t ns = 0;
+  for (std::size_t i = 0; i < report.spans.size(); ++i) {
+    const Span& span = report.spans[i];
+    const bool packed = span.stage == Stage::kEncode && i > 0 && report.spans[i - 1].stage == Stage::kResolve;
+    if (span.stage == Stage::kResolve || packed) ns += span.end_ns - span.begin_ns;
+  }
+  return ns;
+}
+
 }  // namespace slabstream

@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "common/image/local_image.h"
+
 namespace slabstream {
 
 enum class Stage : std::uint8_t {
@@ -45,8 +47,13 @@ struct RankReport {
   std::uint64_t drawn_voxels = 0;     // that went through splat or Z-buffer
   std::uint64_t voxel_bytes = 0;      // received for this group since the last report (0: all was cached)
   std::uint64_t image_bytes = 0;      // payload sent to other workers
+  PixelBounds image_bounds;           // of the box's own image, in the frame
+  std::uint64_t image_pixels = 0;     // of them, not empty: an estimate (SamplePixels)
   friend bool operator==(const RankReport&, const RankReport&) = default;
 };
 inline constexpr int kMaxSpans = 64;
+
+// Of the display worker's report: making the picture and encoding it, in ns. Partial images are encoded, too, but before that.
+std::int64_t PictureNs(const RankReport& report);
 
 }  // namespace slabstream

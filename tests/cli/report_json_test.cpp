@@ -23,7 +23,10 @@ std::vector<FrameRecord> TwoFrames() {
     frame.statistics.groups = 3;
     frame.statistics.attempts = 1;
     frame.statistics.decomposition = "slab";
+    frame.statistics.split = "occupied";
     frame.statistics.axis = "z";
+    frame.statistics.assignment = "greedy";
+    frame.statistics.balance = "dynamic";
     frame.statistics.combine = "fan-in";
     frame.statistics.begin_ns = 5'000'000'000 + std::int64_t(i) * 10'000'000;
     frame.statistics.end_ns = frame.statistics.begin_ns + 30'000'000;
@@ -46,7 +49,14 @@ std::vector<FrameRecord> TwoFrames() {
 TEST(StatsJsonTest, HasThePromisedFields) {
   const FrameOptions options;
   const json stats = json::parse(StatsJson(options, TwoFrames()));
-  EXPECT_EQ(stats["plan"], (json{{"workers", 2}, {"groups", 3}, {"decomposition", "slab"}, {"axis", "z"}, {"combine", "fan-in"}}));
+  EXPECT_EQ(stats["plan"], (json{{"workers", 2},
+                                 {"groups", 3},
+                                 {"decomposition", "slab"},
+                                 {"split", "occupied"},
+                                 {"axis", "z"},
+                                 {"assignment", "greedy"},
+                                 {"balance", "dynamic"},
+                                 {"combine", "fan-in"}}));
   EXPECT_EQ(stats["bytes"], (json{{"voxels", 2000}, {"images", 200}}));
   ASSERT_EQ(stats["frames"].size(), 2U);
   const json& second = stats["frames"][1];
@@ -65,7 +75,7 @@ TEST(StatsJsonTest, TextThatIsNotUtf8DoesNotBreakIt) {
 }
 
 TEST(TraceJsonTest, HasOneProcessAWorkerAndKeepsThreadsApart) {
-  const json trace = json::parse(TraceJson(TwoFrames()));
+  const json trace = json::parse(TraceJson(FrameOptions(), TwoFrames()));
   std::map<std::pair<int, int>, std::set<std::string>> names;  // by process and thread
   std::set<int> named;
   for (const json& event : trace["traceEvents"]) {

@@ -148,6 +148,9 @@ TEST_F(RenderTest, StatisticsShowThatVoxelsTravelOnce) {
   EXPECT_EQ(stats["plan"]["workers"], 2);
   EXPECT_EQ(stats["plan"]["groups"], 2);
   EXPECT_EQ(stats["plan"]["decomposition"], "slab");
+  EXPECT_EQ(stats["plan"]["split"], "voxels");
+  EXPECT_EQ(stats["plan"]["assignment"], "cyclic");
+  EXPECT_EQ(stats["plan"]["balance"], "static");
   EXPECT_EQ(stats["plan"]["combine"], "fan-in");
   ASSERT_EQ(stats["frames"].size(), 4U);
   EXPECT_GE(stats["bytes"]["voxels"], kVoxels * kVoxels * kVoxels / 4);  // those with something to see, at least

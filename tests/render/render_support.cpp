@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstring>
 
 #include "common/base/check.h"
 #include "common/decomposition/decomposition.h"
@@ -89,18 +88,7 @@ ViewParameters RandomView(Projection projection, std::mt19937& random) {
   return view;
 }
 
-std::unique_ptr<SlabData> CutSlab(const Volume& volume, const Box& box) {
-  VoxelBlock block = MakeVoxelBlock(box, volume.block.type);
-  const std::size_t sample = BytesPerSample(block.type);
-  for (std::int32_t z = box.begin.z; z < box.end.z; ++z) {
-    for (std::int32_t y = box.begin.y; y < box.end.y; ++y) {
-      const Index3 first = {box.begin.x, y, z};
-      std::memcpy(&block.bytes[sample * std::size_t(block.Offset(first))],
-                  &volume.block.bytes[sample * std::size_t(volume.block.Offset(first))], sample * std::size_t(box.size().x));
-    }
-  }
-  return std::make_unique<SlabData>(std::move(block));
-}
+std::unique_ptr<SlabData> CutSlab(const Volume& volume, const Box& box) { return std::make_unique<SlabData>(CutBlock(volume.block, box)); }
 
 LocalImage RenderWhole(const Volume& volume, const FrameSetup& setup) {
   const Box whole = volume.description.geometry.bounds();
@@ -123,12 +111,8 @@ LocalImage RenderByBoxes(const Volume& volume, const FrameSetup& setup, const Pa
 LocalImage RenderPicture(const Volume& volume, const FrameSetup& setup) { return FinishPicture(RenderWhole(volume, setup), setup); }
 
 Partition CutIntoSlabs(const Volume& volume, int boxes, Axis axis) {
-  const VolumeSummary summary = Summarize(volume);
-  DecompositionRequest request;
-  request.summary = &summary;
-  request.boxes = boxes;
-  request.axis = axis;
-  return MakeSlabs(request);
+  const WorkField voxels = WorkField::Uniform(volume.description.geometry.size);
+  return MakeSlabs({.work = &voxels, .boxes = boxes, .axis = axis});
 }
 
 Partition CutAtRandom(const Box& bounds, int boxes, std::mt19937& random) {

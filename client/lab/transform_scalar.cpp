@@ -1,8 +1,8 @@
 #include <bit>
 
-#include "bench/transform_loops.h"
+#include "client/lab/transform_loops.h"
 
-namespace slabstream::bench {
+namespace slabstream {
 namespace {
 
 float Product(const std::array<float, 4>& row, int x, int y, int z) {
@@ -11,19 +11,19 @@ float Product(const std::array<float, 4>& row, int x, int y, int z) {
 
 }  // namespace
 
-void StoreProductScalar(const Matrix& matrix, int side, Points& points) {
+void StoreProductScalar(const TransformMatrix& matrix, const Index3& size, TransformedPoints& points) {
   std::size_t i = 0;
-  for (int z = 0; z < side; ++z) {
-    for (int y = 0; y < side; ++y) {
-      for (int x = 0; x < side; ++x, ++i) {
+  for (int z = 0; z < size.z; ++z) {
+    for (int y = 0; y < size.y; ++y) {
+      for (int x = 0; x < size.x; ++x, ++i) {
         for (std::size_t c = 0; c < 3; ++c) points.components[c][i] = Product(matrix[c], x, y, z);
       }
     }
   }
 }
 
-void StoreIncrementsScalar(const Matrix& matrix, int side, Points& points) {
-  const std::size_t beam = std::size_t(side), slice = beam * beam, volume = slice * beam;
+void StoreIncrementsScalar(const TransformMatrix& matrix, const Index3& size, TransformedPoints& points) {
+  const std::size_t beam = std::size_t(size.x), slice = beam * std::size_t(size.y), volume = slice * std::size_t(size.z);
   for (std::size_t c = 0; c < 3; ++c) {
     float* p = points.components[c].data();
     p[0] = matrix[c][3];
@@ -33,11 +33,11 @@ void StoreIncrementsScalar(const Matrix& matrix, int side, Points& points) {
   }
 }
 
-std::uint32_t FuseProductScalar(const Matrix& matrix, int side) {
+std::uint32_t FuseProductScalar(const TransformMatrix& matrix, const Index3& size) {
   std::uint32_t used = 0;
-  for (int z = 0; z < side; ++z) {
-    for (int y = 0; y < side; ++y) {
-      for (int x = 0; x < side; ++x) {
+  for (int z = 0; z < size.z; ++z) {
+    for (int y = 0; y < size.y; ++y) {
+      for (int x = 0; x < size.x; ++x) {
         for (const auto& row : matrix) used ^= std::bit_cast<std::uint32_t>(Product(row, x, y, z));
       }
     }
@@ -45,15 +45,15 @@ std::uint32_t FuseProductScalar(const Matrix& matrix, int side) {
   return used;
 }
 
-std::uint32_t FuseIncrementsScalar(const Matrix& matrix, int side) {
+std::uint32_t FuseIncrementsScalar(const TransformMatrix& matrix, const Index3& size) {
   std::uint32_t used = 0;
   std::array<float, 3> slice{}, beam{}, voxel{};
   for (std::size_t c = 0; c < 3; ++c) slice[c] = matrix[c][3];
-  for (int z = 0; z < side; ++z) {
+  for (int z = 0; z < size.z; ++z) {
     beam = slice;
-    for (int y = 0; y < side; ++y) {
+    for (int y = 0; y < size.y; ++y) {
       voxel = beam;
-      for (int x = 0; x < side; ++x) {
+      for (int x = 0; x < size.x; ++x) {
         for (std::size_t c = 0; c < 3; ++c) {
           used ^= std::bit_cast<std::uint32_t>(voxel[c]);
           voxel[c] += matrix[c][0];
@@ -66,4 +66,4 @@ std::uint32_t FuseIncrementsScalar(const Matrix& matrix, int side) {
   return used;
 }
 
-}  // namespace slabstream::bench
+}  // namespace slabstream

@@ -1,0 +1,308 @@
+// What combining costs: p worker processes of this host, each with a picture in hand, until the root holds the result. Beside nothing: the
+// workers are the real ones (machine, executor, sockets) with a renderer that hands out a prepared picture; this program plays their
+// coordinator. Time runs from the moment at which the last rank holds its picture to the end of the last combining step at the root.
+//
+//   build/bin/combining_bench [--ranks 2,4,8,16] [--size 1024] [--schemes fan-in,direct-send,...] [--repeats N] [--images full,sparse]
+//                             [--links shared,ipc,tcp] [--color float32|half|fixed16]
+//
+// Pictures are premultiplied float RGBA, combined by over. "sparse": each rank has a square of 20 % of the picture, and these slide from
+// one corner to the other. A line a case: median, 10th and 90th percentile in milliseconds, and the median until the coordinator knows.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <pthread.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "common/base/check.h"
+#include "common/base/large_buffers.h"
+#include "common/combining/schemes.h"
+#include "common/transport/socket.h"
+#include "common/wire/any_message.h"
+#include "common/wire/payload.h"
+#include "worker/service.h"
+
+namespace slabstream {
+namespace {
+
+constexpr Epoch kEpoch = 1;
+constexpr DatasetId kDataset = 1;
+constexpr Duration kPatience = std::chrono::seconds(30);
+constexpr int kWarmUp = 10;
+
+struct Case {
+  Rank ranks = 2;
+  std::int32_t size = 1024;
+  bool sparse = false;
+  std::string link;
+  ColorCoding color = ColorCoding::kFloat32;  // of what is sent
+};
+
+// What the processes of one case share.
+struct Shared {
+  pthread_barrier_t all_hold;             // their pictures of the present frame
+  std::atomic<std::int64_t> all_held_ns;  // when the last one did
+};
+
+std::int64_t NowNs() { return MonotonicNow().time_since_epoch().count(); }
+
+LocalImage MakePicture(const Case& config, Rank rank) {
+  PixelBounds bounds = {0, 0, config.size, config.size};
+  if (config.sparse) {
+    const auto side = std::int32_t(std::lround(config.size * std::sqrt(0.2)));
+    const auto at = std::int32_t(std::int64_t(config.size - side) * rank / std::max<Rank>(config.ranks - 1, 1));
+    bounds = {at, at, at + side, at + side};
+  }
+  LocalImage image = MakeUnwrittenImage(PixelFormat::kRgba, bounds);
+  for (std::size_t i = 0; i < image.rgba.size(); ++i) {
+    const float alpha = 0.1F + 0.05F * float((i / 4 + rank) % 7);
+    image.rgba[i] = i % 4 == 3 ? alpha : alpha * float(i % 5) / 5;
+  }
+  return image;
+}
+
+// Hands out a copy of one picture, and returns when all ranks have theirs.
+class PreparedPicture : public Renderer {
+ public:
+  PreparedPicture(const Case& config, Rank rank, Shared& shared) : picture_(MakePicture(config, rank)), shared_(shared) {}
+
+  Result<LocalImage> Render(SlabData&, const Box&, const FrameSetup&, const OcclusionMask&, const std::atomic<bool>&,
+                            RankReport&) override {
+    LocalImage copy = picture_;
+    shared_.all_held_ns = NowNs();  // the last one's stays
+    ::pthread_barrier_wait(&shared_.all_hold);
+    return copy;
+  }
+
+ private:
+  const LocalImage picture_;
+  Shared& shared_;
+};
+
+[[noreturn]] void RunWorker(const Case& config, Rank rank, const std::string& directory, Shared& shared) {
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  KeepFrameBuffers();
+  Context context;
+  WorkerOptions options;
+  options.coordinator_endpoint = "ipc://" + directory + "/control";
+  options.images_endpoint = config.link == "tcp" ? "tcp://127.0.0.1:*" : "ipc://" + directory + "/images-" + std::to_string(rank);
+  options.share_memory = config.link == "shared";
+  options.make_renderer = [&](RendererKind) { return std::make_unique<PreparedPicture>(config, rank, shared); };
+  auto service = WorkerService::Start(context, std::move(options));
+  CHECK(service.ok()) << service.status().message();
+  (*service)->WaitUntilStopped();
+  std::_Exit(0);
+}
+
+struct Times {
+  std::vector<double> combined, reported;  // milliseconds
+};
+
+double Quantile(std::vector<double> values, double q) {
+  std::ranges::sort(values);
+  return values[std::size_t(std::lround(q * double(values.size() - 1)))];
+}
+
+// Plays the coordinator of one case's workers.
+class Coordinator {
+ public:
+  Coordinator(const Case& config, const std::string& directory, const Shared& shared)
+      : config_(config), shared_(shared), control_(*Socket::Router(context_)), slabs_(*Socket::Router(context_)) {
+    CHECK(control_.Bind("ipc://" + directory + "/control").ok());
+    slabs_endpoint_ = *slabs_.Bind("ipc://" + directory + "/slabs");
+    setup_.dataset = kDataset;
+    setup_.description.geometry.size = {16, 16, 65535};
+    setup_.range = {0, 1};
+    setup_.camera = MakeCamera({}, {config.size, config.size}, setup_.description.geometry);
+    setup_.sheets = MakeSheetGrid(setup_.camera, setup_.description.geometry);
+    setup_.sheets.width = setup_.sheets.height = config.size;
+    setup_.transfer.colors = {{0, {1, 1, 1}}};
+    setup_.transfer.opacities = {{0, 1, 0.5, 0}};
+    setup_.termination = 0;
+    const Time deadline = MonotonicNow() + kPatience;
+    while (workers_.size() < config.ranks) {
+      CHECK(MonotonicNow() < deadline) << workers_.size() << " of " << config.ranks << " workers have come";
+      Serve();
+    }
+  }
+
+  Times Measure(const std::string& scheme, int repeats) {
+    GroupAssignment assignment;
+    assignment.epoch = kEpoch;
+    assignment.group_count = 2;  // so that no picture is made of the group
+    assignment.setup = setup_;
+    for (Rank rank = 0; rank < config_.ranks; ++rank) {
+      const std::int32_t z = 8 * std::int32_t(rank) + 64;
+      assignment.group.placements.push_back({rank, {{0, 0, z}, {16, 16, z + 8}}, rank + 1});
+      assignment.peers.push_back({rank + 1, workers_[rank].endpoint, workers_[rank].memory_scope});
+    }
+    assignment.group.schedule = ParseCombining(scheme)->Make({config_.ranks, 0, WholeFrame(setup_)});
+    assignment.group.color = config_.color;
+    assignment.display = 1;
+    Times times;
+    for (int i = -kWarmUp; i < repeats; ++i) {
+      assignment.key = {++frame_, 0, 0};
+      assignment.finished_before = frame_;
+      done_.reset();
+      for (const Worker& worker : workers_) Send(worker.identity, assignment);
+      const Time deadline = MonotonicNow() + kPatience;
+      while (!done_) {
+        CHECK(MonotonicNow() < deadline) << scheme << ": no answer";
+        Serve();
+      }
+      if (i < 0) continue;
+      std::int64_t end_ns = 0;
+      for (const RankReport& report : done_->reports) {
+        for (const Span& span : report.spans) {
+          if (span.stage == Stage::kCombine) end_ns = std::max(end_ns, span.end_ns);
+        }
+      }
+      times.combined.push_back(double(end_ns - shared_.all_held_ns) / 1e6);
+      times.reported.push_back(double(reported_ns_ - shared_.all_held_ns) / 1e6);
+    }
+    return times;
+  }
+
+ private:
+  struct Worker {
+    std::string identity, endpoint;
+    std::uint64_t memory_scope = 0;
+  };
+
+  void Send(const std::string& identity, const AnyMessage& message) { CHECK(control_.Send(identity, Encode(message)).ok()); }
+
+  void Serve() {
+    const std::vector<Socket*> sockets = {&control_, &slabs_};
+    Wait(sockets, nullptr, std::chrono::milliseconds(200));
+    if (const Time now = MonotonicNow(); now >= next_ping_) {
+      next_ping_ = now + std::chrono::milliseconds(500);
+      for (const Worker& worker : workers_) Send(worker.identity, Ping{kEpoch, frame_, {}});
+    }
+    while (const auto incoming = control_.TryReceive()) {
+      const AnyMessage message = Decode(incoming->parts[0].span()).value();
+      if (const auto* hello = std::get_if<Register>(&message)) {
+        if (std::ranges::find(workers_, incoming->identity, &Worker::identity) != workers_.end()) continue;
+        workers_.push_back({incoming->identity, hello->images_endpoint, hello->memory_scope});
+        Send(incoming->identity, Welcome{kEpoch, hello->incarnation, WorkerId(workers_.size()), slabs_endpoint_, 1000, 60000});
+      } else if (const auto* done = std::get_if<GroupDone>(&message)) {
+        reported_ns_ = NowNs();
+        if (done->key.frame == frame_) done_ = *done;
+      } else if (const auto* trouble = std::get_if<WorkerTrouble>(&message)) {
+        CHECK(false) << trouble->status.message();
+      }
+    }
+    while (const auto incoming = slabs_.TryReceive()) {
+      const AnyMessage message = Decode(incoming->parts[0].span()).value();
+      const auto& request = std::get<ChunkRequest>(message);
+      const auto bytes = std::size_t(request.box.voxel_count()) * BytesPerSample(setup_.description.type);
+      Chunk chunk = {.epoch = kEpoch, .dataset = kDataset, .box = request.box, .chunk = request.chunk};
+      const Bytes payload = PackChunk(Bytes(std::vector<std::byte>(std::min<std::size_t>(bytes, kChunkBytes))), Codec::kRaw, chunk);
+      CHECK(slabs_.Send(incoming->identity, Encode(chunk), payload).ok());
+    }
+  }
+
+  const Case& config_;
+  const Shared& shared_;
+  Context context_;
+  Socket control_, slabs_;
+  std::string slabs_endpoint_;
+  FrameSetup setup_;
+  std::vector<Worker> workers_;
+  FrameId frame_ = 0;
+  Time next_ping_ = Time::min();
+  std::int64_t reported_ns_ = 0;
+  std::optional<GroupDone> done_;
+};
+
+// In a process of its own: workers are forked before it has any thread.
+void RunCase(const Case& config, const std::vector<std::string>& schemes, int repeats) {
+  std::string directory = (std::filesystem::temp_directory_path() / "combining_bench_XXXXXX").string();
+  CHECK(::mkdtemp(directory.data()) != nullptr);
+  void* const memory = ::mmap(nullptr, sizeof(Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  CHECK(memory != MAP_FAILED);
+  Shared& shared = *new (memory) Shared{};
+  pthread_barrierattr_t attributes;
+  ::pthread_barrierattr_init(&attributes);
+  ::pthread_barrierattr_setpshared(&attributes, PTHREAD_PROCESS_SHARED);
+  ::pthread_barrier_init(&shared.all_hold, &attributes, config.ranks);
+  std::vector<pid_t> workers;
+  for (Rank rank = 0; rank < config.ranks; ++rank) {
+    workers.push_back(::fork());
+    CHECK(workers.back() >= 0);
+    if (workers.back() == 0) RunWorker(config, rank, directory, shared);
+  }
+  {
+    Coordinator coordinator(config, directory, shared);
+    for (const std::string& scheme : schemes) {
+      const Times times = coordinator.Measure(scheme, repeats);
+      fmt::print("{:6} {:5} {:6} p {:3}  {:20} {:8.2f} [{:.2f}, {:.2f}]  reported {:8.2f}\n", config.link, config.size,
+                 config.sparse ? "sparse" : "full", config.ranks, scheme, Quantile(times.combined, 0.5), Quantile(times.combined, 0.1),
+                 Quantile(times.combined, 0.9), Quantile(times.reported, 0.5));
+      (void)std::fflush(stdout);
+    }
+  }
+  for (const pid_t worker : workers) ::kill(worker, SIGKILL);
+  for (const pid_t worker : workers) ::waitpid(worker, nullptr, 0);
+  std::filesystem::remove_all(directory);
+}
+
+int Run(int argc, char** argv) {
+  std::vector<Rank> ranks = {2, 4, 8, 16};
+  std::vector<std::int32_t> sizes = {1024, 512};
+  std::vector<std::string> schemes = {"fan-in",          "centralized", "chain",       "tree:4",
+                                      "tree:4,strips=4", "radix-k",     "binary-swap", "direct-send"};
+  std::vector<std::string> images = {"full", "sparse"}, links = {"shared", "tcp"};
+  int repeats = 50;
+  ColorCoding color = ColorCoding::kFloat32;
+  CLI::App app("Times combining among worker processes of this host.");
+  app.add_option("--ranks", ranks)->delimiter(',')->check(CLI::Range(1, 64));
+  app.add_option("--size", sizes, "pixels a side, multiples of 8")->delimiter(',')->check(CLI::Range(8, 8192));
+  app.add_option("--schemes", schemes)->delimiter(';');
+  app.add_option("--images", images)->delimiter(',')->check(CLI::IsMember({"full", "sparse"}));
+  app.add_option("--links", links)->delimiter(',')->check(CLI::IsMember({"shared", "ipc", "tcp"}));
+  app.add_option("--color", color)
+      ->transform(CLI::CheckedTransformer(std::map<std::string, ColorCoding>{
+          {"float32", ColorCoding::kFloat32}, {"half", ColorCoding::kHalf}, {"fixed16", ColorCoding::kFixed16}}));
+  app.add_option("--repeats", repeats)->check(CLI::Range(1, 100000));
+  CLI11_PARSE(app, argc, argv);
+  for (const std::string& scheme : schemes) {
+    if (const auto parsed = ParseCombining(scheme); !parsed.ok()) {
+      (void)std::fprintf(stderr, "combining_bench: --schemes %s\n", parsed.status().message().c_str());
+      return 2;
+    }
+  }
+  for (const std::string& link : links) {
+    for (const std::int32_t size : sizes) {
+      for (const std::string& image : images) {
+        for (const Rank count : ranks) {
+          const pid_t child = ::fork();
+          CHECK(child >= 0);
+          if (child == 0) {
+            RunCase({count, size, image == "sparse", link, color}, schemes, repeats);
+            std::_Exit(0);
+          }
+          int status = 0;
+          ::waitpid(child, &status, 0);
+          if (status != 0) return 1;
+        }
+      }
+    }
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace slabstream
+
+int main(int argc, char** argv) { return slabstream::Run(argc, argv); }

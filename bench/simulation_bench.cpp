@@ -1,0 +1,121 @@
+// How far the simulation can be trusted: frames of the embedded service with one and two workers beside what is simulated of them
+// (client/lab/validate.h), and the cost model fitted to boxes of all sizes (common/simulation/cost_fit.h).
+//
+//   build/bin/simulation_bench CASE... [--size PIXELS_A_SIDE] [--views N] [--turns N] [--renderer splat|zbuffer] [--fit]
+//
+// CASE is one of `slabstream bench --list`, or FILE[:TRANSFER]. With --fit the boxes of all cases together give the constants.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+#include "client/cli/bench_cases.h"
+#include "client/lab/calibrate.h"
+#include "client/lab/frame_costs.h"
+#include "client/lab/validate.h"
+#include "common/base/check.h"
+#include "common/base/large_buffers.h"
+#include "common/simulation/cost_fit.h"
+
+namespace slabstream {
+namespace {
+
+constexpr int kBoxCounts[] = {1, 2, 5, 12, 30};  // of the samples that the cost model is fitted to
+
+struct BenchOptions {
+  std::vector<std::string> cases;
+  int size = 512, views = 6, turns = 5, repeats = 3;
+  std::string renderer;
+  bool fit = false;
+};
+
+void PrintMachine() {
+  const MachineModel m = CalibrateThisHost(2).value();
+  const CombiningCosts& c = m.combining;
+  fmt::print(
+      "ns a pixel: scan {:.3f}, encode {:.3f}, combine {:.3f}, local {:.3f}, hidden {:.3f}; us: task and hand-over {:.1f}, plan {:.1f}, "
+      "client {:.1f}; memory slowdown {:.3f}\n",
+      c.scan_pixel * 1e9, c.encode_pixel * 1e9, c.combine_pixel * 1e9, c.local_pixel * 1e9, c.hidden_pixel * 1e9, c.task * 1e6,
+      m.plan_seconds * 1e6, m.client_seconds * 1e6, m.memory_slowdown);
+}
+
+void Validate(const BenchCase& c, const std::shared_ptr<const Volume>& volume, const BenchOptions& options) {
+  for (const int workers : {1, 2}) {
+    ValidationCase what{c.name, volume, BenchRequest(c, BenchView(Projection::kOrthographic, 0, 1), {options.size, options.size}), workers};
+    const ValidationRow row = ValidateSimulation(what, {options.views, options.turns, options.repeats}).value();
+    const auto parts = [](const FrameParts& p) {
+      return fmt::format("{:7.2f} ms (render {:6.2f}, picture {:5.2f}, beside {:5.2f})", p.latency * 1e3, p.render * 1e3, p.picture * 1e3,
+                         (p.latency - p.render - p.picture) * 1e3);
+    };
+    fmt::print("{} {} workers: measured {}, simulated {}, off by {:+5.1f} %, at worst {:+5.1f} %; slowdown {:.3f}\n", row.name, row.workers,
+               parts(row.MeanMeasured()), parts(row.MeanSimulated()), row.error() * 100, row.worst_error() * 100, row.memory_slowdown);
+    std::fflush(stdout);
+  }
+}
+
+void AddSamples(const BenchCase& c, const Volume& volume, const BenchOptions& options, std::vector<CostSample>& samples) {
+  const VolumeSummary summary = Summarize(volume);
+  for (int view = 0; view < options.views; ++view) {
+    FrameRequest request =
+        BenchRequest(c, BenchView(view % 2 == 0 ? Projection::kOrthographic : Projection::kPerspective, view, options.views),
+                     {options.size, options.size});
+    for (const int boxes : kBoxCounts) {
+      Roster roster;
+      for (int i = 1; i <= boxes; ++i) roster.slots.push_back(WorkerId(i));
+      const FramePlan plan = PlanFrame(request, 1, summary, roster, CostModel{}).value();
+      for (const BoxCost& box : MeasureFrameCosts(volume, plan, options.repeats).boxes) {
+        if (box.seconds > 0) samples.push_back(SampleOf(box, plan.setup.camera));
+      }
+    }
+  }
+}
+
+void PrintFit(RendererKind renderer, const std::vector<CostSample>& samples) {
+  const CostFit fit = FitCosts(CostModel().stages(renderer), samples).value();
+  for (const StageFit& stage : fit.stages) {
+    fmt::print("{:10} {:12} {} boxes, residual {:.1f} %, prediction error {:.1f} %\n", ToString(stage.cost.stage), stage.cost.symbol,
+               stage.samples.size(), stage.residual * 100, stage.prediction_error * 100);
+    for (const TermFit& term : stage.terms) {
+      fmt::print("    {:16} {:10.4f} ns  [{:.4f}, {:.4f}]\n", ToString(term.unit), term.seconds * 1e9, term.low * 1e9, term.high * 1e9);
+    }
+  }
+  fmt::print("all stages: prediction error {:.1f} %\n", fit.prediction_error * 100);
+}
+
+void Run(const BenchOptions& options) {
+  if (!options.fit) PrintMachine();
+  std::vector<CostSample> samples;
+  RendererKind renderer = RendererKind::kSplat;
+  for (const std::string& text : options.cases) {
+    BenchCase c = ParseBenchCase(text, false).value();
+    if (!options.renderer.empty()) c.renderer = options.renderer == "splat" ? RendererKind::kSplat : RendererKind::kZBuffer;
+    renderer = c.renderer;
+    const std::shared_ptr<const Volume> volume = LoadBenchVolume(c).value();
+    if (options.fit) {
+      AddSamples(c, *volume, options, samples);
+    } else {
+      Validate(c, volume, options);
+    }
+  }
+  if (options.fit) PrintFit(renderer, samples);
+}
+
+}  // namespace
+}  // namespace slabstream
+
+int main(int argc, char** argv) {
+  slabstream::KeepFrameBuffers();
+  CLI::App app("Frames of the service beside simulated ones");
+  slabstream::BenchOptions options;
+  app.add_option("case", options.cases, "standard case or FILE[:TRANSFER]")->required();
+  app.add_option("--size", options.size, "pixels a side of the picture")->check(CLI::Range(16, 2048))->capture_default_str();
+  app.add_option("--views", options.views, "azimuths over a turn")->check(CLI::Range(1, 1000))->capture_default_str();
+  app.add_option("--turns", options.turns, "frames of each view by the service")->check(CLI::Range(1, 1000))->capture_default_str();
+  app.add_option("--repeats", options.repeats, "renderings of each box")->check(CLI::Range(1, 100))->capture_default_str();
+  app.add_option("--renderer", options.renderer, "instead of the case's")->check(CLI::IsMember({"splat", "zbuffer"}));
+  app.add_flag("--fit", options.fit, "fit the cost model instead");
+  CLI11_PARSE(app, argc, argv);
+  slabstream::Run(options);
+  return 0;
+}

@@ -1,0 +1,167 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "client/experiment/paper/setup.h"
+#include "client/experiment/report/charts.h"
+#include "client/lab/splat_loops.h"
+#include "common/base/time.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::array<int, 6> kWidths = {3, 5, 9, 13, 17, 25};  // k
+constexpr int kRuns = 3, kFigureWorkers = 10;
+// Class II reaches 52 % of the cube at most.
+constexpr std::array<double, 6> kOccupancies = {0.05, 0.1, 0.2, 0.3, 0.4, 0.5};
+
+Json WidthKey(int side, int k) { return {{"what", "footprint"}, {"N", side}, {"k", k}}; }
+
+// A footprint of k taps is cut at three sigma on both sides.
+double SigmaOf(int k) { return (k - 0.5) / 6; }
+
+Trial MeasureWidth(int side, int k) {
+  const auto run = [=]() -> Result<Json> {
+    DenseSlice slice(side, SigmaOf(k), 1);
+    const auto fastest = [&](void (DenseSlice::*splat)()) {
+      double best = std::numeric_limits<double>::infinity();
+      for (int i = 0; i < kRuns; ++i) {
+        const Time begin = MonotonicNow();
+        (slice.*splat)();
+        best = std::min(best, std::chrono::duration<double>(MonotonicNow() - begin).count());
+      }
+      return best;
+    };
+    return Json{{"plain_seconds", fastest(&DenseSlice::SplatPlainly)},
+                {"kernel_seconds", fastest(&DenseSlice::SplatByKernels)},
+                {"taps", slice.taps()}};
+  };
+  return {WidthKey(side, k), run, 0.05 + double(side) * side * k * k * 1e-8};
+}
+
+FrameCase OccupancyFrame(const PaperSetup& setup, double occupancy) {
+  FrameCase frame = setup.Frame(RendererKind::kSplat, setup.large_size(), kFigureWorkers);
+  frame.volume = SphereCase({SphereClass::kFilled, setup.large_size(), occupancy}, kTranslucentSphere);
+  return frame;
+}
+
+// The paper's splatting stage turns voxels into pixels of sheets; ours does that and finds where they are.
+double SplatSeconds(const MeasuredFrame::Cost& box) {
+  return box.stage_seconds[std::size_t(Stage::kTransform)] + box.stage_seconds[std::size_t(Stage::kSplat)];
+}
+double SlowestSplat(const MeasuredFrame& frame) {
+  double most = 0;
+  for (const MeasuredFrame::Cost& box : frame.boxes) most = std::max(most, SplatSeconds(box));
+  return most;
+}
+
+// Of log y on log x, by least squares.
+double Exponent(const std::vector<LinePoint>& points) {
+  double sx = 0, sy = 0, sxx = 0, sxy = 0;
+  for (const LinePoint& p : points) {
+    const double x = std::log(p.x), y = std::log(p.y);
+    sx += x;
+    sy += y;
+    sxx += x * x;
+    sxy += x * y;
+  }
+  const auto n = double(points.size());
+  return (n * sxy - sx * sy) / (n * sxx - sx * sx);
+}
+
+}  // namespace
+
+std::vector<Trial> FootprintTrials(const PaperSetup& setup) {
+  std::vector<Trial> trials;
+  for (const int k : kWidths) trials.push_back(MeasureWidth(setup.large_size(), k));
+  for (const double occupancy : kOccupancies) {
+    trials.push_back(BoxCostTrial(setup.context(), OccupancyFrame(setup, occupancy)));
+    trials.push_back(FinishTrial(setup.context(), OccupancyFrame(setup, occupancy)));
+  }
+  return trials;
+}
+
+Result<Section> FootprintSection(const PaperSetup& setup) {
+  Table table{
+      "figure-8-splatting", "Figure 8 in numbers", {{"curve", ""}, {"N", ""}, {"p", ""}, {"k", ""}, {"C", "%"}, {"time", "ms"}}, {}};
+
+  LineChart by_workers{"Figure 8a: splatting a worker's slab", {"workers p", ""}, {"time", "ms", AxisScale::kLog}, {}};
+  for (const int size : setup.sizes()) {
+    LineSeries series{fmt::format("N = {}", size), Origin::kMeasured, {}};
+    for (const int p : setup.workers()) {
+      const Result<MeasuredFrame> frame = Recall(setup.context(), setup.Frame(RendererKind::kSplat, size, p));
+      if (!frame.ok()) return frame.status();
+      const double ms = SlowestSplat(*frame) * 1e3;
+      series.points.push_back({double(p), ms});
+      table.rows.push_back({"a: slab", Cell::Parameter(size), Cell::Parameter(p), {}, {}, {ms, Origin::kMeasured}});
+    }
+    by_workers.series.push_back(std::move(series));
+  }
+
+  LineChart by_width{"Figure 8b: a filled slice against footprint width",
+                     {"footprint width k", "voxels", AxisScale::kLog},
+                     {"time of a slice", "ms", AxisScale::kLog},
+                     {}};
+  LineSeries plain{"k x k additions a voxel", Origin::kMeasured, {}}, kernels{"k + k by our kernels", Origin::kMeasured, {}};
+  for (const int k : kWidths) {
+    const Json key = WidthKey(setup.large_size(), k);
+    for (auto [series, number] : {std::pair{&plain, "plain_seconds"}, {&kernels, "kernel_seconds"}}) {
+      const Estimate e = EstimateOf(setup.context().log(), key, number);
+      series->points.push_back({double(k), e.median * 1e3, e.low * 1e3, e.high * 1e3});
+      table.rows.push_back(
+          {"b: " + series->name, Cell::Parameter(setup.large_size()), {}, Cell::Parameter(k), {}, {e.median * 1e3, Origin::kMeasured}});
+    }
+  }
+  const double plain_power = Exponent(plain.points), kernel_power = Exponent(kernels.points);
+  by_width.series = {plain, kernels};
+
+  LineChart by_occupancy{fmt::format("Figure 8c: splatting against occupancy, N = {}, p = {}", setup.large_size(), kFigureWorkers),
+                         {"occupied voxels C", "%"},
+                         {"time of the slowest slab", "ms", AxisScale::kLinear, true},
+                         {}};
+  LineSeries occupancy{"class II", Origin::kMeasured, {}};
+  for (const double c : kOccupancies) {
+    const Result<MeasuredFrame> frame = Recall(setup.context(), OccupancyFrame(setup, c));
+    if (!frame.ok()) return frame.status();
+    const double ms = SlowestSplat(*frame) * 1e3;
+    occupancy.points.push_back({c * 100, ms});
+    table.rows.push_back({"c: occupancy",
+                          Cell::Parameter(setup.large_size()),
+                          Cell::Parameter(kFigureWorkers),
+                          {},
+                          Cell::Parameter(c * 100),
+                          {ms, Origin::kMeasured}});
+  }
+  const double growth = occupancy.points.back().y / occupancy.points.front().y,
+               occupied = occupancy.points.back().x / occupancy.points.front().x;
+  by_occupancy.series = {occupancy};
+
+  Section section;
+  section.title = "Splatting: figure 8";
+  section.question = "How does the splatting stage grow with the workers, with the width of the footprint and with occupancy?";
+  section.method = fmt::format(
+      "a: class-I spheres in equal slabs; the slab that takes longest, rendered alone on one thread (places of voxels and splatting). b: a "
+      "filled slice of "
+      "{0} x {0} voxels at a pixel a voxel, through the kernels of the pipeline, which filter along one axis and then along the other, and "
+      "through the loop that "
+      "adds k x k pixels for each voxel as the paper does. c: class-II spheres of growing occupancy.",
+      setup.large_size());
+  section.answer = fmt::format(
+      "With the footprint's width plain splatting grows as k to the power of {:.2f} (the paper: quadratic), our kernels as k to the power "
+      "of {:.2f}; from {:.0f} % to {:.0f} % "
+      "of occupied voxels, {:.0f} times as many, the time grows {:.1f} times (the paper: linear).",
+      plain_power, kernel_power, occupancy.points.front().x, occupancy.points.back().x, occupied, growth);
+  section.blocks = {
+      Figure{"figure-8a-splatting", DrawLines(by_workers), "The slab that takes longest. The paper prints its curve without numbers."},
+      Figure{"figure-8b-footprint", DrawLines(by_width), "Both axes logarithmic, so a straight line is a power of k."},
+      Figure{"figure-8c-occupancy", DrawLines(by_occupancy),
+             "Where a sphere is filled, most of its voxels lie in the open: nothing is hidden from a slab that is rendered alone but by "
+             "itself."},
+      std::move(table)};
+  return section;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,49 @@
+#include "client/experiment/policies.h"
+
+#include <fmt/format.h>
+
+#include "common/base/check.h"
+#include "common/combining/schemes.h"
+#include "common/decomposition/decomposition.h"
+
+namespace slabstream {
+
+std::vector<NamedPolicy> AllPartitions() {
+  std::vector<NamedPolicy> policies;
+  for (const DecompositionEntry& entry : Decompositions()) {
+    for (const std::string_view split : {"voxels", "occupied"}) {
+      NamedPolicy named{fmt::format("{} by {}", entry.name, split), {}};
+      named.policy.decomposition = entry.name;
+      named.policy.split = split;
+      named.policy.groups = 1;
+      policies.push_back(std::move(named));
+    }
+  }
+  return policies;
+}
+
+NamedPolicy EqualSlabs() { return AllPartitions().front(); }
+
+NamedPolicy BalancedTree() {
+  NamedPolicy tree{"kd-tree by occupied", {}};
+  tree.policy.decomposition = "kd-tree";
+  tree.policy.split = "occupied";
+  tree.policy.groups = 1;
+  return tree;
+}
+
+std::vector<std::string> AllSchemes() {
+  std::vector<std::string> schemes;
+  for (const CombiningEntry& entry : CombiningSchemes()) schemes.emplace_back(entry.name);
+  return schemes;
+}
+
+std::vector<std::string> UsualSchemes() { return {"fan-in", "radix-k"}; }
+
+double SteadySeconds(const Timeline& timeline) {
+  const std::size_t frames = timeline.frames.size(), half = frames / 2;
+  CHECK_GE(half, 1U);
+  return (timeline.frames.back().received - timeline.frames[half - 1].received) / double(frames - half);
+}
+
+}  // namespace slabstream

@@ -1,0 +1,11 @@
+// Bytes as text that may stand in a page (RFC 4648, section 4).
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace slabstream {
+
+std::string Base64(std::string_view bytes);
+
+}  // namespace slabstream

@@ -1,0 +1,29 @@
+// Legend: what stands beside a plot. Names with their colours, and below them what the strokes that occur mean.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "client/experiment/report/origin.h"
+#include "client/experiment/report/svg.h"
+
+namespace slabstream {
+
+struct Legend {
+  enum class Swatch { kLine, kBar };
+  Swatch swatch = Swatch::kLine;
+  std::vector<std::string> names;  // by colour
+  std::vector<Origin> origins;     // that occur
+};
+
+double LegendWidth(const Legend& legend);  // pixels, margins included
+double LegendHeight(const Legend& legend);
+void DrawLegend(SvgCanvas& canvas, const Legend& legend, SvgPoint top_left);
+
+// "measured here", "simulated from measured costs", "from the paper".
+std::string OriginWords(Origin origin);
+
+// About the width of a text of the charts' font.
+double TextWidth(const std::string& text);
+
+}  // namespace slabstream

@@ -1,0 +1,19 @@
+// Numbers and texts as reports show them. Pure.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace slabstream {
+
+// For XML and HTML, in text and in attribute values: & < > " ' become entities, control characters (which XML forbids) a replacement sign.
+std::string Escape(std::string_view text);
+
+// Four significant digits without trailing zeros, such as "0.01234", "12.3", "45678"; from 10^7 on and below 10^-4 with an exponent.
+// Not a number or infinite: "–".
+std::string FormatNumber(double value);
+
+// "a", "a-b-c" out of any text: fit for the name of a file, an id or a link.
+std::string Slug(std::string_view text);
+
+}  // namespace slabstream

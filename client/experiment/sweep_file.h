@@ -1,0 +1,48 @@
+// The file of `experiment sweep`: what a user wants varied, as JSON. docs/experiments.md has an example.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "client/cli/bench_cases.h"
+#include "common/base/status.h"
+#include "common/planning/frame_request.h"
+#include "common/simulation/link_model.h"
+
+namespace slabstream {
+
+inline constexpr std::size_t kMaxSweepBytes = std::size_t{1} << 20;
+inline constexpr int kMaxSweepWorkers = 4096;
+inline constexpr std::size_t kMaxSweepCases = 10000;
+
+struct SweepPolicy {
+  std::string name;
+  Policy policy;
+};
+struct SweepView {
+  std::string name;
+  ViewParameters view;
+};
+struct SweepLink {
+  std::string name;
+  LinkModel link;
+};
+
+// Every combination of these is a case.
+struct Sweep {
+  std::string title;
+  std::vector<BenchCase> volumes;
+  std::vector<RendererKind> renderers;
+  std::vector<SweepView> views;
+  std::vector<SweepPolicy> policies;
+  std::vector<int> workers;
+  std::vector<SweepLink> links;
+  ImageSize size{512, 512};
+};
+
+// InvalidArgument in one line naming `path`, the field by its place ("policies[1].combine"), the value and what is allowed; a volume file
+// that is not there is NotFound.
+Result<Sweep> ParseSweep(const std::string& path, std::string_view text);
+
+}  // namespace slabstream

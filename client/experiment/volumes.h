@@ -1,0 +1,46 @@
+// The volumes of an experiment, kept between its trials.
+#pragma once
+
+#include <list>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "client/cli/bench_cases.h"
+#include "common/base/status.h"
+#include "common/volume/occupancy_grid.h"
+#include "common/volume/summary.h"
+#include "common/volume/volume.h"
+
+namespace slabstream {
+
+struct VolumeInUse {
+  std::shared_ptr<const Volume> volume;
+  std::shared_ptr<const VolumeSummary> summary;
+};
+
+// Keeps what was used last within a budget, since trials come in random order. One thread at a time.
+class VolumeCache {
+ public:
+  explicit VolumeCache(std::size_t budget_bytes = std::size_t{1} << 30) : budget_bytes_(budget_bytes) {}
+  // Made or read where it is not held. Cases of one dataset share their volume.
+  Result<VolumeInUse> Get(const BenchCase& volume);
+  // Which voxels its transfer function shows.
+  Result<std::shared_ptr<const OccupancyGrid>> Occupied(const BenchCase& volume);
+
+ private:
+  struct Held {
+    std::string dataset;
+    VolumeInUse volume;
+  };
+  std::size_t budget_bytes_;
+  std::list<Held> held_;                                                  // last used first
+  std::map<std::string, std::shared_ptr<const OccupancyGrid>> occupied_;  // by name of the case
+};
+
+// What the user named, or the brain and its like where they are installed: real volumes beside the spheres. Errors of ParseBenchCase.
+Result<std::vector<BenchCase>> RealVolumes(const std::vector<std::string>& named);
+
+}  // namespace slabstream

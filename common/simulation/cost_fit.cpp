@@ -1,0 +1,204 @@
+#include "common/simulation/cost_fit.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace slabstream {
+namespace {
+
+constexpr std::size_t kSamplesATerm = 3;
+constexpr int kFolds = 5;
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+double Measured(const CostSample& sample, Stage stage) { return double(sample.stage_ns[std::size_t(stage)]) * 1e-9; }
+
+// Rows and times divided by the time, so that residuals are relative.
+struct System {
+  MatrixXd units;
+  VectorXd ones;
+};
+
+System MakeSystem(const StageCost& stage, std::span<const CostSample* const> samples) {
+  System system{MatrixXd(Eigen::Index(samples.size()), Eigen::Index(stage.units.size())), VectorXd::Ones(Eigen::Index(samples.size()))};
+  for (std::size_t row = 0; row < samples.size(); ++row) {
+    for (std::size_t column = 0; column < stage.units.size(); ++column) {
+      system.units(Eigen::Index(row), Eigen::Index(column)) =
+          samples[row]->work[std::size_t(stage.units[column])] / Measured(*samples[row], stage.stage);
+    }
+  }
+  return system;
+}
+
+// Columns to the same length first: their units differ by ten orders of magnitude.
+VectorXd ColumnLengths(const MatrixXd& a) {
+  return a.colwise().norm().transpose().unaryExpr([](double n) { return n > 0 ? n : 1.0; });
+}
+
+VectorXd SolveOn(const MatrixXd& a, const VectorXd& b, const std::vector<Eigen::Index>& columns) {
+  VectorXd x = VectorXd::Zero(a.cols());
+  if (columns.empty()) return x;
+  const VectorXd part = a(Eigen::all, columns).completeOrthogonalDecomposition().solve(b);
+  for (std::size_t i = 0; i < columns.size(); ++i) x[columns[i]] = part[Eigen::Index(i)];
+  return x;
+}
+
+// Lawson and Hanson's NNLS: argmin |a x - b| with x >= 0, and the columns that are not held at 0.
+VectorXd SolveNonNegative(const MatrixXd& a, const VectorXd& b, std::vector<Eigen::Index>& free) {
+  const double tolerance = 1e-12 * b.norm();
+  VectorXd x = VectorXd::Zero(a.cols());
+  free.clear();
+  while (Eigen::Index(free.size()) < a.cols()) {
+    // Frees the column that promises most.
+    const VectorXd gradient = a.transpose() * (b - a * x);
+    Eigen::Index best = -1;
+    for (Eigen::Index i = 0; i < a.cols(); ++i) {
+      if (std::find(free.begin(), free.end(), i) != free.end() || gradient[i] <= tolerance) continue;
+      if (best < 0 || gradient[i] > gradient[best]) best = i;
+    }
+    if (best < 0) break;
+    free.push_back(best);
+    VectorXd next = SolveOn(a, b, free);
+    if (next[best] <= 0) {  // what it promised was rounding
+      free.pop_back();
+      break;
+    }
+    // Goes as far towards it as all stay positive; what reaches 0 is held there.
+    while (std::any_of(free.begin(), free.end(), [&](Eigen::Index i) { return next[i] <= 0; })) {
+      double step = 1;
+      for (const Eigen::Index i : free) {
+        if (next[i] <= 0) step = std::min(step, x[i] / (x[i] - next[i]));
+      }
+      x += step * (next - x);
+      std::erase_if(free, [&](Eigen::Index i) { return x[i] <= 1e-14 && next[i] <= 0; });
+      next = SolveOn(a, b, free);
+    }
+    x = next;
+  }
+  return x;
+}
+
+VectorXd FitConstants(const StageCost& stage, std::span<const CostSample* const> samples, std::vector<Eigen::Index>& free) {
+  const System system = MakeSystem(stage, samples);
+  const VectorXd lengths = ColumnLengths(system.units);
+  return SolveNonNegative(system.units * lengths.cwiseInverse().asDiagonal(), system.ones, free).cwiseQuotient(lengths);
+}
+
+// The 97.5 % quantile of Student's t (Abramowitz and Stegun, 26.7.5): within 1 % for 3 degrees of freedom, better for more.
+double StudentQuantile(double freedom) {
+  constexpr double z = 1.959964;
+  constexpr double z3 = z * z * z, z5 = z3 * z * z, z7 = z5 * z * z;
+  const double n = freedom;
+  return z + (z3 + z) / (4 * n) + (5 * z5 + 16 * z3 + 3 * z) / (96 * n * n) + (3 * z7 + 19 * z5 + 17 * z3 - 15 * z) / (384 * n * n * n);
+}
+
+// Half the width of each constant's 95 % interval, if `columns` are the ones that were fitted.
+VectorXd HalfWidths(const System& system, const std::vector<Eigen::Index>& columns, const VectorXd& seconds) {
+  VectorXd widths = VectorXd::Zero(seconds.size());
+  const double freedom = double(system.units.rows()) - double(columns.size());
+  if (columns.empty() || freedom < 1) return widths;
+  const double variance = (system.units * seconds - system.ones).squaredNorm() / freedom;
+  const VectorXd lengths = ColumnLengths(system.units);
+  const MatrixXd scaled = (system.units * lengths.cwiseInverse().asDiagonal())(Eigen::all, columns);
+  const MatrixXd covariance = (scaled.transpose() * scaled).completeOrthogonalDecomposition().pseudoInverse();
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    widths[columns[i]] =
+        StudentQuantile(freedom) * std::sqrt(variance * covariance(Eigen::Index(i), Eigen::Index(i))) / lengths[columns[i]];
+  }
+  return widths;
+}
+
+StageCost WithConstants(StageCost stage, const VectorXd& seconds) {
+  stage.seconds = {};
+  for (std::size_t i = 0; i < stage.units.size(); ++i) stage.seconds[std::size_t(stage.units[i])] = seconds[Eigen::Index(i)];
+  return stage;
+}
+
+std::vector<TermFit> MakeTerms(const StageCost& stage, const System& system, const VectorXd& seconds,
+                               const std::vector<Eigen::Index>& free) {
+  const VectorXd widths = HalfWidths(system, free, seconds);
+  // A constant that is held at 0 could be what the fit to all of them leaves possible.
+  std::vector<Eigen::Index> all(stage.units.size());
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = Eigen::Index(i);
+  const VectorXd unconstrained = SolveOn(system.units, system.ones, all);
+  const VectorXd all_widths = HalfWidths(system, all, unconstrained);
+
+  std::vector<TermFit> terms;
+  for (const Eigen::Index i : all) {
+    const bool held = std::find(free.begin(), free.end(), i) == free.end();
+    const double high = held ? unconstrained[i] + all_widths[i] : seconds[i] + widths[i];
+    terms.push_back({stage.units[std::size_t(i)], seconds[i], std::max(seconds[i] - widths[i], 0.0), std::max(high, 0.0)});
+  }
+  return terms;
+}
+
+// What each sample is predicted to take by the fit to the other folds; sample i is in fold i mod kFolds.
+std::vector<double> CrossPredict(const StageCost& stage, std::span<const CostSample* const> samples) {
+  std::vector<double> predicted(samples.size());
+  for (int fold = 0; fold < kFolds; ++fold) {
+    std::vector<const CostSample*> others;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      if (int(i % kFolds) != fold) others.push_back(samples[i]);
+    }
+    std::vector<Eigen::Index> free;
+    const StageCost fitted = WithConstants(stage, FitConstants(stage, others, free));
+    for (std::size_t i = std::size_t(fold); i < samples.size(); i += kFolds) predicted[i] = fitted.Predict(samples[i]->work);
+  }
+  return predicted;
+}
+
+}  // namespace
+
+Result<StageFit> FitStage(const StageCost& stage, std::span<const CostSample> samples) {
+  std::vector<const CostSample*> used;
+  for (const CostSample& sample : samples) {
+    if (Measured(sample, stage.stage) > 0) used.push_back(&sample);
+  }
+  if (used.size() < kSamplesATerm * stage.units.size()) {
+    return Status::InvalidArgument(fmt::format("the stage {} took time in {} samples, but {} constants need at least {}",
+                                               ToString(stage.stage), used.size(), stage.units.size(), kSamplesATerm * stage.units.size()));
+  }
+
+  std::vector<Eigen::Index> free;
+  const VectorXd seconds = FitConstants(stage, used, free);
+  const System system = MakeSystem(stage, used);
+  StageFit fit;
+  fit.cost = WithConstants(stage, seconds);
+  fit.terms = MakeTerms(stage, system, seconds, free);
+  fit.residual = std::sqrt((system.units * seconds - system.ones).squaredNorm() / double(used.size()));
+  const std::vector<double> predicted = CrossPredict(stage, used);
+  double missed = 0, measured = 0;
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    const double time = Measured(*used[i], stage.stage);
+    fit.samples.push_back({std::size_t(used[i] - samples.data()), time, predicted[i]});
+    missed += std::abs(predicted[i] - time);
+    measured += time;
+  }
+  fit.prediction_error = missed / measured;
+  return fit;
+}
+
+Result<CostFit> FitCosts(std::span<const StageCost> stages, std::span<const CostSample> samples) {
+  CostFit fit;
+  std::vector<double> missing(samples.size());  // measured less predicted, all stages
+  double missed = 0, measured = 0;
+  for (const StageCost& stage : stages) {
+    Result<StageFit> of_stage = FitStage(stage, samples);
+    if (!of_stage.ok()) return of_stage.status();
+    for (const PredictedSample& sample : of_stage->samples) {
+      missing[sample.index] += sample.measured - sample.predicted;
+      measured += sample.measured;
+    }
+    fit.stages.push_back(*std::move(of_stage));
+  }
+  for (const double seconds : missing) missed += std::abs(seconds);
+  fit.prediction_error = missed / measured;
+  return fit;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,59 @@
+// MachineModel: the machine that frames are simulated on. Rendering is not in it: what a box costs is measured (client/lab) and comes with
+// the frame. All times are seconds of one thread of a worker of speed 1.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/base/status.h"
+#include "common/simulation/link_model.h"
+
+namespace slabstream {
+
+// What the combining thread of a worker does, for each pixel that is not empty and for each task.
+struct CombiningCosts {
+  double scan_pixel = 0.2e-9;     // looked at in search of runs, empty or not
+  double encode_pixel = 1.5e-9;   // copied into a message
+  double combine_pixel = 1.5e-9;  // out of a message, checked, onto what is there
+  double local_pixel = 1e-9;      // of one image of this worker onto another one
+  double hidden_pixel = 0.1e-9;   // of the frame: in search of opaque tiles (FindHiddenTiles)
+  double task = 10e-6;            // from being ordered to begun, and from done to known
+  std::int32_t run_bytes = 12;    // a run in a message
+  std::int32_t rgba_bytes = 16;   // a pixel in a message: splatting
+  std::int32_t depth_bytes = 24;  // and Z-buffer
+  friend bool operator==(const CombiningCosts&, const CombiningCosts&) = default;
+};
+
+// Some workers render slower in some frames, for no reason that a plan could know. Which ones depends on the seed alone.
+struct Stragglers {
+  double probability = 0;  // of a worker, in each frame; [0, 1]
+  double factor = 1;       // then its rendering takes so many times as long; >= 1
+  std::uint64_t seed = 1;
+  friend bool operator==(const Stragglers&, const Stragglers&) = default;
+};
+
+struct MachineModel {
+  LinkModel link;  // between workers; between them and the coordinator a message takes its latency and meets no other
+  CombiningCosts combining;
+  std::vector<double> speeds;  // of the workers, relative, > 0; worker i has speeds[i % size()]. Empty: all 1
+  Stragglers stragglers;
+  std::int32_t threads = 1;  // that render, of each worker
+  // How the picture's making (resampling, encoding) and rendering gain from n threads: n / (1 + (n - 1) * serial_share).
+  double serial_share = 0.02;
+
+  // Workers [i * workers_a_host, ...) share a host. Where more threads are busy than it has cores, all get their share; each busy thread
+  // besides the first slows the others down by `memory_slowdown`, since they share caches and memory. 0: a host for each worker.
+  std::int32_t workers_a_host = 0;
+  std::int32_t cores_a_host = 1;
+  double memory_slowdown = 0;  // [0, 1)
+
+  double plan_seconds = 200e-6;    // the coordinator plans a frame
+  double message_seconds = 5e-6;   // the coordinator sends or takes a message, one after the other
+  double client_seconds = 100e-6;  // from the picture's arrival at the coordinator until the client has it, beside decoding
+  friend bool operator==(const MachineModel&, const MachineModel&) = default;
+};
+
+// InvalidArgument naming field, value and limit.
+Status Validate(const MachineModel& machine);
+
+}  // namespace slabstream

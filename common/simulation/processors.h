@@ -1,0 +1,56 @@
+// Processors: tasks that run on the cores of hosts, in virtual time. Where the tasks of a host want more threads than it has cores, all get
+// their share; each busy thread besides the first slows the others down a little, since they share caches and memory.
+#pragma once
+
+#include <cstdint>
+#include <queue>
+#include <vector>
+
+namespace slabstream {
+
+class Processors {
+ public:
+  // `cores` of each host, > 0; `memory_slowdown` in [0, 1).
+  Processors(std::uint32_t hosts, double cores, double memory_slowdown);
+
+  // Starts a task that takes `seconds` where nobody is in its way and keeps `threads` busy. `task` names it, anything. `now` may not go
+  // back from call to call.
+  void Start(std::uint32_t host, std::uint64_t task, double seconds, double threads, double now);
+
+  struct Completion {
+    double time = 0;
+    std::uint64_t task = 0;
+  };
+  // The next task to end if nothing else is started before: infinity if none runs.
+  double NextTime();
+  // Ends it. NextTime() must be finite.
+  Completion Finish();
+
+ private:
+  struct Task {
+    std::uint64_t name = 0;
+    double left = 0;  // seconds, where nobody is in its way
+    double threads = 1;
+  };
+  struct Host {
+    std::vector<Task> tasks;
+    double since = 0;              // `left` is as of then
+    double speed = 1;              // of every task
+    std::uint64_t generation = 0;  // of its latest forecast
+  };
+  struct Forecast {
+    double time = 0;
+    std::uint32_t host = 0;
+    std::uint64_t generation = 0;
+    friend bool operator>(const Forecast& a, const Forecast& b) { return a.time != b.time ? a.time > b.time : a.host > b.host; }
+  };
+
+  void AdvanceTo(Host& host, double now) const;
+  void Predict(std::uint32_t number);
+
+  const double cores_, memory_slowdown_;
+  std::vector<Host> hosts_;
+  std::priority_queue<Forecast, std::vector<Forecast>, std::greater<>> forecasts_;  // those of older generations are void
+};
+
+}  // namespace slabstream

@@ -1,0 +1,114 @@
+// `experiment`: what is listed runs and leaves a report; what is interrupted continues; what is wrong is told in a line.
+#include <gmock/gmock.h>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "tests/end_to_end/program.h"
+#include "tests/support/well_formed.h"
+
+namespace slabstream {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+class ExperimentTest : public EndToEndTest {
+ protected:
+  void ExpectReport(const std::string& folder, const std::string& experiment) {
+    const json result = json::parse(ReadFile(folder + "/result.json"));
+    EXPECT_EQ(result["experiment"], experiment);
+    EXPECT_NE(result["commit"], "");
+    EXPECT_THAT(result["command"].get<std::string>(), HasSubstr("experiment " + experiment));
+    EXPECT_GE(result["machine"]["cores"], 1);
+    EXPECT_FALSE(result["tables"].empty());
+    for (const json& table : result["tables"]) {
+      EXPECT_TRUE(std::filesystem::exists(Path(folder + "/" + table["name"].get<std::string>() + ".csv"))) << table["name"];
+      EXPECT_FALSE(table["rows"].empty()) << table["name"];
+    }
+    EXPECT_EQ(WhyNotWellFormed(ReadFile(folder + "/report.html")), "");
+    std::size_t plots = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(Path(folder + "/plots"))) {
+      EXPECT_EQ(WhyNotWellFormed(ReadFile(folder + "/plots/" + entry.path().filename().string())), "") << entry.path();
+      ++plots;
+    }
+    EXPECT_GE(plots, 1U);
+  }
+};
+
+TEST_F(ExperimentTest, EveryListedExperimentLeavesAReport) {
+  const std::string list = MustRun({"experiment", "--list"}).out;
+  for (const std::string name : {"paper", "balance", "combining", "streaming", "scaling"}) {
+    EXPECT_THAT(list, HasSubstr(name));
+    MustRun({"experiment", name, "-o", name, "--quick", "--scale", "0.15"});
+    ExpectReport(name, name);
+  }
+  const json paper = json::parse(ReadFile("paper/result.json"));
+  std::set<std::string> names;
+  for (const json& table : paper["tables"]) names.insert(table["name"]);
+  for (const char* name : {"table-1-transform", "table-2-combining", "table-3-constants-splatting", "table-4-constants-zbuffer",
+                           "table-5-splatting", "table-6-zbuffer"})
+    EXPECT_EQ(names.count(name), 1U) << name;
+}
+
+TEST_F(ExperimentTest, SweepOfAUsersOwn) {
+  const std::string ball = MakeSphere("ball.nrrd", 2, 24);
+  std::ofstream(Path("sweep.json")) << R"({"volumes": [{"file": "ball.nrrd", "transfer": "opaque"}], "size": 48,
+    "policies": [{}, {"decomposition": "kd-tree", "combine": "radix-k"}], "workers": [1, 3]})";
+  MustRun({"experiment", "sweep", "sweep.json", "-o", "out"});
+  ExpectReport("out", "sweep");
+  EXPECT_EQ(json::parse(ReadFile("out/result.json"))["tables"][0]["rows"].size(), 4U);
+
+  std::ofstream(Path("bad.json")) << R"({"volumes": [{"file": "ball.nrrd"}], "policies": [{}], "workers": [-1]})";
+  const ProgramResult bad = Slabstream({"experiment", "sweep", "bad.json", "-o", "bad"});
+  EXPECT_EQ(bad.exit_status, 2);
+  EXPECT_THAT(bad.err, HasSubstr("workers[0]: -1"));
+  EXPECT_FALSE(std::filesystem::exists(Path("bad"))) << "nothing is made before the file is right";
+}
+
+TEST_F(ExperimentTest, ContinuesWhereCtrlCStoppedIt) {
+  const std::vector<std::string> arguments = {"experiment", "streaming", "-o", "out", "--quick", "--scale", "0.15", "--repeats", "20"};
+  {
+    RunningProgram program(Command(arguments), directory_);
+    ASSERT_TRUE(program.WaitForOutput("kinds of trials"));
+    program.Signal(SIGINT);
+    const ProgramResult result = program.Wait();
+    EXPECT_EQ(result.exit_status, 130) << result.err;
+    EXPECT_THAT(result.err, HasSubstr("the same command continues"));
+  }
+  const std::string before = ReadFile("out/trials.jsonl");
+  const ProgramResult other = Slabstream({"experiment", "streaming", "-o", "out", "--quick", "--scale", "0.15", "--repeats", "21"});
+  EXPECT_EQ(other.exit_status, 2);
+  EXPECT_THAT(other.err, HasSubstr("holds a run with repeats 20, not 21"));
+  MustRun(arguments);
+  EXPECT_EQ(ReadFile("out/trials.jsonl").substr(0, before.size()), before);
+  ExpectReport("out", "streaming");
+}
+
+TEST_F(ExperimentTest, WhatIsWrongIsToldInALine) {
+  const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
+      {{"experiment"}, "NAME is missing"},
+      {{"experiment", "paper"}, "--output"},
+      {{"experiment", "cake", "-o", "x"}, "'cake' is no experiment"},
+      {{"experiment", "sweep", "-o", "x"}, "needs a FILE"},
+      {{"experiment", "sweep", "none.json", "-o", "x"}, "'none.json' does not exist"},
+      {{"experiment", "paper", "some.json", "-o", "x"}, "takes no FILE"},
+      {{"experiment", "paper", "-o", "x", "--scale", "2"}, "--scale"},
+      {{"experiment", "paper", "-o", "x", "--repeats", "0"}, "--repeats"},
+      {{"experiment", "paper", "-o", "x", "--volume", "none.nrrd"}, "none.nrrd"},
+      {{"experiment", "paper", "-o", "/proc/x"}, "/proc/x"},
+  };
+  for (const auto& [arguments, says] : cases) {
+    const ProgramResult result = Slabstream(arguments);
+    EXPECT_EQ(result.exit_status, 2) << says;
+    EXPECT_THAT(result.err, HasSubstr(says));
+    EXPECT_EQ(result.err_lines().size(), 1U) << result.err;
+    EXPECT_FALSE(std::filesystem::exists(Path("x")));
+  }
+}
+
+}  // namespace
+}  // namespace slabstream

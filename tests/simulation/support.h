@@ -1,0 +1,61 @@
+// Plans and costs made by hand: as many workers as ranks, images that fill a share of a square frame evenly.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/combining/schemes.h"
+#include "common/simulation/simulate_frames.h"
+
+namespace slabstream {
+
+// A machine on which nothing takes time but what a test sets.
+inline MachineModel FreeMachine() {
+  MachineModel machine;
+  machine.link = {Contention::kNone, 0, 1e15};
+  machine.combining = {.scan_pixel = 0, .encode_pixel = 0, .combine_pixel = 0, .local_pixel = 0, .hidden_pixel = 0, .task = 0};
+  machine.combining.run_bytes = 0;
+  machine.plan_seconds = machine.message_seconds = machine.client_seconds = 0;
+  machine.serial_share = 0;
+  return machine;
+}
+
+// Owns what FrameInput points at.
+class MadeFrame {
+ public:
+  // `groups` groups of `workers` boxes each, box i of worker i % workers + 1, on a frame of side x side pixels of which every image fills
+  // `share`; the display worker is the root. `combining`: as --combine takes it.
+  MadeFrame(std::uint32_t workers, std::uint32_t groups, std::int32_t side, double share, double seconds, const std::string& combining,
+            RendererKind renderer = RendererKind::kZBuffer)
+      : coverage_(UniformCoverage({0, 0, side, side}, share * side * side, side, side)) {
+    plan_.setup.renderer = renderer;
+    plan_.setup.camera.width = plan_.setup.camera.height = side;
+    plan_.setup.sheets.width = plan_.setup.sheets.height = side;
+    plan_.slots = workers;
+    plan_.display = 1;
+    for (std::uint32_t g = 0; g < groups; ++g) {
+      GroupPlan group;
+      for (std::uint32_t i = 0; i < workers; ++i) group.placements.push_back({g * workers + i, {}, i + 1});
+      group.schedule = ParseCombining(combining)->Make({workers, 0, WholeFrame(plan_.setup)});
+      plan_.groups.push_back(std::move(group));
+    }
+    costs_.assign(std::size_t(workers) * groups, {seconds, &coverage_, 0});
+  }
+  MadeFrame(const MadeFrame&) = delete;
+
+  FrameInput input() const { return {&plan_, costs_, finish_seconds}; }
+  FramePlan& plan() { return plan_; }
+  std::vector<RenderCost>& costs() { return costs_; }
+  double finish_seconds = 0;
+
+ private:
+  CoverageMap coverage_;
+  FramePlan plan_;
+  std::vector<RenderCost> costs_;
+};
+
+inline Timeline Simulate(const std::vector<FrameInput>& frames, const MachineModel& machine, int in_flight = 1) {
+  return SimulateFrames(frames, machine, {.in_flight = in_flight}).value();
+}
+
+}  // namespace slabstream
