@@ -3,6 +3,7 @@
 #include <tbb/global_control.h>
 #include <tbb/info.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <mutex>
 #include <optional>
@@ -16,19 +17,18 @@ class Pool {
     const std::lock_guard lock(mutex_);
     workers_ += workers;
     threads_ += threads;
-    limit_.reset();                                   // of several limits oneTBB takes the smallest
-    const int parallelism = threads_ - workers_ + 1;  // each worker has one thread of its own
-    if (parallelism > tbb::info::default_concurrency()) {
-      limit_.emplace(tbb::global_control::max_allowed_parallelism, std::size_t(parallelism));
-    }
+    limit_.reset();  // of several limits oneTBB takes the smallest
+    if (needed() > tbb::info::default_concurrency()) limit_.emplace(tbb::global_control::max_allowed_parallelism, std::size_t(needed()));
   }
 
   int threads() {
     const std::lock_guard lock(mutex_);
-    return threads_;
+    return std::min(threads_, std::max(needed(), tbb::info::default_concurrency()));
   }
 
  private:
+  int needed() const { return threads_ - workers_ + 1; }  // of one arena: each worker has one thread of its own
+
   std::mutex mutex_;
   int workers_ = 0, threads_ = 0;  // of this process
   std::optional<tbb::global_control> limit_;

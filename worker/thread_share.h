@@ -15,7 +15,7 @@ class ThreadShare {
   ThreadShare& operator=(const ThreadShare&) = delete;
 
   int threads() const { return threads_; }
-  // Those of all workers of this process together, as of now.
+  // Those of all workers of this process together, as of now, as far as one arena can have them.
   static int OfProcess();
 
  private:
