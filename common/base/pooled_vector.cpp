@@ -69,10 +69,11 @@ class Pool {
     return arena_ == nullptr ? std::nullopt : std::optional(arena_->name());
   }
 
+  // The block's name, if it has one.
   std::optional<BlockName> Pin(const void* data) {
     const std::lock_guard lock(mutex_);
-    if (arena_ == nullptr || !arena_->Contains(data)) return std::nullopt;
     ++pins_[data].count;
+    if (arena_ == nullptr || !arena_->Contains(data)) return std::nullopt;
     return arena_->NameOf(data);
   }
 
@@ -143,10 +144,9 @@ void GiveBackBlock(void* block, std::size_t bytes) {
 Status ShareBlocks() { return TheBlocks().Share(); }
 std::optional<ArenaName> SharedBlocksArena() { return TheBlocks().arena(); }
 
-std::optional<BlockPin> BlockPin::Pin(const void* block) {
-  const std::optional<BlockName> name = TheBlocks().Pin(block);
-  if (!name) return std::nullopt;
-  return BlockPin(block, *name);
+std::optional<BlockPin> BlockPin::Pin(const void* block, std::size_t bytes) {
+  if (block == nullptr || bytes < kLeastKept) return std::nullopt;
+  return BlockPin(block, TheBlocks().Pin(block));
 }
 
 BlockPin::~BlockPin() {

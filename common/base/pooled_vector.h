@@ -25,11 +25,11 @@ void GiveBackBlock(void* block, std::size_t bytes);  // `bytes` as taken
 Status ShareBlocks();
 std::optional<ArenaName> SharedBlocksArena();  // none: not shared
 
-// Keeps what a block holds at the disposal of other processes, also after it was given back: it is used again when its last pin is gone.
+// Keeps what a block holds at the disposal of others, also after it was given back: it is used again when its last pin is gone.
 class BlockPin {
  public:
-  // `block` as TakeBlock gave it, null allowed. None: the block is private.
-  static std::optional<BlockPin> Pin(const void* block);
+  // `block` and `bytes` as taken, null allowed. None: the block is so small that it goes back to the heap at once.
+  static std::optional<BlockPin> Pin(const void* block, std::size_t bytes);
   BlockPin(BlockPin&& other) noexcept : block_(std::exchange(other.block_, nullptr)), name_(other.name_) {}
   BlockPin& operator=(BlockPin&& other) noexcept {
     std::swap(block_, other.block_);
@@ -37,12 +37,12 @@ class BlockPin {
     return *this;
   }
   ~BlockPin();
-  const BlockName& name() const { return name_; }
+  const std::optional<BlockName>& name() const { return name_; }  // none: no other process can read it
 
  private:
-  BlockPin(const void* block, BlockName name) : block_(block), name_(name) {}
+  BlockPin(const void* block, std::optional<BlockName> name) : block_(block), name_(name) {}
   const void* block_;
-  BlockName name_;
+  std::optional<BlockName> name_;
 };
 
 template <class T>
@@ -67,5 +67,10 @@ struct PooledAllocator {
 
 template <class T>
 using PooledVector = std::vector<T, PooledAllocator<T>>;
+
+template <class T>
+std::optional<BlockPin> PinOf(const PooledVector<T>& vector) {
+  return BlockPin::Pin(vector.data(), vector.capacity() * sizeof(T));
+}
 
 }  // namespace slabstream

@@ -28,6 +28,12 @@ class TaskThread {
     ready_.notify_one();
   }
 
+  // Nothing is running and nothing waits. Who alone posts may count on it until then.
+  bool Idle() {
+    const std::lock_guard lock(mutex_);
+    return tasks_.empty() && !running_;
+  }
+
  private:
   void Run(const std::stop_token& stop) {
     while (true) {
@@ -38,14 +44,19 @@ class TaskThread {
         if (stop.stop_requested()) return;
         task = std::move(tasks_.front());
         tasks_.pop_front();
+        running_ = true;
       }
       task();
+      task = nullptr;  // what it held is gone before anybody takes the thread for idle
+      const std::lock_guard lock(mutex_);
+      running_ = false;
     }
   }
 
   std::mutex mutex_;
   std::condition_variable_any ready_;
   std::deque<std::function<void()>> tasks_;  // guarded by mutex_
+  bool running_ = false;                     // guarded by mutex_
   std::jthread thread_;                      // last member: ends before the others are destroyed
 };
 

@@ -3,6 +3,8 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -14,6 +16,13 @@ namespace slabstream {
 namespace {
 
 static_assert(kBrick % kOccupancyCell == 0, "a cell lies in one brick");
+
+// Of the mask of a cell's row: the basic x86-64 instruction set has no such instruction.
+constexpr auto kBitCount = [] {
+  std::array<std::uint8_t, 1 << kOccupancyCell> counts{};
+  for (std::size_t mask = 0; mask < counts.size(); ++mask) counts[mask] = std::uint8_t(std::popcount(mask));
+  return counts;
+}();
 
 // Whether a sample is occupied, 0 or 1: of integers by table.
 template <class T>
@@ -41,27 +50,31 @@ class Occupied {
   std::vector<std::uint8_t> by_sample_;
 };
 
-// Of a cell's row, at most kOccupancyCell samples. Rows of one value, the most frequent ones of sparse data, are one comparison.
+// Of a cell's row, at most kOccupancyCell samples: bit i is sample i. Rows of one value, the most frequent ones of sparse data, are one
+// comparison.
 template <class T>
-std::uint16_t CountRow(const T* row, std::int32_t count, const Occupied<T>& occupied) {
-  if (count == kOccupancyCell && std::memcmp(row, row + 1, (kOccupancyCell - 1) * sizeof(T)) == 0) {
-    return std::uint16_t(kOccupancyCell * occupied(row[0]));
-  }
-  std::uint16_t sum = 0;
-  for (std::int32_t i = 0; i < count; ++i) sum = std::uint16_t(sum + occupied(row[i]));
-  return sum;
+std::uint32_t RowMask(const T* row, std::int32_t count, const Occupied<T>& occupied) {
+  if (count == kOccupancyCell && std::memcmp(row, row + 1, (kOccupancyCell - 1) * sizeof(T)) == 0) return occupied(row[0]) * 0xFFU;
+  std::uint32_t mask = 0;
+  for (std::int32_t i = 0; i < count; ++i) mask |= std::uint32_t{occupied(row[i])} << i;
+  return mask;
 }
 
 template <class T>
-std::uint16_t CountCell(const BrickView<T>& brick, const Box& cell, const Occupied<T>& occupied) {
-  if (brick.y_stride == 0) return std::uint16_t(cell.voxel_count() * occupied(*brick.first));
-  std::uint16_t sum = 0;
+CellOccupancy CountCell(const BrickView<T>& brick, const Box& cell, const Occupied<T>& occupied) {
+  if (brick.y_stride == 0) return occupied(*brick.first) != 0 ? FullCell(cell) : CellOccupancy{};
+  int voxels = 0, rows_x = 0, rows_y = 0;
   for (std::int32_t z = cell.begin.z; z < cell.end.z; ++z) {
+    std::uint32_t columns = 0;  // of the slice, that any row has
     for (std::int32_t y = cell.begin.y; y < cell.end.y; ++y) {
-      sum = std::uint16_t(sum + CountRow(brick.Row(y, z) + (cell.begin.x - brick.begin.x), cell.size().x, occupied));
+      const std::uint32_t mask = RowMask(brick.Row(y, z) + (cell.begin.x - brick.begin.x), cell.size().x, occupied);
+      voxels += kBitCount[mask];
+      rows_x += mask != 0 ? 1 : 0;
+      columns |= mask;
     }
+    rows_y += kBitCount[columns];
   }
-  return sum;
+  return {std::uint16_t(voxels), std::uint8_t(rows_x), std::uint8_t(rows_y)};
 }
 
 template <class T>
@@ -71,7 +84,7 @@ void Count(const VoxelBricks& voxels, const ClassificationTable& table, Occupanc
   constexpr std::int32_t kCellsOfBrick = kBrick / kOccupancyCell;
   tbb::parallel_for(0, cells.y * cells.z, [&](std::int32_t row) {
     Index3 cell = {0, row % cells.y, row / cells.y};
-    std::uint16_t* out = &grid.occupied[std::size_t(row) * std::size_t(cells.x)];
+    CellOccupancy* out = &grid.cells[std::size_t(row) * std::size_t(cells.x)];
     for (; cell.x < cells.x; ++cell.x) {
       const Index3 brick = {cell.x / kCellsOfBrick, cell.y / kCellsOfBrick, cell.z / kCellsOfBrick};
       out[cell.x] = CountCell(voxels.View<T>(brick), OccupancyCellBox(cell, grid.size), occupied);
@@ -85,7 +98,7 @@ OccupancyGrid CountOccupied(const VoxelBricks& voxels, const ClassificationTable
   const Box& box = voxels.box();
   CHECK(box.begin == Index3{} && !box.empty());
   const Index3 cells = OccupancyCells(box.end);
-  OccupancyGrid grid{box.end, std::vector<std::uint16_t>(std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z))};
+  OccupancyGrid grid{box.end, std::vector<CellOccupancy>(std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z))};
   VisitScalarType(voxels.type(), [&](auto* type) { Count<std::remove_cvref_t<decltype(*type)>>(voxels, table, grid); });
   return grid;
 }

@@ -1,11 +1,11 @@
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <charconv>
 #include <optional>
 #include <string>
 
+#include "common/base/find_named.h"
 #include "common/combining/schemes.h"
 
 namespace slabstream {
@@ -60,14 +60,9 @@ Status ParseItem(std::string_view item, const CombiningEntry& scheme, CombiningA
 Result<CombiningChoice> ParseCombining(std::string_view text) {
   std::optional<std::string_view> rest = text;
   const std::string_view name = CutFirst(rest, ':');
-  const std::vector<CombiningEntry>& schemes = CombiningSchemes();
-  const auto scheme = std::ranges::find(schemes, name, &CombiningEntry::name);
-  if (scheme == schemes.end()) {
-    std::vector<std::string_view> names;
-    for (const CombiningEntry& entry : schemes) names.push_back(entry.name);
-    return Status::InvalidArgument(fmt::format("'{}' is not one of {}", name, fmt::join(names, ", ")));
-  }
-  CombiningChoice choice = {&*scheme, {}};
+  const CombiningEntry* scheme = FindNamed(CombiningSchemes(), name);
+  if (scheme == nullptr) return Status::InvalidArgument(fmt::format("'{}' is not one of {}", name, NamesOf(CombiningSchemes())));
+  CombiningChoice choice = {scheme, {}};
   while (rest) {
     if (const Status status = ParseItem(CutFirst(rest, ','), *scheme, choice.arguments); !status.ok())
       return Invalid(text, status.message());

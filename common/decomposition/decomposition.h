@@ -31,7 +31,6 @@ struct DecompositionEntry {
 
 // The only list.
 const std::vector<DecompositionEntry>& Decompositions();
-const DecompositionEntry* FindDecomposition(std::string_view name);  // null: no such name
 
 // Slabs along `axis`, which are numbered along it. Of equal voxels: sizes differ by at most one slice.
 Partition MakeSlabs(const DecompositionRequest& request);

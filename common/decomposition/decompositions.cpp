@@ -13,11 +13,4 @@ const std::vector<DecompositionEntry>& Decompositions() {
   return entries;
 }
 
-const DecompositionEntry* FindDecomposition(std::string_view name) {
-  for (const DecompositionEntry& entry : Decompositions()) {
-    if (entry.name == name) return &entry;
-  }
-  return nullptr;
-}
-
 }  // namespace slabstream

@@ -12,8 +12,8 @@ namespace slabstream {
 
 std::vector<double> CellWork(const OccupancyGrid& grid) {
   std::vector<double> work;
-  work.reserve(grid.occupied.size());
-  for (const std::uint16_t voxels : grid.occupied) work.push_back(voxels > 0 ? voxels + kCellWork : 0);
+  work.reserve(grid.cells.size());
+  for (const CellOccupancy& cell : grid.cells) work.push_back(cell.voxels > 0 ? cell.voxels + kCellWork : 0);
   return work;
 }
 

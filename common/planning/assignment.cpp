@@ -13,16 +13,9 @@ const std::vector<AssignmentEntry>& Assignments() {
   static const std::vector<AssignmentEntry> entries = {
       {"cyclic", "box after box to worker after worker", AssignCyclic},
       {"contiguous", "neighbouring boxes to one worker", AssignContiguous},
-      {"greedy", "the costliest box left to the worker with least to do", AssignGreedy},
+      {"greedy", "the costliest box left to the worker with least to do", AssignGreedy, true},
   };
   return entries;
-}
-
-const AssignmentEntry* FindAssignment(std::string_view name) {
-  for (const AssignmentEntry& entry : Assignments()) {
-    if (entry.name == name) return &entry;
-  }
-  return nullptr;
 }
 
 std::vector<std::uint32_t> AssignCyclic(const AssignmentRequest& request) {

@@ -17,11 +17,11 @@ struct AssignmentEntry {
   std::string_view name;                                           // what --assignment takes
   std::string_view purpose;                                        // one line for --help
   std::vector<std::uint32_t> (*assign)(const AssignmentRequest&);  // by box: its slot, in [0, slots)
+  bool by_cost = false;                                            // it looks at costs: the better they are known, the better it is
 };
 
 // The only list.
 const std::vector<AssignmentEntry>& Assignments();
-const AssignmentEntry* FindAssignment(std::string_view name);  // null: no such name
 
 // Box i belongs to slot i mod slots.
 std::vector<std::uint32_t> AssignCyclic(const AssignmentRequest& request);

@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
+#include <map>
 #include <utility>
 #include <vector>
 
 #include "common/base/check.h"
 #include "common/view/sheet_grid.h"
+#include "common/volume/box_assembly.h"
 
 namespace slabstream {
 namespace {
@@ -37,13 +38,18 @@ double FrameSeconds(const Layout& layout, std::uint32_t slots, std::span<const d
 }
 
 std::int64_t MovedVoxels(const Layout& from, const Layout& to) {
-  std::set<std::pair<std::uint32_t, Box>> had;
-  for (std::size_t box = 0; box < from.owners.size(); ++box) had.insert({from.owners[box], from.partition.boxes()[box]});
+  const auto with_halo = [](const Layout& layout, std::size_t box) {
+    return Grown(layout.partition.boxes()[box], kHalo, layout.partition.bounds());
+  };
+  std::map<std::uint32_t, std::vector<Box>> held;  // by slot
+  for (std::size_t box = 0; box < from.owners.size(); ++box) {
+    if (from.owners[box] != kNoSlot) held[from.owners[box]].push_back(with_halo(from, box));
+  }
   std::int64_t moved = 0;
   for (std::size_t box = 0; box < to.owners.size(); ++box) {
-    const Box& voxels = to.partition.boxes()[box];
-    if (to.owners[box] == kNoSlot || had.contains({to.owners[box], voxels})) continue;
-    moved += Grown(voxels, kHalo, to.partition.bounds()).voxel_count();
+    if (to.owners[box] == kNoSlot) continue;
+    const Box wanted = with_halo(to, box);
+    moved += Assemble(wanted, held[to.owners[box]], MostMissing(wanted)).missing_voxels();
   }
   return moved;
 }

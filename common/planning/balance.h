@@ -1,7 +1,7 @@
 // Dynamic balance: whether a layout should change between two frames, given what rendering costs where. Pure.
 //
 // Two changes are weighed. Boxes are cut anew, at equal learnt cost; or they stay, and some are handed over from slots that have much to do
-// to slots that have little. A change moves voxels: every box that a slot did not have before, with its halo, travels to it whole. It is
+// to slots that have little. A change moves voxels: of every box, with its halo, what its slot did not hold before travels to it. It is
 // made if the frames to come win more time than that takes, and a share of the frame's time that noise alone would hardly pretend.
 #pragma once
 
@@ -26,7 +26,8 @@ std::vector<double> PredictedSeconds(const Layout& layout, const WorkField& cost
 // Render time of a frame: of the slot that has most to do. `seconds` by box.
 double FrameSeconds(const Layout& layout, std::uint32_t slots, std::span<const double> seconds);
 
-// Voxels that slots must get to change over: boxes, with halo, that they own in `to` and not in `from`.
+// Voxels that slots must get to change over: those of their boxes in `to`, with halo, that none of their boxes in `from` holds. What
+// SlabFetcher (worker/slab_fetcher.h) asks for then.
 std::int64_t MovedVoxels(const Layout& from, const Layout& to);
 
 // The same boxes: from the slot with most to do one after the other goes to the slot with least, as long as that helps. `seconds` by box.

@@ -33,12 +33,12 @@ OccupancyGrid BrickVisibility::VisibleCells() const {
   static_assert(kSummaryBrick % kOccupancyCell == 0, "a cell lies in one brick");
   OccupancyGrid grid{summary_.description.geometry.size, {}};
   const Index3 cells = OccupancyCells(grid.size);
-  grid.occupied.reserve(std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z));
+  grid.cells.reserve(std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z));
   for (Index3 cell; cell.z < cells.z; ++cell.z) {
     for (cell.y = 0; cell.y < cells.y; ++cell.y) {
       for (cell.x = 0; cell.x < cells.x; ++cell.x) {
         const Box box = OccupancyCellBox(cell, grid.size);
-        grid.occupied.push_back(std::uint16_t(AnyVisible(box) ? box.voxel_count() : 0));
+        grid.cells.push_back(AnyVisible(box) ? FullCell(box) : CellOccupancy{});
       }
     }
   }

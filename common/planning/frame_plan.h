@@ -38,10 +38,15 @@ struct FrameSetup {
   friend bool operator==(const FrameSetup&, const FrameSetup&) = default;
 };
 
+// What is rendered for a picture of `size` under `view`, which are valid: fills in camera and sheets by what renderer and description say.
+void SetView(const ViewParameters& view, ImageSize size, FrameSetup& setup);
+
 // The frame: all pixels that workers render and combine, from which the picture is made at the end (FinishPicture). Local images, runs and
 // pixel ranges count in it.
 PixelBounds FrameBounds(const FrameSetup& setup);
 inline PixelRange WholeFrame(const FrameSetup& setup) { return {0, std::uint64_t(FrameBounds(setup).pixel_count())}; }
+// What an image of all of them takes in memory.
+std::int64_t FrameBytes(const FrameSetup& setup);
 
 inline PixelFormat FormatOf(RendererKind renderer) { return renderer == RendererKind::kSplat ? PixelFormat::kRgba : PixelFormat::kDepth; }
 
@@ -60,6 +65,14 @@ struct GroupPlan {
   friend bool operator==(const GroupPlan&, const GroupPlan&) = default;
 };
 
+// Frames take turns. Where teams of workers share them out (common/planning/team.h), a plan is of one team's workers; of these, every
+// frame of the team has another one as its display worker, so that no one makes all pictures.
+struct Turn {
+  std::uint64_t number = 0;  // of the frame, among its team's
+  std::uint32_t teams = 1;
+  friend bool operator==(const Turn&, const Turn&) = default;
+};
+
 struct FramePlan {
   FrameSetup setup;
   Layout layout;
@@ -69,9 +82,13 @@ struct FramePlan {
   double pixel_error = 0;         // as in the policy
   std::string combine;            // the combining scheme, as in the policy
   std::vector<GroupPlan> groups;  // nearest first; at least one
-  WorkerId display = 0;           // accumulates the groups and hands the frame over; holds a rank wherever possible
+  Turn turn;
+  WorkerId display = 0;  // accumulates the groups and hands the frame over; holds a rank wherever possible
   friend bool operator==(const FramePlan&, const FramePlan&) = default;
 };
+
+// Of all groups, nearest first.
+std::vector<Placement> PlacementsOf(const FramePlan& plan);
 
 // The worker of each slot of a layout. A slot may be vacant (0) after a loss: its boxes are then lent to the others, round robin, and
 // everybody else keeps their own, so that only the lost voxels travel again. No worker holds two slots.
@@ -80,11 +97,15 @@ struct Roster {
   friend bool operator==(const Roster&, const Roster&) = default;
 };
 
-// Pure. Errors: InvalidArgument (an unknown name of the policy), NotFound (no such preset), Unavailable (no worker in the roster). The
-// request must be valid (Validate). Null `layout`: MakeLayout, with what the volume's summary knows; else one that was made for this
-// volume, transfer function and policy and for as many slots as the roster has.
+// What a frame's plan has whatever the policy. Errors: NotFound (no such preset), InvalidArgument (an image along the slices that is too
+// large). The request must be valid.
+Result<FrameSetup> MakeFrameSetup(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary);
+
+// Pure. Errors: InvalidArgument (an unknown name of the policy, or one that is left open), NotFound (no such preset), Unavailable (no
+// worker in the roster). The request must be valid (Validate). Null `layout`: MakeLayout, with what the volume's summary knows; else one
+// that was made for this volume, transfer function and policy and for as many slots as the roster has.
 Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, const Roster& roster,
-                            const CostModel& cost, const Layout* layout = nullptr);
+                            const CostModel& cost, const Layout* layout = nullptr, const Turn& turn = {});
 
 // The function that a request names or holds, for this volume. NotFound: no such preset.
 Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const VolumeSummary& summary);
@@ -92,6 +113,10 @@ Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const Vol
 // The same frame over another roster with the same number of slots: same setup, layout and groups; workers of placements, schedules and
 // display change. The display worker is kept if it is still in the roster: it holds what was accumulated. Unavailable if nobody is.
 Result<FramePlan> Replan(const FramePlan& plan, const Roster& roster);
+
+// The plan of another frame of the same request, over a roster of the same size with a worker in it: who does what changes, and nothing
+// else.
+FramePlan TakeTurn(const FramePlan& plan, const Roster& roster, const Turn& turn);
 
 // Worker of each box: its slot's, or the one it is lent to; 0 of a box that belongs to nobody, and of all if the roster is empty of
 // workers.

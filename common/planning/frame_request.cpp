@@ -31,6 +31,7 @@ Status Validate(const Policy& policy) {
   if (Status s = ValidateName("policy.assignment", policy.assignment); !s.ok()) return s;
   if (Status s = ValidateName("policy.balance", policy.balance); !s.ok()) return s;
   if (Status s = ValidateName("policy.combine", policy.combine); !s.ok()) return s;
+  if (Status s = InRange("policy.teams", policy.teams, 1, kMaxTeams); !s.ok()) return s;
   return InRange("policy.pixel_error", policy.pixel_error, 0, kMaxPixelError);
 }
 

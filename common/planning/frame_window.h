@@ -1,10 +1,34 @@
-// How much of a frame sequence is under way at a time: the coordinator's rules, which the simulation follows too. The next group renders
-// while one combines, across frames.
+// FrameWindow: how much of a frame sequence is under way at a time. The coordinator's rule, which the simulation follows too. The next
+// group renders while others combine, across frames, and pictures are made meanwhile.
+//
+// What a frame takes on p workers: rendering takes 1/p of the time of one worker; the hops of combining, the making of the picture and the
+// messages around it take what they take. So more workers need more frames under way to be busy: as many as there are workers, since then a
+// newcomer still waits behind about as much work as behind two frames of two workers. It is bounded
+//   below  by 2, which one or two workers need to render while they combine;
+//   above  by kMostInWindow: more of them win little (docs/performance.md);
+//   and by memory: a worker holds an image, which may be as large as the frame, for every unfinished group, at most kWindowBytes of
+//          them in all where 2 are not more.
+// Teams (common/planning/team.h) have a window each.
+//
+// Frames that leave out what groups in front hide have at most kMaskedGroups unfinished groups each, since a group that is handed out
+// earlier knows of less that is hidden.
 #pragma once
+
+#include <cstdint>
 
 namespace slabstream {
 
-inline constexpr int kGroupWindow = 2;        // unfinished groups, over all frames
-inline constexpr int kMaxFramesInFlight = 2;  // frames with a plan
+inline constexpr int kLeastInWindow = 2, kMostInWindow = 16, kMaskedGroups = 2;
+inline constexpr std::int64_t kWindowBytes = std::int64_t{256} << 20;
+
+struct FrameWindow {
+  int groups = kLeastInWindow;  // unfinished, over all frames: handed out and not accumulated
+  int frames = kLeastInWindow;  // with a plan and without a picture
+  friend bool operator==(const FrameWindow&, const FrameWindow&) = default;
+};
+
+// `workers` that there are, in `teams` >= 1; `frame_bytes` of the largest frame under way (FrameBytes), 0 if there is none. Both members
+// lie in [kLeastInWindow, kMostInWindow] for each team.
+FrameWindow WindowFor(std::size_t workers, std::uint32_t teams, std::int64_t frame_bytes);
 
 }  // namespace slabstream

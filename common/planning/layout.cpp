@@ -3,15 +3,19 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <optional>
 #include <string>
 
 #include "common/base/check.h"
+#include "common/base/find_named.h"
 #include "common/combining/schemes.h"
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
 #include "common/planning/brick_visibility.h"
+#include "common/planning/learnt_cost.h"
 #include "common/planning/policy_names.h"
+#include "common/planning/render_work.h"
 #include "common/view/sheet_grid.h"
 
 namespace slabstream {
@@ -21,26 +25,27 @@ constexpr std::int64_t kMostBoxes = std::int64_t{1} << 20;
 
 template <class Entry>
 Status CheckName(std::string_view field, std::string_view name, const std::vector<Entry>& entries) {
-  std::string known;
-  for (const Entry& entry : entries) {
-    if (entry.name == name) return Status::Ok();
-    known += (known.empty() ? "" : ", ") + std::string(entry.name);
-  }
-  return Status::InvalidArgument(fmt::format("{} is '{}', but must be one of: {}", field, name, known));
+  if (FindNamed(entries, name) != nullptr) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("{} is '{}', but must be one of: {}", field, name, NamesOf(entries)));
 }
 
-// The fewest groups whose slabs stay under the target, whatever the view. Slabs thinner than the halo would hold more of it than voxels of
-// their own.
-std::int64_t ChooseGroups(const LayoutRequest& request, Axis axis) {
-  const VolumeDescription& description = request.summary->description;
-  const std::int64_t slices = description.geometry.size[axis], slots = request.slots;
-  const std::int64_t slice_bytes = description.voxel_bytes() / slices;
-  const std::int64_t most = std::clamp<std::int64_t>(slices / (slots * kHalo), 1, kMaxGroups);
-  for (std::int64_t groups = 1; groups < most; ++groups) {
-    const std::int64_t own_slices = (slices + slots * groups - 1) / (slots * groups);
-    if (std::min(own_slices + 2 * kHalo, slices) * slice_bytes <= request.slab_bytes_target) return groups;
-  }
-  return most;
+template <class Entry>
+Status CheckOpenName(std::string_view field, std::string_view name, const std::vector<Entry>& entries) {
+  if (name == kAutomatic || FindNamed(entries, name) != nullptr) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("{} is '{}', but must be one of: {}, {}", field, name, kAutomatic, NamesOf(entries)));
+}
+
+// Boxes that hold three times as many voxels as they own, halo and all: slabs of as many slices as the halo is thick, cubes of this many
+// voxels a side. There is no point in smaller ones.
+constexpr std::int64_t kSmallestCube = 36;
+
+int MostGroups(const LayoutRequest& request, const Policy& policy) {
+  const Index3& size = request.summary->description.geometry.size;
+  const std::int64_t slots = request.slots;
+  const std::int64_t boxes = FindNamed(Decompositions(), policy.decomposition)->one_axis
+                                 ? size[SlabAxis(policy, size)] / kHalo
+                                 : Box{{0, 0, 0}, size}.voxel_count() / (kSmallestCube * kSmallestCube * kSmallestCube);
+  return int(std::clamp<std::int64_t>(boxes / slots, 1, kMaxGroups));
 }
 
 // The fields of work that a layout is made from, each made when it is first asked for.
@@ -54,8 +59,14 @@ class WorkFields {
   const WorkField& Of(WorkSplit split) {
     if (split == WorkSplit::kVoxels) return voxels_;
     if (split == WorkSplit::kCost && request_.known.cost != nullptr) return *request_.known.cost;
-    if (!occupied_) occupied_.emplace(request_.known.occupied != nullptr ? *request_.known.occupied : visibility_.VisibleCells());
+    if (!occupied_) occupied_.emplace(Grid());
     return *occupied_;
+  }
+
+  const OccupancyGrid& Grid() {
+    if (request_.known.occupied != nullptr) return *request_.known.occupied;
+    if (!visible_) visible_.emplace(visibility_.VisibleCells());
+    return *visible_;
   }
 
   // Whether any sample that `box` owns may show something.
@@ -69,72 +80,164 @@ class WorkFields {
   const LayoutRequest& request_;
   const BrickVisibility visibility_;
   const WorkField voxels_;
+  std::optional<OccupancyGrid> visible_;
   std::optional<WorkField> occupied_;
 };
 
 }  // namespace
 
+struct LayoutMaker::State {
+  explicit State(const LayoutRequest& r) : request(r), fields(request) {}
+
+  Partition MakePartition(const Policy& policy, int groups, const WorkField& field) {
+    const Index3& size = request.summary->description.geometry.size;
+    const std::int64_t slots = request.slots, voxels = Box{{0, 0, 0}, size}.voxel_count();
+    return FindNamed(Decompositions(), policy.decomposition)
+        ->make({.work = &field,
+                .boxes = int(std::min({groups * slots, voxels, kMostBoxes})),
+                .most_boxes = int(std::min(kMaxGroups * slots, kMostBoxes)),
+                .together = int(std::min(slots, kMostBoxes)),
+                .axis = SlabAxis(policy, size),
+                .halo = kHalo});
+  }
+
+  bool SlabsFit(const Partition& partition) {
+    const std::int64_t sample_bytes = BytesPerSample(request.summary->description.type);
+    return std::ranges::all_of(partition.boxes(), [&](const Box& box) {
+      const std::int64_t bytes = Grown(box, kHalo, partition.bounds()).voxel_count() * sample_bytes;
+      return bytes <= request.slab_bytes_target || !fields.Shows(box);
+    });
+  }
+
+  const RenderWork& Work() {
+    if (!work) work.emplace(fields.Grid(), request.renderer, MedianExtinction(*request.transfer, *request.summary));
+    return *work;
+  }
+
+  double CostOf(const Box& box, const Policy& policy) {
+    if (!NeedsOccupancy(policy)) return double(box.voxel_count());
+    if (request.known.cost != nullptr) return request.known.cost->Sum(box);
+    const auto [along_x, along_y] = Work().Of(box);
+    return (along_x + along_y) / 2;
+  }
+
+  Layout Assign(Partition partition, const Policy& policy) {
+    std::vector<BoxId> filled;
+    std::vector<double> costs;
+    for (BoxId box = 0; box < partition.boxes().size(); ++box) {
+      if (!fields.Shows(partition.boxes()[box])) continue;
+      filled.push_back(box);
+      costs.push_back(CostOf(partition.boxes()[box], policy));
+    }
+    Layout layout{std::move(partition), {}};
+    layout.owners.assign(layout.partition.boxes().size(), kNoSlot);
+    const std::vector<std::uint32_t> owners = FindNamed(Assignments(), policy.assignment)->assign({costs, request.slots});
+    for (std::size_t i = 0; i < filled.size(); ++i) layout.owners[filled[i]] = owners[i];
+    return layout;
+  }
+
+  // Render times, of a frame and of its boxes.
+  struct Foretold {
+    double frame = 0;
+    std::vector<BoxSeconds> boxes;
+  };
+  Foretold Foretell(const Layout& layout) {
+    Foretold foretold;
+    std::vector<double> along_x(request.slots), along_y(request.slots);
+    for (std::size_t box = 0; box < layout.owners.size(); ++box) {
+      if (layout.owners[box] == kNoSlot) continue;
+      const auto [x, y] = Work().Of(layout.partition.boxes()[box]);
+      foretold.boxes.push_back({layout.partition.boxes()[box], (x + y) / 2});
+      along_x[layout.owners[box]] += x;
+      along_y[layout.owners[box]] += y;
+    }
+    foretold.frame = (*std::ranges::max_element(along_x) + *std::ranges::max_element(along_y)) / 2;
+    return foretold;
+  }
+
+  Layout MakeByForetoldWork(const Policy& policy, int groups) {
+    constexpr int kRounds = 4;
+    Layout best;
+    double least = std::numeric_limits<double>::infinity();
+    LearntCost cost(fields.Grid());
+    for (int round = 0; round < kRounds; ++round) {
+      const WorkField field = cost.Field();
+      Layout layout = Assign(MakePartition(policy, groups, field), policy);
+      const Foretold foretold = Foretell(layout);
+      cost.Learn(foretold.boxes, 1);
+      if (foretold.frame >= least) continue;
+      least = foretold.frame;
+      best = std::move(layout);
+    }
+    return best;
+  }
+
+  const LayoutRequest request;
+  WorkFields fields;
+  std::optional<RenderWork> work;
+};
+
+LayoutMaker::LayoutMaker(const LayoutRequest& request) : state_(std::make_unique<State>(request)) {}
+LayoutMaker::~LayoutMaker() = default;
+LayoutMaker::LayoutMaker(LayoutMaker&&) noexcept = default;
+
+int LayoutMaker::FewestGroups(const Policy& policy) {
+  if (policy.groups > 0) return policy.groups;
+  const int most = MostGroups(state_->request, policy);
+  const WorkField& work = state_->fields.Of(FindWorkSplit(SplitOf(policy)).value());
+  int groups = 1;
+  while (groups < most && !state_->SlabsFit(state_->MakePartition(policy, groups, work))) ++groups;
+  return groups;
+}
+
+Layout LayoutMaker::Make(const Policy& policy) {
+  const WorkSplit split = FindWorkSplit(SplitOf(policy)).value();
+  const int groups = FewestGroups(policy);
+  if (split == WorkSplit::kOccupied || (split == WorkSplit::kCost && state_->request.known.cost == nullptr)) {
+    return state_->MakeByForetoldWork(policy, groups);
+  }
+  return state_->Assign(state_->MakePartition(policy, groups, state_->fields.Of(split)), policy);
+}
+
 Status CheckNames(const Policy& policy) {
-  if (Status s = CheckName("policy.decomposition", policy.decomposition, Decompositions()); !s.ok()) return s;
+  if (Status s = CheckOpenName("policy.decomposition", policy.decomposition, Decompositions()); !s.ok()) return s;
   if (Status s = CheckName("policy.split", policy.split, WorkSplits()); !s.ok()) return s;
-  if (Status s = CheckName("policy.assignment", policy.assignment, Assignments()); !s.ok()) return s;
+  if (Status s = CheckOpenName("policy.assignment", policy.assignment, Assignments()); !s.ok()) return s;
   if (Status s = CheckName("policy.balance", policy.balance, BalanceModes()); !s.ok()) return s;
+  if (policy.combine == kAutomatic) return Status::Ok();
   if (const auto scheme = ParseCombining(policy.combine); !scheme.ok()) {
     return Status::InvalidArgument("policy.combine " + scheme.status().message());
   }
   return Status::Ok();
 }
 
+Status CheckChosen(const Policy& policy) {
+  if (Status status = CheckNames(policy); !status.ok() || !LeavesChoice(policy)) return status;
+  return Status::InvalidArgument("policy: 'auto' leaves a choice, which must be made before a frame is planned");
+}
+
 std::string_view SplitOf(const Policy& policy) {
-  return policy.split == kAutomaticSplit ? FindDecomposition(policy.decomposition)->split : std::string_view(policy.split);
+  if (policy.split != kAutomatic || policy.decomposition == kAutomatic) return policy.split;
+  return FindNamed(Decompositions(), policy.decomposition)->split;
 }
 
 bool NeedsOccupancy(const Policy& policy) {
-  return FindWorkSplit(SplitOf(policy)) != WorkSplit::kVoxels || policy.assignment == "greedy" || policy.balance == kDynamicBalance;
+  if (policy.decomposition == kAutomatic || policy.assignment == kAutomatic) return true;
+  return FindWorkSplit(SplitOf(policy)) != WorkSplit::kVoxels || FindNamed(Assignments(), policy.assignment)->by_cost ||
+         policy.balance == kDynamicBalance;
 }
 
 Axis SlabAxis(const Policy& policy, const Index3& size) {
   if (policy.axis != AxisChoice::kAuto) return Axis(policy.axis);
   // z, about which views turn: slabs one above the other hide little of each other from most sides, so none of them is rendered in vain.
   Axis longest = Axis::kZ;
-  if (!FindDecomposition(policy.decomposition)->one_axis) return longest;
+  if (!FindNamed(Decompositions(), policy.decomposition)->one_axis) return longest;
   for (Axis axis : {Axis::kY, Axis::kX}) {
     if (size[axis] > 2 * size.z && size[axis] > size[longest]) longest = axis;
   }
   return longest;
 }
 
-Layout MakeLayout(const LayoutRequest& request) {
-  const Policy& policy = *request.policy;
-  const VolumeGeometry& geometry = request.summary->description.geometry;
-  const Axis axis = SlabAxis(policy, geometry.size);
-  const std::int64_t groups = policy.groups > 0 ? policy.groups : ChooseGroups(request, axis);
-  const std::int64_t slots = request.slots, voxels = geometry.bounds().voxel_count();
-
-  WorkFields fields(request);
-  const WorkSplit split = FindWorkSplit(SplitOf(policy)).value();
-  Layout layout;
-  layout.partition = FindDecomposition(policy.decomposition)
-                         ->make({.work = &fields.Of(split),
-                                 .boxes = int(std::min({groups * slots, voxels, kMostBoxes})),
-                                 .most_boxes = int(std::min(kMaxGroups * slots, kMostBoxes)),
-                                 .together = int(std::min(slots, kMostBoxes)),
-                                 .axis = axis,
-                                 .halo = kHalo});
-
-  std::vector<BoxId> filled;
-  std::vector<double> costs;
-  const WorkField& cost = fields.Of(NeedsOccupancy(policy) ? WorkSplit::kCost : WorkSplit::kVoxels);
-  for (BoxId box = 0; box < layout.partition.boxes().size(); ++box) {
-    const Box& voxels_of_box = layout.partition.boxes()[box];
-    if (!fields.Shows(voxels_of_box)) continue;
-    filled.push_back(box);
-    costs.push_back(cost.Sum(voxels_of_box));
-  }
-  layout.owners.assign(layout.partition.boxes().size(), kNoSlot);
-  const std::vector<std::uint32_t> owners = FindAssignment(policy.assignment)->assign({costs, request.slots});
-  for (std::size_t i = 0; i < filled.size(); ++i) layout.owners[filled[i]] = owners[i];
-  return layout;
-}
+Layout MakeLayout(const LayoutRequest& request) { return LayoutMaker(request).Make(*request.policy); }
 
 }  // namespace slabstream

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -25,32 +26,56 @@ struct Layout {
 
 // What is known about the work in a volume under one transfer function. Null: not known.
 struct WorkKnowledge {
-  const OccupancyGrid* occupied = nullptr;  // else the bricks of the volume's summary tell what may be occupied
-  const WorkField* cost = nullptr;          // seconds, learnt from frames; else what is occupied stands for it
+  const OccupancyGrid* occupied =
+      nullptr;  // of what the renderer draws (DrawnTable); else the bricks of the volume's summary tell what may be occupied
+  const WorkField* cost = nullptr;  // seconds, learnt from frames; else what is occupied stands for it
 };
 
-// Whether the layout of a policy is better for an exact OccupancyGrid. The policy's names must be known ones.
+// Whether the layout of a policy, or the choice of it, is better for an exact OccupancyGrid. The policy's names must be known ones.
 bool NeedsOccupancy(const Policy& policy);
 
 struct LayoutRequest {
   const VolumeSummary* summary = nullptr;
   const TransferFunction* transfer = nullptr;
-  const Policy* policy = nullptr;                            // with names that there are (CheckNames)
+  const Policy* policy = nullptr;  // with names that there are (CheckNames), none of them left open
+  RendererKind renderer = RendererKind::kSplat;
   std::uint32_t slots = 1;                                   // >= 1
   std::int64_t slab_bytes_target = std::int64_t{256} << 20;  // voxels of one slab at most, where slices allow it
   WorkKnowledge known;
 };
 
-// Pure. Boxes with the halo of which nothing is visible belong to nobody; the others are numbered on for their assignment.
+// Pure. Boxes with the halo of which nothing is visible belong to nobody; the others are numbered on for their assignment. Where boxes are
+// split by what is occupied, they are cut again and again by what RenderWork foretells of them, as they would be by their measured costs
+// (LearntCost); the best of these layouts is taken: that with the quickest frame, on average over views along x and along y.
 Layout MakeLayout(const LayoutRequest& request);
+
+// Layouts by several policies: what they are all made from is worked out once.
+class LayoutMaker {
+ public:
+  // The policy of `request` does not count. What it points at must live as long as this.
+  explicit LayoutMaker(const LayoutRequest& request);
+  ~LayoutMaker();
+  LayoutMaker(LayoutMaker&&) noexcept;
+
+  Layout Make(const Policy& policy);
+  // The fewest groups by which no slab (a box that shows something, with its halo) is larger than the target, in any view; as many as
+  // leave boxes that are not mostly halo, where that is not enough. What the policy says, if it says a number.
+  int FewestGroups(const Policy& policy);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
 
 // The axis that is cut, or cut first: "auto" is z, but for slabs where another axis has more than twice as many slices.
 Axis SlabAxis(const Policy& policy, const Index3& size);
 
-// What `split` of the policy comes to: "auto" is the choice of the decomposition.
+// What `split` of the policy comes to: "auto" is what suits the decomposition (and stays "auto" where that is left open).
 std::string_view SplitOf(const Policy& policy);
 
-// InvalidArgument naming what there is, if a name of the policy is in no list.
+// InvalidArgument naming what there is, if a name of the policy is in no list and not kAutomatic.
 Status CheckNames(const Policy& policy);
+// The same for who needs names of lists: kAutomatic is refused where it leaves a choice (LeavesChoice).
+Status CheckChosen(const Policy& policy);
 
 }  // namespace slabstream

@@ -1,6 +1,7 @@
 #include "common/planning/learnt_cost.h"
 
 #include <algorithm>
+#include <vector>
 
 #include "common/base/check.h"
 
@@ -12,13 +13,15 @@ template <class Function>
 void ForEachCell(const Index3& size, const Box& box, Function&& function) {
   const Index3 cells = OccupancyCells(size);
   const auto cell_of = [](std::int32_t voxel) { return voxel / kOccupancyCell; };
+  const std::int32_t first_x = cell_of(box.begin.x);
+  std::vector<double> shares_x;
+  for (std::int32_t x = first_x; x <= cell_of(box.end.x - 1); ++x) shares_x.push_back(CellShare(box, Axis::kX, x, size));
   for (std::int32_t z = cell_of(box.begin.z); z <= cell_of(box.end.z - 1); ++z) {
+    const double share_z = CellShare(box, Axis::kZ, z, size);
     for (std::int32_t y = cell_of(box.begin.y); y <= cell_of(box.end.y - 1); ++y) {
-      const std::size_t row = (std::size_t(z) * std::size_t(cells.y) + std::size_t(y)) * std::size_t(cells.x);
-      for (std::int32_t x = cell_of(box.begin.x); x <= cell_of(box.end.x - 1); ++x) {
-        const Box cell = OccupancyCellBox({x, y, z}, size);
-        function(row + std::size_t(x), double(Intersection(cell, box).voxel_count()) / double(cell.voxel_count()));
-      }
+      const double share_yz = share_z * CellShare(box, Axis::kY, y, size);
+      std::size_t cell = (std::size_t(z) * std::size_t(cells.y) + std::size_t(y)) * std::size_t(cells.x) + std::size_t(first_x);
+      for (const double share_x : shares_x) function(cell++, share_x * share_yz);
     }
   }
 }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <iterator>
+#include <map>
+#include <set>
 
 #include "common/base/check.h"
 #include "common/combining/schemes.h"
@@ -13,24 +15,26 @@ bool Contains(const Roster& roster, WorkerId worker) {
   return worker != 0 && std::find(roster.slots.begin(), roster.slots.end(), worker) != roster.slots.end();
 }
 
-// 0: there is none.
-WorkerId FirstWorker(const Roster& roster) {
-  const auto first = std::find_if(roster.slots.begin(), roster.slots.end(), [](WorkerId worker) { return worker != 0; });
-  return first == roster.slots.end() ? 0 : *first;
+std::vector<WorkerId> Present(const Roster& roster) {
+  std::vector<WorkerId> present;
+  std::copy_if(roster.slots.begin(), roster.slots.end(), std::back_inserter(present), [](WorkerId worker) { return worker != 0; });
+  return present;
 }
 
-// The owner of the nearest box that shows anything, since it has that group's image at hand; of an empty frame the first worker.
-WorkerId ChooseDisplay(const FramePlan& plan, const Roster& roster) {
+// Who holds a rank of a group can be the root of its schedule, and its image need not travel.
+WorkerId ChooseDisplay(const FramePlan& plan, const std::vector<WorkerId>& present) {
+  std::map<WorkerId, std::size_t> groups;  // in which it holds a rank
   for (const GroupPlan& group : plan.groups) {
-    if (!group.placements.empty()) return group.placements.front().worker;
+    std::set<WorkerId> workers;
+    for (const Placement& placement : group.placements) workers.insert(placement.worker);
+    for (const WorkerId worker : workers) ++groups[worker];
   }
-  return FirstWorker(roster);
-}
-
-// The display worker's rank, so that the group image need not travel; rank 0 if it has none.
-Rank RootOf(const GroupPlan& group, WorkerId display) {
-  const auto root = std::find_if(group.placements.begin(), group.placements.end(), [&](const Placement& p) { return p.worker == display; });
-  return root == group.placements.end() ? 0 : Rank(root - group.placements.begin());
+  std::size_t most = 0;
+  for (const auto& [worker, count] : groups) most = std::max(most, count);
+  std::vector<WorkerId> candidates;
+  std::copy_if(present.begin(), present.end(), std::back_inserter(candidates),
+               [&](WorkerId worker) { return most == 0 || (groups.contains(worker) && groups.at(worker) == most); });
+  return candidates[plan.turn.number % candidates.size()];
 }
 
 // The fewest bits by which combining moves no channel by more than the plan allows. Of two codings of as many bits the finer one.
@@ -51,9 +55,13 @@ ColorCoding ChooseColor(const FramePlan& plan, const GroupPlan& group) {
 
 }  // namespace
 
+Rank RootOf(const GroupPlan& group, WorkerId display) {
+  const auto root = std::find_if(group.placements.begin(), group.placements.end(), [&](const Placement& p) { return p.worker == display; });
+  return root == group.placements.end() ? 0 : Rank(root - group.placements.begin());
+}
+
 std::vector<WorkerId> OwnersOf(const Layout& layout, const Roster& roster) {
-  std::vector<WorkerId> present;
-  std::copy_if(roster.slots.begin(), roster.slots.end(), std::back_inserter(present), [](WorkerId worker) { return worker != 0; });
+  const std::vector<WorkerId> present = Present(roster);
   std::vector<WorkerId> owners(layout.owners.size());
   if (present.empty()) return owners;
   std::vector<std::size_t> lent(roster.slots.size());  // boxes of each slot so far
@@ -67,13 +75,24 @@ std::vector<WorkerId> OwnersOf(const Layout& layout, const Roster& roster) {
   return owners;
 }
 
+void PlaceBoxes(FramePlan& plan) {
+  plan.groups.clear();
+  for (const BoxId id : VisibilityOrder(plan.layout.partition, plan.setup.camera)) {
+    if (plan.layout.owners[id] == kNoSlot) continue;
+    if (plan.groups.empty() || plan.groups.back().placements.size() == plan.slots) plan.groups.emplace_back();
+    plan.groups.back().placements.push_back({id, plan.layout.partition.boxes()[id], 0});
+  }
+  if (plan.groups.empty()) plan.groups.emplace_back();
+}
+
 Status AssignWorkers(const Roster& roster, FramePlan& plan) {
-  if (FirstWorker(roster) == 0) return Status::Unavailable("the frame needs a worker, but none is registered");
+  const std::vector<WorkerId> present = Present(roster);
+  if (present.empty()) return Status::Unavailable("the frame needs a worker, but none is registered");
   const std::vector<WorkerId> owners = OwnersOf(plan.layout, roster);
   for (GroupPlan& group : plan.groups) {
     for (Placement& placement : group.placements) placement.worker = owners[placement.id];
   }
-  if (!Contains(roster, plan.display)) plan.display = ChooseDisplay(plan, roster);
+  if (!Contains(roster, plan.display)) plan.display = ChooseDisplay(plan, present);
 
   const Result<CombiningChoice> scheme = ParseCombining(plan.combine);
   CHECK(scheme.ok()) << scheme.status().message();
@@ -91,6 +110,15 @@ Result<FramePlan> Replan(const FramePlan& plan, const Roster& roster) {
   FramePlan changed = plan;
   if (Status status = AssignWorkers(roster, changed); !status.ok()) return status;
   return changed;
+}
+
+FramePlan TakeTurn(const FramePlan& plan, const Roster& roster, const Turn& turn) {
+  FramePlan other = plan;
+  other.turn = turn;
+  other.display = 0;
+  const Status status = AssignWorkers(roster, other);
+  CHECK(status.ok()) << status.message();
+  return other;
 }
 
 }  // namespace slabstream

@@ -10,26 +10,33 @@
 namespace slabstream {
 namespace {
 
-FrameSetup MakeSetup(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, TransferFunction transfer) {
+Status CheckGrid(const SheetGrid& sheets) {
+  if (std::max(sheets.width, sheets.height) <= kMaxGridSide) return Status::Ok();
+  return Status::InvalidArgument(
+      fmt::format("an image along the slices of this view has {} x {} pixels, but at most {} a side are possible: "
+                  "the slices lie too far apart for the width of their voxels",
+                  sheets.width, sheets.height, kMaxGridSide));
+}
+
+}  // namespace
+
+Result<FrameSetup> MakeFrameSetup(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary) {
+  Result<TransferFunction> transfer = ResolveTransfer(request.transfer, summary);
+  if (!transfer.ok()) return transfer.status();
   FrameSetup setup;
   setup.dataset = dataset;
   setup.description = summary.description;
   setup.range = summary.range;
   setup.renderer = request.renderer;
-  const VolumeGeometry& geometry = summary.description.geometry;
+  SetView(request.view, request.size, setup);
   if (request.renderer == RendererKind::kSplat) {
-    setup.camera = MakeCamera(request.view, request.size, geometry);
-    setup.sheets = MakeSheetGrid(setup.camera, geometry);
-  } else {
-    setup.camera = MakeSupersampledCamera(request.view, request.size, geometry);
+    if (Status status = CheckGrid(setup.sheets); !status.ok()) return status;
   }
-  setup.transfer = std::move(transfer);
+  setup.transfer = *std::move(transfer);
   setup.shading = request.shading;
   setup.termination = request.termination;
   return setup;
 }
-
-}  // namespace
 
 Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const VolumeSummary& summary) {
   Result<TransferFunction> transfer = std::holds_alternative<std::string>(choice.choice)
@@ -39,25 +46,41 @@ Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const Vol
   return transfer;
 }
 
+void SetView(const ViewParameters& view, ImageSize size, FrameSetup& setup) {
+  const VolumeGeometry& geometry = setup.description.geometry;
+  if (setup.renderer == RendererKind::kSplat) {
+    setup.camera = MakeCamera(view, size, geometry);
+    setup.sheets = MakeSheetGrid(setup.camera, geometry);
+  } else {
+    setup.camera = MakeSupersampledCamera(view, size, geometry);
+  }
+}
+
 PixelBounds FrameBounds(const FrameSetup& setup) {
   return setup.renderer == RendererKind::kSplat ? PixelBounds{0, 0, setup.sheets.width, setup.sheets.height}
                                                 : PixelBounds{0, 0, setup.camera.width, setup.camera.height};
 }
 
+std::int64_t FrameBytes(const FrameSetup& setup) {
+  const bool depth = FormatOf(setup.renderer) == PixelFormat::kDepth;
+  return FrameBounds(setup).pixel_count() * std::int64_t(depth ? 6 * sizeof(float) : 4 * sizeof(float));
+}
+
+std::vector<Placement> PlacementsOf(const FramePlan& plan) {
+  std::vector<Placement> placements;
+  for (const GroupPlan& group : plan.groups) placements.insert(placements.end(), group.placements.begin(), group.placements.end());
+  return placements;
+}
+
 Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, const Roster& roster,
-                            const CostModel& cost, const Layout* layout) {
-  if (Status status = CheckNames(request.policy); !status.ok()) return status;
-  Result<TransferFunction> transfer = ResolveTransfer(request.transfer, summary);
-  if (!transfer.ok()) return transfer.status();
+                            const CostModel& cost, const Layout* layout, const Turn& turn) {
+  if (Status status = CheckChosen(request.policy); !status.ok()) return status;
+  Result<FrameSetup> setup = MakeFrameSetup(request, dataset, summary);
+  if (!setup.ok()) return setup.status();
 
   FramePlan plan;
-  plan.setup = MakeSetup(request, dataset, summary, *std::move(transfer));
-  if (const SheetGrid& sheets = plan.setup.sheets; std::max(sheets.width, sheets.height) > kMaxGridSide) {
-    return Status::InvalidArgument(
-        fmt::format("an image along the slices of this view has {} x {} pixels, but at most {} a side are possible: "
-                    "the slices lie too far apart for the width of their voxels",
-                    sheets.width, sheets.height, kMaxGridSide));
-  }
+  plan.turn = turn;
+  plan.setup = *std::move(setup);
   plan.slots = std::uint32_t(roster.slots.size());
   plan.slab_axis = SlabAxis(request.policy, summary.description.geometry.size);
   plan.split = SplitOf(request.policy);
@@ -70,17 +93,11 @@ Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, cons
                                   : MakeLayout({.summary = &summary,
                                                 .transfer = &plan.setup.transfer,
                                                 .policy = &request.policy,
+                                                .renderer = request.renderer,
                                                 .slots = slots,
                                                 .slab_bytes_target = cost.slab_bytes_target});
 
-  // Who sees what when: groups of `slots` boxes that show something, in visibility order.
-  for (const BoxId id : VisibilityOrder(plan.layout.partition, plan.setup.camera)) {
-    if (plan.layout.owners[id] == kNoSlot) continue;
-    if (plan.groups.empty() || plan.groups.back().placements.size() == slots) plan.groups.emplace_back();
-    plan.groups.back().placements.push_back({id, plan.layout.partition.boxes()[id], 0});
-  }
-  if (plan.groups.empty()) plan.groups.emplace_back();
-
+  PlaceBoxes(plan);
   if (Status status = AssignWorkers(roster, plan); !status.ok()) return status;
   return plan;
 }

@@ -6,7 +6,7 @@ namespace slabstream {
 
 const std::vector<NamedChoice>& WorkSplits() {
   static const std::vector<NamedChoice> choices = {
-      {kAutomaticSplit, "what suits the decomposition"},
+      {kAutomatic, "what suits the decomposition"},
       {"voxels", "equal voxels"},
       {"occupied", "equal work, by what is visible under the transfer function"},
       {"cost", "equal render time, as earlier frames took it; until there are any, occupied"},

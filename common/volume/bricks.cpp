@@ -94,14 +94,15 @@ void BrickedVoxels::WriteRun(const Index3& voxel, const T* samples, std::int32_t
   CopyRun(const_cast<T*>(view.Row(voxel.y, voxel.z)) + (voxel.x - view.begin.x), samples, count);
 }
 
-void BrickedVoxels::Write(std::uint64_t begin, std::span<const std::byte> samples) {
+void BrickedVoxels::Write(const Box& box, std::uint64_t begin, std::span<const std::byte> samples) {
+  CHECK(grid_.box.Contains(box));
   VisitScalarType(type_, [&](auto* type) {
     using T = std::remove_cvref_t<decltype(*type)>;
     CHECK(begin % sizeof(T) == 0 && samples.size() % sizeof(T) == 0);
     const auto first = std::int64_t(begin / sizeof(T)), last = first + std::int64_t(samples.size() / sizeof(T));
-    CHECK_LE(last, grid_.box.voxel_count());
+    CHECK_LE(last, box.voxel_count());
     const T* from = reinterpret_cast<const T*>(samples.data());
-    ForEachRun(grid_.box, first, last,
+    ForEachRun(box, first, last,
                [&](const Index3& voxel, std::int32_t count, std::int64_t sample) { WriteRun(voxel, from + (sample - first), count); });
   });
 }
@@ -111,11 +112,11 @@ BrickedVoxels::BrickedVoxels(const VoxelBlock& block) : BrickedVoxels(block.box,
   tbb::parallel_for(0, grid_.counts.z, [&](std::int32_t layer) {
     const Box bricks = grid_.BoxOf({grid_.first.x, grid_.first.y, grid_.first.z + layer});
     const std::size_t begin = std::size_t(bricks.begin.z - block.box.begin.z) * slice_bytes;
-    Write(begin, std::span(block.bytes).subspan(begin, std::size_t(bricks.size().z) * slice_bytes));
+    Write(block.box, begin, std::span(block.bytes).subspan(begin, std::size_t(bricks.size().z) * slice_bytes));
   });
 }
 
-void BrickedVoxels::Read(const Box& box, std::uint64_t begin, std::span<std::byte> samples) const {
+void VoxelBricks::Read(const Box& box, std::uint64_t begin, std::span<std::byte> samples) const {
   CHECK(grid_.box.Contains(box));
   VisitScalarType(type_, [&](auto* type) {
     using T = std::remove_cvref_t<decltype(*type)>;

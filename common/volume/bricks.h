@@ -59,10 +59,9 @@ class BrickedVoxels {
   const BrickGrid& grid() const { return grid_; }
   ScalarType type() const { return type_; }
 
-  // Samples of the box in order, x fastest, from a byte offset on: whole samples. Several threads may write different bricks.
-  void Write(std::uint64_t begin, std::span<const std::byte> samples);
-  // Likewise those of any `box` inside this one.
-  void Read(const Box& box, std::uint64_t begin, std::span<std::byte> samples) const;
+  // Samples of any `box` inside this one in order, x fastest, from a byte offset on: whole samples. Several threads may write different
+  // bricks.
+  void Write(const Box& box, std::uint64_t begin, std::span<const std::byte> samples);
 
   template <class T>
   BrickView<T> View(const Index3& brick) const {
@@ -109,6 +108,9 @@ class VoxelBricks {
   const BrickGrid& grid() const { return grid_; }
   const Box& box() const { return grid_.box; }
   ScalarType type() const { return type_; }
+
+  // The samples of any `box` inside this one in order, x fastest, from a byte offset on: whole samples.
+  void Read(const Box& box, std::uint64_t begin, std::span<std::byte> samples) const;
 
   template <class T>
   BrickView<T> View(const Index3& brick) const {

@@ -1,0 +1,178 @@
+#include "common/tuning/box_estimator.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/check.h"
+#include "common/planning/frame_occlusion.h"
+
+namespace slabstream {
+namespace {
+
+// Pixels that a voxel's footprint fills, for each that its own cross-section covers.
+constexpr double kSplatFootprint = 4, kZBufferFootprint = 1;
+// Occupied voxels of a cell that can have an empty neighbour towards the eye: a surface through it.
+constexpr double kSurface = 1.5 * kOccupancyCell * kOccupancyCell;
+
+double Length(const Camera::ImagePoint& a, const Camera::ImagePoint& b) { return std::hypot(a.x - b.x, a.y - b.y); }
+
+// Pixels of the frame that a voxel in the middle of the volume covers.
+double VoxelPixels(const FrameSetup& setup) {
+  const Index3& size = setup.description.geometry.size;
+  const Vec3 middle = {(size.x - 1) / 2.0, (size.y - 1) / 2.0, (size.z - 1) / 2.0};
+  if (setup.renderer == RendererKind::kSplat) {
+    const SlicePlacement slice = PlaceSlice(setup.sheets, middle[AxesOf(setup.camera.traversal_axis).c]);
+    return kSplatFootprint * slice.scale_u * slice.scale_v;
+  }
+  // The mean of the areas of its three faces, as the eye sees them.
+  const Camera::ImagePoint origin = setup.camera.Project(middle);
+  double edges[3];
+  for (const Axis axis : kAxes) {
+    Vec3 next = middle;
+    next[axis] += 1;
+    edges[Number(axis)] = Length(setup.camera.Project(next), origin);
+  }
+  return kZBufferFootprint * (edges[0] * edges[1] + edges[1] * edges[2] + edges[2] * edges[0]) / 2;
+}
+
+}  // namespace
+
+BoxEstimator::BoxEstimator(const FrameSetup& setup, const OccupancyGrid& occupied, const WorkField* learnt, const CostModel& cost,
+                           std::int32_t pixel_side)
+    : setup_(setup),
+      learnt_(learnt),
+      cost_(cost),
+      frame_(FrameBounds(setup)),
+      pixel_side_(pixel_side),
+      size_(occupied.size),
+      voxel_pixels_(VoxelPixels(setup)) {
+  CHECK_GE(pixel_side, 1);
+  const auto cells = [this](std::int32_t voxels) { return (voxels + side_ - 1) / side_; };
+  const auto count = [&] { return std::int64_t{cells(size_.x)} * cells(size_.y) * cells(size_.z); };
+  while (count() > kMostCells) side_ *= 2;
+  cells_ = {cells(size_.x), cells(size_.y), cells(size_.z)};
+  cell_.resize(std::size_t(count()));
+  const Index3 fine = OccupancyCells(size_);
+  const std::int32_t factor = side_ / kOccupancyCell;
+  const CellOccupancy* next = occupied.cells.data();
+  for (std::int32_t z = 0; z < fine.z; ++z) {
+    for (std::int32_t y = 0; y < fine.y; ++y) {
+      Cell* row = &cell_[(std::size_t(z / factor) * std::size_t(cells_.y) + std::size_t(y / factor)) * std::size_t(cells_.x)];
+      for (std::int32_t x = 0; x < fine.x; ++x) {
+        const double voxels = (next++)->voxels;
+        if (voxels == 0) continue;
+        const double all = double(OccupancyCellBox({x, y, z}, size_).voxel_count());
+        Cell& cell = row[x / factor];
+        cell.occupied += voxels;
+        cell.surface += std::min({voxels, all - voxels, kSurface});
+      }
+    }
+  }
+}
+
+BoxEstimator::Rectangle BoxEstimator::Hull(const Rectangle& a, const Rectangle& b) {
+  return {std::min(a.x_begin, b.x_begin), std::min(a.y_begin, b.y_begin), std::max(a.x_end, b.x_end), std::max(a.y_end, b.y_end)};
+}
+
+BoxEstimator::Rectangle BoxEstimator::Intersection(const Rectangle& a, const Rectangle& b) {
+  return {std::max(a.x_begin, b.x_begin), std::max(a.y_begin, b.y_begin), std::min(a.x_end, b.x_end), std::min(a.y_end, b.y_end)};
+}
+
+BoxEstimator::Rectangle BoxEstimator::Project(const Box& box) const {
+  Rectangle r = Nothing();
+  const auto take = [&r](double x, double y) {
+    r.x_begin = std::min(r.x_begin, x);
+    r.x_end = std::max(r.x_end, x);
+    r.y_begin = std::min(r.y_begin, y);
+    r.y_end = std::max(r.y_end, y);
+  };
+  if (setup_.renderer == RendererKind::kSplat) {
+    const auto [c, u, v] = AxesOf(setup_.camera.traversal_axis);
+    for (const std::int32_t k : {box.begin[c], box.end[c] - 1}) {
+      const SlicePlacement slice = PlaceSlice(setup_.sheets, k);
+      take(slice.scale_u * (box.begin[u] - 1) + slice.offset_u, slice.scale_v * (box.begin[v] - 1) + slice.offset_v);
+      take(slice.scale_u * box.end[u] + slice.offset_u, slice.scale_v * box.end[v] + slice.offset_v);
+    }
+  } else {
+    for (int corner = 0; corner < 8; ++corner) {
+      const auto at = [&](Axis axis) { return ((corner >> Number(axis) & 1) != 0 ? box.end[axis] : box.begin[axis]) - 0.5; };
+      const Camera::ImagePoint point = setup_.camera.Project({at(Axis::kX), at(Axis::kY), at(Axis::kZ)});
+      take(point.x, point.y);
+    }
+  }
+  return r;
+}
+
+BoxEstimator::Estimate BoxEstimator::Of(const Box& box) const {
+  const std::int32_t width = (frame_.width() + pixel_side_ - 1) / pixel_side_, height = (frame_.height() + pixel_side_ - 1) / pixel_side_;
+  Estimate estimate{0, UniformCoverage({}, 0, width, height)};
+  CoverageMap& coverage = estimate.coverage;
+  const double tile_side = double(kCoverageTile) * pixel_side_;
+  const Rectangle frame{0, 0, double(frame_.x_end), double(frame_.y_end)};
+  struct Tile {
+    Rectangle reached = Nothing();
+    double hits = 0;  // pixels, each as often as it is hit
+  };
+  std::vector<Tile> tiles(coverage.share.size());
+  Rectangle bounds = Nothing();
+  double occupied = 0, surface = 0, inside = 0;
+
+  const auto first = [&](Axis axis) { return box.begin[axis] / side_; };
+  const auto last = [&](Axis axis) { return (box.end[axis] - 1) / side_; };
+  for (std::int32_t z = first(Axis::kZ); z <= last(Axis::kZ); ++z) {
+    for (std::int32_t y = first(Axis::kY); y <= last(Axis::kY); ++y) {
+      for (std::int32_t x = first(Axis::kX); x <= last(Axis::kX); ++x) {
+        const Cell& cell = cell_[(std::size_t(z) * std::size_t(cells_.y) + std::size_t(y)) * std::size_t(cells_.x) + std::size_t(x)];
+        if (cell.occupied == 0) continue;
+        const Box whole = slabstream::Intersection({{x * side_, y * side_, z * side_}, {(x + 1) * side_, (y + 1) * side_, (z + 1) * side_}},
+                                                   {{0, 0, 0}, size_});
+        const Box part = slabstream::Intersection(whole, box);
+        const double share = double(part.voxel_count()) / double(whole.voxel_count());
+        occupied += share * cell.occupied;
+        const Rectangle r = Project(part);
+        const Rectangle seen = Intersection(r, frame);
+        if (seen.empty()) continue;
+        const double seen_share = share * seen.area() / r.area();
+        inside += seen_share * cell.occupied;
+        surface += seen_share * cell.surface;
+        bounds = Hull(bounds, seen);
+        const double hits_a_pixel = share * cell.occupied * voxel_pixels_ / r.area();
+        const auto tile_of = [&](double pixel, std::int32_t count) { return std::min(std::int32_t(pixel / tile_side), count - 1); };
+        for (std::int32_t ty = tile_of(seen.y_begin, coverage.tiles_y); ty <= tile_of(seen.y_end, coverage.tiles_y); ++ty) {
+          for (std::int32_t tx = tile_of(seen.x_begin, coverage.tiles_x); tx <= tile_of(seen.x_end, coverage.tiles_x); ++tx) {
+            const Rectangle reached = Intersection(seen, {tx * tile_side, ty * tile_side, (tx + 1) * tile_side, (ty + 1) * tile_side});
+            if (reached.empty()) continue;
+            Tile& tile = tiles[std::size_t(ty) * std::size_t(coverage.tiles_x) + std::size_t(tx)];
+            tile.reached = Hull(tile.reached, reached);
+            tile.hits += hits_a_pixel * reached.area();
+          }
+        }
+      }
+    }
+  }
+  std::size_t number = 0;
+  for (std::int32_t ty = 0; ty < coverage.tiles_y; ++ty) {
+    for (std::int32_t tx = 0; tx < coverage.tiles_x; ++tx, ++number) {
+      const Tile& tile = tiles[number];
+      if (tile.hits <= 0) continue;
+      const double filled = tile.reached.area() * -std::expm1(-tile.hits / tile.reached.area());
+      const double pixels = double(coverage.TilePixels(tx, ty)) * pixel_side_ * pixel_side_;
+      coverage.share[number] = float(std::clamp(filled / pixels, 0.0, 1.0));
+    }
+  }
+  if (learnt_ != nullptr) {
+    estimate.seconds = learnt_->Sum(box);
+  } else if (occupied > 0) {
+    PixelBounds image;
+    if (!bounds.empty()) {
+      image = {std::int32_t(bounds.x_begin), std::int32_t(bounds.y_begin), std::int32_t(std::ceil(bounds.x_end)),
+               std::int32_t(std::ceil(bounds.y_end))};
+    }
+    const double pixels = coverage.pixels() * pixel_side_ * pixel_side_;
+    const double drawn = setup_.renderer == RendererKind::kSplat ? inside : surface;
+    estimate.seconds = cost_.PredictRender(setup_.renderer, CountWork(box, setup_.camera, occupied, drawn, image, pixels));
+  }
+  return estimate;
+}
+
+}  // namespace slabstream

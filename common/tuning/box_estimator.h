@@ -1,0 +1,59 @@
+// BoxEstimator: what boxes should cost and show under one view, before anybody has rendered them.
+//
+// Both come from cells of occupied voxels, which are projected: each is a rectangle of the frame that its voxels hit at random. In the part
+// of a tile that rectangles reach, a pixel that expects n hits is filled with probability 1 - exp(-n). Neighbouring cells are taken
+// together until there are at most kMostCells, so that asking about all boxes of a layout takes about a millisecond.
+#pragma once
+
+#include <vector>
+
+#include "common/image/coverage_map.h"
+#include "common/planning/cost_model.h"
+#include "common/planning/frame_plan.h"
+#include "common/volume/occupancy_grid.h"
+
+namespace slabstream {
+
+class BoxEstimator {
+ public:
+  static constexpr std::int64_t kMostCells = 32 * 32 * 32;
+
+  // Coverage is that of a frame whose pixels are `pixel_side` x `pixel_side` pixels of the true one each (>= 1). `learnt`: seconds, of
+  // earlier frames; null: the cost model's constants count. What is given must live as long as this.
+  BoxEstimator(const FrameSetup& setup, const OccupancyGrid& occupied, const WorkField* learnt, const CostModel& cost,
+               std::int32_t pixel_side);
+
+  struct Estimate {
+    double seconds = 0;    // of one thread
+    CoverageMap coverage;  // of the box's image
+  };
+  Estimate Of(const Box& box) const;  // inside the volume, not empty
+
+ private:
+  struct Cell {
+    double occupied = 0;  // voxels
+    double surface = 0;   // occupied voxels with empty ones beside them, about
+  };
+  struct Rectangle {
+    double x_begin, y_begin, x_end, y_end;  // pixels of the true frame
+    bool empty() const { return x_begin >= x_end || y_begin >= y_end; }
+    double area() const { return empty() ? 0 : (x_end - x_begin) * (y_end - y_begin); }
+  };
+  static Rectangle Nothing() { return {1e9, 1e9, -1e9, -1e9}; }
+  static Rectangle Hull(const Rectangle& a, const Rectangle& b);
+  static Rectangle Intersection(const Rectangle& a, const Rectangle& b);
+  Rectangle Project(const Box& box) const;
+
+  const FrameSetup& setup_;
+  const WorkField* const learnt_;
+  const CostModel& cost_;
+  const PixelBounds frame_;
+  const std::int32_t pixel_side_;
+  const Index3 size_;
+  std::int32_t side_ = kOccupancyCell;  // voxels of a cell
+  Index3 cells_;
+  std::vector<Cell> cell_;  // x fastest
+  double voxel_pixels_;     // that a voxel hits
+};
+
+}  // namespace slabstream

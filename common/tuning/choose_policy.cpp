@@ -1,0 +1,171 @@
+#include "common/tuning/choose_policy.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "common/base/check.h"
+#include "common/combining/schemes.h"
+#include "common/decomposition/decomposition.h"
+#include "common/planning/assignment.h"
+#include "common/planning/brick_visibility.h"
+#include "common/planning/policy_names.h"
+#include "common/tuning/frame_predictor.h"
+
+namespace slabstream {
+namespace {
+
+constexpr DatasetId kAnyDataset = 1;
+constexpr int kGroupFactors[] = {1, 2, 4};  // times the fewest that memory allows
+
+// Schemes by the names of their entries, and with arguments: trees of other arity, more strips.
+std::vector<std::string> SchemesToTry() {
+  std::vector<std::string> schemes;
+  for (const CombiningEntry& entry : CombiningSchemes()) {
+    schemes.emplace_back(entry.name);
+    if (entry.takes_strips) {
+      for (const int strips : {4, 16}) schemes.push_back(fmt::format("{}:strips={}", entry.name, strips));
+    }
+    if (entry.most_factors > 0) schemes.push_back(fmt::format("{}:8", entry.name));
+  }
+  return schemes;
+}
+
+class Search {
+ public:
+  Search(const PolicyQuestion& question, const TransferFunction& transfer, const FramePredictor& predictor)
+      : question_(question),
+        layouts_({.summary = question.summary,
+                  .transfer = &transfer,
+                  .renderer = question.frame->renderer,
+                  .slots = question.slots,
+                  .slab_bytes_target = question.cost->slab_bytes_target,
+                  .known = question.known}),
+        predictor_(predictor),
+        asked_(question.frame->policy),
+        open_partition_(asked_.decomposition == kAutomatic),
+        open_owners_(open_partition_ || asked_.assignment == kAutomatic) {
+    best_ = question.now != nullptr ? *question.now : FixedPolicy(asked_);
+    if (question.now == nullptr) best_.groups = FewestGroupsOf(best_);
+  }
+
+  PolicyChoice Run() {
+    TryLayout(best_);
+    if (open_partition_) ChoosePartition();
+    if (open_owners_) ChooseOwners();
+    if (asked_.combine == kAutomatic) ChooseScheme();
+    return {best_, stands_in_ ? std::nullopt : prediction_, predicted_};
+  }
+
+ private:
+  // The groups that a policy may have at least: those that were asked for, if any.
+  int FewestGroupsOf(Policy policy) {
+    policy.groups = asked_.groups;
+    return layouts_.FewestGroups(policy);
+  }
+
+  void ChoosePartition() {
+    for (const DecompositionEntry& entry : Decompositions()) {
+      for (const NamedChoice& split : WorkSplits()) {
+        const bool wanted = asked_.split == kAutomatic ? split.name != kAutomatic : split.name == asked_.split;
+        // Until costs are known, their split is that by what is occupied.
+        const bool same = asked_.split == kAutomatic && FindWorkSplit(split.name) == WorkSplit::kCost && question_.known.cost == nullptr;
+        if (!wanted || same) continue;
+        Policy policy = best_;
+        policy.decomposition = entry.name;
+        policy.split = split.name;
+        policy.groups = FewestGroupsOf(policy);
+        TryLayout(policy);
+      }
+    }
+  }
+
+  void ChooseOwners() {
+    const Policy start = best_;
+    const int fewest = FewestGroupsOf(start);
+    for (const int factor : kGroupFactors) {
+      if (factor > 1 && asked_.groups > 0) break;
+      for (const AssignmentEntry& entry : Assignments()) {
+        Policy policy = start;
+        if (asked_.assignment == kAutomatic) policy.assignment = entry.name;
+        policy.groups = std::min(factor * fewest, kMaxGroups);
+        TryLayout(policy);
+      }
+    }
+  }
+
+  void ChooseScheme() {
+    if (!prediction_) return;
+    for (const std::string& scheme : SchemesToTry()) {
+      Policy policy = best_;
+      policy.combine = scheme;
+      if (const auto prediction = predictor_.Predict(prepared_, scheme)) Consider(policy, *prediction, kLeastGain);
+    }
+  }
+
+  // Layouts that have been tried under another name are not tried again.
+  void TryLayout(const Policy& policy) {
+    Layout layout = layouts_.Make(policy);
+    if (std::ranges::find(tried_, layout) != tried_.end()) return;
+    tried_.push_back(layout);
+    FramePredictor::Prepared prepared = predictor_.Prepare(std::move(layout));
+    // A scheme that was asked for may have too many steps to be tried: then the default one tells the layouts apart.
+    std::optional<FramePrediction> prediction = predictor_.Predict(prepared, policy.combine);
+    const bool stands_in = !prediction;
+    if (stands_in) prediction = predictor_.Predict(prepared, Policy{}.combine);
+    const bool holds = question_.now != nullptr && best_ == *question_.now;
+    if (prediction && Consider(policy, *prediction, holds ? std::max(kLeastGain, question_.least_gain) : kLeastGain)) {
+      prepared_ = std::move(prepared);
+      stands_in_ = stands_in;
+    }
+  }
+
+  bool Consider(const Policy& policy, const FramePrediction& prediction, double least_gain) {
+    ++predicted_;
+    if (prediction_ && prediction.latency_seconds >= (1 - least_gain) * prediction_->latency_seconds) return false;
+    best_ = policy;
+    prediction_ = prediction;
+    return true;
+  }
+
+  const PolicyQuestion& question_;
+  LayoutMaker layouts_;
+  const FramePredictor& predictor_;
+  const Policy& asked_;
+  const bool open_partition_, open_owners_;
+  Policy best_;
+  std::optional<FramePrediction> prediction_;  // of best_; prepared_ is its layout
+  FramePredictor::Prepared prepared_;
+  bool stands_in_ = false;  // prediction_ is that of the default scheme in place of best_'s
+  std::vector<Layout> tried_;
+  int predicted_ = 0;
+};
+
+}  // namespace
+
+Policy FixedPolicy(Policy policy) {
+  const Policy defaults;
+  if (policy.decomposition == kAutomatic) policy.decomposition = defaults.decomposition;
+  if (policy.assignment == kAutomatic) policy.assignment = defaults.assignment;
+  if (policy.combine == kAutomatic) policy.combine = defaults.combine;
+  policy.split = SplitOf(policy);
+  return policy;
+}
+
+Result<PolicyChoice> ChoosePolicy(const PolicyQuestion& question) {
+  CHECK(CheckNames(question.frame->policy).ok());
+  CHECK(question.now == nullptr || !LeavesChoice(*question.now));
+  const Result<FrameSetup> setup = MakeFrameSetup(*question.frame, kAnyDataset, *question.summary);
+  if (!setup.ok()) return setup.status();
+  std::optional<OccupancyGrid> visible;
+  if (question.known.occupied == nullptr) visible = BrickVisibility(*question.summary, setup->transfer).VisibleCells();
+  const FramePredictor predictor(*setup, visible ? *visible : *question.known.occupied, question.known.cost, *question.cost,
+                                 *question.machine, question.slots, question.render_scale);
+  return Search(question, setup->transfer, predictor).Run();
+}
+
+}  // namespace slabstream

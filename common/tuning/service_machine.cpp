@@ -1,0 +1,46 @@
+#include "common/tuning/service_machine.h"
+
+#include <algorithm>
+
+namespace slabstream {
+
+LinkModel DefaultLink() { return ParseLink("link", kDefaultLink).value(); }
+
+MachineModel ServiceMachine(std::span<const HostedWorker> workers, const ServiceSurroundings& surroundings) {
+  MachineModel machine;
+  std::uint32_t threads = 0, least_threads = workers.empty() ? 1 : workers.front().threads;
+  for (const HostedWorker& worker : workers) {
+    threads += worker.threads;
+    least_threads = std::min(least_threads, worker.threads);
+  }
+  machine.threads = std::int32_t(std::max<std::uint32_t>(least_threads, 1));
+  const bool one_host = std::ranges::all_of(
+      workers, [&](const HostedWorker& worker) { return worker.memory_scope != 0 && worker.memory_scope == workers.front().memory_scope; });
+  if (!one_host) {
+    machine.link = surroundings.link;
+    return machine;
+  }
+  // Pixels stay where they are: only rows' beginnings and ends are told.
+  machine.link = {Contention::kNone, 60e-6, 1e12};
+  machine.combining = {.scan_pixel = 0.03e-9,
+                       .encode_pixel = 0,
+                       .combine_pixel = 0.45e-9,
+                       .local_pixel = 0.45e-9,
+                       .hidden_pixel = 0.1e-9,
+                       .task = 50e-6,
+                       .run_bytes = 8,
+                       .rgba_bytes = 0,
+                       .depth_bytes = 0};
+  machine.plan_seconds = machine.message_seconds = 0;  // in the hand-over of a message, which is measured as a whole
+  machine.client_seconds = 60e-6;
+  const bool coordinators_host = !workers.empty() && workers.front().memory_scope == surroundings.memory_scope;
+  machine.workers_a_host = std::int32_t(std::max<std::size_t>(workers.size(), 1));
+  machine.cores_a_host = std::max<std::int32_t>(coordinators_host ? surroundings.cores : std::int32_t(threads), 1);
+  machine.memory_slowdown = 0.03;
+  const bool one_process =
+      std::ranges::all_of(workers, [&](const HostedWorker& worker) { return worker.pid != 0 && worker.pid == workers.front().pid; });
+  if (one_process) machine.picture_threads = std::min(machine.workers_a_host * machine.threads, machine.cores_a_host);
+  return machine;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,34 @@
+// ServiceMachine: the machine that a coordinator's own workers are, as far as it knows them, for the simulation of frames to come.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "common/simulation/machine_model.h"
+
+namespace slabstream {
+
+struct HostedWorker {
+  std::uint64_t memory_scope = 0;  // workers of the same scope share a host and read each other's memory (SharedMemoryScope); 0: unknown
+  std::uint32_t threads = 1;       // that render
+  std::uint32_t pid = 0;           // of its process on that host: workers of one process make pictures by the threads of all; 0: unknown
+  friend bool operator==(const HostedWorker&, const HostedWorker&) = default;
+};
+
+// What passes between hosts unless the coordinator is told otherwise: a preset of LinkPresets().
+inline constexpr char kDefaultLink[] = "10gbit";
+LinkModel DefaultLink();
+
+struct ServiceSurroundings {
+  LinkModel link = DefaultLink();  // between workers of different hosts
+  std::uint64_t memory_scope = 0;  // the coordinator's own host; 0: unknown
+  std::int32_t cores = 1;          // of it
+  friend bool operator==(const ServiceSurroundings&, const ServiceSurroundings&) = default;
+};
+
+// Workers that all share a host lend each other their images and share its cores: those of the coordinator's host where that is theirs,
+// else as many as they have threads. Otherwise each worker counts as a host of its own behind `link`, images travel in messages, and the
+// slowest link there is decides. Constants as measured on two cores of an AMD EPYC (Zen 5) by client/lab/calibrate.h.
+MachineModel ServiceMachine(std::span<const HostedWorker> workers, const ServiceSurroundings& surroundings);
+
+}  // namespace slabstream
