@@ -6,6 +6,10 @@ target_include_directories(slabstream_options INTERFACE ${CMAKE_SOURCE_DIR})
 target_compile_options(slabstream_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual)
 # Designated initialisers name what differs from the defaults and leave out the rest on purpose.
 target_compile_options(slabstream_options INTERFACE -Wno-missing-field-initializers)
+# Kernels keep vectors in arrays and structs, which those of SVE, whose size no compiler knows, cannot be kept in: NEON on all of Arm.
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
+  target_compile_definitions(slabstream_options INTERFACE "HWY_DISABLED_TARGETS=(HWY_SVE|HWY_SVE2|HWY_SVE_256|HWY_SVE2_128)")
+endif()
 if(SLABSTREAM_WERROR)
   target_compile_options(slabstream_options INTERFACE -Werror)
 endif()

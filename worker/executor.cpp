@@ -21,6 +21,17 @@ const OcclusionMask kNothingHidden;
 
 std::int64_t NowNs() { return MonotonicNow().time_since_epoch().count(); }
 
+// Within as many threads as all workers of this process have: when pixels are combined or a picture is made, the others have rendered their
+// parts of it. Of the thread that the arena belongs to.
+template <class Work>
+auto WithAllThreads(tbb::task_arena& arena, Work&& work) {
+  if (const int threads = ThreadShare::OfProcess(); arena.max_concurrency() != threads) {
+    arena.terminate();
+    arena.initialize(threads);
+  }
+  return arena.execute(work);
+}
+
 // Runs `work`, which returns a Status, and turns what it throws into one: a task thread must not end.
 template <class Work>
 Status Guarded(const char* what, Work&& work) {
@@ -35,12 +46,14 @@ Status Guarded(const char* what, Work&& work) {
   }
 }
 
-// Adds a stretch of time to the report of a message; one of the machine's reports if there is any.
-void AddStage(std::vector<RankReport>& reports, Stage stage, std::int64_t begin_ns, std::int64_t end_ns) {
-  if (reports.empty()) return;
-  RankReport& report = reports.back();
+void AddStage(RankReport& report, Stage stage, std::int64_t begin_ns, std::int64_t end_ns) {
   report.stage_ns[std::size_t(stage)] += end_ns - begin_ns;
   if (report.spans.size() < kMaxSpans) report.spans.push_back({stage, begin_ns, end_ns});
+}
+
+// Adds a stretch of time to the report of a message; one of the machine's reports if there is any.
+void AddStage(std::vector<RankReport>& reports, Stage stage, std::int64_t begin_ns, std::int64_t end_ns) {
+  if (!reports.empty()) AddStage(reports.back(), stage, begin_ns, end_ns);
 }
 
 // The pixels of `view` as runs: the payload, and their header in the message.
@@ -48,6 +61,17 @@ Bytes EncodePixels(const ImageView& view, ColorCoding color, PartialImage& messa
   RunImage runs = EncodeRuns(view, color);
   message.image = runs.header;
   return Bytes(std::move(runs.payload));
+}
+
+// The same without a copy, where the pixels of `view` of `image` are their payload as they lie. Like what is lent they may be read until
+// the message has been sent: pixels that were passed on are written again only when they have come back.
+std::optional<Bytes> PixelsInPlace(const LocalImage& image, const ImageView& view, PartialImage& message) {
+  const std::optional<RunImageHeader> header = DenseHeader(view);
+  if (!header) return std::nullopt;
+  std::optional<BlockPin> pin = PinOf(image.rgba);
+  if (!pin) return std::nullopt;
+  message.image = *header;
+  return Bytes(std::make_shared<BlockPin>(*std::move(pin)), {reinterpret_cast<const std::byte*>(view.rgba), PayloadBytes(*header)});
 }
 
 PixelRange AllPixels(const PixelBounds& frame) { return {0, std::uint64_t(frame.pixel_count())}; }
@@ -86,11 +110,15 @@ void CombineImages(LocalImage& image, bool fresh, const std::shared_ptr<LocalIma
 
 Status CombineIncoming(LocalImage& image, bool fresh, const StartCombine& action, PixelRange pixels) {
   const RunImageHeader& header = action.incoming.header;
-  const Bytes& payload = action.incoming.payload;
+  Bytes payload = action.incoming.payload;
+  if (const std::optional<PackedRuns>& packed = action.incoming.packed) {
+    if (Status fits = ValidateRunHeader(header, action.frame); !fits.ok()) return fits;
+    Result<Bytes> unpacked = UnpackRuns(*packed, payload, PayloadBytes(header));
+    if (!unpacked.ok()) return unpacked.status();
+    payload = *std::move(unpacked);
+  }
   if (!fresh && !action.replace && Covers(pixels, header.bounds, action.frame.width())) {
-    if (Status status = ValidateRuns(header, payload.span(), action.frame); !status.ok()) return status;
-    CombineRuns(image, header, payload.span(), action.side, RoomFor(image.bounds, header.bounds, action.frame));
-    return Status::Ok();
+    return CombineRuns(image, header, payload.span(), action.frame, action.side, RoomFor(image.bounds, header.bounds, action.frame));
   }
   Result<LocalImage> read = ReadRuns(header, payload.span(), action.frame);
   if (!read.ok()) return read.status();
@@ -103,9 +131,16 @@ Status CombineBorrowed(LocalImage& image, bool fresh, const StartCombine& action
   const Result<BorrowedImage> borrowed =
       memory.Borrow(*incoming.shared, incoming.header.format, incoming.payload, pixels, action.frame, MonotonicNow());
   if (!borrowed.ok()) return borrowed.status();
-  CombineView(image, fresh, borrowed->view, action, pixels);
+  const ImageView& view = borrowed->view;
+  if (fresh) {  // room for what is borrowed
+    image = MakeUnwrittenImage(view.format, view.bounds);
+    image.rows.resize(std::size_t(view.bounds.height()));
+  }
+  if (action.replace) Erase(image, pixels, action.frame.width());
+  const bool valid = CombineUnchecked(image, view, action.side, RoomFor(image.bounds, view.bounds, action.frame));
   // Its owner took the frame for over while it was being read here: `image` may hold anything, and the group fails.
-  return borrowed->Intact() ? Status::Ok() : Status::DataLoss("a lent image was taken back while it was read");
+  if (!borrowed->Intact()) return Status::DataLoss("a lent image was taken back while it was read");
+  return valid ? Status::Ok() : Status::InvalidArgument("shared image: a pixel's colour or depth is not finite");
 }
 
 }  // namespace
@@ -115,22 +150,51 @@ struct Executor::Slab {
   explicit Slab(const SlabKey& slab_key) : key(slab_key) {}
 
   Status Store(const Chunk& chunk, const Bytes& payload) {
-    if (chunk.box != key.box || chunk.dataset != key.dataset) return Status::DataLoss("chunk of another slab");
+    if (chunk.box.empty() || !key.box.Contains(chunk.box) || chunk.dataset != key.dataset) return Status::DataLoss("chunk of another slab");
     if (data != nullptr) return Status::Ok();  // a duplicate after the slab was complete
-    const std::uint64_t total = std::uint64_t(key.box.voxel_count()) * BytesPerSample(key.type);
+    const std::uint64_t total = std::uint64_t(chunk.box.voxel_count()) * BytesPerSample(key.type);
     const std::uint64_t begin = std::uint64_t{chunk.chunk} * kChunkBytes;
     if (begin >= total || chunk.raw_bytes != std::min<std::uint64_t>(kChunkBytes, total - begin)) {
       return Status::DataLoss("chunk " + std::to_string(chunk.chunk) + " of " + std::to_string(chunk.raw_bytes) +
-                              " bytes does not fit a slab of " + std::to_string(total));
+                              " bytes does not fit a box of " + std::to_string(total));
     }
     if (!voxels) voxels.emplace(key.box, key.type);
     unpacked.resize(chunk.raw_bytes);
     if (Status status = UnpackChunk(chunk, payload.span(), unpacked); !status.ok()) return status;
-    voxels->Write(begin, unpacked);
+    voxels->Write(chunk.box, begin, unpacked);
     return Status::Ok();
   }
 
+  // What to render from. The first call, when all chunks are stored, copies what other slabs hold. Render thread only.
+  SlabData& Data() {
+    if (data != nullptr) return *data;
+    if (!voxels) voxels.emplace(key.box, key.type);
+    for (const Copy& copy : copies) copy.Perform(*voxels);
+    copies.clear();
+    data = std::make_unique<SlabData>(*std::move(voxels));
+    voxels.reset();
+    unpacked = {};
+    return *data;
+  }
+
+  struct Copy {
+    std::shared_ptr<Slab> from;
+    Box box;
+
+    void Perform(BrickedVoxels& to) const {
+      const VoxelBricks source = from->Data().bricks();
+      const Index3 size = box.size();
+      std::vector<std::byte> slice(std::size_t(size.x) * std::size_t(size.y) * BytesPerSample(source.type()));
+      for (std::int32_t z = 0; z < size.z; ++z) {
+        const std::uint64_t begin = std::uint64_t(z) * slice.size();
+        source.Read(box, begin, slice);
+        to.Write(box, begin, slice);
+      }
+    }
+  };
+
   const SlabKey key;
+  std::vector<Copy> copies;
   std::optional<BrickedVoxels> voxels;
   std::vector<std::byte> unpacked;  // a chunk's samples
   std::unique_ptr<SlabData> data;
@@ -142,35 +206,35 @@ Executor::Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec, int threa
       make_renderer_(std::move(make_renderer)),
       threads_(threads),
       render_arena_(threads),
+      combine_arena_(threads),
       finish_arena_(threads) {}
 
 Executor::~Executor() {
   if (last_render_) *last_render_->cancelled = true;
 }
 
-// Within as many threads as all workers of this process have: when a picture is made, the others have rendered their parts of it.
-template <class Work>
-auto Executor::InFinishArena(Work&& work) {
-  if (const int threads = ThreadShare::OfProcess(); finish_arena_.max_concurrency() != threads) {
-    finish_arena_.terminate();
-    finish_arena_.initialize(threads);
+void Executor::Perform(const OpenSlab& action) {
+  auto slab = std::make_shared<Slab>(action.slab);
+  for (const OpenSlab::Copy& copy : action.copies) {
+    const auto source = slabs_.find(copy.from);
+    CHECK(source != slabs_.end()) << "the machine copies from slabs that it holds";
+    slab->copies.push_back({source->second, copy.box});
   }
-  return finish_arena_.execute(work);
+  slabs_.insert_or_assign(action.slab, std::move(slab));
 }
-
-void Executor::Perform(const OpenSlab& action) { slabs_.insert_or_assign(action.slab, std::make_shared<Slab>(action.slab)); }
 
 void Executor::Perform(const DropSlab& action) { slabs_.erase(action.slab); }
 
 void Executor::Perform(StoreChunk&& action) {
   const auto found = slabs_.find(action.slab);
   if (found == slabs_.end()) {
-    outbox_.Post(WorkerEvent(ChunkStored{action.slab, action.chunk.chunk, Status::NotFound("chunk of a slab that was dropped")}));
+    outbox_.Post(
+        WorkerEvent(ChunkStored{action.slab, action.chunk.box, action.chunk.chunk, Status::NotFound("chunk of a slab that was dropped")}));
     return;
   }
   combine_thread_.Post([this, slab = found->second, store = std::move(action)] {
     Status status = Guarded("slab", [&] { return slab->Store(store.chunk, store.payload); });
-    outbox_.Post(WorkerEvent(ChunkStored{store.slab, store.chunk.chunk, std::move(status)}));
+    outbox_.Post(WorkerEvent(ChunkStored{store.slab, store.chunk.box, store.chunk.chunk, std::move(status)}));
   });
 }
 
@@ -193,15 +257,14 @@ RenderDone Executor::Render(const StartRender& action, Slab& slab, const std::at
   RankReport& report = done.report;
   const std::int64_t begin = NowNs();
   done.status = Guarded("render", [&] {
-    if (slab.data == nullptr) {
-      slab.data = std::make_unique<SlabData>(*std::move(slab.voxels));
-      slab.voxels.reset();
-      slab.unpacked = {};
+    if (!slab.copies.empty()) {
+      slab.Data();
+      AddStage(report, Stage::kFetch, begin, NowNs());
     }
     std::unique_ptr<Renderer>& renderer = renderers_[action.setup->renderer];
     if (renderer == nullptr) renderer = make_renderer_(action.setup->renderer);
     const OcclusionMask& hidden = action.hidden == nullptr ? kNothingHidden : *action.hidden;
-    Result<LocalImage> rendered = renderer->Render(*slab.data, action.placement.box, *action.setup, hidden, cancelled, report);
+    Result<LocalImage> rendered = renderer->Render(slab.Data(), action.placement.box, *action.setup, hidden, cancelled, report);
     if (!rendered.ok()) return rendered.status();
     image = std::move(*rendered);
     report.image_bounds = image.bounds;
@@ -242,13 +305,13 @@ void Executor::Perform(StartCombine&& action) {
     done.status = Guarded("combine", [&] {
       const PixelRange pixels = combine.pixels == PixelRange{} ? AllPixels(combine.frame) : combine.pixels;
       if (other != nullptr) {
-        InFinishArena([&] { CombineImages(*image, fresh, other, combine, pixels); });
+        WithAllThreads(combine_arena_, [&] { CombineImages(*image, fresh, other, combine, pixels); });
         return Status::Ok();
       }
       if (!fresh && image->format != combine.incoming.header.format) {
         return Status::InvalidArgument("PartialImage.image.format is not that of the frame");
       }
-      return InFinishArena([&] {
+      return WithAllThreads(combine_arena_, [&] {
         return combine.incoming.shared ? CombineBorrowed(*image, fresh, combine, pixels, peer_memory_)
                                        : CombineIncoming(*image, fresh, combine, pixels);
       });
@@ -275,19 +338,35 @@ void Executor::Perform(FindHidden&& action) {
   });
 }
 
-void Executor::Perform(SendPartial&& action, bool lend) {
+// False: the pixels have to travel.
+bool Executor::SendLent(const LocalImage& image, SendPartial& send) {
+  const std::int64_t begin = NowNs();
+  std::optional<Bytes> spans = lent_.Lend(image, ViewOf(image, send.message.pixels, send.frame.width()), send.to, send.message);
+  if (!spans) return false;
+  Post(send, *std::move(spans), begin);
+  return true;
+}
+
+void Executor::Post(SendPartial& send, Bytes payload, std::int64_t begin_ns) {
+  AddStage(send.message.reports, Stage::kEncode, begin_ns, NowNs());
+  if (!send.message.reports.empty()) send.message.reports.back().image_bytes += payload.size();
+  outbox_.Post(OutgoingPartial{std::move(send.to), Encode(send.message), std::move(payload), send.message.acknowledge});
+}
+
+void Executor::Perform(SendPartial&& action, const Delivery& delivery) {
   std::shared_ptr<LocalImage> image = FindImage(action.image);
   CHECK(image != nullptr) << "image " << action.image << " to send does not exist";
-  combine_thread_.Post([this, lend, image = std::move(image), send = std::move(action)]() mutable {
+  // To name memory takes less time than to wake a thread that does.
+  if (delivery.lend && combine_thread_.Idle() && SendLent(*image, action)) return;
+  combine_thread_.Post([this, delivery, image = std::move(image), send = std::move(action)]() mutable {
     const Status status = Guarded("encode", [&] {
+      if (delivery.lend && SendLent(*image, send)) return Status::Ok();
       const std::int64_t begin = NowNs();
       const ImageView view = ViewOf(*image, send.message.pixels, send.frame.width());
       std::optional<Bytes> payload;
-      if (lend) payload = lent_.Lend(*image, view, send.to, send.message);
-      if (!payload) payload = InFinishArena([&] { return EncodePixels(view, send.color, send.message); });
-      AddStage(send.message.reports, Stage::kEncode, begin, NowNs());
-      if (!send.message.reports.empty()) send.message.reports.back().image_bytes += payload->size();
-      outbox_.Post(OutgoingPartial{std::move(send.to), Encode(send.message), *std::move(payload)});
+      if (send.color == ColorCoding::kFloat32) payload = PixelsInPlace(*image, view, send.message);
+      if (!payload) payload = WithAllThreads(combine_arena_, [&] { return EncodePixels(view, send.color, send.message); });
+      Post(send, PackForLink(*std::move(payload), delivery.bytes_per_second, send.message.packed), begin);
       return Status::Ok();
     });
     if (!status.ok()) LogError("partial image not sent: " + status.message());  // the coordinator hands the frame out again when it stalls
@@ -301,7 +380,7 @@ void Executor::Resend(const ImageRefused& refused) {
     const Status status = Guarded("encode", [&] {
       PartialImage message = lent->message;
       message.shared.reset();
-      Bytes payload = InFinishArena([&] { return EncodePixels(lent->view, ColorCoding::kFloat32, message); });
+      Bytes payload = WithAllThreads(combine_arena_, [&] { return EncodePixels(lent->view, ColorCoding::kFloat32, message); });
       outbox_.Post(OutgoingPartial{lent->to, Encode(message), std::move(payload)});
       return Status::Ok();
     });
@@ -312,32 +391,37 @@ void Executor::Resend(const ImageRefused& refused) {
 void Executor::Perform(SendFrame&& action) {
   std::shared_ptr<LocalImage> image = FindImage(action.image);
   CHECK(image != nullptr) << "image " << action.image << " to send does not exist";
-  combine_thread_.Post([this, image = std::move(image), send = std::move(action)]() mutable {
+  const bool finished = action.message.groups_done == action.message.group_count;
+  (finished ? finish_thread_ : combine_thread_).Post([this, finished, image = std::move(image), send = std::move(action)]() mutable {
     const Status status = Guarded("encode", [&] {
-      std::vector<RankReport>& reports = send.message.reports;
-      if (reports.empty()) {
-        RankReport& report = reports.emplace_back();
-        report.worker = send.message.worker;
-        report.group = std::max(send.message.groups_done, 1U) - 1;
-      }
-      const std::int64_t begin = NowNs();
-      std::int64_t resolved_ns = begin;
-      RunImage runs = InFinishArena([&] {
-        if (FrameIsPicture(*send.setup)) return EncodePicture(*image);
-        FillRows(*image);
-        const LocalImage picture = FinishPicture(*image, *send.setup);
-        resolved_ns = NowNs();
-        return EncodePicture(picture);
-      });
-      AddStage(reports, Stage::kResolve, begin, resolved_ns);
-      send.message.runs.image = runs.header;
-      const Bytes payload = PackRuns(Bytes(std::move(runs.payload)), frame_codec_, send.message.runs);
-      AddStage(reports, Stage::kEncode, resolved_ns, NowNs());
-      outbox_.Post(OutgoingFrame{Encode(send.message), payload});
+      MakePicture(*image, send, finished ? finish_arena_ : combine_arena_);
       return Status::Ok();
     });
     if (!status.ok()) LogError("frame not sent: " + status.message());
   });
+}
+
+void Executor::MakePicture(LocalImage& image, SendFrame& send, tbb::task_arena& arena) {
+  std::vector<RankReport>& reports = send.message.reports;
+  if (reports.empty()) {
+    RankReport& report = reports.emplace_back();
+    report.worker = send.message.worker;
+    report.group = std::max(send.message.groups_done, 1U) - 1;
+  }
+  const std::int64_t begin = NowNs();
+  std::int64_t resolved_ns = begin;
+  RunImage runs = WithAllThreads(arena, [&] {
+    if (FrameIsPicture(*send.setup)) return EncodePicture(image);
+    FillRows(image);
+    const LocalImage picture = FinishPicture(image, *send.setup);
+    resolved_ns = NowNs();
+    return EncodePicture(picture);
+  });
+  AddStage(reports, Stage::kResolve, begin, resolved_ns);
+  send.message.runs.image = runs.header;
+  const Bytes payload = PackRuns(Bytes(std::move(runs.payload)), frame_codec_, send.message.runs);
+  AddStage(reports, Stage::kEncode, resolved_ns, NowNs());
+  outbox_.Post(OutgoingFrame{Encode(send.message), payload});
 }
 
 void Executor::Perform(const ReleaseImage& action) { images_.erase(action.image); }

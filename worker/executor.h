@@ -1,11 +1,13 @@
 // Executor: carries out what a WorkerMachine orders that takes time: renders on one thread, combines, encodes and unpacks chunks on
-// another. Rendering, and the making of the picture, are spread over the worker's render threads.
+// another, and makes finished pictures on a third, so that the next frames are combined meanwhile. Rendering, and the making of the
+// picture, are spread over the worker's render threads.
 //
 //   1. The thread that owns the machine calls Perform for each action of the kinds below, in order.
 //   2. What comes of it is posted to the outbox: an event for the machine, or a message that is ready to be sent.
 // Tables of slabs and images belong to the calling thread; tasks share the entries that they need, so nothing is freed under a running task
 // and no lock is held while pixels are touched. An entry's contents are touched by one task at a time: the machine orders the next use of a
-// slab or image only after the event that ends the last one, but for the combining thread's own tasks, which run in order.
+// slab or image only after the event that ends the last one, but for the combining thread's own tasks, which run in order. Nothing is
+// combined onto the image of a finished frame; previews, whose image grows on, are made on the combining thread.
 #pragma once
 
 #include <tbb/task_arena.h>
@@ -21,7 +23,9 @@
 #include "common/base/task_thread.h"
 #include "common/image/local_image.h"
 #include "common/transport/mailbox.h"
+#include "worker/image_packing.h"
 #include "worker/lent_images.h"
+#include "worker/link_rates.h"
 #include "worker/peer_memory.h"
 #include "worker/render/pipeline.h"
 #include "worker/thread_share.h"
@@ -34,12 +38,19 @@ struct OutgoingPartial {
   Peer to;
   std::vector<std::byte> header;
   Bytes payload;
+  std::uint64_t acknowledge = 0;  // as in the message
 };
 struct OutgoingFrame {
   std::vector<std::byte> header;
   Bytes payload;
 };  // to the coordinator
 using ExecutorOutput = std::variant<WorkerEvent, OutgoingPartial, OutgoingFrame>;
+
+// How pixels get to another worker.
+struct Delivery {
+  bool lend = false;                              // it can read this process' memory, so that they may stay where they are
+  double bytes_per_second = LinkRates::kUnknown;  // of the link: what is not lent is packed where that pays
+};
 
 class Executor {
  public:
@@ -54,8 +65,7 @@ class Executor {
   void Perform(const CancelRender& action);
   void Perform(StartCombine&& action);
   void Perform(FindHidden&& action);
-  // `lend`: the receiver can read this process' memory, so that the pixels may stay where they are.
-  void Perform(SendPartial&& action, bool lend);
+  void Perform(SendPartial&& action, const Delivery& delivery);
   void Perform(SendFrame&& action);
   void Perform(const ReleaseImage& action);
 
@@ -73,8 +83,9 @@ class Executor {
   };
 
   std::shared_ptr<LocalImage> FindImage(ImageHandle image);  // null: no such image
-  template <class Work>
-  auto InFinishArena(Work&& work);  // combine thread only
+  void MakePicture(LocalImage& image, SendFrame& send, tbb::task_arena& arena);
+  bool SendLent(const LocalImage& image, SendPartial& send);
+  void Post(SendPartial& send, Bytes payload, std::int64_t begin_ns);  // which was made since then
   RenderDone Render(const StartRender& action, Slab& slab, const std::atomic<bool>& cancelled, LocalImage& image);
 
   Mailbox<ExecutorOutput>& outbox_;
@@ -89,8 +100,10 @@ class Executor {
   const ThreadShare threads_;
   // One for each thread below that enters: in a common arena the last picture would wait for the next one's rendering.
   tbb::task_arena render_arena_;
-  tbb::task_arena finish_arena_;  // combine thread's
+  tbb::task_arena combine_arena_;
+  tbb::task_arena finish_arena_;
   TaskThread combine_thread_;
+  TaskThread finish_thread_;
   TaskThread render_thread_;
 };
 

@@ -83,7 +83,7 @@ void GroupRun::OnPartial(const PartialImage& message, Bytes payload, WorkerActio
   if (!Mine(step.to) || Mine(step.from) || group.placements[step.from].worker != message.from_worker || !inside) return;
   Arrivals& arrivals = arrivals_[message.step];
   if (!Remember(arrivals.seen, message.pixels)) return;
-  arrivals.waiting.push_back({message.pixels, message.interval, 0, {message.image, message.shared, std::move(payload)}});
+  arrivals.waiting.push_back({message.pixels, message.interval, 0, {message.image, message.shared, message.packed, std::move(payload)}});
   Append(arrivals.reports, message.reports);
   Advance(actions);
 }
@@ -305,7 +305,8 @@ void GroupRun::CollectGroupPiece(const PartialImage& message, Bytes payload) {
   const bool whole = message.interval == RankInterval{0, group.schedule.ranks};
   if (assignment_.display != self_ || !from_root || !whole || message.pixels.end > frame_.end) return;
   if (group_image_taken_ || !Remember(group_pieces_.seen, message.pixels)) return;
-  group_pieces_.waiting.push_back({message.pixels, message.interval, 0, {message.image, message.shared, std::move(payload)}});
+  group_pieces_.waiting.push_back(
+      {message.pixels, message.interval, 0, {message.image, message.shared, message.packed, std::move(payload)}});
   group_pieces_.merged += PixelCount(message.pixels);
   Append(group_pieces_.reports, message.reports);
 }

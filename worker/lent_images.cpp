@@ -28,11 +28,11 @@ std::optional<Bytes> LentImages::Lend(const LocalImage& image, const ImageView& 
   shared.bounds = view.bounds;
   shared.stride = std::uint32_t(view.stride);
   shared.first_pixel = std::uint64_t(view.rgba - image.rgba.data()) / 4;
-  const std::array<const void*, 3> planes = {image.rgba.data(), image.depth.data(), image.voxel.data()};
+  std::array<std::optional<BlockPin>, 3> planes = {PinOf(image.rgba), PinOf(image.depth), PinOf(image.voxel)};
   for (std::size_t i = 0; i < (view.format == PixelFormat::kDepth ? 3U : 1U); ++i) {
-    std::optional<BlockPin> pin = BlockPin::Pin(planes[i]);
-    if (!pin) return std::nullopt;
-    shared.planes.push_back(pin->name());
+    std::optional<BlockPin>& pin = planes[i];
+    if (!pin || !pin->name()) return std::nullopt;
+    shared.planes.push_back(*pin->name());
     lent->pins.push_back(*std::move(pin));
   }
   message.image = {.format = view.format};

@@ -25,7 +25,7 @@ int Fail(int exit_status, const std::string& message) {
 int Run(int argc, char** argv) {
   slabstream::WorkerOptions options;
   std::uint64_t cache_mib = 0;
-  bool compress = false;
+  std::string compress = "auto";
   std::string log_level = "warning";
 
   CLI::App app("Slabstream worker: renders slabs and combines images for a coordinator.");
@@ -35,7 +35,11 @@ int Run(int argc, char** argv) {
   app.add_option("--threads", options.machine.threads, "render threads (default: 1)");
   app.add_option("--cache-mib", cache_mib, "MiB of voxels kept between frames (default: no limit)")
       ->check(CLI::Range(std::uint64_t{1}, kMaxCacheMib));
-  app.add_flag("--compress", compress, "pack pictures with zstd: pays on links slower than about 100 MB/s, not within a machine");
+  app.add_flag(
+         "--compress{on}", compress,
+         "auto (default): pack images for workers behind links that are slower than zstd; on: all images, and the pictures for clients; "
+         "off: none")
+      ->check(CLI::IsMember({"auto", "on", "off"}));
   app.add_flag("!--no-shared-memory", options.share_memory, "send images to workers of this host in frames as well");
   app.add_option("--log-level", log_level, "debug, info, warning, error or off")->check(CLI::IsMember(slabstream::LogLevelNames()));
   try {
@@ -45,7 +49,7 @@ int Run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return Fail(2, error.what());
   }
-  if (compress) options.codec = slabstream::Codec::kZstd;
+  options.compression = *slabstream::ParseCompression(compress);
   if (cache_mib != 0) options.machine.cache_bytes = cache_mib << 20;
   if (const auto simd = slabstream::LimitSimdTargetByEnvironment(); !simd.ok()) return Fail(2, simd.message());
   slabstream::InitLog("worker " + std::to_string(::getpid()), slabstream::LogLevelNames().at(log_level));

@@ -53,15 +53,18 @@ std::string HostName() {
 }  // namespace
 
 struct WorkerService::Impl {
-  Impl(Context& service_context, const WorkerConfig& config, Codec frame_codec, RendererFactory make_renderer, Socket control_socket,
-       Socket images_socket)
+  Impl(Context& service_context, const WorkerConfig& config, bool lend, Compression user_choice, RendererFactory make_renderer,
+       Socket control_socket, Socket images_socket)
       : context(service_context),
         machine(config),
         control(std::move(control_socket)),
         images(std::move(images_socket)),
         peers(service_context),
         scope(config.memory_scope),
-        executor(std::in_place, outbox, frame_codec, int(config.threads), std::move(make_renderer)) {}
+        lends(lend),
+        compression(user_choice),
+        executor(std::in_place, outbox, user_choice == Compression::kOn ? Codec::kZstd : Codec::kRaw, int(config.threads),
+                 std::move(make_renderer)) {}
 
   void Run();
   void Receive(Socket& socket, const char* plane);
@@ -71,6 +74,10 @@ struct WorkerService::Impl {
   void Remember(const AnyMessage& message);
   bool OpenShared(const AnyMessage& message);
   void Refuse(const PartialImage& partial);
+  void Acknowledge(const AnyMessage& message, std::size_t payload_bytes);
+  bool OnThisHost(const Peer& peer) const { return scope != 0 && peer.memory_scope == scope; }
+  bool IsTimed(const Peer& peer) const;
+  Delivery DeliveryTo(const Peer& peer) const;
 
   // One for each kind of action.
   void Perform(SendControl& action) { Send(control, action.message); }
@@ -91,7 +98,10 @@ struct WorkerService::Impl {
   std::string slabs_endpoint;
   PeerSockets peers;
   Epoch epoch = 0;
-  const std::uint64_t scope;                  // of this process' memory; 0: it is not shared
+  const std::uint64_t scope;  // workers with the same one are on this host; 0: unknown
+  const bool lends;           // its images to them
+  const Compression compression;
+  LinkRates links;                            // while compression is automatic
   std::map<WorkerId, std::string> endpoints;  // of the epoch's other workers' image planes
   std::set<WorkerId> takes_frames_only;       // though they have the same scope
   std::vector<PartialImage> to_refuse;        // by workers whose endpoint is not known yet
@@ -143,17 +153,19 @@ void WorkerService::Impl::Receive(Socket& socket, const char* plane) {
       continue;
     }
     Remember(*message);
+    Acknowledge(*message, payload.size());
     if (OpenShared(*message)) HandleEvent(MessageReceived{std::move(*message), std::move(payload)});
   }
 }
 
-// What concerns memory that is shared between workers: the machine needs to know nothing of it.
+// What concerns memory that is shared between workers, and the links between them: the machine needs to know nothing of it.
 void WorkerService::Impl::Remember(const AnyMessage& message) {
   if (const auto* welcome = std::get_if<Welcome>(&message)) {
     if (std::exchange(epoch, welcome->epoch) == welcome->epoch) return;
     executor->lent().Forget([](const GroupKey&) { return true; });
     takes_frames_only.clear();
     endpoints.clear();
+    links.ForgetAll();
   } else if (const auto* ping = std::get_if<Ping>(&message); ping != nullptr && ping->epoch == epoch) {
     executor->lent().Forget([&](const GroupKey& key) {
       return key.frame < ping->finished_before || std::ranges::find(ping->cancelled, key.frame) != ping->cancelled.end();
@@ -166,7 +178,20 @@ void WorkerService::Impl::Remember(const AnyMessage& message) {
     });
     for (const Peer& peer : assignment->peers) endpoints[peer.worker] = peer.images_endpoint;
     for (const PartialImage& refused : std::exchange(to_refuse, {})) Refuse(refused);
+  } else if (const auto* received = std::get_if<ImageReceived>(&message); received != nullptr && received->epoch == epoch) {
+    links.Received(received->from_worker, received->number, MonotonicNow());
   }
+}
+
+// One whose sender's endpoint is not known yet goes unanswered: the sender asks again.
+void WorkerService::Impl::Acknowledge(const AnyMessage& message, std::size_t payload_bytes) {
+  const auto* partial = std::get_if<PartialImage>(&message);
+  if (partial == nullptr || partial->acknowledge == 0 || payload_bytes < kLeastAcknowledgedBytes || partial->epoch != epoch) return;
+  const auto sender = endpoints.find(partial->from_worker);
+  if (sender == endpoints.end()) return;
+  const ImageReceived received = {epoch, machine.worker(), partial->acknowledge};
+  const Status sent = peers.Send(sender->second, Encode(received), {}, MonotonicNow());
+  if (!sent.ok()) LogDebug("worker " + std::to_string(partial->from_worker) + " is not reached: " + sent.message());
 }
 
 // True if the message is for the machine: a shared image only if it can be read here.
@@ -219,6 +244,7 @@ void WorkerService::Impl::HandleOutput(ExecutorOutput& output) {
     }
   } else {
     auto& partial = std::get<OutgoingPartial>(output);
+    if (IsTimed(partial.to)) links.Sent(partial.to.worker, partial.acknowledge, partial.payload.size(), MonotonicNow());
     const Status sent = peers.Send(partial.to.images_endpoint, std::move(partial.header), partial.payload, MonotonicNow());
     if (sent.ok()) return;
     LogWarning("worker " + std::to_string(partial.to.worker) + " is not reached: " + sent.message());
@@ -249,9 +275,21 @@ void WorkerService::Impl::Perform(ConnectSlabs& action) {
   slabs_endpoint = action.endpoint;
 }
 
+Delivery WorkerService::Impl::DeliveryTo(const Peer& peer) const {
+  if (lends && OnThisHost(peer) && takes_frames_only.count(peer.worker) == 0) return {.lend = true};
+  if (compression == Compression::kOn) return {.bytes_per_second = 0};
+  return IsTimed(peer) ? Delivery{.bytes_per_second = links.Of(peer.worker)} : Delivery{};
+}
+
+// Within a host nothing is: a processor that is short would look like a slow link, and packing would make it shorter.
+bool WorkerService::Impl::IsTimed(const Peer& peer) const {
+  return compression == Compression::kAuto && !OnThisHost(peer) && peer.images_endpoint.starts_with("tcp://");
+}
+
 void WorkerService::Impl::Perform(SendPartial& action) {
-  const bool lend = scope != 0 && action.to.memory_scope == scope && takes_frames_only.count(action.to.worker) == 0;
-  executor->Perform(std::move(action), lend);
+  const Delivery delivery = DeliveryTo(action.to);
+  if (IsTimed(action.to)) action.message.acknowledge = links.Ask(action.to.worker, MonotonicNow());
+  executor->Perform(std::move(action), delivery);
 }
 
 Result<std::unique_ptr<WorkerService>> WorkerService::Start(Context& context, WorkerOptions options) {
@@ -277,15 +315,15 @@ Result<std::unique_ptr<WorkerService>> WorkerService::Start(Context& context, Wo
   config.pid = static_cast<std::uint32_t>(::getpid());
   config.host = HostName();
   config.images_endpoint = std::move(*images_endpoint);
+  config.memory_scope = SharedMemoryScope();
   if (options.share_memory) {
-    if (const Status shared = ShareBlocks(); shared.ok()) {
-      config.memory_scope = SharedMemoryScope();
-    } else {
+    if (const Status shared = ShareBlocks(); !shared.ok()) {
       LogWarning(shared.message() + ": images travel in frames");
+      options.share_memory = false;
     }
   }
-  auto impl =
-      std::make_unique<Impl>(context, config, options.codec, std::move(options.make_renderer), std::move(*control), std::move(*images));
+  auto impl = std::make_unique<Impl>(context, config, options.share_memory, options.compression, std::move(options.make_renderer),
+                                     std::move(*control), std::move(*images));
   impl->thread = std::jthread([raw = impl.get()] { raw->Run(); });
   return std::unique_ptr<WorkerService>(new WorkerService(std::move(impl)));
 }

@@ -10,6 +10,7 @@
 
 #include "common/base/status.h"
 #include "common/transport/socket.h"
+#include "worker/image_packing.h"
 #include "worker/render/pipeline.h"
 #include "worker/worker_machine.h"
 
@@ -18,8 +19,8 @@ namespace slabstream {
 struct WorkerOptions {
   std::string coordinator_endpoint;  // its worker endpoint
   std::string images_endpoint;       // bound; empty: any port of the coordinator's scheme (tcp), a path of its own (ipc), a name (inproc)
-  Codec codec = Codec::kRaw;         // of finished frames; zstd pays where the client's link is slower than it packs
-  bool share_memory = true;          // with other workers of this host: images stay where they are
+  Compression compression = Compression::kAuto;
+  bool share_memory = true;  // images for workers of this host stay where they are
   RendererFactory make_renderer = MakeRenderer;
   WorkerConfig machine;  // incarnation, pid, host, images_endpoint, memory_scope are filled in by Start; threads: [1, kMaxThreads]
 };

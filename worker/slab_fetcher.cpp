@@ -5,12 +5,13 @@
 #include <algorithm>
 
 #include "common/base/check.h"
+#include "common/volume/box_assembly.h"
 
 namespace slabstream {
 namespace {
 
-std::uint32_t BytesOfChunk(const SlabKey& key, std::uint32_t chunk) {
-  const std::uint64_t total = std::uint64_t(key.box.voxel_count()) * BytesPerSample(key.type);
+std::uint32_t BytesOfChunk(const Box& box, ScalarType type, std::uint32_t chunk) {
+  const std::uint64_t total = std::uint64_t(box.voxel_count()) * BytesPerSample(type);
   return std::uint32_t(std::min<std::uint64_t>(kChunkBytes, total - std::uint64_t(chunk) * kChunkBytes));
 }
 
@@ -26,9 +27,9 @@ const SlabFetcher::Slab* SlabFetcher::Find(Generation slab) const {
   return found == slabs_.end() ? nullptr : &found->second;
 }
 
-SlabFetcher::Slab* SlabFetcher::FindRequested(DatasetId dataset, const Box& box, std::uint32_t chunk) {
+SlabFetcher::Slab* SlabFetcher::FindRequested(DatasetId dataset, const ChunkPlace& chunk) {
   for (auto& [generation, slab] : slabs_) {
-    if (slab.key.dataset != dataset || slab.key.box != box) continue;
+    if (slab.key.dataset != dataset) continue;
     const auto request = in_flight_.find({generation, chunk});
     if (request != in_flight_.end() && !request->second.storing) return &slab;
   }
@@ -46,17 +47,54 @@ SlabFetcher::Generation SlabFetcher::Acquire(DatasetId dataset, const Box& box, 
     best = &slabs_[generation];
     best->key = {dataset, box, type, generation};
     best->bytes = std::uint64_t(box.voxel_count()) * BytesPerSample(type);
-    best->chunk_count = ChunkCount(box, type);
-    best->missing.resize(best->chunk_count);
-    for (std::uint32_t i = 0; i < best->chunk_count; ++i) best->missing[i] = best->chunk_count - 1 - i;
     best->pins = 1;
+    OpenSlab open = PlanSlab(*best);
+    if (best->is_complete()) RetireCovered(*best);
     Trim(actions);  // room first, then the new one
-    actions.push_back(OpenSlab{best->key});
+    actions.push_back(std::move(open));
   } else {
     ++best->pins;
   }
   best->last_use = ++use_counter_;
   return best->key.generation;
+}
+
+// What is copied, and from where; and which chunks are missing.
+OpenSlab SlabFetcher::PlanSlab(Slab& slab) {
+  std::vector<Slab*> sources;
+  std::vector<Box> at_hand;
+  const bool room = cached_bytes() <= config_.cache_bytes;  // else whatever can go must go
+  for (auto& [generation, other] : slabs_) {
+    if (!room || &other == &slab || other.retired || !other.is_complete()) continue;
+    if (other.key.dataset != slab.key.dataset || other.key.type != slab.key.type) continue;
+    sources.push_back(&other);
+    at_hand.push_back(other.key.box);
+  }
+  const BoxAssembly assembly = Assemble(slab.key.box, at_hand, MostMissing(slab.key.box));
+  OpenSlab open{slab.key, {}};
+  for (const BoxAssembly::Part& part : assembly.copied) {
+    Slab& source = *sources[part.source];
+    open.copies.push_back({source.key, part.box});
+    ++source.pins;
+    slab.sources.push_back(source.key.generation);
+  }
+  for (const Box& box : assembly.missing) {
+    for (std::uint32_t chunk = 0; chunk < ChunkCount(box, slab.key.type); ++chunk) slab.missing.push_back({box, chunk});
+  }
+  std::ranges::reverse(slab.missing);
+  slab.chunk_count = slab.missing.size();
+  return open;
+}
+
+void SlabFetcher::Rendered(Generation slab) {
+  Slab* found = Find(slab);
+  CHECK(found != nullptr) << "slab " << slab;
+  Unpin(std::exchange(found->sources, {}));
+}
+
+// What was copied from is not what frames use.
+void SlabFetcher::Unpin(std::span<const Generation> sources) {
+  for (const Generation source : sources) --slabs_.at(source).pins;
 }
 
 void SlabFetcher::Release(Generation slab) {
@@ -94,25 +132,26 @@ void SlabFetcher::RequestChunks(std::span<const Generation> slabs, Epoch epoch, 
     Slab* slab = Find(generation);
     if (slab == nullptr || slab->retired) continue;
     while (!slab->missing.empty()) {
-      const std::uint32_t chunk = slab->missing.back();
-      const std::uint32_t bytes = BytesOfChunk(slab->key, chunk);
+      const ChunkPlace chunk = slab->missing.back();
+      const std::uint32_t bytes = BytesOfChunk(chunk.box, slab->key.type, chunk.chunk);
       if (!in_flight_.empty() && in_flight_bytes_ + bytes > config_.credit_bytes) return;
       slab->missing.pop_back();
       in_flight_[{generation, chunk}] = {bytes, now + config_.chunk_timeout, false};
       in_flight_bytes_ += bytes;
       if (!slab->requested) slab->report.begin = now;
       slab->requested = true;
-      actions.push_back(SendChunkRequest{{epoch, worker, slab->key.dataset, slab->key.box, chunk}});
+      actions.push_back(SendChunkRequest{{epoch, worker, slab->key.dataset, chunk.box, chunk.chunk}});
     }
   }
 }
 
 void SlabFetcher::OnChunk(const Chunk& chunk, Bytes payload, WorkerActions& actions) {
-  Slab* slab = FindRequested(chunk.dataset, chunk.box, chunk.chunk);
+  const ChunkPlace place{chunk.box, chunk.chunk};
+  Slab* slab = FindRequested(chunk.dataset, place);
   if (slab == nullptr) return;  // arrived before, or nobody waits for it any more
-  InFlight& request = in_flight_.at({slab->key.generation, chunk.chunk});
+  InFlight& request = in_flight_.at({slab->key.generation, place});
   if (chunk.raw_bytes != request.bytes) {
-    Retry(slab->key.generation, chunk.chunk,
+    Retry(slab->key.generation, place,
           Status::DataLoss(fmt::format("chunk {} has {} bytes, expected {}", chunk.chunk, chunk.raw_bytes, request.bytes)));
     return;
   }
@@ -121,14 +160,15 @@ void SlabFetcher::OnChunk(const Chunk& chunk, Bytes payload, WorkerActions& acti
 }
 
 void SlabFetcher::OnRefused(const ChunkRefused& refused) {
-  if (Slab* slab = FindRequested(refused.dataset, refused.box, refused.chunk)) GiveUp(*slab, refused.status);
+  if (Slab* slab = FindRequested(refused.dataset, {refused.box, refused.chunk})) GiveUp(*slab, refused.status);
 }
 
 void SlabFetcher::OnStored(const ChunkStored& stored, Time now) {
-  const auto request = in_flight_.find({stored.slab.generation, stored.chunk});
+  const ChunkPlace place{stored.box, stored.chunk};
+  const auto request = in_flight_.find({stored.slab.generation, place});
   if (request == in_flight_.end() || !request->second.storing) return;
   if (!stored.status.ok()) {
-    Retry(stored.slab.generation, stored.chunk, stored.status);
+    Retry(stored.slab.generation, place, stored.status);
     return;
   }
   const std::uint32_t bytes = request->second.bytes;
@@ -150,7 +190,7 @@ void SlabFetcher::ExpireRequests(Time now) {
   }
   for (const auto& [generation, chunk] : expired) {
     const auto waited = std::chrono::duration_cast<std::chrono::milliseconds>(config_.chunk_timeout).count();
-    Retry(generation, chunk, Status::Unavailable(fmt::format("chunk {} of a slab did not arrive within {} ms", chunk, waited)));
+    Retry(generation, chunk, Status::Unavailable(fmt::format("chunk {} of a slab did not arrive within {} ms", chunk.chunk, waited)));
   }
 }
 
@@ -162,7 +202,7 @@ Time SlabFetcher::NextExpiry() const {
   return next;
 }
 
-void SlabFetcher::Retry(Generation generation, std::uint32_t chunk, const Status& why) {
+void SlabFetcher::Retry(Generation generation, const ChunkPlace& chunk, const Status& why) {
   const auto request = in_flight_.find({generation, chunk});
   in_flight_bytes_ -= request->second.bytes;
   in_flight_.erase(request);
@@ -229,6 +269,7 @@ void SlabFetcher::Trim(WorkerActions& actions) {
 
 void SlabFetcher::Drop(Generation slab, WorkerActions& actions) {
   actions.push_back(DropSlab{slabs_.at(slab).key});
+  Unpin(slabs_.at(slab).sources);
   slabs_.erase(slab);
 }
 

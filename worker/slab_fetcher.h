@@ -1,6 +1,7 @@
 // SlabFetcher: the slabs of a worker, complete or on their way: which chunks to ask for, within the byte credit, and which slabs to drop.
 //
-//   1. Acquire: a slab that covers the box is pinned, and opened if none is cached or on its way.
+//   1. Acquire: a slab that covers the box is pinned, and opened if none is cached or on its way. What complete slabs hold of it is copied
+//      from them: they stay until it has been rendered from (Rendered) or is dropped. The rest is fetched, box by box.
 //   2. RequestChunks, in the order in which slabs will be needed; Chunk -> StoreChunk -> ChunkStored. What does not arrive within
 //   chunk_timeout, or
 //      arrives damaged, is asked for again, chunk_attempts times; then the slab is given up (TakeFailures).
@@ -37,8 +38,9 @@ class SlabFetcher {
   explicit SlabFetcher(const WorkerConfig& config) : config_(config) {}
 
   Generation Acquire(DatasetId dataset, const Box& box, ScalarType type, WorkerActions& actions);
-  void Release(Generation slab);  // once for each Acquire
-  bool complete(Generation slab) const;
+  void Release(Generation slab);         // once for each Acquire
+  bool complete(Generation slab) const;  // all that must be fetched is stored
+  void Rendered(Generation slab);        // it holds all its voxels itself
   SlabKey key(Generation slab) const;
   FetchReport TakeReport(Generation slab);
   void SetBytes(Generation slab, std::uint64_t bytes);  // with what was derived from the voxels
@@ -62,15 +64,22 @@ class SlabFetcher {
   std::uint64_t fetched_bytes() const { return fetched_bytes_; }
 
  private:
+  struct ChunkPlace {  // a chunk of a box inside the slab
+    Box box;
+    std::uint32_t chunk = 0;
+    friend bool operator==(const ChunkPlace&, const ChunkPlace&) = default;
+    friend auto operator<=>(const ChunkPlace&, const ChunkPlace&) = default;
+  };
   struct Slab {
     SlabKey key;
     int pins = 0;
     bool retired = false;  // not to be acquired again; dropped when unpinned
     std::uint64_t bytes = 0;
     std::uint64_t last_use = 0;
-    std::vector<std::uint32_t> missing;  // chunks neither stored nor in flight; the next one to ask for is last
-    std::uint32_t stored = 0, chunk_count = 0;
-    std::map<std::uint32_t, int> failures;  // by chunk
+    std::vector<Generation> sources;  // pinned
+    std::vector<ChunkPlace> missing;  // chunks neither stored nor in flight; the next one to ask for is last
+    std::size_t stored = 0, chunk_count = 0;
+    std::map<ChunkPlace, int> failures;
     FetchReport report;
     bool requested = false;  // since the last report
 
@@ -81,12 +90,14 @@ class SlabFetcher {
     Time expiry;
     bool storing = false;
   };
-  using ChunkName = std::pair<Generation, std::uint32_t>;
+  using ChunkName = std::pair<Generation, ChunkPlace>;
 
   Slab* Find(Generation slab);
   const Slab* Find(Generation slab) const;
-  Slab* FindRequested(DatasetId dataset, const Box& box, std::uint32_t chunk);
-  void Retry(Generation slab, std::uint32_t chunk, const Status& why);
+  Slab* FindRequested(DatasetId dataset, const ChunkPlace& chunk);
+  OpenSlab PlanSlab(Slab& slab);
+  void Unpin(std::span<const Generation> sources);
+  void Retry(Generation slab, const ChunkPlace& chunk, const Status& why);
   void GiveUp(Slab& slab, Status status);
   void RetireCovered(Slab& complete);
   void Drop(Generation slab, WorkerActions& actions);

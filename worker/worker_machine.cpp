@@ -56,7 +56,8 @@ struct WorkerMachine::State {
   void On(const WorkerTrouble&, const Bytes&) {}
   void On(const Leave&, const Bytes&) {}
   void On(const ChunkRequest&, const Bytes&) {}
-  void On(const ImageRefused&, const Bytes&) {}  // the service's
+  void On(const ImageRefused&, const Bytes&) {}   // the service's
+  void On(const ImageReceived&, const Bytes&) {}  // the service's
   void On(const SubmitFrame&, const Bytes&) {}
   void On(const FrameProgress&, const Bytes&) {}
   void On(const FrameReply&, const Bytes&) {}

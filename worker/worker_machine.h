@@ -7,8 +7,8 @@
 // a new worker.
 //
 // A group on this worker:
-//   GroupAssignment   voxels of its boxes are fetched (chunk requests within the byte credit) unless they are cached; a box that is hidden
-//                     as a whole needs none: its rank holds an empty image at once
+//   GroupAssignment   voxels of its boxes are fetched (chunk requests within the byte credit), as far as no cached slab holds them; a box
+//                     that is hidden as a whole needs none: its rank holds an empty image at once
 //   slab complete     ranks are rendered one after the other, groups in order of frame and group
 //   RenderDone        the rank holds its image; the rank's steps of the schedule are taken in order of rounds: a send goes as soon as
 //   everything
@@ -69,6 +69,7 @@ struct WorkerConfig {
 struct IncomingImage {
   RunImageHeader header;
   std::optional<SharedImage> shared;
+  std::optional<PackedRuns> packed;
   Bytes payload;
 };
 
@@ -79,7 +80,8 @@ struct MessageReceived {
 };  // from any plane; payload lengths are checked already, runs when they are combined
 struct ChunkStored {
   SlabKey slab;
-  std::uint32_t chunk = 0;
+  Box box;                  // as in the chunk
+  std::uint32_t chunk = 0;  // of that box
   Status status;
 };
 struct RenderDone {
@@ -118,9 +120,16 @@ struct SendChunkRequest {
 struct ConnectSlabs {
   std::string endpoint;
 };  // on Welcome
+// Makes room for its voxels. What other slabs hold of them is copied before the first render; these are complete, and open until that
+// render is done. Chunks of boxes inside it bring the rest.
 struct OpenSlab {
+  struct Copy {
+    SlabKey from;
+    Box box;
+  };
   SlabKey slab;
-};  // make room for its voxels
+  std::vector<Copy> copies;
+};
 struct StoreChunk {
   SlabKey slab;
   Chunk chunk;

@@ -108,6 +108,24 @@ ImageView ViewOf(const LocalImage& image, PixelRange range, std::int32_t frame_w
   return view;
 }
 
+std::optional<RunImageHeader> DenseHeader(const ImageView& view) {
+  const auto width = std::size_t(view.bounds.width()), height = std::size_t(view.bounds.height());
+  const ColumnSpan whole = {0, std::uint32_t(width)};
+  if (HasDepth(view.format) || view.bounds.empty() || view.stride != width) return std::nullopt;
+  if (!std::ranges::all_of(view.rows, [&](const ColumnSpan& row) { return row == whole; })) return std::nullopt;
+  constexpr std::size_t kSamples = 32, kMostEmpty = 16;  // along a side; one of so many
+  const std::size_t samples_x = std::min(kSamples, width), samples_y = std::min(kSamples, height);
+  std::size_t empty = 0;
+  for (std::size_t j = 0; j < samples_y; ++j) {
+    const std::size_t row = (2 * j + 1) * height / (2 * samples_y) * width;
+    for (std::size_t i = 0; i < samples_x; ++i) {
+      empty += std::size_t(view.rgba[4 * (row + (2 * i + 1) * width / (2 * samples_x)) + 3] == 0);
+    }
+  }
+  if (kMostEmpty * empty > samples_x * samples_y) return std::nullopt;
+  return RunImageHeader{.format = view.format, .bounds = view.bounds, .pixel_count = std::uint64_t(view.bounds.pixel_count())};
+}
+
 void Clip(ImageView& view, PixelRange range, std::int32_t frame_width) {
   for (std::size_t y = 0; y < view.rows.size(); ++y) {
     const Columns columns = ColumnsInRange(view.bounds, view.bounds.y_begin + std::int64_t(y), range, std::uint64_t(frame_width));

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "common/image/local_image.h"
@@ -34,6 +35,10 @@ ImageView ViewOf(const LocalImage& image, PixelRange range, std::int32_t frame_w
 void Clip(ImageView& view, PixelRange range, std::int32_t frame_width);
 
 LocalImage CopyOf(const ImageView& view);  // with the view's rows
+
+// The header of `view` as a dense image: its colours are the payload where they lie, from view.rgba on. None: they do not lie there row
+// after row, there are depths, or more than a few pixels are empty (which a sample tells), so that runs are shorter.
+std::optional<RunImageHeader> DenseHeader(const ImageView& view);
 
 // The pixels of `view`, which lie in a frame, as they travel; bounds are the view's. Colours are coded as floats where `color` cannot: with
 // depths, and where one of them cannot be coded (ToCodes).

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "common/image/finite.h"
 #include "common/image/image_view.h"
 #include "common/image/run_payload.h"
 
@@ -67,25 +68,6 @@ Status BadColour(ColorCoding color) {
   return Invalid(color == ColorCoding::kFloat32 ? "a pixel's colour is not finite" : "a pixel's colour does not lie in [0, 1]");
 }
 Status DepthNotFinite() { return Invalid("a pixel's depth is not finite"); }
-
-// `floats`: the bytes of floats, at any address.
-bool AllFinite(std::span<const std::byte> floats) {
-  constexpr std::size_t kBatch = 16384;  // floats between two looks at what was found
-  constexpr std::uint32_t kExponentBits = 0x7F800000U;
-  const std::size_t total = floats.size() / sizeof(float);
-  for (std::size_t first = 0; first < total; first += kBatch) {
-    const std::size_t end = std::min(first + kBatch, total);
-    std::uint32_t bad = 0;
-    for (std::size_t i = first; i < end; ++i) {
-      std::uint32_t bits;
-      std::memcpy(&bits, floats.data() + sizeof(bits) * i, sizeof(bits));
-      // All bits of the exponent are set for infinities and NaNs alone.
-      bad |= std::uint32_t{(bits & kExponentBits) == kExponentBits};
-    }
-    if (bad != 0) return false;
-  }
-  return true;
-}
 
 // `codes`: the bytes of codes, at any address.
 bool NoneAbove(std::uint16_t largest, std::span<const std::byte> codes) {
@@ -172,67 +154,13 @@ RunImage Encode(const ImageView& view, PixelFormat format, ColorCoding color) {
   return result;
 }
 
-// ValidateRuns, but for the values of pixels.
-Status ValidateTable(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame) {
-  if (header.format < PixelFormat::kRgba || header.format > PixelFormat::kRgbaDepth) {
-    return Invalid("format is " + std::to_string(int(header.format)) + ", but must be 1 (rgba), 2 (depth) or 3 (rgba and depth)");
-  }
-  const bool coded = header.color == ColorCoding::kHalf || header.color == ColorCoding::kFixed16;
-  if (header.color != ColorCoding::kFloat32 && (!coded || header.format != PixelFormat::kRgba)) {
-    return Invalid("color is " + std::to_string(int(header.color)) +
-                   ", but must be 1 (float32), or 2 (half) or 3 (fixed16) without depths");
-  }
-  const PixelBounds& bounds = header.bounds;
-  // Nothing is computed from the bounds before this: differences of hostile numbers may overflow.
-  if (!frame.Contains(bounds) || (bounds.empty() && bounds != PixelBounds{})) {
-    return Invalid("bounds [" + std::to_string(bounds.x_begin) + ", " + std::to_string(bounds.x_end) + ") x [" +
-                   std::to_string(bounds.y_begin) + ", " + std::to_string(bounds.y_end) + ") do not lie in the frame of " +
-                   std::to_string(frame.width()) + " x " + std::to_string(frame.height()) + " pixels");
-  }
-  const auto limit = std::uint64_t(bounds.pixel_count());
-  if (header.pixel_count > limit) {
-    return Invalid("pixel_count is " + std::to_string(header.pixel_count) + ", but the bounds have " + std::to_string(limit) + " pixels");
-  }
-  if (header.run_count > header.pixel_count) {
-    return Invalid("run_count is " + std::to_string(header.run_count) + ", but there are only " + std::to_string(header.pixel_count) +
-                   " pixels");
-  }
-  if (payload.size() != PayloadBytes(header)) {
-    return Invalid("the payload has " + std::to_string(payload.size()) + " bytes, but the header says " +
-                   std::to_string(PayloadBytes(header)));
-  }
-
-  const RunPayload runs(header, payload);
-  std::uint64_t pixels = 0;
-  std::uint64_t next_row = 0, next_column = 0;  // first place where the next run may begin
-  for (std::uint32_t i = 0; i < header.run_count; ++i) {
-    const Run run = runs.ReadRun(i);
-    const std::uint64_t end_column = std::uint64_t{run.column} + run.pixel_count;
-    if (run.pixel_count == 0 || run.row >= std::uint32_t(bounds.height()) || end_column > std::uint64_t(bounds.width())) {
-      return Invalid("run " + std::to_string(i) + " (row " + std::to_string(run.row) + ", column " + std::to_string(run.column) + ", " +
-                     std::to_string(run.pixel_count) + " pixels) is empty or leaves the bounds");
-    }
-    if (run.row < next_row || (run.row == next_row && run.column < next_column)) {
-      return Invalid("run " + std::to_string(i) + " (row " + std::to_string(run.row) + ", column " + std::to_string(run.column) +
-                     ") overlaps, touches or precedes the run before it");
-    }
-    next_row = run.row;
-    next_column = end_column + 1;
-    pixels += run.pixel_count;
-  }
-  if (pixels != header.pixel_count) {
-    return Invalid("runs hold " + std::to_string(pixels) + " pixels, but pixel_count is " + std::to_string(header.pixel_count));
-  }
-  return Status::Ok();
-}
-
 constexpr std::uint32_t kRunsPerTask = 16;  // the pixels of a row each, mostly: they stay in a core's cache
 
 // For each task the number of pixels of all runs in front of its first one. One task at least.
-std::vector<std::size_t> FirstPixels(const RunPayload& runs, std::uint32_t run_count) {
+std::vector<std::size_t> FirstPixels(const RunPayload& runs) {
   std::vector<std::size_t> first = {0};
   std::size_t pixels = 0;
-  for (std::uint32_t i = 0; i < run_count; ++i) {
+  for (std::uint32_t i = 0; i < runs.run_count(); ++i) {
     if (i > 0 && i % kRunsPerTask == 0) first.push_back(pixels);
     pixels += runs.ReadRun(i).pixel_count;
   }
@@ -245,9 +173,9 @@ template <class Look>
 LocalImage Decode(const RunImageHeader& header, const RunPayload& runs, Look&& look) {
   LocalImage image = MakeUnwrittenImage(header.format, header.bounds);
   const auto place_of = [&](const Run& run) { return std::size_t{run.row} * std::size_t(header.bounds.width()) + run.column; };
-  const std::vector<std::size_t> first_pixels = FirstPixels(runs, header.run_count);
+  const std::vector<std::size_t> first_pixels = FirstPixels(runs);
   tbb::parallel_for(std::size_t{0}, first_pixels.size(), [&](std::size_t task) {
-    const std::size_t begin = task * kRunsPerTask, end = std::min<std::size_t>(begin + kRunsPerTask, header.run_count);
+    const std::size_t begin = task * kRunsPerTask, end = std::min<std::size_t>(begin + kRunsPerTask, runs.run_count());
     std::size_t source = first_pixels[task], written = 0;
     if (begin > 0) {
       const Run before = runs.ReadRun(begin - 1);
@@ -264,7 +192,7 @@ LocalImage Decode(const RunImageHeader& header, const RunPayload& runs, Look&& l
       if (HasVoxel(header.format)) runs.ReadVoxel(source, run.pixel_count, &image.voxel[target]);
       source += run.pixel_count;
     }
-    if (end == header.run_count) MakeEmpty(image, written, std::size_t(header.bounds.pixel_count()));
+    if (end == runs.run_count()) MakeEmpty(image, written, std::size_t(header.bounds.pixel_count()));
   });
   return image;
 }
@@ -285,12 +213,78 @@ RunImage EncodePicture(const LocalImage& image) {
   return Encode(ViewOf(image), HasDepth(image.format) ? PixelFormat::kRgbaDepth : PixelFormat::kRgba, ColorCoding::kFloat32);
 }
 
-Status ValidateRuns(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame) {
-  if (Status status = ValidateTable(header, payload, frame); !status.ok()) return status;
-  const RunPayload runs(header, payload);
-  if (!ColoursAreValid(header.color, runs.rgba(0, header.pixel_count))) return BadColour(header.color);
-  if (HasDepth(header.format) && !AllFinite(runs.depth(0, header.pixel_count))) return DepthNotFinite();
+Status ValidateRunHeader(const RunImageHeader& header, const PixelBounds& frame) {
+  if (header.format < PixelFormat::kRgba || header.format > PixelFormat::kRgbaDepth) {
+    return Invalid("format is " + std::to_string(int(header.format)) + ", but must be 1 (rgba), 2 (depth) or 3 (rgba and depth)");
+  }
+  const bool coded = header.color == ColorCoding::kHalf || header.color == ColorCoding::kFixed16;
+  if (header.color != ColorCoding::kFloat32 && (!coded || header.format != PixelFormat::kRgba)) {
+    return Invalid("color is " + std::to_string(int(header.color)) +
+                   ", but must be 1 (float32), or 2 (half) or 3 (fixed16) without depths");
+  }
+  const PixelBounds& bounds = header.bounds;
+  // Nothing is computed from the bounds before this: differences of hostile numbers may overflow.
+  if (!frame.Contains(bounds) || (bounds.empty() && bounds != PixelBounds{})) {
+    return Invalid("bounds [" + std::to_string(bounds.x_begin) + ", " + std::to_string(bounds.x_end) + ") x [" +
+                   std::to_string(bounds.y_begin) + ", " + std::to_string(bounds.y_end) + ") do not lie in the frame of " +
+                   std::to_string(frame.width()) + " x " + std::to_string(frame.height()) + " pixels");
+  }
+  const auto limit = std::uint64_t(bounds.pixel_count());
+  if (header.pixel_count > limit) {
+    return Invalid("pixel_count is " + std::to_string(header.pixel_count) + ", but the bounds have " + std::to_string(limit) + " pixels");
+  }
+  if (IsDense(header) && header.pixel_count != limit) {
+    return Invalid("run_count is 0, but there are " + std::to_string(header.pixel_count) + " of the bounds' " + std::to_string(limit) +
+                   " pixels");
+  }
+  if (header.run_count > header.pixel_count) {
+    return Invalid("run_count is " + std::to_string(header.run_count) + ", but there are only " + std::to_string(header.pixel_count) +
+                   " pixels");
+  }
   return Status::Ok();
+}
+
+Status ValidateRunTable(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame) {
+  if (Status status = ValidateRunHeader(header, frame); !status.ok()) return status;
+  if (payload.size() != PayloadBytes(header)) {
+    return Invalid("the payload has " + std::to_string(payload.size()) + " bytes, but the header says " +
+                   std::to_string(PayloadBytes(header)));
+  }
+
+  if (IsDense(header)) return Status::Ok();
+  const RunPayload runs(header, payload);
+  std::uint64_t pixels = 0;
+  std::uint64_t next_row = 0, next_column = 0;  // first place where the next run may begin
+  for (std::uint32_t i = 0; i < header.run_count; ++i) {
+    const Run run = runs.ReadRun(i);
+    const std::uint64_t end_column = std::uint64_t{run.column} + run.pixel_count;
+    if (run.pixel_count == 0 || run.row >= std::uint32_t(header.bounds.height()) || end_column > std::uint64_t(header.bounds.width())) {
+      return Invalid("run " + std::to_string(i) + " (row " + std::to_string(run.row) + ", column " + std::to_string(run.column) + ", " +
+                     std::to_string(run.pixel_count) + " pixels) is empty or leaves the bounds");
+    }
+    if (run.row < next_row || (run.row == next_row && run.column < next_column)) {
+      return Invalid("run " + std::to_string(i) + " (row " + std::to_string(run.row) + ", column " + std::to_string(run.column) +
+                     ") overlaps, touches or precedes the run before it");
+    }
+    next_row = run.row;
+    next_column = end_column + 1;
+    pixels += run.pixel_count;
+  }
+  if (pixels != header.pixel_count) {
+    return Invalid("runs hold " + std::to_string(pixels) + " pixels, but pixel_count is " + std::to_string(header.pixel_count));
+  }
+  return Status::Ok();
+}
+
+Status ValidatePixels(const RunImageHeader& header, const RunPayload& runs, std::size_t first, std::size_t count) {
+  if (!ColoursAreValid(header.color, runs.rgba(first, count))) return BadColour(header.color);
+  if (HasDepth(header.format) && !AllFinite(runs.depth(first, count))) return DepthNotFinite();
+  return Status::Ok();
+}
+
+Status ValidateRuns(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame) {
+  if (Status status = ValidateRunTable(header, payload, frame); !status.ok()) return status;
+  return ValidatePixels(header, RunPayload(header, payload), 0, header.pixel_count);
 }
 
 LocalImage DecodeRuns(const RunImageHeader& header, std::span<const std::byte> payload) {
@@ -298,7 +292,7 @@ LocalImage DecodeRuns(const RunImageHeader& header, std::span<const std::byte> p
 }
 
 Result<LocalImage> ReadRuns(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame) {
-  if (Status status = ValidateTable(header, payload, frame); !status.ok()) return status;
+  if (Status status = ValidateRunTable(header, payload, frame); !status.ok()) return status;
   const RunPayload runs(header, payload);
   std::atomic<bool> colours_valid = true, depth_finite = true;
   LocalImage image = Decode(header, runs, [&](std::size_t first, std::size_t count) {

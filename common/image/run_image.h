@@ -6,6 +6,7 @@
 //   pixel_count * 4 * RGBA: f32, or as `color` says (u16)
 //   formats with depths: pixel_count * f32 depth
 //   formats with voxels: pixel_count * u32 voxel
+// Dense: run_count == 0, and pixels; the payload has no runs, and all pixels of the bounds, row by row.
 // Empty: depth == +infinity; where the format has no depths, alpha == 0 (colour is then 0 too).
 #pragma once
 
@@ -35,6 +36,7 @@ struct RunImageHeader {
   friend bool operator==(const RunImageHeader&, const RunImageHeader&) = default;
 };
 
+constexpr bool IsDense(const RunImageHeader& header) { return header.run_count == 0 && header.pixel_count > 0; }
 std::size_t PayloadBytes(const RunImageHeader& header);
 
 struct RunImage {
@@ -50,8 +52,13 @@ RunImage EncodeRuns(const LocalImage& image, PixelRange range, std::int32_t fram
 RunImage EncodePicture(const LocalImage& image);
 
 // InvalidArgument unless header and payload agree, runs ascend without touching, stay inside the bounds, and no pixel is NaN. After this
-// check DecodeRuns and CombineRuns may trust the image. `frame` is the frame's whole rectangle.
+// check DecodeRuns may trust the image. `frame` is the frame's whole rectangle.
 Status ValidateRuns(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame);
+
+// What it says of the header alone: that the image fits its frame, and so how much memory it may take.
+Status ValidateRunHeader(const RunImageHeader& header, const PixelBounds& frame);
+// The same but for the values of pixels, which whoever reads them checks then (ValidatePixels).
+Status ValidateRunTable(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame);
 
 // Dense form. The image must be valid. Rows are decoded in parallel, within the caller's task arena.
 LocalImage DecodeRuns(const RunImageHeader& header, std::span<const std::byte> payload);

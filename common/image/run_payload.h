@@ -1,5 +1,5 @@
 // RunPayload: reads the payload of a run image whose header fits it (run_image.h has the layout). Payload bytes arrive in message buffers
-// of any alignment, so everything is copied out, never pointed into.
+// of any alignment: they are copied out, unless AreFloats says that they may be read where they are.
 #pragma once
 
 #include <algorithm>
@@ -28,14 +28,18 @@ class RunPayload {
  public:
   // payload.size() is PayloadBytes(header).
   RunPayload(const RunImageHeader& header, std::span<const std::byte> payload)
-      : color_(header.color),
+      : dense_width_(IsDense(header) ? std::uint32_t(header.bounds.width()) : 0),
+        run_count_(dense_width_ > 0 ? std::uint32_t(header.bounds.height()) : header.run_count),
+        color_(header.color),
         color_bytes_(4 * BytesPerChannel(header.color)),
         runs_(payload.data()),
         rgba_(runs_ + sizeof(Run) * header.run_count),
         depth_(rgba_ + color_bytes_ * header.pixel_count),
         voxel_(depth_ + sizeof(float) * header.pixel_count) {}
 
+  std::uint32_t run_count() const { return run_count_; }  // of a dense image its rows
   Run ReadRun(std::size_t index) const {
+    if (dense_width_ > 0) return {std::uint32_t(index), 0, dense_width_};
     Run run;
     std::memcpy(&run, runs_ + sizeof(Run) * index, sizeof(Run));
     return run;
@@ -47,6 +51,11 @@ class RunPayload {
   std::span<const std::byte> depth(std::size_t first, std::size_t count) const {
     return {depth_ + sizeof(float) * first, sizeof(float) * count};
   }
+  std::span<const std::byte> voxel(std::size_t first, std::size_t count) const {
+    return {voxel_ + sizeof(std::uint32_t) * first, sizeof(std::uint32_t) * count};
+  }
+  // Whether colours and depths lie there as floats, voxels as words.
+  bool AreFloats() const { return color_ == ColorCoding::kFloat32 && reinterpret_cast<std::uintptr_t>(runs_) % alignof(float) == 0; }
   void ReadRgba(std::size_t first, std::size_t count, float* out) const {
     const std::byte* const source = rgba_ + color_bytes_ * first;
     if (color_ == ColorCoding::kFloat32) {
@@ -69,6 +78,8 @@ class RunPayload {
   }
 
  private:
+  const std::uint32_t dense_width_;  // 0: the payload has runs
+  const std::uint32_t run_count_;
   const ColorCoding color_;
   const std::size_t color_bytes_;  // a pixel
   const std::byte* runs_;
@@ -76,5 +87,8 @@ class RunPayload {
   const std::byte* depth_;  // formats with depths only
   const std::byte* voxel_;  // formats with voxels only
 };
+
+// What ValidateRuns says of pixels [first, first + count) of all runs.
+Status ValidatePixels(const RunImageHeader& header, const RunPayload& runs, std::size_t first, std::size_t count);
 
 }  // namespace slabstream

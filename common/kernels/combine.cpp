@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/base/check.h"
+#include "common/image/finite.h"
 #include "common/image/run_payload.h"
 
 namespace slabstream {
@@ -95,6 +96,14 @@ RowPixels RowOf(const ImageView& view, std::int32_t y, std::int32_t x_begin) {
   return {At(view, std::size_t(y - view.bounds.y_begin) * view.stride + row.begin), {offset + row.begin, offset + row.end}};
 }
 
+// Pixels [first, first + count) of all runs, which are floats where they may be read as such.
+SourcePixels InPlace(const RunImageHeader& header, const RunPayload& runs, std::size_t first, std::size_t count) {
+  const auto* const rgba = reinterpret_cast<const float*>(runs.rgba(first, count).data());
+  if (!HasDepth(header.format)) return {rgba, nullptr, nullptr};
+  return {rgba, reinterpret_cast<const float*>(runs.depth(first, count).data()),
+          reinterpret_cast<const std::uint32_t*>(runs.voxel(first, count).data())};
+}
+
 ColumnSpan AsSpan(const Stretch& columns) { return {std::uint32_t(columns.begin), std::uint32_t(columns.end)}; }
 
 // Adds `theirs` to row y of an image that has room for it.
@@ -112,21 +121,18 @@ void MergeInPlace(LocalImage& image, std::int32_t y, const RowPixels& theirs, Si
   if (span != nullptr) *span = AsSpan(Hull(columns, theirs.columns));
 }
 
-}  // namespace
-
-void Combine(LocalImage& image, const LocalImage& other, Side side) {
-  Combine(image, ViewOf(other), side, Union(image.bounds, other.bounds));
-  FillRows(image);
-}
-
-void Combine(LocalImage& image, const ImageView& other, Side side, const PixelBounds& room) {
+// Combine; go_on(y, columns) after each row that `other` has pixels of, with the image's columns of them. False: so did go_on say.
+template <class GoOn>
+bool CombineRows(LocalImage& image, const ImageView& other, Side side, const PixelBounds& room, GoOn&& go_on) {
   CHECK_EQ(int(image.format), int(other.format));
-  if (other.bounds.empty()) return;
+  if (other.bounds.empty()) return true;
   if (image.bounds.Contains(other.bounds)) {
     for (std::int32_t y = other.bounds.y_begin; y < other.bounds.y_end; ++y) {
-      MergeInPlace(image, y, RowOf(other, y, image.bounds.x_begin), side);
+      const RowPixels theirs = RowOf(other, y, image.bounds.x_begin);
+      MergeInPlace(image, y, theirs, side);
+      if (!go_on(y, theirs.columns)) return false;
     }
-    return;
+    return true;
   }
   const LocalImage old = std::move(image);
   const ImageView ours = ViewOf(old);
@@ -137,7 +143,29 @@ void Combine(LocalImage& image, const ImageView& other, Side side, const PixelBo
     const RowPixels a = RowOf(ours, y, room.x_begin), b = RowOf(other, y, room.x_begin);
     MergeRow(a, b, side, image, IndexOf(room, room.x_begin, y), false);
     image.rows[std::size_t(y - room.y_begin)] = AsSpan(Hull(a.columns, b.columns));
+    if (!go_on(y, b.columns)) return false;
   }
+  return true;
+}
+
+}  // namespace
+
+void Combine(LocalImage& image, const LocalImage& other, Side side) {
+  Combine(image, ViewOf(other), side, Union(image.bounds, other.bounds));
+  FillRows(image);
+}
+
+void Combine(LocalImage& image, const ImageView& other, Side side, const PixelBounds& room) {
+  (void)CombineRows(image, other, side, room, [](std::int32_t, const Stretch&) { return true; });
+}
+
+bool CombineUnchecked(LocalImage& image, const ImageView& other, Side side, const PixelBounds& room) {
+  // What was written, not what was read: it cannot change any more. An operand that is not finite never gives a finite sum or product.
+  return CombineRows(image, other, side, room, [&image](std::int32_t y, const Stretch& columns) {
+    const std::size_t first = IndexOf(image.bounds, image.bounds.x_begin, y) + columns.begin, count = columns.end - columns.begin;
+    if (!AllFinite(std::as_bytes(std::span(image.rgba).subspan(4 * first, 4 * count)))) return false;
+    return image.format == PixelFormat::kRgba || AllDepths(std::span(image.depth).subspan(first, count));
+  });
 }
 
 void Erase(LocalImage& image, PixelRange pixels, std::int32_t frame_width) {
@@ -164,32 +192,42 @@ void Erase(LocalImage& image, PixelRange pixels, std::int32_t frame_width) {
   }
 }
 
-void CombineRuns(LocalImage& image, const RunImageHeader& header, std::span<const std::byte> payload, Side side, const PixelBounds& room) {
+Status CombineRuns(LocalImage& image, const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame, Side side,
+                   const PixelBounds& room) {
   CHECK_EQ(int(image.format), int(header.format));
-  if (header.run_count == 0) return;
+  if (Status table = ValidateRunTable(header, payload, frame); !table.ok()) return table;
+  if (header.pixel_count == 0) return Status::Ok();
   if (!image.bounds.Contains(header.bounds)) {  // room for all first
     LocalImage nothing = MakeUnwrittenImage(header.format, header.bounds);
     nothing.rows.resize(std::size_t(header.bounds.height()));
     Combine(image, ViewOf(nothing), side, room);
   }
 
-  // A run is copied to where kernels may read it; it fits the cache.
-  LocalImage scratch = MakeUnwrittenImage(header.format, {0, 0, header.bounds.width(), 1});
-  const TargetPixels pixels = At(scratch, 0);
+  // Where kernels cannot read a run in place it is copied; it fits the cache.
   const RunPayload runs(header, payload);
+  const bool readable = runs.AreFloats();
+  LocalImage scratch = MakeUnwrittenImage(header.format, {0, 0, readable ? 0 : header.bounds.width(), 1});
   std::size_t first = 0;
-  for (std::uint32_t i = 0; i < header.run_count; ++i) {
+  for (std::uint32_t i = 0; i < runs.run_count(); ++i) {
     const Run run = runs.ReadRun(i);
-    runs.ReadRgba(first, run.pixel_count, pixels.rgba);
-    if (pixels.depth != nullptr) {
-      runs.ReadDepth(first, run.pixel_count, pixels.depth);
-      runs.ReadVoxel(first, run.pixel_count, pixels.voxel);
+    if (Status pixels = ValidatePixels(header, runs, first, run.pixel_count); !pixels.ok()) return pixels;
+    SourcePixels pixels;
+    if (readable) {
+      pixels = InPlace(header, runs, first, run.pixel_count);
+    } else {
+      const TargetPixels copy = At(scratch, 0);
+      runs.ReadRgba(first, run.pixel_count, copy.rgba);
+      if (copy.depth != nullptr) {
+        runs.ReadDepth(first, run.pixel_count, copy.depth);
+        runs.ReadVoxel(first, run.pixel_count, copy.voxel);
+      }
+      pixels = {copy.rgba, copy.depth, copy.voxel};
     }
     const auto column = std::size_t(header.bounds.x_begin - image.bounds.x_begin) + run.column;
-    MergeInPlace(image, header.bounds.y_begin + std::int32_t(run.row),
-                 {{pixels.rgba, pixels.depth, pixels.voxel}, {column, column + run.pixel_count}}, side);
+    MergeInPlace(image, header.bounds.y_begin + std::int32_t(run.row), {pixels, {column, column + run.pixel_count}}, side);
     first += run.pixel_count;
   }
+  return Status::Ok();
 }
 
 }  // namespace slabstream

@@ -26,7 +26,13 @@ enum class Side : std::uint8_t { kFront, kBack };  // where the second image lie
 // Combine(b, a, kFront). Where the bounds must grow they become `room`, which holds both: room for all that is still to come saves growing
 // again, and costs nothing, since what is empty is not written (LocalImage::rows).
 void Combine(LocalImage& image, const ImageView& other, Side side, const PixelBounds& room);
-void CombineRuns(LocalImage& image, const RunImageHeader& header, std::span<const std::byte> payload, Side side, const PixelBounds& room);
+// The same for pixels that nobody has looked at, in memory that another process may even write to meanwhile. False: a pixel where `other`
+// has some now is none (its colour is not finite, or its depth is NaN or -infinity); `image` is then worth nothing.
+[[nodiscard]] bool CombineUnchecked(LocalImage& image, const ImageView& other, Side side, const PixelBounds& room);
+// With runs that come from outside: checked as by ValidateRuns, while they are in the cache for combining. After an error `image` may hold
+// some of them.
+Status CombineRuns(LocalImage& image, const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame, Side side,
+                   const PixelBounds& room);
 // On the union of both bounds, all pixels stored.
 void Combine(LocalImage& image, const LocalImage& other, Side side);
 

@@ -45,6 +45,7 @@ constexpr auto kMembers =
                Member{"ChunkRefused", Envelope::kChunkRefused, &Envelope::chunk_refused, &Envelope::mutable_chunk_refused},
                Member{"PartialImage", Envelope::kPartialImage, &Envelope::partial_image, &Envelope::mutable_partial_image},
                Member{"ImageRefused", Envelope::kImageRefused, &Envelope::image_refused, &Envelope::mutable_image_refused},
+               Member{"ImageReceived", Envelope::kImageReceived, &Envelope::image_received, &Envelope::mutable_image_received},
                Member{"SubmitFrame", Envelope::kSubmitFrame, &Envelope::submit_frame, &Envelope::mutable_submit_frame},
                Member{"FrameProgress", Envelope::kFrameProgress, &Envelope::frame_progress, &Envelope::mutable_frame_progress},
                Member{"FrameReply", Envelope::kFrameReply, &Envelope::frame_reply, &Envelope::mutable_frame_reply},
@@ -100,7 +101,8 @@ Status Parse(std::span<const std::byte> header, Envelope& envelope) {
 std::size_t PayloadBytesOf(const FrameImage& message) { return message.runs.encoded_bytes; }
 std::size_t PayloadBytesOf(const FrameReply& message) { return message.runs.encoded_bytes; }
 std::size_t PayloadBytesOf(const PartialImage& message) {
-  return message.shared ? sizeof(ColumnSpan) * message.shared->rows() : PayloadBytes(message.image);
+  if (message.shared) return sizeof(ColumnSpan) * message.shared->rows();
+  return message.packed ? message.packed->bytes : PayloadBytes(message.image);
 }
 std::size_t PayloadBytesOf(const Chunk& message) { return message.encoded_bytes; }
 template <class Message>

@@ -23,9 +23,10 @@ namespace slabstream {
 inline constexpr std::uint32_t kWireVersion = 1;
 inline constexpr std::size_t kMaxHeaderBytes = std::size_t{64} << 20;
 
-using AnyMessage = std::variant<Register, Welcome, Heartbeat, Ping, GroupAssignment, GroupDone, FrameImage, WorkerTrouble, Leave, Retire,
-                                Stop, ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused, SubmitFrame, FrameProgress, FrameReply,
-                                FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery, StatusReply, ShutDown, ShutDownReply>;
+using AnyMessage =
+    std::variant<Register, Welcome, Heartbeat, Ping, GroupAssignment, GroupDone, FrameImage, WorkerTrouble, Leave, Retire, Stop,
+                 ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused, ImageReceived, SubmitFrame, FrameProgress, FrameReply,
+                 FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery, StatusReply, ShutDown, ShutDownReply>;
 
 std::vector<std::byte> Encode(const AnyMessage& message);
 

@@ -47,6 +47,29 @@ FrameProgress FromProto(const v1::FrameProgress& in, Checker& check) {
   return out;
 }
 
+// Of seconds, and of the imbalance.
+constexpr double kMaxPredicted = 1e9;
+
+v1::FramePrediction ToProto(const FramePrediction& in) {
+  v1::FramePrediction out;
+  out.set_render_seconds(in.render_seconds);
+  out.set_combine_seconds(in.combine_seconds);
+  out.set_finish_seconds(in.finish_seconds);
+  out.set_latency_seconds(in.latency_seconds);
+  out.set_imbalance(in.imbalance);
+  return out;
+}
+
+FramePrediction FromProto(const v1::FramePrediction& in, Checker& check) {
+  FramePrediction out;
+  out.render_seconds = check.Between("render_seconds", in.render_seconds(), 0, kMaxPredicted);
+  out.combine_seconds = check.Between("combine_seconds", in.combine_seconds(), 0, kMaxPredicted);
+  out.finish_seconds = check.Between("finish_seconds", in.finish_seconds(), 0, kMaxPredicted);
+  out.latency_seconds = check.Between("latency_seconds", in.latency_seconds(), 0, kMaxPredicted);
+  out.imbalance = check.Between("imbalance", in.imbalance(), 1, kMaxPredicted);
+  return out;
+}
+
 v1::FrameStatistics ToProto(const FrameStatistics& in) {
   v1::FrameStatistics out;
   out.set_workers(in.workers);
@@ -64,6 +87,7 @@ v1::FrameStatistics ToProto(const FrameStatistics& in) {
   WriteAll(in.reports, out.mutable_reports());
   out.set_display(in.display);
   *out.mutable_grid() = ToProto(in.grid);
+  if (in.predicted) *out.mutable_predicted() = ToProto(*in.predicted);
   return out;
 }
 
@@ -84,6 +108,7 @@ FrameStatistics FromProto(const v1::FrameStatistics& in, Checker& check) {
   out.reports = ReadAll("reports", in.reports(), kMaxReports, check);
   out.display = in.display();
   out.grid = FromProto(in.grid(), check);
+  if (in.has_predicted()) out.predicted = Read("predicted", in.predicted(), check);
   return out;
 }
 

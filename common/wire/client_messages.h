@@ -13,10 +13,12 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/planning/frame_request.h"
+#include "common/stats/prediction.h"
 #include "common/wire/control_messages.h"
 #include "common/wire/ids.h"
 
@@ -54,6 +56,7 @@ struct FrameStatistics {
   std::vector<RankReport> reports;                                       // at most kMaxReports
   std::uint32_t display = 0;                                             // worker
   PixelBounds grid;                                                      // of the frame that was rendered and combined (FrameBounds)
+  std::optional<FramePrediction> predicted;                              // where the policy left a choice
   friend bool operator==(const FrameStatistics&, const FrameStatistics&) = default;
 };
 

@@ -145,6 +145,10 @@ v1::SharedImage ToProto(const SharedImage& in);
 SharedImage FromProto(const v1::SharedImage& in, Checker& check);
 v1::SharedBlock ToProto(const BlockName& in);
 BlockName FromProto(const v1::SharedBlock& in, Checker& check);
+v1::PackedRuns ToProto(const PackedRuns& in);
+PackedRuns FromProto(const v1::PackedRuns& in, Checker& check);
+v1::ImageReceived ToProto(const ImageReceived& in);
+ImageReceived FromProto(const v1::ImageReceived& in, Checker& check);
 v1::ImageRefused ToProto(const ImageRefused& in);
 ImageRefused FromProto(const v1::ImageRefused& in, Checker& check);
 

@@ -47,6 +47,23 @@ BlockName FromProto(const v1::SharedBlock& in, Checker& check) {
           .slot = check.Range("slot", in.slot(), 0, kArenaSlots - 1)};
 }
 
+v1::PackedRuns ToProto(const PackedRuns& in) {
+  v1::PackedRuns out;
+  out.set_codec(WireEnum<v1::Codec>(in.codec, Codec::kRaw));
+  out.set_bytes(in.bytes);
+  out.set_digest(in.digest);
+  return out;
+}
+
+PackedRuns FromProto(const v1::PackedRuns& in, Checker& check) {
+  PackedRuns out;
+  out.codec = check.OneOf("codec", in.codec(), Codec::kRaw, Codec::kZstd);
+  check.That(out.codec != Codec::kRaw, "codec", "raw, of packed runs");
+  out.bytes = check.Range("bytes", in.bytes(), 1, kMaxRunsBytes - 1);
+  out.digest = in.digest();
+  return out;
+}
+
 v1::PartialImage ToProto(const PartialImage& in) {
   v1::PartialImage out;
   out.set_epoch(in.epoch);
@@ -59,6 +76,8 @@ v1::PartialImage ToProto(const PartialImage& in) {
   *out.mutable_image() = ToProto(in.image);
   WriteAll(in.reports, out.mutable_reports());
   if (in.shared) *out.mutable_shared() = ToProto(*in.shared);
+  if (in.packed) *out.mutable_packed() = ToProto(*in.packed);
+  out.set_acknowledge(in.acknowledge);
   return out;
 }
 
@@ -80,7 +99,15 @@ PartialImage FromProto(const v1::PartialImage& in, Checker& check) {
     const std::size_t planes = out.image.format == PixelFormat::kDepth ? 3 : 1;
     check.That(out.shared->planes.size() == planes, "shared.planes",
                std::to_string(out.shared->planes.size()) + " of " + std::to_string(planes));
+    check.That(!in.has_packed(), "packed", "beside a shared image");
   }
+  if (in.has_packed()) {
+    out.packed = Read("packed", in.packed(), check);
+    const std::uint64_t raw = PayloadBytes(out.image);
+    check.That(out.packed->bytes < raw, "packed.bytes",
+               std::to_string(out.packed->bytes) + " are not less than the " + std::to_string(raw) + " of the runs");
+  }
+  out.acknowledge = in.acknowledge();
   return out;
 }
 
@@ -92,6 +119,20 @@ v1::ImageRefused ToProto(const ImageRefused& in) {
   out.set_step(in.step);
   *out.mutable_pixels() = ToProto(in.pixels);
   return out;
+}
+
+v1::ImageReceived ToProto(const ImageReceived& in) {
+  v1::ImageReceived out;
+  out.set_epoch(in.epoch);
+  out.set_from_worker(in.from_worker);
+  out.set_number(in.number);
+  return out;
+}
+
+ImageReceived FromProto(const v1::ImageReceived& in, Checker& check) {
+  return {.epoch = in.epoch(),
+          .from_worker = in.from_worker(),
+          .number = check.Range("number", in.number(), 1, std::numeric_limits<std::uint64_t>::max())};
 }
 
 ImageRefused FromProto(const v1::ImageRefused& in, Checker& check) {

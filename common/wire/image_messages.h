@@ -12,8 +12,6 @@
 
 namespace slabstream {
 
-// One step of a group's schedule, carried out; or, with step == number of steps, the whole group image on its way from the root to the
-// display worker. Payload: the runs, always Codec::kRaw; of a shared image the ColumnSpan of each row of its bounds.
 // Pixels that stay in the sender's memory.
 struct SharedImage {
   ArenaName arena;
@@ -25,6 +23,19 @@ struct SharedImage {
   friend bool operator==(const SharedImage&, const SharedImage&) = default;
 };
 
+// How the payload of an image's runs is packed.
+struct PackedRuns {
+  Codec codec = Codec::kZstd;  // not kRaw
+  std::uint64_t bytes = 1;     // of the payload, [1, PayloadBytes(image))
+  std::uint64_t digest = 0;    // XXH3-64 of the payload
+  friend bool operator==(const PackedRuns&, const PackedRuns&) = default;
+};
+
+// Payloads with fewer bytes are not acknowledged: they say more of a link's latency than of its rate.
+inline constexpr std::size_t kLeastAcknowledgedBytes = std::size_t{64} << 10;
+
+// One step of a group's schedule, carried out; or, with step == number of steps, the whole group image on its way from the root to the
+// display worker. Payload: the runs, as they are unless `packed`; of a shared image the ColumnSpan of each row of its bounds.
 struct PartialImage {
   Epoch epoch = 0;
   WorkerId from_worker = 0;
@@ -34,8 +45,18 @@ struct PartialImage {
   PixelRange pixels;       // of the frame, as in the step
   RunImageHeader image;    // of a shared image the format alone
   std::optional<SharedImage> shared;
-  std::vector<RankReport> reports;  // of the ranks in `interval` that have not been passed on yet
+  std::optional<PackedRuns> packed;  // not of a shared image
+  std::uint64_t acknowledge = 0;     // not 0: the sender waits for ImageReceived with this number
+  std::vector<RankReport> reports;   // of the ranks in `interval` that have not been passed on yet
   friend bool operator==(const PartialImage&, const PartialImage&) = default;
+};
+
+// To the sender of an image that asked for it (`acknowledge`): it is here.
+struct ImageReceived {
+  Epoch epoch = 0;
+  WorkerId from_worker = 0;
+  std::uint64_t number = 1;  // not 0
+  friend bool operator==(const ImageReceived&, const ImageReceived&) = default;
 };
 
 // To the sender of a shared image: it cannot be read here; these pixels, and all others from now on, are to come as runs.

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "common/base/check.h"
 #include "common/image/run_image.h"
@@ -18,32 +17,41 @@ constexpr int kZstdLevel = 1;
 constexpr std::size_t kWordBytes = 4;
 
 // All first bytes of the words, then all second ones, and so on. bytes.size() is a multiple of kWordBytes.
-std::vector<std::byte> GroupBySignificance(std::span<const std::byte> bytes) {
+PooledVector<std::byte> GroupBySignificance(std::span<const std::byte> bytes) {
   const std::size_t words = bytes.size() / kWordBytes;
-  std::vector<std::byte> grouped(bytes.size());
-  for (std::size_t word = 0; word < words; ++word) {
-    for (std::size_t i = 0; i < kWordBytes; ++i) grouped[i * words + word] = bytes[word * kWordBytes + i];
+  PooledVector<std::byte> grouped(bytes.size());
+  const std::byte* __restrict in = bytes.data();
+  std::byte* __restrict out = grouped.data();
+  for (std::size_t word = 0; word < words; ++word) {  // the compiler makes vectors of it
+    out[word] = in[kWordBytes * word];
+    out[words + word] = in[kWordBytes * word + 1];
+    out[2 * words + word] = in[kWordBytes * word + 2];
+    out[3 * words + word] = in[kWordBytes * word + 3];
   }
   return grouped;
 }
 
-std::vector<std::byte> UngroupBySignificance(std::span<const std::byte> grouped) {
+PooledVector<std::byte> UngroupBySignificance(std::span<const std::byte> grouped) {
   const std::size_t words = grouped.size() / kWordBytes;
-  std::vector<std::byte> bytes(grouped.size());
+  PooledVector<std::byte> bytes(grouped.size());
+  const std::byte* __restrict in = grouped.data();
+  std::byte* __restrict out = bytes.data();
   for (std::size_t word = 0; word < words; ++word) {
-    for (std::size_t i = 0; i < kWordBytes; ++i) bytes[word * kWordBytes + i] = grouped[i * words + word];
+    out[kWordBytes * word] = in[word];
+    out[kWordBytes * word + 1] = in[words + word];
+    out[kWordBytes * word + 2] = in[2 * words + word];
+    out[kWordBytes * word + 3] = in[3 * words + word];
   }
   return bytes;
 }
 
 // Empty if the bytes do not get smaller.
-std::vector<std::byte> Compress(std::span<const std::byte> bytes) {
+PooledVector<std::byte> Compress(std::span<const std::byte> bytes) {
   if (bytes.empty()) return {};
-  std::vector<std::byte> packed(bytes.size() - 1);
+  PooledVector<std::byte> packed(bytes.size() - 1);
   const std::size_t size = ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), kZstdLevel);
   if (ZSTD_isError(size)) return {};  // the room did not suffice
   packed.resize(size);
-  packed.shrink_to_fit();
   return packed;
 }
 
@@ -79,13 +87,21 @@ Status CheckDigest(std::span<const std::byte> bytes, std::uint64_t expected) {
   return Status::DataLoss("payload: digest " + std::to_string(met) + ", the header says " + std::to_string(expected));
 }
 
+// A zstd frame of grouped words. Memory is taken when the frame's size is what it should be.
+Result<Bytes> UnpackGrouped(std::span<const std::byte> packed, std::size_t expected) {
+  if (Status status = CheckContentSize(packed, expected); !status.ok()) return status;
+  PooledVector<std::byte> grouped(expected);
+  if (Status status = Decompress(packed, grouped); !status.ok()) return status;
+  return Bytes(UngroupBySignificance(grouped));
+}
+
 }  // namespace
 
 Bytes PackRuns(Bytes payload, Codec codec, EncodedRuns& runs) {
   CHECK_EQ(payload.size(), PayloadBytes(runs.image));
   runs.codec = Codec::kRaw;
   if (codec == Codec::kZstd) {
-    if (std::vector<std::byte> packed = Compress(GroupBySignificance(payload.span())); !packed.empty()) {
+    if (PooledVector<std::byte> packed = Compress(GroupBySignificance(payload.span())); !packed.empty()) {
       runs.codec = Codec::kZstd;
       payload = Bytes(std::move(packed));
     }
@@ -103,10 +119,20 @@ Result<Bytes> UnpackRuns(const EncodedRuns& runs, const Bytes& payload) {
     if (Status status = CheckLength(payload.size(), expected); !status.ok()) return status;
     return payload;
   }
-  if (Status status = CheckContentSize(payload.span(), expected); !status.ok()) return status;
-  std::vector<std::byte> grouped(expected);
-  if (Status status = Decompress(payload.span(), grouped); !status.ok()) return status;
-  return Bytes(UngroupBySignificance(grouped));
+  return UnpackGrouped(payload.span(), expected);
+}
+
+std::optional<Bytes> PackRuns(std::span<const std::byte> payload, PackedRuns& packed) {
+  PooledVector<std::byte> bytes = Compress(GroupBySignificance(payload));
+  if (bytes.empty()) return std::nullopt;
+  packed = {Codec::kZstd, bytes.size(), Digest(bytes)};
+  return Bytes(std::move(bytes));
+}
+
+Result<Bytes> UnpackRuns(const PackedRuns& packed, const Bytes& payload, std::size_t raw_bytes) {
+  if (Status status = CheckLength(payload.size(), packed.bytes); !status.ok()) return status;
+  if (Status status = CheckDigest(payload.span(), packed.digest); !status.ok()) return status;
+  return UnpackGrouped(payload.span(), raw_bytes);
 }
 
 Bytes PackChunk(Bytes samples, Codec codec, Chunk& chunk) {
@@ -115,7 +141,7 @@ Bytes PackChunk(Bytes samples, Codec codec, Chunk& chunk) {
   chunk.digest = Digest(samples.span());
   chunk.codec = Codec::kRaw;
   if (codec == Codec::kZstd) {
-    if (std::vector<std::byte> packed = Compress(samples.span()); !packed.empty()) {
+    if (PooledVector<std::byte> packed = Compress(samples.span()); !packed.empty()) {
       chunk.codec = Codec::kZstd;
       samples = Bytes(std::move(packed));
     }

@@ -7,11 +7,13 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 
 #include "common/base/bytes.h"
 #include "common/base/status.h"
 #include "common/wire/control_messages.h"
+#include "common/wire/image_messages.h"
 #include "common/wire/slab_messages.h"
 
 namespace slabstream {
@@ -24,6 +26,12 @@ Bytes PackRuns(Bytes payload, Codec codec, EncodedRuns& runs);
 // The runs' payload of PayloadBytes(runs.image) bytes. `runs` has come through Decode. DataLoss naming both values: the payload's length,
 // its digest or its unpacked length is not what `runs` says, or zstd cannot read it. What the runs hold is for ValidateRuns to check.
 Result<Bytes> UnpackRuns(const EncodedRuns& runs, const Bytes& payload);
+
+// The same between workers: packs with zstd what `payload` holds, PayloadBytes of some image. None: that does not get smaller.
+std::optional<Bytes> PackRuns(std::span<const std::byte> payload, PackedRuns& packed);
+
+// `raw_bytes`, PayloadBytes of the image, are taken: whoever calls has found that the image fits its frame. DataLoss as above.
+Result<Bytes> UnpackRuns(const PackedRuns& packed, const Bytes& payload, std::size_t raw_bytes);
 
 // Packs the samples of one chunk, 1 ... kChunkBytes bytes. Fills codec, raw_bytes, encoded_bytes and digest of `chunk`.
 Bytes PackChunk(Bytes samples, Codec codec, Chunk& chunk);

@@ -144,6 +144,7 @@ v1::Policy ToProto(const Policy& in) {
   out.set_assignment(WireText(in.assignment, kMaxNameBytes));
   out.set_balance(WireText(in.balance, kMaxNameBytes));
   out.set_pixel_error(in.pixel_error);
+  out.set_teams(static_cast<std::uint32_t>(in.teams));
   return out;
 }
 
@@ -157,6 +158,7 @@ Policy FromProto(const v1::Policy& in, Checker& check) {
   out.assignment = check.Text("assignment", in.assignment(), 1, kMaxNameBytes);
   out.balance = check.Text("balance", in.balance(), 1, kMaxNameBytes);
   out.pixel_error = check.Between("pixel_error", in.pixel_error(), 0, kMaxPixelError);
+  out.teams = static_cast<int>(check.Range("teams", in.teams(), 1, kMaxTeams));
   return out;
 }
 

@@ -187,7 +187,8 @@ RunImageHeader FromProto(const v1::RunImageHeader& in, Checker& check) {
   out.bounds = Read("bounds", in.bounds(), check);
   // At most kMaxFramePixels pixels and 2^32 runs: the payload's length cannot overflow.
   out.pixel_count = check.Range("pixel_count", in.pixel_count(), 0, static_cast<std::uint64_t>(out.bounds.pixel_count()));
-  out.run_count = check.Range("run_count", in.run_count(), out.pixel_count == 0 ? 0 : 1, out.pixel_count);
+  const bool may_be_dense = out.pixel_count == static_cast<std::uint64_t>(out.bounds.pixel_count());
+  out.run_count = check.Range("run_count", in.run_count(), may_be_dense || out.pixel_count == 0 ? 0 : 1, out.pixel_count);
   if (const std::uint64_t bytes = PayloadBytes(out); bytes > kMaxRunsBytes) {
     check.Fail("pixel_count", "a payload of " + std::to_string(bytes) + " bytes, at most " + std::to_string(kMaxRunsBytes));
   }
@@ -209,6 +210,7 @@ EncodedRuns FromProto(const v1::EncodedRuns& in, Checker& check) {
   EncodedRuns out;
   out.image = Read("image", in.image(), check);
   check.That(out.image.color == ColorCoding::kFloat32, "image.color", "not floats, to a client");
+  check.That(!IsDense(out.image), "image.run_count", "0, of a picture with pixels");
   out.codec = CodecFromProto(in.codec(), check);
   const std::uint64_t raw_bytes = PayloadBytes(out.image);
   out.encoded_bytes = check.Range("encoded_bytes", in.encoded_bytes(), out.codec == Codec::kRaw ? raw_bytes : 1, raw_bytes);

@@ -12,7 +12,7 @@ SlabData::~SlabData() = default;
 const VoxelBlock& SlabData::voxels() const {
   if (bricks_) {
     block_ = MakeVoxelBlock(bricks_->grid().box, bricks_->type());
-    bricks_->Read(block_.box, 0, block_.bytes);
+    bricks().Read(block_.box, 0, block_.bytes);
     bricks_.reset();
   }
   return block_;
