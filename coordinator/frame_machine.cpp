@@ -6,6 +6,9 @@
 #include <optional>
 #include <utility>
 
+#include "common/planning/policy_names.h"
+#include "common/planning/render_work.h"
+#include "common/planning/team.h"
 #include "coordinator/frame_machine_state.h"
 
 namespace slabstream {
@@ -34,10 +37,7 @@ void FrameMachine::State::On(const OccupiedCounted& event) {
   if (event.grid.ok()) {
     occupancy.Counted(event.count, *event.grid);
   } else if (const std::optional<OccupancyTable::Subject> failed = occupancy.Failed(event.count)) {
-    const auto waits = [&](const OpenRequest& request) {
-      return request.counted_under != nullptr && *request.counted_under == failed->transfer &&
-             datasets.Find(request.submit.frame.dataset)->id == failed->dataset;
-    };
+    const auto waits = [&](const OpenRequest& request) { return request.counted != nullptr && *request.counted == *failed; };
     for (const OpenRequest& request : queue.Extract(waits)) FailRequest(request, event.grid.status());
   }
 }
@@ -48,23 +48,24 @@ void FrameMachine::State::FindOutCount(OpenRequest& request) const {
   const DatasetTable::Entry& dataset = *datasets.Find(frame.dataset);
   if (dataset.state != DatasetState::kReady || !CheckNames(frame.policy).ok() || !NeedsOccupancy(frame.policy)) return;
   Result<TransferFunction> transfer = ResolveTransfer(frame.transfer, *dataset.summary);
-  if (transfer.ok()) request.counted_under = std::make_shared<const TransferFunction>(*std::move(transfer));
+  if (!transfer.ok()) return;
+  request.counted =
+      std::make_shared<const OccupancyTable::Subject>(OccupancyTable::Subject{dataset.id, *std::move(transfer), frame.renderer});
 }
 
 // For the next requests in turn. Those behind them wait, so that no grid is dropped before it was used.
 void FrameMachine::State::CountAhead() {
   std::size_t ahead = 0;
   queue.ForEach([&](const OpenRequest& request) {
-    if (request.counted_under == nullptr || ahead == kCountAhead) return;
+    if (request.counted == nullptr || ahead == kCountAhead) return;
     ++ahead;
-    const DatasetTable::Entry& dataset = *datasets.Find(request.submit.frame.dataset);
-    const TransferFunction& transfer = *request.counted_under;
-    if (occupancy.Counting(dataset.id, transfer) || occupancy.Find(dataset.id, transfer) != nullptr) return;
-    const VolumeSummary& summary = *dataset.summary;
+    const OccupancyTable::Subject& subject = *request.counted;
+    if (occupancy.Counting(subject) || occupancy.Find(subject) != nullptr) return;
+    const VolumeSummary& summary = *datasets.Find(request.submit.frame.dataset)->summary;
     actions.emplace_back(
-        CountDataset{.count = occupancy.Begin(dataset.id, transfer),
-                     .dataset = dataset.id,
-                     .table = std::make_shared<const ClassificationTable>(Classify(transfer, summary.description, summary.range))});
+        CountDataset{.count = occupancy.Begin(subject),
+                     .dataset = subject.dataset,
+                     .table = std::make_shared<const ClassificationTable>(DrawnTable(subject.transfer, summary, subject.renderer))});
   });
 }
 
@@ -105,7 +106,7 @@ void FrameMachine::State::Expire() {
 
   for (const OpenRequest& request : queue.Extract(out_of_time)) {
     const DatasetTable::Entry& dataset = *datasets.Find(request.submit.frame.dataset);
-    const bool counting = request.counted_under != nullptr && occupancy.Counting(dataset.id, *request.counted_under);
+    const bool counting = request.counted != nullptr && occupancy.Counting(*request.counted);
     FailRequest(request, late(request, dataset.state != DatasetState::kReady ? "its dataset was still being loaded"
                                        : counting                            ? "the occupied voxels of its dataset were still being counted"
                                                                              : "it was still queued"));
@@ -142,10 +143,11 @@ void FrameMachine::State::Advance() {
       SendClient(frame.request().client, frame.Progress());
     }
   }
-  while (frames.unfinished_groups() < std::uint32_t(kGroupWindow)) {
-    if (RunningFrame* frame = frames.NextToHandOut()) {
-      HandOut(*frame);
-    } else if (!frames.HasRoom() || !StartNextFrame()) {
+  while (true) {
+    const FramesInFlight::Choice next = frames.Next(roster.members().size());
+    if (next.step == FramesInFlight::Step::kHandOut) {
+      HandOut(*next.frame);
+    } else if (next.step == FramesInFlight::Step::kWait || !StartNextFrame()) {
       break;
     }
   }
@@ -157,26 +159,30 @@ bool FrameMachine::State::StartNextFrame() {
   CountAhead();
   const auto ready = [&](const OpenRequest& request) {
     const DatasetTable::Entry& dataset = *datasets.Find(request.submit.frame.dataset);
-    return dataset.state == DatasetState::kReady &&
-           (request.counted_under == nullptr || occupancy.Find(dataset.id, *request.counted_under) != nullptr);
+    return dataset.state == DatasetState::kReady && (request.counted == nullptr || occupancy.Find(*request.counted) != nullptr);
   };
   std::optional<OpenRequest> request = queue.TakeNext(ready);
   if (!request) return false;
   const FrameRequest& frame = request->submit.frame;
   const DatasetTable::Entry& dataset = *datasets.Find(frame.dataset);
-  const Roster slots = roster.slots();
+  const Team team = TeamOf(roster.slots(), std::uint32_t(frame.policy.teams), frames.next_id());
+  const Roster& slots = team.roster;
   const Layout* layout = nullptr;
   const Result<TransferFunction> transfer = ResolveTransfer(frame.transfer, *dataset.summary);
   if (transfer.ok() && CheckNames(frame.policy).ok()) {
+    if (Status status = MakeChoice(*request, *transfer, std::uint32_t(slots.slots.size())); !status.ok()) {
+      FailRequest(*request, status);
+      return true;
+    }
     layout = &layouts.Find({.frame = &frame,
                             .dataset = dataset.id,
                             .summary = dataset.summary.get(),
                             .transfer = &*transfer,
-                            .occupied = request->counted_under ? occupancy.Find(dataset.id, *request->counted_under) : nullptr,
+                            .occupied = request->counted ? occupancy.Find(*request->counted) : nullptr,
                             .slots = std::uint32_t(slots.slots.size()),
                             .slab_bytes_target = config.cost.slab_bytes_target});
   }
-  Result<FramePlan> plan = PlanFrame(frame, dataset.id, *dataset.summary, slots, config.cost, layout);
+  Result<FramePlan> plan = PlanFrame(frame, dataset.id, *dataset.summary, slots, config.cost, layout, team.turn);
   if (!plan.ok()) {
     FailRequest(*request, plan.status());
     return true;
@@ -185,6 +191,34 @@ bool FrameMachine::State::StartNextFrame() {
       frames.Add(RunningFrame(frames.next_id(), *std::move(request), std::move(plan).value(), slots, limits, now));
   SendClient(running.request().client, running.Progress());
   return true;
+}
+
+MachineModel FrameMachine::State::DescribeMachine() const {
+  std::vector<HostedWorker> workers;
+  for (const Member& member : roster.members())
+    workers.push_back({member.description.memory_scope, member.description.threads, member.description.pid});
+  return ServiceMachine(workers, config.surroundings);
+}
+
+// Fills in what the request's policy leaves open.
+Status FrameMachine::State::MakeChoice(OpenRequest& request, const TransferFunction& transfer, std::uint32_t slots) {
+  FrameRequest& frame = request.submit.frame;
+  if (!LeavesChoice(frame.policy)) return Status::Ok();
+  const DatasetTable::Entry& dataset = *datasets.Find(frame.dataset);
+  const MachineModel machine = DescribeMachine();
+  Result<ChosenPolicy> chosen = policies.Find({.frame = &frame,
+                                               .dataset = dataset.id,
+                                               .summary = dataset.summary.get(),
+                                               .transfer = &transfer,
+                                               .occupied = request.counted ? occupancy.Find(*request.counted) : nullptr,
+                                               .slots = slots,
+                                               .machine = &machine,
+                                               .cost = &config.cost,
+                                               .layouts = &layouts});
+  if (!chosen.ok()) return chosen.status();
+  frame.policy = chosen->policy;
+  request.chosen = *std::move(chosen);
+  return Status::Ok();
 }
 
 void FrameMachine::State::HandOut(RunningFrame& frame) {

@@ -7,10 +7,11 @@
 //   datasets   loaded at first use; requests wait for it; a failed load fails them
 //   occupancy  where a policy asks for it, occupied voxels are counted once for each dataset and transfer function;
 //              requests wait for that, and a failed count fails them
+//   policies   what a policy leaves open is chosen when its first frame is planned, and kept (PolicyTable)
 //   layouts    stay while views change, and learn from the render times of frames (LayoutTable)
-//   frames     planned when the window has room (PlanFrame); group after group is handed out, never more than kGroupWindow groups
-//   unfinished over all
-//              frames, so group g+1 renders while g combines, across frames too; a frame ends with its FrameImage or with FrameFailed
+//   frames     planned when the window has room (PlanFrame); group after group is handed out, as many as the window allows over all frames,
+//              so that groups render while others combine, across frames too; the display worker changes from frame to frame; a frame ends
+//              with its FrameImage or with FrameFailed
 //   workers    Register gives an id and a slot (a vacant one first); silence, an unreachable peer or Leave takes the worker out, and every
 //   frame that
 //              it had a part in is re-planned over the rest (attempt + 1) from its first unfinished group, or from the first if the display
@@ -36,7 +37,7 @@
 #include "common/base/bytes.h"
 #include "common/base/time.h"
 #include "common/classification/classification_table.h"
-#include "common/planning/frame_window.h"
+#include "common/tuning/service_machine.h"
 #include "common/wire/any_message.h"
 #include "coordinator/occupancy_table.h"
 #include "coordinator/peer_token.h"
@@ -49,6 +50,7 @@ struct CoordinatorConfig {
   std::string slabs_endpoint;
   std::vector<std::string> datasets;  // names of the catalogue
   CostModel cost;
+  ServiceSurroundings surroundings;                     // what policies are chosen for; scope and cores are filled in by the service
   Duration heartbeat = std::chrono::milliseconds(500);  // also the interval of Ping
   Duration worker_timeout = std::chrono::seconds(6);
   Duration client_timeout = std::chrono::seconds(10);

@@ -17,6 +17,7 @@
 #include "coordinator/frame_machine.h"
 #include "coordinator/frames_in_flight.h"
 #include "coordinator/layout_table.h"
+#include "coordinator/policy_table.h"
 #include "coordinator/request_queue.h"
 #include "coordinator/roster.h"
 
@@ -49,6 +50,7 @@ struct FrameMachine::State {
   FramesInFlight frames;
   OccupancyTable occupancy;
   LayoutTable layouts;
+  PolicyTable policies;
   const FrameLimits limits;
 
   Time now;                     // of this Step
@@ -85,10 +87,10 @@ struct FrameMachine::State {
   void OnWorkerMessage(const FromWorker& event, const WorkerTrouble& message);
   void OnWorkerMessage(const FromWorker& event, const Leave& message);
   // What no worker sends here is dropped.
-  template <
-      AnyOf<Welcome, Ping, GroupAssignment, Retire, Stop, ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused, SubmitFrame,
-            FrameProgress, FrameReply, FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery, StatusReply, ShutDown, ShutDownReply>
-          Message>
+  template <AnyOf<Welcome, Ping, GroupAssignment, Retire, Stop, ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused,
+                  ImageReceived, SubmitFrame, FrameProgress, FrameReply, FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery,
+                  StatusReply, ShutDown, ShutDownReply>
+                Message>
   void OnWorkerMessage(const FromWorker&, const Message&) {}
 
   // ---- messages of clients
@@ -98,10 +100,10 @@ struct FrameMachine::State {
   void OnClientMessage(PeerToken client, const StatusQuery& message);
   void OnClientMessage(PeerToken client, const ShutDown& message);
   // What no client sends is dropped.
-  template <
-      AnyOf<Register, Welcome, Heartbeat, Ping, GroupAssignment, GroupDone, FrameImage, WorkerTrouble, Leave, Retire, Stop, ChunkRequest,
-            Chunk, ChunkRefused, PartialImage, ImageRefused, FrameProgress, FrameReply, FrameFailed, ClientPong, StatusReply, ShutDownReply>
-          Message>
+  template <AnyOf<Register, Welcome, Heartbeat, Ping, GroupAssignment, GroupDone, FrameImage, WorkerTrouble, Leave, Retire, Stop,
+                  ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused, ImageReceived, FrameProgress, FrameReply, FrameFailed,
+                  ClientPong, StatusReply, ShutDownReply>
+                Message>
   void OnClientMessage(PeerToken, const Message&) {}
 
   // ---- requests
@@ -119,6 +121,8 @@ struct FrameMachine::State {
   void FindOutCount(OpenRequest& request) const;
   void CountAhead();
   bool StartNextFrame();
+  MachineModel DescribeMachine() const;
+  Status MakeChoice(OpenRequest& request, const TransferFunction& transfer, std::uint32_t slots);
   void HandOut(RunningFrame& frame);
   void AfterGroupDone(const RunningFrame& frame);
   void EndFrame(FrameId id);

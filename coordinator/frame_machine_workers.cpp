@@ -55,6 +55,7 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const FrameIm
   }
   reply.statistics = frame->Statistics(now);
   layouts.Learn(frame->plan(), request.submit.frame.policy, reply.statistics.reports);
+  if (request.chosen) policies.Learn(frame->plan(), *request.chosen, reply.statistics.reports);
   EndRequest(request.client, request.submit.request, std::move(reply), event.payload);
   ++frames_done;
   EndFrame(message.frame);

@@ -4,11 +4,12 @@
 #include <utility>
 
 #include "common/base/check.h"
+#include "common/planning/frame_occlusion.h"
+#include "common/planning/frame_window.h"
 
 namespace slabstream {
 
 RunningFrame& FramesInFlight::Add(RunningFrame frame) {
-  CHECK(HasRoom());
   CHECK_EQ(frame.id(), next_id());
   last_id_ = frame.id();
   return frames_.emplace_back(std::move(frame));
@@ -31,15 +32,22 @@ RunningFrame* FramesInFlight::FindRequest(PeerToken client, RequestId request) {
   return frame == frames_.end() ? nullptr : &*frame;
 }
 
-std::uint32_t FramesInFlight::unfinished_groups() const {
-  std::uint32_t count = 0;
-  for (const RunningFrame& frame : frames_) count += frame.unfinished_groups();
-  return count;
-}
-
-RunningFrame* FramesInFlight::NextToHandOut() {
-  const auto frame = std::find_if(frames_.begin(), frames_.end(), [](const RunningFrame& f) { return f.CanHandOut(); });
-  return frame == frames_.end() ? nullptr : &*frame;
+FramesInFlight::Choice FramesInFlight::Next(std::size_t workers) {
+  std::int64_t frame_bytes = 0;
+  std::uint32_t unfinished = 0, teams = 1;
+  for (const RunningFrame& frame : frames_) {
+    frame_bytes = std::max(frame_bytes, FrameBytes(frame.plan().setup));
+    unfinished += frame.unfinished_groups();
+    teams = std::max(teams, frame.plan().turn.teams);
+  }
+  const FrameWindow window = WindowFor(workers, teams, frame_bytes);
+  if (unfinished >= std::uint32_t(window.groups)) return {};
+  const auto next = std::find_if(frames_.begin(), frames_.end(), [](const RunningFrame& frame) {
+    const bool masked = UsesOcclusion(frame.plan().setup);
+    return frame.CanHandOut() && (!masked || frame.unfinished_groups() < std::uint32_t(kMaskedGroups));
+  });
+  if (next != frames_.end()) return {Step::kHandOut, &*next};
+  return {frames_.size() < std::size_t(window.frames) ? Step::kStart : Step::kWait};
 }
 
 }  // namespace slabstream

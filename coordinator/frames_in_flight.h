@@ -1,26 +1,30 @@
-// FramesInFlight: the frames that run now, oldest first, and which earlier ones are over. At most kMaxFramesInFlight run, so that the next
-// frame's first group renders while the last one combines.
+// FramesInFlight: the frames that run now, oldest first, and which earlier ones are over. How many may run, and how many of their groups,
+// is the window's matter (common/planning/frame_window.h): Next says what it allows.
 #pragma once
 
 #include <list>
 #include <vector>
 
-#include "common/planning/frame_window.h"
 #include "coordinator/running_frame.h"
 
 namespace slabstream {
 
 class FramesInFlight {
  public:
-  bool HasRoom() const { return frames_.size() < std::size_t(kMaxFramesInFlight); }
   FrameId next_id() const { return last_id_ + 1; }
-  RunningFrame& Add(RunningFrame frame);  // frame.id() == next_id(), HasRoom()
+  RunningFrame& Add(RunningFrame frame);  // frame.id() == next_id()
   void Remove(FrameId id);                // it is over
 
   RunningFrame* Find(FrameId id);                                  // null: not in flight
   RunningFrame* FindRequest(PeerToken client, RequestId request);  // null: not in flight
-  std::uint32_t unfinished_groups() const;                         // of all frames
-  RunningFrame* NextToHandOut();                                   // the oldest frame with a group left; null: none
+
+  enum class Step { kHandOut, kStart, kWait };
+  struct Choice {
+    Step step = Step::kWait;
+    RunningFrame* frame = nullptr;  // kHandOut: the oldest one that may hand out a group
+  };
+  // What `workers` workers should be given next: a group of a frame that runs, another frame, or nothing for now.
+  Choice Next(std::size_t workers);
 
   // What workers may forget: all frames before finished_before(), and cancelled(), the newest kMaxCancelled that are over though their id
   // is larger.

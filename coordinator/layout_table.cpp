@@ -39,10 +39,17 @@ LayoutTable::Learnt* LayoutTable::FindLearnt(DatasetId dataset, const TransferFu
   return &*found;
 }
 
+LayoutTable::Key LayoutTable::KeyOf(DatasetId dataset, const TransferFunction& transfer, RendererKind renderer, const Policy& policy,
+                                    std::uint32_t slots) {
+  Key key{dataset, transfer, renderer, policy, slots};
+  key.policy.combine.clear();
+  key.policy.pixel_error = 0;
+  return key;
+}
+
 const Layout& LayoutTable::Find(const Request& request) {
   const FrameRequest& frame = *request.frame;
-  Key key{request.dataset, *request.transfer, frame.renderer, frame.policy, request.slots};
-  key.policy.combine.clear();  // how images are combined moves no box
+  Key key = KeyOf(request.dataset, *request.transfer, frame.renderer, frame.policy, request.slots);
 
   Learnt* learnt = nullptr;
   if (request.occupied != nullptr) {
@@ -56,6 +63,7 @@ const Layout& LayoutTable::Find(const Request& request) {
   LayoutRequest make{.summary = request.summary,
                      .transfer = request.transfer,
                      .policy = &frame.policy,
+                     .renderer = frame.renderer,
                      .slots = request.slots,
                      .slab_bytes_target = request.slab_bytes_target,
                      .known = {.occupied = request.occupied.get()}};
@@ -90,13 +98,22 @@ const Layout& LayoutTable::Find(const Request& request) {
   return entry.layout;
 }
 
+bool LayoutTable::KnowsCost(DatasetId dataset, const TransferFunction& transfer, RendererKind renderer) {
+  const Learnt* const learnt = FindLearnt(dataset, transfer, renderer);
+  return learnt != nullptr && learnt->cost.any();
+}
+
+std::optional<WorkField> LayoutTable::KnownCost(DatasetId dataset, const TransferFunction& transfer, RendererKind renderer) {
+  if (!KnowsCost(dataset, transfer, renderer)) return std::nullopt;
+  return learnt_.front().cost.Field();
+}
+
 void LayoutTable::Learn(const FramePlan& plan, const Policy& policy, std::span<const RankReport> reports) {
   Learnt* const learnt = FindLearnt(plan.setup.dataset, plan.setup.transfer, plan.setup.renderer);
   if (learnt == nullptr) return;
   const std::map<BoxId, double> seconds = SecondsOf(plan.layout, reports);
   if (seconds.empty()) return;
-  Key key{plan.setup.dataset, plan.setup.transfer, plan.setup.renderer, policy, plan.slots};
-  key.policy.combine.clear();
+  const Key key = KeyOf(plan.setup.dataset, plan.setup.transfer, plan.setup.renderer, policy, plan.slots);
   const auto entry =
       std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.key == key && e.layout == plan.layout; });
   // The first frame of a layout tells most; of a layout that has been changed since, what an average one does.

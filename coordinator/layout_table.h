@@ -10,6 +10,7 @@
 
 #include <list>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -42,6 +43,10 @@ class LayoutTable {
   // What the frame should be planned with. Valid until the next call.
   const Layout& Find(const Request& request);
 
+  // What boxes cost, as far as frames have told: seconds.
+  bool KnowsCost(DatasetId dataset, const TransferFunction& transfer, RendererKind renderer);
+  std::optional<WorkField> KnownCost(DatasetId dataset, const TransferFunction& transfer, RendererKind renderer);
+
   // A finished frame of this request's dataset, transfer function and renderer. Nothing is learnt from frames that were planned without
   // occupied voxels.
   void Learn(const FramePlan& plan, const Policy& policy, std::span<const RankReport> reports);
@@ -55,6 +60,8 @@ class LayoutTable {
     std::uint32_t slots = 1;
     friend bool operator==(const Key&, const Key&) = default;
   };
+  // How images are combined moves no box, so policies that differ in that alone share a layout.
+  static Key KeyOf(DatasetId dataset, const TransferFunction& transfer, RendererKind renderer, const Policy& policy, std::uint32_t slots);
   struct Entry {
     Key key;
     Layout layout;

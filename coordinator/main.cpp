@@ -25,6 +25,7 @@ int Run(int argc, char** argv) {
   options.client_endpoint = "tcp://127.0.0.1:7420";
   std::vector<std::string> data;
   bool compress = false;
+  std::string link = slabstream::kDefaultLink;
   std::string log_level = "warning";
 
   CLI::App app("Slabstream coordinator: takes requests from clients, plans frames and streams slabs to workers.");
@@ -33,6 +34,11 @@ int Run(int argc, char** argv) {
   app.add_option("--slabs-listen", options.slabs_endpoint, "for voxels (default: any port, or the path with .slabs)");
   app.add_option("--data", data, "a volume as NAME=PATH, or a directory of volumes; any number of times")->allow_extra_args(false);
   app.add_flag("--compress", compress, "pack voxels for workers with zstd: pays on links slower than about 300 MB/s, not within a machine");
+  std::string links = "Between workers of different hosts, as NAME or NAME:MICROSECONDS,GBIT, for policies that are 'auto'";
+  for (const slabstream::LinkPreset& preset : slabstream::LinkPresets()) {
+    links += "\n  " + std::string(preset.name) + ": " + std::string(preset.purpose);
+  }
+  app.add_option("--link", link, links)->type_name("LINK")->default_str(link);
   app.add_option("--log-level", log_level, "debug, info, warning, error or off")->check(CLI::IsMember(slabstream::LogLevelNames()));
   try {
     app.parse(argc, argv);
@@ -41,6 +47,9 @@ int Run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return Fail(slabstream::Status::InvalidArgument(error.what()));
   }
+  const auto parsed_link = slabstream::ParseLink("--link", link);
+  if (!parsed_link.ok()) return Fail(parsed_link.status());
+  options.machine.surroundings.link = *parsed_link;
   auto catalogue = slabstream::MakeCatalogue(data);
   if (!catalogue.ok()) return Fail(catalogue.status());
   options.catalogue = std::move(*catalogue);

@@ -8,24 +8,22 @@
 
 namespace slabstream {
 
-std::shared_ptr<const OccupancyGrid> OccupancyTable::Find(DatasetId dataset, const TransferFunction& transfer) {
-  const auto found = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& entry) {
-    return entry.grid != nullptr && entry.subject.dataset == dataset && entry.subject.transfer == transfer;
-  });
+std::shared_ptr<const OccupancyGrid> OccupancyTable::Find(const Subject& subject) {
+  const auto found =
+      std::find_if(entries_.begin(), entries_.end(), [&](const Entry& entry) { return entry.grid != nullptr && entry.subject == subject; });
   if (found == entries_.end()) return nullptr;
   entries_.splice(entries_.begin(), entries_, found);
   return found->grid;
 }
 
-bool OccupancyTable::Counting(DatasetId dataset, const TransferFunction& transfer) const {
-  return std::any_of(entries_.begin(), entries_.end(), [&](const Entry& entry) {
-    return entry.grid == nullptr && entry.subject.dataset == dataset && entry.subject.transfer == transfer;
-  });
+bool OccupancyTable::Counting(const Subject& subject) const {
+  return std::any_of(entries_.begin(), entries_.end(),
+                     [&](const Entry& entry) { return entry.grid == nullptr && entry.subject == subject; });
 }
 
-CountId OccupancyTable::Begin(DatasetId dataset, const TransferFunction& transfer) {
-  CHECK(!Counting(dataset, transfer));
-  entries_.push_front({{dataset, transfer}, ++last_count_, nullptr});
+CountId OccupancyTable::Begin(Subject subject) {
+  CHECK(!Counting(subject));
+  entries_.push_front({std::move(subject), ++last_count_, nullptr});
   return last_count_;
 }
 

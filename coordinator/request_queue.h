@@ -12,6 +12,8 @@
 
 #include "common/base/time.h"
 #include "common/wire/client_messages.h"
+#include "coordinator/chosen_policy.h"
+#include "coordinator/occupancy_table.h"
 #include "coordinator/peer_token.h"
 
 namespace slabstream {
@@ -20,8 +22,10 @@ struct OpenRequest {
   PeerToken client = 0;
   SubmitFrame submit;
   Time arrived;
-  // What must be counted before the frame can be planned: voxels occupied under this function. Null: nothing, or not known yet.
-  std::shared_ptr<const TransferFunction> counted_under;
+  // What must be counted before the frame can be planned. Null: nothing, or not known yet.
+  std::shared_ptr<const OccupancyTable::Subject> counted;
+  // None: the policy of `submit` leaves no choice, or it is not made yet. Else that policy is the chosen one.
+  std::optional<ChosenPolicy> chosen;
 
   Time deadline() const { return arrived + std::chrono::milliseconds(submit.deadline_ms); }
   bool Is(PeerToken of_client, RequestId id) const { return client == of_client && submit.request == id; }

@@ -237,7 +237,8 @@ FrameStatistics RunningFrame::Statistics(Time now) const {
                              .end_ns = Nanoseconds(now),
                              .reports = {},
                              .display = plan_.display,
-                             .grid = FrameBounds(plan_.setup)};
+                             .grid = FrameBounds(plan_.setup),
+                             .predicted = request_.chosen ? request_.chosen->prediction : std::nullopt};
   const auto append = [&](const std::vector<RankReport>& reports) {
     const std::size_t room = kMaxReports - statistics.reports.size();
     statistics.reports.insert(statistics.reports.end(), reports.begin(), reports.begin() + std::ptrdiff_t(std::min(room, reports.size())));

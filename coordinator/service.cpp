@@ -13,6 +13,7 @@
 #include <variant>
 
 #include "common/base/log.h"
+#include "common/base/shared_arena.h"
 #include "common/base/task_thread.h"
 #include "common/transport/endpoint.h"
 #include "common/transport/mailbox.h"
@@ -235,6 +236,8 @@ Result<std::unique_ptr<CoordinatorService>> CoordinatorService::Start(Context& c
 
   options.machine.pid = static_cast<std::uint32_t>(::getpid());
   options.machine.slabs_endpoint = (*slabs)->endpoint();
+  options.machine.surroundings.memory_scope = SharedMemoryScope();
+  options.machine.surroundings.cores = std::int32_t(std::max(std::thread::hardware_concurrency(), 1U));
   options.machine.datasets.clear();
   for (const auto& [name, loader] : options.catalogue) options.machine.datasets.push_back(name);
   auto impl = std::make_unique<Impl>(std::move(options), std::move(*clients), std::move(*control), std::move(*slabs));

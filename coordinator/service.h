@@ -20,7 +20,7 @@ struct CoordinatorOptions {
   std::string slabs_endpoint;   // bound; empty: any port, ".slabs" beside an ipc path or inproc name
   Catalogue catalogue;          // name -> how to load it
   Codec codec = Codec::kRaw;    // of voxels on their way to workers; zstd pays where the link is slower than it packs
-  CoordinatorConfig machine;    // epoch, pid, slabs_endpoint and datasets are filled in by Start
+  CoordinatorConfig machine;    // epoch, pid, slabs_endpoint, datasets and surroundings (but for the link) are filled in by Start
 };
 
 class CoordinatorService {

@@ -76,7 +76,7 @@ Bytes SlabServer::Cut(const Samples& samples, const Box& part, std::uint64_t beg
   if (samples.volume != nullptr) return BoxSamples(samples.volume, part, begin, end);
   ChunkBuffers::Buffer buffer = buffers_.Take();
   const std::span<std::byte> cut(buffer->data(), end - begin);
-  samples.bricks->Read(part, begin, cut);
+  VoxelBricks(*samples.bricks).Read(part, begin, cut);
   return {std::move(buffer), cut};
 }
 

@@ -1,0 +1,115 @@
+#include "coordinator/policy_table.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "common/planning/policy_names.h"
+
+namespace slabstream {
+namespace {
+
+constexpr double kLeastFactor = 0.1, kMostFactor = 10;  // a frame says that rendering takes longer by
+
+// Of the worker with most to do; what is done once a slab is no cost of the next frame.
+double RenderSeconds(std::span<const RankReport> reports) {
+  std::map<std::uint32_t, std::int64_t> by_worker;
+  std::int64_t most = 0;
+  for (const RankReport& report : reports) {
+    const auto stage = [&report](Stage s) { return report.stage_ns[std::size_t(s)]; };
+    most = std::max(most, by_worker[report.worker] += std::max<std::int64_t>(stage(Stage::kRender) - stage(Stage::kPrepare), 0));
+  }
+  return 1e-9 * double(most);
+}
+
+template <class List>
+void KeepFirst(List& list, std::size_t count) {
+  while (list.size() > count) list.pop_back();
+}
+
+}  // namespace
+
+PolicyTable::Kind PolicyTable::KindOf(const Request& request) {
+  const FrameRequest& frame = *request.frame;
+  return {.projection = frame.view.projection,
+          .traversal_axis = MakeCamera(frame.view, frame.size, request.summary->description.geometry).traversal_axis,
+          .zoom_octave = std::ilogb(frame.view.zoom),
+          .size = frame.size};
+}
+
+Result<ChosenPolicy> PolicyTable::Choose(const Request& request, Entry& entry, const Kind& kind, const Policy& open, const Policy* now) {
+  const std::optional<WorkField> cost =
+      entry.by_cost ? request.layouts->KnownCost(request.dataset, *request.transfer, request.frame->renderer) : std::nullopt;
+  FrameRequest frame = *request.frame;
+  frame.policy = open;
+  const Result<PolicyChoice> choice = ChoosePolicy({.frame = &frame,
+                                                    .summary = request.summary,
+                                                    .known = {.occupied = request.occupied.get(), .cost = cost ? &*cost : nullptr},
+                                                    .slots = request.slots,
+                                                    .machine = request.machine,
+                                                    .cost = request.cost,
+                                                    .render_scale = entry.render_scale,
+                                                    .now = now,
+                                                    .least_gain = kRevisitGain});
+  if (!choice.ok()) return choice.status();
+  ChosenPolicy chosen{entry.key.asked, choice->policy, choice->prediction, entry.render_scale};
+  const auto same = std::ranges::find(entry.choices, kind, &Choice::kind);
+  if (same != entry.choices.end()) entry.choices.erase(same);
+  entry.choices.push_front({kind, chosen, entry.frames_seen});
+  KeepFirst(entry.choices, kMaxKinds);
+  return chosen;
+}
+
+Result<ChosenPolicy> PolicyTable::Find(const Request& request) {
+  const Kind kind = KindOf(request);
+  Key key{request.dataset, *request.transfer, request.frame->renderer, request.frame->policy, request.slots};
+  const auto found = std::ranges::find(entries_, key, &Entry::key);
+  if (found == entries_.end() || found->machine != *request.machine) {
+    if (found != entries_.end()) entries_.erase(found);
+    Entry entry{.key = std::move(key), .machine = *request.machine};
+    entry.by_cost = request.layouts->KnowsCost(request.dataset, *request.transfer, request.frame->renderer);
+    Result<ChosenPolicy> chosen = Choose(request, entry, kind, entry.key.asked, nullptr);
+    if (!chosen.ok()) return chosen;
+    entries_.push_front(std::move(entry));
+    KeepFirst(entries_, kMaxKept);
+    return chosen;
+  }
+  entries_.splice(entries_.begin(), entries_, found);
+  Entry& entry = entries_.front();
+  const Policy holds = entry.choices.front().chosen.policy;
+  if (!entry.by_cost && request.layouts->KnowsCost(request.dataset, *request.transfer, request.frame->renderer)) {
+    entry.by_cost = true;
+    entry.render_scale = 1;  // costs are seconds now
+    entry.frames_seen = 0;
+    entry.choices.clear();
+    Result<ChosenPolicy> chosen = Choose(request, entry, kind, entry.key.asked, &holds);
+    if (!chosen.ok()) entries_.pop_front();
+    return chosen;
+  }
+  const auto choice = std::ranges::find(entry.choices, kind, &Choice::kind);
+  if (choice == entry.choices.end()) {
+    Policy open = holds;
+    open.combine = entry.key.asked.combine;
+    return Choose(request, entry, kind, open, nullptr);
+  }
+  const int seen = entry.frames_seen;
+  const int due =
+      seen < kMostFramesAPrediction ? int(std::bit_floor(unsigned(seen))) : seen / kMostFramesAPrediction * kMostFramesAPrediction;
+  if (choice->made_after < due) return Choose(request, entry, kind, choice->chosen.policy, nullptr);
+  entry.choices.splice(entry.choices.begin(), entry.choices, choice);
+  return choice->chosen;
+}
+
+void PolicyTable::Learn(const FramePlan& plan, const ChosenPolicy& chosen, std::span<const RankReport> reports) {
+  const Key key{plan.setup.dataset, plan.setup.transfer, plan.setup.renderer, chosen.asked, plan.slots};
+  const auto entry = std::ranges::find(entries_, key, &Entry::key);
+  const double seconds = RenderSeconds(reports);
+  if (entry == entries_.end() || seconds <= 0 || !chosen.prediction || chosen.prediction->render_seconds <= 0) return;
+  const double weight = std::max(kLeastWeight, 1.0 / ++entry->frames_seen);
+  const double factor = std::clamp(seconds / chosen.prediction->render_seconds, kLeastFactor, kMostFactor);
+  entry->render_scale += weight * (chosen.render_scale * factor - entry->render_scale);
+}
+
+}  // namespace slabstream
