@@ -20,7 +20,9 @@
 #include "client/lab/replay.h"
 #include "common/base/log.h"
 #include "common/kernels/simd_target.h"
+#include "common/planning/policy_names.h"
 #include "common/transport/endpoint.h"
+#include "common/tuning/service_machine.h"
 
 namespace slabstream {
 namespace {
@@ -204,7 +206,21 @@ void DeclareUp(CLI::App& app, UpOptions& options, Command& command) {
       "Where clients reach the service; tcp://127.0.0.1:* takes any free port")
       ->type_name("ENDPOINT")
       ->default_str(options.listen);
-  sub->add_flag("--compress", options.compress, "Pack pictures with zstd, for clients behind a slow tunnel");
+  sub->add_flag(
+         "--compress{on}", options.compress,
+         "Pack images with zstd: =auto (default) between workers where the link is slower than that, =on also pictures for clients behind "
+         "a slow tunnel, =off never")
+      ->check(CLI::IsMember({"auto", "on", "off"}));
+  AddParsed(
+      *sub, "--link", options.link,
+      [](const std::string& option, const std::string& text) -> Result<std::string> {
+        const Result<LinkModel> link = ParseLink(option, text);
+        if (!link.ok()) return link.status();
+        return text;
+      },
+      fmt::format("Between workers that join from other hosts, for policies that are '{}'\n{}", kAutomatic, LinkList()))
+      ->type_name("NAME[:MICROSECONDS,GBIT]")
+      ->default_str(kDefaultLink);
   sub->add_flag("--detach", options.detach, "Return when the service is ready; `slabstream down` ends it");
   sub->callback([&] { command = [&] { return RunUp(options); }; });
 }

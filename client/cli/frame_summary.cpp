@@ -35,6 +35,7 @@ FrameSummary Summarize(const FrameStatistics& statistics) {
     for (std::size_t stage = 0; stage < report.stage_ns.size(); ++stage) summary.stage_ns[stage] += report.stage_ns[stage];
     summary.voxel_bytes += report.voxel_bytes;
     summary.image_bytes += report.image_bytes;
+    summary.finish_ns += PictureNs(report);
     render_ns[report.worker] += report.stage_ns[std::size_t(Stage::kRender)];
     for (const Span& span : report.spans) {
       // Waiting for voxels is not work.
@@ -48,6 +49,9 @@ FrameSummary Summarize(const FrameStatistics& statistics) {
     most = std::max(most, ns);
     total += ns;
   }
+  summary.render_ns = most;
+  summary.combine_ns = summary.stage_ns[std::size_t(Stage::kCombine)] + summary.stage_ns[std::size_t(Stage::kEncode)] +
+                       summary.stage_ns[std::size_t(Stage::kResolve)] - summary.finish_ns;
   if (total > 0) summary.imbalance = double(most) * workers / double(total);
 
   std::int64_t busy_ns = 0;

@@ -8,6 +8,9 @@ namespace slabstream {
 
 struct FrameSummary {
   StageTimes stage_ns{};          // worker time, summed over ranks
+  std::int64_t render_ns = 0;     // of the worker with most to do
+  std::int64_t combine_ns = 0;    // combining and encoding of partial images, summed over workers
+  std::int64_t finish_ns = 0;     // making and encoding the picture
   std::uint64_t voxel_bytes = 0;  // that travelled to workers
   std::uint64_t image_bytes = 0;  // that travelled between workers
   double imbalance = 1;           // most / mean render time of a worker, over all workers of the plan; at least 1

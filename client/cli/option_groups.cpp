@@ -20,11 +20,19 @@ namespace {
 
 constexpr std::size_t kMaxTransferFileBytes = std::size_t{16} << 20;
 
-// An option that takes one of the names of a list such as Decompositions(), whose entries have a name and a purpose.
+constexpr char kLeftToThePlanner[] = "what should be fastest for this volume, view and service";
+
+// An option that takes one of the names of a list such as Decompositions(), whose entries have a name and a purpose. `automatic`: the
+// purpose of kAutomatic, if the option takes it beside them.
 template <class T, class Entries>
-CLI::Option* AddNamed(CLI::App& app, const std::string& name, T& target, const Entries& entries, const std::string& help) {
+CLI::Option* AddNamed(CLI::App& app, const std::string& name, T& target, const Entries& entries, const std::string& help,
+                      std::string_view automatic = {}) {
   std::string text = help;
   std::vector<std::string_view> names;
+  if (!automatic.empty()) {
+    names.push_back(kAutomatic);
+    text += fmt::format("\n  {}: {}", kAutomatic, automatic);
+  }
   for (const auto& entry : entries) {
     names.push_back(entry.name);
     text += fmt::format("\n  {}: {}", entry.name, entry.purpose);
@@ -50,11 +58,12 @@ CLI::Option* AddChoice(CLI::App& app, const std::string& name, T& target, const 
 }
 
 void AddCombining(CLI::App& app, std::string& target) {
-  std::string text = "How partial images become one";
+  std::string text = fmt::format("How partial images become one\n  {}: {}", kAutomatic, kLeftToThePlanner);
   for (const CombiningEntry& entry : CombiningSchemes()) {
     text += fmt::format("\n  {}{}{}: {}", entry.name, entry.arguments.empty() ? "" : ":", entry.arguments, entry.purpose);
   }
   const auto parse = [](const std::string& option, const std::string& value) -> Result<std::string> {
+    if (value == kAutomatic) return value;
     const Result<CombiningChoice> choice = ParseCombining(value);
     if (!choice.ok()) return Status::InvalidArgument(fmt::format("{} {}", option, choice.status().message()));
     return value;
@@ -123,16 +132,19 @@ void AddLookOptions(CLI::App& app, FrameRequest& request, PictureFormat& format)
 }
 
 void AddPolicyOptions(CLI::App& app, Policy& policy) {
-  AddNamed(app, "--decomposition", policy.decomposition, Decompositions(), "How the volume is divided")->default_str(policy.decomposition);
+  AddNamed(app, "--decomposition", policy.decomposition, Decompositions(), "How the volume is divided", kLeftToThePlanner)
+      ->default_str(policy.decomposition);
   AddChoice<AxisChoice, 4>(app, "--axis", policy.axis, {"x", "y", "z", "auto"},
                            {AxisChoice::kX, AxisChoice::kY, AxisChoice::kZ, AxisChoice::kAuto},
                            "Axis that slabs are cut along, and other boxes first")
       ->default_str("auto");
   AddNamed(app, "--split", policy.split, WorkSplits(), "What boxes have equal shares of")->default_str(policy.split);
-  AddNamed(app, "--assignment", policy.assignment, Assignments(), "Who owns which box")->default_str(policy.assignment);
+  AddNamed(app, "--assignment", policy.assignment, Assignments(), "Who owns which box", kLeftToThePlanner)->default_str(policy.assignment);
   AddNamed(app, "--balance", policy.balance, BalanceModes(), "Whether boxes change while frames go by")->default_str(policy.balance);
   AddInteger(app, "--groups", policy.groups, 0, kMaxGroups,
              "Groups of boxes that are rendered one after the other; 0: chosen by the service");
+  AddInteger(app, "--teams", policy.teams, 1, kMaxTeams,
+             "Parts of the workers that frames go to in turn, each with all voxels; 1: all workers share every frame");
   AddCombining(app, policy.combine);
   AddNumber(app, "--pixel-error", policy.pixel_error, {0, kMaxPixelError},
             "How far a colour in [0, 1] may move because workers send each other 16 bits a channel instead of 32");

@@ -80,7 +80,8 @@ struct UpOptions {
   int threads = 0;                // of each worker; 0: CoreShare
   std::vector<std::string> data;  // NAME=PATH or DIR, as slabstream-coordinator takes them
   std::string listen;             // endpoint for clients; a wildcard port is fine
-  bool compress = false;          // of pictures
+  std::string compress = "auto";  // images on their way: auto, on or off, as slabstream-worker takes it
+  std::string link;               // as ParseLink takes it; empty: the coordinator's default
   bool detach = false;
 };
 

@@ -11,20 +11,42 @@ using Json = nlohmann::ordered_json;
 
 double Milliseconds(std::int64_t ns) { return double(ns) / 1e6; }
 
+// What was predicted, what happened, and by how much of what happened the prediction is off.
+void AddPrediction(Json& json, const FramePrediction& predicted, const FrameRecord& frame, const FrameSummary& summary) {
+  struct Figure {
+    const char* name;
+    double predicted, happened;
+  };
+  const Figure figures[] = {
+      {"render_ms", predicted.render_seconds * 1e3, Milliseconds(summary.render_ns)},
+      {"combine_ms", predicted.combine_seconds * 1e3, Milliseconds(summary.combine_ns)},
+      {"finish_ms", predicted.finish_seconds * 1e3, Milliseconds(summary.finish_ns)},
+      {"latency_ms", predicted.latency_seconds * 1e3, Milliseconds(frame.latency.count())},
+      {"imbalance", predicted.imbalance, summary.imbalance},
+  };
+  for (const Figure& figure : figures) {
+    json["predicted"][figure.name] = figure.predicted;
+    json["happened"][figure.name] = figure.happened;
+    if (figure.happened > 0) json["prediction_error"][figure.name] = figure.predicted / figure.happened - 1;
+  }
+}
+
 Json FrameJson(const FrameRecord& frame, const FrameSummary& summary) {
   Json stages = Json::object();
   for (int stage = 0; stage < kStageCount; ++stage) {
     stages[std::string(ToString(Stage(stage)))] = Milliseconds(summary.stage_ns[std::size_t(stage)]);
   }
-  return {{"output", frame.output},
-          {"latency_ms", Milliseconds(frame.latency.count())},
-          {"queued_ms", Milliseconds(frame.statistics.queued_ns)},
-          {"attempts", frame.statistics.attempts},
-          {"workers", frame.statistics.workers},
-          {"bytes", {{"voxels", summary.voxel_bytes}, {"images", summary.image_bytes}}},
-          {"stages_ms", stages},
-          {"imbalance", summary.imbalance},
-          {"idle_share", summary.idle_share}};
+  Json json = {{"output", frame.output},
+               {"latency_ms", Milliseconds(frame.latency.count())},
+               {"queued_ms", Milliseconds(frame.statistics.queued_ns)},
+               {"attempts", frame.statistics.attempts},
+               {"workers", frame.statistics.workers},
+               {"bytes", {{"voxels", summary.voxel_bytes}, {"images", summary.image_bytes}}},
+               {"stages_ms", stages},
+               {"imbalance", summary.imbalance},
+               {"idle_share", summary.idle_share}};
+  if (frame.statistics.predicted) AddPrediction(json, *frame.statistics.predicted, frame, summary);
+  return json;
 }
 
 }  // namespace

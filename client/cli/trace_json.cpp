@@ -78,6 +78,7 @@ std::string TraceJson(const FrameOptions& options, const std::vector<FrameRecord
     for (const auto& [track, name] : kTracks) events.push_back(Name("thread_name", worker, track, name));
   }
   std::vector<RecordedFrame> recorded;
+  recorded.reserve(frames.size());
   for (const FrameRecord& frame : frames) recorded.push_back(Record(frame.statistics, options.request.renderer, frame.latency));
   const Json json = {{"displayTimeUnit", "ms"}, {"traceEvents", std::move(events)}, {kRecordingKey, RecordingJson(recorded)}};
   return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";

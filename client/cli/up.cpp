@@ -144,6 +144,7 @@ class LocalService {
   Status StartCoordinator() {
     std::vector<std::string> arguments = {"--listen", options_.listen};
     for (const std::string& data : options_.data) arguments.insert(arguments.end(), {"--data", data});
+    if (!options_.link.empty()) arguments.insert(arguments.end(), {"--link", options_.link});
     Result<Child*> child = StartChild(kCoordinatorProgram, std::move(arguments));
     if (!child.ok()) return child.status();
     state_.coordinator = (*child)->pid();
@@ -160,8 +161,8 @@ class LocalService {
 
   Status StartWorkers() {
     const int threads = options_.threads > 0 ? options_.threads : CoreShare(options_.workers);
-    std::vector<std::string> arguments = {"--coordinator", worker_endpoint_, "--threads", std::to_string(threads)};
-    if (options_.compress) arguments.emplace_back("--compress");
+    const std::vector<std::string> arguments = {"--coordinator", worker_endpoint_, "--threads", std::to_string(threads),
+                                                "--compress=" + options_.compress};
     for (int i = 0; i < options_.workers; ++i) {
       const Result<Child*> child = StartChild(kWorkerProgram, arguments);
       if (!child.ok()) return child.status();

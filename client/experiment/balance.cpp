@@ -101,17 +101,10 @@ Result<Json> MeasureMoving(ExperimentContext& context, const Balance& balance, c
     layout = std::move(next);
     const Result<FramePlan> plan = PlanOf(context, frame, layout);
     if (!plan.ok()) return plan.status();
-    std::vector<Box> boxes;
-    std::vector<Placement> placements;
-    for (const GroupPlan& group : plan->groups) {
-      for (const Placement& placement : group.placements) {
-        boxes.push_back(placement.box);
-        placements.push_back(placement);
-      }
-    }
+    const std::vector<Placement> placements = PlacementsOf(*plan);
     std::vector<double> seconds(std::size_t(frame.workers));
     std::vector<RankReport> reports(placements.size());
-    const std::vector<BoxCost> costs = MeasureBoxCosts(*knowledge->volume.volume, plan->setup, boxes, kRenderings);
+    const std::vector<BoxCost> costs = MeasureBoxCosts(*knowledge->volume.volume, *plan, kRenderings);
     for (std::size_t box = 0; box < costs.size(); ++box) {
       seconds[placements[box].worker - 1] += costs[box].seconds;
       reports[box].box = placements[box].id;
@@ -189,9 +182,13 @@ Result<Outcome> AddRow(ExperimentContext& context, const FrameCase& frame, const
   return outcome;
 }
 
+// "boxes of equal ..."
+std::string SplitWords(const std::string& split) { return split == "occupied" ? "occupied voxels" : split; }
+
 // Partitions over workers.
 Result<Section> PartitionSection(ExperimentContext& context, const Balance& balance, const BenchCase& volume) {
-  Table table = NewTable("partitions-" + volume.dataset, fmt::format("{}: one box a worker", volume.dataset));
+  const std::string title = TitleOf(volume);
+  Table table = NewTable("partitions-" + volume.dataset, fmt::format("{}: one box a worker", title));
   // A chart for each split: more lines than a palette has colours would not be told apart.
   std::map<std::string, LineChart> imbalance, times;
   std::map<std::string, double> at_table;
@@ -205,20 +202,22 @@ Result<Section> PartitionSection(ExperimentContext& context, const Balance& bala
       time.points.push_back({double(p), outcome->figures.steady_seconds * 1e3});
       if (p == kTableWorkers) at_table[named.name] = outcome->imbalance;
     }
-    const AxisSpec workers{"workers p", "", AxisScale::kLog};
+    const AxisSpec workers = WorkersAxis();
     imbalance.try_emplace(
-        split, LineChart{fmt::format("{}: imbalance, boxes of equal {}", volume.dataset, split), workers, {"most / mean", ""}, {}});
-    times.try_emplace(
         split,
         LineChart{
-            fmt::format("{}: picture to picture, boxes of equal {}", volume.dataset, split), workers, {"time", "ms", AxisScale::kLog}, {}});
+            fmt::format("{}: imbalance, boxes of equal {}", title, SplitWords(split)), workers, {"most / mean", "", AxisScale::kLog}, {}});
+    times.try_emplace(split, LineChart{fmt::format("{}: picture to picture, boxes of equal {}", title, SplitWords(split)),
+                                       workers,
+                                       {"time", "ms", AxisScale::kLog},
+                                       {}});
     imbalance.at(split).series.push_back(std::move(even));
     times.at(split).series.push_back(std::move(time));
   }
   const auto best = std::ranges::min_element(at_table, {}, [](const auto& entry) { return entry.second; });
   Section section;
-  section.title = "Partitions: " + volume.dataset;
-  section.question = fmt::format("{}: which partition gives workers equal work?", volume.purpose);
+  section.title = "Partitions: " + title;
+  section.question = "Which partition gives workers equal work?";
   section.method = fmt::format(
       "{0} x {0} pixels, one box a worker. Every box is rendered alone on one thread; imbalance is the longest of the workers' render "
       "times over their mean. "
@@ -232,15 +231,14 @@ Result<Section> PartitionSection(ExperimentContext& context, const Balance& bala
                                        "Render times of workers; 1 is perfect. Workers whose box shows nothing count with no time."});
   }
   for (const auto& [split, chart] : times) {
-    section.blocks.emplace_back(
-        Figure{fmt::format("time-{}-{}", volume.dataset, split), DrawLines(chart),
-               fmt::format("{} frames asked for ahead. One worker makes the pictures: no partition goes below its time.", kFramesAhead)});
+    section.blocks.emplace_back(Figure{fmt::format("time-{}-{}", volume.dataset, split), DrawLines(chart),
+                                       "As many frames asked for ahead as keep all workers busy."});
   }
   for (const NamedPolicy& named : {EqualSlabs(), BalancedTree()}) {
     const Result<MeasuredFrame> measured = Recall(context, balance.Frame(volume, named.policy, kTableWorkers));
     if (!measured.ok()) return measured.status();
     section.blocks.emplace_back(BoxCostFigure(fmt::format("boxes-{}-{}", volume.dataset, Slug(named.name)),
-                                              fmt::format("{}, p = {}: {}", volume.dataset, kTableWorkers, named.name), *measured,
+                                              fmt::format("{}, p = {}: {}", title, kTableWorkers, named.name), *measured,
                                               "Render time of every box that the cut meets."));
   }
   section.blocks.emplace_back(std::move(table));
@@ -258,8 +256,8 @@ Result<Section> AssignmentSection(ExperimentContext& context, const Balance& bal
       kTableWorkers, kBoxesAWorker);
   std::string sentence;
   for (const BenchCase& volume : balance.volumes) {
-    Table table = NewTable("assignments-" + volume.dataset, fmt::format("{}: {} boxes a worker", volume.dataset, kBoxesAWorker));
-    BarChart chart{volume.dataset + ": imbalance by assignment", "partition", {"most / mean", ""}, {"imbalance"}, {}};
+    Table table = NewTable("assignments-" + volume.dataset, fmt::format("{}: {} boxes a worker", TitleOf(volume), kBoxesAWorker));
+    BarChart chart{TitleOf(volume) + ": imbalance by assignment", "partition", {"most / mean", ""}, {}, {}};
     std::pair<double, std::string> best{std::numeric_limits<double>::infinity(), ""};
     for (const NamedPolicy& named : AllPartitions()) {
       BarGroup group{named.name, {}};
@@ -273,7 +271,7 @@ Result<Section> AssignmentSection(ExperimentContext& context, const Balance& bal
       }
       chart.groups.push_back(std::move(group));
     }
-    sentence += fmt::format("{}{}: {} ({:.2f})", sentence.empty() ? "" : "; ", volume.dataset, best.second, best.first);
+    sentence += fmt::format("{}{}: {} ({:.2f})", sentence.empty() ? "" : "; ", TitleOf(volume), best.second, best.first);
     section.blocks.emplace_back(Figure{"assignments-" + volume.dataset, DrawBars(chart), "1 is perfect."});
     section.blocks.emplace_back(std::move(table));
   }
@@ -296,26 +294,26 @@ Result<Section> MovingSection(ExperimentContext& context, const Balance& balance
               {}};
   std::string sentence;
   for (const BenchCase& volume : balance.volumes) {
-    LineChart chart{volume.dataset + ": imbalance, frame by frame", {"frame", ""}, {"most / mean", ""}, {}};
+    LineChart chart{TitleOf(volume) + ": imbalance, frame by frame", {"frame", ""}, {"most / mean", ""}, {}};
     for (const Moving& moving : MovingPolicies()) {
       const std::vector<const Json*> repeats = context.log().All(MovingKey(volume, moving, balance.pixels, MovingFrames(context)));
-      const std::vector<double> imbalance = MediansOf(repeats, "imbalance"), slowest = MediansOf(repeats, "slowest_ms"),
-                                moved = MediansOf(repeats, "moved_bytes");
+      const std::vector<Estimate> imbalance = EstimatesOf(repeats, "imbalance"), slowest = EstimatesOf(repeats, "slowest_ms");
+      const std::vector<double> moved = MediansOf(repeats, "moved_bytes");
       LineSeries series{moving.name, Origin::kMeasured, {}};
       for (std::size_t i = 0; i < imbalance.size(); ++i) {
-        series.points.push_back({double(i + 1), imbalance[i]});
-        table.rows.push_back({volume.dataset,
+        series.points.push_back({double(i + 1), imbalance[i].median, imbalance[i].low, imbalance[i].high});
+        table.rows.push_back({TitleOf(volume),
                               moving.name,
                               Cell::Parameter(double(i + 1)),
-                              {imbalance[i], Origin::kMeasured},
-                              {slowest[i], Origin::kMeasured},
+                              Cell(imbalance[i], Origin::kMeasured),
+                              Cell(slowest[i], Origin::kMeasured),
                               {moved[i] * 1e-6, Origin::kMeasured}});
       }
       chart.series.push_back(std::move(series));
       if (moving.name != "kd-tree by occupied, dynamic") continue;
       const std::size_t sixth = std::min<std::size_t>(5, imbalance.size() - 1);
-      sentence += fmt::format("{}{} {:.2f} after {} frames, {:.1f} MB moved in all", sentence.empty() ? "" : "; ", volume.dataset,
-                              imbalance[sixth], sixth, std::accumulate(moved.begin(), moved.end(), 0.0) * 1e-6);
+      sentence += fmt::format("{}{} {:.2f} after {} frames, {:.1f} MB moved in all", sentence.empty() ? "" : "; ", TitleOf(volume),
+                              imbalance[sixth].median, sixth, std::accumulate(moved.begin(), moved.end(), 0.0) * 1e-6);
     }
     section.blocks.emplace_back(Figure{"moving-" + volume.dataset, DrawLines(chart), "Medians over repeats, frame by frame."});
   }
@@ -335,16 +333,11 @@ Result<Report> RunBalance(ExperimentContext& context) {
   report.summary =
       "Sparse volumes give equal slabs very unequal work. Every partition, divided by voxels and by occupied voxels, every assignment, and "
       "boxes that change while the view moves: who is idle, what travels, how long a frame takes.";
-  const auto add = [&](Result<Section> section) -> Status {
-    if (!section.ok()) return section.status();
-    report.sections.push_back(*std::move(section));
-    return Status::Ok();
-  };
   for (const BenchCase& volume : balance->volumes) {
-    if (Status status = add(PartitionSection(context, *balance, volume)); !status.ok()) return status;
+    if (Status status = report.Add(PartitionSection(context, *balance, volume)); !status.ok()) return status;
   }
-  if (Status status = add(AssignmentSection(context, *balance)); !status.ok()) return status;
-  if (Status status = add(MovingSection(context, *balance)); !status.ok()) return status;
+  if (Status status = report.Add(AssignmentSection(context, *balance)); !status.ok()) return status;
+  if (Status status = report.Add(MovingSection(context, *balance)); !status.ok()) return status;
   return report;
 }
 

@@ -13,8 +13,8 @@ struct FrameFigures {
   double idle_share = 0;       // of the workers' time of that frame
   double image_bytes = 0;      // between workers
 };
-inline constexpr int kFramesAhead = 4, kSteadyFrames = 16;
 
-Result<FrameFigures> FindFigures(const MeasuredFrame& frame, const MachineModel& machine);
+// `teams`: as large as the frame's, which take frames in turn.
+Result<FrameFigures> FindFigures(const MeasuredFrame& frame, const MachineModel& machine, int teams = 1);
 
 }  // namespace slabstream

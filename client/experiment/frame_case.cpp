@@ -12,12 +12,18 @@
 #include "client/lab/box_costs.h"
 #include "client/lab/frame_costs.h"
 #include "common/base/check.h"
+#include "common/planning/frame_window.h"
+#include "common/planning/policy_names.h"
+#include "common/planning/team.h"
+#include "common/tuning/choose_policy.h"
+#include "common/tuning/service_machine.h"
 
 namespace slabstream {
 namespace {
 
 constexpr int kRenderings = 2;  // of each box, after the first; the faster one counts
 constexpr int kWarmUpFrames = 2, kFinishes = 3;
+constexpr int kLearningFrames = 8;  // to warm up with dynamic balance
 
 Roster RosterOf(int workers) {
   Roster roster;
@@ -74,24 +80,24 @@ CoverageMap CoverageOf(const Json& json, const PixelBounds& frame) {
   return coverage;
 }
 
-Result<Json> MeasureBoxes(ExperimentContext& context, const FrameCase& frame) {
+Result<Json> MeasurePlannedBoxes(ExperimentContext& context, const FrameCase& frame) {
   const Result<FramePlan> plan = PlanOf(context, frame);
-  if (!plan.ok()) return plan.status();
+  return plan.ok() ? MeasureBoxes(context, frame, *plan) : plan.status();
+}
+
+}  // namespace
+
+Result<Json> MeasureBoxes(ExperimentContext& context, const FrameCase& frame, const FramePlan& plan) {
   const Result<VolumeInUse> volume = context.volumes().Get(frame.volume);
   if (!volume.ok()) return volume.status();
   Json numbers = {{"ids", Json::array()}};
-  for (const char* list : {"seconds", "first_seconds", "occupied_voxels", "drawn_voxels", "covered_pixels", "voxel_bytes", "coverage"}) {
+  for (const char* list :
+       {"seconds", "first_seconds", "occupied_voxels", "drawn_voxels", "covered_pixels", "voxel_bytes", "work", "coverage"}) {
     numbers[list] = Json::array();
   }
   for (int stage = 0; stage < kStageCount; ++stage) numbers["stages"][std::string(ToString(Stage(stage)))] = Json::array();
-  std::vector<Box> boxes;
-  for (const GroupPlan& group : plan->groups) {
-    for (const Placement& placement : group.placements) {
-      boxes.push_back(placement.box);
-      numbers["ids"].push_back(placement.id);
-    }
-  }
-  for (const BoxCost& cost : MeasureBoxCosts(*volume->volume, plan->setup, boxes, kRenderings)) {
+  for (const Placement& placement : PlacementsOf(plan)) numbers["ids"].push_back(placement.id);
+  for (const BoxCost& cost : MeasureBoxCosts(*volume->volume, plan, kRenderings)) {
     numbers["seconds"].push_back(cost.seconds);
     numbers["first_seconds"].push_back(cost.first_seconds);
     numbers["occupied_voxels"].push_back(cost.occupied_voxels);
@@ -99,12 +105,16 @@ Result<Json> MeasureBoxes(ExperimentContext& context, const FrameCase& frame) {
     numbers["covered_pixels"].push_back(cost.covered_pixels);
     numbers["voxel_bytes"].push_back(cost.voxel_bytes);
     numbers["coverage"].push_back(CoverageJson(cost.coverage));
+    const CostSample sample = SampleOf(cost, plan.setup.camera);
+    numbers["work"].push_back(sample.work);
     for (int stage = 0; stage < kStageCount; ++stage) {
-      numbers["stages"][std::string(ToString(Stage(stage)))].push_back(double(cost.stage_ns[std::size_t(stage)]) * 1e-9);
+      numbers["stages"][std::string(ToString(Stage(stage)))].push_back(double(sample.stage_ns[std::size_t(stage)]) * 1e-9);
     }
   }
   return numbers;
 }
+
+namespace {
 
 Result<Json> MeasureFinish(ExperimentContext& context, const FrameCase& frame) {
   FrameCase whole = frame;
@@ -118,6 +128,8 @@ Result<Json> MeasureFinish(ExperimentContext& context, const FrameCase& frame) {
   return Json{{"finish_seconds", cost.finish_seconds}, {"receive_seconds", cost.receive_seconds}};
 }
 
+int WarmUpFrames(const Policy& policy) { return policy.balance == kDynamicBalance ? kLearningFrames : kWarmUpFrames; }
+
 Result<Json> MeasureService(ExperimentContext& context, const FrameCase& frame, int frames) {
   Result<VolumeInUse> volume = context.volumes().Get(frame.volume);
   if (!volume.ok()) return volume.status();
@@ -128,10 +140,11 @@ Result<Json> MeasureService(ExperimentContext& context, const FrameCase& frame, 
   request.dataset = session->dataset();
   std::vector<double> latencies, imbalances, idle_shares, image_bytes;
   std::array<std::vector<double>, kStageCount> stages;
-  for (int i = 0; i < kWarmUpFrames + frames; ++i) {
+  const int warm_up = WarmUpFrames(frame.policy);
+  for (int i = 0; i < warm_up + frames; ++i) {
     const Result<Picture> picture = session->client().Render(request);
     if (!picture.ok()) return picture.status();
-    if (i < kWarmUpFrames) continue;
+    if (i < warm_up) continue;
     const FrameSummary summary = Summarize(picture->statistics);
     latencies.push_back(double(picture->latency.count()) * 1e-6);
     imbalances.push_back(summary.imbalance);
@@ -180,13 +193,14 @@ Result<LayoutKnowledge> KnowLayout(ExperimentContext& context, const FrameCase& 
   if (!occupied.ok()) return occupied.status();
   Result<TransferFunction> transfer = ResolveTransfer(frame.volume.transfer, *volume->summary);
   if (!transfer.ok()) return transfer.status();
-  return LayoutKnowledge{*volume, *occupied, *std::move(transfer), frame.policy};
+  return LayoutKnowledge{*volume, *occupied, *std::move(transfer), frame.policy, frame.volume.renderer};
 }
 
 LayoutRequest LayoutRequestOf(const LayoutKnowledge& knowledge, int workers) {
   LayoutRequest request{.summary = knowledge.volume.summary.get(),
                         .transfer = &knowledge.transfer,
                         .policy = &knowledge.policy,
+                        .renderer = knowledge.renderer,
                         .slots = std::uint32_t(workers)};
   if (NeedsOccupancy(knowledge.policy)) request.known.occupied = knowledge.occupied.get();
   return request;
@@ -207,6 +221,24 @@ Result<FramePlan> PlanOf(ExperimentContext& context, const FrameCase& frame, con
   return PlanFrame(request, kPlannedDataset, *volume->summary, RosterOf(frame.workers), CostModel{}, &layout);
 }
 
+Result<FrameCase> WithChosenPolicy(ExperimentContext& context, FrameCase frame, const LinkModel& link) {
+  if (!LeavesChoice(frame.policy)) return frame;
+  const Result<LayoutKnowledge> knowledge = KnowLayout(context, frame);
+  if (!knowledge.ok()) return knowledge.status();
+  const FrameRequest request = RequestOf(frame);
+  const MachineModel machine = ServiceMachine(std::vector<HostedWorker>(std::size_t(frame.workers)), {.link = link});
+  const CostModel cost;
+  const Result<PolicyChoice> choice = ChoosePolicy({.frame = &request,
+                                                    .summary = knowledge->volume.summary.get(),
+                                                    .known = {.occupied = knowledge->occupied.get()},
+                                                    .slots = std::uint32_t(frame.workers),
+                                                    .machine = &machine,
+                                                    .cost = &cost});
+  if (!choice.ok()) return choice.status();
+  frame.policy = choice->policy;
+  return frame;
+}
+
 std::string_view NameOf(RendererKind renderer) { return renderer == RendererKind::kSplat ? "splatting" : "Z-buffer"; }
 
 Json BoxCostKey(const FrameCase& frame) {
@@ -220,11 +252,13 @@ Json ServiceKey(const FrameCase& frame) {
   AddPartition(key, frame);
   key["assignment"] = frame.policy.assignment;
   key["combine"] = frame.policy.combine;
+  key["balance"] = frame.policy.balance;
+  key["pixel_error"] = frame.policy.pixel_error;
   return key;
 }
 
 Trial BoxCostTrial(ExperimentContext& context, const FrameCase& frame) {
-  return {BoxCostKey(frame), [&context, frame] { return MeasureBoxes(context, frame); }, (1 + kRenderings) * ExpectedEffort(frame)};
+  return {BoxCostKey(frame), [&context, frame] { return MeasurePlannedBoxes(context, frame); }, (1 + kRenderings) * ExpectedEffort(frame)};
 }
 Trial FinishTrial(ExperimentContext& context, const FrameCase& frame) {
   FrameCase whole = frame;
@@ -233,7 +267,7 @@ Trial FinishTrial(ExperimentContext& context, const FrameCase& frame) {
 }
 Trial ServiceTrial(ExperimentContext& context, const FrameCase& frame, int frames) {
   return {ServiceKey(frame), [&context, frame, frames] { return MeasureService(context, frame, frames); },
-          (2 + kWarmUpFrames + frames) * ExpectedEffort(frame)};
+          (2 + WarmUpFrames(frame.policy) + frames) * ExpectedEffort(frame)};
 }
 
 std::vector<Trial> WithoutDoubles(std::vector<Trial> trials) {
@@ -271,15 +305,25 @@ double MeasuredFrame::StageSeconds(Stage stage) const {
 Result<MeasuredFrame> Recall(ExperimentContext& context, const FrameCase& frame) {
   Result<FramePlan> plan = PlanOf(context, frame);
   if (!plan.ok()) return plan.status();
-  MeasuredFrame measured{*std::move(plan),
+  return WithBoxCosts(context, frame, *std::move(plan), context.log().All(BoxCostKey(frame)));
+}
+
+Result<std::vector<MeasuredFrame>> RecallRepeats(ExperimentContext& context, const FrameCase& frame) {
+  const Result<FramePlan> plan = PlanOf(context, frame);
+  if (!plan.ok()) return plan.status();
+  std::vector<MeasuredFrame> frames;
+  for (const Json* repeat : context.log().All(BoxCostKey(frame))) frames.push_back(WithBoxCosts(context, frame, *plan, {repeat}));
+  return frames;
+}
+
+MeasuredFrame WithBoxCosts(ExperimentContext& context, const FrameCase& frame, FramePlan plan, const std::vector<const Json*>& repeats) {
+  CHECK(!repeats.empty()) << BoxCostKey(frame).dump();
+  MeasuredFrame measured{std::move(plan),
                          {},
                          EstimateOf(context.log(), FinishKey(frame), "finish_seconds").median,
                          EstimateOf(context.log(), FinishKey(frame), "receive_seconds").median};
   measured.boxes.resize(measured.plan.layout.partition.boxes().size());
 
-  const Json key = BoxCostKey(frame);
-  const std::vector<const Json*> repeats = context.log().All(key);
-  CHECK(!repeats.empty()) << key.dump();
   const std::vector<double> ids = MediansOf(repeats, "ids"), seconds = MediansOf(repeats, "seconds"),
                             first = MediansOf(repeats, "first_seconds"), occupied = MediansOf(repeats, "occupied_voxels"),
                             drawn = MediansOf(repeats, "drawn_voxels"), covered = MediansOf(repeats, "covered_pixels"),
@@ -290,8 +334,14 @@ Result<MeasuredFrame> Recall(ExperimentContext& context, const FrameCase& frame)
   }
   for (std::size_t i = 0; i < ids.size(); ++i) {
     MeasuredFrame::Cost& box = measured.boxes.at(std::size_t(ids[i]));
-    box = {seconds[i], first[i],   {},       occupied[i],
-           drawn[i],   covered[i], bytes[i], CoverageOf(repeats.front()->at("coverage")[i], FrameBounds(measured.plan.setup))};
+    box = {.seconds = seconds[i],
+           .first_seconds = first[i],
+           .occupied_voxels = occupied[i],
+           .drawn_voxels = drawn[i],
+           .covered_pixels = covered[i],
+           .voxel_bytes = bytes[i],
+           .work = repeats.front()->at("work")[i].get<WorkUnits>(),
+           .coverage = CoverageOf(repeats.front()->at("coverage")[i], FrameBounds(measured.plan.setup))};
     for (std::size_t stage = 0; stage < stages.size(); ++stage) box.stage_seconds[stage] = stages[stage][i];
   }
   return measured;
@@ -305,8 +355,29 @@ void FillImages(MeasuredFrame& frame) {
   }
 }
 
-Result<Timeline> Simulate(const MeasuredFrame& frame, const MachineModel& machine, int frames, int in_flight, bool keep_spans) {
-  return SimulateFrames(std::vector<FrameInput>(std::size_t(frames), frame.Input()), machine, {in_flight, keep_spans});
+Result<Timeline> Simulate(const MeasuredFrame& frame, const MachineModel& machine, int frames, int in_flight, bool keep_spans, int teams) {
+  const Roster everybody = RosterOf(int(frame.plan.slots) * teams);
+  std::vector<FramePlan> plans;  // as many as there are different ones
+  for (std::size_t turn = 0; turn < std::min(std::size_t(frames), everybody.slots.size()); ++turn) {
+    const Team team = TeamOf(everybody, std::uint32_t(teams), turn);
+    plans.push_back(TakeTurn(frame.plan, team.roster, team.turn));
+  }
+  std::vector<FrameInput> inputs(std::size_t(frames), frame.Input());
+  for (std::size_t i = 0; i < inputs.size(); ++i) inputs[i].plan = &plans[i % plans.size()];
+  return SimulateFrames(inputs, machine, {in_flight, keep_spans});
+}
+
+Result<double> SteadySeconds(const MeasuredFrame& frame, const MachineModel& machine, int teams) {
+  const std::size_t workers = std::size_t(frame.plan.slots) * std::size_t(teams);
+  const int window = WindowFor(workers, std::uint32_t(teams), FrameBytes(frame.plan.setup)).frames;
+  // Whole rounds of the teams, since they may end together, of which the middle half is looked at.
+  const int frames = 4 * teams * std::max((window + teams - 1) / teams, 4);
+  const Result<Timeline> timeline = Simulate(frame, machine, frames, FramesAhead(window), false, teams);
+  if (!timeline.ok()) return timeline.status();
+  std::vector<double> received;
+  for (const SimulatedFrame& simulated : timeline->frames) received.push_back(simulated.received);
+  std::sort(received.begin(), received.end());
+  return (received[std::size_t(3 * frames / 4) - 1] - received[std::size_t(frames / 4) - 1]) / (frames / 2);
 }
 
 }  // namespace slabstream

@@ -10,6 +10,7 @@
 #include "client/cli/bench_cases.h"
 #include "client/experiment/experiment.h"
 #include "common/image/coverage_map.h"
+#include "common/planning/cost_model.h"
 #include "common/planning/frame_plan.h"
 #include "common/planning/layout.h"
 #include "common/simulation/simulate_frames.h"
@@ -55,9 +56,14 @@ struct LayoutKnowledge {
   std::shared_ptr<const OccupancyGrid> occupied;
   TransferFunction transfer;
   Policy policy;
+  RendererKind renderer = RendererKind::kSplat;
 };
 Result<LayoutKnowledge> KnowLayout(ExperimentContext& context, const FrameCase& frame);
 LayoutRequest LayoutRequestOf(const LayoutKnowledge& knowledge, int workers);
+
+// The same frame by a policy that leaves nothing open: as a coordinator of so many workers, a host each, joined by `link`, would choose it
+// before it has seen a frame. Errors as of KnowLayout and ChoosePolicy.
+Result<FrameCase> WithChosenPolicy(ExperimentContext& context, FrameCase frame, const LinkModel& link);
 
 // Trials without those whose key comes a second time.
 std::vector<Trial> WithoutDoubles(std::vector<Trial> trials);
@@ -69,6 +75,7 @@ struct MeasuredFrame {
     double seconds = 0, first_seconds = 0;
     std::array<double, kStageCount> stage_seconds{};
     double occupied_voxels = 0, drawn_voxels = 0, covered_pixels = 0, voxel_bytes = 0;
+    WorkUnits work{};
     CoverageMap coverage;
   };
   std::vector<Cost> boxes;  // by BoxId; those without a placement cost nothing
@@ -81,13 +88,27 @@ struct MeasuredFrame {
 };
 // Both trials must have been run.
 Result<MeasuredFrame> Recall(ExperimentContext& context, const FrameCase& frame);
+// The same of each repeat of the box costs by itself.
+Result<std::vector<MeasuredFrame>> RecallRepeats(ExperimentContext& context, const FrameCase& frame);
+
+// Numbers of a BoxCostTrial of a plan of the frame, and a plan with them.
+Result<Json> MeasureBoxes(ExperimentContext& context, const FrameCase& frame, const FramePlan& plan);
+MeasuredFrame WithBoxCosts(ExperimentContext& context, const FrameCase& frame, FramePlan plan, const std::vector<const Json*>& repeats);
+
+// Numbers of a BoxCostTrial of a plan of the frame, and a plan with them.
+Result<Json> MeasureBoxes(ExperimentContext& context, const FrameCase& frame, const FramePlan& plan);
+MeasuredFrame WithBoxCosts(ExperimentContext& context, const FrameCase& frame, FramePlan plan, const std::vector<const Json*>& repeats);
 
 // As if every image filled the whole frame, as the paper's did: no empty pixel is left out.
 void FillImages(MeasuredFrame& frame);
 
 // The same frame over and over: what a client sees who asks for `frames` frames, `in_flight` ahead. The first is cold in no sense: voxels
-// are cached and normals made.
+// are cached and normals made. The frame's workers are one of `teams` teams as large (common/planning/team.h).
 Result<Timeline> Simulate(const MeasuredFrame& frame, const MachineModel& machine, int frames = 1, int in_flight = 1,
-                          bool keep_spans = false);
+                          bool keep_spans = false, int teams = 1);
+
+// From picture to picture, of as many frames asked for ahead as keep the service busy: a few more than it has under way.
+Result<double> SteadySeconds(const MeasuredFrame& frame, const MachineModel& machine, int teams = 1);
+inline int FramesAhead(int window) { return window + 2; }
 
 }  // namespace slabstream

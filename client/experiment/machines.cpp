@@ -1,5 +1,7 @@
 #include "client/experiment/machines.h"
 
+#include <tbb/task_arena.h>
+
 #include "client/lab/calibrate.h"
 #include "common/base/check.h"
 
@@ -37,7 +39,9 @@ Trial HostTrial(int workers) {
     for (const Found& number : kNumbers) numbers[number.name] = number.of(*machine);
     // Between hosts pixels travel in messages, where workers of one host lend them to each other.
     const double task = machine->combining.task;
-    machine->combining = MeasureCombining(Transfer::kMessage);
+    // Hosts of a cluster have one thread for it.
+    tbb::task_arena one_thread(1);
+    machine->combining = one_thread.execute([] { return MeasureCombining(Transfer::kMessage); });
     machine->combining.task = task;
     for (const Found& number : kNumbers) numbers[std::string("between_hosts_") + number.name] = number.of(*machine);
     return numbers;
@@ -65,6 +69,7 @@ MachineModel ThisMachine(const ExperimentContext& context, const FrameCase& fram
   machine.link.bytes_per_second = 1e12;
   machine.workers_a_host = frame.workers;
   machine.cores_a_host = int(EstimateOf(context.log(), key, "cores").median);
+  machine.picture_threads = std::min(machine.workers_a_host, machine.cores_a_host);
   machine.memory_slowdown = EstimateOf(context.log(), NeighbourKey(frame), "slowdown").median;
   return machine;
 }
@@ -81,6 +86,8 @@ MachineModel Cluster(const ExperimentContext& context, const LinkModel& link) {
     number.of(machine) = EstimateOf(context.log(), HostKey(1), std::string("between_hosts_") + number.name).median;
   machine.message_seconds = MachineModel().message_seconds;  // over sockets, which threads of a process do without
   machine.link = link;
+  machine.workers_a_host = 1;
+  machine.cores_a_host = kCoresAHost;
   return machine;
 }
 
@@ -91,6 +98,7 @@ MachineModel PaperMachine(const ExperimentContext& context, double frame_seconds
   MachineModel machine = Cluster(context, Link("pvs"));
   machine.link.bytes_per_second = pixels * machine.combining.rgba_bytes / (kImageShare * frame_seconds);
   machine.plan_seconds = machine.message_seconds = machine.client_seconds = 0;
+  machine.cores_a_host = 1;  // its workers were single processors
   machine.combining.task = 0;
   machine.combining.hidden_pixel = 0;
   return machine;

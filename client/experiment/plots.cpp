@@ -25,28 +25,34 @@ int KindOf(Stage stage) {
 
 }  // namespace
 
+AxisSpec WorkersAxis(AxisScale scale) { return {.label = "workers p", .scale = scale, .at_values = true}; }
+
 Figure TimelineFigure(const std::string& name, const std::string& title, const Timeline& timeline, double from, double to,
                       const std::string& caption, std::uint32_t most_workers) {
   constexpr double kMilliseconds = 1e3;
   const std::uint32_t workers = std::min(timeline.workers, most_workers);
   GanttChart chart{title, "ms", Origin::kSimulated, {"render", "combine", "encode", "make the picture", "pixels arrive"}, {}};
   for (std::uint32_t i = 0; i < workers; ++i) {
-    for (const char* what : {"renders", "combines", "receives"}) chart.lanes.push_back({fmt::format("worker {} {}", i + 1, what), {}});
+    for (const char* what : {"renders", "combines", "makes pictures", "receives"})
+      chart.lanes.push_back({fmt::format("worker {} {}", i + 1, what), {}});
   }
-  const auto add = [&](std::uint32_t worker, std::size_t lane, double begin, double end, int kind, std::string hint) {
+  const auto add = [&](std::uint32_t worker, std::size_t lane, double begin, double end, int kind, std::uint32_t frame, std::string hint) {
     if (worker >= workers || end <= from || begin >= to) return;
-    chart.lanes[3 * worker + lane].spans.push_back(
-        {(std::max(begin, from) - from) * kMilliseconds, (std::min(end, to) - from) * kMilliseconds, kind, std::move(hint)});
+    chart.lanes[4 * worker + lane].spans.push_back({(std::max(begin, from) - from) * kMilliseconds,
+                                                    (std::min(end, to) - from) * kMilliseconds, kind, fmt::format("{}", frame + 1),
+                                                    std::move(hint)});
   };
   for (const SimulatedSpan& span : timeline.spans) {
-    add(span.worker, span.lane == Lane::kRender ? 0 : 1, span.begin, span.end, KindOf(span.stage),
+    add(span.worker, std::size_t(span.lane), span.begin, span.end, KindOf(span.stage), span.frame,
         fmt::format("frame {}, group {}, {}", span.frame + 1, span.group + 1, ToString(span.stage)));
   }
   for (const SimulatedMessage& message : timeline.messages) {
-    add(message.to, 2, message.begin, message.end, kReceives,
+    add(message.to, 3, message.begin, message.end, kReceives, message.frame,
         fmt::format("frame {}, group {}, {} bytes from worker {}", message.frame + 1, message.group + 1, FormatNumber(message.bytes),
                     message.from + 1));
   }
+  // What a worker never does needs no room; that it does not render is worth seeing.
+  std::erase_if(chart.lanes, [](const GanttLane& lane) { return lane.spans.empty() && !lane.name.ends_with("renders"); });
   return {name, DrawGantt(chart), caption};
 }
 

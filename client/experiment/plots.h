@@ -4,10 +4,14 @@
 #include <string>
 
 #include "client/experiment/frame_case.h"
+#include "client/experiment/report/axis.h"
 #include "client/experiment/report/document.h"
 #include "common/simulation/timeline.h"
 
 namespace slabstream {
+
+// Numbers of workers, each of which is marked.
+AxisSpec WorkersAxis(AxisScale scale = AxisScale::kLog);
 
 // What the workers do in [from, to) seconds of a simulated run (spans kept): a lane for each thread of a worker, one for what arrives
 // there. The first `most_workers` of them.

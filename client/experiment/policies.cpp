@@ -40,10 +40,4 @@ std::vector<std::string> AllSchemes() {
 
 std::vector<std::string> UsualSchemes() { return {"fan-in", "radix-k"}; }
 
-double SteadySeconds(const Timeline& timeline) {
-  const std::size_t frames = timeline.frames.size(), half = frames / 2;
-  CHECK_GE(half, 1U);
-  return (timeline.frames.back().received - timeline.frames[half - 1].received) / double(frames - half);
-}
-
 }  // namespace slabstream

@@ -24,7 +24,4 @@ std::vector<std::string> AllSchemes();
 // Those that are worth trying with each partition: a tree, a swap.
 std::vector<std::string> UsualSchemes();
 
-// Seconds from picture to picture of a run of many frames, once it flows: over its second half.
-double SteadySeconds(const Timeline& timeline);
-
 }  // namespace slabstream

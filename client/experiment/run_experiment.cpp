@@ -13,16 +13,11 @@
 #include "client/cli/interrupt.h"
 #include "client/experiment/sweep_file.h"
 #include "commit.h"
+#include "common/base/find_named.h"
 #include "common/transport/socket.h"
 
 namespace slabstream {
 namespace {
-
-const Experiment* FindExperiment(std::string_view name) {
-  const auto& all = Experiments();
-  const auto found = std::ranges::find(all, name, &Experiment::name);
-  return found == all.end() ? nullptr : &*found;
-}
 
 // All that decides which trials there are.
 Result<Json> Parameters(const ExperimentOptions& options) {
@@ -62,7 +57,7 @@ std::string ExperimentList() {
 }
 
 Status RunExperiment(const ExperimentOptions& options) {
-  const Experiment* experiment = FindExperiment(options.name);
+  const Experiment* experiment = FindNamed(Experiments(), options.name);
   if (experiment == nullptr) return Status::NotFound(fmt::format("NAME '{}' is no experiment (--list names them)", options.name));
   if (experiment->takes_file != !options.sweep_file.empty()) {
     return Status::InvalidArgument(experiment->takes_file

@@ -15,6 +15,9 @@ struct Estimate {
   double median = 0, low = 0, high = 0;
   double coverage = 0;  // confidence of [low, high], in [0, 1]
   int count = 0;
+
+  // In another unit: factor > 0.
+  Estimate Times(double factor) const { return {median * factor, low * factor, high * factor, coverage, count}; }
 };
 Estimate MedianOf(std::vector<double> values, double confidence = 0.95);  // no values: all zero
 

@@ -142,10 +142,11 @@ Result<Report> RunStreaming(ExperimentContext& context) {
     section.question = fmt::format("{}: how many groups?", volume.purpose);
     section.method = fmt::format(
         "Equal slabs, {0} x {0} pixels, the tree; every slab is rendered alone on one thread, frames are simulated on a switched network "
-        "of 10 Gbit/s with all that a service does around a frame. Efficiency compares picture to picture, {1} frames asked for ahead, "
+        "of 10 Gbit/s with all that a service does around a frame. Efficiency compares picture to picture, as many frames asked for ahead "
+        "as keep all workers busy, "
         "with one worker and one group. A worker must hold the slabs of two groups and their halos; those it has room for besides stay "
         "cached.",
-        streams->pixels, kFramesAhead);
+        streams->pixels);
     section.answer = sentence;
     section.blocks = {Figure{"efficiency-" + volume.dataset, DrawLines(efficiency),
                              "What more groups cost: halos are rendered again and again, and every group has its own combining."},
@@ -154,7 +155,7 @@ Result<Report> RunStreaming(ExperimentContext& context) {
                       std::move(table)};
     const Result<MeasuredFrame> shown = Recall(context, streams->Frame(volume, streams->workers[1], streams->groups[2]));
     if (!shown.ok()) return shown.status();
-    const Result<Timeline> timeline = Simulate(*shown, machine, 3, kFramesAhead, true);
+    const Result<Timeline> timeline = Simulate(*shown, machine, 3, 3, true);
     if (!timeline.ok()) return timeline.status();
     section.blocks.emplace_back(TimelineFigure(
         "timeline-" + volume.dataset, fmt::format("Three frames, p = {}, {} groups", streams->workers[1], streams->groups[2]), *timeline, 0,

@@ -94,10 +94,18 @@ class Value {
 };
 
 template <class Entries>
-std::vector<std::string_view> NamesOf(const Entries& entries) {
+std::vector<std::string_view> NamesIn(const Entries& entries) {
   std::vector<std::string_view> names;
   for (const auto& entry : entries) names.push_back(entry.name);
   return names;
+}
+
+// With the choice to leave it open.
+template <class Entries>
+std::string ReadName(const Value& value, const Entries& entries) {
+  std::vector<std::string_view> names = NamesIn(entries);
+  if (std::ranges::find(names, kAutomatic) == names.end()) names.push_back(kAutomatic);
+  return std::string(names[value.OneOf(names)]);
 }
 
 BenchCase ReadVolume(const Value& value) {
@@ -160,20 +168,23 @@ SweepPolicy ReadPolicy(const Value& value) {
   Policy& policy = read.policy;
   policy.groups = 1;
   constexpr std::array<std::string_view, 4> kAxes = {"x", "y", "z", "auto"};
-  value.Fields(
-      {{"name", [&](const Value& v) { read.name = v.Text(); }},
-       {"decomposition", [&](const Value& v) { policy.decomposition = NamesOf(Decompositions())[v.OneOf(NamesOf(Decompositions()))]; }},
-       {"split", [&](const Value& v) { policy.split = NamesOf(WorkSplits())[v.OneOf(NamesOf(WorkSplits()))]; }},
-       {"assignment", [&](const Value& v) { policy.assignment = NamesOf(Assignments())[v.OneOf(NamesOf(Assignments()))]; }},
-       {"axis", [&](const Value& v) { policy.axis = AxisChoice(v.OneOf(kAxes)); }},
-       {"groups", [&](const Value& v) { policy.groups = v.Integer(1, kMaxGroups); }},
-       {"combine", [&](const Value& v) {
-          policy.combine = v.Text();
-          if (const auto parsed = ParseCombining(policy.combine); !parsed.ok()) v.Complain(parsed.status().message());
-        }}});
-  if (read.name.empty())
-    read.name =
-        fmt::format("{} by {}, {}, {} groups, {}", policy.decomposition, SplitOf(policy), policy.assignment, policy.groups, policy.combine);
+  value.Fields({{"name", [&](const Value& v) { read.name = v.Text(); }},
+                {"decomposition", [&](const Value& v) { policy.decomposition = ReadName(v, Decompositions()); }},
+                {"split", [&](const Value& v) { policy.split = ReadName(v, WorkSplits()); }},
+                {"assignment", [&](const Value& v) { policy.assignment = ReadName(v, Assignments()); }},
+                {"axis", [&](const Value& v) { policy.axis = AxisChoice(v.OneOf(kAxes)); }},
+                {"balance", [&](const Value& v) { policy.balance = NamesIn(BalanceModes())[v.OneOf(NamesIn(BalanceModes()))]; }},
+                {"pixel_error",
+                 [&](const Value& v) {
+                   policy.pixel_error = v.Number({0, kMaxPixelError});
+                 }},
+                {"groups", [&](const Value& v) { policy.groups = v.Integer(1, kMaxGroups); }},
+                {"combine", [&](const Value& v) {
+                   policy.combine = v.Text();
+                   if (policy.combine == kAutomatic) return;
+                   if (const auto parsed = ParseCombining(policy.combine); !parsed.ok()) v.Complain(parsed.status().message());
+                 }}});
+  if (read.name.empty()) read.name = Describe(policy);
   return read;
 }
 
@@ -200,6 +211,11 @@ void CheckNamesDiffer(const std::vector<T>& entries, const char* list, std::opti
 }
 
 }  // namespace
+
+std::string Describe(const Policy& policy) {
+  return fmt::format("{} by {}, {}, {}, {} groups, {}{}", policy.decomposition, SplitOf(policy), policy.assignment, policy.balance,
+                     policy.groups, policy.combine, policy.pixel_error > 0 ? fmt::format(", error {}", policy.pixel_error) : "");
+}
 
 Result<Sweep> ParseSweep(const std::string& path, std::string_view text) {
   std::optional<std::string> mistake;

@@ -41,6 +41,9 @@ struct Sweep {
   ImageSize size{512, 512};
 };
 
+// What a policy is called that has no name of its own.
+std::string Describe(const Policy& policy);
+
 // InvalidArgument in one line naming `path`, the field by its place ("policies[1].combine"), the value and what is allowed; a volume file
 // that is not there is NotFound.
 Result<Sweep> ParseSweep(const std::string& path, std::string_view text);

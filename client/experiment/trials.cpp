@@ -84,14 +84,20 @@ std::vector<double> ValuesOf(const TrialLog& log, const Json& key, const std::st
   return values;
 }
 
-std::vector<double> MediansOf(const std::vector<const Json*>& repeats, const std::string& list) {
+std::vector<Estimate> EstimatesOf(const std::vector<const Json*>& repeats, const std::string& list) {
   CHECK(!repeats.empty()) << list;
-  std::vector<double> medians;
+  std::vector<Estimate> estimates;
   for (std::size_t i = 0; i < Field(*repeats.front(), list).size(); ++i) {
     std::vector<double> values;
     for (const Json* numbers : repeats) values.push_back(Field(*numbers, list).at(i).get<double>());
-    medians.push_back(MedianOf(std::move(values)).median);
+    estimates.push_back(MedianOf(std::move(values)));
   }
+  return estimates;
+}
+
+std::vector<double> MediansOf(const std::vector<const Json*>& repeats, const std::string& list) {
+  std::vector<double> medians;
+  for (const Estimate& estimate : EstimatesOf(repeats, list)) medians.push_back(estimate.median);
   return medians;
 }
 

@@ -32,7 +32,8 @@ Status RunTrials(const std::vector<Trial>& trials, const TrialSchedule& schedule
 // All repeats of a number, which is named or, with a slash in front, found by its JSON pointer. CHECKs that the trial was run and has it.
 std::vector<double> ValuesOf(const TrialLog& log, const Json& key, const std::string& number);
 inline Estimate EstimateOf(const TrialLog& log, const Json& key, const std::string& number) { return MedianOf(ValuesOf(log, key, number)); }
-// The same where the number is a list, entry by entry: the medians over `repeats`, which hold lists of one length.
+// The same where the number is a list, entry by entry, over `repeats`, which hold lists of one length.
+std::vector<Estimate> EstimatesOf(const std::vector<const Json*>& repeats, const std::string& list);
 std::vector<double> MediansOf(const std::vector<const Json*>& repeats, const std::string& list);
 
 }  // namespace slabstream

@@ -1,10 +1,13 @@
 #include "client/experiment/volumes.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <filesystem>
 
 #include "common/classification/count_occupied.h"
 #include "common/planning/frame_plan.h"
+#include "common/planning/render_work.h"
 
 namespace slabstream {
 
@@ -28,16 +31,22 @@ Result<VolumeInUse> VolumeCache::Get(const BenchCase& volume) {
 }
 
 Result<std::shared_ptr<const OccupancyGrid>> VolumeCache::Occupied(const BenchCase& volume) {
-  std::shared_ptr<const OccupancyGrid>& grid = occupied_[volume.name];
+  std::shared_ptr<const OccupancyGrid>& grid = occupied_[{volume.name, volume.renderer}];
   if (grid != nullptr) return grid;
   const Result<VolumeInUse> in_use = Get(volume);
   if (!in_use.ok()) return in_use.status();
   const VolumeSummary& summary = *in_use->summary;
   const Result<TransferFunction> transfer = ResolveTransfer(volume.transfer, summary);
   if (!transfer.ok()) return transfer.status();
-  grid =
-      std::make_shared<const OccupancyGrid>(CountOccupied(in_use->volume->block, Classify(*transfer, summary.description, summary.range)));
+  grid = std::make_shared<const OccupancyGrid>(CountOccupied(in_use->volume->block, DrawnTable(*transfer, summary, volume.renderer)));
   return grid;
+}
+
+std::string TitleOf(const BenchCase& volume) {
+  const auto* sphere = std::get_if<SphereRequest>(&volume.volume);
+  if (sphere == nullptr) return volume.dataset;
+  return fmt::format("class {}, N = {}, {:.3g} % occupied", sphere->sphere_class == SphereClass::kHollow ? "I" : "II", sphere->size,
+                     sphere->occupancy * 100);
 }
 
 Result<std::vector<BenchCase>> RealVolumes(const std::vector<std::string>& named) {

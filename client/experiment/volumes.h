@@ -27,7 +27,7 @@ class VolumeCache {
   explicit VolumeCache(std::size_t budget_bytes = std::size_t{1} << 30) : budget_bytes_(budget_bytes) {}
   // Made or read where it is not held. Cases of one dataset share their volume.
   Result<VolumeInUse> Get(const BenchCase& volume);
-  // Which voxels its transfer function shows.
+  // Which voxels its renderer draws under its transfer function.
   Result<std::shared_ptr<const OccupancyGrid>> Occupied(const BenchCase& volume);
 
  private:
@@ -36,9 +36,12 @@ class VolumeCache {
     VolumeInUse volume;
   };
   std::size_t budget_bytes_;
-  std::list<Held> held_;                                                  // last used first
-  std::map<std::string, std::shared_ptr<const OccupancyGrid>> occupied_;  // by name of the case
+  std::list<Held> held_;                                                                           // last used first
+  std::map<std::pair<std::string, RendererKind>, std::shared_ptr<const OccupancyGrid>> occupied_;  // by name of the case
 };
+
+// What reports call it: "class I, N = 300, 5 % occupied"; a file by its dataset's name.
+std::string TitleOf(const BenchCase& volume);
 
 // What the user named, or the brain and its like where they are installed: real volumes beside the spheres. Errors of ParseBenchCase.
 Result<std::vector<BenchCase>> RealVolumes(const std::vector<std::string>& named);

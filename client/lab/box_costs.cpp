@@ -49,6 +49,12 @@ std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FrameSetup& set
   return costs;
 }
 
+std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FramePlan& plan, int repeats) {
+  std::vector<Box> boxes;
+  for (const Placement& placement : PlacementsOf(plan)) boxes.push_back(placement.box);
+  return MeasureBoxCosts(volume, plan.setup, boxes, repeats);
+}
+
 double Imbalance(std::span<const double> seconds) {
   const double sum = std::accumulate(seconds.begin(), seconds.end(), 0.0);
   return sum > 0 ? *std::max_element(seconds.begin(), seconds.end()) * double(seconds.size()) / sum : 1;

@@ -33,6 +33,9 @@ struct BoxCost {
 // later renderings of each. Nothing is hidden by other boxes. On the calling thread alone.
 std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FrameSetup& setup, std::span<const Box> boxes, int repeats);
 
+// The boxes that a plan has rendered, by the order of PlacementsOf(plan).
+std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FramePlan& plan, int repeats);
+
 // Largest / mean of the boxes' `seconds`: 1 is perfect balance. With `slots` owners of several boxes each, sum their boxes first. 1 where
 // nothing costs anything.
 double Imbalance(std::span<const double> seconds);

@@ -78,7 +78,7 @@ Result<double> SmallFrameSeconds(int workers) {
     }
     seconds.push_back(double(picture->latency.count() - render_ns - picture_ns) * 1e-9);
   }
-  return MedianOf(std::move(seconds));
+  return UpperMedian(std::move(seconds));
 }
 
 }  // namespace
@@ -106,10 +106,8 @@ CombiningCosts MeasureCombining(Transfer transfer) {
   // full = (scan + encode) pixels, half = (scan + encode / 2) pixels
   costs.encode_pixel = std::max(2 * (encode_full - encode_half) / kPixels, 0.0);
   costs.scan_pixel = std::max(encode_full / kPixels - costs.encode_pixel, 0.0);
-  const double combine = FastestOf([&] {
-    CHECK(ValidateRuns(full_runs.header, full_runs.payload, full.bounds).ok());
-    CombineRuns(target, full_runs.header, full_runs.payload, Side::kBack, full.bounds);
-  });
+  const double combine =
+      FastestOf([&] { CHECK(CombineRuns(target, full_runs.header, full_runs.payload, full.bounds, Side::kBack, full.bounds).ok()); });
   costs.combine_pixel = combine / kPixels;
   return costs;
 }
@@ -170,6 +168,7 @@ Result<MachineModel> CalibrateThisHost(int workers) {
   machine.plan_seconds = machine.message_seconds = 0;  // in these
   machine.workers_a_host = workers;
   machine.cores_a_host = int(std::max(std::thread::hardware_concurrency(), 1U));
+  machine.picture_threads = std::min(workers, machine.cores_a_host);  // as worker/thread_share.h has it
 
   const Volume sphere = MakeSphere({SphereClass::kFilled, kSlowdownVolume, 0.4}).value();
   FrameRequest request;

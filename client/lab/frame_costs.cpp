@@ -43,22 +43,26 @@ PictureCost MeasurePictureCost(const Volume& volume, const FrameSetup& setup, in
   struct MadeAnswer {
     EncodedRuns header;
     Bytes payload;
-    PixelBounds bounds;  // from (0, 0)
   };
-  const auto finish = [&](const LocalImage& frame) {
-    MadeAnswer answer;
-    const auto encode = [&](const LocalImage& picture) {
-      answer.bounds = {0, 0, std::max(picture.bounds.x_end, 1), std::max(picture.bounds.y_end, 1)};
-      RunImage runs = EncodeRuns(picture, {0, std::uint64_t(answer.bounds.pixel_count())}, answer.bounds.x_end);
-      answer.header.image = runs.header;
-      answer.payload = PackRuns(Bytes(std::move(runs.payload)), Codec::kRaw, answer.header);
-    };
+  // As the display worker does (worker/executor.cpp).
+  const auto finish = [&](LocalImage& frame) {
+    RunImage runs;
     if (FrameIsPicture(setup)) {
-      encode(frame);
+      runs = EncodePicture(frame);
     } else {
-      encode(FinishPicture(frame, setup));
+      FillRows(frame);
+      runs = EncodePicture(FinishPicture(frame, setup));
     }
+    MadeAnswer answer;
+    answer.header.image = runs.header;
+    answer.payload = PackRuns(Bytes(std::move(runs.payload)), Codec::kRaw, answer.header);
     return answer;
+  };
+  // As the client does (client/client.cpp).
+  const auto receive = [](const MadeAnswer& answer) {
+    const Bytes runs = UnpackRuns(answer.header, answer.payload).value();
+    const PixelBounds& bounds = answer.header.image.bounds;
+    CHECK(ReadRuns(answer.header.image, runs.span(), {0, 0, std::max(bounds.x_end, 1), std::max(bounds.y_end, 1)}).ok());
   };
 
   std::deque<MadeAnswer> kept;
@@ -74,29 +78,17 @@ PictureCost MeasurePictureCost(const Volume& volume, const FrameSetup& setup, in
     frame = render();
     kept.pop_front();
     finish_seconds.push_back(on_another_thread([&] { kept.push_back(finish(frame)); }));
-    const MadeAnswer& answer = kept.back();
-    receive_seconds.push_back(on_another_thread([&] {
-      const Bytes runs = UnpackRuns(answer.header, answer.payload).value();
-      CHECK(ValidateRuns(answer.header.image, runs.span(), answer.bounds).ok());
-      CHECK(DecodeRuns(answer.header.image, runs.span()).bounds == answer.header.image.bounds);
-    }));
+    receive_seconds.push_back(on_another_thread([&] { receive(kept.back()); }));
   }
-  return {MedianOf(std::move(finish_seconds)), MedianOf(std::move(receive_seconds))};
+  return {UpperMedian(std::move(finish_seconds)), UpperMedian(std::move(receive_seconds))};
 }
 
 FrameCosts MeasureFrameCosts(const Volume& volume, const FramePlan& plan, int repeats) {
   FrameCosts costs;
   costs.boxes.resize(plan.layout.partition.boxes().size());
-  std::vector<Box> boxes;
-  std::vector<BoxId> ids;
-  for (const GroupPlan& group : plan.groups) {
-    for (const Placement& placement : group.placements) {
-      boxes.push_back(placement.box);
-      ids.push_back(placement.id);
-    }
-  }
-  std::vector<BoxCost> measured = MeasureBoxCosts(volume, plan.setup, boxes, repeats);
-  for (std::size_t i = 0; i < ids.size(); ++i) costs.boxes[ids[i]] = std::move(measured[i]);
+  const std::vector<Placement> placements = PlacementsOf(plan);
+  std::vector<BoxCost> measured = MeasureBoxCosts(volume, plan, repeats);
+  for (std::size_t i = 0; i < placements.size(); ++i) costs.boxes[placements[i].id] = std::move(measured[i]);
   costs.picture = MeasurePictureCost(volume, plan.setup, repeats);
   return costs;
 }

@@ -13,6 +13,8 @@
 
 #include "client/lab/calibrate.h"
 #include "common/combining/schemes.h"
+#include "common/planning/placement.h"
+#include "common/planning/policy_names.h"
 #include "common/simulation/simulate_frames.h"
 
 namespace slabstream {
@@ -75,10 +77,7 @@ void MakeReplayed(const RecordedFrame& frame, const ReplayChange& change, Replay
       out.input.boxes.push_back({rank.render_seconds, &out.coverage.back(), 0});
     }
     if (group.placements.empty()) continue;
-    const auto root = std::find_if(group.placements.begin(), group.placements.end(),
-                                   [&](const Placement& placement) { return placement.worker == plan.display; });
-    const Rank root_rank = root == group.placements.end() ? 0 : Rank(root - group.placements.begin());
-    group.schedule = scheme.Make({Rank(group.placements.size()), root_rank, WholeFrame(plan.setup)});
+    group.schedule = scheme.Make({Rank(group.placements.size()), RootOf(group, plan.display), WholeFrame(plan.setup)});
   }
   out.input.plan = &plan;
   out.input.finish_seconds = frame.picture_seconds;
@@ -173,6 +172,9 @@ Result<ReplayChange> ParseReplayChange(std::span<const std::string> texts) {
         (key == "combine" && !change.combine.empty()) || (key == "link" && change.link) || (key == "workers" && change.workers);
     if (again) return Status::InvalidArgument(fmt::format("--with {}: {} is given twice", text, key));
     if (key == "combine") {
+      if (value == kAutomatic) {
+        return Status::InvalidArgument(fmt::format("--with {}: a replay asks what one scheme would have done, so it must be named", text));
+      }
       if (const auto scheme = ParseCombining(value); !scheme.ok()) {
         return Status::InvalidArgument(fmt::format("--with {}: {}", text, scheme.status().message()));
       }

@@ -26,7 +26,7 @@ double SecondsOf(Work&& work) {
 }
 
 // Of at least one value; the upper one of the two in the middle.
-inline double MedianOf(std::vector<double> values) {
+inline double UpperMedian(std::vector<double> values) {
   const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;

@@ -31,7 +31,7 @@ FrameParts Median(const std::vector<FrameParts>& frames) {
   const auto median = [&](double FrameParts::*part) {
     std::vector<double> values;
     for (const FrameParts& frame : frames) values.push_back(frame.*part);
-    return MedianOf(std::move(values));
+    return UpperMedian(std::move(values));
   };
   return {median(&FrameParts::render), median(&FrameParts::picture), median(&FrameParts::latency)};
 }

@@ -140,16 +140,25 @@ void FrameSimulation::CoordinatorTakes(double now) { coordinator_free_ = std::ma
 
 void FrameSimulation::HandOutGroups() {
   while (true) {
-    std::uint32_t unfinished = 0;
-    for (const std::uint32_t frame : in_flight_) unfinished += frames_[frame].next_group - frames_[frame].groups_done;
-    if (unfinished >= std::uint32_t(kGroupWindow)) return;
-    const auto open = std::find_if(in_flight_.begin(), in_flight_.end(),
-                                   [&](std::uint32_t frame) { return frames_[frame].next_group < plan(frame).groups.size(); });
+    std::uint32_t unfinished = 0, teams = 1;
+    std::int64_t frame_bytes = 0;
+    const auto open_groups = [&](std::uint32_t frame) { return frames_[frame].next_group - frames_[frame].groups_done; };
+    for (const std::uint32_t frame : in_flight_) {
+      unfinished += open_groups(frame);
+      frame_bytes = std::max(frame_bytes, FrameBytes(plan(frame).setup));
+      teams = std::max(teams, plan(frame).turn.teams);
+    }
+    const FrameWindow window = WindowFor(workers_.size(), teams, frame_bytes);
+    if (unfinished >= std::uint32_t(window.groups)) return;
+    const auto open = std::find_if(in_flight_.begin(), in_flight_.end(), [&](std::uint32_t frame) {
+      const bool masked = UsesOcclusion(plan(frame).setup);
+      return frames_[frame].next_group < plan(frame).groups.size() && (!masked || open_groups(frame) < std::uint32_t(kMaskedGroups));
+    });
     if (open != in_flight_.end()) {
       HandOut(*open);
       continue;
     }
-    if (waiting_.empty() || in_flight_.size() >= std::size_t(kMaxFramesInFlight)) return;
+    if (waiting_.empty() || in_flight_.size() >= std::size_t(window.frames)) return;
     const std::uint32_t frame = waiting_.front();
     waiting_.pop_front();
     in_flight_.push_back(frame);
@@ -211,15 +220,44 @@ void FrameSimulation::AddRender(std::uint32_t frame, std::uint32_t group, Rank r
   const std::uint32_t worker = IndexOf(plan(frame).groups[group].placements[rank].worker);
   workers_[worker].renders.insert({frame, group, rank});
   StartRender(worker);
+  if (!options_.steal) return;
+  for (std::uint32_t thief = 0; thief < workers_.size() && !workers_[worker].renders.empty(); ++thief) StartRender(thief);
+}
+
+double FrameSimulation::RenderSeconds(const Render& render) const {
+  const auto& [frame, group, rank] = render;
+  return inputs_[frame].boxes[plan(frame).groups[group].placements[rank].id].seconds;
+}
+
+// What a worker renders next, and in whose queue that waits.
+std::optional<std::pair<std::uint32_t, FrameSimulation::Render>> FrameSimulation::NextRender(std::uint32_t worker) const {
+  std::optional<std::pair<std::uint32_t, Render>> next;
+  const auto consider = [&](std::uint32_t owner, const Render& render) {
+    const auto group_of = [](const Render& r) { return std::pair(std::get<0>(r), std::get<1>(r)); };
+    if (next && group_of(next->second) < group_of(render)) return;
+    if (next && group_of(next->second) == group_of(render) && RenderSeconds(next->second) >= RenderSeconds(render)) return;
+    next = {owner, render};
+  };
+  if (!options_.steal) {
+    const std::set<Render>& own = workers_[worker].renders;
+    if (!own.empty()) next = {worker, *own.begin()};
+    return next;
+  }
+  for (std::uint32_t owner = 0; owner < workers_.size(); ++owner) {
+    for (const Render& render : workers_[owner].renders) consider(owner, render);
+  }
+  return next;
 }
 
 void FrameSimulation::StartRender(std::uint32_t index) {
   Worker& worker = workers_[index];
-  if (worker.rendering || worker.renders.empty()) return;
-  const auto [frame, group, rank] = *worker.renders.begin();
-  worker.renders.erase(worker.renders.begin());
-  worker.rendering = true;
-  const double seconds = inputs_[frame].boxes[plan(frame).groups[group].placements[rank].id].seconds;
+  if (worker.busy[std::size_t(Lane::kRender)]) return;
+  const auto next = NextRender(index);
+  if (!next) return;
+  const auto& [owner, render] = *next;
+  const auto [frame, group, rank] = render;
+  const double seconds = RenderSeconds(render);
+  workers_[owner].renders.erase(render);
   Start({.work = Work::kRender,
          .frame = frame,
          .group = group,
@@ -231,24 +269,34 @@ void FrameSimulation::StartRender(std::uint32_t index) {
 
 // ---------------------------------------------------------------- combining
 
-void FrameSimulation::AddCombine(Task task) {
-  const std::uint32_t worker = task.worker;
-  workers_[worker].combines.push_back(task);
-  StartCombine(worker);
+Lane FrameSimulation::LaneOf(Work work) {
+  switch (work) {
+    case Work::kRender: return Lane::kRender;
+    case Work::kFinish: return Lane::kFinish;
+    case Work::kEncode:
+    case Work::kCombine:
+    case Work::kEncodeGroup:
+    case Work::kAccumulate: break;
+  }
+  return Lane::kCombine;
 }
 
-void FrameSimulation::StartCombine(std::uint32_t index) {
-  Worker& worker = workers_[index];
-  if (worker.combining || worker.combines.empty()) return;
-  worker.combining = true;
-  const Task task = worker.combines.front();
-  worker.combines.pop_front();
+void FrameSimulation::AddCombine(const Task& task) {
+  workers_[task.worker].combines.push_back(task);
+  StartNext(task.worker, Lane::kCombine, workers_[task.worker].combines);
+}
+
+void FrameSimulation::StartNext(std::uint32_t worker, Lane lane, std::deque<Task>& tasks) {
+  if (workers_[worker].busy[std::size_t(lane)] || tasks.empty()) return;
+  const Task task = tasks.front();
+  tasks.pop_front();
   Start(task);
 }
 
 // All threads but the first are of no help for a part of the work.
 void FrameSimulation::Start(Task task) {
   task.begin = now_;
+  workers_[task.worker].busy[std::size_t(LaneOf(task.work))] = true;
   const double seconds = task.seconds * (1 + (task.threads - 1) * machine_.serial_share) / task.threads / SpeedOf(task.worker);
   const std::uint32_t host = task.worker / std::uint32_t(std::max(machine_.workers_a_host, 1));
   processors_.Start(host, tasks_started_, seconds, task.threads, now_);
@@ -259,12 +307,12 @@ void FrameSimulation::OnDone(const Task& task) {
   Frame& frame = frames_[task.frame];
   SimulatedFrame& result = timeline_.frames[task.frame];
   Worker& worker = workers_[task.worker];
-  const Lane lane = task.work == Work::kRender ? Lane::kRender : Lane::kCombine;
+  const Lane lane = LaneOf(task.work);
   const Stage stage = task.work == Work::kRender                                      ? Stage::kRender
                       : task.work == Work::kFinish                                    ? Stage::kResolve
                       : task.work == Work::kEncode || task.work == Work::kEncodeGroup ? Stage::kEncode
                                                                                       : Stage::kCombine;
-  (lane == Lane::kRender ? worker.rendering : worker.combining) = false;
+  worker.busy[std::size_t(lane)] = false;
   result.stage_seconds[std::size_t(stage)] += now_ - task.begin;
   frame.busy[task.worker].emplace_back(task.begin, now_);
   if (options_.keep_spans) timeline_.spans.push_back({task.frame, task.group, task.worker, lane, task.rank, stage, task.begin, now_});
@@ -304,12 +352,13 @@ void FrameSimulation::OnDone(const Task& task) {
     case Work::kFinish: Post(now_ + machine_.link.latency_seconds, Arrival::kPicture, task.frame); break;
   }
   StartRender(task.worker);
-  StartCombine(task.worker);
+  StartNext(task.worker, Lane::kCombine, worker.combines);
+  StartNext(task.worker, Lane::kFinish, worker.finishes);
 }
 
 void FrameSimulation::SendPixels(SimulatedMessage message, const UnionCoverage::Amount& amount, Arrival what, std::uint32_t number) {
   message.pixels = amount.filled;
-  message.bytes = MessageBytes(message.frame, amount);
+  message.bytes = MessageBytes(message, amount);
   message.ready = now_;
   const Network::Passage passage = network_.Send(message.from, message.to, message.bytes, now_);
   message.begin = passage.begin;
@@ -333,7 +382,9 @@ void FrameSimulation::Advance(std::uint32_t frame, std::uint32_t group_index, Ra
       continue;
     }
     const Step& step = group_plan.schedule.steps[taken.step];
-    const UnionCoverage::Amount amount = AmountOf(group, taken.parts);
+    // What arrives is what was sent.
+    const UnionCoverage::Amount amount =
+        taken.kind == ScheduleRun::Kind::kReceive ? group.messages.at(taken.step).amount : AmountOf(group, taken.parts);
     Task task{
         .frame = frame, .group = group_index, .worker = IndexOf(group_plan.placements[rank].worker), .rank = rank, .step = taken.step};
     switch (taken.kind) {
@@ -418,12 +469,14 @@ void FrameSimulation::OnAccumulated(std::uint32_t number) {
   frame.groups.erase(group);
   Post(now_ + machine_.link.latency_seconds, Arrival::kGroupDone, number, group);
   if (frame.accumulated < plan(number).groups.size()) return Accumulate(number);
-  AddCombine({.work = Work::kFinish,
-              .frame = number,
-              .group = group,
-              .worker = display(number),
-              .seconds = inputs_[number].finish_seconds,
-              .threads = double(machine_.threads)});
+  Worker& worker = workers_[display(number)];
+  worker.finishes.push_back({.work = Work::kFinish,
+                             .frame = number,
+                             .group = group,
+                             .worker = display(number),
+                             .seconds = inputs_[number].finish_seconds,
+                             .threads = double(std::max(machine_.threads, machine_.picture_threads))});
+  StartNext(display(number), Lane::kFinish, worker.finishes);
 }
 
 // ---------------------------------------------------------------- quantities
@@ -434,10 +487,12 @@ UnionCoverage::Amount FrameSimulation::AmountOf(const Group& group, const Parts&
   return amount;
 }
 
-double FrameSimulation::MessageBytes(std::uint32_t frame, const UnionCoverage::Amount& amount) const {
+double FrameSimulation::MessageBytes(const SimulatedMessage& message, const UnionCoverage::Amount& amount) const {
   const CombiningCosts& costs = machine_.combining;
-  const bool rgba = FormatOf(plan(frame).setup.renderer) == PixelFormat::kRgba;
-  return amount.filled * (rgba ? costs.rgba_bytes : costs.depth_bytes) + amount.runs * costs.run_bytes;
+  const bool rgba = FormatOf(plan(message.frame).setup.renderer) == PixelFormat::kRgba;
+  const ColorCoding color = plan(message.frame).groups[message.group].color;
+  const double color_share = double(BytesPerChannel(color)) / double(BytesPerChannel(ColorCoding::kFloat32));
+  return amount.filled * (rgba ? costs.rgba_bytes * color_share : costs.depth_bytes) + amount.runs * costs.run_bytes;
 }
 
 double FrameSimulation::EncodeSeconds(const UnionCoverage::Amount& amount) const {

@@ -4,6 +4,7 @@
 // events at the same time the one that was caused first goes first.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -51,10 +52,11 @@ class FrameSimulation {
     double seconds = 0, threads = 1;
     double begin = 0;
   };
+  using Render = std::tuple<std::uint32_t, std::uint32_t, Rank>;  // frame, group and rank
   struct Worker {
-    std::set<std::tuple<std::uint32_t, std::uint32_t, Rank>> renders;  // frame, group and rank, that have their voxels
-    bool rendering = false, combining = false;
-    std::deque<Task> combines;
+    std::set<Render> renders;    // that have their voxels
+    std::array<bool, 3> busy{};  // by lane
+    std::deque<Task> combines, finishes;
   };
   using Parts = ScheduleRun::Parts;
   struct Message {  // encoded, on its way
@@ -95,8 +97,11 @@ class FrameSimulation {
   void OnAssignment(std::uint32_t frame, std::uint32_t group, std::uint32_t worker);
   void AddRender(std::uint32_t frame, std::uint32_t group, Rank rank);
   void StartRender(std::uint32_t worker);
-  void AddCombine(Task task);
-  void StartCombine(std::uint32_t worker);
+  double RenderSeconds(const Render& render) const;
+  std::optional<std::pair<std::uint32_t, Render>> NextRender(std::uint32_t worker) const;
+  void AddCombine(const Task& task);
+  void StartNext(std::uint32_t worker, Lane lane, std::deque<Task>& tasks);
+  static Lane LaneOf(Work work);
   void Start(Task task);
   void OnDone(const Task& task);
   void Advance(std::uint32_t frame, std::uint32_t group, Rank rank);
@@ -106,7 +111,7 @@ class FrameSimulation {
   void OnAccumulated(std::uint32_t frame);
 
   UnionCoverage::Amount AmountOf(const Group& group, const Parts& parts) const;
-  double MessageBytes(std::uint32_t frame, const UnionCoverage::Amount& amount) const;
+  double MessageBytes(const SimulatedMessage& message, const UnionCoverage::Amount& amount) const;
   double EncodeSeconds(const UnionCoverage::Amount& amount) const;
   void SendPixels(SimulatedMessage message, const UnionCoverage::Amount& amount, Arrival what, std::uint32_t number);
   double SpeedOf(std::uint32_t worker) const;

@@ -2,9 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <charconv>
 #include <limits>
+
+#include "common/base/find_named.h"
 
 namespace slabstream {
 namespace {
@@ -46,12 +47,9 @@ const std::vector<LinkPreset>& LinkPresets() {
 Result<LinkModel> ParseLink(std::string_view option, std::string_view text) {
   const std::size_t colon = text.find(':');
   const std::string_view name = text.substr(0, colon);
-  const std::vector<LinkPreset>& presets = LinkPresets();
-  const auto preset = std::find_if(presets.begin(), presets.end(), [&](const LinkPreset& p) { return p.name == name; });
-  if (preset == presets.end()) {
-    std::string known;
-    for (const LinkPreset& p : presets) known += (known.empty() ? "" : ", ") + std::string(p.name);
-    return Status::InvalidArgument(fmt::format("{}: '{}' is no link, but must be one of: {}", option, name, known));
+  const LinkPreset* preset = FindNamed(LinkPresets(), name);
+  if (preset == nullptr) {
+    return Status::InvalidArgument(fmt::format("{}: '{}' is no link, but must be one of: {}", option, name, NamesOf(LinkPresets())));
   }
   LinkModel link = preset->link;
   if (colon == std::string_view::npos) return link;

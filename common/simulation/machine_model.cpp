@@ -43,6 +43,7 @@ Status Validate(const MachineModel& machine) {
   if (Status s = InRange("stragglers.probability", machine.stragglers.probability, 0, 1); !s.ok()) return s;
   if (Status s = InRange("stragglers.factor", machine.stragglers.factor, 1, 1e6); !s.ok()) return s;
   if (Status s = InRange("threads", machine.threads, 1, 4096); !s.ok()) return s;
+  if (Status s = InRange("picture_threads", machine.picture_threads, 0, 4096); !s.ok()) return s;
   if (Status s = InRange("serial_share", machine.serial_share, 0, 1); !s.ok()) return s;
   if (Status s = InRange("workers_a_host", machine.workers_a_host, 0, 1 << 20); !s.ok()) return s;
   if (Status s = InRange("cores_a_host", machine.cores_a_host, 1, 1 << 20); !s.ok()) return s;

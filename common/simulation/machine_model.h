@@ -19,7 +19,7 @@ struct CombiningCosts {
   double hidden_pixel = 0.1e-9;   // of the frame: in search of opaque tiles (FindHiddenTiles)
   double task = 10e-6;            // from being ordered to begun, and from done to known
   std::int32_t run_bytes = 12;    // a run in a message
-  std::int32_t rgba_bytes = 16;   // a pixel in a message: splatting
+  std::int32_t rgba_bytes = 16;   // a pixel in a message: splatting, colours as floats
   std::int32_t depth_bytes = 24;  // and Z-buffer
   friend bool operator==(const CombiningCosts&, const CombiningCosts&) = default;
 };
@@ -37,7 +37,8 @@ struct MachineModel {
   CombiningCosts combining;
   std::vector<double> speeds;  // of the workers, relative, > 0; worker i has speeds[i % size()]. Empty: all 1
   Stragglers stragglers;
-  std::int32_t threads = 1;  // that render, of each worker
+  std::int32_t threads = 1;          // that render, of each worker
+  std::int32_t picture_threads = 0;  // that make a picture: workers of one process lend each other theirs. Fewer than `threads`: these
   // How the picture's making (resampling, encoding) and rendering gain from n threads: n / (1 + (n - 1) * serial_share).
   double serial_share = 0.02;
 

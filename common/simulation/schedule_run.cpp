@@ -1,66 +1,30 @@
 #include "common/simulation/schedule_run.h"
 
 #include <algorithm>
-#include <map>
 #include <utility>
 
 #include "common/base/check.h"
 
 namespace slabstream {
-namespace {
-
-// Of one rank: the latest step that touches a pixel.
-class LatestSteps {
- public:
-  // Calls before(step) for each latest step in `pixels`, once each, and puts `step` in their place.
-  template <class Before>
-  void Replace(PixelRange pixels, std::uint32_t step, Before&& before) {
-    CutAt(pixels.begin);
-    CutAt(pixels.end);
-    std::vector<std::uint32_t> found;
-    const auto end = latest_.lower_bound(pixels.end);
-    for (auto it = latest_.lower_bound(pixels.begin); it != end; it = latest_.erase(it)) found.push_back(it->second.step);
-    std::sort(found.begin(), found.end());
-    found.erase(std::unique(found.begin(), found.end()), found.end());
-    for (const std::uint32_t earlier : found) before(earlier);
-    latest_[pixels.begin] = {pixels.end, step};
-  }
-
- private:
-  struct Stretch {
-    std::uint64_t end = 0;
-    std::uint32_t step = 0;
-  };
-
-  void CutAt(std::uint64_t pixel) {
-    auto it = latest_.lower_bound(pixel);
-    if (it == latest_.begin()) return;
-    Stretch& stretch = std::prev(it)->second;
-    if (stretch.end <= pixel) return;
-    latest_.emplace_hint(it, pixel, stretch);
-    stretch.end = pixel;
-  }
-
-  std::map<std::uint64_t, Stretch> latest_;
-};
-
-}  // namespace
 
 ScheduleRun::ScheduleRun(const GroupPlan& group, PixelRange frame)
     : group_(group), steps_(group.schedule.steps.size()), ranks_(group.schedule.ranks) {
   for (Rank rank = 0; rank < group.schedule.ranks; ++rank) ranks_[rank].held.Put(frame, {rank, rank + 1});
 
-  std::vector<LatestSteps> latest(ranks_.size());
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> order;  // (step and side that comes first, the one that waits)
+  std::vector<Fragments<std::uint32_t>> latest(ranks_.size());  // the latest step that touches a pixel
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> order;   // (step and side that comes first, the one that waits)
   const std::vector<Step>& steps = group.schedule.steps;
   for (std::uint32_t i = 0; i < steps.size(); ++i) {
     for (const Side side : {kFrom, kTo}) {
       const Rank rank = side == kFrom ? steps[i].from : steps[i].to;
       ++ranks_[rank].open_steps;
-      latest[rank].Replace(steps[i].pixels, i, [&](std::uint32_t earlier) {
+      std::set<std::uint32_t> before;
+      for (const auto& [begin, held] : latest[rank].Take(steps[i].pixels)) before.insert(held.value);
+      for (const std::uint32_t earlier : before) {
         order.emplace_back(2 * earlier + (steps[earlier].from == rank ? kFrom : kTo), 2 * i + side);
         ++steps_[i].waits[side];
-      });
+      }
+      latest[rank].Put(steps[i].pixels, i);
     }
   }
   std::sort(order.begin(), order.end());

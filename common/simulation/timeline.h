@@ -11,14 +11,14 @@
 
 namespace slabstream {
 
-enum class Lane : std::uint8_t { kRender = 0, kCombine = 1 };  // the two threads of a worker
+enum class Lane : std::uint8_t { kRender = 0, kCombine = 1, kFinish = 2 };  // the threads of a worker
 
 struct SimulatedSpan {
   std::uint32_t frame = 0, group = 0;
   std::uint32_t worker = 0;  // index: its place in SimulationResult::workers
   Lane lane = Lane::kRender;
   Rank rank = 0;                 // that it was done for
-  Stage stage = Stage::kRender;  // kRender, kEncode, kCombine (also accumulating and looking for hidden tiles) or kResolve
+  Stage stage = Stage::kRender;  // kRender, kEncode, kCombine (also accumulating and looking for hidden tiles) or kResolve (kFinish)
   double begin = 0, end = 0;     // seconds
 };
 
@@ -42,7 +42,7 @@ struct SimulatedFrame {
 
   std::array<double, kStageCount> stage_seconds{};  // worker time, summed over workers
   double imbalance = 1;                             // most / mean render time of a worker, over all slots of the plan
-  double idle_share = 0;  // of the workers' time from plan to last byte, when neither of a worker's threads worked for this frame
+  double idle_share = 0;  // of the workers' time from plan to last byte, when none of a worker's threads worked for this frame
   double image_bytes = 0, voxel_bytes = 0;  // that travelled
   std::uint64_t messages = 0;               // between workers
 };
@@ -55,7 +55,7 @@ struct Timeline {
   double end = 0;  // the last picture is received
 
   double frames_per_second() const { return end > 0 ? double(frames.size()) / end : 0; }
-  // Of the workers' time, both threads counted as one, in which they rendered: what is left of perfect scaling.
+  // Of the workers' time, its threads counted as one, in which they rendered: what is left of perfect scaling.
   double render_share = 0;
 };
 

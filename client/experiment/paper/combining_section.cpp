@@ -5,6 +5,7 @@
 
 #include "client/experiment/paper/measures.h"
 #include "client/experiment/paper/printed.h"
+#include "client/experiment/plots.h"
 #include "client/experiment/report/charts.h"
 
 namespace slabstream {
@@ -65,7 +66,7 @@ Result<Section> CombiningSection(const PaperSetup& setup) {
     table.rows.push_back(std::move(row));
   }
 
-  LineChart chart{"Figure 9: combining, hierarchical", {"workers p", ""}, {"time", "ms", AxisScale::kLinear, true}, {}};
+  LineChart chart{"Figure 9: combining, hierarchical", WorkersAxis(AxisScale::kLinear), {"time", "ms", AxisScale::kLinear, true}, {}};
   Table curve{"figure-9-combining", "Figure 9 in numbers", {{"N", ""}, {"p", ""}, {"combining", "ms"}}, {}};
   double at_half = 0, at_full = 0;
   for (const int size : setup.sizes()) {

@@ -32,19 +32,14 @@ Result<Report> RunPaper(ExperimentContext& context) {
       "two workers), simulated from the measured costs of the slabs elsewhere, and theirs beside it. Times of this machine and of theirs "
       "are "
       "thirty years apart; shapes, shares, speed-ups and efficiencies are what to compare.";
-  const auto add = [&](Result<Section> section) -> Status {
-    if (!section.ok()) return section.status();
-    report.sections.push_back(*std::move(section));
-    return Status::Ok();
-  };
   for (auto* make : {TransformSection, FootprintSection, ConstantsSection, CombiningSection}) {
-    if (Status status = add(make(setup)); !status.ok()) return status;
+    if (Status status = report.Add(make(setup)); !status.ok()) return status;
   }
   for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
-    if (Status status = add(PipelineSection(setup, renderer)); !status.ok()) return status;
+    if (Status status = report.Add(PipelineSection(setup, renderer)); !status.ok()) return status;
   }
   for (auto* make : {ImprovedSection, ValidationSection, PicturesSection}) {
-    if (Status status = add(make(setup)); !status.ok()) return status;
+    if (Status status = report.Add(make(setup)); !status.ok()) return status;
   }
   return report;
 }

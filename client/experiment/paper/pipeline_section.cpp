@@ -6,7 +6,9 @@
 
 #include "client/experiment/paper/measures.h"
 #include "client/experiment/paper/printed.h"
+#include "client/experiment/plots.h"
 #include "client/experiment/report/charts.h"
+#include "client/experiment/report/text.h"
 
 namespace slabstream {
 namespace {
@@ -69,7 +71,7 @@ struct Curve {
 
 LineChart CurvesOf(const std::vector<Curve>& curves, const PaperSetup& setup, const std::string& title, const AxisSpec& y,
                    double (*value)(double one, double seconds, int p), std::span<const double> paper) {
-  LineChart chart{title, {"workers p", ""}, y, {}};
+  LineChart chart{title, WorkersAxis(AxisScale::kLinear), y, {}};
   for (const Curve& curve : curves) {
     LineSeries series{fmt::format("N = {}", curve.size), Origin::kSimulated, {}};
     const double one = curve.frames.front().second.seconds;
@@ -113,7 +115,12 @@ Result<Section> PipelineSection(const PaperSetup& setup, RendererKind renderer) 
                           renderer == RendererKind::kSplat ? "Table 5." : "Table 6.", tabled.size),
               {{"p", ""}, {"time", "ms"}},
               {}};
-  BarChart bars{fmt::format("Where a frame's time goes, N = {}", tabled.size), "workers p", {"share of the frame's time", "%"}, {}, {}};
+  BarChart bars{fmt::format("Where a frame's time goes, N = {}", tabled.size),
+                "workers p",
+                // Shares that are printed in whole per cent may sum to 101.
+                {.label = "share of the frame's time", .unit = "%", .tight = true},
+                {},
+                {}};
   for (const auto& [name, stages] : pipeline.stages) bars.parts.push_back(name);
   bars.parts.emplace_back("combine");
   for (const std::string& part : bars.parts) table.columns.push_back({part, "%"});
@@ -142,7 +149,7 @@ Result<Section> PipelineSection(const PaperSetup& setup, RendererKind renderer) 
 
   const auto& [last_p, last] = tabled.frames.back();
   const double one = tabled.frames.front().second.seconds, paper_one = pipeline.paper_seconds[0],
-               paper_last = pipeline.paper_seconds.back();
+               paper_last = pipeline.paper_seconds.back(), paper_combining = pipeline.paper_shares.back().back() / 100 * paper_last;
   Table curve_table{fmt::format("{}-curves", pipeline.figure),
                     "The curves in numbers",
                     {{"N", ""}, {"p", ""}, {"time", "ms"}, {"speed-up", ""}, {"efficiency", "%"}},
@@ -158,23 +165,29 @@ Result<Section> PipelineSection(const PaperSetup& setup, RendererKind renderer) 
     }
   }
 
+  const double rendering_gain = paper_one / one, combining_gain = paper_combining / last.combine_seconds;
   Section section;
   section.title = pipeline.title;
   section.question =
       fmt::format("How long does a frame by {} take, how much do p workers gain, and where does the time go?", NameOf(renderer));
   section.method =
       "As the paper did it: class-I spheres, equal slabs, hierarchical combining, one frame at a time, nobody balanced. Slabs are measured "
-      "one by one; with p = 1 that is "
-      "the whole frame. For more workers combining, of whole images, is simulated on the paper's bus, scaled to these processors. Shares "
-      "are of the frame's "
-      "time: stages of the "
-      "worker that renders longest, and what combining adds to it.";
+      "one by one; with p = 1 that is the whole frame. For more workers the combining of whole images is simulated on the paper's bus, "
+      "scaled to these processors. Shares are of the frame's time: stages of the worker that renders longest, and what combining adds to "
+      "it.";
+  if (renderer == RendererKind::kZBuffer) section.method += " Our Z-buffer transforms a voxel as it draws it: the one stage holds both.";
   section.answer = fmt::format(
       "At N = {}, p = {} the speed-up is {:.1f}, an efficiency of {:.0f} % (the paper at N = 200, p = 30: {:.1f}, {:.0f} %), with {:.0f} % "
-      "of the time in combining (the paper: {:.0f} %); one "
-      "processor takes {:.1f} ms where theirs took {:.0f} s.",
+      "of the time in combining (the paper: {:.0f} %). One processor takes {:.1f} ms where theirs took {:.0f} s, about {} times less; "
+      "combining takes "
+      "about {} times less.{}",
       tabled.size, last_p, one / last.seconds, Efficiency(one, last.seconds, last_p), paper_one / paper_last,
-      Efficiency(paper_one, paper_last, 30), SharesOf(last, pipeline).back(), pipeline.paper_shares.back().back(), one * 1e3, paper_one);
+      Efficiency(paper_one, paper_last, 30), SharesOf(last, pipeline).back(), pipeline.paper_shares.back().back(), one * 1e3, paper_one,
+      FormatAbout(rendering_gain), FormatAbout(combining_gain),
+      rendering_gain > combining_gain
+          ? " Rendering has gained more than the combining of whole images, so combining weighs more than it did and efficiency falls with "
+            "fewer workers."
+          : "");
   const std::string figure = pipeline.figure, number = renderer == RendererKind::kSplat ? "10" : "11";
   section.blocks = {std::move(table),
                     Figure{figure + "-stages", DrawBars(bars), "Ours and the paper's, side by side."},

@@ -35,14 +35,14 @@ inline constexpr std::array<Constant, 4> kZBufferConstants = {{{"ct", 13e-6}, {"
 // Tables 5 and 6: seconds of a frame, and of it the per cent of each stage.
 inline constexpr std::array<int, 7> kStageWorkers = {1, 5, 10, 15, 20, 25, 30};
 inline constexpr std::array<double, 7> kSplattingSeconds = {72.89, 15.90, 8.43, 5.91, 4.96, 4.19, 3.55};
-inline constexpr std::array<std::string_view, 5> kSplattingStages = {"transform", "shade", "splat", "composite", "combine"};
+// By stage: transform, shade, splat, composite, combine.
 inline constexpr std::array<std::array<double, 7>, 5> kSplattingShares = {{{2, 2, 2, 2, 2, 2, 2},
                                                                            {22, 24, 22, 21, 17, 24, 24},
                                                                            {44, 34, 33, 32, 31, 20, 26},
                                                                            {32, 31, 31, 29, 27, 31, 26},
                                                                            {0, 9, 12, 18, 23, 23, 22}}};
 inline constexpr std::array<double, 7> kZBufferSeconds = {8.46, 2.05, 1.42, 1.19, 1.15, 1.07, 1.38};
-inline constexpr std::array<std::string_view, 4> kZBufferStages = {"transform", "Z-buffer", "shade", "combine"};
+// By stage: transform, Z-buffer, shade, combine.
 inline constexpr std::array<std::array<double, 7>, 4> kZBufferShares = {
     {{20, 18, 14, 11, 9, 8, 6}, {78, 61, 44, 31, 24, 21, 12}, {2, 7, 10, 13, 13, 14, 11}, {0, 14, 32, 45, 54, 57, 72}}};
 

@@ -1,15 +1,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 
 #include "client/experiment/paper/printed.h"
 #include "client/experiment/paper/setup.h"
+#include "client/experiment/plots.h"
 #include "client/experiment/report/charts.h"
+#include "client/lab/thread_time.h"
 #include "client/lab/transform_loops.h"
-#include "common/base/time.h"
 
 namespace slabstream {
 namespace {
@@ -37,14 +37,15 @@ Trial Measure(int size, int workers, const Loop& loop) {
     TransformedPoints points(slab);
     loop.store(kMatrix, slab, points);  // brings the memory in
     double fastest = std::numeric_limits<double>::infinity();
-    for (int i = 0; i < kRuns; ++i) {
-      const Time begin = MonotonicNow();
-      loop.store(kMatrix, slab, points);
-      fastest = std::min(fastest, std::chrono::duration<double>(MonotonicNow() - begin).count());
-    }
+    for (int i = 0; i < kRuns; ++i) fastest = std::min(fastest, SecondsOf([&] { loop.store(kMatrix, slab, points); }));
     return Json{{"seconds", fastest}};
   };
   return {Key(size, workers, loop.name), run, 0.02 + double(size) * size * size / workers * 2e-8};
+}
+
+// Of N in time = c N^power, through two sizes.
+double PowerOf(double small, double small_seconds, double large, double large_seconds) {
+  return std::log(large_seconds / small_seconds) / std::log(large / small);
 }
 
 }  // namespace
@@ -62,7 +63,7 @@ Result<Section> TransformSection(const PaperSetup& setup) {
   const TrialLog& log = setup.context().log();
   const auto estimate = [&](int size, int p, const Loop& loop) { return EstimateOf(log, Key(size, p, loop.name), "seconds"); };
 
-  LineChart chart{"Figure 7: transforming a worker's slab", {"workers p", ""}, {"time", "ms", AxisScale::kLog}, {}};
+  LineChart chart{"Figure 7: transforming a worker's slab", WorkersAxis(AxisScale::kLinear), {"time", "ms", AxisScale::kLog}, {}};
   for (const int size : setup.sizes()) {
     LineSeries series{fmt::format("N = {}", size), Origin::kMeasured, {}};
     for (const int p : setup.workers()) {
@@ -113,8 +114,7 @@ Result<Section> TransformSection(const PaperSetup& setup) {
 
   const int small = setup.sizes()[setup.sizes().size() / 2 - 1], large = setup.sizes().back();
   const int p = std::ranges::find(setup.workers(), 15) != setup.workers().end() ? 15 : 10;
-  const double exponent =
-      std::log(estimate(large, p, kIncrements).median / estimate(small, p, kIncrements).median) / std::log(double(large) / small);
+  const double power = PowerOf(small, estimate(small, p, kIncrements).median, large, estimate(large, p, kIncrements).median);
   Section section;
   section.title = "Transform: table 1 and figure 7";
   section.question =
@@ -130,8 +130,10 @@ Result<Section> TransformSection(const PaperSetup& setup) {
   section.answer = fmt::format(
       "Increments in vectors are {:.1f} to {:.1f} times as fast as a product a voxel (the paper: 4.8 to 6), and time grows as N to the "
       "power of {:.2f} from "
-      "N = {} to {} at p = {} (the paper: 5.97 ms to 43.21 ms for N = 150 to 300 at p = 15, a power of 2.86).",
-      least, most, exponent, small, large, p);
+      "N = {} to {} at p = {} (the paper: {:.2f} ms to {:.2f} ms for N = {} to {} at p = 15, a power of {:.2f}).",
+      least, most, power, small, large, p, printed::kCubicSeconds[0] * 1e3, printed::kCubicSeconds[1] * 1e3, printed::kCubicSizes[0],
+      printed::kCubicSizes[1],
+      PowerOf(printed::kCubicSizes[0], printed::kCubicSeconds[0], printed::kCubicSizes[1], printed::kCubicSeconds[1]));
   section.blocks = {
       Figure{
           "figure-7-transform", DrawLines(chart),

@@ -15,6 +15,7 @@ struct AxisSpec {
   AxisScale scale = AxisScale::kLinear;
   bool from_zero = false;  // linear: 0 belongs to it, whatever the values
   bool tight = false;      // linear: ends with the values, not at a mark
+  bool at_values = false;  // marks stand at the values themselves, where these are few: numbers of workers
 };
 
 class ChartAxis {

@@ -10,8 +10,19 @@
 namespace slabstream {
 namespace {
 
+bool IsPlain(const BarChart& chart) { return chart.parts.empty(); }
+
 Legend LegendOf(const BarChart& chart) {
-  Legend legend{Legend::Swatch::kBar, chart.parts, {}};
+  Legend legend{Legend::Swatch::kBar, {}, {}};
+  for (const std::string& part : chart.parts) legend.entries.push_back({part, Origin::kMeasured});
+  if (IsPlain(chart)) {
+    for (const BarGroup& group : chart.groups) {
+      for (const Bar& bar : group.bars) {
+        if (std::ranges::find(legend.entries, bar.label, &Legend::Entry::name) == legend.entries.end())
+          legend.entries.push_back({bar.label, bar.origin});
+      }
+    }
+  }
   for (const Origin origin : kOrigins) {
     const auto has = [&](const BarGroup& group) {
       return std::ranges::any_of(group.bars, [&](const Bar& bar) { return bar.origin == origin; });
@@ -34,7 +45,7 @@ std::string DrawBars(const BarChart& chart) {
     longest_group = std::max(longest_group, TextWidth(group.label));
     for (const Bar& bar : group.bars) {
       heights.push_back(Sum(bar));
-      longest_label = std::max(longest_label, TextWidth(bar.label));
+      if (!IsPlain(chart)) longest_label = std::max(longest_label, TextWidth(bar.label));
     }
   }
   AxisSpec spec = chart.y;
@@ -60,12 +71,14 @@ std::string DrawBars(const BarChart& chart) {
       double below = 0;
       for (std::size_t part = 0; part < bar.parts.size(); ++part) {
         const double height = (y.At(below + bar.parts[part]) - y.At(below)) * area.height;
-        const std::string hint = fmt::format("{} {}, {}: {} {} ({})", group.label, bar.label, chart.parts[part],
+        const std::string hint = fmt::format("{} {}{}: {} {} ({})", group.label, bar.label, IsPlain(chart) ? "" : ", " + chart.parts[part],
                                              FormatNumber(bar.parts[part]), chart.y.unit, ToString(bar.origin));
-        if (height > 0) canvas.Bar(left, bottom - y.At(below) * area.height - height, bar_width, height, int(part), bar.origin, hint);
+        const int color = IsPlain(chart) ? legend.ColorOf(bar.label) : int(part);
+        if (height > 0) canvas.Bar(left, bottom - y.At(below) * area.height - height, bar_width, height, color, bar.origin, hint);
         below += bar.parts[part];
       }
-      if (!bar.label.empty()) canvas.VerticalText({left + bar_width / 2 + 4, bottom + 6}, bar.label, TextAnchor::kEnd, "small");
+      if (!IsPlain(chart) && !bar.label.empty())
+        canvas.VerticalText({left + bar_width / 2 + 4, bottom + 6}, bar.label, TextAnchor::kEnd, "small");
     }
     if (upright) {
       canvas.VerticalText({middle + 4, bottom + below_bars}, group.label, TextAnchor::kEnd);

@@ -1,5 +1,6 @@
 // The kinds of plots of reports, as values, each drawn by one function (and file) as an SVG text. Whatever is drawn carries its Origin; a
-// legend stands beside the plot, never over data, and says in words which stroke is measured, simulated or from the paper.
+// legend stands beside the plot, never over data, and says in words which stroke is measured, simulated or from the paper. Series differ by
+// colour and by marker.
 #pragma once
 
 #include <string>
@@ -19,6 +20,7 @@ struct LineSeries {
   std::string name;
   Origin origin = Origin::kMeasured;
   std::vector<LinePoint> points;  // by ascending x; what an axis cannot show is left out
+  bool reference = false;         // no data, but what data is compared with: a thin line without markers or origin
 };
 struct LineChart {
   std::string title;
@@ -27,11 +29,11 @@ struct LineChart {
 };
 std::string DrawLines(const LineChart& chart);
 
-// Bars: groups of bars side by side, each a stack of parts (one part: a plain bar).
+// Bars: groups of bars side by side, each a stack of parts, or plain bars that the legend names.
 struct Bar {
-  std::string label;  // under it; empty: none
+  std::string label;  // of stacks: under it; of plain bars: its name in the legend; empty: none
   Origin origin = Origin::kMeasured;
-  std::vector<double> parts;  // by BarChart::parts, from below; none negative
+  std::vector<double> parts;  // by BarChart::parts, from below; of a plain bar: one; none negative
 };
 struct BarGroup {
   std::string label;
@@ -39,9 +41,9 @@ struct BarGroup {
 };
 struct BarChart {
   std::string title;
-  std::string group_axis;  // what groups are: "workers p"
-  AxisSpec y;              // linear
-  std::vector<std::string> parts;
+  std::string group_axis;          // what groups are: "workers p"
+  AxisSpec y;                      // linear
+  std::vector<std::string> parts;  // empty: bars are plain
   std::vector<BarGroup> groups;
 };
 std::string DrawBars(const BarChart& chart);
@@ -49,7 +51,8 @@ std::string DrawBars(const BarChart& chart);
 // A timeline: lanes from above, spans in time.
 struct GanttSpan {
   double begin = 0, end = 0;
-  int kind = 0;  // of GanttChart::kinds: its colour
+  int kind = 0;       // of GanttChart::kinds: its colour
+  std::string label;  // a letter or two, written where there is room
   std::string hint;
 };
 struct GanttLane {

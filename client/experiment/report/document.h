@@ -45,6 +45,9 @@ struct Provenance {
 struct Report {
   std::string title, summary;
   std::vector<Section> sections;
+
+  // At its end; says why there is none.
+  Status Add(Result<Section> section);
 };
 
 std::string ReportHtml(const Report& report, const Provenance& provenance);             // one file, nothing to load

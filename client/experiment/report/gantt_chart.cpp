@@ -10,6 +10,7 @@ namespace slabstream {
 namespace {
 
 constexpr double kTop = 40, kWidth = 600, kBottom = 48;
+constexpr double kLabelledLane = 16;  // height of lanes in which labels have room
 
 }  // namespace
 
@@ -21,8 +22,9 @@ std::string DrawGantt(const GanttChart& chart) {
     for (const GanttSpan& span : lane.spans) times.push_back(span.end);
   }
   const ChartAxis time({"time", chart.unit, AxisScale::kLinear, true, true}, times);
-  const Legend legend{Legend::Swatch::kBar, chart.kinds, {}};
-  const double lane_height = chart.lanes.size() > 48 ? 9 : 16;
+  Legend legend{Legend::Swatch::kBar, {}, {}};
+  for (const std::string& kind : chart.kinds) legend.entries.push_back({kind, Origin::kMeasured});
+  const double lane_height = chart.lanes.size() > 48 ? 9 : kLabelledLane;
   PlotArea area{names + 20, kTop, kWidth, lane_height * double(chart.lanes.size()), 0, 0};
   area.total_width = area.x + kWidth + LegendWidth(legend);
   area.total_height = kTop + std::max(area.height + kBottom, LegendHeight(legend));
@@ -41,6 +43,8 @@ std::string DrawGantt(const GanttChart& chart) {
       const double x = area.x + time.At(span.begin) * area.width, width = (time.At(span.end) - time.At(span.begin)) * area.width;
       canvas.Bar(x, top + 2, std::max(width, 0.4), lane_height - 4, span.kind, Origin::kMeasured,
                  fmt::format("{}: {}, {} to {} {}", lane.name, span.hint, FormatNumber(span.begin), FormatNumber(span.end), chart.unit));
+      if (lane_height >= kLabelledLane && width > TextWidth(span.label) + 2)
+        canvas.Text({x + width / 2, top + lane_height / 2 + 3.4}, span.label, TextAnchor::kMiddle, "mark");
     }
   }
   canvas.Line({area.x, area.y}, {area.x, area.y + area.height}, "axis");

@@ -2,19 +2,20 @@
 
 #include <algorithm>
 
+#include "common/base/check.h"
+
 namespace slabstream {
 namespace {
 
 constexpr double kRow = 18, kSwatch = 30, kGap = 8, kMargin = 14, kBetween = 10;
-constexpr int kPlain = 6;  // the palette's grey
 
-void DrawSwatch(SvgCanvas& canvas, Legend::Swatch swatch, SvgPoint at, int color, Origin origin) {
+void DrawSwatch(SvgCanvas& canvas, Legend::Swatch swatch, SvgPoint at, int color, std::optional<Origin> origin) {
   if (swatch == Legend::Swatch::kBar) {
-    canvas.Bar(at.x + 8, at.y - 6, kSwatch - 14, 11, color, origin);
+    canvas.Bar(at.x + 8, at.y - 6, kSwatch - 14, 11, color, origin.value_or(Origin::kMeasured));
     return;
   }
   canvas.Polyline({at, {at.x + kSwatch, at.y}}, color, origin);
-  canvas.Marker({at.x + kSwatch / 2, at.y}, color, origin);
+  if (origin) canvas.Marker({at.x + kSwatch / 2, at.y}, color, *origin);
 }
 
 }  // namespace
@@ -33,29 +34,33 @@ std::string OriginWords(Origin origin) {
   return "from the paper";
 }
 
+int Legend::ColorOf(const std::string& name) const {
+  const auto found = std::ranges::find(entries, name, &Entry::name);
+  CHECK(found != entries.end()) << name;
+  return int(found - entries.begin());
+}
+
 double LegendWidth(const Legend& legend) {
   double widest = 0;
-  for (const std::string& name : legend.names) widest = std::max(widest, TextWidth(name));
+  for (const Legend::Entry& entry : legend.entries) widest = std::max(widest, TextWidth(entry.name));
   for (const Origin origin : legend.origins) widest = std::max(widest, TextWidth(OriginWords(origin)));
   return 2 * kMargin + kSwatch + kGap + widest;
 }
 
-double LegendHeight(const Legend& legend) { return kRow * double(legend.names.size() + legend.origins.size()) + kBetween + kRow; }
+double LegendHeight(const Legend& legend) { return kRow * double(legend.entries.size() + legend.origins.size()) + kBetween + kRow; }
 
 void DrawLegend(SvgCanvas& canvas, const Legend& legend, SvgPoint top_left) {
   double y = top_left.y + kRow / 2;
   const double x = top_left.x + kMargin;
-  const auto row = [&](const std::string& words, int color, Origin origin) {
+  const auto row = [&](const std::string& words, int color, std::optional<Origin> origin) {
     DrawSwatch(canvas, legend.swatch, {x, y}, color, origin);
     canvas.Text({x + kSwatch + kGap, y + 4}, words);
     y += kRow;
   };
-  // A name stands for all strokes of its colour, so it is drawn as what occurs first.
-  for (std::size_t i = 0; i < legend.names.size(); ++i)
-    row(legend.names[i], int(i), legend.origins.empty() ? Origin::kMeasured : legend.origins.front());
-  if (legend.names.empty()) return;
+  for (std::size_t i = 0; i < legend.entries.size(); ++i) row(legend.entries[i].name, int(i), legend.entries[i].origin);
+  if (legend.entries.empty()) return;
   y += kBetween;
-  for (const Origin origin : legend.origins) row(OriginWords(origin), kPlain, origin);
+  for (const Origin origin : legend.origins) row(OriginWords(origin), kPlainColor, origin);
 }
 
 }  // namespace slabstream

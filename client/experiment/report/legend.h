@@ -1,6 +1,7 @@
 // Legend: what stands beside a plot. Names with their colours, and below them what the strokes that occur mean.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,9 +12,16 @@ namespace slabstream {
 
 struct Legend {
   enum class Swatch { kLine, kBar };
+  // A name stands for all strokes of its colour, so it is drawn as the first of them.
+  struct Entry {
+    std::string name;
+    std::optional<Origin> origin;  // none: something that data is compared with
+  };
   Swatch swatch = Swatch::kLine;
-  std::vector<std::string> names;  // by colour
-  std::vector<Origin> origins;     // that occur
+  std::vector<Entry> entries;   // by colour
+  std::vector<Origin> origins;  // that occur
+
+  int ColorOf(const std::string& name) const;  // of an entry
 };
 
 double LegendWidth(const Legend& legend);  // pixels, margins included

@@ -13,10 +13,11 @@ namespace {
 Legend LegendOf(const LineChart& chart) {
   Legend legend;
   for (const LineSeries& series : chart.series) {
-    if (std::ranges::find(legend.names, series.name) == legend.names.end()) legend.names.push_back(series.name);
+    if (std::ranges::find(legend.entries, series.name, &Legend::Entry::name) == legend.entries.end())
+      legend.entries.push_back({series.name, series.reference ? std::nullopt : std::optional(series.origin)});
   }
   for (const Origin origin : kOrigins) {
-    if (std::ranges::any_of(chart.series, [&](const LineSeries& series) { return series.origin == origin; }))
+    if (std::ranges::any_of(chart.series, [&](const LineSeries& series) { return !series.reference && series.origin == origin; }))
       legend.origins.push_back(origin);
   }
   return legend;
@@ -46,12 +47,13 @@ std::string DrawLines(const LineChart& chart) {
     return SvgPoint{area.x + x.At(at_x) * area.width, area.y + (1 - y.At(at_y)) * area.height};
   };
   for (const LineSeries& series : chart.series) {
-    const int color = int(std::ranges::find(legend.names, series.name) - legend.names.begin());
+    const int color = legend.ColorOf(series.name);
     std::vector<LinePoint> shown;
     std::ranges::copy_if(series.points, std::back_inserter(shown), [&](const LinePoint& p) { return x.Shows(p.x) && y.Shows(p.y); });
     std::vector<SvgPoint> curve;
     for (const LinePoint& point : shown) curve.push_back(place(point.x, point.y));
-    canvas.Polyline(curve, color, series.origin);
+    canvas.Polyline(curve, color, series.reference ? std::nullopt : std::optional(series.origin));
+    if (series.reference) continue;
     for (std::size_t i = 0; i < shown.size(); ++i) {
       const LinePoint& point = shown[i];
       std::string hint = fmt::format("{}, {} = {}: {} {} ({})", series.name, chart.x.label, FormatNumber(point.x), FormatNumber(point.y),

@@ -8,8 +8,8 @@
 namespace slabstream {
 
 enum class Origin : std::uint8_t {
-  kMeasured = 0,   // on this machine, by running it; solid line, filled dot
-  kSimulated = 1,  // in virtual time, from costs measured on this machine; dashed line, open square
+  kMeasured = 0,   // on this machine, by running it; solid line, filled marker
+  kSimulated = 1,  // in virtual time, from costs measured on this machine; dashed line, open marker
   kPaper = 2,      // printed by Yagel and Machiraju; dotted line, cross
 };
 inline constexpr std::array<Origin, 3> kOrigins = {Origin::kMeasured, Origin::kSimulated, Origin::kPaper};

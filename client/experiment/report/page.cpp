@@ -17,11 +17,11 @@ h1{margin-bottom:.2rem}h2{margin-top:2.6rem;border-top:1px solid #ccc;padding-to
 .answer{border-left:4px solid #0072b2;padding:.3rem .9rem;background:#f2f7fb;font-weight:600}
 dt{font-weight:600}figure{margin:1.4rem 0;overflow-x:auto}svg{max-width:100%;height:auto}img{max-width:24rem;width:100%}
 .table{overflow-x:auto;margin:1.2rem 0}table{border-collapse:collapse;font-size:.9rem;font-variant-numeric:tabular-nums}
-caption{text-align:left;padding-bottom:.3rem}th,td{padding:.22rem .7rem;border-bottom:1px solid #ddd;text-align:right;white-space:nowrap}
+summary{cursor:pointer;color:#555}caption{text-align:left;padding-bottom:.3rem}th,td{padding:.22rem .7rem;border-bottom:1px solid #ddd;text-align:right;white-space:nowrap}
 th{border-bottom:2px solid #999;vertical-align:bottom}td.words{text-align:left}
 .measured{font-weight:600}.simulated{font-style:italic}.paper,.none{color:#777}small{font-weight:400}
 nav ol{columns:2;font-size:.95rem}a{color:#0060a0}
-@media (prefers-color-scheme:dark){body{color:#e4e4e4;background:#181818}.provenance,.key,figcaption,caption{color:#aaa}.paper,.none{color:#999}
+@media (prefers-color-scheme:dark){body{color:#e4e4e4;background:#181818}.provenance,.key,figcaption,caption,summary{color:#aaa}.paper,.none{color:#999}
 .answer{background:#1d2a35;border-color:#4db2ff}h2{border-color:#444}th,td{border-color:#3a3a3a}th{border-bottom-color:#777}a{color:#7fc4ff}}
 @media print{body{max-width:none}h2{break-after:avoid}figure,.table{break-inside:avoid}}
 </style>)";
@@ -46,7 +46,8 @@ std::string ProvenanceHtml(const Provenance& p) {
   return fmt::format(
       "<p class=\"provenance\">{} · Slabstream {} ({}) · {}, {} cores, {} · seed {}, {} repeats<br/><code>{}</code><br/>"
       "Medians; intervals in brackets and whiskers are those of order statistics (95 % confidence from six repeats on, below that the "
-      "smallest and the largest value). Everything on this page is also in <a href=\"result.json\">result.json</a>.</p>\n",
+      "smallest and the largest value). Every table can be saved as CSV; all of them are in result.json, which was written beside this "
+      "page.</p>\n",
       Escape(p.date), Escape(p.version), Escape(p.commit), Escape(p.cpu), p.cores, Escape(p.simd), p.seed, p.repeats, Escape(p.command));
 }
 

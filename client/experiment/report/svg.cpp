@@ -12,7 +12,16 @@
 namespace slabstream {
 namespace {
 
-constexpr double kMarkerRadius = 3.6;
+// By colour, round the point where a path begins: circle, square, triangle, diamond, triangle upside down, pentagon, flag, hourglass.
+constexpr std::array<std::string_view, kPaletteSize> kMarkers = {"m-3.7 0a3.7 3.7 0 1 0 7.4 0a3.7 3.7 0 1 0 -7.4 0z",
+                                                                 "m-3.5 -3.5h7v7h-7z",
+                                                                 "m0 -4.6l4.4 7.6h-8.8z",
+                                                                 "m0 -4.8l4.8 4.8l-4.8 4.8l-4.8 -4.8z",
+                                                                 "m0 4.6l4.4 -7.6h-8.8z",
+                                                                 "m0 -4.3l4.1 3l-1.6 4.8h-5l-1.6 -4.8z",
+                                                                 "m-3.6 -4.4l7.4 4.4l-7.4 4.4z",
+                                                                 "m-4 -4h8l-8 8h8z"};
+constexpr std::string_view kCross = "m-3.6 -3.6l7.2 7.2m0 -7.2l-7.2 7.2";
 
 // Okabe and Ito's colours, darkened where they would be faint on white; and the same, lightened, for dark pages.
 constexpr std::array<std::string_view, kPaletteSize> kLight = {"#0072b2", "#d55e00", "#009e73", "#aa4499",
@@ -20,8 +29,8 @@ constexpr std::array<std::string_view, kPaletteSize> kLight = {"#0072b2", "#d55e
 constexpr std::array<std::string_view, kPaletteSize> kDark = {"#4db2ff", "#ff8a3d", "#2fd0a5", "#e08fd0",
                                                               "#f2c14e", "#8fd0f5", "#b5b5b5", "#e07a9f"};
 
-std::string ColorRules(const std::array<std::string_view, kPaletteSize>& colors) {
-  std::string rules;
+std::string ColorRules(const std::array<std::string_view, kPaletteSize>& colors, std::string_view plain) {
+  std::string rules = fmt::format(".ss .c{0}{{stroke:{1};fill:{1}}}", kPaletteSize, plain);
   for (int i = 0; i < kPaletteSize; ++i) {
     rules += fmt::format(".ss .c{0}{{stroke:{1};fill:{1}}}", i, colors[std::size_t(i)]);
   }
@@ -37,15 +46,15 @@ const std::string& StyleSheet() {
       ".ss .back{fill:#f4f4f4;stroke:none}.ss .outline{fill:none;stroke:#999;stroke-width:.6}"
       ".ss .curve{fill:none;stroke-width:1.8;stroke-linejoin:round}.ss .whisker{fill:none;stroke-width:1.1;opacity:.75}"
       ".ss .curve.simulated{stroke-dasharray:6 3.5}.ss .curve.paper{stroke-dasharray:.1 4.2;stroke-linecap:round;stroke-width:2.2}"
-      ".ss .open{fill:none;stroke-width:1.5}"
+      ".ss .open{fill:none;stroke-width:1.5}.ss .reference{fill:none;stroke:#777;stroke-width:1}.ss text.mark{font-size:9px;fill:#fff}"
       ".ss .bar{stroke-width:1}.ss .bar.simulated{fill-opacity:.5;stroke-dasharray:4 2}"
       ".ss .bar.paper{fill-opacity:.15;stroke-dasharray:1.2 2.2}" +
-      ColorRules(kLight) +
+      ColorRules(kLight, "#555") +
       // After the colours: what is not filled stays open.
       ".ss .curve,.ss .open,.ss .whisker{fill:none}"
       "@media (prefers-color-scheme:dark){.ss text{fill:#e6e6e6}.ss text.small{fill:#b0b0b0}.ss .axis{stroke:#aaa}.ss .grid{stroke:#3a3a3a}"
-      ".ss .back{fill:#262626}.ss .outline{stroke:#777}" +
-      ColorRules(kDark) + ".ss .curve,.ss .open,.ss .whisker{fill:none}}</style>";
+      ".ss text.mark{fill:#000}.ss .back{fill:#262626}.ss .outline{stroke:#777}" +
+      ColorRules(kDark, "#bbb") + ".ss .curve,.ss .open,.ss .whisker{fill:none}}</style>";
   return sheet;
 }
 
@@ -58,7 +67,8 @@ std::string_view AnchorName(TextAnchor anchor) {
   return "end";
 }
 
-int ColorClass(int color) { return color % kPaletteSize; }
+// The number of the class; that of texts comes after the palette.
+int ColorClass(int color) { return color == kPlainColor ? kPaletteSize : color % kPaletteSize; }
 
 }  // namespace
 
@@ -98,27 +108,19 @@ void SvgCanvas::VerticalText(SvgPoint at, std::string_view text, TextAnchor anch
                        AnchorName(anchor), at.x, at.y, Escape(text));
 }
 
-void SvgCanvas::Polyline(const std::vector<SvgPoint>& points, int color, Origin origin) {
+void SvgCanvas::Polyline(const std::vector<SvgPoint>& points, int color, std::optional<Origin> origin) {
   if (points.size() < 2) return;
-  text_ += fmt::format("<polyline class=\"c{} curve {}\" points=\"", ColorClass(color), ToString(origin));
+  text_ += fmt::format("<polyline class=\"{}\" points=\"",
+                       origin ? fmt::format("c{} curve {}", ColorClass(color), ToString(*origin)) : "reference");
   for (const SvgPoint& point : points) fmt::format_to(std::back_inserter(text_), "{:.1f},{:.1f} ", point.x, point.y);
   text_.back() = '"';
   text_ += "/>\n";
 }
 
 void SvgCanvas::Marker(SvgPoint at, int color, Origin origin, std::string_view hint) {
-  const double r = kMarkerRadius;
   const int c = ColorClass(color);
-  switch (origin) {
-    case Origin::kMeasured: Hint(hint, fmt::format("circle class=\"c{}\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{}\"", c, at.x, at.y, r)); break;
-    case Origin::kSimulated:
-      Hint(hint, fmt::format("rect class=\"c{} open\" x=\"{:.1f}\" y=\"{:.1f}\" width=\"{}\" height=\"{}\"", c, at.x - r, at.y - r, 2 * r,
-                             2 * r));
-      break;
-    case Origin::kPaper:
-      Hint(hint, fmt::format("path class=\"c{0} open\" d=\"M{1:.1f} {2:.1f}l{3} {3}m0 -{3}l-{3} {3}\"", c, at.x - r, at.y - r, 2 * r));
-      break;
-  }
+  Hint(hint, fmt::format("path class=\"c{}{}\" d=\"M{:.1f} {:.1f}{}\"", c, origin == Origin::kMeasured ? "" : " open", at.x, at.y,
+                         origin == Origin::kPaper ? kCross : kMarkers[std::size_t(c % kPaletteSize)]));
 }
 
 void SvgCanvas::Spread(double x, double y_low, double y_high, int color) {

@@ -2,6 +2,7 @@
 // that is part of the drawing and serves light and dark pages alike; no script, no font file, no link.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -12,7 +13,7 @@
 namespace slabstream {
 
 // Colours of series and stages that also those can tell apart who see fewer colours (after Okabe and Ito 2008). Index modulo the count.
-inline constexpr int kPaletteSize = 8;
+inline constexpr int kPaletteSize = 8, kPlainColor = -1;  // plain: that of texts, for what stands for all colours
 
 struct SvgPoint {
   double x = 0, y = 0;
@@ -31,10 +32,11 @@ class SvgCanvas {
   // Read from below.
   void VerticalText(SvgPoint at, std::string_view text, TextAnchor anchor = TextAnchor::kMiddle, std::string_view style = "label");
 
-  // Series: drawn as its origin asks for.
-  void Polyline(const std::vector<SvgPoint>& points, int color, Origin origin);
-  void Marker(SvgPoint at, int color, Origin origin, std::string_view hint = "");  // hint: shown on hovering
-  void Spread(double x, double y_low, double y_high, int color);                   // a whisker
+  // Series: drawn as its origin asks for; no origin: a line that data is compared with.
+  void Polyline(const std::vector<SvgPoint>& points, int color, std::optional<Origin> origin);
+  // Each colour has a shape of its own, filled or open by origin; what is from the paper is a cross. `hint`: shown on hovering.
+  void Marker(SvgPoint at, int color, Origin origin, std::string_view hint = "");
+  void Spread(double x, double y_low, double y_high, int color);  // a whisker
   void Bar(double x, double y, double width, double height, int color, Origin origin, std::string_view hint = "");
 
   void Rect(double x, double y, double width, double height, std::string_view style, std::string_view hint = "");

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "client/experiment/report/base64.h"
 #include "client/experiment/report/text.h"
 #include "common/base/check.h"
 
@@ -13,6 +14,8 @@ namespace slabstream {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kMostOpenRows = 24;
 
 std::string Heading(const Column& column) { return column.unit.empty() ? column.name : fmt::format("{} ({})", column.name, column.unit); }
 
@@ -99,8 +102,12 @@ Json TableJson(const Table& table) {
 }
 
 std::string TableHtml(const Table& table) {
-  std::string html = fmt::format("<div class=\"table\"><table><caption>{} <a href=\"{}.csv\">CSV</a></caption><thead><tr>",
-                                 Escape(table.title), Escape(table.name));
+  const bool folded = table.rows.size() > kMostOpenRows;
+  std::string html = folded ? fmt::format("<details><summary>{} ({} rows)</summary>", Escape(table.title), table.rows.size()) : "";
+  html += fmt::format(
+      "<div class=\"table\"><table><caption>{} <a download=\"{}.csv\" href=\"data:text/csv;charset=utf-8;base64,{}\">CSV</a></caption>"
+      "<thead><tr>",
+      Escape(table.title), Escape(table.name), Base64(TableCsv(table)));
   for (const Column& column : table.columns) html += fmt::format("<th>{}</th>", Escape(Heading(column)));
   html += "</tr></thead><tbody>\n";
   bool told = false;
@@ -118,7 +125,7 @@ std::string TableHtml(const Table& table) {
         "<p class=\"key\"><span class=\"measured\">bold: measured here</span>, <span class=\"simulated\">italic: simulated</span>, "
         "<span class=\"paper\">grey: from the paper</span></p>";
   }
-  return html + "</div>\n";
+  return html + (folded ? "</div></details>\n" : "</div>\n");
 }
 
 }  // namespace slabstream

@@ -42,7 +42,7 @@ struct Table {
 // origin".
 std::string TableCsv(const Table& table);
 nlohmann::ordered_json TableJson(
-    const Table& table);  // {name, title, columns: [...], rows: [{column: value or {value, low, high, origin}}]}
-std::string TableHtml(const Table& table);
+    const Table& table);                    // {name, title, columns: [...], rows: [{column: value or {value, low, high, origin}}]}
+std::string TableHtml(const Table& table);  // holds the CSV too, to be saved; a long one is folded
 
 }  // namespace slabstream

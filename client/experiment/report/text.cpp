@@ -39,6 +39,12 @@ std::string FormatNumber(double value) {
   return fmt::format("{:.4g}", value);
 }
 
+std::string FormatAbout(double value) {
+  if (!std::isfinite(value) || value == 0) return FormatNumber(value);
+  const double unit = std::pow(10, std::floor(std::log10(std::abs(value))) - 1);
+  return FormatNumber(std::round(value / unit) * unit);
+}
+
 std::string Slug(std::string_view text) {
   std::string slug;
   for (const char c : text) {

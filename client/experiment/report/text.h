@@ -13,6 +13,9 @@ std::string Escape(std::string_view text);
 // Not a number or infinite: "–".
 std::string FormatNumber(double value);
 
+// Two significant digits, for ratios that mean no more: "16000", "1.5".
+std::string FormatAbout(double value);
+
 // "a", "a-b-c" out of any text: fit for the name of a file, an id or a link.
 std::string Slug(std::string_view text);
 
