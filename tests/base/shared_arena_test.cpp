@@ -154,8 +154,8 @@ TEST(BlockPin, KeepsWhatABlockHeldUntilTheLastPinIsGone) {
   {
     const PooledVector<int> image(1000000, 5);
     address = image.data();
-    pin = BlockPin::Pin(address);
-    second = BlockPin::Pin(address);
+    pin = PinOf(image);
+    second = PinOf(image);
     ASSERT_TRUE(pin && second);
     EXPECT_EQ(pin->name(), second->name());
   }
@@ -165,16 +165,16 @@ TEST(BlockPin, KeepsWhatABlockHeldUntilTheLastPinIsGone) {
     pin.reset();
     const PooledVector<int> another(1000000, 6);
     EXPECT_NE(another.data(), address);
-    const auto* numbers = reinterpret_cast<const int*>(mapped->Find(second->name(), 4000000));
+    const auto* numbers = reinterpret_cast<const int*>(mapped->Find(*second->name(), 4000000));
     EXPECT_EQ(numbers[999999], 5);
-    EXPECT_TRUE(mapped->Holds(second->name()));
+    EXPECT_TRUE(mapped->Holds(*second->name()));
   }
-  const BlockName name = second->name();
+  const BlockName name = *second->name();
   second.reset();
   EXPECT_FALSE(mapped->Holds(name));
   const PooledVector<int> small(10);
-  EXPECT_FALSE(BlockPin::Pin(small.data()).has_value());
-  EXPECT_FALSE(BlockPin::Pin(nullptr).has_value());
+  EXPECT_FALSE(PinOf(small).has_value());
+  EXPECT_FALSE(PinOf(PooledVector<int>()).has_value());
 }
 
 }  // namespace

@@ -4,6 +4,8 @@
 
 #include <cmath>
 #include <limits>
+#include <set>
+#include <tuple>
 
 #include "tests/support/random.h"
 #include "tests/support/random_transfer.h"
@@ -14,7 +16,8 @@ namespace {
 
 OccupancyGrid CountOneByOne(const Volume& volume, const ClassificationTable& table) {
   const Index3 size = volume.description.geometry.size, cells = OccupancyCells(size);
-  OccupancyGrid grid{size, std::vector<std::uint16_t>(std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z))};
+  OccupancyGrid grid{size, std::vector<CellOccupancy>(std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z))};
+  std::set<std::tuple<std::size_t, std::int32_t, std::int32_t, bool>> rows;  // that were counted
   VisitScalarType(volume.block.type, [&]<class T>(const T*) {
     for (Index3 v; v.z < size.z; ++v.z) {
       for (v.y = 0; v.y < size.y; ++v.y) {
@@ -22,7 +25,12 @@ OccupancyGrid CountOneByOne(const Volume& volume, const ClassificationTable& tab
           const auto sample = double(volume.block.samples<T>()[volume.block.Offset(v)]);
           if (!std::isfinite(sample) || table.opacity[std::size_t(table.BinOf(sample))] == 0) continue;
           const Index3 cell = {v.x / kOccupancyCell, v.y / kOccupancyCell, v.z / kOccupancyCell};
-          ++grid.occupied[(std::size_t(cell.z) * std::size_t(cells.y) + std::size_t(cell.y)) * std::size_t(cells.x) + std::size_t(cell.x)];
+          const std::size_t number =
+              (std::size_t(cell.z) * std::size_t(cells.y) + std::size_t(cell.y)) * std::size_t(cells.x) + std::size_t(cell.x);
+          CellOccupancy& counts = grid.cells[number];
+          ++counts.voxels;
+          if (rows.insert({number, v.y, v.z, true}).second) ++counts.rows_x;
+          if (rows.insert({number, v.x, v.z, false}).second) ++counts.rows_y;
         }
       }
     }

@@ -36,6 +36,21 @@ TEST(FrameSummaryTest, ImbalanceIsMostOverMeanOfAllWorkers) {
   EXPECT_EQ(summary.image_bytes, 40U);
 }
 
+TEST(FrameSummaryTest, MakingThePictureIsNoCombining) {
+  FrameStatistics statistics;
+  statistics.workers = 2;
+  statistics.reports = {Report(1, 70, {{Stage::kEncode, 0, 5}}),
+                        Report(2, 90, {{Stage::kCombine, 0, 30}, {Stage::kResolve, 30, 50}, {Stage::kEncode, 50, 60}})};
+  statistics.reports[0].stage_ns[std::size_t(Stage::kEncode)] = 5;
+  statistics.reports[1].stage_ns[std::size_t(Stage::kCombine)] = 30;
+  statistics.reports[1].stage_ns[std::size_t(Stage::kResolve)] = 20;
+  statistics.reports[1].stage_ns[std::size_t(Stage::kEncode)] = 10;
+  const FrameSummary summary = Summarize(statistics);
+  EXPECT_EQ(summary.render_ns, 90);
+  EXPECT_EQ(summary.finish_ns, 30);
+  EXPECT_EQ(summary.combine_ns, 35);
+}
+
 TEST(FrameSummaryTest, IdleShareCountsOverlappingWorkOnceAndWaitingNotAtAll) {
   FrameStatistics statistics;
   statistics.workers = 2;

@@ -1,4 +1,7 @@
 // How frames run: the window of groups, what ends a frame, and what is done about losses, stalls and trouble.
+#include <map>
+
+#include "common/planning/frame_window.h"
 #include "tests/coordinator/coordinator_script.h"
 
 namespace slabstream {
@@ -91,17 +94,44 @@ TEST(CoordinatorFrames, WindowHoldsForAnyNumberOfGroupsAndFrames) {
   std::vector<GroupAssignment> out = HandedOut(actions);
   std::size_t handed_out = out.size(), answered = 0, pictures = 0;
   while (answered < out.size()) {
-    EXPECT_LE(handed_out - answered, std::size_t(kGroupWindow));
+    EXPECT_LE(handed_out - answered, std::size_t(WindowFor(3, 1, 0).groups));
+    for (FrameId frame = 1; frame <= 6; ++frame) {
+      EXPECT_LE(std::count_if(out.begin() + std::ptrdiff_t(answered), out.end(), [&](auto& group) { return group.key.frame == frame; }),
+                kMaskedGroups);
+    }
     const Actions more = script.Answer(out[answered++]);
     pictures += ToClients<FrameReply>(more).size();
-    for (auto& group : HandedOut(more)) {
-      EXPECT_LT(out.back().key, group.key) << "in order of frames and groups";
-      out.push_back(std::move(group));
-    }
+    for (auto& group : HandedOut(more)) out.push_back(std::move(group));
     handed_out = out.size();
   }
   EXPECT_EQ(pictures, 6U);
   EXPECT_EQ(out.size(), 21U);
+  std::map<FrameId, std::uint32_t> next;
+  for (const GroupAssignment& group : out) EXPECT_EQ(group.key.group, next[group.key.frame]++) << "in order of groups";
+}
+
+TEST(CoordinatorFrames, MoreWorkersHaveMoreFramesUnderWay) {
+  for (const int workers : {1, 2, 5, 40}) {
+    CoordinatorScript script;
+    for (int token = 1; token <= workers; ++token) script.Join(PeerToken(token), std::uint32_t(token));
+    Actions actions;
+    for (RequestId id = 1; id <= 50; ++id) CoordinatorScript::Append(actions, script.Submit(kClient, Frame(id)));
+    EXPECT_EQ(HandedOut(actions).size(), std::size_t(WindowFor(std::size_t(workers), 1, 0).groups)) << workers << " workers";
+  }
+}
+
+TEST(CoordinatorFrames, DisplayWorkersTakeTurnsAndKeepTheirFrame) {
+  CoordinatorScript script;
+  for (PeerToken token = 1; token <= 4; ++token) script.Join(token, std::uint32_t(token));
+  std::vector<WorkerId> displays;
+  for (RequestId id = 1; id <= 8; ++id) {
+    const auto groups = HandedOut(script.AnswerAll(script.Submit(kClient, Frame(id, 3))));
+    ASSERT_EQ(groups.size(), 3U);
+    displays.push_back(groups[0].display);
+    for (const GroupAssignment& group : groups) EXPECT_EQ(group.display, displays.back());
+  }
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(displays[i], displays[i + 4]);
+  EXPECT_EQ(std::set<WorkerId>(displays.begin(), displays.end()).size(), 4U) << "everybody has a turn";
 }
 
 TEST(CoordinatorFrames, LossIsPlannedAroundFromTheFirstUnfinishedGroup) {

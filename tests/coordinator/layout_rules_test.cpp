@@ -1,5 +1,5 @@
-// What the machine does about layouts: counts occupied voxels where a policy needs them, keeps layouts while views change, and lets them
-// follow render times where balance is dynamic.
+// What the machine does about layouts and open policies: counts occupied voxels where a policy needs them, keeps layouts while views
+// change, and lets them follow render times where balance is dynamic.
 #include "tests/coordinator/coordinator_script.h"
 
 namespace slabstream {
@@ -17,7 +17,8 @@ SubmitFrame KdFrame(RequestId request, const std::string& balance = "static") {
 
 // All of BlockSummary().
 std::shared_ptr<const OccupancyGrid> FullGrid() {
-  return std::make_shared<const OccupancyGrid>(OccupancyGrid{{32, 32, 48}, std::vector<std::uint16_t>(4 * 4 * 6, 512)});
+  return std::make_shared<const OccupancyGrid>(
+      OccupancyGrid{{32, 32, 48}, std::vector<CellOccupancy>(4 * 4 * 6, FullCell({{0, 0, 0}, {8, 8, 8}}))});
 }
 
 std::vector<Box> Boxes(const Actions& actions) {
@@ -96,6 +97,28 @@ TEST(CoordinatorLayouts, ACountThatNeverEndsMeetsTheDeadline) {
   EXPECT_NE(failed[0].message.status.message().find("being counted"), std::string::npos) << failed[0].message.status.message();
 }
 
+TEST(CoordinatorLayouts, WhatEachRendererDrawsIsCountedOnce) {
+  CoordinatorScript script;
+  script.Join(11, 1);
+  std::vector<std::shared_ptr<const ClassificationTable>> tables;
+  RequestId request = 0;
+  for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer, RendererKind::kSplat}) {
+    SubmitFrame submit = KdFrame(++request);
+    submit.frame.renderer = renderer;
+    submit.frame.transfer.choice = TransferFunction{.colors = {{0, {1, 1, 1}}}, .opacities = {{0, 0.1}, {255, 1}}};
+    const std::size_t counted = script.counts.size();
+    Actions actions = script.Submit(kClient, submit);
+    if (script.counts.size() > counted) {
+      tables.push_back(script.counts.back().table);
+      actions = script.Step(OccupiedCounted{script.counts.back().count, FullGrid()});
+    }
+    EXPECT_EQ(ToClients<FrameReply>(script.AnswerAll(actions)).size(), 1U);
+  }
+  ASSERT_EQ(tables.size(), 2U);
+  const auto drawn = [](const ClassificationTable& table) { return std::ranges::count_if(table.opacity, [](float a) { return a > 0; }); };
+  EXPECT_GT(drawn(*tables[0]), drawn(*tables[1])) << "the Z-buffer draws what is opaque";
+}
+
 TEST(CoordinatorLayouts, ManyTransferFunctionsAreCountedInTurnAndAllServed) {
   CoordinatorScript script;
   script.Join(11, 1);
@@ -146,7 +169,7 @@ TEST(CoordinatorLayouts, DynamicOnesFollowRenderTimesAndThenStay) {
   for (RequestId request = 3; request < 6; ++request) script.Play(KdFrame(request, "dynamic"), 10);
   const std::vector<Box> settled = script.Play(KdFrame(6, "dynamic"), 10);
   for (RequestId request = 7; request < 10; ++request) EXPECT_EQ(script.Play(KdFrame(request, "dynamic"), 10), settled);
-  EXPECT_LT(settled[0].size().z, first[0].size().z);  // the costly half is shared by more
+  EXPECT_LT(settled[0].voxel_count(), first[0].voxel_count());  // the costly half is shared by more
 }
 
 TEST(CoordinatorLayouts, SplitByCostIsMadeAnewOnceCostsAreKnown) {
@@ -160,6 +183,86 @@ TEST(CoordinatorLayouts, SplitByCostIsMadeAnewOnceCostsAreKnown) {
   EXPECT_NE(second, first);
   EXPECT_LT(second[0].size().z, first[0].size().z);
   for (RequestId request = 3; request < 6; ++request) EXPECT_EQ(script.Play(frame(request), 10), second);
+}
+
+SubmitFrame OpenFrame(RequestId request) {
+  SubmitFrame submit = Frame(request, 0);
+  Policy& policy = submit.frame.policy;
+  policy.decomposition = policy.split = policy.assignment = policy.combine = "auto";
+  submit.frame.view.azimuth_degrees = double(request) * 30;
+  return submit;
+}
+
+class ChoiceScript : public BalanceScript {
+ public:
+  FrameStatistics StatisticsOf(const SubmitFrame& submit, double ratio) {
+    const std::size_t counted = counts.size();
+    Actions actions = Submit(kClient, submit);
+    if (counts.size() > counted) Append(actions, Step(OccupiedCounted{counts.back().count, FullGrid()}));
+    std::vector<GroupAssignment> groups = HandedOut(actions);
+    for (std::size_t i = 0; i < groups.size(); ++i) {
+      Actions more = Done(groups[i], Reports(groups[i], ratio));
+      if (groups[i].key.group + 1 == groups[i].group_count) Append(more, Image(groups[i], groups[i].group_count));
+      for (GroupAssignment& group : HandedOut(more)) groups.push_back(std::move(group));
+      Append(actions, more);
+    }
+    const auto replies = ToClients<FrameReply>(actions);
+    EXPECT_EQ(replies.size(), 1U);
+    return replies.empty() ? FrameStatistics{} : replies[0].message.statistics;
+  }
+};
+
+TEST(CoordinatorPolicies, AnOpenPolicyIsFilledInAndPredicted) {
+  ChoiceScript script;
+  const FrameStatistics statistics = script.StatisticsOf(OpenFrame(1), 1);
+  for (const std::string& name : {statistics.decomposition, statistics.split, statistics.assignment, statistics.combine}) {
+    EXPECT_NE(name, "auto");
+    EXPECT_NE(name, "");
+  }
+  ASSERT_TRUE(statistics.predicted);
+  EXPECT_GT(statistics.predicted->latency_seconds, 0);
+  EXPECT_FALSE(script.StatisticsOf(Frame(2), 1).predicted) << "nothing was left open";
+}
+
+TEST(CoordinatorPolicies, AChoiceStaysWhileViewsChange) {
+  ChoiceScript script;
+  std::vector<Box> boxes;
+  for (RequestId request = 1; request < 14; ++request) {
+    const std::vector<Box> now = script.Play(OpenFrame(request), 1);
+    // Once costs are known, another partition must gain a lot; here nothing can.
+    if (request > 1) {
+      EXPECT_EQ(now, boxes) << "frame " << request;
+    }
+    boxes = now;
+  }
+}
+
+TEST(CoordinatorPolicies, WhatHappenedCorrectsThePrediction) {
+  ChoiceScript script;
+  double predicted = 0, happened = 0;
+  for (RequestId request = 1; request < 10; ++request) {
+    SubmitFrame submit = OpenFrame(request);
+    submit.frame.view.azimuth_degrees = 0;
+    const FrameStatistics statistics = script.StatisticsOf(submit, 1);
+    ASSERT_TRUE(statistics.predicted);
+    predicted = statistics.predicted->render_seconds;
+    happened = 0;
+    for (const RankReport& report : statistics.reports) {
+      happened =
+          std::max(happened, 1e-9 * double(report.stage_ns[std::size_t(Stage::kRender)] - report.stage_ns[std::size_t(Stage::kPrepare)]));
+    }
+  }
+  EXPECT_NEAR(predicted / happened, 1, 0.1);
+}
+
+TEST(CoordinatorPolicies, AnUnknownNameFailsBesideAnOpenOne) {
+  ChoiceScript script;
+  SubmitFrame submit = OpenFrame(1);
+  submit.frame.policy.combine = "teleport";
+  const auto failed = ToClients<FrameFailed>(script.Submit(kClient, submit));
+  ASSERT_EQ(failed.size(), 1U);
+  EXPECT_EQ(failed[0].message.status.code(), StatusCode::kInvalidArgument);
+  EXPECT_THAT(failed[0].message.status.message(), testing::AllOf(testing::HasSubstr("teleport"), testing::HasSubstr("fan-in")));
 }
 
 TEST(CoordinatorLayouts, AnotherNumberOfWorkersIsAnotherLayout) {

@@ -2,19 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/support/random.h"
+#include "tests/support/random_box.h"
 
 namespace slabstream {
 namespace {
-
-Box RandomBox(Random& random, const Index3& size) {
-  Box box;
-  for (const Axis axis : kAxes) {
-    box.begin[axis] = random.Integer(0, size[axis] - 1);
-    box.end[axis] = random.Integer(box.begin[axis] + 1, size[axis]);
-  }
-  return box;
-}
 
 TEST(WorkField, SumsAreThoseOfItsCellsInProportion) {
   Random random(81);
@@ -26,7 +17,7 @@ TEST(WorkField, SumsAreThoseOfItsCellsInProportion) {
     for (double& w : work) w = random.Chance(0.5) ? 0 : random.Real(0, 3);
     const WorkField field(size, work);
     for (int j = 0; j < 20; ++j) {
-      const Box box = RandomBox(random, size);
+      const Box box = RandomBox(random, {{0, 0, 0}, size});
       double expected = 0;
       Box hull;
       for (std::size_t n = 0; n < work.size(); ++n) {
@@ -52,7 +43,7 @@ TEST(WorkField, OfUniformWorkCountsVoxels) {
   const Index3 size = {70, 20, 33};
   const WorkField field = WorkField::Uniform(size);
   for (int i = 0; i < 20; ++i) {
-    const Box box = RandomBox(random, size);
+    const Box box = RandomBox(random, {{0, 0, 0}, size});
     EXPECT_EQ(field.Sum(box), double(box.voxel_count()));
     EXPECT_EQ(field.Hull(box), box);
   }

@@ -57,10 +57,11 @@ TEST_F(ExperimentTest, EveryListedExperimentLeavesAReport) {
 TEST_F(ExperimentTest, SweepOfAUsersOwn) {
   const std::string ball = MakeSphere("ball.nrrd", 2, 24);
   std::ofstream(Path("sweep.json")) << R"({"volumes": [{"file": "ball.nrrd", "transfer": "opaque"}], "size": 48,
-    "policies": [{}, {"decomposition": "kd-tree", "combine": "radix-k"}], "workers": [1, 3]})";
+    "policies": [{}, {"decomposition": "kd-tree", "combine": "radix-k"},
+                 {"name": "open", "decomposition": "auto", "split": "auto", "assignment": "auto", "combine": "auto"}], "workers": [1, 3]})";
   MustRun({"experiment", "sweep", "sweep.json", "-o", "out"});
   ExpectReport("out", "sweep");
-  EXPECT_EQ(json::parse(ReadFile("out/result.json"))["tables"][0]["rows"].size(), 4U);
+  EXPECT_EQ(json::parse(ReadFile("out/result.json"))["tables"][0]["rows"].size(), 6U);
 
   std::ofstream(Path("bad.json")) << R"({"volumes": [{"file": "ball.nrrd"}], "policies": [{}], "workers": [-1]})";
   const ProgramResult bad = Slabstream({"experiment", "sweep", "bad.json", "-o", "bad"});

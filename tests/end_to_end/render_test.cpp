@@ -164,6 +164,20 @@ TEST_F(RenderTest, StatisticsShowThatVoxelsTravelOnce) {
     EXPECT_LE(frame["idle_share"], 1.0);
   }
 
+  EXPECT_FALSE(stats["frames"][0].contains("predicted")) << "nothing was left open";
+  MustRun({"turntable", ball_, "--local=2", "--decomposition", "auto", "--assignment", "auto", "--combine", "auto", "-o", "a_%d.png",
+           "--frames", "3", "--size", "64", "--stats", "auto.json"});
+  const json chosen = json::parse(ReadFile("auto.json"));
+  for (const char* name : {"decomposition", "split", "assignment", "combine"}) EXPECT_NE(chosen["plan"][name], "auto") << name;
+  for (const json& frame : chosen["frames"]) {
+    for (const char* figure : {"render_ms", "combine_ms", "finish_ms", "latency_ms", "imbalance"}) {
+      EXPECT_GE(frame["predicted"][figure], 0.0) << figure;
+      EXPECT_GE(frame["happened"][figure], 0.0) << figure;
+    }
+    EXPECT_NEAR(frame["prediction_error"]["latency_ms"],
+                frame["predicted"]["latency_ms"].get<double>() / frame["happened"]["latency_ms"].get<double>() - 1, 1e-6);
+  }
+
   const json trace = json::parse(ReadFile("trace.json"));
   std::set<int> processes;
   std::set<std::string> names;

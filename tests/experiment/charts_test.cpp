@@ -1,13 +1,17 @@
 // Charts are well-formed XML whatever they are given, keep texts as texts, and put everything that they draw inside the drawing.
 #include "client/experiment/report/charts.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <regex>
+#include <set>
 
 #include "client/experiment/report/document.h"
+#include "client/experiment/report/svg.h"
 #include "client/experiment/report/text.h"
 #include "tests/support/random.h"
 #include "tests/support/well_formed.h"
@@ -73,6 +77,48 @@ TEST(Charts, OriginsAreToldApartByStrokeAndInWords) {
   EXPECT_THAT(DrawLines(chart), Not(HasSubstr("from the paper"))) << "only what occurs is explained";
 }
 
+// The path that draws a marker, without its place.
+std::set<std::string> MarkersOf(const std::string& svg) {
+  std::set<std::string> markers;
+  const std::regex marker("<path class=\"(c[0-9])[^\"]*\" d=\"M[0-9.-]+ [0-9.-]+(m[^\"]*)\"");
+  for (auto match = std::sregex_iterator(svg.begin(), svg.end(), marker); match != std::sregex_iterator(); ++match)
+    markers.insert((*match)[2]);
+  return markers;
+}
+
+TEST(Charts, SeriesAreToldApartByMarkerToo) {
+  LineChart chart{"t", {"x", ""}, {"y", ""}, {}};
+  for (int i = 0; i < kPaletteSize; ++i) chart.series.push_back({fmt::format("series {}", i), Origin::kMeasured, {{1, 1}, {2, double(i)}}});
+  EXPECT_EQ(MarkersOf(DrawLines(chart)).size(), std::size_t(kPaletteSize));
+}
+
+TEST(Charts, WhatDataIsComparedWithIsNoData) {
+  LineChart chart{
+      "t", {"x", ""}, {"y", ""}, {{"data", Origin::kSimulated, {{1, 1}, {2, 3}}}, {"ideal", Origin::kMeasured, {{1, 1}, {2, 2}}, true}}};
+  const std::string svg = DrawLines(chart);
+  EXPECT_THAT(svg, HasSubstr(">ideal</text>"));
+  EXPECT_THAT(svg, Not(HasSubstr("measured here")));
+  EXPECT_THAT(svg, Not(HasSubstr("curve measured")));
+}
+
+TEST(Charts, PlainBarsAreNamedByTheLegend) {
+  const std::string svg = DrawBars({"t",
+                                    "g",
+                                    {"y", ""},
+                                    {},
+                                    {{"1", {{"one", Origin::kMeasured, {1}}, {"two", Origin::kMeasured, {2}}}},
+                                     {"2", {{"one", Origin::kMeasured, {3}}, {"two", Origin::kMeasured, {4}}}}}});
+  ExpectGood(svg);
+  const auto count = [&](const std::string& what) {
+    std::size_t found = 0;
+    for (std::size_t at = svg.find(what); at != std::string::npos; at = svg.find(what, at + 1)) ++found;
+    return found;
+  };
+  for (const char* name : {"one", "two"}) EXPECT_EQ(count(fmt::format(">{}</text>", name)), 1U);
+  EXPECT_EQ(count("class=\"c0 bar"), 3U) << "two and the legend's";
+  EXPECT_EQ(count("class=\"c1 bar"), 3U);
+}
+
 TEST(Charts, BarsGanttAndHeatMap) {
   ExpectGood(DrawBars({kNasty, kNasty, {kNasty, "%"}, {}, {}}));
   ExpectGood(DrawBars({kNasty,
@@ -81,7 +127,8 @@ TEST(Charts, BarsGanttAndHeatMap) {
                        {"a", kNasty},
                        {{"1", {{kNasty, Origin::kMeasured, {0, 0}}, {"p", Origin::kPaper, {30, 70}}}}, {"2", {}}}}));
   ExpectGood(DrawGantt({kNasty, "ms", Origin::kSimulated, {kNasty}, {}}));
-  ExpectGood(DrawGantt({kNasty, "ms", Origin::kSimulated, {"a", "b"}, {{kNasty, {{0, 1, 0, kNasty}, {1, 1, 1, ""}}}, {"empty", {}}}}));
+  ExpectGood(
+      DrawGantt({kNasty, "ms", Origin::kSimulated, {"a", "b"}, {{kNasty, {{0, 1, 0, kNasty, kNasty}, {1, 1, 1, "", ""}}}, {"empty", {}}}}));
   ExpectGood(DrawHeatMap({kNasty, kNasty, Origin::kMeasured, {}}));
   ExpectGood(DrawHeatMap({kNasty, "ms", Origin::kMeasured, {{"cut", "x", "y", 10, 5, {{0, 0, 10, 5, 0, ""}, {2, 2, 3, 3, 7, kNasty}}}}}));
 }
@@ -112,6 +159,21 @@ TEST(ChartAxis, CoversItsValuesAndHasAFewMarks) {
   }
 }
 
+TEST(ChartAxis, MarksMayStandAtTheValues) {
+  for (const AxisScale scale : {AxisScale::kLog, AxisScale::kLinear}) {
+    AxisSpec spec{"p", "", scale};
+    spec.at_values = true;
+    const ChartAxis axis(spec, {2, 16, 5, 16, 1024});
+    EXPECT_THAT(axis.marks(), testing::ElementsAre(2, 5, 16, 1024));
+    EXPECT_EQ(axis.At(2), 0);
+    EXPECT_EQ(axis.At(1024), 1);
+    std::vector<double> many(100);
+    std::iota(many.begin(), many.end(), 1);
+    EXPECT_LE(ChartAxis(spec, many).marks().size(), 13U) << "not at that many";
+    EXPECT_GE(ChartAxis(spec, {3, 3}).marks().size(), 2U) << "one value makes no axis";
+  }
+}
+
 TEST(Text, NumbersAndEscapes) {
   EXPECT_EQ(FormatNumber(0), "0");
   EXPECT_EQ(FormatNumber(12.3), "12.3");
@@ -119,6 +181,9 @@ TEST(Text, NumbersAndEscapes) {
   EXPECT_EQ(FormatNumber(45678.4), "45678");
   EXPECT_EQ(FormatNumber(1.25e9), "1.25e+09");
   EXPECT_EQ(FormatNumber(kNan), "–");
+  EXPECT_EQ(FormatAbout(16357), "16000");
+  EXPECT_EQ(FormatAbout(0.01251), "0.013");
+  EXPECT_EQ(FormatAbout(0), "0");
   EXPECT_EQ(Escape("a<b & \"c\" 'd'"), "a&lt;b &amp; &quot;c&quot; &#39;d&#39;");
   EXPECT_EQ(Slug("Figure 10a: N³, p"), "figure-10a-n-p");
   EXPECT_EQ(Slug("..."), "a");
@@ -131,8 +196,8 @@ TEST(Report, PageIsWellFormedAndSelfContained) {
                                kNasty,
                                kNasty,
                                kNasty,
-                               {Figure{"f" + std::to_string(i), DrawLines({"t", {"x", ""}, {"y", ""}, {}}), kNasty},
-                                Table{"t" + std::to_string(i), kNasty, {{kNasty, kNasty}}, {{kNasty}, {{1, Origin::kPaper}}, {Cell()}}},
+                               {Figure{fmt::format("f{}", i), DrawLines({"t", {"x", ""}, {"y", ""}, {}}), kNasty},
+                                Table{fmt::format("t{}", i), kNasty, {{kNasty, kNasty}}, {{kNasty}, {{1, Origin::kPaper}}, {Cell()}}},
                                 Photo{"\x89PNG", kNasty}}});
   }
   const std::string page = ReportHtml(report, {kNasty, kNasty, kNasty, kNasty, kNasty, kNasty, 2, 1, 1, kNasty});

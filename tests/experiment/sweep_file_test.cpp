@@ -15,7 +15,7 @@ constexpr const char* kGood = R"({
   "volumes": [{"sphere": {"class": 2, "size": 40, "occupancy": 0.3}, "opacity": 0.2}],
   "renderers": ["splat", "zbuffer"],
   "views": [{"azimuth": 30}, {"name": "close", "projection": "perspective", "zoom": 2}],
-  "policies": [{"combine": "fan-in"}, {"name": "even", "decomposition": "kd-tree", "split": "occupied", "assignment": "greedy", "groups": 2, "combine": "tree:4,strips=8"}],
+  "policies": [{"combine": "fan-in"}, {"name": "even", "decomposition": "kd-tree", "split": "occupied", "assignment": "greedy", "groups": 2, "combine": "tree:4,strips=8", "balance": "dynamic", "pixel_error": 0.001}],
   "workers": [1, 16],
   "links": ["10gbit", "1gbit:30,1"]
 })";
@@ -29,11 +29,20 @@ TEST(SweepFile, ReadsWhatItSays) {
   EXPECT_EQ(sweep->renderers.size(), 2U);
   EXPECT_EQ(sweep->views[0].name, "view 1");
   EXPECT_EQ(sweep->views[1].view.zoom, 2);
-  EXPECT_EQ(sweep->policies[0].name, "slab by voxels, cyclic, 1 groups, fan-in");
+  EXPECT_EQ(sweep->policies[0].name, "slab by voxels, cyclic, static, 1 groups, fan-in");
   EXPECT_EQ(sweep->policies[1].policy.split, "occupied");
   EXPECT_EQ(sweep->policies[1].policy.assignment, "greedy");
+  EXPECT_EQ(sweep->policies[1].policy.balance, "dynamic");
+  EXPECT_EQ(sweep->policies[1].policy.pixel_error, 0.001);
   EXPECT_EQ(sweep->workers, (std::vector{1, 16}));
   EXPECT_DOUBLE_EQ(sweep->links[1].link.latency_seconds, 30e-6);
+}
+
+TEST(SweepFile, LeavesNamesOpen) {
+  const Result<Sweep> sweep = ParseSweep("s.json", R"({"volumes": [{"sphere": {}}], "workers": [2],
+    "policies": [{"decomposition": "auto", "split": "auto", "assignment": "auto", "combine": "auto"}]})");
+  ASSERT_TRUE(sweep.ok()) << sweep.status().message();
+  EXPECT_EQ(sweep->policies[0].name, "auto by auto, auto, static, 1 groups, auto");
 }
 
 TEST(SweepFile, HasDefaults) {
@@ -63,6 +72,8 @@ TEST(SweepFile, TellsWhatIsWrongInOneLineThatNamesFieldValueAndLimit) {
       {"\"kd-tree\"", "\"cake\"", "policies[1].decomposition: \"cake\" must be one of slab, "},
       {"\"tree:4,strips=8\"", "\"tree:1\"", "policies[1].combine: "},
       {"\"greedy\"", "\"lots\"", "policies[1].assignment: \"lots\" must be one of cyclic"},
+      {"\"dynamic\"", "\"always\"", "policies[1].balance: \"always\" must be one of static, dynamic"},
+      {"0.001", "2", "policies[1].pixel_error: 2 must be a number in [0, "},
       {"\"groups\": 2", "\"groups\": 0", "policies[1].groups: 0 must be a whole number in [1, "},
       {"\"groups\": 2", "\"group\": 2", "policies[1]: 'group' is no field"},
       {"\"1gbit:30,1\"", "\"string\"", "links[1]: "},

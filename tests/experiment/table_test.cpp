@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "client/experiment/report/base64.h"
 #include "tests/support/well_formed.h"
 
 namespace slabstream {
@@ -32,6 +33,22 @@ TEST(Table, JsonTellsThemToo) {
   EXPECT_EQ(json["rows"][0]["time"], (nlohmann::ordered_json{{"value", 2.0}, {"origin", "measured"}, {"low", 1.0}, {"high", 3.0}}));
   EXPECT_EQ(json["rows"][0]["N"], 7.0);
   EXPECT_TRUE(json["rows"][1]["N"].is_null());
+}
+
+TEST(Table, PageHoldsTheCsv) {
+  const std::string html = TableHtml(Example()), before = "href=\"data:text/csv;charset=utf-8;base64,";
+  const std::size_t begin = html.find(before);
+  ASSERT_NE(begin, std::string::npos);
+  EXPECT_EQ(html.compare(begin + before.size(), Base64(TableCsv(Example())).size(), Base64(TableCsv(Example()))), 0);
+  EXPECT_THAT(html, HasSubstr("download=\"t.csv\""));
+}
+
+TEST(Table, LongOnesAreFolded) {
+  Table table = Example();
+  EXPECT_THAT(TableHtml(table), testing::Not(HasSubstr("<details>")));
+  table.rows.resize(500, table.rows.front());
+  EXPECT_EQ(WhyNotWellFormed(TableHtml(table)), "");
+  EXPECT_THAT(TableHtml(table), HasSubstr("<details><summary>A table (500 rows)</summary>"));
 }
 
 TEST(Table, HtmlTellsThemInWords) {

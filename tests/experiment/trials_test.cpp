@@ -84,7 +84,9 @@ TEST(Trials, InterruptedAnywhereItEndsLikeOneInOneGo) {
       int left = random.Integer(0, 6);
       const Status status = RunTrials(Trials(runs), {4, kRepeats, false, [&left] { return left-- == 0; }}, *log);
       done = status.ok();
-      if (!done) EXPECT_EQ(status.code(), StatusCode::kCancelled);
+      if (!done) {
+        EXPECT_EQ(status.code(), StatusCode::kCancelled);
+      }
     }
     EXPECT_TRUE(done);
     EXPECT_EQ(runs, whole_runs) << "no trial twice";

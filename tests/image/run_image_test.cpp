@@ -5,6 +5,8 @@
 
 #include <cstring>
 #include <limits>
+#include <optional>
+#include <vector>
 
 #include "tests/support/random_image.h"
 
@@ -192,6 +194,63 @@ const Corruption kCorruptions[] = {
     {"NaN colour", [](auto&, auto& p) { PokeFloat(p, 24 + 4, std::numeric_limits<float>::quiet_NaN()); }, "not finite"},
     {"infinite alpha", [](auto&, auto& p) { PokeFloat(p, 24 + 16 * 3 + 12, std::numeric_limits<float>::infinity()); }, "not finite"},
 };
+
+// Nearly all pixels of `bounds`, the others empty.
+LocalImage NearlyFull(Random& random, const PixelBounds& bounds) {
+  LocalImage image = MakeLocalImage(PixelFormat::kRgba, bounds);
+  for (std::size_t i = 0; i < image.rgba.size(); ++i) image.rgba[i] = i / 4 % 97 == 5 ? 0.0F : float(random.Real(0.1, 1));
+  return image;
+}
+
+TEST(DenseImages, AreTheirPixelsAsTheyLie) {
+  Random random(35);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 100; ++i) {
+    PixelBounds bounds = RandomBounds(random, kFrame);
+    if (bounds.empty()) bounds = kFrame;
+    LocalImage image = NearlyFull(random, bounds);
+    for (std::int64_t pixel = 0; pixel < bounds.pixel_count(); ++pixel) {  // no rim is empty
+      const std::int64_t x = pixel % bounds.width();
+      if (x == 0 || x == bounds.width() - 1) image.rgba[4 * std::size_t(pixel) + 3] = 1;
+    }
+    const ImageView view = ViewOf(image, kWhole, kFrame.width());
+    const std::optional<RunImageHeader> header = DenseHeader(view);
+    if (!header) continue;  // a small image whose few empty pixels are many
+    const std::span<const std::byte> payload(reinterpret_cast<const std::byte*>(view.rgba), PayloadBytes(*header));
+    EXPECT_EQ(payload.size(), sizeof(float) * image.rgba.size());
+    ASSERT_EQ(ValidateRuns(*header, payload, kFrame), Status::Ok());
+    EXPECT_EQ(DecodeRuns(*header, payload).rgba, image.rgba);
+    EXPECT_EQ(ReadRuns(*header, payload, kFrame)->rgba, image.rgba);
+
+    std::vector<std::byte> bad(payload.begin(), payload.end());
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    std::memcpy(bad.data() + 4 * random.Integer<std::size_t>(0, bad.size() / 4 - 1), &nan, sizeof(nan));
+    EXPECT_FALSE(ValidateRuns(*header, bad, kFrame).ok());
+    RunImageHeader less = *header;
+    less.pixel_count -= 1;
+    if (less.pixel_count == 0) continue;  // an empty picture is well
+    EXPECT_FALSE(ValidateRuns(less, payload.first(payload.size() - 16), kFrame).ok());
+  }
+  EXPECT_TRUE(DenseHeader(ViewOf(NearlyFull(random, kFrame))).has_value());
+}
+
+TEST(DenseImages, AreNotThoseWithGapsHolesOrDepths) {
+  Random random(36);
+  SCOPED_TRACE(random.trace());
+  const LocalImage image = NearlyFull(random, kFrame);
+  EXPECT_FALSE(DenseHeader(ViewOf(LocalImage{})).has_value());
+  EXPECT_FALSE(DenseHeader(ViewOf(RandomImage(random, PixelFormat::kRgba, kFrame))).has_value()) << "a third is empty";
+  EXPECT_FALSE(DenseHeader(ViewOf(RandomImage(random, PixelFormat::kDepth, kFrame))).has_value());
+  EXPECT_FALSE(DenseHeader(ViewOf(image, {0, 23 * 5 + 7}, kFrame.width())).has_value()) << "the last row is not whole";
+  LocalImage spans = image;
+  spans.rows.assign(17, {0, 23});
+  spans.rows[3] = {0, 22};
+  EXPECT_FALSE(DenseHeader(ViewOf(spans)).has_value()) << "what lies beside a span may be anything";
+  ImageView left = ViewOf(image);
+  left.bounds.x_end = 10;
+  for (ColumnSpan& row : left.rows) row.end = 10;
+  EXPECT_FALSE(DenseHeader(left).has_value()) << "rows are apart";
+}
 
 TEST(ValidateRuns, RefusesWhatDoesNotFit) {
   for (PixelFormat format : kFormats) {

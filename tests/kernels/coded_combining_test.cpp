@@ -32,7 +32,7 @@ LocalImage RunSchedule(const Schedule& schedule, const std::vector<LocalImage>& 
       const bool gone = to.first[pixel] == kMaxRanks;
       if (gone) Erase(to.image, one, kFrame.width());
       const Side side = !gone && first < to.first[pixel] ? Side::kFront : Side::kBack;
-      CombineRuns(to.image, sent.header, sent.payload, side, kFrame);
+      EXPECT_EQ(CombineRuns(to.image, sent.header, sent.payload, kFrame, side, kFrame), Status::Ok());
       to.first[pixel] = gone ? first : std::min(first, to.first[pixel]);
       held[step.from].first[pixel] = kMaxRanks;
       Erase(held[step.from].image, one, kFrame.width());

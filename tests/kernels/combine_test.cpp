@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <limits>
 #include <vector>
 
 #include "tests/support/random_image.h"
@@ -34,13 +36,21 @@ LocalImage Combined(LocalImage image, const LocalImage& other, Side side) {
 // Either the least or the most that an image may grow to: no difference in the picture.
 PixelBounds Room(const PixelBounds& a, const PixelBounds& b, Side side) { return side == Side::kFront ? Union(a, b) : kFrame; }
 
-// The same, with `other` as it travels, at an odd address.
-LocalImage CombinedRuns(LocalImage image, const LocalImage& other, Side side) {
+// The same, with `other` as it travels, at an address where kernels can read it and at one where they cannot.
+LocalImage CombinedRuns(const LocalImage& image, const LocalImage& other, Side side) {
   const RunImage runs = EncodeRuns(other, kWhole, kFrame.width());
-  std::vector<std::byte> shifted(runs.payload.size() + 1);
-  std::copy(runs.payload.begin(), runs.payload.end(), shifted.begin() + 1);
-  CombineRuns(image, runs.header, std::span<const std::byte>(shifted).subspan(1), side, Room(image.bounds, runs.header.bounds, side));
-  return image;
+  LocalImage results[2] = {image, image};
+  for (const std::size_t shift : {std::size_t{0}, std::size_t{1}}) {
+    std::vector<std::byte> payload(runs.payload.size() + shift);
+    std::copy(runs.payload.begin(), runs.payload.end(), payload.begin() + std::ptrdiff_t(shift));
+    const auto bytes = std::span<const std::byte>(payload).subspan(shift);
+    const PixelBounds room = Room(image.bounds, runs.header.bounds, side);
+    EXPECT_EQ(CombineRuns(results[shift], runs.header, bytes, kFrame, side, room), Status::Ok());
+  }
+  FillRows(results[0]);
+  FillRows(results[1]);
+  ExpectSameBits(results[0], results[1]);
+  return results[0];
 }
 
 // The same pixels on the whole frame: images without empty rims have smaller bounds.
@@ -130,6 +140,48 @@ TEST_P(CombineFormats, ViewsOfARangeGiveTheBitsOfItsPixels) {
   }
 }
 
+// Bad pixels anywhere: either the result has none of them (another pixel hid it), or it is refused.
+TEST_P(CombineFormats, PixelsThatAreNoneNeverPass) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity(), kNan = std::numeric_limits<float>::quiet_NaN();
+  Random random(55);
+  SCOPED_TRACE(random.trace());
+  const auto is_good = [](const LocalImage& image) {
+    return std::ranges::all_of(image.rgba, [](float c) { return std::isfinite(c); }) &&
+           std::ranges::all_of(image.depth, [](float d) { return !std::isnan(d) && d != -kInfinity; });
+  };
+  int refused = 0, hidden = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const LocalImage a = RandomImage(random, GetParam(), RandomBounds(random, kFrame));
+    LocalImage b = RandomImage(random, GetParam(), RandomBounds(random, kFrame));
+    if (b.bounds.empty()) continue;
+    const auto pixel = random.Integer<std::size_t>(0, std::size_t(b.bounds.pixel_count()) - 1);
+    const bool spoilt = random.Chance(0.8);
+    if (spoilt) {
+      const float bad = random.Chance(0.4) ? kNan : random.Chance(0.5) ? kInfinity : -kInfinity;
+      if (GetParam() == PixelFormat::kDepth && random.Chance(0.4)) {
+        b.depth[pixel] = bad == kInfinity ? kNan : bad;
+      } else {
+        b.rgba[4 * pixel + random.Integer<std::size_t>(0, 3)] = bad;
+      }
+    }
+    const ImageView view = ViewOf(b);
+    const Side side = random.Chance(0.5) ? Side::kFront : Side::kBack;
+    LocalImage image = a, same = a;
+    const bool accepted = CombineUnchecked(image, view, side, Room(image.bounds, view.bounds, side));
+    if (!spoilt) EXPECT_TRUE(accepted);
+    if (!accepted) {
+      ++refused;
+      continue;
+    }
+    Combine(same, view, side, Room(same.bounds, view.bounds, side));
+    ExpectSameBits(OnFrame(image), OnFrame(same));
+    EXPECT_TRUE(is_good(OnFrame(image)));
+    if (spoilt) ++hidden;
+  }
+  EXPECT_GT(refused, 500);
+  if (GetParam() == PixelFormat::kRgba) EXPECT_EQ(hidden, 0) << "over lets everything through";
+}
+
 TEST_P(CombineFormats, EmptyImagesAreNeutral) {
   Random random(53);
   SCOPED_TRACE(random.trace());
@@ -180,6 +232,22 @@ TEST(Combine, DepthTiesGoToTheLowerVoxelAcrossTheWrap) {
   EXPECT_TRUE(NearerDepth(1, 0xFFFFFFFFU, 1, 0));  // neighbours on both sides of 2^32
   EXPECT_FALSE(NearerDepth(1, 0, 1, 0xFFFFFFFFU));
   EXPECT_FALSE(NearerDepth(1, 7, 1, 7));
+}
+
+TEST(CombineRuns, DenseImagesCombineAsTheirRuns) {
+  Random random(37);
+  SCOPED_TRACE(random.trace());
+  for (const Side side : {Side::kFront, Side::kBack}) {
+    const LocalImage image = RandomImage(random, PixelFormat::kRgba, RandomBounds(random, kFrame));
+    LocalImage other = RandomImage(random, PixelFormat::kRgba, {3, 2, 30, 11});
+    for (float& value : other.rgba) value = value == 0 ? 0.25F : value;
+    const std::optional<RunImageHeader> header = DenseHeader(ViewOf(other));
+    ASSERT_TRUE(header.has_value());
+    LocalImage combined = image;
+    const std::span<const std::byte> payload = std::as_bytes(std::span(other.rgba));
+    ASSERT_EQ(CombineRuns(combined, *header, payload, kFrame, side, kFrame), Status::Ok());
+    ExpectSameBits(OnFrame(combined), OnFrame(Combined(image, other, side)));
+  }
 }
 
 }  // namespace

@@ -23,8 +23,8 @@ TEST(Replay, ChangesAreParsed) {
   EXPECT_EQ(change.combine, "radix-k:2x2");
   EXPECT_DOUBLE_EQ(change.link->latency_seconds, 5e-6);
   EXPECT_EQ(change.workers, 16);
-  for (const char* text : {"", "combine", "combine=", "combine=stirring", "link=string", "workers=0", "workers=-1", "workers=2x",
-                           "workers=", "speed=3", "workers=99999999999"}) {
+  for (const char* text : {"", "combine", "combine=", "combine=stirring", "combine=auto", "link=string", "workers=0", "workers=-1",
+                           "workers=2x", "workers=", "speed=3", "workers=99999999999"}) {
     const std::vector<std::string> wrong = {text};
     const auto parsed = ParseReplayChange(wrong);
     ASSERT_FALSE(parsed.ok()) << text;

@@ -24,7 +24,6 @@ TEST(Assignments, GiveEveryBoxASlotAndNoSlotMuchMoreThanOthers) {
   Random random(61);
   SCOPED_TRACE(random.trace());
   for (const AssignmentEntry& entry : Assignments()) {
-    EXPECT_EQ(FindAssignment(entry.name), &entry);
     for (const std::uint32_t slots : {1U, 2U, 3U, 5U, 8U, 13U}) {
       for (const std::size_t boxes : {0U, 1U, 5U, 13U, 40U}) {
         std::vector<double> costs(boxes, 1.0);
@@ -40,7 +39,6 @@ TEST(Assignments, GiveEveryBoxASlotAndNoSlotMuchMoreThanOthers) {
       }
     }
   }
-  EXPECT_EQ(FindAssignment("nonsense"), nullptr);
 }
 
 TEST(Assignments, GreedyKeepsWithinGrahamsBound) {
@@ -66,7 +64,7 @@ struct World {
   Index3 size{128, 128, 256};
   VolumeSummary summary = FullSummary(size);
   TransferFunction transfer = std::get<TransferFunction>(SomeRequest().transfer.choice);
-  OccupancyGrid grid{size, std::vector<std::uint16_t>(16 * 16 * 32, 512)};
+  OccupancyGrid grid{size, std::vector<CellOccupancy>(16 * 16 * 32, FullCell({{0, 0, 0}, {8, 8, 8}}))};
   Policy policy{.decomposition = "kd-tree", .groups = 1, .balance = "dynamic"};
   double seconds_a_cell = 1e-4;
   Random random{63};
@@ -187,7 +185,7 @@ TEST(Balance, HandOverNeverMakesAFrameSlower) {
   }
 }
 
-TEST(MovedVoxels, AreThoseOfBoxesThatANewSlotGetsWithTheirHalo) {
+TEST(MovedVoxels, AreThoseThatASlotDidNotHoldWithTheirHalo) {
   const WorkField voxels = WorkField::Uniform({10, 10, 60});
   const Layout from = {MakeSlabs({.work = &voxels, .boxes = 3}), {0, 1, kNoSlot}};
   Layout to = from;
@@ -195,7 +193,7 @@ TEST(MovedVoxels, AreThoseOfBoxesThatANewSlotGetsWithTheirHalo) {
   to.owners = {0, kNoSlot, kNoSlot};
   EXPECT_EQ(MovedVoxels(from, to), 0);
   to.owners = {1, 1, 2};
-  EXPECT_EQ(MovedVoxels(from, to), 10 * 10 * (28 + 28));
+  EXPECT_EQ(MovedVoxels(from, to), 10 * 10 * ((28 - 16) + 28)) << "slot 1 held the halo of its box, twice 8 slices";
 }
 
 TEST(LearntCost, AddsUpToWhatFramesTook) {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tests/support/random.h"
+#include "tests/support/random_box.h"
 
 namespace slabstream {
 namespace {
@@ -27,22 +27,13 @@ FrameSetup RandomSetup(Random& random) {
   return setup;
 }
 
-Box RandomBox(Random& random, const Index3& size) {
-  Box box;
-  for (const Axis axis : kAxes) {
-    box.begin[axis] = random.Integer(0, size[axis] - 1);
-    box.end[axis] = random.Integer(box.begin[axis] + 1, size[axis]);
-  }
-  return box;
-}
-
 TEST(FrameOcclusion, ABoxReachesNoFurtherThanItsReach) {
   Random random(21);
   SCOPED_TRACE(random.trace());
   int inside = 0;
   for (int round = 0; round < 3000; ++round) {
     const FrameSetup setup = RandomSetup(random);
-    const Box box = RandomBox(random, setup.description.geometry.size);
+    const Box box = RandomBox(random, setup.description.geometry.bounds());
     const PixelBounds reach = ReachOf(box, setup), frame = FrameBounds(setup);
     EXPECT_TRUE(frame.Contains(reach));
     const auto [c, u, v] = AxesOf(setup.camera.traversal_axis);
@@ -68,7 +59,7 @@ TEST(FrameOcclusion, AMaskHidesABoxIfItHidesItsReach) {
   int hidden = 0;
   for (int round = 0; round < 2000; ++round) {
     const FrameSetup setup = RandomSetup(random);
-    const Box box = RandomBox(random, setup.description.geometry.size);
+    const Box box = RandomBox(random, setup.description.geometry.bounds());
     const PixelBounds frame = FrameBounds(setup);
     OcclusionMask mask{OcclusionTiles(frame.width()), OcclusionTiles(frame.height()), {}};
     mask.hidden.assign(std::size_t(mask.tiles_x) * std::size_t(mask.tiles_y), 1);

@@ -167,13 +167,40 @@ TEST(PlanFrame, ChoosesTheFewestGroupsWhoseSlabsStayUnderTheTarget) {
     cost.slab_bytes_target = target_slices * slice_bytes;
     return PlanFrame(SomeRequest(), 7, summary, FullRoster(workers), cost)->groups.size();
   };
-  EXPECT_EQ(groups(1000, 1), 1U);  // all of it fits
-  EXPECT_EQ(groups(999, 1), 2U);   // halves and their halos
-  EXPECT_EQ(groups(500 + 2 * kHalo, 1), 2U);
-  EXPECT_EQ(groups(500 + 2 * kHalo - 1, 1), 3U);
+  EXPECT_EQ(groups(1000, 1), 1U);         // all of it fits
+  EXPECT_EQ(groups(999, 1), 2U);          // halves and their halos
+  EXPECT_EQ(groups(500 + kHalo, 1), 2U);  // which each have one neighbour
+  EXPECT_EQ(groups(500 + kHalo - 1, 1), 3U);
   EXPECT_EQ(groups(250 + 2 * kHalo, 2), 2U);
   EXPECT_EQ(groups(1, 1), 1000U / kHalo);  // not thinner than a halo
   EXPECT_EQ(groups(1, 1000), 1U);
+}
+
+TEST(PlanFrame, ChoosesGroupsByTheLargestBoxThatShowsSomething) {
+  // Visible are the bricks of one corner, 48 voxels a side.
+  VolumeSummary summary = FullSummary({192, 192, 192});
+  std::size_t brick = 0;
+  for (Index3 b; b.z < 12; ++b.z) {
+    for (b.y = 0; b.y < 12; ++b.y) {
+      for (b.x = 0; b.x < 12; ++b.x, ++brick) {
+        if (std::max({b.x, b.y, b.z}) > 2) summary.bricks[brick] = {0, 0};
+      }
+    }
+  }
+  for (const DecompositionEntry& entry : Decompositions()) {
+    FrameRequest request = SomeRequest();
+    request.policy.decomposition = entry.name;
+    CostModel cost;
+    cost.slab_bytes_target = 64 * 64 * 64;
+    const FramePlan plan = *PlanFrame(request, 7, summary, FullRoster(2), cost);
+    const std::vector<Placement> placements = PlacementsOf(plan);
+    ASSERT_FALSE(placements.empty());
+    // Slabs across the whole volume become as thin as their halo allows, and stay too large.
+    if (entry.one_axis) continue;
+    for (const Placement& placement : placements) {
+      EXPECT_LE(SlabBox(placement.box, plan.setup).voxel_count(), cost.slab_bytes_target) << entry.name;
+    }
+  }
 }
 
 TEST(PlanFrame, LeavesOutBoxesThatShowNothing) {
@@ -195,6 +222,24 @@ TEST(PlanFrame, LeavesOutBoxesThatShowNothing) {
   // Only boxes that show anything are dealt out, and the nearest one is the display worker's.
   EXPECT_EQ(plan.layout.owners, (std::vector<std::uint32_t>{kNoSlot, kNoSlot, kNoSlot, 0, 1, 0, kNoSlot, kNoSlot, kNoSlot, kNoSlot}));
   EXPECT_EQ(plan.display, roster.slots[0]);
+}
+
+TEST(PlanFrame, DisplayWorkersTakeTurns) {
+  for (int workers = 1; workers <= 7; ++workers) {
+    FrameRequest request = SomeRequest();
+    request.policy.groups = 3;
+    const Roster roster = FullRoster(workers);
+    const FramePlan first = Plan(request, FullSummary({96, 96, 96}), roster);
+    std::set<WorkerId> displays;
+    for (std::uint64_t turn = 0; turn < 2 * std::uint64_t(workers); ++turn) {
+      const FramePlan plan = TakeTurn(first, roster, {turn, 1});
+      ExpectSound(plan, roster);
+      EXPECT_EQ(PlacedBoxes(plan), PlacedBoxes(first));
+      EXPECT_EQ(plan.display, TakeTurn(first, roster, {turn + std::uint64_t(workers), 1}).display);
+      displays.insert(plan.display);
+    }
+    EXPECT_EQ(displays.size(), std::size_t(workers));
+  }
 }
 
 TEST(PlanFrame, AnEmptyVolumeHasAPlanOfEmptyGroups) {
@@ -277,16 +322,20 @@ TEST(PlanFrame, NamesWhatItDoesNotKnow) {
     return PlanFrame(request, 7, summary, roster, {}).status();
   };
   EXPECT_EQ(status([](auto& r) { r.policy.decomposition = "cake"; }, FullRoster(1)),
-            Status::InvalidArgument("policy.decomposition is 'cake', but must be one of: slab, beam, subcube, octree, kd-tree"));
+            Status::InvalidArgument("policy.decomposition is 'cake', but must be one of: auto, slab, beam, subcube, octree, kd-tree"));
   EXPECT_EQ(status([](auto& r) { r.policy.split = "hairs"; }, FullRoster(1)),
             Status::InvalidArgument("policy.split is 'hairs', but must be one of: auto, voxels, occupied, cost"));
   EXPECT_EQ(status([](auto& r) { r.policy.assignment = "lots"; }, FullRoster(1)),
-            Status::InvalidArgument("policy.assignment is 'lots', but must be one of: cyclic, contiguous, greedy"));
+            Status::InvalidArgument("policy.assignment is 'lots', but must be one of: auto, cyclic, contiguous, greedy"));
   EXPECT_EQ(status([](auto& r) { r.policy.balance = "act"; }, FullRoster(1)),
             Status::InvalidArgument("policy.balance is 'act', but must be one of: static, dynamic"));
   EXPECT_EQ(
       status([](auto& r) { r.policy.combine = "mix"; }, FullRoster(1)),
       Status::InvalidArgument("policy.combine 'mix' is not one of fan-in, centralized, chain, tree, radix-k, binary-swap, direct-send"));
+  const Status open = Status::InvalidArgument("policy: 'auto' leaves a choice, which must be made before a frame is planned");
+  EXPECT_EQ(status([](auto& r) { r.policy.decomposition = kAutomatic; }, FullRoster(1)), open);
+  EXPECT_EQ(status([](auto& r) { r.policy.assignment = kAutomatic; }, FullRoster(1)), open);
+  EXPECT_EQ(status([](auto& r) { r.policy.combine = kAutomatic; }, FullRoster(1)), open);
   EXPECT_EQ(status([](auto& r) { r.transfer.choice = "no-such-preset"; }, FullRoster(1)).code(), StatusCode::kNotFound);
   for (const Roster& nobody : {Roster{}, Roster{{0}}, Roster{{0, 0, 0}}}) {
     EXPECT_EQ(status([](auto&) {}, nobody).code(), StatusCode::kUnavailable);

@@ -63,13 +63,7 @@ FrameSetup MakeSetup(const Volume& volume, const SetupOptions& options) {
   setup.description = volume.description;
   setup.range = Summarize(volume).range;
   setup.renderer = options.renderer;
-  const VolumeGeometry& geometry = volume.description.geometry;
-  if (options.renderer == RendererKind::kSplat) {
-    setup.camera = MakeCamera(options.view, options.size, geometry);
-    setup.sheets = MakeSheetGrid(setup.camera, geometry);
-  } else {
-    setup.camera = MakeSupersampledCamera(options.view, options.size, geometry);
-  }
+  SetView(options.view, options.size, setup);
   setup.transfer = options.transfer;
   setup.shading = options.shading;
   setup.termination = options.termination;

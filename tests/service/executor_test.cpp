@@ -8,6 +8,7 @@
 #include <array>
 
 #include "common/wire/payload.h"
+#include "tests/service/outputs.h"
 #include "tests/service/pictures.h"
 
 namespace slabstream {
@@ -24,20 +25,6 @@ LocalImage Filled(const PixelBounds& bounds, float value) {
 
 class ExecutorTest : public testing::Test {
  protected:
-  ExecutorOutput Next() {
-    while (outputs_.empty()) {
-      Wait({}, &outbox_.wakeup(), std::chrono::seconds(10));
-      outputs_ = outbox_.TakeAll();
-    }
-    ExecutorOutput first = std::move(outputs_.front());
-    outputs_.erase(outputs_.begin());
-    return first;
-  }
-  template <class Event>
-  Event NextEvent() {
-    return std::get<Event>(std::get<WorkerEvent>(Next()));
-  }
-
   // Orders a combine of an image as it comes from another worker.
   CombineDone CombineIncoming(ImageHandle into, const LocalImage& image, Side side) {
     RunImage runs = EncodeRuns(image, {0, 16 * 8}, 16);
@@ -46,7 +33,7 @@ class ExecutorTest : public testing::Test {
                                    .incoming = {.header = runs.header, .payload = Bytes(std::move(runs.payload))},
                                    .side = side,
                                    .frame = kFrame});
-    return NextEvent<CombineDone>();
+    return outputs_.NextEvent<CombineDone>();
   }
   // What the image would be sent as: its pixels.
   LocalImage PixelsOf(ImageHandle image, PixelRange pixels = {0, 16 * 8}) {
@@ -54,17 +41,16 @@ class ExecutorTest : public testing::Test {
         SendPartial{.message = {.epoch = 1, .from_worker = 1, .key = kKey, .interval = {0, 1}, .pixels = pixels, .reports = {RankReport{}}},
                     .image = image,
                     .frame = kFrame},
-        false);
-    const auto sent = std::get<OutgoingPartial>(Next());
+        {});
+    const auto sent = std::get<OutgoingPartial>(outputs_.Next());
     const AnyMessage message = Decode(sent.header).value();
     const auto& partial = std::get<PartialImage>(message);
     EXPECT_EQ(partial.reports.back().image_bytes, sent.payload.size());
     return DecodeRuns(partial.image, sent.payload.span());
   }
 
-  Mailbox<ExecutorOutput> outbox_;
-  std::vector<ExecutorOutput> outputs_;
-  Executor executor_{outbox_, Codec::kZstd, 2};
+  Outputs outputs_;
+  Executor executor_{outputs_.outbox, Codec::kZstd, 2};
 };
 
 TEST_F(ExecutorTest, ImagesCombineInOrderAndSourcesStayAsTheyAre) {
@@ -72,9 +58,9 @@ TEST_F(ExecutorTest, ImagesCombineInOrderAndSourcesStayAsTheyAre) {
   EXPECT_TRUE(CombineIncoming(2, Filled({0, 0, 4, 4}, 0.25F), Side::kBack).status.ok());
   // 3 becomes a copy of the left half of row 0 of 1; then 2 goes behind 1.
   executor_.Perform(StartCombine{.key = kKey, .image = 3, .other = 1, .pixels = {0, 4}, .frame = kFrame});
-  EXPECT_TRUE(NextEvent<CombineDone>().status.ok());
+  EXPECT_TRUE(outputs_.NextEvent<CombineDone>().status.ok());
   executor_.Perform(StartCombine{.key = kKey, .image = 1, .other = 2, .side = Side::kBack, .frame = kFrame});
-  EXPECT_TRUE(NextEvent<CombineDone>().status.ok());
+  EXPECT_TRUE(outputs_.NextEvent<CombineDone>().status.ok());
 
   const LocalImage combined = PixelsOf(1);
   EXPECT_FLOAT_EQ(PixelAt(combined, 1, 1).rgba[3], 0.5F + 0.5F * 0.25F);
@@ -90,7 +76,7 @@ TEST_F(ExecutorTest, ReleasedImagesServeTheOrdersThatWereGivenBefore) {
   EXPECT_TRUE(CombineIncoming(1, Filled({0, 0, 8, 4}, 0.5F), Side::kBack).status.ok());
   executor_.Perform(StartCombine{.key = kKey, .image = 2, .other = 1, .frame = kFrame});
   executor_.Perform(ReleaseImage{1});
-  EXPECT_TRUE(NextEvent<CombineDone>().status.ok());
+  EXPECT_TRUE(outputs_.NextEvent<CombineDone>().status.ok());
   EXPECT_FLOAT_EQ(PixelAt(PixelsOf(2), 7, 3).rgba[3], 0.5F);
   executor_.Perform(ReleaseImage{1});  // again: nothing happens
 }
@@ -102,7 +88,7 @@ TEST_F(ExecutorTest, DamagedRunsAreRefused) {
   runs.header.bounds = {0, 0, 1 << 24, 1 << 24};  // would take petabytes
   executor_.Perform(StartCombine{
       .key = kKey, .image = 1, .incoming = {.header = runs.header, .payload = Bytes(std::move(runs.payload))}, .frame = kFrame});
-  EXPECT_FALSE(NextEvent<CombineDone>().status.ok());
+  EXPECT_FALSE(outputs_.NextEvent<CombineDone>().status.ok());
   EXPECT_FALSE(CombineIncoming(1, MakeLocalImage(PixelFormat::kDepth, {0, 0, 8, 4}), Side::kBack).status.ok());
   EXPECT_FLOAT_EQ(PixelAt(PixelsOf(1), 7, 3).rgba[3], 0.5F) << "the image is as it was";
 }
@@ -122,19 +108,19 @@ TEST_F(ExecutorTest, HiddenTilesAreThoseOfWhatWasCombinedBefore) {
   executor_.Perform(FindHidden{kKey, 1, shared, {}});
   combine({30, 0, 40, 8}, 1);
   executor_.Perform(FindHidden{kKey, 1, shared, {}});
-  EXPECT_TRUE(NextEvent<CombineDone>().status.ok());
-  const auto first = NextEvent<HiddenFound>();
+  EXPECT_TRUE(outputs_.NextEvent<CombineDone>().status.ok());
+  const auto first = outputs_.NextEvent<HiddenFound>();
   EXPECT_EQ(first.image, 1U);
   EXPECT_EQ(first.key, kKey);
   EXPECT_EQ(first.hidden, (OcclusionMask{3, 1, {1, 0, 0}}));
-  EXPECT_TRUE(NextEvent<CombineDone>().status.ok());
-  EXPECT_EQ(NextEvent<HiddenFound>().hidden, (OcclusionMask{3, 1, {1, 0, 1}}));
+  EXPECT_TRUE(outputs_.NextEvent<CombineDone>().status.ok());
+  EXPECT_EQ(outputs_.NextEvent<HiddenFound>().hidden, (OcclusionMask{3, 1, {1, 0, 1}}));
 }
 
 TEST_F(ExecutorTest, AnImageWithDepthHidesNothing) {
   EXPECT_TRUE(CombineIncoming(1, MakeLocalImage(PixelFormat::kDepth, {0, 0, 8, 4}), Side::kBack).status.ok());
   executor_.Perform(FindHidden{kKey, 1, std::make_shared<const FrameSetup>(), {}});
-  EXPECT_TRUE(NextEvent<HiddenFound>().hidden.empty());
+  EXPECT_TRUE(outputs_.NextEvent<HiddenFound>().hidden.empty());
 }
 
 TEST_F(ExecutorTest, FinishedFrameIsResolvedAndPacked) {
@@ -144,7 +130,7 @@ TEST_F(ExecutorTest, FinishedFrameIsResolvedAndPacked) {
   executor_.Perform(SendFrame{.message = {.epoch = 1, .worker = 1, .frame = 3, .attempt = 1, .groups_done = 1},
                               .image = 1,
                               .setup = std::make_shared<const FrameSetup>(setup)});
-  const auto sent = std::get<OutgoingFrame>(Next());
+  const auto sent = std::get<OutgoingFrame>(outputs_.Next());
   const AnyMessage message = Decode(sent.header).value();
   const auto& frame = std::get<FrameImage>(message);
   EXPECT_EQ(frame.runs.image.bounds, (PixelBounds{1, 0, 4, 2}));
@@ -161,7 +147,7 @@ TEST_F(ExecutorTest, EveryChunkIsAnsweredAndDamageIsFound) {
   const Bytes payload = PackChunk(Bytes(std::vector<std::byte>(1000, std::byte{7})), Codec::kZstd, chunk);
   const auto store = [&](const Chunk& header, const Bytes& bytes) {
     executor_.Perform(StoreChunk{slab, header, bytes});
-    const auto stored = NextEvent<ChunkStored>();
+    const auto stored = outputs_.NextEvent<ChunkStored>();
     EXPECT_EQ(stored.slab, slab);
     EXPECT_EQ(stored.chunk, header.chunk);
     return stored.status.code();
@@ -195,25 +181,78 @@ TEST_F(ExecutorTest, RenderIsAnsweredAlsoWhenItIsCancelled) {
   Chunk chunk{.epoch = 1, .dataset = 1, .box = slab.box, .chunk = 0};
   const Bytes payload = PackChunk(samples, Codec::kRaw, chunk);
   executor_.Perform(StoreChunk{slab, chunk, payload});
-  ASSERT_TRUE(NextEvent<ChunkStored>().status.ok());
+  ASSERT_TRUE(outputs_.NextEvent<ChunkStored>().status.ok());
 
   const auto setup = std::make_shared<const FrameSetup>(plan.setup);
   executor_.Perform(StartRender{.key = kKey, .slab = slab, .placement = {.box = slab.box, .worker = 1}, .setup = setup, .image = 1});
   executor_.Perform(CancelRender{kKey});
-  auto done = NextEvent<RenderDone>();
+  auto done = outputs_.NextEvent<RenderDone>();
   EXPECT_EQ(done.image, 1U);
   EXPECT_TRUE(done.status.ok() || done.status.code() == StatusCode::kCancelled) << done.status.message();
 
   executor_.Perform(DropSlab{slab});  // but its last render goes on
   executor_.Perform(OpenSlab{slab});
   executor_.Perform(StoreChunk{slab, chunk, payload});
-  ASSERT_TRUE(NextEvent<ChunkStored>().status.ok());
+  ASSERT_TRUE(outputs_.NextEvent<ChunkStored>().status.ok());
   executor_.Perform(StartRender{.key = kKey, .slab = slab, .placement = {.box = slab.box, .worker = 1}, .setup = setup, .image = 2});
   executor_.Perform(DropSlab{slab});
-  done = NextEvent<RenderDone>();
+  done = outputs_.NextEvent<RenderDone>();
   EXPECT_TRUE(done.status.ok()) << done.status.message();
   EXPECT_GT(done.slab_bytes, 0U);
   EXPECT_GT(done.report.stage_ns[std::size_t(Stage::kRender)], 0);
+}
+
+TEST_F(ExecutorTest, WhatIsCopiedFromOtherSlabsIsWhatWouldHaveArrived) {
+  const std::shared_ptr<const Volume> volume = TestSphere(96);
+  const Box whole = volume->block.box;
+  for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
+    const FramePlan plan = PlanFrame(TestRequest(renderer, 20), 1, Summarize(*volume), Roster{{1}}, CostModel{}).value();
+    const auto setup = std::make_shared<const FrameSetup>(plan.setup);
+    const auto store = [&](const SlabKey& slab, const Box& box) {
+      Chunk chunk{.epoch = 1, .dataset = 1, .box = box, .chunk = 0};
+      const VoxelBlock samples = CutBlock(volume->block, box);
+      ASSERT_LE(samples.bytes.size(), kChunkBytes);
+      const Bytes payload = PackChunk(Bytes(std::vector<std::byte>(samples.bytes.begin(), samples.bytes.end())), Codec::kRaw, chunk);
+      executor_.Perform(StoreChunk{slab, chunk, payload});
+      const auto stored = outputs_.NextEvent<ChunkStored>();
+      EXPECT_TRUE(stored.status.ok()) << stored.status.message();
+      EXPECT_EQ(stored.box, box);
+    };
+    const auto render = [&](const SlabKey& slab, ImageHandle image) {
+      executor_.Perform(StartRender{.key = kKey, .slab = slab, .placement = {.box = whole, .worker = 1}, .setup = setup, .image = image});
+      const auto done = outputs_.NextEvent<RenderDone>();
+      EXPECT_TRUE(done.status.ok()) << done.status.message();
+      return done.report;
+    };
+    const auto key = [&](const Box& box, std::uint64_t generation) {
+      return SlabKey{.dataset = 1, .box = box, .type = volume->block.type, .generation = generation};
+    };
+    const SlabKey direct = key(whole, 1), lower = key({{0, 0, 0}, {96, 96, 50}}, 2), side = key({{20, 0, 0}, {96, 96, 80}}, 3),
+                  put_together = key(whole, 4);
+    executor_.Perform(OpenSlab{direct, {}});
+    store(direct, whole);
+    const RankReport expected = render(direct, 1);
+    EXPECT_GT(expected.drawn_voxels, 0U);
+
+    // One source is itself a copy in part and was not rendered from; both are dropped before the first render.
+    executor_.Perform(OpenSlab{lower, {}});
+    store(lower, lower.box);
+    executor_.Perform(OpenSlab{side, {{lower, {{20, 0, 0}, {96, 96, 50}}}}});
+    store(side, {{20, 0, 50}, {96, 96, 80}});
+    executor_.Perform(OpenSlab{put_together, {{lower, lower.box}, {side, {{20, 0, 50}, {96, 96, 80}}}}});
+    store(put_together, {{0, 0, 50}, {20, 96, 80}});
+    store(put_together, {{0, 0, 80}, {96, 96, 96}});
+    executor_.Perform(DropSlab{lower});
+    executor_.Perform(DropSlab{side});
+    const RankReport report = render(put_together, 2);
+    EXPECT_EQ(report.occupied_voxels, expected.occupied_voxels);
+    EXPECT_EQ(report.drawn_voxels, expected.drawn_voxels);
+    EXPECT_EQ(report.image_bounds, expected.image_bounds);
+    EXPECT_EQ(report.image_pixels, expected.image_pixels);
+    for (const ImageHandle image : {1, 2}) executor_.Perform(ReleaseImage{image});
+    executor_.Perform(DropSlab{direct});
+    executor_.Perform(DropSlab{put_together});
+  }
 }
 
 }  // namespace

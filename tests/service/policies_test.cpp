@@ -1,8 +1,10 @@
 // Whatever the policy, the picture is that of one renderer that holds the whole volume: every partition, assignment, way to combine and
-// renderer, for any number of workers, in both projections, with boxes that change from frame to frame.
+// renderer, for any number of workers, in both projections, with boxes that change from frame to frame; and whatever the service chooses.
 #include <gtest/gtest.h>
 
-#include <map>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "client/embedded/embedded_service.h"
 #include "common/combining/schemes.h"
@@ -21,6 +23,13 @@ std::shared_ptr<const Volume> SparseVolume() {
     const auto distance = [&](const Vec3& center) { return Length(ToVec3(v) - center); };
     return std::max({0.0, 250 - 12 * distance({18, 16, 20}), 250 - 15 * distance({58, 40, 66})});
   }));
+}
+
+template <class Entries>
+std::vector<std::string_view> WithAutomatic(const Entries& entries) {
+  std::vector<std::string_view> names = {kAutomatic};
+  for (const auto& entry : entries) names.push_back(entry.name);
+  return names;
 }
 
 class PoliciesTest : public testing::TestWithParam<int> {};
@@ -43,15 +52,16 @@ TEST_P(PoliciesTest, NeverChangeThePicture) {
       request.view.projection = projection;
       const LocalImage expected = RenderDirectly(request, *volume);
       ASSERT_GT(HighestAlpha(expected), 0.5);
-      for (const DecompositionEntry& decomposition : Decompositions()) {
-        for (const AssignmentEntry& assignment : Assignments()) {
+      for (const std::string_view decomposition : WithAutomatic(Decompositions())) {
+        for (const std::string_view assignment : WithAutomatic(Assignments())) {
           // The other lists in turn, so that all pairs come up over all of it.
           ++frame;
-          request.policy.decomposition = decomposition.name;
-          request.policy.assignment = assignment.name;
+          request.policy.decomposition = decomposition;
+          request.policy.assignment = assignment;
           request.policy.split = WorkSplits()[frame % WorkSplits().size()].name;
           request.policy.balance = BalanceModes()[frame / 3 % BalanceModes().size()].name;
-          request.policy.combine = CombiningSchemes()[frame % CombiningSchemes().size()].name;
+          const std::vector<std::string_view> schemes = WithAutomatic(CombiningSchemes());
+          request.policy.combine = schemes[frame % schemes.size()];
           request.policy.groups = 1 + int(frame % 3);
           SCOPED_TRACE(testing::Message() << GetParam() << " workers, renderer " << int(renderer) << ", projection " << int(projection)
                                           << ", " << request.policy.groups << " groups, " << request.policy.decomposition << ", "
@@ -60,8 +70,16 @@ TEST_P(PoliciesTest, NeverChangeThePicture) {
           const Result<Picture> picture = client.Render(request, std::chrono::seconds(60));
           ASSERT_TRUE(picture.ok()) << picture.status().message();
           EXPECT_LE(LargestDifference(picture->image, expected, request.size), AllowedDifference(request));
-          EXPECT_EQ(picture->statistics.decomposition, request.policy.decomposition);
-          EXPECT_EQ(picture->statistics.assignment, request.policy.assignment);
+          const FrameStatistics& done = picture->statistics;
+          EXPECT_EQ(done.predicted.has_value(), LeavesChoice(request.policy));
+          for (const auto& [asked, got] :
+               {std::pair(request.policy.decomposition, done.decomposition), std::pair(request.policy.assignment, done.assignment),
+                std::pair(request.policy.combine, done.combine)}) {
+            EXPECT_NE(got, kAutomatic);
+            if (asked != kAutomatic) {
+              EXPECT_EQ(got, asked);
+            }
+          }
           EXPECT_EQ(picture->statistics.balance, request.policy.balance);
           EXPECT_NE(picture->statistics.split, "auto");
         }

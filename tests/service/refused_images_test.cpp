@@ -1,115 +1,15 @@
-// A worker whose peer's memory cannot be opened, on either end: the image comes as runs. The test plays the coordinator and the peer.
-#include <gtest/gtest.h>
+// A worker whose peer's memory cannot be opened, on either end: the image comes as runs.
 #include <unistd.h>
 
-#include <optional>
-
 #include "common/base/shared_arena.h"
-#include "common/wire/payload.h"
-#include "tests/support/random_image.h"
-#include "worker/service.h"
+#include "tests/service/worker_and_peer.h"
 
 namespace slabstream {
 namespace {
 
-constexpr Epoch kEpoch = 9;
-constexpr WorkerId kWorker = 1, kPeer = 2;
-constexpr std::int32_t kSide = 200;
-constexpr const char *kWorkerImages = "inproc://refused.worker", *kPeerImages = "inproc://refused.peer";
-
-LocalImage Picture(std::uint64_t seed) {
-  Random random(seed);
-  return RandomImage(random, PixelFormat::kRgba, {0, 0, kSide, kSide});
-}
-
-class FixedPicture : public Renderer {
- public:
-  Result<LocalImage> Render(SlabData&, const Box&, const FrameSetup&, const OcclusionMask&, const std::atomic<bool>&,
-                            RankReport&) override {
-    return Picture(1);
-  }
-};
-
-class RefusedImagesTest : public testing::Test {
+class RefusedImagesTest : public WorkerAndPeer {
  protected:
-  RefusedImagesTest()
-      : control_(*Socket::Router(context_)),
-        slabs_(*Socket::Router(context_)),
-        images_(*Socket::Router(context_)),
-        to_worker_(*Socket::Dealer(context_)) {
-    CHECK(control_.Bind("inproc://refused.control").ok() && slabs_.Bind("inproc://refused.slabs").ok() && images_.Bind(kPeerImages).ok());
-    WorkerOptions options;
-    options.coordinator_endpoint = "inproc://refused.control";
-    options.images_endpoint = kWorkerImages;
-    options.make_renderer = [](RendererKind) { return std::make_unique<FixedPicture>(); };
-    worker_ = WorkerService::Start(context_, std::move(options)).value();
-    CHECK(to_worker_.Connect(kWorkerImages).ok());
-    const auto hello = Await<Register>();
-    EXPECT_NE(hello.memory_scope, 0U);
-    SendControl(Welcome{kEpoch, hello.incarnation, kWorker, "inproc://refused.slabs", 1000, 60000});
-  }
-
-  void SendControl(const AnyMessage& message) { ASSERT_TRUE(control_.Send(identity_, Encode(message)).ok()); }
-  void SendToWorker(const AnyMessage& message, const Bytes& payload = {}) {
-    ASSERT_TRUE(to_worker_.Send({}, Encode(message), payload).ok());
-  }
-
-  // The next message of this kind that the worker sends anywhere; chunks are handed out meanwhile.
-  template <class Message>
-  Message Await() {
-    const Time deadline = MonotonicNow() + std::chrono::seconds(30);
-    while (MonotonicNow() < deadline) {
-      Socket* const sockets[] = {&control_, &slabs_, &images_};
-      Wait(sockets, nullptr, std::chrono::seconds(1));
-      for (Socket* socket : sockets) {
-        while (auto incoming = socket->TryReceive()) {
-          const AnyMessage message = Decode(incoming->parts[0].span()).value();
-          if (socket == &control_) identity_ = incoming->identity;
-          if (const auto* request = std::get_if<ChunkRequest>(&message)) Serve(incoming->identity, *request);
-          payload_ = incoming->parts.size() > 1 ? incoming->parts[1] : Bytes();
-          if (const auto* wanted = std::get_if<Message>(&message)) return *wanted;
-        }
-      }
-    }
-    ADD_FAILURE() << "the message did not come";
-    return {};
-  }
-
-  void Serve(const std::string& identity, const ChunkRequest& request) {
-    Chunk chunk = {.epoch = kEpoch, .dataset = request.dataset, .box = request.box, .chunk = request.chunk};
-    const Bytes payload = PackChunk(Bytes(std::vector<std::byte>(std::size_t(request.box.voxel_count()))), Codec::kRaw, chunk);
-    ASSERT_TRUE(slabs_.Send(identity, Encode(chunk), payload).ok());
-  }
-
-  // Rank 0, the root, is `root`; both ranks render everything.
-  GroupAssignment Assignment(FrameId frame, WorkerId root) {
-    GroupAssignment assignment;
-    assignment.epoch = kEpoch;
-    assignment.key = {frame, 0, 0};
-    assignment.finished_before = frame;
-    assignment.group_count = 2;
-    FrameSetup& setup = assignment.setup;
-    setup.dataset = 1;
-    setup.description.geometry.size = {8, 8, 32};
-    setup.range = {0, 1};
-    setup.camera = MakeCamera({}, {kSide, kSide}, setup.description.geometry);
-    setup.sheets = MakeSheetGrid(setup.camera, setup.description.geometry);
-    setup.sheets.width = setup.sheets.height = kSide;
-    setup.transfer.colors = {{0, {1, 1, 1}}};
-    setup.transfer.opacities = {{0, 1, 0.5, 0}};
-    setup.termination = 0;
-    assignment.group.placements = {{0, {{0, 0, 0}, {8, 8, 16}}, root}, {1, {{0, 0, 16}, {8, 8, 32}}, kWorker + kPeer - root}};
-    assignment.group.schedule = MakeFanIn({2, 0, WholeFrame(setup)});
-    assignment.display = root;
-    assignment.peers = {{kWorker, kWorkerImages, SharedMemoryScope()}, {kPeer, kPeerImages, SharedMemoryScope()}};
-    return assignment;
-  }
-
-  Context context_;
-  Socket control_, slabs_, images_, to_worker_;
-  std::unique_ptr<WorkerService> worker_;
-  std::string identity_;  // of the worker's control connection
-  Bytes payload_;         // of the message that Await returned
+  RefusedImagesTest() { EXPECT_NE(memory_scope_, 0U); }
 };
 
 TEST_F(RefusedImagesTest, TheReceiverAsksForRuns) {

@@ -4,11 +4,12 @@
 
 #include <cstring>
 #include <functional>
+#include <limits>
 
 #include "common/base/pooled_vector.h"
+#include "tests/service/outputs.h"
 #include "tests/service/pictures.h"
 #include "tests/support/random_image.h"
-#include "worker/executor.h"
 
 namespace slabstream {
 namespace {
@@ -173,39 +174,29 @@ class TwoExecutors : public testing::Test {
   TwoExecutors() { CHECK(ShareBlocks().ok()); }
 
   struct Worker {
-    Mailbox<ExecutorOutput> outbox;
-    std::vector<ExecutorOutput> outputs;
-    Executor executor{outbox, Codec::kRaw, 1};
+    Outputs outputs;
+    Executor executor{outputs.outbox, Codec::kRaw, 1};
 
-    ExecutorOutput Next() {
-      while (outputs.empty()) {
-        Wait({}, &outbox.wakeup(), std::chrono::seconds(10));
-        outputs = outbox.TakeAll();
-      }
-      ExecutorOutput first = std::move(outputs.front());
-      outputs.erase(outputs.begin());
-      return first;
-    }
     Status Combine(ImageHandle into, const PartialImage& message, const Bytes& payload, bool replace = false) {
       executor.Perform(StartCombine{.key = kKey,
                                     .image = into,
-                                    .incoming = {message.image, message.shared, payload},
+                                    .incoming = {message.image, message.shared, message.packed, payload},
                                     .side = Side::kBack,
                                     .replace = replace,
                                     .pixels = message.pixels,
                                     .frame = kFrame});
-      return std::get<CombineDone>(std::get<WorkerEvent>(Next())).status;
+      return outputs.NextEvent<CombineDone>().status;
     }
     std::pair<PartialImage, Bytes> Send(ImageHandle image, bool lend) {
       executor.Perform(SendPartial{{2, "inproc://two", 7},
                                    {.epoch = 1, .from_worker = 1, .key = kKey, .step = 4, .interval = {0, 1}, .pixels = kWhole},
                                    image,
                                    kFrame},
-                       lend);
+                       Delivery{.lend = lend});
       return TakeSent();
     }
     std::pair<PartialImage, Bytes> TakeSent() {
-      const auto sent = std::get<OutgoingPartial>(Next());
+      const auto sent = std::get<OutgoingPartial>(outputs.Next());
       const AnyMessage message = Decode(sent.header).value();
       return {std::get<PartialImage>(message), sent.payload};
     }
@@ -243,6 +234,27 @@ TEST_F(TwoExecutors, LentImagesCombineAsSentOnesDo) {
     // And where pixels come back to where they were.
     EXPECT_TRUE(two_.Combine(handle, lent, spans, true).ok());
     EXPECT_EQ(PixelsOf(two_, handle), PixelsOf(one_, handle));
+  }
+}
+
+// As those that come in frames.
+TEST_F(TwoExecutors, PixelsThatAreNoneFailTheStep) {
+  ImageHandle handle = 0;
+  for (const PixelFormat format : {PixelFormat::kRgba, PixelFormat::kDepth}) {
+    LocalImage image = RandomImage(random_, format, kFrame);
+    const std::size_t pixel = 123 * 400 + 45;
+    image.rgba[4 * pixel + 1] = std::numeric_limits<float>::quiet_NaN();
+    if (format == PixelFormat::kDepth) image.depth[pixel] = -1e30F;  // in front of all others
+    PartialImage message = {.epoch = 1, .from_worker = 1, .key = kKey, .step = 4, .interval = {0, 1}, .pixels = kWhole};
+    LentImages lent;
+    const std::optional<Bytes> spans = lent.Lend(image, ViewOf(image, kWhole, kFrame.width()), {2, "inproc://two", 7}, message);
+    ASSERT_TRUE(spans.has_value());
+    ASSERT_TRUE(two_.executor.peer_memory().Open(message.shared->arena, kNow).ok());
+    const ImageHandle present = ++handle, fresh = ++handle;
+    Give(two_, present, RandomImage(random_, format, {0, 0, 380, 280}));
+    EXPECT_EQ(two_.Combine(present, message, *spans).code(), StatusCode::kInvalidArgument);
+    EXPECT_EQ(two_.Combine(present, message, *spans, true).code(), StatusCode::kInvalidArgument);
+    EXPECT_EQ(two_.Combine(fresh, message, *spans).code(), StatusCode::kInvalidArgument);
   }
 }
 

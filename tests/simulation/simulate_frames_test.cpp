@@ -9,6 +9,7 @@
 #include <set>
 #include <tuple>
 
+#include "common/planning/frame_occlusion.h"
 #include "common/planning/frame_window.h"
 #include "tests/simulation/support.h"
 #include "tests/support/random_combining.h"
@@ -48,6 +49,21 @@ TEST(SimulateFrames, OneWorkerTakesTheSumOfWhatThereIsToDo) {
   EXPECT_NEAR(timeline.frames[0].latency(), messages + 0.1 + 2 + 0.5 + 0.2, 1e-9);
   EXPECT_EQ(timeline.frames[0].image_bytes, 0);
   EXPECT_EQ(timeline.frames[0].imbalance, 1);
+}
+
+TEST(SimulateFrames, ColoursInFewerBitsAreFewerBytes) {
+  for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
+    std::map<ColorCoding, double> bytes;
+    for (const ColorCoding color : {ColorCoding::kFloat32, ColorCoding::kHalf, ColorCoding::kFixed16}) {
+      MadeFrame frame(5, 2, kSide, 0.5, 1, "fan-in", renderer);
+      for (GroupPlan& group : frame.plan().groups) group.color = color;
+      bytes[color] = Simulate({frame.input()}, FreeMachine()).frames[0].image_bytes;
+    }
+    const double share = renderer == RendererKind::kSplat ? 0.5 : 1;  // depth and index are never coded
+    EXPECT_GT(bytes[ColorCoding::kFloat32], 0);
+    EXPECT_DOUBLE_EQ(bytes[ColorCoding::kHalf], share * bytes[ColorCoding::kFloat32]);
+    EXPECT_DOUBLE_EQ(bytes[ColorCoding::kFixed16], share * bytes[ColorCoding::kFloat32]);
+  }
 }
 
 TEST(SimulateFrames, AChainTakesOneHopForEachWorker) {
@@ -151,6 +167,19 @@ TEST(SimulateFrames, VoxelsComeBeforeRendering) {
   EXPECT_EQ(result.voxel_bytes, 1000);
 }
 
+// Two workers, of which one has all the costly boxes: as if any of them could be anywhere, costliest first.
+TEST(SimulateFrames, StealingRendersWhereThereIsTime) {
+  MadeFrame frame(4, 1, kSide, 0, 1, "fan-in");
+  for (std::size_t box = 0; box < 4; ++box) {
+    frame.plan().groups[0].placements[box].worker = box < 3 ? 1 : 2;
+    frame.costs()[box].seconds = box < 3 ? 4 - double(box) : 1;  // 4, 3, 2 and 1
+  }
+  EXPECT_NEAR(Simulate({frame.input()}, FreeMachine()).frames[0].latency(), 9, 1e-9);
+  const Timeline stolen = SimulateFrames(std::vector{frame.input()}, FreeMachine(), {.steal = true}).value();
+  EXPECT_NEAR(stolen.frames[0].latency(), 5, 1e-9);
+  EXPECT_NEAR(stolen.frames[0].stage_seconds[std::size_t(Stage::kRender)], 10, 1e-9) << "nothing is rendered twice";
+}
+
 TEST(SimulateFrames, StragglersDependOnTheSeedAlone) {
   MachineModel machine = FreeMachine();
   machine.stragglers = {0.2, 3, 1};
@@ -210,6 +239,7 @@ RandomRun MakeRandomRun(Random& random) {
   run.machine.memory_slowdown = random.Real(0, 0.3);
   run.machine.threads = random.Integer(1, 4);
   run.in_flight = random.Integer(1, 3);
+  run.machine.picture_threads = random.Integer(0, 4);
   return run;
 }
 
@@ -234,13 +264,11 @@ TEST(SimulateFrames, NothingHappensTwiceOrBeforeItsTime) {
     }
 
     std::size_t boxes = 0, steps = 0, group_images = 0;
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> order;  // groups over all frames
     for (std::uint32_t f = 0; f < run.inputs.size(); ++f) {
       const FramePlan& plan = *run.inputs[f].plan;
       EXPECT_EQ(timeline.frames[f].groups_done.size(), plan.groups.size());
       for (std::uint32_t g = 0; g < plan.groups.size(); ++g) {
         const GroupPlan& group = plan.groups[g];
-        order.emplace_back(f, g);
         boxes += group.placements.size();
         if (group.placements.empty()) continue;
         for (const Step& step : group.schedule.steps) {
@@ -266,14 +294,23 @@ TEST(SimulateFrames, NothingHappensTwiceOrBeforeItsTime) {
     EXPECT_EQ(partials.size(), steps);
     EXPECT_EQ(images_sent, group_images);
 
-    // The window: before a group begins, all but one of as many as were handed out earlier are done.
-    std::vector<double> done;
-    for (const SimulatedFrame& frame : timeline.frames) done.insert(done.end(), frame.groups_done.begin(), frame.groups_done.end());
-    std::sort(done.begin(), done.end());
+    // The window: when a group begins, no more are unfinished than it allows, over all frames and of a frame with masks.
+    std::map<std::pair<std::uint32_t, std::uint32_t>, double> begun;
     for (const SimulatedSpan& span : spans) {
-      if (span.stage != Stage::kRender) continue;
-      const auto place = std::size_t(std::find(order.begin(), order.end(), std::pair(span.frame, span.group)) - order.begin());
-      EXPECT_TRUE(place < std::size_t(kGroupWindow) || span.begin >= done[place - std::size_t(kGroupWindow)]);
+      if (span.stage == Stage::kRender) begun.try_emplace({span.frame, span.group}, span.begin);
+    }
+    const int window = WindowFor(timeline.workers, 1, 0).groups;
+    for (const auto& [group, time] : begun) {
+      int unfinished = 0, of_frame = 0;
+      for (const auto& [other, begin] : begun) {
+        if (begin > time || timeline.frames[other.first].groups_done[other.second] <= time) continue;
+        ++unfinished;
+        of_frame += other.first == group.first ? 1 : 0;
+      }
+      EXPECT_LE(unfinished, window);
+      if (UsesOcclusion(run.inputs[group.first].plan->setup)) {
+        EXPECT_LE(of_frame, kMaskedGroups);
+      }
     }
     for (const SimulatedFrame& frame : timeline.frames) {
       EXPECT_GE(frame.planned, frame.submitted);
@@ -294,6 +331,51 @@ TEST(SimulateFrames, TheSameRunIsTheSameToTheLastBit) {
     ASSERT_EQ(a.spans.size(), b.spans.size());
     for (std::size_t s = 0; s < a.spans.size(); ++s) EXPECT_EQ(a.spans[s].end, b.spans[s].end);
   }
+}
+
+// With turns, p workers make pictures side by side; without, one makes them all.
+TEST(SimulateFrames, PicturesAreMadeBesideEachOtherIfWorkersTakeTurns) {
+  constexpr std::uint32_t kWorkers = 8;
+  std::vector<std::unique_ptr<MadeFrame>> frames;
+  std::vector<FrameInput> taking_turns, one_displays;
+  for (std::uint32_t f = 0; f < 40; ++f) {
+    for (std::vector<FrameInput>* inputs : {&taking_turns, &one_displays}) {
+      frames.push_back(std::make_unique<MadeFrame>(kWorkers, 1, kSide, 0.5, 1, "fan-in"));
+      frames.back()->plan().display = inputs == &taking_turns ? f % kWorkers + 1 : 1;
+      frames.back()->plan().groups[0].schedule =
+          MakeSchedule("fan-in", {kWorkers, frames.back()->plan().display - 1, WholeFrame(frames.back()->plan().setup)});
+      frames.back()->finish_seconds = 4;
+      inputs->push_back(frames.back()->input());
+    }
+  }
+  const double turns = Simulate(taking_turns, FreeMachine(), 16).end, one = Simulate(one_displays, FreeMachine(), 16).end;
+  EXPECT_NEAR(turns, 40 + 4, 1e-9) << "rendering and the last picture";
+  EXPECT_NEAR(one, 1 + 40 * 4, 1e-9) << "picture after picture";
+}
+
+// A worker of one core renders, combines and makes pictures one after the other, whatever number of threads it has.
+TEST(SimulateFrames, AThreadIsNoCore) {
+  MachineModel machine = FreeMachine();
+  const MadeFrame frame(1, 1, kSide, 0.5, 1, "fan-in");
+  FrameInput input = frame.input();
+  input.finish_seconds = 0.5;
+  machine.workers_a_host = 1;
+  machine.cores_a_host = 1;
+  EXPECT_NEAR(Simulate(std::vector<FrameInput>(20, input), machine, 4).end, 20 * 1.5, 1e-9);
+  machine.cores_a_host = 2;
+  EXPECT_NEAR(Simulate(std::vector<FrameInput>(20, input), machine, 4).end, 20 + 0.5, 1e-9);
+}
+
+TEST(SimulateFrames, WorkersOfOneProcessMakeAPictureTogether) {
+  MachineModel machine = FreeMachine();
+  const MadeFrame frame(2, 1, kSide, 0.5, 1, "fan-in");
+  FrameInput input = frame.input();
+  input.finish_seconds = 1;
+  machine.workers_a_host = 2;
+  machine.cores_a_host = 2;
+  EXPECT_NEAR(Simulate({input}, machine).end, 1 + 1, 1e-9);
+  machine.picture_threads = 2;
+  EXPECT_NEAR(Simulate({input}, machine).end, 1 + 0.5, 1e-9);
 }
 
 TEST(SimulateFrames, FewerCoresNeverHelpAlone) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "common/volume/box_assembly.h"
 #include "tests/simulator/model_occlusion.h"
 
 namespace slabstream {
@@ -16,7 +17,8 @@ ModelWorker::ModelWorker(int node, WorkerConfig config, const WorkerSpeed& speed
       queue_(queue),
       network_(network),
       machine_(std::move(config)),
-      combine_thread_free_(queue.now()) {}
+      combine_thread_free_(queue.now()),
+      finish_thread_free_(queue.now()) {}
 
 void ModelWorker::Start() { Step(Tick{}); }
 
@@ -39,9 +41,9 @@ void ModelWorker::Wake() {
   ASSERT_LT(idle_wakes_, 10) << "worker node " << node_ << " spins";
 }
 
-Time ModelWorker::CombineThread(Duration work) {
-  combine_thread_free_ = std::max(combine_thread_free_, queue_.now()) + work;
-  return combine_thread_free_;
+Time ModelWorker::After(Time& free, Duration work) const {
+  free = std::max(free, queue_.now()) + work;
+  return free;
 }
 
 void ModelWorker::Perform(const SendControl& action) { network_.ToCoordinator(node_, action.message, {}); }
@@ -66,31 +68,54 @@ void ModelWorker::CheckCredit() {
 }
 
 void ModelWorker::Perform(const OpenSlab& action) {
-  EXPECT_TRUE(slabs_.emplace(action.slab, std::set<std::uint32_t>()).second) << "a slab is opened twice";
+  EXPECT_TRUE(slabs_.try_emplace(action.slab).second) << "a slab is opened twice";
+  for (const OpenSlab::Copy& copy : action.copies) {
+    EXPECT_TRUE(Complete(copy.from)) << "a slab is copied from that is not open or not complete";
+    EXPECT_TRUE(copy.from.box.Contains(copy.box) && copy.from.dataset == action.slab.dataset && copy.from.type == action.slab.type);
+    slabs_[action.slab].copied.push_back(copy);
+  }
 }
 
 void ModelWorker::Perform(const StoreChunk& action) {
   EXPECT_EQ(slabs_.count(action.slab), 1U) << "a chunk is stored in a slab that is not open";
-  queue_.At(CombineThread(speed_.store), [this, slab = action.slab, chunk = action.chunk.chunk] {
-    requested_.erase({slab.dataset, slab.box, chunk});
+  EXPECT_TRUE(action.slab.box.Contains(action.chunk.box));
+  queue_.At(CombineThread(speed_.store), [this, slab = action.slab, box = action.chunk.box, chunk = action.chunk.chunk] {
+    requested_.erase({slab.dataset, box, chunk});
     Status status;
     if (random_.Chance(faults_.damage_chunk)) {
       status = Status::DataLoss("digest of a chunk");
     } else if (const auto open = slabs_.find(slab); open != slabs_.end()) {
-      open->second.insert(chunk);
+      open->second.chunks[box].insert(chunk);
     }
-    Step(ChunkStored{slab, chunk, status});
+    Step(ChunkStored{slab, box, chunk, status});
   });
+}
+
+// All chunks of the boxes that it has any of, and these with the copied ones tile it.
+bool ModelWorker::Complete(const SlabKey& key) const {
+  const auto open = slabs_.find(key);
+  if (open == slabs_.end()) return false;
+  std::vector<Box> boxes;
+  for (const auto& [box, chunks] : open->second.chunks) {
+    if (chunks.size() != ChunkCount(box, key.type)) return false;
+    boxes.push_back(box);
+  }
+  for (const OpenSlab::Copy& copy : open->second.copied) boxes.push_back(copy.box);
+  return Assemble(key.box, boxes).missing.empty();
 }
 
 void ModelWorker::Perform(const DropSlab& action) {
   EXPECT_EQ(slabs_.erase(action.slab), 1U) << "a slab is dropped that is not open";
+  for (const auto& [key, slab] : slabs_) {
+    for (const OpenSlab::Copy& copy : slab.copied)
+      EXPECT_TRUE(slab.rendered || copy.from != action.slab) << "a slab is dropped that is copied from";
+  }
   EXPECT_FALSE(rendering_ && rendering_->slab == action.slab) << "a slab is dropped while it is rendered from";
 }
 
 void ModelWorker::Perform(const StartRender& action) {
   EXPECT_FALSE(rendering_.has_value()) << "two renders at a time";
-  EXPECT_EQ(slabs_[action.slab].size(), ChunkCount(action.slab.box, action.slab.type)) << "a slab is rendered from before it is complete";
+  EXPECT_TRUE(Complete(action.slab)) << "a slab is rendered from before it is complete";
   EXPECT_TRUE(action.slab.box.Contains(SlabBox(action.placement.box, *action.setup))) << "a slab without the voxels of its box";
   EXPECT_EQ(action.slab.dataset, action.setup->dataset);
   rendering_ = action;
@@ -109,6 +134,7 @@ void ModelWorker::FinishRender(std::uint64_t number, Status status, Duration tim
   if (!alive_ || !rendering_ || number != render_number_) return;  // ended already
   const StartRender render = *std::exchange(rendering_, std::nullopt);
   if (status.ok()) {
+    slabs_.at(render.slab).rendered = true;
     const PixelBounds frame = FrameBounds(*render.setup);
     images_.Render(render.image, render.placement.id, std::uint64_t(frame.pixel_count()), [&](std::uint64_t i) {
       const auto width = std::uint64_t(frame.width());
@@ -147,9 +173,11 @@ void ModelWorker::Perform(const SendPartial& action) {
 }
 
 void ModelWorker::Perform(const SendFrame& action) {
-  queue_.At(CombineThread(speed_.combine), [this, message = action.message, payload = PackSymbols(images_.Get(action.image))] {
-    if (alive_) network_.ToCoordinator(node_, message, payload);
-  });
+  const bool finished = action.message.groups_done == action.message.group_count;
+  queue_.At(After(finished ? finish_thread_free_ : combine_thread_free_, speed_.finish),
+            [this, message = action.message, payload = PackSymbols(images_.Get(action.image))] {
+              if (alive_) network_.ToCoordinator(node_, message, payload);
+            });
 }
 
 void ModelWorker::Perform(const StopProcess&) {

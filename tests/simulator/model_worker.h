@@ -1,5 +1,5 @@
 // ModelWorker: a worker process without sockets, threads, voxels and pixels. It runs a WorkerMachine and carries out its actions in virtual
-// time: one thread renders, one combines, encodes and unpacks; images are symbolic.
+// time: one thread renders, one combines, encodes and unpacks, one makes finished pictures; images are symbolic.
 #pragma once
 
 #include <map>
@@ -25,7 +25,7 @@ class WorkerNetwork {
 };
 
 struct WorkerSpeed {
-  Duration render{}, combine{}, store{};
+  Duration render{}, combine{}, store{}, finish{};
 };
 
 class ModelWorker {
@@ -53,7 +53,9 @@ class ModelWorker {
 
   void Step(const WorkerEvent& event);
   void Wake();
-  Time CombineThread(Duration work);  // when it is done with this work, which begins after all before it
+  // When a thread that was busy until `free` is done with this work, which begins after all before it.
+  Time After(Time& free, Duration work) const;
+  Time CombineThread(Duration work) { return After(combine_thread_free_, work); }
 
   void Perform(const SendControl& action);
   void Perform(const SendChunkRequest& action);
@@ -61,6 +63,7 @@ class ModelWorker {
   void Perform(const OpenSlab& action);
   void Perform(const StoreChunk& action);
   void Perform(const DropSlab& action);
+  bool Complete(const SlabKey& key) const;
   void Perform(const StartRender& action);
   void Perform(const CancelRender& action);
   void Perform(const StartCombine& action);
@@ -88,9 +91,14 @@ class ModelWorker {
   SymbolicImages images_;
   std::optional<StartRender> rendering_;
   std::uint64_t render_number_ = 0;
-  Time combine_thread_free_;
-  std::map<SlabKey, std::set<std::uint32_t>> slabs_;  // open slabs and their chunks
-  std::map<ChunkName, Outstanding> requested_;        // and not yet stored, as the credit counts
+  Time combine_thread_free_, finish_thread_free_;
+  struct ModelSlab {
+    std::map<Box, std::set<std::uint32_t>> chunks;  // stored, by box
+    std::vector<OpenSlab::Copy> copied;
+    bool rendered = false;
+  };
+  std::map<SlabKey, ModelSlab> slabs_;          // that are open
+  std::map<ChunkName, Outstanding> requested_;  // and not yet stored, as the credit counts
 };
 
 }  // namespace slabstream

@@ -9,6 +9,7 @@
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
 #include "common/planning/brick_visibility.h"
+#include "common/planning/frame_window.h"
 #include "common/planning/policy_names.h"
 #include "tests/simulator/model_occlusion.h"
 #include "tests/support/random_combining.h"
@@ -81,6 +82,7 @@ Simulation::Simulation(std::uint64_t seed, Tally& tally)
   speed_.render = milliseconds(random_.Chance(0.1) ? 300 : random_.Integer(1, 40));
   speed_.combine = std::chrono::microseconds(random_.Integer(10, 5000));
   speed_.store = std::chrono::microseconds(random_.Integer(10, 1000));
+  speed_.finish = std::chrono::microseconds(random_.Integer(10, 20000));
   worker_config_.register_interval = milliseconds(500);
   worker_config_.chunk_timeout = seconds(1);
   worker_config_.chunk_attempts = 6;
@@ -98,6 +100,8 @@ Simulation::Simulation(std::uint64_t seed, Tally& tally)
     policy_.balance = one_of(BalanceModes());
   }
   policy_.combine = RandomCombining(random_);
+  if (random_.Chance(0.1)) policy_.decomposition = policy_.assignment = policy_.combine = kAutomatic;
+  if (random_.Chance(0.3)) policy_.teams = random_.Integer(2, 4);
 }
 
 Simulation::~Simulation() = default;
@@ -330,8 +334,13 @@ void Simulation::Observe(const GroupAssignment& assignment) {
 
   std::size_t unfinished = 0;
   for (const auto& [id, other] : frames_) unfinished += other.over ? 0 : other.unfinished();
-  // While a frame waits for its next attempt, the groups of the last one are still out but no longer counted.
-  EXPECT_LE(unfinished, std::size_t(faults_.none() ? kGroupWindow : 2 * kGroupWindow));
+  // While frames wait for their next attempt, the groups of the last one, which may have had the window to itself, are still out but no
+  // longer counted.
+  const FrameWindow window = WindowFor(workers_.size(), std::uint32_t(policy_.teams), FrameBytes(assignment.setup));
+  EXPECT_LE(unfinished, std::size_t(faults_.none() ? window.groups : window.groups * window.frames));
+  if (faults_.none() && UsesOcclusion(assignment.setup)) {
+    EXPECT_LE(frame.unfinished(), std::size_t(kMaskedGroups));
+  }
 }
 
 void Simulation::CheckHidden(const GroupAssignment& assignment, const SeenFrame& frame) {

@@ -6,7 +6,7 @@
 //   some may be left out, but only where the frame's termination allows it
 //   a mask of hidden tiles tells only of tiles that the groups in front hide, as the display worker at hand has accumulated them
 //   no image is left, read after its release or released twice; no slab is rendered from before it is complete; credits are kept
-//   at most kGroupWindow groups are unfinished at a time
+//   no more groups are unfinished at a time than the window allows, nor of one frame with masks
 //   where only workers come and go and few messages are lost, but a worker is always there: every frame is finished
 //   without faults: no frame fails, none needs a second attempt, and voxels that a worker has had do not travel again
 #pragma once

@@ -3,12 +3,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <bit>
 #include <cstring>
 #include <limits>
 #include <numeric>
 #include <vector>
 
+#include "common/volume/box_assembly.h"
+#include "tests/support/random_box.h"
 #include "tests/support/random_volume.h"
 
 namespace slabstream {
@@ -47,15 +50,6 @@ VoxelBlock Cut(const VoxelBlock& block, const Box& box) {
   return part;
 }
 
-Box RandomBox(Random& random, const Box& inside) {
-  Box box;
-  for (int axis = 0; axis < 3; ++axis) {
-    box.begin[axis] = random.Integer(inside.begin[axis], inside.end[axis] - 1);
-    box.end[axis] = random.Integer(box.begin[axis] + 1, inside.end[axis]);
-  }
-  return box;
-}
-
 TEST(Bricks, TileTheBox) {
   const BrickGrid grid({{3, 20, 16}, {50, 33, 17}});
   EXPECT_EQ(grid.counts, (Index3{4, 2, 1}));
@@ -89,15 +83,36 @@ TEST(BrickedVoxels, WhatWasWrittenInPiecesIsRead) {
     for (std::size_t i = begins.size(); i > 1; --i) std::swap(begins[i - 1], begins[random.Integer(std::size_t{0}, i - 1)]);
     begins.push_back(begins.front());
     for (std::size_t begin : begins) {
-      bricks.Write(begin, std::span(slab.bytes).subspan(begin, std::min(piece, slab.bytes.size() - begin)));
+      bricks.Write(slab.box, begin, std::span(slab.bytes).subspan(begin, std::min(piece, slab.bytes.size() - begin)));
     }
 
     const Box part = RandomBox(random, slab.box);
     const VoxelBlock expected = Cut(slab, part);
     const std::size_t skipped = sample * std::size_t(random.Integer(std::int64_t{0}, part.voxel_count() - 1));
     std::vector<std::byte> read(expected.bytes.size() - skipped);
-    bricks.Read(part, skipped, read);
-    ASSERT_EQ(std::memcmp(read.data(), expected.bytes.data() + skipped, read.size()), 0) << "round " << round;
+    for (const VoxelBricks& voxels : {VoxelBricks(bricks), VoxelBricks(slab)}) {
+      std::ranges::fill(read, std::byte{0});
+      voxels.Read(part, skipped, read);
+      ASSERT_EQ(std::memcmp(read.data(), expected.bytes.data() + skipped, read.size()), 0) << "round " << round;
+    }
+  }
+}
+
+TEST(BrickedVoxels, WhatWasWrittenBoxByBoxIsRead) {
+  Random random(43);
+  SCOPED_TRACE(random.trace());
+  for (int round = 0; round < 60; ++round) {
+    const ScalarType type = kTypes[round % 3];
+    const Volume volume = PatchyVolume(random, {random.Integer(1, 70), random.Integer(1, 40), random.Integer(1, 40)}, type);
+    const VoxelBlock slab = Cut(volume.block, RandomBox(random, volume.block.box));
+    std::vector<Box> boxes = Difference(slab.box, RandomBox(random, slab.box));
+    const std::vector<Box> rest = Assemble(slab.box, boxes).missing;
+    boxes.insert(boxes.end(), rest.begin(), rest.end());
+    BrickedVoxels bricks(slab.box, type);
+    for (const Box& box : boxes) bricks.Write(box, 0, Cut(slab, box).bytes);
+    std::vector<std::byte> read(slab.bytes.size());
+    VoxelBricks(bricks).Read(slab.box, 0, read);
+    ASSERT_EQ(std::memcmp(read.data(), slab.bytes.data(), read.size()), 0) << "round " << round;
   }
 }
 
@@ -139,7 +154,8 @@ TEST(BrickedVoxels, KeepTheBitsOfWhatIsNotANumber) {
   Volume volume = MakeTestVolume({40, 16, 16}, ScalarType::kFloat32, [&](const Index3& v) { return v.x < 16 ? nan : -0.0F; });
   volume.block.samples<float>()[35] = other_nan;
   std::vector<std::byte> read(volume.block.bytes.size());
-  BrickedVoxels(volume.block).Read(volume.block.box, 0, read);
+  const BrickedVoxels bricks(volume.block);
+  VoxelBricks(bricks).Read(volume.block.box, 0, read);
   EXPECT_EQ(std::memcmp(read.data(), volume.block.bytes.data(), read.size()), 0);
 }
 

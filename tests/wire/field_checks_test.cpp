@@ -209,11 +209,24 @@ TEST(FieldChecks, Images) {
     header->set_color(v1::COLOR_CODING_FLOAT32);
     return header;
   };
+  const auto packed = [](v1::Envelope& e, v1::Codec codec, std::uint64_t bytes) {
+    e.mutable_partial_image()->mutable_packed()->set_codec(codec);
+    e.mutable_partial_image()->mutable_packed()->set_bytes(bytes);
+  };
+  Check<ImageReceived>({
+      {[](auto& e) { e.mutable_image_received()->set_number(0); }, "ImageReceived.number: 0 is not in [1, 18446744073709551615]"},
+  });
   Check<PartialImage>({
       {[&](auto& e) { image(e); }, ""},
       {[&](auto& e) { image(e)->set_pixel_count(1201); }, "PartialImage.image.pixel_count: 1201 is not in [0, 1200]"},
-      {[&](auto& e) { image(e)->set_run_count(1201); }, "PartialImage.image.run_count: 1201 is not in [1, 1200]"},
-      {[&](auto& e) { image(e)->set_run_count(0); }, "PartialImage.image.run_count: 0 is not in [1, 1200]"},
+      {[&](auto& e) { image(e)->set_run_count(1201); }, "PartialImage.image.run_count: 1201 is not in [0, 1200]"},
+      {[&](auto& e) { image(e)->set_run_count(0); }, ""},  // dense
+      {[&](auto& e) {
+         v1::RunImageHeader* header = image(e);
+         header->set_pixel_count(1199);
+         header->set_run_count(0);
+       },
+       "PartialImage.image.run_count: 0 is not in [1, 1199]"},
       {[&](auto& e) { image(e)->set_pixel_count(0); }, "PartialImage.image.run_count: 10 is not in [0, 0]"},
       {[&](auto& e) { image(e)->mutable_bounds()->set_x_begin(31); }, "PartialImage.image.bounds.x_end: 30 is not in [31, 16777216]"},
       {[&](auto& e) { image(e)->mutable_bounds()->set_y_end(1U << 25U); },
@@ -225,6 +238,27 @@ TEST(FieldChecks, Images) {
          header->set_pixel_count(std::uint64_t{1} << 48U);
        },
        "PartialImage.image.pixel_count: a payload of 4503599627370616 bytes, at most 2147483648"},
+      {[&](auto& e) {
+         image(e);
+         packed(e, v1::CODEC_ZSTD, 10 * 12 + 1200 * 16 - 1);
+       },
+       ""},
+      {[&](auto& e) {
+         image(e);
+         packed(e, v1::CODEC_ZSTD, 10 * 12 + 1200 * 16);
+       },
+       "PartialImage.packed.bytes: 19320 are not less than the 19320 of the runs"},
+      {[&](auto& e) {
+         image(e);
+         packed(e, v1::CODEC_ZSTD, 0);
+       },
+       "PartialImage.packed.bytes: 0 is not in [1, 2147483647]"},
+      {[&](auto& e) {
+         image(e);
+         packed(e, v1::CODEC_RAW, 1);
+       },
+       "PartialImage.packed.codec: raw, of packed runs"},
+      {[&](auto& e) { packed(e, v1::CODEC_ZSTD, 1); }, "PartialImage.packed.bytes: 1 are not less than the 0 of the runs"},
       {[](auto& e) { e.mutable_partial_image()->mutable_shared(); }, "PartialImage.shared.arena: 0 is not in [1, 18446744073709551615]"},
       {[](auto& e) { e.mutable_partial_image()->set_interval_end(0); }, "PartialImage.interval_end: 0 is not in [1, 65536]"},
       {[](auto& e) { e.mutable_partial_image()->set_step((1U << 20U) + 1); }, "PartialImage.step: 1048577 is not in [0, 1048576]"},

@@ -51,12 +51,7 @@ GroupAssignment Assignment(Rank ranks, const ViewParameters& view, RendererKind 
   setup.description = Description();
   setup.range = {-1, 1e30F};
   setup.renderer = renderer;
-  if (renderer == RendererKind::kSplat) {
-    setup.camera = MakeCamera(view, {640, 480}, setup.description.geometry);
-    setup.sheets = MakeSheetGrid(setup.camera, setup.description.geometry);
-  } else {
-    setup.camera = MakeSupersampledCamera(view, {640, 480}, setup.description.geometry);
-  }
+  SetView(view, {640, 480}, setup);
   setup.transfer = Curve();
   setup.shading = ManyLights();
   setup.termination = 0;
@@ -179,7 +174,7 @@ std::vector<ChunkRefused> Samples() {
 
 template <>
 std::vector<PartialImage> Samples() {
-  return {{1, 2, {3, 4, 5}, 0, {0, 1}, {0, 0}, NoRuns().image, {}, {}},
+  return {{1, 2, {3, 4, 5}, 0, {0, 1}, {0, 0}, NoRuns().image, {}, {}, 0, {}},
           {kMax64,
            kMax32,
            {},
@@ -188,6 +183,8 @@ std::vector<PartialImage> Samples() {
            {17, std::uint64_t{1} << 48U},
            {PixelFormat::kDepth, {1, 2, 30, 40}, 7, 900},
            {},
+           PackedRuns{Codec::kZstd, 7 * 12 + 900 * 24 - 1, kMax64},
+           kMax64,
            {RankReport{}, FullReport()}},
           {1,
            2,
@@ -201,12 +198,19 @@ std::vector<PartialImage> Samples() {
                        1U << 24U,
                        std::uint64_t{1} << 48U,
                        {{kArenaBytes, kMax64, kArenaSlots - 1}, {0, 1, 0}, {4096, 1, 1}}},
+           {},
+           1,
            {}}};
 }
 
 template <>
 std::vector<ImageRefused> Samples() {
   return {{}, {kMax64, kMax32, {3, 4, 5}, 1U << 20U, {17, std::uint64_t{1} << 48U}}};
+}
+
+template <>
+std::vector<ImageReceived> Samples() {
+  return {{}, {kMax64, kMax32, kMax64}};
 }
 
 template <>
@@ -219,7 +223,7 @@ std::vector<SubmitFrame> Samples() {
   full.transfer = {Curve(), 1e-6};
   full.shading = ManyLights();
   full.termination = 0.5;
-  full.policy = {kUmlaut, kLongName, AxisChoice::kX, kMaxGroups, kUmlaut, kLongName, kLongName, kMaxPixelError};
+  full.policy = {kUmlaut, kLongName, AxisChoice::kX, kMaxGroups, kUmlaut, kLongName, kLongName, kMaxPixelError, kMaxTeams};
   full.previews = true;
   return {{0, 1, Request()}, {kMax64, 86400000, full}};
 }
@@ -233,7 +237,11 @@ template <>
 std::vector<FrameReply> Samples() {
   const FrameStatistics statistics{kMax32,  kMax32,    kMax32,    "slab",   "occupied", "x",           kLongName,
                                    kUmlaut, kLongName, -kMaxTime, kMaxTime, kMaxTime,   {FullReport()}};
-  return {{1, {1, 1}, 0, 1, NoRuns(), {}}, {kMax64, {30, 40}, 1024, 1024, SomeRuns(), statistics}};
+  FrameStatistics predicted = statistics;
+  predicted.predicted = FramePrediction{0.25, 0, 1e-9, 1e9, 1.5};
+  return {{1, {1, 1}, 0, 1, NoRuns(), {}},
+          {kMax64, {30, 40}, 1024, 1024, SomeRuns(), statistics},
+          {kMax64, {30, 40}, 1024, 1024, SomeRuns(), predicted}};
 }
 
 template <>

@@ -47,6 +47,8 @@ std::vector<PartialImage> Samples();
 template <>
 std::vector<ImageRefused> Samples();
 template <>
+std::vector<ImageReceived> Samples();
+template <>
 std::vector<SubmitFrame> Samples();
 template <>
 std::vector<FrameProgress> Samples();

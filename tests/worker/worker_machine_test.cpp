@@ -124,7 +124,7 @@ class WorkerMachineTest : public testing::Test {
       if (const auto* request = std::get_if<SendChunkRequest>(&actions[i])) {
         more = Tell(Answer(request->request));
       } else if (const auto* store = std::get_if<StoreChunk>(&actions[i])) {
-        more = Tell(ChunkStored{store->slab, store->chunk.chunk, {}});
+        more = Tell(ChunkStored{store->slab, store->chunk.box, store->chunk.chunk, {}});
       } else {
         others.push_back(actions[i]);
       }
@@ -215,7 +215,8 @@ TEST_F(WorkerMachineTest, AsksForChunksWithinItsCredit) {
   ASSERT_THAT(All<StoreChunk>(arrived), SizeIs(1));
   EXPECT_THAT(All<SendChunkRequest>(arrived), IsEmpty()) << "credit is used until the chunk is stored";
   EXPECT_THAT(All<StoreChunk>(Tell(Answer(first[0].request))), IsEmpty()) << "a second copy changes nothing";
-  const auto next = All<SendChunkRequest>(Tell(ChunkStored{All<StoreChunk>(arrived)[0].slab, 0, {}}));
+  const StoreChunk& store = All<StoreChunk>(arrived)[0];
+  const auto next = All<SendChunkRequest>(Tell(ChunkStored{store.slab, store.chunk.box, 0, {}}));
   ASSERT_THAT(next, SizeIs(1));
   EXPECT_EQ(next[0].request.chunk, 2U);
 }
@@ -233,7 +234,7 @@ TEST_F(WorkerMachineTest, AsksAgainForWhatIsLostOrDamagedAndGivesUp) {
   EXPECT_EQ(All<SendChunkRequest>(again)[0].request, first[0].request);
   const auto stored = All<StoreChunk>(Tell(Answer(first[0].request)));
   ASSERT_THAT(stored, SizeIs(1));
-  again = Tell(ChunkStored{stored[0].slab, 0, Status::DataLoss("digest")});
+  again = Tell(ChunkStored{stored[0].slab, stored[0].chunk.box, 0, Status::DataLoss("digest")});
   ASSERT_THAT(All<SendChunkRequest>(again), SizeIs(1));
   const Actions given_up = After(seconds(3));
   const auto trouble = Sent<WorkerTrouble>(given_up);
@@ -266,18 +267,59 @@ TEST_F(WorkerMachineTest, KeepsSlabsForTheNextFrame) {
   EXPECT_EQ(Sent<GroupDone>(Rendered(All<StartRender>(second)[0]))[0].reports.at(0).voxel_bytes, 0U);
 }
 
-TEST_F(WorkerMachineTest, ALargerHaloReplacesTheSlab) {
+TEST_F(WorkerMachineTest, ALargerHaloReplacesTheSlabOnceItIsCopied) {
   const auto first = All<StartRender>(Feed(Tell(Assignment(1, {kSelf}))));
   Rendered(first.at(0));
   GroupAssignment wider = Assignment(2, {kSelf});
   wider.setup.halo = 16;
   const Actions fed = Feed(Tell(wider));
   ASSERT_THAT(All<StartRender>(fed), SizeIs(1));
-  EXPECT_THAT(All<DropSlab>(fed), ElementsAre(testing::Field(&DropSlab::slab, first[0].slab)));
-  Rendered(All<StartRender>(fed)[0]);
+  EXPECT_THAT(All<DropSlab>(fed), IsEmpty());
+  EXPECT_THAT(All<DropSlab>(Rendered(All<StartRender>(fed)[0])), ElementsAre(testing::Field(&DropSlab::slab, first[0].slab)));
   const Actions narrow = Tell(Assignment(3, {kSelf}));
   EXPECT_THAT(All<SendChunkRequest>(narrow), IsEmpty()) << "the wider slab holds all that the narrower halo needs";
   EXPECT_THAT(All<StartRender>(narrow), SizeIs(1));
+}
+
+TEST_F(WorkerMachineTest, FetchesOfAResizedBoxWhatItDoesNotHold) {
+  const auto first = All<StartRender>(Feed(Tell(Assignment(1, {kSelf})))).at(0);
+  Rendered(first);
+  GroupAssignment resized = Assignment(2, {kSelf});
+  resized.group.placements[0].box = {{0, 0, 10}, {100, 128, 80}};
+  const Actions told = Tell(resized);
+  const auto open = All<OpenSlab>(told);
+  ASSERT_THAT(open, SizeIs(1));
+  ASSERT_THAT(open[0].copies, SizeIs(1));
+  EXPECT_EQ(open[0].copies[0].from, first.slab);
+  EXPECT_EQ(open[0].copies[0].box, (Box{{0, 0, 2}, {108, 128, 72}})) << "as far as the slab of 72 slices goes";
+  const auto requests = All<SendChunkRequest>(told);
+  ASSERT_THAT(requests, SizeIs(1));
+  EXPECT_EQ(requests[0].request.box, (Box{{0, 0, 72}, {108, 128, 88}}));
+  EXPECT_THAT(All<StartRender>(told), IsEmpty());
+  const auto second = All<StartRender>(Feed(told));
+  ASSERT_THAT(second, SizeIs(1));
+  const Actions done = Rendered(second[0]);
+  EXPECT_EQ(Sent<GroupDone>(done).at(0).reports.at(0).voxel_bytes, 108U * 128 * 16);
+
+  // A part of both is all there.
+  GroupAssignment within = Assignment(3, {kSelf});
+  within.group.placements[0].box = {{8, 8, 30}, {120, 120, 64}};
+  const Actions held = Tell(within);
+  EXPECT_THAT(All<SendChunkRequest>(held), IsEmpty());
+  EXPECT_THAT(All<StartRender>(held), SizeIs(1));
+}
+
+TEST_F(WorkerMachineTest, FetchesAllWhereThereIsNoRoomForWhatItWouldCopyFrom) {
+  WorkerConfig config = Config();
+  config.cache_bytes = 128 * 128 * 150;
+  Start(config);
+  const auto first = All<StartRender>(Feed(Tell(Assignment(1, {kSelf})))).at(0);
+  Rendered(first);
+  GroupAssignment resized = Assignment(2, {kSelf});
+  resized.group.placements[0].box = {{0, 0, 10}, {128, 128, 80}};
+  const Actions told = Tell(resized);
+  EXPECT_THAT(All<DropSlab>(told), ElementsAre(testing::Field(&DropSlab::slab, first.slab)));
+  EXPECT_THAT(All<OpenSlab>(told).at(0).copies, IsEmpty());
 }
 
 TEST_F(WorkerMachineTest, DropsTheOldestUnusedSlabAboveItsBudget) {

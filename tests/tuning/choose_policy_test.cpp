@@ -1,0 +1,206 @@
+// What is chosen where a policy leaves a choice.
+#include "common/tuning/choose_policy.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "common/combining/schemes.h"
+#include "common/decomposition/decomposition.h"
+#include "common/planning/assignment.h"
+#include "common/planning/brick_visibility.h"
+#include "common/planning/policy_names.h"
+#include "common/tuning/service_machine.h"
+#include "tests/planning/support.h"
+
+namespace slabstream {
+namespace {
+
+struct NamedSummary {
+  std::string name;
+  VolumeSummary summary;
+};
+
+// SomeRequest() shows what is above 100.
+VolumeSummary SummaryWith(const Index3& size, auto&& shows) {
+  VolumeSummary summary = FullSummary(size);
+  std::size_t brick = 0;
+  for (Index3 b; b.z < summary.brick_counts.z; ++b.z) {
+    for (b.y = 0; b.y < summary.brick_counts.y; ++b.y) {
+      for (b.x = 0; b.x < summary.brick_counts.x; ++b.x) summary.bricks[brick++] = shows(b) ? ValueRange{0, 255} : ValueRange{0, 50};
+    }
+  }
+  return summary;
+}
+
+std::vector<NamedSummary> OddVolumes() {
+  return {{"all occupied", FullSummary({48, 56, 40})},
+          {"empty", SummaryWith({48, 48, 48}, [](const Index3&) { return false; })},
+          {"one voxel thick", FullSummary({70, 1, 33})},
+          {"one voxel", FullSummary({1, 1, 1})},
+          {"a corner", SummaryWith({96, 96, 96}, [](const Index3& b) { return b.x + b.y + b.z < 3; })}};
+}
+
+Policy Automatic() {
+  Policy policy;
+  policy.decomposition = policy.split = policy.assignment = policy.combine = kAutomatic;
+  return policy;
+}
+
+struct Question {
+  FrameRequest request = SomeRequest();
+  VolumeSummary summary;
+  MachineModel machine = ServiceMachine({}, {});
+  CostModel cost;
+  std::uint32_t slots = 1;
+
+  PolicyChoice Choose(const Policy& policy) {
+    request.policy = policy;
+    Result<PolicyChoice> choice =
+        ChoosePolicy({.frame = &request, .summary = &summary, .slots = slots, .machine = &machine, .cost = &cost});
+    EXPECT_TRUE(choice.ok()) << choice.status().message();
+    return *choice;
+  }
+};
+
+bool SameChoice(const PolicyChoice& a, const PolicyChoice& b) {
+  return a.policy == b.policy && a.prediction == b.prediction && a.predicted == b.predicted;
+}
+
+class ChoosePolicyTest : public testing::TestWithParam<int> {};
+
+TEST_P(ChoosePolicyTest, MakesPlansOfAnyVolumeAndKeepsWhatIsFixed) {
+  Random random(std::uint64_t(GetParam()) + 99);
+  SCOPED_TRACE(random.trace());
+  const auto one_of = [&](const auto& entries) { return std::string(entries[random.Integer<std::size_t>(0, entries.size() - 1)].name); };
+  for (const NamedSummary& volume : OddVolumes()) {
+    for (int left_open = 1; left_open < 8; ++left_open) {
+      Question question{.summary = volume.summary, .slots = std::uint32_t(GetParam())};
+      question.request.renderer = random.Chance(0.5) ? RendererKind::kSplat : RendererKind::kZBuffer;
+      question.request.view = RandomView(random);
+      Policy asked;
+      asked.decomposition = (left_open & 1) != 0 ? std::string(kAutomatic) : one_of(Decompositions());
+      asked.assignment = (left_open & 2) != 0 ? std::string(kAutomatic) : one_of(Assignments());
+      asked.combine = (left_open & 4) != 0 ? std::string(kAutomatic) : std::string("fan-in");
+      asked.split = one_of(WorkSplits());
+      asked.groups = random.Integer(0, 3);
+      asked.balance = one_of(BalanceModes());
+      SCOPED_TRACE(testing::Message() << volume.name << ", p = " << GetParam() << ", " << asked.decomposition << ", " << asked.split << ", "
+                                      << asked.assignment << ", " << asked.combine << ", " << asked.groups << " groups");
+      const PolicyChoice choice = question.Choose(asked);
+      EXPECT_TRUE(CheckChosen(choice.policy).ok()) << CheckChosen(choice.policy).message();
+      EXPECT_NE(choice.policy.split, kAutomatic);
+      EXPECT_GE(choice.policy.groups, 1);
+      EXPECT_LE(choice.policy.groups, kMaxGroups);
+      if (asked.decomposition != kAutomatic) {
+        EXPECT_EQ(choice.policy.decomposition, asked.decomposition);
+      }
+      if (asked.assignment != kAutomatic) {
+        EXPECT_EQ(choice.policy.assignment, asked.assignment);
+      }
+      if (asked.combine != kAutomatic) {
+        EXPECT_EQ(choice.policy.combine, asked.combine);
+      }
+      if (asked.split != kAutomatic) {
+        EXPECT_EQ(choice.policy.split, asked.split);
+      }
+      if (asked.groups > 0) {
+        EXPECT_EQ(choice.policy.groups, asked.groups);
+      }
+      EXPECT_EQ(choice.policy.balance, asked.balance);
+
+      question.request.policy = choice.policy;
+      EXPECT_TRUE(PlanFrame(question.request, 1, question.summary, FullRoster(GetParam()), question.cost).ok());
+      EXPECT_TRUE(SameChoice(choice, question.Choose(asked))) << "chosen otherwise the second time";
+
+      // What would hold without choosing is one of the candidates.
+      const PolicyChoice fixed = question.Choose(FixedPolicy(asked));
+      ASSERT_TRUE(choice.prediction && fixed.prediction);
+      EXPECT_LE(choice.prediction->latency_seconds, fixed.prediction->latency_seconds);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Workers, ChoosePolicyTest, testing::Values(1, 2, 3, 5, 8, 13, 64, 1024));
+
+TEST(ChoosePolicy, DividesWhatLiesInACornerByWork) {
+  Question question{.summary = SummaryWith({192, 192, 192}, [](const Index3& b) { return b.z < 3 && b.x < 6; }), .slots = 8};
+  const PolicyChoice fixed = question.Choose(Policy{}), chosen = question.Choose(Automatic());
+  EXPECT_LT(chosen.prediction->render_seconds, 0.7 * fixed.prediction->render_seconds) << chosen.policy.decomposition;
+  EXPECT_LT(chosen.prediction->imbalance, 1.5);
+}
+
+TEST(ChoosePolicy, KeepsWhatHoldsUnlessEnoughIsGained) {
+  Question question{.summary = SummaryWith({192, 192, 192}, [](const Index3& b) { return b.z < 3 && b.x < 6; }), .slots = 8};
+  question.request.policy = Automatic();
+  Policy now;
+  now.groups = 1;
+  now.split = "voxels";
+  PolicyQuestion asked{.frame = &question.request,
+                       .summary = &question.summary,
+                       .slots = question.slots,
+                       .machine = &question.machine,
+                       .cost = &question.cost,
+                       .now = &now,
+                       .least_gain = 0.95};
+  EXPECT_EQ(ChoosePolicy(asked)->policy.decomposition, now.decomposition);
+  asked.least_gain = 0.05;
+  EXPECT_NE(ChoosePolicy(asked)->policy.decomposition, now.decomposition);
+}
+
+TEST(ChoosePolicy, SlabsOfAllCandidatesFitTheBudget) {
+  Question question{.summary = FullSummary({256, 256, 256}), .slots = 2};
+  question.cost.slab_bytes_target = 3 << 20;
+  for (const DecompositionEntry& entry : Decompositions()) {
+    Policy asked = Automatic();
+    asked.decomposition = entry.name;
+    const PolicyChoice choice = question.Choose(asked);
+    const TransferFunction transfer = ResolveTransfer(question.request.transfer, question.summary).value();
+    const Layout layout =
+        MakeLayout({.summary = &question.summary, .transfer = &transfer, .policy = &choice.policy, .slots = question.slots});
+    for (const Box& box : layout.partition.boxes()) {
+      EXPECT_LE(Grown(box, kHalo, layout.partition.bounds()).voxel_count(), question.cost.slab_bytes_target)
+          << entry.name << ", " << choice.policy.groups << " groups";
+    }
+  }
+}
+
+TEST(ChoosePolicy, ASlowerLinkNeverMakesFramesFaster) {
+  Question question{.summary = FullSummary({96, 96, 96}), .slots = 13};
+  for (const Contention contention : {Contention::kSwitched, Contention::kSharedBus, Contention::kFatTree}) {
+    double before = 0;
+    for (const double bytes_per_second : {1e10, 1e9, 1e8, 1e7}) {
+      question.machine.link = {contention, 20e-6, bytes_per_second};
+      Policy asked;
+      asked.combine = kAutomatic;
+      const PolicyChoice choice = question.Choose(asked);
+      // Of two that differ by less than kLeastGain either may be taken.
+      EXPECT_GE(choice.prediction->latency_seconds, (1 - kLeastGain) * before) << bytes_per_second << ", " << choice.policy.combine;
+      before = choice.prediction->latency_seconds;
+    }
+  }
+}
+
+TEST(ChoosePolicy, ASchemeOfTooManyStepsIsNotTriedAndNotPredicted) {
+  Question question{.summary = FullSummary({64, 64, 64}), .slots = 1024};
+  Policy asked = Automatic();
+  asked.groups = 1;
+  EXPECT_NE(question.Choose(asked).policy.combine, "direct-send");
+  asked.combine = "direct-send";
+  const PolicyChoice choice = question.Choose(asked);
+  EXPECT_EQ(choice.policy.combine, "direct-send");
+}
+
+TEST(ChoosePolicy, TellsWhatIsWrongWithARequest) {
+  Question question{.summary = FullSummary({64, 64, 64})};
+  question.request.policy = Automatic();
+  question.request.transfer.choice = std::string("no such preset");
+  EXPECT_EQ(ChoosePolicy({.frame = &question.request, .summary = &question.summary, .machine = &question.machine, .cost = &question.cost})
+                .status()
+                .code(),
+            StatusCode::kNotFound);
+}
+
+}  // namespace
+}  // namespace slabstream

@@ -1,0 +1,53 @@
+// Which machine a service is, as far as its coordinator can tell.
+#include "common/tuning/service_machine.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+namespace slabstream {
+namespace {
+
+ServiceSurroundings Surroundings(const LinkModel& link) { return {.link = link, .memory_scope = 7, .cores = 4}; }
+
+TEST(ServiceMachine, WorkersOfOneHostLendTheirImagesAndShareItsCores) {
+  const LinkModel slow{Contention::kSharedBus, 1e-3, 1e6};
+  const std::vector<HostedWorker> workers(3, {.memory_scope = 7, .threads = 2});
+  const MachineModel machine = ServiceMachine(workers, Surroundings(slow));
+  EXPECT_TRUE(Validate(machine).ok());
+  EXPECT_EQ(machine.link.contention, Contention::kNone);
+  EXPECT_EQ(machine.combining.rgba_bytes, 0) << "pixels travel although they are lent";
+  EXPECT_EQ(machine.workers_a_host, 3);
+  EXPECT_EQ(machine.cores_a_host, 4);
+  EXPECT_EQ(machine.threads, 2);
+}
+
+TEST(ServiceMachine, WorkersOfOneProcessMakePicturesTogether) {
+  std::vector<HostedWorker> workers(3, {.memory_scope = 7, .threads = 1, .pid = 99});
+  EXPECT_EQ(ServiceMachine(workers, Surroundings({})).picture_threads, 3);
+  workers[1].pid = 98;
+  EXPECT_LE(ServiceMachine(workers, Surroundings({})).picture_threads, 1);
+}
+
+TEST(ServiceMachine, AnotherHostThanTheCoordinatorsHasTheCoresThatItsWorkersUse) {
+  const std::vector<HostedWorker> workers(3, {.memory_scope = 8, .threads = 2});
+  EXPECT_EQ(ServiceMachine(workers, Surroundings({})).cores_a_host, 6);
+}
+
+TEST(ServiceMachine, WorkersOfDifferentOrUnknownHostsSendImagesOverTheLink) {
+  const LinkModel link = ParseLink("link", "1gbit").value();
+  for (const std::uint64_t scope : {std::uint64_t{0}, std::uint64_t{8}}) {
+    const std::vector<HostedWorker> workers = {{.memory_scope = scope, .threads = 4}, {.memory_scope = scope == 0 ? 0U : 7U, .threads = 1}};
+    const MachineModel machine = ServiceMachine(workers, Surroundings(link));
+    EXPECT_TRUE(Validate(machine).ok());
+    EXPECT_EQ(machine.link, link);
+    EXPECT_GT(machine.combining.rgba_bytes, 0);
+    EXPECT_EQ(machine.workers_a_host, 0);
+    EXPECT_EQ(machine.threads, 1) << "the slowest worker counts";
+  }
+}
+
+TEST(ServiceMachine, NobodyIsAMachineToo) { EXPECT_TRUE(Validate(ServiceMachine({}, {})).ok()); }
+
+}  // namespace
+}  // namespace slabstream
