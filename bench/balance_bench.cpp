@@ -1,18 +1,24 @@
 // How even partitions are: every box of each is rendered alone on one thread (client/lab/box_costs.h), the boxes of a slot are added up,
-// and the slot with most to do is compared with the mean. Then the same after some frames of dynamic balance of one view. For volumes given
-// on the command line; "sphere1:300" is the paper's class-I sphere with N = 300.
+// and the slot with most to do is compared with the mean, in views all round. Then the same in each view after some frames of dynamic
+// balance. For volumes given on the command line; "sphere1:300" is the paper's class-I sphere with N = 300. --stealing simulates frames of
+// both kinds of layout, and what work stealing could win at most.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <string>
 #include <vector>
 
 #include "client/lab/box_costs.h"
 #include "common/classification/count_occupied.h"
 #include "common/decomposition/decomposition.h"
+#include "common/planning/assignment.h"
 #include "common/planning/balance.h"
 #include "common/planning/learnt_cost.h"
+#include "common/planning/render_work.h"
+#include "common/simulation/simulate_frames.h"
 #include "common/volume/sphere.h"
 #include "common/volume_io/volume_reader.h"
 
@@ -20,12 +26,12 @@ namespace slabstream {
 namespace {
 
 struct Options {
-  std::vector<std::string> volumes;
+  std::vector<std::string> volumes, decompositions, splits = {"voxels", "occupied"};
   Policy policy{.groups = 1};
   std::string preset = "auto", renderer = "splat";
-  int slots = 16, repeats = 3, size = 512, frames = 5;
+  int slots = 16, repeats = 3, size = 512, frames = 5, views = 4;
   double azimuth = 30, elevation = 20;
-  bool verbose = false;
+  bool verbose = false, stealing = false;
 };
 
 std::shared_ptr<const Volume> Load(const std::string& name) {
@@ -35,20 +41,30 @@ std::shared_ptr<const Volume> Load(const std::string& name) {
   return std::make_shared<const Volume>(MakeSphere(request).value());
 }
 
-FrameSetup MakeSetup(const Options& options, const VolumeSummary& summary) {
+RendererKind RendererOf(const Options& options) { return options.renderer == "zbuffer" ? RendererKind::kZBuffer : RendererKind::kSplat; }
+
+FramePlan MakePlan(const Options& options, const VolumeSummary& summary, int view, const Layout* layout = nullptr) {
   FrameRequest request;
   request.dataset = "volume";
-  request.renderer = options.renderer == "zbuffer" ? RendererKind::kZBuffer : RendererKind::kSplat;
+  request.renderer = RendererOf(options);
   request.size = {options.size, options.size};
-  request.view = {.azimuth_degrees = options.azimuth, .elevation_degrees = options.elevation};
+  request.view = {.azimuth_degrees = options.azimuth + 360.0 * view / options.views, .elevation_degrees = options.elevation};
   request.transfer.choice = options.preset;
-  return PlanFrame(request, 1, summary, Roster{{1}}, {}).value().setup;
+  request.policy = options.policy;
+  Roster roster;
+  for (int slot = 1; slot <= (layout == nullptr ? 1 : options.slots); ++slot) roster.slots.push_back(WorkerId(slot));
+  return PlanFrame(request, 1, summary, roster, {}, layout).value();
 }
+
+FrameSetup MakeSetup(const Options& options, const VolumeSummary& summary, int view) { return MakePlan(options, summary, view).setup; }
 
 struct Measured {
   std::vector<BoxSeconds> boxes;
   std::vector<double> by_box;         // of the layout; 0: nobody renders it
-  double imbalance = 0, seconds = 0;  // of slots; of all boxes together
+  std::vector<CoverageMap> coverage;  // likewise
+  double imbalance = 0;               // of slots
+  double slowest = 0;                 // slot, seconds
+  double sum = 0;                     // of all boxes
 };
 
 Measured Measure(const Options& options, const Volume& volume, const FrameSetup& setup, const Layout& layout) {
@@ -61,61 +77,185 @@ Measured Measure(const Options& options, const Volume& volume, const FrameSetup&
   }
   Measured measured;
   measured.by_box.resize(layout.owners.size());
+  measured.coverage.resize(layout.owners.size());
   std::vector<double> slots(std::size_t(options.slots));
   const std::vector<BoxCost> costs = MeasureBoxCosts(volume, setup, boxes, options.repeats);
   for (std::size_t i = 0; i < costs.size(); ++i) {
     measured.boxes.push_back({costs[i].box, costs[i].seconds});
-    measured.seconds += costs[i].seconds;
+    measured.sum += costs[i].seconds;
     measured.by_box[numbers[i]] = costs[i].seconds;
+    measured.coverage[numbers[i]] = costs[i].coverage;
     slots[layout.owners[numbers[i]]] += costs[i].seconds;
   }
   measured.imbalance = Imbalance(slots);
+  measured.slowest = *std::ranges::max_element(slots);
   return measured;
 }
 
-void Compare(const Options& options, const std::string& name, const Volume& volume, const VolumeSummary& summary, const FrameSetup& setup,
-             const OccupancyGrid& grid, const Policy& policy) {
-  LayoutRequest request{.summary = &summary,
-                        .transfer = &setup.transfer,
-                        .policy = &policy,
-                        .slots = std::uint32_t(options.slots),
-                        .known = {.occupied = &grid}};
-  Layout layout = MakeLayout(request);
-  Measured measured = Measure(options, volume, setup, layout);
-  fmt::print("{:24} {:8} {:9} {:10} {:4} boxes: {:6.3f} max/mean, {:7.2f} ms", name, policy.decomposition, SplitOf(policy),
-             policy.assignment, measured.boxes.size(), measured.imbalance, 1e3 * measured.seconds);
-
-  LearntCost learnt(grid);
-  std::int64_t moved = 0;
-  for (int frame = 0, seen = 1; frame < options.frames; ++frame, ++seen) {
-    learnt.Learn(measured.boxes, std::max(0.2, 1.0 / seen));
-    const WorkField cost = learnt.Field();
-    request.known.cost = &cost;
-    if (std::optional<Layout> better = Rebalance(layout, measured.by_box, request, seen)) {
-      moved += MovedVoxels(layout, *better);
-      layout = *std::move(better);
-      seen = 0;
-    }
-    measured = Measure(options, volume, setup, layout);
-    if (options.verbose) fmt::print(" {:.3f}{}", measured.imbalance, seen == 0 ? "*" : "");
+// Over views: median, least and largest.
+struct Spread {
+  std::vector<double> values;
+  double median() const {
+    std::vector<double> sorted = values;
+    std::ranges::sort(sorted);
+    return (sorted[(sorted.size() - 1) / 2] + sorted[sorted.size() / 2]) / 2;
   }
-  fmt::print("; after {} frames {:6.3f}, {:7.2f} ms, {:6.1f} Mvoxels moved\n", options.frames, measured.imbalance, 1e3 * measured.seconds,
-             1e-6 * double(moved));
-}
+};
+
+struct Outcome {
+  Spread imbalance, slowest, sum, moved;
+  Spread residual;  // root mean square of (measured - foretold) / foretold, over the boxes of a view, both relative to their means
+  // Simulated, ms from picture to picture and latency: as it is, with stealing, and both with stragglers.
+  std::array<Spread, 4> steady, latency;
+
+  void Add(const Measured& measured, std::int64_t moved_voxels) {
+    imbalance.values.push_back(measured.imbalance);
+    slowest.values.push_back(1e3 * measured.slowest);
+    sum.values.push_back(1e3 * measured.sum);
+    moved.values.push_back(1e-6 * double(moved_voxels));
+  }
+  std::string Text() const {
+    const auto [least, most] = std::ranges::minmax(imbalance.values);
+    return fmt::format("{:5.3f} ({:5.3f} ... {:5.3f}), slowest {:6.2f} ms, all {:7.2f} ms, foretold to {:4.2f}", imbalance.median(), least,
+                       most, slowest.median(), sum.median(), residual.median());
+  }
+};
+
+class Comparison {
+ public:
+  Comparison(const Options& options, const std::string& name)
+      : options_(options),
+        name_(name.substr(name.rfind('/') + 1)),
+        volume_(Load(name)),
+        summary_(Summarize(*volume_)),
+        transfer_(MakeSetup(options, summary_, 0).transfer),
+        grid_(CountOccupied(volume_->block, DrawnTable(transfer_, summary_, RendererOf(options)))),
+        work_(grid_, RendererOf(options), MedianExtinction(transfer_, summary_)) {}
+
+  void Run(const Policy& policy) const {
+    const LayoutRequest request{.summary = &summary_,
+                                .transfer = &transfer_,
+                                .policy = &policy,
+                                .renderer = RendererOf(options_),
+                                .slots = std::uint32_t(options_.slots),
+                                .known = {.occupied = &grid_}};
+    const Layout layout = MakeLayout(request);
+    const auto boxes = std::ranges::count_if(layout.owners, [](std::uint32_t owner) { return owner != kNoSlot; });
+    Outcome fixed, balanced;
+    for (int view = 0; view < options_.views; ++view) {
+      const FrameSetup setup = MakeSetup(options_, summary_, view);
+      Measured measured = Measure(options_, *volume_, setup, layout);
+      fixed.Add(measured, 0);
+      AddResidual(setup, measured, fixed);
+      if (options_.stealing) Simulate(view, layout, measured, fixed);
+      if (options_.frames > 0) Balance(view, setup, request, layout, std::move(measured), balanced);
+    }
+    fmt::print("{:22} {:8} {:9} {:10} {:4} boxes, max/mean {}\n", name_, policy.decomposition, SplitOf(policy), policy.assignment, boxes,
+               fixed.Text());
+    if (options_.stealing) PrintSimulated("static", fixed);
+    if (options_.frames == 0) return;
+    fmt::print("{:48} after {} frames, max/mean {}, {:.1f} Mvoxels moved\n", "", options_.frames, balanced.Text(), balanced.moved.median());
+    if (options_.stealing) PrintSimulated("dynamic", balanced);
+    std::fflush(stdout);
+  }
+
+ private:
+  void AddResidual(const FrameSetup& setup, const Measured& measured, Outcome& outcome) const {
+    const auto axis = std::size_t(std::min(Number(setup.camera.traversal_axis), 1));  // of views along z nothing is foretold
+    double foretold = 0, squares = 0;
+    for (const BoxSeconds& box : measured.boxes) foretold += work_.Of(box.box)[axis];
+    for (const BoxSeconds& box : measured.boxes) {
+      if (work_.Of(box.box)[axis] == 0) continue;  // all it has is beside it
+      const double ratio = box.seconds / measured.sum / (work_.Of(box.box)[axis] / foretold);
+      squares += (ratio - 1) * (ratio - 1);
+    }
+    outcome.residual.values.push_back(std::sqrt(squares / double(measured.boxes.size())));
+  }
+
+  // As the coordinator's LayoutTable does it.
+  void Balance(int view, const FrameSetup& setup, LayoutRequest request, Layout layout, Measured measured, Outcome& outcome) const {
+    LearntCost learnt(grid_);
+    std::int64_t moved = 0;
+    std::vector<double> seconds = measured.by_box;  // of this layout, over its frames
+    for (int frame = 0, seen = 1; frame < options_.frames; ++frame, ++seen) {
+      const double weight = std::max(0.2, 1.0 / seen);
+      learnt.Learn(measured.boxes, weight);
+      if (seen == 1) seconds = measured.by_box;
+      for (std::size_t box = 0; box < seconds.size(); ++box) seconds[box] += weight * (measured.by_box[box] - seconds[box]);
+      const WorkField cost = learnt.Field();
+      request.known.cost = &cost;
+      if (std::optional<Layout> better = Rebalance(layout, seconds, request, seen)) {
+        moved += MovedVoxels(layout, *better);
+        layout = *std::move(better);
+        seen = 0;
+      }
+      measured = Measure(options_, *volume_, setup, layout);
+      if (options_.verbose) fmt::print(" {:.3f}{}", measured.imbalance, seen == 0 ? "*" : "");
+    }
+    if (options_.verbose) fmt::print("\n");
+    outcome.Add(measured, moved);
+    AddResidual(setup, measured, outcome);
+    if (options_.stealing) Simulate(view, layout, measured, outcome);
+  }
+
+  // On a switched link of 10 Gbit/s, all there is to do besides rendering as long as on the machine that the model's defaults are of.
+  void Simulate(int view, const Layout& layout, const Measured& measured, Outcome& outcome) const {
+    const FramePlan plan = MakePlan(options_, summary_, view, &layout);
+    FrameInput frame{&plan, {}, 1e-3, 0.5e-3};
+    for (std::size_t box = 0; box < layout.owners.size(); ++box) frame.boxes.push_back({measured.by_box[box], &measured.coverage[box], 0});
+    MachineModel machine;
+    machine.link = {Contention::kSwitched, 20e-6, 1.25e9};
+    const auto run = [&](int frames, bool steal) {
+      return SimulateFrames(std::vector<FrameInput>(std::size_t(frames), frame), machine,
+                            {.in_flight = frames > 1 ? 2 : 1, .keep_spans = false, .steal = steal})
+          .value();
+    };
+    constexpr int kFrames = 40;
+    for (std::size_t i = 0; i < 4; ++i) {
+      machine.stragglers = i < 2 ? Stragglers{} : Stragglers{0.1, 2, 1};
+      const Timeline timeline = run(kFrames, i % 2 == 1);
+      outcome.steady[i].values.push_back(1e3 * timeline.end / kFrames);
+      Spread alone;
+      for (std::uint64_t seed = 1; seed <= 9; ++seed) {
+        machine.stragglers.seed = seed;
+        alone.values.push_back(1e3 * run(1, i % 2 == 1).end);
+      }
+      outcome.latency[i].values.push_back(alone.median());
+    }
+  }
+
+  static void PrintSimulated(std::string_view layout, const Outcome& outcome) {
+    const auto gain = [](const std::array<Spread, 4>& times, std::size_t i) {
+      return 100 * (1 - times[i + 1].median() / times[i].median());
+    };
+    for (const std::size_t i : {0U, 2U}) {
+      fmt::print("{:48} {:8}{}: {:.2f} ms from picture to picture, stealing at most {:.1f} % less; latency {:.2f} ms, {:.1f} % less\n", "",
+                 layout, i == 0 ? "" : ", stragglers", outcome.steady[i].median(), gain(outcome.steady, i), outcome.latency[i].median(),
+                 gain(outcome.latency, i));
+    }
+  }
+
+  const Options& options_;
+  const std::string name_;
+  const std::shared_ptr<const Volume> volume_;
+  const VolumeSummary summary_;
+  const TransferFunction transfer_;
+  const OccupancyGrid grid_;
+  const RenderWork work_;
+};
 
 void Run(const Options& options) {
   for (const std::string& name : options.volumes) {
-    const std::shared_ptr<const Volume> volume = Load(name);
-    const VolumeSummary summary = Summarize(*volume);
-    const FrameSetup setup = MakeSetup(options, summary);
-    const OccupancyGrid grid = CountOccupied(volume->block, Classify(setup.transfer, setup.description, setup.range));
+    const Comparison comparison(options, name);
     for (const DecompositionEntry& decomposition : Decompositions()) {
+      const std::vector<std::string>& wanted = options.decompositions;
+      if (!wanted.empty() && std::ranges::find(wanted, decomposition.name) == wanted.end()) continue;
       Policy policy = options.policy;
       policy.decomposition = decomposition.name;
-      for (const std::string split : {"voxels", "occupied"}) {
+      for (const std::string& split : options.splits) {
         policy.split = split;
         if (decomposition.name == "octree" && split != decomposition.split) continue;  // blind to work
-        Compare(options, name.substr(name.rfind('/') + 1), *volume, summary, setup, grid, policy);
+        comparison.Run(policy);
       }
     }
   }
@@ -130,14 +270,20 @@ int main(int argc, char** argv) {
   app.add_option("VOLUME", options.volumes, "Files, or sphere1:N and sphere2:N")->required();
   app.add_option("--transfer", options.preset, "A preset");
   app.add_option("--renderer", options.renderer)->check(CLI::IsMember({"splat", "zbuffer"}));
-  app.add_option("--assignment", options.policy.assignment)->check(CLI::IsMember({"cyclic", "contiguous", "greedy"}));
+  app.add_option("--decomposition", options.decompositions, "Only these");
+  app.add_option("--split", options.splits)->check(CLI::IsMember({"voxels", "occupied"}));
+  std::vector<std::string> assignments;
+  for (const slabstream::AssignmentEntry& assignment : slabstream::Assignments()) assignments.emplace_back(assignment.name);
+  app.add_option("--assignment", options.policy.assignment)->check(CLI::IsMember(assignments));
   app.add_option("--slots", options.slots)->check(CLI::Range(1, 4096));
   app.add_option("--groups", options.policy.groups)->check(CLI::Range(1, slabstream::kMaxGroups));
   app.add_option("--frames", options.frames, "Of dynamic balance")->check(CLI::Range(0, 1000));
+  app.add_option("--views", options.views, "Azimuths, all round")->check(CLI::Range(1, 1000));
   app.add_option("--repeats", options.repeats)->check(CLI::Range(1, 1000));
   app.add_option("--size", options.size)->check(CLI::Range(1, 8192));
-  app.add_option("--azimuth", options.azimuth);
+  app.add_option("--azimuth", options.azimuth, "Of the first view");
   app.add_option("--elevation", options.elevation);
+  app.add_flag("--stealing", options.stealing, "Simulate frames with and without");
   app.add_flag("--verbose", options.verbose, "Imbalance frame by frame; * where boxes changed");
   CLI11_PARSE(app, argc, argv);
   slabstream::Run(options);

@@ -3,15 +3,21 @@
 // coordinator. Time runs from the moment at which the last rank holds its picture to the end of the last combining step at the root.
 //
 //   build/bin/combining_bench [--ranks 2,4,8,16] [--size 1024] [--schemes fan-in,direct-send,...] [--repeats N] [--images full,sparse]
-//                             [--links shared,ipc,tcp] [--color float32|half|fixed16]
+//                             [--links shared,ipc,tcp] [--color float32|half|fixed16] [--compress auto|on|off]
 //
 // Pictures are premultiplied float RGBA, combined by over. "sparse": each rank has a square of 20 % of the picture, and these slide from
-// one corner to the other. A line a case: median, 10th and 90th percentile in milliseconds, and the median until the coordinator knows.
+// one corner to the other; packed they get smaller than any that are rendered. A line a case: median, 10th and 90th percentile in
+// milliseconds, the median until the coordinator knows, and the
+// processor time of all workers for a frame (the making of the pictures left out): where workers outnumber cores, time is not below that
+// over the number of cores. For tcp, first what the system alone takes: one process writes the bytes of a full picture to a plain socket,
+// another reads them, both from and to buffers that they keep; and the processor time of both for the images of p ranks, over the cores.
+#include <arpa/inet.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <pthread.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -21,8 +27,10 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <ctime>
 #include <filesystem>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "common/base/check.h"
@@ -47,15 +55,28 @@ struct Case {
   bool sparse = false;
   std::string link;
   ColorCoding color = ColorCoding::kFloat32;  // of what is sent
+  Compression compression = Compression::kAuto;
 };
 
 // What the processes of one case share.
 struct Shared {
   pthread_barrier_t all_hold;             // their pictures of the present frame
   std::atomic<std::int64_t> all_held_ns;  // when the last one did
+  std::atomic<std::int64_t> made_ns;      // processor time that was spent on making them, of all workers and frames
 };
 
 std::int64_t NowNs() { return MonotonicNow().time_since_epoch().count(); }
+
+std::int64_t ProcessorNs(clockid_t clock) {
+  timespec time = {};
+  CHECK_EQ(::clock_gettime(clock, &time), 0);
+  return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
+}
+std::int64_t ProcessorNsOf(pid_t process) {
+  clockid_t clock = {};
+  CHECK_EQ(::clock_getcpuclockid(process, &clock), 0);
+  return ProcessorNs(clock);
+}
 
 LocalImage MakePicture(const Case& config, Rank rank) {
   PixelBounds bounds = {0, 0, config.size, config.size};
@@ -79,7 +100,9 @@ class PreparedPicture : public Renderer {
 
   Result<LocalImage> Render(SlabData&, const Box&, const FrameSetup&, const OcclusionMask&, const std::atomic<bool>&,
                             RankReport&) override {
+    const std::int64_t begin_ns = ProcessorNs(CLOCK_THREAD_CPUTIME_ID);
     LocalImage copy = picture_;
+    shared_.made_ns += ProcessorNs(CLOCK_THREAD_CPUTIME_ID) - begin_ns;
     shared_.all_held_ns = NowNs();  // the last one's stays
     ::pthread_barrier_wait(&shared_.all_hold);
     return copy;
@@ -98,6 +121,7 @@ class PreparedPicture : public Renderer {
   options.coordinator_endpoint = "ipc://" + directory + "/control";
   options.images_endpoint = config.link == "tcp" ? "tcp://127.0.0.1:*" : "ipc://" + directory + "/images-" + std::to_string(rank);
   options.share_memory = config.link == "shared";
+  options.compression = config.compression;
   options.make_renderer = [&](RendererKind) { return std::make_unique<PreparedPicture>(config, rank, shared); };
   auto service = WorkerService::Start(context, std::move(options));
   CHECK(service.ok()) << service.status().message();
@@ -107,6 +131,7 @@ class PreparedPicture : public Renderer {
 
 struct Times {
   std::vector<double> combined, reported;  // milliseconds
+  double processor = 0;                    // milliseconds a frame, of all workers
 };
 
 double Quantile(std::vector<double> values, double q) {
@@ -117,8 +142,12 @@ double Quantile(std::vector<double> values, double q) {
 // Plays the coordinator of one case's workers.
 class Coordinator {
  public:
-  Coordinator(const Case& config, const std::string& directory, const Shared& shared)
-      : config_(config), shared_(shared), control_(*Socket::Router(context_)), slabs_(*Socket::Router(context_)) {
+  Coordinator(const Case& config, const std::string& directory, const Shared& shared, std::vector<pid_t> processes)
+      : config_(config),
+        shared_(shared),
+        processes_(std::move(processes)),
+        control_(*Socket::Router(context_)),
+        slabs_(*Socket::Router(context_)) {
     CHECK(control_.Bind("ipc://" + directory + "/control").ok());
     slabs_endpoint_ = *slabs_.Bind("ipc://" + directory + "/slabs");
     setup_.dataset = kDataset;
@@ -151,7 +180,9 @@ class Coordinator {
     assignment.group.color = config_.color;
     assignment.display = 1;
     Times times;
+    std::int64_t busy_ns = 0;
     for (int i = -kWarmUp; i < repeats; ++i) {
+      if (i == 0) busy_ns = BusyNs();
       assignment.key = {++frame_, 0, 0};
       assignment.finished_before = frame_;
       done_.reset();
@@ -171,6 +202,7 @@ class Coordinator {
       times.combined.push_back(double(end_ns - shared_.all_held_ns) / 1e6);
       times.reported.push_back(double(reported_ns_ - shared_.all_held_ns) / 1e6);
     }
+    times.processor = double(BusyNs() - busy_ns) / 1e6 / repeats;
     return times;
   }
 
@@ -179,6 +211,13 @@ class Coordinator {
     std::string identity, endpoint;
     std::uint64_t memory_scope = 0;
   };
+
+  // Processor time of all workers but for the making of pictures.
+  std::int64_t BusyNs() const {
+    std::int64_t sum = -shared_.made_ns;
+    for (const pid_t process : processes_) sum += ProcessorNsOf(process);
+    return sum;
+  }
 
   void Send(const std::string& identity, const AnyMessage& message) { CHECK(control_.Send(identity, Encode(message)).ok()); }
 
@@ -214,6 +253,7 @@ class Coordinator {
 
   const Case& config_;
   const Shared& shared_;
+  const std::vector<pid_t> processes_;
   Context context_;
   Socket control_, slabs_;
   std::string slabs_endpoint_;
@@ -243,18 +283,77 @@ void RunCase(const Case& config, const std::vector<std::string>& schemes, int re
     if (workers.back() == 0) RunWorker(config, rank, directory, shared);
   }
   {
-    Coordinator coordinator(config, directory, shared);
+    Coordinator coordinator(config, directory, shared, workers);
     for (const std::string& scheme : schemes) {
       const Times times = coordinator.Measure(scheme, repeats);
-      fmt::print("{:6} {:5} {:6} p {:3}  {:20} {:8.2f} [{:.2f}, {:.2f}]  reported {:8.2f}\n", config.link, config.size,
+      fmt::print("{:6} {:5} {:6} p {:3}  {:20} {:8.2f} [{:.2f}, {:.2f}]  reported {:8.2f}  processor {:8.2f}\n", config.link, config.size,
                  config.sparse ? "sparse" : "full", config.ranks, scheme, Quantile(times.combined, 0.5), Quantile(times.combined, 0.1),
-                 Quantile(times.combined, 0.9), Quantile(times.reported, 0.5));
+                 Quantile(times.combined, 0.9), Quantile(times.reported, 0.5), times.processor);
       (void)std::fflush(stdout);
     }
   }
   for (const pid_t worker : workers) ::kill(worker, SIGKILL);
   for (const pid_t worker : workers) ::waitpid(worker, nullptr, 0);
   std::filesystem::remove_all(directory);
+}
+
+// Reads pictures of `bytes` bytes from the one connection that comes, answers each with a byte.
+[[noreturn]] void DrainPictures(int listener, std::size_t bytes) {
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  const int socket = ::accept(listener, nullptr, nullptr);
+  std::vector<std::byte> picture(bytes);
+  while (true) {
+    for (std::size_t read = 0; read < bytes;) {
+      const ssize_t count = ::recv(socket, picture.data() + read, bytes - read, 0);
+      if (count <= 0) std::_Exit(0);
+      read += std::size_t(count);
+    }
+    CHECK_EQ(::send(socket, picture.data(), 1, 0), 1);
+  }
+}
+
+// What the system takes to move pictures between processes. Called before this process has any thread.
+void MeasureLoopback(std::int32_t size, const std::vector<Rank>& ranks, int repeats) {
+  const std::size_t bytes = 4 * sizeof(float) * std::size_t(size) * std::size_t(size);
+  sockaddr_in address = {};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t length = sizeof(address);
+  const int listener = ::socket(AF_INET, SOCK_STREAM, 0);
+  CHECK(::bind(listener, reinterpret_cast<sockaddr*>(&address), length) == 0 && ::listen(listener, 1) == 0);
+  CHECK_EQ(::getsockname(listener, reinterpret_cast<sockaddr*>(&address), &length), 0);
+  const pid_t reader = ::fork();
+  CHECK(reader >= 0);
+  if (reader == 0) DrainPictures(listener, bytes);
+  const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
+  CHECK_EQ(::connect(socket, reinterpret_cast<sockaddr*>(&address), length), 0);
+  const std::vector<std::byte> picture(bytes, std::byte{1});
+  std::vector<double> times;
+  const auto busy_ns = [&] { return ProcessorNs(CLOCK_PROCESS_CPUTIME_ID) + ProcessorNsOf(reader); };
+  std::int64_t begin_busy_ns = 0;
+  for (int i = -kWarmUp; i < repeats; ++i) {
+    if (i == 0) begin_busy_ns = busy_ns();
+    const std::int64_t begin_ns = NowNs();
+    for (std::size_t written = 0; written < bytes;) {
+      const ssize_t count = ::send(socket, picture.data() + written, bytes - written, 0);
+      CHECK(count > 0);
+      written += std::size_t(count);
+    }
+    std::byte answer;
+    CHECK_EQ(::recv(socket, &answer, 1, 0), 1);
+    if (i >= 0) times.push_back(double(NowNs() - begin_ns) / 1e6);
+  }
+  const double processor = double(busy_ns() - begin_busy_ns) / 1e6 / repeats;
+  fmt::print("tcp    {:5} loopback copy alone, an image {:8.2f} [{:.2f}, {:.2f}]  processor {:8.2f}", size, Quantile(times, 0.5),
+             Quantile(times, 0.1), Quantile(times, 0.9), processor);
+  for (const Rank count : ranks) {
+    fmt::print("  p {} {:.2f}", count, processor * (count - 1) / std::min(count, std::thread::hardware_concurrency()));
+  }
+  fmt::print("\n");
+  (void)std::fflush(stdout);  // before the next fork
+  ::close(socket);
+  ::close(listener);
+  ::waitpid(reader, nullptr, 0);
 }
 
 int Run(int argc, char** argv) {
@@ -265,6 +364,7 @@ int Run(int argc, char** argv) {
   std::vector<std::string> images = {"full", "sparse"}, links = {"shared", "tcp"};
   int repeats = 50;
   ColorCoding color = ColorCoding::kFloat32;
+  std::string compress = "auto";
   CLI::App app("Times combining among worker processes of this host.");
   app.add_option("--ranks", ranks)->delimiter(',')->check(CLI::Range(1, 64));
   app.add_option("--size", sizes, "pixels a side, multiples of 8")->delimiter(',')->check(CLI::Range(8, 8192));
@@ -274,6 +374,7 @@ int Run(int argc, char** argv) {
   app.add_option("--color", color)
       ->transform(CLI::CheckedTransformer(std::map<std::string, ColorCoding>{
           {"float32", ColorCoding::kFloat32}, {"half", ColorCoding::kHalf}, {"fixed16", ColorCoding::kFixed16}}));
+  app.add_option("--compress", compress)->check(CLI::IsMember({"auto", "on", "off"}));
   app.add_option("--repeats", repeats)->check(CLI::Range(1, 100000));
   CLI11_PARSE(app, argc, argv);
   for (const std::string& scheme : schemes) {
@@ -284,12 +385,13 @@ int Run(int argc, char** argv) {
   }
   for (const std::string& link : links) {
     for (const std::int32_t size : sizes) {
+      if (link == "tcp") MeasureLoopback(size, ranks, repeats);
       for (const std::string& image : images) {
         for (const Rank count : ranks) {
           const pid_t child = ::fork();
           CHECK(child >= 0);
           if (child == 0) {
-            RunCase({count, size, image == "sparse", link, color}, schemes, repeats);
+            RunCase({count, size, image == "sparse", link, color, *ParseCompression(compress)}, schemes, repeats);
             std::_Exit(0);
           }
           int status = 0;

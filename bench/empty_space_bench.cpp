@@ -42,8 +42,7 @@ void EmptySpace(benchmark::State& state) {
   view.azimuth_degrees = 30;
   view.elevation_degrees = 20;
   view.zoom = double(side) / kObject;
-  setup.camera = MakeCamera(view, {512, 512}, volume.description.geometry);
-  setup.sheets = MakeSheetGrid(setup.camera, volume.description.geometry);
+  SetView(view, {512, 512}, setup);
 
   SlabData slab{BrickedVoxels(volume.block)};
   const std::unique_ptr<Renderer> renderer = MakeRenderer(kind);

@@ -19,7 +19,7 @@ ClassificationTable Table(const VolumeDescription& description) {
 
 template <class Voxels>
 void Run(benchmark::State& state, const Voxels& voxels, const ClassificationTable& table) {
-  for (auto _ : state) benchmark::DoNotOptimize(CountOccupied(voxels, table).occupied.data());
+  for (auto _ : state) benchmark::DoNotOptimize(CountOccupied(voxels, table).cells.data());
 }
 
 void CountNoise(benchmark::State& state) {

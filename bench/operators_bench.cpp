@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "common/base/check.h"
 #include "common/kernels/combine.h"
 #include "common/kernels/resample.h"
 
@@ -36,18 +37,25 @@ void Over(benchmark::State& state) {
 BENCHMARK(Over<OverRow>)->Name("OverRows")->Unit(benchmark::kMicrosecond);
 BENCHMARK(Over<OverRowReference>)->Name("OverRowsReference")->Unit(benchmark::kMicrosecond);
 
+template <bool kUnchecked>
 void CombineImages(benchmark::State& state) {
   const auto format = PixelFormat(state.range(0));
   const LocalImage other = Filled(format, 0.3F);
+  const ImageView view = ViewOf(other);
   LocalImage image = Filled(format, 0.6F);
   for (auto _ : state) {
-    Combine(image, other, Side::kBack);
+    if constexpr (kUnchecked) {
+      CHECK(CombineUnchecked(image, view, Side::kBack, image.bounds));
+    } else {
+      Combine(image, view, Side::kBack, image.bounds);
+    }
     benchmark::ClobberMemory();
   }
   state.SetItemsProcessed(state.iterations() * kPixels);
   state.SetLabel(format == PixelFormat::kRgba ? "over" : "nearest depth");
 }
-BENCHMARK(CombineImages)->Arg(1)->Arg(2)->Unit(benchmark::kMicrosecond);
+BENCHMARK(CombineImages<false>)->Name("CombineImages")->Arg(1)->Arg(2)->Unit(benchmark::kMicrosecond);
+BENCHMARK(CombineImages<true>)->Name("CombineUncheckedImages")->Arg(1)->Arg(2)->Unit(benchmark::kMicrosecond);
 
 // A picture from a frame of about as many pixels, turned and skewed as by an oblique view, 16 rows a call.
 template <void (*kResample)(const LocalImage&, const ProjectiveMap&, std::int32_t, std::int32_t, LocalImage&)>

@@ -50,7 +50,7 @@ void Validate(const BenchCase& c, const std::shared_ptr<const Volume>& volume, c
     };
     fmt::print("{} {} workers: measured {}, simulated {}, off by {:+5.1f} %, at worst {:+5.1f} %; slowdown {:.3f}\n", row.name, row.workers,
                parts(row.MeanMeasured()), parts(row.MeanSimulated()), row.error() * 100, row.worst_error() * 100, row.memory_slowdown);
-    std::fflush(stdout);
+    (void)std::fflush(stdout);
   }
 }
 
@@ -83,22 +83,28 @@ void PrintFit(RendererKind renderer, const std::vector<CostSample>& samples) {
   fmt::print("all stages: prediction error {:.1f} %\n", fit.prediction_error * 100);
 }
 
-void Run(const BenchOptions& options) {
+// Errors: as ParseBenchCase and LoadBenchVolume.
+Status Run(const BenchOptions& options) {
+  std::vector<BenchCase> cases;
+  for (const std::string& text : options.cases) {
+    Result<BenchCase> c = ParseBenchCase(text, false);
+    if (!c.ok()) return c.status();
+    if (!options.renderer.empty()) c->renderer = options.renderer == "splat" ? RendererKind::kSplat : RendererKind::kZBuffer;
+    cases.push_back(*std::move(c));
+  }
   if (!options.fit) PrintMachine();
   std::vector<CostSample> samples;
-  RendererKind renderer = RendererKind::kSplat;
-  for (const std::string& text : options.cases) {
-    BenchCase c = ParseBenchCase(text, false).value();
-    if (!options.renderer.empty()) c.renderer = options.renderer == "splat" ? RendererKind::kSplat : RendererKind::kZBuffer;
-    renderer = c.renderer;
-    const std::shared_ptr<const Volume> volume = LoadBenchVolume(c).value();
+  for (const BenchCase& c : cases) {
+    const Result<std::shared_ptr<const Volume>> volume = LoadBenchVolume(c);
+    if (!volume.ok()) return volume.status();
     if (options.fit) {
-      AddSamples(c, *volume, options, samples);
+      AddSamples(c, **volume, options, samples);
     } else {
-      Validate(c, volume, options);
+      Validate(c, *volume, options);
     }
   }
-  if (options.fit) PrintFit(renderer, samples);
+  if (options.fit) PrintFit(cases.back().renderer, samples);
+  return Status::Ok();
 }
 
 }  // namespace
@@ -116,6 +122,8 @@ int main(int argc, char** argv) {
   app.add_option("--renderer", options.renderer, "instead of the case's")->check(CLI::IsMember({"splat", "zbuffer"}));
   app.add_flag("--fit", options.fit, "fit the cost model instead");
   CLI11_PARSE(app, argc, argv);
-  slabstream::Run(options);
-  return 0;
+  const slabstream::Status status = slabstream::Run(options);
+  if (status.ok()) return 0;
+  fmt::print(stderr, "simulation_bench: {}\n", status.message());
+  return 2;
 }

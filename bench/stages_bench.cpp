@@ -34,12 +34,7 @@ void Stages(benchmark::State& state) {
   view.azimuth_degrees = 30;
   view.elevation_degrees = 20;
   const VolumeGeometry& geometry = volume.description.geometry;
-  if (renderer_kind == RendererKind::kSplat) {
-    setup.camera = MakeCamera(view, {512, 512}, geometry);
-    setup.sheets = MakeSheetGrid(setup.camera, geometry);
-  } else {
-    setup.camera = MakeSupersampledCamera(view, {512, 512}, geometry);
-  }
+  SetView(view, {512, 512}, setup);
 
   const WorkField voxels = WorkField::Uniform(geometry.size);
   const Partition partition = MakeSlabs({.work = &voxels, .boxes = boxes});
@@ -60,7 +55,7 @@ void Stages(benchmark::State& state) {
         benchmark::DoNotOptimize(frame.rgba.data());
       }
       const auto begin = std::chrono::steady_clock::now();
-      benchmark::DoNotOptimize(FinishPicture(std::move(frame), setup));
+      benchmark::DoNotOptimize(FinishPicture(frame, setup));
       finish += std::chrono::steady_clock::now() - begin;
     });
   };
