@@ -215,7 +215,7 @@ TEST_F(WorkerMachineTest, AsksForChunksWithinItsCredit) {
   ASSERT_THAT(All<StoreChunk>(arrived), SizeIs(1));
   EXPECT_THAT(All<SendChunkRequest>(arrived), IsEmpty()) << "credit is used until the chunk is stored";
   EXPECT_THAT(All<StoreChunk>(Tell(Answer(first[0].request))), IsEmpty()) << "a second copy changes nothing";
-  const StoreChunk& store = All<StoreChunk>(arrived)[0];
+  const StoreChunk store = All<StoreChunk>(arrived)[0];
   const auto next = All<SendChunkRequest>(Tell(ChunkStored{store.slab, store.chunk.box, 0, {}}));
   ASSERT_THAT(next, SizeIs(1));
   EXPECT_EQ(next[0].request.chunk, 2U);
