@@ -5,7 +5,7 @@
 // messages around it take what they take. So more workers need more frames under way to be busy: as many as there are workers, since then a
 // newcomer still waits behind about as much work as behind two frames of two workers. It is bounded
 //   below  by 2, which one or two workers need to render while they combine;
-//   above  by kMostInWindow: more of them win little (docs/performance.md);
+//   above  by kMostInWindow, so that a frame asked for late does not wait behind many;
 //   and by memory: a worker holds an image, which may be as large as the frame, for every unfinished group, at most kWindowBytes of
 //          them in all where 2 are not more.
 // Teams (common/planning/team.h) have a window each.
