@@ -7,6 +7,7 @@
 
 #include "client/experiment/experiment.h"
 #include "client/experiment/figures.h"
+#include "client/experiment/learnt_layouts.h"
 #include "client/experiment/machines.h"
 #include "client/experiment/plots.h"
 #include "client/experiment/policies.h"
@@ -16,7 +17,6 @@
 #include "common/planning/assignment.h"
 #include "common/planning/balance.h"
 #include "common/planning/policy_names.h"
-#include "coordinator/layout_table.h"
 
 namespace slabstream {
 namespace {
@@ -85,32 +85,26 @@ Json MovingKey(const BenchCase& volume, const Moving& moving, int pixels, int fr
 
 Result<Json> MeasureMoving(ExperimentContext& context, const Balance& balance, const BenchCase& volume, const Moving& moving, int frames) {
   FrameCase frame = balance.Frame(volume, moving.policy, kTableWorkers);
-  const Result<LayoutKnowledge> knowledge = KnowLayout(context, frame);
-  if (!knowledge.ok()) return knowledge.status();
-  FrameRequest request;
-  request.renderer = frame.volume.renderer;
-  request.policy = frame.policy;
-  LayoutTable layouts;
+  Result<LearntLayouts> layouts = LearntLayouts::Make(context, frame);
+  if (!layouts.ok()) return layouts.status();
+  const LayoutKnowledge& knowledge = layouts->knowledge();
   Layout layout;
   Json numbers = {{"imbalance", Json::array()}, {"slowest_ms", Json::array()}, {"moved_bytes", Json::array()}};
   for (int i = 0; i < frames; ++i) {
     frame.view = BenchView(Projection::kOrthographic, i, kMovingFrames);
-    Layout next = layouts.Find({&request, kPlannedDataset, knowledge->volume.summary.get(), &knowledge->transfer, knowledge->occupied,
-                                std::uint32_t(frame.workers), CostModel().slab_bytes_target});
-    const double moved = i == 0 ? 0 : double(MovedVoxels(layout, next)) * VoxelBytes(*knowledge);
-    layout = std::move(next);
+    const Layout& next = layouts->Next();
+    const double moved = i == 0 ? 0 : double(MovedVoxels(layout, next)) * VoxelBytes(knowledge);
+    layout = next;
     const Result<FramePlan> plan = PlanOf(context, frame, layout);
     if (!plan.ok()) return plan.status();
     const std::vector<Placement> placements = PlacementsOf(*plan);
     std::vector<double> seconds(std::size_t(frame.workers));
-    std::vector<RankReport> reports(placements.size());
-    const std::vector<BoxCost> costs = MeasureBoxCosts(*knowledge->volume.volume, *plan, kRenderings);
-    for (std::size_t box = 0; box < costs.size(); ++box) {
-      seconds[placements[box].worker - 1] += costs[box].seconds;
-      reports[box].box = placements[box].id;
-      reports[box].stage_ns[std::size_t(Stage::kRender)] = std::int64_t(costs[box].seconds * 1e9);
+    std::vector<std::int64_t> nanoseconds;
+    for (const BoxCost& cost : MeasureBoxCosts(*knowledge.volume.volume, *plan, kRenderings)) {
+      seconds[placements[nanoseconds.size()].worker - 1] += cost.seconds;
+      nanoseconds.push_back(std::int64_t(cost.seconds * 1e9));
     }
-    layouts.Learn(*plan, request.policy, reports);
+    layouts->Learn(*plan, nanoseconds);
     numbers["imbalance"].push_back(Imbalance(seconds));
     numbers["slowest_ms"].push_back(*std::ranges::max_element(seconds) * 1e3);
     numbers["moved_bytes"].push_back(moved);

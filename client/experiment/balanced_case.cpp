@@ -1,8 +1,8 @@
 #include "client/experiment/balanced_case.h"
 
+#include "client/experiment/learnt_layouts.h"
 #include "client/lab/box_costs.h"
 #include "common/planning/policy_names.h"
-#include "coordinator/layout_table.h"
 
 namespace slabstream {
 namespace {
@@ -20,48 +20,8 @@ Json BalancedKey(const FrameCase& frame) {
   return key;
 }
 
-// Layouts from frame to frame. What is learnt decides them, so that they come again when it is told again.
-class Layouts {
- public:
-  static Result<Layouts> Make(ExperimentContext& context, const FrameCase& frame) {
-    Result<LayoutKnowledge> knowledge = KnowLayout(context, frame);
-    if (!knowledge.ok()) return knowledge.status();
-    return Layouts(*std::move(knowledge), frame);
-  }
-
-  const Layout& Next() {
-    FrameRequest request;
-    request.renderer = renderer_;
-    request.policy = policy_;
-    return table_.Find({&request, kPlannedDataset, knowledge_.volume.summary.get(), &knowledge_.transfer, knowledge_.occupied, slots_,
-                        CostModel().slab_bytes_target});
-  }
-  // `nanoseconds` by placement.
-  void Learn(const FramePlan& plan, const std::vector<std::int64_t>& nanoseconds) {
-    std::vector<RankReport> reports;
-    for (const GroupPlan& group : plan.groups) {
-      for (const Placement& placement : group.placements) {
-        RankReport& report = reports.emplace_back();
-        report.box = placement.id;
-        report.stage_ns[std::size_t(Stage::kRender)] = nanoseconds.at(reports.size() - 1);
-      }
-    }
-    table_.Learn(plan, policy_, reports);
-  }
-
- private:
-  Layouts(LayoutKnowledge knowledge, const FrameCase& frame)
-      : knowledge_(std::move(knowledge)), renderer_(frame.volume.renderer), policy_(frame.policy), slots_(std::uint32_t(frame.workers)) {}
-
-  LayoutKnowledge knowledge_;
-  RendererKind renderer_;
-  Policy policy_;
-  std::uint32_t slots_;
-  LayoutTable table_;
-};
-
 Result<Json> MeasureBalanced(ExperimentContext& context, const FrameCase& frame) {
-  Result<Layouts> layouts = Layouts::Make(context, frame);
+  Result<LearntLayouts> layouts = LearntLayouts::Make(context, frame);
   if (!layouts.ok()) return layouts.status();
   Json learnt = Json::array();
   for (int i = 0; i < kBalancedFrames; ++i) {
@@ -93,7 +53,7 @@ Result<std::vector<MeasuredFrame>> RecallBalanced(ExperimentContext& context, co
   const FrameCase balanced = Balanced(frame);
   std::vector<MeasuredFrame> frames;
   for (const Json* repeat : context.log().All(BalancedKey(balanced))) {
-    Result<Layouts> layouts = Layouts::Make(context, balanced);
+    Result<LearntLayouts> layouts = LearntLayouts::Make(context, balanced);
     if (!layouts.ok()) return layouts.status();
     for (const Json& learnt : repeat->at("learnt")) {
       const Result<FramePlan> plan = PlanOf(context, balanced, layouts->Next());
