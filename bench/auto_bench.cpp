@@ -26,6 +26,7 @@
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
 #include "common/planning/learnt_cost.h"
+#include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
 #include "common/planning/render_work.h"
 #include "common/simulation/simulate_frames.h"
@@ -92,8 +93,7 @@ class Truth {
  public:
   Truth(const Options& options, const Subject& subject, const FrameSetup& setup, const OccupancyGrid& grid, const MachineModel& machine,
         int workers)
-      : options_(options), subject_(subject), setup_(setup), grid_(grid), machine_(machine) {
-    for (int i = 1; i <= workers; ++i) roster_.slots.push_back(WorkerId(i));
+      : options_(options), subject_(subject), setup_(setup), grid_(grid), machine_(machine), roster_(RosterOf(std::uint32_t(workers))) {
     picture_ = MeasurePictureCost(*subject.volume, setup, options.repeats);
   }
 

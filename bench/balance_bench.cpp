@@ -17,6 +17,7 @@
 #include "common/planning/assignment.h"
 #include "common/planning/balance.h"
 #include "common/planning/learnt_cost.h"
+#include "common/planning/placement.h"
 #include "common/planning/render_work.h"
 #include "common/simulation/simulate_frames.h"
 #include "common/volume/sphere.h"
@@ -51,8 +52,7 @@ FramePlan MakePlan(const Options& options, const VolumeSummary& summary, int vie
   request.view = {.azimuth_degrees = options.azimuth + 360.0 * view / options.views, .elevation_degrees = options.elevation};
   request.transfer.choice = options.preset;
   request.policy = options.policy;
-  Roster roster;
-  for (int slot = 1; slot <= (layout == nullptr ? 1 : options.slots); ++slot) roster.slots.push_back(WorkerId(slot));
+  const Roster roster = RosterOf(layout == nullptr ? 1 : std::uint32_t(options.slots));
   return PlanFrame(request, 1, summary, roster, {}, layout).value();
 }
 

@@ -16,6 +16,7 @@
 #include "client/lab/validate.h"
 #include "common/base/check.h"
 #include "common/base/large_buffers.h"
+#include "common/planning/placement.h"
 #include "common/simulation/cost_fit.h"
 
 namespace slabstream {
@@ -61,9 +62,7 @@ void AddSamples(const BenchCase& c, const Volume& volume, const BenchOptions& op
         BenchRequest(c, BenchView(view % 2 == 0 ? Projection::kOrthographic : Projection::kPerspective, view, options.views),
                      {options.size, options.size});
     for (const int boxes : kBoxCounts) {
-      Roster roster;
-      for (int i = 1; i <= boxes; ++i) roster.slots.push_back(WorkerId(i));
-      const FramePlan plan = PlanFrame(request, 1, summary, roster, CostModel{}).value();
+      const FramePlan plan = PlanFrame(request, 1, summary, RosterOf(std::uint32_t(boxes)), CostModel{}).value();
       for (const BoxCost& box : MeasureFrameCosts(volume, plan, options.repeats).boxes) {
         if (box.seconds > 0) samples.push_back(SampleOf(box, plan.setup.camera));
       }

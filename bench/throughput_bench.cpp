@@ -21,6 +21,7 @@
 #include "client/lab/frame_costs.h"
 #include "common/base/large_buffers.h"
 #include "common/classification/count_occupied.h"
+#include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
 #include "common/planning/team.h"
 #include "common/simulation/simulate_frames.h"
@@ -71,15 +72,9 @@ struct Planned {
   double all = 0, most = 0;  // render seconds: of all boxes, of the worker that has most
 };
 
-Roster RosterOf(int workers) {
-  Roster roster;
-  for (int i = 1; i <= workers; ++i) roster.slots.push_back(WorkerId(i));
-  return roster;
-}
-
 // The frame after `frames` of them.
 Planned Plan(const Subject& subject, const Policy& policy, int workers, int frames, int repeats) {
-  const Roster roster = RosterOf(workers);
+  const Roster roster = RosterOf(std::uint32_t(workers));
   FrameRequest request = subject.request;
   request.policy = policy;
   LayoutTable layouts;
@@ -134,7 +129,7 @@ struct Flow {
 Flow Simulate(const FramePlan& plan, const FrameCosts& costs, const MachineModel& machine, bool paper, int teams) {
   FrameInput input = costs.Input(plan);
   if (paper) input.finish_seconds = input.receive_seconds = 0;
-  const Roster everybody = RosterOf(int(plan.slots) * teams);
+  const Roster everybody = RosterOf(plan.slots * std::uint32_t(teams));
   std::vector<FramePlan> plans;
   for (std::size_t turn = 0; turn < everybody.slots.size(); ++turn) {
     const Team team = TeamOf(everybody, std::uint32_t(teams), turn);
@@ -199,7 +194,8 @@ void Run(const Options& options) {
           FrameRequest request = subject.request;
           request.policy = policy;
           request.policy.combine = scheme;
-          const FramePlan plan = PlanFrame(request, 1, subject.summary, RosterOf(team), CostModel{}, &planned.plan.layout).value();
+          const FramePlan plan =
+              PlanFrame(request, 1, subject.summary, RosterOf(std::uint32_t(team)), CostModel{}, &planned.plan.layout).value();
           const Flow flow = Simulate(plan, planned.costs, machine, link == "pvs", options.workers / team);
           fmt::print(
               "  {:7} {:12}: T1 {:.3f} ms, picture to picture {:.3f} ms, efficiency {:5.1f} %; busiest render {:.3f}, combine {:.3f}, "

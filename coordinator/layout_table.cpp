@@ -7,25 +7,21 @@
 
 #include "common/planning/balance.h"
 #include "common/planning/policy_names.h"
+#include "coordinator/learning_table.h"
 
 namespace slabstream {
 namespace {
 
-// Rendering of each box; what is done once a slab is no cost of the next frame.
+// Of each box that was rendered.
 std::map<BoxId, double> SecondsOf(const Layout& layout, std::span<const RankReport> reports) {
   std::map<BoxId, double> seconds;
   for (const RankReport& report : reports) {
-    const auto stage = [&report](Stage s) { return report.stage_ns[std::size_t(s)]; };
     // What travels with a picture tells of no box.
-    if (stage(Stage::kRender) <= 0 || report.box >= layout.owners.size() || layout.owners[report.box] == kNoSlot) continue;
-    seconds[report.box] = 1e-9 * double(std::max<std::int64_t>(stage(Stage::kRender) - stage(Stage::kPrepare), 0));
+    if (report.stage_ns[std::size_t(Stage::kRender)] <= 0 || report.box >= layout.owners.size() || layout.owners[report.box] == kNoSlot)
+      continue;
+    seconds[report.box] = 1e-9 * double(LastingRenderNs(report));
   }
   return seconds;
-}
-
-template <class List>
-void KeepFirst(List& list, std::size_t count) {
-  while (list.size() > count) list.pop_back();
 }
 
 }  // namespace

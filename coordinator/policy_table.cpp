@@ -7,26 +7,21 @@
 #include <utility>
 
 #include "common/planning/policy_names.h"
+#include "coordinator/learning_table.h"
 
 namespace slabstream {
 namespace {
 
 constexpr double kLeastFactor = 0.1, kMostFactor = 10;  // a frame says that rendering takes longer by
 
-// Of the worker with most to do; what is done once a slab is no cost of the next frame.
+// Of the worker with most to do.
 double RenderSeconds(std::span<const RankReport> reports) {
   std::map<std::uint32_t, std::int64_t> by_worker;
   std::int64_t most = 0;
   for (const RankReport& report : reports) {
-    const auto stage = [&report](Stage s) { return report.stage_ns[std::size_t(s)]; };
-    most = std::max(most, by_worker[report.worker] += std::max<std::int64_t>(stage(Stage::kRender) - stage(Stage::kPrepare), 0));
+    most = std::max(most, by_worker[report.worker] += LastingRenderNs(report));
   }
   return 1e-9 * double(most);
-}
-
-template <class List>
-void KeepFirst(List& list, std::size_t count) {
-  while (list.size() > count) list.pop_back();
 }
 
 }  // namespace

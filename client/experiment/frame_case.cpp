@@ -13,6 +13,7 @@
 #include "client/lab/frame_costs.h"
 #include "common/base/check.h"
 #include "common/planning/frame_window.h"
+#include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
 #include "common/planning/team.h"
 #include "common/tuning/choose_policy.h"
@@ -24,12 +25,6 @@ namespace {
 constexpr int kRenderings = 2;  // of each box, after the first; the faster one counts
 constexpr int kWarmUpFrames = 2, kFinishes = 3;
 constexpr int kLearningFrames = 8;  // to warm up with dynamic balance
-
-Roster RosterOf(int workers) {
-  Roster roster;
-  for (int i = 1; i <= workers; ++i) roster.slots.push_back(WorkerId(i));
-  return roster;
-}
 
 FrameRequest RequestOf(const FrameCase& frame) {
   FrameRequest request = BenchRequest(frame.volume, frame.view, frame.size);
@@ -218,7 +213,7 @@ Result<FramePlan> PlanOf(ExperimentContext& context, const FrameCase& frame, con
   if (Status status = Validate(request); !status.ok()) return status;
   const Result<VolumeInUse> volume = context.volumes().Get(frame.volume);
   if (!volume.ok()) return volume.status();
-  return PlanFrame(request, kPlannedDataset, *volume->summary, RosterOf(frame.workers), CostModel{}, &layout);
+  return PlanFrame(request, kPlannedDataset, *volume->summary, RosterOf(std::uint32_t(frame.workers)), CostModel{}, &layout);
 }
 
 Result<FrameCase> WithChosenPolicy(ExperimentContext& context, FrameCase frame, const LinkModel& link) {
@@ -356,7 +351,7 @@ void FillImages(MeasuredFrame& frame) {
 }
 
 Result<Timeline> Simulate(const MeasuredFrame& frame, const MachineModel& machine, int frames, int in_flight, bool keep_spans, int teams) {
-  const Roster everybody = RosterOf(int(frame.plan.slots) * teams);
+  const Roster everybody = RosterOf(frame.plan.slots * std::uint32_t(teams));
   std::vector<FramePlan> plans;  // as many as there are different ones
   for (std::size_t turn = 0; turn < std::min(std::size_t(frames), everybody.slots.size()); ++turn) {
     const Team team = TeamOf(everybody, std::uint32_t(teams), turn);

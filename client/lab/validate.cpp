@@ -10,6 +10,7 @@
 #include "client/lab/calibrate.h"
 #include "client/lab/frame_costs.h"
 #include "client/lab/thread_time.h"
+#include "common/planning/placement.h"
 
 namespace slabstream {
 namespace {
@@ -109,8 +110,7 @@ Result<ValidationRow> ValidateSimulation(const ValidationCase& what, const Valid
   const std::vector<FrameRequest> requests = Views(what, options.views);
   Result<MachineModel> machine = CalibrateThisHost(what.workers);
   if (!machine.ok()) return machine.status();
-  Roster roster;
-  for (int i = 1; i <= what.workers; ++i) roster.slots.push_back(WorkerId(i));
+  const Roster roster = RosterOf(std::uint32_t(what.workers));
   const VolumeSummary summary = Summarize(*what.volume);
   for (const FrameRequest& request : requests) {
     const Result<FramePlan> plan = PlanFrame(request, 1, summary, roster, CostModel{});

@@ -60,6 +60,12 @@ Rank RootOf(const GroupPlan& group, WorkerId display) {
   return root == group.placements.end() ? 0 : Rank(root - group.placements.begin());
 }
 
+Roster RosterOf(std::uint32_t workers) {
+  Roster roster;
+  for (WorkerId worker = 1; worker <= workers; ++worker) roster.slots.push_back(worker);
+  return roster;
+}
+
 std::vector<WorkerId> OwnersOf(const Layout& layout, const Roster& roster) {
   const std::vector<WorkerId> present = Present(roster);
   std::vector<WorkerId> owners(layout.owners.size());

@@ -5,6 +5,9 @@
 
 namespace slabstream {
 
+// Workers 1 ... `workers`, one a slot: what plans are made for that no service runs.
+Roster RosterOf(std::uint32_t workers);
+
 // Groups of `plan.slots` boxes of its layout that show something, in visibility order; at least one group.
 void PlaceBoxes(FramePlan& plan);
 

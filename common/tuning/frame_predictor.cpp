@@ -75,9 +75,9 @@ FramePredictor::FramePredictor(const FrameSetup& setup, const OccupancyGrid& occ
       estimator_(setup, occupied, learnt, cost, pixel_side_),
       finish_seconds_(FinishSeconds(setup)),
       receive_seconds_(kReceivePixel * PicturePixels(setup)),
-      machine_(WithCoarsePixels(machine, pixel_side_)) {
+      machine_(WithCoarsePixels(machine, pixel_side_)),
+      roster_(RosterOf(slots)) {
   CHECK_GE(slots, 1U);
-  for (WorkerId worker = 1; worker <= slots; ++worker) roster_.slots.push_back(worker);
 }
 
 FramePredictor::Prepared FramePredictor::Prepare(Layout layout) const {
@@ -88,11 +88,9 @@ FramePredictor::Prepared FramePredictor::Prepare(Layout layout) const {
   plan.slots = slots_;
   PlaceBoxes(plan);
   prepared.boxes.resize(plan.layout.owners.size());
-  for (const GroupPlan& group : plan.groups) {
-    for (const Placement& placement : group.placements) {
-      BoxEstimator::Estimate& box = prepared.boxes[placement.id] = estimator_.Of(placement.box);
-      box.seconds *= render_scale_;
-    }
+  for (const Placement& placement : PlacementsOf(plan)) {
+    BoxEstimator::Estimate& box = prepared.boxes[placement.id] = estimator_.Of(placement.box);
+    box.seconds *= render_scale_;
   }
   return prepared;
 }

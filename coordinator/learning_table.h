@@ -1,0 +1,24 @@
+// What the tables that learn from finished frames have in common.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+
+#include "common/stats/report.h"
+
+namespace slabstream {
+
+// Of a list whose entries were asked for last first.
+template <class List>
+void KeepFirst(List& list, std::size_t count) {
+  while (list.size() > count) list.pop_back();
+}
+
+// Rendering without what is done once a slab, which is no cost of the next frame. 0: none is reported.
+inline std::int64_t LastingRenderNs(const RankReport& report) {
+  const auto stage = [&report](Stage s) { return report.stage_ns[std::size_t(s)]; };
+  return std::max<std::int64_t>(stage(Stage::kRender) - stage(Stage::kPrepare), 0);
+}
+
+}  // namespace slabstream
