@@ -102,5 +102,35 @@ TEST(Lattice, IsBoundedForAnyGrid) {
   }
 }
 
+TEST(Lattice, FindsFirstSamplesOfEvenlySpacedPlaces) {
+  const unsigned seed = 24;
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  for (int i = 0; i < 500; ++i) {
+    const double scale = std::pow(10, 2 * uniform(random) - 1), offset = 400 * uniform(random) - 200;
+    const Lattice lattice = MakeLattice(scale, offset, 1.5 + 4 * uniform(random));
+    const auto begin = std::int32_t(random() % 100), end = begin + std::int32_t(random() % 300);
+    const std::int64_t stride = (1 + std::int64_t(random() % 20)) << 32, from = (std::int64_t(random() % 400) - 200) << 32;
+    FirstSamples samples(lattice, from, stride);
+    for (int n = 0; n < 60; ++n, samples.Next()) {
+      const std::int64_t place = from + n * stride;
+      const std::int32_t first = samples.In(begin, end);
+      ASSERT_TRUE(first >= begin && first <= end);
+      if (first > begin) {
+        ASSERT_LT(lattice.At(first - 1), place) << "seed " << seed << " case " << i << ", " << n;
+      }
+      if (first < end) {
+        ASSERT_GE(lattice.At(first), place) << "seed " << seed << " case " << i << ", " << n;
+      }
+    }
+  }
+  FirstSamples still({.start = 0, .step = 0}, -5, 3);  // every sample lies at 0
+  EXPECT_EQ(still.In(2, 9), 2);
+  still.Next();
+  EXPECT_EQ(still.In(2, 9), 2);
+  still.Next();
+  EXPECT_EQ(still.In(2, 9), 9);
+}
+
 }  // namespace
 }  // namespace slabstream

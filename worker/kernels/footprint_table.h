@@ -10,6 +10,7 @@
 // Places are counted in fixed point, 32 bits behind the binary point (Lattice): exact from sample to sample and the same everywhere.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include "common/base/aligned_buffer.h"
@@ -44,6 +45,31 @@ struct Lattice {
 // Of samples at column i + 0.5 = scale * u + offset, for a footprint of this radius. Whatever lies farther than 2^30 voxels away is moved
 // there.
 Lattice MakeLattice(double scale, double offset, double radius);
+
+// The first sample i with At(i) at or beyond a place, for one evenly spaced place after the other: additions after two divisions.
+class FirstSamples {
+ public:
+  FirstSamples(const Lattice& lattice, std::int64_t place, std::int64_t stride);
+
+  // Of the place at hand, in [begin, end].
+  std::int32_t In(std::int32_t begin, std::int32_t end) const {
+    if (step_ <= 0) return sample_ <= 0 ? begin : end;
+    return std::int32_t(std::clamp<std::int64_t>(sample_, begin, end));
+  }
+  void Next() {
+    sample_ += stride_samples_;
+    beyond_ += stride_beyond_;
+    if (step_ > 0 && beyond_ >= step_) {
+      beyond_ -= step_;
+      ++sample_;
+    }
+  }
+
+ private:
+  std::int64_t step_;                                    // samples that stand still: sample_ is how far away the place is
+  std::int64_t sample_ = 0, beyond_ = 0;                 // ceil(distance / step); distance + step - 1 is sample_ * step + beyond_
+  std::int64_t stride_samples_ = 0, stride_beyond_ = 0;  // likewise of the stride, rounded down
+};
 
 // The first sample i with At(i) at or beyond `place`, in [begin, end].
 std::int32_t FirstSampleAt(const Lattice& lattice, std::int64_t place, std::int32_t begin, std::int32_t end);

@@ -8,7 +8,9 @@
 
 #include <hwy/contrib/math/math-inl.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <span>
 
 #include "common/base/aligned_buffer.h"
@@ -50,7 +52,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 void FillTable(const Shading& shading, std::span<const Vec3> lights, const Vec3& to_viewer, PhongFactors* factors) {
   const hn::CappedTag<float, 16> d;
   const CodedNormals& normals = AllNormals();
-  const auto zero = hn::Zero(d), least = hn::Set(d, 1e-30F);
+  // Most normals are far from a highlight: what is less than 1e-9 of it counts as nothing, and is not computed.
+  const auto zero = hn::Zero(d), least = hn::Set(d, float(std::max(std::exp(std::log(1e-9) / shading.shininess), 1e-30)));
   const auto shininess = hn::Set(d, shading.shininess);
   for (std::size_t i = 0; i < kPaddedCodes; i += hn::Lanes(d)) {
     const auto x = hn::Load(d, &normals.component[0][i]), y = hn::Load(d, &normals.component[1][i]),
@@ -65,8 +68,10 @@ void FillTable(const Shading& shading, std::span<const Vec3> lights, const Vec3&
       const auto cosine = along(light);
       diffuse = hn::Add(diffuse, hn::Abs(cosine));
       const auto reflected = hn::Sub(hn::Mul(hn::Add(cosine, cosine), viewer), hn::Set(d, float(Dot(light, to_viewer))));  // R.V
+      const auto shines = hn::Gt(reflected, least);
+      if (hn::AllFalse(d, shines)) continue;
       const auto power = hn::Exp(d, hn::Mul(shininess, hn::Log(d, hn::Min(hn::Max(reflected, least), hn::Set(d, 1.0F)))));
-      specular = hn::Add(specular, hn::IfThenElse(hn::Gt(reflected, least), power, zero));
+      specular = hn::Add(specular, hn::IfThenElse(shines, power, zero));
     }
     hn::StoreInterleaved2(hn::MulAdd(diffuse, hn::Set(d, shading.diffuse), hn::Set(d, shading.ambient)),
                           hn::Mul(specular, hn::Set(d, shading.specular)), d, &factors[i].diffuse);

@@ -33,12 +33,15 @@ Interval OwnedPixels(const Lattice& lattice, const FootprintTable& footprint, st
 }  // namespace
 
 const FootprintTable& Footprints::Get(double sigma) {
+  if (last_ != nullptr && sigma == last_sigma_) return *last_;
   // Rounded to steps of 1.1 % where it varies, so that a frame needs a few dozen.
   constexpr double kSteps = 64;  // an octave
   const double rounded = std::exp2(std::round(kSteps * std::log2(sigma)) / kSteps);
   auto found = tables_.find(rounded);
   if (found == tables_.end()) found = tables_.emplace(rounded, MakeFootprintTable(rounded, kFootprintCut)).first;
-  return found->second;
+  last_sigma_ = sigma;
+  last_ = &found->second;
+  return *last_;
 }
 
 std::int32_t FirstPixelWithTap(const Lattice& lattice, std::int32_t voxel, std::int32_t begin, std::int32_t end) {

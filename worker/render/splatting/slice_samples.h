@@ -23,6 +23,8 @@ class Footprints {
 
  private:
   std::map<double, FootprintTable> tables_;
+  double last_sigma_ = 0;  // asked for, of
+  const FootprintTable* last_ = nullptr;
 };
 
 struct SliceSamples {

@@ -8,8 +8,6 @@
 namespace slabstream {
 namespace {
 
-constexpr std::int32_t kSegmentFloats = 4 * kSegment;
-
 // Occupied voxels of an octet, by its mask: the basic x86-64 instruction set has no such instruction.
 constexpr auto kOctetCount = [] {
   std::array<std::uint8_t, 1 << kOctet> counts{};
@@ -42,7 +40,8 @@ SplatBand::SplatBand(const SplatPass& pass, std::int32_t y_begin, std::int32_t y
       words_(SegmentWords(segments_)),
       opaque_alpha_(pass.setup.termination > 0 ? float(1 - pass.setup.termination) : 2.0F),
       open_(std::size_t(y_end - y_begin) * std::size_t(words_)),
-      owned_(std::size_t(words_)) {
+      owned_(std::size_t(words_)),
+      nothing_(std::size_t(words_)) {
   static_assert(kOcclusionTile % kSegment == 0);
   for (std::int32_t row = y_begin; row < y_end; ++row) {
     Insert(Open(row), 0, segments_);
@@ -181,70 +180,49 @@ void SplatBand::ShadeAndFilter(const SliceSamples& slice) {
       if (any_filled_[std::size_t(beam - first_beam_)] == 0) continue;
       const float* voxel_0 = ShadedBeam(beam) + 4 * std::ptrdiff_t{margin_ - pass_.first_octet * kOctet};
       FilterBeam(*slice.along_u, slice.columns, {voxel_0, FilteredBeam(beam), &filled_[BeamWord(beam)], words_, pass_.bounds.x_begin});
+      ClearForeignSamples(slice, beam);
     }
     ClearOctets(octets);
     clock_.Charge(Stage::kSplat);
   }
 }
 
+// Segments at the box's sides hold samples that belong to others: there the beam holds nothing, so that rows are left as they are.
+void SplatBand::ClearForeignSamples(const SliceSamples& slice, std::int32_t beam) {
+  const SegmentWord* filled = &filled_[BeamWord(beam)];
+  const auto clear = [&](std::int32_t begin, std::int32_t end) {  // pixels of one segment, from `bounds` on
+    if (begin == end || !AnyOf(filled, begin / kSegment, begin / kSegment + 1)) return;
+    std::fill(FilteredBeam(beam) + 4 * std::ptrdiff_t{begin}, FilteredBeam(beam) + 4 * std::ptrdiff_t{end}, 0.0F);
+  };
+  const std::int32_t left = slice.owned.x_begin - pass_.bounds.x_begin, right = slice.owned.x_end - pass_.bounds.x_begin;
+  clear(left / kSegment * kSegment, left);
+  clear(right, (right + kSegment - 1) / kSegment * kSegment);
+}
+
 void SplatBand::CompositeRows(const SliceSamples& slice) {
-  const std::int32_t taps = slice.along_v->taps;
-  const bool cut = slice.owned.x_begin % kSegment != 0 || slice.owned.x_end % kSegment != 0;
+  const std::int32_t taps = slice.along_v->taps, end_beam = first_beam_ + beam_count_;
+  row_beams_.resize(std::size_t(taps));
+  row_filled_.resize(std::size_t(taps));
   for (std::int32_t row = rows_.begin; row < rows_.end; ++row) {
     const std::int64_t at = slice.rows.At(row);
     const std::int32_t first = Lattice::First(at);
-    // Of its taps, those on beams that there are.
-    const std::int32_t begin = std::max(first, first_beam_), end = std::min(first + taps, first_beam_ + beam_count_);
-    if (begin >= end) continue;
-    const auto filled = std::span<const std::uint8_t>(any_filled_).subspan(std::size_t(begin - first_beam_), std::size_t(end - begin));
-    if (std::ranges::find(filled, 1) == filled.end()) continue;
-    row_beams_.clear();
-    row_filled_.clear();
-    for (std::int32_t beam = begin; beam < end; ++beam) {
-      row_beams_.push_back(FilteredBeam(beam));
-      row_filled_.push_back(&filled_[BeamWord(beam)]);
+    bool any = false;
+    for (std::int32_t n = 0; n < taps; ++n) {
+      const std::int32_t beam = first + n;
+      const bool is_filled = beam >= first_beam_ && beam < end_beam && any_filled_[std::size_t(beam - first_beam_)] != 0;
+      row_beams_[std::size_t(n)] = is_filled ? FilteredBeam(beam) : filtered_.data();
+      row_filled_[std::size_t(n)] = is_filled ? &filled_[BeamWord(beam)] : nothing_.data();
+      any |= is_filled;
     }
-    RowWork work;
-    work.taps = end - begin;
-    work.weights = &slice.along_v->weights[Lattice::Phase(at) * std::size_t(taps) + std::size_t(begin - first)];
-    work.beams = row_beams_.data();
-    work.filled = row_filled_.data();
-    work.accumulated = &image_.rgba[4 * std::size_t(row - pass_.bounds.y_begin) * std::size_t(pass_.bounds.width())];
-    work.open = Open(row);
-    work.words = words_;
-    work.opaque_alpha = opaque_alpha_;
-    if (cut) {
-      CompositeCutRow(slice, work);
-    } else {
-      CompositeRow(work);
-    }
-  }
-}
-
-// Where the box owns a part of a segment, what belongs to others is put back.
-void SplatBand::CompositeCutRow(const SliceSamples& slice, const RowWork& work) {
-  struct Cut {
-    std::int32_t segment = 0, begin = 0, end = 0;  // pixels of the segment that are not owned
-    bool open = false;
-    std::array<float, kSegmentFloats> kept{};
-  };
-  const std::int32_t left = slice.owned.x_begin - pass_.bounds.x_begin, right = slice.owned.x_end - pass_.bounds.x_begin;
-  std::array<Cut, 2> cuts = {Cut{left / kSegment, 0, left % kSegment}, Cut{right / kSegment, right % kSegment, kSegment}};
-  if (right % kSegment == 0) cuts[1] = {0, 0, 0};
-  for (Cut& cut : cuts) {
-    // Most rows of a slice have nothing at the box's sides.
-    const auto fills = [&cut](const SegmentWord* filled) { return AnyOf(filled, cut.segment, cut.segment + 1); };
-    if (std::none_of(work.filled, work.filled + work.taps, fills)) cut.begin = cut.end;
-    if (cut.begin == cut.end) continue;
-    cut.open = AnyOf(work.open, cut.segment, cut.segment + 1);
-    std::copy_n(work.accumulated + std::ptrdiff_t{cut.segment} * kSegmentFloats, kSegmentFloats, cut.kept.begin());
-  }
-  CompositeRow(work);
-  for (const Cut& cut : cuts) {
-    if (cut.begin == cut.end) continue;
-    float* segment = work.accumulated + std::ptrdiff_t{cut.segment} * kSegmentFloats;
-    std::copy(cut.kept.begin() + 4 * cut.begin, cut.kept.begin() + 4 * cut.end, segment + 4 * cut.begin);
-    if (cut.open) Insert(work.open, cut.segment, cut.segment + 1);  // whether it is opaque was judged with what does not belong here
+    if (!any) continue;
+    CompositeRow({.taps = taps,
+                  .weights = &slice.along_v->weights[Lattice::Phase(at) * std::size_t(taps)],
+                  .beams = row_beams_.data(),
+                  .filled = row_filled_.data(),
+                  .accumulated = &image_.rgba[4 * std::size_t(row - pass_.bounds.y_begin) * std::size_t(pass_.bounds.width())],
+                  .open = Open(row),
+                  .words = words_,
+                  .opaque_alpha = opaque_alpha_});
   }
 }
 

@@ -38,8 +38,8 @@ class SplatBand {
   void FindOctets(std::int32_t beam);
   void PrefetchCells(std::int32_t slice, std::int32_t beam) const;
   void ShadeAndFilter(const SliceSamples& slice);
+  void ClearForeignSamples(const SliceSamples& slice, std::int32_t beam);
   void CompositeRows(const SliceSamples& slice);
-  void CompositeCutRow(const SliceSamples& slice, const RowWork& work);
 
   SegmentWord* Open(std::int32_t row) { return &open_[std::size_t(row - y_begin_) * std::size_t(words_)]; }
   std::size_t BeamWord(std::int32_t beam) const { return std::size_t(beam - first_beam_) * std::size_t(words_); }
@@ -63,7 +63,8 @@ class SplatBand {
   SheetOpacity::Slopes slopes_;
   Rows rows_;                                     // that it can touch
   std::int32_t first_beam_ = 0, beam_count_ = 0;  // whose footprints reach them
-  std::vector<SegmentWord> owned_;                // [word]: columns that the box owns
+  std::vector<SegmentWord> owned_;                // [word]: segments of which the box owns a column
+  const std::vector<SegmentWord> nothing_;        // [word]: 0
   std::vector<SegmentWord> needed_;               // [beam][word]: owned, and open in any row that the beam reaches
   std::vector<SegmentWord> filled_;               // [beam][word]: of them, those that the beam's voxels reach
   std::vector<std::uint8_t> any_filled_;          // [beam]: 1 if any of them is
@@ -72,7 +73,7 @@ class SplatBand {
   std::int32_t margin_ = 0, shaded_voxels_ = 0;   // voxels beside the occupied ones; voxels in a row of shaded_
   AlignedVector<float> shaded_;                   // [kShadedBeams][voxel][4]: zero but for the octets at hand
   PooledVector<float> filtered_;                  // [beam][column][4]: of `filled` segments
-  std::vector<const float*> row_beams_;           // scratch of CompositeRows
+  std::vector<const float*> row_beams_;           // [tap]: scratch of CompositeRows
   std::vector<const SegmentWord*> row_filled_;
 };
 

@@ -28,16 +28,19 @@ SplatPass::SplatPass(const OccupiedCells& occupied_cells, const ClassificationTa
 
   first_octet = occupied.begin[u] / kCellVoxels * kCellOctets;
   octet_count = ((occupied.end[u] - 1) / kCellVoxels + 1) * kCellOctets - first_octet;
-  reached.reserve(slices.size() * std::size_t(octet_count));
+  reached.resize(slices.size() * std::size_t(octet_count));
+  SegmentSpan* span = reached.data();
+  constexpr std::int64_t kOctetStride = std::int64_t{kOctet} << 32;
   for (const SliceSamples& slice : slices) {
     const PixelBounds& owned = slice.owned;
-    for (std::int32_t octet = first_octet; octet < first_octet + octet_count; ++octet) {
-      reached.emplace_back();
+    // Of an octet: the first pixel with a tap in it, and the first one beyond it.
+    FirstSamples first(slice.columns, std::int64_t{first_octet * kOctet - slice.along_u->taps + 1} << 32, kOctetStride);
+    FirstSamples last(slice.columns, std::int64_t{(first_octet + 1) * kOctet} << 32, kOctetStride);
+    for (std::int32_t octet = 0; octet < octet_count; ++octet, ++span, first.Next(), last.Next()) {
       if (owned.empty()) continue;
-      const std::int32_t begin =
-          FirstPixelWithTap(slice.columns, octet * kOctet - slice.along_u->taps + 1, owned.x_begin, owned.x_end) - bounds.x_begin;
-      const std::int32_t end = FirstPixelWithTap(slice.columns, (octet + 1) * kOctet, owned.x_begin, owned.x_end) - bounds.x_begin;
-      if (begin < end) reached.back() = MakeSpan(begin / kSegment, (end + kSegment - 1) / kSegment);
+      const std::int32_t begin = first.In(owned.x_begin, owned.x_end) - bounds.x_begin;
+      const std::int32_t end = last.In(owned.x_begin, owned.x_end) - bounds.x_begin;
+      if (begin < end) *span = MakeSpan(begin / kSegment, (end + kSegment - 1) / kSegment);
     }
   }
 }
