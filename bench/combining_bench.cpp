@@ -9,11 +9,14 @@
 // one corner to the other; packed they get smaller than any that are rendered. A line a case: median, 10th and 90th percentile in
 // milliseconds, the median until the coordinator knows, and the
 // processor time of all workers for a frame (the making of the pictures left out): where workers outnumber cores, time is not below that
-// over the number of cores. For tcp, first what the system alone takes: one process writes the bytes of a full picture to a plain socket,
-// another reads them, both from and to buffers that they keep; and the processor time of both for the images of p ranks, over the cores.
+// over the number of cores; last, how many times as many pixels are handed over as are filled, which bounds what sparse pictures gain. For
+// tcp and full pictures, first what the system alone takes to move them one after the other: a process writes those of p - 1 ranks to a
+// plain socket, another reads them, from and to memory that both keep.
 #include <arpa/inet.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <pthread.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
@@ -78,14 +81,37 @@ std::int64_t ProcessorNsOf(pid_t process) {
   return ProcessorNs(clock);
 }
 
-LocalImage MakePicture(const Case& config, Rank rank) {
-  PixelBounds bounds = {0, 0, config.size, config.size};
-  if (config.sparse) {
-    const auto side = std::int32_t(std::lround(config.size * std::sqrt(0.2)));
-    const auto at = std::int32_t(std::int64_t(config.size - side) * rank / std::max<Rank>(config.ranks - 1, 1));
-    bounds = {at, at, at + side, at + side};
+PixelBounds BoundsOf(const Case& config, Rank rank) {
+  if (!config.sparse) return {0, 0, config.size, config.size};
+  const auto side = std::int32_t(std::lround(config.size * std::sqrt(0.2)));
+  const auto at = std::int32_t(std::int64_t(config.size - side) * rank / std::max<Rank>(config.ranks - 1, 1));
+  return {at, at, at + side, at + side};
+}
+
+// All pixels that the steps hand over, by those of them that are not empty: what was combined fills more than each picture did.
+double PixelsOverFilled(const Case& config, const Schedule& schedule) {
+  const auto size = std::size_t(config.size);
+  std::vector<std::vector<bool>> filled(config.ranks, std::vector<bool>(size * size));
+  for (Rank rank = 0; rank < config.ranks; ++rank) {
+    const PixelBounds bounds = BoundsOf(config, rank);
+    for (auto y = std::size_t(bounds.y_begin); y < std::size_t(bounds.y_end); ++y) {
+      std::fill_n(filled[rank].begin() + std::ptrdiff_t(y * size + std::size_t(bounds.x_begin)), bounds.width(), true);
+    }
   }
-  LocalImage image = MakeUnwrittenImage(PixelFormat::kRgba, bounds);
+  double all = 0, of_them = 0;
+  for (const Step& step : schedule.steps) {
+    for (std::size_t pixel = step.pixels.begin; pixel < step.pixels.end; ++pixel) {
+      ++all;
+      if (!filled[step.from][pixel]) continue;
+      ++of_them;
+      filled[step.to][pixel] = true;
+    }
+  }
+  return all / of_them;
+}
+
+LocalImage MakePicture(const Case& config, Rank rank) {
+  LocalImage image = MakeUnwrittenImage(PixelFormat::kRgba, BoundsOf(config, rank));
   for (std::size_t i = 0; i < image.rgba.size(); ++i) {
     const float alpha = 0.1F + 0.05F * float((i / 4 + rank) % 7);
     image.rgba[i] = i % 4 == 3 ? alpha : alpha * float(i % 5) / 5;
@@ -130,6 +156,7 @@ class PreparedPicture : public Renderer {
 }
 
 struct Times {
+  double pixels_over_filled = 1;
   std::vector<double> combined, reported;  // milliseconds
   double processor = 0;                    // milliseconds a frame, of all workers
 };
@@ -180,6 +207,7 @@ class Coordinator {
     assignment.group.color = config_.color;
     assignment.display = 1;
     Times times;
+    if (config_.ranks > 1) times.pixels_over_filled = PixelsOverFilled(config_, assignment.group.schedule);
     std::int64_t busy_ns = 0;
     for (int i = -kWarmUp; i < repeats; ++i) {
       if (i == 0) busy_ns = BusyNs();
@@ -286,9 +314,10 @@ void RunCase(const Case& config, const std::vector<std::string>& schemes, int re
     Coordinator coordinator(config, directory, shared, workers);
     for (const std::string& scheme : schemes) {
       const Times times = coordinator.Measure(scheme, repeats);
-      fmt::print("{:6} {:5} {:6} p {:3}  {:20} {:8.2f} [{:.2f}, {:.2f}]  reported {:8.2f}  processor {:8.2f}\n", config.link, config.size,
-                 config.sparse ? "sparse" : "full", config.ranks, scheme, Quantile(times.combined, 0.5), Quantile(times.combined, 0.1),
-                 Quantile(times.combined, 0.9), Quantile(times.reported, 0.5), times.processor);
+      fmt::print("{:6} {:5} {:6} p {:3}  {:20} {:8.2f} [{:.2f}, {:.2f}]  reported {:8.2f}  processor {:8.2f}  pixels/filled {:.2f}\n",
+                 config.link, config.size, config.sparse ? "sparse" : "full", config.ranks, scheme, Quantile(times.combined, 0.5),
+                 Quantile(times.combined, 0.1), Quantile(times.combined, 0.9), Quantile(times.reported, 0.5), times.processor,
+                 times.pixels_over_filled);
       (void)std::fflush(stdout);
     }
   }
@@ -297,14 +326,17 @@ void RunCase(const Case& config, const std::vector<std::string>& schemes, int re
   std::filesystem::remove_all(directory);
 }
 
-// Reads pictures of `bytes` bytes from the one connection that comes, answers each with a byte.
-[[noreturn]] void DrainPictures(int listener, std::size_t bytes) {
+// As memory that is kept from frame to frame.
+using Pictures = std::vector<std::vector<std::byte>>;
+
+// Reads pictures into those of `pictures` in turn from the one connection that comes, answers each with a byte.
+[[noreturn]] void DrainPictures(int listener, Pictures pictures) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   const int socket = ::accept(listener, nullptr, nullptr);
-  std::vector<std::byte> picture(bytes);
-  while (true) {
-    for (std::size_t read = 0; read < bytes;) {
-      const ssize_t count = ::recv(socket, picture.data() + read, bytes - read, 0);
+  for (std::size_t i = 0;; ++i) {
+    std::vector<std::byte>& picture = pictures[i % pictures.size()];
+    for (std::size_t read = 0; read < picture.size();) {
+      const ssize_t count = ::recv(socket, picture.data() + read, picture.size() - read, 0);
       if (count <= 0) std::_Exit(0);
       read += std::size_t(count);
     }
@@ -312,9 +344,12 @@ void RunCase(const Case& config, const std::vector<std::string>& schemes, int re
   }
 }
 
-// What the system takes to move pictures between processes. Called before this process has any thread.
-void MeasureLoopback(std::int32_t size, const std::vector<Rank>& ranks, int repeats) {
-  const std::size_t bytes = 4 * sizeof(float) * std::size_t(size) * std::size_t(size);
+// What the system takes to move the pictures of all ranks but one between processes: as many as there are at either end, so that they are
+// in a cache as far as a frame's are, through connections of the workers' kind. Called before this process has any thread.
+void MeasureLoopback(std::int32_t size, Rank ranks, int repeats) {
+  constexpr char kCongestionControl[] = "reno";
+  const std::size_t bytes = 4 * sizeof(float) * std::size_t(size) * std::size_t(size), images = std::max<Rank>(ranks, 2) - 1;
+  const Pictures pictures(images, std::vector<std::byte>(bytes, std::byte{1}));
   sockaddr_in address = {};
   address.sin_family = AF_INET;
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
@@ -324,32 +359,31 @@ void MeasureLoopback(std::int32_t size, const std::vector<Rank>& ranks, int repe
   CHECK_EQ(::getsockname(listener, reinterpret_cast<sockaddr*>(&address), &length), 0);
   const pid_t reader = ::fork();
   CHECK(reader >= 0);
-  if (reader == 0) DrainPictures(listener, bytes);
+  if (reader == 0) DrainPictures(listener, pictures);
   const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
+  CHECK_EQ(::setsockopt(socket, IPPROTO_TCP, TCP_CONGESTION, kCongestionControl, sizeof(kCongestionControl) - 1), 0);
   CHECK_EQ(::connect(socket, reinterpret_cast<sockaddr*>(&address), length), 0);
-  const std::vector<std::byte> picture(bytes, std::byte{1});
   std::vector<double> times;
   const auto busy_ns = [&] { return ProcessorNs(CLOCK_PROCESS_CPUTIME_ID) + ProcessorNsOf(reader); };
   std::int64_t begin_busy_ns = 0;
   for (int i = -kWarmUp; i < repeats; ++i) {
     if (i == 0) begin_busy_ns = busy_ns();
     const std::int64_t begin_ns = NowNs();
-    for (std::size_t written = 0; written < bytes;) {
-      const ssize_t count = ::send(socket, picture.data() + written, bytes - written, 0);
-      CHECK(count > 0);
-      written += std::size_t(count);
+    for (const std::vector<std::byte>& picture : pictures) {
+      for (std::size_t written = 0; written < bytes;) {
+        const ssize_t count = ::send(socket, picture.data() + written, bytes - written, 0);
+        CHECK(count > 0);
+        written += std::size_t(count);
+      }
+      std::byte answer;
+      CHECK_EQ(::recv(socket, &answer, 1, 0), 1);
     }
-    std::byte answer;
-    CHECK_EQ(::recv(socket, &answer, 1, 0), 1);
-    if (i >= 0) times.push_back(double(NowNs() - begin_ns) / 1e6);
+    times.push_back(double(NowNs() - begin_ns) / 1e6);
   }
+  times.erase(times.begin(), times.begin() + kWarmUp);
   const double processor = double(busy_ns() - begin_busy_ns) / 1e6 / repeats;
-  fmt::print("tcp    {:5} loopback copy alone, an image {:8.2f} [{:.2f}, {:.2f}]  processor {:8.2f}", size, Quantile(times, 0.5),
-             Quantile(times, 0.1), Quantile(times, 0.9), processor);
-  for (const Rank count : ranks) {
-    fmt::print("  p {} {:.2f}", count, processor * (count - 1) / std::min(count, std::thread::hardware_concurrency()));
-  }
-  fmt::print("\n");
+  fmt::print("tcp    {:5} full   p {:3}  {:20} {:8.2f} [{:.2f}, {:.2f}]  {:17} processor {:8.2f}\n", size, ranks, "bytes alone",
+             Quantile(times, 0.5), Quantile(times, 0.1), Quantile(times, 0.9), "", processor);
   (void)std::fflush(stdout);  // before the next fork
   ::close(socket);
   ::close(listener);
@@ -385,9 +419,9 @@ int Run(int argc, char** argv) {
   }
   for (const std::string& link : links) {
     for (const std::int32_t size : sizes) {
-      if (link == "tcp") MeasureLoopback(size, ranks, repeats);
       for (const std::string& image : images) {
         for (const Rank count : ranks) {
+          if (link == "tcp" && image == "full") MeasureLoopback(size, count, repeats);
           const pid_t child = ::fork();
           CHECK(child >= 0);
           if (child == 0) {

@@ -46,11 +46,6 @@ Status Guarded(const char* what, Work&& work) {
   }
 }
 
-void AddStage(RankReport& report, Stage stage, std::int64_t begin_ns, std::int64_t end_ns) {
-  report.stage_ns[std::size_t(stage)] += end_ns - begin_ns;
-  if (report.spans.size() < kMaxSpans) report.spans.push_back({stage, begin_ns, end_ns});
-}
-
 // Adds a stretch of time to the report of a message; one of the machine's reports if there is any.
 void AddStage(std::vector<RankReport>& reports, Stage stage, std::int64_t begin_ns, std::int64_t end_ns) {
   if (!reports.empty()) AddStage(reports.back(), stage, begin_ns, end_ns);
@@ -338,39 +333,47 @@ void Executor::Perform(FindHidden&& action) {
   });
 }
 
-// False: the pixels have to travel.
-bool Executor::SendLent(const LocalImage& image, SendPartial& send) {
-  const std::int64_t begin = NowNs();
-  std::optional<Bytes> spans = lent_.Lend(image, ViewOf(image, send.message.pixels, send.frame.width()), send.to, send.message);
-  if (!spans) return false;
-  Post(send, *std::move(spans), begin);
-  return true;
+std::optional<Bytes> Executor::PayloadInPlace(const LocalImage& image, const ImageView& view, const Delivery& delivery, SendPartial& send) {
+  if (delivery.lend) {
+    if (std::optional<Bytes> spans = lent_.Lend(image, view, send.to, send.message)) return spans;
+  }
+  return send.color == ColorCoding::kFloat32 ? PixelsInPlace(image, view, send.message) : std::nullopt;
 }
 
 void Executor::Post(SendPartial& send, Bytes payload, std::int64_t begin_ns) {
-  AddStage(send.message.reports, Stage::kEncode, begin_ns, NowNs());
-  if (!send.message.reports.empty()) send.message.reports.back().image_bytes += payload.size();
+  sent_.Add(send.message.key, send.rank, payload.size(), begin_ns, NowNs());
+  sent_.MoveInto(send.message.key, send.message.reports);
   outbox_.Post(OutgoingPartial{std::move(send.to), Encode(send.message), std::move(payload), send.message.acknowledge});
 }
 
 void Executor::Perform(SendPartial&& action, const Delivery& delivery) {
   std::shared_ptr<LocalImage> image = FindImage(action.image);
   CHECK(image != nullptr) << "image " << action.image << " to send does not exist";
-  // To name memory takes less time than to wake a thread that does.
-  if (delivery.lend && combine_thread_.Idle() && SendLent(*image, action)) return;
-  combine_thread_.Post([this, delivery, image = std::move(image), send = std::move(action)]() mutable {
-    const Status status = Guarded("encode", [&] {
-      if (delivery.lend && SendLent(*image, send)) return Status::Ok();
-      const std::int64_t begin = NowNs();
-      const ImageView view = ViewOf(*image, send.message.pixels, send.frame.width());
-      std::optional<Bytes> payload;
-      if (send.color == ColorCoding::kFloat32) payload = PixelsInPlace(*image, view, send.message);
-      if (!payload) payload = WithAllThreads(combine_arena_, [&] { return EncodePixels(view, send.color, send.message); });
-      Post(send, PackForLink(*std::move(payload), delivery.bytes_per_second, send.message.packed), begin);
-      return Status::Ok();
-    });
-    if (!status.ok()) LogError("partial image not sent: " + status.message());  // the coordinator hands the frame out again when it stalls
-  });
+  const auto view_of = [](const LocalImage& of, const SendPartial& send) { return ViewOf(of, send.message.pixels, send.frame.width()); };
+  std::optional<ImageView> view;
+  std::optional<Bytes> payload;
+  // To say where pixels are takes less time than to wake a thread that does.
+  if (combine_thread_.Idle()) {
+    const std::int64_t begin = NowNs();
+    view = view_of(*image, action);
+    payload = PayloadInPlace(*image, *view, delivery, action);
+    if (payload && !MayPack(delivery.bytes_per_second)) return Post(action, *std::move(payload), begin);
+  }
+  combine_thread_.Post(
+      [=, this, image = std::move(image), view = std::move(view), payload = std::move(payload), send = std::move(action)]() mutable {
+        const Status status = Guarded("encode", [&] {
+          const std::int64_t begin = NowNs();
+          if (!view) {
+            view = view_of(*image, send);
+            payload = PayloadInPlace(*image, *view, delivery, send);
+          }
+          if (!payload) payload = WithAllThreads(combine_arena_, [&] { return EncodePixels(*view, send.color, send.message); });
+          Post(send, PackForLink(*std::move(payload), delivery.bytes_per_second, send.message.packed), begin);
+          return Status::Ok();
+        });
+        if (!status.ok())
+          LogError("partial image not sent: " + status.message());  // the coordinator hands the frame out again when it stalls
+      });
 }
 
 void Executor::Resend(const ImageRefused& refused) {

@@ -28,6 +28,7 @@
 #include "worker/link_rates.h"
 #include "worker/peer_memory.h"
 #include "worker/render/pipeline.h"
+#include "worker/sent_tallies.h"
 #include "worker/thread_share.h"
 #include "worker/worker_machine.h"
 
@@ -69,9 +70,15 @@ class Executor {
   void Perform(SendFrame&& action);
   void Perform(const ReleaseImage& action);
 
-  // What was lent and what is borrowed.
-  LentImages& lent() { return lent_; }
   PeerMemory& peer_memory() { return peer_memory_; }
+  // Adds to reports that leave otherwise than with a PartialImage what the messages of their ranks took.
+  void AddSent(const GroupKey& key, std::vector<RankReport>& reports) { sent_.MoveInto(key, reports); }
+  // Lets go of what was lent and is known of the groups for which `over(key)` is true.
+  template <class Predicate>
+  void Forget(Predicate over) {
+    lent_.Forget(over);
+    sent_.Forget(over);
+  }
   // Sends as runs what was lent, if it still is.
   void Resend(const ImageRefused& refused);
 
@@ -84,7 +91,8 @@ class Executor {
 
   std::shared_ptr<LocalImage> FindImage(ImageHandle image);  // null: no such image
   void MakePicture(LocalImage& image, SendFrame& send, tbb::task_arena& arena);
-  bool SendLent(const LocalImage& image, SendPartial& send);
+  // Of pixels that stay where they are until they are read there, or sent from there. None: they have to be encoded.
+  std::optional<Bytes> PayloadInPlace(const LocalImage& image, const ImageView& view, const Delivery& delivery, SendPartial& send);
   void Post(SendPartial& send, Bytes payload, std::int64_t begin_ns);  // which was made since then
   RenderDone Render(const StartRender& action, Slab& slab, const std::atomic<bool>& cancelled, LocalImage& image);
 
@@ -93,6 +101,7 @@ class Executor {
   std::map<SlabKey, std::shared_ptr<Slab>> slabs_;
   std::map<ImageHandle, std::shared_ptr<LocalImage>> images_;
   LentImages lent_;
+  SentTallies sent_;
   PeerMemory peer_memory_;
   std::optional<RunningRender> last_render_;
   const RendererFactory make_renderer_;

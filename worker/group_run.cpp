@@ -181,7 +181,7 @@ bool GroupRun::TakeStep(Rank rank, std::uint32_t index, WorkerActions& actions) 
   }
   RankState& to = ranks_.at(step.to);
   if (!Ready(to, index)) return false;
-  MoveLocally(from, rank, to, index, actions);
+  MoveLocally(from, to, index, actions);
   return true;
 }
 
@@ -189,18 +189,18 @@ void GroupRun::Send(RankState& from, Rank rank, std::uint32_t index, WorkerActio
   const Step& step = assignment_.group.schedule.steps[index];
   std::erase(from.open_steps, index);
   const std::vector<Fragment> parts = from.fragments.Take(step.pixels);
-  SendFragments(parts, index, assignment_.group.placements[step.to].worker, TakeReports(from, rank), actions);
+  SendFragments(rank, parts, index, assignment_.group.placements[step.to].worker, TakeReports(from), actions);
   ReleaseUnused(parts, actions);
 }
 
-void GroupRun::MoveLocally(RankState& from, Rank rank, RankState& to, std::uint32_t index, WorkerActions& actions) {
+void GroupRun::MoveLocally(RankState& from, RankState& to, std::uint32_t index, WorkerActions& actions) {
   const Step& step = assignment_.group.schedule.steps[index];
   std::erase(from.open_steps, index);
   std::erase(to.open_steps, index);
   const std::vector<Fragment> parts = from.fragments.Take(step.pixels);
   for (const Fragment& part : parts) Merge(to, step.to, {part.pixels, part.ranks, part.image, {}}, actions);
   ReleaseUnused(parts, actions);
-  Append(to.reports, TakeReports(from, rank));
+  Append(to.reports, TakeReports(from));
 }
 
 bool GroupRun::Receive(RankState& to, Rank rank, std::uint32_t index, WorkerActions& actions) {
@@ -290,12 +290,12 @@ void GroupRun::FinishRoot(WorkerActions& actions) {
     return Fail(fmt::format("the schedule is over, but the root holds only {} of {} pixels of all ranks", held, PixelCount(frame_)));
   }
   if (assignment_.display != self_) {
-    SendFragments(parts, std::uint32_t(assignment_.group.schedule.steps.size()), assignment_.display, TakeReports(rank, root), actions);
+    SendFragments(root, parts, std::uint32_t(assignment_.group.schedule.steps.size()), assignment_.display, TakeReports(rank), actions);
     ReleaseUnused(parts, actions);
     return;
   }
   for (const Fragment& part : parts) group_pieces_.waiting.push_back({part.pixels, part.ranks, part.image, {}});
-  Append(group_pieces_.reports, TakeReports(rank, root));
+  Append(group_pieces_.reports, TakeReports(rank));
   group_pieces_.merged = held;
 }
 
@@ -311,8 +311,8 @@ void GroupRun::CollectGroupPiece(const PartialImage& message, Bytes payload) {
   Append(group_pieces_.reports, message.reports);
 }
 
-void GroupRun::SendFragments(const std::vector<Fragment>& fragments, std::uint32_t step, WorkerId to, std::vector<RankReport> reports,
-                             WorkerActions& actions) {
+void GroupRun::SendFragments(Rank rank, const std::vector<Fragment>& fragments, std::uint32_t step, WorkerId to,
+                             std::vector<RankReport> reports, WorkerActions& actions) {
   const Peer* peer = FindPeer(to);
   if (peer == nullptr) return Fail(fmt::format("worker {} takes part in the group but has no endpoint in it", to));
   for (const Fragment& fragment : fragments) {
@@ -323,7 +323,8 @@ void GroupRun::SendFragments(const std::vector<Fragment>& fragments, std::uint32
     message.step = step;
     message.interval = fragment.ranks;
     message.pixels = fragment.pixels;
-    actions.push_back(SendPartial{*peer, std::move(message), fragment.image, FrameBounds(assignment_.setup), assignment_.group.color});
+    actions.push_back(
+        SendPartial{*peer, std::move(message), fragment.image, FrameBounds(assignment_.setup), assignment_.group.color, rank});
   }
   if (!fragments.empty()) std::get<SendPartial>(actions.back()).message.reports = std::move(reports);
 }
@@ -340,12 +341,9 @@ void GroupRun::ReleaseUnused(std::vector<Fragment> taken, WorkerActions& actions
   }
 }
 
-// Reports leave a rank with its last pixels, so that all that the rank combined is in them; its own report comes last, where the executor
-// looks for it.
-std::vector<RankReport> GroupRun::TakeReports(RankState& rank, Rank number) {
-  if (!rank.open_steps.empty()) return {};
-  std::stable_partition(rank.reports.begin(), rank.reports.end(), [&](const RankReport& report) { return report.rank != number; });
-  return std::exchange(rank.reports, {});
+// Reports leave a rank with its last pixels, so that all that the rank combined is in them.
+std::vector<RankReport> GroupRun::TakeReports(RankState& rank) {
+  return rank.open_steps.empty() ? std::exchange(rank.reports, {}) : std::vector<RankReport>();
 }
 
 const Peer* GroupRun::FindPeer(WorkerId worker) const {

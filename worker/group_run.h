@@ -75,7 +75,7 @@ class GroupRun {
   void Advance(WorkerActions& actions);
   bool TakeStep(Rank rank, std::uint32_t step, WorkerActions& actions);
   void Send(RankState& from, Rank rank, std::uint32_t step, WorkerActions& actions);
-  void MoveLocally(RankState& from, Rank rank, RankState& to, std::uint32_t step, WorkerActions& actions);
+  void MoveLocally(RankState& from, RankState& to, std::uint32_t step, WorkerActions& actions);
   bool Receive(RankState& to, Rank rank, std::uint32_t step, WorkerActions& actions);
   void Merge(RankState& to, Rank rank, ImagePiece piece, WorkerActions& actions);
   void Combine(RankState& to, Rank rank, const Fragment& held, const ImagePiece& piece, WorkerActions& actions);
@@ -85,10 +85,10 @@ class GroupRun {
   void Start(StartCombine combine, RankState& to, Rank rank, WorkerActions& actions);
   void FinishRoot(WorkerActions& actions);
   void CollectGroupPiece(const PartialImage& message, Bytes payload);
-  void SendFragments(const std::vector<Fragment>& fragments, std::uint32_t step, WorkerId to, std::vector<RankReport> reports,
+  void SendFragments(Rank rank, const std::vector<Fragment>& fragments, std::uint32_t step, WorkerId to, std::vector<RankReport> reports,
                      WorkerActions& actions);
   void ReleaseUnused(std::vector<Fragment> taken, WorkerActions& actions);
-  std::vector<RankReport> TakeReports(RankState& rank, Rank number);
+  std::vector<RankReport> TakeReports(RankState& rank);
   const Peer* FindPeer(WorkerId worker) const;
   void Fail(std::string why);
 

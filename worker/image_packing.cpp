@@ -43,9 +43,11 @@ CodecSpeed SampleCodec(std::span<const std::byte> payload) {
   return {double(bytes) / seconds, double(small->size()) / double(bytes)};
 }
 
+bool MayPack(double link_bytes_per_second) { return PackingPays(link_bytes_per_second, kFastest); }
+
 Bytes PackForLink(Bytes payload, double link_bytes_per_second, std::optional<PackedRuns>& packed) {
   packed.reset();
-  if (payload.empty() || !PackingPays(link_bytes_per_second, kFastest)) return payload;
+  if (payload.empty() || !MayPack(link_bytes_per_second)) return payload;
   if (!PackingPays(link_bytes_per_second, SampleCodec(payload.span()))) return payload;
   PackedRuns how;
   std::optional<Bytes> small = PackRuns(payload.span(), how);

@@ -34,6 +34,9 @@ bool PackingPays(double link_bytes_per_second, const CodecSpeed& codec);
 // Packs and unpacks a part from the middle of `payload`, the runs of some image.
 CodecSpeed SampleCodec(std::span<const std::byte> payload);
 
+// False: the link is too fast for any payload to be packed.
+bool MayPack(double link_bytes_per_second);
+
 // `payload`, packed if that pays (`packed` says how), otherwise as it is. Takes processor time only where the link may be slow enough.
 Bytes PackForLink(Bytes payload, double link_bytes_per_second, std::optional<PackedRuns>& packed);
 

@@ -53,15 +53,15 @@ std::string HostName() {
 }  // namespace
 
 struct WorkerService::Impl {
-  Impl(Context& service_context, const WorkerConfig& config, bool lend, Compression user_choice, RendererFactory make_renderer,
-       Socket control_socket, Socket images_socket)
+  Impl(Context& service_context, const WorkerConfig& config, Compression user_choice, RendererFactory make_renderer, Socket control_socket,
+       Socket images_socket)
       : context(service_context),
         machine(config),
         control(std::move(control_socket)),
         images(std::move(images_socket)),
         peers(service_context),
         scope(config.memory_scope),
-        lends(lend),
+        lends(config.lends_memory),
         compression(user_choice),
         executor(std::in_place, outbox, user_choice == Compression::kOn ? Codec::kZstd : Codec::kRaw, int(config.threads),
                  std::move(make_renderer)) {}
@@ -80,7 +80,7 @@ struct WorkerService::Impl {
   Delivery DeliveryTo(const Peer& peer) const;
 
   // One for each kind of action.
-  void Perform(SendControl& action) { Send(control, action.message); }
+  void Perform(SendControl& action);
   void Perform(SendChunkRequest& action);
   void Perform(ConnectSlabs& action);
   void Perform(SendPartial& action);
@@ -162,17 +162,17 @@ void WorkerService::Impl::Receive(Socket& socket, const char* plane) {
 void WorkerService::Impl::Remember(const AnyMessage& message) {
   if (const auto* welcome = std::get_if<Welcome>(&message)) {
     if (std::exchange(epoch, welcome->epoch) == welcome->epoch) return;
-    executor->lent().Forget([](const GroupKey&) { return true; });
+    executor->Forget([](const GroupKey&) { return true; });
     takes_frames_only.clear();
     endpoints.clear();
     links.ForgetAll();
   } else if (const auto* ping = std::get_if<Ping>(&message); ping != nullptr && ping->epoch == epoch) {
-    executor->lent().Forget([&](const GroupKey& key) {
+    executor->Forget([&](const GroupKey& key) {
       return key.frame < ping->finished_before || std::ranges::find(ping->cancelled, key.frame) != ping->cancelled.end();
     });
   } else if (const auto* assignment = std::get_if<GroupAssignment>(&message); assignment != nullptr && assignment->epoch == epoch) {
     const GroupKey& now = assignment->key;
-    executor->lent().Forget([&](const GroupKey& key) {
+    executor->Forget([&](const GroupKey& key) {
       const bool read = key.frame == now.frame && (key.attempt < now.attempt || key.group < assignment->groups_done);
       return read || key.frame < assignment->finished_before;
     });
@@ -258,6 +258,11 @@ void WorkerService::Impl::Send(Socket& socket, const AnyMessage& message) {
     LogDebug(std::string(NameOf(message)) + " not sent: " + sent.message());
 }
 
+void WorkerService::Impl::Perform(SendControl& action) {
+  if (auto* done = std::get_if<GroupDone>(&action.message)) executor->AddSent(done->key, done->reports);
+  Send(control, action.message);
+}
+
 void WorkerService::Impl::Perform(SendChunkRequest& action) {
   if (slabs) Send(*slabs, action.request);
 }
@@ -322,8 +327,9 @@ Result<std::unique_ptr<WorkerService>> WorkerService::Start(Context& context, Wo
       options.share_memory = false;
     }
   }
-  auto impl = std::make_unique<Impl>(context, config, options.share_memory, options.compression, std::move(options.make_renderer),
-                                     std::move(*control), std::move(*images));
+  config.lends_memory = options.share_memory;
+  auto impl = std::make_unique<Impl>(context, config, options.compression, std::move(options.make_renderer), std::move(*control),
+                                     std::move(*images));
   impl->thread = std::jthread([raw = impl.get()] { raw->Run(); });
   return std::unique_ptr<WorkerService>(new WorkerService(std::move(impl)));
 }

@@ -22,7 +22,8 @@ struct WorkerOptions {
   Compression compression = Compression::kAuto;
   bool share_memory = true;  // images for workers of this host stay where they are
   RendererFactory make_renderer = MakeRenderer;
-  WorkerConfig machine;  // incarnation, pid, host, images_endpoint, memory_scope are filled in by Start; threads: [1, kMaxThreads]
+  WorkerConfig
+      machine;  // incarnation, pid, host, images_endpoint, memory_scope, lends_memory are filled in by Start; threads: [1, kMaxThreads]
 };
 
 class WorkerService {

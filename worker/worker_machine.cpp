@@ -169,8 +169,8 @@ void WorkerMachine::State::End() {
 void WorkerMachine::State::KeepTime() {
   if (worker != 0 && now >= last_heard + timeout) Unregister();
   if (worker == 0 && now >= next_register) {
-    actions.push_back(SendControl{
-        Register{incarnation, config.pid, config.host, config.images_endpoint, config.threads, config.cache_bytes, config.memory_scope}});
+    actions.push_back(SendControl{Register{incarnation, config.pid, config.host, config.images_endpoint, config.threads, config.cache_bytes,
+                                           config.memory_scope, config.lends_memory}});
     next_register = now + config.register_interval;
   }
   if (worker != 0 && now >= next_heartbeat) {

@@ -56,6 +56,7 @@ struct WorkerConfig {
   std::string host;
   std::string images_endpoint;
   std::uint64_t memory_scope = 0;                        // as in Register
+  bool lends_memory = false;                             // as in Register
   std::uint32_t threads = 1;                             // that render: for the coordinator to know
   std::uint64_t cache_bytes = std::uint64_t{1} << 40;    // slabs not needed by a current group are dropped, oldest first, above this
   std::uint64_t credit_bytes = std::uint64_t{16} << 20;  // chunk bytes requested and not yet stored
@@ -171,14 +172,14 @@ struct FindHidden {
   std::shared_ptr<const FrameSetup> setup;
   OcclusionMask known;
 };
-// Sends message.pixels of `image`: fills in how they travel, and the byte count and encode time of the last report (if there is one). No
-// answer.
+// Sends message.pixels of `image`: fills in how they travel, and into reports of this worker's ranks what their messages took. No answer.
 struct SendPartial {
   Peer to;
   PartialImage message;
   ImageHandle image = 0;
   PixelBounds frame;
   ColorCoding color = ColorCoding::kFloat32;  // if they travel as runs
+  Rank rank = 0;                              // that sends
 };
 // Makes the picture of `image`, a frame, encodes it, fills message.runs and a report, sends to the coordinator. No answer.
 struct SendFrame {

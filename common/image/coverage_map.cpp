@@ -1,5 +1,6 @@
 #include "common/image/coverage_map.h"
 
+#include <algorithm>
 #include <limits>
 
 #include "common/base/check.h"
@@ -23,10 +24,11 @@ bool Filled(const LocalImage& image, std::size_t pixel) {
 
 std::uint64_t SamplePixels(const LocalImage& image) {
   constexpr std::int64_t kFew = 64 * 64;
+  constexpr std::int32_t kRows = 32;
   const std::int64_t pixels = image.bounds.pixel_count();
   const bool few = pixels <= kFew;
-  // A pixel of RGBA in every cache line of every eighth row.
-  const std::int32_t row_step = few ? 1 : 8, column_step = few ? 1 : 4;
+  // A pixel of RGBA in every cache line of some rows.
+  const std::int32_t row_step = few ? 1 : std::max(image.bounds.height() / kRows, 1), column_step = few ? 1 : 4;
   std::int64_t looked_at = 0, filled = 0;
   for (std::int32_t y = row_step / 2; y < image.bounds.height(); y += row_step) {
     for (std::int32_t x = column_step / 2; x < image.bounds.width(); x += column_step) {

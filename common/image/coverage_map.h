@@ -27,8 +27,8 @@ struct CoverageMap {
 
 // Images as renderers make them: all pixels are stored.
 //
-// Pixels of `image` that are not empty: all are looked at where there are few, one in 32 of larger images, so that asking costs next to
-// nothing.
+// Pixels of `image` that are not empty: all are looked at where there are few, of larger images a quarter of some 32 rows, so that asking
+// costs next to nothing.
 std::uint64_t SamplePixels(const LocalImage& image);
 
 // Of `image`, whose bounds lie in a frame of width x height pixels, each at least 1. Exact.

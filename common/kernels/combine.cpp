@@ -26,6 +26,8 @@ SourcePixels At(const ImageView& view, std::size_t pixel) {
   return {view.rgba + 4 * pixel, view.depth + pixel, view.voxel + pixel};
 }
 
+// memcpy writes rows without reading what was there before, which no loop of vectors does: that counts for more than another look at what
+// was written, which is in the nearest cache.
 void CopyRow(const SourcePixels& source, const TargetPixels& target, std::size_t count) {
   std::memcpy(target.rgba, source.rgba, kRgbaBytes * count);
   if (source.depth == nullptr) return;
@@ -33,16 +35,15 @@ void CopyRow(const SourcePixels& source, const TargetPixels& target, std::size_t
   std::memcpy(target.voxel, source.voxel, sizeof(std::uint32_t) * count);
 }
 
-// `ours` with `theirs` on its `side`. All have depths, or none. `target` may be `ours`.
-void CombineRow(const SourcePixels& ours, const SourcePixels& theirs, Side side, const TargetPixels& target, std::size_t count) {
+// `ours` with `theirs` on its `side`. All have depths, or none. `target` may be `ours`. False: a colour that was computed is not finite.
+bool CombineRow(const SourcePixels& ours, const SourcePixels& theirs, Side side, const TargetPixels& target, std::size_t count) {
   if (ours.depth != nullptr && theirs.depth != nullptr) {
     if (target.depth != ours.depth) CopyRow(ours, target, count);
     NearestRow(theirs, target, count);
-  } else if (side == Side::kFront) {
-    OverRow(theirs.rgba, ours.rgba, target.rgba, count);
-  } else {
-    OverRow(ours.rgba, theirs.rgba, target.rgba, count);
+    return true;
   }
+  if (side == Side::kFront) return OverRow(theirs.rgba, ours.rgba, target.rgba, count);
+  return OverRow(ours.rgba, theirs.rgba, target.rgba, count);
 }
 
 // Columns [begin, end) of a row of some image; none if begin == end.
@@ -67,25 +68,41 @@ struct RowPixels {
   }
 };
 
+// Whether pixels that are combined have been looked at.
+enum class Values { kKnown, kUnchecked };
+
+bool AreFinite(const LocalImage& image, std::size_t first, std::size_t count) {
+  return AllFinite(std::as_bytes(std::span(image.rgba).subspan(4 * first, 4 * count)));
+}
+
 // Writes both to the row of `image` that begins at index `row`: each pixel of their hull once, or not at all where `ours` is there already.
-void MergeRow(const RowPixels& ours, const RowPixels& theirs, Side side, LocalImage& image, std::size_t row, bool in_place) {
+// False: what was written of `theirs`, whose values are unchecked, is no colour or depth. What was written counts, not what was read: it
+// cannot change any more.
+template <Values kTheirs>
+bool MergeRow(const RowPixels& ours, const RowPixels& theirs, Side side, LocalImage& image, std::size_t row, bool in_place) {
   const Stretch a = ours.columns, b = theirs.columns, hull = Hull(a, b);
   std::array<std::size_t, 4> cuts = {a.begin, a.end, b.begin, b.end};
   std::ranges::sort(cuts);
+  bool valid = true;
   for (std::size_t i = 0; i + 1 < cuts.size(); ++i) {
     const std::size_t begin = std::max(cuts[i], hull.begin), end = std::min(cuts[i + 1], hull.end);
     if (begin >= end) continue;
     const bool in_ours = begin >= a.begin && end <= a.end, in_theirs = begin >= b.begin && end <= b.end;
     if (in_ours && in_theirs) {
-      CombineRow(ours.At(begin), theirs.At(begin), side, At(image, row + begin), end - begin);
+      valid &= CombineRow(ours.At(begin), theirs.At(begin), side, At(image, row + begin), end - begin);
     } else if (in_theirs) {
       CopyRow(theirs.At(begin), At(image, row + begin), end - begin);
+      if (kTheirs == Values::kUnchecked && image.format == PixelFormat::kRgba) valid &= AreFinite(image, row + begin, end - begin);
     } else if (!in_ours) {
       MakeEmpty(image, row + begin, row + end);
     } else if (!in_place) {
       CopyRow(ours.At(begin), At(image, row + begin), end - begin);
     }
   }
+  if (kTheirs == Values::kKnown) return true;
+  if (image.format == PixelFormat::kRgba) return valid;
+  const std::size_t first = row + b.begin, count = b.end - b.begin;
+  return AreFinite(image, first, count) && AllDepths(std::span(image.depth).subspan(first, count));
 }
 
 RowPixels RowOf(const ImageView& view, std::int32_t y, std::int32_t x_begin) {
@@ -106,9 +123,10 @@ SourcePixels InPlace(const RunImageHeader& header, const RunPayload& runs, std::
 
 ColumnSpan AsSpan(const Stretch& columns) { return {std::uint32_t(columns.begin), std::uint32_t(columns.end)}; }
 
-// Adds `theirs` to row y of an image that has room for it.
-void MergeInPlace(LocalImage& image, std::int32_t y, const RowPixels& theirs, Side side) {
-  if (theirs.columns.begin == theirs.columns.end) return;
+// Adds `theirs` to row y of an image that has room for it. False: as MergeRow.
+template <Values kTheirs>
+bool MergeInPlace(LocalImage& image, std::int32_t y, const RowPixels& theirs, Side side) {
+  if (theirs.columns.begin == theirs.columns.end) return true;
   const std::size_t row = IndexOf(image.bounds, image.bounds.x_begin, y);
   ColumnSpan* const span = image.rows.empty() ? nullptr : &image.rows[std::size_t(y - image.bounds.y_begin)];
   const Stretch columns = span == nullptr ? Stretch{0, std::size_t(image.bounds.width())} : Stretch{span->begin, span->end};
@@ -117,20 +135,19 @@ void MergeInPlace(LocalImage& image, std::int32_t y, const RowPixels& theirs, Si
     const TargetPixels here = At(image, row + columns.begin);
     ours = {{here.rgba, here.depth, here.voxel}, columns};
   }
-  MergeRow(ours, theirs, side, image, row, true);
+  const bool valid = MergeRow<kTheirs>(ours, theirs, side, image, row, true);
   if (span != nullptr) *span = AsSpan(Hull(columns, theirs.columns));
+  return valid;
 }
 
-// Combine; go_on(y, columns) after each row that `other` has pixels of, with the image's columns of them. False: so did go_on say.
-template <class GoOn>
-bool CombineRows(LocalImage& image, const ImageView& other, Side side, const PixelBounds& room, GoOn&& go_on) {
+// False: as MergeRow, and the rest is left out.
+template <Values kOther>
+bool CombineRows(LocalImage& image, const ImageView& other, Side side, const PixelBounds& room) {
   CHECK_EQ(int(image.format), int(other.format));
   if (other.bounds.empty()) return true;
   if (image.bounds.Contains(other.bounds)) {
     for (std::int32_t y = other.bounds.y_begin; y < other.bounds.y_end; ++y) {
-      const RowPixels theirs = RowOf(other, y, image.bounds.x_begin);
-      MergeInPlace(image, y, theirs, side);
-      if (!go_on(y, theirs.columns)) return false;
+      if (!MergeInPlace<kOther>(image, y, RowOf(other, y, image.bounds.x_begin), side)) return false;
     }
     return true;
   }
@@ -141,9 +158,8 @@ bool CombineRows(LocalImage& image, const ImageView& other, Side side, const Pix
   image.rows.resize(std::size_t(room.height()));
   for (std::int32_t y = room.y_begin; y < room.y_end; ++y) {
     const RowPixels a = RowOf(ours, y, room.x_begin), b = RowOf(other, y, room.x_begin);
-    MergeRow(a, b, side, image, IndexOf(room, room.x_begin, y), false);
+    if (!MergeRow<kOther>(a, b, side, image, IndexOf(room, room.x_begin, y), false)) return false;
     image.rows[std::size_t(y - room.y_begin)] = AsSpan(Hull(a.columns, b.columns));
-    if (!go_on(y, b.columns)) return false;
   }
   return true;
 }
@@ -156,16 +172,11 @@ void Combine(LocalImage& image, const LocalImage& other, Side side) {
 }
 
 void Combine(LocalImage& image, const ImageView& other, Side side, const PixelBounds& room) {
-  (void)CombineRows(image, other, side, room, [](std::int32_t, const Stretch&) { return true; });
+  (void)CombineRows<Values::kKnown>(image, other, side, room);
 }
 
 bool CombineUnchecked(LocalImage& image, const ImageView& other, Side side, const PixelBounds& room) {
-  // What was written, not what was read: it cannot change any more. An operand that is not finite never gives a finite sum or product.
-  return CombineRows(image, other, side, room, [&image](std::int32_t y, const Stretch& columns) {
-    const std::size_t first = IndexOf(image.bounds, image.bounds.x_begin, y) + columns.begin, count = columns.end - columns.begin;
-    if (!AllFinite(std::as_bytes(std::span(image.rgba).subspan(4 * first, 4 * count)))) return false;
-    return image.format == PixelFormat::kRgba || AllDepths(std::span(image.depth).subspan(first, count));
-  });
+  return CombineRows<Values::kUnchecked>(image, other, side, room);
 }
 
 void Erase(LocalImage& image, PixelRange pixels, std::int32_t frame_width) {
@@ -205,12 +216,15 @@ Status CombineRuns(LocalImage& image, const RunImageHeader& header, std::span<co
 
   // Where kernels cannot read a run in place it is copied; it fits the cache.
   const RunPayload runs(header, payload);
-  const bool readable = runs.AreFloats();
+  const bool readable = runs.AreFloats(), floats = header.color == ColorCoding::kFloat32 && !HasDepth(header.format);
   LocalImage scratch = MakeUnwrittenImage(header.format, {0, 0, readable ? 0 : header.bounds.width(), 1});
   std::size_t first = 0;
   for (std::uint32_t i = 0; i < runs.run_count(); ++i) {
     const Run run = runs.ReadRun(i);
-    if (Status pixels = ValidatePixels(header, runs, first, run.pixel_count); !pixels.ok()) return pixels;
+    // Colours that are floats are checked by what comes of them; a depth, or a code that stands for none, would not be seen there.
+    if (!floats) {
+      if (Status pixels = ValidatePixels(header, runs, first, run.pixel_count); !pixels.ok()) return pixels;
+    }
     SourcePixels pixels;
     if (readable) {
       pixels = InPlace(header, runs, first, run.pixel_count);
@@ -224,7 +238,13 @@ Status CombineRuns(LocalImage& image, const RunImageHeader& header, std::span<co
       pixels = {copy.rgba, copy.depth, copy.voxel};
     }
     const auto column = std::size_t(header.bounds.x_begin - image.bounds.x_begin) + run.column;
-    MergeInPlace(image, header.bounds.y_begin + std::int32_t(run.row), {pixels, {column, column + run.pixel_count}}, side);
+    const std::int32_t y = header.bounds.y_begin + std::int32_t(run.row);
+    const RowPixels theirs = {pixels, {column, column + run.pixel_count}};
+    if (!floats) {
+      (void)MergeInPlace<Values::kKnown>(image, y, theirs, side);
+    } else if (!MergeInPlace<Values::kUnchecked>(image, y, theirs, side)) {
+      return Status::InvalidArgument("run image: a pixel's colour is not finite, or what it is combined to");
+    }
     first += run.pixel_count;
   }
   return Status::Ok();

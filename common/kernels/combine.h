@@ -29,8 +29,8 @@ void Combine(LocalImage& image, const ImageView& other, Side side, const PixelBo
 // The same for pixels that nobody has looked at, in memory that another process may even write to meanwhile. False: a pixel where `other`
 // has some now is none (its colour is not finite, or its depth is NaN or -infinity); `image` is then worth nothing.
 [[nodiscard]] bool CombineUnchecked(LocalImage& image, const ImageView& other, Side side, const PixelBounds& room);
-// With runs that come from outside: checked as by ValidateRuns, while they are in the cache for combining. After an error `image` may hold
-// some of them.
+// With runs that come from outside: checked as by ValidateRuns, while they are combined, and that the colours which come of it are finite.
+// After an error `image` may hold some of them.
 Status CombineRuns(LocalImage& image, const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame, Side side,
                    const PixelBounds& room);
 // On the union of both bounds, all pixels stored.
@@ -39,9 +39,10 @@ void Combine(LocalImage& image, const LocalImage& other, Side side);
 // Makes the pixels `pixels` of a frame `frame_width` wide empty.
 void Erase(LocalImage& image, PixelRange pixels, std::int32_t frame_width);
 
-// The row kernels. rgba rows hold 4 * pixel_count floats; rows do not alias. out may equal front (first) or back (second).
-void OverRow(const float* front, const float* back, float* out, std::size_t pixel_count);
-void OverRowReference(const float* front, const float* back, float* out, std::size_t pixel_count);
+// The row kernels. rgba rows hold 4 * pixel_count floats; rows do not alias. out may equal front (first) or back (second). False: some
+// value that was written is not finite; an operand that is not never gives a sum that is.
+bool OverRow(const float* front, const float* back, float* out, std::size_t pixel_count);
+bool OverRowReference(const float* front, const float* back, float* out, std::size_t pixel_count);
 
 // A stretch of pixels of one row, to read or to write.
 template <class Float, class Index>

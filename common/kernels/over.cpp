@@ -7,6 +7,8 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include <cstdint>
+
 #include "common/kernels/combine.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -16,27 +18,37 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 #if HWY_TARGET == HWY_SCALAR
 
-void OverRow(const float* front, const float* back, float* out, std::size_t pixel_count) {
-  OverRowReference(front, back, out, pixel_count);
+bool OverRow(const float* front, const float* back, float* out, std::size_t pixel_count) {
+  return OverRowReference(front, back, out, pixel_count);
 }
 
 #else
 
-// As many pixels as one vector of D holds.
+// As many pixels as one vector of D holds. Returns the bits of what it wrote, without signs.
 template <class D>
-HWY_INLINE void OverVector(D d, const float* front, const float* back, float* out) {
+HWY_INLINE hn::Vec<hn::RebindToUnsigned<D> > OverVector(D d, const float* front, const float* back, float* out) {
+  const hn::RebindToUnsigned<D> du;
   const auto f = hn::LoadU(d, front);
   const auto transmittance = hn::Sub(hn::Set(d, 1.0F), hn::Broadcast<3>(f));  // of alpha, within each 128-bit block: one pixel
-  hn::StoreU(hn::Add(f, hn::Mul(transmittance, hn::LoadU(d, back))), d, out);
+  const auto sum = hn::Add(f, hn::Mul(transmittance, hn::LoadU(d, back)));
+  hn::StoreU(sum, d, out);
+  return hn::And(hn::BitCast(du, sum), hn::Set(du, 0x7FFFFFFF));
 }
 
-void OverRow(const float* front, const float* back, float* out, std::size_t pixel_count) {
+bool OverRow(const float* front, const float* back, float* out, std::size_t pixel_count) {
+  constexpr std::uint32_t kInfinity = 0x7F800000;  // without a sign, the bits of all finite numbers are less, those of NaNs more
   const hn::ScalableTag<float> wide;
   const hn::FixedTag<float, 4> pixel;
+  const hn::RebindToUnsigned<decltype(wide)> wide_bits;
+  const hn::RebindToUnsigned<decltype(pixel)> pixel_bits;
   const std::size_t lanes = hn::Lanes(wide), count = 4 * pixel_count;
+  auto largest = hn::Zero(wide_bits);
+  auto largest_of_tail = hn::Zero(pixel_bits);
   std::size_t i = 0;
-  for (; i + lanes <= count; i += lanes) OverVector(wide, front + i, back + i, out + i);
-  for (; i < count; i += 4) OverVector(pixel, front + i, back + i, out + i);
+  for (; i + lanes <= count; i += lanes) largest = hn::Max(largest, OverVector(wide, front + i, back + i, out + i));
+  for (; i < count; i += 4) largest_of_tail = hn::Max(largest_of_tail, OverVector(pixel, front + i, back + i, out + i));
+  return hn::AllTrue(wide_bits, hn::Lt(largest, hn::Set(wide_bits, kInfinity))) &&
+         hn::AllTrue(pixel_bits, hn::Lt(largest_of_tail, hn::Set(pixel_bits, kInfinity)));
 }
 
 #endif
@@ -50,8 +62,8 @@ namespace slabstream {
 
 HWY_EXPORT(OverRow);
 
-void OverRow(const float* front, const float* back, float* out, std::size_t pixel_count) {
-  HWY_DYNAMIC_DISPATCH(OverRow)(front, back, out, pixel_count);
+bool OverRow(const float* front, const float* back, float* out, std::size_t pixel_count) {
+  return HWY_DYNAMIC_DISPATCH(OverRow)(front, back, out, pixel_count);
 }
 
 }  // namespace slabstream

@@ -22,6 +22,11 @@ std::string_view ToString(Stage stage) {
   return "";
 }
 
+void AddStage(RankReport& report, Stage stage, std::int64_t begin_ns, std::int64_t end_ns) {
+  report.stage_ns[std::size_t(stage)] += end_ns - begin_ns;
+  if (report.spans.size() < kMaxSpans) report.spans.push_back({stage, begin_ns, end_ns});
+}
+
 std::int64_t PictureNs(const RankReport& report) {
   std::int64_t ns = 0;
   for (std::size_t i = 0; i < report.spans.size(); ++i) {

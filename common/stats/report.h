@@ -53,6 +53,9 @@ struct RankReport {
 };
 inline constexpr int kMaxSpans = 64;
 
+// Adds a stretch of time, while there is room for its span.
+void AddStage(RankReport& report, Stage stage, std::int64_t begin_ns, std::int64_t end_ns);
+
 // Of the display worker's report: making the picture and encoding it, in ns. Partial images are encoded, too, but before that.
 std::int64_t PictureNs(const RankReport& report);
 

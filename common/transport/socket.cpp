@@ -7,6 +7,7 @@
 #include <zmq.hpp>
 
 #include "common/base/check.h"
+#include "common/transport/connection_tuner.h"
 #include "common/transport/endpoint.h"
 #include "common/transport/ipc_listener.h"
 
@@ -32,8 +33,9 @@ struct Socket::Impl {
 
   zmq::socket_t socket;
   bool router;
-  std::vector<std::string> names;      // inproc endpoints bound here
-  std::vector<IpcListener> listeners;  // ipc files bound here
+  std::unique_ptr<ConnectionTuner> tuner;  // of the tcp connections made here
+  std::vector<std::string> names;          // inproc endpoints bound here
+  std::vector<IpcListener> listeners;      // ipc files bound here
 
   // Names and files are free again when the socket is gone; ZeroMQ alone would free them some time later.
   ~Impl() {
@@ -197,6 +199,7 @@ Status Socket::Connect(const std::string& text) {
   if (!endpoint.ok()) return endpoint.status();
   try {
     AllowAddressFamily(impl_->socket, *endpoint);
+    if (endpoint->scheme == Scheme::kTcp && impl_->tuner == nullptr) impl_->tuner = std::make_unique<ConnectionTuner>(impl_->socket);
     impl_->socket.connect(endpoint->ToString());
     return Status::Ok();
   } catch (const zmq::error_t& error) {
@@ -206,6 +209,7 @@ Status Socket::Connect(const std::string& text) {
 
 Status Socket::Send(const std::string& identity, std::vector<std::byte> header, const Bytes& payload) {
   zmq::socket_t& socket = impl_->socket;
+  if (impl_->tuner != nullptr) impl_->tuner->TuneNew();
   int error = impl_->router ? SendPart(socket, zmq::message_t(identity.data(), identity.size()), true) : 0;
   if (error == 0) error = SendPart(socket, Share(Bytes(std::move(header))), !payload.empty());
   if (error == 0 && !payload.empty()) error = SendPart(socket, Share(payload), false);
@@ -239,6 +243,7 @@ std::optional<Incoming> Socket::TryReceive() {
     }
     if (!incoming.parts.empty() && surplus == 0) return incoming;
   }
+  if (impl_->tuner != nullptr) impl_->tuner->TuneNew();
   return std::nullopt;
 }
 

@@ -44,6 +44,7 @@ v1::Register ToProto(const Register& in) {
   out.set_threads(in.threads);
   out.set_memory_bytes(in.memory_bytes);
   out.set_memory_scope(in.memory_scope);
+  out.set_lends_memory(in.lends_memory);
   return out;
 }
 
@@ -56,6 +57,7 @@ Register FromProto(const v1::Register& in, Checker& check) {
   out.threads = check.Range("threads", in.threads(), 1, kMaxThreads);
   out.memory_bytes = in.memory_bytes();
   out.memory_scope = in.memory_scope();
+  out.lends_memory = in.lends_memory();
   return out;
 }
 

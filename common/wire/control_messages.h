@@ -40,6 +40,7 @@ struct Register {
   std::uint32_t threads = 1;       // render threads, [1, kMaxThreads]
   std::uint64_t memory_bytes = 0;  // budget for cached slabs; 0: none stated
   std::uint64_t memory_scope = 0;  // workers of the same scope can read each other's memory (SharedMemoryScope); 0: it takes frames only
+  bool lends_memory = false;       // its own images stay where they are for workers of its scope; else it sends them in frames
   friend bool operator==(const Register&, const Register&) = default;
 };
 

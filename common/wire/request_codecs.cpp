@@ -5,7 +5,7 @@ namespace slabstream {
 
 static_assert(v1::Projection_MAX == static_cast<int>(Projection::kPerspective));
 static_assert(v1::RendererKind_MAX == static_cast<int>(RendererKind::kZBuffer));
-static_assert(v1::AxisChoice_MAX == static_cast<int>(AxisChoice::kAuto) + 1);
+static_assert(v1::AxisChoice_MAX == static_cast<int>(AxisChoice::kView) + 1);
 
 // Most ranges of these values are checked by Validate, once for the whole FrameRequest. What is checked here is what a struct could not
 // hold or what has to be known before, and what is not a number, so that the message names the field as the schema does.
@@ -151,7 +151,7 @@ v1::Policy ToProto(const Policy& in) {
 Policy FromProto(const v1::Policy& in, Checker& check) {
   Policy out;
   out.decomposition = check.Text("decomposition", in.decomposition(), 1, kMaxNameBytes);
-  out.axis = check.OneOf("axis", in.axis(), AxisChoice::kX, AxisChoice::kAuto);
+  out.axis = check.OneOf("axis", in.axis(), AxisChoice::kX, AxisChoice::kView);
   out.groups = static_cast<int>(check.Range("groups", in.groups(), 0, kMaxGroups));
   out.combine = check.Text("combine", in.combine(), 1, kMaxNameBytes);
   out.split = check.Text("split", in.split(), 1, kMaxNameBytes);

@@ -5,6 +5,8 @@
 #include <hwy/targets.h>
 
 #include <cstring>
+#include <limits>
+#include <utility>
 #include <vector>
 
 #include "common/kernels/combine.h"
@@ -51,18 +53,38 @@ TEST_P(OverRowTargets, GivesTheBitsOfTheReference) {
     for (std::size_t shift : {0, 1, 3}) {
       const std::vector<float> front = RandomRow(random, pixels, shift), back = RandomRow(random, pixels, shift);
       std::vector<float> expected(4 * pixels), out(4 * pixels + shift + 4, -1.0F);
-      OverRowReference(front.data() + shift, back.data() + shift, expected.data(), pixels);
-      OverRow(front.data() + shift, back.data() + shift, out.data() + shift, pixels);
+      EXPECT_TRUE(OverRowReference(front.data() + shift, back.data() + shift, expected.data(), pixels));
+      EXPECT_TRUE(OverRow(front.data() + shift, back.data() + shift, out.data() + shift, pixels));
       ASSERT_TRUE(SameBits(out, shift, expected)) << pixels << " pixels, shift " << shift;
       for (std::size_t i = 0; i < 4; ++i) ASSERT_EQ(out[out.size() - 1 - i], -1.0F) << "wrote past the end";
 
       // In place, on either operand.
       std::vector<float> in_place = front;
-      OverRow(in_place.data() + shift, back.data() + shift, in_place.data() + shift, pixels);
+      EXPECT_TRUE(OverRow(in_place.data() + shift, back.data() + shift, in_place.data() + shift, pixels));
       ASSERT_TRUE(SameBits(in_place, shift, expected));
       in_place = back;
-      OverRow(front.data() + shift, in_place.data() + shift, in_place.data() + shift, pixels);
+      EXPECT_TRUE(OverRow(front.data() + shift, in_place.data() + shift, in_place.data() + shift, pixels));
       ASSERT_TRUE(SameBits(in_place, shift, expected));
+    }
+  }
+}
+
+// Wherever it is in the row, and whatever lies in front of it or behind.
+TEST_P(OverRowTargets, TellsOfAnyOperandThatIsNotFinite) {
+  Random random(62);
+  SCOPED_TRACE(random.trace());
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  for (const std::size_t pixels : {1, 3, 4, 5, 8, 33}) {
+    std::vector<float> front = RandomRow(random, pixels, 0), back = RandomRow(random, pixels, 0), out(4 * pixels);
+    for (std::vector<float>* operand : {&front, &back}) {
+      for (float& value : *operand) {
+        for (const float bad : {kInfinity, -kInfinity, std::numeric_limits<float>::quiet_NaN()}) {
+          const float good = std::exchange(value, bad);
+          EXPECT_FALSE(OverRow(front.data(), back.data(), out.data(), pixels));
+          EXPECT_FALSE(OverRowReference(front.data(), back.data(), out.data(), pixels));
+          value = good;
+        }
+      }
     }
   }
 }

@@ -72,6 +72,36 @@ TEST_F(ExecutorTest, ImagesCombineInOrderAndSourcesStayAsTheyAre) {
   EXPECT_FLOAT_EQ(PixelAt(PixelsOf(2), 1, 1).rgba[3], 0.25F);
 }
 
+// In strips, say: the report goes with the last one.
+TEST_F(ExecutorTest, ReportsTellOfAllMessagesOfTheirRank) {
+  ASSERT_TRUE(CombineIncoming(1, Filled({0, 0, 8, 4}, 0.5F), Side::kBack).status.ok());
+  const auto send = [&](Rank rank, PixelRange pixels, std::vector<RankReport> reports) {
+    executor_.Perform(
+        SendPartial{
+            .message = {.epoch = 1, .from_worker = 1, .key = kKey, .interval = {0, 1}, .pixels = pixels, .reports = std::move(reports)},
+            .image = 1,
+            .frame = kFrame,
+            .rank = rank},
+        {});
+    return std::get<OutgoingPartial>(outputs_.Next());
+  };
+  const std::size_t bytes = send(3, {0, 16}, {}).payload.size() + send(3, {16, 32}, {}).payload.size();
+  EXPECT_GT(bytes, 0U);
+  const std::size_t others = send(4, {0, 16}, {}).payload.size();
+  const OutgoingPartial last = send(3, {32, 128}, {{.rank = 2}, {.rank = 3}});
+  const AnyMessage message = Decode(last.header).value();
+  const std::vector<RankReport>& reports = std::get<PartialImage>(message).reports;
+  EXPECT_EQ(reports[0], RankReport{.rank = 2}) << "not of this worker";
+  EXPECT_EQ(reports[1].image_bytes, bytes + last.payload.size());
+  EXPECT_EQ(reports[1].spans.size(), 3U);
+
+  // With GroupDone, if no message carries them.
+  std::vector<RankReport> done = {{.rank = 3}, {.rank = 4}};
+  executor_.AddSent(kKey, done);
+  EXPECT_EQ(done[0], RankReport{.rank = 3}) << "told already";
+  EXPECT_EQ(done[1].image_bytes, others);
+}
+
 TEST_F(ExecutorTest, ReleasedImagesServeTheOrdersThatWereGivenBefore) {
   EXPECT_TRUE(CombineIncoming(1, Filled({0, 0, 8, 4}, 0.5F), Side::kBack).status.ok());
   executor_.Perform(StartCombine{.key = kKey, .image = 2, .other = 1, .frame = kFrame});

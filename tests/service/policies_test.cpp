@@ -88,6 +88,31 @@ TEST_P(PoliciesTest, NeverChangeThePicture) {
   }
 }
 
+// Over a scheme that sends a rank's pixels at once and one that sends them in parts: the same pixels, in more runs.
+TEST(PoliciesStatistics, CountTheBytesOfEveryMessage) {
+  const std::shared_ptr<const Volume> volume = SparseVolume();
+  EmbeddedOptions options;
+  options.workers = 4;
+  options.worker.threads = 1;
+  options.coordinator.catalogue["ball"] = [volume]() -> Result<std::shared_ptr<const Volume>> { return volume; };
+  Context context;
+  const auto service = EmbeddedService::Start(context, options);
+  ASSERT_TRUE(service.ok()) << service.status().message();
+  Client client = Client::Connect(context, (*service)->endpoint()).value();
+  FrameRequest request = TestRequest(RendererKind::kSplat, 120, 1);
+  const auto image_bytes = [&](const char* scheme) {
+    request.policy.combine = scheme;
+    const Result<Picture> picture = client.Render(request, std::chrono::seconds(60));
+    std::uint64_t bytes = 0;
+    for (const RankReport& report : picture.value().statistics.reports) bytes += report.image_bytes;
+    return double(bytes);
+  };
+  const double whole = image_bytes("fan-in"), strips = image_bytes("tree:2,strips=4");
+  EXPECT_GT(whole, 0);
+  EXPECT_GE(strips, whole);
+  EXPECT_LE(strips, 1.5 * whole);
+}
+
 INSTANTIATE_TEST_SUITE_P(Workers, PoliciesTest, testing::Values(1, 2, 3, 5, 8, 13));
 
 }  // namespace

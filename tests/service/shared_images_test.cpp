@@ -270,7 +270,7 @@ TEST_F(TwoExecutors, WhatIsRefusedComesAsRuns) {
   EXPECT_FALSE(message.shared.has_value());
   EXPECT_EQ(message.step, lent.step);
   EXPECT_TRUE(std::ranges::equal(payload.span(), expected));
-  one_.executor.lent().Forget([](const GroupKey&) { return true; });
+  one_.executor.Forget([](const GroupKey&) { return true; });
   one_.executor.Resend({.epoch = 1, .from_worker = 2, .key = lent.key, .step = lent.step, .pixels = lent.pixels});  // too late: nothing
 }
 
@@ -280,7 +280,7 @@ TEST_F(TwoExecutors, AnImageThatWasTakenBackFailsTheStep) {
   const auto [lent, spans] = one_.Send(1, true);
   ASSERT_TRUE(two_.executor.peer_memory().Open(lent.shared->arena, kNow).ok());
   one_.executor.Perform(ReleaseImage{1});
-  one_.executor.lent().Forget([](const GroupKey&) { return true; });
+  one_.executor.Forget([](const GroupKey&) { return true; });
   Give(one_, 2, RandomImage(random_, PixelFormat::kRgba, kFrame));  // its combining thread has let go of the image before this
   EXPECT_EQ(two_.Combine(1, lent, spans).code(), StatusCode::kDataLoss);
 }

@@ -3,6 +3,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <stdlib.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -17,8 +19,10 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 #include <zmq.hpp>
 
+#include "common/transport/endpoint.h"
 #include "common/transport/mailbox.h"
 #include "tests/support/temporary_directory.h"
 
@@ -271,6 +275,36 @@ TEST(Socket, MessagesOfMoreThanTwoPartsAreDropped) {
     EXPECT_EQ(incoming->parts.size(), parts);
     EXPECT_EQ(TextOf(incoming->parts[0]), std::to_string(parts));
   }
+}
+
+// The congestion control of this process' connections to 127.0.0.1:`port`, by their descriptors.
+std::vector<std::string> CongestionControlsTo(std::uint16_t port) {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
+    const int descriptor = std::stoi(entry.path().filename());
+    sockaddr_in peer = {};
+    socklen_t bytes = sizeof(peer);
+    if (::getpeername(descriptor, reinterpret_cast<sockaddr*>(&peer), &bytes) != 0) continue;
+    if (peer.sin_family != AF_INET || ntohs(peer.sin_port) != port) continue;
+    std::array<char, 16> name{};
+    bytes = name.size() - 1;
+    if (::getsockopt(descriptor, IPPROTO_TCP, TCP_CONGESTION, name.data(), &bytes) == 0) names.emplace_back(name.data());
+  }
+  return names;
+}
+
+TEST(Socket, ConnectionsWithinTheHostAreNotPaced) {
+  Context context;
+  Result<Socket> router = Socket::Router(context);
+  ASSERT_TRUE(router.ok());
+  const Result<std::string> bound = router->Bind("tcp://127.0.0.1:*");
+  ASSERT_TRUE(bound.ok());
+  Result<Socket> dealer = Socket::Dealer(context);
+  ASSERT_TRUE(dealer.ok() && dealer->Connect(*bound).ok());
+  ASSERT_TRUE(dealer->Send({}, BytesOf("makes the connection")).ok());
+  ASSERT_TRUE(Receive(*router));
+  ASSERT_TRUE(dealer->Send({}, BytesOf("finds it there")).ok());
+  EXPECT_THAT(CongestionControlsTo(ParseEndpoint(*bound, false)->port), testing::ElementsAre("reno"));
 }
 
 TEST(Socket, RefusesWhatIsNotLoopback) {

@@ -99,7 +99,7 @@ FrameRequest Request() {
 template <>
 std::vector<Register> Samples() {
   return {{1, 2, "host", "tcp://127.0.0.1:1", 1, 0},
-          {kMax64, kMax32, kLongName, kLongEndpoint, kMaxThreads, kMax64},
+          {kMax64, kMax32, kLongName, kLongEndpoint, kMaxThreads, kMax64, kMax64, true},
           {0, 0, kUmlaut, kOddEndpoint}};
 }
 

@@ -1,0 +1,67 @@
+#include "common/transport/connection_tuner.h"
+
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <utility>
+
+namespace slabstream {
+namespace {
+
+constexpr const char* kReno = "reno";
+constexpr std::size_t kMostNameBytes = 16;  // of a congestion control, TCP_CA_NAME_MAX of the kernel
+
+std::string UniqueName() {
+  static std::atomic<std::uint64_t> last = 0;
+  return "inproc://connection-tuner-" + std::to_string(++last);
+}
+
+// Both ends have the same address.
+bool StaysOnThisHost(int descriptor) {
+  sockaddr_storage here = {}, there = {};
+  socklen_t here_bytes = sizeof(here), there_bytes = sizeof(there);
+  if (::getsockname(descriptor, reinterpret_cast<sockaddr*>(&here), &here_bytes) != 0 ||
+      ::getpeername(descriptor, reinterpret_cast<sockaddr*>(&there), &there_bytes) != 0 || here.ss_family != there.ss_family) {
+    return false;
+  }
+  if (here.ss_family == AF_INET) {
+    return reinterpret_cast<const sockaddr_in&>(here).sin_addr.s_addr == reinterpret_cast<const sockaddr_in&>(there).sin_addr.s_addr;
+  }
+  return here.ss_family == AF_INET6 && std::memcmp(&reinterpret_cast<const sockaddr_in6&>(here).sin6_addr,
+                                                   &reinterpret_cast<const sockaddr_in6&>(there).sin6_addr, sizeof(in6_addr)) == 0;
+}
+
+}  // namespace
+
+ConnectionTuner::ConnectionTuner(zmq::socket_t& socket) { init(socket, UniqueName(), ZMQ_EVENT_CONNECTED); }
+
+void ConnectionTuner::TuneNew() {
+  try {
+    while (check_event()) {
+    }
+  } catch (const zmq::error_t&) {  // a signal: the next call goes on
+  }
+}
+
+// The connection may be gone by now and its descriptor another one's: then that is a connection of this host, too, or it stays as it is.
+void ConnectionTuner::on_event_connected(const zmq_event_t& event, const char*) {
+  const int descriptor = event.value;
+  if (!StaysOnThisHost(descriptor)) return;
+  std::array<char, kMostNameBytes> system{};
+  socklen_t bytes = system.size();
+  if (::getsockopt(descriptor, IPPROTO_TCP, TCP_CONGESTION, system.data(), &bytes) != 0) return;
+  // If one fails, the connection is a slower one. Something may have been sent already. BBR has then lowered the slow start threshold to
+  // what was under way, and reno would be paced by that for ever: so BBR begins anew, which takes the threshold away.
+  for (const char* name : {kReno, std::as_const(system).data(), kReno}) {
+    (void)::setsockopt(descriptor, IPPROTO_TCP, TCP_CONGESTION, name, socklen_t(std::strlen(name)));
+  }
+}
+
+}  // namespace slabstream

@@ -1,0 +1,82 @@
+// The worker machine and its coordinator: taken in, heard of, lost, left.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/worker/worker_machine_fixture.h"
+
+namespace slabstream {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using testing::ElementsAre;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+class WorkerRegistrationTest : public WorkerMachineTest {};
+
+TEST_F(WorkerRegistrationTest, RegistersUntilWelcome) {
+  Start(Config(), false);
+  EXPECT_THAT(Sent<Register>(Tell(Tick{})), SizeIs(1));
+  EXPECT_THAT(Sent<Register>(After(milliseconds(10))), IsEmpty());
+  EXPECT_EQ(machine->NextWake(), now + milliseconds(990));
+  const auto again = Sent<Register>(After(milliseconds(990)));
+  ASSERT_THAT(again, SizeIs(1));
+  EXPECT_EQ(again[0].incarnation, 1000U);
+  EXPECT_EQ(again[0].images_endpoint, "inproc://self");
+
+  EXPECT_THAT(Tell(WelcomeTo(999)), IsEmpty()) << "a welcome to somebody else";
+  const Actions welcomed = Tell(WelcomeTo(1000));
+  EXPECT_EQ(machine->worker(), kSelf);
+  ASSERT_THAT(All<ConnectSlabs>(welcomed), SizeIs(1));
+  EXPECT_EQ(All<ConnectSlabs>(welcomed)[0].endpoint, "inproc://slabs");
+  EXPECT_THAT(Sent<Heartbeat>(welcomed), SizeIs(1));
+  EXPECT_THAT(Tell(WelcomeTo(1000)), IsEmpty()) << "a second copy changes nothing";
+}
+
+TEST_F(WorkerRegistrationTest, BeatsAndFallsSilentWithItsCoordinator) {
+  EXPECT_THAT(Sent<Heartbeat>(After(milliseconds(500))), SizeIs(1));
+  Tell(Ping{kEpoch, 0, {}});
+  After(milliseconds(5900));
+  EXPECT_TRUE(machine->registered());
+  Tell(Ping{kEpoch + 1, 0, {}});  // of another coordinator: not a sign of life of this one
+  const auto registers = Sent<Register>(After(milliseconds(100)));
+  EXPECT_FALSE(machine->registered());
+  ASSERT_THAT(registers, SizeIs(1));
+  EXPECT_EQ(registers[0].incarnation, 1001U) << "what it held is gone, so it is a new worker";
+  EXPECT_THAT(Tell(WelcomeTo(1000)), IsEmpty());
+  EXPECT_FALSE(Tell(WelcomeTo(1001)).empty());
+  EXPECT_TRUE(machine->registered());
+}
+
+TEST_F(WorkerRegistrationTest, RetireMakesItRegisterAgain) {
+  EXPECT_THAT(Sent<Register>(Tell(Retire{kEpoch + 1})), SizeIs(1));
+  EXPECT_FALSE(machine->registered());
+  EXPECT_THAT(Tell(Retire{kEpoch + 1}), IsEmpty());
+}
+
+TEST_F(WorkerRegistrationTest, LeavesInOrderAndObeysStop) {
+  const Actions leaving = Tell(StopRequested{});
+  EXPECT_THAT(Sent<Leave>(leaving), SizeIs(1));
+  EXPECT_THAT(All<StopProcess>(leaving), SizeIs(1));
+  EXPECT_EQ(machine->NextWake(), Time::max());
+  EXPECT_THAT(After(seconds(10)), IsEmpty());
+
+  Start(Config());
+  EXPECT_THAT(All<StopProcess>(Tell(Stop{kEpoch + 1})), IsEmpty()) << "another coordinator's";
+  EXPECT_THAT(All<StopProcess>(Tell(Stop{kEpoch})), SizeIs(1));
+}
+
+TEST_F(WorkerRegistrationTest, LosingTheCoordinatorReleasesEverything) {
+  const auto first = All<StartRender>(Feed(Tell(Assignment(1, {kSelf}, 0, 2)))).at(0);
+  Rendered(first);
+  const auto second = All<StartRender>(Feed(Tell(Assignment(1, {kSelf}, 1, 2)))).at(0);
+  const Actions lost = After(seconds(6));
+  EXPECT_THAT(All<CancelRender>(lost), SizeIs(1));
+  EXPECT_THAT(All<ReleaseImage>(lost), ElementsAre(testing::Field(&ReleaseImage::image, first.image)));
+  EXPECT_THAT(All<DropSlab>(lost), IsEmpty());
+  EXPECT_THAT(All<ReleaseImage>(Rendered(second)), SizeIs(1));
+}
+
+}  // namespace
+}  // namespace slabstream

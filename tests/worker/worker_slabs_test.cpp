@@ -1,0 +1,162 @@
+// The worker machine and its voxels: what it asks for, keeps, copies and drops.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/worker/worker_machine_fixture.h"
+
+namespace slabstream {
+namespace {
+
+using std::chrono::seconds;
+using testing::ElementsAre;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+class WorkerSlabsTest : public WorkerMachineTest {};
+
+TEST_F(WorkerSlabsTest, AsksForChunksWithinItsCredit) {
+  WorkerConfig config = Config();
+  config.credit_bytes = 2 * kChunkBytes;
+  Start(config);
+  GroupAssignment assignment = Assignment(1, {kSelf});
+  assignment.group.placements[0].box = {{0, 0, 0}, {128, 128, 320}};  // 328 slices with halo: 6 chunks, the last one short
+  const auto first = All<SendChunkRequest>(Tell(assignment));
+  ASSERT_THAT(first, SizeIs(2));
+  EXPECT_EQ(first[0].request.chunk, 0U);
+  EXPECT_EQ(first[1].request.chunk, 1U);
+  EXPECT_EQ(first[0].request.box, (Box{{0, 0, 0}, {128, 128, 328}}));
+  const Actions arrived = Tell(Answer(first[0].request));
+  ASSERT_THAT(All<StoreChunk>(arrived), SizeIs(1));
+  EXPECT_THAT(All<SendChunkRequest>(arrived), IsEmpty()) << "credit is used until the chunk is stored";
+  EXPECT_THAT(All<StoreChunk>(Tell(Answer(first[0].request))), IsEmpty()) << "a second copy changes nothing";
+  const StoreChunk store = All<StoreChunk>(arrived)[0];
+  const auto next = All<SendChunkRequest>(Tell(ChunkStored{store.slab, store.chunk.box, 0, {}}));
+  ASSERT_THAT(next, SizeIs(1));
+  EXPECT_EQ(next[0].request.chunk, 2U);
+}
+
+TEST_F(WorkerSlabsTest, AsksAgainForWhatIsLostOrDamagedAndGivesUp) {
+  WorkerConfig config = Config();
+  config.chunk_attempts = 3;
+  config.credit_bytes = kChunkBytes;
+  Start(config);
+  const auto first = All<SendChunkRequest>(Tell(Assignment(1, {kSelf})));
+  ASSERT_THAT(first, SizeIs(1));
+  Actions again = After(seconds(3));
+  Tell(Ping{kEpoch, 0, {}});
+  ASSERT_THAT(All<SendChunkRequest>(again), SizeIs(1));
+  EXPECT_EQ(All<SendChunkRequest>(again)[0].request, first[0].request);
+  const auto stored = All<StoreChunk>(Tell(Answer(first[0].request)));
+  ASSERT_THAT(stored, SizeIs(1));
+  again = Tell(ChunkStored{stored[0].slab, stored[0].chunk.box, 0, Status::DataLoss("digest")});
+  ASSERT_THAT(All<SendChunkRequest>(again), SizeIs(1));
+  const Actions given_up = After(seconds(3));
+  const auto trouble = Sent<WorkerTrouble>(given_up);
+  ASSERT_THAT(trouble, SizeIs(1));
+  EXPECT_EQ(trouble[0].key, (GroupKey{1, 1, 0}));
+  EXPECT_EQ(trouble[0].status.code(), StatusCode::kUnavailable);
+  EXPECT_THAT(All<DropSlab>(given_up), SizeIs(1));
+  EXPECT_THAT(All<OpenSlab>(Tell(Assignment(1, {kSelf}, 0, 1, 2))), SizeIs(1)) << "the next attempt begins from nothing";
+}
+
+TEST_F(WorkerSlabsTest, ReportsARefusedChunk) {
+  const auto requests = All<SendChunkRequest>(Tell(Assignment(1, {kSelf})));
+  ASSERT_FALSE(requests.empty());
+  const ChunkRequest& request = requests[0].request;
+  const auto trouble =
+      Sent<WorkerTrouble>(Tell(ChunkRefused{kEpoch, request.dataset, request.box, request.chunk, Status::NotFound("no such dataset")}));
+  ASSERT_THAT(trouble, SizeIs(1));
+  EXPECT_EQ(trouble[0].status, Status::NotFound("no such dataset"));
+}
+
+TEST_F(WorkerSlabsTest, KeepsSlabsForTheNextFrame) {
+  const auto first = All<StartRender>(Feed(Tell(Assignment(1, {kSelf}))));
+  ASSERT_THAT(first, SizeIs(1));
+  const Actions done = Rendered(first[0]);
+  ASSERT_THAT(Sent<GroupDone>(done), SizeIs(1));
+  EXPECT_EQ(Sent<GroupDone>(done)[0].reports.at(0).voxel_bytes, 128U * 128 * 72);
+  const Actions second = Tell(Assignment(2, {kSelf}));
+  EXPECT_THAT(All<SendChunkRequest>(second), IsEmpty());
+  ASSERT_THAT(All<StartRender>(second), SizeIs(1));
+  EXPECT_EQ(Sent<GroupDone>(Rendered(All<StartRender>(second)[0]))[0].reports.at(0).voxel_bytes, 0U);
+}
+
+TEST_F(WorkerSlabsTest, ALargerHaloReplacesTheSlabOnceItIsCopied) {
+  const auto first = All<StartRender>(Feed(Tell(Assignment(1, {kSelf}))));
+  Rendered(first.at(0));
+  GroupAssignment wider = Assignment(2, {kSelf});
+  wider.setup.halo = 16;
+  const Actions fed = Feed(Tell(wider));
+  ASSERT_THAT(All<StartRender>(fed), SizeIs(1));
+  EXPECT_THAT(All<DropSlab>(fed), IsEmpty());
+  EXPECT_THAT(All<DropSlab>(Rendered(All<StartRender>(fed)[0])), ElementsAre(testing::Field(&DropSlab::slab, first[0].slab)));
+  const Actions narrow = Tell(Assignment(3, {kSelf}));
+  EXPECT_THAT(All<SendChunkRequest>(narrow), IsEmpty()) << "the wider slab holds all that the narrower halo needs";
+  EXPECT_THAT(All<StartRender>(narrow), SizeIs(1));
+}
+
+TEST_F(WorkerSlabsTest, FetchesOfAResizedBoxWhatItDoesNotHold) {
+  const auto first = All<StartRender>(Feed(Tell(Assignment(1, {kSelf})))).at(0);
+  Rendered(first);
+  GroupAssignment resized = Assignment(2, {kSelf});
+  resized.group.placements[0].box = {{0, 0, 10}, {100, 128, 80}};
+  const Actions told = Tell(resized);
+  const auto open = All<OpenSlab>(told);
+  ASSERT_THAT(open, SizeIs(1));
+  ASSERT_THAT(open[0].copies, SizeIs(1));
+  EXPECT_EQ(open[0].copies[0].from, first.slab);
+  EXPECT_EQ(open[0].copies[0].box, (Box{{0, 0, 2}, {108, 128, 72}})) << "as far as the slab of 72 slices goes";
+  const auto requests = All<SendChunkRequest>(told);
+  ASSERT_THAT(requests, SizeIs(1));
+  EXPECT_EQ(requests[0].request.box, (Box{{0, 0, 72}, {108, 128, 88}}));
+  EXPECT_THAT(All<StartRender>(told), IsEmpty());
+  const auto second = All<StartRender>(Feed(told));
+  ASSERT_THAT(second, SizeIs(1));
+  const Actions done = Rendered(second[0]);
+  EXPECT_EQ(Sent<GroupDone>(done).at(0).reports.at(0).voxel_bytes, 108U * 128 * 16);
+
+  // A part of both is all there.
+  GroupAssignment within = Assignment(3, {kSelf});
+  within.group.placements[0].box = {{8, 8, 30}, {120, 120, 64}};
+  const Actions held = Tell(within);
+  EXPECT_THAT(All<SendChunkRequest>(held), IsEmpty());
+  EXPECT_THAT(All<StartRender>(held), SizeIs(1));
+}
+
+TEST_F(WorkerSlabsTest, FetchesAllWhereThereIsNoRoomForWhatItWouldCopyFrom) {
+  WorkerConfig config = Config();
+  config.cache_bytes = 128 * 128 * 150;
+  Start(config);
+  const auto first = All<StartRender>(Feed(Tell(Assignment(1, {kSelf})))).at(0);
+  Rendered(first);
+  GroupAssignment resized = Assignment(2, {kSelf});
+  resized.group.placements[0].box = {{0, 0, 10}, {128, 128, 80}};
+  const Actions told = Tell(resized);
+  EXPECT_THAT(All<DropSlab>(told), ElementsAre(testing::Field(&DropSlab::slab, first.slab)));
+  EXPECT_THAT(All<OpenSlab>(told).at(0).copies, IsEmpty());
+}
+
+TEST_F(WorkerSlabsTest, DropsTheOldestUnusedSlabAboveItsBudget) {
+  WorkerConfig config = Config();
+  config.cache_bytes = 2 * 128 * 128 * 80;
+  Start(config);
+  SlabKey oldest;
+  for (std::uint32_t group = 0; group < 2; ++group) {
+    const auto render = All<StartRender>(Feed(Tell(Assignment(1, {kSelf}, group, 3)))).at(0);
+    if (group == 0) oldest = render.slab;
+    Rendered(render);
+  }
+  EXPECT_THAT(All<DropSlab>(Tell(Assignment(1, {kSelf}, 2, 3))), ElementsAre(testing::Field(&DropSlab::slab, oldest)));
+}
+
+TEST_F(WorkerSlabsTest, AnotherCoordinatorMeansOtherVoxels) {
+  const auto first = All<StartRender>(Feed(Tell(Assignment(1, {kSelf})))).at(0);
+  Rendered(first);
+  Tell(Retire{kEpoch});
+  EXPECT_THAT(All<DropSlab>(Tell(WelcomeTo(1001))), IsEmpty()) << "the same coordinator: voxels stay";
+  Tell(Retire{kEpoch});
+  EXPECT_THAT(All<DropSlab>(Tell(WelcomeTo(1002, kEpoch + 1))), ElementsAre(testing::Field(&DropSlab::slab, first.slab)));
+}
+
+}  // namespace
+}  // namespace slabstream

@@ -1,0 +1,38 @@
+// SentTallies: what the messages of each rank took, kept until its report leaves this worker.
+//
+// A rank may send many messages of a group, in strips or to many others, and its report goes with the last of them; or with those of
+// another rank of this worker; or, from the display worker, with GroupDone. The machine counts none of that: it sees no bytes. Any thread.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "common/stats/report.h"
+#include "common/wire/ids.h"
+
+namespace slabstream {
+
+class SentTallies {
+ public:
+  // A message of `rank` with a payload of `bytes` was made from begin_ns on until end_ns, on the clock of MonotonicNow().
+  void Add(const GroupKey& key, std::uint32_t rank, std::size_t bytes, std::int64_t begin_ns, std::int64_t end_ns);
+
+  // Adds what is known of them to the reports of ranks of `key`, and forgets it.
+  void MoveInto(const GroupKey& key, std::vector<RankReport>& reports);
+
+  template <class Predicate>
+  void Forget(Predicate over) {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(tallies_, [&](const auto& tally) { return over(tally.first.first); });
+  }
+
+ private:
+  std::mutex mutex_;
+  std::map<std::pair<GroupKey, std::uint32_t>, RankReport> tallies_;  // by rank: its bytes and encoding; guarded by mutex_
+};
+
+}  // namespace slabstream
