@@ -130,7 +130,7 @@ class Comparison {
         summary_(Summarize(*volume_)),
         transfer_(MakeSetup(options, summary_, 0).transfer),
         grid_(CountOccupied(volume_->block, DrawnTable(transfer_, summary_, RendererOf(options)))),
-        work_(grid_, RendererOf(options), MedianExtinction(transfer_, summary_)) {}
+        work_(grid_, summary_.description.geometry.spacing, RendererOf(options), MedianExtinction(transfer_, summary_)) {}
 
   void Run(const Policy& policy) const {
     const LayoutRequest request{.summary = &summary_,

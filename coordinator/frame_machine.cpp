@@ -163,8 +163,9 @@ bool FrameMachine::State::StartNextFrame() {
   };
   std::optional<OpenRequest> request = queue.TakeNext(ready);
   if (!request) return false;
-  const FrameRequest& frame = request->submit.frame;
+  FrameRequest& frame = request->submit.frame;
   const DatasetTable::Entry& dataset = *datasets.Find(frame.dataset);
+  frame.policy = SettledPolicy(frame, dataset.summary->description.geometry);
   const Team team = TeamOf(roster.slots(), std::uint32_t(frame.policy.teams), frames.next_id());
   const Roster& slots = team.roster;
   const Layout* layout = nullptr;
@@ -196,7 +197,8 @@ bool FrameMachine::State::StartNextFrame() {
 MachineModel FrameMachine::State::DescribeMachine() const {
   std::vector<HostedWorker> workers;
   for (const Member& member : roster.members())
-    workers.push_back({member.description.memory_scope, member.description.threads, member.description.pid});
+    workers.push_back(
+        {member.description.memory_scope, member.description.lends_memory, member.description.threads, member.description.pid});
   return ServiceMachine(workers, config.surroundings);
 }
 

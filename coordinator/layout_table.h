@@ -24,7 +24,7 @@ namespace slabstream {
 class LayoutTable {
  public:
   static constexpr std::size_t kMaxKept = 16;   // layouts
-  static constexpr std::size_t kMaxLearnt = 4;  // costs: as large as an OccupancyGrid each, four times over
+  static constexpr std::size_t kMaxLearnt = 4;  // costs: two thirds of an OccupancyGrid each
   static constexpr double kLeastWeight = 0.2;   // of a frame, however many there were before it: older ones fade by a fifth a frame
 
   // Quick at first, then patient: before its n-th change a layout must have been measured for n - 1 frames, 1 at least and at most this

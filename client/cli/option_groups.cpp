@@ -134,9 +134,9 @@ void AddLookOptions(CLI::App& app, FrameRequest& request, PictureFormat& format)
 void AddPolicyOptions(CLI::App& app, Policy& policy) {
   AddNamed(app, "--decomposition", policy.decomposition, Decompositions(), "How the volume is divided", kLeftToThePlanner)
       ->default_str(policy.decomposition);
-  AddChoice<AxisChoice, 4>(app, "--axis", policy.axis, {"x", "y", "z", "auto"},
-                           {AxisChoice::kX, AxisChoice::kY, AxisChoice::kZ, AxisChoice::kAuto},
-                           "Axis that slabs are cut along, and other boxes first")
+  AddChoice<AxisChoice, 5>(app, "--axis", policy.axis, {"x", "y", "z", "auto", "view"},
+                           {AxisChoice::kX, AxisChoice::kY, AxisChoice::kZ, AxisChoice::kAuto, AxisChoice::kView},
+                           "Axis that slabs are cut along, and other boxes first; view: the one nearest to the view direction")
       ->default_str("auto");
   AddNamed(app, "--split", policy.split, WorkSplits(), "What boxes have equal shares of")->default_str(policy.split);
   AddNamed(app, "--assignment", policy.assignment, Assignments(), "Who owns which box", kLeftToThePlanner)->default_str(policy.assignment);

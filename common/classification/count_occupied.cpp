@@ -3,8 +3,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -17,12 +15,23 @@ namespace {
 
 static_assert(kBrick % kOccupancyCell == 0, "a cell lies in one brick");
 
-// Of the mask of a cell's row: the basic x86-64 instruction set has no such instruction.
-constexpr auto kBitCount = [] {
-  std::array<std::uint8_t, 1 << kOccupancyCell> counts{};
-  for (std::size_t mask = 0; mask < counts.size(); ++mask) counts[mask] = std::uint8_t(std::popcount(mask));
-  return counts;
-}();
+// A layer of a cell: bit kOccupancyCell * y + x.
+using Layer = std::uint64_t;
+
+// Its rows that hold any, bit y.
+constexpr std::uint32_t RowsOf(Layer layer) {
+  constexpr Layer kLow = 0x7F7F7F7F7F7F7F7F;
+  const Layer any = (((layer & kLow) + kLow) | layer) & ~kLow;  // the highest bit of each row
+  return std::uint32_t((any >> 7) * 0x0102040810204080 >> 56);
+}
+
+// Its columns that hold any, bit x.
+constexpr std::uint32_t ColumnsOf(Layer layer) {
+  layer |= layer >> 32;
+  layer |= layer >> 16;
+  layer |= layer >> 8;
+  return std::uint32_t(layer & 0xFF);
+}
 
 // Whether a sample is occupied, 0 or 1: of integers by table.
 template <class T>
@@ -63,18 +72,20 @@ std::uint32_t RowMask(const T* row, std::int32_t count, const Occupied<T>& occup
 template <class T>
 CellOccupancy CountCell(const BrickView<T>& brick, const Box& cell, const Occupied<T>& occupied) {
   if (brick.y_stride == 0) return occupied(*brick.first) != 0 ? FullCell(cell) : CellOccupancy{};
-  int voxels = 0, rows_x = 0, rows_y = 0;
+  CellOccupancy counted;
   for (std::int32_t z = cell.begin.z; z < cell.end.z; ++z) {
-    std::uint32_t columns = 0;  // of the slice, that any row has
+    Layer layer = 0;
     for (std::int32_t y = cell.begin.y; y < cell.end.y; ++y) {
-      const std::uint32_t mask = RowMask(brick.Row(y, z) + (cell.begin.x - brick.begin.x), cell.size().x, occupied);
-      voxels += kBitCount[mask];
-      rows_x += mask != 0 ? 1 : 0;
-      columns |= mask;
+      const Layer row = RowMask(brick.Row(y, z) + (cell.begin.x - brick.begin.x), cell.size().x, occupied);
+      layer |= row << kOccupancyCell * (y - cell.begin.y);
     }
-    rows_y += kBitCount[columns];
+    if (layer == 0) continue;
+    const std::int32_t first_line = kOccupancyCell * (z - cell.begin.z);
+    counted.lines_x |= LineSet{RowsOf(layer)} << first_line;
+    counted.lines_y |= LineSet{ColumnsOf(layer)} << first_line;
+    counted.voxels = std::uint16_t(counted.voxels + CountOf(layer));
   }
-  return {std::uint16_t(voxels), std::uint8_t(rows_x), std::uint8_t(rows_y)};
+  return counted;
 }
 
 template <class T>

@@ -19,6 +19,10 @@ struct DecompositionRequest {
   int together = 1;       // boxes of a group: of a whole number of groups, each is a subtree, and so follows one another in any view
   Axis axis = Axis::kZ;   // which axis is cut (slabs), first (beams), or where two are as good as each other
   std::int32_t halo = 0;  // voxels: a box that has no work nearer than that is empty
+  // A partition of the same volume into as many boxes by the same decomposition: it is resized. Planes move to where the work is halved
+  // now, but keep their axes and how many boxes lie on either side, so that work which is known of the old boxes tells of the new ones.
+  const Partition* resized = nullptr;
+  int shape = 0;  // [0, DecompositionEntry::shapes)
 };
 
 struct DecompositionEntry {
@@ -27,6 +31,7 @@ struct DecompositionEntry {
   Partition (*make)(const DecompositionRequest&);
   std::string_view split;  // what its boxes have equal shares of, unless told otherwise: a name of WorkSplits()
   bool one_axis;           // cuts one axis only, which must have slices enough
+  int shapes = 1;          // into which it can cut the same work; which is quickest to render depends on the volume
 };
 
 // The only list.
@@ -42,8 +47,9 @@ Partition MakeSubcubes(const DecompositionRequest& request);
 // work.
 Partition MakeOctree(const DecompositionRequest& request);
 // A kd-tree: boxes hug what is occupied. Empty space at least kLeastCut voxels thick is cut away from a box before it is divided, at equal
-// work, across `axis` while that leaves boxes of two halos, else across its longest side. What was cut away are boxes of the partition,
-// too, numbered after the `boxes` others.
+// work, across `axis` down to boxes of a few halos, as `shape` has it, else across its longest side. What was cut away are
+// boxes of the partition, too, numbered after the `boxes` others.
+inline constexpr int kKdTreeShapes = 3;
 Partition MakeKdTree(const DecompositionRequest& request);
 
 }  // namespace slabstream

@@ -8,7 +8,7 @@ const std::vector<DecompositionEntry>& Decompositions() {
       {"beam", "boxes cut along two axes, --axis first", MakeBeams, "voxels", false},
       {"subcube", "boxes cut along all three axes", MakeSubcubes, "voxels", false},
       {"octree", "eighths of eighths, at least as many as wanted", MakeOctree, "voxels", false},
-      {"kd-tree", "boxes that hug what is occupied, empty space cut away", MakeKdTree, "occupied", false},
+      {"kd-tree", "boxes that hug what is occupied, empty space cut away", MakeKdTree, "occupied", false, kKdTreeShapes},
   };
   return entries;
 }

@@ -1,7 +1,10 @@
 #include "common/decomposition/grow_tree.h"
 
 #include <algorithm>
+#include <optional>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "common/base/check.h"
 
@@ -17,15 +20,49 @@ struct Run {
   std::int64_t first = 0, whole = 1;
 };
 
+// How an earlier partition was cut: a walk from its root down, past what it cut away.
+class Pattern {
+ public:
+  Pattern() = default;
+  // The first `boxes` boxes of the partition hold something.
+  Pattern(const Partition& partition, std::int64_t boxes) : nodes_(partition.nodes()), filled_(nodes_.size()) { Count(0, boxes); }
+
+  struct Cut {
+    Axis axis;
+    std::int64_t lower_boxes;
+    std::uint32_t lower, upper;
+  };
+  static constexpr std::uint32_t kRoot = 0;
+  // How the `boxes` >= 2 boxes below a node were divided; none if there are not as many.
+  std::optional<Cut> At(std::uint32_t node, std::int64_t boxes) const {
+    if (nodes_.empty() || filled_[node] != boxes) return std::nullopt;
+    while (filled_[nodes_[node].lower] == 0 || filled_[nodes_[node].upper] == 0) {
+      node = filled_[nodes_[node].lower] == 0 ? nodes_[node].upper : nodes_[node].lower;
+    }
+    return Cut{nodes_[node].axis, filled_[nodes_[node].lower], nodes_[node].lower, nodes_[node].upper};
+  }
+
+ private:
+  std::int64_t Count(std::uint32_t node, std::int64_t boxes) {
+    const Node& n = nodes_[node];
+    return filled_[node] = n.leaf ? (n.box < boxes ? 1 : 0) : Count(n.lower, boxes) + Count(n.upper, boxes);
+  }
+
+  std::span<const Node> nodes_;
+  std::vector<std::int64_t> filled_;  // boxes below each node
+};
+
 class TreeGrower {
  public:
   TreeGrower(const DecompositionRequest& request, const GrowOptions& options)
-      : request_(request), options_(options), bounds_{{0, 0, 0}, request.work->size()} {}
+      : request_(request), options_(options), bounds_{{0, 0, 0}, request.work->size()} {
+    if (request.resized != nullptr) pattern_ = Pattern(*request.resized, request.boxes);
+  }
 
   Partition Grow() {
     CHECK_GE(request_.boxes, 1);
     const std::int64_t boxes = std::min<std::int64_t>(request_.boxes, Room(bounds_));
-    GrowBox(bounds_, boxes, {});
+    GrowBox(bounds_, boxes, {}, Pattern::kRoot);
     BoxId id = 0;
     for (const std::uint32_t leaf : filled_) nodes_[leaf].box = id++;
     for (const std::uint32_t leaf : empty_) nodes_[leaf].box = id++;
@@ -58,18 +95,20 @@ class TreeGrower {
     return number;
   }
 
-  // The root of `boxes` >= 1 boxes in `box`, which has room for them.
-  std::uint32_t GrowBox(const Box& box, std::int64_t boxes, Run run) {
+  // The root of `boxes` >= 1 boxes in `box`, which has room for them. `like`: the node of the pattern that tells how, if it does.
+  std::uint32_t GrowBox(const Box& box, std::int64_t boxes, Run run, std::uint32_t like) {
     if (options_.cut_away_empty) {
       const Box hull = Hull(box);
       if (hull.empty()) return AddLeaf(empty_);
-      if (hull != box && Room(hull) >= boxes) return CutAway(box, hull, boxes);
+      if (hull != box && Room(hull) >= boxes) return CutAway(box, hull, boxes, like);
     }
     if (boxes == 1) return AddLeaf(filled_);
-    const Axis axis = ChooseAxis(box);
+    std::optional<Pattern::Cut> pattern = pattern_.At(like, boxes);
+    if (pattern && box.size()[pattern->axis] < 2) pattern.reset();  // a single slice now
+    const Axis axis = pattern ? pattern->axis : ChooseAxis(box);
     if (run.box.empty() || run.axis != axis) run = {axis, box, 0, boxes};
 
-    std::int64_t lower_boxes = LowerHalf(boxes);
+    std::int64_t lower_boxes = pattern ? pattern->lower_boxes : LowerHalf(boxes);
     const std::int64_t layer = Room(box) / box.size()[axis];  // boxes that one slice has room for
     const auto slices = [layer](std::int64_t count) { return std::int32_t((count + layer - 1) / layer); };
     const std::int32_t first = box.begin[axis] + slices(lower_boxes), last = box.end[axis] - slices(boxes - lower_boxes);
@@ -85,8 +124,8 @@ class TreeGrower {
     Run upper_run = run;
     upper_run.first += lower_boxes;
     return Cut(
-        box, axis, position, [&](const Box& lower) { return GrowBox(lower, lower_boxes, run); },
-        [&](const Box& upper) { return GrowBox(upper, boxes - lower_boxes, upper_run); });
+        box, axis, position, [&](const Box& lower) { return GrowBox(lower, lower_boxes, run, pattern ? pattern->lower : like); },
+        [&](const Box& upper) { return GrowBox(upper, boxes - lower_boxes, upper_run, pattern ? pattern->upper : like); });
   }
 
   // Whole groups stay together, as far as there are several.
@@ -117,9 +156,11 @@ class TreeGrower {
     return hull;
   }
 
-  std::uint32_t CutAway(const Box& box, const Box& hull, std::int64_t boxes) {
+  std::uint32_t CutAway(const Box& box, const Box& hull, std::int64_t boxes, std::uint32_t like) {
     const auto empty = [&](const Box&) { return AddLeaf(empty_); };
-    const auto rest = [&](const Box& smaller) { return smaller == hull ? GrowBox(hull, boxes, {}) : CutAway(smaller, hull, boxes); };
+    const auto rest = [&](const Box& smaller) {
+      return smaller == hull ? GrowBox(hull, boxes, {}, like) : CutAway(smaller, hull, boxes, like);
+    };
     for (const Axis axis : kAxes) {
       if (hull.begin[axis] > box.begin[axis]) return Cut(box, axis, hull.begin[axis], empty, rest);
       if (hull.end[axis] < box.end[axis]) return Cut(box, axis, hull.end[axis], rest, empty);
@@ -131,6 +172,7 @@ class TreeGrower {
   const DecompositionRequest& request_;
   const GrowOptions& options_;
   const Box bounds_;
+  Pattern pattern_;
   std::vector<Node> nodes_;
   std::vector<std::uint32_t> filled_, empty_;  // leaves, in the order of the tree
 };

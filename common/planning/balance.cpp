@@ -95,14 +95,19 @@ std::optional<Layout> Rebalance(const Layout& now, std::span<const double> secon
 
   Policy by_cost = *request.policy;
   by_cost.split = "cost";
-  LayoutRequest anew = request;
-  anew.policy = &by_cost;
-  Layout cut_anew = MakeLayout(anew);
+  LayoutRequest other_boxes = request;
+  other_boxes.policy = &by_cost;
   const auto predicted = [&](const Layout& layout) {
     return FrameSeconds(layout, request.slots, PredictedSeconds(layout, *request.known.cost));
   };
+  const double before = predicted(now);
+  Layout cut_anew = MakeLayout(other_boxes);
   const double after_cut = predicted(cut_anew);
-  weigh(std::move(cut_anew), predicted(now), after_cut);
+  other_boxes.resized = &now.partition;
+  Layout resized = MakeLayout(other_boxes);
+  const double after_resizing = predicted(resized);
+  weigh(std::move(resized), before, after_resizing);
+  if (after_cut < (1 - terms.least_gain_of_new_boxes) * after_resizing) weigh(std::move(cut_anew), before, after_cut);
   return chosen;
 }
 

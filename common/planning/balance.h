@@ -1,7 +1,8 @@
 // Dynamic balance: whether a layout should change between two frames, given what rendering costs where. Pure.
 //
-// Two changes are weighed. Boxes are cut anew, at equal learnt cost; or they stay, and some are handed over from slots that have much to do
-// to slots that have little. A change moves voxels: of every box, with its halo, what its slot did not hold before travels to it. It is
+// Three changes are weighed. Boxes stay, and some are handed over from slots that have much to do to slots that have little; or they are
+// resized at equal learnt cost; or they are cut anew, where that is predicted to be better by far: of boxes that are quite different what
+// was learnt tells little. A change moves voxels: of every box, with its halo, what its slot did not hold before travels to it. It is
 // made if the frames to come win more time than that takes, and a share of the frame's time that noise alone would hardly pretend.
 #pragma once
 
@@ -18,6 +19,7 @@ struct BalanceTerms {
   double bytes_per_second = 5e8;  // at which voxels reach their new owners and are made ready to be rendered
   double frames = 1000;           // over which a change must pay
   double least_gain = 0.02;  // share of the frame's render time that a change must win; twice that after one frame, and so on (1 + 1/n)
+  double least_gain_of_new_boxes = 0.1;  // share of the frame's render time that boxes cut anew must win beside resized ones
 };
 
 // What each box of a layout should take, by box, if cells cost what `cost` says; 0 of those that nobody renders.

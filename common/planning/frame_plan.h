@@ -101,6 +101,9 @@ struct Roster {
 // large). The request must be valid.
 Result<FrameSetup> MakeFrameSetup(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary);
 
+// The policy of the request, whose view settles what depends on it: AxisChoice::kView. The request must be valid.
+Policy SettledPolicy(const FrameRequest& request, const VolumeGeometry& geometry);
+
 // Pure. Errors: InvalidArgument (an unknown name of the policy, or one that is left open), NotFound (no such preset), Unavailable (no
 // worker in the roster). The request must be valid (Validate). Null `layout`: MakeLayout, with what the volume's summary knows; else one
 // that was made for this volume, transfer function and policy and for as many slots as the roster has.

@@ -19,16 +19,19 @@ inline constexpr double kDefaultTermination = 1.0 / 1024, kMaxTermination = 0.5;
 inline constexpr double kMaxPixelError = 0.1;
 inline constexpr std::size_t kMaxNameBytes = 256;
 
-enum class AxisChoice : std::uint8_t { kX = 0, kY = 1, kZ = 2, kAuto = 3 };
+// kAuto: z, or the longest axis of slabs (SlabAxis), so that turning the view never moves voxels. kView: the axis along which the slices of
+// the frame are traversed, so that no slice is divided; each of the three axes has a layout of its own, whose voxels workers fetch when a
+// view first needs it.
+enum class AxisChoice : std::uint8_t { kX = 0, kY = 1, kZ = 2, kAuto = 3, kView = 4 };
 
 struct Policy {
-  std::string decomposition = "slab";   // a name of Decompositions(), or "auto" (kAutomatic), as the other names
-  std::string split = "auto";           // of WorkSplits(): what boxes have equal shares of
-  AxisChoice axis = AxisChoice::kAuto;  // auto: the volume's longest axis, so that turning the view never moves voxels
-  int groups = 0;                       // [1, kMaxGroups]; 0: the planner chooses
-  std::string assignment = "cyclic";    // of Assignments(), or "auto": who owns which box
-  std::string balance = "static";       // of BalanceModes(): whether boxes change while frames go by
-  std::string combine = "fan-in";       // a scheme with its arguments (common/combining/schemes.h), or "auto"
+  std::string decomposition = "slab";  // a name of Decompositions(), or "auto" (kAutomatic), as the other names
+  std::string split = "auto";          // of WorkSplits(): what boxes have equal shares of
+  AxisChoice axis = AxisChoice::kAuto;
+  int groups = 0;                     // [1, kMaxGroups]; 0: the planner chooses
+  std::string assignment = "cyclic";  // of Assignments(), or "auto": who owns which box
+  std::string balance = "static";     // of BalanceModes(): whether boxes change while frames go by
+  std::string combine = "fan-in";     // a scheme with its arguments (common/combining/schemes.h), or "auto"
   // How far a channel of the picture may be moved by sending colours in fewer bits between workers: [0, kMaxPixelError]; 0: not at all.
   double pixel_error = 0;
   int teams = 1;  // [1, kMaxTeams]: that frames go to in turn (common/planning/team.h); 1: all workers share every frame

@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <tuple>
 
 #include "common/base/check.h"
 #include "common/base/find_named.h"
@@ -89,7 +90,7 @@ class WorkFields {
 struct LayoutMaker::State {
   explicit State(const LayoutRequest& r) : request(r), fields(request) {}
 
-  Partition MakePartition(const Policy& policy, int groups, const WorkField& field) {
+  Partition MakePartition(const Policy& policy, int groups, const WorkField& field, const Partition* resized = nullptr, int shape = 0) {
     const Index3& size = request.summary->description.geometry.size;
     const std::int64_t slots = request.slots, voxels = Box{{0, 0, 0}, size}.voxel_count();
     return FindNamed(Decompositions(), policy.decomposition)
@@ -98,7 +99,9 @@ struct LayoutMaker::State {
                 .most_boxes = int(std::min(kMaxGroups * slots, kMostBoxes)),
                 .together = int(std::min(slots, kMostBoxes)),
                 .axis = SlabAxis(policy, size),
-                .halo = kHalo});
+                .halo = kHalo,
+                .resized = resized,
+                .shape = shape});
   }
 
   bool SlabsFit(const Partition& partition) {
@@ -110,7 +113,10 @@ struct LayoutMaker::State {
   }
 
   const RenderWork& Work() {
-    if (!work) work.emplace(fields.Grid(), request.renderer, MedianExtinction(*request.transfer, *request.summary));
+    if (!work) {
+      const Vec3& spacing = request.summary->description.geometry.spacing;
+      work.emplace(fields.Grid(), spacing, request.renderer, MedianExtinction(*request.transfer, *request.summary));
+    }
     return *work;
   }
 
@@ -122,54 +128,82 @@ struct LayoutMaker::State {
   }
 
   Layout Assign(Partition partition, const Policy& policy) {
+    const AssignmentEntry& assignment = *FindNamed(Assignments(), policy.assignment);
     std::vector<BoxId> filled;
     std::vector<double> costs;
     for (BoxId box = 0; box < partition.boxes().size(); ++box) {
       if (!fields.Shows(partition.boxes()[box])) continue;
       filled.push_back(box);
-      costs.push_back(CostOf(partition.boxes()[box], policy));
+      costs.push_back(assignment.by_cost ? CostOf(partition.boxes()[box], policy) : 1);
     }
     Layout layout{std::move(partition), {}};
     layout.owners.assign(layout.partition.boxes().size(), kNoSlot);
-    const std::vector<std::uint32_t> owners = FindNamed(Assignments(), policy.assignment)->assign({costs, request.slots});
+    const std::vector<std::uint32_t> owners = assignment.assign({costs, request.slots});
     for (std::size_t i = 0; i < filled.size(); ++i) layout.owners[filled[i]] = owners[i];
     return layout;
   }
 
-  // Render times, of a frame and of its boxes.
+  // Of a layout: the render time of a frame, on average over views, and of each box the share of all work that it has in the view where it
+  // has most. Boxes of equal work on average may each be the slowest in some view; boxes that are equal by this measure are so in all.
   struct Foretold {
     double frame = 0;
-    std::vector<BoxSeconds> boxes;
+    std::vector<BoxSeconds> shares;
   };
   Foretold Foretell(const Layout& layout) {
+    constexpr std::size_t kViews = std::tuple_size_v<RenderWork::ByView>;
     Foretold foretold;
-    std::vector<double> along_x(request.slots), along_y(request.slots);
+    std::vector<RenderWork::ByView> times, slots(request.slots);
+    RenderWork::ByView sum{};
     for (std::size_t box = 0; box < layout.owners.size(); ++box) {
       if (layout.owners[box] == kNoSlot) continue;
-      const auto [x, y] = Work().Of(layout.partition.boxes()[box]);
-      foretold.boxes.push_back({layout.partition.boxes()[box], (x + y) / 2});
-      along_x[layout.owners[box]] += x;
-      along_y[layout.owners[box]] += y;
+      foretold.shares.push_back({layout.partition.boxes()[box]});
+      times.push_back(Work().Of(layout.partition.boxes()[box]));
+      for (std::size_t view = 0; view < kViews; ++view) {
+        slots[layout.owners[box]][view] += times.back()[view];
+        sum[view] += times.back()[view];
+      }
     }
-    foretold.frame = (*std::ranges::max_element(along_x) + *std::ranges::max_element(along_y)) / 2;
+    for (std::size_t view = 0; view < kViews; ++view) {
+      if (sum[view] == 0) continue;
+      for (std::size_t i = 0; i < times.size(); ++i) {
+        foretold.shares[i].seconds = std::max(foretold.shares[i].seconds, times[i][view] / sum[view]);
+      }
+      foretold.frame += std::ranges::max(slots, {}, [view](const RenderWork::ByView& slot) { return slot[view]; })[view] / kViews;
+    }
     return foretold;
   }
 
-  Layout MakeByForetoldWork(const Policy& policy, int groups) {
-    constexpr int kRounds = 4;
+  // Layouts that are made one from the other: each by what is foretold of the last one's boxes.
+  struct Refined {
+    explicit Refined(const OccupancyGrid& grid) : cost(grid) {}
+    LearntCost cost;
     Layout best;
-    double least = std::numeric_limits<double>::infinity();
-    LearntCost cost(fields.Grid());
-    for (int round = 0; round < kRounds; ++round) {
-      const WorkField field = cost.Field();
-      Layout layout = Assign(MakePartition(policy, groups, field), policy);
-      const Foretold foretold = Foretell(layout);
-      cost.Learn(foretold.boxes, 1);
-      if (foretold.frame >= least) continue;
-      least = foretold.frame;
-      best = std::move(layout);
+    double frame = std::numeric_limits<double>::infinity();  // of the best one
+  };
+  void Refine(const Policy& policy, int groups, int shape, const Partition* resized, Refined& refined) {
+    const WorkField field = refined.cost.Field();
+    Layout layout = Assign(MakePartition(policy, groups, field, resized, shape), policy);
+    const Foretold foretold = Foretell(layout);
+    refined.cost.Learn(foretold.shares, 1);
+    if (foretold.frame >= refined.frame) return;
+    refined.frame = foretold.frame;
+    refined.best = std::move(layout);
+  }
+
+  // Boxes are cut anew at first, of each shape, then those of the best shape are resized.
+  Layout MakeByForetoldWork(const Policy& policy, int groups) {
+    constexpr int kCuts = 2, kResizings = 3;
+    std::optional<Refined> best;
+    for (int shape = 0; shape < FindNamed(Decompositions(), policy.decomposition)->shapes; ++shape) {
+      Refined refined(fields.Grid());
+      for (int cut = 0; cut < kCuts; ++cut) Refine(policy, groups, shape, nullptr, refined);
+      if (!best || refined.frame < best->frame) best.emplace(std::move(refined));
     }
-    return best;
+    for (int i = 0; i < kResizings; ++i) {
+      const Partition of = best->best.partition;
+      Refine(policy, groups, 0, &of, *best);
+    }
+    return std::move(best->best);
   }
 
   const LayoutRequest request;
@@ -196,7 +230,7 @@ Layout LayoutMaker::Make(const Policy& policy) {
   if (split == WorkSplit::kOccupied || (split == WorkSplit::kCost && state_->request.known.cost == nullptr)) {
     return state_->MakeByForetoldWork(policy, groups);
   }
-  return state_->Assign(state_->MakePartition(policy, groups, state_->fields.Of(split)), policy);
+  return state_->Assign(state_->MakePartition(policy, groups, state_->fields.Of(split), state_->request.resized), policy);
 }
 
 Status CheckNames(const Policy& policy) {
@@ -228,6 +262,7 @@ bool NeedsOccupancy(const Policy& policy) {
 }
 
 Axis SlabAxis(const Policy& policy, const Index3& size) {
+  CHECK(policy.axis != AxisChoice::kView);
   if (policy.axis != AxisChoice::kAuto) return Axis(policy.axis);
   // z, about which views turn: slabs one above the other hide little of each other from most sides, so none of them is rendered in vain.
   Axis longest = Axis::kZ;

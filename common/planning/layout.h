@@ -37,11 +37,12 @@ bool NeedsOccupancy(const Policy& policy);
 struct LayoutRequest {
   const VolumeSummary* summary = nullptr;
   const TransferFunction* transfer = nullptr;
-  const Policy* policy = nullptr;  // with names that there are (CheckNames), none of them left open
+  const Policy* policy = nullptr;  // with names that there are (CheckNames), none of them left open, and an axis that is settled
   RendererKind renderer = RendererKind::kSplat;
   std::uint32_t slots = 1;                                   // >= 1
   std::int64_t slab_bytes_target = std::int64_t{256} << 20;  // voxels of one slab at most, where slices allow it
   WorkKnowledge known;
+  const Partition* resized = nullptr;  // of a layout by the same policy: its boxes are resized (DecompositionRequest); null: cut anew
 };
 
 // Pure. Boxes with the halo of which nothing is visible belong to nobody; the others are numbered on for their assignment. Where boxes are
@@ -67,7 +68,8 @@ class LayoutMaker {
   std::unique_ptr<State> state_;
 };
 
-// The axis that is cut, or cut first: "auto" is z, but for slabs where another axis has more than twice as many slices.
+// The axis that is cut, or cut first: "auto" is z, but for slabs where another axis has more than twice as many slices. Not of kView, which
+// is settled first (SettledPolicy).
 Axis SlabAxis(const Policy& policy, const Index3& size);
 
 // What `split` of the policy comes to: "auto" is what suits the decomposition (and stays "auto" where that is left open).

@@ -33,7 +33,7 @@ class LearntCost {
   // A frame scales costs by factors between these: what is hidden today may be seen tomorrow.
   static constexpr double kLeastFactor = 0.1, kMostFactor = 10;
 
-  const Index3 size_;
+  Index3 size_;
   std::vector<double> cost_;  // by cell: seconds; until anything is learnt, work
   bool any_ = false;
 };

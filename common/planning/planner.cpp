@@ -72,9 +72,16 @@ std::vector<Placement> PlacementsOf(const FramePlan& plan) {
   return placements;
 }
 
+Policy SettledPolicy(const FrameRequest& request, const VolumeGeometry& geometry) {
+  Policy policy = request.policy;
+  if (policy.axis == AxisChoice::kView) policy.axis = AxisChoice(MakeCamera(request.view, request.size, geometry).traversal_axis);
+  return policy;
+}
+
 Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, const Roster& roster,
                             const CostModel& cost, const Layout* layout, const Turn& turn) {
-  if (Status status = CheckChosen(request.policy); !status.ok()) return status;
+  const Policy policy = SettledPolicy(request, summary.description.geometry);
+  if (Status status = CheckChosen(policy); !status.ok()) return status;
   Result<FrameSetup> setup = MakeFrameSetup(request, dataset, summary);
   if (!setup.ok()) return setup.status();
 
@@ -82,17 +89,17 @@ Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, cons
   plan.turn = turn;
   plan.setup = *std::move(setup);
   plan.slots = std::uint32_t(roster.slots.size());
-  plan.slab_axis = SlabAxis(request.policy, summary.description.geometry.size);
-  plan.split = SplitOf(request.policy);
-  plan.combine = request.policy.combine;
-  plan.pixel_error = request.policy.pixel_error;
+  plan.slab_axis = SlabAxis(policy, summary.description.geometry.size);
+  plan.split = SplitOf(policy);
+  plan.combine = policy.combine;
+  plan.pixel_error = policy.pixel_error;
 
   // Where the boxes are, and whose.
   const std::uint32_t slots = std::max<std::uint32_t>(plan.slots, 1);
   plan.layout = layout != nullptr ? *layout
                                   : MakeLayout({.summary = &summary,
                                                 .transfer = &plan.setup.transfer,
-                                                .policy = &request.policy,
+                                                .policy = &policy,
                                                 .renderer = request.renderer,
                                                 .slots = slots,
                                                 .slab_bytes_target = cost.slab_bytes_target});

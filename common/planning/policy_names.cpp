@@ -24,7 +24,7 @@ std::optional<WorkSplit> FindWorkSplit(std::string_view name) {
 const std::vector<NamedChoice>& BalanceModes() {
   static const std::vector<NamedChoice> choices = {
       {kStaticBalance, "boxes stay as they were made"},
-      {kDynamicBalance, "boxes are cut anew between frames where what is won pays for the voxels that move"},
+      {kDynamicBalance, "boxes are resized between frames where what is won pays for the voxels that move"},
   };
   return choices;
 }

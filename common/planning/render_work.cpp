@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
+#include "common/planning/cell_range.h"
+
 namespace slabstream {
 namespace {
-
-constexpr double kRowsOfCell = kOccupancyCell * kOccupancyCell;
 
 // The smallest box that holds both, which are not empty.
 Box HullOf(const Box& a, const Box& b) {
@@ -20,21 +20,6 @@ Box HullOf(const Box& a, const Box& b) {
   }
   return hull;
 }
-
-// Cells of a box along one axis, and how much of each of them lies inside: of `box`, and of `reach` round it.
-struct CellRange {
-  CellRange(const Box& box, const Box& reach, Axis axis, const Index3& size)
-      : begin(reach.begin[axis] / kOccupancyCell), end((reach.end[axis] - 1) / kOccupancyCell + 1) {
-    for (std::int32_t cell = begin; cell < end; ++cell) {
-      own.push_back(CellShare(box, axis, cell, size));
-      reached.push_back(CellShare(reach, axis, cell, size));
-    }
-  }
-  std::size_t size() const { return own.size(); }
-
-  std::int32_t begin, end;
-  std::vector<double> own, reached;
-};
 
 }  // namespace
 
@@ -77,46 +62,16 @@ RenderWork::ByView RenderWork::Of(const Box& box) const { return renderer_ == Re
 RenderWork::ByView RenderWork::SplattingOf(const Box& box) const {
   ByView times{};
   for (const Axis along : {Axis::kX, Axis::kY}) {
-    const Seen from_below = See(box, along, true), from_above = See(box, along, false);
-    if (from_below.octets == 0) return {};
+    const SplatCounts counts = splatting_.Count(box, along);
+    if (counts.rows == 0) continue;
     times[std::size_t(Number(along))] =
-        kSplatBox + 0.5 * (kRow * (from_below.rows + from_above.rows) + kOctet * (from_below.octets + from_above.octets));
+        kSplatBox + kSlice * counts.slices + kRow * counts.rows + kSegment * counts.segments + kRun * counts.runs + kOctet * counts.octets;
   }
   return times;
 }
 
-RenderWork::Seen RenderWork::See(const Box& box, Axis along, bool ascending) const {
-  const Box reach = Grown(box, kRim, {{0, 0, 0}, grid_.size});
-  const Axis beam = along == Axis::kX ? Axis::kY : Axis::kX;
-  const CellRange slices(box, reach, along, grid_.size), beams(box, reach, beam, grid_.size), rows(box, reach, Axis::kZ, grid_.size);
-  const Index3 cells = OccupancyCells(grid_.size);
-  const auto step = [&](Axis axis) { return axis == Axis::kX ? std::size_t{1} : std::size_t(cells.x); };
-  Seen seen;
-  std::vector<double> open(beams.size());  // share of the rays through these cells that nothing has stopped yet
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    std::ranges::fill(open, 1.0);
-    for (std::size_t s = 0; s < slices.size(); ++s) {
-      const std::size_t slice = ascending ? s : slices.size() - 1 - s;
-      const CellOccupancy* cell = &grid_.cells[(std::size_t(rows.begin) + k) * std::size_t(cells.x) * std::size_t(cells.y) +
-                                               (std::size_t(slices.begin) + slice) * step(along) + std::size_t(beams.begin) * step(beam)];
-      double empty = 1;  // share of the beams that hold nothing to be seen
-      for (std::size_t i = 0; i < beams.size(); ++i, cell += step(beam)) {
-        if (cell->voxels == 0) continue;
-        const double along_beam = open[i] * (beam == Axis::kX ? cell->rows_x : cell->rows_y);
-        seen.octets += along_beam * beams.reached[i] * slices.reached[slice] * rows.reached[k];
-        empty *= 1 - along_beam / kRowsOfCell;
-        const double along_ray = along == Axis::kX ? cell->rows_x : cell->rows_y;
-        const double depth = extinction_ * cell->voxels / along_ray * slices.reached[slice];
-        open[i] *= 1 - along_ray / kRowsOfCell * std::min(1.0, depth / kOpaqueDepth);
-      }
-      seen.rows += kRowsOfCell * (1 - empty * empty) * slices.own[slice] * rows.reached[k];
-    }
-  }
-  return seen;
-}
-
 RenderWork::ByView RenderWork::ZBufferOf(const Box& box) const {
-  const CellRange x(box, box, Axis::kX, grid_.size), y(box, box, Axis::kY, grid_.size), z(box, box, Axis::kZ, grid_.size);
+  const CellRange x(box, Axis::kX), y(box, Axis::kY), z(box, Axis::kZ);
   const Index3 cells = OccupancyCells(grid_.size);
   double surface_cells = 0;
   Box drawn;  // cells that hold anything
@@ -129,7 +84,7 @@ RenderWork::ByView RenderWork::ZBufferOf(const Box& box) const {
         const Box place = Intersection(OccupancyCellBox({i, j, k}, grid_.size), box);
         drawn = drawn.empty() ? place : HullOf(drawn, place);
         if (cell.voxels == OccupancyCellBox({i, j, k}, grid_.size).voxel_count()) continue;  // inside
-        surface_cells += x.own[std::size_t(i - x.begin)] * y.own[std::size_t(j - y.begin)] * z.own[std::size_t(k - z.begin)];
+        surface_cells += x.ShareInside(i) * y.ShareInside(j) * z.ShareInside(k);
       }
     }
   }

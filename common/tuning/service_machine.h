@@ -10,6 +10,7 @@ namespace slabstream {
 
 struct HostedWorker {
   std::uint64_t memory_scope = 0;  // workers of the same scope share a host and read each other's memory (SharedMemoryScope); 0: unknown
+  bool lends_memory = true;        // its images stay where they are for those; else it sends them in messages
   std::uint32_t threads = 1;       // that render
   std::uint32_t pid = 0;           // of its process on that host: workers of one process make pictures by the threads of all; 0: unknown
   friend bool operator==(const HostedWorker&, const HostedWorker&) = default;
@@ -26,9 +27,10 @@ struct ServiceSurroundings {
   friend bool operator==(const ServiceSurroundings&, const ServiceSurroundings&) = default;
 };
 
-// Workers that all share a host lend each other their images and share its cores: those of the coordinator's host where that is theirs,
-// else as many as they have threads. Otherwise each worker counts as a host of its own behind `link`, images travel in messages, and the
-// slowest link there is decides. Constants as measured on two cores of an AMD EPYC (Zen 5) by client/lab/calibrate.h.
+// Workers that all share a host share its cores: those of the coordinator's host where that is theirs, else as many as they have threads.
+// They lend each other their images; if one of them does not, all images count as messages through the host's loopback. Otherwise each
+// worker counts as a host of its own behind `link`, images travel in messages, and the slowest link there is decides. Constants as measured
+// on two cores of an AMD EPYC (Zen 5) by client/lab/calibrate.h, the loopback's by bench/combining_bench.
 MachineModel ServiceMachine(std::span<const HostedWorker> workers, const ServiceSurroundings& surroundings);
 
 }  // namespace slabstream

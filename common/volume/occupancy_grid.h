@@ -31,16 +31,38 @@ constexpr double CellShare(const Box& box, Axis axis, std::int32_t cell, const I
   return double(std::max(std::min(box.end[axis], end) - std::max(box.begin[axis], begin), 0)) / (end - begin);
 }
 
+// A set of the lines of a cell that run along one of the axes x and y: bit kOccupancyCell * z + i is the line at z and at i along the other
+// one, both counted from the cell's first voxel.
+using LineSet = std::uint64_t;
+static_assert(kOccupancyCell * kOccupancyCell == 64, "a bit for each line");
+
+// The lines at [z_begin, z_end) and [begin, end) along the other axis: 0 <= begin <= end <= kOccupancyCell.
+constexpr LineSet LinesIn(std::int32_t z_begin, std::int32_t z_end, std::int32_t begin, std::int32_t end) {
+  const auto below = [](std::int32_t bit) { return bit == 64 ? ~LineSet{0} : (LineSet{1} << bit) - 1; };
+  constexpr LineSet kFirstOfEachLayer = 0x0101010101010101;
+  const LineSet layers = below(kOccupancyCell * z_end) & ~below(kOccupancyCell * z_begin);
+  return layers & kFirstOfEachLayer * (below(end) & ~below(begin));
+}
+
+// How many lines a set holds, by byte: one for each z. The basic x86-64 instruction set has no instruction for it, and the library's
+// function takes a call (Warren, "Hacker's Delight", 2002, section 5-1).
+constexpr LineSet CountsByLayer(LineSet lines) {
+  lines -= lines >> 1 & 0x5555555555555555;
+  lines = (lines & 0x3333333333333333) + (lines >> 2 & 0x3333333333333333);
+  return (lines + (lines >> 4)) & 0x0F0F0F0F0F0F0F0F;
+}
+constexpr int CountOf(LineSet lines) { return int(CountsByLayer(lines) * 0x0101010101010101 >> 56); }
+
 struct CellOccupancy {
-  std::uint16_t voxels = 0;             // occupied: [0, kOccupancyCell^3]
-  std::uint8_t rows_x = 0, rows_y = 0;  // of the cell's rows along x and along y, those that hold any: [0, kOccupancyCell^2]
+  LineSet lines_x = 0, lines_y = 0;  // of the lines along x (bits by z and y) and along y (by z and x), those that hold any occupied voxel
+  std::uint16_t voxels = 0;          // occupied: [0, kOccupancyCell^3]
   friend bool operator==(const CellOccupancy&, const CellOccupancy&) = default;
 };
 
 // Of a cell of these voxels, all of which are occupied.
 constexpr CellOccupancy FullCell(const Box& cell) {
   const Index3 size = cell.size();
-  return {std::uint16_t(cell.voxel_count()), std::uint8_t(size.y * size.z), std::uint8_t(size.x * size.z)};
+  return {LinesIn(0, size.z, 0, size.y), LinesIn(0, size.z, 0, size.x), std::uint16_t(cell.voxel_count())};
 }
 
 struct OccupancyGrid {

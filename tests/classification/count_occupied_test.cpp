@@ -4,8 +4,6 @@
 
 #include <cmath>
 #include <limits>
-#include <set>
-#include <tuple>
 
 #include "tests/support/random.h"
 #include "tests/support/random_transfer.h"
@@ -17,7 +15,6 @@ namespace {
 OccupancyGrid CountOneByOne(const Volume& volume, const ClassificationTable& table) {
   const Index3 size = volume.description.geometry.size, cells = OccupancyCells(size);
   OccupancyGrid grid{size, std::vector<CellOccupancy>(std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z))};
-  std::set<std::tuple<std::size_t, std::int32_t, std::int32_t, bool>> rows;  // that were counted
   VisitScalarType(volume.block.type, [&]<class T>(const T*) {
     for (Index3 v; v.z < size.z; ++v.z) {
       for (v.y = 0; v.y < size.y; ++v.y) {
@@ -29,8 +26,8 @@ OccupancyGrid CountOneByOne(const Volume& volume, const ClassificationTable& tab
               (std::size_t(cell.z) * std::size_t(cells.y) + std::size_t(cell.y)) * std::size_t(cells.x) + std::size_t(cell.x);
           CellOccupancy& counts = grid.cells[number];
           ++counts.voxels;
-          if (rows.insert({number, v.y, v.z, true}).second) ++counts.rows_x;
-          if (rows.insert({number, v.x, v.z, false}).second) ++counts.rows_y;
+          counts.lines_x |= LineSet{1} << (8 * (v.z % 8) + v.y % 8);
+          counts.lines_y |= LineSet{1} << (8 * (v.z % 8) + v.x % 8);
         }
       }
     }

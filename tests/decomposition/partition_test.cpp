@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "common/decomposition/decomposition.h"
@@ -63,11 +65,63 @@ TEST(Decompositions, EveryOneTilesTheVolumeForEveryNumberOfBoxes) {
                                                     .most_boxes = 2000,
                                                     .together = random.Integer(1, boxes),
                                                     .axis = axis,
-                                                    .halo = kHaloVoxels});
+                                                    .halo = kHaloVoxels,
+                                                    .shape = random.Integer(0, entry.shapes - 1)});
             ExpectTiles(partition, {{0, 0, 0}, size});
           }
         }
       }
+    }
+  }
+}
+
+// How a partition is cut, but for where: axes of the planes with something on both sides, and the boxes below.
+std::string PatternOf(const Partition& partition, std::uint32_t node, BoxId boxes) {
+  const Node& n = partition.nodes()[node];
+  if (n.leaf) return n.box < boxes ? "." : "";
+  const std::string lower = PatternOf(partition, n.lower, boxes), upper = PatternOf(partition, n.upper, boxes);
+  if (lower.empty() || upper.empty()) return lower + upper;
+  return std::string(1, Letter(n.axis)) + "(" + lower + upper + ")";
+}
+
+TEST(Decompositions, ResizedBoxesAreCutAlongTheSameAxes) {
+  Random random(76);
+  SCOPED_TRACE(random.trace());
+  for (const DecompositionEntry& entry : Decompositions()) {
+    for (int i = 0; i < 200; ++i) {
+      const Index3 size = {random.Integer(30, 90), random.Integer(30, 90), random.Integer(30, 90)};
+      const Box bounds = {{0, 0, 0}, size};
+      const WorkField work(RandomGrid(random, size)), other_work(RandomGrid(random, size));
+      DecompositionRequest request{.work = &work,
+                                   .boxes = random.Integer(1, 40),
+                                   .most_boxes = 2000,
+                                   .axis = kAxes[random.Integer<std::size_t>(0, 2)],
+                                   .halo = kHaloVoxels};
+      request.together = request.boxes;
+      const Partition made = entry.make(request);
+      request.resized = &made;
+      EXPECT_EQ(entry.make(request), made) << entry.name << ": the same work";
+      request.work = &other_work;
+      const Partition resized = entry.make(request);
+      ExpectTiles(resized, bounds);
+      // Uniform work fills every box, and there is room for all: nothing has to change but planes.
+      const WorkField voxels = WorkField::Uniform(size);
+      DecompositionRequest even = request;
+      even.work = &voxels;
+      even.resized = nullptr;
+      const Partition full = entry.make(even);
+      DecompositionRequest uneven = request;
+      std::vector<double> heavier =
+          CellWork({size, std::vector<CellOccupancy>(std::size_t(OccupancyCells(size).x) * std::size_t(OccupancyCells(size).y) *
+                                                         std::size_t(OccupancyCells(size).z),
+                                                     CellOccupancy{.voxels = 1})});
+      for (double& cell : heavier) cell *= random.Real(1, 3);
+      const WorkField heavier_work(size, heavier);
+      uneven.work = &heavier_work;
+      uneven.resized = &full;
+      const Partition moved = entry.make(uneven);
+      ExpectTiles(moved, bounds);
+      EXPECT_EQ(PatternOf(moved, 0, 2000), PatternOf(full, 0, 2000)) << entry.name;
     }
   }
 }
@@ -143,6 +197,18 @@ TEST(KdTree, CutsAwayNothingThatAnyBoxNeeds) {
     EXPECT_NEAR(sum, work.total(), 1e-9 * work.total());
   }
   EXPECT_GT(cut_away, 100U);
+}
+
+TEST(KdTree, ShapesDifferInHowThinBoxesAreAlongTheFirstAxis) {
+  const WorkField voxels = WorkField::Uniform({160, 160, 160});
+  std::set<std::int32_t> thinnest;
+  for (int shape = 0; shape < kKdTreeShapes; ++shape) {
+    const Partition partition = MakeKdTree({.work = &voxels, .boxes = 16, .axis = Axis::kZ, .halo = kHaloVoxels, .shape = shape});
+    std::int32_t height = 160;
+    for (const Box& box : partition.boxes()) height = std::min(height, box.size().z);
+    thinnest.insert(height);
+  }
+  EXPECT_EQ(thinnest, (std::set<std::int32_t>{10, 20, 40}));
 }
 
 TEST(KdTree, HugsWhatIsOccupied) {

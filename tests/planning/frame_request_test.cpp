@@ -48,7 +48,7 @@ TEST(ValidateFrameRequest, NamesFieldValueAndLimit) {
       {[](auto& r) { r.policy.split = ""; }, "policy.split has 0 bytes"},
       {[](auto& r) { r.policy.assignment = ""; }, "policy.assignment has 0 bytes"},
       {[&](auto& r) { r.policy.balance = long_name; }, "policy.balance has 257 bytes"},
-      {[](auto& r) { r.policy.axis = AxisChoice{4}; }, "policy.axis is 4, but must lie in [0, 3]"},
+      {[](auto& r) { r.policy.axis = AxisChoice{5}; }, "policy.axis is 5, but must lie in [0, 4]"},
       {[](auto& r) { r.policy.groups = -1; }, "policy.groups is -1, but must lie in [0, 1024]"},
       {[&](auto& r) { r.policy.combine = long_name; }, "policy.combine has 257 bytes"},
   };

@@ -71,7 +71,7 @@ TEST(PlanFrame, IsSoundForAnyWorkersGroupsAndSizes) {
     const VolumeSummary summary = FullSummary(size);
     for (int workers : {1, 2, 3, 5, 8, 13, 64}) {
       for (int groups : {0, 1, 2, 7, 40}) {
-        for (AxisChoice axis : {AxisChoice::kX, AxisChoice::kY, AxisChoice::kZ, AxisChoice::kAuto}) {
+        for (AxisChoice axis : {AxisChoice::kX, AxisChoice::kY, AxisChoice::kZ, AxisChoice::kAuto, AxisChoice::kView}) {
           SCOPED_TRACE(testing::Message() << size.x << "x" << size.y << "x" << size.z << ", " << workers << " workers, " << groups
                                           << " groups, axis " << int(axis));
           FrameRequest request = SomeRequest();
@@ -108,6 +108,24 @@ TEST(PlanFrame, UsesEveryNameOfAPolicy) {
         }
       }
     }
+  }
+}
+
+TEST(PlanFrame, SlabsAlongTheViewDivideNoSlice) {
+  Random random(92);
+  SCOPED_TRACE(random.trace());
+  const VolumeSummary summary = FullSummary({40, 90, 50});
+  const Roster roster = FullRoster(4);
+  FrameRequest request = SomeRequest();
+  request.policy.axis = AxisChoice::kView;
+  for (int i = 0; i < 50; ++i) {
+    request.view = RandomView(random);
+    const FramePlan plan = Plan(request, summary, roster);
+    EXPECT_EQ(plan.slab_axis, plan.setup.camera.traversal_axis);
+    // As if the axis had been asked for: other views along it share the layout.
+    FrameRequest same = request;
+    same.policy.axis = AxisChoice(plan.slab_axis);
+    EXPECT_EQ(plan, Plan(same, summary, roster));
   }
 }
 

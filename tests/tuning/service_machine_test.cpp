@@ -22,6 +22,21 @@ TEST(ServiceMachine, WorkersOfOneHostLendTheirImagesAndShareItsCores) {
   EXPECT_EQ(machine.threads, 2);
 }
 
+TEST(ServiceMachine, OneThatDoesNotLendMakesImagesOfTheHostTravel) {
+  const LinkModel slow{Contention::kSharedBus, 1e-3, 1e6};
+  std::vector<HostedWorker> workers(3, {.memory_scope = 7, .threads = 2});
+  const MachineModel lent = ServiceMachine(workers, Surroundings(slow));
+  workers[1].lends_memory = false;
+  const MachineModel machine = ServiceMachine(workers, Surroundings(slow));
+  EXPECT_TRUE(Validate(machine).ok());
+  EXPECT_EQ(machine.combining.rgba_bytes, MachineModel().combining.rgba_bytes);
+  EXPECT_GT(machine.combining.encode_pixel, 0);
+  EXPECT_LT(machine.link.bytes_per_second, lent.link.bytes_per_second);
+  EXPECT_EQ(machine.link.contention, Contention::kNone) << "within the host, not over the link between hosts";
+  EXPECT_EQ(machine.workers_a_host, 3);
+  EXPECT_EQ(machine.cores_a_host, 4);
+}
+
 TEST(ServiceMachine, WorkersOfOneProcessMakePicturesTogether) {
   std::vector<HostedWorker> workers(3, {.memory_scope = 7, .threads = 1, .pid = 99});
   EXPECT_EQ(ServiceMachine(workers, Surroundings({})).picture_threads, 3);

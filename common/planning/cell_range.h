@@ -1,0 +1,32 @@
+// CellRange: the cells of an OccupancyGrid that a box touches along one axis, and how much of each lies inside.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+#include "common/volume/occupancy_grid.h"
+
+namespace slabstream {
+
+class CellRange {
+ public:
+  // `box` is not empty.
+  CellRange(const Box& box, Axis axis)
+      : begin(box.begin[axis] / kOccupancyCell),
+        end((box.end[axis] - 1) / kOccupancyCell + 1),
+        first_voxel_(box.begin[axis]),
+        end_voxel_(box.end[axis]) {}
+
+  const std::int32_t begin, end;  // cells
+
+  // Of a cell's voxels, those inside the box, counted from the cell's first one.
+  std::int32_t FirstInside(std::int32_t cell) const { return std::max(first_voxel_ - cell * kOccupancyCell, 0); }
+  std::int32_t EndInside(std::int32_t cell) const { return std::min(end_voxel_ - cell * kOccupancyCell, kOccupancyCell); }
+  // Of kOccupancyCell.
+  double ShareInside(std::int32_t cell) const { return double(EndInside(cell) - FirstInside(cell)) / kOccupancyCell; }
+
+ private:
+  const std::int32_t first_voxel_, end_voxel_;
+};
+
+}  // namespace slabstream
