@@ -1,7 +1,7 @@
 // How far the simulation can be trusted: frames of the embedded service with one and two workers beside what is simulated of them
 // (client/lab/validate.h), and the cost model fitted to boxes of all sizes (common/simulation/cost_fit.h).
 //
-//   build/bin/simulation_bench CASE... [--size PIXELS_A_SIDE] [--views N] [--turns N] [--renderer splat|zbuffer] [--fit]
+//   build/bin/simulation_bench CASE... [--size PIXELS_A_SIDE] [--views N] [--turns N] [--renderer splat|zbuffer] [--fit [--repeats N]]
 //
 // CASE is one of `slabstream bench --list`, or FILE[:TRANSFER]. With --fit the boxes of all cases together give the constants.
 #include <fmt/format.h>
@@ -26,31 +26,40 @@ constexpr int kBoxCounts[] = {1, 2, 5, 12, 30};  // of the samples that the cost
 
 struct BenchOptions {
   std::vector<std::string> cases;
-  int size = 512, views = 6, turns = 5, repeats = 3;
+  int size = 512, views = 4, turns = 15, repeats = 3;
   std::string renderer;
   bool fit = false;
 };
 
+std::string Microseconds(const Estimate& e) { return fmt::format("{:.1f} us [{:.1f}, {:.1f}]", e.median * 1e6, e.low * 1e6, e.high * 1e6); }
+
+std::string Percent(const Estimate& e) { return fmt::format("{:.1f} % [{:.1f}, {:.1f}]", e.median * 100, e.low * 100, e.high * 100); }
+
 void PrintMachine() {
-  const MachineModel m = CalibrateThisHost(2).value();
-  const CombiningCosts& c = m.combining;
+  const Calibration calibration = CalibrateThisHost(2).value();
+  const CombiningCosts& c = calibration.machine.combining;
   fmt::print(
-      "ns a pixel: scan {:.3f}, encode {:.3f}, combine {:.3f}, local {:.3f}, hidden {:.3f}; us: task and hand-over {:.1f}, plan {:.1f}, "
-      "client {:.1f}; memory slowdown {:.3f}\n",
-      c.scan_pixel * 1e9, c.encode_pixel * 1e9, c.combine_pixel * 1e9, c.local_pixel * 1e9, c.hidden_pixel * 1e9, c.task * 1e6,
-      m.plan_seconds * 1e6, m.client_seconds * 1e6, m.memory_slowdown);
+      "ns a pixel: scan {:.3f}, encode {:.3f}, combine {:.3f}, local {:.3f}, hidden {:.3f}; hand-over to a thread that is awake {}, asleep "
+      "{}; "
+      "two halves of a sphere slow each other down by {}\n",
+      c.scan_pixel * 1e9, c.encode_pixel * 1e9, c.combine_pixel * 1e9, c.local_pixel * 1e9, c.hidden_pixel * 1e9,
+      Microseconds(calibration.hand_overs.awake), Microseconds(calibration.hand_overs.asleep), Percent(calibration.memory_slowdown));
 }
 
 void Validate(const BenchCase& c, const std::shared_ptr<const Volume>& volume, const BenchOptions& options) {
   for (const int workers : {1, 2}) {
     ValidationCase what{c.name, volume, BenchRequest(c, BenchView(Projection::kOrthographic, 0, 1), {options.size, options.size}), workers};
-    const ValidationRow row = ValidateSimulation(what, {options.views, options.turns, options.repeats}).value();
-    const auto parts = [](const FrameParts& p) {
-      return fmt::format("{:7.2f} ms (render {:6.2f}, picture {:5.2f}, beside {:5.2f})", p.latency * 1e3, p.render * 1e3, p.picture * 1e3,
-                         (p.latency - p.render - p.picture) * 1e3);
+    const ValidationRow row = ValidateSimulation(what, {options.views, options.turns}).value();
+    const auto parts = [](const FrameParts& p, double low, double high) {
+      return fmt::format("{:6.2f} ms [{:.2f}, {:.2f}] (render {:.2f}, picture {:.2f}, beside {:.2f})", p.latency * 1e3, low * 1e3,
+                         high * 1e3, p.render * 1e3, p.picture * 1e3, (p.latency - p.render - p.picture) * 1e3);
     };
-    fmt::print("{} {} workers: measured {}, simulated {}, off by {:+5.1f} %, at worst {:+5.1f} %; slowdown {:.3f}\n", row.name, row.workers,
-               parts(row.MeanMeasured()), parts(row.MeanSimulated()), row.error() * 100, row.worst_error() * 100, row.memory_slowdown);
+    const ValidatedView mean = row.Mean();
+    fmt::print("{} {} workers: measured {}, simulated {}, off by {:+.1f} %, at worst {:+.1f} %; hand-overs {}, {}{}\n", row.name,
+               row.workers, parts(mean.measured, mean.measured_low, mean.measured_high),
+               parts(mean.simulated, mean.simulated_low, mean.simulated_high), row.error() * 100, row.worst_error() * 100,
+               Microseconds(row.hand_overs.awake), Microseconds(row.hand_overs.asleep),
+               workers == 2 ? ", slowdown " + Percent(row.slowdown) : "");
     (void)std::fflush(stdout);
   }
 }
@@ -116,8 +125,10 @@ int main(int argc, char** argv) {
   app.add_option("case", options.cases, "standard case or FILE[:TRANSFER]")->required();
   app.add_option("--size", options.size, "pixels a side of the picture")->check(CLI::Range(16, 2048))->capture_default_str();
   app.add_option("--views", options.views, "azimuths over a turn")->check(CLI::Range(1, 1000))->capture_default_str();
-  app.add_option("--turns", options.turns, "frames of each view by the service")->check(CLI::Range(1, 1000))->capture_default_str();
-  app.add_option("--repeats", options.repeats, "renderings of each box")->check(CLI::Range(1, 100))->capture_default_str();
+  app.add_option("--turns", options.turns, "frames of each view, measured and simulated")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  app.add_option("--repeats", options.repeats, "renderings of each box for --fit")->check(CLI::Range(1, 100))->capture_default_str();
   app.add_option("--renderer", options.renderer, "instead of the case's")->check(CLI::IsMember({"splat", "zbuffer"}));
   app.add_flag("--fit", options.fit, "fit the cost model instead");
   CLI11_PARSE(app, argc, argv);

@@ -18,6 +18,7 @@
 
 #include "client/cli/bench_cases.h"
 #include "client/lab/calibrate.h"
+#include "client/lab/combining_costs.h"
 #include "client/lab/frame_costs.h"
 #include "common/base/large_buffers.h"
 #include "common/classification/count_occupied.h"
@@ -101,11 +102,11 @@ Planned Plan(const Subject& subject, const Policy& policy, int workers, int fram
 
 MachineModel MachineFor(const std::string& link, double one_seconds, int size) {
   MachineModel machine;
-  static const MachineModel host = CalibrateThisHost(1).value();
+  static const HandOvers hand_overs = CalibrateThisHost(1).value().machine.hand_overs;
   static const CombiningCosts messages = MeasureCombining(Transfer::kMessage);
   machine.combining = messages;
-  machine.combining.task = host.combining.task;
-  machine.client_seconds = host.client_seconds;
+  machine.hand_overs = hand_overs;
+  machine.client_seconds = 0;
   machine.link = ParseLink("link", link).value();
   machine.workers_a_host = 1;
   machine.cores_a_host = 2;
@@ -113,7 +114,8 @@ MachineModel MachineFor(const std::string& link, double one_seconds, int size) {
     // As client/experiment/machines.cpp: the paper's ratio of computing to communicating, and nothing around a frame.
     machine.link.bytes_per_second = double(size) * size * machine.combining.rgba_bytes / (0.083 / 72.89 * one_seconds);
     machine.plan_seconds = machine.message_seconds = machine.client_seconds = 0;
-    machine.combining.task = machine.combining.hidden_pixel = 0;
+    machine.hand_overs = {.awake = 0, .asleep = 0};
+    machine.combining.hidden_pixel = 0;
     machine.cores_a_host = 1;
   }
   return machine;

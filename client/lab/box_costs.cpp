@@ -1,50 +1,45 @@
 #include "client/lab/box_costs.h"
 
-#include <tbb/task_arena.h>
-
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <limits>
-#include <memory>
 #include <numeric>
 
-#include "client/lab/thread_time.h"
+#include "client/lab/lab_worker.h"
 #include "common/base/check.h"
-#include "worker/render/pipeline.h"
 
 namespace slabstream {
 
 std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FrameSetup& setup, std::span<const Box> boxes, int repeats) {
   CHECK_GE(repeats, 1);
-  const std::unique_ptr<Renderer> renderer = MakeRenderer(setup.renderer);
-  const std::atomic<bool> cancelled = false;
-  tbb::task_arena one_thread(1);
+  LabWorker worker(volume);
   std::vector<BoxCost> costs;
   for (const Box& box : boxes) {
-    BoxCost& cost = costs.emplace_back(BoxCost{.box = box, .seconds = std::numeric_limits<double>::infinity()});
-    const Box slab_box = SlabBox(box, setup);
-    cost.voxel_bytes = std::uint64_t(slab_box.voxel_count()) * BytesPerSample(volume.block.type);
-    SlabData slab(BrickedVoxels(CutBlock(volume.block, slab_box)));
-    for (int repeat = 0; repeat <= repeats; ++repeat) {
-      RankReport report;
-      one_thread.execute([&] {
-        const double begin = ThreadSeconds();
-        const LocalImage image = renderer->Render(slab, box, setup, {}, cancelled, report).value();
-        const double seconds = ThreadSeconds() - begin;
-        if (repeat == 0) {
-          cost.first_seconds = seconds;
-          cost.occupied_voxels = report.occupied_voxels;
-          cost.drawn_voxels = report.drawn_voxels;
-          cost.bounds = image.bounds;
-          cost.coverage = FindCoverage(image, FrameBounds(setup).width(), FrameBounds(setup).height());
-          cost.covered_pixels = std::uint64_t(std::llround(cost.coverage.pixels()));
-        } else if (seconds < cost.seconds) {
-          cost.seconds = seconds;
-          cost.stage_ns = report.stage_ns;
-        }
-      });
+    const BoxRendering first = worker.Render(box, setup);
+    BoxCost& cost = costs.emplace_back();
+    cost.box = box;
+    cost.first_seconds = first.processor_seconds;
+    cost.occupied_voxels = first.report.occupied_voxels;
+    cost.drawn_voxels = first.report.drawn_voxels;
+    cost.bounds = first.image.bounds;
+    cost.coverage = FindCoverage(first.image, FrameBounds(setup).width(), FrameBounds(setup).height());
+    cost.covered_pixels = std::uint64_t(std::llround(cost.coverage.pixels()));
+    cost.voxel_bytes = std::uint64_t(SlabBox(box, setup).voxel_count()) * BytesPerSample(volume.block.type);
+  }
+  // In rounds: a moment in which the machine is slower, or quicker, does not make all that is measured of a box. Each time it is rendered
+  // twice, and the second one counts: a worker's caches hold what it rendered last, not other workers' boxes.
+  std::vector<std::vector<BoxRendering>> again(boxes.size());
+  for (int repeat = 0; repeat < repeats; ++repeat) {
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+      (void)worker.Render(boxes[i], setup);
+      again[i].push_back(worker.Render(boxes[i], setup));
+      again[i].back().image = {};
     }
+  }
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    const auto middle = again[i].begin() + (again[i].end() - again[i].begin() - 1) / 2;
+    std::ranges::nth_element(again[i], middle, {}, &BoxRendering::processor_seconds);
+    costs[i].seconds = middle->processor_seconds;
+    costs[i].stage_ns = middle->report.stage_ns;
   }
   return costs;
 }

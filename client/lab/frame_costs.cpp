@@ -3,14 +3,12 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <atomic>
-#include <deque>
-#include <memory>
 #include <thread>
 #include <utility>
 
 #include "client/lab/thread_time.h"
 #include "common/base/check.h"
+#include "common/base/time.h"
 #include "common/image/run_image.h"
 #include "common/wire/payload.h"
 #include "coordinator/clients.h"
@@ -19,68 +17,83 @@
 
 namespace slabstream {
 
-// Each step on a thread of its own, as in the service: what the last one wrote lies in another core's caches. And with as many answers kept
-// as the coordinator keeps of a client: the memory that an answer is written to is one that nobody has touched for long.
+namespace {
+
+template <class Work>
+double SecondsOnAnotherThread(int threads, Work&& work) {
+  double seconds = 0;
+  std::thread([&] {
+    tbb::task_arena arena(threads);
+    arena.execute([&] { seconds = SecondsOf(work); });
+  }).join();
+  return seconds;
+}
+
+}  // namespace
+
+// As the display worker does (worker/executor.cpp).
+PictureMeter::Answer PictureMeter::Finish(LocalImage& frame, const FrameSetup& setup) {
+  RunImage runs;
+  if (FrameIsPicture(setup)) {
+    runs = EncodePicture(frame);
+  } else {
+    FillRows(frame);
+    runs = EncodePicture(FinishPicture(frame, setup));
+  }
+  Answer answer;
+  answer.header.image = runs.header;
+  answer.payload = PackRuns(Bytes(std::move(runs.payload)), Codec::kRaw, answer.header);
+  return answer;
+}
+
+// As the client does (client/client.cpp).
+void PictureMeter::Receive(const Answer& answer) {
+  const Bytes runs = UnpackRuns(answer.header, answer.payload).value();
+  const PixelBounds& bounds = answer.header.image.bounds;
+  CHECK(ReadRuns(answer.header.image, runs.span(), {0, 0, std::max(bounds.x_end, 1), std::max(bounds.y_end, 1)}).ok());
+}
+
+bool PictureMeter::Full() const {
+  return !kept_.empty() && (kept_.size() >= kMaxKeptAnswers || kept_bytes_ + kept_.front().payload.size() > kMaxKeptAnswerBytes);
+}
+
+void PictureMeter::Keep(Answer answer) {
+  kept_bytes_ += answer.payload.size();
+  kept_.push_back(std::move(answer));
+}
+
+void PictureMeter::KeepAnswers(const FrameSetup& setup) {
+  LocalImage frame = worker_.Render(volume_.block.box, setup).image;
+  while (!Full()) Keep(Finish(frame, setup));
+}
+
+PictureCost PictureMeter::Measure(const FrameSetup& setup) {
+  LocalImage frame = worker_.Render(volume_.block.box, setup).image;
+  while (Full()) {
+    kept_bytes_ -= kept_.front().payload.size();
+    kept_.pop_front();
+  }
+  PictureCost cost;
+  cost.finish_seconds = SecondsOnAnotherThread(threads_, [&] {
+    const Time begin = MonotonicNow();
+    Keep(Finish(frame, setup));
+    cost.finish_elapsed = double((MonotonicNow() - begin).count()) * 1e-9;
+  });
+  cost.receive_seconds = SecondsOnAnotherThread(1, [&] { Receive(kept_.back()); });
+  return cost;
+}
+
 PictureCost MeasurePictureCost(const Volume& volume, const FrameSetup& setup, int repeats) {
   CHECK_GE(repeats, 1);
-  const std::unique_ptr<Renderer> renderer = MakeRenderer(setup.renderer);
-  SlabData slab(BrickedVoxels(CutBlock(volume.block, volume.block.box)));
-  const std::atomic<bool> cancelled = false;
-  tbb::task_arena one_thread(1);
-  const auto on_another_thread = [&](auto&& work) {
-    double seconds = 0;
-    std::thread([&] { one_thread.execute([&] { seconds = SecondsOf(work); }); }).join();
-    return seconds;
-  };
-  const auto render = [&] {
-    LocalImage frame;
-    one_thread.execute([&] {
-      RankReport report;
-      frame = renderer->Render(slab, volume.block.box, setup, {}, cancelled, report).value();
-    });
-    return frame;
-  };
-  struct MadeAnswer {
-    EncodedRuns header;
-    Bytes payload;
-  };
-  // As the display worker does (worker/executor.cpp).
-  const auto finish = [&](LocalImage& frame) {
-    RunImage runs;
-    if (FrameIsPicture(setup)) {
-      runs = EncodePicture(frame);
-    } else {
-      FillRows(frame);
-      runs = EncodePicture(FinishPicture(frame, setup));
-    }
-    MadeAnswer answer;
-    answer.header.image = runs.header;
-    answer.payload = PackRuns(Bytes(std::move(runs.payload)), Codec::kRaw, answer.header);
-    return answer;
-  };
-  // As the client does (client/client.cpp).
-  const auto receive = [](const MadeAnswer& answer) {
-    const Bytes runs = UnpackRuns(answer.header, answer.payload).value();
-    const PixelBounds& bounds = answer.header.image.bounds;
-    CHECK(ReadRuns(answer.header.image, runs.span(), {0, 0, std::max(bounds.x_end, 1), std::max(bounds.y_end, 1)}).ok());
-  };
-
-  std::deque<MadeAnswer> kept;
-  LocalImage frame = render();
-  std::size_t kept_bytes = 0;
-  do {
-    kept.push_back(finish(frame));
-    kept_bytes += kept.back().payload.size();
-  } while (kept_bytes + kept.front().payload.size() <= kMaxKeptAnswerBytes && kept.size() < kMaxKeptAnswers);
-
+  PictureMeter meter(volume);
+  meter.KeepAnswers(setup);
   std::vector<double> finish_seconds, receive_seconds;
   for (int i = 0; i < repeats; ++i) {
-    frame = render();
-    kept.pop_front();
-    finish_seconds.push_back(on_another_thread([&] { kept.push_back(finish(frame)); }));
-    receive_seconds.push_back(on_another_thread([&] { receive(kept.back()); }));
+    const PictureCost cost = meter.Measure(setup);
+    finish_seconds.push_back(cost.finish_seconds);
+    receive_seconds.push_back(cost.receive_seconds);
   }
-  return {UpperMedian(std::move(finish_seconds)), UpperMedian(std::move(receive_seconds))};
+  return {.finish_seconds = UpperMedian(std::move(finish_seconds)), .receive_seconds = UpperMedian(std::move(receive_seconds))};
 }
 
 FrameCosts MeasureFrameCosts(const Volume& volume, const FramePlan& plan, int repeats) {

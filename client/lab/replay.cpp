@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "client/lab/calibrate.h"
+#include "client/lab/combining_costs.h"
 #include "common/combining/schemes.h"
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
@@ -48,7 +49,7 @@ std::vector<std::vector<RecordedRank>> Regroup(const RecordedFrame& frame, const
   return groups;
 }
 
-void MakeReplayed(const RecordedFrame& frame, const ReplayChange& change, Replayed& out) {
+void MakeReplayed(const RecordedFrame& frame, const ReplayChange& change, const HandOvers& hand_overs, Replayed& out) {
   const std::vector<std::vector<RecordedRank>> groups = Regroup(frame, change.workers);
   const std::string& combine = change.combine.empty() ? frame.combine : change.combine;
   FramePlan& plan = out.plan;
@@ -81,8 +82,9 @@ void MakeReplayed(const RecordedFrame& frame, const ReplayChange& change, Replay
   }
   out.input.plan = &plan;
   out.input.finish_seconds = frame.picture_seconds;
-  // What passed between the coordinator's last byte and the client's.
-  out.input.receive_seconds = std::max(frame.latency - (frame.end - frame.arrived), 0.0);
+  // What passed outside the coordinator, less what is simulated of it: the request's hand-over and the picture's.
+  const double outside = frame.latency - (frame.end - frame.arrived);
+  out.input.receive_seconds = std::max(outside - hand_overs.awake - hand_overs.asleep, 0.0);
 }
 
 bool Warm(const RecordedFrame& frame) { return frame.voxel_bytes == 0; }
@@ -128,7 +130,7 @@ Result<ReplayedRun> Simulated(std::span<const RecordedFrame> frames, const Repla
   std::vector<Replayed> replayed(frames.size());
   std::vector<FrameInput> inputs;
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    MakeReplayed(frames[i], change, replayed[i]);
+    MakeReplayed(frames[i], change, machine.hand_overs, replayed[i]);
     inputs.push_back(replayed[i].input);
   }
   const Result<Timeline> timeline = SimulateFrames(inputs, machine, {.in_flight = in_flight, .keep_spans = false});
@@ -201,9 +203,7 @@ MachineModel ChangedMachine(const MachineModel& machine, const ReplayChange& cha
   MachineModel changed = machine;
   if (!change.link) return changed;
   changed.link = *change.link;
-  const double task = changed.combining.task;
   changed.combining = MeasureCombining(change.link->contention == Contention::kNone ? Transfer::kLent : Transfer::kMessage);
-  changed.combining.task = task;
   return changed;
 }
 
@@ -221,8 +221,9 @@ Result<ReplayReport> Replay(std::span<const RecordedFrame> frames, const ReplayC
   report.in_flight = InFlight(frames);
   report.measured = Measured(frames);
   const auto for_recorded_times = [](MachineModel model) {
-    model.workers_a_host = 0;  // what workers did to each other is in them
-    model.client_seconds = 0;  // what the client's side took comes with each frame
+    model.workers_a_host = 0;   // what workers did to each other is in them
+    model.picture_threads = 0;  // and how many threads made a picture
+    model.client_seconds = 0;   // what the client's side took comes with each frame
     return model;
   };
   const Result<ReplayedRun> same = Simulated(frames, {}, for_recorded_times(machine), report.in_flight);
@@ -243,9 +244,10 @@ Status RunReplay(const ReplayOptions& options, std::ostream& out) {
   text << file.rdbuf();
   const Result<std::vector<RecordedFrame>> frames = ParseRecording(text.str());
   if (!frames.ok()) return Status(frames.status().code(), fmt::format("{}: {}", options.trace_path, frames.status().message()));
-  const Result<MachineModel> machine = CalibrateThisHost(int(frames->front().workers));
-  if (!machine.ok()) return machine.status();
-  const Result<ReplayReport> report = Replay(*frames, *change, *machine, ChangedMachine(*machine, *change));
+  const Result<Calibration> calibration = CalibrateThisHost(int(frames->front().workers));
+  if (!calibration.ok()) return calibration.status();
+  const MachineModel& machine = calibration->machine;
+  const Result<ReplayReport> report = Replay(*frames, *change, machine, ChangedMachine(machine, *change));
   if (!report.ok()) return report.status();
 
   out << fmt::format("{} frames of {} workers, {} in flight, {}; means of frames that fetched no voxels\n", frames->size(),

@@ -5,42 +5,24 @@
 #include <map>
 #include <utility>
 
-#include "client/client.h"
-#include "client/embedded/embedded_service.h"
 #include "client/lab/calibrate.h"
 #include "client/lab/frame_costs.h"
-#include "client/lab/thread_time.h"
+#include "client/lab/hand_over_probe.h"
+#include "client/lab/lab_service.h"
+#include "client/lab/plan_renderings.h"
+#include "common/base/check.h"
 #include "common/planning/placement.h"
 
 namespace slabstream {
 namespace {
 
 constexpr char kDataset[] = "volume";
+constexpr int kHandOverSamples = 4;  // a turn
 
-FrameParts Mean(const std::vector<FrameParts>& frames) {
-  FrameParts mean;
-  for (const FrameParts& frame : frames) {
-    mean.render += frame.render / double(frames.size());
-    mean.picture += frame.picture / double(frames.size());
-    mean.latency += frame.latency / double(frames.size());
-  }
-  return mean;
-}
-
-// Each part by itself.
-FrameParts Median(const std::vector<FrameParts>& frames) {
-  const auto median = [&](double FrameParts::*part) {
-    std::vector<double> values;
-    for (const FrameParts& frame : frames) values.push_back(frame.*part);
-    return UpperMedian(std::move(values));
-  };
-  return {median(&FrameParts::render), median(&FrameParts::picture), median(&FrameParts::latency)};
-}
-
-FrameParts PartsOf(const Picture& picture) {
-  FrameParts parts{.latency = double(picture.latency.count()) * 1e-9};
+FrameParts PartsOf(const TimedPicture& timed) {
+  FrameParts parts{.latency = double((timed.received - timed.submitted).count()) * 1e-9};
   std::map<std::uint32_t, double> render;  // by worker
-  for (const RankReport& report : picture.statistics.reports) {
+  for (const RankReport& report : timed.picture.statistics.reports) {
     render[report.worker] += double(report.stage_ns[std::size_t(Stage::kRender)]) * 1e-9;
     parts.picture += double(PictureNs(report)) * 1e-9;
   }
@@ -59,74 +41,121 @@ FrameParts PartsOf(const Timeline& timeline) {
   return parts;
 }
 
-std::vector<FrameRequest> Views(const ValidationCase& what, int views) {
-  std::vector<FrameRequest> requests(std::size_t(views), what.request);
-  for (int i = 0; i < views; ++i) {
-    requests[std::size_t(i)].dataset = kDataset;
-    requests[std::size_t(i)].view.azimuth_degrees = 360.0 * i / views;
-  }
-  return requests;
+double Quantile(const std::vector<FrameParts>& frames, double FrameParts::*part, double share) {
+  std::vector<double> values;
+  for (const FrameParts& frame : frames) values.push_back(frame.*part);
+  const auto at = values.begin() + std::ptrdiff_t(std::min<double>(share * double(values.size()), double(values.size() - 1)));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
 }
 
-// Medians by view; turn after turn, so that what disturbs the machine for a while disturbs all views.
-Result<std::vector<FrameParts>> MeasureService(const ValidationCase& what, const std::vector<FrameRequest>& requests, int turns) {
-  Context context;
-  EmbeddedOptions options;
-  options.workers = what.workers;
-  options.coordinator.catalogue[kDataset] = [volume = what.volume]() -> Result<std::shared_ptr<const Volume>> { return volume; };
-  Result<std::unique_ptr<EmbeddedService>> service = EmbeddedService::Start(context, std::move(options));
-  if (!service.ok()) return service.status();
-  Result<Client> client = Client::Connect(context, (*service)->endpoint());
-  if (!client.ok()) return client.status();
-  std::vector<std::vector<FrameParts>> frames(requests.size());
-  for (int turn = -1; turn < turns; ++turn) {  // the first one fetches voxels and makes normals
-    for (std::size_t i = 0; i < requests.size(); ++i) {
-      const Result<Picture> picture = client->Render(requests[i]);
-      if (!picture.ok()) return picture.status();
-      if (turn >= 0) frames[i].push_back(PartsOf(*picture));
-    }
+FrameParts Median(const std::vector<FrameParts>& frames) {
+  return {Quantile(frames, &FrameParts::render, 0.5), Quantile(frames, &FrameParts::picture, 0.5),
+          Quantile(frames, &FrameParts::latency, 0.5)};
+}
+
+// Everything that belongs to one view.
+struct View {
+  FrameRequest request;
+  FramePlan plan;
+  FrameCosts costs;  // what boxes cover; their seconds are measured anew in each turn
+  std::vector<FrameParts> measured, simulated;
+};
+
+Result<std::vector<View>> MakeViews(const ValidationCase& what, int count) {
+  const Roster roster = RosterOf(std::uint32_t(what.workers));
+  const VolumeSummary summary = Summarize(*what.volume);
+  std::vector<View> views;
+  for (int i = 0; i < count; ++i) {
+    View& view = views.emplace_back(View{.request = what.request});
+    view.request.dataset = kDataset;
+    view.request.view.azimuth_degrees = 360.0 * i / count;
+    Result<FramePlan> plan = PlanFrame(view.request, 1, summary, roster, CostModel{});
+    if (!plan.ok()) return plan.status();
+    view.plan = *std::move(plan);
+    view.costs = MeasureFrameCosts(*what.volume, view.plan, 1);
   }
-  std::vector<FrameParts> medians;
-  for (const std::vector<FrameParts>& of_view : frames) medians.push_back(Median(of_view));
-  return medians;
+  return views;
 }
 
 }  // namespace
 
-FrameParts ValidationRow::MeanMeasured() const { return Mean(measured); }
-FrameParts ValidationRow::MeanSimulated() const { return Mean(simulated); }
+ValidatedView ValidationRow::Mean() const {
+  ValidatedView mean;
+  const double share = 1.0 / double(views.size());
+  const auto add = [&](FrameParts& to, const FrameParts& from) {
+    to.render += share * from.render;
+    to.picture += share * from.picture;
+    to.latency += share * from.latency;
+  };
+  for (const ValidatedView& view : views) {
+    add(mean.measured, view.measured);
+    add(mean.simulated, view.simulated);
+    mean.measured_low += share * view.measured_low;
+    mean.measured_high += share * view.measured_high;
+    mean.simulated_low += share * view.simulated_low;
+    mean.simulated_high += share * view.simulated_high;
+  }
+  return mean;
+}
 
 double ValidationRow::worst_error() const {
   double worst = 0;
-  for (std::size_t i = 0; i < measured.size(); ++i) {
-    const double error = simulated[i].latency / measured[i].latency - 1;
-    if (std::abs(error) > std::abs(worst)) worst = error;
+  for (const ValidatedView& view : views) {
+    if (std::abs(view.error()) > std::abs(worst)) worst = view.error();
   }
   return worst;
 }
 
 Result<ValidationRow> ValidateSimulation(const ValidationCase& what, const ValidationOptions& options) {
-  ValidationRow row{.name = what.name, .workers = what.workers};
-  const std::vector<FrameRequest> requests = Views(what, options.views);
-  Result<MachineModel> machine = CalibrateThisHost(what.workers);
-  if (!machine.ok()) return machine.status();
-  const Roster roster = RosterOf(std::uint32_t(what.workers));
-  const VolumeSummary summary = Summarize(*what.volume);
-  for (const FrameRequest& request : requests) {
-    const Result<FramePlan> plan = PlanFrame(request, 1, summary, roster, CostModel{});
-    if (!plan.ok()) return plan.status();
-    if (row.simulated.empty()) {
-      machine->memory_slowdown = row.memory_slowdown = MeasureMemorySlowdown(*what.volume, plan->setup);
-    }
-    const FrameCosts costs = MeasureFrameCosts(*what.volume, *plan, options.repeats);
-    const FrameInput input = costs.Input(*plan);
-    const Result<Timeline> timeline = SimulateFrames(std::span(&input, 1), *machine);
-    if (!timeline.ok()) return timeline.status();
-    row.simulated.push_back(PartsOf(*timeline));
+  if (what.workers < 1 || what.workers > 2) {
+    return Status::InvalidArgument("workers " + std::to_string(what.workers) + " is out of range [1, 2]");
   }
-  Result<std::vector<FrameParts>> measured = MeasureService(what, requests, options.turns);
-  if (!measured.ok()) return measured.status();
-  row.measured = *std::move(measured);
+  Result<std::vector<View>> views = MakeViews(what, options.views);
+  if (!views.ok()) return views.status();
+  HandOverProbe probe;
+  Result<std::unique_ptr<LabService>> service = LabService::Start(what.workers, {{kDataset, what.volume}});
+  if (!service.ok()) return service.status();
+  PlanRenderings renderings(*what.volume, what.workers);
+  PictureMeter pictures(*what.volume, what.workers);
+  MachineModel machine = ThisHost(what.workers);
+  machine.picture_threads = 0;  // pictures are measured as all of them make it
+  std::vector<double> slowdowns;
+
+  for (int turn = -1; turn < options.turns; ++turn) {  // the first one fetches voxels and makes normals
+    if (Status status = probe.Sample(kHandOverSamples); !status.ok()) return status;
+    for (View& view : *views) {
+      if (const Result<TimedPicture> first = (*service)->Render(view.request); !first.ok()) return first.status();
+      const Result<TimedPicture> timed = (*service)->Render(view.request);
+      if (!timed.ok()) return timed.status();
+      renderings.Measure(view.plan);
+      const PlanSeconds seconds = renderings.Measure(view.plan);
+      pictures.Measure(view.plan.setup);
+      const PictureCost picture = pictures.Measure(view.plan.setup);
+      if (turn < 0) continue;
+
+      for (const Placement& placement : PlacementsOf(view.plan)) view.costs.boxes[placement.id].seconds = seconds.boxes[placement.id];
+      view.costs.picture = {.finish_seconds = picture.finish_elapsed, .receive_seconds = picture.receive_seconds};
+      slowdowns.push_back(seconds.slowdown);
+      machine.hand_overs = probe.Estimates().Costs();
+      machine.memory_slowdown = ModelSlowdown(seconds.slowdown);
+      const FrameInput input = view.costs.Input(view.plan);
+      const Result<Timeline> timeline = SimulateFrames(std::span(&input, 1), machine);
+      if (!timeline.ok()) return timeline.status();
+      view.measured.push_back(PartsOf(*timed));
+      view.simulated.push_back(PartsOf(*timeline));
+    }
+  }
+
+  ValidationRow row{.name = what.name, .workers = what.workers, .machine = machine, .hand_overs = probe.Estimates()};
+  if (what.workers == 2) row.slowdown = MedianOf(std::move(slowdowns));
+  for (const View& view : *views) {
+    const auto quartile = [&](const std::vector<FrameParts>& frames, double share) {
+      return Quantile(frames, &FrameParts::latency, share);
+    };
+    row.views.push_back({Median(view.measured), Median(view.simulated), quartile(view.measured, 0.25), quartile(view.measured, 0.75),
+                         quartile(view.simulated, 0.25), quartile(view.simulated, 0.75)});
+  }
   return row;
 }
 

@@ -1,16 +1,23 @@
 // Validation: frames of the embedded service beside what the simulation says of them, in one run.
 //
-// For each view of a turning volume and each number of workers: the plan is made as the coordinator makes it, its boxes are rendered one by
-// one in this process, alone on one thread, and their costs simulated on a model of this machine (calibrate.h); the service renders the
-// same view with so many workers of one thread each, one frame in flight. Nothing of the service's own times enters the simulation.
+// Turn after turn and view after view, one after the other:
+//   - the service renders the view with one or two workers of one thread each, one frame in flight;
+//   - in this process, the boxes of its plan are rendered alone, on one thread; with two workers also both at once, which tells how much
+//     they slow each other down (neighbours.h); the picture is made and decoded.
+// Each of these is done twice in a row, and the second time counts: its threads have not slept for long, and its data is in the caches if
+// it ever is. Before each turn frames of another volume and service tell what hand-overs take. What was measured of a view in a turn is
+// simulated on a model of this machine (calibrate.h). So the same weather hits both sides, and both are given as medians over turns.
+// Nothing of the service's own times enters the simulation.
 #pragma once
 
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "client/lab/hand_over_fit.h"
 #include "common/base/status.h"
 #include "common/planning/frame_request.h"
+#include "common/simulation/machine_model.h"
 #include "common/volume/volume.h"
 
 namespace slabstream {
@@ -19,13 +26,12 @@ struct ValidationCase {
   std::string name;
   std::shared_ptr<const Volume> volume;
   FrameRequest request;  // azimuth and dataset are filled in
-  int workers = 1;
+  int workers = 1;       // or 2
 };
 
 struct ValidationOptions {
-  int views = 6;    // azimuths, evenly over a turn
-  int turns = 5;    // frames of each view by the service
-  int repeats = 3;  // renderings of each box
+  int views = 4;   // azimuths, evenly over a turn of the volume
+  int turns = 15;  // frames of each view
 };
 
 // Of one frame, in seconds.
@@ -35,18 +41,27 @@ struct FrameParts {
   double latency = 0;  // request to decoded picture, all in all
 };
 
+struct ValidatedView {
+  FrameParts measured, simulated;              // medians over turns, each part by itself
+  double measured_low = 0, measured_high = 0;  // quartiles of the latency: what the machine's noise is
+  double simulated_low = 0, simulated_high = 0;
+  double error() const { return simulated.latency / measured.latency - 1; }
+};
+
 struct ValidationRow {
   std::string name;
   int workers = 1;
-  std::vector<FrameParts> measured, simulated;  // by view; measured: medians over turns
-  double memory_slowdown = 0;                   // of this volume (MachineModel)
+  std::vector<ValidatedView> views;
+  MachineModel machine;  // as it was in the end
+  HandOverEstimates hand_overs;
+  Estimate slowdown;  // of two workers' renderings, over all turns and views
 
-  FrameParts MeanMeasured() const;
-  FrameParts MeanSimulated() const;
-  double error() const { return MeanSimulated().latency / MeanMeasured().latency - 1; }  // of the latency
-  double worst_error() const;                                                            // of one view, the largest in size
+  ValidatedView Mean() const;  // over views, every number by itself
+  double error() const { return Mean().error(); }
+  double worst_error() const;  // of one view, the largest in size
 };
 
+// InvalidArgument: workers beyond 2. Fails with the service.
 Result<ValidationRow> ValidateSimulation(const ValidationCase& what, const ValidationOptions& options);
 
 }  // namespace slabstream

@@ -4,24 +4,22 @@
 // events at the same time the one that was caused first goes first.
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <deque>
 #include <map>
 #include <memory>
-#include <optional>
 #include <queue>
 #include <set>
 #include <span>
-#include <tuple>
-#include <utility>
 #include <vector>
 
+#include "common/simulation/frame_account.h"
+#include "common/simulation/hand_outs.h"
 #include "common/simulation/network.h"
-#include "common/simulation/processors.h"
 #include "common/simulation/schedule_run.h"
 #include "common/simulation/simulate_frames.h"
+#include "common/simulation/threads.h"
 #include "common/simulation/union_coverage.h"
+#include "common/simulation/worker_lanes.h"
 
 namespace slabstream {
 
@@ -33,30 +31,15 @@ class FrameSimulation {
   Timeline Run();
 
  private:
-  enum class Arrival : std::uint8_t { kRequest, kAssignment, kVoxels, kPartial, kGroupImage, kGroupDone, kPicture, kReceived };
+  enum class Arrival : std::uint8_t { kRequest, kAssignment, kVoxels, kPartial, kGroupImage, kGroupDone, kPicture, kReceived, kTaskKnown };
   struct Event {
     double time = 0;
     std::uint64_t order = 0;
     Arrival what = Arrival::kRequest;
     std::uint32_t frame = 0, group = 0;
     std::uint32_t number = 0;  // worker, rank or step
+    LaneTask task;             // kTaskKnown
     friend bool operator>(const Event& a, const Event& b) { return a.time != b.time ? a.time > b.time : a.order > b.order; }
-  };
-  enum class Work : std::uint8_t { kRender, kEncode, kCombine, kEncodeGroup, kAccumulate, kFinish };
-  struct Task {
-    Work work = Work::kRender;
-    std::uint32_t frame = 0, group = 0;
-    std::uint32_t worker = 0;
-    Rank rank = 0;           // for whom it is done
-    std::uint32_t step = 0;  // kEncode, kCombine
-    double seconds = 0, threads = 1;
-    double begin = 0;
-  };
-  using Render = std::tuple<std::uint32_t, std::uint32_t, Rank>;  // frame, group and rank
-  struct Worker {
-    std::set<Render> renders;    // that have their voxels
-    std::array<bool, 3> busy{};  // by lane
-    std::deque<Task> combines, finishes;
   };
   using Parts = ScheduleRun::Parts;
   struct Message {  // encoded, on its way
@@ -72,13 +55,11 @@ class FrameSimulation {
     bool local = false;           // the display worker made it
   };
   struct Frame {
-    std::uint32_t next_group = 0, groups_done = 0;  // the coordinator's
     std::map<std::uint32_t, Group> groups;
     std::set<std::uint32_t> complete;  // group images at the display worker, not yet accumulated
     std::uint32_t accumulated = 0;     // groups
     bool accumulating = false;
-    std::vector<double> render_seconds;                        // by worker
-    std::vector<std::vector<std::pair<double, double>>> busy;  // by worker
+    std::unique_ptr<FrameAccount> account;  // from its plan until its picture is received
   };
 
   const FramePlan& plan(std::uint32_t frame) const { return *inputs_[frame].plan; }
@@ -91,19 +72,13 @@ class FrameSimulation {
   void Submit(double now);
   void CoordinatorTakes(double now);
   void HandOutGroups();
-  void HandOut(std::uint32_t frame);
+  void HandOut(std::uint32_t frame, std::uint32_t group);
 
   // ---- workers
   void OnAssignment(std::uint32_t frame, std::uint32_t group, std::uint32_t worker);
   void AddRender(std::uint32_t frame, std::uint32_t group, Rank rank);
-  void StartRender(std::uint32_t worker);
-  double RenderSeconds(const Render& render) const;
-  std::optional<std::pair<std::uint32_t, Render>> NextRender(std::uint32_t worker) const;
-  void AddCombine(const Task& task);
-  void StartNext(std::uint32_t worker, Lane lane, std::deque<Task>& tasks);
-  static Lane LaneOf(Work work);
-  void Start(Task task);
-  void OnDone(const Task& task);
+  void OnDone(const LaneTask& task);   // it ends
+  void OnKnown(const LaneTask& task);  // its worker was told
   void Advance(std::uint32_t frame, std::uint32_t group, Rank rank);
   void FinishRoot(std::uint32_t frame, std::uint32_t group);
   void AddToFrame(std::uint32_t frame, std::uint32_t group);
@@ -112,11 +87,8 @@ class FrameSimulation {
 
   UnionCoverage::Amount AmountOf(const Group& group, const Parts& parts) const;
   double MessageBytes(const SimulatedMessage& message, const UnionCoverage::Amount& amount) const;
-  double EncodeSeconds(const UnionCoverage::Amount& amount) const;
+  void AddEncode(LaneTask task, const UnionCoverage::Amount& amount);
   void SendPixels(SimulatedMessage message, const UnionCoverage::Amount& amount, Arrival what, std::uint32_t number);
-  double SpeedOf(std::uint32_t worker) const;
-  double Slowness(std::uint32_t frame, std::uint32_t worker) const;
-  void CloseFrame(std::uint32_t frame);
 
   const std::span<const FrameInput> inputs_;
   const MachineModel& machine_;
@@ -126,15 +98,12 @@ class FrameSimulation {
   std::uint64_t events_posted_ = 0;
   std::priority_queue<Event, std::vector<Event>, std::greater<>> events_;
   Network network_;
-  Processors processors_;
-  std::vector<Worker> workers_;
-  std::map<std::uint64_t, Task> running_;
-  std::uint64_t tasks_started_ = 0;
+  Threads threads_;
+  WorkerLanes lanes_;
+  HandOuts hand_outs_;
 
   std::vector<Frame> frames_;
-  std::uint32_t submitted_ = 0;          // frames that the client has asked for
-  std::deque<std::uint32_t> waiting_;    // frames that the coordinator has not planned yet
-  std::deque<std::uint32_t> in_flight_;  // oldest first
+  std::uint32_t submitted_ = 0;  // frames that the client has asked for
   double coordinator_free_ = 0;
   double render_seconds_ = 0;
   Timeline timeline_;

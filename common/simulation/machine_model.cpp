@@ -20,10 +20,11 @@ Status Validate(const LinkModel& link) {
 }
 
 Status Validate(const CombiningCosts& costs) {
-  const std::pair<const char*, double> seconds[] = {
-      {"combining.scan_pixel", costs.scan_pixel},       {"combining.encode_pixel", costs.encode_pixel},
-      {"combining.combine_pixel", costs.combine_pixel}, {"combining.local_pixel", costs.local_pixel},
-      {"combining.hidden_pixel", costs.hidden_pixel},   {"combining.task", costs.task}};
+  const std::pair<const char*, double> seconds[] = {{"combining.scan_pixel", costs.scan_pixel},
+                                                    {"combining.encode_pixel", costs.encode_pixel},
+                                                    {"combining.combine_pixel", costs.combine_pixel},
+                                                    {"combining.local_pixel", costs.local_pixel},
+                                                    {"combining.hidden_pixel", costs.hidden_pixel}};
   for (const auto& [field, value] : seconds) {
     if (Status s = InRange(field, value, 0, kMaxSeconds); !s.ok()) return s;
   }
@@ -32,11 +33,18 @@ Status Validate(const CombiningCosts& costs) {
   return InRange("combining.depth_bytes", costs.depth_bytes, 0, 1024);
 }
 
+Status Validate(const HandOvers& costs) {
+  if (Status s = InRange("hand_overs.awake", costs.awake, 0, kMaxSeconds); !s.ok()) return s;
+  if (Status s = InRange("hand_overs.asleep", costs.asleep, 0, kMaxSeconds); !s.ok()) return s;
+  return InRange("hand_overs.doze", costs.doze, 0, std::numeric_limits<double>::max());
+}
+
 }  // namespace
 
 Status Validate(const MachineModel& machine) {
   if (Status s = Validate(machine.link); !s.ok()) return s;
   if (Status s = Validate(machine.combining); !s.ok()) return s;
+  if (Status s = Validate(machine.hand_overs); !s.ok()) return s;
   for (const double speed : machine.speeds) {
     if (Status s = InRange("speeds", speed, 1e-6, 1e6); !s.ok()) return s;
   }

@@ -10,18 +10,29 @@
 
 namespace slabstream {
 
-// What the combining thread of a worker does, for each pixel that is not empty and for each task.
+// What the combining thread of a worker does, for each pixel that is not empty.
 struct CombiningCosts {
   double scan_pixel = 0.2e-9;     // looked at in search of runs, empty or not
   double encode_pixel = 1.5e-9;   // copied into a message
   double combine_pixel = 1.5e-9;  // out of a message, checked, onto what is there
   double local_pixel = 1e-9;      // of one image of this worker onto another one
   double hidden_pixel = 0.1e-9;   // of the frame: in search of opaque tiles (FindHiddenTiles)
-  double task = 10e-6;            // from being ordered to begun, and from done to known
   std::int32_t run_bytes = 12;    // a run in a message
   std::int32_t rgba_bytes = 16;   // a pixel in a message: splatting, colours as floats
   std::int32_t depth_bytes = 24;  // and Z-buffer
+  // Pixels that are sent stay where they are: the thread that owns the sockets tells of them itself if the combining thread is busy with
+  // nothing.
+  bool lent = false;
   friend bool operator==(const CombiningCosts&, const CombiningCosts&) = default;
+};
+
+// Seconds from one thread's handing something over (a message, a task, a result) until another one has begun with it: what it takes to
+// encode and decode it, to decide what is to be done, and to wake who sleeps. Of every thread of the service and its clients alike.
+struct HandOvers {
+  double awake = 25e-6;   // to a thread that was at work a moment ago
+  double asleep = 60e-6;  // to one that has waited for `doze` seconds or longer, and so has its core, or somebody else had it
+  double doze = 500e-6;
+  friend bool operator==(const HandOvers&, const HandOvers&) = default;
 };
 
 // Some workers render slower in some frames, for no reason that a plan could know. Which ones depends on the seed alone.
@@ -33,8 +44,10 @@ struct Stragglers {
 };
 
 struct MachineModel {
-  LinkModel link;  // between workers; between them and the coordinator a message takes its latency and meets no other
+  // Between workers; between them and the coordinator a message takes its latency and meets no other. Hand-overs come on top.
+  LinkModel link;
   CombiningCosts combining;
+  HandOvers hand_overs;
   std::vector<double> speeds;  // of the workers, relative, > 0; worker i has speeds[i % size()]. Empty: all 1
   Stragglers stragglers;
   std::int32_t threads = 1;          // that render, of each worker
@@ -48,9 +61,9 @@ struct MachineModel {
   std::int32_t cores_a_host = 1;
   double memory_slowdown = 0;  // [0, 1)
 
-  double plan_seconds = 200e-6;    // the coordinator plans a frame
-  double message_seconds = 5e-6;   // the coordinator sends or takes a message, one after the other
-  double client_seconds = 100e-6;  // from the picture's arrival at the coordinator until the client has it, beside decoding
+  double plan_seconds = 200e-6;   // the coordinator plans a frame
+  double message_seconds = 5e-6;  // the coordinator sends or takes a message, one after the other
+  double client_seconds = 50e-6;  // the picture's way from the coordinator to the client, beside hand-over and decoding
   friend bool operator==(const MachineModel&, const MachineModel&) = default;
 };
 

@@ -51,6 +51,42 @@ TEST(SimulateFrames, OneWorkerTakesTheSumOfWhatThereIsToDo) {
   EXPECT_EQ(timeline.frames[0].imbalance, 1);
 }
 
+// From thread to thread: client, coordinator, worker, render lane, worker, finish lane, worker, coordinator, client.
+TEST(SimulateFrames, EveryHandOverTakesItsTime) {
+  MachineModel machine = FreeMachine();
+  machine.hand_overs = {.awake = 0.01, .asleep = 0.07, .doze = 0};
+  MadeFrame frame(1, 1, kSide, 1, 2, "fan-in");
+  frame.finish_seconds = 0.5;
+  EXPECT_NEAR(Simulate({frame.input()}, machine).frames[0].latency(), 2 + 0.5 + 8 * 0.07, 1e-9);
+  machine.hand_overs.doze = 100;
+  EXPECT_NEAR(Simulate({frame.input()}, machine).frames[0].latency(), 2 + 0.5 + 8 * 0.01, 1e-9);
+  // Who has waited for a second is asleep: nobody when the frame begins; when it is rendered the worker and its finish lane; when the
+  // picture is made the client alone, since coordinator and worker have had to do with the group's end.
+  machine.hand_overs.doze = 1;
+  EXPECT_NEAR(Simulate({frame.input()}, machine).frames[0].latency(), 2 + 0.5 + 3 * 0.01 + 2 * 0.07 + 2 * 0.01 + 0.07, 1e-9);
+}
+
+// An image of another worker comes in addition: told of by its worker, at the other one, at its combining lane and back. One that travels
+// is encoded by a lane of its own first.
+TEST(SimulateFrames, HandOversOfAnImageDependOnHowItTravels) {
+  MachineModel machine = FreeMachine();
+  machine.hand_overs = {.awake = 0.01, .asleep = 0.01};
+  const MadeFrame one(1, 1, kSide, 1, 2, "fan-in"), two(2, 1, kSide, 1, 2, "fan-in");
+  const double alone = Simulate({one.input()}, machine).frames[0].latency();
+  EXPECT_NEAR(Simulate({two.input()}, machine).frames[0].latency(), alone + 5 * 0.01, 1e-9);
+  machine.combining.lent = true;
+  EXPECT_NEAR(Simulate({two.input()}, machine).frames[0].latency(), alone + 3 * 0.01, 1e-9);
+}
+
+TEST(SimulateFrames, ARenderingIsOrderedWhenTheLastOneIsKnown) {
+  MachineModel machine = FreeMachine();
+  machine.hand_overs = {.awake = 0.01, .asleep = 0.01};
+  const MadeFrame frame(1, 2, kSide, 1, 2, "fan-in");
+  const Timeline timeline = Simulate({frame.input()}, machine);
+  ASSERT_GE(timeline.spans.size(), 2U);
+  EXPECT_NEAR(timeline.spans[1].begin - timeline.spans[0].end, 2 * 0.01, 1e-9);
+}
+
 TEST(SimulateFrames, ColoursInFewerBitsAreFewerBytes) {
   for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
     std::map<ColorCoding, double> bytes;
@@ -124,10 +160,11 @@ TEST(SimulateFrames, PerfectBalanceWithoutCommunicationIsPerfect) {
 TEST(SimulateFrames, GroupsHideTheirCombining) {
   const MachineModel machine = SimpleMachine(Contention::kNone, 1e-9, 4);
   const MadeFrame frame(2, 5, kSide, 1, 10, "fan-in");
-  // Each group: render 10, combine at the root 4; accumulating in place costs nothing here.
+  // Each group: render 10, combine at the root 4; accumulating in place takes its turn on the same lane, but no time here.
   EXPECT_NEAR(Simulate({frame.input()}, machine).frames[0].latency(), 5 * 10 + 4, 1e-3);
   const MachineModel slow = SimpleMachine(Contention::kNone, 1e-9, 25);
-  EXPECT_NEAR(Simulate({frame.input()}, slow).frames[0].latency(), 10 + 5 * 25, 1e-2);
+  // A group is accumulated when the next one is combined, so that the window opens late: the last group is not rendered meanwhile.
+  EXPECT_NEAR(Simulate({frame.input()}, slow).frames[0].latency(), 10 + 5 * 25 + 10, 1e-2);
 }
 
 TEST(SimulateFrames, ImbalanceAndIdleShareAreThoseOfTheReports) {

@@ -12,7 +12,6 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -21,18 +20,14 @@
 #include "coordinator/frame_machine.h"
 #include "tests/simulator/event_queue.h"
 #include "tests/simulator/faults.h"
+#include "tests/simulator/frame_witness.h"
 #include "tests/simulator/model_client.h"
 #include "tests/simulator/model_worker.h"
 #include "tests/simulator/network.h"
+#include "tests/simulator/random_world.h"
+#include "tests/simulator/tally.h"
 
 namespace slabstream {
-
-// Counts over all worlds, so that a test can see that it tested something.
-struct Tally {
-  std::uint64_t worlds = 0, requests = 0, pictures = 0, previews = 0, errors = 0, cancelled = 0, retried = 0, cached_frames = 0,
-                workers_killed = 0, coordinator_restarts = 0, masks = 0, masks_of_retries = 0, hidden_pixels = 0, hidden_boxes = 0,
-                counts = 0, moved_boxes = 0;
-};
 
 class Simulation : private WorkerNetwork {
  public:
@@ -49,29 +44,7 @@ class Simulation : private WorkerNetwork {
     bool alive = true;
     int idle_wakes = 0;
   };
-  // What the coordinator handed out for a frame.
-  struct SeenFrame {
-    std::uint32_t group_count = 0;
-    std::uint32_t attempt = 0;
-    FrameSetup setup;
-    std::map<std::uint32_t, std::vector<BoxId>> groups;
-    std::map<BoxId, Box> boxes;
-    WorkerId display = 0;                      // of this attempt
-    std::set<std::uint32_t> handed_out;        // groups of this attempt
-    std::map<WorkerId, std::uint32_t> done;    // groups that a display worker has said are done: the first so many
-    std::set<std::pair<WorkerId, Box>> slabs;  // who needed which voxels
-    std::set<BoxId> left_out;                  // boxes that were hidden as a whole, in any attempt
-    bool all_cached = true;                    // when it was handed out, workers held all voxels that it needs
-    bool over = false;
-    std::size_t unfinished() const {  // handed out, and not done as the display worker sees it
-      const auto known = done.find(display);
-      return std::size_t(std::distance(handed_out.lower_bound(known == done.end() ? 0 : known->second), handed_out.end()));
-    }
-  };
-
   // ---- the world
-  void MakeVolume();
-  SubmitFrame RandomRequest(RequestId id);
   void AddWorker(Duration after);
   void KillWorker();
   void StartCoordinator();
@@ -90,9 +63,6 @@ class Simulation : private WorkerNetwork {
   void Perform(const CoordinatorEvent& event, const LoadDataset& action);
   void Perform(const CoordinatorEvent& event, const CountDataset& action);
   void Perform(const CoordinatorEvent& event, const StopService&);
-  void Observe(const GroupAssignment& assignment);
-  void CheckHidden(const GroupAssignment& assignment, const SeenFrame& frame);
-  void CheckPicture(const FrameImage& image, const Bytes& payload, const FrameReply& reply);
 
   // ---- messages
   AnyMessage OnTheWay(const AnyMessage& message) const;
@@ -111,20 +81,14 @@ class Simulation : private WorkerNetwork {
   Network network_;
   const bool encode_messages_;  // in a few worlds messages are encoded and decoded on their way
   bool workerless_ = false;     // for a moment no worker was alive
-  std::shared_ptr<const VolumeSummary> summary_;
-  std::shared_ptr<const OccupancyGrid> occupied_;
+  const World world_;
+  FrameWitness witness_;
   std::unique_ptr<Coordinator> coordinator_;
   std::vector<std::unique_ptr<Coordinator>> dead_coordinators_;  // events that are still planned refer to them
   std::vector<std::unique_ptr<ModelWorker>> workers_;            // by node
   std::vector<std::unique_ptr<ModelClient>> clients_;
   std::set<int> told_dead_;  // worker nodes whose death the sockets notice
-  WorkerConfig worker_config_;
-  WorkerSpeed speed_;
-  Policy policy_;
   std::size_t requests_planned_ = 0, requests_made_ = 0;
-  std::map<FrameId, SeenFrame> frames_;         // of this epoch
-  std::map<BoxId, Box> last_boxes_;             // as they were handed out last
-  std::set<std::pair<WorkerId, Box>> fetched_;  // voxels that workers hold for sure
   std::optional<StatusReply> status_;
 };
 

@@ -1,0 +1,41 @@
+// LabWorker: renders boxes as a worker of one render thread does, in this process, and says what that took: from a box's own voxels and
+// halo, kept by bricks, by the same pipelines.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+
+#include "common/image/local_image.h"
+#include "common/planning/frame_plan.h"
+#include "common/stats/report.h"
+#include "common/volume/volume.h"
+#include "worker/render/pipeline.h"
+
+namespace slabstream {
+
+struct BoxRendering {
+  LocalImage image;
+  RankReport report;
+  double processor_seconds = 0;  // of the calling thread: whatever else the machine does is not in it
+  double seconds = 0;            // by the clock on the wall
+};
+
+class LabWorker {
+ public:
+  explicit LabWorker(const Volume& volume);  // outlives the worker
+  ~LabWorker();
+
+  // `box` lies inside the volume and is not empty; `setup` is of this volume (FramePlan::setup). Nothing is hidden by other boxes. On the
+  // calling thread alone; one at a time. The first rendering from a slab cuts its voxels (not timed) and makes what workers keep between
+  // frames (timed): classification, normals, occupied voxels. All slabs are kept.
+  BoxRendering Render(const Box& box, const FrameSetup& setup);
+
+ private:
+  const Volume& volume_;
+  std::optional<RendererKind> kind_;
+  std::unique_ptr<Renderer> renderer_;
+  std::map<Box, std::unique_ptr<SlabData>> slabs_;  // with halo
+};
+
+}  // namespace slabstream

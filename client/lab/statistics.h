@@ -1,0 +1,27 @@
+// What repeats of a measurement say: their median and how sure it is. Pure.
+#pragma once
+
+#include <vector>
+
+namespace slabstream {
+
+// The interval is that of order statistics: the k-th smallest and k-th largest value with the largest k whose interval covers the median of
+// the distribution with at least the wanted confidence, whatever the distribution (David and Nagaraja, Order Statistics, 2003,
+// section 7.1):
+//   coverage(k) = 1 - 2 P(Binomial(count, 1/2) < k)
+// Fewer than six values cannot reach 95 %: the interval is then all of them and `coverage` says what that is worth. One value, or values
+// that are all the same (something computed): the interval is the value.
+struct Estimate {
+  double median = 0, low = 0, high = 0;
+  double coverage = 0;  // confidence of [low, high], in [0, 1]
+  int count = 0;
+
+  // In another unit: factor > 0.
+  Estimate Times(double factor) const { return {median * factor, low * factor, high * factor, coverage, count}; }
+};
+Estimate MedianOf(std::vector<double> values, double confidence = 0.95);  // no values: all zero
+
+// Coverage of the interval between the k-th smallest and the k-th largest of `count` values, 1 <= k <= (count + 1) / 2.
+double MedianCoverage(int count, int k);
+
+}  // namespace slabstream

@@ -1,0 +1,92 @@
+#include "tests/simulator/random_world.h"
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/decomposition/decomposition.h"
+#include "common/planning/assignment.h"
+#include "common/planning/brick_visibility.h"
+#include "common/planning/policy_names.h"
+#include "tests/support/random_combining.h"
+
+namespace slabstream {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr Index3 kVolumeSize{256, 256, 128};  // 8 MiB: a slab has 1 to 8 chunks
+
+// Values up to 50 show nothing.
+TransferFunction StepTransfer() {
+  TransferFunction transfer;
+  transfer.colors = {{0, {0, 0, 0}}, {255, {1, 1, 1}}};
+  transfer.opacities = {{0, 0}, {50, 0}, {51, 0.5}, {255, 1}};
+  return transfer;
+}
+
+// Whole layers of bricks across x are empty, so that some slabs show nothing.
+void MakeVolume(Random& random, World& world) {
+  auto summary = std::make_shared<VolumeSummary>();
+  summary->description.geometry.size = kVolumeSize;
+  summary->range = {0, 255};
+  summary->brick_counts = {kVolumeSize.x / kSummaryBrick, kVolumeSize.y / kSummaryBrick, kVolumeSize.z / kSummaryBrick};
+  const double empty = random.Chance(0.05) ? 1 : random.Real(0, 0.8);
+  std::vector<ValueRange> layers;
+  for (int x = 0; x < summary->brick_counts.x; ++x) layers.push_back(random.Chance(empty) ? ValueRange{0, 10} : ValueRange{0, 200});
+  for (int i = 0; i < summary->brick_counts.y * summary->brick_counts.z; ++i) {
+    summary->bricks.insert(summary->bricks.end(), layers.begin(), layers.end());
+  }
+  world.occupied = std::make_shared<const OccupancyGrid>(BrickVisibility(*summary, StepTransfer()).VisibleCells());
+  world.summary = std::move(summary);
+}
+
+}  // namespace
+
+World RandomWorld(Random& random, const Faults& faults) {
+  World world;
+  MakeVolume(random, world);
+  world.speed.render = milliseconds(random.Chance(0.1) ? 300 : random.Integer(1, 40));
+  world.speed.combine = std::chrono::microseconds(random.Integer(10, 5000));
+  world.speed.store = std::chrono::microseconds(random.Integer(10, 1000));
+  world.speed.finish = std::chrono::microseconds(random.Integer(10, 20000));
+  world.worker_config.register_interval = milliseconds(500);
+  world.worker_config.chunk_timeout = seconds(1);
+  world.worker_config.chunk_attempts = 6;
+  world.worker_config.credit_bytes = std::uint64_t{kChunkBytes} * random.Integer<std::uint64_t>(1, 4);
+  if (!faults.none() && random.Chance(0.3)) world.worker_config.cache_bytes = std::uint64_t{4} << 20;
+  world.policy.groups = random.Integer(1, 6);
+  world.policy.axis = AxisChoice(random.Integer(0, 4));
+  const auto one_of = [&](const auto& entries) { return std::string(entries[random.Integer<std::size_t>(0, entries.size() - 1)].name); };
+  if (random.Chance(0.7)) {
+    world.policy.decomposition = one_of(Decompositions());
+    world.policy.split = one_of(WorkSplits());
+    world.policy.assignment = one_of(Assignments());
+    world.policy.balance = one_of(BalanceModes());
+  }
+  world.policy.combine = RandomCombining(random);
+  if (random.Chance(0.1)) world.policy.decomposition = world.policy.assignment = world.policy.combine = kAutomatic;
+  if (random.Chance(0.3)) world.policy.teams = random.Integer(2, 4);
+  return world;
+}
+
+SubmitFrame RandomRequest(Random& random, const Policy& policy, RequestId id, std::uint32_t deadline_ms) {
+  SubmitFrame submit;
+  submit.request = id;
+  submit.deadline_ms = deadline_ms;
+  submit.frame.dataset = "volume";
+  submit.frame.size = {random.Integer(1, 3), random.Integer(1, 2)};
+  submit.frame.view.zoom = random.Chance(0.2) ? 400 : 4000;  // few pixels, but not minified: no supersampling
+  submit.frame.view.azimuth_degrees = random.Integer(0, 7) * 45 + 10;
+  submit.frame.view.elevation_degrees = random.Integer(-80, 80);
+  submit.frame.view.projection = random.Chance(0.5) ? Projection::kOrthographic : Projection::kPerspective;
+  submit.frame.transfer.choice = StepTransfer();
+  if (random.Chance(0.1)) submit.frame.renderer = RendererKind::kZBuffer;
+  if (random.Chance(0.1)) submit.frame.termination = 0;
+  submit.frame.policy = policy;
+  submit.frame.previews = random.Chance(0.3);
+  return submit;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,31 @@
+// What a simulated world is made of, by chance: a volume with empty parts, how fast and how large workers are, one policy for all frames;
+// and the frames that clients ask for in it.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "common/planning/frame_request.h"
+#include "common/volume/occupancy_grid.h"
+#include "common/volume/summary.h"
+#include "common/wire/client_messages.h"
+#include "tests/simulator/faults.h"
+#include "tests/simulator/model_worker.h"
+#include "tests/support/random.h"
+
+namespace slabstream {
+
+struct World {
+  std::shared_ptr<const VolumeSummary> summary;
+  std::shared_ptr<const OccupancyGrid> occupied;
+  WorkerConfig worker_config;
+  WorkerSpeed speed;
+  Policy policy;
+};
+
+World RandomWorld(Random& random, const Faults& faults);
+
+// Of the world's volume, "volume".
+SubmitFrame RandomRequest(Random& random, const Policy& policy, RequestId id, std::uint32_t deadline_ms);
+
+}  // namespace slabstream
