@@ -24,12 +24,12 @@ LocalImage Filled(PixelFormat format, float alpha) {
   return image;
 }
 
-template <void (*kOver)(const float*, const float*, float*, std::size_t)>
+template <bool (*kOver)(const float*, const float*, float*, std::size_t)>
 void Over(benchmark::State& state) {
   const LocalImage front = Filled(PixelFormat::kRgba, 0.3F);
   LocalImage back = Filled(PixelFormat::kRgba, 0.6F);
   for (auto _ : state) {
-    kOver(front.rgba.data(), back.rgba.data(), back.rgba.data(), std::size_t(kPixels));
+    CHECK(kOver(front.rgba.data(), back.rgba.data(), back.rgba.data(), std::size_t(kPixels)));
     benchmark::ClobberMemory();
   }
   state.SetItemsProcessed(state.iterations() * kPixels);

@@ -92,7 +92,7 @@ Result<Json> MeasureMoving(ExperimentContext& context, const Balance& balance, c
   Json numbers = {{"imbalance", Json::array()}, {"slowest_ms", Json::array()}, {"moved_bytes", Json::array()}};
   for (int i = 0; i < frames; ++i) {
     frame.view = BenchView(Projection::kOrthographic, i, kMovingFrames);
-    const Layout& next = layouts->Next();
+    const Layout& next = layouts->Next(frame);
     const double moved = i == 0 ? 0 : double(MovedVoxels(layout, next)) * VoxelBytes(knowledge);
     layout = next;
     const Result<FramePlan> plan = PlanOf(context, frame, layout);

@@ -25,7 +25,7 @@ Result<Json> MeasureBalanced(ExperimentContext& context, const FrameCase& frame)
   if (!layouts.ok()) return layouts.status();
   Json learnt = Json::array();
   for (int i = 0; i < kBalancedFrames; ++i) {
-    const Result<FramePlan> plan = PlanOf(context, frame, layouts->Next());
+    const Result<FramePlan> plan = PlanOf(context, frame, layouts->Next(frame));
     if (!plan.ok()) return plan.status();
     const Result<Json> boxes = MeasureBoxes(context, frame, *plan);
     if (!boxes.ok()) return boxes.status();
@@ -34,7 +34,7 @@ Result<Json> MeasureBalanced(ExperimentContext& context, const FrameCase& frame)
     layouts->Learn(*plan, nanoseconds);
     learnt.push_back(nanoseconds);
   }
-  const Result<FramePlan> plan = PlanOf(context, frame, layouts->Next());
+  const Result<FramePlan> plan = PlanOf(context, frame, layouts->Next(frame));
   if (!plan.ok()) return plan.status();
   Result<Json> boxes = MeasureBoxes(context, frame, *plan);
   if (boxes.ok()) (*boxes)["learnt"] = std::move(learnt);
@@ -56,11 +56,11 @@ Result<std::vector<MeasuredFrame>> RecallBalanced(ExperimentContext& context, co
     Result<LearntLayouts> layouts = LearntLayouts::Make(context, balanced);
     if (!layouts.ok()) return layouts.status();
     for (const Json& learnt : repeat->at("learnt")) {
-      const Result<FramePlan> plan = PlanOf(context, balanced, layouts->Next());
+      const Result<FramePlan> plan = PlanOf(context, balanced, layouts->Next(balanced));
       if (!plan.ok()) return plan.status();
       layouts->Learn(*plan, learnt.get<std::vector<std::int64_t>>());
     }
-    Result<FramePlan> plan = PlanOf(context, balanced, layouts->Next());
+    Result<FramePlan> plan = PlanOf(context, balanced, layouts->Next(balanced));
     if (!plan.ok()) return plan.status();
     frames.push_back(WithBoxCosts(context, balanced, *std::move(plan), {repeat}));
   }

@@ -26,12 +26,6 @@ constexpr int kRenderings = 2;  // of each box, after the first; the faster one 
 constexpr int kWarmUpFrames = 2, kFinishes = 3;
 constexpr int kLearningFrames = 8;  // to warm up with dynamic balance
 
-FrameRequest RequestOf(const FrameCase& frame) {
-  FrameRequest request = BenchRequest(frame.volume, frame.view, frame.size);
-  request.policy = frame.policy;
-  return request;
-}
-
 // Where the boxes are.
 void AddPartition(Json& key, const FrameCase& frame) {
   const Policy& policy = frame.policy;
@@ -81,6 +75,12 @@ Result<Json> MeasurePlannedBoxes(ExperimentContext& context, const FrameCase& fr
 }
 
 }  // namespace
+
+FrameRequest RequestOf(const FrameCase& frame) {
+  FrameRequest request = BenchRequest(frame.volume, frame.view, frame.size);
+  request.policy = frame.policy;
+  return request;
+}
 
 Result<Json> MeasureBoxes(ExperimentContext& context, const FrameCase& frame, const FramePlan& plan) {
   const Result<VolumeInUse> volume = context.volumes().Get(frame.volume);
@@ -188,7 +188,8 @@ Result<LayoutKnowledge> KnowLayout(ExperimentContext& context, const FrameCase& 
   if (!occupied.ok()) return occupied.status();
   Result<TransferFunction> transfer = ResolveTransfer(frame.volume.transfer, *volume->summary);
   if (!transfer.ok()) return transfer.status();
-  return LayoutKnowledge{*volume, *occupied, *std::move(transfer), frame.policy, frame.volume.renderer};
+  return LayoutKnowledge{*volume, *occupied, *std::move(transfer), SettledPolicy(RequestOf(frame), volume->summary->description.geometry),
+                         frame.volume.renderer};
 }
 
 LayoutRequest LayoutRequestOf(const LayoutKnowledge& knowledge, int workers) {

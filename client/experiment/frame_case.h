@@ -26,6 +26,7 @@ struct FrameCase {
   int workers = 1;
 };
 
+FrameRequest RequestOf(const FrameCase& frame);
 std::string_view NameOf(RendererKind renderer);  // "splatting", "Z-buffer"
 
 // Box costs depend on the partition and the view, not on who owns a box or how images are combined: cases that differ in these alone share
@@ -55,7 +56,7 @@ struct LayoutKnowledge {
   VolumeInUse volume;
   std::shared_ptr<const OccupancyGrid> occupied;
   TransferFunction transfer;
-  Policy policy;
+  Policy policy;  // settled
   RendererKind renderer = RendererKind::kSplat;
 };
 Result<LayoutKnowledge> KnowLayout(ExperimentContext& context, const FrameCase& frame);
@@ -90,10 +91,6 @@ struct MeasuredFrame {
 Result<MeasuredFrame> Recall(ExperimentContext& context, const FrameCase& frame);
 // The same of each repeat of the box costs by itself.
 Result<std::vector<MeasuredFrame>> RecallRepeats(ExperimentContext& context, const FrameCase& frame);
-
-// Numbers of a BoxCostTrial of a plan of the frame, and a plan with them.
-Result<Json> MeasureBoxes(ExperimentContext& context, const FrameCase& frame, const FramePlan& plan);
-MeasuredFrame WithBoxCosts(ExperimentContext& context, const FrameCase& frame, FramePlan plan, const std::vector<const Json*>& repeats);
 
 // Numbers of a BoxCostTrial of a plan of the frame, and a plan with them.
 Result<Json> MeasureBoxes(ExperimentContext& context, const FrameCase& frame, const FramePlan& plan);

@@ -16,21 +16,20 @@ class LearntLayouts {
   static Result<LearntLayouts> Make(ExperimentContext& context, const FrameCase& frame) {
     Result<LayoutKnowledge> knowledge = KnowLayout(context, frame);
     if (!knowledge.ok()) return knowledge.status();
-    return LearntLayouts(*std::move(knowledge), frame);
+    return LearntLayouts(*std::move(knowledge), std::uint32_t(frame.workers));
   }
 
   const LayoutKnowledge& knowledge() const { return knowledge_; }
 
-  // Of the next frame. Valid until the next call.
-  const Layout& Next() {
-    FrameRequest request;
-    request.renderer = renderer_;
-    request.policy = policy_;
+  // Of the next frame, which may differ in its view alone from the one given to Make. Valid until the next call.
+  const Layout& Next(const FrameCase& frame) {
+    FrameRequest request = RequestOf(frame);
+    request.policy = policy_ = SettledPolicy(request, knowledge_.volume.summary->description.geometry);
     return table_.Find({&request, kPlannedDataset, knowledge_.volume.summary.get(), &knowledge_.transfer, knowledge_.occupied, slots_,
                         CostModel().slab_bytes_target});
   }
 
-  // What rendering took, by PlacementsOf(plan).
+  // What rendering the frame of the last Next took, by PlacementsOf(plan).
   void Learn(const FramePlan& plan, std::span<const std::int64_t> nanoseconds) {
     std::vector<RankReport> reports;
     for (const Placement& placement : PlacementsOf(plan)) {
@@ -42,12 +41,10 @@ class LearntLayouts {
   }
 
  private:
-  LearntLayouts(LayoutKnowledge knowledge, const FrameCase& frame)
-      : knowledge_(std::move(knowledge)), renderer_(frame.volume.renderer), policy_(frame.policy), slots_(std::uint32_t(frame.workers)) {}
+  LearntLayouts(LayoutKnowledge knowledge, std::uint32_t slots) : knowledge_(std::move(knowledge)), slots_(slots) {}
 
   LayoutKnowledge knowledge_;
-  RendererKind renderer_;
-  Policy policy_;
+  Policy policy_;  // of the last Next
   std::uint32_t slots_;
   LayoutTable table_;
 };

@@ -3,6 +3,8 @@
 #include <tbb/task_arena.h>
 
 #include "client/lab/calibrate.h"
+#include "client/lab/combining_costs.h"
+#include "client/lab/neighbours.h"
 #include "common/base/check.h"
 
 namespace slabstream {
@@ -22,7 +24,8 @@ constexpr Found kNumbers[] = {
     {"combine_pixel", [](MachineModel& m) -> double& { return m.combining.combine_pixel; }},
     {"local_pixel", [](MachineModel& m) -> double& { return m.combining.local_pixel; }},
     {"hidden_pixel", [](MachineModel& m) -> double& { return m.combining.hidden_pixel; }},
-    {"task", [](MachineModel& m) -> double& { return m.combining.task; }},
+    {"hand_over_awake", [](MachineModel& m) -> double& { return m.hand_overs.awake; }},
+    {"hand_over_asleep", [](MachineModel& m) -> double& { return m.hand_overs.asleep; }},
     {"latency", [](MachineModel& m) -> double& { return m.link.latency_seconds; }},
     {"plan", [](MachineModel& m) -> double& { return m.plan_seconds; }},
     {"message", [](MachineModel& m) -> double& { return m.message_seconds; }},
@@ -33,17 +36,16 @@ constexpr Found kNumbers[] = {
 
 Trial HostTrial(int workers) {
   const auto run = [workers]() -> Result<Json> {
-    Result<MachineModel> machine = CalibrateThisHost(workers);
-    if (!machine.ok()) return machine.status();
-    Json numbers = {{"cores", machine->cores_a_host}};
-    for (const Found& number : kNumbers) numbers[number.name] = number.of(*machine);
+    const Result<Calibration> calibration = CalibrateThisHost(workers);
+    if (!calibration.ok()) return calibration.status();
+    MachineModel machine = calibration->machine;
+    Json numbers = {{"cores", machine.cores_a_host}};
+    for (const Found& number : kNumbers) numbers[number.name] = number.of(machine);
     // Between hosts pixels travel in messages, where workers of one host lend them to each other.
-    const double task = machine->combining.task;
     // Hosts of a cluster have one thread for it.
     tbb::task_arena one_thread(1);
-    machine->combining = one_thread.execute([] { return MeasureCombining(Transfer::kMessage); });
-    machine->combining.task = task;
-    for (const Found& number : kNumbers) numbers[std::string("between_hosts_") + number.name] = number.of(*machine);
+    machine.combining = one_thread.execute([] { return MeasureCombining(Transfer::kMessage); });
+    for (const Found& number : kNumbers) numbers[std::string("between_hosts_") + number.name] = number.of(machine);
     return numbers;
   };
   return {HostKey(workers), run, 50};
@@ -55,7 +57,7 @@ Trial NeighbourTrial(ExperimentContext& context, const FrameCase& frame) {
     if (!volume.ok()) return volume.status();
     const Result<FramePlan> plan = PlanOf(context, frame);
     if (!plan.ok()) return plan.status();
-    return Json{{"slowdown", MeasureMemorySlowdown(*volume->volume, plan->setup)}};
+    return Json{{"slowdown", ModelSlowdown(MeasureSlowdown(*volume->volume, plan->setup).median)}};
   };
   return {NeighbourKey(frame), run, 10};
 }
@@ -66,6 +68,7 @@ MachineModel ThisMachine(const ExperimentContext& context, const FrameCase& fram
   for (const Found& number : kNumbers) number.of(machine) = EstimateOf(context.log(), key, number.name).median;
   machine.link.contention = Contention::kNone;  // within a process workers lend each other their pixels
   machine.combining.rgba_bytes = machine.combining.depth_bytes = 0;
+  machine.combining.lent = true;
   machine.link.bytes_per_second = 1e12;
   machine.workers_a_host = frame.workers;
   machine.cores_a_host = int(EstimateOf(context.log(), key, "cores").median);
@@ -99,7 +102,7 @@ MachineModel PaperMachine(const ExperimentContext& context, double frame_seconds
   machine.link.bytes_per_second = pixels * machine.combining.rgba_bytes / (kImageShare * frame_seconds);
   machine.plan_seconds = machine.message_seconds = machine.client_seconds = 0;
   machine.cores_a_host = 1;  // its workers were single processors
-  machine.combining.task = 0;
+  machine.hand_overs = {.awake = 0, .asleep = 0};
   machine.combining.hidden_pixel = 0;
   return machine;
 }

@@ -32,6 +32,17 @@ NamedPolicy BalancedTree() {
   return tree;
 }
 
+std::vector<NamedPolicy> PartitionsAlongTheView() {
+  std::vector<NamedPolicy> policies;
+  for (const char* decomposition : {"slab", "kd-tree"}) {
+    NamedPolicy named{fmt::format("{} along the view", decomposition), BalancedTree().policy};
+    named.policy.decomposition = decomposition;
+    named.policy.axis = AxisChoice::kView;
+    policies.push_back(std::move(named));
+  }
+  return policies;
+}
+
 std::vector<std::string> AllSchemes() {
   std::vector<std::string> schemes;
   for (const CombiningEntry& entry : CombiningSchemes()) schemes.emplace_back(entry.name);

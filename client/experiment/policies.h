@@ -19,6 +19,9 @@ std::vector<NamedPolicy> AllPartitions();
 // Two of them: what the paper does, and what is meant to balance.
 NamedPolicy EqualSlabs();
 NamedPolicy BalancedTree();
+// Boxes cut along the axis on which the view's slices are traversed, by occupied voxels: what is rendered at borders is least, and what
+// travels when another axis comes nearest is most.
+std::vector<NamedPolicy> PartitionsAlongTheView();
 // Every scheme, with its own arguments.
 std::vector<std::string> AllSchemes();
 // Those that are worth trying with each partition: a tree, a swap.

@@ -167,7 +167,7 @@ SweepPolicy ReadPolicy(const Value& value) {
   SweepPolicy read;
   Policy& policy = read.policy;
   policy.groups = 1;
-  constexpr std::array<std::string_view, 4> kAxes = {"x", "y", "z", "auto"};
+  constexpr std::array<std::string_view, 5> kAxes = {"x", "y", "z", "auto", "view"};
   value.Fields({{"name", [&](const Value& v) { read.name = v.Text(); }},
                 {"decomposition", [&](const Value& v) { policy.decomposition = ReadName(v, Decompositions()); }},
                 {"split", [&](const Value& v) { policy.split = ReadName(v, WorkSplits()); }},

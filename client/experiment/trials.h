@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "client/experiment/statistics.h"
 #include "client/experiment/trial_log.h"
+#include "client/lab/statistics.h"
 
 namespace slabstream {
 

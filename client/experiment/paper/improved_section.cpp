@@ -60,7 +60,16 @@ struct Outcome {
 // What is tried with dynamic balance, too: it takes a frame after the other to measure.
 std::vector<NamedPolicy> BalancedPartitions(int workers) {
   if (workers == 1) return {};
-  return {EqualSlabs(), BalancedTree()};
+  std::vector<NamedPolicy> partitions = PartitionsAlongTheView();
+  partitions.insert(partitions.begin(), {EqualSlabs(), BalancedTree()});
+  return partitions;
+}
+
+std::vector<NamedPolicy> Partitions() {
+  std::vector<NamedPolicy> partitions = AllPartitions();
+  const std::vector<NamedPolicy> along = PartitionsAlongTheView();
+  partitions.insert(partitions.end(), along.begin(), along.end());
+  return partitions;
 }
 
 // Frames of one pipeline and size on one machine, however they are divided.
@@ -75,7 +84,7 @@ class Improved {
   // Of all ways to divide, and the schemes that suit a link, with `team` of `workers` on a frame.
   Result<Outcome> FindBest(int workers, int team) const {
     Outcome best;
-    for (const NamedPolicy& named : AllPartitions()) {
+    for (const NamedPolicy& named : Partitions()) {
       const FrameCase frame = With(setup_.Frame(renderer_, size_, team), named.policy);
       const Result<MeasuredFrame> measured = Recall(setup_.context(), frame);
       if (!measured.ok()) return measured.status();
@@ -88,7 +97,7 @@ class Improved {
       // The middle one of its repeats, so that the luckiest does not count.
       std::vector<Outcome> outcomes(measured->size());
       for (std::size_t i = 0; i < outcomes.size(); ++i) {
-        const std::string name = fmt::format("{} dynamic", named.policy.decomposition);
+        const std::string name = fmt::format("{}, dynamic", named.name);
         if (Status status = Try((*measured)[i], name, workers, outcomes[i]); !status.ok()) return status;
       }
       std::ranges::sort(outcomes, {}, &Outcome::seconds);
@@ -165,7 +174,7 @@ std::vector<Trial> ImprovedTrials(const PaperSetup& setup) {
     for (const int size : Sizes(setup)) {
       for (const int p : shared) {
         const FrameCase frame = setup.Frame(renderer, size, p);
-        for (const NamedPolicy& named : AllPartitions()) trials.push_back(BoxCostTrial(setup.context(), With(frame, named.policy)));
+        for (const NamedPolicy& named : Partitions()) trials.push_back(BoxCostTrial(setup.context(), With(frame, named.policy)));
         for (const NamedPolicy& named : BalancedPartitions(p)) trials.push_back(BalancedTrial(setup.context(), With(frame, named.policy)));
       }
     }
@@ -293,8 +302,9 @@ Result<Section> ImprovedSection(const PaperSetup& setup) {
   section.question = "The paper proposes data streaming, other primitives and load balancing. What do they give?";
   section.method =
       "The same spheres, now with as many frames asked for ahead as keep all workers busy: they render the next frames while the last ones "
-      "are combined, and take turns at making the picture. Volumes are divided so that workers have equal work: every partition, two of "
-      "them also with dynamic balance, and the usual combining schemes are tried; the best one is shown and named. Efficiency compares the "
+      "are combined, and take turns at making the picture. Volumes are divided so that workers have equal work: every partition along z, "
+      "slabs and kd-trees also along the axis on which the view's slices are traversed, four of them with dynamic balance, too, and the "
+      "usual combining schemes are tried; the best one is shown and named. Efficiency compares the "
       "time from picture to picture with that of one worker on the same machine. No schedule exceeds what the boxes allow: the whole "
       "volume's render time over that of the worker that has most, times the workers a frame. Where not all workers share every frame, "
       "teams of them take frames in turn, and each team holds the volume. pvs is the paper's bus scaled to these processors, one a "

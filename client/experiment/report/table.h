@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "client/experiment/report/origin.h"
-#include "client/experiment/statistics.h"
+#include "client/lab/statistics.h"
 
 namespace slabstream {
 
