@@ -3,8 +3,8 @@
 // can exceed; then frames simulated on a link, asked for ahead: the time from picture to picture, and how busy each kind of resource is by
 // then.
 //
-//   build/bin/throughput_bench [--size N] [--workers P] [--team M] [--renderer splat|zbuffer] [--frames F] [--schemes A B ...] [--links A B
-//   ...]
+//   build/bin/throughput_bench [--size N] [--workers P] [--team M] [--renderer splat|zbuffer] [--axis auto|view] [--frames F]
+//                              [--schemes A B ...] [--links A B ...]
 //
 // Every box is rendered alone on one thread. Dynamic balance: the coordinator's table of layouts learns from F frames of that view.
 #include <fmt/format.h>
@@ -38,6 +38,7 @@ struct Options {
   std::vector<std::string> schemes = {"fan-in", "radix-k", "direct-send"};
   std::vector<std::string> links = {"pvs", "10gbit"};
   int team = 0;  // workers that share a frame; 0: all
+  AxisChoice axis = AxisChoice::kAuto;
 };
 
 struct Subject {
@@ -78,6 +79,7 @@ Planned Plan(const Subject& subject, const Policy& policy, int workers, int fram
   const Roster roster = RosterOf(std::uint32_t(workers));
   FrameRequest request = subject.request;
   request.policy = policy;
+  request.policy = SettledPolicy(request, subject.summary.description.geometry);
   LayoutTable layouts;
   Planned planned;
   for (int frame = 0; frame < frames; ++frame) {
@@ -95,7 +97,7 @@ Planned Plan(const Subject& subject, const Policy& policy, int workers, int fram
       report.box = placement.id;
       report.stage_ns[std::size_t(Stage::kRender)] = std::int64_t(box * 1e9);
     }
-    layouts.Learn(planned.plan, policy, reports);
+    layouts.Learn(planned.plan, request.policy, reports);
   }
   return planned;
 }
@@ -181,7 +183,7 @@ void Run(const Options& options) {
   const int team = options.team == 0 ? options.workers : options.team;
   for (const std::string& decomposition : options.decompositions) {
     for (const std::string split : {"voxels", "occupied", "cost"}) {
-      Policy policy{.decomposition = decomposition, .split = split, .groups = 1};
+      Policy policy{.decomposition = decomposition, .split = split, .axis = options.axis, .groups = 1};
       const bool dynamic = split == "cost";
       if (dynamic) policy.balance = kDynamicBalance;
       Planned planned = Plan(subject, policy, team, dynamic ? options.frames : 1, options.repeats);
@@ -225,6 +227,9 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
   app.add_option("--renderer", options.renderer, "pipeline")->check(CLI::IsMember({"splat", "zbuffer"}))->capture_default_str();
+  app.add_option("--axis", options.axis, "that is cut, or cut first")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, slabstream::AxisChoice>{{"auto", slabstream::AxisChoice::kAuto}, {"view", slabstream::AxisChoice::kView}}));
   app.add_option("--repeats", options.repeats, "renderings of each box")->check(CLI::Range(1, 100))->capture_default_str();
   app.add_option("--frames", options.frames, "that dynamic balance learns from")->check(CLI::Range(1, 100))->capture_default_str();
   app.add_option("--decompositions", options.decompositions, "of the volume");

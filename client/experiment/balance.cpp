@@ -115,7 +115,7 @@ Result<Json> MeasureMoving(ExperimentContext& context, const Balance& balance, c
 int MovingFrames(const ExperimentContext& context) { return context.quick() ? 6 : kMovingFrames; }
 
 std::vector<Trial> TrialsOf(ExperimentContext& context, const Balance& balance) {
-  std::vector<Trial> trials = {HostTrial(1)};
+  std::vector<Trial> trials = {HostTrial()};
   for (const BenchCase& volume : balance.volumes) {
     for (const NamedPolicy& named : AllPartitions()) {
       trials.push_back(FinishTrial(context, balance.Frame(volume, named.policy, 1)));

@@ -336,7 +336,7 @@ class CombiningReport {
 
 Result<Report> RunCombining(ExperimentContext& context) {
   const Sweeps sweeps = SweepsOf(context);
-  std::vector<Trial> measured = {HostTrial(1)}, simulated;
+  std::vector<Trial> measured = {HostTrial()}, simulated;
   for (const std::string& scheme : AllSchemes()) {
     for (const int ranks : sweeps.measured_ranks) {
       for (const double share : {1.0, sweeps.sparse})

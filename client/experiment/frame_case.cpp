@@ -11,6 +11,7 @@
 #include "client/cli/session.h"
 #include "client/lab/box_costs.h"
 #include "client/lab/frame_costs.h"
+#include "client/lab/validate.h"
 #include "common/base/check.h"
 #include "common/planning/frame_window.h"
 #include "common/planning/placement.h"
@@ -264,6 +265,25 @@ Trial FinishTrial(ExperimentContext& context, const FrameCase& frame) {
 Trial ServiceTrial(ExperimentContext& context, const FrameCase& frame, int frames) {
   return {ServiceKey(frame), [&context, frame, frames] { return MeasureService(context, frame, frames); },
           (2 + WarmUpFrames(frame.policy) + frames) * ExpectedEffort(frame)};
+}
+
+Json ValidationKey(const FrameCase& frame) {
+  Json key = PictureKey("validation", frame);
+  AddPartition(key, frame);
+  return key;
+}
+
+Trial ValidationTrial(ExperimentContext& context, const FrameCase& frame, int turns) {
+  const auto validate = [&context, frame, turns]() -> Result<Json> {
+    const Result<VolumeInUse> volume = context.volumes().Get(frame.volume);
+    if (!volume.ok()) return volume.status();
+    const ValidationCase what{frame.volume.name, volume->volume, RequestOf(frame), frame.workers};
+    const Result<ValidationRow> row = ValidateSimulation(what, {.views = 1, .turns = turns});
+    if (!row.ok()) return row.status();
+    const ValidatedView& view = row->views.front();
+    return Json{{"measured_ms", view.measured.latency * 1e3}, {"simulated_ms", view.simulated.latency * 1e3}};
+  };
+  return {ValidationKey(frame), validate, 4 * turns * ExpectedEffort(frame)};  // the service's, and the boxes', twice each
 }
 
 std::vector<Trial> WithoutDoubles(std::vector<Trial> trials) {

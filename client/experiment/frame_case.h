@@ -44,6 +44,11 @@ Json FinishKey(const FrameCase& frame);
 Trial ServiceTrial(ExperimentContext& context, const FrameCase& frame, int frames);
 Json ServiceKey(const FrameCase& frame);
 
+// The same frame by the service and as the simulation says, in turns (client/lab/validate.h), for frame.workers of 1 or 2: "measured_ms"
+// and "simulated_ms".
+Trial ValidationTrial(ExperimentContext& context, const FrameCase& frame, int turns);
+Json ValidationKey(const FrameCase& frame);
+
 // What a picture is of, whoever renders it: the beginning of every key. `what`: of the trial.
 Json PictureKey(std::string_view what, const FrameCase& frame);
 // The plan that the service would make of its first frame. Errors of Validate and PlanFrame.

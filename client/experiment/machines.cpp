@@ -4,14 +4,12 @@
 
 #include "client/lab/calibrate.h"
 #include "client/lab/combining_costs.h"
-#include "client/lab/neighbours.h"
 #include "common/base/check.h"
 
 namespace slabstream {
 namespace {
 
-Json HostKey(int workers) { return {{"what", "host"}, {"workers", workers}}; }
-Json NeighbourKey(const FrameCase& frame) { return PictureKey("neighbours", frame); }
+Json HostKey() { return {{"what", "host"}}; }
 
 // The numbers of a MachineModel that calibration finds.
 struct Found {
@@ -34,47 +32,19 @@ constexpr Found kNumbers[] = {
 
 }  // namespace
 
-Trial HostTrial(int workers) {
-  const auto run = [workers]() -> Result<Json> {
-    const Result<Calibration> calibration = CalibrateThisHost(workers);
+Trial HostTrial() {
+  const auto run = []() -> Result<Json> {
+    const Result<Calibration> calibration = CalibrateThisHost(1);
     if (!calibration.ok()) return calibration.status();
     MachineModel machine = calibration->machine;
-    Json numbers = {{"cores", machine.cores_a_host}};
-    for (const Found& number : kNumbers) numbers[number.name] = number.of(machine);
-    // Between hosts pixels travel in messages, where workers of one host lend them to each other.
-    // Hosts of a cluster have one thread for it.
+    // Between hosts pixels travel in messages, where workers of one host lend them to each other. Hosts have one thread for it.
     tbb::task_arena one_thread(1);
     machine.combining = one_thread.execute([] { return MeasureCombining(Transfer::kMessage); });
-    for (const Found& number : kNumbers) numbers[std::string("between_hosts_") + number.name] = number.of(machine);
+    Json numbers = Json::object();
+    for (const Found& number : kNumbers) numbers[number.name] = number.of(machine);
     return numbers;
   };
-  return {HostKey(workers), run, 50};
-}
-
-Trial NeighbourTrial(ExperimentContext& context, const FrameCase& frame) {
-  const auto run = [&context, frame]() -> Result<Json> {
-    const Result<VolumeInUse> volume = context.volumes().Get(frame.volume);
-    if (!volume.ok()) return volume.status();
-    const Result<FramePlan> plan = PlanOf(context, frame);
-    if (!plan.ok()) return plan.status();
-    return Json{{"slowdown", ModelSlowdown(MeasureSlowdown(*volume->volume, plan->setup).median)}};
-  };
-  return {NeighbourKey(frame), run, 10};
-}
-
-MachineModel ThisMachine(const ExperimentContext& context, const FrameCase& frame) {
-  const Json key = HostKey(frame.workers);
-  MachineModel machine;
-  for (const Found& number : kNumbers) number.of(machine) = EstimateOf(context.log(), key, number.name).median;
-  machine.link.contention = Contention::kNone;  // within a process workers lend each other their pixels
-  machine.combining.rgba_bytes = machine.combining.depth_bytes = 0;
-  machine.combining.lent = true;
-  machine.link.bytes_per_second = 1e12;
-  machine.workers_a_host = frame.workers;
-  machine.cores_a_host = int(EstimateOf(context.log(), key, "cores").median);
-  machine.picture_threads = std::min(machine.workers_a_host, machine.cores_a_host);
-  machine.memory_slowdown = EstimateOf(context.log(), NeighbourKey(frame), "slowdown").median;
-  return machine;
+  return {HostKey(), run, 50};
 }
 
 LinkModel Link(std::string_view preset) {
@@ -85,8 +55,7 @@ LinkModel Link(std::string_view preset) {
 
 MachineModel Cluster(const ExperimentContext& context, const LinkModel& link) {
   MachineModel machine;
-  for (const Found& number : kNumbers)
-    number.of(machine) = EstimateOf(context.log(), HostKey(1), std::string("between_hosts_") + number.name).median;
+  for (const Found& number : kNumbers) number.of(machine) = EstimateOf(context.log(), HostKey(), number.name).median;
   machine.message_seconds = MachineModel().message_seconds;  // over sockets, which threads of a process do without
   machine.link = link;
   machine.workers_a_host = 1;

@@ -8,17 +8,12 @@
 
 namespace slabstream {
 
-// Measures this machine as the simulation wants to know it (client/lab/calibrate.h), with `workers` workers of one thread each.
-Trial HostTrial(int workers);
-// How much two renderers of this picture slow each other down.
-Trial NeighbourTrial(ExperimentContext& context, const FrameCase& frame);
-
-// This machine with frame.workers workers, as the embedded service runs them. Its HostTrial and the frame's NeighbourTrial must have been
-// run.
-MachineModel ThisMachine(const ExperimentContext& context, const FrameCase& frame);
+// Measures this machine's constants as the simulation wants to know them (client/lab/calibrate.h), but for pixels that travel between
+// hosts.
+Trial HostTrial();
 
 // A host for each worker, of kCoresAHost cores of this machine's speed, joined by `link`: one core for rendering, one for all else.
-// HostTrial(1) must have been run.
+// HostTrial must have been run.
 inline constexpr int kCoresAHost = 2;
 MachineModel Cluster(const ExperimentContext& context, const LinkModel& link);
 LinkModel Link(std::string_view preset);  // of LinkPresets()

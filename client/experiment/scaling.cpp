@@ -187,7 +187,7 @@ Result<Section> SectionOf(ExperimentContext& context, const Kind& kind) {
 
 Result<Report> RunScaling(ExperimentContext& context) {
   const std::vector<Kind> kinds = KindsOf(context);
-  std::vector<Trial> trials = {HostTrial(1)};
+  std::vector<Trial> trials = {HostTrial()};
   for (const Kind& kind : kinds) {
     for (const Series& series : kind.series) {
       for (const FrameCase& frame : series.frames) {

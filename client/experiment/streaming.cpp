@@ -62,7 +62,7 @@ double WindowBytes(const MeasuredFrame& frame) {
 Result<Report> RunStreaming(ExperimentContext& context) {
   const Result<Streams> streams = StreamsOf(context);
   if (!streams.ok()) return streams.status();
-  std::vector<Trial> trials = {HostTrial(1)};
+  std::vector<Trial> trials = {HostTrial()};
   for (const BenchCase& volume : streams->volumes) {
     trials.push_back(FinishTrial(context, streams->Frame(volume, 1, 1)));
     trials.push_back(BoxCostTrial(context, streams->Frame(volume, 1, 1)));

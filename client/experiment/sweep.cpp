@@ -73,7 +73,7 @@ Status ForEachPicture(const Sweep& sweep, Use&& use) {
 }
 
 Result<std::vector<Trial>> TrialsOf(ExperimentContext& context, const Sweep& sweep) {
-  std::vector<Trial> trials = {HostTrial(1)};
+  std::vector<Trial> trials = {HostTrial()};
   const Status done = ForEachPicture(sweep, [&](const BenchCase& volume, RendererKind renderer, const SweepView& view) -> Status {
     for (const SweepPolicy& policy : sweep.policies) {
       for (const int p : sweep.workers) {

@@ -10,7 +10,7 @@
 namespace slabstream {
 namespace {
 
-constexpr int kServiceFrames = 5;
+constexpr int kValidationTurns = 7;
 constexpr double kOccupancy = 0.05;  // of class I
 // Oblique, so that no slab hides behind another one and slices are seen neither edge-on nor straight on.
 constexpr double kAzimuth = 30, kElevation = 20;
@@ -70,10 +70,9 @@ std::vector<Trial> FrameTrials(const PaperSetup& setup) {
     trials.push_back(BoxCostTrial(setup.context(), frame));
     trials.push_back(FinishTrial(setup.context(), frame));
     if (std::ranges::find(measured, frame.workers) == measured.end()) continue;
-    trials.push_back(ServiceTrial(setup.context(), frame, kServiceFrames));
-    trials.push_back(NeighbourTrial(setup.context(), frame));
+    trials.push_back(ValidationTrial(setup.context(), frame, kValidationTurns));
   }
-  for (const int p : measured) trials.push_back(HostTrial(p));
+  trials.push_back(HostTrial());
   return trials;
 }
 

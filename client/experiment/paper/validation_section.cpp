@@ -5,7 +5,6 @@
 #include <limits>
 #include <map>
 
-#include "client/experiment/machines.h"
 #include "client/experiment/paper/setup.h"
 #include "client/experiment/report/charts.h"
 
@@ -57,13 +56,9 @@ Result<Section> ValidationSection(const PaperSetup& setup) {
       LineSeries series{fmt::format("{}, p = {}", NameOf(renderer), p), Origin::kSimulated, {}};
       for (const int size : setup.sizes()) {
         const FrameCase frame = setup.Frame(renderer, size, p);
-        const Estimate measured = EstimateOf(setup.context().log(), ServiceKey(frame), "latency_ms");
-        const Result<MeasuredFrame> costs = Recall(setup.context(), frame);
-        if (!costs.ok()) return costs.status();
-        const Result<Timeline> timeline = Simulate(*costs, ThisMachine(setup.context(), frame));
-        if (!timeline.ok()) return timeline.status();
-        const double simulated = timeline->frames.front().latency() * 1e3;
-        const auto error_against = [&](double ms) { return 100 * (simulated / ms - 1); };
+        const Estimate measured = EstimateOf(setup.context().log(), ValidationKey(frame), "measured_ms");
+        const Estimate simulated = EstimateOf(setup.context().log(), ValidationKey(frame), "simulated_ms");
+        const auto error_against = [&](double ms) { return 100 * (simulated.median / ms - 1); };
         const double error = error_against(measured.median);
         Errors& errors = by_workers[p];
         (measured.median >= kLongMilliseconds ? errors.long_frames : errors.short_frames).push_back(std::abs(error));
@@ -84,10 +79,10 @@ Result<Section> ValidationSection(const PaperSetup& setup) {
   section.title = "How far to trust the simulation";
   section.question = "Where this machine can run the workers, does the simulation say what the service does?";
   section.method =
-      "The same frames by the service inside this process, one and two workers of one thread each, one frame in flight, in the same run; "
-      "and simulated from the costs of their slabs on a model of this machine, whose constants are measured by themselves: operators, "
-      "hand-overs on frames that hold next to nothing, and how much two renderers slow each other down. Nothing of the service's own times "
-      "enters the simulation, which leaves out lost messages, hiding by groups in front, and whatever else the machine does.";
+      "The same frames by the service inside this process, one and two workers of one thread each, one frame in flight; and, turn by turn "
+      "between them, simulated from the costs of their slabs on a model of this machine, whose constants are measured by themselves: "
+      "operators, hand-overs on frames of another service, and how much two renderers slow each other down. Medians over turns on both "
+      "sides. Nothing of the service's own times enters the simulation, which leaves out lost messages and hiding by groups in front.";
   std::vector<double> long_errors;
   for (const auto& [workers, errors] : by_workers) {
     const std::string who = workers == 1 ? "one worker" : fmt::format("{} workers", workers);
