@@ -23,7 +23,7 @@
 namespace slabstream {
 namespace {
 
-constexpr int kRenderings = 2;  // of each box, after the first; the faster one counts
+constexpr int kRenderings = 2;  // rounds of box costs: of two, the lower one is the median that counts
 constexpr int kWarmUpFrames = 2, kFinishes = 3;
 constexpr int kLearningFrames = 8;  // to warm up with dynamic balance
 

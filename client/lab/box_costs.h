@@ -19,7 +19,7 @@ namespace slabstream {
 struct BoxCost {
   Box box;
   double first_seconds = 0;           // processor time of the first rendering
-  double seconds = 0;                 // of the median later one: cores are at times quicker, too, so that the quickest tells of luck
+  double seconds = 0;                 // of the median later one (of two the lower): the quickest is luck, for cores are at times quicker
   StageTimes stage_ns{};              // of that one, by the clock on the wall
   std::uint64_t occupied_voxels = 0;  // in the box, under the transfer function; splatting
   std::uint64_t drawn_voxels = 0;     // that went through splat or Z-buffer
@@ -30,7 +30,8 @@ struct BoxCost {
 };
 
 // By the order of `boxes`, which lie inside the volume and are not empty. `setup` is of this volume (FramePlan::setup). `repeats` >= 1
-// later rounds, in which each is rendered twice more. Nothing is hidden by other boxes. On the calling thread alone. All boxes are kept at once.
+// later rounds, in which each is rendered twice more. Nothing is hidden by other boxes. On the calling thread alone. All boxes are kept at
+// once.
 std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FrameSetup& setup, std::span<const Box> boxes, int repeats);
 
 // The boxes that a plan has rendered, by the order of PlacementsOf(plan).
