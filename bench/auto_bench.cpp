@@ -1,7 +1,7 @@
 // What `auto` chooses and how good that is. For volumes given on the command line ("sphere1:300" is the paper's class-I sphere with N =
 // 300; FILE@PRESET names a transfer function), a view and a number of workers:
 //
-//   simulated   every box of every candidate's partition is rendered alone on one thread (client/lab); frames are simulated from these
+//   simulated   every box of every candidate's partition is rendered alone on one thread (laboratory/measure); frames are simulated from these
 //   costs
 //               on the machine that the choice was made for. Printed: the policy that holds where nothing is chosen, what ChoosePolicy
 //               takes before anything is known and once costs are learnt, the best of all candidates, and how long choosing took
@@ -19,8 +19,8 @@
 #include "client/cli/frame_summary.h"
 #include "client/client.h"
 #include "client/embedded/embedded_service.h"
-#include "client/lab/frame_costs.h"
-#include "client/lab/thread_time.h"
+#include "laboratory/measure/frame_costs.h"
+#include "laboratory/measure/thread_time.h"
 #include "common/classification/count_occupied.h"
 #include "common/combining/schemes.h"
 #include "common/decomposition/decomposition.h"

@@ -1,4 +1,4 @@
-// How even partitions are: every box of each is rendered alone on one thread (client/lab/box_costs.h), the boxes of a slot are added up,
+// How even partitions are: every box of each is rendered alone on one thread (laboratory/measure/box_costs.h), the boxes of a slot are added up,
 // and the slot with most to do is compared with the mean, in views all round. Then the same in each view after some frames of dynamic
 // balance. For volumes given on the command line; "sphere1:300" is the paper's class-I sphere with N = 300. --stealing simulates frames of
 // both kinds of layout, and what work stealing could win at most.
@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "client/lab/box_costs.h"
+#include "laboratory/measure/box_costs.h"
 #include "common/classification/count_occupied.h"
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"

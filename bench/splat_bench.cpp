@@ -9,7 +9,7 @@
 #include <chrono>
 #include <vector>
 
-#include "client/lab/splat_loops.h"
+#include "laboratory/measure/splat_loops.h"
 
 namespace slabstream {
 namespace {

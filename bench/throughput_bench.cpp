@@ -17,9 +17,9 @@
 #include <vector>
 
 #include "client/cli/bench_cases.h"
-#include "client/lab/calibrate.h"
-#include "client/lab/combining_costs.h"
-#include "client/lab/frame_costs.h"
+#include "laboratory/measure/calibrate.h"
+#include "laboratory/measure/combining_costs.h"
+#include "laboratory/measure/frame_costs.h"
 #include "common/base/large_buffers.h"
 #include "common/classification/count_occupied.h"
 #include "common/planning/placement.h"
@@ -113,7 +113,7 @@ MachineModel MachineFor(const std::string& link, double one_seconds, int size) {
   machine.workers_a_host = 1;
   machine.cores_a_host = 2;
   if (link == "pvs") {
-    // As client/experiment/machines.cpp: the paper's ratio of computing to communicating, and nothing around a frame.
+    // As laboratory/experiments/machines.cpp: the paper's ratio of computing to communicating, and nothing around a frame.
     machine.link.bytes_per_second = double(size) * size * machine.combining.rgba_bytes / (0.083 / 72.89 * one_seconds);
     machine.plan_seconds = machine.message_seconds = machine.client_seconds = 0;
     machine.hand_overs = {.awake = 0, .asleep = 0};

@@ -3,7 +3,7 @@
 // instead: places in fixed point along one dimension (Lattice), where a beam is filtered.
 #include <benchmark/benchmark.h>
 
-#include "client/lab/transform_loops.h"
+#include "laboratory/measure/transform_loops.h"
 #include "worker/kernels/footprint_table.h"
 
 namespace slabstream::bench {

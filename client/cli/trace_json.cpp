@@ -5,7 +5,7 @@
 #include <set>
 #include <utility>
 
-#include "client/lab/recording.h"
+#include "laboratory/measure/recording.h"
 
 namespace slabstream {
 namespace {

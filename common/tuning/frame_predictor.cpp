@@ -14,7 +14,7 @@ namespace slabstream {
 namespace {
 
 // Seconds a pixel, one thread: resampling the accumulated frame to a pixel of the picture, averaging supersampled ones, encoding the
-// picture; checking and decoding it at the client. As client/lab/frame_costs.h measures them.
+// picture; checking and decoding it at the client. As laboratory/measure/frame_costs.h measures them.
 constexpr double kResamplePixel = 4.5e-9, kResolvePixel = 1.5e-9, kEncodePixel = 2.5e-9, kReceivePixel = 1.2e-9;
 
 double PicturePixels(const FrameSetup& setup) {

@@ -1,0 +1,77 @@
+// Experiments: what `slabstream experiment NAME -o DIR` runs. Each is one file and one line in Experiments(). An experiment says which
+// trials it needs (trials.h), has them run, and makes a report of their numbers (report/document.h); the frame around it
+// (run_experiment.cpp) does the rest: folder, resumption, progress, provenance, files.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "laboratory/report/document.h"
+#include "laboratory/experiments/trials.h"
+#include "laboratory/experiments/volumes.h"
+#include "common/base/status.h"
+
+namespace slabstream {
+
+struct ExperimentOptions {
+  std::string name;
+  std::string sweep_file;  // of `sweep`; else empty
+  std::string folder;
+  bool quick = false;  // a tenth of the time: fewer sizes and repeats
+  double scale = 1;    // [kMinScale, 1]: of the sides of spheres and pictures
+  std::uint64_t seed = 1;
+  int repeats = 0;  // [1, kMaxRepeats]; 0: the experiment's own number
+  Resume resume = Resume::kSame;
+  std::vector<std::string> volumes;  // FILE[:TRANSFER], beside or instead of the standard ones
+  bool list = false;
+  std::string command;  // as it was typed
+};
+inline constexpr int kMaxRepeats = 1000, kLeastScaledSide = 8;
+inline constexpr double kMinScale = 0.05;
+
+// What an experiment works with.
+class ExperimentContext {
+ public:
+  ExperimentContext(ExperimentOptions options, TrialLog log, std::function<bool()> interrupted);
+
+  const ExperimentOptions& options() const { return options_; }
+  bool quick() const { return options_.quick; }
+  int Scaled(int side) const;  // a sphere's side or a picture's, at least kLeastScaledSide
+  VolumeCache& volumes() { return volumes_; }
+
+  // Runs those that the log does not hold yet. `repeats`: where the user did not say.
+  Status Run(const std::vector<Trial>& trials, int repeats);
+  const TrialLog& log() const { return log_; }
+  int repeats() const { return repeats_; }  // of the last Run
+
+ private:
+  ExperimentOptions options_;
+  TrialLog log_;
+  std::function<bool()> interrupted_;
+  VolumeCache volumes_;
+  int repeats_ = 1;
+};
+
+struct Experiment {
+  std::string_view name;
+  std::string_view purpose;  // one line for --list
+  Result<Report> (*run)(ExperimentContext&);
+  // What is wrong with the options, before a folder is made; null: nothing can be that is not checked for all.
+  Status (*check)(const ExperimentOptions&) = nullptr;
+  bool takes_file = false;  // ExperimentOptions::sweep_file
+};
+
+// The only list.
+const std::vector<Experiment>& Experiments();
+
+Result<Report> RunPaper(ExperimentContext& context);
+Result<Report> RunBalance(ExperimentContext& context);
+Result<Report> RunCombining(ExperimentContext& context);
+Result<Report> RunStreaming(ExperimentContext& context);
+Result<Report> RunScaling(ExperimentContext& context);
+Result<Report> RunSweep(ExperimentContext& context);
+Status CheckSweepFile(const ExperimentOptions& options);
+
+}  // namespace slabstream

@@ -1,0 +1,399 @@
+#include "laboratory/experiments/frame_case.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <utility>
+
+#include "client/cli/frame_summary.h"
+#include "client/cli/session.h"
+#include "laboratory/measure/box_costs.h"
+#include "laboratory/measure/frame_costs.h"
+#include "laboratory/measure/validate.h"
+#include "common/base/check.h"
+#include "common/planning/frame_window.h"
+#include "common/planning/placement.h"
+#include "common/planning/policy_names.h"
+#include "common/planning/team.h"
+#include "common/tuning/choose_policy.h"
+#include "common/tuning/service_machine.h"
+
+namespace slabstream {
+namespace {
+
+constexpr int kRenderings = 2;  // rounds of box costs: of two, the lower one is the median that counts
+constexpr int kWarmUpFrames = 2, kFinishes = 3;
+constexpr int kLearningFrames = 8;  // to warm up with dynamic balance
+
+// Where the boxes are.
+void AddPartition(Json& key, const FrameCase& frame) {
+  const Policy& policy = frame.policy;
+  key["decomposition"] = policy.decomposition;
+  key["split"] = SplitOf(policy);
+  key["axis"] = int(policy.axis);
+  key["groups"] = policy.groups;
+  key["workers"] = frame.workers;
+}
+
+// Pixels that are not empty, tile by tile, of the smallest rectangle of tiles that holds all: [x, y, width, height, count, ...].
+Json CoverageJson(const CoverageMap& coverage) {
+  std::int32_t x_begin = coverage.tiles_x, x_end = 0, y_begin = coverage.tiles_y, y_end = 0;
+  for (std::int32_t y = 0; y < coverage.tiles_y; ++y) {
+    for (std::int32_t x = 0; x < coverage.tiles_x; ++x) {
+      if (coverage.at(x, y) <= 0) continue;
+      x_begin = std::min(x_begin, x);
+      x_end = std::max(x_end, x + 1);
+      y_begin = std::min(y_begin, y);
+      y_end = std::max(y_end, y + 1);
+    }
+  }
+  if (x_end <= x_begin) return Json::array();
+  Json json = {x_begin, y_begin, x_end - x_begin, y_end - y_begin};
+  for (std::int32_t y = y_begin; y < y_end; ++y) {
+    for (std::int32_t x = x_begin; x < x_end; ++x) json.push_back(int(coverage.at(x, y) * float(coverage.TilePixels(x, y)) + 0.5F));
+  }
+  return json;
+}
+
+CoverageMap CoverageOf(const Json& json, const PixelBounds& frame) {
+  CoverageMap coverage = UniformCoverage({}, 0, frame.width(), frame.height());
+  if (json.empty()) return coverage;
+  const auto x_begin = json[0].get<std::int32_t>(), y_begin = json[1].get<std::int32_t>(), width = json[2].get<std::int32_t>(),
+             height = json[3].get<std::int32_t>();
+  for (std::int32_t i = 0; i < width * height; ++i) {
+    const std::int32_t x = x_begin + i % width, y = y_begin + i / width;
+    coverage.share[std::size_t(y) * std::size_t(coverage.tiles_x) + std::size_t(x)] =
+        json[std::size_t(4 + i)].get<float>() / float(coverage.TilePixels(x, y));
+  }
+  return coverage;
+}
+
+Result<Json> MeasurePlannedBoxes(ExperimentContext& context, const FrameCase& frame) {
+  const Result<FramePlan> plan = PlanOf(context, frame);
+  return plan.ok() ? MeasureBoxes(context, frame, *plan) : plan.status();
+}
+
+}  // namespace
+
+FrameRequest RequestOf(const FrameCase& frame) {
+  FrameRequest request = BenchRequest(frame.volume, frame.view, frame.size);
+  request.policy = frame.policy;
+  return request;
+}
+
+Result<Json> MeasureBoxes(ExperimentContext& context, const FrameCase& frame, const FramePlan& plan) {
+  const Result<VolumeInUse> volume = context.volumes().Get(frame.volume);
+  if (!volume.ok()) return volume.status();
+  Json numbers = {{"ids", Json::array()}};
+  for (const char* list :
+       {"seconds", "first_seconds", "occupied_voxels", "drawn_voxels", "covered_pixels", "voxel_bytes", "work", "coverage"}) {
+    numbers[list] = Json::array();
+  }
+  for (int stage = 0; stage < kStageCount; ++stage) numbers["stages"][std::string(ToString(Stage(stage)))] = Json::array();
+  for (const Placement& placement : PlacementsOf(plan)) numbers["ids"].push_back(placement.id);
+  for (const BoxCost& cost : MeasureBoxCosts(*volume->volume, plan, kRenderings)) {
+    numbers["seconds"].push_back(cost.seconds);
+    numbers["first_seconds"].push_back(cost.first_seconds);
+    numbers["occupied_voxels"].push_back(cost.occupied_voxels);
+    numbers["drawn_voxels"].push_back(cost.drawn_voxels);
+    numbers["covered_pixels"].push_back(cost.covered_pixels);
+    numbers["voxel_bytes"].push_back(cost.voxel_bytes);
+    numbers["coverage"].push_back(CoverageJson(cost.coverage));
+    const CostSample sample = SampleOf(cost, plan.setup.camera);
+    numbers["work"].push_back(sample.work);
+    for (int stage = 0; stage < kStageCount; ++stage) {
+      numbers["stages"][std::string(ToString(Stage(stage)))].push_back(double(sample.stage_ns[std::size_t(stage)]) * 1e-9);
+    }
+  }
+  return numbers;
+}
+
+namespace {
+
+Result<Json> MeasureFinish(ExperimentContext& context, const FrameCase& frame) {
+  FrameCase whole = frame;
+  whole.workers = 1;
+  whole.policy = {.groups = 1};
+  const Result<VolumeInUse> volume = context.volumes().Get(frame.volume);
+  if (!volume.ok()) return volume.status();
+  const Result<FramePlan> plan = PlanOf(context, whole);
+  if (!plan.ok()) return plan.status();
+  const PictureCost cost = MeasurePictureCost(*volume->volume, plan->setup, kFinishes);
+  return Json{{"finish_seconds", cost.finish_seconds}, {"receive_seconds", cost.receive_seconds}};
+}
+
+int WarmUpFrames(const Policy& policy) { return policy.balance == kDynamicBalance ? kLearningFrames : kWarmUpFrames; }
+
+Result<Json> MeasureService(ExperimentContext& context, const FrameCase& frame, int frames) {
+  Result<VolumeInUse> volume = context.volumes().Get(frame.volume);
+  if (!volume.ok()) return volume.status();
+  Result<Session> session = Session::OpenLocal({.local_workers = frame.workers, .local_threads = 1},
+                                               [held = volume->volume]() -> Result<std::shared_ptr<const Volume>> { return held; });
+  if (!session.ok()) return session.status();
+  FrameRequest request = RequestOf(frame);
+  request.dataset = session->dataset();
+  std::vector<double> latencies, imbalances, idle_shares, image_bytes;
+  std::array<std::vector<double>, kStageCount> stages;
+  const int warm_up = WarmUpFrames(frame.policy);
+  for (int i = 0; i < warm_up + frames; ++i) {
+    const Result<Picture> picture = session->client().Render(request);
+    if (!picture.ok()) return picture.status();
+    if (i < warm_up) continue;
+    const FrameSummary summary = Summarize(picture->statistics);
+    latencies.push_back(double(picture->latency.count()) * 1e-6);
+    imbalances.push_back(summary.imbalance);
+    idle_shares.push_back(summary.idle_share);
+    image_bytes.push_back(double(summary.image_bytes));
+    for (std::size_t stage = 0; stage < stages.size(); ++stage) stages[stage].push_back(double(summary.stage_ns[stage]) * 1e-6);
+  }
+  Json stage_medians = Json::object();
+  for (std::size_t stage = 0; stage < stages.size(); ++stage) {
+    stage_medians[std::string(ToString(Stage(stage)))] = MedianOf(std::move(stages[stage])).median;
+  }
+  return Json{{"latency_ms", MedianOf(latencies).median},
+              {"all_latency_ms", latencies},
+              {"stages_ms", stage_medians},
+              {"imbalance", MedianOf(std::move(imbalances)).median},
+              {"idle_share", MedianOf(std::move(idle_shares)).median},
+              {"image_bytes", MedianOf(std::move(image_bytes)).median}};
+}
+
+// Beside each other: rendering grows with voxels and boxes' halos, and with pixels.
+double ExpectedEffort(const FrameCase& frame) {
+  const auto* sphere = std::get_if<SphereRequest>(&frame.volume.volume);
+  const double side = sphere != nullptr ? sphere->size : 200;
+  const double halo = 2.0 * kHalo * std::cbrt(double(frame.workers) * std::max(1, frame.policy.groups));
+  return side * side * (side + 3 * halo) * 1e-6 + double(frame.size.width) * frame.size.height * 2e-6 + 0.1;
+}
+
+}  // namespace
+
+Json PictureKey(std::string_view what, const FrameCase& frame) {
+  const ViewParameters& view = frame.view;
+  return {{"what", what},
+          {"volume", frame.volume.dataset},
+          {"look", frame.volume.name},
+          {"renderer", NameOf(frame.volume.renderer)},
+          {"size", {frame.size.width, frame.size.height}},
+          {"view",
+           {view.projection == Projection::kPerspective ? "perspective" : "orthographic", view.azimuth_degrees, view.elevation_degrees,
+            view.zoom}}};
+}
+
+Result<LayoutKnowledge> KnowLayout(ExperimentContext& context, const FrameCase& frame) {
+  const Result<VolumeInUse> volume = context.volumes().Get(frame.volume);
+  if (!volume.ok()) return volume.status();
+  const Result<std::shared_ptr<const OccupancyGrid>> occupied = context.volumes().Occupied(frame.volume);
+  if (!occupied.ok()) return occupied.status();
+  Result<TransferFunction> transfer = ResolveTransfer(frame.volume.transfer, *volume->summary);
+  if (!transfer.ok()) return transfer.status();
+  return LayoutKnowledge{*volume, *occupied, *std::move(transfer), SettledPolicy(RequestOf(frame), volume->summary->description.geometry),
+                         frame.volume.renderer};
+}
+
+LayoutRequest LayoutRequestOf(const LayoutKnowledge& knowledge, int workers) {
+  LayoutRequest request{.summary = knowledge.volume.summary.get(),
+                        .transfer = &knowledge.transfer,
+                        .policy = &knowledge.policy,
+                        .renderer = knowledge.renderer,
+                        .slots = std::uint32_t(workers)};
+  if (NeedsOccupancy(knowledge.policy)) request.known.occupied = knowledge.occupied.get();
+  return request;
+}
+
+Result<FramePlan> PlanOf(ExperimentContext& context, const FrameCase& frame) {
+  if (Status status = CheckNames(frame.policy); !status.ok()) return status;
+  const Result<LayoutKnowledge> knowledge = KnowLayout(context, frame);
+  if (!knowledge.ok()) return knowledge.status();
+  return PlanOf(context, frame, MakeLayout(LayoutRequestOf(*knowledge, frame.workers)));
+}
+
+Result<FramePlan> PlanOf(ExperimentContext& context, const FrameCase& frame, const Layout& layout) {
+  const FrameRequest request = RequestOf(frame);
+  if (Status status = Validate(request); !status.ok()) return status;
+  const Result<VolumeInUse> volume = context.volumes().Get(frame.volume);
+  if (!volume.ok()) return volume.status();
+  return PlanFrame(request, kPlannedDataset, *volume->summary, RosterOf(std::uint32_t(frame.workers)), CostModel{}, &layout);
+}
+
+Result<FrameCase> WithChosenPolicy(ExperimentContext& context, FrameCase frame, const LinkModel& link) {
+  if (!LeavesChoice(frame.policy)) return frame;
+  const Result<LayoutKnowledge> knowledge = KnowLayout(context, frame);
+  if (!knowledge.ok()) return knowledge.status();
+  const FrameRequest request = RequestOf(frame);
+  const MachineModel machine = ServiceMachine(std::vector<HostedWorker>(std::size_t(frame.workers)), {.link = link});
+  const CostModel cost;
+  const Result<PolicyChoice> choice = ChoosePolicy({.frame = &request,
+                                                    .summary = knowledge->volume.summary.get(),
+                                                    .known = {.occupied = knowledge->occupied.get()},
+                                                    .slots = std::uint32_t(frame.workers),
+                                                    .machine = &machine,
+                                                    .cost = &cost});
+  if (!choice.ok()) return choice.status();
+  frame.policy = choice->policy;
+  return frame;
+}
+
+std::string_view NameOf(RendererKind renderer) { return renderer == RendererKind::kSplat ? "splatting" : "Z-buffer"; }
+
+Json BoxCostKey(const FrameCase& frame) {
+  Json key = PictureKey("box costs", frame);
+  AddPartition(key, frame);
+  return key;
+}
+Json FinishKey(const FrameCase& frame) { return PictureKey("picture", frame); }
+Json ServiceKey(const FrameCase& frame) {
+  Json key = PictureKey("service", frame);
+  AddPartition(key, frame);
+  key["assignment"] = frame.policy.assignment;
+  key["combine"] = frame.policy.combine;
+  key["balance"] = frame.policy.balance;
+  key["pixel_error"] = frame.policy.pixel_error;
+  return key;
+}
+
+Trial BoxCostTrial(ExperimentContext& context, const FrameCase& frame) {
+  return {BoxCostKey(frame), [&context, frame] { return MeasurePlannedBoxes(context, frame); }, (1 + kRenderings) * ExpectedEffort(frame)};
+}
+Trial FinishTrial(ExperimentContext& context, const FrameCase& frame) {
+  FrameCase whole = frame;
+  whole.workers = 1;
+  return {FinishKey(frame), [&context, frame] { return MeasureFinish(context, frame); }, ExpectedEffort(whole)};
+}
+Trial ServiceTrial(ExperimentContext& context, const FrameCase& frame, int frames) {
+  return {ServiceKey(frame), [&context, frame, frames] { return MeasureService(context, frame, frames); },
+          (2 + WarmUpFrames(frame.policy) + frames) * ExpectedEffort(frame)};
+}
+
+Json ValidationKey(const FrameCase& frame) {
+  Json key = PictureKey("validation", frame);
+  AddPartition(key, frame);
+  return key;
+}
+
+Trial ValidationTrial(ExperimentContext& context, const FrameCase& frame, int turns) {
+  const auto validate = [&context, frame, turns]() -> Result<Json> {
+    const Result<VolumeInUse> volume = context.volumes().Get(frame.volume);
+    if (!volume.ok()) return volume.status();
+    const ValidationCase what{frame.volume.name, volume->volume, RequestOf(frame), frame.workers};
+    const Result<ValidationRow> row = ValidateSimulation(what, {.views = 1, .turns = turns});
+    if (!row.ok()) return row.status();
+    const ValidatedView& view = row->views.front();
+    return Json{{"measured_ms", view.measured.latency * 1e3}, {"simulated_ms", view.simulated.latency * 1e3}};
+  };
+  return {ValidationKey(frame), validate, 4 * turns * ExpectedEffort(frame)};  // the service's, and the boxes', twice each
+}
+
+std::vector<Trial> WithoutDoubles(std::vector<Trial> trials) {
+  std::set<std::string> seen;
+  std::erase_if(trials, [&](const Trial& trial) { return !seen.insert(trial.key.dump()).second; });
+  return trials;
+}
+
+FrameInput MeasuredFrame::Input() const {
+  FrameInput input{&plan, {}, finish_seconds, receive_seconds};
+  for (const Cost& box : boxes) input.boxes.push_back({box.seconds, box.coverage.share.empty() ? nullptr : &box.coverage, 0});
+  return input;
+}
+
+std::vector<double> MeasuredFrame::WorkerSeconds() const {
+  std::vector<double> seconds(plan.slots);
+  for (const GroupPlan& group : plan.groups) {
+    for (const Placement& placement : group.placements) seconds[placement.worker - 1] += boxes[placement.id].seconds;
+  }
+  return seconds;
+}
+
+double MeasuredFrame::RenderSeconds() const {
+  double sum = 0;
+  for (const Cost& box : boxes) sum += box.seconds;
+  return sum;
+}
+
+double MeasuredFrame::StageSeconds(Stage stage) const {
+  double sum = 0;
+  for (const Cost& box : boxes) sum += box.stage_seconds[std::size_t(stage)];
+  return sum;
+}
+
+Result<MeasuredFrame> Recall(ExperimentContext& context, const FrameCase& frame) {
+  Result<FramePlan> plan = PlanOf(context, frame);
+  if (!plan.ok()) return plan.status();
+  return WithBoxCosts(context, frame, *std::move(plan), context.log().All(BoxCostKey(frame)));
+}
+
+Result<std::vector<MeasuredFrame>> RecallRepeats(ExperimentContext& context, const FrameCase& frame) {
+  const Result<FramePlan> plan = PlanOf(context, frame);
+  if (!plan.ok()) return plan.status();
+  std::vector<MeasuredFrame> frames;
+  for (const Json* repeat : context.log().All(BoxCostKey(frame))) frames.push_back(WithBoxCosts(context, frame, *plan, {repeat}));
+  return frames;
+}
+
+MeasuredFrame WithBoxCosts(ExperimentContext& context, const FrameCase& frame, FramePlan plan, const std::vector<const Json*>& repeats) {
+  CHECK(!repeats.empty()) << BoxCostKey(frame).dump();
+  MeasuredFrame measured{std::move(plan),
+                         {},
+                         EstimateOf(context.log(), FinishKey(frame), "finish_seconds").median,
+                         EstimateOf(context.log(), FinishKey(frame), "receive_seconds").median};
+  measured.boxes.resize(measured.plan.layout.partition.boxes().size());
+
+  const std::vector<double> ids = MediansOf(repeats, "ids"), seconds = MediansOf(repeats, "seconds"),
+                            first = MediansOf(repeats, "first_seconds"), occupied = MediansOf(repeats, "occupied_voxels"),
+                            drawn = MediansOf(repeats, "drawn_voxels"), covered = MediansOf(repeats, "covered_pixels"),
+                            bytes = MediansOf(repeats, "voxel_bytes");
+  std::array<std::vector<double>, kStageCount> stages;
+  for (int stage = 0; stage < kStageCount; ++stage) {
+    stages[std::size_t(stage)] = MediansOf(repeats, "/stages/" + std::string(ToString(Stage(stage))));
+  }
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    MeasuredFrame::Cost& box = measured.boxes.at(std::size_t(ids[i]));
+    box = {.seconds = seconds[i],
+           .first_seconds = first[i],
+           .occupied_voxels = occupied[i],
+           .drawn_voxels = drawn[i],
+           .covered_pixels = covered[i],
+           .voxel_bytes = bytes[i],
+           .work = repeats.front()->at("work")[i].get<WorkUnits>(),
+           .coverage = CoverageOf(repeats.front()->at("coverage")[i], FrameBounds(measured.plan.setup))};
+    for (std::size_t stage = 0; stage < stages.size(); ++stage) box.stage_seconds[stage] = stages[stage][i];
+  }
+  return measured;
+}
+
+void FillImages(MeasuredFrame& frame) {
+  const PixelBounds bounds = FrameBounds(frame.plan.setup);
+  const CoverageMap full = UniformCoverage(bounds, double(bounds.pixel_count()), bounds.width(), bounds.height());
+  for (MeasuredFrame::Cost& box : frame.boxes) {
+    if (!box.coverage.share.empty()) box.coverage = full;
+  }
+}
+
+Result<Timeline> Simulate(const MeasuredFrame& frame, const MachineModel& machine, int frames, int in_flight, bool keep_spans, int teams) {
+  const Roster everybody = RosterOf(frame.plan.slots * std::uint32_t(teams));
+  std::vector<FramePlan> plans;  // as many as there are different ones
+  for (std::size_t turn = 0; turn < std::min(std::size_t(frames), everybody.slots.size()); ++turn) {
+    const Team team = TeamOf(everybody, std::uint32_t(teams), turn);
+    plans.push_back(TakeTurn(frame.plan, team.roster, team.turn));
+  }
+  std::vector<FrameInput> inputs(std::size_t(frames), frame.Input());
+  for (std::size_t i = 0; i < inputs.size(); ++i) inputs[i].plan = &plans[i % plans.size()];
+  return SimulateFrames(inputs, machine, {in_flight, keep_spans});
+}
+
+Result<double> SteadySeconds(const MeasuredFrame& frame, const MachineModel& machine, int teams) {
+  const std::size_t workers = std::size_t(frame.plan.slots) * std::size_t(teams);
+  const int window = WindowFor(workers, std::uint32_t(teams), FrameBytes(frame.plan.setup)).frames;
+  // Whole rounds of the teams, since they may end together, of which the middle half is looked at.
+  const int frames = 4 * teams * std::max((window + teams - 1) / teams, 4);
+  const Result<Timeline> timeline = Simulate(frame, machine, frames, FramesAhead(window), false, teams);
+  if (!timeline.ok()) return timeline.status();
+  std::vector<double> received;
+  for (const SimulatedFrame& simulated : timeline->frames) received.push_back(simulated.received);
+  std::sort(received.begin(), received.end());
+  return (received[std::size_t(3 * frames / 4) - 1] - received[std::size_t(frames / 4) - 1]) / (frames / 2);
+}
+
+}  // namespace slabstream

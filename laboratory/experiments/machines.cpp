@@ -1,0 +1,79 @@
+#include "laboratory/experiments/machines.h"
+
+#include <tbb/task_arena.h>
+
+#include "laboratory/measure/calibrate.h"
+#include "laboratory/measure/combining_costs.h"
+#include "common/base/check.h"
+
+namespace slabstream {
+namespace {
+
+Json HostKey() { return {{"what", "host"}}; }
+
+// The numbers of a MachineModel that calibration finds.
+struct Found {
+  const char* name;
+  double& (*of)(MachineModel&);
+};
+constexpr Found kNumbers[] = {
+    {"scan_pixel", [](MachineModel& m) -> double& { return m.combining.scan_pixel; }},
+    {"encode_pixel", [](MachineModel& m) -> double& { return m.combining.encode_pixel; }},
+    {"combine_pixel", [](MachineModel& m) -> double& { return m.combining.combine_pixel; }},
+    {"local_pixel", [](MachineModel& m) -> double& { return m.combining.local_pixel; }},
+    {"hidden_pixel", [](MachineModel& m) -> double& { return m.combining.hidden_pixel; }},
+    {"hand_over_awake", [](MachineModel& m) -> double& { return m.hand_overs.awake; }},
+    {"hand_over_asleep", [](MachineModel& m) -> double& { return m.hand_overs.asleep; }},
+    {"latency", [](MachineModel& m) -> double& { return m.link.latency_seconds; }},
+    {"plan", [](MachineModel& m) -> double& { return m.plan_seconds; }},
+    {"message", [](MachineModel& m) -> double& { return m.message_seconds; }},
+    {"client", [](MachineModel& m) -> double& { return m.client_seconds; }},
+};
+
+}  // namespace
+
+Trial HostTrial() {
+  const auto run = []() -> Result<Json> {
+    const Result<Calibration> calibration = CalibrateThisHost(1);
+    if (!calibration.ok()) return calibration.status();
+    MachineModel machine = calibration->machine;
+    // Between hosts pixels travel in messages, where workers of one host lend them to each other. Hosts have one thread for it.
+    tbb::task_arena one_thread(1);
+    machine.combining = one_thread.execute([] { return MeasureCombining(Transfer::kMessage); });
+    Json numbers = Json::object();
+    for (const Found& number : kNumbers) numbers[number.name] = number.of(machine);
+    return numbers;
+  };
+  return {HostKey(), run, 50};
+}
+
+LinkModel Link(std::string_view preset) {
+  const Result<LinkModel> link = ParseLink("link", preset);
+  CHECK(link.ok()) << link.status().message();
+  return *link;
+}
+
+MachineModel Cluster(const ExperimentContext& context, const LinkModel& link) {
+  MachineModel machine;
+  for (const Found& number : kNumbers) number.of(machine) = EstimateOf(context.log(), HostKey(), number.name).median;
+  machine.message_seconds = MachineModel().message_seconds;  // over sockets, which threads of a process do without
+  machine.link = link;
+  machine.workers_a_host = 1;
+  machine.cores_a_host = kCoresAHost;
+  return machine;
+}
+
+MachineModel PaperMachine(const ExperimentContext& context, double frame_seconds, double pixels) {
+  // For N = 200 and p = 10 ... 30 centralised combining takes about 0.20 s an image (table 2 less the other stages of table 5), of which
+  // compositing takes 0.117 s (table 5, p = 1: 32 % of 72.89 s for 200 slices). Writing and reading it takes the rest.
+  constexpr double kImageShare = 0.083 / 72.89;
+  MachineModel machine = Cluster(context, Link("pvs"));
+  machine.link.bytes_per_second = pixels * machine.combining.rgba_bytes / (kImageShare * frame_seconds);
+  machine.plan_seconds = machine.message_seconds = machine.client_seconds = 0;
+  machine.cores_a_host = 1;  // its workers were single processors
+  machine.hand_overs = {.awake = 0, .asleep = 0};
+  machine.combining.hidden_pixel = 0;
+  return machine;
+}
+
+}  // namespace slabstream

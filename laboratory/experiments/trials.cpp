@@ -1,0 +1,104 @@
+#include "laboratory/experiments/trials.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <optional>
+#include <random>
+#include <set>
+#include <utility>
+
+#include "client/cli/progress_bar.h"
+#include "common/base/check.h"
+#include "common/base/time.h"
+
+namespace slabstream {
+namespace {
+
+struct Run {
+  const Trial* trial = nullptr;
+  int repeat = 0;
+};
+
+// Round after round of repeats, each in an order of its own. The order of a seed does not depend on what the log holds.
+std::vector<Run> InRandomOrder(const std::vector<Trial>& trials, const TrialSchedule& schedule) {
+  std::mt19937_64 random(schedule.seed);
+  std::vector<Run> runs;
+  for (int repeat = 0; repeat < schedule.repeats; ++repeat) {
+    const std::size_t begin = runs.size();
+    for (const Trial& trial : trials) {
+      if (repeat == 0 || trial.repeat) runs.push_back({&trial, repeat});
+    }
+    // Fisher and Yates; std::shuffle may differ from library to library.
+    for (std::size_t left = runs.size() - begin; left > 1; --left) {
+      const auto first = runs.begin() + std::ptrdiff_t(begin);
+      std::iter_swap(first + std::ptrdiff_t(left - 1), first + std::ptrdiff_t(random() % left));
+    }
+  }
+  return runs;
+}
+
+std::string TimeLeft(double seconds) {
+  if (seconds < 90) return fmt::format("about {:.0f} s left", seconds);
+  return fmt::format("about {:.0f} min left", seconds / 60);
+}
+
+const Json& Field(const Json& numbers, const std::string& name) {
+  return name.front() == '/' ? numbers.at(Json::json_pointer(name)) : numbers.at(name);
+}
+
+}  // namespace
+
+Status RunTrials(const std::vector<Trial>& trials, const TrialSchedule& schedule, TrialLog& log) {
+  std::set<std::string> keys;
+  for (const Trial& trial : trials) CHECK(keys.insert(trial.key.dump()).second) << "two trials have the key " << trial.key.dump();
+
+  std::vector<Run> runs = InRandomOrder(trials, schedule);
+  std::erase_if(runs, [&](const Run& run) { return log.Find(run.trial->key, run.repeat) != nullptr; });
+  double effort = 0, effort_done = 0;
+  for (const Run& run : runs) effort += run.trial->effort;
+
+  ProgressBar bar(schedule.progress, effort);
+  const Time begin = MonotonicNow();
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    if (schedule.interrupted && schedule.interrupted()) {
+      return Status::Cancelled(fmt::format("interrupted after {} of {} trials; the same command continues", i, runs.size()));
+    }
+    const Trial& trial = *runs[i].trial;
+    const double passed = std::chrono::duration<double>(MonotonicNow() - begin).count();
+    const std::string left = effort_done > 0 ? ", " + TimeLeft(passed / effort_done * (effort - effort_done)) : "";
+    bar.Show(effort_done, fmt::format("trial {} of {}{}", i + 1, runs.size(), left));
+    Result<Json> numbers = trial.run();
+    if (!numbers.ok()) return Status(numbers.status().code(), fmt::format("trial {}: {}", trial.key.dump(), numbers.status().message()));
+    if (Status status = log.Append(trial.key, runs[i].repeat, *std::move(numbers)); !status.ok()) return status;
+    effort_done += trial.effort;
+  }
+  return Status::Ok();
+}
+
+std::vector<double> ValuesOf(const TrialLog& log, const Json& key, const std::string& number) {
+  std::vector<double> values;
+  for (const Json* numbers : log.All(key)) values.push_back(Field(*numbers, number).get<double>());
+  CHECK(!values.empty()) << key.dump();
+  return values;
+}
+
+std::vector<Estimate> EstimatesOf(const std::vector<const Json*>& repeats, const std::string& list) {
+  CHECK(!repeats.empty()) << list;
+  std::vector<Estimate> estimates;
+  for (std::size_t i = 0; i < Field(*repeats.front(), list).size(); ++i) {
+    std::vector<double> values;
+    for (const Json* numbers : repeats) values.push_back(Field(*numbers, list).at(i).get<double>());
+    estimates.push_back(MedianOf(std::move(values)));
+  }
+  return estimates;
+}
+
+std::vector<double> MediansOf(const std::vector<const Json*>& repeats, const std::string& list) {
+  std::vector<double> medians;
+  for (const Estimate& estimate : EstimatesOf(repeats, list)) medians.push_back(estimate.median);
+  return medians;
+}
+
+}  // namespace slabstream

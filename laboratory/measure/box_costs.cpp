@@ -1,0 +1,58 @@
+#include "laboratory/measure/box_costs.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "laboratory/measure/lab_worker.h"
+#include "common/base/check.h"
+
+namespace slabstream {
+
+std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FrameSetup& setup, std::span<const Box> boxes, int repeats) {
+  CHECK_GE(repeats, 1);
+  LabWorker worker(volume);
+  std::vector<BoxCost> costs;
+  for (const Box& box : boxes) {
+    const BoxRendering first = worker.Render(box, setup);
+    BoxCost& cost = costs.emplace_back();
+    cost.box = box;
+    cost.first_seconds = first.processor_seconds;
+    cost.occupied_voxels = first.report.occupied_voxels;
+    cost.drawn_voxels = first.report.drawn_voxels;
+    cost.bounds = first.image.bounds;
+    cost.coverage = FindCoverage(first.image, FrameBounds(setup).width(), FrameBounds(setup).height());
+    cost.covered_pixels = std::uint64_t(std::llround(cost.coverage.pixels()));
+    cost.voxel_bytes = std::uint64_t(SlabBox(box, setup).voxel_count()) * BytesPerSample(volume.block.type);
+  }
+  // In rounds: a moment in which the machine is slower, or quicker, does not make all that is measured of a box. Each time it is rendered
+  // twice, and the second one counts: a worker's caches hold what it rendered last, not other workers' boxes.
+  std::vector<std::vector<BoxRendering>> again(boxes.size());
+  for (int repeat = 0; repeat < repeats; ++repeat) {
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+      (void)worker.Render(boxes[i], setup);
+      again[i].push_back(worker.Render(boxes[i], setup));
+      again[i].back().image = {};
+    }
+  }
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    const auto middle = again[i].begin() + (again[i].end() - again[i].begin() - 1) / 2;
+    std::ranges::nth_element(again[i], middle, {}, &BoxRendering::processor_seconds);
+    costs[i].seconds = middle->processor_seconds;
+    costs[i].stage_ns = middle->report.stage_ns;
+  }
+  return costs;
+}
+
+std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FramePlan& plan, int repeats) {
+  std::vector<Box> boxes;
+  for (const Placement& placement : PlacementsOf(plan)) boxes.push_back(placement.box);
+  return MeasureBoxCosts(volume, plan.setup, boxes, repeats);
+}
+
+double Imbalance(std::span<const double> seconds) {
+  const double sum = std::accumulate(seconds.begin(), seconds.end(), 0.0);
+  return sum > 0 ? *std::max_element(seconds.begin(), seconds.end()) * double(seconds.size()) / sum : 1;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,50 @@
+#include "laboratory/measure/calibrate.h"
+
+#include <algorithm>
+#include <thread>
+#include <utility>
+
+#include "laboratory/measure/combining_costs.h"
+#include "laboratory/measure/hand_over_probe.h"
+#include "laboratory/measure/neighbours.h"
+#include "common/planning/frame_plan.h"
+#include "common/volume/sphere.h"
+
+namespace slabstream {
+namespace {
+
+constexpr int kHandOverSamples = 40;
+constexpr int kSlowdownVolume = 128;
+
+}  // namespace
+
+double ModelSlowdown(double measured) { return std::clamp(measured, 0.0, 0.99); }
+
+MachineModel ThisHost(int workers) {
+  MachineModel machine;
+  machine.combining = MeasureCombining(Transfer::kLent);
+  machine.link = {Contention::kNone, 0, 1e12};  // pixels stay where they are
+  // A coordinator's work is in the hand-overs to and from it.
+  machine.plan_seconds = machine.message_seconds = machine.client_seconds = 0;
+  machine.workers_a_host = workers;
+  machine.cores_a_host = int(std::max(std::thread::hardware_concurrency(), 1U));
+  machine.picture_threads = std::min(workers, machine.cores_a_host);  // as worker/thread_share.h has it
+  return machine;
+}
+
+Result<Calibration> CalibrateThisHost(int workers) {
+  HandOverProbe probe;
+  if (Status status = probe.Sample(kHandOverSamples); !status.ok()) return status;
+  const Volume sphere = MakeSphere({SphereClass::kFilled, kSlowdownVolume, 0.4}).value();
+  FrameRequest request;
+  request.dataset = "sphere";
+  const Result<FramePlan> plan = PlanFrame(request, 1, Summarize(sphere), Roster{{1}}, CostModel{});
+  if (!plan.ok()) return plan.status();
+
+  Calibration calibration{ThisHost(workers), probe.Estimates(), MeasureSlowdown(sphere, plan->setup)};
+  calibration.machine.hand_overs = calibration.hand_overs.Costs();
+  calibration.machine.memory_slowdown = ModelSlowdown(calibration.memory_slowdown.median);
+  return calibration;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,127 @@
+#include "laboratory/measure/frame_costs.h"
+
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <thread>
+#include <utility>
+
+#include "laboratory/measure/thread_time.h"
+#include "common/base/check.h"
+#include "common/base/time.h"
+#include "common/image/run_image.h"
+#include "common/wire/payload.h"
+#include "coordinator/clients.h"
+#include "worker/render/finish_picture.h"
+#include "worker/render/pipeline.h"
+
+namespace slabstream {
+
+namespace {
+
+template <class Work>
+double SecondsOnAnotherThread(int threads, Work&& work) {
+  double seconds = 0;
+  std::thread([&] {
+    tbb::task_arena arena(threads);
+    arena.execute([&] { seconds = SecondsOf(work); });
+  }).join();
+  return seconds;
+}
+
+}  // namespace
+
+// As the display worker does (worker/executor.cpp).
+PictureMeter::Answer PictureMeter::Finish(LocalImage& frame, const FrameSetup& setup) {
+  RunImage runs;
+  if (FrameIsPicture(setup)) {
+    runs = EncodePicture(frame);
+  } else {
+    FillRows(frame);
+    runs = EncodePicture(FinishPicture(frame, setup));
+  }
+  Answer answer;
+  answer.header.image = runs.header;
+  answer.payload = PackRuns(Bytes(std::move(runs.payload)), Codec::kRaw, answer.header);
+  return answer;
+}
+
+// As the client does (client/client.cpp).
+void PictureMeter::Receive(const Answer& answer) {
+  const Bytes runs = UnpackRuns(answer.header, answer.payload).value();
+  const PixelBounds& bounds = answer.header.image.bounds;
+  CHECK(ReadRuns(answer.header.image, runs.span(), {0, 0, std::max(bounds.x_end, 1), std::max(bounds.y_end, 1)}).ok());
+}
+
+bool PictureMeter::Full() const {
+  return !kept_.empty() && (kept_.size() >= kMaxKeptAnswers || kept_bytes_ + kept_.front().payload.size() > kMaxKeptAnswerBytes);
+}
+
+void PictureMeter::Keep(Answer answer) {
+  kept_bytes_ += answer.payload.size();
+  kept_.push_back(std::move(answer));
+}
+
+void PictureMeter::KeepAnswers(const FrameSetup& setup) {
+  LocalImage frame = worker_.Render(volume_.block.box, setup).image;
+  while (!Full()) Keep(Finish(frame, setup));
+}
+
+PictureCost PictureMeter::Measure(const FrameSetup& setup) {
+  LocalImage frame = worker_.Render(volume_.block.box, setup).image;
+  while (Full()) {
+    kept_bytes_ -= kept_.front().payload.size();
+    kept_.pop_front();
+  }
+  PictureCost cost;
+  cost.finish_seconds = SecondsOnAnotherThread(threads_, [&] {
+    const Time begin = MonotonicNow();
+    Keep(Finish(frame, setup));
+    cost.finish_elapsed = double((MonotonicNow() - begin).count()) * 1e-9;
+  });
+  cost.receive_seconds = SecondsOnAnotherThread(1, [&] { Receive(kept_.back()); });
+  return cost;
+}
+
+PictureCost MeasurePictureCost(const Volume& volume, const FrameSetup& setup, int repeats) {
+  CHECK_GE(repeats, 1);
+  PictureMeter meter(volume);
+  meter.KeepAnswers(setup);
+  std::vector<double> finish_seconds, receive_seconds;
+  for (int i = 0; i < repeats; ++i) {
+    const PictureCost cost = meter.Measure(setup);
+    finish_seconds.push_back(cost.finish_seconds);
+    receive_seconds.push_back(cost.receive_seconds);
+  }
+  return {.finish_seconds = UpperMedian(std::move(finish_seconds)), .receive_seconds = UpperMedian(std::move(receive_seconds))};
+}
+
+FrameCosts MeasureFrameCosts(const Volume& volume, const FramePlan& plan, int repeats) {
+  FrameCosts costs;
+  costs.boxes.resize(plan.layout.partition.boxes().size());
+  const std::vector<Placement> placements = PlacementsOf(plan);
+  std::vector<BoxCost> measured = MeasureBoxCosts(volume, plan, repeats);
+  for (std::size_t i = 0; i < placements.size(); ++i) costs.boxes[placements[i].id] = std::move(measured[i]);
+  costs.picture = MeasurePictureCost(volume, plan.setup, repeats);
+  return costs;
+}
+
+CostSample SampleOf(const BoxCost& box, const Camera& camera) {
+  CostSample sample;
+  sample.work = CountWork(box.box, camera, double(box.occupied_voxels), double(box.drawn_voxels), box.bounds, double(box.covered_pixels));
+  // Stages are timed by the clock on the wall, which goes on while others have the processor.
+  const double elapsed = double(box.stage_ns[std::size_t(Stage::kRender)]) * 1e-9;
+  const double share = elapsed > 0 ? std::min(box.seconds / elapsed, 1.0) : 1;
+  for (std::size_t stage = 0; stage < sample.stage_ns.size(); ++stage) {
+    sample.stage_ns[stage] = std::int64_t(double(box.stage_ns[stage]) * share);
+  }
+  return sample;
+}
+
+FrameInput FrameCosts::Input(const FramePlan& plan) const {
+  FrameInput input{.plan = &plan, .boxes = {}, .finish_seconds = picture.finish_seconds, .receive_seconds = picture.receive_seconds};
+  for (const BoxCost& box : boxes) input.boxes.push_back({box.seconds, box.coverage.share.empty() ? nullptr : &box.coverage, 0});
+  return input;
+}
+
+}  // namespace slabstream

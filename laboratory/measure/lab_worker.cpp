@@ -1,0 +1,33 @@
+#include "laboratory/measure/lab_worker.h"
+
+#include <tbb/task_arena.h>
+
+#include <atomic>
+
+#include "laboratory/measure/thread_time.h"
+#include "common/base/time.h"
+
+namespace slabstream {
+
+LabWorker::LabWorker(const Volume& volume) : volume_(volume) {}
+LabWorker::~LabWorker() = default;
+
+BoxRendering LabWorker::Render(const Box& box, const FrameSetup& setup) {
+  if (kind_ != setup.renderer) renderer_ = MakeRenderer(setup.renderer);
+  kind_ = setup.renderer;
+  const Box slab_box = SlabBox(box, setup);
+  std::unique_ptr<SlabData>& slab = slabs_[slab_box];
+  if (slab == nullptr) slab = std::make_unique<SlabData>(BrickedVoxels(CutBlock(volume_.block, slab_box)));
+  const std::atomic<bool> cancelled = false;
+  BoxRendering rendering;
+  tbb::task_arena one_thread(1);
+  one_thread.execute([&] {
+    const Time begin = MonotonicNow();
+    rendering.processor_seconds =
+        SecondsOf([&] { rendering.image = renderer_->Render(*slab, box, setup, {}, cancelled, rendering.report).value(); });
+    rendering.seconds = double((MonotonicNow() - begin).count()) * 1e-9;
+  });
+  return rendering;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,162 @@
+#include "laboratory/measure/validate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "laboratory/measure/calibrate.h"
+#include "laboratory/measure/frame_costs.h"
+#include "laboratory/measure/hand_over_probe.h"
+#include "laboratory/measure/lab_service.h"
+#include "laboratory/measure/plan_renderings.h"
+#include "common/base/check.h"
+#include "common/planning/placement.h"
+
+namespace slabstream {
+namespace {
+
+constexpr char kDataset[] = "volume";
+constexpr int kHandOverSamples = 4;  // a turn
+
+FrameParts PartsOf(const TimedPicture& timed) {
+  FrameParts parts{.latency = double((timed.received - timed.submitted).count()) * 1e-9};
+  std::map<std::uint32_t, double> render;  // by worker
+  for (const RankReport& report : timed.picture.statistics.reports) {
+    render[report.worker] += double(report.stage_ns[std::size_t(Stage::kRender)]) * 1e-9;
+    parts.picture += double(PictureNs(report)) * 1e-9;
+  }
+  for (const auto& [worker, seconds] : render) parts.render = std::max(parts.render, seconds);
+  return parts;
+}
+
+FrameParts PartsOf(const Timeline& timeline) {
+  FrameParts parts{.latency = timeline.frames[0].latency()};
+  std::map<std::uint32_t, double> render;
+  for (const SimulatedSpan& span : timeline.spans) {
+    if (span.stage == Stage::kRender) render[span.worker] += span.end - span.begin;
+    if (span.stage == Stage::kResolve) parts.picture += span.end - span.begin;
+  }
+  for (const auto& [worker, seconds] : render) parts.render = std::max(parts.render, seconds);
+  return parts;
+}
+
+double Quantile(const std::vector<FrameParts>& frames, double FrameParts::*part, double share) {
+  std::vector<double> values;
+  for (const FrameParts& frame : frames) values.push_back(frame.*part);
+  const auto at = values.begin() + std::ptrdiff_t(std::min<double>(share * double(values.size()), double(values.size() - 1)));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+FrameParts Median(const std::vector<FrameParts>& frames) {
+  return {Quantile(frames, &FrameParts::render, 0.5), Quantile(frames, &FrameParts::picture, 0.5),
+          Quantile(frames, &FrameParts::latency, 0.5)};
+}
+
+// Everything that belongs to one view.
+struct View {
+  FrameRequest request;
+  FramePlan plan;
+  FrameCosts costs;  // what boxes cover; their seconds are measured anew in each turn
+  std::vector<FrameParts> measured, simulated;
+};
+
+Result<std::vector<View>> MakeViews(const ValidationCase& what, int count) {
+  const Roster roster = RosterOf(std::uint32_t(what.workers));
+  const VolumeSummary summary = Summarize(*what.volume);
+  std::vector<View> views;
+  for (int i = 0; i < count; ++i) {
+    View& view = views.emplace_back(View{.request = what.request});
+    view.request.dataset = kDataset;
+    view.request.view.azimuth_degrees = 360.0 * i / count;
+    Result<FramePlan> plan = PlanFrame(view.request, 1, summary, roster, CostModel{});
+    if (!plan.ok()) return plan.status();
+    view.plan = *std::move(plan);
+    view.costs = MeasureFrameCosts(*what.volume, view.plan, 1);
+  }
+  return views;
+}
+
+}  // namespace
+
+ValidatedView ValidationRow::Mean() const {
+  ValidatedView mean;
+  const double share = 1.0 / double(views.size());
+  const auto add = [&](FrameParts& to, const FrameParts& from) {
+    to.render += share * from.render;
+    to.picture += share * from.picture;
+    to.latency += share * from.latency;
+  };
+  for (const ValidatedView& view : views) {
+    add(mean.measured, view.measured);
+    add(mean.simulated, view.simulated);
+    mean.measured_low += share * view.measured_low;
+    mean.measured_high += share * view.measured_high;
+    mean.simulated_low += share * view.simulated_low;
+    mean.simulated_high += share * view.simulated_high;
+  }
+  return mean;
+}
+
+double ValidationRow::worst_error() const {
+  double worst = 0;
+  for (const ValidatedView& view : views) {
+    if (std::abs(view.error()) > std::abs(worst)) worst = view.error();
+  }
+  return worst;
+}
+
+Result<ValidationRow> ValidateSimulation(const ValidationCase& what, const ValidationOptions& options) {
+  if (what.workers < 1 || what.workers > 2) {
+    return Status::InvalidArgument("workers " + std::to_string(what.workers) + " is out of range [1, 2]");
+  }
+  Result<std::vector<View>> views = MakeViews(what, options.views);
+  if (!views.ok()) return views.status();
+  HandOverProbe probe;
+  Result<std::unique_ptr<LabService>> service = LabService::Start(what.workers, {{kDataset, what.volume}});
+  if (!service.ok()) return service.status();
+  PlanRenderings renderings(*what.volume, what.workers);
+  PictureMeter pictures(*what.volume, what.workers);
+  MachineModel machine = ThisHost(what.workers);
+  machine.picture_threads = 0;  // pictures are measured as all of them make it
+  std::vector<double> slowdowns;
+
+  for (int turn = -1; turn < options.turns; ++turn) {  // the first one fetches voxels and makes normals
+    if (Status status = probe.Sample(kHandOverSamples); !status.ok()) return status;
+    for (View& view : *views) {
+      if (const Result<TimedPicture> first = (*service)->Render(view.request); !first.ok()) return first.status();
+      const Result<TimedPicture> timed = (*service)->Render(view.request);
+      if (!timed.ok()) return timed.status();
+      renderings.Measure(view.plan);
+      const PlanSeconds seconds = renderings.Measure(view.plan);
+      pictures.Measure(view.plan.setup);
+      const PictureCost picture = pictures.Measure(view.plan.setup);
+      if (turn < 0) continue;
+
+      for (const Placement& placement : PlacementsOf(view.plan)) view.costs.boxes[placement.id].seconds = seconds.boxes[placement.id];
+      view.costs.picture = {.finish_seconds = picture.finish_elapsed, .receive_seconds = picture.receive_seconds};
+      slowdowns.push_back(seconds.slowdown);
+      machine.hand_overs = probe.Estimates().Costs();
+      machine.memory_slowdown = ModelSlowdown(seconds.slowdown);
+      const FrameInput input = view.costs.Input(view.plan);
+      const Result<Timeline> timeline = SimulateFrames(std::span(&input, 1), machine);
+      if (!timeline.ok()) return timeline.status();
+      view.measured.push_back(PartsOf(*timed));
+      view.simulated.push_back(PartsOf(*timeline));
+    }
+  }
+
+  ValidationRow row{.name = what.name, .workers = what.workers, .machine = machine, .hand_overs = probe.Estimates()};
+  if (what.workers == 2) row.slowdown = MedianOf(std::move(slowdowns));
+  for (const View& view : *views) {
+    const auto quartile = [&](const std::vector<FrameParts>& frames, double share) {
+      return Quantile(frames, &FrameParts::latency, share);
+    };
+    row.views.push_back({Median(view.measured), Median(view.simulated), quartile(view.measured, 0.25), quartile(view.measured, 0.75),
+                         quartile(view.simulated, 0.25), quartile(view.simulated, 0.75)});
+  }
+  return row;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,67 @@
+// Validation: frames of the embedded service beside what the simulation says of them, in one run.
+//
+// Turn after turn and view after view, one after the other:
+//   - the service renders the view with one or two workers of one thread each, one frame in flight;
+//   - in this process, the boxes of its plan are rendered alone, on one thread; with two workers also both at once, which tells how much
+//     they slow each other down (neighbours.h); the picture is made and decoded.
+// Each of these is done twice in a row, and the second time counts: its threads have not slept for long, and its data is in the caches if
+// it ever is. Before each turn frames of another volume and service tell what hand-overs take. What was measured of a view in a turn is
+// simulated on a model of this machine (calibrate.h). So the same weather hits both sides, and both are given as medians over turns.
+// Nothing of the service's own times enters the simulation.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "laboratory/measure/hand_over_fit.h"
+#include "common/base/status.h"
+#include "common/planning/frame_request.h"
+#include "common/simulation/machine_model.h"
+#include "common/volume/volume.h"
+
+namespace slabstream {
+
+struct ValidationCase {
+  std::string name;
+  std::shared_ptr<const Volume> volume;
+  FrameRequest request;  // azimuth and dataset are filled in
+  int workers = 1;       // or 2
+};
+
+struct ValidationOptions {
+  int views = 4;   // azimuths, evenly over a turn of the volume
+  int turns = 15;  // frames of each view
+};
+
+// Of one frame, in seconds.
+struct FrameParts {
+  double render = 0;   // of the worker that rendered longest
+  double picture = 0;  // made of the frame and encoded, by the display worker
+  double latency = 0;  // request to decoded picture, all in all
+};
+
+struct ValidatedView {
+  FrameParts measured, simulated;              // medians over turns, each part by itself
+  double measured_low = 0, measured_high = 0;  // quartiles of the latency: what the machine's noise is
+  double simulated_low = 0, simulated_high = 0;
+  double error() const { return simulated.latency / measured.latency - 1; }
+};
+
+struct ValidationRow {
+  std::string name;
+  int workers = 1;
+  std::vector<ValidatedView> views;
+  MachineModel machine;  // as it was in the end
+  HandOverEstimates hand_overs;
+  Estimate slowdown;  // of two workers' renderings, over all turns and views
+
+  ValidatedView Mean() const;  // over views, every number by itself
+  double error() const { return Mean().error(); }
+  double worst_error() const;  // of one view, the largest in size
+};
+
+// InvalidArgument: workers beyond 2. Fails with the service.
+Result<ValidationRow> ValidateSimulation(const ValidationCase& what, const ValidationOptions& options);
+
+}  // namespace slabstream

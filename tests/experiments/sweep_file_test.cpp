@@ -1,0 +1,110 @@
+#include "laboratory/experiments/sweep_file.h"
+
+#include <gmock/gmock.h>
+
+#include <string>
+#include <vector>
+
+namespace slabstream {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr const char* kGood = R"({
+  "title": "two", "size": [300, 200],
+  "volumes": [{"sphere": {"class": 2, "size": 40, "occupancy": 0.3}, "opacity": 0.2}],
+  "renderers": ["splat", "zbuffer"],
+  "views": [{"azimuth": 30}, {"name": "close", "projection": "perspective", "zoom": 2}],
+  "policies": [{"combine": "fan-in"}, {"name": "even", "decomposition": "kd-tree", "split": "occupied", "assignment": "greedy", "groups": 2, "combine": "tree:4,strips=8", "balance": "dynamic", "pixel_error": 0.001}],
+  "workers": [1, 16],
+  "links": ["10gbit", "1gbit:30,1"]
+})";
+
+TEST(SweepFile, ReadsWhatItSays) {
+  const Result<Sweep> sweep = ParseSweep("s.json", kGood);
+  ASSERT_TRUE(sweep.ok()) << sweep.status().message();
+  EXPECT_EQ(sweep->title, "two");
+  EXPECT_EQ(sweep->size, (ImageSize{300, 200}));
+  EXPECT_EQ(sweep->volumes[0].opacity, 0.2);
+  EXPECT_EQ(sweep->renderers.size(), 2U);
+  EXPECT_EQ(sweep->views[0].name, "view 1");
+  EXPECT_EQ(sweep->views[1].view.zoom, 2);
+  EXPECT_EQ(sweep->policies[0].name, "slab by voxels, cyclic, static, 1 groups, fan-in");
+  EXPECT_EQ(sweep->policies[1].policy.split, "occupied");
+  EXPECT_EQ(sweep->policies[1].policy.assignment, "greedy");
+  EXPECT_EQ(sweep->policies[1].policy.balance, "dynamic");
+  EXPECT_EQ(sweep->policies[1].policy.pixel_error, 0.001);
+  EXPECT_EQ(sweep->workers, (std::vector{1, 16}));
+  EXPECT_DOUBLE_EQ(sweep->links[1].link.latency_seconds, 30e-6);
+}
+
+TEST(SweepFile, LeavesNamesOpen) {
+  const Result<Sweep> sweep = ParseSweep("s.json", R"({"volumes": [{"sphere": {}}], "workers": [2],
+    "policies": [{"decomposition": "auto", "split": "auto", "assignment": "auto", "combine": "auto"}]})");
+  ASSERT_TRUE(sweep.ok()) << sweep.status().message();
+  EXPECT_EQ(sweep->policies[0].name, "auto by auto, auto, static, 1 groups, auto");
+}
+
+TEST(SweepFile, HasDefaults) {
+  const Result<Sweep> sweep = ParseSweep("s.json", R"({"volumes": [{"sphere": {}}], "policies": [{}], "workers": [2]})");
+  ASSERT_TRUE(sweep.ok()) << sweep.status().message();
+  EXPECT_EQ(sweep->renderers, std::vector{RendererKind::kSplat});
+  EXPECT_EQ(sweep->views.size(), 1U);
+  EXPECT_EQ(sweep->links[0].name, "10gbit");
+}
+
+std::string Replaced(std::string text, const std::string& what, const std::string& with) {
+  const std::size_t at = text.find(what);
+  EXPECT_NE(at, std::string::npos) << what;
+  return text.replace(at, what.size(), with);
+}
+
+TEST(SweepFile, TellsWhatIsWrongInOneLineThatNamesFieldValueAndLimit) {
+  struct Case {
+    std::string what, with, says;
+  };
+  const std::vector<Case> cases = {
+      {"[1, 16]", "[0]", "workers[0]: 0 must be a whole number in [1, 4096]"},
+      {"[1, 16]", "[1.5]", "workers[0]: 1.5 must be a whole number in [1, 4096]"},
+      {"[1, 16]", "[]", "workers: [] must be a list of at least one"},
+      {"[1, 16]", "3", "workers: 3 must be a list"},
+      {"\"workers\"", "\"wrokers\"", "'wrokers' is no field; there are title, size"},
+      {"\"kd-tree\"", "\"cake\"", "policies[1].decomposition: \"cake\" must be one of slab, "},
+      {"\"tree:4,strips=8\"", "\"tree:1\"", "policies[1].combine: "},
+      {"\"greedy\"", "\"lots\"", "policies[1].assignment: \"lots\" must be one of cyclic"},
+      {"\"dynamic\"", "\"always\"", "policies[1].balance: \"always\" must be one of static, dynamic"},
+      {"0.001", "2", "policies[1].pixel_error: 2 must be a number in [0, "},
+      {"\"groups\": 2", "\"groups\": 0", "policies[1].groups: 0 must be a whole number in [1, "},
+      {"\"groups\": 2", "\"group\": 2", "policies[1]: 'group' is no field"},
+      {"\"1gbit:30,1\"", "\"string\"", "links[1]: "},
+      {"\"1gbit:30,1\"", "7", "links[1]: 7 must be a text"},
+      {"\"zoom\": 2", "\"zoom\": 0", "views[1].zoom: 0 must be a number in ["},
+      {"{\"azimuth\": 30}", "30", "views[0]: 30 must be an object"},
+      {"\"close\"", "\"view 1\"", "views: two of them are called 'view 1'"},
+      {"\"occupancy\": 0.3", "\"occupancy\": 0.9", "volumes[0].sphere.occupancy: 0.9 must be a number in (0, 0.52]"},
+      {"\"class\": 2", "\"class\": 3", "volumes[0].sphere.class: 3 must be a whole number in [1, 2]"},
+      {"{\"sphere\": {\"class\": 2, \"size\": 40, \"occupancy\": 0.3}, \"opacity\": 0.2}", "{\"file\": \"/no/such.nrrd\"}", "volumes[0]: "},
+      {"{\"sphere\": {\"class\": 2, \"size\": 40, \"occupancy\": 0.3}, \"opacity\": 0.2}", "{}", "must have either 'sphere' or 'file'"},
+      {"[300, 200]", "[300]", "size: [300] must be [width, height]"},
+      {"[300, 200]", "0", "size: 0 must be a whole number in [1, "},
+      {"\"title\"", "title", "is not JSON: "},
+  };
+  for (const Case& c : cases) {
+    const Status status = ParseSweep("s.json", Replaced(kGood, c.what, c.with)).status();
+    EXPECT_EQ(status.code(), StatusCode::kInvalidArgument) << c.with;
+    EXPECT_THAT(status.message(), testing::StartsWith("FILE 's.json'")) << c.with;
+    EXPECT_THAT(status.message(), HasSubstr(c.says)) << c.with;
+    EXPECT_EQ(status.message().find('\n'), std::string::npos) << status.message();
+  }
+  for (const char* text : {"", "[]", "3", "{}", "null"}) EXPECT_FALSE(ParseSweep("s.json", text).ok()) << text;
+}
+
+TEST(SweepFile, ALongListIsRefused) {
+  std::string workers = "1";
+  for (int i = 0; i < 3000; ++i) workers += ", 2";
+  const Status status = ParseSweep("s.json", Replaced(kGood, "1, 16", workers)).status();
+  EXPECT_THAT(status.message(), HasSubstr("cases are too many: at most 10000"));
+}
+
+}  // namespace
+}  // namespace slabstream

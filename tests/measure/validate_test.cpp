@@ -1,0 +1,61 @@
+#include "laboratory/measure/validate.h"
+
+#include <gtest/gtest.h>
+
+#include "laboratory/measure/plan_renderings.h"
+#include "common/planning/placement.h"
+#include "tests/render/render_support.h"
+
+namespace slabstream {
+namespace {
+
+using namespace slabstream::testing;  // NOLINT(google-build-using-namespace): test support
+
+ValidationCase SmallCase(RendererKind renderer, int workers) {
+  ValidationCase what{.name = "blobs", .workers = workers};
+  what.volume = std::make_shared<const Volume>(MakeBlobs({{40, 32, 48}, {1, 1, 1}}, ScalarType::kUint8, 3));
+  what.request.renderer = renderer;
+  what.request.size = {64, 48};
+  return what;
+}
+
+// Whatever the machine does meanwhile: both sides are there for every view, and their parts fit into the whole.
+TEST(Validation, HasBothSidesOfEveryView) {
+  for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
+    for (const int workers : {1, 2}) {
+      const Result<ValidationRow> row = ValidateSimulation(SmallCase(renderer, workers), {.views = 3, .turns = 1});
+      ASSERT_TRUE(row.ok()) << row.status().message();
+      ASSERT_EQ(row->views.size(), 3U);
+      EXPECT_EQ(row->slowdown.count, workers == 2 ? 3 : 0);
+      for (const ValidatedView& view : row->views) {
+        for (const FrameParts& parts : {view.measured, view.simulated}) {
+          EXPECT_GT(parts.render, 0);
+          EXPECT_GT(parts.picture, 0);
+          EXPECT_GT(parts.latency, parts.render + parts.picture);
+        }
+        EXPECT_EQ(view.measured_low, view.measured.latency);  // of one turn
+        EXPECT_EQ(view.simulated_high, view.simulated.latency);
+      }
+    }
+  }
+}
+
+TEST(Validation, RefusesMoreWorkersThanItCanMeasureSideBySide) {
+  const Result<ValidationRow> row = ValidateSimulation(SmallCase(RendererKind::kSplat, 3), {});
+  EXPECT_EQ(row.status().code(), StatusCode::kInvalidArgument);
+}
+
+TEST(PlanRenderings, MeasureEveryBoxOfThePlan) {
+  const ValidationCase what = SmallCase(RendererKind::kSplat, 2);
+  FrameRequest request = what.request;
+  request.dataset = "blobs";
+  request.policy.groups = 2;
+  const FramePlan plan = PlanFrame(request, 1, Summarize(*what.volume), Roster{{1, 2}}, CostModel{}).value();
+  PlanRenderings renderings(*what.volume, 2);
+  const PlanSeconds seconds = renderings.Measure(plan);
+  ASSERT_EQ(seconds.boxes.size(), plan.layout.partition.boxes().size());
+  for (const Placement& placement : PlacementsOf(plan)) EXPECT_GT(seconds.boxes[placement.id], 0) << placement.id;
+}
+
+}  // namespace
+}  // namespace slabstream
