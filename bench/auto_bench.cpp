@@ -1,8 +1,8 @@
 // What `auto` chooses and how good that is. For volumes given on the command line ("sphere1:300" is the paper's class-I sphere with N =
 // 300; FILE@PRESET names a transfer function), a view and a number of workers:
 //
-//   simulated   every box of every candidate's partition is rendered alone on one thread (laboratory/measure); frames are simulated from these
-//   costs
+//   simulated   every box of every candidate's partition is rendered alone on one thread (laboratory/measure); frames are simulated from
+//   these costs
 //               on the machine that the choice was made for. Printed: the policy that holds where nothing is chosen, what ChoosePolicy
 //               takes before anything is known and once costs are learnt, the best of all candidates, and how long choosing took
 //   --service   frames of a turning volume by the embedded service, the fixed policy and `auto` in turn: medians, and what was predicted
@@ -19,8 +19,6 @@
 #include "client/cli/frame_summary.h"
 #include "client/client.h"
 #include "client/embedded/embedded_service.h"
-#include "laboratory/measure/frame_costs.h"
-#include "laboratory/measure/thread_time.h"
 #include "common/classification/count_occupied.h"
 #include "common/combining/schemes.h"
 #include "common/decomposition/decomposition.h"
@@ -28,12 +26,14 @@
 #include "common/planning/learnt_cost.h"
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
-#include "common/planning/render_work.h"
+#include "common/renderers/registry.h"
 #include "common/simulation/simulate_frames.h"
 #include "common/tuning/choose_policy.h"
 #include "common/tuning/service_machine.h"
 #include "common/volume/sphere.h"
 #include "common/volume_io/volume_reader.h"
+#include "laboratory/measure/frame_costs.h"
+#include "laboratory/measure/thread_time.h"
 
 namespace slabstream {
 namespace {
@@ -71,7 +71,7 @@ Subject Load(const Options& options, std::string text) {
   }
   subject.summary = Summarize(*subject.volume);
   subject.request.dataset = "volume";
-  subject.request.renderer = options.renderer == "zbuffer" ? RendererKind::kZBuffer : RendererKind::kSplat;
+  subject.request.renderer = options.renderer;
   subject.request.size = {options.size, options.size};
   subject.request.view = {.azimuth_degrees = options.azimuth, .elevation_degrees = options.elevation};
   return subject;
@@ -163,7 +163,7 @@ std::vector<HostedWorker> Hosts(const Options& options, int workers) {
 
 void Simulate(const Options& options, const Subject& subject, int workers) {
   const FrameSetup setup = MakeFrameSetup(subject.request, 1, subject.summary).value();
-  const OccupancyGrid grid = CountOccupied(subject.volume->block, DrawnTable(setup.transfer, subject.summary, setup.renderer));
+  const OccupancyGrid grid = CountOccupied(subject.volume->block, setup.renderer->DrawnTable(setup.transfer, subject.summary));
   const MachineModel machine = ServiceMachine(
       Hosts(options, workers), {.link = ParseLink("--link", options.link).value(), .memory_scope = 1, .cores = std::int32_t(workers)});
   Truth truth(options, subject, setup, grid, machine, workers);

@@ -1,7 +1,7 @@
-// How even partitions are: every box of each is rendered alone on one thread (laboratory/measure/box_costs.h), the boxes of a slot are added up,
-// and the slot with most to do is compared with the mean, in views all round. Then the same in each view after some frames of dynamic
-// balance. For volumes given on the command line; "sphere1:300" is the paper's class-I sphere with N = 300. --stealing simulates frames of
-// both kinds of layout, and what work stealing could win at most.
+// How even partitions are: every box of each is rendered alone on one thread (laboratory/measure/box_costs.h), the boxes of a slot are
+// added up, and the slot with most to do is compared with the mean, in views all round. Then the same in each view after some frames of
+// dynamic balance. For volumes given on the command line; "sphere1:300" is the paper's class-I sphere with N = 300. --stealing simulates
+// frames of both kinds of layout, and what work stealing could win at most.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -11,17 +11,17 @@
 #include <string>
 #include <vector>
 
-#include "laboratory/measure/box_costs.h"
 #include "common/classification/count_occupied.h"
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
 #include "common/planning/balance.h"
 #include "common/planning/learnt_cost.h"
 #include "common/planning/placement.h"
-#include "common/planning/render_work.h"
+#include "common/renderers/registry.h"
 #include "common/simulation/simulate_frames.h"
 #include "common/volume/sphere.h"
 #include "common/volume_io/volume_reader.h"
+#include "laboratory/measure/box_costs.h"
 
 namespace slabstream {
 namespace {
@@ -42,12 +42,12 @@ std::shared_ptr<const Volume> Load(const std::string& name) {
   return std::make_shared<const Volume>(MakeSphere(request).value());
 }
 
-RendererKind RendererOf(const Options& options) { return options.renderer == "zbuffer" ? RendererKind::kZBuffer : RendererKind::kSplat; }
+const RendererKind* RendererOf(const Options& options) { return RequireRenderer(options.renderer).value(); }
 
 FramePlan MakePlan(const Options& options, const VolumeSummary& summary, int view, const Layout* layout = nullptr) {
   FrameRequest request;
   request.dataset = "volume";
-  request.renderer = RendererOf(options);
+  request.renderer = options.renderer;
   request.size = {options.size, options.size};
   request.view = {.azimuth_degrees = options.azimuth + 360.0 * view / options.views, .elevation_degrees = options.elevation};
   request.transfer.choice = options.preset;
@@ -79,7 +79,7 @@ Measured Measure(const Options& options, const Volume& volume, const FrameSetup&
   measured.by_box.resize(layout.owners.size());
   measured.coverage.resize(layout.owners.size());
   std::vector<double> slots(std::size_t(options.slots));
-  const std::vector<BoxCost> costs = MeasureBoxCosts(volume, setup, boxes, options.repeats);
+  const std::vector<AnalyticCost> costs = MeasureBoxCosts(volume, setup, boxes, options.repeats);
   for (std::size_t i = 0; i < costs.size(); ++i) {
     measured.boxes.push_back({costs[i].box, costs[i].seconds});
     measured.sum += costs[i].seconds;
@@ -129,8 +129,8 @@ class Comparison {
         volume_(Load(name)),
         summary_(Summarize(*volume_)),
         transfer_(MakeSetup(options, summary_, 0).transfer),
-        grid_(CountOccupied(volume_->block, DrawnTable(transfer_, summary_, RendererOf(options)))),
-        work_(grid_, summary_.description.geometry.spacing, RendererOf(options), MedianExtinction(transfer_, summary_)) {}
+        grid_(CountOccupied(volume_->block, RendererOf(options)->DrawnTable(transfer_, summary_))),
+        cost_(RendererOf(options)->MakeCost({&grid_, &summary_, &transfer_})) {}
 
   void Run(const Policy& policy) const {
     const LayoutRequest request{.summary = &summary_,
@@ -163,10 +163,10 @@ class Comparison {
   void AddResidual(const FrameSetup& setup, const Measured& measured, Outcome& outcome) const {
     const auto axis = std::size_t(std::min(Number(setup.camera.traversal_axis), 1));  // of views along z nothing is foretold
     double foretold = 0, squares = 0;
-    for (const BoxSeconds& box : measured.boxes) foretold += work_.Of(box.box)[axis];
+    for (const BoxSeconds& box : measured.boxes) foretold += cost_->Seconds(box.box, {.along = Axis(axis)});
     for (const BoxSeconds& box : measured.boxes) {
-      if (work_.Of(box.box)[axis] == 0) continue;  // all it has is beside it
-      const double ratio = box.seconds / measured.sum / (work_.Of(box.box)[axis] / foretold);
+      if (cost_->Seconds(box.box, {.along = Axis(axis)}) == 0) continue;  // all it has is beside it
+      const double ratio = box.seconds / measured.sum / (cost_->Seconds(box.box, {.along = Axis(axis)}) / foretold);
       squares += (ratio - 1) * (ratio - 1);
     }
     outcome.residual.values.push_back(std::sqrt(squares / double(measured.boxes.size())));
@@ -241,7 +241,7 @@ class Comparison {
   const VolumeSummary summary_;
   const TransferFunction transfer_;
   const OccupancyGrid grid_;
-  const RenderWork work_;
+  const std::unique_ptr<AnalyticCost> cost_;
 };
 
 void Run(const Options& options) {

@@ -39,6 +39,7 @@
 #include "common/base/check.h"
 #include "common/base/large_buffers.h"
 #include "common/combining/schemes.h"
+#include "common/renderers/registry.h"
 #include "common/transport/socket.h"
 #include "common/wire/any_message.h"
 #include "common/wire/payload.h"
@@ -148,7 +149,7 @@ class PreparedPicture : public Renderer {
   options.images_endpoint = config.link == "tcp" ? "tcp://127.0.0.1:*" : "ipc://" + directory + "/images-" + std::to_string(rank);
   options.share_memory = config.link == "shared";
   options.compression = config.compression;
-  options.make_renderer = [&](RendererKind) { return std::make_unique<PreparedPicture>(config, rank, shared); };
+  options.make_renderer = [&](const RendererKind&) { return std::make_unique<PreparedPicture>(config, rank, shared); };
   auto service = WorkerService::Start(context, std::move(options));
   CHECK(service.ok()) << service.status().message();
   (*service)->WaitUntilStopped();
@@ -177,6 +178,7 @@ class Coordinator {
         slabs_(*Socket::Router(context_)) {
     CHECK(control_.Bind("ipc://" + directory + "/control").ok());
     slabs_endpoint_ = *slabs_.Bind("ipc://" + directory + "/slabs");
+    SetRenderer(*FindRenderer(kDefaultRenderer), setup_);
     setup_.dataset = kDataset;
     setup_.description.geometry.size = {16, 16, 65535};
     setup_.range = {0, 1};

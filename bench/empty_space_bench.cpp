@@ -5,8 +5,10 @@
 #include <atomic>
 #include <cstring>
 
+#include "common/base/check.h"
+#include "common/renderers/registry.h"
 #include "common/volume/sphere.h"
-#include "worker/render/pipeline.h"
+#include "worker/renderers/renderer.h"
 
 namespace slabstream {
 namespace {
@@ -29,20 +31,20 @@ Volume Surround(const Volume& object, std::int32_t side) {
 
 void EmptySpace(benchmark::State& state) {
   const auto side = std::int32_t(state.range(0));
-  const auto kind = RendererKind(state.range(1));
+  const RendererKind& kind = *Renderers()[std::size_t(state.range(1))];
   const Volume volume = Surround(MakeSphere({SphereClass::kHollow, kObject, 0.05}).value(), side);
 
   FrameSetup setup;
   setup.description = volume.description;
   setup.range = {0, 255};
-  setup.renderer = kind;
+  SetRenderer(kind, setup);
   setup.transfer.colors = {{0, {0, 0, 0}}, {128, {0.9F, 0.4F, 0.1F}}, {255, {0.2F, 0.5F, 0.9F}}};
   setup.transfer.opacities = {{0, 0, 0.5, 0}, {64, 0.05, 0.5, 0}, {255, 0.05, 0.5, 0}};
   ViewParameters view;
   view.azimuth_degrees = 30;
   view.elevation_degrees = 20;
   view.zoom = double(side) / kObject;
-  SetView(view, {512, 512}, setup);
+  CHECK(kind.SetView(view, {512, 512}, setup).ok());
 
   SlabData slab{BrickedVoxels(volume.block)};
   const std::unique_ptr<Renderer> renderer = MakeRenderer(kind);
@@ -58,14 +60,14 @@ void EmptySpace(benchmark::State& state) {
   }
   const double frames = double(state.iterations()) * 1e6;
   state.counters["first_prepare"] = double(first.stage_ns[std::size_t(Stage::kPrepare)]) / 1e6;
-  for (Stage stage : {Stage::kPrepare, Stage::kTransform, Stage::kShade, Stage::kSplat, Stage::kComposite, Stage::kZBuffer}) {
-    if (const auto ns = report.stage_ns[std::size_t(stage)]; ns != 0) state.counters[std::string(ToString(stage))] = double(ns) / frames;
-  }
+  state.SetLabel(std::string(kind.name()));
+  for (const Stage stage : kind.stages())
+    state.counters[std::string(ToString(stage))] = double(report.stage_ns[std::size_t(stage)]) / frames;
   state.counters["slab_MB"] = double(slab.bytes()) / 1e6;
 }
 BENCHMARK(EmptySpace)
     ->ArgNames({"side", "renderer"})
-    ->ArgsProduct({{128, 256, 512}, {int(RendererKind::kSplat), int(RendererKind::kZBuffer)}})
+    ->ArgsProduct({{128, 256, 512}, benchmark::CreateDenseRange(0, std::int64_t(Renderers().size()) - 1, 1)})
     ->MeasureProcessCPUTime()
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);

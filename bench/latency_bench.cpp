@@ -47,7 +47,7 @@ struct Measured {
 FrameRequest RequestOf(const BenchOptions& options, int frame) {
   FrameRequest request;
   request.dataset = "sphere";
-  request.renderer = options.renderer == "splat" ? RendererKind::kSplat : RendererKind::kZBuffer;
+  request.renderer = options.renderer;
   request.size = {options.size, options.size};
   request.view.azimuth_degrees = frame * 360.0 / options.frames;
   request.view.elevation_degrees = 20;

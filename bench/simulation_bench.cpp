@@ -11,13 +11,14 @@
 #include <vector>
 
 #include "client/cli/bench_cases.h"
-#include "laboratory/measure/calibrate.h"
-#include "laboratory/measure/frame_costs.h"
-#include "laboratory/measure/validate.h"
 #include "common/base/check.h"
 #include "common/base/large_buffers.h"
 #include "common/planning/placement.h"
+#include "common/renderers/registry.h"
 #include "common/simulation/cost_fit.h"
+#include "laboratory/measure/calibrate.h"
+#include "laboratory/measure/frame_costs.h"
+#include "laboratory/measure/validate.h"
 
 namespace slabstream {
 namespace {
@@ -79,8 +80,8 @@ void AddSamples(const BenchCase& c, const Volume& volume, const BenchOptions& op
   }
 }
 
-void PrintFit(RendererKind renderer, const std::vector<CostSample>& samples) {
-  const CostFit fit = FitCosts(CostModel().stages(renderer), samples).value();
+void PrintFit(const RendererKind* renderer, const std::vector<CostSample>& samples) {
+  const CostFit fit = FitCosts(CostModel().stages(renderer->name()), samples).value();
   for (const StageFit& stage : fit.stages) {
     fmt::print("{:10} {:12} {} boxes, residual {:.1f} %, prediction error {:.1f} %\n", ToString(stage.cost.stage), stage.cost.symbol,
                stage.samples.size(), stage.residual * 100, stage.prediction_error * 100);
@@ -97,7 +98,7 @@ Status Run(const BenchOptions& options) {
   for (const std::string& text : options.cases) {
     Result<BenchCase> c = ParseBenchCase(text, false);
     if (!c.ok()) return c.status();
-    if (!options.renderer.empty()) c->renderer = options.renderer == "splat" ? RendererKind::kSplat : RendererKind::kZBuffer;
+    if (!options.renderer.empty()) c->renderer = RequireRenderer(options.renderer).value();
     cases.push_back(*std::move(c));
   }
   if (!options.fit) PrintMachine();

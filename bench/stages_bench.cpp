@@ -7,10 +7,11 @@
 #include <atomic>
 #include <chrono>
 
+#include "common/base/check.h"
 #include "common/decomposition/decomposition.h"
+#include "common/renderers/registry.h"
 #include "common/volume/sphere.h"
-#include "worker/render/finish_picture.h"
-#include "worker/render/pipeline.h"
+#include "worker/renderers/renderer.h"
 
 namespace slabstream {
 namespace {
@@ -20,21 +21,21 @@ constexpr int kSide = 200;
 void Stages(benchmark::State& state) {
   const auto sphere = SphereClass(state.range(0));
   const auto boxes = int(state.range(1));
-  const auto renderer_kind = RendererKind(state.range(2));
+  const RendererKind& kind = *Renderers()[std::size_t(state.range(2))];
   const Volume volume = MakeSphere({sphere, kSide, sphere == SphereClass::kHollow ? 0.05 : 0.40}).value();
   const VolumeSummary summary = Summarize(volume);
 
   FrameSetup setup;
   setup.description = volume.description;
   setup.range = summary.range;
-  setup.renderer = renderer_kind;
+  SetRenderer(kind, setup);
   setup.transfer.colors = {{0, {0, 0, 0}}, {128, {0.9F, 0.4F, 0.1F}}, {255, {0.2F, 0.5F, 0.9F}}};
   setup.transfer.opacities = {{0, 0, 0.5, 0}, {64, 0.05, 0.5, 0}, {255, 0.05, 0.5, 0}};
   ViewParameters view;
   view.azimuth_degrees = 30;
   view.elevation_degrees = 20;
   const VolumeGeometry& geometry = volume.description.geometry;
-  SetView(view, {512, 512}, setup);
+  CHECK(kind.SetView(view, {512, 512}, setup).ok());
 
   const WorkField voxels = WorkField::Uniform(geometry.size);
   const Partition partition = MakeSlabs({.work = &voxels, .boxes = boxes});
@@ -43,7 +44,7 @@ void Stages(benchmark::State& state) {
     slabs.push_back(std::make_unique<SlabData>(CutBlock(volume.block, SlabBox(box, setup))));
   }
 
-  const std::unique_ptr<Renderer> renderer = MakeRenderer(renderer_kind);
+  const std::unique_ptr<Renderer> renderer = MakeRenderer(kind);
   const std::atomic<bool> cancelled{false};
   tbb::task_arena one_thread(1);
   std::chrono::duration<double, std::milli> finish{};
@@ -55,7 +56,7 @@ void Stages(benchmark::State& state) {
         benchmark::DoNotOptimize(frame.rgba.data());
       }
       const auto begin = std::chrono::steady_clock::now();
-      benchmark::DoNotOptimize(FinishPicture(frame, setup));
+      benchmark::DoNotOptimize(kind.Finish(frame, setup));
       finish += std::chrono::steady_clock::now() - begin;
     });
   };
@@ -68,9 +69,9 @@ void Stages(benchmark::State& state) {
   }
   const double frames = double(state.iterations()) * 1e6;
   state.counters["first_prepare"] = double(first.stage_ns[std::size_t(Stage::kPrepare)]) / 1e6;
-  for (Stage stage : {Stage::kTransform, Stage::kShade, Stage::kSplat, Stage::kComposite, Stage::kZBuffer}) {
-    if (const auto ns = report.stage_ns[std::size_t(stage)]; ns != 0) state.counters[std::string(ToString(stage))] = double(ns) / frames;
-  }
+  state.SetLabel(std::string(kind.name()));
+  for (const Stage stage : kind.stages())
+    state.counters[std::string(ToString(stage))] = double(report.stage_ns[std::size_t(stage)]) / frames;
   state.counters["finish"] = finish.count() / double(state.iterations());
   state.counters["voxels"] = double(first.drawn_voxels);
 }

@@ -17,16 +17,17 @@
 #include <vector>
 
 #include "client/cli/bench_cases.h"
-#include "laboratory/measure/calibrate.h"
-#include "laboratory/measure/combining_costs.h"
-#include "laboratory/measure/frame_costs.h"
 #include "common/base/large_buffers.h"
 #include "common/classification/count_occupied.h"
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
 #include "common/planning/team.h"
+#include "common/renderers/registry.h"
 #include "common/simulation/simulate_frames.h"
 #include "coordinator/layout_table.h"
+#include "laboratory/measure/calibrate.h"
+#include "laboratory/measure/combining_costs.h"
+#include "laboratory/measure/frame_costs.h"
 
 namespace slabstream {
 namespace {
@@ -50,9 +51,9 @@ struct Subject {
 };
 
 Subject MakeSubject(const Options& options) {
-  const bool splat = options.renderer == "splat";
-  const BenchCase sphere = SphereCase({SphereClass::kHollow, options.size, 0.05}, splat ? kTranslucentSphere : kOpaqueSphere,
-                                      splat ? RendererKind::kSplat : RendererKind::kZBuffer);
+  const RendererKind* const renderer = RequireRenderer(options.renderer).value();
+  const double opacity = HasDepth(renderer->format()) ? kOpaqueSphere : kTranslucentSphere;
+  const BenchCase sphere = SphereCase({SphereClass::kHollow, options.size, 0.05}, opacity, renderer);
   Subject subject;
   subject.volume = LoadBenchVolume(sphere).value();
   subject.summary = Summarize(*subject.volume);

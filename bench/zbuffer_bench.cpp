@@ -5,8 +5,9 @@
 
 #include <atomic>
 
+#include "common/renderers/registry.h"
 #include "common/volume/sphere.h"
-#include "worker/render/pipeline.h"
+#include "worker/renderers/renderer.h"
 
 namespace slabstream {
 namespace {
@@ -21,7 +22,7 @@ void Frame(benchmark::State& state) {
     FrameSetup setup;
     setup.description = volume.description;
     setup.range = Summarize(volume).range;
-    setup.renderer = RendererKind::kZBuffer;
+    SetRenderer(*FindRenderer("zbuffer"), setup);
     setup.transfer.colors = {{0, {0, 0, 0}}, {128, {0.9F, 0.4F, 0.1F}}, {255, {0.2F, 0.5F, 0.9F}}};
     setup.transfer.opacities = {{0, 0, 0.5, 0}, {64, 0.9, 0.5, 0}, {255, 0.9, 0.5, 0}};
     ViewParameters view;
@@ -37,7 +38,7 @@ void Frame(benchmark::State& state) {
   VoxelBlock copy = MakeVoxelBlock(volume.block.box, volume.block.type);
   copy.bytes = volume.block.bytes;
   SlabData slab(std::move(copy));
-  const std::unique_ptr<Renderer> renderer = MakeRenderer(RendererKind::kZBuffer);
+  const std::unique_ptr<Renderer> renderer = MakeRenderer(*FindRenderer("zbuffer"));
   const std::atomic<bool> cancelled{false};
   std::size_t frame = 0;
   const auto render = [&](RankReport& report) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/base/log.h"
+#include "common/planning/validate_request.h"
 #include "common/wire/any_message.h"
 #include "common/wire/payload.h"
 

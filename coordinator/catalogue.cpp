@@ -6,7 +6,7 @@
 #include <string_view>
 #include <system_error>
 
-#include "common/planning/frame_request.h"
+#include "common/frame/frame_request.h"
 #include "common/volume_io/volume_reader.h"
 
 namespace slabstream {

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "common/planning/frame_request.h"
+#include "common/frame/frame_request.h"
 #include "common/stats/prediction.h"
 
 namespace slabstream {

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "common/planning/policy_names.h"
-#include "common/planning/render_work.h"
 #include "common/planning/team.h"
+#include "common/renderers/registry.h"
 #include "coordinator/frame_machine_state.h"
 
 namespace slabstream {
@@ -49,8 +49,8 @@ void FrameMachine::State::FindOutCount(OpenRequest& request) const {
   if (dataset.state != DatasetState::kReady || !CheckNames(frame.policy).ok() || !NeedsOccupancy(frame.policy)) return;
   Result<TransferFunction> transfer = ResolveTransfer(frame.transfer, *dataset.summary);
   if (!transfer.ok()) return;
-  request.counted =
-      std::make_shared<const OccupancyTable::Subject>(OccupancyTable::Subject{dataset.id, *std::move(transfer), frame.renderer});
+  request.counted = std::make_shared<const OccupancyTable::Subject>(
+      OccupancyTable::Subject{dataset.id, *std::move(transfer), FindRenderer(frame.renderer)});
 }
 
 // For the next requests in turn. Those behind them wait, so that no grid is dropped before it was used.
@@ -65,7 +65,7 @@ void FrameMachine::State::CountAhead() {
     actions.emplace_back(
         CountDataset{.count = occupancy.Begin(subject),
                      .dataset = subject.dataset,
-                     .table = std::make_shared<const ClassificationTable>(DrawnTable(subject.transfer, summary, subject.renderer))});
+                     .table = std::make_shared<const ClassificationTable>(subject.renderer->DrawnTable(subject.transfer, summary))});
   });
 }
 

@@ -7,6 +7,7 @@
 
 #include "common/planning/balance.h"
 #include "common/planning/policy_names.h"
+#include "common/renderers/registry.h"
 #include "coordinator/learning_table.h"
 
 namespace slabstream {
@@ -26,7 +27,7 @@ std::map<BoxId, double> SecondsOf(const Layout& layout, std::span<const RankRepo
 
 }  // namespace
 
-LayoutTable::Learnt* LayoutTable::FindLearnt(DatasetId dataset, const TransferFunction& transfer, RendererKind renderer) {
+LayoutTable::Learnt* LayoutTable::FindLearnt(DatasetId dataset, const TransferFunction& transfer, const RendererKind* renderer) {
   const auto found = std::find_if(learnt_.begin(), learnt_.end(), [&](const Learnt& learnt) {
     return learnt.dataset == dataset && learnt.transfer == transfer && learnt.renderer == renderer;
   });
@@ -35,7 +36,7 @@ LayoutTable::Learnt* LayoutTable::FindLearnt(DatasetId dataset, const TransferFu
   return &*found;
 }
 
-LayoutTable::Key LayoutTable::KeyOf(DatasetId dataset, const TransferFunction& transfer, RendererKind renderer, const Policy& policy,
+LayoutTable::Key LayoutTable::KeyOf(DatasetId dataset, const TransferFunction& transfer, const RendererKind* renderer, const Policy& policy,
                                     std::uint32_t slots) {
   Key key{dataset, transfer, renderer, policy, slots};
   key.policy.combine.clear();
@@ -45,7 +46,7 @@ LayoutTable::Key LayoutTable::KeyOf(DatasetId dataset, const TransferFunction& t
 
 const Layout& LayoutTable::Find(const Request& request) {
   const FrameRequest& frame = *request.frame;
-  Key key = KeyOf(request.dataset, *request.transfer, frame.renderer, frame.policy, request.slots);
+  Key key = KeyOf(request.dataset, *request.transfer, FindRenderer(frame.renderer), frame.policy, request.slots);
 
   Learnt* learnt = nullptr;
   if (request.occupied != nullptr) {
@@ -59,7 +60,7 @@ const Layout& LayoutTable::Find(const Request& request) {
   LayoutRequest make{.summary = request.summary,
                      .transfer = request.transfer,
                      .policy = &frame.policy,
-                     .renderer = frame.renderer,
+                     .renderer = key.renderer,
                      .slots = request.slots,
                      .slab_bytes_target = request.slab_bytes_target,
                      .known = {.occupied = request.occupied.get()}};
@@ -94,12 +95,12 @@ const Layout& LayoutTable::Find(const Request& request) {
   return entry.layout;
 }
 
-bool LayoutTable::KnowsCost(DatasetId dataset, const TransferFunction& transfer, RendererKind renderer) {
+bool LayoutTable::KnowsCost(DatasetId dataset, const TransferFunction& transfer, const RendererKind* renderer) {
   const Learnt* const learnt = FindLearnt(dataset, transfer, renderer);
   return learnt != nullptr && learnt->cost.any();
 }
 
-std::optional<WorkField> LayoutTable::KnownCost(DatasetId dataset, const TransferFunction& transfer, RendererKind renderer) {
+std::optional<WorkField> LayoutTable::KnownCost(DatasetId dataset, const TransferFunction& transfer, const RendererKind* renderer) {
   if (!KnowsCost(dataset, transfer, renderer)) return std::nullopt;
   return learnt_.front().cost.Field();
 }

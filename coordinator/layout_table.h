@@ -44,8 +44,8 @@ class LayoutTable {
   const Layout& Find(const Request& request);
 
   // What boxes cost, as far as frames have told: seconds.
-  bool KnowsCost(DatasetId dataset, const TransferFunction& transfer, RendererKind renderer);
-  std::optional<WorkField> KnownCost(DatasetId dataset, const TransferFunction& transfer, RendererKind renderer);
+  bool KnowsCost(DatasetId dataset, const TransferFunction& transfer, const RendererKind* renderer);
+  std::optional<WorkField> KnownCost(DatasetId dataset, const TransferFunction& transfer, const RendererKind* renderer);
 
   // A finished frame of this request's dataset, transfer function and renderer. Nothing is learnt from frames that were planned without
   // occupied voxels.
@@ -55,13 +55,14 @@ class LayoutTable {
   struct Key {
     DatasetId dataset = 0;
     TransferFunction transfer;
-    RendererKind renderer = RendererKind::kSplat;
+    const RendererKind* renderer = nullptr;
     Policy policy;
     std::uint32_t slots = 1;
     friend bool operator==(const Key&, const Key&) = default;
   };
   // How images are combined moves no box, so policies that differ in that alone share a layout.
-  static Key KeyOf(DatasetId dataset, const TransferFunction& transfer, RendererKind renderer, const Policy& policy, std::uint32_t slots);
+  static Key KeyOf(DatasetId dataset, const TransferFunction& transfer, const RendererKind* renderer, const Policy& policy,
+                   std::uint32_t slots);
   struct Entry {
     Key key;
     Layout layout;
@@ -73,10 +74,10 @@ class LayoutTable {
   struct Learnt {
     DatasetId dataset = 0;
     TransferFunction transfer;
-    RendererKind renderer = RendererKind::kSplat;
+    const RendererKind* renderer = nullptr;
     LearntCost cost;
   };
-  Learnt* FindLearnt(DatasetId dataset, const TransferFunction& transfer, RendererKind renderer);
+  Learnt* FindLearnt(DatasetId dataset, const TransferFunction& transfer, const RendererKind* renderer);
 
   std::list<Entry> entries_;  // asked for last first
   std::list<Learnt> learnt_;  // likewise

@@ -22,7 +22,7 @@ class OccupancyTable {
   struct Subject {
     DatasetId dataset = 0;
     TransferFunction transfer;
-    RendererKind renderer = RendererKind::kSplat;
+    const RendererKind* renderer = nullptr;
     friend bool operator==(const Subject&, const Subject&) = default;
   };
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/planning/policy_names.h"
+#include "common/renderers/registry.h"
 #include "coordinator/learning_table.h"
 
 namespace slabstream {
@@ -36,7 +37,7 @@ PolicyTable::Kind PolicyTable::KindOf(const Request& request) {
 
 Result<ChosenPolicy> PolicyTable::Choose(const Request& request, Entry& entry, const Kind& kind, const Policy& open, const Policy* now) {
   const std::optional<WorkField> cost =
-      entry.by_cost ? request.layouts->KnownCost(request.dataset, *request.transfer, request.frame->renderer) : std::nullopt;
+      entry.by_cost ? request.layouts->KnownCost(request.dataset, *request.transfer, FindRenderer(request.frame->renderer)) : std::nullopt;
   FrameRequest frame = *request.frame;
   frame.policy = open;
   const Result<PolicyChoice> choice = ChoosePolicy({.frame = &frame,
@@ -59,12 +60,12 @@ Result<ChosenPolicy> PolicyTable::Choose(const Request& request, Entry& entry, c
 
 Result<ChosenPolicy> PolicyTable::Find(const Request& request) {
   const Kind kind = KindOf(request);
-  Key key{request.dataset, *request.transfer, request.frame->renderer, request.frame->policy, request.slots};
+  Key key{request.dataset, *request.transfer, FindRenderer(request.frame->renderer), request.frame->policy, request.slots};
   const auto found = std::ranges::find(entries_, key, &Entry::key);
   if (found == entries_.end() || found->machine != *request.machine) {
     if (found != entries_.end()) entries_.erase(found);
     Entry entry{.key = std::move(key), .machine = *request.machine};
-    entry.by_cost = request.layouts->KnowsCost(request.dataset, *request.transfer, request.frame->renderer);
+    entry.by_cost = request.layouts->KnowsCost(request.dataset, *request.transfer, FindRenderer(request.frame->renderer));
     Result<ChosenPolicy> chosen = Choose(request, entry, kind, entry.key.asked, nullptr);
     if (!chosen.ok()) return chosen;
     entries_.push_front(std::move(entry));
@@ -74,7 +75,7 @@ Result<ChosenPolicy> PolicyTable::Find(const Request& request) {
   entries_.splice(entries_.begin(), entries_, found);
   Entry& entry = entries_.front();
   const Policy holds = entry.choices.front().chosen.policy;
-  if (!entry.by_cost && request.layouts->KnowsCost(request.dataset, *request.transfer, request.frame->renderer)) {
+  if (!entry.by_cost && request.layouts->KnowsCost(request.dataset, *request.transfer, FindRenderer(request.frame->renderer))) {
     entry.by_cost = true;
     entry.render_scale = 1;  // costs are seconds now
     entry.frames_seen = 0;

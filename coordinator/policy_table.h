@@ -64,7 +64,7 @@ class PolicyTable {
   struct Key {
     DatasetId dataset = 0;
     TransferFunction transfer;
-    RendererKind renderer = RendererKind::kSplat;
+    const RendererKind* renderer = nullptr;
     Policy asked;
     std::uint32_t slots = 1;
     friend bool operator==(const Key&, const Key&) = default;

@@ -11,8 +11,8 @@
 #include "common/base/log.h"
 #include "common/image/coverage_map.h"
 #include "common/image/image_view.h"
+#include "common/renderers/renderer_kind.h"
 #include "common/wire/payload.h"
-#include "worker/render/finish_picture.h"
 
 namespace slabstream {
 namespace {
@@ -257,7 +257,7 @@ RenderDone Executor::Render(const StartRender& action, Slab& slab, const std::at
       AddStage(report, Stage::kFetch, begin, NowNs());
     }
     std::unique_ptr<Renderer>& renderer = renderers_[action.setup->renderer];
-    if (renderer == nullptr) renderer = make_renderer_(action.setup->renderer);
+    if (renderer == nullptr) renderer = make_renderer_(*action.setup->renderer);
     const OcclusionMask& hidden = action.hidden == nullptr ? kNothingHidden : *action.hidden;
     Result<LocalImage> rendered = renderer->Render(slab.Data(), action.placement.box, *action.setup, hidden, cancelled, report);
     if (!rendered.ok()) return rendered.status();
@@ -323,7 +323,8 @@ void Executor::Perform(FindHidden&& action) {
     HiddenFound found{find.key, find.image, {}};
     const Status status = Guarded("hidden tiles", [&] {
       const PixelBounds frame = FrameBounds(*find.setup);
-      if (image->format != PixelFormat::kRgba) return Status::InvalidArgument("hidden tiles: an image with depth");  // a peer's mistake
+      if (image->format != PixelFormat::kRgba)
+        return Status::InvalidArgument("hidden tiles: not an image that blends");  // a peer's mistake
       FillRows(*image);
       found.hidden = FindHiddenTiles(*image, frame.width(), frame.height(), find.setup->termination, std::move(find.known));
       return Status::Ok();
@@ -414,9 +415,10 @@ void Executor::MakePicture(LocalImage& image, SendFrame& send, tbb::task_arena& 
   const std::int64_t begin = NowNs();
   std::int64_t resolved_ns = begin;
   RunImage runs = WithAllThreads(arena, [&] {
-    if (FrameIsPicture(*send.setup)) return EncodePicture(image);
+    const RendererKind& renderer = *send.setup->renderer;
+    if (renderer.FrameIsPicture(*send.setup)) return EncodePicture(image);
     FillRows(image);
-    const LocalImage picture = FinishPicture(image, *send.setup);
+    const LocalImage picture = renderer.Finish(image, *send.setup);
     resolved_ns = NowNs();
     return EncodePicture(picture);
   });

@@ -27,7 +27,7 @@
 #include "worker/lent_images.h"
 #include "worker/link_rates.h"
 #include "worker/peer_memory.h"
-#include "worker/render/pipeline.h"
+#include "worker/renderers/renderer.h"
 #include "worker/sent_tallies.h"
 #include "worker/thread_share.h"
 #include "worker/worker_machine.h"
@@ -105,7 +105,7 @@ class Executor {
   PeerMemory peer_memory_;
   std::optional<RunningRender> last_render_;
   const RendererFactory make_renderer_;
-  std::map<RendererKind, std::unique_ptr<Renderer>> renderers_;  // the render thread's
+  std::map<const RendererKind*, std::unique_ptr<Renderer>> renderers_;  // the render thread's
   const ThreadShare threads_;
   // One for each thread below that enters: in a common arena the last picture would wait for the next one's rendering.
   tbb::task_arena render_arena_;

@@ -69,7 +69,7 @@ void FrameAccumulator::StartGroup(GroupImage group, WorkerActions& actions) {
   reports_.push_back(std::move(group.reports));
   if (group.pieces.empty() && image_ == 0) {  // a frame that begins with an empty group begins with an empty picture
     RunImageHeader nothing;
-    nothing.format = FormatOf(setup_->renderer);
+    nothing.format = setup_->format;
     group.pieces.push_back({pixels_, {}, 0, {.header = nothing}});
   }
   std::set<ImageHandle> used;
@@ -123,7 +123,7 @@ void FrameAccumulator::SendPicture(WorkerActions& actions) {
   message.attempt = attempt_;
   message.groups_done = groups_done_;
   message.group_count = group_count_;
-  message.runs.image.format = FormatOf(setup_->renderer);
+  message.runs.image.format = setup_->format;
   actions.push_back(SendFrame{std::move(message), image_, setup_});
   if (groups_done_ == group_count_) frame_sent_attempt_ = attempt_;
 }

@@ -64,7 +64,7 @@ void GroupRun::OnRendered(Rank rank, ImageHandle image, RankReport report, Worke
 
 void GroupRun::LeaveOut(Rank rank, RankReport report, WorkerActions& actions) {
   RunImageHeader nothing;
-  nothing.format = FormatOf(assignment_.setup.renderer);
+  nothing.format = assignment_.setup.format;
   const ImageHandle image = names_.Next();
   Start({.image = image, .incoming = {.header = nothing}}, ranks_.at(rank), rank, actions);
   OnRendered(rank, image, std::move(report), actions);

@@ -29,7 +29,7 @@ std::optional<Bytes> LentImages::Lend(const LocalImage& image, const ImageView& 
   shared.stride = std::uint32_t(view.stride);
   shared.first_pixel = std::uint64_t(view.rgba - image.rgba.data()) / 4;
   std::array<std::optional<BlockPin>, 3> planes = {PinOf(image.rgba), PinOf(image.depth), PinOf(image.voxel)};
-  for (std::size_t i = 0; i < (view.format == PixelFormat::kDepth ? 3U : 1U); ++i) {
+  for (std::size_t i = 0; i < (HasDepth(view.format) ? 3U : 1U); ++i) {
     std::optional<BlockPin>& pin = planes[i];
     if (!pin || !pin->name()) return std::nullopt;
     shared.planes.push_back(*pin->name());

@@ -52,7 +52,7 @@ Result<BorrowedImage> PeerMemory::Borrow(const SharedImage& image, PixelFormat f
   // Nothing overflows: strides, sides and first pixels have been limited where the message was read.
   if (view.stride < width) return Invalid("rows overlap");
   const std::uint64_t pixels = image.first_pixel + (height - 1) * view.stride + width;
-  const bool depth = format == PixelFormat::kDepth;
+  const bool depth = HasDepth(format);
   const std::array<std::uint64_t, 3> pixel_bytes = {4 * sizeof(float), sizeof(float), sizeof(std::uint32_t)};
   std::array<const std::byte*, 3> first = {};
   if (image.planes.size() != (depth ? 3U : 1U)) return Invalid(std::to_string(image.planes.size()) + " planes");

@@ -11,7 +11,7 @@
 #include "common/base/status.h"
 #include "common/transport/socket.h"
 #include "worker/image_packing.h"
-#include "worker/render/pipeline.h"
+#include "worker/renderers/renderer.h"
 #include "worker/worker_machine.h"
 
 namespace slabstream {

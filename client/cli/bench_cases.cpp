@@ -35,7 +35,8 @@ std::string SphereName(const SphereRequest& sphere) {
   return sphere.occupancy == StandardOccupancy(sphere.sphere_class) ? name : fmt::format("{}-{:g}", name, sphere.occupancy);
 }
 
-BenchCase StandardSphere(SphereClass sphere_class, int size, double opacity, RendererKind renderer = RendererKind::kSplat) {
+BenchCase StandardSphere(SphereClass sphere_class, int size, double opacity,
+                         const RendererKind* renderer = FindRenderer(kDefaultRenderer)) {
   return SphereCase({sphere_class, size, StandardOccupancy(sphere_class)}, opacity, renderer);
 }
 
@@ -48,12 +49,13 @@ std::string Stem(const std::string& path) {
 
 }  // namespace
 
-BenchCase SphereCase(const SphereRequest& sphere, double opacity, RendererKind renderer) {
-  const bool hollow = sphere.sphere_class == SphereClass::kHollow, points = renderer == RendererKind::kZBuffer;
+BenchCase SphereCase(const SphereRequest& sphere, double opacity, const RendererKind* renderer) {
+  const bool hollow = sphere.sphere_class == SphereClass::kHollow, points = HasDepth(renderer->format());
   const std::string dataset = SphereName(sphere);
-  return {.name = fmt::format("{}{}{}", points ? "zbuffer-" : "", dataset, opacity == kOpaqueSphere && !points ? "-opaque" : ""),
+  return {.name = fmt::format("{}{}{}", points ? std::string(renderer->name()) + "-" : std::string(), dataset,
+                              opacity == kOpaqueSphere && !points ? "-opaque" : ""),
           .purpose = fmt::format("{} sphere, {} voxels a side, {:g} % occupied, opacity {:g} a voxel, {}", hollow ? "hollow" : "filled",
-                                 sphere.size, sphere.occupancy * 100, opacity, points ? "Z-buffer" : "splatting"),
+                                 sphere.size, sphere.occupancy * 100, opacity, renderer->title()),
           .dataset = dataset,
           .volume = sphere,
           .renderer = renderer,
@@ -76,7 +78,7 @@ const std::vector<BenchCase>& StandardBenchCases() {
       StandardSphere(SphereClass::kHollow, 256, kOpaqueSphere),
       StandardSphere(SphereClass::kFilled, 256, kOpaqueSphere),
       StandardSphere(SphereClass::kHollow, 512, kTranslucentSphere),
-      StandardSphere(SphereClass::kHollow, 256, kOpaqueSphere, RendererKind::kZBuffer),
+      StandardSphere(SphereClass::kHollow, 256, kOpaqueSphere, FindRenderer("zbuffer")),
       BrainCase(),
   };
   return cases;
@@ -131,7 +133,7 @@ ViewParameters BenchView(Projection projection, int index, int frames) {
 FrameRequest BenchRequest(const BenchCase& bench_case, const ViewParameters& view, ImageSize size) {
   FrameRequest request;
   request.dataset = bench_case.dataset;
-  request.renderer = bench_case.renderer;
+  request.renderer = bench_case.renderer->name();
   request.size = size;
   request.view = view;
   request.transfer = bench_case.transfer;

@@ -7,7 +7,8 @@
 #include <variant>
 #include <vector>
 
-#include "common/planning/frame_request.h"
+#include "common/frame/frame_request.h"
+#include "common/renderers/registry.h"
 #include "common/volume/sphere.h"
 #include "common/volume/volume.h"
 
@@ -18,7 +19,7 @@ struct BenchCase {
   std::string purpose;                              // one line for --list
   std::string dataset;                              // the volume's name: cases of one volume share it, and at a service it is the dataset's
   std::variant<SphereRequest, std::string> volume;  // made here, or a file's path (unused at a service)
-  RendererKind renderer = RendererKind::kSplat;
+  const RendererKind* renderer = FindRenderer(kDefaultRenderer);
   TransferChoice transfer;
   std::optional<double> opacity;  // of an occupied voxel, where all have the same
 };
@@ -26,7 +27,7 @@ struct BenchCase {
 const std::vector<BenchCase>& StandardBenchCases();
 
 // What the standard ones are made by: a sphere whose occupied voxels have this opacity, and the MRI brain of Debian's package mricron-data.
-BenchCase SphereCase(const SphereRequest& sphere, double opacity, RendererKind renderer = RendererKind::kSplat);
+BenchCase SphereCase(const SphereRequest& sphere, double opacity, const RendererKind* renderer = FindRenderer(kDefaultRenderer));
 BenchCase BrainCase();
 inline constexpr double kTranslucentSphere = 0.05, kOpaqueSphere = 0.9;
 

@@ -17,7 +17,7 @@ std::string SceneJson(const BenchCase& c, const BenchOptions& options) {
       {"volume", c.dataset + ".mha"},
       {"transfer", c.name + ".transfer.json"},
       {"opacity_distance", c.transfer.opacity_distance},
-      {"renderer", c.renderer == RendererKind::kSplat ? "splat" : "zbuffer"},
+      {"renderer", c.renderer->name()},
       {"size", options.size},
       {"views",
        {{"frames", options.frames},

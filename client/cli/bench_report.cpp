@@ -15,8 +15,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string_view NameOf(RendererKind renderer) { return renderer == RendererKind::kSplat ? "splat" : "zbuffer"; }
-
 std::vector<double> BothProjections(const BenchResult& result) {
   std::vector<double> both = result.orthographic_ms;
   both.insert(both.end(), result.perspective_ms.begin(), result.perspective_ms.end());
@@ -45,7 +43,7 @@ Json CaseJson(const BenchRun& run, const BenchResult& result) {
   }
   return {{"case", c.name},
           {"volume", volume},
-          {"renderer", NameOf(c.renderer)},
+          {"renderer", c.renderer->name()},
           {"transfer", preset != nullptr ? Json(*preset) : Json("curve")},
           {"opacity", c.opacity ? Json(*c.opacity) : Json()},
           {"opacity_distance", c.transfer.opacity_distance},
@@ -100,7 +98,7 @@ std::string BenchRow(const BenchResult& result, std::size_t name_width) {
   const Spread both = SpreadOf(BothProjections(result));
   const auto mebibytes = [](std::int64_t bytes) { return double(bytes) / (1 << 20); };
   return fmt::format("{:<{}} {:>15} {:>8} {:>8.2f} {:>8.2f} {:>8.2f} {:>8.2f} {:>8.2f} {:>8.2f} {:>8.2f} {:>8.1f} {:>7.1f} {:>7.1f}\n",
-                     c.name, name_width, fmt::format("{}x{}x{}", size.x, size.y, size.z), NameOf(c.renderer),
+                     c.name, name_width, fmt::format("{}x{}x{}", size.x, size.y, size.z), c.renderer->name(),
                      SpreadOf(result.orthographic_ms).median, SpreadOf(result.perspective_ms).median, both.median, both.p05, both.p95,
                      both.min, both.max, result.first_frame_ms, mebibytes(result.description.voxel_bytes()),
                      mebibytes(result.peak_rss_bytes));

@@ -16,13 +16,14 @@
 #include "client/cli/cores.h"
 #include "client/cli/files.h"
 #include "client/cli/option_groups.h"
-#include "laboratory/experiments/run_experiment.h"
-#include "laboratory/measure/replay.h"
 #include "common/base/log.h"
 #include "common/kernels/simd_target.h"
 #include "common/planning/policy_names.h"
+#include "common/renderers/registry.h"
 #include "common/transport/endpoint.h"
 #include "common/tuning/service_machine.h"
+#include "laboratory/experiments/run_experiment.h"
+#include "laboratory/measure/replay.h"
 
 namespace slabstream {
 namespace {
@@ -82,13 +83,13 @@ void DeclareBench(CLI::App& app, BenchOptions& options, Command& command) {
   endpoint->description("Instead of one in this process, measure the service there; CASE is then NAME[:PRESET|:FILE.json] of a dataset");
   AddParsed(
       *sub, "--renderer", options.renderer,
-      [](const std::string& option, const std::string& text) -> Result<std::optional<RendererKind>> {
-        const Result<std::size_t> index = ParseChoice(option, text, std::array<std::string_view, 2>{"splat", "zbuffer"});
+      [](const std::string& option, const std::string& text) -> Result<std::optional<const RendererKind*>> {
+        const Result<std::size_t> index = ParseChoice(option, text, RendererNames());
         if (!index.ok()) return index.status();
-        return std::optional(*index == 0 ? RendererKind::kSplat : RendererKind::kZBuffer);
+        return std::optional(Renderers()[*index]);
       },
       "Instead of that of each case")
-      ->type_name("splat|zbuffer");
+      ->type_name(fmt::format("{}", fmt::join(RendererNames(), "|")));
   sub->add_option("--json", options.json_path, "Write all figures and the machine as JSON")->type_name("FILE");
   sub->add_option("--pictures", options.pictures_directory, "Write the first view of each projection there, after the measuring")
       ->type_name("DIR");

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <filesystem>
+#include <map>
 #include <vector>
 
 #include "client/cli/cores.h"
@@ -12,6 +13,7 @@
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
 #include "common/planning/policy_names.h"
+#include "common/renderers/registry.h"
 #include "common/transport/endpoint.h"
 #include "common/wire/control_messages.h"
 
@@ -55,6 +57,37 @@ CLI::Option* AddChoice(CLI::App& app, const std::string& name, T& target, const 
     return values[*index];
   };
   return AddParsed(app, name, target, parse, help)->type_name(fmt::format("{}", fmt::join(names, "|")));
+}
+
+// --renderer, and an option for each parameter that a renderer has. Whether the chosen renderer has it is checked with the request.
+void AddRendererOptions(CLI::App& app, FrameRequest& request) {
+  std::string help = "How voxels become a picture";
+  std::map<std::string_view, std::pair<const RendererParameter*, std::string>> parameters;  // and the renderers that have it
+  for (const RendererKind* kind : Renderers()) {
+    help += fmt::format("\n  {}: {}", kind->name(), kind->purpose());
+    for (const RendererParameter& parameter : kind->parameters()) {
+      auto& [entry, renderers] = parameters[parameter.name];
+      entry = &parameter;
+      renderers += (renderers.empty() ? "" : ", ") + std::string(kind->name());
+    }
+  }
+  const auto parse = [](const std::string& option, const std::string& text) -> Result<std::string> {
+    const Result<std::size_t> index = ParseChoice(option, text, RendererNames());
+    if (!index.ok()) return index.status();
+    return text;
+  };
+  AddParsed(app, "--renderer", request.renderer, parse, help)->default_str(std::string(kDefaultRenderer));
+  for (const auto& [name, entry] : parameters) {
+    const auto& [parameter, renderers] = entry;
+    const bool choice = !parameter->choices.empty();
+    const std::string standard =
+        choice ? std::string(parameter->choices[std::size_t(parameter->standard)]) : fmt::format("{:g}", parameter->standard);
+    app.add_option_function<std::string>(
+           "--" + std::string(name), [&request, key = std::string(name)](const std::string& text) { request.parameters[key] = text; },
+           fmt::format("{} (renderer {})", parameter->purpose, renderers))
+        ->type_name(choice ? fmt::format("{}", fmt::join(parameter->choices, "|")) : "NUMBER")
+        ->default_str(standard);
+  }
 }
 
 void AddCombining(CLI::App& app, std::string& target) {
@@ -103,9 +136,7 @@ void AddViewOptions(CLI::App& app, ViewParameters& view, ImageSize& size) {
 }
 
 void AddLookOptions(CLI::App& app, FrameRequest& request, PictureFormat& format) {
-  AddChoice<RendererKind, 2>(app, "--renderer", request.renderer, {"splat", "zbuffer"}, {RendererKind::kSplat, RendererKind::kZBuffer},
-                             "Translucent splatting, or the first surface by Z-buffer")
-      ->default_str("splat");
+  AddRendererOptions(app, request);
   AddTransferOptions(app, request.transfer);
   AddChoice<bool, 2>(app, "--shading", request.shading.phong, {"phong", "none"}, {true, false}, "")->default_str("phong");
   app.add_option("--light", CLI::callback_t([&request](const CLI::results_t& texts) {

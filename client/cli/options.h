@@ -7,10 +7,12 @@
 
 #include "client/cli/values.h"
 #include "client/image_io/image_writer.h"
-#include "common/planning/frame_request.h"
+#include "common/frame/frame_request.h"
 #include "common/volume/sphere.h"
 
 namespace slabstream {
+
+class RendererKind;
 
 inline constexpr int kMaxLocalWorkers = 256;  // of EmbeddedOptions
 
@@ -56,7 +58,7 @@ struct BenchOptions {
   int size = 512;                                               // pixels a side, [1, kMaxBenchSize]
   int frames = 12;                                              // of a turn of each projection, [1, kMaxTurntableFrames]
   int turns = 2;                                                // [1, kMaxTurns]
-  std::optional<RendererKind> renderer;                         // instead of that of each case
+  std::optional<const RendererKind*> renderer;                  // instead of that of each case
   std::string json_path, pictures_directory, export_directory;  // empty: not wanted
   bool list = false;
   std::string command;  // as it was typed

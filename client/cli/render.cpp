@@ -6,6 +6,7 @@
 #include "client/cli/files.h"
 #include "client/cli/report_files.h"
 #include "client/cli/session.h"
+#include "common/planning/validate_request.h"
 
 namespace slabstream {
 

@@ -5,6 +5,7 @@
 #include <set>
 #include <utility>
 
+#include "common/renderers/registry.h"
 #include "laboratory/measure/recording.h"
 
 namespace slabstream {
@@ -79,7 +80,8 @@ std::string TraceJson(const FrameOptions& options, const std::vector<FrameRecord
   }
   std::vector<RecordedFrame> recorded;
   recorded.reserve(frames.size());
-  for (const FrameRecord& frame : frames) recorded.push_back(Record(frame.statistics, options.request.renderer, frame.latency));
+  for (const FrameRecord& frame : frames)
+    recorded.push_back(Record(frame.statistics, *FindRenderer(options.request.renderer), frame.latency));
   const Json json = {{"displayTimeUnit", "ms"}, {"traceEvents", std::move(events)}, {kRecordingKey, RecordingJson(recorded)}};
   return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
 }

@@ -6,7 +6,7 @@
 #include <map>
 #include <optional>
 
-#include "common/image/run_image.h"
+#include "common/image/pixel_bounds.h"
 
 namespace slabstream {
 

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "common/base/status.h"
-#include "common/image/run_image.h"
+#include "common/image/pixel_bounds.h"
 
 namespace slabstream {
 

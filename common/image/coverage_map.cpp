@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "common/base/check.h"
+#include "common/image/local_image.h"
 
 namespace slabstream {
 namespace {
@@ -17,7 +18,7 @@ CoverageMap EmptyMap(std::int32_t width, std::int32_t height) {
 }
 
 bool Filled(const LocalImage& image, std::size_t pixel) {
-  return image.format == PixelFormat::kDepth ? image.depth[pixel] < std::numeric_limits<float>::infinity() : image.rgba[4 * pixel + 3] > 0;
+  return HasDepth(image.format) ? image.depth[pixel] < std::numeric_limits<float>::infinity() : image.rgba[4 * pixel + 3] > 0;
 }
 
 }  // namespace

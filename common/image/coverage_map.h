@@ -5,10 +5,12 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/image/local_image.h"
 #include "common/image/occlusion_mask.h"
+#include "common/image/pixel_bounds.h"
 
 namespace slabstream {
+
+struct LocalImage;
 
 inline constexpr std::int32_t kCoverageTile = kOcclusionTile;  // pixels of the rendered frame, along x and y
 

@@ -1,47 +1,19 @@
 // LocalImage: the picture of some boxes, on the pixels that they can touch.
 //
-// Three pixel formats. kRgba (splatting): premultiplied float RGBA, interleaved, 16 bytes a pixel; empty is (0, 0, 0, 0).
-// kDepth (Z-buffer): the same RGBA (alpha 0 or 1) with a depth plane (float, camera depth; empty is +infinity) and a voxel plane (the low
-// 32 bits of the index of the voxel's face that is seen: FaceIndex in worker/kernels/surface_face.h), which breaks ties of depth: see
-// NearerDepth. kRgbaDepth is what is left of kDepth in a finished picture, which meets no other image: it has no voxel plane. Rows are
-// stored top down without padding; pixel (x, y) is at index (y - bounds.y_begin) * bounds.width() + (x - bounds.x_begin).
+// Planes (pixel_format.h): interleaved float RGBA, 16 bytes a pixel, where empty is (0, 0, 0, 0); camera depths (float, empty is
+// +infinity); voxel indices (the low 32 bits of the index of the voxel's face that is seen: FaceIndex in worker/kernels/surface_face.h),
+// which break ties of depth (NearerDepth). Rows are stored top down without padding; pixel (x, y) is at index (y - bounds.y_begin) *
+// bounds.width() + (x - bounds.x_begin).
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 #include <vector>
 
 #include "common/base/pooled_vector.h"
+#include "common/image/pixel_bounds.h"
+#include "common/image/pixel_format.h"
 
 namespace slabstream {
-
-enum class PixelFormat : std::uint8_t { kRgba = 1, kDepth = 2, kRgbaDepth = 3 };
-
-constexpr bool HasDepth(PixelFormat format) { return format != PixelFormat::kRgba; }
-constexpr bool HasVoxel(PixelFormat format) { return format == PixelFormat::kDepth; }
-
-// Half-open pixel rectangle.
-struct PixelBounds {
-  std::int32_t x_begin = 0, y_begin = 0, x_end = 0, y_end = 0;
-
-  constexpr std::int32_t width() const { return x_end - x_begin; }
-  constexpr std::int32_t height() const { return y_end - y_begin; }
-  constexpr bool empty() const { return x_end <= x_begin || y_end <= y_begin; }
-  constexpr std::int64_t pixel_count() const { return empty() ? 0 : std::int64_t(width()) * height(); }
-  constexpr bool Contains(const PixelBounds& b) const {
-    return b.empty() || (b.x_begin >= x_begin && b.y_begin >= y_begin && b.x_end <= x_end && b.y_end <= y_end);
-  }
-  friend constexpr bool operator==(const PixelBounds&, const PixelBounds&) = default;
-};
-
-constexpr PixelBounds Intersection(const PixelBounds& a, const PixelBounds& b) {
-  return {std::max(a.x_begin, b.x_begin), std::max(a.y_begin, b.y_begin), std::min(a.x_end, b.x_end), std::min(a.y_end, b.y_end)};
-}
-constexpr PixelBounds Union(const PixelBounds& a, const PixelBounds& b) {
-  if (a.empty()) return b;
-  if (b.empty()) return a;
-  return {std::min(a.x_begin, b.x_begin), std::min(a.y_begin, b.y_begin), std::max(a.x_end, b.x_end), std::max(a.y_end, b.y_end)};
-}
 
 // Columns [begin, end) of one row, from the bounds' x_begin; begin == end: none.
 struct ColumnSpan {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "common/base/check.h"
+#include "common/image/local_image.h"
 
 namespace slabstream {
 namespace {

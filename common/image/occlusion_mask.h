@@ -7,9 +7,11 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/image/local_image.h"
+#include "common/image/pixel_bounds.h"
 
 namespace slabstream {
+
+struct LocalImage;
 
 inline constexpr std::int32_t kOcclusionTile = 16;  // pixels of the rendered frame, along x and y
 

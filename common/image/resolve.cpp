@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/base/check.h"
+#include "common/image/local_image.h"
 
 namespace slabstream {
 
@@ -18,7 +19,7 @@ LocalImage Resolve(const LocalImage& image, int supersample) {
   const auto round_up = [&](std::int32_t fine_coordinate) { return (fine_coordinate + supersample - 1) >> shift; };
   LocalImage result =
       MakeLocalImage(image.format, {fine.x_begin >> shift, fine.y_begin >> shift, round_up(fine.x_end), round_up(fine.y_end)});
-  const bool depth = image.format == PixelFormat::kDepth;
+  const bool depth = HasVoxel(image.format);
   const auto width = std::size_t(result.bounds.width());
   const double weight = 1.0 / (double(supersample) * supersample);
 

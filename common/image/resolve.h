@@ -2,9 +2,9 @@
 // its depth the smallest. Sums run in a fixed order, so the result is the same wherever it is computed.
 #pragma once
 
-#include "common/image/local_image.h"
-
 namespace slabstream {
+
+struct LocalImage;
 
 // `supersample` is a power of two, 1 returns the image as it is. Bounds of the result are in final pixels, grown to whole ones.
 LocalImage Resolve(const LocalImage& image, int supersample);

@@ -138,7 +138,7 @@ RunImage Encode(const ImageView& view, PixelFormat format, ColorCoding color) {
     result.header.pixel_count += band.pixel_count;
   }
   result.header.run_count = std::uint32_t(run_count);
-  if (!HasDepth(format)) result.header.color = color;
+  if (format == PixelFormat::kRgba) result.header.color = color;
 
   result.payload.resize(PayloadBytes(result.header));
   const PayloadWriter writer(result.header, result.payload.data());
@@ -210,17 +210,18 @@ RunImage EncodeRuns(const LocalImage& image, PixelRange range, std::int32_t fram
 }
 
 RunImage EncodePicture(const LocalImage& image) {
-  return Encode(ViewOf(image), HasDepth(image.format) ? PixelFormat::kRgbaDepth : PixelFormat::kRgba, ColorCoding::kFloat32);
+  return Encode(ViewOf(image), HasVoxel(image.format) ? PixelFormat::kRgbaDepth : image.format, ColorCoding::kFloat32);
 }
 
 Status ValidateRunHeader(const RunImageHeader& header, const PixelBounds& frame) {
-  if (header.format < PixelFormat::kRgba || header.format > PixelFormat::kRgbaDepth) {
-    return Invalid("format is " + std::to_string(int(header.format)) + ", but must be 1 (rgba), 2 (depth) or 3 (rgba and depth)");
+  if (header.format < PixelFormat::kRgba || header.format > PixelFormat::kSum) {
+    return Invalid("format is " + std::to_string(int(header.format)) +
+                   ", but must be 1 (rgba), 2 (depth), 3 (rgba and depth), 4 (maximum) or 5 (sum)");
   }
   const bool coded = header.color == ColorCoding::kHalf || header.color == ColorCoding::kFixed16;
   if (header.color != ColorCoding::kFloat32 && (!coded || header.format != PixelFormat::kRgba)) {
     return Invalid("color is " + std::to_string(int(header.color)) +
-                   ", but must be 1 (float32), or 2 (half) or 3 (fixed16) without depths");
+                   ", but must be 1 (float32), or for colours alone 2 (half) or 3 (fixed16)");
   }
   const PixelBounds& bounds = header.bounds;
   // Nothing is computed from the bounds before this: differences of hostile numbers may overflow.

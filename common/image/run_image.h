@@ -15,29 +15,10 @@
 #include <span>
 
 #include "common/base/status.h"
-#include "common/image/color_coding.h"
 #include "common/image/local_image.h"
+#include "common/image/run_header.h"
 
 namespace slabstream {
-
-// Half-open range of linear pixel indices y * frame_width + x of the (supersampled) frame.
-struct PixelRange {
-  std::uint64_t begin = 0, end = 0;
-  friend constexpr bool operator==(const PixelRange&, const PixelRange&) = default;
-  friend constexpr auto operator<=>(const PixelRange&, const PixelRange&) = default;
-};
-
-struct RunImageHeader {
-  PixelFormat format = PixelFormat::kRgba;
-  PixelBounds bounds;  // within the frame
-  std::uint32_t run_count = 0;
-  std::uint64_t pixel_count = 0;              // in all runs
-  ColorCoding color = ColorCoding::kFloat32;  // kDepth: always
-  friend bool operator==(const RunImageHeader&, const RunImageHeader&) = default;
-};
-
-constexpr bool IsDense(const RunImageHeader& header) { return header.run_count == 0 && header.pixel_count > 0; }
-std::size_t PayloadBytes(const RunImageHeader& header);
 
 struct RunImage {
   RunImageHeader header;

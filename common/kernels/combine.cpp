@@ -17,12 +17,12 @@ std::size_t IndexOf(const PixelBounds& bounds, std::int32_t x, std::int32_t y) {
 }
 
 TargetPixels At(LocalImage& image, std::size_t pixel) {
-  if (image.format == PixelFormat::kRgba) return {&image.rgba[4 * pixel], nullptr, nullptr};
+  if (!HasDepth(image.format)) return {&image.rgba[4 * pixel], nullptr, nullptr};
   return {&image.rgba[4 * pixel], &image.depth[pixel], &image.voxel[pixel]};
 }
 
 SourcePixels At(const ImageView& view, std::size_t pixel) {
-  if (view.format == PixelFormat::kRgba) return {view.rgba + 4 * pixel, nullptr, nullptr};
+  if (!HasDepth(view.format)) return {view.rgba + 4 * pixel, nullptr, nullptr};
   return {view.rgba + 4 * pixel, view.depth + pixel, view.voxel + pixel};
 }
 
@@ -35,15 +35,24 @@ void CopyRow(const SourcePixels& source, const TargetPixels& target, std::size_t
   std::memcpy(target.voxel, source.voxel, sizeof(std::uint32_t) * count);
 }
 
-// `ours` with `theirs` on its `side`. All have depths, or none. `target` may be `ours`. False: a colour that was computed is not finite.
-bool CombineRow(const SourcePixels& ours, const SourcePixels& theirs, Side side, const TargetPixels& target, std::size_t count) {
-  if (ours.depth != nullptr && theirs.depth != nullptr) {
-    if (target.depth != ours.depth) CopyRow(ours, target, count);
-    NearestRow(theirs, target, count);
-    return true;
+// `ours` with `theirs` on its `side`, all of one format. `target` may be `ours`. False: a value that was computed is not finite.
+bool CombineRow(PixelFormat format, const SourcePixels& ours, const SourcePixels& theirs, Side side, const TargetPixels& target,
+                std::size_t count) {
+  switch (format) {
+    case PixelFormat::kRgba: {
+      const bool in_front = side == Side::kFront;
+      return OverRow(in_front ? theirs.rgba : ours.rgba, in_front ? ours.rgba : theirs.rgba, target.rgba, count);
+    }
+    case PixelFormat::kDepth:
+      if (target.depth != ours.depth) CopyRow(ours, target, count);
+      NearestRow(theirs, target, count);
+      return true;
+    case PixelFormat::kMaximum: return MaximumRow(ours.rgba, theirs.rgba, target.rgba, count);
+    case PixelFormat::kSum: return SumRow(ours.rgba, theirs.rgba, target.rgba, count);
+    case PixelFormat::kRgbaDepth: break;  // finished pictures do not combine
   }
-  if (side == Side::kFront) return OverRow(theirs.rgba, ours.rgba, target.rgba, count);
-  return OverRow(ours.rgba, theirs.rgba, target.rgba, count);
+  CHECK(false) << "images of pixel format " << int(format) << " do not combine";
+  return false;
 }
 
 // Columns [begin, end) of a row of some image; none if begin == end.
@@ -89,10 +98,10 @@ bool MergeRow(const RowPixels& ours, const RowPixels& theirs, Side side, LocalIm
     if (begin >= end) continue;
     const bool in_ours = begin >= a.begin && end <= a.end, in_theirs = begin >= b.begin && end <= b.end;
     if (in_ours && in_theirs) {
-      valid &= CombineRow(ours.At(begin), theirs.At(begin), side, At(image, row + begin), end - begin);
+      valid &= CombineRow(image.format, ours.At(begin), theirs.At(begin), side, At(image, row + begin), end - begin);
     } else if (in_theirs) {
       CopyRow(theirs.At(begin), At(image, row + begin), end - begin);
-      if (kTheirs == Values::kUnchecked && image.format == PixelFormat::kRgba) valid &= AreFinite(image, row + begin, end - begin);
+      if (kTheirs == Values::kUnchecked && !HasDepth(image.format)) valid &= AreFinite(image, row + begin, end - begin);
     } else if (!in_ours) {
       MakeEmpty(image, row + begin, row + end);
     } else if (!in_place) {
@@ -100,7 +109,7 @@ bool MergeRow(const RowPixels& ours, const RowPixels& theirs, Side side, LocalIm
     }
   }
   if (kTheirs == Values::kKnown) return true;
-  if (image.format == PixelFormat::kRgba) return valid;
+  if (!HasDepth(image.format)) return valid;
   const std::size_t first = row + b.begin, count = b.end - b.begin;
   return AreFinite(image, first, count) && AllDepths(std::span(image.depth).subspan(first, count));
 }

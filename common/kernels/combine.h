@@ -1,8 +1,9 @@
-// The two image operators, on whole local images and on run-encoded ones.
+// The image operators, one for each pixel format (common/image/pixel_format.h), on whole local images and on run-encoded ones.
 //
 // Over (Porter and Duff 1984, premultiplied): out = front + (1 - front.alpha) * back, all four channels.
 // Nearest: the nearer depth wins; equal depths go to the lower voxel index in serial-number order (NearerDepth), so the result does not
 // depend on the order of operands.
+// Maximum and sum, channel by channel.
 #pragma once
 
 #include <cstddef>
@@ -22,9 +23,9 @@ inline bool NearerDepth(float depth_a, std::uint32_t voxel_a, float depth_b, std
 
 enum class Side : std::uint8_t { kFront, kBack };  // where the second image lies as seen from the first
 
-// Combines `other` into `image`. `side` tells where `other` lies (kRgba only). Formats must agree. Bit-for-bit: Combine(a, b, kBack) equals
-// Combine(b, a, kFront). Where the bounds must grow they become `room`, which holds both: room for all that is still to come saves growing
-// again, and costs nothing, since what is empty is not written (LocalImage::rows).
+// Combines `other` into `image`. `side` tells where `other` lies, which only kRgba asks. Formats must agree. Bit-for-bit: Combine(a, b,
+// kBack) equals Combine(b, a, kFront). Where the bounds must grow they become `room`, which holds both: room for all that is still to come
+// saves growing again, and costs nothing, since what is empty is not written (LocalImage::rows).
 void Combine(LocalImage& image, const ImageView& other, Side side, const PixelBounds& room);
 // The same for pixels that nobody has looked at, in memory that another process may even write to meanwhile. False: a pixel where `other`
 // has some now is none (its colour is not finite, or its depth is NaN or -infinity); `image` is then worth nothing.
@@ -43,6 +44,10 @@ void Erase(LocalImage& image, PixelRange pixels, std::int32_t frame_width);
 // value that was written is not finite; an operand that is not never gives a sum that is.
 bool OverRow(const float* front, const float* back, float* out, std::size_t pixel_count);
 bool OverRowReference(const float* front, const float* back, float* out, std::size_t pixel_count);
+
+// The larger value, and the sum, in each channel. Rows as above.
+bool MaximumRow(const float* a, const float* b, float* out, std::size_t pixel_count);
+bool SumRow(const float* a, const float* b, float* out, std::size_t pixel_count);
 
 // A stretch of pixels of one row, to read or to write.
 template <class Float, class Index>

@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace slabstream {
 
-BrickVisibility::BrickVisibility(const VolumeSummary& summary, const TransferFunction& transfer)
-    : summary_(summary), table_(Classify(transfer, summary.description, summary.range)), next_visible_(table_.opacity.size()) {
+BrickVisibility::BrickVisibility(const VolumeSummary& summary, ClassificationTable drawn)
+    : summary_(summary), table_(std::move(drawn)), next_visible_(table_.opacity.size()) {
   int next = table_.size();
   for (int bin = table_.size() - 1; bin >= 0; --bin) {
     if (table_.opacity[std::size_t(bin)] > 0) next = bin;

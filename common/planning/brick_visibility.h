@@ -1,7 +1,7 @@
-// BrickVisibility: can a box of voxels show anything under a transfer function? Answered from the summary's bricks, without voxels.
+// BrickVisibility: whether a renderer may draw anything of a box of voxels. The ranges of values of the summary's bricks answer it, without
+// voxels.
 //
-// The answer is exact but for rounding on the safe side: what is called empty holds no voxel whose bin in the renderers' classification
-// table has an opacity above zero.
+// Rounding is on the safe side: a box that is called empty holds no voxel whose bin has an opacity above zero in the renderer's DrawnTable.
 #pragma once
 
 #include <vector>
@@ -15,7 +15,7 @@ namespace slabstream {
 class BrickVisibility {
  public:
   // `summary` must outlive this.
-  BrickVisibility(const VolumeSummary& summary, const TransferFunction& transfer);
+  BrickVisibility(const VolumeSummary& summary, ClassificationTable drawn);
 
   // True if a brick that touches `box` (not empty, inside the volume) can be visible.
   bool AnyVisible(const Box& box) const;

@@ -41,14 +41,23 @@ double StageCost::Predict(const WorkUnits& work) const {
 }
 
 CostModel::CostModel()
-    : splat{MakeStage(Stage::kTransform, "c_t, c_o", {{kBox, 5.3e-5}, {kBrickTest, 4.3e-8}, {kOccupied, 3.2e-10}, {kSheetPixel, 1.2e-11}}),
+    : renderers{
+          {"splat",
+           {MakeStage(Stage::kTransform, "c_t, c_o", {{kBox, 5.3e-5}, {kBrickTest, 4.3e-8}, {kOccupied, 3.2e-10}, {kSheetPixel, 1.2e-11}}),
             MakeStage(Stage::kShade, "c_sh", {{kBox, 4.6e-6}, {kDrawn, 7.7e-10}}),
             MakeStage(Stage::kSplat, "c_sp", {{kBox, 0}, {kDrawn, 1.15e-9}, {kSheetPixel, 7.2e-12}}),
-            MakeStage(Stage::kComposite, "c_cp", {{kBox, 0}, {kDrawn, 7.1e-10}, {kSheetPixel, 8.6e-12}})},
-      zbuffer{MakeStage(Stage::kZBuffer, "c_t, c_o, c_z", {{kBox, 5e-7}, {kBrickTest, 0}, {kDrawn, 9.3e-9}, {kPixel, 1e-10}}),
-              MakeStage(Stage::kShade, "c_sh", {{kBox, 1.9e-6}, {kPixel, 6.4e-9}})} {}
+            MakeStage(Stage::kComposite, "c_cp", {{kBox, 0}, {kDrawn, 7.1e-10}, {kSheetPixel, 8.6e-12}})}},
+          {"zbuffer",
+           {MakeStage(Stage::kZBuffer, "c_t, c_o, c_z", {{kBox, 5e-7}, {kBrickTest, 0}, {kDrawn, 9.3e-9}, {kPixel, 1e-10}}),
+            MakeStage(Stage::kShade, "c_sh", {{kBox, 1.9e-6}, {kPixel, 6.4e-9}})}}} {}
 
-double CostModel::PredictRender(RendererKind renderer, const WorkUnits& work) const {
+const std::vector<StageCost>& CostModel::stages(std::string_view renderer) const {
+  static const std::vector<StageCost> none;
+  const auto found = renderers.find(renderer);
+  return found == renderers.end() ? none : found->second;
+}
+
+double CostModel::PredictRender(std::string_view renderer, const WorkUnits& work) const {
   double sum = 0;
   for (const StageCost& stage : stages(renderer)) sum += stage.Predict(work);
   return sum;

@@ -15,12 +15,15 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
-#include "common/image/local_image.h"
-#include "common/planning/frame_request.h"
+#include "common/frame/frame_request.h"
+#include "common/image/pixel_bounds.h"
 #include "common/stats/report.h"
 #include "common/view/camera.h"
 #include "common/volume/box.h"
@@ -52,12 +55,12 @@ struct StageCost {
 };
 
 struct CostModel {
-  std::vector<StageCost> splat, zbuffer;  // stages of a rendering
+  std::map<std::string, std::vector<StageCost>, std::less<>> renderers;  // by name: the stages of a rendering
 
   // As measured on one core of an AMD EPYC (Zen 5, AVX-512); docs/simulation.md says how.
   CostModel();
-  const std::vector<StageCost>& stages(RendererKind renderer) const { return renderer == RendererKind::kSplat ? splat : zbuffer; }
-  double PredictRender(RendererKind renderer, const WorkUnits& work) const;  // all stages
+  const std::vector<StageCost>& stages(std::string_view renderer) const;         // none: no constants were measured
+  double PredictRender(std::string_view renderer, const WorkUnits& work) const;  // all stages
 
   std::int64_t slab_bytes_target = std::int64_t{256} << 20;  // voxels of one slab at most, where slices allow it
 };

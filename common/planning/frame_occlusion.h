@@ -6,19 +6,16 @@
 // of boxes that are hidden as a whole.
 #pragma once
 
+#include "common/frame/frame_setup.h"
 #include "common/image/occlusion_mask.h"
-#include "common/planning/frame_plan.h"
 
 namespace slabstream {
 
-// Splatting with a termination threshold. Z-buffer images have nothing that is opaque before all groups are in.
-inline bool UsesOcclusion(const FrameSetup& setup) { return setup.renderer == RendererKind::kSplat && setup.termination > 0; }
+// Images that blend front to back, with a termination threshold. In other formats no pixel is final before all groups are in.
+inline bool UsesOcclusion(const FrameSetup& setup) { return setup.format == PixelFormat::kRgba && setup.termination > 0; }
 
 // InvalidArgument: a mask that is not empty in a frame that uses none, or with other numbers of tiles than the frame has.
 Status CheckFits(const OcclusionMask& mask, const FrameSetup& setup);
-
-// Pixels of the frame that samples of `box` can lie in, whatever its voxels. Splatting.
-PixelBounds ReachOf(const Box& box, const FrameSetup& setup);
 
 // Whether `mask`, which fits the frame, hides all that `box` could show, so that its voxels need not even be fetched. No mask hides
 // nothing.

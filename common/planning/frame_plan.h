@@ -11,44 +11,15 @@
 
 #include "common/base/status.h"
 #include "common/combining/schedule.h"
+#include "common/frame/frame_setup.h"
+#include "common/image/color_coding.h"
 #include "common/planning/cost_model.h"
-#include "common/planning/frame_request.h"
 #include "common/planning/layout.h"
-#include "common/view/sheet_grid.h"
 #include "common/volume/summary.h"
 
 namespace slabstream {
 
-using WorkerId = std::uint32_t;   // an identity within one coordinator's life; never given twice. 0: nobody
-using DatasetId = std::uint32_t;  // one loaded volume within one coordinator's life. 0: none
-
-// What every worker needs to render its part, fixed at the start of a frame: a re-plan after a lost worker changes who does what and
-// nothing here.
-struct FrameSetup {
-  DatasetId dataset = 0;
-  VolumeDescription description;
-  ValueRange range;  // data values: what the classification table is made for
-  RendererKind renderer = RendererKind::kSplat;
-  Camera camera;     // of the picture; Z-buffer: supersampled, and what is rendered
-  SheetGrid sheets;  // splatting: what is rendered
-  TransferFunction transfer;
-  Shading shading;
-  double termination = kDefaultTermination;
-  std::int32_t halo = kHalo;  // voxels that are kept round a box
-  friend bool operator==(const FrameSetup&, const FrameSetup&) = default;
-};
-
-// What is rendered for a picture of `size` under `view`, which are valid: fills in camera and sheets by what renderer and description say.
-void SetView(const ViewParameters& view, ImageSize size, FrameSetup& setup);
-
-// The frame: all pixels that workers render and combine, from which the picture is made at the end (FinishPicture). Local images, runs and
-// pixel ranges count in it.
-PixelBounds FrameBounds(const FrameSetup& setup);
-inline PixelRange WholeFrame(const FrameSetup& setup) { return {0, std::uint64_t(FrameBounds(setup).pixel_count())}; }
-// What an image of all of them takes in memory.
-std::int64_t FrameBytes(const FrameSetup& setup);
-
-inline PixelFormat FormatOf(RendererKind renderer) { return renderer == RendererKind::kSplat ? PixelFormat::kRgba : PixelFormat::kDepth; }
+using WorkerId = std::uint32_t;  // an identity within one coordinator's life; never given twice. 0: nobody
 
 // One rank of a group: which box, and who renders it. A worker may hold several ranks of a group (after another one was lost).
 struct Placement {
@@ -97,8 +68,8 @@ struct Roster {
   friend bool operator==(const Roster&, const Roster&) = default;
 };
 
-// What a frame's plan has whatever the policy. Errors: NotFound (no such preset), InvalidArgument (an image along the slices that is too
-// large). The request must be valid.
+// What a frame's plan has whatever the policy. Errors: NotFound (no such preset), InvalidArgument (a frame that is too large). The request
+// must be valid.
 Result<FrameSetup> MakeFrameSetup(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary);
 
 // The policy of the request, whose view settles what depends on it: AxisChoice::kView. The request must be valid.
@@ -124,8 +95,5 @@ FramePlan TakeTurn(const FramePlan& plan, const Roster& roster, const Turn& turn
 // Worker of each box: its slot's, or the one it is lent to; 0 of a box that belongs to nobody, and of all if the roster is empty of
 // workers.
 std::vector<WorkerId> OwnersOf(const Layout& layout, const Roster& roster);
-
-// Voxels that a worker must hold to render `box`: the box and its halo, cut to the volume.
-inline Box SlabBox(const Box& box, const FrameSetup& setup) { return Grown(box, setup.halo, setup.description.geometry.bounds()); }
 
 }  // namespace slabstream

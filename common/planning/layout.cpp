@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <optional>
 #include <string>
-#include <tuple>
 
 #include "common/base/check.h"
 #include "common/base/find_named.h"
@@ -16,7 +16,7 @@
 #include "common/planning/brick_visibility.h"
 #include "common/planning/learnt_cost.h"
 #include "common/planning/policy_names.h"
-#include "common/planning/render_work.h"
+#include "common/renderers/renderer_kind.h"
 #include "common/view/sheet_grid.h"
 
 namespace slabstream {
@@ -44,7 +44,7 @@ int MostGroups(const LayoutRequest& request, const Policy& policy) {
   const Index3& size = request.summary->description.geometry.size;
   const std::int64_t slots = request.slots;
   const std::int64_t boxes = FindNamed(Decompositions(), policy.decomposition)->one_axis
-                                 ? size[SlabAxis(policy, size)] / kHalo
+                                 ? size[SlabAxis(policy, size)] / request.renderer->reach()
                                  : Box{{0, 0, 0}, size}.voxel_count() / (kSmallestCube * kSmallestCube * kSmallestCube);
   return int(std::clamp<std::int64_t>(boxes / slots, 1, kMaxGroups));
 }
@@ -54,7 +54,7 @@ class WorkFields {
  public:
   explicit WorkFields(const LayoutRequest& request)
       : request_(request),
-        visibility_(*request.summary, *request.transfer),
+        visibility_(*request.summary, request.renderer->DrawnTable(*request.transfer, *request.summary)),
         voxels_(WorkField::Uniform(request.summary->description.geometry.size)) {}
 
   const WorkField& Of(WorkSplit split) {
@@ -72,7 +72,7 @@ class WorkFields {
 
   // Whether any sample that `box` owns may show something.
   bool Shows(const Box& box) {
-    const Box with_halo = Grown(box, kHalo, request_.summary->description.geometry.bounds());
+    const Box with_halo = Grown(box, request_.renderer->reach(), request_.summary->description.geometry.bounds());
     if (request_.known.occupied == nullptr) return visibility_.AnyVisible(with_halo);
     return !Of(WorkSplit::kOccupied).Hull(with_halo).empty();
   }
@@ -99,7 +99,7 @@ struct LayoutMaker::State {
                 .most_boxes = int(std::min(kMaxGroups * slots, kMostBoxes)),
                 .together = int(std::min(slots, kMostBoxes)),
                 .axis = SlabAxis(policy, size),
-                .halo = kHalo,
+                .halo = request.renderer->reach(),
                 .resized = resized,
                 .shape = shape});
   }
@@ -107,23 +107,23 @@ struct LayoutMaker::State {
   bool SlabsFit(const Partition& partition) {
     const std::int64_t sample_bytes = BytesPerSample(request.summary->description.type);
     return std::ranges::all_of(partition.boxes(), [&](const Box& box) {
-      const std::int64_t bytes = Grown(box, kHalo, partition.bounds()).voxel_count() * sample_bytes;
+      const std::int64_t bytes = Grown(box, request.renderer->reach(), partition.bounds()).voxel_count() * sample_bytes;
       return bytes <= request.slab_bytes_target || !fields.Shows(box);
     });
   }
 
-  const RenderWork& Work() {
-    if (!work) {
-      const Vec3& spacing = request.summary->description.geometry.spacing;
-      work.emplace(fields.Grid(), spacing, request.renderer, MedianExtinction(*request.transfer, *request.summary));
-    }
-    return *work;
+  // Seconds of a box in views along x and along y: views turn about z.
+  static constexpr std::size_t kViews = 2;
+  using ByView = std::array<double, kViews>;
+  ByView PredictedSeconds(const Box& box) {
+    if (!cost) cost = request.renderer->MakeCost({&fields.Grid(), request.summary, request.transfer});
+    return {cost->Seconds(box, {.along = Axis::kX}), cost->Seconds(box, {.along = Axis::kY})};
   }
 
   double CostOf(const Box& box, const Policy& policy) {
     if (!NeedsOccupancy(policy)) return double(box.voxel_count());
     if (request.known.cost != nullptr) return request.known.cost->Sum(box);
-    const auto [along_x, along_y] = Work().Of(box);
+    const auto [along_x, along_y] = PredictedSeconds(box);
     return (along_x + along_y) / 2;
   }
 
@@ -150,14 +150,13 @@ struct LayoutMaker::State {
     std::vector<BoxSeconds> shares;
   };
   Foretold Foretell(const Layout& layout) {
-    constexpr std::size_t kViews = std::tuple_size_v<RenderWork::ByView>;
     Foretold foretold;
-    std::vector<RenderWork::ByView> times, slots(request.slots);
-    RenderWork::ByView sum{};
+    std::vector<ByView> times, slots(request.slots);
+    ByView sum{};
     for (std::size_t box = 0; box < layout.owners.size(); ++box) {
       if (layout.owners[box] == kNoSlot) continue;
       foretold.shares.push_back({layout.partition.boxes()[box]});
-      times.push_back(Work().Of(layout.partition.boxes()[box]));
+      times.push_back(PredictedSeconds(layout.partition.boxes()[box]));
       for (std::size_t view = 0; view < kViews; ++view) {
         slots[layout.owners[box]][view] += times.back()[view];
         sum[view] += times.back()[view];
@@ -168,7 +167,7 @@ struct LayoutMaker::State {
       for (std::size_t i = 0; i < times.size(); ++i) {
         foretold.shares[i].seconds = std::max(foretold.shares[i].seconds, times[i][view] / sum[view]);
       }
-      foretold.frame += std::ranges::max(slots, {}, [view](const RenderWork::ByView& slot) { return slot[view]; })[view] / kViews;
+      foretold.frame += std::ranges::max(slots, {}, [view](const ByView& slot) { return slot[view]; })[view] / kViews;
     }
     return foretold;
   }
@@ -208,7 +207,7 @@ struct LayoutMaker::State {
 
   const LayoutRequest request;
   WorkFields fields;
-  std::optional<RenderWork> work;
+  std::unique_ptr<AnalyticCost> cost;
 };
 
 LayoutMaker::LayoutMaker(const LayoutRequest& request) : state_(std::make_unique<State>(request)) {}

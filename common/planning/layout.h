@@ -11,10 +11,12 @@
 #include "common/base/status.h"
 #include "common/decomposition/partition.h"
 #include "common/decomposition/work_field.h"
-#include "common/planning/frame_request.h"
+#include "common/frame/frame_request.h"
 #include "common/volume/summary.h"
 
 namespace slabstream {
+
+class RendererKind;
 
 inline constexpr std::uint32_t kNoSlot = std::numeric_limits<std::uint32_t>::max();  // of a box that shows nothing: nobody renders it
 
@@ -27,7 +29,7 @@ struct Layout {
 // What is known about the work in a volume under one transfer function. Null: not known.
 struct WorkKnowledge {
   const OccupancyGrid* occupied =
-      nullptr;  // of what the renderer draws (DrawnTable); else the bricks of the volume's summary tell what may be occupied
+      nullptr;  // of what the renderer draws (RendererKind::DrawnTable); else the bricks of the volume's summary tell what may be occupied
   const WorkField* cost = nullptr;  // seconds, learnt from frames; else what is occupied stands for it
 };
 
@@ -38,7 +40,7 @@ struct LayoutRequest {
   const VolumeSummary* summary = nullptr;
   const TransferFunction* transfer = nullptr;
   const Policy* policy = nullptr;  // with names that there are (CheckNames), none of them left open, and an axis that is settled
-  RendererKind renderer = RendererKind::kSplat;
+  const RendererKind* renderer = nullptr;
   std::uint32_t slots = 1;                                   // >= 1
   std::int64_t slab_bytes_target = std::int64_t{256} << 20;  // voxels of one slab at most, where slices allow it
   WorkKnowledge known;
@@ -46,8 +48,9 @@ struct LayoutRequest {
 };
 
 // Pure. Boxes with the halo of which nothing is visible belong to nobody; the others are numbered on for their assignment. Where boxes are
-// split by what is occupied, they are cut again and again by what RenderWork foretells of them, as they would be by their measured costs
-// (LearntCost); the best of these layouts is taken: that with the quickest frame, on average over views along x and along y.
+// split by what is occupied, they are cut again and again by the cost that the renderer predicts for them (AnalyticCost), as they would be
+// by their measured costs (LearntCost); the best of these layouts is taken: that with the quickest frame, on average over views along x and
+// along y.
 Layout MakeLayout(const LayoutRequest& request);
 
 // Layouts by several policies: what they are all made from is worked out once.

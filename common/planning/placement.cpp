@@ -39,7 +39,7 @@ WorkerId ChooseDisplay(const FramePlan& plan, const std::vector<WorkerId>& prese
 
 // The fewest bits by which combining moves no channel by more than the plan allows. Of two codings of as many bits the finer one.
 ColorCoding ChooseColor(const FramePlan& plan, const GroupPlan& group) {
-  if (plan.pixel_error <= 0 || plan.setup.renderer != RendererKind::kSplat || group.placements.empty()) return ColorCoding::kFloat32;
+  if (plan.pixel_error <= 0 || plan.setup.format != PixelFormat::kRgba || group.placements.empty()) return ColorCoding::kFloat32;
   Travel travel = TravelOf(group.schedule, WholeFrame(plan.setup));
   if (group.placements[group.schedule.root].worker != plan.display) travel = {travel.hops + 1, travel.transfers + 1};
   ColorCoding best = ColorCoding::kFloat32;

@@ -1,25 +1,12 @@
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <string>
 #include <utility>
 
 #include "common/planning/frame_plan.h"
 #include "common/planning/placement.h"
+#include "common/renderers/registry.h"
 
 namespace slabstream {
-namespace {
-
-Status CheckGrid(const SheetGrid& sheets) {
-  if (std::max(sheets.width, sheets.height) <= kMaxGridSide) return Status::Ok();
-  return Status::InvalidArgument(
-      fmt::format("an image along the slices of this view has {} x {} pixels, but at most {} a side are possible: "
-                  "the slices lie too far apart for the width of their voxels",
-                  sheets.width, sheets.height, kMaxGridSide));
-}
-
-}  // namespace
-
 Result<FrameSetup> MakeFrameSetup(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary) {
   Result<TransferFunction> transfer = ResolveTransfer(request.transfer, summary);
   if (!transfer.ok()) return transfer.status();
@@ -27,11 +14,9 @@ Result<FrameSetup> MakeFrameSetup(const FrameRequest& request, DatasetId dataset
   setup.dataset = dataset;
   setup.description = summary.description;
   setup.range = summary.range;
-  setup.renderer = request.renderer;
-  SetView(request.view, request.size, setup);
-  if (request.renderer == RendererKind::kSplat) {
-    if (Status status = CheckGrid(setup.sheets); !status.ok()) return status;
-  }
+  SetRenderer(*FindRenderer(request.renderer), setup);
+  setup.parameters = ParseParameters(*setup.renderer, request.parameters).value();
+  if (Status status = setup.renderer->SetView(request.view, request.size, setup); !status.ok()) return status;
   setup.transfer = *std::move(transfer);
   setup.shading = request.shading;
   setup.termination = request.termination;
@@ -44,26 +29,6 @@ Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const Vol
                                           : Result<TransferFunction>(std::get<TransferFunction>(choice.choice));
   if (transfer.ok()) transfer->opacity_distance = choice.opacity_distance;
   return transfer;
-}
-
-void SetView(const ViewParameters& view, ImageSize size, FrameSetup& setup) {
-  const VolumeGeometry& geometry = setup.description.geometry;
-  if (setup.renderer == RendererKind::kSplat) {
-    setup.camera = MakeCamera(view, size, geometry);
-    setup.sheets = MakeSheetGrid(setup.camera, geometry);
-  } else {
-    setup.camera = MakeSupersampledCamera(view, size, geometry);
-  }
-}
-
-PixelBounds FrameBounds(const FrameSetup& setup) {
-  return setup.renderer == RendererKind::kSplat ? PixelBounds{0, 0, setup.sheets.width, setup.sheets.height}
-                                                : PixelBounds{0, 0, setup.camera.width, setup.camera.height};
-}
-
-std::int64_t FrameBytes(const FrameSetup& setup) {
-  const bool depth = FormatOf(setup.renderer) == PixelFormat::kDepth;
-  return FrameBounds(setup).pixel_count() * std::int64_t(depth ? 6 * sizeof(float) : 4 * sizeof(float));
 }
 
 std::vector<Placement> PlacementsOf(const FramePlan& plan) {
@@ -100,7 +65,7 @@ Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, cons
                                   : MakeLayout({.summary = &summary,
                                                 .transfer = &plan.setup.transfer,
                                                 .policy = &policy,
-                                                .renderer = request.renderer,
+                                                .renderer = plan.setup.renderer,
                                                 .slots = slots,
                                                 .slab_bytes_target = cost.slab_bytes_target});
 

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "common/planning/frame_request.h"
+#include "common/frame/frame_request.h"
 
 namespace slabstream {
 

@@ -378,7 +378,7 @@ UnionCoverage::Amount FrameSimulation::AmountOf(const Group& group, const Parts&
 
 double FrameSimulation::MessageBytes(const SimulatedMessage& message, const UnionCoverage::Amount& amount) const {
   const CombiningCosts& costs = machine_.combining;
-  const bool rgba = FormatOf(plan(message.frame).setup.renderer) == PixelFormat::kRgba;
+  const bool rgba = !HasDepth(plan(message.frame).setup.format);
   const ColorCoding color = plan(message.frame).groups[message.group].color;
   const double color_share = double(BytesPerChannel(color)) / double(BytesPerChannel(ColorCoding::kFloat32));
   return amount.filled * (rgba ? costs.rgba_bytes * color_share : costs.depth_bytes) + amount.runs * costs.run_bytes;

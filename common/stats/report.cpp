@@ -17,6 +17,7 @@ std::string_view ToString(Stage stage) {
     case Stage::kEncode: return "encode";
     case Stage::kResolve: return "resolve";
     case Stage::kRender: return "render";
+    case Stage::kSample: return "sample";
   }
   CHECK(false) << "no such stage: " << int(stage);
   return "";

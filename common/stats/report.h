@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "common/image/local_image.h"
+#include "common/image/pixel_bounds.h"
 
 namespace slabstream {
 
@@ -22,9 +22,10 @@ enum class Stage : std::uint8_t {
   kCombine = 7,  // local images of ranks into the group image
   kEncode = 8,   // images into runs and payload bytes
   kResolve = 9,  // supersampled frame to final pixels
-  kRender = 10,  // one rank from start to end: contains kPrepare ... kZBuffer
+  kRender = 10,  // one rank from start to end: contains kPrepare ... kZBuffer and kSample
+  kSample = 11,  // samples along rays: interpolated, classified, shaded, composited
 };
-inline constexpr int kStageCount = 11;
+inline constexpr int kStageCount = 12;
 std::string_view ToString(Stage stage);  // "transform": names of --stats and --trace
 
 using StageTimes = std::array<std::int64_t, kStageCount>;  // ns, worker time by stage

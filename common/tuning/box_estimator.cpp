@@ -4,13 +4,11 @@
 #include <cmath>
 
 #include "common/base/check.h"
-#include "common/planning/frame_occlusion.h"
+#include "common/renderers/renderer_kind.h"
 
 namespace slabstream {
 namespace {
 
-// Pixels that a voxel's footprint fills, for each that its own cross-section covers.
-constexpr double kSplatFootprint = 4, kZBufferFootprint = 1;
 // Occupied voxels of a cell that can have an empty neighbour towards the eye: a surface through it.
 constexpr double kSurface = 1.5 * kOccupancyCell * kOccupancyCell;
 
@@ -20,9 +18,9 @@ double Length(const Camera::ImagePoint& a, const Camera::ImagePoint& b) { return
 double VoxelPixels(const FrameSetup& setup) {
   const Index3& size = setup.description.geometry.size;
   const Vec3 middle = {(size.x - 1) / 2.0, (size.y - 1) / 2.0, (size.z - 1) / 2.0};
-  if (setup.renderer == RendererKind::kSplat) {
+  if (!setup.sheets.empty()) {
     const SlicePlacement slice = PlaceSlice(setup.sheets, middle[AxesOf(setup.camera.traversal_axis).c]);
-    return kSplatFootprint * slice.scale_u * slice.scale_v;
+    return setup.renderer->footprint() * slice.scale_u * slice.scale_v;
   }
   // The mean of the areas of its three faces, as the eye sees them.
   const Camera::ImagePoint origin = setup.camera.Project(middle);
@@ -32,7 +30,7 @@ double VoxelPixels(const FrameSetup& setup) {
     next[axis] += 1;
     edges[Number(axis)] = Length(setup.camera.Project(next), origin);
   }
-  return kZBufferFootprint * (edges[0] * edges[1] + edges[1] * edges[2] + edges[2] * edges[0]) / 2;
+  return setup.renderer->footprint() * (edges[0] * edges[1] + edges[1] * edges[2] + edges[2] * edges[0]) / 2;
 }
 
 }  // namespace
@@ -86,7 +84,7 @@ BoxEstimator::Rectangle BoxEstimator::Project(const Box& box) const {
     r.y_begin = std::min(r.y_begin, y);
     r.y_end = std::max(r.y_end, y);
   };
-  if (setup_.renderer == RendererKind::kSplat) {
+  if (!setup_.sheets.empty()) {
     const auto [c, u, v] = AxesOf(setup_.camera.traversal_axis);
     for (const std::int32_t k : {box.begin[c], box.end[c] - 1}) {
       const SlicePlacement slice = PlaceSlice(setup_.sheets, k);
@@ -169,8 +167,8 @@ BoxEstimator::Estimate BoxEstimator::Of(const Box& box) const {
                std::int32_t(std::ceil(bounds.y_end))};
     }
     const double pixels = coverage.pixels() * pixel_side_ * pixel_side_;
-    const double drawn = setup_.renderer == RendererKind::kSplat ? inside : surface;
-    estimate.seconds = cost_.PredictRender(setup_.renderer, CountWork(box, setup_.camera, occupied, drawn, image, pixels));
+    const double drawn = HasDepth(setup_.format) ? surface : inside;
+    estimate.seconds = cost_.PredictRender(setup_.renderer->name(), CountWork(box, setup_.camera, occupied, drawn, image, pixels));
   }
   return estimate;
 }

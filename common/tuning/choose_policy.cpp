@@ -14,6 +14,7 @@
 #include "common/planning/assignment.h"
 #include "common/planning/brick_visibility.h"
 #include "common/planning/policy_names.h"
+#include "common/renderers/renderer_kind.h"
 #include "common/tuning/frame_predictor.h"
 
 namespace slabstream {
@@ -37,11 +38,11 @@ std::vector<std::string> SchemesToTry() {
 
 class Search {
  public:
-  Search(const PolicyQuestion& question, const TransferFunction& transfer, const FramePredictor& predictor)
+  Search(const PolicyQuestion& question, const FrameSetup& setup, const FramePredictor& predictor)
       : question_(question),
         layouts_({.summary = question.summary,
-                  .transfer = &transfer,
-                  .renderer = question.frame->renderer,
+                  .transfer = &setup.transfer,
+                  .renderer = setup.renderer,
                   .slots = question.slots,
                   .slab_bytes_target = question.cost->slab_bytes_target,
                   .known = question.known}),
@@ -162,10 +163,11 @@ Result<PolicyChoice> ChoosePolicy(const PolicyQuestion& question) {
   const Result<FrameSetup> setup = MakeFrameSetup(*question.frame, kAnyDataset, *question.summary);
   if (!setup.ok()) return setup.status();
   std::optional<OccupancyGrid> visible;
-  if (question.known.occupied == nullptr) visible = BrickVisibility(*question.summary, setup->transfer).VisibleCells();
+  if (question.known.occupied == nullptr)
+    visible = BrickVisibility(*question.summary, setup->renderer->DrawnTable(setup->transfer, *question.summary)).VisibleCells();
   const FramePredictor predictor(*setup, visible ? *visible : *question.known.occupied, question.known.cost, *question.cost,
                                  *question.machine, question.slots, question.render_scale);
-  return Search(question, setup->transfer, predictor).Run();
+  return Search(question, *setup, predictor).Run();
 }
 
 }  // namespace slabstream

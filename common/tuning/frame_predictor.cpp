@@ -23,7 +23,7 @@ double PicturePixels(const FrameSetup& setup) {
 
 double FinishSeconds(const FrameSetup& setup) {
   double seconds = kEncodePixel * PicturePixels(setup);
-  if (setup.renderer == RendererKind::kSplat) seconds += kResamplePixel * PicturePixels(setup);
+  if (!setup.sheets.empty()) seconds += kResamplePixel * PicturePixels(setup);
   if (setup.camera.supersample > 1) seconds += kResolvePixel * double(FrameBounds(setup).pixel_count());
   return seconds;
 }
@@ -43,9 +43,10 @@ std::int32_t ChoosePixelSide(const FrameSetup& setup, std::uint32_t slots) {
 
 // Only the size of the frame and the eye matter to what is made of it.
 FrameSetup Coarse(FrameSetup setup, std::int32_t side) {
-  setup.sheets.width = CoarsePixels(setup.sheets.width, side);
-  setup.sheets.height = CoarsePixels(setup.sheets.height, side);
-  if (setup.renderer == RendererKind::kZBuffer) {
+  if (!setup.sheets.empty()) {
+    setup.sheets.width = CoarsePixels(setup.sheets.width, side);
+    setup.sheets.height = CoarsePixels(setup.sheets.height, side);
+  } else {
     setup.camera.width = CoarsePixels(setup.camera.width, side);
     setup.camera.height = CoarsePixels(setup.camera.height, side);
   }

@@ -40,6 +40,7 @@ struct SheetGrid {
   // meets no slice.
   std::array<double, 9> from_picture{};
 
+  bool empty() const { return width == 0; }  // no grid
   friend bool operator==(const SheetGrid&, const SheetGrid&) = default;
 };
 

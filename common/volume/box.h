@@ -33,6 +33,14 @@ constexpr Box Intersection(const Box& a, const Box& b) {
           {std::min(a.end.x, b.end.x), std::min(a.end.y, b.end.y), std::min(a.end.z, b.end.z)}};
 }
 
+// The smallest box that holds both. An empty box adds nothing.
+constexpr Box Hull(const Box& a, const Box& b) {
+  if (a.empty()) return b;
+  if (b.empty()) return a;
+  return {{std::min(a.begin.x, b.begin.x), std::min(a.begin.y, b.begin.y), std::min(a.begin.z, b.begin.z)},
+          {std::max(a.end.x, b.end.x), std::max(a.end.y, b.end.y), std::max(a.end.z, b.end.z)}};
+}
+
 // `box` grown by `voxels` on every side and cut to `limit`: the box and its halo.
 constexpr Box Grown(const Box& box, std::int32_t voxels, const Box& limit) {
   return Intersection(

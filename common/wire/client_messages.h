@@ -17,7 +17,7 @@
 #include <string>
 #include <vector>
 
-#include "common/planning/frame_request.h"
+#include "common/frame/frame_request.h"
 #include "common/stats/prediction.h"
 #include "common/wire/control_messages.h"
 #include "common/wire/ids.h"

@@ -20,7 +20,7 @@
 
 #include "common/base/status.h"
 #include "common/image/occlusion_mask.h"
-#include "common/image/run_image.h"
+#include "common/image/run_header.h"
 #include "common/planning/frame_plan.h"
 #include "common/stats/report.h"
 #include "common/wire/ids.h"

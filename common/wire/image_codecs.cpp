@@ -96,7 +96,7 @@ PartialImage FromProto(const v1::PartialImage& in, Checker& check) {
   if (in.has_shared()) {
     out.shared = Read("shared", in.shared(), check);
     check.That(out.image.bounds.empty() && out.image.pixel_count == 0, "image", "runs beside a shared image");
-    const std::size_t planes = out.image.format == PixelFormat::kDepth ? 3 : 1;
+    const std::size_t planes = HasDepth(out.image.format) ? 3 : 1;
     check.That(out.shared->planes.size() == planes, "shared.planes",
                std::to_string(out.shared->planes.size()) + " of " + std::to_string(planes));
     check.That(!in.has_packed(), "packed", "beside a shared image");

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <vector>
 
+#include "common/renderers/registry.h"
 #include "common/wire/codecs.h"
 #include "common/wire/limits.h"
 
@@ -44,6 +46,21 @@ int ReadSide(std::string_view field, std::uint32_t value, std::uint32_t supersam
   if (side % supersample != 0)
     check.Fail(field, std::to_string(side) + " is not a multiple of supersample, " + std::to_string(supersample));
   return static_cast<int>(side);
+}
+
+void ReadRenderer(const v1::FrameSetup& in, FrameSetup& out, Checker& check) {
+  const Result<const RendererKind*> renderer = RequireRenderer(in.renderer());
+  if (!renderer.ok()) return check.Adopt(renderer.status());
+  SetRenderer(**renderer, out);
+  const std::vector<RendererParameter>& parameters = out.renderer->parameters();
+  if (std::size_t(in.parameters_size()) != parameters.size()) {
+    return check.Fail("parameters", std::to_string(in.parameters_size()) + " values, expected " + std::to_string(parameters.size()));
+  }
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const auto scope = check.In("parameters", i);
+    const double most = parameters[i].choices.empty() ? parameters[i].most : double(parameters[i].choices.size() - 1);
+    out.parameters[i] = check.Between("", in.parameters(int(i)), parameters[i].least, most);
+  }
 }
 
 }  // namespace
@@ -133,13 +150,14 @@ v1::FrameSetup ToProto(const FrameSetup& in) {
   out.set_dataset(in.dataset);
   *out.mutable_description() = ToProto(in.description);
   *out.mutable_range() = ToProto(in.range);
-  out.set_renderer(WireEnum<v1::RendererKind>(in.renderer, RendererKind::kSplat));
+  out.set_renderer(std::string(in.renderer->name()));
+  out.mutable_parameters()->Add(in.parameters.begin(), in.parameters.end());
   *out.mutable_camera() = ToProto(in.camera);
   *out.mutable_transfer() = ToProto(in.transfer);
   *out.mutable_shading() = ToProto(in.shading);
   out.set_termination(in.termination);
   out.set_halo(static_cast<std::uint32_t>(in.halo));
-  if (in.renderer == RendererKind::kSplat) *out.mutable_sheets() = ToProto(in.sheets);
+  if (!in.sheets.empty()) *out.mutable_sheets() = ToProto(in.sheets);
   return out;
 }
 
@@ -148,13 +166,16 @@ FrameSetup FromProto(const v1::FrameSetup& in, Checker& check) {
   out.dataset = check.Range("dataset", in.dataset(), 1, std::numeric_limits<DatasetId>::max());
   out.description = Read("description", in.description(), check);
   out.range = Read("range", in.range(), check);
-  out.renderer = check.OneOf("renderer", in.renderer(), RendererKind::kSplat, RendererKind::kZBuffer);
+  ReadRenderer(in, out, check);
   out.camera = Read("camera", in.camera(), check);
   out.transfer = Read("transfer", in.transfer(), check);
   out.shading = Read("shading", in.shading(), check);
   out.termination = check.Between("termination", in.termination(), 0, kMaxTermination);
   out.halo = static_cast<std::int32_t>(check.Range("halo", in.halo(), 0, kMaxVolumeSide));
-  if (out.renderer == RendererKind::kSplat) {
+  if (check.ok() && in.has_sheets() != out.renderer->along_slices()) {
+    check.Fail("sheets", in.has_sheets() ? "not expected by this renderer" : "missing");
+  }
+  if (in.has_sheets()) {
     out.sheets = Read("sheets", in.sheets(), check);
     for (const double k : {-0.5, out.description.geometry.size[out.camera.traversal_axis] - 0.5}) {
       check.That(out.sheets.w_c * k + out.sheets.w_0 > 0, "sheets", "a slice lies behind the eye");

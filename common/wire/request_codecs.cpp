@@ -1,10 +1,10 @@
+#include "common/planning/validate_request.h"
 #include "common/wire/codecs.h"
 #include "common/wire/wire_text.h"
 
 namespace slabstream {
 
 static_assert(v1::Projection_MAX == static_cast<int>(Projection::kPerspective));
-static_assert(v1::RendererKind_MAX == static_cast<int>(RendererKind::kZBuffer));
 static_assert(v1::AxisChoice_MAX == static_cast<int>(AxisChoice::kView) + 1);
 
 // Most ranges of these values are checked by Validate, once for the whole FrameRequest. What is checked here is what a struct could not
@@ -165,7 +165,8 @@ Policy FromProto(const v1::Policy& in, Checker& check) {
 v1::FrameRequest ToProto(const FrameRequest& in) {
   v1::FrameRequest out;
   out.set_dataset(WireText(in.dataset, kMaxNameBytes));
-  out.set_renderer(WireEnum<v1::RendererKind>(in.renderer, RendererKind::kSplat));
+  out.set_renderer(WireText(in.renderer, kMaxNameBytes));
+  for (const auto& [name, text] : in.parameters) (*out.mutable_parameters())[WireText(name, kMaxNameBytes)] = WireText(text, kMaxNameBytes);
   *out.mutable_size() = ToProto(in.size);
   *out.mutable_view() = ToProto(in.view);
   *out.mutable_transfer() = ToProto(in.transfer);
@@ -179,7 +180,13 @@ v1::FrameRequest ToProto(const FrameRequest& in) {
 FrameRequest FromProto(const v1::FrameRequest& in, Checker& check) {
   FrameRequest out;
   out.dataset = check.Text("dataset", in.dataset(), 1, kMaxNameBytes);
-  out.renderer = check.OneOf("renderer", in.renderer(), RendererKind::kSplat, RendererKind::kZBuffer);
+  if (!in.renderer().empty()) out.renderer = check.Text("renderer", in.renderer(), 1, kMaxNameBytes);
+  if (check.Count("parameters", int(in.parameters_size()), kMaxParameters) > 0) {
+    for (const auto& [name, text] : in.parameters()) {
+      const auto scope = check.In("parameters");
+      out.parameters[check.Text("name", name, 1, kMaxNameBytes)] = check.Text("value", text, 1, kMaxNameBytes);
+    }
+  }
   out.size = Read("size", in.size(), check);
   out.view = Read("view", in.view(), check);
   out.transfer = Read("transfer", in.transfer(), check);

@@ -11,7 +11,7 @@ namespace slabstream {
 static_assert(v1::Axis_MAX == Number(Axis::kZ) + 1);
 static_assert(v1::ScalarType_MAX == static_cast<int>(ScalarType::kFloat32));
 static_assert(v1::StatusCode_MAX == kStatusCodeCount - 1);
-static_assert(v1::PixelFormat_MAX == static_cast<int>(PixelFormat::kRgbaDepth));
+static_assert(v1::PixelFormat_MAX == static_cast<int>(PixelFormat::kSum));
 static_assert(v1::Codec_MAX == static_cast<int>(Codec::kZstd));
 static_assert(v1::Stage_MAX == kStageCount);
 
@@ -181,9 +181,9 @@ v1::RunImageHeader ToProto(const RunImageHeader& in) {
 
 RunImageHeader FromProto(const v1::RunImageHeader& in, Checker& check) {
   RunImageHeader out;
-  out.format = check.OneOf("format", in.format(), PixelFormat::kRgba, PixelFormat::kRgbaDepth);
+  out.format = check.OneOf("format", in.format(), PixelFormat::kRgba, PixelFormat::kSum);
   out.color = check.OneOf("color", in.color(), ColorCoding::kFloat32, ColorCoding::kFixed16);
-  check.That(out.format == PixelFormat::kRgba || out.color == ColorCoding::kFloat32, "color", "not floats, beside depths");
+  check.That(out.format == PixelFormat::kRgba || out.color == ColorCoding::kFloat32, "color", "not floats, in a format that is not rgba");
   out.bounds = Read("bounds", in.bounds(), check);
   // At most kMaxFramePixels pixels and 2^32 runs: the payload's length cannot overflow.
   out.pixel_count = check.Range("pixel_count", in.pixel_count(), 0, static_cast<std::uint64_t>(out.bounds.pixel_count()));
@@ -257,7 +257,7 @@ v1::Span ToProto(const Span& in) {
 }
 
 Span FromProto(const v1::Span& in, Checker& check) {
-  return {.stage = check.OneOf("stage", in.stage(), Stage::kFetch, Stage::kRender), .begin_ns = in.begin_ns(), .end_ns = in.end_ns()};
+  return {.stage = check.OneOf("stage", in.stage(), Stage::kFetch, Stage::kSample), .begin_ns = in.begin_ns(), .end_ns = in.end_ns()};
 }
 
 v1::RankReport ToProto(const RankReport& in) {

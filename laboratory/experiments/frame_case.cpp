@@ -9,16 +9,18 @@
 
 #include "client/cli/frame_summary.h"
 #include "client/cli/session.h"
-#include "laboratory/measure/box_costs.h"
-#include "laboratory/measure/frame_costs.h"
-#include "laboratory/measure/validate.h"
 #include "common/base/check.h"
 #include "common/planning/frame_window.h"
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
 #include "common/planning/team.h"
+#include "common/planning/validate_request.h"
+#include "common/renderers/registry.h"
 #include "common/tuning/choose_policy.h"
 #include "common/tuning/service_machine.h"
+#include "laboratory/measure/box_costs.h"
+#include "laboratory/measure/frame_costs.h"
+#include "laboratory/measure/validate.h"
 
 namespace slabstream {
 namespace {
@@ -76,6 +78,9 @@ Result<Json> MeasurePlannedBoxes(ExperimentContext& context, const FrameCase& fr
 }
 
 }  // namespace
+
+const RendererKind* Splatting() { return FindRenderer("splat"); }
+const RendererKind* ZBuffer() { return FindRenderer("zbuffer"); }
 
 FrameRequest RequestOf(const FrameCase& frame) {
   FrameRequest request = BenchRequest(frame.volume, frame.view, frame.size);
@@ -175,7 +180,7 @@ Json PictureKey(std::string_view what, const FrameCase& frame) {
   return {{"what", what},
           {"volume", frame.volume.dataset},
           {"look", frame.volume.name},
-          {"renderer", NameOf(frame.volume.renderer)},
+          {"renderer", frame.volume.renderer->title()},
           {"size", {frame.size.width, frame.size.height}},
           {"view",
            {view.projection == Projection::kPerspective ? "perspective" : "orthographic", view.azimuth_degrees, view.elevation_degrees,
@@ -235,8 +240,6 @@ Result<FrameCase> WithChosenPolicy(ExperimentContext& context, FrameCase frame, 
   frame.policy = choice->policy;
   return frame;
 }
-
-std::string_view NameOf(RendererKind renderer) { return renderer == RendererKind::kSplat ? "splatting" : "Z-buffer"; }
 
 Json BoxCostKey(const FrameCase& frame) {
   Json key = PictureKey("box costs", frame);

@@ -1,6 +1,6 @@
-// FrameCase: one way to render one frame. What its boxes cost is measured by rendering each of them alone (laboratory/measure/box_costs.h); what a
-// frame of it takes is measured by the service where this machine has the cores, and simulated from the boxes' costs for any number of
-// workers (common/simulation).
+// FrameCase: one way to render one frame. What its boxes cost is measured by rendering each of them alone (laboratory/measure/box_costs.h);
+// what a frame of it takes is measured by the service where this machine has the cores, and simulated from the boxes' costs for any number
+// of workers (common/simulation).
 #pragma once
 
 #include <array>
@@ -8,13 +8,13 @@
 #include <vector>
 
 #include "client/cli/bench_cases.h"
-#include "laboratory/experiments/experiment.h"
 #include "common/image/coverage_map.h"
 #include "common/planning/cost_model.h"
 #include "common/planning/frame_plan.h"
 #include "common/planning/layout.h"
 #include "common/simulation/simulate_frames.h"
 #include "common/stats/report.h"
+#include "laboratory/experiments/experiment.h"
 
 namespace slabstream {
 
@@ -26,8 +26,11 @@ struct FrameCase {
   int workers = 1;
 };
 
+// The renderers of the paper.
+const RendererKind* Splatting();
+const RendererKind* ZBuffer();
+
 FrameRequest RequestOf(const FrameCase& frame);
-std::string_view NameOf(RendererKind renderer);  // "splatting", "Z-buffer"
 
 // Box costs depend on the partition and the view, not on who owns a box or how images are combined: cases that differ in these alone share
 // one trial (and key).
@@ -44,8 +47,8 @@ Json FinishKey(const FrameCase& frame);
 Trial ServiceTrial(ExperimentContext& context, const FrameCase& frame, int frames);
 Json ServiceKey(const FrameCase& frame);
 
-// The same frame by the service and as the simulation says, in turns (laboratory/measure/validate.h), for frame.workers of 1 or 2: "measured_ms"
-// and "simulated_ms".
+// The same frame by the service and as the simulation says, in turns (laboratory/measure/validate.h), for frame.workers of 1 or 2:
+// "measured_ms" and "simulated_ms".
 Trial ValidationTrial(ExperimentContext& context, const FrameCase& frame, int turns);
 Json ValidationKey(const FrameCase& frame);
 
@@ -62,7 +65,7 @@ struct LayoutKnowledge {
   std::shared_ptr<const OccupancyGrid> occupied;
   TransferFunction transfer;
   Policy policy;  // settled
-  RendererKind renderer = RendererKind::kSplat;
+  const RendererKind* renderer = nullptr;
 };
 Result<LayoutKnowledge> KnowLayout(ExperimentContext& context, const FrameCase& frame);
 LayoutRequest LayoutRequestOf(const LayoutKnowledge& knowledge, int workers);

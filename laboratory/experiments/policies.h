@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "common/planning/frame_request.h"
+#include "common/frame/frame_request.h"
 #include "common/simulation/timeline.h"
 
 namespace slabstream {

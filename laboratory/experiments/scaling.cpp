@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/renderers/registry.h"
 #include "laboratory/experiments/balanced_case.h"
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/figures.h"
@@ -38,12 +39,12 @@ struct Series {
   }
 };
 
-std::vector<Series> StrongSeries(const ExperimentContext& context, RendererKind renderer) {
+std::vector<Series> StrongSeries(const ExperimentContext& context, const RendererKind* renderer) {
   const std::vector<int> workers = context.quick() ? std::vector{1, 4, 16, 64} : std::vector{1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024};
   const int size = context.Scaled(context.quick() ? 128 : 300), pixels = context.Scaled(512);
   std::vector<Series> all;
   const BenchCase sphere =
-      SphereCase({SphereClass::kHollow, size, 0.05}, renderer == RendererKind::kSplat ? kTranslucentSphere : kOpaqueSphere, renderer);
+      SphereCase({SphereClass::kHollow, size, 0.05}, HasDepth(renderer->format()) ? kOpaqueSphere : kTranslucentSphere, renderer);
   for (const NamedPolicy& named : {EqualSlabs(), BalancedTree()}) {
     for (const std::string& scheme : UsualSchemes()) {
       Series series{fmt::format("{}, {}", named.name, scheme), {}};
@@ -70,13 +71,13 @@ std::vector<Series> WeakSeries(const ExperimentContext& context) {
   const std::vector<int> workers = context.quick() ? std::vector{1, 8} : std::vector{1, 2, 4, 8, 16, 32, 64};
   const int one = context.Scaled(context.quick() ? 48 : 96), pixels = context.Scaled(512);
   std::vector<Series> all;
-  for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
+  for (const RendererKind* renderer : {Splatting(), ZBuffer()}) {
     for (const NamedPolicy& named : {EqualSlabs(), BalancedTree()}) {
-      Series series{fmt::format("{}, {}", NameOf(renderer), named.name), {}};
+      Series series{fmt::format("{}, {}", renderer->title(), named.name), {}};
       for (const int p : workers) {
         const int size = int(std::lround(one * std::cbrt(double(p))));
         const BenchCase sphere =
-            SphereCase({SphereClass::kFilled, size, 0.4}, renderer == RendererKind::kSplat ? kTranslucentSphere : kOpaqueSphere, renderer);
+            SphereCase({SphereClass::kFilled, size, 0.4}, HasDepth(renderer->format()) ? kOpaqueSphere : kTranslucentSphere, renderer);
         series.frames.push_back(FrameOf(sphere, pixels, named.policy, p));
       }
       if (std::ranges::find(all, series.name, &Series::name) == all.end()) all.push_back(std::move(series));
@@ -112,8 +113,8 @@ struct Kind {
 };
 
 std::vector<Kind> KindsOf(const ExperimentContext& context) {
-  return {{"strong-splatting", "Strong scaling: splatting", false, StrongSeries(context, RendererKind::kSplat)},
-          {"strong-zbuffer", "Strong scaling: Z-buffer", false, StrongSeries(context, RendererKind::kZBuffer)},
+  return {{"strong-splatting", "Strong scaling: splatting", false, StrongSeries(context, Splatting())},
+          {"strong-zbuffer", "Strong scaling: Z-buffer", false, StrongSeries(context, ZBuffer())},
           {"weak", "Weak scaling", true, WeakSeries(context)}};
 }
 

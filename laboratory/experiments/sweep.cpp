@@ -3,15 +3,16 @@
 #include <algorithm>
 
 #include "client/cli/files.h"
+#include "common/planning/policy_names.h"
+#include "common/renderers/registry.h"
 #include "laboratory/experiments/balanced_case.h"
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/figures.h"
 #include "laboratory/experiments/machines.h"
 #include "laboratory/experiments/plots.h"
+#include "laboratory/experiments/sweep_file.h"
 #include "laboratory/report/charts.h"
 #include "laboratory/report/text.h"
-#include "laboratory/experiments/sweep_file.h"
-#include "common/planning/policy_names.h"
 
 namespace slabstream {
 namespace {
@@ -24,7 +25,7 @@ Result<Sweep> ReadSweep(const ExperimentOptions& options) {
   return ParseSweep(options.sweep_file, *text);
 }
 
-Result<FrameCase> FrameOf(ExperimentContext& context, const Sweep& sweep, const BenchCase& volume, RendererKind renderer,
+Result<FrameCase> FrameOf(ExperimentContext& context, const Sweep& sweep, const BenchCase& volume, const RendererKind* renderer,
                           const SweepView& view, const SweepPolicy& policy, int workers, const SweepLink& link) {
   FrameCase frame{volume, sweep.size, view.view, policy.policy, workers};
   frame.volume.renderer = renderer;
@@ -63,7 +64,7 @@ Result<FrameFigures> FiguresOf(ExperimentContext& context, const FrameCase& fram
 template <class Use>
 Status ForEachPicture(const Sweep& sweep, Use&& use) {
   for (const BenchCase& volume : sweep.volumes) {
-    for (const RendererKind renderer : sweep.renderers) {
+    for (const RendererKind* renderer : sweep.renderers) {
       for (const SweepView& view : sweep.views) {
         if (Status status = use(volume, renderer, view); !status.ok()) return status;
       }
@@ -74,7 +75,7 @@ Status ForEachPicture(const Sweep& sweep, Use&& use) {
 
 Result<std::vector<Trial>> TrialsOf(ExperimentContext& context, const Sweep& sweep) {
   std::vector<Trial> trials = {HostTrial()};
-  const Status done = ForEachPicture(sweep, [&](const BenchCase& volume, RendererKind renderer, const SweepView& view) -> Status {
+  const Status done = ForEachPicture(sweep, [&](const BenchCase& volume, const RendererKind* renderer, const SweepView& view) -> Status {
     for (const SweepPolicy& policy : sweep.policies) {
       for (const int p : sweep.workers) {
         for (const SweepLink& link : sweep.links) {
@@ -108,8 +109,8 @@ Result<Report> RunSweep(ExperimentContext& context) {
   report.summary = fmt::format("A sweep of your own: {} volumes, {} renderers, {} views, {} policies, {} numbers of workers and {} links.",
                                sweep->volumes.size(), sweep->renderers.size(), sweep->views.size(), sweep->policies.size(),
                                sweep->workers.size(), sweep->links.size());
-  const Status status = ForEachPicture(*sweep, [&](const BenchCase& volume, RendererKind renderer, const SweepView& view) -> Status {
-    const std::string title = fmt::format("{}, {}, {}", volume.name, NameOf(renderer), view.name), name = Slug(title);
+  const Status status = ForEachPicture(*sweep, [&](const BenchCase& volume, const RendererKind* renderer, const SweepView& view) -> Status {
+    const std::string title = fmt::format("{}, {}, {}", volume.name, renderer->title(), view.name), name = Slug(title);
     Table table{name,
                 title,
                 {{"policy", ""},

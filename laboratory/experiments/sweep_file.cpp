@@ -13,12 +13,13 @@
 #include <utility>
 
 #include "client/cli/values.h"
-#include "laboratory/experiments/frame_case.h"
 #include "common/combining/schemes.h"
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
 #include "common/planning/layout.h"
 #include "common/planning/policy_names.h"
+#include "common/renderers/registry.h"
+#include "laboratory/experiments/frame_case.h"
 
 namespace slabstream {
 namespace {
@@ -228,17 +229,13 @@ Result<Sweep> ParseSweep(const std::string& path, std::string_view text) {
     return Status::InvalidArgument(fmt::format("FILE '{}' is not JSON: {}", path, what.substr(what.find("] ") + 2)));
   }
   Sweep sweep;
-  constexpr std::array<std::string_view, 2> kRenderers = {"splat", "zbuffer"};
   const Value file(json, "", mistake);
   file.Fields(
       {{"title", [&](const Value& v) { sweep.title = v.Text(); }},
        {"size", [&](const Value& v) { ReadSize(v, sweep.size); }},
        {"volumes", [&](const Value& v) { v.Each([&](const Value& e) { sweep.volumes.push_back(ReadVolume(e)); }); }},
        {"renderers",
-        [&](const Value& v) {
-          v.Each(
-              [&](const Value& e) { sweep.renderers.push_back(e.OneOf(kRenderers) == 0 ? RendererKind::kSplat : RendererKind::kZBuffer); });
-        }},
+        [&](const Value& v) { v.Each([&](const Value& e) { sweep.renderers.push_back(Renderers()[e.OneOf(RendererNames())]); }); }},
        {"views", [&](const Value& v) { v.Each([&](const Value& e) { sweep.views.push_back(ReadView(e, sweep.views.size())); }); }},
        {"policies", [&](const Value& v) { v.Each([&](const Value& e) { sweep.policies.push_back(ReadPolicy(e)); }); }},
        {"workers", [&](const Value& v) { v.Each([&](const Value& e) { sweep.workers.push_back(e.Integer(1, kMaxSweepWorkers)); }); }},
@@ -257,7 +254,7 @@ Result<Sweep> ParseSweep(const std::string& path, std::string_view text) {
     if (!mistake && !json.contains(needed)) mistake = fmt::format("'{}' is missing", needed);
   }
   if (sweep.title.empty()) sweep.title = "Sweep";
-  if (sweep.renderers.empty()) sweep.renderers = {RendererKind::kSplat};
+  if (sweep.renderers.empty()) sweep.renderers = {FindRenderer(kDefaultRenderer)};
   if (sweep.views.empty()) sweep.views = {{"view 1", BenchView(Projection::kOrthographic, 1, 12)}};
   if (sweep.links.empty()) sweep.links = {{"10gbit", *ParseLink("link", "10gbit")}};
   CheckNamesDiffer(sweep.volumes, "volumes", mistake);

@@ -7,7 +7,7 @@
 
 #include "client/cli/bench_cases.h"
 #include "common/base/status.h"
-#include "common/planning/frame_request.h"
+#include "common/frame/frame_request.h"
 #include "common/simulation/link_model.h"
 
 namespace slabstream {
@@ -33,7 +33,7 @@ struct SweepLink {
 struct Sweep {
   std::string title;
   std::vector<BenchCase> volumes;
-  std::vector<RendererKind> renderers;
+  std::vector<const RendererKind*> renderers;
   std::vector<SweepView> views;
   std::vector<SweepPolicy> policies;
   std::vector<int> workers;

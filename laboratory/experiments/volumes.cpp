@@ -7,7 +7,7 @@
 
 #include "common/classification/count_occupied.h"
 #include "common/planning/frame_plan.h"
-#include "common/planning/render_work.h"
+#include "common/renderers/renderer_kind.h"
 
 namespace slabstream {
 
@@ -38,7 +38,7 @@ Result<std::shared_ptr<const OccupancyGrid>> VolumeCache::Occupied(const BenchCa
   const VolumeSummary& summary = *in_use->summary;
   const Result<TransferFunction> transfer = ResolveTransfer(volume.transfer, summary);
   if (!transfer.ok()) return transfer.status();
-  grid = std::make_shared<const OccupancyGrid>(CountOccupied(in_use->volume->block, DrawnTable(*transfer, summary, volume.renderer)));
+  grid = std::make_shared<const OccupancyGrid>(CountOccupied(in_use->volume->block, volume.renderer->DrawnTable(*transfer, summary)));
   return grid;
 }
 

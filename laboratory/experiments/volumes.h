@@ -36,8 +36,8 @@ class VolumeCache {
     VolumeInUse volume;
   };
   std::size_t budget_bytes_;
-  std::list<Held> held_;                                                                           // last used first
-  std::map<std::pair<std::string, RendererKind>, std::shared_ptr<const OccupancyGrid>> occupied_;  // by name of the case
+  std::list<Held> held_;                                                                                  // last used first
+  std::map<std::pair<std::string, const RendererKind*>, std::shared_ptr<const OccupancyGrid>> occupied_;  // by name of the case
 };
 
 // What reports call it: "class I, N = 300, 5 % occupied"; a file by its dataset's name.

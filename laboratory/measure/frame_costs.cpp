@@ -6,14 +6,14 @@
 #include <thread>
 #include <utility>
 
-#include "laboratory/measure/thread_time.h"
 #include "common/base/check.h"
 #include "common/base/time.h"
 #include "common/image/run_image.h"
+#include "common/renderers/renderer_kind.h"
 #include "common/wire/payload.h"
 #include "coordinator/clients.h"
-#include "worker/render/finish_picture.h"
-#include "worker/render/pipeline.h"
+#include "laboratory/measure/thread_time.h"
+#include "worker/renderers/renderer.h"
 
 namespace slabstream {
 
@@ -34,11 +34,11 @@ double SecondsOnAnotherThread(int threads, Work&& work) {
 // As the display worker does (worker/executor.cpp).
 PictureMeter::Answer PictureMeter::Finish(LocalImage& frame, const FrameSetup& setup) {
   RunImage runs;
-  if (FrameIsPicture(setup)) {
+  if (setup.renderer->FrameIsPicture(setup)) {
     runs = EncodePicture(frame);
   } else {
     FillRows(frame);
-    runs = EncodePicture(FinishPicture(frame, setup));
+    runs = EncodePicture(setup.renderer->Finish(frame, setup));
   }
   Answer answer;
   answer.header.image = runs.header;

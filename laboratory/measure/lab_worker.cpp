@@ -4,8 +4,8 @@
 
 #include <atomic>
 
-#include "laboratory/measure/thread_time.h"
 #include "common/base/time.h"
+#include "laboratory/measure/thread_time.h"
 
 namespace slabstream {
 
@@ -13,7 +13,7 @@ LabWorker::LabWorker(const Volume& volume) : volume_(volume) {}
 LabWorker::~LabWorker() = default;
 
 BoxRendering LabWorker::Render(const Box& box, const FrameSetup& setup) {
-  if (kind_ != setup.renderer) renderer_ = MakeRenderer(setup.renderer);
+  if (kind_ != setup.renderer) renderer_ = MakeRenderer(*setup.renderer);
   kind_ = setup.renderer;
   const Box slab_box = SlabBox(box, setup);
   std::unique_ptr<SlabData>& slab = slabs_[slab_box];

@@ -10,7 +10,7 @@
 #include "common/planning/frame_plan.h"
 #include "common/stats/report.h"
 #include "common/volume/volume.h"
-#include "worker/render/pipeline.h"
+#include "worker/renderers/renderer.h"
 
 namespace slabstream {
 
@@ -33,7 +33,7 @@ class LabWorker {
 
  private:
   const Volume& volume_;
-  std::optional<RendererKind> kind_;
+  const RendererKind* kind_ = nullptr;
   std::unique_ptr<Renderer> renderer_;
   std::map<Box, std::unique_ptr<SlabData>> slabs_;  // with halo
 };

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/combining/schemes.h"
+#include "common/renderers/registry.h"
 #include "common/view/range_status.h"
 #include "common/view/sheet_grid.h"
 
@@ -115,9 +116,10 @@ RecordedFrame ReadFrame(const Json& json, const std::string& place, Status& fail
   Reader reader(json, place, failure);
   RecordedFrame frame;
   const std::string renderer = reader.Text("renderer");
-  frame.renderer = renderer == "zbuffer" ? RendererKind::kZBuffer : RendererKind::kSplat;
-  if (renderer != "zbuffer" && renderer != "splat") {
-    reader.Fail(fmt::format("{}.renderer is '{}', but must be splat or zbuffer", place, renderer));
+  if (const Result<const RendererKind*> kind = RequireRenderer(renderer); kind.ok()) {
+    frame.renderer = *kind;
+  } else {
+    reader.Fail(fmt::format("{}.{}", place, kind.status().message()));
   }
   if (const Json& grid = reader.List("grid", 2); !grid.empty()) {
     frame.grid = {0, 0, reader.Pixel("grid", grid[0]), reader.Pixel("grid", grid[1])};
@@ -154,9 +156,9 @@ RecordedFrame ReadFrame(const Json& json, const std::string& place, Status& fail
 
 }  // namespace
 
-RecordedFrame Record(const FrameStatistics& statistics, RendererKind renderer, Duration latency) {
+RecordedFrame Record(const FrameStatistics& statistics, const RendererKind& renderer, Duration latency) {
   RecordedFrame frame;
-  frame.renderer = renderer;
+  frame.renderer = &renderer;
   frame.grid = statistics.grid;
   frame.workers = statistics.workers;
   frame.display = statistics.display;
@@ -195,7 +197,7 @@ Json RecordingJson(std::span<const RecordedFrame> frames) {
       for (const RecordedRank& rank : group) ranks.push_back(RankJson(rank));
       groups.push_back(std::move(ranks));
     }
-    list.push_back({{"renderer", frame.renderer == RendererKind::kSplat ? "splat" : "zbuffer"},
+    list.push_back({{"renderer", frame.renderer->name()},
                     {"grid", {frame.grid.width(), frame.grid.height()}},
                     {"workers", frame.workers},
                     {"display", frame.display},

@@ -34,7 +34,7 @@ struct RecordedRank {
 };
 
 struct RecordedFrame {
-  RendererKind renderer = RendererKind::kSplat;
+  const RendererKind* renderer = nullptr;
   PixelBounds grid;  // of the frame that was rendered and combined
   std::uint32_t workers = 1;
   WorkerId display = 0;
@@ -47,7 +47,7 @@ struct RecordedFrame {
 };
 
 // Reports must have been kept. Ranks that were not reported show nothing and cost nothing.
-RecordedFrame Record(const FrameStatistics& statistics, RendererKind renderer, Duration latency);
+RecordedFrame Record(const FrameStatistics& statistics, const RendererKind& renderer, Duration latency);
 
 nlohmann::ordered_json RecordingJson(std::span<const RecordedFrame> frames);
 

@@ -11,12 +11,13 @@
 #include <sstream>
 #include <utility>
 
-#include "laboratory/measure/calibrate.h"
-#include "laboratory/measure/combining_costs.h"
 #include "common/combining/schemes.h"
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
+#include "common/renderers/renderer_kind.h"
 #include "common/simulation/simulate_frames.h"
+#include "laboratory/measure/calibrate.h"
+#include "laboratory/measure/combining_costs.h"
 
 namespace slabstream {
 namespace {
@@ -53,7 +54,7 @@ void MakeReplayed(const RecordedFrame& frame, const ReplayChange& change, const 
   const std::vector<std::vector<RecordedRank>> groups = Regroup(frame, change.workers);
   const std::string& combine = change.combine.empty() ? frame.combine : change.combine;
   FramePlan& plan = out.plan;
-  plan.setup.renderer = frame.renderer;
+  SetRenderer(*frame.renderer, plan.setup);
   plan.setup.camera.width = plan.setup.sheets.width = frame.grid.width();
   plan.setup.camera.height = plan.setup.sheets.height = frame.grid.height();
   plan.slots = change.workers ? std::uint32_t(*change.workers) : frame.workers;

@@ -1,6 +1,7 @@
 // What display workers find hidden: which assignments it goes with, and which it must not.
 #include "common/planning/frame_occlusion.h"
 #include "tests/coordinator/coordinator_script.h"
+#include "tests/support/renderers.h"
 
 namespace slabstream {
 namespace {
@@ -95,7 +96,7 @@ TEST(CoordinatorHiddenTiles, MasksThatDoNotFitTheFrameAreDropped) {
     script.Join(11, 1);
     SubmitFrame submit = Frame(1, 3);
     if (which == 1) submit.frame.termination = 0;
-    if (which == 2) submit.frame.renderer = RendererKind::kZBuffer;
+    if (which == 2) submit.frame.renderer = ZBuffer()->name();
     const auto first = HandedOut(script.Submit(kClient, submit));
     OcclusionMask mask = Mask(first.at(0), 1);
     if (which == 0) mask = {mask.tiles_x + 1, 1, std::vector<std::uint8_t>(std::size_t(mask.tiles_x) + 1, 1)};

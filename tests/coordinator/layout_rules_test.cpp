@@ -1,6 +1,7 @@
 // What the machine does about layouts and open policies: counts occupied voxels where a policy needs them, keeps layouts while views
 // change, and lets them follow render times where balance is dynamic.
 #include "tests/coordinator/coordinator_script.h"
+#include "tests/support/renderers.h"
 
 namespace slabstream {
 namespace {
@@ -102,9 +103,9 @@ TEST(CoordinatorLayouts, WhatEachRendererDrawsIsCountedOnce) {
   script.Join(11, 1);
   std::vector<std::shared_ptr<const ClassificationTable>> tables;
   RequestId request = 0;
-  for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer, RendererKind::kSplat}) {
+  for (const RendererKind* renderer : {Splatting(), ZBuffer(), Splatting()}) {
     SubmitFrame submit = KdFrame(++request);
-    submit.frame.renderer = renderer;
+    submit.frame.renderer = renderer->name();
     submit.frame.transfer.choice = TransferFunction{.colors = {{0, {1, 1, 1}}}, .opacities = {{0, 0.1}, {255, 1}}};
     const std::size_t counted = script.counts.size();
     Actions actions = script.Submit(kClient, submit);

@@ -1,4 +1,5 @@
 #include "laboratory/experiments/sweep_file.h"
+#include "tests/support/renderers.h"
 
 #include <gmock/gmock.h>
 
@@ -48,7 +49,7 @@ TEST(SweepFile, LeavesNamesOpen) {
 TEST(SweepFile, HasDefaults) {
   const Result<Sweep> sweep = ParseSweep("s.json", R"({"volumes": [{"sphere": {}}], "policies": [{}], "workers": [2]})");
   ASSERT_TRUE(sweep.ok()) << sweep.status().message();
-  EXPECT_EQ(sweep->renderers, std::vector{RendererKind::kSplat});
+  EXPECT_EQ(sweep->renderers, std::vector{FindRenderer("splat")});
   EXPECT_EQ(sweep->views.size(), 1U);
   EXPECT_EQ(sweep->links[0].name, "10gbit");
 }

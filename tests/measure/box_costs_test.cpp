@@ -3,7 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "common/decomposition/decomposition.h"
-#include "tests/render/render_support.h"
+#include "tests/renderers/render_support.h"
+#include "tests/support/renderers.h"
 
 namespace slabstream {
 namespace {
@@ -12,7 +13,7 @@ using namespace slabstream::testing;  // NOLINT(google-build-using-namespace): t
 
 TEST(BoxCosts, CountsOfBoxesAddUpToThoseOfTheVolume) {
   const Volume volume = MakeBlobs({{40, 32, 48}, {1, 1, 1}}, ScalarType::kUint8, 3);
-  for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
+  for (const RendererKind* renderer : Renderers()) {
     const FrameSetup setup = MakeSetup(volume, {.renderer = renderer});
     const std::vector<BoxCost> whole = MeasureBoxCosts(volume, setup, std::vector{volume.block.box}, 1);
     ASSERT_EQ(whole.size(), 1U);

@@ -2,26 +2,27 @@
 
 #include <gtest/gtest.h>
 
-#include "laboratory/measure/plan_renderings.h"
 #include "common/planning/placement.h"
-#include "tests/render/render_support.h"
+#include "laboratory/measure/plan_renderings.h"
+#include "tests/renderers/render_support.h"
+#include "tests/support/renderers.h"
 
 namespace slabstream {
 namespace {
 
 using namespace slabstream::testing;  // NOLINT(google-build-using-namespace): test support
 
-ValidationCase SmallCase(RendererKind renderer, int workers) {
+ValidationCase SmallCase(const RendererKind* renderer, int workers) {
   ValidationCase what{.name = "blobs", .workers = workers};
   what.volume = std::make_shared<const Volume>(MakeBlobs({{40, 32, 48}, {1, 1, 1}}, ScalarType::kUint8, 3));
-  what.request.renderer = renderer;
+  what.request.renderer = renderer->name();
   what.request.size = {64, 48};
   return what;
 }
 
 // Whatever the machine does meanwhile: both sides are there for every view, and their parts fit into the whole.
 TEST(Validation, HasBothSidesOfEveryView) {
-  for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
+  for (const RendererKind* renderer : Renderers()) {
     for (const int workers : {1, 2}) {
       const Result<ValidationRow> row = ValidateSimulation(SmallCase(renderer, workers), {.views = 3, .turns = 1});
       ASSERT_TRUE(row.ok()) << row.status().message();
@@ -41,12 +42,12 @@ TEST(Validation, HasBothSidesOfEveryView) {
 }
 
 TEST(Validation, RefusesMoreWorkersThanItCanMeasureSideBySide) {
-  const Result<ValidationRow> row = ValidateSimulation(SmallCase(RendererKind::kSplat, 3), {});
+  const Result<ValidationRow> row = ValidateSimulation(SmallCase(Splatting(), 3), {});
   EXPECT_EQ(row.status().code(), StatusCode::kInvalidArgument);
 }
 
 TEST(PlanRenderings, MeasureEveryBoxOfThePlan) {
-  const ValidationCase what = SmallCase(RendererKind::kSplat, 2);
+  const ValidationCase what = SmallCase(Splatting(), 2);
   FrameRequest request = what.request;
   request.dataset = "blobs";
   request.policy.groups = 2;

@@ -76,7 +76,7 @@ TEST(BrickVisibility, NeverCallsAVisibleVoxelEmpty) {
         TransferFunction transfer;
         transfer.colors = {{0, {1, 1, 1}}};
         transfer.opacities = {{start, 0}, {start + 0.5 * width, 1e-3}, {start + width, 0}};
-        const BrickVisibility bricks(summary, transfer);
+        const BrickVisibility bricks(summary, Classify(transfer, summary.description, summary.range));
         const ClassificationTable table = Classify(transfer, summary.description, summary.range);
         for (int k = 0; k < 20; ++k) {
           Box box = BoxOfBrick(summary, chosen);
@@ -105,7 +105,7 @@ TEST(BrickVisibility, LooksAtEveryBrickThatTheBoxTouches) {
     VolumeSummary summary = FullSummary({40, 32, 33});  // 3 x 2 x 3 bricks
     for (ValueRange& brick : summary.bricks) brick = {0, 50};
     summary.bricks[std::size_t((bright.z * 2 + bright.y) * 3 + bright.x)] = {0, 150};
-    const BrickVisibility bricks(summary, transfer);
+    const BrickVisibility bricks(summary, Classify(transfer, summary.description, summary.range));
     for (std::int32_t z = 0; z < 33; z += 4) {
       for (std::int32_t y = 0; y < 32; y += 3) {
         for (std::int32_t x = 0; x < 40; x += 3) {
@@ -122,12 +122,15 @@ TEST(BrickVisibility, ConstantMappingAndBricksWithoutFiniteValues) {
   const TransferFunction transfer = std::get<TransferFunction>(SomeRequest().transfer.choice);
   VolumeSummary summary = FullSummary({16, 16, 16});
   summary.bricks = {kNoFiniteValue};
-  EXPECT_FALSE(BrickVisibility(summary, transfer).AnyVisible(summary.description.geometry.bounds()));
+  EXPECT_FALSE(
+      BrickVisibility(summary, Classify(transfer, summary.description, summary.range)).AnyVisible(summary.description.geometry.bounds()));
   for (float value : {50.0F, 150.0F}) {  // every sample means the same value
     summary.description.mapping = {0, double(value)};
     summary.range = {value, value};
     summary.bricks = {summary.range};
-    EXPECT_EQ(BrickVisibility(summary, transfer).AnyVisible(summary.description.geometry.bounds()), value > 100);
+    EXPECT_EQ(
+        BrickVisibility(summary, Classify(transfer, summary.description, summary.range)).AnyVisible(summary.description.geometry.bounds()),
+        value > 100);
   }
 }
 

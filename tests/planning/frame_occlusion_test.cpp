@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tests/support/random_box.h"
+#include "tests/support/renderers.h"
 
 namespace slabstream {
 namespace {
@@ -87,10 +88,10 @@ TEST(FrameOcclusion, MasksFitFramesThatUseThem) {
   EXPECT_FALSE(CheckFits(mask, setup).ok());
   EXPECT_TRUE(CheckFits({}, setup).ok());
   setup.termination = 0.1;
-  setup.renderer = RendererKind::kZBuffer;
+  SetRenderer(*ZBuffer(), setup);
   EXPECT_FALSE(CheckFits(mask, setup).ok());
   EXPECT_TRUE(CheckFits({}, setup).ok());
-  setup.renderer = RendererKind::kSplat;
+  SetRenderer(*Splatting(), setup);
   setup.sheets.width += kOcclusionTile;
   EXPECT_FALSE(CheckFits(mask, setup).ok());
 }

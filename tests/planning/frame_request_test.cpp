@@ -1,4 +1,4 @@
-#include "common/planning/frame_request.h"
+#include "common/planning/validate_request.h"
 
 #include <gtest/gtest.h>
 
@@ -34,7 +34,8 @@ TEST(ValidateFrameRequest, NamesFieldValueAndLimit) {
   const Case cases[] = {
       {[](auto& r) { r.dataset = ""; }, "dataset has 0 bytes, but must have 1 to 256"},
       {[&](auto& r) { r.dataset = long_name; }, "dataset has 257 bytes"},
-      {[](auto& r) { r.renderer = RendererKind{3}; }, "renderer is 3, but must be 1 (splat) or 2 (zbuffer)"},
+      {[](auto& r) { r.renderer = "teapot"; }, "renderer is 'teapot', but must be one of: splat, zbuffer"},
+      {[](auto& r) { r.parameters["fineness"] = "1"; }, "fineness is '1', but the renderer 'splat' has no such parameter"},
       {[](auto& r) { r.size.width = 0; }, "size.width is 0"},
       {[](auto& r) { r.view.zoom = kNan; }, "view.zoom is nan"},
       {[](auto& r) { r.transfer.choice = ""; }, "transfer.preset has 0 bytes"},

@@ -12,6 +12,7 @@
 #include "common/planning/policy_names.h"
 #include "tests/planning/support.h"
 #include "tests/support/random.h"
+#include "tests/support/renderers.h"
 
 namespace slabstream {
 namespace {
@@ -275,7 +276,7 @@ TEST(PlanFrame, AnEmptyVolumeHasAPlanOfEmptyGroups) {
 
 TEST(PlanFrame, SetupHoldsWhatTheRequestAsksFor) {
   FrameRequest request = SomeRequest();
-  request.renderer = RendererKind::kZBuffer;
+  request.renderer = ZBuffer()->name();
   request.termination = 0.25;
   request.transfer.opacity_distance = 3;
   request.shading.phong = false;
@@ -285,7 +286,7 @@ TEST(PlanFrame, SetupHoldsWhatTheRequestAsksFor) {
   EXPECT_EQ(setup.dataset, 7U);
   EXPECT_EQ(setup.description, summary.description);
   EXPECT_EQ(setup.range, summary.range);
-  EXPECT_EQ(setup.renderer, RendererKind::kZBuffer);
+  EXPECT_EQ(setup.renderer, ZBuffer());
   EXPECT_EQ(setup.camera, MakeSupersampledCamera(request.view, request.size, summary.description.geometry));
   EXPECT_EQ(setup.transfer.opacity_distance, 3);
   EXPECT_EQ(setup.shading, request.shading);
@@ -304,7 +305,7 @@ TEST(PlanFrame, TheFrameIsWhatThePipelineRenders) {
   EXPECT_EQ(splat.sheets, MakeSheetGrid(splat.camera, geometry));
   EXPECT_EQ(FrameBounds(splat), (PixelBounds{0, 0, splat.sheets.width, splat.sheets.height}));
 
-  request.renderer = RendererKind::kZBuffer;
+  request.renderer = ZBuffer()->name();
   const FrameSetup zbuffer = Plan(request, summary, FullRoster(2)).setup;
   EXPECT_GT(zbuffer.camera.supersample, 1);
   EXPECT_EQ(FrameBounds(zbuffer), (PixelBounds{0, 0, zbuffer.camera.width, zbuffer.camera.height}));
@@ -384,7 +385,7 @@ TEST(PlanFrame, ColoursTravelInAsManyBitsAsTheirErrorAllows) {
   request.policy.pixel_error = 1.0 / 1024;
   const FramePlan plan = Plan(request, large, FullRoster(100));
   EXPECT_EQ(plan.groups[0].color, ColorCoding::kHalf) << "99 transfers, but one hop";
-  request.renderer = RendererKind::kZBuffer;
+  request.renderer = ZBuffer()->name();
   EXPECT_EQ(color(kMaxPixelError, 5), ColorCoding::kFloat32);
   request.policy.pixel_error = 0.2;
   EXPECT_EQ(Validate(request).code(), StatusCode::kInvalidArgument);

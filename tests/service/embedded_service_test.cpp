@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "tests/service/pictures.h"
+#include "tests/support/renderers.h"
 
 namespace slabstream {
 namespace {
@@ -58,7 +59,7 @@ TEST_F(EmbeddedServiceTest, PictureIsThatOfOneRendererForAnyWorkersAndGroups) {
   for (const int workers : {1, 3}) {
     Start(workers);
     Client client = Connect();
-    for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
+    for (const RendererKind* renderer : Renderers()) {
       for (const int groups : {1, 2, 5}) {
         SCOPED_TRACE(testing::Message() << workers << " workers, " << groups << " groups, renderer " << int(renderer));
         const FrameStatistics statistics = ExpectRightPicture(client, TestRequest(renderer, 30, groups));
@@ -81,7 +82,7 @@ std::uint64_t DrawnBehindWithoutMasks(const FrameRequest& request, const Volume&
   RankReport report;
   for (std::size_t group = 2; group < plan.groups.size(); ++group) {
     for (const Placement& placement : plan.groups[group].placements) {
-      EXPECT_TRUE(MakeRenderer(request.renderer)->Render(slab, placement.box, plan.setup, {}, cancelled, report).ok());
+      EXPECT_TRUE(MakeRenderer(*plan->setup.renderer)->Render(slab, placement.box, plan.setup, {}, cancelled, report).ok());
     }
   }
   return report.drawn_voxels;
@@ -92,7 +93,7 @@ TEST_F(EmbeddedServiceTest, GroupsLeaveOutWhatThoseInFrontHide) {
   auto block = std::make_shared<Volume>(*TestSphere(64));
   std::ranges::fill(block->block.bytes, std::byte{255});
   volume_ = block;
-  FrameRequest request = TestRequest(RendererKind::kSplat, 30, 6);
+  FrameRequest request = TestRequest(Splatting(), 30, 6);
   request.view.elevation_degrees = 70;  // slabs are behind each other
   request.size = {200, 200};
   std::get<TransferFunction>(request.transfer.choice).opacities = {{0, 0.9, 0.5, 0}};
@@ -119,7 +120,7 @@ TEST_F(EmbeddedServiceTest, GroupsLeaveOutWhatThoseInFrontHide) {
 }
 
 TEST_F(EmbeddedServiceTest, ThreadsAndWorkersGiveTheSamePicture) {
-  for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
+  for (const RendererKind* renderer : Renderers()) {
     const FrameRequest request = TestRequest(renderer, 200, 1);
     std::optional<Picture> first;
     const auto difference = [&](int workers, int threads) {
@@ -146,9 +147,9 @@ TEST_F(EmbeddedServiceTest, StatusTellsTheThreadsOfWorkers) {
 TEST_F(EmbeddedServiceTest, SecondFrameMovesNoVoxels) {
   Start(2);
   Client client = Connect();
-  EXPECT_GT(VoxelBytes(ExpectRightPicture(client, TestRequest(RendererKind::kSplat, 0))), 0U);
-  EXPECT_EQ(VoxelBytes(ExpectRightPicture(client, TestRequest(RendererKind::kSplat, 137))), 0U);
-  EXPECT_EQ(VoxelBytes(ExpectRightPicture(client, TestRequest(RendererKind::kZBuffer, 251))), 0U);
+  EXPECT_GT(VoxelBytes(ExpectRightPicture(client, TestRequest(Splatting(), 0))), 0U);
+  EXPECT_EQ(VoxelBytes(ExpectRightPicture(client, TestRequest(Splatting(), 137))), 0U);
+  EXPECT_EQ(VoxelBytes(ExpectRightPicture(client, TestRequest(ZBuffer(), 251))), 0U);
 }
 
 TEST_F(EmbeddedServiceTest, SeveralClientsAtOnce) {
@@ -158,7 +159,7 @@ TEST_F(EmbeddedServiceTest, SeveralClientsAtOnce) {
     threads.emplace_back([this, i] {
       Client client = Connect();
       for (int frame = 0; frame < 3; ++frame) {
-        ExpectRightPicture(client, TestRequest(i % 2 == 0 ? RendererKind::kSplat : RendererKind::kZBuffer, 100 * i + 40 * frame));
+        ExpectRightPicture(client, TestRequest(i % 2 == 0 ? Splatting() : ZBuffer(), 100 * i + 40 * frame));
       }
     });
   }
@@ -169,7 +170,7 @@ TEST_F(EmbeddedServiceTest, OneClientKeepsSeveralFramesInFlight) {
   Client client = Connect();
   std::map<RequestId, FrameRequest> open;
   for (int i = 0; i < 6; ++i) {
-    const FrameRequest request = TestRequest(RendererKind::kSplat, 60 * i);
+    const FrameRequest request = TestRequest(Splatting(), 60 * i);
     open.emplace(client.Submit(request, seconds(60)), request);
   }
   while (!open.empty()) {
@@ -187,7 +188,7 @@ TEST_F(EmbeddedServiceTest, OneClientKeepsSeveralFramesInFlight) {
 TEST_F(EmbeddedServiceTest, PreviewsComeGroupByGroupAndThenThePicture) {
   Start(2);
   Client client = Connect();
-  FrameRequest request = TestRequest(RendererKind::kSplat, 75, 4);
+  FrameRequest request = TestRequest(Splatting(), 75, 4);
   request.previews = true;
   const RequestId id = client.Submit(request, seconds(60));
   std::uint32_t groups_done = 0;
@@ -216,7 +217,7 @@ TEST_F(EmbeddedServiceTest, CancelEndsTheRequestAndFreesTheWorkers) {
   volume_ = TestSphere(128);
   Start(2);
   Client client = Connect();
-  FrameRequest large = TestRequest(RendererKind::kSplat, 10, 8);
+  FrameRequest large = TestRequest(Splatting(), 10, 8);
   large.size = {2048, 2048};
   const RequestId id = client.Submit(large, seconds(60));
   std::optional<ClientEvent> event = client.Next(seconds(60));
@@ -233,7 +234,7 @@ TEST_F(EmbeddedServiceTest, CancelEndsTheRequestAndFreesTheWorkers) {
   const Result<StatusReply> status = client.QueryStatus();
   ASSERT_TRUE(status.ok()) << status.status().message();
   EXPECT_EQ(status->running + status->queued, 0U);
-  ExpectRightPicture(client, TestRequest(RendererKind::kZBuffer, 10));
+  ExpectRightPicture(client, TestRequest(ZBuffer(), 10));
 }
 
 TEST_F(EmbeddedServiceTest, ClientThatGoesAwayFreesItsWork) {
@@ -241,12 +242,12 @@ TEST_F(EmbeddedServiceTest, ClientThatGoesAwayFreesItsWork) {
   Start(1);
   {
     Client client = Connect();
-    FrameRequest large = TestRequest(RendererKind::kSplat, 10, 8);
+    FrameRequest large = TestRequest(Splatting(), 10, 8);
     large.size = {2048, 2048};
     for (int i = 0; i < 8; ++i) client.Submit(large, std::chrono::minutes(60));
   }
   Client client = Connect();
-  ExpectRightPicture(client, TestRequest(RendererKind::kZBuffer, 10));
+  ExpectRightPicture(client, TestRequest(ZBuffer(), 10));
   const Result<StatusReply> status = client.QueryStatus();
   ASSERT_TRUE(status.ok());
   EXPECT_EQ(status->running + status->queued, 0U);
@@ -257,7 +258,7 @@ TEST_F(EmbeddedServiceTest, WorkersLeaveAndJoinWhileFramesRun) {
   Client client = Connect();
   for (int frame = 0; frame < 4; ++frame) {
     SCOPED_TRACE(testing::Message() << "frame " << frame);
-    const FrameRequest request = TestRequest(RendererKind::kSplat, 45 * frame, 3);
+    const FrameRequest request = TestRequest(Splatting(), 45 * frame, 3);
     const RequestId id = client.Submit(request, seconds(60));
     service_->worker(frame).RequestStop();
     ASSERT_TRUE(service_->AddWorker().ok());
@@ -279,7 +280,7 @@ TEST_F(EmbeddedServiceTest, WorkersLeaveAndJoinWhileFramesRun) {
 TEST_F(EmbeddedServiceTest, NothingVisibleIsAnEmptyPicture) {
   Start(2);
   Client client = Connect();
-  for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
+  for (const RendererKind* renderer : Renderers()) {
     FrameRequest request = TestRequest(renderer, 0);
     std::get<TransferFunction>(request.transfer.choice).opacities = {{0, 0, 0.5, 0}};
     const Result<Picture> picture = client.Render(request, seconds(60));
@@ -291,7 +292,7 @@ TEST_F(EmbeddedServiceTest, NothingVisibleIsAnEmptyPicture) {
 TEST_F(EmbeddedServiceTest, FailuresSayWhatWasWrong) {
   Start(1);
   Client client = Connect();
-  FrameRequest request = TestRequest(RendererKind::kSplat, 0);
+  FrameRequest request = TestRequest(Splatting(), 0);
   request.dataset = "nothing";
   Result<Picture> picture = client.Render(request);
   EXPECT_EQ(picture.status().code(), StatusCode::kNotFound);
@@ -305,19 +306,19 @@ TEST_F(EmbeddedServiceTest, FailuresSayWhatWasWrong) {
   picture = client.Render(request);
   EXPECT_EQ(picture.status().code(), StatusCode::kInvalidArgument);
   EXPECT_THAT(picture.status().message(), testing::HasSubstr("zoom"));
-  ExpectRightPicture(client, TestRequest(RendererKind::kSplat, 0));
+  ExpectRightPicture(client, TestRequest(Splatting(), 0));
 }
 
 TEST_F(EmbeddedServiceTest, ShutDownEndsServiceAndOpenRequests) {
   Start(2);
   const ClientTiming quick = {.ping = std::chrono::milliseconds(50), .silence = std::chrono::milliseconds(500)};
   Client client = Client::Connect(context_, service_->endpoint(), seconds(5), quick).value();
-  ExpectRightPicture(client, TestRequest(RendererKind::kZBuffer, 0));
+  ExpectRightPicture(client, TestRequest(ZBuffer(), 0));
   const Status status = client.ShutDownService();
   EXPECT_TRUE(status.ok()) << status.message();
   service_->worker(0).WaitUntilStopped();
   service_->worker(1).WaitUntilStopped();
-  client.Submit(TestRequest(RendererKind::kZBuffer, 0));
+  client.Submit(TestRequest(ZBuffer(), 0));
   const std::optional<ClientEvent> event = client.Next(seconds(60));
   ASSERT_TRUE(event.has_value());
   EXPECT_EQ(std::get<Status>(event->what).code(), StatusCode::kUnavailable);

@@ -1,6 +1,7 @@
 // The executor against orders as the machine gives them: every order that has an answer gets exactly one, also when what came in is
 // damaged.
 #include "worker/executor.h"
+#include "tests/support/renderers.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -155,7 +156,8 @@ TEST_F(ExecutorTest, AnImageWithDepthHidesNothing) {
 
 TEST_F(ExecutorTest, FinishedFrameIsResolvedAndPacked) {
   EXPECT_TRUE(CombineIncoming(1, Filled({2, 0, 8, 4}, 0.5F), Side::kBack).status.ok());
-  FrameSetup setup{.renderer = RendererKind::kZBuffer};
+  FrameSetup setup;
+  SetRenderer(*ZBuffer(), setup);
   setup.camera.supersample = 2;
   executor_.Perform(SendFrame{.message = {.epoch = 1, .worker = 1, .frame = 3, .attempt = 1, .groups_done = 1},
                               .image = 1,
@@ -201,7 +203,7 @@ TEST_F(ExecutorTest, EveryChunkIsAnsweredAndDamageIsFound) {
 
 TEST_F(ExecutorTest, RenderIsAnsweredAlsoWhenItIsCancelled) {
   const std::shared_ptr<const Volume> volume = TestSphere(96);
-  FrameRequest request = TestRequest(RendererKind::kSplat, 20);
+  FrameRequest request = TestRequest(Splatting(), 20);
   request.size = {1024, 1024};
   const FramePlan plan = PlanFrame(request, 1, Summarize(*volume), Roster{{1}}, CostModel{}).value();
   const SlabKey slab{.dataset = 1, .box = volume->block.box, .type = volume->block.type};
@@ -235,7 +237,7 @@ TEST_F(ExecutorTest, RenderIsAnsweredAlsoWhenItIsCancelled) {
 TEST_F(ExecutorTest, WhatIsCopiedFromOtherSlabsIsWhatWouldHaveArrived) {
   const std::shared_ptr<const Volume> volume = TestSphere(96);
   const Box whole = volume->block.box;
-  for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
+  for (const RendererKind* renderer : Renderers()) {
     const FramePlan plan = PlanFrame(TestRequest(renderer, 20), 1, Summarize(*volume), Roster{{1}}, CostModel{}).value();
     const auto setup = std::make_shared<const FrameSetup>(plan.setup);
     const auto store = [&](const SlabKey& slab, const Box& box) {

@@ -5,6 +5,7 @@
 #include "coordinator/service.h"
 #include "tests/service/pictures.h"
 #include "tests/support/random.h"
+#include "tests/support/renderers.h"
 #include "worker/service.h"
 
 namespace slabstream {
@@ -67,7 +68,7 @@ TEST(HostilePeers, GarbageIsDroppedOnEveryPlane) {
       while (attacker.TryReceive()) {
       }
     }
-    const FrameRequest request = TestRequest(RendererKind::kSplat, 70 * round);
+    const FrameRequest request = TestRequest(Splatting(), 70 * round);
     const Result<Picture> picture = client.Render(request, seconds(60));
     ASSERT_TRUE(picture.ok()) << picture.status().message();
     EXPECT_LE(LargestDifference(picture->image, RenderDirectly(request, *volume), request.size), AllowedDifference(request));

@@ -15,6 +15,7 @@
 #include "tests/service/pictures.h"
 #include "tests/support/random.h"
 #include "tests/support/random_combining.h"
+#include "tests/support/renderers.h"
 #include "tests/support/temporary_directory.h"
 
 namespace slabstream {
@@ -105,8 +106,7 @@ TEST_F(MultiProcessTest, KilledWorkersCostNoFrameAndChangeNoPicture) {
   Client client = Connect();
   AwaitWorkers(client, 3);
   for (int round = 0; round < 8; ++round) {
-    FrameRequest request =
-        TestRequest(round % 2 == 0 ? RendererKind::kSplat : RendererKind::kZBuffer, random_.Integer(0, 359), random_.Integer(1, 4));
+    FrameRequest request = TestRequest(round % 2 == 0 ? Splatting() : ZBuffer(), random_.Integer(0, 359), random_.Integer(1, 4));
     request.size = {320, 300};
     request.previews = true;
     request.policy.combine = RandomCombining(random_);
@@ -158,7 +158,7 @@ TEST_F(MultiProcessTest, ManyFramesTakeNoMoreMemoryAndFilesThanAFew) {
   };
   Use early;
   for (int i = 0; i < 200; ++i) {
-    FrameRequest request = TestRequest(RendererKind::kSplat, 3 * i, 2);
+    FrameRequest request = TestRequest(Splatting(), 3 * i, 2);
     request.size = {320, 300};
     request.policy.combine = RandomCombining(random_);
     const Result<Picture> picture = client.Render(request, seconds(60));
@@ -182,7 +182,7 @@ TEST_F(MultiProcessTest, WorkersThatShareNoMemoryGiveTheSamePicture) {
   Client client = Connect();
   AwaitWorkers(client, 3);
   for (const CombiningEntry& scheme : CombiningSchemes()) {
-    for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
+    for (const RendererKind* renderer : Renderers()) {
       FrameRequest request = TestRequest(renderer, 50, 1);
       request.size = {320, 300};
       request.policy.combine = scheme.name;
@@ -194,7 +194,7 @@ TEST_F(MultiProcessTest, WorkersThatShareNoMemoryGiveTheSamePicture) {
       request.policy.pixel_error = 1.0 / 1024;
       const Result<Picture> coded = client.Render(request, seconds(60));
       ASSERT_TRUE(coded.ok()) << coded.status().message();
-      const double allowed = renderer == RendererKind::kZBuffer ? 0 : request.policy.pixel_error;
+      const double allowed = renderer->format() == PixelFormat::kRgba ? request.policy.pixel_error : 0;
       EXPECT_LE(LargestDifference(coded->image, expected, request.size), AllowedDifference(request) + allowed) << scheme.name;
     }
   }
@@ -206,7 +206,7 @@ TEST_F(MultiProcessTest, OneWorkerThatComesBackSavesTheFrame) {
   StartWorker();
   Client client = Connect();
   AwaitWorkers(client, 2);
-  FrameRequest request = TestRequest(RendererKind::kSplat, 33, 4);
+  FrameRequest request = TestRequest(Splatting(), 33, 4);
   request.size = {512, 512};
   const RequestId id = client.Submit(request, seconds(100));
   bool killed = false;
@@ -224,11 +224,11 @@ TEST_F(MultiProcessTest, OneWorkerThatComesBackSavesTheFrame) {
 TEST_F(MultiProcessTest, WithoutWorkersAFrameEndsInAnErrorThatSaysSo) {
   StartCoordinator();
   Client client = Connect();
-  const Result<Picture> picture = client.Render(TestRequest(RendererKind::kSplat, 0), seconds(60));
+  const Result<Picture> picture = client.Render(TestRequest(Splatting(), 0), seconds(60));
   EXPECT_EQ(picture.status().code(), StatusCode::kUnavailable) << picture.status().message();
   EXPECT_THAT(picture.status().message(), HasSubstr("worker"));
   StartWorker();
-  const Result<Picture> later = client.Render(TestRequest(RendererKind::kSplat, 0), seconds(60));
+  const Result<Picture> later = client.Render(TestRequest(Splatting(), 0), seconds(60));
   EXPECT_TRUE(later.ok()) << later.status().message();
 }
 
@@ -236,7 +236,7 @@ TEST_F(MultiProcessTest, KilledCoordinatorEndsClientsAndWorkersComeBackToTheNext
   StartCoordinator();
   StartWorker();
   StartWorker();
-  const FrameRequest request = TestRequest(RendererKind::kZBuffer, 120, 3);
+  const FrameRequest request = TestRequest(ZBuffer(), 120, 3);
   const LocalImage expected = RenderDirectly(request, *volume_);
   {
     Client client = Connect();

@@ -13,8 +13,8 @@
 #include "common/planning/frame_plan.h"
 #include "common/volume/sphere.h"
 #include "common/volume/summary.h"
-#include "worker/render/finish_picture.h"
-#include "worker/render/pipeline.h"
+#include "tests/support/renderers.h"
+#include "worker/renderers/renderer.h"
 
 namespace slabstream {
 
@@ -22,10 +22,10 @@ inline std::shared_ptr<const Volume> TestSphere(int size) {
   return std::make_shared<const Volume>(MakeSphere({.sphere_class = SphereClass::kFilled, .size = size, .occupancy = 0.3}).value());
 }
 
-inline FrameRequest TestRequest(RendererKind renderer, double azimuth_degrees, int groups = 2) {
+inline FrameRequest TestRequest(const RendererKind* renderer, double azimuth_degrees, int groups = 2) {
   FrameRequest request;
   request.dataset = "ball";
-  request.renderer = renderer;
+  request.renderer = renderer->name();
   request.size = {96, 80};
   request.view.azimuth_degrees = azimuth_degrees;
   request.view.elevation_degrees = 20;
@@ -45,7 +45,7 @@ inline LocalImage RenderDirectly(const FrameRequest& request, const Volume& volu
   SlabData slab(std::move(copy));
   const std::atomic<bool> cancelled = false;
   RankReport report;
-  Result<LocalImage> image = MakeRenderer(request.renderer)->Render(slab, volume.block.box, plan->setup, {}, cancelled, report);
+  Result<LocalImage> image = MakeRenderer(*plan->setup.renderer)->Render(slab, volume.block.box, plan->setup, {}, cancelled, report);
   CHECK(image.ok()) << image.status().message();
   return FinishPicture(*std::move(image), plan->setup);
 }
@@ -77,9 +77,10 @@ inline float LargestDifference(const LocalImage& a, const LocalImage& b, ImageSi
   return largest;
 }
 
-// The bound of design: Z-buffer pictures are identical, splatting differs by rounding and by what termination hides.
+// Accumulated opacity differs by rounding and by what termination hides; pictures of other formats are identical.
 inline float AllowedDifference(const FrameRequest& request) {
-  return request.renderer == RendererKind::kZBuffer ? 0.0F : 2e-5F + float(request.termination);
+  const PixelFormat format = FindRenderer(request.renderer)->format();
+  return format == PixelFormat::kRgba ? 2e-5F + float(request.termination) : 0.0F;
 }
 
 inline double HighestAlpha(const LocalImage& image) {

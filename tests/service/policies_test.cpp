@@ -13,6 +13,7 @@
 #include "common/planning/policy_names.h"
 #include "tests/service/pictures.h"
 #include "tests/support/random_volume.h"
+#include "tests/support/renderers.h"
 
 namespace slabstream {
 namespace {
@@ -46,7 +47,7 @@ TEST_P(PoliciesTest, NeverChangeThePicture) {
   Client client = Client::Connect(context, (*service)->endpoint()).value();
 
   std::size_t frame = 0;
-  for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
+  for (const RendererKind* renderer : Renderers()) {
     for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
       FrameRequest request = TestRequest(renderer, 120, 1);
       request.view.projection = projection;
@@ -99,7 +100,7 @@ TEST(PoliciesStatistics, CountTheBytesOfEveryMessage) {
   const auto service = EmbeddedService::Start(context, options);
   ASSERT_TRUE(service.ok()) << service.status().message();
   Client client = Client::Connect(context, (*service)->endpoint()).value();
-  FrameRequest request = TestRequest(RendererKind::kSplat, 120, 1);
+  FrameRequest request = TestRequest(Splatting(), 120, 1);
   const auto image_bytes = [&](const char* scheme) {
     request.policy.combine = scheme;
     const Result<Picture> picture = client.Render(request, std::chrono::seconds(60));

@@ -45,7 +45,7 @@ class WorkerAndPeer : public testing::Test {
     peer_images_ = images_.Bind(inproc ? images_endpoint + ".peer" : images_endpoint).value();
     options.coordinator_endpoint = "inproc://control";
     options.images_endpoint = inproc ? images_endpoint + ".worker" : images_endpoint;
-    options.make_renderer = [](RendererKind) { return std::make_unique<FixedPicture>(); };
+    options.make_renderer = [](const RendererKind&) { return std::make_unique<FixedPicture>(); };
     worker_ = WorkerService::Start(context_, std::move(options)).value();
     const auto hello = Await<Register>();
     memory_scope_ = peer_scope_ = hello.memory_scope;
@@ -98,6 +98,7 @@ class WorkerAndPeer : public testing::Test {
     assignment.finished_before = frame;
     assignment.group_count = 2;
     FrameSetup& setup = assignment.setup;
+    SetRenderer(*Splatting(), setup);
     setup.dataset = 1;
     setup.description.geometry.size = {8, 8, 32};
     setup.range = {0, 1};

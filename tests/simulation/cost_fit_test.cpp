@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tests/support/random.h"
+#include "tests/support/renderers.h"
 
 namespace slabstream {
 namespace {
@@ -110,16 +111,16 @@ TEST(CostFit, AllStagesOfAPipeline) {
   Random random(6);
   SCOPED_TRACE(random.trace());
   const CostModel model;
-  for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
+  for (const RendererKind* renderer : Renderers()) {
     std::vector<CostSample> samples = MakeSamples(random, Truth(), 60, 0);
     for (CostSample& sample : samples) {
       sample.stage_ns = {};
-      for (const StageCost& stage : model.stages(renderer)) {
+      for (const StageCost& stage : model.stages(renderer->name())) {
         sample.stage_ns[std::size_t(stage.stage)] = std::llround(1e9 * stage.Predict(sample.work) * random.Real(0.95, 1.05));
       }
     }
-    const CostFit fit = FitCosts(model.stages(renderer), samples).value();
-    EXPECT_EQ(fit.stages.size(), model.stages(renderer).size());
+    const CostFit fit = FitCosts(model.stages(renderer->name()), samples).value();
+    EXPECT_EQ(fit.stages.size(), model.stages(renderer->name()).size());
     EXPECT_LT(fit.prediction_error, 0.05);
   }
 }

@@ -13,6 +13,7 @@
 #include "common/planning/frame_window.h"
 #include "tests/simulation/support.h"
 #include "tests/support/random_combining.h"
+#include "tests/support/renderers.h"
 
 namespace slabstream {
 namespace {
@@ -88,14 +89,14 @@ TEST(SimulateFrames, ARenderingIsOrderedWhenTheLastOneIsKnown) {
 }
 
 TEST(SimulateFrames, ColoursInFewerBitsAreFewerBytes) {
-  for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
+  for (const RendererKind* renderer : Renderers()) {
     std::map<ColorCoding, double> bytes;
     for (const ColorCoding color : {ColorCoding::kFloat32, ColorCoding::kHalf, ColorCoding::kFixed16}) {
       MadeFrame frame(5, 2, kSide, 0.5, 1, "fan-in", renderer);
       for (GroupPlan& group : frame.plan().groups) group.color = color;
       bytes[color] = Simulate({frame.input()}, FreeMachine()).frames[0].image_bytes;
     }
-    const double share = renderer == RendererKind::kSplat ? 0.5 : 1;  // depth and index are never coded
+    const double share = renderer->format() == PixelFormat::kRgba ? 0.5 : 1;  // others are never coded
     EXPECT_GT(bytes[ColorCoding::kFloat32], 0);
     EXPECT_DOUBLE_EQ(bytes[ColorCoding::kHalf], share * bytes[ColorCoding::kFloat32]);
     EXPECT_DOUBLE_EQ(bytes[ColorCoding::kFixed16], share * bytes[ColorCoding::kFloat32]);
@@ -251,7 +252,7 @@ RandomRun MakeRandomRun(Random& random) {
   for (int f = 0; f < count; ++f) {
     const auto groups = random.Integer<std::uint32_t>(1, 5);
     auto frame = std::make_unique<MadeFrame>(workers, groups, kSide, random.Real(0, 1), 0, RandomCombining(random),
-                                             random.Chance(0.5) ? RendererKind::kSplat : RendererKind::kZBuffer);
+                                             random.Chance(0.5) ? Splatting() : ZBuffer());
     const std::string combining = RandomCombining(random);
     for (RenderCost& cost : frame->costs()) cost.seconds = random.Real(0, 0.01);
     const auto owners = random.Integer<WorkerId>(1, workers);

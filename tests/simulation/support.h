@@ -6,6 +6,7 @@
 
 #include "common/combining/schemes.h"
 #include "common/simulation/simulate_frames.h"
+#include "tests/support/renderers.h"
 
 namespace slabstream {
 
@@ -27,9 +28,9 @@ class MadeFrame {
   // `groups` groups of `workers` boxes each, box i of worker i % workers + 1, on a frame of side x side pixels of which every image fills
   // `share`; the display worker is the root. `combining`: as --combine takes it.
   MadeFrame(std::uint32_t workers, std::uint32_t groups, std::int32_t side, double share, double seconds, const std::string& combining,
-            RendererKind renderer = RendererKind::kZBuffer)
+            const RendererKind* renderer = ZBuffer())
       : coverage_(UniformCoverage({0, 0, side, side}, share * side * side, side, side)) {
-    plan_.setup.renderer = renderer;
+    plan_.SetRenderer(*renderer, setup);
     plan_.setup.camera.width = plan_.setup.camera.height = side;
     plan_.setup.sheets.width = plan_.setup.sheets.height = side;
     plan_.slots = workers;

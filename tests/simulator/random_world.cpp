@@ -9,6 +9,7 @@
 #include "common/planning/brick_visibility.h"
 #include "common/planning/policy_names.h"
 #include "tests/support/random_combining.h"
+#include "tests/support/renderers.h"
 
 namespace slabstream {
 namespace {
@@ -38,7 +39,8 @@ void MakeVolume(Random& random, World& world) {
   for (int i = 0; i < summary->brick_counts.y * summary->brick_counts.z; ++i) {
     summary->bricks.insert(summary->bricks.end(), layers.begin(), layers.end());
   }
-  world.occupied = std::make_shared<const OccupancyGrid>(BrickVisibility(*summary, StepTransfer()).VisibleCells());
+  world.occupied = std::make_shared<const OccupancyGrid>(
+      BrickVisibility(*summary, Classify(StepTransfer(), summary->description, summary->range)).VisibleCells());
   world.summary = std::move(summary);
 }
 
@@ -82,7 +84,7 @@ SubmitFrame RandomRequest(Random& random, const Policy& policy, RequestId id, st
   submit.frame.view.elevation_degrees = random.Integer(-80, 80);
   submit.frame.view.projection = random.Chance(0.5) ? Projection::kOrthographic : Projection::kPerspective;
   submit.frame.transfer.choice = StepTransfer();
-  if (random.Chance(0.1)) submit.frame.renderer = RendererKind::kZBuffer;
+  if (random.Chance(0.1)) submit.frame.renderer = ZBuffer()->name();
   if (random.Chance(0.1)) submit.frame.termination = 0;
   submit.frame.policy = policy;
   submit.frame.previews = random.Chance(0.3);

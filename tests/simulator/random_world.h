@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "common/planning/frame_request.h"
+#include "common/frame/frame_request.h"
 #include "common/volume/occupancy_grid.h"
 #include "common/volume/summary.h"
 #include "common/wire/client_messages.h"

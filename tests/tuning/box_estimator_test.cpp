@@ -7,6 +7,7 @@
 
 #include "common/decomposition/decomposition.h"
 #include "tests/planning/support.h"
+#include "tests/support/renderers.h"
 
 namespace slabstream {
 namespace {
@@ -25,9 +26,9 @@ OccupancyGrid FilledGrid(const Index3& size, const Box& filled) {
   return grid;
 }
 
-FrameSetup SetupOf(const Index3& size, RendererKind renderer, const ViewParameters& view = {}, int side = 256) {
+FrameSetup SetupOf(const Index3& size, const RendererKind* renderer, const ViewParameters& view = {}, int side = 256) {
   FrameRequest request = SomeRequest();
-  request.renderer = renderer;
+  request.renderer = renderer->name();
   request.view = view;
   request.size = {side, side};
   return MakeFrameSetup(request, 1, FullSummary(size)).value();
@@ -37,7 +38,7 @@ TEST(BoxEstimator, AnOpaqueBlockSeenFromTheFrontCoversItsRectangle) {
   const Index3 size = {128, 128, 128};
   const Box block = {{32, 0, 48}, {96, 128, 112}};
   const OccupancyGrid grid = FilledGrid(size, block);
-  for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
+  for (const RendererKind* renderer : Renderers()) {
     const FrameSetup setup = SetupOf(size, renderer);  // along +y
     const CostModel cost;
     for (const int pixel_side : {1, 3}) {
@@ -46,14 +47,14 @@ TEST(BoxEstimator, AnOpaqueBlockSeenFromTheFrontCoversItsRectangle) {
       const double pixels = estimate.coverage.pixels() * pixel_side * pixel_side;
       // 64 x 64 voxels, as large as they are in the frame; footprints reach a voxel further.
       double scale = 0;
-      if (renderer == RendererKind::kSplat) {
+      if (renderer->along_slices()) {
         const SlicePlacement slice = PlaceSlice(setup.sheets, 64);
         scale = slice.scale_u * slice.scale_v;
       } else {
         const Camera::ImagePoint a = setup.camera.Project({0, 64, 0}), b = setup.camera.Project({1, 64, 0});
         scale = (b.x - a.x) * (b.x - a.x);
       }
-      EXPECT_NEAR(pixels / (64 * 64 * scale), 1, 0.12) << int(renderer) << ", pixels of " << pixel_side;
+      EXPECT_NEAR(pixels / (64 * 64 * scale), 1, 0.12) << renderer->name() << ", pixels of " << pixel_side;
       EXPECT_GT(estimate.seconds, 0);
     }
   }
@@ -62,7 +63,7 @@ TEST(BoxEstimator, AnOpaqueBlockSeenFromTheFrontCoversItsRectangle) {
 TEST(BoxEstimator, BoxesWithoutAnythingCostAndShowNothing) {
   const Index3 size = {64, 64, 64};
   const OccupancyGrid grid = FilledGrid(size, {{0, 0, 0}, {64, 64, 16}});
-  const FrameSetup setup = SetupOf(size, RendererKind::kSplat);
+  const FrameSetup setup = SetupOf(size, Splatting());
   const CostModel cost;
   const BoxEstimator estimator(setup, grid, nullptr, cost, 1);
   const BoxEstimator::Estimate nothing = estimator.Of({{0, 0, 16}, {64, 64, 64}});
@@ -88,7 +89,7 @@ TEST(BoxEstimator, SharesAreSharesAndBoxesCoverWhatTheWholeCovers) {
         }
       }
     }
-    const FrameSetup setup = SetupOf(size, random.Chance(0.5) ? RendererKind::kSplat : RendererKind::kZBuffer, RandomView(random));
+    const FrameSetup setup = SetupOf(size, random.Chance(0.5) ? Splatting() : ZBuffer(), RandomView(random));
     const BoxEstimator estimator(setup, grid, nullptr, cost, random.Integer(1, 4));
     const BoxEstimator::Estimate whole = estimator.Of({{0, 0, 0}, size});
     double sum = 0;
@@ -110,7 +111,7 @@ TEST(BoxEstimator, WhatWasLearntCounts) {
   const OccupancyGrid grid = FilledGrid(size, {{0, 0, 0}, size});
   const std::vector<double> seconds(grid.cells.size(), 0.5);
   const WorkField learnt(size, seconds);
-  const FrameSetup setup = SetupOf(size, RendererKind::kZBuffer);
+  const FrameSetup setup = SetupOf(size, ZBuffer());
   const CostModel cost;
   const BoxEstimator estimator(setup, grid, &learnt, cost, 1);
   EXPECT_NEAR(estimator.Of({{0, 0, 0}, {64, 64, 32}}).seconds, 0.5 * 8 * 8 * 4, 1e-6);

@@ -13,6 +13,7 @@
 #include "common/planning/policy_names.h"
 #include "common/tuning/service_machine.h"
 #include "tests/planning/support.h"
+#include "tests/support/renderers.h"
 
 namespace slabstream {
 namespace {
@@ -77,7 +78,7 @@ TEST_P(ChoosePolicyTest, MakesPlansOfAnyVolumeAndKeepsWhatIsFixed) {
   for (const NamedSummary& volume : OddVolumes()) {
     for (int left_open = 1; left_open < 8; ++left_open) {
       Question question{.summary = volume.summary, .slots = std::uint32_t(GetParam())};
-      question.request.renderer = random.Chance(0.5) ? RendererKind::kSplat : RendererKind::kZBuffer;
+      question.request.renderer = (random.Chance(0.5) ? Splatting() : ZBuffer())->name();
       question.request.view = RandomView(random);
       Policy asked;
       asked.decomposition = (left_open & 1) != 0 ? std::string(kAutomatic) : one_of(Decompositions());

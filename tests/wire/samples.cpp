@@ -1,4 +1,5 @@
 #include "tests/wire/samples.h"
+#include "tests/support/renderers.h"
 
 #include <limits>
 #include <string>
@@ -40,7 +41,7 @@ Shading ManyLights() {
 }
 
 // A group of `ranks` slabs along z, combined by fan-in.
-GroupAssignment Assignment(Rank ranks, const ViewParameters& view, RendererKind renderer) {
+GroupAssignment Assignment(Rank ranks, const ViewParameters& view, const RendererKind* renderer) {
   GroupAssignment message{.epoch = kMax64, .key = {.frame = kMax64, .attempt = kMax32, .group = 3}, .finished_before = kMax64 - 1};
   message.group_count = 1024;
   message.first_group = 3;
@@ -50,7 +51,7 @@ GroupAssignment Assignment(Rank ranks, const ViewParameters& view, RendererKind 
   setup.dataset = kMax32;
   setup.description = Description();
   setup.range = {-1, 1e30F};
-  setup.renderer = renderer;
+  SetRenderer(*renderer, setup);
   SetView(view, {640, 480}, setup);
   setup.transfer = Curve();
   setup.shading = ManyLights();
@@ -63,7 +64,7 @@ GroupAssignment Assignment(Rank ranks, const ViewParameters& view, RendererKind 
     message.peers.push_back({rank + 1, "tcp://127.0.0.1:" + std::to_string(5000 + rank)});
   }
   message.group.schedule = ranks == 0 ? Schedule{.ranks = 0, .root = 0, .steps = {}} : MakeFanIn({ranks, ranks / 2, WholeFrame(setup)});
-  message.group.color = renderer == RendererKind::kSplat ? ColorCoding::kFixed16 : ColorCoding::kFloat32;
+  message.group.color = renderer->format() == PixelFormat::kRgba ? ColorCoding::kFixed16 : ColorCoding::kFloat32;
   message.peers.push_back({kMax32, kOddEndpoint});
   return message;
 }
@@ -76,7 +77,7 @@ OcclusionMask Mask(std::int32_t tiles_x, std::int32_t tiles_y) {
 }
 
 GroupAssignment BehindOthers() {
-  GroupAssignment message = Assignment(2, {}, RendererKind::kSplat);
+  GroupAssignment message = Assignment(2, {}, Splatting());
   message.setup.termination = 0.5;
   message.hidden = Mask(OcclusionTiles(message.setup.sheets.width), OcclusionTiles(message.setup.sheets.height));
   return message;
@@ -121,8 +122,7 @@ std::vector<Ping> Samples() {
 template <>
 std::vector<GroupAssignment> Samples() {
   const ViewParameters oblique{Projection::kPerspective, 1e6, -33, 12.5, 0.01, 60};
-  return {Assignment(3, {}, RendererKind::kSplat), Assignment(0, oblique, RendererKind::kZBuffer),
-          Assignment(16, oblique, RendererKind::kSplat), BehindOthers()};
+  return {Assignment(3, {}, Splatting()), Assignment(0, oblique, ZBuffer()), Assignment(16, oblique, Splatting()), BehindOthers()};
 }
 
 template <>
@@ -217,7 +217,7 @@ template <>
 std::vector<SubmitFrame> Samples() {
   FrameRequest full;
   full.dataset = kLongName;
-  full.renderer = RendererKind::kZBuffer;
+  full.renderer = ZBuffer()->name();
   full.size = {kMaxImageSide, 1};
   full.view = {Projection::kPerspective, kMaxAngleDegrees, -kMaxAngleDegrees, -0.0, kMinZoom, kMinFovDegrees};
   full.transfer = {Curve(), 1e-6};

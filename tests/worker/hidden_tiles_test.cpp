@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/renderers.h"
 #include "tests/worker/worker_machine_fixture.h"
 
 namespace slabstream {
@@ -74,7 +75,7 @@ TEST_F(HiddenTilesTest, AreNotLookedForWhereNothingMayBeLeftOut) {
   exact.setup.termination = 0;
   GroupAssignment depth = Group(0, 3);
   depth.key.frame = 2;
-  depth.setup.renderer = RendererKind::kZBuffer;
+  depth.SetRenderer(*ZBuffer(), setup);
   depth.setup.camera.width = 4;
   depth.setup.camera.height = 2;
   GroupAssignment only = Group(0, 1);

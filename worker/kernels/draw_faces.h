@@ -14,7 +14,7 @@
 
 #include <cstdint>
 
-#include "common/image/local_image.h"
+#include "common/image/pixel_bounds.h"
 #include "common/view/camera.h"
 #include "worker/kernels/surface_face.h"
 

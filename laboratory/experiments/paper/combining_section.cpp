@@ -20,7 +20,7 @@ FrameCase With(FrameCase frame, const char* scheme) {
 }  // namespace
 
 Result<Section> CombiningSection(const PaperSetup& setup) {
-  const Result<MachineModel> machine = setup.Machine(RendererKind::kSplat);
+  const Result<MachineModel> machine = setup.Machine(Splatting());
   if (!machine.ok()) return machine.status();
   Table table{"table-2-combining",
               fmt::format("Table 2. A frame by splatting, N = {}, on the paper's bus scaled to these processors", setup.table_size()),
@@ -38,7 +38,7 @@ Result<Section> CombiningSection(const PaperSetup& setup) {
   int last_p = 1;
   for (const int p : setup.workers()) {
     if (p == 1) continue;
-    const FrameCase frame = setup.Frame(RendererKind::kSplat, setup.table_size(), p);
+    const FrameCase frame = setup.Frame(Splatting(), setup.table_size(), p);
     std::vector<Cell> row = {Cell::Parameter(p)};
     std::array<double, 4> seconds{};
     std::size_t at = 0;
@@ -73,7 +73,7 @@ Result<Section> CombiningSection(const PaperSetup& setup) {
     LineSeries series{fmt::format("N = {}", size), Origin::kSimulated, {}};
     for (const int p : setup.workers()) {
       if (p == 1) continue;
-      const Result<PaperFrame> frame = CountAsPaper(setup, setup.Frame(RendererKind::kSplat, size, p), *machine);
+      const Result<PaperFrame> frame = CountAsPaper(setup, setup.Frame(Splatting(), size, p), *machine);
       if (!frame.ok()) return frame.status();
       const double ms = frame->combine_seconds * 1e3;
       series.points.push_back({double(p), ms});

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/simulation/cost_fit.h"
 #include "laboratory/experiments/paper/measures.h"
 #include "laboratory/experiments/paper/printed.h"
 #include "laboratory/report/text.h"
-#include "common/simulation/cost_fit.h"
 
 namespace slabstream {
 namespace {
@@ -56,7 +56,7 @@ void Note(Term& term, double seconds, double units) {
   if (units > 0 && seconds > 0) term.values.push_back(seconds / units);
 }
 
-Status Collect(const PaperSetup& setup, RendererKind renderer, std::vector<Term>& terms) {
+Status Collect(const PaperSetup& setup, const RendererKind* renderer, std::vector<Term>& terms) {
   const Result<MachineModel> machine = setup.Machine(renderer);
   if (!machine.ok()) return machine.status();
   for (const int size : setup.sizes()) {
@@ -73,7 +73,7 @@ Status Collect(const PaperSetup& setup, RendererKind renderer, std::vector<Term>
       const double voxels = double(size) * size * size;
       const auto seconds = [&](Stage stage) { return measured->StageSeconds(stage); };
       Note(terms[0], seconds(Stage::kTransform), voxels);
-      if (renderer == RendererKind::kSplat) {
+      if (renderer == Splatting()) {
         Note(terms[1], seconds(Stage::kShade), occupied);
         Note(terms[2], seconds(Stage::kSplat), occupied);
         Note(terms[3], seconds(Stage::kComposite), pixels * size);
@@ -124,7 +124,7 @@ struct Fit {
   Table table;
   std::string errors;  // "shade 4 %, splat 12 %"
 };
-Result<Fit> FitModel(const PaperSetup& setup, RendererKind renderer, const std::string& name, const std::string& title) {
+Result<Fit> FitModel(const PaperSetup& setup, const RendererKind* renderer, const std::string& name, const std::string& title) {
   std::vector<CostSample> samples;
   for (const int size : setup.sizes()) {
     for (const int p : setup.workers()) {
@@ -145,7 +145,7 @@ Result<Fit> FitModel(const PaperSetup& setup, RendererKind renderer, const std::
        {}},
       ""};
   const CostModel model;
-  for (const StageCost& stage : model.stages(renderer)) {
+  for (const StageCost& stage : model.stages(renderer->name())) {
     const Result<StageFit> fitted = FitStage(stage, samples);
     if (!fitted.ok()) continue;
     bool first = true;
@@ -170,12 +170,12 @@ Result<Fit> FitModel(const PaperSetup& setup, RendererKind renderer, const std::
 
 Result<Section> ConstantsSection(const PaperSetup& setup) {
   std::vector<Term> splatting = SplattingTerms(), zbuffer = ZBufferTerms();
-  if (Status status = Collect(setup, RendererKind::kSplat, splatting); !status.ok()) return status;
-  if (Status status = Collect(setup, RendererKind::kZBuffer, zbuffer); !status.ok()) return status;
+  if (Status status = Collect(setup, Splatting(), splatting); !status.ok()) return status;
+  if (Status status = Collect(setup, ZBuffer(), zbuffer); !status.ok()) return status;
 
-  const Result<Fit> splatting_fit = FitModel(setup, RendererKind::kSplat, "fit-splatting", "Our own model of splatting, fitted");
+  const Result<Fit> splatting_fit = FitModel(setup, Splatting(), "fit-splatting", "Our own model of splatting, fitted");
   if (!splatting_fit.ok()) return splatting_fit.status();
-  const Result<Fit> zbuffer_fit = FitModel(setup, RendererKind::kZBuffer, "fit-zbuffer", "Our own model of the Z-buffer, fitted");
+  const Result<Fit> zbuffer_fit = FitModel(setup, ZBuffer(), "fit-zbuffer", "Our own model of the Z-buffer, fitted");
   if (!zbuffer_fit.ok()) return zbuffer_fit.status();
 
   Section section;

@@ -6,9 +6,9 @@
 
 #include "laboratory/experiments/paper/setup.h"
 #include "laboratory/experiments/plots.h"
-#include "laboratory/report/charts.h"
 #include "laboratory/measure/splat_loops.h"
 #include "laboratory/measure/thread_time.h"
+#include "laboratory/report/charts.h"
 
 namespace slabstream {
 namespace {
@@ -40,7 +40,7 @@ Trial MeasureWidth(int side, int k) {
 }
 
 FrameCase OccupancyFrame(const PaperSetup& setup, double occupancy) {
-  FrameCase frame = setup.Frame(RendererKind::kSplat, setup.large_size(), kFigureWorkers);
+  FrameCase frame = setup.Frame(Splatting(), setup.large_size(), kFigureWorkers);
   frame.volume = SphereCase({SphereClass::kFilled, setup.large_size(), occupancy}, kTranslucentSphere);
   return frame;
 }
@@ -97,7 +97,7 @@ Result<Section> FootprintSection(const PaperSetup& setup) {
   for (const int size : setup.sizes()) {
     LineSeries series{fmt::format("N = {}", size), Origin::kMeasured, {}};
     for (const int p : setup.workers()) {
-      const Result<Estimate> ms = SlowestSplat(setup, setup.Frame(RendererKind::kSplat, size, p));
+      const Result<Estimate> ms = SlowestSplat(setup, setup.Frame(Splatting(), size, p));
       if (!ms.ok()) return ms.status();
       series.points.push_back(PointOf(p, *ms));
       table.rows.push_back({"a: slab", Cell::Parameter(size), Cell::Parameter(p), {}, {}, Cell(*ms, Origin::kMeasured)});

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 
+#include "common/renderers/registry.h"
 #include "laboratory/experiments/balanced_case.h"
 #include "laboratory/experiments/machines.h"
 #include "laboratory/experiments/paper/printed.h"
@@ -35,7 +36,7 @@ FrameCase With(FrameCase frame, const Policy& policy) {
 }
 
 // The paper's machine and what it counts, or a cluster of today with everything.
-Result<MachineModel> MachineOf(const PaperSetup& setup, RendererKind renderer, std::string_view link) {
+Result<MachineModel> MachineOf(const PaperSetup& setup, const RendererKind* renderer, std::string_view link) {
   if (link == "pvs") return setup.Machine(renderer);
   return Cluster(setup.context(), Link(link));
 }
@@ -75,7 +76,7 @@ std::vector<NamedPolicy> Partitions() {
 // Frames of one pipeline and size on one machine, however they are divided.
 class Improved {
  public:
-  static Result<Improved> Make(const PaperSetup& setup, RendererKind renderer, int size, std::string_view link) {
+  static Result<Improved> Make(const PaperSetup& setup, const RendererKind* renderer, int size, std::string_view link) {
     Result<MachineModel> machine = MachineOf(setup, renderer, link);
     if (!machine.ok()) return machine.status();
     return Improved(setup, renderer, size, link, *std::move(machine));
@@ -116,7 +117,7 @@ class Improved {
   }
 
  private:
-  Improved(const PaperSetup& setup, RendererKind renderer, int size, std::string_view link, MachineModel machine)
+  Improved(const PaperSetup& setup, const RendererKind* renderer, int size, std::string_view link, MachineModel machine)
       : setup_(setup), renderer_(renderer), size_(size), paper_(link == "pvs"), machine_(std::move(machine)) {}
 
   // The paper's times end with the combined image.
@@ -146,7 +147,7 @@ class Improved {
   }
 
   const PaperSetup& setup_;
-  RendererKind renderer_;
+  const RendererKind* renderer_;
   int size_;
   bool paper_;
   MachineModel machine_;
@@ -170,7 +171,7 @@ std::vector<Trial> ImprovedTrials(const PaperSetup& setup) {
     for (const int team : TeamSizes(p)) shared.insert(team);
   }
   std::vector<Trial> trials;
-  for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
+  for (const RendererKind* renderer : {Splatting(), ZBuffer()}) {
     for (const int size : Sizes(setup)) {
       for (const int p : shared) {
         const FrameCase frame = setup.Frame(renderer, size, p);
@@ -203,8 +204,8 @@ Result<Section> ImprovedSection(const PaperSetup& setup) {
   Section section;
   std::string everybody, teams;
   const int most_workers = Workers(setup).back();
-  for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
-    const bool splat = renderer == RendererKind::kSplat;
+  for (const RendererKind* renderer : {Splatting(), ZBuffer()}) {
+    const bool splat = renderer == Splatting();
     LineChart chart{fmt::format("{}: efficiency with streaming and balance", splat ? "Splatting" : "Z-buffer"),
                     {"workers p", ""},
                     {"efficiency", "%", AxisScale::kLinear, true},
@@ -231,7 +232,7 @@ Result<Section> ImprovedSection(const PaperSetup& setup) {
             const Result<Outcome> best = improved->FindBest(p, team);
             if (!best.ok()) return best.status();
             const double efficiency = 100 * one->seconds / best->seconds / p, limit = 100 * one->render / team / best->most;
-            table.rows.push_back({std::string(NameOf(renderer)),
+            table.rows.push_back({std::string(renderer->title()),
                                   Cell::Parameter(size),
                                   link,
                                   Cell::Parameter(p),
@@ -252,11 +253,11 @@ Result<Section> ImprovedSection(const PaperSetup& setup) {
             if (team == p) {
               everybody +=
                   fmt::format("{}{} {:.0f} % ({}; boxes take {:.2f} times as long as the whole, the longest {:.2f} times the mean)",
-                              everybody.empty() ? "" : ", ", NameOf(renderer), efficiency, link, best->render / one->render,
+                              everybody.empty() ? "" : ", ", renderer->title(), efficiency, link, best->render / one->render,
                               best->most * team / best->render);
             } else if (team <= 2) {
               teams +=
-                  fmt::format("{}{} {:.0f} % in teams of {} ({})", teams.empty() ? "" : ", ", NameOf(renderer), efficiency, team, link);
+                  fmt::format("{}{} {:.0f} % in teams of {} ({})", teams.empty() ? "" : ", ", renderer->title(), efficiency, team, link);
             }
           }
         }
@@ -281,7 +282,7 @@ Result<Section> ImprovedSection(const PaperSetup& setup) {
 
   // What it looks like, a few frames of it.
   const int p = Workers(setup)[std::min<std::size_t>(1, Workers(setup).size() - 1)];
-  const FrameCase shown = setup.Frame(RendererKind::kSplat, setup.large_size(), p);
+  const FrameCase shown = setup.Frame(Splatting(), setup.large_size(), p);
   const Result<MeasuredFrame> slabs = Recall(setup.context(), shown);
   if (!slabs.ok()) return slabs.status();
   const NamedPolicy balanced = BalancedTree();

@@ -35,7 +35,7 @@ Result<Report> RunPaper(ExperimentContext& context) {
   for (auto* make : {TransformSection, FootprintSection, ConstantsSection, CombiningSection}) {
     if (Status status = report.Add(make(setup)); !status.ok()) return status;
   }
-  for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
+  for (const RendererKind* renderer : {Splatting(), ZBuffer()}) {
     if (Status status = report.Add(PipelineSection(setup, renderer)); !status.ok()) return status;
   }
   for (auto* make : {ImprovedSection, ValidationSection, PicturesSection}) {

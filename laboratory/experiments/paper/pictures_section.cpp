@@ -4,8 +4,9 @@
 
 #include "client/cli/files.h"
 #include "client/cli/session.h"
-#include "laboratory/experiments/paper/setup.h"
 #include "client/image_io/image_writer.h"
+#include "common/renderers/registry.h"
+#include "laboratory/experiments/paper/setup.h"
 
 namespace slabstream {
 namespace {
@@ -30,8 +31,7 @@ Result<Photo> Render(const PaperSetup& setup, BenchCase volume, const std::strin
   const std::string folder = setup.context().options().folder + "/pictures";
   std::error_code error;
   std::filesystem::create_directories(folder, error);
-  const std::string path =
-      fmt::format("{}/{}-{}.png", folder, volume.dataset, volume.renderer == RendererKind::kSplat ? "splat" : "zbuffer");
+  const std::string path = fmt::format("{}/{}-{}.png", folder, volume.dataset, volume.renderer->name());
   PictureFormat format;
   format.background = {0, 0, 0, 1};
   if (Status status = WritePicture(picture->image, picture->size, path, format); !status.ok()) return status;
@@ -53,17 +53,17 @@ Result<Section> PicturesSection(const PaperSetup& setup) {
   if (!heads.ok()) return heads.status();
   heads->resize(std::min<std::size_t>(heads->size(), 1));
   const SphereRequest sphere{SphereClass::kFilled, setup.Scaled(128), 0.4};
-  for (const RendererKind renderer : {RendererKind::kZBuffer, RendererKind::kSplat}) {
+  for (const RendererKind* renderer : {ZBuffer(), Splatting()}) {
     for (BenchCase head : *heads) {
       head.renderer = renderer;
-      Result<Photo> photo = Render(setup, head, fmt::format("Figure 12: {} by {}", head.dataset, NameOf(renderer)));
+      Result<Photo> photo = Render(setup, head, fmt::format("Figure 12: {} by {}", head.dataset, renderer->title()));
       if (!photo.ok()) return photo.status();
       section.blocks.emplace_back(*std::move(photo));
     }
   }
-  for (const RendererKind renderer : {RendererKind::kZBuffer, RendererKind::kSplat}) {
+  for (const RendererKind* renderer : {ZBuffer(), Splatting()}) {
     Result<Photo> photo = Render(setup, SphereCase(sphere, kOpaqueSphere, renderer),
-                                 fmt::format("Figure 13: a sphere, {0} x {0} x {0}, by {1}", sphere.size, NameOf(renderer)));
+                                 fmt::format("Figure 13: a sphere, {0} x {0} x {0}, by {1}", sphere.size, renderer->title()));
     if (!photo.ok()) return photo.status();
     section.blocks.emplace_back(*std::move(photo));
   }

@@ -4,6 +4,7 @@
 #include <span>
 #include <utility>
 
+#include "common/renderers/registry.h"
 #include "laboratory/experiments/paper/measures.h"
 #include "laboratory/experiments/paper/printed.h"
 #include "laboratory/experiments/plots.h"
@@ -15,10 +16,12 @@ namespace {
 
 // One pipeline: how its tables and figures are called, its stages, and what the paper prints.
 struct Pipeline {
-  RendererKind renderer;
+  const RendererKind* renderer;
   const char* title;
   const char* table;
   const char* figure;
+  const char* table_number;                                        // "5", in the paper
+  const char* figure_number;                                       // "10"
   std::vector<std::pair<std::string, std::vector<Stage>>> stages;  // the paper's name, ours; combining comes last
   std::span<const double> paper_seconds;
   std::vector<std::vector<double>> paper_shares;  // by stage and combining
@@ -31,13 +34,15 @@ std::vector<std::vector<double>> Shares(const std::array<std::array<double, 7>, 
   return copy;
 }
 
-Pipeline PipelineOf(RendererKind renderer) {
-  if (renderer == RendererKind::kSplat) {
+Pipeline PipelineOf(const RendererKind* renderer) {
+  if (renderer == Splatting()) {
     return {
         renderer,
         "Splatting: table 5 and figure 10",
         "table-5-splatting",
         "figure-10",
+        "5",
+        "10",
         {{"transform", {Stage::kTransform}}, {"shade", {Stage::kShade}}, {"splat", {Stage::kSplat}}, {"composite", {Stage::kComposite}}},
         printed::kSplattingSeconds,
         Shares(printed::kSplattingShares)};
@@ -47,6 +52,8 @@ Pipeline PipelineOf(RendererKind renderer) {
       "Z-buffer: table 6 and figure 11",
       "table-6-zbuffer",
       "figure-11",
+      "6",
+      "11",
       {{"transform", {Stage::kTransform}}, {"Z-buffer", {Stage::kZBuffer, Stage::kSplat, Stage::kComposite}}, {"shade", {Stage::kShade}}},
       printed::kZBufferSeconds,
       Shares(printed::kZBufferShares)};
@@ -94,7 +101,7 @@ double Efficiency(double one, double seconds, int p) { return 100 * one / second
 
 }  // namespace
 
-Result<Section> PipelineSection(const PaperSetup& setup, RendererKind renderer) {
+Result<Section> PipelineSection(const PaperSetup& setup, const RendererKind* renderer) {
   const Pipeline pipeline = PipelineOf(renderer);
   const Result<MachineModel> machine = setup.Machine(renderer);
   if (!machine.ok()) return machine.status();
@@ -111,8 +118,7 @@ Result<Section> PipelineSection(const PaperSetup& setup, RendererKind renderer) 
 
   // The table, and the same as bars.
   Table table{pipeline.table,
-              fmt::format("{} N = {}: a frame and the share of each stage, per cent",
-                          renderer == RendererKind::kSplat ? "Table 5." : "Table 6.", tabled.size),
+              fmt::format("Table {}. N = {}: a frame and the share of each stage, per cent", pipeline.table_number, tabled.size),
               {{"p", ""}, {"time", "ms"}},
               {}};
   BarChart bars{fmt::format("Where a frame's time goes, N = {}", tabled.size),
@@ -169,13 +175,13 @@ Result<Section> PipelineSection(const PaperSetup& setup, RendererKind renderer) 
   Section section;
   section.title = pipeline.title;
   section.question =
-      fmt::format("How long does a frame by {} take, how much do p workers gain, and where does the time go?", NameOf(renderer));
+      fmt::format("How long does a frame by {} take, how much do p workers gain, and where does the time go?", renderer->title());
   section.method =
       "As the paper did it: class-I spheres, equal slabs, hierarchical combining, one frame at a time, nobody balanced. Slabs are measured "
       "one by one; with p = 1 that is the whole frame. For more workers the combining of whole images is simulated on the paper's bus, "
       "scaled to these processors. Shares are of the frame's time: stages of the worker that renders longest, and what combining adds to "
       "it.";
-  if (renderer == RendererKind::kZBuffer) section.method += " Our Z-buffer transforms a voxel as it draws it: the one stage holds both.";
+  if (renderer == ZBuffer()) section.method += " Our Z-buffer transforms a voxel as it draws it: the one stage holds both.";
   section.answer = fmt::format(
       "At N = {}, p = {} the speed-up is {:.1f}, an efficiency of {:.0f} % (the paper at N = 200, p = 30: {:.1f}, {:.0f} %), with {:.0f} % "
       "of the time in combining (the paper: {:.0f} %). One processor takes {:.1f} ms where theirs took {:.0f} s, about {} times less; "
@@ -188,7 +194,7 @@ Result<Section> PipelineSection(const PaperSetup& setup, RendererKind renderer) 
           ? " Rendering has gained more than the combining of whole images, so combining weighs more than it did and efficiency falls with "
             "fewer workers."
           : "");
-  const std::string figure = pipeline.figure, number = renderer == RendererKind::kSplat ? "10" : "11";
+  const std::string figure = pipeline.figure, number = pipeline.figure_number;
   section.blocks = {std::move(table),
                     Figure{figure + "-stages", DrawBars(bars), "Ours and the paper's, side by side."},
                     Figure{figure + "a-time",

@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "client/cli/bench_machine.h"
+#include "common/renderers/registry.h"
 #include "laboratory/experiments/machines.h"
 #include "laboratory/experiments/paper/printed.h"
 
@@ -34,9 +35,9 @@ std::vector<int> PaperSetup::MeasuredWorkers() const {
   return workers;
 }
 
-FrameCase PaperSetup::Frame(RendererKind renderer, int size, int workers) const {
+FrameCase PaperSetup::Frame(const RendererKind* renderer, int size, int workers) const {
   FrameCase frame;
-  const double opacity = renderer == RendererKind::kSplat ? kTranslucentSphere : kOpaqueSphere;
+  const double opacity = HasDepth(renderer->format()) ? kOpaqueSphere : kTranslucentSphere;
   frame.volume = SphereCase({SphereClass::kHollow, size, kOccupancy}, opacity, renderer);
   frame.size = {size, size};
   frame.view.azimuth_degrees = kAzimuth;
@@ -47,7 +48,7 @@ FrameCase PaperSetup::Frame(RendererKind renderer, int size, int workers) const 
   return frame;
 }
 
-Result<MachineModel> PaperSetup::Machine(RendererKind renderer) const {
+Result<MachineModel> PaperSetup::Machine(const RendererKind* renderer) const {
   const Result<MeasuredFrame> one = Recall(context_, Frame(renderer, table_size(), 1));
   if (!one.ok()) return one.status();
   return PaperMachine(context_, one->RenderSeconds(), double(table_size()) * table_size());
@@ -55,7 +56,7 @@ Result<MachineModel> PaperSetup::Machine(RendererKind renderer) const {
 
 std::vector<FrameCase> PaperSetup::Frames() const {
   std::vector<FrameCase> frames;
-  for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
+  for (const RendererKind* renderer : {Splatting(), ZBuffer()}) {
     for (const int size : sizes_) {
       for (const int p : workers_) frames.push_back(Frame(renderer, size, p));
     }

@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "laboratory/experiments/frame_case.h"
 #include "common/simulation/machine_model.h"
+#include "laboratory/experiments/frame_case.h"
 
 namespace slabstream {
 
@@ -22,10 +22,10 @@ class PaperSetup {
 
   // Class I with 5 % of its voxels occupied, equal slabs, one group, on sqrt(3) N x sqrt(3) N pixels: a pixel a voxel, and the whole cube
   // in view whichever way it is turned.
-  FrameCase Frame(RendererKind renderer, int size, int workers) const;
+  FrameCase Frame(const RendererKind* renderer, int size, int workers) const;
 
   // PaperMachine, by what a frame of the tables' N takes here.
-  Result<MachineModel> Machine(RendererKind renderer) const;
+  Result<MachineModel> Machine(const RendererKind* renderer) const;
 
   // All of (renderer, size, workers).
   std::vector<FrameCase> Frames() const;
@@ -44,7 +44,7 @@ std::vector<Trial> FrameTrials(const PaperSetup& setup);
 Result<Section> ValidationSection(const PaperSetup& setup);
 Result<Section> CombiningSection(const PaperSetup& setup);
 Result<Section> ConstantsSection(const PaperSetup& setup);
-Result<Section> PipelineSection(const PaperSetup& setup, RendererKind renderer);
+Result<Section> PipelineSection(const PaperSetup& setup, const RendererKind* renderer);
 std::vector<Trial> ImprovedTrials(const PaperSetup& setup);
 Result<Section> ImprovedSection(const PaperSetup& setup);
 Result<Section> PicturesSection(const PaperSetup& setup);

@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 
+#include "common/renderers/registry.h"
 #include "laboratory/experiments/paper/setup.h"
 #include "laboratory/report/charts.h"
 
@@ -52,8 +53,8 @@ Result<Section> ValidationSection(const PaperSetup& setup) {
   std::map<int, Errors> by_workers;
   double least = std::numeric_limits<double>::infinity(), most = 0;
   for (const int p : setup.MeasuredWorkers()) {
-    for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer}) {
-      LineSeries series{fmt::format("{}, p = {}", NameOf(renderer), p), Origin::kSimulated, {}};
+    for (const RendererKind* renderer : {Splatting(), ZBuffer()}) {
+      LineSeries series{fmt::format("{}, p = {}", renderer->title(), p), Origin::kSimulated, {}};
       for (const int size : setup.sizes()) {
         const FrameCase frame = setup.Frame(renderer, size, p);
         const Estimate measured = EstimateOf(setup.context().log(), ValidationKey(frame), "measured_ms");
@@ -62,7 +63,7 @@ Result<Section> ValidationSection(const PaperSetup& setup) {
         const double error = error_against(measured.median);
         Errors& errors = by_workers[p];
         (measured.median >= kLongMilliseconds ? errors.long_frames : errors.short_frames).push_back(std::abs(error));
-        table.rows.push_back({std::string(NameOf(renderer)), Cell::Parameter(size), Cell::Parameter(p), Cell(measured, Origin::kMeasured),
+        table.rows.push_back({std::string(renderer->title()), Cell::Parameter(size), Cell::Parameter(p), Cell(measured, Origin::kMeasured),
                               Cell(simulated, Origin::kSimulated), Cell(error, Origin::kSimulated)});
         series.points.push_back({measured.median, error, error_against(measured.high), error_against(measured.low)});
         least = std::min(least, measured.median);

@@ -1,0 +1,68 @@
+// FrameRequest: one picture, as a client asks for it. Policy: how the service is to make it; it can never change the picture.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <string_view>
+#include <variant>
+
+#include "common/base/status.h"
+#include "common/classification/transfer_function.h"
+#include "common/view/camera.h"
+#include "common/view/shading.h"
+
+namespace slabstream {
+
+inline constexpr int kMaxGroups = 1024, kMaxTeams = 1024;
+inline constexpr double kDefaultTermination = 1.0 / 1024, kMaxTermination = 0.5;
+inline constexpr double kMaxPixelError = 0.1;
+inline constexpr std::size_t kMaxNameBytes = 256;
+
+// kAuto: z, or the longest axis of slabs (SlabAxis), so that turning the view never moves voxels. kView: the axis along which the slices of
+// the frame are traversed, so that no slice is divided; each of the three axes has a layout of its own, whose voxels workers fetch when a
+// view first needs it.
+enum class AxisChoice : std::uint8_t { kX = 0, kY = 1, kZ = 2, kAuto = 3, kView = 4 };
+
+struct Policy {
+  std::string decomposition = "slab";  // a name of Decompositions(), or "auto" (kAutomatic), as the other names
+  std::string split = "auto";          // of WorkSplits(): what boxes have equal shares of
+  AxisChoice axis = AxisChoice::kAuto;
+  int groups = 0;                     // [1, kMaxGroups]; 0: the planner chooses
+  std::string assignment = "cyclic";  // of Assignments(), or "auto": who owns which box
+  std::string balance = "static";     // of BalanceModes(): whether boxes change while frames go by
+  std::string combine = "fan-in";     // a scheme with its arguments (common/combining/schemes.h), or "auto"
+  // How far a channel of the picture may be moved by sending colours in fewer bits between workers: [0, kMaxPixelError]; 0: not at all.
+  double pixel_error = 0;
+  int teams = 1;  // [1, kMaxTeams]: that frames go to in turn (common/planning/team.h); 1: all workers share every frame
+  friend bool operator==(const Policy&, const Policy&) = default;
+};
+
+// A preset's name (resolved by the coordinator, which knows the volume) or the function itself.
+struct TransferChoice {
+  std::variant<std::string, TransferFunction> choice = std::string("auto");
+  double opacity_distance = 1;  // voxel lengths; replaces that of a preset or function
+  friend bool operator==(const TransferChoice&, const TransferChoice&) = default;
+};
+
+// Values of a renderer's parameters (RendererKind::parameters), by name, as a user types them. What is left out has its default.
+using ParameterTexts = std::map<std::string, std::string, std::less<>>;
+inline constexpr std::size_t kMaxParameters = 32;
+inline constexpr std::string_view kDefaultRenderer = "splat";
+
+struct FrameRequest {
+  std::string dataset;                     // a name of the catalogue, 1 ... kMaxNameBytes
+  std::string renderer{kDefaultRenderer};  // a name of Renderers() (common/renderers/registry.h)
+  ParameterTexts parameters;               // of the renderer
+  ImageSize size;
+  ViewParameters view;
+  TransferChoice transfer;
+  Shading shading;
+  double termination = kDefaultTermination;  // [0, kMaxTermination]: transmittance below which what lies behind is skipped; 0: never
+  Policy policy;
+  bool previews = false;  // a picture after each group
+  friend bool operator==(const FrameRequest&, const FrameRequest&) = default;
+};
+
+}  // namespace slabstream

@@ -1,0 +1,49 @@
+// FrameSetup: what every worker needs to render its part of a frame. It is made once a frame (MakeFrameSetup, common/planning) and never
+// changes: a new plan after a lost worker changes who does what, and nothing here.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/classification/transfer_function.h"
+#include "common/frame/frame_request.h"
+#include "common/image/pixel_bounds.h"
+#include "common/image/pixel_format.h"
+#include "common/view/sheet_grid.h"
+#include "common/volume/summary.h"
+
+namespace slabstream {
+
+class RendererKind;  // common/renderers/renderer_kind.h
+
+using DatasetId = std::uint32_t;  // one loaded volume within one coordinator's life. 0: none
+
+struct FrameSetup {
+  DatasetId dataset = 0;
+  VolumeDescription description;
+  ValueRange range;                         // data values that the classification table is made for
+  const RendererKind* renderer = nullptr;   // of Renderers(); lives as long as the program
+  std::vector<double> parameters;           // one value for each of renderer->parameters()
+  PixelFormat format = PixelFormat::kRgba;  // of local images: renderer->format(), so that combining need not know renderers
+  Camera camera;                            // of the picture, perhaps supersampled
+  SheetGrid sheets;                         // the frame grid of renderers that work along slices; empty: the camera's grid
+  TransferFunction transfer;
+  Shading shading;
+  double termination = kDefaultTermination;
+  std::int32_t halo = kHalo;  // voxels that a worker keeps round a box
+  friend bool operator==(const FrameSetup&, const FrameSetup&) = default;
+};
+
+// All pixels that workers render and combine, and that the final picture is made from. Local images, runs and pixel ranges lie in it.
+PixelBounds FrameBounds(const FrameSetup& setup);
+inline PixelRange WholeFrame(const FrameSetup& setup) { return {0, std::uint64_t(FrameBounds(setup).pixel_count())}; }
+// Memory of an image of the whole frame.
+std::int64_t FrameBytes(const FrameSetup& setup);
+
+// Pixels of the frame that samples of `box` can lie in, whatever its voxels.
+PixelBounds ReachOf(const Box& box, const FrameSetup& setup);
+
+// Voxels that a worker must hold to render `box`: the box and its halo, cut to the volume.
+inline Box SlabBox(const Box& box, const FrameSetup& setup) { return Grown(box, setup.halo, setup.description.geometry.bounds()); }
+
+}  // namespace slabstream

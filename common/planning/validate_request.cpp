@@ -1,0 +1,54 @@
+#include "common/planning/validate_request.h"
+
+#include <fmt/format.h>
+
+#include "common/renderers/registry.h"
+#include "common/view/range_status.h"
+
+namespace slabstream {
+namespace {
+
+Status ValidateName(std::string_view field, std::string_view name) {
+  if (!name.empty() && name.size() <= kMaxNameBytes) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("{} has {} bytes, but must have 1 to {}", field, name.size(), kMaxNameBytes));
+}
+
+Status Validate(const TransferChoice& transfer) {
+  if (const auto* preset = std::get_if<std::string>(&transfer.choice)) {
+    if (Status s = ValidateName("transfer.preset", *preset); !s.ok()) return s;
+  } else if (Status s = Validate(std::get<TransferFunction>(transfer.choice)); !s.ok()) {
+    return s;
+  }
+  if (transfer.opacity_distance > 0 && transfer.opacity_distance <= kMaxOpacityDistance) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("transfer.opacity_distance is {}, but must lie in (0, {}] voxel lengths",
+                                             transfer.opacity_distance, kMaxOpacityDistance));
+}
+
+Status Validate(const Policy& policy) {
+  if (Status s = ValidateName("policy.decomposition", policy.decomposition); !s.ok()) return s;
+  if (Status s = InRange("policy.axis", int(policy.axis), int(AxisChoice::kX), int(AxisChoice::kView)); !s.ok()) return s;
+  if (Status s = InRange("policy.groups", policy.groups, 0, kMaxGroups); !s.ok()) return s;
+  if (Status s = ValidateName("policy.split", policy.split); !s.ok()) return s;
+  if (Status s = ValidateName("policy.assignment", policy.assignment); !s.ok()) return s;
+  if (Status s = ValidateName("policy.balance", policy.balance); !s.ok()) return s;
+  if (Status s = ValidateName("policy.combine", policy.combine); !s.ok()) return s;
+  if (Status s = InRange("policy.teams", policy.teams, 1, kMaxTeams); !s.ok()) return s;
+  return InRange("policy.pixel_error", policy.pixel_error, 0, kMaxPixelError);
+}
+
+}  // namespace
+
+Status Validate(const FrameRequest& request) {
+  if (Status s = ValidateName("dataset", request.dataset); !s.ok()) return s;
+  const Result<const RendererKind*> renderer = RequireRenderer(request.renderer);
+  if (!renderer.ok()) return renderer.status();
+  if (const auto parameters = ParseParameters(**renderer, request.parameters); !parameters.ok()) return parameters.status();
+  if (Status s = Validate(request.size); !s.ok()) return s;
+  if (Status s = Validate(request.view); !s.ok()) return s;
+  if (Status s = Validate(request.transfer); !s.ok()) return s;
+  if (Status s = Validate(request.shading); !s.ok()) return s;
+  if (Status s = InRange("termination", request.termination, 0, kMaxTermination); !s.ok()) return s;
+  return Validate(request.policy);
+}
+
+}  // namespace slabstream

@@ -1,0 +1,12 @@
+// What a request must hold before anything is made of it.
+#pragma once
+
+#include "common/base/status.h"
+#include "common/frame/frame_request.h"
+
+namespace slabstream {
+
+// InvalidArgument naming field, value and limit. Names of the policy are looked up later (CheckNames, common/planning/layout.h).
+Status Validate(const FrameRequest& request);
+
+}  // namespace slabstream

@@ -1,0 +1,107 @@
+// RendererKind: the planning half of a renderer. It answers what the planner, the coordinator, the wire, the command line and the
+// laboratory ask about a renderer, without voxels, sockets, threads or clocks. The pixel half (worker/renderers/renderer.h) renders boxes.
+// Both halves have one name; common/renderers/CMakeLists.txt has the only list of names.
+//
+// Every kind is a constant object (Renderers()) that any thread may use.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "common/base/status.h"
+#include "common/classification/classification_table.h"
+#include "common/frame/frame_setup.h"
+#include "common/stats/report.h"
+#include "common/volume/occupancy_grid.h"
+#include "common/volume/summary.h"
+
+namespace slabstream {
+
+struct LocalImage;
+
+// A number or a choice that a request may set for a renderer, such as sampling-rate. The command line takes it as --NAME.
+struct RendererParameter {
+  std::string_view name;                  // lower case with hyphens
+  std::string_view purpose;               // one line for --help
+  double standard = 0;                    // if the request says nothing; of choices, an index
+  double least = 0, most = 0;             // limits of a number
+  std::vector<std::string_view> choices;  // by value; empty: a number
+};
+
+// The direction and scale from which a cost is asked for.
+struct CostView {
+  Axis along = Axis::kY;        // data axis nearest to the view direction
+  double pixels_per_voxel = 1;  // of the frame, for the smallest side of a voxel, > 0
+};
+
+// The time that boxes of one volume take under one transfer function.
+class AnalyticCost {
+ public:
+  virtual ~AnalyticCost() = default;
+  // Seconds of one thread; 0 if the box draws nothing. `box` lies inside the volume and is not empty.
+  virtual double Seconds(const Box& box, const CostView& view) const = 0;
+};
+
+// What a AnalyticCost is made from; all of it must outlive it.
+struct CostBasis {
+  const OccupancyGrid* drawn = nullptr;  // voxels that the renderer draws (RendererKind::DrawnTable)
+  const VolumeSummary* summary = nullptr;
+  const TransferFunction* transfer = nullptr;
+};
+
+class RendererKind {
+ public:
+  struct Facts {
+    std::string_view name;                    // of --renderer and of messages: "splat"
+    std::string_view title;                   // in reports: "splatting"
+    std::string_view purpose;                 // one line for --help
+    PixelFormat format = PixelFormat::kRgba;  // of local images; it says how they combine (common/kernels/combine.h)
+    std::int32_t reach = kHalo;               // voxels outside a box that its samples depend on, [0, kHalo]
+    bool along_slices = false;                // the frame is an image along the slices (SheetGrid), else the camera's
+    double footprint = 1;                     // pixels that a voxel fills, for each pixel of its cross-section
+    std::vector<Stage> stages;                // that the pixel half charges, in the order of work
+    std::vector<RendererParameter> parameters;
+  };
+
+  explicit RendererKind(Facts facts) : facts_(std::move(facts)) {}
+  virtual ~RendererKind() = default;
+  RendererKind(const RendererKind&) = delete;
+  RendererKind& operator=(const RendererKind&) = delete;
+
+  std::string_view name() const { return facts_.name; }
+  std::string_view title() const { return facts_.title; }
+  std::string_view purpose() const { return facts_.purpose; }
+  PixelFormat format() const { return facts_.format; }
+  std::int32_t reach() const { return facts_.reach; }
+  bool along_slices() const { return facts_.along_slices; }
+  double footprint() const { return facts_.footprint; }
+  const std::vector<Stage>& stages() const { return facts_.stages; }
+  const std::vector<RendererParameter>& parameters() const { return facts_.parameters; }
+
+  // Fills in the frame that workers render for a picture of `size` under `view`, both valid: camera, and sheets if the renderer works
+  // along slices. `setup` has its description. InvalidArgument: the frame would be too large.
+  virtual Status SetView(const ViewParameters& view, ImageSize size, FrameSetup& setup) const = 0;
+
+  // The classification table whose opacity is 0 in exactly the bins that the renderer does not draw. Boxes without a drawn voxel within
+  // their reach are not rendered, and empty space is skipped by it.
+  virtual ClassificationTable DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const;
+
+  virtual std::unique_ptr<AnalyticCost> MakeCost(const CostBasis& basis) const = 0;
+
+  // The picture: of the whole accumulated frame, which stores all its pixels. Bounds of the result are in pixels of the picture. Runs
+  // within the caller's task arena. The default resamples a frame along slices, and averages supersampled pixels.
+  virtual LocalImage Finish(const LocalImage& frame, const FrameSetup& setup) const;
+  // Whether that would be a copy of the frame.
+  virtual bool FrameIsPicture(const FrameSetup& setup) const;
+
+ private:
+  const Facts facts_;
+};
+
+// Makes `setup` one for this renderer: renderer, format, halo, and parameters by default.
+void SetRenderer(const RendererKind& kind, FrameSetup& setup);
+
+}  // namespace slabstream

@@ -1,0 +1,26 @@
+// SplatCost: the time that splatting takes in a box, from the lines of cells that hold anything (splat_work.h).
+#pragma once
+
+#include "common/renderers/renderer_kind.h"
+#include "common/renderers/splat/splat_work.h"
+
+namespace slabstream::splat {
+
+// The opacity of material, as the extinction coefficient of a voxel length; finite, >= 0. It is the median over the voxels that show
+// anything, by the volume's histogram. A mean would be that of a few dense voxels in a volume that is thin otherwise.
+double MedianExtinction(const TransferFunction& transfer, const VolumeSummary& summary);
+
+class SplatCost : public AnalyticCost {
+ public:
+  explicit SplatCost(const CostBasis& basis)
+      : SplatCost(*basis.drawn, basis.summary->description.geometry.spacing, MedianExtinction(*basis.transfer, *basis.summary)) {}
+  // `drawn` must outlive this. `spacing` > 0. `extinction` as above.
+  SplatCost(const OccupancyGrid& drawn, const Vec3& spacing, double extinction) : work_(drawn, spacing, extinction) {}
+
+  double Seconds(const Box& box, const CostView& view) const override;
+
+ private:
+  const SplatWork work_;
+};
+
+}  // namespace slabstream::splat

@@ -1,0 +1,47 @@
+// Splatting's planning half: the frame is an image along the slices of the volume (sheet_grid.h), and all voxels that show anything draw.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/renderers/splat/splat_cost.h"
+
+namespace slabstream::splat {
+namespace {
+
+Status CheckGrid(const SheetGrid& sheets) {
+  if (std::max(sheets.width, sheets.height) <= kMaxGridSide) return Status::Ok();
+  return Status::InvalidArgument(
+      fmt::format("an image along the slices of this view has {} x {} pixels, but at most {} a side are possible: "
+                  "the slices lie too far apart for the width of their voxels",
+                  sheets.width, sheets.height, kMaxGridSide));
+}
+
+class SplatKind : public RendererKind {
+ public:
+  SplatKind()
+      : RendererKind({.name = "splat",
+                      .title = "splatting",
+                      .purpose = "soft footprints of all voxels that show anything; for translucent volumes",
+                      .format = PixelFormat::kRgba,
+                      .reach = kHalo,
+                      .along_slices = true,
+                      .footprint = 4,
+                      .stages = {Stage::kTransform, Stage::kShade, Stage::kSplat, Stage::kComposite}}) {}
+
+  Status SetView(const ViewParameters& view, ImageSize size, FrameSetup& setup) const override {
+    const VolumeGeometry& geometry = setup.description.geometry;
+    setup.camera = MakeCamera(view, size, geometry);
+    setup.sheets = MakeSheetGrid(setup.camera, geometry);
+    return CheckGrid(setup.sheets);
+  }
+  std::unique_ptr<AnalyticCost> MakeCost(const CostBasis& basis) const override { return std::make_unique<SplatCost>(basis); }
+};
+
+}  // namespace
+
+const RendererKind& Kind() {
+  static const SplatKind kind;
+  return kind;
+}
+
+}  // namespace slabstream::splat

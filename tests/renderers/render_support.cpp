@@ -1,0 +1,162 @@
+#include "tests/renderers/render_support.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "common/base/check.h"
+#include "common/decomposition/decomposition.h"
+#include "common/kernels/combine.h"
+#include "tests/support/renderers.h"
+
+namespace slabstream::testing {
+
+Volume MakeVolume(const VolumeGeometry& geometry, ScalarType type, const std::function<double(const Index3&)>& value) {
+  Volume volume{{geometry, type, {}}, MakeVoxelBlock(geometry.bounds(), type)};
+  VisitScalarType(type, [&](auto* tag) {
+    auto* samples = volume.block.samples<std::remove_cvref_t<decltype(*tag)>>();
+    for (Index3 v; v.z < geometry.size.z; ++v.z) {
+      for (v.y = 0; v.y < geometry.size.y; ++v.y) {
+        for (v.x = 0; v.x < geometry.size.x; ++v.x) samples[volume.block.Offset(v)] = std::remove_cvref_t<decltype(*tag)>(value(v));
+      }
+    }
+  });
+  return volume;
+}
+
+Volume MakeBlobs(const VolumeGeometry& geometry, ScalarType type, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  struct Wave {
+    Vec3 k;
+    double phase;
+  };
+  std::vector<Wave> waves;
+  for (int i = 0; i < 5; ++i) waves.push_back({{uniform(random), uniform(random), uniform(random)}, 6 * uniform(random)});
+  return MakeVolume(geometry, type, [&](const Index3& v) {
+    double sum = 0;
+    for (const Wave& wave : waves) sum += std::sin(Dot(wave.k, ToVec3(v)) + wave.phase);
+    return std::clamp(100 * sum, 0.0, 200.0);
+  });
+}
+
+Volume MakeBlock(const VolumeGeometry& geometry) {
+  return MakeVolume(geometry, ScalarType::kUint8, [](const Index3&) { return 100; });
+}
+
+TransferFunction Ramp(double opacity) {
+  TransferFunction transfer;
+  transfer.colors = {{0, {0.9F, 0.2F, 0.1F}}, {100, {0.3F, 0.8F, 0.2F}}, {200, {0.2F, 0.4F, 1.0F}}};
+  transfer.opacities = {{0, 0, 0.5, 0}, {200, opacity, 0.5, 0}};
+  return transfer;
+}
+
+TransferFunction Uniform(double opacity, Rgb color) {
+  TransferFunction transfer;
+  transfer.colors = {{0, color}};
+  transfer.opacities = {{0, 0, 0.5, 0}, {1, opacity, 0.5, 0}};
+  return transfer;
+}
+
+FrameSetup MakeSetup(const Volume& volume, const SetupOptions& options) {
+  FrameSetup setup;
+  setup.description = volume.description;
+  setup.range = Summarize(volume).range;
+  SetRenderer(*options.renderer, setup);
+  SetView(options.view, options.size, setup);
+  setup.transfer = options.transfer;
+  setup.shading = options.shading;
+  setup.termination = options.termination;
+  return setup;
+}
+
+ViewParameters RandomView(Projection projection, std::mt19937& random) {
+  std::uniform_real_distribution<double> uniform(0, 1);
+  ViewParameters view;
+  view.projection = projection;
+  view.azimuth_degrees = 360 * uniform(random);
+  view.elevation_degrees = std::asin(2 * uniform(random) - 1) * 57.29577951308232;
+  view.roll_degrees = 360 * uniform(random);
+  view.zoom = 0.5 + uniform(random);
+  view.fov_degrees = 10 + 50 * uniform(random);
+  return view;
+}
+
+std::unique_ptr<SlabData> CutSlab(const Volume& volume, const Box& box) { return std::make_unique<SlabData>(CutBlock(volume.block, box)); }
+
+LocalImage RenderWhole(const Volume& volume, const FrameSetup& setup) {
+  const Box whole = volume.description.geometry.bounds();
+  const auto slab = CutSlab(volume, whole);
+  RankReport report;
+  return MakeRenderer(*setup.renderer)->Render(*slab, whole, setup, {}, std::atomic<bool>(false), report).value();
+}
+
+LocalImage RenderByBoxes(const Volume& volume, const FrameSetup& setup, const Partition& partition) {
+  LocalImage frame = MakeLocalImage(setup.format, {});
+  for (BoxId id : VisibilityOrder(partition, setup.camera)) {
+    const Box& box = partition.boxes()[id];
+    const auto slab = CutSlab(volume, SlabBox(box, setup));
+    RankReport report;
+    Combine(frame, MakeRenderer(*setup.renderer)->Render(*slab, box, setup, {}, std::atomic<bool>(false), report).value(), Side::kBack);
+  }
+  return frame;
+}
+
+LocalImage RenderPicture(const Volume& volume, const FrameSetup& setup) { return FinishPicture(RenderWhole(volume, setup), setup); }
+
+Partition CutIntoSlabs(const Volume& volume, int boxes, Axis axis) {
+  const WorkField voxels = WorkField::Uniform(volume.description.geometry.size);
+  return MakeSlabs({.work = &voxels, .boxes = boxes, .axis = axis});
+}
+
+Partition CutAtRandom(const Box& bounds, int boxes, std::mt19937& random) {
+  std::vector<Partition::Node> nodes(1);
+  std::vector<Box> extents = {bounds};
+  std::vector<std::uint32_t> leaves = {0};
+  for (int tries = 0; int(leaves.size()) < boxes; ++tries) {
+    CHECK_LT(tries, 1000) << "no room for so many boxes";
+    const std::size_t at = std::uniform_int_distribution<std::size_t>(0, leaves.size() - 1)(random);
+    const std::uint32_t node = leaves[at];
+    const Axis axis = kAxes[std::uniform_int_distribution<std::size_t>(0, 2)(random)];
+    const Box extent = extents[node];
+    if (extent.size()[axis] < 2) continue;
+    const auto position = std::uniform_int_distribution<std::int32_t>(extent.begin[axis] + 1, extent.end[axis] - 1)(random);
+    Box lower = extent, upper = extent;
+    lower.end[axis] = upper.begin[axis] = position;
+    nodes[node] = {false, axis, position, std::uint32_t(nodes.size()), std::uint32_t(nodes.size() + 1), 0};
+    leaves[at] = std::uint32_t(nodes.size());
+    leaves.push_back(std::uint32_t(nodes.size() + 1));
+    nodes.resize(nodes.size() + 2);
+    extents.push_back(lower);
+    extents.push_back(upper);
+  }
+  BoxId id = 0;
+  for (Partition::Node& node : nodes) {
+    if (node.leaf) node.box = id++;
+  }
+  return {bounds, std::move(nodes)};
+}
+
+std::array<float, 4> PixelOf(const LocalImage& image, int x, int y) {
+  const PixelBounds& b = image.bounds;
+  if (x < b.x_begin || x >= b.x_end || y < b.y_begin || y >= b.y_end) return {};
+  const float* pixel = &image.rgba[4 * (std::size_t(y - b.y_begin) * std::size_t(b.width()) + std::size_t(x - b.x_begin))];
+  return {pixel[0], pixel[1], pixel[2], pixel[3]};
+}
+
+float LargestDifference(const LocalImage& a, const LocalImage& b) {
+  float largest = 0;
+  const PixelBounds bounds = Union(a.bounds, b.bounds);
+  for (int y = bounds.y_begin; y < bounds.y_end; ++y) {
+    for (int x = bounds.x_begin; x < bounds.x_end; ++x) {
+      const auto pa = PixelOf(a, x, y), pb = PixelOf(b, x, y);
+      for (std::size_t c = 0; c < 4; ++c) {
+        const float difference = std::abs(pa[c] - pb[c]);
+        if (!(difference <= largest)) largest = difference;  // keeps NaN
+      }
+    }
+  }
+  return largest;
+}
+
+}  // namespace slabstream::testing

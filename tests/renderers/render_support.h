@@ -1,0 +1,63 @@
+// What the rendering tests share: small volumes from closed forms, frame set-ups, rendering by one box or by many, and comparison of
+// images.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "common/decomposition/partition.h"
+#include "tests/support/renderers.h"
+#include "worker/renderers/renderer.h"
+
+namespace slabstream::testing {
+
+// A volume of `type` whose voxel (x, y, z) stores value(x, y, z).
+Volume MakeVolume(const VolumeGeometry& geometry, ScalarType type, const std::function<double(const Index3&)>& value);
+
+// Blobs, holes and slopes with values 0 ... 200, different for each seed; about half of the voxels are 0.
+Volume MakeBlobs(const VolumeGeometry& geometry, ScalarType type, unsigned seed);
+
+// Every voxel stores 100.
+Volume MakeBlock(const VolumeGeometry& geometry);
+
+// Opacity 0 at value 0, then rising linearly to `opacity` at 200; colours that change with the value.
+TransferFunction Ramp(double opacity);
+// Opacity `opacity` of every value from 1 on, in one colour.
+TransferFunction Uniform(double opacity, Rgb color);
+
+struct SetupOptions {
+  const RendererKind* renderer = Splatting();
+  ViewParameters view;
+  ImageSize size{64, 64};
+  TransferFunction transfer = Ramp(0.2);
+  Shading shading;
+  double termination = 0;
+};
+FrameSetup MakeSetup(const Volume& volume, const SetupOptions& options);
+
+ViewParameters RandomView(Projection projection, std::mt19937& random);
+
+// The voxels of `box`, which lies in the volume.
+std::unique_ptr<SlabData> CutSlab(const Volume& volume, const Box& box);
+
+// The frame, of the whole volume as one box.
+LocalImage RenderWhole(const Volume& volume, const FrameSetup& setup);
+// Each box of the partition from its own slab, combined in visibility order.
+LocalImage RenderByBoxes(const Volume& volume, const FrameSetup& setup, const Partition& partition);
+// The picture, of the whole volume as one box.
+LocalImage RenderPicture(const Volume& volume, const FrameSetup& setup);
+
+// `boxes` slabs along an axis (fewer where there are not as many slices).
+Partition CutIntoSlabs(const Volume& volume, int boxes, Axis axis);
+// A kd-tree with `boxes` leaves cut at random places.
+Partition CutAtRandom(const Box& bounds, int boxes, std::mt19937& random);
+
+// Four channels of a pixel; zeros outside the image's bounds.
+std::array<float, 4> PixelOf(const LocalImage& image, int x, int y);
+// Largest difference of any channel of any pixel of either image.
+float LargestDifference(const LocalImage& a, const LocalImage& b);
+
+}  // namespace slabstream::testing

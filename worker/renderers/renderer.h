@@ -1,0 +1,38 @@
+// Renderer: the pixel half of a renderer. It turns the voxels of a box (with their halo) into the box's local image: the samples that the
+// box owns, for a frame's camera, transfer function and shading. The planning half is RendererKind (common/renderers/renderer_kind.h).
+//
+// Each sample belongs to exactly one box, and a box computes the same samples however the volume is divided (docs/rendering.md): where a
+// box begins or ends decides which samples it owns, and nothing else.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+
+#include "common/base/status.h"
+#include "common/frame/frame_setup.h"
+#include "common/image/local_image.h"
+#include "common/image/occlusion_mask.h"
+#include "common/stats/report.h"
+#include "worker/renderers/slab_data.h"
+
+namespace slabstream {
+
+class Renderer {
+ public:
+  virtual ~Renderer() = default;
+
+  // Local image of `box`, whose voxels and halo (SlabBox) lie in `slab`, in setup.format. Pixels that `hidden` hides may be left empty.
+  // Adds stage times, spans and counts to `report`. If `cancelled` becomes true it stops soon and returns Cancelled. Called within the task
+  // arena of the worker's render threads: parallel algorithms of oneTBB use as many threads as the worker has. A stage's time is that of
+  // all threads together.
+  virtual Result<LocalImage> Render(SlabData& slab, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
+                                    const std::atomic<bool>& cancelled, RankReport& report) = 0;
+};
+
+// The pixel half of `kind`, one of Renderers().
+std::unique_ptr<Renderer> MakeRenderer(const RendererKind& kind);
+
+using RendererFactory = std::function<std::unique_ptr<Renderer>(const RendererKind&)>;
+
+}  // namespace slabstream

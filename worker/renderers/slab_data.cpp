@@ -1,0 +1,36 @@
+#include "worker/renderers/slab_data.h"
+
+namespace slabstream {
+
+const VoxelBlock& SlabData::voxels() const {
+  if (bricks_) {
+    block_ = MakeVoxelBlock(bricks_->grid().box, bricks_->type());
+    bricks().Read(block_.box, 0, block_.bytes);
+    bricks_.reset();
+  }
+  return block_;
+}
+
+const BrickRanges& SlabData::ranges() {
+  if (!ranges_) ranges_.emplace(bricks());
+  return *ranges_;
+}
+
+const ClassificationTable& SlabData::Classification(const FrameSetup& setup) {
+  // A slab's description never changes: it is that of its dataset.
+  auto key = std::pair(setup.transfer, setup.range);
+  if (classified_ != key) {
+    table_ = Classify(setup.transfer, setup.description, setup.range);
+    classified_ = std::move(key);
+  }
+  return table_;
+}
+
+std::size_t SlabData::bytes() const {
+  std::size_t total = block_.bytes.capacity() + (bricks_ ? bricks_->bytes() : 0) + (ranges_ ? ranges_->bytes() : 0);
+  total += table_.opacity.capacity() * sizeof(float) + table_.color.capacity() * sizeof(Rgb);
+  for (const auto& [type, cache] : caches_) total += cache->bytes();
+  return total;
+}
+
+}  // namespace slabstream

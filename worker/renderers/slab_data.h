@@ -1,0 +1,65 @@
+// SlabData: the voxels of one slab with its halo, and what renderers made from them once. One thread at a time uses it.
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <optional>
+#include <typeindex>
+#include <utility>
+
+#include "common/classification/classification_table.h"
+#include "common/frame/frame_setup.h"
+#include "common/volume/bricks.h"
+#include "worker/renderers/brick_ranges.h"
+
+namespace slabstream {
+
+// What one renderer keeps of a slab between frames. Each renderer has a class of its own.
+class SlabCache {
+ public:
+  virtual ~SlabCache() = default;
+  virtual std::size_t bytes() const = 0;  // memory
+};
+
+class SlabData {
+ public:
+  explicit SlabData(VoxelBlock voxels) : block_(std::move(voxels)) {}
+  explicit SlabData(BrickedVoxels voxels) : bricks_(std::move(voxels)) {}
+  SlabData(const SlabData&) = delete;
+  SlabData& operator=(const SlabData&) = delete;
+
+  // All voxels as one block. The first call makes it if there are bricks only, which then go; from the next one on any thread may call.
+  const VoxelBlock& voxels() const;
+  VoxelBricks bricks() const { return bricks_ ? VoxelBricks(*bricks_) : VoxelBricks(block_); }
+
+  // The range of samples of each brick.
+  const BrickRanges& ranges();
+
+  // The table of this frame's transfer function. Valid until the next call.
+  const ClassificationTable& Classification(const FrameSetup& setup);
+
+  // The renderer's cache; made by the first call.
+  template <std::derived_from<SlabCache> Cache>
+  Cache& CacheOf() {
+    std::unique_ptr<SlabCache>& cache = caches_[typeid(Cache)];
+    if (cache == nullptr) cache = std::make_unique<Cache>();
+    return static_cast<Cache&>(*cache);
+  }
+
+  // Memory of voxels and everything made from them.
+  std::size_t bytes() const;
+
+ private:
+  // The same samples, in one of two ways.
+  mutable VoxelBlock block_;
+  mutable std::optional<BrickedVoxels> bricks_;  // then block_ is empty
+
+  std::optional<BrickRanges> ranges_;
+  std::optional<std::pair<TransferFunction, ValueRange>> classified_;  // what table_ was made from
+  ClassificationTable table_;
+  std::map<std::type_index, std::unique_ptr<SlabCache>> caches_;
+};
+
+}  // namespace slabstream

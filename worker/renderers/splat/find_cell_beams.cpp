@@ -1,0 +1,250 @@
+// FindCellBeams: two passes over the bricks that may hold anything, a row of bricks along x as a task. The first one marks occupied voxels,
+// which says where each beam's records begin; the second one fills them in.
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <type_traits>
+
+#include "worker/kernels/brick_normals.h"
+#include "worker/renderers/splat/occupied_cells.h"
+
+namespace slabstream {
+namespace {
+
+static_assert(kCellVoxels == 32, "masks are 32 bits");
+static_assert(kCellVoxels % kBrick == 0, "a brick's row lies in one cell");
+static_assert(kNormalRow == kBrick && kSelectRow == kBrick);
+
+using RowMasks = std::array<std::uint16_t, kBrick>;  // bit i of [y]: a property of the brick's voxel i of row y
+
+template <class T>
+class BeamFinder {
+ public:
+  BeamFinder(const VoxelBricks& voxels, const BrickRanges& ranges, const BinLookup<T>& lookup, const Vec3& spacing)
+      : voxels_(voxels), grid_(voxels.grid()), lookup_(lookup), spacing_(spacing), intervals_(lookup.Intervals()), shows_(grid_.size()) {
+    Box& box = beams_.box;
+    box = {grid_.box.end, grid_.box.begin};
+    ForEachBrick([&](const Index3& brick) {
+      const BrickRanges::Range& range = ranges.Of(brick);
+      if (!lookup.AnyBetween(range.min, range.max)) return;
+      shows_[grid_.Number(brick)] = 1;
+      const Box part = grid_.BoxOf(brick);
+      for (int axis = 0; axis < 3; ++axis) {
+        box.begin[axis] = std::min(box.begin[axis], part.begin[axis]);
+        box.end[axis] = std::max(box.end[axis], part.end[axis]);
+      }
+    });
+    if (box.empty()) box = {};
+  }
+
+  CellBeams Find() && {
+    const Box& box = beams_.box;
+    if (box.empty()) return std::move(beams_);
+    beams_.first_cell = box.begin.x / kCellVoxels;
+    beams_.cell_count = (box.end.x - 1) / kCellVoxels + 1 - beams_.first_cell;
+    beams_.beam_count = std::size_t(box.size().y) * std::size_t(box.size().z);
+    beams_.masks = MakeLargeArray<std::uint32_t>(beams_.cells());
+    beams_.first_record = MakeLargeArray<std::uint64_t>(beams_.beam_count + 1);
+    ForEachRowOfBricks([this](const Index3& first) { Mark(first); });
+    std::uint64_t total = 0;
+    for (std::size_t beam = 0; beam <= beams_.beam_count; ++beam) {
+      const std::uint64_t count = beam < beams_.beam_count ? beams_.first_record[beam] : 0;
+      beams_.first_record[beam] = total;
+      total += count;
+    }
+    beams_.records = MakeLargeArray<VoxelRecord>(total);
+    ForEachRowOfBricks([this](const Index3& first) { Fill(first); });
+    return std::move(beams_);
+  }
+
+ private:
+  template <class Function>
+  void ForEachBrick(Function&& function) const {
+    const Index3 begin = grid_.first, end = {begin.x + grid_.counts.x, begin.y + grid_.counts.y, begin.z + grid_.counts.z};
+    for (Index3 brick = begin; brick.z < end.z; ++brick.z) {
+      for (brick.y = begin.y; brick.y < end.y; ++brick.y) {
+        for (brick.x = begin.x; brick.x < end.x; ++brick.x) function(brick);
+      }
+    }
+  }
+
+  // Of the box of the beams; calls function(first brick).
+  template <class Function>
+  void ForEachRowOfBricks(Function&& function) const {
+    const BrickGrid bricks(beams_.box);
+    tbb::parallel_for(0, bricks.counts.y * bricks.counts.z, [&](std::int32_t row) {
+      function(Index3{bricks.first.x, bricks.first.y + row % bricks.counts.y, bricks.first.z + row / bricks.counts.y});
+    });
+  }
+
+  // The row's bricks that may hold anything.
+  template <class Function>
+  void ForEachShown(Index3 brick, Function&& function) const {
+    for (const std::int32_t end = (beams_.box.end.x - 1) / kBrick + 1; brick.x < end; ++brick.x) {
+      if (shows_[grid_.Number(brick)] != 0) function(brick);
+    }
+  }
+
+  std::size_t BeamOf(std::int32_t y, std::int32_t z) const {
+    return std::size_t(z - beams_.box.begin.z) * beams_.Stride(Axis::kZ) + std::size_t(y - beams_.box.begin.y);
+  }
+  std::uint32_t* MasksOf(std::size_t beam) const { return &beams_.masks[beam * std::size_t(beams_.cell_count)]; }
+  std::size_t CellOf(std::int32_t x) const { return std::size_t(x / kCellVoxels - beams_.first_cell); }
+
+  // Masks of the row's beams, and for now the number of their records in first_record.
+  void Mark(const Index3& first_brick) {
+    const Box row = grid_.BoxOf(first_brick);
+    const auto cell_count = std::size_t(beams_.cell_count);
+    for (std::int32_t z = row.begin.z; z < row.end.z; ++z) {
+      std::fill_n(MasksOf(BeamOf(row.begin.y, z)), std::size_t(row.size().y) * cell_count, 0U);
+    }
+    ForEachShown(first_brick, [&](const Index3& brick) {
+      const BrickView<T> view = voxels_.View<T>(brick);
+      const Box box = grid_.BoxOf(brick);
+      const std::int32_t width = box.size().x, height = box.size().y;
+      for (std::int32_t z = box.begin.z; z < box.end.z; ++z) {
+        RowMasks masks{};
+        Select(view.Row(box.begin.y, z), view.y_stride, width, height, masks);
+        std::uint32_t* cell = MasksOf(BeamOf(box.begin.y, z)) + CellOf(box.begin.x);
+        for (std::int32_t y = 0; y < height; ++y, cell += cell_count) {
+          *cell |= std::uint32_t{masks[std::size_t(y)]} << (box.begin.x % kCellVoxels);
+        }
+      }
+    });
+    for (std::int32_t z = row.begin.z; z < row.end.z; ++z) {
+      for (std::int32_t y = row.begin.y; y < row.end.y; ++y) {
+        const std::size_t beam = BeamOf(y, z);
+        const std::uint32_t* masks = MasksOf(beam);
+        std::uint32_t records = 0;  // a beam has at most kMaxVolumeSide
+        for (std::size_t cell = 0; cell < cell_count; ++cell) records += std::uint32_t(std::popcount(masks[cell]));
+        beams_.first_record[beam] = records;
+      }
+    }
+  }
+
+  void Select(const T* samples, std::ptrdiff_t stride, std::int32_t width, std::int32_t height, RowMasks& masks) const {
+    constexpr std::size_t kFewIntervals = 4;
+    if (width == kBrick && intervals_.size() <= kFewIntervals) {
+      SelectSamples<T>(samples, stride, height, intervals_, masks.data());
+      return;
+    }
+    for (std::int32_t y = 0; y < height; ++y, samples += stride) {
+      for (std::int32_t x = 0; x < width; ++x) {
+        masks[std::size_t(y)] = std::uint16_t(masks[std::size_t(y)] | std::uint32_t{lookup_(samples[x]) != kNotSelected} << x);
+      }
+    }
+  }
+
+  void Fill(const Index3& first_brick) {
+    const Box row = grid_.BoxOf(first_brick);
+    const auto height = std::size_t(row.size().y);
+    std::array<std::array<std::uint64_t, kBrick>, kBrick> next;  // [z][y]: the record that comes next
+    for (std::int32_t z = row.begin.z; z < row.end.z; ++z) {
+      std::copy_n(&beams_.first_record[BeamOf(row.begin.y, z)], height, next[std::size_t(z - row.begin.z)].begin());
+    }
+    std::array<NormalSums, 3> planes;  // of z: [z % 3]
+    ForEachShown(first_brick, [&](const Index3& brick) {
+      const BrickView<T> view = voxels_.View<T>(brick);
+      const Box box = grid_.BoxOf(brick);
+      const std::int32_t shift = box.begin.x % kCellVoxels;
+      const std::uint32_t width_bits = (std::uint32_t{1} << box.size().x) - 1;
+      NormalScales scales = ScalesIn(box);
+      std::int32_t summed_end = grid_.box.begin.z;  // planes before this one are there, as far as they are needed again
+      for (std::int32_t z = box.begin.z; z < box.end.z; ++z) {
+        RowMasks masks;
+        std::uint32_t rows = 0;
+        const std::uint32_t* cell = MasksOf(BeamOf(box.begin.y, z)) + CellOf(box.begin.x);
+        for (std::size_t y = 0; y < height; ++y, cell += beams_.cell_count) {
+          masks[y] = std::uint16_t(*cell >> shift & width_bits);
+          rows |= std::uint32_t{masks[y] != 0} << y;
+        }
+        if (rows == 0) continue;
+        const std::int32_t below = std::max(z - 1, grid_.box.begin.z), above = std::min(z + 1, grid_.box.end.z - 1);
+        for (summed_end = std::max(summed_end, below); summed_end <= above; ++summed_end) {
+          NormalSamples<T> samples;
+          LoadPlane(box, brick, summed_end, samples);
+          SumPlane<T>(samples, planes[std::size_t(summed_end % 3)]);
+        }
+        scales.z = ScaleAt(Axis::kZ, z);
+        std::uint16_t codes[kBrick][kBrick];
+        EncodeNormals(planes[std::size_t(below % 3)], planes[std::size_t(z % 3)], planes[std::size_t(above % 3)], scales, rows, codes);
+        for (; rows != 0; rows &= rows - 1) {
+          const auto y = std::size_t(std::countr_zero(rows));
+          std::uint64_t& place = next[std::size_t(z - box.begin.z)][y];
+          place += WriteRecords(masks[y], view.Row(box.begin.y + std::int32_t(y), z), codes[y], &beams_.records[place]);
+        }
+      }
+    });
+  }
+
+  std::uint64_t WriteRecords(std::uint32_t mask, const T* samples, const std::uint16_t* codes, VoxelRecord* out) const {
+    if (mask == 0xFFFF) {
+      for (std::size_t i = 0; i < std::size_t{kBrick}; ++i) out[i] = {lookup_(samples[i]), codes[i]};
+      return kBrick;
+    }
+    std::uint64_t count = 0;
+    for (; mask != 0; mask &= mask - 1, ++count) {
+      const auto i = std::size_t(std::countr_zero(mask));
+      out[count] = {lookup_(samples[i]), codes[i]};
+    }
+    return count;
+  }
+
+  // A plane of the brick with one voxel more on each side.
+  void LoadPlane(const Box& box, const Index3& brick, std::int32_t z, NormalSamples<T>& samples) const {
+    const Box& all = grid_.box;
+    const bool has_left = box.begin.x > all.begin.x, has_right = box.end.x < all.end.x;
+    const std::int32_t width = box.size().x;
+    BrickView<T> middle, left, right;
+    std::int32_t row_of_views = -1;
+    for (std::int32_t y = box.begin.y - 1; y <= box.end.y; ++y) {
+      const std::int32_t inside = std::clamp(y, all.begin.y, all.end.y - 1);
+      if (inside / kBrick != row_of_views) {
+        row_of_views = inside / kBrick;
+        const std::int32_t layer = z / kBrick;
+        middle = voxels_.View<T>({brick.x, row_of_views, layer});
+        if (has_left) left = voxels_.View<T>({brick.x - 1, row_of_views, layer});
+        if (has_right) right = voxels_.View<T>({brick.x + 1, row_of_views, layer});
+      }
+      const T* from = middle.Row(inside, z);
+      T* to = samples.row[y - box.begin.y + 1];
+      std::copy_n(from, width, to + 1);
+      to[0] = has_left ? left.Row(inside, z)[box.begin.x - left.begin.x - 1] : from[0];
+      to[width + 1] = has_right ? right.Row(inside, z)[0] : from[width - 1];
+    }
+  }
+
+  float ScaleAt(Axis axis, std::int32_t at) const {
+    const int steps = int(at > grid_.box.begin[axis]) + int(at + 1 < grid_.box.end[axis]);
+    return steps == 0 ? 0.0F : float(1 / (steps * spacing_[axis]));
+  }
+  NormalScales ScalesIn(const Box& box) const {
+    NormalScales scales;
+    for (std::int32_t i = 0; i < box.size().x; ++i) scales.x[std::size_t(i)] = ScaleAt(Axis::kX, box.begin.x + i);
+    for (std::int32_t i = 0; i < box.size().y; ++i) scales.y[std::size_t(i)] = ScaleAt(Axis::kY, box.begin.y + i);
+    return scales;
+  }
+
+  const VoxelBricks& voxels_;
+  const BrickGrid& grid_;
+  const BinLookup<T>& lookup_;
+  const Vec3 spacing_;
+  const std::vector<SampleInterval<T>> intervals_;
+  std::vector<std::uint8_t> shows_;  // by brick: 1 where a selected sample may be
+  CellBeams beams_;
+};
+
+}  // namespace
+
+CellBeams FindCellBeams(const VoxelBricks& voxels, const BrickRanges& bricks, const ClassificationTable& table,
+                        const BinSelection& selection, const Vec3& spacing) {
+  return VisitScalarType(voxels.type(), [&](auto* type) {
+    using T = std::remove_cvref_t<decltype(*type)>;
+    const BinLookup<T> lookup(table, selection);
+    return BeamFinder<T>(voxels, bricks, lookup, spacing).Find();
+  });
+}
+
+}  // namespace slabstream

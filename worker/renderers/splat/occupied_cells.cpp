@@ -1,0 +1,103 @@
+#include "worker/renderers/splat/occupied_cells.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_reduce.h>
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+
+#include "common/base/check.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::int32_t kCell = kCellVoxels;
+
+// What was found in some slices.
+struct Found {
+  Index3 begin = {kFar, kFar, kFar}, end;
+  std::uint64_t in_box = 0;
+
+  static constexpr std::int32_t kFar = std::numeric_limits<std::int32_t>::max();
+  void Include(const Found& other) {
+    for (int axis = 0; axis < 3; ++axis) {
+      begin[axis] = std::min(begin[axis], other.begin[axis]);
+      end[axis] = std::max(end[axis], other.end[axis]);
+    }
+    in_box += other.in_box;
+  }
+};
+
+// Bits of a cell that begins at `origin` for voxels [begin, end) of its beam.
+std::uint32_t BitsWithin(std::int32_t origin, std::int32_t begin, std::int32_t end) {
+  const std::int32_t first = std::clamp(begin - origin, 0, kCell), last = std::clamp(end - origin, first, kCell);
+  return std::uint32_t((std::uint64_t{1} << last) - (std::uint64_t{1} << first));
+}
+
+Found FindInSlice(const OccupiedCells& cells, const Box& wanted, std::int32_t slice) {
+  const auto [c, u, v] = cells.axes;
+  Found found;
+  for (std::int32_t row = cells.box.begin[v]; row < cells.box.end[v]; ++row) {
+    const std::size_t beam = cells.Beam(slice, row);
+    if (cells.first_record[beam] == cells.first_record[beam + 1]) continue;
+    const bool row_wanted = row >= wanted.begin[v] && row < wanted.end[v];
+    for (std::int32_t cell = 0; cell < cells.cell_count; ++cell) {
+      const std::uint32_t mask = cells.Masks(beam)[cell];
+      if (mask == 0) continue;
+      const std::int32_t origin = (cells.first_cell + cell) * kCell;
+      found.begin[u] = std::min(found.begin[u], origin + std::countr_zero(mask));
+      found.end[u] = std::max(found.end[u], origin + kCell - std::countl_zero(mask));
+      if (row_wanted) found.in_box += std::uint64_t(std::popcount(mask & BitsWithin(origin, wanted.begin[u], wanted.end[u])));
+    }
+    found.begin[v] = std::min(found.begin[v], row);
+    found.end[v] = row + 1;
+    found.begin[c] = slice;
+    found.end[c] = slice + 1;
+  }
+  return found;
+}
+
+}  // namespace
+
+std::size_t CellBeams::bytes() const {
+  return cells() * sizeof(masks[0]) + (beam_count + 1) * sizeof(first_record[0]) + record_count() * sizeof(VoxelRecord);
+}
+
+OccupiedCells CellsOf(const CellBeams& beams, Axis traversal, const Box& wanted) {
+  OccupiedCells cells;
+  cells.axes = AxesOf(traversal);
+  const auto [c, u, v] = cells.axes;
+  CHECK(beams.u == u);
+  cells.box = beams.box;
+  cells.box.begin[c] = std::max(cells.box.begin[c], wanted.begin[c]);
+  cells.box.end[c] = std::min(cells.box.end[c], wanted.end[c]);
+  if (cells.box.empty()) {
+    cells.box = {};
+    return cells;
+  }
+  cells.first_cell = beams.first_cell;
+  cells.cell_count = beams.cell_count;
+  cells.slice_stride = beams.Stride(c);
+  cells.row_stride = beams.Stride(v);
+  cells.first_beam = std::size_t(cells.box.begin[c] - beams.box.begin[c]) * cells.slice_stride;
+  cells.masks = beams.masks.get();
+  cells.first_record = {beams.first_record.get(), beams.beam_count + 1};
+  cells.records = {beams.records.get(), beams.record_count()};
+
+  const Found found = tbb::parallel_reduce(
+      tbb::blocked_range<std::int32_t>(cells.box.begin[c], cells.box.end[c]), Found{},
+      [&](const tbb::blocked_range<std::int32_t>& slices, Found sum) {
+        for (std::int32_t slice = slices.begin(); slice < slices.end(); ++slice) sum.Include(FindInSlice(cells, wanted, slice));
+        return sum;
+      },
+      [](Found a, const Found& b) {
+        a.Include(b);
+        return a;
+      });
+  if (found.begin.x != Found::kFar) cells.occupied = {found.begin, found.end};
+  cells.occupied_in_box = found.in_box;
+  return cells;
+}
+
+}  // namespace slabstream

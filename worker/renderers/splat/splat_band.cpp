@@ -1,0 +1,231 @@
+#include "worker/renderers/splat/splat_band.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <span>
+
+#include "common/image/local_image.h"
+
+namespace slabstream {
+namespace {
+
+// Occupied voxels of an octet, by its mask: the basic x86-64 instruction set has no such instruction.
+constexpr auto kOctetCount = [] {
+  std::array<std::uint8_t, 1 << kOctet> counts{};
+  for (std::size_t mask = 0; mask < counts.size(); ++mask) counts[mask] = std::uint8_t(std::popcount(mask));
+  return counts;
+}();
+
+// Octets of up to 16 cells that are not empty: bit i is octet i.
+constexpr std::int32_t kSetCells = 64 / kCellOctets;
+std::uint64_t OccupiedOctets(const std::uint32_t* masks, std::int32_t count) {
+  std::uint64_t set = 0;
+  for (std::int32_t cell = 0; cell < count; ++cell) {
+    // The high bit of every byte that is not 0; a product moves these four together.
+    const std::uint32_t high = (((masks[cell] & 0x7F7F7F7FU) + 0x7F7F7F7FU) | masks[cell]) & 0x80808080U;
+    set |= std::uint64_t{(high >> 7) * 0x10204080U >> 28} << (cell * kCellOctets);
+  }
+  return set;
+}
+
+}  // namespace
+
+SplatBand::SplatBand(const SplatPass& pass, std::int32_t y_begin, std::int32_t y_end, LocalImage& image, RankReport& report)
+    : pass_(pass),
+      y_begin_(y_begin),
+      y_end_(y_end),
+      image_(image),
+      report_(report),
+      clock_(report),
+      segments_(pass.bounds.width() / kSegment),
+      words_(SegmentWords(segments_)),
+      opaque_alpha_(pass.setup.termination > 0 ? float(1 - pass.setup.termination) : 2.0F),
+      open_(std::size_t(y_end - y_begin) * std::size_t(words_)),
+      owned_(std::size_t(words_)),
+      nothing_(std::size_t(words_)) {
+  static_assert(kOcclusionTile % kSegment == 0);
+  for (std::int32_t row = y_begin; row < y_end; ++row) {
+    Insert(Open(row), 0, segments_);
+    if (pass.hidden.empty()) continue;
+    for (std::int32_t segment = 0; segment < segments_; ++segment) {
+      if (pass.hidden.Hides(pass.bounds.x_begin + segment * kSegment, row)) Remove(Open(row), segment, segment + 1);
+    }
+  }
+}
+
+bool SplatBand::finished() const {
+  return std::ranges::all_of(open_, [](SegmentWord word) { return word == 0; });
+}
+
+void SplatBand::AddSlice(std::int32_t k) {
+  slice_ = k;
+  slopes_ = pass_.opacity.SlopesIn(k);
+  const SliceSamples& slice = pass_.Slice(k);
+  if (!PlaceBeams(slice)) return;
+  FindNeeded(slice);
+  clock_.Charge(Stage::kTransform);
+  if (octets_.empty()) return;
+  ShadeAndFilter(slice);
+  CompositeRows(slice);
+  clock_.Charge(Stage::kComposite);
+}
+
+// Rows and beams of the slice that have to do with each other, and room for them. False if there are none.
+bool SplatBand::PlaceBeams(const SliceSamples& slice) {
+  const Axis v = pass_.cells.axes.v;
+  rows_ = {std::max(y_begin_, slice.owned.y_begin), std::min(y_end_, slice.owned.y_end)};
+  if (rows_.begin >= rows_.end || slice.owned.empty()) return false;
+  first_beam_ = std::max(pass_.cells.occupied.begin[v], Lattice::First(slice.rows.At(rows_.begin)));
+  beam_count_ = std::min(pass_.cells.occupied.end[v], Lattice::First(slice.rows.At(rows_.end - 1)) + slice.along_v->taps) - first_beam_;
+  if (beam_count_ <= 0) return false;
+
+  // A segment's taps reach that far beyond the octet that made it count.
+  const auto segment_voxels = std::int32_t(kSegment * slice.columns.step >> 32) + 1;
+  margin_ = std::max(margin_, (slice.along_u->padded_taps + segment_voxels + kOctet - 1) / kOctet * kOctet);
+  const std::int32_t voxels = pass_.octet_count * kOctet + 2 * margin_;
+  if (voxels != shaded_voxels_) {
+    shaded_voxels_ = voxels;
+    shaded_.assign(4 * std::size_t{kShadedBeams} * std::size_t(voxels), 0.0F);
+  }
+  const auto beams = std::size_t(beam_count_);
+  if (filtered_.size() < 4 * beams * std::size_t(pass_.bounds.width())) filtered_.resize(4 * beams * std::size_t(pass_.bounds.width()));
+  needed_.assign((beams + 1) * std::size_t(words_), 0);  // and a word behind the last beam's, for spans
+  filled_.assign(needed_.size(), 0);
+  any_filled_.assign(beams, 0);
+  return true;
+}
+
+// Beam by beam: which segments are wanted of it, and which of its octets reach them.
+void SplatBand::FindNeeded(const SliceSamples& slice) {
+  const std::int32_t next_slice = pass_.setup.camera.ascending ? slice_ + 1 : slice_ - 1;
+  octets_.clear();
+  octets_before_.clear();
+  std::ranges::fill(owned_, 0);
+  Insert(owned_.data(), (slice.owned.x_begin - pass_.bounds.x_begin) / kSegment,
+         (slice.owned.x_end - pass_.bounds.x_begin + kSegment - 1) / kSegment);
+  // Rows that the beam reaches: those whose taps begin at most `taps` - 1 beams before it.
+  Rows reached = {rows_.begin, rows_.begin};
+  const auto first_tap = [&](std::int32_t row) { return Lattice::First(slice.rows.At(row)); };
+  for (std::int32_t beam = first_beam_; beam < first_beam_ + beam_count_; ++beam) {
+    octets_before_.push_back(octets_.size());
+    while (reached.begin < rows_.end && first_tap(reached.begin) <= beam - slice.along_v->taps) ++reached.begin;
+    while (reached.end < rows_.end && first_tap(reached.end) <= beam) ++reached.end;
+    const std::size_t number = pass_.cells.Beam(slice_, beam);
+    PrefetchCells(next_slice, beam);
+    if (pass_.cells.first_record[number] == pass_.cells.first_record[number + 1]) continue;
+    SegmentWord* needed = &needed_[BeamWord(beam)];
+    SegmentWord any = 0;
+    for (std::int32_t word = 0; word < words_; ++word) {
+      SegmentWord open = 0;
+      for (std::int32_t row = reached.begin; row < reached.end; ++row) open |= Open(row)[word];
+      any |= needed[word] = open & owned_[std::size_t(word)];
+    }
+    if (any != 0) FindOctets(beam);
+  }
+  octets_before_.push_back(octets_.size());
+}
+
+void SplatBand::FindOctets(std::int32_t beam) {
+  const OccupiedCells& cells = pass_.cells;
+  const std::size_t number = cells.Beam(slice_, beam);
+  const std::int32_t cell_count = pass_.octet_count / kCellOctets;
+  // Cells of the occupied box: there is nothing before them.
+  const std::uint32_t* masks = cells.Masks(number) + (pass_.first_octet / kCellOctets - cells.first_cell);
+  const VoxelRecord* record = &cells.records[cells.first_record[number]];
+  const SegmentSpan* reached = pass_.Reached(slice_);
+  const SegmentWord* needed = &needed_[BeamWord(beam)];
+  SegmentWord* filled = &filled_[BeamWord(beam)];
+  float* shaded = ShadedBeam(beam) + 4 * std::ptrdiff_t{margin_};
+  const float along_v = slopes_.AlongV(beam), across = 1 + along_v * along_v;
+  std::uint64_t drawn = 0;
+  for (std::int32_t first_cell = 0; first_cell < cell_count; first_cell += kSetCells) {
+    const std::int32_t set_cells = std::min(kSetCells, cell_count - first_cell);
+    for (std::uint64_t rest = OccupiedOctets(masks + first_cell, set_cells); rest != 0; rest &= rest - 1) {
+      const std::int32_t octet = first_cell * kCellOctets + std::countr_zero(rest);
+      const std::uint32_t occupied = masks[octet / kCellOctets] >> (octet % kCellOctets * kOctet) & ((1U << kOctet) - 1);
+      const VoxelRecord* records = record;
+      record += kOctetCount[occupied];
+      if (!AnyOf(needed, reached[octet])) continue;
+      __builtin_prefetch(records);  // shading comes to it after the slice's other octets
+      Insert(filled, reached[octet]);
+      octets_.push_back(
+          {records, shaded + 4 * std::ptrdiff_t{octet * kOctet}, occupied, slopes_.AlongU((pass_.first_octet + octet) * kOctet), across});
+      drawn += kOctetCount[occupied];
+    }
+  }
+  report_.drawn_voxels += drawn;
+  SegmentWord any = 0;
+  for (std::int32_t word = 0; word < words_; ++word) any |= filled[word] &= needed[word];
+  any_filled_[std::size_t(beam - first_beam_)] = any != 0;
+}
+
+// Beams of a slice lie together, those of the next one elsewhere.
+void SplatBand::PrefetchCells(std::int32_t slice, std::int32_t beam) const {
+  const OccupiedCells& cells = pass_.cells;
+  if (slice < cells.occupied.begin[cells.axes.c] || slice >= cells.occupied.end[cells.axes.c]) return;
+  const std::size_t number = cells.Beam(slice, beam);
+  __builtin_prefetch(&cells.first_record[number]);
+  constexpr std::int32_t kLineCells = 64 / sizeof(std::uint32_t);
+  for (std::int32_t cell = 0; cell < cells.cell_count; cell += kLineCells) __builtin_prefetch(cells.Masks(number) + cell);
+}
+
+void SplatBand::ShadeAndFilter(const SliceSamples& slice) {
+  for (std::int32_t begin = 0; begin < beam_count_; begin += kShadedBeams) {
+    const std::int32_t end = std::min(begin + kShadedBeams, beam_count_);
+    const std::size_t first = octets_before_[std::size_t(begin)];
+    const auto octets = std::span<const OctetWork>(octets_).subspan(first, octets_before_[std::size_t(end)] - first);
+    if (octets.empty()) continue;
+    ShadeOctets(pass_.tables, slopes_.u_step, octets);
+    clock_.Charge(Stage::kShade);
+    for (std::int32_t beam = first_beam_ + begin; beam < first_beam_ + end; ++beam) {
+      if (any_filled_[std::size_t(beam - first_beam_)] == 0) continue;
+      const float* voxel_0 = ShadedBeam(beam) + 4 * std::ptrdiff_t{margin_ - pass_.first_octet * kOctet};
+      FilterBeam(*slice.along_u, slice.columns, {voxel_0, FilteredBeam(beam), &filled_[BeamWord(beam)], words_, pass_.bounds.x_begin});
+      ClearForeignSamples(slice, beam);
+    }
+    ClearOctets(octets);
+    clock_.Charge(Stage::kSplat);
+  }
+}
+
+// Segments at the box's sides hold samples that belong to others: there the beam holds nothing, so that rows are left as they are.
+void SplatBand::ClearForeignSamples(const SliceSamples& slice, std::int32_t beam) {
+  const SegmentWord* filled = &filled_[BeamWord(beam)];
+  const auto clear = [&](std::int32_t begin, std::int32_t end) {  // pixels of one segment, from `bounds` on
+    if (begin == end || !AnyOf(filled, begin / kSegment, begin / kSegment + 1)) return;
+    std::fill(FilteredBeam(beam) + 4 * std::ptrdiff_t{begin}, FilteredBeam(beam) + 4 * std::ptrdiff_t{end}, 0.0F);
+  };
+  const std::int32_t left = slice.owned.x_begin - pass_.bounds.x_begin, right = slice.owned.x_end - pass_.bounds.x_begin;
+  clear(left / kSegment * kSegment, left);
+  clear(right, (right + kSegment - 1) / kSegment * kSegment);
+}
+
+void SplatBand::CompositeRows(const SliceSamples& slice) {
+  const std::int32_t taps = slice.along_v->taps, end_beam = first_beam_ + beam_count_;
+  row_beams_.resize(std::size_t(taps));
+  row_filled_.resize(std::size_t(taps));
+  for (std::int32_t row = rows_.begin; row < rows_.end; ++row) {
+    const std::int64_t at = slice.rows.At(row);
+    const std::int32_t first = Lattice::First(at);
+    bool any = false;
+    for (std::int32_t n = 0; n < taps; ++n) {
+      const std::int32_t beam = first + n;
+      const bool is_filled = beam >= first_beam_ && beam < end_beam && any_filled_[std::size_t(beam - first_beam_)] != 0;
+      row_beams_[std::size_t(n)] = is_filled ? FilteredBeam(beam) : filtered_.data();
+      row_filled_[std::size_t(n)] = is_filled ? &filled_[BeamWord(beam)] : nothing_.data();
+      any |= is_filled;
+    }
+    if (!any) continue;
+    CompositeRow({.taps = taps,
+                  .weights = &slice.along_v->weights[Lattice::Phase(at) * std::size_t(taps)],
+                  .beams = row_beams_.data(),
+                  .filled = row_filled_.data(),
+                  .accumulated = &image_.rgba[4 * std::size_t(row - pass_.bounds.y_begin) * std::size_t(pass_.bounds.width())],
+                  .open = Open(row),
+                  .words = words_,
+                  .opaque_alpha = opaque_alpha_});
+  }
+}
+
+}  // namespace slabstream

@@ -1,0 +1,31 @@
+// SplatCache: what splatting keeps of a slab between frames: its occupied voxels, by beams, while the transfer function shows the same
+// ones.
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <optional>
+#include <utility>
+
+#include "worker/renderers/slab_data.h"
+#include "worker/renderers/splat/occupied_cells.h"
+
+namespace slabstream {
+
+class SplatCache : public SlabCache {
+ public:
+  // Occupied voxels for the camera's traversal axis, in the slices of `box`. Valid until the next call.
+  const OccupiedCells& Occupied(SlabData& slab, const FrameSetup& setup, const Box& box);
+
+  std::size_t bytes() const override;
+
+ private:
+  const CellBeams& Beams(SlabData& slab, const FrameSetup& setup, Axis u);
+
+  static constexpr std::size_t kKeptViews = 8;
+  BinSelection occupied_bins_;
+  std::optional<CellBeams> along_x_, along_y_;
+  std::deque<std::pair<Box, OccupiedCells>> occupied_;  // by the box they were made for; last used first
+};
+
+}  // namespace slabstream

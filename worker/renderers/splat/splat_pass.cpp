@@ -1,0 +1,48 @@
+#include "worker/renderers/splat/splat_pass.h"
+
+#include <algorithm>
+
+#include "worker/kernels/segment_set.h"
+
+namespace slabstream {
+namespace {
+
+PixelBounds WholeSegments(const PixelBounds& b) {
+  if (b.empty()) return {};
+  return {b.x_begin / kSegment * kSegment, b.y_begin, (b.x_end + kSegment - 1) / kSegment * kSegment, b.y_end};
+}
+
+}  // namespace
+
+SplatPass::SplatPass(const OccupiedCells& occupied_cells, const ClassificationTable& table, const FrameSetup& frame_setup, const Box& box,
+                     const OcclusionMask& hidden_tiles)
+    : cells(occupied_cells), setup(frame_setup), hidden(hidden_tiles), opacity(frame_setup), tables(opacity.Tables(table)) {
+  const auto [c, u, v] = cells.axes;
+  const Box& occupied = cells.occupied;
+  for (std::int32_t k = occupied.begin[c]; k < occupied.end[c]; ++k) {
+    slices.push_back(SampleSlice(setup, box, occupied, k, footprints));
+    if (!slices.back().owned.empty()) bounds = Union(bounds, slices.back().owned);
+  }
+  bounds = WholeSegments(bounds);
+  if (bounds.empty()) return;
+
+  first_octet = occupied.begin[u] / kCellVoxels * kCellOctets;
+  octet_count = ((occupied.end[u] - 1) / kCellVoxels + 1) * kCellOctets - first_octet;
+  reached.resize(slices.size() * std::size_t(octet_count));
+  SegmentSpan* span = reached.data();
+  constexpr std::int64_t kOctetStride = std::int64_t{kOctet} << 32;
+  for (const SliceSamples& slice : slices) {
+    const PixelBounds& owned = slice.owned;
+    // Of an octet: the first pixel with a tap in it, and the first one beyond it.
+    FirstSamples first(slice.columns, std::int64_t{first_octet * kOctet - slice.along_u->taps + 1} << 32, kOctetStride);
+    FirstSamples last(slice.columns, std::int64_t{(first_octet + 1) * kOctet} << 32, kOctetStride);
+    for (std::int32_t octet = 0; octet < octet_count; ++octet, ++span, first.Next(), last.Next()) {
+      if (owned.empty()) continue;
+      const std::int32_t begin = first.In(owned.x_begin, owned.x_end) - bounds.x_begin;
+      const std::int32_t end = last.In(owned.x_begin, owned.x_end) - bounds.x_begin;
+      if (begin < end) *span = MakeSpan(begin / kSegment, (end + kSegment - 1) / kSegment);
+    }
+  }
+}
+
+}  // namespace slabstream

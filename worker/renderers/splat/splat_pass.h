@@ -1,0 +1,37 @@
+// SplatPass: what the bands of one Render share, made once a frame: where slices are sampled, the tables of shading, and the image.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/image/occlusion_mask.h"
+#include "worker/kernels/segment_set.h"
+#include "worker/renderers/splat/occupied_cells.h"
+#include "worker/renderers/splat/sheet_opacity.h"
+#include "worker/renderers/splat/slice_samples.h"
+
+namespace slabstream {
+
+struct SplatPass {
+  SplatPass(const OccupiedCells& occupied_cells, const ClassificationTable& table, const FrameSetup& frame_setup, const Box& box,
+            const OcclusionMask& hidden_tiles);
+
+  const SliceSamples& Slice(std::int32_t k) const { return slices[std::size_t(k - cells.occupied.begin[cells.axes.c])]; }
+  // By octet of a beam, from first_octet on: the segments that its voxels reach and the box owns, counted from the image's left border.
+  const SegmentSpan* Reached(std::int32_t k) const {
+    return &reached[std::size_t(k - cells.occupied.begin[cells.axes.c]) * std::size_t(octet_count)];
+  }
+
+  const OccupiedCells& cells;
+  const FrameSetup& setup;
+  const OcclusionMask& hidden;
+  SheetOpacity opacity;
+  ShadeTables tables;
+  Footprints footprints;
+  std::vector<SliceSamples> slices;               // of the occupied slices
+  PixelBounds bounds;                             // of the image: whole segments; empty if nothing shows
+  std::int32_t first_octet = 0, octet_count = 0;  // octets of whole cells
+  std::vector<SegmentSpan> reached;               // [slice][octet]
+};
+
+}  // namespace slabstream

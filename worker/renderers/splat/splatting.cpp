@@ -1,0 +1,59 @@
+#include "worker/renderers/splat/splatting.h"
+
+#include <tbb/parallel_for.h>
+
+#include <vector>
+
+#include "worker/renderers/splat/splat_band.h"
+#include "worker/renderers/splat/splat_cache.h"
+#include "worker/renderers/splat/splat_pass.h"
+#include "worker/renderers/stage_clock.h"
+
+namespace slabstream {
+namespace {
+
+// Rows of a band: few enough that they stay in the second-level cache with their beams, many enough that little is shaded twice.
+constexpr std::int32_t kBandRows = 64;
+
+void RenderBand(const SplatPass& pass, std::int32_t y_begin, const std::atomic<bool>& cancelled, LocalImage& image, RankReport& report) {
+  SplatBand band(pass, y_begin, std::min(y_begin + kBandRows, pass.bounds.y_end), image, report);
+  const Axis c = pass.cells.axes.c;
+  const std::int32_t begin = pass.cells.occupied.begin[c], end = pass.cells.occupied.end[c];
+  for (std::int32_t i = 0; i < end - begin && !band.finished() && !cancelled; ++i) {
+    band.AddSlice(pass.setup.camera.ascending ? begin + i : end - 1 - i);
+  }
+}
+
+void AddTo(RankReport& sum, const RankReport& part) {
+  for (std::size_t stage = 0; stage < sum.stage_ns.size(); ++stage) sum.stage_ns[stage] += part.stage_ns[stage];
+  sum.drawn_voxels += part.drawn_voxels;
+}
+
+}  // namespace
+
+Result<LocalImage> SplattingRenderer::Render(SlabData& slab, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
+                                             const std::atomic<bool>& cancelled, RankReport& report) {
+  StageClock clock(report);
+  const ClassificationTable& table = slab.Classification(setup);
+  const OccupiedCells& cells = slab.CacheOf<SplatCache>().Occupied(slab, setup, box);
+  report.occupied_voxels += cells.occupied_in_box;
+  clock.Charge(Stage::kPrepare);
+  LocalImage image = MakeLocalImage(PixelFormat::kRgba, {});
+  if (!cells.occupied.empty()) {
+    const SplatPass pass(cells, table, setup, box, hidden);
+    if (!hidden.HidesAll(pass.bounds)) image = MakeLocalImage(PixelFormat::kRgba, pass.bounds);
+    clock.Charge(Stage::kTransform);
+    const std::int32_t bands = (image.bounds.height() + kBandRows - 1) / kBandRows;
+    std::vector<RankReport> parts(static_cast<std::size_t>(bands));
+    tbb::parallel_for(
+        0, bands, [&](std::int32_t i) { RenderBand(pass, pass.bounds.y_begin + i * kBandRows, cancelled, image, parts[std::size_t(i)]); });
+    for (const RankReport& part : parts) AddTo(report, part);
+  }
+  clock.Finish(Stage::kRender);
+  if (cancelled) return Status::Cancelled("rendering was cancelled");
+  return image;
+}
+
+std::unique_ptr<Renderer> splat::MakePixelHalf() { return std::make_unique<SplattingRenderer>(); }
+
+}  // namespace slabstream

@@ -1,0 +1,44 @@
+// BrickProjection: where the bricks of a surface and their faces lie on a frame's screen. Made once a frame.
+#pragma once
+
+#include <cstdint>
+
+#include "common/image/pixel_bounds.h"
+#include "common/view/camera.h"
+#include "worker/kernels/draw_faces.h"
+#include "worker/renderers/zbuffer/surface.h"
+
+namespace slabstream {
+
+// A brick as a frame sees it.
+struct ProjectedBrick {
+  PixelBounds pixels;       // that its faces may touch, within the frame; may be empty
+  float nearest = 0;        // depth; no face is nearer
+  std::uint32_t sides = 0;  // that may face the eye: bit side
+};
+
+class BrickProjection {
+ public:
+  BrickProjection(const Camera& camera, const Index3& volume_size);
+
+  ProjectedBrick View(const SurfaceBrick& brick) const;
+
+  // For DrawFaces. Depends on the brick's place in the volume alone, not on which faces a box has of it. The brick lies at least partly
+  // within the frame.
+  FaceProjection Faces(const SurfaceBrick& brick, int side) const;
+
+ private:
+  // The projection of a box of data space: centre and half size, pixels.
+  struct Extent {
+    double x, y, half_x, half_y, least_w;
+  };
+  Extent Project(const Vec3& centre, const Vec3& half) const;
+
+  const Camera& camera_;
+  const Index3 volume_size_;
+  Vec3 ray_x_, ray_y_;                          // change of a ray a pixel: of its direction (perspective) or its origin
+  Vec3 direction_;                              // of the central ray
+  std::array<FaceProjection, kSides> by_side_;  // what all bricks share
+};
+
+}  // namespace slabstream

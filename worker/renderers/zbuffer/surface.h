@@ -1,0 +1,39 @@
+// Surface: what the Z-buffer draws of a box, made once for a transfer function: the faces of its opaque voxels beyond which nothing is
+// opaque, with bins and the normals at their corners. 24 bytes a face. They are kept by bricks, so that a frame places, culls and sorts a
+// few bricks instead of many faces, and draws only the sides that face the eye.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "common/base/aligned_buffer.h"
+#include "common/volume/volume.h"
+#include "worker/kernels/surface_face.h"
+#include "worker/renderers/bin_lookup.h"
+#include "worker/renderers/brick_ranges.h"
+
+namespace slabstream {
+
+struct SurfaceBrick {
+  Index3 origin;                                       // voxel (0, 0, 0) of the brick, at multiples of kFaceBrick
+  Box voxels;                                          // just those that have faces
+  std::array<std::uint32_t, kSides + 1> side_begin{};  // number of each side's first face, then the end
+
+  std::uint32_t face_count() const { return side_begin[kSides] - side_begin[0]; }
+};
+
+struct Surface {
+  std::vector<SurfaceBrick> bricks;    // x fastest
+  AlignedVector<FaceSite> sites;       // by face, in the order of FaceIndex; kSitesReadAhead more at the end, which are no faces
+  AlignedVector<FaceNormals> normals;  // by face
+
+  std::size_t bytes() const;
+};
+
+// Neighbours are looked up in all of `voxels`, the halo (of at least 2 voxels) included; outside the volume nothing is opaque. Works on the
+// threads of the task arena it is called in.
+Surface FindSurface(const VoxelBlock& voxels, const BrickRanges& ranges, const ClassificationTable& table, const BinSelection& opaque,
+                    const Vec3& spacing, const Box& box);
+
+}  // namespace slabstream

@@ -1,0 +1,27 @@
+// SurfaceCache: the surfaces that the Z-buffer keeps of a slab between frames, while the transfer function makes the same voxels opaque.
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <utility>
+
+#include "worker/renderers/slab_data.h"
+#include "worker/renderers/zbuffer/surface.h"
+
+namespace slabstream {
+
+class SurfaceCache : public SlabCache {
+ public:
+  // Faces of the opaque voxels of `box`: opacity at least half of the largest that the volume's range of values has. Valid until the next
+  // call.
+  const Surface& OpaqueSurface(SlabData& slab, const FrameSetup& setup, const Box& box);
+
+  std::size_t bytes() const override;
+
+ private:
+  static constexpr std::size_t kKeptBoxes = 16;  // several boxes may share a slab
+  BinSelection opaque_bins_;
+  std::deque<std::pair<Box, Surface>> surfaces_;  // last used first
+};
+
+}  // namespace slabstream

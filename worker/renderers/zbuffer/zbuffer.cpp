@@ -1,0 +1,167 @@
+#include "worker/renderers/zbuffer/zbuffer.h"
+
+#include <hwy/cache_control.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "worker/kernels/draw_faces.h"
+#include "worker/kernels/shade_faces.h"
+#include "worker/renderers/stage_clock.h"
+#include "worker/renderers/zbuffer/brick_projection.h"
+#include "worker/renderers/zbuffer/surface_cache.h"
+
+namespace slabstream {
+namespace {
+
+// The bricks that may be seen, nearest first, and the pixels that they may touch.
+struct Scene {
+  std::vector<ProjectedBrick> views;  // by brick of the surface
+  std::vector<std::uint32_t> order;   // of those that may be seen
+  PixelBounds bounds;
+};
+
+Scene PlaceBricks(const Surface& surface, const BrickProjection& projection) {
+  constexpr std::size_t kGrain = 256;
+  Scene scene;
+  const std::size_t count = surface.bricks.size();
+  scene.views.resize(count);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kGrain), [&](const tbb::blocked_range<std::size_t>& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) scene.views[i] = projection.View(surface.bricks[i]);
+  });
+  float least = std::numeric_limits<float>::infinity(), greatest = 0;
+  for (const ProjectedBrick& view : scene.views) {
+    if (view.pixels.empty()) continue;
+    scene.bounds = Union(scene.bounds, view.pixels);
+    least = std::min(least, view.nearest);
+    greatest = std::max(greatest, view.nearest);
+  }
+  // A counting sort by depth: it decides only how many bricks turn out to be hidden.
+  constexpr std::size_t kClasses = 256;
+  const float scale = greatest > least ? float(kClasses - 1) / (greatest - least) : 0.0F;
+  const auto depth_class = [&](const ProjectedBrick& view) { return std::size_t((view.nearest - least) * scale); };
+  std::array<std::uint32_t, kClasses + 1> begin{};
+  for (const ProjectedBrick& view : scene.views) {
+    if (!view.pixels.empty()) ++begin[depth_class(view) + 1];
+  }
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  scene.order.resize(begin.back());
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!scene.views[i].pixels.empty()) scene.order[begin[depth_class(scene.views[i])]++] = std::uint32_t(i);
+  }
+  return scene;
+}
+
+// Rows of the bounds in bands of about equal work, from top to bottom: each band's first row, and the end. At least `bands` of them where
+// there are as many rows, and none with many more than kMostKeys pixels, so that keys stay in a core's cache.
+std::vector<std::int32_t> CutIntoBands(const Surface& surface, const Scene& scene, std::int64_t bands) {
+  constexpr std::int64_t kMostKeys = 1 << 16;
+  const std::int64_t most_rows = std::max<std::int64_t>(1, kMostKeys / std::max(1, scene.bounds.width()));
+  std::vector<std::int64_t> work(std::size_t(scene.bounds.height()), scene.bounds.width());
+  for (std::uint32_t number : scene.order) {
+    const PixelBounds& pixels = scene.views[number].pixels;
+    work[std::size_t((pixels.y_begin + pixels.y_end) / 2 - scene.bounds.y_begin)] += surface.bricks[number].face_count();
+  }
+  const std::int64_t total = std::accumulate(work.begin(), work.end(), std::int64_t{0});
+  std::vector<std::int32_t> begins = {scene.bounds.y_begin};
+  std::int64_t done = 0, part = 1;
+  for (std::size_t row = 0; row < work.size(); ++row) {
+    done += work[row];
+    const std::int32_t next = scene.bounds.y_begin + std::int32_t(row) + 1;
+    if (done * bands < total * part && next - begins.back() < most_rows) continue;
+    begins.push_back(next);
+    part = done * bands / std::max<std::int64_t>(total, 1) + 1;
+  }
+  if (begins.back() < scene.bounds.y_end) begins.push_back(scene.bounds.y_end);
+  return begins;
+}
+
+// Asks for the sites of a brick's sides; they arrive while other bricks are drawn.
+void FetchSites(const Surface& surface, std::uint32_t brick, std::uint32_t sides) {
+  constexpr std::uint32_t kPerLine = 64 / sizeof(FaceSite);
+  const auto& begin = surface.bricks[brick].side_begin;
+  for (std::size_t side = 0; side < kSides; ++side) {
+    if ((sides >> side & 1) == 0) continue;
+    for (std::uint32_t face = begin[side]; face < begin[side + 1]; face += kPerLine) hwy::Prefetch(&surface.sites[face]);
+  }
+}
+
+std::size_t DrawBand(const Surface& surface, const Scene& scene, const BrickProjection& projection, Projection kind,
+                     const std::atomic<bool>& cancelled, const KeyBand& band) {
+  std::fill_n(band.keys, band.stride * std::size_t(band.bounds.height()), kEmptyKey);
+  std::vector<std::uint32_t> bricks;
+  for (std::uint32_t number : scene.order) {
+    if (!Intersection(scene.views[number].pixels, band.bounds).empty()) bricks.push_back(number);
+  }
+  constexpr std::size_t kAhead = 2;  // bricks
+  std::size_t drawn = 0;
+  for (std::size_t i = 0; i < bricks.size() && !cancelled.load(std::memory_order_relaxed); ++i) {
+    if (i + kAhead < bricks.size()) FetchSites(surface, bricks[i + kAhead], scene.views[bricks[i + kAhead]].sides);
+    const ProjectedBrick& view = scene.views[bricks[i]];
+    if (AllNearer(band, Intersection(view.pixels, band.bounds), view.nearest)) continue;
+    const SurfaceBrick& brick = surface.bricks[bricks[i]];
+    for (int side = 0; side < kSides; ++side) {
+      const std::uint32_t first = brick.side_begin[std::size_t(side)], count = brick.side_begin[std::size_t(side) + 1] - first;
+      if ((view.sides >> side & 1) == 0 || count == 0) continue;
+      drawn += DrawFaces(kind, projection.Faces(brick, side), surface.sites.data(), surface.normals.data(), first, count, band);
+    }
+  }
+  return drawn;
+}
+
+}  // namespace
+
+Result<LocalImage> ZBufferRenderer::Render(SlabData& slab, const Box& box, const FrameSetup& setup, const OcclusionMask& /*hidden*/,
+                                           const std::atomic<bool>& cancelled, RankReport& report) {
+  StageClock clock(report);
+  const ClassificationTable& table = slab.Classification(setup);
+  const Surface& surface = slab.CacheOf<SurfaceCache>().OpaqueSurface(slab, setup, box);
+  clock.Charge(Stage::kPrepare);
+
+  const BrickProjection projection(setup.camera, setup.description.geometry.size);
+  const Scene scene = PlaceBricks(surface, projection);
+  LocalImage image = MakeUnwrittenImage(PixelFormat::kDepth, scene.bounds);
+  const std::vector<std::int32_t> begins = CutIntoBands(surface, scene, kBandsPerThread * tbb::this_task_arena::max_concurrency());
+  FaceShading shading = MakeFaceShading(setup.camera, setup.shading, setup.description.geometry.size);
+  shading.sites = surface.sites.data();
+  shading.normals = surface.normals.data();
+  std::vector<float> colors;
+  colors.reserve(4 * table.color.size());
+  for (const Rgb& color : table.color) colors.insert(colors.end(), {color.r, color.g, color.b, 1});
+  shading.colors = colors.data();
+  clock.Charge(Stage::kZBuffer);
+
+  std::atomic<std::size_t> drawn = 0;
+  std::atomic<std::int64_t> draw_ns = 0, shade_ns = 0;
+  tbb::parallel_for(std::size_t{1}, begins.size(), [&](std::size_t i) {
+    const Time begin = MonotonicNow();
+    KeyBand band;
+    band.bounds = {scene.bounds.x_begin, begins[i - 1], scene.bounds.x_end, begins[i]};
+    band.stride = std::size_t(band.bounds.width() + kKeyPadding);
+    AlignedVector<std::uint64_t>& keys = keys_.local();
+    keys.resize(std::max(keys.size(), band.stride * std::size_t(band.bounds.height())));
+    band.keys = keys.data();
+    drawn += DrawBand(surface, scene, projection, setup.camera.projection, cancelled, band);
+    const Time middle = MonotonicNow();
+    for (std::int32_t y = band.bounds.y_begin; y < band.bounds.y_end && !cancelled.load(std::memory_order_relaxed); ++y) {
+      const auto width = std::size_t(band.bounds.width()), pixel = std::size_t(y - scene.bounds.y_begin) * width;
+      ShadeFaceRow(shading, band.keys + std::size_t(y - band.bounds.y_begin) * band.stride, band.bounds.x_begin, y, width,
+                   &image.rgba[4 * pixel], &image.depth[pixel], &image.voxel[pixel]);
+    }
+    draw_ns += (middle - begin).count();
+    shade_ns += (MonotonicNow() - middle).count();
+  });
+  report.stage_ns[std::size_t(Stage::kZBuffer)] += draw_ns;
+  report.stage_ns[std::size_t(Stage::kShade)] += shade_ns;
+  report.drawn_voxels += drawn;
+  clock.Finish(Stage::kRender);
+  if (cancelled) return Status::Cancelled("rendering was cancelled");
+  return image;
+}
+
+std::unique_ptr<Renderer> zbuffer::MakePixelHalf() { return std::make_unique<ZBufferRenderer>(); }
+
+}  // namespace slabstream
