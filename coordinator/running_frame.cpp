@@ -84,11 +84,15 @@ RunningFrame::HandOut RunningFrame::NextGroup(Time now) {
 }
 
 Status RunningFrame::BeginAttempt(const Roster& roster, Time now) {
-  Result<FramePlan> plan = Replan(plan_, roster);
-  if (!plan.ok()) return plan.status();
+  Roster able = roster;
+  for (WorkerId& worker : able.slots) {
+    if (unable_.contains(worker)) worker = 0;
+  }
+  Result<FramePlan> plan = Replan(plan_, able);
+  if (!plan.ok()) return unable_.empty() ? plan.status() : inability_;
   const bool keeps_accumulated = plan->display == plan_.display && !display_in_doubt_;
   plan_ = std::move(plan).value();
-  roster_ = roster;
+  roster_ = std::move(able);
   displays_.push_back(plan_.display);
   if (!keeps_accumulated) {
     groups_done_ = 0;
@@ -166,7 +170,14 @@ void RunningFrame::OnLoss(WorkerId worker, Time now) {
 }
 
 Status RunningFrame::OnTrouble(const WorkerTrouble& message, Time now) {
-  if (message.key.attempt != attempt() || message.key.group < groups_done_ || attempt_due_) return Status::Ok();
+  const bool no_picture = message.worker == plan_.display && groups_done_ == group_count();
+  if (message.key.attempt != attempt() || (message.key.group < groups_done_ && !no_picture)) return Status::Ok();
+  const Status reason(message.status.code(), WorkerName(message.worker) + ": " + message.status.message());
+  if (message.elsewhere) {
+    unable_.insert(message.worker);
+    inability_ = reason;
+  }
+  if (attempt_due_) return Status::Ok();
   if (message.unreachable != 0) {
     if (!suspicion_) {
       suspicion_ = {.accused = message.unreachable,
@@ -177,8 +188,7 @@ Status RunningFrame::OnTrouble(const WorkerTrouble& message, Time now) {
     return Status::Ok();
   }
   if (message.worker == plan_.display) display_in_doubt_ = true;
-  return CountStall(Status(message.status.code(), WorkerName(message.worker) + ": " + message.status.message()), limits_.pause * stalls_,
-                    now);
+  return CountStall(reason, message.elsewhere ? Duration::zero() : limits_.pause * stalls_, now);
 }
 
 Status RunningFrame::Expire(Time now) {

@@ -23,8 +23,8 @@ class SlabServer {
  public:
   // The voxels of a dataset: a whole volume, or bricks where those take much less memory. One of the two, or neither.
   struct Samples {
-    std::shared_ptr<const Volume> volume;
-    std::shared_ptr<const BrickedVoxels> bricks;
+    std::shared_ptr<const Volume> volume = nullptr;
+    std::shared_ptr<const BrickedVoxels> bricks = nullptr;
 
     bool any() const { return volume != nullptr || bricks != nullptr; }
     const Box& box() const { return volume != nullptr ? volume->block.box : bricks->grid().box; }

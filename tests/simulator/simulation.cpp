@@ -275,7 +275,7 @@ void Simulation::Perform(const CoordinatorEvent&, const CountDataset& action) {
 // Plans come late, and not always in the order in which they were asked for.
 void Simulation::Perform(const CoordinatorEvent&, const PlanRequest& action) {
   Planned planned{action.plan, coordinator_->planner.Plan(action)};
-  if (random_.Chance(faults_.fail_load)) planned.frame = Status::ResourceExhausted("not enough memory to plan");
+  if (random_.Chance(faults_.fail_load / 5)) planned.frame = Status::ResourceExhausted("not enough memory to plan");
   queue_.After(std::chrono::microseconds(random_.Integer(0, faults_.none() ? 200 : 100000)),
                [this, planned, generation = coordinator_->generation] {
                  if (coordinator_->generation == generation) StepCoordinator(planned);
