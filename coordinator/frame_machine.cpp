@@ -45,7 +45,7 @@ void FrameMachine::State::On(const OccupiedCounted& event) {
   if (event.grid.ok()) {
     occupancy.Counted(event.count, *event.grid);
   } else if (const std::optional<ClassifiedVolume> failed = occupancy.Failed(event.count)) {
-    const auto waits = [&](const OpenRequest& request) { return request.volume == failed && NeedsOccupancy(request.submit.frame.policy); };
+    const auto waits = [&](const OpenRequest& request) { return request.volume == failed && request.needs_occupancy; };
     for (const OpenRequest& request : queue.Extract(waits)) FailRequest(request, event.grid.status());
   }
 }
@@ -77,7 +77,7 @@ Status FrameMachine::State::FindVolume(OpenRequest& request) const {
 void FrameMachine::State::CountAhead() {
   std::size_t ahead = 0;
   queue.VisitInTurn([&](const OpenRequest& request) {
-    if (!request.volume || request.plan != 0 || !NeedsOccupancy(request.submit.frame.policy)) return true;
+    if (!request.volume || request.plan != 0 || !request.needs_occupancy) return true;
     const ClassifiedVolume& volume = *request.volume;
     if (!occupancy.Counting(volume) && occupancy.Find(volume) == nullptr) {
       const auto& summary = datasets.Find(request.submit.frame.dataset)->summary;
@@ -113,7 +113,7 @@ PlanRequest FrameMachine::State::MakePlanRequest(const OpenRequest& request) {
                   .frame = frame,
                   .volume = *request.volume,
                   .summary = datasets.Find(frame.dataset)->summary,
-                  .occupied = NeedsOccupancy(frame.policy) ? occupancy.Find(*request.volume) : nullptr,
+                  .occupied = request.needs_occupancy ? occupancy.Find(*request.volume) : nullptr,
                   .roster = std::move(team.roster),
                   .turn = team.turn,
                   .workers = {}};
@@ -177,7 +177,7 @@ void FrameMachine::State::Expire() {
     FailRequest(request, late(request, dataset.state != DatasetState::kReady ? "its dataset was still being loaded"
                                        : counting                            ? "the occupied voxels of its dataset were still being counted"
                                        : request.plan != 0 && !HasPlan(request) ? "it was still being planned"
-                                                                             : "it was still queued"));
+                                                                                : "it was still queued"));
   }
   for (const OpenRequest& request : queue.Extract(without_workers)) FailRequest(request, no_worker);
   for (auto it = frames.begin(); it != frames.end();) {

@@ -1,28 +1,31 @@
-// FrameMachine: everything that the coordinator decides, as a pure state machine: (event, now) -> actions. It has no sockets, threads, clocks
-// or voxels, and it does nothing that takes long: loading, counting and planning are actions that the executor answers with events.
+// FrameMachine: everything that the coordinator decides, as a pure state machine: (event, now) -> actions. It has no sockets, threads,
+// clocks or voxels, and it does nothing that takes long: loading, counting and planning are actions that the executor answers with events.
 //
-//   clients    Requests are queued; the clients are served in turn, one frame each. The machine reports progress. A request ends when its client
-//              cancels it or falls silent. The last answers of a client are kept, so that submitting a request again costs nothing.
+//   clients    Requests are queued; the clients are served in turn, one frame each. The machine reports progress. A request ends when its
+//              client cancels it or falls silent. The last answers of a client are kept, so that it costs nothing to submit a request
+//              again.
 //   datasets   A dataset is loaded when it is first used. Requests wait for it; a failed load fails them.
-//   occupancy  Where a policy needs it, occupied voxels are counted once for each dataset, transfer function and renderer. Requests wait for
-//              the count; a failed count fails them.
-//   plans      The next requests in turn are planned ahead (PlanRequest), as many as the window has room for and kPlansAhead more, so that a
-//              frame can start the moment there is room. A request stays in the queue until its frame starts. A plan that was made for other
-//              workers than there are now is made again. A failed plan fails its request alone.
-//   frames     Group after group is handed out, as many as the window allows over all frames, so that groups render while others combine,
-//              across frames too. The display worker changes from frame to frame. A frame ends with its FrameImage or with FrameFailed.
-//   workers    Register gives an id and a slot (a vacant one first). Silence, an unreachable peer or Leave takes the worker out. Every frame that
-//              it had a part in is re-planned over the others (attempt + 1) from its first unfinished group, or from the first group if the
-//              display worker is lost. Slots that stay vacant for vacancy_grace are given up; the next frame is then partitioned anew.
-//   stalls     A frame without progress for stall_timeout is handed out again (attempt + 1); after max_stalls in a row it fails. If there is no
-//              worker for worker_wait, everything that waits fails and says so. Every request has a deadline.
+//   occupancy  Where a policy needs it, occupied voxels are counted once for each dataset, transfer function and renderer. Requests wait
+//              for the count; a failed count fails them.
+//   plans      The next requests in turn are planned ahead (PlanRequest), as many as the window has room for and kPlansAhead more, so
+//              that a frame can start the moment there is room. A request stays in the queue until its frame starts. A plan that was
+//              made for other workers than there are now is made again. A failed plan fails its request alone.
+//   frames     Group after group is handed out, as many as the window allows over all frames, so that groups render while others
+//              combine, across frames too. The display worker changes from frame to frame. A frame ends with its FrameImage or with
+//              FrameFailed.
+//   workers    Register gives an id and a slot (a vacant one first). Silence, an unreachable peer or Leave takes the worker out. Every
+//              frame that it had a part in is re-planned over the others (attempt + 1) from its first unfinished group, or from the
+//              first group if the display worker is lost. Slots that stay vacant for vacancy_grace are given up; the next frame is then
+//              partitioned anew. A worker that cannot do its part of a frame (WorkerTrouble) is left out of that frame.
+//   stalls     A frame without progress for stall_timeout is handed out again (attempt + 1); after max_stalls in a row it fails. If there
+//              is no worker for worker_wait, everything that waits fails and says so. Every request has a deadline.
 //   end        ShutDown ends the service: workers Stop. CoordinatorStopRequested ends the coordinator alone: workers Retire and wait for
 //              another coordinator. Both fail the open requests and end with StopService; a stopped machine does nothing more.
 //
 // What the executor must do: call Step(CoordinatorTick) no later than NextWake(), which is Time::max() if nothing can happen by itself;
-// carry out the actions in order; answer LoadDataset, CountDataset and PlanRequest with one event each, in any order; report WorkerGone or
-// ClientGone when a send finds nobody. If the executor calls late, the machine assumes that the executor itself was held up, and extends
-// everybody's time by as much.
+// carry out the actions in order; answer LoadDataset, CountDataset and PlanRequest with one event each, in any order; report WorkerGone
+// or ClientGone when a send finds nobody. If the executor calls late, the machine assumes that the executor itself was held up, and
+// extends everybody's time by as much.
 #pragma once
 
 #include <cstdint>
@@ -44,7 +47,7 @@ struct CoordinatorConfig {
   Epoch epoch = 0;  // random, not 0
   std::uint32_t pid = 0;
   std::string slabs_endpoint;
-  std::vector<std::string> datasets;  // names of the catalogue
+  std::vector<std::string> datasets;                    // names of the catalogue
   Duration heartbeat = std::chrono::milliseconds(500);  // also the interval of Ping
   Duration worker_timeout = std::chrono::seconds(6);
   Duration client_timeout = std::chrono::seconds(10);

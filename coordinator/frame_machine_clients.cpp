@@ -22,6 +22,7 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const SubmitFrame& m
   OpenRequest request{.client = client, .submit = message, .arrived = now};
   const Status admissible = Admissible(client, message);
   if (!admissible.ok()) return FailRequest(request, admissible);
+  request.needs_occupancy = NeedsOccupancy(message.frame.policy);
   const DatasetState state = datasets.Find(message.frame.dataset)->state;
   if (state == DatasetState::kUnloaded || state == DatasetState::kFailed) {
     const DatasetId id = datasets.BeginLoad(message.frame.dataset);

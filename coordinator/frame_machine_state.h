@@ -120,7 +120,7 @@ struct FrameMachine::State {
   void Expire();
   void Advance();
   Status FindVolume(OpenRequest& request) const;
-  bool WaitsForCount(const OpenRequest& request) { return NeedsOccupancy(request.submit.frame.policy) && !occupancy.Find(*request.volume); }
+  bool WaitsForCount(const OpenRequest& request) { return request.needs_occupancy && !occupancy.Find(*request.volume); }
   void CountAhead();
   void PlanAhead();
   void DropPlans();

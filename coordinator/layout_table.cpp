@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "common/planning/balance.h"
-#include "common/planning/policy_names.h"
 #include "coordinator/learning_table.h"
 
 namespace slabstream {
@@ -33,16 +32,16 @@ LayoutTable::Learnt* LayoutTable::FindLearnt(const ClassifiedVolume& volume) {
   return &*found;
 }
 
-LayoutTable::Key LayoutTable::KeyOf(const ClassifiedVolume& volume, const Policy& policy, std::uint32_t slots) {
+LayoutTable::Key LayoutTable::KeyOf(const ClassifiedVolume& volume, const ResolvedPolicy& policy, std::uint32_t slots) {
   Key key{volume, policy, slots};
   key.policy.combine.clear();
   key.policy.pixel_error = 0;
   return key;
 }
 
-const Layout& LayoutTable::Find(const Request& request) {
-  const FrameRequest& frame = *request.frame;
-  Key key = KeyOf(*request.volume, frame.policy, request.slots);
+std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
+  const ResolvedPolicy& policy = *request.policy;
+  Key key = KeyOf(*request.volume, policy, request.slots);
 
   Learnt* learnt = nullptr;
   if (request.occupied != nullptr) {
@@ -55,8 +54,8 @@ const Layout& LayoutTable::Find(const Request& request) {
   const bool known = learnt != nullptr && learnt->cost.any();
   LayoutRequest make{.summary = request.summary,
                      .transfer = &request.volume->transfer(),
-                     .policy = &frame.policy,
-                     .renderer = frame.renderer,
+                     .policy = &policy,
+                     .renderer = request.volume->renderer(),
                      .slots = request.slots,
                      .slab_bytes_target = request.slab_bytes_target,
                      .known = {.occupied = request.occupied.get()}};
@@ -68,22 +67,22 @@ const Layout& LayoutTable::Find(const Request& request) {
 
   const auto found = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& entry) { return entry.key == key; });
   if (found == entries_.end()) {
-    entries_.push_front({std::move(key), MakeLayout(with_cost()), known, 0, 0, {}});
+    entries_.push_front({std::move(key), std::make_shared<const Layout>(MakeLayout(with_cost())), known, 0, 0, {}});
     KeepFirst(entries_, kMaxKept);
     return entries_.front().layout;
   }
   entries_.splice(entries_.begin(), entries_, found);
   Entry& entry = *found;
   std::optional<Layout> better;
-  if (known && frame.policy.balance == kDynamicBalance) {
+  if (known && policy.dynamic_balance) {
     if (entry.frames_seen >= std::clamp(entry.changes, 1, kMostPatience))
-      better = Rebalance(entry.layout, entry.seconds, with_cost(), entry.frames_seen);
-  } else if (known && !entry.by_cost && FindWorkSplit(SplitOf(frame.policy)) == WorkSplit::kCost) {
+      better = Rebalance(*entry.layout, entry.seconds, with_cost(), entry.frames_seen);
+  } else if (known && !entry.by_cost && policy.split == WorkSplit::kCost) {
     better = MakeLayout(with_cost());
     entry.by_cost = true;
   }
-  if (better && !(*better == entry.layout)) {
-    entry.layout = *std::move(better);
+  if (better && *better != *entry.layout) {
+    entry.layout = std::make_shared<const Layout>(*std::move(better));
     ++entry.changes;
     entry.frames_seen = 0;
     entry.seconds.clear();
@@ -101,24 +100,24 @@ std::optional<WorkField> LayoutTable::KnownCost(const ClassifiedVolume& volume) 
   return learnt_.front().cost.Field();
 }
 
-void LayoutTable::Learn(const ClassifiedVolume& volume, const FramePlan& plan, const Policy& policy,
+void LayoutTable::Learn(const ClassifiedVolume& volume, const FramePlan& plan, const ResolvedPolicy& policy,
                         std::span<const RankReport> reports) {
   Learnt* const learnt = FindLearnt(volume);
   if (learnt == nullptr) return;
-  const std::map<BoxId, double> seconds = SecondsOf(plan.layout, reports);
+  const std::map<BoxId, double> seconds = SecondsOf(*plan.layout, reports);
   if (seconds.empty()) return;
   const Key key = KeyOf(volume, policy, plan.slots);
-  const auto entry =
-      std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.key == key && e.layout == plan.layout; });
+  const auto entry = std::find_if(entries_.begin(), entries_.end(),
+                                  [&](const Entry& e) { return e.key == key && (e.layout == plan.layout || *e.layout == *plan.layout); });
   // The first frame of a layout tells most; of a layout that has been changed since, what an average one does.
   double weight = kLeastWeight;
   if (entry != entries_.end()) {
     weight = std::max(weight, 1.0 / ++entry->frames_seen);
-    entry->seconds.resize(plan.layout.owners.size());
+    entry->seconds.resize(plan.layout->owners.size());
   }
   std::vector<BoxSeconds> boxes;
   for (const auto& [box, time] : seconds) {
-    boxes.push_back({plan.layout.partition.boxes()[box], time});
+    boxes.push_back({plan.layout->partition.boxes()[box], time});
     if (entry == entries_.end()) continue;
     double& known = entry->seconds[box];
     known = known == 0 ? time : known + weight * (time - known);

@@ -33,35 +33,35 @@ class LayoutTable {
   static constexpr int kMostPatience = 8;
 
   struct Request {
-    const FrameRequest* frame = nullptr;  // with names that there are (CheckNames)
+    const ResolvedPolicy* policy = nullptr;
     const ClassifiedVolume* volume = nullptr;  // of the frame
     const VolumeSummary* summary = nullptr;
     std::shared_ptr<const OccupancyGrid> occupied;  // null: the policy does not need it
     std::uint32_t slots = 1;
     std::int64_t slab_bytes_target = 0;
   };
-  // What the frame should be planned with. Valid until the next call.
-  const Layout& Find(const Request& request);
+  // What the frame should be planned with.
+  std::shared_ptr<const Layout> Find(const Request& request);
 
   // What boxes cost, as far as frames have told: seconds.
   bool KnowsCost(const ClassifiedVolume& volume);
   std::optional<WorkField> KnownCost(const ClassifiedVolume& volume);
 
   // A finished frame. Nothing is learnt from frames that were planned without occupied voxels.
-  void Learn(const ClassifiedVolume& volume, const FramePlan& plan, const Policy& policy, std::span<const RankReport> reports);
+  void Learn(const ClassifiedVolume& volume, const FramePlan& plan, const ResolvedPolicy& policy, std::span<const RankReport> reports);
 
  private:
   struct Key {
     ClassifiedVolume volume;
-    Policy policy;
+    ResolvedPolicy policy;
     std::uint32_t slots = 1;
     friend bool operator==(const Key&, const Key&) = default;
   };
   // How images are combined moves no box, so policies that differ in that alone share a layout.
-  static Key KeyOf(const ClassifiedVolume& volume, const Policy& policy, std::uint32_t slots);
+  static Key KeyOf(const ClassifiedVolume& volume, const ResolvedPolicy& policy, std::uint32_t slots);
   struct Entry {
     Key key;
-    Layout layout;
+    std::shared_ptr<const Layout> layout;
     bool by_cost = false;         // made when costs were known
     int changes = 0;              // by dynamic balance
     int frames_seen = 0;          // of this layout

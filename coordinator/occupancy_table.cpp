@@ -17,8 +17,7 @@ std::shared_ptr<const OccupancyGrid> OccupancyTable::Find(const ClassifiedVolume
 }
 
 bool OccupancyTable::Counting(const ClassifiedVolume& volume) const {
-  return std::any_of(entries_.begin(), entries_.end(),
-                     [&](const Entry& entry) { return entry.grid == nullptr && entry.volume == volume; });
+  return std::any_of(entries_.begin(), entries_.end(), [&](const Entry& entry) { return entry.grid == nullptr && entry.volume == volume; });
 }
 
 CountId OccupancyTable::Begin(const ClassifiedVolume& volume) {

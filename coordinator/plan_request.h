@@ -30,7 +30,7 @@ struct PlanRequest {
 
 struct PlannedFrame {
   PlanRequest asked;
-  Policy policy;                              // that the plan was made by: nothing is left open
+  ResolvedPolicy policy;                      // that the plan was made by
   std::optional<FramePrediction> prediction;  // none: the policy was not open, or the frame is too much to simulate
   double render_scale = 1;                    // that the prediction was made with (PolicyTable)
   FramePlan plan;

@@ -13,10 +13,11 @@ Result<std::shared_ptr<const PlannedFrame>> Planner::Plan(const PlanRequest& req
 
 Result<std::shared_ptr<const PlannedFrame>> Planner::TryPlan(const PlanRequest& request) {
   auto planned = std::make_shared<PlannedFrame>(PlannedFrame{.asked = request, .policy = {}, .prediction = {}, .plan = {}});
-  FrameRequest frame = request.frame;
-  frame.policy = SettledPolicy(frame, request.summary->description.geometry);
+  const VolumeGeometry& geometry = request.summary->description.geometry;
   const auto slots = std::uint32_t(request.roster.slots.size());
-  if (LeavesChoice(frame.policy)) {
+  if (LeavesChoice(request.frame.policy)) {
+    FrameRequest frame = request.frame;
+    frame.policy = SettledPolicy(frame, geometry);
     const MachineModel machine = ServiceMachine(request.workers, config_.surroundings);
     const Result<ChosenPolicy> chosen = policies_.Find({.frame = &frame,
                                                         .volume = &request.volume,
@@ -27,20 +28,23 @@ Result<std::shared_ptr<const PlannedFrame>> Planner::TryPlan(const PlanRequest& 
                                                         .cost = &config_.cost,
                                                         .layouts = &layouts_});
     if (!chosen.ok()) return chosen.status();
-    frame.policy = chosen->policy;
+    planned->policy = chosen->policy;
     planned->prediction = chosen->prediction;
     planned->render_scale = chosen->render_scale;
+  } else {
+    Result<ResolvedPolicy> policy = ResolvePolicy(request.frame, geometry);
+    if (!policy.ok()) return policy.status();
+    planned->policy = *std::move(policy);
   }
-  const Layout& layout = layouts_.Find({.frame = &frame,
-                                        .volume = &request.volume,
-                                        .summary = request.summary.get(),
-                                        .occupied = request.occupied,
-                                        .slots = slots,
-                                        .slab_bytes_target = config_.cost.slab_bytes_target});
-  Result<FramePlan> plan =
-      PlanFrame(frame, request.volume.dataset(), *request.summary, request.roster, config_.cost, &layout, request.turn);
+  std::shared_ptr<const Layout> layout = layouts_.Find({.policy = &planned->policy,
+                                                        .volume = &request.volume,
+                                                        .summary = request.summary.get(),
+                                                        .occupied = request.occupied,
+                                                        .slots = slots,
+                                                        .slab_bytes_target = config_.cost.slab_bytes_target});
+  Result<FramePlan> plan = PlanFrame(request.frame, planned->policy, request.volume.dataset(), *request.summary, request.roster,
+                                     std::move(layout), request.turn);
   if (!plan.ok()) return plan.status();
-  planned->policy = std::move(frame.policy);
   planned->plan = *std::move(plan);
   return std::shared_ptr<const PlannedFrame>(std::move(planned));
 }

@@ -34,9 +34,9 @@ PolicyTable::Kind PolicyTable::KindOf(const Request& request) {
           .size = frame.size};
 }
 
-Result<ChosenPolicy> PolicyTable::Choose(const Request& request, Entry& entry, const Kind& kind, const Policy& open, const Policy* now) {
-  const std::optional<WorkField> cost =
-      entry.by_cost ? request.layouts->KnownCost(*request.volume) : std::nullopt;
+Result<ChosenPolicy> PolicyTable::Choose(const Request& request, Entry& entry, const Kind& kind, const Policy& open,
+                                         const ResolvedPolicy* now) {
+  const std::optional<WorkField> cost = entry.by_cost ? request.layouts->KnownCost(*request.volume) : std::nullopt;
   FrameRequest frame = *request.frame;
   frame.policy = open;
   const Result<PolicyChoice> choice = ChoosePolicy({.frame = &frame,
@@ -73,7 +73,7 @@ Result<ChosenPolicy> PolicyTable::Find(const Request& request) {
   }
   entries_.splice(entries_.begin(), entries_, found);
   Entry& entry = entries_.front();
-  const Policy holds = entry.choices.front().chosen.policy;
+  const ResolvedPolicy holds = entry.choices.front().chosen.policy;
   if (!entry.by_cost && request.layouts->KnowsCost(*request.volume)) {
     entry.by_cost = true;
     entry.render_scale = 1;  // costs are seconds now
@@ -85,14 +85,14 @@ Result<ChosenPolicy> PolicyTable::Find(const Request& request) {
   }
   const auto choice = std::ranges::find(entry.choices, kind, &Choice::kind);
   if (choice == entry.choices.end()) {
-    Policy open = holds;
+    Policy open = AskFor(holds);
     open.combine = entry.key.asked.combine;
     return Choose(request, entry, kind, open, nullptr);
   }
   const int seen = entry.frames_seen;
   const int due =
       seen < kMostFramesAPrediction ? int(std::bit_floor(unsigned(seen))) : seen / kMostFramesAPrediction * kMostFramesAPrediction;
-  if (choice->made_after < due) return Choose(request, entry, kind, choice->chosen.policy, nullptr);
+  if (choice->made_after < due) return Choose(request, entry, kind, AskFor(choice->chosen.policy), nullptr);
   entry.choices.splice(entry.choices.begin(), entry.choices, choice);
   return choice->chosen;
 }

@@ -23,7 +23,7 @@
 namespace slabstream {
 
 struct ChosenPolicy {
-  Policy policy;                              // leaves nothing open
+  ResolvedPolicy policy;
   std::optional<FramePrediction> prediction;  // none: too much to simulate
   double render_scale = 1;                    // by which it was corrected (PolicyQuestion)
 };
@@ -37,7 +37,7 @@ class PolicyTable {
   static constexpr int kMostFramesAPrediction = 64;  // it is made anew after 1, 2, 4 ... frames, and after as many as this again and again
 
   struct Request {
-    const FrameRequest* frame = nullptr;  // whose policy has names that there are (CheckNames)
+    const FrameRequest* frame = nullptr;       // whose policy has names that there are (CheckNames)
     const ClassifiedVolume* volume = nullptr;  // of the frame
     const VolumeSummary* summary = nullptr;
     std::shared_ptr<const OccupancyGrid> occupied;  // null: not counted
@@ -81,7 +81,7 @@ class PolicyTable {
     std::list<Choice> choices;  // by kind; asked for last first; the same but for `combine`
   };
   static Kind KindOf(const Request& request);
-  Result<ChosenPolicy> Choose(const Request& request, Entry& entry, const Kind& kind, const Policy& open, const Policy* now);
+  Result<ChosenPolicy> Choose(const Request& request, Entry& entry, const Kind& kind, const Policy& open, const ResolvedPolicy* now);
 
   std::list<Entry> entries_;  // asked for last first
 };

@@ -21,6 +21,7 @@ struct OpenRequest {
   PeerToken client = 0;
   SubmitFrame submit;
   Time arrived;
+  bool needs_occupancy = false;                 // of its policy (NeedsOccupancy)
   std::optional<ClassifiedVolume> volume;       // none: its dataset is not loaded yet
   PlanId plan = 0;                              // that was asked for; 0: none
   std::uint64_t planned_for = 0;                // LiveRoster::version() when it was

@@ -233,15 +233,15 @@ FrameProgress RunningFrame::Progress() const {
 }
 
 FrameStatistics RunningFrame::Statistics(Time now) const {
-  const Policy& policy = request_.planned->policy;
+  const ResolvedPolicy& policy = request_.planned->policy;
   FrameStatistics statistics{.workers = std::uint32_t(Participants().size()),
                              .groups = group_count(),
                              .attempts = attempt(),
-                             .decomposition = policy.decomposition,
-                             .split = plan_.split,
-                             .axis = std::string(1, Letter(plan_.slab_axis)),
-                             .assignment = policy.assignment,
-                             .balance = policy.balance,
+                             .decomposition = std::string(policy.decomposition->name),
+                             .split = std::string(NameOf(policy.split)),
+                             .axis = std::string(1, Letter(policy.axis)),
+                             .assignment = std::string(policy.assignment->name),
+                             .balance = request_.submit.frame.policy.balance,
                              .combine = plan_.combine,
                              .queued_ns = (begin_ - request_.arrived).count(),
                              .begin_ns = Nanoseconds(begin_),

@@ -15,7 +15,6 @@
 #include "common/base/guarded.h"
 #include "common/base/log.h"
 #include "common/base/shared_arena.h"
-#include "common/classification/count_occupied.h"
 #include "common/planning/render_work.h"
 #include "common/transport/endpoint.h"
 #include "common/transport/mailbox.h"
@@ -72,9 +71,10 @@ Result<News> Load(const VolumeLoader& loader, const LoadDataset& action) {
   return news;
 }
 
-Result<std::shared_ptr<const OccupancyGrid>> Count(const SlabServer::Samples& samples, const CountDataset& action) {
+Result<std::shared_ptr<const OccupancyGrid>> Count(const CountFunction& count, const SlabServer::Samples& samples,
+                                                   const CountDataset& action) {
   const ClassificationTable drawn = DrawnTable(action.volume.transfer(), *action.summary, action.volume.renderer());
-  return std::make_shared<const OccupancyGrid>(CountOccupied(samples.view(), drawn));
+  return std::make_shared<const OccupancyGrid>(count(samples.view(), drawn));
 }
 
 }  // namespace
@@ -87,6 +87,7 @@ struct CoordinatorService::Impl {
         control(std::move(control_socket)),
         slabs(std::move(slab_server)),
         make_plan(std::move(service_options.make_plan)),
+        count_occupied(std::move(service_options.count_occupied)),
         planner(std::make_shared<Planner>(std::move(service_options.planner))) {}
 
   void Run();
@@ -119,7 +120,8 @@ struct CoordinatorService::Impl {
   bool stop_now = false;  // the machine said so
   Time next_forget;
   const PlanFunction make_plan;
-  const std::shared_ptr<Planner> planner;  // the planning thread's
+  const CountFunction count_occupied;
+  const std::shared_ptr<Planner> planner;                      // the planning thread's
   std::map<PlanId, std::shared_ptr<std::atomic<bool>>> plans;  // under way: whether they are dropped
   BackgroundTasks loads{kLoadsAtOnce}, counts{1}, planning{1};
   std::jthread thread;  // owns the sockets and the machine; last member: ends first
@@ -174,8 +176,8 @@ void CoordinatorService::Impl::HandleEvent(const CoordinatorEvent& event) {
   }
 }
 
-// A peer that cannot be reached, or that does not take its messages, is gone, and so is one to which nothing can be said for want of memory.
-// The machine hears of it after the actions at hand, not between them.
+// A peer that cannot be reached, or that does not take its messages, is gone, and so is one to which nothing can be said for want of
+// memory. The machine hears of it after the actions at hand, not between them.
 void CoordinatorService::Impl::Send(Socket& socket, PeerTable& peers, PeerToken to, const AnyMessage& message, const Bytes& payload,
                                     const CoordinatorEvent& gone) {
   const std::string* identity = peers.IdentityOf(to);
@@ -236,8 +238,9 @@ void CoordinatorService::Impl::Perform(LoadDataset& action) {
 
 void CoordinatorService::Impl::Perform(CountDataset& action) {
   const Status begun = Guarded("counting of occupied voxels", [&] {
-    counts.Post([inbox = inbox, samples = slabs->Find(action.volume.dataset()), action] {
-      inbox->Post(NewsOf(OccupiedCounted{action.count, Guarded("counting of occupied voxels", [&] { return Count(samples, action); })}));
+    counts.Post([inbox = inbox, count = count_occupied, samples = slabs->Find(action.volume.dataset()), action] {
+      auto grid = Guarded("counting of occupied voxels", [&] { return Count(count, samples, action); });
+      inbox->Post(NewsOf(OccupiedCounted{action.count, std::move(grid)}));
     });
     return Status::Ok();
   });
@@ -265,13 +268,18 @@ void CoordinatorService::Impl::Perform(DropPlan& action) {
 }
 
 void CoordinatorService::Impl::Perform(FrameMeasured& action) {
-  planning.Post([planner = planner, measured = std::move(action)] {
+  const auto learn = [planner = planner, measured = std::move(action)] {
     const Status learnt = Guarded("learning from a frame", [&] {
       planner->Learn(measured);
       return Status::Ok();
     });
     if (!learnt.ok()) LogWarning(learnt.message());
+  };
+  const Status begun = Guarded("learning from a frame", [&] {
+    planning.Post(learn);
+    return Status::Ok();
   });
+  if (!begun.ok()) LogWarning(begun.message());
 }
 
 Result<std::unique_ptr<CoordinatorService>> CoordinatorService::Start(Context& context, CoordinatorOptions options) {

@@ -2,8 +2,8 @@
 //
 // Threads: one owns the client and control sockets and runs the machine; one owns the slabs socket, cuts and packs chunks; one plans; one
 // counts occupied voxels; each dataset that is being loaded has one, kLoadsAtOnce at a time. None of them waits for another one, and what
-// one of them throws fails what it was doing: a frame, a load, a count, a chunk. If the machine's own thread throws, open requests fail with the
-// reason and the service stops.
+// one of them throws fails what it was doing: a frame, a load, a count, a chunk. If the machine's own thread throws, open requests fail
+// with the reason and the service stops.
 #pragma once
 
 #include <functional>
@@ -11,6 +11,7 @@
 #include <string>
 
 #include "common/base/status.h"
+#include "common/classification/count_occupied.h"
 #include "common/transport/socket.h"
 #include "coordinator/catalogue.h"
 #include "coordinator/frame_machine.h"
@@ -18,6 +19,8 @@
 
 namespace slabstream {
 
+// What the planning and the counting thread call. Tests put others in their place, which fail or wait.
+using CountFunction = std::function<OccupancyGrid(const VoxelBricks&, const ClassificationTable&)>;
 using PlanFunction = std::function<Result<std::shared_ptr<const PlannedFrame>>(Planner&, const PlanRequest&)>;
 
 struct CoordinatorOptions {
@@ -29,6 +32,7 @@ struct CoordinatorOptions {
   CoordinatorConfig machine;    // epoch, pid, slabs_endpoint and datasets are filled in by Start
   PlannerConfig planner;        // surroundings, but for the link, are filled in by Start
   PlanFunction make_plan = &Planner::Plan;
+  CountFunction count_occupied = CountOccupied;
 };
 
 inline constexpr std::size_t kLoadsAtOnce = 4;

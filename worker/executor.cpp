@@ -358,10 +358,17 @@ void Executor::Perform(SendPartial&& action, const Delivery& delivery) {
   std::optional<Bytes> payload;
   // To say where pixels are takes less time than to wake a thread that does.
   if (combine_thread_.Idle()) {
-    const std::int64_t begin = NowNs();
-    view = view_of(*image, action);
-    payload = PayloadInPlace(*image, *view, delivery, action);
-    if (payload && !MayPack(delivery.bytes_per_second)) return Post(action, *std::move(payload), begin);
+    bool posted = false;
+    const Status status = Guard("encode", [&] {
+      const std::int64_t begin = NowNs();
+      view = view_of(*image, action);
+      payload = PayloadInPlace(*image, *view, delivery, action);
+      posted = payload && !MayPack(delivery.bytes_per_second);
+      if (posted) Post(action, *std::move(payload), begin);
+      return Status::Ok();
+    });
+    if (!status.ok()) return outbox_.Post(WorkerEvent(SendFailed{action.message.key, status}));
+    if (posted) return;
   }
   combine_thread_.Post(
       [=, this, image = std::move(image), view = std::move(view), payload = std::move(payload), send = std::move(action)]() mutable {

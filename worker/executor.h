@@ -63,7 +63,8 @@ struct Delivery {
 class Executor {
  public:
   // `frame_codec` packs finished frames. `threads` render, at least 1. The outbox must outlive the executor.
-  Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec, int threads, RendererFactory make_renderer = MakeRenderer, TaskHook hook = {});
+  Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec, int threads, RendererFactory make_renderer = MakeRenderer,
+           TaskHook hook = {});
   ~Executor();  // cancels the running render, drops what has not begun, joins
 
   void Perform(const OpenSlab& action);

@@ -1,9 +1,9 @@
 // WorkerService: runs a WorkerMachine over ZeroMQ.
 //
 // Threads: one owns all sockets and runs the machine; one renders, with as many helpers as WorkerConfig::threads says; one combines,
-// encodes and unpacks chunks; one makes finished pictures. So rendering of one group goes on beside the combining of another, and heartbeats are on time whatever is
-// computed. What a task throws fails its group, which the coordinator is told of at once. If the thread that runs the machine throws, the
-// worker leaves and says why in its log.
+// encodes and unpacks chunks; one makes finished pictures. So rendering of one group goes on beside the combining of another, and
+// heartbeats are on time whatever is computed. What a task throws fails its group, which the coordinator is told of at once. If the thread
+// that runs the machine throws, the worker leaves and says why in its log.
 #pragma once
 
 #include <memory>

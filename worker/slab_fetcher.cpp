@@ -170,7 +170,8 @@ void SlabFetcher::OnStored(const ChunkStored& stored, Time now) {
   if (!stored.status.ok()) {
     Slab* slab = Find(stored.slab.generation);
     Retry(stored.slab.generation, place, stored.status);
-    if (slab != nullptr && stored.status.code() == StatusCode::kResourceExhausted) GiveUp(*slab, stored.status);  // no room for the next copy either
+    if (slab != nullptr && stored.status.code() == StatusCode::kResourceExhausted)
+      GiveUp(*slab, stored.status);  // no room for the next copy either
     return;
   }
   const std::uint32_t bytes = request->second.bytes;

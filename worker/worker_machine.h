@@ -115,7 +115,8 @@ struct PeerUnreachable {
 };
 struct StopRequested {};  // SIGTERM: leave in order
 struct Tick {};
-using WorkerEvent = std::variant<MessageReceived, ChunkStored, RenderDone, CombineDone, HiddenFound, SendFailed, PeerUnreachable, StopRequested, Tick>;
+using WorkerEvent =
+    std::variant<MessageReceived, ChunkStored, RenderDone, CombineDone, HiddenFound, SendFailed, PeerUnreachable, StopRequested, Tick>;
 
 // ---- actions
 struct SendControl {
@@ -178,8 +179,8 @@ struct FindHidden {
   std::shared_ptr<const FrameSetup> setup;
   OcclusionMask known;
 };
-// Sends message.pixels of `image`: fills in how they travel, and into reports of this worker's ranks what their messages took. -> SendFailed,
-// or nothing.
+// Sends message.pixels of `image`: fills in how they travel, and into reports of this worker's ranks what their messages took. ->
+// SendFailed, or nothing.
 struct SendPartial {
   Peer to;
   PartialImage message;

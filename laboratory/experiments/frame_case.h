@@ -61,7 +61,7 @@ struct LayoutKnowledge {
   VolumeInUse volume;
   std::shared_ptr<const OccupancyGrid> occupied;
   TransferFunction transfer;
-  Policy policy;  // settled
+  ResolvedPolicy policy;
   RendererKind renderer = RendererKind::kSplat;
 };
 Result<LayoutKnowledge> KnowLayout(ExperimentContext& context, const FrameCase& frame);

@@ -23,10 +23,10 @@ class LearntLayouts {
 
   // Of the next frame, which may differ in its view alone from the one given to Make. Valid until the next call.
   const Layout& Next(const FrameCase& frame) {
-    FrameRequest request = RequestOf(frame);
-    request.policy = policy_ = SettledPolicy(request, knowledge_.volume.summary->description.geometry);
-    return table_.Find(
-        {&request, &volume_, knowledge_.volume.summary.get(), knowledge_.occupied, slots_, CostModel().slab_bytes_target});
+    policy_ = ResolvePolicy(RequestOf(frame), knowledge_.volume.summary->description.geometry).value();
+    layout_ = table_.Find(
+        {&policy_, &volume_, knowledge_.volume.summary.get(), knowledge_.occupied, slots_, CostModel().slab_bytes_target});
+    return *layout_;
   }
 
   // What rendering the frame of the last Next took, by PlacementsOf(plan).
@@ -46,7 +46,8 @@ class LearntLayouts {
 
   LayoutKnowledge knowledge_;
   ClassifiedVolume volume_;
-  Policy policy_;  // of the last Next
+  ResolvedPolicy policy_;  // of the last Next
+  std::shared_ptr<const Layout> layout_;
   std::uint32_t slots_;
   LayoutTable table_;
 };

@@ -133,8 +133,8 @@ class CoordinatorScript {
   std::vector<LoadDataset> loads;   // all that were asked for
   std::vector<CountDataset> counts;
   Planner planner;
-  bool plans_at_once = true;          // else plans wait in `plans` for Plan()
-  std::vector<PlanRequest> plans;     // that were not made yet
+  bool plans_at_once = true;       // else plans wait in `plans` for Plan()
+  std::vector<PlanRequest> plans;  // that were not made yet
 
   // All that comes of the event, of the plans that are made at once, too.
   Actions Step(const CoordinatorEvent& event) {

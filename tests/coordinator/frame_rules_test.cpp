@@ -338,7 +338,8 @@ TEST(CoordinatorFrames, TroubleOfTheDisplayWorkerBeginsAgain) {
 }
 
 WorkerTrouble Unable(const GroupAssignment& group, WorkerId worker) {
-  return {.epoch = 77, .worker = worker, .key = group.key, .status = Status::ResourceExhausted("render: not enough memory"), .elsewhere = true};
+  return {
+      .epoch = 77, .worker = worker, .key = group.key, .status = Status::ResourceExhausted("render: not enough memory"), .elsewhere = true};
 }
 
 TEST(CoordinatorFrames, WorkerThatIsUnableIsLeftOutAtOnceAndOnlyOfThisFrame) {

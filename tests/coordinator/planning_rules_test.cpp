@@ -84,8 +84,7 @@ TEST(CoordinatorPlanning, FailedPlanFailsThatFrameOnly) {
   ASSERT_THAT(script.plans, SizeIs(2));
   const PlanRequest first = script.plans[0];
   script.plans.erase(script.plans.begin());
-  const auto failed =
-      ToClients<FrameFailed>(script.Step(Planned{first.plan, Status::ResourceExhausted("planning: not enough memory")}));
+  const auto failed = ToClients<FrameFailed>(script.Step(Planned{first.plan, Status::ResourceExhausted("planning: not enough memory")}));
   ASSERT_THAT(failed, SizeIs(1));
   EXPECT_EQ(failed[0].message.request, 1U);
   EXPECT_EQ(failed[0].message.status, Status::ResourceExhausted("planning: not enough memory"));

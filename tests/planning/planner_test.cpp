@@ -24,11 +24,11 @@ FramePlan Plan(const FrameRequest& request, const VolumeSummary& summary, const 
 
 // What every plan must be, whatever it was made for.
 void ExpectSound(const FramePlan& plan, const Roster& roster) {
-  std::vector<BoxId> order = VisibilityOrder(plan.layout.partition, plan.setup.camera);
-  ASSERT_EQ(plan.layout.owners.size(), order.size());
-  std::erase_if(order, [&](BoxId box) { return plan.layout.owners[box] == kNoSlot; });
+  std::vector<BoxId> order = VisibilityOrder(plan.layout->partition, plan.setup.camera);
+  ASSERT_EQ(plan.layout->owners.size(), order.size());
+  std::erase_if(order, [&](BoxId box) { return plan.layout->owners[box] == kNoSlot; });
   EXPECT_EQ(plan.groups.size(), std::max<std::size_t>(1, (order.size() + plan.slots - 1) / plan.slots));
-  const std::vector<WorkerId> owners = OwnersOf(plan.layout, roster);
+  const std::vector<WorkerId> owners = OwnersOf(*plan.layout, roster);
 
   // The placements of all groups are the boxes that show something, in visibility order, each in the group where it belongs.
   std::map<BoxId, std::size_t> position;
@@ -38,7 +38,7 @@ void ExpectSound(const FramePlan& plan, const Roster& roster) {
     const GroupPlan& group = plan.groups[g];
     for (std::size_t rank = 0; rank < group.placements.size(); ++rank) {
       const Placement& placement = group.placements[rank];
-      EXPECT_EQ(placement.box, plan.layout.partition.boxes()[placement.id]);
+      EXPECT_EQ(placement.box, plan.layout->partition.boxes()[placement.id]);
       EXPECT_EQ(position[placement.id] / plan.slots, g);
       if (rank > 0) {
         EXPECT_LT(position[group.placements[rank - 1].id], position[placement.id]);
@@ -81,7 +81,7 @@ TEST(PlanFrame, IsSoundForAnyWorkersGroupsAndSizes) {
           const Roster roster = FullRoster(workers);
           const FramePlan plan = Plan(request, summary, roster);
           ExpectSound(plan, roster);
-          EXPECT_EQ(PlacedBoxes(plan).size(), plan.layout.partition.boxes().size());  // everything is visible
+          EXPECT_EQ(PlacedBoxes(plan).size(), plan.layout->partition.boxes().size());  // everything is visible
           if (groups > 0 && groups * workers <= size[plan.slab_axis]) {
             EXPECT_EQ(plan.groups.size(), std::size_t(groups));
           }
@@ -141,7 +141,7 @@ TEST(PlanFrame, TurningTheViewReversesRanksButNeverOwnership) {
   for (int i = 0; i < 50; ++i) {
     request.view = RandomView(random);
     const FramePlan plan = Plan(request, summary, roster);
-    EXPECT_EQ(plan.layout.partition, first.layout.partition);
+    EXPECT_EQ(plan.layout->partition, first.layout->partition);
     std::vector<BoxId> forward = PlacedBoxes(first), boxes = PlacedBoxes(plan);
     if (plan.setup.camera.view_direction.y < 0 && request.view.projection == Projection::kOrthographic) {
       std::reverse(forward.begin(), forward.end());
@@ -173,7 +173,7 @@ TEST(PlanFrame, AutomaticChoicesDoNotDependOnTheView) {
     request.view = RandomView(random);
     const Result<FramePlan> plan = PlanFrame(request, 7, summary, FullRoster(2), cost);
     ASSERT_TRUE(plan.ok());
-    EXPECT_EQ(plan->layout.partition, first->layout.partition);
+    EXPECT_EQ(plan->layout->partition, first->layout->partition);
   }
 }
 
@@ -238,7 +238,7 @@ TEST(PlanFrame, LeavesOutBoxesThatShowNothing) {
   EXPECT_EQ(PlacedBoxes(plan), (std::vector<BoxId>{3, 4, 5}));
   EXPECT_EQ(plan.groups.size(), 2U);
   // Only boxes that show anything are dealt out, and the nearest one is the display worker's.
-  EXPECT_EQ(plan.layout.owners, (std::vector<std::uint32_t>{kNoSlot, kNoSlot, kNoSlot, 0, 1, 0, kNoSlot, kNoSlot, kNoSlot, kNoSlot}));
+  EXPECT_EQ(plan.layout->owners, (std::vector<std::uint32_t>{kNoSlot, kNoSlot, kNoSlot, 0, 1, 0, kNoSlot, kNoSlot, kNoSlot, kNoSlot}));
   EXPECT_EQ(plan.display, roster.slots[0]);
 }
 
@@ -408,7 +408,7 @@ TEST(Replan, ReassignsLostBoxesAndChangesNothingElse) {
         ASSERT_TRUE(again.ok());
         ExpectSound(*again, rest);
         EXPECT_EQ(again->setup, plan.setup);
-        EXPECT_EQ(again->layout.partition, plan.layout.partition);
+        EXPECT_EQ(again->layout->partition, plan.layout->partition);
         EXPECT_EQ(PlacedBoxes(*again), PlacedBoxes(plan));
         ASSERT_EQ(again->groups.size(), plan.groups.size());
         std::set<WorkerId> lenders;

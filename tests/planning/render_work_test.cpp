@@ -226,12 +226,12 @@ TEST(MakeLayout, BoxesOfAKdTreeTakeEquallyLong) {
     const RenderWork work(grid, kCubes, renderer, MedianExtinction(transfer, summary));
     for (const std::uint32_t slots : {2U, 3U, 5U, 8U, 13U}) {
       SCOPED_TRACE(std::to_string(slots) + " slots, renderer " + std::to_string(int(renderer)));
-      Policy policy;
-      policy.decomposition = "kd-tree";
-      policy.groups = 1;
+      FrameRequest frame;
+      frame.policy = {.decomposition = "kd-tree", .groups = 1};
+      ResolvedPolicy resolved = ResolvePolicy(frame, summary.description.geometry).value();
       const LayoutRequest request{.summary = &summary,
                                   .transfer = &transfer,
-                                  .policy = &policy,
+                                  .policy = &resolved,
                                   .renderer = renderer,
                                   .slots = slots,
                                   .known = {.occupied = &grid}};
@@ -239,7 +239,7 @@ TEST(MakeLayout, BoxesOfAKdTreeTakeEquallyLong) {
       if (renderer == RendererKind::kSplat) {
         EXPECT_LT(occupied.imbalance, 1.12);
       }
-      policy.split = "voxels";
+      resolved.split = WorkSplit::kVoxels;
       EXPECT_LE(occupied.frame, ForetoldOf(MakeLayout(request), work).frame) << "than boxes of equal volume";
     }
   }
