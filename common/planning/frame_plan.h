@@ -76,7 +76,7 @@ struct Turn {
 
 struct FramePlan {
   FrameSetup setup;
-  std::shared_ptr<const Layout> layout;  // never null
+  std::shared_ptr<const Layout> layout;  // never null; equal plans share it
   std::uint32_t slots = 1;               // p: owner slots the layout was made for
   Axis slab_axis = Axis::kZ;
   double pixel_error = 0;         // as in the policy

@@ -8,6 +8,7 @@
 #include "common/combining/schemes.h"
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
+#include "common/planning/classified_volume.h"
 #include "common/planning/frame_plan.h"
 #include "common/planning/policy_names.h"
 #include "tests/planning/support.h"
@@ -125,7 +126,10 @@ TEST(PlanFrame, SlabsAlongTheViewDivideNoSlice) {
     // As if the axis had been asked for: other views along it share the layout.
     FrameRequest same = request;
     same.policy.axis = AxisChoice(plan.slab_axis);
-    EXPECT_EQ(plan, Plan(same, summary, roster));
+    FramePlan other = Plan(same, summary, roster);
+    EXPECT_EQ(*other.layout, *plan.layout);
+    other.layout = plan.layout;  // plans are equal if they share it
+    EXPECT_EQ(other, plan);
   }
 }
 
@@ -330,6 +334,43 @@ TEST(PlanFrame, ResolvesPresets) {
   TransferFunction expected = *MakePreset("auto", summary);
   expected.opacity_distance = 2.5;
   EXPECT_EQ(Plan(request, summary, FullRoster(1)).setup.transfer, expected);
+}
+
+TEST(ResolvePolicy, OfWhatItAskedForIsTheSame) {
+  const VolumeGeometry geometry = FullSummary({40, 200, 42}).description.geometry;
+  FrameRequest request = SomeRequest();
+  for (const DecompositionEntry& decomposition : Decompositions()) {
+    for (const AssignmentEntry& assignment : Assignments()) {
+      for (const NamedChoice& split : WorkSplits()) {
+        for (const AxisChoice axis : {AxisChoice::kX, AxisChoice::kAuto, AxisChoice::kView}) {
+          request.policy = {.decomposition = std::string(decomposition.name),
+                            .split = std::string(split.name),
+                            .axis = axis,
+                            .assignment = std::string(assignment.name),
+                            .balance = std::string(kDynamicBalance)};
+          const Result<ResolvedPolicy> resolved = ResolvePolicy(request, geometry);
+          ASSERT_TRUE(resolved.ok()) << resolved.status().message();
+          EXPECT_EQ(resolved->decomposition, &decomposition);
+          EXPECT_EQ(resolved->assignment, &assignment);
+          EXPECT_EQ(NeedsOccupancy(*resolved), NeedsOccupancy(request.policy));
+          request.policy = AskFor(*resolved);
+          EXPECT_EQ(*ResolvePolicy(request, geometry), *resolved);
+        }
+      }
+    }
+  }
+}
+
+TEST(ClassifiedVolume, IsAKeyByWhatItIs) {
+  const TransferFunction transfer = std::get<TransferFunction>(SomeRequest().transfer.choice);
+  const ClassifiedVolume volume(3, transfer, RendererKind::kSplat), same(3, transfer, RendererKind::kSplat);
+  EXPECT_EQ(volume, same);
+  EXPECT_EQ(volume.hash(), same.hash());
+  TransferFunction other = transfer;
+  other.opacities.back().opacity /= 2;
+  EXPECT_NE(volume, ClassifiedVolume(4, transfer, RendererKind::kSplat));
+  EXPECT_NE(volume, ClassifiedVolume(3, transfer, RendererKind::kZBuffer));
+  EXPECT_NE(volume, ClassifiedVolume(3, other, RendererKind::kSplat));
 }
 
 TEST(PlanFrame, NamesWhatItDoesNotKnow) {
