@@ -100,26 +100,16 @@ class Truth {
   SimulatedFrame Frame(const Policy& policy, const WorkField* cost = nullptr) {
     FrameRequest request = subject_.request;
     request.policy = policy;
-    const Layout layout = MakeLayout({.summary = &subject_.summary,
-                                      .transfer = &setup_.transfer,
-                                      .policy = &policy,
-                                      .renderer = setup_.renderer,
-                                      .slots = std::uint32_t(roster_.slots.size()),
-                                      .known = {.occupied = &grid_, .cost = cost}});
-    const FramePlan plan = PlanFrame(request, 1, subject_.summary, roster_, {}, &layout).value();
-    const std::vector<BoxCost>& boxes = Measure(plan.layout);
+    const auto layout = std::make_shared<const Layout>(LayoutBy(policy, cost));
+    const FramePlan plan = PlanFrame(request, 1, subject_.summary, roster_, {}, layout).value();
+    const std::vector<BoxCost>& boxes = Measure(*plan.layout);
     FrameInput input{.plan = &plan, .finish_seconds = picture_.finish_seconds, .receive_seconds = picture_.receive_seconds};
     for (const BoxCost& box : boxes) input.boxes.push_back({box.seconds, box.coverage.share.empty() ? nullptr : &box.coverage, 0});
     return SimulateFrames(std::span(&input, 1), machine_, {.keep_spans = false}).value().frames[0];
   }
 
   std::vector<BoxSeconds> Seconds(const Policy& policy) {
-    const Layout layout = MakeLayout({.summary = &subject_.summary,
-                                      .transfer = &setup_.transfer,
-                                      .policy = &policy,
-                                      .renderer = setup_.renderer,
-                                      .slots = std::uint32_t(roster_.slots.size()),
-                                      .known = {.occupied = &grid_}});
+    const Layout layout = LayoutBy(policy, nullptr);
     std::vector<BoxSeconds> seconds;
     const std::vector<BoxCost>& costs = Measure(layout);
     for (std::size_t box = 0; box < costs.size(); ++box) {
@@ -129,6 +119,17 @@ class Truth {
   }
 
  private:
+  Layout LayoutBy(const Policy& policy, const WorkField* cost) const {
+    FrameRequest request = subject_.request;
+    request.policy = policy;
+    const ResolvedPolicy resolved = ResolvePolicy(request, subject_.summary.description.geometry).value();
+    return MakeLayout({.summary = &subject_.summary,
+                       .transfer = &setup_.transfer,
+                       .policy = &resolved,
+                       .renderer = setup_.renderer,
+                       .slots = std::uint32_t(roster_.slots.size()),
+                       .known = {.occupied = &grid_, .cost = cost}});
+  }
   const std::vector<BoxCost>& Measure(const Layout& layout) {
     const std::vector<Box> key(layout.partition.boxes().begin(), layout.partition.boxes().end());
     const auto [found, fresh] = measured_.try_emplace(key);
@@ -184,24 +185,24 @@ void Simulate(const Options& options, const Subject& subject, int workers) {
     const double render = frame.imbalance * frame.stage_seconds[std::size_t(Stage::kRender)] / workers;
     fmt::print("  {:22} {:7.2f} ms (render {:6.2f}, imbalance {:5.2f}), predicted {:7.2f} ({:6.2f}, {:5.2f})  {}\n", what,
                frame.latency() * 1e3, render * 1e3, frame.imbalance, choice.prediction->latency_seconds * 1e3,
-               choice.prediction->render_seconds * 1e3, choice.prediction->imbalance, Text(choice.policy));
+               choice.prediction->render_seconds * 1e3, choice.prediction->imbalance, Text(AskFor(choice.policy)));
   };
   const PolicyChoice fixed = choose(FixedPolicy(Automatic()));
   const double begin = ThreadSeconds();
   const PolicyChoice chosen = choose(Automatic());
   const double choosing = ThreadSeconds() - begin;
   fmt::print("{}, {}, p = {}: {} candidates in {:.1f} ms\n", subject.name, options.renderer, workers, chosen.predicted, choosing * 1e3);
-  print("fixed", fixed, truth.Frame(fixed.policy));
-  print("auto", chosen, truth.Frame(chosen.policy));
+  print("fixed", fixed, truth.Frame(AskFor(fixed.policy)));
+  print("auto", chosen, truth.Frame(AskFor(chosen.policy)));
 
   LearntCost learnt(grid);
-  learnt.Learn(truth.Seconds(chosen.policy), 1);
+  learnt.Learn(truth.Seconds(AskFor(chosen.policy)), 1);
   const WorkField field = learnt.Field();
   question.known.cost = &field;
   question.now = &chosen.policy;
   question.least_gain = 0.1;
   const PolicyChoice revisited = choose(Automatic());
-  print("auto, costs known", revisited, truth.Frame(revisited.policy, &field));
+  print("auto, costs known", revisited, truth.Frame(AskFor(revisited.policy), &field));
 
   std::pair<double, Policy> best{std::numeric_limits<double>::infinity(), {}};
   for (const DecompositionEntry& decomposition : Decompositions()) {

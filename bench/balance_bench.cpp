@@ -44,7 +44,7 @@ std::shared_ptr<const Volume> Load(const std::string& name) {
 
 const RendererKind* RendererOf(const Options& options) { return RequireRenderer(options.renderer).value(); }
 
-FramePlan MakePlan(const Options& options, const VolumeSummary& summary, int view, const Layout* layout = nullptr) {
+FrameRequest MakeRequest(const Options& options, int view) {
   FrameRequest request;
   request.dataset = "volume";
   request.renderer = options.renderer;
@@ -52,8 +52,12 @@ FramePlan MakePlan(const Options& options, const VolumeSummary& summary, int vie
   request.view = {.azimuth_degrees = options.azimuth + 360.0 * view / options.views, .elevation_degrees = options.elevation};
   request.transfer.choice = options.preset;
   request.policy = options.policy;
+  return request;
+}
+
+FramePlan MakePlan(const Options& options, const VolumeSummary& summary, int view, std::shared_ptr<const Layout> layout = nullptr) {
   const Roster roster = RosterOf(layout == nullptr ? 1 : std::uint32_t(options.slots));
-  return PlanFrame(request, 1, summary, roster, {}, layout).value();
+  return PlanFrame(MakeRequest(options, view), 1, summary, roster, {}, std::move(layout)).value();
 }
 
 FrameSetup MakeSetup(const Options& options, const VolumeSummary& summary, int view) { return MakePlan(options, summary, view).setup; }
@@ -133,9 +137,12 @@ class Comparison {
         cost_(RendererOf(options)->MakeCost({&grid_, &summary_, &transfer_})) {}
 
   void Run(const Policy& policy) const {
+    FrameRequest frame = MakeRequest(options_, 0);
+    frame.policy = policy;
+    const ResolvedPolicy resolved = ResolvePolicy(frame, summary_.description.geometry).value();
     const LayoutRequest request{.summary = &summary_,
                                 .transfer = &transfer_,
-                                .policy = &policy,
+                                .policy = &resolved,
                                 .renderer = RendererOf(options_),
                                 .slots = std::uint32_t(options_.slots),
                                 .known = {.occupied = &grid_}};
@@ -200,7 +207,7 @@ class Comparison {
 
   // On a switched link of 10 Gbit/s, all there is to do besides rendering as long as on the machine that the model's defaults are of.
   void Simulate(int view, const Layout& layout, const Measured& measured, Outcome& outcome) const {
-    const FramePlan plan = MakePlan(options_, summary_, view, &layout);
+    const FramePlan plan = MakePlan(options_, summary_, view, std::make_shared<const Layout>(layout));
     FrameInput frame{&plan, {}, 1e-3, 0.5e-3};
     for (std::size_t box = 0; box < layout.owners.size(); ++box) frame.boxes.push_back({measured.by_box[box], &measured.coverage[box], 0});
     MachineModel machine;

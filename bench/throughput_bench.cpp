@@ -80,13 +80,14 @@ Planned Plan(const Subject& subject, const Policy& policy, int workers, int fram
   const Roster roster = RosterOf(std::uint32_t(workers));
   FrameRequest request = subject.request;
   request.policy = policy;
-  request.policy = SettledPolicy(request, subject.summary.description.geometry);
+  const ResolvedPolicy resolved = ResolvePolicy(request, subject.summary.description.geometry).value();
+  const ClassifiedVolume volume(1, subject.transfer, request.renderer);
   LayoutTable layouts;
   Planned planned;
   for (int frame = 0; frame < frames; ++frame) {
-    const Layout& layout = layouts.Find(
-        {&request, 1, &subject.summary, &subject.transfer, subject.occupied, std::uint32_t(workers), CostModel().slab_bytes_target});
-    planned = {.plan = PlanFrame(request, 1, subject.summary, roster, CostModel{}, &layout).value(), .costs = {}};
+    const std::shared_ptr<const Layout> layout = layouts.Find(
+        {&resolved, &volume, &subject.summary, subject.occupied, std::uint32_t(workers), CostModel().slab_bytes_target});
+    planned = {.plan = PlanFrame(request, 1, subject.summary, roster, CostModel{}, layout).value(), .costs = {}};
     planned.costs = MeasureFrameCosts(*subject.volume, planned.plan, repeats);
     std::vector<RankReport> reports;
     std::map<WorkerId, double> seconds;
@@ -98,7 +99,7 @@ Planned Plan(const Subject& subject, const Policy& policy, int workers, int fram
       report.box = placement.id;
       report.stage_ns[std::size_t(Stage::kRender)] = std::int64_t(box * 1e9);
     }
-    layouts.Learn(planned.plan, request.policy, reports);
+    layouts.Learn(volume, planned.plan, resolved, reports);
   }
   return planned;
 }
@@ -200,7 +201,7 @@ void Run(const Options& options) {
           request.policy = policy;
           request.policy.combine = scheme;
           const FramePlan plan =
-              PlanFrame(request, 1, subject.summary, RosterOf(std::uint32_t(team)), CostModel{}, &planned.plan.layout).value();
+              PlanFrame(request, 1, subject.summary, RosterOf(std::uint32_t(team)), CostModel{}, planned.plan.layout).value();
           const Flow flow = Simulate(plan, planned.costs, machine, link == "pvs", options.workers / team);
           fmt::print(
               "  {:7} {:12}: T1 {:.3f} ms, picture to picture {:.3f} ms, efficiency {:5.1f} %; busiest render {:.3f}, combine {:.3f}, "

@@ -1,15 +1,22 @@
+#include <cstdlib>
 #include <exception>
 #include <iostream>
 
 #include "client/cli/command_line.h"
+#include "common/base/background_tasks.h"
 #include "common/base/large_buffers.h"
 
 int main(int argc, char** argv) {
   slabstream::KeepFrameBuffers();
+  int exit_status = 1;
   try {
-    return slabstream::RunCommandLine(argc, argv);
+    exit_status = slabstream::RunCommandLine(argc, argv);
   } catch (const std::exception& error) {  // out of memory, mostly: everything that is expected comes back as a Status
     std::cerr << "slabstream: " << error.what() << "\n";
-    return 1;
   }
+  if (slabstream::BackgroundTasks::AnyRunning()) {  // a load of an embedded service that was interrupted
+    std::cout.flush();
+    std::_Exit(exit_status);
+  }
+  return exit_status;
 }

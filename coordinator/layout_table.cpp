@@ -6,8 +6,6 @@
 #include <utility>
 
 #include "common/planning/balance.h"
-#include "common/planning/policy_names.h"
-#include "common/renderers/registry.h"
 #include "coordinator/learning_table.h"
 
 namespace slabstream {
@@ -27,40 +25,37 @@ std::map<BoxId, double> SecondsOf(const Layout& layout, std::span<const RankRepo
 
 }  // namespace
 
-LayoutTable::Learnt* LayoutTable::FindLearnt(DatasetId dataset, const TransferFunction& transfer, const RendererKind* renderer) {
-  const auto found = std::find_if(learnt_.begin(), learnt_.end(), [&](const Learnt& learnt) {
-    return learnt.dataset == dataset && learnt.transfer == transfer && learnt.renderer == renderer;
-  });
+LayoutTable::Learnt* LayoutTable::FindLearnt(const ClassifiedVolume& volume) {
+  const auto found = std::ranges::find(learnt_, volume, &Learnt::volume);
   if (found == learnt_.end()) return nullptr;
   learnt_.splice(learnt_.begin(), learnt_, found);
   return &*found;
 }
 
-LayoutTable::Key LayoutTable::KeyOf(DatasetId dataset, const TransferFunction& transfer, const RendererKind* renderer, const Policy& policy,
-                                    std::uint32_t slots) {
-  Key key{dataset, transfer, renderer, policy, slots};
+LayoutTable::Key LayoutTable::KeyOf(const ClassifiedVolume& volume, const ResolvedPolicy& policy, std::uint32_t slots) {
+  Key key{volume, policy, slots};
   key.policy.combine.clear();
   key.policy.pixel_error = 0;
   return key;
 }
 
-const Layout& LayoutTable::Find(const Request& request) {
-  const FrameRequest& frame = *request.frame;
-  Key key = KeyOf(request.dataset, *request.transfer, FindRenderer(frame.renderer), frame.policy, request.slots);
+std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
+  const ResolvedPolicy& policy = *request.policy;
+  Key key = KeyOf(*request.volume, policy, request.slots);
 
   Learnt* learnt = nullptr;
   if (request.occupied != nullptr) {
-    learnt = FindLearnt(key.dataset, key.transfer, key.renderer);
+    learnt = FindLearnt(key.volume);
     if (learnt == nullptr) {
-      learnt = &learnt_.emplace_front(Learnt{key.dataset, key.transfer, key.renderer, LearntCost(*request.occupied)});
+      learnt = &learnt_.emplace_front(Learnt{key.volume, LearntCost(*request.occupied)});
       KeepFirst(learnt_, kMaxLearnt);
     }
   }
   const bool known = learnt != nullptr && learnt->cost.any();
   LayoutRequest make{.summary = request.summary,
-                     .transfer = request.transfer,
-                     .policy = &frame.policy,
-                     .renderer = key.renderer,
+                     .transfer = &request.volume->transfer(),
+                     .policy = &policy,
+                     .renderer = request.volume->renderer(),
                      .slots = request.slots,
                      .slab_bytes_target = request.slab_bytes_target,
                      .known = {.occupied = request.occupied.get()}};
@@ -72,22 +67,22 @@ const Layout& LayoutTable::Find(const Request& request) {
 
   const auto found = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& entry) { return entry.key == key; });
   if (found == entries_.end()) {
-    entries_.push_front({std::move(key), MakeLayout(with_cost()), known, 0, 0, {}});
+    entries_.push_front({std::move(key), std::make_shared<const Layout>(MakeLayout(with_cost())), known, 0, 0, {}});
     KeepFirst(entries_, kMaxKept);
     return entries_.front().layout;
   }
   entries_.splice(entries_.begin(), entries_, found);
   Entry& entry = *found;
   std::optional<Layout> better;
-  if (known && frame.policy.balance == kDynamicBalance) {
+  if (known && policy.dynamic_balance) {
     if (entry.frames_seen >= std::clamp(entry.changes, 1, kMostPatience))
-      better = Rebalance(entry.layout, entry.seconds, with_cost(), entry.frames_seen);
-  } else if (known && !entry.by_cost && FindWorkSplit(SplitOf(frame.policy)) == WorkSplit::kCost) {
+      better = Rebalance(*entry.layout, entry.seconds, with_cost(), entry.frames_seen);
+  } else if (known && !entry.by_cost && policy.split == WorkSplit::kCost) {
     better = MakeLayout(with_cost());
     entry.by_cost = true;
   }
-  if (better && !(*better == entry.layout)) {
-    entry.layout = *std::move(better);
+  if (better && *better != *entry.layout) {
+    entry.layout = std::make_shared<const Layout>(*std::move(better));
     ++entry.changes;
     entry.frames_seen = 0;
     entry.seconds.clear();
@@ -95,33 +90,34 @@ const Layout& LayoutTable::Find(const Request& request) {
   return entry.layout;
 }
 
-bool LayoutTable::KnowsCost(DatasetId dataset, const TransferFunction& transfer, const RendererKind* renderer) {
-  const Learnt* const learnt = FindLearnt(dataset, transfer, renderer);
+bool LayoutTable::KnowsCost(const ClassifiedVolume& volume) {
+  const Learnt* const learnt = FindLearnt(volume);
   return learnt != nullptr && learnt->cost.any();
 }
 
-std::optional<WorkField> LayoutTable::KnownCost(DatasetId dataset, const TransferFunction& transfer, const RendererKind* renderer) {
-  if (!KnowsCost(dataset, transfer, renderer)) return std::nullopt;
+std::optional<WorkField> LayoutTable::KnownCost(const ClassifiedVolume& volume) {
+  if (!KnowsCost(volume)) return std::nullopt;
   return learnt_.front().cost.Field();
 }
 
-void LayoutTable::Learn(const FramePlan& plan, const Policy& policy, std::span<const RankReport> reports) {
-  Learnt* const learnt = FindLearnt(plan.setup.dataset, plan.setup.transfer, plan.setup.renderer);
+void LayoutTable::Learn(const ClassifiedVolume& volume, const FramePlan& plan, const ResolvedPolicy& policy,
+                        std::span<const RankReport> reports) {
+  Learnt* const learnt = FindLearnt(volume);
   if (learnt == nullptr) return;
-  const std::map<BoxId, double> seconds = SecondsOf(plan.layout, reports);
+  const std::map<BoxId, double> seconds = SecondsOf(*plan.layout, reports);
   if (seconds.empty()) return;
-  const Key key = KeyOf(plan.setup.dataset, plan.setup.transfer, plan.setup.renderer, policy, plan.slots);
-  const auto entry =
-      std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.key == key && e.layout == plan.layout; });
+  const Key key = KeyOf(volume, policy, plan.slots);
+  const auto entry = std::find_if(entries_.begin(), entries_.end(),
+                                  [&](const Entry& e) { return e.key == key && (e.layout == plan.layout || *e.layout == *plan.layout); });
   // The first frame of a layout tells most; of a layout that has been changed since, what an average one does.
   double weight = kLeastWeight;
   if (entry != entries_.end()) {
     weight = std::max(weight, 1.0 / ++entry->frames_seen);
-    entry->seconds.resize(plan.layout.owners.size());
+    entry->seconds.resize(plan.layout->owners.size());
   }
   std::vector<BoxSeconds> boxes;
   for (const auto& [box, time] : seconds) {
-    boxes.push_back({plan.layout.partition.boxes()[box], time});
+    boxes.push_back({plan.layout->partition.boxes()[box], time});
     if (entry == entries_.end()) continue;
     double& known = entry->seconds[box];
     known = known == 0 ? time : known + weight * (time - known);

@@ -17,10 +17,16 @@
 #include "common/stats/report.h"
 #include "common/tuning/choose_policy.h"
 #include "common/volume/occupancy_grid.h"
-#include "coordinator/chosen_policy.h"
 #include "coordinator/layout_table.h"
+#include "coordinator/plan_request.h"
 
 namespace slabstream {
+
+struct ChosenPolicy {
+  ResolvedPolicy policy;
+  std::optional<FramePrediction> prediction;  // none: too much to simulate
+  double render_scale = 1;                    // by which it was corrected (PolicyQuestion)
+};
 
 class PolicyTable {
  public:
@@ -31,10 +37,9 @@ class PolicyTable {
   static constexpr int kMostFramesAPrediction = 64;  // it is made anew after 1, 2, 4 ... frames, and after as many as this again and again
 
   struct Request {
-    const FrameRequest* frame = nullptr;  // whose policy has names that there are (CheckNames)
-    DatasetId dataset = 0;
+    const FrameRequest* frame = nullptr;       // whose policy has names that there are (CheckNames)
+    const ClassifiedVolume* volume = nullptr;  // of the frame
     const VolumeSummary* summary = nullptr;
-    const TransferFunction* transfer = nullptr;     // of the frame, resolved
     std::shared_ptr<const OccupancyGrid> occupied;  // null: not counted
     std::uint32_t slots = 1;
     const MachineModel* machine = nullptr;
@@ -44,8 +49,8 @@ class PolicyTable {
   // Errors as of ChoosePolicy.
   Result<ChosenPolicy> Find(const Request& request);
 
-  // A finished frame that was planned by what Find said.
-  void Learn(const FramePlan& plan, const ChosenPolicy& chosen, std::span<const RankReport> reports);
+  // A finished frame. Nothing is learnt from one of which nothing was predicted.
+  void Learn(const PlannedFrame& frame, std::span<const RankReport> reports);
 
  private:
   // Views of a kind look at the same slices at about the same size.
@@ -62,9 +67,7 @@ class PolicyTable {
     int made_after = 0;  // frames
   };
   struct Key {
-    DatasetId dataset = 0;
-    TransferFunction transfer;
-    const RendererKind* renderer = nullptr;
+    ClassifiedVolume volume;
     Policy asked;
     std::uint32_t slots = 1;
     friend bool operator==(const Key&, const Key&) = default;
@@ -78,7 +81,7 @@ class PolicyTable {
     std::list<Choice> choices;  // by kind; asked for last first; the same but for `combine`
   };
   static Kind KindOf(const Request& request);
-  Result<ChosenPolicy> Choose(const Request& request, Entry& entry, const Kind& kind, const Policy& open, const Policy* now);
+  Result<ChosenPolicy> Choose(const Request& request, Entry& entry, const Kind& kind, const Policy& open, const ResolvedPolicy* now);
 
   std::list<Entry> entries_;  // asked for last first
 };

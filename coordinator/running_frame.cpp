@@ -21,11 +21,11 @@ std::int64_t Nanoseconds(Time time) { return time.time_since_epoch().count(); }
 
 }  // namespace
 
-RunningFrame::RunningFrame(FrameId id, OpenRequest request, FramePlan plan, Roster roster, const FrameLimits& limits, Time now)
+RunningFrame::RunningFrame(FrameId id, OpenRequest request, const FrameLimits& limits, Time now)
     : id_(id),
       request_(std::move(request)),
-      plan_(std::move(plan)),
-      roster_(std::move(roster)),
+      plan_(request_.planned->plan),
+      roster_(request_.planned->asked.roster),
       limits_(limits),
       begin_(now),
       displays_{plan_.display},
@@ -84,11 +84,15 @@ RunningFrame::HandOut RunningFrame::NextGroup(Time now) {
 }
 
 Status RunningFrame::BeginAttempt(const Roster& roster, Time now) {
-  Result<FramePlan> plan = Replan(plan_, roster);
-  if (!plan.ok()) return plan.status();
+  Roster able = roster;
+  for (WorkerId& worker : able.slots) {
+    if (unable_.contains(worker)) worker = 0;
+  }
+  Result<FramePlan> plan = Replan(plan_, able);
+  if (!plan.ok()) return unable_.empty() ? plan.status() : inability_;
   const bool keeps_accumulated = plan->display == plan_.display && !display_in_doubt_;
   plan_ = std::move(plan).value();
-  roster_ = roster;
+  roster_ = std::move(able);
   displays_.push_back(plan_.display);
   if (!keeps_accumulated) {
     groups_done_ = 0;
@@ -166,7 +170,14 @@ void RunningFrame::OnLoss(WorkerId worker, Time now) {
 }
 
 Status RunningFrame::OnTrouble(const WorkerTrouble& message, Time now) {
-  if (message.key.attempt != attempt() || message.key.group < groups_done_ || attempt_due_) return Status::Ok();
+  const bool no_picture = message.worker == plan_.display && groups_done_ == group_count();
+  if (message.key.attempt != attempt() || (message.key.group < groups_done_ && !no_picture)) return Status::Ok();
+  const Status reason(message.status.code(), WorkerName(message.worker) + ": " + message.status.message());
+  if (message.elsewhere) {
+    unable_.insert(message.worker);
+    inability_ = reason;
+  }
+  if (attempt_due_) return Status::Ok();
   if (message.unreachable != 0) {
     if (!suspicion_) {
       suspicion_ = {.accused = message.unreachable,
@@ -177,8 +188,7 @@ Status RunningFrame::OnTrouble(const WorkerTrouble& message, Time now) {
     return Status::Ok();
   }
   if (message.worker == plan_.display) display_in_doubt_ = true;
-  return CountStall(Status(message.status.code(), WorkerName(message.worker) + ": " + message.status.message()), limits_.pause * stalls_,
-                    now);
+  return CountStall(reason, message.elsewhere ? Duration::zero() : limits_.pause * stalls_, now);
 }
 
 Status RunningFrame::Expire(Time now) {
@@ -223,13 +233,14 @@ FrameProgress RunningFrame::Progress() const {
 }
 
 FrameStatistics RunningFrame::Statistics(Time now) const {
+  const ResolvedPolicy& policy = request_.planned->policy;
   FrameStatistics statistics{.workers = std::uint32_t(Participants().size()),
                              .groups = group_count(),
                              .attempts = attempt(),
-                             .decomposition = request_.submit.frame.policy.decomposition,
-                             .split = plan_.split,
-                             .axis = std::string(1, Letter(plan_.slab_axis)),
-                             .assignment = request_.submit.frame.policy.assignment,
+                             .decomposition = std::string(policy.decomposition->name),
+                             .split = std::string(NameOf(policy.split)),
+                             .axis = std::string(1, Letter(policy.axis)),
+                             .assignment = std::string(policy.assignment->name),
                              .balance = request_.submit.frame.policy.balance,
                              .combine = plan_.combine,
                              .queued_ns = (begin_ - request_.arrived).count(),
@@ -238,7 +249,7 @@ FrameStatistics RunningFrame::Statistics(Time now) const {
                              .reports = {},
                              .display = plan_.display,
                              .grid = FrameBounds(plan_.setup),
-                             .predicted = request_.chosen ? request_.chosen->prediction : std::nullopt};
+                             .predicted = request_.planned->prediction};
   const auto append = [&](const std::vector<RankReport>& reports) {
     const std::size_t room = kMaxReports - statistics.reports.size();
     statistics.reports.insert(statistics.reports.end(), reports.begin(), reports.begin() + std::ptrdiff_t(std::min(room, reports.size())));

@@ -6,6 +6,7 @@
 //   a worker with a part in it is lost                     the first unfinished group, now
 //   no progress for stall_timeout                          the first unfinished group, now; counted
 //   a worker could not do its part                         the first unfinished group, after a pause that grows; counted
+//   the same, but another worker may be able to            the first unfinished group, now, without that worker; counted
 //   a worker cannot reach another that is alive            the first unfinished group, once that is proved; counted
 //   any of these, if the display worker was lost or had the trouble     group 0: what it accumulated is gone or in doubt
 // Counted ones fail the frame when max_stalls of them come in a row, with no group finished between them that had never been finished
@@ -44,8 +45,8 @@ struct FrameLimits {
 
 class RunningFrame {
  public:
-  // `roster` is what `plan` was made for.
-  RunningFrame(FrameId id, OpenRequest request, FramePlan plan, Roster roster, const FrameLimits& limits, Time now);
+  // `request` is planned.
+  RunningFrame(FrameId id, OpenRequest request, const FrameLimits& limits, Time now);
 
   FrameId id() const { return id_; }
   const OpenRequest& request() const { return request_; }
@@ -69,7 +70,8 @@ class RunningFrame {
   HandOut NextGroup(Time now);  // needs CanHandOut()
 
   bool AttemptDue(Time now) const { return attempt_due_ && now >= *attempt_due_; }
-  // Begins the next attempt over `roster` (same number of slots). Unavailable if nobody is in it; nothing changes then.
+  // Begins the next attempt over `roster` (same number of slots), without those that could not do their part. If nobody is left: the reason
+  // of the last one of them, else Unavailable; nothing changes then.
   Status BeginAttempt(const Roster& roster, Time now);
 
   // ---- what workers say
@@ -83,6 +85,7 @@ class RunningFrame {
   // ---- what goes wrong. A Status that is not ok: the frame has failed.
   void OnLoss(WorkerId worker, Time now);  // it is no longer in the roster
   // Trouble of another attempt or of a group that is done is no news. message.unreachable, if any, must be in the roster.
+  // Of the display worker when all groups are done: it cannot make the picture.
   Status OnTrouble(const WorkerTrouble& message, Time now);
   Status Expire(Time now);  // stalls, suspicions
 
@@ -122,6 +125,8 @@ class RunningFrame {
   std::optional<Time> attempt_due_;
   bool display_in_doubt_ = false;  // the next attempt begins with group 0
   std::optional<Suspicion> suspicion_;
+  std::set<WorkerId> unable_;  // to do their part of this frame
+  Status inability_;           // of the last one of them
   int stalls_ = 0;
   Time last_progress_;
   std::set<WorkerId> moved_on_;                   // workers that have rendered all that is handed out of this frame

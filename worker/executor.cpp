@@ -1,13 +1,11 @@
 #include "worker/executor.h"
 
 #include <algorithm>
-#include <exception>
-#include <new>
-#include <stdexcept>
 #include <string>
 #include <utility>
 
 #include "common/base/check.h"
+#include "common/base/guarded.h"
 #include "common/base/log.h"
 #include "common/image/coverage_map.h"
 #include "common/image/image_view.h"
@@ -32,20 +30,6 @@ auto WithAllThreads(tbb::task_arena& arena, Work&& work) {
   return arena.execute(work);
 }
 
-// Runs `work`, which returns a Status, and turns what it throws into one: a task thread must not end.
-template <class Work>
-Status Guarded(const char* what, Work&& work) {
-  try {
-    return work();
-  } catch (const std::bad_alloc&) {
-    return Status::ResourceExhausted(std::string(what) + ": not enough memory");
-  } catch (const std::length_error&) {  // of a vector beyond every memory
-    return Status::ResourceExhausted(std::string(what) + ": not enough memory");
-  } catch (const std::exception& error) {
-    return Status::Internal(std::string(what) + ": " + error.what());
-  }
-}
-
 // Adds a stretch of time to the report of a message; one of the machine's reports if there is any.
 void AddStage(std::vector<RankReport>& reports, Stage stage, std::int64_t begin_ns, std::int64_t end_ns) {
   if (!reports.empty()) AddStage(reports.back(), stage, begin_ns, end_ns);
@@ -68,6 +52,9 @@ std::optional<Bytes> PixelsInPlace(const LocalImage& image, const ImageView& vie
   message.image = *header;
   return Bytes(std::make_shared<BlockPin>(*std::move(pin)), {reinterpret_cast<const std::byte*>(view.rgba), PayloadBytes(*header)});
 }
+
+// The last group that a picture shows.
+GroupKey KeyOf(const FrameImage& message) { return {message.frame, message.attempt, std::max(message.groups_done, 1U) - 1}; }
 
 PixelRange AllPixels(const PixelBounds& frame) { return {0, std::uint64_t(frame.pixel_count())}; }
 
@@ -195,14 +182,31 @@ struct Executor::Slab {
   std::unique_ptr<SlabData> data;
 };
 
-Executor::Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec, int threads, RendererFactory make_renderer)
+Executor::Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec, int threads, RendererFactory make_renderer, TaskHook hook)
     : outbox_(outbox),
       frame_codec_(frame_codec),
       make_renderer_(std::move(make_renderer)),
+      hook_(std::move(hook)),
       threads_(threads),
       render_arena_(threads),
       combine_arena_(threads),
-      finish_arena_(threads) {}
+      finish_arena_(threads),
+      combine_thread_([this] { Break(); }),
+      finish_thread_([this] { Break(); }),
+      render_thread_([this] { Break(); }) {}
+
+void Executor::Break() {
+  broken_ = true;
+  outbox_.wakeup().Notify();
+}
+
+template <class Work>
+Status Executor::Guard(const char* task, Work&& work) {
+  return Guarded(task, [&]() -> Status {
+    if (hook_) hook_(task);
+    return work();
+  });
+}
 
 Executor::~Executor() {
   if (last_render_) *last_render_->cancelled = true;
@@ -228,7 +232,7 @@ void Executor::Perform(StoreChunk&& action) {
     return;
   }
   combine_thread_.Post([this, slab = found->second, store = std::move(action)] {
-    Status status = Guarded("slab", [&] { return slab->Store(store.chunk, store.payload); });
+    Status status = Guard("slab", [&] { return slab->Store(store.chunk, store.payload); });
     outbox_.Post(WorkerEvent(ChunkStored{store.slab, store.chunk.box, store.chunk.chunk, std::move(status)}));
   });
 }
@@ -251,7 +255,7 @@ RenderDone Executor::Render(const StartRender& action, Slab& slab, const std::at
   done.image = action.image;
   RankReport& report = done.report;
   const std::int64_t begin = NowNs();
-  done.status = Guarded("render", [&] {
+  done.status = Guard("render", [&] {
     if (!slab.copies.empty()) {
       slab.Data();
       AddStage(report, Stage::kFetch, begin, NowNs());
@@ -297,7 +301,7 @@ void Executor::Perform(StartCombine&& action) {
     done.key = combine.key;
     done.image = combine.image;
     done.span = {Stage::kCombine, NowNs(), 0};
-    done.status = Guarded("combine", [&] {
+    done.status = Guard("combine", [&] {
       const PixelRange pixels = combine.pixels == PixelRange{} ? AllPixels(combine.frame) : combine.pixels;
       if (other != nullptr) {
         WithAllThreads(combine_arena_, [&] { CombineImages(*image, fresh, other, combine, pixels); });
@@ -321,7 +325,7 @@ void Executor::Perform(FindHidden&& action) {
   CHECK(image != nullptr) << "image " << action.image << " to look through does not exist";
   combine_thread_.Post([this, image = std::move(image), find = std::move(action)]() mutable {
     HiddenFound found{find.key, find.image, {}};
-    const Status status = Guarded("hidden tiles", [&] {
+    const Status status = Guard("hidden tiles", [&] {
       const PixelBounds frame = FrameBounds(*find.setup);
       if (image->format != PixelFormat::kRgba)
         return Status::InvalidArgument("hidden tiles: not an image that blends");  // a peer's mistake
@@ -344,7 +348,7 @@ std::optional<Bytes> Executor::PayloadInPlace(const LocalImage& image, const Ima
 void Executor::Post(SendPartial& send, Bytes payload, std::int64_t begin_ns) {
   sent_.Add(send.message.key, send.rank, payload.size(), begin_ns, NowNs());
   sent_.MoveInto(send.message.key, send.message.reports);
-  outbox_.Post(OutgoingPartial{std::move(send.to), Encode(send.message), std::move(payload), send.message.acknowledge});
+  outbox_.Post(OutgoingPartial{std::move(send.to), Encode(send.message), std::move(payload), send.message.acknowledge, send.message.key});
 }
 
 void Executor::Perform(SendPartial&& action, const Delivery& delivery) {
@@ -355,14 +359,21 @@ void Executor::Perform(SendPartial&& action, const Delivery& delivery) {
   std::optional<Bytes> payload;
   // To say where pixels are takes less time than to wake a thread that does.
   if (combine_thread_.Idle()) {
-    const std::int64_t begin = NowNs();
-    view = view_of(*image, action);
-    payload = PayloadInPlace(*image, *view, delivery, action);
-    if (payload && !MayPack(delivery.bytes_per_second)) return Post(action, *std::move(payload), begin);
+    bool posted = false;
+    const Status status = Guard("encode", [&] {
+      const std::int64_t begin = NowNs();
+      view = view_of(*image, action);
+      payload = PayloadInPlace(*image, *view, delivery, action);
+      posted = payload && !MayPack(delivery.bytes_per_second);
+      if (posted) Post(action, *std::move(payload), begin);
+      return Status::Ok();
+    });
+    if (!status.ok()) return outbox_.Post(WorkerEvent(SendFailed{action.message.key, status}));
+    if (posted) return;
   }
   combine_thread_.Post(
       [=, this, image = std::move(image), view = std::move(view), payload = std::move(payload), send = std::move(action)]() mutable {
-        const Status status = Guarded("encode", [&] {
+        const Status status = Guard("encode", [&] {
           const std::int64_t begin = NowNs();
           if (!view) {
             view = view_of(*image, send);
@@ -372,8 +383,7 @@ void Executor::Perform(SendPartial&& action, const Delivery& delivery) {
           Post(send, PackForLink(*std::move(payload), delivery.bytes_per_second, send.message.packed), begin);
           return Status::Ok();
         });
-        if (!status.ok())
-          LogError("partial image not sent: " + status.message());  // the coordinator hands the frame out again when it stalls
+        if (!status.ok()) outbox_.Post(WorkerEvent(SendFailed{send.message.key, status}));
       });
 }
 
@@ -381,14 +391,14 @@ void Executor::Resend(const ImageRefused& refused) {
   std::shared_ptr<const LentImage> lent = lent_.Find(refused.key, refused.step, refused.pixels);
   if (lent == nullptr) return;
   combine_thread_.Post([this, lent = std::move(lent)] {
-    const Status status = Guarded("encode", [&] {
+    const Status status = Guard("encode", [&] {
       PartialImage message = lent->message;
       message.shared.reset();
       Bytes payload = WithAllThreads(combine_arena_, [&] { return EncodePixels(lent->view, ColorCoding::kFloat32, message); });
-      outbox_.Post(OutgoingPartial{lent->to, Encode(message), std::move(payload)});
+      outbox_.Post(OutgoingPartial{lent->to, Encode(message), std::move(payload), 0, message.key});
       return Status::Ok();
     });
-    if (!status.ok()) LogError("partial image not sent: " + status.message());
+    if (!status.ok()) outbox_.Post(WorkerEvent(SendFailed{lent->message.key, status}));
   });
 }
 
@@ -397,11 +407,12 @@ void Executor::Perform(SendFrame&& action) {
   CHECK(image != nullptr) << "image " << action.image << " to send does not exist";
   const bool finished = action.message.groups_done == action.message.group_count;
   (finished ? finish_thread_ : combine_thread_).Post([this, finished, image = std::move(image), send = std::move(action)]() mutable {
-    const Status status = Guarded("encode", [&] {
+    const GroupKey key = KeyOf(send.message);
+    const Status status = Guard("picture", [&] {
       MakePicture(*image, send, finished ? finish_arena_ : combine_arena_);
       return Status::Ok();
     });
-    if (!status.ok()) LogError("frame not sent: " + status.message());
+    if (!status.ok()) outbox_.Post(WorkerEvent(SendFailed{key, status}));
   });
 }
 
@@ -426,7 +437,7 @@ void Executor::MakePicture(LocalImage& image, SendFrame& send, tbb::task_arena& 
   send.message.runs.image = runs.header;
   const Bytes payload = PackRuns(Bytes(std::move(runs.payload)), frame_codec_, send.message.runs);
   AddStage(reports, Stage::kEncode, resolved_ns, NowNs());
-  outbox_.Post(OutgoingFrame{Encode(send.message), payload});
+  outbox_.Post(OutgoingFrame{KeyOf(send.message), Encode(send.message), payload});
 }
 
 void Executor::Perform(const ReleaseImage& action) { images_.erase(action.image); }

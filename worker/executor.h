@@ -13,10 +13,12 @@
 #include <tbb/task_arena.h>
 
 #include <atomic>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -40,12 +42,17 @@ struct OutgoingPartial {
   std::vector<std::byte> header;
   Bytes payload;
   std::uint64_t acknowledge = 0;  // as in the message
+  GroupKey key;                   // likewise
 };
 struct OutgoingFrame {
+  GroupKey key;  // the last group that it shows
   std::vector<std::byte> header;
   Bytes payload;
 };  // to the coordinator
 using ExecutorOutput = std::variant<WorkerEvent, OutgoingPartial, OutgoingFrame>;
+
+// Called at the beginning of each task, on its thread, with its name; what it throws fails the task. For tests; empty: nothing.
+using TaskHook = std::function<void(std::string_view task)>;
 
 // How pixels get to another worker.
 struct Delivery {
@@ -56,7 +63,8 @@ struct Delivery {
 class Executor {
  public:
   // `frame_codec` packs finished frames. `threads` render, at least 1. The outbox must outlive the executor.
-  Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec, int threads, RendererFactory make_renderer = MakeRenderer);
+  Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec, int threads, RendererFactory make_renderer = MakeRenderer,
+           TaskHook hook = {});
   ~Executor();  // cancels the running render, drops what has not begun, joins
 
   void Perform(const OpenSlab& action);
@@ -70,6 +78,8 @@ class Executor {
   void Perform(SendFrame&& action);
   void Perform(const ReleaseImage& action);
 
+  // A task could not even report that it failed. Its outbox was notified; the worker can only leave.
+  bool broken() const { return broken_; }
   PeerMemory& peer_memory() { return peer_memory_; }
   // Adds to reports that leave otherwise than with a PartialImage what the messages of their ranks took.
   void AddSent(const GroupKey& key, std::vector<RankReport>& reports) { sent_.MoveInto(key, reports); }
@@ -89,6 +99,10 @@ class Executor {
     std::shared_ptr<std::atomic<bool>> cancelled;
   };
 
+  // An exception barrier round `work`, which returns a Status.
+  template <class Work>
+  Status Guard(const char* task, Work&& work);
+  void Break();
   std::shared_ptr<LocalImage> FindImage(ImageHandle image);  // null: no such image
   void MakePicture(LocalImage& image, SendFrame& send, tbb::task_arena& arena);
   // Of pixels that stay where they are until they are read there, or sent from there. None: they have to be encoded.
@@ -105,6 +119,8 @@ class Executor {
   PeerMemory peer_memory_;
   std::optional<RunningRender> last_render_;
   const RendererFactory make_renderer_;
+  const TaskHook hook_;
+  std::atomic<bool> broken_ = false;
   std::map<const RendererKind*, std::unique_ptr<Renderer>> renderers_;  // the render thread's
   const ThreadShare threads_;
   // One for each thread below that enters: in a common arena the last picture would wait for the next one's rendering.

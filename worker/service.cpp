@@ -9,12 +9,14 @@
 #include <optional>
 #include <random>
 #include <set>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <utility>
 #include <variant>
 #include <vector>
 
+#include "common/base/guarded.h"
 #include "common/base/log.h"
 #include "common/base/pooled_vector.h"
 #include "common/base/shared_arena.h"
@@ -53,8 +55,8 @@ std::string HostName() {
 }  // namespace
 
 struct WorkerService::Impl {
-  Impl(Context& service_context, const WorkerConfig& config, Compression user_choice, RendererFactory make_renderer, Socket control_socket,
-       Socket images_socket)
+  Impl(Context& service_context, const WorkerConfig& config, Compression user_choice, RendererFactory make_renderer, TaskHook task_hook,
+       Socket control_socket, Socket images_socket)
       : context(service_context),
         machine(config),
         control(std::move(control_socket)),
@@ -63,10 +65,12 @@ struct WorkerService::Impl {
         scope(config.memory_scope),
         lends(config.lends_memory),
         compression(user_choice),
+        hook(std::move(task_hook)),
         executor(std::in_place, outbox, user_choice == Compression::kOn ? Codec::kZstd : Codec::kRaw, int(config.threads),
-                 std::move(make_renderer)) {}
+                 std::move(make_renderer), hook) {}
 
   void Run();
+  void Loop();
   void Receive(Socket& socket, const char* plane);
   void HandleEvent(const WorkerEvent& event);
   void HandleOutput(ExecutorOutput& output);
@@ -101,6 +105,7 @@ struct WorkerService::Impl {
   const std::uint64_t scope;  // workers with the same one are on this host; 0: unknown
   const bool lends;           // its images to them
   const Compression compression;
+  const TaskHook hook;
   LinkRates links;                            // while compression is automatic
   std::map<WorkerId, std::string> endpoints;  // of the epoch's other workers' image planes
   std::set<WorkerId> takes_frames_only;       // though they have the same scope
@@ -115,12 +120,31 @@ struct WorkerService::Impl {
 };
 
 void WorkerService::Impl::Run() {
+  const Status ended = Guarded("worker", [&] {
+    Loop();
+    return Status::Ok();
+  });
+  if (!ended.ok()) {
+    LogError("the worker leaves: " + ended.message());
+    (void)Guarded("worker", [&] {
+      HandleEvent(StopRequested{});
+      return Status::Ok();
+    });
+  }
+  executor.reset();
+  SetRegistered();
+  stopped = true;
+  stopped.notify_all();
+}
+
+void WorkerService::Impl::Loop() {
   Time stop_deadline = Time::max();
   HandleEvent(Tick{});
   while (!stop_now && MonotonicNow() < stop_deadline) {
     std::vector<Socket*> sockets = {&control, &images};
     if (slabs) sockets.push_back(&*slabs);
     Wait(sockets, &outbox.wakeup(), std::clamp(machine.NextWake() - MonotonicNow(), Duration::zero(), kLongestWait));
+    if (executor->broken()) throw std::runtime_error("a task could not report its failure");
     for (ExecutorOutput& output : outbox.TakeAll()) HandleOutput(output);
     Receive(control, "control");
     Receive(images, "images");
@@ -134,17 +158,13 @@ void WorkerService::Impl::Run() {
     peers.CloseIdle(now);
     executor->peer_memory().CloseIdle(now);
   }
-  executor.reset();
-  SetRegistered();
-  stopped = true;
-  stopped.notify_all();
 }
 
 void WorkerService::Impl::Receive(Socket& socket, const char* plane) {
   for (int i = 0; i < kReceiveBatch; ++i) {
     std::optional<Incoming> incoming = socket.TryReceive();
     if (!incoming) return;
-    Result<AnyMessage> message = Decode(incoming->parts[0].span());
+    Result<AnyMessage> message = Guarded("decoding", [&] { return Decode(incoming->parts[0].span()); });
     Bytes payload = incoming->parts.size() > 1 ? std::move(incoming->parts[1]) : Bytes();
     if (!message.ok() || payload.size() != ExpectedPayloadBytes(*message)) {
       LogWarning(std::string(plane) + " plane: dropped a message: " +
@@ -239,13 +259,21 @@ void WorkerService::Impl::HandleOutput(ExecutorOutput& output) {
   if (const auto* event = std::get_if<WorkerEvent>(&output)) {
     HandleEvent(*event);
   } else if (auto* frame = std::get_if<OutgoingFrame>(&output)) {
-    if (const Status sent = control.Send({}, std::move(frame->header), frame->payload); !sent.ok()) {
-      LogWarning("frame not sent: " + sent.message());
-    }
+    const Status sent = Guarded("send", [&] {
+      if (hook) hook("send");
+      return control.Send({}, std::move(frame->header), frame->payload);
+    });
+    if (!sent.ok()) HandleEvent(SendFailed{frame->key, sent});
   } else {
     auto& partial = std::get<OutgoingPartial>(output);
     if (IsTimed(partial.to)) links.Sent(partial.to.worker, partial.acknowledge, partial.payload.size(), MonotonicNow());
-    const Status sent = peers.Send(partial.to.images_endpoint, std::move(partial.header), partial.payload, MonotonicNow());
+    Status sent;
+    const Status tried = Guarded("send", [&] {
+      if (hook) hook("send");
+      sent = peers.Send(partial.to.images_endpoint, std::move(partial.header), partial.payload, MonotonicNow());
+      return Status::Ok();
+    });
+    if (!tried.ok()) return HandleEvent(SendFailed{partial.key, tried});  // no fault of the peer's
     if (sent.ok()) return;
     LogWarning("worker " + std::to_string(partial.to.worker) + " is not reached: " + sent.message());
     HandleEvent(PeerUnreachable{partial.to.worker});
@@ -328,8 +356,8 @@ Result<std::unique_ptr<WorkerService>> WorkerService::Start(Context& context, Wo
     }
   }
   config.lends_memory = options.share_memory;
-  auto impl = std::make_unique<Impl>(context, config, options.compression, std::move(options.make_renderer), std::move(*control),
-                                     std::move(*images));
+  auto impl = std::make_unique<Impl>(context, config, options.compression, std::move(options.make_renderer), std::move(options.task_hook),
+                                     std::move(*control), std::move(*images));
   impl->thread = std::jthread([raw = impl.get()] { raw->Run(); });
   return std::unique_ptr<WorkerService>(new WorkerService(std::move(impl)));
 }

@@ -1,8 +1,9 @@
 // WorkerService: runs a WorkerMachine over ZeroMQ.
 //
 // Threads: one owns all sockets and runs the machine; one renders, with as many helpers as WorkerConfig::threads says; one combines,
-// encodes and unpacks chunks. So rendering of one group goes on beside the combining of another, and heartbeats are on time whatever is
-// computed.
+// encodes and unpacks chunks; one makes finished pictures. So rendering of one group goes on beside the combining of another, and
+// heartbeats are on time whatever is computed. What a task throws fails its group, which the coordinator is told of at once. If the thread
+// that runs the machine throws, the worker leaves and says why in its log.
 #pragma once
 
 #include <memory>
@@ -10,6 +11,7 @@
 
 #include "common/base/status.h"
 #include "common/transport/socket.h"
+#include "worker/executor.h"
 #include "worker/image_packing.h"
 #include "worker/renderers/renderer.h"
 #include "worker/worker_machine.h"
@@ -22,6 +24,7 @@ struct WorkerOptions {
   Compression compression = Compression::kAuto;
   bool share_memory = true;  // images for workers of this host stay where they are
   RendererFactory make_renderer = MakeRenderer;
+  TaskHook task_hook;  // of the executor, and for "send"
   WorkerConfig
       machine;  // incarnation, pid, host, images_endpoint, memory_scope, lends_memory are filled in by Start; threads: [1, kMaxThreads]
 };

@@ -168,7 +168,10 @@ void SlabFetcher::OnStored(const ChunkStored& stored, Time now) {
   const auto request = in_flight_.find({stored.slab.generation, place});
   if (request == in_flight_.end() || !request->second.storing) return;
   if (!stored.status.ok()) {
+    Slab* slab = Find(stored.slab.generation);
     Retry(stored.slab.generation, place, stored.status);
+    if (slab != nullptr && stored.status.code() == StatusCode::kResourceExhausted)
+      GiveUp(*slab, stored.status);  // no room for the next copy either
     return;
   }
   const std::uint32_t bytes = request->second.bytes;

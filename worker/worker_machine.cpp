@@ -36,6 +36,7 @@ struct WorkerMachine::State {
   void On(const RenderDone& done);
   void On(const CombineDone& done);
   void On(const HiddenFound& found);
+  void On(const SendFailed& failed);
   void On(const PeerUnreachable& peer);
   void On(const StopRequested&);
   void On(const Tick&) {}
@@ -87,6 +88,7 @@ struct WorkerMachine::State {
   void AddToFrame(Frame& frame, GroupImage image);
   void CheckAccumulator(FrameId id, Frame& frame);
   void Trouble(const GroupKey& key, Status status, WorkerId unreachable = 0);
+  Time NextWake() const;
   void FailGroup(const GroupKey& key, const Status& status);
   void ReportSlabFailures();
 
@@ -98,6 +100,7 @@ struct WorkerMachine::State {
   Duration heartbeat{}, timeout{};
   Time next_heartbeat, last_heard;
   Time next_register = Time::min();
+  Time wake = Time::max();  // promised at the end of the last Step
   bool ended = false;
 
   ImageNames names;
@@ -302,6 +305,11 @@ void WorkerMachine::State::On(const HiddenFound& found) {
   if (frame != frames.end() && frame->second.accumulator) frame->second.accumulator->OnHiddenFound(found, actions);
 }
 
+void WorkerMachine::State::On(const SendFailed& failed) {
+  const auto frame = frames.find(failed.key.frame);
+  if (frame != frames.end() && frame->second.attempt == failed.key.attempt) FailGroup(failed.key, failed.status);
+}
+
 void WorkerMachine::State::On(const PeerUnreachable& peer) {
   for (const auto& [id, frame] : frames) {
     for (const auto& [group, run] : frame.groups) {
@@ -359,7 +367,9 @@ void WorkerMachine::State::FailGroup(const GroupKey& key, const Status& status) 
 }
 
 void WorkerMachine::State::Trouble(const GroupKey& key, Status status, WorkerId unreachable) {
-  actions.push_back(SendControl{WorkerTrouble{epoch, worker, key, unreachable, std::move(status)}});
+  // What is missing here, or broke here, may be there and whole elsewhere.
+  const bool elsewhere = status.code() == StatusCode::kResourceExhausted || status.code() == StatusCode::kInternal;
+  actions.push_back(SendControl{WorkerTrouble{epoch, worker, key, unreachable, std::move(status), elsewhere}});
 }
 
 // ---------------------------------------------------------------- voxels
@@ -387,6 +397,7 @@ WorkerMachine::WorkerMachine(WorkerMachine&&) noexcept = default;
 std::vector<WorkerAction> WorkerMachine::Step(const WorkerEvent& event, Time now) {
   State& s = *state_;
   s.now = now;
+  if (now > s.wake) s.last_heard += now - s.wake;
   std::visit([&](const auto& e) { s.On(e); }, event);
   s.slabs.ExpireRequests(now);
   s.ReportSlabFailures();
@@ -396,15 +407,17 @@ std::vector<WorkerAction> WorkerMachine::Step(const WorkerEvent& event, Time now
     s.renders.StartNext(s.actions);
   }
   s.slabs.Trim(s.actions);
+  s.wake = s.NextWake();
   return std::exchange(s.actions, {});
 }
 
-Time WorkerMachine::NextWake() const {
-  const State& s = *state_;
-  if (s.ended) return Time::max();
-  if (s.worker == 0) return s.next_register;
-  return std::min({s.next_heartbeat, s.last_heard + s.timeout, s.slabs.NextExpiry()});
+Time WorkerMachine::State::NextWake() const {
+  if (ended) return Time::max();
+  if (worker == 0) return next_register;
+  return std::min({next_heartbeat, last_heard + timeout, slabs.NextExpiry()});
 }
+
+Time WorkerMachine::NextWake() const { return state_->NextWake(); }
 
 bool WorkerMachine::registered() const { return state_->worker != 0; }
 WorkerId WorkerMachine::worker() const { return state_->worker; }

@@ -21,7 +21,8 @@
 //
 // What the executor must do: run StartRender, StartCombine, FindHidden and StoreChunk on other threads and answer each with exactly one
 // event; run StartCombine, FindHidden, SendPartial and SendFrame in the order in which they were given; call Step(Tick) no later than
-// NextWake().
+// NextWake(). If it calls late, the machine assumes that the executor itself was held up (a process that was stopped), and extends the
+// coordinator's time by as much: what was not read meanwhile is not the coordinator's silence.
 #pragma once
 
 #include <cstdint>
@@ -104,12 +105,18 @@ struct HiddenFound {
   ImageHandle image = 0;
   OcclusionMask hidden;
 };
+// A SendPartial or SendFrame came to nothing.
+struct SendFailed {
+  GroupKey key;
+  Status status;
+};
 struct PeerUnreachable {
   WorkerId worker = 0;
 };
 struct StopRequested {};  // SIGTERM: leave in order
 struct Tick {};
-using WorkerEvent = std::variant<MessageReceived, ChunkStored, RenderDone, CombineDone, HiddenFound, PeerUnreachable, StopRequested, Tick>;
+using WorkerEvent =
+    std::variant<MessageReceived, ChunkStored, RenderDone, CombineDone, HiddenFound, SendFailed, PeerUnreachable, StopRequested, Tick>;
 
 // ---- actions
 struct SendControl {
@@ -172,7 +179,8 @@ struct FindHidden {
   std::shared_ptr<const FrameSetup> setup;
   OcclusionMask known;
 };
-// Sends message.pixels of `image`: fills in how they travel, and into reports of this worker's ranks what their messages took. No answer.
+// Sends message.pixels of `image`: fills in how they travel, and into reports of this worker's ranks what their messages took. ->
+// SendFailed, or nothing.
 struct SendPartial {
   Peer to;
   PartialImage message;
@@ -181,7 +189,8 @@ struct SendPartial {
   ColorCoding color = ColorCoding::kFloat32;  // if they travel as runs
   Rank rank = 0;                              // that sends
 };
-// Makes the picture of `image`, a frame, encodes it, fills message.runs and a report, sends to the coordinator. No answer.
+// Makes the picture of `image`, a frame, encodes it, fills message.runs and a report, sends to the coordinator. -> SendFailed, or
+// nothing.
 struct SendFrame {
   FrameImage message;
   ImageHandle image = 0;

@@ -3,23 +3,29 @@
 
 #include <condition_variable>
 #include <deque>
+#include <exception>
 #include <functional>
 #include <mutex>
 #include <stop_token>
+#include <string>
 #include <thread>
 #include <utility>
+
+#include "common/base/log.h"
 
 namespace slabstream {
 
 class TaskThread {
  public:
-  TaskThread() : thread_([this](const std::stop_token& stop) { Run(stop); }) {}
+  // `on_exception` is called on the thread, and must not throw, when a task has thrown.
+  explicit TaskThread(std::function<void()> on_exception = std::terminate)
+      : on_exception_(std::move(on_exception)), thread_([this](const std::stop_token& stop) { Run(stop); }) {}
   // Waits for the running task; tasks that have not begun are dropped.
   ~TaskThread() = default;
   TaskThread(const TaskThread&) = delete;
   TaskThread& operator=(const TaskThread&) = delete;
 
-  // From any thread. Tasks must not throw.
+  // From any thread. Tasks report their own failures; what they throw beside that is told to `on_exception`.
   void Post(std::function<void()> task) {
     {
       const std::lock_guard lock(mutex_);
@@ -46,13 +52,19 @@ class TaskThread {
         tasks_.pop_front();
         running_ = true;
       }
-      task();
+      try {
+        task();
+      } catch (const std::exception& error) {
+        LogError(std::string("task: ") + error.what());
+        on_exception_();
+      }
       task = nullptr;  // what it held is gone before anybody takes the thread for idle
       const std::lock_guard lock(mutex_);
       running_ = false;
     }
   }
 
+  const std::function<void()> on_exception_;
   std::mutex mutex_;
   std::condition_variable_any ready_;
   std::deque<std::function<void()>> tasks_;  // guarded by mutex_

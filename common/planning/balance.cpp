@@ -93,8 +93,8 @@ std::optional<Layout> Rebalance(const Layout& now, std::span<const double> secon
   const double after_hand_over = FrameSeconds(handed_over, request.slots, seconds);
   weigh(std::move(handed_over), FrameSeconds(now, request.slots, seconds), after_hand_over);
 
-  Policy by_cost = *request.policy;
-  by_cost.split = "cost";
+  ResolvedPolicy by_cost = *request.policy;
+  by_cost.split = WorkSplit::kCost;
   LayoutRequest other_boxes = request;
   other_boxes.policy = &by_cost;
   const auto predicted = [&](const Layout& layout) {

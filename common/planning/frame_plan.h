@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -46,10 +47,9 @@ struct Turn {
 
 struct FramePlan {
   FrameSetup setup;
-  Layout layout;
-  std::uint32_t slots = 1;  // p: owner slots the layout was made for
+  std::shared_ptr<const Layout> layout;  // never null; equal plans share it
+  std::uint32_t slots = 1;               // p: owner slots the layout was made for
   Axis slab_axis = Axis::kZ;
-  std::string split;              // what boxes have equal shares of: a name of WorkSplits(), but "auto"
   double pixel_error = 0;         // as in the policy
   std::string combine;            // the combining scheme, as in the policy
   std::vector<GroupPlan> groups;  // nearest first; at least one
@@ -72,14 +72,15 @@ struct Roster {
 // must be valid.
 Result<FrameSetup> MakeFrameSetup(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary);
 
-// The policy of the request, whose view settles what depends on it: AxisChoice::kView. The request must be valid.
-Policy SettledPolicy(const FrameRequest& request, const VolumeGeometry& geometry);
-
-// Pure. Errors: InvalidArgument (an unknown name of the policy, or one that is left open), NotFound (no such preset), Unavailable (no
-// worker in the roster). The request must be valid (Validate). Null `layout`: MakeLayout, with what the volume's summary knows; else one
-// that was made for this volume, transfer function and policy and for as many slots as the roster has.
+// Pure. Errors: InvalidArgument (an image along the slices that is too large), NotFound (no such preset), Unavailable (no worker in the
+// roster). The request must be valid (Validate); its own policy does not count. `layout` was made for this volume, transfer function and
+// policy and for as many slots as the roster has.
+Result<FramePlan> PlanFrame(const FrameRequest& request, const ResolvedPolicy& policy, DatasetId dataset, const VolumeSummary& summary,
+                            const Roster& roster, std::shared_ptr<const Layout> layout, const Turn& turn = {});
+// The same by the request's own policy, where nothing is known but the volume's summary. Errors also as of ResolvePolicy. Null `layout`:
+// MakeLayout.
 Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, const Roster& roster,
-                            const CostModel& cost, const Layout* layout = nullptr, const Turn& turn = {});
+                            const CostModel& cost, std::shared_ptr<const Layout> layout = nullptr, const Turn& turn = {});
 
 // The function that a request names or holds, for this volume. NotFound: no such preset.
 Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const VolumeSummary& summary);

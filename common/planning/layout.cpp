@@ -1,21 +1,13 @@
 #include "common/planning/layout.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <limits>
 #include <optional>
-#include <string>
 
 #include "common/base/check.h"
-#include "common/base/find_named.h"
-#include "common/combining/schemes.h"
-#include "common/decomposition/decomposition.h"
-#include "common/planning/assignment.h"
 #include "common/planning/brick_visibility.h"
 #include "common/planning/learnt_cost.h"
-#include "common/planning/policy_names.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/view/sheet_grid.h"
 
@@ -24,27 +16,15 @@ namespace {
 
 constexpr std::int64_t kMostBoxes = std::int64_t{1} << 20;
 
-template <class Entry>
-Status CheckName(std::string_view field, std::string_view name, const std::vector<Entry>& entries) {
-  if (FindNamed(entries, name) != nullptr) return Status::Ok();
-  return Status::InvalidArgument(fmt::format("{} is '{}', but must be one of: {}", field, name, NamesOf(entries)));
-}
-
-template <class Entry>
-Status CheckOpenName(std::string_view field, std::string_view name, const std::vector<Entry>& entries) {
-  if (name == kAutomatic || FindNamed(entries, name) != nullptr) return Status::Ok();
-  return Status::InvalidArgument(fmt::format("{} is '{}', but must be one of: {}, {}", field, name, kAutomatic, NamesOf(entries)));
-}
-
 // Boxes that hold three times as many voxels as they own, halo and all: slabs of as many slices as the halo is thick, cubes of this many
 // voxels a side. There is no point in smaller ones.
 constexpr std::int64_t kSmallestCube = 36;
 
-int MostGroups(const LayoutRequest& request, const Policy& policy) {
+int MostGroups(const LayoutRequest& request, const ResolvedPolicy& policy) {
   const Index3& size = request.summary->description.geometry.size;
   const std::int64_t slots = request.slots;
-  const std::int64_t boxes = FindNamed(Decompositions(), policy.decomposition)->one_axis
-                                 ? size[SlabAxis(policy, size)] / request.renderer->reach()
+  const std::int64_t boxes = policy.decomposition->one_axis
+                                 ? size[policy.axis] / request.renderer->reach()
                                  : Box{{0, 0, 0}, size}.voxel_count() / (kSmallestCube * kSmallestCube * kSmallestCube);
   return int(std::clamp<std::int64_t>(boxes / slots, 1, kMaxGroups));
 }
@@ -90,18 +70,18 @@ class WorkFields {
 struct LayoutMaker::State {
   explicit State(const LayoutRequest& r) : request(r), fields(request) {}
 
-  Partition MakePartition(const Policy& policy, int groups, const WorkField& field, const Partition* resized = nullptr, int shape = 0) {
+  Partition MakePartition(const ResolvedPolicy& policy, int groups, const WorkField& field, const Partition* resized = nullptr,
+                          int shape = 0) {
     const Index3& size = request.summary->description.geometry.size;
     const std::int64_t slots = request.slots, voxels = Box{{0, 0, 0}, size}.voxel_count();
-    return FindNamed(Decompositions(), policy.decomposition)
-        ->make({.work = &field,
-                .boxes = int(std::min({groups * slots, voxels, kMostBoxes})),
-                .most_boxes = int(std::min(kMaxGroups * slots, kMostBoxes)),
-                .together = int(std::min(slots, kMostBoxes)),
-                .axis = SlabAxis(policy, size),
-                .halo = request.renderer->reach(),
-                .resized = resized,
-                .shape = shape});
+    return policy.decomposition->make({.work = &field,
+                                       .boxes = int(std::min({groups * slots, voxels, kMostBoxes})),
+                                       .most_boxes = int(std::min(kMaxGroups * slots, kMostBoxes)),
+                                       .together = int(std::min(slots, kMostBoxes)),
+                                       .axis = policy.axis,
+                                       .halo = request.renderer->reach(),
+                                       .resized = resized,
+                                       .shape = shape});
   }
 
   bool SlabsFit(const Partition& partition) {
@@ -120,25 +100,24 @@ struct LayoutMaker::State {
     return {cost->Seconds(box, {.along = Axis::kX}), cost->Seconds(box, {.along = Axis::kY})};
   }
 
-  double CostOf(const Box& box, const Policy& policy) {
+  double CostOf(const Box& box, const ResolvedPolicy& policy) {
     if (!NeedsOccupancy(policy)) return double(box.voxel_count());
     if (request.known.cost != nullptr) return request.known.cost->Sum(box);
     const auto [along_x, along_y] = PredictedSeconds(box);
     return (along_x + along_y) / 2;
   }
 
-  Layout Assign(Partition partition, const Policy& policy) {
-    const AssignmentEntry& assignment = *FindNamed(Assignments(), policy.assignment);
+  Layout Assign(Partition partition, const ResolvedPolicy& policy) {
     std::vector<BoxId> filled;
     std::vector<double> costs;
     for (BoxId box = 0; box < partition.boxes().size(); ++box) {
       if (!fields.Shows(partition.boxes()[box])) continue;
       filled.push_back(box);
-      costs.push_back(assignment.by_cost ? CostOf(partition.boxes()[box], policy) : 1);
+      costs.push_back(policy.assignment->by_cost ? CostOf(partition.boxes()[box], policy) : 1);
     }
     Layout layout{std::move(partition), {}};
     layout.owners.assign(layout.partition.boxes().size(), kNoSlot);
-    const std::vector<std::uint32_t> owners = assignment.assign({costs, request.slots});
+    const std::vector<std::uint32_t> owners = policy.assignment->assign({costs, request.slots});
     for (std::size_t i = 0; i < filled.size(); ++i) layout.owners[filled[i]] = owners[i];
     return layout;
   }
@@ -179,7 +158,7 @@ struct LayoutMaker::State {
     Layout best;
     double frame = std::numeric_limits<double>::infinity();  // of the best one
   };
-  void Refine(const Policy& policy, int groups, int shape, const Partition* resized, Refined& refined) {
+  void Refine(const ResolvedPolicy& policy, int groups, int shape, const Partition* resized, Refined& refined) {
     const WorkField field = refined.cost.Field();
     Layout layout = Assign(MakePartition(policy, groups, field, resized, shape), policy);
     const Foretold foretold = Foretell(layout);
@@ -190,10 +169,10 @@ struct LayoutMaker::State {
   }
 
   // Boxes are cut anew at first, of each shape, then those of the best shape are resized.
-  Layout MakeByForetoldWork(const Policy& policy, int groups) {
+  Layout MakeByForetoldWork(const ResolvedPolicy& policy, int groups) {
     constexpr int kCuts = 2, kResizings = 3;
     std::optional<Refined> best;
-    for (int shape = 0; shape < FindNamed(Decompositions(), policy.decomposition)->shapes; ++shape) {
+    for (int shape = 0; shape < policy.decomposition->shapes; ++shape) {
       Refined refined(fields.Grid());
       for (int cut = 0; cut < kCuts; ++cut) Refine(policy, groups, shape, nullptr, refined);
       if (!best || refined.frame < best->frame) best.emplace(std::move(refined));
@@ -214,62 +193,22 @@ LayoutMaker::LayoutMaker(const LayoutRequest& request) : state_(std::make_unique
 LayoutMaker::~LayoutMaker() = default;
 LayoutMaker::LayoutMaker(LayoutMaker&&) noexcept = default;
 
-int LayoutMaker::FewestGroups(const Policy& policy) {
+int LayoutMaker::FewestGroups(const ResolvedPolicy& policy) {
   if (policy.groups > 0) return policy.groups;
   const int most = MostGroups(state_->request, policy);
-  const WorkField& work = state_->fields.Of(FindWorkSplit(SplitOf(policy)).value());
+  const WorkField& work = state_->fields.Of(policy.split);
   int groups = 1;
   while (groups < most && !state_->SlabsFit(state_->MakePartition(policy, groups, work))) ++groups;
   return groups;
 }
 
-Layout LayoutMaker::Make(const Policy& policy) {
-  const WorkSplit split = FindWorkSplit(SplitOf(policy)).value();
+Layout LayoutMaker::Make(const ResolvedPolicy& policy) {
+  const WorkSplit split = policy.split;
   const int groups = FewestGroups(policy);
   if (split == WorkSplit::kOccupied || (split == WorkSplit::kCost && state_->request.known.cost == nullptr)) {
     return state_->MakeByForetoldWork(policy, groups);
   }
   return state_->Assign(state_->MakePartition(policy, groups, state_->fields.Of(split), state_->request.resized), policy);
-}
-
-Status CheckNames(const Policy& policy) {
-  if (Status s = CheckOpenName("policy.decomposition", policy.decomposition, Decompositions()); !s.ok()) return s;
-  if (Status s = CheckName("policy.split", policy.split, WorkSplits()); !s.ok()) return s;
-  if (Status s = CheckOpenName("policy.assignment", policy.assignment, Assignments()); !s.ok()) return s;
-  if (Status s = CheckName("policy.balance", policy.balance, BalanceModes()); !s.ok()) return s;
-  if (policy.combine == kAutomatic) return Status::Ok();
-  if (const auto scheme = ParseCombining(policy.combine); !scheme.ok()) {
-    return Status::InvalidArgument("policy.combine " + scheme.status().message());
-  }
-  return Status::Ok();
-}
-
-Status CheckChosen(const Policy& policy) {
-  if (Status status = CheckNames(policy); !status.ok() || !LeavesChoice(policy)) return status;
-  return Status::InvalidArgument("policy: 'auto' leaves a choice, which must be made before a frame is planned");
-}
-
-std::string_view SplitOf(const Policy& policy) {
-  if (policy.split != kAutomatic || policy.decomposition == kAutomatic) return policy.split;
-  return FindNamed(Decompositions(), policy.decomposition)->split;
-}
-
-bool NeedsOccupancy(const Policy& policy) {
-  if (policy.decomposition == kAutomatic || policy.assignment == kAutomatic) return true;
-  return FindWorkSplit(SplitOf(policy)) != WorkSplit::kVoxels || FindNamed(Assignments(), policy.assignment)->by_cost ||
-         policy.balance == kDynamicBalance;
-}
-
-Axis SlabAxis(const Policy& policy, const Index3& size) {
-  CHECK(policy.axis != AxisChoice::kView);
-  if (policy.axis != AxisChoice::kAuto) return Axis(policy.axis);
-  // z, about which views turn: slabs one above the other hide little of each other from most sides, so none of them is rendered in vain.
-  Axis longest = Axis::kZ;
-  if (!FindNamed(Decompositions(), policy.decomposition)->one_axis) return longest;
-  for (Axis axis : {Axis::kY, Axis::kX}) {
-    if (size[axis] > 2 * size.z && size[axis] > size[longest]) longest = axis;
-  }
-  return longest;
 }
 
 Layout MakeLayout(const LayoutRequest& request) { return LayoutMaker(request).Make(*request.policy); }

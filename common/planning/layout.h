@@ -8,10 +8,9 @@
 #include <span>
 #include <vector>
 
-#include "common/base/status.h"
 #include "common/decomposition/partition.h"
 #include "common/decomposition/work_field.h"
-#include "common/frame/frame_request.h"
+#include "common/planning/resolved_policy.h"
 #include "common/volume/summary.h"
 
 namespace slabstream {
@@ -33,13 +32,10 @@ struct WorkKnowledge {
   const WorkField* cost = nullptr;  // seconds, learnt from frames; else what is occupied stands for it
 };
 
-// Whether the layout of a policy, or the choice of it, is better for an exact OccupancyGrid. The policy's names must be known ones.
-bool NeedsOccupancy(const Policy& policy);
-
 struct LayoutRequest {
   const VolumeSummary* summary = nullptr;
   const TransferFunction* transfer = nullptr;
-  const Policy* policy = nullptr;  // with names that there are (CheckNames), none of them left open, and an axis that is settled
+  const ResolvedPolicy* policy = nullptr;
   const RendererKind* renderer = nullptr;
   std::uint32_t slots = 1;                                   // >= 1
   std::int64_t slab_bytes_target = std::int64_t{256} << 20;  // voxels of one slab at most, where slices allow it
@@ -61,26 +57,14 @@ class LayoutMaker {
   ~LayoutMaker();
   LayoutMaker(LayoutMaker&&) noexcept;
 
-  Layout Make(const Policy& policy);
+  Layout Make(const ResolvedPolicy& policy);
   // The fewest groups by which no slab (a box that shows something, with its halo) is larger than the target, in any view; as many as
   // leave boxes that are not mostly halo, where that is not enough. What the policy says, if it says a number.
-  int FewestGroups(const Policy& policy);
+  int FewestGroups(const ResolvedPolicy& policy);
 
  private:
   struct State;
   std::unique_ptr<State> state_;
 };
-
-// The axis that is cut, or cut first: "auto" is z, but for slabs where another axis has more than twice as many slices. Not of kView, which
-// is settled first (SettledPolicy).
-Axis SlabAxis(const Policy& policy, const Index3& size);
-
-// What `split` of the policy comes to: "auto" is what suits the decomposition (and stays "auto" where that is left open).
-std::string_view SplitOf(const Policy& policy);
-
-// InvalidArgument naming what there is, if a name of the policy is in no list and not kAutomatic.
-Status CheckNames(const Policy& policy);
-// The same for who needs names of lists: kAutomatic is refused where it leaves a choice (LeavesChoice).
-Status CheckChosen(const Policy& policy);
 
 }  // namespace slabstream

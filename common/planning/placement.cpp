@@ -83,10 +83,10 @@ std::vector<WorkerId> OwnersOf(const Layout& layout, const Roster& roster) {
 
 void PlaceBoxes(FramePlan& plan) {
   plan.groups.clear();
-  for (const BoxId id : VisibilityOrder(plan.layout.partition, plan.setup.camera)) {
-    if (plan.layout.owners[id] == kNoSlot) continue;
+  for (const BoxId id : VisibilityOrder(plan.layout->partition, plan.setup.camera)) {
+    if (plan.layout->owners[id] == kNoSlot) continue;
     if (plan.groups.empty() || plan.groups.back().placements.size() == plan.slots) plan.groups.emplace_back();
-    plan.groups.back().placements.push_back({id, plan.layout.partition.boxes()[id], 0});
+    plan.groups.back().placements.push_back({id, plan.layout->partition.boxes()[id], 0});
   }
   if (plan.groups.empty()) plan.groups.emplace_back();
 }
@@ -94,7 +94,7 @@ void PlaceBoxes(FramePlan& plan) {
 Status AssignWorkers(const Roster& roster, FramePlan& plan) {
   const std::vector<WorkerId> present = Present(roster);
   if (present.empty()) return Status::Unavailable("the frame needs a worker, but none is registered");
-  const std::vector<WorkerId> owners = OwnersOf(plan.layout, roster);
+  const std::vector<WorkerId> owners = OwnersOf(*plan.layout, roster);
   for (GroupPlan& group : plan.groups) {
     for (Placement& placement : group.placements) placement.worker = owners[placement.id];
   }

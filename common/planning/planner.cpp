@@ -37,41 +37,38 @@ std::vector<Placement> PlacementsOf(const FramePlan& plan) {
   return placements;
 }
 
-Policy SettledPolicy(const FrameRequest& request, const VolumeGeometry& geometry) {
-  Policy policy = request.policy;
-  if (policy.axis == AxisChoice::kView) policy.axis = AxisChoice(MakeCamera(request.view, request.size, geometry).traversal_axis);
-  return policy;
-}
-
-Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, const Roster& roster,
-                            const CostModel& cost, const Layout* layout, const Turn& turn) {
-  const Policy policy = SettledPolicy(request, summary.description.geometry);
-  if (Status status = CheckChosen(policy); !status.ok()) return status;
+Result<FramePlan> PlanFrame(const FrameRequest& request, const ResolvedPolicy& policy, DatasetId dataset, const VolumeSummary& summary,
+                            const Roster& roster, std::shared_ptr<const Layout> layout, const Turn& turn) {
   Result<FrameSetup> setup = MakeFrameSetup(request, dataset, summary);
   if (!setup.ok()) return setup.status();
-
   FramePlan plan;
   plan.turn = turn;
   plan.setup = *std::move(setup);
+  plan.layout = std::move(layout);
   plan.slots = std::uint32_t(roster.slots.size());
-  plan.slab_axis = SlabAxis(policy, summary.description.geometry.size);
-  plan.split = SplitOf(policy);
+  plan.slab_axis = policy.axis;
   plan.combine = policy.combine;
   plan.pixel_error = policy.pixel_error;
-
-  // Where the boxes are, and whose.
-  const std::uint32_t slots = std::max<std::uint32_t>(plan.slots, 1);
-  plan.layout = layout != nullptr ? *layout
-                                  : MakeLayout({.summary = &summary,
-                                                .transfer = &plan.setup.transfer,
-                                                .policy = &policy,
-                                                .renderer = plan.setup.renderer,
-                                                .slots = slots,
-                                                .slab_bytes_target = cost.slab_bytes_target});
-
   PlaceBoxes(plan);
   if (Status status = AssignWorkers(roster, plan); !status.ok()) return status;
   return plan;
+}
+
+Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, const Roster& roster,
+                            const CostModel& cost, std::shared_ptr<const Layout> layout, const Turn& turn) {
+  const Result<ResolvedPolicy> policy = ResolvePolicy(request, summary.description.geometry);
+  if (!policy.ok()) return policy.status();
+  if (layout == nullptr) {
+    const Result<TransferFunction> transfer = ResolveTransfer(request.transfer, summary);
+    if (!transfer.ok()) return transfer.status();
+    layout = std::make_shared<const Layout>(MakeLayout({.summary = &summary,
+                                                        .transfer = &*transfer,
+                                                        .policy = &*policy,
+                                                        .renderer = setup->renderer,
+                                                        .slots = std::max<std::uint32_t>(std::uint32_t(roster.slots.size()), 1),
+                                                        .slab_bytes_target = cost.slab_bytes_target}));
+  }
+  return PlanFrame(request, *policy, dataset, summary, roster, std::move(layout), turn);
 }
 
 }  // namespace slabstream

@@ -21,6 +21,8 @@ std::optional<WorkSplit> FindWorkSplit(std::string_view name) {
   return WorkSplit(found - choices.begin() - 1);
 }
 
+std::string_view NameOf(WorkSplit split) { return WorkSplits()[std::size_t(split) + 1].name; }
+
 const std::vector<NamedChoice>& BalanceModes() {
   static const std::vector<NamedChoice> choices = {
       {kStaticBalance, "boxes stay as they were made"},

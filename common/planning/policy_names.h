@@ -28,6 +28,7 @@ struct NamedChoice {
 enum class WorkSplit { kVoxels, kOccupied, kCost };
 const std::vector<NamedChoice>& WorkSplits();                   // kAutomatic first, then by WorkSplit
 std::optional<WorkSplit> FindWorkSplit(std::string_view name);  // none: kAutomatic, or no such name
+std::string_view NameOf(WorkSplit split);
 
 // --balance: whether boxes change while frames go by.
 const std::vector<NamedChoice>& BalanceModes();  // "static", "dynamic"

@@ -210,9 +210,11 @@ Status Socket::Connect(const std::string& text) {
 Status Socket::Send(const std::string& identity, std::vector<std::byte> header, const Bytes& payload) {
   zmq::socket_t& socket = impl_->socket;
   if (impl_->tuner != nullptr) impl_->tuner->TuneNew();
-  int error = impl_->router ? SendPart(socket, zmq::message_t(identity.data(), identity.size()), true) : 0;
-  if (error == 0) error = SendPart(socket, Share(Bytes(std::move(header))), !payload.empty());
-  if (error == 0 && !payload.empty()) error = SendPart(socket, Share(payload), false);
+  // All parts are made before the first one is sent: what runs out of memory between them would leave half a message.
+  zmq::message_t to(identity.data(), identity.size()), head = Share(Bytes(std::move(header))), body = Share(payload);
+  int error = impl_->router ? SendPart(socket, std::move(to), true) : 0;
+  if (error == 0) error = SendPart(socket, std::move(head), !payload.empty());
+  if (error == 0 && !payload.empty()) error = SendPart(socket, std::move(body), false);
   switch (error) {
     case 0: return Status::Ok();
     case EAGAIN: return Status::ResourceExhausted("send: the high-water mark is reached or nobody is connected");

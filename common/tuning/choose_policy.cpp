@@ -47,11 +47,17 @@ class Search {
                   .slab_bytes_target = question.cost->slab_bytes_target,
                   .known = question.known}),
         predictor_(predictor),
-        asked_(question.frame->policy),
+        asked_(SettledPolicy(*question.frame, question.summary->description.geometry)),
         open_partition_(asked_.decomposition == kAutomatic),
         open_owners_(open_partition_ || asked_.assignment == kAutomatic) {
-    best_ = question.now != nullptr ? *question.now : FixedPolicy(asked_);
-    if (question.now == nullptr) best_.groups = FewestGroupsOf(best_);
+    if (question.now != nullptr) {
+      best_ = *question.now;
+      return;
+    }
+    FrameRequest fixed = *question.frame;
+    fixed.policy = FixedPolicy(asked_);
+    best_ = ResolvePolicy(fixed, question.summary->description.geometry).value();
+    best_.groups = FewestGroupsOf(best_);
   }
 
   PolicyChoice Run() {
@@ -64,21 +70,22 @@ class Search {
 
  private:
   // The groups that a policy may have at least: those that were asked for, if any.
-  int FewestGroupsOf(Policy policy) {
+  int FewestGroupsOf(ResolvedPolicy policy) {
     policy.groups = asked_.groups;
     return layouts_.FewestGroups(policy);
   }
 
   void ChoosePartition() {
     for (const DecompositionEntry& entry : Decompositions()) {
-      for (const NamedChoice& split : WorkSplits()) {
-        const bool wanted = asked_.split == kAutomatic ? split.name != kAutomatic : split.name == asked_.split;
+      for (const WorkSplit split : {WorkSplit::kVoxels, WorkSplit::kOccupied, WorkSplit::kCost}) {
+        const bool wanted = asked_.split == kAutomatic || asked_.split == NameOf(split);
         // Until costs are known, their split is that by what is occupied.
-        const bool same = asked_.split == kAutomatic && FindWorkSplit(split.name) == WorkSplit::kCost && question_.known.cost == nullptr;
+        const bool same = asked_.split == kAutomatic && split == WorkSplit::kCost && question_.known.cost == nullptr;
         if (!wanted || same) continue;
-        Policy policy = best_;
-        policy.decomposition = entry.name;
-        policy.split = split.name;
+        ResolvedPolicy policy = best_;
+        policy.decomposition = &entry;
+        policy.split = split;
+        policy.axis = SlabAxis(asked_.axis, entry, question_.summary->description.geometry.size);
         policy.groups = FewestGroupsOf(policy);
         TryLayout(policy);
       }
@@ -86,13 +93,13 @@ class Search {
   }
 
   void ChooseOwners() {
-    const Policy start = best_;
+    const ResolvedPolicy start = best_;
     const int fewest = FewestGroupsOf(start);
     for (const int factor : kGroupFactors) {
       if (factor > 1 && asked_.groups > 0) break;
       for (const AssignmentEntry& entry : Assignments()) {
-        Policy policy = start;
-        if (asked_.assignment == kAutomatic) policy.assignment = entry.name;
+        ResolvedPolicy policy = start;
+        if (asked_.assignment == kAutomatic) policy.assignment = &entry;
         policy.groups = std::min(factor * fewest, kMaxGroups);
         TryLayout(policy);
       }
@@ -102,14 +109,14 @@ class Search {
   void ChooseScheme() {
     if (!prediction_) return;
     for (const std::string& scheme : SchemesToTry()) {
-      Policy policy = best_;
+      ResolvedPolicy policy = best_;
       policy.combine = scheme;
       if (const auto prediction = predictor_.Predict(prepared_, scheme)) Consider(policy, *prediction, kLeastGain);
     }
   }
 
   // Layouts that have been tried under another name are not tried again.
-  void TryLayout(const Policy& policy) {
+  void TryLayout(const ResolvedPolicy& policy) {
     Layout layout = layouts_.Make(policy);
     if (std::ranges::find(tried_, layout) != tried_.end()) return;
     tried_.push_back(layout);
@@ -125,7 +132,7 @@ class Search {
     }
   }
 
-  bool Consider(const Policy& policy, const FramePrediction& prediction, double least_gain) {
+  bool Consider(const ResolvedPolicy& policy, const FramePrediction& prediction, double least_gain) {
     ++predicted_;
     if (prediction_ && prediction.latency_seconds >= (1 - least_gain) * prediction_->latency_seconds) return false;
     best_ = policy;
@@ -136,9 +143,9 @@ class Search {
   const PolicyQuestion& question_;
   LayoutMaker layouts_;
   const FramePredictor& predictor_;
-  const Policy& asked_;
+  const Policy asked_;  // but for the view
   const bool open_partition_, open_owners_;
-  Policy best_;
+  ResolvedPolicy best_;
   std::optional<FramePrediction> prediction_;  // of best_; prepared_ is its layout
   FramePredictor::Prepared prepared_;
   bool stands_in_ = false;  // prediction_ is that of the default scheme in place of best_'s
@@ -159,7 +166,6 @@ Policy FixedPolicy(Policy policy) {
 
 Result<PolicyChoice> ChoosePolicy(const PolicyQuestion& question) {
   CHECK(CheckNames(question.frame->policy).ok());
-  CHECK(question.now == nullptr || !LeavesChoice(*question.now));
   const Result<FrameSetup> setup = MakeFrameSetup(*question.frame, kAnyDataset, *question.summary);
   if (!setup.ok()) return setup.status();
   std::optional<OccupancyGrid> visible;

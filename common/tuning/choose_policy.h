@@ -29,13 +29,13 @@ struct PolicyQuestion {
   const MachineModel* machine = nullptr;  // valid; see service_machine.h
   const CostModel* cost = nullptr;
   double render_scale = 1;  // by how much longer boxes took so far than was predicted; > 0
-  // What holds already, if anything: a policy that leaves nothing open, and fits the frame's. It stays unless another one gains that share.
-  const Policy* now = nullptr;
+  // What holds already, if anything, and fits the frame's policy. It stays unless another one gains that share.
+  const ResolvedPolicy* now = nullptr;
   double least_gain = 0;  // [0, 1)
 };
 
 struct PolicyChoice {
-  Policy policy;                              // leaves nothing open, nor the number of groups
+  ResolvedPolicy policy;                      // with a number of groups
   std::optional<FramePrediction> prediction;  // of it; none: its schedule is too long to be tried (FramePredictor::kMostSteps)
   int predicted = 0;                          // candidates
 };

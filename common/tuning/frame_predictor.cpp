@@ -85,10 +85,10 @@ FramePredictor::Prepared FramePredictor::Prepare(Layout layout) const {
   Prepared prepared;
   FramePlan& plan = prepared.plan;
   plan.setup = coarse_;
-  plan.layout = std::move(layout);
+  plan.layout = std::make_shared<const Layout>(std::move(layout));
   plan.slots = slots_;
   PlaceBoxes(plan);
-  prepared.boxes.resize(plan.layout.owners.size());
+  prepared.boxes.resize(plan.layout->owners.size());
   for (const Placement& placement : PlacementsOf(plan)) {
     BoxEstimator::Estimate& box = prepared.boxes[placement.id] = estimator_.Of(placement.box);
     box.seconds *= render_scale_;

@@ -225,6 +225,7 @@ v1::WorkerTrouble ToProto(const WorkerTrouble& in) {
   *out.mutable_key() = ToProto(in.key);
   out.set_unreachable(in.unreachable);
   *out.mutable_status() = ToProto(in.status);
+  out.set_elsewhere(in.elsewhere);
   return out;
 }
 
@@ -235,6 +236,7 @@ WorkerTrouble FromProto(const v1::WorkerTrouble& in, Checker& check) {
   out.key = Read("key", in.key(), check);
   out.unreachable = in.unreachable();
   out.status = Read("status", in.status(), check);
+  out.elsewhere = in.elsewhere();
   return out;
 }
 

@@ -132,7 +132,8 @@ struct WorkerTrouble {
   WorkerId worker = 0;
   GroupKey key;
   WorkerId unreachable = 0;  // a peer that does not answer, or 0
-  Status status;             // not ok
+  Status status;             // not ok; its message says what failed
+  bool elsewhere = false;    // another worker may be able to do it, so the frame goes on without this one; else the same may work later
   friend bool operator==(const WorkerTrouble&, const WorkerTrouble&) = default;
 };
 

@@ -194,8 +194,9 @@ Result<LayoutKnowledge> KnowLayout(ExperimentContext& context, const FrameCase& 
   if (!occupied.ok()) return occupied.status();
   Result<TransferFunction> transfer = ResolveTransfer(frame.volume.transfer, *volume->summary);
   if (!transfer.ok()) return transfer.status();
-  return LayoutKnowledge{*volume, *occupied, *std::move(transfer), SettledPolicy(RequestOf(frame), volume->summary->description.geometry),
-                         frame.volume.renderer};
+  Result<ResolvedPolicy> policy = ResolvePolicy(RequestOf(frame), volume->summary->description.geometry);
+  if (!policy.ok()) return policy.status();
+  return LayoutKnowledge{*volume, *occupied, *std::move(transfer), *std::move(policy), frame.volume.renderer};
 }
 
 LayoutRequest LayoutRequestOf(const LayoutKnowledge& knowledge, int workers) {
@@ -209,7 +210,6 @@ LayoutRequest LayoutRequestOf(const LayoutKnowledge& knowledge, int workers) {
 }
 
 Result<FramePlan> PlanOf(ExperimentContext& context, const FrameCase& frame) {
-  if (Status status = CheckNames(frame.policy); !status.ok()) return status;
   const Result<LayoutKnowledge> knowledge = KnowLayout(context, frame);
   if (!knowledge.ok()) return knowledge.status();
   return PlanOf(context, frame, MakeLayout(LayoutRequestOf(*knowledge, frame.workers)));
@@ -220,12 +220,15 @@ Result<FramePlan> PlanOf(ExperimentContext& context, const FrameCase& frame, con
   if (Status status = Validate(request); !status.ok()) return status;
   const Result<VolumeInUse> volume = context.volumes().Get(frame.volume);
   if (!volume.ok()) return volume.status();
-  return PlanFrame(request, kPlannedDataset, *volume->summary, RosterOf(std::uint32_t(frame.workers)), CostModel{}, &layout);
+  return PlanFrame(request, kPlannedDataset, *volume->summary, RosterOf(std::uint32_t(frame.workers)), CostModel{},
+                   std::make_shared<const Layout>(layout));
 }
 
 Result<FrameCase> WithChosenPolicy(ExperimentContext& context, FrameCase frame, const LinkModel& link) {
   if (!LeavesChoice(frame.policy)) return frame;
-  const Result<LayoutKnowledge> knowledge = KnowLayout(context, frame);
+  FrameCase fixed = frame;
+  fixed.policy = FixedPolicy(frame.policy);
+  const Result<LayoutKnowledge> knowledge = KnowLayout(context, fixed);
   if (!knowledge.ok()) return knowledge.status();
   const FrameRequest request = RequestOf(frame);
   const MachineModel machine = ServiceMachine(std::vector<HostedWorker>(std::size_t(frame.workers)), {.link = link});
@@ -237,7 +240,7 @@ Result<FrameCase> WithChosenPolicy(ExperimentContext& context, FrameCase frame, 
                                                     .machine = &machine,
                                                     .cost = &cost});
   if (!choice.ok()) return choice.status();
-  frame.policy = choice->policy;
+  frame.policy = AskFor(choice->policy);
   return frame;
 }
 
@@ -341,7 +344,7 @@ MeasuredFrame WithBoxCosts(ExperimentContext& context, const FrameCase& frame, F
                          {},
                          EstimateOf(context.log(), FinishKey(frame), "finish_seconds").median,
                          EstimateOf(context.log(), FinishKey(frame), "receive_seconds").median};
-  measured.boxes.resize(measured.plan.layout.partition.boxes().size());
+  measured.boxes.resize(measured.plan.layout->partition.boxes().size());
 
   const std::vector<double> ids = MediansOf(repeats, "ids"), seconds = MediansOf(repeats, "seconds"),
                             first = MediansOf(repeats, "first_seconds"), occupied = MediansOf(repeats, "occupied_voxels"),

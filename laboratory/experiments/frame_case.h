@@ -64,7 +64,7 @@ struct LayoutKnowledge {
   VolumeInUse volume;
   std::shared_ptr<const OccupancyGrid> occupied;
   TransferFunction transfer;
-  Policy policy;  // settled
+  ResolvedPolicy policy;
   const RendererKind* renderer = nullptr;
 };
 Result<LayoutKnowledge> KnowLayout(ExperimentContext& context, const FrameCase& frame);

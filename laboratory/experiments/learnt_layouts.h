@@ -23,10 +23,10 @@ class LearntLayouts {
 
   // Of the next frame, which may differ in its view alone from the one given to Make. Valid until the next call.
   const Layout& Next(const FrameCase& frame) {
-    FrameRequest request = RequestOf(frame);
-    request.policy = policy_ = SettledPolicy(request, knowledge_.volume.summary->description.geometry);
-    return table_.Find({&request, kPlannedDataset, knowledge_.volume.summary.get(), &knowledge_.transfer, knowledge_.occupied, slots_,
-                        CostModel().slab_bytes_target});
+    policy_ = ResolvePolicy(RequestOf(frame), knowledge_.volume.summary->description.geometry).value();
+    layout_ = table_.Find(
+        {&policy_, &volume_, knowledge_.volume.summary.get(), knowledge_.occupied, slots_, CostModel().slab_bytes_target});
+    return *layout_;
   }
 
   // What rendering the frame of the last Next took, by PlacementsOf(plan).
@@ -37,14 +37,17 @@ class LearntLayouts {
       report.box = placement.id;
       report.stage_ns[std::size_t(Stage::kRender)] = nanoseconds[reports.size() - 1];
     }
-    table_.Learn(plan, policy_, reports);
+    table_.Learn(volume_, plan, policy_, reports);
   }
 
  private:
-  LearntLayouts(LayoutKnowledge knowledge, std::uint32_t slots) : knowledge_(std::move(knowledge)), slots_(slots) {}
+  LearntLayouts(LayoutKnowledge knowledge, std::uint32_t slots)
+      : knowledge_(std::move(knowledge)), volume_(kPlannedDataset, knowledge_.transfer, knowledge_.renderer), slots_(slots) {}
 
   LayoutKnowledge knowledge_;
-  Policy policy_;  // of the last Next
+  ClassifiedVolume volume_;
+  ResolvedPolicy policy_;  // of the last Next
+  std::shared_ptr<const Layout> layout_;
   std::uint32_t slots_;
   LayoutTable table_;
 };

@@ -71,7 +71,7 @@ Figure BoxCostFigure(const std::string& name, const std::string& title, const Me
   for (const Cut& cut : kCuts) {
     HeatPanel panel{cut.title, cut.right_name, cut.up_name, double(size[cut.right]), double(size[cut.up]), {}};
     const std::int32_t middle = size[cut.across] / 2;
-    const std::span<const Box> boxes = frame.plan.layout.partition.boxes();
+    const std::span<const Box> boxes = frame.plan.layout->partition.boxes();
     for (std::size_t id = 0; id < boxes.size(); ++id) {
       const Box& box = boxes[id];
       if (box.begin[cut.across] > middle || box.end[cut.across] <= middle) continue;

@@ -98,7 +98,7 @@ PictureCost MeasurePictureCost(const Volume& volume, const FrameSetup& setup, in
 
 FrameCosts MeasureFrameCosts(const Volume& volume, const FramePlan& plan, int repeats) {
   FrameCosts costs;
-  costs.boxes.resize(plan.layout.partition.boxes().size());
+  costs.boxes.resize(plan.layout->partition.boxes().size());
   const std::vector<Placement> placements = PlacementsOf(plan);
   std::vector<BoxCost> measured = MeasureBoxCosts(volume, plan, repeats);
   for (std::size_t i = 0; i < placements.size(); ++i) costs.boxes[placements[i].id] = std::move(measured[i]);

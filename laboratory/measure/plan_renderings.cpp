@@ -52,7 +52,7 @@ PlanRenderings::~PlanRenderings() = default;
 
 PlanSeconds PlanRenderings::Measure(const FramePlan& plan) {
   PlanSeconds seconds;
-  seconds.boxes.resize(plan.layout.partition.boxes().size());
+  seconds.boxes.resize(plan.layout->partition.boxes().size());
   std::vector<std::vector<Box>> boxes(workers_.size());
   std::vector<double> alone(workers_.size());
   const std::vector<Placement> placements = PlacementsOf(plan);

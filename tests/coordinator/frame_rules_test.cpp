@@ -337,6 +337,61 @@ TEST(CoordinatorFrames, TroubleOfTheDisplayWorkerBeginsAgain) {
   EXPECT_TRUE(script.Done(groups[1]).empty()) << "said before the trouble";
 }
 
+WorkerTrouble Unable(const GroupAssignment& group, WorkerId worker) {
+  return {
+      .epoch = 77, .worker = worker, .key = group.key, .status = Status::ResourceExhausted("render: not enough memory"), .elsewhere = true};
+}
+
+TEST(CoordinatorFrames, WorkerThatIsUnableIsLeftOutAtOnceAndOnlyOfThisFrame) {
+  CoordinatorScript script;
+  script.Join(11, 1);
+  script.Join(12, 2);
+  script.Join(13, 3);
+  const auto groups = HandedOut(script.Submit(kClient, Frame(1, 3)));
+  script.Done(groups.at(0));
+  const WorkerId unable = groups[0].display % 3 + 1;
+  const Actions actions = script.Worker({}, Unable(groups[1], unable));
+  const auto again = HandedOut(actions);
+  ASSERT_EQ(again.at(0).key, (GroupKey{1, 2, 1}));
+  EXPECT_FALSE(WorkersOf(again[0]).contains(unable));
+  EXPECT_EQ(WorkersOf(again[0]).size(), 2U);
+  EXPECT_EQ(ToClients<FrameReply>(script.AnswerAll(actions)).size(), 1U);
+  EXPECT_EQ(WorkersOf(HandedOut(script.Submit(kClient, Frame(2))).at(0)).size(), 3U);
+}
+
+TEST(CoordinatorFrames, FrameThatNoWorkerIsAbleToRenderFailsAtOnceWithTheReason) {
+  for (const int workers : {1, 2, 3}) {
+    CoordinatorScript script;
+    for (int token = 1; token <= workers; ++token) script.Join(PeerToken(token), std::uint32_t(token));
+    Actions actions = script.Submit(kClient, Frame(1, 2));
+    for (int i = 1; i < workers; ++i) {
+      const GroupAssignment group = HandedOut(actions).at(0);
+      actions = script.Worker({}, Unable(group, *WorkersOf(group).begin()));
+      EXPECT_TRUE(ToClients<FrameFailed>(actions).empty());
+    }
+    const GroupAssignment last = HandedOut(actions).at(0);
+    const auto failed = ToClients<FrameFailed>(script.Worker({}, Unable(last, last.display)));
+    ASSERT_EQ(failed.size(), 1U) << workers << " workers";
+    EXPECT_EQ(failed[0].message.status.code(), StatusCode::kResourceExhausted);
+    EXPECT_EQ(failed[0].message.status.message(), "worker " + std::to_string(last.display) + ": render: not enough memory");
+    EXPECT_EQ(script.QueryStatus().running, 0U);
+  }
+}
+
+TEST(CoordinatorFrames, PictureThatTheDisplayWorkerCannotMakeIsMadeByAnother) {
+  CoordinatorScript script;
+  script.Join(11, 1);
+  script.Join(12, 2);
+  const auto groups = HandedOut(script.Submit(kClient, Frame(1, 2)));
+  script.Done(groups.at(0));
+  script.Done(groups.at(1));
+  const Actions actions = script.Worker({}, Unable(groups[1], groups[1].display));
+  const auto again = HandedOut(actions);
+  ASSERT_EQ(again.at(0).key, (GroupKey{1, 2, 0})) << "what it accumulated is its own";
+  EXPECT_NE(again[0].display, groups[0].display);
+  EXPECT_EQ(ToClients<FrameReply>(script.AnswerAll(actions)).size(), 1U);
+}
+
 class UnreachablePeer : public testing::Test {
  protected:
   void SetUp() override {

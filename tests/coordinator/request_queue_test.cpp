@@ -64,6 +64,20 @@ TEST(RequestQueue, PositionsAreTheOrderOfService) {
   }
 }
 
+TEST(RequestQueue, VisitsInTheOrderInWhichRequestsAreServed) {
+  Random random(5);
+  SCOPED_TRACE(random.trace());
+  RequestQueue queue;
+  for (int i = 0; i < 40; ++i) queue.Push(Request(random.Integer<PeerToken>(1, 5), RequestId(i)));
+  std::vector<RequestId> visited, served;
+  queue.VisitInTurn([&](const OpenRequest& request) {
+    visited.push_back(request.submit.request);
+    return visited.size() < 30;
+  });
+  while (served.size() < 30) served.push_back(queue.TakeNext(Any)->submit.request);
+  EXPECT_EQ(visited, served);
+}
+
 TEST(RequestQueue, ExtractTakesOutWhatIsWantedAndNothingElse) {
   RequestQueue queue;
   for (RequestId id = 1; id <= 4; ++id) queue.Push(Request(1, id));

@@ -54,7 +54,7 @@ TEST(PlanRenderings, MeasureEveryBoxOfThePlan) {
   const FramePlan plan = PlanFrame(request, 1, Summarize(*what.volume), Roster{{1, 2}}, CostModel{}).value();
   PlanRenderings renderings(*what.volume, 2);
   const PlanSeconds seconds = renderings.Measure(plan);
-  ASSERT_EQ(seconds.boxes.size(), plan.layout.partition.boxes().size());
+  ASSERT_EQ(seconds.boxes.size(), plan.layout->partition.boxes().size());
   for (const Placement& placement : PlacementsOf(plan)) EXPECT_GT(seconds.boxes[placement.id], 0) << placement.id;
 }
 

@@ -66,6 +66,7 @@ struct World {
   TransferFunction transfer = std::get<TransferFunction>(SomeRequest().transfer.choice);
   OccupancyGrid grid{size, std::vector<CellOccupancy>(16 * 16 * 32, FullCell({{0, 0, 0}, {8, 8, 8}}))};
   Policy policy{.decomposition = "kd-tree", .groups = 1, .balance = "dynamic"};
+  mutable ResolvedPolicy resolved;  // of the last Request
   double seconds_a_cell = 1e-4;
   Random random{63};
 
@@ -80,7 +81,10 @@ struct World {
     return {size, work};
   }
   LayoutRequest Request(const WorkField* cost) const {
-    return {.summary = &summary, .transfer = &transfer, .policy = &policy, .slots = kSlots, .known = {.occupied = &grid, .cost = cost}};
+    FrameRequest request;
+    request.policy = policy;
+    resolved = ResolvePolicy(request, summary.description.geometry).value();
+    return {.summary = &summary, .transfer = &transfer, .policy = &resolved, .slots = kSlots, .known = {.occupied = &grid, .cost = cost}};
   }
   std::vector<BoxSeconds> Render(const Layout& layout, double noise) {
     const WorkField truth = Truth();

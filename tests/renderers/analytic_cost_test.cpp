@@ -240,12 +240,12 @@ TEST(MakeLayout, BoxesOfAKdTreeTakeEquallyLong) {
     const std::unique_ptr<AnalyticCost> cost = renderer->MakeCost({&grid, &summary, &transfer});
     for (const std::uint32_t slots : {2U, 3U, 5U, 8U, 13U}) {
       SCOPED_TRACE(std::to_string(slots) + " slots, renderer " + std::string(renderer->name()));
-      Policy policy;
-      policy.decomposition = "kd-tree";
-      policy.groups = 1;
+      FrameRequest frame;
+      frame.policy = {.decomposition = "kd-tree", .groups = 1};
+      ResolvedPolicy resolved = ResolvePolicy(frame, summary.description.geometry).value();
       const LayoutRequest request{.summary = &summary,
                                   .transfer = &transfer,
-                                  .policy = &policy,
+                                  .policy = &resolved,
                                   .renderer = renderer,
                                   .slots = slots,
                                   .known = {.occupied = &grid}};
@@ -253,7 +253,7 @@ TEST(MakeLayout, BoxesOfAKdTreeTakeEquallyLong) {
       if (renderer->along_slices()) {
         EXPECT_LT(occupied.imbalance, 1.12);
       }
-      policy.split = "voxels";
+      resolved.split = WorkSplit::kVoxels;
       EXPECT_LE(occupied.frame, ForetoldOf(MakeLayout(request), *cost).frame) << "than boxes of equal volume";
     }
   }

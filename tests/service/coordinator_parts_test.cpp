@@ -116,7 +116,7 @@ class SlabServerTest : public testing::Test {
         volume_(RandomVolume({300, 70, 60}, ScalarType::kUint8, random_)),  // two chunks
         server_(SlabServer::Start(context_, "inproc://slab-server-test", kEpoch).value()),
         worker_(Socket::Dealer(context_).value()) {
-    server_->Publish(5, volume_);
+    server_->Publish(5, {.volume = volume_});
     CHECK(worker_.Connect(server_->endpoint()).ok());
   }
 
@@ -146,7 +146,7 @@ class SlabServerTest : public testing::Test {
 
 TEST_F(SlabServerTest, ChunksPutTogetherAreTheBox) {
   const Box box = volume_->block.box;
-  server_->Publish(6, std::make_shared<const BrickedVoxels>(volume_->block));
+  server_->Publish(6, {.bricks = std::make_shared<const BrickedVoxels>(volume_->block)});
   for (DatasetId dataset : {5U, 6U}) {
     std::vector<Bytes> payloads;
     std::vector<std::byte> samples(std::size_t(box.voxel_count()));

@@ -100,6 +100,28 @@ class MultiProcessTest : public testing::Test {
   std::string client_endpoint_, worker_endpoint_;
 };
 
+// Stopped for longer than the coordinator waits for it, and continued: it is a new worker, and nothing else happens.
+TEST_F(MultiProcessTest, StoppedWorkerComesBackAndCostsOneAttemptAtMost) {
+  StartCoordinator();
+  for (int i = 0; i < 3; ++i) StartWorker();
+  Client client = Connect();
+  AwaitWorkers(client, 3);
+  ASSERT_TRUE(client.Render(TestRequest(Splatting(), 0)).ok());
+  workers_[1].Kill(SIGSTOP);
+  const RequestId request = client.Submit(TestRequest(Splatting(), 30));
+  const Result<Picture> picture = Await(client, request, [] {});
+  ASSERT_TRUE(picture.ok()) << picture.status().message();
+  EXPECT_EQ(picture->statistics.attempts, 2U) << "it was lost";
+  workers_[1].Kill(SIGCONT);
+  AwaitWorkers(client, 3);
+  for (int i = 0; i < 20; ++i) {
+    const Result<Picture> next = client.Render(TestRequest(Splatting(), 10 * i));
+    ASSERT_TRUE(next.ok()) << next.status().message();
+    EXPECT_EQ(next->statistics.attempts, 1U);
+  }
+  EXPECT_EQ(client.QueryStatus().value().workers_lost, 1U);
+}
+
 TEST_F(MultiProcessTest, KilledWorkersCostNoFrameAndChangeNoPicture) {
   StartCoordinator();
   for (int i = 0; i < 3; ++i) StartWorker();

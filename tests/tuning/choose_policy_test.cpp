@@ -90,28 +90,29 @@ TEST_P(ChoosePolicyTest, MakesPlansOfAnyVolumeAndKeepsWhatIsFixed) {
       SCOPED_TRACE(testing::Message() << volume.name << ", p = " << GetParam() << ", " << asked.decomposition << ", " << asked.split << ", "
                                       << asked.assignment << ", " << asked.combine << ", " << asked.groups << " groups");
       const PolicyChoice choice = question.Choose(asked);
-      EXPECT_TRUE(CheckChosen(choice.policy).ok()) << CheckChosen(choice.policy).message();
-      EXPECT_NE(choice.policy.split, kAutomatic);
+      const Policy got = AskFor(choice.policy);
+      EXPECT_TRUE(CheckNames(got).ok() && !LeavesChoice(got)) << CheckNames(got).message();
+      EXPECT_NE(got.split, kAutomatic);
       EXPECT_GE(choice.policy.groups, 1);
       EXPECT_LE(choice.policy.groups, kMaxGroups);
       if (asked.decomposition != kAutomatic) {
-        EXPECT_EQ(choice.policy.decomposition, asked.decomposition);
+        EXPECT_EQ(got.decomposition, asked.decomposition);
       }
       if (asked.assignment != kAutomatic) {
-        EXPECT_EQ(choice.policy.assignment, asked.assignment);
+        EXPECT_EQ(got.assignment, asked.assignment);
       }
       if (asked.combine != kAutomatic) {
-        EXPECT_EQ(choice.policy.combine, asked.combine);
+        EXPECT_EQ(got.combine, asked.combine);
       }
       if (asked.split != kAutomatic) {
-        EXPECT_EQ(choice.policy.split, asked.split);
+        EXPECT_EQ(got.split, asked.split);
       }
       if (asked.groups > 0) {
-        EXPECT_EQ(choice.policy.groups, asked.groups);
+        EXPECT_EQ(got.groups, asked.groups);
       }
-      EXPECT_EQ(choice.policy.balance, asked.balance);
+      EXPECT_EQ(got.balance, asked.balance);
 
-      question.request.policy = choice.policy;
+      question.request.policy = got;
       EXPECT_TRUE(PlanFrame(question.request, 1, question.summary, FullRoster(GetParam()), question.cost).ok());
       EXPECT_TRUE(SameChoice(choice, question.Choose(asked))) << "chosen otherwise the second time";
 
@@ -128,16 +129,16 @@ INSTANTIATE_TEST_SUITE_P(Workers, ChoosePolicyTest, testing::Values(1, 2, 3, 5, 
 TEST(ChoosePolicy, DividesWhatLiesInACornerByWork) {
   Question question{.summary = SummaryWith({192, 192, 192}, [](const Index3& b) { return b.z < 3 && b.x < 6; }), .slots = 8};
   const PolicyChoice fixed = question.Choose(Policy{}), chosen = question.Choose(Automatic());
-  EXPECT_LT(chosen.prediction->render_seconds, 0.7 * fixed.prediction->render_seconds) << chosen.policy.decomposition;
+  EXPECT_LT(chosen.prediction->render_seconds, 0.7 * fixed.prediction->render_seconds) << chosen.policy.decomposition->name;
   EXPECT_LT(chosen.prediction->imbalance, 1.5);
 }
 
 TEST(ChoosePolicy, KeepsWhatHoldsUnlessEnoughIsGained) {
   Question question{.summary = SummaryWith({192, 192, 192}, [](const Index3& b) { return b.z < 3 && b.x < 6; }), .slots = 8};
   question.request.policy = Automatic();
-  Policy now;
-  now.groups = 1;
-  now.split = "voxels";
+  FrameRequest holding = question.request;
+  holding.policy = {.split = "voxels", .groups = 1};
+  const ResolvedPolicy now = ResolvePolicy(holding, question.summary.description.geometry).value();
   PolicyQuestion asked{.frame = &question.request,
                        .summary = &question.summary,
                        .slots = question.slots,

@@ -139,7 +139,7 @@ std::vector<FrameImage> Samples() {
 
 template <>
 std::vector<WorkerTrouble> Samples() {
-  return {{1, 2, {3, 4, 5}, 0, Status::Internal("")}, {kMax64, kMax32, {}, kMax32, Status::InvalidArgument(kLongText)}};
+  return {{1, 2, {3, 4, 5}, 0, Status::Internal("")}, {kMax64, kMax32, {}, kMax32, Status::InvalidArgument(kLongText), true}};
 }
 
 template <>

@@ -116,8 +116,21 @@ TEST_F(WorkerGroupsTest, AFailedRenderIsReported) {
   const auto trouble = Sent<WorkerTrouble>(failed);
   ASSERT_THAT(trouble, SizeIs(1));
   EXPECT_EQ(trouble[0].status, Status::ResourceExhausted("no memory"));
+  EXPECT_TRUE(trouble[0].elsewhere);
   EXPECT_THAT(All<ReleaseImage>(failed), SizeIs(1));
   EXPECT_THAT(All<StartRender>(Tell(Assignment(1, {kSelf}, 0, 1, 2))), SizeIs(1));
+}
+
+TEST_F(WorkerGroupsTest, AFailedSendIsReported) {
+  const GroupAssignment assignment = Assignment(1, {kPeer, kSelf});
+  Rendered(All<StartRender>(Feed(Tell(assignment))).at(0));
+  const auto trouble = Sent<WorkerTrouble>(Tell(SendFailed{assignment.key, Status::ResourceExhausted("encode: not enough memory")}));
+  ASSERT_THAT(trouble, SizeIs(1));
+  EXPECT_EQ(trouble[0].key, assignment.key);
+  EXPECT_EQ(trouble[0].status.message(), "encode: not enough memory");
+  EXPECT_TRUE(trouble[0].elsewhere);
+  const GroupKey old{1, 0, 0};
+  EXPECT_THAT(Tell(SendFailed{old, Status::ResourceExhausted("of an attempt that is over")}), IsEmpty());
 }
 
 TEST_F(WorkerGroupsTest, AFailedCombineIsReported) {
@@ -125,7 +138,8 @@ TEST_F(WorkerGroupsTest, AFailedCombineIsReported) {
   Tell(FromPeer(assignment.key));
   const Actions rendered = Rendered(All<StartRender>(Feed(Tell(assignment))).at(0));
   const Actions failed = Combined(All<StartCombine>(rendered).at(0), Status::DataLoss("runs"));
-  EXPECT_THAT(Sent<WorkerTrouble>(failed), SizeIs(1));
+  ASSERT_THAT(Sent<WorkerTrouble>(failed), SizeIs(1));
+  EXPECT_FALSE(Sent<WorkerTrouble>(failed)[0].elsewhere) << "what came was damaged, which says nothing of this worker";
   EXPECT_THAT(All<ReleaseImage>(failed), SizeIs(1));
   EXPECT_THAT(Sent<GroupDone>(failed), IsEmpty());
 }

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <optional>
 #include <vector>
 
@@ -59,9 +60,16 @@ class WorkerMachineTest : public testing::Test {
 
   Actions Tell(const WorkerEvent& event) { return machine->Step(event, now); }
   Actions Tell(const AnyMessage& message, Bytes payload = {}) { return Tell(WorkerEvent(MessageReceived{message, std::move(payload)})); }
+  // Ticks at the end, and before that whenever the machine asks for it.
   Actions After(Duration time) {
-    now += time;
-    return Tell(Tick{});
+    Actions actions;
+    const Time end = now + time;
+    do {
+      now = std::clamp(machine->NextWake(), now, end);
+      const Actions more = Tell(Tick{});
+      actions.insert(actions.end(), more.begin(), more.end());
+    } while (now < end);
+    return actions;
   }
 
   // One group of a frame of 4 x 2 pixels: rank r shows box r, which is one MiB and a bit with its halo. Nothing is ever hidden.

@@ -49,6 +49,19 @@ TEST_F(WorkerRegistrationTest, BeatsAndFallsSilentWithItsCoordinator) {
   EXPECT_TRUE(machine->registered());
 }
 
+// A process that was stopped and continued: the coordinator's messages wait to be read, and it may not have noticed.
+TEST_F(WorkerRegistrationTest, ItsOwnSleepIsNotTheCoordinatorsSilence) {
+  const auto render = All<StartRender>(Feed(Tell(Assignment(1, {kSelf})))).at(0);
+  now += seconds(20);
+  EXPECT_FALSE(Rendered(render).empty());  // the first thing that it hears is not from the coordinator
+  EXPECT_TRUE(machine->registered());
+  Tell(Ping{kEpoch, 0, {}});
+  After(milliseconds(5900));
+  EXPECT_TRUE(machine->registered());
+  After(milliseconds(100));
+  EXPECT_FALSE(machine->registered()) << "it was awake all the time";
+}
+
 TEST_F(WorkerRegistrationTest, RetireMakesItRegisterAgain) {
   EXPECT_THAT(Sent<Register>(Tell(Retire{kEpoch + 1})), SizeIs(1));
   EXPECT_FALSE(machine->registered());

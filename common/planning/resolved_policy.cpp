@@ -1,0 +1,104 @@
+#include "common/planning/resolved_policy.h"
+
+#include <fmt/format.h>
+
+#include <vector>
+
+#include "common/base/check.h"
+#include "common/base/find_named.h"
+#include "common/combining/schemes.h"
+
+namespace slabstream {
+namespace {
+
+template <class Entry>
+Status CheckName(std::string_view field, std::string_view name, const std::vector<Entry>& entries) {
+  if (FindNamed(entries, name) != nullptr) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("{} is '{}', but must be one of: {}", field, name, NamesOf(entries)));
+}
+
+template <class Entry>
+Status CheckOpenName(std::string_view field, std::string_view name, const std::vector<Entry>& entries) {
+  if (name == kAutomatic || FindNamed(entries, name) != nullptr) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("{} is '{}', but must be one of: {}, {}", field, name, kAutomatic, NamesOf(entries)));
+}
+
+}  // namespace
+
+Status CheckNames(const Policy& policy) {
+  if (Status s = CheckOpenName("policy.decomposition", policy.decomposition, Decompositions()); !s.ok()) return s;
+  if (Status s = CheckName("policy.split", policy.split, WorkSplits()); !s.ok()) return s;
+  if (Status s = CheckOpenName("policy.assignment", policy.assignment, Assignments()); !s.ok()) return s;
+  if (Status s = CheckName("policy.balance", policy.balance, BalanceModes()); !s.ok()) return s;
+  if (policy.combine == kAutomatic) return Status::Ok();
+  if (const auto scheme = ParseCombining(policy.combine); !scheme.ok()) {
+    return Status::InvalidArgument("policy.combine " + scheme.status().message());
+  }
+  return Status::Ok();
+}
+
+Policy SettledPolicy(const FrameRequest& request, const VolumeGeometry& geometry) {
+  Policy policy = request.policy;
+  if (policy.axis == AxisChoice::kView) policy.axis = AxisChoice(MakeCamera(request.view, request.size, geometry).traversal_axis);
+  return policy;
+}
+
+Result<ResolvedPolicy> ResolvePolicy(const FrameRequest& request, const VolumeGeometry& geometry) {
+  const Policy policy = SettledPolicy(request, geometry);
+  if (Status status = CheckNames(policy); !status.ok()) return status;
+  if (LeavesChoice(policy)) {
+    return Status::InvalidArgument("policy: 'auto' leaves a choice, which must be made before a frame is planned");
+  }
+  ResolvedPolicy resolved;
+  resolved.decomposition = FindNamed(Decompositions(), policy.decomposition);
+  resolved.split = FindWorkSplit(SplitOf(policy)).value();
+  resolved.axis = SlabAxis(policy.axis, *resolved.decomposition, geometry.size);
+  resolved.groups = policy.groups;
+  resolved.assignment = FindNamed(Assignments(), policy.assignment);
+  resolved.dynamic_balance = policy.balance == kDynamicBalance;
+  resolved.combine = policy.combine;
+  resolved.pixel_error = policy.pixel_error;
+  resolved.teams = policy.teams;
+  return resolved;
+}
+
+Policy AskFor(const ResolvedPolicy& policy) {
+  return {.decomposition = std::string(policy.decomposition->name),
+          .split = std::string(NameOf(policy.split)),
+          .axis = AxisChoice(policy.axis),
+          .groups = policy.groups,
+          .assignment = std::string(policy.assignment->name),
+          .balance = std::string(policy.dynamic_balance ? kDynamicBalance : kStaticBalance),
+          .combine = policy.combine,
+          .pixel_error = policy.pixel_error,
+          .teams = policy.teams};
+}
+
+Axis SlabAxis(AxisChoice choice, const DecompositionEntry& decomposition, const Index3& size) {
+  CHECK(choice != AxisChoice::kView);
+  if (choice != AxisChoice::kAuto) return Axis(choice);
+  // z, about which views turn: slabs one above the other hide little of each other from most sides, so none of them is rendered in vain.
+  Axis longest = Axis::kZ;
+  if (!decomposition.one_axis) return longest;
+  for (Axis axis : {Axis::kY, Axis::kX}) {
+    if (size[axis] > 2 * size.z && size[axis] > size[longest]) longest = axis;
+  }
+  return longest;
+}
+
+std::string_view SplitOf(const Policy& policy) {
+  if (policy.split != kAutomatic || policy.decomposition == kAutomatic) return policy.split;
+  return FindNamed(Decompositions(), policy.decomposition)->split;
+}
+
+bool NeedsOccupancy(const Policy& policy) {
+  if (policy.decomposition == kAutomatic || policy.assignment == kAutomatic) return true;
+  return FindWorkSplit(SplitOf(policy)) != WorkSplit::kVoxels || FindNamed(Assignments(), policy.assignment)->by_cost ||
+         policy.balance == kDynamicBalance;
+}
+
+bool NeedsOccupancy(const ResolvedPolicy& policy) {
+  return policy.split != WorkSplit::kVoxels || policy.assignment->by_cost || policy.dynamic_balance;
+}
+
+}  // namespace slabstream

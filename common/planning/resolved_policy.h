@@ -1,0 +1,54 @@
+// ResolvedPolicy: how a frame is made, with nothing left open. A Policy is what a client asks for: its names may be "auto", and its axis
+// may depend on the view. Names are looked up once, here; whoever plans works with entries of the lists.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "common/base/status.h"
+#include "common/decomposition/decomposition.h"
+#include "common/planning/assignment.h"
+#include "common/frame/frame_request.h"
+#include "common/planning/policy_names.h"
+#include "common/volume/volume.h"
+
+namespace slabstream {
+
+struct ResolvedPolicy {
+  const DecompositionEntry* decomposition = nullptr;  // of Decompositions(), never null
+  WorkSplit split = WorkSplit::kVoxels;
+  Axis axis = Axis::kZ;                         // that is cut, or cut first
+  int groups = 0;                               // [1, kMaxGroups]; 0: the fewest that memory allows (LayoutMaker::FewestGroups)
+  const AssignmentEntry* assignment = nullptr;  // of Assignments(), never null
+  bool dynamic_balance = false;                 // boxes may change between frames
+  std::string combine;                          // ParseCombining takes it
+  double pixel_error = 0;                       // as in Policy
+  int teams = 1;                                // as in Policy
+  friend bool operator==(const ResolvedPolicy&, const ResolvedPolicy&) = default;
+};
+
+// InvalidArgument: a name that is in no list (CheckNames), or one that is left open (LeavesChoice). The request must be valid.
+Result<ResolvedPolicy> ResolvePolicy(const FrameRequest& request, const VolumeGeometry& geometry);
+
+// The policy that asks for exactly this.
+Policy AskFor(const ResolvedPolicy& policy);
+
+// InvalidArgument that says which names there are, if a name of the policy is in no list and not kAutomatic.
+Status CheckNames(const Policy& policy);
+
+// The request's policy with an axis that no longer depends on the view (AxisChoice::kView). The request must be valid.
+Policy SettledPolicy(const FrameRequest& request, const VolumeGeometry& geometry);
+
+// The axis that is cut, or cut first: "auto" is z, but for slabs another axis that has more than twice as many slices. `choice` is not
+// kView.
+Axis SlabAxis(AxisChoice choice, const DecompositionEntry& decomposition, const Index3& size);
+
+// What `split` of the policy comes to: "auto" is what suits the decomposition, and stays "auto" while that is open. Its names must be
+// known.
+std::string_view SplitOf(const Policy& policy);
+
+// Whether the layout of a policy, or the choice of it, is better for an exact OccupancyGrid. Its names must be known.
+bool NeedsOccupancy(const Policy& policy);
+bool NeedsOccupancy(const ResolvedPolicy& policy);
+
+}  // namespace slabstream
