@@ -9,7 +9,7 @@
 #include "client/cli/bench_report.h"
 #include "client/cli/bench_run.h"
 #include "client/cli/commands.h"
-#include "client/cli/files.h"
+#include "common/base/files.h"
 
 namespace slabstream {
 namespace {
@@ -51,7 +51,7 @@ Status MakeDirectory(const std::string& option, const std::string& path) {
 
 Status PrepareOutputs(const BenchOptions& options) {
   if (!options.json_path.empty()) {
-    if (Status status = CheckOutputDirectory("--json", options.json_path); !status.ok()) return status;
+    if (Status status = CheckCanWrite("--json", options.json_path); !status.ok()) return status;
   }
   if (Status status = MakeDirectory("--pictures", options.pictures_directory); !status.ok()) return status;
   return MakeDirectory("--export", options.export_directory);

@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "client/cli/files.h"
+#include "common/base/files.h"
 #include "common/volume_io/volume_reader.h"
 
 namespace slabstream {

@@ -14,7 +14,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/cores.h"
-#include "client/cli/files.h"
+#include "common/base/files.h"
 #include "client/cli/option_groups.h"
 #include "laboratory/experiments/run_experiment.h"
 #include "laboratory/measure/replay.h"

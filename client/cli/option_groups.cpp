@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "client/cli/cores.h"
-#include "client/cli/files.h"
+#include "common/base/files.h"
 #include "common/combining/schemes.h"
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"

@@ -9,7 +9,7 @@
 #include <iostream>
 
 #include "client/cli/bench_machine.h"
-#include "client/cli/files.h"
+#include "common/base/files.h"
 #include "client/cli/interrupt.h"
 #include "laboratory/experiments/sweep_file.h"
 #include "commit.h"

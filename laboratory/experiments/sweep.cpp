@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "client/cli/files.h"
+#include "common/base/files.h"
 #include "laboratory/experiments/balanced_case.h"
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/figures.h"

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/end_to_end/program.h"
+#include "tests/support/full_disk.h"
 
 namespace slabstream {
 namespace {
@@ -48,6 +49,18 @@ TEST_F(VolumeToolsTest, SpheresAreDeterministicInEveryFormat) {
     MakeSphere(name, 1, 33);
     const json info = Info(name);
     for (const char* field : {"size", "type", "range", "histogram", "occupancy"}) EXPECT_EQ(info[field], reference[field]) << name;
+  }
+}
+
+TEST_F(VolumeToolsTest, AFullDiskKeepsTheOlderVolume) {
+  for (const std::string name : {"s.nrrd", "s.mha", "s.mhd"}) {
+    MakeSphere(name, 2, 20);
+    const json before = Info(name);
+    const ProgramResult result = OnFullDisk(100, [&] { return Slabstream({"sphere", "--class", "2", "--size", "30", "-o", name}); });
+    EXPECT_EQ(result.exit_status, 1) << name;
+    EXPECT_EQ(result.out, "");
+    EXPECT_THAT(result.err, HasSubstr("File too large"));
+    EXPECT_EQ(Info(name), before);
   }
 }
 
