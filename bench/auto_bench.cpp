@@ -1,8 +1,8 @@
 // What `auto` chooses and how good that is. For volumes given on the command line ("sphere1:300" is the paper's class-I sphere with N =
 // 300; FILE@PRESET names a transfer function), a view and a number of workers:
 //
-//   simulated   every box of every candidate's partition is rendered alone on one thread (laboratory/measure); frames are simulated from these
-//   costs
+//   simulated   every box of every candidate's partition is rendered alone on one thread (laboratory/measure); frames are simulated from
+//   these costs
 //               on the machine that the choice was made for. Printed: the policy that holds where nothing is chosen, what ChoosePolicy
 //               takes before anything is known and once costs are learnt, the best of all candidates, and how long choosing took
 //   --service   frames of a turning volume by the embedded service, the fixed policy and `auto` in turn: medians, and what was predicted
@@ -19,8 +19,6 @@
 #include "client/cli/frame_summary.h"
 #include "client/client.h"
 #include "client/embedded/embedded_service.h"
-#include "laboratory/measure/frame_costs.h"
-#include "laboratory/measure/thread_time.h"
 #include "common/classification/count_occupied.h"
 #include "common/combining/schemes.h"
 #include "common/decomposition/decomposition.h"
@@ -34,6 +32,9 @@
 #include "common/tuning/service_machine.h"
 #include "common/volume/sphere.h"
 #include "common/volume_io/volume_reader.h"
+#include "laboratory/measure/frame_costs.h"
+#include "laboratory/measure/statistics.h"
+#include "laboratory/measure/thread_time.h"
 
 namespace slabstream {
 namespace {
@@ -225,7 +226,7 @@ void Simulate(const Options& options, const Subject& subject, int workers) {
   fmt::print("  {:22} {:7.2f} ms  {}\n", "best of all", best.first * 1e3, Text(best.second));
 }
 
-double Median(std::vector<double> values) { return values.empty() ? 0 : UpperMedian(std::move(values)); }
+double Median(std::vector<double> values) { return MedianOf(std::move(values)).median; }
 
 void Serve(const Options& options, const Subject& subject, int workers) {
   Context context;

@@ -1,7 +1,7 @@
-// How even partitions are: every box of each is rendered alone on one thread (laboratory/measure/box_costs.h), the boxes of a slot are added up,
-// and the slot with most to do is compared with the mean, in views all round. Then the same in each view after some frames of dynamic
-// balance. For volumes given on the command line; "sphere1:300" is the paper's class-I sphere with N = 300. --stealing simulates frames of
-// both kinds of layout, and what work stealing could win at most.
+// How even partitions are: every box of each is rendered alone on one thread (laboratory/measure/box_costs.h), the boxes of a slot are
+// added up, and the slot with most to do is compared with the mean, in views all round. Then the same in each view after some frames of
+// dynamic balance. For volumes given on the command line; "sphere1:300" is the paper's class-I sphere with N = 300. --stealing simulates
+// frames of both kinds of layout, and what work stealing could win at most.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -11,7 +11,6 @@
 #include <string>
 #include <vector>
 
-#include "laboratory/measure/box_costs.h"
 #include "common/classification/count_occupied.h"
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
@@ -22,6 +21,8 @@
 #include "common/simulation/simulate_frames.h"
 #include "common/volume/sphere.h"
 #include "common/volume_io/volume_reader.h"
+#include "laboratory/measure/box_costs.h"
+#include "laboratory/measure/statistics.h"
 
 namespace slabstream {
 namespace {
@@ -95,11 +96,7 @@ Measured Measure(const Options& options, const Volume& volume, const FrameSetup&
 // Over views: median, least and largest.
 struct Spread {
   std::vector<double> values;
-  double median() const {
-    std::vector<double> sorted = values;
-    std::ranges::sort(sorted);
-    return (sorted[(sorted.size() - 1) / 2] + sorted[sorted.size() / 2]) / 2;
-  }
+  double median() const { return MedianOf(values).median; }
 };
 
 struct Outcome {

@@ -16,10 +16,6 @@
 #include <string>
 #include <vector>
 
-#include "client/cli/bench_cases.h"
-#include "laboratory/measure/calibrate.h"
-#include "laboratory/measure/combining_costs.h"
-#include "laboratory/measure/frame_costs.h"
 #include "common/base/large_buffers.h"
 #include "common/classification/count_occupied.h"
 #include "common/planning/placement.h"
@@ -27,6 +23,10 @@
 #include "common/planning/team.h"
 #include "common/simulation/simulate_frames.h"
 #include "coordinator/layout_table.h"
+#include "laboratory/bench/bench_cases.h"
+#include "laboratory/measure/calibrate.h"
+#include "laboratory/measure/combining_costs.h"
+#include "laboratory/measure/frame_costs.h"
 
 namespace slabstream {
 namespace {

@@ -3,9 +3,9 @@
 #include <iostream>
 
 #include "client/cli/commands.h"
-#include "common/base/files.h"
 #include "client/cli/report_files.h"
 #include "client/cli/session.h"
+#include "common/base/files.h"
 
 namespace slabstream {
 

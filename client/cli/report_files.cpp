@@ -1,8 +1,8 @@
 #include "client/cli/report_files.h"
 
-#include "common/base/files.h"
 #include "client/cli/stats_json.h"
 #include "client/cli/trace_json.h"
+#include "common/base/files.h"
 
 namespace slabstream {
 

@@ -5,7 +5,7 @@
 #include <set>
 #include <utility>
 
-#include "laboratory/measure/recording.h"
+#include "client/cli/recording.h"
 
 namespace slabstream {
 namespace {

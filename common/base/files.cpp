@@ -127,6 +127,7 @@ Status CheckCanWrite(const std::string& option, const std::string& path) {
   if (!parent.empty() && !fs::is_directory(parent, error)) {
     return Status::NotFound(fmt::format("{} '{}': the directory '{}' does not exist", option, path, parent.string()));
   }
+  if (fs::exists(path, error) && !fs::is_regular_file(path, error)) return Status::Ok();  // opening a pipe would disturb its reader
   const Status status = OutputFile::Create(path).status();
   return status.ok() ? status : Status::InvalidArgument(fmt::format("{}: {}", option, status.message()));
 }

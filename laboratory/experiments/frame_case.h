@@ -1,20 +1,20 @@
-// FrameCase: one way to render one frame. What its boxes cost is measured by rendering each of them alone (laboratory/measure/box_costs.h); what a
-// frame of it takes is measured by the service where this machine has the cores, and simulated from the boxes' costs for any number of
-// workers (common/simulation).
+// FrameCase: one way to render one frame. What its boxes cost is measured by rendering each of them alone (laboratory/measure/box_costs.h);
+// what a frame of it takes is measured by the service where this machine has the cores, and simulated from the boxes' costs for any number
+// of workers (common/simulation).
 #pragma once
 
 #include <array>
 #include <string>
 #include <vector>
 
-#include "client/cli/bench_cases.h"
-#include "laboratory/experiments/experiment.h"
 #include "common/image/coverage_map.h"
 #include "common/planning/cost_model.h"
 #include "common/planning/frame_plan.h"
 #include "common/planning/layout.h"
 #include "common/simulation/simulate_frames.h"
 #include "common/stats/report.h"
+#include "laboratory/bench/bench_cases.h"
+#include "laboratory/experiments/experiment.h"
 
 namespace slabstream {
 
@@ -44,8 +44,8 @@ Json FinishKey(const FrameCase& frame);
 Trial ServiceTrial(ExperimentContext& context, const FrameCase& frame, int frames);
 Json ServiceKey(const FrameCase& frame);
 
-// The same frame by the service and as the simulation says, in turns (laboratory/measure/validate.h), for frame.workers of 1 or 2: "measured_ms"
-// and "simulated_ms".
+// The same frame by the service and as the simulation says, in turns (laboratory/measure/validate.h), for frame.workers of 1 or 2:
+// "measured_ms" and "simulated_ms".
 Trial ValidationTrial(ExperimentContext& context, const FrameCase& frame, int turns);
 Json ValidationKey(const FrameCase& frame);
 

@@ -6,12 +6,13 @@
 #include <thread>
 #include <utility>
 
-#include "laboratory/measure/thread_time.h"
 #include "common/base/check.h"
 #include "common/base/time.h"
 #include "common/image/run_image.h"
 #include "common/wire/payload.h"
 #include "coordinator/clients.h"
+#include "laboratory/measure/statistics.h"
+#include "laboratory/measure/thread_time.h"
 #include "worker/render/finish_picture.h"
 #include "worker/render/pipeline.h"
 
@@ -93,7 +94,7 @@ PictureCost MeasurePictureCost(const Volume& volume, const FrameSetup& setup, in
     finish_seconds.push_back(cost.finish_seconds);
     receive_seconds.push_back(cost.receive_seconds);
   }
-  return {.finish_seconds = UpperMedian(std::move(finish_seconds)), .receive_seconds = UpperMedian(std::move(receive_seconds))};
+  return {.finish_seconds = MedianOf(std::move(finish_seconds)).median, .receive_seconds = MedianOf(std::move(receive_seconds)).median};
 }
 
 FrameCosts MeasureFrameCosts(const Volume& volume, const FramePlan& plan, int repeats) {

@@ -4,8 +4,8 @@
 
 #include <atomic>
 
-#include "laboratory/measure/thread_time.h"
 #include "common/base/time.h"
+#include "laboratory/measure/thread_time.h"
 
 namespace slabstream {
 

@@ -11,12 +11,12 @@
 #include <sstream>
 #include <utility>
 
-#include "laboratory/measure/calibrate.h"
-#include "laboratory/measure/combining_costs.h"
 #include "common/combining/schemes.h"
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
 #include "common/simulation/simulate_frames.h"
+#include "laboratory/measure/calibrate.h"
+#include "laboratory/measure/combining_costs.h"
 
 namespace slabstream {
 namespace {

@@ -14,11 +14,11 @@
 #include <string>
 #include <vector>
 
-#include "laboratory/measure/hand_over_fit.h"
 #include "common/base/status.h"
 #include "common/planning/frame_request.h"
 #include "common/simulation/machine_model.h"
 #include "common/volume/volume.h"
+#include "laboratory/measure/hand_over_fit.h"
 
 namespace slabstream {
 

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "tests/end_to_end/program.h"
 #include "tests/support/full_disk.h"
@@ -75,6 +76,34 @@ TEST_F(VolumeToolsTest, InfoIsReadable) {
 TEST_F(VolumeToolsTest, HelpNamesWhatCanBeChosen) {
   const std::string text = MustRun({"render", "--help"}).out;
   for (const char* part : {"--local", "--transfer", "auto", "opaque", "slab", "fan-in", "--azimuth"}) EXPECT_THAT(text, HasSubstr(part));
+  EXPECT_EQ(MustRun({"help", "render"}).out, text);
+  EXPECT_EQ(MustRun({"help"}).out, MustRun({"--help"}).out);
+  EXPECT_THAT(MustRun({"help", "experiment", "replay"}).out, HasSubstr("--with KEY=VALUE"));
+  EXPECT_EQ(Slabstream({"help", "rendr"}).exit_status, 2);
+}
+
+TEST_F(VolumeToolsTest, HelpExplainsEveryOptionInWords) {
+  for (const char* command : {"render", "turntable", "info", "sphere", "up", "down", "status", "bench", "experiment", "help"}) {
+    const std::string text = MustRun({command, "--help"}).out;
+    for (const char* notation : {"REQUIRED", "{", "}", ":{", " x ", "Needs:", "Excludes:", "=36"}) {
+      EXPECT_THAT(text, testing::Not(HasSubstr(notation))) << command;
+    }
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);) {
+      // An option that stands alone has its text on the next line; that line is indented.
+      if (line.rfind("  -", 0) != 0 || line.size() > 34) continue;
+      ASSERT_TRUE(std::getline(lines, line)) << command;
+      EXPECT_EQ(line.rfind(std::string(30, ' '), 0), 0U) << command << ": no text before '" << line << "'";
+    }
+  }
+  const std::string text = MustRun({"turntable", "--help"}).out;
+  for (const char* heading : {"View:", "Look:", "Distribution", "Output:", "(required)", "(default: 512)"})
+    EXPECT_THAT(text, HasSubstr(heading));
+  for (const char* old : {"--split", "--teams"}) EXPECT_THAT(text, testing::Not(HasSubstr(old)));
+}
+
+TEST_F(VolumeToolsTest, EveryProgramTellsItsVersion) {
+  EXPECT_THAT(MustRun({"--version"}).out, testing::MatchesRegex("slabstream [0-9]+\\.[0-9]+\\.[0-9]+\n"));
 }
 
 }  // namespace

@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "laboratory/measure/plan_renderings.h"
 #include "common/planning/placement.h"
+#include "laboratory/measure/plan_renderings.h"
 #include "tests/render/render_support.h"
 
 namespace slabstream {

@@ -5,8 +5,8 @@
 
 #include "laboratory/experiments/paper/measures.h"
 #include "laboratory/experiments/paper/printed.h"
+#include "laboratory/measure/cost_fit.h"
 #include "laboratory/report/text.h"
-#include "common/simulation/cost_fit.h"
 
 namespace slabstream {
 namespace {

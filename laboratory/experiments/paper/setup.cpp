@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <numbers>
 
-#include "client/cli/bench_machine.h"
+#include "laboratory/bench/bench_machine.h"
 #include "laboratory/experiments/machines.h"
 #include "laboratory/experiments/paper/printed.h"
 

@@ -1,4 +1,4 @@
-#include "client/cli/bench_export.h"
+#include "laboratory/bench/bench_export.h"
 
 #include <nlohmann/json.hpp>
 
