@@ -33,6 +33,7 @@
 #include "common/volume/sphere.h"
 #include "common/volume_io/volume_reader.h"
 #include "laboratory/measure/frame_costs.h"
+#include "laboratory/measure/statistics.h"
 #include "laboratory/measure/thread_time.h"
 
 namespace slabstream {
@@ -226,7 +227,7 @@ void Simulate(const Options& options, const Subject& subject, int workers) {
   fmt::print("  {:22} {:7.2f} ms  {}\n", "best of all", best.first * 1e3, Text(best.second));
 }
 
-double Median(std::vector<double> values) { return values.empty() ? 0 : UpperMedian(std::move(values)); }
+double Median(std::vector<double> values) { return MedianOf(std::move(values)).median; }
 
 void Serve(const Options& options, const Subject& subject, int workers) {
   Context context;

@@ -22,6 +22,7 @@
 #include "common/volume/sphere.h"
 #include "common/volume_io/volume_reader.h"
 #include "laboratory/measure/box_costs.h"
+#include "laboratory/measure/statistics.h"
 
 namespace slabstream {
 namespace {
@@ -99,11 +100,7 @@ Measured Measure(const Options& options, const Volume& volume, const FrameSetup&
 // Over views: median, least and largest.
 struct Spread {
   std::vector<double> values;
-  double median() const {
-    std::vector<double> sorted = values;
-    std::ranges::sort(sorted);
-    return (sorted[(sorted.size() - 1) / 2] + sorted[sorted.size() / 2]) / 2;
-  }
+  double median() const { return MedianOf(values).median; }
 };
 
 struct Outcome {

@@ -31,7 +31,6 @@
 #include <csignal>
 #include <cstdio>
 #include <ctime>
-#include <filesystem>
 #include <string>
 #include <thread>
 #include <vector>
@@ -43,6 +42,8 @@
 #include "common/transport/socket.h"
 #include "common/wire/any_message.h"
 #include "common/wire/payload.h"
+#include "laboratory/measure/statistics.h"
+#include "tests/support/temporary_directory.h"
 #include "worker/service.h"
 
 namespace slabstream {
@@ -161,11 +162,6 @@ struct Times {
   std::vector<double> combined, reported;  // milliseconds
   double processor = 0;                    // milliseconds a frame, of all workers
 };
-
-double Quantile(std::vector<double> values, double q) {
-  std::ranges::sort(values);
-  return values[std::size_t(std::lround(q * double(values.size() - 1)))];
-}
 
 // Plays the coordinator of one case's workers.
 class Coordinator {
@@ -297,8 +293,8 @@ class Coordinator {
 
 // In a process of its own: workers are forked before it has any thread.
 void RunCase(const Case& config, const std::vector<std::string>& schemes, int repeats) {
-  std::string directory = (std::filesystem::temp_directory_path() / "combining_bench_XXXXXX").string();
-  CHECK(::mkdtemp(directory.data()) != nullptr);
+  const TemporaryDirectory temporary;
+  const std::string directory = temporary.path();
   void* const memory = ::mmap(nullptr, sizeof(Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   CHECK(memory != MAP_FAILED);
   Shared& shared = *new (memory) Shared{};
@@ -325,7 +321,6 @@ void RunCase(const Case& config, const std::vector<std::string>& schemes, int re
   }
   for (const pid_t worker : workers) ::kill(worker, SIGKILL);
   for (const pid_t worker : workers) ::waitpid(worker, nullptr, 0);
-  std::filesystem::remove_all(directory);
 }
 
 // As memory that is kept from frame to frame.

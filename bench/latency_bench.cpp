@@ -14,7 +14,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdlib>
-#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -26,6 +25,8 @@
 #include "common/base/large_buffers.h"
 #include "common/volume/sphere.h"
 #include "common/volume_io/volume_reader.h"
+#include "laboratory/measure/statistics.h"
+#include "tests/support/temporary_directory.h"
 
 namespace slabstream {
 namespace {
@@ -77,11 +78,6 @@ void Measure(Client& client, const BenchOptions& options, Measured& measured) {
     measured.before.push_back(milliseconds(begin_ns - submit_ns));
     measured.beside.push_back(milliseconds(picture->latency.count() - (end_ns - begin_ns) - finish_ns));
   }
-}
-
-double Quantile(std::vector<double> values, double share) {
-  std::sort(values.begin(), values.end());
-  return values[std::min(values.size() - 1, std::size_t(share * double(values.size())))];
 }
 
 void PrintHead() {
@@ -138,8 +134,8 @@ void MeasureEmbedded(const BenchOptions& options, const std::shared_ptr<const Vo
 }
 
 int Run(const BenchOptions& options) {
-  std::string directory = std::filesystem::temp_directory_path() / "slabstream-latency-XXXXXX";
-  CHECK(::mkdtemp(directory.data()) != nullptr) << directory;
+  const TemporaryDirectory temporary;
+  const std::string directory = temporary.path();
   const auto sphere = std::make_shared<const Volume>(MakeSphere({.sphere_class = SphereClass::kHollow, .size = options.volume}).value());
   CHECK(WriteVolume(*sphere, directory + "/sphere.mha").ok());
   fmt::print("sphere {0}^3, {1}x{1}, zoom {2}, {3}, {4} workers of {5} threads, {6} frames\n", options.volume, options.size, options.zoom,
@@ -158,7 +154,6 @@ int Run(const BenchOptions& options) {
     MeasureEmbedded(options, sphere, 1, options.workers * options.threads, embedded_one);
     PrintRow("embedded, 1", embedded_one);
   }
-  std::filesystem::remove_all(directory);
   return 0;
 }
 

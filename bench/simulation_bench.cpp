@@ -1,5 +1,5 @@
 // How far the simulation can be trusted: frames of the embedded service with one and two workers beside what is simulated of them
-// (laboratory/measure/validate.h), and the cost model fitted to boxes of all sizes (common/simulation/cost_fit.h).
+// (laboratory/measure/validate.h), and the cost model fitted to boxes of all sizes (laboratory/measure/cost_fit.h).
 //
 //   build/bin/simulation_bench CASE... [--size PIXELS_A_SIDE] [--views N] [--turns N] [--renderer splat|zbuffer] [--fit [--repeats N]]
 //
@@ -10,13 +10,13 @@
 #include <string>
 #include <vector>
 
-#include "client/cli/bench_cases.h"
 #include "common/base/check.h"
 #include "common/base/large_buffers.h"
 #include "common/planning/placement.h"
 #include "common/renderers/registry.h"
-#include "common/simulation/cost_fit.h"
+#include "laboratory/bench/bench_cases.h"
 #include "laboratory/measure/calibrate.h"
+#include "laboratory/measure/cost_fit.h"
 #include "laboratory/measure/frame_costs.h"
 #include "laboratory/measure/validate.h"
 

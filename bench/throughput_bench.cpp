@@ -16,7 +16,6 @@
 #include <string>
 #include <vector>
 
-#include "client/cli/bench_cases.h"
 #include "common/base/large_buffers.h"
 #include "common/classification/count_occupied.h"
 #include "common/planning/placement.h"
@@ -25,6 +24,7 @@
 #include "common/renderers/registry.h"
 #include "common/simulation/simulate_frames.h"
 #include "coordinator/layout_table.h"
+#include "laboratory/bench/bench_cases.h"
 #include "laboratory/measure/calibrate.h"
 #include "laboratory/measure/combining_costs.h"
 #include "laboratory/measure/frame_costs.h"

@@ -5,12 +5,13 @@
 #include "client/cli/command_line.h"
 #include "common/base/background_tasks.h"
 #include "common/base/large_buffers.h"
+#include "laboratory/cli/laboratory_commands.h"
 
 int main(int argc, char** argv) {
   slabstream::KeepFrameBuffers();
   int exit_status = 1;
   try {
-    exit_status = slabstream::RunCommandLine(argc, argv);
+    return slabstream::RunCommandLine(argc, argv, slabstream::LaboratoryCommands());
   } catch (const std::exception& error) {  // out of memory, mostly: everything that is expected comes back as a Status
     std::cerr << "slabstream: " << error.what() << "\n";
   }

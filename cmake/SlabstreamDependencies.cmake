@@ -17,9 +17,6 @@ pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
 # OpenImageIO's own CMake configuration wants its command-line tools and an OpenCV include directory; its pkg-config file does not.
 pkg_check_modules(OIIO REQUIRED IMPORTED_TARGET OpenImageIO)
 
-# ITK defines targets and include directories globally through its "use file"; take just the modules that read and write volumes.
-find_package(ITK 5 REQUIRED COMPONENTS ITKCommon ITKIOImageBase ITKIONIFTI ITKIONRRD ITKIOMeta)
-
 if(SLABSTREAM_TESTS)
   find_package(GTest CONFIG REQUIRED)
   include(GoogleTest)

@@ -1,3 +1,14 @@
+# Compile through ccache where it is installed. If its folder cannot be written, as with an unwritable HOME, use one in the build folder.
+find_program(SLABSTREAM_CCACHE ccache)
+if(SLABSTREAM_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  execute_process(COMMAND ${SLABSTREAM_CCACHE} --get-config cache_dir OUTPUT_VARIABLE folder OUTPUT_STRIP_TRAILING_WHITESPACE)
+  execute_process(COMMAND sh -c "mkdir -p \"$0\" && test -w \"$0\"" "${folder}" RESULT_VARIABLE failure ERROR_QUIET)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${SLABSTREAM_CCACHE})
+  if(failure)
+    set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_DIR=${CMAKE_BINARY_DIR}/ccache ${SLABSTREAM_CCACHE})
+  endif()
+endif()
+
 # One target a folder. Warnings, optimisation and sanitizers come with the interface target below, never from global flags.
 
 add_library(slabstream_options INTERFACE)

@@ -10,6 +10,7 @@
 #include "common/base/large_buffers.h"
 #include "common/base/log.h"
 #include "common/base/stop_signals.h"
+#include "common/base/version.h"
 #include "common/transport/socket.h"
 #include "coordinator/catalogue.h"
 #include "coordinator/service.h"
@@ -31,6 +32,7 @@ int Run(int argc, char** argv) {
   std::string log_level = "warning";
 
   CLI::App app("Slabstream coordinator: takes requests from clients, plans frames and streams slabs to workers.");
+  app.set_version_flag("--version", std::string(slabstream::Version()));
   app.add_option("--listen", options.client_endpoint, "for clients (default tcp://127.0.0.1:7420; port * is any)");
   app.add_option("--worker-listen", options.worker_endpoint, "for workers (default: the next port, or the path with .workers)");
   app.add_option("--slabs-listen", options.slabs_endpoint, "for voxels (default: any port, or the path with .slabs)");
@@ -44,8 +46,8 @@ int Run(int argc, char** argv) {
   app.add_option("--log-level", log_level, "debug, info, warning, error or off")->check(CLI::IsMember(slabstream::LogLevelNames()));
   try {
     app.parse(argc, argv);
-  } catch (const CLI::CallForHelp& help) {
-    return app.exit(help);
+  } catch (const CLI::Success& asked) {  // --help, --version
+    return app.exit(asked);
   } catch (const CLI::ParseError& error) {
     return Fail(slabstream::Status::InvalidArgument(error.what()));
   }

@@ -9,17 +9,18 @@ fail() {
   exit 1
 }
 
-# Names of the packages in deploy/packages that are not installed.
+# Names of the packages in deploy/packages that are not installed. Arguments: the first words of the lines that count.
 missing_packages() {
   local wanted installed
-  wanted="$(awk '!/^ *#/ && NF { print $2 }' "$repository/deploy/packages" | sort)"
+  wanted="$(awk -v words=" $* " '!/^ *#/ && NF && index(words, " " $1 " ") { print $2 }' "$repository/deploy/packages" | sort)"
   installed="$(dpkg-query -W -f='${Package} ${db:Status-Status}\n' 2>/dev/null | awk '$2 == "installed" { print $1 }' | sort -u)"
   comm -23 <(printf '%s\n' "$wanted") <(printf '%s\n' "$installed")
 }
 
+# Arguments: further first words of lines of deploy/packages beside the usual ones.
 install_packages() {
   local missing as_root=()
-  missing="$(missing_packages)"
+  missing="$(missing_packages run build test demo "$@")"
   if [[ -z "$missing" ]]; then
     say "Debian packages: all installed"
     return

@@ -9,6 +9,7 @@
 #include "common/base/large_buffers.h"
 #include "common/base/log.h"
 #include "common/base/stop_signals.h"
+#include "common/base/version.h"
 #include "common/kernels/simd_target.h"
 #include "common/transport/socket.h"
 #include "worker/service.h"
@@ -29,6 +30,7 @@ int Run(int argc, char** argv) {
   std::string log_level = "warning";
 
   CLI::App app("Slabstream worker: renders slabs and combines images for a coordinator.");
+  app.set_version_flag("--version", std::string(slabstream::Version()));
   app.add_option("--coordinator", options.coordinator_endpoint, "the coordinator's endpoint for workers, such as tcp://127.0.0.1:7421")
       ->required();
   app.add_option("--listen", options.images_endpoint, "where other workers send partial images (default: any port beside the coordinator)");
@@ -44,8 +46,8 @@ int Run(int argc, char** argv) {
   app.add_option("--log-level", log_level, "debug, info, warning, error or off")->check(CLI::IsMember(slabstream::LogLevelNames()));
   try {
     app.parse(argc, argv);
-  } catch (const CLI::CallForHelp& help) {
-    return app.exit(help);
+  } catch (const CLI::Success& asked) {  // --help, --version
+    return app.exit(asked);
   } catch (const CLI::ParseError& error) {
     return Fail(2, error.what());
   }

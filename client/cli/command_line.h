@@ -1,10 +1,30 @@
-// From argv to a subcommand and its exit status. The names of options are stable: scripts rely on them.
+// From argv to a command and its exit status. The names of options are stable: scripts rely on them.
 #pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+
+#include "common/base/status.h"
+
+namespace CLI {
+class App;
+}
 
 namespace slabstream {
 
-// 0: done. 1: the service or the frame failed. 2: bad arguments or input. 130: stopped by Ctrl-C. Unless 0 exactly one line on stderr says
-// why: "slabstream render: --zoom 0 is out of range [0.001, 10000]".
-int RunCommandLine(int argc, const char* const* argv);
+// Where a command declares itself.
+struct CommandLine {
+  CLI::App& app;                 // gets a subcommand with its options
+  std::function<Status()>& run;  // set by the subcommand's callback: what runs after the parse
+  const std::string& typed;      // the whole command line
+};
+
+// Declares one command. The values of its options must live as long as its callbacks, which may own them.
+using DeclareCommand = void (*)(const CommandLine& line);
+
+// Runs one of the client's commands or of `more`. 0: done. 1: the service or the frame failed. 2: bad arguments or input. 130: stopped by
+// Ctrl-C. Unless 0 exactly one line on stderr says why: "slabstream render: --zoom 0 is out of range [0.001, 10000]".
+int RunCommandLine(int argc, const char* const* argv, std::span<const DeclareCommand> more);
 
 }  // namespace slabstream

@@ -1,15 +1,19 @@
-// The subcommands of `slabstream`, one source file each. A command prints its results on stdout; what it returns is told on stderr in one
-// line by the caller, which also makes the exit status of it (see command_line.h).
+// The client's commands, one source file each; client_commands.cpp declares their options. A command prints its results on stdout. What it
+// returns is reported on stderr in one line by the caller, which also makes the exit status from it (command_line.h).
 #pragma once
 
+#include <span>
+
+#include "client/cli/command_line.h"
 #include "client/cli/options.h"
 #include "common/base/status.h"
 
 namespace slabstream {
 
+std::span<const DeclareCommand> ClientCommands();
+
 Status RunRender(const RenderOptions& options);
 Status RunTurntable(const TurntableOptions& options);
-Status RunBench(const BenchOptions& options);
 Status RunInfo(const InfoOptions& options);
 Status RunSphere(const SphereOptions& options);
 Status RunUp(const UpOptions& options);

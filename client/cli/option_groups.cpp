@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "client/cli/cores.h"
-#include "client/cli/files.h"
+#include "client/cli/volume_argument.h"
 #include "common/combining/schemes.h"
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
@@ -19,8 +19,6 @@
 
 namespace slabstream {
 namespace {
-
-constexpr std::size_t kMaxTransferFileBytes = std::size_t{16} << 20;
 
 constexpr char kLeftToThePlanner[] = "what should be fastest for this volume, view and service";
 
@@ -44,7 +42,7 @@ CLI::Option* AddNamed(CLI::App& app, const std::string& name, T& target, const E
     if (!index.ok()) return index.status();
     return value;
   };
-  return AddParsed(app, name, target, parse, text)->type_name(fmt::format("{{{}}}", fmt::join(names, ",")));
+  return AddParsed(app, name, target, parse, text)->type_name("NAME")->default_str(target);
 }
 
 // An option that takes one of `names`, which stand for `values`.
@@ -56,7 +54,7 @@ CLI::Option* AddChoice(CLI::App& app, const std::string& name, T& target, const 
     if (!index.ok()) return index.status();
     return values[*index];
   };
-  return AddParsed(app, name, target, parse, help)->type_name(fmt::format("{}", fmt::join(names, "|")));
+  return AddParsed(app, name, target, parse, help)->type_name("NAME");
 }
 
 // --renderer, and an option for each parameter that a renderer has. Whether the chosen renderer has it is checked with the request.
@@ -91,7 +89,7 @@ void AddRendererOptions(CLI::App& app, FrameRequest& request) {
 }
 
 void AddCombining(CLI::App& app, std::string& target) {
-  std::string text = fmt::format("How partial images become one\n  {}: {}", kAutomatic, kLeftToThePlanner);
+  std::string text = fmt::format("How workers combine their partial images\n  {}: {}", kAutomatic, kLeftToThePlanner);
   for (const CombiningEntry& entry : CombiningSchemes()) {
     text += fmt::format("\n  {}{}{}: {}", entry.name, entry.arguments.empty() ? "" : ":", entry.arguments, entry.purpose);
   }
@@ -105,40 +103,45 @@ void AddCombining(CLI::App& app, std::string& target) {
 }
 
 void AddConnectionOptions(CLI::App& app, ConnectionOptions& connection) {
-  // Takes its value with `=` only, so that a SOURCE after a bare --local stays the source. CLI11 hands over "true" for the bare form.
-  const auto parse = [](const std::string& option, const std::string& text) -> Result<int> {
-    if (text == "true") return std::min(CoreCount(), kMaxLocalWorkers);
-    return ParseInteger(option, text, 1, kMaxLocalWorkers);
-  };
-  CLI::Option* local =
-      AddParsed(app, "--local", connection.local_workers, parse,
-                fmt::format("Render the file SOURCE in this process; --local=N: by N workers (default: one a core, {} here)", CoreCount()))
-          ->expected(0);
+  app.option_defaults()->group("Service");
+  const std::string every_core = std::to_string(std::min(CoreCount(), kMaxLocalWorkers));
+  const auto parse = [](const std::string& option, const std::string& text) { return ParseInteger(option, text, 1, kMaxLocalWorkers); };
+  CLI::Option* local = AddOptionalValue(app, "--local", connection.local_workers, every_core, parse,
+                                        fmt::format("Render the file SOURCE in this process, by N workers, or by one a core ({} here) if N "
+                                                    "is left out; needs no service",
+                                                    every_core))
+                           ->type_name("[N]");
   AddThreads(app, connection.local_threads, "Render threads of each worker of --local")->needs(local);
   AddEndpoint(app, connection.endpoint);
 }
 
 void AddViewOptions(CLI::App& app, ViewParameters& view, ImageSize& size) {
+  app.option_defaults()->group("View");
   const NumberRange angle{-kMaxAngleDegrees, kMaxAngleDegrees};
   AddParsed(
       app, "--size", size, [](const std::string& option, const std::string& text) { return ParseImageSize(option, text); },
       "Pixels: WIDTHxHEIGHT, or one number for a square")
-      ->type_name("WxH|S")
+      ->type_name("SIZE")
       ->default_str("512");
   AddChoice<Projection, 2>(app, "--projection", view.projection, {"orthographic", "perspective"},
-                           {Projection::kOrthographic, Projection::kPerspective}, "")
+                           {Projection::kOrthographic, Projection::kPerspective}, "Orthographic or perspective projection")
       ->default_str("orthographic");
-  AddNumber(app, "--azimuth", view.azimuth_degrees, angle, "Degrees that the eye turns about +z; at 90 it is on the +x side");
+  AddNumber(app, "--azimuth", view.azimuth_degrees, angle,
+            "Degrees that the eye turns about +z; at 0 it looks along +y, at 90 it is on the +x side");
   AddNumber(app, "--elevation", view.elevation_degrees, angle, "Degrees that the eye is lifted towards +z");
   AddNumber(app, "--roll", view.roll_degrees, angle, "Degrees that the picture is turned clockwise");
   AddNumber(app, "--zoom", view.zoom, {kMinZoom, kMaxZoom}, "Magnification; at 1 the volume's bounding sphere fills the shorter side");
-  AddNumber(app, "--fov", view.fov_degrees, {kMinFovDegrees, kMaxFovDegrees}, "Degrees of the cone that holds the sphere (perspective)");
+  AddNumber(app, "--fov", view.fov_degrees, {kMinFovDegrees, kMaxFovDegrees},
+            "Field of view in degrees, for --projection perspective; the eye's distance follows");
 }
 
 void AddLookOptions(CLI::App& app, FrameRequest& request, PictureFormat& format) {
+  app.option_defaults()->group("Look");
   AddRendererOptions(app, request);
   AddTransferOptions(app, request.transfer);
-  AddChoice<bool, 2>(app, "--shading", request.shading.phong, {"phong", "none"}, {true, false}, "")->default_str("phong");
+  AddChoice<bool, 2>(app, "--shading", request.shading.phong, {"phong", "none"}, {true, false},
+                     "Lighting; phong: lit surfaces; none: the material's own colours")
+      ->default_str("phong");
   app.add_option("--light", CLI::callback_t([&request](const CLI::results_t& texts) {
                    request.shading.lights.clear();
                    for (const std::string& text : texts) {
@@ -149,55 +152,42 @@ void AddLookOptions(CLI::App& app, FrameRequest& request, PictureFormat& format)
                    if (int(texts.size()) <= kMaxLights) return true;
                    throw CLI::ValidationError(fmt::format("--light is given {} times, at most {} are possible", texts.size(), kMaxLights));
                  }),
-                 "Direction towards a light, in volume axes; may be repeated (default: a headlight)")
+                 "Direction towards a light, in volume axes; may be repeated (default: a light at the eye)")
       ->type_name("X,Y,Z")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   AddParsed(
       app, "--background", format.background, [](const std::string& option, const std::string& text) { return ParseColor(option, text); },
-      "Colour behind the picture, each in [0, 1] (default: transparent)")
+      "Colour behind the picture, and its opacity (default 1), each from 0 to 1 (default: transparent)")
       ->type_name("R,G,B[,A]");
   AddNumber(app, "--termination", request.termination, {0, kMaxTermination},
-            "Transmittance below which what lies behind is skipped; 0: never");
-  AddChoice<int, 2>(app, "--depth", format.png_bits, {"8", "16"}, {8, 16}, "Bits of a PNG's channels")->default_str("8");
+            "Skip what lies behind material whose remaining transmittance is below this; 0: skip nothing");
+  AddChoice<int, 2>(app, "--depth", format.png_bits, {"8", "16"}, {8, 16}, "Bits of each channel of a PNG: 8 or 16")->default_str("8");
 }
 
 void AddPolicyOptions(CLI::App& app, Policy& policy) {
-  AddNamed(app, "--decomposition", policy.decomposition, Decompositions(), "How the volume is divided", kLeftToThePlanner)
-      ->default_str(policy.decomposition);
-  AddChoice<AxisChoice, 5>(app, "--axis", policy.axis, {"x", "y", "z", "auto", "view"},
-                           {AxisChoice::kX, AxisChoice::kY, AxisChoice::kZ, AxisChoice::kAuto, AxisChoice::kView},
-                           "Axis that slabs are cut along, and other boxes first; view: the one nearest to the view direction")
+  app.option_defaults()->group("Distribution (never changes the picture)");
+  AddNamed(app, "--decomposition", policy.decomposition, Decompositions(), "How the volume is divided into boxes", kLeftToThePlanner);
+  AddChoice<AxisChoice, 5>(
+      app, "--axis", policy.axis, {"x", "y", "z", "auto", "view"},
+      {AxisChoice::kX, AxisChoice::kY, AxisChoice::kZ, AxisChoice::kAuto, AxisChoice::kView},
+      "Axis along which slabs are cut, and other boxes first: x, y, z, auto, or view, the axis nearest to the view direction")
       ->default_str("auto");
-  AddNamed(app, "--split", policy.split, WorkSplits(), "What boxes have equal shares of")->default_str(policy.split);
-  AddNamed(app, "--assignment", policy.assignment, Assignments(), "Who owns which box", kLeftToThePlanner)->default_str(policy.assignment);
-  AddNamed(app, "--balance", policy.balance, BalanceModes(), "Whether boxes change while frames go by")->default_str(policy.balance);
+  AddNamed(app, "--balance-by", policy.split, WorkSplits(), "The load metric: what boxes have equal shares of");
+  AddNamed(app, "--split", policy.split, WorkSplits(), "")->group(kHidden);
+  AddNamed(app, "--assignment", policy.assignment, Assignments(), "Which worker owns which box", kLeftToThePlanner);
+  AddNamed(app, "--balance", policy.balance, BalanceModes(), "Whether boxes change from frame to frame");
   AddInteger(app, "--groups", policy.groups, 0, kMaxGroups,
-             "Groups of boxes that are rendered one after the other; 0: chosen by the service");
-  AddInteger(app, "--teams", policy.teams, 1, kMaxTeams,
-             "Parts of the workers that frames go to in turn, each with all voxels; 1: all workers share every frame");
+             "Groups of boxes, nearest first, that are rendered one after the other; 0: the service chooses");
+  AddInteger(app, "--frame-parallel", policy.teams, 1, kMaxTeams,
+             "Frames rendered at the same time, each by its own part of the workers, which needs all voxels in every part");
+  AddInteger(app, "--teams", policy.teams, 1, kMaxTeams, "")->group(kHidden);
   AddCombining(app, policy.combine);
   AddNumber(app, "--pixel-error", policy.pixel_error, {0, kMaxPixelError},
-            "How far a colour in [0, 1] may move because workers send each other 16 bits a channel instead of 32");
+            "How far a colour from 0 to 1 may be off so that workers can send each other 16 bits a channel instead of 32");
 }
 
 }  // namespace
-
-Result<std::variant<std::string, TransferFunction>> ParseTransfer(const std::string& option, const std::string& text) {
-  using Choice = std::variant<std::string, TransferFunction>;
-  if (std::filesystem::path(text).extension() == ".json" || text.find('/') != std::string::npos) {
-    const Result<std::string> json = ReadTextFile(text, kMaxTransferFileBytes);
-    if (!json.ok()) return Status(json.status().code(), fmt::format("{} {}", option, json.status().message()));
-    Result<TransferFunction> transfer = ParseParaViewColorMap(*json, text);
-    if (!transfer.ok()) return Status(transfer.status().code(), fmt::format("{} {}", option, transfer.status().message()));
-    return Choice(*std::move(transfer));
-  }
-  std::vector<std::string_view> names;
-  for (const PresetInfo& preset : TransferPresets()) names.push_back(preset.name);
-  const Result<std::size_t> index = ParseChoice(option, text, names);
-  if (!index.ok()) return Status::InvalidArgument(index.status().message() + ", nor a .json file");
-  return Choice(text);
-}
 
 CLI::Option* AddNumber(CLI::App& app, const std::string& names, double& target, NumberRange range, const std::string& help) {
   const auto parse = [range](const std::string& option, const std::string& text) { return ParseNumber(option, text, range); };
@@ -210,8 +200,7 @@ CLI::Option* AddInteger(CLI::App& app, const std::string& names, int& target, in
 }
 
 CLI::Option* AddThreads(CLI::App& app, int& threads, const std::string& help) {
-  return AddInteger(app, "--threads", threads, 1, int(kMaxThreads), help + " (default: the cores divided by the workers, at least 1)")
-      ->default_str("");
+  return AddInteger(app, "--threads", threads, 1, int(kMaxThreads), help)->default_str("the cores divided by the workers");
 }
 
 CLI::Option* AddEndpoint(CLI::App& app, std::string& endpoint) {
@@ -220,28 +209,48 @@ CLI::Option* AddEndpoint(CLI::App& app, std::string& endpoint) {
     if (!parsed.ok()) return Status::InvalidArgument(fmt::format("{} {}", option, parsed.status().message()));
     return text;
   };
-  return AddParsed(app, "--endpoint", endpoint, parse,
-                   "Where the service listens (default: $SLABSTREAM_ENDPOINT, the service started last by `up`)")
-      ->type_name("ENDPOINT");
+  return AddParsed(app, "--endpoint", endpoint, parse, "Where the service listens")
+      ->type_name("ENDPOINT")
+      ->default_str("$SLABSTREAM_ENDPOINT, or the service that `up` started last");
 }
 
 void AddTransferOptions(CLI::App& app, TransferChoice& transfer) {
-  std::string help = "Colours and opacities: a ParaView colour map (.json) or one of";
+  std::string help = "Transfer function: a ParaView colour map (a .json file) or one of these presets";
   for (const PresetInfo& preset : TransferPresets()) help += fmt::format("\n  {}: {}", preset.name, preset.purpose);
-  AddParsed(app, "--transfer", transfer.choice, ParseTransfer, help)->type_name("PRESET|FILE")->default_str("auto");
+  AddParsed(app, "--transfer", transfer.choice, ParseTransfer, help)->type_name("TRANSFER")->default_str("auto");
   AddNumber(app, "--opacity-distance", transfer.opacity_distance, {0, kMaxOpacityDistance, true},
-            "Voxel lengths of material that the transfer function's opacity is meant for");
+            "Length of material, in voxels, that has the opacity which the transfer function says");
+}
+
+void ResolveSource(CLI::App& app, const CLI::Option* source, std::string& volume, TransferChoice& transfer, std::function<bool()> is_file) {
+  app.parse_complete_callback([&app, source, &volume, &transfer, is_file = std::move(is_file)] {
+    if (source->count() == 0) return;
+    Result<VolumeArgument> argument = ParseVolumeArgument("SOURCE", volume, is_file());
+    if (!argument.ok()) throw CLI::ValidationError(argument.status().message());
+    if (!argument->transfer) return;
+    if (app.get_option("--transfer")->count() > 0) {
+      throw CLI::ValidationError(fmt::format("SOURCE '{}' names a transfer function, and so does --transfer", volume));
+    }
+    volume = std::move(argument->volume);
+    transfer.choice = *std::move(argument->transfer);
+  });
 }
 
 void AddFrameOptions(CLI::App& app, FrameOptions& options) {
-  app.add_option("SOURCE", options.source, "A dataset's name at the service, or with --local a volume file")->required();
+  app.option_defaults()->group("Options");
+  CLI::Option* source = app.add_option("SOURCE", options.source,
+                                       "A dataset's name at the service, or with --local a volume file; followed by :TRANSFER it says "
+                                       "what --transfer says")
+                            ->required();
   AddConnectionOptions(app, options.connection);
   AddViewOptions(app, options.request.view, options.request.size);
   AddLookOptions(app, options.request, options.format);
   AddPolicyOptions(app, options.request.policy);
+  ResolveSource(app, source, options.source, options.request.transfer, [&options] { return options.connection.local_workers > 0; });
+  app.option_defaults()->group(kOutputGroup);
   app.add_option("--stats", options.stats_path, "Write plan, bytes and stage times as JSON")->type_name("FILE");
-  app.add_option("--trace", options.trace_path, "Write what each worker did when, for Perfetto or chrome://tracing")->type_name("FILE");
-  app.add_flag("--progress", options.progress, "Show on stderr how far the frames are");
+  app.add_option("--trace", options.trace_path, "Write what each worker did and when, for Perfetto or chrome://tracing")->type_name("FILE");
+  app.add_flag("--progress", options.progress, "Show progress on stderr");
 }
 
 }  // namespace slabstream

@@ -3,9 +3,9 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <functional>
 #include <string>
 #include <utility>
-#include <variant>
 
 #include "client/cli/options.h"
 
@@ -24,19 +24,33 @@ CLI::Option* AddParsed(CLI::App& app, const std::string& names, T& target, Parse
   return app.add_option(names, CLI::callback_t(store), help);
 }
 
+// An option whose value is given with `=` or left out: --local=4, --local. `bare` stands for what is left out. What follows it is never
+// taken for its value.
+template <class T, class Parse>
+CLI::Option* AddOptionalValue(CLI::App& app, const std::string& name, T& target, const std::string& bare, Parse parse,
+                              const std::string& help) {
+  const auto given = [bare, parse = std::move(parse)](const std::string& option, const std::string& text) {
+    return parse(option, text == "true" ? bare : text);  // CLI11 hands over "true" for the bare form
+  };
+  return AddParsed(app, name, target, given, help)->expected(0);
+}
+
 CLI::Option* AddNumber(CLI::App& app, const std::string& names, double& target, NumberRange range, const std::string& help);
 CLI::Option* AddInteger(CLI::App& app, const std::string& names, int& target, int min, int max, const std::string& help);
 
 CLI::Option* AddEndpoint(CLI::App& app, std::string& endpoint);
 
-// What --transfer takes: a ParaView colour map if the text names a file, else the name of a preset.
-Result<std::variant<std::string, TransferFunction>> ParseTransfer(const std::string& option, const std::string& text);
+// Headings of the help text. Options under kHidden are not shown: old spellings that go on working, and what cannot be used yet.
+inline constexpr char kOutputGroup[] = "Output", kHidden[] = "";
 
 // --threads, [1, kMaxThreads]; 0 is left where it is not given.
 CLI::Option* AddThreads(CLI::App& app, int& threads, const std::string& help);
 
 // --transfer and --opacity-distance.
 void AddTransferOptions(CLI::App& app, TransferChoice& transfer);
+
+// After the parse, splits a `source` of the form VOLUME:TRANSFER into its parts (volume_argument.h). `is_file` is asked then.
+void ResolveSource(CLI::App& app, const CLI::Option* source, std::string& volume, TransferChoice& transfer, std::function<bool()> is_file);
 
 // Everything that `render` and `turntable` share: SOURCE, connection, view, look, policy, and what is written beside pictures.
 void AddFrameOptions(CLI::App& app, FrameOptions& options);

@@ -1,7 +1,6 @@
-// What each subcommand was asked to do: plain values, filled by command_line.cpp, valid when a command sees them.
+// What each subcommand was asked to do: plain values, filled by client_commands.cpp, valid when a command sees them.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -48,20 +47,6 @@ struct TurntableOptions {
   int frames = 36;    // [1, kMaxTurntableFrames], evenly over `turns` full turns that begin at the request's azimuth
   int turns = 1;      // [1, kMaxTurns]
   int in_flight = 2;  // [1, kMaxInFlight] frames asked for and not yet complete
-};
-
-inline constexpr int kMaxBenchSize = 8192;
-
-struct BenchOptions {
-  std::vector<std::string> cases;  // as ParseBenchCase takes them; empty: all standard ones
-  ConnectionOptions connection;
-  int size = 512;                                               // pixels a side, [1, kMaxBenchSize]
-  int frames = 12;                                              // of a turn of each projection, [1, kMaxTurntableFrames]
-  int turns = 2;                                                // [1, kMaxTurns]
-  std::optional<const RendererKind*> renderer;                  // instead of that of each case
-  std::string json_path, pictures_directory, export_directory;  // empty: not wanted
-  bool list = false;
-  std::string command;  // as it was typed
 };
 
 struct InfoOptions {

@@ -3,9 +3,9 @@
 #include <iostream>
 
 #include "client/cli/commands.h"
-#include "client/cli/files.h"
 #include "client/cli/report_files.h"
 #include "client/cli/session.h"
+#include "common/base/files.h"
 #include "common/planning/validate_request.h"
 
 namespace slabstream {
@@ -13,7 +13,7 @@ namespace slabstream {
 Status RunRender(const RenderOptions& options) {
   const Time start = MonotonicNow();
   if (Status status = CheckPicturePath(options.output); !status.ok()) return status;
-  if (Status status = CheckOutputDirectory("--output", options.output); !status.ok()) return status;
+  if (Status status = CheckCanWrite("--output", options.output); !status.ok()) return status;
   if (Status status = CheckReportPaths(options.frame); !status.ok()) return status;
 
   Result<Session> session = Session::Open(options.frame.connection, options.frame.source);

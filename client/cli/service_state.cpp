@@ -14,7 +14,7 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
-#include "client/cli/files.h"
+#include "common/base/files.h"
 #include "common/transport/endpoint.h"
 
 namespace slabstream {
@@ -41,19 +41,26 @@ std::optional<ServiceState> Load(const std::string& path) {
   }
 }
 
+// The folder that XDG_RUNTIME_DIR names may be missing (no login session) or belong to another user (sudo and su pass the variable on).
+bool IsOwnDirectory(const char* path) {
+  struct stat info {};
+  return path != nullptr && path[0] == '/' && ::stat(path, &info) == 0 && S_ISDIR(info.st_mode) && info.st_uid == ::getuid();
+}
+
 }  // namespace
 
 Result<std::string> StateDirectory() {
   const char* runtime = std::getenv("XDG_RUNTIME_DIR");
-  const std::string path =
-      runtime != nullptr && runtime[0] == '/' ? fmt::format("{}/slabstream", runtime) : fmt::format("/tmp/slabstream-{}", ::getuid());
+  const std::string path = IsOwnDirectory(runtime) ? fmt::format("{}/slabstream", runtime) : fmt::format("/tmp/slabstream-{}", ::getuid());
   if (::mkdir(path.c_str(), 0700) != 0 && errno != EEXIST) {
-    return Status::Unavailable(fmt::format("cannot make the directory '{}': {}", path, std::strerror(errno)));
+    return Status::Unavailable(
+        fmt::format("cannot make the directory '{}': {}; $XDG_RUNTIME_DIR chooses another place", path, std::strerror(errno)));
   }
   struct stat info {};
   // lstat: a link that somebody else left in /tmp is not ours, wherever it points.
   if (::lstat(path.c_str(), &info) != 0 || !S_ISDIR(info.st_mode) || info.st_uid != ::getuid() || (info.st_mode & 077) != 0) {
-    return Status::Unavailable(fmt::format("'{}' must be a directory of this user alone (mode 0700)", path));
+    return Status::Unavailable(
+        fmt::format("'{}' must be a directory of this user alone (mode 0700); $XDG_RUNTIME_DIR chooses another place", path));
   }
   return path;
 }

@@ -1,6 +1,6 @@
 // What `up` writes down about a service that it started, so that `down` and `status` find it: one JSON file a service, named after its
-// endpoint, in $XDG_RUNTIME_DIR/slabstream, or else /tmp/slabstream-UID; the directory is the user's own (0700). The processes' logs lie
-// beside it.
+// endpoint, in $XDG_RUNTIME_DIR/slabstream if that variable names a directory of this user, or else in /tmp/slabstream-UID. The directory
+// is the user's own (0700). The processes' logs lie beside it.
 #pragma once
 
 #include <sys/types.h>
@@ -25,7 +25,7 @@ struct ServiceState {
   friend bool operator==(const ServiceState&, const ServiceState&) = default;
 };
 
-// Made if it does not exist. Unavailable if it cannot be made or belongs to somebody else.
+// Made if it does not exist. Unavailable, naming XDG_RUNTIME_DIR, if it cannot be made or belongs to somebody else.
 Result<std::string> StateDirectory();
 
 Status SaveState(const ServiceState& state);

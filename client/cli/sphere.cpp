@@ -3,13 +3,13 @@
 #include <iostream>
 
 #include "client/cli/commands.h"
-#include "client/cli/files.h"
+#include "common/base/files.h"
 #include "common/volume_io/volume_reader.h"
 
 namespace slabstream {
 
 Status RunSphere(const SphereOptions& options) {
-  if (Status status = CheckOutputDirectory("--output", options.output); !status.ok()) return status;
+  if (Status status = CheckCanWrite("--output", options.output); !status.ok()) return status;
   const Result<Volume> sphere = MakeSphere(options.request);
   if (!sphere.ok()) return sphere.status();
   if (Status status = WriteVolume(*sphere, options.output); !status.ok()) return status;

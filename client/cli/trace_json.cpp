@@ -5,8 +5,8 @@
 #include <set>
 #include <utility>
 
+#include "client/cli/recording.h"
 #include "common/renderers/registry.h"
-#include "laboratory/measure/recording.h"
 
 namespace slabstream {
 namespace {

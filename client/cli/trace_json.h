@@ -3,7 +3,7 @@
 //
 // One process a worker with the tracks render, combine and fetch; names are stages, args say frame, group, rank and box. Process 0 has a
 // track of whole frames a frame in flight. Times are microseconds since the first frame was planned. Beside the events stands what a replay
-// needs (laboratory/measure/recording.h).
+// needs (client/cli/recording.h).
 #pragma once
 
 #include <string>

@@ -4,9 +4,9 @@
 #include <iostream>
 
 #include "client/cli/commands.h"
-#include "client/cli/files.h"
 #include "client/cli/report_files.h"
 #include "client/cli/session.h"
+#include "common/base/files.h"
 #include "common/planning/validate_request.h"
 
 namespace slabstream {
@@ -30,7 +30,7 @@ Status RunTurntable(const TurntableOptions& options) {
   const Time start = MonotonicNow();
   const std::string first = options.output.Name(0);
   if (Status status = CheckPicturePath(first); !status.ok()) return status;
-  if (Status status = CheckOutputDirectory("--output", first); !status.ok()) return status;
+  if (Status status = CheckCanWrite("--output", first); !status.ok()) return status;
   if (Status status = CheckReportPaths(options.frame); !status.ok()) return status;
 
   Result<Session> session = Session::Open(options.frame.connection, options.frame.source);

@@ -1,11 +1,10 @@
 #include "client/image_io/image_writer.h"
 
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cctype>
 #include <cmath>
 #include <filesystem>
@@ -15,6 +14,7 @@
 #include <vector>
 
 #include "common/base/check.h"
+#include "common/base/files.h"
 
 namespace slabstream {
 namespace {
@@ -86,11 +86,25 @@ bool WriteExrRows(const LocalImage& image, ImageSize size, const PictureFormat& 
   return true;
 }
 
-// A name in the same directory that no other writer uses.
-std::string TemporaryNameFor(const std::string& path) {
-  static std::atomic<unsigned> counter{0};
-  return fmt::format("{}.{}-{}.tmp", path, ::getpid(), counter++);
-}
+// Hands the encoder's bytes to the file. What fails there is reported by OutputFile, for encoders are careless about it.
+class FileSink : public OIIO::Filesystem::IOProxy {
+ public:
+  explicit FileSink(OutputFile& file) : IOProxy("", Write), file_(file) {}
+
+  const char* proxytype() const override { return "slabstream"; }
+  std::size_t write(const void* bytes, std::size_t size) override {
+    const std::size_t written = pwrite(bytes, size, m_pos);
+    m_pos += std::int64_t(written);
+    return written;
+  }
+  std::size_t pwrite(const void* bytes, std::size_t size, std::int64_t offset) override {
+    file_.WriteAt(offset, {static_cast<const std::byte*>(bytes), size});
+    return file_.ok() ? size : 0;
+  }
+
+ private:
+  OutputFile& file_;
+};
 
 }  // namespace
 
@@ -121,27 +135,24 @@ Status WritePicture(const LocalImage& image, ImageSize size, const std::string& 
     spec.attribute("compression", "zip");
   }
 
-  const std::string temporary = TemporaryNameFor(path);
+  Result<OutputFile> file = OutputFile::Create(path);
+  if (!file.ok()) return file.status();
+  FileSink sink(*file);
+  OIIO::Filesystem::IOProxy* proxy = &sink;
+  spec.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
+  const std::unique_ptr<OIIO::ImageOutput> out = OIIO::ImageOutput::create(png ? "png" : "openexr");
   const auto failure = [&](const std::string& reason) {
-    std::error_code ignored;
-    std::filesystem::remove(temporary, ignored);
-    std::string line = reason.substr(0, reason.find('\n'));
+    if (Status status = file->Close(); !status.ok()) return status;  // no space, not what the encoder makes of it
+    const std::string line = reason.substr(0, reason.find('\n'));
     return Status::Unavailable(fmt::format("cannot write '{}': {}", path, line.empty() ? "unknown reason" : line));
   };
-  const std::unique_ptr<OIIO::ImageOutput> out = OIIO::ImageOutput::create(png ? "png" : "openexr");
   if (!out) return failure(OIIO::geterror());
-  if (!out->open(temporary, spec)) return failure(out->geterror());
-  const auto write = [&](int y, const void* row) { return out->write_scanline(y, 0, sample, row); };
+  if (!out->open(png ? "picture.png" : "picture.exr", spec)) return failure(out->geterror());
+  const auto write = [&](int y, const void* row) { return file->ok() && out->write_scanline(y, 0, sample, row); };
   const bool written = png ? WritePngRows(image, size, format, write) : WriteExrRows(image, size, format, write);
-  if (!written) {
-    out->close();
-    return failure(out->geterror());
-  }
-  if (!out->close()) return failure(out->geterror());
-
-  std::error_code error;
-  std::filesystem::rename(temporary, path, error);
-  return error ? failure(error.message()) : Status::Ok();
+  const bool closed = out->close();
+  if (!written || !closed) return failure(out->geterror());
+  return file->Finish();
 }
 
 }  // namespace slabstream

@@ -2,7 +2,7 @@
 //
 // PNG: straight alpha, 8 or 16 bit, row 0 at the top; code = round(max * clamp(straight value, 0, 1)), without a transfer curve.
 // EXR: premultiplied linear float R, G, B, A, and Z (camera depth, +infinity where nothing is seen) for images that have depth.
-// The file appears whole or not at all: it is written beside its final place and renamed.
+// The file appears whole or not at all (common/base/files.h).
 #pragma once
 
 #include <string>

@@ -10,7 +10,7 @@
 //   c_z C N^3/p  Z-buffer             kBrickTest, kDrawn, kPixel                   faces towards the eye
 //   c_sh C I^2  shade (Z-buffer)      kPixel                                       deferred: pixels that show something
 //   c_co I^2 log p  combine           CombiningCosts (common/simulation)           a matter of the schedule, which is simulated
-// and kBox, what any box costs. Constants are seconds of one thread; common/simulation/cost_fit.h finds them.
+// and kBox, what any box costs. Constants are seconds of one thread; laboratory/measure/cost_fit.h finds them.
 #pragma once
 
 #include <array>

@@ -64,7 +64,7 @@ Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, cons
     layout = std::make_shared<const Layout>(MakeLayout({.summary = &summary,
                                                         .transfer = &*transfer,
                                                         .policy = &*policy,
-                                                        .renderer = setup->renderer,
+                                                        .renderer = FindRenderer(request.renderer),
                                                         .slots = std::max<std::uint32_t>(std::uint32_t(roster.slots.size()), 1),
                                                         .slab_bytes_target = cost.slab_bytes_target}));
   }

@@ -1,8 +1,6 @@
-// MetaImage with its samples in the same file or in one other (.mha, .mhd), raw or zlib-compressed. The header is read here, by the fields
-// that MetaIO documents: ITK's own parser prints to stderr what it does not like and trusts the header's numbers.
+// MetaImage with its samples in the same file or in one other (.mha, .mhd), raw or zlib-compressed, by the fields that MetaIO documents.
 #include <filesystem>
 #include <optional>
-#include <sstream>
 #include <utility>
 #include <vector>
 
@@ -28,23 +26,7 @@ std::optional<SampleType> ToSampleType(const std::string& name) {
   return std::nullopt;
 }
 
-// The numbers of the first of these fields that is there; nullopt if it does not hold `count` of them and nothing else.
-std::optional<std::vector<double>> Numbers(const TextHeader& text, std::initializer_list<const char*> keys, std::size_t count,
-                                           std::vector<double> if_absent) {
-  for (const char* key : keys) {
-    const std::optional<std::string> field = text.Find(key);
-    if (!field) continue;
-    std::istringstream stream(*field);
-    std::vector<double> numbers(count);
-    for (double& number : numbers) {
-      if (!(stream >> number)) return std::nullopt;
-    }
-    return (stream >> std::ws).eof() ? std::optional(numbers) : std::nullopt;
-  }
-  return if_absent;
-}
-
-bool IsTrue(const TextHeader& text, const std::string& key) {
+bool IsTrue(const TextHeader& text, const char* key) {
   const std::string value = ToLower(text.Find(key).value_or("false"));
   return value.starts_with('t') || value == "1";
 }
@@ -58,7 +40,7 @@ Result<RawHeader> ReadHeader(const TextHeader& text, const std::string& path) {
   const std::int64_t dimensions = ToInteger(*text.Find("NDims")).value_or(0);
   if (dimensions < 1 || dimensions > 4) return wrong("NDims is '" + *text.Find("NDims") + "', must be 3");
   const auto count = std::size_t(dimensions);
-  const auto sizes = Numbers(text, {"DimSize"}, count, {});
+  const auto sizes = text.Numbers({"DimSize"}, count, {});
   if (!sizes) return wrong("DimSize is '" + *text.Find("DimSize") + "', must be " + std::to_string(count) + " numbers");
   if (count < kDimensions || (count > kDimensions && (*sizes)[kDimensions] != 1)) {
     return Status::InvalidArgument(path + ": has " + std::to_string(count) + " dimensions, must have 3");
@@ -68,27 +50,21 @@ Result<RawHeader> ReadHeader(const TextHeader& text, const std::string& path) {
   const std::optional<SampleType> type = ToSampleType(*text.Find("ElementType"));
   if (!type) return wrong("ElementType '" + *text.Find("ElementType") + "' is not supported");
 
-  std::array<std::int64_t, kDimensions> size{};
-  for (std::size_t i = 0; i < kDimensions; ++i) {
-    const double side = (*sizes)[i];
-    // What is not a whole number is as wrong as 0.
-    size[i] = side >= 1 && side <= 1e15 && side == double(std::int64_t(side)) ? std::int64_t(side) : 0;
-  }
-  if (Status status = CheckSize(path, size); !status.ok()) return status;
-
-  const auto spacing = Numbers(text, {"ElementSpacing", "ElementSize"}, count, std::vector<double>(count, 1));
-  const auto origin = Numbers(text, {"Offset", "Origin", "Position"}, count, std::vector<double>(count, 0));
+  const Result<Index3> size = ToSize(path, *sizes);
+  if (!size.ok()) return size.status();
+  const auto spacing = text.Numbers({"ElementSpacing", "ElementSize"}, count, std::vector<double>(count, 1));
+  const auto origin = text.Numbers({"Offset", "Origin", "Position"}, count, std::vector<double>(count, 0));
   std::vector<double> identity(count * count);
   for (std::size_t i = 0; i < count; ++i) identity[i * count + i] = 1;
-  const auto directions = Numbers(text, {"TransformMatrix", "Rotation", "Orientation"}, count * count, identity);
+  const auto directions = text.Numbers({"TransformMatrix", "Rotation", "Orientation"}, count * count, identity);
   if (!spacing) return wrong("ElementSpacing must be " + std::to_string(count) + " numbers");
   if (!origin) return wrong("Offset must be " + std::to_string(count) + " numbers");
   if (!directions) return wrong("TransformMatrix must be " + std::to_string(count * count) + " numbers");
 
   RawHeader header;
   header.type = *type;
+  header.size = *size;
   for (std::size_t i = 0; i < kDimensions; ++i) {
-    header.size[int(i)] = std::int32_t(size[i]);
     header.spacing[int(i)] = (*spacing)[i];
     header.origin[int(i)] = (*origin)[i];
     for (std::size_t j = 0; j < kDimensions; ++j) header.directions[i][int(j)] = (*directions)[i * count + j];

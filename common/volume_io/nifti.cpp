@@ -1,8 +1,5 @@
-// NIfTI-1 in one file (.nii, .nii.gz). ITK reads the geometry. Sample type, rescale and place of the samples come from the header's own
-// fields, because ITK turns samples with a rescale slope into floats, which would lose the integers.
-#include <itkNiftiImageIO.h>
-#include <nifti1_io.h>
-
+// NIfTI-1 in one file (.nii, .nii.gz). Fields, numbers and formulas are those of nifti1.h, the format's definition.
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -10,7 +7,6 @@
 #include <fstream>
 #include <optional>
 
-#include "common/volume_io/itk_header.h"
 #include "common/volume_io/raw_volume.h"
 
 namespace slabstream {
@@ -19,23 +15,27 @@ namespace {
 constexpr std::size_t kHeaderBytes = 348;
 constexpr std::int64_t kUsualOffset = 352;  // header and four bytes that announce extensions
 
-// Bytes of the header by their places in nifti1.h, in the file's byte order.
+// The header's bytes in the file's byte order.
 class NiftiHeader {
  public:
   explicit NiftiHeader(const std::array<std::byte, kHeaderBytes>& bytes) : bytes_(bytes) {
-    const bool native = At<std::int32_t>(0) == std::int32_t{kHeaderBytes};
-    swap_ = !native;
-    big_endian_ = native == (std::endian::native == std::endian::big);
+    swap_ = At<std::int32_t>(0) != std::int32_t{kHeaderBytes};
   }
 
   bool valid() const { return At<std::int32_t>(0) == std::int32_t{kHeaderBytes} && std::memcmp(bytes_.data() + 344, "n+1", 4) == 0; }
-  bool big_endian() const { return big_endian_; }
-  std::int16_t dimensions() const { return At<std::int16_t>(40); }
-  std::int16_t side(std::int16_t dimension) const { return At<std::int16_t>(40 + 2 * std::size_t(dimension)); }  // from 1
-  std::int16_t data_type() const { return At<std::int16_t>(70); }
-  float voxel_offset() const { return At<float>(108); }
+  bool big_endian() const { return swap_ != (std::endian::native == std::endian::big); }
+  int dim(int i) const { return At<std::int16_t>(40 + 2 * std::size_t(i)); }
+  int data_type() const { return At<std::int16_t>(70); }
+  double pixdim(int i) const { return At<float>(76 + 4 * std::size_t(i)); }
+  float vox_offset() const { return At<float>(108); }
   float slope() const { return At<float>(112); }
   float intercept() const { return At<float>(116); }
+  int space_unit() const { return std::to_integer<int>(bytes_[123]) & 7; }
+  int qform_code() const { return At<std::int16_t>(252); }
+  int sform_code() const { return At<std::int16_t>(254); }
+  double quatern(int i) const { return At<float>(256 + 4 * std::size_t(i)); }  // b, c, d
+  double qoffset(int i) const { return At<float>(268 + 4 * std::size_t(i)); }
+  double srow(int row, int column) const { return At<float>(280 + 16 * std::size_t(row) + 4 * std::size_t(column)); }
 
  private:
   template <class T>
@@ -47,11 +47,11 @@ class NiftiHeader {
   }
 
   const std::array<std::byte, kHeaderBytes>& bytes_;
-  bool swap_ = false, big_endian_ = false;
+  bool swap_ = false;
 };
 
-// NIFTI_TYPE_... of nifti1.h.
-std::optional<SampleType> ToSampleType(std::int16_t data_type) {
+// NIFTI_TYPE_...
+std::optional<SampleType> ToSampleType(int data_type) {
   switch (data_type) {
     case 2: return SampleType::kUint8;
     case 4: return SampleType::kInt16;
@@ -67,19 +67,58 @@ std::optional<SampleType> ToSampleType(std::int16_t data_type) {
   }
 }
 
-// Before ITK's parser, which would print what is wrong with them.
-Status CheckDimensions(const NiftiHeader& fields, const std::string& path) {
-  constexpr std::int16_t kMaxDimensions = 7;
-  if (fields.dimensions() < 1 || fields.dimensions() > kMaxDimensions) {
-    return Status::InvalidArgument(path + ": has " + std::to_string(fields.dimensions()) + " dimensions, must have 3");
+// Origin and directions. Of the quaternion and the affine matrix ITK takes the matrix if it leads to the scanner's axes, else the
+// quaternion; so do we. Without either they stay those of the index axes.
+void ReadOrientation(const NiftiHeader& fields, double millimetres, RawHeader& header) {
+  constexpr int kScanner = 1;  // NIFTI_XFORM_SCANNER_ANAT
+  Vec3 columns[3], origin;
+  if (fields.sform_code() == kScanner || (fields.sform_code() > 0 && fields.qform_code() <= 0)) {
+    for (int i = 0; i < 3; ++i) columns[i] = {fields.srow(0, i), fields.srow(1, i), fields.srow(2, i)};
+    origin = {fields.srow(0, 3), fields.srow(1, 3), fields.srow(2, 3)};
+  } else if (fields.qform_code() > 0) {
+    const double b = fields.quatern(0), c = fields.quatern(1), d = fields.quatern(2);
+    const double a = std::sqrt(std::max(0.0, 1 - (b * b + c * c + d * d)));
+    columns[0] = {a * a + b * b - c * c - d * d, 2 * (b * c + a * d), 2 * (b * d - a * c)};
+    columns[1] = {2 * (b * c - a * d), a * a + c * c - b * b - d * d, 2 * (c * d + a * b)};
+    columns[2] = (fields.pixdim(0) < 0 ? -1.0 : 1.0) * Vec3{2 * (b * d + a * c), 2 * (c * d - a * b), a * a + d * d - b * b - c * c};
+    origin = {fields.qoffset(0), fields.qoffset(1), fields.qoffset(2)};
+  } else {
+    return;
   }
-  for (std::int16_t i = 1; i <= fields.dimensions(); ++i) {
-    if (fields.side(i) < 1) {
-      return Status::InvalidArgument(path + ": dim[" + std::to_string(i) + "] is " + std::to_string(fields.side(i)) +
-                                     ", must be at least 1");
-    }
+  constexpr Vec3 kLpsFromRas = {-1, -1, 1};
+  header.origin = millimetres * (kLpsFromRas * origin);
+  for (std::size_t i = 0; i < 3; ++i) header.directions[i] = Normalized(kLpsFromRas * columns[i]);
+}
+
+Result<RawHeader> ReadHeader(const NiftiHeader& fields, const std::string& path) {
+  const auto wrong = [&](const std::string& why) { return Status::InvalidArgument(path + ": " + why); };
+  const std::optional<SampleType> type = ToSampleType(fields.data_type());
+  if (!type) {
+    return wrong("NIfTI data type " + std::to_string(fields.data_type()) +
+                 " is not supported, single integers of 8 to 64 bits and floats of 32 and 64 bits are");
   }
-  return Status::Ok();
+  int dimensions = fields.dim(0);
+  if (dimensions < 1 || dimensions > 7) return wrong("has " + std::to_string(dimensions) + " dimensions, must have 3");
+  for (int i = 1; i <= dimensions; ++i) {
+    if (fields.dim(i) < 1) return wrong("dim[" + std::to_string(i) + "] is " + std::to_string(fields.dim(i)) + ", must be at least 1");
+  }
+  while (dimensions > 3 && fields.dim(dimensions) == 1) --dimensions;
+  if (dimensions != 3) return wrong("has " + std::to_string(dimensions) + " dimensions, must have 3");
+
+  RawHeader header;
+  header.type = *type;
+  constexpr int kMetres = 1, kMicrometres = 3;  // NIFTI_UNITS_...
+  const double millimetres = fields.space_unit() == kMetres ? 1000 : fields.space_unit() == kMicrometres ? 0.001 : 1;
+  for (int i = 0; i < 3; ++i) {
+    header.size[i] = fields.dim(i + 1);
+    header.spacing[i] = millimetres * fields.pixdim(i + 1);
+  }
+  ReadOrientation(fields, millimetres, header);
+  // A slope of 0 says that there is none.
+  if (fields.slope() != 0 && std::isfinite(fields.slope()) && std::isfinite(fields.intercept())) {
+    header.rescale = {fields.slope(), fields.intercept()};
+  }
+  return header;
 }
 
 bool BeginsLikeGzip(const std::string& path) {
@@ -95,29 +134,15 @@ Result<RawVolume> ReadNifti(const std::string& path) {
   if (Status status = ReadPayloadStart(payload, bytes); !status.ok()) return status;
   const NiftiHeader fields(bytes);
   if (!fields.valid()) return Status::InvalidArgument(path + ": not a NIfTI volume: the header is not that of NIfTI-1 in one file");
-  const std::optional<SampleType> type = ToSampleType(fields.data_type());
-  if (!type) {
-    return Status::InvalidArgument(path + ": NIfTI data type " + std::to_string(fields.data_type()) +
-                                   " is not supported, single integers of 8 to 64 bits and floats of 32 and 64 bits are");
-  }
-
-  if (Status status = CheckDimensions(fields, path); !status.ok()) return status;
-
-  nifti_set_debug_level(0);  // what is wrong is reported as a Status, not on stderr
-  auto io = itk::NiftiImageIO::New();
-  Result<RawHeader> header = ReadItkHeader(*io, path, "NIfTI");
+  const Result<RawHeader> header = ReadHeader(fields, path);
   if (!header.ok()) return header.status();
-  header->type = *type;
-  const float slope = fields.slope(), intercept = fields.intercept();
-  // A slope of 0 says that there is none (nifti1.h).
-  if (slope != 0 && std::isfinite(slope) && std::isfinite(intercept)) header->rescale = {slope, intercept};
 
   constexpr float kMaxOffset = 1 << 30;  // bytes: floats are exact enough, extensions are smaller
-  const float offset = fields.voxel_offset();
-  if (!(offset <= kMaxOffset))
+  const float offset = fields.vox_offset();
+  if (!(offset <= kMaxOffset)) {
     return Status::InvalidArgument(path + ": vox_offset is " + std::to_string(offset) + ", must be at most 2^30");
-  const std::int64_t samples_at = offset < float{kHeaderBytes} ? kUsualOffset : std::int64_t(offset);
-  (payload.compressed ? payload.skip : payload.offset) = samples_at;
+  }
+  (payload.compressed ? payload.skip : payload.offset) = offset < float{kHeaderBytes} ? kUsualOffset : std::int64_t(offset);
   payload.big_endian = fields.big_endian();
   return ReadSamples(path, *header, payload);
 }

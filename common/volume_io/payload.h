@@ -1,5 +1,5 @@
-// The samples of a volume file, behind its header: where they lie and how they are packed. Reading them here, and not in ITK's readers,
-// which take a missing end for zeros (NIfTI, MetaImage) and hold the samples twice, finds every truncation and needs no second copy.
+// The samples of a volume file, behind its header: where they lie and how they are packed. Reading finds every truncation and holds the
+// samples once.
 #pragma once
 
 #include <cstddef>

@@ -1,9 +1,13 @@
 #include "common/volume_io/text_header.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <charconv>
 #include <fstream>
+#include <sstream>
+
+#include "common/volume_io/raw_volume.h"
 
 namespace slabstream {
 namespace {
@@ -16,9 +20,40 @@ std::string Trimmed(const std::string& text) {
 
 }  // namespace
 
-std::optional<std::string> TextHeader::Find(const std::string& key) const {
-  const auto found = fields.find(key);
-  return found == fields.end() ? std::nullopt : std::optional(found->second);
+std::optional<std::string> TextHeader::Find(std::initializer_list<const char*> keys) const {
+  for (const char* key : keys) {
+    if (const auto found = fields.find(key); found != fields.end()) return found->second;
+  }
+  return std::nullopt;
+}
+
+std::optional<std::vector<double>> TextHeader::Numbers(std::initializer_list<const char*> keys, std::size_t count,
+                                                       std::vector<double> if_absent) const {
+  std::optional<std::string> text = Find(keys);
+  if (!text) return if_absent;
+  std::replace_if(
+      text->begin(), text->end(), [](char c) { return c == '(' || c == ')' || c == ','; }, ' ');
+  std::istringstream words(*text);
+  std::vector<double> numbers;
+  for (std::string word; words >> word;) {
+    if (word == "none") continue;
+    const char* begin = word.data() + (word.size() > 1 && word[0] == '+' ? 1 : 0);
+    double number = 0;
+    const auto [end, error] = std::from_chars(begin, word.data() + word.size(), number);
+    if (error != std::errc() || end != word.data() + word.size()) return std::nullopt;
+    numbers.push_back(number);
+  }
+  return numbers.size() == count ? std::optional(numbers) : std::nullopt;
+}
+
+Result<Index3> ToSize(const std::string& path, const std::vector<double>& sides) {
+  std::array<std::int64_t, 3> size{};
+  for (std::size_t i = 0; i < size.size(); ++i) {
+    const double side = sides[i];
+    size[i] = side >= 1 && side <= 1e15 && side == double(std::int64_t(side)) ? std::int64_t(side) : 0;
+  }
+  if (Status status = CheckSize(path, size); !status.ok()) return status;
+  return Index3{std::int32_t(size[0]), std::int32_t(size[1]), std::int32_t(size[2])};
 }
 
 Result<TextHeader> ReadTextHeader(const std::string& path, char separator, KeyCase key_case, const std::string& last_key) {
@@ -38,6 +73,7 @@ Result<TextHeader> ReadTextHeader(const std::string& path, char separator, KeyCa
     }
     const std::string line = Trimmed(text.substr(begin, newline - begin));
     begin = newline == std::string::npos ? text.size() : newline + 1;
+    if (header.end == 0) header.first_line = line;
     header.end = std::int64_t(begin);
     if (line.empty()) break;
     const std::size_t at = line.find(separator);

@@ -1,5 +1,4 @@
-// TIFF: a multi-page file, or a directory of files, one a slice. Read through libtiff itself: ITK's reader has no 64-bit samples, spoils
-// 32-bit integers and prints to stderr what is wrong.
+// TIFF: a multi-page file, or a directory of files, one a slice.
 //
 // TIFF knows no distance between slices, and its resolution speaks of print: spacing is 1 along x and z, and along y what the two
 // resolutions give.

@@ -1,7 +1,6 @@
 // Volume files to volumes: NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd; .nhdr with a detached data file; raw or gzip), MetaImage (.mhd, .mha; raw
-// or zlib), and TIFF (a directory of slices, one file a slice, in natural order of their names; or one multi-page file). ITK reads the
-// headers of NIfTI and NRRD and writes; samples are read here, so that truncated and damaged files are found before and while memory is
-// taken for them. During reading a volume needs its bytes in the file and, where samples become narrower, its kept bytes on top.
+// or zlib), and TIFF (a directory of slices, one file a slice, in natural order of their names; or one multi-page file). Truncated and
+// damaged files are found before and while memory is taken for them. During reading a volume needs its bytes in the file and, where samples become narrower, its kept bytes on top.
 //
 // Samples are kept as uint8, uint16 or float32, without losing what was in the file: int8 and int16 are shifted into the unsigned type
 // (ValueMapping.offset); uint32, int32, uint64, int64 and float64 become uint16 if all their values are integers that fit after a shift,
@@ -29,7 +28,7 @@ struct VolumeFileInfo {
   std::string file_type;  // sample type in the file, such as "int16"
   std::string format;     // "NIfTI", "NRRD", "MetaImage", "TIFF"
   Vec3 origin;
-  std::array<Vec3, 3> directions;  // of the x, y and z axes (physical, ITK's LPS convention)
+  std::array<Vec3, 3> directions;  // of the x, y and z axes (physical: x to the left, y to posterior, z to superior)
 };
 
 struct LoadedVolume {
@@ -45,8 +44,8 @@ Result<LoadedVolume> ReadVolume(const std::string& path);
 bool LooksLikeVolume(const std::string& path);
 
 // Writes NRRD (gzip) or MetaImage (raw; .mhd: with a .raw beside it) by the ending. Such files have no value mapping: samples that were
-// read from int8 or int16 become these again, others with a mapping become float32 data values. InvalidArgument: another ending, or a path
-// that cannot be opened.
+// read from int8 or int16 become these again, others with a mapping become float32 data values. An older file is replaced only by a whole
+// one (common/base/files.h). InvalidArgument: another ending. Unavailable: cannot be written; the message says why.
 Status WriteVolume(const Volume& volume, const std::string& path);
 
 }  // namespace slabstream

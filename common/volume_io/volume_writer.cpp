@@ -1,10 +1,15 @@
-#include <itkMetaImageIO.h>
-#include <itkNrrdImageIO.h>
+#include <fmt/format.h>
+#include <zlib.h>
 
+#include <algorithm>
+#include <bit>
 #include <filesystem>
-#include <fstream>
+#include <new>
+#include <span>
+#include <string>
+#include <vector>
 
-#include "common/volume_io/itk_header.h"
+#include "common/base/files.h"
 #include "common/volume_io/text_header.h"
 #include "common/volume_io/volume_reader.h"
 
@@ -13,7 +18,8 @@ namespace {
 
 // Samples as a file without a value mapping can hold them: the data values themselves.
 struct FileSamples {
-  itk::IOComponentEnum type = itk::IOComponentEnum::UCHAR;
+  const char* nrrd_type = "uint8";
+  const char* meta_type = "MET_UCHAR";
   AlignedVector<std::byte> converted;  // empty: the volume's own bytes
 };
 
@@ -32,69 +38,94 @@ FileSamples ToFileSamples(const Volume& volume) {
   const ScalarType type = volume.description.type;
   if (mapping == ValueMapping{}) {
     switch (type) {
-      case ScalarType::kUint8: return {itk::IOComponentEnum::UCHAR, {}};
-      case ScalarType::kUint16: return {itk::IOComponentEnum::USHORT, {}};
-      case ScalarType::kFloat32: return {itk::IOComponentEnum::FLOAT, {}};
+      case ScalarType::kUint8: return {"uint8", "MET_UCHAR", {}};
+      case ScalarType::kUint16: return {"uint16", "MET_USHORT", {}};
+      case ScalarType::kFloat32: return {"float", "MET_FLOAT", {}};
     }
   }
   // What was read from signed integers is signed again.
   if (type == ScalarType::kUint8 && mapping == ValueMapping{1, -128}) {
-    return {itk::IOComponentEnum::CHAR, DataValues<std::uint8_t, std::int8_t>(volume)};
+    return {"int8", "MET_CHAR", DataValues<std::uint8_t, std::int8_t>(volume)};
   }
   if (type == ScalarType::kUint16 && mapping == ValueMapping{1, -32768}) {
-    return {itk::IOComponentEnum::SHORT, DataValues<std::uint16_t, std::int16_t>(volume)};
+    return {"int16", "MET_SHORT", DataValues<std::uint16_t, std::int16_t>(volume)};
   }
-  return VisitScalarType(type, [&]<class T>(const T*) { return FileSamples{itk::IOComponentEnum::FLOAT, DataValues<T, float>(volume)}; });
+  return VisitScalarType(type, [&]<class T>(const T*) { return FileSamples{"float", "MET_FLOAT", DataValues<T, float>(volume)}; });
 }
 
-itk::ImageIOBase::Pointer MakeWriter(const std::string& path) {
-  const std::string lower = ToLower(path);
-  if (lower.ends_with(".nrrd")) {
-    const itk::ImageIOBase::Pointer io = itk::NrrdImageIO::New().GetPointer();
-    io->SetUseCompression(true);
-    return io;
+constexpr bool kBigEndian = std::endian::native == std::endian::big;
+
+std::string NrrdHeader(const VolumeGeometry& geometry, const char* type) {
+  const auto& [size, spacing] = geometry;
+  return fmt::format(
+      "NRRD0004\ntype: {}\ndimension: 3\nspace: left-posterior-superior\nsizes: {} {} {}\n"
+      "space directions: ({},0,0) (0,{},0) (0,0,{})\nkinds: domain domain domain\nendian: {}\nencoding: gzip\nspace origin: (0,0,0)\n\n",
+      type, size[0], size[1], size[2], spacing[0], spacing[1], spacing[2], kBigEndian ? "big" : "little");
+}
+
+std::string MetaHeader(const VolumeGeometry& geometry, const char* type, const std::string& data_file) {
+  const auto& [size, spacing] = geometry;
+  return fmt::format(
+      "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = {}\nCompressedData = False\n"
+      "TransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = 0 0 0\nElementSpacing = {} {} {}\nDimSize = {} {} {}\nElementType = {}\n"
+      "ElementDataFile = {}\n",
+      kBigEndian ? "True" : "False", spacing[0], spacing[1], spacing[2], size[0], size[1], size[2], type, data_file);
+}
+
+// Appends the bytes as one gzip member.
+void AppendGzip(OutputFile& file, std::span<const std::byte> bytes) {
+  constexpr int kGzipWindow = 15 + 16;
+  constexpr std::size_t kBlock = std::size_t{1} << 20;
+  z_stream stream{};
+  if (deflateInit2(&stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, kGzipWindow, 8, Z_DEFAULT_STRATEGY) != Z_OK) throw std::bad_alloc();
+  std::vector<std::byte> out(kBlock);
+  for (int code = Z_OK; code != Z_STREAM_END && file.ok();) {
+    if (stream.avail_in == 0) {
+      const std::size_t taken = std::min(bytes.size(), kBlock);  // zlib counts in 32 bits
+      stream.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(bytes.data()));
+      stream.avail_in = uInt(taken);
+      bytes = bytes.subspan(taken);
+    }
+    stream.next_out = reinterpret_cast<Bytef*>(out.data());
+    stream.avail_out = uInt(out.size());
+    code = deflate(&stream, bytes.empty() ? Z_FINISH : Z_NO_FLUSH);
+    file.Append(std::span(out).first(out.size() - stream.avail_out));
   }
-  if (lower.ends_with(".mha") || lower.ends_with(".mhd")) return itk::MetaImageIO::New().GetPointer();
-  return nullptr;
+  deflateEnd(&stream);
 }
 
 }  // namespace
 
 Status WriteVolume(const Volume& volume, const std::string& path) {
-  itk::Object::GlobalWarningDisplayOff();
-  const itk::ImageIOBase::Pointer io = MakeWriter(path);
-  if (io.IsNull()) return Status::InvalidArgument(path + ": volumes are written as .nrrd, .mha or .mhd");
-  // ITK's writers differ in how they report this.
-  if (!std::ofstream(path, std::ios::binary)) return Status::InvalidArgument(path + ": cannot be opened for writing");
-
-  constexpr unsigned kDimensions = 3;
+  const std::string lower = ToLower(path);
+  const bool nrrd = lower.ends_with(".nrrd"), detached = lower.ends_with(".mhd");
+  if (!nrrd && !detached && !lower.ends_with(".mha")) {
+    return Status::InvalidArgument(path + ": volumes are written as .nrrd, .mha or .mhd");
+  }
+  Result<OutputFile> file = OutputFile::Create(path);
+  if (!file.ok()) return file.status();
   const FileSamples samples = ToFileSamples(volume);
-  io->SetFileName(path);
-  io->SetNumberOfDimensions(kDimensions);
-  io->SetNumberOfComponents(1);
-  io->SetPixelType(itk::IOPixelEnum::SCALAR);
-  io->SetComponentType(samples.type);
-  itk::ImageIORegion region(kDimensions);
-  for (unsigned i = 0; i < kDimensions; ++i) {
-    const std::int32_t size = volume.description.geometry.size[int(i)];
-    io->SetDimensions(i, itk::SizeValueType(size));
-    io->SetSpacing(i, volume.description.geometry.spacing[int(i)]);
-    io->SetOrigin(i, 0);
-    std::vector<double> direction(kDimensions);
-    direction[i] = 1;
-    io->SetDirection(i, direction);
-    region.SetSize(i, itk::SizeValueType(size));
+  const std::span<const std::byte> bytes = samples.converted.empty() ? std::span(volume.block.bytes) : std::span(samples.converted);
+  const VolumeGeometry& geometry = volume.description.geometry;
+  if (nrrd) {
+    file->Append(NrrdHeader(geometry, samples.nrrd_type));
+    AppendGzip(*file, bytes);
+    return file->Finish();
   }
-  io->SetIORegion(region);
-  try {
-    io->WriteImageInformation();
-    io->Write(samples.converted.empty() ? volume.block.bytes.data() : samples.converted.data());
-  } catch (const itk::ExceptionObject& error) {
-    return Status::Internal(path + ": cannot be written: " + CauseOf(error.GetDescription()));
-  } catch (const std::exception& error) {
-    return Status::Internal(path + ": cannot be written: " + CauseOf(error.what()));
+  if (!detached) {
+    file->Append(MetaHeader(geometry, samples.meta_type, "LOCAL"));
+    file->Append(bytes);
+    return file->Finish();
   }
-  return Status::Ok();
+  const std::filesystem::path data_path = std::filesystem::path(path).replace_extension(".raw");
+  Result<OutputFile> data = OutputFile::Create(data_path.string());
+  if (!data.ok()) return data.status();
+  data->Append(bytes);
+  file->Append(MetaHeader(geometry, samples.meta_type, data_path.filename().string()));
+  // Both are stored before either takes its place.
+  if (Status status = file->Close(); !status.ok()) return status;
+  if (Status status = data->Finish(); !status.ok()) return status;
+  return file->Finish();
 }
 
 }  // namespace slabstream

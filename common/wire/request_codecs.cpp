@@ -1,4 +1,5 @@
 #include "common/planning/validate_request.h"
+#include <algorithm>
 #include "common/wire/codecs.h"
 #include "common/wire/wire_text.h"
 
@@ -158,7 +159,7 @@ Policy FromProto(const v1::Policy& in, Checker& check) {
   out.assignment = check.Text("assignment", in.assignment(), 1, kMaxNameBytes);
   out.balance = check.Text("balance", in.balance(), 1, kMaxNameBytes);
   out.pixel_error = check.Between("pixel_error", in.pixel_error(), 0, kMaxPixelError);
-  out.teams = static_cast<int>(check.Range("teams", in.teams(), 1, kMaxTeams));
+  out.teams = std::max(1, static_cast<int>(check.Range("teams", in.teams(), 0, kMaxTeams)));  // 0: left out
   return out;
 }
 

@@ -7,13 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "client/cli/bench_cases.h"
 #include "common/image/coverage_map.h"
 #include "common/planning/cost_model.h"
 #include "common/planning/frame_plan.h"
 #include "common/planning/layout.h"
 #include "common/simulation/simulate_frames.h"
 #include "common/stats/report.h"
+#include "laboratory/bench/bench_cases.h"
 #include "laboratory/experiments/experiment.h"
 
 namespace slabstream {

@@ -8,13 +8,14 @@
 #include <ctime>
 #include <iostream>
 
-#include "client/cli/bench_machine.h"
-#include "client/cli/files.h"
 #include "client/cli/interrupt.h"
-#include "laboratory/experiments/sweep_file.h"
 #include "commit.h"
+#include "common/base/files.h"
 #include "common/base/find_named.h"
+#include "common/base/version.h"
 #include "common/transport/socket.h"
+#include "laboratory/bench/bench_machine.h"
+#include "laboratory/experiments/sweep_file.h"
 
 namespace slabstream {
 namespace {
@@ -82,8 +83,8 @@ Status RunExperiment(const ExperimentOptions& options) {
   if (!report.ok()) return report.status();
   if (interrupt.interrupted()) return Status::Cancelled("interrupted while the report was made; the same command continues");
 
-  const Provenance provenance{options.name, SLABSTREAM_VERSION, SLABSTREAM_COMMIT, options.command,   machine.cpu,
-                              machine.simd, machine.cores,      options.seed,      context.repeats(), NowUtc()};
+  const Provenance provenance{options.name, std::string(Version()), SLABSTREAM_COMMIT, options.command,   machine.cpu,
+                              machine.simd, machine.cores,          options.seed,      context.repeats(), NowUtc()};
   if (Status status = WriteReport(*report, provenance, options.folder); !status.ok()) return status;
   for (const Section& section : report->sections) {
     if (!section.answer.empty()) std::cout << fmt::format("{}: {}\n", section.title, section.answer);

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "client/cli/files.h"
+#include "common/base/files.h"
 #include "common/planning/policy_names.h"
 #include "common/renderers/registry.h"
 #include "laboratory/experiments/balanced_case.h"

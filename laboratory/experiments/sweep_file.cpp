@@ -12,6 +12,7 @@
 #include <set>
 #include <utility>
 
+#include "client/cli/json_value.h"
 #include "client/cli/values.h"
 #include "common/combining/schemes.h"
 #include "common/decomposition/decomposition.h"
@@ -26,74 +27,6 @@ namespace {
 
 constexpr int kMaxSphere = 1024;
 
-// One value of the file and its place. Whatever is wrong is noted in the reader that all values of a file share; the first mistake stays,
-// and what is read after it does not matter.
-class Value {
- public:
-  Value(const Json& json, std::string place, std::optional<std::string>& mistake)
-      : json_(&json), place_(std::move(place)), mistake_(&mistake) {}
-
-  const std::string& place() const { return place_; }
-  void Complain(const std::string& what) const {
-    if (!*mistake_) *mistake_ = place_.empty() ? what : fmt::format("{}: {}", place_, what);
-  }
-  std::string Shown() const {
-    constexpr std::size_t kMost = 60;
-    std::string text = json_->dump(-1, ' ', false, Json::error_handler_t::replace);
-    return text.size() <= kMost ? text : text.substr(0, kMost) + "...";
-  }
-
-  // An object with no other fields than these; calls the function of each that is there.
-  void Fields(const std::vector<std::pair<std::string, std::function<void(const Value&)>>>& fields) const {
-    if (!json_->is_object()) return Complain(fmt::format("{} must be an object", Shown()));
-    for (const auto& [name, value] : json_->items()) {
-      const auto found = std::ranges::find(fields, name, &std::pair<std::string, std::function<void(const Value&)>>::first);
-      if (found != fields.end()) {
-        found->second(Value(value, place_.empty() ? name : place_ + "." + name, *mistake_));
-        continue;
-      }
-      std::string known;
-      for (const auto& field : fields) known += (known.empty() ? "" : ", ") + field.first;
-      Complain(fmt::format("'{}' is no field; there are {}", name, known));
-    }
-  }
-  // A list that is not empty.
-  void Each(const std::function<void(const Value&)>& read) const {
-    if (!json_->is_array() || json_->empty()) return Complain(fmt::format("{} must be a list of at least one", Shown()));
-    for (std::size_t i = 0; i < json_->size(); ++i) read(Value((*json_)[i], fmt::format("{}[{}]", place_, i), *mistake_));
-  }
-  bool Has(const char* field) const { return json_->is_object() && json_->contains(field); }
-
-  std::string Text() const {
-    if (json_->is_string()) return json_->get<std::string>();
-    Complain(fmt::format("{} must be a text", Shown()));
-    return "";
-  }
-  double Number(const NumberRange& range) const {
-    const double value = json_->is_number() ? json_->get<double>() : std::nan("");
-    const bool inside = std::isfinite(value) && value <= range.max && (range.min_open ? value > range.min : value >= range.min);
-    if (!inside) Complain(fmt::format("{} must be a number in {}{}, {}]", Shown(), range.min_open ? "(" : "[", range.min, range.max));
-    return inside ? value : range.max;
-  }
-  int Integer(int min, int max) const {
-    const bool inside = json_->is_number_integer() && json_->get<double>() >= min && json_->get<double>() <= max;
-    if (!inside) Complain(fmt::format("{} must be a whole number in [{}, {}]", Shown(), min, max));
-    return inside ? json_->get<int>() : min;
-  }
-  std::size_t OneOf(std::span<const std::string_view> names) const {
-    const std::string text = Text();
-    const auto found = std::ranges::find(names, text);
-    if (found != names.end()) return std::size_t(found - names.begin());
-    Complain(fmt::format("{} must be one of {}", Shown(), fmt::join(names, ", ")));
-    return 0;
-  }
-
- private:
-  const Json* json_;
-  std::string place_;
-  std::optional<std::string>* mistake_;
-};
-
 template <class Entries>
 std::vector<std::string_view> NamesIn(const Entries& entries) {
   std::vector<std::string_view> names;
@@ -103,13 +36,13 @@ std::vector<std::string_view> NamesIn(const Entries& entries) {
 
 // With the choice to leave it open.
 template <class Entries>
-std::string ReadName(const Value& value, const Entries& entries) {
+std::string ReadName(const JsonValue& value, const Entries& entries) {
   std::vector<std::string_view> names = NamesIn(entries);
   if (std::ranges::find(names, kAutomatic) == names.end()) names.push_back(kAutomatic);
   return std::string(names[value.OneOf(names)]);
 }
 
-BenchCase ReadVolume(const Value& value) {
+BenchCase ReadVolume(const JsonValue& value) {
   if (value.Has("sphere") == value.Has("file")) {
     value.Complain(fmt::format("{} must have either 'sphere' or 'file'", value.Shown()));
     return {};
@@ -118,19 +51,19 @@ BenchCase ReadVolume(const Value& value) {
   double opacity = kTranslucentSphere;
   std::string file, transfer;
   value.Fields({{"sphere",
-                 [&](const Value& v) {
-                   v.Fields({{"class", [&](const Value& c) { sphere.sphere_class = SphereClass(c.Integer(1, 2)); }},
-                             {"size", [&](const Value& s) { sphere.size = s.Integer(2, kMaxSphere); }},
-                             {"occupancy", [&](const Value& o) {
+                 [&](const JsonValue& v) {
+                   v.Fields({{"class", [&](const JsonValue& c) { sphere.sphere_class = SphereClass(c.Integer(1, 2)); }},
+                             {"size", [&](const JsonValue& s) { sphere.size = s.Integer(2, kMaxSphere); }},
+                             {"occupancy", [&](const JsonValue& o) {
                                 sphere.occupancy = o.Number({0, 0.52, true});
                               }}});
                  }},
                 {"opacity",
-                 [&](const Value& v) {
+                 [&](const JsonValue& v) {
                    opacity = v.Number({0, 1, true});
                  }},
-                {"file", [&](const Value& v) { file = v.Text(); }},
-                {"transfer", [&](const Value& v) { transfer = v.Text(); }}});
+                {"file", [&](const JsonValue& v) { file = v.Text(); }},
+                {"transfer", [&](const JsonValue& v) { transfer = v.Text(); }}});
   if (!value.Has("file")) {
     if (value.Has("transfer")) value.Complain("a sphere has 'opacity', not 'transfer'");
     return SphereCase(sphere, opacity);
@@ -142,45 +75,45 @@ BenchCase ReadVolume(const Value& value) {
   return {};
 }
 
-SweepView ReadView(const Value& value, std::size_t index) {
+SweepView ReadView(const JsonValue& value, std::size_t index) {
   SweepView read{fmt::format("view {}", index + 1), {}};
   const NumberRange angle{-kMaxAngleDegrees, kMaxAngleDegrees};
   constexpr std::array<std::string_view, 2> kProjections = {"orthographic", "perspective"};
   ViewParameters& view = read.view;
   value.Fields(
-      {{"name", [&](const Value& v) { read.name = v.Text(); }},
+      {{"name", [&](const JsonValue& v) { read.name = v.Text(); }},
        {"projection",
-        [&](const Value& v) { view.projection = v.OneOf(kProjections) == 0 ? Projection::kOrthographic : Projection::kPerspective; }},
-       {"azimuth", [&](const Value& v) { view.azimuth_degrees = v.Number(angle); }},
-       {"elevation", [&](const Value& v) { view.elevation_degrees = v.Number(angle); }},
-       {"roll", [&](const Value& v) { view.roll_degrees = v.Number(angle); }},
+        [&](const JsonValue& v) { view.projection = v.OneOf(kProjections) == 0 ? Projection::kOrthographic : Projection::kPerspective; }},
+       {"azimuth", [&](const JsonValue& v) { view.azimuth_degrees = v.Number(angle); }},
+       {"elevation", [&](const JsonValue& v) { view.elevation_degrees = v.Number(angle); }},
+       {"roll", [&](const JsonValue& v) { view.roll_degrees = v.Number(angle); }},
        {"zoom",
-        [&](const Value& v) {
+        [&](const JsonValue& v) {
           view.zoom = v.Number({kMinZoom, kMaxZoom});
         }},
-       {"fov", [&](const Value& v) {
+       {"fov", [&](const JsonValue& v) {
           view.fov_degrees = v.Number({kMinFovDegrees, kMaxFovDegrees});
         }}});
   return read;
 }
 
-SweepPolicy ReadPolicy(const Value& value) {
+SweepPolicy ReadPolicy(const JsonValue& value) {
   SweepPolicy read;
   Policy& policy = read.policy;
   policy.groups = 1;
   constexpr std::array<std::string_view, 5> kAxes = {"x", "y", "z", "auto", "view"};
-  value.Fields({{"name", [&](const Value& v) { read.name = v.Text(); }},
-                {"decomposition", [&](const Value& v) { policy.decomposition = ReadName(v, Decompositions()); }},
-                {"split", [&](const Value& v) { policy.split = ReadName(v, WorkSplits()); }},
-                {"assignment", [&](const Value& v) { policy.assignment = ReadName(v, Assignments()); }},
-                {"axis", [&](const Value& v) { policy.axis = AxisChoice(v.OneOf(kAxes)); }},
-                {"balance", [&](const Value& v) { policy.balance = NamesIn(BalanceModes())[v.OneOf(NamesIn(BalanceModes()))]; }},
+  value.Fields({{"name", [&](const JsonValue& v) { read.name = v.Text(); }},
+                {"decomposition", [&](const JsonValue& v) { policy.decomposition = ReadName(v, Decompositions()); }},
+                {"split", [&](const JsonValue& v) { policy.split = ReadName(v, WorkSplits()); }},
+                {"assignment", [&](const JsonValue& v) { policy.assignment = ReadName(v, Assignments()); }},
+                {"axis", [&](const JsonValue& v) { policy.axis = AxisChoice(v.OneOf(kAxes)); }},
+                {"balance", [&](const JsonValue& v) { policy.balance = NamesIn(BalanceModes())[v.OneOf(NamesIn(BalanceModes()))]; }},
                 {"pixel_error",
-                 [&](const Value& v) {
+                 [&](const JsonValue& v) {
                    policy.pixel_error = v.Number({0, kMaxPixelError});
                  }},
-                {"groups", [&](const Value& v) { policy.groups = v.Integer(1, kMaxGroups); }},
-                {"combine", [&](const Value& v) {
+                {"groups", [&](const JsonValue& v) { policy.groups = v.Integer(1, kMaxGroups); }},
+                {"combine", [&](const JsonValue& v) {
                    policy.combine = v.Text();
                    if (policy.combine == kAutomatic) return;
                    if (const auto parsed = ParseCombining(policy.combine); !parsed.ok()) v.Complain(parsed.status().message());
@@ -189,10 +122,10 @@ SweepPolicy ReadPolicy(const Value& value) {
   return read;
 }
 
-void ReadSize(const Value& value, ImageSize& size) {
+void ReadSize(const JsonValue& value, ImageSize& size) {
   if (value.Shown().starts_with("[")) {
     std::vector<int> sides;
-    value.Each([&](const Value& v) { sides.push_back(v.Integer(1, kMaxImageSide)); });
+    value.Each([&](const JsonValue& v) { sides.push_back(v.Integer(1, kMaxImageSide)); });
     if (sides.size() != 2) return value.Complain(fmt::format("{} must be [width, height] or one number", value.Shown()));
     size = {sides[0], sides[1]};
   } else {
@@ -229,18 +162,23 @@ Result<Sweep> ParseSweep(const std::string& path, std::string_view text) {
     return Status::InvalidArgument(fmt::format("FILE '{}' is not JSON: {}", path, what.substr(what.find("] ") + 2)));
   }
   Sweep sweep;
-  const Value file(json, "", mistake);
+  const JsonValue file(json, "", mistake);
   file.Fields(
-      {{"title", [&](const Value& v) { sweep.title = v.Text(); }},
-       {"size", [&](const Value& v) { ReadSize(v, sweep.size); }},
-       {"volumes", [&](const Value& v) { v.Each([&](const Value& e) { sweep.volumes.push_back(ReadVolume(e)); }); }},
+      {{"title", [&](const JsonValue& v) { sweep.title = v.Text(); }},
+       {"size", [&](const JsonValue& v) { ReadSize(v, sweep.size); }},
+       {"volumes", [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.volumes.push_back(ReadVolume(e)); }); }},
        {"renderers",
-        [&](const Value& v) { v.Each([&](const Value& e) { sweep.renderers.push_back(Renderers()[e.OneOf(RendererNames())]); }); }},
-       {"views", [&](const Value& v) { v.Each([&](const Value& e) { sweep.views.push_back(ReadView(e, sweep.views.size())); }); }},
-       {"policies", [&](const Value& v) { v.Each([&](const Value& e) { sweep.policies.push_back(ReadPolicy(e)); }); }},
-       {"workers", [&](const Value& v) { v.Each([&](const Value& e) { sweep.workers.push_back(e.Integer(1, kMaxSweepWorkers)); }); }},
-       {"links", [&](const Value& v) {
-          v.Each([&](const Value& e) {
+        [&](const JsonValue& v) {
+          v.Each([&](const JsonValue& e) {
+            sweep.renderers.push_back(Renderers()[e.OneOf(RendererNames())]);
+          });
+        }},
+       {"views", [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.views.push_back(ReadView(e, sweep.views.size())); }); }},
+       {"policies", [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.policies.push_back(ReadPolicy(e)); }); }},
+       {"workers",
+        [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.workers.push_back(e.Integer(1, kMaxSweepWorkers)); }); }},
+       {"links", [&](const JsonValue& v) {
+          v.Each([&](const JsonValue& e) {
             const std::string name = e.Text();
             const Result<LinkModel> link = ParseLink("link", name);
             if (link.ok()) {

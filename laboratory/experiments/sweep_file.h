@@ -5,10 +5,10 @@
 #include <string_view>
 #include <vector>
 
-#include "client/cli/bench_cases.h"
 #include "common/base/status.h"
 #include "common/frame/frame_request.h"
 #include "common/simulation/link_model.h"
+#include "laboratory/bench/bench_cases.h"
 
 namespace slabstream {
 

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <filesystem>
 
-#include "client/cli/files.h"
+#include "common/base/files.h"
 
 namespace slabstream {
 namespace {

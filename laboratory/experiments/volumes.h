@@ -8,11 +8,11 @@
 #include <utility>
 #include <vector>
 
-#include "client/cli/bench_cases.h"
 #include "common/base/status.h"
 #include "common/volume/occupancy_grid.h"
 #include "common/volume/summary.h"
 #include "common/volume/volume.h"
+#include "laboratory/bench/bench_cases.h"
 
 namespace slabstream {
 

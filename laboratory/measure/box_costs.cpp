@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "laboratory/measure/lab_worker.h"
 #include "common/base/check.h"
+#include "laboratory/measure/lab_worker.h"
 
 namespace slabstream {
 

@@ -4,11 +4,11 @@
 #include <thread>
 #include <utility>
 
+#include "common/planning/frame_plan.h"
+#include "common/volume/sphere.h"
 #include "laboratory/measure/combining_costs.h"
 #include "laboratory/measure/hand_over_probe.h"
 #include "laboratory/measure/neighbours.h"
-#include "common/planning/frame_plan.h"
-#include "common/volume/sphere.h"
 
 namespace slabstream {
 namespace {

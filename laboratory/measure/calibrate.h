@@ -5,10 +5,10 @@
 //   neighbours    two halves of a sphere rendered alone and at once (neighbours.h)
 #pragma once
 
-#include "laboratory/measure/hand_over_fit.h"
-#include "laboratory/measure/statistics.h"
 #include "common/base/status.h"
 #include "common/simulation/machine_model.h"
+#include "laboratory/measure/hand_over_fit.h"
+#include "laboratory/measure/statistics.h"
 
 namespace slabstream {
 

@@ -5,10 +5,11 @@
 #include <thread>
 #include <vector>
 
-#include "laboratory/measure/thread_time.h"
 #include "common/base/check.h"
 #include "common/image/coverage_map.h"
 #include "common/kernels/combine.h"
+#include "laboratory/measure/statistics.h"
+#include "laboratory/measure/thread_time.h"
 
 namespace slabstream {
 namespace {
@@ -47,7 +48,7 @@ double MedianSeconds(Prepare&& prepare, Work&& work) {
     EmptyCaches();
     seconds.push_back(SecondsOf(work));
   }
-  return UpperMedian(std::move(seconds));
+  return MedianOf(std::move(seconds)).median;
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "common/renderers/renderer_kind.h"
 #include "common/wire/payload.h"
 #include "coordinator/clients.h"
+#include "laboratory/measure/statistics.h"
 #include "laboratory/measure/thread_time.h"
 #include "worker/renderers/renderer.h"
 
@@ -93,7 +94,7 @@ PictureCost MeasurePictureCost(const Volume& volume, const FrameSetup& setup, in
     finish_seconds.push_back(cost.finish_seconds);
     receive_seconds.push_back(cost.receive_seconds);
   }
-  return {.finish_seconds = UpperMedian(std::move(finish_seconds)), .receive_seconds = UpperMedian(std::move(receive_seconds))};
+  return {.finish_seconds = MedianOf(std::move(finish_seconds)).median, .receive_seconds = MedianOf(std::move(receive_seconds)).median};
 }
 
 FrameCosts MeasureFrameCosts(const Volume& volume, const FramePlan& plan, int repeats) {

@@ -5,12 +5,12 @@
 #include <deque>
 #include <vector>
 
-#include "laboratory/measure/box_costs.h"
-#include "laboratory/measure/lab_worker.h"
 #include "common/planning/frame_plan.h"
-#include "common/simulation/cost_fit.h"
 #include "common/simulation/simulate_frames.h"
 #include "common/wire/payload.h"
+#include "laboratory/measure/box_costs.h"
+#include "laboratory/measure/cost_fit.h"
+#include "laboratory/measure/lab_worker.h"
 
 namespace slabstream {
 

@@ -12,8 +12,8 @@
 
 #include <span>
 
-#include "laboratory/measure/statistics.h"
 #include "common/simulation/machine_model.h"
+#include "laboratory/measure/statistics.h"
 
 namespace slabstream {
 

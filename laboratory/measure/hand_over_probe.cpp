@@ -4,8 +4,8 @@
 #include <memory>
 #include <string>
 
-#include "laboratory/measure/lab_service.h"
 #include "common/volume/sphere.h"
+#include "laboratory/measure/lab_service.h"
 
 namespace slabstream {
 namespace {

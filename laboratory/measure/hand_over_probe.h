@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include "laboratory/measure/hand_over_fit.h"
 #include "common/base/status.h"
+#include "laboratory/measure/hand_over_fit.h"
 
 namespace slabstream {
 

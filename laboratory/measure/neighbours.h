@@ -1,9 +1,9 @@
 // Neighbours: how much two renderers of one host slow each other down, for they share caches and memory.
 #pragma once
 
-#include "laboratory/measure/statistics.h"
 #include "common/planning/frame_plan.h"
 #include "common/volume/volume.h"
+#include "laboratory/measure/statistics.h"
 
 namespace slabstream {
 

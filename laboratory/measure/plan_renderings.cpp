@@ -4,11 +4,11 @@
 #include <future>
 #include <span>
 
-#include "laboratory/measure/lab_worker.h"
-#include "laboratory/measure/neighbours.h"
 #include "common/base/task_thread.h"
 #include "common/base/time.h"
 #include "common/planning/placement.h"
+#include "laboratory/measure/lab_worker.h"
+#include "laboratory/measure/neighbours.h"
 
 namespace slabstream {
 namespace {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "laboratory/measure/recording.h"
+#include "client/cli/recording.h"
 #include "common/base/status.h"
 #include "common/simulation/machine_model.h"
 

@@ -30,4 +30,12 @@ Estimate MedianOf(std::vector<double> values, double confidence) {
   return estimate;
 }
 
+double Quantile(std::vector<double> values, double q) {
+  CHECK(!values.empty() && q >= 0 && q <= 1) << q;
+  const auto rank = std::max(0.0, std::ceil(q * double(values.size())) - 1);
+  const auto found = values.begin() + std::ptrdiff_t(rank);
+  std::nth_element(values.begin(), found, values.end());
+  return *found;
+}
+
 }  // namespace slabstream

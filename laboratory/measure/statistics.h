@@ -1,4 +1,4 @@
-// What repeats of a measurement say: their median and how sure it is. Pure.
+// What repeats of a measurement say: their median, how sure it is, and quantiles. Pure.
 #pragma once
 
 #include <vector>
@@ -20,6 +20,9 @@ struct Estimate {
   Estimate Times(double factor) const { return {median * factor, low * factor, high * factor, coverage, count}; }
 };
 Estimate MedianOf(std::vector<double> values, double confidence = 0.95);  // no values: all zero
+
+// The q-quantile by nearest rank: the least of the values that at least a share q of them do not exceed. At least one value, q in [0, 1].
+double Quantile(std::vector<double> values, double q);
 
 // Coverage of the interval between the k-th smallest and the k-th largest of `count` values, 1 <= k <= (count + 1) / 2.
 double MedianCoverage(int count, int k);

@@ -3,10 +3,7 @@
 
 #include <time.h>
 
-#include <algorithm>
-#include <cstddef>
 #include <utility>
-#include <vector>
 
 #include "common/base/check.h"
 
@@ -23,13 +20,6 @@ double SecondsOf(Work&& work) {
   const double begin = ThreadSeconds();
   std::forward<Work>(work)();
   return ThreadSeconds() - begin;
-}
-
-// Of at least one value; the upper one of the two in the middle.
-inline double UpperMedian(std::vector<double> values) {
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 }  // namespace slabstream

@@ -5,13 +5,13 @@
 #include <map>
 #include <utility>
 
+#include "common/base/check.h"
+#include "common/planning/placement.h"
 #include "laboratory/measure/calibrate.h"
 #include "laboratory/measure/frame_costs.h"
 #include "laboratory/measure/hand_over_probe.h"
 #include "laboratory/measure/lab_service.h"
 #include "laboratory/measure/plan_renderings.h"
-#include "common/base/check.h"
-#include "common/planning/placement.h"
 
 namespace slabstream {
 namespace {

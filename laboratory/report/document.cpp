@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "client/cli/files.h"
+#include "common/base/files.h"
 
 namespace slabstream {
 

@@ -37,6 +37,25 @@ TEST_F(ServiceStateTest, TheDirectoryIsOursAlone) {
 
   ASSERT_EQ(::chmod(directory->c_str(), 0755), 0);
   EXPECT_EQ(StateDirectory().status().code(), StatusCode::kUnavailable);
+  EXPECT_THAT(StateDirectory().status().message(), testing::HasSubstr("XDG_RUNTIME_DIR"));
+}
+
+TEST_F(ServiceStateTest, ARuntimeDirectoryThatIsMissingOrForeignIsPassedOver) {
+  const std::string fallback = "/tmp/slabstream-" + std::to_string(::getuid());
+  const bool was_there = std::filesystem::exists(fallback);
+  std::string foreign = "/";
+  if (::getuid() == 0) {
+    foreign = directory_ + "/foreign";
+    std::filesystem::create_directory(foreign);
+    ASSERT_EQ(::chown(foreign.c_str(), 65534, 65534), 0);
+  }
+  for (const std::string& path : {std::string("/nowhere/at/all"), foreign}) {
+    ::setenv("XDG_RUNTIME_DIR", path.c_str(), 1);
+    const Result<std::string> directory = StateDirectory();
+    EXPECT_EQ(directory.ok() ? *directory : directory.status().message(), fallback) << path;
+  }
+  std::error_code in_use;  // by a service of this user
+  if (!was_there) std::filesystem::remove(fallback, in_use);
 }
 
 TEST_F(ServiceStateTest, ALinkInItsPlaceIsRefused) {

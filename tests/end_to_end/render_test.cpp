@@ -118,6 +118,27 @@ TEST_F(RenderTest, BackgroundAndSixteenBitsReachTheFile) {
   EXPECT_EQ(picture.At(0, 0, 3), 1);
 }
 
+TEST_F(RenderTest, AnOptionHasTheSameMeaningInEachOfItsSpellings) {
+  Render("a.png");
+  const std::string picture = ReadFile("a.png");
+  const std::vector<std::vector<std::string>> spellings = {
+      {ball_, "--local", "2", "--transfer", "opaque"},
+      {"--local", "2", ball_, "--transfer", "opaque"},
+      {"--local", ball_, "--transfer", "opaque"},
+      {ball_ + ":opaque", "--local"},
+      {ball_, "--transfer", "opaque", "--local=2", "--balance-by", "voxels", "--frame-parallel", "1"},
+      {ball_, "--transfer", "opaque", "--local=2", "--split", "voxels", "--teams", "1"},
+  };
+  for (std::vector<std::string> arguments : spellings) {
+    arguments.insert(arguments.begin(), "render");
+    const std::vector<std::string> rest = {"-o", "b.png", "--size", std::to_string(kPixels), "--shading", "none"};
+    arguments.insert(arguments.end(), rest.begin(), rest.end());
+    MustRun(arguments);
+    EXPECT_EQ(ReadFile("b.png"), picture) << arguments[1] << " " << arguments[2];
+  }
+  EXPECT_EQ(Slabstream({"render", ball_ + ":opaque", "--transfer", "auto", "--local", "-o", "c.png"}).exit_status, 2);
+}
+
 TEST_F(RenderTest, APictureWithoutAnythingToSeeIsEmpty) {
   const PictureFile picture = Render("ball.png", {"--zoom", "0.001"});
   EXPECT_EQ(picture.width, kPixels);

@@ -8,6 +8,7 @@
 
 #include "tests/end_to_end/picture_file.h"
 #include "tests/end_to_end/program.h"
+#include "tests/support/full_disk.h"
 
 namespace slabstream {
 namespace {
@@ -65,6 +66,20 @@ TEST_F(ServiceTest, NeitherThreadsNorPackingChangeThePicture) {
   MustRun({"render", "ball", "-o", "service.exr", "--size", "64"});
   MustRun({"render", ball_, "--local=1", "--threads", "1", "-o", "local.exr", "--size", "64"});
   EXPECT_EQ(LargestDifference(ReadPicture(Path("service.exr")), ReadPicture(Path("local.exr"))), 0);
+}
+
+TEST_F(ServiceTest, AFullDiskEndsATurntableAndKeepsTheOlderPictures) {
+  Up(endpoint_);
+  MustRun({"turntable", "ball", "--frames", "2", "-o", "f%d.png", "--size", "64"});
+  const std::string before = ReadFile("f0.png");
+  const ProgramResult result = OnFullDisk(1000, [&] {
+    return Slabstream({"turntable", "ball", "--frames", "2", "-o", "f%d.png", "--size", "64", "--azimuth", "45"});
+  });
+  EXPECT_EQ(result.exit_status, 1);
+  EXPECT_EQ(result.out, "");
+  EXPECT_THAT(result.err, HasSubstr("cannot write 'f0.png': File too large"));
+  EXPECT_EQ(ReadFile("f0.png"), before);
+  EXPECT_EQ(Files(), (std::vector<std::string>{"ball.nrrd", "f0.png", "f1.png"}));
 }
 
 TEST_F(ServiceTest, VoxelsStayWithTheWorkersAcrossClients) {

@@ -3,8 +3,10 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "tests/end_to_end/program.h"
+#include "tests/support/full_disk.h"
 
 namespace slabstream {
 namespace {
@@ -51,6 +53,18 @@ TEST_F(VolumeToolsTest, SpheresAreDeterministicInEveryFormat) {
   }
 }
 
+TEST_F(VolumeToolsTest, AFullDiskKeepsTheOlderVolume) {
+  for (const std::string name : {"s.nrrd", "s.mha", "s.mhd"}) {
+    MakeSphere(name, 2, 20);
+    const json before = Info(name);
+    const ProgramResult result = OnFullDisk(100, [&] { return Slabstream({"sphere", "--class", "2", "--size", "30", "-o", name}); });
+    EXPECT_EQ(result.exit_status, 1) << name;
+    EXPECT_EQ(result.out, "");
+    EXPECT_THAT(result.err, HasSubstr("File too large"));
+    EXPECT_EQ(Info(name), before);
+  }
+}
+
 TEST_F(VolumeToolsTest, InfoIsReadable) {
   MakeSphere("s.nrrd", 1, 20);
   const std::string text = MustRun({"info", "s.nrrd"}).out;
@@ -62,6 +76,34 @@ TEST_F(VolumeToolsTest, InfoIsReadable) {
 TEST_F(VolumeToolsTest, HelpNamesWhatCanBeChosen) {
   const std::string text = MustRun({"render", "--help"}).out;
   for (const char* part : {"--local", "--transfer", "auto", "opaque", "slab", "fan-in", "--azimuth"}) EXPECT_THAT(text, HasSubstr(part));
+  EXPECT_EQ(MustRun({"help", "render"}).out, text);
+  EXPECT_EQ(MustRun({"help"}).out, MustRun({"--help"}).out);
+  EXPECT_THAT(MustRun({"help", "experiment", "replay"}).out, HasSubstr("--with KEY=VALUE"));
+  EXPECT_EQ(Slabstream({"help", "rendr"}).exit_status, 2);
+}
+
+TEST_F(VolumeToolsTest, HelpExplainsEveryOptionInWords) {
+  for (const char* command : {"render", "turntable", "info", "sphere", "up", "down", "status", "bench", "experiment", "help"}) {
+    const std::string text = MustRun({command, "--help"}).out;
+    for (const char* notation : {"REQUIRED", "{", "}", ":{", " x ", "Needs:", "Excludes:", "=36"}) {
+      EXPECT_THAT(text, testing::Not(HasSubstr(notation))) << command;
+    }
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);) {
+      // An option that stands alone has its text on the next line; that line is indented.
+      if (line.rfind("  -", 0) != 0 || line.size() > 34) continue;
+      ASSERT_TRUE(std::getline(lines, line)) << command;
+      EXPECT_EQ(line.rfind(std::string(30, ' '), 0), 0U) << command << ": no text before '" << line << "'";
+    }
+  }
+  const std::string text = MustRun({"turntable", "--help"}).out;
+  for (const char* heading : {"View:", "Look:", "Distribution", "Output:", "(required)", "(default: 512)"})
+    EXPECT_THAT(text, HasSubstr(heading));
+  for (const char* old : {"--split", "--teams"}) EXPECT_THAT(text, testing::Not(HasSubstr(old)));
+}
+
+TEST_F(VolumeToolsTest, EveryProgramTellsItsVersion) {
+  EXPECT_THAT(MustRun({"--version"}).out, testing::MatchesRegex("slabstream [0-9]+\\.[0-9]+\\.[0-9]+\n"));
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // Files are read back with OpenImageIO, unconverted, and compared with what the format promises.
 #include "client/image_io/image_writer.h"
+#include "tests/support/full_disk.h"
 #include "tests/support/temporary_directory.h"
 
 #include <OpenImageIO/imageio.h>
@@ -141,6 +142,24 @@ TEST_F(ImageWriterTest, AnOlderPictureIsReplacedOnlyByAWholeOne) {
   ASSERT_EQ(WritePicture(TwoPixels(PixelFormat::kRgba), kSize, Path("a.png"), {}), Status::Ok());
   EXPECT_EQ(Read(Path("a.png")).spec.width, 6);
   EXPECT_EQ(FileCount(), 1U);
+}
+
+TEST_F(ImageWriterTest, AFullDiskIsToldAndKeepsTheOlderPicture) {
+  LocalImage noise = MakeLocalImage(PixelFormat::kRgba, {0, 0, 64, 64});
+  for (std::size_t i = 0; i < noise.rgba.size(); ++i) noise.rgba[i] = float(i * 2654435761U % 1000U) / 1000;
+  for (const std::string name : {"a.png", "a.exr"}) {
+    ASSERT_EQ(WritePicture(noise, {64, 64}, Path(name), {}), Status::Ok());
+    const auto whole = std::filesystem::file_size(Path(name));
+    ASSERT_EQ(WritePicture(TwoPixels(PixelFormat::kRgba), kSize, Path(name), {}), Status::Ok());
+    const auto bytes = std::filesystem::file_size(Path(name));
+    // From the first byte to the last, which only closing writes.
+    for (const std::uintmax_t limit : {std::uintmax_t{0}, whole / 2, whole - 1}) {
+      const Status status = OnFullDisk(limit, [&] { return WritePicture(noise, {64, 64}, Path(name), {}); });
+      EXPECT_EQ(status, Status::Unavailable("cannot write '" + Path(name) + "': File too large")) << limit;
+      EXPECT_EQ(std::filesystem::file_size(Path(name)), bytes);
+    }
+  }
+  EXPECT_EQ(FileCount(), 2U);
 }
 
 }  // namespace

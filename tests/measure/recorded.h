@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "laboratory/measure/recording.h"
+#include "client/cli/recording.h"
 #include "tests/support/random.h"
 #include "tests/support/renderers.h"
 

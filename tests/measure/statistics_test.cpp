@@ -20,6 +20,16 @@ TEST(MedianCoverage, IsThatOfTheTables) {
   EXPECT_NEAR(MedianCoverage(1, 1), 0, 1e-12);
 }
 
+TEST(Quantile, IsTheLeastValueThatTheShareDoesNotExceed) {
+  EXPECT_EQ(Quantile({5}, 0), 5);
+  EXPECT_EQ(Quantile({5}, 1), 5);
+  EXPECT_EQ(Quantile({4, 1, 3, 2}, 0), 1);
+  EXPECT_EQ(Quantile({4, 1, 3, 2}, 0.25), 1);
+  EXPECT_EQ(Quantile({4, 1, 3, 2}, 0.26), 2);
+  EXPECT_EQ(Quantile({4, 1, 3, 2}, 0.75), 3);
+  EXPECT_EQ(Quantile({4, 1, 3, 2}, 1), 4);
+}
+
 TEST(MedianOf, KnownValues) {
   const Estimate none = MedianOf({});
   EXPECT_EQ(none.count, 0);

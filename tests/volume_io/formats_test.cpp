@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "common/volume_io/volume_reader.h"
+#include "tests/support/full_disk.h"
 #include "tests/support/random_volume.h"
 #include "tests/volume_io/volume_files.h"
 
@@ -241,6 +242,38 @@ TEST(Geometry, ReadsDirectionsAndOriginForInfo) {
   EXPECT_EQ(loaded.info.directions[2], (Vec3{0, 0, 1}));
 }
 
+TEST(Nifti, ReadsDirectionsAndOriginForInfo) {
+  const TemporaryDirectory directory;
+  const auto expect = [&](std::int16_t qform, std::int16_t sform, const Vec3& origin, const std::array<Vec3, 3>& directions) {
+    for (const bool big_endian : {false, true}) {
+      WriteFile(directory / "v.nii", NiftiHeader({.big_endian = big_endian, .qform = qform, .sform = sform}) + std::string(24, 'x'));
+      const VolumeFileInfo info = Read(directory / "v.nii").info;
+      for (int i = 0; i < 3; ++i) {
+        EXPECT_NEAR(info.origin[i], origin[i], 1e-6) << qform << sform;
+        for (int axis = 0; axis < 3; ++axis) {
+          EXPECT_NEAR(info.directions[std::size_t(axis)][i], directions[std::size_t(axis)][i], 1e-6) << qform << sform;
+        }
+      }
+    }
+  };
+  // NIfTI's x and y run to the right and to anterior, ours to the left and to posterior.
+  const std::array<Vec3, 3> turned = {Vec3{0, -1, 0}, Vec3{1, 0, 0}, Vec3{0, 0, 1}},
+                            swapped = {Vec3{-1, 0, 0}, Vec3{0, 0, 1}, Vec3{0, -1, 0}};
+  expect(0, 0, {0, 0, 0}, {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}});
+  expect(1, 0, {-1, -2, 3}, turned);
+  expect(2, 2, {-1, -2, 3}, turned);
+  expect(0, 2, {-4, -5, 6}, swapped);
+  expect(2, 1, {-4, -5, 6}, swapped);
+}
+
+TEST(Nrrd, TurnsOtherSpacesToLeftPosteriorSuperior) {
+  const TemporaryDirectory directory;
+  std::string header = NrrdHeader({}, "raw");
+  header.insert(header.find("endian:"), "space: right-anterior-superior\nspace origin: (1,2,3)\n");
+  WriteFile(directory / "v.nrrd", header + std::string(24, 'x'));
+  EXPECT_EQ(Read(directory / "v.nrrd").info.origin, (Vec3{-1, -2, 3}));
+}
+
 TEST(Nrrd, SkipsBytesBeforeTheSamples) {
   const TemporaryDirectory directory;
   std::string samples;
@@ -334,8 +367,27 @@ TEST(WriteVolume, SaysWhatItCannotWrite) {
   EXPECT_EQ(ending.code(), StatusCode::kInvalidArgument);
   EXPECT_THAT(ending.message(), testing::AllOf(HasSubstr("v.png"), HasSubstr(".nrrd, .mha or .mhd")));
   const Status place = WriteVolume(volume, directory / "nowhere/v.nrrd");
-  EXPECT_EQ(place.code(), StatusCode::kInvalidArgument);
-  EXPECT_THAT(place.message(), HasSubstr("cannot be opened"));
+  EXPECT_EQ(place.code(), StatusCode::kUnavailable);
+  EXPECT_THAT(place.message(), testing::AllOf(HasSubstr("nowhere/v.nrrd"), HasSubstr("No such file or directory")));
+}
+
+TEST(WriteVolume, TellsAFullDiskAndKeepsTheOlderVolume) {
+  Random random(12);
+  SCOPED_TRACE(random.trace());
+  const TemporaryDirectory directory;
+  const Volume small = RandomVolume(random, {4, 4, 4}, ScalarType::kUint8), large = RandomVolume(random, {40, 40, 40}, ScalarType::kUint8);
+  for (const char* file : {"v.nrrd", "v.mha", "v.mhd"}) {
+    ASSERT_TRUE(WriteVolume(small, directory / file).ok());
+    for (const std::int64_t limit : {0, 1000, 40 * 40 * 40 - 1}) {
+      const Status status = OnFullDisk(rlim_t(limit), [&] { return WriteVolume(large, directory / file); });
+      EXPECT_EQ(status.code(), StatusCode::kUnavailable);
+      EXPECT_THAT(status.message(), HasSubstr("File too large"));
+      EXPECT_EQ(Read(directory / file).volume->block.bytes, small.block.bytes) << file;
+    }
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(directory.path())) names.push_back(entry.path().filename());
+    EXPECT_THAT(names, testing::Each(testing::Not(HasSubstr("tmp"))));
+  }
 }
 
 }  // namespace

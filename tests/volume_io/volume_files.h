@@ -1,4 +1,4 @@
-// Volume files written byte by byte from the formats' definitions, so that the readers are not tested against ITK's own idea of them.
+// Volume files written byte by byte from the formats' definitions, so that the readers are not tested against a library's idea of them.
 #pragma once
 
 #include <cstdint>
@@ -28,6 +28,7 @@ struct FileSpec {
   bool big_endian = false;
   Vec3 spacing = {1, 1, 1};
   float slope = 1, intercept = 0;        // NIfTI only
+  std::int16_t qform = 0, sform = 0;     // NIfTI only: codes
   std::vector<std::int16_t> dimensions;  // NIfTI only: dim[1] ... instead of `size`
 };
 

@@ -294,6 +294,8 @@ TEST(FieldChecks, Clients) {
       {[&](auto& e) { frame(e)->mutable_shading()->set_shininess(0); }, "SubmitFrame.frame: shading.shininess"},
       {[&](auto& e) { frame(e)->set_termination(0.75); }, "SubmitFrame.frame: termination"},
       {[&](auto& e) { frame(e)->mutable_policy()->set_groups(1025); }, "SubmitFrame.frame.policy.groups: 1025 is not in [0, 1024]"},
+      {[&](auto& e) { frame(e)->mutable_policy()->set_teams(1025); }, "SubmitFrame.frame.policy.teams: 1025 is not in [0, 1024]"},
+      {[&](auto& e) { frame(e)->mutable_policy()->set_teams(0); }, ""},
       {[&](auto& e) { frame(e)->mutable_policy()->clear_combine(); },
        "SubmitFrame.frame.policy.combine: a text of 0 bytes, expected 1 to 256"},
   });

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/simulation/cost_fit.h"
 #include "laboratory/experiments/paper/measures.h"
 #include "laboratory/experiments/paper/printed.h"
+#include "laboratory/measure/cost_fit.h"
 #include "laboratory/report/text.h"
 
 namespace slabstream {

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "client/cli/files.h"
+#include "common/base/files.h"
 #include "client/cli/session.h"
 #include "client/image_io/image_writer.h"
 #include "common/renderers/registry.h"

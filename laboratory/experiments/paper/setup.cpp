@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <numbers>
 
-#include "client/cli/bench_machine.h"
 #include "common/renderers/registry.h"
+#include "laboratory/bench/bench_machine.h"
 #include "laboratory/experiments/machines.h"
 #include "laboratory/experiments/paper/printed.h"
 

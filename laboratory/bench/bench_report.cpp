@@ -1,14 +1,15 @@
-#include "client/cli/bench_report.h"
+#include "laboratory/bench/bench_report.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "client/cli/cores.h"
 #include "client/cli/frame_summary.h"
 #include "common/base/check.h"
+#include "common/base/version.h"
+#include "laboratory/measure/statistics.h"
 
 namespace slabstream {
 namespace {
@@ -58,12 +59,10 @@ Json CaseJson(const BenchRun& run, const BenchResult& result) {
 
 }  // namespace
 
-Spread SpreadOf(std::vector<double> values) {
+Spread SpreadOf(const std::vector<double>& values) {
   if (values.empty()) return {};
-  std::sort(values.begin(), values.end());
-  const std::size_t count = values.size();
-  const auto rank = [&](double share) { return values[std::size_t(std::max(0.0, std::ceil(share * double(count)) - 1))]; };
-  return {int(count), (values[(count - 1) / 2] + values[count / 2]) / 2, rank(0.05), rank(0.95), values.front(), values.back()};
+  return {int(values.size()),     MedianOf(values).median, Quantile(values, 0.05),
+          Quantile(values, 0.95), Quantile(values, 0),     Quantile(values, 1)};
 }
 
 void SetFrames(BenchResult& result, std::span<const FrameJob> jobs, std::span<const FrameRecord> records) {
@@ -76,7 +75,7 @@ void SetFrames(BenchResult& result, std::span<const FrameJob> jobs, std::span<co
     const StageTimes stage_ns = Summarize(records[i].statistics).stage_ns;
     for (std::size_t stage = 0; stage < stages.size(); ++stage) stages[stage].push_back(double(stage_ns[stage]) / 1e6);
   }
-  for (std::size_t stage = 0; stage < stages.size(); ++stage) result.stage_median_ms[stage] = SpreadOf(std::move(stages[stage])).median;
+  for (std::size_t stage = 0; stage < stages.size(); ++stage) result.stage_median_ms[stage] = MedianOf(std::move(stages[stage])).median;
 }
 
 std::string BenchHeader(const BenchRun& run, std::size_t name_width) {
@@ -99,14 +98,14 @@ std::string BenchRow(const BenchResult& result, std::size_t name_width) {
   const auto mebibytes = [](std::int64_t bytes) { return double(bytes) / (1 << 20); };
   return fmt::format("{:<{}} {:>15} {:>8} {:>8.2f} {:>8.2f} {:>8.2f} {:>8.2f} {:>8.2f} {:>8.2f} {:>8.2f} {:>8.1f} {:>7.1f} {:>7.1f}\n",
                      c.name, name_width, fmt::format("{}x{}x{}", size.x, size.y, size.z), c.renderer->name(),
-                     SpreadOf(result.orthographic_ms).median, SpreadOf(result.perspective_ms).median, both.median, both.p05, both.p95,
+                     MedianOf(result.orthographic_ms).median, MedianOf(result.perspective_ms).median, both.median, both.p05, both.p95,
                      both.min, both.max, result.first_frame_ms, mebibytes(result.description.voxel_bytes()),
                      mebibytes(result.peak_rss_bytes));
 }
 
 std::string BenchJson(const BenchRun& run, const std::vector<BenchResult>& results) {
   const BenchOptions& o = run.options;
-  Json json = {{"version", SLABSTREAM_VERSION},
+  Json json = {{"version", Version()},
                {"command", o.command},
                {"machine", {{"cpu", run.machine.cpu}, {"cores", run.machine.cores}, {"simd", run.machine.simd}}},
                {"size", o.size},

@@ -1,4 +1,4 @@
-#include "client/cli/bench_cases.h"
+#include "laboratory/bench/bench_cases.h"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "client/cli/input_volume.h"
-#include "client/cli/option_groups.h"
+#include "client/cli/volume_argument.h"
 
 namespace slabstream {
 namespace {
@@ -88,26 +88,20 @@ Result<BenchCase> ParseBenchCase(const std::string& text, bool at_service) {
   for (const BenchCase& standard : StandardBenchCases()) {
     if (standard.name == text) return standard;
   }
-  // A colon may belong to the name of a file that is there.
+  Result<VolumeArgument> argument = ParseVolumeArgument("CASE", text, !at_service);
+  if (!argument.ok()) return argument.status();
   std::error_code error;
-  const std::size_t colon = !at_service && std::filesystem::exists(text, error) ? std::string::npos : text.rfind(':');
-  const std::string source = text.substr(0, colon);
-  if (!at_service && !std::filesystem::exists(source, error)) {
+  if (!at_service && !std::filesystem::exists(argument->volume, error)) {
     return Status::NotFound(fmt::format("CASE '{}' is neither a file nor a standard case (--list names them)", text));
   }
-  if (!at_service && !LooksLikeVolume(source)) return Status::InvalidArgument(fmt::format("CASE '{}' is not a volume file", text));
+  if (!at_service && !LooksLikeVolume(argument->volume))
+    return Status::InvalidArgument(fmt::format("CASE '{}' is not a volume file", text));
 
   BenchCase bench_case;
-  bench_case.volume = source;
-  bench_case.dataset = at_service ? source : Stem(source);
-  std::string transfer = "auto";
-  if (colon != std::string::npos) {
-    transfer = text.substr(colon + 1);
-    auto choice = ParseTransfer(fmt::format("CASE '{}':", text), transfer);
-    if (!choice.ok()) return choice.status();
-    bench_case.transfer.choice = *std::move(choice);
-  }
-  bench_case.name = bench_case.dataset + "-" + Stem(transfer);
+  bench_case.volume = argument->volume;
+  bench_case.dataset = at_service ? argument->volume : Stem(argument->volume);
+  bench_case.name = bench_case.dataset + "-" + (argument->transfer ? Stem(argument->transfer_text) : "auto");
+  if (argument->transfer) bench_case.transfer.choice = *std::move(argument->transfer);
   return bench_case;
 }
 

@@ -7,20 +7,20 @@
 #include <string>
 #include <vector>
 
-#include "client/cli/bench_cases.h"
-#include "client/cli/bench_machine.h"
 #include "client/cli/frame_loop.h"
-#include "client/cli/options.h"
 #include "common/stats/report.h"
+#include "laboratory/bench/bench.h"
+#include "laboratory/bench/bench_cases.h"
+#include "laboratory/bench/bench_machine.h"
 
 namespace slabstream {
 
-// Of times in ms. Quantiles by nearest rank; the median of an even number is the mean of the two in the middle.
+// Of times in ms. Quantiles by nearest rank, the median as in statistics.h.
 struct Spread {
   int count = 0;
   double median = 0, p05 = 0, p95 = 0, min = 0, max = 0;
 };
-Spread SpreadOf(std::vector<double> values);
+Spread SpreadOf(const std::vector<double>& values);
 
 struct BenchResult {
   BenchCase bench_case;

@@ -1,4 +1,4 @@
-#include "client/cli/bench_machine.h"
+#include "laboratory/bench/bench_machine.h"
 
 #include <malloc.h>
 #include <sched.h>

@@ -1,4 +1,4 @@
-#include "laboratory/measure/recording.h"
+#include "client/cli/recording.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -63,7 +63,7 @@ TEST(Recording, WhatIsWrongIsNamed) {
       {"version", [](Json& r, Json&, Json&) { r["version"] = 2; }},
       {"frames", [](Json& r, Json&, Json&) { r["frames"] = Json::array(); }},
       {"slabstream.frames", [](Json& r, Json&, Json&) { r.erase("frames"); }},
-      {"frames[1] is no object", [](Json&, Json& f, Json&) { f = 3; }},
+      {"frames[1]: 3 must be an object", [](Json&, Json& f, Json&) { f = 3; }},
       {"frames[1].renderer", [](Json&, Json& f, Json&) { f["renderer"] = "rays"; }},
       {"frames[1].grid",
        [](Json&, Json& f, Json&) {
@@ -82,7 +82,7 @@ TEST(Recording, WhatIsWrongIsNamed) {
       {"frames[1].combine", [](Json&, Json& f, Json&) { f["combine"] = "stirring"; }},
       {"frames[1].latency_us", [](Json&, Json& f, Json&) { f["latency_us"] = -1; }},
       {"frames[1].groups", [](Json&, Json& f, Json&) { f["groups"] = Json::array(); }},
-      {"groups[0] is no list", [](Json&, Json& f, Json&) { f["groups"] = {3}; }},
+      {"groups[0]: 3 must be a list", [](Json&, Json& f, Json&) { f["groups"] = {3}; }},
       {"groups[0][1].box", [](Json&, Json&, Json& k) { k["box"] = "first"; }},
       {"groups[0][1].render_us", [](Json&, Json&, Json& k) { k["render_us"] = nullptr; }},
       {"groups[0][1].bounds",

@@ -2,9 +2,9 @@
 // with one frame in flight. Pictures are decoded into memory while it measures and written only afterwards.
 #pragma once
 
-#include "client/cli/bench_report.h"
-#include "client/cli/options.h"
 #include "common/base/status.h"
+#include "laboratory/bench/bench.h"
+#include "laboratory/bench/bench_report.h"
 
 namespace slabstream {
 

@@ -1,4 +1,4 @@
-#include "client/cli/bench_cases.h"
+#include "laboratory/bench/bench_cases.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

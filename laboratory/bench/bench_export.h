@@ -1,9 +1,9 @@
 // Cases of `slabstream bench` for other renderers: the voxels, the curve and the views that it would draw.
 #pragma once
 
-#include "client/cli/bench_cases.h"
-#include "client/cli/options.h"
 #include "common/base/status.h"
+#include "laboratory/bench/bench.h"
+#include "laboratory/bench/bench_cases.h"
 
 namespace slabstream {
 

@@ -1,15 +1,16 @@
+#include "laboratory/bench/bench.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <iostream>
 
-#include "client/cli/bench_cases.h"
-#include "client/cli/bench_export.h"
-#include "client/cli/bench_report.h"
-#include "client/cli/bench_run.h"
-#include "client/cli/commands.h"
-#include "client/cli/files.h"
+#include "common/base/files.h"
+#include "laboratory/bench/bench_cases.h"
+#include "laboratory/bench/bench_export.h"
+#include "laboratory/bench/bench_report.h"
+#include "laboratory/bench/bench_run.h"
 
 namespace slabstream {
 namespace {
@@ -43,15 +44,16 @@ Result<std::vector<BenchCase>> ChooseCases(const BenchOptions& options) {
 }
 
 Status MakeDirectory(const std::string& option, const std::string& path) {
+  if (path.empty()) return Status::Ok();
   std::error_code error;
-  if (!path.empty()) std::filesystem::create_directories(path, error);
-  if (!error) return Status::Ok();
-  return Status::InvalidArgument(fmt::format("{} '{}' cannot be made: {}", option, path, error.message()));
+  std::filesystem::create_directories(path, error);
+  if (error) return Status::InvalidArgument(fmt::format("{} '{}' cannot be made: {}", option, path, error.message()));
+  return CheckCanWrite(option, path + "/probe");
 }
 
 Status PrepareOutputs(const BenchOptions& options) {
   if (!options.json_path.empty()) {
-    if (Status status = CheckOutputDirectory("--json", options.json_path); !status.ok()) return status;
+    if (Status status = CheckCanWrite("--json", options.json_path); !status.ok()) return status;
   }
   if (Status status = MakeDirectory("--pictures", options.pictures_directory); !status.ok()) return status;
   return MakeDirectory("--export", options.export_directory);

@@ -1,4 +1,4 @@
-#include "client/cli/bench_run.h"
+#include "laboratory/bench/bench_run.h"
 
 #include <fmt/format.h>
 #include <unistd.h>

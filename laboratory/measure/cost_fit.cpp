@@ -1,4 +1,4 @@
-#include "common/simulation/cost_fit.h"
+#include "laboratory/measure/cost_fit.h"
 
 #include <fmt/format.h>
 

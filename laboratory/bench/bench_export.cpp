@@ -1,8 +1,8 @@
-#include "client/cli/bench_export.h"
+#include "laboratory/bench/bench_export.h"
 
 #include <nlohmann/json.hpp>
 
-#include "client/cli/files.h"
+#include "common/base/files.h"
 #include "common/volume_io/volume_reader.h"
 
 namespace slabstream {

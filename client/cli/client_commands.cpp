@@ -1,0 +1,149 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <memory>
+
+#include "client/cli/commands.h"
+#include "client/cli/cores.h"
+#include "client/cli/option_groups.h"
+#include "common/planning/policy_names.h"
+#include "common/transport/endpoint.h"
+#include "common/tuning/service_machine.h"
+
+namespace slabstream {
+namespace {
+
+// When the command is the one that was typed, `execute` runs with the options.
+template <class Options>
+void RunWith(CLI::App& sub, std::function<Status()>& run, std::shared_ptr<Options> options, Status (*execute)(const Options&)) {
+  sub.callback([&run, options, execute] { run = [options, execute] { return execute(*options); }; });
+}
+
+void DeclareRender(const CommandLine& line) {
+  CLI::App* sub = line.app.add_subcommand("render", "Render one picture of a volume");
+  auto options = std::make_shared<RenderOptions>();
+  sub->add_option("-o,--output", options->output, "The picture: .png or .exr")->required()->type_name("FILE")->group(kOutputGroup);
+  AddFrameOptions(*sub, options->frame);
+  sub->add_flag("--previews", options->frame.request.previews, "Write the picture anew after each group, nearest first (see --groups)");
+  RunWith(*sub, line.run, options, RunRender);
+}
+
+void DeclareTurntable(const CommandLine& line) {
+  CLI::App* sub = line.app.add_subcommand("turntable", "Render a full turn about the volume's z axis, frame after frame");
+  auto options = std::make_shared<TurntableOptions>();
+  sub->option_defaults()->group(kOutputGroup);
+  AddParsed(
+      *sub, "-o,--output", options->output,
+      [](const std::string& option, const std::string& text) { return FramePattern::Parse(option, text); },
+      "The pictures: a name with a place for the number, such as 'frame_%04d.png'")
+      ->required()
+      ->type_name("PATTERN");
+  AddInteger(*sub, "--frames", options->frames, 1, kMaxTurntableFrames, "How many pictures")->required();
+  AddInteger(*sub, "--turns", options->turns, 1, kMaxTurns, "How many full turns the pictures are spread over");
+  AddInteger(*sub, "--in-flight", options->in_flight, 1, kMaxInFlight, "How many pictures are requested at the same time");
+  AddFrameOptions(*sub, options->frame);
+  RunWith(*sub, line.run, options, RunTurntable);
+}
+
+void DeclareInfo(const CommandLine& line) {
+  CLI::App* sub = line.app.add_subcommand("info", "Describe a volume file: size, samples, values, histogram, occupancy");
+  auto options = std::make_shared<InfoOptions>();
+  CLI::Option* source = sub->add_option("SOURCE", options->path, "A volume file, as FILE or FILE:TRANSFER")->required();
+  AddTransferOptions(*sub, options->transfer);
+  ResolveSource(*sub, source, options->path, options->transfer, [] { return true; });
+  sub->add_flag("--json", options->json, "Print JSON");
+  RunWith(*sub, line.run, options, RunInfo);
+}
+
+void DeclareSphere(const CommandLine& line) {
+  CLI::App* sub = line.app.add_subcommand("sphere", "Make one of the two test volumes of Yagel and Machiraju");
+  auto options = std::make_shared<SphereOptions>();
+  AddParsed(
+      *sub, "--class", options->request.sphere_class,
+      [](const std::string& option, const std::string& text) -> Result<SphereClass> {
+        const Result<int> number = ParseInteger(option, text, 1, 2);
+        if (!number.ok()) return number.status();
+        return SphereClass(*number);
+      },
+      "1: hollow, 2: filled")
+      ->required()
+      ->type_name("N");
+  AddInteger(*sub, "--size", options->request.size, 2, 4096, "Voxels a side")->required();
+  AddNumber(*sub, "--occupancy", options->request.occupancy, {0, 1, true}, "Share of voxels that are not empty");
+  sub->add_option("-o,--output", options->output, "The volume: .nrrd, .mhd or .mha")->required()->type_name("FILE");
+  RunWith(*sub, line.run, options, RunSphere);
+}
+
+void DeclareUp(const CommandLine& line) {
+  CLI::App* sub = line.app.add_subcommand("up", "Start a coordinator and workers on this machine");
+  auto options = std::make_shared<UpOptions>();
+  options->workers = std::min(CoreCount(), kMaxUpWorkers);
+  options->listen = "tcp://127.0.0.1:7420";
+  AddInteger(*sub, "--workers", options->workers, 1, kMaxUpWorkers, "Worker processes")->default_str("one a core");
+  AddThreads(*sub, options->threads, "Render threads of each worker");
+  sub->add_option("--data", options->data,
+                  "A volume to serve, as NAME=FILE, or a directory of volumes that are named after their files; may be repeated")
+      ->type_name("NAME=FILE")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  AddParsed(
+      *sub, "--listen", options->listen,
+      [](const std::string& option, const std::string& text) -> Result<std::string> {
+        const Result<Endpoint> endpoint = ParseEndpoint(text, true);
+        if (!endpoint.ok()) return Status::InvalidArgument(option + " " + endpoint.status().message());
+        return text;
+      },
+      "Where clients reach the service; tcp://127.0.0.1:* takes any free port")
+      ->type_name("ENDPOINT")
+      ->default_str(options->listen);
+  AddOptionalValue(
+      *sub, "--compress", options->compress, "on",
+      [](const std::string& option, const std::string& text) -> Result<std::string> {
+        constexpr std::string_view kChoices[] = {"auto", "on", "off"};
+        const Result<std::size_t> index = ParseChoice(option, text, kChoices);
+        if (!index.ok()) return index.status();
+        return text;
+      },
+      "Compress images with zstd. auto: between workers whose link is slower than the compression. on, which --compress alone means: all "
+      "images between workers, and pictures for clients behind a slow tunnel. off: never")
+      ->type_name("[=MODE]")
+      ->default_str("auto");
+  // Workers of other hosts cannot join yet.
+  AddParsed(
+      *sub, "--link", options->link,
+      [](const std::string& option, const std::string& text) -> Result<std::string> {
+        const Result<LinkModel> link = ParseLink(option, text);
+        if (!link.ok()) return link.status();
+        return text;
+      },
+      "")
+      ->group(kHidden);
+  sub->add_flag("--detach", options->detach, "Return when the service is ready; `slabstream down` ends it");
+  RunWith(*sub, line.run, options, RunUp);
+}
+
+void DeclareDown(const CommandLine& line) {
+  CLI::App* sub = line.app.add_subcommand("down", "End a service that `up` started");
+  auto options = std::make_shared<DownOptions>();
+  AddEndpoint(*sub, options->endpoint);
+  RunWith(*sub, line.run, options, RunDown);
+}
+
+void DeclareStatus(const CommandLine& line) {
+  CLI::App* sub = line.app.add_subcommand("status", "Show a service's workers, datasets and frames");
+  auto options = std::make_shared<StatusOptions>();
+  AddEndpoint(*sub, options->endpoint);
+  sub->add_flag("--json", options->json, "Print JSON");
+  RunWith(*sub, line.run, options, RunStatus);
+}
+
+}  // namespace
+
+std::span<const DeclareCommand> ClientCommands() {
+  static constexpr DeclareCommand kCommands[] = {DeclareRender, DeclareTurntable, DeclareInfo,  DeclareSphere,
+                                                 DeclareUp,     DeclareDown,      DeclareStatus};
+  return kCommands;
+}
+
+}  // namespace slabstream

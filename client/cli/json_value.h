@@ -1,0 +1,48 @@
+// Values of a JSON file that a user names, each with its place in it: what is wrong is told with the place, the value and what it must be.
+#pragma once
+
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "client/cli/values.h"
+
+namespace slabstream {
+
+using Json = nlohmann::ordered_json;
+
+// One value. Whatever is wrong is noted in `mistake`, which all values of a file share; the first mistake stays, and what is read after it
+// does not matter.
+class JsonValue {
+ public:
+  JsonValue(const Json& json, std::string place, std::optional<std::string>& mistake)
+      : json_(&json), place_(std::move(place)), mistake_(&mistake) {}
+
+  void Complain(const std::string& what) const;
+  std::string Shown() const;  // the value's text, cut off where it is long
+
+  using Read = std::function<void(const JsonValue&)>;
+  // An object with no other fields than these; calls the function of each that is there.
+  void Fields(const std::vector<std::pair<std::string, Read>>& fields) const;
+  // A list of at least so many values.
+  void Each(const Read& read, std::size_t least = 1) const;
+  bool Has(const char* field) const { return json_->is_object() && json_->contains(field); }
+  JsonValue At(const char* field) const;  // which must be there
+
+  std::string Text() const;
+  double Number(const NumberRange& range) const;
+  int Integer(int min, int max) const;
+  std::size_t OneOf(std::span<const std::string_view> names) const;  // its index
+
+ private:
+  const Json* json_;
+  std::string place_;
+  std::optional<std::string>* mistake_;
+};
+
+}  // namespace slabstream

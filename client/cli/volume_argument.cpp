@@ -1,0 +1,53 @@
+#include "client/cli/volume_argument.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <string_view>
+#include <vector>
+
+#include "client/cli/values.h"
+#include "common/base/files.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::size_t kMaxTransferFileBytes = std::size_t{16} << 20;
+
+bool NamesFile(const std::string& transfer) {
+  return std::filesystem::path(transfer).extension() == ".json" || transfer.find('/') != std::string::npos;
+}
+
+}  // namespace
+
+Result<std::variant<std::string, TransferFunction>> ParseTransfer(const std::string& option, const std::string& text) {
+  using Choice = std::variant<std::string, TransferFunction>;
+  if (NamesFile(text)) {
+    const Result<std::string> json = ReadTextFile(text, kMaxTransferFileBytes);
+    if (!json.ok()) return Status(json.status().code(), fmt::format("{} {}", option, json.status().message()));
+    Result<TransferFunction> transfer = ParseParaViewColorMap(*json, text);
+    if (!transfer.ok()) return Status(transfer.status().code(), fmt::format("{} {}", option, transfer.status().message()));
+    return Choice(*std::move(transfer));
+  }
+  std::vector<std::string_view> names;
+  for (const PresetInfo& preset : TransferPresets()) names.push_back(preset.name);
+  const Result<std::size_t> index = ParseChoice(option, text, names);
+  if (!index.ok()) return Status::InvalidArgument(index.status().message() + ", nor a .json file");
+  return Choice(text);
+}
+
+Result<VolumeArgument> ParseVolumeArgument(const std::string& argument, const std::string& text, bool is_file) {
+  const VolumeArgument whole{text, "", {}};
+  const std::size_t colon = text.rfind(':');
+  std::error_code error;
+  if (colon == std::string::npos || (is_file && std::filesystem::exists(text, error))) return whole;
+  VolumeArgument parts{text.substr(0, colon), text.substr(colon + 1), {}};
+  if (is_file && !std::filesystem::exists(parts.volume, error)) return whole;
+  auto transfer = ParseTransfer(fmt::format("{} '{}':", argument, text), parts.transfer_text);
+  if (!transfer.ok() && !is_file && !NamesFile(parts.transfer_text)) return whole;
+  if (!transfer.ok()) return transfer.status();
+  parts.transfer = *std::move(transfer);
+  return parts;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,27 @@
+// A volume on the command line, as every command takes it: VOLUME or VOLUME:TRANSFER. VOLUME is a file or, at a service, a dataset's name;
+// TRANSFER is what --transfer takes.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <variant>
+
+#include "common/base/status.h"
+#include "common/classification/transfer_function.h"
+
+namespace slabstream {
+
+// What --transfer takes: a ParaView colour map if the text names a file, else the name of a preset. `option` begins messages.
+Result<std::variant<std::string, TransferFunction>> ParseTransfer(const std::string& option, const std::string& text);
+
+struct VolumeArgument {
+  std::string volume;
+  std::string transfer_text;  // empty: none was given
+  std::optional<std::variant<std::string, TransferFunction>> transfer;
+};
+
+// A colon may also belong to the name of a file that exists, or of a dataset if no preset or colour map follows it. Whether the volume
+// exists is not checked. NotFound, InvalidArgument: the transfer function; `argument` ("SOURCE") begins messages.
+Result<VolumeArgument> ParseVolumeArgument(const std::string& argument, const std::string& text, bool is_file);
+
+}  // namespace slabstream

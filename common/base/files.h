@@ -1,0 +1,57 @@
+// Files that are written whole or not at all, and small text files that are read within a limit. Every program writes its files through
+// OutputFile: pictures, volumes, JSON.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "common/base/status.h"
+
+namespace slabstream {
+
+// A file that is being written. The bytes go to a temporary file in the same folder. Finish replaces the target by it, but only after every
+// write and the close have succeeded, so a full disk neither leaves half a file nor costs the file that was there before. A target that
+// exists and is no regular file, such as a device or a pipe, is written directly.
+//
+// Each failure is Unavailable, such as "cannot write 'a.png': No space left on device". The first one stays: later writes do nothing, and
+// Close and Finish return it. One thread at a time.
+class OutputFile {
+ public:
+  static Result<OutputFile> Create(const std::string& path);
+  OutputFile(OutputFile&& other) noexcept;
+  OutputFile& operator=(OutputFile&&) = delete;
+  ~OutputFile();  // removes the temporary file unless Finish has succeeded
+
+  void Append(std::span<const std::byte> bytes);
+  void Append(const std::string& text) { Append(std::as_bytes(std::span(text))); }
+  void WriteAt(std::int64_t offset, std::span<const std::byte> bytes);  // later appends go on behind the last byte written by Append
+  bool ok() const { return error_ == 0; }
+
+  Status Close();   // nothing can be written afterwards; the target is still untouched
+  Status Finish();  // closes if need be, then puts the file in its place
+
+ private:
+  OutputFile(std::string path, std::string target, std::string temporary, int descriptor);
+  void Keep(int error);  // the first errno stays
+
+  std::string path_;       // as the caller wrote it, for messages
+  std::string target_;     // `path_` with links resolved
+  std::string temporary_;  // empty: written directly, or already in its place
+  int descriptor_ = -1;
+  int error_ = 0;  // errno of the first failure
+  std::int64_t end_ = 0;
+};
+
+// Unavailable, naming the path, if it cannot be written.
+Status WriteTextFile(const std::string& path, const std::string& text);
+
+// NotFound: no such file. ResourceExhausted: longer than `max_bytes`. Messages name the path.
+Result<std::string> ReadTextFile(const std::string& path, std::size_t max_bytes);
+
+// InvalidArgument or NotFound, with the reason, unless a file can be created as `path`: to be asked before long work begins. Leaves nothing
+// behind. `option` begins the message.
+Status CheckCanWrite(const std::string& option, const std::string& path);
+
+}  // namespace slabstream
