@@ -80,11 +80,12 @@ Planned Plan(const Subject& subject, const Policy& policy, int workers, int fram
   FrameRequest request = subject.request;
   request.policy = policy;
   request.policy = SettledPolicy(request, subject.summary.description.geometry);
+  const ClassifiedVolume volume(1, subject.transfer, request.renderer);
   LayoutTable layouts;
   Planned planned;
   for (int frame = 0; frame < frames; ++frame) {
     const Layout& layout = layouts.Find(
-        {&request, 1, &subject.summary, &subject.transfer, subject.occupied, std::uint32_t(workers), CostModel().slab_bytes_target});
+        {&request, &volume, &subject.summary, subject.occupied, std::uint32_t(workers), CostModel().slab_bytes_target});
     planned = {.plan = PlanFrame(request, 1, subject.summary, roster, CostModel{}, &layout).value(), .costs = {}};
     planned.costs = MeasureFrameCosts(*subject.volume, planned.plan, repeats);
     std::vector<RankReport> reports;
@@ -97,7 +98,7 @@ Planned Plan(const Subject& subject, const Policy& policy, int workers, int fram
       report.box = placement.id;
       report.stage_ns[std::size_t(Stage::kRender)] = std::int64_t(box * 1e9);
     }
-    layouts.Learn(planned.plan, request.policy, reports);
+    layouts.Learn(volume, planned.plan, request.policy, reports);
   }
   return planned;
 }

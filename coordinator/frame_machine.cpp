@@ -6,8 +6,6 @@
 #include <optional>
 #include <utility>
 
-#include "common/planning/policy_names.h"
-#include "common/planning/render_work.h"
 #include "common/planning/team.h"
 #include "coordinator/frame_machine_state.h"
 
@@ -16,15 +14,25 @@ namespace slabstream {
 namespace {
 constexpr std::size_t kCountAhead = 4;
 static_assert(kCountAhead <= OccupancyTable::kMaxKept);
+// Frames that are planned beyond what the window has room for: a frame that ends makes room for one, whose plan should be there by then.
+constexpr std::size_t kPlansAhead = 1;
 }  // namespace
 
 void FrameMachine::State::On(const DatasetLoaded& event) {
   if (!datasets.Loaded(event.name, event.dataset, event.summary)) return;
+  std::vector<std::pair<OpenRequest, Status>> failed;
   queue.Update([&](OpenRequest& request) {
     if (request.submit.frame.dataset != event.name) return;
-    FindOutCount(request);
-    SendQueued(request);
+    if (Status status = FindVolume(request); !status.ok()) {
+      failed.emplace_back(request, std::move(status));
+    } else {
+      SendQueued(request);
+    }
   });
+  for (const auto& [request, status] : failed) {
+    queue.Extract([&](const OpenRequest& queued) { return queued.Is(request.client, request.submit.request); });
+    FailRequest(request, status);
+  }
 }
 
 void FrameMachine::State::On(const DatasetFailed& event) {
@@ -36,36 +44,95 @@ void FrameMachine::State::On(const DatasetFailed& event) {
 void FrameMachine::State::On(const OccupiedCounted& event) {
   if (event.grid.ok()) {
     occupancy.Counted(event.count, *event.grid);
-  } else if (const std::optional<OccupancyTable::Subject> failed = occupancy.Failed(event.count)) {
-    const auto waits = [&](const OpenRequest& request) { return request.counted != nullptr && *request.counted == *failed; };
+  } else if (const std::optional<ClassifiedVolume> failed = occupancy.Failed(event.count)) {
+    const auto waits = [&](const OpenRequest& request) { return request.volume == failed && NeedsOccupancy(request.submit.frame.policy); };
     for (const OpenRequest& request : queue.Extract(waits)) FailRequest(request, event.grid.status());
   }
 }
 
-// The dataset must be known; nothing is found out before it is loaded. What is wrong with the request is told when it is planned.
-void FrameMachine::State::FindOutCount(OpenRequest& request) const {
+// A request that has ended is not in the queue any more.
+void FrameMachine::State::On(const Planned& event) {
+  planning.erase(event.plan);
+  if (event.frame.ok()) {
+    queue.Update([&](OpenRequest& request) {
+      if (request.plan == event.plan) request.planned = *event.frame;
+    });
+  } else {
+    const auto is_it = [&](const OpenRequest& request) { return request.plan == event.plan && request.planned_for == roster.version(); };
+    for (const OpenRequest& request : queue.Extract(is_it)) FailRequest(request, event.frame.status());
+  }
+}
+
+// Once its dataset is loaded. NotFound: no such preset.
+Status FrameMachine::State::FindVolume(OpenRequest& request) const {
   const FrameRequest& frame = request.submit.frame;
   const DatasetTable::Entry& dataset = *datasets.Find(frame.dataset);
-  if (dataset.state != DatasetState::kReady || !CheckNames(frame.policy).ok() || !NeedsOccupancy(frame.policy)) return;
   Result<TransferFunction> transfer = ResolveTransfer(frame.transfer, *dataset.summary);
-  if (!transfer.ok()) return;
-  request.counted =
-      std::make_shared<const OccupancyTable::Subject>(OccupancyTable::Subject{dataset.id, *std::move(transfer), frame.renderer});
+  if (!transfer.ok()) return transfer.status();
+  request.volume.emplace(dataset.id, *std::move(transfer), frame.renderer);
+  return Status::Ok();
 }
 
 // For the next requests in turn. Those behind them wait, so that no grid is dropped before it was used.
 void FrameMachine::State::CountAhead() {
   std::size_t ahead = 0;
-  queue.ForEach([&](const OpenRequest& request) {
-    if (request.counted == nullptr || ahead == kCountAhead) return;
-    ++ahead;
-    const OccupancyTable::Subject& subject = *request.counted;
-    if (occupancy.Counting(subject) || occupancy.Find(subject) != nullptr) return;
-    const VolumeSummary& summary = *datasets.Find(request.submit.frame.dataset)->summary;
-    actions.emplace_back(
-        CountDataset{.count = occupancy.Begin(subject),
-                     .dataset = subject.dataset,
-                     .table = std::make_shared<const ClassificationTable>(DrawnTable(subject.transfer, summary, subject.renderer))});
+  queue.VisitInTurn([&](const OpenRequest& request) {
+    if (!request.volume || request.plan != 0 || !NeedsOccupancy(request.submit.frame.policy)) return true;
+    const ClassifiedVolume& volume = *request.volume;
+    if (!occupancy.Counting(volume) && occupancy.Find(volume) == nullptr) {
+      const auto& summary = datasets.Find(request.submit.frame.dataset)->summary;
+      actions.emplace_back(CountDataset{.count = occupancy.Begin(volume), .volume = volume, .summary = summary});
+    }
+    return ++ahead < kCountAhead;
+  });
+}
+
+// For as many of the next requests in turn as can start soon.
+void FrameMachine::State::PlanAhead() {
+  std::size_t ahead = 0;
+  const std::size_t most = frames.Room(roster.members().size()) + kPlansAhead;
+  queue.VisitInTurn([&](OpenRequest& request) {
+    if (!request.volume) return true;
+    const bool under_way = request.plan != 0 && request.planned_for == roster.version();
+    if (!under_way) {
+      if (WaitsForCount(request)) return true;
+      request.plan = ++last_plan;
+      request.planned_for = roster.version();
+      request.planned = nullptr;
+      planning.insert(request.plan);
+      actions.emplace_back(MakePlanRequest(request));
+    }
+    return ++ahead < most;
+  });
+}
+
+PlanRequest FrameMachine::State::MakePlanRequest(const OpenRequest& request) {
+  const FrameRequest& frame = request.submit.frame;
+  Team team = TeamOf(roster.slots(), std::uint32_t(frame.policy.teams), request.plan);
+  PlanRequest ask{.plan = request.plan,
+                  .frame = frame,
+                  .volume = *request.volume,
+                  .summary = datasets.Find(frame.dataset)->summary,
+                  .occupied = NeedsOccupancy(frame.policy) ? occupancy.Find(*request.volume) : nullptr,
+                  .roster = std::move(team.roster),
+                  .turn = team.turn,
+                  .workers = {}};
+  for (const Member& member : roster.members()) {
+    const Register& worker = member.description;
+    ask.workers.push_back({worker.memory_scope, worker.lends_memory, worker.threads, worker.pid});
+  }
+  return ask;
+}
+
+// Of requests that have ended, or that ask for another plan now.
+void FrameMachine::State::DropPlans() {
+  if (planning.empty()) return;
+  std::set<PlanId> wanted;
+  queue.ForEach([&](const OpenRequest& request) { wanted.insert(request.plan); });
+  std::erase_if(planning, [&](PlanId plan) {
+    if (wanted.contains(plan)) return false;
+    actions.emplace_back(DropPlan{plan});
+    return true;
   });
 }
 
@@ -106,9 +173,10 @@ void FrameMachine::State::Expire() {
 
   for (const OpenRequest& request : queue.Extract(out_of_time)) {
     const DatasetTable::Entry& dataset = *datasets.Find(request.submit.frame.dataset);
-    const bool counting = request.counted != nullptr && occupancy.Counting(*request.counted);
+    const bool counting = request.volume && occupancy.Counting(*request.volume);
     FailRequest(request, late(request, dataset.state != DatasetState::kReady ? "its dataset was still being loaded"
                                        : counting                            ? "the occupied voxels of its dataset were still being counted"
+                                       : request.plan != 0 && !HasPlan(request) ? "it was still being planned"
                                                                              : "it was still queued"));
   }
   for (const OpenRequest& request : queue.Extract(without_workers)) FailRequest(request, no_worker);
@@ -152,75 +220,16 @@ void FrameMachine::State::Advance() {
     }
   }
   CountAhead();
+  PlanAhead();
 }
 
-// Plans the next frame in turn, as late as possible, so that it is made for the workers that there are. False: nothing can start.
+// The first frame in turn that is planned for the workers that there are. False: there is none.
 bool FrameMachine::State::StartNextFrame() {
-  CountAhead();
-  const auto ready = [&](const OpenRequest& request) {
-    const DatasetTable::Entry& dataset = *datasets.Find(request.submit.frame.dataset);
-    return dataset.state == DatasetState::kReady && (request.counted == nullptr || occupancy.Find(*request.counted) != nullptr);
-  };
-  std::optional<OpenRequest> request = queue.TakeNext(ready);
+  std::optional<OpenRequest> request = queue.TakeNext([&](const OpenRequest& open) { return HasPlan(open); });
   if (!request) return false;
-  FrameRequest& frame = request->submit.frame;
-  const DatasetTable::Entry& dataset = *datasets.Find(frame.dataset);
-  frame.policy = SettledPolicy(frame, dataset.summary->description.geometry);
-  const Team team = TeamOf(roster.slots(), std::uint32_t(frame.policy.teams), frames.next_id());
-  const Roster& slots = team.roster;
-  const Layout* layout = nullptr;
-  const Result<TransferFunction> transfer = ResolveTransfer(frame.transfer, *dataset.summary);
-  if (transfer.ok() && CheckNames(frame.policy).ok()) {
-    if (Status status = MakeChoice(*request, *transfer, std::uint32_t(slots.slots.size())); !status.ok()) {
-      FailRequest(*request, status);
-      return true;
-    }
-    layout = &layouts.Find({.frame = &frame,
-                            .dataset = dataset.id,
-                            .summary = dataset.summary.get(),
-                            .transfer = &*transfer,
-                            .occupied = request->counted ? occupancy.Find(*request->counted) : nullptr,
-                            .slots = std::uint32_t(slots.slots.size()),
-                            .slab_bytes_target = config.cost.slab_bytes_target});
-  }
-  Result<FramePlan> plan = PlanFrame(frame, dataset.id, *dataset.summary, slots, config.cost, layout, team.turn);
-  if (!plan.ok()) {
-    FailRequest(*request, plan.status());
-    return true;
-  }
-  const RunningFrame& running =
-      frames.Add(RunningFrame(frames.next_id(), *std::move(request), std::move(plan).value(), slots, limits, now));
+  const RunningFrame& running = frames.Add(RunningFrame(frames.next_id(), *std::move(request), limits, now));
   SendClient(running.request().client, running.Progress());
   return true;
-}
-
-MachineModel FrameMachine::State::DescribeMachine() const {
-  std::vector<HostedWorker> workers;
-  for (const Member& member : roster.members())
-    workers.push_back(
-        {member.description.memory_scope, member.description.lends_memory, member.description.threads, member.description.pid});
-  return ServiceMachine(workers, config.surroundings);
-}
-
-// Fills in what the request's policy leaves open.
-Status FrameMachine::State::MakeChoice(OpenRequest& request, const TransferFunction& transfer, std::uint32_t slots) {
-  FrameRequest& frame = request.submit.frame;
-  if (!LeavesChoice(frame.policy)) return Status::Ok();
-  const DatasetTable::Entry& dataset = *datasets.Find(frame.dataset);
-  const MachineModel machine = DescribeMachine();
-  Result<ChosenPolicy> chosen = policies.Find({.frame = &frame,
-                                               .dataset = dataset.id,
-                                               .summary = dataset.summary.get(),
-                                               .transfer = &transfer,
-                                               .occupied = request.counted ? occupancy.Find(*request.counted) : nullptr,
-                                               .slots = slots,
-                                               .machine = &machine,
-                                               .cost = &config.cost,
-                                               .layouts = &layouts});
-  if (!chosen.ok()) return chosen.status();
-  frame.policy = chosen->policy;
-  request.chosen = *std::move(chosen);
-  return Status::Ok();
 }
 
 void FrameMachine::State::HandOut(RunningFrame& frame) {
@@ -278,6 +287,7 @@ std::vector<CoordinatorAction> FrameMachine::Step(const CoordinatorEvent& event,
   if (!state.stopped) {
     state.Expire();
     state.Advance();
+    state.DropPlans();
   }
   state.wake = state.stopped ? Time::max() : state.NextWake();
   return std::exchange(state.actions, {});

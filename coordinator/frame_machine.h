@@ -1,31 +1,28 @@
-// FrameMachine: everything the coordinator decides, as a pure state machine. (event, now) -> actions. No sockets, threads, clocks or
-// voxels.
+// FrameMachine: everything that the coordinator decides, as a pure state machine: (event, now) -> actions. It has no sockets, threads, clocks
+// or voxels, and it does nothing that takes long: loading, counting and planning are actions that the executor answers with events.
 //
-//   clients    a request is queued; queues of clients are served in turn, one frame each (fair); progress is told; silence or Cancel frees
-//   the work.
-//              The last answers of a client are kept for it, so that a request that is submitted again costs nothing
-//   datasets   loaded at first use; requests wait for it; a failed load fails them
-//   occupancy  where a policy asks for it, occupied voxels are counted once for each dataset and transfer function;
-//              requests wait for that, and a failed count fails them
-//   policies   what a policy leaves open is chosen when its first frame is planned, and kept (PolicyTable)
-//   layouts    stay while views change, and learn from the render times of frames (LayoutTable)
-//   frames     planned when the window has room (PlanFrame); group after group is handed out, as many as the window allows over all frames,
-//              so that groups render while others combine, across frames too; the display worker changes from frame to frame; a frame ends
-//              with its FrameImage or with FrameFailed
-//   workers    Register gives an id and a slot (a vacant one first); silence, an unreachable peer or Leave takes the worker out, and every
-//   frame that
-//              it had a part in is re-planned over the rest (attempt + 1) from its first unfinished group, or from the first if the display
-//              worker is lost. Slots that stay vacant for vacancy_grace are given up, and the next frame is partitioned anew.
-//   stalls     a running frame without any progress for stall_timeout is handed out again (attempt + 1); after max_stalls in a row it
-//   fails. No worker for
-//              worker_wait fails what waits, saying so. Every request has a deadline.
+//   clients    Requests are queued; the clients are served in turn, one frame each. The machine reports progress. A request ends when its client
+//              cancels it or falls silent. The last answers of a client are kept, so that submitting a request again costs nothing.
+//   datasets   A dataset is loaded when it is first used. Requests wait for it; a failed load fails them.
+//   occupancy  Where a policy needs it, occupied voxels are counted once for each dataset, transfer function and renderer. Requests wait for
+//              the count; a failed count fails them.
+//   plans      The next requests in turn are planned ahead (PlanRequest), as many as the window has room for and kPlansAhead more, so that a
+//              frame can start the moment there is room. A request stays in the queue until its frame starts. A plan that was made for other
+//              workers than there are now is made again. A failed plan fails its request alone.
+//   frames     Group after group is handed out, as many as the window allows over all frames, so that groups render while others combine,
+//              across frames too. The display worker changes from frame to frame. A frame ends with its FrameImage or with FrameFailed.
+//   workers    Register gives an id and a slot (a vacant one first). Silence, an unreachable peer or Leave takes the worker out. Every frame that
+//              it had a part in is re-planned over the others (attempt + 1) from its first unfinished group, or from the first group if the
+//              display worker is lost. Slots that stay vacant for vacancy_grace are given up; the next frame is then partitioned anew.
+//   stalls     A frame without progress for stall_timeout is handed out again (attempt + 1); after max_stalls in a row it fails. If there is no
+//              worker for worker_wait, everything that waits fails and says so. Every request has a deadline.
 //   end        ShutDown ends the service: workers Stop. CoordinatorStopRequested ends the coordinator alone: workers Retire and wait for
-//   another one.
-//              Both fail open requests, then StopService; a stopped machine does nothing more.
+//              another coordinator. Both fail the open requests and end with StopService; a stopped machine does nothing more.
 //
 // What the executor must do: call Step(CoordinatorTick) no later than NextWake(), which is Time::max() if nothing can happen by itself;
-// carry the actions out in order; tell WorkerGone or ClientGone when a send finds nobody. Calls that come late are taken for the executor's
-// own sleep: nobody's silence is counted against them for that long.
+// carry out the actions in order; answer LoadDataset, CountDataset and PlanRequest with one event each, in any order; report WorkerGone or
+// ClientGone when a send finds nobody. If the executor calls late, the machine assumes that the executor itself was held up, and extends
+// everybody's time by as much.
 #pragma once
 
 #include <cstdint>
@@ -36,11 +33,10 @@
 
 #include "common/base/bytes.h"
 #include "common/base/time.h"
-#include "common/classification/classification_table.h"
-#include "common/tuning/service_machine.h"
 #include "common/wire/any_message.h"
 #include "coordinator/occupancy_table.h"
 #include "coordinator/peer_token.h"
+#include "coordinator/plan_request.h"
 
 namespace slabstream {
 
@@ -49,8 +45,6 @@ struct CoordinatorConfig {
   std::uint32_t pid = 0;
   std::string slabs_endpoint;
   std::vector<std::string> datasets;  // names of the catalogue
-  CostModel cost;
-  ServiceSurroundings surroundings;                     // what policies are chosen for; scope and cores are filled in by the service
   Duration heartbeat = std::chrono::milliseconds(500);  // also the interval of Ping
   Duration worker_timeout = std::chrono::seconds(6);
   Duration client_timeout = std::chrono::seconds(10);
@@ -92,10 +86,18 @@ struct OccupiedCounted {
   CountId count = 0;
   Result<std::shared_ptr<const OccupancyGrid>> grid;  // of the dataset's size
 };
-struct CoordinatorStopRequested {};  // SIGTERM
+// The end of a PlanRequest.
+struct Planned {
+  PlanId plan = 0;
+  Result<std::shared_ptr<const PlannedFrame>> frame;
+};
+// SIGTERM, or a failure of the executor that leaves it no choice.
+struct CoordinatorStopRequested {
+  std::string reason = "the coordinator is going down";
+};
 struct CoordinatorTick {};
 using CoordinatorEvent = std::variant<FromWorker, FromClient, WorkerGone, ClientGone, DatasetLoaded, DatasetFailed, OccupiedCounted,
-                                      CoordinatorStopRequested, CoordinatorTick>;
+                                      Planned, CoordinatorStopRequested, CoordinatorTick>;
 
 // ---- actions
 struct ToWorker {
@@ -112,14 +114,20 @@ struct LoadDataset {
   std::string name;
   DatasetId dataset = 0;
 };
-// -> OccupiedCounted: CountOccupied over the voxels of a dataset that was loaded
+// -> OccupiedCounted: counts what of the volume, whose dataset was loaded, its renderer draws (DrawnTable, CountOccupied).
 struct CountDataset {
   CountId count = 0;
-  DatasetId dataset = 0;
-  std::shared_ptr<const ClassificationTable> table;
+  ClassifiedVolume volume;
+  std::shared_ptr<const VolumeSummary> summary;
+};
+// PlanRequest (coordinator/plan_request.h) -> Planned, by what a Planner makes of it.
+// FrameMeasured: for the Planner to learn from. No answer.
+// DropPlan: nobody waits for this plan any more, so that it need not be made. Planned may still come.
+struct DropPlan {
+  PlanId plan = 0;
 };
 struct StopService {};  // everything was told; end
-using CoordinatorAction = std::variant<ToWorker, ToClient, LoadDataset, CountDataset, StopService>;
+using CoordinatorAction = std::variant<ToWorker, ToClient, LoadDataset, CountDataset, PlanRequest, DropPlan, FrameMeasured, StopService>;
 
 class FrameMachine {
  public:

@@ -27,13 +27,16 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const SubmitFrame& m
     const DatasetId id = datasets.BeginLoad(message.frame.dataset);
     actions.emplace_back(LoadDataset{.name = message.frame.dataset, .dataset = id});
   }
-  FindOutCount(request);
+  if (state == DatasetState::kReady) {
+    if (const Status found = FindVolume(request); !found.ok()) return FailRequest(request, found);
+  }
   queue.Push(request);
   SendQueued(request);
 }
 
 Status FrameMachine::State::Admissible(PeerToken client, const SubmitFrame& message) const {
   if (datasets.Find(message.frame.dataset) == nullptr) return datasets.NoSuchDataset(message.frame.dataset);
+  if (Status names = CheckNames(message.frame.policy); !names.ok()) return names;
   const auto running = std::count_if(frames.begin(), frames.end(), [&](const RunningFrame& f) { return f.request().client == client; });
   if (queue.CountOf(client) + std::size_t(running) >= kMaxOpenRequests) {
     return Status::ResourceExhausted("this client has " + std::to_string(kMaxOpenRequests) +

@@ -8,6 +8,7 @@
 
 #include <concepts>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,8 +17,7 @@
 #include "coordinator/datasets.h"
 #include "coordinator/frame_machine.h"
 #include "coordinator/frames_in_flight.h"
-#include "coordinator/layout_table.h"
-#include "coordinator/policy_table.h"
+#include "coordinator/occupancy_table.h"
 #include "coordinator/request_queue.h"
 #include "coordinator/roster.h"
 
@@ -49,8 +49,8 @@ struct FrameMachine::State {
   RequestQueue queue;
   FramesInFlight frames;
   OccupancyTable occupancy;
-  LayoutTable layouts;
-  PolicyTable policies;
+  std::set<PlanId> planning;  // asked for and neither answered nor dropped
+  PlanId last_plan = 0;
   const FrameLimits limits;
 
   Time now;                     // of this Step
@@ -76,7 +76,8 @@ struct FrameMachine::State {
   void On(const DatasetLoaded& event);
   void On(const DatasetFailed& event);
   void On(const OccupiedCounted& event);
-  void On(const CoordinatorStopRequested&) { StopAll(Retire{.epoch = config.epoch}, "the coordinator is going down"); }
+  void On(const Planned& event);
+  void On(const CoordinatorStopRequested& event) { StopAll(Retire{.epoch = config.epoch}, event.reason); }
   void On(const CoordinatorTick&) {}
 
   // ---- messages of workers
@@ -118,11 +119,14 @@ struct FrameMachine::State {
   // ---- frames and workers
   void Expire();
   void Advance();
-  void FindOutCount(OpenRequest& request) const;
+  Status FindVolume(OpenRequest& request) const;
+  bool WaitsForCount(const OpenRequest& request) { return NeedsOccupancy(request.submit.frame.policy) && !occupancy.Find(*request.volume); }
   void CountAhead();
+  void PlanAhead();
+  void DropPlans();
+  PlanRequest MakePlanRequest(const OpenRequest& request);
+  bool HasPlan(const OpenRequest& request) const { return request.planned != nullptr && request.planned_for == roster.version(); }
   bool StartNextFrame();
-  MachineModel DescribeMachine() const;
-  Status MakeChoice(OpenRequest& request, const TransferFunction& transfer, std::uint32_t slots);
   void HandOut(RunningFrame& frame);
   void AfterGroupDone(const RunningFrame& frame);
   void EndFrame(FrameId id);

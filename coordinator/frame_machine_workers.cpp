@@ -54,8 +54,7 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const FrameIm
     return;
   }
   reply.statistics = frame->Statistics(now);
-  layouts.Learn(frame->plan(), request.submit.frame.policy, reply.statistics.reports);
-  if (request.chosen) policies.Learn(frame->plan(), *request.chosen, reply.statistics.reports);
+  if (request.planned->teaches()) actions.emplace_back(FrameMeasured{request.planned, reply.statistics.reports});
   EndRequest(request.client, request.submit.request, std::move(reply), event.payload);
   ++frames_done;
   EndFrame(message.frame);

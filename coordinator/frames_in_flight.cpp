@@ -5,7 +5,6 @@
 
 #include "common/base/check.h"
 #include "common/planning/frame_occlusion.h"
-#include "common/planning/frame_window.h"
 
 namespace slabstream {
 
@@ -32,15 +31,25 @@ RunningFrame* FramesInFlight::FindRequest(PeerToken client, RequestId request) {
   return frame == frames_.end() ? nullptr : &*frame;
 }
 
-FramesInFlight::Choice FramesInFlight::Next(std::size_t workers) {
+FrameWindow FramesInFlight::Window(std::size_t workers) const {
   std::int64_t frame_bytes = 0;
-  std::uint32_t unfinished = 0, teams = 1;
+  std::uint32_t teams = 1;
   for (const RunningFrame& frame : frames_) {
     frame_bytes = std::max(frame_bytes, FrameBytes(frame.plan().setup));
-    unfinished += frame.unfinished_groups();
     teams = std::max(teams, frame.plan().turn.teams);
   }
-  const FrameWindow window = WindowFor(workers, teams, frame_bytes);
+  return WindowFor(workers, teams, frame_bytes);
+}
+
+std::size_t FramesInFlight::Room(std::size_t workers) const {
+  const auto frames = std::size_t(Window(workers).frames);
+  return frames - std::min(frames, frames_.size());
+}
+
+FramesInFlight::Choice FramesInFlight::Next(std::size_t workers) {
+  const FrameWindow window = Window(workers);
+  std::uint32_t unfinished = 0;
+  for (const RunningFrame& frame : frames_) unfinished += frame.unfinished_groups();
   if (unfinished >= std::uint32_t(window.groups)) return {};
   const auto next = std::find_if(frames_.begin(), frames_.end(), [](const RunningFrame& frame) {
     const bool masked = UsesOcclusion(frame.plan().setup);

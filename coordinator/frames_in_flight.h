@@ -5,6 +5,7 @@
 #include <list>
 #include <vector>
 
+#include "common/planning/frame_window.h"
 #include "coordinator/running_frame.h"
 
 namespace slabstream {
@@ -25,6 +26,8 @@ class FramesInFlight {
   };
   // What `workers` workers should be given next: a group of a frame that runs, another frame, or nothing for now.
   Choice Next(std::size_t workers);
+  // How many more frames `workers` workers may have under way.
+  std::size_t Room(std::size_t workers) const;
 
   // What workers may forget: all frames before finished_before(), and cancelled(), the newest kMaxCancelled that are over though their id
   // is larger.
@@ -38,6 +41,8 @@ class FramesInFlight {
   auto end() const { return frames_.end(); }
 
  private:
+  FrameWindow Window(std::size_t workers) const;
+
   std::list<RunningFrame> frames_;  // references stay valid
   std::vector<FrameId> over_;       // not smaller than finished_before(), ascending
   FrameId last_id_ = 0;

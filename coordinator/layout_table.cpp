@@ -26,18 +26,15 @@ std::map<BoxId, double> SecondsOf(const Layout& layout, std::span<const RankRepo
 
 }  // namespace
 
-LayoutTable::Learnt* LayoutTable::FindLearnt(DatasetId dataset, const TransferFunction& transfer, RendererKind renderer) {
-  const auto found = std::find_if(learnt_.begin(), learnt_.end(), [&](const Learnt& learnt) {
-    return learnt.dataset == dataset && learnt.transfer == transfer && learnt.renderer == renderer;
-  });
+LayoutTable::Learnt* LayoutTable::FindLearnt(const ClassifiedVolume& volume) {
+  const auto found = std::ranges::find(learnt_, volume, &Learnt::volume);
   if (found == learnt_.end()) return nullptr;
   learnt_.splice(learnt_.begin(), learnt_, found);
   return &*found;
 }
 
-LayoutTable::Key LayoutTable::KeyOf(DatasetId dataset, const TransferFunction& transfer, RendererKind renderer, const Policy& policy,
-                                    std::uint32_t slots) {
-  Key key{dataset, transfer, renderer, policy, slots};
+LayoutTable::Key LayoutTable::KeyOf(const ClassifiedVolume& volume, const Policy& policy, std::uint32_t slots) {
+  Key key{volume, policy, slots};
   key.policy.combine.clear();
   key.policy.pixel_error = 0;
   return key;
@@ -45,19 +42,19 @@ LayoutTable::Key LayoutTable::KeyOf(DatasetId dataset, const TransferFunction& t
 
 const Layout& LayoutTable::Find(const Request& request) {
   const FrameRequest& frame = *request.frame;
-  Key key = KeyOf(request.dataset, *request.transfer, frame.renderer, frame.policy, request.slots);
+  Key key = KeyOf(*request.volume, frame.policy, request.slots);
 
   Learnt* learnt = nullptr;
   if (request.occupied != nullptr) {
-    learnt = FindLearnt(key.dataset, key.transfer, key.renderer);
+    learnt = FindLearnt(key.volume);
     if (learnt == nullptr) {
-      learnt = &learnt_.emplace_front(Learnt{key.dataset, key.transfer, key.renderer, LearntCost(*request.occupied)});
+      learnt = &learnt_.emplace_front(Learnt{key.volume, LearntCost(*request.occupied)});
       KeepFirst(learnt_, kMaxLearnt);
     }
   }
   const bool known = learnt != nullptr && learnt->cost.any();
   LayoutRequest make{.summary = request.summary,
-                     .transfer = request.transfer,
+                     .transfer = &request.volume->transfer(),
                      .policy = &frame.policy,
                      .renderer = frame.renderer,
                      .slots = request.slots,
@@ -94,22 +91,23 @@ const Layout& LayoutTable::Find(const Request& request) {
   return entry.layout;
 }
 
-bool LayoutTable::KnowsCost(DatasetId dataset, const TransferFunction& transfer, RendererKind renderer) {
-  const Learnt* const learnt = FindLearnt(dataset, transfer, renderer);
+bool LayoutTable::KnowsCost(const ClassifiedVolume& volume) {
+  const Learnt* const learnt = FindLearnt(volume);
   return learnt != nullptr && learnt->cost.any();
 }
 
-std::optional<WorkField> LayoutTable::KnownCost(DatasetId dataset, const TransferFunction& transfer, RendererKind renderer) {
-  if (!KnowsCost(dataset, transfer, renderer)) return std::nullopt;
+std::optional<WorkField> LayoutTable::KnownCost(const ClassifiedVolume& volume) {
+  if (!KnowsCost(volume)) return std::nullopt;
   return learnt_.front().cost.Field();
 }
 
-void LayoutTable::Learn(const FramePlan& plan, const Policy& policy, std::span<const RankReport> reports) {
-  Learnt* const learnt = FindLearnt(plan.setup.dataset, plan.setup.transfer, plan.setup.renderer);
+void LayoutTable::Learn(const ClassifiedVolume& volume, const FramePlan& plan, const Policy& policy,
+                        std::span<const RankReport> reports) {
+  Learnt* const learnt = FindLearnt(volume);
   if (learnt == nullptr) return;
   const std::map<BoxId, double> seconds = SecondsOf(plan.layout, reports);
   if (seconds.empty()) return;
-  const Key key = KeyOf(plan.setup.dataset, plan.setup.transfer, plan.setup.renderer, policy, plan.slots);
+  const Key key = KeyOf(volume, policy, plan.slots);
   const auto entry =
       std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.key == key && e.layout == plan.layout; });
   // The first frame of a layout tells most; of a layout that has been changed since, what an average one does.

@@ -14,6 +14,7 @@
 #include <span>
 #include <vector>
 
+#include "common/planning/classified_volume.h"
 #include "common/planning/frame_plan.h"
 #include "common/planning/learnt_cost.h"
 #include "common/stats/report.h"
@@ -33,9 +34,8 @@ class LayoutTable {
 
   struct Request {
     const FrameRequest* frame = nullptr;  // with names that there are (CheckNames)
-    DatasetId dataset = 0;
+    const ClassifiedVolume* volume = nullptr;  // of the frame
     const VolumeSummary* summary = nullptr;
-    const TransferFunction* transfer = nullptr;     // of the frame, resolved
     std::shared_ptr<const OccupancyGrid> occupied;  // null: the policy does not need it
     std::uint32_t slots = 1;
     std::int64_t slab_bytes_target = 0;
@@ -44,24 +44,21 @@ class LayoutTable {
   const Layout& Find(const Request& request);
 
   // What boxes cost, as far as frames have told: seconds.
-  bool KnowsCost(DatasetId dataset, const TransferFunction& transfer, RendererKind renderer);
-  std::optional<WorkField> KnownCost(DatasetId dataset, const TransferFunction& transfer, RendererKind renderer);
+  bool KnowsCost(const ClassifiedVolume& volume);
+  std::optional<WorkField> KnownCost(const ClassifiedVolume& volume);
 
-  // A finished frame of this request's dataset, transfer function and renderer. Nothing is learnt from frames that were planned without
-  // occupied voxels.
-  void Learn(const FramePlan& plan, const Policy& policy, std::span<const RankReport> reports);
+  // A finished frame. Nothing is learnt from frames that were planned without occupied voxels.
+  void Learn(const ClassifiedVolume& volume, const FramePlan& plan, const Policy& policy, std::span<const RankReport> reports);
 
  private:
   struct Key {
-    DatasetId dataset = 0;
-    TransferFunction transfer;
-    RendererKind renderer = RendererKind::kSplat;
+    ClassifiedVolume volume;
     Policy policy;
     std::uint32_t slots = 1;
     friend bool operator==(const Key&, const Key&) = default;
   };
   // How images are combined moves no box, so policies that differ in that alone share a layout.
-  static Key KeyOf(DatasetId dataset, const TransferFunction& transfer, RendererKind renderer, const Policy& policy, std::uint32_t slots);
+  static Key KeyOf(const ClassifiedVolume& volume, const Policy& policy, std::uint32_t slots);
   struct Entry {
     Key key;
     Layout layout;
@@ -71,12 +68,10 @@ class LayoutTable {
     std::vector<double> seconds;  // by box of it, over these frames, newer ones counting more; 0: not rendered yet
   };
   struct Learnt {
-    DatasetId dataset = 0;
-    TransferFunction transfer;
-    RendererKind renderer = RendererKind::kSplat;
+    ClassifiedVolume volume;
     LearntCost cost;
   };
-  Learnt* FindLearnt(DatasetId dataset, const TransferFunction& transfer, RendererKind renderer);
+  Learnt* FindLearnt(const ClassifiedVolume& volume);
 
   std::list<Entry> entries_;  // asked for last first
   std::list<Learnt> learnt_;  // likewise

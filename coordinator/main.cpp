@@ -1,10 +1,12 @@
 // slabstream-coordinator: the service's front. It ends on SIGINT, SIGTERM or a client's order, and tells its workers to end.
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <string>
 #include <vector>
 
+#include "common/base/background_tasks.h"
 #include "common/base/large_buffers.h"
 #include "common/base/log.h"
 #include "common/base/stop_signals.h"
@@ -49,7 +51,7 @@ int Run(int argc, char** argv) {
   }
   const auto parsed_link = slabstream::ParseLink("--link", link);
   if (!parsed_link.ok()) return Fail(parsed_link.status());
-  options.machine.surroundings.link = *parsed_link;
+  options.planner.surroundings.link = *parsed_link;
   auto catalogue = slabstream::MakeCatalogue(data);
   if (!catalogue.ok()) return Fail(catalogue.status());
   options.catalogue = std::move(*catalogue);
@@ -72,10 +74,12 @@ int Run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   slabstream::KeepFrameBuffers();
+  int exit_status = 1;
   try {
-    return Run(argc, argv);
+    exit_status = Run(argc, argv);
   } catch (const std::exception& error) {  // out of memory, mostly: everything that is expected comes back as a Status
     (void)std::fprintf(stderr, "slabstream-coordinator: %s\n", error.what());
-    return 1;
   }
+  if (slabstream::BackgroundTasks::AnyRunning()) std::_Exit(exit_status);  // a load that takes long does not keep the process
+  return exit_status;
 }

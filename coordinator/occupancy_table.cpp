@@ -8,22 +8,22 @@
 
 namespace slabstream {
 
-std::shared_ptr<const OccupancyGrid> OccupancyTable::Find(const Subject& subject) {
+std::shared_ptr<const OccupancyGrid> OccupancyTable::Find(const ClassifiedVolume& volume) {
   const auto found =
-      std::find_if(entries_.begin(), entries_.end(), [&](const Entry& entry) { return entry.grid != nullptr && entry.subject == subject; });
+      std::find_if(entries_.begin(), entries_.end(), [&](const Entry& entry) { return entry.grid != nullptr && entry.volume == volume; });
   if (found == entries_.end()) return nullptr;
   entries_.splice(entries_.begin(), entries_, found);
   return found->grid;
 }
 
-bool OccupancyTable::Counting(const Subject& subject) const {
+bool OccupancyTable::Counting(const ClassifiedVolume& volume) const {
   return std::any_of(entries_.begin(), entries_.end(),
-                     [&](const Entry& entry) { return entry.grid == nullptr && entry.subject == subject; });
+                     [&](const Entry& entry) { return entry.grid == nullptr && entry.volume == volume; });
 }
 
-CountId OccupancyTable::Begin(Subject subject) {
-  CHECK(!Counting(subject));
-  entries_.push_front({std::move(subject), ++last_count_, nullptr});
+CountId OccupancyTable::Begin(const ClassifiedVolume& volume) {
+  CHECK(!Counting(volume));
+  entries_.push_front({volume, ++last_count_, nullptr});
   return last_count_;
 }
 
@@ -43,13 +43,13 @@ bool OccupancyTable::Counted(CountId count, std::shared_ptr<const OccupancyGrid>
   return true;
 }
 
-std::optional<OccupancyTable::Subject> OccupancyTable::Failed(CountId count) {
+std::optional<ClassifiedVolume> OccupancyTable::Failed(CountId count) {
   const auto found =
       std::find_if(entries_.begin(), entries_.end(), [&](const Entry& entry) { return entry.grid == nullptr && entry.count == count; });
   if (found == entries_.end()) return std::nullopt;
-  Subject subject = std::move(found->subject);
+  ClassifiedVolume volume = std::move(found->volume);
   entries_.erase(found);
-  return subject;
+  return volume;
 }
 
 }  // namespace slabstream

@@ -1,6 +1,5 @@
-// OccupancyTable: which voxels of the datasets a renderer draws under which transfer function, as far as plans need to know. Counting reads
-// all voxels, so the executor does it; every count has an id of its own, so that an answer that comes late or twice is told apart. The last
-// few grids are kept.
+// OccupancyTable: the occupied voxels of classified volumes, as far as plans need them. Counting reads all voxels, so the executor does it.
+// Every count has an id of its own, so that late and repeated answers are recognised. The last few grids are kept.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +7,7 @@
 #include <memory>
 #include <optional>
 
-#include "common/planning/frame_plan.h"
+#include "common/planning/classified_volume.h"
 #include "common/volume/occupancy_grid.h"
 
 namespace slabstream {
@@ -19,26 +18,19 @@ class OccupancyTable {
  public:
   static constexpr std::size_t kMaxKept = 8;  // grids; counts under way are kept beside them
 
-  struct Subject {
-    DatasetId dataset = 0;
-    TransferFunction transfer;
-    RendererKind renderer = RendererKind::kSplat;
-    friend bool operator==(const Subject&, const Subject&) = default;
-  };
-
   // Null: not counted. Whoever asks wants to keep it: the one asked for longest ago goes first.
-  std::shared_ptr<const OccupancyGrid> Find(const Subject& subject);
-  bool Counting(const Subject& subject) const;
-  CountId Begin(Subject subject);  // neither found nor counting
+  std::shared_ptr<const OccupancyGrid> Find(const ClassifiedVolume& volume);
+  bool Counting(const ClassifiedVolume& volume) const;
+  CountId Begin(const ClassifiedVolume& volume);  // neither found nor counting
 
   // The end of a count. False: there is none with this id under way; nothing changes.
   bool Counted(CountId count, std::shared_ptr<const OccupancyGrid> grid);
   // Likewise; what was counted. It may be begun anew.
-  std::optional<Subject> Failed(CountId count);
+  std::optional<ClassifiedVolume> Failed(CountId count);
 
  private:
   struct Entry {
-    Subject subject;
+    ClassifiedVolume volume;
     CountId count = 0;
     std::shared_ptr<const OccupancyGrid> grid;  // null: under way
   };

@@ -36,7 +36,7 @@ PolicyTable::Kind PolicyTable::KindOf(const Request& request) {
 
 Result<ChosenPolicy> PolicyTable::Choose(const Request& request, Entry& entry, const Kind& kind, const Policy& open, const Policy* now) {
   const std::optional<WorkField> cost =
-      entry.by_cost ? request.layouts->KnownCost(request.dataset, *request.transfer, request.frame->renderer) : std::nullopt;
+      entry.by_cost ? request.layouts->KnownCost(*request.volume) : std::nullopt;
   FrameRequest frame = *request.frame;
   frame.policy = open;
   const Result<PolicyChoice> choice = ChoosePolicy({.frame = &frame,
@@ -49,7 +49,7 @@ Result<ChosenPolicy> PolicyTable::Choose(const Request& request, Entry& entry, c
                                                     .now = now,
                                                     .least_gain = kRevisitGain});
   if (!choice.ok()) return choice.status();
-  ChosenPolicy chosen{entry.key.asked, choice->policy, choice->prediction, entry.render_scale};
+  ChosenPolicy chosen{choice->policy, choice->prediction, entry.render_scale};
   const auto same = std::ranges::find(entry.choices, kind, &Choice::kind);
   if (same != entry.choices.end()) entry.choices.erase(same);
   entry.choices.push_front({kind, chosen, entry.frames_seen});
@@ -59,12 +59,12 @@ Result<ChosenPolicy> PolicyTable::Choose(const Request& request, Entry& entry, c
 
 Result<ChosenPolicy> PolicyTable::Find(const Request& request) {
   const Kind kind = KindOf(request);
-  Key key{request.dataset, *request.transfer, request.frame->renderer, request.frame->policy, request.slots};
+  Key key{*request.volume, request.frame->policy, request.slots};
   const auto found = std::ranges::find(entries_, key, &Entry::key);
   if (found == entries_.end() || found->machine != *request.machine) {
     if (found != entries_.end()) entries_.erase(found);
     Entry entry{.key = std::move(key), .machine = *request.machine};
-    entry.by_cost = request.layouts->KnowsCost(request.dataset, *request.transfer, request.frame->renderer);
+    entry.by_cost = request.layouts->KnowsCost(*request.volume);
     Result<ChosenPolicy> chosen = Choose(request, entry, kind, entry.key.asked, nullptr);
     if (!chosen.ok()) return chosen;
     entries_.push_front(std::move(entry));
@@ -74,7 +74,7 @@ Result<ChosenPolicy> PolicyTable::Find(const Request& request) {
   entries_.splice(entries_.begin(), entries_, found);
   Entry& entry = entries_.front();
   const Policy holds = entry.choices.front().chosen.policy;
-  if (!entry.by_cost && request.layouts->KnowsCost(request.dataset, *request.transfer, request.frame->renderer)) {
+  if (!entry.by_cost && request.layouts->KnowsCost(*request.volume)) {
     entry.by_cost = true;
     entry.render_scale = 1;  // costs are seconds now
     entry.frames_seen = 0;
@@ -97,14 +97,15 @@ Result<ChosenPolicy> PolicyTable::Find(const Request& request) {
   return choice->chosen;
 }
 
-void PolicyTable::Learn(const FramePlan& plan, const ChosenPolicy& chosen, std::span<const RankReport> reports) {
-  const Key key{plan.setup.dataset, plan.setup.transfer, plan.setup.renderer, chosen.asked, plan.slots};
-  const auto entry = std::ranges::find(entries_, key, &Entry::key);
+void PolicyTable::Learn(const PlannedFrame& frame, std::span<const RankReport> reports) {
+  if (!frame.prediction || frame.prediction->render_seconds <= 0) return;
+  const Policy asked = SettledPolicy(frame.asked.frame, frame.asked.summary->description.geometry);
+  const auto entry = std::ranges::find(entries_, Key{frame.asked.volume, asked, frame.plan.slots}, &Entry::key);
   const double seconds = RenderSeconds(reports);
-  if (entry == entries_.end() || seconds <= 0 || !chosen.prediction || chosen.prediction->render_seconds <= 0) return;
+  if (entry == entries_.end() || seconds <= 0) return;
   const double weight = std::max(kLeastWeight, 1.0 / ++entry->frames_seen);
-  const double factor = std::clamp(seconds / chosen.prediction->render_seconds, kLeastFactor, kMostFactor);
-  entry->render_scale += weight * (chosen.render_scale * factor - entry->render_scale);
+  const double factor = std::clamp(seconds / frame.prediction->render_seconds, kLeastFactor, kMostFactor);
+  entry->render_scale += weight * (frame.render_scale * factor - entry->render_scale);
 }
 
 }  // namespace slabstream

@@ -17,10 +17,16 @@
 #include "common/stats/report.h"
 #include "common/tuning/choose_policy.h"
 #include "common/volume/occupancy_grid.h"
-#include "coordinator/chosen_policy.h"
 #include "coordinator/layout_table.h"
+#include "coordinator/plan_request.h"
 
 namespace slabstream {
+
+struct ChosenPolicy {
+  Policy policy;                              // leaves nothing open
+  std::optional<FramePrediction> prediction;  // none: too much to simulate
+  double render_scale = 1;                    // by which it was corrected (PolicyQuestion)
+};
 
 class PolicyTable {
  public:
@@ -32,9 +38,8 @@ class PolicyTable {
 
   struct Request {
     const FrameRequest* frame = nullptr;  // whose policy has names that there are (CheckNames)
-    DatasetId dataset = 0;
+    const ClassifiedVolume* volume = nullptr;  // of the frame
     const VolumeSummary* summary = nullptr;
-    const TransferFunction* transfer = nullptr;     // of the frame, resolved
     std::shared_ptr<const OccupancyGrid> occupied;  // null: not counted
     std::uint32_t slots = 1;
     const MachineModel* machine = nullptr;
@@ -44,8 +49,8 @@ class PolicyTable {
   // Errors as of ChoosePolicy.
   Result<ChosenPolicy> Find(const Request& request);
 
-  // A finished frame that was planned by what Find said.
-  void Learn(const FramePlan& plan, const ChosenPolicy& chosen, std::span<const RankReport> reports);
+  // A finished frame. Nothing is learnt from one of which nothing was predicted.
+  void Learn(const PlannedFrame& frame, std::span<const RankReport> reports);
 
  private:
   // Views of a kind look at the same slices at about the same size.
@@ -62,9 +67,7 @@ class PolicyTable {
     int made_after = 0;  // frames
   };
   struct Key {
-    DatasetId dataset = 0;
-    TransferFunction transfer;
-    RendererKind renderer = RendererKind::kSplat;
+    ClassifiedVolume volume;
     Policy asked;
     std::uint32_t slots = 1;
     friend bool operator==(const Key&, const Key&) = default;

@@ -52,6 +52,18 @@ void RequestQueue::Update(const std::function<void(OpenRequest&)>& change) {
   }
 }
 
+void RequestQueue::VisitInTurn(const std::function<bool(OpenRequest&)>& visit) {
+  bool more = true;
+  for (std::size_t round = 0; more; ++round) {
+    more = false;
+    for (ClientQueue& queue : turn_) {
+      if (round >= queue.requests.size()) continue;
+      more = true;
+      if (!visit(queue.requests[round])) return;
+    }
+  }
+}
+
 bool RequestQueue::Contains(PeerToken client, RequestId request) const {
   return std::any_of(turn_.begin(), turn_.end(), [&](const ClientQueue& queue) {
     return queue.client == client &&

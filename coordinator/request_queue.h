@@ -12,9 +12,8 @@
 
 #include "common/base/time.h"
 #include "common/wire/client_messages.h"
-#include "coordinator/chosen_policy.h"
-#include "coordinator/occupancy_table.h"
 #include "coordinator/peer_token.h"
+#include "coordinator/plan_request.h"
 
 namespace slabstream {
 
@@ -22,10 +21,10 @@ struct OpenRequest {
   PeerToken client = 0;
   SubmitFrame submit;
   Time arrived;
-  // What must be counted before the frame can be planned. Null: nothing, or not known yet.
-  std::shared_ptr<const OccupancyTable::Subject> counted;
-  // None: the policy of `submit` leaves no choice, or it is not made yet. Else that policy is the chosen one.
-  std::optional<ChosenPolicy> chosen;
+  std::optional<ClassifiedVolume> volume;       // none: its dataset is not loaded yet
+  PlanId plan = 0;                              // that was asked for; 0: none
+  std::uint64_t planned_for = 0;                // LiveRoster::version() when it was
+  std::shared_ptr<const PlannedFrame> planned;  // null: not yet
 
   Time deadline() const { return arrived + std::chrono::milliseconds(submit.deadline_ms); }
   bool Is(PeerToken of_client, RequestId id) const { return client == of_client && submit.request == id; }
@@ -42,6 +41,8 @@ class RequestQueue {
 
   void ForEach(const std::function<void(const OpenRequest&)>& visit) const;  // in turn of clients, then in order of arrival
   void Update(const std::function<void(OpenRequest&)>& change);              // likewise
+  // In the order in which they are served if all are ready, until `visit` returns false.
+  void VisitInTurn(const std::function<bool(OpenRequest&)>& visit);
   bool Contains(PeerToken client, RequestId request) const;
   std::size_t size() const;
   std::size_t CountOf(PeerToken client) const;

@@ -26,6 +26,7 @@ WorkerId LiveRoster::Admit(const Register& message, PeerToken from, Time now) {
   auto slot = std::find_if(slots_.begin(), slots_.end(), [](const Slot& s) { return s.worker == 0; });
   if (slot == slots_.end()) slot = slots_.insert(slot, Slot{});
   slot->worker = last_id_;
+  ++version_;
   return last_id_;
 }
 
@@ -52,6 +53,7 @@ void LiveRoster::Touch(WorkerId worker, Time now) {
 
 void LiveRoster::Remove(WorkerId worker, Time now) {
   if (std::erase_if(members_, [worker](const Member& m) { return m.id == worker; }) == 0) return;
+  ++version_;
   for (Slot& slot : slots_) {
     if (slot.worker == worker) slot = {.worker = 0, .vacant_since = now};
   }
@@ -59,7 +61,8 @@ void LiveRoster::Remove(WorkerId worker, Time now) {
 }
 
 void LiveRoster::GiveUpVacancies(Time now) {
-  std::erase_if(slots_, [&](const Slot& slot) { return slot.worker == 0 && now >= slot.vacant_since + vacancy_grace_; });
+  const auto expired = [&](const Slot& slot) { return slot.worker == 0 && now >= slot.vacant_since + vacancy_grace_; };
+  if (std::erase_if(slots_, expired) > 0) ++version_;
 }
 
 void LiveRoster::Postpone(Duration duration) {

@@ -57,6 +57,7 @@ class LiveRoster {
   std::uint32_t SlotOf(WorkerId worker) const;       // of a member
 
   Roster slots() const;  // 0 where a slot is vacant
+  std::uint64_t version() const { return version_; }  // another one whenever slots() changes
   // The slots of a plan made earlier: workers that are still here keep theirs; the others' go to workers without a slot in it, the present
   // owner of the same slot first. What is left is vacant.
   Roster Refill(const Roster& planned) const;
@@ -72,6 +73,7 @@ class LiveRoster {
   std::vector<Member> members_;  // by ascending id
   std::vector<Slot> slots_;
   WorkerId last_id_ = 0;
+  std::uint64_t version_ = 0;
   Time empty_since_ = Time::min();
 };
 

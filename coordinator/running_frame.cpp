@@ -21,11 +21,11 @@ std::int64_t Nanoseconds(Time time) { return time.time_since_epoch().count(); }
 
 }  // namespace
 
-RunningFrame::RunningFrame(FrameId id, OpenRequest request, FramePlan plan, Roster roster, const FrameLimits& limits, Time now)
+RunningFrame::RunningFrame(FrameId id, OpenRequest request, const FrameLimits& limits, Time now)
     : id_(id),
       request_(std::move(request)),
-      plan_(std::move(plan)),
-      roster_(std::move(roster)),
+      plan_(request_.planned->plan),
+      roster_(request_.planned->asked.roster),
       limits_(limits),
       begin_(now),
       displays_{plan_.display},
@@ -223,14 +223,15 @@ FrameProgress RunningFrame::Progress() const {
 }
 
 FrameStatistics RunningFrame::Statistics(Time now) const {
+  const Policy& policy = request_.planned->policy;
   FrameStatistics statistics{.workers = std::uint32_t(Participants().size()),
                              .groups = group_count(),
                              .attempts = attempt(),
-                             .decomposition = request_.submit.frame.policy.decomposition,
+                             .decomposition = policy.decomposition,
                              .split = plan_.split,
                              .axis = std::string(1, Letter(plan_.slab_axis)),
-                             .assignment = request_.submit.frame.policy.assignment,
-                             .balance = request_.submit.frame.policy.balance,
+                             .assignment = policy.assignment,
+                             .balance = policy.balance,
                              .combine = plan_.combine,
                              .queued_ns = (begin_ - request_.arrived).count(),
                              .begin_ns = Nanoseconds(begin_),
@@ -238,7 +239,7 @@ FrameStatistics RunningFrame::Statistics(Time now) const {
                              .reports = {},
                              .display = plan_.display,
                              .grid = FrameBounds(plan_.setup),
-                             .predicted = request_.chosen ? request_.chosen->prediction : std::nullopt};
+                             .predicted = request_.planned->prediction};
   const auto append = [&](const std::vector<RankReport>& reports) {
     const std::size_t room = kMaxReports - statistics.reports.size();
     statistics.reports.insert(statistics.reports.end(), reports.begin(), reports.begin() + std::ptrdiff_t(std::min(room, reports.size())));

@@ -44,8 +44,8 @@ struct FrameLimits {
 
 class RunningFrame {
  public:
-  // `roster` is what `plan` was made for.
-  RunningFrame(FrameId id, OpenRequest request, FramePlan plan, Roster roster, const FrameLimits& limits, Time now);
+  // `request` is planned.
+  RunningFrame(FrameId id, OpenRequest request, const FrameLimits& limits, Time now);
 
   FrameId id() const { return id_; }
   const OpenRequest& request() const { return request_; }

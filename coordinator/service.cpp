@@ -5,16 +5,18 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <exception>
-#include <new>
+#include <map>
 #include <random>
 #include <thread>
 #include <utility>
 #include <variant>
 
+#include "common/base/background_tasks.h"
+#include "common/base/guarded.h"
 #include "common/base/log.h"
 #include "common/base/shared_arena.h"
-#include "common/base/task_thread.h"
+#include "common/classification/count_occupied.h"
+#include "common/planning/render_work.h"
 #include "common/transport/endpoint.h"
 #include "common/transport/mailbox.h"
 #include "coordinator/peer_table.h"
@@ -47,8 +49,32 @@ bool MostBricksAreEqual(const VolumeSummary& summary) {
   return 2 * std::size_t(equal) >= summary.bricks.size();
 }
 
-Status LoadFailure(const std::string& name, const std::string& reason) {
-  return Status::ResourceExhausted("dataset \"" + name + "\" could not be loaded: " + reason);
+// What other threads tell the machine's. Voxels are published first, before the machine can send anybody for them.
+struct News {
+  CoordinatorEvent event;
+  DatasetId dataset = 0;
+  SlabServer::Samples samples;
+};
+
+News NewsOf(CoordinatorEvent event) { return {.event = std::move(event), .dataset = 0, .samples = {}}; }
+
+Result<News> Load(const VolumeLoader& loader, const LoadDataset& action) {
+  const Result<std::shared_ptr<const Volume>> volume = loader();
+  if (!volume.ok()) return volume.status();
+  auto summary = std::make_shared<const VolumeSummary>(Summarize(**volume));
+  News news{.event = {}, .dataset = action.dataset, .samples = {}};
+  if (MostBricksAreEqual(*summary)) {
+    news.samples.bricks = std::make_shared<const BrickedVoxels>((*volume)->block);
+  } else {
+    news.samples.volume = *volume;
+  }
+  news.event = DatasetLoaded{action.name, action.dataset, std::move(summary)};
+  return news;
+}
+
+Result<std::shared_ptr<const OccupancyGrid>> Count(const SlabServer::Samples& samples, const CountDataset& action) {
+  const ClassificationTable drawn = DrawnTable(action.volume.transfer(), *action.summary, action.volume.renderer());
+  return std::make_shared<const OccupancyGrid>(CountOccupied(samples.view(), drawn));
 }
 
 }  // namespace
@@ -59,16 +85,26 @@ struct CoordinatorService::Impl {
         machine(std::move(service_options.machine)),
         clients(std::move(client_socket)),
         control(std::move(control_socket)),
-        slabs(std::move(slab_server)) {}
+        slabs(std::move(slab_server)),
+        make_plan(std::move(service_options.make_plan)),
+        planner(std::make_shared<Planner>(std::move(service_options.planner))) {}
 
   void Run();
+  void Loop();
   void HandleEvent(const CoordinatorEvent& event);
-  void Perform(CoordinatorAction& action);
   void ReceiveFromClients();
   void ReceiveFromWorkers();
   void Send(Socket& socket, PeerTable& peers, PeerToken to, const AnyMessage& message, const Bytes& payload, const CoordinatorEvent& gone);
-  void Load(const LoadDataset& action);
-  void Count(const CountDataset& action);
+
+  // One for each kind of action.
+  void Perform(ToWorker& action) { Send(control, worker_peers, action.to, action.message, {}, WorkerGone{action.to}); }
+  void Perform(ToClient& action) { Send(clients, client_peers, action.to, action.message, action.payload, ClientGone{action.to}); }
+  void Perform(LoadDataset& action);
+  void Perform(CountDataset& action);
+  void Perform(PlanRequest& action);
+  void Perform(DropPlan& action);
+  void Perform(FrameMeasured& action);
+  void Perform(StopService&) { stop_now = true; }
 
   std::string client_endpoint, worker_endpoint;
   const Catalogue catalogue;
@@ -76,22 +112,45 @@ struct CoordinatorService::Impl {
   Socket clients, control;
   PeerTable client_peers, worker_peers;
   std::unique_ptr<SlabServer> slabs;
-  Mailbox<CoordinatorEvent> inbox;  // from the loader and from failed sends; its wakeup also tells of stop_requested
+  // From the other threads and from failed sends; its wakeup also tells of stop_requested. Tasks that outlive the service share it.
+  const std::shared_ptr<Mailbox<News>> inbox = std::make_shared<Mailbox<News>>();
   std::atomic<bool> stop_requested = false;
   std::atomic<bool> stopped = false;
   bool stop_now = false;  // the machine said so
   Time next_forget;
-  TaskThread loader;
+  const PlanFunction make_plan;
+  const std::shared_ptr<Planner> planner;  // the planning thread's
+  std::map<PlanId, std::shared_ptr<std::atomic<bool>>> plans;  // under way: whether they are dropped
+  BackgroundTasks loads{kLoadsAtOnce}, counts{1}, planning{1};
   std::jthread thread;  // owns the sockets and the machine; last member: ends first
 };
 
 void CoordinatorService::Impl::Run() {
+  const Status ended = Guarded("coordinator", [&] {
+    Loop();
+    return Status::Ok();
+  });
+  if (!ended.ok()) {
+    LogError("the coordinator stops: " + ended.message());
+    (void)Guarded("coordinator", [&] {
+      HandleEvent(CoordinatorStopRequested{ended.message()});
+      return Status::Ok();
+    });
+  }
+  stopped = true;
+  stopped.notify_all();
+}
+
+void CoordinatorService::Impl::Loop() {
   const std::array<Socket*, 2> sockets = {&clients, &control};
   Time stop_deadline = Time::max();
   HandleEvent(CoordinatorTick{});
   while (!stop_now && MonotonicNow() < stop_deadline) {
-    Wait(sockets, &inbox.wakeup(), std::clamp(machine.NextWake() - MonotonicNow(), Duration::zero(), kLongestWait));
-    for (const CoordinatorEvent& event : inbox.TakeAll()) HandleEvent(event);
+    Wait(sockets, &inbox->wakeup(), std::clamp(machine.NextWake() - MonotonicNow(), Duration::zero(), kLongestWait));
+    for (News& news : inbox->TakeAll()) {
+      if (news.samples.any()) slabs->Publish(news.dataset, std::move(news.samples));
+      HandleEvent(news.event);
+    }
     ReceiveFromWorkers();
     ReceiveFromClients();
     const Time now = MonotonicNow();
@@ -106,46 +165,33 @@ void CoordinatorService::Impl::Run() {
       next_forget = now + kForgetInterval;
     }
   }
-  stopped = true;
-  stopped.notify_all();
 }
 
 void CoordinatorService::Impl::HandleEvent(const CoordinatorEvent& event) {
-  for (CoordinatorAction& action : machine.Step(event, MonotonicNow())) Perform(action);
-}
-
-void CoordinatorService::Impl::Perform(CoordinatorAction& action) {
-  if (const auto* to_worker = std::get_if<ToWorker>(&action)) {
-    Send(control, worker_peers, to_worker->to, to_worker->message, {}, WorkerGone{to_worker->to});
-  } else if (const auto* to_client = std::get_if<ToClient>(&action)) {
-    Send(clients, client_peers, to_client->to, to_client->message, to_client->payload, ClientGone{to_client->to});
-  } else if (const auto* load = std::get_if<LoadDataset>(&action)) {
-    Load(*load);
-  } else if (const auto* count = std::get_if<CountDataset>(&action)) {
-    Count(*count);
-  } else {
-    static_assert(std::variant_size_v<CoordinatorAction> == 5);
-    stop_now = true;
+  if (const auto* planned = std::get_if<Planned>(&event)) plans.erase(planned->plan);
+  for (CoordinatorAction& action : machine.Step(event, MonotonicNow())) {
+    std::visit([this](auto& each) { Perform(each); }, action);
   }
 }
 
-// A peer that cannot be reached, or that does not take its messages, is gone. The machine hears of it after the actions at hand, not
-// between them.
+// A peer that cannot be reached, or that does not take its messages, is gone, and so is one to which nothing can be said for want of memory.
+// The machine hears of it after the actions at hand, not between them.
 void CoordinatorService::Impl::Send(Socket& socket, PeerTable& peers, PeerToken to, const AnyMessage& message, const Bytes& payload,
                                     const CoordinatorEvent& gone) {
   const std::string* identity = peers.IdentityOf(to);
-  const Status sent = identity == nullptr ? Status::Unavailable("forgotten connection") : socket.Send(*identity, Encode(message), payload);
+  const Status sent = identity == nullptr ? Status::Unavailable("forgotten connection")
+                                          : Guarded("send", [&] { return socket.Send(*identity, Encode(message), payload); });
   if (sent.ok()) return;
   LogDebug(std::string(NameOf(message)) + " not sent: " + sent.message());
   peers.Forget(to);
-  inbox.Post(gone);
+  inbox->Post(NewsOf(gone));
 }
 
 void CoordinatorService::Impl::ReceiveFromWorkers() {
   for (int i = 0; i < kReceiveBatch; ++i) {
     std::optional<Incoming> incoming = control.TryReceive();
     if (!incoming) return;
-    Result<AnyMessage> message = Decode(incoming->parts[0].span());
+    Result<AnyMessage> message = Guarded("decoding", [&] { return Decode(incoming->parts[0].span()); });
     Bytes payload = incoming->parts.size() > 1 ? std::move(incoming->parts[1]) : Bytes();
     if (!message.ok() || payload.size() != ExpectedPayloadBytes(*message)) {
       LogWarning("control plane: dropped a message: " +
@@ -161,7 +207,7 @@ void CoordinatorService::Impl::ReceiveFromClients() {
   for (int i = 0; i < kReceiveBatch; ++i) {
     const std::optional<Incoming> incoming = clients.TryReceive();
     if (!incoming) return;
-    Result<AnyMessage> message = Decode(incoming->parts[0].span());
+    Result<AnyMessage> message = Guarded("decoding", [&] { return Decode(incoming->parts[0].span()); });
     if (!message.ok()) {
       LogWarning("client plane: refused a message: " + message.status().message());
       // A request that can be told by its id gets its answer, so that nobody waits for what will never come.
@@ -174,40 +220,57 @@ void CoordinatorService::Impl::ReceiveFromClients() {
   }
 }
 
-void CoordinatorService::Impl::Load(const LoadDataset& action) {
-  loader.Post([this, name = action.name, dataset = action.dataset] {
-    const auto load = [&]() -> CoordinatorEvent {
-      try {
-        const Result<std::shared_ptr<const Volume>> volume = catalogue.at(name)();
-        if (!volume.ok()) return DatasetFailed{name, volume.status()};
-        auto summary = std::make_shared<const VolumeSummary>(Summarize(**volume));
-        // Before the machine can send anybody for its voxels.
-        if (MostBricksAreEqual(*summary)) {
-          slabs->Publish(dataset, std::make_shared<const BrickedVoxels>((*volume)->block));
-        } else {
-          slabs->Publish(dataset, *volume);
-        }
-        return DatasetLoaded{name, dataset, std::move(summary)};
-      } catch (const std::bad_alloc&) {
-        return DatasetFailed{name, LoadFailure(name, "not enough memory")};
-      } catch (const std::exception& error) {  // of libraries below the reader
-        return DatasetFailed{name, LoadFailure(name, error.what())};
-      }
-    };
-    inbox.Post(load());
+// What cannot even be begun fails as if it had been.
+void CoordinatorService::Impl::Perform(LoadDataset& action) {
+  const auto load = [loader = catalogue.at(action.name), action] {
+    const std::string barrier = "dataset \"" + action.name + "\" could not be loaded";
+    Result<News> loaded = Guarded(barrier.c_str(), [&] { return Load(loader, action); });
+    return loaded.ok() ? *std::move(loaded) : NewsOf(DatasetFailed{action.name, loaded.status()});
+  };
+  const Status begun = Guarded("loading", [&] {
+    loads.Post([inbox = inbox, load] { inbox->Post(load()); });
+    return Status::Ok();
   });
+  if (!begun.ok()) inbox->Post(NewsOf(DatasetFailed{action.name, begun}));
 }
 
-void CoordinatorService::Impl::Count(const CountDataset& action) {
-  loader.Post([this, action] {
-    const auto count = [&]() -> Result<std::shared_ptr<const OccupancyGrid>> {
-      try {
-        return std::make_shared<const OccupancyGrid>(slabs->CountOccupied(action.dataset, *action.table));
-      } catch (const std::bad_alloc&) {
-        return Status::ResourceExhausted("occupied voxels could not be counted: not enough memory");
-      }
-    };
-    inbox.Post(OccupiedCounted{action.count, count()});
+void CoordinatorService::Impl::Perform(CountDataset& action) {
+  const Status begun = Guarded("counting of occupied voxels", [&] {
+    counts.Post([inbox = inbox, samples = slabs->Find(action.volume.dataset()), action] {
+      inbox->Post(NewsOf(OccupiedCounted{action.count, Guarded("counting of occupied voxels", [&] { return Count(samples, action); })}));
+    });
+    return Status::Ok();
+  });
+  if (!begun.ok()) inbox->Post(NewsOf(OccupiedCounted{action.count, begun}));
+}
+
+void CoordinatorService::Impl::Perform(PlanRequest& action) {
+  const PlanId plan = action.plan;
+  const Status begun = Guarded("planning", [&] {
+    const auto& dropped = plans[plan] = std::make_shared<std::atomic<bool>>(false);
+    planning.Post([inbox = inbox, planner = planner, make = make_plan, dropped, request = std::move(action)] {
+      if (*dropped) return;
+      inbox->Post(NewsOf(Planned{request.plan, Guarded("planning", [&] { return make(*planner, request); })}));
+    });
+    return Status::Ok();
+  });
+  if (!begun.ok()) inbox->Post(NewsOf(Planned{plan, begun}));
+}
+
+void CoordinatorService::Impl::Perform(DropPlan& action) {
+  const auto plan = plans.find(action.plan);
+  if (plan == plans.end()) return;
+  *plan->second = true;
+  plans.erase(plan);
+}
+
+void CoordinatorService::Impl::Perform(FrameMeasured& action) {
+  planning.Post([planner = planner, measured = std::move(action)] {
+    const Status learnt = Guarded("learning from a frame", [&] {
+      planner->Learn(measured);
+      return Status::Ok();
+    });
+    if (!learnt.ok()) LogWarning(learnt.message());
   });
 }
 
@@ -236,8 +299,8 @@ Result<std::unique_ptr<CoordinatorService>> CoordinatorService::Start(Context& c
 
   options.machine.pid = static_cast<std::uint32_t>(::getpid());
   options.machine.slabs_endpoint = (*slabs)->endpoint();
-  options.machine.surroundings.memory_scope = SharedMemoryScope();
-  options.machine.surroundings.cores = std::int32_t(std::max(std::thread::hardware_concurrency(), 1U));
+  options.planner.surroundings.memory_scope = SharedMemoryScope();
+  options.planner.surroundings.cores = std::int32_t(std::max(std::thread::hardware_concurrency(), 1U));
   options.machine.datasets.clear();
   for (const auto& [name, loader] : options.catalogue) options.machine.datasets.push_back(name);
   auto impl = std::make_unique<Impl>(std::move(options), std::move(*clients), std::move(*control), std::move(*slabs));
@@ -255,7 +318,7 @@ const std::string& CoordinatorService::worker_endpoint() const { return impl_->w
 
 void CoordinatorService::RequestStop() {
   impl_->stop_requested = true;
-  impl_->inbox.wakeup().Notify();
+  impl_->inbox->wakeup().Notify();
 }
 
 void CoordinatorService::WaitUntilStopped() { impl_->stopped.wait(false); }

@@ -1,9 +1,12 @@
 // CoordinatorService: runs a FrameMachine over ZeroMQ. Binds the client, control and slabs planes, loads datasets, serves voxels.
 //
-// Threads: one owns the client and control sockets and runs the machine; one owns the slabs socket, cuts and packs chunks; one loads
-// datasets and counts occupied voxels in them.
+// Threads: one owns the client and control sockets and runs the machine; one owns the slabs socket, cuts and packs chunks; one plans; one
+// counts occupied voxels; each dataset that is being loaded has one, kLoadsAtOnce at a time. None of them waits for another one, and what
+// one of them throws fails what it was doing: a frame, a load, a count, a chunk. If the machine's own thread throws, open requests fail with the
+// reason and the service stops.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -11,8 +14,11 @@
 #include "common/transport/socket.h"
 #include "coordinator/catalogue.h"
 #include "coordinator/frame_machine.h"
+#include "coordinator/planner.h"
 
 namespace slabstream {
+
+using PlanFunction = std::function<Result<std::shared_ptr<const PlannedFrame>>(Planner&, const PlanRequest&)>;
 
 struct CoordinatorOptions {
   std::string client_endpoint;  // bound; a wildcard port is read back
@@ -20,14 +26,19 @@ struct CoordinatorOptions {
   std::string slabs_endpoint;   // bound; empty: any port, ".slabs" beside an ipc path or inproc name
   Catalogue catalogue;          // name -> how to load it
   Codec codec = Codec::kRaw;    // of voxels on their way to workers; zstd pays where the link is slower than it packs
-  CoordinatorConfig machine;    // epoch, pid, slabs_endpoint, datasets and surroundings (but for the link) are filled in by Start
+  CoordinatorConfig machine;    // epoch, pid, slabs_endpoint and datasets are filled in by Start
+  PlannerConfig planner;        // surroundings, but for the link, are filled in by Start
+  PlanFunction make_plan = &Planner::Plan;
 };
+
+inline constexpr std::size_t kLoadsAtOnce = 4;
 
 class CoordinatorService {
  public:
   // Binds and starts the threads. `context` must outlive the service. InvalidArgument: an endpoint; Unavailable: it is taken.
   static Result<std::unique_ptr<CoordinatorService>> Start(Context& context, CoordinatorOptions options);
-  ~CoordinatorService();  // stops and joins
+  // Stops. Does not wait for a load, count or plan that is running (BackgroundTasks): what the catalogue's loaders use must outlive them.
+  ~CoordinatorService();
 
   const std::string& client_endpoint() const;  // with the port that was chosen
   const std::string& worker_endpoint() const;

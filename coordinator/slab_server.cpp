@@ -8,6 +8,7 @@
 #include <variant>
 #include <vector>
 
+#include "common/base/guarded.h"
 #include "common/base/log.h"
 #include "common/transport/endpoint.h"
 #include "common/wire/payload.h"
@@ -50,20 +51,9 @@ SlabServer::~SlabServer() {
   thread_.join();
 }
 
-void SlabServer::Publish(DatasetId dataset, std::shared_ptr<const Volume> volume) {
+void SlabServer::Publish(DatasetId dataset, Samples samples) {
   const std::lock_guard lock(mutex_);
-  samples_.insert_or_assign(dataset, Samples{std::move(volume), nullptr});
-}
-
-void SlabServer::Publish(DatasetId dataset, std::shared_ptr<const BrickedVoxels> bricks) {
-  const std::lock_guard lock(mutex_);
-  samples_.insert_or_assign(dataset, Samples{nullptr, std::move(bricks)});
-}
-
-OccupancyGrid SlabServer::CountOccupied(DatasetId dataset, const ClassificationTable& table) {
-  const Samples samples = Find(dataset);
-  CHECK(samples.any()) << "dataset " << dataset;
-  return slabstream::CountOccupied(samples.volume != nullptr ? VoxelBricks(samples.volume->block) : VoxelBricks(*samples.bricks), table);
+  samples_.insert_or_assign(dataset, std::move(samples));
 }
 
 SlabServer::Samples SlabServer::Find(DatasetId dataset) {
@@ -99,7 +89,11 @@ void SlabServer::Run(const std::stop_token& stop) {
     while (!stop.stop_requested()) {
       const std::optional<Incoming> incoming = socket_.TryReceive();
       if (!incoming) break;
-      Answer(*incoming);
+      const Status answered = Guarded("slabs plane", [&] {
+        Answer(*incoming);
+        return Status::Ok();
+      });
+      if (!answered.ok()) LogWarning(answered.message());  // the worker asks again when its request times out
     }
   }
 }
@@ -111,21 +105,22 @@ void SlabServer::Answer(const Incoming& incoming) {
     LogWarning("slabs plane: dropped " + (decoded.ok() ? std::string(NameOf(*decoded)) : decoded.status().message()));
     return;
   }
-  const Samples samples = Find(request->dataset);
-  Status status = Check(*request, epoch_, samples);
-  if (!status.ok()) {
-    LogWarning(status.message());
-    const ChunkRefused refused{epoch_, request->dataset, request->box, request->chunk, std::move(status)};
-    (void)socket_.Send(incoming.identity, Encode(refused));  // a worker that has gone needs no refusal
-    return;
-  }
-  const std::uint64_t box_bytes = std::uint64_t(request->box.voxel_count()) * BytesPerSample(samples.type());
-  const std::uint64_t begin = std::uint64_t{request->chunk} * kChunkBytes;
-  Chunk chunk{.epoch = epoch_, .dataset = request->dataset, .box = request->box, .chunk = request->chunk};
-  const Bytes payload = PackChunk(Cut(samples, request->box, begin, std::min(begin + kChunkBytes, box_bytes)), codec_, chunk);
-  if (const Status sent = socket_.Send(incoming.identity, Encode(chunk), payload); !sent.ok()) {
-    LogDebug("slabs plane: " + sent.message());  // it has gone, or asks again when its request times out
-  }
+  const Status served = Guarded("chunk request", [&] {
+    const Samples samples = Find(request->dataset);
+    if (Status status = Check(*request, epoch_, samples); !status.ok()) return status;
+    const std::uint64_t box_bytes = std::uint64_t(request->box.voxel_count()) * BytesPerSample(samples.type());
+    const std::uint64_t begin = std::uint64_t{request->chunk} * kChunkBytes;
+    Chunk chunk{.epoch = epoch_, .dataset = request->dataset, .box = request->box, .chunk = request->chunk};
+    const Bytes payload = PackChunk(Cut(samples, request->box, begin, std::min(begin + kChunkBytes, box_bytes)), codec_, chunk);
+    if (const Status sent = socket_.Send(incoming.identity, Encode(chunk), payload); !sent.ok()) {
+      LogDebug("slabs plane: " + sent.message());  // it has gone, or asks again when its request times out
+    }
+    return Status::Ok();
+  });
+  if (served.ok()) return;
+  LogWarning(served.message());
+  const ChunkRefused refused{epoch_, request->dataset, request->box, request->chunk, served};
+  (void)socket_.Send(incoming.identity, Encode(refused));  // a worker that has gone needs no refusal
 }
 
 }  // namespace slabstream

@@ -12,7 +12,6 @@
 #include <thread>
 
 #include "common/base/status.h"
-#include "common/classification/count_occupied.h"
 #include "common/transport/socket.h"
 #include "common/volume/bricks.h"
 #include "common/wire/any_message.h"
@@ -22,22 +21,7 @@ namespace slabstream {
 
 class SlabServer {
  public:
-  static Result<std::unique_ptr<SlabServer>> Start(Context& context, const std::string& endpoint, Epoch epoch, Codec codec = Codec::kRaw);
-  ~SlabServer();  // stops and joins
-
-  const std::string& endpoint() const { return endpoint_; }
-
-  // From any thread; once an id. The volume is served until the server ends: kept whole, or by bricks where those take much less memory.
-  void Publish(DatasetId dataset, std::shared_ptr<const Volume> volume);
-  void Publish(DatasetId dataset, std::shared_ptr<const BrickedVoxels> bricks);
-  // From any thread, of a dataset that was published.
-  OccupancyGrid CountOccupied(DatasetId dataset, const ClassificationTable& table);
-
- private:
-  SlabServer(Socket socket, std::string endpoint, Epoch epoch, Codec codec);
-  void Run(const std::stop_token& stop);
-  void Answer(const Incoming& incoming);
-  // One of the two.
+  // The voxels of a dataset: a whole volume, or bricks where those take much less memory. One of the two, or neither.
   struct Samples {
     std::shared_ptr<const Volume> volume;
     std::shared_ptr<const BrickedVoxels> bricks;
@@ -45,10 +29,24 @@ class SlabServer {
     bool any() const { return volume != nullptr || bricks != nullptr; }
     const Box& box() const { return volume != nullptr ? volume->block.box : bricks->grid().box; }
     ScalarType type() const { return volume != nullptr ? volume->block.type : bricks->type(); }
+    VoxelBricks view() const { return volume != nullptr ? VoxelBricks(volume->block) : VoxelBricks(*bricks); }
   };
+
+  static Result<std::unique_ptr<SlabServer>> Start(Context& context, const std::string& endpoint, Epoch epoch, Codec codec = Codec::kRaw);
+  ~SlabServer();  // stops and joins
+
+  const std::string& endpoint() const { return endpoint_; }
+
+  // From any thread; once an id. They are served until the server ends.
+  void Publish(DatasetId dataset, Samples samples);
+  Samples Find(DatasetId dataset);  // from any thread; neither: not published
+
+ private:
+  SlabServer(Socket socket, std::string endpoint, Epoch epoch, Codec codec);
+  void Run(const std::stop_token& stop);
+  void Answer(const Incoming& incoming);
   Bytes Cut(const Samples& samples, const Box& part, std::uint64_t begin, std::uint64_t end);  // as BoxSamples
   static Status Check(const ChunkRequest& request, Epoch epoch, const Samples& samples);       // why it cannot be met, or ok
-  Samples Find(DatasetId dataset);
 
   const std::string endpoint_;
   const Epoch epoch_;

@@ -4,17 +4,10 @@
 #include <cstdint>
 #include <span>
 
+#include "common/planning/hosted_worker.h"
 #include "common/simulation/machine_model.h"
 
 namespace slabstream {
-
-struct HostedWorker {
-  std::uint64_t memory_scope = 0;  // workers of the same scope share a host and read each other's memory (SharedMemoryScope); 0: unknown
-  bool lends_memory = true;        // its images stay where they are for those; else it sends them in messages
-  std::uint32_t threads = 1;       // that render
-  std::uint32_t pid = 0;           // of its process on that host: workers of one process make pictures by the threads of all; 0: unknown
-  friend bool operator==(const HostedWorker&, const HostedWorker&) = default;
-};
 
 // What passes between hosts unless the coordinator is told otherwise: a preset of LinkPresets().
 inline constexpr char kDefaultLink[] = "10gbit";

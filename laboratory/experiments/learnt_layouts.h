@@ -25,8 +25,8 @@ class LearntLayouts {
   const Layout& Next(const FrameCase& frame) {
     FrameRequest request = RequestOf(frame);
     request.policy = policy_ = SettledPolicy(request, knowledge_.volume.summary->description.geometry);
-    return table_.Find({&request, kPlannedDataset, knowledge_.volume.summary.get(), &knowledge_.transfer, knowledge_.occupied, slots_,
-                        CostModel().slab_bytes_target});
+    return table_.Find(
+        {&request, &volume_, knowledge_.volume.summary.get(), knowledge_.occupied, slots_, CostModel().slab_bytes_target});
   }
 
   // What rendering the frame of the last Next took, by PlacementsOf(plan).
@@ -37,13 +37,15 @@ class LearntLayouts {
       report.box = placement.id;
       report.stage_ns[std::size_t(Stage::kRender)] = nanoseconds[reports.size() - 1];
     }
-    table_.Learn(plan, policy_, reports);
+    table_.Learn(volume_, plan, policy_, reports);
   }
 
  private:
-  LearntLayouts(LayoutKnowledge knowledge, std::uint32_t slots) : knowledge_(std::move(knowledge)), slots_(slots) {}
+  LearntLayouts(LayoutKnowledge knowledge, std::uint32_t slots)
+      : knowledge_(std::move(knowledge)), volume_(kPlannedDataset, knowledge_.transfer, knowledge_.renderer), slots_(slots) {}
 
   LayoutKnowledge knowledge_;
+  ClassifiedVolume volume_;
   Policy policy_;  // of the last Next
   std::uint32_t slots_;
   LayoutTable table_;

@@ -12,7 +12,9 @@
 #include <utility>
 #include <vector>
 
+#include "common/planning/render_work.h"
 #include "coordinator/frame_machine.h"
+#include "coordinator/planner.h"
 
 namespace slabstream {
 
@@ -130,12 +132,28 @@ class CoordinatorScript {
   std::vector<PeerToken> clients;   // those that send pings
   std::vector<LoadDataset> loads;   // all that were asked for
   std::vector<CountDataset> counts;
+  Planner planner;
+  bool plans_at_once = true;          // else plans wait in `plans` for Plan()
+  std::vector<PlanRequest> plans;     // that were not made yet
 
+  // All that comes of the event, of the plans that are made at once, too.
   Actions Step(const CoordinatorEvent& event) {
     Actions actions = machine.Step(event, now);
+    for (FrameMeasured& measured : Of<FrameMeasured>(actions)) planner.Learn(measured);
+    for (PlanRequest& request : Of<PlanRequest>(actions)) plans.push_back(std::move(request));
+    for (const DropPlan& drop : Of<DropPlan>(actions)) {
+      std::erase_if(plans, [&](const PlanRequest& request) { return request.plan == drop.plan; });
+    }
     for (const LoadDataset& load : Of<LoadDataset>(actions)) loads.push_back(load);
     for (const CountDataset& count : Of<CountDataset>(actions)) counts.push_back(count);
+    while (plans_at_once && !plans.empty()) Append(actions, Plan());
     return actions;
+  }
+  // Makes the oldest plan that is waited for.
+  Actions Plan() {
+    const PlanRequest request = std::move(plans.front());
+    plans.erase(plans.begin());
+    return Step(Planned{request.plan, planner.Plan(request)});
   }
   Actions Worker(const FakeWorker& from, AnyMessage message, Bytes payload = {}) {
     return Step(FromWorker{from.token, std::move(message), std::move(payload)});

@@ -100,7 +100,7 @@ TEST(CoordinatorLayouts, ACountThatNeverEndsMeetsTheDeadline) {
 TEST(CoordinatorLayouts, WhatEachRendererDrawsIsCountedOnce) {
   CoordinatorScript script;
   script.Join(11, 1);
-  std::vector<std::shared_ptr<const ClassificationTable>> tables;
+  std::vector<ClassificationTable> tables;
   RequestId request = 0;
   for (const RendererKind renderer : {RendererKind::kSplat, RendererKind::kZBuffer, RendererKind::kSplat}) {
     SubmitFrame submit = KdFrame(++request);
@@ -109,14 +109,15 @@ TEST(CoordinatorLayouts, WhatEachRendererDrawsIsCountedOnce) {
     const std::size_t counted = script.counts.size();
     Actions actions = script.Submit(kClient, submit);
     if (script.counts.size() > counted) {
-      tables.push_back(script.counts.back().table);
+      const CountDataset& count = script.counts.back();
+      tables.push_back(DrawnTable(count.volume.transfer(), *count.summary, count.volume.renderer()));
       actions = script.Step(OccupiedCounted{script.counts.back().count, FullGrid()});
     }
     EXPECT_EQ(ToClients<FrameReply>(script.AnswerAll(actions)).size(), 1U);
   }
   ASSERT_EQ(tables.size(), 2U);
   const auto drawn = [](const ClassificationTable& table) { return std::ranges::count_if(table.opacity, [](float a) { return a > 0; }); };
-  EXPECT_GT(drawn(*tables[0]), drawn(*tables[1])) << "the Z-buffer draws what is opaque";
+  EXPECT_GT(drawn(tables[0]), drawn(tables[1])) << "the Z-buffer draws what is opaque";
 }
 
 TEST(CoordinatorLayouts, ManyTransferFunctionsAreCountedInTurnAndAllServed) {

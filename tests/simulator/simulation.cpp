@@ -81,7 +81,7 @@ void Simulation::StartCoordinator() {
   const std::uint64_t generation = coordinator_ == nullptr ? 1 : coordinator_->generation + 1;
   if (coordinator_ != nullptr) dead_coordinators_.push_back(std::move(coordinator_));
   const Epoch epoch = config.epoch;
-  coordinator_ = std::unique_ptr<Coordinator>(new Coordinator{FrameMachine(std::move(config)), epoch, {}, generation, true, 0});
+  coordinator_ = std::unique_ptr<Coordinator>(new Coordinator{FrameMachine(std::move(config)), Planner(), epoch, {}, generation, true, 0});
   witness_.OnRestart();
   StepCoordinator(CoordinatorTick{});
 }
@@ -270,6 +270,16 @@ void Simulation::Perform(const CoordinatorEvent&, const CountDataset& action) {
       StepCoordinator(counted);
     });
   }
+}
+
+// Plans come late, and not always in the order in which they were asked for.
+void Simulation::Perform(const CoordinatorEvent&, const PlanRequest& action) {
+  Planned planned{action.plan, coordinator_->planner.Plan(action)};
+  if (random_.Chance(faults_.fail_load)) planned.frame = Status::ResourceExhausted("not enough memory to plan");
+  queue_.After(std::chrono::microseconds(random_.Integer(0, faults_.none() ? 200 : 100000)),
+               [this, planned, generation = coordinator_->generation] {
+                 if (coordinator_->generation == generation) StepCoordinator(planned);
+               });
 }
 
 void Simulation::Perform(const CoordinatorEvent&, const StopService&) { coordinator_->alive = false; }

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "coordinator/frame_machine.h"
+#include "coordinator/planner.h"
 #include "tests/simulator/event_queue.h"
 #include "tests/simulator/faults.h"
 #include "tests/simulator/frame_witness.h"
@@ -38,6 +39,7 @@ class Simulation : private WorkerNetwork {
  private:
   struct Coordinator {
     FrameMachine machine;
+    Planner planner;
     Epoch epoch = 0;
     Alarm alarm;
     std::uint64_t generation = 0;
@@ -62,6 +64,9 @@ class Simulation : private WorkerNetwork {
   void Perform(const CoordinatorEvent& event, const ToClient& action);
   void Perform(const CoordinatorEvent& event, const LoadDataset& action);
   void Perform(const CoordinatorEvent& event, const CountDataset& action);
+  void Perform(const CoordinatorEvent& event, const PlanRequest& action);
+  void Perform(const CoordinatorEvent&, const DropPlan&) {}
+  void Perform(const CoordinatorEvent&, const FrameMeasured& action) { coordinator_->planner.Learn(action); }
   void Perform(const CoordinatorEvent& event, const StopService&);
 
   // ---- messages

@@ -1,0 +1,39 @@
+// Guarded: an exception barrier. Libraries and the allocator throw; threads must not end by that.
+#pragma once
+
+#include <exception>
+#include <new>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+
+#include "common/base/status.h"
+
+namespace slabstream {
+
+// The exception at hand as a Status that begins with `what`. ResourceExhausted: no memory; Internal: anything else.
+inline Status CurrentFailure(const std::string& what) {
+  try {
+    throw;
+  } catch (const std::bad_alloc&) {
+    return Status::ResourceExhausted(what + ": not enough memory");
+  } catch (const std::length_error&) {  // a container beyond every memory
+    return Status::ResourceExhausted(what + ": not enough memory");
+  } catch (const std::exception& error) {
+    return Status::Internal(what + ": " + error.what());
+  } catch (...) {
+    return Status::Internal(what + ": unknown exception");
+  }
+}
+
+// What `work` returns, a Status or Result; if it throws, CurrentFailure(what).
+template <class Work>
+std::invoke_result_t<Work> Guarded(const char* what, Work&& work) {
+  try {
+    return work();
+  } catch (...) {
+    return CurrentFailure(what);
+  }
+}
+
+}  // namespace slabstream

@@ -1,0 +1,47 @@
+// What the machine asks of a planner, and what it gets: values that are safe to hand to another thread.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "common/planning/classified_volume.h"
+#include "common/planning/frame_plan.h"
+#include "common/planning/hosted_worker.h"
+#include "common/stats/prediction.h"
+#include "common/stats/report.h"
+#include "common/volume/occupancy_grid.h"
+
+namespace slabstream {
+
+using PlanId = std::uint64_t;  // never given twice; 0: none
+
+struct PlanRequest {
+  PlanId plan = 0;
+  FrameRequest frame;  // valid, with names that there are (CheckNames); names of the policy may be left open
+  ClassifiedVolume volume;
+  std::shared_ptr<const VolumeSummary> summary;   // of it
+  std::shared_ptr<const OccupancyGrid> occupied;  // of it; null: the policy does not need it (NeedsOccupancy)
+  Roster roster;                                  // of the frame's team, with a worker in it
+  Turn turn;
+  std::vector<HostedWorker> workers;  // all that there are: an open policy is chosen for them
+};
+
+struct PlannedFrame {
+  PlanRequest asked;
+  Policy policy;                              // that the plan was made by: nothing is left open
+  std::optional<FramePrediction> prediction;  // none: the policy was not open, or the frame is too much to simulate
+  double render_scale = 1;                    // that the prediction was made with (PolicyTable)
+  FramePlan plan;
+
+  bool teaches() const { return asked.occupied != nullptr || prediction; }  // what rendering takes tells something of the frames to come
+};
+
+// A frame that was planned like this is finished. What its boxes took to render, for the planner to learn from.
+struct FrameMeasured {
+  std::shared_ptr<const PlannedFrame> frame;
+  std::vector<RankReport> reports;
+};
+
+}  // namespace slabstream

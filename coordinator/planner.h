@@ -1,0 +1,40 @@
+// Planner: makes plans, and keeps what they are made from: chosen policies, layouts, and what boxes cost as far as frames have told.
+//
+// One thread uses it at a time. The service gives it a thread of its own, since a plan may take seconds: a policy that is left open is
+// chosen by simulated frames, and a layout may be refined several times. The same calls in the same order give the same plans.
+#pragma once
+
+#include <memory>
+
+#include "common/planning/cost_model.h"
+#include "common/tuning/service_machine.h"
+#include "coordinator/layout_table.h"
+#include "coordinator/plan_request.h"
+#include "coordinator/policy_table.h"
+
+namespace slabstream {
+
+struct PlannerConfig {
+  CostModel cost;
+  ServiceSurroundings surroundings;  // what policies are chosen for
+};
+
+class Planner {
+ public:
+  explicit Planner(PlannerConfig config = {}) : config_(std::move(config)) {}
+
+  // Errors as of PlanFrame and ChoosePolicy, and ResourceExhausted or Internal for what they throw.
+  Result<std::shared_ptr<const PlannedFrame>> Plan(const PlanRequest& request);
+
+  // A frame that was planned like this is finished.
+  void Learn(const FrameMeasured& measured);
+
+ private:
+  Result<std::shared_ptr<const PlannedFrame>> TryPlan(const PlanRequest& request);
+
+  const PlannerConfig config_;
+  LayoutTable layouts_;
+  PolicyTable policies_;
+};
+
+}  // namespace slabstream
