@@ -91,7 +91,7 @@ PixelBounds BoundsOf(const Case& config, Rank rank) {
 }
 
 // All pixels that the steps hand over, by those of them that are not empty: what was combined fills more than each picture did.
-double PixelsOverFilled(const Case& config, const Schedule& schedule) {
+double PixelsOverFilled(const Case& config, const IndexedSchedule& schedule) {
   const auto size = std::size_t(config.size);
   std::vector<std::vector<bool>> filled(config.ranks, std::vector<bool>(size * size));
   for (Rank rank = 0; rank < config.ranks; ++rank) {
@@ -101,7 +101,7 @@ double PixelsOverFilled(const Case& config, const Schedule& schedule) {
     }
   }
   double all = 0, of_them = 0;
-  for (const Step& step : schedule.steps) {
+  for (const Step& step : schedule.steps()) {
     for (std::size_t pixel = step.pixels.begin; pixel < step.pixels.end; ++pixel) {
       ++all;
       if (!filled[step.from][pixel]) continue;
@@ -201,11 +201,12 @@ class Coordinator {
       assignment.group.placements.push_back({rank, {{0, 0, z}, {16, 16, z + 8}}, rank + 1});
       assignment.peers.push_back({rank + 1, workers_[rank].endpoint, workers_[rank].memory_scope});
     }
-    assignment.group.schedule = ParseCombining(scheme)->Make({config_.ranks, 0, WholeFrame(setup_)});
+    assignment.group.schedule = {scheme, config_.ranks, 0};
     assignment.group.color = config_.color;
     assignment.display = 1;
     Times times;
-    if (config_.ranks > 1) times.pixels_over_filled = PixelsOverFilled(config_, assignment.group.schedule);
+    if (config_.ranks > 1)
+      times.pixels_over_filled = PixelsOverFilled(config_, *DeriveSchedule(assignment.group.schedule, WholeFrame(setup_)).value());
     std::int64_t busy_ns = 0;
     for (int i = -kWarmUp; i < repeats; ++i) {
       if (i == 0) busy_ns = BusyNs();

@@ -1,20 +1,19 @@
-// GroupRun: one group of one attempt on one worker. It runs the group's schedule for the ranks that this worker renders, whatever family
-// made it, and on the display worker collects the group image.
+// GroupRun: one group of one attempt on one worker. It runs the group's schedule for the ranks that this worker renders (ScheduleRunner),
+// and on the display worker it collects the group image.
 //
-// A step may be taken at a rank when the rank is rendered, everything combined for it so far is done, and all earlier steps of the rank
-// that touch the same pixels are taken: so what meets is the same in any order of arrival, and steps of disjoint pixels do not wait for
-// each other. A step travels as one PartialImage for each of the sender's fragments in its range (one, unless the schedule divides images);
-// the receiver counts pixels until the range is covered. A step between two ranks of this worker moves fragments without a message.
+// A step travels as one PartialImage for each of the sender's fragments in its range (one, unless the schedule divides images); the
+// receiver counts pixels until the range is covered. A step between two ranks of this worker moves fragments without a message.
 //
-// Whatever goes wrong is kept in failure(); the run then does nothing any more and waits to be dropped.
+// The first failure is kept in failure(). The run then does nothing any more and waits to be dropped.
 #pragma once
 
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <utility>
 #include <vector>
 
-#include "worker/fragment_set.h"
+#include "common/combining/schedule_runner.h"
 #include "worker/image_names.h"
 
 namespace slabstream {
@@ -36,7 +35,7 @@ struct GroupImage {
 
 class GroupRun {
  public:
-  // `assignment` of any content; what does not fit together is a failure. `names` must outlive the run.
+  // An assignment whose parts do not fit together is a failure. `names` must outlive the run.
   GroupRun(GroupAssignment assignment, WorkerId self, ImageNames& names);
 
   const GroupAssignment& assignment() const { return assignment_; }
@@ -55,54 +54,64 @@ class GroupRun {
   void Drop(WorkerActions& actions);           // releases what it holds
 
  private:
-  struct RankState {
-    bool rendered = false;
-    ImageHandle own = 0;  // its picture, once rendered
-    int combining = 0;    // StartCombine without CombineDone
-    FragmentSet fragments;
-    std::vector<std::uint32_t> open_steps;  // not taken yet, in order
-    std::vector<RankReport> reports;        // on their way with this rank
+  // Where pixels of a rank are stored, and which ranks they have been combined from. Fragments may share an image; their pixels are then
+  // disjoint, also between ranks.
+  struct ImagePart {
+    RankInterval ranks;
+    ImageHandle image = 0;
+    friend bool operator==(const ImagePart&, const ImagePart&) = default;
   };
-  struct Arrivals {  // of one step that this worker receives
+  using Runner = ScheduleRunner<ImagePart>;
+  using Held = Fragment<ImagePart>;
+  struct RankState {
+    ImageHandle own = 0;              // its picture, once rendered
+    std::vector<RankReport> reports;  // on their way with this rank
+  };
+  struct Arrivals {  // of one step that this worker receives, or of the group image
     std::vector<PixelRange> seen;
     std::vector<ImagePiece> waiting;
     std::vector<RankReport> reports;
-    std::uint64_t merged = 0;  // pixels
   };
 
-  bool Mine(Rank rank) const { return ranks_.count(rank) > 0; }
-  bool Ready(const RankState& rank, std::uint32_t step) const;
+  bool Mine(Rank rank) const { return ranks_.contains(rank); }
+  WorkerId WorkerOf(Rank rank) const { return assignment_.group.placements[rank].worker; }
+  Rank root() const { return assignment_.group.schedule.root; }
+  std::uint32_t step_count() const { return std::uint32_t(runner_.order().schedule().steps().size()); }
+  Runner MakeRunner();
   void Advance(WorkerActions& actions);
-  bool TakeStep(Rank rank, std::uint32_t step, WorkerActions& actions);
-  void Send(RankState& from, Rank rank, std::uint32_t step, WorkerActions& actions);
-  void MoveLocally(RankState& from, RankState& to, std::uint32_t step, WorkerActions& actions);
-  bool Receive(RankState& to, Rank rank, std::uint32_t step, WorkerActions& actions);
-  void Merge(RankState& to, Rank rank, ImagePiece piece, WorkerActions& actions);
-  void Combine(RankState& to, Rank rank, const Fragment& held, const ImagePiece& piece, WorkerActions& actions);
-  bool ComesHome(const RankState& to, Rank rank, const ImagePiece& piece) const;
-  void TakeHome(RankState& to, Rank rank, ImagePiece piece, WorkerActions& actions);
+  void Send(Runner::Taken taken, WorkerActions& actions);
+  void MoveLocally(Runner::Taken taken, WorkerActions& actions);
+  void Receive(const Runner::Taken& taken, WorkerActions& actions);
+  void Merge(Rank rank, ImagePiece piece, WorkerActions& actions);
+  void Combine(Rank rank, const Held& held, const ImagePiece& piece, WorkerActions& actions);
+  bool ComesHome(Rank rank, const ImagePiece& piece) const;
+  void TakeHome(Rank rank, ImagePiece piece, WorkerActions& actions);
   // Fills in key and frame.
-  void Start(StartCombine combine, RankState& to, Rank rank, WorkerActions& actions);
+  void Start(StartCombine combine, Rank rank, WorkerActions& actions);
   void FinishRoot(WorkerActions& actions);
   void CollectGroupPiece(const PartialImage& message, Bytes payload);
-  void SendFragments(Rank rank, const std::vector<Fragment>& fragments, std::uint32_t step, WorkerId to, std::vector<RankReport> reports,
+  // The messages carry `reports`.
+  void SendFragments(Rank rank, const std::vector<Held>& fragments, std::uint32_t step, WorkerId to, std::vector<RankReport> reports,
                      WorkerActions& actions);
-  void ReleaseUnused(std::vector<Fragment> taken, WorkerActions& actions);
-  std::vector<RankReport> TakeReports(RankState& rank);
+  bool Uses(Rank rank, ImageHandle image) const;
+  void ReleaseUnused(const std::vector<Held>& taken, WorkerActions& actions);
+  std::vector<RankReport> TakeReports(Rank rank);
   const Peer* FindPeer(WorkerId worker) const;
   void Fail(std::string why);
 
-  const GroupAssignment assignment_;
+  const GroupAssignment assignment_;  // peers by ascending worker
   const WorkerId self_;
   ImageNames& names_;
   const PixelRange frame_;
+  Status failure_;
+  Runner runner_;
   std::map<Rank, RankState> ranks_;                      // of this worker
-  std::map<std::uint32_t, Arrivals> arrivals_;           // by step; also of steps that are done, to know duplicates
+  std::map<std::uint32_t, Arrivals> arrivals_;           // by step, of steps that are not complete
   std::vector<std::pair<ImageHandle, Rank>> combining_;  // StartCombine without CombineDone
   bool root_done_ = false;
-  Arrivals group_pieces_;  // display worker
+  Arrivals group_pieces_;           // display worker
+  std::uint64_t group_pixels_ = 0;  // in them
   bool group_image_taken_ = false;
-  Status failure_;
 };
 
 }  // namespace slabstream

@@ -1,65 +1,107 @@
-// Fragments<Value>: what one rank holds while a schedule runs on values instead of images: disjoint ranges of pixels, each with a value.
+// Fragments<Value>: what one rank holds while a schedule runs. A fragment is a range of pixels with one value, for example the image that
+// the pixels are stored in and the ranks that they have been combined from. Fragments of a rank never overlap.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
-#include <iterator>
-#include <map>
 #include <optional>
+#include <vector>
 
+#include "common/base/check.h"
 #include "common/image/pixel_bounds.h"
+#include "common/image/run_image.h"
 
 namespace slabstream {
+
+constexpr std::uint64_t PixelCount(const PixelRange& range) { return range.end > range.begin ? range.end - range.begin : 0; }
+constexpr bool Overlap(const PixelRange& a, const PixelRange& b) { return a.begin < b.end && b.begin < a.end; }
+
+template <class Value>
+struct Fragment {
+  PixelRange pixels;  // not empty
+  Value value;
+  friend bool operator==(const Fragment&, const Fragment&) = default;
+};
+
+template <class Value>
+std::uint64_t PixelCount(const std::vector<Fragment<Value>>& fragments) {
+  std::uint64_t pixels = 0;
+  for (const Fragment<Value>& fragment : fragments) pixels += PixelCount(fragment.pixels);
+  return pixels;
+}
 
 template <class Value>
 class Fragments {
  public:
-  struct Fragment {
-    std::uint64_t end = 0;
-    Value value;
-  };
-  using Map = std::map<std::uint64_t, Fragment>;  // by first pixel
+  using List = std::vector<Fragment<Value>>;  // in order of pixels
 
-  void Put(PixelRange pixels, const Value& value) { fragments_[pixels.begin] = {pixels.end, value}; }
+  // The parts of fragments that lie in `range`.
+  List Within(const PixelRange& range) const {
+    List parts;
+    for (auto it = FirstAfter(range.begin); it != list_.end() && it->pixels.begin < range.end; ++it) {
+      parts.push_back({{std::max(it->pixels.begin, range.begin), std::min(it->pixels.end, range.end)}, it->value});
+    }
+    return parts;
+  }
 
-  // Takes out the fragments that lie in `pixels`, cutting those at its ends.
-  Map Take(PixelRange pixels) {
-    CutAt(pixels.begin);
-    CutAt(pixels.end);
-    Map taken;
-    const auto end = fragments_.lower_bound(pixels.end);
-    for (auto it = fragments_.lower_bound(pixels.begin); it != end;) taken.insert(taken.end(), fragments_.extract(it++));
+  // Removes what lies in `range` and returns it. Fragments at the ends of the range are cut.
+  List Take(const PixelRange& range) {
+    List taken = Within(range);
+    if (taken.empty()) return taken;
+    const auto first = list_.begin() + (FirstAfter(range.begin) - list_.cbegin());
+    const auto last = first + std::ptrdiff_t(taken.size());
+    const Fragment<Value> before = {{first->pixels.begin, range.begin}, first->value};
+    const Fragment<Value> after = {{range.end, (last - 1)->pixels.end}, (last - 1)->value};
+    auto place = list_.erase(first, last);
+    if (PixelCount(after.pixels) > 0) place = list_.insert(place, after);
+    if (PixelCount(before.pixels) > 0) list_.insert(place, before);
     return taken;
   }
 
-  // Adds a fragment to what is held; where nothing is held it is taken as it is, elsewhere merge(held, value) says what becomes of both.
-  // False if that is nothing.
-  template <class Merge>
-  bool Combine(PixelRange pixels, const Value& value, Merge&& merge) {
-    std::uint64_t next = pixels.begin;  // pixels before it are done
-    for (const auto& [begin, held] : Take(pixels)) {
-      if (begin > next) Put({next, begin}, value);
-      const std::optional<Value> both = merge(held.value, value);
-      if (!both) return false;
-      Put({begin, held.end}, *both);
-      next = held.end;
+  // `fragment` must not overlap another one. Neighbours with equal values become one.
+  void Put(const Fragment<Value>& fragment) {
+    auto place = list_.begin() + (FirstAfter(fragment.pixels.begin) - list_.cbegin());
+    DCHECK(place == list_.end() || fragment.pixels.end <= place->pixels.begin);
+    const bool joins_next = place != list_.end() && place->pixels.begin == fragment.pixels.end && place->value == fragment.value;
+    const bool joins_last =
+        place != list_.begin() && (place - 1)->pixels.end == fragment.pixels.begin && (place - 1)->value == fragment.value;
+    if (joins_last) {
+      (place - 1)->pixels.end = joins_next ? place->pixels.end : fragment.pixels.end;
+      if (joins_next) list_.erase(place);
+    } else if (joins_next) {
+      place->pixels.begin = fragment.pixels.begin;
+    } else {
+      list_.insert(place, fragment);
     }
-    if (next < pixels.end) Put({next, pixels.end}, value);
+  }
+
+  // Adds a fragment to what is held. Where nothing is held it is taken as it is; elsewhere merge(held, value) says what both become.
+  // False if merge returns nothing; the pixels from there on are then lost.
+  template <class Merge>
+  bool Combine(const Fragment<Value>& fragment, Merge&& merge) {
+    std::uint64_t next = fragment.pixels.begin;  // pixels before it are done
+    for (const Fragment<Value>& held : Take(fragment.pixels)) {
+      if (held.pixels.begin > next) Put({{next, held.pixels.begin}, fragment.value});
+      const std::optional<Value> both = merge(held.value, fragment.value);
+      if (!both) return false;
+      Put({held.pixels, *both});
+      next = held.pixels.end;
+    }
+    if (next < fragment.pixels.end) Put({{next, fragment.pixels.end}, fragment.value});
     return true;
   }
 
-  const Map& fragments() const { return fragments_; }
+  bool empty() const { return list_.empty(); }
+  const List& list() const { return list_; }
 
  private:
-  void CutAt(std::uint64_t pixel) {
-    auto it = fragments_.lower_bound(pixel);
-    if (it == fragments_.begin()) return;
-    Fragment& before = std::prev(it)->second;
-    if (before.end <= pixel) return;
-    fragments_.emplace_hint(it, pixel, before);
-    before.end = pixel;
+  // The first fragment that ends after `pixel`.
+  typename List::const_iterator FirstAfter(std::uint64_t pixel) const {
+    return std::upper_bound(list_.begin(), list_.end(), pixel,
+                            [](std::uint64_t value, const Fragment<Value>& fragment) { return value < fragment.pixels.end; });
   }
 
-  Map fragments_;
+  List list_;
 };
 
 }  // namespace slabstream

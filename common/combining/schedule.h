@@ -1,19 +1,21 @@
-// Schedule: how the images of a group's ranks become one, as data. The executor does not know which family made it.
+// Schedule: how the images of a group's ranks become one, as data. What runs it does not know which family made it.
 //
 // Ranks 0 ... ranks-1 hold one image each, in visibility order, nearest first. A step moves the pixels of `pixels` that `from` holds at
 // that time to `to`. If `to` holds these pixels too, the two are combined: their rank intervals must be adjacent, and `to` then holds the
 // union; if it does not, it takes them as they are. `from` no longer holds them. Steps of one round may run at the same time, so those of
 // one rank concern disjoint pixels; a rank takes its own steps in order of rounds. At the end `root` holds [0, ranks) of all pixels. A
-// group without images has ranks == 0 and no steps.
+// group without images has ranks == 0 and no steps. Plans and messages name schedules (named_schedule.h).
 #pragma once
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "common/base/status.h"
 #include "common/image/pixel_bounds.h"
+#include "common/image/run_image.h"
 
 namespace slabstream {
 
@@ -26,6 +28,13 @@ struct RankInterval {
   Rank begin = 0, end = 0;
   friend constexpr bool operator==(const RankInterval&, const RankInterval&) = default;
 };
+
+// What two intervals combine to. None: they are not adjacent.
+constexpr std::optional<RankInterval> Joined(const RankInterval& a, const RankInterval& b) {
+  if (a.end == b.begin) return RankInterval{a.begin, b.end};
+  if (b.end == a.begin) return RankInterval{b.begin, a.end};
+  return std::nullopt;
+}
 
 struct Step {
   std::uint32_t round = 0;
@@ -69,18 +78,5 @@ std::vector<std::uint32_t> DefaultFactors(Rank ranks);
 
 inline Schedule MakeFanIn(const ScheduleRequest& request) { return MakeTree(request, 2, 1); }
 inline Schedule MakeCentralized(const ScheduleRequest& request) { return MakeTree(request, std::max<Rank>(request.ranks, 2), 1); }
-
-// Runs the schedule on intervals and says what is wrong with it, if anything: ranks in range, rounds ascending, no rank touches pixels
-// twice in a round, only adjacent intervals meet, nobody sends what it does not hold, and the root ends with [0, ranks) of every pixel of
-// `pixels`.
-Status CheckSchedule(const Schedule& schedule, PixelRange pixels);
-
-// How often pixels are passed on, at most over all pixels of the result: one after the other on the way of any one rank's colours, and
-// altogether.
-struct Travel {
-  std::uint32_t hops = 0, transfers = 0;
-  friend bool operator==(const Travel&, const Travel&) = default;
-};
-Travel TravelOf(const Schedule& schedule, PixelRange pixels);  // a schedule that CheckSchedule finds sound
 
 }  // namespace slabstream

@@ -1,25 +1,27 @@
-#include <algorithm>
-#include <vector>
+#include "common/combining/travel.h"
 
-#include "common/combining/fragments.h"
-#include "common/combining/schedule.h"
+#include <algorithm>
+#include <optional>
+
+#include "common/combining/schedule_runner.h"
 
 namespace slabstream {
 
-Travel TravelOf(const Schedule& schedule, PixelRange pixels) {
-  std::vector<Fragments<Travel>> held(schedule.ranks);
-  for (Fragments<Travel>& rank : held) rank.Put(pixels, {});
-  for (const Step& step : schedule.steps) {
-    for (const auto& [begin, moved] : held[step.from].Take(step.pixels)) {
-      const Travel arrived = {moved.value.hops + 1, moved.value.transfers + 1};
-      held[step.to].Combine({begin, moved.end}, arrived, [](const Travel& a, const Travel& b) -> std::optional<Travel> {
+Travel TravelOf(const SharedSchedule& schedule, PixelRange pixels) {
+  Travel most;
+  const Rank ranks = schedule->schedule().ranks;
+  if (ranks == 0) return most;
+  ScheduleRunner<Travel> runner(schedule, pixels, AllRanks(ranks));
+  for (Rank rank = 0; rank < ranks; ++rank) runner.OnRendered(rank, {});
+  while (const auto taken = runner.TakeNext()) {
+    for (const Fragment<Travel>& part : taken->parts) {
+      const Travel arrived = {part.value.hops + 1, part.value.transfers + 1};
+      runner.held(taken->step->to).Combine({part.pixels, arrived}, [](const Travel& a, const Travel& b) -> std::optional<Travel> {
         return Travel{std::max(a.hops, b.hops), a.transfers + b.transfers};
       });
     }
   }
-  Travel most;
-  if (schedule.ranks == 0) return most;
-  for (const auto& [begin, fragment] : held[schedule.root].fragments()) {
+  for (const Fragment<Travel>& fragment : runner.held(schedule->schedule().root).list()) {
     most = {std::max(most.hops, fragment.value.hops), std::max(most.transfers, fragment.value.transfers)};
   }
   return most;

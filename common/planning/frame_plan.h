@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/combining/named_schedule.h"
 #include "common/combining/schedule.h"
 #include "common/frame/frame_setup.h"
 #include "common/image/color_coding.h"
@@ -32,7 +33,7 @@ struct Placement {
 
 struct GroupPlan {
   std::vector<Placement> placements;          // by rank, nearest first; boxes that show nothing are left out, so it may be empty
-  Schedule schedule;                          // over these ranks; ranks == 0 if there are none
+  ScheduleName schedule;                      // over these ranks
   ColorCoding color = ColorCoding::kFloat32;  // of images between workers, where they are sent as runs
   friend bool operator==(const GroupPlan&, const GroupPlan&) = default;
 };

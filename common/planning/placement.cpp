@@ -6,7 +6,7 @@
 #include <set>
 
 #include "common/base/check.h"
-#include "common/combining/schemes.h"
+#include "common/combining/travel.h"
 
 namespace slabstream {
 namespace {
@@ -40,7 +40,8 @@ WorkerId ChooseDisplay(const FramePlan& plan, const std::vector<WorkerId>& prese
 // The fewest bits by which combining moves no channel by more than the plan allows. Of two codings of as many bits the finer one.
 ColorCoding ChooseColor(const FramePlan& plan, const GroupPlan& group) {
   if (plan.pixel_error <= 0 || plan.setup.format != PixelFormat::kRgba || group.placements.empty()) return ColorCoding::kFloat32;
-  Travel travel = TravelOf(group.schedule, WholeFrame(plan.setup));
+  const PixelRange frame = WholeFrame(plan.setup);
+  Travel travel = TravelOf(DeriveSchedule(group.schedule, frame).value(), frame);
   if (group.placements[group.schedule.root].worker != plan.display) travel = {travel.hops + 1, travel.transfers + 1};
   ColorCoding best = ColorCoding::kFloat32;
   double least = plan.pixel_error;
@@ -100,12 +101,8 @@ Status AssignWorkers(const Roster& roster, FramePlan& plan) {
   }
   if (!Contains(roster, plan.display)) plan.display = ChooseDisplay(plan, present);
 
-  const Result<CombiningChoice> scheme = ParseCombining(plan.combine);
-  CHECK(scheme.ok()) << scheme.status().message();
-  const PixelRange frame = WholeFrame(plan.setup);
   for (GroupPlan& group : plan.groups) {
-    group.schedule = group.placements.empty() ? Schedule{.ranks = 0, .root = 0, .steps = {}}
-                                              : scheme->Make({Rank(group.placements.size()), RootOf(group, plan.display), frame});
+    group.schedule = {plan.combine, Rank(group.placements.size()), RootOf(group, plan.display)};
     group.color = ChooseColor(plan, group);
   }
   return Status::Ok();

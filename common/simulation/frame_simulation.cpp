@@ -82,9 +82,10 @@ void FrameSimulation::Handle(const Event& event) {
     case Arrival::kVoxels: return AddRender(event.frame, event.group, event.number);
     case Arrival::kPartial: {
       Group& group = frame.groups.at(event.group);
-      const Rank to = plan(event.frame).groups[event.group].schedule.steps[event.number].to;
-      group.run->OnArrived(event.number, group.messages.at(event.number).parts);
-      return Advance(event.frame, event.group, to);
+      const Step& step = group.schedule->steps()[event.number];
+      const std::uint32_t worker = IndexOf(plan(event.frame).groups[event.group].placements[step.to].worker);
+      group.runs.at(worker).order().OnArrived(event.number, PixelCount(step.pixels));
+      return Advance(event.frame, event.group, worker);
     }
     case Arrival::kGroupImage: return AddToFrame(event.frame, event.group);
     case Arrival::kGroupDone:
@@ -145,16 +146,17 @@ void FrameSimulation::HandOut(std::uint32_t number, std::uint32_t index) {
   Group& group = frame.groups[index];
 
   std::vector<const CoverageMap*> coverage;
-  std::vector<std::uint32_t> workers = {display(number)};
-  for (const Placement& placement : group_plan.placements) {
+  std::map<std::uint32_t, std::vector<Rank>> ranks = {{display(number), {}}};  // of each worker
+  for (Rank rank = 0; rank < group_plan.placements.size(); ++rank) {
+    const Placement& placement = group_plan.placements[rank];
     coverage.push_back(inputs_[number].boxes[placement.id].coverage);
-    workers.push_back(IndexOf(placement.worker));
+    ranks[IndexOf(placement.worker)].push_back(rank);
   }
   group.coverage = std::make_unique<UnionCoverage>(coverage, bounds.width(), bounds.height());
-  group.run = std::make_unique<ScheduleRun>(group_plan, WholeFrame(plan(number).setup));
-  std::sort(workers.begin(), workers.end());
-  workers.erase(std::unique(workers.begin(), workers.end()), workers.end());
-  for (const std::uint32_t worker : workers) {
+  const PixelRange whole = WholeFrame(plan(number).setup);
+  group.schedule = DeriveSchedule(group_plan.schedule, whole).value();
+  for (auto& [worker, of_worker] : ranks) {
+    group.runs.try_emplace(worker, group.schedule, whole, std::move(of_worker));
     coordinator_free_ += machine_.message_seconds;
     const double arrival = coordinator_free_ + machine_.link.latency_seconds;
     Post(threads_.Begin(Threads::Machine(worker), arrival), Arrival::kAssignment, number, index, worker);
@@ -215,14 +217,16 @@ void FrameSimulation::OnDone(const LaneTask& task) {
 void FrameSimulation::OnKnown(const LaneTask& task) {
   Frame& frame = frames_[task.frame];
   switch (task.work) {
-    case Work::kRender:
+    case Work::kRender: {
       lanes_.OnRenderKnown(task.worker, now_);
-      frame.groups.at(task.group).run->OnRendered(task.rank);
-      Advance(task.frame, task.group, task.rank);
+      const std::uint32_t owner = IndexOf(plan(task.frame).groups[task.group].placements[task.rank].worker);
+      frame.groups.at(task.group).runs.at(owner).OnRendered(task.rank, {task.rank, task.rank + 1});
+      Advance(task.frame, task.group, owner);
       break;
+    }
     case Work::kEncode: {
       const GroupPlan& group = plan(task.frame).groups[task.group];
-      const Step& step = group.schedule.steps[task.step];
+      const Step& step = frame.groups.at(task.group).schedule->steps()[task.step];
       SendPixels({.kind = SimulatedMessage::Kind::kPartial,
                   .frame = task.frame,
                   .group = task.group,
@@ -233,8 +237,8 @@ void FrameSimulation::OnKnown(const LaneTask& task) {
       break;
     }
     case Work::kCombine:
-      frame.groups.at(task.group).run->OnCombined(task.rank);
-      Advance(task.frame, task.group, task.rank);
+      frame.groups.at(task.group).runs.at(task.worker).order().OnCombined(task.rank);
+      Advance(task.frame, task.group, task.worker);
       break;
     case Work::kEncodeGroup:
       SendPixels({.kind = SimulatedMessage::Kind::kGroupImage,
@@ -266,53 +270,46 @@ void FrameSimulation::SendPixels(SimulatedMessage message, const UnionCoverage::
   if (options_.keep_spans) timeline_.messages.push_back(message);
 }
 
-// Takes every step that can be taken at the rank now, and at ranks of the same worker that this concerns.
-void FrameSimulation::Advance(std::uint32_t frame, std::uint32_t group_index, Rank first) {
-  const GroupPlan& group_plan = plan(frame).groups[group_index];
+// Takes every step that the worker can take now.
+void FrameSimulation::Advance(std::uint32_t frame, std::uint32_t group_index, std::uint32_t worker) {
   Group& group = frames_[frame].groups.at(group_index);
-  std::vector<Rank> ranks = {first};
-  while (!ranks.empty()) {
-    const Rank rank = ranks.back();
-    ScheduleRun::Taken taken = group.run->TakeNext(rank);
-    if (taken.kind == ScheduleRun::Kind::kNone) {
-      ranks.pop_back();
-      continue;
+  Runner& run = group.runs.at(worker);
+  const auto put = [&run](Rank rank, const Parts& parts) {  // true if something was there
+    bool onto = false;
+    for (const Fragment<RankInterval>& part : parts) {
+      onto |= !run.held(rank).Within(part.pixels).empty();
+      CHECK(run.held(rank).Combine(part, Joined)) << "the schedule is sound";
     }
-    const Step& step = group_plan.schedule.steps[taken.step];
-    // What arrives is what was sent.
-    const UnionCoverage::Amount amount =
-        taken.kind == ScheduleRun::Kind::kReceive ? group.messages.at(taken.step).amount : AmountOf(group, taken.parts);
-    LaneTask task{
-        .frame = frame, .group = group_index, .worker = IndexOf(group_plan.placements[rank].worker), .rank = rank, .step = taken.step};
-    switch (taken.kind) {
-      case ScheduleRun::Kind::kNone: break;
-      case ScheduleRun::Kind::kSend:
-        group.messages[taken.step] = {std::move(taken.parts), amount};
+    return onto;
+  };
+  while (std::optional<Runner::Taken> taken = run.TakeNext()) {
+    const Rank to = taken->step->to;
+    LaneTask task{.work = Work::kCombine, .frame = frame, .group = group_index, .worker = worker, .rank = to, .step = taken->index};
+    switch (taken->kind) {
+      case StepOrder::Kind::kSend: {
+        const UnionCoverage::Amount amount = AmountOf(group, taken->parts);
+        group.messages[taken->index] = {std::move(taken->parts), amount};
         task.work = Work::kEncode;
+        task.rank = taken->step->from;
         AddEncode(task, amount);
-        break;
-      case ScheduleRun::Kind::kReceive:
-        group.messages.erase(taken.step);
-        group.run->Combining(rank);
-        task.work = Work::kCombine;
-        task.seconds = machine_.combining.combine_pixel * amount.filled;
-        lanes_.Add(task, now_);
-        break;
-      case ScheduleRun::Kind::kMove: {
-        const Rank other = rank == step.from ? step.to : step.from;
-        if (taken.onto) {
-          group.run->Combining(step.to);
-          task.work = Work::kCombine;
-          task.rank = step.to;
-          task.seconds = machine_.combining.local_pixel * amount.filled;
-          lanes_.Add(task, now_);
-        }
-        ranks.push_back(other);
+        continue;
+      }
+      case StepOrder::Kind::kReceive: {
+        const auto message = group.messages.extract(taken->index);  // what arrives is what was sent
+        put(to, message.mapped().parts);
+        task.seconds = machine_.combining.combine_pixel * message.mapped().amount.filled;
         break;
       }
+      case StepOrder::Kind::kMove:
+        if (!put(to, taken->parts)) continue;
+        task.seconds = machine_.combining.local_pixel * AmountOf(group, taken->parts).filled;
+        break;
     }
+    run.order().OnCombineStarted(to);
+    lanes_.Add(task, now_);
   }
-  if (group.run->RootDone() && !group.root_done) FinishRoot(frame, group_index);
+  const Rank root = group.schedule->schedule().root;
+  if (!group.root_done && run.order().Here(root) && run.order().Done(root)) FinishRoot(frame, group_index);
 }
 
 void FrameSimulation::FinishRoot(std::uint32_t frame, std::uint32_t group_index) {
@@ -372,7 +369,7 @@ void FrameSimulation::OnAccumulated(std::uint32_t number) {
 
 UnionCoverage::Amount FrameSimulation::AmountOf(const Group& group, const Parts& parts) const {
   UnionCoverage::Amount amount;
-  for (const auto& [begin, part] : parts) amount += group.coverage->Of(part.value, {begin, part.end});
+  for (const Fragment<RankInterval>& part : parts) amount += group.coverage->Of(part.value, part.pixels);
   return amount;
 }
 

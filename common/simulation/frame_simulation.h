@@ -12,10 +12,10 @@
 #include <span>
 #include <vector>
 
+#include "common/combining/schedule_runner.h"
 #include "common/simulation/frame_account.h"
 #include "common/simulation/hand_outs.h"
 #include "common/simulation/network.h"
-#include "common/simulation/schedule_run.h"
 #include "common/simulation/simulate_frames.h"
 #include "common/simulation/threads.h"
 #include "common/simulation/union_coverage.h"
@@ -41,14 +41,16 @@ class FrameSimulation {
     LaneTask task;             // kTaskKnown
     friend bool operator>(const Event& a, const Event& b) { return a.time != b.time ? a.time > b.time : a.order > b.order; }
   };
-  using Parts = ScheduleRun::Parts;
+  using Runner = ScheduleRunner<RankInterval>;
+  using Parts = Runner::Parts;
   struct Message {  // encoded, on its way
     Parts parts;
     UnionCoverage::Amount amount;
   };
   struct Group {  // between its hand-out and its being accumulated
     std::unique_ptr<UnionCoverage> coverage;
-    std::unique_ptr<ScheduleRun> run;
+    SharedSchedule schedule;
+    std::map<std::uint32_t, Runner> runs;       // by worker that holds ranks
     std::map<std::uint32_t, Message> messages;  // by step
     bool root_done = false;
     UnionCoverage::Amount image;  // of the group
@@ -79,7 +81,7 @@ class FrameSimulation {
   void AddRender(std::uint32_t frame, std::uint32_t group, Rank rank);
   void OnDone(const LaneTask& task);   // it ends
   void OnKnown(const LaneTask& task);  // its worker was told
-  void Advance(std::uint32_t frame, std::uint32_t group, Rank rank);
+  void Advance(std::uint32_t frame, std::uint32_t group, std::uint32_t worker);
   void FinishRoot(std::uint32_t frame, std::uint32_t group);
   void AddToFrame(std::uint32_t frame, std::uint32_t group);
   void Accumulate(std::uint32_t frame);

@@ -42,9 +42,10 @@ Status CheckFrame(std::size_t frame, const FrameInput& input) {
   }
   for (std::size_t g = 0; g < input.plan->groups.size(); ++g) {
     const GroupPlan& group = input.plan->groups[g];
-    if (group.schedule.ranks != group.placements.size() || (group.schedule.ranks > 0 && group.schedule.root >= group.schedule.ranks)) {
-      return Wrong(frame, fmt::format("the schedule of group {} is of {} ranks with root {}, but there are {} boxes", g,
-                                      group.schedule.ranks, group.schedule.root, group.placements.size()));
+    if (Status status = CheckScheduleName(group.schedule); !status.ok()) return Wrong(frame, status.message());
+    if (group.schedule.ranks != group.placements.size()) {
+      return Wrong(frame, fmt::format("the schedule of group {} is of {} ranks, but there are {} boxes", g, group.schedule.ranks,
+                                      group.placements.size()));
     }
     for (const Placement& placement : group.placements) {
       if (Status status = CheckBox(frame, input, placement); !status.ok()) return status;

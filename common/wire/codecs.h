@@ -87,19 +87,17 @@ FrameRequest FromProto(const v1::FrameRequest& in, Checker& check);
 v1::Camera ToProto(const Camera& in);
 v1::FrameSetup ToProto(const FrameSetup& in);
 v1::Placement ToProto(const Placement& in);
-v1::Step ToProto(const Step& in);
-v1::Schedule ToProto(const Schedule& in);
+v1::ScheduleName ToProto(const ScheduleName& in);
 v1::GroupPlan ToProto(const GroupPlan& in);
 
 Camera FromProto(const v1::Camera& in, Checker& check);
 FrameSetup FromProto(const v1::FrameSetup& in, Checker& check);
 Placement FromProto(const v1::Placement& in, Checker& check);
-Step FromProto(const v1::Step& in, Checker& check);
-Schedule FromProto(const v1::Schedule& in, Checker& check);
+ScheduleName FromProto(const v1::ScheduleName& in, Checker& check);
 GroupPlan FromProto(const v1::GroupPlan& in, Checker& check);
 
-// Whether the plan fits the setup: boxes inside the volume, as many ranks as placements, a schedule that ends with the whole frame. If both
-// are ok by themselves.
+// Whether the plan fits the setup: boxes inside the volume, as many ranks as placements, a schedule that exists. If both are ok by
+// themselves.
 void CheckFits(const GroupPlan& group, const FrameSetup& setup, Checker& check);
 
 // ---- control_codecs.cpp

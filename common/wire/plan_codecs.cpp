@@ -207,37 +207,19 @@ Placement FromProto(const v1::Placement& in, Checker& check) {
   return out;
 }
 
-v1::Step ToProto(const Step& in) {
-  v1::Step out;
-  out.set_round(in.round);
-  out.set_from(in.from);
-  out.set_to(in.to);
-  *out.mutable_pixels() = ToProto(in.pixels);
-  return out;
-}
-
-Step FromProto(const v1::Step& in, Checker& check) {
-  Step out;
-  out.round = in.round();
-  out.from = in.from();
-  out.to = in.to();
-  out.pixels = Read("pixels", in.pixels(), check);
-  return out;
-}
-
-v1::Schedule ToProto(const Schedule& in) {
-  v1::Schedule out;
+v1::ScheduleName ToProto(const ScheduleName& in) {
+  v1::ScheduleName out;
+  out.set_scheme(in.scheme);
   out.set_ranks(in.ranks);
   out.set_root(in.root);
-  WriteAll(in.steps, out.mutable_steps());
   return out;
 }
 
-Schedule FromProto(const v1::Schedule& in, Checker& check) {
-  Schedule out;
+ScheduleName FromProto(const v1::ScheduleName& in, Checker& check) {
+  ScheduleName out;
+  out.scheme = check.Text("scheme", in.scheme(), 0, kMaxNameBytes);
   out.ranks = check.Range("ranks", in.ranks(), 0, kMaxRanks);
   out.root = in.root();
-  out.steps = ReadAll("steps", in.steps(), kMaxSteps, check);
   return out;
 }
 
@@ -267,8 +249,7 @@ void CheckFits(const GroupPlan& group, const FrameSetup& setup, Checker& check) 
     check.Fail("schedule.ranks",
                std::to_string(group.schedule.ranks) + ", but there are " + std::to_string(group.placements.size()) + " placements");
   }
-  const std::uint64_t frame_pixels = std::uint64_t(FrameBounds(setup).pixel_count());
-  if (check.ok()) check.Adopt(CheckSchedule(group.schedule, {0, frame_pixels}));
+  if (check.ok()) check.Adopt(CheckScheduleName(group.schedule));
 }
 
 }  // namespace slabstream

@@ -50,9 +50,7 @@ std::vector<PixelBounds> FilledParts(const Combining& c, std::uint64_t seed) {
   return parts;
 }
 
-Schedule ScheduleOf(const Combining& c) {
-  return ParseCombining(c.scheme).value().Make({Rank(c.ranks), 0, {0, std::uint64_t(c.side) * std::uint64_t(c.side)}});
-}
+ScheduleName ScheduleOf(const Combining& c) { return {c.scheme, Rank(c.ranks), 0}; }
 
 // Every step on real images, one after the other; the time of a round is that of the rank that has most to do in it. What links cost is
 // left out.
@@ -86,7 +84,7 @@ Computing RunSchedule(const Schedule& schedule, std::vector<LocalImage>& images,
 
 Trial MeasureOperators(const Combining& c, std::uint64_t seed) {
   const auto run = [=]() -> Result<Json> {
-    const Schedule schedule = ScheduleOf(c);
+    const SharedSchedule schedule = DeriveSchedule(ScheduleOf(c), {0, std::uint64_t(c.side) * std::uint64_t(c.side)}).value();
     tbb::task_arena one_thread(1);
     Computing computing{.seconds = std::numeric_limits<double>::infinity()};
     // The first time brings memory in, which workers keep from frame to frame.
@@ -96,7 +94,7 @@ Trial MeasureOperators(const Combining& c, std::uint64_t seed) {
         images.push_back(MakeLocalImage(PixelFormat::kRgba, part));
         std::ranges::fill(images.back().rgba, 0.3F);
       }
-      const Computing one = one_thread.execute([&] { return RunSchedule(schedule, images, c.side); });
+      const Computing one = one_thread.execute([&] { return RunSchedule(schedule->schedule(), images, c.side); });
       if (one.seconds < computing.seconds) computing = one;
     }
     return Json{{"seconds", computing.seconds}, {"bytes", computing.bytes}};

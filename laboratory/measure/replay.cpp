@@ -66,20 +66,17 @@ void MakeReplayed(const RecordedFrame& frame, const ReplayChange& change, const 
     plan.display = first->front().worker;
   }
 
-  const CombiningChoice scheme = ParseCombining(combine).value();
   out.coverage.reserve(BoxesOf(frame));
   BoxId number = 0;
   for (const std::vector<RecordedRank>& recorded : groups) {
     GroupPlan& group = plan.groups.emplace_back();
-    group.schedule.ranks = 0;
     for (const RecordedRank& rank : recorded) {
       // A rank that nobody reported cost nothing, wherever it was.
       group.placements.push_back({number++, {}, rank.worker == 0 ? plan.display : rank.worker});
       out.coverage.push_back(UniformCoverage(rank.bounds, rank.pixels, frame.grid.width(), frame.grid.height()));
       out.input.boxes.push_back({rank.render_seconds, &out.coverage.back(), 0});
     }
-    if (group.placements.empty()) continue;
-    group.schedule = scheme.Make({Rank(group.placements.size()), RootOf(group, plan.display), WholeFrame(plan.setup)});
+    group.schedule = {combine, Rank(group.placements.size()), RootOf(group, plan.display)};
   }
   out.input.plan = &plan;
   out.input.finish_seconds = frame.picture_seconds;

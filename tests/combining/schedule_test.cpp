@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "tests/support/check_schedule.h"
 #include "tests/support/random_combining.h"
 
 namespace slabstream {

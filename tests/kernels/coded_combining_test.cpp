@@ -2,9 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <memory>
 #include <vector>
 
-#include "common/combining/schedule.h"
+#include "common/combining/travel.h"
 #include "common/kernels/combine.h"
 #include "tests/support/random_combining.h"
 #include "tests/support/random_image.h"
@@ -14,6 +15,8 @@ namespace {
 
 constexpr PixelBounds kFrame = {0, 0, 16, 12};
 constexpr PixelRange kWhole = {0, 16 * 12};
+
+Travel Travels(const Schedule& schedule) { return TravelOf(std::make_shared<const IndexedSchedule>(schedule), kWhole); }
 
 // What the root of the schedule ends with.
 LocalImage RunSchedule(const Schedule& schedule, const std::vector<LocalImage>& images, ColorCoding coding) {
@@ -57,7 +60,7 @@ TEST(CodedCombining, StaysWithinItsBound) {
     }
     const std::string combining = RandomCombining(random);
     const Schedule schedule = MakeSchedule(combining, {ranks, random.Integer<Rank>(0, ranks - 1), kWhole});
-    const Travel travel = TravelOf(schedule, kWhole);
+    const Travel travel = Travels(schedule);
     const LocalImage exact = RunSchedule(schedule, images, ColorCoding::kFloat32);
     for (const ColorCoding coding : {ColorCoding::kHalf, ColorCoding::kFixed16}) {
       const LocalImage coded = RunSchedule(schedule, images, coding);
@@ -71,11 +74,11 @@ TEST(CodedCombining, StaysWithinItsBound) {
 }
 
 TEST(Travel, CountsHopsAndTransfers) {
-  EXPECT_EQ(TravelOf(MakeFanIn({1, 0, kWhole}), kWhole), (Travel{0, 0}));
-  EXPECT_EQ(TravelOf(MakeFanIn({8, 0, kWhole}), kWhole), (Travel{3, 7}));
-  EXPECT_EQ(TravelOf(MakeCentralized({8, 3, kWhole}), kWhole), (Travel{1, 7}));
-  EXPECT_EQ(TravelOf(MakeChain({8, 0, kWhole}, 3), kWhole), (Travel{7, 7}));
-  EXPECT_EQ(TravelOf(MakeSwap({8, 0, kWhole}, std::vector<std::uint32_t>{8}), kWhole), (Travel{2, 8}));
+  EXPECT_EQ(Travels(MakeFanIn({1, 0, kWhole})), (Travel{0, 0}));
+  EXPECT_EQ(Travels(MakeFanIn({8, 0, kWhole})), (Travel{3, 7}));
+  EXPECT_EQ(Travels(MakeCentralized({8, 3, kWhole})), (Travel{1, 7}));
+  EXPECT_EQ(Travels(MakeChain({8, 0, kWhole}, 3)), (Travel{7, 7}));
+  EXPECT_EQ(Travels(MakeSwap({8, 0, kWhole}, std::vector<std::uint32_t>{8})), (Travel{2, 8}));
 }
 
 }  // namespace

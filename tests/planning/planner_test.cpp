@@ -6,12 +6,14 @@
 #include <vector>
 
 #include "common/combining/schemes.h"
+#include "common/combining/travel.h"
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
 #include "common/planning/classified_volume.h"
 #include "common/planning/frame_plan.h"
 #include "common/planning/policy_names.h"
 #include "tests/planning/support.h"
+#include "tests/support/check_schedule.h"
 #include "tests/support/random.h"
 #include "tests/support/renderers.h"
 
@@ -49,7 +51,7 @@ void ExpectSound(const FramePlan& plan, const Roster& roster) {
       EXPECT_NE(placement.worker, 0U);
     }
     EXPECT_EQ(group.schedule.ranks, group.placements.size());
-    EXPECT_EQ(CheckSchedule(group.schedule, frame), Status::Ok());
+    EXPECT_EQ(CheckSchedule(DeriveSchedule(group.schedule, frame).value()->schedule(), frame), Status::Ok());
     // The display worker gets the group's image without another message if it has a rank.
     const bool has_rank = std::any_of(group.placements.begin(), group.placements.end(), [&](auto& p) { return p.worker == plan.display; });
     if (has_rank) {
@@ -274,7 +276,7 @@ TEST(PlanFrame, AnEmptyVolumeHasAPlanOfEmptyGroups) {
   ExpectSound(plan, roster);
   EXPECT_TRUE(PlacedBoxes(plan).empty());
   EXPECT_EQ(plan.groups.size(), 1U);
-  EXPECT_EQ(plan.groups[0].schedule, (Schedule{0, 0, {}}));
+  EXPECT_EQ(plan.groups[0].schedule, (ScheduleName{plan.combine, 0, 0}));
   EXPECT_EQ(plan.display, roster.slots[0]);
 }
 
@@ -410,7 +412,7 @@ TEST(PlanFrame, ColoursTravelInAsManyBitsAsTheirErrorAllows) {
     request.policy.pixel_error = pixel_error;
     const FramePlan plan = Plan(request, summary, FullRoster(workers));
     for (const GroupPlan& group : plan.groups) {
-      const Travel travel = TravelOf(group.schedule, WholeFrame(plan.setup));
+      const Travel travel = TravelOf(DeriveSchedule(group.schedule, WholeFrame(plan.setup)).value(), WholeFrame(plan.setup));
       EXPECT_LE(CodingError(group.color, travel.hops, travel.transfers), pixel_error);
     }
     return plan.groups[0].color;

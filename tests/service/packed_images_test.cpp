@@ -40,7 +40,7 @@ class PackedInputTest : public PackedImagesTest {
     const Bytes packed = *PackRuns(runs.payload, how);
     std::vector<std::byte> payload(packed.span().begin(), packed.span().end());
     PartialImage partial = {.epoch = kEpoch, .from_worker = kPeer, .key = assignment.key, .step = 0, .interval = {1, 2}};
-    partial.pixels = assignment.group.schedule.steps[0].pixels;
+    partial.pixels = WholeFrame(assignment.setup);
     partial.image = runs.header;
     partial.packed = how;
     damage(partial, payload);
@@ -112,7 +112,7 @@ TEST_F(AcknowledgedImagesTest, AReceiverAnswersWhatIsLargeEnough) {
   for (FrameId frame = 1; frame <= 2; ++frame) {
     const GroupAssignment assignment = Assignment(frame, kWorker);
     PartialImage partial = {.epoch = kEpoch, .from_worker = kPeer, .key = assignment.key, .step = 0, .interval = {1, 2}};
-    partial.pixels = assignment.group.schedule.steps[0].pixels;
+    partial.pixels = WholeFrame(assignment.setup);
     SendControl(assignment);
     if (frame == 1) {  // too small to be answered
       partial.acknowledge = 77;

@@ -15,7 +15,7 @@ class RefusedImagesTest : public WorkerAndPeer {
 TEST_F(RefusedImagesTest, TheReceiverAsksForRuns) {
   const GroupAssignment assignment = Assignment(1, kWorker);
   const LocalImage theirs = Picture(2);
-  const PixelRange all = assignment.group.schedule.steps[0].pixels;
+  const PixelRange all = WholeFrame(assignment.setup);
   PartialImage partial = {.epoch = kEpoch, .from_worker = kPeer, .key = assignment.key, .step = 0, .interval = {1, 2}, .pixels = all};
   // Nobody has such a descriptor. It comes before the assignment: the worker does not know yet whom to tell.
   partial.shared = SharedImage{{5, std::uint32_t(::getpid()), 99999}, {0, 0, kSide, kSide}, kSide, 0, {{65536, 1, 0}}};
@@ -54,7 +54,7 @@ TEST_F(RefusedImagesTest, TheSenderSendsRunsAndLendsNoMore) {
 TEST_F(RefusedImagesTest, AWrongDescriptionFailsTheGroupAndNothingElse) {
   const GroupAssignment assignment = Assignment(1, kWorker);
   PartialImage partial = {.epoch = kEpoch, .from_worker = kPeer, .key = assignment.key, .step = 0, .interval = {1, 2}};
-  partial.pixels = assignment.group.schedule.steps[0].pixels;
+  partial.pixels = WholeFrame(assignment.setup);
   // The worker's own memory exists, but no such block is lent in it.
   partial.shared = SharedImage{*SharedBlocksArena(), {0, 0, kSide, kSide}, kSide, 0, {{kArenaBytes - 4096, 1, 0}}};
   SendControl(assignment);

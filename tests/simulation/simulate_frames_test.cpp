@@ -260,11 +260,10 @@ RandomRun MakeRandomRun(Random& random) {
     for (GroupPlan& group : frame->plan().groups) {
       if (random.Chance(0.1)) {
         group = {};
-        group.schedule.ranks = 0;
         continue;
       }
       for (Placement& placement : group.placements) placement.worker = (placement.worker - 1) % owners + 1;
-      group.schedule = MakeSchedule(combining, {workers, random.Integer<Rank>(0, workers - 1), WholeFrame(frame->plan().setup)});
+      group.schedule = {combining, workers, random.Integer<Rank>(0, workers - 1)};
     }
     run.inputs.push_back(frame->input());
     run.inputs.back().finish_seconds = random.Real(0, 0.01);
@@ -309,7 +308,8 @@ TEST(SimulateFrames, NothingHappensTwiceOrBeforeItsTime) {
         const GroupPlan& group = plan.groups[g];
         boxes += group.placements.size();
         if (group.placements.empty()) continue;
-        for (const Step& step : group.schedule.steps) {
+        const SharedSchedule schedule = DeriveSchedule(group.schedule, WholeFrame(plan.setup)).value();
+        for (const Step& step : schedule->steps()) {
           steps += group.placements[step.from].worker != group.placements[step.to].worker ? 1 : 0;
         }
         group_images += group.placements[group.schedule.root].worker != plan.display ? 1 : 0;
@@ -326,7 +326,9 @@ TEST(SimulateFrames, NothingHappensTwiceOrBeforeItsTime) {
       if (message.kind == SimulatedMessage::Kind::kGroupImage) ++images_sent;
       if (message.kind != SimulatedMessage::Kind::kPartial) continue;
       EXPECT_TRUE(partials.emplace(message.frame, message.group, message.step).second);
-      const Rank from = run.inputs[message.frame].plan->groups[message.group].schedule.steps[message.step].from;
+      const FramePlan& plan = *run.inputs[message.frame].plan;
+      const SharedSchedule schedule = DeriveSchedule(plan.groups[message.group].schedule, WholeFrame(plan.setup)).value();
+      const Rank from = schedule->steps()[message.step].from;
       EXPECT_GE(message.ready, rendered.at({message.frame, message.group, from}));
     }
     EXPECT_EQ(partials.size(), steps);
@@ -380,8 +382,7 @@ TEST(SimulateFrames, PicturesAreMadeBesideEachOtherIfWorkersTakeTurns) {
     for (std::vector<FrameInput>* inputs : {&taking_turns, &one_displays}) {
       frames.push_back(std::make_unique<MadeFrame>(kWorkers, 1, kSide, 0.5, 1, "fan-in"));
       frames.back()->plan().display = inputs == &taking_turns ? f % kWorkers + 1 : 1;
-      frames.back()->plan().groups[0].schedule =
-          MakeSchedule("fan-in", {kWorkers, frames.back()->plan().display - 1, WholeFrame(frames.back()->plan().setup)});
+      frames.back()->plan().groups[0].schedule = {"fan-in", kWorkers, frames.back()->plan().display - 1};
       frames.back()->finish_seconds = 4;
       inputs->push_back(frames.back()->input());
     }

@@ -82,7 +82,7 @@ TEST(AnyMessage, ManyRanksSurvive) {
     message.group.placements.push_back({rank, box, rank + 1});
     message.peers.push_back({rank + 1, "inproc://worker"});
   }
-  message.group.schedule = MakeFanIn({kRanks, 0, WholeFrame(message.setup)});
+  message.group.schedule = {"direct-send", kRanks, 0};
   EXPECT_TRUE(DecodeAnyInput(Encode(message)));
 }
 

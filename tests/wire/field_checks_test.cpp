@@ -116,11 +116,6 @@ TEST(FieldChecks, Groups) {
       {[&](E& e) { sheets(e)->set_y_v(1e3); }, "GroupAssignment.setup.sheets: a voxel is wider than 24 pixels"},
       {[&](E& e) { sheets(e)->mutable_from_picture()->RemoveLast(); }, "GroupAssignment.setup.sheets.from_picture: 8 values, expected 9"},
       {[&](E& e) { sheets(e)->set_from_picture(4, INFINITY); }, "GroupAssignment.setup.sheets.from_picture[4]: inf is not a finite number"},
-      {[&](E& e) {
-         sheets(e)->set_width(8);
-         sheets(e)->set_height(1);
-       },
-       "GroupAssignment.group: schedule"},  // of more pixels than the frame
       {[&](E& e) { plan(e)->mutable_placements(2)->mutable_box()->mutable_end()->set_z(317); },
        "GroupAssignment.group.placements[2].box: not inside the volume"},
       {[&](E& e) { plan(e)->mutable_placements(0)->mutable_box()->mutable_end()->set_y(0); },
@@ -130,15 +125,10 @@ TEST(FieldChecks, Groups) {
       {[&](E& e) { plan(e)->mutable_placements(1)->set_worker(0); }, "GroupAssignment.group.placements[1].worker: 0 is not in [1, "},
       {[&](E& e) { plan(e)->mutable_placements()->RemoveLast(); }, "GroupAssignment.group.schedule.ranks: 3, but there are 2 placements"},
       {[&](E& e) { schedule(e)->set_ranks(65537); }, "GroupAssignment.group.schedule.ranks: 65537 is not in [0, 65536]"},
-      {[&](E& e) { schedule(e)->set_root(3); }, "GroupAssignment.group: schedule.root"},
-      {[&](E& e) { schedule(e)->mutable_steps(0)->set_from(3); }, "GroupAssignment.group: schedule.steps[0]"},
-      {[&](E& e) { schedule(e)->mutable_steps(0)->set_to(schedule(e)->steps(0).from()); }, "GroupAssignment.group: schedule.steps[0]"},
-      {[&](E& e) { schedule(e)->mutable_steps(0)->set_round(99); }, "GroupAssignment.group: schedule.steps[1]"},
-      {[&](E& e) { schedule(e)->mutable_steps(0)->mutable_pixels()->set_end(std::uint64_t{1} << 48U); },
-       "GroupAssignment.group: schedule.steps[0]"},
-      {[&](E& e) { schedule(e)->mutable_steps(0)->mutable_pixels()->set_end(~std::uint64_t{0}); },
-       "GroupAssignment.group.schedule.steps[0].pixels.end: 18446744073709551615 is not in [0, 281474976710656]"},
-      {[&](E& e) { schedule(e)->mutable_steps()->RemoveLast(); }, "GroupAssignment.group: schedule"},
+      {[&](E& e) { schedule(e)->set_root(3); }, "GroupAssignment.group: schedule.root is 3, but must be below 3"},
+      {[&](E& e) { schedule(e)->set_scheme("glue"); }, "GroupAssignment.group: schedule.scheme: 'glue' is not one of "},
+      {[&](E& e) { schedule(e)->clear_scheme(); }, "GroupAssignment.group: schedule.scheme: '' is not one of "},
+      {[&](E& e) { schedule(e)->set_scheme(std::string(257, 'x')); }, "GroupAssignment.group.schedule.scheme: "},
   });
 }
 

@@ -163,7 +163,6 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       {"opacities", kMaxTransferPoints},
       {"lights", kMaxLights},
       {"placements", kMaxRanks},
-      {"steps", kMaxSteps},
       {"peers", kMaxPeers},
       {"reports", kMaxReports},
       {"spans", kMaxSpans},

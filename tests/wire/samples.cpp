@@ -40,7 +40,7 @@ Shading ManyLights() {
   return shading;
 }
 
-// A group of `ranks` slabs along z, combined by fan-in.
+// A group of `ranks` slabs along z.
 GroupAssignment Assignment(Rank ranks, const ViewParameters& view, const RendererKind* renderer) {
   GroupAssignment message{.epoch = kMax64, .key = {.frame = kMax64, .attempt = kMax32, .group = 3}, .finished_before = kMax64 - 1};
   message.group_count = 1024;
@@ -63,7 +63,7 @@ GroupAssignment Assignment(Rank ranks, const ViewParameters& view, const Rendere
     message.group.placements.push_back({rank, {{0, 0, z}, {size.x, size.y, z + 1}}, rank + 1});
     message.peers.push_back({rank + 1, "tcp://127.0.0.1:" + std::to_string(5000 + rank)});
   }
-  message.group.schedule = ranks == 0 ? Schedule{.ranks = 0, .root = 0, .steps = {}} : MakeFanIn({ranks, ranks / 2, WholeFrame(setup)});
+  message.group.schedule = {ranks == 0 ? "" : "radix-k:2x3", ranks, ranks / 2};
   message.group.color = renderer->format() == PixelFormat::kRgba ? ColorCoding::kFixed16 : ColorCoding::kFloat32;
   message.peers.push_back({kMax32, kOddEndpoint});
   return message;

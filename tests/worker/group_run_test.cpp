@@ -127,7 +127,7 @@ GroupAssignment MakeAssignment(Rank ranks, const std::string& combining, Rank ro
   assignment.setup.sheets.width = kWidth;
   assignment.setup.sheets.height = kHeight;
   for (Rank rank = 0; rank < ranks; ++rank) assignment.group.placements.push_back({rank, {}, 1});
-  assignment.group.schedule = MakeSchedule(combining, {ranks, root, kFrame});
+  assignment.group.schedule = {combining, ranks, root};
   return assignment;
 }
 
@@ -140,7 +140,6 @@ TEST(GroupRun, EveryScheduleGivesTheGroupImageOnceInOrder) {
       const std::string combining = RandomArguments(scheme, random);
       GroupAssignment assignment = MakeAssignment(ranks, combining, random.Integer<Rank>(0, ranks - 1));
       SCOPED_TRACE(combining + ", " + std::to_string(ranks) + " ranks, trial " + std::to_string(trial));
-      ASSERT_EQ(CheckSchedule(assignment.group.schedule, kFrame), Status::Ok());
       const WorkerId workers = random.Integer<WorkerId>(1, 5);
       for (Placement& placement : assignment.group.placements) placement.worker = random.Integer<WorkerId>(1, workers);
       assignment.display = random.Integer<WorkerId>(1, workers);
@@ -211,11 +210,17 @@ TEST(GroupRun, DropReleasesWhateverItHolds) {
 
 TEST(GroupRun, ImagesOfRanksThatAreNotAdjacentAreAFailure) {
   GroupAssignment assignment = MakeAssignment(3, "fan-in", 0);
-  assignment.group.schedule.steps = {{0, 2, 0, kFrame}, {1, 1, 0, kFrame}};
+  assignment.group.placements[1].worker = 2;
   ImageNames names;
   GroupRun run(assignment, 1, names);
   WorkerActions actions;
-  for (Rank rank = 0; rank < 3; ++rank) run.OnRendered(rank, names.Next(), {}, actions);
+  run.OnRendered(0, names.Next(), {}, actions);
+  PartialImage wrong;  // rank 1 sends what it should not have
+  wrong.key = assignment.key;
+  wrong.from_worker = 2;
+  wrong.interval = {2, 3};
+  wrong.pixels = kFrame;
+  run.OnPartial(wrong, {}, actions);
   EXPECT_EQ(run.failure().code(), StatusCode::kInternal);
   EXPECT_NE(run.failure().message().find("not adjacent"), std::string::npos) << run.failure().message();
 }
@@ -225,9 +230,11 @@ TEST(GroupRun, AScheduleThatDoesNotFitIsAFailure) {
   GroupAssignment too_few = MakeAssignment(3, "fan-in", 0);
   too_few.group.placements.pop_back();
   EXPECT_FALSE(GroupRun(too_few, 1, names).failure().ok());
-  GroupAssignment out_of_range = MakeAssignment(3, "fan-in", 0);
-  out_of_range.group.schedule.steps[0].from = 3;
-  EXPECT_FALSE(GroupRun(out_of_range, 1, names).failure().ok());
+  for (const ScheduleName& name : {ScheduleName{"fan-in", 3, 3}, ScheduleName{"glue", 3, 0}, ScheduleName{"fan-in", 4, 0}}) {
+    GroupAssignment wrong = MakeAssignment(3, "fan-in", 0);
+    wrong.group.schedule = name;
+    EXPECT_FALSE(GroupRun(wrong, 1, names).failure().ok()) << name.scheme << ", " << name.ranks << " ranks, root " << name.root;
+  }
 }
 
 TEST(GroupRun, ImagesFromWorkersThatDoNotOwnTheRankAreIgnored) {

@@ -89,7 +89,7 @@ class WorkerMachineTest : public testing::Test {
       const std::int32_t slab = std::int32_t(group * 4 + rank);
       a.group.placements.push_back({BoxId(slab), {{0, 0, slab * 64}, {128, 128, slab * 64 + 64}}, placements[rank]});
     }
-    if (!placements.empty()) a.group.schedule = MakeFanIn({Rank(placements.size()), 0, {0, 8}});
+    a.group.schedule = {"fan-in", Rank(placements.size()), 0};
     a.peers = {{kSelf, "inproc://self"}, {kPeer, "inproc://peer"}};
     return a;
   }

@@ -1,17 +1,19 @@
-// CheckSchedule: runs a schedule on rank intervals instead of images.
+// CheckSchedule: runs a schedule on intervals of ranks instead of images and says what is wrong with it.
+#pragma once
 
 #include <fmt/format.h>
 
 #include <iterator>
 #include <map>
+#include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
-#include "common/combining/holdings.h"
-#include "common/combining/schedule.h"
+#include "common/base/status.h"
+#include "common/combining/schedule_runner.h"
 
 namespace slabstream {
-namespace {
 
 // Pixels that a rank sends or receives in the current round: these must be disjoint, since the steps of a round have no order.
 class RoundUse {
@@ -36,22 +38,13 @@ class RoundUse {
   std::vector<PerRank> used_;
 };
 
-bool Covers(const Holdings::Map& fragments, PixelRange pixels) {
-  std::uint64_t next = pixels.begin;
-  for (const auto& [begin, fragment] : fragments) {
-    if (begin != next) return false;
-    next = fragment.end;
-  }
-  return next == pixels.end;
-}
-
-Status Wrong(std::size_t step, const std::string& message) {
+inline Status Wrong(std::size_t step, const std::string& message) {
   return Status::InvalidArgument(fmt::format("schedule.steps[{}]: {}", step, message));
 }
 
-}  // namespace
-
-Status CheckSchedule(const Schedule& schedule, PixelRange pixels) {
+// Checks that ranks are in range, rounds ascend, no rank touches pixels twice in a round, only adjacent intervals meet, nobody sends what
+// it does not hold, and the root ends with [0, ranks) of every pixel of `pixels`. InvalidArgument otherwise.
+inline Status CheckSchedule(const Schedule& schedule, PixelRange pixels) {
   if (schedule.ranks == 0) {
     return schedule.steps.empty() ? Status::Ok() : Status::InvalidArgument("schedule.steps is not empty, but there are no ranks");
   }
@@ -62,8 +55,6 @@ Status CheckSchedule(const Schedule& schedule, PixelRange pixels) {
   }
   if (pixels.begin >= pixels.end) return Status::InvalidArgument("schedule: the frame has no pixels");
 
-  std::vector<Holdings> holdings(schedule.ranks);
-  for (Rank rank = 0; rank < schedule.ranks; ++rank) holdings[rank].Put(pixels, {rank, rank + 1});
   RoundUse round_use(schedule.ranks);
 
   for (std::size_t i = 0; i < schedule.steps.size(); ++i) {
@@ -84,16 +75,23 @@ Status CheckSchedule(const Schedule& schedule, PixelRange pixels) {
         return Wrong(i, fmt::format("rank {} touches the same pixels twice in round {}", rank, step.round));
       }
     }
-    const auto moved = holdings[step.from].Take(step.pixels);
-    if (!Covers(moved, step.pixels)) return Wrong(i, fmt::format("rank {} sends pixels that it does not hold", step.from));
-    for (const auto& [begin, fragment] : moved) {
-      if (!holdings[step.to].Combine({begin, fragment.end}, fragment.value, Joined)) {
-        return Wrong(i, fmt::format("ranks [{}, {}) meet an interval at rank {} that is not adjacent", fragment.value.begin,
-                                    fragment.value.end, step.to));
+  }
+
+  ScheduleRunner<RankInterval> runner(std::make_shared<const IndexedSchedule>(schedule), pixels, AllRanks(schedule.ranks));
+  for (Rank rank = 0; rank < schedule.ranks; ++rank) runner.OnRendered(rank, {rank, rank + 1});
+  while (const auto taken = runner.TakeNext()) {
+    const Step& step = *taken->step;
+    if (PixelCount(taken->parts) != PixelCount(step.pixels)) {
+      return Wrong(taken->index, fmt::format("rank {} sends pixels that it does not hold", step.from));
+    }
+    for (const Fragment<RankInterval>& part : taken->parts) {
+      if (!runner.held(step.to).Combine(part, Joined)) {
+        return Wrong(taken->index, fmt::format("ranks [{}, {}) meet an interval at rank {} that is not adjacent", part.value.begin,
+                                               part.value.end, step.to));
       }
     }
   }
-  if (!IsWhole(holdings[schedule.root], pixels, {0, schedule.ranks})) {
+  if (runner.held(schedule.root).list() != std::vector<Fragment<RankInterval>>{{pixels, {0, schedule.ranks}}}) {
     return Status::InvalidArgument(
         fmt::format("schedule: root {} does not end with ranks [0, {}) of every pixel", schedule.root, schedule.ranks));
   }

@@ -1,0 +1,88 @@
+#include "common/combining/named_schedule.h"
+
+#include <fmt/format.h>
+
+#include <list>
+#include <mutex>
+#include <utility>
+
+#include "common/base/check.h"
+#include "common/combining/schemes.h"
+
+namespace slabstream {
+namespace {
+
+// The last schedules that were derived, latest first.
+class RecentSchedules {
+ public:
+  SharedSchedule Find(const ScheduleName& name, PixelRange frame) {
+    const std::lock_guard lock(mutex_);
+    for (auto it = entries_.begin(); it != entries_.end(); ++it) {
+      if (it->name != name || it->frame != frame) continue;
+      entries_.splice(entries_.begin(), entries_, it);
+      return entries_.front().schedule;
+    }
+    return nullptr;
+  }
+
+  void Keep(const ScheduleName& name, PixelRange frame, const SharedSchedule& schedule) {
+    const std::lock_guard lock(mutex_);
+    entries_.push_front({name, frame, schedule});
+    std::size_t steps = 0, kept = 0;
+    for (auto it = entries_.begin(); it != entries_.end(); ++kept) {
+      steps += it->schedule->steps().size();
+      it = kept > 0 && (steps > kMaxSteps || kept == kMostKept) ? entries_.erase(it) : std::next(it);
+    }
+  }
+
+ private:
+  static constexpr std::size_t kMostKept = 64;
+  struct Entry {
+    ScheduleName name;
+    PixelRange frame;
+    SharedSchedule schedule;
+  };
+  std::mutex mutex_;
+  std::list<Entry> entries_;
+};
+
+}  // namespace
+
+IndexedSchedule::IndexedSchedule(Schedule schedule) : schedule_(std::move(schedule)), first_of_rank_(schedule_.ranks + 1) {
+  for (const Step& step : schedule_.steps) {
+    CHECK(step.from < schedule_.ranks && step.to < schedule_.ranks && step.from != step.to) << "from " << step.from << " to " << step.to;
+    ++first_of_rank_[step.from + 1];
+    ++first_of_rank_[step.to + 1];
+  }
+  for (Rank rank = 0; rank < schedule_.ranks; ++rank) first_of_rank_[rank + 1] += first_of_rank_[rank];
+  by_rank_.resize(first_of_rank_.back());
+  std::vector<std::uint32_t> next(first_of_rank_.begin(), first_of_rank_.end() - 1);
+  for (std::uint32_t i = 0; i < schedule_.steps.size(); ++i) {
+    by_rank_[next[schedule_.steps[i].from]++] = i;
+    by_rank_[next[schedule_.steps[i].to]++] = i;
+  }
+}
+
+Status CheckScheduleName(const ScheduleName& name) {
+  if (name.ranks > kMaxRanks) {
+    return Status::InvalidArgument(fmt::format("schedule.ranks is {}, but at most {} are allowed", name.ranks, kMaxRanks));
+  }
+  if (name.root >= std::max<Rank>(name.ranks, 1)) {
+    return Status::InvalidArgument(fmt::format("schedule.root is {}, but must be below {}", name.root, std::max<Rank>(name.ranks, 1)));
+  }
+  if (name.ranks == 0) return Status::Ok();
+  const Result<CombiningChoice> scheme = ParseCombining(name.scheme);
+  return scheme.ok() ? Status::Ok() : Status::InvalidArgument(fmt::format("schedule.scheme: {}", scheme.status().message()));
+}
+
+Result<SharedSchedule> DeriveSchedule(const ScheduleName& name, PixelRange frame) {
+  static RecentSchedules recent;
+  if (Status status = CheckScheduleName(name); !status.ok()) return status;
+  if (name.ranks == 0) return std::make_shared<const IndexedSchedule>(Schedule{.ranks = 0, .root = 0, .steps = {}});
+  if (SharedSchedule known = recent.Find(name, frame)) return known;
+  auto schedule = std::make_shared<const IndexedSchedule>(ParseCombining(name.scheme)->Make({name.ranks, name.root, frame}));
+  recent.Keep(name, frame, schedule);
+  return SharedSchedule(std::move(schedule));
+}
+
+}  // namespace slabstream

@@ -1,0 +1,50 @@
+// Schedules by name. Plans and messages carry a ScheduleName; whoever needs the steps derives them from it. The same name and pixels give
+// the same steps in the same order everywhere, so a message can refer to a step by its index.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/base/status.h"
+#include "common/combining/schedule.h"
+
+namespace slabstream {
+
+struct ScheduleName {
+  std::string scheme;  // as --combine spells it, for example "radix-k:4x4"
+  Rank ranks = 0;      // [0, kMaxRanks]; 0: a group without images, which needs no scheme
+  Rank root = 0;       // below `ranks`; 0 if there are none
+  friend bool operator==(const ScheduleName&, const ScheduleName&) = default;
+};
+
+// InvalidArgument: an unknown scheme, wrong arguments of it, too many ranks, or a root that is no rank.
+Status CheckScheduleName(const ScheduleName& name);
+
+// A schedule and, for each rank, the steps that it sends or receives. Immutable.
+class IndexedSchedule {
+ public:
+  // Every step goes from one rank below schedule.ranks to another one.
+  explicit IndexedSchedule(Schedule schedule);
+
+  const Schedule& schedule() const { return schedule_; }
+  const std::vector<Step>& steps() const { return schedule_.steps; }
+  // Indices into steps(), ascending.
+  std::span<const std::uint32_t> StepsOf(Rank rank) const {
+    return std::span(by_rank_).subspan(first_of_rank_[rank], first_of_rank_[rank + 1] - first_of_rank_[rank]);
+  }
+
+ private:
+  Schedule schedule_;
+  std::vector<std::uint32_t> by_rank_, first_of_rank_;
+};
+
+using SharedSchedule = std::shared_ptr<const IndexedSchedule>;
+
+// The schedule of that name over all pixels of a frame. Errors: as CheckScheduleName. Groups and frames repeat names, and a process may
+// hold many workers, so the last schedules are kept and shared (at most kMaxSteps steps of them, and the last one). Any thread may call.
+Result<SharedSchedule> DeriveSchedule(const ScheduleName& name, PixelRange frame);
+
+}  // namespace slabstream

@@ -1,0 +1,90 @@
+// StepOrder: which steps of a schedule may be taken next at some of its ranks: those of one worker, or all of them.
+//
+// A step may be taken at a rank when the rank is rendered, nothing is being combined for it, and all its earlier steps on the same pixels
+// are taken. So the same images meet in any order of arrival, and steps of disjoint pixels do not wait for each other. For each step the
+// object counts what it still waits for, so an event costs no scan over the open steps. Memory grows with the steps of its own ranks.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <set>
+#include <span>
+#include <vector>
+
+#include "common/combining/named_schedule.h"
+
+namespace slabstream {
+
+class StepOrder {
+ public:
+  // `ranks`: those that are here, ascending, below the schedule's.
+  StepOrder(SharedSchedule schedule, std::vector<Rank> ranks);
+
+  const IndexedSchedule& schedule() const { return *schedule_; }
+  const std::vector<Rank>& ranks() const { return numbers_; }
+  bool Here(Rank rank) const { return FindRank(rank).has_value(); }
+
+  // All ranks below are here.
+  void OnRendered(Rank rank);
+  void OnCombineStarted(Rank rank) { ++At(rank).combining; }
+  void OnCombined(Rank rank);
+  // `pixels` of the step have come from a rank that is not here. The step is Awaited and has not had these pixels yet.
+  void OnArrived(std::uint32_t step, std::uint64_t pixels);
+  // True if the step goes from a rank elsewhere to one here, and not all of its pixels have been taken.
+  bool Awaited(std::uint32_t step) const;
+
+  // kReceive: all pixels that have arrived and are not taken yet. It comes again if more arrive. kMove: between two ranks that are here.
+  enum class Kind : std::uint8_t { kSend, kReceive, kMove };
+  struct Taken {
+    Kind kind = Kind::kSend;
+    std::uint32_t step = 0;
+  };
+  // A step that may be taken now; it counts as taken. None: wait for the next event.
+  std::optional<Taken> TakeNext();
+
+  bool Rendered(Rank rank) const { return At(rank).rendered; }
+  bool HasOpenSteps(Rank rank) const { return At(rank).open_steps > 0; }
+  // Rendered, all steps taken, and nothing is being combined.
+  bool Done(Rank rank) const { return At(rank).free() && At(rank).open_steps == 0; }
+
+ private:
+  static constexpr std::uint32_t kElsewhere = ~std::uint32_t{0};
+
+  struct Turn {  // a rank's part in a step
+    std::uint32_t step = 0;
+    std::uint32_t rank = 0;              // index into ranks_
+    std::uint32_t partner = kElsewhere;  // the other rank's turn, if that rank is here too
+    std::uint32_t waits = 0;             // for so many earlier turns of the rank
+    std::uint64_t arrived = 0;           // pixels, of a step from elsewhere
+    bool untaken = false;                // some of them are not taken
+    bool taken = false;
+  };
+  struct RankState {
+    std::uint32_t first_turn = 0, turn_end = 0;
+    std::uint32_t open_steps = 0;
+    std::uint32_t combining = 0;
+    bool rendered = false;
+    std::set<std::uint32_t> possible;  // turns that wait for nothing but that their ranks are free
+    bool free() const { return rendered && combining == 0; }
+  };
+
+  std::optional<std::uint32_t> FindRank(Rank rank) const;
+  std::optional<std::uint32_t> FindTurn(Rank rank, std::uint32_t step) const;
+  RankState& At(Rank rank);
+  const RankState& At(Rank rank) const;
+  const Step& StepOf(const Turn& turn) const { return schedule_->steps()[turn.step]; }
+  bool Sends(const Turn& turn) const { return StepOf(turn).from == numbers_[turn.rank]; }
+  void FindWaits();
+  void Offer(std::uint32_t turn);
+  void Close(std::uint32_t turn);
+
+  SharedSchedule schedule_;
+  std::vector<Rank> numbers_;
+  std::vector<RankState> ranks_;  // of numbers_
+  std::vector<Turn> turns_;       // rank by rank, each in order of steps
+  // The turns that wait for turn i: [first_waiter_[i], first_waiter_[i + 1]) of waiters_.
+  std::vector<std::uint32_t> first_waiter_, waiters_;
+  std::set<std::uint32_t> changed_;  // ranks at which a turn may have become possible
+};
+
+}  // namespace slabstream

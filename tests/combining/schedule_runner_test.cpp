@@ -1,0 +1,174 @@
+#include "common/combining/schedule_runner.h"
+
+#include <gtest/gtest.h>
+
+#include <deque>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tests/support/random.h"
+#include "tests/support/random_combining.h"
+
+namespace slabstream {
+namespace {
+
+constexpr PixelRange kFrame = {0, 240};
+
+SharedSchedule Derive(const ScheduleName& name) { return DeriveSchedule(name, kFrame).value(); }
+
+// Runs a schedule on several workers with messages in any order, whole or in pieces, while combining takes its time.
+class World {
+ public:
+  World(Random& random, const SharedSchedule& schedule, int workers) : random_(random), schedule_(schedule) {
+    std::vector<std::vector<Rank>> ranks(static_cast<std::size_t>(workers));
+    for (Rank rank = 0; rank < schedule->schedule().ranks; ++rank) {
+      owner_.push_back(random.Integer<std::size_t>(0, ranks.size() - 1));
+      ranks[owner_.back()].push_back(rank);
+      events_.emplace_back([this, rank] { runner(rank).OnRendered(rank, {rank, rank + 1}); });
+    }
+    for (std::vector<Rank>& of_worker : ranks) runners_.emplace_back(schedule, kFrame, std::move(of_worker));
+  }
+
+  void Run() {
+    while (!events_.empty()) {
+      const auto next = events_.begin() + std::ptrdiff_t(random_.Integer<std::size_t>(0, events_.size() - 1));
+      const std::function<void()> event = std::move(*next);
+      events_.erase(next);
+      event();
+      for (auto& runner : runners_) Advance(runner);
+    }
+  }
+
+  ScheduleRunner<RankInterval>& runner(Rank rank) { return runners_[owner_[rank]]; }
+
+ private:
+  using Runner = ScheduleRunner<RankInterval>;
+
+  void Advance(Runner& runner) {
+    while (auto taken = runner.TakeNext()) {
+      const Step& step = *taken->step;
+      if (taken->kind == StepOrder::Kind::kReceive) {
+        ASSERT_FALSE(arrived_[taken->index].empty());
+        for (const Fragment<RankInterval>& part : std::exchange(arrived_[taken->index], {})) Merge(runner, step.to, part);
+        continue;
+      }
+      ASSERT_EQ(PixelCount(taken->parts), PixelCount(step.pixels));
+      for (const Fragment<RankInterval>& part : taken->parts) {
+        if (taken->kind == StepOrder::Kind::kMove) {
+          Merge(runner, step.to, part);
+        } else {
+          events_.emplace_back([this, index = taken->index, part] {
+            StepOrder& order = this->runner(schedule_->steps()[index].to).order();
+            ASSERT_TRUE(order.Awaited(index));
+            arrived_[index].push_back(part);
+            order.OnArrived(index, PixelCount(part.pixels));
+          });
+        }
+      }
+    }
+  }
+
+  void Merge(Runner& runner, Rank rank, const Fragment<RankInterval>& part) {
+    ASSERT_TRUE(runner.held(rank).Combine(part, Joined));
+    if (random_.Chance(0.5)) return;
+    runner.order().OnCombineStarted(rank);
+    events_.emplace_back([&runner, rank] { runner.order().OnCombined(rank); });
+  }
+
+  Random& random_;
+  SharedSchedule schedule_;
+  std::vector<std::size_t> owner_;  // of each rank
+  std::vector<Runner> runners_;
+  std::vector<std::function<void()>> events_;
+  std::map<std::uint32_t, std::vector<Fragment<RankInterval>>> arrived_;
+};
+
+TEST(ScheduleRunner, EveryScheduleEndsAtItsRootWhateverTheOrderOfEvents) {
+  Random random(3);
+  SCOPED_TRACE(random.trace());
+  for (const CombiningEntry& scheme : CombiningSchemes()) {
+    for (int trial = 0; trial < 60; ++trial) {
+      const auto ranks = random.Integer<Rank>(1, 14);
+      const ScheduleName name = {RandomArguments(scheme, random), ranks, random.Integer<Rank>(0, ranks - 1)};
+      SCOPED_TRACE(name.scheme + ", " + std::to_string(ranks) + " ranks, trial " + std::to_string(trial));
+      World world(random, Derive(name), random.Integer(1, 6));
+      world.Run();
+      if (HasFatalFailure()) return;
+      for (Rank rank = 0; rank < ranks; ++rank) EXPECT_TRUE(world.runner(rank).order().Done(rank));
+      EXPECT_EQ(world.runner(name.root).held(name.root).list(), (Fragments<RankInterval>::List{{kFrame, {0, ranks}}}));
+    }
+  }
+}
+
+TEST(ScheduleRunner, ARankThatIsNotRenderedOrIsCombiningWaits) {
+  ScheduleRunner<RankInterval> runner(Derive({"centralized", 3, 0}), kFrame, {0});
+  ASSERT_TRUE(runner.order().Awaited(0));
+  runner.order().OnArrived(0, 240);
+  EXPECT_FALSE(runner.TakeNext());
+  runner.OnRendered(0, {0, 1});
+  EXPECT_TRUE(runner.TakeNext());
+  EXPECT_FALSE(runner.order().Awaited(0));
+  runner.order().OnCombineStarted(0);
+  runner.order().OnArrived(1, 240);
+  EXPECT_FALSE(runner.TakeNext());
+  EXPECT_FALSE(runner.order().Done(0));
+  runner.order().OnCombined(0);
+  EXPECT_TRUE(runner.TakeNext());
+  EXPECT_TRUE(runner.order().Done(0));
+}
+
+TEST(ScheduleRunner, StepsOfTheSamePixelsKeepTheirOrderAndOthersDoNotWait) {
+  ScheduleRunner<RankInterval> runner(Derive({"chain:strips=2", 3, 0}), kFrame, {1});
+  runner.OnRendered(1, {1, 2});
+  const std::vector<Step>& steps = runner.order().schedule().steps();
+  const auto index = [&](Rank to, std::uint64_t begin) {
+    return std::uint32_t(std::ranges::find_if(steps, [&](const Step& s) { return s.to == to && s.pixels.begin == begin; }) - steps.begin());
+  };
+  EXPECT_FALSE(runner.TakeNext()) << "what is sent on waits for what comes in";
+  runner.order().OnArrived(index(1, 120), 120);
+  EXPECT_EQ(runner.TakeNext()->index, index(1, 120)) << "the second strip came first";
+  EXPECT_EQ(runner.TakeNext()->index, index(0, 120));
+  EXPECT_FALSE(runner.TakeNext());
+}
+
+TEST(ScheduleRunner, AReceiveComesAgainUntilAllPixelsAreThere) {
+  ScheduleRunner<RankInterval> runner(Derive({"fan-in", 2, 0}), kFrame, {0});
+  runner.OnRendered(0, {0, 1});
+  runner.order().OnArrived(0, 100);
+  EXPECT_TRUE(runner.TakeNext());
+  EXPECT_FALSE(runner.TakeNext());
+  EXPECT_TRUE(runner.order().Awaited(0));
+  runner.order().OnArrived(0, 140);
+  EXPECT_TRUE(runner.TakeNext());
+  EXPECT_FALSE(runner.order().Awaited(0));
+}
+
+TEST(DeriveSchedule, IsWhatTheSchemeMakes) {
+  for (const CombiningEntry& entry : CombiningSchemes()) {
+    const std::string scheme(entry.name);
+    const SharedSchedule schedule = Derive({scheme, 13, 5});
+    EXPECT_EQ(schedule->schedule(), MakeSchedule(scheme, {13, 5, kFrame}));
+    EXPECT_EQ(Derive({scheme, 13, 5}), schedule) << "the last schedules are shared";
+    for (Rank rank = 0; rank < 13; ++rank) {
+      std::vector<std::uint32_t> expected;
+      for (std::uint32_t i = 0; i < schedule->steps().size(); ++i) {
+        if (schedule->steps()[i].from == rank || schedule->steps()[i].to == rank) expected.push_back(i);
+      }
+      EXPECT_TRUE(std::ranges::equal(schedule->StepsOf(rank), expected));
+    }
+  }
+  EXPECT_EQ(Derive({"", 0, 0})->schedule(), (Schedule{0, 0, {}}));
+}
+
+TEST(DeriveSchedule, SaysWhatIsWrongWithAName) {
+  const auto message = [](const ScheduleName& name) { return DeriveSchedule(name, kFrame).status().message(); };
+  EXPECT_EQ(message({"fan-in", 2, 2}), "schedule.root is 2, but must be below 2");
+  EXPECT_EQ(message({"fan-in", 0, 1}), "schedule.root is 1, but must be below 1");
+  EXPECT_EQ(message({"fan-in", kMaxRanks + 1, 0}), "schedule.ranks is 65537, but at most 65536 are allowed");
+  EXPECT_NE(message({"glue", 2, 0}).find("schedule.scheme: 'glue' is not one of"), std::string::npos);
+  EXPECT_NE(message({"fan-in:2", 2, 0}).find("takes nothing after its name"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace slabstream
