@@ -169,15 +169,10 @@ void Simulate(const Options& options, const Subject& subject, int workers) {
   const MachineModel machine = ServiceMachine(
       Hosts(options, workers), {.link = ParseLink("--link", options.link).value(), .memory_scope = 1, .cores = std::int32_t(workers)});
   Truth truth(options, subject, setup, grid, machine, workers);
-  const CostModel cost;
 
   FrameRequest request = subject.request;
-  PolicyQuestion question{.frame = &request,
-                          .summary = &subject.summary,
-                          .known = {.occupied = &grid},
-                          .slots = std::uint32_t(workers),
-                          .machine = &machine,
-                          .cost = &cost};
+  PolicyQuestion question{
+      .frame = &request, .summary = &subject.summary, .known = {.occupied = &grid}, .slots = std::uint32_t(workers), .machine = &machine};
   const auto choose = [&](const Policy& policy) {
     request.policy = policy;
     return ChoosePolicy(question).value();

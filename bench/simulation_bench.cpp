@@ -72,7 +72,7 @@ void AddSamples(const BenchCase& c, const Volume& volume, const BenchOptions& op
         BenchRequest(c, BenchView(view % 2 == 0 ? Projection::kOrthographic : Projection::kPerspective, view, options.views),
                      {options.size, options.size});
     for (const int boxes : kBoxCounts) {
-      const FramePlan plan = PlanFrame(request, 1, summary, RosterOf(std::uint32_t(boxes)), CostModel{}).value();
+      const FramePlan plan = PlanFrame(request, 1, summary, RosterOf(std::uint32_t(boxes))).value();
       for (const BoxCost& box : MeasureFrameCosts(volume, plan, options.repeats).boxes) {
         if (box.seconds > 0) samples.push_back(SampleOf(box, plan.setup.camera));
       }

@@ -85,9 +85,9 @@ Planned Plan(const Subject& subject, const Policy& policy, int workers, int fram
   LayoutTable layouts;
   Planned planned;
   for (int frame = 0; frame < frames; ++frame) {
-    const std::shared_ptr<const Layout> layout = layouts.Find(
-        {&resolved, &volume, &subject.summary, subject.occupied, std::uint32_t(workers), CostModel().slab_bytes_target});
-    planned = {.plan = PlanFrame(request, 1, subject.summary, roster, CostModel{}, layout).value(), .costs = {}};
+    const std::shared_ptr<const Layout> layout =
+        layouts.Find({&resolved, &volume, &subject.summary, subject.occupied, std::uint32_t(workers)});
+    planned = {.plan = PlanFrame(request, 1, subject.summary, roster, layout).value(), .costs = {}};
     planned.costs = MeasureFrameCosts(*subject.volume, planned.plan, repeats);
     std::vector<RankReport> reports;
     std::map<WorkerId, double> seconds;
@@ -200,8 +200,7 @@ void Run(const Options& options) {
           FrameRequest request = subject.request;
           request.policy = policy;
           request.policy.combine = scheme;
-          const FramePlan plan =
-              PlanFrame(request, 1, subject.summary, RosterOf(std::uint32_t(team)), CostModel{}, planned.plan.layout).value();
+          const FramePlan plan = PlanFrame(request, 1, subject.summary, RosterOf(std::uint32_t(team)), planned.plan.layout).value();
           const Flow flow = Simulate(plan, planned.costs, machine, link == "pvs", options.workers / team);
           fmt::print(
               "  {:7} {:12}: T1 {:.3f} ms, picture to picture {:.3f} ms, efficiency {:5.1f} %; busiest render {:.3f}, combine {:.3f}, "

@@ -25,7 +25,7 @@ Result<std::shared_ptr<const PlannedFrame>> Planner::TryPlan(const PlanRequest& 
                                                         .occupied = request.occupied,
                                                         .slots = slots,
                                                         .machine = &machine,
-                                                        .cost = &config_.cost,
+                                                        .slab_bytes_target = config_.slab_bytes_target,
                                                         .layouts = &layouts_});
     if (!chosen.ok()) return chosen.status();
     planned->policy = chosen->policy;
@@ -41,7 +41,7 @@ Result<std::shared_ptr<const PlannedFrame>> Planner::TryPlan(const PlanRequest& 
                                                         .summary = request.summary.get(),
                                                         .occupied = request.occupied,
                                                         .slots = slots,
-                                                        .slab_bytes_target = config_.cost.slab_bytes_target});
+                                                        .slab_bytes_target = config_.slab_bytes_target});
   Result<FramePlan> plan = PlanFrame(request.frame, planned->policy, request.volume.dataset(), *request.summary, request.roster,
                                      std::move(layout), request.turn);
   if (!plan.ok()) return plan.status();

@@ -6,7 +6,6 @@
 
 #include <memory>
 
-#include "common/planning/cost_model.h"
 #include "common/tuning/service_machine.h"
 #include "coordinator/layout_table.h"
 #include "coordinator/plan_request.h"
@@ -15,7 +14,7 @@
 namespace slabstream {
 
 struct PlannerConfig {
-  CostModel cost;
+  std::int64_t slab_bytes_target = kSlabBytesTarget;
   ServiceSurroundings surroundings;  // what policies are chosen for
 };
 

@@ -45,7 +45,7 @@ Result<ChosenPolicy> PolicyTable::Choose(const Request& request, Entry& entry, c
                                                     .known = {.occupied = request.occupied.get(), .cost = cost ? &*cost : nullptr},
                                                     .slots = request.slots,
                                                     .machine = request.machine,
-                                                    .cost = request.cost,
+                                                    .slab_bytes_target = request.slab_bytes_target,
                                                     .render_scale = entry.render_scale,
                                                     .now = now,
                                                     .least_gain = kRevisitGain});

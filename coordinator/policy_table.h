@@ -43,7 +43,7 @@ class PolicyTable {
     std::shared_ptr<const OccupancyGrid> occupied;  // null: not counted
     std::uint32_t slots = 1;
     const MachineModel* machine = nullptr;
-    const CostModel* cost = nullptr;
+    std::int64_t slab_bytes_target = kSlabBytesTarget;
     LayoutTable* layouts = nullptr;  // that knows what boxes cost
   };
   // Errors as of ChoosePolicy.

@@ -9,7 +9,6 @@
 
 #include "common/base/check.h"
 #include "common/image/pixel_bounds.h"
-#include "common/image/run_image.h"
 
 namespace slabstream {
 

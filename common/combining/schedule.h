@@ -15,7 +15,6 @@
 
 #include "common/base/status.h"
 #include "common/image/pixel_bounds.h"
-#include "common/image/run_image.h"
 
 namespace slabstream {
 

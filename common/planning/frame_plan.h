@@ -1,7 +1,7 @@
 // FramePlan: everything that a frame will do, as a value. Built by pure functions; the service, the embedded executor and the simulator run
 // it.
 //
-//   request + volume summary + roster + cost model  --PlanFrame-->  FramePlan  --executor-->  image + reports
+//   request + volume summary + roster + costs  --PlanFrame-->  FramePlan  --executor-->  image + reports
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,6 @@
 #include "common/combining/schedule.h"
 #include "common/frame/frame_setup.h"
 #include "common/image/color_coding.h"
-#include "common/planning/cost_model.h"
 #include "common/planning/layout.h"
 #include "common/volume/summary.h"
 
@@ -81,7 +80,8 @@ Result<FramePlan> PlanFrame(const FrameRequest& request, const ResolvedPolicy& p
 // The same by the request's own policy, where nothing is known but the volume's summary. Errors also as of ResolvePolicy. Null `layout`:
 // MakeLayout.
 Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, const Roster& roster,
-                            const CostModel& cost, std::shared_ptr<const Layout> layout = nullptr, const Turn& turn = {});
+                            std::shared_ptr<const Layout> layout = nullptr, const Turn& turn = {},
+                            std::int64_t slab_bytes_target = kSlabBytesTarget);
 
 // The function that a request names or holds, for this volume. NotFound: no such preset.
 Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const VolumeSummary& summary);

@@ -7,6 +7,7 @@
 
 #include "common/base/check.h"
 #include "common/planning/brick_visibility.h"
+#include "common/planning/cost_estimator.h"
 #include "common/planning/learnt_cost.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/view/sheet_grid.h"
@@ -92,19 +93,21 @@ struct LayoutMaker::State {
     });
   }
 
+  const CostEstimator& Costs() {
+    if (!costs) costs.emplace(*request.renderer, CostBasis{&fields.Grid(), request.summary, request.transfer}, request.known.cost);
+    return *costs;
+  }
+
   // Seconds of a box in views along x and along y: views turn about z.
   static constexpr std::size_t kViews = 2;
   using ByView = std::array<double, kViews>;
   ByView PredictedSeconds(const Box& box) {
-    if (!cost) cost = request.renderer->MakeCost({&fields.Grid(), request.summary, request.transfer});
-    return {cost->Seconds(box, {.along = Axis::kX}), cost->Seconds(box, {.along = Axis::kY})};
+    return {Costs().Analytic(box, {.along = Axis::kX}), Costs().Analytic(box, {.along = Axis::kY})};
   }
 
   double CostOf(const Box& box, const ResolvedPolicy& policy) {
     if (!NeedsOccupancy(policy)) return double(box.voxel_count());
-    if (request.known.cost != nullptr) return request.known.cost->Sum(box);
-    const auto [along_x, along_y] = PredictedSeconds(box);
-    return (along_x + along_y) / 2;
+    return (Costs().Seconds(box, {.along = Axis::kX}) + Costs().Seconds(box, {.along = Axis::kY})) / 2;
   }
 
   Layout Assign(Partition partition, const ResolvedPolicy& policy) {
@@ -186,7 +189,7 @@ struct LayoutMaker::State {
 
   const LayoutRequest request;
   WorkFields fields;
-  std::unique_ptr<AnalyticCost> cost;
+  std::optional<CostEstimator> costs;
 };
 
 LayoutMaker::LayoutMaker(const LayoutRequest& request) : state_(std::make_unique<State>(request)) {}

@@ -32,13 +32,16 @@ struct WorkKnowledge {
   const WorkField* cost = nullptr;  // seconds, learnt from frames; else what is occupied stands for it
 };
 
+// Memory of the voxels of one slab at most, where slices allow it.
+inline constexpr std::int64_t kSlabBytesTarget = std::int64_t{256} << 20;
+
 struct LayoutRequest {
   const VolumeSummary* summary = nullptr;
   const TransferFunction* transfer = nullptr;
   const ResolvedPolicy* policy = nullptr;
   const RendererKind* renderer = nullptr;
-  std::uint32_t slots = 1;                                   // >= 1
-  std::int64_t slab_bytes_target = std::int64_t{256} << 20;  // voxels of one slab at most, where slices allow it
+  std::uint32_t slots = 1;  // >= 1
+  std::int64_t slab_bytes_target = kSlabBytesTarget;
   WorkKnowledge known;
   const Partition* resized = nullptr;  // of a layout by the same policy: its boxes are resized (DecompositionRequest); null: cut anew
 };

@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "common/image/local_image.h"
 #include "common/image/resolve.h"
@@ -11,6 +12,22 @@
 
 namespace slabstream {
 namespace {
+
+// Pixels of the frame for a step of the least spacing, at the middle of the volume.
+double PixelsPerVoxel(const FrameSetup& setup) {
+  const VolumeGeometry& geometry = setup.description.geometry;
+  const Index3& size = geometry.size;
+  const Vec3 middle = {(size.x - 1) / 2.0, (size.y - 1) / 2.0, (size.z - 1) / 2.0};
+  const double least = std::min({geometry.spacing.x, geometry.spacing.y, geometry.spacing.z});
+  if (!setup.sheets.empty()) {
+    const auto [c, u, v] = AxesOf(setup.camera.traversal_axis);
+    const SlicePlacement slice = PlaceSlice(setup.sheets, middle[c]);
+    return least * std::sqrt(slice.scale_u * slice.scale_v / (geometry.spacing[u] * geometry.spacing[v]));
+  }
+  const Camera::ImagePoint at = setup.camera.Project(middle);
+  const Camera::ImagePoint beside = setup.camera.Project(middle + least * setup.camera.right / geometry.spacing);
+  return std::hypot(beside.x - at.x, beside.y - at.y);
+}
 
 LocalImage ResamplePicture(const LocalImage& frame, const FrameSetup& setup) {
   LocalImage picture = MakeUnwrittenImage(frame.format, {0, 0, setup.camera.width, setup.camera.height});
@@ -24,6 +41,8 @@ LocalImage ResamplePicture(const LocalImage& frame, const FrameSetup& setup) {
 }
 
 }  // namespace
+
+CostView CostViewOf(const FrameSetup& setup) { return {.along = setup.camera.traversal_axis, .pixels_per_voxel = PixelsPerVoxel(setup)}; }
 
 ClassificationTable RendererKind::DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const {
   return Classify(transfer, summary.description, summary.range);

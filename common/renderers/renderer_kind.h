@@ -37,6 +37,9 @@ struct CostView {
   double pixels_per_voxel = 1;  // of the frame, for the smallest side of a voxel, > 0
 };
 
+// That of a setup's frame.
+CostView CostViewOf(const FrameSetup& setup);
+
 // The time that boxes of one volume take under one transfer function.
 class AnalyticCost {
  public:

@@ -9,9 +9,6 @@
 namespace slabstream {
 namespace {
 
-// Occupied voxels of a cell that can have an empty neighbour towards the eye: a surface through it.
-constexpr double kSurface = 1.5 * kOccupancyCell * kOccupancyCell;
-
 double Length(const Camera::ImagePoint& a, const Camera::ImagePoint& b) { return std::hypot(a.x - b.x, a.y - b.y); }
 
 // Pixels of the frame that a voxel in the middle of the volume covers.
@@ -35,11 +32,11 @@ double VoxelPixels(const FrameSetup& setup) {
 
 }  // namespace
 
-BoxEstimator::BoxEstimator(const FrameSetup& setup, const OccupancyGrid& occupied, const WorkField* learnt, const CostModel& cost,
+BoxEstimator::BoxEstimator(const FrameSetup& setup, const VolumeSummary& summary, const OccupancyGrid& occupied, const WorkField* measured,
                            std::int32_t pixel_side)
     : setup_(setup),
-      learnt_(learnt),
-      cost_(cost),
+      cost_(*setup.renderer, {&occupied, &summary, &setup.transfer}, measured),
+      view_(CostViewOf(setup)),
       frame_(FrameBounds(setup)),
       pixel_side_(pixel_side),
       size_(occupied.size),
@@ -55,14 +52,9 @@ BoxEstimator::BoxEstimator(const FrameSetup& setup, const OccupancyGrid& occupie
   const CellOccupancy* next = occupied.cells.data();
   for (std::int32_t z = 0; z < fine.z; ++z) {
     for (std::int32_t y = 0; y < fine.y; ++y) {
-      Cell* row = &cell_[(std::size_t(z / factor) * std::size_t(cells_.y) + std::size_t(y / factor)) * std::size_t(cells_.x)];
+      double* const row = &cell_[(std::size_t(z / factor) * std::size_t(cells_.y) + std::size_t(y / factor)) * std::size_t(cells_.x)];
       for (std::int32_t x = 0; x < fine.x; ++x) {
-        const double voxels = (next++)->voxels;
-        if (voxels == 0) continue;
-        const double all = double(OccupancyCellBox({x, y, z}, size_).voxel_count());
-        Cell& cell = row[x / factor];
-        cell.occupied += voxels;
-        cell.surface += std::min({voxels, all - voxels, kSurface});
+        row[x / factor] += (next++)->voxels;
       }
     }
   }
@@ -112,29 +104,26 @@ BoxEstimator::Estimate BoxEstimator::Of(const Box& box) const {
     double hits = 0;  // pixels, each as often as it is hit
   };
   std::vector<Tile> tiles(coverage.share.size());
-  Rectangle bounds = Nothing();
-  double occupied = 0, surface = 0, inside = 0;
+  double occupied = 0, inside = 0;
 
   const auto first = [&](Axis axis) { return box.begin[axis] / side_; };
   const auto last = [&](Axis axis) { return (box.end[axis] - 1) / side_; };
   for (std::int32_t z = first(Axis::kZ); z <= last(Axis::kZ); ++z) {
     for (std::int32_t y = first(Axis::kY); y <= last(Axis::kY); ++y) {
       for (std::int32_t x = first(Axis::kX); x <= last(Axis::kX); ++x) {
-        const Cell& cell = cell_[(std::size_t(z) * std::size_t(cells_.y) + std::size_t(y)) * std::size_t(cells_.x) + std::size_t(x)];
-        if (cell.occupied == 0) continue;
+        const double voxels = cell_[(std::size_t(z) * std::size_t(cells_.y) + std::size_t(y)) * std::size_t(cells_.x) + std::size_t(x)];
+        if (voxels == 0) continue;
         const Box whole = slabstream::Intersection({{x * side_, y * side_, z * side_}, {(x + 1) * side_, (y + 1) * side_, (z + 1) * side_}},
                                                    {{0, 0, 0}, size_});
         const Box part = slabstream::Intersection(whole, box);
         const double share = double(part.voxel_count()) / double(whole.voxel_count());
-        occupied += share * cell.occupied;
+        occupied += share * voxels;
         const Rectangle r = Project(part);
         const Rectangle seen = Intersection(r, frame);
         if (seen.empty()) continue;
         const double seen_share = share * seen.area() / r.area();
-        inside += seen_share * cell.occupied;
-        surface += seen_share * cell.surface;
-        bounds = Hull(bounds, seen);
-        const double hits_a_pixel = share * cell.occupied * voxel_pixels_ / r.area();
+        inside += seen_share * voxels;
+        const double hits_a_pixel = share * voxels * voxel_pixels_ / r.area();
         const auto tile_of = [&](double pixel, std::int32_t count) { return std::min(std::int32_t(pixel / tile_side), count - 1); };
         for (std::int32_t ty = tile_of(seen.y_begin, coverage.tiles_y); ty <= tile_of(seen.y_end, coverage.tiles_y); ++ty) {
           for (std::int32_t tx = tile_of(seen.x_begin, coverage.tiles_x); tx <= tile_of(seen.x_end, coverage.tiles_x); ++tx) {
@@ -158,18 +147,8 @@ BoxEstimator::Estimate BoxEstimator::Of(const Box& box) const {
       coverage.share[number] = float(std::clamp(filled / pixels, 0.0, 1.0));
     }
   }
-  if (learnt_ != nullptr) {
-    estimate.seconds = learnt_->Sum(box);
-  } else if (occupied > 0) {
-    PixelBounds image;
-    if (!bounds.empty()) {
-      image = {std::int32_t(bounds.x_begin), std::int32_t(bounds.y_begin), std::int32_t(std::ceil(bounds.x_end)),
-               std::int32_t(std::ceil(bounds.y_end))};
-    }
-    const double pixels = coverage.pixels() * pixel_side_ * pixel_side_;
-    const double drawn = HasDepth(setup_.format) ? surface : inside;
-    estimate.seconds = cost_.PredictRender(setup_.renderer->name(), CountWork(box, setup_.camera, occupied, drawn, image, pixels));
-  }
+  // Voxels outside the frame are not drawn.
+  if (occupied > 0) estimate.seconds = cost_.Seconds(box, view_) * inside / occupied;
   return estimate;
 }
 

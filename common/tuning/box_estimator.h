@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "common/image/coverage_map.h"
-#include "common/planning/cost_model.h"
+#include "common/planning/cost_estimator.h"
 #include "common/planning/frame_plan.h"
 #include "common/volume/occupancy_grid.h"
 
@@ -18,9 +18,9 @@ class BoxEstimator {
  public:
   static constexpr std::int64_t kMostCells = 32 * 32 * 32;
 
-  // Coverage is that of a frame whose pixels are `pixel_side` x `pixel_side` pixels of the true one each (>= 1). `learnt`: seconds, of
-  // earlier frames; null: the cost model's constants count. What is given must live as long as this.
-  BoxEstimator(const FrameSetup& setup, const OccupancyGrid& occupied, const WorkField* learnt, const CostModel& cost,
+  // Coverage is that of a frame whose pixels are `pixel_side` x `pixel_side` pixels of the true one each (>= 1). `measured`: as
+  // for CostEstimator. What is given must live as long as this.
+  BoxEstimator(const FrameSetup& setup, const VolumeSummary& summary, const OccupancyGrid& occupied, const WorkField* measured,
                std::int32_t pixel_side);
 
   struct Estimate {
@@ -30,10 +30,6 @@ class BoxEstimator {
   Estimate Of(const Box& box) const;  // inside the volume, not empty
 
  private:
-  struct Cell {
-    double occupied = 0;  // voxels
-    double surface = 0;   // occupied voxels with empty ones beside them, about
-  };
   struct Rectangle {
     double x_begin, y_begin, x_end, y_end;  // pixels of the true frame
     bool empty() const { return x_begin >= x_end || y_begin >= y_end; }
@@ -45,15 +41,15 @@ class BoxEstimator {
   Rectangle Project(const Box& box) const;
 
   const FrameSetup& setup_;
-  const WorkField* const learnt_;
-  const CostModel& cost_;
+  const CostEstimator cost_;
+  const CostView view_;
   const PixelBounds frame_;
   const std::int32_t pixel_side_;
   const Index3 size_;
   std::int32_t side_ = kOccupancyCell;  // voxels of a cell
   Index3 cells_;
-  std::vector<Cell> cell_;  // x fastest
-  double voxel_pixels_;     // that a voxel hits
+  std::vector<double> cell_;  // occupied voxels, x fastest
+  double voxel_pixels_;       // that a voxel hits
 };
 
 }  // namespace slabstream

@@ -44,7 +44,7 @@ class Search {
                   .transfer = &setup.transfer,
                   .renderer = setup.renderer,
                   .slots = question.slots,
-                  .slab_bytes_target = question.cost->slab_bytes_target,
+                  .slab_bytes_target = question.slab_bytes_target,
                   .known = question.known}),
         predictor_(predictor),
         asked_(SettledPolicy(*question.frame, question.summary->description.geometry)),
@@ -171,7 +171,7 @@ Result<PolicyChoice> ChoosePolicy(const PolicyQuestion& question) {
   std::optional<OccupancyGrid> visible;
   if (question.known.occupied == nullptr)
     visible = BrickVisibility(*question.summary, setup->renderer->DrawnTable(setup->transfer, *question.summary)).VisibleCells();
-  const FramePredictor predictor(*setup, visible ? *visible : *question.known.occupied, question.known.cost, *question.cost,
+  const FramePredictor predictor(*setup, *question.summary, visible ? *visible : *question.known.occupied, question.known.cost,
                                  *question.machine, question.slots, question.render_scale);
   return Search(question, *setup, predictor).Run();
 }

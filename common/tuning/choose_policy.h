@@ -27,7 +27,7 @@ struct PolicyQuestion {
   WorkKnowledge known;
   std::uint32_t slots = 1;                // workers, [1, kMaxRanks]
   const MachineModel* machine = nullptr;  // valid; see service_machine.h
-  const CostModel* cost = nullptr;
+  std::int64_t slab_bytes_target = kSlabBytesTarget;
   double render_scale = 1;  // by how much longer boxes took so far than was predicted; > 0
   // What holds already, if anything, and fits the frame's policy. It stays unless another one gains that share.
   const ResolvedPolicy* now = nullptr;

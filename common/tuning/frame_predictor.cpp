@@ -67,13 +67,13 @@ MachineModel WithCoarsePixels(MachineModel machine, std::int32_t side) {
 
 }  // namespace
 
-FramePredictor::FramePredictor(const FrameSetup& setup, const OccupancyGrid& occupied, const WorkField* learnt, const CostModel& cost,
-                               const MachineModel& machine, std::uint32_t slots, double render_scale)
+FramePredictor::FramePredictor(const FrameSetup& setup, const VolumeSummary& summary, const OccupancyGrid& occupied,
+                               const WorkField* measured, const MachineModel& machine, std::uint32_t slots, double render_scale)
     : slots_(slots),
       render_scale_(render_scale),
       pixel_side_(ChoosePixelSide(setup, slots)),
       coarse_(Coarse(setup, pixel_side_)),
-      estimator_(setup, occupied, learnt, cost, pixel_side_),
+      estimator_(setup, summary, occupied, measured, pixel_side_),
       finish_seconds_(FinishSeconds(setup)),
       receive_seconds_(kReceivePixel * PicturePixels(setup)),
       machine_(WithCoarsePixels(machine, pixel_side_)),

@@ -21,7 +21,7 @@ class FramePredictor {
   static constexpr std::uint64_t kMostSteps = 8192;  // of a frame: schedules of more are too long to be tried
 
   // `render_scale`: by how much longer boxes took so far than was predicted. What is given must live as long as this.
-  FramePredictor(const FrameSetup& setup, const OccupancyGrid& occupied, const WorkField* learnt, const CostModel& cost,
+  FramePredictor(const FrameSetup& setup, const VolumeSummary& summary, const OccupancyGrid& occupied, const WorkField* measured,
                  const MachineModel& machine, std::uint32_t slots, double render_scale);
 
   // A layout whose boxes are estimated, ready for any scheme.

@@ -220,7 +220,7 @@ Result<FramePlan> PlanOf(ExperimentContext& context, const FrameCase& frame, con
   if (Status status = Validate(request); !status.ok()) return status;
   const Result<VolumeInUse> volume = context.volumes().Get(frame.volume);
   if (!volume.ok()) return volume.status();
-  return PlanFrame(request, kPlannedDataset, *volume->summary, RosterOf(std::uint32_t(frame.workers)), CostModel{},
+  return PlanFrame(request, kPlannedDataset, *volume->summary, RosterOf(std::uint32_t(frame.workers)),
                    std::make_shared<const Layout>(layout));
 }
 
@@ -232,13 +232,11 @@ Result<FrameCase> WithChosenPolicy(ExperimentContext& context, FrameCase frame, 
   if (!knowledge.ok()) return knowledge.status();
   const FrameRequest request = RequestOf(frame);
   const MachineModel machine = ServiceMachine(std::vector<HostedWorker>(std::size_t(frame.workers)), {.link = link});
-  const CostModel cost;
   const Result<PolicyChoice> choice = ChoosePolicy({.frame = &request,
                                                     .summary = knowledge->volume.summary.get(),
                                                     .known = {.occupied = knowledge->occupied.get()},
                                                     .slots = std::uint32_t(frame.workers),
-                                                    .machine = &machine,
-                                                    .cost = &cost});
+                                                    .machine = &machine});
   if (!choice.ok()) return choice.status();
   frame.policy = AskFor(choice->policy);
   return frame;

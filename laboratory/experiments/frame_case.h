@@ -8,13 +8,13 @@
 #include <vector>
 
 #include "common/image/coverage_map.h"
-#include "common/planning/cost_model.h"
 #include "common/planning/frame_plan.h"
 #include "common/planning/layout.h"
 #include "common/simulation/simulate_frames.h"
 #include "common/stats/report.h"
 #include "laboratory/bench/bench_cases.h"
 #include "laboratory/experiments/experiment.h"
+#include "laboratory/measure/cost_model.h"
 
 namespace slabstream {
 

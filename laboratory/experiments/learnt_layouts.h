@@ -6,8 +6,8 @@
 #include <span>
 #include <utility>
 
-#include "laboratory/experiments/frame_case.h"
 #include "coordinator/layout_table.h"
+#include "laboratory/experiments/frame_case.h"
 
 namespace slabstream {
 
@@ -24,8 +24,7 @@ class LearntLayouts {
   // Of the next frame, which may differ in its view alone from the one given to Make. Valid until the next call.
   const Layout& Next(const FrameCase& frame) {
     policy_ = ResolvePolicy(RequestOf(frame), knowledge_.volume.summary->description.geometry).value();
-    layout_ = table_.Find(
-        {&policy_, &volume_, knowledge_.volume.summary.get(), knowledge_.occupied, slots_, CostModel().slab_bytes_target});
+    layout_ = table_.Find({&policy_, &volume_, knowledge_.volume.summary.get(), knowledge_.occupied, slots_});
     return *layout_;
   }
 

@@ -38,7 +38,7 @@ Result<Calibration> CalibrateThisHost(int workers) {
   const Volume sphere = MakeSphere({SphereClass::kFilled, kSlowdownVolume, 0.4}).value();
   FrameRequest request;
   request.dataset = "sphere";
-  const Result<FramePlan> plan = PlanFrame(request, 1, Summarize(sphere), Roster{{1}}, CostModel{});
+  const Result<FramePlan> plan = PlanFrame(request, 1, Summarize(sphere), Roster{{1}});
   if (!plan.ok()) return plan.status();
 
   Calibration calibration{ThisHost(workers), probe.Estimates(), MeasureSlowdown(sphere, plan->setup)};

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "common/base/status.h"
-#include "common/planning/cost_model.h"
+#include "laboratory/measure/cost_model.h"
 
 namespace slabstream {
 

@@ -70,7 +70,7 @@ Result<std::vector<View>> MakeViews(const ValidationCase& what, int count) {
     View& view = views.emplace_back(View{.request = what.request});
     view.request.dataset = kDataset;
     view.request.view.azimuth_degrees = 360.0 * i / count;
-    Result<FramePlan> plan = PlanFrame(view.request, 1, summary, roster, CostModel{});
+    Result<FramePlan> plan = PlanFrame(view.request, 1, summary, roster);
     if (!plan.ok()) return plan.status();
     view.plan = *std::move(plan);
     view.costs = MeasureFrameCosts(*what.volume, view.plan, 1);

@@ -19,7 +19,7 @@ TEST(FrameCosts, FitTheirPlan) {
     request.renderer = renderer->name();
     request.size = {64, 48};
     request.policy.groups = 2;
-    const FramePlan plan = PlanFrame(request, 1, Summarize(volume), Roster{{1, 2, 3}}, CostModel{}).value();
+    const FramePlan plan = PlanFrame(request, 1, Summarize(volume), Roster{{1, 2, 3}}).value();
     const FrameCosts costs = MeasureFrameCosts(volume, plan, 1);
     EXPECT_GT(costs.picture.finish_seconds, 0);
     EXPECT_GT(costs.picture.receive_seconds, 0);

@@ -51,7 +51,7 @@ TEST(PlanRenderings, MeasureEveryBoxOfThePlan) {
   FrameRequest request = what.request;
   request.dataset = "blobs";
   request.policy.groups = 2;
-  const FramePlan plan = PlanFrame(request, 1, Summarize(*what.volume), Roster{{1, 2}}, CostModel{}).value();
+  const FramePlan plan = PlanFrame(request, 1, Summarize(*what.volume), Roster{{1, 2}}).value();
   PlanRenderings renderings(*what.volume, 2);
   const PlanSeconds seconds = renderings.Measure(plan);
   ASSERT_EQ(seconds.boxes.size(), plan.layout->partition.boxes().size());

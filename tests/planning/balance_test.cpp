@@ -84,7 +84,12 @@ struct World {
     FrameRequest request;
     request.policy = policy;
     resolved = ResolvePolicy(request, summary.description.geometry).value();
-    return {.summary = &summary, .transfer = &transfer, .policy = &resolved, .slots = kSlots, .known = {.occupied = &grid, .cost = cost}};
+    return {.summary = &summary,
+            .transfer = &transfer,
+            .policy = &resolved,
+            .renderer = FindRenderer(kDefaultRenderer),
+            .slots = kSlots,
+            .known = {.occupied = &grid, .cost = cost}};
   }
   std::vector<BoxSeconds> Render(const Layout& layout, double noise) {
     const WorkField truth = Truth();

@@ -74,7 +74,7 @@ TEST_F(EmbeddedServiceTest, PictureIsThatOfOneRendererForAnyWorkersAndGroups) {
 std::uint64_t DrawnBehindWithoutMasks(const FrameRequest& request, const Volume& volume, std::uint32_t workers) {
   Roster roster;
   for (WorkerId worker = 1; worker <= workers; ++worker) roster.slots.push_back(worker);
-  const FramePlan plan = PlanFrame(request, 1, Summarize(volume), roster, CostModel{}).value();
+  const FramePlan plan = PlanFrame(request, 1, Summarize(volume), roster).value();
   VoxelBlock copy = MakeVoxelBlock(volume.block.box, volume.block.type);
   copy.bytes = volume.block.bytes;
   SlabData slab(std::move(copy));

@@ -205,7 +205,7 @@ TEST_F(ExecutorTest, RenderIsAnsweredAlsoWhenItIsCancelled) {
   const std::shared_ptr<const Volume> volume = TestSphere(96);
   FrameRequest request = TestRequest(Splatting(), 20);
   request.size = {1024, 1024};
-  const FramePlan plan = PlanFrame(request, 1, Summarize(*volume), Roster{{1}}, CostModel{}).value();
+  const FramePlan plan = PlanFrame(request, 1, Summarize(*volume), Roster{{1}}).value();
   const SlabKey slab{.dataset = 1, .box = volume->block.box, .type = volume->block.type};
   executor_.Perform(OpenSlab{slab});
   const Bytes samples(volume, volume->block.bytes);
@@ -238,7 +238,7 @@ TEST_F(ExecutorTest, WhatIsCopiedFromOtherSlabsIsWhatWouldHaveArrived) {
   const std::shared_ptr<const Volume> volume = TestSphere(96);
   const Box whole = volume->block.box;
   for (const RendererKind* renderer : Renderers()) {
-    const FramePlan plan = PlanFrame(TestRequest(renderer, 20), 1, Summarize(*volume), Roster{{1}}, CostModel{}).value();
+    const FramePlan plan = PlanFrame(TestRequest(renderer, 20), 1, Summarize(*volume), Roster{{1}}).value();
     const auto setup = std::make_shared<const FrameSetup>(plan.setup);
     const auto store = [&](const SlabKey& slab, const Box& box) {
       Chunk chunk{.epoch = 1, .dataset = 1, .box = box, .chunk = 0};

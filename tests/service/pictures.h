@@ -38,7 +38,7 @@ inline FrameRequest TestRequest(const RendererKind* renderer, double azimuth_deg
 
 // The whole volume as one box, without planner's groups, combining or transport.
 inline LocalImage RenderDirectly(const FrameRequest& request, const Volume& volume) {
-  const Result<FramePlan> plan = PlanFrame(request, 1, Summarize(volume), Roster{{1}}, CostModel{});
+  const Result<FramePlan> plan = PlanFrame(request, 1, Summarize(volume), Roster{{1}});
   CHECK(plan.ok()) << plan.status().message();
   VoxelBlock copy = MakeVoxelBlock(volume.block.box, volume.block.type);
   copy.bytes = volume.block.bytes;

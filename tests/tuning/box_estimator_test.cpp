@@ -36,13 +36,13 @@ FrameSetup SetupOf(const Index3& size, const RendererKind* renderer, const ViewP
 
 TEST(BoxEstimator, AnOpaqueBlockSeenFromTheFrontCoversItsRectangle) {
   const Index3 size = {128, 128, 128};
+  const VolumeSummary summary = FullSummary(size);
   const Box block = {{32, 0, 48}, {96, 128, 112}};
   const OccupancyGrid grid = FilledGrid(size, block);
   for (const RendererKind* renderer : Renderers()) {
     const FrameSetup setup = SetupOf(size, renderer);  // along +y
-    const CostModel cost;
     for (const int pixel_side : {1, 3}) {
-      const BoxEstimator estimator(setup, grid, nullptr, cost, pixel_side);
+      const BoxEstimator estimator(setup, summary, grid, nullptr, pixel_side);
       const BoxEstimator::Estimate estimate = estimator.Of({{0, 0, 0}, size});
       const double pixels = estimate.coverage.pixels() * pixel_side * pixel_side;
       // 64 x 64 voxels, as large as they are in the frame; footprints reach a voxel further.
@@ -62,10 +62,10 @@ TEST(BoxEstimator, AnOpaqueBlockSeenFromTheFrontCoversItsRectangle) {
 
 TEST(BoxEstimator, BoxesWithoutAnythingCostAndShowNothing) {
   const Index3 size = {64, 64, 64};
+  const VolumeSummary summary = FullSummary(size);
   const OccupancyGrid grid = FilledGrid(size, {{0, 0, 0}, {64, 64, 16}});
   const FrameSetup setup = SetupOf(size, Splatting());
-  const CostModel cost;
-  const BoxEstimator estimator(setup, grid, nullptr, cost, 1);
+  const BoxEstimator estimator(setup, summary, grid, nullptr, 1);
   const BoxEstimator::Estimate nothing = estimator.Of({{0, 0, 16}, {64, 64, 64}});
   EXPECT_EQ(nothing.seconds, 0);
   EXPECT_EQ(nothing.coverage.pixels(), 0);
@@ -75,7 +75,7 @@ TEST(BoxEstimator, SharesAreSharesAndBoxesCoverWhatTheWholeCovers) {
   Random random(4711);
   SCOPED_TRACE(random.trace());
   const Index3 size = {90, 77, 133};
-  const CostModel cost;
+  const VolumeSummary summary = FullSummary(size);
   for (int round = 0; round < 20; ++round) {
     OccupancyGrid grid{size, {}};
     const Index3 cells = OccupancyCells(size);
@@ -90,7 +90,7 @@ TEST(BoxEstimator, SharesAreSharesAndBoxesCoverWhatTheWholeCovers) {
       }
     }
     const FrameSetup setup = SetupOf(size, random.Chance(0.5) ? Splatting() : ZBuffer(), RandomView(random));
-    const BoxEstimator estimator(setup, grid, nullptr, cost, random.Integer(1, 4));
+    const BoxEstimator estimator(setup, summary, grid, nullptr, random.Integer(1, 4));
     const BoxEstimator::Estimate whole = estimator.Of({{0, 0, 0}, size});
     double sum = 0;
     const WorkField work(grid);
@@ -108,12 +108,12 @@ TEST(BoxEstimator, SharesAreSharesAndBoxesCoverWhatTheWholeCovers) {
 
 TEST(BoxEstimator, WhatWasLearntCounts) {
   const Index3 size = {64, 64, 64};
+  const VolumeSummary summary = FullSummary(size);
   const OccupancyGrid grid = FilledGrid(size, {{0, 0, 0}, size});
   const std::vector<double> seconds(grid.cells.size(), 0.5);
   const WorkField learnt(size, seconds);
   const FrameSetup setup = SetupOf(size, ZBuffer());
-  const CostModel cost;
-  const BoxEstimator estimator(setup, grid, &learnt, cost, 1);
+  const BoxEstimator estimator(setup, summary, grid, &learnt, 1);
   EXPECT_NEAR(estimator.Of({{0, 0, 0}, {64, 64, 32}}).seconds, 0.5 * 8 * 8 * 4, 1e-6);
 }
 

@@ -53,13 +53,13 @@ struct Question {
   FrameRequest request = SomeRequest();
   VolumeSummary summary;
   MachineModel machine = ServiceMachine({}, {});
-  CostModel cost;
+  std::int64_t slab_bytes_target = kSlabBytesTarget;
   std::uint32_t slots = 1;
 
   PolicyChoice Choose(const Policy& policy) {
     request.policy = policy;
     Result<PolicyChoice> choice =
-        ChoosePolicy({.frame = &request, .summary = &summary, .slots = slots, .machine = &machine, .cost = &cost});
+        ChoosePolicy({.frame = &request, .summary = &summary, .slots = slots, .machine = &machine, .slab_bytes_target = slab_bytes_target});
     EXPECT_TRUE(choice.ok()) << choice.status().message();
     return *choice;
   }
@@ -113,7 +113,7 @@ TEST_P(ChoosePolicyTest, MakesPlansOfAnyVolumeAndKeepsWhatIsFixed) {
       EXPECT_EQ(got.balance, asked.balance);
 
       question.request.policy = got;
-      EXPECT_TRUE(PlanFrame(question.request, 1, question.summary, FullRoster(GetParam()), question.cost).ok());
+      EXPECT_TRUE(PlanFrame(question.request, 1, question.summary, FullRoster(GetParam())).ok());
       EXPECT_TRUE(SameChoice(choice, question.Choose(asked))) << "chosen otherwise the second time";
 
       // What would hold without choosing is one of the candidates.
@@ -143,7 +143,7 @@ TEST(ChoosePolicy, KeepsWhatHoldsUnlessEnoughIsGained) {
                        .summary = &question.summary,
                        .slots = question.slots,
                        .machine = &question.machine,
-                       .cost = &question.cost,
+                       .slab_bytes_target = question.slab_bytes_target,
                        .now = &now,
                        .least_gain = 0.95};
   EXPECT_EQ(ChoosePolicy(asked)->policy.decomposition, now.decomposition);
@@ -153,16 +153,16 @@ TEST(ChoosePolicy, KeepsWhatHoldsUnlessEnoughIsGained) {
 
 TEST(ChoosePolicy, SlabsOfAllCandidatesFitTheBudget) {
   Question question{.summary = FullSummary({256, 256, 256}), .slots = 2};
-  question.cost.slab_bytes_target = 3 << 20;
+  question.slab_bytes_target = 3 << 20;
   for (const DecompositionEntry& entry : Decompositions()) {
     Policy asked = Automatic();
     asked.decomposition = entry.name;
     const PolicyChoice choice = question.Choose(asked);
     const TransferFunction transfer = ResolveTransfer(question.request.transfer, question.summary).value();
-    const Layout layout =
-        MakeLayout({.summary = &question.summary, .transfer = &transfer, .policy = &choice.policy, .slots = question.slots});
+    const Layout layout = MakeLayout(
+        {.summary = &question.summary, .transfer = &transfer, .policy = &choice.policy, .renderer = Splatting(), .slots = question.slots});
     for (const Box& box : layout.partition.boxes()) {
-      EXPECT_LE(Grown(box, kHalo, layout.partition.bounds()).voxel_count(), question.cost.slab_bytes_target)
+      EXPECT_LE(Grown(box, kHalo, layout.partition.bounds()).voxel_count(), question.slab_bytes_target)
           << entry.name << ", " << choice.policy.groups << " groups";
     }
   }
@@ -198,7 +198,10 @@ TEST(ChoosePolicy, TellsWhatIsWrongWithARequest) {
   Question question{.summary = FullSummary({64, 64, 64})};
   question.request.policy = Automatic();
   question.request.transfer.choice = std::string("no such preset");
-  EXPECT_EQ(ChoosePolicy({.frame = &question.request, .summary = &question.summary, .machine = &question.machine, .cost = &question.cost})
+  EXPECT_EQ(ChoosePolicy({.frame = &question.request,
+                          .summary = &question.summary,
+                          .machine = &question.machine,
+                          .slab_bytes_target = question.slab_bytes_target})
                 .status()
                 .code(),
             StatusCode::kNotFound);

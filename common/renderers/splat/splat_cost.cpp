@@ -45,10 +45,18 @@ double MedianExtinction(const TransferFunction& transfer, const VolumeSummary& s
   return 0;
 }
 
-double SplatCost::Seconds(const Box& box, const CostView& view) const {
-  const SplatCounts counts = work_.Count(box, view.along);
+// Counts are those at a pixel a voxel. At another scale there are as many more rows, and segments are as much longer.
+double SplatCost::SecondsAlong(const Box& box, Axis along, double scale) const {
+  const SplatCounts counts = work_.Count(box, along);
   if (counts.rows == 0) return 0;
-  return kBox + kSlice * counts.slices + kRow * counts.rows + kSegment * counts.segments + kRun * counts.runs + kOctet * counts.octets;
+  return kBox + kSlice * counts.slices + scale * (kRow * counts.rows + scale * kSegment * counts.segments + kRun * counts.runs) +
+         kOctet * counts.octets;
+}
+
+double SplatCost::Seconds(const Box& box, const CostView& view) const {
+  const double scale = std::clamp(view.pixels_per_voxel, kMinGridPixelsPerVoxel, kMaxGridPixelsPerVoxel);
+  if (view.along != Axis::kZ) return SecondsAlong(box, view.along, scale);
+  return (SecondsAlong(box, Axis::kX, scale) + SecondsAlong(box, Axis::kY, scale)) / 2;  // lines along z are not known
 }
 
 }  // namespace slabstream::splat

@@ -20,6 +20,8 @@ class SplatCost : public AnalyticCost {
   double Seconds(const Box& box, const CostView& view) const override;
 
  private:
+  double SecondsAlong(const Box& box, Axis along, double scale) const;
+
   const SplatWork work_;
 };
 

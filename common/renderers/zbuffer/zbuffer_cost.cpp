@@ -11,7 +11,7 @@ constexpr double kBox = 1.5e-6, kSurfaceCell = 230e-9, kPixel = 1.5e-9;
 
 }  // namespace
 
-double ZBufferCost::Seconds(const Box& box, const CostView& /*view*/) const {
+double ZBufferCost::Seconds(const Box& box, const CostView& view) const {
   const CellRange x(box, Axis::kX), y(box, Axis::kY), z(box, Axis::kZ);
   const Index3 cells = OccupancyCells(drawn_.size);
   double surface_cells = 0;
@@ -34,7 +34,7 @@ double ZBufferCost::Seconds(const Box& box, const CostView& /*view*/) const {
   // third of what lies flat is seen.
   const Index3 size = hull.size();
   const double width = 0.64 * (size.x + size.y), pixels = width * (size.z + width / 3);
-  return kBox + kSurfaceCell * surface_cells + kPixel * pixels;
+  return kBox + kSurfaceCell * surface_cells + kPixel * pixels * view.pixels_per_voxel * view.pixels_per_voxel;
 }
 
 }  // namespace slabstream::zbuffer

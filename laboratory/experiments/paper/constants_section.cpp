@@ -118,8 +118,8 @@ Table TableOf(const std::string& name, const std::string& title, const std::vect
   return table;
 }
 
-// The model of our own stages (common/planning/cost_model.h), fitted to every slab of every N and p. Stages that took no time anywhere, as
-// in very small runs, are left out.
+// The model of our own stages (laboratory/measure/cost_model.h), fitted to every slab of every N and p. Stages that took no time anywhere,
+// as in very small runs, are left out.
 struct Fit {
   Table table;
   std::string errors;  // "shade 4 %, splat 12 %"

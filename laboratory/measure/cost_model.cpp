@@ -1,4 +1,4 @@
-#include "common/planning/cost_model.h"
+#include "laboratory/measure/cost_model.h"
 
 #include "common/volume/summary.h"
 

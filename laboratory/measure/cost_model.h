@@ -1,5 +1,6 @@
-// CostModel: what rendering a box takes, from how much there is to do in it. The paper's Eq. 20 and 25 (Yagel and Machiraju), stage by
-// stage, in the units that our pipelines count:
+// CostModel: the time of each stage of rendering a box, as the paper models it (Yagel and Machiraju, Eq. 20 and 25), in the units that our
+// renderers count. Experiments fit its constants and print them beside the paper's. Plans do not use it: they ask AnalyticCost
+// (common/renderers/renderer_kind.h).
 //
 //   paper                             here, a box                                  why
 //   c_t N^3/p  transform              kOccupied, kSheetPixel                       empty voxels are not transformed
@@ -22,7 +23,6 @@
 #include <string_view>
 #include <vector>
 
-#include "common/frame/frame_request.h"
 #include "common/image/pixel_bounds.h"
 #include "common/stats/report.h"
 #include "common/view/camera.h"
@@ -61,8 +61,6 @@ struct CostModel {
   CostModel();
   const std::vector<StageCost>& stages(std::string_view renderer) const;         // none: no constants were measured
   double PredictRender(std::string_view renderer, const WorkUnits& work) const;  // all stages
-
-  std::int64_t slab_bytes_target = std::int64_t{256} << 20;  // voxels of one slab at most, where slices allow it
 };
 
 }  // namespace slabstream
