@@ -6,7 +6,8 @@
 
 #include <memory>
 
-#include "common/tuning/service_machine.h"
+#include "common/planning/cost_model.h"
+#include "coordinator/tuning/service_machine.h"
 #include "coordinator/layout_table.h"
 #include "coordinator/plan_request.h"
 #include "coordinator/policy_table.h"

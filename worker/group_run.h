@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -106,7 +107,7 @@ class GroupRun {
   Status failure_;
   Runner runner_;
   std::map<Rank, RankState> ranks_;                      // of this worker
-  std::map<std::uint32_t, Arrivals> arrivals_;           // by step, of steps that are not complete
+  std::unordered_map<std::uint32_t, Arrivals> arrivals_;  // by step, of steps that are not complete
   std::vector<std::pair<ImageHandle, Rank>> combining_;  // StartCombine without CombineDone
   bool root_done_ = false;
   Arrivals group_pieces_;           // display worker

@@ -9,7 +9,7 @@
 #include "client/cli/option_groups.h"
 #include "common/planning/policy_names.h"
 #include "common/transport/endpoint.h"
-#include "common/tuning/service_machine.h"
+#include "coordinator/tuning/service_machine.h"
 
 namespace slabstream {
 namespace {

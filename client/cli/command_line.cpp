@@ -15,6 +15,9 @@
 #include "common/base/log.h"
 #include "common/base/version.h"
 #include "common/kernels/simd_target.h"
+#include "common/planning/policy_names.h"
+#include "common/transport/endpoint.h"
+#include "coordinator/tuning/service_machine.h"
 
 namespace slabstream {
 namespace {

@@ -6,7 +6,8 @@
 #include <vector>
 
 #include "common/planning/frame_plan.h"
-#include "common/simulation/simulate_frames.h"
+#include "common/simulation/cost_fit.h"
+#include "simulator/simulate_frames.h"
 #include "common/wire/payload.h"
 #include "laboratory/measure/box_costs.h"
 #include "laboratory/measure/cost_fit.h"

@@ -15,7 +15,7 @@
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
 #include "common/renderers/renderer_kind.h"
-#include "common/simulation/simulate_frames.h"
+#include "simulator/simulate_frames.h"
 #include "laboratory/measure/calibrate.h"
 #include "laboratory/measure/combining_costs.h"
 

@@ -8,6 +8,7 @@
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
 #include "common/planning/learnt_cost.h"
+#include "common/renderers/registry.h"
 #include "tests/planning/support.h"
 #include "tests/support/random.h"
 
