@@ -7,17 +7,17 @@
 #include <map>
 #include <random>
 
-#include "laboratory/experiments/experiment.h"
-#include "laboratory/experiments/machines.h"
-#include "laboratory/experiments/plots.h"
-#include "laboratory/experiments/policies.h"
-#include "laboratory/report/charts.h"
-#include "laboratory/report/text.h"
-#include "laboratory/measure/thread_time.h"
 #include "common/base/check.h"
 #include "common/combining/schemes.h"
 #include "common/decomposition/decomposition.h"
 #include "common/kernels/combine.h"
+#include "laboratory/experiments/experiment.h"
+#include "laboratory/experiments/machines.h"
+#include "laboratory/experiments/plots.h"
+#include "laboratory/experiments/policies.h"
+#include "laboratory/measure/thread_time.h"
+#include "laboratory/report/charts.h"
+#include "laboratory/report/text.h"
 
 namespace slabstream {
 namespace {

@@ -9,9 +9,6 @@
 
 #include "client/cli/frame_summary.h"
 #include "client/cli/session.h"
-#include "laboratory/measure/box_costs.h"
-#include "laboratory/measure/frame_costs.h"
-#include "laboratory/measure/validate.h"
 #include "common/base/check.h"
 #include "common/planning/frame_window.h"
 #include "common/planning/placement.h"
@@ -19,6 +16,9 @@
 #include "common/planning/team.h"
 #include "common/tuning/choose_policy.h"
 #include "common/tuning/service_machine.h"
+#include "laboratory/measure/box_costs.h"
+#include "laboratory/measure/frame_costs.h"
+#include "laboratory/measure/validate.h"
 
 namespace slabstream {
 namespace {

@@ -6,8 +6,8 @@
 #include <span>
 #include <utility>
 
-#include "laboratory/experiments/frame_case.h"
 #include "coordinator/layout_table.h"
+#include "laboratory/experiments/frame_case.h"
 
 namespace slabstream {
 

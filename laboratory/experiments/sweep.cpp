@@ -3,15 +3,15 @@
 #include <algorithm>
 
 #include "common/base/files.h"
+#include "common/planning/policy_names.h"
 #include "laboratory/experiments/balanced_case.h"
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/figures.h"
 #include "laboratory/experiments/machines.h"
 #include "laboratory/experiments/plots.h"
+#include "laboratory/experiments/sweep_file.h"
 #include "laboratory/report/charts.h"
 #include "laboratory/report/text.h"
-#include "laboratory/experiments/sweep_file.h"
-#include "common/planning/policy_names.h"
 
 namespace slabstream {
 namespace {

@@ -6,9 +6,9 @@
 
 #include "laboratory/experiments/paper/setup.h"
 #include "laboratory/experiments/plots.h"
-#include "laboratory/report/charts.h"
 #include "laboratory/measure/splat_loops.h"
 #include "laboratory/measure/thread_time.h"
+#include "laboratory/report/charts.h"
 
 namespace slabstream {
 namespace {

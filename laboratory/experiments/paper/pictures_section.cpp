@@ -2,10 +2,10 @@
 
 #include <filesystem>
 
-#include "common/base/files.h"
 #include "client/cli/session.h"
-#include "laboratory/experiments/paper/setup.h"
 #include "client/image_io/image_writer.h"
+#include "common/base/files.h"
+#include "laboratory/experiments/paper/setup.h"
 
 namespace slabstream {
 namespace {

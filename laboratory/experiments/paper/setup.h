@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "laboratory/experiments/frame_case.h"
 #include "common/simulation/machine_model.h"
+#include "laboratory/experiments/frame_case.h"
 
 namespace slabstream {
 
