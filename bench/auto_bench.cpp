@@ -26,7 +26,6 @@
 #include "common/planning/learnt_cost.h"
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
-#include "common/planning/render_work.h"
 #include "common/renderers/registry.h"
 #include "simulator/simulate_frames.h"
 #include "coordinator/tuning/choose_policy.h"

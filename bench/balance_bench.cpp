@@ -15,7 +15,6 @@
 #include "common/planning/balance.h"
 #include "common/planning/learnt_cost.h"
 #include "common/planning/placement.h"
-#include "common/planning/render_work.h"
 #include "common/renderers/registry.h"
 #include "simulator/simulate_frames.h"
 #include "common/volume/sphere.h"

@@ -3,10 +3,10 @@
 
     check_includes.py ROOT TARGETS
 
-TARGETS is written by SlabstreamIncludeCheck.cmake. A file may use what its target links, what those targets link publicly, and so on. A header
-that other targets include may use only what its target links publicly. A header belongs to the target that compiles the source of the same
-name; if none does, to the targets of its folder, or of the next folder above that has any. Headers without a source below tests/ belong to
-whoever includes them. Prints a line for each violation; exit status 1 if there is any.
+TARGETS is written by SlabstreamIncludeCheck.cmake. A file may use what its target links, what those targets link publicly, and so
+on. A header that other targets include may use only what its target links publicly. A header belongs to the target that compiles
+the source of the same name; if none does, to the targets of its folder, or of the next folder above that has any. Headers without
+a source below tests/ belong to whoever includes them. Prints a line for each violation; exit status 1 if there is any.
 """
 import re
 import sys

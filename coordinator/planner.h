@@ -6,7 +6,6 @@
 
 #include <memory>
 
-#include "common/planning/cost_model.h"
 #include "coordinator/tuning/service_machine.h"
 #include "coordinator/layout_table.h"
 #include "coordinator/plan_request.h"

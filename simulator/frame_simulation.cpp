@@ -387,7 +387,7 @@ void FrameSimulation::Transfer(Parcel* parcel) {
   const CombiningCosts& costs = machine_.combining;
   SimulatedMessage& message = parcel->message;
   const UnionCoverage::Amount& amount = parcel->amount;
-  const bool rgba = FormatOf(plan(message.frame).setup.renderer) == PixelFormat::kRgba;
+  const bool rgba = !HasDepth(plan(message.frame).setup.format);
   const double color_share = double(BytesPerChannel(parcel->color)) / double(BytesPerChannel(ColorCoding::kFloat32));
   message.pixels = amount.filled;
   message.bytes = amount.filled * (rgba ? costs.rgba_bytes * color_share : costs.depth_bytes) + amount.runs * costs.run_bytes;

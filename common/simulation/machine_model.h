@@ -1,5 +1,5 @@
-// MachineModel: the machine that frames are simulated on. Rendering is not in it: what a box costs is measured (laboratory/measure) and comes with
-// the frame. All times are seconds of one thread of a worker of speed 1.
+// MachineModel: the machine that frames are simulated on. Rendering is not in it: what a box costs is measured (laboratory/measure) and
+// comes with the frame. All times are seconds of one thread of a worker of speed 1.
 #pragma once
 
 #include <cstdint>

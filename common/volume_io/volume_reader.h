@@ -1,6 +1,7 @@
 // Volume files to volumes: NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd; .nhdr with a detached data file; raw or gzip), MetaImage (.mhd, .mha; raw
 // or zlib), and TIFF (a directory of slices, one file a slice, in natural order of their names; or one multi-page file). Truncated and
-// damaged files are found before and while memory is taken for them. During reading a volume needs its bytes in the file and, where samples become narrower, its kept bytes on top.
+// damaged files are found before and while memory is taken for them. During reading a volume needs its bytes in the file and, where samples
+// become narrower, its kept bytes on top.
 //
 // Samples are kept as uint8, uint16 or float32, without losing what was in the file: int8 and int16 are shifted into the unsigned type
 // (ValueMapping.offset); uint32, int32, uint64, int64 and float64 become uint16 if all their values are integers that fit after a shift,

@@ -5,18 +5,18 @@
 #include <map>
 #include <numeric>
 
+#include "common/planning/assignment.h"
+#include "common/planning/balance.h"
+#include "common/planning/policy_names.h"
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/figures.h"
 #include "laboratory/experiments/learnt_layouts.h"
 #include "laboratory/experiments/machines.h"
 #include "laboratory/experiments/plots.h"
 #include "laboratory/experiments/policies.h"
+#include "laboratory/measure/box_costs.h"
 #include "laboratory/report/charts.h"
 #include "laboratory/report/text.h"
-#include "laboratory/measure/box_costs.h"
-#include "common/planning/assignment.h"
-#include "common/planning/balance.h"
-#include "common/planning/policy_names.h"
 
 namespace slabstream {
 namespace {

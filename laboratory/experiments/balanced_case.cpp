@@ -1,8 +1,8 @@
 #include "laboratory/experiments/balanced_case.h"
 
+#include "common/planning/policy_names.h"
 #include "laboratory/experiments/learnt_layouts.h"
 #include "laboratory/measure/box_costs.h"
-#include "common/planning/policy_names.h"
 
 namespace slabstream {
 namespace {

@@ -8,10 +8,10 @@
 #include <string_view>
 #include <vector>
 
-#include "laboratory/report/document.h"
+#include "common/base/status.h"
 #include "laboratory/experiments/trials.h"
 #include "laboratory/experiments/volumes.h"
-#include "common/base/status.h"
+#include "laboratory/report/document.h"
 
 namespace slabstream {
 

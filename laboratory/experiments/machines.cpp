@@ -2,9 +2,9 @@
 
 #include <tbb/task_arena.h>
 
+#include "common/base/check.h"
 #include "laboratory/measure/calibrate.h"
 #include "laboratory/measure/combining_costs.h"
-#include "common/base/check.h"
 
 namespace slabstream {
 namespace {

@@ -3,13 +3,13 @@
 
 #include <string_view>
 
-#include "laboratory/experiments/frame_case.h"
 #include "common/simulation/machine_model.h"
+#include "laboratory/experiments/frame_case.h"
 
 namespace slabstream {
 
-// Measures this machine's constants as the simulation wants to know them (laboratory/measure/calibrate.h), but for pixels that travel between
-// hosts.
+// Measures this machine's constants as the simulation wants to know them (laboratory/measure/calibrate.h), but for pixels that travel
+// between hosts.
 Trial HostTrial();
 
 // A host for each worker, of kCoresAHost cores of this machine's speed, joined by `link`: one core for rendering, one for all else.

@@ -3,10 +3,10 @@
 
 #include <string>
 
+#include "common/simulation/timeline.h"
 #include "laboratory/experiments/frame_case.h"
 #include "laboratory/report/axis.h"
 #include "laboratory/report/document.h"
-#include "common/simulation/timeline.h"
 
 namespace slabstream {
 

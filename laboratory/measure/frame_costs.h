@@ -6,11 +6,10 @@
 #include <vector>
 
 #include "common/planning/frame_plan.h"
-#include "common/simulation/cost_fit.h"
+#include "laboratory/measure/cost_fit.h"
 #include "simulator/simulate_frames.h"
 #include "common/wire/payload.h"
 #include "laboratory/measure/box_costs.h"
-#include "laboratory/measure/cost_fit.h"
 #include "laboratory/measure/lab_worker.h"
 
 namespace slabstream {

@@ -7,8 +7,8 @@
 #include <variant>
 #include <vector>
 
-#include "laboratory/report/table.h"
 #include "common/base/status.h"
+#include "laboratory/report/table.h"
 
 namespace slabstream {
 

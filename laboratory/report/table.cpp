@@ -6,9 +6,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "common/base/check.h"
 #include "laboratory/report/base64.h"
 #include "laboratory/report/text.h"
-#include "common/base/check.h"
 
 namespace slabstream {
 namespace {

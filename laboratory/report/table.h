@@ -7,8 +7,8 @@
 #include <variant>
 #include <vector>
 
-#include "laboratory/report/origin.h"
 #include "laboratory/measure/statistics.h"
+#include "laboratory/report/origin.h"
 
 namespace slabstream {
 

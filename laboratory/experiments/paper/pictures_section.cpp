@@ -2,9 +2,9 @@
 
 #include <filesystem>
 
-#include "common/base/files.h"
 #include "client/cli/session.h"
 #include "client/image_io/image_writer.h"
+#include "common/base/files.h"
 #include "common/renderers/registry.h"
 #include "laboratory/experiments/paper/setup.h"
 

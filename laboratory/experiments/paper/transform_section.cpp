@@ -7,9 +7,9 @@
 #include "laboratory/experiments/paper/printed.h"
 #include "laboratory/experiments/paper/setup.h"
 #include "laboratory/experiments/plots.h"
-#include "laboratory/report/charts.h"
 #include "laboratory/measure/thread_time.h"
 #include "laboratory/measure/transform_loops.h"
+#include "laboratory/report/charts.h"
 
 namespace slabstream {
 namespace {
