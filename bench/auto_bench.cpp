@@ -102,7 +102,7 @@ class Truth {
     FrameRequest request = subject_.request;
     request.policy = policy;
     const auto layout = std::make_shared<const Layout>(LayoutBy(policy, cost));
-    const FramePlan plan = PlanFrame(request, 1, subject_.summary, roster_, {}, layout).value();
+    const FramePlan plan = PlanFrame(request, 1, subject_.summary, roster_, layout).value();
     const std::vector<BoxCost>& boxes = Measure(*plan.layout);
     FrameInput input{.plan = &plan, .finish_seconds = picture_.finish_seconds, .receive_seconds = picture_.receive_seconds};
     for (const BoxCost& box : boxes) input.boxes.push_back({box.seconds, box.coverage.share.empty() ? nullptr : &box.coverage, 0});

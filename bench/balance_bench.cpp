@@ -56,7 +56,7 @@ FrameRequest MakeRequest(const Options& options, int view) {
 
 FramePlan MakePlan(const Options& options, const VolumeSummary& summary, int view, std::shared_ptr<const Layout> layout = nullptr) {
   const Roster roster = RosterOf(layout == nullptr ? 1 : std::uint32_t(options.slots));
-  return PlanFrame(MakeRequest(options, view), 1, summary, roster, {}, std::move(layout)).value();
+  return PlanFrame(MakeRequest(options, view), 1, summary, roster, std::move(layout)).value();
 }
 
 FrameSetup MakeSetup(const Options& options, const VolumeSummary& summary, int view) { return MakePlan(options, summary, view).setup; }
@@ -80,7 +80,7 @@ Measured Measure(const Options& options, const Volume& volume, const FrameSetup&
   Measured measured;
   measured.by_box.resize(layout.owners.size());
   std::vector<double> slots(std::size_t(options.slots));
-  const std::vector<AnalyticCost> costs = MeasureBoxCosts(volume, setup, boxes, options.repeats);
+  const std::vector<BoxCost> costs = MeasureBoxCosts(volume, setup, boxes, options.repeats);
   for (std::size_t i = 0; i < costs.size(); ++i) {
     measured.boxes.push_back({costs[i].box, costs[i].seconds});
     measured.sum += costs[i].seconds;

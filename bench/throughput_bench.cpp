@@ -82,7 +82,7 @@ Planned Plan(const Subject& subject, const Policy& policy, int workers, int fram
   FrameRequest request = subject.request;
   request.policy = policy;
   const ResolvedPolicy resolved = ResolvePolicy(request, subject.summary.description.geometry).value();
-  const ClassifiedVolume volume(1, subject.transfer, request.renderer);
+  const ClassifiedVolume volume(1, subject.transfer, FindRenderer(request.renderer));
   LayoutTable layouts;
   Planned planned;
   for (int frame = 0; frame < frames; ++frame) {

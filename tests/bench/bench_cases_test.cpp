@@ -1,3 +1,4 @@
+#include "common/planning/validate_request.h"
 #include "laboratory/bench/bench_cases.h"
 
 #include <gmock/gmock.h>

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "common/image/local_image.h"
 #include "tests/support/random.h"
 
 namespace slabstream {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "common/image/local_image.h"
 #include "tests/support/random.h"
 
 namespace slabstream {

@@ -4,6 +4,7 @@
 
 #include <limits>
 
+#include "common/image/local_image.h"
 #include "tests/support/random_image.h"
 
 namespace slabstream {

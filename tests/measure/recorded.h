@@ -15,7 +15,7 @@ inline std::vector<RecordedFrame> RandomRecording(Random& random, int frames, st
   double now = 0;
   for (int i = 0; i < frames; ++i) {
     RecordedFrame& frame = recording.emplace_back();
-    frame.renderer = (random.Chance(0.5) ? Splatting() : ZBuffer())->name();
+    frame.renderer = random.Chance(0.5) ? Splatting() : ZBuffer();
     frame.grid = {0, 0, random.Integer(1, 100), random.Integer(1, 100)};
     frame.workers = workers;
     frame.display = random.Integer<WorkerId>(1, workers);

@@ -12,6 +12,7 @@
 #include "common/planning/classified_volume.h"
 #include "common/planning/frame_plan.h"
 #include "common/planning/policy_names.h"
+#include "common/planning/validate_request.h"
 #include "tests/planning/support.h"
 #include "tests/support/check_schedule.h"
 #include "tests/support/random.h"

@@ -61,7 +61,7 @@ TEST_F(EmbeddedServiceTest, PictureIsThatOfOneRendererForAnyWorkersAndGroups) {
     Client client = Connect();
     for (const RendererKind* renderer : Renderers()) {
       for (const int groups : {1, 2, 5}) {
-        SCOPED_TRACE(testing::Message() << workers << " workers, " << groups << " groups, renderer " << int(renderer));
+        SCOPED_TRACE(testing::Message() << workers << " workers, " << groups << " groups, renderer " << renderer->name());
         const FrameStatistics statistics = ExpectRightPicture(client, TestRequest(renderer, 30, groups));
         EXPECT_EQ(statistics.groups, std::uint32_t(groups));
         EXPECT_EQ(statistics.attempts, 1U);
@@ -82,7 +82,7 @@ std::uint64_t DrawnBehindWithoutMasks(const FrameRequest& request, const Volume&
   RankReport report;
   for (std::size_t group = 2; group < plan.groups.size(); ++group) {
     for (const Placement& placement : plan.groups[group].placements) {
-      EXPECT_TRUE(MakeRenderer(*plan->setup.renderer)->Render(slab, placement.box, plan.setup, {}, cancelled, report).ok());
+      EXPECT_TRUE(MakeRenderer(*plan.setup.renderer)->Render(slab, placement.box, plan.setup, {}, cancelled, report).ok());
     }
   }
   return report.drawn_voxels;
@@ -130,7 +130,7 @@ TEST_F(EmbeddedServiceTest, ThreadsAndWorkersGiveTheSamePicture) {
       if (!first) first = picture;
       return LargestDifference(first->image, picture.image, request.size);
     };
-    SCOPED_TRACE(testing::Message() << "renderer " << int(renderer));
+    SCOPED_TRACE(testing::Message() << "renderer " << renderer->name());
     for (const int threads : {1, 2, 3}) EXPECT_EQ(difference(1, threads), 0) << threads << " threads";
     EXPECT_LE(difference(2, 1), AllowedDifference(request));
     EXPECT_LE(difference(2, 3), AllowedDifference(request));

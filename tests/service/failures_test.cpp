@@ -110,7 +110,7 @@ INSTANTIATE_TEST_SUITE_P(Tasks, TaskFailuresTest, testing::Values("slab", "rende
                          [](const auto& test) { return std::string(test.param); });
 
 TEST_F(FailuresTest, ARendererThatThrowsIsReportedWithWhatItSaid) {
-  Start({TaskHook(), TaskHook()}, [](RendererKind) -> std::unique_ptr<Renderer> { throw std::runtime_error("no such shader"); });
+  Start({TaskHook(), TaskHook()}, [](const RendererKind&) -> std::unique_ptr<Renderer> { throw std::runtime_error("no such shader"); });
   ExpectFailure(Render(), StatusCode::kInternal, "render: no such shader");
 }
 

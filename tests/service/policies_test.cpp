@@ -64,7 +64,7 @@ TEST_P(PoliciesTest, NeverChangeThePicture) {
           const std::vector<std::string_view> schemes = WithAutomatic(CombiningSchemes());
           request.policy.combine = schemes[frame % schemes.size()];
           request.policy.groups = 1 + int(frame % 3);
-          SCOPED_TRACE(testing::Message() << GetParam() << " workers, renderer " << int(renderer) << ", projection " << int(projection)
+          SCOPED_TRACE(testing::Message() << GetParam() << " workers, renderer " << renderer->name() << ", projection " << int(projection)
                                           << ", " << request.policy.groups << " groups, " << request.policy.decomposition << ", "
                                           << request.policy.split << ", " << request.policy.assignment << ", " << request.policy.balance
                                           << ", " << request.policy.combine);

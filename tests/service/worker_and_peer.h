@@ -10,6 +10,7 @@
 
 #include "common/wire/payload.h"
 #include "tests/support/random_image.h"
+#include "tests/support/renderers.h"
 #include "worker/service.h"
 
 namespace slabstream {

@@ -30,7 +30,7 @@ class MadeFrame {
   MadeFrame(std::uint32_t workers, std::uint32_t groups, std::int32_t side, double share, double seconds, const std::string& combining,
             const RendererKind* renderer = ZBuffer())
       : coverage_(UniformCoverage({0, 0, side, side}, share * side * side, side, side)) {
-    plan_.SetRenderer(*renderer, setup);
+    SetRenderer(*renderer, plan_.setup);
     plan_.setup.camera.width = plan_.setup.camera.height = side;
     plan_.setup.sheets.width = plan_.setup.sheets.height = side;
     plan_.slots = workers;

@@ -1,3 +1,4 @@
+#include "common/image/run_image.h"
 #include "common/simulation/union_coverage.h"
 
 #include <gtest/gtest.h>

@@ -75,7 +75,7 @@ TEST_F(HiddenTilesTest, AreNotLookedForWhereNothingMayBeLeftOut) {
   exact.setup.termination = 0;
   GroupAssignment depth = Group(0, 3);
   depth.key.frame = 2;
-  depth.SetRenderer(*ZBuffer(), setup);
+  SetRenderer(*ZBuffer(), depth.setup);
   depth.setup.camera.width = 4;
   depth.setup.camera.height = 2;
   GroupAssignment only = Group(0, 1);
