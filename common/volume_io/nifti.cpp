@@ -87,7 +87,9 @@ void ReadOrientation(const NiftiHeader& fields, double millimetres, RawHeader& h
   }
   constexpr Vec3 kLpsFromRas = {-1, -1, 1};
   header.origin = millimetres * (kLpsFromRas * origin);
-  for (std::size_t i = 0; i < 3; ++i) header.directions[i] = Normalized(kLpsFromRas * columns[i]);
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (const Vec3 direction = kLpsFromRas * columns[i]; Length(direction) > 0) header.directions[i] = Normalized(direction);
+  }
 }
 
 Result<RawHeader> ReadHeader(const NiftiHeader& fields, const std::string& path) {
