@@ -59,8 +59,6 @@ FramePlan MakePlan(const Options& options, const VolumeSummary& summary, int vie
   return PlanFrame(MakeRequest(options, view), 1, summary, roster, std::move(layout)).value();
 }
 
-FrameSetup MakeSetup(const Options& options, const VolumeSummary& summary, int view) { return MakePlan(options, summary, view).setup; }
-
 struct Measured {
   std::vector<BoxSeconds> boxes;
   std::vector<double> by_box;  // of the layout; 0: nobody renders it
@@ -144,7 +142,7 @@ class Comparison {
       Measured measured = Measure(options_, *volume_, setup, layout);
       fixed.Add(measured, 0);
       AddResidual(setup, measured, fixed);
-      if (options_.frames > 0) Balance(view, setup, request, layout, std::move(measured), balanced);
+      if (options_.frames > 0) Balance(setup, request, layout, std::move(measured), balanced);
     }
     fmt::print("{:22} {:8} {:9} {:10} {:4} boxes, max/mean {}\n", name_, policy.decomposition, SplitOf(policy), policy.assignment, boxes,
                fixed.Text());
@@ -167,7 +165,7 @@ class Comparison {
   }
 
   // As the coordinator's LayoutTable does it.
-  void Balance(int view, const FrameSetup& setup, LayoutRequest request, Layout layout, Measured measured, Outcome& outcome) const {
+  void Balance(const FrameSetup& setup, LayoutRequest request, Layout layout, Measured measured, Outcome& outcome) const {
     LearntCost learnt(grid_);
     std::int64_t moved = 0;
     std::vector<double> seconds = measured.by_box;  // of this layout, over its frames

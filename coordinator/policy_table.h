@@ -15,10 +15,10 @@
 
 #include "common/planning/frame_plan.h"
 #include "common/stats/report.h"
-#include "coordinator/tuning/choose_policy.h"
 #include "common/volume/occupancy_grid.h"
 #include "coordinator/layout_table.h"
 #include "coordinator/plan_request.h"
+#include "coordinator/tuning/choose_policy.h"
 
 namespace slabstream {
 

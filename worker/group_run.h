@@ -106,9 +106,9 @@ class GroupRun {
   const PixelRange frame_;
   Status failure_;
   Runner runner_;
-  std::map<Rank, RankState> ranks_;                      // of this worker
+  std::map<Rank, RankState> ranks_;                       // of this worker
   std::unordered_map<std::uint32_t, Arrivals> arrivals_;  // by step, of steps that are not complete
-  std::vector<std::pair<ImageHandle, Rank>> combining_;  // StartCombine without CombineDone
+  std::vector<std::pair<ImageHandle, Rank>> combining_;   // StartCombine without CombineDone
   bool root_done_ = false;
   Arrivals group_pieces_;           // display worker
   std::uint64_t group_pixels_ = 0;  // in them

@@ -6,8 +6,9 @@
 //   picture    finish lane -> worker -> coordinator -> client                               3, until the picture is there
 //
 // Frames that take less than HandOvers::doze find all threads awake: their hand-overs are a tenth of the time that is neither rendering
-// nor making a picture (planning a frame like the last one takes next to no time). When rendering ends that took much longer, the worker's own thread and its finish lane have slept: half of the time
-// until the picture is begun. So each constant is a stretch of time that was measured as such, never a difference of two. Pure.
+// nor making a picture (planning a frame like the last one takes next to no time). When rendering ends that took much longer, the worker's
+// own thread and its finish lane have slept: half of the time until the picture is begun. So each constant is a stretch of time that was
+// measured as such, never a difference of two. Pure.
 #pragma once
 
 #include <span>
