@@ -29,9 +29,9 @@
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
 #include "common/planning/render_work.h"
-#include "common/simulation/simulate_frames.h"
-#include "common/tuning/choose_policy.h"
-#include "common/tuning/service_machine.h"
+#include "simulator/simulate_frames.h"
+#include "coordinator/tuning/choose_policy.h"
+#include "coordinator/tuning/service_machine.h"
 #include "common/volume/sphere.h"
 #include "common/volume_io/volume_reader.h"
 

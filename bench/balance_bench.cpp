@@ -1,17 +1,14 @@
-// How even partitions are: every box of each is rendered alone on one thread (laboratory/measure/box_costs.h), the boxes of a slot are added up,
-// and the slot with most to do is compared with the mean, in views all round. Then the same in each view after some frames of dynamic
-// balance. For volumes given on the command line; "sphere1:300" is the paper's class-I sphere with N = 300. --stealing simulates frames of
-// both kinds of layout, and what work stealing could win at most.
+// How even partitions are: every box of each is rendered alone on one thread (laboratory/measure/box_costs.h), the boxes of a slot are
+// added up, and the slot with most to do is compared with the mean, in views all round. Then the same in each view after some frames of
+// dynamic balance. For volumes given on the command line; "sphere1:300" is the paper's class-I sphere with N = 300.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <string>
 #include <vector>
 
-#include "laboratory/measure/box_costs.h"
 #include "common/classification/count_occupied.h"
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
@@ -19,9 +16,9 @@
 #include "common/planning/learnt_cost.h"
 #include "common/planning/placement.h"
 #include "common/planning/render_work.h"
-#include "common/simulation/simulate_frames.h"
 #include "common/volume/sphere.h"
 #include "common/volume_io/volume_reader.h"
+#include "laboratory/measure/box_costs.h"
 
 namespace slabstream {
 namespace {
@@ -32,7 +29,7 @@ struct Options {
   std::string preset = "auto", renderer = "splat";
   int slots = 16, repeats = 3, size = 512, frames = 5, views = 4;
   double azimuth = 30, elevation = 20;
-  bool verbose = false, stealing = false;
+  bool verbose = false;
 };
 
 std::shared_ptr<const Volume> Load(const std::string& name) {
@@ -44,7 +41,7 @@ std::shared_ptr<const Volume> Load(const std::string& name) {
 
 RendererKind RendererOf(const Options& options) { return options.renderer == "zbuffer" ? RendererKind::kZBuffer : RendererKind::kSplat; }
 
-FramePlan MakePlan(const Options& options, const VolumeSummary& summary, int view, const Layout* layout = nullptr) {
+FrameSetup MakeSetup(const Options& options, const VolumeSummary& summary, int view) {
   FrameRequest request;
   request.dataset = "volume";
   request.renderer = RendererOf(options);
@@ -52,19 +49,15 @@ FramePlan MakePlan(const Options& options, const VolumeSummary& summary, int vie
   request.view = {.azimuth_degrees = options.azimuth + 360.0 * view / options.views, .elevation_degrees = options.elevation};
   request.transfer.choice = options.preset;
   request.policy = options.policy;
-  const Roster roster = RosterOf(layout == nullptr ? 1 : std::uint32_t(options.slots));
-  return PlanFrame(request, 1, summary, roster, {}, layout).value();
+  return MakeFrameSetup(request, 1, summary).value();
 }
-
-FrameSetup MakeSetup(const Options& options, const VolumeSummary& summary, int view) { return MakePlan(options, summary, view).setup; }
 
 struct Measured {
   std::vector<BoxSeconds> boxes;
-  std::vector<double> by_box;         // of the layout; 0: nobody renders it
-  std::vector<CoverageMap> coverage;  // likewise
-  double imbalance = 0;               // of slots
-  double slowest = 0;                 // slot, seconds
-  double sum = 0;                     // of all boxes
+  std::vector<double> by_box;  // of the layout; 0: nobody renders it
+  double imbalance = 0;        // of slots
+  double slowest = 0;          // slot, seconds
+  double sum = 0;              // of all boxes
 };
 
 Measured Measure(const Options& options, const Volume& volume, const FrameSetup& setup, const Layout& layout) {
@@ -77,14 +70,12 @@ Measured Measure(const Options& options, const Volume& volume, const FrameSetup&
   }
   Measured measured;
   measured.by_box.resize(layout.owners.size());
-  measured.coverage.resize(layout.owners.size());
   std::vector<double> slots(std::size_t(options.slots));
   const std::vector<BoxCost> costs = MeasureBoxCosts(volume, setup, boxes, options.repeats);
   for (std::size_t i = 0; i < costs.size(); ++i) {
     measured.boxes.push_back({costs[i].box, costs[i].seconds});
     measured.sum += costs[i].seconds;
     measured.by_box[numbers[i]] = costs[i].seconds;
-    measured.coverage[numbers[i]] = costs[i].coverage;
     slots[layout.owners[numbers[i]]] += costs[i].seconds;
   }
   measured.imbalance = Imbalance(slots);
@@ -105,8 +96,6 @@ struct Spread {
 struct Outcome {
   Spread imbalance, slowest, sum, moved;
   Spread residual;  // root mean square of (measured - foretold) / foretold, over the boxes of a view, both relative to their means
-  // Simulated, ms from picture to picture and latency: as it is, with stealing, and both with stragglers.
-  std::array<Spread, 4> steady, latency;
 
   void Add(const Measured& measured, std::int64_t moved_voxels) {
     imbalance.values.push_back(measured.imbalance);
@@ -147,15 +136,12 @@ class Comparison {
       Measured measured = Measure(options_, *volume_, setup, layout);
       fixed.Add(measured, 0);
       AddResidual(setup, measured, fixed);
-      if (options_.stealing) Simulate(view, layout, measured, fixed);
-      if (options_.frames > 0) Balance(view, setup, request, layout, std::move(measured), balanced);
+      if (options_.frames > 0) Balance(setup, request, layout, std::move(measured), balanced);
     }
     fmt::print("{:22} {:8} {:9} {:10} {:4} boxes, max/mean {}\n", name_, policy.decomposition, SplitOf(policy), policy.assignment, boxes,
                fixed.Text());
-    if (options_.stealing) PrintSimulated("static", fixed);
     if (options_.frames == 0) return;
     fmt::print("{:48} after {} frames, max/mean {}, {:.1f} Mvoxels moved\n", "", options_.frames, balanced.Text(), balanced.moved.median());
-    if (options_.stealing) PrintSimulated("dynamic", balanced);
     std::fflush(stdout);
   }
 
@@ -173,7 +159,7 @@ class Comparison {
   }
 
   // As the coordinator's LayoutTable does it.
-  void Balance(int view, const FrameSetup& setup, LayoutRequest request, Layout layout, Measured measured, Outcome& outcome) const {
+  void Balance(const FrameSetup& setup, LayoutRequest request, Layout layout, Measured measured, Outcome& outcome) const {
     LearntCost learnt(grid_);
     std::int64_t moved = 0;
     std::vector<double> seconds = measured.by_box;  // of this layout, over its frames
@@ -195,44 +181,6 @@ class Comparison {
     if (options_.verbose) fmt::print("\n");
     outcome.Add(measured, moved);
     AddResidual(setup, measured, outcome);
-    if (options_.stealing) Simulate(view, layout, measured, outcome);
-  }
-
-  // On a switched link of 10 Gbit/s, all there is to do besides rendering as long as on the machine that the model's defaults are of.
-  void Simulate(int view, const Layout& layout, const Measured& measured, Outcome& outcome) const {
-    const FramePlan plan = MakePlan(options_, summary_, view, &layout);
-    FrameInput frame{&plan, {}, 1e-3, 0.5e-3};
-    for (std::size_t box = 0; box < layout.owners.size(); ++box) frame.boxes.push_back({measured.by_box[box], &measured.coverage[box], 0});
-    MachineModel machine;
-    machine.link = {Contention::kSwitched, 20e-6, 1.25e9};
-    const auto run = [&](int frames, bool steal) {
-      return SimulateFrames(std::vector<FrameInput>(std::size_t(frames), frame), machine,
-                            {.in_flight = frames > 1 ? 2 : 1, .keep_spans = false, .steal = steal})
-          .value();
-    };
-    constexpr int kFrames = 40;
-    for (std::size_t i = 0; i < 4; ++i) {
-      machine.stragglers = i < 2 ? Stragglers{} : Stragglers{0.1, 2, 1};
-      const Timeline timeline = run(kFrames, i % 2 == 1);
-      outcome.steady[i].values.push_back(1e3 * timeline.end / kFrames);
-      Spread alone;
-      for (std::uint64_t seed = 1; seed <= 9; ++seed) {
-        machine.stragglers.seed = seed;
-        alone.values.push_back(1e3 * run(1, i % 2 == 1).end);
-      }
-      outcome.latency[i].values.push_back(alone.median());
-    }
-  }
-
-  static void PrintSimulated(std::string_view layout, const Outcome& outcome) {
-    const auto gain = [](const std::array<Spread, 4>& times, std::size_t i) {
-      return 100 * (1 - times[i + 1].median() / times[i].median());
-    };
-    for (const std::size_t i : {0U, 2U}) {
-      fmt::print("{:48} {:8}{}: {:.2f} ms from picture to picture, stealing at most {:.1f} % less; latency {:.2f} ms, {:.1f} % less\n", "",
-                 layout, i == 0 ? "" : ", stragglers", outcome.steady[i].median(), gain(outcome.steady, i), outcome.latency[i].median(),
-                 gain(outcome.latency, i));
-    }
   }
 
   const Options& options_;
@@ -283,7 +231,6 @@ int main(int argc, char** argv) {
   app.add_option("--size", options.size)->check(CLI::Range(1, 8192));
   app.add_option("--azimuth", options.azimuth, "Of the first view");
   app.add_option("--elevation", options.elevation);
-  app.add_flag("--stealing", options.stealing, "Simulate frames with and without");
   app.add_flag("--verbose", options.verbose, "Imbalance frame by frame; * where boxes changed");
   CLI11_PARSE(app, argc, argv);
   slabstream::Run(options);

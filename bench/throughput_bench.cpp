@@ -25,7 +25,8 @@
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
 #include "common/planning/team.h"
-#include "common/simulation/simulate_frames.h"
+#include "common/wire/client_messages.h"
+#include "simulator/simulate_frames.h"
 #include "coordinator/layout_table.h"
 
 namespace slabstream {
@@ -144,7 +145,7 @@ Flow Simulate(const FramePlan& plan, const FrameCosts& costs, const MachineModel
   const int frames = 4 * teams * std::max((16 + teams - 1) / teams, 4);
   std::vector<FrameInput> inputs(std::size_t(frames), input);
   for (std::size_t i = 0; i < inputs.size(); ++i) inputs[i].plan = &plans[i % plans.size()];
-  const Timeline timeline = SimulateFrames(inputs, machine, {.in_flight = frames}).value();
+  const Timeline timeline = SimulateFrames(inputs, machine, {.in_flight = std::min(frames, int(kMaxOpenRequests))}).value();
   Flow flow;
   std::vector<double> received;
   for (const SimulatedFrame& frame : timeline.frames) received.push_back(frame.received);

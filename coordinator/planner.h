@@ -7,10 +7,10 @@
 #include <memory>
 
 #include "common/planning/cost_model.h"
-#include "common/tuning/service_machine.h"
 #include "coordinator/layout_table.h"
 #include "coordinator/plan_request.h"
 #include "coordinator/policy_table.h"
+#include "coordinator/tuning/service_machine.h"
 
 namespace slabstream {
 

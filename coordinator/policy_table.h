@@ -15,10 +15,10 @@
 
 #include "common/planning/frame_plan.h"
 #include "common/stats/report.h"
-#include "common/tuning/choose_policy.h"
 #include "common/volume/occupancy_grid.h"
 #include "coordinator/layout_table.h"
 #include "coordinator/plan_request.h"
+#include "coordinator/tuning/choose_policy.h"
 
 namespace slabstream {
 
@@ -37,7 +37,7 @@ class PolicyTable {
   static constexpr int kMostFramesAPrediction = 64;  // it is made anew after 1, 2, 4 ... frames, and after as many as this again and again
 
   struct Request {
-    const FrameRequest* frame = nullptr;  // whose policy has names that there are (CheckNames)
+    const FrameRequest* frame = nullptr;       // whose policy has names that there are (CheckNames)
     const ClassifiedVolume* volume = nullptr;  // of the frame
     const VolumeSummary* summary = nullptr;
     std::shared_ptr<const OccupancyGrid> occupied;  // null: not counted

@@ -85,7 +85,8 @@ void FrameAccumulator::StartGroup(GroupImage group, WorkerActions& actions) {
                                    .incoming = std::move(piece.incoming),
                                    .side = Side::kBack,
                                    .pixels = piece.pixels == pixels_ ? PixelRange{} : piece.pixels,
-                                   .frame = FrameBounds(*setup_)});
+                                   .frame = FrameBounds(*setup_),
+                                   .ranks = piece.ranks});
     ++combining_;
     if (piece.image != 0) used.insert(piece.image);
   }

@@ -26,7 +26,7 @@ void Append(std::vector<RankReport>& reports, std::vector<RankReport> more) {
 }
 
 GroupAssignment PeersByWorker(GroupAssignment assignment) {
-  std::ranges::sort(assignment.peers, {}, &Peer::worker);
+  if (!std::ranges::is_sorted(assignment.peers, {}, &Peer::worker)) std::ranges::sort(assignment.peers, {}, &Peer::worker);
   return assignment;
 }
 
@@ -217,8 +217,13 @@ bool GroupRun::ComesHome(Rank rank, const ImagePiece& piece) const {
 
 void GroupRun::TakeHome(Rank rank, ImagePiece piece, WorkerActions& actions) {
   const ImageHandle own = ranks_.at(rank).own;
-  Start({.image = own, .other = piece.image, .incoming = std::move(piece.incoming), .replace = true, .pixels = piece.pixels}, rank,
-        actions);
+  Start({.image = own,
+         .other = piece.image,
+         .incoming = std::move(piece.incoming),
+         .replace = true,
+         .pixels = piece.pixels,
+         .ranks = piece.ranks},
+        rank, actions);
   runner_.held(rank).Put({piece.pixels, {piece.ranks, own}});
 }
 
@@ -232,7 +237,8 @@ void GroupRun::Combine(Rank rank, const Held& held, const ImagePiece& piece, Wor
          .other = piece.image,
          .incoming = piece.incoming,
          .side = piece.ranks.end == held.value.ranks.begin ? Side::kFront : Side::kBack,
-         .pixels = held.pixels == frame_ ? PixelRange{} : held.pixels},
+         .pixels = held.pixels == frame_ ? PixelRange{} : held.pixels,
+         .ranks = piece.ranks},
         rank, actions);
   runner_.held(rank).Take(held.pixels);
   runner_.held(rank).Put({held.pixels, {*both, held.value.image}});

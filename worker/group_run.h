@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -105,9 +106,9 @@ class GroupRun {
   const PixelRange frame_;
   Status failure_;
   Runner runner_;
-  std::map<Rank, RankState> ranks_;                      // of this worker
-  std::map<std::uint32_t, Arrivals> arrivals_;           // by step, of steps that are not complete
-  std::vector<std::pair<ImageHandle, Rank>> combining_;  // StartCombine without CombineDone
+  std::map<Rank, RankState> ranks_;                       // of this worker
+  std::unordered_map<std::uint32_t, Arrivals> arrivals_;  // by step, of steps that are not complete
+  std::vector<std::pair<ImageHandle, Rank>> combining_;   // StartCombine without CombineDone
   bool root_done_ = false;
   Arrivals group_pieces_;           // display worker
   std::uint64_t group_pixels_ = 0;  // in them

@@ -164,6 +164,7 @@ struct StartCombine {
   bool replace = false;  // instead: `pixels` of `image`, which have been passed on, become those of the other one
   PixelRange pixels;     // of the frame; empty: all
   PixelBounds frame;
+  RankInterval ranks;  // that `other` shows there; 0 `other`: as the message says
 };
 // Finds the hidden tiles of `image`, a frame that groups up to `key` have been accumulated into. `known`: the last ones. -> HiddenFound
 struct FindHidden {

@@ -22,7 +22,7 @@
 #include "common/kernels/simd_target.h"
 #include "common/planning/policy_names.h"
 #include "common/transport/endpoint.h"
-#include "common/tuning/service_machine.h"
+#include "coordinator/tuning/service_machine.h"
 
 namespace slabstream {
 namespace {

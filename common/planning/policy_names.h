@@ -1,6 +1,6 @@
 // The names that a Policy may hold beside those of Decompositions(), Assignments() and CombiningSchemes().
 //
-// kAutomatic stands for any of them: in decomposition, assignment and combine it leaves the choice to ChoosePolicy (common/tuning), in
+// kAutomatic stands for any of them: in decomposition, assignment and combine it leaves the choice to ChoosePolicy (coordinator/tuning), in
 // split it means what suits the decomposition, and is chosen together with it where that is left open, too.
 #pragma once
 

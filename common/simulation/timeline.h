@@ -17,7 +17,7 @@ struct SimulatedSpan {
   std::uint32_t frame = 0, group = 0;
   std::uint32_t worker = 0;  // index: its place in SimulationResult::workers
   Lane lane = Lane::kRender;
-  Rank rank = 0;                 // that it was done for
+  Rank rank = 0;                 // that is rendered or sent; 0 of other stages
   Stage stage = Stage::kRender;  // kRender, kEncode, kCombine (also accumulating and looking for hidden tiles) or kResolve (kFinish)
   double begin = 0, end = 0;     // seconds
 };

@@ -17,8 +17,8 @@
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
 #include "common/planning/team.h"
-#include "common/tuning/choose_policy.h"
-#include "common/tuning/service_machine.h"
+#include "coordinator/tuning/choose_policy.h"
+#include "coordinator/tuning/service_machine.h"
 
 namespace slabstream {
 namespace {

@@ -13,7 +13,7 @@
 #include "common/planning/cost_model.h"
 #include "common/planning/frame_plan.h"
 #include "common/planning/layout.h"
-#include "common/simulation/simulate_frames.h"
+#include "simulator/simulate_frames.h"
 #include "common/stats/report.h"
 
 namespace slabstream {

@@ -9,7 +9,7 @@
 #include "laboratory/measure/lab_worker.h"
 #include "common/planning/frame_plan.h"
 #include "common/simulation/cost_fit.h"
-#include "common/simulation/simulate_frames.h"
+#include "simulator/simulate_frames.h"
 #include "common/wire/payload.h"
 
 namespace slabstream {

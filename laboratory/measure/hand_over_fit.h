@@ -1,19 +1,20 @@
 // What it takes to hand something from one thread of the service to another (HandOvers), out of the instants of frames of one worker. A
-// frame passes eight hand-overs, between which only rendering and the making of the picture lie:
+// frame passes ten hand-overs, between which only planning, rendering and the making of the picture lie:
 //
-//   request    client -> coordinator -> worker -> render lane     3, until rendering begins
-//   rendered   render lane -> worker -> finish lane               2, until the picture is begun
-//   picture    finish lane -> worker -> coordinator -> client     3, until the picture is there
+//   request    client -> coordinator -> planner -> coordinator -> worker -> render lane     5, until rendering begins
+//   rendered   render lane -> worker -> finish lane                                         2, until the picture is begun
+//   picture    finish lane -> worker -> coordinator -> client                               3, until the picture is there
 //
-// Frames that take less than HandOvers::doze find all threads awake: their hand-overs are an eighth of the time that is neither rendering
-// nor making a picture. When rendering ends that took much longer, the worker's own thread and its finish lane have slept: half of the time
-// until the picture is begun. So each constant is a stretch of time that was measured as such, never a difference of two. Pure.
+// Frames that take less than HandOvers::doze find all threads awake: their hand-overs are a tenth of the time that is neither rendering
+// nor making a picture (planning a frame like the last one takes next to no time). When rendering ends that took much longer, the worker's
+// own thread and its finish lane have slept: half of the time until the picture is begun. So each constant is a stretch of time that was
+// measured as such, never a difference of two. Pure.
 #pragma once
 
 #include <span>
 
-#include "laboratory/measure/statistics.h"
 #include "common/simulation/machine_model.h"
+#include "laboratory/measure/statistics.h"
 
 namespace slabstream {
 

@@ -14,7 +14,7 @@
 #include "common/combining/schemes.h"
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
-#include "common/simulation/simulate_frames.h"
+#include "simulator/simulate_frames.h"
 #include "laboratory/measure/calibrate.h"
 #include "laboratory/measure/combining_costs.h"
 

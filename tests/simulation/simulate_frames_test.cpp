@@ -1,4 +1,4 @@
-#include "common/simulation/simulate_frames.h"
+#include "simulator/simulate_frames.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -51,19 +51,19 @@ TEST(SimulateFrames, OneWorkerTakesTheSumOfWhatThereIsToDo) {
   EXPECT_EQ(timeline.frames[0].imbalance, 1);
 }
 
-// From thread to thread: client, coordinator, worker, render lane, worker, finish lane, worker, coordinator, client.
+// From thread to thread: client, coordinator, planner, coordinator, worker, render lane, worker, finish lane, worker, coordinator, client.
 TEST(SimulateFrames, EveryHandOverTakesItsTime) {
   MachineModel machine = FreeMachine();
   machine.hand_overs = {.awake = 0.01, .asleep = 0.07, .doze = 0};
   MadeFrame frame(1, 1, kSide, 1, 2, "fan-in");
   frame.finish_seconds = 0.5;
-  EXPECT_NEAR(Simulate({frame.input()}, machine).frames[0].latency(), 2 + 0.5 + 8 * 0.07, 1e-9);
+  EXPECT_NEAR(Simulate({frame.input()}, machine).frames[0].latency(), 2 + 0.5 + 10 * 0.07, 1e-9);
   machine.hand_overs.doze = 100;
-  EXPECT_NEAR(Simulate({frame.input()}, machine).frames[0].latency(), 2 + 0.5 + 8 * 0.01, 1e-9);
+  EXPECT_NEAR(Simulate({frame.input()}, machine).frames[0].latency(), 2 + 0.5 + 10 * 0.01, 1e-9);
   // Who has waited for a second is asleep: nobody when the frame begins; when it is rendered the worker and its finish lane; when the
   // picture is made the client alone, since coordinator and worker have had to do with the group's end.
   machine.hand_overs.doze = 1;
-  EXPECT_NEAR(Simulate({frame.input()}, machine).frames[0].latency(), 2 + 0.5 + 3 * 0.01 + 2 * 0.07 + 2 * 0.01 + 0.07, 1e-9);
+  EXPECT_NEAR(Simulate({frame.input()}, machine).frames[0].latency(), 2 + 0.5 + 5 * 0.01 + 2 * 0.07 + 2 * 0.01 + 0.07, 1e-9);
 }
 
 // An image of another worker comes in addition: told of by its worker, at the other one, at its combining lane and back. One that travels
@@ -202,19 +202,6 @@ TEST(SimulateFrames, VoxelsComeBeforeRendering) {
   const SimulatedFrame result = Simulate({frame.input()}, machine).frames[0];
   EXPECT_NEAR(result.latency(), 10 + 1, 1e-9);  // one after the other out of the coordinator
   EXPECT_EQ(result.voxel_bytes, 1000);
-}
-
-// Two workers, of which one has all the costly boxes: as if any of them could be anywhere, costliest first.
-TEST(SimulateFrames, StealingRendersWhereThereIsTime) {
-  MadeFrame frame(4, 1, kSide, 0, 1, "fan-in");
-  for (std::size_t box = 0; box < 4; ++box) {
-    frame.plan().groups[0].placements[box].worker = box < 3 ? 1 : 2;
-    frame.costs()[box].seconds = box < 3 ? 4 - double(box) : 1;  // 4, 3, 2 and 1
-  }
-  EXPECT_NEAR(Simulate({frame.input()}, FreeMachine()).frames[0].latency(), 9, 1e-9);
-  const Timeline stolen = SimulateFrames(std::vector{frame.input()}, FreeMachine(), {.steal = true}).value();
-  EXPECT_NEAR(stolen.frames[0].latency(), 5, 1e-9);
-  EXPECT_NEAR(stolen.frames[0].stage_seconds[std::size_t(Stage::kRender)], 10, 1e-9) << "nothing is rendered twice";
 }
 
 TEST(SimulateFrames, StragglersDependOnTheSeedAlone) {
@@ -428,6 +415,17 @@ TEST(SimulateFrames, FewerCoresNeverHelpAlone) {
   }
 }
 
+TEST(SimulateFrames, AThousandWorkersTakeEachStepOfTheScheduleOnce) {
+  constexpr std::uint32_t kWorkers = 1024;
+  for (const char* scheme : {"fan-in", "radix-k"}) {
+    const MadeFrame frame(kWorkers, 1, kSide, 0.5, 1, scheme);
+    const Timeline timeline = SimulateFrames(std::vector{frame.input()}, FreeMachine(), {.keep_spans = false}).value();
+    const PixelRange pixels = {0, std::uint64_t(kSide) * kSide};
+    EXPECT_EQ(timeline.frames[0].messages, DeriveSchedule({scheme, kWorkers, 0}, pixels).value()->steps().size()) << scheme;
+    EXPECT_NEAR(timeline.frames[0].latency(), 1, 1e-9) << scheme;
+  }
+}
+
 TEST(SimulateFrames, WhatDoesNotFitIsNamed) {
   const MachineModel machine;
   const auto message = [&](const FrameInput& input, const MachineModel& on) {
@@ -445,6 +443,7 @@ TEST(SimulateFrames, WhatDoesNotFitIsNamed) {
   const CoverageMap other = UniformCoverage({}, 0, 8, 8);
   input.boxes[0].coverage = &other;
   EXPECT_THAT(message(input, machine), HasSubstr("8 x 8"));
+  EXPECT_THAT(SimulateFrames({}, machine, {.in_flight = 0}).status().message(), HasSubstr("in_flight is 0, but must be in [1, 256]"));
   MachineModel slow;
   slow.link.bytes_per_second = 0;
   EXPECT_THAT(message(frame.input(), slow), HasSubstr("link.bytes_per_second"));

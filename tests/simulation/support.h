@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "common/combining/schemes.h"
-#include "common/simulation/simulate_frames.h"
+#include "simulator/simulate_frames.h"
 
 namespace slabstream {
 

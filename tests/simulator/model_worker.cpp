@@ -7,8 +7,8 @@
 
 namespace slabstream {
 
-ModelWorker::ModelWorker(int node, WorkerConfig config, const WorkerSpeed& speed, const Faults& faults, Random& random, EventQueue& queue,
-                         WorkerNetwork& network)
+ModelWorker::ModelWorker(int node, WorkerConfig config, const WorkerSpeed& speed, const Faults& faults, Random& random,
+                         EventQueue<Time>& queue, WorkerNetwork& network)
     : node_(node),
       config_(config),
       speed_(speed),

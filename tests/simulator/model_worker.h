@@ -8,7 +8,8 @@
 #include <string>
 #include <utility>
 
-#include "tests/simulator/event_queue.h"
+#include "simulator/event_queue.h"
+#include "tests/simulator/alarm.h"
 #include "tests/simulator/faults.h"
 #include "tests/support/symbolic_images.h"
 #include "worker/worker_machine.h"
@@ -30,7 +31,7 @@ struct WorkerSpeed {
 
 class ModelWorker {
  public:
-  ModelWorker(int node, WorkerConfig config, const WorkerSpeed& speed, const Faults& faults, Random& random, EventQueue& queue,
+  ModelWorker(int node, WorkerConfig config, const WorkerSpeed& speed, const Faults& faults, Random& random, EventQueue<Time>& queue,
               WorkerNetwork& network);
 
   void Start();
@@ -81,7 +82,7 @@ class ModelWorker {
   const WorkerSpeed speed_;
   const Faults& faults_;
   Random& random_;
-  EventQueue& queue_;
+  EventQueue<Time>& queue_;
   WorkerNetwork& network_;
   WorkerMachine machine_;
   Alarm alarm_;

@@ -1,20 +1,20 @@
-// Network: moves messages between the ends of a simulated world, and loses, delays, duplicates and reorders them.
+// FaultyNetwork: moves messages between the ends of a simulated world, and loses, delays, duplicates and reorders them.
 #pragma once
 
 #include <functional>
 #include <map>
 #include <utility>
 
-#include "tests/simulator/event_queue.h"
+#include "simulator/event_queue.h"
 #include "tests/simulator/faults.h"
 
 namespace slabstream {
 
-class Network {
+class FaultyNetwork {
  public:
   using Link = std::pair<int, int>;  // from, to: any numbers that name ends
 
-  Network(EventQueue& queue, Random& random, const Faults& faults, Duration latency)
+  FaultyNetwork(EventQueue<Time>& queue, Random& random, const Faults& faults, Duration latency)
       : queue_(queue), random_(random), faults_(faults), latency_(latency) {}
 
   // Calls `deliver` never, once or twice, later.
@@ -37,7 +37,7 @@ class Network {
     return last;
   }
 
-  EventQueue& queue_;
+  EventQueue<Time>& queue_;
   Random& random_;
   const Faults& faults_;
   const Duration latency_;

@@ -19,7 +19,8 @@
 
 #include "coordinator/frame_machine.h"
 #include "coordinator/planner.h"
-#include "tests/simulator/event_queue.h"
+#include "simulator/event_queue.h"
+#include "tests/simulator/alarm.h"
 #include "tests/simulator/faults.h"
 #include "tests/simulator/frame_witness.h"
 #include "tests/simulator/model_client.h"
@@ -81,9 +82,9 @@ class Simulation : private WorkerNetwork {
 
   Random random_;
   Tally& tally_;
-  EventQueue queue_;
+  EventQueue<Time> queue_{Time(std::chrono::seconds(1000))};
   Faults faults_;
-  Network network_;
+  FaultyNetwork network_;
   const bool encode_messages_;  // in a few worlds messages are encoded and decoded on their way
   bool workerless_ = false;     // for a moment no worker was alive
   const World world_;

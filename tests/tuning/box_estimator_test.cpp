@@ -1,5 +1,5 @@
 // Estimates of boxes: where their images lie, how they add up.
-#include "common/tuning/box_estimator.h"
+#include "coordinator/tuning/box_estimator.h"
 
 #include <gtest/gtest.h>
 

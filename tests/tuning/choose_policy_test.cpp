@@ -1,5 +1,5 @@
 // What is chosen where a policy leaves a choice.
-#include "common/tuning/choose_policy.h"
+#include "coordinator/tuning/choose_policy.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include "common/planning/assignment.h"
 #include "common/planning/brick_visibility.h"
 #include "common/planning/policy_names.h"
-#include "common/tuning/service_machine.h"
+#include "coordinator/tuning/service_machine.h"
 #include "tests/planning/support.h"
 
 namespace slabstream {

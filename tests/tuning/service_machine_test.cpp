@@ -1,5 +1,5 @@
 // Which machine a service is, as far as its coordinator can tell.
-#include "common/tuning/service_machine.h"
+#include "coordinator/tuning/service_machine.h"
 
 #include <gtest/gtest.h>
 

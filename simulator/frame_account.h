@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/simulation/timeline.h"
-#include "common/simulation/worker_lanes.h"
+#include "simulator/worker_lanes.h"
 
 namespace slabstream {
 

@@ -1,4 +1,4 @@
-#include "common/tuning/frame_predictor.h"
+#include "coordinator/tuning/frame_predictor.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include "common/combining/schemes.h"
 #include "common/image/occlusion_mask.h"
 #include "common/planning/placement.h"
-#include "common/simulation/simulate_frames.h"
+#include "simulator/simulate_frames.h"
 
 namespace slabstream {
 namespace {

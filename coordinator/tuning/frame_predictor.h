@@ -10,7 +10,7 @@
 
 #include "common/simulation/machine_model.h"
 #include "common/stats/prediction.h"
-#include "common/tuning/box_estimator.h"
+#include "coordinator/tuning/box_estimator.h"
 
 namespace slabstream {
 

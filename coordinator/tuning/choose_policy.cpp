@@ -1,4 +1,4 @@
-#include "common/tuning/choose_policy.h"
+#include "coordinator/tuning/choose_policy.h"
 
 #include <fmt/format.h>
 
@@ -14,7 +14,7 @@
 #include "common/planning/assignment.h"
 #include "common/planning/brick_visibility.h"
 #include "common/planning/policy_names.h"
-#include "common/tuning/frame_predictor.h"
+#include "coordinator/tuning/frame_predictor.h"
 
 namespace slabstream {
 namespace {

@@ -1,10 +1,11 @@
-#include "common/simulation/simulate_frames.h"
+#include "simulator/simulate_frames.h"
 
 #include <fmt/format.h>
 
 #include <cmath>
 
-#include "common/simulation/frame_simulation.h"
+#include "common/wire/client_messages.h"
+#include "simulator/frame_simulation.h"
 
 namespace slabstream {
 namespace {
@@ -58,8 +59,8 @@ Status CheckFrame(std::size_t frame, const FrameInput& input) {
 
 Result<Timeline> SimulateFrames(std::span<const FrameInput> frames, const MachineModel& machine, const SimulationOptions& options) {
   if (Status status = Validate(machine); !status.ok()) return status;
-  if (options.in_flight < 1) {
-    return Status::InvalidArgument(fmt::format("in_flight is {}, but must be at least 1", options.in_flight));
+  if (options.in_flight < 1 || options.in_flight > int(kMaxOpenRequests)) {
+    return Status::InvalidArgument(fmt::format("in_flight is {}, but must be in [1, {}]", options.in_flight, kMaxOpenRequests));
   }
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (Status status = CheckFrame(i, frames[i]); !status.ok()) return status;

@@ -1,11 +1,10 @@
-// SimulateFrames: frame plans in virtual time, on any machine, by the rules of the service. Pure and deterministic.
+// SimulateFrames: frame plans in virtual time, on any machine. Pure and deterministic.
 //
-// What is followed (docs/architecture.md): as many unfinished groups and frames as the window allows (common/planning/frame_window.h); a
-// worker renders one rank at a time, in order of frame, group and rank, on its render lane; its combine lane does one task after the other
-// in the order in which they came up, its finish lane likewise makes pictures; a step of the schedule is taken at a rank when that is
-// rendered, nothing is being combined for it, and all its earlier steps on the same pixels are taken; the display worker accumulates groups
-// in order, reports each one done, and makes the picture. What is left out: nothing is lost, nothing is hidden by groups in front (box
-// costs are those of boxes alone), frames are asked for by one client, previews travel for free.
+// The coordinator's FrameMachine and a WorkerMachine for each worker decide everything, as in the service: the window, who renders what
+// when, which step of a schedule is taken, in which order groups are accumulated. What they start takes the time that the machine model and
+// the costs of boxes say. A worker has three lanes: one renders, one combines and encodes, one makes pictures; each does one task after the
+// other. Left out: nothing is lost, nothing is hidden by groups in front (box costs are those of boxes alone), one client asks for the
+// frames, previews travel for free.
 //
 // How many pixels of a range an image of several ranks fills: of each tile of 16 x 16 pixels the ranks' shares count as if they were
 // independent, 1 - prod(1 - share). The truth lies between their maximum and their sum; where tiles are full or empty all three agree. Runs
@@ -39,11 +38,8 @@ struct FrameInput {
 };
 
 struct SimulationOptions {
-  int in_flight = 1;       // frames that the client asks for ahead, >= 1
+  int in_flight = 1;       // frames that the client asks for ahead, [1, kMaxOpenRequests]
   bool keep_spans = true;  // Timeline::spans and messages
-  // Any worker renders any box that waits, of the oldest group the costliest one first, and neither its voxels nor its image take any time
-  // between the box's owner and the worker: the most that work stealing could win.
-  bool steal = false;
 };
 
 // InvalidArgument: a machine, plan or cost that is out of range or does not fit, with its place. Workers are numbered by WorkerId, in

@@ -1,4 +1,4 @@
-#include "common/tuning/service_machine.h"
+#include "coordinator/tuning/service_machine.h"
 
 #include <algorithm>
 

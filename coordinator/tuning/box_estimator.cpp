@@ -1,4 +1,4 @@
-#include "common/tuning/box_estimator.h"
+#include "coordinator/tuning/box_estimator.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "common/simulation/frame_account.h"
+#include "simulator/frame_account.h"
 
 #include <algorithm>
 

@@ -14,9 +14,10 @@ namespace slabstream {
 class Threads {
  public:
   using Id = std::size_t;
-  // Of the client, the coordinator, and of each worker: the thread that owns its sockets and those of its lanes.
-  static constexpr Id kClient = 0, kCoordinator = 1;
-  static Id Machine(std::uint32_t worker) { return 2 + 4 * Id{worker}; }
+  // Of the client; of the coordinator, which plans on a thread of its own; of each worker: the thread that owns its sockets, and those of
+  // its lanes.
+  static constexpr Id kClient = 0, kCoordinator = 1, kPlanner = 2;
+  static Id Machine(std::uint32_t worker) { return 3 + 4 * Id{worker}; }
   static Id Of(std::uint32_t worker, Lane lane) { return Machine(worker) + 1 + Id(lane); }
 
   // All have been at work until time 0.
