@@ -43,7 +43,7 @@ std::shared_ptr<const Volume> Load(const std::string& name) {
 
 const RendererKind* RendererOf(const Options& options) { return RequireRenderer(options.renderer).value(); }
 
-FrameRequest MakeRequest(const Options& options, int view) {
+FrameSetup MakeSetup(const Options& options, const VolumeSummary& summary, int view) {
   FrameRequest request;
   request.dataset = "volume";
   request.renderer = options.renderer;
@@ -51,12 +51,7 @@ FrameRequest MakeRequest(const Options& options, int view) {
   request.view = {.azimuth_degrees = options.azimuth + 360.0 * view / options.views, .elevation_degrees = options.elevation};
   request.transfer.choice = options.preset;
   request.policy = options.policy;
-  return request;
-}
-
-FramePlan MakePlan(const Options& options, const VolumeSummary& summary, int view, std::shared_ptr<const Layout> layout = nullptr) {
-  const Roster roster = RosterOf(layout == nullptr ? 1 : std::uint32_t(options.slots));
-  return PlanFrame(MakeRequest(options, view), 1, summary, roster, std::move(layout)).value();
+  return MakeFrameSetup(request, 1, summary).value();
 }
 
 struct Measured {

@@ -49,7 +49,7 @@ def make_property(vtk, scene, directory, smallest_spacing):
     return prop
 
 
-def make_mapper(vtk, kind, threads, sample_distance):
+def make_mapper(vtk, kind, threads, sample_distance, renderer):
     """One sample a voxel length, one ray a pixel, and no trading of quality for speed."""
     if kind == "fixedpoint":
         mapper = vtk.vtkFixedPointVolumeRayCastMapper()
@@ -62,7 +62,10 @@ def make_mapper(vtk, kind, threads, sample_distance):
     mapper.SetAutoAdjustSampleDistances(0)
     mapper.SetImageSampleDistance(1.0)
     mapper.SetSampleDistance(sample_distance)
-    mapper.SetBlendModeToComposite()
+    if renderer == "mip":
+        mapper.SetBlendModeToMaximumIntensity()
+    else:
+        mapper.SetBlendModeToComposite()
     return mapper
 
 
@@ -75,7 +78,7 @@ class Stage:
         self.views, self.size = scene["views"], scene["size"]
         self.radius = 0.5 * math.sqrt(sum((n * s) ** 2 for n, s in zip(dims, spacing)))
         self.centre = [(n - 1) / 2 * s for n, s in zip(dims, spacing)]
-        mapper = make_mapper(vtk, mapper_kind, threads, min(spacing))
+        mapper = make_mapper(vtk, mapper_kind, threads, min(spacing), scene["renderer"])
         mapper.SetInputData(image)
         volume = vtk.vtkVolume()
         volume.SetMapper(mapper)

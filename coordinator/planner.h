@@ -10,7 +10,6 @@
 #include "coordinator/layout_table.h"
 #include "coordinator/plan_request.h"
 #include "coordinator/policy_table.h"
-#include "coordinator/tuning/service_machine.h"
 
 namespace slabstream {
 

@@ -15,7 +15,7 @@ Result<FrameSetup> MakeFrameSetup(const FrameRequest& request, DatasetId dataset
   setup.description = summary.description;
   setup.range = summary.range;
   SetRenderer(*FindRenderer(request.renderer), setup);
-  setup.parameters = ParseParameters(*setup.renderer, request.parameters).value();
+  SetParameters(ParseParameters(*setup.renderer, request.parameters).value(), setup);
   if (Status status = setup.renderer->SetView(request.view, request.size, setup); !status.ok()) return status;
   setup.transfer = *std::move(transfer);
   setup.shading = request.shading;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "common/image/local_image.h"
 #include "common/image/resolve.h"
@@ -57,10 +58,15 @@ bool RendererKind::FrameIsPicture(const FrameSetup& setup) const { return setup.
 
 void SetRenderer(const RendererKind& kind, FrameSetup& setup) {
   setup.renderer = &kind;
-  setup.format = kind.format();
   setup.halo = kind.reach();
-  setup.parameters.clear();
-  for (const RendererParameter& parameter : kind.parameters()) setup.parameters.push_back(parameter.standard);
+  std::vector<double> values;
+  for (const RendererParameter& parameter : kind.parameters()) values.push_back(parameter.standard);
+  SetParameters(std::move(values), setup);
+}
+
+void SetParameters(std::vector<double> values, FrameSetup& setup) {
+  setup.parameters = std::move(values);
+  setup.format = setup.renderer->FormatOf(setup.parameters);
 }
 
 }  // namespace slabstream

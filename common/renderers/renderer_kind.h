@@ -61,7 +61,7 @@ class RendererKind {
     std::string_view name;                    // of --renderer and of messages: "splat"
     std::string_view title;                   // in reports: "splatting"
     std::string_view purpose;                 // one line for --help
-    PixelFormat format = PixelFormat::kRgba;  // of local images; it says how they combine (common/kernels/combine.h)
+    PixelFormat format = PixelFormat::kRgba;  // of local images by default parameters; it says how they combine (common/kernels/combine.h)
     std::int32_t reach = kHalo;               // voxels outside a box that its samples depend on, [0, kHalo]
     bool along_slices = false;                // the frame is an image along the slices (SheetGrid), else the camera's
     double footprint = 1;                     // pixels that a voxel fills, for each pixel of its cross-section
@@ -84,6 +84,9 @@ class RendererKind {
   const std::vector<Stage>& stages() const { return facts_.stages; }
   const std::vector<RendererParameter>& parameters() const { return facts_.parameters; }
 
+  // The pixel format of local images, which may depend on the values of parameters().
+  virtual PixelFormat FormatOf(const std::vector<double>& /*parameters*/) const { return facts_.format; }
+
   // Fills in the frame that workers render for a picture of `size` under `view`, both valid: camera, and sheets if the renderer works
   // along slices. `setup` has its description. InvalidArgument: the frame would be too large.
   virtual Status SetView(const ViewParameters& view, ImageSize size, FrameSetup& setup) const = 0;
@@ -104,7 +107,9 @@ class RendererKind {
   const Facts facts_;
 };
 
-// Makes `setup` one for this renderer: renderer, format, halo, and parameters by default.
+// Makes `setup` one for this renderer: renderer, halo, parameters by default, and the format that goes with them.
 void SetRenderer(const RendererKind& kind, FrameSetup& setup);
+// One value for each of the renderer's parameters, and the format that goes with them.
+void SetParameters(std::vector<double> values, FrameSetup& setup);
 
 }  // namespace slabstream

@@ -56,11 +56,13 @@ void ReadRenderer(const v1::FrameSetup& in, FrameSetup& out, Checker& check) {
   if (std::size_t(in.parameters_size()) != parameters.size()) {
     return check.Fail("parameters", std::to_string(in.parameters_size()) + " values, expected " + std::to_string(parameters.size()));
   }
+  std::vector<double> values;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     const auto scope = check.In("parameters", i);
     const double most = parameters[i].choices.empty() ? parameters[i].most : double(parameters[i].choices.size() - 1);
-    out.parameters[i] = check.Between("", in.parameters(int(i)), parameters[i].least, most);
+    values.push_back(check.Between("", in.parameters(int(i)), parameters[i].least, most));
   }
+  SetParameters(std::move(values), out);
 }
 
 }  // namespace

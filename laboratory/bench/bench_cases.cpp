@@ -52,8 +52,8 @@ std::string Stem(const std::string& path) {
 BenchCase SphereCase(const SphereRequest& sphere, double opacity, const RendererKind* renderer) {
   const bool hollow = sphere.sphere_class == SphereClass::kHollow, points = HasDepth(renderer->format());
   const std::string dataset = SphereName(sphere);
-  return {.name = fmt::format("{}{}{}", points ? std::string(renderer->name()) + "-" : std::string(), dataset,
-                              opacity == kOpaqueSphere && !points ? "-opaque" : ""),
+  return {.name = fmt::format("{}{}{}", renderer == FindRenderer(kDefaultRenderer) ? std::string() : std::string(renderer->name()) + "-",
+                              dataset, opacity == kOpaqueSphere && !points ? "-opaque" : ""),
           .purpose = fmt::format("{} sphere, {} voxels a side, {:g} % occupied, opacity {:g} a voxel, {}", hollow ? "hollow" : "filled",
                                  sphere.size, sphere.occupancy * 100, opacity, renderer->title()),
           .dataset = dataset,
@@ -79,6 +79,10 @@ const std::vector<BenchCase>& StandardBenchCases() {
       StandardSphere(SphereClass::kFilled, 256, kOpaqueSphere),
       StandardSphere(SphereClass::kHollow, 512, kTranslucentSphere),
       StandardSphere(SphereClass::kHollow, 256, kOpaqueSphere, FindRenderer("zbuffer")),
+      StandardSphere(SphereClass::kHollow, 256, kTranslucentSphere, FindRenderer("raycast")),
+      StandardSphere(SphereClass::kFilled, 256, kTranslucentSphere, FindRenderer("raycast")),
+      StandardSphere(SphereClass::kHollow, 256, kTranslucentSphere, FindRenderer("mip")),
+      StandardSphere(SphereClass::kFilled, 256, kTranslucentSphere, FindRenderer("mip")),
       BrainCase(),
   };
   return cases;

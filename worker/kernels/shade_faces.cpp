@@ -13,6 +13,7 @@
 #include <numbers>
 
 #include "worker/kernels/draw_faces.h"
+#include "worker/kernels/power-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace slabstream {
@@ -26,30 +27,6 @@ using Floats = hn::Vec<FloatTag>;
 using Uints = hn::Vec<UintTag>;
 
 HWY_INLINE Floats Set(float value) { return hn::Set(FloatTag(), value); }
-
-// base^exponent for base in [0, 1]: 2^(exponent log2(base)). See PowerOfFractionFloat in shade_faces_reference.cpp, operation by operation.
-HWY_INLINE Floats PowerOfFraction(Floats base, float exponent) {
-  const FloatTag df;
-  const IntTag di;
-  const auto positive = hn::Gt(base, hn::Zero(df));
-  // m in [sqrt(1/2), sqrt(2)): the mantissa's upper part is moved to the next exponent.
-  const auto bits = hn::BitCast(di, base);
-  const auto e = hn::ShiftRight<23>(hn::Sub(bits, hn::Set(di, 0x3F3504F3)));
-  const auto m = hn::BitCast(df, hn::Sub(bits, hn::ShiftLeft<23>(e)));
-  const auto s = hn::Div(hn::Sub(m, Set(1)), hn::Add(m, Set(1))), s2 = hn::Mul(s, s);
-  auto series = Set(1.0F / 7);
-  for (float coefficient : {1.0F / 5, 1.0F / 3, 1.0F}) series = hn::Add(hn::Mul(series, s2), Set(coefficient));
-  const auto log2 = hn::Add(hn::ConvertTo(df, e), hn::Mul(hn::Mul(s, series), Set(float(2 / std::numbers::ln2))));
-  const auto power = hn::Max(hn::Mul(log2, Set(exponent)), Set(-126));
-  const auto whole = hn::Floor(hn::Add(power, Set(0.5F)));
-  const auto rest = hn::Mul(hn::Sub(power, whole), Set(float(std::numbers::ln2)));
-  auto result = Set(1.0F / 720);
-  for (float coefficient : {1.0F / 120, 1.0F / 24, 1.0F / 6, 1.0F / 2, 1.0F, 1.0F}) {
-    result = hn::Add(hn::Mul(result, rest), Set(coefficient));
-  }
-  const auto scale = hn::BitCast(df, hn::ShiftLeft<23>(hn::Add(hn::ConvertTo(di, whole), hn::Set(di, 127))));
-  return hn::IfThenElseZero(positive, hn::Mul(result, scale));
-}
 
 struct Normal {
   Floats x, y, z;
@@ -184,7 +161,7 @@ HWY_INLINE void ShadePixels(const FaceShading& shading, const std::uint64_t* HWY
       const auto n_l = Dot(n, shading.light[i]);
       lit = hn::Add(lit, hn::Abs(n_l));
       const auto r_v = hn::Sub(hn::Mul(hn::Add(n_l, n_l), n_v), Set(shading.light_to_viewer[i]));
-      shine = hn::Add(shine, PowerOfFraction(hn::Min(hn::Max(r_v, hn::Zero(df)), Set(1)), shading.shininess));
+      shine = hn::Add(shine, PowerOfFraction(hn::Min(hn::Max(r_v, hn::Zero(df)), Set(1)), Set(shading.shininess)));
     }
     diffuse = hn::IfThenElse(has_normal, hn::Add(Set(shading.ambient), hn::Mul(Set(shading.diffuse), lit)), diffuse);
     specular = hn::IfThenElseZero(has_normal, hn::Mul(Set(shading.specular), shine));

@@ -1,0 +1,22 @@
+// What an intensity projection shows of the samples along a ray.
+#pragma once
+
+#include <cstdint>
+
+#include "common/frame/frame_setup.h"
+
+namespace slabstream::mip {
+
+enum class ProjectionMode : std::uint8_t { kMaximum = 0, kMinimum = 1, kMean = 2 };
+
+// The renderer's parameters, in the order of RendererKind::parameters.
+inline double SamplesPerVoxel(const FrameSetup& setup) { return setup.parameters.at(0); }
+inline ProjectionMode ModeOf(const FrameSetup& setup) { return ProjectionMode(int(setup.parameters.at(1))); }
+
+// What the four channels of a pixel hold. Value: data values from the volume's least (0) to its largest (1).
+//   maximum  kMaximum  (value, 0, 0, 1)
+//   minimum  kMaximum  (1 - value, 0, 0, 1)
+//   mean     kSum      sums of the bytes of min(floor(value * 2^24), 2^24 - 1), highest first, and the number of samples; exact up to
+//                      65793 samples of a ray
+
+}  // namespace slabstream::mip

@@ -1,0 +1,48 @@
+// The ray caster's planning half: the frame is the picture, supersampled where it is minified; images blend front to back.
+#include <algorithm>
+
+#include "common/renderers/raycast/raycast_cost.h"
+
+namespace slabstream::raycast {
+namespace {
+
+class RaycastKind : public RendererKind {
+ public:
+  RaycastKind()
+      : RendererKind({.name = "raycast",
+                      .title = "ray casting",
+                      .purpose = "ray casting: trilinear samples along each pixel's ray, for sharp surfaces inside translucent material",
+                      .format = PixelFormat::kRgba,
+                      .reach = kHalo,  // 2 would do; like the other renderers, so that all use the same cached voxels
+                      .footprint = 1,
+                      .stages = {Stage::kSample},
+                      .parameters = {{.name = "sampling-rate",
+                                      .purpose = "samples along a ray in each voxel length",
+                                      .standard = 1,
+                                      .least = 0.1,
+                                      .most = 16}}}) {}
+
+  Status SetView(const ViewParameters& view, ImageSize size, FrameSetup& setup) const override {
+    setup.camera = MakeSupersampledCamera(view, size, setup.description.geometry);
+    return Status::Ok();
+  }
+
+  // Between two voxels lie all values in between: where the lower one is clear and the upper one too, what lies between them may be
+  // visible. A voxel counts as drawn from the least visible value on: without one, nothing in its reach shows.
+  ClassificationTable DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const override {
+    ClassificationTable table = Classify(transfer, summary.description, summary.range);
+    const auto first = std::ranges::find_if(table.opacity, [](float opacity) { return opacity > 0; });
+    std::for_each(first, table.opacity.end(), [&](float& opacity) { opacity = opacity > 0 ? opacity : table.max_opacity; });
+    return table;
+  }
+  std::unique_ptr<AnalyticCost> MakeCost(const CostBasis& basis) const override { return std::make_unique<RaycastCost>(basis); }
+};
+
+}  // namespace
+
+const RendererKind& Kind() {
+  static const RaycastKind kind;
+  return kind;
+}
+
+}  // namespace slabstream::raycast

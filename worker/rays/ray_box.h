@@ -1,0 +1,37 @@
+// RayBox: what ray kernels need to know of one box. Neither copies nor owns.
+#pragma once
+
+#include "worker/rays/cell_ranges.h"
+#include "worker/rays/padded_voxels.h"
+#include "worker/rays/view_rays.h"
+
+namespace slabstream {
+
+struct RayBox {
+  ScalarType type = ScalarType::kUint8;
+  const std::byte* samples = nullptr;  // of voxel origin - 1: PaddedVoxels::samples
+  Index3 origin;                       // of the voxels' box, less 1: no sample has a floor below
+  std::int32_t row = 0, slice = 0;     // samples from voxel to voxel along y and z
+  Index3 cells;                        // CellGrid::counts
+  Float3 low{}, high{};                // the box owns the positions p with low <= p < high on every axis
+  RayReach reach;                      // of those that may matter
+  bool at_border = false;              // the box touches the volume's border
+};
+
+// The largest array of padded samples that kernels can address, in bytes.
+inline constexpr std::size_t kMostRayBytes = (std::size_t{1} << 31) - 1;
+
+// `box` lies in that of the voxels. `sampled`: samples of the box outside these positions need not be visited.
+struct SampledRegion {
+  Vec3 low, high;
+};
+RayBox MakeRayBox(const PaddedVoxels& voxels, const CellGrid& cells, const Box& box, const SampledRegion& sampled, const ViewRays& rays,
+                  const Camera& camera);
+
+// All positions that the box owns.
+inline SampledRegion WholeBox(const Box& box) {
+  const Vec3 half = {0.5, 0.5, 0.5};
+  return {ToVec3(box.begin) - half, ToVec3(box.end) - half};
+}
+
+}  // namespace slabstream

@@ -1,0 +1,302 @@
+// Packets of neighbouring rays, one to a lane: which samples a box owns, where they lie, and what is interpolated there. Included once for
+// each instruction set, hence the unusual guard. Additions and multiplications are never fused: every instruction set gives the same bits.
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdint>
+
+#include "worker/rays/ray_box.h"
+
+#if defined(SLABSTREAM_WORKER_RAYS_RAY_PACKET_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SLABSTREAM_WORKER_RAYS_RAY_PACKET_INL_H_
+#undef SLABSTREAM_WORKER_RAYS_RAY_PACKET_INL_H_
+#else
+#define SLABSTREAM_WORKER_RAYS_RAY_PACKET_INL_H_
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace slabstream {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using FloatTag = hn::CappedTag<float, 16>;
+using IntTag = hn::RebindToSigned<FloatTag>;
+using Floats = hn::Vec<FloatTag>;
+using Ints = hn::Vec<IntTag>;
+using Mask = hn::Mask<FloatTag>;
+
+// Pixels of a packet, [y][x].
+constexpr std::size_t kLanes = hn::MaxLanes(FloatTag());
+constexpr std::int32_t kPacketWidth = kLanes < 4 ? std::int32_t(kLanes) : 4, kPacketHeight = std::int32_t(kLanes) / kPacketWidth;
+
+HWY_INLINE Floats Set(float value) { return hn::Set(FloatTag(), value); }
+HWY_INLINE Ints SetInt(std::int32_t value) { return hn::Set(IntTag(), value); }
+HWY_INLINE Floats Lerp(Floats t, Floats a, Floats b) { return hn::Add(a, hn::Mul(t, hn::Sub(b, a))); }
+
+struct RayPacket {
+  Floats first[3], move[3];
+  Mask valid;  // pixels of the tile
+};
+
+// The packet whose first pixel is (x, y); pixels from x_end or y_end on are not valid. As RayOf.
+HWY_INLINE RayPacket PacketAt(const ViewRays& view, std::int32_t x, std::int32_t y, std::int32_t x_end, std::int32_t y_end) {
+  const FloatTag df;
+  const IntTag di;
+  const auto lane = hn::Iota(di, 0);
+  const auto lane_x = hn::And(lane, SetInt(kPacketWidth - 1)), lane_y = hn::ShiftRight < kPacketWidth == 4 ? 2
+                                                                        : kPacketWidth == 2                ? 1
+                                                                                                           : 0 > (lane);
+  const auto px = hn::ConvertTo(df, hn::Add(SetInt(x), lane_x)), py = hn::ConvertTo(df, hn::Add(SetInt(y), lane_y));
+  const auto from_x = hn::Sub(px, Set(view.centre_x)), from_y = hn::Sub(py, Set(view.centre_y));
+  RayPacket packet;
+  packet.valid = hn::And(hn::Lt(px, Set(float(x_end))), hn::Lt(py, Set(float(y_end))));
+  const auto one = Set(1);
+  const auto square = hn::Mul(hn::Add(hn::Mul(from_x, from_x), hn::Mul(from_y, from_y)), Set(view.pixel_squared));
+  const auto length = hn::Sqrt(hn::Add(one, square));
+  const auto lag = hn::Div(square, hn::Add(one, length)), scale = hn::Div(Set(view.step), length),
+             shift = hn::Div(Set(view.start_distance), length);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto offset = hn::Add(hn::Mul(from_x, Set(view.right[i])), hn::Mul(from_y, Set(view.down[i])));
+    const auto forward = Set(view.forward[i]), start = Set(view.start[i]);
+    if (view.perspective) {
+      packet.first[i] = hn::Add(start, hn::Mul(shift, hn::Sub(offset, hn::Mul(lag, forward))));
+      packet.move[i] = hn::Mul(scale, hn::Add(forward, offset));
+    } else {
+      packet.first[i] = hn::Add(start, offset);
+      packet.move[i] = hn::Mul(Set(view.step), forward);
+    }
+  }
+  return packet;
+}
+
+// Calls render(packet, rgba) for the packets of a tile of pixels; rgba is room for four floats a lane. Where it returns true, they are
+// copied to the tile's pixels, of which the first is at `to`.
+template <class Render>
+HWY_INLINE void ForEachPacket(const ViewRays& view, const PixelBounds& tile, float* HWY_RESTRICT to, std::size_t floats_a_row,
+                              Render&& render) {
+  for (std::int32_t y = tile.y_begin; y < tile.y_end; y += kPacketHeight) {
+    for (std::int32_t x = tile.x_begin; x < tile.x_end; x += kPacketWidth) {
+      alignas(64) float rgba[4 * kLanes];
+      if (!render(PacketAt(view, x, y, tile.x_end, tile.y_end), rgba)) continue;
+      const std::int32_t width = std::min(kPacketWidth, tile.x_end - x), height = std::min(kPacketHeight, tile.y_end - y);
+      for (std::int32_t row = 0; row < height; ++row) {
+        std::copy_n(rgba + 4 * row * kPacketWidth, 4 * width,
+                    to + std::size_t(y + row - tile.y_begin) * floats_a_row + 4 * std::size_t(x - tile.x_begin));
+      }
+    }
+  }
+}
+
+HWY_INLINE Floats PositionOf(const RayPacket& packet, std::size_t axis, Floats k) {
+  return hn::Add(packet.first[axis], hn::Mul(k, packet.move[axis]));
+}
+
+// Samples [begin, end) of each ray; begin >= end: none.
+struct SampleInterval {
+  Floats begin, end;
+};
+
+// Samples k of [begin, end) at positions p with low <= p < high on every axis. Rounding is monotonic, so each coordinate of a ray is
+// monotonic in k as computed, and the samples inside are one interval: bisection finds its ends exactly.
+HWY_INLINE SampleInterval SamplesInside(const RayPacket& packet, const Float3& low, const Float3& high, std::int32_t begin,
+                                        std::int32_t end) {
+  const FloatTag df;
+  const auto backward = [&](std::size_t i) HWY_ATTR { return hn::Lt(packet.move[i], hn::Zero(df)); };
+  // The sample lies before the box, or past it, along an axis.
+  const auto before = [&](Floats k) HWY_ATTR {
+    Mask any = hn::Lt(k, hn::Zero(df));  // never
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto p = PositionOf(packet, i, k);
+      const auto below = hn::Lt(p, Set(low[i])), above = hn::Ge(p, Set(high[i]));
+      any = hn::Or(any, hn::Or(hn::AndNot(backward(i), below), hn::And(backward(i), above)));
+    }
+    return any;
+  };
+  const auto within_or_before = [&](Floats k) HWY_ATTR {
+    Mask all = hn::Ge(k, hn::Zero(df));  // always
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto p = PositionOf(packet, i, k);
+      const auto not_below = hn::Ge(p, Set(low[i])), not_above = hn::Lt(p, Set(high[i]));
+      all = hn::And(all, hn::Or(hn::AndNot(backward(i), not_above), hn::And(backward(i), not_below)));
+    }
+    return all;
+  };
+  const auto first = Set(float(begin));
+  const auto count = std::uint32_t(end - begin);
+  // Length of the longest beginning of [first, first + count) that fulfils the condition; it holds for no sample after one for which it
+  // does not.
+  Floats lead = hn::Zero(df), held = hn::Zero(df);
+  for (std::uint32_t bit = std::bit_floor(count); bit != 0; bit /= 2) {
+    const auto extend = [&](Floats& length, auto&& condition) HWY_ATTR {
+      const auto longer = hn::Add(length, Set(float(bit)));
+      const auto fits = hn::Le(longer, Set(float(count)));
+      const auto holds = condition(hn::Sub(hn::Add(first, longer), Set(1)));
+      length = hn::IfThenElse(hn::And(fits, holds), longer, length);
+    };
+    extend(lead, before);
+    extend(held, within_or_before);
+  }
+  return {hn::Add(first, lead), hn::IfThenElse(packet.valid, hn::Add(first, held), hn::Zero(df))};
+}
+
+// The samples that the box owns, as far as they may matter.
+HWY_INLINE SampleInterval OwnedSamples(const RayPacket& packet, const RayBox& box) {
+  return SamplesInside(packet, box.low, box.high, box.reach.begin, box.reach.end);
+}
+
+// Where sample k of each ray lies in the box. For rays whose sample the box owns; the others' indices may be anything.
+struct SamplePlace {
+  Floats position[3];
+  Floats fraction[3];  // position - floor
+  Ints voxel[3];       // floor - box.origin
+};
+HWY_INLINE SamplePlace PlaceSample(const RayPacket& packet, const RayBox& box, Floats k) {
+  const IntTag di;
+  SamplePlace place;
+  for (std::size_t i = 0; i < 3; ++i) {
+    place.position[i] = PositionOf(packet, i, k);
+    const auto floor = hn::Floor(place.position[i]);
+    place.fraction[i] = hn::Sub(place.position[i], floor);
+    place.voxel[i] = hn::Sub(hn::ConvertTo(di, floor), SetInt(box.origin[int(i)]));
+  }
+  return place;
+}
+
+// Index of the cell; 0 where not `owned`. kShift: log2 of the cell's side in voxels.
+template <int kShift>
+HWY_INLINE Ints CellOf(const SamplePlace& place, const Index3& cells, Mask owned) {
+  const auto row = hn::Add(hn::Mul(hn::ShiftRight<kShift>(place.voxel[2]), SetInt(cells.y)), hn::ShiftRight<kShift>(place.voxel[1]));
+  const auto index = hn::Add(hn::Mul(row, SetInt(cells.x)), hn::ShiftRight<kShift>(place.voxel[0]));
+  return hn::IfThenElseZero(hn::RebindMask(IntTag(), owned), index);
+}
+
+// What rays leap with: 1 / move by axis, and the steps that a safety margin takes.
+struct LeapScales {
+  Floats inverse[3], margin[3];
+};
+HWY_INLINE LeapScales LeapScalesOf(const RayPacket& packet) {
+  constexpr float kMargin = 1.0F / 64;  // voxels: covers the rounding of positions
+  LeapScales scales;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto least = Set(1e-9F);
+    const auto move = hn::IfThenElse(hn::Lt(hn::Abs(packet.move[i]), least), least, packet.move[i]);
+    scales.inverse[i] = hn::Div(Set(1), move);
+    scales.margin[i] = hn::Mul(hn::Abs(scales.inverse[i]), Set(kMargin));
+  }
+  return scales;
+}
+
+// Steps after which a ray may leave the cells that are less than `cells` away from its own; at least 1. All samples before lie within them.
+template <int kShift>
+HWY_INLINE Floats StepsWithin(const RayBox& box, const LeapScales& scales, const SamplePlace& place, Floats cells) {
+  const FloatTag df;
+  constexpr float kSide = float(1 << kShift);
+  Floats steps = Set(1e9F);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto cell = hn::ConvertTo(df, hn::ShiftRight<kShift>(place.voxel[i]));
+    const auto inside = hn::Sub(place.position[i], Set(float(box.origin[int(i)])));
+    const auto ahead = hn::IfThenElse(hn::Lt(scales.inverse[i], hn::Zero(df)), hn::Sub(Set(1), cells), cells);
+    const auto way = hn::Sub(hn::Mul(hn::Add(cell, ahead), Set(kSide)), inside);
+    steps = hn::Min(steps, hn::Sub(hn::Mul(way, scales.inverse[i]), scales.margin[i]));
+  }
+  return hn::Add(hn::Floor(hn::Max(steps, hn::Zero(df))), Set(1));
+}
+
+// --- Interpolation. Four voxels along x around a sample: one before its floor, its floor, and two after it.
+
+struct InnerPair {
+  Floats a, b;  // the middle two
+  Ints word;    // 8-bit samples: all four
+};
+
+// `at`: index of the first of the four voxels, in samples.
+HWY_INLINE InnerPair LoadInner(const std::uint8_t* samples, Ints at) {
+  const FloatTag df;
+  const IntTag di;
+  const auto word = hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(samples), at);
+  const auto byte = SetInt(0xFF);
+  return {hn::ConvertTo(df, hn::And(hn::ShiftRight<8>(word), byte)), hn::ConvertTo(df, hn::And(hn::ShiftRight<16>(word), byte)), word};
+}
+HWY_INLINE InnerPair LoadInner(const std::uint16_t* samples, Ints at) {
+  const FloatTag df;
+  const IntTag di;
+  const auto word = hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(samples + 1), hn::Add(at, at));
+  const auto low = SetInt(0xFFFF);
+  return {hn::ConvertTo(df, hn::And(word, low)), hn::ConvertTo(df, hn::And(hn::ShiftRight<16>(word), low)), word};
+}
+HWY_INLINE InnerPair LoadInner(const float* samples, Ints at) {
+  const FloatTag df;
+  return {hn::GatherIndex(df, samples + 1, at), hn::GatherIndex(df, samples + 2, at), at};
+}
+
+// What the outer two are further: b - first and last - a, twice the slope at a and at b.
+struct OuterSlopes {
+  Floats at_a, at_b;
+};
+HWY_INLINE OuterSlopes LoadSlopes(const std::uint8_t* /*samples*/, Ints /*at*/, const InnerPair& inner) {
+  const FloatTag df;
+  const auto byte = SetInt(0xFF);
+  const auto first = hn::ConvertTo(df, hn::And(inner.word, byte)), last = hn::ConvertTo(df, hn::And(hn::ShiftRight<24>(inner.word), byte));
+  return {hn::Sub(inner.b, first), hn::Sub(last, inner.a)};
+}
+HWY_INLINE OuterSlopes LoadSlopes(const std::uint16_t* samples, Ints at, const InnerPair& inner) {
+  const FloatTag df;
+  const IntTag di;
+  const auto low = SetInt(0xFFFF), offset = hn::Add(at, at);
+  const auto* const words = reinterpret_cast<const std::int32_t*>(samples);
+  const auto first = hn::ConvertTo(df, hn::And(hn::GatherOffset(di, words, offset), low));
+  const auto last = hn::ConvertTo(df, hn::And(hn::ShiftRight<16>(hn::GatherOffset(di, words + 1, offset)), low));
+  return {hn::Sub(inner.b, first), hn::Sub(last, inner.a)};
+}
+HWY_INLINE OuterSlopes LoadSlopes(const float* samples, Ints at, const InnerPair& inner) {
+  const FloatTag df;
+  return {hn::Sub(inner.b, hn::GatherIndex(df, samples, at)), hn::Sub(hn::GatherIndex(df, samples + 3, at), inner.a)};
+}
+
+// The eight voxels around a sample, in rows along x: [z][y].
+template <class T>
+struct Neighbours {
+  const T* samples;
+  Ints row, slice;  // strides
+  Ints at;          // the first of the four voxels along x, one row and one slice before the sample's floor
+  InnerPair inner[2][2];
+
+  // Row y, z of 0 ... 3, of which 1 and 2 are around the sample.
+  HWY_INLINE Ints RowAt(int y, int z) const {
+    auto index = at;
+    for (int i = 0; i < y; ++i) index = hn::Add(index, row);
+    for (int i = 0; i < z; ++i) index = hn::Add(index, slice);
+    return index;
+  }
+};
+
+template <class T>
+HWY_INLINE Neighbours<T> LoadNeighbours(const RayBox& box, const SamplePlace& place, Mask owned) {
+  Neighbours<T> n;
+  n.samples = reinterpret_cast<const T*>(box.samples);
+  n.row = SetInt(box.row);
+  n.slice = SetInt(box.slice);
+  const auto at = hn::Add(hn::Add(hn::Mul(place.voxel[2], n.slice), hn::Mul(place.voxel[1], n.row)), place.voxel[0]);
+  n.at = hn::IfThenElseZero(hn::RebindMask(IntTag(), owned), at);
+  for (int z = 0; z < 2; ++z) {
+    for (int y = 0; y < 2; ++y) n.inner[z][y] = LoadInner(n.samples, n.RowAt(y + 1, z + 1));
+  }
+  return n;
+}
+
+// Along x of the four rows, then along y, then along z.
+template <class T>
+HWY_INLINE Floats Interpolate(const Neighbours<T>& n, const SamplePlace& place) {
+  const auto along_x = [&](const InnerPair& pair) HWY_ATTR { return Lerp(place.fraction[0], pair.a, pair.b); };
+  const auto low = Lerp(place.fraction[1], along_x(n.inner[0][0]), along_x(n.inner[0][1]));
+  const auto high = Lerp(place.fraction[1], along_x(n.inner[1][0]), along_x(n.inner[1][1]));
+  return Lerp(place.fraction[2], low, high);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace slabstream
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,56 @@
+#include "worker/rays/ray_volume.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace slabstream {
+
+std::vector<Box> CutIntoLayers(const Box& box, ScalarType type, std::size_t most_bytes) {
+  const Index3 size = box.size();
+  const std::int64_t slice = std::int64_t{size.x + 2 * kPad} * (size.y + 2 * kPad) * std::int64_t(BytesPerSample(type));
+  const std::int64_t slices = std::max<std::int64_t>(std::int64_t(most_bytes) / slice - 2 * kPad, 1);
+  std::vector<Box> layers;
+  for (std::int64_t z = box.begin.z; z < box.end.z; z += slices) {
+    layers.push_back(box);
+    layers.back().begin.z = std::int32_t(z);
+    layers.back().end.z = std::int32_t(std::min<std::int64_t>(z + slices, box.end.z));
+  }
+  return layers;
+}
+
+const std::vector<RayPiece>& RayVolume::PiecesOf(const SlabData& slab) {
+  if (!pieces_.empty()) return pieces_;
+  const VoxelBricks bricks = slab.bricks();
+  for (const Box& layer : CutIntoLayers(bricks.box(), bricks.type(), kMostRayBytes)) {
+    RayPiece piece;
+    piece.voxels = Pad(bricks, layer);
+    piece.cells = FindCellRanges(piece.voxels);
+    pieces_.push_back(std::move(piece));
+  }
+  return pieces_;
+}
+
+std::size_t RayVolume::bytes() const {
+  std::size_t total = 0;
+  for (const RayPiece& piece : pieces_) total += piece.voxels.bytes() + piece.cells.bytes();
+  return total;
+}
+
+std::vector<std::size_t> NearestFirst(std::span<const RayPiece> pieces, const Camera& camera) {
+  std::vector<std::size_t> order(pieces.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  if (camera.projection == Projection::kOrthographic) {
+    if (camera.view_direction.z < 0) std::ranges::reverse(order);
+    return order;
+  }
+  // A ray meets pieces on one side of the eye only, so how those on both sides are mixed does not matter.
+  const auto distance = [&](std::size_t piece) {
+    const Box& box = pieces[piece].voxels.box;
+    return std::abs(std::clamp(camera.eye.z, box.begin.z - 0.5, box.end.z - 0.5) - camera.eye.z);
+  };
+  std::ranges::stable_sort(order, {}, distance);
+  return order;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,37 @@
+// RayVolume: the voxels of a slab as ray kernels read them. Image-order renderers share it; it stays with the slab between frames.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "common/view/camera.h"
+#include "worker/rays/ray_box.h"
+#include "worker/renderers/slab_data.h"
+
+namespace slabstream {
+
+// Kernels address so many bytes. A larger slab is cut into pieces along z, which are rendered like boxes of a partition.
+struct RayPiece {
+  PaddedVoxels voxels;
+  CellRanges cells;
+};
+
+class RayVolume : public SlabCache {
+ public:
+  // Made by the first call. Parallel.
+  const std::vector<RayPiece>& PiecesOf(const SlabData& slab);
+
+  std::size_t bytes() const override;
+
+ private:
+  std::vector<RayPiece> pieces_;  // lowest z first
+};
+
+// `box` in layers along z, whose padded samples take at most `most_bytes`, but at least one slice each.
+std::vector<Box> CutIntoLayers(const Box& box, ScalarType type, std::size_t most_bytes);
+
+// Numbers of the pieces in visibility order, nearest first.
+std::vector<std::size_t> NearestFirst(std::span<const RayPiece> pieces, const Camera& camera);
+
+}  // namespace slabstream

@@ -1,0 +1,96 @@
+#include "worker/rays/view_rays.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace slabstream {
+namespace {
+
+Float3 ToFloat3(const Vec3& v) { return {float(v.x), float(v.y), float(v.z)}; }
+
+}  // namespace
+
+ViewRays MakeViewRays(const Camera& camera, const VolumeGeometry& geometry, double samples_per_voxel) {
+  const Vec3 spacing = geometry.spacing;
+  const double step = std::min({spacing.x, spacing.y, spacing.z}) / samples_per_voxel;
+  const double radius = 0.5 * Length(ToVec3(geometry.size) * spacing);
+  const double centre_depth = camera.Project(0.5 * (ToVec3(geometry.size) - Vec3{1, 1, 1})).depth;
+  const double first = std::max(std::floor((centre_depth - radius) / step), 0.0);
+
+  ViewRays rays;
+  rays.perspective = camera.projection == Projection::kPerspective;
+  // Whole and half numbers: a pixel's place relative to the centre is exact in single precision.
+  rays.centre_x = float(0.5 * camera.width - 0.5);
+  rays.centre_y = float(0.5 * camera.height - 0.5);
+  const double x = 0.5 * camera.width, y = 0.5 * camera.height;
+  const auto offset = [&](const Camera::Ray& from, const Camera::Ray& to) {
+    return rays.perspective ? to.direction - from.direction : to.origin - from.origin;
+  };
+  const Camera::Ray centre = camera.RayAt(x, y);
+  const Vec3 right = offset(centre, camera.RayAt(x + 1, y));
+  rays.right = ToFloat3(right);
+  rays.down = ToFloat3(offset(centre, camera.RayAt(x, y + 1)));
+  rays.forward = ToFloat3(centre.direction);
+  rays.start = ToFloat3(centre.origin + first * step * centre.direction);
+  rays.pixel_squared = float(Dot(right * spacing, right * spacing));
+  rays.start_distance = float(first * step);
+  rays.step = float(step);
+  rays.sample_count = std::int32_t(std::ceil((centre_depth + radius) / step) - first) + 1;
+  rays.volume_end = ToFloat3(ToVec3(geometry.size) - Vec3{0.5, 0.5, 0.5});
+  return rays;
+}
+
+PixelRay RayOf(const ViewRays& rays, std::int32_t x, std::int32_t y) {
+  const float from_x = float(x) - rays.centre_x, from_y = float(y) - rays.centre_y;
+  PixelRay ray{};
+  // Perspective: the unit vector along the ray is (forward + offset) / length. The first sample is written relative to that of the central
+  // ray, so that nothing cancels where the eye is far away: 1 / length - 1 = -square / (length (1 + length)).
+  const float square = (from_x * from_x + from_y * from_y) * rays.pixel_squared;
+  const float length = std::sqrt(1 + square);
+  const float lag = square / (1 + length), scale = rays.step / length, shift = rays.start_distance / length;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const float offset = from_x * rays.right[i] + from_y * rays.down[i];
+    ray.first[i] = rays.start[i] + (rays.perspective ? shift * (offset - lag * rays.forward[i]) : offset);
+    ray.move[i] = rays.perspective ? scale * (rays.forward[i] + offset) : rays.step * rays.forward[i];
+  }
+  return ray;
+}
+
+Float3 SamplePosition(const PixelRay& ray, std::int32_t k) {
+  Float3 position{};
+  for (std::size_t i = 0; i < 3; ++i) position[i] = ray.first[i] + float(k) * ray.move[i];
+  return position;
+}
+
+RayReach ReachOfBox(const ViewRays& rays, const Camera& camera, const Vec3& low, const Vec3& high) {
+  constexpr double kPixelSlack = 0.01;
+  constexpr std::int32_t kSampleSlack = 2;
+  double left = camera.width, right = 0, top = camera.height, bottom = 0, nearest = 1e300, farthest = 0;
+  // Positions of samples are rounded: see the header.
+  const double error =
+      0x1p-21 * std::max({1.0, std::abs(low.x), std::abs(low.y), std::abs(low.z), std::abs(high.x), std::abs(high.y), std::abs(high.z)});
+  const Vec3 from = low - Vec3{error, error, error}, to = high + Vec3{error, error, error};
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3 p = {corner & 1 ? to.x : from.x, corner & 2 ? to.y : from.y, corner & 4 ? to.z : from.z};
+    const Camera::ImagePoint at = camera.Project(p);
+    left = std::min(left, at.x);
+    right = std::max(right, at.x);
+    top = std::min(top, at.y);
+    bottom = std::max(bottom, at.y);
+    nearest = std::min(nearest, at.depth);  // no point is nearer to the eye than its plane of depth
+    farthest = std::max(farthest, rays.perspective ? Length((p - camera.eye) * camera.spacing) : at.depth);
+  }
+  const auto sample = [&](double distance) { return std::int32_t((distance - double(rays.start_distance)) / double(rays.step)); };
+  // A pixel counts if its centre lies within.
+  const auto first_pixel = [](double x, std::int32_t count) {
+    return std::int32_t(std::clamp(std::ceil(x - 0.5 - kPixelSlack), 0.0, double(count)));
+  };
+  RayReach reach;
+  reach.begin = std::clamp(sample(nearest) - kSampleSlack, 0, rays.sample_count);
+  reach.end = std::clamp(sample(farthest) + 1 + kSampleSlack, reach.begin, rays.sample_count);
+  reach.pixels = {first_pixel(left, camera.width), first_pixel(top, camera.height), first_pixel(right + 2 * kPixelSlack, camera.width),
+                  first_pixel(bottom + 2 * kPixelSlack, camera.height)};
+  return reach;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,159 @@
+#include "worker/renderers/mip/project.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "worker/renderers/mip/project.cpp"
+#include <hwy/foreach_target.h>
+// Highway wants this order.
+#include <hwy/highway.h>
+
+#include <limits>
+
+#include "worker/rays/ray_packet-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace slabstream {
+namespace HWY_NAMESPACE {
+
+// Interpolated samples, kept within the range of their voxels. Lanes that are not in `valid` hold anything.
+struct Samples {
+  Floats values;
+  Mask valid;
+};
+template <class T>
+HWY_INLINE Samples SamplesAt(const RayBox& box, const SamplePlace& place, Mask owned) {
+  const Neighbours<T> n = LoadNeighbours<T>(box, place, owned);
+  const auto value = Interpolate(n, place);
+  Floats least = n.inner[0][0].a, largest = n.inner[0][0].a;
+  for (const auto& row : n.inner) {
+    for (const InnerPair& pair : row) {
+      least = hn::Min(least, hn::Min(pair.a, pair.b));
+      largest = hn::Max(largest, hn::Max(pair.a, pair.b));
+    }
+  }
+  const auto finite = hn::Le(hn::Abs(value), Set(std::numeric_limits<float>::max()));
+  return {hn::Min(hn::Max(value, least), largest), hn::And(owned, finite)};
+}
+
+HWY_INLINE Floats ValueOf(const ProjectWork& work, Floats samples) {
+  const auto value = hn::Mul(hn::Sub(samples, Set(work.low)), Set(work.scale));
+  return hn::Abs(hn::Min(hn::Max(value, hn::Zero(FloatTag())), Set(1)));  // without a sign of 0
+}
+
+// Whether any of a packet's rays has a sample in the box; `pixels` then holds them all.
+template <class T>
+HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet, float* HWY_RESTRICT pixels) {
+  const FloatTag df;
+  const RayBox& box = *work.box;
+  const SampleInterval owned = OwnedSamples(packet, box);
+  const LeapScales leaps = LeapScalesOf(packet);
+  const auto sign = Set(work.sign), most = Set(work.bounds->most);
+  const Index3& cells = box.cells;
+  const Index3& blocks = work.bounds->block_counts;
+  // Each ray goes on by itself: its next sample is k. It ends behind the box, or once it has found the most that the box holds.
+  auto k = owned.begin;
+  auto alive = hn::Lt(k, owned.end);
+  auto best = Set(std::numeric_limits<float>::lowest());
+  auto found = hn::Lt(best, best);  // none
+  bool rising = true;               // most of the last samples were larger than those before
+  while (!hn::AllFalse(df, alive)) {
+    const SamplePlace place = PlaceSample(packet, box, k);
+    // Rays leap over blocks and cells that cannot hold more than was found; the others go on to their next sample.
+    auto sampled = alive;
+    auto steps = Set(1);
+    if (!rising) {
+      const auto block = hn::GatherIndex(df, work.bounds->blocks.data(), CellOf<kBlockShift>(place, blocks, alive));
+      const auto dull_block = hn::Le(block, best);
+      steps = hn::IfThenElse(dull_block, StepsWithin<kBlockShift>(box, leaps, place, Set(1)), steps);
+      sampled = hn::AndNot(dull_block, sampled);
+      if (!hn::AllFalse(df, sampled)) {
+        const auto cell = hn::GatherIndex(df, work.bounds->cells.data(), CellOf<kCellShift>(place, cells, sampled));
+        const auto dull_cell = hn::AndNot(dull_block, hn::Le(cell, best));
+        steps = hn::IfThenElse(dull_cell, StepsWithin<kCellShift>(box, leaps, place, Set(1)), steps);
+        sampled = hn::AndNot(dull_cell, sampled);
+      }
+    }
+    k = hn::Add(k, steps);
+    alive = hn::And(alive, hn::Lt(k, owned.end));
+    if (hn::AllFalse(df, sampled)) continue;
+
+    const Samples samples = SamplesAt<T>(box, place, sampled);
+    const auto candidate = hn::Mul(samples.values, sign);
+    const auto larger = hn::And(samples.valid, hn::Gt(candidate, best));
+    rising = hn::CountTrue(df, larger) > kLanes / 2;
+    best = hn::IfThenElse(larger, candidate, best);
+    found = hn::Or(found, samples.valid);
+    alive = hn::And(alive, hn::Lt(best, most));
+  }
+  if (hn::AllFalse(df, found)) return false;
+  auto value = ValueOf(work, hn::Mul(best, sign));
+  if (work.complement) value = hn::Sub(Set(1), value);
+  const auto zero = hn::Zero(df);
+  hn::StoreInterleaved4(hn::IfThenElseZero(found, value), zero, zero, hn::IfThenElseZero(found, Set(1)), df, pixels);
+  return true;
+}
+
+template <class T>
+HWY_INLINE bool SumOfPacket(const ProjectWork& work, const RayPacket& packet, float* HWY_RESTRICT pixels) {
+  const FloatTag df;
+  const IntTag di;
+  const RayBox& box = *work.box;
+  const SampleInterval owned = OwnedSamples(packet, box);
+  const auto begin = hn::MinOfLanes(df, hn::IfThenElse(hn::Lt(owned.begin, owned.end), owned.begin, owned.end));
+  const float end = hn::GetLane(hn::MaxOfLanes(df, owned.end));
+  Ints high = hn::Zero(di), middle = high, low = high, count = high;
+  const auto byte = SetInt(0xFF), one = SetInt(1);
+  for (float k = hn::GetLane(begin); k < end; k += 1) {
+    const auto sample = Set(k);
+    const auto active = hn::And(hn::Ge(sample, owned.begin), hn::Lt(sample, owned.end));
+    const Samples samples = SamplesAt<T>(box, PlaceSample(packet, box, sample), active);
+    const auto valid = hn::RebindMask(di, samples.valid);
+    const auto value = hn::ConvertTo(di, hn::Mul(ValueOf(work, samples.values), Set(0x1p24F)));
+    const auto fixed = hn::IfThenElseZero(valid, hn::Min(value, SetInt(0xFFFFFF)));
+    high = hn::Add(high, hn::ShiftRight<16>(fixed));
+    middle = hn::Add(middle, hn::And(hn::ShiftRight<8>(fixed), byte));
+    low = hn::Add(low, hn::And(fixed, byte));
+    count = hn::Add(count, hn::IfThenElseZero(valid, one));
+  }
+  if (hn::AllTrue(di, hn::Eq(count, hn::Zero(di)))) return false;
+  hn::StoreInterleaved4(hn::ConvertTo(df, high), hn::ConvertTo(df, middle), hn::ConvertTo(df, low), hn::ConvertTo(df, count), df, pixels);
+  return true;
+}
+
+template <class T>
+HWY_INLINE void Project(const ProjectWork& work, const PixelBounds& tile, float* HWY_RESTRICT pixels, std::size_t floats_a_row) {
+  ForEachPacket(*work.rays, tile, pixels, floats_a_row, [&](const RayPacket& packet, float* HWY_RESTRICT result) HWY_ATTR {
+    return work.bounds != nullptr ? ExtremeOfPacket<T>(work, packet, result) : SumOfPacket<T>(work, packet, result);
+  });
+}
+
+void Project8(const ProjectWork& work, const PixelBounds& tile, float* pixels, std::size_t row) {
+  Project<std::uint8_t>(work, tile, pixels, row);
+}
+void Project16(const ProjectWork& work, const PixelBounds& tile, float* pixels, std::size_t row) {
+  Project<std::uint16_t>(work, tile, pixels, row);
+}
+void ProjectFloat(const ProjectWork& work, const PixelBounds& tile, float* pixels, std::size_t row) {
+  Project<float>(work, tile, pixels, row);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace slabstream
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace slabstream {
+HWY_EXPORT(Project8);
+HWY_EXPORT(Project16);
+HWY_EXPORT(ProjectFloat);
+
+void ProjectTile(const ProjectWork& work, const PixelBounds& tile, float* pixels, std::size_t floats_a_row) {
+  switch (work.box->type) {
+    case ScalarType::kUint8: return HWY_DYNAMIC_DISPATCH(Project8)(work, tile, pixels, floats_a_row);
+    case ScalarType::kUint16: return HWY_DYNAMIC_DISPATCH(Project16)(work, tile, pixels, floats_a_row);
+    case ScalarType::kFloat32: break;
+  }
+  HWY_DYNAMIC_DISPATCH(ProjectFloat)(work, tile, pixels, floats_a_row);
+}
+
+}  // namespace slabstream
+#endif

@@ -1,0 +1,18 @@
+// EmptyDistance: for each cell the Chebyshev distance, in cells, to the nearest one that shows anything; 0 in such a cell. A ray in a cell
+// of distance d may leap over everything less than d cells away (Zuiderveld et al. 1992 call such a map proximity clouds).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "worker/rays/cell_ranges.h"
+#include "worker/renderers/raycast/ray_look.h"
+
+namespace slabstream {
+
+inline constexpr std::size_t kEmptyDistancePadding = 3;  // bytes after the last distance: kernels read four at a time
+
+// [z][y][x] and the padding; at most 255.
+std::vector<std::uint8_t> EmptyDistances(const CellRanges& cells, const VisibleSamples& visible);
+
+}  // namespace slabstream

@@ -1,0 +1,211 @@
+#include "worker/renderers/raycast/march.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "worker/renderers/raycast/march.cpp"
+#include <hwy/foreach_target.h>
+// Highway wants this order.
+#include <hwy/highway.h>
+
+#include <limits>
+
+#include "worker/kernels/power-inl.h"
+#include "worker/rays/ray_packet-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace slabstream {
+namespace HWY_NAMESPACE {
+
+// Central differences, times two, of stored samples around a place, interpolated.
+struct Gradient {
+  Floats x, y, z;
+};
+
+template <class T>
+HWY_INLINE Gradient GradientAt(const Neighbours<T>& n, const SamplePlace& place) {
+  const auto u = place.fraction[0], v = place.fraction[1], w = place.fraction[2];
+  // Row y, z of 0 ... 3, interpolated along x.
+  const auto inner = [&](int y, int z) HWY_ATTR { return Lerp(u, n.inner[z - 1][y - 1].a, n.inner[z - 1][y - 1].b); };
+  const auto outer = [&](int y, int z) HWY_ATTR {
+    const InnerPair pair = LoadInner(n.samples, n.RowAt(y, z));
+    return Lerp(u, pair.a, pair.b);
+  };
+  const auto slope = [&](int y, int z) HWY_ATTR {
+    const OuterSlopes slopes = LoadSlopes(n.samples, n.RowAt(y, z), n.inner[z - 1][y - 1]);
+    return Lerp(u, slopes.at_a, slopes.at_b);
+  };
+  const auto r11 = inner(1, 1), r21 = inner(2, 1), r12 = inner(1, 2), r22 = inner(2, 2);
+  const auto along_y = [&](Floats first, Floats a, Floats b, Floats last) HWY_ATTR { return Lerp(v, hn::Sub(b, first), hn::Sub(last, a)); };
+  const auto along_z = [&](Floats first, Floats a, Floats b, Floats last) HWY_ATTR { return Lerp(w, hn::Sub(b, first), hn::Sub(last, a)); };
+  return {Lerp(w, Lerp(v, slope(1, 1), slope(2, 1)), Lerp(v, slope(1, 2), slope(2, 2))),
+          Lerp(w, along_y(outer(0, 1), r11, r21, outer(3, 1)), along_y(outer(0, 2), r12, r22, outer(3, 2))),
+          Lerp(v, along_z(outer(1, 0), r11, r12, outer(1, 3)), along_z(outer(2, 0), r21, r22, outer(2, 3)))};
+}
+
+struct Light {
+  Floats diffuse, specular;
+};
+
+HWY_INLINE Light LightOf(const RayLook& look, const Gradient& g) {
+  const FloatTag df;
+  const auto dot = [&](const Float3& v)
+                       HWY_ATTR { return hn::Add(hn::Add(hn::Mul(g.x, Set(v[0])), hn::Mul(g.y, Set(v[1]))), hn::Mul(g.z, Set(v[2]))); };
+  const auto nx = hn::Mul(g.x, Set(look.inverse_spacing[0])), ny = hn::Mul(g.y, Set(look.inverse_spacing[1])),
+             nz = hn::Mul(g.z, Set(look.inverse_spacing[2]));
+  const auto square = hn::Add(hn::Add(hn::Mul(nx, nx), hn::Mul(ny, ny)), hn::Mul(nz, nz));
+  const auto has_gradient = hn::And(hn::Gt(square, hn::Zero(df)), hn::Le(square, Set(std::numeric_limits<float>::max())));
+  const auto per_length = hn::Div(Set(1), hn::Sqrt(hn::IfThenElse(has_gradient, square, Set(1))));
+  const auto n_v = hn::Mul(dot(look.viewer), per_length);
+  auto lit = hn::Zero(df), shine = hn::Zero(df);
+  for (const RayLook::Light& light : look.lights) {
+    const auto n_l = hn::Mul(dot(light.direction), per_length);
+    lit = hn::Add(lit, hn::Abs(n_l));
+    const auto r_v = hn::Sub(hn::Mul(hn::Add(n_l, n_l), n_v), Set(light.to_viewer));
+    shine = hn::Add(shine, PowerOfFraction(hn::Min(hn::Max(r_v, hn::Zero(df)), Set(1)), Set(look.shininess)));
+  }
+  return {hn::IfThenElse(has_gradient, hn::MulAdd(lit, Set(look.diffuse), Set(look.ambient)), Set(look.diffuse_without_gradient)),
+          hn::IfThenElseZero(has_gradient, hn::Mul(shine, Set(look.specular)))};
+}
+
+// A sample stands for half a step of its ray on each side. For the first and the last sample in the volume that part reaches to where the
+// ray enters or leaves the volume, between 0 and 1 step away.
+struct EndSamples {
+  Floats first, last;                // k
+  Floats first_excess, last_excess;  // steps, [-0.5, 0.5]
+};
+HWY_INLINE EndSamples EndSamplesOf(const ViewRays& view, const RayPacket& packet, const LeapScales& scales) {
+  const Float3 low = {-0.5F, -0.5F, -0.5F}, &high = view.volume_end;
+  const SampleInterval inside = SamplesInside(packet, low, high, 0, view.sample_count);
+  auto enter = Set(-1e9F), leave = Set(1e9F);  // in samples
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto a = hn::Mul(hn::Sub(Set(low[i]), packet.first[i]), scales.inverse[i]);
+    const auto b = hn::Mul(hn::Sub(Set(high[i]), packet.first[i]), scales.inverse[i]);
+    enter = hn::Max(enter, hn::Min(a, b));
+    leave = hn::Min(leave, hn::Max(a, b));
+  }
+  const auto half = Set(0.5F);
+  const auto limited = [&](Floats excess) HWY_ATTR { return hn::Min(hn::Max(excess, hn::Neg(half)), half); };
+  const auto last = hn::Sub(inside.end, Set(1));
+  return {inside.begin, last, limited(hn::Sub(hn::Sub(inside.begin, enter), half)), limited(hn::Sub(hn::Sub(leave, last), half))};
+}
+
+// The rays of one packet.
+template <class T>
+HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& packet, float* HWY_RESTRICT rgba) {
+  const FloatTag df;
+  const IntTag di;
+  const RayBox& box = *work.box;
+  const RayLook& look = *work.look;
+  const SampleInterval owned = OwnedSamples(packet, box);
+  const LeapScales leaps = LeapScalesOf(packet);
+  const auto zero = hn::Zero(df), one = Set(1);
+  // A ray that transmits less ends.
+  const auto opaque = Set(1 - work.termination);
+  const float* const entries = look.entries.data();
+
+  const bool at_border = box.at_border;
+  EndSamples ends{zero, zero, zero, zero};
+  if (at_border) ends = EndSamplesOf(*work.rays, packet, leaps);
+
+  Floats red = zero, green = zero, blue = zero, alpha = zero;
+  // Each ray goes on by itself: its next sample is k.
+  auto k = owned.begin;
+  auto alive = hn::Lt(k, owned.end);
+  bool in_matter = false;  // most of the last samples were visible
+  std::uint64_t shaded = 0;
+  while (!hn::AllFalse(df, alive)) {
+    const SamplePlace place = PlaceSample(packet, box, k);
+    // Rays in empty space leap ahead; the others go on to their next sample.
+    auto sampled = alive;
+    auto steps = one;
+    if (!in_matter) {
+      const auto cell = CellOf<kCellShift>(place, box.cells, alive);
+      const auto distance = hn::And(hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(work.empty_distance), cell), SetInt(0xFF));
+      const auto empty = hn::RebindMask(df, hn::Gt(distance, hn::Zero(di)));
+      sampled = hn::AndNot(empty, alive);
+      steps = hn::IfThenElse(empty, StepsWithin<kCellShift>(box, leaps, place, hn::ConvertTo(df, distance)), one);
+    }
+    const auto this_k = k;
+    k = hn::Add(k, steps);
+    alive = hn::And(alive, hn::Lt(k, owned.end));
+    if (hn::AllFalse(df, sampled)) continue;
+
+    const Neighbours<T> neighbours = LoadNeighbours<T>(box, place, sampled);
+    const auto value = Interpolate(neighbours, place);
+    const auto finite = hn::Le(hn::Abs(value), Set(std::numeric_limits<float>::max()));
+    const auto number =
+        hn::Min(hn::Max(hn::Add(hn::Mul(hn::Sub(value, Set(look.origin)), Set(look.scale)), Set(look.rounding)), zero), Set(look.last));
+    const auto entry = hn::ShiftLeft<2>(hn::ConvertTo(di, hn::IfThenElseZero(finite, number)));
+    auto opacity = hn::GatherIndex(df, entries + 3, entry);
+    const auto visible = hn::And(hn::And(sampled, finite), hn::Gt(opacity, zero));
+    const std::size_t count = hn::CountTrue(df, visible);
+    in_matter = count > kLanes / 2;
+    if (count == 0) continue;
+    shaded += count;
+
+    if (at_border) {
+      const auto is_first = hn::Eq(this_k, ends.first), is_last = hn::Eq(this_k, ends.last);
+      if (!hn::AllFalse(df, hn::And(visible, hn::Or(is_first, is_last)))) {
+        const auto steps_of_first = hn::Add(one, hn::IfThenElseZero(is_first, ends.first_excess));
+        const auto power = hn::Add(steps_of_first, hn::IfThenElseZero(is_last, ends.last_excess));
+        opacity = hn::Sub(one, PowerOfFraction(hn::Sub(one, opacity), power));
+      }
+    }
+    Light light = {one, zero};
+    if (look.phong) light = LightOf(look, GradientAt(neighbours, place));
+    const auto weight = hn::IfThenElseZero(visible, hn::Mul(hn::Sub(one, alpha), opacity));
+    const auto add = [&](Floats& sum, const float* colors) HWY_ATTR {
+      const auto color = hn::MulAdd(hn::GatherIndex(df, colors, entry), light.diffuse, light.specular);
+      sum = hn::MulAdd(weight, hn::Min(hn::Max(color, zero), one), sum);
+    };
+    add(red, entries);
+    add(green, entries + 1);
+    add(blue, entries + 2);
+    alpha = hn::Add(alpha, weight);
+    alive = hn::And(alive, hn::Lt(alpha, opaque));
+  }
+  if (shaded != 0) hn::StoreInterleaved4(red, green, blue, alpha, df, rgba);
+  return shaded;
+}
+
+template <class T>
+HWY_INLINE std::uint64_t March(const MarchWork& work, const PixelBounds& tile, float* HWY_RESTRICT rgba, std::size_t floats_a_row) {
+  std::uint64_t shaded = 0;
+  ForEachPacket(*work.rays, tile, rgba, floats_a_row, [&](const RayPacket& packet, float* HWY_RESTRICT pixels) HWY_ATTR {
+    const std::uint64_t found = MarchPacket<T>(work, packet, pixels);
+    shaded += found;
+    return found != 0;
+  });
+  return shaded;
+}
+
+std::uint64_t March8(const MarchWork& work, const PixelBounds& tile, float* rgba, std::size_t row) {
+  return March<std::uint8_t>(work, tile, rgba, row);
+}
+std::uint64_t March16(const MarchWork& work, const PixelBounds& tile, float* rgba, std::size_t row) {
+  return March<std::uint16_t>(work, tile, rgba, row);
+}
+std::uint64_t MarchFloat(const MarchWork& work, const PixelBounds& tile, float* rgba, std::size_t row) {
+  return March<float>(work, tile, rgba, row);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace slabstream
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace slabstream {
+HWY_EXPORT(March8);
+HWY_EXPORT(March16);
+HWY_EXPORT(MarchFloat);
+
+std::uint64_t MarchTile(const MarchWork& work, const PixelBounds& tile, float* rgba, std::size_t floats_a_row) {
+  switch (work.box->type) {
+    case ScalarType::kUint8: return HWY_DYNAMIC_DISPATCH(March8)(work, tile, rgba, floats_a_row);
+    case ScalarType::kUint16: return HWY_DYNAMIC_DISPATCH(March16)(work, tile, rgba, floats_a_row);
+    case ScalarType::kFloat32: break;
+  }
+  return HWY_DYNAMIC_DISPATCH(MarchFloat)(work, tile, rgba, floats_a_row);
+}
+
+}  // namespace slabstream
+#endif

@@ -1,0 +1,33 @@
+// March: the ray caster's kernel (Levoy 1988, 1990). Samples of a box along the rays of a tile of pixels are interpolated, classified,
+// shaded and composited front to back.
+//
+//   sample      trilinear interpolation of stored samples: along x, then y, then z
+//   classified  after interpolation, by RayLook::entries; a sample that is not finite is empty
+//   gradient    central differences of stored samples over two voxels, interpolated like the samples; that of the interpolated volume
+//   shaded      as Phong::AtNormal and WithoutGradient define it
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "worker/rays/ray_box.h"
+#include "worker/renderers/raycast/ray_look.h"
+
+namespace slabstream {
+
+struct MarchWork {
+  const ViewRays* rays = nullptr;
+  const RayBox* box = nullptr;
+  const RayLook* look = nullptr;
+  const std::uint8_t* empty_distance = nullptr;  // EmptyDistances of the box's cells
+  float termination = 0;                         // a ray ends where it transmits less; 0: never
+};
+
+// Premultiplied RGBA of the samples that the box owns on the rays of the pixels of `tile`, whose first pixel is at `rgba`. Pixels without a
+// visible sample may be left as they are: they must be 0 before. Returns how many samples were shaded.
+std::uint64_t MarchTile(const MarchWork& work, const PixelBounds& tile, float* rgba, std::size_t floats_a_row);
+
+// The definition: one ray and one sample after the other, without leaps. Within 1e-5 of MarchTile where `termination` is 0.
+void MarchTileReference(const MarchWork& work, const PixelBounds& tile, float* rgba, std::size_t floats_a_row);
+
+}  // namespace slabstream

@@ -1,0 +1,53 @@
+// RayLook: how the ray caster turns an interpolated sample into colour and opacity, as tables and constants. Made once a frame.
+#pragma once
+
+#include <vector>
+
+#include "common/base/aligned_buffer.h"
+#include "common/classification/classification_table.h"
+#include "common/view/camera.h"
+#include "common/view/shading.h"
+#include "worker/rays/view_rays.h"
+
+namespace slabstream {
+
+struct RayLook {
+  // Entry of a stored sample s: floor(clamp((s - origin) * scale + rounding, 0, last)). Four floats each: straight colour, and the opacity
+  // of one step along a ray. Rounding is 0.5, or a little less where bins hold several values: what single precision makes of a value that
+  // ClassificationTable::BinOf finds in an empty bin then never lies in a visible one above.
+  float origin = 0, scale = 1, rounding = 0.5F, last = 0;
+  AlignedVector<float> entries;
+
+  // Phong's model for the gradient g of samples in data space. With n = g / spacing: N.L = Dot(g, light) / |g * inverse_spacing|.
+  struct Light {
+    Float3 direction;  // towards the light, by component divided by the spacing
+    float to_viewer;   // L.V
+  };
+  bool phong = true;
+  Float3 inverse_spacing{}, viewer{};  // towards the viewer, divided like the lights
+  std::vector<Light> lights;
+  float ambient = 0, diffuse = 1, specular = 0, shininess = 1;
+  float diffuse_without_gradient = 1;  // no light decides: see Phong::WithoutGradient
+};
+
+// `steps_per_voxel`: samples in a voxel length along a ray.
+//
+// Where each stored integer has a bin of its own, colour and opacity between two bins are interpolated linearly, at as many places as make
+// up to kMaxBins entries. A table with several values in a bin is used as it is. Either way a value between two samples is visible only if
+// a bin between theirs is visible, so a brick that is empty by the ClassificationTable is empty here.
+RayLook MakeRayLook(const ClassificationTable& table, const VolumeDescription& description, const Camera& camera, const Shading& shading,
+                    double steps_per_voxel);
+
+// True if a sample between two stored ones may have an opacity above 0.
+class VisibleSamples {
+ public:
+  explicit VisibleSamples(const RayLook& look);
+  bool AnyBetween(float low, float high) const;  // false if low > high
+  friend bool operator==(const VisibleSamples&, const VisibleSamples&) = default;
+
+ private:
+  float origin_, scale_, rounding_, last_;
+  std::vector<std::int32_t> visible_before_;  // entries before this one
+};
+
+}  // namespace slabstream
