@@ -217,7 +217,7 @@ void FrameSimulation::Perform(const PlanRequest& action) {
   timeline_.frames[frame].planned = coordinator_free_;
   frames_.emplace(frame, Frame{{}, FrameAccount(ids_.size())});
   auto planned = std::make_shared<PlannedFrame>(
-      PlannedFrame{.asked = action, .policy = {}, .prediction = {}, .plan = PlanForMachines(plan(frame), frame, ids_)});
+      PlannedFrame{.asked = action, .policy = ResolvePolicy(action.frame, {}).value(), .prediction = {}, .plan = PlanForMachines(plan(frame), frame, ids_)});
   planner_free_ = std::max(planner_free_, threads_.Begin(Threads::kPlanner, coordinator_free_)) + machine_.plan_seconds;
   threads_.Active(Threads::kPlanner, planner_free_);
   queue_.At(threads_.Begin(Threads::kCoordinator, planner_free_), [this, id = action.plan, planned] {

@@ -49,7 +49,7 @@ int ReadSide(std::string_view field, std::uint32_t value, std::uint32_t supersam
 }
 
 void ReadRenderer(const v1::FrameSetup& in, FrameSetup& out, Checker& check) {
-  const Result<const RendererKind*> renderer = RequireRenderer(in.renderer());
+  const Result<const RendererKind*> renderer = RequireRenderer(check.Text("renderer", in.renderer(), 1, kMaxNameBytes));
   if (!renderer.ok()) return check.Adopt(renderer.status());
   SetRenderer(**renderer, out);
   const std::vector<RendererParameter>& parameters = out.renderer->parameters();

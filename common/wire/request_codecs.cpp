@@ -167,7 +167,11 @@ v1::FrameRequest ToProto(const FrameRequest& in) {
   v1::FrameRequest out;
   out.set_dataset(WireText(in.dataset, kMaxNameBytes));
   out.set_renderer(WireText(in.renderer, kMaxNameBytes));
-  for (const auto& [name, text] : in.parameters) (*out.mutable_parameters())[WireText(name, kMaxNameBytes)] = WireText(text, kMaxNameBytes);
+  for (const auto& [name, text] : in.parameters) {
+    v1::Parameter& parameter = *out.add_parameters();
+    parameter.set_name(WireText(name, kMaxNameBytes));
+    parameter.set_text(WireText(text, kMaxNameBytes));
+  }
   *out.mutable_size() = ToProto(in.size);
   *out.mutable_view() = ToProto(in.view);
   *out.mutable_transfer() = ToProto(in.transfer);
@@ -182,11 +186,10 @@ FrameRequest FromProto(const v1::FrameRequest& in, Checker& check) {
   FrameRequest out;
   out.dataset = check.Text("dataset", in.dataset(), 1, kMaxNameBytes);
   if (!in.renderer().empty()) out.renderer = check.Text("renderer", in.renderer(), 1, kMaxNameBytes);
-  if (check.Count("parameters", int(in.parameters_size()), kMaxParameters) > 0) {
-    for (const auto& [name, text] : in.parameters()) {
-      const auto scope = check.In("parameters");
-      out.parameters[check.Text("name", name, 1, kMaxNameBytes)] = check.Text("value", text, 1, kMaxNameBytes);
-    }
+  for (int i = 0; i < check.Count("parameters", in.parameters_size(), kMaxParameters); ++i) {
+    const auto scope = check.In("parameters", std::size_t(i));
+    const std::string name = check.Text("name", in.parameters(i).name(), 1, kMaxNameBytes);
+    check.That(out.parameters.emplace(name, check.Text("text", in.parameters(i).text(), 1, kMaxNameBytes)).second, "name", "given twice");
   }
   out.size = Read("size", in.size(), check);
   out.view = Read("view", in.view(), check);

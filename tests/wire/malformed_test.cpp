@@ -177,6 +177,7 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       {"from_picture", 9},
       {"stage_ns", kStageCount},
       {"planes", 3},
+      {"parameters", kMaxParameters},
   };
   std::map<std::string, bool> seen;
   AlterEachField(
@@ -203,7 +204,7 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       [&](const Place& place, const std::string& error) {
         EXPECT_THAT(error, StartsWith(place.path + ": " + std::to_string(limits.at(place.field->name()) + 1)));
       });
-  EXPECT_EQ(seen.size(), limits.size() + 3) << "reports are in four messages";
+  EXPECT_EQ(seen.size(), limits.size() + 4) << "reports are in four messages, parameters in two";
 }
 
 TEST(Malformed, MissingFieldsAreNoCrash) {

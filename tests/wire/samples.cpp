@@ -217,7 +217,8 @@ template <>
 std::vector<SubmitFrame> Samples() {
   FrameRequest full;
   full.dataset = kLongName;
-  full.renderer = ZBuffer()->name();
+  full.renderer = "mip";
+  full.parameters = {{"projection-mode", "minimum"}};
   full.size = {kMaxImageSide, 1};
   full.view = {Projection::kPerspective, kMaxAngleDegrees, -kMaxAngleDegrees, -0.0, kMinZoom, kMinFovDegrees};
   full.transfer = {Curve(), 1e-6};

@@ -8,7 +8,7 @@
 #include <cstdint>
 
 #include "common/classification/classification_table.h"
-#include "common/planning/frame_plan.h"
+#include "common/frame/frame_setup.h"
 #include "worker/kernels/shade.h"
 
 namespace slabstream {

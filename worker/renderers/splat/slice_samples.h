@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "common/image/pixel_bounds.h"
-#include "common/planning/frame_plan.h"
+#include "common/frame/frame_setup.h"
 #include "worker/kernels/footprint_table.h"
 
 namespace slabstream {
