@@ -16,11 +16,11 @@
 #include "common/planning/learnt_cost.h"
 #include "common/planning/placement.h"
 #include "common/renderers/registry.h"
-#include "simulator/simulate_frames.h"
 #include "common/volume/sphere.h"
 #include "common/volume_io/volume_reader.h"
 #include "laboratory/measure/box_costs.h"
 #include "laboratory/measure/statistics.h"
+#include "simulator/simulate_frames.h"
 
 namespace slabstream {
 namespace {
@@ -43,7 +43,7 @@ std::shared_ptr<const Volume> Load(const std::string& name) {
 
 const RendererKind* RendererOf(const Options& options) { return RequireRenderer(options.renderer).value(); }
 
-FrameSetup MakeSetup(const Options& options, const VolumeSummary& summary, int view) {
+FrameRequest MakeRequest(const Options& options, int view) {
   FrameRequest request;
   request.dataset = "volume";
   request.renderer = options.renderer;
@@ -51,7 +51,11 @@ FrameSetup MakeSetup(const Options& options, const VolumeSummary& summary, int v
   request.view = {.azimuth_degrees = options.azimuth + 360.0 * view / options.views, .elevation_degrees = options.elevation};
   request.transfer.choice = options.preset;
   request.policy = options.policy;
-  return MakeFrameSetup(request, 1, summary).value();
+  return request;
+}
+
+FrameSetup MakeSetup(const Options& options, const VolumeSummary& summary, int view) {
+  return MakeFrameSetup(MakeRequest(options, view), 1, summary).value();
 }
 
 struct Measured {

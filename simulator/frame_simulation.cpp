@@ -216,8 +216,10 @@ void FrameSimulation::Perform(const PlanRequest& action) {
   CHECK_LT(frame, inputs_.size()) << "a frame is planned twice";
   timeline_.frames[frame].planned = coordinator_free_;
   frames_.emplace(frame, Frame{{}, FrameAccount(ids_.size())});
-  auto planned = std::make_shared<PlannedFrame>(
-      PlannedFrame{.asked = action, .policy = ResolvePolicy(action.frame, {}).value(), .prediction = {}, .plan = PlanForMachines(plan(frame), frame, ids_)});
+  auto planned = std::make_shared<PlannedFrame>(PlannedFrame{.asked = action,
+                                                             .policy = ResolvePolicy(action.frame, {}).value(),
+                                                             .prediction = {},
+                                                             .plan = PlanForMachines(plan(frame), frame, ids_)});
   planner_free_ = std::max(planner_free_, threads_.Begin(Threads::kPlanner, coordinator_free_)) + machine_.plan_seconds;
   threads_.Active(Threads::kPlanner, planner_free_);
   queue_.At(threads_.Begin(Threads::kCoordinator, planner_free_), [this, id = action.plan, planned] {
@@ -387,10 +389,11 @@ void FrameSimulation::Transfer(Parcel* parcel) {
   const CombiningCosts& costs = machine_.combining;
   SimulatedMessage& message = parcel->message;
   const UnionCoverage::Amount& amount = parcel->amount;
-  const bool rgba = !HasDepth(plan(message.frame).setup.format);
-  const double color_share = double(BytesPerChannel(parcel->color)) / double(BytesPerChannel(ColorCoding::kFloat32));
+  const PixelFormat format = plan(message.frame).setup.format;
+  const ColorCoding color = format == PixelFormat::kRgba ? parcel->color : ColorCoding::kFloat32;  // others are never coded
+  const double color_share = double(BytesPerChannel(color)) / double(BytesPerChannel(ColorCoding::kFloat32));
   message.pixels = amount.filled;
-  message.bytes = amount.filled * (rgba ? costs.rgba_bytes * color_share : costs.depth_bytes) + amount.runs * costs.run_bytes;
+  message.bytes = amount.filled * (HasDepth(format) ? costs.depth_bytes : costs.rgba_bytes * color_share) + amount.runs * costs.run_bytes;
   timeline_.frames[message.frame].image_bytes += message.bytes;
   ++timeline_.frames[message.frame].messages;
   queue_.At(Travel(message, now()), [this, parcel] {

@@ -66,7 +66,7 @@ void AddRendererOptions(CLI::App& app, FrameRequest& request) {
     for (const RendererParameter& parameter : kind->parameters()) {
       auto& [entry, renderers] = parameters[parameter.name];
       entry = &parameter;
-      renderers += (renderers.empty() ? "" : ", ") + std::string(kind->name());
+      renderers += (renderers.empty() ? "" : " and ") + std::string(kind->name());
     }
   }
   const auto parse = [](const std::string& option, const std::string& text) -> Result<std::string> {
@@ -74,7 +74,7 @@ void AddRendererOptions(CLI::App& app, FrameRequest& request) {
     if (!index.ok()) return index.status();
     return text;
   };
-  AddParsed(app, "--renderer", request.renderer, parse, help)->default_str(std::string(kDefaultRenderer));
+  AddParsed(app, "--renderer", request.renderer, parse, help)->type_name("NAME")->default_str(std::string(kDefaultRenderer));
   for (const auto& [name, entry] : parameters) {
     const auto& [parameter, renderers] = entry;
     const bool choice = !parameter->choices.empty();
@@ -82,8 +82,8 @@ void AddRendererOptions(CLI::App& app, FrameRequest& request) {
         choice ? std::string(parameter->choices[std::size_t(parameter->standard)]) : fmt::format("{:g}", parameter->standard);
     app.add_option_function<std::string>(
            "--" + std::string(name), [&request, key = std::string(name)](const std::string& text) { request.parameters[key] = text; },
-           fmt::format("{} (renderer {})", parameter->purpose, renderers))
-        ->type_name(choice ? fmt::format("{}", fmt::join(parameter->choices, "|")) : "NUMBER")
+           fmt::format("{}; for --renderer {}", parameter->purpose, renderers))
+        ->type_name(choice ? "NAME" : "NUMBER")
         ->default_str(standard);
   }
 }

@@ -19,6 +19,7 @@
 #include "common/base/status.h"
 #include "common/base/time.h"
 #include "common/planning/frame_plan.h"
+#include "common/renderers/registry.h"
 #include "common/wire/client_messages.h"
 
 namespace slabstream {
@@ -34,7 +35,7 @@ struct RecordedRank {
 };
 
 struct RecordedFrame {
-  const RendererKind* renderer = nullptr;
+  const RendererKind* renderer = FindRenderer(kDefaultRenderer);
   PixelBounds grid;  // of the frame that was rendered and combined
   std::uint32_t workers = 1;
   WorkerId display = 0;

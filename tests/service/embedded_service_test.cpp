@@ -45,7 +45,7 @@ class EmbeddedServiceTest : public testing::Test {
     EXPECT_TRUE(picture.ok()) << picture.status().message();
     if (!picture.ok()) return {};
     EXPECT_EQ(picture->size, request.size);
-    EXPECT_GT(HighestAlpha(picture->image), 0.5);
+    EXPECT_GT(HighestAlpha(picture->image), ExpectedAlpha(request));
     EXPECT_LE(LargestDifference(picture->image, RenderDirectly(request, *volume_), request.size), AllowedDifference(request));
     return picture->statistics;
   }

@@ -264,7 +264,7 @@ TEST_F(ExecutorTest, WhatIsCopiedFromOtherSlabsIsWhatWouldHaveArrived) {
     executor_.Perform(OpenSlab{direct, {}});
     store(direct, whole);
     const RankReport expected = render(direct, 1);
-    EXPECT_GT(expected.drawn_voxels, 0U);
+    EXPECT_GT(expected.image_pixels, 0U);
 
     // One source is itself a copy in part and was not rendered from; both are dropped before the first render.
     executor_.Perform(OpenSlab{lower, {}});

@@ -83,6 +83,12 @@ inline float AllowedDifference(const FrameRequest& request) {
   return format == PixelFormat::kRgba ? 2e-5F + float(request.termination) : 0.0F;
 }
 
+// The least alpha that the most opaque pixel of a test picture has: opacity accumulates, but a projection shows that of one value.
+inline double ExpectedAlpha(const FrameRequest& request) {
+  const PixelFormat format = FindRenderer(request.renderer)->format();
+  return format == PixelFormat::kRgba || HasDepth(format) ? 0.5 : 0.15;
+}
+
 inline double HighestAlpha(const LocalImage& image) {
   float highest = 0;
   for (std::size_t i = 3; i < image.rgba.size(); i += 4) highest = std::max(highest, image.rgba[i]);

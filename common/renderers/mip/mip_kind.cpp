@@ -68,15 +68,15 @@ class MipKind : public RendererKind {
       : RendererKind(
             {.name = "mip",
              .title = "intensity projection",
-             .purpose = "intensity projection: the largest, least or mean value along each ray, for vessels",
+             .purpose = "the largest, least or mean value along each ray, for vessels",
              .format = PixelFormat::kMaximum,
              .reach = kHalo,  // 2 would do; like the other renderers, so that all use the same cached voxels
              .footprint = 1,
              .stages = {Stage::kSample},
              .parameters = {
-                 {.name = "sampling-rate", .purpose = "samples along a ray in each voxel length", .standard = 1, .least = 0.1, .most = 16},
+                 {.name = "sampling-rate", .purpose = "Samples along a ray in each voxel length", .standard = 1, .least = 0.1, .most = 16},
                  {.name = "projection-mode",
-                  .purpose = "value of a pixel: the largest, the least or the mean sample along its ray",
+                  .purpose = "Value of a pixel: the largest, the least or the mean sample along its ray",
                   .standard = double(ProjectionMode::kMaximum),
                   .choices = {"maximum", "minimum", "mean"}}}}) {}
 

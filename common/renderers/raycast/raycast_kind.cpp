@@ -11,13 +11,13 @@ class RaycastKind : public RendererKind {
   RaycastKind()
       : RendererKind({.name = "raycast",
                       .title = "ray casting",
-                      .purpose = "ray casting: trilinear samples along each pixel's ray, for sharp surfaces inside translucent material",
+                      .purpose = "trilinear samples along each pixel's ray, for sharp surfaces inside translucent material",
                       .format = PixelFormat::kRgba,
                       .reach = kHalo,  // 2 would do; like the other renderers, so that all use the same cached voxels
                       .footprint = 1,
                       .stages = {Stage::kSample},
                       .parameters = {{.name = "sampling-rate",
-                                      .purpose = "samples along a ray in each voxel length",
+                                      .purpose = "Samples along a ray in each voxel length",
                                       .standard = 1,
                                       .least = 0.1,
                                       .most = 16}}}) {}
