@@ -67,8 +67,8 @@ std::optional<SampleType> ToSampleType(int data_type) {
   }
 }
 
-// Origin and directions. Of the quaternion and the affine matrix ITK takes the matrix if it leads to the scanner's axes, else the
-// quaternion; so do we. Without either they stay those of the index axes.
+// Origin and directions. Like ITK, takes the affine matrix if it leads to the scanner's axes, else the quaternion. Without either they stay
+// those of the index axes.
 void ReadOrientation(const NiftiHeader& fields, double millimetres, RawHeader& header) {
   constexpr int kScanner = 1;  // NIFTI_XFORM_SCANNER_ANAT
   Vec3 columns[3], origin;

@@ -49,7 +49,7 @@ class InflateReader {
     return done;
   }
 
-  // True if the stream, to its checksum, is sound: to be asked when everything that is wanted was read. Reads what is left of it.
+  // Reads the rest of the stream; true if it is sound, checksum included. Call it when everything wanted has been read.
   bool EndsWell() {
     std::vector<std::byte> rest(kBlock);
     while (!ended_ && Read(rest) == rest.size()) {
@@ -66,7 +66,7 @@ class InflateReader {
     stream_.avail_in = uInt(file_.gcount());
     return stream_.avail_in > 0;
   }
-  // What follows the end of a stream is another gzip member, or padding that is left alone.
+  // What follows the end of a stream is another gzip member, or padding, which is ignored.
   bool NextMember() {
     constexpr Bytef kGzipMagic = 0x1f;
     if (*stream_.next_in != kGzipMagic) return false;
