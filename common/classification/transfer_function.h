@@ -49,12 +49,12 @@ struct TransferFunction {
   friend bool operator==(const TransferFunction&, const TransferFunction&) = default;
 };
 
-// InvalidArgument naming the point, the value and the limit, unless everything that is said above holds.
+// InvalidArgument naming the point, the value and the limit, unless everything stated above holds.
 Status Validate(const TransferFunction& transfer);
 
 // Largest opacity of any value in [low, high] (exact: at curve points and segment ends; the curves are monotone between points; of a step
-// above `low` both sides count). 0 if low > high. Whether a brick can be skipped is asked of the ClassificationTable instead, which is what
-// renderers see.
+// above `low` both sides count). 0 if low > high. To decide whether a brick can be skipped, ask the ClassificationTable, which renderers
+// use.
 double MaxOpacity(const TransferFunction& transfer, double low, double high);
 
 // Parses ParaView's colour-map JSON: an array of presets (the first counts) or one preset object, with "RGBPoints" (x, r, g, b, ...) and
