@@ -1,6 +1,6 @@
-// OverRow for every instruction set that the compiler knows; the best one that the CPU has is chosen at the first call. Multiplication and
-// addition are kept apart (and this file is compiled without contraction), so every instruction set, and vector and tail, give the
-// reference's bits; the loop waits for memory, not for arithmetic.
+// OverRow for every instruction set that the compiler knows; the best one that the CPU has is chosen at the first call. Products and sums
+// are not fused (this file is compiled without contraction), so all instruction sets, and vector and tail, give the reference's bits. The
+// loop waits for memory, not for arithmetic.
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "common/kernels/over.cpp"

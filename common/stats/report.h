@@ -54,10 +54,10 @@ struct RankReport {
 };
 inline constexpr int kMaxSpans = 64;
 
-// Adds a stretch of time, while there is room for its span.
+// Adds a stretch of time to the stage; its span only while there is room.
 void AddStage(RankReport& report, Stage stage, std::int64_t begin_ns, std::int64_t end_ns);
 
-// Of the display worker's report: making the picture and encoding it, in ns. Partial images are encoded, too, but before that.
+// The time to make and encode the picture, in ns, from the display worker's report. Earlier encoding of partial images does not count.
 std::int64_t PictureNs(const RankReport& report);
 
 }  // namespace slabstream
