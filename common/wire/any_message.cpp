@@ -82,7 +82,7 @@ void SilenceProtobuf() {
   (void)silenced;
 }
 
-// The envelope, if its bytes can be read and its version is ours.
+// Reads the envelope, if its bytes can be read and its version is ours.
 Status Parse(std::span<const std::byte> header, Envelope& envelope) {
   if (header.size() > kMaxHeaderBytes) {
     return Status::InvalidArgument("Envelope: " + std::to_string(header.size()) + " bytes, at most " + std::to_string(kMaxHeaderBytes));

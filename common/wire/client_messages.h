@@ -24,9 +24,8 @@
 
 namespace slabstream {
 
-inline constexpr std::size_t kMaxOpenRequests = 256;  // of one client
-inline constexpr std::int64_t kMaxRequestBytes =
-    1 << 20;  // any header that a client sends fits: what the coordinator's client socket takes at most
+inline constexpr std::size_t kMaxOpenRequests = 256;       // of one client
+inline constexpr std::int64_t kMaxRequestBytes = 1 << 20;  // limit of the coordinator's client socket; any header that a client sends fits
 
 struct SubmitFrame {
   RequestId request = 0;
