@@ -21,7 +21,7 @@ namespace slabstream {
 class BackgroundTasks {
  public:
   explicit BackgroundTasks(std::size_t most_threads) : shared_(std::make_shared<Shared>()), most_threads_(most_threads) {}
-  // Drops the tasks that have not begun. Those that run go on: they must own what they use.
+  // Drops the tasks that have not begun. Running ones go on, so they must own what they use.
   ~BackgroundTasks() {
     const std::lock_guard lock(shared_->mutex);
     shared_->closed = true;

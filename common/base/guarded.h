@@ -11,7 +11,7 @@
 
 namespace slabstream {
 
-// The exception at hand as a Status that begins with `what`. ResourceExhausted: no memory; Internal: anything else.
+// The current exception as a Status that begins with `what`. ResourceExhausted: no memory; Internal: anything else.
 inline Status CurrentFailure(const std::string& what) {
   try {
     throw;

@@ -87,7 +87,7 @@ class SharedArena {
   std::vector<std::uint32_t> free_slots_;
 };
 
-// Another process' arena, or one's own, to be read. Any thread.
+// Another process' arena, or this one's own, mapped for reading. Any thread.
 class MappedArena {
  public:
   // NotFound: there is no such arena (any more). Unavailable: it may not be opened. InvalidArgument: there is something else, or another

@@ -30,7 +30,7 @@ TransferFunction Opaque(const VolumeSummary& summary) {
 
 // ---- CT
 
-// Data values of the materials that CT presets speak of.
+// Data values of the materials that CT presets use.
 struct CtScale {
   double air, skin, soft_tissue, bone, dense_bone, metal;
 };

@@ -4,7 +4,7 @@
 //
 // Opacity is that of `opacity_distance` voxel lengths of material (the smallest spacing), so a value's extinction per voxel length is
 // -ln(1 - opacity) / opacity_distance; renderers correct it for the distance between their samples.
-// Colours are straight (not premultiplied) and taken as linear: what is written here is what an opaque, unshaded voxel shows.
+// Colours are straight (not premultiplied) and taken as linear: an opaque, unshaded voxel shows exactly these values.
 #pragma once
 
 #include <cstdint>
@@ -65,7 +65,7 @@ Result<TransferFunction> ParseParaViewColorMap(std::string_view json, std::strin
 // The inverse, as a preset called `name`. `transfer` valid; its opacity_distance has no place there.
 std::string FormatParaViewColorMap(const TransferFunction& transfer, std::string_view name);
 
-// Built-in transfer functions, chosen by name; "auto" is made from the histogram of the volume at hand.
+// Built-in transfer functions, chosen by name; "auto" is made from the histogram of the volume.
 struct PresetInfo {
   std::string_view name;     // what --transfer takes
   std::string_view purpose;  // one line for --help

@@ -18,7 +18,7 @@
 #define SLABSTREAM_COMMON_IMAGE_FINITE_CPP_
 namespace slabstream {
 
-// The bits of infinity: with the sign cleared, those of all finite numbers are less, those of NaNs are more.
+// The bits of infinity. Without the sign, the bits of all finite numbers are smaller, those of NaNs larger.
 inline constexpr std::uint32_t kInfinityBits = 0x7F800000, kSignBit = 0x80000000;
 
 }  // namespace slabstream

@@ -36,7 +36,7 @@ HWY_INLINE hn::Vec<hn::RebindToUnsigned<D> > OverVector(D d, const float* front,
 }
 
 bool OverRow(const float* front, const float* back, float* out, std::size_t pixel_count) {
-  constexpr std::uint32_t kInfinity = 0x7F800000;  // without a sign, the bits of all finite numbers are less, those of NaNs more
+  constexpr std::uint32_t kInfinity = 0x7F800000;  // without a sign, the bits of all finite numbers are smaller, those of NaNs larger
   const hn::ScalableTag<float> wide;
   const hn::FixedTag<float, 4> pixel;
   const hn::RebindToUnsigned<decltype(wide)> wide_bits;

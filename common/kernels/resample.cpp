@@ -43,7 +43,7 @@ struct Places {
   HWY_ALIGN float weight_y[3][kBatch];
 };
 
-// Of places at + 1/2 pixel: store(i, first pixels, the three weights) for each vector of them.
+// Weights of narrow splines at the places `at` (pixel centres: + 1/2): store(i, first pixels, the three weights) for each vector.
 template <class Store>
 HWY_INLINE void NarrowSpline(const double* HWY_RESTRICT at, Store&& store) {
   const hn::CappedTag<double, 8> d;

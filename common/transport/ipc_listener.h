@@ -18,7 +18,7 @@ class IpcListener {
   // Unavailable naming the path: somebody listens there, it is not a socket, no permission, no such directory.
   static Result<IpcListener> Listen(const std::string& path);
 
-  // The descriptor. Whoever calls it owns it.
+  // Returns the descriptor; the caller then owns it.
   int Release();
 
   // Removes the file unless another process has put its own there meanwhile.

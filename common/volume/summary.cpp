@@ -61,7 +61,7 @@ class BrickRow {
     for (std::size_t x = 0; x < width; ++x) {
       const T value = row[x];
       if constexpr (std::is_floating_point_v<T>) {
-        // Comparisons with NaN are false; infinite values are replaced by what is there.
+        // Comparisons with NaN are false; infinite values are replaced by the bounds so far.
         const bool finite = IsFinite(value);
         const T low_value = finite ? value : low[x], high_value = finite ? value : high[x];
         low[x] = low_value < low[x] ? low_value : low[x];

@@ -116,7 +116,7 @@ Result<RawHeader> ReadHeader(const NiftiHeader& fields, const std::string& path)
     header.spacing[i] = millimetres * fields.pixdim(i + 1);
   }
   ReadOrientation(fields, millimetres, header);
-  // A slope of 0 says that there is none.
+  // A slope of 0 means that there is none.
   if (fields.slope() != 0 && std::isfinite(fields.slope()) && std::isfinite(fields.intercept())) {
     header.rescale = {fields.slope(), fields.intercept()};
   }

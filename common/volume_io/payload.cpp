@@ -32,7 +32,7 @@ class InflateReader {
   InflateReader(const InflateReader&) = delete;
   InflateReader& operator=(const InflateReader&) = delete;
 
-  // Bytes written to `out`, fewer than its size only at the end of the stream or of the file, or where the stream is damaged.
+  // Returns the bytes written to `out`: fewer than its size only at the end of the stream or of the file, or if the stream is damaged.
   std::size_t Read(std::span<std::byte> out) {
     std::size_t done = 0;
     while (done < out.size() && ready_ && !damaged_) {

@@ -55,7 +55,7 @@ struct FrameStatistics {
   std::vector<RankReport> reports;                                       // at most kMaxReports
   std::uint32_t display = 0;                                             // worker
   PixelBounds grid;                                                      // of the frame that was rendered and combined (FrameBounds)
-  std::optional<FramePrediction> predicted;                              // where the policy left a choice
+  std::optional<FramePrediction> predicted;                              // if the policy left a choice
   friend bool operator==(const FrameStatistics&, const FrameStatistics&) = default;
 };
 
