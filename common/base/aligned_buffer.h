@@ -22,7 +22,7 @@ struct AlignedAllocator {
   T* allocate(std::size_t count) {
     const std::size_t bytes = count * sizeof(T);
     void* const data = ::operator new(bytes, Alignment(bytes));
-    if (bytes >= kHugeBuffer) (void)::madvise(data, bytes, MADV_HUGEPAGE);  // where there are none it stays as it is
+    if (bytes >= kHugeBuffer) (void)::madvise(data, bytes, MADV_HUGEPAGE);  // without huge pages nothing changes
     return static_cast<T*>(data);
   }
   void deallocate(T* data, std::size_t count) { ::operator delete(data, Alignment(count * sizeof(T))); }

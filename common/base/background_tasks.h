@@ -21,7 +21,7 @@ namespace slabstream {
 class BackgroundTasks {
  public:
   explicit BackgroundTasks(std::size_t most_threads) : shared_(std::make_shared<Shared>()), most_threads_(most_threads) {}
-  // Drops the tasks that have not begun. Those that run go on: they must own what they use.
+  // Drops the tasks that have not begun. Running ones go on, so they must own what they use.
   ~BackgroundTasks() {
     const std::lock_guard lock(shared_->mutex);
     shared_->closed = true;
@@ -31,8 +31,8 @@ class BackgroundTasks {
   BackgroundTasks(const BackgroundTasks&) = delete;
   BackgroundTasks& operator=(const BackgroundTasks&) = delete;
 
-  // Tasks report their own failures: what they throw is only logged. May throw itself, if there is no memory or no thread; the task then
-  // never runs.
+  // Tasks report their own failures: an exception that leaves one is only logged. Post itself throws if it gets no memory or no thread; the
+  // task then never runs.
   void Post(std::function<void()> task) {
     const std::lock_guard lock(shared_->mutex);
     if (shared_->idle <= shared_->tasks.size() && shared_->threads < most_threads_) {

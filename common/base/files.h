@@ -50,8 +50,8 @@ Status WriteTextFile(const std::string& path, const std::string& text);
 // NotFound: no such file. ResourceExhausted: longer than `max_bytes`. Messages name the path.
 Result<std::string> ReadTextFile(const std::string& path, std::size_t max_bytes);
 
-// InvalidArgument or NotFound, with the reason, unless a file can be created as `path`: to be asked before long work begins. Leaves nothing
-// behind. `option` begins the message.
+// Checks, before long work begins, that a file can be created as `path`; leaves nothing behind. Else InvalidArgument or NotFound with the
+// reason; the message begins with `option`.
 Status CheckCanWrite(const std::string& option, const std::string& path);
 
 }  // namespace slabstream

@@ -1,4 +1,4 @@
-// Lists of entries with a `name`, as options and files spell it: finding one, and saying which there are.
+// Lists of entries with a `name`, as options and files spell it: find one, or list their names.
 #pragma once
 
 #include <algorithm>

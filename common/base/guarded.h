@@ -1,4 +1,4 @@
-// Guarded: an exception barrier. Libraries and the allocator throw; threads must not end by that.
+// Guarded: an exception barrier. Libraries and the allocator throw; that must not end a thread.
 #pragma once
 
 #include <exception>
@@ -11,13 +11,13 @@
 
 namespace slabstream {
 
-// The exception at hand as a Status that begins with `what`. ResourceExhausted: no memory; Internal: anything else.
+// The current exception as a Status that begins with `what`. ResourceExhausted: no memory; Internal: anything else.
 inline Status CurrentFailure(const std::string& what) {
   try {
     throw;
   } catch (const std::bad_alloc&) {
     return Status::ResourceExhausted(what + ": not enough memory");
-  } catch (const std::length_error&) {  // a container beyond every memory
+  } catch (const std::length_error&) {  // a container larger than any memory
     return Status::ResourceExhausted(what + ": not enough memory");
   } catch (const std::exception& error) {
     return Status::Internal(what + ": " + error.what());
@@ -26,7 +26,7 @@ inline Status CurrentFailure(const std::string& what) {
   }
 }
 
-// What `work` returns, a Status or Result; if it throws, CurrentFailure(what).
+// Returns what `work` returns, a Status or Result; if it throws, CurrentFailure(what).
 template <class Work>
 std::invoke_result_t<Work> Guarded(const char* what, Work&& work) {
   try {

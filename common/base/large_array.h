@@ -1,6 +1,6 @@
-// LargeArray<T>: an array of elements without constructor for what is large and written at once. Its memory is mapped for it alone and goes
-// back to the system when it is freed. It asks for huge pages: taking 4 KiB at a time costs more than what is computed into them. What is
-// never written takes no memory, and reads as 0.
+// LargeArray<T>: an array for large data that is written at once; its elements have no constructor. It is a memory mapping of its own,
+// which goes back to the system when it is freed. It asks for huge pages: taking 4 KiB at a time costs more than what is computed into
+// them. Memory that is never written is never taken, and reads as 0.
 #pragma once
 
 #include <sys/mman.h>
@@ -31,7 +31,7 @@ LargeArray<T> MakeLargeArray(std::size_t count) {
   const std::size_t bytes = count * sizeof(T);
   void* data = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
   if (data == MAP_FAILED) throw std::bad_alloc();
-  (void)::madvise(data, bytes, MADV_HUGEPAGE);  // where there are none it stays as it is
+  (void)::madvise(data, bytes, MADV_HUGEPAGE);  // without huge pages nothing changes
   return LargeArray<T>(static_cast<T*>(data), UnmapArray{bytes});
 }
 

@@ -13,12 +13,12 @@ namespace {
 
 constexpr std::size_t kLeastKept = std::size_t{1} << 17;  // bytes: smaller blocks come from the heap, and go back to it
 #ifdef __SANITIZE_ADDRESS__
-constexpr std::size_t kMostKept = 0;  // so that the use of a block that was given back is seen
+constexpr std::size_t kMostKept = 0;  // so that the sanitizer sees uses of a block after it was given back
 #else
 constexpr std::size_t kMostKept = std::size_t{96} << 20;  // bytes in all
 #endif
 
-// Images of neighbouring views differ in size: one's block is to fit the other. What is never written of a block takes no memory.
+// Images of neighbouring views differ in size; rounding lets them reuse each other's blocks. Pages never written take no memory.
 std::size_t RoundedUp(std::size_t bytes) { return std::bit_ceil(bytes); }
 
 void* AllocatePrivate(std::size_t bytes) { return ::operator new(bytes, std::align_val_t(kBufferAlignment)); }
@@ -29,7 +29,7 @@ class Pool {
   void* Take(std::size_t bytes) {
     {
       const std::lock_guard lock(mutex_);
-      const auto kept = std::ranges::find(blocks_.rbegin(), blocks_.rend(), bytes, &Block::bytes);  // the last one is in a cache
+      const auto kept = std::ranges::find(blocks_.rbegin(), blocks_.rend(), bytes, &Block::bytes);  // the last one may be in a cache
       if (kept != blocks_.rend()) {
         void* const data = kept->data;
         blocks_.erase(std::next(kept).base());
@@ -98,7 +98,7 @@ class Pool {
 
   void Keep(void* data, std::size_t bytes) {
     if (bytes > kMostKept) return Free(data);
-    while (bytes_ + bytes > kMostKept) {  // the ones that were not wanted for longest
+    while (bytes_ + bytes > kMostKept) {  // those unused for longest
       Free(blocks_.front().data);
       bytes_ -= blocks_.front().bytes;
       blocks_.erase(blocks_.begin());
@@ -117,7 +117,7 @@ class Pool {
   }
 
   std::mutex mutex_;
-  std::vector<Block> blocks_;  // given back last comes last; a few hundred at most
+  std::vector<Block> blocks_;  // last given back comes last; a few hundred at most
   std::size_t bytes_ = 0;
   std::unique_ptr<SharedArena> arena_;
   std::unordered_map<const void*, Pinned> pins_;

@@ -1,6 +1,6 @@
 // PooledVector<T>: std::vector for images and other large buffers of numbers that come and go with each frame. Its storage begins at a
-// 64-byte boundary and is used again: memory that is new from the system costs a page fault every 4 KiB, more than rendering what is
-// written to it. New elements are left as they are unless a value is given: resize(n) alone does not write.
+// 64-byte boundary and is reused: new memory from the system costs a page fault every 4 KiB, more than rendering what is written to it. New
+// elements are uninitialised unless a value is given: resize(n) alone does not write.
 #pragma once
 
 #include <cstddef>
@@ -16,16 +16,16 @@
 
 namespace slabstream {
 
-// Blocks of at least `bytes` bytes at 64-byte boundaries. Large ones that were given back are kept for the next one who wants as much, up
-// to 96 MiB for the process. Any thread.
+// Blocks of at least `bytes` bytes at 64-byte boundaries. Large blocks that were given back are kept for reuse, up to 96 MiB for the
+// process. Any thread.
 void* TakeBlock(std::size_t bytes);
 void GiveBackBlock(void* block, std::size_t bytes);  // `bytes` as taken
 
-// From now on large blocks are taken from a SharedArena of the process. Unavailable: there is none; blocks stay private. Again: no change.
+// From now on, takes large blocks from a SharedArena of the process. Unavailable: there is none; blocks stay private. Again: no change.
 Status ShareBlocks();
 std::optional<ArenaName> SharedBlocksArena();  // none: not shared
 
-// Keeps what a block holds at the disposal of others, also after it was given back: it is used again when its last pin is gone.
+// Keeps the contents of a block, even after it was given back: the block is reused only when its last pin is gone.
 class BlockPin {
  public:
   // `block` and `bytes` as taken, null allowed. None: the block is so small that it goes back to the heap at once.

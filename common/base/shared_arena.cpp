@@ -67,7 +67,7 @@ Result<std::unique_ptr<SharedArena>> SharedArena::Create() {
   FileDescriptor file(::memfd_create("slabstream", MFD_CLOEXEC | MFD_ALLOW_SEALING));
   if (file.number() < 0) return SystemError(StatusCode::kUnavailable, "memfd_create");
   if (::ftruncate(file.number(), off_t(kArenaBytes)) != 0) return SystemError(StatusCode::kUnavailable, "ftruncate");
-  // A reader need not fear that what it has mapped shrinks under it.
+  // The file never shrinks under a reader's mapping.
   if (::fcntl(file.number(), F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL) != 0) {
     return SystemError(StatusCode::kUnavailable, "sealing");
   }
@@ -115,7 +115,7 @@ void SharedArena::Renew(void* block) {
   if (++last_generation_ == 0) ++last_generation_;
   taken.generation = last_generation_;
   header().generations[taken.slot].store(taken.generation, std::memory_order_relaxed);
-  // Nothing that is written to the block from now on is seen before its new generation; also not what goes past the caches.
+  // Readers see the new generation before anything written to the block from now on, even by stores that bypass the caches.
   std::atomic_thread_fence(std::memory_order_seq_cst);
 }
 
@@ -128,7 +128,7 @@ void SharedArena::GiveBack(void* block) {
   std::size_t offset = std::size_t(static_cast<std::byte*>(block) - base_), bytes = taken->second.bytes;
   taken_.erase(taken);
   (void)::madvise(block, bytes, MADV_REMOVE);  // if that fails the memory is merely kept
-  // One with its neighbours.
+  // Join it with free neighbours.
   const auto after = free_.find(offset + bytes);
   if (after != free_.end()) {
     bytes += after->second;
@@ -152,7 +152,7 @@ BlockName SharedArena::NameOf(const void* block) const {
 
 Result<std::shared_ptr<const MappedArena>> MappedArena::Open(const ArenaName& name) {
   const std::string path = "/proc/" + std::to_string(name.pid) + "/fd/" + std::to_string(name.file_descriptor);
-  // Looked at before it is opened: opening a pipe or a device has effects of its own.
+  // Check before opening: opening a pipe or a device has side effects.
   struct stat found {};
   if (::stat(path.c_str(), &found) != 0) {
     return SystemError(errno == ENOENT ? StatusCode::kNotFound : StatusCode::kUnavailable, path.c_str());

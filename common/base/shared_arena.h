@@ -1,11 +1,11 @@
-// Memory of this process that other processes of the same host may read, without a name in any file system: what is left of it goes with
-// the last process that has it open.
+// Memory of this process that other processes of the same host may read. It has no name in any file system: it goes with the last process
+// that has it open.
 //
 //   1. The owner makes a SharedArena, takes blocks from it, and tells others its ArenaName and the BlockName of what they may read.
 //   2. A reader maps the arena by its name (MappedArena::Open, through /proc/<pid>/fd) and reads the block's bytes.
-//   3. The owner may use a block again at any time, also while a reader that was stopped for a while still reads it. So the reader asks
-//      Holds(block) after it has read: if that is false, what it read may be anything.
-// Each use of a block has a generation number of its own, in a table at the arena's beginning that only the owner writes.
+//   3. The owner may reuse a block at any time, even while a slow reader still reads it. So the reader calls Holds(block) after reading: if
+//      that is false, what it read may be anything.
+// Each use of a block has its own generation number, in a table at the arena's beginning that only the owner writes.
 #pragma once
 
 #include <atomic>
@@ -35,7 +35,7 @@ struct BlockName {
 
 inline constexpr std::size_t kBlockAlignment = 4096;               // bytes: a page
 inline constexpr std::uint32_t kArenaSlots = 8190;                 // blocks at a time
-inline constexpr std::size_t kArenaBytes = std::size_t{64} << 30;  // of addresses; memory is taken where it is written
+inline constexpr std::size_t kArenaBytes = std::size_t{64} << 30;  // of addresses; memory is taken when it is written
 
 // Key of the space in which process ids and their descriptors can be looked up: the running kernel and the process id namespace. Two
 // processes with different keys cannot open each other's arenas. 0: unknown, for instance without /proc.
@@ -63,7 +63,7 @@ class SharedArena {
   void* Take(std::size_t bytes);
   // Gives its memory back to the system.
   void GiveBack(void* block);
-  // What was read of the block until now is its own, whatever is written from now on; it stays taken, with a new name.
+  // Gives the block, which stays taken, a new name. Holds is false for the old one before anything more is written.
   void Renew(void* block);
 
   bool Contains(const void* address) const { return address >= base_ && address < base_ + kArenaBytes; }
@@ -87,19 +87,19 @@ class SharedArena {
   std::vector<std::uint32_t> free_slots_;
 };
 
-// Another process' arena, or one's own, to be read. Any thread.
+// Another process' arena, or this one's own, mapped for reading. Any thread.
 class MappedArena {
  public:
-  // NotFound: there is no such arena (any more). Unavailable: it may not be opened. InvalidArgument: what is there is no arena, or another
-  // one. Nothing else is opened, read or waited for, whatever the name says.
+  // NotFound: there is no such arena (any more). Unavailable: it may not be opened. InvalidArgument: there is something else, or another
+  // arena. Never opens, reads or waits for anything else, whatever the name says.
   static Result<std::shared_ptr<const MappedArena>> Open(const ArenaName& name);
   ~MappedArena();
   MappedArena(const MappedArena&) = delete;
   MappedArena& operator=(const MappedArena&) = delete;
 
-  // The first of `bytes` bytes of a block; null if the name is not of a block that can be in the arena. Any name.
+  // The first of `bytes` bytes of a block; null if the arena cannot hold such a block. Any name may be given.
   const std::byte* Find(const BlockName& block, std::uint64_t bytes) const;
-  // True if all bytes that were read of the block before the call are what its owner wrote into it.
+  // True if all bytes read from the block before the call are what its owner wrote into it.
   bool Holds(const BlockName& block) const;
 
  private:

@@ -17,7 +17,7 @@ namespace slabstream {
 
 class TaskThread {
  public:
-  // `on_exception` is called on the thread, and must not throw, when a task has thrown.
+  // When a task throws, `on_exception` is called on the thread; it must not throw.
   explicit TaskThread(std::function<void()> on_exception = std::terminate)
       : on_exception_(std::move(on_exception)), thread_([this](const std::stop_token& stop) { Run(stop); }) {}
   // Waits for the running task; tasks that have not begun are dropped.
@@ -25,7 +25,7 @@ class TaskThread {
   TaskThread(const TaskThread&) = delete;
   TaskThread& operator=(const TaskThread&) = delete;
 
-  // From any thread. Tasks report their own failures; what they throw beside that is told to `on_exception`.
+  // From any thread. Tasks report their own failures; `on_exception` is called if one throws.
   void Post(std::function<void()> task) {
     {
       const std::lock_guard lock(mutex_);
@@ -34,7 +34,7 @@ class TaskThread {
     ready_.notify_one();
   }
 
-  // Nothing is running and nothing waits. Who alone posts may count on it until then.
+  // True if no task runs or waits. A caller that alone posts may rely on it until its next Post.
   bool Idle() {
     const std::lock_guard lock(mutex_);
     return tasks_.empty() && !running_;
@@ -58,7 +58,7 @@ class TaskThread {
         LogError(std::string("task: ") + error.what());
         on_exception_();
       }
-      task = nullptr;  // what it held is gone before anybody takes the thread for idle
+      task = nullptr;  // frees what it held before Idle can return true
       const std::lock_guard lock(mutex_);
       running_ = false;
     }

@@ -1,4 +1,4 @@
-// The version of Slabstream, which is said in one place: the project's line in CMakeLists.txt.
+// The version of Slabstream. Its only source is the project line in CMakeLists.txt.
 #pragma once
 
 #include <string_view>

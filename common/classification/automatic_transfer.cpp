@@ -12,7 +12,7 @@ namespace {
 // One stop of a side's curves: the share of the side's voxels that lie nearer to the background.
 struct Stop {
   double quantile;
-  double opacity;  // times that of the median
+  double opacity;  // as a multiple of the median's
   Rgb above, below;
 };
 constexpr std::array<Stop, 5> kStops = {{
@@ -24,7 +24,7 @@ constexpr std::array<Stop, 5> kStops = {{
 }};
 constexpr double kMaxOpacity = 0.95;
 
-// Opacity, per voxel length, that makes a ray through the mean stretch of material (its share of the volume's side) let 2 % through.
+// The opacity per voxel length at which a mean stretch of material (its share of the volume's side) lets 2 % of the light through.
 double MedianOpacity(const VolumeSummary& summary, double share) {
   const double side = std::cbrt(double(summary.description.geometry.bounds().voxel_count()));
   const double stretch = std::max(share * side, 1.0);  // voxels

@@ -5,9 +5,9 @@
 
 namespace slabstream {
 
-// Shows what differs from the background, opacities and colours spread over the quantiles of those values: warm colours above the
-// background, cold ones below. Opacities are chosen so that a ray through an average stretch of material comes out nearly opaque. A volume
-// of one value becomes a translucent block. Any summary is fine.
+// Shows what differs from the background. Opacities and colours are spread over the quantiles of those values: warm colours above the
+// background, cold ones below. A ray through an average stretch of material comes out nearly opaque. A volume of one value becomes a
+// translucent block. Any summary is fine.
 TransferFunction AutomaticTransfer(const VolumeSummary& summary);
 
 }  // namespace slabstream

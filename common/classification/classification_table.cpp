@@ -10,8 +10,8 @@ struct StoredRange {
   double low = 0, high = 0;
 };
 
-// The stored samples behind a range of data values, which has been rounded to floats: integers are recovered by rounding, float samples
-// within the error of a float.
+// The stored samples of a range of data values that was rounded to floats. Integers are recovered by rounding, float samples within the
+// error of a float.
 StoredRange StoredFromData(const VolumeDescription& description, ValueRange range) {
   const auto& [scale, offset] = description.mapping;
   if (scale == 0) return {};

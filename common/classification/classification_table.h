@@ -1,9 +1,9 @@
 // ClassificationTable: the transfer function sampled once per frame setup, so that renderers classify a stored sample by one look-up.
 //
-// Bin of a stored sample s: BinOf(s), in [0, size). For 8-bit volumes each stored value has its own bin; for 16-bit volumes whose range has
-// at most kMaxBins values too; otherwise kMaxBins bin centres lie at equal distances over the value range, the first at its beginning and
-// the last at its end (so a background at the very beginning of an opacity ramp stays empty), and a sample is classified as the nearest
-// centre. Bin 0 .. size-1 ascend with the stored value. Samples that are not finite have no bin: they are empty.
+// Bin of a stored sample s: BinOf(s), in [0, size). Each stored value has its own bin in 8-bit volumes, and in 16-bit volumes whose range
+// has at most kMaxBins values. Otherwise kMaxBins bin centres lie at equal distances over the value range, the first at its beginning and
+// the last at its end (so a background at the very beginning of an opacity ramp stays empty), and a sample belongs to the nearest centre.
+// Bins ascend with the stored value. Samples that are not finite have no bin: they are empty.
 #pragma once
 
 #include <cstdint>
@@ -33,8 +33,8 @@ struct ClassificationTable {
 // `range` is in data values and comes from the volume's summary, so that all workers build the same table.
 ClassificationTable Classify(const TransferFunction& transfer, const VolumeDescription& description, ValueRange range);
 
-// Largest opacity that the table gives to a sample with a data value in `values`, such as a brick of the summary (0 for kNoFiniteValue).
-// What is 0 here is empty for every renderer; MaxOpacity(TransferFunction) may differ from it by what happens within one bin.
+// Largest opacity that the table gives to a sample with a data value in `values`, such as a brick of the summary (0 for kNoFiniteValue). If
+// it is 0, the values are empty for every renderer; MaxOpacity(TransferFunction) may differ by what happens within one bin.
 float MaxOpacity(const ClassificationTable& table, const VolumeDescription& description, ValueRange values);
 
 }  // namespace slabstream

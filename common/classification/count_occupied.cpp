@@ -18,14 +18,14 @@ static_assert(kBrick % kOccupancyCell == 0, "a cell lies in one brick");
 // A layer of a cell: bit kOccupancyCell * y + x.
 using Layer = std::uint64_t;
 
-// Its rows that hold any, bit y.
+// The rows of a layer that hold any, bit y.
 constexpr std::uint32_t RowsOf(Layer layer) {
   constexpr Layer kLow = 0x7F7F7F7F7F7F7F7F;
   const Layer any = (((layer & kLow) + kLow) | layer) & ~kLow;  // the highest bit of each row
   return std::uint32_t((any >> 7) * 0x0102040810204080 >> 56);
 }
 
-// Its columns that hold any, bit x.
+// The columns of a layer that hold any, bit x.
 constexpr std::uint32_t ColumnsOf(Layer layer) {
   layer |= layer >> 32;
   layer |= layer >> 16;
@@ -59,7 +59,7 @@ class Occupied {
   std::vector<std::uint8_t> by_sample_;
 };
 
-// Of a cell's row, at most kOccupancyCell samples: bit i is sample i. Rows of one value, the most frequent ones of sparse data, are one
+// The occupied samples of a cell's row, at most kOccupancyCell: bit i is sample i. Rows of one value, most rows of sparse data, take one
 // comparison.
 template <class T>
 std::uint32_t RowMask(const T* row, std::int32_t count, const Occupied<T>& occupied) {

@@ -42,7 +42,7 @@ int LastFilled(const Histogram& histogram) {
   return last;
 }
 
-// The highest bin; where smoothing spread it over its neighbours, the one that it came from.
+// The highest bin; if smoothing spread it over its neighbours, the bin that it came from.
 int FindPeak(const Histogram& histogram, const Histogram& smoothed) {
   const auto spread = std::max_element(smoothed.begin(), smoothed.end()) - smoothed.begin();
   const auto first = std::max<std::ptrdiff_t>(0, spread - kRadius), last = std::min<std::ptrdiff_t>(kLast, spread + kRadius);

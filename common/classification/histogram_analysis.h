@@ -22,10 +22,10 @@ struct Foreground {
   MaterialBins above, below;  // values higher and lower than the background
 };
 
-// The background is the peak of the smoothed histogram, or its lowest bin where that alone holds 5 % of the voxels and stands apart (air
-// cut to the smallest value; the outside of a mask). Each side of it ends where the triangle method (Zack, Rogers and Latt 1977) puts the
-// foot of the peak. If one side holds less than a fifth of the voxels of the other, it counts as noise of the background and is left out.
-// Where there is no peak to speak of, everything but the lowest bin is material; a volume of one value has none.
+// The background is the peak of the smoothed histogram, or its lowest bin if that alone holds 5 % of the voxels and stands apart (air cut
+// to the smallest value; the outside of a mask). Each side of it ends where the triangle method (Zack, Rogers and Latt 1977) puts the foot
+// of the peak. If one side holds less than a fifth of the voxels of the other, it counts as noise of the background and is left out.
+// Without a clear peak, everything but the lowest bin is material; a volume of one value has none.
 Foreground FindForeground(const VolumeSummary& summary);
 
 // The data value below which the share q, in [0, 1], of the voxels of these bins lies. `bins` is not empty.

@@ -6,7 +6,7 @@
 namespace slabstream {
 namespace {
 
-// Voxels of opacity above zero, where the volume holds so few different integers that each has a bin of its own.
+// Counts voxels with an opacity above zero in a volume with so few different integers that each has its own bin.
 std::uint64_t CountExactly(const VolumeSummary& summary, const TransferFunction& transfer, std::int64_t first_stored,
                            std::int64_t last_stored) {
   std::uint64_t visible = 0;

@@ -30,13 +30,13 @@ TransferFunction Opaque(const VolumeSummary& summary) {
 
 // ---- CT
 
-// Data values of the materials that CT presets speak of.
+// Data values of the materials that CT presets use.
 struct CtScale {
   double air, skin, soft_tissue, bone, dense_bone, metal;
 };
 
-// Hounsfield units where air is far below zero; the same plus 1024, as scanners store them, where values begin at zero and go far beyond
-// eight bits; for anything else (8-bit and industrial scans) shares of the range, chosen on 8-bit head scans.
+// Hounsfield units if air is far below zero. Hounsfield units plus 1024, as scanners store them, if values begin at zero and go far beyond
+// eight bits. For anything else (8-bit and industrial scans) shares of the range, chosen on 8-bit head scans.
 CtScale FindCtScale(const ValueRange& range) {
   constexpr CtScale kHounsfield = {-900, -350, 40, 180, 420, 1500};
   if (range.min <= -500) return kHounsfield;
@@ -73,21 +73,21 @@ TransferFunction CtSkin(const VolumeSummary& summary) {
 
 // ---- Fitted to the values above the background
 
-// The bins above the background, or the upper half of all bins where there are none, so that each preset shows something of any volume.
+// The bins above the background; if there are none the upper half of all bins, so that each preset shows something of any volume.
 MaterialBins Material(const VolumeSummary& summary) {
   const MaterialBins above = FindForeground(summary).above;
   return above.share > 0 ? above : MaterialBins{kHistogramBins / 2, kHistogramBins - 1, 0.5};
 }
 
-// Opacity, per voxel length, that lets 2 % through a stretch of this share of the volume's side, and of at least four voxels: where a
-// surface is solid within fewer, its voxels show as steps, like the grain of wood.
+// The opacity per voxel length at which a stretch of this share of the volume's side, of at least four voxels, lets 2 % of the light
+// through. A surface that is solid within fewer voxels shows them as steps, like the grain of wood.
 double SoftSurfaceOpacity(const VolumeSummary& summary, double share_of_side) {
   const double side = std::cbrt(double(summary.description.geometry.bounds().voxel_count()));
   return 1 - std::pow(0.02, 1 / std::max(share_of_side * side, 4.0));
 }
 
-// A soft surface round grey matter. At the bottom of the folds grey matter shares its voxels with fluid and is darker than that on top:
-// colour makes it darker still, so that the folds stand out.
+// A soft surface round grey matter. At the bottom of the folds grey matter shares its voxels with fluid and is darker than on top. Colour
+// makes it darker still, so that the folds stand out.
 TransferFunction MriBrain(const VolumeSummary& summary) {
   const MaterialBins tissue = Material(summary);
   const double begin = BinBorder(summary.range, tissue.first), middle = Quantile(summary, tissue, 0.5);
@@ -102,7 +102,7 @@ TransferFunction MriBrain(const VolumeSummary& summary) {
           {{clear, 0}, {solid, opacity}, {std::max(solid, at(0.98)), std::min(1.4 * opacity, 0.95)}}};
 }
 
-// Skin as a veil, what is brighter shines through it.
+// Skin as a veil; brighter tissue shines through it.
 TransferFunction MriHead(const VolumeSummary& summary) {
   const MaterialBins tissue = Material(summary);
   const double begin = BinBorder(summary.range, tissue.first);

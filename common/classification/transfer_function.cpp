@@ -54,7 +54,7 @@ double Interpolate(const OpacityPoint& a, const OpacityPoint& b, double s) {
   const double midpoint = std::clamp(a.midpoint, kEdge, 1 - kEdge);
   s = s < midpoint ? 0.5 * s / midpoint : 0.5 + 0.5 * (s - midpoint) / (1 - midpoint);
 
-  // At either end of the range of sharpness the curve is taken to be what it tends to.
+  // Near either end of the range of sharpness the curve is replaced by its limit.
   if (a.sharpness > 0.99) return s < 0.5 ? a.opacity : b.opacity;
   if (a.sharpness < 0.01) return std::lerp(a.opacity, b.opacity, s);
 

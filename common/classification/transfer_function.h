@@ -4,7 +4,7 @@
 //
 // Opacity is that of `opacity_distance` voxel lengths of material (the smallest spacing), so a value's extinction per voxel length is
 // -ln(1 - opacity) / opacity_distance; renderers correct it for the distance between their samples.
-// Colours are straight (not premultiplied) and taken as linear: what is written here is what an opaque, unshaded voxel shows.
+// Colours are straight (not premultiplied) and taken as linear: an opaque, unshaded voxel shows exactly these values.
 #pragma once
 
 #include <cstdint>
@@ -49,12 +49,12 @@ struct TransferFunction {
   friend bool operator==(const TransferFunction&, const TransferFunction&) = default;
 };
 
-// InvalidArgument naming the point, the value and the limit, unless everything that is said above holds.
+// InvalidArgument naming the point, the value and the limit, unless everything stated above holds.
 Status Validate(const TransferFunction& transfer);
 
 // Largest opacity of any value in [low, high] (exact: at curve points and segment ends; the curves are monotone between points; of a step
-// above `low` both sides count). 0 if low > high. Whether a brick can be skipped is asked of the ClassificationTable instead, which is what
-// renderers see.
+// above `low` both sides count). 0 if low > high. To decide whether a brick can be skipped, ask the ClassificationTable, which renderers
+// use.
 double MaxOpacity(const TransferFunction& transfer, double low, double high);
 
 // Parses ParaView's colour-map JSON: an array of presets (the first counts) or one preset object, with "RGBPoints" (x, r, g, b, ...) and
@@ -65,7 +65,7 @@ Result<TransferFunction> ParseParaViewColorMap(std::string_view json, std::strin
 // The inverse, as a preset called `name`. `transfer` valid; its opacity_distance has no place there.
 std::string FormatParaViewColorMap(const TransferFunction& transfer, std::string_view name);
 
-// Built-in transfer functions, chosen by name; "auto" is made from the histogram of the volume at hand.
+// Built-in transfer functions, chosen by name; "auto" is made from the histogram of the volume.
 struct PresetInfo {
   std::string_view name;     // what --transfer takes
   std::string_view purpose;  // one line for --help

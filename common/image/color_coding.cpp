@@ -1,4 +1,4 @@
-// ToCodes and FromCodes for every instruction set that the compiler knows: the reference's bits.
+// ToCodes and FromCodes for every instruction set that the compiler knows. The bits are the reference's.
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "common/image/color_coding.cpp"

@@ -2,7 +2,7 @@
 //
 // kHalf: IEEE 754 binary16, rounded to the nearest, ties to even. Relative error at most 2^-11 (values of 2^-14 and more).
 // kFixed16: round(65535 value). Absolute error at most 2^-17 (half of 1 / 65535, a little more than 2^-17: 7.63e-6).
-// 0 and 1 are exact in both, and order is kept. What rounding of sums has put a little above 1 becomes 1.
+// 0 and 1 are exact in both, and order is kept. Values slightly above 1, from rounded sums, become 1.
 #pragma once
 
 #include <cstddef>
@@ -15,13 +15,13 @@ enum class ColorCoding : std::uint8_t { kFloat32 = 1, kHalf = 2, kFixed16 = 3 };
 inline constexpr float kLargestColor = 1 + 0x1p-18F;  // that can be coded
 
 constexpr std::size_t BytesPerChannel(ColorCoding coding) { return coding == ColorCoding::kFloat32 ? 4 : 2; }
-// Codes above it stand for no value in [0, 1]. 16-bit codings only.
+// Larger codes stand for no value in [0, 1]. 16-bit codings only.
 constexpr std::uint16_t LargestCode(ColorCoding coding) { return coding == ColorCoding::kHalf ? 0x3C00 : 0xFFFF; }
 
-// How far combining may move a channel of the picture when all images travel in this coding, to first order: `hops` is the largest number
-// of transfers one after the other that any pixel's colours make, `transfers` the largest number of transfers of one pixel altogether.
-//   kHalf: at each hop the images that travel lie behind each other; their contributions to a channel add up to at most 1, so that relative
-//   errors u = 2^-11 of their colours move it by at most u, and those of their alphas, through what lies behind them, by u once more.
+// The largest error of a channel of the picture, to first order, if all images travel in this coding. `hops`: the most transfers in a row
+// that any pixel's colours make. `transfers`: the most transfers of one pixel altogether.
+//   kHalf: the images of one hop lie behind each other; their contributions to a channel add up to at most 1. So relative errors
+//   u = 2^-11 of their colours move it by at most u, and errors of their alphas, through what lies behind them, by u once more.
 //   kFixed16: errors are absolute, so each transfer counts, for its colour and its alpha.
 constexpr double CodingError(ColorCoding coding, std::uint32_t hops, std::uint32_t transfers) {
   switch (coding) {
@@ -32,11 +32,11 @@ constexpr double CodingError(ColorCoding coding, std::uint32_t hops, std::uint32
   return 0;
 }
 
-// `count` values from `values` to `codes`, and back; a 16-bit coding; no alignment needed beyond the types'. ToCodes returns false, and
-// writes anything, if a value does not lie in [0, kLargestColor]. FromCodes takes codes up to LargestCode.
+// Converts `count` values to codes of a 16-bit coding, and back; no alignment needed beyond the types'. ToCodes returns false, and the
+// codes are undefined, if a value does not lie in [0, kLargestColor]. FromCodes takes codes up to LargestCode.
 bool ToCodes(ColorCoding coding, const float* values, std::uint16_t* codes, std::size_t count);
 void FromCodes(ColorCoding coding, const std::uint16_t* codes, float* values, std::size_t count);
-// The definition.
+// The definition of both.
 bool ToCodesReference(ColorCoding coding, const float* values, std::uint16_t* codes, std::size_t count);
 void FromCodesReference(ColorCoding coding, const std::uint16_t* codes, float* values, std::size_t count);
 

@@ -9,7 +9,7 @@ namespace {
 constexpr float kSmallestNormal = 0x1p-14F;  // of binary16
 
 std::uint16_t ToHalf(float value) {
-  // Below the normals the step is 2^-24, which is that of floats from 0.5 to 1: adding 0.5 rounds.
+  // Subnormal halves have the step 2^-24, like floats from 0.5 to 1: adding 0.5 rounds.
   if (value < kSmallestNormal) return std::uint16_t(std::bit_cast<std::uint32_t>(value + 0.5F) - std::bit_cast<std::uint32_t>(0.5F));
   const auto bits = std::bit_cast<std::uint32_t>(value) - (std::uint32_t{127 - 15} << 23);  // another bias of the exponent
   return std::uint16_t((bits + 0xFFF + ((bits >> 13) & 1)) >> 13);

@@ -28,7 +28,7 @@ std::uint64_t SamplePixels(const LocalImage& image) {
   constexpr std::int32_t kRows = 32;
   const std::int64_t pixels = image.bounds.pixel_count();
   const bool few = pixels <= kFew;
-  // A pixel of RGBA in every cache line of some rows.
+  // One RGBA pixel of each cache line, in some rows.
   const std::int32_t row_step = few ? 1 : std::max(image.bounds.height() / kRows, 1), column_step = few ? 1 : 4;
   std::int64_t looked_at = 0, filled = 0;
   for (std::int32_t y = row_step / 2; y < image.bounds.height(); y += row_step) {
@@ -37,7 +37,7 @@ std::uint64_t SamplePixels(const LocalImage& image) {
       ++looked_at;
     }
   }
-  // Narrow images may have no row or column that is looked at.
+  // The sampling may miss all pixels of a narrow image.
   return std::uint64_t(looked_at > 0 ? (filled * pixels + looked_at / 2) / looked_at : pixels);
 }
 

@@ -1,5 +1,5 @@
-// CoverageMap: how many pixels of each tile of a frame an image fills. What a cost model needs to know of a picture without its pixels: how
-// much of any pixel range travels, and how images that lie on each other add up.
+// CoverageMap: how many pixels of each tile of a frame an image fills. Cost models use it instead of the pixels: how much of any pixel
+// range travels, and how images that overlap add up.
 #pragma once
 
 #include <cstdint>
@@ -27,16 +27,16 @@ struct CoverageMap {
   friend bool operator==(const CoverageMap&, const CoverageMap&) = default;
 };
 
-// Images as renderers make them: all pixels are stored.
+// Images are those of renderers: all pixels are stored.
 //
-// Pixels of `image` that are not empty: all are looked at where there are few, of larger images a quarter of some 32 rows, so that asking
-// costs next to nothing.
+// Estimates how many pixels of `image` are not empty. Looks at all pixels of small images, and at a quarter of some 32 rows of larger ones,
+// so that it costs next to nothing.
 std::uint64_t SamplePixels(const LocalImage& image);
 
-// Of `image`, whose bounds lie in a frame of width x height pixels, each at least 1. Exact.
+// The coverage of `image`, whose bounds lie in a frame of width x height pixels, each at least 1. Exact.
 CoverageMap FindCoverage(const LocalImage& image, std::int32_t width, std::int32_t height);
 
-// `pixels` of them, spread evenly over `bounds`: where no more is known. At most bounds.pixel_count().
+// `pixels` pixels, at most bounds.pixel_count(), spread evenly over `bounds`: for when no more is known.
 CoverageMap UniformCoverage(const PixelBounds& bounds, double pixels, std::int32_t width, std::int32_t height);
 
 }  // namespace slabstream

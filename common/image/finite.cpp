@@ -1,5 +1,5 @@
-// AllFinite and AllDepths for every instruction set that the compiler knows: they look at what was just written, so they wait for nothing
-// but their own arithmetic.
+// AllFinite and AllDepths for every instruction set that the compiler knows. They read what was just written, so only their own arithmetic
+// takes time.
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "common/image/finite.cpp"
@@ -18,7 +18,7 @@
 #define SLABSTREAM_COMMON_IMAGE_FINITE_CPP_
 namespace slabstream {
 
-// The bits of infinity: with the sign cleared, those of all finite numbers are less, those of NaNs are more.
+// The bits of infinity. Without the sign, the bits of all finite numbers are smaller, those of NaNs larger.
 inline constexpr std::uint32_t kInfinityBits = 0x7F800000, kSignBit = 0x80000000;
 
 }  // namespace slabstream
@@ -35,7 +35,7 @@ std::uint32_t LargestMagnitude(const std::byte* bytes, std::size_t count) {
   std::size_t i = 0;
 #if HWY_TARGET != HWY_SCALAR
   const hn::ScalableTag<std::uint32_t> d;
-  const hn::Repartition<std::uint8_t, decltype(d)> d8;  // of no alignment
+  const hn::Repartition<std::uint8_t, decltype(d)> d8;  // needs no alignment
   const std::size_t lanes = hn::Lanes(d);
   const auto* const from = reinterpret_cast<const std::uint8_t*>(bytes);
   const auto load = [&](std::size_t at)
@@ -78,7 +78,7 @@ HWY_EXPORT(LargestMagnitude);
 HWY_EXPORT(NoneBelowLeast);
 
 bool AllFinite(std::span<const std::byte> floats) {
-  constexpr std::size_t kBatch = 16384;  // floats between two looks at what was found
+  constexpr std::size_t kBatch = 16384;  // floats between two checks of the result
   const std::size_t count = floats.size() / sizeof(float);
   for (std::size_t first = 0; first < count; first += kBatch) {
     const std::size_t some = std::min(kBatch, count - first);

@@ -1,4 +1,4 @@
-// Whether what another process wrote can be a picture at all.
+// Whether values that another process wrote can be those of a picture.
 #pragma once
 
 #include <cstddef>
@@ -6,10 +6,10 @@
 
 namespace slabstream {
 
-// No NaN and no infinity. `floats`: the bytes of floats, at any address.
+// True if no float is NaN or infinite. `floats`: the bytes of floats, at any address.
 bool AllFinite(std::span<const std::byte> floats);
 
-// No NaN and nothing below the least float: depths, of which +infinity says that a pixel is empty.
+// True if no depth is NaN or -infinity. A depth of +infinity marks an empty pixel.
 bool AllDepths(std::span<const float> depths);
 
 }  // namespace slabstream

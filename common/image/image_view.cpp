@@ -21,11 +21,11 @@ Columns ColumnsInRange(const PixelBounds& bounds, std::int64_t y, PixelRange ran
           std::min<std::int64_t>(bounds.x_end, column(range.end)) - bounds.x_begin};
 }
 
-// `columns` without the empty pixels at both ends. Empty is where `plane`, which has a value each `stride`, is `empty`.
+// `columns` without the empty pixels at both ends. `plane` has a value each `stride`; a pixel is empty if that is `empty`.
 template <std::size_t stride>
 Columns Narrowed(const float* plane, float empty, Columns columns) {
   const auto is_empty = [&](std::int64_t x) { return plane[stride * std::size_t(x)] == empty; };
-  // Eight at a time without a branch each, then what is left.
+  // Tests eight pixels a branch, then the rest one by one.
   const auto are_empty = [&](std::int64_t x) {
     bool all = true;
     for (std::int64_t i = 0; i < 8; ++i) all &= is_empty(x + i);
@@ -113,7 +113,7 @@ std::optional<RunImageHeader> DenseHeader(const ImageView& view) {
   const ColumnSpan whole = {0, std::uint32_t(width)};
   if (HasDepth(view.format) || view.bounds.empty() || view.stride != width) return std::nullopt;
   if (!std::ranges::all_of(view.rows, [&](const ColumnSpan& row) { return row == whole; })) return std::nullopt;
-  constexpr std::size_t kSamples = 32, kMostEmpty = 16;  // along a side; one of so many
+  constexpr std::size_t kSamples = 32, kMostEmpty = 16;  // samples along a side; at most one in so many is empty
   const std::size_t samples_x = std::min(kSamples, width), samples_y = std::min(kSamples, height);
   std::size_t empty = 0;
   for (std::size_t j = 0; j < samples_y; ++j) {

@@ -27,18 +27,18 @@ struct LocalImage {
   PooledVector<float> rgba;           // 4 * pixel_count
   PooledVector<float> depth;          // pixel_count if the format has depths; else empty
   PooledVector<std::uint32_t> voxel;  // pixel_count if the format has voxels; else empty
-  // While images are combined: pixels that are not in the span of their row are empty, whatever is stored. No spans: all pixels are stored,
-  // as in all images that renderers make and that pictures are made from.
+  // Used while images are combined: pixels outside the span of their row are empty, whatever is stored. No spans: all pixels are stored, as
+  // in images from renderers and in images that become pictures.
   std::vector<ColumnSpan> rows;
 };
 
 // All pixels empty.
 LocalImage MakeLocalImage(PixelFormat format, const PixelBounds& bounds);
-// Pixels [begin, end) by index.
+// Makes pixels [begin, end), by index, empty.
 void MakeEmpty(LocalImage& image, std::size_t begin, std::size_t end);
-// Stores the empty pixels that `rows` left out.
+// Stores the empty pixels outside `rows`, and drops the spans.
 void FillRows(LocalImage& image);
-// Pixels hold anything: for who writes every one of them.
+// Pixels are uninitialised: for callers that write every one of them.
 LocalImage MakeUnwrittenImage(PixelFormat format, const PixelBounds& bounds);
 
 }  // namespace slabstream

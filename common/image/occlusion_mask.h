@@ -1,7 +1,7 @@
 // OcclusionMask: which parts of a frame are opaque already, so that what lies behind them need not be rendered.
 //
-// Made by the display worker from what it has accumulated so far, told to the workers with the groups that lie behind (early termination
-// across groups). A mask that is out of date or missing changes no picture by more than the termination threshold: it only ever says less.
+// The display worker makes it from what it has accumulated so far. Workers get it with the groups that lie behind (early termination across
+// groups). A mask that is out of date or missing hides less, so it changes no picture by more than the termination threshold.
 #pragma once
 
 #include <cstdint>
@@ -21,21 +21,21 @@ struct OcclusionMask {
   std::vector<std::uint8_t> hidden;  // [y][x], 0 or 1; tiles_x * tiles_y of them
 
   bool empty() const { return hidden.empty(); }
-  // Of the tile that holds the pixel, which lies in the frame.
+  // Whether the tile of a pixel, which lies in the frame, is hidden.
   bool Hides(std::int32_t x, std::int32_t y) const {
     return !hidden.empty() && hidden[std::size_t(y / kOcclusionTile) * std::size_t(tiles_x) + std::size_t(x / kOcclusionTile)] != 0;
   }
-  // All pixels of `bounds`, which lie in the frame. True if there are none.
+  // Whether all pixels of `bounds`, which lie in the frame, are hidden. True if there are none.
   bool HidesAll(const PixelBounds& bounds) const;
   friend bool operator==(const OcclusionMask&, const OcclusionMask&) = default;
 };
 
-// Along an axis of a frame with so many pixels.
+// Tiles along an axis of so many pixels.
 constexpr std::int32_t OcclusionTiles(std::int32_t pixels) { return (pixels + kOcclusionTile - 1) / kOcclusionTile; }
 
 // Tiles whose pixels all transmit at most `termination`: alpha >= 1 - termination. Pixels outside the image's bounds are empty.
 // `termination` 0, or an image without an opaque tile: an empty mask. `image` is a kRgba image of a frame of width x height pixels.
-// `known`: found earlier, before more was put behind the same image; what was hidden stays hidden and is not looked at again.
+// `known`: an earlier result, before more was put behind the same image; its hidden tiles stay hidden and are not tested again.
 OcclusionMask FindHiddenTiles(const LocalImage& image, std::int32_t width, std::int32_t height, double termination,
                               OcclusionMask known = {});
 

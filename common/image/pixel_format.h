@@ -3,11 +3,11 @@
 // format      planes                    empty pixel        two pixels combine to
 // kRgba       rgba                      alpha = 0          front over back (Porter and Duff 1984); rgba is premultiplied
 // kDepth      rgba, depth, voxel index  depth = +infinity  the nearer one; equal depths: the one with the lower voxel index
-// kRgbaDepth  rgba, depth               depth = +infinity  nothing: it is kDepth in a finished picture
+// kRgbaDepth  rgba, depth               depth = +infinity  nothing: only finished pictures have it, made from kDepth
 // kMaximum    rgba                      alpha = 0          the larger value in each channel
 // kSum        rgba                      alpha = 0          the sum in each channel
-// A renderer says what the four channels of kMaximum and kSum mean. Their values are finite and >= 0, and combining does not depend on the
-// order of images. Sums are exact, and so independent of the order as well, as long as a renderer adds integers below 2^24.
+// A renderer defines what the four channels of kMaximum and kSum mean. Their values are finite and >= 0, and combining does not depend on
+// the order of images. Sums are exact, and so independent of the order as well, as long as a renderer adds integers below 2^24.
 #pragma once
 
 #include <cstddef>

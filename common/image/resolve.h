@@ -6,7 +6,7 @@ namespace slabstream {
 
 struct LocalImage;
 
-// `supersample` is a power of two, 1 returns the image as it is. Bounds of the result are in final pixels, grown to whole ones.
+// `supersample` is a power of two; 1 returns the image unchanged. Bounds of the result are in final pixels, grown to whole ones.
 LocalImage Resolve(const LocalImage& image, int supersample);
 
 }  // namespace slabstream

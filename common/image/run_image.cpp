@@ -23,7 +23,7 @@ std::size_t PixelBytes(const RunImageHeader& header) {
 
 constexpr std::size_t kBandRows = 32;  // of one task
 
-// What one band of rows holds, and what lies in front of it in the payload.
+// The contents of one band of rows, and what lies in front of it in the payload.
 struct Band {
   std::vector<Run> runs;
   std::uint64_t pixel_count = 0;
@@ -85,13 +85,13 @@ bool ColoursAreValid(ColorCoding color, std::span<const std::byte> colours) {
   return color == ColorCoding::kFloat32 ? AllFinite(colours) : NoneAbove(LargestCode(color), colours);
 }
 
-// The pixels of one row, [begin, end), that are not empty, as maximal spans: found(begin, end) for each. Empty is where `plane`, which has
-// a value each `stride`, is `empty`.
+// Finds the pixels of one row, [begin, end), that are not empty, as maximal spans: found(begin, end) for each. `plane` has a value each
+// `stride`; a pixel is empty if that is `empty`.
 template <std::size_t stride, class Found>
 void ForEachSpan(const float* plane, float empty, std::size_t begin, std::size_t end, Found&& found) {
   constexpr std::size_t kBlock = 16;
   const auto is_empty = [&](std::size_t x) { return plane[stride * x] == empty; };
-  // Whole blocks are counted in vectors; the compiler sees to that.
+  // The compiler vectorises the counting in whole blocks.
   const auto empty_ones = [&](std::size_t x) {
     std::size_t count = 0;
     for (std::size_t i = 0; i < kBlock; ++i) count += std::size_t(is_empty(x + i));
@@ -107,7 +107,7 @@ void ForEachSpan(const float* plane, float empty, std::size_t begin, std::size_t
   }
 }
 
-// `format`: that of the view, or one with fewer planes. Colours that cannot be coded stay floats, all of them.
+// `format`: that of the view, or one with fewer planes. If a colour cannot be coded, all stay floats.
 RunImage Encode(const ImageView& view, PixelFormat format, ColorCoding color) {
   RunImage result;
   result.header.format = format;
@@ -154,7 +154,7 @@ RunImage Encode(const ImageView& view, PixelFormat format, ColorCoding color) {
   return result;
 }
 
-constexpr std::uint32_t kRunsPerTask = 16;  // the pixels of a row each, mostly: they stay in a core's cache
+constexpr std::uint32_t kRunsPerTask = 16;  // mostly a row each: their pixels stay in a core's cache
 
 // For each task the number of pixels of all runs in front of its first one. One task at least.
 std::vector<std::size_t> FirstPixels(const RunPayload& runs) {

@@ -6,7 +6,7 @@
 //   pixel_count * 4 * RGBA: f32, or as `color` says (u16)
 //   formats with depths: pixel_count * f32 depth
 //   formats with voxels: pixel_count * u32 voxel
-// Dense: run_count == 0, and pixels; the payload has no runs, and all pixels of the bounds, row by row.
+// Dense: run_count == 0 and pixel_count > 0; the payload has no runs, but all pixels of the bounds, row by row.
 // Empty: depth == +infinity; where the format has no depths, alpha == 0 (colour is then 0 too).
 #pragma once
 
@@ -36,15 +36,15 @@ RunImage EncodePicture(const LocalImage& image);
 // check DecodeRuns may trust the image. `frame` is the frame's whole rectangle.
 Status ValidateRuns(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame);
 
-// What it says of the header alone: that the image fits its frame, and so how much memory it may take.
+// The part of ValidateRuns that needs only the header: the image fits its frame, and so how much memory it may take.
 Status ValidateRunHeader(const RunImageHeader& header, const PixelBounds& frame);
-// The same but for the values of pixels, which whoever reads them checks then (ValidatePixels).
+// All of ValidateRuns but the values of pixels: whoever reads those checks them (ValidatePixels).
 Status ValidateRunTable(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame);
 
 // Dense form. The image must be valid. Rows are decoded in parallel, within the caller's task arena.
 LocalImage DecodeRuns(const RunImageHeader& header, std::span<const std::byte> payload);
 
-// Both in one pass over the payload.
+// ValidateRuns and DecodeRuns in one pass over the payload.
 Result<LocalImage> ReadRuns(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame);
 
 }  // namespace slabstream

@@ -1,5 +1,5 @@
 // RunPayload: reads the payload of a run image whose header fits it (run_image.h has the layout). Payload bytes arrive in message buffers
-// of any alignment: they are copied out, unless AreFloats says that they may be read where they are.
+// of any alignment: they are copied out, unless AreFloats allows reading them in place.
 #pragma once
 
 #include <algorithm>
@@ -37,14 +37,14 @@ class RunPayload {
         depth_(rgba_ + color_bytes_ * header.pixel_count),
         voxel_(depth_ + sizeof(float) * header.pixel_count) {}
 
-  std::uint32_t run_count() const { return run_count_; }  // of a dense image its rows
+  std::uint32_t run_count() const { return run_count_; }  // dense image: its rows
   Run ReadRun(std::size_t index) const {
     if (dense_width_ > 0) return {std::uint32_t(index), 0, dense_width_};
     Run run;
     std::memcpy(&run, runs_ + sizeof(Run) * index, sizeof(Run));
     return run;
   }
-  // Pixels [first, first + count) of all runs: their bytes, four floats or codes, or one float each; and as numbers.
+  // Pixels [first, first + count) of all runs: here as bytes (a colour is four floats or codes), below as numbers.
   std::span<const std::byte> rgba(std::size_t first, std::size_t count) const {
     return {rgba_ + color_bytes_ * first, color_bytes_ * count};
   }
@@ -54,7 +54,7 @@ class RunPayload {
   std::span<const std::byte> voxel(std::size_t first, std::size_t count) const {
     return {voxel_ + sizeof(std::uint32_t) * first, sizeof(std::uint32_t) * count};
   }
-  // Whether colours and depths lie there as floats, voxels as words.
+  // Whether the payload can be read in place: colours and depths as floats, voxels as words.
   bool AreFloats() const { return color_ == ColorCoding::kFloat32 && reinterpret_cast<std::uintptr_t>(runs_) % alignof(float) == 0; }
   void ReadRgba(std::size_t first, std::size_t count, float* out) const {
     const std::byte* const source = rgba_ + color_bytes_ * first;
@@ -88,7 +88,7 @@ class RunPayload {
   const std::byte* voxel_;  // formats with voxels only
 };
 
-// What ValidateRuns says of pixels [first, first + count) of all runs.
+// The part of ValidateRuns for the values of pixels [first, first + count) of all runs.
 Status ValidatePixels(const RunImageHeader& header, const RunPayload& runs, std::size_t first, std::size_t count);
 
 }  // namespace slabstream

@@ -1,4 +1,4 @@
-// Operators that treat the four channels of a pixel alike. The compiler's vectors do: the loops wait for memory.
+// Operators that treat the four channels of a pixel alike. Loops that the compiler vectorises suffice: they wait for memory.
 #include <limits>
 
 #include "common/kernels/combine.h"

@@ -26,8 +26,8 @@ SourcePixels At(const ImageView& view, std::size_t pixel) {
   return {view.rgba + 4 * pixel, view.depth + pixel, view.voxel + pixel};
 }
 
-// memcpy writes rows without reading what was there before, which no loop of vectors does: that counts for more than another look at what
-// was written, which is in the nearest cache.
+// memcpy writes rows without first reading the old contents, which a loop of vectors does not avoid. That saves more than it costs to check
+// what was written, which is in the nearest cache.
 void CopyRow(const SourcePixels& source, const TargetPixels& target, std::size_t count) {
   std::memcpy(target.rgba, source.rgba, kRgbaBytes * count);
   if (source.depth == nullptr) return;
@@ -77,16 +77,16 @@ struct RowPixels {
   }
 };
 
-// Whether pixels that are combined have been looked at.
+// Whether the pixels to combine have been checked.
 enum class Values { kKnown, kUnchecked };
 
 bool AreFinite(const LocalImage& image, std::size_t first, std::size_t count) {
   return AllFinite(std::as_bytes(std::span(image.rgba).subspan(4 * first, 4 * count)));
 }
 
-// Writes both to the row of `image` that begins at index `row`: each pixel of their hull once, or not at all where `ours` is there already.
-// False: what was written of `theirs`, whose values are unchecked, is no colour or depth. What was written counts, not what was read: it
-// cannot change any more.
+// Writes both to the row of `image` that begins at index `row`: each pixel of their hull once, or not at all if `ours` is there already.
+// False: what was written of `theirs`, whose values are unchecked, is no colour or depth. Checks what was written, because `theirs` may
+// still change.
 template <Values kTheirs>
 bool MergeRow(const RowPixels& ours, const RowPixels& theirs, Side side, LocalImage& image, std::size_t row, bool in_place) {
   const Stretch a = ours.columns, b = theirs.columns, hull = Hull(a, b);
@@ -122,7 +122,7 @@ RowPixels RowOf(const ImageView& view, std::int32_t y, std::int32_t x_begin) {
   return {At(view, std::size_t(y - view.bounds.y_begin) * view.stride + row.begin), {offset + row.begin, offset + row.end}};
 }
 
-// Pixels [first, first + count) of all runs, which are floats where they may be read as such.
+// Pixels [first, first + count) of all runs that can be read as floats (RunPayload::AreFloats).
 SourcePixels InPlace(const RunImageHeader& header, const RunPayload& runs, std::size_t first, std::size_t count) {
   const auto* const rgba = reinterpret_cast<const float*>(runs.rgba(first, count).data());
   if (!HasDepth(header.format)) return {rgba, nullptr, nullptr};
@@ -217,20 +217,20 @@ Status CombineRuns(LocalImage& image, const RunImageHeader& header, std::span<co
   CHECK_EQ(int(image.format), int(header.format));
   if (Status table = ValidateRunTable(header, payload, frame); !table.ok()) return table;
   if (header.pixel_count == 0) return Status::Ok();
-  if (!image.bounds.Contains(header.bounds)) {  // room for all first
+  if (!image.bounds.Contains(header.bounds)) {  // first make room for all
     LocalImage nothing = MakeUnwrittenImage(header.format, header.bounds);
     nothing.rows.resize(std::size_t(header.bounds.height()));
     Combine(image, ViewOf(nothing), side, room);
   }
 
-  // Where kernels cannot read a run in place it is copied; it fits the cache.
+  // A run that kernels cannot read in place is copied; it fits the cache.
   const RunPayload runs(header, payload);
   const bool readable = runs.AreFloats(), floats = header.color == ColorCoding::kFloat32 && !HasDepth(header.format);
   LocalImage scratch = MakeUnwrittenImage(header.format, {0, 0, readable ? 0 : header.bounds.width(), 1});
   std::size_t first = 0;
   for (std::uint32_t i = 0; i < runs.run_count(); ++i) {
     const Run run = runs.ReadRun(i);
-    // Colours that are floats are checked by what comes of them; a depth, or a code that stands for none, would not be seen there.
+    // Float colours are checked after combining. That would not show an invalid depth or code.
     if (!floats) {
       if (Status pixels = ValidatePixels(header, runs, first, run.pixel_count); !pixels.ok()) return pixels;
     }

@@ -1,4 +1,4 @@
-// NearestRow for every instruction set that the compiler knows: the reference's bits. Where neither image hides the other within a vector,
+// NearestRow for every instruction set that the compiler knows. The bits are the reference's. If one image is in front in a whole vector,
 // as is usual, nothing or all of it is copied.
 
 #undef HWY_TARGET_INCLUDE

@@ -1,6 +1,6 @@
-// OverRow for every instruction set that the compiler knows; the best one that the CPU has is chosen at the first call. Multiplication and
-// addition are kept apart (and this file is compiled without contraction), so every instruction set, and vector and tail, give the
-// reference's bits; the loop waits for memory, not for arithmetic.
+// OverRow for every instruction set that the compiler knows; the best one that the CPU has is chosen at the first call. Products and sums
+// are not fused (this file is compiled without contraction), so all instruction sets, and vector and tail, give the reference's bits. The
+// loop waits for memory, not for arithmetic.
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "common/kernels/over.cpp"
@@ -36,7 +36,7 @@ HWY_INLINE hn::Vec<hn::RebindToUnsigned<D> > OverVector(D d, const float* front,
 }
 
 bool OverRow(const float* front, const float* back, float* out, std::size_t pixel_count) {
-  constexpr std::uint32_t kInfinity = 0x7F800000;  // without a sign, the bits of all finite numbers are less, those of NaNs more
+  constexpr std::uint32_t kInfinity = 0x7F800000;  // without a sign, the bits of all finite numbers are smaller, those of NaNs larger
   const hn::ScalableTag<float> wide;
   const hn::FixedTag<float, 4> pixel;
   const hn::RebindToUnsigned<decltype(wide)> wide_bits;

@@ -31,19 +31,19 @@ using PixelTag = hn::FixedTag<float, 4>;  // one pixel
 // Up to four neighbouring pixels of a row.
 using PixelsTag = hn::FixedTag<float, HWY_HAVE_SCALABLE ? 4 : HWY_MIN(std::size_t{16}, HWY_MAX_BYTES / sizeof(float))>;
 
-// Some neighbouring pixels of a row of the picture: where they lie in the frame, and, if no spline of theirs is wider than 3 pixels, its
-// first pixel and weights.
+// Some neighbouring pixels of a row of the picture: where they lie in the frame, and, if none of their splines is wider than 3 pixels, the
+// first pixel and the weights of each.
 constexpr std::int32_t kBatch = 16;
 struct Places {
   HWY_ALIGN double x[kBatch], y[kBatch];
-  bool narrow = false;  // all of them; what is below holds then
-  bool inside = false;  // what is read of all of them lies on the image
+  bool narrow = false;  // no spline is wider than 3 pixels; needed by the members below
+  bool inside = false;  // all pixels of the frame that they read lie on the image
   HWY_ALIGN std::int32_t first_x[kBatch], first_y[kBatch];
   HWY_ALIGN float weight_x[4 * kBatch + 16];  // of the three pixels and a 0, pixel after pixel; then room to read beyond
   HWY_ALIGN float weight_y[3][kBatch];
 };
 
-// Of places at + 1/2 pixel: store(i, first pixels, the three weights) for each vector of them.
+// Weights of narrow splines at the places `at` (pixel centres: + 1/2): store(i, first pixels, the three weights) for each vector.
 template <class Store>
 HWY_INLINE void NarrowSpline(const double* HWY_RESTRICT at, Store&& store) {
   const hn::CappedTag<double, 8> d;
@@ -59,14 +59,14 @@ HWY_INLINE void NarrowSpline(const double* HWY_RESTRICT at, Store&& store) {
   }
 }
 
-// Whether all that is read of a narrow pixel lies on the image: three pixels and a fourth, which has weight 0.
+// Whether all pixels that a narrow spline reads lie on the image: three, and a fourth with weight 0.
 HWY_INLINE bool IsInside(const PixelBounds& image, const Places& places, std::int32_t i) {
   constexpr double kReach = 3;
   return places.x[i] >= image.x_begin + kReach && places.x[i] <= image.x_end - kReach && places.y[i] >= image.y_begin + kReach &&
          places.y[i] <= image.y_end - kReach;
 }
 
-// Of the pixels x_begin, x_begin + 1, ... of row y: the places of ResampleAt in vectors.
+// Finds the places of pixels x_begin, x_begin + 1, ... of row y, as ResampleAt does, in vectors.
 HWY_INLINE void FindPlaces(const ProjectiveMap& map, const PixelBounds& image, std::int32_t x_begin, std::int32_t y, Places& places) {
   const hn::CappedTag<double, 8> d;
   const hn::Rebind<float, decltype(d)> df;
@@ -94,7 +94,7 @@ HWY_INLINE void FindPlaces(const ProjectiveMap& map, const PixelBounds& image, s
   constexpr double kSteepest = (1 + kSkewSlack) * (1 + kSkewSlack);
   places.narrow = hn::AllTrue(d, hn::Le(widest, hn::Set(d, kSteepest))) && hn::AllTrue(d, hn::Gt(least_w, zero));
   if (!places.narrow) return;
-  places.inside = IsInside(image, places, 0) && IsInside(image, places, kBatch - 1);  // a line stays a line
+  places.inside = IsInside(image, places, 0) && IsInside(image, places, kBatch - 1);  // a line stays a line, so its ends suffice
   NarrowSpline(places.x, [&](std::int32_t i, auto first, auto left, auto middle, auto right) HWY_ATTR {
     hn::Store(first, di, places.first_x + i);
     hn::StoreInterleaved4(left, middle, right, hn::Zero(df), df, places.weight_x + 4 * i);
@@ -121,7 +121,7 @@ struct Spline {
     weight.resize(std::size_t(taps));
     const double per_scale = 1 / scale;
     const auto value = [&](double pixel) { return QuadraticSpline((pixel + 0.5 - at) * per_scale); };
-    // The usual case: all of it lies there, so that the weights' sum is at hand.
+    // The usual case: the whole spline lies there, so the sum of its weights is at hand.
     const bool whole = begin == spline_begin && end == spline_end;
     double sum = 0;
     for (std::int32_t i = 0; i < taps; ++i) {
@@ -134,7 +134,7 @@ struct Spline {
   }
 };
 
-// Any place and width.
+// Resamples one pixel, at any place and width.
 void ResampleOne(const LocalImage& frame, const ResamplePoint& point, Spline& along_x, Spline& along_y, float* out) {
   const PixelTag d;
   const PixelBounds& b = frame.bounds;
@@ -165,7 +165,7 @@ HWY_INLINE hn::Vec<PixelTag> SumOfPixels(Vector pixels) {
   }
 }
 
-// Pixels [begin, end) of the batch, all of them inside. `out`: of the batch's first pixel.
+// Resamples pixels [begin, end) of the batch, all of them inside. `out`: of the batch's first pixel.
 HWY_INLINE void ResampleNarrow(const LocalImage& frame, const Places& places, std::int32_t begin, std::int32_t end,
                                float* HWY_RESTRICT out) {
   const PixelsTag d;
@@ -192,7 +192,7 @@ HWY_INLINE void ResampleNarrow(const LocalImage& frame, const Places& places, st
   }
 }
 
-// Asks for what the next batch of the row will read, about.
+// Prefetches about what the next batch of the row will read.
 HWY_INLINE void FetchNext(const LocalImage& frame, const Places& places) {
   const PixelBounds& b = frame.bounds;
   constexpr double kBatchesPerSpan = double(kBatch) / (kBatch - 1);
@@ -212,7 +212,7 @@ void ResampleRows(const LocalImage& frame, const ProjectiveMap& frame_from_pictu
   const std::int32_t width = picture.bounds.x_end;
   Places places;
   Spline along_x, along_y;
-  // Batch below batch: neighbouring rows read the same lines of the frame, and there is time to fetch those of the next column.
+  // Works down columns of batches: neighbouring rows read the same lines of the frame, which leaves time to fetch the next column's.
   for (std::int32_t x = 0; x < width; x += kBatch) {
     const std::int32_t count = std::min(kBatch, width - x);
     for (std::int32_t y = y_begin; y < y_end; ++y) {

@@ -1,9 +1,9 @@
 // From the frame that splatting renders (SheetGrid) to the picture: each pixel of the picture is a weighted mean of pixels of the frame
-// round the place where its ray meets it.
+// round the point where its ray meets it.
 //
 // The weights are a quadratic B-spline in x and one in y, sampled at the centres of the frame's pixels and divided by their sum; pixels
-// outside the image are empty. A spline is 3 pixels of the frame wide; where a pixel of the picture is wider than one of the frame, 3 of
-// those, so that minified pictures do not alias. Weights are not negative and sum to 1, so an error of the frame never grows.
+// outside the image are empty. A spline is 3 pixels wide: pixels of the frame, or of the picture if those are wider, so that minified
+// pictures do not alias. Weights are not negative and sum to 1, so an error of the frame never grows.
 //
 // Width of a spline in x, in pixels of the frame: s = max(1, |dX/d(x, y)| - kSkewSlack), the spline is 3 s wide. (In a skewed grid columns
 // are denser than the gradient tells.)
@@ -19,7 +19,7 @@ namespace slabstream {
 inline constexpr double kSkewSlack = 0.25;  // pixels
 
 // Fills the rows [y_begin, y_end) of `picture` (kRgba, bounds beginning at (0, 0)) from `frame` (kRgba). `frame_from_picture`: row-major
-// projective map, (X, Y, W) = map (x, y, 1); pictures of places with W <= 0 are empty. Any thread, disjoint rows.
+// projective map, (X, Y, W) = map (x, y, 1); pixels with W <= 0 are empty. Any thread, disjoint rows.
 using ProjectiveMap = std::array<double, 9>;
 void ResampleRows(const LocalImage& frame, const ProjectiveMap& frame_from_picture, std::int32_t y_begin, std::int32_t y_end,
                   LocalImage& picture);

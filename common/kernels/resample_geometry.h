@@ -1,4 +1,4 @@
-// What both forms of ResampleRows need to know of a pixel of the picture.
+// What both forms of ResampleRows compute for a pixel of the picture.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +14,7 @@ struct ResamplePoint {
   double scale_x = 1, scale_y = 1;  // s of resample.h
 };
 
-// Of the picture's point (x, y).
+// For the picture's point (x, y).
 inline ResamplePoint ResampleAt(const ProjectiveMap& m, double x, double y) {
   const double w = m[6] * x + m[7] * y + m[8];
   if (!(w > 0)) return {};
@@ -32,7 +32,7 @@ inline ResamplePoint ResampleAt(const ProjectiveMap& m, double x, double y) {
   return point;
 }
 
-// Farther places, in pixels, are taken as not in the frame.
+// Places farther away, in pixels, count as outside the frame.
 inline constexpr double kFarthestPlace = 1 << 29;
 inline bool IsNear(double x, double y) { return std::abs(x) < kFarthestPlace && std::abs(y) < kFarthestPlace; }
 
@@ -43,7 +43,7 @@ inline double QuadraticSpline(double t) {
   return t <= 0.5 ? 0.75 - t * t : 0.5 * (1.5 - t) * (1.5 - t);
 }
 
-// The sum of a spline's samples at the centres of all pixels. From some width on it is the width, within 3e-7 of it.
+// The sum of a spline's samples at the centres of all pixels. For wide splines it is the width, to within 3e-7 of it.
 inline double SplineSum(double at, double scale) {
   constexpr double kWide = 64;
   if (scale > kWide) return scale;

@@ -8,13 +8,13 @@
 
 namespace slabstream {
 
-// Those that this program has code for and this CPU runs, best first: "avx512", "avx2", "sse4", "ssse3", "sse2", "neon", ...
+// Instruction sets that this program has code for and this CPU runs, best first: "avx512", "avx2", "sse4", "ssse3", "sse2", "neon", ...
 std::vector<std::string> SimdTargets();
 
-// No better one than `name` (of SimdTargets()) from now on. Before the first kernel runs. InvalidArgument: no such name.
+// Limits kernels to `name` (of SimdTargets()) or worse. Call it before the first kernel runs. InvalidArgument: no such name.
 Status LimitSimdTarget(const std::string& name);
 
-// The same by the environment variable SLABSTREAM_SIMD, if it is set: for measuring, and for running the tests under each instruction set.
+// The same by the environment variable SLABSTREAM_SIMD, if set: for measuring, and for running the tests under each instruction set.
 Status LimitSimdTargetByEnvironment();
 
 }  // namespace slabstream

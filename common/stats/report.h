@@ -49,15 +49,15 @@ struct RankReport {
   std::uint64_t voxel_bytes = 0;      // received for this group since the last report (0: all was cached)
   std::uint64_t image_bytes = 0;      // payload sent to other workers
   PixelBounds image_bounds;           // of the box's own image, in the frame
-  std::uint64_t image_pixels = 0;     // of them, not empty: an estimate (SamplePixels)
+  std::uint64_t image_pixels = 0;     // pixels in image_bounds that are not empty: an estimate (SamplePixels)
   friend bool operator==(const RankReport&, const RankReport&) = default;
 };
 inline constexpr int kMaxSpans = 64;
 
-// Adds a stretch of time, while there is room for its span.
+// Adds a stretch of time to the stage; its span only while there is room.
 void AddStage(RankReport& report, Stage stage, std::int64_t begin_ns, std::int64_t end_ns);
 
-// Of the display worker's report: making the picture and encoding it, in ns. Partial images are encoded, too, but before that.
+// The time to make and encode the picture, in ns, from the display worker's report. Earlier encoding of partial images does not count.
 std::int64_t PictureNs(const RankReport& report);
 
 }  // namespace slabstream

@@ -50,15 +50,15 @@ void ConnectionTuner::TuneNew() {
   }
 }
 
-// The connection may be gone by now and its descriptor another one's: then that is a connection of this host, too, or it stays as it is.
+// The connection may be gone and its descriptor reused: then the new connection is one of this host too, or stays unchanged.
 void ConnectionTuner::on_event_connected(const zmq_event_t& event, const char*) {
   const int descriptor = event.value;
   if (!StaysOnThisHost(descriptor)) return;
   std::array<char, kMostNameBytes> system{};
   socklen_t bytes = system.size();
   if (::getsockopt(descriptor, IPPROTO_TCP, TCP_CONGESTION, system.data(), &bytes) != 0) return;
-  // If one fails, the connection is a slower one. Something may have been sent already. BBR has then lowered the slow start threshold to
-  // what was under way, and reno would be paced by that for ever: so BBR begins anew, which takes the threshold away.
+  // If one fails, the connection is merely slower. If something was sent already, BBR has lowered the slow start threshold to what was in
+  // flight, and reno would be held to that for ever. So BBR starts anew, which removes the threshold.
   for (const char* name : {kReno, std::as_const(system).data(), kReno}) {
     (void)::setsockopt(descriptor, IPPROTO_TCP, TCP_CONGESTION, name, socklen_t(std::strlen(name)));
   }

@@ -1,21 +1,21 @@
-// ConnectionTuner: sets on the connections that a socket has made what ZeroMQ has no option for. Private to this folder.
+// ConnectionTuner: sets options of a socket's connections for which ZeroMQ has none. Private to this folder.
 //
-// A connection that stays on this host gets reno for its congestion control, which every process may choose. Where the system's choice
-// paces what is sent, as BBR does, an image costs twice the processor time on the loopback, which has no queue to be kept short. All other
-// connections keep the system's choice.
+// A connection that stays on this host gets reno as its congestion control, which every process may choose. If the system's choice paces
+// packets, as BBR does, an image costs twice the processor time on the loopback, which has no queue to keep short. All other connections
+// keep the system's choice.
 #pragma once
 
 #include <zmq.hpp>
 
 namespace slabstream {
 
-// Of the thread that the socket belongs to; ends before the socket.
+// For the socket's thread only; ends before the socket.
 class ConnectionTuner : private zmq::monitor_t {
  public:
   // Before the socket connects. Throws zmq::error_t.
   explicit ConnectionTuner(zmq::socket_t& socket);
 
-  // Tunes connections that were made since the last call. To be called now and then: until then ZeroMQ remembers them.
+  // Tunes connections made since the last call. Call it now and then: until then ZeroMQ remembers them.
   void TuneNew();
 
  private:

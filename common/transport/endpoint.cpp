@@ -21,7 +21,7 @@ bool Printable(std::string_view text) {
   return std::all_of(text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) > ' ' && c != '\x7f'; });
 }
 
-// The text in messages: bounded, and without bytes that would break the line.
+// The text for messages: bounded, and without bytes that would break the line.
 std::string Quoted(std::string_view text) {
   std::string quoted = "endpoint \"";
   for (const char c : text.substr(0, 128)) quoted += static_cast<unsigned char>(c) < ' ' || c == '\x7f' ? '?' : c;

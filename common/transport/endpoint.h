@@ -26,8 +26,8 @@ struct Endpoint {
 // (binding).
 Result<Endpoint> ParseEndpoint(std::string_view text, bool allow_wildcard);
 
-// Where the coordinator listens for workers when only the client endpoint is given: the next tcp port (any for any; the one before
-// 65535, which has no next), or the path with ".workers".
+// Where the coordinator listens for workers if only the client endpoint is given: the next tcp port (any for any; the one before for
+// 65535), or the path with ".workers".
 Endpoint WorkerEndpointFor(const Endpoint& client_endpoint);
 
 }  // namespace slabstream

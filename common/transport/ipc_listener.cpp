@@ -20,7 +20,7 @@ constexpr int kBacklog = 100;  // ZeroMQ's default
 sockaddr_un AddressOf(const std::string& path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
-  CHECK_LT(path.size(), sizeof(address.sun_path));  // ParseEndpoint has seen to it
+  CHECK_LT(path.size(), sizeof(address.sun_path));  // ParseEndpoint has checked it
   std::memcpy(address.sun_path, path.data(), path.size());
   return address;
 }
@@ -34,7 +34,7 @@ bool Bind(int descriptor, const sockaddr_un& address) {
   return ::bind(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0;
 }
 
-// Makes room where a socket file is left over from a process that has ended.
+// Removes a socket file left over from a process that has ended.
 Status RemoveStale(const std::string& path, const sockaddr_un& address) {
   struct stat file {};
   if (::lstat(path.c_str(), &file) != 0) return errno == ENOENT ? Status::Ok() : SystemError(path, errno);

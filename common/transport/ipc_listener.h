@@ -1,8 +1,8 @@
 // IpcListener: a listening Unix socket and its file, made here and handed to ZeroMQ as a descriptor.
 //
-// ZeroMQ could bind the path itself, but it removes whatever lies there first, a living service's socket or a user's file alike, and
-// removes its own file at some time after closing. Here a path is taken over only from a socket that nobody listens on, and the file is
-// gone when Remove returns.
+// ZeroMQ could bind the path itself, but it first removes whatever lies there, even a living service's socket or a user's file, and removes
+// its own file some time after closing. Here a path is taken over only from a socket that nobody listens on, and the file is gone when
+// Remove returns.
 #pragma once
 
 #include <sys/types.h>
@@ -18,7 +18,7 @@ class IpcListener {
   // Unavailable naming the path: somebody listens there, it is not a socket, no permission, no such directory.
   static Result<IpcListener> Listen(const std::string& path);
 
-  // The descriptor. Whoever calls it owns it.
+  // Returns the descriptor; the caller then owns it.
   int Release();
 
   // Removes the file unless another process has put its own there meanwhile.

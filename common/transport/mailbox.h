@@ -21,7 +21,7 @@ class Mailbox {
     wakeup_.Notify();
   }
 
-  // Everything that was posted since the last call, in order.
+  // Everything posted since the last call, in order.
   std::vector<T> TakeAll() {
     const std::lock_guard lock(mutex_);
     return std::exchange(values_, {});

@@ -22,7 +22,7 @@ struct Context::Impl {
 };
 
 Context::Context() : impl_(std::make_unique<Impl>()) {
-  constexpr int kMaxSockets = 65535;  // the usual 1023 would bound the embedded workers: each has a socket to each other one
+  constexpr int kMaxSockets = 65535;  // the usual 1023 would limit the embedded workers: each has a socket to every other
   impl_->context.set(zmq::ctxopt::max_sockets, kMaxSockets);
 }
 
@@ -84,8 +84,8 @@ void BindDescriptor(zmq::socket_t& socket, const std::string& endpoint, IpcListe
   socket.set(zmq::sockopt::use_fd, kNone);
 }
 
-// ZeroMQ orders what a thread did before it sent a message before what another does after receiving or freeing it. ThreadSanitizer does not
-// see that inside an uninstrumented library, so it is told.
+// What a thread did before it sent a message happens before what another does after receiving or freeing it. ThreadSanitizer does not see
+// that inside ZeroMQ, which is not instrumented, so these calls tell it.
 void BeforeHandOver([[maybe_unused]] const void* data) {
 #ifdef __SANITIZE_THREAD__
   __tsan_release(const_cast<void*>(data));
@@ -102,14 +102,14 @@ void LetGo(void* data, void* owner) {
   delete static_cast<Bytes*>(owner);
 }
 
-// A message that shares the bytes and lets go of them when ZeroMQ has sent it, from whatever thread.
+// A message that shares the bytes and releases them when ZeroMQ has sent it, on any thread.
 zmq::message_t Share(Bytes bytes) {
   if (bytes.empty()) return {};
   auto owner = std::make_unique<Bytes>(std::move(bytes));
   const std::span<const std::byte> data = owner->span();
   zmq::message_t message(const_cast<std::byte*>(data.data()), data.size(), LetGo, owner.get());
   BeforeHandOver(data.data());
-  (void)owner.release();  // the message's now
+  (void)owner.release();  // the message owns it now
   return message;
 }
 
@@ -210,7 +210,7 @@ Status Socket::Connect(const std::string& text) {
 Status Socket::Send(const std::string& identity, std::vector<std::byte> header, const Bytes& payload) {
   zmq::socket_t& socket = impl_->socket;
   if (impl_->tuner != nullptr) impl_->tuner->TuneNew();
-  // All parts are made before the first one is sent: what runs out of memory between them would leave half a message.
+  // Make all parts before sending the first one: running out of memory between them would leave half a message.
   zmq::message_t to(identity.data(), identity.size()), head = Share(Bytes(std::move(header))), body = Share(payload);
   int error = impl_->router ? SendPart(socket, std::move(to), true) : 0;
   if (error == 0) error = SendPart(socket, std::move(head), !payload.empty());
@@ -233,7 +233,7 @@ std::optional<Incoming> Socket::TryReceive() {
     } else {
       incoming.parts.push_back(Adopt(std::move(part)));
     }
-    // The parts of a message arrive together: none of them is waited for.
+    // The parts of a message arrive together, so none of them needs a wait.
     std::size_t surplus = 0;
     while (more && ReceivePart(impl_->socket, part)) {
       more = part.more();

@@ -4,11 +4,13 @@
 //   2. Socket::Router / Socket::Dealer, then Bind or Connect.
 //   3. A loop: Wait(sockets, wakeup, timeout), then TryReceive until empty, then Send.
 // A socket belongs to the thread that uses it; it may be made in one thread and handed to another before its first use. Context and Wakeup
-// are thread-safe. No call blocks but Wait. Routers are MANDATORY: sending to an identity that is not connected fails with Unavailable,
-// which is also how a router notices that a peer has gone; identities are ZeroMQ's, never given twice. A dealer queues what it sends until
-// its connection is up, and again while it is broken, up to the high-water mark: tcp and ipc reconnect by themselves (every 100 ms), and
-// what was queued then reaches whoever listens there now. So receivers go by epochs, and a dealer whose peer is known to be dead is closed,
-// which drops the queue after the linger time. inproc does not reconnect: after its peer has closed, sending ends in ResourceExhausted.
+// are thread-safe. Only Wait blocks.
+//
+// Routers are MANDATORY: sending to an identity that is not connected fails with Unavailable, which is also how a router notices that a
+// peer has gone. ZeroMQ makes the identities, and never the same one twice. A dealer queues what it sends until its connection is up, and
+// again while it is broken, up to the high-water mark: tcp and ipc reconnect by themselves (every 100 ms), and the queue then reaches
+// whoever listens there now. So receivers check epochs, and a dealer whose peer is known to be dead is closed, which drops the queue after
+// the linger time. inproc does not reconnect: after its peer has closed, sending ends in ResourceExhausted.
 #pragma once
 
 #include <cstdint>

@@ -13,7 +13,7 @@ inline constexpr int kMaxLights = 8;
 struct Shading {
   bool phong = true;
   std::vector<Vec3> lights;  // directions towards the lights in volume axes (physical), not zero; empty: a headlight
-  // Ambient and diffuse add up to 1: what faces a single light has just the colour that the transfer function gives it.
+  // Ambient and diffuse add up to 1: a surface that faces a single light has exactly the colour of its transfer function.
   float ambient = 0.2F, diffuse = 0.8F, specular = 0.2F;  // [0, 1]
   float shininess = 20;                                   // [1, 1000]
   friend bool operator==(const Shading&, const Shading&) = default;

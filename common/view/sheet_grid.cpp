@@ -19,7 +19,7 @@ Matrix Product(const Matrix& a, const Matrix& b) {
   return product;
 }
 
-// Up to a positive factor: the adjugate, times the sign of the determinant.
+// The inverse up to a positive factor: the adjugate, times the sign of the determinant.
 Matrix InverseDirection(const Matrix& m) {
   const Matrix adjugate = {m[4] * m[8] - m[5] * m[7], m[2] * m[7] - m[1] * m[8], m[1] * m[5] - m[2] * m[4],
                            m[5] * m[6] - m[3] * m[8], m[0] * m[8] - m[2] * m[6], m[2] * m[3] - m[0] * m[5],
@@ -43,8 +43,8 @@ SheetGrid MakeSheetGrid(const Camera& camera, const VolumeGeometry& geometry) {
   const Vec3 centre = 0.5 * (ToVec3(geometry.size) - Vec3{1, 1, 1});
   const bool perspective = camera.projection == Projection::kPerspective;
 
-  // The plane through the volume's centre, k = centre[c], stands for the grid: what a ray meets there says its pixel. picture_from_plane
-  // takes (u, v, 1) to homogeneous coordinates of the picture.
+  // The plane through the volume's centre, k = centre[c], stands for the grid: the point where a ray meets it is the ray's pixel.
+  // picture_from_plane takes (u, v, 1) to homogeneous coordinates of the picture.
   Matrix picture_from_plane;
   const std::array<const std::array<double, 4>*, 3> rows = {&camera.x_row, &camera.y_row, &camera.w_row};
   for (std::size_t i = 0; i < 3; ++i) {
@@ -87,7 +87,7 @@ SheetGrid MakeSheetGrid(const Camera& camera, const VolumeGeometry& geometry) {
     grid.y_0 = grid.y_v * per_slice_v * centre[c];
   }
 
-  // What footprints of the volume reach, in pixels.
+  // The pixels that footprints of the volume reach.
   Extent columns, image_rows;
   for (const double k : {-0.5, geometry.size[c] - 0.5}) {
     const SlicePlacement slice = PlaceSlice(grid, k);
@@ -97,13 +97,13 @@ SheetGrid MakeSheetGrid(const Camera& camera, const VolumeGeometry& geometry) {
       image_rows.Add(slice.scale_v * (centre[v] + side * (0.5 * geometry.size[v] + kFootprintCut * sigma.v)) + slice.offset_v);
     }
   }
-  // Of that, what is in the picture, unless its border sees beyond the horizon of the slices.
+  // Cut to what is in the picture, unless the picture's border sees beyond the horizon of the slices.
   const Matrix plane_from_picture = InverseDirection(picture_from_plane);
   const Matrix grid_from_plane = {grid.x_u, 0, 0, 0, grid.y_v, 0, 0, 0, 1};
   const Matrix unshifted = Product(grid_from_plane, plane_from_picture);
   Extent seen_columns, seen_rows;
   bool horizon = false;
-  constexpr double kFilterReach = 4;  // pixels of the picture that resampling reaches beyond its border, and to spare
+  constexpr double kFilterReach = 4;  // pixels of the picture that resampling reaches beyond its border, with some to spare
   for (const double x : {-kFilterReach, camera.width + kFilterReach}) {
     for (const double y : {-kFilterReach, camera.height + kFilterReach}) {
       const double w = unshifted[6] * x + unshifted[7] * y + unshifted[8];
@@ -117,7 +117,7 @@ SheetGrid MakeSheetGrid(const Camera& camera, const VolumeGeometry& geometry) {
     }
   }
   if (!horizon) {
-    constexpr double kGridReach = 2;  // pixels of the grid, for the same reason where those are the wider ones
+    constexpr double kGridReach = 2;  // the same in pixels of the grid, if those are wider
     columns = {std::max(columns.begin, seen_columns.begin - kGridReach), std::min(columns.end, seen_columns.end + kGridReach)};
     image_rows = {std::max(image_rows.begin, seen_rows.begin - kGridReach), std::min(image_rows.end, seen_rows.end + kGridReach)};
   }

@@ -1,6 +1,6 @@
 // SheetGrid: the image that splatting renders, aligned with the slices of the volume (the intermediate image of Lacroute and Levoy's
-// shear-warp factorization, 1994). All rays of a camera that meet the slices meet them in one order of rows and columns, so an image whose
-// columns run along u and whose rows run along v has, in every slice, a sheet that is the slice itself, scaled and shifted:
+// shear-warp factorization, 1994). All rays of a camera that meet the slices meet them in the same order of rows and columns. So if columns
+// of the image run along u and its rows along v, each slice appears in it as a sheet that is only scaled and shifted:
 //
 //   column(u, k) = (x_u u + x_c k + x_0) / w(k),   row(v, k) = (y_v v + y_c k + y_0) / w(k),   w(k) = w_c k + w_0
 //
@@ -8,8 +8,8 @@
 // (i + 0.5, j + 0.5). Orthographic: w = 1. A pixel of the grid is one ray, the same for all slices; the frame that workers combine is made
 // of such pixels, and the display worker resamples it to the picture by a projective map (ResamplePicture) at the end.
 //
-// Resolution: at the volume's centre, a column is as wide as a pixel of the picture, but between half a voxel (what a footprint holds has
-// no finer detail to show) and two voxels (so that a footprint reaches a bounded number of voxels). Likewise rows.
+// Resolution: at the volume's centre, a column is as wide as a pixel of the picture, but at least half a voxel (a footprint has no finer
+// detail to show) and at most two voxels (so that a footprint reaches a bounded number of voxels). Likewise rows.
 #pragma once
 
 #include <array>
@@ -44,8 +44,8 @@ struct SheetGrid {
   friend bool operator==(const SheetGrid&, const SheetGrid&) = default;
 };
 
-// Of the picture that `camera` (not supersampled) describes. Its sides are above kMaxGridSide where an oblique view sees many slices that
-// lie hundreds of voxel widths apart: PlanFrame refuses such views.
+// The grid for the picture of `camera` (not supersampled). Its sides exceed kMaxGridSide if an oblique view sees many slices that lie
+// hundreds of voxel widths apart: PlanFrame refuses such views.
 SheetGrid MakeSheetGrid(const Camera& camera, const VolumeGeometry& geometry);
 
 // In slice k: column = scale_u u + offset_u, row = scale_v v + offset_v; the scales are pixels a voxel, > 0.
@@ -58,9 +58,9 @@ inline SlicePlacement PlaceSlice(const SheetGrid& grid, double k) {
 }
 
 // The footprint of a voxel within its slice: the product of a Gaussian along u and one along v, cut off at kFootprintCut standard
-// deviations. It is the shadow that a round Gaussian of variance kFootprintVoxelVariance casts along the central ray on its slice (the
-// correlation of u and v left out; where slices are far apart, of a ray with a shear of at most kMaxFootprintShear), and never so narrow
-// that the grid could miss it.
+// deviations. It is the shadow that a round Gaussian of variance kFootprintVoxelVariance casts along the central ray on its slice, without
+// the correlation of u and v, and with the shear limited to kMaxFootprintShear (slices far apart). It is never so narrow that the grid
+// could miss it.
 inline constexpr double kFootprintVoxelVariance = 0.36;  // voxels^2
 inline constexpr double kFootprintGridVariance = 0.3;    // pixels^2 of the grid, the least
 inline constexpr double kFootprintCut = 3;               // standard deviations
@@ -70,8 +70,8 @@ struct FootprintSigma {
 };
 FootprintSigma FootprintIn(const SheetGrid& grid, const SlicePlacement& slice);
 
-// The largest scale of a slice that any view has is 12 pixels a voxel: next to the eye of a wide perspective view. Grids are refused
-// beyond:
+// The largest scale of a slice in any view is 12 pixels a voxel: next to the eye of a wide perspective view. Grids with scales
+// above this are refused:
 inline constexpr double kMaxSliceScale = 24;
 
 // Voxels that a worker must hold round its own to compute all its samples exactly: the reach of the widest footprint of any view, less than

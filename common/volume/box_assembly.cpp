@@ -37,7 +37,7 @@ BoxAssembly Assemble(const Box& wanted, std::span<const Box> at_hand, std::size_
   if (!wanted.empty()) assembly.missing.push_back(wanted);
   std::vector<bool> left_out(at_hand.size());
   while (true) {
-    // What a box at hand still has to give; one that has given its part has nothing more.
+    // The box that holds most of what is missing. One copied from before holds nothing of it.
     std::size_t best = 0;
     std::int64_t most = 0;
     for (std::size_t source = 0; source < at_hand.size(); ++source) {

@@ -34,7 +34,7 @@ void ForEachRun(const Box& box, std::int64_t begin, std::int64_t end, Function&&
 
 Index3 BrickOf(const Index3& voxel) { return {voxel.x / kBrick, voxel.y / kBrick, voxel.z / kBrick}; }
 
-// Most runs are as long as a brick: what is done with a known length is a few instructions.
+// Most runs are as long as a brick: with a length known to the compiler, copying takes a few instructions.
 template <class T>
 void CopyRun(T* to, const T* from, std::int32_t count) {
   if (count == kBrick) {
@@ -43,7 +43,7 @@ void CopyRun(T* to, const T* from, std::int32_t count) {
     std::memcpy(to, from, std::size_t(count) * sizeof(T));
   }
 }
-// Bytes, not values: a NaN is kept as it is.
+// Compares bytes, so that NaNs keep their bits.
 template <class T>
 bool EqualRuns(const T* a, const T* b, std::int32_t count) {
   if (count == kBrick) return std::memcmp(a, b, kBrick * sizeof(T)) == 0;

@@ -1,7 +1,6 @@
-// Bricks: cubes of kBrick voxels a side, at global multiples of kBrick, cut off by the box that they divide. BrickedVoxels keeps the
-// samples of a box brick by brick: where all samples of a brick are equal one row of them is kept, so what is empty takes hardly any
-// memory. That is most of a segmented scan and the surroundings of many simulations; of a volume without such bricks nothing is saved and
-// nothing lost.
+// Bricks: cubes of kBrick voxels a side, at global multiples of kBrick, cut off by the box that they divide. BrickedVoxels stores the
+// samples of a box brick by brick. If all samples of a brick are equal it keeps one row of them, so empty space takes hardly any memory:
+// most of a segmented scan, and the surroundings of many simulations. Without such bricks nothing is saved and nothing lost.
 //
 // VoxelBricks reads bricks of either kind of storage, VoxelBlock or BrickedVoxels.
 #pragma once
@@ -39,28 +38,28 @@ struct BrickGrid {
   Index3 first, counts;  // bricks
 };
 
-// Where the samples of a brick are: rows along x. Rows may be one and the same.
+// Where the samples of a brick lie: rows along x. Several rows may be the same memory.
 template <class T>
 struct BrickView {
   const T* first = nullptr;  // sample of the brick's first voxel
   Index3 begin;
   std::ptrdiff_t y_stride = 0, z_stride = 0;
 
-  // From the brick's first voxel along x on.
+  // Samples from the brick's first voxel along x on.
   const T* Row(std::int32_t y, std::int32_t z) const { return first + (y - begin.y) * y_stride + (z - begin.z) * z_stride; }
 };
 
 class BrickedVoxels {
  public:
-  // All samples are 0 until the first ones are written; from then on what was not written has any value.
+  // All samples are 0 until the first Write; from then on, samples not written have any value.
   BrickedVoxels(const Box& box, ScalarType type);
   explicit BrickedVoxels(const VoxelBlock& block);
 
   const BrickGrid& grid() const { return grid_; }
   ScalarType type() const { return type_; }
 
-  // Samples of any `box` inside this one in order, x fastest, from a byte offset on: whole samples. Several threads may write different
-  // bricks.
+  // Writes samples of any `box` inside this one, in order, x fastest, from byte `begin` on: whole samples. Several threads may write
+  // different bricks.
   void Write(const Box& box, std::uint64_t begin, std::span<const std::byte> samples);
 
   template <class T>
@@ -89,12 +88,12 @@ class BrickedVoxels {
 
   BrickGrid grid_;
   ScalarType type_;
-  AlignedVector<std::byte> equal_rows_;                                      // of each brick without samples of its own
+  AlignedVector<std::byte> equal_rows_;                                      // by brick: its row if all samples are equal
   std::vector<std::uint8_t> met_;                                            // by brick: 1 once any of its samples was written
   std::vector<std::byte*> bricks_;                                           // null: all samples are equal
-  std::unique_ptr<std::mutex> pool_mutex_ = std::make_unique<std::mutex>();  // of the rest
-  std::vector<LargeArray<std::byte>> pools_;                                 // that the bricks lie in, one after the other
-  std::size_t pool_left_ = 0;                                                // bytes of the last one
+  std::unique_ptr<std::mutex> pool_mutex_ = std::make_unique<std::mutex>();  // guards what follows
+  std::vector<LargeArray<std::byte>> pools_;                                 // hold the bricks, one after the other
+  std::size_t pool_left_ = 0;                                                // free bytes of the last pool
 };
 
 // Neither copies nor owns.
@@ -109,7 +108,7 @@ class VoxelBricks {
   const Box& box() const { return grid_.box; }
   ScalarType type() const { return type_; }
 
-  // The samples of any `box` inside this one in order, x fastest, from a byte offset on: whole samples.
+  // Reads samples of any `box` inside this one, in order, x fastest, from byte `begin` on: whole samples.
   void Read(const Box& box, std::uint64_t begin, std::span<std::byte> samples) const;
 
   template <class T>

@@ -19,10 +19,10 @@ class CellRange {
 
   const std::int32_t begin, end;  // cells
 
-  // Of a cell's voxels, those inside the box, counted from the cell's first one.
+  // The range of a cell's voxels that lies inside the box, counted from the cell's first one.
   std::int32_t FirstInside(std::int32_t cell) const { return std::max(first_voxel_ - cell * kOccupancyCell, 0); }
   std::int32_t EndInside(std::int32_t cell) const { return std::min(end_voxel_ - cell * kOccupancyCell, kOccupancyCell); }
-  // Of kOccupancyCell.
+  // As a share of kOccupancyCell.
   double ShareInside(std::int32_t cell) const { return double(EndInside(cell) - FirstInside(cell)) / kOccupancyCell; }
 
  private:

@@ -9,7 +9,7 @@
 
 namespace slabstream {
 
-// Bytes that this process can still take without swapping: the system's available memory, less where its control group allows less.
+// Bytes that this process can still take without swapping: the system's available memory, or less if its control group allows less.
 // The largest int64 if neither can be read.
 std::int64_t AvailableMemoryBytes();
 

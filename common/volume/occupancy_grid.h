@@ -1,4 +1,4 @@
-// OccupancyGrid: how many voxels of each cell of a volume are occupied, that is drawn under one transfer function, and how they lie.
+// OccupancyGrid: how many voxels of each cell of a volume are occupied, that is, drawn under one transfer function, and on which lines.
 //
 // Cells are cubes of kOccupancyCell voxels a side at multiples of it, the last ones cut off by the volume's border.
 #pragma once
@@ -25,14 +25,14 @@ constexpr Box OccupancyCellBox(const Index3& cell, const Index3& size) {
   return Intersection({voxel(cell), voxel({cell.x + 1, cell.y + 1, cell.z + 1})}, {{0, 0, 0}, size});
 }
 
-// Of the cells' extent number `cell` along an axis, the share that lies in `box`.
+// The share of cell number `cell` along an axis that lies in `box`.
 constexpr double CellShare(const Box& box, Axis axis, std::int32_t cell, const Index3& size) {
   const std::int32_t begin = cell * kOccupancyCell, end = std::min(begin + kOccupancyCell, size[axis]);
   return double(std::max(std::min(box.end[axis], end) - std::max(box.begin[axis], begin), 0)) / (end - begin);
 }
 
-// A set of the lines of a cell that run along one of the axes x and y: bit kOccupancyCell * z + i is the line at z and at i along the other
-// one, both counted from the cell's first voxel.
+// A set of lines of a cell along x or y: bit kOccupancyCell * z + i is the line at z, and at i along the other of these axes. Both are
+// counted from the cell's first voxel.
 using LineSet = std::uint64_t;
 static_assert(kOccupancyCell * kOccupancyCell == 64, "a bit for each line");
 
@@ -44,8 +44,8 @@ constexpr LineSet LinesIn(std::int32_t z_begin, std::int32_t z_end, std::int32_t
   return layers & kFirstOfEachLayer * (below(end) & ~below(begin));
 }
 
-// How many lines a set holds, by byte: one for each z. The basic x86-64 instruction set has no instruction for it, and the library's
-// function takes a call (Warren, "Hacker's Delight", 2002, section 5-1).
+// How many lines a set holds: one byte for each z. The basic x86-64 instruction set has no instruction for it, and the library's function
+// costs a call (Warren, "Hacker's Delight", 2002, section 5-1).
 constexpr LineSet CountsByLayer(LineSet lines) {
   lines -= lines >> 1 & 0x5555555555555555;
   lines = (lines & 0x3333333333333333) + (lines >> 2 & 0x3333333333333333);
@@ -54,12 +54,12 @@ constexpr LineSet CountsByLayer(LineSet lines) {
 constexpr int CountOf(LineSet lines) { return int(CountsByLayer(lines) * 0x0101010101010101 >> 56); }
 
 struct CellOccupancy {
-  LineSet lines_x = 0, lines_y = 0;  // of the lines along x (bits by z and y) and along y (by z and x), those that hold any occupied voxel
+  LineSet lines_x = 0, lines_y = 0;  // lines along x (bits by z and y) and along y (by z and x) with any occupied voxel
   std::uint16_t voxels = 0;          // occupied: [0, kOccupancyCell^3]
   friend bool operator==(const CellOccupancy&, const CellOccupancy&) = default;
 };
 
-// Of a cell of these voxels, all of which are occupied.
+// The occupancy of a cell with these voxels if all of them are occupied.
 constexpr CellOccupancy FullCell(const Box& cell) {
   const Index3 size = cell.size();
   return {LinesIn(0, size.z, 0, size.y), LinesIn(0, size.z, 0, size.x), std::uint16_t(cell.voxel_count())};

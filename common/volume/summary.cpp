@@ -33,7 +33,7 @@ struct StoredRange {
   }
 };
 
-// Data values are kept as float; a mapping that leads out of its range gets the nearest finite one.
+// Data values are kept as float; a value beyond its range becomes the nearest finite float.
 float DataValue(const ValueMapping& mapping, double stored) {
   constexpr double kLimit = std::numeric_limits<float>::max();
   return float(std::clamp(mapping.FromStored(stored), -kLimit, kLimit));
@@ -61,7 +61,7 @@ class BrickRow {
     for (std::size_t x = 0; x < width; ++x) {
       const T value = row[x];
       if constexpr (std::is_floating_point_v<T>) {
-        // Comparisons with NaN are false; infinite values are replaced by what is there.
+        // Comparisons with NaN are false; infinite values are replaced by the bounds so far.
         const bool finite = IsFinite(value);
         const T low_value = finite ? value : low[x], high_value = finite ? value : high[x];
         low[x] = low_value < low[x] ? low_value : low[x];
@@ -84,8 +84,8 @@ class BrickRow {
   std::vector<T> low_, high_;
 };
 
-// How often each stored integer occurs. Neighbouring voxels are often equal, and counting them in the same place would make each wait for
-// the one before it: four tables take turns.
+// How often each stored integer occurs. Neighbouring voxels are often equal, and counting them in one table would make each wait for the
+// one before it: four tables take turns.
 template <class T>
 class StoredCounts {
  public:

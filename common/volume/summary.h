@@ -1,7 +1,7 @@
 // VolumeSummary: what the planner, the automatic transfer function and `info` know about a volume without its voxels.
 //
 // The volume is divided into bricks of kSummaryBrick voxels a side (the last ones cut off by the volume's border). Each brick keeps the
-// range of data values of its voxels, so whether a box can hold anything visible under a transfer function is answered from bricks.
+// range of data values of its voxels, so bricks tell whether a box can hold anything visible under a transfer function.
 #pragma once
 
 #include <algorithm>
@@ -22,11 +22,11 @@ struct ValueRange {
   friend bool operator==(const ValueRange&, const ValueRange&) = default;
 };
 
-// What a brick without any finite value has for its range: min > max.
+// The range of a brick without any finite value: min > max.
 inline constexpr ValueRange kNoFiniteValue = {1, 0};
 
-// The bin of a data value, in [0, kHistogramBins): equal bins over `range`, of which the last includes range.max; values outside go to the
-// nearest bin. Where the range is one value, everything is in bin 0.
+// The bin of a data value, in [0, kHistogramBins): equal bins over `range`; the last one includes range.max, and values outside go to the
+// nearest bin. If the range is one value, everything is in bin 0.
 inline int HistogramBin(const ValueRange& range, double value) {
   const double width = double(range.max) - double(range.min);
   if (!(width > 0)) return 0;
@@ -44,7 +44,7 @@ struct VolumeSummary {
   friend bool operator==(const VolumeSummary&, const VolumeSummary&) = default;
 };
 
-// Reads every voxel once, those of float volumes a second time for the histogram. In parallel, with the same result for any number of
+// Reads every voxel once; those of float volumes a second time for the histogram. Parallel; the result is the same for any number of
 // threads.
 VolumeSummary Summarize(const Volume& volume);
 

@@ -36,7 +36,7 @@ Result<RawHeader> ReadHeader(const TextHeader& text, const std::string& path) {
   for (const char* key : {"NDims", "DimSize", "ElementType", "ElementDataFile"}) {
     if (text.Find(key).value_or("").empty()) return wrong(std::string(key) + " is missing");
   }
-  // A fourth dimension is looked at to say what is wrong with it, or nothing if it is 1.
+  // Read a fourth dimension, to report it unless its size is 1.
   const std::int64_t dimensions = ToInteger(*text.Find("NDims")).value_or(0);
   if (dimensions < 1 || dimensions > 4) return wrong("NDims is '" + *text.Find("NDims") + "', must be 3");
   const auto count = std::size_t(dimensions);

@@ -67,8 +67,8 @@ std::optional<SampleType> ToSampleType(int data_type) {
   }
 }
 
-// Origin and directions. Of the quaternion and the affine matrix ITK takes the matrix if it leads to the scanner's axes, else the
-// quaternion; so do we. Without either they stay those of the index axes.
+// Origin and directions. Like ITK, takes the affine matrix if it leads to the scanner's axes, else the quaternion. Without either they stay
+// those of the index axes.
 void ReadOrientation(const NiftiHeader& fields, double millimetres, RawHeader& header) {
   constexpr int kScanner = 1;  // NIFTI_XFORM_SCANNER_ANAT
   Vec3 columns[3], origin;
@@ -116,7 +116,7 @@ Result<RawHeader> ReadHeader(const NiftiHeader& fields, const std::string& path)
     header.spacing[i] = millimetres * fields.pixdim(i + 1);
   }
   ReadOrientation(fields, millimetres, header);
-  // A slope of 0 says that there is none.
+  // A slope of 0 means that there is none.
   if (fields.slope() != 0 && std::isfinite(fields.slope()) && std::isfinite(fields.intercept())) {
     header.rescale = {fields.slope(), fields.intercept()};
   }

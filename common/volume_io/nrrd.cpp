@@ -32,7 +32,7 @@ std::optional<SampleType> ToSampleType(const std::string& name) {
   return std::nullopt;
 }
 
-// From this space to left, posterior, superior; spaces without a patient are taken as they are.
+// From this space to left, posterior, superior; spaces without a patient stay unchanged.
 Vec3 LpsFrom(const std::string& space) {
   if (space == "right-anterior-superior" || space == "ras") return {-1, -1, 1};
   if (space == "left-anterior-superior" || space == "las") return {1, -1, 1};

@@ -32,7 +32,7 @@ class InflateReader {
   InflateReader(const InflateReader&) = delete;
   InflateReader& operator=(const InflateReader&) = delete;
 
-  // Bytes written to `out`, fewer than its size only at the end of the stream or of the file, or where the stream is damaged.
+  // Returns the bytes written to `out`: fewer than its size only at the end of the stream or of the file, or if the stream is damaged.
   std::size_t Read(std::span<std::byte> out) {
     std::size_t done = 0;
     while (done < out.size() && ready_ && !damaged_) {
@@ -49,7 +49,7 @@ class InflateReader {
     return done;
   }
 
-  // True if the stream, to its checksum, is sound: to be asked when everything that is wanted was read. Reads what is left of it.
+  // Reads the rest of the stream; true if it is sound, checksum included. Call it when everything wanted has been read.
   bool EndsWell() {
     std::vector<std::byte> rest(kBlock);
     while (!ended_ && Read(rest) == rest.size()) {
@@ -66,7 +66,7 @@ class InflateReader {
     stream_.avail_in = uInt(file_.gcount());
     return stream_.avail_in > 0;
   }
-  // What follows the end of a stream is another gzip member, or padding that is left alone.
+  // What follows the end of a stream is another gzip member, or padding, which is ignored.
   bool NextMember() {
     constexpr Bytef kGzipMagic = 0x1f;
     if (*stream_.next_in != kGzipMagic) return false;

@@ -1,5 +1,5 @@
-// The samples of a volume file, behind its header: where they lie and how they are packed. Reading finds every truncation and holds the
-// samples once.
+// The samples of a volume file, behind its header: where they lie and how they are packed. Reading detects every truncation and holds one
+// copy of the samples.
 #pragma once
 
 #include <cstddef>
@@ -19,15 +19,15 @@ struct Payload {
   bool big_endian = false;
 };
 
-// DataLoss unless the file is long enough to hold `bytes` of samples - of compressed files: could be, by the largest ratio that deflate
-// reaches. To be asked before memory is taken for them. NotFound if there is no such file.
+// Checks, before memory is taken, that the file is long enough for `bytes` of samples: a compressed one, at the largest ratio that deflate
+// reaches. DataLoss: it is not. NotFound: no such file.
 Status CheckHolds(const Payload& payload, std::int64_t bytes);
 
 // Fills `out` with the bytes as they are in the file (byte order is not touched). A compressed stream is read to its end, so that its
-// checksum tells of damage. DataLoss: truncated or damaged. NotFound: no such file.
+// checksum is verified. DataLoss: truncated or damaged. NotFound: no such file.
 Status ReadPayload(const Payload& payload, std::span<std::byte> out);
 
-// The same, without looking at what follows: for headers inside a compressed stream.
+// The same, but ignores what follows: for headers inside a compressed stream.
 Status ReadPayloadStart(const Payload& payload, std::span<std::byte> out);
 
 }  // namespace slabstream

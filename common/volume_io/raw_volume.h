@@ -1,4 +1,4 @@
-// What every format's reader makes of a file: its description and its samples as they are in the file. One function a format.
+// What each format's reader makes of a file: its description, and its samples as stored. One function a format.
 #pragma once
 
 #include <array>
@@ -33,10 +33,10 @@ struct RawVolume {
 // InvalidArgument naming `path`, the axis and the limit, unless every side is in [1, kMaxVolumeSide].
 Status CheckSize(const std::string& path, const std::array<std::int64_t, 3>& size);
 
-// The payload moved so that its samples are the last bytes of its file. NotFound naming `path` and the file, if it does not exist.
+// The payload with its offset set so that the samples end the file. NotFound naming `path` and the file, if it does not exist.
 Result<Payload> FromTheEnd(Payload payload, const std::string& path, std::int64_t sample_bytes);
 
-// Takes memory for the samples and reads them, after both the file and the memory were found large enough.
+// Checks that the file and the memory are large enough, then takes memory for the samples and reads them.
 Result<RawVolume> ReadSamples(const std::string& path, const RawHeader& header, const Payload& payload);
 
 // The formats. Errors as in volume_reader.h.

@@ -61,7 +61,7 @@ bool IsInteger(T value) {
   }
 }
 
-// Narrows samples of 32 and 64 bits: to uint16 where all are integers within a stretch of 65536, else to float.
+// Narrows samples of 32 and 64 bits: to uint16 if all are integers within a stretch of 65536, else to float.
 template <class T>
 KeptSamples Narrow(AlignedVector<std::byte> bytes) {
   constexpr T kSpan = 65535;
@@ -74,7 +74,7 @@ KeptSamples Narrow(AlignedVector<std::byte> bytes) {
     integers = integers && IsInteger(sample);
   }
   KeptSamples kept;
-  // Compared without subtracting, which could overflow.
+  // Compare without subtracting, which could overflow.
   const bool fits = integers && (low >= std::numeric_limits<T>::max() - kSpan || high <= low + kSpan);
   if (fits) {
     const T shift = low >= 0 && high <= kSpan ? T{0} : low;

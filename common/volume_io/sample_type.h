@@ -25,8 +25,8 @@ struct KeptSamples {
   AlignedVector<std::byte> bytes;
 };
 
-// `bytes` holds samples of `type` in this machine's byte order, aligned, and is taken over: types of the same size are converted in place,
-// wider ones need the memory of the kept samples on top.
+// Takes over `bytes`: aligned samples of `type` in this machine's byte order. Types of the same size are converted in place; wider ones
+// need the memory of the kept samples on top.
 KeptSamples Keep(SampleType type, AlignedVector<std::byte> bytes);
 
 }  // namespace slabstream

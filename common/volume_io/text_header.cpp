@@ -59,7 +59,7 @@ Result<Index3> ToSize(const std::string& path, const std::vector<double>& sides)
 Result<TextHeader> ReadTextHeader(const std::string& path, char separator, KeyCase key_case, const std::string& last_key) {
   std::ifstream file(path, std::ios::binary);
   if (!file) return Status::NotFound(path + ": cannot be opened for reading");
-  // A limit on what is looked at, so that a large binary file is never taken for one endless line.
+  // Limits what is read, so that a large binary file is never taken for one endless line.
   std::string text(kMaxTextHeader, '\0');
   file.read(text.data(), std::streamsize(text.size()));
   text.resize(std::size_t(file.gcount()));

@@ -1,7 +1,7 @@
 // TIFF: a multi-page file, or a directory of files, one a slice.
 //
-// TIFF knows no distance between slices, and its resolution speaks of print: spacing is 1 along x and z, and along y what the two
-// resolutions give.
+// TIFF states no distance between slices, and its resolution is meant for print: spacing is 1 along x and z, and along y the ratio of the
+// two resolutions.
 #include <tiffio.h>
 
 #include <algorithm>
@@ -43,7 +43,7 @@ class TiffFile {
     TIFFOpenOptions* options = TIFFOpenOptionsAlloc();
     TIFFOpenOptionsSetErrorHandlerExtR(options, KeepFirst, complaint_.get());
     TIFFOpenOptionsSetWarningHandlerExtR(options, Ignore, nullptr);
-    tiff_.reset(TIFFOpenExt(path_.c_str(), "rm", options));  // m: no memory mapping, which a shrinking file would turn into a signal
+    tiff_.reset(TIFFOpenExt(path_.c_str(), "rm", options));  // m: no memory mapping, since a shrinking file would raise a signal
     TIFFOpenOptionsFree(options);
   }
 
@@ -54,7 +54,7 @@ class TiffFile {
   Status Damaged() const { return Failed(StatusCode::kDataLoss, "truncated or damaged"); }
   Status NotTiff() const { return Failed(StatusCode::kInvalidArgument, "not a TIFF volume"); }
 
-  // Pages to the end of the chain; an end that is broken off is an error.
+  // Counts the pages to the end of the chain; a broken chain is an error.
   Result<std::int64_t> CountPages() {
     std::int64_t pages = 1;
     while (TIFFReadDirectory(tiff_.get()) != 0) {
@@ -69,7 +69,7 @@ class TiffFile {
   // Size (along z: 1), type and spacing of this page. InvalidArgument unless it has one sample a pixel of a type that is supported.
   Result<RawHeader> ReadPageHeader() const;
 
-  // The samples of this page, `header` being its own, in this machine's byte order. DataLoss: truncated or damaged.
+  // Reads the samples of this page, with its own `header`, in this machine's byte order. DataLoss: truncated or damaged.
   Status ReadPage(const RawHeader& header, std::byte* out);
 
  private:
@@ -135,7 +135,7 @@ Result<RawHeader> TiffFile::ReadPageHeader() const {
 Status TiffFile::ReadPage(const RawHeader& header, std::byte* out) {
   if (TIFFIsTiled(tiff_.get()) != 0) return ReadTiles(header, out);
   const std::size_t row_bytes = std::size_t(header.size.x) * BytesPerSample(header.type);
-  // libtiff writes whole scanlines, of a length that it works out itself.
+  // libtiff writes whole scanlines, and computes their length itself.
   if (std::size_t(TIFFScanlineSize64(tiff_.get())) != row_bytes) return Damaged();
   for (std::int32_t y = 0; y < header.size.y; ++y) {
     if (TIFFReadScanline(tiff_.get(), out + std::size_t(y) * row_bytes, std::uint32_t(y), 0) < 0) return Damaged();
@@ -168,13 +168,13 @@ Status TiffFile::ReadTiles(const RawHeader& header, std::byte* out) {
   return Status::Ok();
 }
 
-// Memory for a whole volume of pages like `page`, after looking whether files of that many bytes can hold it.
+// Takes memory for a whole volume of pages like `page`, after checking that files of that many bytes can hold it.
 Result<RawVolume> Allocate(const std::string& path, const RawHeader& page, std::int64_t pages, std::int64_t file_bytes) {
   if (Status status = CheckSize(path, {page.size.x, page.size.y, pages}); !status.ok()) return status;
   RawVolume raw{page, {}};
   raw.header.size.z = std::int32_t(pages);
   const std::int64_t needed = raw.header.sample_bytes();
-  // More than what LZW (1400), deflate (1032) and LZMA (7000) reach; a file that claims more than that is damaged.
+  // More than LZW (1400), deflate (1032) and LZMA (7000) reach; a file that claims more is damaged.
   constexpr std::int64_t kMaxRatio = 8192;
   if (needed / kMaxRatio > file_bytes) {
     return Status::DataLoss(path + ": truncated: the header speaks of " + std::to_string(needed) + " bytes of samples, the file has " +
@@ -245,7 +245,7 @@ Result<RawVolume> ReadSlices(const std::string& directory, const std::vector<std
   return std::move(*raw);
 }
 
-// Names with numbers in them by the numbers' values: s2 before s10.
+// Compares numbers inside names by value: s2 before s10.
 bool NaturallyBefore(const std::string& a, const std::string& b) {
   const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
   std::size_t i = 0, j = 0;

@@ -40,7 +40,7 @@ const Format* FindFormat(const std::string& path) {
   return found == kFormats.end() ? nullptr : &*found;
 }
 
-// Renderers need a distance: the sign only says how the axis runs in the scanner, and of zero or NaN nothing better than 1 is known.
+// Renderers need a distance. The sign only tells how the axis runs in the scanner; for zero or NaN, 1 is the best guess.
 double UsableSpacing(double spacing, const std::string& path) {
   const double distance = std::abs(spacing);
   if (distance > 0 && std::isfinite(distance)) return distance;
@@ -73,7 +73,7 @@ Result<LoadedVolume> Finish(RawVolume raw, const Format& format, const std::stri
   return loaded;
 }
 
-// Messages quote what stands in files, so they may hold anything; a user gets one line.
+// Messages quote files, which may hold anything; a user gets one printable line.
 Status Printable(const Status& status) {
   std::string message = status.message();
   std::replace_if(

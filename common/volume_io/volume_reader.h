@@ -1,16 +1,16 @@
 // Volume files to volumes: NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd; .nhdr with a detached data file; raw or gzip), MetaImage (.mhd, .mha; raw
 // or zlib), and TIFF (a directory of slices, one file a slice, in natural order of their names; or one multi-page file). Truncated and
-// damaged files are found before and while memory is taken for them. During reading a volume needs its bytes in the file and, where samples
-// become narrower, its kept bytes on top.
+// damaged files are detected before memory is taken for them or while they are read. Reading takes memory for the bytes of the file's
+// samples and, if samples become narrower, for the kept bytes on top.
 //
 // Samples are kept as uint8, uint16 or float32, without losing what was in the file: int8 and int16 are shifted into the unsigned type
 // (ValueMapping.offset); uint32, int32, uint64, int64 and float64 become uint16 if all their values are integers that fit after a shift,
-// else float32 - and where float32 cannot hold a value exactly the reader says so in a warning of the log. A rescale slope and intercept
-// (NIfTI scl_slope, scl_inter) goes into ValueMapping.
+// else float32. If float32 cannot hold a value exactly, the reader logs a warning. A rescale slope and intercept (NIfTI scl_slope,
+// scl_inter) goes into ValueMapping.
 //
 // Axes: x, y, z are the file's own index axes, first index fastest; direction cosines are read for `info` and do not turn the picture.
-// Spacing is its absolute value; 0 and NaN become 1, with a warning. TIFF knows no distance of slices: spacing is 1 along x and z, and
-// along y by the ratio of the two resolutions.
+// Spacing is its absolute value; 0 and NaN become 1, with a warning. TIFF states no distance of slices: spacing is 1 along x and z, and
+// along y the ratio of the two resolutions.
 //
 // All functions may be called from any thread.
 #pragma once
@@ -45,8 +45,8 @@ Result<LoadedVolume> ReadVolume(const std::string& path);
 bool LooksLikeVolume(const std::string& path);
 
 // Writes NRRD (gzip) or MetaImage (raw; .mhd: with a .raw beside it) by the ending. Such files have no value mapping: samples that were
-// read from int8 or int16 become these again, others with a mapping become float32 data values. An older file is replaced only by a whole
-// one (common/base/files.h). InvalidArgument: another ending. Unavailable: cannot be written; the message says why.
+// read from int8 or int16 become that type again, others with a mapping become float32 data values. An older file is replaced only by a
+// complete one (common/base/files.h). InvalidArgument: another ending. Unavailable: cannot be written; the message says why.
 Status WriteVolume(const Volume& volume, const std::string& path);
 
 }  // namespace slabstream

@@ -16,7 +16,7 @@
 namespace slabstream {
 namespace {
 
-// Samples as a file without a value mapping can hold them: the data values themselves.
+// Samples for a file without a value mapping: the data values themselves.
 struct FileSamples {
   const char* nrrd_type = "uint8";
   const char* meta_type = "MET_UCHAR";
@@ -43,7 +43,7 @@ FileSamples ToFileSamples(const Volume& volume) {
       case ScalarType::kFloat32: return {"float", "MET_FLOAT", {}};
     }
   }
-  // What was read from signed integers is signed again.
+  // Samples read from signed integers become signed again.
   if (type == ScalarType::kUint8 && mapping == ValueMapping{1, -128}) {
     return {"int8", "MET_CHAR", DataValues<std::uint8_t, std::int8_t>(volume)};
   }
@@ -122,7 +122,7 @@ Status WriteVolume(const Volume& volume, const std::string& path) {
   if (!data.ok()) return data.status();
   data->Append(bytes);
   file->Append(MetaHeader(geometry, samples.meta_type, data_path.filename().string()));
-  // Both are stored before either takes its place.
+  // Store both files before either takes its place.
   if (Status status = file->Close(); !status.ok()) return status;
   if (Status status = data->Finish(); !status.ok()) return status;
   return file->Finish();

@@ -24,7 +24,7 @@ struct Member {
   const Proto& (Envelope::*get)() const;
   Proto* (Envelope::*mutable_get)();
 };
-template <class Proto>  // what C++20 deduces for an aggregate; clang 14, which clang-tidy parses with, does not yet
+template <class Proto>  // C++20 deduces this for an aggregate; clang 14, the parser of clang-tidy, does not yet
 Member(const char*, Envelope::MessageCase, const Proto& (Envelope::*)() const, Proto* (Envelope::*)())->Member<Proto>;
 
 // One line a message, in the order of AnyMessage.
@@ -82,7 +82,7 @@ void SilenceProtobuf() {
   (void)silenced;
 }
 
-// The envelope, if its bytes can be read and its version is ours.
+// Reads the envelope, if its bytes can be read and its version is ours.
 Status Parse(std::span<const std::byte> header, Envelope& envelope) {
   if (header.size() > kMaxHeaderBytes) {
     return Status::InvalidArgument("Envelope: " + std::to_string(header.size()) + " bytes, at most " + std::to_string(kMaxHeaderBytes));

@@ -1,8 +1,8 @@
-// The only list of messages. A service visits the variant without a default branch, so that the compiler asks for the handler of a new one,
-// and the codec tests run over every member.
+// The only list of messages. Services visit the variant without a default branch, so that the compiler asks for a handler of each new one.
+// The codec tests run over every member.
 //
 // On the wire a message is one ZeroMQ frame with a Protobuf Envelope {version, one of the messages below} and, where the message has a
-// payload, one more frame of raw bytes. docs/wire.md writes it down byte by byte.
+// payload, one more frame of raw bytes. docs/wire.md describes it byte by byte.
 #pragma once
 
 #include <cstddef>
@@ -31,7 +31,7 @@ using AnyMessage =
 std::vector<std::byte> Encode(const AnyMessage& message);
 
 // InvalidArgument naming the message, the field, the value and the limit: wrong version, unknown enum value, NaN, a size out of bounds,
-// undecodable bytes. What is returned holds everything that the structs' comments promise; nobody checks again.
+// undecodable bytes. The result keeps everything that the structs' comments promise; nobody checks again.
 Result<AnyMessage> Decode(std::span<const std::byte> header);
 
 // The answer to a SubmitFrame that Decode has refused, so that its client hears why; nullopt for every other header.

@@ -2,8 +2,8 @@
 //
 //   Checker check("Register");
 //   out.threads = check.Range("threads", in.threads(), 1, 1024);   // fails as "Register.threads: 0 is not in [1, 1024]"
-// A check that fails returns a harmless value and reading goes on, so that a codec is a plain list of its fields; whoever began asks ok()
-// at the end. Nothing here takes more memory than the message itself has.
+// A check that fails returns a harmless value and reading goes on, so that a codec is a plain list of its fields; its caller asks ok() at
+// the end. Nothing here takes more memory than the message.
 #pragma once
 
 #include <cmath>
@@ -25,7 +25,7 @@ class Checker {
   bool ok() const { return status_.ok(); }
   const Status& status() const { return status_; }
 
-  // While the scope lives, names of fields are those of the message in `field`, or in item `index` of `field`.
+  // While the scope lives, field names are those of the message in `field`, or in item `index` of `field`.
   class [[nodiscard]] Scope {
    public:
     Scope(std::string& path, std::size_t length) : path_(path), length_(length) {}
@@ -42,7 +42,7 @@ class Checker {
   // InvalidArgument "path.field: what"; an empty field means the message itself. Only the first failure counts.
   void Fail(std::string_view field, std::string_view what);
 
-  // Takes over what a Validate function found.
+  // Records what a Validate function returned.
   void Adopt(const Status& status);
 
   void That(bool condition, std::string_view field, std::string_view what) {

@@ -24,9 +24,8 @@
 
 namespace slabstream {
 
-inline constexpr std::size_t kMaxOpenRequests = 256;  // of one client
-inline constexpr std::int64_t kMaxRequestBytes =
-    1 << 20;  // any header that a client sends fits: what the coordinator's client socket takes at most
+inline constexpr std::size_t kMaxOpenRequests = 256;       // of one client
+inline constexpr std::int64_t kMaxRequestBytes = 1 << 20;  // limit of the coordinator's client socket; any header that a client sends fits
 
 struct SubmitFrame {
   RequestId request = 0;
@@ -56,7 +55,7 @@ struct FrameStatistics {
   std::vector<RankReport> reports;                                       // at most kMaxReports
   std::uint32_t display = 0;                                             // worker
   PixelBounds grid;                                                      // of the frame that was rendered and combined (FrameBounds)
-  std::optional<FramePrediction> predicted;                              // where the policy left a choice
+  std::optional<FramePrediction> predicted;                              // if the policy left a choice
   friend bool operator==(const FrameStatistics&, const FrameStatistics&) = default;
 };
 

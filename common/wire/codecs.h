@@ -1,7 +1,8 @@
 // Private to common/wire: structs to Protobuf messages and back. The files of this folder are the only ones that see generated code.
 //
-// FromProto checks everything that the comments of the struct promise and notes what is wrong in the Checker, whose scope names the message
-// at hand. If the Checker is ok at the end, the structs hold. ToProto trusts its argument; texts are made fit to travel (wire_text.h).
+// FromProto checks everything that the comments of the struct promise and records faults in the Checker, whose scope names the current
+// message. If the Checker is ok at the end, the structs are valid. ToProto trusts its argument, but makes texts fit to travel
+// (wire_text.h).
 #pragma once
 
 #include <google/protobuf/repeated_ptr_field.h>
@@ -96,7 +97,7 @@ Placement FromProto(const v1::Placement& in, Checker& check);
 ScheduleName FromProto(const v1::ScheduleName& in, Checker& check);
 GroupPlan FromProto(const v1::GroupPlan& in, Checker& check);
 
-// Whether the plan fits the setup: boxes inside the volume, as many ranks as placements, a schedule that exists. If both are ok by
+// Checks that the plan fits the setup: boxes inside the volume, as many ranks as placements, a schedule that exists. Both must be valid by
 // themselves.
 void CheckFits(const GroupPlan& group, const FrameSetup& setup, Checker& check);
 

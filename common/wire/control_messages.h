@@ -9,7 +9,7 @@
 //   GroupDone ------------------------>            display worker only; opens the window for the next group
 //   FrameImage + payload ------------->            display worker only; a preview or the finished frame
 //   WorkerTrouble -------------------->            something failed for this group
-//   Leave     ------------------------>            a worker goes in an orderly way
+//   Leave     ------------------------>            a worker leaves in an orderly way
 //             <------------------------  Retire    you are not (or no longer) known: register again
 //             <------------------------  Stop      end the process
 #pragma once
@@ -40,7 +40,7 @@ struct Register {
   std::uint32_t threads = 1;       // render threads, [1, kMaxThreads]
   std::uint64_t memory_bytes = 0;  // budget for cached slabs; 0: none stated
   std::uint64_t memory_scope = 0;  // workers of the same scope can read each other's memory (SharedMemoryScope); 0: it takes frames only
-  bool lends_memory = false;       // its own images stay where they are for workers of its scope; else it sends them in frames
+  bool lends_memory = false;       // it lends its own images to workers of its scope; else it sends them in frames
   friend bool operator==(const Register&, const Register&) = default;
 };
 
@@ -67,7 +67,7 @@ struct Heartbeat {
 struct Ping {
   Epoch epoch = 0;
   FrameId finished_before = 0;     // all frames with a smaller id are over: forget them
-  std::vector<FrameId> cancelled;  // over too, though their id is not smaller; at most kMaxCancelled
+  std::vector<FrameId> cancelled;  // also over, though their id is not smaller; at most kMaxCancelled
   friend bool operator==(const Ping&, const Ping&) = default;
 };
 inline constexpr std::size_t kMaxCancelled = 1024;
@@ -91,7 +91,7 @@ struct GroupAssignment {
   GroupPlan group;
   std::vector<Peer> peers;        // every worker of the group, and the display worker
   OcclusionMask hidden;           // some of what earlier groups hide (common/planning/frame_occlusion.h); fits the setup
-  std::uint32_t groups_done = 0;  // of the frame, at most key.group: accumulated, so that what was lent for them has been read
+  std::uint32_t groups_done = 0;  // of the frame, at most key.group: accumulated, so images lent for them have been read
   friend bool operator==(const GroupAssignment&, const GroupAssignment&) = default;
 };
 

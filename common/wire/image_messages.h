@@ -31,11 +31,11 @@ struct PackedRuns {
   friend bool operator==(const PackedRuns&, const PackedRuns&) = default;
 };
 
-// Payloads with fewer bytes are not acknowledged: they say more of a link's latency than of its rate.
+// Payloads with fewer bytes are not acknowledged: they measure a link's latency rather than its rate.
 inline constexpr std::size_t kLeastAcknowledgedBytes = std::size_t{64} << 10;
 
 // One step of a group's schedule, carried out; or, with step == number of steps, the whole group image on its way from the root to the
-// display worker. Payload: the runs, as they are unless `packed`; of a shared image the ColumnSpan of each row of its bounds.
+// display worker. Payload: the runs, raw unless `packed`; of a shared image, the ColumnSpan of each row of its bounds.
 struct PartialImage {
   Epoch epoch = 0;
   WorkerId from_worker = 0;
@@ -43,7 +43,7 @@ struct PartialImage {
   std::uint32_t step = 0;  // index into schedule.steps
   RankInterval interval;   // ranks whose images these pixels hold
   PixelRange pixels;       // of the frame, as in the step
-  RunImageHeader image;    // of a shared image the format alone
+  RunImageHeader image;    // of a shared image, only the format
   std::optional<SharedImage> shared;
   std::optional<PackedRuns> packed;  // not of a shared image
   std::uint64_t acknowledge = 0;     // not 0: the sender waits for ImageReceived with this number
@@ -51,7 +51,7 @@ struct PartialImage {
   friend bool operator==(const PartialImage&, const PartialImage&) = default;
 };
 
-// To the sender of an image that asked for it (`acknowledge`): it is here.
+// To the sender of an image that asked for it (`acknowledge`): the image has arrived.
 struct ImageReceived {
   Epoch epoch = 0;
   WorkerId from_worker = 0;
@@ -59,7 +59,7 @@ struct ImageReceived {
   friend bool operator==(const ImageReceived&, const ImageReceived&) = default;
 };
 
-// To the sender of a shared image: it cannot be read here; these pixels, and all others from now on, are to come as runs.
+// To the sender of a shared image: it cannot be read here. Send these pixels, and all others from now on, as runs.
 struct ImageRefused {
   Epoch epoch = 0;
   WorkerId from_worker = 0;

@@ -1,4 +1,4 @@
-// Limits of what travels that no struct's header states. Those beside the structs: kMaxNameBytes, kMaxTextBytes, kMaxEndpointBytes,
+// Limits of messages that no struct's header states. Others stand beside the structs: kMaxNameBytes, kMaxTextBytes, kMaxEndpointBytes,
 // kMaxReports, ...
 #pragma once
 

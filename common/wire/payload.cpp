@@ -22,7 +22,7 @@ PooledVector<std::byte> GroupBySignificance(std::span<const std::byte> bytes) {
   PooledVector<std::byte> grouped(bytes.size());
   const std::byte* __restrict in = bytes.data();
   std::byte* __restrict out = grouped.data();
-  for (std::size_t word = 0; word < words; ++word) {  // the compiler makes vectors of it
+  for (std::size_t word = 0; word < words; ++word) {  // the compiler vectorises it
     out[word] = in[kWordBytes * word];
     out[words + word] = in[kWordBytes * word + 1];
     out[2 * words + word] = in[kWordBytes * word + 2];
@@ -50,7 +50,7 @@ PooledVector<std::byte> Compress(std::span<const std::byte> bytes) {
   if (bytes.empty()) return {};
   PooledVector<std::byte> packed(bytes.size() - 1);
   const std::size_t size = ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), kZstdLevel);
-  if (ZSTD_isError(size)) return {};  // the room did not suffice
+  if (ZSTD_isError(size)) return {};  // not enough room
   packed.resize(size);
   return packed;
 }
@@ -65,7 +65,7 @@ Status Decompress(std::span<const std::byte> packed, std::span<std::byte> out) {
   return Status::Ok();
 }
 
-// Whether the zstd frame itself states the size that the header states: asked before memory is taken for the content.
+// Checks, before memory is taken for the content, that the zstd frame states the same size as the header.
 Status CheckContentSize(std::span<const std::byte> packed, std::uint64_t expected) {
   const unsigned long long size = ZSTD_getFrameContentSize(packed.data(), packed.size());
   if (size == ZSTD_CONTENTSIZE_ERROR || size == ZSTD_CONTENTSIZE_UNKNOWN)
@@ -87,7 +87,7 @@ Status CheckDigest(std::span<const std::byte> bytes, std::uint64_t expected) {
   return Status::DataLoss("payload: digest " + std::to_string(met) + ", the header says " + std::to_string(expected));
 }
 
-// A zstd frame of grouped words. Memory is taken when the frame's size is what it should be.
+// Unpacks a zstd frame of grouped words. Takes memory only if the frame has the expected size.
 Result<Bytes> UnpackGrouped(std::span<const std::byte> packed, std::size_t expected) {
   if (Status status = CheckContentSize(packed, expected); !status.ok()) return status;
   PooledVector<std::byte> grouped(expected);

@@ -1,9 +1,9 @@
 // Payload frames: how the runs of an image and the samples of a chunk are packed into bytes, and back.
 //
 // A packer fills the fields of the header that describe the payload; the unpacker checks the payload against them. Compression is zstd,
-// level 1. Where it does not make the payload smaller, or Codec::kRaw was asked for, the bytes are passed on as they are, without a copy.
-// Digests are XXH3-64 (seed 0). Unpacking takes memory only after the sizes that header and frame state have been found to agree.
-// All functions may be called from any thread.
+// level 1. If it does not make the payload smaller, or Codec::kRaw was asked for, the bytes are passed on unchanged, without a copy.
+// Digests are XXH3-64 (seed 0). Unpacking takes memory only if the sizes in header and frame agree. All functions may be called from any
+// thread.
 #pragma once
 
 #include <cstddef>
@@ -23,14 +23,14 @@ namespace slabstream {
 // alike.
 Bytes PackRuns(Bytes payload, Codec codec, EncodedRuns& runs);
 
-// The runs' payload of PayloadBytes(runs.image) bytes. `runs` has come through Decode. DataLoss naming both values: the payload's length,
-// its digest or its unpacked length is not what `runs` says, or zstd cannot read it. What the runs hold is for ValidateRuns to check.
+// Returns the runs' payload, PayloadBytes(runs.image) bytes. `runs` has come through Decode. DataLoss naming both values: the payload's
+// length, its digest or its unpacked length is not what `runs` says, or zstd cannot read it. ValidateRuns checks the runs themselves.
 Result<Bytes> UnpackRuns(const EncodedRuns& runs, const Bytes& payload);
 
-// The same between workers: packs with zstd what `payload` holds, PayloadBytes of some image. None: that does not get smaller.
+// The same between workers: packs `payload`, PayloadBytes of some image, with zstd. None: it does not get smaller.
 std::optional<Bytes> PackRuns(std::span<const std::byte> payload, PackedRuns& packed);
 
-// `raw_bytes`, PayloadBytes of the image, are taken: whoever calls has found that the image fits its frame. DataLoss as above.
+// Takes `raw_bytes` of memory, PayloadBytes of the image: the caller has checked that the image fits its frame. DataLoss as above.
 Result<Bytes> UnpackRuns(const PackedRuns& packed, const Bytes& payload, std::size_t raw_bytes);
 
 // Packs the samples of one chunk, 1 ... kChunkBytes bytes. Fills codec, raw_bytes, encoded_bytes and digest of `chunk`.

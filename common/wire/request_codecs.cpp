@@ -8,8 +8,8 @@ namespace slabstream {
 static_assert(v1::Projection_MAX == static_cast<int>(Projection::kPerspective));
 static_assert(v1::AxisChoice_MAX == static_cast<int>(AxisChoice::kView) + 1);
 
-// Most ranges of these values are checked by Validate, once for the whole FrameRequest. What is checked here is what a struct could not
-// hold or what has to be known before, and what is not a number, so that the message names the field as the schema does.
+// Validate checks most ranges of these values, once for the whole FrameRequest. Checked here: what a struct cannot hold, what must be known
+// before, and what is not a number, so that the message names the field as the schema does.
 
 v1::ImageSize ToProto(const ImageSize& in) {
   v1::ImageSize out;

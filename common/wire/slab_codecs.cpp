@@ -3,7 +3,7 @@
 namespace slabstream {
 namespace {
 
-// A chunk of the box for the widest sample type; which type it is, only the dataset tells.
+// Checks a chunk number for the widest sample type, because only the dataset knows the actual type.
 std::uint32_t ReadChunkNumber(std::uint32_t chunk, const Box& box, Checker& check) {
   const std::uint32_t count = ChunkCount(box, ScalarType::kFloat32);
   return check.Range("chunk", chunk, 0, count == 0 ? 0 : count - 1);

@@ -1,8 +1,8 @@
 // The slabs plane: voxels, from the coordinator (ROUTER) to workers (DEALER), pulled chunk by chunk.
 //
-// The samples of a box (x fastest) are cut into chunks of kChunkBytes; the last one is shorter. A worker asks for chunks one by one and
-// never has more bytes outstanding than its credit: each request is the credit for its answer, so bytes in flight are bounded at both ends
-// and a lost message is asked for again. The coordinator keeps no state about it.
+// The samples of a box (x fastest) are cut into chunks of kChunkBytes; the last one is shorter. A worker requests chunks one by one and
+// never has more bytes outstanding than its credit. Each request is the credit for its answer, so bytes in flight are bounded at both ends,
+// and a lost message is requested again. The coordinator keeps no state about it.
 #pragma once
 
 #include <cstdint>

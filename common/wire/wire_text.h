@@ -1,5 +1,5 @@
-// Texts on their way out. Protobuf strings must be UTF-8 and our receivers bound their length, but a file name in an error message or a
-// host's name may be anything: a message that nobody can decode would be worse than a mangled letter.
+// Texts of outgoing messages. Protobuf strings must be UTF-8 and our receivers bound their length, but a file name in an error message or a
+// host's name may be anything. A message that nobody can decode would be worse than a mangled letter.
 #pragma once
 
 #include <cstddef>
