@@ -1,4 +1,4 @@
-// What a request must hold before anything is made of it.
+// Checks a request before anything uses it.
 #pragma once
 
 #include "common/base/status.h"
