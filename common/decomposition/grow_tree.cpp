@@ -95,7 +95,7 @@ class TreeGrower {
     return number;
   }
 
-  // The root of `boxes` >= 1 boxes in `box`, which has room for them. `like`: the node of the pattern that tells how, if it does.
+  // Divides `box` into `boxes` >= 1 boxes, which it has room for; returns the root. `like`: the node of the pattern to follow, if any.
   std::uint32_t GrowBox(const Box& box, std::int64_t boxes, Run run, std::uint32_t like) {
     if (options_.cut_away_empty) {
       const Box hull = Hull(box);
@@ -143,7 +143,7 @@ class TreeGrower {
     return best;
   }
 
-  // What of `box` may own a sample: all work within the halo of it, and a halo around that. Sides where little would be cut off stay.
+  // The part of `box` that may own a sample: all work within the halo of it, and a halo around that. Sides that would lose little stay.
   Box Hull(const Box& box) const {
     const Box work = request_.work->Hull(Grown(box, request_.halo, bounds_));
     if (work.empty()) return {};
