@@ -1,5 +1,5 @@
-// RequestQueue: frames that were asked for and do not run yet. Each client has a queue of its own; clients are served in turn, one frame
-// each, so that a turntable of a thousand frames delays another client's picture by one frame and not by a thousand.
+// RequestQueue: requested frames that do not run yet. Each client has a queue of its own; clients are served in turn, one frame each, so
+// that a turntable of a thousand frames delays another client's picture by one frame and not by a thousand.
 #pragma once
 
 #include <cstdint>

@@ -97,7 +97,7 @@ FramePredictor::Prepared FramePredictor::Prepare(Layout layout) const {
 }
 
 bool FramePredictor::Affordable(const Prepared& prepared, const std::string& combine) const {
-  // Steps grow with a power of the ranks, which two small schedules tell.
+  // Steps grow with a power of the ranks; two small schedules give the exponent.
   constexpr Rank kFew = 32;
   const CombiningChoice scheme = ParseCombining(combine).value();
   const PixelRange frame = WholeFrame(prepared.plan.setup);
