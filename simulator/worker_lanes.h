@@ -31,7 +31,7 @@ struct LaneTask {
   Rank rank = 0;               // for whom it is done
   double seconds = 0;          // of one thread of a worker of speed 1
   double threads = 1;          // that do it together
-  bool direct = false;         // by the thread that orders it: nothing is handed over
+  bool direct = false;         // done by the thread that orders it: nothing is handed over
   double begin = 0;            // once it has begun
   std::function<void()> then;  // called when the thread that ordered it knows that it is done
 };
@@ -47,7 +47,7 @@ class WorkerLanes {
 
   // When a task begins or ends next if none is added before: infinity if none is under way.
   double NextTime();
-  // Carries that out; the task that ends, if one does. NextTime() must be finite.
+  // Carries that out; returns the task that ends, if one does. NextTime() must be finite.
   std::optional<LaneTask> Step();
 
  private:
