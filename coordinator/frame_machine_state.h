@@ -49,7 +49,7 @@ struct FrameMachine::State {
   RequestQueue queue;
   FramesInFlight frames;
   OccupancyTable occupancy;
-  std::set<PlanId> planning;  // asked for and neither answered nor dropped
+  std::set<PlanId> planning;  // requested and neither answered nor dropped
   PlanId last_plan = 0;
   const FrameLimits limits;
 

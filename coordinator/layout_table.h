@@ -65,7 +65,7 @@ class LayoutTable {
     bool by_cost = false;         // made when costs were known
     int changes = 0;              // by dynamic balance
     int frames_seen = 0;          // of this layout
-    std::vector<double> seconds;  // by box of it, over these frames, newer ones counting more; 0: not rendered yet
+    std::vector<double> seconds;  // by box, over these frames; newer ones count more; 0: not rendered yet
   };
   struct Learnt {
     ClassifiedVolume volume;
@@ -73,7 +73,7 @@ class LayoutTable {
   };
   Learnt* FindLearnt(const ClassifiedVolume& volume);
 
-  std::list<Entry> entries_;  // asked for last first
+  std::list<Entry> entries_;  // most recently used first
   std::list<Learnt> learnt_;  // likewise
 };
 

@@ -34,7 +34,7 @@ class OccupancyTable {
     CountId count = 0;
     std::shared_ptr<const OccupancyGrid> grid;  // null: under way
   };
-  std::list<Entry> entries_;  // asked for last first
+  std::list<Entry> entries_;  // most recently used first
   CountId last_count_ = 0;
 };
 

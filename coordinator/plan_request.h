@@ -30,9 +30,9 @@ struct PlanRequest {
 
 struct PlannedFrame {
   PlanRequest asked;
-  ResolvedPolicy policy;                      // that the plan was made by
+  ResolvedPolicy policy;                      // policy that the plan was made by
   std::optional<FramePrediction> prediction;  // none: the policy was not open, or the frame is too much to simulate
-  double render_scale = 1;                    // that the prediction was made with (PolicyTable)
+  double render_scale = 1;                    // used for the prediction (PolicyTable)
   FramePlan plan;
 
   bool teaches() const { return asked.occupied != nullptr || prediction; }  // render times help to plan coming frames

@@ -31,7 +31,7 @@ struct ChosenPolicy {
 class PolicyTable {
  public:
   static constexpr std::size_t kMaxKept = 16;        // choices
-  static constexpr std::size_t kMaxKinds = 16;       // of views, of each
+  static constexpr std::size_t kMaxKinds = 16;       // kinds of views, for each choice
   static constexpr double kRevisitGain = 0.1;        // share of a frame's latency
   static constexpr double kLeastWeight = 0.2;        // of a frame's render time, however many came before it
   static constexpr int kMostFramesAPrediction = 64;  // it is made anew after 1, 2, 4 ... frames, later after every so many
@@ -83,7 +83,7 @@ class PolicyTable {
   static Kind KindOf(const Request& request);
   Result<ChosenPolicy> Choose(const Request& request, Entry& entry, const Kind& kind, const Policy& open, const ResolvedPolicy* now);
 
-  std::list<Entry> entries_;  // asked for last first
+  std::list<Entry> entries_;  // most recently used first
 };
 
 }  // namespace slabstream

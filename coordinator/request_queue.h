@@ -23,7 +23,7 @@ struct OpenRequest {
   Time arrived;
   bool needs_occupancy = false;                 // of its policy (NeedsOccupancy)
   std::optional<ClassifiedVolume> volume;       // none: its dataset is not loaded yet
-  PlanId plan = 0;                              // that was asked for; 0: none
+  PlanId plan = 0;                              // the requested plan; 0: none
   std::uint64_t planned_for = 0;                // LiveRoster::version() when it was
   std::shared_ptr<const PlannedFrame> planned;  // null: not yet
 

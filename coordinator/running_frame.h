@@ -56,7 +56,7 @@ class RunningFrame {
   std::uint32_t group_count() const { return std::uint32_t(plan_.groups.size()); }
   std::uint32_t groups_done() const { return groups_done_; }
   std::uint32_t unfinished_groups() const;  // handed out and not done; 0 while a new attempt is due
-  bool HasPart(WorkerId worker) const;      // in what is not done yet
+  bool HasPart(WorkerId worker) const;      // in groups that are not done yet
   std::vector<WorkerId> Renderers(std::uint32_t group) const;
   std::vector<WorkerId> Participants() const;  // workers with a placement anywhere in the plan, and the display worker
 
@@ -124,13 +124,13 @@ class RunningFrame {
   std::optional<Time> attempt_due_;
   bool display_in_doubt_ = false;  // the next attempt begins with group 0
   std::optional<Suspicion> suspicion_;
-  std::set<WorkerId> unable_;  // to do their part of this frame
-  Status inability_;           // of the last one of them
+  std::set<WorkerId> unable_;  // workers that cannot do their part of this frame
+  Status inability_;           // reason of the last one of them
   int stalls_ = 0;
   Time last_progress_;
   std::set<WorkerId> moved_on_;                   // workers that have rendered all that is handed out of this frame
   std::vector<std::vector<RankReport>> reports_;  // by group
-  std::vector<RankReport> display_reports_;       // that came with the finished picture
+  std::vector<RankReport> display_reports_;       // sent with the finished picture
 };
 
 }  // namespace slabstream

@@ -21,7 +21,7 @@ namespace slabstream {
 
 class SlabServer {
  public:
-  // The voxels of a dataset: a whole volume, or bricks where those take much less memory. One of the two, or neither.
+  // The voxels of a dataset: a whole volume, or bricks if they take much less memory. One of the two, or neither.
   struct Samples {
     std::shared_ptr<const Volume> volume = nullptr;
     std::shared_ptr<const BrickedVoxels> bricks = nullptr;

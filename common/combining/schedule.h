@@ -51,7 +51,7 @@ struct Schedule {
 
 struct ScheduleRequest {
   Rank ranks = 1;
-  Rank root = 0;      // who holds the result
+  Rank root = 0;      // rank that holds the result
   PixelRange pixels;  // of the whole frame
 };
 

@@ -54,7 +54,7 @@ class StepOrder {
     std::uint32_t step = 0;
     std::uint32_t rank = 0;              // index into ranks_
     std::uint32_t partner = kElsewhere;  // the other rank's turn, if that rank is here too
-    std::uint32_t waits = 0;             // for this many earlier turns of the rank
+    std::uint32_t waits = 0;             // number of earlier turns of the rank to wait for
     std::uint64_t arrived = 0;           // pixels, of a step from elsewhere
     bool untaken = false;                // some of them are not taken
     bool taken = false;

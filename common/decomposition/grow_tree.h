@@ -18,7 +18,7 @@ namespace slabstream {
 inline constexpr std::int32_t kLeastCut = 4;  // voxels
 
 struct GrowOptions {
-  std::span<const Axis> axes;  // that may be cut; of equally long sides, the first one is cut
+  std::span<const Axis> axes;  // axes that may be cut; of equally long sides, the first one is cut
   // The first axis is cut as long as it has at least this many slices, however long the other sides are.
   std::int32_t first_axis_down_to = std::numeric_limits<std::int32_t>::max();
   bool cut_away_empty = false;

@@ -16,8 +16,8 @@
 namespace slabstream {
 
 struct BalanceTerms {
-  double bytes_per_second = 5e8;         // at which voxels reach their new owners and are prepared for rendering
-  double frames = 1000;                  // within which a change must pay
+  double bytes_per_second = 5e8;         // rate at which voxels reach their new owners and are prepared for rendering
+  double frames = 1000;                  // number of frames within which a change must pay
   double least_gain = 0.02;              // share of the frame's render time that a change must save; times 1 + 1/n after n frames
   double least_gain_of_new_boxes = 0.1;  // share of the frame's render time that new boxes must save beyond resized ones
 };

@@ -33,14 +33,14 @@ struct Placement {
 struct GroupPlan {
   std::vector<Placement> placements;          // by rank, nearest first; boxes that show nothing are left out, so it may be empty
   ScheduleName schedule;                      // over these ranks
-  ColorCoding color = ColorCoding::kFloat32;  // of images that workers send as runs
+  ColorCoding color = ColorCoding::kFloat32;  // coding of images that workers send as runs
   friend bool operator==(const GroupPlan&, const GroupPlan&) = default;
 };
 
 // Frames take turns. If the workers are divided into teams (common/planning/team.h), a plan uses the workers of one team. The display
 // worker changes from frame to frame of a team, so that no worker makes all pictures.
 struct Turn {
-  std::uint64_t number = 0;  // of the frame, among those of its team
+  std::uint64_t number = 0;  // number of the frame among those of its team
   std::uint32_t teams = 1;
   friend bool operator==(const Turn&, const Turn&) = default;
 };

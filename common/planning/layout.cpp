@@ -30,7 +30,7 @@ int MostGroups(const LayoutRequest& request, const ResolvedPolicy& policy) {
   return int(std::clamp<std::int64_t>(boxes / slots, 1, kMaxGroups));
 }
 
-// The fields of work that a layout is made from, each made when it is first asked for.
+// The fields of work that layouts are made from, each made at its first use.
 class WorkFields {
  public:
   explicit WorkFields(const LayoutRequest& request)

@@ -17,7 +17,7 @@ namespace slabstream {
 
 class RendererKind;
 
-inline constexpr std::uint32_t kNoSlot = std::numeric_limits<std::uint32_t>::max();  // of a box that shows nothing: nobody renders it
+inline constexpr std::uint32_t kNoSlot = std::numeric_limits<std::uint32_t>::max();  // the box shows nothing, so nobody renders it
 
 struct Layout {
   Partition partition;
@@ -42,7 +42,7 @@ struct LayoutRequest {
   std::uint32_t slots = 1;  // >= 1
   std::int64_t slab_bytes_target = kSlabBytesTarget;
   WorkKnowledge known;
-  const Partition* resized = nullptr;  // of a layout by the same policy, to be resized (DecompositionRequest); null: cut anew
+  const Partition* resized = nullptr;  // partition to resize, of a layout by the same policy (DecompositionRequest); null: cut anew
 };
 
 // Pure. A box is assigned to no worker if neither it nor its halo contains a visible voxel; the others are numbered consecutively for their

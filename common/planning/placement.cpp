@@ -23,7 +23,7 @@ std::vector<WorkerId> Present(const Roster& roster) {
 
 // A display worker that holds a rank of a group can be the root of its schedule, so that the image need not travel.
 WorkerId ChooseDisplay(const FramePlan& plan, const std::vector<WorkerId>& present) {
-  std::map<WorkerId, std::size_t> groups;  // in which it holds a rank
+  std::map<WorkerId, std::size_t> groups;  // number of groups in which it holds a rank
   for (const GroupPlan& group : plan.groups) {
     std::set<WorkerId> workers;
     for (const Placement& placement : group.placements) workers.insert(placement.worker);

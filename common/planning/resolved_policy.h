@@ -17,7 +17,7 @@ namespace slabstream {
 struct ResolvedPolicy {
   const DecompositionEntry* decomposition = nullptr;  // of Decompositions(), never null
   WorkSplit split = WorkSplit::kVoxels;
-  Axis axis = Axis::kZ;                         // that is cut, or cut first
+  Axis axis = Axis::kZ;                         // the axis that is cut, or cut first
   int groups = 0;                               // [1, kMaxGroups]; 0: the fewest that memory allows (LayoutMaker::FewestGroups)
   const AssignmentEntry* assignment = nullptr;  // of Assignments(), never null
   bool dynamic_balance = false;                 // boxes may change between frames

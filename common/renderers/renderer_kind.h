@@ -31,7 +31,7 @@ struct RendererParameter {
   std::vector<std::string_view> choices;  // by value; empty: a number
 };
 
-// The direction and scale from which a cost is asked for.
+// The direction and scale of a view whose cost is asked for.
 struct CostView {
   Axis along = Axis::kY;        // data axis nearest to the view direction
   double pixels_per_voxel = 1;  // of the frame, for the smallest side of a voxel, > 0
@@ -65,7 +65,7 @@ class RendererKind {
     std::int32_t reach = kHalo;               // voxels outside a box that its samples depend on, [0, kHalo]
     bool along_slices = false;                // the frame is an image along the slices (SheetGrid), else the camera's
     double footprint = 1;                     // pixels that a voxel fills, for each pixel of its cross-section
-    std::vector<Stage> stages;                // that the pixel half charges time to, in the order of work
+    std::vector<Stage> stages;                // stages that the pixel half charges time to, in order
     std::vector<RendererParameter> parameters;
   };
 

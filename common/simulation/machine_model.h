@@ -50,8 +50,8 @@ struct MachineModel {
   HandOvers hand_overs;
   std::vector<double> speeds;  // of the workers, relative, > 0; worker i has speeds[i % size()]. Empty: all 1
   Stragglers stragglers;
-  std::int32_t threads = 1;          // that render, of each worker
-  std::int32_t picture_threads = 0;  // that make a picture: workers of one process share theirs. If fewer: `threads`
+  std::int32_t threads = 1;          // render threads of each worker
+  std::int32_t picture_threads = 0;  // threads that make a picture (`threads` if that is more): workers of one process share theirs
   // Speed-up of making the picture (resampling, encoding) and of rendering by n threads: n / (1 + (n - 1) * serial_share).
   double serial_share = 0.02;
 

@@ -17,7 +17,7 @@ struct SimulatedSpan {
   std::uint32_t frame = 0, group = 0;
   std::uint32_t worker = 0;  // index: its place in SimulationResult::workers
   Lane lane = Lane::kRender;
-  Rank rank = 0;                 // that is rendered or sent; 0 for other stages
+  Rank rank = 0;                 // rank that is rendered or sent; 0 for other stages
   Stage stage = Stage::kRender;  // kRender, kEncode, kCombine (also accumulating and looking for hidden tiles) or kResolve (kFinish)
   double begin = 0, end = 0;     // seconds
 };
@@ -42,7 +42,7 @@ struct SimulatedFrame {
 
   std::array<double, kStageCount> stage_seconds{};  // worker time, summed over workers
   double imbalance = 1;                             // most / mean render time of a worker, over all slots of the plan
-  double idle_share = 0;                    // of the workers' time from plan to last byte: none of a worker's threads worked for this frame
+  double idle_share = 0;                    // of the workers' time from plan to last byte, without any thread at work for this frame
   double image_bytes = 0, voxel_bytes = 0;  // sent
   std::uint64_t messages = 0;               // between workers
 };

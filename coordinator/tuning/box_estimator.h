@@ -49,7 +49,7 @@ class BoxEstimator {
   std::int32_t side_ = kOccupancyCell;  // voxels of a cell
   Index3 cells_;
   std::vector<double> cell_;  // occupied voxels, x fastest
-  double voxel_pixels_;       // that a voxel hits
+  double voxel_pixels_;       // pixels that a voxel hits
 };
 
 }  // namespace slabstream

@@ -41,7 +41,7 @@ struct PolicyChoice {
 
 inline constexpr double kLeastGain = 0.02;
 
-// The policy of a frame if nothing is chosen: what is left open is as in Policy{}.
+// The policy of a frame if nothing is chosen: open names are as in Policy{}.
 Policy FixedPolicy(Policy policy);
 
 // Errors as of MakeFrameSetup.

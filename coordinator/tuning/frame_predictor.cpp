@@ -41,7 +41,7 @@ std::int32_t ChoosePixelSide(const FrameSetup& setup, std::uint32_t slots) {
   return side;
 }
 
-// Only the size of the frame and the eye matter to what is made of it.
+// The simulation uses only the size of the frame and the eye.
 FrameSetup Coarse(FrameSetup setup, std::int32_t side) {
   if (!setup.sheets.empty()) {
     setup.sheets.width = CoarsePixels(setup.sheets.width, side);

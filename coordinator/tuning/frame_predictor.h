@@ -29,7 +29,7 @@ class FramePredictor {
     FramePlan plan;  // of the coarse frame; without schedules
     std::vector<BoxEstimator::Estimate> boxes;
   };
-  Prepared Prepare(Layout layout) const;  // of as many slots as this
+  Prepared Prepare(Layout layout) const;  // `layout` has as many slots as this
 
   // `combine` is a scheme (ParseCombining). None: its schedule has more than kMostSteps steps, extrapolated from fewer ranks.
   std::optional<FramePrediction> Predict(Prepared& prepared, const std::string& combine) const;

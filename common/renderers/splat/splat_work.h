@@ -16,11 +16,11 @@ namespace slabstream::splat {
 
 // At one pixel for the smallest side of a voxel.
 struct SplatCounts {
-  double slices = 0;    // in which anything is drawn
-  double rows = 0;      // of samples that anything reaches, over all slices
-  double segments = 0;  // of rows, a cell long, that hold anything
-  double runs = 0;      // of such segments, one beside the other
-  double octets = 0;    // of voxels, a cell long along a beam, that hold anything
+  double slices = 0;    // slices in which anything is drawn
+  double rows = 0;      // rows of samples that anything reaches, over all slices
+  double segments = 0;  // segments of rows, a cell long, that are not empty
+  double runs = 0;      // runs of such segments, one beside the other
+  double octets = 0;    // octets of voxels, a cell long along a beam, that are not empty
 };
 
 class SplatWork {
