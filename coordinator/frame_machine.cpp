@@ -64,7 +64,7 @@ void FrameMachine::State::On(const Planned& event) {
   }
 }
 
-// Once its dataset is loaded. NotFound: no such preset.
+// Sets request.volume; its dataset is loaded. NotFound: no such preset.
 Status FrameMachine::State::FindVolume(OpenRequest& request) const {
   const FrameRequest& frame = request.submit.frame;
   const DatasetTable::Entry& dataset = *datasets.Find(frame.dataset);

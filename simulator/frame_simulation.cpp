@@ -227,7 +227,7 @@ void FrameSimulation::Perform(const PlanRequest& action) {
   });
 }
 
-// The first of its messages is sent.
+// The first assignment of a group begins it.
 void FrameSimulation::BeginGroup(const GroupAssignment& assignment) {
   const std::uint32_t number = assignment.setup.dataset - 1;
   frame_of_[assignment.key.frame] = number;

@@ -61,9 +61,8 @@ struct ScheduleRequest {
 // the next one comes in (the paper's pipeline). `strips` >= 1.
 Schedule MakeChain(const ScheduleRequest& request, std::uint32_t strips);
 
-// A tree: k neighbouring intervals meet at one rank. The root stands for the interval that it lies in; else the first rank does. k = 2 is
-// the paper's fan-in, k >= ranks the centralized scheme (Yagel and Machiraju, section 2.1, figures 3c and 3a). `strips` >= 1 as above. k >=
-// 2.
+// A tree (k >= 2): k neighbouring intervals meet at one rank. The root stands for the interval that it lies in; else the first rank does. k
+// = 2 is the paper's fan-in, k >= ranks the centralized scheme (Yagel and Machiraju, section 2.1, figures 3c and 3a). `strips` as above.
 Schedule MakeTree(const ScheduleRequest& request, std::uint32_t k, std::uint32_t strips);
 
 // Radix-k (Peterka et al. 2009): in round i ranks meet in groups of factors[i], and each takes one share of the group's pixels from all

@@ -107,7 +107,7 @@ void StepOrder::Offer(std::uint32_t index) {
   changed_.insert(turn.rank);
 }
 
-// The turn is taken: those that wait for it wait for one less.
+// Marks the turn as taken; those that wait for it wait for one less.
 void StepOrder::Close(std::uint32_t index) {
   turns_[index].taken = true;
   ranks_[turns_[index].rank].possible.erase(index);

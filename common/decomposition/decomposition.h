@@ -46,8 +46,8 @@ Partition MakeSubcubes(const DecompositionRequest& request);
 // Halves all boxes along all three axes, m times: 8^m boxes, the least m that makes `boxes` and no more than `most_boxes`. Ignores work.
 Partition MakeOctree(const DecompositionRequest& request);
 // A kd-tree whose boxes fit tightly round what is occupied. Empty space at least kLeastCut voxels thick is cut away from a box before the
-// box is divided at equal work: across `axis` down to boxes of a few halos, which depends on `shape`, else across its longest side. The
-// empty parts are boxes of the partition, too, numbered after the `boxes` others.
+// box is divided at equal work: across `axis` down to boxes of a few halos (`shape` says how many), else across its longest side. The empty
+// parts are boxes of the partition, too, numbered after the `boxes` others.
 inline constexpr int kKdTreeShapes = 3;
 Partition MakeKdTree(const DecompositionRequest& request);
 

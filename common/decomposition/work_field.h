@@ -48,8 +48,8 @@ class WorkField {
   std::vector<double> sums_;  // steps before a corner of cells, [z][y][x]: whole numbers, so that sums are exact
 };
 
-// The plane `axis = p` that divides the work of `box` (its voxels if it holds no work) most nearly in the proportion part : whole - part, 0
-// < part < whole. p is the first index of the upper part and lies strictly inside the box, which has two slices or more. If work is
+// The plane `axis = p` that divides the work of `box` (its voxels if it holds no work) most nearly in the proportion part : whole - part,
+// 0 < part < whole. p is the first index of the upper part and lies strictly inside the box, which has two slices or more. If work is
 // uniform, p is rounded down, so that slab i of n begins at slice i * slices / n.
 std::int32_t PlaneAt(const WorkField& work, const Box& box, Axis axis, std::int64_t part, std::int64_t whole);
 
