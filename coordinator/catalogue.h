@@ -20,8 +20,7 @@ using VolumeLoader = std::function<Result<std::shared_ptr<const Volume>>()>;
 using Catalogue = std::map<std::string, VolumeLoader>;
 
 // Reads directories, opens no volume. InvalidArgument: a name that is empty, too long (kMaxNameBytes) or has other characters than letters,
-// digits and
-// "._-", one name twice, a DIR without volumes; NotFound: a path that does not exist. Messages name the argument.
+// digits and "._-", a repeated name, a DIR without volumes; NotFound: a path that does not exist. Messages name the argument.
 Result<Catalogue> MakeCatalogue(const std::vector<std::string>& arguments);
 
 }  // namespace slabstream

@@ -1,5 +1,5 @@
-// ChunkBuffers: memory for the samples of chunks, used again once whoever got a chunk has let go of it. Memory that is new for each of them
-// would be new pages each time, which cost more than what is written into them.
+// ChunkBuffers: memory for the samples of chunks, used again once the receiver of a chunk has released it. New memory for each chunk would
+// be new pages each time, which cost more than writing the samples.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@ namespace slabstream {
 class ChunkBuffers {
  public:
   using Memory = std::array<std::byte, kChunkBytes>;
-  using Buffer = std::shared_ptr<Memory>;  // may be let go by any thread, and outlive this object
+  using Buffer = std::shared_ptr<Memory>;  // may be released by any thread, and outlive this object
 
   Buffer Take() {
     std::unique_ptr<Memory> memory;

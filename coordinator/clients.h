@@ -1,6 +1,5 @@
-// ClientTable: the clients that have asked for frames, when each was last heard, and the last answers that each was sent. Answers are kept
-// within limits, so that a client that asks for the same request again (its connection broke, say) gets the answer and not the work once
-// more.
+// ClientTable: the clients that have asked for frames, when each was last heard, and the last answers sent to each. Answers are kept within
+// limits, so that a client that repeats a request (its connection broke, say) gets the kept answer and the work is not repeated.
 #pragma once
 
 #include <cstddef>
@@ -16,8 +15,8 @@
 namespace slabstream {
 
 inline constexpr std::size_t kMaxKeptAnswers = 64;  // of one client
-// Payloads of one client's kept answers. Few: answers are hardly ever asked for again, and each picture that is kept is a buffer that the
-// next one cannot have while it is still in a cache.
+// Payloads of one client's kept answers. Few: answers are hardly ever asked for again, and a kept picture holds a buffer that the next
+// picture could use while it is still in a cache.
 inline constexpr std::size_t kMaxKeptAnswerBytes = std::size_t{8} << 20;
 
 // What ended a request: its final FrameReply, or FrameFailed.
@@ -35,7 +34,7 @@ class ClientTable {
   void Meet(PeerToken client, Time now);   // heard; from now on it has an entry
   void Touch(PeerToken client, Time now);  // heard, if it has one
   void Forget(PeerToken client);
-  void Postpone(Duration duration);  // all silences begin later: the listener itself was asleep
+  void Postpone(Duration duration);  // all silences begin later, since the listener itself was asleep
 
   bool Knows(PeerToken client) const { return clients_.contains(client); }
   std::vector<PeerToken> Silent(Time now) const;

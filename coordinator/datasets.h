@@ -1,5 +1,5 @@
 // DatasetTable: the catalogue's names and how far each has been loaded. A dataset is loaded at its first use; a failed load is tried again
-// at the next request. Every load has an id of its own, so what belongs to an earlier load is told apart.
+// at the next request. Every load has its own id, so that results of an earlier load are recognised.
 #pragma once
 
 #include <cstdint>

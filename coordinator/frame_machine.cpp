@@ -15,7 +15,7 @@ namespace slabstream {
 namespace {
 constexpr std::size_t kCountAhead = 4;
 static_assert(kCountAhead <= OccupancyTable::kMaxKept);
-// Frames that are planned beyond what the window has room for: a frame that ends makes room for one, whose plan should be there by then.
+// Frames planned beyond the window's room: when a frame ends and makes room for another, that one's plan should be ready.
 constexpr std::size_t kPlansAhead = 1;
 }  // namespace
 
@@ -64,7 +64,7 @@ void FrameMachine::State::On(const Planned& event) {
   }
 }
 
-// Once its dataset is loaded. NotFound: no such preset.
+// Sets request.volume; its dataset is loaded. NotFound: no such preset.
 Status FrameMachine::State::FindVolume(OpenRequest& request) const {
   const FrameRequest& frame = request.submit.frame;
   const DatasetTable::Entry& dataset = *datasets.Find(frame.dataset);
@@ -74,7 +74,7 @@ Status FrameMachine::State::FindVolume(OpenRequest& request) const {
   return Status::Ok();
 }
 
-// For the next requests in turn. Those behind them wait, so that no grid is dropped before it was used.
+// Counts for the next requests in turn. Those behind them wait, so that no grid is dropped before it is used.
 void FrameMachine::State::CountAhead() {
   std::size_t ahead = 0;
   queue.VisitInTurn([&](const OpenRequest& request) {
@@ -88,7 +88,7 @@ void FrameMachine::State::CountAhead() {
   });
 }
 
-// For as many of the next requests in turn as can start soon.
+// Plans as many of the next requests in turn as can start soon.
 void FrameMachine::State::PlanAhead() {
   std::size_t ahead = 0;
   const std::size_t most = frames.Room(roster.members().size()) + kPlansAhead;
@@ -125,7 +125,7 @@ PlanRequest FrameMachine::State::MakePlanRequest(const OpenRequest& request) {
   return ask;
 }
 
-// Of requests that have ended, or that ask for another plan now.
+// Drops plans of requests that have ended, or that need another plan now.
 void FrameMachine::State::DropPlans() {
   if (planning.empty()) return;
   std::set<PlanId> wanted;
@@ -224,7 +224,7 @@ void FrameMachine::State::Advance() {
   PlanAhead();
 }
 
-// The first frame in turn that is planned for the workers that there are. False: there is none.
+// Starts the first frame in turn that is planned for the present workers. False: there is none.
 bool FrameMachine::State::StartNextFrame() {
   std::optional<OpenRequest> request = queue.TakeNext([&](const OpenRequest& open) { return HasPlan(open); });
   if (!request) return false;
@@ -280,7 +280,7 @@ std::vector<CoordinatorAction> FrameMachine::Step(const CoordinatorEvent& event,
   state.now = now;
   if (!state.started) state.started = now;
   if (now > state.wake) {
-    // The executor was held up (a stopped process, a busy machine): what was not read meanwhile is not the others' silence.
+    // The executor was held up (a stopped process, a busy machine): unread messages are no silence of the others.
     state.roster.Postpone(now - state.wake);
     state.clients.Postpone(now - state.wake);
   }

@@ -117,19 +117,17 @@ struct LoadDataset {
   std::string name;
   DatasetId dataset = 0;
 };
-// -> OccupiedCounted: counts what of the volume, whose dataset was loaded, its renderer draws (DrawnTable, CountOccupied).
+// -> OccupiedCounted: counts the voxels of the volume that its renderer draws (DrawnTable, CountOccupied). The dataset was loaded.
 struct CountDataset {
   CountId count = 0;
   ClassifiedVolume volume;
   std::shared_ptr<const VolumeSummary> summary;
 };
-// PlanRequest (coordinator/plan_request.h) -> Planned, by what a Planner makes of it.
-// FrameMeasured: for the Planner to learn from. No answer.
-// DropPlan: nobody waits for this plan any more, so that it need not be made. Planned may still come.
+// PlanRequest (coordinator/plan_request.h) -> Planned, with the Planner's result.
 struct DropPlan {
   PlanId plan = 0;
 };
-struct StopService {};  // everything was told; end
+struct StopService {};  // everything was sent; end
 using CoordinatorAction = std::variant<ToWorker, ToClient, LoadDataset, CountDataset, PlanRequest, DropPlan, FrameMeasured, StopService>;
 
 class FrameMachine {

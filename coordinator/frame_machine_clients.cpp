@@ -60,7 +60,7 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const CancelFrame& m
   } else if (Answer* answer = clients.FindAnswer(client, message.request)) {
     SendAnswer(client, *answer);
   } else {
-    // Not seen yet, perhaps: the answer is kept, so that a SubmitFrame that arrives later ends like this, too.
+    // The SubmitFrame may still be under way: the answer is kept, so that it ends like this, too.
     EndRequest(client, message.request, FrameFailed{.request = message.request, .status = cancelled}, {});
   }
 }
@@ -71,7 +71,7 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const ClientPing& me
     Answer* answer = clients.FindAnswer(client, request);
     if (answer == nullptr && !IsOpen(client, request)) continue;
     pong.known.push_back(request);
-    // Asked about long after it was sent, the answer must have been lost with a connection.
+    // If the client asks long after the answer was sent, a connection must have lost it.
     if (answer != nullptr && now >= answer->sent + config.client_timeout / 2) SendAnswer(client, *answer);
   }
   SendClient(client, std::move(pong));

@@ -49,7 +49,7 @@ struct FrameMachine::State {
   RequestQueue queue;
   FramesInFlight frames;
   OccupancyTable occupancy;
-  std::set<PlanId> planning;  // asked for and neither answered nor dropped
+  std::set<PlanId> planning;  // requested and neither answered nor dropped
   PlanId last_plan = 0;
   const FrameLimits limits;
 
@@ -87,7 +87,7 @@ struct FrameMachine::State {
   void OnWorkerMessage(const FromWorker& event, const FrameImage& message);
   void OnWorkerMessage(const FromWorker& event, const WorkerTrouble& message);
   void OnWorkerMessage(const FromWorker& event, const Leave& message);
-  // What no worker sends here is dropped.
+  // Drops what no worker sends here.
   template <AnyOf<Welcome, Ping, GroupAssignment, Retire, Stop, ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused,
                   ImageReceived, SubmitFrame, FrameProgress, FrameReply, FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery,
                   StatusReply, ShutDown, ShutDownReply>
@@ -100,7 +100,7 @@ struct FrameMachine::State {
   void OnClientMessage(PeerToken client, const ClientPing& message);
   void OnClientMessage(PeerToken client, const StatusQuery& message);
   void OnClientMessage(PeerToken client, const ShutDown& message);
-  // What no client sends is dropped.
+  // Drops what no client sends.
   template <AnyOf<Register, Welcome, Heartbeat, Ping, GroupAssignment, GroupDone, FrameImage, WorkerTrouble, Leave, Retire, Stop,
                   ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused, ImageReceived, FrameProgress, FrameReply, FrameFailed,
                   ClientPong, StatusReply, ShutDownReply>

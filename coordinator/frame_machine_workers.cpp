@@ -67,7 +67,7 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker&, const WorkerTrouble
   if (frame == nullptr) return;
   if (message.unreachable != 0) {
     if (roster.Find(message.unreachable) == nullptr) return;  // known to be lost: the frame has been planned anew already
-    SendWorker(message.unreachable, MakePing());              // whose failure would prove the complaint right
+    SendWorker(message.unreachable, MakePing());              // if it cannot be sent, the complaint is right
   }
   const Status status = frame->OnTrouble(message, now);
   if (!status.ok()) FailFrame(*frame, status);

@@ -1,5 +1,5 @@
-// FramesInFlight: the frames that run now, oldest first, and which earlier ones are over. How many may run, and how many of their groups,
-// is the window's matter (common/planning/frame_window.h): Next says what it allows.
+// FramesInFlight: the frames that run now, oldest first, and which earlier ones are over. The window (common/planning/frame_window.h)
+// limits the running frames and their groups; Next says what it allows.
 #pragma once
 
 #include <list>
@@ -29,8 +29,7 @@ class FramesInFlight {
   // How many more frames `workers` workers may have under way.
   std::size_t Room(std::size_t workers) const;
 
-  // What workers may forget: all frames before finished_before(), and cancelled(), the newest kMaxCancelled that are over though their id
-  // is larger.
+  // Frames that workers may forget: all before finished_before(), and cancelled(): of later ones that are over, the newest kMaxCancelled.
   FrameId finished_before() const { return frames_.empty() ? next_id() : frames_.front().id(); }
   const std::vector<FrameId>& cancelled() const { return over_; }
 

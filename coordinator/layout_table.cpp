@@ -11,11 +11,11 @@
 namespace slabstream {
 namespace {
 
-// Of each box that was rendered.
+// Render time of each box that was rendered.
 std::map<BoxId, double> SecondsOf(const Layout& layout, std::span<const RankReport> reports) {
   std::map<BoxId, double> seconds;
   for (const RankReport& report : reports) {
-    // What travels with a picture tells of no box.
+    // Reports that come with a picture concern no box.
     if (report.stage_ns[std::size_t(Stage::kRender)] <= 0 || report.box >= layout.owners.size() || layout.owners[report.box] == kNoSlot)
       continue;
     seconds[report.box] = 1e-9 * double(LastingRenderNs(report));
@@ -109,7 +109,7 @@ void LayoutTable::Learn(const ClassifiedVolume& volume, const FramePlan& plan, c
   const Key key = KeyOf(volume, policy, plan.slots);
   const auto entry = std::find_if(entries_.begin(), entries_.end(),
                                   [&](const Entry& e) { return e.key == key && (e.layout == plan.layout || *e.layout == *plan.layout); });
-  // The first frame of a layout tells most; of a layout that has been changed since, what an average one does.
+  // The first frame of a layout counts most; a frame of a layout that has been changed since counts as an average one.
   double weight = kLeastWeight;
   if (entry != entries_.end()) {
     weight = std::max(weight, 1.0 / ++entry->frames_seen);

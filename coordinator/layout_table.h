@@ -1,11 +1,11 @@
-// LayoutTable: the layouts that frames are planned with, and what their render times teach.
+// LayoutTable: the layouts that frames are planned with, and the costs learnt from their render times.
 //
-// A layout is made once and stays: for the same volume, transfer function, renderer, policy and number of slots, whatever the view. Two
-// things change it. Where boxes are split by cost, it is made anew once when costs are first known. With dynamic balance it changes between
-// frames when Rebalance says so. Another number of slots (a worker has joined, a vacancy was given up) is another layout; what was learnt
-// holds for all of them.
+// A layout is made once for a volume, transfer function, renderer, policy and number of slots, and stays whatever the view. Two things
+// change it. If boxes are split by cost, it is made anew once, when costs are first known. With dynamic balance, it changes between frames
+// when Rebalance says so. Another number of slots (a worker has joined, a vacancy was given up) has another layout; learnt costs hold for
+// all of them.
 //
-// The last few layouts and costs are kept. Those that no frame has asked for longest go first.
+// The last few layouts and costs are kept. The least recently used go first.
 #pragma once
 
 #include <list>
@@ -26,10 +26,10 @@ class LayoutTable {
  public:
   static constexpr std::size_t kMaxKept = 16;   // layouts
   static constexpr std::size_t kMaxLearnt = 4;  // costs: two thirds of an OccupancyGrid each
-  static constexpr double kLeastWeight = 0.2;   // of a frame, however many there were before it: older ones fade by a fifth a frame
+  static constexpr double kLeastWeight = 0.2;   // of a frame, however many came before it: older ones fade by a fifth a frame
 
-  // Quick at first, then patient: before its n-th change a layout must have been measured for n - 1 frames, 1 at least and at most this
-  // many. So noise moves voxels seldom, and a view that moves is still followed.
+  // Before its n-th change, a layout must have been measured for n - 1 frames, 1 at least and at most this many. So noise seldom moves
+  // voxels, and a view that moves is still followed.
   static constexpr int kMostPatience = 8;
 
   struct Request {
@@ -40,14 +40,14 @@ class LayoutTable {
     std::uint32_t slots = 1;
     std::int64_t slab_bytes_target = kSlabBytesTarget;
   };
-  // What the frame should be planned with.
+  // The layout to plan the frame with.
   std::shared_ptr<const Layout> Find(const Request& request);
 
-  // What boxes cost, as far as frames have told: seconds.
+  // Measured costs: seconds.
   bool KnowsCost(const ClassifiedVolume& volume);
   std::optional<WorkField> KnownCost(const ClassifiedVolume& volume);
 
-  // A finished frame. Nothing is learnt from frames that were planned without occupied voxels.
+  // Learns from a finished frame, unless it was planned without occupied voxels.
   void Learn(const ClassifiedVolume& volume, const FramePlan& plan, const ResolvedPolicy& policy, std::span<const RankReport> reports);
 
  private:
@@ -57,7 +57,7 @@ class LayoutTable {
     std::uint32_t slots = 1;
     friend bool operator==(const Key&, const Key&) = default;
   };
-  // How images are combined moves no box, so policies that differ in that alone share a layout.
+  // Combining moves no box, so policies that differ in that alone share a layout.
   static Key KeyOf(const ClassifiedVolume& volume, const ResolvedPolicy& policy, std::uint32_t slots);
   struct Entry {
     Key key;
@@ -65,7 +65,7 @@ class LayoutTable {
     bool by_cost = false;         // made when costs were known
     int changes = 0;              // by dynamic balance
     int frames_seen = 0;          // of this layout
-    std::vector<double> seconds;  // by box of it, over these frames, newer ones counting more; 0: not rendered yet
+    std::vector<double> seconds;  // by box, over these frames; newer ones count more; 0: not rendered yet
   };
   struct Learnt {
     ClassifiedVolume volume;
@@ -73,7 +73,7 @@ class LayoutTable {
   };
   Learnt* FindLearnt(const ClassifiedVolume& volume);
 
-  std::list<Entry> entries_;  // asked for last first
+  std::list<Entry> entries_;  // most recently used first
   std::list<Learnt> learnt_;  // likewise
 };
 

@@ -18,14 +18,14 @@ class OccupancyTable {
  public:
   static constexpr std::size_t kMaxKept = 8;  // grids; counts under way are kept beside them
 
-  // Null: not counted. Whoever asks wants to keep it: the one asked for longest ago goes first.
+  // Null: not counted. A found grid counts as used; the least recently used goes first.
   std::shared_ptr<const OccupancyGrid> Find(const ClassifiedVolume& volume);
   bool Counting(const ClassifiedVolume& volume) const;
   CountId Begin(const ClassifiedVolume& volume);  // neither found nor counting
 
   // The end of a count. False: there is none with this id under way; nothing changes.
   bool Counted(CountId count, std::shared_ptr<const OccupancyGrid> grid);
-  // Likewise; what was counted. It may be begun anew.
+  // Likewise; returns the volume whose count failed. It may be begun anew.
   std::optional<ClassifiedVolume> Failed(CountId count);
 
  private:
@@ -34,7 +34,7 @@ class OccupancyTable {
     CountId count = 0;
     std::shared_ptr<const OccupancyGrid> grid;  // null: under way
   };
-  std::list<Entry> entries_;  // asked for last first
+  std::list<Entry> entries_;  // most recently used first
   CountId last_count_ = 0;
 };
 

@@ -18,8 +18,8 @@ class PeerTable {
 
   void Forget(PeerToken token);
 
-  // Forgets connections that were last heard before `limit`, so that a long life with many short connections does not grow. Whoever has
-  // work in the service sends something every second and is never forgotten.
+  // Forgets connections that were last heard before `limit`, so that many short connections do not fill the memory of a long life. A peer
+  // with work in the service sends something every second and is never forgotten.
   void ForgetSilentSince(Time limit);
 
   std::size_t size() const { return peers_.size(); }

@@ -1,4 +1,4 @@
-// What the machine asks of a planner, and what it gets: values that are safe to hand to another thread.
+// What the machine sends to a planner and gets from it: values that are safe to hand to another thread.
 #pragma once
 
 #include <cstdint>
@@ -19,26 +19,26 @@ using PlanId = std::uint64_t;  // never given twice; 0: none
 
 struct PlanRequest {
   PlanId plan = 0;
-  FrameRequest frame;  // valid, with names that there are (CheckNames); names of the policy may be left open
+  FrameRequest frame;  // valid, with known names (CheckNames); names of the policy may be left open
   ClassifiedVolume volume;
   std::shared_ptr<const VolumeSummary> summary;   // of it
   std::shared_ptr<const OccupancyGrid> occupied;  // of it; null: the policy does not need it (NeedsOccupancy)
   Roster roster;                                  // of the frame's team, with a worker in it
   Turn turn;
-  std::vector<HostedWorker> workers;  // all that there are: an open policy is chosen for them
+  std::vector<HostedWorker> workers;  // all of the service: an open policy is chosen for them
 };
 
 struct PlannedFrame {
   PlanRequest asked;
-  ResolvedPolicy policy;                      // that the plan was made by
+  ResolvedPolicy policy;                      // policy that the plan was made by
   std::optional<FramePrediction> prediction;  // none: the policy was not open, or the frame is too much to simulate
-  double render_scale = 1;                    // that the prediction was made with (PolicyTable)
+  double render_scale = 1;                    // used for the prediction (PolicyTable)
   FramePlan plan;
 
-  bool teaches() const { return asked.occupied != nullptr || prediction; }  // what rendering takes tells something of the frames to come
+  bool teaches() const { return asked.occupied != nullptr || prediction; }  // render times help to plan coming frames
 };
 
-// A frame that was planned like this is finished. What its boxes took to render, for the planner to learn from.
+// A finished frame: how it was planned and how long its boxes took to render, for the planner to learn from.
 struct FrameMeasured {
   std::shared_ptr<const PlannedFrame> frame;
   std::vector<RankReport> reports;

@@ -1,7 +1,7 @@
-// Planner: makes plans, and keeps what they are made from: chosen policies, layouts, and what boxes cost as far as frames have told.
+// Planner: makes plans, and keeps what they are made from: chosen policies, layouts and measured costs.
 //
-// One thread uses it at a time. The service gives it a thread of its own, since a plan may take seconds: a policy that is left open is
-// chosen by simulated frames, and a layout may be refined several times. The same calls in the same order give the same plans.
+// One thread uses it at a time. The service gives it a thread of its own, since a plan may take seconds: an open policy is chosen by
+// simulated frames, and a layout may be refined several times. The same calls in the same order give the same plans.
 #pragma once
 
 #include <memory>
@@ -22,10 +22,10 @@ class Planner {
  public:
   explicit Planner(PlannerConfig config = {}) : config_(std::move(config)) {}
 
-  // Errors as of PlanFrame and ChoosePolicy, and ResourceExhausted or Internal for what they throw.
+  // Errors as of PlanFrame and ChoosePolicy; ResourceExhausted or Internal for exceptions.
   Result<std::shared_ptr<const PlannedFrame>> Plan(const PlanRequest& request);
 
-  // A frame that was planned like this is finished.
+  // Learns from a finished frame.
   void Learn(const FrameMeasured& measured);
 
  private:

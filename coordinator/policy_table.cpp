@@ -13,9 +13,9 @@
 namespace slabstream {
 namespace {
 
-constexpr double kLeastFactor = 0.1, kMostFactor = 10;  // a frame says that rendering takes longer by
+constexpr double kLeastFactor = 0.1, kMostFactor = 10;  // limits of measured / predicted render time of one frame
 
-// Of the worker with most to do.
+// Render time of the busiest worker.
 double RenderSeconds(std::span<const RankReport> reports) {
   std::map<std::uint32_t, std::int64_t> by_worker;
   std::int64_t most = 0;

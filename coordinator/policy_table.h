@@ -1,11 +1,11 @@
-// PolicyTable: what frames get whose policy leaves a choice ("auto"), and what was predicted of them.
+// PolicyTable: the choices made for open policies ("auto"), and what was predicted of their frames.
 //
 // A choice is made once for a volume, transfer function, renderer, policy and set of workers, with the first frame that asks for it
-// (ChoosePolicy), and its partition then stays whatever the view, so that turning the view moves no voxels. How images are combined moves
-// none, so that is chosen anew for each kind of view. When it is first known what boxes cost, the choice is made once more: another
-// partition must then be predicted to gain kRevisitGain. What rendering took corrects later predictions.
+// (ChoosePolicy). Its partition then stays whatever the view, so that turning the view moves no voxels. Combining moves none, so the scheme
+// is chosen anew for each kind of view. When costs are first measured, the choice is made once more: another partition must then be
+// predicted to gain kRevisitGain. Measured render times correct later predictions.
 //
-// The last few choices are kept. Those that no frame has asked for longest go first.
+// The last few choices are kept. The least recently used go first.
 #pragma once
 
 #include <list>
@@ -25,31 +25,31 @@ namespace slabstream {
 struct ChosenPolicy {
   ResolvedPolicy policy;
   std::optional<FramePrediction> prediction;  // none: too much to simulate
-  double render_scale = 1;                    // by which it was corrected (PolicyQuestion)
+  double render_scale = 1;                    // correction of the prediction (PolicyQuestion)
 };
 
 class PolicyTable {
  public:
   static constexpr std::size_t kMaxKept = 16;        // choices
-  static constexpr std::size_t kMaxKinds = 16;       // of views, of each
+  static constexpr std::size_t kMaxKinds = 16;       // kinds of views, for each choice
   static constexpr double kRevisitGain = 0.1;        // share of a frame's latency
-  static constexpr double kLeastWeight = 0.2;        // of a frame's render time, however many there were before it
-  static constexpr int kMostFramesAPrediction = 64;  // it is made anew after 1, 2, 4 ... frames, and after as many as this again and again
+  static constexpr double kLeastWeight = 0.2;        // of a frame's render time, however many came before it
+  static constexpr int kMostFramesAPrediction = 64;  // it is made anew after 1, 2, 4 ... frames, later after every so many
 
   struct Request {
-    const FrameRequest* frame = nullptr;       // whose policy has names that there are (CheckNames)
+    const FrameRequest* frame = nullptr;       // its policy has known names (CheckNames)
     const ClassifiedVolume* volume = nullptr;  // of the frame
     const VolumeSummary* summary = nullptr;
     std::shared_ptr<const OccupancyGrid> occupied;  // null: not counted
     std::uint32_t slots = 1;
     const MachineModel* machine = nullptr;
     std::int64_t slab_bytes_target = kSlabBytesTarget;
-    LayoutTable* layouts = nullptr;  // that knows what boxes cost
+    LayoutTable* layouts = nullptr;  // source of measured costs
   };
   // Errors as of ChoosePolicy.
   Result<ChosenPolicy> Find(const Request& request);
 
-  // A finished frame. Nothing is learnt from one of which nothing was predicted.
+  // Learns from a finished frame, if it had a prediction.
   void Learn(const PlannedFrame& frame, std::span<const RankReport> reports);
 
  private:
@@ -76,14 +76,14 @@ class PolicyTable {
     Key key;
     MachineModel machine;
     bool by_cost = false;     // chosen when costs were known
-    double render_scale = 1;  // by how much longer rendering took than was predicted without it
+    double render_scale = 1;  // measured render time / predicted without it
     int frames_seen = 0;
-    std::list<Choice> choices;  // by kind; asked for last first; the same but for `combine`
+    std::list<Choice> choices;  // by kind; most recently used first; they differ only in `combine`
   };
   static Kind KindOf(const Request& request);
   Result<ChosenPolicy> Choose(const Request& request, Entry& entry, const Kind& kind, const Policy& open, const ResolvedPolicy* now);
 
-  std::list<Entry> entries_;  // asked for last first
+  std::list<Entry> entries_;  // most recently used first
 };
 
 }  // namespace slabstream

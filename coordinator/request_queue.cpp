@@ -88,7 +88,7 @@ std::uint32_t RequestQueue::PositionOf(PeerToken client, RequestId request) cons
   const auto found =
       std::find_if(own->requests.begin(), own->requests.end(), [&](const OpenRequest& r) { return r.submit.request == request; });
   CHECK(found != own->requests.end()) << "request " << request;
-  // In the turns before its own, `before` of each client that stands behind in turn are served, and one more of each that stands in front.
+  // Before its turn, `before` requests of each client behind it in turn are served, and one more of each client in front of it.
   const std::size_t before = std::size_t(found - own->requests.begin());
   std::size_t position = before;
   std::size_t served = before + 1;

@@ -1,5 +1,5 @@
-// RequestQueue: frames that were asked for and do not run yet. Each client has a queue of its own; clients are served in turn, one frame
-// each, so that a turntable of a thousand frames delays another client's picture by one frame and not by a thousand.
+// RequestQueue: requested frames that do not run yet. Each client has a queue of its own; clients are served in turn, one frame each, so
+// that a turntable of a thousand frames delays another client's picture by one frame and not by a thousand.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@ struct OpenRequest {
   Time arrived;
   bool needs_occupancy = false;                 // of its policy (NeedsOccupancy)
   std::optional<ClassifiedVolume> volume;       // none: its dataset is not loaded yet
-  PlanId plan = 0;                              // that was asked for; 0: none
+  PlanId plan = 0;                              // the requested plan; 0: none
   std::uint64_t planned_for = 0;                // LiveRoster::version() when it was
   std::shared_ptr<const PlannedFrame> planned;  // null: not yet
 

@@ -1,4 +1,4 @@
-// LiveRoster: which workers there are, which slot each one owns, and when each was last heard. Pure: time is an argument.
+// LiveRoster: the present workers, the slot that each one owns, and when each was last heard. Pure: time is an argument.
 //
 // A worker is an incarnation (one registration of one process: what it held before is gone). It keeps its id while it stays, on whatever
 // connection it speaks; a new incarnation is a new worker. Slots outlive workers: the slot of a lost worker stays vacant for a grace
@@ -33,7 +33,7 @@ class LiveRoster {
   // Members that this Register proves dead: same connection or same image endpoint, other incarnation. Remove them before Admit, so that
   // the new worker gets their slot.
   std::vector<WorkerId> ReplacedBy(const Register& message, PeerToken from) const;
-  // A new worker, or the one that it is already: Registers repeat until the Welcome arrives.
+  // Adds a worker, or finds the one that it is already: Registers repeat until the Welcome arrives.
   WorkerId Admit(const Register& message, PeerToken from, Time now);
 
   struct News {
@@ -46,7 +46,7 @@ class LiveRoster {
 
   void Remove(WorkerId worker, Time now);  // its slot becomes vacant
   void GiveUpVacancies(Time now);          // drops slots that have been vacant for the grace period
-  void Postpone(Duration duration);        // all silences begin later: the listener itself was asleep
+  void Postpone(Duration duration);        // all silences begin later, since the listener itself was asleep
 
   const Member* Find(WorkerId worker) const;  // null: not a member
   std::vector<WorkerId> At(PeerToken peer) const;
@@ -57,9 +57,9 @@ class LiveRoster {
   std::uint32_t SlotOf(WorkerId worker) const;       // of a member
 
   Roster slots() const;                               // 0 where a slot is vacant
-  std::uint64_t version() const { return version_; }  // another one whenever slots() changes
-  // The slots of a plan made earlier: workers that are still here keep theirs; the others' go to workers without a slot in it, the present
-  // owner of the same slot first. What is left is vacant.
+  std::uint64_t version() const { return version_; }  // changes whenever slots() does
+  // Fills the slots of an earlier plan: workers that are still here keep theirs; the others' go to workers without a slot in it, the
+  // present owner of the same slot first. The rest are vacant.
   Roster Refill(const Roster& planned) const;
 
   Time NextWake() const;  // the next silence or end of a grace period; Time::max(): none

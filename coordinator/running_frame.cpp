@@ -133,7 +133,7 @@ bool RunningFrame::OnGroupDone(const GroupDone& message, Time now) {
   return Finish(message.key.group + 1, now);
 }
 
-// News of an older attempt may come late, and so after a mask of more groups.
+// A message of an older attempt may arrive after a mask of more groups.
 void RunningFrame::KeepHidden(const GroupDone& message) {
   const std::uint32_t groups = message.key.group + 1;
   if (message.hidden.empty() || groups <= hidden_by_ || !CheckFits(message.hidden, plan_.setup).ok()) return;

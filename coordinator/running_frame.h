@@ -1,7 +1,7 @@
-// RunningFrame: one frame from its plan to its end. It knows which groups are handed out and which are done, on which attempt, and what was
+// RunningFrame: one frame from its plan to its end. It knows which groups are handed out, which are done, on which attempt, and what was
 // measured.
 //
-// An attempt hands out the groups [first group, group count) of one plan. What ends it before the frame's end, and where the next one
+// An attempt hands out the groups [first group, group count) of one plan. Events that end it before the frame's end, and where the next one
 // begins:
 //   a worker with a part in it is lost                     the first unfinished group, now
 //   no progress for stall_timeout                          the first unfinished group, now; counted
@@ -9,17 +9,16 @@
 //   the same, but another worker may be able to            the first unfinished group, now, without that worker; counted
 //   a worker cannot reach another that is alive            the first unfinished group, once that is proved; counted
 //   any of these, if the display worker was lost or had the trouble     group 0: what it accumulated is gone or in doubt
-// Counted ones fail the frame when max_stalls of them come in a row, with no group finished between them that had never been finished
-// before. So a frame ends, whatever happens, as long as workers are not lost for ever.
+// The frame fails after max_stalls counted events in a row, with no group finished for the first time between them. So every frame ends, as
+// long as workers are not lost for ever.
 //
-// A group is done when the display worker has accumulated it, which it does in order: group g done means 0 ... g done. That holds for the
-// display worker's lifetime, not for an attempt, and a picture is right whoever makes it, so news of older attempts counts where its sender
-// proves it.
+// A group is done when the display worker has accumulated it. It does so in order: group g done means 0 ... g done. That holds for the
+// display worker's lifetime, not for an attempt, and a picture is right whoever makes it, so messages of older attempts count if their
+// sender proves them.
 //
 // What is hidden (common/planning/frame_occlusion.h): each GroupDone of the present display worker may bring the mask of what it has
-// accumulated; the one of most groups is kept. The rule: the assignment of group g, of whatever attempt, carries it only if it was made
-// from groups in front of g. When an attempt begins again with group 0, the mask goes with what was accumulated. A mask that does not come,
-// or not in time, costs work and no more.
+// accumulated; the mask of most groups is kept. The assignment of group g, in any attempt, carries it only if it was made from groups in
+// front of g. When an attempt begins again with group 0, the mask is dropped. A mask that is missing or late costs work and no more.
 #pragma once
 
 #include <cstdint>
@@ -39,8 +38,8 @@ struct FrameLimits {
   Duration stall_timeout{};
   int max_stalls = 1;
   Duration pause{};          // before the second attempt after trouble; each further one waits this much longer
-  Duration proof_of_life{};  // a heartbeat that much later than a complaint about its sender refutes "it is dead"
-  Duration suspicion{};      // that much later the accused worker is lost, or alive for sure
+  Duration proof_of_life{};  // a heartbeat this much later than a complaint about its sender refutes "it is dead"
+  Duration suspicion{};      // this much later the accused worker is lost, or alive for sure
 };
 
 class RunningFrame {
@@ -57,7 +56,7 @@ class RunningFrame {
   std::uint32_t group_count() const { return std::uint32_t(plan_.groups.size()); }
   std::uint32_t groups_done() const { return groups_done_; }
   std::uint32_t unfinished_groups() const;  // handed out and not done; 0 while a new attempt is due
-  bool HasPart(WorkerId worker) const;      // in what is not done yet
+  bool HasPart(WorkerId worker) const;      // in groups that are not done yet
   std::vector<WorkerId> Renderers(std::uint32_t group) const;
   std::vector<WorkerId> Participants() const;  // workers with a placement anywhere in the plan, and the display worker
 
@@ -70,22 +69,22 @@ class RunningFrame {
   HandOut NextGroup(Time now);  // needs CanHandOut()
 
   bool AttemptDue(Time now) const { return attempt_due_ && now >= *attempt_due_; }
-  // Begins the next attempt over `roster` (same number of slots), without those that could not do their part. If nobody is left: the reason
-  // of the last one of them, else Unavailable; nothing changes then.
+  // Begins the next attempt over `roster` (same number of slots), without workers that could not do their part. If nobody is left, nothing
+  // changes; the Status is the last such worker's reason, or Unavailable if there is none.
   Status BeginAttempt(const Roster& roster, Time now);
 
   // ---- what workers say
   bool OnGroupDone(const GroupDone& message, Time now);  // true: groups_done() rose
   enum class Use { kNothing, kPreview, kFinal };
-  Use OnImage(const FrameImage& message, Time now);  // which use the picture is of; a preview tells of groups done, too
+  Use OnImage(const FrameImage& message, Time now);  // what the picture is used for; a preview reports groups done, too
   void OnHeartbeat(WorkerId worker, bool progressed, Time now);
   // These workers have rendered a younger frame's group. They render in order, so what they do now is no progress of this frame.
   void OnOvertaken(const std::vector<WorkerId>& workers);
 
   // ---- what goes wrong. A Status that is not ok: the frame has failed.
   void OnLoss(WorkerId worker, Time now);  // it is no longer in the roster
-  // Trouble of another attempt or of a group that is done is no news. message.unreachable, if any, must be in the roster.
-  // Of the display worker when all groups are done: it cannot make the picture.
+  // Ignores trouble of another attempt or of a group that is done. message.unreachable, if any, must be in the roster. Trouble of the
+  // display worker when all groups are done: it cannot make the picture.
   Status OnTrouble(const WorkerTrouble& message, Time now);
   Status Expire(Time now);  // stalls, suspicions
 
@@ -114,7 +113,7 @@ class RunningFrame {
   Time begin_;
 
   std::vector<WorkerId> displays_;        // by attempt - 1
-  std::uint32_t accumulating_since_ = 1;  // the attempt at whose begin the present display worker had nothing
+  std::uint32_t accumulating_since_ = 1;  // the attempt that the present display worker began with nothing
   std::uint32_t first_group_ = 0;         // of this attempt
   std::uint32_t next_group_ = 0;          // to be handed out
   std::uint32_t groups_done_ = 0;         // by the present display worker
@@ -125,13 +124,13 @@ class RunningFrame {
   std::optional<Time> attempt_due_;
   bool display_in_doubt_ = false;  // the next attempt begins with group 0
   std::optional<Suspicion> suspicion_;
-  std::set<WorkerId> unable_;  // to do their part of this frame
-  Status inability_;           // of the last one of them
+  std::set<WorkerId> unable_;  // workers that cannot do their part of this frame
+  Status inability_;           // reason of the last one of them
   int stalls_ = 0;
   Time last_progress_;
   std::set<WorkerId> moved_on_;                   // workers that have rendered all that is handed out of this frame
   std::vector<std::vector<RankReport>> reports_;  // by group
-  std::vector<RankReport> display_reports_;       // that came with the finished picture
+  std::vector<RankReport> display_reports_;       // sent with the finished picture
 };
 
 }  // namespace slabstream

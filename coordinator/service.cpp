@@ -48,7 +48,7 @@ bool MostBricksAreEqual(const VolumeSummary& summary) {
   return 2 * std::size_t(equal) >= summary.bricks.size();
 }
 
-// What other threads tell the machine's. Voxels are published first, before the machine can send anybody for them.
+// What other threads send to the machine's thread. Voxels are published first, before the machine can send anybody for them.
 struct News {
   CoordinatorEvent event;
   DatasetId dataset = 0;
@@ -113,7 +113,7 @@ struct CoordinatorService::Impl {
   Socket clients, control;
   PeerTable client_peers, worker_peers;
   std::unique_ptr<SlabServer> slabs;
-  // From the other threads and from failed sends; its wakeup also tells of stop_requested. Tasks that outlive the service share it.
+  // From the other threads and from failed sends; its wakeup also signals stop_requested. Tasks that outlive the service share it.
   const std::shared_ptr<Mailbox<News>> inbox = std::make_shared<Mailbox<News>>();
   std::atomic<bool> stop_requested = false;
   std::atomic<bool> stopped = false;
@@ -176,8 +176,8 @@ void CoordinatorService::Impl::HandleEvent(const CoordinatorEvent& event) {
   }
 }
 
-// A peer that cannot be reached, or that does not take its messages, is gone, and so is one to which nothing can be said for want of
-// memory. The machine hears of it after the actions at hand, not between them.
+// A peer is gone if it cannot be reached, does not take its messages, or cannot be sent one for want of memory. The machine hears of it
+// after the actions at hand, not between them.
 void CoordinatorService::Impl::Send(Socket& socket, PeerTable& peers, PeerToken to, const AnyMessage& message, const Bytes& payload,
                                     const CoordinatorEvent& gone) {
   const std::string* identity = peers.IdentityOf(to);
@@ -212,7 +212,7 @@ void CoordinatorService::Impl::ReceiveFromClients() {
     Result<AnyMessage> message = Guarded("decoding", [&] { return Decode(incoming->parts[0].span()); });
     if (!message.ok()) {
       LogWarning("client plane: refused a message: " + message.status().message());
-      // A request that can be told by its id gets its answer, so that nobody waits for what will never come.
+      // A refused request whose id can be read gets an answer, so that nobody waits for it in vain.
       if (const std::optional<AnyMessage> refusal = RefusalOf(incoming->parts[0].span(), message.status())) {
         (void)clients.Send(incoming->identity, Encode(*refusal));
       }
@@ -222,7 +222,7 @@ void CoordinatorService::Impl::ReceiveFromClients() {
   }
 }
 
-// What cannot even be begun fails as if it had been.
+// A task that cannot be started fails like one that was started.
 void CoordinatorService::Impl::Perform(LoadDataset& action) {
   const auto load = [loader = catalogue.at(action.name), action] {
     const std::string barrier = "dataset \"" + action.name + "\" could not be loaded";

@@ -1,8 +1,8 @@
 // CoordinatorService: runs a FrameMachine over ZeroMQ. Binds the client, control and slabs planes, loads datasets, serves voxels.
 //
 // Threads: one owns the client and control sockets and runs the machine; one owns the slabs socket, cuts and packs chunks; one plans; one
-// counts occupied voxels; each dataset that is being loaded has one, kLoadsAtOnce at a time. None of them waits for another one, and what
-// one of them throws fails what it was doing: a frame, a load, a count, a chunk. If the machine's own thread throws, open requests fail
+// counts occupied voxels; each dataset that is being loaded has one, kLoadsAtOnce at a time. None of them waits for another one. An
+// exception in one fails only what it was doing: a frame, a load, a count, a chunk. If the machine's own thread throws, open requests fail
 // with the reason and the service stops.
 #pragma once
 
@@ -19,7 +19,7 @@
 
 namespace slabstream {
 
-// What the planning and the counting thread call. Tests put others in their place, which fail or wait.
+// Called by the planning and the counting thread. Tests replace them by functions that fail or wait.
 using CountFunction = std::function<OccupancyGrid(const VoxelBricks&, const ClassificationTable&)>;
 using PlanFunction = std::function<Result<std::shared_ptr<const PlannedFrame>>(Planner&, const PlanRequest&)>;
 
@@ -28,9 +28,9 @@ struct CoordinatorOptions {
   std::string worker_endpoint;  // bound; empty: WorkerEndpointFor(client_endpoint)
   std::string slabs_endpoint;   // bound; empty: any port, ".slabs" beside an ipc path or inproc name
   Catalogue catalogue;          // name -> how to load it
-  Codec codec = Codec::kRaw;    // of voxels on their way to workers; zstd pays where the link is slower than it packs
+  Codec codec = Codec::kRaw;    // of voxels on their way to workers; zstd pays if the link is slower than packing
   CoordinatorConfig machine;    // epoch, pid, slabs_endpoint and datasets are filled in by Start
-  PlannerConfig planner;        // surroundings, but for the link, are filled in by Start
+  PlannerConfig planner;        // surroundings, except the link, are filled in by Start
   PlanFunction make_plan = &Planner::Plan;
   CountFunction count_occupied = CountOccupied;
 };

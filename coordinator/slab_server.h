@@ -2,7 +2,7 @@
 // volumes.
 //
 // It keeps no state about workers: each request is the credit for one answer of at most kChunkBytes. A request that cannot be met is
-// refused with a reason. Chunks go out packed, but raw over inproc, where those of a whole volume are its own memory.
+// refused with a reason. Chunks go out packed, except over inproc: they are raw there, and those of a whole volume refer to its own memory.
 #pragma once
 
 #include <map>
@@ -21,7 +21,7 @@ namespace slabstream {
 
 class SlabServer {
  public:
-  // The voxels of a dataset: a whole volume, or bricks where those take much less memory. One of the two, or neither.
+  // The voxels of a dataset: a whole volume, or bricks if they take much less memory. One of the two, or neither.
   struct Samples {
     std::shared_ptr<const Volume> volume = nullptr;
     std::shared_ptr<const BrickedVoxels> bricks = nullptr;
@@ -37,7 +37,7 @@ class SlabServer {
 
   const std::string& endpoint() const { return endpoint_; }
 
-  // From any thread; once an id. They are served until the server ends.
+  // From any thread; once for each id. They are served until the server ends.
   void Publish(DatasetId dataset, Samples samples);
   Samples Find(DatasetId dataset);  // from any thread; neither: not published
 

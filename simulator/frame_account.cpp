@@ -5,7 +5,7 @@
 namespace slabstream {
 namespace {
 
-// Of the parts of [begin, end) that the intervals cover.
+// The seconds of [begin, end) that the intervals cover.
 double CoveredSeconds(std::vector<std::pair<double, double>> intervals, double begin, double end) {
   std::sort(intervals.begin(), intervals.end());
   double covered = 0, reached = begin;

@@ -43,7 +43,7 @@ WorkerMachine MakeWorker(std::uint32_t index) {
   WorkerConfig config;
   config.incarnation = index + 1;
   config.images_endpoint = std::to_string(index);
-  config.cache_bytes = 0;  // voxels are fetched or not as the costs say, never because a frame before had them
+  config.cache_bytes = 0;  // costs alone say whether voxels are fetched, whatever earlier frames had
   config.credit_bytes = ~std::uint64_t{0} >> 1U;
   config.register_interval = config.chunk_timeout = kNever;
   config.early_image_bytes = ~std::uint64_t{0} >> 1U;
@@ -70,7 +70,7 @@ FramePlan PlanForMachines(const FramePlan& plan, std::uint32_t frame, const std:
   return out;
 }
 
-// What a message shows, in place of its pixels.
+// The number of filled pixels, in place of a message's pixels.
 Bytes Note(double filled) {
   std::vector<std::byte> note(sizeof(filled));
   std::memcpy(note.data(), &filled, sizeof(filled));
@@ -190,7 +190,7 @@ void FrameSimulation::Perform(ToWorker& action) {
   const double arrival = CoordinatorSends();
   const auto* assignment = std::get_if<GroupAssignment>(&action.message);
   if (assignment != nullptr) BeginGroup(*assignment);
-  // What a ping tells is of no consequence for any time.
+  // Pings do not change any time.
   queue_.At(assignment != nullptr ? threads_.Begin(Threads::Machine(worker), arrival) : arrival,
             [this, worker, message = std::move(action.message)]() mutable {
               StepWorker(worker, MessageReceived{std::move(message), {}});
@@ -229,7 +229,7 @@ void FrameSimulation::Perform(const PlanRequest& action) {
   });
 }
 
-// The first of its messages is sent.
+// The first assignment of a group begins it.
 void FrameSimulation::BeginGroup(const GroupAssignment& assignment) {
   const std::uint32_t number = assignment.setup.dataset - 1;
   frame_of_[assignment.key.frame] = number;
@@ -342,7 +342,7 @@ void FrameSimulation::Perform(Index worker, SendPartial& action) {
   const UnionCoverage::Amount amount = group.coverage.Of(action.message.interval, action.message.pixels);
   const CombiningCosts& costs = machine_.combining;
   task.seconds = costs.scan_pixel * amount.scanned + costs.encode_pixel * amount.filled;
-  // A lent image is told of by the thread that owns the sockets where that is quicker, as workers do.
+  // The thread that owns the sockets announces a lent image itself if that is quicker, as in workers.
   task.direct = costs.lent && lanes_.Idle(worker, Lane::kCombine);
   if (unused_parcels_.empty()) unused_parcels_.push_back(&parcels_.emplace_back());
   Parcel* parcel = unused_parcels_.back();
@@ -379,7 +379,7 @@ void FrameSimulation::OnDone(LaneTask& task) {
   if (options_.keep_spans)
     timeline_.spans.push_back({task.frame, task.group, task.worker, LaneOf(task.work), task.rank, stage, task.begin, now()});
   if (task.work == Work::kRender) render_seconds_ += now() - task.begin;
-  if (task.direct) return task.then();  // what the thread that owns the sockets does itself it knows
+  if (task.direct) return task.then();  // the thread that owns the sockets did it itself
   queue_.At(threads_.Begin(Threads::Machine(task.worker), now()), std::move(task.then));
 }
 

@@ -1,9 +1,9 @@
 // FrameSimulation: the event loop behind SimulateFrames. It runs one FrameMachine and as many WorkerMachines in virtual time, as the
 // service does with threads and sockets, and carries out their actions with costs in place of pixels. One object runs once.
 //
-// Whatever happens is an event at a time: a message arrives, or a task of a worker's thread ends. The machine that it concerns takes one
-// step, and its actions become messages and tasks. Plans are given: the coordinator's question for a plan is answered with one of them.
-// Nothing fails here, so the machines have nothing to do by themselves: heartbeats and time-outs are set beyond the end of the run.
+// Everything that happens is an event at a time: a message arrives, or a task of a worker's thread ends. The machine concerned takes one
+// step, and its actions become messages and tasks. Plans are given: each PlanRequest is answered with one of them. Nothing fails here, so
+// the machines do nothing by themselves: heartbeats and time-outs are set beyond the end of the run.
 #pragma once
 
 #include <cstdint>
@@ -45,7 +45,7 @@ class FrameSimulation {
     PartialImage image;
   };
   struct Frame {
-    std::map<std::uint32_t, Group> groups;  // handed out, and not done as the coordinator knows
+    std::map<std::uint32_t, Group> groups;  // handed out, and not done as far as the coordinator knows
     FrameAccount account;                   // from its plan until its picture is received
   };
 
@@ -115,7 +115,7 @@ class FrameSimulation {
   std::uint32_t submitted_ = 0, planned_ = 0;  // frames
   std::map<FrameId, std::uint32_t> frame_of_;
   std::map<std::uint32_t, Frame> frames_;  // that are under way
-  std::deque<Parcel> parcels_;             // a direct send of p ranks has p^2 of them under way: they are kept for the next ones
+  std::deque<Parcel> parcels_;             // a direct send of p ranks has p^2 of them under way: they are used again
   std::vector<Parcel*> unused_parcels_;
   double render_seconds_ = 0;
   Timeline timeline_;

@@ -1,14 +1,14 @@
 // SimulateFrames: frame plans in virtual time, on any machine. Pure and deterministic.
 //
 // The coordinator's FrameMachine and a WorkerMachine for each worker decide everything, as in the service: the window, who renders what
-// when, which step of a schedule is taken, in which order groups are accumulated. What they start takes the time that the machine model and
-// the costs of boxes say. A worker has three lanes: one renders, one combines and encodes, one makes pictures; each does one task after the
-// other. Left out: nothing is lost, nothing is hidden by groups in front (box costs are those of boxes alone), one client asks for the
-// frames, previews travel for free.
+// when, which step of a schedule is taken, in which order groups are accumulated. What they start takes the time given by the machine model
+// and the costs of boxes. A worker has three lanes: one renders, one combines and encodes, one makes pictures; each does one task after the
+// other. Simplifications: nothing is lost, nothing is hidden by groups in front (box costs are those of boxes alone), one client asks for
+// the frames, previews travel for free.
 //
-// How many pixels of a range an image of several ranks fills: of each tile of 16 x 16 pixels the ranks' shares count as if they were
-// independent, 1 - prod(1 - share). The truth lies between their maximum and their sum; where tiles are full or empty all three agree. Runs
-// in a message: one for each row and each unbroken stretch of tiles that are not empty.
+// An image of several ranks fills this share of a range: in each tile of 16 x 16 pixels the ranks' shares count as independent, 1 - prod(1
+// - share). The truth lies between their maximum and their sum; in full or empty tiles all three agree. A message has one run for each row
+// and each unbroken stretch of tiles that are not empty.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@
 
 namespace slabstream {
 
-// What one box costs and gives, under one view.
+// The cost and the image of one box, in one view.
 struct RenderCost {
   double seconds = 0;                     // of one thread of a worker of speed 1
   const CoverageMap* coverage = nullptr;  // of its image, in the frame's grid; null: it shows nothing

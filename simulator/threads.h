@@ -1,5 +1,5 @@
-// Threads: when a thread begins with what it is handed, in virtual time. One that has been at work a moment ago is quick; one that has
-// slept must be woken, on a core that may sleep, too, and finds its data out of the caches (HandOvers).
+// Threads: when a thread begins with what it is handed, in virtual time. One that was at work a moment ago is quick; one that sleeps must
+// be woken, on a core that may sleep, too, and finds its data out of the caches (HandOvers).
 #pragma once
 
 #include <cstddef>
@@ -14,8 +14,7 @@ namespace slabstream {
 class Threads {
  public:
   using Id = std::size_t;
-  // Of the client; of the coordinator, which plans on a thread of its own; of each worker: the thread that owns its sockets, and those of
-  // its lanes.
+  // The threads: the client's; the coordinator's, and its planner's; each worker's: the one that owns its sockets, and those of its lanes.
   static constexpr Id kClient = 0, kCoordinator = 1, kPlanner = 2;
   static Id Machine(std::uint32_t worker) { return 3 + 4 * Id{worker}; }
   static Id Of(std::uint32_t worker, Lane lane) { return Machine(worker) + 1 + Id(lane); }

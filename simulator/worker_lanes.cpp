@@ -70,7 +70,7 @@ std::optional<LaneTask> WorkerLanes::Step() {
   threads_.Active(task.direct ? Threads::Machine(task.worker) : Threads::Of(task.worker, lane), done.time);
   LaneState& state = workers_[task.worker][std::size_t(lane)];
   state.taken = !state.waiting.empty();
-  if (state.taken) {  // what waits in a lane's own queue need not be handed over any more
+  if (state.taken) {  // a task in a lane's own queue needs no hand-over
     LaneTask next = std::move(state.waiting.front());
     state.waiting.pop_front();
     Begin(std::move(next), done.time);
@@ -84,7 +84,7 @@ void WorkerLanes::HandOver(LaneTask task, double now) {
   starts_.push({begin, hand_overs_++, std::move(task)});
 }
 
-// All threads but the first are of no help for a part of the work.
+// Only the first thread does the serial share of the work.
 void WorkerLanes::Begin(LaneTask task, double now) {
   task.begin = now;
   const double seconds = task.seconds * (1 + (task.threads - 1) * machine_.serial_share) / task.threads / SpeedOf(task.worker);
@@ -97,7 +97,7 @@ double WorkerLanes::SpeedOf(std::uint32_t worker) const {
   return machine_.speeds.empty() ? 1 : machine_.speeds[worker % machine_.speeds.size()];
 }
 
-// A function of seed, frame and worker, whatever else happens.
+// Depends on seed, frame and worker alone.
 double WorkerLanes::Slowness(std::uint32_t frame, std::uint32_t worker) const {
   const Stragglers& stragglers = machine_.stragglers;
   if (stragglers.probability <= 0) return 1;

@@ -27,11 +27,11 @@ Stage StageOf(Work work);  // kRender, kEncode, kCombine or kResolve
 struct LaneTask {
   Work work = Work::kRender;
   std::uint32_t frame = 0, group = 0;
-  std::uint32_t worker = 0;    // that does it
-  Rank rank = 0;               // for whom it is done
+  std::uint32_t worker = 0;    // the worker that does it
+  Rank rank = 0;               // the rank that it is done for
   double seconds = 0;          // of one thread of a worker of speed 1
-  double threads = 1;          // that do it together
-  bool direct = false;         // by the thread that orders it: nothing is handed over
+  double threads = 1;          // threads that do it together
+  bool direct = false;         // done by the thread that orders it: nothing is handed over
   double begin = 0;            // once it has begun
   std::function<void()> then;  // called when the thread that ordered it knows that it is done
 };
@@ -47,7 +47,7 @@ class WorkerLanes {
 
   // When a task begins or ends next if none is added before: infinity if none is under way.
   double NextTime();
-  // Carries that out; the task that ends, if one does. NextTime() must be finite.
+  // Carries that out; returns the task that ends, if one does. NextTime() must be finite.
   std::optional<LaneTask> Step();
 
  private:

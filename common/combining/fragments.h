@@ -74,8 +74,8 @@ class Fragments {
     }
   }
 
-  // Adds a fragment to what is held. Where nothing is held it is taken as it is; elsewhere merge(held, value) says what both become.
-  // False if merge returns nothing; the pixels from there on are then lost.
+  // Adds a fragment. Where nothing is held, it is stored as it is; elsewhere merge(held, value) returns the combined value. False if merge
+  // returns nothing; the pixels from there on are then lost.
   template <class Merge>
   bool Combine(const Fragment<Value>& fragment, Merge&& merge) {
     std::uint64_t next = fragment.pixels.begin;  // pixels before it are done

@@ -20,7 +20,7 @@ struct ScheduleName {
   friend bool operator==(const ScheduleName&, const ScheduleName&) = default;
 };
 
-// InvalidArgument: an unknown scheme, wrong arguments of it, too many ranks, or a root that is no rank.
+// InvalidArgument: an unknown scheme, wrong arguments, too many ranks, or a root that is no rank.
 Status CheckScheduleName(const ScheduleName& name);
 
 // A schedule and, for each rank, the steps that it sends or receives. Immutable.
@@ -44,7 +44,7 @@ class IndexedSchedule {
 using SharedSchedule = std::shared_ptr<const IndexedSchedule>;
 
 // The schedule of that name over all pixels of a frame. Errors: as CheckScheduleName. Groups and frames repeat names, and a process may
-// hold many workers, so the last schedules are kept and shared (at most kMaxSteps steps of them, and the last one). Any thread may call.
+// hold many workers, so recent schedules are kept and shared: at most kMaxSteps steps, but always the latest one. Any thread may call.
 Result<SharedSchedule> DeriveSchedule(const ScheduleName& name, PixelRange frame);
 
 }  // namespace slabstream

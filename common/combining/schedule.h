@@ -1,10 +1,10 @@
-// Schedule: how the images of a group's ranks become one, as data. What runs it does not know which family made it.
+// Schedule: how the images of a group's ranks become one, as data. The code that runs it does not know which family made it.
 //
 // Ranks 0 ... ranks-1 hold one image each, in visibility order, nearest first. A step moves the pixels of `pixels` that `from` holds at
-// that time to `to`. If `to` holds these pixels too, the two are combined: their rank intervals must be adjacent, and `to` then holds the
-// union; if it does not, it takes them as they are. `from` no longer holds them. Steps of one round may run at the same time, so those of
-// one rank concern disjoint pixels; a rank takes its own steps in order of rounds. At the end `root` holds [0, ranks) of all pixels. A
-// group without images has ranks == 0 and no steps. Plans and messages name schedules (named_schedule.h).
+// that time to `to`; `from` no longer holds them. If `to` holds these pixels too, the two are combined: their rank intervals must be
+// adjacent, and `to` then holds the union. Else `to` takes the pixels as they are. Steps of one round may run at the same time, so those of
+// one rank have disjoint pixels; a rank takes its own steps in order of rounds. At the end `root` holds [0, ranks) of all pixels. A group
+// without images has ranks == 0 and no steps. Plans and messages name schedules (named_schedule.h).
 #pragma once
 
 #include <algorithm>
@@ -51,25 +51,24 @@ struct Schedule {
 
 struct ScheduleRequest {
   Rank ranks = 1;
-  Rank root = 0;      // who holds the result
+  Rank root = 0;      // rank that holds the result
   PixelRange pixels;  // of the whole frame
 };
 
 // The families. Any number of ranks, any root; steps of no pixels are left out.
 
-// Both ends send towards the root, each rank what it has got combined with its own, strip after strip: a rank passes one strip on while the
-// next one comes in (the paper's pipeline). `strips` >= 1.
+// Both ends send towards the root, strip after strip. Each rank combines what it receives with its own pixels and passes a strip on while
+// the next one comes in (the paper's pipeline). `strips` >= 1.
 Schedule MakeChain(const ScheduleRequest& request, std::uint32_t strips);
 
-// A tree in which k neighbouring intervals meet at one rank; the ranks that meet are those that hold the root or come first in an interval.
-// k = 2 is the paper's fan-in, k >= ranks the centralized scheme (Yagel and Machiraju, section 2.1, figures 3c and 3a). `strips` >= 1 as
-// above. k >= 2.
+// A tree (k >= 2): k neighbouring intervals meet at one rank. The root stands for the interval that it lies in; else the first rank does. k
+// = 2 is the paper's fan-in, k >= ranks the centralized scheme (Yagel and Machiraju, section 2.1, figures 3c and 3a). `strips` as above.
 Schedule MakeTree(const ScheduleRequest& request, std::uint32_t k, std::uint32_t strips);
 
-// Radix-k (Peterka et al. 2009): in round i ranks meet in groups of factors[i] and each takes one share of the pixels that the group holds,
-// from all others of it; then the root collects all shares. All factors 2 is binary swap (recursive halving), one factor of `ranks` is
-// direct send. Factors are used in order as far as ranks and kMaxSteps allow, the last one reduced to what they allow. Where their product
-// is less than `ranks`, neighbours fold their images into one first.
+// Radix-k (Peterka et al. 2009): in round i ranks meet in groups of factors[i], and each takes one share of the group's pixels from all
+// others; then the root collects all shares. All factors 2 is binary swap (recursive halving), one factor of `ranks` is direct send.
+// Factors are used in order as far as ranks and kMaxSteps allow, and the last one is reduced to fit. If their product is less than `ranks`,
+// neighbours first fold their images into one.
 Schedule MakeSwap(const ScheduleRequest& request, std::span<const std::uint32_t> factors);
 
 // Factors of at most 8 whose product is the largest that is not above `ranks`.

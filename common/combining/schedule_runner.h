@@ -1,6 +1,6 @@
 // ScheduleRunner<Value>: runs a schedule at some of its ranks, or at all. It says which step comes next (StepOrder) and keeps what each of
-// these ranks holds. What a value is, and what two of them become, is the caller's: images in the worker, intervals of ranks where a
-// schedule is checked, covered pixels where one is simulated.
+// these ranks holds. The caller defines values and how two of them merge: images in the worker, intervals of ranks where a schedule is
+// checked, covered pixels where one is simulated.
 //
 // The caller merges what a kMove or kReceive brings into held(to). Nothing here knows which family made the schedule.
 #pragma once
@@ -46,7 +46,7 @@ class ScheduleRunner {
     StepOrder::Kind kind = StepOrder::Kind::kSend;
     std::uint32_t index = 0;
     const Step* step = nullptr;
-    Parts parts;  // kSend, kMove: what `from` held of the step's pixels, no longer there. It may be less than the step's pixels.
+    Parts parts;  // kSend, kMove: what `from` held of the step's pixels, perhaps not all; now removed from it
   };
   std::optional<Taken> TakeNext() {
     const std::optional<StepOrder::Taken> next = order_.TakeNext();

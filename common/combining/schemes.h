@@ -27,7 +27,7 @@ struct CombiningEntry {
   std::string_view name;
   std::string_view purpose;      // one line for --help
   std::string_view arguments;    // what may follow "NAME:", for --help and errors; empty: nothing may
-  std::size_t most_factors = 0;  // that it takes
+  std::size_t most_factors = 0;  // most factors that it takes
   bool takes_strips = false;
   Schedule (*make)(const ScheduleRequest&, const CombiningArguments&);  // any arguments that the entry takes
 };

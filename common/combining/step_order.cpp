@@ -93,7 +93,7 @@ bool StepOrder::Awaited(std::uint32_t step) const {
   return turn && turns_[*turn].partner == kElsewhere && !turns_[*turn].taken;
 }
 
-// Puts the turn where TakeNext looks, if nothing but its ranks themselves stands in its way.
+// Offers the turn to TakeNext if it waits only for its ranks to be free.
 void StepOrder::Offer(std::uint32_t index) {
   const Turn& turn = turns_[index];
   if (turn.taken || turn.waits > 0) return;
@@ -107,7 +107,7 @@ void StepOrder::Offer(std::uint32_t index) {
   changed_.insert(turn.rank);
 }
 
-// The turn is taken: those that wait for it wait for one less.
+// Marks the turn as taken; those that wait for it wait for one less.
 void StepOrder::Close(std::uint32_t index) {
   turns_[index].taken = true;
   ranks_[turns_[index].rank].possible.erase(index);

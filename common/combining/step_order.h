@@ -17,14 +17,14 @@ namespace slabstream {
 
 class StepOrder {
  public:
-  // `ranks`: those that are here, ascending, below the schedule's.
+  // `ranks`: the ranks here, ascending, all below the schedule's number of ranks.
   StepOrder(SharedSchedule schedule, std::vector<Rank> ranks);
 
   const IndexedSchedule& schedule() const { return *schedule_; }
   const std::vector<Rank>& ranks() const { return numbers_; }
   bool Here(Rank rank) const { return FindRank(rank).has_value(); }
 
-  // All ranks below are here.
+  // The functions below take ranks that are here.
   void OnRendered(Rank rank);
   void OnCombineStarted(Rank rank) { ++At(rank).combining; }
   void OnCombined(Rank rank);
@@ -54,7 +54,7 @@ class StepOrder {
     std::uint32_t step = 0;
     std::uint32_t rank = 0;              // index into ranks_
     std::uint32_t partner = kElsewhere;  // the other rank's turn, if that rank is here too
-    std::uint32_t waits = 0;             // for so many earlier turns of the rank
+    std::uint32_t waits = 0;             // number of earlier turns of the rank to wait for
     std::uint64_t arrived = 0;           // pixels, of a step from elsewhere
     bool untaken = false;                // some of them are not taken
     bool taken = false;
@@ -64,7 +64,7 @@ class StepOrder {
     std::uint32_t open_steps = 0;
     std::uint32_t combining = 0;
     bool rendered = false;
-    std::set<std::uint32_t> possible;  // turns that wait for nothing but that their ranks are free
+    std::set<std::uint32_t> possible;  // turns that wait only for their ranks to be free
     bool free() const { return rendered && combining == 0; }
   };
 

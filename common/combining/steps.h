@@ -1,4 +1,4 @@
-// What the families of schedules are made with.
+// Building blocks of the families of schedules.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +13,8 @@ constexpr PixelRange Share(const PixelRange& pixels, std::uint64_t part, std::ui
   return {pixels.begin + size * part / parts, pixels.begin + size * (part + 1) / parts};
 }
 
-// An order in which member `to` of `count` neighbours takes something from all others so that what it holds stays one interval: from the
-// inside out. take(turn, from) for each; turns count from 0 and are the same for every `to`: no member is asked twice in a turn.
+// Calls take(turn, from) so that member `to` of `count` neighbours takes something from each of the others, from the inside out: what it
+// holds stays one interval. Turns count from 0, in step for every `to`: no member is asked twice in a turn.
 template <class Take>
 void ForEachInsideOut(std::uint32_t to, std::uint32_t count, Take&& take) {
   for (std::uint32_t distance = 1; distance < count; ++distance) {
@@ -24,8 +24,8 @@ void ForEachInsideOut(std::uint32_t to, std::uint32_t count, Take&& take) {
 }
 constexpr std::uint32_t InsideOutTurns(std::uint32_t count) { return count < 2 ? 0 : 2 * (count - 1); }
 
-// Each step of `schedule`, which move the same pixels, once for each of `strips` strips of them, which follow each other by a round. There
-// are fewer strips where the pixels or kMaxSteps are too few.
+// Splits each step of `schedule` into `strips` strips of its pixels, one round after the other; all steps move the same pixels. There are
+// fewer strips if there are too few pixels, or if kMaxSteps allows no more.
 Schedule InStrips(Schedule schedule, std::uint32_t strips);
 
 }  // namespace slabstream

@@ -7,8 +7,7 @@
 
 namespace slabstream {
 
-// How often pixels are passed on, at most over all pixels of the result: one after the other on the way of any one rank's colours, and
-// altogether.
+// How often a pixel of the result is passed on, at most: in sequence, on the way of any one rank's colours (hops), and in all (transfers).
 struct Travel {
   std::uint32_t hops = 0, transfers = 0;
   friend bool operator==(const Travel&, const Travel&) = default;

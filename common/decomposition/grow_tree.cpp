@@ -95,7 +95,7 @@ class TreeGrower {
     return number;
   }
 
-  // The root of `boxes` >= 1 boxes in `box`, which has room for them. `like`: the node of the pattern that tells how, if it does.
+  // Divides `box` into `boxes` >= 1 boxes, which it has room for; returns the root. `like`: the node of the pattern to follow, if any.
   std::uint32_t GrowBox(const Box& box, std::int64_t boxes, Run run, std::uint32_t like) {
     if (options_.cut_away_empty) {
       const Box hull = Hull(box);
@@ -116,7 +116,7 @@ class TreeGrower {
     if (first <= last) {
       position = std::clamp(position, first, last);
     } else {
-      // Too crowded to halve: as many as there is room for on either side.
+      // Too crowded to halve: each side takes as many as it has room for.
       position = std::clamp(position, box.begin[axis] + 1, box.end[axis] - 1);
       const std::int64_t lower_room = layer * (position - box.begin[axis]), upper_room = layer * (box.end[axis] - position);
       lower_boxes = std::clamp(lower_boxes, boxes - upper_room, lower_room);
@@ -128,7 +128,7 @@ class TreeGrower {
         [&](const Box& upper) { return GrowBox(upper, boxes - lower_boxes, upper_run, pattern ? pattern->upper : like); });
   }
 
-  // Whole groups stay together, as far as there are several.
+  // Keeps whole groups together if there are several.
   std::int64_t LowerHalf(std::int64_t boxes) const {
     const std::int64_t together = request_.together;
     return boxes > together && boxes % together == 0 ? boxes / together / 2 * together : boxes / 2;
@@ -143,7 +143,7 @@ class TreeGrower {
     return best;
   }
 
-  // What of `box` may own a sample: all work within the halo of it, and a halo around that. Sides where little would be cut off stay.
+  // The part of `box` that may own a sample: all work within the halo of it, and a halo around that. Sides that would lose little stay.
   Box Hull(const Box& box) const {
     const Box work = request_.work->Hull(Grown(box, request_.halo, bounds_));
     if (work.empty()) return {};

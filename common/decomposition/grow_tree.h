@@ -1,8 +1,8 @@
-// GrowTree: kd-trees by recursive bisection in proportion, which is how slabs, beams, subcubes and kd-trees are made alike.
+// GrowTree makes slabs, beams, subcubes and kd-trees alike: as kd-trees, by recursive bisection in proportion.
 //
-// A box that is to hold n boxes is cut across its longest side (of the axes allowed), so that floor(n / 2) and ceil(n / 2) of them get
-// their shares of the work; and so on with both parts. Cuts that follow one another along one axis are quantiles of the box that the first
-// of them cut: one rounding each, none adds up.
+// A box to be divided into n boxes is cut across its longest side (of the axes allowed), so that floor(n / 2) and ceil(n / 2) of them get
+// their shares of the work; both parts are divided likewise. Successive cuts along one axis are quantiles of the box that the first of them
+// cut: each is rounded once, and errors do not add up.
 #pragma once
 
 #include <array>
@@ -14,12 +14,12 @@
 
 namespace slabstream {
 
-// Thinner empty space stays with what is beside it: it costs its owner nothing to render, and a plane more than it saves.
+// Thinner empty space stays in its box: it costs nothing to render, and another plane costs more than it saves.
 inline constexpr std::int32_t kLeastCut = 4;  // voxels
 
 struct GrowOptions {
-  std::span<const Axis> axes;  // that may be cut; of equally long sides the first one is
-  // Slices along the first axis from which on it is cut, however long the other sides are.
+  std::span<const Axis> axes;  // axes that may be cut; of equally long sides, the first one is cut
+  // The first axis is cut as long as it has at least this many slices, however long the other sides are.
   std::int32_t first_axis_down_to = std::numeric_limits<std::int32_t>::max();
   bool cut_away_empty = false;
 };

@@ -12,7 +12,7 @@ Partition::Partition(const Box& bounds, std::vector<Node> nodes) : bounds_(bound
   const auto leaf_count = std::size_t(std::count_if(nodes_.begin(), nodes_.end(), [](const Node& node) { return node.leaf; }));
   boxes_.resize(leaf_count);
 
-  // Every plane cuts its box in two that are not empty, so the leaves tile the bounds if every node is reached once and every leaf has its
+  // Every plane cuts its box into two non-empty ones, so the leaves tile the bounds if every node is reached once and every leaf has its
   // own id.
   struct Visit {
     std::uint32_t node;

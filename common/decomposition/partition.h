@@ -1,5 +1,5 @@
-// Partition: a kd-tree whose leaves are half-open boxes that tile the volume. It answers "where are the boxes"; who owns them is another
-// question (Layout in common/planning/layout.h).
+// Partition: a kd-tree whose leaves are half-open boxes that tile the volume. It says where the boxes are; a Layout
+// (common/planning/layout.h) says who owns them.
 //
 // Leaves are numbered by a BoxId. For slabs the ids ascend along the axis.
 #pragma once

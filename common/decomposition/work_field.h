@@ -1,7 +1,7 @@
-// WorkField: how much work lies where in a volume, so that boxes of equal work can be cut.
+// WorkField: how work is distributed in a volume, so that boxes of equal work can be cut.
 //
-// Work is known by cells of an OccupancyGrid and taken as evenly spread within each of them. Sums over boxes come from a summed-volume
-// table (Crow, "Summed-area tables for texture mapping", 1984, in three dimensions), so a box of any size costs the same to ask about.
+// Work is known for each cell of an OccupancyGrid and assumed to be even within a cell. Sums over boxes come from a summed-volume table
+// (Crow, "Summed-area tables for texture mapping", 1984, in three dimensions), so a lookup takes the same time for a box of any size.
 // Values, immutable.
 #pragma once
 
@@ -12,9 +12,9 @@
 
 namespace slabstream {
 
-// Work of every cell of the grid, as far as what is occupied tells: an occupied voxel is 1, and a cell that has any kCellWork more. Voxels
-// are shaded and filtered one by one, but rows of pixels are composited in segments, however little of them is covered: over five volumes
-// and all decompositions, splatting took as long for a touched cell as for some 600 voxels (bench/balance_bench).
+// Work of every cell of the grid, estimated from occupied voxels: 1 for each, and kCellWork more for a cell that has any. Voxels are shaded
+// and filtered one by one, but rows of pixels are composited in segments, however little of them is covered: over five volumes and all
+// decompositions, splatting took as long for a touched cell as for some 600 voxels (bench/balance_bench).
 inline constexpr double kCellWork = 512;
 std::vector<double> CellWork(const OccupancyGrid& grid);
 
@@ -33,7 +33,7 @@ class WorkField {
   // Work in `box`, which is cut to the volume and may be empty.
   double Sum(const Box& box) const;
 
-  // The smallest box of cells, cut to `box`, that holds all work of `box`; empty if there is none. All of it where work is uniform.
+  // The smallest box of cells, cut to `box`, that holds all work of `box`; empty if there is none. All of `box` if work is uniform.
   Box Hull(const Box& box) const;
 
  private:
@@ -44,13 +44,13 @@ class WorkField {
 
   Index3 size_;
   Index3 corners_;            // cells + 1
-  double step_ = 1;           // work of one
+  double step_ = 1;           // work of one step
   std::vector<double> sums_;  // steps before a corner of cells, [z][y][x]: whole numbers, so that sums are exact
 };
 
-// The first index p of the upper part where the plane `axis = p` cuts `box` in the proportion part : whole - part, 0 < part < whole, by
-// work (by voxels where the box holds no work): strictly inside the box, which has two slices or more. The plane nearest to it; where work
-// is uniform rounded down, so that slab i of n begins at slice i * slices / n.
+// The plane `axis = p` that divides the work of `box` (its voxels if it holds no work) most nearly in the proportion part : whole - part,
+// 0 < part < whole. p is the first index of the upper part and lies strictly inside the box, which has two slices or more. If work is
+// uniform, p is rounded down, so that slab i of n begins at slice i * slices / n.
 std::int32_t PlaneAt(const WorkField& work, const Box& box, Axis axis, std::int64_t part, std::int64_t whole);
 
 }  // namespace slabstream

@@ -1,4 +1,4 @@
-// FrameRequest: one picture, as a client asks for it. Policy: how the service is to make it; it can never change the picture.
+// FrameRequest: one picture, as a client asks for it. Policy: how the service should make it; it never changes the picture.
 #pragma once
 
 #include <cstdint>
@@ -21,21 +21,21 @@ inline constexpr double kMaxPixelError = 0.1;
 inline constexpr std::size_t kMaxNameBytes = 256;
 
 // kAuto: z, or the longest axis of slabs (SlabAxis), so that turning the view never moves voxels. kView: the axis along which the slices of
-// the frame are traversed, so that no slice is divided; each of the three axes has a layout of its own, whose voxels workers fetch when a
+// the frame are traversed, so that no slice is divided. Each of the three axes then has its own layout; workers fetch its voxels when a
 // view first needs it.
 enum class AxisChoice : std::uint8_t { kX = 0, kY = 1, kZ = 2, kAuto = 3, kView = 4 };
 
 struct Policy {
-  std::string decomposition = "slab";  // a name of Decompositions(), or "auto" (kAutomatic), as the other names
+  std::string decomposition = "slab";  // a name of Decompositions(), or "auto" (kAutomatic), like the other names
   std::string split = "auto";          // of WorkSplits(): what boxes have equal shares of
   AxisChoice axis = AxisChoice::kAuto;
   int groups = 0;                     // [1, kMaxGroups]; 0: the planner chooses
   std::string assignment = "cyclic";  // of Assignments(), or "auto": who owns which box
-  std::string balance = "static";     // of BalanceModes(): whether boxes change while frames go by
+  std::string balance = "static";     // of BalanceModes(): whether boxes change between frames
   std::string combine = "fan-in";     // a scheme with its arguments (common/combining/schemes.h), or "auto"
-  // How far a channel of the picture may be moved by sending colours in fewer bits between workers: [0, kMaxPixelError]; 0: not at all.
+  // How much a channel of the picture may change because workers send colours in fewer bits: [0, kMaxPixelError]; 0: not at all.
   double pixel_error = 0;
-  int teams = 1;  // [1, kMaxTeams]: that frames go to in turn (common/planning/team.h); 1: all workers share every frame
+  int teams = 1;  // [1, kMaxTeams]: render frames in turn (common/planning/team.h); 1: all workers share every frame
   friend bool operator==(const Policy&, const Policy&) = default;
 };
 
@@ -46,7 +46,7 @@ struct TransferChoice {
   friend bool operator==(const TransferChoice&, const TransferChoice&) = default;
 };
 
-// Values of a renderer's parameters (RendererKind::parameters), by name, as a user types them. What is left out has its default.
+// Values of a renderer's parameters (RendererKind::parameters), by name, as a user types them. Missing ones have their defaults.
 using ParameterTexts = std::map<std::string, std::string, std::less<>>;
 inline constexpr std::size_t kMaxParameters = 32;
 inline constexpr std::string_view kDefaultRenderer = "splat";

@@ -28,7 +28,7 @@ struct Extent {
 };
 
 // A box owns samples between its planes, and on the volume's rim those that footprints reach. Rows and columns are monotonic functions of
-// slice and voxel, so that the box's corners bound them.
+// slice and voxel, so the box's corners bound them.
 void AddSlices(const Box& box, const FrameSetup& setup, Extent& extent) {
   const auto [c, u, v] = AxesOf(setup.camera.traversal_axis);
   for (const std::int32_t k : {box.begin[c], box.end[c] - 1}) {

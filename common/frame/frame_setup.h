@@ -1,5 +1,5 @@
 // FrameSetup: what every worker needs to render its part of a frame. It is made once a frame (MakeFrameSetup, common/planning) and never
-// changes: a new plan after a lost worker changes who does what, and nothing here.
+// changes: a new plan after the loss of a worker changes only who does what.
 #pragma once
 
 #include <cstdint>

@@ -35,7 +35,7 @@ std::vector<std::uint32_t> AssignGreedy(const AssignmentRequest& request) {
   std::iota(costliest_first.begin(), costliest_first.end(), std::size_t{0});
   std::stable_sort(costliest_first.begin(), costliest_first.end(),
                    [&](std::size_t a, std::size_t b) { return request.costs[a] > request.costs[b]; });
-  // What slots have to do: time, boxes, number; least first. Boxes, so that those that cost nothing are spread, too.
+  // Load of a slot: time, number of boxes, slot; least first. The number of boxes spreads boxes that cost nothing.
   using Load = std::tuple<double, std::uint32_t, std::uint32_t>;
   std::priority_queue<Load, std::vector<Load>, std::greater<>> loads;
   for (std::uint32_t slot = 0; slot < request.slots; ++slot) loads.push({0, 0, slot});

@@ -1,4 +1,4 @@
-// Assignments: which slot owns which box. Each is one line in Assignments(). Where boxes are is another question (Decompositions()).
+// Assignments: which slot owns which box. Each is one line in Assignments(). Decompositions() decide where the boxes are.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ struct AssignmentEntry {
   std::string_view name;                                           // what --assignment takes
   std::string_view purpose;                                        // one line for --help
   std::vector<std::uint32_t> (*assign)(const AssignmentRequest&);  // by box: its slot, in [0, slots)
-  bool by_cost = false;                                            // it looks at costs: the better they are known, the better it is
+  bool by_cost = false;                                            // it uses costs: the better they are known, the better it is
 };
 
 // The only list.
@@ -25,10 +25,10 @@ const std::vector<AssignmentEntry>& Assignments();
 
 // Box i belongs to slot i mod slots.
 std::vector<std::uint32_t> AssignCyclic(const AssignmentRequest& request);
-// Boxes that follow one another belong to one slot; numbers differ by at most one.
+// Each slot owns consecutive boxes; the numbers of boxes of two slots differ by at most one.
 std::vector<std::uint32_t> AssignContiguous(const AssignmentRequest& request);
-// The costliest box that is left goes to the slot that has least to do (longest processing time first: Graham, "Bounds on multiprocessing
-// timing anomalies", 1969: at most 4/3 of the best there is). Equal ones in the order of boxes and slots.
+// Takes boxes in descending order of cost and gives each to the slot with the least cost so far (longest processing time first: Graham,
+// "Bounds on multiprocessing timing anomalies", 1969: at most 4/3 of the optimum). Ties go in the order of boxes and slots.
 std::vector<std::uint32_t> AssignGreedy(const AssignmentRequest& request);
 
 }  // namespace slabstream

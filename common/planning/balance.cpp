@@ -59,7 +59,7 @@ Layout HandOver(const Layout& layout, std::uint32_t slots, std::span<const doubl
   std::vector<double> sums = SlotSeconds(layout, slots, seconds);
   for (std::size_t moves = 0; moves < seconds.size(); ++moves) {
     const auto most = std::max_element(sums.begin(), sums.end()), least = std::min_element(sums.begin(), sums.end());
-    // The box that leaves the two of them most alike; it must take less than what is between them.
+    // The box that makes the two slots most alike; it must take less than their difference.
     const double half = (*most - *least) / 2;
     std::optional<std::size_t> best;
     for (std::size_t box = 0; box < seconds.size(); ++box) {

@@ -1,9 +1,9 @@
-// Dynamic balance: whether a layout should change between two frames, given what rendering costs where. Pure.
+// Dynamic balance: whether a layout should change between two frames, given the cost of each part of the volume. Pure.
 //
-// Three changes are weighed. Boxes stay, and some are handed over from slots that have much to do to slots that have little; or they are
-// resized at equal learnt cost; or they are cut anew, where that is predicted to be better by far: of boxes that are quite different what
-// was learnt tells little. A change moves voxels: of every box, with its halo, what its slot did not hold before travels to it. It is
-// made if the frames to come win more time than that takes, and a share of the frame's time that noise alone would hardly pretend.
+// Rebalance weighs three changes: hand boxes over from busy slots to others; resize the boxes to equal measured cost; or cut the volume
+// anew if that is predicted to be much better, since measured costs say little about quite different boxes. A change moves voxels: a slot
+// receives the voxels of its boxes, with halo, that it did not hold before. A change is made if it saves the coming frames more time than
+// the move takes, and saves a larger share of the frame's time than noise is likely to fake.
 #pragma once
 
 #include <cstdint>
@@ -16,28 +16,28 @@
 namespace slabstream {
 
 struct BalanceTerms {
-  double bytes_per_second = 5e8;  // at which voxels reach their new owners and are made ready to be rendered
-  double frames = 1000;           // over which a change must pay
-  double least_gain = 0.02;  // share of the frame's render time that a change must win; twice that after one frame, and so on (1 + 1/n)
-  double least_gain_of_new_boxes = 0.1;  // share of the frame's render time that boxes cut anew must win beside resized ones
+  double bytes_per_second = 5e8;         // rate at which voxels reach their new owners and are prepared for rendering
+  double frames = 1000;                  // number of frames within which a change must pay
+  double least_gain = 0.02;              // share of the frame's render time that a change must save; times 1 + 1/n after n frames
+  double least_gain_of_new_boxes = 0.1;  // share of the frame's render time that new boxes must save beyond resized ones
 };
 
-// What each box of a layout should take, by box, if cells cost what `cost` says; 0 of those that nobody renders.
+// Predicted seconds of each box, from the cost of cells in `cost`; 0 if nobody renders the box.
 std::vector<double> PredictedSeconds(const Layout& layout, const WorkField& cost);
 
-// Render time of a frame: of the slot that has most to do. `seconds` by box.
+// Render time of a frame: that of the busiest slot. `seconds` by box.
 double FrameSeconds(const Layout& layout, std::uint32_t slots, std::span<const double> seconds);
 
-// Voxels that slots must get to change over: those of their boxes in `to`, with halo, that none of their boxes in `from` holds. What
-// SlabFetcher (worker/slab_fetcher.h) asks for then.
+// Voxels that slots must receive to change over: of each box in `to`, with halo, those that no box of its slot in `from` holds. SlabFetcher
+// (worker/slab_fetcher.h) then requests exactly these.
 std::int64_t MovedVoxels(const Layout& from, const Layout& to);
 
-// The same boxes: from the slot with most to do one after the other goes to the slot with least, as long as that helps. `seconds` by box.
+// Keeps the boxes. Moves one after the other from the busiest slot to the least busy one, as long as that helps. `seconds` by box.
 Layout HandOver(const Layout& layout, std::uint32_t slots, std::span<const double> seconds);
 
-// The layout to change to, if any. `request` is what `now` was made for, with known.cost; `seconds`, what the boxes of `now` took in
-// `frames_seen` >= 1 frames. Like is compared with like: to hand over, by what boxes took; to cut anew, by what cells cost on either side,
-// for cells tell boxes apart no more finely than they are large.
+// The layout to change to, if any. `request` is what `now` was made for, with known.cost; `seconds` are the times of the boxes of `now` in
+// `frames_seen` >= 1 frames. Comparisons use one kind of time on both sides: measured times of boxes to hand over, costs of cells to cut
+// anew, because cells resolve boxes no more finely than they are large.
 std::optional<Layout> Rebalance(const Layout& now, std::span<const double> seconds, const LayoutRequest& request, int frames_seen,
                                 const BalanceTerms& terms = {});
 

@@ -1,7 +1,6 @@
-// BrickVisibility: whether a renderer may draw anything of a box of voxels. The ranges of values of the summary's bricks answer it, without
-// voxels.
+// BrickVisibility: whether a renderer may draw any voxel of a box. The value ranges of the summary's bricks tell; no voxels are needed.
 //
-// Rounding is on the safe side: a box that is called empty holds no voxel whose bin has an opacity above zero in the renderer's DrawnTable.
+// Rounding is conservative: a box that is called empty holds no voxel whose bin has an opacity above zero in the renderer's DrawnTable.
 #pragma once
 
 #include <vector>
@@ -20,7 +19,7 @@ class BrickVisibility {
   // True if a brick that touches `box` (not empty, inside the volume) can be visible.
   bool AnyVisible(const Box& box) const;
 
-  // All voxels of bricks that can be visible, as if each of them were: for who has counted none.
+  // Counts all voxels of bricks that can be visible as occupied: a substitute for an exact count.
   OccupancyGrid VisibleCells() const;
 
  private:
@@ -29,7 +28,7 @@ class BrickVisibility {
 
   const VolumeSummary& summary_;
   ClassificationTable table_;
-  std::vector<int> next_visible_;  // by bin: the lowest bin from it on with an opacity above zero; table_.size(): none
+  std::vector<int> next_visible_;  // by bin: the lowest bin at or above it with an opacity above zero; table_.size(): none
 };
 
 }  // namespace slabstream

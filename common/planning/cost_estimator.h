@@ -1,7 +1,7 @@
-// CostEstimator: the time that boxes of a volume take. Layouts, the choice of a policy and predicted frames all ask it.
+// CostEstimator: the time that boxes of a volume take, for layouts, the choice of a policy and predicted frames.
 //
-// Until frames have been measured, the renderer's analytic cost answers (AnalyticCost), for any view. Measured frames replace it by what
-// they taught about each part of the volume, on average over their views (LearntCost).
+// Without measured frames it returns the renderer's analytic cost (AnalyticCost) for the view. With them it returns the measured cost of
+// each part of the volume, an average over the frames' views (LearntCost).
 #pragma once
 
 #include <memory>
@@ -13,7 +13,7 @@ namespace slabstream {
 
 class CostEstimator {
  public:
-  // What is given must outlive this. `measured`: seconds, of earlier frames; null: none were.
+  // All arguments must outlive this. `measured`: seconds, from earlier frames; null: there are none.
   CostEstimator(const RendererKind& renderer, const CostBasis& basis, const WorkField* measured)
       : analytic_(renderer.MakeCost(basis)), measured_(measured) {}
 

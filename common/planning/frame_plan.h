@@ -20,9 +20,9 @@
 
 namespace slabstream {
 
-using WorkerId = std::uint32_t;  // an identity within one coordinator's life; never given twice. 0: nobody
+using WorkerId = std::uint32_t;  // unique within one coordinator's life, never reused. 0: nobody
 
-// One rank of a group: which box, and who renders it. A worker may hold several ranks of a group (after another one was lost).
+// One rank of a group: which box, and who renders it. After the loss of a worker, another one may hold several ranks of a group.
 struct Placement {
   BoxId id = 0;
   Box box;
@@ -33,14 +33,14 @@ struct Placement {
 struct GroupPlan {
   std::vector<Placement> placements;          // by rank, nearest first; boxes that show nothing are left out, so it may be empty
   ScheduleName schedule;                      // over these ranks
-  ColorCoding color = ColorCoding::kFloat32;  // of images between workers, where they are sent as runs
+  ColorCoding color = ColorCoding::kFloat32;  // coding of images that workers send as runs
   friend bool operator==(const GroupPlan&, const GroupPlan&) = default;
 };
 
-// Frames take turns. Where teams of workers share them out (common/planning/team.h), a plan is of one team's workers; of these, every
-// frame of the team has another one as its display worker, so that no one makes all pictures.
+// Frames take turns. If the workers are divided into teams (common/planning/team.h), a plan uses the workers of one team. The display
+// worker changes from frame to frame of a team, so that no worker makes all pictures.
 struct Turn {
-  std::uint64_t number = 0;  // of the frame, among its team's
+  std::uint64_t number = 0;  // number of the frame among those of its team
   std::uint32_t teams = 1;
   friend bool operator==(const Turn&, const Turn&) = default;
 };
@@ -58,26 +58,26 @@ struct FramePlan {
   friend bool operator==(const FramePlan&, const FramePlan&) = default;
 };
 
-// Of all groups, nearest first.
+// The placements of all groups, nearest first.
 std::vector<Placement> PlacementsOf(const FramePlan& plan);
 
-// The worker of each slot of a layout. A slot may be vacant (0) after a loss: its boxes are then lent to the others, round robin, and
-// everybody else keeps their own, so that only the lost voxels travel again. No worker holds two slots.
+// The worker of each slot of a layout. A slot may be vacant (0) after a loss. Its boxes are then lent to the other workers, round robin;
+// these keep their own boxes, so that only the lost voxels travel again. No worker holds two slots.
 struct Roster {
   std::vector<WorkerId> slots;
   friend bool operator==(const Roster&, const Roster&) = default;
 };
 
-// What a frame's plan has whatever the policy. Errors: NotFound (no such preset), InvalidArgument (a frame that is too large). The request
-// must be valid.
+// The part of a plan that does not depend on the policy. Errors: NotFound (no such preset), InvalidArgument (a frame that is too large).
+// The request must be valid.
 Result<FrameSetup> MakeFrameSetup(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary);
 
 // Pure. Errors: InvalidArgument (an image along the slices that is too large), NotFound (no such preset), Unavailable (no worker in the
-// roster). The request must be valid (Validate); its own policy does not count. `layout` was made for this volume, transfer function and
-// policy and for as many slots as the roster has.
+// roster). The request must be valid (Validate); its own policy is ignored. `layout` was made for this volume, transfer function and policy
+// and for as many slots as the roster has.
 Result<FramePlan> PlanFrame(const FrameRequest& request, const ResolvedPolicy& policy, DatasetId dataset, const VolumeSummary& summary,
                             const Roster& roster, std::shared_ptr<const Layout> layout, const Turn& turn = {});
-// The same by the request's own policy, where nothing is known but the volume's summary. Errors also as of ResolvePolicy. Null `layout`:
+// The same with the request's own policy and no knowledge but the volume's summary. Errors also as of ResolvePolicy. Null `layout`: uses
 // MakeLayout.
 Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, const Roster& roster,
                             std::shared_ptr<const Layout> layout = nullptr, const Turn& turn = {},
@@ -86,16 +86,14 @@ Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, cons
 // The function that a request names or holds, for this volume. NotFound: no such preset.
 Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const VolumeSummary& summary);
 
-// The same frame over another roster with the same number of slots: same setup, layout and groups; workers of placements, schedules and
-// display change. The display worker is kept if it is still in the roster: it holds what was accumulated. Unavailable if nobody is.
+// Plans the same frame for another roster with the same number of slots. Setup, layout and groups stay; workers of placements, schedules
+// and display change. The display worker stays if it is still in the roster: it holds the accumulated image. Unavailable: no worker.
 Result<FramePlan> Replan(const FramePlan& plan, const Roster& roster);
 
-// The plan of another frame of the same request, over a roster of the same size with a worker in it: who does what changes, and nothing
-// else.
+// The plan of another frame of the same request, for a roster of the same size with a worker in it. Only who does what changes.
 FramePlan TakeTurn(const FramePlan& plan, const Roster& roster, const Turn& turn);
 
-// Worker of each box: its slot's, or the one it is lent to; 0 of a box that belongs to nobody, and of all if the roster is empty of
-// workers.
+// The worker of each box: its slot's, or the one that it is lent to; 0 if the box belongs to nobody, or if the roster has no worker.
 std::vector<WorkerId> OwnersOf(const Layout& layout, const Roster& roster);
 
 }  // namespace slabstream

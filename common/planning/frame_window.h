@@ -1,17 +1,17 @@
-// FrameWindow: how much of a frame sequence is under way at a time. The coordinator's rule, which the simulation follows too. The next
-// group renders while others combine, across frames, and pictures are made meanwhile.
+// FrameWindow: how much of a frame sequence is under way at a time. The coordinator and the simulation follow this rule. The next group
+// renders while others combine, across frames, and pictures are made meanwhile.
 //
-// What a frame takes on p workers: rendering takes 1/p of the time of one worker; the hops of combining, the making of the picture and the
-// messages around it take what they take. So more workers need more frames under way to be busy: as many as there are workers, since then a
-// newcomer still waits behind about as much work as behind two frames of two workers. It is bounded
+// Rendering a frame on p workers takes 1/p of the time of one worker; the hops of combining, the making of the picture and the messages
+// around it do not get shorter. So more workers need more frames under way to be busy: as many as there are workers, since a new frame then
+// still waits behind about as much work as behind two frames of two workers. The number is bounded
 //   below  by 2, which one or two workers need to render while they combine;
 //   above  by kMostInWindow, so that a frame asked for late does not wait behind many;
-//   and by memory: a worker holds an image, which may be as large as the frame, for every unfinished group, at most kWindowBytes of
-//          them in all where 2 are not more.
-// Teams (common/planning/team.h) have a window each.
+//   and by memory: a worker holds an image, which may be as large as the frame, for every unfinished group: at most kWindowBytes in
+//          all, but always room for 2.
+// Each team (common/planning/team.h) has its own window.
 //
-// Frames that leave out what groups in front hide have at most kMaskedGroups unfinished groups each, since a group that is handed out
-// earlier knows of less that is hidden.
+// A frame that uses occlusion masks has at most kMaskedGroups unfinished groups: the earlier a group is handed out, the less is known to be
+// hidden from it.
 #pragma once
 
 #include <cstdint>
@@ -27,8 +27,8 @@ struct FrameWindow {
   friend bool operator==(const FrameWindow&, const FrameWindow&) = default;
 };
 
-// `workers` that there are, in `teams` >= 1; `frame_bytes` of the largest frame under way (FrameBytes), 0 if there is none. Both members
-// lie in [kLeastInWindow, kMostInWindow] for each team.
+// `workers` in all, in `teams` >= 1 teams; `frame_bytes` of the largest frame under way (FrameBytes), 0 if there is none. Both members lie
+// in [kLeastInWindow, kMostInWindow] for each team.
 FrameWindow WindowFor(std::size_t workers, std::uint32_t teams, std::int64_t frame_bytes);
 
 }  // namespace slabstream

@@ -1,4 +1,4 @@
-// HostedWorker: what an open policy's choice needs to know of a worker.
+// HostedWorker: what the choice of an open policy needs to know about a worker.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,8 @@ namespace slabstream {
 struct HostedWorker {
   std::uint64_t memory_scope = 0;  // workers of the same scope share a host and read each other's memory (SharedMemoryScope); 0: unknown
   bool lends_memory = true;        // workers of its scope read its images in place; otherwise it sends them in messages
-  std::uint32_t threads = 1;       // that render
-  std::uint32_t pid = 0;           // of its process: the workers of one process make pictures with the threads of all; 0: unknown
+  std::uint32_t threads = 1;       // render threads
+  std::uint32_t pid = 0;           // process id: the workers of one process share their threads to make pictures; 0: unknown
   friend bool operator==(const HostedWorker&, const HostedWorker&) = default;
 };
 

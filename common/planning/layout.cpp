@@ -17,8 +17,8 @@ namespace {
 
 constexpr std::int64_t kMostBoxes = std::int64_t{1} << 20;
 
-// Boxes that hold three times as many voxels as they own, halo and all: slabs of as many slices as the halo is thick, cubes of this many
-// voxels a side. There is no point in smaller ones.
+// The smallest boxes that make sense hold three times as many voxels as they own, halo included: slabs of as many slices as the halo is
+// thick, cubes of this many voxels a side.
 constexpr std::int64_t kSmallestCube = 36;
 
 int MostGroups(const LayoutRequest& request, const ResolvedPolicy& policy) {
@@ -30,7 +30,7 @@ int MostGroups(const LayoutRequest& request, const ResolvedPolicy& policy) {
   return int(std::clamp<std::int64_t>(boxes / slots, 1, kMaxGroups));
 }
 
-// The fields of work that a layout is made from, each made when it is first asked for.
+// The fields of work that layouts are made from, each made at its first use.
 class WorkFields {
  public:
   explicit WorkFields(const LayoutRequest& request)
@@ -125,8 +125,8 @@ struct LayoutMaker::State {
     return layout;
   }
 
-  // Of a layout: the render time of a frame, on average over views, and of each box the share of all work that it has in the view where it
-  // has most. Boxes of equal work on average may each be the slowest in some view; boxes that are equal by this measure are so in all.
+  // Of a layout: the render time of a frame, averaged over views, and each box's largest share of the work of any view. Boxes of equal work
+  // on average may each be the slowest in some view; boxes that are equal by this measure are equal in all views.
   struct Foretold {
     double frame = 0;
     std::vector<BoxSeconds> shares;
@@ -154,7 +154,7 @@ struct LayoutMaker::State {
     return foretold;
   }
 
-  // Layouts that are made one from the other: each by what is foretold of the last one's boxes.
+  // A sequence of layouts: each is cut by the predicted times of the last one's boxes.
   struct Refined {
     explicit Refined(const OccupancyGrid& grid) : cost(grid) {}
     LearntCost cost;
@@ -171,7 +171,7 @@ struct LayoutMaker::State {
     refined.best = std::move(layout);
   }
 
-  // Boxes are cut anew at first, of each shape, then those of the best shape are resized.
+  // First cuts boxes anew in each shape, then resizes those of the best shape.
   Layout MakeByForetoldWork(const ResolvedPolicy& policy, int groups) {
     constexpr int kCuts = 2, kResizings = 3;
     std::optional<Refined> best;

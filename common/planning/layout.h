@@ -17,7 +17,7 @@ namespace slabstream {
 
 class RendererKind;
 
-inline constexpr std::uint32_t kNoSlot = std::numeric_limits<std::uint32_t>::max();  // of a box that shows nothing: nobody renders it
+inline constexpr std::uint32_t kNoSlot = std::numeric_limits<std::uint32_t>::max();  // the box shows nothing, so nobody renders it
 
 struct Layout {
   Partition partition;
@@ -27,12 +27,11 @@ struct Layout {
 
 // What is known about the work in a volume under one transfer function. Null: not known.
 struct WorkKnowledge {
-  const OccupancyGrid* occupied =
-      nullptr;  // of what the renderer draws (RendererKind::DrawnTable); else the bricks of the volume's summary tell what may be occupied
-  const WorkField* cost = nullptr;  // seconds, learnt from frames; else what is occupied stands for it
+  const OccupancyGrid* occupied = nullptr;  // drawn voxels (RendererKind::DrawnTable); null: the summary's bricks tell what may be drawn
+  const WorkField* cost = nullptr;          // seconds, learnt from frames; null: occupied voxels stand for it
 };
 
-// Memory of the voxels of one slab at most, where slices allow it.
+// Most memory for the voxels of one slab, as far as the size of slices allows.
 inline constexpr std::int64_t kSlabBytesTarget = std::int64_t{256} << 20;
 
 struct LayoutRequest {
@@ -43,26 +42,25 @@ struct LayoutRequest {
   std::uint32_t slots = 1;  // >= 1
   std::int64_t slab_bytes_target = kSlabBytesTarget;
   WorkKnowledge known;
-  const Partition* resized = nullptr;  // of a layout by the same policy: its boxes are resized (DecompositionRequest); null: cut anew
+  const Partition* resized = nullptr;  // partition to resize, of a layout by the same policy (DecompositionRequest); null: cut anew
 };
 
-// Pure. Boxes with the halo of which nothing is visible belong to nobody; the others are numbered on for their assignment. Where boxes are
-// split by what is occupied, they are cut again and again by the cost that the renderer predicts for them (AnalyticCost), as they would be
-// by their measured costs (LearntCost); the best of these layouts is taken: that with the quickest frame, on average over views along x and
-// along y.
+// Pure. A box is assigned to no worker if neither it nor its halo contains a visible voxel; the others are numbered consecutively for their
+// assignment. If boxes are split by what is occupied, they are cut repeatedly by their analytic costs (AnalyticCost), as they would be by
+// measured costs (LearntCost). The result is the layout with the quickest frame, on average over views along x and along y.
 Layout MakeLayout(const LayoutRequest& request);
 
-// Layouts by several policies: what they are all made from is worked out once.
+// Makes layouts by several policies; computes what they share once.
 class LayoutMaker {
  public:
-  // The policy of `request` does not count. What it points at must live as long as this.
+  // Ignores the policy of `request`. What it points at must live as long as this.
   explicit LayoutMaker(const LayoutRequest& request);
   ~LayoutMaker();
   LayoutMaker(LayoutMaker&&) noexcept;
 
   Layout Make(const ResolvedPolicy& policy);
-  // The fewest groups by which no slab (a box that shows something, with its halo) is larger than the target, in any view; as many as
-  // leave boxes that are not mostly halo, where that is not enough. What the policy says, if it says a number.
+  // The policy's number of groups, if it sets one. Else the fewest groups with which no slab (a box that shows something, with its halo) is
+  // larger than the target, in any view; if none are enough, as many as leave boxes that are not mostly halo.
   int FewestGroups(const ResolvedPolicy& policy);
 
  private:

@@ -1,8 +1,8 @@
-// LearntCost: what rendering costs where in a volume, learnt from the render times of boxes in earlier frames.
+// LearntCost: the render cost of each part of a volume, learnt from the render times of boxes in earlier frames.
 //
-// Every cell of the volume's OccupancyGrid has a cost, which begins as the work that WorkField sees in it. A frame says what each of its
-// boxes took; the costs of a box's cells are scaled alike, by how much longer the box took than they predicted (iterative proportional
-// fitting: Deming and Stephan 1940). So what one partition taught about the inside of a box stays known when boxes are cut anew.
+// Every cell of the volume's OccupancyGrid has a cost, which begins as its work (CellWork). A frame reports the time of each of its boxes;
+// all cells of a box are then scaled by the ratio of measured to predicted time (iterative proportional fitting: Deming and Stephan 1940).
+// So what one partition taught about the inside of a box stays known when boxes are cut anew.
 #pragma once
 
 #include <cstdint>
@@ -16,21 +16,21 @@ namespace slabstream {
 
 struct BoxSeconds {
   Box box;
-  double seconds = 0;  // >= 0: rendering; what is done once (fetching, classification) does not belong to it
+  double seconds = 0;  // >= 0: rendering, without one-time work (fetching, classification)
 };
 
 class LearntCost {
  public:
   explicit LearntCost(const OccupancyGrid& grid);
 
-  // One frame's boxes, which do not overlap. `weight` in (0, 1]: how much of what they took beyond the prediction is believed.
+  // The boxes of one frame, which do not overlap. `weight` in (0, 1]: how much of the deviation from the prediction is believed.
   void Learn(std::span<const BoxSeconds> boxes, double weight);
 
   bool any() const { return any_; }
   WorkField Field() const;  // seconds
 
  private:
-  // A frame scales costs by factors between these: what is hidden today may be seen tomorrow.
+  // One frame scales costs by factors between these: what one view hides, the next may show.
   static constexpr double kLeastFactor = 0.1, kMostFactor = 10;
 
   Index3 size_;

@@ -21,9 +21,9 @@ std::vector<WorkerId> Present(const Roster& roster) {
   return present;
 }
 
-// Who holds a rank of a group can be the root of its schedule, and its image need not travel.
+// A display worker that holds a rank of a group can be the root of its schedule, so that the image need not travel.
 WorkerId ChooseDisplay(const FramePlan& plan, const std::vector<WorkerId>& present) {
-  std::map<WorkerId, std::size_t> groups;  // in which it holds a rank
+  std::map<WorkerId, std::size_t> groups;  // number of groups in which it holds a rank
   for (const GroupPlan& group : plan.groups) {
     std::set<WorkerId> workers;
     for (const Placement& placement : group.placements) workers.insert(placement.worker);
@@ -37,7 +37,7 @@ WorkerId ChooseDisplay(const FramePlan& plan, const std::vector<WorkerId>& prese
   return candidates[plan.turn.number % candidates.size()];
 }
 
-// The fewest bits by which combining moves no channel by more than the plan allows. Of two codings of as many bits the finer one.
+// The fewest bits with which combining changes no channel by more than the plan allows. Of two codings with as many bits, the finer one.
 ColorCoding ChooseColor(const FramePlan& plan, const GroupPlan& group) {
   if (plan.pixel_error <= 0 || plan.setup.format != PixelFormat::kRgba || group.placements.empty()) return ColorCoding::kFloat32;
   const PixelRange frame = WholeFrame(plan.setup);

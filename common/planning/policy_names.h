@@ -1,7 +1,7 @@
-// The names that a Policy may hold beside those of Decompositions(), Assignments() and CombiningSchemes().
+// The names that a Policy may hold besides those of Decompositions(), Assignments() and CombiningSchemes().
 //
-// kAutomatic stands for any of them: in decomposition, assignment and combine it leaves the choice to ChoosePolicy (coordinator/tuning), in
-// split it means what suits the decomposition, and is chosen together with it where that is left open, too.
+// kAutomatic leaves the choice of decomposition, assignment and combine to ChoosePolicy (coordinator/tuning). As a split it means the one
+// that suits the decomposition; if the decomposition is open, both are chosen together.
 #pragma once
 
 #include <optional>
@@ -14,7 +14,7 @@ namespace slabstream {
 
 inline constexpr std::string_view kAutomatic = "auto";
 
-// Whether a name is left to ChoosePolicy. Plans and layouts are made by policies of which none is.
+// Whether a name is left to ChoosePolicy. Plans and layouts need policies without such names.
 inline bool LeavesChoice(const Policy& policy) {
   return policy.decomposition == kAutomatic || policy.assignment == kAutomatic || policy.combine == kAutomatic;
 }
@@ -30,7 +30,7 @@ const std::vector<NamedChoice>& WorkSplits();                   // kAutomatic fi
 std::optional<WorkSplit> FindWorkSplit(std::string_view name);  // none: kAutomatic, or no such name
 std::string_view NameOf(WorkSplit split);
 
-// --balance: whether boxes change while frames go by.
+// --balance: whether boxes change between frames.
 const std::vector<NamedChoice>& BalanceModes();  // "static", "dynamic"
 inline constexpr std::string_view kStaticBalance = "static", kDynamicBalance = "dynamic";
 

@@ -77,7 +77,7 @@ Policy AskFor(const ResolvedPolicy& policy) {
 Axis SlabAxis(AxisChoice choice, const DecompositionEntry& decomposition, const Index3& size) {
   CHECK(choice != AxisChoice::kView);
   if (choice != AxisChoice::kAuto) return Axis(choice);
-  // z, about which views turn: slabs one above the other hide little of each other from most sides, so none of them is rendered in vain.
+  // z, the axis that views turn about: slabs stacked along it hide little of each other from most sides, so none is rendered in vain.
   Axis longest = Axis::kZ;
   if (!decomposition.one_axis) return longest;
   for (Axis axis : {Axis::kY, Axis::kX}) {

@@ -1,5 +1,5 @@
 // ResolvedPolicy: how a frame is made, with nothing left open. A Policy is what a client asks for: its names may be "auto", and its axis
-// may depend on the view. Names are looked up once, here; whoever plans works with entries of the lists.
+// may depend on the view. Names are looked up once, here; planning works with the entries of the lists.
 #pragma once
 
 #include <string>
@@ -17,7 +17,7 @@ namespace slabstream {
 struct ResolvedPolicy {
   const DecompositionEntry* decomposition = nullptr;  // of Decompositions(), never null
   WorkSplit split = WorkSplit::kVoxels;
-  Axis axis = Axis::kZ;                         // that is cut, or cut first
+  Axis axis = Axis::kZ;                         // the axis that is cut, or cut first
   int groups = 0;                               // [1, kMaxGroups]; 0: the fewest that memory allows (LayoutMaker::FewestGroups)
   const AssignmentEntry* assignment = nullptr;  // of Assignments(), never null
   bool dynamic_balance = false;                 // boxes may change between frames
@@ -27,7 +27,7 @@ struct ResolvedPolicy {
   friend bool operator==(const ResolvedPolicy&, const ResolvedPolicy&) = default;
 };
 
-// InvalidArgument: a name that is in no list (CheckNames), or one that is left open (LeavesChoice). The request must be valid.
+// InvalidArgument: a name that is in no list (CheckNames), or an open one (LeavesChoice). The request must be valid.
 Result<ResolvedPolicy> ResolvePolicy(const FrameRequest& request, const VolumeGeometry& geometry);
 
 // The policy that asks for exactly this.
@@ -39,15 +39,14 @@ Status CheckNames(const Policy& policy);
 // The request's policy with an axis that no longer depends on the view (AxisChoice::kView). The request must be valid.
 Policy SettledPolicy(const FrameRequest& request, const VolumeGeometry& geometry);
 
-// The axis that is cut, or cut first: "auto" is z, but for slabs another axis that has more than twice as many slices. `choice` is not
+// The axis that is cut, or cut first. "auto" is z; for slabs it is another axis if that has more than twice as many slices. `choice` is not
 // kView.
 Axis SlabAxis(AxisChoice choice, const DecompositionEntry& decomposition, const Index3& size);
 
-// What `split` of the policy comes to: "auto" is what suits the decomposition, and stays "auto" while that is open. Its names must be
-// known.
+// The policy's split. "auto" becomes what suits the decomposition, and stays "auto" while that is open. The policy's names must be known.
 std::string_view SplitOf(const Policy& policy);
 
-// Whether the layout of a policy, or the choice of it, is better for an exact OccupancyGrid. Its names must be known.
+// Whether an exact OccupancyGrid improves the policy's layout, or the choice of it. The policy's names must be known.
 bool NeedsOccupancy(const Policy& policy);
 bool NeedsOccupancy(const ResolvedPolicy& policy);
 

@@ -1,6 +1,6 @@
-// Teams: frames may go to parts of the workers in turn. A team renders its frames alone, so each team holds the whole volume among its
-// members: memory against what a frame costs however many workers share it (boxes that overlap by their halos, images to combine,
-// messages). One team is everybody on every frame, which makes a single frame soonest.
+// Teams divide the workers; each team renders whole frames in turn. So each team holds the whole volume: it trades memory for the costs of
+// a frame that do not depend on how many workers share it (boxes that overlap by their halos, images to combine, messages). With one team,
+// all workers share every frame, which makes a single frame soonest.
 #pragma once
 
 #include "common/planning/frame_plan.h"
@@ -12,8 +12,8 @@ struct Team {
   Turn turn;
 };
 
-// Whose turn the frame is. Teams are consecutive slots, alike in number to one; at most as many as there are slots (`teams` >= 1 says how
-// many there should be). One without workers is passed over. Without any worker: all slots. Pure.
+// The team that renders the frame. Teams are consecutive slots; their sizes differ by at most one. There are `teams` >= 1 of them, but no
+// more than slots. Teams without workers are skipped. Without any worker: all slots. Pure.
 Team TeamOf(const Roster& roster, std::uint32_t teams, std::uint64_t frame);
 
 }  // namespace slabstream

@@ -1,4 +1,4 @@
-// What a request must hold before anything is made of it.
+// Checks a request before anything uses it.
 #pragma once
 
 #include "common/base/status.h"
@@ -6,7 +6,7 @@
 
 namespace slabstream {
 
-// InvalidArgument naming field, value and limit. Names of the policy are looked up later (CheckNames, common/planning/layout.h).
+// InvalidArgument naming field, value and limit. Names of the policy are looked up later (CheckNames).
 Status Validate(const FrameRequest& request);
 
 }  // namespace slabstream

@@ -24,8 +24,8 @@ const RendererKind* FindRenderer(std::string_view name);
 // InvalidArgument, naming all renderers, if none has this name.
 Result<const RendererKind*> RequireRenderer(std::string_view name);
 
-// The value of each parameter of `kind`, as the request's texts set it or as it stands by default. InvalidArgument, naming the parameter,
-// its text and its limits: a parameter that the renderer does not have, or a text that is no valid value.
+// The value of each parameter of `kind`, from the request's texts or its default. InvalidArgument, naming the parameter, its text and its
+// limits: a parameter that the renderer does not have, or a text that is no valid value.
 Result<std::vector<double>> ParseParameters(const RendererKind& kind, const ParameterTexts& texts);
 
 }  // namespace slabstream

@@ -26,18 +26,18 @@ struct LocalImage;
 struct RendererParameter {
   std::string_view name;                  // lower case with hyphens
   std::string_view purpose;               // one line for --help
-  double standard = 0;                    // if the request says nothing; of choices, an index
+  double standard = 0;                    // if the request says nothing; for choices, an index
   double least = 0, most = 0;             // limits of a number
   std::vector<std::string_view> choices;  // by value; empty: a number
 };
 
-// The direction and scale from which a cost is asked for.
+// The direction and scale of a view whose cost is asked for.
 struct CostView {
   Axis along = Axis::kY;        // data axis nearest to the view direction
   double pixels_per_voxel = 1;  // of the frame, for the smallest side of a voxel, > 0
 };
 
-// That of a setup's frame.
+// The view of a setup's frame.
 CostView CostViewOf(const FrameSetup& setup);
 
 // The time that boxes of one volume take under one transfer function.
@@ -48,7 +48,7 @@ class AnalyticCost {
   virtual double Seconds(const Box& box, const CostView& view) const = 0;
 };
 
-// What a AnalyticCost is made from; all of it must outlive it.
+// What an AnalyticCost is made from; all of it must outlive it.
 struct CostBasis {
   const OccupancyGrid* drawn = nullptr;  // voxels that the renderer draws (RendererKind::DrawnTable)
   const VolumeSummary* summary = nullptr;
@@ -61,11 +61,11 @@ class RendererKind {
     std::string_view name;                    // of --renderer and of messages: "splat"
     std::string_view title;                   // in reports: "splatting"
     std::string_view purpose;                 // one line for --help
-    PixelFormat format = PixelFormat::kRgba;  // of local images by default parameters; it says how they combine (common/kernels/combine.h)
+    PixelFormat format = PixelFormat::kRgba;  // of local images with default parameters; says how they combine (common/kernels/combine.h)
     std::int32_t reach = kHalo;               // voxels outside a box that its samples depend on, [0, kHalo]
     bool along_slices = false;                // the frame is an image along the slices (SheetGrid), else the camera's
     double footprint = 1;                     // pixels that a voxel fills, for each pixel of its cross-section
-    std::vector<Stage> stages;                // that the pixel half charges, in the order of work
+    std::vector<Stage> stages;                // stages that the pixel half charges time to, in order
     std::vector<RendererParameter> parameters;
   };
 
@@ -92,24 +92,24 @@ class RendererKind {
   virtual Status SetView(const ViewParameters& view, ImageSize size, FrameSetup& setup) const = 0;
 
   // The classification table whose opacity is 0 in exactly the bins that the renderer does not draw. Boxes without a drawn voxel within
-  // their reach are not rendered, and empty space is skipped by it.
+  // their reach are not rendered. Empty-space skipping uses it, too.
   virtual ClassificationTable DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const;
 
   virtual std::unique_ptr<AnalyticCost> MakeCost(const CostBasis& basis) const = 0;
 
-  // The picture: of the whole accumulated frame, which stores all its pixels. Bounds of the result are in pixels of the picture. Runs
-  // within the caller's task arena. The default resamples a frame along slices, and averages supersampled pixels.
+  // Makes the picture from the whole accumulated frame, which stores all its pixels. Bounds of the result are in pixels of the picture.
+  // Runs within the caller's task arena. The default resamples a frame along slices, and averages supersampled pixels.
   virtual LocalImage Finish(const LocalImage& frame, const FrameSetup& setup) const;
-  // Whether that would be a copy of the frame.
+  // Whether Finish would only copy the frame.
   virtual bool FrameIsPicture(const FrameSetup& setup) const;
 
  private:
   const Facts facts_;
 };
 
-// Makes `setup` one for this renderer: renderer, halo, parameters by default, and the format that goes with them.
+// Sets renderer, halo, default parameters and the format that they imply.
 void SetRenderer(const RendererKind& kind, FrameSetup& setup);
-// One value for each of the renderer's parameters, and the format that goes with them.
+// Sets one value for each of the renderer's parameters, and the format that they imply.
 void SetParameters(std::vector<double> values, FrameSetup& setup);
 
 }  // namespace slabstream

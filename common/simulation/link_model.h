@@ -1,8 +1,8 @@
-// LinkModel: what it takes to bring bytes from one worker to another, and which messages get in each other's way.
+// LinkModel: how long a message from one worker to another takes, and which messages wait for each other.
 //
 // A message of b bytes from one end to another passes one or more wires in turn, cut-through: its first byte reaches the next wire without
-// waiting for its last. Each wire carries one message at a time, in the order in which they were sent, at its own rate. Its last byte
-// arrives `latency` after it has left the slowest of them.
+// waiting for its last. Each wire carries one message at a time, in the order of sending, at its own rate. The last byte of a message
+// arrives `latency` after it has left the slowest wire.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,7 @@ struct LinkModel {
   Contention contention = Contention::kSwitched;
   double latency_seconds = 0;     // of one message, before any byte is counted; >= 0
   double bytes_per_second = 1e9;  // of a wire; > 0
-  // kFatTree: ends that share an uplink, and their bytes a second / the uplink's.
+  // kFatTree: ends that share an uplink, and the ratio of their total rate to the uplink's.
   std::int32_t ports = 16;
   double oversubscription = 4;
   friend bool operator==(const LinkModel&, const LinkModel&) = default;

@@ -1,4 +1,4 @@
-// MachineModel: the machine that frames are simulated on. Rendering is not in it: what a box costs is measured (laboratory/measure) and
+// MachineModel: the machine that frames are simulated on. It has no render times: the cost of a box is measured (laboratory/measure) and
 // comes with the frame. All times are seconds of one thread of a worker of speed 1.
 #pragma once
 
@@ -10,27 +10,27 @@
 
 namespace slabstream {
 
-// What the combining thread of a worker does, for each pixel that is not empty.
+// Costs of a worker's combining thread, for each pixel that is not empty.
 struct CombiningCosts {
-  double scan_pixel = 0.2e-9;     // looked at in search of runs, empty or not
+  double scan_pixel = 0.2e-9;     // searched for runs, empty or not
   double encode_pixel = 1.5e-9;   // copied into a message
-  double combine_pixel = 1.5e-9;  // out of a message, checked, onto what is there
+  double combine_pixel = 1.5e-9;  // from a message, checked, onto what is there
   double local_pixel = 1e-9;      // of one image of this worker onto another one
-  double hidden_pixel = 0.1e-9;   // of the frame: in search of opaque tiles (FindHiddenTiles)
+  double hidden_pixel = 0.1e-9;   // of the frame: searched for opaque tiles (FindHiddenTiles)
   std::int32_t run_bytes = 12;    // a run in a message
   std::int32_t rgba_bytes = 16;   // a pixel in a message: splatting, colours as floats
-  std::int32_t depth_bytes = 24;  // and Z-buffer
-  // Pixels that are sent stay where they are: the thread that owns the sockets tells of them itself if the combining thread is busy with
-  // nothing.
+  std::int32_t depth_bytes = 24;  // a pixel in a message: Z-buffer
+  // Images are lent: their pixels stay where they are. The thread that owns the sockets announces them itself if the combining thread is
+  // idle.
   bool lent = false;
   friend bool operator==(const CombiningCosts&, const CombiningCosts&) = default;
 };
 
-// Seconds from one thread's handing something over (a message, a task, a result) until another one has begun with it: what it takes to
-// encode and decode it, to decide what is to be done, and to wake who sleeps. Of every thread of the service and its clients alike.
+// Seconds from one thread's handing something over (a message, a task, a result) until another one has begun with it: to encode and decode
+// it, to decide what to do, and to wake a sleeping thread. The same for all threads of the service and its clients.
 struct HandOvers {
   double awake = 25e-6;   // to a thread that was at work a moment ago
-  double asleep = 60e-6;  // to one that has waited for `doze` seconds or longer, and so has its core, or somebody else had it
+  double asleep = 60e-6;  // to one that has waited for `doze` seconds or longer; its core slept, too, or did other work
   double doze = 500e-6;
   friend bool operator==(const HandOvers&, const HandOvers&) = default;
 };
@@ -38,32 +38,32 @@ struct HandOvers {
 // Some workers render slower in some frames, for no reason that a plan could know. Which ones depends on the seed alone.
 struct Stragglers {
   double probability = 0;  // of a worker, in each frame; [0, 1]
-  double factor = 1;       // then its rendering takes so many times as long; >= 1
+  double factor = 1;       // then its rendering takes this many times as long; >= 1
   std::uint64_t seed = 1;
   friend bool operator==(const Stragglers&, const Stragglers&) = default;
 };
 
 struct MachineModel {
-  // Between workers; between them and the coordinator a message takes its latency and meets no other. Hand-overs come on top.
+  // Between workers. A message between a worker and the coordinator takes only its latency and waits for no other. Hand-overs come on top.
   LinkModel link;
   CombiningCosts combining;
   HandOvers hand_overs;
   std::vector<double> speeds;  // of the workers, relative, > 0; worker i has speeds[i % size()]. Empty: all 1
   Stragglers stragglers;
-  std::int32_t threads = 1;          // that render, of each worker
-  std::int32_t picture_threads = 0;  // that make a picture: workers of one process lend each other theirs. Fewer than `threads`: these
-  // How the picture's making (resampling, encoding) and rendering gain from n threads: n / (1 + (n - 1) * serial_share).
+  std::int32_t threads = 1;          // render threads of each worker
+  std::int32_t picture_threads = 0;  // threads that make a picture (`threads` if that is more): workers of one process share theirs
+  // Speed-up of making the picture (resampling, encoding) and of rendering by n threads: n / (1 + (n - 1) * serial_share).
   double serial_share = 0.02;
 
-  // Workers [i * workers_a_host, ...) share a host. Where more threads are busy than it has cores, all get their share; each busy thread
-  // besides the first slows the others down by `memory_slowdown`, since they share caches and memory. 0: a host for each worker.
+  // Workers [i * workers_a_host, ...) share a host. If more threads are busy than it has cores, they share the cores equally; each busy
+  // thread besides the first slows the others down by `memory_slowdown`, since they share caches and memory. 0: a host for each worker.
   std::int32_t workers_a_host = 0;
   std::int32_t cores_a_host = 1;
   double memory_slowdown = 0;  // [0, 1)
 
   double plan_seconds = 200e-6;   // the coordinator plans a frame
   double message_seconds = 5e-6;  // the coordinator sends or takes a message, one after the other
-  double client_seconds = 50e-6;  // the picture's way from the coordinator to the client, beside hand-over and decoding
+  double client_seconds = 50e-6;  // the picture's way from the coordinator to the client, without hand-over and decoding
   friend bool operator==(const MachineModel&, const MachineModel&) = default;
 };
 

@@ -1,5 +1,5 @@
-// Processors: tasks that run on the cores of hosts, in virtual time. Where the tasks of a host want more threads than it has cores, all get
-// their share; each busy thread besides the first slows the others down a little, since they share caches and memory.
+// Processors: tasks that run on the cores of hosts, in virtual time. If the tasks of a host want more threads than it has cores, they share
+// the cores equally; each busy thread besides the first slows the others down a little, since they share caches and memory.
 #pragma once
 
 #include <cstdint>
@@ -13,15 +13,15 @@ class Processors {
   // `cores` of each host, > 0; `memory_slowdown` in [0, 1).
   Processors(std::uint32_t hosts, double cores, double memory_slowdown);
 
-  // Starts a task that takes `seconds` where nobody is in its way and keeps `threads` busy. `task` names it, anything. `now` may not go
-  // back from call to call.
+  // Starts a task that takes `seconds` if nothing slows it down, and keeps `threads` busy. `task` is any name for it. `now` must not
+  // decrease from call to call.
   void Start(std::uint32_t host, std::uint64_t task, double seconds, double threads, double now);
 
   struct Completion {
     double time = 0;
     std::uint64_t task = 0;
   };
-  // The next task to end if nothing else is started before: infinity if none runs.
+  // When the next task ends if nothing else is started before; infinity if none runs.
   double NextTime();
   // Ends it. NextTime() must be finite.
   Completion Finish();
@@ -29,7 +29,7 @@ class Processors {
  private:
   struct Task {
     std::uint64_t name = 0;
-    double left = 0;  // seconds, where nobody is in its way
+    double left = 0;  // seconds, if nothing slows it down
     double threads = 1;
   };
   struct Host {

@@ -1,5 +1,5 @@
-// Timeline: what happened in a simulated run, second by second. The same figures as the service reports of its own frames, so that the two
-// can be compared. Virtual time begins at 0, when the first frame is asked for.
+// Timeline: what happened in a simulated run, second by second. It has the figures that the service reports for its own frames, so that the
+// two can be compared. Virtual time begins at 0, when the first frame is asked for.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@ struct SimulatedSpan {
   std::uint32_t frame = 0, group = 0;
   std::uint32_t worker = 0;  // index: its place in SimulationResult::workers
   Lane lane = Lane::kRender;
-  Rank rank = 0;                 // that is rendered or sent; 0 of other stages
+  Rank rank = 0;                 // rank that is rendered or sent; 0 for other stages
   Stage stage = Stage::kRender;  // kRender, kEncode, kCombine (also accumulating and looking for hidden tiles) or kResolve (kFinish)
   double begin = 0, end = 0;     // seconds
 };
@@ -37,13 +37,13 @@ struct SimulatedMessage {
 struct SimulatedFrame {
   double submitted = 0, planned = 0;  // by the client; when the coordinator began to plan it
   double done = 0, received = 0;      // last byte at the coordinator; picture decoded at the client
-  std::vector<double> groups_done;    // when the coordinator knew: the time of a preview; by group
+  std::vector<double> groups_done;    // by group: when the coordinator knew, the time of a preview
   double latency() const { return received - submitted; }
 
   std::array<double, kStageCount> stage_seconds{};  // worker time, summed over workers
   double imbalance = 1;                             // most / mean render time of a worker, over all slots of the plan
-  double idle_share = 0;  // of the workers' time from plan to last byte, when none of a worker's threads worked for this frame
-  double image_bytes = 0, voxel_bytes = 0;  // that travelled
+  double idle_share = 0;                    // of the workers' time from plan to last byte, without any thread at work for this frame
+  double image_bytes = 0, voxel_bytes = 0;  // sent
   std::uint64_t messages = 0;               // between workers
 };
 
@@ -55,7 +55,7 @@ struct Timeline {
   double end = 0;  // the last picture is received
 
   double frames_per_second() const { return end > 0 ? double(frames.size()) / end : 0; }
-  // Of the workers' time, its threads counted as one, in which they rendered: what is left of perfect scaling.
+  // Share of the workers' time in which they rendered, all threads of a worker counted as one: what is left of perfect scaling.
   double render_share = 0;
 };
 

@@ -1,5 +1,5 @@
-// UnionCoverage: how much of a pixel range the images of some neighbouring ranks fill together, without looking at pixels. Tile by tile,
-// ranks are taken as independent: 1 - prod(1 - share).
+// UnionCoverage: how much of a pixel range the images of some neighbouring ranks fill together, estimated without pixels. In each tile,
+// ranks count as independent: 1 - prod(1 - share).
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace slabstream {
 
 class UnionCoverage {
  public:
-  // By rank; null: shows nothing. All of a frame of width x height pixels.
+  // `ranks`: by rank; null: shows nothing. All belong to a frame of width x height pixels.
   UnionCoverage(std::span<const CoverageMap* const> ranks, std::int32_t width, std::int32_t height);
 
   struct Amount {
@@ -22,7 +22,7 @@ class UnionCoverage {
     double runs = 0;     // unbroken stretches of them, row by row
     Amount& operator+=(const Amount& more);
   };
-  // Of linear pixels y * width + x. A range that begins or ends within a row counts by its part of the row.
+  // `pixels` are numbered y * width + x. Of a row that lies in them only in part, its share counts.
   Amount Of(RankInterval ranks, PixelRange pixels) const;
 
  private:

@@ -1,8 +1,8 @@
-// BoxEstimator: what boxes should cost and show under one view, before anybody has rendered them.
+// BoxEstimator: estimates the time and the coverage of boxes in one view, before anybody has rendered them.
 //
-// Both come from cells of occupied voxels, which are projected: each is a rectangle of the frame that its voxels hit at random. In the part
-// of a tile that rectangles reach, a pixel that expects n hits is filled with probability 1 - exp(-n). Neighbouring cells are taken
-// together until there are at most kMostCells, so that asking about all boxes of a layout takes about a millisecond.
+// It projects cells of occupied voxels: each becomes a rectangle of the frame that its voxels hit at random. In the part of a tile that
+// rectangles reach, a pixel that expects n hits is filled with probability 1 - exp(-n). Neighbouring cells are merged until there are at
+// most kMostCells, so that estimating all boxes of a layout takes about a millisecond.
 #pragma once
 
 #include <vector>
@@ -18,8 +18,8 @@ class BoxEstimator {
  public:
   static constexpr std::int64_t kMostCells = 32 * 32 * 32;
 
-  // Coverage is that of a frame whose pixels are `pixel_side` x `pixel_side` pixels of the true one each (>= 1). `measured`: as
-  // for CostEstimator. What is given must live as long as this.
+  // Coverage is for a coarse frame: each of its pixels is `pixel_side` x `pixel_side` pixels of the true one (>= 1). `measured`: as for
+  // CostEstimator. All arguments must live as long as this.
   BoxEstimator(const FrameSetup& setup, const VolumeSummary& summary, const OccupancyGrid& occupied, const WorkField* measured,
                std::int32_t pixel_side);
 
@@ -49,7 +49,7 @@ class BoxEstimator {
   std::int32_t side_ = kOccupancyCell;  // voxels of a cell
   Index3 cells_;
   std::vector<double> cell_;  // occupied voxels, x fastest
-  double voxel_pixels_;       // that a voxel hits
+  double voxel_pixels_;       // pixels that a voxel hits
 };
 
 }  // namespace slabstream

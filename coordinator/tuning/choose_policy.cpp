@@ -69,7 +69,7 @@ class Search {
   }
 
  private:
-  // The groups that a policy may have at least: those that were asked for, if any.
+  // The fewest groups that a policy may have: those that were asked for, if any.
   int FewestGroupsOf(ResolvedPolicy policy) {
     policy.groups = asked_.groups;
     return layouts_.FewestGroups(policy);
@@ -79,7 +79,7 @@ class Search {
     for (const DecompositionEntry& entry : Decompositions()) {
       for (const WorkSplit split : {WorkSplit::kVoxels, WorkSplit::kOccupied, WorkSplit::kCost}) {
         const bool wanted = asked_.split == kAutomatic || asked_.split == NameOf(split);
-        // Until costs are known, their split is that by what is occupied.
+        // Until costs are known, a split by cost is the split by what is occupied.
         const bool same = asked_.split == kAutomatic && split == WorkSplit::kCost && question_.known.cost == nullptr;
         if (!wanted || same) continue;
         ResolvedPolicy policy = best_;
@@ -121,7 +121,7 @@ class Search {
     if (std::ranges::find(tried_, layout) != tried_.end()) return;
     tried_.push_back(layout);
     FramePredictor::Prepared prepared = predictor_.Prepare(std::move(layout));
-    // A scheme that was asked for may have too many steps to be tried: then the default one tells the layouts apart.
+    // A requested scheme may have too many steps to be tried: the default one then compares the layouts.
     std::optional<FramePrediction> prediction = predictor_.Predict(prepared, policy.combine);
     const bool stands_in = !prediction;
     if (stands_in) prediction = predictor_.Predict(prepared, Policy{}.combine);
@@ -148,7 +148,7 @@ class Search {
   ResolvedPolicy best_;
   std::optional<FramePrediction> prediction_;  // of best_; prepared_ is its layout
   FramePredictor::Prepared prepared_;
-  bool stands_in_ = false;  // prediction_ is that of the default scheme in place of best_'s
+  bool stands_in_ = false;  // prediction_ is for the default scheme in place of best_'s
   std::vector<Layout> tried_;
   int predicted_ = 0;
 };

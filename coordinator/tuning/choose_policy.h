@@ -1,13 +1,12 @@
-// ChoosePolicy: fills in what a policy leaves open ("auto") by what frames should take. Pure and deterministic.
+// ChoosePolicy: fills in what a policy leaves open ("auto"), by predicted frame times. Pure and deterministic.
 //
-// Candidates come from the lists (Decompositions, WorkSplits, Assignments, CombiningSchemes), so that a new entry takes part by itself.
-// Each is judged by a simulated frame (frame_predictor.h). One thing after the other is chosen, what matters most first: the partition and
-// what its boxes have equal shares of; the number of groups and the assignment; the scheme and its arguments. Where two are predicted
-// within kLeastGain of each other the one that came first stays, the policy that would hold without choosing (FixedPolicy) before all
-// others.
+// Candidates come from the lists (Decompositions, WorkSplits, Assignments, CombiningSchemes), so a new entry takes part by itself. Each is
+// judged by a simulated frame (frame_predictor.h). Choices are made one after the other, the most important first: the partition and what
+// its boxes have equal shares of; the number of groups and the assignment; the scheme and its arguments. A candidate must be predicted to
+// gain more than kLeastGain over the ones before it; the first is the policy that holds without choosing (FixedPolicy).
 //
-// What counts is the latency of a frame that nobody asked for ahead: it is what somebody who turns a volume waits for. Frames that are
-// asked for ahead gain with it: the partition that ends first is the one with least to do for the worker with most.
+// The measure is the latency of a frame that nobody asked for ahead: somebody who turns a volume waits for it. Frames that are asked for
+// ahead gain, too: the partition that ends first has the least work for the busiest worker.
 //
 // Memory comes first: no candidate has fewer groups than its slabs need (FewestGroups).
 #pragma once
@@ -22,14 +21,14 @@
 namespace slabstream {
 
 struct PolicyQuestion {
-  const FrameRequest* frame = nullptr;  // whose policy has names that there are (CheckNames)
+  const FrameRequest* frame = nullptr;  // its policy has known names (CheckNames)
   const VolumeSummary* summary = nullptr;
   WorkKnowledge known;
   std::uint32_t slots = 1;                // workers, [1, kMaxRanks]
   const MachineModel* machine = nullptr;  // valid; see service_machine.h
   std::int64_t slab_bytes_target = kSlabBytesTarget;
-  double render_scale = 1;  // by how much longer boxes took so far than was predicted; > 0
-  // What holds already, if anything, and fits the frame's policy. It stays unless another one gains that share.
+  double render_scale = 1;  // measured / predicted time of boxes so far; > 0
+  // The present policy, if any; it fits the frame's policy. It stays unless another one gains the share least_gain.
   const ResolvedPolicy* now = nullptr;
   double least_gain = 0;  // [0, 1)
 };
@@ -42,7 +41,7 @@ struct PolicyChoice {
 
 inline constexpr double kLeastGain = 0.02;
 
-// The policy that a frame has where nothing is chosen: what is left open is as in Policy{}.
+// The policy of a frame if nothing is chosen: open names are as in Policy{}.
 Policy FixedPolicy(Policy policy);
 
 // Errors as of MakeFrameSetup.

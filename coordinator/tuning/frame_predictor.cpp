@@ -41,7 +41,7 @@ std::int32_t ChoosePixelSide(const FrameSetup& setup, std::uint32_t slots) {
   return side;
 }
 
-// Only the size of the frame and the eye matter to what is made of it.
+// The simulation uses only the size of the frame and the eye.
 FrameSetup Coarse(FrameSetup setup, std::int32_t side) {
   if (!setup.sheets.empty()) {
     setup.sheets.width = CoarsePixels(setup.sheets.width, side);
@@ -97,7 +97,7 @@ FramePredictor::Prepared FramePredictor::Prepare(Layout layout) const {
 }
 
 bool FramePredictor::Affordable(const Prepared& prepared, const std::string& combine) const {
-  // Steps grow with a power of the ranks, which two small schedules tell.
+  // Steps grow with a power of the ranks; two small schedules give the exponent.
   constexpr Rank kFew = 32;
   const CombiningChoice scheme = ParseCombining(combine).value();
   const PixelRange frame = WholeFrame(prepared.plan.setup);

@@ -1,7 +1,7 @@
-// FramePredictor: what a frame should take under one layout and one way to combine, by the simulation that experiments use
+// FramePredictor: predicts the time of a frame with one layout and one way to combine, by the simulation that experiments use
 // (common/simulation), with estimated boxes (box_estimator.h). Pure and deterministic.
 //
-// It simulates a coarse frame: pixels are put together until ranks x tiles are at most kMostTiles, and what a pixel takes is multiplied.
+// It simulates a coarse frame: pixels are merged until ranks x tiles are at most kMostTiles, and costs per pixel grow accordingly.
 #pragma once
 
 #include <optional>
@@ -20,18 +20,18 @@ class FramePredictor {
   static constexpr std::int64_t kMostFrameTiles = 1024;
   static constexpr std::uint64_t kMostSteps = 8192;  // of a frame: schedules of more are too long to be tried
 
-  // `render_scale`: by how much longer boxes took so far than was predicted. What is given must live as long as this.
+  // `render_scale`: measured / predicted time of boxes so far. All arguments must live as long as this.
   FramePredictor(const FrameSetup& setup, const VolumeSummary& summary, const OccupancyGrid& occupied, const WorkField* measured,
                  const MachineModel& machine, std::uint32_t slots, double render_scale);
 
-  // A layout whose boxes are estimated, ready for any scheme.
+  // A layout with estimated boxes, ready for any scheme.
   struct Prepared {
     FramePlan plan;  // of the coarse frame; without schedules
     std::vector<BoxEstimator::Estimate> boxes;
   };
-  Prepared Prepare(Layout layout) const;  // of as many slots as this
+  Prepared Prepare(Layout layout) const;  // `layout` has as many slots as this
 
-  // `combine` is a scheme (ParseCombining). None: its schedule has more than kMostSteps steps, as far as those for fewer ranks tell.
+  // `combine` is a scheme (ParseCombining). None: its schedule has more than kMostSteps steps, extrapolated from fewer ranks.
   std::optional<FramePrediction> Predict(Prepared& prepared, const std::string& combine) const;
 
  private:

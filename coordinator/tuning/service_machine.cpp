@@ -7,7 +7,7 @@ namespace {
 
 constexpr double kLoopbackRate = 6e9;  // bytes a second: 16 MiB in 2.7 ms
 
-// Pixels stay where they are: only rows' beginnings and ends are told.
+// Pixels stay where they are: only the beginnings and ends of rows are sent.
 void LendImages(MachineModel& machine) {
   machine.link.bytes_per_second = 1e12;
   machine.combining = {.scan_pixel = 0.03e-9,

@@ -58,7 +58,7 @@ class MipCost : public AnalyticCost {
   }
 
  private:
-  // Seconds of one thread: for a box, and for a voxel at a pixel a voxel.
+  // Seconds of one thread: for a box, and for a voxel at one pixel a voxel.
   static constexpr double kBox = 30e-6, kVoxel = 4e-9;
 };
 

@@ -27,8 +27,8 @@ class RaycastKind : public RendererKind {
     return Status::Ok();
   }
 
-  // Between two voxels lie all values in between: where the lower one is clear and the upper one too, what lies between them may be
-  // visible. A voxel counts as drawn from the least visible value on: without one, nothing in its reach shows.
+  // Interpolation gives all values between those of two voxels, so a sample between two clear voxels may be visible. A voxel counts as
+  // drawn if it is at least the lowest visible value: without such a voxel, nothing in its reach shows.
   ClassificationTable DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const override {
     ClassificationTable table = Classify(transfer, summary.description, summary.range);
     const auto first = std::ranges::find_if(table.opacity, [](float opacity) { return opacity > 0; });

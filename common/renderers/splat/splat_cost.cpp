@@ -9,8 +9,8 @@
 namespace slabstream::splat {
 namespace {
 
-// Seconds of one thread, at about a pixel a voxel: for a box; for each of its slices; for each row of samples that anything reaches in a
-// slice; for each segment of a row that holds anything; for each run of such segments; for each octet of voxels that is shaded.
+// Seconds of one thread, at about a pixel a voxel: for a box; for each of its slices; for each row of samples that is not empty, in each
+// slice; for each segment of a row that is not empty; for each run of such segments; for each octet of voxels that is shaded.
 //
 // Fitted to kd-trees and beams of 8 and 16 boxes of equal numbers of voxels and of occupied voxels, over a class-I sphere, vessels,
 // heptane, bonsai and an MR brain in views along x and along y. Root mean square of the relative error over 16 boxes, in brackets when
@@ -45,7 +45,7 @@ double MedianExtinction(const TransferFunction& transfer, const VolumeSummary& s
   return 0;
 }
 
-// Counts are those at a pixel a voxel. At another scale there are as many more rows, and segments are as much longer.
+// Counts are for one pixel a voxel. The number of rows and the length of segments both grow with the scale.
 double SplatCost::SecondsAlong(const Box& box, Axis along, double scale) const {
   const SplatCounts counts = work_.Count(box, along);
   if (counts.rows == 0) return 0;

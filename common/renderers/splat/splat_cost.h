@@ -1,4 +1,4 @@
-// SplatCost: the time that splatting takes in a box, from the lines of cells that hold anything (splat_work.h).
+// SplatCost: the time that splatting takes in a box, from the lines of cells that are not empty (splat_work.h).
 #pragma once
 
 #include "common/renderers/renderer_kind.h"
@@ -6,8 +6,8 @@
 
 namespace slabstream::splat {
 
-// The opacity of material, as the extinction coefficient of a voxel length; finite, >= 0. It is the median over the voxels that show
-// anything, by the volume's histogram. A mean would be that of a few dense voxels in a volume that is thin otherwise.
+// The median extinction coefficient of a voxel length, over the voxels that show anything, by the volume's histogram; finite, >= 0. In a
+// mostly thin volume, a few dense voxels would decide a mean.
 double MedianExtinction(const TransferFunction& transfer, const VolumeSummary& summary);
 
 class SplatCost : public AnalyticCost {

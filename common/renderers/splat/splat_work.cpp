@@ -11,22 +11,22 @@ namespace {
 
 constexpr std::int32_t kRim = 2;                 // voxels on either side of a sample that reach it
 constexpr std::int32_t kLayer = kOccupancyCell;  // bits from a line of a cell to the one above it
-// Of a segment, on average over its rays, when the last of them is opaque: exp(-6.93) is kDefaultTermination. The factor was fitted.
+// Mean optical depth of a segment's rays when the last of them is opaque: exp(-6.93) is kDefaultTermination. The factor was fitted.
 constexpr float kOpaqueDepth = 1.5F * 6.93F;
 constexpr double kMostPixels = 2;  // a voxel, as SheetGrid has it
 
-// tan of the elevation over cos of the azimuth (20 and 30 degrees): how far a ray rises, by how far it goes across the slices.
+// tan(elevation) / cos(azimuth), at 20 and 30 degrees: how far a ray rises for each unit across the slices.
 constexpr double kRise = 0.42;
-// tan of the azimuth, on average between -45 and 45 degrees: how far it goes along the beams.
+// Mean of |tan(azimuth)| between -45 and 45 degrees: how far it goes along the beams.
 constexpr float kDrift = 0.44F;
 
-// Rows of samples that lines of a cell reach, or those of the cells below and above it. Row z lies between lines z - 1 and z, and holds
-// something if any of the kRim lines on either side does.
+// Rows of samples that lines of a cell reach, or those of the cells below and above it. Row z lies between lines z - 1 and z, and is not
+// empty if any of the kRim lines on either side is not.
 constexpr LineSet RowsReached(LineSet below, LineSet lines, LineSet above) {
   return lines << 2 * kLayer | lines << kLayer | lines | lines >> kLayer | below >> 6 * kLayer | below >> 7 * kLayer | above << 7 * kLayer;
 }
 
-// How deep the rays have come that are in a box, by row and by cell along the beams.
+// Optical depth of the rays in a box, by row and by cell along the beams.
 class RayDepths {
  public:
   RayDepths(std::int32_t layers, std::int32_t cells, std::int32_t rise)
@@ -35,7 +35,7 @@ class RayDepths {
         cells_(cells),
         depth_(std::size_t(rows_) * std::size_t(cells + 1)) {}
 
-  // From one cell across the slices to the next: rays from above leave below, others come, and neighbours mix.
+  // From one cell across the slices to the next: rays move down, new ones come in at the top, and neighbours mix.
   void Advance() {
     for (std::int32_t cell = 0; cell < cells_; ++cell) {
       float* const depth = Of(cell, 0);
