@@ -27,7 +27,7 @@ struct RayLook {
   Float3 inverse_spacing{}, viewer{};  // towards the viewer, divided like the lights
   std::vector<Light> lights;
   float ambient = 0, diffuse = 1, specular = 0, shininess = 1;
-  float diffuse_without_gradient = 1;  // independent of the lights: see Phong::WithoutGradient
+  float diffuse_without_gradient = 1;  // independent of light directions: see Phong::WithoutGradient
 };
 
 // `steps_per_voxel`: samples in a voxel length along a ray.
