@@ -219,9 +219,9 @@ Result<ReplayReport> Replay(std::span<const RecordedFrame> frames, const ReplayC
   report.in_flight = InFlight(frames);
   report.measured = Measured(frames);
   const auto for_recorded_times = [](MachineModel model) {
-    model.workers_a_host = 0;  // the recorded times include the slowdown by neighbours
+    model.workers_a_host = 0;   // the recorded times include the slowdown by neighbours
     model.picture_threads = 0;  // and the effect of threads on making a picture
-    model.client_seconds = 0;  // each frame has its own time at the client
+    model.client_seconds = 0;   // each frame has its own time at the client
     return model;
   };
   const Result<ReplayedRun> same = Simulated(frames, {}, for_recorded_times(machine), report.in_flight);
