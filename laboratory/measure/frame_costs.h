@@ -30,7 +30,7 @@ class PictureMeter {
 
   // For the frame of the whole volume: processor time of the thread that makes the picture, and of the one that decodes it.
   PictureCost Measure(const FrameSetup& setup);
-  void KeepAnswers(const FrameSetup& setup);  // as many as there will be
+  void KeepAnswers(const FrameSetup& setup);  // until as many are kept as there will be
 
  private:
   struct Answer {

@@ -7,7 +7,7 @@
 // Each of these is done twice in a row, and the second time counts: its threads have not slept for long, and its data is in the caches if
 // it fits. Before each turn, frames of another volume and service measure hand-overs. The measurements of a view in a turn are simulated on
 // a model of this machine (calibrate.h). So both sides meet the same state of the machine, and both are medians over turns. No time
-// measured in the service enters the simulation.
+// of the measured service enters the simulation.
 #pragma once
 
 #include <memory>

@@ -77,8 +77,8 @@ class BinLookup {
   }
 
  private:
-  // Finite samples by their place in ascending order, [0, kSamples). Floats are ordered as the integers of their bits, negative ones
-  // backwards; -0 has the place of 0.
+  // Finite samples by their position in ascending order, [0, kSamples). Floats are ordered as the integers of their bits, negative ones
+  // backwards; -0 has the position of 0.
   static constexpr std::int64_t kFiniteFloats = 0x7F800000;  // without sign
   static constexpr std::int64_t kSamples = std::is_integral_v<T> ? std::int64_t{1} << (8 * sizeof(T)) : 2 * kFiniteFloats - 1;
   static T SampleAt(std::int64_t place) {
@@ -91,7 +91,7 @@ class BinLookup {
     }
   }
 
-  // Place of the least sample whose bin is at least `bin`; kSamples: there is none. Bins ascend with samples.
+  // Position of the least sample whose bin is at least `bin`; kSamples: there is none. Bins ascend with samples.
   std::int64_t FirstWithBin(int bin) const {
     std::int64_t low = 0, high = kSamples;
     while (low < high) {
