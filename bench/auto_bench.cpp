@@ -1,11 +1,10 @@
-// What `auto` chooses and how good that is. For volumes given on the command line ("sphere1:300" is the paper's class-I sphere with N =
+// The choice of `auto`, and how good it is. For volumes given on the command line ("sphere1:300" is the paper's class-I sphere with N =
 // 300; FILE@PRESET names a transfer function), a view and a number of workers:
 //
 //   simulated   every box of every candidate's partition is rendered alone on one thread (laboratory/measure); frames are simulated from
-//   these costs
-//               on the machine that the choice was made for. Printed: the policy that holds where nothing is chosen, what ChoosePolicy
-//               takes before anything is known and once costs are learnt, the best of all candidates, and how long choosing took
-//   --service   frames of a turning volume by the embedded service, the fixed policy and `auto` in turn: medians, and what was predicted
+//               these costs on the machine that the choice was made for. Prints the fixed policy, the choices of ChoosePolicy before
+//               anything is known and once costs are learnt, the best of all candidates, and the time of choosing
+//   --service   frames of a turning volume by the embedded service, the fixed policy and `auto` in turn: medians and predictions
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -89,7 +88,7 @@ std::string Text(const Policy& policy) {
                      policy.combine);
 }
 
-// Frames in virtual time from measured boxes, which are measured once a partition.
+// Frames in virtual time from measured boxes. Each partition's boxes are measured once.
 class Truth {
  public:
   Truth(const Options& options, const Subject& subject, const FrameSetup& setup, const OccupancyGrid& grid, const MachineModel& machine,
@@ -237,7 +236,7 @@ void Serve(const Options& options, const Subject& subject, int workers) {
     std::string text;
     double first = 0;
   } runs[2];
-  // Turn by turn, so that what disturbs the machine disturbs both.
+  // In turns, so that disturbances of the machine affect both.
   for (int turn = 0; turn < 3; ++turn) {
     for (std::size_t which = 0; which < 2; ++which) {
       FrameRequest request = subject.request;

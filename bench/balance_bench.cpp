@@ -1,5 +1,5 @@
 // How even partitions are: every box of each is rendered alone on one thread (laboratory/measure/box_costs.h), the boxes of a slot are
-// added up, and the slot with most to do is compared with the mean, in views all round. Then the same in each view after some frames of
+// added up, and the slot with the most is compared with the mean, in views from all sides. Then the same in each view after some frames of
 // dynamic balance. For volumes given on the command line; "sphere1:300" is the paper's class-I sphere with N = 300.
 #include <fmt/format.h>
 
@@ -97,7 +97,7 @@ struct Spread {
 
 struct Outcome {
   Spread imbalance, slowest, sum, moved;
-  Spread residual;  // root mean square of (measured - foretold) / foretold, over the boxes of a view, both relative to their means
+  Spread residual;  // root mean square of (measured - predicted) / predicted, over the boxes of a view, both relative to their means
 
   void Add(const Measured& measured, std::int64_t moved_voxels) {
     imbalance.values.push_back(measured.imbalance);
@@ -152,18 +152,18 @@ class Comparison {
 
  private:
   void AddResidual(const FrameSetup& setup, const Measured& measured, Outcome& outcome) const {
-    const auto axis = std::size_t(std::min(Number(setup.camera.traversal_axis), 1));  // of views along z nothing is foretold
+    const auto axis = std::size_t(std::min(Number(setup.camera.traversal_axis), 1));  // for views along z there is no prediction
     double foretold = 0, squares = 0;
     for (const BoxSeconds& box : measured.boxes) foretold += cost_->Seconds(box.box, {.along = Axis(axis)});
     for (const BoxSeconds& box : measured.boxes) {
-      if (cost_->Seconds(box.box, {.along = Axis(axis)}) == 0) continue;  // all it has is beside it
+      if (cost_->Seconds(box.box, {.along = Axis(axis)}) == 0) continue;  // all its cost is in the halo
       const double ratio = box.seconds / measured.sum / (cost_->Seconds(box.box, {.along = Axis(axis)}) / foretold);
       squares += (ratio - 1) * (ratio - 1);
     }
     outcome.residual.values.push_back(std::sqrt(squares / double(measured.boxes.size())));
   }
 
-  // As the coordinator's LayoutTable does it.
+  // Same as the coordinator's LayoutTable.
   void Balance(const FrameSetup& setup, LayoutRequest request, Layout layout, Measured measured, Outcome& outcome) const {
     LearntCost learnt(grid_);
     std::int64_t moved = 0;

@@ -1,17 +1,16 @@
-// What combining costs: p worker processes of this host, each with a picture in hand, until the root holds the result. Beside nothing: the
-// workers are the real ones (machine, executor, sockets) with a renderer that hands out a prepared picture; this program plays their
+// The cost of combining: p worker processes on this host, each with a finished picture, until the root holds the result. Nothing else runs:
+// the workers are the real ones (machine, executor, sockets) with a renderer that returns a prepared picture; this program plays their
 // coordinator. Time runs from the moment at which the last rank holds its picture to the end of the last combining step at the root.
 //
 //   build/bin/combining_bench [--ranks 2,4,8,16] [--size 1024] [--schemes fan-in,direct-send,...] [--repeats N] [--images full,sparse]
 //                             [--links shared,ipc,tcp] [--color float32|half|fixed16] [--compress auto|on|off]
 //
 // Pictures are premultiplied float RGBA, combined by over. "sparse": each rank has a square of 20 % of the picture, and these slide from
-// one corner to the other; packed they get smaller than any that are rendered. A line a case: median, 10th and 90th percentile in
-// milliseconds, the median until the coordinator knows, and the
-// processor time of all workers for a frame (the making of the pictures left out): where workers outnumber cores, time is not below that
-// over the number of cores; last, how many times as many pixels are handed over as are filled, which bounds what sparse pictures gain. For
-// tcp and full pictures, first what the system alone takes to move them one after the other: a process writes those of p - 1 ranks to a
-// plain socket, another reads them, from and to memory that both keep.
+// one corner to the other; they compress better than any rendered picture. Each line is a case: median, 10th and 90th percentile in
+// milliseconds; the median until the coordinator knows; the processor time of all workers for a frame, without making the pictures (if
+// workers outnumber cores, the time is not below this over the number of cores); and the ratio of pixels handed over to pixels filled,
+// which bounds the gain from sparse pictures. For tcp and full pictures, the first line is the system's time to move them one after the
+// other: a process writes those of p - 1 ranks to a plain socket, another reads them, from and to memory that both keep.
 #include <arpa/inet.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -59,15 +58,15 @@ struct Case {
   std::int32_t size = 1024;
   bool sparse = false;
   std::string link;
-  ColorCoding color = ColorCoding::kFloat32;  // of what is sent
+  ColorCoding color = ColorCoding::kFloat32;  // of the pixels sent
   Compression compression = Compression::kAuto;
 };
 
-// What the processes of one case share.
+// Memory that the processes of one case share.
 struct Shared {
-  pthread_barrier_t all_hold;             // their pictures of the present frame
+  pthread_barrier_t all_hold;             // their pictures of the current frame
   std::atomic<std::int64_t> all_held_ns;  // when the last one did
-  std::atomic<std::int64_t> made_ns;      // processor time that was spent on making them, of all workers and frames
+  std::atomic<std::int64_t> made_ns;      // processor time spent on making them, over all workers and frames
 };
 
 std::int64_t NowNs() { return MonotonicNow().time_since_epoch().count(); }
@@ -90,7 +89,7 @@ PixelBounds BoundsOf(const Case& config, Rank rank) {
   return {at, at, at + side, at + side};
 }
 
-// All pixels that the steps hand over, by those of them that are not empty: what was combined fills more than each picture did.
+// All pixels that the steps hand over, divided by the non-empty ones among them: a combined image has more of these than each picture.
 double PixelsOverFilled(const Case& config, const IndexedSchedule& schedule) {
   const auto size = std::size_t(config.size);
   std::vector<std::vector<bool>> filled(config.ranks, std::vector<bool>(size * size));
@@ -121,7 +120,7 @@ LocalImage MakePicture(const Case& config, Rank rank) {
   return image;
 }
 
-// Hands out a copy of one picture, and returns when all ranks have theirs.
+// Returns a copy of one picture, when all ranks have theirs.
 class PreparedPicture : public Renderer {
  public:
   PreparedPicture(const Case& config, Rank rank, Shared& shared) : picture_(MakePicture(config, rank)), shared_(shared) {}
@@ -131,7 +130,7 @@ class PreparedPicture : public Renderer {
     const std::int64_t begin_ns = ProcessorNs(CLOCK_THREAD_CPUTIME_ID);
     LocalImage copy = picture_;
     shared_.made_ns += ProcessorNs(CLOCK_THREAD_CPUTIME_ID) - begin_ns;
-    shared_.all_held_ns = NowNs();  // the last one's stays
+    shared_.all_held_ns = NowNs();  // the last one's time stays
     ::pthread_barrier_wait(&shared_.all_hold);
     return copy;
   }
@@ -239,7 +238,7 @@ class Coordinator {
     std::uint64_t memory_scope = 0;
   };
 
-  // Processor time of all workers but for the making of pictures.
+  // Processor time of all workers, without making the pictures.
   std::int64_t BusyNs() const {
     std::int64_t sum = -shared_.made_ns;
     for (const pid_t process : processes_) sum += ProcessorNsOf(process);
@@ -324,10 +323,10 @@ void RunCase(const Case& config, const std::vector<std::string>& schemes, int re
   for (const pid_t worker : workers) ::waitpid(worker, nullptr, 0);
 }
 
-// As memory that is kept from frame to frame.
+// In memory that is kept from frame to frame.
 using Pictures = std::vector<std::vector<std::byte>>;
 
-// Reads pictures into those of `pictures` in turn from the one connection that comes, answers each with a byte.
+// Accepts one connection, reads pictures into those of `pictures` in turn, and answers each with a byte.
 [[noreturn]] void DrainPictures(int listener, Pictures pictures) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   const int socket = ::accept(listener, nullptr, nullptr);
@@ -342,8 +341,8 @@ using Pictures = std::vector<std::vector<std::byte>>;
   }
 }
 
-// What the system takes to move the pictures of all ranks but one between processes: as many as there are at either end, so that they are
-// in a cache as far as a frame's are, through connections of the workers' kind. Called before this process has any thread.
+// Measures the system's time to move the pictures of all ranks but one between processes, through connections like the workers'. Both ends
+// hold as many pictures, so that they are as far in a cache as a frame's are. Called before this process has any thread.
 void MeasureLoopback(std::int32_t size, Rank ranks, int repeats) {
   constexpr char kCongestionControl[] = "reno";
   const std::size_t bytes = 4 * sizeof(float) * std::size_t(size) * std::size_t(size), images = std::max<Rank>(ranks, 2) - 1;

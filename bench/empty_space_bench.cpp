@@ -1,5 +1,5 @@
-// What empty space costs: the paper's hollow sphere of 128^3 voxels alone, and in the middle of volumes of 256^3 and 512^3 voxels, at a
-// zoom that shows it in the same size. Second frame on; the counters of stages are milliseconds a frame.
+// The cost of empty space: the paper's hollow sphere of 128^3 voxels alone, and in the middle of volumes of 256^3 and 512^3 voxels, at a
+// zoom that shows it in the same size. From the second frame on; the counters of stages are milliseconds a frame.
 #include <benchmark/benchmark.h>
 
 #include <atomic>

@@ -1,13 +1,13 @@
-// What a frame costs beside rendering: request to last byte, less the time from the first worker's start of rendering to the last one's
-// end, and less the making of the picture from the frame (resampling or resolving, which an embedded renderer would have to do too). One
-// frame in flight, a turning view; embedded, and with a coordinator and workers as processes over ipc and tcp. With one frame in flight
-// nothing hides anything: this is what a user waits for between two pictures.
+// The latency of a frame beside rendering: request to last byte, less the time from the first worker's start of rendering to the last one's
+// end, and less making the picture from the frame (resampling or resolving, which an embedded renderer would have to do too). One frame in
+// flight, a turning view; embedded, and with a coordinator and workers as processes over ipc and tcp. With one frame in flight nothing
+// overlaps: this is the user's wait between two pictures.
 //
 //   build/bin/latency_bench [--volume VOXELS_A_SIDE] [--size PIXELS_A_SIDE] [--zoom Z] [--frames N] [--workers N] [--threads N]
 //                           [--renderer splat|zbuffer]
 //
-// A line a transport: medians and 95th percentiles of the frames after a warm-up. "Before render" is the part of the time beside that
-// passes until the first worker begins.
+// A line a transport: medians and 95th percentiles of the frames after a warm-up. "Before render" is the part of this latency before the
+// first worker begins.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -40,7 +40,7 @@ struct BenchOptions {
   std::string renderer = "splat";
 };
 
-// What is measured of each frame, in milliseconds.
+// Measurements of each frame, in milliseconds.
 struct Measured {
   std::vector<double> latency, render, finish, beside, before;
 };
@@ -94,7 +94,7 @@ void PrintRow(const std::string& name, const Measured& measured) {
   std::fflush(stdout);
 }
 
-// Coordinator and workers as processes, as `slabstream up` starts them. Before this process has threads.
+// Coordinator and workers as processes, as `slabstream up` starts them. Call before this process has threads.
 void MeasureProcesses(const BenchOptions& options, const std::string& listen, const std::string& directory, Measured& measured) {
   const auto start = [&](std::vector<std::string> command) {
     command[0] = ProgramBeside(command[0]).value();

@@ -1,4 +1,4 @@
-// Counting occupied voxels of 512^3 (8 bits): noise, where every row must be looked through, and the paper's hollow sphere, whole and by
+// Counting the occupied voxels of 512^3 (8 bits): noise, of which every row must be searched, and the paper's hollow sphere, whole and by
 // bricks.
 #include <benchmark/benchmark.h>
 

@@ -1,5 +1,5 @@
 // The image operators on 512 x 512 pixels: over on rows (vectors and reference), whole images by over and by nearest depth, and the picture
-// from the frame of splatting.
+// from a frame of splatting.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -57,7 +57,7 @@ void CombineImages(benchmark::State& state) {
 BENCHMARK(CombineImages<false>)->Name("CombineImages")->Arg(1)->Arg(2)->Unit(benchmark::kMicrosecond);
 BENCHMARK(CombineImages<true>)->Name("CombineUncheckedImages")->Arg(1)->Arg(2)->Unit(benchmark::kMicrosecond);
 
-// A picture from a frame of about as many pixels, turned and skewed as by an oblique view, 16 rows a call.
+// A picture from a frame of about as many pixels, rotated and skewed as by an oblique view, 16 rows a call.
 template <void (*kResample)(const LocalImage&, const ProjectiveMap&, std::int32_t, std::int32_t, LocalImage&)>
 void Resample(benchmark::State& state) {
   const LocalImage frame = Filled(PixelFormat::kRgba, 0.3F);

@@ -1,9 +1,9 @@
-// How far the simulation can be trusted: frames of the embedded service with one and two workers beside what is simulated of them
+// The accuracy of the simulation: frames of the embedded service with one and two workers beside their simulation
 // (laboratory/measure/validate.h), and the cost model fitted to boxes of all sizes (laboratory/measure/cost_fit.h).
 //
 //   build/bin/simulation_bench CASE... [--size PIXELS_A_SIDE] [--views N] [--turns N] [--renderer splat|zbuffer] [--fit [--repeats N]]
 //
-// CASE is one of `slabstream bench --list`, or FILE[:TRANSFER]. With --fit the boxes of all cases together give the constants.
+// CASE is one of `slabstream bench --list`, or FILE[:TRANSFER]. With --fit the constants are fitted to the boxes of all cases together.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -23,7 +23,7 @@
 namespace slabstream {
 namespace {
 
-constexpr int kBoxCounts[] = {1, 2, 5, 12, 30};  // of the samples that the cost model is fitted to
+constexpr int kBoxCounts[] = {1, 2, 5, 12, 30};  // of the samples for the fit of the cost model
 
 struct BenchOptions {
   std::vector<std::string> cases;

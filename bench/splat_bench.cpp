@@ -1,5 +1,5 @@
-// Splatting and compositing of a dense slice, 256 x 256 shaded voxels into a frame: the kernels of the pipeline beside what they replace.
-// `ratio`: how many times faster the kernels are.
+// Splatting and compositing of a dense slice, 256 x 256 shaded voxels into a frame: the kernels of the pipeline beside the loop that they
+// replace. `ratio`: how many times faster the kernels are.
 #include <benchmark/benchmark.h>
 
 #include <hwy/highway.h>

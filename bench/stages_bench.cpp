@@ -1,6 +1,6 @@
-// Stage times of whole renderings on one thread: the paper's two spheres at N = 200, as one box and as two boxes one after the other
-// (p = 1, 2), both pipelines, second frame on. Counters are milliseconds a frame, summed over boxes; `finish` is the picture from the
-// frame.
+// Stage times of whole renderings on one thread: the paper's two spheres at N = 200, as one box and as two boxes one after the other (p =
+// 1, 2), both pipelines, from the second frame on. Counters are milliseconds a frame, summed over boxes; `finish` is making the picture
+// from the frame.
 #include <benchmark/benchmark.h>
 #include <tbb/task_arena.h>
 

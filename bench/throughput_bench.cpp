@@ -1,7 +1,6 @@
-// What bounds the throughput of many workers. For the paper's class-I sphere and some ways to divide it: the render time of all boxes
-// against that of the whole volume (how much more work there is), how even the workers are, and from both the efficiency that no schedule
-// can exceed; then frames simulated on a link, asked for ahead: the time from picture to picture, and how busy each kind of resource is by
-// then.
+// The bounds on the throughput of many workers. For the paper's class-I sphere and some partitions: the render time of all boxes against
+// that of the whole volume (the extra work), how even the workers are, and from both the efficiency that no schedule can exceed. Then
+// frames simulated on a link, requested ahead: the time from picture to picture, and how busy each kind of resource is.
 //
 //   build/bin/throughput_bench [--size N] [--workers P] [--team M] [--renderer splat|zbuffer] [--axis auto|view] [--frames F]
 //                              [--schemes A B ...] [--links A B ...]
@@ -73,10 +72,10 @@ Subject MakeSubject(const Options& options) {
 struct Planned {
   FramePlan plan;
   FrameCosts costs;
-  double all = 0, most = 0;  // render seconds: of all boxes, of the worker that has most
+  double all = 0, most = 0;  // render seconds: of all boxes, and of the worker with the most
 };
 
-// The frame after `frames` of them.
+// The frame after `frames` earlier ones.
 Planned Plan(const Subject& subject, const Policy& policy, int workers, int frames, int repeats) {
   const Roster roster = RosterOf(std::uint32_t(workers));
   FrameRequest request = subject.request;
@@ -116,7 +115,7 @@ MachineModel MachineFor(const std::string& link, double one_seconds, int size) {
   machine.workers_a_host = 1;
   machine.cores_a_host = 2;
   if (link == "pvs") {
-    // As laboratory/experiments/machines.cpp: the paper's ratio of computing to communicating, and nothing around a frame.
+    // As laboratory/experiments/machines.cpp: the paper's ratio of computing to communicating, and no costs around a frame.
     machine.link.bytes_per_second = double(size) * size * machine.combining.rgba_bytes / (0.083 / 72.89 * one_seconds);
     machine.plan_seconds = machine.message_seconds = machine.client_seconds = 0;
     machine.hand_overs = {.awake = 0, .asleep = 0};
@@ -142,7 +141,7 @@ Flow Simulate(const FramePlan& plan, const FrameCosts& costs, const MachineModel
     const Team team = TeamOf(everybody, std::uint32_t(teams), turn);
     plans.push_back(TakeTurn(plan, team.roster, team.turn));
   }
-  // Whole rounds of the teams, since they may end together, of which the middle half is looked at.
+  // Whole rounds of the teams, since teams may end together. The middle half is evaluated.
   const int frames = 4 * teams * std::max((16 + teams - 1) / teams, 4);
   std::vector<FrameInput> inputs(std::size_t(frames), input);
   for (std::size_t i = 0; i < inputs.size(); ++i) inputs[i].plan = &plans[i % plans.size()];

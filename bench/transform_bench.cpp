@@ -1,6 +1,6 @@
-// The paper's table 1: the transform of all voxels of an N^3 volume (N = 200 and 300) by a matrix product a voxel against running
-// additions; scalar and in vectors, into stored coordinates and fused with their use. And beside them what the splatting pipeline does
-// instead: places in fixed point along one dimension (Lattice), where a beam is filtered.
+// The paper's table 1: the transform of all voxels of an N^3 volume (N = 200 and 300) by a matrix product for each voxel against running
+// additions; scalar and in vectors, into stored coordinates and fused with their use. And what the splatting pipeline does instead:
+// fixed-point positions along one dimension (Lattice), for which a beam is filtered.
 #include <benchmark/benchmark.h>
 
 #include "laboratory/measure/transform_loops.h"
@@ -38,7 +38,8 @@ void Fused(benchmark::State& state) {
   CountVoxels(state, side);
 }
 
-// Every voxel of the volume occupied, a pixel a voxel: a lattice a slice, and the first tap and the phase of each sample of each beam.
+// All voxels of the volume occupied, a pixel a voxel: a lattice for each slice, and the first tap and the phase of each sample of each
+// beam.
 void InTheRenderPath(benchmark::State& state) {
   const auto side = int(state.range(0));
   for (auto _ : state) {

@@ -1,5 +1,5 @@
-// Frames of the Z-buffer, second one on: the paper's hollow sphere with N = 200 and 256 at 512 x 512, 12 azimuths one after the other, by 1
-// and 2 threads. Time is a frame's; counters are milliseconds a frame, summed over threads.
+// Frames of the Z-buffer, from the second on: the paper's hollow sphere with N = 200 and 256 at 512 x 512, 12 azimuths one after the other,
+// by 1 and 2 threads. Time is per frame; counters are milliseconds a frame, summed over threads.
 #include <benchmark/benchmark.h>
 #include <tbb/task_arena.h>
 

@@ -16,8 +16,8 @@
 namespace slabstream {
 namespace {
 
-constexpr int kUnknownPongs = 2;  // in a row: then a request is submitted again
-constexpr int kMaxResubmits = 3;  // then it fails
+constexpr int kUnknownPongs = 2;  // in a row, before a request is submitted again
+constexpr int kMaxResubmits = 3;  // before it fails
 constexpr std::int64_t kMaxDeadlineMs = 86'400'000;
 
 // A request that has not ended.
@@ -28,7 +28,7 @@ struct OpenRequest {
   int resubmits = 0;
 };
 
-// The picture of a reply, checked: whoever answers at the endpoint may send anything.
+// The checked picture of a reply: whoever answers at the endpoint may send anything.
 Result<Picture> DecodePicture(FrameReply& reply, const Bytes& payload, ImageSize expected) {
   if (reply.size != expected) {
     return Status::DataLoss("FrameReply.size is " + std::to_string(reply.size.width) + "x" + std::to_string(reply.size.height) +
@@ -59,8 +59,8 @@ struct Client::Impl {
 
   void Submit(const SubmitFrame& message);
 
-  // Sends what is due, waits for one of: a message, a wakeup, something else due, `limit`; and handles what has come. True: it was the
-  // wakeup.
+  // Sends due messages, waits for a message, a wakeup, the next due time or `limit`, and handles what has come. True: a wakeup ended the
+  // wait.
   bool Pump(Time limit);
 
   Status NoAnswer(Duration timeout) const {
@@ -68,7 +68,7 @@ struct Client::Impl {
                                std::to_string(std::chrono::duration_cast<std::chrono::milliseconds>(timeout).count()) + " ms");
   }
 
-  // Pumps until `done()`; false when the time is over.
+  // Pumps until `done()`; false: the time is over.
   template <class Done>
   bool PumpUntil(Duration timeout, Done&& done) {
     const Time limit = MonotonicNow() + timeout;
@@ -94,12 +94,12 @@ struct Client::Impl {
   RequestId last_request = 0;
   std::uint64_t last_nonce = 0;
   std::map<RequestId, OpenRequest> open;
-  std::map<std::uint64_t, std::vector<RequestId>> pinged;  // requests of each ping without an answer, by nonce
+  std::map<std::uint64_t, std::vector<RequestId>> pinged;  // requests of each unanswered ping, by nonce
   std::deque<ClientEvent> events;
   std::optional<StatusReply> status_reply;
   std::optional<ShutDownReply> shut_down_reply;
   Time next_ping;
-  std::optional<Time> unanswered_since;  // the first ping after which nothing was heard
+  std::optional<Time> unanswered_since;  // time of the first ping since the last message
 };
 
 void Client::Impl::Submit(const SubmitFrame& message) {
@@ -113,14 +113,14 @@ void Client::Impl::SendPing(Time now) {
   for (const auto& [request, unused] : open) {
     if (ping.open.size() < kMaxOpenRequests) ping.open.push_back(request);
   }
-  (void)Send(ping);  // a ping that cannot be queued counts as one without an answer
+  (void)Send(ping);  // a ping that cannot be queued counts as unanswered
   pinged[ping.nonce] = std::move(ping.open);
   if (!unanswered_since) unanswered_since = now;
   next_ping = now + timing.ping;
 }
 
 bool Client::Impl::Pump(Time limit) {
-  // What has come already is handled before silence is judged: the caller may have been busy elsewhere for long.
+  // Messages that have already come are handled before silence is judged: the caller may have been busy elsewhere for long.
   const bool received = Receive();
   Time now = MonotonicNow();
   if (!open.empty()) {
@@ -133,7 +133,7 @@ bool Client::Impl::Pump(Time limit) {
     limit = std::min(limit, next_ping);
     if (unanswered_since) limit = std::min(limit, *unanswered_since + timing.silence);
   }
-  if (received) return false;  // it may be what the caller waits for
+  if (received) return false;  // a message may be what the caller waits for
   const std::array<Socket*, 1> sockets = {&socket};
   now = MonotonicNow();
   Wait(sockets, &wakeup, std::max<Duration>(limit - now, Duration::zero()));
@@ -252,7 +252,7 @@ RequestId Client::Submit(const FrameRequest& request, Duration deadline) {
   SubmitFrame message{.request = id, .deadline_ms = std::uint32_t(std::clamp<std::int64_t>(ms, 1, kMaxDeadlineMs)), .frame = request};
   impl_->open.emplace(id, OpenRequest{.message = message, .submitted = MonotonicNow()});
   if (Status status = Validate(request); !status.ok()) {
-    impl_->End(id, std::move(status));  // the service would drop what it cannot decode
+    impl_->End(id, std::move(status));  // the service would drop a request that it cannot decode
   } else if (impl_->open.size() > kMaxOpenRequests) {
     impl_->End(id, Status::ResourceExhausted("at most " + std::to_string(kMaxOpenRequests) + " requests may be open at once"));
   } else {
@@ -267,7 +267,7 @@ void Client::Cancel(RequestId request) {
 
 std::optional<ClientEvent> Client::Next(Duration timeout) {
   const Time limit = MonotonicNow() + timeout;
-  // One round at least, so that a caller who polls without a timeout keeps pinging and receiving.
+  // At least one round, so that a caller who polls without a timeout keeps pinging and receiving.
   bool woken = false;
   do {
     woken = impl_->Pump(impl_->events.empty() ? limit : MonotonicNow());
@@ -280,7 +280,7 @@ std::optional<ClientEvent> Client::Next(Duration timeout) {
 
 Result<Picture> Client::Render(const FrameRequest& request, Duration deadline) {
   const RequestId id = Submit(request, deadline);
-  std::deque<ClientEvent> others;  // of requests that somebody else waits for
+  std::deque<ClientEvent> others;  // of other open requests
   std::optional<Result<Picture>> end;
   while (!end) {
     std::optional<ClientEvent> event = Next(impl_->timing.ping);

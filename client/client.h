@@ -35,7 +35,7 @@ struct ClientEvent {
 
 struct ClientTiming {
   Duration ping = std::chrono::seconds(1);     // between pings while requests are open
-  Duration silence = std::chrono::seconds(5);  // without an answer to a ping: the service is gone
+  Duration silence = std::chrono::seconds(5);  // without an answer to a ping, the service counts as gone
 };
 
 class Client {
@@ -44,18 +44,18 @@ class Client {
                                 ClientTiming timing = {});
   Client(Client&&) noexcept;
   Client& operator=(Client&&) noexcept;
-  ~Client();  // cancels what is open
+  ~Client();  // cancels open requests
 
-  // A deadline counts from the request's arrival at the service; it is cut to what the schema allows.
+  // A deadline counts from the request's arrival at the service and is limited to what the schema allows.
   RequestId Submit(const FrameRequest& request, Duration deadline = std::chrono::minutes(10));
   void Cancel(RequestId request);
 
-  // The next event of any open request; nullopt when the timeout is over, or earlier if wakeup() was notified or a signal was handled. If
-  // the service stops answering, every open request gets an Unavailable event. A request that the service has lost is submitted again, a
-  // few times.
+  // The next event of any open request; nullopt after the timeout, or earlier if wakeup() was notified or a signal was handled. If the
+  // service stops answering, every open request gets an Unavailable event. A request that the service has lost is submitted again, a few
+  // times.
   std::optional<ClientEvent> Next(Duration timeout);
 
-  // Submit and wait for the end.
+  // Submits and waits for the end.
   Result<Picture> Render(const FrameRequest& request, Duration deadline = std::chrono::minutes(10));
 
   Result<StatusReply> QueryStatus(Duration timeout = std::chrono::seconds(5));

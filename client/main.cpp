@@ -12,10 +12,10 @@ int main(int argc, char** argv) {
   int exit_status = 1;
   try {
     return slabstream::RunCommandLine(argc, argv, slabstream::LaboratoryCommands());
-  } catch (const std::exception& error) {  // out of memory, mostly: everything that is expected comes back as a Status
+  } catch (const std::exception& error) {  // mostly out of memory: all expected errors are returned as a Status
     std::cerr << "slabstream: " << error.what() << "\n";
   }
-  if (slabstream::BackgroundTasks::AnyRunning()) {  // a load of an embedded service that was interrupted
+  if (slabstream::BackgroundTasks::AnyRunning()) {  // an interrupted load of an embedded service
     std::cout.flush();
     std::_Exit(exit_status);
   }

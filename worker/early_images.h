@@ -1,4 +1,4 @@
-// EarlyImages: PartialImages that came before the assignment of their group, within a byte limit.
+// EarlyImages: PartialImages that arrived before the assignment of their group, within a byte limit.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ class EarlyImages {
  public:
   explicit EarlyImages(std::uint64_t limit_bytes) : limit_bytes_(limit_bytes) {}
 
-  // A second copy of the same image is dropped. ResourceExhausted: the limit is reached, the image is dropped.
+  // Drops a second copy of the same image. ResourceExhausted: the limit is reached; the image is dropped.
   Status Keep(PartialImage message, Bytes payload);
   std::vector<std::pair<PartialImage, Bytes>> Take(const GroupKey& key);
 

@@ -19,8 +19,8 @@ const OcclusionMask kNothingHidden;
 
 std::int64_t NowNs() { return MonotonicNow().time_since_epoch().count(); }
 
-// Within as many threads as all workers of this process have: when pixels are combined or a picture is made, the others have rendered their
-// parts of it. Of the thread that the arena belongs to.
+// Runs `work` with as many threads as all workers of this process have: when pixels are combined or a picture is made, the other workers
+// have already rendered. Call on the thread that the arena belongs to.
 template <class Work>
 auto WithAllThreads(tbb::task_arena& arena, Work&& work) {
   if (const int threads = ThreadShare::OfProcess(); arena.max_concurrency() != threads) {
@@ -30,7 +30,7 @@ auto WithAllThreads(tbb::task_arena& arena, Work&& work) {
   return arena.execute(work);
 }
 
-// Adds a stretch of time to the report of a message; one of the machine's reports if there is any.
+// Adds a time span to the last of a message's reports, if there is any.
 void AddStage(std::vector<RankReport>& reports, Stage stage, std::int64_t begin_ns, std::int64_t end_ns) {
   if (!reports.empty()) AddStage(reports.back(), stage, begin_ns, end_ns);
 }
@@ -42,8 +42,8 @@ Bytes EncodePixels(const ImageView& view, ColorCoding color, PartialImage& messa
   return Bytes(std::move(runs.payload));
 }
 
-// The same without a copy, where the pixels of `view` of `image` are their payload as they lie. Like what is lent they may be read until
-// the message has been sent: pixels that were passed on are written again only when they have come back.
+// The same without a copy, if the pixels of `view` of `image` already lie in memory as their payload. Like lent pixels they may be read
+// until the message has been sent: pixels that were passed on are written again only after they have come back.
 std::optional<Bytes> PixelsInPlace(const LocalImage& image, const ImageView& view, PartialImage& message) {
   const std::optional<RunImageHeader> header = DenseHeader(view);
   if (!header) return std::nullopt;
@@ -64,13 +64,13 @@ bool Covers(PixelRange pixels, const PixelBounds& bounds, std::int32_t frame_wid
   return pixels.begin <= index(bounds.x_begin, bounds.y_begin) && index(bounds.x_end - 1, bounds.y_end - 1) < pixels.end;
 }
 
-// What an image grows to: the whole frame, of which only what is written takes memory, unless it is very large.
+// The bounds to which an image grows: the whole frame, unless it is very large. Only written parts take memory.
 PixelBounds RoomFor(const PixelBounds& a, const PixelBounds& b, const PixelBounds& frame) {
   constexpr std::int64_t kMostPixels = std::int64_t{1} << 22;
   return frame.pixel_count() <= kMostPixels ? frame : Union(a, b);
 }
 
-// `view` has no pixels but those of `pixels`. `fresh`: `image` is none yet.
+// `view` has only pixels of `pixels`. `fresh`: `image` does not exist yet.
 void CombineView(LocalImage& image, bool fresh, const ImageView& view, const StartCombine& action, PixelRange pixels) {
   if (fresh) {
     image = CopyOf(view);
@@ -84,7 +84,7 @@ void CombineView(LocalImage& image, bool fresh, const ImageView& view, const Sta
 void CombineImages(LocalImage& image, bool fresh, const std::shared_ptr<LocalImage>& other, const StartCombine& action, PixelRange pixels) {
   const bool whole = Covers(pixels, other->bounds, action.frame.width());
   if (fresh && whole && other.use_count() == 1) {
-    image = std::move(*other);  // released already, and this task is the last that holds it: nobody misses it
+    image = std::move(*other);  // already released, and this task is the last holder
   } else {
     CombineView(image, fresh, whole ? ViewOf(*other) : ViewOf(*other, pixels, action.frame.width()), action, pixels);
   }
@@ -114,20 +114,20 @@ Status CombineBorrowed(LocalImage& image, bool fresh, const StartCombine& action
       memory.Borrow(*incoming.shared, incoming.header.format, incoming.payload, pixels, action.frame, MonotonicNow());
   if (!borrowed.ok()) return borrowed.status();
   const ImageView& view = borrowed->view;
-  if (fresh) {  // room for what is borrowed
+  if (fresh) {  // room for the borrowed pixels
     image = MakeUnwrittenImage(view.format, view.bounds);
     image.rows.resize(std::size_t(view.bounds.height()));
   }
   if (action.replace) Erase(image, pixels, action.frame.width());
   const bool valid = CombineUnchecked(image, view, action.side, RoomFor(image.bounds, view.bounds, action.frame));
-  // Its owner took the frame for over while it was being read here: `image` may hold anything, and the group fails.
+  // The owner reused the frame while it was read here: `image` may hold anything, and the group fails.
   if (!borrowed->Intact()) return Status::DataLoss("a lent image was taken back while it was read");
   return valid ? Status::Ok() : Status::InvalidArgument("shared image: a pixel's colour or depth is not finite");
 }
 
 }  // namespace
 
-// Voxels while they arrive (combining thread), then what renders from them (render thread, from the first StartRender on).
+// Voxels while they arrive (combining thread), then the data to render from (render thread, from the first StartRender on).
 struct Executor::Slab {
   explicit Slab(const SlabKey& slab_key) : key(slab_key) {}
 
@@ -147,7 +147,7 @@ struct Executor::Slab {
     return Status::Ok();
   }
 
-  // What to render from. The first call, when all chunks are stored, copies what other slabs hold. Render thread only.
+  // The data to render from. The first call, when all chunks are stored, copies voxels that other slabs hold. Render thread only.
   SlabData& Data() {
     if (data != nullptr) return *data;
     if (!voxels) voxels.emplace(key.box, key.type);
@@ -333,7 +333,7 @@ void Executor::Perform(FindHidden&& action) {
       found.hidden = FindHiddenTiles(*image, frame.width(), frame.height(), find.setup->termination, std::move(find.known));
       return Status::Ok();
     });
-    if (!status.ok()) LogWarning(status.message());  // what nobody is told of is rendered
+    if (!status.ok()) LogWarning(status.message());  // what no mask hides is rendered
     outbox_.Post(WorkerEvent(std::move(found)));
   });
 }
@@ -357,7 +357,7 @@ void Executor::Perform(SendPartial&& action, const Delivery& delivery) {
   const auto view_of = [](const LocalImage& of, const SendPartial& send) { return ViewOf(of, send.message.pixels, send.frame.width()); };
   std::optional<ImageView> view;
   std::optional<Bytes> payload;
-  // To say where pixels are takes less time than to wake a thread that does.
+  // Describing where pixels are takes less time than waking a thread for it.
   if (combine_thread_.Idle()) {
     bool posted = false;
     const Status status = Guard("encode", [&] {

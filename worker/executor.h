@@ -1,13 +1,12 @@
-// Executor: carries out what a WorkerMachine orders that takes time: renders on one thread, combines, encodes and unpacks chunks on
-// another, and makes finished pictures on a third, so that the next frames are combined meanwhile. Rendering, and the making of the
-// picture, are spread over the worker's render threads.
+// Executor: runs the slow actions of a WorkerMachine. One thread renders; another combines, encodes and unpacks chunks; a third makes
+// finished pictures while the next frames are combined. Rendering and making pictures use all render threads of the worker.
 //
 //   1. The thread that owns the machine calls Perform for each action of the kinds below, in order.
-//   2. What comes of it is posted to the outbox: an event for the machine, or a message that is ready to be sent.
-// Tables of slabs and images belong to the calling thread; tasks share the entries that they need, so nothing is freed under a running task
-// and no lock is held while pixels are touched. An entry's contents are touched by one task at a time: the machine orders the next use of a
-// slab or image only after the event that ends the last one, but for the combining thread's own tasks, which run in order. Nothing is
-// combined onto the image of a finished frame; previews, whose image grows on, are made on the combining thread.
+//   2. The result goes to the outbox: an event for the machine, or a message that is ready to be sent.
+// Tables of slabs and images belong to the calling thread. Tasks share the entries that they need, so nothing is freed under a running task
+// and no lock is held while pixels are touched. One task at a time touches an entry's contents: the machine orders the next use of a slab
+// or image only after the event that ends the last one. The combining thread's own tasks are an exception: they run in order. Nothing is
+// combined into the image of a finished frame; the image of a preview still grows, so previews are made on the combining thread.
 #pragma once
 
 #include <tbb/task_arena.h>
@@ -36,7 +35,7 @@
 
 namespace slabstream {
 
-// A message of the combining thread, encoded.
+// An encoded message from the combining thread.
 struct OutgoingPartial {
   Peer to;
   std::vector<std::byte> header;
@@ -51,13 +50,13 @@ struct OutgoingFrame {
 };  // to the coordinator
 using ExecutorOutput = std::variant<WorkerEvent, OutgoingPartial, OutgoingFrame>;
 
-// Called at the beginning of each task, on its thread, with its name; what it throws fails the task. For tests; empty: nothing.
+// Called with the name of each task when the task begins, on its thread. If it throws, the task fails. For tests; may be empty.
 using TaskHook = std::function<void(std::string_view task)>;
 
-// How pixels get to another worker.
+// How pixels reach another worker.
 struct Delivery {
-  bool lend = false;                              // it can read this process' memory, so that they may stay where they are
-  double bytes_per_second = LinkRates::kUnknown;  // of the link: what is not lent is packed where that pays
+  bool lend = false;                              // the receiver can read this process' memory, so pixels may stay where they are
+  double bytes_per_second = LinkRates::kUnknown;  // of the link; pixels that are not lent are packed if that pays
 };
 
 class Executor {
@@ -65,7 +64,7 @@ class Executor {
   // `frame_codec` packs finished frames. `threads` render, at least 1. The outbox must outlive the executor.
   Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec, int threads, RendererFactory make_renderer = MakeRenderer,
            TaskHook hook = {});
-  ~Executor();  // cancels the running render, drops what has not begun, joins
+  ~Executor();  // cancels the running render, drops tasks that have not begun, joins
 
   void Perform(const OpenSlab& action);
   void Perform(StoreChunk&& action);
@@ -78,18 +77,18 @@ class Executor {
   void Perform(SendFrame&& action);
   void Perform(const ReleaseImage& action);
 
-  // A task could not even report that it failed. Its outbox was notified; the worker can only leave.
+  // A task could not even report its failure. The outbox was notified; the worker can only leave.
   bool broken() const { return broken_; }
   PeerMemory& peer_memory() { return peer_memory_; }
-  // Adds to reports that leave otherwise than with a PartialImage what the messages of their ranks took.
+  // For reports that leave without a PartialImage: adds the bytes and times of their ranks' messages.
   void AddSent(const GroupKey& key, std::vector<RankReport>& reports) { sent_.MoveInto(key, reports); }
-  // Lets go of what was lent and is known of the groups for which `over(key)` is true.
+  // Releases the lent images and forgets the tallies of the groups for which `over(key)` is true.
   template <class Predicate>
   void Forget(Predicate over) {
     lent_.Forget(over);
     sent_.Forget(over);
   }
-  // Sends as runs what was lent, if it still is.
+  // Sends a lent image as runs, if it is still lent.
   void Resend(const ImageRefused& refused);
 
  private:
@@ -99,15 +98,15 @@ class Executor {
     std::shared_ptr<std::atomic<bool>> cancelled;
   };
 
-  // An exception barrier round `work`, which returns a Status.
+  // Runs `work`, which returns a Status, and catches its exceptions.
   template <class Work>
   Status Guard(const char* task, Work&& work);
   void Break();
   std::shared_ptr<LocalImage> FindImage(ImageHandle image);  // null: no such image
   void MakePicture(LocalImage& image, SendFrame& send, tbb::task_arena& arena);
-  // Of pixels that stay where they are until they are read there, or sent from there. None: they have to be encoded.
+  // The payload for pixels that stay where they are until they are read or sent from there. None: they have to be encoded.
   std::optional<Bytes> PayloadInPlace(const LocalImage& image, const ImageView& view, const Delivery& delivery, SendPartial& send);
-  void Post(SendPartial& send, Bytes payload, std::int64_t begin_ns);  // which was made since then
+  void Post(SendPartial& send, Bytes payload, std::int64_t begin_ns);  // the payload was made since begin_ns
   RenderDone Render(const StartRender& action, Slab& slab, const std::atomic<bool>& cancelled, LocalImage& image);
 
   Mailbox<ExecutorOutput>& outbox_;
@@ -121,9 +120,9 @@ class Executor {
   const RendererFactory make_renderer_;
   const TaskHook hook_;
   std::atomic<bool> broken_ = false;
-  std::map<const RendererKind*, std::unique_ptr<Renderer>> renderers_;  // the render thread's
+  std::map<const RendererKind*, std::unique_ptr<Renderer>> renderers_;  // used by the render thread
   const ThreadShare threads_;
-  // One for each thread below that enters: in a common arena the last picture would wait for the next one's rendering.
+  // One arena for each thread below that enters: in a shared one, the last picture would wait for the rendering of the next.
   tbb::task_arena render_arena_;
   tbb::task_arena combine_arena_;
   tbb::task_arena finish_arena_;

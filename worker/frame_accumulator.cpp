@@ -67,7 +67,7 @@ void FrameAccumulator::Advance(WorkerActions& actions) {
 void FrameAccumulator::StartGroup(GroupImage group, WorkerActions& actions) {
   group_started_ = true;
   reports_.push_back(std::move(group.reports));
-  if (group.pieces.empty() && image_ == 0) {  // a frame that begins with an empty group begins with an empty picture
+  if (group.pieces.empty() && image_ == 0) {  // a frame that starts with an empty group starts with an empty picture
     RunImageHeader nothing;
     nothing.format = setup_->format;
     group.pieces.push_back({pixels_, {}, 0, {.header = nothing}});
@@ -75,7 +75,7 @@ void FrameAccumulator::StartGroup(GroupImage group, WorkerActions& actions) {
   std::set<ImageHandle> used;
   for (ImagePiece& piece : group.pieces) {
     if (image_ == 0 && piece.image != 0 && piece.pixels == pixels_) {
-      image_ = piece.image;  // the first group's image becomes the frame's
+      image_ = piece.image;  // the first group's image becomes the frame
       continue;
     }
     if (image_ == 0) image_ = names_.Next();

@@ -1,7 +1,7 @@
-// FrameAccumulator: the frame on its display worker. Group images are put behind each other, nearest first; early ones wait. After each
-// group it reports GroupDone and sends a preview if wanted, after the last one the frame. Where frames use occlusion masks, it first has
-// the hidden tiles found, which go with the report; of the last group nobody needs them. It outlives attempts: what is accumulated is right
-// whoever rendered it. It keeps the picture until the frame is over, because the coordinator may ask again (Confirm).
+// FrameAccumulator: the frame on its display worker. It accumulates group images front to back; early ones wait. After each group it
+// reports GroupDone and sends a preview if wanted; after the last group it sends the frame. If frames use occlusion masks, it first finds
+// the hidden tiles and adds them to the report, except after the last group, when nobody needs them. It outlives attempts: accumulated
+// pixels are right whoever rendered them. It keeps the picture until the frame is over, because the coordinator may ask again (Confirm).
 #pragma once
 
 #include <cstdint>
@@ -18,10 +18,10 @@ namespace slabstream {
 
 class FrameAccumulator {
  public:
-  // Of any group's assignment of the frame. `names` must outlive it.
+  // `assignment`: of any group of the frame. `names` must outlive the accumulator.
   FrameAccumulator(const GroupAssignment& assignment, WorkerId self, ImageNames& names);
 
-  // Here already, whether accumulated, being combined, or waiting.
+  // True if the group's image is here: accumulated, being combined, or waiting.
   bool Has(std::uint32_t group) const { return group < groups_done_ + (group_started_ ? 1U : 0U) || waiting_.count(group) > 0; }
   std::uint32_t groups_done() const { return groups_done_; }
   const Status& failure() const { return failure_; }  // the picture is lost: drop the accumulator
@@ -33,7 +33,7 @@ class FrameAccumulator {
   bool OnCombined(const CombineDone& done, WorkerActions& actions);  // false: not one of its combines
   void OnHiddenFound(const HiddenFound& found, WorkerActions& actions);
 
-  // Says again that the group is done, and sends the finished frame again (once for each attempt), if they are.
+  // If the group is done, reports it again; if the frame is finished, sends it again, once for each attempt.
   void Confirm(std::uint32_t group, WorkerActions& actions);
 
   void Drop(WorkerActions& actions);  // releases what it holds
@@ -58,10 +58,10 @@ class FrameAccumulator {
   std::uint32_t groups_done_ = 0;                    // accumulated, nearest first
   std::optional<std::uint32_t> frame_sent_attempt_;  // the latest attempt for which the finished frame was sent
   ImageHandle image_ = 0;                            // 0: none yet
-  int combining_ = 0;                                // StartCombine into image_ and FindHidden in it without their answer
+  int combining_ = 0;                                // StartCombine and FindHidden of image_ that have not been answered
   bool group_started_ = false;
   OcclusionMask hidden_;                          // by the groups done
-  std::map<std::uint32_t, GroupImage> waiting_;   // complete, in front of them something is missing
+  std::map<std::uint32_t, GroupImage> waiting_;   // complete, but a group in front of them is missing
   std::vector<std::vector<RankReport>> reports_;  // of the groups done, and of the one being combined
   Status failure_;
 };

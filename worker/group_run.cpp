@@ -14,7 +14,7 @@ namespace {
 
 std::string Text(const RankInterval& ranks) { return fmt::format("[{}, {})", ranks.begin, ranks.end); }
 
-// False if some of `pixels` has been seen: a duplicate.
+// False if any of `pixels` has been seen before: a duplicate.
 bool Remember(std::vector<PixelRange>& seen, const PixelRange& pixels) {
   if (std::any_of(seen.begin(), seen.end(), [&](const PixelRange& old) { return Overlap(old, pixels); })) return false;
   seen.push_back(pixels);
@@ -49,7 +49,7 @@ GroupRun::GroupRun(GroupAssignment assignment, WorkerId self, ImageNames& names)
   for (const Rank rank : runner_.order().ranks()) ranks_[rank];
 }
 
-// Of a group that its schedule does not fit: one without ranks.
+// If the schedule does not fit the group: a runner without ranks.
 GroupRun::Runner GroupRun::MakeRunner() {
   const GroupPlan& group = assignment_.group;
   Result<SharedSchedule> schedule = DeriveSchedule(group.schedule, frame_);
@@ -187,7 +187,7 @@ void GroupRun::Receive(const Runner::Taken& taken, WorkerActions& actions) {
 
 void GroupRun::Merge(Rank rank, ImagePiece piece, WorkerActions& actions) {
   const std::vector<Held> held = runner_.held(rank).Within(piece.pixels);
-  // The usual case: it goes straight into the one image that is there.
+  // The usual case: the piece goes straight into the only image.
   if (piece.image == 0 && held.size() == 1 && held[0].pixels == piece.pixels) return Combine(rank, held[0], piece, actions);
   if (held.empty() && ComesHome(rank, piece)) return TakeHome(rank, std::move(piece), actions);
   const bool incoming = piece.image == 0;
@@ -208,8 +208,8 @@ void GroupRun::Merge(Rank rank, ImagePiece piece, WorkerActions& actions) {
   if (incoming) ReleaseUnused({{piece.pixels, {piece.ranks, piece.image}}}, actions);
 }
 
-// True if the rank passed these pixels on before and gets them back now, combined with others': then whoever read them has done so, and
-// their place in the rank's own image is free.
+// True if the rank passed these pixels on before and now gets them back, combined with others: then their reader has finished, and their
+// place in the rank's own image is free.
 bool GroupRun::ComesHome(Rank rank, const ImagePiece& piece) const {
   const ImageHandle own = ranks_.at(rank).own;
   return own != 0 && piece.image != own && piece.ranks.begin <= rank && rank < piece.ranks.end && Uses(rank, own);
@@ -306,7 +306,7 @@ bool GroupRun::Uses(Rank rank, ImageHandle image) const {
   return std::ranges::any_of(runner_.held().at(rank).list(), [&](const Held& part) { return part.value.image == image; });
 }
 
-// Releases the images of fragments that were taken, once each, unless other fragments still use them.
+// Releases the images of taken fragments, once each, unless other fragments still use them.
 void GroupRun::ReleaseUnused(const std::vector<Held>& taken, WorkerActions& actions) {
   std::vector<ImageHandle> images;
   for (const Held& part : taken) images.push_back(part.value.image);
@@ -318,7 +318,7 @@ void GroupRun::ReleaseUnused(const std::vector<Held>& taken, WorkerActions& acti
   }
 }
 
-// Reports leave a rank with its last pixels, so that all that the rank combined is in them.
+// Reports leave with the rank's last pixels, so that they include all its combining.
 std::vector<RankReport> GroupRun::TakeReports(Rank rank) {
   return runner_.order().HasOpenSteps(rank) ? std::vector<RankReport>() : std::exchange(ranks_.at(rank).reports, {});
 }

@@ -1,10 +1,10 @@
 // GroupRun: one group of one attempt on one worker. It runs the group's schedule for the ranks that this worker renders (ScheduleRunner),
 // and on the display worker it collects the group image.
 //
-// A step travels as one PartialImage for each of the sender's fragments in its range (one, unless the schedule divides images); the
+// A step travels as one PartialImage for each of the sender's fragments in its range (one, unless the schedule divides images). The
 // receiver counts pixels until the range is covered. A step between two ranks of this worker moves fragments without a message.
 //
-// The first failure is kept in failure(). The run then does nothing any more and waits to be dropped.
+// After the first failure, kept in failure(), the run does nothing more and waits to be dropped.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@
 
 namespace slabstream {
 
-// Part of an image: pixels of `image`, or if that is 0 what came from another worker.
+// Part of an image: pixels of `image`, or if that is 0, pixels from another worker.
 struct ImagePiece {
   PixelRange pixels;
   RankInterval ranks;
@@ -27,7 +27,7 @@ struct ImagePiece {
   IncomingImage incoming;
 };
 
-// All pixels of a group (no pieces: the group is empty), on the display worker. Who takes it owns the images.
+// All pixels of a group, on the display worker; an empty group has no pieces. The taker owns the images.
 struct GroupImage {
   GroupKey key;
   std::vector<ImagePiece> pieces;
@@ -36,7 +36,7 @@ struct GroupImage {
 
 class GroupRun {
  public:
-  // An assignment whose parts do not fit together is a failure. `names` must outlive the run.
+  // An inconsistent assignment is a failure. `names` must outlive the run.
   GroupRun(GroupAssignment assignment, WorkerId self, ImageNames& names);
 
   const GroupAssignment& assignment() const { return assignment_; }
@@ -45,17 +45,17 @@ class GroupRun {
 
   // Takes over `image`, the picture of one of this worker's ranks.
   void OnRendered(Rank rank, ImageHandle image, RankReport report, WorkerActions& actions);
-  // One of this worker's ranks shows nothing and is not rendered: its picture is empty.
+  // One of this worker's ranks draws nothing: it is not rendered and its picture is empty.
   void LeaveOut(Rank rank, RankReport report, WorkerActions& actions);
   void OnPartial(const PartialImage& message, Bytes payload, WorkerActions& actions);
   void OnCombined(const CombineDone& done, WorkerActions& actions);
 
   std::optional<GroupImage> TakeGroupImage();  // display worker, once
-  bool finished() const;                       // this worker has nothing more to do for it, and holds nothing of it
+  bool finished() const;                       // this worker has nothing more to do for the group, and holds nothing of it
   void Drop(WorkerActions& actions);           // releases what it holds
 
  private:
-  // Where pixels of a rank are stored, and which ranks they have been combined from. Fragments may share an image; their pixels are then
+  // Where pixels of a rank are stored, and the ranks that were combined into them. Fragments may share an image; their pixels are then
   // disjoint, also between ranks.
   struct ImagePart {
     RankInterval ranks;
@@ -68,7 +68,7 @@ class GroupRun {
     ImageHandle own = 0;              // its picture, once rendered
     std::vector<RankReport> reports;  // on their way with this rank
   };
-  struct Arrivals {  // of one step that this worker receives, or of the group image
+  struct Arrivals {  // for one step that this worker receives, or for the group image
     std::vector<PixelRange> seen;
     std::vector<ImagePiece> waiting;
     std::vector<RankReport> reports;
@@ -107,7 +107,7 @@ class GroupRun {
   Status failure_;
   Runner runner_;
   std::map<Rank, RankState> ranks_;                       // of this worker
-  std::unordered_map<std::uint32_t, Arrivals> arrivals_;  // by step, of steps that are not complete
+  std::unordered_map<std::uint32_t, Arrivals> arrivals_;  // by step, for incomplete steps
   std::vector<std::pair<ImageHandle, Rank>> combining_;   // StartCombine without CombineDone
   bool root_done_ = false;
   Arrivals group_pieces_;           // display worker

@@ -1,4 +1,4 @@
-// Names for images: the machine chooses handles, so that it can talk about an image before the executor has made it.
+// Names for images: the machine chooses handles, so it can name an image before the executor has made it.
 #pragma once
 
 #include <vector>

@@ -30,7 +30,7 @@ bool PackingPays(double link_bytes_per_second, const CodecSpeed& codec) {
 }
 
 CodecSpeed SampleCodec(std::span<const std::byte> payload) {
-  constexpr std::size_t kWord = 4;  // what is packed comes in words
+  constexpr std::size_t kWord = 4;  // the codec packs words
   const std::size_t bytes = std::min(kSampleBytes, payload.size()) / kWord * kWord;
   if (bytes == 0) return {};
   const std::span<const std::byte> sample = payload.subspan((payload.size() - bytes) / 2 / kWord * kWord, bytes);

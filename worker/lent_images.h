@@ -1,11 +1,11 @@
-// LentImages: images that other workers of this host read in this process' memory instead of having them sent.
+// LentImages: images that other workers of this host read in this process' memory instead of receiving them.
 //
-//   1. Lend pins the memory and describes it in the message, which then goes without pixels.
-//   2. The receiver combines straight from there. If it cannot open the memory it says so (ImageRefused): Find, and send the same as runs.
-//   3. Forget lets go of what was lent for groups that are over: their images have been read, or nobody needs them any more.
-// No message tells that an image was read. That a group is done says it of all that was lent for it, since an image is passed on only when
-// everything that went into it has been read; and a reader that was late for any reason notices (common/base/shared_arena.h).
-// Any thread.
+//   1. Lend pins the memory and describes it in the message, which then carries no pixels.
+//   2. The receiver combines straight from there. If it cannot open the memory it answers ImageRefused: Find the image, and send it as
+//   runs.
+//   3. Forget releases the images of groups that are over: they have been read, or nobody needs them any more.
+// No message says that an image was read. When a group is done, all images lent for it have been read, because an image is passed on only
+// after everything that went into it was read. A late reader notices (common/base/shared_arena.h). Any thread.
 #pragma once
 
 #include <cstdint>
@@ -29,14 +29,14 @@ struct LentImage {
 
 class LentImages {
  public:
-  static constexpr std::size_t kLeastBytes = std::size_t{32} << 10;  // of pixels: fewer are sent as quickly
+  static constexpr std::size_t kLeastBytes = std::size_t{32} << 10;  // of pixels: smaller images are sent as quickly
   static constexpr std::size_t kMostBytes = std::size_t{2} << 30;    // lent at a time
 
   // Fills message.shared for `view` of `image` and returns the payload. None: the memory is private, the image is small, or too much is
   // lent already.
   std::optional<Bytes> Lend(const LocalImage& image, const ImageView& view, const Peer& to, PartialImage& message);
 
-  // What was lent with this message, if it has not been forgotten; the memory stays as long as the result does.
+  // The image lent with this message, if it has not been forgotten. The memory stays as long as the result does.
   std::shared_ptr<const LentImage> Find(const GroupKey& key, std::uint32_t step, const PixelRange& pixels);
 
   template <class Predicate>

@@ -44,7 +44,7 @@ void LinkRates::Received(WorkerId from, std::uint64_t number, Time now) {
     const double seconds = std::max(std::chrono::duration<double>(now - message.sent).count(), 1e-9);
     best = std::max(best, double(link.bytes_asked - message.before) / seconds);
   }
-  if (best == 0) return;  // more has been sent since than is remembered
+  if (best == 0) return;  // more messages have been sent since than are remembered
   link.rates.push_back(best);
   if (link.rates.size() > kAnswers) link.rates.pop_front();
 }

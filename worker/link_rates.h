@@ -1,12 +1,12 @@
-// LinkRates: how fast the links to other workers are, as their answers to images tell. Of the thread that sends; knows no clock.
+// LinkRates: estimates the speed of the links to other workers from their answers to images. Belongs to the sending thread; reads no clock.
 //
-//   1. Ask gives the number to put into a message, or 0: then this image is not timed. The first few images to a worker are, later about
-//      one a second.
-//   2. Sent for everything that is sent there, timed or not: what is queued in front of an image is moved before it.
-//   3. Received when the answer to a number comes: what was sent has all arrived by then.
-// From one answer the rate is the largest of bytes / time over the last messages sent before it, beginning with any of them: shorter
-// stretches leave out what they waited for, longer ones hold idle time. Of the last few answers the best counts: a receiver that had no
-// processor for a while is no slow link.
+//   1. Ask returns the number to put into a message, or 0 if this image is not timed. The first few images to a worker are timed, later
+//      about one a second.
+//   2. Call Sent for everything sent to the worker, timed or not: bytes queued in front of an image move before it.
+//   3. Call Received when the answer to a number arrives: by then everything sent so far has arrived.
+// One answer gives the rate as the maximum of bytes / time over the last messages sent before it, for every possible first message: shorter
+// stretches leave out what they waited for, longer ones hold idle time. The best of the last few answers counts, since a receiver that
+// lacked a processor for a while is not a slow link.
 #pragma once
 
 #include <cstddef>
@@ -23,8 +23,8 @@ namespace slabstream {
 
 class LinkRates {
  public:
-  static constexpr std::size_t kAnswers = 4;                       // that count
-  static constexpr std::size_t kLeastAnswers = 2;                  // that a rate is known by
+  static constexpr std::size_t kAnswers = 4;                       // answers that count
+  static constexpr std::size_t kLeastAnswers = 2;                  // needed before a rate is known
   static constexpr Duration kInterval = std::chrono::seconds(1);   // between later questions
   static constexpr Duration kPatience = std::chrono::seconds(30);  // for an answer
   static constexpr double kUnknown = std::numeric_limits<double>::infinity();
@@ -39,7 +39,7 @@ class LinkRates {
   void ForgetAll() { links_.clear(); }
 
  private:
-  static constexpr std::size_t kMessages = 64;  // that are looked back at
+  static constexpr std::size_t kMessages = 64;  // of the past that an answer considers
   struct Message {
     Time sent;
     std::uint64_t before;  // bytes sent earlier
@@ -47,10 +47,10 @@ class LinkRates {
   struct Link {
     std::deque<Message> messages;
     std::uint64_t bytes = 0;        // sent in all
-    std::uint64_t asked = 0;        // number that is not answered; 0: none
+    std::uint64_t asked = 0;        // number without an answer yet; 0: none
     std::optional<Time> asked_at;   // last
-    bool was_sent = false;          // the asked one
-    std::uint64_t bytes_asked = 0;  // sent in all with it
+    bool was_sent = false;          // whether the message with that number was sent
+    std::uint64_t bytes_asked = 0;  // bytes sent in all, up to and including that message
     Time asked_sent;
     std::deque<double> rates;  // of the last answers
   };

@@ -1,4 +1,4 @@
-// slabstream-worker: one worker process. It waits for its coordinator as long as it takes and ends on Stop, SIGINT or SIGTERM.
+// slabstream-worker: one worker process. It waits for its coordinator without a time limit and ends on Stop, SIGINT or SIGTERM.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -70,7 +70,7 @@ int main(int argc, char** argv) {
   slabstream::KeepFrameBuffers();
   try {
     return Run(argc, argv);
-  } catch (const std::exception& error) {  // out of memory, mostly: everything that is expected comes back as a Status
+  } catch (const std::exception& error) {  // mostly out of memory: all expected errors are returned as a Status
     (void)std::fprintf(stderr, "slabstream-worker: %s\n", error.what());
     return 1;
   }

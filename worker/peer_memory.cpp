@@ -49,7 +49,7 @@ Result<BorrowedImage> PeerMemory::Borrow(const SharedImage& image, PixelFormat f
   const auto fits = [&](const ColumnSpan& row) { return row.begin <= row.end && row.end <= width; };
   if (!std::ranges::all_of(view.rows, fits)) return Invalid("a row span leaves the bounds");
 
-  // Nothing overflows: strides, sides and first pixels have been limited where the message was read.
+  // Nothing overflows: strides, sides and first pixels were limited when the message was read.
   if (view.stride < width) return Invalid("rows overlap");
   const std::uint64_t pixels = image.first_pixel + (height - 1) * view.stride + width;
   const bool depth = HasDepth(format);

@@ -1,5 +1,5 @@
-// PeerMemory: the memory of other workers of this host, mapped to read the images that they lend. A mapping is kept while it is used, and a
-// while longer; it keeps the memory of a dead worker, so idle ones are closed. Any thread.
+// PeerMemory: maps the memory of other workers of this host, to read the images that they lend. A mapping stays a while after its last use.
+// It keeps the memory of a dead worker alive, so idle ones are closed. Any thread.
 #pragma once
 
 #include <chrono>
@@ -23,7 +23,7 @@ struct BorrowedImage {
   std::shared_ptr<const MappedArena> arena;
   std::vector<BlockName> planes;
 
-  // After the last read: false if what was read may be anything.
+  // Call after the last read. False: the pixels read may be arbitrary.
   bool Intact() const;
 };
 
@@ -34,8 +34,8 @@ class PeerMemory {
   // Maps the arena unless it is mapped already. Errors: as MappedArena::Open.
   Status Open(const ArenaName& name, Time now);
 
-  // The pixels of `image` that lie in `range` of `frame`. Any image and payload (`spans`): nothing outside the arena is ever read.
-  // InvalidArgument: something does not fit; DataLoss: the image is not lent any more; others: as Open, since an image may wait for longer
+  // The pixels of `image` that lie in `range` of `frame`. Accepts any image and payload (`spans`): never reads outside the arena.
+  // InvalidArgument: something does not fit. DataLoss: the image is no longer lent. Others: as Open, since an image may wait for longer
   // than a mapping is kept.
   Result<BorrowedImage> Borrow(const SharedImage& image, PixelFormat format, const Bytes& spans, PixelRange range, const PixelBounds& frame,
                                Time now);

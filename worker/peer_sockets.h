@@ -1,7 +1,7 @@
-// PeerSockets: the sending ends of the images plane, one DEALER to each worker that something was sent to lately.
+// PeerSockets: the sending ends of the images plane, one DEALER for each worker that was sent to lately.
 //
-// A DEALER queues silently while its peer is down; that a peer is dead the coordinator finds out, and orders nothing more for it. Its
-// socket and what it queued are closed after kPeerIdle without use.
+// A DEALER queues silently while its peer is down. The coordinator detects dead peers and orders nothing more for them. A socket and its
+// queue are closed after kPeerIdle without use.
 #pragma once
 
 #include <chrono>

@@ -1,5 +1,5 @@
-// RenderQueue: the ranks that this worker has yet to render, in order of frame, group and rank, and the one that is being rendered. The
-// first whose slab is complete goes next; there is never more than one. Each job pins its slab.
+// RenderQueue: the ranks that this worker has yet to render, in order of frame, group and rank, and the one that it renders now. The first
+// rank with a complete slab goes next; only one is rendered at a time. Each job pins its slab.
 #pragma once
 
 #include <cstdint>
@@ -25,8 +25,8 @@ class RenderQueue {
   void DropGroup(const GroupKey& key, WorkerActions& actions);  // its running render is cancelled
   void StartNext(WorkerActions& actions);                       // if nothing is rendered and a slab is complete
 
-  // The end of the running render: the executor's report with identities and what was fetched filled in, or nothing if its group was
-  // dropped (the image is then released).
+  // Call when the running render ends. Returns the executor's report with identities and fetch figures filled in, or nothing if the group
+  // was dropped (the image is then released).
   std::optional<RankReport> Finish(const RenderDone& done, WorkerId worker, WorkerActions& actions);
 
   std::vector<SlabFetcher::Generation> SlabsInOrder() const;  // of waiting jobs

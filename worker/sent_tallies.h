@@ -1,7 +1,7 @@
-// SentTallies: what the messages of each rank took, kept until its report leaves this worker.
+// SentTallies: bytes and encoding time of each rank's messages, kept until the rank's report leaves this worker.
 //
-// A rank may send many messages of a group, in strips or to many others, and its report goes with the last of them; or with those of
-// another rank of this worker; or, from the display worker, with GroupDone. The machine counts none of that: it sees no bytes. Any thread.
+// A rank may send many messages of a group, in strips or to many others. Its report goes with the last of them, or with those of another
+// rank of this worker, or, from the display worker, with GroupDone. The machine sees no bytes and so counts nothing. Any thread.
 #pragma once
 
 #include <cstddef>
@@ -18,10 +18,10 @@ namespace slabstream {
 
 class SentTallies {
  public:
-  // A message of `rank` with a payload of `bytes` was made from begin_ns on until end_ns, on the clock of MonotonicNow().
+  // A message of `rank` with a payload of `bytes` was made from begin_ns to end_ns, by the clock of MonotonicNow().
   void Add(const GroupKey& key, std::uint32_t rank, std::size_t bytes, std::int64_t begin_ns, std::int64_t end_ns);
 
-  // Adds what is known of them to the reports of ranks of `key`, and forgets it.
+  // Moves the tallies of ranks of `key` into their reports.
   void MoveInto(const GroupKey& key, std::vector<RankReport>& reports);
 
   template <class Predicate>
@@ -32,7 +32,7 @@ class SentTallies {
 
  private:
   std::mutex mutex_;
-  std::map<std::pair<GroupKey, std::uint32_t>, RankReport> tallies_;  // by rank: its bytes and encoding; guarded by mutex_
+  std::map<std::pair<GroupKey, std::uint32_t>, RankReport> tallies_;  // bytes and encoding by rank; guarded by mutex_
 };
 
 }  // namespace slabstream

@@ -28,10 +28,10 @@
 namespace slabstream {
 namespace {
 
-constexpr Duration kLongestWait = std::chrono::seconds(1);  // between looks at what is idle
-constexpr Duration kStopGrace = std::chrono::seconds(5);    // for the machine to leave in order
+constexpr Duration kLongestWait = std::chrono::seconds(1);  // between checks for idle connections
+constexpr Duration kStopGrace = std::chrono::seconds(5);    // for the machine to leave in an orderly way
 constexpr std::size_t kMostRefused = 4096;                  // images that wait for an endpoint
-constexpr int kReceiveBatch = 64;                           // messages of one socket before the others have their turn
+constexpr int kReceiveBatch = 64;                           // messages of one socket before the other sockets' turn
 
 Incarnation RandomIncarnation() {
   std::random_device device;
@@ -39,7 +39,7 @@ Incarnation RandomIncarnation() {
   return incarnation == 0 ? 1 : incarnation;
 }
 
-// Where this worker takes partial images if nobody says: on the coordinator's host and by its scheme.
+// The default endpoint for partial images: on the coordinator's host and by its scheme.
 std::string ImagesEndpointFor(Endpoint coordinator, Incarnation incarnation) {
   coordinator.port = 0;
   coordinator.path += ".images-" + std::to_string(incarnation);
@@ -98,23 +98,23 @@ struct WorkerService::Impl {
   Context& context;
   WorkerMachine machine;
   Socket control, images;
-  std::optional<Socket> slabs;  // once the coordinator said where
+  std::optional<Socket> slabs;  // once the coordinator has named its endpoint
   std::string slabs_endpoint;
   PeerSockets peers;
   Epoch epoch = 0;
-  const std::uint64_t scope;  // workers with the same one are on this host; 0: unknown
-  const bool lends;           // its images to them
+  const std::uint64_t scope;  // workers with the same scope are on this host; 0: unknown
+  const bool lends;           // its images to these workers
   const Compression compression;
   const TaskHook hook;
   LinkRates links;                            // while compression is automatic
-  std::map<WorkerId, std::string> endpoints;  // of the epoch's other workers' image planes
-  std::set<WorkerId> takes_frames_only;       // though they have the same scope
-  std::vector<PartialImage> to_refuse;        // by workers whose endpoint is not known yet
-  std::atomic<bool> registered = false;       // ever, or stopped
+  std::map<WorkerId, std::string> endpoints;  // image planes of the epoch's other workers
+  std::set<WorkerId> takes_frames_only;       // workers that cannot map memory though they have the same scope
+  std::vector<PartialImage> to_refuse;        // from workers whose endpoint is not known yet
+  std::atomic<bool> registered = false;       // at least once, or stopped
   std::atomic<bool> stop_requested = false;
   std::atomic<bool> stopped = false;
-  bool stop_now = false;           // the machine said so
-  Mailbox<ExecutorOutput> outbox;  // its wakeup also tells of stop_requested
+  bool stop_now = false;           // set by the machine
+  Mailbox<ExecutorOutput> outbox;  // its wakeup also signals stop_requested
   std::optional<Executor> executor;
   std::jthread thread;  // owns the sockets and the machine; last member: ends first
 };
@@ -178,7 +178,7 @@ void WorkerService::Impl::Receive(Socket& socket, const char* plane) {
   }
 }
 
-// What concerns memory that is shared between workers, and the links between them: the machine needs to know nothing of it.
+// Handles memory shared between workers, and the links between them: the machine knows nothing of either.
 void WorkerService::Impl::Remember(const AnyMessage& message) {
   if (const auto* welcome = std::get_if<Welcome>(&message)) {
     if (std::exchange(epoch, welcome->epoch) == welcome->epoch) return;
@@ -203,7 +203,7 @@ void WorkerService::Impl::Remember(const AnyMessage& message) {
   }
 }
 
-// One whose sender's endpoint is not known yet goes unanswered: the sender asks again.
+// A message from a sender with an unknown endpoint gets no answer: the sender asks again.
 void WorkerService::Impl::Acknowledge(const AnyMessage& message, std::size_t payload_bytes) {
   const auto* partial = std::get_if<PartialImage>(&message);
   if (partial == nullptr || partial->acknowledge == 0 || payload_bytes < kLeastAcknowledgedBytes || partial->epoch != epoch) return;
@@ -214,7 +214,7 @@ void WorkerService::Impl::Acknowledge(const AnyMessage& message, std::size_t pay
   if (!sent.ok()) LogDebug("worker " + std::to_string(partial->from_worker) + " is not reached: " + sent.message());
 }
 
-// True if the message is for the machine: a shared image only if it can be read here.
+// True if the message is for the machine. A shared image is, only if it can be read here.
 bool WorkerService::Impl::OpenShared(const AnyMessage& message) {
   if (const auto* refused = std::get_if<ImageRefused>(&message)) {
     if (refused->epoch == epoch && takes_frames_only.insert(refused->from_worker).second) {
@@ -235,7 +235,7 @@ bool WorkerService::Impl::OpenShared(const AnyMessage& message) {
 
 void WorkerService::Impl::Refuse(const PartialImage& partial) {
   const auto sender = endpoints.find(partial.from_worker);
-  if (sender == endpoints.end()) {  // the group's assignment, which says where it is, has not come yet
+  if (sender == endpoints.end()) {  // the group's assignment with the endpoint has not arrived yet
     if (to_refuse.size() < kMostRefused) to_refuse.push_back(partial);
     return;
   }
@@ -280,7 +280,7 @@ void WorkerService::Impl::HandleOutput(ExecutorOutput& output) {
   }
 }
 
-// The coordinator asks again for what was lost here: registration, heartbeats and requests repeat.
+// Lost messages are not sent again here: registration, heartbeats and requests repeat.
 void WorkerService::Impl::Send(Socket& socket, const AnyMessage& message) {
   if (const Status sent = socket.Send({}, Encode(message)); !sent.ok())
     LogDebug(std::string(NameOf(message)) + " not sent: " + sent.message());
@@ -314,7 +314,7 @@ Delivery WorkerService::Impl::DeliveryTo(const Peer& peer) const {
   return IsTimed(peer) ? Delivery{.bytes_per_second = links.Of(peer.worker)} : Delivery{};
 }
 
-// Within a host nothing is: a processor that is short would look like a slow link, and packing would make it shorter.
+// Links within a host are not timed: a lack of processor time would look like a slow link, and packing would worsen it.
 bool WorkerService::Impl::IsTimed(const Peer& peer) const {
   return compression == Compression::kAuto && !OnThisHost(peer) && peer.images_endpoint.starts_with("tcp://");
 }

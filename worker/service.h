@@ -1,9 +1,9 @@
 // WorkerService: runs a WorkerMachine over ZeroMQ.
 //
 // Threads: one owns all sockets and runs the machine; one renders, with as many helpers as WorkerConfig::threads says; one combines,
-// encodes and unpacks chunks; one makes finished pictures. So rendering of one group goes on beside the combining of another, and
-// heartbeats are on time whatever is computed. What a task throws fails its group, which the coordinator is told of at once. If the thread
-// that runs the machine throws, the worker leaves and says why in its log.
+// encodes and unpacks chunks; one makes finished pictures. So one group is rendered while another is combined, and heartbeats are on time
+// whatever is computed. If a task throws, its group fails, and the coordinator is told at once. If the thread that runs the machine throws,
+// the worker leaves and logs why.
 #pragma once
 
 #include <memory>
@@ -22,7 +22,7 @@ struct WorkerOptions {
   std::string coordinator_endpoint;  // its worker endpoint
   std::string images_endpoint;       // bound; empty: any port of the coordinator's scheme (tcp), a path of its own (ipc), a name (inproc)
   Compression compression = Compression::kAuto;
-  bool share_memory = true;  // images for workers of this host stay where they are
+  bool share_memory = true;  // lend images to workers of this host
   RendererFactory make_renderer = MakeRenderer;
   TaskHook task_hook;  // of the executor, and for "send"
   WorkerConfig
@@ -34,7 +34,7 @@ class WorkerService {
   static Result<std::unique_ptr<WorkerService>> Start(Context& context, WorkerOptions options);
   ~WorkerService();  // stops and joins
 
-  // Returns once the coordinator has taken this worker in for the first time, or the service has stopped.
+  // Returns once the coordinator has registered this worker for the first time, or the service has stopped.
   void WaitUntilRegistered();
 
   void RequestStop();

@@ -59,11 +59,11 @@ SlabFetcher::Generation SlabFetcher::Acquire(DatasetId dataset, const Box& box, 
   return best->key.generation;
 }
 
-// What is copied, and from where; and which chunks are missing.
+// Which voxels are copied, and from where; and which chunks are missing.
 OpenSlab SlabFetcher::PlanSlab(Slab& slab) {
   std::vector<Slab*> sources;
   std::vector<Box> at_hand;
-  const bool room = cached_bytes() <= config_.cache_bytes;  // else whatever can go must go
+  const bool room = cached_bytes() <= config_.cache_bytes;  // if not, everything that can be dropped must be
   for (auto& [generation, other] : slabs_) {
     if (!room || &other == &slab || other.retired || !other.is_complete()) continue;
     if (other.key.dataset != slab.key.dataset || other.key.type != slab.key.type) continue;
@@ -92,7 +92,7 @@ void SlabFetcher::Rendered(Generation slab) {
   Unpin(std::exchange(found->sources, {}));
 }
 
-// What was copied from is not what frames use.
+// Does not mark the sources as used: they were only copied from.
 void SlabFetcher::Unpin(std::span<const Generation> sources) {
   for (const Generation source : sources) --slabs_.at(source).pins;
 }
@@ -148,7 +148,7 @@ void SlabFetcher::RequestChunks(std::span<const Generation> slabs, Epoch epoch, 
 void SlabFetcher::OnChunk(const Chunk& chunk, Bytes payload, WorkerActions& actions) {
   const ChunkPlace place{chunk.box, chunk.chunk};
   Slab* slab = FindRequested(chunk.dataset, place);
-  if (slab == nullptr) return;  // arrived before, or nobody waits for it any more
+  if (slab == nullptr) return;  // a duplicate, or nobody waits for it any more
   InFlight& request = in_flight_.at({slab->key.generation, place});
   if (chunk.raw_bytes != request.bytes) {
     Retry(slab->key.generation, place,
@@ -223,7 +223,7 @@ void SlabFetcher::GiveUp(Slab& slab, Status status) {
   failures_.push_back({slab.key.generation, std::move(status)});
 }
 
-// Of two slabs of which one covers the other, the smaller one is no longer needed once both are complete, or if nobody waits for it.
+// If one slab covers another, the smaller one is no longer needed once both are complete, or if nobody waits for it.
 void SlabFetcher::RetireCovered(Slab& complete) {
   const auto covers = [](const Slab& a, const Slab& b) {
     return a.key.dataset == b.key.dataset && a.key.type == b.key.type && a.key.box.Contains(b.key.box);

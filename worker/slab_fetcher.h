@@ -1,10 +1,10 @@
-// SlabFetcher: the slabs of a worker, complete or on their way: which chunks to ask for, within the byte credit, and which slabs to drop.
+// SlabFetcher: the slabs of a worker, complete or on their way. It decides which chunks to ask for, within the byte credit, and which slabs
+// to drop.
 //
-//   1. Acquire: a slab that covers the box is pinned, and opened if none is cached or on its way. What complete slabs hold of it is copied
-//      from them: they stay until it has been rendered from (Rendered) or is dropped. The rest is fetched, box by box.
-//   2. RequestChunks, in the order in which slabs will be needed; Chunk -> StoreChunk -> ChunkStored. What does not arrive within
-//   chunk_timeout, or
-//      arrives damaged, is asked for again, chunk_attempts times; then the slab is given up (TakeFailures).
+//   1. Acquire pins a slab that covers the box; it opens one if none is cached or on its way. Voxels that complete slabs hold are copied
+//      from them: these stay until the new slab has been rendered from (Rendered) or is dropped. The rest is fetched, box by box.
+//   2. RequestChunks, in the order in which slabs will be needed; Chunk -> StoreChunk -> ChunkStored. A chunk that does not arrive within
+//      chunk_timeout, or arrives damaged, is asked for again, chunk_attempts times; then the slab is given up (TakeFailures).
 //   3. complete(slab): it can be rendered from. Release when that is done; the slab stays cached.
 // Trim drops unpinned slabs: those that a complete one covers (the same box with a smaller halo), then the least recently used above
 // cache_bytes.
@@ -29,7 +29,7 @@ class SlabFetcher {
     Generation slab = 0;
     Status status;
   };
-  // What was received for a slab since it was asked last.
+  // What was received for a slab since the last report.
   struct FetchReport {
     std::uint64_t voxel_bytes = 0;
     Time begin, end;  // first request, last chunk stored; meaningful if voxel_bytes > 0
@@ -40,12 +40,12 @@ class SlabFetcher {
   Generation Acquire(DatasetId dataset, const Box& box, ScalarType type, WorkerActions& actions);
   void Release(Generation slab);         // once for each Acquire
   bool complete(Generation slab) const;  // all that must be fetched is stored
-  void Rendered(Generation slab);        // it holds all its voxels itself
+  void Rendered(Generation slab);        // the slab now holds all its voxels itself
   SlabKey key(Generation slab) const;
   FetchReport TakeReport(Generation slab);
-  void SetBytes(Generation slab, std::uint64_t bytes);  // with what was derived from the voxels
+  void SetBytes(Generation slab, std::uint64_t bytes);  // including data derived from the voxels
 
-  // Requests missing chunks of these slabs as far as the credit goes (one chunk always goes).
+  // Requests missing chunks of these slabs within the credit (one chunk is always allowed).
   void RequestChunks(std::span<const Generation> slabs, Epoch epoch, WorkerId worker, Time now, WorkerActions& actions);
   void OnChunk(const Chunk& chunk, Bytes payload, WorkerActions& actions);
   void OnRefused(const ChunkRefused& refused);
@@ -56,7 +56,7 @@ class SlabFetcher {
   // Slabs given up since the last call. They are never complete; whoever acquired them must release them.
   std::vector<Failure> TakeFailures() { return std::exchange(failures_, {}); }
 
-  void ForgetRequests();  // the coordinator is gone: nothing that was asked for will come
+  void ForgetRequests();  // the coordinator is gone: requested chunks will not come
   void RetireAll();       // another coordinator: no slab may be used again
   void Trim(WorkerActions& actions);
 

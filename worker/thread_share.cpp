@@ -17,7 +17,7 @@ class Pool {
     const std::lock_guard lock(mutex_);
     workers_ += workers;
     threads_ += threads;
-    limit_.reset();  // of several limits oneTBB takes the smallest
+    limit_.reset();  // oneTBB applies the smallest of several limits
     if (needed() > tbb::info::default_concurrency()) limit_.emplace(tbb::global_control::max_allowed_parallelism, std::size_t(needed()));
   }
 
@@ -27,7 +27,7 @@ class Pool {
   }
 
  private:
-  int needed() const { return threads_ - workers_ + 1; }  // of one arena: each worker has one thread of its own
+  int needed() const { return threads_ - workers_ + 1; }  // by one arena: each worker has one thread of its own
 
   std::mutex mutex_;
   int workers_ = 0, threads_ = 0;  // of this process

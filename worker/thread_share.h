@@ -1,8 +1,8 @@
 // ThreadShare: the threads that one worker computes with, for as long as it lives.
 //
-// oneTBB has one pool of threads a process, by default one less than there are cores, and all task arenas draw from it. Several workers may
-// live in a process, and users may ask for more threads than cores: the shares of a process together see to it that the pool is as large as
-// its workers were told. A pool that is larger by default stays as it is; arenas bound what a worker takes of it.
+// oneTBB has one pool of threads per process, by default one less than there are cores, and all task arenas draw from it. Several workers
+// may live in a process, and users may ask for more threads than cores: together, the shares of a process make the pool as large as its
+// workers need. A pool that is larger by default stays as it is; arenas limit what a worker takes from it.
 #pragma once
 
 namespace slabstream {
@@ -15,7 +15,7 @@ class ThreadShare {
   ThreadShare& operator=(const ThreadShare&) = delete;
 
   int threads() const { return threads_; }
-  // Those of all workers of this process together, as of now, as far as one arena can have them.
+  // The threads of all workers of this process together, now, limited to what one arena can have.
   static int OfProcess();
 
  private:

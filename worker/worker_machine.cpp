@@ -21,14 +21,14 @@ struct WorkerMachine::State {
   explicit State(WorkerConfig c)
       : config(std::move(c)), incarnation(config.incarnation), slabs(config), renders(slabs, names), early(config.early_image_bytes) {}
 
-  // One frame, at the latest attempt that was heard of. A group without a run is over here: done, failed, or not needed.
+  // One frame, at the latest known attempt. A group without a run is over here: done, failed, or not needed.
   struct Frame {
     std::uint32_t attempt = 0;
     std::map<std::uint32_t, std::optional<GroupRun>> groups;
     std::optional<FrameAccumulator> accumulator;  // display worker
   };
 
-  // ---- what the coordinator and the executor say. `actions` and `now` are those of the running Step.
+  // ---- input from the coordinator and the executor. `actions` and `now` are those of the running Step.
   void On(const MessageReceived& event) {
     std::visit([&](const auto& message) { On(message, event.payload); }, event.message);
   }
@@ -49,7 +49,7 @@ struct WorkerMachine::State {
   void On(const Chunk& chunk, const Bytes& payload);
   void On(const ChunkRefused& refused, const Bytes&);
   void On(const PartialImage& partial, const Bytes& payload);
-  // What a worker sends, and the client plane: not for a worker.
+  // Messages that a worker sends, and those of the client plane: not for a worker.
   void On(const Register&, const Bytes&) {}
   void On(const Heartbeat&, const Bytes&) {}
   void On(const GroupDone&, const Bytes&) {}
@@ -57,8 +57,8 @@ struct WorkerMachine::State {
   void On(const WorkerTrouble&, const Bytes&) {}
   void On(const Leave&, const Bytes&) {}
   void On(const ChunkRequest&, const Bytes&) {}
-  void On(const ImageRefused&, const Bytes&) {}   // the service's
-  void On(const ImageReceived&, const Bytes&) {}  // the service's
+  void On(const ImageRefused&, const Bytes&) {}   // for the service
+  void On(const ImageReceived&, const Bytes&) {}  // for the service
   void On(const SubmitFrame&, const Bytes&) {}
   void On(const FrameProgress&, const Bytes&) {}
   void On(const FrameReply&, const Bytes&) {}
@@ -93,14 +93,14 @@ struct WorkerMachine::State {
   void ReportSlabFailures();
 
   const WorkerConfig config;
-  Incarnation incarnation;  // of the present registration
+  Incarnation incarnation;  // of the current registration
   Epoch epoch = 0;          // while registered
   WorkerId worker = 0;      // 0: unregistered
-  Epoch slabs_epoch = 0;    // whose volumes are cached
+  Epoch slabs_epoch = 0;    // epoch of the cached volumes
   Duration heartbeat{}, timeout{};
   Time next_heartbeat, last_heard;
   Time next_register = Time::min();
-  Time wake = Time::max();  // promised at the end of the last Step
+  Time wake = Time::max();  // returned at the end of the last Step
   bool ended = false;
 
   ImageNames names;
@@ -125,7 +125,7 @@ bool WorkerMachine::State::Heard(Epoch from) {
 }
 
 void WorkerMachine::State::On(const Welcome& welcome, const Bytes&) {
-  if (worker != 0 || ended || welcome.incarnation != incarnation) return;  // known, or of an earlier registration
+  if (worker != 0 || ended || welcome.incarnation != incarnation) return;  // already registered, or an answer to an earlier registration
   epoch = welcome.epoch;
   worker = welcome.worker;
   heartbeat = std::chrono::milliseconds(welcome.heartbeat_ms);
@@ -138,7 +138,7 @@ void WorkerMachine::State::On(const Welcome& welcome, const Bytes&) {
 }
 
 void WorkerMachine::State::On(const Retire&, const Bytes&) {
-  if (worker != 0) Unregister();  // also if it comes from another epoch: then the one that this worker knows is gone
+  if (worker != 0) Unregister();  // also if it comes from another epoch: then this worker's coordinator is gone
 }
 
 void WorkerMachine::State::On(const Stop& stop, const Bytes&) {
@@ -337,7 +337,7 @@ void WorkerMachine::State::AfterRun(GroupRun& run) {
   if (image) AddToFrame(frames.at(key.frame), std::move(*image));
 }
 
-// Ends the run, done or not; late messages of its group find nothing any more.
+// Ends the run, done or not. Late messages of its group are then ignored.
 void WorkerMachine::State::EndRun(GroupKey key) {
   renders.DropGroup(key, actions);
   std::optional<GroupRun>& run = frames.at(key.frame).groups.at(key.group);
@@ -367,7 +367,7 @@ void WorkerMachine::State::FailGroup(const GroupKey& key, const Status& status) 
 }
 
 void WorkerMachine::State::Trouble(const GroupKey& key, Status status, WorkerId unreachable) {
-  // What is missing here, or broke here, may be there and whole elsewhere.
+  // Resources missing here, or errors here, need not occur on another worker.
   const bool elsewhere = status.code() == StatusCode::kResourceExhausted || status.code() == StatusCode::kInternal;
   actions.push_back(SendControl{WorkerTrouble{epoch, worker, key, unreachable, std::move(status), elsewhere}});
 }

@@ -1,28 +1,25 @@
-// WorkerMachine: everything a worker decides, as a pure state machine. (event, now) -> actions. It reads no clock, owns no socket, touches
-// no pixel and no voxel: images have handles, payloads are opaque Bytes. The service (worker/service.h) and the simulator of the tests run
-// it.
+// WorkerMachine: all decisions of a worker, as a pure state machine: (event, now) -> actions. It reads no clock, owns no socket, touches no
+// pixel and no voxel: images have handles, payloads are opaque Bytes. The service (worker/service.h) and the simulator of the tests run it.
 //
-// States:  unregistered --Welcome--> registered --silence, Retire--> unregistered (everything but cached slabs is dropped; an epoch change
-// drops those too) What was dropped cannot be continued, so it registers again under the next incarnation number: to the coordinator it is
-// a new worker.
+// States:  unregistered --Welcome--> registered --silence, Retire--> unregistered
+// Unregistering drops everything but cached slabs; a change of epoch drops those too. Dropped work cannot be continued, so the worker
+// registers again under the next incarnation number: to the coordinator it is a new worker.
 //
 // A group on this worker:
-//   GroupAssignment   voxels of its boxes are fetched (chunk requests within the byte credit), as far as no cached slab holds them; a box
-//                     that is hidden as a whole needs none: its rank holds an empty image at once
+//   GroupAssignment   fetch the voxels of its boxes that no cached slab holds (chunk requests within the byte credit); a box that is
+//                     entirely hidden needs none: its rank holds an empty image at once
 //   slab complete     ranks are rendered one after the other, groups in order of frame and group
-//   RenderDone        the rank holds its image; the rank's steps of the schedule are taken in order of rounds: a send goes as soon as
-//   everything
-//                     before it is in, a receive waits for its PartialImage; ranks of this same worker combine without a message
-//   root is complete  the group image goes to the display worker, which accumulates groups front to back (in order, early ones wait),
-//   reports
-//                     GroupDone (with what is hidden by then), sends a preview if wanted, and after the last group the frame
+//   RenderDone        the rank holds its image; its steps of the schedule run in order of rounds: a send goes as soon as everything before
+//                     it is in, a receive waits for its PartialImage; ranks of this same worker combine without a message
+//   root is complete  the group image goes to the display worker. It accumulates groups front to back (early ones wait), reports GroupDone
+//                     (with the tiles hidden by then), sends a preview if wanted, and after the last group the frame
 // PartialImages that arrive before their assignment are kept, within a byte limit; those of finished frames and older attempts are dropped.
-// Anything that arrives twice changes nothing.
+// A second copy of any message changes nothing.
 //
-// What the executor must do: run StartRender, StartCombine, FindHidden and StoreChunk on other threads and answer each with exactly one
-// event; run StartCombine, FindHidden, SendPartial and SendFrame in the order in which they were given; call Step(Tick) no later than
-// NextWake(). If it calls late, the machine assumes that the executor itself was held up (a process that was stopped), and extends the
-// coordinator's time by as much: what was not read meanwhile is not the coordinator's silence.
+// The executor must: run StartRender, StartCombine, FindHidden and StoreChunk on other threads and answer each with exactly one event; run
+// StartCombine, FindHidden, SendPartial and SendFrame in the order given; call Step(Tick) no later than NextWake(). If it calls late, the
+// machine assumes that its own process was held up (stopped), and gives the coordinator as much more time: messages not read meanwhile do
+// not mean that the coordinator was silent.
 #pragma once
 
 #include <cstdint>
@@ -46,19 +43,19 @@ struct SlabKey {
   DatasetId dataset = 0;
   Box box;
   ScalarType type = ScalarType::kUint8;
-  std::uint64_t generation = 0;  // named by the machine, never reused: a slab that was dropped and opened again is another one
+  std::uint64_t generation = 0;  // named by the machine, never reused: a slab that is dropped and opened again gets a new one
   friend bool operator==(const SlabKey&, const SlabKey&) = default;
   friend auto operator<=>(const SlabKey&, const SlabKey&) = default;
 };
 
 struct WorkerConfig {
-  Incarnation incarnation = 0;  // random, not 0: of the first registration; later ones count on from it
+  Incarnation incarnation = 0;  // random, not 0: of the first registration; later registrations count up from it
   std::uint32_t pid = 0;
   std::string host;
   std::string images_endpoint;
   std::uint64_t memory_scope = 0;                        // as in Register
   bool lends_memory = false;                             // as in Register
-  std::uint32_t threads = 1;                             // that render: for the coordinator to know
+  std::uint32_t threads = 1;                             // render threads, reported to the coordinator
   std::uint64_t cache_bytes = std::uint64_t{1} << 40;    // slabs not needed by a current group are dropped, oldest first, above this
   std::uint64_t credit_bytes = std::uint64_t{16} << 20;  // chunk bytes requested and not yet stored
   Duration register_interval = std::chrono::seconds(1);
@@ -79,7 +76,7 @@ struct IncomingImage {
 struct MessageReceived {
   AnyMessage message;
   Bytes payload;
-};  // from any plane; payload lengths are checked already, runs when they are combined
+};  // from any plane; payload lengths are already checked, runs are checked when they are combined
 struct ChunkStored {
   SlabKey slab;
   Box box;                  // as in the chunk
@@ -105,7 +102,7 @@ struct HiddenFound {
   ImageHandle image = 0;
   OcclusionMask hidden;
 };
-// A SendPartial or SendFrame came to nothing.
+// A SendPartial or SendFrame failed.
 struct SendFailed {
   GroupKey key;
   Status status;
@@ -113,7 +110,7 @@ struct SendFailed {
 struct PeerUnreachable {
   WorkerId worker = 0;
 };
-struct StopRequested {};  // SIGTERM: leave in order
+struct StopRequested {};  // SIGTERM: leave in an orderly way
 struct Tick {};
 using WorkerEvent =
     std::variant<MessageReceived, ChunkStored, RenderDone, CombineDone, HiddenFound, SendFailed, PeerUnreachable, StopRequested, Tick>;
@@ -128,8 +125,8 @@ struct SendChunkRequest {
 struct ConnectSlabs {
   std::string endpoint;
 };  // on Welcome
-// Makes room for its voxels. What other slabs hold of them is copied before the first render; these are complete, and open until that
-// render is done. Chunks of boxes inside it bring the rest.
+// Makes room for the slab's voxels. Voxels that other slabs hold are copied before the first render; those slabs are complete, and open
+// until that render is done. Chunks of boxes inside the slab bring the rest.
 struct OpenSlab {
   struct Copy {
     SlabKey from;
@@ -146,41 +143,41 @@ struct StoreChunk {
 struct DropSlab {
   SlabKey slab;
 };
-// Gives the handle `image` a picture, unless it fails.
+// Renders a picture and stores it under the handle `image`, unless it fails.
 struct StartRender {
   GroupKey key;
   Rank rank = 0;
   SlabKey slab;
   Placement placement;
   std::shared_ptr<const FrameSetup> setup;
-  std::shared_ptr<const OcclusionMask> hidden;  // need not be rendered; null: nothing is known to be hidden
+  std::shared_ptr<const OcclusionMask> hidden;  // tiles that need not be rendered; null: none is known
   ImageHandle image = 0;
 };
 struct CancelRender {
   GroupKey key;
-};  // the running one, if it is of this group; RenderDone still comes
-// Combines `other`, or if that is 0 the incoming image, into `image`. If `image` names no image yet, it becomes a copy of the other one. Of
-// the other one only the pixels of `pixels` count: an image may hold pixels that have been passed on. `other` stays as it is and needs its
-// own release. -> CombineDone
+};  // the running one, if it belongs to this group; RenderDone still comes
+// Combines `other` (if 0: the incoming image) into `image`. If `image` names no image yet, it becomes a copy of the other one. Only the
+// pixels of `pixels` count in the other one: an image may hold pixels that have been passed on. `other` stays unchanged and needs its own
+// release. -> CombineDone
 struct StartCombine {
   GroupKey key;
   ImageHandle image = 0;
   ImageHandle other = 0;
   IncomingImage incoming;
   Side side = Side::kBack;
-  bool replace = false;  // instead: `pixels` of `image`, which have been passed on, become those of the other one
+  bool replace = false;  // instead: `pixels` of `image`, which have been passed on, are replaced by those of the other one
   PixelRange pixels;     // of the frame; empty: all
   PixelBounds frame;
-  RankInterval ranks;  // that `other` shows there; 0 `other`: as the message says
+  RankInterval ranks;  // that `other` shows there; if `other` is 0: as the message says
 };
-// Finds the hidden tiles of `image`, a frame that groups up to `key` have been accumulated into. `known`: the last ones. -> HiddenFound
+// Finds the hidden tiles of `image`, a frame that has accumulated the groups up to `key`. `known`: the last hidden tiles. -> HiddenFound
 struct FindHidden {
   GroupKey key;
   ImageHandle image = 0;
   std::shared_ptr<const FrameSetup> setup;
   OcclusionMask known;
 };
-// Sends message.pixels of `image`: fills in how they travel, and into reports of this worker's ranks what their messages took. ->
+// Sends message.pixels of `image`. Fills in how they travel, and adds bytes and times of messages to the reports of this worker's ranks. ->
 // SendFailed, or nothing.
 struct SendPartial {
   Peer to;
@@ -190,15 +187,15 @@ struct SendPartial {
   ColorCoding color = ColorCoding::kFloat32;  // if they travel as runs
   Rank rank = 0;                              // that sends
 };
-// Makes the picture of `image`, a frame, encodes it, fills message.runs and a report, sends to the coordinator. -> SendFailed, or
+// Makes the picture of `image`, a frame, encodes it, fills message.runs and a report, sends it to the coordinator. -> SendFailed, or
 // nothing.
 struct SendFrame {
   FrameImage message;
   ImageHandle image = 0;
   std::shared_ptr<const FrameSetup> setup;
 };
-// After everything that was started before it. Every handle that is named in a StartRender, or in a StartCombine as an image that is not
-// there yet, is released exactly once, also if its making failed.
+// Runs after everything that was started before it. Every handle that is named in a StartRender, or as a new image in a StartCombine, is
+// released exactly once, even if making the image failed.
 struct ReleaseImage {
   ImageHandle image = 0;
 };

@@ -14,7 +14,7 @@
 namespace slabstream {
 namespace {
 
-// When the command is the one that was typed, `execute` runs with the options.
+// If this command is the one that was typed, `execute` runs with the options.
 template <class Options>
 void RunWith(CLI::App& sub, std::function<Status()>& run, std::shared_ptr<Options> options, Status (*execute)(const Options&)) {
   sub.callback([&run, options, execute] { run = [options, execute] { return execute(*options); }; });

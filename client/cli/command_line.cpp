@@ -89,7 +89,7 @@ std::vector<std::string> Arguments(int argc, const char* const* argv) {
 int RunCommandLine(int argc, const char* const* argv, std::span<const DeclareCommand> more) {
   CLI::App app("Slabstream renders volumes on CPUs, by any number of worker processes.", "slabstream");
   app.formatter(std::make_shared<HelpFormatter>());
-  app.require_subcommand(0, 1);  // so that what follows a command is never taken for another one
+  app.require_subcommand(0, 1);  // so that words after a command are never taken for another command
   app.set_help_flag("-h,--help", "Print this text");
   app.set_version_flag("--version", fmt::format("slabstream {}", Version()), "Print the version");
   std::function<Status()> run;

@@ -13,10 +13,10 @@ class App;
 
 namespace slabstream {
 
-// Where a command declares itself.
+// The place where a command declares itself.
 struct CommandLine {
   CLI::App& app;                 // gets a subcommand with its options
-  std::function<Status()>& run;  // set by the subcommand's callback: what runs after the parse
+  std::function<Status()>& run;  // set by the subcommand's callback; called after the parse
   const std::string& typed;      // the whole command line
 };
 
@@ -24,7 +24,7 @@ struct CommandLine {
 using DeclareCommand = void (*)(const CommandLine& line);
 
 // Runs one of the client's commands or of `more`. 0: done. 1: the service or the frame failed. 2: bad arguments or input. 130: stopped by
-// Ctrl-C. Unless 0 exactly one line on stderr says why: "slabstream render: --zoom 0 is out of range [0.001, 10000]".
+// Ctrl-C. Unless 0, exactly one line on stderr says why: "slabstream render: --zoom 0 is out of range [0.001, 10000]".
 int RunCommandLine(int argc, const char* const* argv, std::span<const DeclareCommand> more);
 
 }  // namespace slabstream

@@ -1,4 +1,4 @@
-// Cores of this machine, and what workers get of them when nobody says how many threads they are to have.
+// The cores of this machine, and the default number of threads of a worker.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,7 @@ namespace slabstream {
 
 inline int CoreCount() { return std::max(1, int(std::thread::hardware_concurrency())); }
 
-// Threads for each of `workers`, so that together they have the cores; at least 1.
+// Threads for each of `workers`, so that together they use all cores; at least 1.
 inline int CoreShare(int workers) { return std::max(1, CoreCount() / workers); }
 
 // Render threads of each worker of --local.

@@ -1,5 +1,5 @@
-// `down`: asks the service to end, waits for its processes, and ends those that do not listen. Only processes of the state file whose name
-// still is ours are touched.
+// `down`: asks the service to end, waits for its processes, and ends those that do not react. It touches only processes of the state file
+// that still have our name.
 #include <fmt/format.h>
 #include <unistd.h>
 

@@ -28,7 +28,7 @@ class FrameLoop {
     while (next_ < jobs_.size() || !open_.empty()) {
       if (interrupt.interrupted()) return Abandon(Status::Cancelled("interrupted"));
       SubmitAhead();
-      // A finished write ends the wait too; the timeout is for one that finishes just as a message arrives.
+      // A finished write ends the wait too. The timeout is for a write that finishes just as a message arrives.
       if (auto event = client_.Next(milliseconds(50))) {
         if (Status status = Handle(*std::move(event)); !status.ok()) return Abandon(std::move(status));
       }
@@ -45,7 +45,7 @@ class FrameLoop {
   std::vector<FrameRecord> TakeRecords() { return std::move(records_); }
 
  private:
-  // Pictures that wait to be written count too: neither frames nor memory run ahead of the disk.
+  // Pictures that wait to be written count too, so that neither frames nor memory run ahead of the disk.
   void SubmitAhead() {
     const std::size_t limit = std::size_t(options_.in_flight);
     while (next_ < jobs_.size() && open_.size() < limit && writes_.size() < limit) {
@@ -89,7 +89,7 @@ class FrameLoop {
     return status;
   }
 
-  // Lets the service free its workers, and gives the message a moment to leave.
+  // Lets the service free its workers, and gives the message some time to leave.
   Status Abandon(Status why) {
     for (const auto& [request, index] : open_) client_.Cancel(request);
     const Time deadline = MonotonicNow() + std::chrono::seconds(2);
@@ -105,7 +105,7 @@ class FrameLoop {
   const FrameLoopOptions& options_;
   ProgressDisplay display_;
   std::vector<FrameRecord> records_;
-  std::size_t next_ = 0;                    // of jobs_: the first that was not asked for yet
+  std::size_t next_ = 0;                    // of jobs_: the first that has not been requested yet
   std::map<RequestId, std::size_t> open_;   // to the job's index
   std::deque<std::future<Status>> writes_;  // oldest first
 };

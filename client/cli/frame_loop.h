@@ -1,4 +1,4 @@
-// Frames, one after another, with some asked for ahead: what `render` (one frame), `turntable` and `bench` share.
+// Renders frames in sequence, with some requested ahead. Shared by `render` (one frame), `turntable` and `bench`.
 #pragma once
 
 #include <string>
@@ -15,7 +15,7 @@ struct FrameJob {
   std::string output;  // where the picture goes; empty: nowhere
 };
 
-// What is remembered of a finished frame.
+// Figures of a finished frame.
 struct FrameRecord {
   std::string output;
   Duration latency{};          // request to last byte
@@ -27,11 +27,11 @@ struct FrameLoopOptions {
   PictureFormat format;
   bool keep_reports = false;
   bool progress = false;  // on stderr
-  std::string label;      // what the progress begins with
+  std::string label;      // begins each line of progress
 };
 
-// Renders and writes `jobs`; pictures are encoded beside the frames that follow. The records are in the order of the jobs. The first
-// failure cancels what is open and is returned; Ctrl-C does the same with Cancelled.
+// Renders and writes `jobs`; pictures are encoded while the next frames render. The records are in the order of the jobs. The first failure
+// cancels the open frames and is returned; Ctrl-C does the same with Cancelled.
 Result<std::vector<FrameRecord>> RenderFrames(Client& client, const std::vector<FrameJob>& jobs, const FrameLoopOptions& options);
 
 }  // namespace slabstream

@@ -11,7 +11,7 @@ namespace {
 
 using Interval = std::pair<std::int64_t, std::int64_t>;
 
-// Length of the union, cut to [begin, end).
+// Length of the union, clipped to [begin, end).
 std::int64_t CoveredNs(std::vector<Interval> intervals, std::int64_t begin, std::int64_t end) {
   std::sort(intervals.begin(), intervals.end());
   std::int64_t covered = 0, reached = begin;

@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::size_t kNameWidth = 32, kTextWidth = 78;  // columns
 
-// Lines of at most kTextWidth columns where words allow it. Further lines of an indented line are indented more.
+// Lines of at most kTextWidth columns if words allow it. Continuation lines of an indented line are indented more.
 std::string Wrapped(const std::string& text) {
   std::string wrapped;
   std::istringstream lines(text);
@@ -47,7 +47,7 @@ std::string HelpFormatter::make_option_opts(const CLI::Option* option) const {
   return type.empty() ? "" : " " + type;
 }
 
-// Lists of choices follow the first line: what is said of the whole option belongs there.
+// Lists of choices follow the first line, so notes about the whole option go there.
 std::string HelpFormatter::make_option_desc(const CLI::Option* option) const {
   std::string text = option->get_description();
   const std::size_t end = std::min(text.find('\n'), text.size());

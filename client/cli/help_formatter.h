@@ -1,4 +1,4 @@
-// How the help texts look: an option's description ends with its default or "required" in words, in no notation of the parser's.
+// Formats the help texts: an option's description ends with its default or "required" in words, not in the parser's notation.
 #pragma once
 
 #include <CLI/CLI.hpp>

@@ -1,4 +1,4 @@
-// Volume files that the user names on the command line: whatever is wrong with them is bad input.
+// Volume files that the user names on the command line: every error in them is bad input.
 #pragma once
 
 #include <string>
@@ -8,10 +8,10 @@
 
 namespace slabstream {
 
-// Whether it is worth trying: NotFound, or InvalidArgument naming the endings there are. Reads nothing.
+// NotFound: no such file. InvalidArgument: not a volume by its name (names the known endings). Reads nothing.
 Status CheckVolumePath(const std::string& path);
 
-// ReadVolume, with damage of the file (DataLoss) told as InvalidArgument: here it is the input that is wrong, not a service.
+// ReadVolume, but a damaged file (DataLoss) becomes InvalidArgument: here the input is wrong, not a service.
 Result<LoadedVolume> ReadInputVolume(const std::string& path);
 
 }  // namespace slabstream

@@ -29,7 +29,7 @@ InterruptGuard::InterruptGuard(Wakeup& wakeup) {
   g_wakeup = &wakeup;
   struct sigaction action {};
   action.sa_handler = OnSignal;
-  action.sa_flags = SA_RESETHAND;  // the second one finds the default action: the process ends
+  action.sa_flags = SA_RESETHAND;  // the second signal meets the default action: the process ends
   sigemptyset(&action.sa_mask);
   sigaction(SIGINT, &action, &old_interrupt_);
   sigaction(SIGTERM, &action, &old_terminate_);

@@ -1,4 +1,4 @@
-// Ctrl-C while frames are rendered: a flag, and an end to the client's waiting. A second Ctrl-C ends the process at once.
+// Ctrl-C while frames are rendered: sets a flag and ends the client's waiting. A second Ctrl-C ends the process at once.
 #pragma once
 
 #include <csignal>

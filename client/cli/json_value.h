@@ -1,4 +1,4 @@
-// Values of a JSON file that a user names, each with its place in it: what is wrong is told with the place, the value and what it must be.
+// Values of a JSON file that a user names, each with its position in the file. Errors name the position, the value and what is expected.
 #pragma once
 
 #include <functional>
@@ -16,23 +16,23 @@ namespace slabstream {
 
 using Json = nlohmann::ordered_json;
 
-// One value. Whatever is wrong is noted in `mistake`, which all values of a file share; the first mistake stays, and what is read after it
-// does not matter.
+// One value. Errors are stored in `mistake`, which all values of a file share. The first mistake stays, and values read after it do not
+// matter.
 class JsonValue {
  public:
   JsonValue(const Json& json, std::string place, std::optional<std::string>& mistake)
       : json_(&json), place_(std::move(place)), mistake_(&mistake) {}
 
   void Complain(const std::string& what) const;
-  std::string Shown() const;  // the value's text, cut off where it is long
+  std::string Shown() const;  // the value's text, cut off if it is long
 
   using Read = std::function<void(const JsonValue&)>;
-  // An object with no other fields than these; calls the function of each that is there.
+  // An object with no other fields than these. Calls the function of each field that is present.
   void Fields(const std::vector<std::pair<std::string, Read>>& fields) const;
-  // A list of at least so many values.
+  // A list of at least `least` values.
   void Each(const Read& read, std::size_t least = 1) const;
   bool Has(const char* field) const { return json_->is_object() && json_->contains(field); }
-  JsonValue At(const char* field) const;  // which must be there
+  JsonValue At(const char* field) const;  // the field must be present
 
   std::string Text() const;
   double Number(const NumberRange& range) const;

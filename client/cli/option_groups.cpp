@@ -22,8 +22,8 @@ namespace {
 
 constexpr char kLeftToThePlanner[] = "what should be fastest for this volume, view and service";
 
-// An option that takes one of the names of a list such as Decompositions(), whose entries have a name and a purpose. `automatic`: the
-// purpose of kAutomatic, if the option takes it beside them.
+// An option that takes a name from a list such as Decompositions(), whose entries have a name and a purpose. `automatic`: the purpose of
+// kAutomatic, if the option also takes that.
 template <class T, class Entries>
 CLI::Option* AddNamed(CLI::App& app, const std::string& name, T& target, const Entries& entries, const std::string& help,
                       std::string_view automatic = {}) {
@@ -45,7 +45,7 @@ CLI::Option* AddNamed(CLI::App& app, const std::string& name, T& target, const E
   return AddParsed(app, name, target, parse, text)->type_name("NAME")->default_str(target);
 }
 
-// An option that takes one of `names`, which stand for `values`.
+// An option that takes one of `names`; each stands for one of `values`.
 template <class T, std::size_t count>
 CLI::Option* AddChoice(CLI::App& app, const std::string& name, T& target, const std::array<std::string_view, count>& names,
                        const std::array<T, count>& values, const std::string& help) {
@@ -57,10 +57,10 @@ CLI::Option* AddChoice(CLI::App& app, const std::string& name, T& target, const 
   return AddParsed(app, name, target, parse, help)->type_name("NAME");
 }
 
-// --renderer, and an option for each parameter that a renderer has. Whether the chosen renderer has it is checked with the request.
+// --renderer, and an option for each parameter of any renderer. Whether the chosen renderer has it is checked with the request.
 void AddRendererOptions(CLI::App& app, FrameRequest& request) {
   std::string help = "How voxels become a picture";
-  std::map<std::string_view, std::pair<const RendererParameter*, std::string>> parameters;  // and the renderers that have it
+  std::map<std::string_view, std::pair<const RendererParameter*, std::string>> parameters;  // and the renderers with this parameter
   for (const RendererKind* kind : Renderers()) {
     help += fmt::format("\n  {}: {}", kind->name(), kind->purpose());
     for (const RendererParameter& parameter : kind->parameters()) {

@@ -1,5 +1,5 @@
-// Options that several subcommands share, declared with CLI11. A value that cannot be used ends the parse with a CLI::ValidationError whose
-// text is the line for the user.
+// Options that several subcommands share, declared with CLI11. An invalid value ends the parse with a CLI::ValidationError whose text is
+// the line for the user.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -24,13 +24,13 @@ CLI::Option* AddParsed(CLI::App& app, const std::string& names, T& target, Parse
   return app.add_option(names, CLI::callback_t(store), help);
 }
 
-// An option whose value is given with `=` or left out: --local=4, --local. `bare` stands for what is left out. What follows it is never
+// An option whose value is given with `=` or omitted: --local=4, --local. `bare` stands for an omitted value. The next argument is never
 // taken for its value.
 template <class T, class Parse>
 CLI::Option* AddOptionalValue(CLI::App& app, const std::string& name, T& target, const std::string& bare, Parse parse,
                               const std::string& help) {
   const auto given = [bare, parse = std::move(parse)](const std::string& option, const std::string& text) {
-    return parse(option, text == "true" ? bare : text);  // CLI11 hands over "true" for the bare form
+    return parse(option, text == "true" ? bare : text);  // CLI11 passes "true" for the bare form
   };
   return AddParsed(app, name, target, given, help)->expected(0);
 }
@@ -40,19 +40,19 @@ CLI::Option* AddInteger(CLI::App& app, const std::string& names, int& target, in
 
 CLI::Option* AddEndpoint(CLI::App& app, std::string& endpoint);
 
-// Headings of the help text. Options under kHidden are not shown: old spellings that go on working, and what cannot be used yet.
+// Headings of the help text. Options under kHidden are not shown: old spellings that still work, and options that cannot be used yet.
 inline constexpr char kOutputGroup[] = "Output", kHidden[] = "";
 
-// --threads, [1, kMaxThreads]; 0 is left where it is not given.
+// --threads, [1, kMaxThreads]; 0 stays if it is not given.
 CLI::Option* AddThreads(CLI::App& app, int& threads, const std::string& help);
 
 // --transfer and --opacity-distance.
 void AddTransferOptions(CLI::App& app, TransferChoice& transfer);
 
-// After the parse, splits a `source` of the form VOLUME:TRANSFER into its parts (volume_argument.h). `is_file` is asked then.
+// After the parse, splits a `source` of the form VOLUME:TRANSFER into its parts (volume_argument.h). Calls `is_file` only then.
 void ResolveSource(CLI::App& app, const CLI::Option* source, std::string& volume, TransferChoice& transfer, std::function<bool()> is_file);
 
-// Everything that `render` and `turntable` share: SOURCE, connection, view, look, policy, and what is written beside pictures.
+// All options that `render` and `turntable` share: SOURCE, connection, view, look, policy, and the files written beside pictures.
 void AddFrameOptions(CLI::App& app, FrameOptions& options);
 
 }  // namespace slabstream

@@ -1,4 +1,4 @@
-// What each subcommand was asked to do: plain values, filled by client_commands.cpp, valid when a command sees them.
+// The options of each subcommand: plain values, filled by client_commands.cpp, valid when a command sees them.
 #pragma once
 
 #include <string>
@@ -17,8 +17,8 @@ inline constexpr int kMaxLocalWorkers = 256;  // of EmbeddedOptions
 
 // Where the frames are rendered.
 struct ConnectionOptions {
-  int local_workers = 0;  // 0: at the service; else in this process, by this many workers
-  int local_threads = 0;  // of each of these; 0: LocalThreads
+  int local_workers = 0;  // 0: render at the service; else in this process, by this many workers
+  int local_threads = 0;  // of each local worker; 0: LocalThreads
   std::string endpoint;   // empty: see DefaultEndpoint (service_state.h)
 };
 
@@ -46,7 +46,7 @@ struct TurntableOptions {
   FramePattern output;
   int frames = 36;    // [1, kMaxTurntableFrames], evenly over `turns` full turns that begin at the request's azimuth
   int turns = 1;      // [1, kMaxTurns]
-  int in_flight = 2;  // [1, kMaxInFlight] frames asked for and not yet complete
+  int in_flight = 2;  // [1, kMaxInFlight] frames requested and not yet complete
 };
 
 struct InfoOptions {
@@ -67,7 +67,7 @@ struct UpOptions {
   int threads = 0;                // of each worker; 0: CoreShare
   std::vector<std::string> data;  // NAME=PATH or DIR, as slabstream-coordinator takes them
   std::string listen;             // endpoint for clients; a wildcard port is fine
-  std::string compress = "auto";  // images on their way: auto, on or off, as slabstream-worker takes it
+  std::string compress = "auto";  // compression of images on their way: auto, on or off, as slabstream-worker takes it
   std::string link;               // as ParseLink takes it; empty: the coordinator's default
   bool detach = false;
 };

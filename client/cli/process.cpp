@@ -21,7 +21,7 @@ namespace {
 
 constexpr Duration kPollInterval = std::chrono::milliseconds(20);
 
-// What the child does between fork and exec: system calls only. `stdin_fd`, `stdout_fd` and `stderr_fd` close themselves at exec.
+// The child between fork and exec: system calls only. `stdin_fd`, `stdout_fd` and `stderr_fd` close themselves at exec.
 [[noreturn]] void BecomeProgram(char* const* arguments, int stdin_fd, int stdout_fd, int stderr_fd, bool outlives_us, pid_t parent) {
   ::setsid();
   if (!outlives_us) {

@@ -1,4 +1,4 @@
-// Child processes, for `up`: start one, learn that it ended.
+// Child processes, for `up`: start one, and find out whether it has ended.
 #pragma once
 
 #include <sys/types.h>
@@ -18,7 +18,7 @@ Result<std::string> ProgramBeside(const std::string& name);
 struct ChildOptions {
   std::vector<std::string> command;  // program path and arguments
   std::string log_path;              // stderr is appended to it
-  bool outlives_us = false;          // else the kernel sends it SIGTERM when this process ends, however that happens
+  bool outlives_us = false;          // else the kernel sends it SIGTERM when this process ends for any reason
 };
 
 struct ChildEnd {
@@ -26,8 +26,8 @@ struct ChildEnd {
   std::string description;  // "exited with status 1", "was killed by signal 9"
 };
 
-// A child process in a session of its own, so that Ctrl-C at the terminal reaches only us, with stdin from /dev/null and no signal blocked.
-// Not for processes with threads. Move-only; the destructor leaves the process alone.
+// A child process in a session of its own, so that Ctrl-C at the terminal reaches only the parent, with stdin from /dev/null and no signal
+// blocked. The caller must have no threads. Move-only; the destructor leaves the child running.
 class Child {
  public:
   static Result<Child> Start(const ChildOptions& options);
@@ -40,10 +40,10 @@ class Child {
   // The first line of its stdout. Unavailable if it ends before that; DeadlineExceeded.
   Result<std::string> ReadLine(Duration timeout);
 
-  // How it ended, if it has; reaps it. The same answer from then on.
+  // How it ended, if it has; reaps it. Later calls return the same.
   std::optional<ChildEnd> Ended();
 
-  // Sends SIGTERM, then after `patience` SIGKILL, and reaps it.
+  // Sends SIGTERM, then SIGKILL after `patience`, and reaps it.
   void Terminate(Duration patience);
 
  private:

@@ -1,4 +1,4 @@
-// How far some work is, on stderr: a bar that is redrawn if that is a terminal, else a line whenever something changes.
+// The progress of some work on stderr: on a terminal, a bar that is redrawn; otherwise a line for each change.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@ namespace slabstream {
 
 class ProgressBar {
  public:
-  ProgressBar(bool wanted, double total);  // total > 0: what `done` reaches
+  ProgressBar(bool wanted, double total);  // total > 0: the value of `done` at the end
   ~ProgressBar();                          // clears the bar
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
@@ -17,7 +17,7 @@ class ProgressBar {
  private:
   bool wanted_, terminal_;
   double total_;
-  std::string last_;  // what stands there, so that nothing is said twice
+  std::string last_;  // the last text, so that nothing is printed twice
 };
 
 }  // namespace slabstream

@@ -1,4 +1,4 @@
-// How far the frames are, on stderr.
+// The progress of frames on stderr.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@ namespace slabstream {
 
 class ProgressDisplay {
  public:
-  ProgressDisplay(bool wanted, int frame_count, const std::string& label = "");  // label: what each text begins with
+  ProgressDisplay(bool wanted, int frame_count, const std::string& label = "");  // label: begins each text
 
   void Show(int frame, const FrameProgress& progress);  // frame: from 0
   void FrameDone(int frame);

@@ -32,7 +32,7 @@ Json RankJson(const RecordedRank& rank) {
           {"pixels", rank.pixels}};
 }
 
-// Each a pixel's column or row.
+// A list of pixel columns or rows.
 std::vector<std::int32_t> ReadPixels(const JsonValue& value, std::size_t count) {
   std::vector<std::int32_t> pixels;
   value.Each([&](const JsonValue& v) { pixels.push_back(v.Integer(0, kMaxGridSide)); }, count);

@@ -1,5 +1,5 @@
-// Recording: what a trace file says of frames beside their spans, so that they can be simulated again: who rendered which box in what time,
-// and how much of the frame its image filled. `--trace` writes it under a key of its own, which viewers of traces ignore.
+// Recording: what a trace file stores of frames beside their spans, so that they can be simulated again: who rendered each box, in what
+// time, and how much of the frame its image filled. `--trace` writes it under a key of its own, which trace viewers ignore.
 //
 //   "slabstream": {"version": 1, "frames": [
 //     {"renderer": "splat", "grid": [w, h], "workers", "display", "combine",
@@ -28,10 +28,10 @@ inline constexpr char kRecordingKey[] = "slabstream";
 
 struct RecordedRank {
   BoxId box = 0;
-  WorkerId worker = 0;  // 0: nobody reported this rank
+  WorkerId worker = 0;  // 0: no report for this rank
   double render_seconds = 0;
   PixelBounds bounds;  // of its image, in the grid
-  double pixels = 0;   // of them, not empty
+  double pixels = 0;   // non-empty pixels in the bounds
 };
 
 struct RecordedFrame {
@@ -40,20 +40,20 @@ struct RecordedFrame {
   std::uint32_t workers = 1;
   WorkerId display = 0;
   std::string combine;
-  double arrived = 0, begin = 0, end = 0;  // seconds, at the coordinator, on a clock of its own
+  double arrived = 0, begin = 0, end = 0;  // seconds, on the coordinator's own clock
   double latency = 0;                      // seconds, for the client
   double picture_seconds = 0;
   double image_bytes = 0, voxel_bytes = 0;  // that travelled
   std::vector<std::vector<RecordedRank>> groups;
 };
 
-// Reports must have been kept. Ranks that were not reported show nothing and cost nothing.
+// The statistics must contain the reports. Ranks without a report draw nothing and cost nothing.
 RecordedFrame Record(const FrameStatistics& statistics, const RendererKind& renderer, Duration latency);
 
 nlohmann::ordered_json RecordingJson(std::span<const RecordedFrame> frames);
 
-// Of a whole trace file's text; at least one frame. InvalidArgument, naming the place: no JSON, not recorded by Slabstream, another
-// version, or a value that is missing or out of range.
+// Parses the text of a whole trace file; at least one frame. InvalidArgument, naming the place: not JSON, not recorded by Slabstream,
+// another version, or a missing or out-of-range value.
 Result<std::vector<RecordedFrame>> ParseRecording(std::string_view text);
 
 }  // namespace slabstream

@@ -7,11 +7,11 @@
 
 namespace slabstream {
 
-// Before work begins: whether the directories are there.
+// Before work begins: checks that the directories exist.
 Status CheckReportPaths(const FrameOptions& options);
 inline bool WantsReports(const FrameOptions& options) { return !options.stats_path.empty() || !options.trace_path.empty(); }
 
-// Afterwards. Writes what was asked for.
+// Afterwards: writes the requested files.
 Status WriteReports(const FrameOptions& options, const std::vector<FrameRecord>& frames);
 
 }  // namespace slabstream

@@ -41,7 +41,7 @@ std::optional<ServiceState> Load(const std::string& path) {
   }
 }
 
-// The folder that XDG_RUNTIME_DIR names may be missing (no login session) or belong to another user (sudo and su pass the variable on).
+// The folder named by XDG_RUNTIME_DIR may be missing (no login session) or belong to another user (sudo and su pass the variable on).
 bool IsOwnDirectory(const char* path) {
   struct stat info {};
   return path != nullptr && path[0] == '/' && ::stat(path, &info) == 0 && S_ISDIR(info.st_mode) && info.st_uid == ::getuid();

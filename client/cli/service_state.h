@@ -1,6 +1,6 @@
-// What `up` writes down about a service that it started, so that `down` and `status` find it: one JSON file a service, named after its
+// The record that `up` keeps of a service that it started, so that `down` and `status` find it: one JSON file a service, named after its
 // endpoint, in $XDG_RUNTIME_DIR/slabstream if that variable names a directory of this user, or else in /tmp/slabstream-UID. The directory
-// is the user's own (0700). The processes' logs lie beside it.
+// is the user's own (0700). The processes' logs are in it too.
 #pragma once
 
 #include <sys/types.h>
@@ -25,20 +25,20 @@ struct ServiceState {
   friend bool operator==(const ServiceState&, const ServiceState&) = default;
 };
 
-// Made if it does not exist. Unavailable, naming XDG_RUNTIME_DIR, if it cannot be made or belongs to somebody else.
+// Creates the directory if it does not exist. Unavailable, naming XDG_RUNTIME_DIR: it cannot be created or belongs to somebody else.
 Result<std::string> StateDirectory();
 
 Status SaveState(const ServiceState& state);
 void RemoveState(const ServiceState& state);  // and its logs
 
-// The state of the service at `endpoint`, or of the one started last if that is empty. Only services whose coordinator runs count; files of
-// others are removed. nullopt: there is none.
+// The state of the service at `endpoint`, or of the last one started if `endpoint` is empty. Only services with a running coordinator
+// count; files of others are removed. nullopt: there is none.
 std::optional<ServiceState> FindState(const std::string& endpoint);
 
-// $SLABSTREAM_ENDPOINT, else that of the service started last, else kDefaultEndpoint. InvalidArgument: the variable holds no endpoint.
+// $SLABSTREAM_ENDPOINT, else that of the last service started, else kDefaultEndpoint. InvalidArgument: the variable holds no endpoint.
 Result<std::string> DefaultEndpoint();
 
-// Whether `pid` runs (a zombie does not) and is one of ours: its /proc/PID/stat names `program`, of which the kernel keeps 15 characters.
+// Whether `pid` runs (a zombie does not) and is one of ours: its /proc/PID/stat names `program` (the kernel keeps 15 characters).
 bool IsRunning(pid_t pid, const std::string& program);
 
 inline constexpr const char* kCoordinatorProgram = "slabstream-coordinator";

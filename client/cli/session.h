@@ -16,11 +16,10 @@ class EmbeddedService;
 
 class Session {
  public:
-  // At the service `source` is a name of its catalogue; with local workers it is a volume file, which is checked to exist here and read
-  // when the first frame asks for it. Unavailable within 5 s if nobody answers.
+  // At the service `source` is a name of its catalogue. With local workers it is a volume file: Open checks that it exists, and the first
+  // frame reads it. Unavailable within 5 s if nobody answers.
   static Result<Session> Open(const ConnectionOptions& connection, const std::string& source);
-  // In this process, by connection.local_workers > 0: a volume that `load` gives when the first frame asks for it, from a thread of its
-  // own.
+  // In this process, by connection.local_workers > 0. `load` supplies the volume when the first frame needs it, on a thread of its own.
   static Result<Session> OpenLocal(const ConnectionOptions& connection, std::function<Result<std::shared_ptr<const Volume>>()> load);
   // The service alone, for `status`. `endpoint` as in ConnectionOptions.
   static Result<Session> OpenService(const std::string& endpoint);
@@ -29,7 +28,7 @@ class Session {
   ~Session();
 
   Client& client() { return *client_; }
-  const std::string& dataset() const { return dataset_; }  // what to ask the client for
+  const std::string& dataset() const { return dataset_; }  // the dataset to request
 
  private:
   Session();

@@ -11,7 +11,7 @@ using Json = nlohmann::ordered_json;
 
 double Milliseconds(std::int64_t ns) { return double(ns) / 1e6; }
 
-// What was predicted, what happened, and by how much of what happened the prediction is off.
+// Predicted and actual values, and the error of the prediction relative to the actual value.
 void AddPrediction(Json& json, const FramePrediction& predicted, const FrameRecord& frame, const FrameSummary& summary) {
   struct Figure {
     const char* name;

@@ -1,4 +1,4 @@
-// --stats: what the frames were made of and what they cost.
+// --stats: the plans and costs of the frames.
 //
 //   { "source", "renderer", "size": [w, h],
 //     "plan": {"workers", "groups", "decomposition", "split", "axis",       of the last frame: a lost worker changes it

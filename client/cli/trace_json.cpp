@@ -13,7 +13,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Tracks of a worker: its two threads, and its waiting for voxels, which goes on beside both.
+// Tracks of a worker: its two threads, and its waiting for voxels, which overlaps both.
 enum Track { kRenderTrack = 1, kCombineTrack = 2, kFetchTrack = 3 };
 constexpr std::pair<Track, const char*> kTracks[] = {{kRenderTrack, "render"}, {kCombineTrack, "combine"}, {kFetchTrack, "fetch"}};
 
@@ -51,7 +51,7 @@ std::string TraceJson(const FrameOptions& options, const std::vector<FrameRecord
 
   Json events = Json::array();
   std::set<std::uint32_t> workers;
-  std::vector<std::int64_t> lanes;  // by track of process 0: when its last frame ended; frames in flight overlap
+  std::vector<std::int64_t> lanes;  // by track of process 0: the end of its last frame; frames in flight overlap
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const FrameStatistics& frame = frames[i].statistics;
     std::size_t lane = 0;

@@ -1,9 +1,9 @@
 // --trace: the spans of all frames in Chrome's trace format
 // (https://docs.google.com/document/d/1CvAClvFfyA5R-PhYUmn5OOQtYMH4h6I0nSsKchNAySU), which Perfetto opens.
 //
-// One process a worker with the tracks render, combine and fetch; names are stages, args say frame, group, rank and box. Process 0 has a
-// track of whole frames a frame in flight. Times are microseconds since the first frame was planned. Beside the events stands what a replay
-// needs (client/cli/recording.h).
+// One process a worker, with the tracks render, combine and fetch; names are stages, args give frame, group, rank and box. Process 0 has a
+// track of whole frames for each frame in flight. Times are microseconds since the first frame was planned. Beside the events the file
+// holds the data for a replay (client/cli/recording.h).
 #pragma once
 
 #include <string>

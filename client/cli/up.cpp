@@ -1,4 +1,4 @@
-// `up`: one coordinator and N workers as processes of this machine. In the foreground they end with us; with --detach they stay.
+// `up`: one coordinator and N workers as processes of this machine. In the foreground they end with this process; with --detach they stay.
 #include <fmt/format.h>
 
 #include <unistd.h>
@@ -26,7 +26,7 @@ using std::chrono::seconds;
 constexpr Duration kStartTimeout = seconds(30);  // until the coordinator listens, and again until all workers are registered
 constexpr Duration kPatience = seconds(5);       // for an orderly end, then again before SIGKILL
 
-// While it lives SIGINT and SIGTERM wait until they are asked for, in every thread that is started meanwhile too.
+// While it lives, SIGINT and SIGTERM stay pending until they are asked for, also in threads started meanwhile.
 class BlockedSignals {
  public:
   BlockedSignals() {
@@ -84,7 +84,7 @@ class LocalService {
     }
   }
 
-  // Until a signal comes (Ok) or the coordinator ends. Tells on stderr which workers end meanwhile.
+  // Until a signal comes (Ok) or the coordinator ends. Reports workers that end meanwhile on stderr.
   Status Watch(const BlockedSignals& signals) {
     std::vector<bool> told(children_.size());
     while (!signals.Wait(milliseconds(200))) {
@@ -102,7 +102,7 @@ class LocalService {
     return Status::Ok();
   }
 
-  // Asks the coordinator to end everything, helps where that is not enough, and forgets the service.
+  // Asks the coordinator to end all processes, ends those that remain, and forgets the service.
   void Stop() {
     if (!children_.empty() && !children_.front().Ended() && !state_.endpoint.empty()) {
       if (Result<Session> session = Session::OpenService(state_.endpoint); session.ok() && session->client().ShutDownService().ok()) {
@@ -122,7 +122,7 @@ class LocalService {
     return fmt::format("{}/{}.log", state_.log_directory, child == 0 ? std::string("coordinator") : fmt::format("worker-{}", child));
   }
 
-  // What a child that ended too early says about itself.
+  // The error of a child that ended too early, with its own message.
   Status StartFailure(std::size_t child, const ChildEnd& end) const {
     const std::string program = child == 0 ? kCoordinatorProgram : kWorkerProgram;
     std::string line = LastLogLine(LogOf(child));

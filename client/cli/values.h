@@ -1,5 +1,5 @@
-// Texts of the command line to values. Pure. Every failure is InvalidArgument, one line that names the option, the text and what is
-// expected.
+// Parses texts of the command line into values. Pure. Every failure is InvalidArgument, one line that names the option, the text and what
+// is expected.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
-// A volume on the command line, as every command takes it: VOLUME or VOLUME:TRANSFER. VOLUME is a file or, at a service, a dataset's name;
-// TRANSFER is what --transfer takes.
+// A volume on the command line, in the form that all commands accept: VOLUME or VOLUME:TRANSFER. VOLUME is a file or, at a service, a
+// dataset's name; TRANSFER is a value of --transfer.
 #pragma once
 
 #include <optional>
@@ -11,7 +11,7 @@
 
 namespace slabstream {
 
-// What --transfer takes: a ParaView colour map if the text names a file, else the name of a preset. `option` begins messages.
+// A value of --transfer: a ParaView colour map if the text names a file, else the name of a preset. `option` begins messages.
 Result<std::variant<std::string, TransferFunction>> ParseTransfer(const std::string& option, const std::string& text);
 
 struct VolumeArgument {
@@ -20,8 +20,8 @@ struct VolumeArgument {
   std::optional<std::variant<std::string, TransferFunction>> transfer;
 };
 
-// A colon may also belong to the name of a file that exists, or of a dataset if no preset or colour map follows it. Whether the volume
-// exists is not checked. NotFound, InvalidArgument: the transfer function; `argument` ("SOURCE") begins messages.
+// A colon may also belong to the name of an existing file, or of a dataset if no preset or colour map follows it. Does not check that the
+// volume exists. NotFound, InvalidArgument: the transfer function; `argument` ("SOURCE") begins messages.
 Result<VolumeArgument> ParseVolumeArgument(const std::string& argument, const std::string& text, bool is_file);
 
 }  // namespace slabstream

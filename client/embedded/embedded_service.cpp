@@ -42,7 +42,7 @@ Result<std::unique_ptr<EmbeddedService>> EmbeddedService::Start(Context& context
   for (int i = 0; i < options.workers; ++i) {
     if (Status status = service->AddWorker(); !status.ok()) return status;
   }
-  // The first frame is planned for all of them, not for those that happen to be quick.
+  // So that the first frame is planned for all of them, not only for those that happen to be quick.
   for (const auto& worker : service->impl_->workers) worker->WaitUntilRegistered();
   return service;
 }
@@ -50,7 +50,7 @@ Result<std::unique_ptr<EmbeddedService>> EmbeddedService::Start(Context& context
 EmbeddedService::EmbeddedService(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 EmbeddedService::~EmbeddedService() {
-  // All at once rather than one after the other: each waits for its running tasks.
+  // All at once rather than in sequence: each waits for its running tasks.
   for (const auto& worker : impl_->workers) worker->RequestStop();
   impl_->coordinator->RequestStop();
 }

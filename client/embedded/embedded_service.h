@@ -1,4 +1,4 @@
-// EmbeddedService: the same coordinator and workers as threads of this process, over inproc. For `--local` and for tests.
+// EmbeddedService: the coordinator and workers as threads of this process, over inproc. For `--local` and for tests.
 #pragma once
 
 #include <functional>
@@ -15,8 +15,8 @@ namespace slabstream {
 
 struct EmbeddedOptions {
   int workers = 1;                 // [1, 256]
-  CoordinatorOptions coordinator;  // endpoints are filled in; catalogue and machine timings count
-  WorkerConfig worker;             // of each; threads, timings and budgets count
+  CoordinatorOptions coordinator;  // endpoints are filled in; catalogue and machine timings are used
+  WorkerConfig worker;             // of each; threads, timings and budgets are used
 };
 
 class EmbeddedService {

@@ -55,7 +55,7 @@ void ToStraightCodes(std::span<const float> premultiplied, std::span<Code> codes
   }
 }
 
-// Calls write(y, row) for each row, with the row in the file's own sample layout; stops at the first that fails.
+// Calls write(y, row) for each row, in the file's own sample layout. Stops at the first failure.
 template <class Write>
 bool WritePngRows(const LocalImage& image, ImageSize size, const PictureFormat& format, Write write) {
   std::vector<float> rgba(4 * std::size_t(size.width));
@@ -86,7 +86,7 @@ bool WriteExrRows(const LocalImage& image, ImageSize size, const PictureFormat& 
   return true;
 }
 
-// Hands the encoder's bytes to the file. What fails there is reported by OutputFile, for encoders are careless about it.
+// Passes the encoder's bytes to the file. OutputFile reports failures, because encoders do so unreliably.
 class FileSink : public OIIO::Filesystem::IOProxy {
  public:
   explicit FileSink(OutputFile& file) : IOProxy("", Write), file_(file) {}
@@ -127,7 +127,7 @@ Status WritePicture(const LocalImage& image, ImageSize size, const std::string& 
   spec.alpha_channel = 3;
   spec.z_channel = with_depth ? 4 : -1;
   if (png) {
-    // Samples are handed over in their final form: nothing is divided by alpha or bent by a transfer curve on the way.
+    // Samples are passed in their final form: no division by alpha and no transfer curve on the way.
     spec.attribute("oiio:UnassociatedAlpha", 1);
     spec.attribute("oiio:ColorSpace", "sRGB");
   } else {
@@ -142,7 +142,7 @@ Status WritePicture(const LocalImage& image, ImageSize size, const std::string& 
   spec.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
   const std::unique_ptr<OIIO::ImageOutput> out = OIIO::ImageOutput::create(png ? "png" : "openexr");
   const auto failure = [&](const std::string& reason) {
-    if (Status status = file->Close(); !status.ok()) return status;  // no space, not what the encoder makes of it
+    if (Status status = file->Close(); !status.ok()) return status;  // reports a full disk rather than the encoder's message about it
     const std::string line = reason.substr(0, reason.find('\n'));
     return Status::Unavailable(fmt::format("cannot write '{}': {}", path, line.empty() ? "unknown reason" : line));
   };

@@ -1,4 +1,4 @@
-// Pictures to files. The only place that knows OpenImageIO.
+// Writes pictures to files. The only place that uses OpenImageIO.
 //
 // PNG: straight alpha, 8 or 16 bit, row 0 at the top; code = round(max * clamp(straight value, 0, 1)), without a transfer curve.
 // EXR: premultiplied linear float R, G, B, A, and Z (camera depth, +infinity where nothing is seen) for images that have depth.
@@ -23,11 +23,11 @@ struct PictureFormat {
   StraightColor background;  // put behind the picture; the default leaves it as it is
 };
 
-// InvalidArgument naming the path and the endings there are, unless `path` ends in .png or .exr (any case).
+// InvalidArgument, naming the path and the known endings, unless `path` ends in .png or .exr (any case).
 Status CheckPicturePath(const std::string& path);
 
-// `image` is premultiplied, its bounds lie within `size`; pixels outside are empty. Both formats are written row by row, so that a picture
-// costs no more memory than it already has. InvalidArgument: the path's ending. Unavailable: cannot be written; the message names the path.
+// `image` is premultiplied, its bounds lie within `size`; pixels outside are empty. Both formats are written row by row, so that writing
+// needs no second copy of the picture. InvalidArgument: the path's ending. Unavailable: cannot be written; the message names the path.
 Status WritePicture(const LocalImage& image, ImageSize size, const std::string& path, const PictureFormat& format);
 
 }  // namespace slabstream

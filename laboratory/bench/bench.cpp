@@ -23,7 +23,7 @@ std::string WhyNot(const BenchCase& c, const BenchOptions& options) {
   return fmt::format("'{}' does not exist", *path);
 }
 
-// Those that are named, all of which must be there; or all standard ones, of which some may not.
+// The named cases, all of which must exist; or all standard ones, some of which may be missing.
 Result<std::vector<BenchCase>> ChooseCases(const BenchOptions& options) {
   std::vector<BenchCase> cases;
   for (const std::string& text : options.cases) {

@@ -1,4 +1,4 @@
-// `slabstream bench`: measures the standard cases, or volumes of the user's, on turntables of both projections.
+// `slabstream bench`: measures the standard cases, or the user's volumes, on turntables of both projections.
 #pragma once
 
 #include <optional>
@@ -13,12 +13,12 @@ namespace slabstream {
 inline constexpr int kMaxBenchSize = 8192;
 
 struct BenchOptions {
-  std::vector<std::string> cases;  // as ParseBenchCase takes them; empty: all standard ones
+  std::vector<std::string> cases;  // in the syntax of ParseBenchCase; empty: all standard ones
   ConnectionOptions connection;
   int size = 512;                                               // pixels a side, [1, kMaxBenchSize]
-  int frames = 12;                                              // of a turn of each projection, [1, kMaxTurntableFrames]
+  int frames = 12;                                              // in a turn of each projection, [1, kMaxTurntableFrames]
   int turns = 2;                                                // [1, kMaxTurns]
-  std::optional<const RendererKind*> renderer;                         // instead of that of each case
+  std::optional<const RendererKind*> renderer;                  // replaces that of each case
   std::string json_path, pictures_directory, export_directory;  // empty: not wanted
   bool list = false;
   std::string command;  // as it was typed

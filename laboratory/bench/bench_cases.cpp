@@ -13,9 +13,9 @@ namespace {
 
 constexpr double kHollowOccupancy = 0.05, kFilledOccupancy = 0.40;
 
-// Half way to the values of occupied voxels (128 ... 255) everything is as opaque and coloured as those: renderers that interpolate before
-// they classify then show the same surface, without a dark rim. Values rise along x, and the hue with them, so that a mirrored picture
-// would show.
+// From half way to the values of occupied voxels (128 ... 255) on, everything is as opaque and coloured as those: renderers that
+// interpolate before they classify then show the same surface, without a dark rim. Values rise along x, and the hue with them, so that a
+// mirrored picture is noticed.
 TransferFunction SphereTransfer(double opacity) {
   constexpr Rgb kWarm = {0.90F, 0.72F, 0.55F}, kCool = {0.65F, 0.72F, 0.85F};
   return {{{0, kWarm}, {128, kWarm}, {255, kCool}}, {{0, 0}, {64, opacity}, {255, opacity}}};
@@ -29,7 +29,7 @@ TransferFunction BrainTransfer() {
 
 double StandardOccupancy(SphereClass sphere_class) { return sphere_class == SphereClass::kHollow ? kHollowOccupancy : kFilledOccupancy; }
 
-// "class1-256"; one of another occupancy than the standard one says so.
+// "class1-256"; an occupancy other than the standard one is part of the name.
 std::string SphereName(const SphereRequest& sphere) {
   const std::string name = fmt::format("class{}-{}", int(sphere.sphere_class), sphere.size);
   return sphere.occupancy == StandardOccupancy(sphere.sphere_class) ? name : fmt::format("{}-{:g}", name, sphere.occupancy);

@@ -1,4 +1,4 @@
-// What `slabstream bench` renders: volumes, looks and views whose names stay, so that figures of different days and machines compare.
+// The cases of `slabstream bench`: volumes, looks and views with fixed names, so that figures of different days and machines compare.
 #pragma once
 
 #include <memory>
@@ -15,7 +15,7 @@
 namespace slabstream {
 
 struct BenchCase {
-  std::string name;                                 // what the table calls it; fit for a file's name
+  std::string name;                                 // in the table; fit for a file's name
   std::string purpose;                              // one line for --list
   std::string dataset;                              // the volume's name: cases of one volume share it, and at a service it is the dataset's
   std::variant<SphereRequest, std::string> volume;  // made here, or a file's path (unused at a service)
@@ -26,24 +26,24 @@ struct BenchCase {
 
 const std::vector<BenchCase>& StandardBenchCases();
 
-// What the standard ones are made by: a sphere whose occupied voxels have this opacity, and the MRI brain of Debian's package mricron-data.
+// Builds the standard cases: a sphere whose occupied voxels have this opacity, and the MRI brain of Debian's package mricron-data.
 BenchCase SphereCase(const SphereRequest& sphere, double opacity, const RendererKind* renderer = FindRenderer(kDefaultRenderer));
 BenchCase BrainCase();
 inline constexpr double kTranslucentSphere = 0.05, kOpaqueSphere = 0.9;
 
-// A standard case's name, or FILE[:TRANSFER] of a volume file (`at_service`: NAME[:TRANSFER] of a dataset), where TRANSFER is what
-// --transfer takes. NotFound, InvalidArgument: naming the text.
+// A standard case's name, or FILE[:TRANSFER] of a volume file (`at_service`: NAME[:TRANSFER] of a dataset), with TRANSFER as in --transfer.
+// NotFound, InvalidArgument: naming the text.
 Result<BenchCase> ParseBenchCase(const std::string& text, bool at_service);
 
-// Its volume, made or read: never that of a service.
+// Makes or reads its volume. Never gets it from a service.
 Result<std::shared_ptr<const Volume>> LoadBenchVolume(const BenchCase& bench_case);
 
-// The turntable that every case is seen on: frame `index` of `frames` of one turn. The side of a cube fills the picture's side
-// (orthographic); under perspective it is seen from where the bounding sphere fits a cone of 30 degrees.
+// The turntable of every case: frame `index` of `frames` of one turn. Orthographic: the side of a cube fills the picture's side.
+// Perspective: the eye is where the bounding sphere fits a cone of 30 degrees.
 inline constexpr double kBenchElevationDegrees = 20, kBenchZoom = 1.732, kBenchFovDegrees = 30;
 ViewParameters BenchView(Projection projection, int index, int frames);
 
-// Phong by a headlight, one of the views; what is not said here has the default of FrameRequest.
+// One of the views, with Phong shading by a headlight; everything else has the default of FrameRequest.
 FrameRequest BenchRequest(const BenchCase& bench_case, const ViewParameters& view, ImageSize size);
 
 }  // namespace slabstream

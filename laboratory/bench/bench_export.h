@@ -1,4 +1,4 @@
-// Cases of `slabstream bench` for other renderers: the voxels, the curve and the views that it would draw.
+// Exports cases of `slabstream bench` for other renderers: voxels, transfer function and views.
 #pragma once
 
 #include "common/base/status.h"
@@ -11,7 +11,7 @@ namespace slabstream {
 //   DATASET.mha         the volume (cases of one volume share it)
 //   CASE.transfer.json  the transfer function as a ParaView colour map, presets resolved
 //   CASE.scene.json     both names, renderer, picture size, views and lighting
-// Files are overwritten. The volume is one of this machine, never of a service.
+// Overwrites files. The volume is on this machine, never at a service.
 Status ExportCase(const BenchCase& bench_case, const BenchOptions& options);
 
 }  // namespace slabstream

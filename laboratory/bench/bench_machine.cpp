@@ -13,7 +13,7 @@
 namespace slabstream {
 namespace {
 
-// What stands behind the colon of the first line of a file of /proc that begins with `field`; empty if there is none.
+// The text after the colon in the first line of a /proc file that begins with `field`; empty if there is none.
 std::string ProcField(const char* path, std::string_view field) {
   std::ifstream file(path);
   for (std::string line; std::getline(file, line);) {
@@ -36,7 +36,7 @@ MachineInfo DescribeMachine() { return {ProcField("/proc/cpuinfo", "model name")
 
 void ResetPeakMemory() {
   ::malloc_trim(0);
-  std::ofstream("/proc/self/clear_refs") << "5";  // proc(5): the peak is what is resident now
+  std::ofstream("/proc/self/clear_refs") << "5";  // proc(5): sets the peak to the memory resident now
 }
 
 std::int64_t PeakMemoryBytes() {

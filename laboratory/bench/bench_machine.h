@@ -1,4 +1,4 @@
-// The machine that a figure was measured on, and how much memory measuring took.
+// The machine that a figure was measured on, and the memory that measuring took.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +13,8 @@ struct MachineInfo {
 };
 MachineInfo DescribeMachine();
 
-// Peak of this process's resident memory since the last ResetPeakMemory, or since it began where the system cannot reset it. 0: unknown.
-void ResetPeakMemory();  // gives free memory back first
+// Peak of this process's resident memory since the last ResetPeakMemory, or since its start if the system cannot reset it. 0: unknown.
+void ResetPeakMemory();  // first returns free memory to the system
 std::int64_t PeakMemoryBytes();
 
 }  // namespace slabstream

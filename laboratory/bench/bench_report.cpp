@@ -111,7 +111,7 @@ std::string BenchJson(const BenchRun& run, const std::vector<BenchResult>& resul
                {"size", o.size},
                {"frames", o.frames},
                {"turns", o.turns},
-               {"endpoint", o.connection.endpoint},  // empty: in this process, by so many workers with so many threads each
+               {"endpoint", o.connection.endpoint},  // empty: in this process, with the numbers of workers and threads below
                {"workers", o.connection.local_workers},
                {"threads", o.connection.local_workers > 0 ? LocalThreads(o.connection) : 0},
                {"cases", Json::array()}};

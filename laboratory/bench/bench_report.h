@@ -1,4 +1,4 @@
-// What `slabstream bench` measured, as a table for people and JSON for programs. Pure.
+// Results of `slabstream bench`, as a table for people and JSON for programs. Pure.
 #pragma once
 
 #include <array>
@@ -26,14 +26,14 @@ struct BenchResult {
   BenchCase bench_case;
   std::string skipped;            // why nothing was measured; then the rest is empty
   VolumeDescription description;  // of the volume
-  double first_frame_ms = 0;      // an embedded service holds nothing yet: a file is read in it
-  // Request to last byte of each frame after the warm-up, in the order they were rendered.
+  double first_frame_ms = 0;      // an embedded service is empty then, so this includes reading a file
+  // Request to last byte of each frame after the warm-up, in order of rendering.
   std::vector<double> orthographic_ms, perspective_ms;
   std::array<double, kStageCount> stage_median_ms{};  // worker time, summed over workers
   std::int64_t peak_rss_bytes = 0;                    // of this process: all of the service if it is embedded
 };
 
-// Sets the times and stages of a result that has none: `records[i]` is of `jobs[i]`.
+// Sets the times and stages of a result that has none: `records[i]` belongs to `jobs[i]`.
 void SetFrames(BenchResult& result, std::span<const FrameJob> jobs, std::span<const FrameRecord> records);
 
 struct BenchRun {

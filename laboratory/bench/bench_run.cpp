@@ -18,7 +18,7 @@ constexpr Projection kProjections[] = {Projection::kOrthographic, Projection::kP
 Result<Session> OpenSession(const BenchCase& c, const ConnectionOptions& connection) {
   if (connection.local_workers == 0) return Session::Open(connection, c.dataset);
   if (const auto* path = std::get_if<std::string>(&c.volume)) return Session::Open(connection, *path);
-  // A sphere is made beforehand, so that the first frame's time is the service's own; nobody but the service keeps it.
+  // A sphere is made beforehand, so that the first frame's time is the service's own. Only the service keeps it.
   Result<std::shared_ptr<const Volume>> sphere = LoadBenchVolume(c);
   if (!sphere.ok()) return sphere.status();
   return Session::OpenLocal(connection, [c, made = *std::move(sphere)]() mutable -> Result<std::shared_ptr<const Volume>> {
@@ -68,7 +68,7 @@ Result<BenchResult> RunBenchCase(const BenchCase& bench_case, const BenchOptions
 
   FrameLoopOptions loop;
   loop.keep_reports = true;
-  loop.progress = ::isatty(STDERR_FILENO) == 1;  // else the rows of the table tell how far it is
+  loop.progress = ::isatty(STDERR_FILENO) == 1;  // else the rows of the table show the progress
   loop.label = bench_case.name;
   const Result<std::vector<FrameRecord>> records = RenderFrames(session->client(), jobs, loop);
   if (!records.ok()) return records.status();

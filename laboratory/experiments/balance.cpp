@@ -23,8 +23,8 @@ namespace {
 
 constexpr int kRepeats = 3, kQuickRepeats = 1;
 constexpr int kTableWorkers = 16;  // p of the tables that compare partitions
-constexpr int kBoxesAWorker = 4;   // where assignments are compared: with one box each they have nothing to choose
-constexpr int kMovingFrames = 24;  // of a turn
+constexpr int kBoxesAWorker = 4;   // to compare assignments: with one box each they have no choice
+constexpr int kMovingFrames = 24;  // in a turn
 constexpr int kRenderings = 3;
 constexpr std::string_view kLink = "10gbit";
 
@@ -61,8 +61,8 @@ double VoxelBytes(const LayoutKnowledge& knowledge) {
   return double(BytesPerSample(description.type));
 }
 
-// A turning view, frame after frame: the boxes are rendered alone, what they took is learnt, and before the next frame the layout may
-// change, by the coordinator's own table of layouts.
+// A turning view, frame after frame: the boxes are rendered alone and their times are learnt. Before the next frame the coordinator's own
+// table of layouts may change the layout.
 struct Moving {
   std::string name;
   Policy policy;
@@ -183,7 +183,7 @@ std::string SplitWords(const std::string& split) { return split == "occupied" ? 
 Result<Section> PartitionSection(ExperimentContext& context, const Balance& balance, const BenchCase& volume) {
   const std::string title = TitleOf(volume);
   Table table = NewTable("partitions-" + volume.dataset, fmt::format("{}: one box a worker", title));
-  // A chart for each split: more lines than a palette has colours would not be told apart.
+  // One chart for each split: a chart with more lines than the palette has colours would be unreadable.
   std::map<std::string, LineChart> imbalance, times;
   std::map<std::string, double> at_table;
   for (const NamedPolicy& named : AllPartitions()) {

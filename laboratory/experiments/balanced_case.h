@@ -1,17 +1,17 @@
-// A frame with dynamic balance: what its boxes cost after some frames of the same view, in which the coordinator's table of layouts learnt
-// where the work is and changed the boxes. Every repeat is balanced by itself, from what it measured itself.
+// A frame with dynamic balance: the costs of its boxes after some frames of the same view, during which the coordinator's table of layouts
+// learnt where the work is and changed the boxes. Each repeat is balanced separately, from its own measurements.
 #pragma once
 
 #include "laboratory/experiments/frame_case.h"
 
 namespace slabstream {
 
-inline constexpr int kBalancedFrames = 6;  // that are learnt from, at one box measured once each
+inline constexpr int kBalancedFrames = 6;  // to learn from, with each box measured once
 
-// The policy's balance is taken to be dynamic, whatever it says.
+// Assumes dynamic balance, whatever the policy says.
 Trial BalancedTrial(ExperimentContext& context, const FrameCase& frame);
 
-// By repeat: layouts differ. The trial, and FinishTrial, must have been run.
+// One for each repeat, because layouts differ. The trial, and FinishTrial, must have been run.
 Result<std::vector<MeasuredFrame>> RecallBalanced(ExperimentContext& context, const FrameCase& frame);
 
 }  // namespace slabstream

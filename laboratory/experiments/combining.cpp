@@ -23,11 +23,11 @@ namespace slabstream {
 namespace {
 
 constexpr int kRepeats = 7, kQuickRepeats = 2;
-constexpr int kTurns = 3;          // of which the fastest counts
+constexpr int kTurns = 3;          // the fastest counts
 constexpr int kMeasuredMost = 16;  // ranks whose images are kept in memory at a time
 
-// One combining: p images of side x side pixels, each of which fills `share` of the frame. Where, is a matter of the seed: a rectangle of
-// the frame's shape somewhere, as boxes of a sparse volume leave it.
+// One combining: p images of side x side pixels, each of which fills `share` of the frame: a rectangle of the frame's shape at a place that
+// the seed decides, like the image of a box in a sparse volume.
 struct Combining {
   std::string scheme = "fan-in";
   int ranks = 16;
@@ -52,8 +52,8 @@ std::vector<PixelBounds> FilledParts(const Combining& c, std::uint64_t seed) {
 
 ScheduleName ScheduleOf(const Combining& c) { return {c.scheme, Rank(c.ranks), 0}; }
 
-// Every step on real images, one after the other; the time of a round is that of the rank that has most to do in it. What links cost is
-// left out.
+// Runs every step on real images, in sequence. The time of a round is that of the rank with the most work in it. Costs of links are left
+// out.
 struct Computing {
   double seconds = 0, bytes = 0;
 };
@@ -87,7 +87,7 @@ Trial MeasureOperators(const Combining& c, std::uint64_t seed) {
     const SharedSchedule schedule = DeriveSchedule(ScheduleOf(c), {0, std::uint64_t(c.side) * std::uint64_t(c.side)}).value();
     tbb::task_arena one_thread(1);
     Computing computing{.seconds = std::numeric_limits<double>::infinity()};
-    // The first time brings memory in, which workers keep from frame to frame.
+    // The first turn allocates memory, which workers keep from frame to frame.
     for (int turn = 0; turn < kTurns; ++turn) {
       std::vector<LocalImage> images;
       for (const PixelBounds& part : FilledParts(c, seed)) {
@@ -102,7 +102,7 @@ Trial MeasureOperators(const Combining& c, std::uint64_t seed) {
   return {KeyOf("operators", c), run, double(c.side) * c.side * c.share * c.ranks * 2e-6 + 0.05};
 }
 
-// A frame whose boxes are rendered in no time, until its picture is complete at the display worker, on a machine of the link.
+// Time until the picture is complete at the display worker, on a machine of this link, if boxes are rendered in no time.
 Result<double> CombiningSeconds(const ExperimentContext& context, const Combining& c, const LinkModel& link) {
   FramePlan plan;
   const Index3 size = {8, 8, c.ranks};
@@ -354,7 +354,7 @@ Result<Report> RunCombining(ExperimentContext& context) {
     }
   }
   const int repeats = context.quick() ? kQuickRepeats : kRepeats;
-  // What is simulated needs what is measured.
+  // Simulations need the measurements.
   if (Status status = context.Run(measured, repeats); !status.ok()) return status;
   if (Status status = context.Run(WithoutDoubles(std::move(simulated)), repeats); !status.ok()) return status;
 

@@ -1,6 +1,6 @@
-// Experiments: what `slabstream experiment NAME -o DIR` runs. Each is one file and one line in Experiments(). An experiment says which
-// trials it needs (trials.h), has them run, and makes a report of their numbers (report/document.h); the frame around it
-// (run_experiment.cpp) does the rest: folder, resumption, progress, provenance, files.
+// Experiments: `slabstream experiment NAME -o DIR` runs one. Each is one file and one line in Experiments(). An experiment lists the trials
+// that it needs (trials.h), has them run, and makes a report of their numbers (report/document.h). The rest is the same for all
+// (run_experiment.cpp): folder, resumption, progress, provenance, files.
 #pragma once
 
 #include <cstdint>
@@ -31,7 +31,7 @@ struct ExperimentOptions {
 inline constexpr int kMaxRepeats = 1000, kLeastScaledSide = 8;
 inline constexpr double kMinScale = 0.05;
 
-// What an experiment works with.
+// The environment of an experiment.
 class ExperimentContext {
  public:
   ExperimentContext(ExperimentOptions options, TrialLog log, std::function<bool()> interrupted);
@@ -41,7 +41,7 @@ class ExperimentContext {
   int Scaled(int side) const;  // a sphere's side or a picture's, at least kLeastScaledSide
   VolumeCache& volumes() { return volumes_; }
 
-  // Runs those that the log does not hold yet. `repeats`: where the user did not say.
+  // Runs the trials that the log does not hold yet. `repeats` applies if the user gave no number.
   Status Run(const std::vector<Trial>& trials, int repeats);
   const TrialLog& log() const { return log_; }
   int repeats() const { return repeats_; }  // of the last Run
@@ -58,7 +58,7 @@ struct Experiment {
   std::string_view name;
   std::string_view purpose;  // one line for --list
   Result<Report> (*run)(ExperimentContext&);
-  // What is wrong with the options, before a folder is made; null: nothing can be that is not checked for all.
+  // Checks the options before a folder is made; null: the checks common to all experiments suffice.
   Status (*check)(const ExperimentOptions&) = nullptr;
   bool takes_file = false;  // ExperimentOptions::sweep_file
 };

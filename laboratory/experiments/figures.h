@@ -1,4 +1,4 @@
-// FrameFigures: what people compare of a way to render, of one simulated run.
+// FrameFigures: the figures by which ways to render are compared, from one simulated run.
 #pragma once
 
 #include "laboratory/experiments/frame_case.h"
@@ -6,15 +6,15 @@
 namespace slabstream {
 
 struct FrameFigures {
-  double latency_seconds = 0;  // of a frame that nobody asked for ahead
-  double preview_seconds = 0;  // until the first group of it can be seen
-  double steady_seconds = 0;   // from picture to picture, with frames asked for ahead
+  double latency_seconds = 0;  // of a frame that was not requested ahead
+  double preview_seconds = 0;  // until its first group can be seen
+  double steady_seconds = 0;   // from picture to picture, with frames requested ahead
   double imbalance = 1;        // most / mean render time of a worker
   double idle_share = 0;       // of the workers' time of that frame
   double image_bytes = 0;      // between workers
 };
 
-// `teams`: as large as the frame's, which take frames in turn.
+// `teams` of the size of the frame's take frames in turn.
 Result<FrameFigures> FindFigures(const MeasuredFrame& frame, const MachineModel& machine, int teams = 1);
 
 }  // namespace slabstream

@@ -25,11 +25,11 @@
 namespace slabstream {
 namespace {
 
-constexpr int kRenderings = 2;  // rounds of box costs: of two, the lower one is the median that counts
+constexpr int kRenderings = 2;  // rounds of box costs; of two, the lower one counts as the median
 constexpr int kWarmUpFrames = 2, kFinishes = 3;
 constexpr int kLearningFrames = 8;  // to warm up with dynamic balance
 
-// Where the boxes are.
+// The parameters that decide where the boxes are.
 void AddPartition(Json& key, const FrameCase& frame) {
   const Policy& policy = frame.policy;
   key["decomposition"] = policy.decomposition;
@@ -39,7 +39,7 @@ void AddPartition(Json& key, const FrameCase& frame) {
   key["workers"] = frame.workers;
 }
 
-// Pixels that are not empty, tile by tile, of the smallest rectangle of tiles that holds all: [x, y, width, height, count, ...].
+// Counts of non-empty pixels, tile by tile, in the smallest rectangle of tiles that holds all: [x, y, width, height, count, ...].
 Json CoverageJson(const CoverageMap& coverage) {
   std::int32_t x_begin = coverage.tiles_x, x_end = 0, y_begin = coverage.tiles_y, y_end = 0;
   for (std::int32_t y = 0; y < coverage.tiles_y; ++y) {
@@ -165,7 +165,7 @@ Result<Json> MeasureService(ExperimentContext& context, const FrameCase& frame, 
               {"image_bytes", MedianOf(std::move(image_bytes)).median}};
 }
 
-// Beside each other: rendering grows with voxels and boxes' halos, and with pixels.
+// Relative to other frames: rendering grows with voxels and halos of boxes, and with pixels.
 double ExpectedEffort(const FrameCase& frame) {
   const auto* sphere = std::get_if<SphereRequest>(&frame.volume.volume);
   const double side = sphere != nullptr ? sphere->size : 200;
@@ -287,7 +287,7 @@ Trial ValidationTrial(ExperimentContext& context, const FrameCase& frame, int tu
     const ValidatedView& view = row->views.front();
     return Json{{"measured_ms", view.measured.latency * 1e3}, {"simulated_ms", view.simulated.latency * 1e3}};
   };
-  return {ValidationKey(frame), validate, 4 * turns * ExpectedEffort(frame)};  // the service's, and the boxes', twice each
+  return {ValidationKey(frame), validate, 4 * turns * ExpectedEffort(frame)};  // the service's frames and the boxes, twice each
 }
 
 std::vector<Trial> WithoutDoubles(std::vector<Trial> trials) {
@@ -377,7 +377,7 @@ void FillImages(MeasuredFrame& frame) {
 
 Result<Timeline> Simulate(const MeasuredFrame& frame, const MachineModel& machine, int frames, int in_flight, bool keep_spans, int teams) {
   const Roster everybody = RosterOf(frame.plan.slots * std::uint32_t(teams));
-  std::vector<FramePlan> plans;  // as many as there are different ones
+  std::vector<FramePlan> plans;  // the distinct plans
   for (std::size_t turn = 0; turn < std::min(std::size_t(frames), everybody.slots.size()); ++turn) {
     const Team team = TeamOf(everybody, std::uint32_t(teams), turn);
     plans.push_back(TakeTurn(frame.plan, team.roster, team.turn));
@@ -390,7 +390,7 @@ Result<Timeline> Simulate(const MeasuredFrame& frame, const MachineModel& machin
 Result<double> SteadySeconds(const MeasuredFrame& frame, const MachineModel& machine, int teams) {
   const std::size_t workers = std::size_t(frame.plan.slots) * std::size_t(teams);
   const int window = WindowFor(workers, std::uint32_t(teams), FrameBytes(frame.plan.setup)).frames;
-  // Whole rounds of the teams, since they may end together, of which the middle half is looked at.
+  // Whole rounds of the teams, since teams may end together. The middle half is evaluated.
   const int frames = 4 * teams * std::max((window + teams - 1) / teams, 4);
   const Result<Timeline> timeline = Simulate(frame, machine, frames, FramesAhead(window), false, teams);
   if (!timeline.ok()) return timeline.status();

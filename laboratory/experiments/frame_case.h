@@ -1,6 +1,6 @@
-// FrameCase: one way to render one frame. What its boxes cost is measured by rendering each of them alone (laboratory/measure/box_costs.h);
-// what a frame of it takes is measured by the service where this machine has the cores, and simulated from the boxes' costs for any number
-// of workers (common/simulation).
+// FrameCase: one way to render one frame. The costs of its boxes are measured by rendering each of them alone
+// (laboratory/measure/box_costs.h). The frame time is measured with the service if this machine has enough cores, and simulated from the
+// box costs for any number of workers (common/simulation).
 #pragma once
 
 #include <array>
@@ -32,34 +32,34 @@ const RendererKind* ZBuffer();
 
 FrameRequest RequestOf(const FrameCase& frame);
 
-// Box costs depend on the partition and the view, not on who owns a box or how images are combined: cases that differ in these alone share
-// one trial (and key).
+// Box costs depend on the partition and the view, not on the assignment or the combining scheme: cases that differ only in these share one
+// trial (and key).
 Trial BoxCostTrial(ExperimentContext& context, const FrameCase& frame);
 Json BoxCostKey(const FrameCase& frame);
 
-// How long the picture takes to be made of the accumulated frame and encoded, and to be decoded by the client, on one thread:
-// "finish_seconds", "receive_seconds".
+// Times on one thread: "finish_seconds" to make the picture from the accumulated frame and encode it, "receive_seconds" for the client to
+// decode it.
 Trial FinishTrial(ExperimentContext& context, const FrameCase& frame);
 Json FinishKey(const FrameCase& frame);
 
-// Frames of the embedded service with frame.workers workers of one thread each, one frame in flight, after two to warm up. Numbers:
+// Frames of the embedded service with frame.workers workers of one thread each, one frame in flight, after two warm-up frames. Numbers:
 // "latency_ms" (the median of `frames`), "stages_ms" by name, "imbalance", "idle_share", "image_bytes".
 Trial ServiceTrial(ExperimentContext& context, const FrameCase& frame, int frames);
 Json ServiceKey(const FrameCase& frame);
 
-// The same frame by the service and as the simulation says, in turns (laboratory/measure/validate.h), for frame.workers of 1 or 2:
+// The same frame measured with the service and simulated, in turns (laboratory/measure/validate.h), for frame.workers of 1 or 2:
 // "measured_ms" and "simulated_ms".
 Trial ValidationTrial(ExperimentContext& context, const FrameCase& frame, int turns);
 Json ValidationKey(const FrameCase& frame);
 
-// What a picture is of, whoever renders it: the beginning of every key. `what`: of the trial.
+// Identifies what a picture shows, whoever renders it: the beginning of every key. `what` names the trial.
 Json PictureKey(std::string_view what, const FrameCase& frame);
-// The plan that the service would make of its first frame. Errors of Validate and PlanFrame.
+// The service's plan for its first frame. Errors of Validate and PlanFrame.
 Result<FramePlan> PlanOf(ExperimentContext& context, const FrameCase& frame);
-// The same with boxes that somebody else has laid out.
+// The same with a given layout.
 Result<FramePlan> PlanOf(ExperimentContext& context, const FrameCase& frame, const Layout& layout);
-inline constexpr DatasetId kPlannedDataset = 1;  // of these plans
-// What lays them out: as long as `knowledge` lives, and the volume is in use.
+inline constexpr DatasetId kPlannedDataset = 1;  // in these plans
+// Makes layouts, as long as `knowledge` lives and the volume is in use.
 struct LayoutKnowledge {
   VolumeInUse volume;
   std::shared_ptr<const OccupancyGrid> occupied;
@@ -70,14 +70,14 @@ struct LayoutKnowledge {
 Result<LayoutKnowledge> KnowLayout(ExperimentContext& context, const FrameCase& frame);
 LayoutRequest LayoutRequestOf(const LayoutKnowledge& knowledge, int workers);
 
-// The same frame by a policy that leaves nothing open: as a coordinator of so many workers, a host each, joined by `link`, would choose it
+// The same frame with a resolved policy: the one that a coordinator of as many workers, one on each host, joined by `link`, would choose
 // before it has seen a frame. Errors as of KnowLayout and ChoosePolicy.
 Result<FrameCase> WithChosenPolicy(ExperimentContext& context, FrameCase frame, const LinkModel& link);
 
-// Trials without those whose key comes a second time.
+// Removes trials whose key has occurred before.
 std::vector<Trial> WithoutDoubles(std::vector<Trial> trials);
 
-// A planned frame with what its boxes were measured to cost: medians over repeats.
+// A planned frame with the measured costs of its boxes: medians over repeats.
 struct MeasuredFrame {
   FramePlan plan;
   struct Cost {
@@ -90,29 +90,29 @@ struct MeasuredFrame {
   std::vector<Cost> boxes;  // by BoxId; those without a placement cost nothing
   double finish_seconds = 0, receive_seconds = 0;
 
-  FrameInput Input() const;                   // of SimulateFrames, as long as this lives
-  std::vector<double> WorkerSeconds() const;  // render time of each worker, also of those without a box
+  FrameInput Input() const;                   // for SimulateFrames, valid as long as this lives
+  std::vector<double> WorkerSeconds() const;  // render time of each worker, including workers without a box
   double RenderSeconds() const;               // of all
   double StageSeconds(Stage stage) const;     // of all
 };
 // Both trials must have been run.
 Result<MeasuredFrame> Recall(ExperimentContext& context, const FrameCase& frame);
-// The same of each repeat of the box costs by itself.
+// The same for each repeat of the box costs separately.
 Result<std::vector<MeasuredFrame>> RecallRepeats(ExperimentContext& context, const FrameCase& frame);
 
-// Numbers of a BoxCostTrial of a plan of the frame, and a plan with them.
+// The numbers of a BoxCostTrial for a plan of the frame, and the plan with such numbers.
 Result<Json> MeasureBoxes(ExperimentContext& context, const FrameCase& frame, const FramePlan& plan);
 MeasuredFrame WithBoxCosts(ExperimentContext& context, const FrameCase& frame, FramePlan plan, const std::vector<const Json*>& repeats);
 
-// As if every image filled the whole frame, as the paper's did: no empty pixel is left out.
+// Pretends that every image fills the whole frame, as the paper's did: no empty pixel is left out.
 void FillImages(MeasuredFrame& frame);
 
-// The same frame over and over: what a client sees who asks for `frames` frames, `in_flight` ahead. The first is cold in no sense: voxels
-// are cached and normals made. The frame's workers are one of `teams` teams as large (common/planning/team.h).
+// The same frame over and over: a client's view who asks for `frames` frames, `in_flight` ahead. Even the first is warm: voxels are cached
+// and normals made. The frame's workers are one of `teams` teams of equal size (common/planning/team.h).
 Result<Timeline> Simulate(const MeasuredFrame& frame, const MachineModel& machine, int frames = 1, int in_flight = 1,
                           bool keep_spans = false, int teams = 1);
 
-// From picture to picture, of as many frames asked for ahead as keep the service busy: a few more than it has under way.
+// Time from picture to picture, with enough frames requested ahead to keep the service busy: a few more than it has under way.
 Result<double> SteadySeconds(const MeasuredFrame& frame, const MachineModel& machine, int teams = 1);
 inline int FramesAhead(int window) { return window + 2; }
 

@@ -1,5 +1,5 @@
-// LearntLayouts: the layouts of a case from frame to frame, as the coordinator's LayoutTable makes them of what frames took. What is learnt
-// decides them, so that they come again when it is told again.
+// LearntLayouts: the layouts of a case from frame to frame, made by the coordinator's LayoutTable from the render times of frames. The
+// times decide the layouts, so the same times give the same layouts.
 #pragma once
 
 #include <cstdint>
@@ -21,14 +21,14 @@ class LearntLayouts {
 
   const LayoutKnowledge& knowledge() const { return knowledge_; }
 
-  // Of the next frame, which may differ in its view alone from the one given to Make. Valid until the next call.
+  // The layout of the next frame, which may differ only in its view from the one given to Make. Valid until the next call.
   const Layout& Next(const FrameCase& frame) {
     policy_ = ResolvePolicy(RequestOf(frame), knowledge_.volume.summary->description.geometry).value();
     layout_ = table_.Find({&policy_, &volume_, knowledge_.volume.summary.get(), knowledge_.occupied, slots_});
     return *layout_;
   }
 
-  // What rendering the frame of the last Next took, by PlacementsOf(plan).
+  // Render times of the frame of the last Next, by PlacementsOf(plan).
   void Learn(const FramePlan& plan, std::span<const std::int64_t> nanoseconds) {
     std::vector<RankReport> reports;
     for (const Placement& placement : PlacementsOf(plan)) {

@@ -37,7 +37,7 @@ Trial HostTrial() {
     const Result<Calibration> calibration = CalibrateThisHost(1);
     if (!calibration.ok()) return calibration.status();
     MachineModel machine = calibration->machine;
-    // Between hosts pixels travel in messages, where workers of one host lend them to each other. Hosts have one thread for it.
+    // Between hosts pixels travel in messages, instead of being lent. Hosts have one thread for it.
     tbb::task_arena one_thread(1);
     machine.combining = one_thread.execute([] { return MeasureCombining(Transfer::kMessage); });
     Json numbers = Json::object();
@@ -56,7 +56,7 @@ LinkModel Link(std::string_view preset) {
 MachineModel Cluster(const ExperimentContext& context, const LinkModel& link) {
   MachineModel machine;
   for (const Found& number : kNumbers) number.of(machine) = EstimateOf(context.log(), HostKey(), number.name).median;
-  machine.message_seconds = MachineModel().message_seconds;  // over sockets, which threads of a process do without
+  machine.message_seconds = MachineModel().message_seconds;  // over sockets; threads of one process need none
   machine.link = link;
   machine.workers_a_host = 1;
   machine.cores_a_host = kCoresAHost;
@@ -64,8 +64,8 @@ MachineModel Cluster(const ExperimentContext& context, const LinkModel& link) {
 }
 
 MachineModel PaperMachine(const ExperimentContext& context, double frame_seconds, double pixels) {
-  // For N = 200 and p = 10 ... 30 centralised combining takes about 0.20 s an image (table 2 less the other stages of table 5), of which
-  // compositing takes 0.117 s (table 5, p = 1: 32 % of 72.89 s for 200 slices). Writing and reading it takes the rest.
+  // For N = 200 and p = 10 ... 30 centralised combining takes about 0.20 s an image (table 2 less the other stages of table 5). Compositing
+  // takes 0.117 s of it (table 5, p = 1: 32 % of 72.89 s for 200 slices), writing and reading the rest.
   constexpr double kImageShare = 0.083 / 72.89;
   MachineModel machine = Cluster(context, Link("pvs"));
   machine.link.bytes_per_second = pixels * machine.combining.rgba_bytes / (kImageShare * frame_seconds);

@@ -51,7 +51,7 @@ Figure TimelineFigure(const std::string& name, const std::string& title, const T
         fmt::format("frame {}, group {}, {} bytes from worker {}", message.frame + 1, message.group + 1, FormatNumber(message.bytes),
                     message.from + 1));
   }
-  // What a worker never does needs no room; that it does not render is worth seeing.
+  // Lanes without spans are left out, except "renders": a worker that does not render is worth seeing.
   std::erase_if(chart.lanes, [](const GanttLane& lane) { return lane.spans.empty() && !lane.name.ends_with("renders"); });
   return {name, DrawGantt(chart), caption};
 }

@@ -1,4 +1,4 @@
-// Plots that several experiments draw from the same things.
+// Plots that several experiments share.
 #pragma once
 
 #include <string>
@@ -10,15 +10,15 @@
 
 namespace slabstream {
 
-// Numbers of workers, each of which is marked.
+// Numbers of workers, with a mark at each.
 AxisSpec WorkersAxis(AxisScale scale = AxisScale::kLog);
 
-// What the workers do in [from, to) seconds of a simulated run (spans kept): a lane for each thread of a worker, one for what arrives
-// there. The first `most_workers` of them.
+// The work of the first `most_workers` workers in [from, to) seconds of a simulated run (spans kept): a lane for each thread of a worker,
+// and one for what arrives there.
 Figure TimelineFigure(const std::string& name, const std::string& title, const Timeline& timeline, double from, double to,
                       const std::string& caption, std::uint32_t most_workers = 12);
 
-// What each box costs, on three cuts through the middle of the volume.
+// The cost of each box, on three cuts through the middle of the volume.
 Figure BoxCostFigure(const std::string& name, const std::string& title, const MeasuredFrame& frame, const std::string& caption);
 
 }  // namespace slabstream

@@ -1,4 +1,4 @@
-// Policies to compare, made from the lists of the planner, so that a new partition or scheme takes part by itself.
+// Policies to compare, made from the planner's lists, so that a new partition or scheme is included automatically.
 #pragma once
 
 #include <string>
@@ -16,15 +16,15 @@ struct NamedPolicy {
 
 // Every decomposition, divided by voxels and by occupied voxels.
 std::vector<NamedPolicy> AllPartitions();
-// Two of them: what the paper does, and what is meant to balance.
+// Two of them: the paper's, and one meant to balance.
 NamedPolicy EqualSlabs();
 NamedPolicy BalancedTree();
-// Boxes cut along the axis on which the view's slices are traversed, by occupied voxels: what is rendered at borders is least, and what
-// travels when another axis comes nearest is most.
+// Boxes cut along the traversal axis of the view, by occupied voxels: the least work at borders, but the most voxels to move when another
+// axis becomes the traversal axis.
 std::vector<NamedPolicy> PartitionsAlongTheView();
 // Every scheme, with its own arguments.
 std::vector<std::string> AllSchemes();
-// Those that are worth trying with each partition: a tree, a swap.
+// Schemes worth trying with each partition: a tree, a swap.
 std::vector<std::string> UsualSchemes();
 
 }  // namespace slabstream

@@ -20,7 +20,7 @@
 namespace slabstream {
 namespace {
 
-// All that decides which trials there are.
+// Everything that decides the set of trials.
 Result<Json> Parameters(const ExperimentOptions& options) {
   Json parameters = {{"seed", options.seed},   {"repeats", options.repeats}, {"quick", options.quick},
                      {"scale", options.scale}, {"volumes", options.volumes}, {"sweep", Json()}};
@@ -28,7 +28,7 @@ Result<Json> Parameters(const ExperimentOptions& options) {
     const Result<std::string> text = ReadTextFile(options.sweep_file, kMaxSweepBytes);
     if (!text.ok()) return text.status();
     const Json sweep = Json::parse(*text, nullptr, false);
-    parameters["sweep"] = sweep.is_discarded() ? Json() : sweep;  // what is wrong with it the experiment tells
+    parameters["sweep"] = sweep.is_discarded() ? Json() : sweep;  // the experiment reports its errors
   }
   return parameters;
 }

@@ -1,4 +1,4 @@
-// The frame round every experiment: its folder, resumption, Ctrl-C, provenance and the files that it leaves behind.
+// The parts common to all experiments: folder, resumption, Ctrl-C, provenance and result files.
 #pragma once
 
 #include "laboratory/experiments/experiment.h"
@@ -8,8 +8,8 @@ namespace slabstream {
 // Names and purposes, a line each.
 std::string ExperimentList();
 
-// Runs options.name and writes its report into options.folder; says on stdout where it is. InvalidArgument, NotFound: an option, a file, or
-// a folder that holds another run. Cancelled: by Ctrl-C; what is measured stays in the folder and the same command continues.
+// Runs options.name, writes its report into options.folder and prints on stdout where it is. InvalidArgument, NotFound: an option, a file,
+// or a folder that holds another run. Cancelled: by Ctrl-C; measurements stay in the folder and the same command continues.
 Status RunExperiment(const ExperimentOptions& options);
 
 }  // namespace slabstream

@@ -17,22 +17,22 @@ namespace {
 
 constexpr int kRepeats = 3, kQuickRepeats = 1;
 constexpr std::string_view kLink = "10gbit";
-constexpr int kTeam = 2;                 // workers that share a frame, in the series that have teams
-constexpr int kMostDynamicWorkers = 64;  // measuring frame after frame of more boxes takes long
+constexpr int kTeam = 2;                 // workers that share a frame, in series with teams
+constexpr int kMostDynamicWorkers = 64;  // measuring more boxes frame after frame takes long
 
 FrameCase FrameOf(const BenchCase& volume, int pixels, const Policy& policy, int workers) {
   return {volume, {pixels, pixels}, BenchView(Projection::kOrthographic, 1, 12), policy, workers};
 }
 
-// One line of the report: the same policy over workers. The volume may grow with them.
+// One line of the report: the same policy for different numbers of workers. The volume may grow with them.
 struct Series {
   std::string name;
   std::vector<FrameCase> frames;  // by workers, 1 first
-  int team = 0;                   // workers that share a frame: the frames' own, or this many
+  int team = 0;                   // workers that share a frame; 0: all workers of the frame
   bool dynamic = false;           // balance
 
   int TeamOf(const FrameCase& frame) const { return team == 0 ? frame.workers : std::min(team, frame.workers); }
-  // What is measured of it.
+  // The frame that is measured for it.
   FrameCase Shared(FrameCase frame) const {
     frame.workers = TeamOf(frame);
     return frame;
@@ -66,7 +66,7 @@ std::vector<Series> StrongSeries(const ExperimentContext& context, const Rendere
   return all;
 }
 
-// As many voxels for each worker, whatever their number.
+// Equally many voxels for each worker, whatever their number.
 std::vector<Series> WeakSeries(const ExperimentContext& context) {
   const std::vector<int> workers = context.quick() ? std::vector{1, 8} : std::vector{1, 2, 4, 8, 16, 32, 64};
   const int one = context.Scaled(context.quick() ? 48 : 96), pixels = context.Scaled(512);
@@ -92,7 +92,7 @@ Result<FrameFigures> FiguresOf(ExperimentContext& context, const Series& series,
     const Result<MeasuredFrame> measured = Recall(context, series.Shared(frame));
     return measured.ok() ? FindFigures(*measured, machine, teams) : measured.status();
   }
-  // Layouts differ from repeat to repeat: the one in the middle.
+  // Layouts differ from repeat to repeat: takes the median one.
   const Result<std::vector<MeasuredFrame>> measured = RecallBalanced(context, series.Shared(frame));
   if (!measured.ok()) return measured.status();
   std::vector<FrameFigures> all;
@@ -118,7 +118,7 @@ std::vector<Kind> KindsOf(const ExperimentContext& context) {
           {"weak", "Weak scaling", true, WeakSeries(context)}};
 }
 
-// Efficiency by the time from picture to picture: of strong scaling one / p, of weak scaling one.
+// Efficiency by the time from picture to picture. The ideal time is one / p for strong scaling, one for weak scaling.
 Result<Section> SectionOf(ExperimentContext& context, const Kind& kind) {
   Table table{kind.slug,
               kind.title,

@@ -40,7 +40,7 @@ Result<Streams> StreamsOf(const ExperimentContext& context) {
   return streams;
 }
 
-// Voxels that a worker must hold while frames stream through it without a cache: those of two groups.
+// Bytes of voxels that a worker must hold while frames stream through it without a cache: those of two groups.
 double WindowBytes(const MeasuredFrame& frame) {
   double most = 0;
   for (std::size_t g = 0; g < frame.plan.groups.size(); ++g) {

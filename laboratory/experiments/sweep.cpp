@@ -32,14 +32,14 @@ Result<FrameCase> FrameOf(ExperimentContext& context, const Sweep& sweep, const 
   return WithChosenPolicy(context, std::move(frame), link.link);
 }
 
-// What the table calls it.
+// The policy's name in the table.
 std::string PolicyText(const SweepPolicy& asked, const Policy& chosen) {
   return LeavesChoice(asked.policy) ? fmt::format("{}: {}", asked.name, Describe(chosen)) : asked.name;
 }
 
 bool IsDynamic(const FrameCase& frame) { return frame.policy.balance == kDynamicBalance; }
 
-// What comes of a frame over a link. With dynamic balance every repeat has boxes of its own: the one whose frame takes the middle time.
+// Figures of a frame over a link. With dynamic balance every repeat has its own boxes: the repeat with the median frame time counts.
 Result<FrameFigures> FiguresOf(ExperimentContext& context, const FrameCase& frame, const LinkModel& link) {
   std::vector<MeasuredFrame> measured;
   if (IsDynamic(frame)) {

@@ -34,7 +34,7 @@ std::vector<std::string_view> NamesIn(const Entries& entries) {
   return names;
 }
 
-// With the choice to leave it open.
+// Includes the choice to leave it open.
 template <class Entries>
 std::string ReadName(const JsonValue& value, const Entries& entries) {
   std::vector<std::string_view> names = NamesIn(entries);
@@ -135,7 +135,7 @@ void ReadSize(const JsonValue& value, ImageSize& size) {
     value.Complain(fmt::format("{} has more than {} pixels", value.Shown(), kMaxImagePixels));
 }
 
-// Cases are told apart by name.
+// Names distinguish cases.
 template <class T>
 void CheckNamesDiffer(const std::vector<T>& entries, const char* list, std::optional<std::string>& mistake) {
   std::set<std::string> seen;

@@ -1,4 +1,4 @@
-// The file of `experiment sweep`: what a user wants varied, as JSON. docs/experiments.md has an example.
+// The file of `experiment sweep`: the parameters to vary, as JSON. docs/experiments.md has an example.
 #pragma once
 
 #include <string>
@@ -41,11 +41,11 @@ struct Sweep {
   ImageSize size{512, 512};
 };
 
-// What a policy is called that has no name of its own.
+// The name of a policy that was given none.
 std::string Describe(const Policy& policy);
 
-// InvalidArgument in one line naming `path`, the field by its place ("policies[1].combine"), the value and what is allowed; a volume file
-// that is not there is NotFound.
+// InvalidArgument in one line naming `path`, the field by its place ("policies[1].combine"), the value and what is allowed. NotFound: a
+// volume file does not exist.
 Result<Sweep> ParseSweep(const std::string& path, std::string_view text);
 
 }  // namespace slabstream

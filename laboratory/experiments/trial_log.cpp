@@ -21,7 +21,7 @@ Json IdentityJson(const RunIdentity& identity) {
       {"experiment", identity.experiment}, {"parameters", identity.parameters}, {"commit", identity.commit}, {"machine", identity.machine}};
 }
 
-// What keeps the trials of `held` from being continued; empty: nothing does.
+// The reason why the trials of `held` cannot be continued; empty: they can.
 std::string WhyNot(const Json& held, const Json& wanted, Resume resume) {
   if (!held.is_object()) return "something else";
   if (held.value("experiment", "") != wanted["experiment"]) return fmt::format("experiment '{}'", held.value("experiment", ""));
@@ -70,7 +70,7 @@ Status TrialLog::Load(const std::string& path) {
   std::uintmax_t whole_lines = 0;  // bytes
   int number = 1;
   for (std::string line; std::getline(file, line); ++number) {
-    if (file.eof()) {  // no line's end: cut short while it was written
+    if (file.eof()) {  // no end of line: cut short while it was written
       std::error_code error;
       std::filesystem::resize_file(path, whole_lines, error);
       return error ? Status::Unavailable(fmt::format("cannot write '{}': {}", path, error.message())) : Status::Ok();

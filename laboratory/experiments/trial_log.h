@@ -1,9 +1,9 @@
-// TrialLog: what was measured, kept on disk trial by trial, so that a run that was interrupted continues where it stopped.
+// TrialLog: keeps measurements on disk trial by trial, so that an interrupted run continues where it stopped.
 //
-// A folder holds `experiment.json` (whose run it is: RunIdentity) and `trials.jsonl`: one line a finished trial,
+// A folder holds `experiment.json` (the identity of the run: RunIdentity) and `trials.jsonl`: one line a finished trial,
 //   {"key": {...}, "repeat": 0, "numbers": {...}}
-// A line is written at once when its trial ends. A line that a crash has cut short is dropped when the folder is opened again; any other
-// line that cannot be read is an error that names it.
+// A line is written as soon as its trial ends. A line cut short by a crash is dropped when the folder is opened again; any other unreadable
+// line is an error that names it.
 #pragma once
 
 #include <cstdint>
@@ -21,10 +21,10 @@ namespace slabstream {
 
 using Json = nlohmann::ordered_json;
 
-// What must agree before trials of two runs may be mixed.
+// Trials of two runs may be mixed only if these agree.
 struct RunIdentity {
   std::string experiment;
-  Json parameters;              // everything that decides which trials there are: seed, repeats, quick, volumes, the sweep's text
+  Json parameters;              // everything that decides the set of trials: seed, repeats, quick, volumes, the sweep's text
   std::string commit, machine;  // who measured
 };
 
@@ -36,8 +36,8 @@ enum class Resume {
 
 class TrialLog {
  public:
-  // Makes the folder if need be. InvalidArgument in one line if it holds another run (saying what differs), or something else that would be
-  // overwritten. Unavailable: it cannot be written.
+  // Creates the folder if need be. InvalidArgument in one line: it holds another run (the line says what differs), or something else that
+  // would be overwritten. Unavailable: it cannot be written.
   static Result<TrialLog> Open(const std::string& folder, const RunIdentity& identity, Resume resume);
   TrialLog(TrialLog&&) = default;
 

@@ -21,7 +21,7 @@ struct Run {
   int repeat = 0;
 };
 
-// Round after round of repeats, each in an order of its own. The order of a seed does not depend on what the log holds.
+// Round after round of repeats, each in its own random order. The order depends on the seed, not on the contents of the log.
 std::vector<Run> InRandomOrder(const std::vector<Trial>& trials, const TrialSchedule& schedule) {
   std::mt19937_64 random(schedule.seed);
   std::vector<Run> runs;

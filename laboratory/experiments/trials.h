@@ -1,5 +1,5 @@
-// Trials: the single measurements of an experiment, run in random order with their repeats interleaved, so that whatever drifts on the
-// machine meanwhile (clock, heat, neighbours) meets all of them alike.
+// Trials: the single measurements of an experiment, run in random order with their repeats interleaved, so that drift of the machine
+// (clock, heat, neighbours) affects all of them alike.
 #pragma once
 
 #include <cstdint>
@@ -13,10 +13,10 @@
 namespace slabstream {
 
 struct Trial {
-  Json key;                           // its parameters, an object; says all that decides its numbers, and no two are alike
+  Json key;                           // its parameters, an object; holds all that decides its numbers, and is unique
   std::function<Result<Json>()> run;  // numbers by name, an object; must not depend on what ran before
-  double effort = 1;                  // expected time beside that of other trials: for the time left
-  bool repeat = true;                 // false: its numbers are computed, once is enough
+  double effort = 1;                  // expected time relative to other trials, for the time left
+  bool repeat = true;                 // false: its numbers are computed, so once is enough
 };
 
 struct TrialSchedule {
@@ -26,13 +26,14 @@ struct TrialSchedule {
   std::function<bool()> interrupted;  // asked between trials
 };
 
-// Runs what the log does not hold yet. Cancelled once interrupted; the first trial that fails ends it, naming the trial's key.
+// Runs the trials that the log does not hold yet. Cancelled if interrupted; the first failed trial ends the run, and the error names its
+// key.
 Status RunTrials(const std::vector<Trial>& trials, const TrialSchedule& schedule, TrialLog& log);
 
-// All repeats of a number, which is named or, with a slash in front, found by its JSON pointer. CHECKs that the trial was run and has it.
+// All repeats of a number, given by name or, with a leading slash, by JSON pointer. CHECKs that the trial was run and has the number.
 std::vector<double> ValuesOf(const TrialLog& log, const Json& key, const std::string& number);
 inline Estimate EstimateOf(const TrialLog& log, const Json& key, const std::string& number) { return MedianOf(ValuesOf(log, key, number)); }
-// The same where the number is a list, entry by entry, over `repeats`, which hold lists of one length.
+// The same for a list of numbers, entry by entry, over `repeats`, which hold lists of one length.
 std::vector<Estimate> EstimatesOf(const std::vector<const Json*>& repeats, const std::string& list);
 std::vector<double> MediansOf(const std::vector<const Json*>& repeats, const std::string& list);
 

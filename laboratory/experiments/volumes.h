@@ -21,13 +21,13 @@ struct VolumeInUse {
   std::shared_ptr<const VolumeSummary> summary;
 };
 
-// Keeps what was used last within a budget, since trials come in random order. One thread at a time.
+// Keeps the most recently used volumes within a budget, since trials come in random order. One thread at a time.
 class VolumeCache {
  public:
   explicit VolumeCache(std::size_t budget_bytes = std::size_t{1} << 30) : budget_bytes_(budget_bytes) {}
-  // Made or read where it is not held. Cases of one dataset share their volume.
+  // Makes or reads the volume if it is not held. Cases of one dataset share their volume.
   Result<VolumeInUse> Get(const BenchCase& volume);
-  // Which voxels its renderer draws under its transfer function.
+  // The voxels that its renderer draws under its transfer function.
   Result<std::shared_ptr<const OccupancyGrid>> Occupied(const BenchCase& volume);
 
  private:
@@ -36,14 +36,14 @@ class VolumeCache {
     VolumeInUse volume;
   };
   std::size_t budget_bytes_;
-  std::list<Held> held_;                                                                                  // last used first
+  std::list<Held> held_;                                                                                  // most recently used first
   std::map<std::pair<std::string, const RendererKind*>, std::shared_ptr<const OccupancyGrid>> occupied_;  // by name of the case
 };
 
-// What reports call it: "class I, N = 300, 5 % occupied"; a file by its dataset's name.
+// The name in reports: "class I, N = 300, 5 % occupied"; a file by its dataset's name.
 std::string TitleOf(const BenchCase& volume);
 
-// What the user named, or the brain and its like where they are installed: real volumes beside the spheres. Errors of ParseBenchCase.
+// The volumes that the user named, or the installed real volumes, such as the brain, beside the spheres. Errors of ParseBenchCase.
 Result<std::vector<BenchCase>> RealVolumes(const std::vector<std::string>& named);
 
 }  // namespace slabstream

@@ -25,8 +25,8 @@ std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FrameSetup& set
     cost.covered_pixels = std::uint64_t(std::llround(cost.coverage.pixels()));
     cost.voxel_bytes = std::uint64_t(SlabBox(box, setup).voxel_count()) * BytesPerSample(volume.block.type);
   }
-  // In rounds: a moment in which the machine is slower, or quicker, does not make all that is measured of a box. Each time it is rendered
-  // twice, and the second one counts: a worker's caches hold what it rendered last, not other workers' boxes.
+  // In rounds: a moment in which the machine is slower or quicker affects only part of a box's times. Each round renders a box twice, and
+  // the second time counts: a worker's caches hold what it rendered last, not other workers' boxes.
   std::vector<std::vector<BoxRendering>> again(boxes.size());
   for (int repeat = 0; repeat < repeats; ++repeat) {
     for (std::size_t i = 0; i < boxes.size(); ++i) {

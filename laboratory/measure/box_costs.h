@@ -1,8 +1,8 @@
-// Box costs: what each box of a partition costs to render, measured by rendering it in this process, alone, on one thread. From them the
-// laboratory predicts frames for any number of workers, and partitions are judged by how even they are.
+// Box costs: the render time of each box of a partition, measured by rendering it in this process, alone, on one thread. From them the
+// laboratory predicts frames for any number of workers and judges how even partitions are.
 //
-// A box is rendered as a worker does it: from its own voxels and halo, kept by bricks, by the same pipeline. The first rendering makes what
-// workers keep between frames (classification, normals, occupied voxels); later ones are what a turning view costs.
+// A box is rendered as in a worker: from its own voxels and halo, kept by bricks, by the same pipeline. The first rendering makes the data
+// that workers keep between frames (classification, normals, occupied voxels); later ones give the cost of a turning view.
 #pragma once
 
 #include <cstdint>
@@ -19,26 +19,26 @@ namespace slabstream {
 struct BoxCost {
   Box box;
   double first_seconds = 0;           // processor time of the first rendering
-  double seconds = 0;                 // of the median later one (of two the lower): the quickest is luck, for cores are at times quicker
-  StageTimes stage_ns{};              // of that one, by the clock on the wall
+  double seconds = 0;                 // median of the later ones (of two the lower); the minimum is luck, since cores are at times quicker
+  StageTimes stage_ns{};              // of that rendering, in elapsed time
   std::uint64_t occupied_voxels = 0;  // in the box, under the transfer function; splatting
   std::uint64_t drawn_voxels = 0;     // that went through splat or Z-buffer
   PixelBounds bounds;                 // of its local image
-  std::uint64_t covered_pixels = 0;   // of them, not empty
-  CoverageMap coverage;               // where these lie in the frame
-  std::uint64_t voxel_bytes = 0;      // of box and halo: what its owner must fetch
+  std::uint64_t covered_pixels = 0;   // non-empty pixels in the bounds
+  CoverageMap coverage;               // where these pixels lie in the frame
+  std::uint64_t voxel_bytes = 0;      // of box and halo: the owner must fetch them
 };
 
-// By the order of `boxes`, which lie inside the volume and are not empty. `setup` is of this volume (FramePlan::setup). `repeats` >= 1
-// later rounds, in which each is rendered twice more. Nothing is hidden by other boxes. On the calling thread alone. All boxes are kept at
+// In the order of `boxes`, which lie inside the volume and are not empty. `setup` is of this volume (FramePlan::setup). `repeats` >= 1
+// later rounds, each of which renders every box twice more. Other boxes hide nothing. Runs on the calling thread alone. Keeps all boxes at
 // once.
 std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FrameSetup& setup, std::span<const Box> boxes, int repeats);
 
-// The boxes that a plan has rendered, by the order of PlacementsOf(plan).
+// The boxes that a plan renders, in the order of PlacementsOf(plan).
 std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FramePlan& plan, int repeats);
 
-// Largest / mean of the boxes' `seconds`: 1 is perfect balance. With `slots` owners of several boxes each, sum their boxes first. 1 where
-// nothing costs anything.
+// Largest / mean of the boxes' `seconds`: 1 is perfect balance, and the value if all costs are 0. With `slots` owners of several boxes
+// each, sum their boxes first.
 double Imbalance(std::span<const double> seconds);
 
 }  // namespace slabstream

@@ -24,11 +24,11 @@ MachineModel ThisHost(int workers) {
   MachineModel machine;
   machine.combining = MeasureCombining(Transfer::kLent);
   machine.link = {Contention::kNone, 0, 1e12};  // pixels stay where they are
-  // A coordinator's work is in the hand-overs to and from it.
+  // The hand-overs to and from the coordinator include its work.
   machine.plan_seconds = machine.message_seconds = machine.client_seconds = 0;
   machine.workers_a_host = workers;
   machine.cores_a_host = int(std::max(std::thread::hardware_concurrency(), 1U));
-  machine.picture_threads = std::min(workers, machine.cores_a_host);  // as worker/thread_share.h has it
+  machine.picture_threads = std::min(workers, machine.cores_a_host);  // as in worker/thread_share.h
   return machine;
 }
 

@@ -1,4 +1,4 @@
-// Calibrate: the machine model of this host, measured in two seconds or so.
+// Calibrate: the machine model of this host, measured in about two seconds.
 //
 //   combining     the operators that a worker's combining thread runs (combining_costs.h)
 //   hand-overs    frames of the embedded service with tiny pictures (hand_over_probe.h)
@@ -14,19 +14,19 @@ namespace slabstream {
 
 struct Calibration {
   MachineModel machine;
-  // How sure its numbers are.
+  // The uncertainty of its numbers.
   HandOverEstimates hand_overs;
   Estimate memory_slowdown;
 };
 
-// Workers are those of the embedded service, `workers` of them, one render thread each; they share the cores that there are and lend each
-// other their images. Fails with the service.
+// For `workers` workers of the embedded service with one render thread each; they share the available cores and lend each other their
+// images. Fails with the service.
 Result<Calibration> CalibrateThisHost(int workers);
 
-// The same without what takes frames to measure: hand-overs and slowdown are left as they are by default.
+// The same without the measurements that take frames: hand-overs and slowdown keep their defaults.
 MachineModel ThisHost(int workers);
 
-// A slowdown as a machine model can have it: [0, 0.99].
+// A slowdown clamped to the range of a machine model: [0, 0.99].
 double ModelSlowdown(double measured);
 
 }  // namespace slabstream

@@ -16,12 +16,12 @@ namespace {
 
 constexpr std::int32_t kSide = 512;  // of the frame
 constexpr PixelBounds kFrame = {0, 0, kSide, kSide};
-constexpr PixelBounds kBounds = {kSide / 8, kSide / 8, kSide - kSide / 8, kSide - kSide / 8};  // of the pictures that are combined
+constexpr PixelBounds kBounds = {kSide / 8, kSide / 8, kSide - kSide / 8, kSide - kSide / 8};  // of the combined pictures
 constexpr double kPixels = double(kSide) * kSide;
 constexpr int kRepeats = 15;
-constexpr std::size_t kCacheBytes = std::size_t{64} << 20;  // more than there is of them
+constexpr std::size_t kCacheBytes = std::size_t{64} << 20;  // more than any cache
 
-// Of `bounds`; every row holds `filled` of its pixels, in runs of 32.
+// Fills `bounds`; every row holds `filled` of its pixels, in runs of 32.
 LocalImage MakePicture(const PixelBounds& bounds, double filled) {
   constexpr std::int32_t kRun = 32;
   LocalImage image = MakeLocalImage(PixelFormat::kRgba, bounds);
@@ -39,7 +39,7 @@ void EmptyCaches() {
   for (std::uint64_t& word : other) ++word;
 }
 
-// `prepare` makes what the work needs, on another thread.
+// `prepare` makes the input of the work, on another thread.
 template <class Prepare, class Work>
 double MedianSeconds(Prepare&& prepare, Work&& work) {
   std::vector<double> seconds;
@@ -66,7 +66,7 @@ CombiningCosts MeasureCombining(Transfer transfer) {
   costs.local_pixel = MedianSeconds(make_images, [&] { Combine(target, ViewOf(other), Side::kBack, kFrame); }) / kFilled;
   costs.hidden_pixel = MedianSeconds(make_pictures, [&] { CHECK(FindHiddenTiles(full, kSide, kSide, 1e-3).empty()); }) / kPixels;
   if (transfer == Transfer::kLent) {
-    // Only where rows begin and end is looked for, and told.
+    // The sender only finds and describes where rows begin and end.
     costs.lent = true;
     costs.scan_pixel = MedianSeconds(make_pictures, [&] { CHECK(!ViewOf(half, all, kSide).rows.empty()); }) / kPixels;
     costs.encode_pixel = 0;
@@ -78,7 +78,7 @@ CombiningCosts MeasureCombining(Transfer transfer) {
   }
   const double encode_full = MedianSeconds(make_pictures, [&] { CHECK_GT(EncodeRuns(full, all, kSide).payload.size(), 0U); });
   const double encode_half = MedianSeconds(make_pictures, [&] { CHECK_GT(EncodeRuns(half, all, kSide).payload.size(), 0U); });
-  // full = (scan + encode) pixels, half = (scan + encode / 2) pixels. Copying is by far the most of it.
+  // full = (scan + encode) pixels, half = (scan + encode / 2) pixels. Most of it is copying.
   costs.encode_pixel = std::clamp(2 * (encode_full - encode_half), 0.0, encode_full) / kPixels;
   costs.scan_pixel = encode_full / kPixels - costs.encode_pixel;
   RunImage runs;

@@ -1,19 +1,19 @@
-// What the combining thread of a worker takes for pixels, measured by running its operators in this process.
+// The time that a worker's combining thread takes per pixel, measured by running its operators in this process.
 #pragma once
 
 #include "common/simulation/machine_model.h"
 
 namespace slabstream {
 
-// How the pixels of a partial image get from one worker to another.
+// How the pixels of a partial image travel from one worker to another.
 enum class Transfer {
-  kLent,     // workers of one host: they stay where they are and are read there
+  kLent,     // between workers of one host: they stay where they are and are read there
   kMessage,  // between hosts: as runs, in the message
 };
 
-// Processor time, medians of several runs on pictures that are full and half empty. As in frames they are not in this core's caches (what
-// arrives was written by another one, and rendering has been through here since), and an image becomes as large as the frame when the first
-// other one is combined onto it.
+// Processor time, medians of several runs on pictures that are full and half empty. As in frames, the pixels are not in this core's caches
+// (incoming ones were written by another core, and rendering has run on this one since), and an image becomes as large as the frame when
+// the first other one is combined into it.
 CombiningCosts MeasureCombining(Transfer transfer);
 
 }  // namespace slabstream

@@ -35,7 +35,7 @@ System MakeSystem(const StageCost& stage, std::span<const CostSample* const> sam
   return system;
 }
 
-// Columns to the same length first: their units differ by ten orders of magnitude.
+// Columns are first scaled to the same length: their units differ by ten orders of magnitude.
 VectorXd ColumnLengths(const MatrixXd& a) {
   return a.colwise().norm().transpose().unaryExpr([](double n) { return n > 0 ? n : 1.0; });
 }
@@ -54,7 +54,7 @@ VectorXd SolveNonNegative(const MatrixXd& a, const VectorXd& b, std::vector<Eige
   VectorXd x = VectorXd::Zero(a.cols());
   free.clear();
   while (Eigen::Index(free.size()) < a.cols()) {
-    // Frees the column that promises most.
+    // Frees the column with the largest gradient.
     const VectorXd gradient = a.transpose() * (b - a * x);
     Eigen::Index best = -1;
     for (Eigen::Index i = 0; i < a.cols(); ++i) {
@@ -64,11 +64,11 @@ VectorXd SolveNonNegative(const MatrixXd& a, const VectorXd& b, std::vector<Eige
     if (best < 0) break;
     free.push_back(best);
     VectorXd next = SolveOn(a, b, free);
-    if (next[best] <= 0) {  // what it promised was rounding
+    if (next[best] <= 0) {  // the gradient was rounding
       free.pop_back();
       break;
     }
-    // Goes as far towards it as all stay positive; what reaches 0 is held there.
+    // Moves towards the solution as far as all values stay positive. A value that reaches 0 is held there.
     while (std::any_of(free.begin(), free.end(), [&](Eigen::Index i) { return next[i] <= 0; })) {
       double step = 1;
       for (const Eigen::Index i : free) {
@@ -122,7 +122,7 @@ StageCost WithConstants(StageCost stage, const VectorXd& seconds) {
 std::vector<TermFit> MakeTerms(const StageCost& stage, const System& system, const VectorXd& seconds,
                                const std::vector<Eigen::Index>& free) {
   const VectorXd widths = HalfWidths(system, free, seconds);
-  // A constant that is held at 0 could be what the fit to all of them leaves possible.
+  // A constant held at 0 gets the upper bound of the fit with all columns.
   std::vector<Eigen::Index> all(stage.units.size());
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = Eigen::Index(i);
   const VectorXd unconstrained = SolveOn(system.units, system.ones, all);
@@ -137,7 +137,7 @@ std::vector<TermFit> MakeTerms(const StageCost& stage, const System& system, con
   return terms;
 }
 
-// What each sample is predicted to take by the fit to the other folds; sample i is in fold i mod kFolds.
+// Each sample's time as predicted by the fit to the other folds; sample i is in fold i mod kFolds.
 std::vector<double> CrossPredict(const StageCost& stage, std::span<const CostSample* const> samples) {
   std::vector<double> predicted(samples.size());
   for (int fold = 0; fold < kFolds; ++fold) {
@@ -185,7 +185,7 @@ Result<StageFit> FitStage(const StageCost& stage, std::span<const CostSample> sa
 
 Result<CostFit> FitCosts(std::span<const StageCost> stages, std::span<const CostSample> samples) {
   CostFit fit;
-  std::vector<double> missing(samples.size());  // measured less predicted, all stages
+  std::vector<double> missing(samples.size());  // measured minus predicted, all stages
   double missed = 0, measured = 0;
   for (const StageCost& stage : stages) {
     Result<StageFit> of_stage = FitStage(stage, samples);

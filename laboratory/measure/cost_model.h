@@ -1,5 +1,5 @@
-// CostModel: the time of each stage of rendering a box, as the paper models it (Yagel and Machiraju, Eq. 20 and 25), in the units that our
-// renderers count. Experiments fit its constants and print them beside the paper's. Plans do not use it: they ask AnalyticCost
+// CostModel: the time of each stage of rendering a box, as in the paper's model (Yagel and Machiraju, Eq. 20 and 25), in the units that our
+// renderers count. Experiments fit its constants and print them beside the paper's. Plans do not use it: they use AnalyticCost
 // (common/renderers/renderer_kind.h).
 //
 //   paper                             here, a box                                  why
@@ -11,7 +11,7 @@
 //   c_z C N^3/p  Z-buffer             kBrickTest, kDrawn, kPixel                   faces towards the eye
 //   c_sh C I^2  shade (Z-buffer)      kPixel                                       deferred: pixels that show something
 //   c_co I^2 log p  combine           CombiningCosts (common/simulation)           a matter of the schedule, which is simulated
-// and kBox, what any box costs. Constants are seconds of one thread; laboratory/measure/cost_fit.h finds them.
+// kBox is a cost that every box has. Constants are seconds of one thread; laboratory/measure/cost_fit.h fits them.
 #pragma once
 
 #include <array>
@@ -41,15 +41,15 @@ enum class WorkUnit : std::uint8_t {
 inline constexpr int kWorkUnitCount = 6;
 std::string_view ToString(WorkUnit unit);  // "occupied voxel"
 
-using WorkUnits = std::array<double, kWorkUnitCount>;  // how many of each
+using WorkUnits = std::array<double, kWorkUnitCount>;  // the amount of each
 
-// Of one box under one view: what a renderer reported of it. `bounds`: of its image.
+// For one box under one view, from a renderer's report. `bounds`: of its image.
 WorkUnits CountWork(const Box& box, const Camera& camera, double occupied, double drawn, const PixelBounds& bounds, double pixels);
 
 struct StageCost {
   Stage stage = Stage::kRender;
   std::string_view symbol;      // of the paper
-  std::vector<WorkUnit> units;  // that it depends on
+  std::vector<WorkUnit> units;  // the units that it depends on
   WorkUnits seconds{};          // of each of them; 0 for the others
   double Predict(const WorkUnits& work) const;
 };
@@ -59,7 +59,7 @@ struct CostModel {
 
   // As measured on one core of an AMD EPYC (Zen 5, AVX-512); docs/simulation.md says how.
   CostModel();
-  const std::vector<StageCost>& stages(std::string_view renderer) const;         // none: no constants were measured
+  const std::vector<StageCost>& stages(std::string_view renderer) const;         // empty: no constants were measured
   double PredictRender(std::string_view renderer, const WorkUnits& work) const;  // all stages
 };
 

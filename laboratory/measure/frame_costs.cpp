@@ -32,7 +32,7 @@ double SecondsOnAnotherThread(int threads, Work&& work) {
 
 }  // namespace
 
-// As the display worker does (worker/executor.cpp).
+// Does the work of the display worker (worker/executor.cpp).
 PictureMeter::Answer PictureMeter::Finish(LocalImage& frame, const FrameSetup& setup) {
   RunImage runs;
   if (setup.renderer->FrameIsPicture(setup)) {
@@ -47,7 +47,7 @@ PictureMeter::Answer PictureMeter::Finish(LocalImage& frame, const FrameSetup& s
   return answer;
 }
 
-// As the client does (client/client.cpp).
+// Does the work of the client (client/client.cpp).
 void PictureMeter::Receive(const Answer& answer) {
   const Bytes runs = UnpackRuns(answer.header, answer.payload).value();
   const PixelBounds& bounds = answer.header.image.bounds;
@@ -110,7 +110,7 @@ FrameCosts MeasureFrameCosts(const Volume& volume, const FramePlan& plan, int re
 CostSample SampleOf(const BoxCost& box, const Camera& camera) {
   CostSample sample;
   sample.work = CountWork(box.box, camera, double(box.occupied_voxels), double(box.drawn_voxels), box.bounds, double(box.covered_pixels));
-  // Stages are timed by the clock on the wall, which goes on while others have the processor.
+  // Stages are timed in elapsed time, which continues while others have the processor.
   const double elapsed = double(box.stage_ns[std::size_t(Stage::kRender)]) * 1e-9;
   const double share = elapsed > 0 ? std::min(box.seconds / elapsed, 1.0) : 1;
   for (std::size_t stage = 0; stage < sample.stage_ns.size(); ++stage) {

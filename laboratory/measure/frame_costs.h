@@ -1,5 +1,5 @@
-// Frame costs: everything that a simulation wants to know of one frame, measured in this process, on one thread: what each box of its plan
-// takes and covers (box_costs.h), and what it takes to make the picture of them and to decode it.
+// Frame costs: all inputs of a simulation of one frame, measured in this process, on one thread: the time and coverage of each box of its
+// plan (box_costs.h), and the time to make the picture from them and to decode it.
 #pragma once
 
 #include <deque>
@@ -15,22 +15,22 @@
 namespace slabstream {
 
 struct PictureCost {
-  double finish_seconds = 0;   // resampling or resolving, encoding, digest: what the display worker does
-  double receive_seconds = 0;  // digest, check, decoding: what the client does
-  double finish_elapsed = 0;   // as finish_seconds, but by the clock on the wall, by all threads of the meter
+  double finish_seconds = 0;   // resampling or resolving, encoding, digest: the display worker's part
+  double receive_seconds = 0;  // digest, check, decoding: the client's part
+  double finish_elapsed = 0;   // elapsed time of the same, by all threads of the meter
 };
 
-// Makes and decodes pictures of one volume. Each step on a thread of its own, as in the service: what the last one wrote lies in another
-// core's caches. And with as many answers kept as the coordinator keeps of a client: the memory that an answer is written to is one that
-// nobody has touched for long.
+// Makes and decodes pictures of one volume under the conditions of the service. Each step runs on a thread of its own, so its input lies in
+// another core's caches. As many answers are kept as the coordinator keeps of a client, so an answer is written to memory that has not been
+// touched for long.
 class PictureMeter {
  public:
-  // `volume` outlives the meter. `threads` >= 1 make a picture, if oneTBB has so many.
+  // `volume` outlives the meter. `threads` >= 1 make a picture, if oneTBB has that many.
   explicit PictureMeter(const Volume& volume, int threads = 1) : volume_(volume), threads_(threads), worker_(volume) {}
 
-  // Of the frame that the whole volume gives. Processor time of the thread that makes it, and of the one that decodes it.
+  // For the frame of the whole volume: processor time of the thread that makes the picture, and of the one that decodes it.
   PictureCost Measure(const FrameSetup& setup);
-  void KeepAnswers(const FrameSetup& setup);  // as many as there will be
+  void KeepAnswers(const FrameSetup& setup);  // until as many are kept as there will be
 
  private:
   struct Answer {
@@ -53,17 +53,17 @@ struct FrameCosts {
   std::vector<BoxCost> boxes;  // by BoxId of the plan; boxes without a placement cost nothing
   PictureCost picture;
 
-  // As long as this and `plan`, which it was measured for, live. Voxels are taken to be cached.
+  // Valid as long as this and `plan`, for which it was measured, live. Assumes that voxels are cached.
   FrameInput Input(const FramePlan& plan) const;
 };
 
 // `repeats` >= 1: medians. `plan` is of this volume.
 FrameCosts MeasureFrameCosts(const Volume& volume, const FramePlan& plan, int repeats);
 
-// What the cost model is fitted to: processor time of each stage.
+// A sample for the fit of the cost model: processor time of each stage.
 CostSample SampleOf(const BoxCost& box, const Camera& camera);
 
-// Medians of `repeats` >= 1 pictures of the frame that the whole volume gives.
+// Medians of `repeats` >= 1 pictures of the frame of the whole volume.
 PictureCost MeasurePictureCost(const Volume& volume, const FrameSetup& setup, int repeats);
 
 }  // namespace slabstream

@@ -13,7 +13,7 @@ namespace {
 constexpr char kQuick[] = "quick", kSlow[] = "slow";
 constexpr int kQuickVolume = 16, kSlowVolume = 160;
 constexpr int kQuickPicture = 32, kSlowPicture = 512;
-constexpr int kQuickFrames = 4;  // a sample; the first one wakes everybody
+constexpr int kQuickFrames = 4;  // a sample; the first one wakes all threads
 
 FrameRequest Request(const std::string& dataset) {
   FrameRequest request;
@@ -55,7 +55,7 @@ Status HandOverProbe::Sample(int count) {
                                                                                {kSlow, Sphere(kSlowVolume)}};
   const Result<std::unique_ptr<LabService>> service = LabService::Start(1, volumes);
   if (!service.ok()) return service.status();
-  for (int sample = -1; sample < count; ++sample) {  // in the first one voxels are fetched, and made what workers keep
+  for (int sample = -1; sample < count; ++sample) {  // the first one fetches voxels and makes the data that workers keep
     for (int i = 0; i < kQuickFrames; ++i) {
       const Result<TimedPicture> timed = (*service)->Render(Request(kQuick));
       if (!timed.ok()) return timed.status();

@@ -1,5 +1,5 @@
-// HandOverProbe: frames of an embedded service of one worker that tell what hand-overs take (hand_over_fit.h): tiny ones in quick
-// succession, and one that renders for some milliseconds. Take samples between other measurements, so that the same weather hits all.
+// HandOverProbe: measures hand-overs (hand_over_fit.h) with frames of an embedded service of one worker: tiny ones in quick succession, and
+// one that renders for some milliseconds. Take samples between other measurements, so that drift of the machine affects all alike.
 #pragma once
 
 #include <vector>
@@ -11,8 +11,8 @@ namespace slabstream {
 
 class HandOverProbe {
  public:
-  // Some frames for each of `count` samples, 10 ms or so, by a service that lives as long as the call: beside it, workers of this process
-  // would have one thread more to make pictures with (worker/thread_share.h). Fails with the service.
+  // Renders some frames for each of `count` samples, 10 ms or so, by a service that lives only during the call: beside it, workers of this
+  // process would have one more thread to make pictures with (worker/thread_share.h). Fails with the service.
   Status Sample(int count);
 
   // At least one sample must have been taken.

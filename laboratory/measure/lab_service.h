@@ -1,4 +1,4 @@
-// LabService: an embedded service with some volumes, and a client of it, whose frames are timed.
+// LabService: an embedded service with some volumes, and a client that times its frames.
 #pragma once
 
 #include <map>
@@ -13,7 +13,7 @@
 namespace slabstream {
 
 struct TimedPicture {
-  Time submitted, received;  // by the client, on the clock of the spans
+  Time submitted, received;  // at the client, on the clock of the spans
   Picture picture;
 };
 

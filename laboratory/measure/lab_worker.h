@@ -1,5 +1,5 @@
-// LabWorker: renders boxes as a worker of one render thread does, in this process, and says what that took: from a box's own voxels and
-// halo, kept by bricks, by the same pipelines.
+// LabWorker: renders boxes in this process like a worker of one render thread, and measures the time: from a box's own voxels and halo,
+// kept by bricks, by the same pipelines.
 #pragma once
 
 #include <map>
@@ -17,8 +17,8 @@ namespace slabstream {
 struct BoxRendering {
   LocalImage image;
   RankReport report;
-  double processor_seconds = 0;  // of the calling thread: whatever else the machine does is not in it
-  double seconds = 0;            // by the clock on the wall
+  double processor_seconds = 0;  // of the calling thread: excludes all other work of the machine
+  double seconds = 0;            // elapsed
 };
 
 class LabWorker {
@@ -26,9 +26,9 @@ class LabWorker {
   explicit LabWorker(const Volume& volume);  // outlives the worker
   ~LabWorker();
 
-  // `box` lies inside the volume and is not empty; `setup` is of this volume (FramePlan::setup). Nothing is hidden by other boxes. On the
-  // calling thread alone; one at a time. The first rendering from a slab cuts its voxels (not timed) and makes what workers keep between
-  // frames (timed): classification, normals, occupied voxels. All slabs are kept.
+  // `box` lies inside the volume and is not empty; `setup` is of this volume (FramePlan::setup). Other boxes hide nothing. Runs on the
+  // calling thread alone; one call at a time. The first rendering of a slab cuts out its voxels (not timed) and makes the data that workers
+  // keep between frames (timed): classification, normals, occupied voxels. All slabs are kept.
   BoxRendering Render(const Box& box, const FrameSetup& setup);
 
  private:

@@ -15,8 +15,8 @@ constexpr int kTurns = 15;
 
 }  // namespace
 
-// While both run, each gets 1 / (1 + s) done a second: the shorter one is done after shorter (1 + s), the rest of the longer one takes
-// longer - shorter.
+// While both run, each does 1 / (1 + s) of its work per second: the shorter one is done after shorter (1 + s), and the rest of the longer
+// one takes longer - shorter.
 double SlowdownOf(double first, double second, double both) { return (both - std::max(first, second)) / std::min(first, second); }
 
 Estimate MeasureSlowdown(const Volume& volume, const FrameSetup& setup) {

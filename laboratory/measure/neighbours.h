@@ -1,4 +1,4 @@
-// Neighbours: how much two renderers of one host slow each other down, for they share caches and memory.
+// Neighbours: how much two renderers on one host slow each other down, because they share caches and memory.
 #pragma once
 
 #include "common/planning/frame_plan.h"
@@ -7,12 +7,12 @@
 
 namespace slabstream {
 
-// Two renderings that take `first` and `second` seconds alone and are both done after `both` seconds when they begin at once: how many
-// times as long, less one, each took while both ran (MachineModel::memory_slowdown). All > 0. Below 0 by noise alone.
+// Two renderings take `first` and `second` seconds alone; started together, both are done after `both` seconds. Returns the factor by which
+// each was slower while both ran, less one (MachineModel::memory_slowdown). All > 0. Below 0 only by noise.
 double SlowdownOf(double first, double second, double both);
 
-// Of two threads that render `volume`, each half of it, by processor time: pairs of renderings alone and at once, in turn. Zero, of no
-// pair, where there is one core.
+// For two threads that each render half of `volume`, by processor time: pairs of renderings alone and together, in turn. Zero, from no
+// pair, if there is one core.
 Estimate MeasureSlowdown(const Volume& volume, const FrameSetup& setup);
 
 }  // namespace slabstream

@@ -24,7 +24,7 @@ class PlanRenderings::Worker {
  public:
   explicit Worker(const Volume& volume) : renderer_(volume) {}
 
-  // `boxes` and `setup` live until then.
+  // `boxes` and `setup` must live until the result is there.
   std::future<Rendered> Render(std::span<const Box> boxes, const FrameSetup& setup) {
     auto done = std::make_shared<std::promise<Rendered>>();
     std::future<Rendered> rendered = done->get_future();

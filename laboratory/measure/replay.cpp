@@ -22,7 +22,7 @@
 namespace slabstream {
 namespace {
 
-// A frame as the simulation takes it; what FrameInput points at.
+// A frame as input of the simulation; FrameInput points into it.
 struct Replayed {
   FramePlan plan;
   std::vector<CoverageMap> coverage;
@@ -35,7 +35,7 @@ std::size_t BoxesOf(const RecordedFrame& frame) {
   return boxes;
 }
 
-// The groups again, or the same boxes in the same order in groups of `workers`.
+// The recorded groups, or the same boxes in the same order in groups of `workers`.
 std::vector<std::vector<RecordedRank>> Regroup(const RecordedFrame& frame, const std::optional<int>& workers) {
   if (!workers) return frame.groups;
   std::vector<std::vector<RecordedRank>> groups;
@@ -71,7 +71,7 @@ void MakeReplayed(const RecordedFrame& frame, const ReplayChange& change, const 
   for (const std::vector<RecordedRank>& recorded : groups) {
     GroupPlan& group = plan.groups.emplace_back();
     for (const RecordedRank& rank : recorded) {
-      // A rank that nobody reported cost nothing, wherever it was.
+      // A rank without a report cost nothing, wherever it was.
       group.placements.push_back({number++, {}, rank.worker == 0 ? plan.display : rank.worker});
       out.coverage.push_back(UniformCoverage(rank.bounds, rank.pixels, frame.grid.width(), frame.grid.height()));
       out.input.boxes.push_back({rank.render_seconds, &out.coverage.back(), 0});
@@ -80,7 +80,7 @@ void MakeReplayed(const RecordedFrame& frame, const ReplayChange& change, const 
   }
   out.input.plan = &plan;
   out.input.finish_seconds = frame.picture_seconds;
-  // What passed outside the coordinator, less what is simulated of it: the request's hand-over and the picture's.
+  // The time spent outside the coordinator, less the simulated part of it: the hand-overs of the request and of the picture.
   const double outside = frame.latency - (frame.end - frame.arrived);
   out.input.receive_seconds = std::max(outside - hand_overs.awake - hand_overs.asleep, 0.0);
 }
@@ -100,7 +100,7 @@ double MeanOf(std::span<const RecordedFrame> frames, Value&& value) {
   return sum / count;
 }
 
-// Most / mean render time of a worker, as --stats has it.
+// Most / mean render time of a worker, as in --stats.
 double ImbalanceOf(const RecordedFrame& frame) {
   std::map<WorkerId, double> seconds;
   double most = 0, total = 0;
@@ -143,7 +143,7 @@ Result<ReplayedRun> Simulated(std::span<const RecordedFrame> frames, const Repla
   return run;
 }
 
-// Most frames that were asked for and not yet complete.
+// The largest number of frames requested and not yet complete.
 int InFlight(std::span<const RecordedFrame> frames) {
   int most = 1;
   for (const RecordedFrame& frame : frames) {
@@ -219,9 +219,9 @@ Result<ReplayReport> Replay(std::span<const RecordedFrame> frames, const ReplayC
   report.in_flight = InFlight(frames);
   report.measured = Measured(frames);
   const auto for_recorded_times = [](MachineModel model) {
-    model.workers_a_host = 0;   // what workers did to each other is in them
-    model.picture_threads = 0;  // and how many threads made a picture
-    model.client_seconds = 0;   // what the client's side took comes with each frame
+    model.workers_a_host = 0;   // the recorded times include the slowdown by neighbours
+    model.picture_threads = 0;  // and the effect of threads on making a picture
+    model.client_seconds = 0;   // each frame has its own time at the client
     return model;
   };
   const Result<ReplayedRun> same = Simulated(frames, {}, for_recorded_times(machine), report.in_flight);

@@ -1,5 +1,5 @@
-// Replay: frames that were recorded (recording.h) once more, in virtual time: as they were, which shows how far the simulation can be
-// trusted with them, and under another policy or on another machine, with the same measured costs of boxes and the same images.
+// Replay: simulates recorded frames (recording.h) in virtual time. Unchanged, they show how far the simulation can be trusted with them.
+// Under another policy or on another machine, they keep the measured costs of boxes and the same images.
 #pragma once
 
 #include <iosfwd>
@@ -14,10 +14,10 @@
 
 namespace slabstream {
 
-// What is to be different; what is empty stays as it was.
+// The changes; an empty field stays as recorded.
 struct ReplayChange {
-  std::string combine;            // as --combine takes it
-  std::optional<LinkModel> link;  // between workers that have a host each
+  std::string combine;            // in the syntax of --combine
+  std::optional<LinkModel> link;  // between workers on separate hosts
   std::optional<int> workers;     // at least 1, at most the boxes of the frame with fewest; box i goes to worker i mod workers
 };
 
@@ -33,12 +33,11 @@ struct ReplayedRun {
 };
 
 struct ReplayReport {
-  int in_flight = 1;  // frames that were asked for ahead, as the recording shows
+  int in_flight = 1;  // frames that were requested ahead, as the recording shows
   ReplayedRun measured, as_it_was, changed;
 };
 
-// The machine with the changes: what `machine`, the host that the trace was recorded on or one like it, becomes under another link.
-// Images then travel in messages.
+// Applies the changes to `machine`, the host that the trace was recorded on or a similar one. With another link, images travel in messages.
 MachineModel ChangedMachine(const MachineModel& machine, const ReplayChange& change);
 
 // Errors: InvalidArgument (more workers than boxes).
@@ -47,7 +46,7 @@ Result<ReplayReport> Replay(std::span<const RecordedFrame> frames, const ReplayC
 
 struct ReplayOptions {
   std::string trace_path;
-  std::vector<std::string> changes;  // as ParseReplayChange takes them
+  std::vector<std::string> changes;  // in the syntax of ParseReplayChange
 };
 
 // Reads, calibrates this host, replays and prints a table. InvalidArgument, NotFound: options or file.

@@ -56,7 +56,7 @@ void DenseSlice::SplatByKernels() {
   }
 }
 
-// One voxel after the other, by a table of its footprint's weights as above.
+// One voxel after the other, with a table of its footprint's weights as above.
 void DenseSlice::SplatPlainly() {
   const std::int32_t taps = footprint_.taps, k = std::int32_t(taps * 0x1p32 / double(lattice_.step) + 0.5);
   const auto pixels = std::size_t(pixels_), sheet_row = std::size_t(pixels_ + 2 * kMargin);

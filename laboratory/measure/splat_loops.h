@@ -1,6 +1,6 @@
-// DenseSlice: splatting and compositing of a filled slice, side x side shaded voxels into a frame, by the kernels of the pipeline, band by
-// band as it runs them; and by what they replace, a loop that adds k x k weighted pixels into a sheet for each voxel (Westover 1990) and
-// then composites the sheet. For timing: both do the work of a slice, and leave their pixels where nobody looks.
+// DenseSlice: splatting and compositing of a filled slice, side x side shaded voxels into a frame, in two ways: by the pipeline's kernels,
+// band by band as in the pipeline; and by the loop that they replace, which adds k x k weighted pixels into a sheet for each voxel
+// (Westover 1990) and then composites the sheet. For timing: both do the work of a slice, and their pixels are not used.
 #pragma once
 
 #include <cstdint>

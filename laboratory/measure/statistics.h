@@ -1,4 +1,4 @@
-// What repeats of a measurement say: their median, how sure it is, and quantiles. Pure.
+// Statistics of repeated measurements: median, confidence interval and quantiles. Pure.
 #pragma once
 
 #include <vector>
@@ -9,8 +9,8 @@ namespace slabstream {
 // the distribution with at least the wanted confidence, whatever the distribution (David and Nagaraja, Order Statistics, 2003,
 // section 7.1):
 //   coverage(k) = 1 - 2 P(Binomial(count, 1/2) < k)
-// Fewer than six values cannot reach 95 %: the interval is then all of them and `coverage` says what that is worth. One value, or values
-// that are all the same (something computed): the interval is the value.
+// Fewer than six values cannot reach 95 %: the interval then spans all of them and `coverage` gives its confidence. For one value, or equal
+// values (something computed), the interval is the value.
 struct Estimate {
   double median = 0, low = 0, high = 0;
   double coverage = 0;  // confidence of [low, high], in [0, 1]
@@ -21,7 +21,7 @@ struct Estimate {
 };
 Estimate MedianOf(std::vector<double> values, double confidence = 0.95);  // no values: all zero
 
-// The q-quantile by nearest rank: the least of the values that at least a share q of them do not exceed. At least one value, q in [0, 1].
+// The q-quantile by nearest rank: the least value that at least a share q of the values do not exceed. At least one value, q in [0, 1].
 double Quantile(std::vector<double> values, double q);
 
 // Coverage of the interval between the k-th smallest and the k-th largest of `count` values, 1 <= k <= (count + 1) / 2.

@@ -1,4 +1,4 @@
-// Processor time of the calling thread: what a measurement counts, so that whatever else the machine does is not in it.
+// Processor time of the calling thread. Measurements use it because it excludes all other work of the machine.
 #pragma once
 
 #include <time.h>

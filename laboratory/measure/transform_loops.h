@@ -1,6 +1,6 @@
-// The transform of all voxels of a slab, x fastest: as a matrix product a voxel, and by running additions (the paper's seed, voxel, beam
-// and slice phases). Stored: three arrays of coordinates. Fused: coordinates are used at once and never stored; here their bits are
-// combined, which is about the least that one can do with them.
+// The transform of all voxels of a slab, x fastest: as a matrix product for each voxel, and by running additions (the paper's seed, voxel,
+// beam and slice phases). Stored: three arrays of coordinates. Fused: coordinates are used at once and never stored; here their bits are
+// combined, which is about the least possible use of them.
 //
 // Scalar loops are compiled without automatic vectorisation; vector loops use Highway, for the best instruction set of the machine.
 #pragma once

@@ -52,7 +52,7 @@ HWY_INLINE void Increments(const TransformMatrix& matrix, const Index3& size, Us
   }
 }
 
-// Vectors may run over the end of a beam; the next one overwrites that, and behind the last one there is room.
+// Vectors may run over the end of a beam. The next beam overwrites the excess, and there is room after the last one.
 void StoreProduct(const TransformMatrix& matrix, const Index3& size, TransformedPoints& points) {
   Products(matrix, size, [&](std::size_t c, std::size_t i, auto v) HWY_ATTR { hn::StoreU(v, FloatTag(), &points.components[c][i]); });
 }

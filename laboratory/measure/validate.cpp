@@ -58,7 +58,7 @@ FrameParts Median(const std::vector<FrameParts>& frames) {
 struct View {
   FrameRequest request;
   FramePlan plan;
-  FrameCosts costs;  // what boxes cover; their seconds are measured anew in each turn
+  FrameCosts costs;  // coverage of the boxes; their seconds are measured anew in each turn
   std::vector<FrameParts> measured, simulated;
 };
 
@@ -119,10 +119,10 @@ Result<ValidationRow> ValidateSimulation(const ValidationCase& what, const Valid
   PlanRenderings renderings(*what.volume, what.workers);
   PictureMeter pictures(*what.volume, what.workers);
   MachineModel machine = ThisHost(what.workers);
-  machine.picture_threads = 0;  // pictures are measured as all of them make it
+  machine.picture_threads = 0;  // pictures are measured with all the threads that make them
   std::vector<double> slowdowns;
 
-  for (int turn = -1; turn < options.turns; ++turn) {  // the first one fetches voxels and makes normals
+  for (int turn = -1; turn < options.turns; ++turn) {  // the first turn fetches voxels and makes normals
     if (Status status = probe.Sample(kHandOverSamples); !status.ok()) return status;
     for (View& view : *views) {
       if (const Result<TimedPicture> first = (*service)->Render(view.request); !first.ok()) return first.status();

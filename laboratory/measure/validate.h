@@ -1,13 +1,13 @@
-// Validation: frames of the embedded service beside what the simulation says of them, in one run.
+// Validation: compares frames of the embedded service with their simulation, in one run.
 //
-// Turn after turn and view after view, one after the other:
+// Turn after turn and view after view, in sequence:
 //   - the service renders the view with one or two workers of one thread each, one frame in flight;
-//   - in this process, the boxes of its plan are rendered alone, on one thread; with two workers also both at once, which tells how much
+//   - in this process, the boxes of its plan are rendered alone, on one thread; with two workers also both at once, which shows how much
 //     they slow each other down (neighbours.h); the picture is made and decoded.
 // Each of these is done twice in a row, and the second time counts: its threads have not slept for long, and its data is in the caches if
-// it ever is. Before each turn frames of another volume and service tell what hand-overs take. What was measured of a view in a turn is
-// simulated on a model of this machine (calibrate.h). So the same weather hits both sides, and both are given as medians over turns.
-// Nothing of the service's own times enters the simulation.
+// it fits. Before each turn, frames of another volume and service measure hand-overs. The measurements of a view in a turn are simulated on
+// a model of this machine (calibrate.h). So both sides meet the same state of the machine, and both are medians over turns. No time
+// of the measured service enters the simulation.
 #pragma once
 
 #include <memory>
@@ -36,14 +36,14 @@ struct ValidationOptions {
 
 // Of one frame, in seconds.
 struct FrameParts {
-  double render = 0;   // of the worker that rendered longest
-  double picture = 0;  // made of the frame and encoded, by the display worker
-  double latency = 0;  // request to decoded picture, all in all
+  double render = 0;   // of the worker with the longest render time
+  double picture = 0;  // made from the frame and encoded, by the display worker
+  double latency = 0;  // from request to decoded picture
 };
 
 struct ValidatedView {
-  FrameParts measured, simulated;              // medians over turns, each part by itself
-  double measured_low = 0, measured_high = 0;  // quartiles of the latency: what the machine's noise is
+  FrameParts measured, simulated;              // medians over turns, each part separately
+  double measured_low = 0, measured_high = 0;  // quartiles of the latency: the noise of the machine
   double simulated_low = 0, simulated_high = 0;
   double error() const { return simulated.latency / measured.latency - 1; }
 };
@@ -52,13 +52,13 @@ struct ValidationRow {
   std::string name;
   int workers = 1;
   std::vector<ValidatedView> views;
-  MachineModel machine;  // as it was in the end
+  MachineModel machine;  // at the end
   HandOverEstimates hand_overs;
   Estimate slowdown;  // of two workers' renderings, over all turns and views
 
-  ValidatedView Mean() const;  // over views, every number by itself
+  ValidatedView Mean() const;  // over views, each number separately
   double error() const { return Mean().error(); }
-  double worst_error() const;  // of one view, the largest in size
+  double worst_error() const;  // of one view, the largest in magnitude
 };
 
 // InvalidArgument: workers beyond 2. Fails with the service.

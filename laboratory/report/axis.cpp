@@ -23,7 +23,7 @@ double RoundStep(double step) {
   return 10 * power;
 }
 
-// These factors times powers of ten; the outer two enclose [low, high].
+// Marks at these factors times powers of ten; the outer two enclose [low, high].
 std::vector<double> EnclosingMarks(double low, double high, std::initializer_list<double> factors) {
   std::vector<double> marks;
   const int first = int(std::floor(std::log10(low) + 1e-9)), last = int(std::ceil(std::log10(high) - 1e-9));
@@ -35,8 +35,8 @@ std::vector<double> EnclosingMarks(double low, double high, std::initializer_lis
   return marks;
 }
 
-// Marks at 1, 2 and 5 times powers of ten, closer ones where these are too few; where they are too many, only powers between the outer two,
-// and none that crowds an outer one.
+// Marks at 1, 2 and 5 times powers of ten, closer ones if these are too few. If they are too many, only powers between the outer two marks,
+// and none too close to an outer one.
 std::vector<double> LogMarks(double low, double high) {
   constexpr std::size_t kLeast = 4, kMost = 9;
   constexpr double kCrowded = 0.05;  // of the axis

@@ -52,7 +52,7 @@ std::string DrawBars(const BarChart& chart) {
   spec.from_zero = true;
   const ChartAxis y(spec, heights);
   const Legend legend = LegendOf(chart);
-  const double below_bars = longest_label > 0 ? longest_label + 10 : 4;  // labels of bars stand upright under them
+  const double below_bars = longest_label > 0 ? longest_label + 10 : 4;  // labels of bars are written vertically under them
   const double group_width = PlaceBeside(legend).width / double(std::max<std::size_t>(1, chart.groups.size()));
   const bool upright = longest_group > group_width;  // labels of groups, too
   const double below_groups = below_bars + (upright ? longest_group + 8 : 14);

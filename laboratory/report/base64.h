@@ -1,4 +1,4 @@
-// Bytes as text that may stand in a page (RFC 4648, section 4).
+// Bytes as text for a page (RFC 4648, section 4).
 #pragma once
 
 #include <string>

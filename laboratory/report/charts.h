@@ -1,5 +1,5 @@
-// The kinds of plots of reports, as values, each drawn by one function (and file) as an SVG text. Whatever is drawn carries its Origin; a
-// legend stands beside the plot, never over data, and says in words which stroke is measured, simulated or from the paper. Series differ by
+// The kinds of plots in reports, as values. Each is drawn by one function (and file) as an SVG text. Every drawn element carries its
+// Origin. A legend beside the plot, never over data, says in words which stroke is measured, simulated or from the paper. Series differ by
 // colour and by marker.
 #pragma once
 
@@ -11,7 +11,7 @@
 
 namespace slabstream {
 
-// Lines. Series of one name share a colour (and an entry of the legend) whatever their origins.
+// Lines. Series of one name share a colour (and an entry of the legend), whatever their origins.
 struct LinePoint {
   double x = 0, y = 0;
   double low = 0, high = 0;  // of the spread of y; equal: none
@@ -19,8 +19,8 @@ struct LinePoint {
 struct LineSeries {
   std::string name;
   Origin origin = Origin::kMeasured;
-  std::vector<LinePoint> points;  // by ascending x; what an axis cannot show is left out
-  bool reference = false;         // no data, but what data is compared with: a thin line without markers or origin
+  std::vector<LinePoint> points;  // by ascending x; points that an axis cannot show are left out
+  bool reference = false;         // not data but a reference for it: a thin line without markers or origin
 };
 struct LineChart {
   std::string title;
@@ -29,7 +29,7 @@ struct LineChart {
 };
 std::string DrawLines(const LineChart& chart);
 
-// Bars: groups of bars side by side, each a stack of parts, or plain bars that the legend names.
+// Bars: groups of bars side by side. A bar is a stack of parts, or a plain bar that the legend names.
 struct Bar {
   std::string label;  // of stacks: under it; of plain bars: its name in the legend; empty: none
   Origin origin = Origin::kMeasured;
@@ -52,7 +52,7 @@ std::string DrawBars(const BarChart& chart);
 struct GanttSpan {
   double begin = 0, end = 0;
   int kind = 0;       // of GanttChart::kinds: its colour
-  std::string label;  // a letter or two, written where there is room
+  std::string label;  // a letter or two, written if there is room
   std::string hint;
 };
 struct GanttLane {

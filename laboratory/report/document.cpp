@@ -50,7 +50,7 @@ Status WriteReport(const Report& report, const Provenance& provenance, const std
   }
   const auto json = ReportJson(report, provenance).dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
   if (Status status = write("result.json", json); !status.ok()) return status;
-  return write("report.html", ReportHtml(report, provenance));  // last: who sees it finds the rest
+  return write("report.html", ReportHtml(report, provenance));  // last: whoever sees it finds all other files
 }
 
 }  // namespace slabstream

@@ -1,5 +1,5 @@
-// Report: what an experiment has to say, as a good lab report says it: what was asked, what was done, what came out in one sentence with
-// its number, then the plots and tables that show it. A value; written by WriteReport as one HTML page and as files for programs.
+// Report: the result of an experiment, structured like a good lab report: question, method, answer in one sentence with its number, then
+// the plots and tables that show it. A value; WriteReport writes it as one HTML page and as files for programs.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -32,7 +32,7 @@ struct Section {
   std::vector<Block> blocks;
 };
 
-// What makes a run repeatable; stands at the page's head and in every result file.
+// The data needed to repeat a run; at the page's head and in every result file.
 struct Provenance {
   std::string experiment, version, commit, command;
   std::string cpu, simd;
@@ -46,7 +46,7 @@ struct Report {
   std::string title, summary;
   std::vector<Section> sections;
 
-  // At its end; says why there is none.
+  // Appends the section. Returns its error if there is none.
   Status Add(Result<Section> section);
 };
 

@@ -1,4 +1,4 @@
-// Legend: what stands beside a plot. Names with their colours, and below them what the strokes that occur mean.
+// Legend: the text beside a plot. Names with their colours, and below them the meanings of the strokes that occur.
 #pragma once
 
 #include <optional>
@@ -12,10 +12,10 @@ namespace slabstream {
 
 struct Legend {
   enum class Swatch { kLine, kBar };
-  // A name stands for all strokes of its colour, so it is drawn as the first of them.
+  // A name stands for all strokes of its colour and is drawn like the first of them.
   struct Entry {
     std::string name;
-    std::optional<Origin> origin;  // none: something that data is compared with
+    std::optional<Origin> origin;  // none: a reference for the data
   };
   Swatch swatch = Swatch::kLine;
   std::vector<Entry> entries;   // by colour
@@ -31,7 +31,7 @@ void DrawLegend(SvgCanvas& canvas, const Legend& legend, SvgPoint top_left);
 // "measured here", "simulated from measured costs", "from the paper".
 std::string OriginWords(Origin origin);
 
-// About the width of a text of the charts' font.
+// Approximate width of a text in the charts' font.
 double TextWidth(const std::string& text);
 
 }  // namespace slabstream

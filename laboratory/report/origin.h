@@ -1,4 +1,4 @@
-// Where a number comes from. Every plot and table tells the three apart, by drawing and in words.
+// The source of a number. Every plot and table distinguishes the three, by drawing and in words.
 #pragma once
 
 #include <array>

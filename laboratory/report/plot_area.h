@@ -14,10 +14,10 @@ struct PlotArea {
   double total_width = 0, total_height = 0;    // of the drawing
 };
 
-// The usual size, with the legend to the right of it. `below`: pixels under it for labels of the horizontal axis.
+// The usual size, with the legend on its right. `below`: pixels under it for labels of the horizontal axis.
 PlotArea PlaceBeside(const Legend& legend, double below = 50);
 
-// Title, vertical axis with its grid.
+// Draws the title and the vertical axis with its grid.
 void DrawFrame(SvgCanvas& canvas, const PlotArea& area, const std::string& title, const ChartAxis& y);
 void DrawHorizontalAxis(SvgCanvas& canvas, const PlotArea& area, const ChartAxis& x);
 

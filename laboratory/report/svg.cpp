@@ -23,7 +23,7 @@ constexpr std::array<std::string_view, kPaletteSize> kMarkers = {"m-3.7 0a3.7 3.
                                                                  "m-4 -4h8l-8 8h8z"};
 constexpr std::string_view kCross = "m-3.6 -3.6l7.2 7.2m0 -7.2l-7.2 7.2";
 
-// Okabe and Ito's colours, darkened where they would be faint on white; and the same, lightened, for dark pages.
+// Okabe and Ito's colours, darkened if they would be faint on white; and lightened, for dark pages.
 constexpr std::array<std::string_view, kPaletteSize> kLight = {"#0072b2", "#d55e00", "#009e73", "#aa4499",
                                                                "#c08a00", "#3aa0d8", "#6b6b6b", "#882255"};
 constexpr std::array<std::string_view, kPaletteSize> kDark = {"#4db2ff", "#ff8a3d", "#2fd0a5", "#e08fd0",
@@ -50,7 +50,7 @@ const std::string& StyleSheet() {
       ".ss .bar{stroke-width:1}.ss .bar.simulated{fill-opacity:.5;stroke-dasharray:4 2}"
       ".ss .bar.paper{fill-opacity:.15;stroke-dasharray:1.2 2.2}" +
       ColorRules(kLight, "#555") +
-      // After the colours: what is not filled stays open.
+      // After the colours, so that unfilled shapes stay open.
       ".ss .curve,.ss .open,.ss .whisker{fill:none}"
       "@media (prefers-color-scheme:dark){.ss text{fill:#e6e6e6}.ss text.small{fill:#b0b0b0}.ss .axis{stroke:#aaa}.ss .grid{stroke:#3a3a3a}"
       ".ss text.mark{fill:#000}.ss .back{fill:#262626}.ss .outline{stroke:#777}" +

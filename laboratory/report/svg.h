@@ -1,5 +1,5 @@
-// SvgCanvas: a drawing as one self-contained SVG text, with the few shapes that charts are made of. Colours are classes of one style sheet
-// that is part of the drawing and serves light and dark pages alike; no script, no font file, no link.
+// SvgCanvas: a drawing as one self-contained SVG text, with the few shapes of charts. Colours are classes of one style sheet that is part
+// of the drawing and works for light and dark pages; no script, no font file, no link.
 #pragma once
 
 #include <optional>
@@ -12,8 +12,8 @@
 
 namespace slabstream {
 
-// Colours of series and stages that also those can tell apart who see fewer colours (after Okabe and Ito 2008). Index modulo the count.
-inline constexpr int kPaletteSize = 8, kPlainColor = -1;  // plain: that of texts, for what stands for all colours
+// Colours of series and stages that colour-blind readers can tell apart (after Okabe and Ito 2008). Index modulo the count.
+inline constexpr int kPaletteSize = 8, kPlainColor = -1;  // plain: the colour of texts, standing for all colours
 
 struct SvgPoint {
   double x = 0, y = 0;
@@ -23,18 +23,18 @@ enum class TextAnchor { kStart, kMiddle, kEnd };
 
 class SvgCanvas {
  public:
-  // Pixels. `title` is what a screen reader says.
+  // Size in pixels. Screen readers read `title`.
   SvgCanvas(double width, double height, std::string_view title);
 
   // `style` is a class of the style sheet: "grid", "axis".
   void Line(SvgPoint from, SvgPoint to, std::string_view style);
   void Text(SvgPoint at, std::string_view text, TextAnchor anchor = TextAnchor::kStart, std::string_view style = "label");
-  // Read from below.
+  // Reads from bottom to top.
   void VerticalText(SvgPoint at, std::string_view text, TextAnchor anchor = TextAnchor::kMiddle, std::string_view style = "label");
 
-  // Series: drawn as its origin asks for; no origin: a line that data is compared with.
+  // Series: the stroke follows the origin; no origin: a reference line.
   void Polyline(const std::vector<SvgPoint>& points, int color, std::optional<Origin> origin);
-  // Each colour has a shape of its own, filled or open by origin; what is from the paper is a cross. `hint`: shown on hovering.
+  // Each colour has its own shape, filled or open by origin; numbers from the paper are crosses. `hint`: shown on hovering.
   void Marker(SvgPoint at, int color, Origin origin, std::string_view hint = "");
   void Spread(double x, double y_low, double y_high, int color);  // a whisker
   void Bar(double x, double y, double width, double height, int color, Origin origin, std::string_view hint = "");

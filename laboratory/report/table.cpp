@@ -26,7 +26,7 @@ bool AnyCell(const Table& table, std::size_t column, Has has) {
 bool HasInterval(const Cell& cell) { return cell.low.has_value(); }
 bool HasOrigin(const Cell& cell) { return cell.origin.has_value(); }
 
-// Numbers as they are: a program reads them.
+// Numbers in full precision, for programs.
 std::string Exact(const std::optional<double>& number) { return number && std::isfinite(*number) ? fmt::format("{}", *number) : ""; }
 
 std::string CsvField(const std::string& text) {

@@ -12,14 +12,14 @@
 
 namespace slabstream {
 
-// Nothing (shown as a dash), a text, or a number with its origin and, where it was measured several times, its interval.
+// Nothing (shown as a dash), a text, or a number with its origin and, if it was measured several times, its interval.
 struct Cell {
   Cell() = default;
   Cell(std::string words) : text(std::move(words)) {}  // NOLINT(google-explicit-constructor): rows read as lists of values
   Cell(const char* words) : text(words) {}             // NOLINT(google-explicit-constructor)
   Cell(double value, Origin from) : number(value), origin(from) {}
   Cell(const Estimate& estimate, Origin from);
-  static Cell Parameter(double value);  // a number that was chosen, not found: it has no origin
+  static Cell Parameter(double value);  // a chosen number, not a result: it has no origin
 
   std::string text;
   std::optional<double> number, low, high;

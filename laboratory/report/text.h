@@ -1,4 +1,4 @@
-// Numbers and texts as reports show them. Pure.
+// Formats numbers and texts for reports. Pure.
 #pragma once
 
 #include <string>
@@ -13,10 +13,10 @@ std::string Escape(std::string_view text);
 // Not a number or infinite: "–".
 std::string FormatNumber(double value);
 
-// Two significant digits, for ratios that mean no more: "16000", "1.5".
+// Two significant digits, for ratios of low precision: "16000", "1.5".
 std::string FormatAbout(double value);
 
-// "a", "a-b-c" out of any text: fit for the name of a file, an id or a link.
+// "a", "a-b-c" from any text: fit for a file name, an id or a link.
 std::string Slug(std::string_view text);
 
 }  // namespace slabstream

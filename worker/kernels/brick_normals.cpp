@@ -69,7 +69,7 @@ void Encode(const NormalSums& below, const NormalSums& middle, const NormalSums&
   const D d;
   const hn::Rebind<std::uint16_t, D> d16;
   const std::size_t lanes = hn::Lanes(d);
-  // Of all rows before any is read: what was just stored is slow to load from another offset.
+  // Filled for all rows before any is read: a load right after a store at another offset is slow.
   alignas(64) float smooth[kNormalRow][kNormalColumns], along_y[kNormalRow][kNormalColumns], along_z[kNormalRow][kNormalColumns];
   for (std::uint32_t rest = rows; rest != 0; rest &= rest - 1) {
     const int y = std::countr_zero(rest);

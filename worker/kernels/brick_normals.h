@@ -1,10 +1,10 @@
-// Normal codes of the voxels of a brick: the gradient of Zucker and Hummel (1981), along each axis the difference of the two neighbouring
-// slices, smoothed by (1, 2, 1) along the other two. The smoothing's factor 16 is the same for all axes and left in: only the direction is
-// kept.
+// Normal codes of the voxels of a brick, by the gradient of Zucker and Hummel (1981): along each axis the difference of the two
+// neighbouring slices, smoothed by (1, 2, 1) along the other two. The smoothing factor 16 is the same for all axes and is left in, because
+// only the direction is kept.
 //
-//   1. SumPlane for three planes z - 1, z, z + 1: what along y is needed of each, by column.
-//   2. EncodeNormals: the rest, for the rows of z that are wanted. The sums of a plane serve three z.
-// Sums are made in the same order everywhere (y, z, then x; the outer two of three first) and without fused operations, so the codes do not
+//   1. SumPlane for three planes z - 1, z, z + 1: sums along y, by column.
+//   2. EncodeNormals: the rest, for the wanted rows of z. The sums of a plane serve three z.
+// Sums are always added in the same order (y, z, then x; the outer two of three first) and without fused operations, so the codes do not
 // depend on the instruction set. Integer samples are summed exactly.
 #pragma once
 
@@ -16,7 +16,7 @@ namespace slabstream {
 inline constexpr int kNormalRow = 16;      // voxels of a row, and rows of a plane
 inline constexpr int kNormalColumns = 32;  // columns -1 ... 16 and padding, which may hold anything
 
-// Samples of rows -1 ... 16. Outside the volume: as the nearest one inside. T: std::uint8_t, std::uint16_t, float.
+// Samples of rows -1 ... 16. Outside the volume, the nearest sample inside. T: std::uint8_t, std::uint16_t, float.
 template <class T>
 struct alignas(64) NormalSamples {
   T row[kNormalRow + 2][kNormalColumns];
@@ -24,7 +24,7 @@ struct alignas(64) NormalSamples {
 struct alignas(64) NormalSums {
   float smooth[kNormalRow][kNormalColumns], slope[kNormalRow][kNormalColumns];
 };
-// 1 / physical distance of a voxel's two neighbours, by axis: neighbours that are missing make it shorter, 0 where both are.
+// 1 / physical distance of a voxel's two neighbours, by axis. Shorter if one neighbour is missing, 0 if both are.
 struct NormalScales {
   std::array<float, kNormalRow> x{}, y{};
   float z = 0;

@@ -22,8 +22,8 @@ using IntTag = hn::RebindToSigned<FloatTag>;
 using UintTag = hn::RebindToUnsigned<FloatTag>;
 constexpr std::size_t kMostFaces = hn::MaxLanes(FloatTag());
 
-// What a vector of faces needs to be drawn: the pixels to visit, cut off at the band, and the values at the pixel that is leftmost and
-// topmost of those that the face can touch, whether it lies in the band or not.
+// A vector of faces, ready to be drawn: the pixels to visit, clipped to the band, and the values at the leftmost and topmost pixel that the
+// face can touch, inside the band or not.
 struct FaceBatch {
   alignas(64) std::int32_t right[kMostFaces], below[kMostFaces];   // columns and rows from that pixel to the first visited one
   alignas(64) std::int32_t columns[kMostFaces], rows[kMostFaces];  // visited
@@ -85,7 +85,8 @@ HWY_INLINE std::uint32_t PlaceFaces(const FaceProjection& faces, const FaceSite*
     const auto eye_a = hn::Add(set(faces.eye_a), index(faces.a));
     const auto eye_u = hn::Add(set(faces.eye_u), index(faces.u)), eye_v = hn::Add(set(faces.eye_v), index(faces.v));
     visible = hn::And(visible, hn::RebindMask(di, hn::Lt(hn::Mul(set(faces.sign), eye_a), hn::Zero(df))));
-    // The ray of the centre has direction (eye_a, eye_u, eye_v) / depth; one pixel aside it meets the plane nearer or farther by the slope.
+    // The ray through the centre has direction (eye_a, eye_u, eye_v) / depth; the ray one pixel aside meets the plane nearer or farther by
+    // the slope.
     const auto per_ray_a = hn::Div(depth, eye_a);
     const auto slope_x = hn::Mul(set(faces.ray_x_a), per_ray_a), slope_y = hn::Mul(set(faces.ray_y_a), per_ray_a);
     const auto u_x = hn::Sub(hn::Mul(depth, set(faces.ray_x_u)), hn::Mul(slope_x, eye_u));
@@ -112,7 +113,7 @@ HWY_INLINE std::uint32_t PlaceFaces(const FaceProjection& faces, const FaceSite*
   return std::uint32_t(bits[0]) | std::uint32_t(bits[1]) << 8;
 }
 
-// Lanes are pixels of a row: as many as keys fill a register, but at most kMostPixels.
+// Lanes are pixels of a row: as many as keys fit into a register, but at most kMostPixels.
 template <std::size_t kMostPixels>
 struct RowTags {
   using Key = hn::CappedTag<std::uint64_t, kMostPixels>;
@@ -125,7 +126,7 @@ HWY_INLINE V DepthWhere(M hit, V depth) {
   return hn::IfThenElse(hit, depth, hn::Set(hn::DFromV<V>(), std::numeric_limits<float>::infinity()));
 }
 
-// Keys become those of the face where these are less: nowhere at infinite depths.
+// Takes the face's keys where they are less: nowhere at infinite depths.
 template <class Tags, class V>
 HWY_INLINE void Merge(V depth, std::uint32_t face, std::uint64_t* HWY_RESTRICT keys) {
   const typename Tags::Key dk;
@@ -165,8 +166,8 @@ HWY_INLINE void DrawFace(const FaceProjection& faces, const FaceBatch& batch, st
   }
 }
 
-// Small faces: at most 4 x 4 pixels, all computed at once. `u`, `v` and `depth` are what a pixel adds to the values at the leftmost and
-// topmost one, the same for all faces of an orthographic view.
+// Small faces: at most 4 x 4 pixels, all computed at once. `u`, `v` and `depth` are each pixel's offsets from the values at the leftmost
+// and topmost one, the same for all faces of an orthographic view.
 constexpr std::int32_t kStampSide = 4;
 constexpr std::int32_t kStampPixels = kStampSide * kStampSide;
 

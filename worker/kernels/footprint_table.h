@@ -1,13 +1,13 @@
-// FootprintTable: the one-dimensional footprint of a voxel, tabulated for the places that a sample can have between two voxels.
+// FootprintTable: the one-dimensional footprint of a voxel, tabulated for sample positions between two voxels.
 //
-// A sample at t voxels (from a voxel's centre on) is a weighted mean of the voxels within the radius R = cut * sigma of it:
+// A sample at t voxels (from a voxel's centre) is a weighted mean of the voxels within the radius R = cut * sigma:
 //   first = floor(t - R) + 1;   phase = floor(kPhases * frac(t - R));   sum over n < taps of weight(phase, n) * voxel[first + n]
 // with weight(phase, n) = g(d) / (sum of g over the phase's taps) for the distance d of voxel first + n at the middle of the phase,
 //   g(d) = exp(-d^2 / (2 sigma^2)) - exp(-cut^2 / 2) for |d| < R, else 0.
-// Weights of a phase sum to 1, so the samples of a filled slice are what its voxels are. The Gaussian is lowered by its value at the cut,
-// so that it ends without a step. A sample's place is off by at most 1 / (2 kPhases) voxel.
+// Weights of a phase sum to 1, so a slice of equal voxels yields samples equal to them. The value of the Gaussian at the cut is subtracted,
+// so that it ends without a step. A sample's position is off by at most 1 / (2 kPhases) voxel.
 //
-// Places are counted in fixed point, 32 bits behind the binary point (Lattice): exact from sample to sample and the same everywhere.
+// Positions are fixed point with 32 fractional bits (Lattice): exact from sample to sample and the same everywhere.
 #pragma once
 
 #include <algorithm>
@@ -24,7 +24,7 @@ struct FootprintTable {
   std::int32_t taps = 0;         // ceil(2 radius)
   AlignedVector<float> weights;  // [phase][taps]
 
-  // The same for pixels of four channels: every weight four times, and an even number of taps, so that two voxels are one vector.
+  // The same for pixels of four channels: every weight four times. The number of taps is even, so that two voxels are one vector.
   std::int32_t padded_taps = 0;
   AlignedVector<float> channel_weights;  // [phase][padded_taps][4]
 };
@@ -42,16 +42,15 @@ struct Lattice {
   static std::size_t Phase(std::int64_t at) { return std::size_t(std::uint32_t(at) >> (32 - kPhaseBits)); }
 };
 
-// Of samples at column i + 0.5 = scale * u + offset, for a footprint of this radius. Whatever lies farther than 2^30 voxels away is moved
-// there.
+// For samples at column i + 0.5 = scale * u + offset and a footprint of this radius. Positions are clamped to 2^30 voxels.
 Lattice MakeLattice(double scale, double offset, double radius);
 
-// The first sample i with At(i) at or beyond a place, for one evenly spaced place after the other: additions after two divisions.
+// The first sample i with At(i) at or beyond a position, for evenly spaced positions in turn: additions only, after two divisions.
 class FirstSamples {
  public:
   FirstSamples(const Lattice& lattice, std::int64_t place, std::int64_t stride);
 
-  // Of the place at hand, in [begin, end].
+  // For the current position, in [begin, end].
   std::int32_t In(std::int32_t begin, std::int32_t end) const {
     if (step_ <= 0) return sample_ <= 0 ? begin : end;
     return std::int32_t(std::clamp<std::int64_t>(sample_, begin, end));
@@ -66,15 +65,15 @@ class FirstSamples {
   }
 
  private:
-  std::int64_t step_;                                    // samples that stand still: sample_ is how far away the place is
+  std::int64_t step_;                                    // 0: samples stand still; then sample_ is the distance to the position
   std::int64_t sample_ = 0, beyond_ = 0;                 // ceil(distance / step); distance + step - 1 is sample_ * step + beyond_
-  std::int64_t stride_samples_ = 0, stride_beyond_ = 0;  // likewise of the stride, rounded down
+  std::int64_t stride_samples_ = 0, stride_beyond_ = 0;  // the same for the stride, rounded down
 };
 
 // The first sample i with At(i) at or beyond `place`, in [begin, end].
 std::int32_t FirstSampleAt(const Lattice& lattice, std::int64_t place, std::int32_t begin, std::int32_t end);
 
-// The first sample whose place u is at or beyond `voxel`, in [begin, end].
+// The first sample whose position u is at or beyond `voxel`, in [begin, end].
 std::int32_t FirstSampleFrom(const Lattice& lattice, double radius, double voxel, std::int32_t begin, std::int32_t end);
 
 }  // namespace slabstream

@@ -1,6 +1,6 @@
-// A surface normal in 15 bits. Shading is two-sided, so only the line through a normal counts: the half with z >= 0 is laid out on a square
-// by the hemi-octahedral map (Cigolle et al., A survey of efficient representations for independent unit vectors, 2014) and rounded to a
-// grid of kNormalGrid x kNormalGrid. The grid is odd, so the three axes have exact codes. Largest error 0.8 degrees.
+// A surface normal in 15 bits. Shading is two-sided, so only the line through a normal counts. The hemi-octahedral map (Cigolle et al., A
+// survey of efficient representations for independent unit vectors, 2014) lays the half with z >= 0 out on a square, and the result is
+// rounded to a grid of kNormalGrid x kNormalGrid. The grid is odd, so the three axes have exact codes. Largest error 0.8 degrees.
 #pragma once
 
 #include <algorithm>

@@ -10,7 +10,8 @@ namespace slabstream {
 double PowerOfFraction(double base, double exponent) {
   if (!(base > 0)) return 0;
   if (base >= 1) return 1;
-  // base = m * 2^e with m in [sqrt(1/2), sqrt(2)); ln m = 2 artanh(s), s = (m - 1) / (m + 1), |s| < 0.172: the series' rest is below 1e-15.
+  // base = m * 2^e with m in [sqrt(1/2), sqrt(2)); ln m = 2 artanh(s), s = (m - 1) / (m + 1), |s| < 0.172: the series' error is below
+  // 1e-15.
   int e = 0;
   double m = std::frexp(base, &e);
   if (m < std::numbers::sqrt2 / 2) {
@@ -23,7 +24,7 @@ double PowerOfFraction(double base, double exponent) {
     series = series * s2 + coefficient;
   const double log2 = exponent * (e + 2 * s * series / std::numbers::ln2);
   if (log2 < -1000) return 0;
-  // 2^log2 = 2^whole * e^rest, |rest| <= ln(2) / 2: the Taylor series' rest is below 1e-15.
+  // 2^log2 = 2^whole * e^rest, |rest| <= ln(2) / 2: the Taylor series' error is below 1e-15.
   const double whole = std::floor(log2 + 0.5), rest = (log2 - whole) * std::numbers::ln2;
   double power = 0;
   for (double factorial :

@@ -1,9 +1,9 @@
 // Phong (1975) shading with white directional lights and the viewer at infinity, on both sides of a surface:
 //   I = clamp(colour * (ambient + diffuse * sum |N.L|) + specular * sum max(R.V, 0)^shininess, 0, 1);   R = 2 (N.L) N - L
-// sums over the lights; V points against the view direction, L towards the light. Inside homogeneous material there is no gradient: it is
-// lit as surfaces that face every way are on average, |N.L| = 1/2, without a specular part. (Lit as if it faced the light, it would show
-// as bright rings where footprints reach up from below the steps of a hard-edged surface.) A negative R.V counts as 0: edge-on to a
-// headlight, R points straight away from the viewer, and by its size the rim would be as bright as the highlight.
+// The sums run over the lights; V points against the view direction, L towards the light. Homogeneous material has no gradient: it is lit
+// like the average of surfaces in all directions, |N.L| = 1/2, without a specular part. (If it were lit as if it faced the light, bright
+// rings would show where footprints reach up from below the steps of a hard-edged surface.) A negative R.V counts as 0: edge-on to a
+// headlight, R points straight away from the viewer, and |R.V| would make the rim as bright as the highlight.
 #pragma once
 
 #include <vector>
@@ -13,7 +13,7 @@
 
 namespace slabstream {
 
-// What the normal decides: I = clamp(colour * diffuse + specular).
+// The factors that depend on the normal: I = clamp(colour * diffuse + specular).
 struct PhongFactors {
   float diffuse = 1, specular = 0;
 };
@@ -23,11 +23,11 @@ class Phong {
   // `view_direction`: physical, unit, away from the eye.
   Phong(const Shading& shading, const Vec3& view_direction);
 
-  // The definition, in double precision, which PhongTable (splatting) and ShadeFaces (Z-buffer) are held to. The same bits on every
+  // The definition, in double precision. PhongTable (splatting) and ShadeFaces (Z-buffer) are tested against it. The same bits on every
   // machine.
   PhongFactors AtNormal(const Vec3& unit_normal) const;
   PhongFactors WithoutGradient() const;
-  const std::vector<Vec3>& lights() const { return lights_; }  // unit directions towards them; the headlight where none was given
+  const std::vector<Vec3>& lights() const { return lights_; }  // unit directions towards them; the headlight if none was given
 
   // By normal code (normal_code.h), kNoGradient included.
   std::vector<PhongFactors> ByNormalCode() const;
@@ -38,8 +38,8 @@ class Phong {
   Vec3 to_viewer_;            // unit
 };
 
-// base^exponent for base in [0, 1] and exponent in [1, 1000], within 1e-9 relative; the same bits everywhere, which std::pow does not
-// promise.
+// base^exponent for base in [0, 1] and exponent in [1, 1000], within 1e-9 relative. The same bits everywhere, which std::pow does not
+// guarantee.
 double PowerOfFraction(double base, double exponent);
 
 }  // namespace slabstream

@@ -16,7 +16,7 @@
 #include "common/base/aligned_buffer.h"
 #include "worker/kernels/normal_code.h"
 
-#ifndef SLABSTREAM_WORKER_KERNELS_PHONG_TABLE_CPP_  // what is shared by all instruction sets
+#ifndef SLABSTREAM_WORKER_KERNELS_PHONG_TABLE_CPP_  // shared by all instruction sets
 #define SLABSTREAM_WORKER_KERNELS_PHONG_TABLE_CPP_
 namespace slabstream {
 
@@ -52,7 +52,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 void FillTable(const Shading& shading, std::span<const Vec3> lights, const Vec3& to_viewer, PhongFactors* factors) {
   const hn::CappedTag<float, 16> d;
   const CodedNormals& normals = AllNormals();
-  // Most normals are far from a highlight: what is less than 1e-9 of it counts as nothing, and is not computed.
+  // Most normals are far from a highlight: factors less than 1e-9 of its peak count as zero and are not computed.
   const auto zero = hn::Zero(d), least = hn::Set(d, float(std::max(std::exp(std::log(1e-9) / shading.shininess), 1e-30)));
   const auto shininess = hn::Set(d, shading.shininess);
   for (std::size_t i = 0; i < kPaddedCodes; i += hn::Lanes(d)) {

@@ -1,5 +1,5 @@
-// Light by normal code: what Phong::ByNormalCode defines, for all codes at once, in single precision: within 2e-7 * max(shininess, 20) of
-// the definition, a light.
+// Light by normal code: Phong::ByNormalCode for all codes at once, in single precision, within 2e-7 * max(shininess, 20) of the definition
+// per light.
 #pragma once
 
 #include <vector>

@@ -1,4 +1,4 @@
-// PowerOfFraction for vectors of floats. Included once for each instruction set, hence the unusual guard.
+// PowerOfFraction for vectors of floats. Included once for each instruction set, hence the unusual include guard.
 #include <hwy/highway.h>
 
 #include <numbers>
@@ -14,8 +14,8 @@ HWY_BEFORE_NAMESPACE();
 namespace slabstream {
 namespace HWY_NAMESPACE {
 
-// base^exponent for base in [0, 1]: 2^(exponent log2(base)). Multiplications and additions are rounded one by one, so that every
-// instruction set gives the same bits: PowerOfFractionFloat in shade_faces_reference.cpp is the same, operation by operation.
+// base^exponent for base in [0, 1]: 2^(exponent log2(base)). Each multiplication and addition is rounded, so every instruction set gives
+// the same bits. PowerOfFractionFloat in shade_faces_reference.cpp does the same operations in the same order.
 template <class V>
 HWY_INLINE V PowerOfFraction(V base, V exponent) {
   namespace hn = hwy::HWY_NAMESPACE;

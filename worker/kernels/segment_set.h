@@ -1,5 +1,5 @@
-// Sets of segments of one row of pixels, as bits: which are open, which hold something. A segment is kSegment pixels, from a multiple of
-// kSegment on. Empty and hidden parts of a row cost a few instructions for 64 segments.
+// Sets of segments of one row of pixels, as bits: segments that are open, or that hold something. A segment is kSegment pixels, starting at
+// a multiple of kSegment. Skipping empty and hidden parts of a row costs a few instructions for 64 segments.
 #pragma once
 
 #include <algorithm>
@@ -43,7 +43,7 @@ inline void Remove(SegmentWord* set, std::int32_t begin, std::int32_t end) {
   ForEachWord(begin, end, [&](std::int32_t word, SegmentWord bits) { set[word] &= ~bits; });
 }
 
-// At most 64 neighbouring segments: bits of a word and of the one behind it.
+// At most 64 neighbouring segments: bits of a word and of the next one.
 struct SegmentSpan {
   std::uint32_t word = 0;
   SegmentWord first = 0, second = 0;
@@ -54,7 +54,7 @@ constexpr SegmentSpan MakeSpan(std::int32_t begin, std::int32_t end) {
           end - origin > kWordSegments ? WordBits(0, end - origin - kWordSegments) : 0};
 }
 
-// `set` has a word behind those of the row.
+// `set` has one word more than the row.
 inline bool AnyOf(const SegmentWord* set, const SegmentSpan& span) {
   return ((set[span.word] & span.first) | (set[span.word + 1] & span.second)) != 0;
 }

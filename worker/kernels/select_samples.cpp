@@ -20,7 +20,7 @@ HWY_INLINE void Select(const T* HWY_RESTRICT samples, std::ptrdiff_t stride, int
     for (std::size_t i = 0; i < std::size_t{kSelectRow}; i += hn::Lanes(d)) {
       const auto v = hn::LoadU(d, samples + i);
       for (const SampleInterval<T>& interval : intervals) {
-        // Unsigned integers have no order by instruction; NaN is equal to nothing.
+        // There is no comparison instruction for unsigned integers; NaN equals nothing.
         const auto inside = hn::Eq(hn::Min(hn::Max(v, hn::Set(d, interval.low)), hn::Set(d, interval.high)), v);
         std::uint8_t bits[8] = {};
         hn::StoreMaskBits(d, inside, bits);

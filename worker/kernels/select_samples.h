@@ -1,4 +1,4 @@
-// Which samples of a row lie in any of a few intervals, as bits: occupied voxels are found by it.
+// Finds the samples of a row that lie in any of a few intervals, as bits. It selects the occupied voxels.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ struct SampleInterval {
 
 inline constexpr int kSelectRow = 16;  // samples of a row
 
-// Bit i of masks[row]: an interval holds samples[row * stride + i]. NaN lies in none. T: std::uint8_t, std::uint16_t, float.
+// Bit i of masks[row] is set if an interval holds samples[row * stride + i]. No interval holds NaN. T: std::uint8_t, std::uint16_t, float.
 template <class T>
 void SelectSamples(const T* samples, std::ptrdiff_t stride, int rows, std::span<const SampleInterval<T>> intervals, std::uint16_t* masks);
 

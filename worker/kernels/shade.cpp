@@ -11,7 +11,7 @@
 #include <bit>
 #include <cmath>
 
-#ifndef SLABSTREAM_WORKER_KERNELS_SHADE_CPP_  // what is shared by all instruction sets
+#ifndef SLABSTREAM_WORKER_KERNELS_SHADE_CPP_  // shared by all instruction sets
 #define SLABSTREAM_WORKER_KERNELS_SHADE_CPP_
 namespace slabstream {
 
@@ -40,8 +40,8 @@ using VoxelTag = hn::FixedTag<float, 4>;  // the channels of a voxel
 
 #if HWY_TARGET <= HWY_AVX3
 
-// Four voxels to a vector, a whole octet at a time: which of its voxels are occupied decides what is loaded and what is kept, not what is
-// executed. A loop over the occupied ones would be mispredicted at most octets of a shell.
+// Four voxels to a vector, a whole octet at a time. Occupancy selects what is loaded and kept, not what is executed: a loop over the
+// occupied voxels would be mispredicted at most octets of a shell.
 using QuadTag = hn::FixedTag<float, 16>;
 using HalfQuadTag = hn::FixedTag<float, 8>;
 
@@ -49,11 +49,11 @@ using HalfQuadTag = hn::FixedTag<float, 8>;
 alignas(64) constexpr std::int32_t kFirstOfPair[] = {0, 0, 0, 8, 2, 2, 2, 8, 4, 4, 4, 8, 6, 6, 6, 8};
 alignas(64) constexpr std::int32_t kSecondOfPair[] = {1, 1, 1, 9, 3, 3, 3, 9, 5, 5, 5, 9, 7, 7, 7, 9};
 alignas(32) constexpr float kZeroOne[] = {0, 1, 0, 0, 0, 0, 0, 0};
-// Of eight voxels' floats, those of the first and of the last four, each for all channels of its voxel.
+// From eight voxels' floats, those of the first and of the last four, each repeated for all channels of its voxel.
 alignas(64) constexpr std::int32_t kOfVoxel[][16] = {{0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3},
                                                      {4, 4, 4, 4, 5, 5, 5, 5, 6, 6, 6, 6, 7, 7, 7, 7}};
 
-// Of voxels begin ... begin + 3. at(i): where the four floats of voxel i are.
+// Loads voxels begin ... begin + 3. at(i): address of the four floats of voxel i.
 template <class At>
 HWY_INLINE hn::Vec<QuadTag> LoadVoxels(At&& at, std::size_t begin) {
   const VoxelTag d;
@@ -62,7 +62,7 @@ HWY_INLINE hn::Vec<QuadTag> LoadVoxels(At&& at, std::size_t begin) {
                      hn::Combine(half, hn::Load(d, at(begin + 1)), hn::Load(d, at(begin))));
 }
 
-// Likewise two floats.
+// The same for two floats.
 template <class At>
 HWY_INLINE hn::Vec<HalfQuadTag> LoadPairs(At&& at, std::size_t begin) {
   const hn::FixedTag<float, 2> d;
@@ -71,7 +71,7 @@ HWY_INLINE hn::Vec<HalfQuadTag> LoadPairs(At&& at, std::size_t begin) {
                      hn::Combine(two, hn::LoadU(d, at(begin + 1)), hn::LoadU(d, at(begin))));
 }
 
-// The record of each voxel of an octet, counted from its first one, by mask; of empty voxels, one that there is.
+// By mask: the record of each voxel of an octet, counted from its first one; for empty voxels, any existing one.
 constexpr auto kRecordOf = [] {
   std::array<std::array<std::uint8_t, kOctet>, 1 << kOctet> record{};
   for (std::uint32_t mask = 1; mask < record.size(); ++mask) {
@@ -82,7 +82,7 @@ constexpr auto kRecordOf = [] {
   return record;
 }();
 
-// Lanes of four voxels, by a mask of these.
+// By a mask of four voxels: their lanes.
 constexpr auto kQuadLanes = [] {
   std::array<std::uint16_t, 16> lanes{};
   for (std::uint32_t mask = 0; mask < lanes.size(); ++mask) {

@@ -1,4 +1,4 @@
-// The shading stage of splatting: what each occupied voxel adds to its sheet, by look-ups.
+// The shading stage of splatting: looks up what each occupied voxel adds to its sheet.
 #pragma once
 
 #include <cstdint>
@@ -11,15 +11,15 @@
 
 namespace slabstream {
 
-// Made once a frame. The opacity of a voxel is that of its sheet; under perspective it depends on how far apart sheets are along the
-// voxel's own ray, so there are tables for `levels` evenly spaced distances, between which opacities are interpolated linearly.
+// Made once a frame. A voxel's opacity is its opacity in the sheet. Under perspective this depends on the distance between sheets along the
+// voxel's own ray, so there are tables for `levels` evenly spaced distances; opacities in between are interpolated linearly.
 struct ShadeTables {
   int bins = 0, levels = 1;
   AlignedVector<float> color;           // [bin][4]: straight colour, then the opacity of level 0
   AlignedVector<float> opacity;         // [bin][level]; one level: not read
   std::vector<PhongFactors> by_normal;  // by normal code
 
-  // Of a voxel on a ray of slopes s and t along u and v (way along the axis a way along the traversal axis): its level is
+  // For a voxel on a ray with slopes s and t along u and v (distance along the axis per distance along the traversal axis), the level is
   // clamp(level_scale * sqrt(1 + s^2 + t^2) - level_offset, 0, last_level), with last_level < levels - 1.
   float level_scale = 0, level_offset = 0, last_level = 0;
 };
@@ -27,7 +27,7 @@ struct ShadeTables {
 // An octet with at least one occupied voxel.
 struct OctetWork {
   const VoxelRecord* records = nullptr;  // of its occupied voxels, in order
-  float* rgba = nullptr;                 // 4 * kOctet floats, 64-byte aligned: opacity * (shaded colour, 1), or 0 where nothing is
+  float* rgba = nullptr;                 // 4 * kOctet floats, 64-byte aligned: opacity * (shaded colour, 1), or 0 for empty voxels
   std::uint32_t occupied = 0;            // bit i: voxel i
   float slope = 0, across = 1;           // s of voxel 0, and 1 + t^2. One level: not read
 };

@@ -54,8 +54,8 @@ HWY_INLINE Floats Dot(const Normal& n, const float (&v)[3]) {
 // Pixels that are shaded at once.
 constexpr std::size_t kLanes = hn::MaxLanes(FloatTag());
 
-// What the faces of these pixels hold, pixel by pixel. Copied ahead of time: fetching by lane is several times as slow as copying whole
-// records, and a register that is loaded right after its parts were stored waits for them.
+// The face data of these pixels, pixel by pixel. Copied ahead of time: gathering by lane is several times as slow as copying whole records,
+// and loading a register right after its parts were stored stalls.
 struct Staged {
   alignas(64) std::array<FaceSite, kLanes> sites;
   alignas(64) std::array<FaceNormals, kLanes> normals;
@@ -71,7 +71,7 @@ HWY_INLINE bool AllEmpty(const std::uint64_t* HWY_RESTRICT keys) {
   return hn::AllTrue(du, hn::Eq(depth, hn::Set(du, std::uint32_t(kEmptyKey >> 32))));
 }
 
-// For pixels that are not all empty; the empty ones get any face.
+// For pixels that are not all empty; empty ones get any face.
 HWY_INLINE void Stage(const FaceShading& shading, const std::uint64_t* HWY_RESTRICT keys, Staged& staged) {
   for (std::size_t i = 0; i < kLanes; ++i) {
     const std::size_t face = IsEmpty(keys[i]) ? 0 : std::uint32_t(keys[i]);
@@ -82,7 +82,7 @@ HWY_INLINE void Stage(const FaceShading& shading, const std::uint64_t* HWY_RESTR
   }
 }
 
-// Neighbouring pixels may see faces that are far apart in memory; by the time a pixel is staged, its face has arrived.
+// Prefetches: neighbouring pixels may see faces that are far apart in memory. When a pixel is staged, its face has arrived.
 HWY_INLINE void FetchFaces(const FaceShading& shading, const std::uint64_t* HWY_RESTRICT keys) {
   for (std::size_t i = 0; i < kLanes; ++i) {
     if (IsEmpty(keys[i])) continue;
@@ -132,7 +132,7 @@ HWY_INLINE void ShadePixels(const FaceShading& shading, const std::uint64_t* HWY
 
   auto diffuse = Set(shading.diffuse_without_normal), specular = hn::Zero(df);
   if (shading.phong) {
-    // Where in its cell the point lies, 0 ... 1. Depths of empty pixels are infinite, and what comes of them is not used.
+    // The point's position in its cell, 0 ... 1. Depths of empty pixels are infinite; their results are not used.
     const auto px = hn::Add(hn::Iota(df, float(column)), Set(0.5F)), py = Set(float(row) + 0.5F);
     const auto within_cell = [&](std::size_t i, Uints voxel) {
       const auto origin =
@@ -178,7 +178,7 @@ HWY_INLINE void ShadePixels(const FaceShading& shading, const std::uint64_t* HWY
 
 void ShadeRow(const FaceShading& shading, const std::uint64_t* keys, std::int32_t column, std::int32_t row, std::size_t count, float* rgba,
               float* depth, std::uint32_t* voxel) {
-  // The last pixels are done in a buffer: keys after the row belong to nobody, and nothing may be written there.
+  // The last pixels go through a buffer: keys after the row are meaningless, and nothing may be written there.
   const std::size_t whole = count / kLanes * kLanes;
   alignas(64) std::array<std::uint64_t, kLanes> last_keys;
   last_keys.fill(kEmptyKey);

@@ -1,7 +1,7 @@
 // The second pass of the Z-buffer: keys of pixels (draw_faces.h) become colours, depths and indices. Each pixel is shaded once.
 //
-// The point that was hit is found from the depth; the normals at the four corners of the face are blended bilinearly, made unit, and lit
-// by Phong (phong.h), all in single precision without fused operations: the same bits on every instruction set.
+// The depth gives the point that was hit. The normals at the four corners of the face are blended bilinearly, normalised, and lit by Phong
+// (phong.h), all in single precision without fused operations: the same bits on every instruction set.
 #pragma once
 
 #include <cstddef>

@@ -12,7 +12,7 @@ namespace {
 // base^exponent for base in [0, 1], exponent in [1, 1000], within 2^-20 times max(1, -log2 of the power).
 float PowerOfFractionFloat(float base, float exponent) {
   if (!(base > 0)) return 0;
-  // base = m 2^e, m in [sqrt(1/2), sqrt(2)); ln m = 2 artanh(s), s = (m - 1) / (m + 1), |s| < 0.172: the series' rest is below 2e-8.
+  // base = m 2^e, m in [sqrt(1/2), sqrt(2)); ln m = 2 artanh(s), s = (m - 1) / (m + 1), |s| < 0.172: the series' error is below 2e-8.
   const auto bits = std::bit_cast<std::int32_t>(base);
   const std::int32_t e = (bits - 0x3F3504F3) >> 23;
   const auto m = std::bit_cast<float>(bits - (e << 23));

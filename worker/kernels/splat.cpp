@@ -29,7 +29,7 @@ constexpr std::ptrdiff_t kSegmentFloats = 4 * std::ptrdiff_t{kSegment};
 using TapTag = hn::CappedTag<float, 16>;
 using TapVec = hn::Vec<TapTag>;
 
-// Sum over taps of one sample, not yet over the blocks of 128 bits: tap n is in block n % (blocks of a vector).
+// Sum over taps of one sample, kept apart by block of 128 bits: tap n is in block n % (blocks of a vector).
 template <std::int32_t kTaps>
 HWY_INLINE TapVec SumTaps(const float* HWY_RESTRICT voxels, const float* HWY_RESTRICT weights, std::int32_t taps_given) {
   const TapTag d;
@@ -47,12 +47,12 @@ HWY_INLINE TapVec SumTaps(const float* HWY_RESTRICT voxels, const float* HWY_RES
   return sum;
 }
 
-// Stores as many samples as fit into a vector; sample(i): that of the i-th, by blocks.
+// Stores as many samples as fit into a vector; sample(i) gives the i-th, by blocks.
 template <class Sample>
 HWY_INLINE void StoreSamples(Sample&& sample, float* HWY_RESTRICT out) {
   const TapTag d;
 #if HWY_TARGET <= HWY_AVX3
-  // Halves added: of samples 0 and 2, of 1 and 3. Then the two blocks that are left of each.
+  // Adds halves, of samples 0 and 2 and of 1 and 3, then the two remaining blocks of each.
   const auto add_halves = [&](TapVec a, TapVec b)
                               HWY_ATTR { return hn::Add(hn::ConcatUpperLower(d, b, a), hn::ConcatLowerUpper(d, b, a)); };
   const auto even = add_halves(sample(0), sample(2)), odd = add_halves(sample(1), sample(3));

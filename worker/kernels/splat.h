@@ -1,10 +1,9 @@
 // The splatting stage: sheets of a slice from its shaded voxels.
 //
 // A footprint is the product of one along u and one along v, and a slice meets the frame's pixels in straight columns and rows
-// (common/view/sheet_grid.h). So a sheet is made in two passes of one-dimensional sums, in gather form: first each beam is filtered along
-// u to the columns of the frame (FilterBeam); then each row of the frame gathers the few beams that reach it, and goes over what is
-// accumulated at once (CompositeRow), so a sheet is never stored. That is k + k operations a pixel instead of k * k, without a store
-// for each tap.
+// (common/view/sheet_grid.h). So a sheet is made in two passes of one-dimensional sums, in gather form. First each beam is filtered along u
+// to the columns of the frame (FilterBeam). Then each row of the frame gathers the few beams that reach it and composites the sum at once
+// (CompositeRow), so no sheet is stored. That is k + k operations a pixel instead of k * k, without a store for each tap.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +15,7 @@ namespace slabstream {
 
 // out[i] = sum over n < padded_taps of weight(phase(i), n) * voxels[first(i) + n], for the samples i of the segments in `wanted`; RGBA.
 struct BeamWork {
-  const float* voxels = nullptr;        // of voxel 0 of the volume's beam; only what taps reach is read, it must be finite
+  const float* voxels = nullptr;        // of voxel 0 of the volume's beam; only voxels that taps reach are read; they must be finite
   float* out = nullptr;                 // of the row's first pixel, 64-byte aligned
   const SegmentWord* wanted = nullptr;  // `words` words
   std::int32_t words = 0;
@@ -26,7 +25,7 @@ void FilterBeam(const FootprintTable& footprint, const Lattice& lattice, const B
 void FilterBeamReference(const FootprintTable& footprint, const Lattice& lattice, const BeamWork& work);
 
 // accumulated = accumulated over S, with S = sum over n < taps of weights[n] * beams[n]: premultiplied, front to back (Porter and Duff
-// 1984), in the open segments that any of the beams fills. Where the least alpha of a segment then is opaque_alpha or more, it is closed.
+// 1984), in the open segments that any of the beams fills. A segment closes when its least alpha reaches opaque_alpha.
 struct RowWork {
   std::int32_t taps = 0;
   const float* weights = nullptr;

@@ -1,4 +1,4 @@
-// VoxelRecord: what is kept of an occupied voxel from frame to frame.
+// VoxelRecord: data of an occupied voxel that is kept between frames.
 #pragma once
 
 #include <cstdint>
@@ -10,6 +10,6 @@ struct VoxelRecord {
   std::uint16_t normal;  // normal_code.h
 };
 
-inline constexpr std::int32_t kOctet = 8;  // voxels of a beam, from a global multiple of 8 on: what is shaded or skipped as a whole
+inline constexpr std::int32_t kOctet = 8;  // voxels of a beam, from a global multiple of 8 on: the unit of shading and skipping
 
 }  // namespace slabstream

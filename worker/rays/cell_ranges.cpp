@@ -26,7 +26,7 @@ class ColumnRanges {
         low[x] = std::min(low[x], row[x]);
         high[x] = std::max(high[x], row[x]);
       } else {
-        // Infinite samples and NaN are none.
+        // Skips infinite samples and NaN.
         const bool finite = row[x] >= std::numeric_limits<T>::lowest() && row[x] <= std::numeric_limits<T>::max();
         low[x] = finite && row[x] < low[x] ? row[x] : low[x];
         high[x] = finite && row[x] > high[x] ? row[x] : high[x];
@@ -45,7 +45,8 @@ class ColumnRanges {
 }  // namespace
 
 CellRanges FindCellRanges(const PaddedVoxels& voxels) {
-  // Floors of positions run from box.begin - 1 to box.end - 1, and voxels from the one to box.end: relative to the first, 0 ... size + 1.
+  // Floors of positions run from box.begin - 1 to box.end - 1, and the voxels read from there to box.end: relative to the first, 0 ... size
+  // + 1.
   const Index3 size = voxels.box.size();
   CellRanges cells;
   for (int axis = 0; axis < 3; ++axis) cells.grid.counts[axis] = (size[axis] + 1 + kCellSide - 1) / kCellSide;

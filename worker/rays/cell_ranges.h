@@ -1,7 +1,7 @@
-// CellRanges: least and greatest sample of small cells, so that rays leap over what shows nothing.
+// CellRanges: least and greatest sample of small cells, so that rays leap over cells that show nothing.
 //
-// A cell holds the sample positions p whose floor lies in a cube of kCellSide voxels, counted from box.begin - 1 on. Trilinear
-// interpolation also reads the voxels one further, so the range of a cell is that of kCellSide + 1 voxels a side.
+// A cell holds the sample positions p whose floor lies in a cube of kCellSide voxels, counted from box.begin - 1. Trilinear interpolation
+// also reads the next voxel, so a cell's range is that of kCellSide + 1 voxels a side.
 #pragma once
 
 #include <cstdint>

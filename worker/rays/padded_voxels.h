@@ -1,5 +1,5 @@
 // PaddedVoxels: the samples of a box and of kPad voxels around it, in one array, x fastest. Beyond the volume's border the nearest voxel's
-// sample is repeated. So a kernel reads all neighbours of a sample of the box without asking where the volume ends.
+// sample is repeated, so a kernel reads all neighbours of a sample without testing where the volume ends.
 #pragma once
 
 #include <cstddef>
@@ -25,7 +25,7 @@ struct PaddedVoxels {
   }
 };
 
-// `box` is not empty and lies in `voxels`, as do the voxels of the volume within kPad of it. Parallel.
+// `box` is not empty. It lies in `voxels`, and so do the volume's voxels within kPad of it. Parallel.
 PaddedVoxels Pad(const VoxelBricks& voxels, const Box& box);
 
 }  // namespace slabstream

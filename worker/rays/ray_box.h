@@ -1,4 +1,4 @@
-// RayBox: what ray kernels need to know of one box. Neither copies nor owns.
+// RayBox: one box for the ray kernels. Neither copies nor owns.
 #pragma once
 
 #include "worker/rays/cell_ranges.h"
@@ -14,14 +14,14 @@ struct RayBox {
   std::int32_t row = 0, slice = 0;     // samples from voxel to voxel along y and z
   Index3 cells;                        // CellGrid::counts
   Float3 low{}, high{};                // the box owns the positions p with low <= p < high on every axis
-  RayReach reach;                      // of those that may matter
+  RayReach reach;                      // of the positions that may matter
   bool at_border = false;              // the box touches the volume's border
 };
 
 // The largest array of padded samples that kernels can address, in bytes.
 inline constexpr std::size_t kMostRayBytes = (std::size_t{1} << 31) - 1;
 
-// `box` lies in that of the voxels. `sampled`: samples of the box outside these positions need not be visited.
+// `box` lies in the box of the voxels. Samples of the box outside `sampled` need not be visited.
 struct SampledRegion {
   Vec3 low, high;
 };

@@ -1,5 +1,6 @@
-// Packets of neighbouring rays, one to a lane: which samples a box owns, where they lie, and what is interpolated there. Included once for
-// each instruction set, hence the unusual guard. Additions and multiplications are never fused: every instruction set gives the same bits.
+// Packets of neighbouring rays, one to a lane: the samples that a box owns, their positions, and interpolation there. Included once for
+// each instruction set, hence the unusual include guard. Additions and multiplications are never fused: every instruction set gives the
+// same bits.
 #include <hwy/highway.h>
 
 #include <algorithm>
@@ -71,8 +72,8 @@ HWY_INLINE RayPacket PacketAt(const ViewRays& view, std::int32_t x, std::int32_t
   return packet;
 }
 
-// Calls render(packet, rgba) for the packets of a tile of pixels; rgba is room for four floats a lane. Where it returns true, they are
-// copied to the tile's pixels, of which the first is at `to`.
+// Calls render(packet, rgba) for the packets of a tile of pixels; rgba is room for four floats a lane. If it returns true, they are copied
+// to the tile's pixels, the first of which is at `to`.
 template <class Render>
 HWY_INLINE void ForEachPacket(const ViewRays& view, const PixelBounds& tile, float* HWY_RESTRICT to, std::size_t floats_a_row,
                               Render&& render) {
@@ -125,8 +126,7 @@ HWY_INLINE SampleInterval SamplesInside(const RayPacket& packet, const Float3& l
   };
   const auto first = Set(float(begin));
   const auto count = std::uint32_t(end - begin);
-  // Length of the longest beginning of [first, first + count) that fulfils the condition; it holds for no sample after one for which it
-  // does not.
+  // Number of leading elements of [first, first + count) that fulfil the condition. After the first that does not, none does.
   Floats lead = hn::Zero(df), held = hn::Zero(df);
   for (std::uint32_t bit = std::bit_floor(count); bit != 0; bit /= 2) {
     const auto extend = [&](Floats& length, auto&& condition) HWY_ATTR {
@@ -141,12 +141,12 @@ HWY_INLINE SampleInterval SamplesInside(const RayPacket& packet, const Float3& l
   return {hn::Add(first, lead), hn::IfThenElse(packet.valid, hn::Add(first, held), hn::Zero(df))};
 }
 
-// The samples that the box owns, as far as they may matter.
+// The samples that the box owns and that may matter.
 HWY_INLINE SampleInterval OwnedSamples(const RayPacket& packet, const RayBox& box) {
   return SamplesInside(packet, box.low, box.high, box.reach.begin, box.reach.end);
 }
 
-// Where sample k of each ray lies in the box. For rays whose sample the box owns; the others' indices may be anything.
+// The position of sample k of each ray in the box. If the box does not own a ray's sample, the ray's indices are arbitrary.
 struct SamplePlace {
   Floats position[3];
   Floats fraction[3];  // position - floor
@@ -172,7 +172,7 @@ HWY_INLINE Ints CellOf(const SamplePlace& place, const Index3& cells, Mask owned
   return hn::IfThenElseZero(hn::RebindMask(IntTag(), owned), index);
 }
 
-// What rays leap with: 1 / move by axis, and the steps that a safety margin takes.
+// Constants for leaps: 1 / move by axis, and the steps of a safety margin.
 struct LeapScales {
   Floats inverse[3], margin[3];
 };
@@ -188,7 +188,7 @@ HWY_INLINE LeapScales LeapScalesOf(const RayPacket& packet) {
   return scales;
 }
 
-// Steps after which a ray may leave the cells that are less than `cells` away from its own; at least 1. All samples before lie within them.
+// Steps after which a ray may leave the cells less than `cells` away from its own; at least 1. All earlier samples lie within them.
 template <int kShift>
 HWY_INLINE Floats StepsWithin(const RayBox& box, const LeapScales& scales, const SamplePlace& place, Floats cells) {
   const FloatTag df;
@@ -231,7 +231,7 @@ HWY_INLINE InnerPair LoadInner(const float* samples, Ints at) {
   return {hn::GatherIndex(df, samples + 1, at), hn::GatherIndex(df, samples + 2, at), at};
 }
 
-// What the outer two are further: b - first and last - a, twice the slope at a and at b.
+// Differences to the outer two: b - first and last - a, twice the slope at a and at b.
 struct OuterSlopes {
   Floats at_a, at_b;
 };
@@ -263,7 +263,7 @@ struct Neighbours {
   Ints at;          // the first of the four voxels along x, one row and one slice before the sample's floor
   InnerPair inner[2][2];
 
-  // Row y, z of 0 ... 3, of which 1 and 2 are around the sample.
+  // Row y, z of 0 ... 3. Rows 1 and 2 are around the sample.
   HWY_INLINE Ints RowAt(int y, int z) const {
     auto index = at;
     for (int i = 0; i < y; ++i) index = hn::Add(index, row);

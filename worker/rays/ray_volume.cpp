@@ -44,7 +44,7 @@ std::vector<std::size_t> NearestFirst(std::span<const RayPiece> pieces, const Ca
     if (camera.view_direction.z < 0) std::ranges::reverse(order);
     return order;
   }
-  // A ray meets pieces on one side of the eye only, so how those on both sides are mixed does not matter.
+  // A ray meets only pieces on one side of the eye, so the order between pieces on different sides does not matter.
   const auto distance = [&](std::size_t piece) {
     const Box& box = pieces[piece].voxels.box;
     return std::abs(std::clamp(camera.eye.z, box.begin.z - 0.5, box.end.z - 0.5) - camera.eye.z);

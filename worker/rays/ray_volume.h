@@ -1,4 +1,4 @@
-// RayVolume: the voxels of a slab as ray kernels read them. Image-order renderers share it; it stays with the slab between frames.
+// RayVolume: the voxels of a slab as ray kernels read them. Image-order renderers share it, and it stays with the slab between frames.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@
 
 namespace slabstream {
 
-// Kernels address so many bytes. A larger slab is cut into pieces along z, which are rendered like boxes of a partition.
+// Kernels can address only so many bytes. A larger slab is cut into pieces along z, which are rendered like boxes of a partition.
 struct RayPiece {
   PaddedVoxels voxels;
   CellRanges cells;
@@ -28,10 +28,10 @@ class RayVolume : public SlabCache {
   std::vector<RayPiece> pieces_;  // lowest z first
 };
 
-// `box` in layers along z, whose padded samples take at most `most_bytes`, but at least one slice each.
+// Cuts `box` into layers along z. The padded samples of each take at most `most_bytes`, but each has at least one slice.
 std::vector<Box> CutIntoLayers(const Box& box, ScalarType type, std::size_t most_bytes);
 
-// Numbers of the pieces in visibility order, nearest first.
+// Indices of the pieces in visibility order, nearest first.
 std::vector<std::size_t> NearestFirst(std::span<const RayPiece> pieces, const Camera& camera);
 
 }  // namespace slabstream

@@ -19,7 +19,7 @@ ViewRays MakeViewRays(const Camera& camera, const VolumeGeometry& geometry, doub
 
   ViewRays rays;
   rays.perspective = camera.projection == Projection::kPerspective;
-  // Whole and half numbers: a pixel's place relative to the centre is exact in single precision.
+  // Whole and half numbers: a pixel's position relative to the centre is exact in single precision.
   rays.centre_x = float(0.5 * camera.width - 0.5);
   rays.centre_y = float(0.5 * camera.height - 0.5);
   const double x = 0.5 * camera.width, y = 0.5 * camera.height;
@@ -44,7 +44,7 @@ PixelRay RayOf(const ViewRays& rays, std::int32_t x, std::int32_t y) {
   const float from_x = float(x) - rays.centre_x, from_y = float(y) - rays.centre_y;
   PixelRay ray{};
   // Perspective: the unit vector along the ray is (forward + offset) / length. The first sample is written relative to that of the central
-  // ray, so that nothing cancels where the eye is far away: 1 / length - 1 = -square / (length (1 + length)).
+  // ray, so that nothing cancels if the eye is far away: 1 / length - 1 = -square / (length (1 + length)).
   const float square = (from_x * from_x + from_y * from_y) * rays.pixel_squared;
   const float length = std::sqrt(1 + square);
   const float lag = square / (1 + length), scale = rays.step / length, shift = rays.start_distance / length;
@@ -81,7 +81,7 @@ RayReach ReachOfBox(const ViewRays& rays, const Camera& camera, const Vec3& low,
     farthest = std::max(farthest, rays.perspective ? Length((p - camera.eye) * camera.spacing) : at.depth);
   }
   const auto sample = [&](double distance) { return std::int32_t((distance - double(rays.start_distance)) / double(rays.step)); };
-  // A pixel counts if its centre lies within.
+  // A pixel counts if its centre is inside.
   const auto first_pixel = [](double x, std::int32_t count) {
     return std::int32_t(std::clamp(std::ceil(x - 0.5 - kPixelSlack), 0.0, double(count)));
   };

@@ -1,4 +1,4 @@
-// BinLookup<T>: from a stored sample to its bin of the classification table, for the bins that were selected (visible ones, opaque ones).
+// BinLookup<T>: finds the bin of a stored sample in the classification table, for selected bins (visible or opaque ones).
 #pragma once
 
 #include <bit>
@@ -17,7 +17,7 @@ namespace slabstream {
 inline constexpr std::uint16_t kNotSelected = 0xFFFF;  // kMaxBins is far below
 static_assert(kMaxBins < kNotSelected);
 
-// What decides which bin a sample has and whether the bin counts. Equal selections select the same voxels with the same bins.
+// Determines each sample's bin and whether the bin counts. Equal selections select the same voxels with the same bins.
 struct BinSelection {
   double scale = 1, origin = 0;        // of ClassificationTable
   std::vector<std::uint8_t> selected;  // by bin: 0 or 1
@@ -64,7 +64,7 @@ class BinLookup {
       if (selected[bin] == 0) continue;
       const std::size_t first = bin;
       while (bin + 1 < selected.size() && selected[bin + 1] != 0) ++bin;
-      // Where no sample falls into these bins, the first one of a bin further on.
+      // If no sample falls into these bins, this is the first sample of a later bin.
       const std::int64_t begin = FirstWithBin(int(first)), end = FirstWithBin(int(bin) + 1);
       if (begin < end) intervals.push_back({SampleAt(begin), SampleAt(end - 1)});
     }
@@ -77,8 +77,8 @@ class BinLookup {
   }
 
  private:
-  // Finite samples by their place in ascending order, [0, kSamples). Floats are ordered as the integers of their bits, negative ones
-  // backwards; -0 has the place of 0.
+  // Finite samples by their position in ascending order, [0, kSamples). Floats are ordered as the integers of their bits, negative ones
+  // backwards; -0 has the position of 0.
   static constexpr std::int64_t kFiniteFloats = 0x7F800000;  // without sign
   static constexpr std::int64_t kSamples = std::is_integral_v<T> ? std::int64_t{1} << (8 * sizeof(T)) : 2 * kFiniteFloats - 1;
   static T SampleAt(std::int64_t place) {
@@ -91,7 +91,7 @@ class BinLookup {
     }
   }
 
-  // Place of the least sample whose bin is at least `bin`; kSamples: there is none. Bins ascend with samples.
+  // Position of the least sample whose bin is at least `bin`; kSamples: there is none. Bins ascend with samples.
   std::int64_t FirstWithBin(int bin) const {
     std::int64_t low = 0, high = kSamples;
     while (low < high) {

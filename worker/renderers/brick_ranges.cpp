@@ -32,7 +32,7 @@ struct Extremes {
   }
 };
 
-// Reads what lies together in memory in one go: it vectorises.
+// Reads contiguous memory in one pass, which vectorises.
 template <class T>
 BrickRanges::Range RangeOf(const BrickView<T>& brick, const Box& box) {
   const Index3 size = box.size();

@@ -1,5 +1,5 @@
-// BrickRanges: least and greatest stored sample of each brick of a slab, so that a transfer function skips what it does not show without
-// reading voxels. Bricks are kBrick voxels a side, at global multiples of kBrick, cut off by the slab.
+// BrickRanges: least and greatest stored sample of each brick of a slab. With it, bricks that a transfer function does not show are skipped
+// without reading voxels. Bricks are kBrick voxels a side, at global multiples of kBrick, clipped to the slab.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// The pixel halves of all renderers. The list is that of the planning halves (common/renderers/CMakeLists.txt).
+// The pixel halves of all renderers. The list is the same as that of the planning halves (common/renderers/CMakeLists.txt).
 #include "common/base/check.h"
 #include "common/renderers/renderer_kind.h"
 #include "worker/renderers/renderer.h"

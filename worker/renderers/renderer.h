@@ -1,8 +1,8 @@
 // Renderer: the pixel half of a renderer. It turns the voxels of a box (with their halo) into the box's local image: the samples that the
 // box owns, for a frame's camera, transfer function and shading. The planning half is RendererKind (common/renderers/renderer_kind.h).
 //
-// Each sample belongs to exactly one box, and a box computes the same samples however the volume is divided (docs/rendering.md): where a
-// box begins or ends decides which samples it owns, and nothing else.
+// Each sample belongs to exactly one box, and a box computes the same samples however the volume is divided (docs/rendering.md): the
+// borders of a box decide only which samples it owns.
 #pragma once
 
 #include <atomic>
@@ -22,10 +22,10 @@ class Renderer {
  public:
   virtual ~Renderer() = default;
 
-  // Local image of `box`, whose voxels and halo (SlabBox) lie in `slab`, in setup.format. Pixels that `hidden` hides may be left empty.
-  // Adds stage times, spans and counts to `report`. If `cancelled` becomes true it stops soon and returns Cancelled. Called within the task
-  // arena of the worker's render threads: parallel algorithms of oneTBB use as many threads as the worker has. A stage's time is that of
-  // all threads together.
+  // Local image of `box` in setup.format. `slab` holds the voxels and halo (SlabBox) of the box. Pixels that `hidden` hides may be left
+  // empty. Adds stage times, spans and counts to `report`; a stage's time is the sum over all threads. If `cancelled` becomes true it stops
+  // soon and returns Cancelled. Called within the task arena of the worker's render threads: parallel algorithms of oneTBB use as many
+  // threads as the worker has.
   virtual Result<LocalImage> Render(SlabData& slab, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
                                     const std::atomic<bool>& cancelled, RankReport& report) = 0;
 };

@@ -17,7 +17,7 @@ const BrickRanges& SlabData::ranges() {
 }
 
 const ClassificationTable& SlabData::Classification(const FrameSetup& setup) {
-  // A slab's description never changes: it is that of its dataset.
+  // A slab's description never changes: it is its dataset's.
   auto key = std::pair(setup.transfer, setup.range);
   if (classified_ != key) {
     table_ = Classify(setup.transfer, setup.description, setup.range);

@@ -1,4 +1,4 @@
-// SlabData: the voxels of one slab with its halo, and what renderers made from them once. One thread at a time uses it.
+// SlabData: the voxels of one slab with its halo, and what renderers derived from them. One thread at a time uses it.
 #pragma once
 
 #include <concepts>
@@ -16,7 +16,7 @@
 
 namespace slabstream {
 
-// What one renderer keeps of a slab between frames. Each renderer has a class of its own.
+// Data that one renderer keeps of a slab between frames. Each renderer has its own class.
 class SlabCache {
  public:
   virtual ~SlabCache() = default;
@@ -30,7 +30,7 @@ class SlabData {
   SlabData(const SlabData&) = delete;
   SlabData& operator=(const SlabData&) = delete;
 
-  // All voxels as one block. The first call makes it if there are bricks only, which then go; from the next one on any thread may call.
+  // All voxels as one block. If there are only bricks, the first call turns them into a block; after that any thread may call.
   const VoxelBlock& voxels() const;
   VoxelBricks bricks() const { return bricks_ ? VoxelBricks(*bricks_) : VoxelBricks(block_); }
 
@@ -40,7 +40,7 @@ class SlabData {
   // The table of this frame's transfer function. Valid until the next call.
   const ClassificationTable& Classification(const FrameSetup& setup);
 
-  // The renderer's cache; made by the first call.
+  // The renderer's cache. The first call creates it.
   template <std::derived_from<SlabCache> Cache>
   Cache& CacheOf() {
     std::unique_ptr<SlabCache>& cache = caches_[typeid(Cache)];
@@ -48,16 +48,16 @@ class SlabData {
     return static_cast<Cache&>(*cache);
   }
 
-  // Memory of voxels and everything made from them.
+  // Memory of voxels and of everything derived from them.
   std::size_t bytes() const;
 
  private:
-  // The same samples, in one of two ways.
+  // The same samples, stored in one of two ways.
   mutable VoxelBlock block_;
   mutable std::optional<BrickedVoxels> bricks_;  // then block_ is empty
 
   std::optional<BrickRanges> ranges_;
-  std::optional<std::pair<TransferFunction, ValueRange>> classified_;  // what table_ was made from
+  std::optional<std::pair<TransferFunction, ValueRange>> classified_;  // table_ was made from these
   ClassificationTable table_;
   std::map<std::type_index, std::unique_ptr<SlabCache>> caches_;
 };

@@ -11,7 +11,7 @@
 namespace slabstream {
 namespace {
 
-// The paper's two.
+// The frame with one of the paper's two schemes.
 FrameCase With(FrameCase frame, const char* scheme) {
   frame.policy.combine = scheme;
   return frame;

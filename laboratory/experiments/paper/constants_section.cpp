@@ -15,8 +15,8 @@ constexpr double kNanoseconds = 1e9, kPaperOccupancy = 0.05;
 constexpr double kVoxels = double(printed::kSize) * printed::kSize * printed::kSize, kPixels = double(printed::kSize) * printed::kSize;
 const double kRounds = std::log2(30);
 
-// One constant of Eq. 21 or 25: what it is a unit of, what is printed, and what the printed times of table 5 or 6 give for N = 200, C = 5
-// %, I = N, p = 1 (combining: p = 30).
+// One constant of Eq. 21 or 25: its unit, the printed value, and the value that follows from the printed times of table 5 or 6 for N = 200,
+// C = 5 %, I = N, p = 1 (combining: p = 30).
 struct Term {
   std::string symbol, unit;
   double printed = 0, from_times = 0;
@@ -118,8 +118,8 @@ Table TableOf(const std::string& name, const std::string& title, const std::vect
   return table;
 }
 
-// The model of our own stages (laboratory/measure/cost_model.h), fitted to every slab of every N and p. Stages that took no time anywhere,
-// as in very small runs, are left out.
+// The model of our own stages (laboratory/measure/cost_model.h), fitted to every slab of every N and p. Stages that never took any time, as
+// in very small runs, are left out.
 struct Fit {
   Table table;
   std::string errors;  // "shade 4 %, splat 12 %"

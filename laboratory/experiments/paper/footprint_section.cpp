@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::array<int, 6> kWidths = {3, 5, 9, 13, 17, 25};  // k
 constexpr int kRuns = 3, kFigureWorkers = 10;
-constexpr int kWide = 9;  // k from which a voxel's footprint costs more than all else that is done for it
+constexpr int kWide = 9;  // k from which a voxel's footprint costs more than all its other work
 // Class II reaches 52 % of the cube at most.
 constexpr std::array<double, 6> kOccupancies = {0.05, 0.1, 0.2, 0.3, 0.4, 0.5};
 
@@ -45,11 +45,11 @@ FrameCase OccupancyFrame(const PaperSetup& setup, double occupancy) {
   return frame;
 }
 
-// The paper's splatting stage turns voxels into pixels of sheets; ours does that and finds where they are.
+// The paper's splatting stage turns voxels into pixels of sheets; ours also finds where these pixels are.
 double SplatSeconds(const MeasuredFrame::Cost& box) {
   return box.stage_seconds[std::size_t(Stage::kTransform)] + box.stage_seconds[std::size_t(Stage::kSplat)];
 }
-// Milliseconds of the slab that takes longest.
+// Milliseconds of the slowest slab.
 Result<Estimate> SlowestSplat(const PaperSetup& setup, const FrameCase& frame) {
   const Result<std::vector<MeasuredFrame>> repeats = RecallRepeats(setup.context(), frame);
   if (!repeats.ok()) return repeats.status();
@@ -62,7 +62,7 @@ Result<Estimate> SlowestSplat(const PaperSetup& setup, const FrameCase& frame) {
 }
 LinePoint PointOf(double x, const Estimate& y) { return {x, y.median, y.low, y.high}; }
 
-// Of log y on log x, by least squares, over wide footprints.
+// Exponent of y as a power of x: least squares of log y on log x, over wide footprints.
 double Exponent(std::vector<LinePoint> points) {
   std::erase_if(points, [](const LinePoint& point) { return point.x < kWide; });
   double sx = 0, sy = 0, sxx = 0, sxy = 0;

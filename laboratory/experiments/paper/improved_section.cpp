@@ -17,7 +17,7 @@ namespace slabstream {
 namespace {
 
 constexpr std::array<const char*, 2> kLinks = {"pvs", "10gbit"};
-constexpr std::array<int, 4> kTeamSizes = {1, 2, 5, 10};  // beside all workers
+constexpr std::array<int, 4> kTeamSizes = {1, 2, 5, 10};  // in addition to all workers
 
 std::vector<int> Sizes(const PaperSetup& setup) {
   const std::set<int> sizes = {setup.table_size(), setup.large_size()};
@@ -35,30 +35,30 @@ FrameCase With(FrameCase frame, const Policy& policy) {
   return frame;
 }
 
-// The paper's machine and what it counts, or a cluster of today with everything.
+// The paper's machine with the costs that it counts, or a cluster of today with all costs.
 Result<MachineModel> MachineOf(const PaperSetup& setup, const RendererKind* renderer, std::string_view link) {
   if (link == "pvs") return setup.Machine(renderer);
   return Cluster(setup.context(), Link(link));
 }
 
-// Seconds of one frame of which nobody asks for the next before it is there.
+// Seconds of one frame if nobody asks for the next before it is there.
 Result<double> AloneSeconds(const MeasuredFrame& frame, const MachineModel& machine) {
   const Result<Timeline> timeline = Simulate(frame, machine);
   if (!timeline.ok()) return timeline.status();
   return timeline->frames.front().latency();
 }
 
-// One way to have p workers make frames, and what comes of it.
+// One way to render frames with p workers, and its result.
 struct Outcome {
   std::string policy;
   int team = 1;        // workers that share a frame
   double seconds = 0;  // from picture to picture
   double alone = 0;    // of one frame
-  double render = 0;   // of all its boxes
-  double most = 0;     // of the worker that has most of it
+  double render = 0;   // sum over its boxes
+  double most = 0;     // of the worker with the most
 };
 
-// What is tried with dynamic balance, too: it takes a frame after the other to measure.
+// The partitions to try with dynamic balance, too: measuring it takes one frame after the other.
 std::vector<NamedPolicy> BalancedPartitions(int workers) {
   if (workers == 1) return {};
   std::vector<NamedPolicy> partitions = PartitionsAlongTheView();
@@ -82,7 +82,7 @@ class Improved {
     return Improved(setup, renderer, size, link, *std::move(machine));
   }
 
-  // Of all ways to divide, and the schemes that suit a link, with `team` of `workers` on a frame.
+  // The best of all partitions and the schemes that suit a link, with `team` of `workers` on a frame.
   Result<Outcome> FindBest(int workers, int team) const {
     Outcome best;
     for (const NamedPolicy& named : Partitions()) {
@@ -95,7 +95,7 @@ class Improved {
       const FrameCase frame = With(setup_.Frame(renderer_, size_, team), named.policy);
       const Result<std::vector<MeasuredFrame>> measured = RecallBalanced(setup_.context(), frame);
       if (!measured.ok()) return measured.status();
-      // The middle one of its repeats, so that the luckiest does not count.
+      // The median repeat, so that the luckiest does not count.
       std::vector<Outcome> outcomes(measured->size());
       for (std::size_t i = 0; i < outcomes.size(); ++i) {
         const std::string name = fmt::format("{}, dynamic", named.name);
@@ -108,7 +108,7 @@ class Improved {
     return best;
   }
 
-  // Equal slabs, one frame after the other, as the paper measured.
+  // Equal slabs, one frame after the other, as measured in the paper.
   Result<double> PlainSeconds(int workers) const {
     Result<MeasuredFrame> measured = Recall(setup_.context(), setup_.Frame(renderer_, size_, workers));
     if (!measured.ok()) return measured.status();
@@ -153,7 +153,7 @@ class Improved {
   MachineModel machine_;
 };
 
-// Workers that may share a frame where there are p, the smallest team first.
+// Sizes of teams for p workers, the smallest first.
 std::vector<int> TeamSizes(int workers) {
   std::vector<int> sizes;
   for (const int team : kTeamSizes) {
@@ -280,7 +280,7 @@ Result<Section> ImprovedSection(const PaperSetup& setup) {
   }
   section.blocks.emplace_back(std::move(table));
 
-  // What it looks like, a few frames of it.
+  // The timeline of a few frames.
   const int p = Workers(setup)[std::min<std::size_t>(1, Workers(setup).size() - 1)];
   const FrameCase shown = setup.Frame(Splatting(), setup.large_size(), p);
   const Result<MeasuredFrame> slabs = Recall(setup.context(), shown);

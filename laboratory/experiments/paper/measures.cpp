@@ -16,13 +16,13 @@ Result<PaperFrame> CountAsPaper(const PaperSetup& setup, const FrameCase& frame,
   measured->finish_seconds = measured->receive_seconds = 0;
   if (images == Images::kWhole) FillImages(*measured);
   PaperFrame counted;
-  for (const MeasuredFrame::Cost& box : measured->boxes) {  // a worker has one
+  for (const MeasuredFrame::Cost& box : measured->boxes) {  // one for each worker
     if (box.seconds <= counted.render_seconds) continue;
     counted.render_seconds = box.seconds;
     counted.stage_seconds = {};
     double sum = 0;
     for (const Stage stage : kStages) sum += box.stage_seconds[std::size_t(stage)];
-    // What lies between the stages is shared out among them.
+    // The time between the stages is shared out among them.
     for (const Stage stage : kStages) {
       counted.stage_seconds[std::size_t(stage)] = sum > 0 ? box.stage_seconds[std::size_t(stage)] * box.seconds / sum : 0;
     }

@@ -1,4 +1,4 @@
-// What the paper counts of a frame.
+// The paper's measures of a frame.
 #pragma once
 
 #include <array>
@@ -8,13 +8,13 @@
 
 namespace slabstream {
 
-// Until the combined image lies at one worker, on `machine` (PaperSetup::Machine): without the making of a picture and its way to a client.
-// Images are whole ones, as the paper sent them, or with their empty pixels left out, as Slabstream sends them.
+// Times until one worker holds the combined image, on `machine` (PaperSetup::Machine): without making a picture and sending it to a client.
+// Images are sent whole, as in the paper, or without their empty pixels, as in Slabstream.
 enum class Images { kWhole, kWithoutEmpty };
 struct PaperFrame {
   double seconds = 0;
   Origin origin = Origin::kMeasured;                // one worker combines nothing: its time is that of its slab
-  double render_seconds = 0;                        // of the worker that renders longest
+  double render_seconds = 0;                        // of the worker with the longest render time
   double combine_seconds = 0;                       // the rest
   std::array<double, kStageCount> stage_seconds{};  // of that worker; they sum to render_seconds
 };

@@ -14,7 +14,7 @@
 namespace slabstream {
 namespace {
 
-// One pipeline: how its tables and figures are called, its stages, and what the paper prints.
+// One pipeline: names of its tables and figures, its stages, and the paper's numbers.
 struct Pipeline {
   const RendererKind* renderer;
   const char* title;
@@ -123,7 +123,7 @@ Result<Section> PipelineSection(const PaperSetup& setup, const RendererKind* ren
               {}};
   BarChart bars{fmt::format("Where a frame's time goes, N = {}", tabled.size),
                 "workers p",
-                // Shares that are printed in whole per cent may sum to 101.
+                // Shares printed in whole per cent may sum to 101.
                 {.label = "share of the frame's time", .unit = "%", .tight = true},
                 {},
                 {}};

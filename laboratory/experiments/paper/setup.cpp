@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kValidationTurns = 7;
 constexpr double kOccupancy = 0.05;  // of class I
-// Oblique, so that no slab hides behind another one and slices are seen neither edge-on nor straight on.
+// Oblique, so that no slab hides behind another, and slices are seen neither edge-on nor face-on.
 constexpr double kAzimuth = 30, kElevation = 20;
 
 }  // namespace
@@ -42,7 +42,7 @@ FrameCase PaperSetup::Frame(const RendererKind* renderer, int size, int workers)
   frame.size = {size, size};
   frame.view.azimuth_degrees = kAzimuth;
   frame.view.elevation_degrees = kElevation;
-  frame.view.zoom = std::numbers::sqrt3;  // at 1 it is the cube's diagonal that fills the picture
+  frame.view.zoom = std::numbers::sqrt3;  // at 1 the cube's diagonal fills the picture
   frame.policy.groups = 1;
   frame.workers = workers;
   return frame;

@@ -1,4 +1,4 @@
-// What the sections of `experiment paper` share: which sizes and workers, which frames.
+// The sizes, workers and frames that the sections of `experiment paper` share.
 #pragma once
 
 #include <vector>
@@ -15,16 +15,16 @@ class PaperSetup {
   ExperimentContext& context() const { return context_; }
   const std::vector<int>& sizes() const { return sizes_; }      // N; the paper's, scaled
   const std::vector<int>& workers() const { return workers_; }  // p
-  std::vector<int> MeasuredWorkers() const;                     // those that this machine has cores for, of 1 and 2
+  std::vector<int> MeasuredWorkers() const;                     // 1 and 2, if this machine has the cores
   int table_size() const { return Scaled(200); }                // N of the paper's tables
   int large_size() const { return sizes_.back(); }              // N of its figures 8b and 8c
   int Scaled(int side) const { return context_.Scaled(side); }
 
   // Class I with 5 % of its voxels occupied, equal slabs, one group, on sqrt(3) N x sqrt(3) N pixels: a pixel a voxel, and the whole cube
-  // in view whichever way it is turned.
+  // is in view however it is turned.
   FrameCase Frame(const RendererKind* renderer, int size, int workers) const;
 
-  // PaperMachine, by what a frame of the tables' N takes here.
+  // PaperMachine for the time of a frame of the tables' N on this machine.
   Result<MachineModel> Machine(const RendererKind* renderer) const;
 
   // All of (renderer, size, workers).
@@ -35,7 +35,7 @@ class PaperSetup {
   std::vector<int> sizes_, workers_;
 };
 
-// Sections: what they need measured, and what they say about it.
+// Sections: the measurements that they need, and their texts.
 std::vector<Trial> TransformTrials(const PaperSetup& setup);
 Result<Section> TransformSection(const PaperSetup& setup);
 std::vector<Trial> FootprintTrials(const PaperSetup& setup);

@@ -24,7 +24,7 @@ struct Loop {
 constexpr Loop kProduct = {"product", StoreProductScalar}, kProductVector = {"product in vectors", StoreProductVector},
                kIncrements = {"increments in vectors", StoreIncrementsVector};
 
-// The slab of the worker that has most slices.
+// The slab of the worker with the most slices.
 Index3 SlabOf(int size, int workers) { return {size, size, (size + workers - 1) / workers}; }
 
 Json Key(int size, int workers, std::string_view loop) {
@@ -35,7 +35,7 @@ Trial Measure(int size, int workers, const Loop& loop) {
   const auto run = [=]() -> Result<Json> {
     const Index3 slab = SlabOf(size, workers);
     TransformedPoints points(slab);
-    loop.store(kMatrix, slab, points);  // brings the memory in
+    loop.store(kMatrix, slab, points);  // allocates the memory
     double fastest = std::numeric_limits<double>::infinity();
     for (int i = 0; i < kRuns; ++i) fastest = std::min(fastest, SecondsOf([&] { loop.store(kMatrix, slab, points); }));
     return Json{{"seconds", fastest}};
@@ -43,7 +43,7 @@ Trial Measure(int size, int workers, const Loop& loop) {
   return {Key(size, workers, loop.name), run, 0.02 + double(size) * size * size / workers * 2e-8};
 }
 
-// Of N in time = c N^power, through two sizes.
+// The power of N in time = c N^power, through two sizes.
 double PowerOf(double small, double small_seconds, double large, double large_seconds) {
   return std::log(large_seconds / small_seconds) / std::log(large / small);
 }

@@ -13,7 +13,7 @@ namespace slabstream {
 
 namespace {
 
-// Frames that take less are mostly hand-overs between threads, which sleep and are woken.
+// Shorter frames consist mostly of hand-overs between threads that sleep and are woken.
 constexpr double kLongMilliseconds = 5;
 constexpr double kGood = 10;  // per cent
 
@@ -23,7 +23,7 @@ std::string Sentence(const std::string& which, const std::vector<double>& errors
                      *std::ranges::max_element(errors), errors.size());
 }
 
-// What the errors of long frames allow.
+// The conclusion from the errors of long frames.
 std::string Conclusion(const std::vector<double>& errors) {
   if (errors.empty()) {
     return fmt::format("No frame took {:.0f} ms: this run cannot tell how far to trust times of long frames.", kLongMilliseconds);

@@ -13,7 +13,7 @@
 namespace slabstream::mip {
 namespace {
 
-// Bounds of what the cells of a slab hold, by piece.
+// Bounds of a slab's cells, by piece.
 class BoundsCache : public SlabCache {
  public:
   const std::vector<SampleBounds>& Of(const std::vector<RayPiece>& pieces, float sign) {
@@ -43,7 +43,7 @@ class MipRenderer : public Renderer {
     StageClock clock(report);
     const ProjectionMode mode = ModeOf(setup);
     ProjectWork work;
-    // Data values that fall as stored samples rise have their largest where the samples have their least.
+    // If data values fall as stored samples rise, the largest value belongs to the least sample.
     const ValueMapping& mapping = setup.description.mapping;
     const bool largest = (mode == ProjectionMode::kMaximum) == (mapping.scale >= 0);
     work.sign = largest ? 1.0F : -1.0F;

@@ -14,7 +14,7 @@ HWY_BEFORE_NAMESPACE();
 namespace slabstream {
 namespace HWY_NAMESPACE {
 
-// Interpolated samples, kept within the range of their voxels. Lanes that are not in `valid` hold anything.
+// Interpolated samples, clamped to the range of their voxels. Lanes not in `valid` are arbitrary.
 struct Samples {
   Floats values;
   Mask valid;
@@ -39,7 +39,7 @@ HWY_INLINE Floats ValueOf(const ProjectWork& work, Floats samples) {
   return hn::Abs(hn::Min(hn::Max(value, hn::Zero(FloatTag())), Set(1)));  // without a sign of 0
 }
 
-// Whether any of a packet's rays has a sample in the box; `pixels` then holds them all.
+// Returns whether any of a packet's rays has a sample in the box; `pixels` then holds them all.
 template <class T>
 HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet, float* HWY_RESTRICT pixels) {
   const FloatTag df;
@@ -49,7 +49,7 @@ HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet
   const auto sign = Set(work.sign), most = Set(work.bounds->most);
   const Index3& cells = box.cells;
   const Index3& blocks = work.bounds->block_counts;
-  // Each ray goes on by itself: its next sample is k. It ends behind the box, or once it has found the most that the box holds.
+  // Each ray advances separately: its next sample is k. It ends behind the box, or when it has found the box's extreme.
   auto k = owned.begin;
   auto alive = hn::Lt(k, owned.end);
   auto best = Set(std::numeric_limits<float>::lowest());
@@ -57,7 +57,7 @@ HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet
   bool rising = true;               // most of the last samples were larger than those before
   while (!hn::AllFalse(df, alive)) {
     const SamplePlace place = PlaceSample(packet, box, k);
-    // Rays leap over blocks and cells that cannot hold more than was found; the others go on to their next sample.
+    // Rays leap over blocks and cells whose bound does not exceed what was found; the others go on to their next sample.
     auto sampled = alive;
     auto steps = Set(1);
     if (!rising) {

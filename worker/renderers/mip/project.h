@@ -1,9 +1,9 @@
-// ProjectTile: the kernel of intensity projections. The samples of a box along a pixel's ray become one value: the largest, the least, or
-// their mean.
+// ProjectTile: the kernel of intensity projections. It reduces the samples of a box along a pixel's ray to one value: the largest, the
+// least, or their mean.
 //
-// Samples are interpolated trilinearly and kept within the range of their eight voxels, so that a cell's range bounds them exactly. Samples
-// that are not finite count as none. All results are the same bits on every instruction set, and combining the boxes of any partition gives
-// the bits of one box:
+// Samples are interpolated trilinearly and clamped to the range of their eight voxels, so that a cell's range bounds them exactly. Samples
+// that are not finite are skipped. Results have the same bits on every instruction set, and combining the boxes of any partition gives the
+// same bits as one box:
 //
 //   extreme  the extreme of `sign` * sample; then normalised, which is monotonic
 //   mean     sums of integers
@@ -32,19 +32,19 @@ SampleBounds BoundSamples(const CellRanges& cells, float sign);
 struct ProjectWork {
   const ViewRays* rays = nullptr;
   const RayBox* box = nullptr;
-  const SampleBounds* bounds = nullptr;  // for the same sign; of a mean: null
+  const SampleBounds* bounds = nullptr;  // for the same sign; null for a mean
   float sign = 1;                        // 1: the largest sample; -1: the least
   // Of a sample: value = clamp((sample - low) * scale, 0, 1).
   float low = 0, scale = 1;
-  bool complement = false;  // store 1 - value, of which the largest is that of the least value
+  bool complement = false;  // store 1 - value, which is largest for the least value
 };
 
-// Four floats a pixel of `tile`, the first one's at `pixels`. Pixels without a sample may be left as they are: they must be 0 before.
+// Four floats a pixel of `tile`; `pixels` points to the first pixel's. Pixels without a sample may stay unwritten: they must be 0 before.
 //   bounds given: (value of the extreme sample, or 1 - value, 0, 0, 1)
 //   null:         the sums over all samples of the bytes of floor(value * 2^24), at most 2^24 - 1, highest first, and their number
 void ProjectTile(const ProjectWork& work, const PixelBounds& tile, float* pixels, std::size_t floats_a_row);
 
-// The definition: one ray and one sample after the other. The same bits.
+// The definition: one ray and one sample after the other. Gives the same bits.
 void ProjectTileReference(const ProjectWork& work, const PixelBounds& tile, float* pixels, std::size_t floats_a_row);
 
 }  // namespace slabstream

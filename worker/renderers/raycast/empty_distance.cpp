@@ -5,13 +5,13 @@
 namespace slabstream {
 namespace {
 
-// Two sweeps over all cells, in order and backwards, of a distance transform with the 26 neighbours at distance 1: exact for this distance
+// A distance transform in two sweeps over all cells, forwards and backwards, with the 26 neighbours at distance 1: exact for this distance
 // (Borgefors 1986).
 class Sweep {
  public:
   Sweep(const Index3& counts, std::uint8_t* distance) : counts_(counts), distance_(distance), nearest_(std::size_t(counts.x) + 2) {}
 
-  // The row's cells by those of the rows that the sweep has visited before: `towards` is -1 or 1 along y and z.
+  // Updates the row's cells from the rows that the sweep has already visited: `towards` is -1 or 1 along y and z.
   void Visit(std::int32_t y, std::int32_t z, std::int32_t towards) {
     const auto width = std::size_t(counts_.x);
     std::fill(nearest_.begin(), nearest_.end(), std::uint8_t{255});

@@ -1,5 +1,5 @@
-// EmptyDistance: for each cell the Chebyshev distance, in cells, to the nearest one that shows anything; 0 in such a cell. A ray in a cell
-// of distance d may leap over everything less than d cells away (Zuiderveld et al. 1992 call such a map proximity clouds).
+// EmptyDistance: for each cell the Chebyshev distance, in cells, to the nearest visible cell; 0 in a visible cell. A ray in a cell of
+// distance d may leap over all cells less than d away (Zuiderveld et al. 1992 call such a map proximity clouds).
 #pragma once
 
 #include <cstdint>

@@ -15,7 +15,7 @@ HWY_BEFORE_NAMESPACE();
 namespace slabstream {
 namespace HWY_NAMESPACE {
 
-// Central differences, times two, of stored samples around a place, interpolated.
+// Central differences, times two, of stored samples around a position, interpolated.
 struct Gradient {
   Floats x, y, z;
 };
@@ -66,8 +66,8 @@ HWY_INLINE Light LightOf(const RayLook& look, const Gradient& g) {
           hn::IfThenElseZero(has_gradient, hn::Mul(shine, Set(look.specular)))};
 }
 
-// A sample stands for half a step of its ray on each side. For the first and the last sample in the volume that part reaches to where the
-// ray enters or leaves the volume, between 0 and 1 step away.
+// A sample stands for half a step of its ray on each side. For the first and the last sample in the volume that part reaches to the point
+// where the ray enters or leaves the volume, between 0 and 1 step away.
 struct EndSamples {
   Floats first, last;                // k
   Floats first_excess, last_excess;  // steps, [-0.5, 0.5]
@@ -98,7 +98,7 @@ HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& pac
   const SampleInterval owned = OwnedSamples(packet, box);
   const LeapScales leaps = LeapScalesOf(packet);
   const auto zero = hn::Zero(df), one = Set(1);
-  // A ray that transmits less ends.
+  // A ray ends when it transmits less.
   const auto opaque = Set(1 - work.termination);
   const float* const entries = look.entries.data();
 
@@ -107,7 +107,7 @@ HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& pac
   if (at_border) ends = EndSamplesOf(*work.rays, packet, leaps);
 
   Floats red = zero, green = zero, blue = zero, alpha = zero;
-  // Each ray goes on by itself: its next sample is k.
+  // Each ray advances separately: its next sample is k.
   auto k = owned.begin;
   auto alive = hn::Lt(k, owned.end);
   bool in_matter = false;  // most of the last samples were visible

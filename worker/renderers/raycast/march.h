@@ -23,8 +23,8 @@ struct MarchWork {
   float termination = 0;                         // a ray ends where it transmits less; 0: never
 };
 
-// Premultiplied RGBA of the samples that the box owns on the rays of the pixels of `tile`, whose first pixel is at `rgba`. Pixels without a
-// visible sample may be left as they are: they must be 0 before. Returns how many samples were shaded.
+// Premultiplied RGBA of the samples that the box owns on the rays of the pixels of `tile`; `rgba` points to the first pixel. Pixels without
+// a visible sample may stay unwritten: they must be 0 before. Returns how many samples were shaded.
 std::uint64_t MarchTile(const MarchWork& work, const PixelBounds& tile, float* rgba, std::size_t floats_a_row);
 
 // The definition: one ray and one sample after the other, without leaps. Within 1e-5 of MarchTile where `termination` is 0.

@@ -58,7 +58,7 @@ class ReferenceMarch {
     return Lerp(w, Lerp(v, row(0, 0), row(1, 0)), Lerp(v, row(0, 1), row(1, 1)));
   }
 
-  // `steps`: that the sample stands for.
+  // `steps`: the length that the sample stands for.
   void Add(const Float3& p, double steps, std::array<float, 4>& sum) const {
     const float sample = Interpolated(p, {});
     if (!std::isfinite(sample)) return;

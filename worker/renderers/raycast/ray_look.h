@@ -1,4 +1,4 @@
-// RayLook: how the ray caster turns an interpolated sample into colour and opacity, as tables and constants. Made once a frame.
+// RayLook: tables and constants by which the ray caster turns an interpolated sample into colour and opacity. Made once a frame.
 #pragma once
 
 #include <vector>
@@ -13,8 +13,8 @@ namespace slabstream {
 
 struct RayLook {
   // Entry of a stored sample s: floor(clamp((s - origin) * scale + rounding, 0, last)). Four floats each: straight colour, and the opacity
-  // of one step along a ray. Rounding is 0.5, or a little less where bins hold several values: what single precision makes of a value that
-  // ClassificationTable::BinOf finds in an empty bin then never lies in a visible one above.
+  // of one step along a ray. Rounding is 0.5, or a little less if bins hold several values: then single precision never moves a value that
+  // ClassificationTable::BinOf puts into an empty bin into a visible bin above.
   float origin = 0, scale = 1, rounding = 0.5F, last = 0;
   AlignedVector<float> entries;
 
@@ -27,14 +27,14 @@ struct RayLook {
   Float3 inverse_spacing{}, viewer{};  // towards the viewer, divided like the lights
   std::vector<Light> lights;
   float ambient = 0, diffuse = 1, specular = 0, shininess = 1;
-  float diffuse_without_gradient = 1;  // no light decides: see Phong::WithoutGradient
+  float diffuse_without_gradient = 1;  // independent of light directions: see Phong::WithoutGradient
 };
 
 // `steps_per_voxel`: samples in a voxel length along a ray.
 //
-// Where each stored integer has a bin of its own, colour and opacity between two bins are interpolated linearly, at as many places as make
-// up to kMaxBins entries. A table with several values in a bin is used as it is. Either way a value between two samples is visible only if
-// a bin between theirs is visible, so a brick that is empty by the ClassificationTable is empty here.
+// If each stored integer has a bin of its own, colour and opacity between two bins are interpolated linearly, at as many places as fit into
+// kMaxBins entries. A table with several values in a bin is used as it is. Either way a value between two samples is visible only if a bin
+// between theirs is visible, so a brick that is empty by the ClassificationTable is empty here.
 RayLook MakeRayLook(const ClassificationTable& table, const VolumeDescription& description, const Camera& camera, const Shading& shading,
                     double steps_per_voxel);
 

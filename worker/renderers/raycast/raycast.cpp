@@ -1,9 +1,9 @@
 // The ray caster's pixel half (Levoy 1988 and 1990; as a part of a sort-last renderer, Ma et al. 1993). docs/rendering.md defines what it
 // computes.
 //
-//   1. once a slab: its voxels are padded (RayVolume), and so is the range of each small cell
-//   2. once a transfer function: for each cell, how far away the nearest visible one is (EmptyDistances)
-//   3. once a frame: tiles of pixels are tasks of their own; a tile's rays march through the box (March)
+//   1. once a slab: pad its voxels (RayVolume) and find the range of each small cell
+//   2. once a transfer function: for each cell, find the distance to the nearest visible one (EmptyDistances)
+//   3. once a frame: tiles of pixels are separate tasks; a tile's rays march through the box (March)
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -23,7 +23,7 @@ namespace {
 // Of one piece of a slab.
 struct Visibility {
   std::vector<std::uint8_t> distances;
-  SampledRegion region;  // of the positions in visible cells; nothing if low.x > high.x
+  SampledRegion region;  // positions in visible cells; empty if low.x > high.x
 };
 
 Visibility VisibilityOf(const RayPiece& piece, const VisibleSamples& visible) {
@@ -48,7 +48,7 @@ Visibility VisibilityOf(const RayPiece& piece, const VisibleSamples& visible) {
   return result;
 }
 
-// What is visible of a slab, while the transfer function makes the same samples visible.
+// The visible parts of a slab, kept until the transfer function makes other samples visible.
 class VisibilityCache : public SlabCache {
  public:
   // By piece.
@@ -73,7 +73,7 @@ class VisibilityCache : public SlabCache {
   std::vector<Visibility> pieces_;
 };
 
-// The share of a voxel's volume that a sample at the volume's centre stands for: a pixel's area times a step.
+// The share of a voxel's volume that a sample at the volume's centre represents: a pixel's area times a step.
 double VoxelsASample(const ViewRays& rays, const FrameSetup& setup) {
   const VolumeGeometry& geometry = setup.description.geometry;
   const double depth = rays.perspective ? setup.camera.Project(0.5 * (ToVec3(geometry.size) - Vec3{1, 1, 1})).depth : 1;

@@ -1,5 +1,5 @@
-// FindCellBeams: two passes over the bricks that may hold anything, a row of bricks along x as a task. The first one marks occupied voxels,
-// which says where each beam's records begin; the second one fills them in.
+// FindCellBeams: two passes over the bricks that may hold anything, with a row of bricks along x as a task. The first pass marks occupied
+// voxels, which determines where each beam's records begin; the second fills in the records.
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -93,7 +93,7 @@ class BeamFinder {
   std::uint32_t* MasksOf(std::size_t beam) const { return &beams_.masks[beam * std::size_t(beams_.cell_count)]; }
   std::size_t CellOf(std::int32_t x) const { return std::size_t(x / kCellVoxels - beams_.first_cell); }
 
-  // Masks of the row's beams, and for now the number of their records in first_record.
+  // Sets the masks of the row's beams, and, for now, the number of their records in first_record.
   void Mark(const Index3& first_brick) {
     const Box row = grid_.BoxOf(first_brick);
     const auto cell_count = std::size_t(beams_.cell_count);
@@ -140,7 +140,7 @@ class BeamFinder {
   void Fill(const Index3& first_brick) {
     const Box row = grid_.BoxOf(first_brick);
     const auto height = std::size_t(row.size().y);
-    std::array<std::array<std::uint64_t, kBrick>, kBrick> next;  // [z][y]: the record that comes next
+    std::array<std::array<std::uint64_t, kBrick>, kBrick> next;  // [z][y]: the next record
     for (std::int32_t z = row.begin.z; z < row.end.z; ++z) {
       std::copy_n(&beams_.first_record[BeamOf(row.begin.y, z)], height, next[std::size_t(z - row.begin.z)].begin());
     }
@@ -151,7 +151,7 @@ class BeamFinder {
       const std::int32_t shift = box.begin.x % kCellVoxels;
       const std::uint32_t width_bits = (std::uint32_t{1} << box.size().x) - 1;
       NormalScales scales = ScalesIn(box);
-      std::int32_t summed_end = grid_.box.begin.z;  // planes before this one are there, as far as they are needed again
+      std::int32_t summed_end = grid_.box.begin.z;  // earlier planes are already summed, if they are needed again
       for (std::int32_t z = box.begin.z; z < box.end.z; ++z) {
         RowMasks masks;
         std::uint32_t rows = 0;
@@ -192,7 +192,7 @@ class BeamFinder {
     return count;
   }
 
-  // A plane of the brick with one voxel more on each side.
+  // A plane of the brick with one more voxel on each side.
   void LoadPlane(const Box& box, const Index3& brick, std::int32_t z, NormalSamples<T>& samples) const {
     const Box& all = grid_.box;
     const bool has_left = box.begin.x > all.begin.x, has_right = box.end.x < all.end.x;
@@ -232,7 +232,7 @@ class BeamFinder {
   const BinLookup<T>& lookup_;
   const Vec3 spacing_;
   const std::vector<SampleInterval<T>> intervals_;
-  std::vector<std::uint8_t> shows_;  // by brick: 1 where a selected sample may be
+  std::vector<std::uint8_t> shows_;  // by brick: 1 if it may hold a selected sample
   CellBeams beams_;
 };
 

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::int32_t kCell = kCellVoxels;
 
-// What was found in some slices.
+// Occupied voxels found in some slices.
 struct Found {
   Index3 begin = {kFar, kFar, kFar}, end;
   std::uint64_t in_box = 0;
@@ -29,7 +29,7 @@ struct Found {
   }
 };
 
-// Bits of a cell that begins at `origin` for voxels [begin, end) of its beam.
+// Bits for voxels [begin, end) of a beam, in the cell that begins at `origin`.
 std::uint32_t BitsWithin(std::int32_t origin, std::int32_t begin, std::int32_t end) {
   const std::int32_t first = std::clamp(begin - origin, 0, kCell), last = std::clamp(end - origin, first, kCell);
   return std::uint32_t((std::uint64_t{1} << last) - (std::uint64_t{1} << first));

@@ -1,12 +1,12 @@
 // OccupiedCells: the occupied voxels of a slab in the order in which a traversal axis visits them: slice by slice, beam by beam, along each
 // beam.
 //
-// In-slice axes: u, along beams, is the lower of the two axes that are not the traversal axis, v the higher one. A cell is kCellVoxels =
-// 32 voxels of a beam from a global multiple of 32 on: a 32-bit mask of which are occupied. So a beam costs a bit a voxel and four bytes an
-// occupied voxel, dense and sparse data alike. Its records are found by counting bits from its first cell on.
+// In-slice axes: u, along beams, is the lower of the two axes that are not the traversal axis, v the higher one. A cell is kCellVoxels = 32
+// voxels of a beam from a global multiple of 32 on, stored as a 32-bit mask of the occupied ones. So a beam costs a bit per voxel and four
+// bytes per occupied voxel, for dense and sparse data alike. A voxel's record is found by counting bits from the beam's first cell on.
 //
-// Traversal along z and along y visits the same beams, those along x, in another order. So CellBeams are kept for two directions only:
-// along x, found in the voxels (FindCellBeams), and along y for traversal along x, made of those (TurnCellBeams).
+// Traversals along z and along y visit the same beams, those along x, in different orders. So CellBeams are kept for two directions only:
+// along x, found in the voxels (FindCellBeams), and along y, for traversal along x, made from those (TurnCellBeams).
 #pragma once
 
 #include <cstdint>
@@ -23,10 +23,10 @@ namespace slabstream {
 
 inline constexpr std::int32_t kCellVoxels = 32, kCellOctets = kCellVoxels / kOctet;
 
-// All beams of a slab along `u`. Tasks fill the arrays side by side.
+// All beams of a slab along `u`. Tasks fill the arrays in parallel.
 struct CellBeams {
   Axis u = Axis::kX, inner = Axis::kY, outer = Axis::kZ;  // beams are numbered [outer][inner]
-  Box box;                                                // all that is occupied, and little else; empty if nothing is
+  Box box;                                                // holds all occupied voxels, and little else; empty if there are none
   std::int32_t first_cell = 0, cell_count = 0;            // along u: cell i begins at voxel 32 * (first_cell + i)
   std::size_t beam_count = 0;
   LargeArray<std::uint32_t> masks;         // [beam][cell]
@@ -39,9 +39,9 @@ struct CellBeams {
   std::size_t bytes() const;
 };
 
-// Occupied: `selection` holds the voxel's bin. Normals are those of the data's gradient by smoothed central differences
-// (docs/rendering.md) over physical spacing, one-sided at the border of the voxels at hand (which is the volume's border, or inside the
-// halo where nothing is read). Parallel; the result is the same for any number of threads.
+// A voxel is occupied if `selection` holds its bin. Normals are those of the data's gradient by smoothed central differences
+// (docs/rendering.md) over physical spacing. They are one-sided at the border of the given voxels, which is the volume's border or lies
+// inside the halo where nothing is read. Parallel; the result is the same for any number of threads.
 CellBeams FindCellBeams(const VoxelBricks& voxels, const BrickRanges& bricks, const ClassificationTable& table,
                         const BinSelection& selection, const Vec3& spacing);
 
@@ -51,7 +51,7 @@ CellBeams TurnCellBeams(const CellBeams& along_x);
 // The cells of one traversal axis; refers to beams, which must outlive it.
 struct OccupiedCells {
   SliceAxes axes{};
-  Box box;       // beams there are: the slices of the wanted box that may hold anything, with what the slab has beside them
+  Box box;       // the box of the beams, limited to the wanted slices
   Box occupied;  // bounding box of the voxels found in it; empty if there are none
   std::int32_t first_cell = 0, cell_count = 0;
   std::size_t slice_stride = 0, row_stride = 0;  // beams
@@ -59,16 +59,16 @@ struct OccupiedCells {
   const std::uint32_t* masks = nullptr;
   std::span<const std::uint64_t> first_record;
   std::span<const VoxelRecord> records;
-  std::uint64_t occupied_in_box = 0;  // of those found, the ones inside the wanted box, not in its halo
+  std::uint64_t occupied_in_box = 0;  // voxels found inside the wanted box, not in its halo
 
-  // Slice and v inside `box`.
+  // `slice` and `v` are inside `box`.
   std::size_t Beam(std::int32_t slice, std::int32_t v) const {
     return first_beam + std::size_t(slice - box.begin[axes.c]) * slice_stride + std::size_t(v - box.begin[axes.v]) * row_stride;
   }
   const std::uint32_t* Masks(std::size_t beam) const { return &masks[beam * std::size_t(cell_count)]; }
 };
 
-// `beams` lie along the u of `traversal`. In the slices of `wanted`.
+// For the slices of `wanted`. `beams` lie along the u of `traversal`.
 OccupiedCells CellsOf(const CellBeams& beams, Axis traversal, const Box& wanted);
 
 }  // namespace slabstream

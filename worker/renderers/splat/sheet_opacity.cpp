@@ -8,7 +8,7 @@
 namespace slabstream {
 namespace {
 
-constexpr int kLevels = 32;  // interpolation is then off by less than 1e-4 for any opacity and a field of view of 60 degrees
+constexpr int kLevels = 32;  // the interpolation error is then below 1e-4 for any opacity and a field of view of 60 degrees
 
 }  // namespace
 
@@ -16,8 +16,8 @@ SheetOpacity::SheetOpacity(const FrameSetup& setup) : setup_(setup), axes_(AxesO
   const Camera& camera = setup.camera;
   central_distance_ = camera.spacing[axes_.c] / std::abs(camera.view_direction[axes_.c]);
   if (camera.projection != Projection::kPerspective) return;
-  // The ratio grows with the angle between a ray and the axis: it is largest at a corner of the volume, and least on the ray nearest to
-  // the axis, which meets a face of the volume or passes through the eye's foot point.
+  // The ratio grows with the angle between a ray and the axis. It is largest at a corner of the volume, and least on the ray nearest to the
+  // axis, which meets a face of the volume or passes through the eye's foot point.
   const Vec3 high = ToVec3(setup.description.geometry.size) - Vec3{1, 1, 1};
   double largest = 0;
   least_ratio_ = 1e300;
@@ -58,7 +58,7 @@ ShadeTables SheetOpacity::Tables(const ClassificationTable& table) const {
   tables.bins = table.size();
   tables.levels = levels_;
   // In levels, a ray's ratio is its length over the spacing of slices.
-  constexpr double kBelowLast = 1e-3;  // there is always a level above
+  constexpr double kBelowLast = 1e-3;  // so that there is always a level above
   tables.level_scale = float(levels_per_ratio_ * camera.spacing[axes_.c] / central_distance_);
   tables.level_offset = float(levels_per_ratio_ * least_ratio_);
   tables.last_level = float(std::max(levels_ - 1 - kBelowLast, 0.0));

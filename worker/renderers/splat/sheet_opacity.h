@@ -1,8 +1,8 @@
 // SheetOpacity: the opacity of a voxel in its sheet.
 //
-// A transfer function gives the opacity alpha of `opacity_distance` voxel lengths of material; between neighbouring sheets a ray travels
-// D, so in its sheet a voxel has 1 - (1 - alpha)^(D / distance). An orthographic camera has one D. Under perspective D is that of the ray
-// through the voxel, D0 * ratio with the central ray's D0; shading interpolates between tables for a few ratios.
+// A transfer function gives the opacity alpha of `opacity_distance` voxel lengths of material. Between neighbouring sheets a ray travels D,
+// so in its sheet a voxel has opacity 1 - (1 - alpha)^(D / distance). An orthographic camera has one D. Under perspective D depends on the
+// ray through the voxel: D0 * ratio, with D0 that of the central ray; shading interpolates between tables for a few ratios.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@ class SheetOpacity {
 
   bool one_level() const { return levels_ == 1; }
 
-  // Slopes of the rays through the voxels of slice k: way along u and v by way along the traversal axis. One level: none.
+  // Slopes of the rays through the voxels of slice k: distance along u and v per distance along the traversal axis. One level: none.
   struct Slopes {
     float u_0 = 0, u_step = 0, v_0 = 0, v_step = 0;  // at voxel 0, and from voxel to voxel
 

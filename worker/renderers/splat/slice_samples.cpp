@@ -8,8 +8,8 @@
 namespace slabstream {
 namespace {
 
-// Planes are moved down by this many voxels. A ray that runs within a plane (axis-parallel views have such rays through pixel centres)
-// would else be given to one side in one slice and to the other in the next, as rounding has it, and its samples would be combined out of
+// Planes are moved down by this many voxels. Otherwise a ray that runs within a plane (axis-parallel views have such rays through pixel
+// centres) would, by rounding, belong to one side in one slice and to the other in the next, and its samples would be combined out of
 // order.
 constexpr double kPlaneShift = 0x1p-20;
 
@@ -17,11 +17,11 @@ struct Interval {
   std::int32_t begin, end;
 };
 
-// Pixels of [0, count) that belong to voxels [own_begin, own_end) of an axis `size` voxels long, and of whose taps one is in
-// [reach_begin, reach_end).
+// Pixels of [0, count) that belong to voxels [own_begin, own_end) of an axis `size` voxels long, and have a tap in [reach_begin,
+// reach_end).
 Interval OwnedPixels(const Lattice& lattice, const FootprintTable& footprint, std::int32_t own_begin, std::int32_t own_end,
                      std::int32_t size, std::int32_t reach_begin, std::int32_t reach_end, std::int32_t count) {
-  // Whole segments, so that only planes cut them.
+  // Whole segments, so that only planes divide segments.
   Interval owned = {FirstPixelWithTap(lattice, reach_begin - footprint.taps + 1, 0, count) / kSegment * kSegment,
                     std::min((FirstPixelWithTap(lattice, reach_end, 0, count) + kSegment - 1) / kSegment * kSegment, count)};
   const auto border = [&](std::int32_t voxel) { return FirstSampleFrom(lattice, footprint.radius, voxel - 0.5 - kPlaneShift, 0, count); };
@@ -34,7 +34,7 @@ Interval OwnedPixels(const Lattice& lattice, const FootprintTable& footprint, st
 
 const FootprintTable& Footprints::Get(double sigma) {
   if (last_ != nullptr && sigma == last_sigma_) return *last_;
-  // Rounded to steps of 1.1 % where it varies, so that a frame needs a few dozen.
+  // If it varies, rounded to steps of 1.1 %, so that a frame needs only a few dozen.
   constexpr double kSteps = 64;  // an octave
   const double rounded = std::exp2(std::round(kSteps * std::log2(sigma)) / kSteps);
   auto found = tables_.find(rounded);

@@ -1,9 +1,9 @@
-// SliceSamples: where the frame's pixels sample a slice, and which of these samples belong to a box.
+// SliceSamples: where the frame's pixels sample a slice, and the samples that belong to a box.
 //
-// Who owns a sample: pixel P of slice k belongs to the box whose cross-section holds the point where P's ray meets the slice. Rays through
-// a column meet a slice in one line of constant u, rays through a row in one of constant v, so a box owns a rectangle of every sheet. Its
-// borders are functions of (grid, slice, plane) alone: boxes on both sides of a plane find the same column, and every sample has one owner.
-// Boxes on the volume's rim own everything outside.
+// Ownership: the sample of pixel P in slice k belongs to the box whose cross-section holds the point where P's ray meets the slice. Rays
+// through a column meet a slice in one line of constant u, rays through a row in one of constant v, so a box owns a rectangle of every
+// sheet. Its borders are functions of (grid, slice, plane) alone: boxes on both sides of a plane find the same column, and every sample has
+// one owner. Boxes on the volume's rim own everything outside.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@
 
 namespace slabstream {
 
-// Footprints of a frame, by standard deviation; they differ from slice to slice only where a perspective view is minified. Addresses stay.
+// Footprints of a frame, by standard deviation. It varies between slices only in a minified perspective view. Addresses stay valid.
 class Footprints {
  public:
   const FootprintTable& Get(double sigma);
@@ -37,7 +37,7 @@ struct SliceSamples {
 // The first pixel i whose first tap is `voxel` or a later one, in [begin, end].
 std::int32_t FirstPixelWithTap(const Lattice& lattice, std::int32_t voxel, std::int32_t begin, std::int32_t end);
 
-// Of slice k. `box`: whose samples; `reach`: holds all occupied voxels.
+// For slice k. `box` owns the samples; `reach` holds all occupied voxels.
 SliceSamples SampleSlice(const FrameSetup& setup, const Box& box, const Box& reach, std::int32_t k, Footprints& footprints);
 
 }  // namespace slabstream

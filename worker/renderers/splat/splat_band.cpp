@@ -10,19 +10,19 @@
 namespace slabstream {
 namespace {
 
-// Occupied voxels of an octet, by its mask: the basic x86-64 instruction set has no such instruction.
+// Number of occupied voxels of an octet, by its mask: the basic x86-64 instruction set has no instruction for it.
 constexpr auto kOctetCount = [] {
   std::array<std::uint8_t, 1 << kOctet> counts{};
   for (std::size_t mask = 0; mask < counts.size(); ++mask) counts[mask] = std::uint8_t(std::popcount(mask));
   return counts;
 }();
 
-// Octets of up to 16 cells that are not empty: bit i is octet i.
+// Non-empty octets of up to 16 cells: bit i is octet i.
 constexpr std::int32_t kSetCells = 64 / kCellOctets;
 std::uint64_t OccupiedOctets(const std::uint32_t* masks, std::int32_t count) {
   std::uint64_t set = 0;
   for (std::int32_t cell = 0; cell < count; ++cell) {
-    // The high bit of every byte that is not 0; a product moves these four together.
+    // The high bit of every byte that is not 0; a multiplication moves these four bits together.
     const std::uint32_t high = (((masks[cell] & 0x7F7F7F7FU) + 0x7F7F7F7FU) | masks[cell]) & 0x80808080U;
     set |= std::uint64_t{(high >> 7) * 0x10204080U >> 28} << (cell * kCellOctets);
   }
@@ -71,7 +71,7 @@ void SplatBand::AddSlice(std::int32_t k) {
   clock_.Charge(Stage::kComposite);
 }
 
-// Rows and beams of the slice that have to do with each other, and room for them. False if there are none.
+// Finds the rows and beams of the slice that meet, and makes room for them. False if there are none.
 bool SplatBand::PlaceBeams(const SliceSamples& slice) {
   const Axis v = pass_.cells.axes.v;
   rows_ = {std::max(y_begin_, slice.owned.y_begin), std::min(y_end_, slice.owned.y_end)};
@@ -80,7 +80,7 @@ bool SplatBand::PlaceBeams(const SliceSamples& slice) {
   beam_count_ = std::min(pass_.cells.occupied.end[v], Lattice::First(slice.rows.At(rows_.end - 1)) + slice.along_v->taps) - first_beam_;
   if (beam_count_ <= 0) return false;
 
-  // A segment's taps reach that far beyond the octet that made it count.
+  // A segment's taps reach this far beyond the octet that needs the segment.
   const auto segment_voxels = std::int32_t(kSegment * slice.columns.step >> 32) + 1;
   margin_ = std::max(margin_, (slice.along_u->padded_taps + segment_voxels + kOctet - 1) / kOctet * kOctet);
   const std::int32_t voxels = pass_.octet_count * kOctet + 2 * margin_;
@@ -90,13 +90,13 @@ bool SplatBand::PlaceBeams(const SliceSamples& slice) {
   }
   const auto beams = std::size_t(beam_count_);
   if (filtered_.size() < 4 * beams * std::size_t(pass_.bounds.width())) filtered_.resize(4 * beams * std::size_t(pass_.bounds.width()));
-  needed_.assign((beams + 1) * std::size_t(words_), 0);  // and a word behind the last beam's, for spans
+  needed_.assign((beams + 1) * std::size_t(words_), 0);  // and one more word after the last beam's, for spans
   filled_.assign(needed_.size(), 0);
   any_filled_.assign(beams, 0);
   return true;
 }
 
-// Beam by beam: which segments are wanted of it, and which of its octets reach them.
+// For each beam: the segments that are needed, and the octets that reach them.
 void SplatBand::FindNeeded(const SliceSamples& slice) {
   const std::int32_t next_slice = pass_.setup.camera.ascending ? slice_ + 1 : slice_ - 1;
   octets_.clear();
@@ -147,7 +147,7 @@ void SplatBand::FindOctets(std::int32_t beam) {
       const VoxelRecord* records = record;
       record += kOctetCount[occupied];
       if (!AnyOf(needed, reached[octet])) continue;
-      __builtin_prefetch(records);  // shading comes to it after the slice's other octets
+      __builtin_prefetch(records);  // used for shading only after the slice's other octets
       Insert(filled, reached[octet]);
       octets_.push_back(
           {records, shaded + 4 * std::ptrdiff_t{octet * kOctet}, occupied, slopes_.AlongU((pass_.first_octet + octet) * kOctet), across});
@@ -160,7 +160,7 @@ void SplatBand::FindOctets(std::int32_t beam) {
   any_filled_[std::size_t(beam - first_beam_)] = any != 0;
 }
 
-// Beams of a slice lie together, those of the next one elsewhere.
+// Beams of a slice are contiguous in memory; those of the next slice are elsewhere.
 void SplatBand::PrefetchCells(std::int32_t slice, std::int32_t beam) const {
   const OccupiedCells& cells = pass_.cells;
   if (slice < cells.occupied.begin[cells.axes.c] || slice >= cells.occupied.end[cells.axes.c]) return;
@@ -189,7 +189,7 @@ void SplatBand::ShadeAndFilter(const SliceSamples& slice) {
   }
 }
 
-// Segments at the box's sides hold samples that belong to others: there the beam holds nothing, so that rows are left as they are.
+// Segments at the box's sides hold samples that belong to other boxes. The beam is cleared there, so that rows stay as they are.
 void SplatBand::ClearForeignSamples(const SliceSamples& slice, std::int32_t beam) {
   const SegmentWord* filled = &filled_[BeamWord(beam)];
   const auto clear = [&](std::int32_t begin, std::int32_t end) {  // pixels of one segment, from `bounds` on

@@ -1,9 +1,9 @@
-// SplatBand: some rows of the image, from the first slice to the last. Bands share nothing that changes, so they are the tasks of the
-// render threads; what lies between two bands is shaded for both.
+// SplatBand: some rows of the image, from the first slice to the last. Bands share no data that changes, so they are the tasks of the
+// render threads. Voxels between two bands are shaded for both.
 //
 // For each slice: find the octets of voxels whose footprints reach pixels of the band that are not opaque yet; shade them; filter their
-// beams to the columns of the frame; composite rows. Which segments of a row are open, which octets show and which segments of a beam hold
-// something are sets of bits (segment_set.h).
+// beams to the columns of the frame; composite rows. Open segments of a row, visible octets and filled segments of a beam are sets of bits
+// (segment_set.h).
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ namespace slabstream {
 
 class SplatBand {
  public:
-  // Rows [y_begin, y_end) of `image`, whose bounds are those of the pass. Both must outlive this. Stage times and counts go to `report`.
+  // Rows [y_begin, y_end) of `image`, which has the bounds of the pass. Both must outlive the band. Stage times and counts go to `report`.
   SplatBand(const SplatPass& pass, std::int32_t y_begin, std::int32_t y_end, LocalImage& image, RankReport& report);
 
   // Slices come nearest first.
@@ -26,7 +26,7 @@ class SplatBand {
   bool finished() const;  // all is opaque: nothing behind shows
 
  private:
-  // Beams that are shaded before they are filtered: few, so that what was written is in the first-level cache when it is read.
+  // Beams that are shaded before they are filtered: few, so that they are still in the first-level cache when they are filtered.
   static constexpr std::int32_t kShadedBeams = 16;
 
   struct Rows {
@@ -43,7 +43,7 @@ class SplatBand {
 
   SegmentWord* Open(std::int32_t row) { return &open_[std::size_t(row - y_begin_) * std::size_t(words_)]; }
   std::size_t BeamWord(std::int32_t beam) const { return std::size_t(beam - first_beam_) * std::size_t(words_); }
-  // One after the other, beams share kShadedBeams places.
+  // Beams take turns in kShadedBeams places.
   float* ShadedBeam(std::int32_t beam) {
     return &shaded_[4 * std::size_t((beam - first_beam_) % kShadedBeams) * std::size_t(shaded_voxels_)];
   }
@@ -58,20 +58,20 @@ class SplatBand {
   const float opaque_alpha_;
   std::vector<SegmentWord> open_;  // [row][word]: not opaque yet
 
-  // Of the slice at hand.
+  // Of the current slice.
   std::int32_t slice_ = 0;
   SheetOpacity::Slopes slopes_;
-  Rows rows_;                                     // that it can touch
-  std::int32_t first_beam_ = 0, beam_count_ = 0;  // whose footprints reach them
-  std::vector<SegmentWord> owned_;                // [word]: segments of which the box owns a column
+  Rows rows_;                                     // that the slice can touch
+  std::int32_t first_beam_ = 0, beam_count_ = 0;  // beams whose footprints reach these rows
+  std::vector<SegmentWord> owned_;                // [word]: segments with a column that the box owns
   const std::vector<SegmentWord> nothing_;        // [word]: 0
   std::vector<SegmentWord> needed_;               // [beam][word]: owned, and open in any row that the beam reaches
-  std::vector<SegmentWord> filled_;               // [beam][word]: of them, those that the beam's voxels reach
-  std::vector<std::uint8_t> any_filled_;          // [beam]: 1 if any of them is
+  std::vector<SegmentWord> filled_;               // [beam][word]: needed segments that the beam's voxels reach
+  std::vector<std::uint8_t> any_filled_;          // [beam]: 1 if any segment is filled
   std::vector<OctetWork> octets_;                 // beam by beam
   std::vector<std::size_t> octets_before_;        // [beam], and one more: where the beam's octets begin
   std::int32_t margin_ = 0, shaded_voxels_ = 0;   // voxels beside the occupied ones; voxels in a row of shaded_
-  AlignedVector<float> shaded_;                   // [kShadedBeams][voxel][4]: zero but for the octets at hand
+  AlignedVector<float> shaded_;                   // [kShadedBeams][voxel][4]: zero except for the current octets
   PooledVector<float> filtered_;                  // [beam][column][4]: of `filled` segments
   std::vector<const float*> row_beams_;           // [tap]: scratch of CompositeRows
   std::vector<const SegmentWord*> row_filled_;

@@ -1,5 +1,4 @@
-// SplatCache: what splatting keeps of a slab between frames: its occupied voxels, by beams, while the transfer function shows the same
-// ones.
+// SplatCache: the occupied voxels of a slab, by beams. Splatting keeps them between frames until the transfer function shows other voxels.
 #pragma once
 
 #include <cstddef>
@@ -25,7 +24,7 @@ class SplatCache : public SlabCache {
   static constexpr std::size_t kKeptViews = 8;
   BinSelection occupied_bins_;
   std::optional<CellBeams> along_x_, along_y_;
-  std::deque<std::pair<Box, OccupiedCells>> occupied_;  // by the box they were made for; last used first
+  std::deque<std::pair<Box, OccupiedCells>> occupied_;  // by the box they were made for; most recently used first
 };
 
 }  // namespace slabstream

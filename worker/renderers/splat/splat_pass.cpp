@@ -33,7 +33,7 @@ SplatPass::SplatPass(const OccupiedCells& occupied_cells, const ClassificationTa
   constexpr std::int64_t kOctetStride = std::int64_t{kOctet} << 32;
   for (const SliceSamples& slice : slices) {
     const PixelBounds& owned = slice.owned;
-    // Of an octet: the first pixel with a tap in it, and the first one beyond it.
+    // For each octet: the first pixel with a tap in it, and the first one beyond it.
     FirstSamples first(slice.columns, std::int64_t{first_octet * kOctet - slice.along_u->taps + 1} << 32, kOctetStride);
     FirstSamples last(slice.columns, std::int64_t{(first_octet + 1) * kOctet} << 32, kOctetStride);
     for (std::int32_t octet = 0; octet < octet_count; ++octet, ++span, first.Next(), last.Next()) {

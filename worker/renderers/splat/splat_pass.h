@@ -1,4 +1,5 @@
-// SplatPass: what the bands of one Render share, made once a frame: where slices are sampled, the tables of shading, and the image.
+// SplatPass: data that the bands of one Render share, made once a frame: sample positions of slices, shading tables, and the image's
+// bounds.
 #pragma once
 
 #include <cstdint>

@@ -12,7 +12,7 @@
 namespace slabstream {
 namespace {
 
-// Rows of a band: few enough that they stay in the second-level cache with their beams, many enough that little is shaded twice.
+// Rows of a band: few enough to stay in the second-level cache with their beams, enough that few voxels are shaded twice.
 constexpr std::int32_t kBandRows = 64;
 
 void RenderBand(const SplatPass& pass, std::int32_t y_begin, const std::atomic<bool>& cancelled, LocalImage& image, RankReport& report) {

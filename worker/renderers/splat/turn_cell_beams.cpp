@@ -1,5 +1,5 @@
-// TurnCellBeams: masks are transposed 32 x 32 voxels at a time, records are dealt out to the beams that they belong to. Slices of one z go
-// to beams of their own, so they are the tasks.
+// TurnCellBeams: transposes masks 32 x 32 voxels at a time and distributes records to their beams. Slices of one z go to beams of their
+// own, so they are the tasks.
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -16,7 +16,7 @@ namespace {
 
 using Block = std::array<std::uint32_t, kCellVoxels>;
 
-// Bit i of word j becomes bit j of word i. Halves of the block are exchanged, then quarters of each half, and so on (H. S. Warren, Hacker's
+// Bit i of word j becomes bit j of word i. Exchanges halves of the block, then quarters of each half, and so on (H. S. Warren, Hacker's
 // Delight, section 7-3).
 void Transpose(Block& block) {
   std::uint32_t low_bits = 0x0000FFFF;
@@ -57,7 +57,7 @@ void TurnMasks(const CellBeams& from, std::int32_t z, CellBeams& to) {
 
 void TurnRecords(const CellBeams& from, std::int32_t z, CellBeams& to) {
   const Box& box = from.box;
-  std::vector<VoxelRecord*> next(std::size_t(box.size().x));  // of the beam of each x
+  std::vector<VoxelRecord*> next(std::size_t(box.size().x));  // next record of the beam of each x
   for (std::size_t x = 0; x < next.size(); ++x) {
     next[x] = &to.records[to.first_record[x * to.Stride(Axis::kX) + std::size_t(z - box.begin.z)]];
   }
@@ -91,7 +91,7 @@ CellBeams TurnCellBeams(const CellBeams& along_x) {
   turned.first_record = MakeLargeArray<std::uint64_t>(turned.beam_count + 1);
   turned.records = MakeLargeArray<VoxelRecord>(along_x.record_count());
 
-  constexpr std::int32_t kSlices = 8;  // together: their beams are neighbours in memory
+  constexpr std::int32_t kSlices = 8;  // at a time: their beams are neighbours in memory
   const auto for_each_z = [&](auto&& function) {
     tbb::parallel_for(tbb::blocked_range<std::int32_t>(box.begin.z, box.end.z, kSlices),
                       [&](const tbb::blocked_range<std::int32_t>& slices) {

@@ -6,7 +6,7 @@
 namespace slabstream {
 namespace {
 
-constexpr double kReach = 0.501;  // voxels from a face's centre to what it covers, a little more than kFaceReach
+constexpr double kReach = 0.501;  // voxels from a face's centre to the edge of what it covers, a little more than kFaceReach
 
 double Apply(const std::array<double, 4>& row, const Vec3& p) { return row[0] * p.x + row[1] * p.y + row[2] * p.z + row[3]; }
 
@@ -115,7 +115,7 @@ FaceProjection BrickProjection::Faces(const SurfaceBrick& brick, int side) const
   faces.eye_a = float(base[faces.a] - camera_.eye[faces.a]);
   faces.eye_u = float(base[faces.u] - camera_.eye[faces.u]);
   faces.eye_v = float(base[faces.v] - camera_.eye[faces.v]);
-  // The largest face of the brick: where on the screen it is farthest out, at the least depth.
+  // The largest face of the brick: the screen position farthest out, at the least depth.
   Vec3 end = base;
   for (int i = 0; i < 3; ++i) end[i] = std::min(brick.origin[i] + kFaceBrick, volume_size_[i]) - 0.5;
   const Vec3 begin = ToVec3(brick.origin) - Vec3{0.5, 0.5, 0.5};

@@ -1,4 +1,4 @@
-// BrickProjection: where the bricks of a surface and their faces lie on a frame's screen. Made once a frame.
+// BrickProjection: the positions of a surface's bricks and their faces on a frame's screen. Made once a frame.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@ class BrickProjection {
 
   ProjectedBrick View(const SurfaceBrick& brick) const;
 
-  // For DrawFaces. Depends on the brick's place in the volume alone, not on which faces a box has of it. The brick lies at least partly
+  // For DrawFaces. Depends only on the brick's position in the volume, not on which of its faces a box has. The brick lies at least partly
   // within the frame.
   FaceProjection Faces(const SurfaceBrick& brick, int side) const;
 
@@ -36,9 +36,9 @@ class BrickProjection {
 
   const Camera& camera_;
   const Index3 volume_size_;
-  Vec3 ray_x_, ray_y_;                          // change of a ray a pixel: of its direction (perspective) or its origin
+  Vec3 ray_x_, ray_y_;                          // change of a ray per pixel: of its direction (perspective) or its origin
   Vec3 direction_;                              // of the central ray
-  std::array<FaceProjection, kSides> by_side_;  // what all bricks share
+  std::array<FaceProjection, kSides> by_side_;  // the part that all bricks share
 };
 
 }  // namespace slabstream

@@ -58,7 +58,7 @@ class BrickSurface {
 
  private:
   static constexpr int kVertices = kFaceBrick + 1;
-  static constexpr std::uint32_t kUnknown = 0xFFFFFFFF;  // no packed normal: these leave the upper two bits free
+  static constexpr std::uint32_t kUnknown = 0xFFFFFFFF;  // not a valid packed normal: these leave the upper two bits free
 
   // Bit x + 1: voxel x of the row is opaque. Rows -1 ... kFaceBrick along y and z.
   std::uint32_t& Row(std::int32_t y, std::int32_t z) { return opaque_[std::size_t((z + 1) * (kFaceBrick + 2) + y + 1)]; }

@@ -1,6 +1,6 @@
-// Surface: what the Z-buffer draws of a box, made once for a transfer function: the faces of its opaque voxels beyond which nothing is
-// opaque, with bins and the normals at their corners. 24 bytes a face. They are kept by bricks, so that a frame places, culls and sorts a
-// few bricks instead of many faces, and draws only the sides that face the eye.
+// Surface: the faces that the Z-buffer draws of a box, made once for a transfer function: the faces of its opaque voxels without an opaque
+// neighbour, with bins and the normals at their corners. 24 bytes a face. Faces are grouped by bricks, so that a frame places, culls and
+// sorts a few bricks instead of many faces, and draws only the sides that face the eye.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@ namespace slabstream {
 
 struct SurfaceBrick {
   Index3 origin;                                       // voxel (0, 0, 0) of the brick, at multiples of kFaceBrick
-  Box voxels;                                          // just those that have faces
+  Box voxels;                                          // bounding box of the voxels that have faces
   std::array<std::uint32_t, kSides + 1> side_begin{};  // number of each side's first face, then the end
 
   std::uint32_t face_count() const { return side_begin[kSides] - side_begin[0]; }
@@ -25,14 +25,14 @@ struct SurfaceBrick {
 
 struct Surface {
   std::vector<SurfaceBrick> bricks;    // x fastest
-  AlignedVector<FaceSite> sites;       // by face, in the order of FaceIndex; kSitesReadAhead more at the end, which are no faces
+  AlignedVector<FaceSite> sites;       // by face, in the order of FaceIndex; then kSitesReadAhead more that are no faces
   AlignedVector<FaceNormals> normals;  // by face
 
   std::size_t bytes() const;
 };
 
-// Neighbours are looked up in all of `voxels`, the halo (of at least 2 voxels) included; outside the volume nothing is opaque. Works on the
-// threads of the task arena it is called in.
+// Looks up neighbours in all of `voxels`, including the halo (of at least 2 voxels); outside the volume nothing is opaque. Runs on the
+// threads of the calling task arena.
 Surface FindSurface(const VoxelBlock& voxels, const BrickRanges& ranges, const ClassificationTable& table, const BinSelection& opaque,
                     const Vec3& spacing, const Box& box);
 

@@ -1,4 +1,4 @@
-// SurfaceCache: the surfaces that the Z-buffer keeps of a slab between frames, while the transfer function makes the same voxels opaque.
+// SurfaceCache: the surfaces of a slab. The Z-buffer keeps them between frames until the transfer function makes other voxels opaque.
 #pragma once
 
 #include <cstddef>
@@ -12,8 +12,8 @@ namespace slabstream {
 
 class SurfaceCache : public SlabCache {
  public:
-  // Faces of the opaque voxels of `box`: opacity at least half of the largest that the volume's range of values has. Valid until the next
-  // call.
+  // Faces of the opaque voxels of `box`: those with at least half of the largest opacity in the volume's range of values. Valid until the
+  // next call.
   const Surface& OpaqueSurface(SlabData& slab, const FrameSetup& setup, const Box& box);
 
   std::size_t bytes() const override;
@@ -21,7 +21,7 @@ class SurfaceCache : public SlabCache {
  private:
   static constexpr std::size_t kKeptBoxes = 16;  // several boxes may share a slab
   BinSelection opaque_bins_;
-  std::deque<std::pair<Box, Surface>> surfaces_;  // last used first
+  std::deque<std::pair<Box, Surface>> surfaces_;  // most recently used first
 };
 
 }  // namespace slabstream

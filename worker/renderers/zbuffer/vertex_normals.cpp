@@ -29,7 +29,7 @@ VertexNormals::Filters VertexNormals::FiltersAlong(int axis, const Box& box, dou
     }
     const auto v = std::size_t(vertex);
     for (std::size_t i = 0; i < 4; ++i) filters.smooth[i][v] = float(smooth[i]);
-    // By differences, which are exactly 0 where samples are equal.
+    // As differences, which are exactly 0 if samples are equal.
     filters.slope[0][v] = float(-slope[0]);
     filters.slope[1][v] = float(-(slope[0] + slope[1]));
     filters.slope[2][v] = float(slope[3]);
@@ -50,7 +50,7 @@ void VertexNormals::Compute(const VoxelBlock& voxels, const Vec3& spacing, const
         for (std::int32_t x = 0; x < kSamples; ++x) row[std::size_t(x)] = float(samples[Inside(box, 0, origin.x + x - 2) - box.begin.x]);
         Row& smooth = smooth_x_[std::size_t(z)][std::size_t(y)];
         Row& slope = slope_x_[std::size_t(z)][std::size_t(y)];
-        for (std::size_t x = 0; x < kSamples; ++x) {  // those from kVertices on have no weights
+        for (std::size_t x = 0; x < kSamples; ++x) {  // samples from kVertices on have no weights
           const float a = row[x], b = row[x + 1], c = row[x + 2], d = row[x + 3];
           smooth[x] = (a * along_x.smooth[0][x] + b * along_x.smooth[1][x]) + (c * along_x.smooth[2][x] + d * along_x.smooth[3][x]);
           slope[x] = ((b - a) * along_x.slope[0][x] + (c - b) * along_x.slope[1][x]) + (d - c) * along_x.slope[2][x];

@@ -1,11 +1,11 @@
-// VertexNormals: normals at the vertices of a brick's cells, the points q + 1/2 between eight voxels: the direction of the gradient of
-// stored samples there, the mean of those at the eight voxels (docs/rendering.md: differences over two voxels, smoothed by (1, 2, 1)/4;
-// one-sided at the border). Along each axis that is one filter over the four nearest samples: (1, 3, 3, 1)/8 smooths, (-1, -1, 1, 1)/4
-// differentiates. Blended over a face they are continuous over all faces, and as wide as the steps of a hard-edged surface, so these do not
-// show as streaks.
+// VertexNormals: normals at the vertices of a brick's cells, the points q + 1/2 between eight voxels. A normal is the direction of the
+// gradient of stored samples there, the mean of the gradients at the eight voxels (docs/rendering.md: differences over two voxels, smoothed
+// by (1, 2, 1)/4; one-sided at the border). Along each axis that is one filter over the four nearest samples: (1, 3, 3, 1)/8 smooths, (-1,
+// -1, 1, 1)/4 differentiates. Blended over faces, normals are continuous from face to face. The filter is as wide as the steps of a
+// hard-edged surface, so these do not show as streaks.
 //
-// In single precision without fused operations, each vertex from samples at most two voxels from the cells that share it: the same bits
-// wherever a slab that holds these samples begins and ends.
+// Single precision without fused operations; each vertex uses samples at most two voxels from the cells that share it. So the bits are the
+// same in every slab that holds these samples.
 #pragma once
 
 #include <array>
@@ -18,18 +18,18 @@ namespace slabstream {
 
 class VertexNormals {
  public:
-  // Reads the samples round the brick at `origin`, as far as they lie in `voxels`. Those outside count as the nearest one inside.
+  // Reads the samples round the brick at `origin` that lie in `voxels`. Samples outside count as the nearest one inside.
   void Compute(const VoxelBlock& voxels, const Vec3& spacing, const Index3& origin);
 
-  // At the vertex below voxel origin + `vertex` along all axes; each coordinate in [0, kFaceBrick]. Over physical distance. Exactly 0 where
-  // all 64 samples are equal; not finite where one is not.
+  // Physical gradient at the vertex below voxel origin + `vertex` along all axes; each coordinate in [0, kFaceBrick]. Exactly 0 if all 64
+  // samples are equal; not finite if one of them is not.
   Vec3 Gradient(const Index3& vertex) const;
 
  private:
   static constexpr int kVertices = kFaceBrick + 1, kSamples = kFaceBrick + 4;  // samples from two before the brick to two after it
   using Row = std::array<float, kSamples>;
 
-  // The filters of all vertices along one axis: weights of samples vertex ... vertex + 3, and of the differences of neighbours among them.
+  // Filters of all vertices along one axis: weights of samples vertex ... vertex + 3, and of their differences.
   struct Filters {
     std::array<Row, 4> smooth{};
     std::array<Row, 3> slope{};

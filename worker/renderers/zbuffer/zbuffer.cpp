@@ -17,10 +17,10 @@
 namespace slabstream {
 namespace {
 
-// The bricks that may be seen, nearest first, and the pixels that they may touch.
+// The bricks that may be visible, nearest first, and the pixels that they may touch.
 struct Scene {
   std::vector<ProjectedBrick> views;  // by brick of the surface
-  std::vector<std::uint32_t> order;   // of those that may be seen
+  std::vector<std::uint32_t> order;   // of the bricks that may be visible
   PixelBounds bounds;
 };
 
@@ -39,7 +39,7 @@ Scene PlaceBricks(const Surface& surface, const BrickProjection& projection) {
     least = std::min(least, view.nearest);
     greatest = std::max(greatest, view.nearest);
   }
-  // A counting sort by depth: it decides only how many bricks turn out to be hidden.
+  // A counting sort by depth. The order affects only how many bricks turn out to be hidden.
   constexpr std::size_t kClasses = 256;
   const float scale = greatest > least ? float(kClasses - 1) / (greatest - least) : 0.0F;
   const auto depth_class = [&](const ProjectedBrick& view) { return std::size_t((view.nearest - least) * scale); };
@@ -55,8 +55,8 @@ Scene PlaceBricks(const Surface& surface, const BrickProjection& projection) {
   return scene;
 }
 
-// Rows of the bounds in bands of about equal work, from top to bottom: each band's first row, and the end. At least `bands` of them where
-// there are as many rows, and none with many more than kMostKeys pixels, so that keys stay in a core's cache.
+// Divides the rows of the bounds into bands of about equal work, from top to bottom: each band's first row, and the end. At least `bands`
+// bands if there are as many rows. No band has many more than kMostKeys pixels, so that keys stay in a core's cache.
 std::vector<std::int32_t> CutIntoBands(const Surface& surface, const Scene& scene, std::int64_t bands) {
   constexpr std::int64_t kMostKeys = 1 << 16;
   const std::int64_t most_rows = std::max<std::int64_t>(1, kMostKeys / std::max(1, scene.bounds.width()));
@@ -79,7 +79,7 @@ std::vector<std::int32_t> CutIntoBands(const Surface& surface, const Scene& scen
   return begins;
 }
 
-// Asks for the sites of a brick's sides; they arrive while other bricks are drawn.
+// Prefetches the sites of a brick's sides; they arrive while other bricks are drawn.
 void FetchSites(const Surface& surface, std::uint32_t brick, std::uint32_t sides) {
   constexpr std::uint32_t kPerLine = 64 / sizeof(FaceSite);
   const auto& begin = surface.bricks[brick].side_begin;
