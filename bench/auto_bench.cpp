@@ -26,14 +26,14 @@
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
 #include "common/renderers/registry.h"
-#include "simulator/simulate_frames.h"
-#include "coordinator/tuning/choose_policy.h"
-#include "coordinator/tuning/service_machine.h"
 #include "common/volume/sphere.h"
 #include "common/volume_io/volume_reader.h"
+#include "coordinator/tuning/choose_policy.h"
+#include "coordinator/tuning/service_machine.h"
 #include "laboratory/measure/frame_costs.h"
 #include "laboratory/measure/statistics.h"
 #include "laboratory/measure/thread_time.h"
+#include "simulator/simulate_frames.h"
 
 namespace slabstream {
 namespace {

@@ -21,13 +21,13 @@
 #include "common/planning/policy_names.h"
 #include "common/planning/team.h"
 #include "common/renderers/registry.h"
-#include "simulator/simulate_frames.h"
 #include "common/wire/client_messages.h"
 #include "coordinator/layout_table.h"
 #include "laboratory/bench/bench_cases.h"
 #include "laboratory/measure/calibrate.h"
 #include "laboratory/measure/combining_costs.h"
 #include "laboratory/measure/frame_costs.h"
+#include "simulator/simulate_frames.h"
 
 namespace slabstream {
 namespace {

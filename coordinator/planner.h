@@ -6,10 +6,10 @@
 
 #include <memory>
 
-#include "coordinator/tuning/service_machine.h"
 #include "coordinator/layout_table.h"
 #include "coordinator/plan_request.h"
 #include "coordinator/policy_table.h"
+#include "coordinator/tuning/service_machine.h"
 
 namespace slabstream {
 

@@ -18,9 +18,7 @@ class CostEstimator {
       : analytic_(renderer.MakeCost(basis)), measured_(measured) {}
 
   // Seconds of one thread. `box` lies inside the volume and is not empty.
-  double Seconds(const Box& box, const CostView& view) const {
-    return measured_ != nullptr ? measured_->Sum(box) : Analytic(box, view);
-  }
+  double Seconds(const Box& box, const CostView& view) const { return measured_ != nullptr ? measured_->Sum(box) : Analytic(box, view); }
   // The same, as if no frame had been measured.
   double Analytic(const Box& box, const CostView& view) const { return analytic_->Seconds(box, view); }
 

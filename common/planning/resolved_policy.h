@@ -7,8 +7,8 @@
 
 #include "common/base/status.h"
 #include "common/decomposition/decomposition.h"
-#include "common/planning/assignment.h"
 #include "common/frame/frame_request.h"
+#include "common/planning/assignment.h"
 #include "common/planning/policy_names.h"
 #include "common/volume/volume.h"
 

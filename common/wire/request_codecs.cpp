@@ -1,5 +1,5 @@
-#include "common/planning/validate_request.h"
 #include <algorithm>
+#include "common/planning/validate_request.h"
 #include "common/wire/codecs.h"
 #include "common/wire/wire_text.h"
 

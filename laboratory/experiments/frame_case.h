@@ -10,11 +10,11 @@
 #include "common/image/coverage_map.h"
 #include "common/planning/frame_plan.h"
 #include "common/planning/layout.h"
-#include "simulator/simulate_frames.h"
 #include "common/stats/report.h"
 #include "laboratory/bench/bench_cases.h"
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/measure/cost_model.h"
+#include "simulator/simulate_frames.h"
 
 namespace slabstream {
 

@@ -168,11 +168,7 @@ Result<Sweep> ParseSweep(const std::string& path, std::string_view text) {
        {"size", [&](const JsonValue& v) { ReadSize(v, sweep.size); }},
        {"volumes", [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.volumes.push_back(ReadVolume(e)); }); }},
        {"renderers",
-        [&](const JsonValue& v) {
-          v.Each([&](const JsonValue& e) {
-            sweep.renderers.push_back(Renderers()[e.OneOf(RendererNames())]);
-          });
-        }},
+        [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.renderers.push_back(Renderers()[e.OneOf(RendererNames())]); }); }},
        {"views", [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.views.push_back(ReadView(e, sweep.views.size())); }); }},
        {"policies", [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.policies.push_back(ReadPolicy(e)); }); }},
        {"workers",

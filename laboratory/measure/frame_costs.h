@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "common/planning/frame_plan.h"
-#include "laboratory/measure/cost_fit.h"
-#include "simulator/simulate_frames.h"
 #include "common/wire/payload.h"
 #include "laboratory/measure/box_costs.h"
+#include "laboratory/measure/cost_fit.h"
 #include "laboratory/measure/lab_worker.h"
+#include "simulator/simulate_frames.h"
 
 namespace slabstream {
 

@@ -15,9 +15,9 @@
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
 #include "common/renderers/renderer_kind.h"
-#include "simulator/simulate_frames.h"
 #include "laboratory/measure/calibrate.h"
 #include "laboratory/measure/combining_costs.h"
+#include "simulator/simulate_frames.h"
 
 namespace slabstream {
 namespace {

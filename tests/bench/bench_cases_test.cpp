@@ -1,5 +1,5 @@
-#include "common/planning/validate_request.h"
 #include "laboratory/bench/bench_cases.h"
+#include "common/planning/validate_request.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -19,8 +19,8 @@ TEST(BenchCases, NamesAreStableUniqueAndFitForFiles) {
   std::vector<std::string> names;
   for (const BenchCase& c : StandardBenchCases()) names.push_back(c.name);
   EXPECT_EQ(names, (std::vector<std::string>{"class1-256", "class2-256", "class1-256-opaque", "class2-256-opaque", "class1-512",
-                                             "zbuffer-class1-256", "raycast-class1-256", "raycast-class2-256",
-                                             "mip-class1-256", "mip-class2-256", "brain"}));
+                                             "zbuffer-class1-256", "raycast-class1-256", "raycast-class2-256", "mip-class1-256",
+                                             "mip-class2-256", "brain"}));
 }
 
 TEST(BenchCases, AllTransferFunctionsAndRequestsAreValid) {

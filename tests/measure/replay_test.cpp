@@ -1,5 +1,5 @@
-#include "common/renderers/registry.h"
 #include "laboratory/measure/replay.h"
+#include "common/renderers/registry.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

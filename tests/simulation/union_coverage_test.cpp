@@ -1,5 +1,5 @@
-#include "common/image/run_image.h"
 #include "common/simulation/union_coverage.h"
+#include "common/image/run_image.h"
 
 #include <gtest/gtest.h>
 

@@ -10,8 +10,8 @@
 #include <map>
 #include <vector>
 
-#include "common/image/pixel_bounds.h"
 #include "common/frame/frame_setup.h"
+#include "common/image/pixel_bounds.h"
 #include "worker/kernels/footprint_table.h"
 
 namespace slabstream {
