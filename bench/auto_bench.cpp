@@ -22,7 +22,7 @@
 #include "common/combining/schemes.h"
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
-#include "common/planning/learnt_cost.h"
+#include "common/planning/measured_cost.h"
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
 #include "common/renderers/registry.h"
@@ -79,12 +79,12 @@ Subject Load(const Options& options, std::string text) {
 
 Policy Automatic() {
   Policy policy;
-  policy.decomposition = policy.split = policy.assignment = policy.combine = kAutomatic;
+  policy.decomposition = policy.load_metric = policy.assignment = policy.combine = kAutomatic;
   return policy;
 }
 
 std::string Text(const Policy& policy) {
-  return fmt::format("{} by {}, {} groups, {}, {}", policy.decomposition, SplitOf(policy), policy.groups, policy.assignment,
+  return fmt::format("{} by {}, {} groups, {}, {}", policy.decomposition, LoadMetricOf(policy), policy.groups, policy.assignment,
                      policy.combine);
 }
 
@@ -190,7 +190,7 @@ void Simulate(const Options& options, const Subject& subject, int workers) {
   print("fixed", fixed, truth.Frame(AskFor(fixed.policy)));
   print("auto", chosen, truth.Frame(AskFor(chosen.policy)));
 
-  LearntCost learnt(grid);
+  MeasuredCost learnt(grid);
   learnt.Learn(truth.Seconds(AskFor(chosen.policy)), 1);
   const WorkField field = learnt.Field();
   question.known.cost = &field;
@@ -207,7 +207,7 @@ void Simulate(const Options& options, const Subject& subject, int workers) {
           for (const CombiningEntry& scheme : CombiningSchemes()) {
             Policy policy;
             policy.decomposition = decomposition.name;
-            policy.split = split;
+            policy.load_metric = split;
             policy.groups = groups;
             policy.assignment = assignment.name;
             policy.combine = scheme.name;
@@ -255,7 +255,7 @@ void Serve(const Options& options, const Subject& subject, int workers) {
           run.predicted.push_back(statistics.predicted->latency_seconds);
           run.predicted_render.push_back(statistics.predicted->render_seconds);
         }
-        run.text = fmt::format("{} by {}, {} groups, {}, {}", statistics.decomposition, statistics.split, statistics.groups,
+        run.text = fmt::format("{} by {}, {} groups, {}, {}", statistics.decomposition, statistics.load_metric, statistics.groups,
                                statistics.assignment, statistics.combine);
       }
     }

@@ -13,7 +13,7 @@
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
 #include "common/planning/balance.h"
-#include "common/planning/learnt_cost.h"
+#include "common/planning/measured_cost.h"
 #include "common/planning/placement.h"
 #include "common/renderers/registry.h"
 #include "common/volume/sphere.h"
@@ -107,7 +107,7 @@ struct Outcome {
   }
   std::string Text() const {
     const auto [least, most] = std::ranges::minmax(imbalance.values);
-    return fmt::format("{:5.3f} ({:5.3f} ... {:5.3f}), slowest {:6.2f} ms, all {:7.2f} ms, foretold to {:4.2f}", imbalance.median(), least,
+    return fmt::format("{:5.3f} ({:5.3f} ... {:5.3f}), slowest {:6.2f} ms, all {:7.2f} ms, predicted to {:4.2f}", imbalance.median(), least,
                        most, slowest.median(), sum.median(), residual.median());
   }
 };
@@ -143,8 +143,8 @@ class Comparison {
       AddResidual(setup, measured, fixed);
       if (options_.frames > 0) Balance(setup, request, layout, std::move(measured), balanced);
     }
-    fmt::print("{:22} {:8} {:9} {:10} {:4} boxes, max/mean {}\n", name_, policy.decomposition, SplitOf(policy), policy.assignment, boxes,
-               fixed.Text());
+    fmt::print("{:22} {:8} {:9} {:10} {:4} boxes, max/mean {}\n", name_, policy.decomposition, LoadMetricOf(policy), policy.assignment,
+               boxes, fixed.Text());
     if (options_.frames == 0) return;
     fmt::print("{:48} after {} frames, max/mean {}, {:.1f} Mvoxels moved\n", "", options_.frames, balanced.Text(), balanced.moved.median());
     std::fflush(stdout);
@@ -153,11 +153,11 @@ class Comparison {
  private:
   void AddResidual(const FrameSetup& setup, const Measured& measured, Outcome& outcome) const {
     const auto axis = std::size_t(std::min(Number(setup.camera.traversal_axis), 1));  // for views along z there is no prediction
-    double foretold = 0, squares = 0;
-    for (const BoxSeconds& box : measured.boxes) foretold += cost_->Seconds(box.box, {.along = Axis(axis)});
+    double predicted = 0, squares = 0;
+    for (const BoxSeconds& box : measured.boxes) predicted += cost_->Seconds(box.box, {.along = Axis(axis)});
     for (const BoxSeconds& box : measured.boxes) {
       if (cost_->Seconds(box.box, {.along = Axis(axis)}) == 0) continue;  // all its cost is in the halo
-      const double ratio = box.seconds / measured.sum / (cost_->Seconds(box.box, {.along = Axis(axis)}) / foretold);
+      const double ratio = box.seconds / measured.sum / (cost_->Seconds(box.box, {.along = Axis(axis)}) / predicted);
       squares += (ratio - 1) * (ratio - 1);
     }
     outcome.residual.values.push_back(std::sqrt(squares / double(measured.boxes.size())));
@@ -165,7 +165,7 @@ class Comparison {
 
   // Same as the coordinator's LayoutTable.
   void Balance(const FrameSetup& setup, LayoutRequest request, Layout layout, Measured measured, Outcome& outcome) const {
-    LearntCost learnt(grid_);
+    MeasuredCost learnt(grid_);
     std::int64_t moved = 0;
     std::vector<double> seconds = measured.by_box;  // of this layout, over its frames
     for (int frame = 0, seen = 1; frame < options_.frames; ++frame, ++seen) {
@@ -206,8 +206,8 @@ void Run(const Options& options) {
       Policy policy = options.policy;
       policy.decomposition = decomposition.name;
       for (const std::string& split : options.splits) {
-        policy.split = split;
-        if (decomposition.name == "octree" && split != decomposition.split) continue;  // blind to work
+        policy.load_metric = split;
+        if (decomposition.name == "octree" && split != decomposition.load_metric) continue;  // blind to work
         comparison.Run(policy);
       }
     }

@@ -40,11 +40,11 @@ void PrintMachine() {
   const Calibration calibration = CalibrateThisHost(2).value();
   const CombiningCosts& c = calibration.machine.combining;
   fmt::print(
-      "ns a pixel: scan {:.3f}, encode {:.3f}, combine {:.3f}, local {:.3f}, hidden {:.3f}; hand-over to a thread that is awake {}, asleep "
+      "ns a pixel: scan {:.3f}, encode {:.3f}, combine {:.3f}, local {:.3f}, hidden {:.3f}; wake-up to a thread that is awake {}, asleep "
       "{}; "
       "two halves of a sphere slow each other down by {}\n",
       c.scan_pixel * 1e9, c.encode_pixel * 1e9, c.combine_pixel * 1e9, c.local_pixel * 1e9, c.hidden_pixel * 1e9,
-      Microseconds(calibration.hand_overs.awake), Microseconds(calibration.hand_overs.asleep), Percent(calibration.memory_slowdown));
+      Microseconds(calibration.wake_ups.awake), Microseconds(calibration.wake_ups.asleep), Percent(calibration.memory_slowdown));
 }
 
 void Validate(const BenchCase& c, const std::shared_ptr<const Volume>& volume, const BenchOptions& options) {
@@ -56,10 +56,9 @@ void Validate(const BenchCase& c, const std::shared_ptr<const Volume>& volume, c
                          high * 1e3, p.render * 1e3, p.picture * 1e3, (p.latency - p.render - p.picture) * 1e3);
     };
     const ValidatedView mean = row.Mean();
-    fmt::print("{} {} workers: measured {}, simulated {}, off by {:+.1f} %, at worst {:+.1f} %; hand-overs {}, {}{}\n", row.name,
-               row.workers, parts(mean.measured, mean.measured_low, mean.measured_high),
-               parts(mean.simulated, mean.simulated_low, mean.simulated_high), row.error() * 100, row.worst_error() * 100,
-               Microseconds(row.hand_overs.awake), Microseconds(row.hand_overs.asleep),
+    fmt::print("{} {} workers: measured {}, simulated {}, off by {:+.1f} %, at worst {:+.1f} %; wake-ups {}, {}{}\n", row.name, row.workers,
+               parts(mean.measured, mean.measured_low, mean.measured_high), parts(mean.simulated, mean.simulated_low, mean.simulated_high),
+               row.error() * 100, row.worst_error() * 100, Microseconds(row.wake_ups.awake), Microseconds(row.wake_ups.asleep),
                workers == 2 ? ", slowdown " + Percent(row.slowdown) : "");
     (void)std::fflush(stdout);
   }

@@ -106,10 +106,10 @@ Planned Plan(const Subject& subject, const Policy& policy, int workers, int fram
 
 MachineModel MachineFor(const std::string& link, double one_seconds, int size) {
   MachineModel machine;
-  static const HandOvers hand_overs = CalibrateThisHost(1).value().machine.hand_overs;
+  static const WakeUps wake_ups = CalibrateThisHost(1).value().machine.wake_ups;
   static const CombiningCosts messages = MeasureCombining(Transfer::kMessage);
   machine.combining = messages;
-  machine.hand_overs = hand_overs;
+  machine.wake_ups = wake_ups;
   machine.client_seconds = 0;
   machine.link = ParseLink("link", link).value();
   machine.workers_a_host = 1;
@@ -118,7 +118,7 @@ MachineModel MachineFor(const std::string& link, double one_seconds, int size) {
     // As laboratory/experiments/machines.cpp: the paper's ratio of computing to communicating, and no costs around a frame.
     machine.link.bytes_per_second = double(size) * size * machine.combining.rgba_bytes / (0.083 / 72.89 * one_seconds);
     machine.plan_seconds = machine.message_seconds = machine.client_seconds = 0;
-    machine.hand_overs = {.awake = 0, .asleep = 0};
+    machine.wake_ups = {.awake = 0, .asleep = 0};
     machine.combining.hidden_pixel = 0;
     machine.cores_a_host = 1;
   }
@@ -185,7 +185,7 @@ void Run(const Options& options) {
   const int team = options.team == 0 ? options.workers : options.team;
   for (const std::string& decomposition : options.decompositions) {
     for (const std::string split : {"voxels", "occupied", "cost"}) {
-      Policy policy{.decomposition = decomposition, .split = split, .axis = options.axis, .groups = 1};
+      Policy policy{.decomposition = decomposition, .load_metric = split, .axis = options.axis, .groups = 1};
       const bool dynamic = split == "cost";
       if (dynamic) policy.balance = kDynamicBalance;
       Planned planned = Plan(subject, policy, team, dynamic ? options.frames : 1, options.repeats);

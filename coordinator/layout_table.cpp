@@ -47,7 +47,7 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
   if (request.occupied != nullptr) {
     learnt = FindLearnt(key.volume);
     if (learnt == nullptr) {
-      learnt = &learnt_.emplace_front(Learnt{key.volume, LearntCost(*request.occupied)});
+      learnt = &learnt_.emplace_front(Learnt{key.volume, MeasuredCost(*request.occupied)});
       KeepFirst(learnt_, kMaxLearnt);
     }
   }
@@ -77,7 +77,7 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
   if (known && policy.dynamic_balance) {
     if (entry.frames_seen >= std::clamp(entry.changes, 1, kMostPatience))
       better = Rebalance(*entry.layout, entry.seconds, with_cost(), entry.frames_seen);
-  } else if (known && !entry.by_cost && policy.split == WorkSplit::kCost) {
+  } else if (known && !entry.by_cost && policy.load_metric == LoadMetric::kCost) {
     better = MakeLayout(with_cost());
     entry.by_cost = true;
   }

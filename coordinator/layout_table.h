@@ -16,7 +16,7 @@
 
 #include "common/planning/classified_volume.h"
 #include "common/planning/frame_plan.h"
-#include "common/planning/learnt_cost.h"
+#include "common/planning/measured_cost.h"
 #include "common/stats/report.h"
 #include "common/volume/occupancy_grid.h"
 
@@ -69,7 +69,7 @@ class LayoutTable {
   };
   struct Learnt {
     ClassifiedVolume volume;
-    LearntCost cost;
+    MeasuredCost cost;
   };
   Learnt* FindLearnt(const ClassifiedVolume& volume);
 

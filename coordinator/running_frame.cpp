@@ -238,7 +238,7 @@ FrameStatistics RunningFrame::Statistics(Time now) const {
                              .groups = group_count(),
                              .attempts = attempt(),
                              .decomposition = std::string(policy.decomposition->name),
-                             .split = std::string(NameOf(policy.split)),
+                             .load_metric = std::string(NameOf(policy.load_metric)),
                              .axis = std::string(1, Letter(policy.axis)),
                              .assignment = std::string(policy.assignment->name),
                              .balance = request_.submit.frame.policy.balance,

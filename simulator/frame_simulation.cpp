@@ -91,7 +91,7 @@ FrameSimulation::FrameSimulation(std::span<const FrameInput> frames, const Machi
       options_(options),
       ids_(WorkersOf(frames)),
       network_(machine.link, std::uint32_t(ids_.size()) + 1),  // the last end is the coordinator's
-      threads_(machine.hand_overs, std::uint32_t(ids_.size())),
+      threads_(machine.wake_ups, std::uint32_t(ids_.size())),
       lanes_(machine, std::uint32_t(ids_.size()), threads_),
       coordinator_(MakeCoordinatorConfig()) {
   for (Index worker = 0; worker < ids_.size(); ++worker) workers_.push_back(MakeWorker(worker));

@@ -1,5 +1,5 @@
 // Threads: when a thread begins with what it is handed, in virtual time. One that was at work a moment ago is quick; one that sleeps must
-// be woken, on a core that may sleep, too, and finds its data out of the caches (HandOvers).
+// be woken, on a core that may sleep, too, and finds its data out of the caches (WakeUps).
 #pragma once
 
 #include <cstddef>
@@ -20,7 +20,7 @@ class Threads {
   static Id Of(std::uint32_t worker, Lane lane) { return Machine(worker) + 1 + Id(lane); }
 
   // All have been at work until time 0.
-  Threads(const HandOvers& costs, std::uint32_t workers) : costs_(costs), active_until_(Machine(workers)) {}
+  Threads(const WakeUps& costs, std::uint32_t workers) : costs_(costs), active_until_(Machine(workers)) {}
 
   // When the thread begins with what it is handed at `now`; it is at work then.
   double Begin(Id thread, double now) {
@@ -32,7 +32,7 @@ class Threads {
   void Active(Id thread, double until) { active_until_[thread] = until > active_until_[thread] ? until : active_until_[thread]; }
 
  private:
-  const HandOvers costs_;
+  const WakeUps costs_;
   std::vector<double> active_until_;
 };
 

@@ -47,7 +47,7 @@ void WorkerLanes::Add(LaneTask task, double now) {
   LaneState& lane = workers_[task.worker][std::size_t(LaneOf(task.work))];
   if (lane.taken) return lane.waiting.push_back(std::move(task));
   lane.taken = true;
-  HandOver(std::move(task), now);
+  WakeUp(std::move(task), now);
 }
 
 bool WorkerLanes::Idle(std::uint32_t worker, Lane lane) const { return !workers_[worker][std::size_t(lane)].taken; }
@@ -70,7 +70,7 @@ std::optional<LaneTask> WorkerLanes::Step() {
   threads_.Active(task.direct ? Threads::Machine(task.worker) : Threads::Of(task.worker, lane), done.time);
   LaneState& state = workers_[task.worker][std::size_t(lane)];
   state.taken = !state.waiting.empty();
-  if (state.taken) {  // a task in a lane's own queue needs no hand-over
+  if (state.taken) {  // a task in a lane's own queue needs no wake-up
     LaneTask next = std::move(state.waiting.front());
     state.waiting.pop_front();
     Begin(std::move(next), done.time);
@@ -78,10 +78,10 @@ std::optional<LaneTask> WorkerLanes::Step() {
   return task;
 }
 
-void WorkerLanes::HandOver(LaneTask task, double now) {
+void WorkerLanes::WakeUp(LaneTask task, double now) {
   const double begin = task.direct ? now : threads_.Begin(Threads::Of(task.worker, LaneOf(task.work)), now);
   if (begin == now) return Begin(std::move(task), now);
-  starts_.push({begin, hand_overs_++, std::move(task)});
+  starts_.push({begin, wake_ups_++, std::move(task)});
 }
 
 // Only the first thread does the serial share of the work.

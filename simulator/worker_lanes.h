@@ -64,7 +64,7 @@ class WorkerLanes {
     friend bool operator>(const Start& a, const Start& b) { return a.time != b.time ? a.time > b.time : a.order > b.order; }
   };
 
-  void HandOver(LaneTask task, double now);
+  void WakeUp(LaneTask task, double now);
   void Begin(LaneTask task, double now);
   double SpeedOf(std::uint32_t worker) const;
   double Slowness(std::uint32_t frame, std::uint32_t worker) const;
@@ -73,7 +73,7 @@ class WorkerLanes {
   Threads& threads_;
   Processors processors_;
   std::priority_queue<Start, std::vector<Start>, std::greater<>> starts_;  // of tasks that were handed over
-  std::uint64_t hand_overs_ = 0;
+  std::uint64_t wake_ups_ = 0;
   std::vector<Worker> workers_;
   std::unordered_map<std::uint64_t, LaneTask> running_;
   std::uint64_t tasks_started_ = 0;

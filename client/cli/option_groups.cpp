@@ -173,8 +173,8 @@ void AddPolicyOptions(CLI::App& app, Policy& policy) {
       {AxisChoice::kX, AxisChoice::kY, AxisChoice::kZ, AxisChoice::kAuto, AxisChoice::kView},
       "Axis along which slabs are cut, and other boxes first: x, y, z, auto, or view, the axis nearest to the view direction")
       ->default_str("auto");
-  AddNamed(app, "--balance-by", policy.split, WorkSplits(), "The load metric: what boxes have equal shares of");
-  AddNamed(app, "--split", policy.split, WorkSplits(), "")->group(kHidden);
+  AddNamed(app, "--balance-by", policy.load_metric, LoadMetrics(), "The load metric: what boxes have equal shares of");
+  AddNamed(app, "--split", policy.load_metric, LoadMetrics(), "")->group(kHidden);
   AddNamed(app, "--assignment", policy.assignment, Assignments(), "Which worker owns which box", kLeftToThePlanner);
   AddNamed(app, "--balance", policy.balance, BalanceModes(), "Whether boxes change from frame to frame");
   AddInteger(app, "--groups", policy.groups, 0, kMaxGroups,

@@ -27,7 +27,7 @@ enum class AxisChoice : std::uint8_t { kX = 0, kY = 1, kZ = 2, kAuto = 3, kView 
 
 struct Policy {
   std::string decomposition = "slab";  // a name of Decompositions(), or "auto" (kAutomatic), like the other names
-  std::string split = "auto";          // of WorkSplits(): what boxes have equal shares of
+  std::string load_metric = "auto";    // of LoadMetrics(): what boxes have equal shares of
   AxisChoice axis = AxisChoice::kAuto;
   int groups = 0;                     // [1, kMaxGroups]; 0: the planner chooses
   std::string assignment = "cyclic";  // of Assignments(), or "auto": who owns which box

@@ -54,7 +54,7 @@ std::int64_t MovedVoxels(const Layout& from, const Layout& to) {
   return moved;
 }
 
-Layout HandOver(const Layout& layout, std::uint32_t slots, std::span<const double> seconds) {
+Layout Reassign(const Layout& layout, std::uint32_t slots, std::span<const double> seconds) {
   Layout changed = layout;
   std::vector<double> sums = SlotSeconds(layout, slots, seconds);
   for (std::size_t moves = 0; moves < seconds.size(); ++moves) {
@@ -89,12 +89,12 @@ std::optional<Layout> Rebalance(const Layout& now, std::span<const double> secon
     chosen = std::move(candidate);
   };
 
-  Layout handed_over = HandOver(now, request.slots, seconds);
-  const double after_hand_over = FrameSeconds(handed_over, request.slots, seconds);
-  weigh(std::move(handed_over), FrameSeconds(now, request.slots, seconds), after_hand_over);
+  Layout reassigned = Reassign(now, request.slots, seconds);
+  const double after_wake_up = FrameSeconds(reassigned, request.slots, seconds);
+  weigh(std::move(reassigned), FrameSeconds(now, request.slots, seconds), after_wake_up);
 
   ResolvedPolicy by_cost = *request.policy;
-  by_cost.split = WorkSplit::kCost;
+  by_cost.load_metric = LoadMetric::kCost;
   LayoutRequest other_boxes = request;
   other_boxes.policy = &by_cost;
   const auto predicted = [&](const Layout& layout) {

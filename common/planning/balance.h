@@ -33,7 +33,7 @@ double FrameSeconds(const Layout& layout, std::uint32_t slots, std::span<const d
 std::int64_t MovedVoxels(const Layout& from, const Layout& to);
 
 // Keeps the boxes. Moves one after the other from the busiest slot to the least busy one, as long as that helps. `seconds` by box.
-Layout HandOver(const Layout& layout, std::uint32_t slots, std::span<const double> seconds);
+Layout Reassign(const Layout& layout, std::uint32_t slots, std::span<const double> seconds);
 
 // The layout to change to, if any. `request` is what `now` was made for, with known.cost; `seconds` are the times of the boxes of `now` in
 // `frames_seen` >= 1 frames. Comparisons use one kind of time on both sides: measured times of boxes to hand over, costs of cells to cut

@@ -1,7 +1,7 @@
 // CostEstimator: the time that boxes of a volume take, for layouts, the choice of a policy and predicted frames.
 //
 // Without measured frames it returns the renderer's analytic cost (AnalyticCost) for the view. With them it returns the measured cost of
-// each part of the volume, an average over the frames' views (LearntCost).
+// each part of the volume, an average over the frames' views (MeasuredCost).
 #pragma once
 
 #include <memory>

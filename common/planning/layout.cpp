@@ -8,7 +8,7 @@
 #include "common/base/check.h"
 #include "common/planning/brick_visibility.h"
 #include "common/planning/cost_estimator.h"
-#include "common/planning/learnt_cost.h"
+#include "common/planning/measured_cost.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/view/sheet_grid.h"
 
@@ -38,9 +38,9 @@ class WorkFields {
         visibility_(*request.summary, request.renderer->DrawnTable(*request.transfer, *request.summary)),
         voxels_(WorkField::Uniform(request.summary->description.geometry.size)) {}
 
-  const WorkField& Of(WorkSplit split) {
-    if (split == WorkSplit::kVoxels) return voxels_;
-    if (split == WorkSplit::kCost && request_.known.cost != nullptr) return *request_.known.cost;
+  const WorkField& Of(LoadMetric metric) {
+    if (metric == LoadMetric::kVoxels) return voxels_;
+    if (metric == LoadMetric::kCost && request_.known.cost != nullptr) return *request_.known.cost;
     if (!occupied_) occupied_.emplace(Grid());
     return *occupied_;
   }
@@ -55,7 +55,7 @@ class WorkFields {
   bool Shows(const Box& box) {
     const Box with_halo = Grown(box, request_.renderer->reach(), request_.summary->description.geometry.bounds());
     if (request_.known.occupied == nullptr) return visibility_.AnyVisible(with_halo);
-    return !Of(WorkSplit::kOccupied).Hull(with_halo).empty();
+    return !Of(LoadMetric::kOccupied).Hull(with_halo).empty();
   }
 
  private:
@@ -127,17 +127,17 @@ struct LayoutMaker::State {
 
   // Of a layout: the render time of a frame, averaged over views, and each box's largest share of the work of any view. Boxes of equal work
   // on average may each be the slowest in some view; boxes that are equal by this measure are equal in all views.
-  struct Foretold {
+  struct Predicted {
     double frame = 0;
     std::vector<BoxSeconds> shares;
   };
-  Foretold Foretell(const Layout& layout) {
-    Foretold foretold;
+  Predicted Predict(const Layout& layout) {
+    Predicted predicted;
     std::vector<ByView> times, slots(request.slots);
     ByView sum{};
     for (std::size_t box = 0; box < layout.owners.size(); ++box) {
       if (layout.owners[box] == kNoSlot) continue;
-      foretold.shares.push_back({layout.partition.boxes()[box]});
+      predicted.shares.push_back({layout.partition.boxes()[box]});
       times.push_back(PredictedSeconds(layout.partition.boxes()[box]));
       for (std::size_t view = 0; view < kViews; ++view) {
         slots[layout.owners[box]][view] += times.back()[view];
@@ -147,32 +147,32 @@ struct LayoutMaker::State {
     for (std::size_t view = 0; view < kViews; ++view) {
       if (sum[view] == 0) continue;
       for (std::size_t i = 0; i < times.size(); ++i) {
-        foretold.shares[i].seconds = std::max(foretold.shares[i].seconds, times[i][view] / sum[view]);
+        predicted.shares[i].seconds = std::max(predicted.shares[i].seconds, times[i][view] / sum[view]);
       }
-      foretold.frame += std::ranges::max(slots, {}, [view](const ByView& slot) { return slot[view]; })[view] / kViews;
+      predicted.frame += std::ranges::max(slots, {}, [view](const ByView& slot) { return slot[view]; })[view] / kViews;
     }
-    return foretold;
+    return predicted;
   }
 
   // A sequence of layouts: each is cut by the predicted times of the last one's boxes.
   struct Refined {
     explicit Refined(const OccupancyGrid& grid) : cost(grid) {}
-    LearntCost cost;
+    MeasuredCost cost;
     Layout best;
     double frame = std::numeric_limits<double>::infinity();  // of the best one
   };
   void Refine(const ResolvedPolicy& policy, int groups, int shape, const Partition* resized, Refined& refined) {
     const WorkField field = refined.cost.Field();
     Layout layout = Assign(MakePartition(policy, groups, field, resized, shape), policy);
-    const Foretold foretold = Foretell(layout);
-    refined.cost.Learn(foretold.shares, 1);
-    if (foretold.frame >= refined.frame) return;
-    refined.frame = foretold.frame;
+    const Predicted predicted = Predict(layout);
+    refined.cost.Learn(predicted.shares, 1);
+    if (predicted.frame >= refined.frame) return;
+    refined.frame = predicted.frame;
     refined.best = std::move(layout);
   }
 
   // First cuts boxes anew in each shape, then resizes those of the best shape.
-  Layout MakeByForetoldWork(const ResolvedPolicy& policy, int groups) {
+  Layout MakeByPredictedCost(const ResolvedPolicy& policy, int groups) {
     constexpr int kCuts = 2, kResizings = 3;
     std::optional<Refined> best;
     for (int shape = 0; shape < policy.decomposition->shapes; ++shape) {
@@ -199,19 +199,19 @@ LayoutMaker::LayoutMaker(LayoutMaker&&) noexcept = default;
 int LayoutMaker::FewestGroups(const ResolvedPolicy& policy) {
   if (policy.groups > 0) return policy.groups;
   const int most = MostGroups(state_->request, policy);
-  const WorkField& work = state_->fields.Of(policy.split);
+  const WorkField& work = state_->fields.Of(policy.load_metric);
   int groups = 1;
   while (groups < most && !state_->SlabsFit(state_->MakePartition(policy, groups, work))) ++groups;
   return groups;
 }
 
 Layout LayoutMaker::Make(const ResolvedPolicy& policy) {
-  const WorkSplit split = policy.split;
+  const LoadMetric metric = policy.load_metric;
   const int groups = FewestGroups(policy);
-  if (split == WorkSplit::kOccupied || (split == WorkSplit::kCost && state_->request.known.cost == nullptr)) {
-    return state_->MakeByForetoldWork(policy, groups);
+  if (metric == LoadMetric::kOccupied || (metric == LoadMetric::kCost && state_->request.known.cost == nullptr)) {
+    return state_->MakeByPredictedCost(policy, groups);
   }
-  return state_->Assign(state_->MakePartition(policy, groups, state_->fields.Of(split), state_->request.resized), policy);
+  return state_->Assign(state_->MakePartition(policy, groups, state_->fields.Of(metric), state_->request.resized), policy);
 }
 
 Layout MakeLayout(const LayoutRequest& request) { return LayoutMaker(request).Make(*request.policy); }

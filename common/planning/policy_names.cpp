@@ -4,7 +4,7 @@
 
 namespace slabstream {
 
-const std::vector<NamedChoice>& WorkSplits() {
+const std::vector<NamedChoice>& LoadMetrics() {
   static const std::vector<NamedChoice> choices = {
       {kAutomatic, "what suits the decomposition"},
       {"voxels", "equal voxels"},
@@ -14,14 +14,14 @@ const std::vector<NamedChoice>& WorkSplits() {
   return choices;
 }
 
-std::optional<WorkSplit> FindWorkSplit(std::string_view name) {
-  const std::vector<NamedChoice>& choices = WorkSplits();
+std::optional<LoadMetric> FindLoadMetric(std::string_view name) {
+  const std::vector<NamedChoice>& choices = LoadMetrics();
   const auto found = std::find_if(choices.begin() + 1, choices.end(), [name](const NamedChoice& choice) { return choice.name == name; });
   if (found == choices.end()) return std::nullopt;
-  return WorkSplit(found - choices.begin() - 1);
+  return LoadMetric(found - choices.begin() - 1);
 }
 
-std::string_view NameOf(WorkSplit split) { return WorkSplits()[std::size_t(split) + 1].name; }
+std::string_view NameOf(LoadMetric metric) { return LoadMetrics()[std::size_t(metric) + 1].name; }
 
 const std::vector<NamedChoice>& BalanceModes() {
   static const std::vector<NamedChoice> choices = {

@@ -1,6 +1,6 @@
 // The names that a Policy may hold besides those of Decompositions(), Assignments() and CombiningSchemes().
 //
-// kAutomatic leaves the choice of decomposition, assignment and combine to ChoosePolicy (coordinator/tuning). As a split it means the one
+// kAutomatic leaves the choice of decomposition, assignment and combine to ChoosePolicy (coordinator/tuning). As a load metric it means the one
 // that suits the decomposition; if the decomposition is open, both are chosen together.
 #pragma once
 
@@ -24,11 +24,11 @@ struct NamedChoice {
   std::string_view purpose;  // one line for --help
 };
 
-// --split: what boxes have equal shares of.
-enum class WorkSplit { kVoxels, kOccupied, kCost };
-const std::vector<NamedChoice>& WorkSplits();                   // kAutomatic first, then by WorkSplit
-std::optional<WorkSplit> FindWorkSplit(std::string_view name);  // none: kAutomatic, or no such name
-std::string_view NameOf(WorkSplit split);
+// --balance-by: what boxes have equal shares of.
+enum class LoadMetric { kVoxels, kOccupied, kCost };
+const std::vector<NamedChoice>& LoadMetrics();                    // kAutomatic first, then by LoadMetric
+std::optional<LoadMetric> FindLoadMetric(std::string_view name);  // none: kAutomatic, or no such name
+std::string_view NameOf(LoadMetric metric);
 
 // --balance: whether boxes change between frames.
 const std::vector<NamedChoice>& BalanceModes();  // "static", "dynamic"

@@ -27,7 +27,7 @@ Status CheckOpenName(std::string_view field, std::string_view name, const std::v
 
 Status CheckNames(const Policy& policy) {
   if (Status s = CheckOpenName("policy.decomposition", policy.decomposition, Decompositions()); !s.ok()) return s;
-  if (Status s = CheckName("policy.split", policy.split, WorkSplits()); !s.ok()) return s;
+  if (Status s = CheckName("policy.load_metric", policy.load_metric, LoadMetrics()); !s.ok()) return s;
   if (Status s = CheckOpenName("policy.assignment", policy.assignment, Assignments()); !s.ok()) return s;
   if (Status s = CheckName("policy.balance", policy.balance, BalanceModes()); !s.ok()) return s;
   if (policy.combine == kAutomatic) return Status::Ok();
@@ -51,7 +51,7 @@ Result<ResolvedPolicy> ResolvePolicy(const FrameRequest& request, const VolumeGe
   }
   ResolvedPolicy resolved;
   resolved.decomposition = FindNamed(Decompositions(), policy.decomposition);
-  resolved.split = FindWorkSplit(SplitOf(policy)).value();
+  resolved.load_metric = FindLoadMetric(LoadMetricOf(policy)).value();
   resolved.axis = SlabAxis(policy.axis, *resolved.decomposition, geometry.size);
   resolved.groups = policy.groups;
   resolved.assignment = FindNamed(Assignments(), policy.assignment);
@@ -64,7 +64,7 @@ Result<ResolvedPolicy> ResolvePolicy(const FrameRequest& request, const VolumeGe
 
 Policy AskFor(const ResolvedPolicy& policy) {
   return {.decomposition = std::string(policy.decomposition->name),
-          .split = std::string(NameOf(policy.split)),
+          .load_metric = std::string(NameOf(policy.load_metric)),
           .axis = AxisChoice(policy.axis),
           .groups = policy.groups,
           .assignment = std::string(policy.assignment->name),
@@ -86,19 +86,19 @@ Axis SlabAxis(AxisChoice choice, const DecompositionEntry& decomposition, const 
   return longest;
 }
 
-std::string_view SplitOf(const Policy& policy) {
-  if (policy.split != kAutomatic || policy.decomposition == kAutomatic) return policy.split;
-  return FindNamed(Decompositions(), policy.decomposition)->split;
+std::string_view LoadMetricOf(const Policy& policy) {
+  if (policy.load_metric != kAutomatic || policy.decomposition == kAutomatic) return policy.load_metric;
+  return FindNamed(Decompositions(), policy.decomposition)->load_metric;
 }
 
 bool NeedsOccupancy(const Policy& policy) {
   if (policy.decomposition == kAutomatic || policy.assignment == kAutomatic) return true;
-  return FindWorkSplit(SplitOf(policy)) != WorkSplit::kVoxels || FindNamed(Assignments(), policy.assignment)->by_cost ||
+  return FindLoadMetric(LoadMetricOf(policy)) != LoadMetric::kVoxels || FindNamed(Assignments(), policy.assignment)->by_cost ||
          policy.balance == kDynamicBalance;
 }
 
 bool NeedsOccupancy(const ResolvedPolicy& policy) {
-  return policy.split != WorkSplit::kVoxels || policy.assignment->by_cost || policy.dynamic_balance;
+  return policy.load_metric != LoadMetric::kVoxels || policy.assignment->by_cost || policy.dynamic_balance;
 }
 
 }  // namespace slabstream

@@ -16,7 +16,7 @@ namespace slabstream {
 
 struct ResolvedPolicy {
   const DecompositionEntry* decomposition = nullptr;  // of Decompositions(), never null
-  WorkSplit split = WorkSplit::kVoxels;
+  LoadMetric load_metric = LoadMetric::kVoxels;
   Axis axis = Axis::kZ;                         // the axis that is cut, or cut first
   int groups = 0;                               // [1, kMaxGroups]; 0: the fewest that memory allows (LayoutMaker::FewestGroups)
   const AssignmentEntry* assignment = nullptr;  // of Assignments(), never null
@@ -43,8 +43,8 @@ Policy SettledPolicy(const FrameRequest& request, const VolumeGeometry& geometry
 // kView.
 Axis SlabAxis(AxisChoice choice, const DecompositionEntry& decomposition, const Index3& size);
 
-// The policy's split. "auto" becomes what suits the decomposition, and stays "auto" while that is open. The policy's names must be known.
-std::string_view SplitOf(const Policy& policy);
+// The policy's load metric. "auto" becomes what suits the decomposition, and stays "auto" while that is open. The policy's names must be known.
+std::string_view LoadMetricOf(const Policy& policy);
 
 // Whether an exact OccupancyGrid improves the policy's layout, or the choice of it. The policy's names must be known.
 bool NeedsOccupancy(const Policy& policy);

@@ -33,10 +33,10 @@ Status Validate(const CombiningCosts& costs) {
   return InRange("combining.depth_bytes", costs.depth_bytes, 0, 1024);
 }
 
-Status Validate(const HandOvers& costs) {
-  if (Status s = InRange("hand_overs.awake", costs.awake, 0, kMaxSeconds); !s.ok()) return s;
-  if (Status s = InRange("hand_overs.asleep", costs.asleep, 0, kMaxSeconds); !s.ok()) return s;
-  return InRange("hand_overs.doze", costs.doze, 0, std::numeric_limits<double>::max());
+Status Validate(const WakeUps& costs) {
+  if (Status s = InRange("wake_ups.awake", costs.awake, 0, kMaxSeconds); !s.ok()) return s;
+  if (Status s = InRange("wake_ups.asleep", costs.asleep, 0, kMaxSeconds); !s.ok()) return s;
+  return InRange("wake_ups.doze", costs.doze, 0, std::numeric_limits<double>::max());
 }
 
 }  // namespace
@@ -44,7 +44,7 @@ Status Validate(const HandOvers& costs) {
 Status Validate(const MachineModel& machine) {
   if (Status s = Validate(machine.link); !s.ok()) return s;
   if (Status s = Validate(machine.combining); !s.ok()) return s;
-  if (Status s = Validate(machine.hand_overs); !s.ok()) return s;
+  if (Status s = Validate(machine.wake_ups); !s.ok()) return s;
   for (const double speed : machine.speeds) {
     if (Status s = InRange("speeds", speed, 1e-6, 1e6); !s.ok()) return s;
   }

@@ -28,11 +28,11 @@ struct CombiningCosts {
 
 // Seconds from one thread's handing something over (a message, a task, a result) until another one has begun with it: to encode and decode
 // it, to decide what to do, and to wake a sleeping thread. The same for all threads of the service and its clients.
-struct HandOvers {
+struct WakeUps {
   double awake = 25e-6;   // to a thread that was at work a moment ago
   double asleep = 60e-6;  // to one that has waited for `doze` seconds or longer; its core slept, too, or did other work
   double doze = 500e-6;
-  friend bool operator==(const HandOvers&, const HandOvers&) = default;
+  friend bool operator==(const WakeUps&, const WakeUps&) = default;
 };
 
 // Some workers render slower in some frames, for no reason that a plan could know. Which ones depends on the seed alone.
@@ -44,10 +44,10 @@ struct Stragglers {
 };
 
 struct MachineModel {
-  // Between workers. A message between a worker and the coordinator takes only its latency and waits for no other. Hand-overs come on top.
+  // Between workers. A message between a worker and the coordinator takes only its latency and waits for no other. Wake-ups come on top.
   LinkModel link;
   CombiningCosts combining;
-  HandOvers hand_overs;
+  WakeUps wake_ups;
   std::vector<double> speeds;  // of the workers, relative, > 0; worker i has speeds[i % size()]. Empty: all 1
   Stragglers stragglers;
   std::int32_t threads = 1;          // render threads of each worker
@@ -63,7 +63,7 @@ struct MachineModel {
 
   double plan_seconds = 200e-6;   // the coordinator plans a frame
   double message_seconds = 5e-6;  // the coordinator sends or takes a message, one after the other
-  double client_seconds = 50e-6;  // the picture's way from the coordinator to the client, without hand-over and decoding
+  double client_seconds = 50e-6;  // the picture's way from the coordinator to the client, without wake-up and decoding
   friend bool operator==(const MachineModel&, const MachineModel&) = default;
 };
 

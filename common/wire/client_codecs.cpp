@@ -78,7 +78,7 @@ v1::FrameStatistics ToProto(const FrameStatistics& in) {
   out.set_decomposition(WireText(in.decomposition, kMaxNameBytes));
   out.set_axis(WireText(in.axis, kMaxNameBytes));
   out.set_combine(WireText(in.combine, kMaxNameBytes));
-  out.set_split(WireText(in.split, kMaxNameBytes));
+  out.set_load_metric(WireText(in.load_metric, kMaxNameBytes));
   out.set_assignment(WireText(in.assignment, kMaxNameBytes));
   out.set_balance(WireText(in.balance, kMaxNameBytes));
   out.set_queued_ns(in.queued_ns);
@@ -99,7 +99,7 @@ FrameStatistics FromProto(const v1::FrameStatistics& in, Checker& check) {
   out.decomposition = check.Text("decomposition", in.decomposition(), 0, kMaxNameBytes);
   out.axis = check.Text("axis", in.axis(), 0, kMaxNameBytes);
   out.combine = check.Text("combine", in.combine(), 0, kMaxNameBytes);
-  out.split = check.Text("split", in.split(), 0, kMaxNameBytes);
+  out.load_metric = check.Text("load_metric", in.load_metric(), 0, kMaxNameBytes);
   out.assignment = check.Text("assignment", in.assignment(), 0, kMaxNameBytes);
   out.balance = check.Text("balance", in.balance(), 0, kMaxNameBytes);
   out.queued_ns = in.queued_ns();

@@ -141,7 +141,7 @@ v1::Policy ToProto(const Policy& in) {
   out.set_axis(WireEnum<v1::AxisChoice>(in.axis, AxisChoice::kX));
   out.set_groups(static_cast<std::uint32_t>(in.groups));
   out.set_combine(WireText(in.combine, kMaxNameBytes));
-  out.set_split(WireText(in.split, kMaxNameBytes));
+  out.set_load_metric(WireText(in.load_metric, kMaxNameBytes));
   out.set_assignment(WireText(in.assignment, kMaxNameBytes));
   out.set_balance(WireText(in.balance, kMaxNameBytes));
   out.set_pixel_error(in.pixel_error);
@@ -155,7 +155,7 @@ Policy FromProto(const v1::Policy& in, Checker& check) {
   out.axis = check.OneOf("axis", in.axis(), AxisChoice::kX, AxisChoice::kView);
   out.groups = static_cast<int>(check.Range("groups", in.groups(), 0, kMaxGroups));
   out.combine = check.Text("combine", in.combine(), 1, kMaxNameBytes);
-  out.split = check.Text("split", in.split(), 1, kMaxNameBytes);
+  out.load_metric = check.Text("load_metric", in.load_metric(), 1, kMaxNameBytes);
   out.assignment = check.Text("assignment", in.assignment(), 1, kMaxNameBytes);
   out.balance = check.Text("balance", in.balance(), 1, kMaxNameBytes);
   out.pixel_error = check.Between("pixel_error", in.pixel_error(), 0, kMaxPixelError);

@@ -77,14 +77,14 @@ class Search {
 
   void ChoosePartition() {
     for (const DecompositionEntry& entry : Decompositions()) {
-      for (const WorkSplit split : {WorkSplit::kVoxels, WorkSplit::kOccupied, WorkSplit::kCost}) {
-        const bool wanted = asked_.split == kAutomatic || asked_.split == NameOf(split);
-        // Until costs are known, a split by cost is the split by what is occupied.
-        const bool same = asked_.split == kAutomatic && split == WorkSplit::kCost && question_.known.cost == nullptr;
+      for (const LoadMetric metric : {LoadMetric::kVoxels, LoadMetric::kOccupied, LoadMetric::kCost}) {
+        const bool wanted = asked_.load_metric == kAutomatic || asked_.load_metric == NameOf(metric);
+        // Until costs are known, balancing by cost is balancing by occupied voxels.
+        const bool same = asked_.load_metric == kAutomatic && metric == LoadMetric::kCost && question_.known.cost == nullptr;
         if (!wanted || same) continue;
         ResolvedPolicy policy = best_;
         policy.decomposition = &entry;
-        policy.split = split;
+        policy.load_metric = metric;
         policy.axis = SlabAxis(asked_.axis, entry, question_.summary->description.geometry.size);
         policy.groups = FewestGroupsOf(policy);
         TryLayout(policy);
@@ -160,7 +160,7 @@ Policy FixedPolicy(Policy policy) {
   if (policy.decomposition == kAutomatic) policy.decomposition = defaults.decomposition;
   if (policy.assignment == kAutomatic) policy.assignment = defaults.assignment;
   if (policy.combine == kAutomatic) policy.combine = defaults.combine;
-  policy.split = SplitOf(policy);
+  policy.load_metric = LoadMetricOf(policy);
   return policy;
 }
 

@@ -1,6 +1,6 @@
 // ChoosePolicy: fills in what a policy leaves open ("auto"), by predicted frame times. Pure and deterministic.
 //
-// Candidates come from the lists (Decompositions, WorkSplits, Assignments, CombiningSchemes), so a new entry takes part by itself. Each is
+// Candidates come from the lists (Decompositions, LoadMetrics, Assignments, CombiningSchemes), so a new entry takes part by itself. Each is
 // judged by a simulated frame (frame_predictor.h). Choices are made one after the other, the most important first: the partition and what
 // its boxes have equal shares of; the number of groups and the assignment; the scheme and its arguments. A candidate must be predicted to
 // gain more than kLeastGain over the ones before it; the first is the policy that holds without choosing (FixedPolicy).

@@ -41,7 +41,7 @@ MachineModel ServiceMachine(std::span<const HostedWorker> workers, const Service
   }
   machine.link = {Contention::kNone, 0, kLoopbackRate};
   if (std::ranges::all_of(workers, &HostedWorker::lends_memory)) LendImages(machine);
-  machine.plan_seconds = machine.message_seconds = machine.client_seconds = 0;  // in the hand-overs, which are measured as a whole
+  machine.plan_seconds = machine.message_seconds = machine.client_seconds = 0;  // in the wake-ups, which are measured as a whole
   const bool coordinators_host = !workers.empty() && workers.front().memory_scope == surroundings.memory_scope;
   machine.workers_a_host = std::int32_t(std::max<std::size_t>(workers.size(), 1));
   machine.cores_a_host = std::max<std::int32_t>(coordinators_host ? surroundings.cores : std::int32_t(threads), 1);

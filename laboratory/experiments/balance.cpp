@@ -10,8 +10,8 @@
 #include "common/planning/policy_names.h"
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/figures.h"
-#include "laboratory/experiments/learnt_layouts.h"
 #include "laboratory/experiments/machines.h"
+#include "laboratory/experiments/measured_layouts.h"
 #include "laboratory/experiments/plots.h"
 #include "laboratory/experiments/policies.h"
 #include "laboratory/measure/box_costs.h"
@@ -85,7 +85,7 @@ Json MovingKey(const BenchCase& volume, const Moving& moving, int pixels, int fr
 
 Result<Json> MeasureMoving(ExperimentContext& context, const Balance& balance, const BenchCase& volume, const Moving& moving, int frames) {
   FrameCase frame = balance.Frame(volume, moving.policy, kTableWorkers);
-  Result<LearntLayouts> layouts = LearntLayouts::Make(context, frame);
+  Result<MeasuredLayouts> layouts = MeasuredLayouts::Make(context, frame);
   if (!layouts.ok()) return layouts.status();
   const LayoutKnowledge& knowledge = layouts->knowledge();
   Layout layout;
@@ -187,7 +187,7 @@ Result<Section> PartitionSection(ExperimentContext& context, const Balance& bala
   std::map<std::string, LineChart> imbalance, times;
   std::map<std::string, double> at_table;
   for (const NamedPolicy& named : AllPartitions()) {
-    const std::string& split = named.policy.split;
+    const std::string& split = named.policy.load_metric;
     LineSeries even{named.policy.decomposition, Origin::kMeasured, {}}, time{named.policy.decomposition, Origin::kSimulated, {}};
     for (const int p : balance.workers) {
       const Result<Outcome> outcome = AddRow(context, balance.Frame(volume, named.policy, p), named.name, table);

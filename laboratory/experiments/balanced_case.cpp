@@ -1,7 +1,7 @@
 #include "laboratory/experiments/balanced_case.h"
 
 #include "common/planning/policy_names.h"
-#include "laboratory/experiments/learnt_layouts.h"
+#include "laboratory/experiments/measured_layouts.h"
 #include "laboratory/measure/box_costs.h"
 
 namespace slabstream {
@@ -21,7 +21,7 @@ Json BalancedKey(const FrameCase& frame) {
 }
 
 Result<Json> MeasureBalanced(ExperimentContext& context, const FrameCase& frame) {
-  Result<LearntLayouts> layouts = LearntLayouts::Make(context, frame);
+  Result<MeasuredLayouts> layouts = MeasuredLayouts::Make(context, frame);
   if (!layouts.ok()) return layouts.status();
   Json learnt = Json::array();
   for (int i = 0; i < kBalancedFrames; ++i) {
@@ -53,7 +53,7 @@ Result<std::vector<MeasuredFrame>> RecallBalanced(ExperimentContext& context, co
   const FrameCase balanced = Balanced(frame);
   std::vector<MeasuredFrame> frames;
   for (const Json* repeat : context.log().All(BalancedKey(balanced))) {
-    Result<LearntLayouts> layouts = LearntLayouts::Make(context, balanced);
+    Result<MeasuredLayouts> layouts = MeasuredLayouts::Make(context, balanced);
     if (!layouts.ok()) return layouts.status();
     for (const Json& learnt : repeat->at("learnt")) {
       const Result<FramePlan> plan = PlanOf(context, balanced, layouts->Next(balanced));

@@ -33,7 +33,7 @@ constexpr int kLearningFrames = 8;  // to warm up with dynamic balance
 void AddPartition(Json& key, const FrameCase& frame) {
   const Policy& policy = frame.policy;
   key["decomposition"] = policy.decomposition;
-  key["split"] = SplitOf(policy);
+  key["split"] = LoadMetricOf(policy);
   key["axis"] = int(policy.axis);
   key["groups"] = policy.groups;
   key["workers"] = frame.workers;

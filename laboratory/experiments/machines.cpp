@@ -22,8 +22,8 @@ constexpr Found kNumbers[] = {
     {"combine_pixel", [](MachineModel& m) -> double& { return m.combining.combine_pixel; }},
     {"local_pixel", [](MachineModel& m) -> double& { return m.combining.local_pixel; }},
     {"hidden_pixel", [](MachineModel& m) -> double& { return m.combining.hidden_pixel; }},
-    {"hand_over_awake", [](MachineModel& m) -> double& { return m.hand_overs.awake; }},
-    {"hand_over_asleep", [](MachineModel& m) -> double& { return m.hand_overs.asleep; }},
+    {"wake_up_awake", [](MachineModel& m) -> double& { return m.wake_ups.awake; }},
+    {"wake_up_asleep", [](MachineModel& m) -> double& { return m.wake_ups.asleep; }},
     {"latency", [](MachineModel& m) -> double& { return m.link.latency_seconds; }},
     {"plan", [](MachineModel& m) -> double& { return m.plan_seconds; }},
     {"message", [](MachineModel& m) -> double& { return m.message_seconds; }},
@@ -71,7 +71,7 @@ MachineModel PaperMachine(const ExperimentContext& context, double frame_seconds
   machine.link.bytes_per_second = pixels * machine.combining.rgba_bytes / (kImageShare * frame_seconds);
   machine.plan_seconds = machine.message_seconds = machine.client_seconds = 0;
   machine.cores_a_host = 1;  // its workers were single processors
-  machine.hand_overs = {.awake = 0, .asleep = 0};
+  machine.wake_ups = {.awake = 0, .asleep = 0};
   machine.combining.hidden_pixel = 0;
   return machine;
 }

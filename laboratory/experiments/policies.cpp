@@ -14,7 +14,7 @@ std::vector<NamedPolicy> AllPartitions() {
     for (const std::string_view split : {"voxels", "occupied"}) {
       NamedPolicy named{fmt::format("{} by {}", entry.name, split), {}};
       named.policy.decomposition = entry.name;
-      named.policy.split = split;
+      named.policy.load_metric = split;
       named.policy.groups = 1;
       policies.push_back(std::move(named));
     }
@@ -27,7 +27,7 @@ NamedPolicy EqualSlabs() { return AllPartitions().front(); }
 NamedPolicy BalancedTree() {
   NamedPolicy tree{"kd-tree by occupied", {}};
   tree.policy.decomposition = "kd-tree";
-  tree.policy.split = "occupied";
+  tree.policy.load_metric = "occupied";
   tree.policy.groups = 1;
   return tree;
 }

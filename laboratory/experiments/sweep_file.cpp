@@ -104,7 +104,7 @@ SweepPolicy ReadPolicy(const JsonValue& value) {
   constexpr std::array<std::string_view, 5> kAxes = {"x", "y", "z", "auto", "view"};
   value.Fields({{"name", [&](const JsonValue& v) { read.name = v.Text(); }},
                 {"decomposition", [&](const JsonValue& v) { policy.decomposition = ReadName(v, Decompositions()); }},
-                {"split", [&](const JsonValue& v) { policy.split = ReadName(v, WorkSplits()); }},
+                {"split", [&](const JsonValue& v) { policy.load_metric = ReadName(v, LoadMetrics()); }},
                 {"assignment", [&](const JsonValue& v) { policy.assignment = ReadName(v, Assignments()); }},
                 {"axis", [&](const JsonValue& v) { policy.axis = AxisChoice(v.OneOf(kAxes)); }},
                 {"balance", [&](const JsonValue& v) { policy.balance = NamesIn(BalanceModes())[v.OneOf(NamesIn(BalanceModes()))]; }},
@@ -147,7 +147,7 @@ void CheckNamesDiffer(const std::vector<T>& entries, const char* list, std::opti
 }  // namespace
 
 std::string Describe(const Policy& policy) {
-  return fmt::format("{} by {}, {}, {}, {} groups, {}{}", policy.decomposition, SplitOf(policy), policy.assignment, policy.balance,
+  return fmt::format("{} by {}, {}, {}, {} groups, {}{}", policy.decomposition, LoadMetricOf(policy), policy.assignment, policy.balance,
                      policy.groups, policy.combine, policy.pixel_error > 0 ? fmt::format(", error {}", policy.pixel_error) : "");
 }
 

@@ -7,13 +7,13 @@
 #include "common/planning/frame_plan.h"
 #include "common/volume/sphere.h"
 #include "laboratory/measure/combining_costs.h"
-#include "laboratory/measure/hand_over_probe.h"
 #include "laboratory/measure/neighbours.h"
+#include "laboratory/measure/wake_up_probe.h"
 
 namespace slabstream {
 namespace {
 
-constexpr int kHandOverSamples = 40;
+constexpr int kWakeUpSamples = 40;
 constexpr int kSlowdownVolume = 128;
 
 }  // namespace
@@ -24,7 +24,7 @@ MachineModel ThisHost(int workers) {
   MachineModel machine;
   machine.combining = MeasureCombining(Transfer::kLent);
   machine.link = {Contention::kNone, 0, 1e12};  // pixels stay where they are
-  // The hand-overs to and from the coordinator include its work.
+  // The wake-ups to and from the coordinator include its work.
   machine.plan_seconds = machine.message_seconds = machine.client_seconds = 0;
   machine.workers_a_host = workers;
   machine.cores_a_host = int(std::max(std::thread::hardware_concurrency(), 1U));
@@ -33,8 +33,8 @@ MachineModel ThisHost(int workers) {
 }
 
 Result<Calibration> CalibrateThisHost(int workers) {
-  HandOverProbe probe;
-  if (Status status = probe.Sample(kHandOverSamples); !status.ok()) return status;
+  WakeUpProbe probe;
+  if (Status status = probe.Sample(kWakeUpSamples); !status.ok()) return status;
   const Volume sphere = MakeSphere({SphereClass::kFilled, kSlowdownVolume, 0.4}).value();
   FrameRequest request;
   request.dataset = "sphere";
@@ -42,7 +42,7 @@ Result<Calibration> CalibrateThisHost(int workers) {
   if (!plan.ok()) return plan.status();
 
   Calibration calibration{ThisHost(workers), probe.Estimates(), MeasureSlowdown(sphere, plan->setup)};
-  calibration.machine.hand_overs = calibration.hand_overs.Costs();
+  calibration.machine.wake_ups = calibration.wake_ups.Costs();
   calibration.machine.memory_slowdown = ModelSlowdown(calibration.memory_slowdown.median);
   return calibration;
 }

@@ -50,7 +50,7 @@ std::vector<std::vector<RecordedRank>> Regroup(const RecordedFrame& frame, const
   return groups;
 }
 
-void MakeReplayed(const RecordedFrame& frame, const ReplayChange& change, const HandOvers& hand_overs, Replayed& out) {
+void MakeReplayed(const RecordedFrame& frame, const ReplayChange& change, const WakeUps& wake_ups, Replayed& out) {
   const std::vector<std::vector<RecordedRank>> groups = Regroup(frame, change.workers);
   const std::string& combine = change.combine.empty() ? frame.combine : change.combine;
   FramePlan& plan = out.plan;
@@ -80,9 +80,9 @@ void MakeReplayed(const RecordedFrame& frame, const ReplayChange& change, const 
   }
   out.input.plan = &plan;
   out.input.finish_seconds = frame.picture_seconds;
-  // The time spent outside the coordinator, less the simulated part of it: the hand-overs of the request and of the picture.
+  // The time spent outside the coordinator, less the simulated part of it: the wake-ups of the request and of the picture.
   const double outside = frame.latency - (frame.end - frame.arrived);
-  out.input.receive_seconds = std::max(outside - hand_overs.awake - hand_overs.asleep, 0.0);
+  out.input.receive_seconds = std::max(outside - wake_ups.awake - wake_ups.asleep, 0.0);
 }
 
 bool Warm(const RecordedFrame& frame) { return frame.voxel_bytes == 0; }
@@ -128,7 +128,7 @@ Result<ReplayedRun> Simulated(std::span<const RecordedFrame> frames, const Repla
   std::vector<Replayed> replayed(frames.size());
   std::vector<FrameInput> inputs;
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    MakeReplayed(frames[i], change, machine.hand_overs, replayed[i]);
+    MakeReplayed(frames[i], change, machine.wake_ups, replayed[i]);
     inputs.push_back(replayed[i].input);
   }
   const Result<Timeline> timeline = SimulateFrames(inputs, machine, {.in_flight = in_flight, .keep_spans = false});

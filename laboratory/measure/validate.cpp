@@ -9,15 +9,15 @@
 #include "common/planning/placement.h"
 #include "laboratory/measure/calibrate.h"
 #include "laboratory/measure/frame_costs.h"
-#include "laboratory/measure/hand_over_probe.h"
 #include "laboratory/measure/lab_service.h"
 #include "laboratory/measure/plan_renderings.h"
+#include "laboratory/measure/wake_up_probe.h"
 
 namespace slabstream {
 namespace {
 
 constexpr char kDataset[] = "volume";
-constexpr int kHandOverSamples = 4;  // a turn
+constexpr int kWakeUpSamples = 4;  // a turn
 
 FrameParts PartsOf(const TimedPicture& timed) {
   FrameParts parts{.latency = double((timed.received - timed.submitted).count()) * 1e-9};
@@ -113,7 +113,7 @@ Result<ValidationRow> ValidateSimulation(const ValidationCase& what, const Valid
   }
   Result<std::vector<View>> views = MakeViews(what, options.views);
   if (!views.ok()) return views.status();
-  HandOverProbe probe;
+  WakeUpProbe probe;
   Result<std::unique_ptr<LabService>> service = LabService::Start(what.workers, {{kDataset, what.volume}});
   if (!service.ok()) return service.status();
   PlanRenderings renderings(*what.volume, what.workers);
@@ -123,7 +123,7 @@ Result<ValidationRow> ValidateSimulation(const ValidationCase& what, const Valid
   std::vector<double> slowdowns;
 
   for (int turn = -1; turn < options.turns; ++turn) {  // the first turn fetches voxels and makes normals
-    if (Status status = probe.Sample(kHandOverSamples); !status.ok()) return status;
+    if (Status status = probe.Sample(kWakeUpSamples); !status.ok()) return status;
     for (View& view : *views) {
       if (const Result<TimedPicture> first = (*service)->Render(view.request); !first.ok()) return first.status();
       const Result<TimedPicture> timed = (*service)->Render(view.request);
@@ -137,7 +137,7 @@ Result<ValidationRow> ValidateSimulation(const ValidationCase& what, const Valid
       for (const Placement& placement : PlacementsOf(view.plan)) view.costs.boxes[placement.id].seconds = seconds.boxes[placement.id];
       view.costs.picture = {.finish_seconds = picture.finish_elapsed, .receive_seconds = picture.receive_seconds};
       slowdowns.push_back(seconds.slowdown);
-      machine.hand_overs = probe.Estimates().Costs();
+      machine.wake_ups = probe.Estimates().Costs();
       machine.memory_slowdown = ModelSlowdown(seconds.slowdown);
       const FrameInput input = view.costs.Input(view.plan);
       const Result<Timeline> timeline = SimulateFrames(std::span(&input, 1), machine);
@@ -147,7 +147,7 @@ Result<ValidationRow> ValidateSimulation(const ValidationCase& what, const Valid
     }
   }
 
-  ValidationRow row{.name = what.name, .workers = what.workers, .machine = machine, .hand_overs = probe.Estimates()};
+  ValidationRow row{.name = what.name, .workers = what.workers, .machine = machine, .wake_ups = probe.Estimates()};
   if (what.workers == 2) row.slowdown = MedianOf(std::move(slowdowns));
   for (const View& view : *views) {
     const auto quartile = [&](const std::vector<FrameParts>& frames, double share) {

@@ -5,7 +5,7 @@
 //   - in this process, the boxes of its plan are rendered alone, on one thread; with two workers also both at once, which shows how much
 //     they slow each other down (neighbours.h); the picture is made and decoded.
 // Each of these is done twice in a row, and the second time counts: its threads have not slept for long, and its data is in the caches if
-// it fits. Before each turn, frames of another volume and service measure hand-overs. The measurements of a view in a turn are simulated on
+// it fits. Before each turn, frames of another volume and service measure wake-ups. The measurements of a view in a turn are simulated on
 // a model of this machine (calibrate.h). So both sides meet the same state of the machine, and both are medians over turns. No time
 // of the measured service enters the simulation.
 #pragma once
@@ -18,7 +18,7 @@
 #include "common/frame/frame_request.h"
 #include "common/simulation/machine_model.h"
 #include "common/volume/volume.h"
-#include "laboratory/measure/hand_over_fit.h"
+#include "laboratory/measure/wake_up_fit.h"
 
 namespace slabstream {
 
@@ -53,7 +53,7 @@ struct ValidationRow {
   int workers = 1;
   std::vector<ValidatedView> views;
   MachineModel machine;  // at the end
-  HandOverEstimates hand_overs;
+  WakeUpEstimates wake_ups;
   Estimate slowdown;  // of two workers' renderings, over all turns and views
 
   ValidatedView Mean() const;  // over views, each number separately

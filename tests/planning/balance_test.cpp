@@ -7,7 +7,7 @@
 
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
-#include "common/planning/learnt_cost.h"
+#include "common/planning/measured_cost.h"
 #include "common/renderers/registry.h"
 #include "tests/planning/support.h"
 #include "tests/support/random.h"
@@ -110,7 +110,7 @@ struct World {
   };
   Outcome Play(int frames, double noise) {
     Outcome outcome;
-    LearntCost learnt(grid);
+    MeasuredCost learnt(grid);
     Layout layout = MakeLayout(Request(nullptr));
     int seen = 0;
     std::vector<double> average;  // by box
@@ -177,7 +177,7 @@ TEST(Balance, MovesNothingWhereItDoesNotPay) {
   EXPECT_FALSE(Rebalance(layout, PredictedSeconds(layout, even), world.Request(&even), 1).has_value());
 }
 
-TEST(Balance, HandOverNeverMakesAFrameSlower) {
+TEST(Balance, ReassigningNeverMakesAFrameSlower) {
   World world;
   world.policy.decomposition = "subcube";
   world.policy.groups = 5;
@@ -186,7 +186,7 @@ TEST(Balance, HandOverNeverMakesAFrameSlower) {
     const WorkField truth = world.Truth();
     const Layout before = MakeLayout(world.Request(nullptr));
     const std::vector<double> seconds = PredictedSeconds(before, truth);
-    const Layout after = HandOver(before, kSlots, seconds);
+    const Layout after = Reassign(before, kSlots, seconds);
     EXPECT_EQ(after.partition, before.partition);
     EXPECT_LE(FrameSeconds(after, kSlots, seconds), FrameSeconds(before, kSlots, seconds));
     // No slot is further above the mean than a box weighs.
@@ -206,9 +206,9 @@ TEST(MovedVoxels, AreThoseThatASlotDidNotHoldWithTheirHalo) {
   EXPECT_EQ(MovedVoxels(from, to), 10 * 10 * ((28 - 16) + 28)) << "slot 1 held the halo of its box, twice 8 slices";
 }
 
-TEST(LearntCost, AddsUpToWhatFramesTook) {
+TEST(MeasuredCost, AddsUpToWhatFramesTook) {
   World world;
-  LearntCost learnt(world.grid);
+  MeasuredCost learnt(world.grid);
   EXPECT_FALSE(learnt.any());
   const Layout layout = MakeLayout(world.Request(nullptr));
   const std::vector<BoxSeconds> frame = world.Render(layout, 0);

@@ -46,7 +46,7 @@ TEST(ValidateFrameRequest, NamesFieldValueAndLimit) {
       {[](auto& r) { r.termination = 0.6; }, "termination is 0.6, but must lie in [0, 0.5]"},
       {[](auto& r) { r.termination = kNan; }, "termination is nan"},
       {[](auto& r) { r.policy.decomposition = ""; }, "policy.decomposition has 0 bytes"},
-      {[](auto& r) { r.policy.split = ""; }, "policy.split has 0 bytes"},
+      {[](auto& r) { r.policy.load_metric = ""; }, "policy.load_metric has 0 bytes"},
       {[](auto& r) { r.policy.assignment = ""; }, "policy.assignment has 0 bytes"},
       {[&](auto& r) { r.policy.balance = long_name; }, "policy.balance has 257 bytes"},
       {[](auto& r) { r.policy.axis = AxisChoice{5}; }, "policy.axis is 5, but must lie in [0, 4]"},

@@ -104,9 +104,9 @@ TEST(PlanFrame, UsesEveryNameOfAPolicy) {
       request.policy.combine = scheme.name;
       request.policy.decomposition = decomposition.name;
       for (const AssignmentEntry& assignment : Assignments()) {
-        for (const NamedChoice& split : WorkSplits()) {
+        for (const NamedChoice& split : LoadMetrics()) {
           request.policy.assignment = assignment.name;
-          request.policy.split = split.name;
+          request.policy.load_metric = split.name;
           request.policy.groups = 2;
           const Roster roster = FullRoster(5);
           ExpectSound(Plan(request, summary, roster), roster);
@@ -341,10 +341,10 @@ TEST(ResolvePolicy, OfWhatItAskedForIsTheSame) {
   FrameRequest request = SomeRequest();
   for (const DecompositionEntry& decomposition : Decompositions()) {
     for (const AssignmentEntry& assignment : Assignments()) {
-      for (const NamedChoice& split : WorkSplits()) {
+      for (const NamedChoice& split : LoadMetrics()) {
         for (const AxisChoice axis : {AxisChoice::kX, AxisChoice::kAuto, AxisChoice::kView}) {
           request.policy = {.decomposition = std::string(decomposition.name),
-                            .split = std::string(split.name),
+                            .load_metric = std::string(split.name),
                             .axis = axis,
                             .assignment = std::string(assignment.name),
                             .balance = std::string(kDynamicBalance)};
@@ -382,8 +382,8 @@ TEST(PlanFrame, NamesWhatItDoesNotKnow) {
   };
   EXPECT_EQ(status([](auto& r) { r.policy.decomposition = "cake"; }, FullRoster(1)),
             Status::InvalidArgument("policy.decomposition is 'cake', but must be one of: auto, slab, beam, subcube, octree, kd-tree"));
-  EXPECT_EQ(status([](auto& r) { r.policy.split = "hairs"; }, FullRoster(1)),
-            Status::InvalidArgument("policy.split is 'hairs', but must be one of: auto, voxels, occupied, cost"));
+  EXPECT_EQ(status([](auto& r) { r.policy.load_metric = "hairs"; }, FullRoster(1)),
+            Status::InvalidArgument("policy.load_metric is 'hairs', but must be one of: auto, voxels, occupied, cost"));
   EXPECT_EQ(status([](auto& r) { r.policy.assignment = "lots"; }, FullRoster(1)),
             Status::InvalidArgument("policy.assignment is 'lots', but must be one of: auto, cyclic, contiguous, greedy"));
   EXPECT_EQ(status([](auto& r) { r.policy.balance = "act"; }, FullRoster(1)),

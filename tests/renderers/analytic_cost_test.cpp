@@ -214,22 +214,22 @@ TEST(DrawnTable, HoldsWhatTheRendererDraws) {
   }
 }
 
-// By what is foretold of the layout's boxes, each with a slot of its own: a frame on average over views, and how uneven the worse view is.
-struct Foretold {
+// By what is predicted of the layout's boxes, each with a slot of its own: a frame on average over views, and how uneven the worse view is.
+struct Predicted {
   double frame = 0, imbalance = 0;
 };
-Foretold ForetoldOf(const Layout& layout, const AnalyticCost& cost) {
-  Foretold foretold;
+Predicted PredictionOf(const Layout& layout, const AnalyticCost& cost) {
+  Predicted predicted;
   for (std::size_t view = 0; view < 2; ++view) {
     std::vector<double> times;
     for (std::size_t box = 0; box < layout.owners.size(); ++box) {
       if (layout.owners[box] != kNoSlot) times.push_back(Of(cost, layout.partition.boxes()[box])[view]);
     }
     const double slowest = *std::ranges::max_element(times), sum = std::accumulate(times.begin(), times.end(), 0.0);
-    foretold.frame += slowest / 2;
-    foretold.imbalance = std::max(foretold.imbalance, slowest * double(times.size()) / sum);
+    predicted.frame += slowest / 2;
+    predicted.imbalance = std::max(predicted.imbalance, slowest * double(times.size()) / sum);
   }
-  return foretold;
+  return predicted;
 }
 
 TEST(MakeLayout, BoxesOfAKdTreeTakeEquallyLong) {
@@ -249,12 +249,12 @@ TEST(MakeLayout, BoxesOfAKdTreeTakeEquallyLong) {
                                   .renderer = renderer,
                                   .slots = slots,
                                   .known = {.occupied = &grid}};
-      const Foretold occupied = ForetoldOf(MakeLayout(request), *cost);
+      const Predicted occupied = PredictionOf(MakeLayout(request), *cost);
       if (renderer->along_slices()) {
         EXPECT_LT(occupied.imbalance, 1.12);
       }
-      resolved.split = WorkSplit::kVoxels;
-      EXPECT_LE(occupied.frame, ForetoldOf(MakeLayout(request), *cost).frame) << "than boxes of equal volume";
+      resolved.load_metric = LoadMetric::kVoxels;
+      EXPECT_LE(occupied.frame, PredictionOf(MakeLayout(request), *cost).frame) << "than boxes of equal volume";
     }
   }
 }

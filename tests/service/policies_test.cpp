@@ -59,15 +59,15 @@ TEST_P(PoliciesTest, NeverChangeThePicture) {
           ++frame;
           request.policy.decomposition = decomposition;
           request.policy.assignment = assignment;
-          request.policy.split = WorkSplits()[frame % WorkSplits().size()].name;
+          request.policy.load_metric = LoadMetrics()[frame % LoadMetrics().size()].name;
           request.policy.balance = BalanceModes()[frame / 3 % BalanceModes().size()].name;
           const std::vector<std::string_view> schemes = WithAutomatic(CombiningSchemes());
           request.policy.combine = schemes[frame % schemes.size()];
           request.policy.groups = 1 + int(frame % 3);
           SCOPED_TRACE(testing::Message() << GetParam() << " workers, renderer " << renderer->name() << ", projection " << int(projection)
                                           << ", " << request.policy.groups << " groups, " << request.policy.decomposition << ", "
-                                          << request.policy.split << ", " << request.policy.assignment << ", " << request.policy.balance
-                                          << ", " << request.policy.combine);
+                                          << request.policy.load_metric << ", " << request.policy.assignment << ", "
+                                          << request.policy.balance << ", " << request.policy.combine);
           const Result<Picture> picture = client.Render(request, std::chrono::seconds(60));
           ASSERT_TRUE(picture.ok()) << picture.status().message();
           EXPECT_LE(LargestDifference(picture->image, expected, request.size), AllowedDifference(request));
@@ -82,7 +82,7 @@ TEST_P(PoliciesTest, NeverChangeThePicture) {
             }
           }
           EXPECT_EQ(picture->statistics.balance, request.policy.balance);
-          EXPECT_NE(picture->statistics.split, "auto");
+          EXPECT_NE(picture->statistics.load_metric, "auto");
         }
       }
     }

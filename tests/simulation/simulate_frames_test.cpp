@@ -53,25 +53,25 @@ TEST(SimulateFrames, OneWorkerTakesTheSumOfWhatThereIsToDo) {
 }
 
 // From thread to thread: client, coordinator, planner, coordinator, worker, render lane, worker, finish lane, worker, coordinator, client.
-TEST(SimulateFrames, EveryHandOverTakesItsTime) {
+TEST(SimulateFrames, EveryWakeUpTakesItsTime) {
   MachineModel machine = FreeMachine();
-  machine.hand_overs = {.awake = 0.01, .asleep = 0.07, .doze = 0};
+  machine.wake_ups = {.awake = 0.01, .asleep = 0.07, .doze = 0};
   MadeFrame frame(1, 1, kSide, 1, 2, "fan-in");
   frame.finish_seconds = 0.5;
   EXPECT_NEAR(Simulate({frame.input()}, machine).frames[0].latency(), 2 + 0.5 + 10 * 0.07, 1e-9);
-  machine.hand_overs.doze = 100;
+  machine.wake_ups.doze = 100;
   EXPECT_NEAR(Simulate({frame.input()}, machine).frames[0].latency(), 2 + 0.5 + 10 * 0.01, 1e-9);
   // Who has waited for a second is asleep: nobody when the frame begins; when it is rendered the worker and its finish lane; when the
   // picture is made the client alone, since coordinator and worker have had to do with the group's end.
-  machine.hand_overs.doze = 1;
+  machine.wake_ups.doze = 1;
   EXPECT_NEAR(Simulate({frame.input()}, machine).frames[0].latency(), 2 + 0.5 + 5 * 0.01 + 2 * 0.07 + 2 * 0.01 + 0.07, 1e-9);
 }
 
 // An image of another worker comes in addition: told of by its worker, at the other one, at its combining lane and back. One that travels
 // is encoded by a lane of its own first.
-TEST(SimulateFrames, HandOversOfAnImageDependOnHowItTravels) {
+TEST(SimulateFrames, WakeUpsOfAnImageDependOnHowItTravels) {
   MachineModel machine = FreeMachine();
-  machine.hand_overs = {.awake = 0.01, .asleep = 0.01};
+  machine.wake_ups = {.awake = 0.01, .asleep = 0.01};
   const MadeFrame one(1, 1, kSide, 1, 2, "fan-in"), two(2, 1, kSide, 1, 2, "fan-in");
   const double alone = Simulate({one.input()}, machine).frames[0].latency();
   EXPECT_NEAR(Simulate({two.input()}, machine).frames[0].latency(), alone + 5 * 0.01, 1e-9);
@@ -81,7 +81,7 @@ TEST(SimulateFrames, HandOversOfAnImageDependOnHowItTravels) {
 
 TEST(SimulateFrames, ARenderingIsOrderedWhenTheLastOneIsKnown) {
   MachineModel machine = FreeMachine();
-  machine.hand_overs = {.awake = 0.01, .asleep = 0.01};
+  machine.wake_ups = {.awake = 0.01, .asleep = 0.01};
   const MadeFrame frame(1, 2, kSide, 1, 2, "fan-in");
   const Timeline timeline = Simulate({frame.input()}, machine);
   ASSERT_GE(timeline.spans.size(), 2U);

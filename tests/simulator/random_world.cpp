@@ -63,7 +63,7 @@ World RandomWorld(Random& random, const Faults& faults) {
   const auto one_of = [&](const auto& entries) { return std::string(entries[random.Integer<std::size_t>(0, entries.size() - 1)].name); };
   if (random.Chance(0.7)) {
     world.policy.decomposition = one_of(Decompositions());
-    world.policy.split = one_of(WorkSplits());
+    world.policy.load_metric = one_of(LoadMetrics());
     world.policy.assignment = one_of(Assignments());
     world.policy.balance = one_of(BalanceModes());
   }

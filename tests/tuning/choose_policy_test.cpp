@@ -45,7 +45,7 @@ std::vector<NamedSummary> OddVolumes() {
 
 Policy Automatic() {
   Policy policy;
-  policy.decomposition = policy.split = policy.assignment = policy.combine = kAutomatic;
+  policy.decomposition = policy.load_metric = policy.assignment = policy.combine = kAutomatic;
   return policy;
 }
 
@@ -84,15 +84,15 @@ TEST_P(ChoosePolicyTest, MakesPlansOfAnyVolumeAndKeepsWhatIsFixed) {
       asked.decomposition = (left_open & 1) != 0 ? std::string(kAutomatic) : one_of(Decompositions());
       asked.assignment = (left_open & 2) != 0 ? std::string(kAutomatic) : one_of(Assignments());
       asked.combine = (left_open & 4) != 0 ? std::string(kAutomatic) : std::string("fan-in");
-      asked.split = one_of(WorkSplits());
+      asked.load_metric = one_of(LoadMetrics());
       asked.groups = random.Integer(0, 3);
       asked.balance = one_of(BalanceModes());
-      SCOPED_TRACE(testing::Message() << volume.name << ", p = " << GetParam() << ", " << asked.decomposition << ", " << asked.split << ", "
-                                      << asked.assignment << ", " << asked.combine << ", " << asked.groups << " groups");
+      SCOPED_TRACE(testing::Message() << volume.name << ", p = " << GetParam() << ", " << asked.decomposition << ", " << asked.load_metric
+                                      << ", " << asked.assignment << ", " << asked.combine << ", " << asked.groups << " groups");
       const PolicyChoice choice = question.Choose(asked);
       const Policy got = AskFor(choice.policy);
       EXPECT_TRUE(CheckNames(got).ok() && !LeavesChoice(got)) << CheckNames(got).message();
-      EXPECT_NE(got.split, kAutomatic);
+      EXPECT_NE(got.load_metric, kAutomatic);
       EXPECT_GE(choice.policy.groups, 1);
       EXPECT_LE(choice.policy.groups, kMaxGroups);
       if (asked.decomposition != kAutomatic) {
@@ -104,8 +104,8 @@ TEST_P(ChoosePolicyTest, MakesPlansOfAnyVolumeAndKeepsWhatIsFixed) {
       if (asked.combine != kAutomatic) {
         EXPECT_EQ(got.combine, asked.combine);
       }
-      if (asked.split != kAutomatic) {
-        EXPECT_EQ(got.split, asked.split);
+      if (asked.load_metric != kAutomatic) {
+        EXPECT_EQ(got.load_metric, asked.load_metric);
       }
       if (asked.groups > 0) {
         EXPECT_EQ(got.groups, asked.groups);
@@ -137,7 +137,7 @@ TEST(ChoosePolicy, KeepsWhatHoldsUnlessEnoughIsGained) {
   Question question{.summary = SummaryWith({192, 192, 192}, [](const Index3& b) { return b.z < 3 && b.x < 6; }), .slots = 8};
   question.request.policy = Automatic();
   FrameRequest holding = question.request;
-  holding.policy = {.split = "voxels", .groups = 1};
+  holding.policy = {.load_metric = "voxels", .groups = 1};
   const ResolvedPolicy now = ResolvePolicy(holding, question.summary.description.geometry).value();
   PolicyQuestion asked{.frame = &question.request,
                        .summary = &question.summary,

@@ -13,7 +13,7 @@ namespace slabstream {
 
 namespace {
 
-// Shorter frames consist mostly of hand-overs between threads that sleep and are woken.
+// Shorter frames consist mostly of wake-ups between threads that sleep and are woken.
 constexpr double kLongMilliseconds = 5;
 constexpr double kGood = 10;  // per cent
 
@@ -82,7 +82,7 @@ Result<Section> ValidationSection(const PaperSetup& setup) {
   section.method =
       "The same frames by the service inside this process, one and two workers of one thread each, one frame in flight; and, turn by turn "
       "between them, simulated from the costs of their slabs on a model of this machine, whose constants are measured by themselves: "
-      "operators, hand-overs on frames of another service, and how much two renderers slow each other down. Medians over turns on both "
+      "operators, wake-ups on frames of another service, and how much two renderers slow each other down. Medians over turns on both "
       "sides. Nothing of the service's own times enters the simulation, which leaves out lost messages and hiding by groups in front.";
   std::vector<double> long_errors;
   for (const auto& [workers, errors] : by_workers) {

@@ -1,4 +1,4 @@
-#include "common/planning/learnt_cost.h"
+#include "common/planning/measured_cost.h"
 
 #include <algorithm>
 #include <vector>
@@ -28,9 +28,9 @@ void ForEachCell(const Index3& size, const Box& box, Function&& function) {
 
 }  // namespace
 
-LearntCost::LearntCost(const OccupancyGrid& grid) : size_(grid.size), cost_(CellWork(grid)) {}
+MeasuredCost::MeasuredCost(const OccupancyGrid& grid) : size_(grid.size), cost_(CellWork(grid)) {}
 
-void LearntCost::Learn(std::span<const BoxSeconds> boxes, double weight) {
+void MeasuredCost::Learn(std::span<const BoxSeconds> boxes, double weight) {
   CHECK(weight > 0 && weight <= 1) << weight;
   const auto predicted = [this](const Box& box) {
     double sum = 0;
@@ -56,6 +56,6 @@ void LearntCost::Learn(std::span<const BoxSeconds> boxes, double weight) {
   }
 }
 
-WorkField LearntCost::Field() const { return {size_, cost_}; }
+WorkField MeasuredCost::Field() const { return {size_, cost_}; }
 
 }  // namespace slabstream

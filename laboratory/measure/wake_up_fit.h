@@ -1,13 +1,13 @@
-// Fits the time to hand work from one thread of the service to another (HandOvers) to the instants of frames of one worker. A frame passes
-// ten hand-overs; between them lie only planning, rendering and making the picture:
+// Fits the time to hand work from one thread of the service to another (WakeUps) to the instants of frames of one worker. A frame passes
+// ten wake-ups; between them lie only planning, rendering and making the picture:
 //
 //   request    client -> coordinator -> planner -> coordinator -> worker -> render lane     5, until rendering begins
 //   rendered   render lane -> worker -> finish lane                                         2, until the picture is begun
 //   picture    finish lane -> worker -> coordinator -> client                               3, until the picture is there
 //
-// Frames that take less than HandOvers::doze find all threads awake: one hand-over is a tenth of the time that is neither rendering nor
+// Frames that take less than WakeUps::doze find all threads awake: one wake-up is a tenth of the time that is neither rendering nor
 // making a picture (planning a frame like the last one takes next to no time). After a rendering that took much longer, the worker's own
-// thread and its finish lane have slept: one hand-over is half of the time until the picture is begun. So each constant was measured as a
+// thread and its finish lane have slept: one wake-up is half of the time until the picture is begun. So each constant was measured as a
 // stretch of time of its own, never as a difference of two. Pure.
 #pragma once
 
@@ -23,12 +23,12 @@ struct FrameInstants {  // seconds, on one clock
   double received = 0;  // before decoding, or of a picture that takes no time to decode
 };
 
-struct HandOverEstimates {
+struct WakeUpEstimates {
   Estimate awake, asleep;  // seconds; medians, so frames in which a thread had to wait for others' time slices do not count
-  HandOvers Costs() const { return {.awake = awake.median, .asleep = asleep.median}; }
+  WakeUps Costs() const { return {.awake = awake.median, .asleep = asleep.median}; }
 };
 
 // `quick`: frames shorter than doze, one after the other; `slow`: frames with longer rendering. At least one of each.
-HandOverEstimates FitHandOvers(std::span<const FrameInstants> quick, std::span<const FrameInstants> slow);
+WakeUpEstimates FitWakeUps(std::span<const FrameInstants> quick, std::span<const FrameInstants> slow);
 
 }  // namespace slabstream

@@ -1,10 +1,10 @@
-#include "laboratory/measure/hand_over_fit.h"
+#include "laboratory/measure/wake_up_fit.h"
 
 #include <gtest/gtest.h>
 
 #include <vector>
 
-#include "laboratory/measure/hand_over_probe.h"
+#include "laboratory/measure/wake_up_probe.h"
 #include "tests/simulation/support.h"
 #include "tests/support/random.h"
 
@@ -13,10 +13,10 @@ namespace {
 
 constexpr double kAwake = 21e-6, kAsleep = 83e-6;
 
-// Frames of one worker as the simulation has them on a machine with these hand-overs, one after the other.
+// Frames of one worker as the simulation has them on a machine with these wake-ups, one after the other.
 std::vector<FrameInstants> SimulatedInstants(double render, int count) {
   MachineModel machine = FreeMachine();
-  machine.hand_overs = {.awake = kAwake, .asleep = kAsleep};
+  machine.wake_ups = {.awake = kAwake, .asleep = kAsleep};
   MadeFrame frame(1, 1, 16, 1, render, "fan-in");
   frame.finish_seconds = 10e-6;
   const Timeline timeline = Simulate(std::vector<FrameInput>(std::size_t(count), frame.input()), machine);
@@ -34,8 +34,8 @@ std::vector<FrameInstants> SimulatedInstants(double render, int count) {
 }
 
 // What the simulation counts, the calibration counts: frames that were simulated with some constants give these back.
-TEST(HandOverFit, SimulatedFramesGiveTheirConstantsBack) {
-  const HandOverEstimates found = FitHandOvers(SimulatedInstants(80e-6, 9), SimulatedInstants(5e-3, 9));
+TEST(WakeUpFit, SimulatedFramesGiveTheirConstantsBack) {
+  const WakeUpEstimates found = FitWakeUps(SimulatedInstants(80e-6, 9), SimulatedInstants(5e-3, 9));
   EXPECT_NEAR(found.awake.median, kAwake, 1e-9);
   EXPECT_NEAR(found.asleep.median, kAsleep, 1e-9);
   EXPECT_NEAR(found.Costs().awake, kAwake, 1e-9);
@@ -43,7 +43,7 @@ TEST(HandOverFit, SimulatedFramesGiveTheirConstantsBack) {
 }
 
 // Every stretch of time a little longer or shorter, and in every fifth frame a thread waits for a time slice of 3 ms somewhere.
-TEST(HandOverFit, NoiseAndLostTimeSlicesHardlyCount) {
+TEST(WakeUpFit, NoiseAndLostTimeSlicesHardlyCount) {
   Random random(31);
   SCOPED_TRACE(random.trace());
   const auto disturbed = [&](std::vector<FrameInstants> frames) {
@@ -60,7 +60,7 @@ TEST(HandOverFit, NoiseAndLostTimeSlicesHardlyCount) {
     }
     return frames;
   };
-  const HandOverEstimates found = FitHandOvers(disturbed(SimulatedInstants(80e-6, 120)), disturbed(SimulatedInstants(5e-3, 40)));
+  const WakeUpEstimates found = FitWakeUps(disturbed(SimulatedInstants(80e-6, 120)), disturbed(SimulatedInstants(5e-3, 40)));
   EXPECT_NEAR(found.awake.median, kAwake, 0.1 * kAwake);
   EXPECT_NEAR(found.asleep.median, kAsleep, 0.1 * kAsleep);
   for (const Estimate& estimate : {found.awake, found.asleep}) {
@@ -72,11 +72,11 @@ TEST(HandOverFit, NoiseAndLostTimeSlicesHardlyCount) {
 }
 
 // Instants of real frames lie in order, so that no constant can come out as zero or less.
-TEST(HandOverProbe, RealFramesTakeTimeToHandOver) {
-  HandOverProbe probe;
+TEST(WakeUpProbe, RealFramesTakeTimeToWakeUp) {
+  WakeUpProbe probe;
   const Status sampled = probe.Sample(3);
   ASSERT_TRUE(sampled.ok()) << sampled.message();
-  const HandOverEstimates found = probe.Estimates();
+  const WakeUpEstimates found = probe.Estimates();
   EXPECT_EQ(found.awake.count, 9);
   EXPECT_EQ(found.asleep.count, 3);
   EXPECT_GT(found.awake.low, 0);

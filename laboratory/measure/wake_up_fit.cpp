@@ -1,4 +1,4 @@
-#include "laboratory/measure/hand_over_fit.h"
+#include "laboratory/measure/wake_up_fit.h"
 
 #include <utility>
 #include <vector>
@@ -7,7 +7,7 @@
 
 namespace slabstream {
 
-HandOverEstimates FitHandOvers(std::span<const FrameInstants> quick, std::span<const FrameInstants> slow) {
+WakeUpEstimates FitWakeUps(std::span<const FrameInstants> quick, std::span<const FrameInstants> slow) {
   CHECK(!quick.empty() && !slow.empty()) << quick.size() << " quick frames and " << slow.size() << " slow ones";
   std::vector<double> awake, asleep;
   for (const FrameInstants& f : quick) {

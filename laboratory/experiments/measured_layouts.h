@@ -1,4 +1,4 @@
-// LearntLayouts: the layouts of a case from frame to frame, made by the coordinator's LayoutTable from the render times of frames. The
+// MeasuredLayouts: the layouts of a case from frame to frame, made by the coordinator's LayoutTable from the render times of frames. The
 // times decide the layouts, so the same times give the same layouts.
 #pragma once
 
@@ -11,12 +11,12 @@
 
 namespace slabstream {
 
-class LearntLayouts {
+class MeasuredLayouts {
  public:
-  static Result<LearntLayouts> Make(ExperimentContext& context, const FrameCase& frame) {
+  static Result<MeasuredLayouts> Make(ExperimentContext& context, const FrameCase& frame) {
     Result<LayoutKnowledge> knowledge = KnowLayout(context, frame);
     if (!knowledge.ok()) return knowledge.status();
-    return LearntLayouts(*std::move(knowledge), std::uint32_t(frame.workers));
+    return MeasuredLayouts(*std::move(knowledge), std::uint32_t(frame.workers));
   }
 
   const LayoutKnowledge& knowledge() const { return knowledge_; }
@@ -40,7 +40,7 @@ class LearntLayouts {
   }
 
  private:
-  LearntLayouts(LayoutKnowledge knowledge, std::uint32_t slots)
+  MeasuredLayouts(LayoutKnowledge knowledge, std::uint32_t slots)
       : knowledge_(std::move(knowledge)), volume_(kPlannedDataset, knowledge_.transfer, knowledge_.renderer), slots_(slots) {}
 
   LayoutKnowledge knowledge_;

@@ -1,4 +1,4 @@
-// LearntCost: the render cost of each part of a volume, learnt from the render times of boxes in earlier frames.
+// MeasuredCost: the render cost of each part of a volume, learnt from the render times of boxes in earlier frames.
 //
 // Every cell of the volume's OccupancyGrid has a cost, which begins as its work (CellWork). A frame reports the time of each of its boxes;
 // all cells of a box are then scaled by the ratio of measured to predicted time (iterative proportional fitting: Deming and Stephan 1940).
@@ -19,9 +19,9 @@ struct BoxSeconds {
   double seconds = 0;  // >= 0: rendering, without one-time work (fetching, classification)
 };
 
-class LearntCost {
+class MeasuredCost {
  public:
-  explicit LearntCost(const OccupancyGrid& grid);
+  explicit MeasuredCost(const OccupancyGrid& grid);
 
   // The boxes of one frame, which do not overlap. `weight` in (0, 1]: how much of the deviation from the prediction is believed.
   void Learn(std::span<const BoxSeconds> boxes, double weight);

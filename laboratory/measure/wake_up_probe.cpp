@@ -1,4 +1,4 @@
-#include "laboratory/measure/hand_over_probe.h"
+#include "laboratory/measure/wake_up_probe.h"
 
 #include <map>
 #include <memory>
@@ -50,7 +50,7 @@ std::shared_ptr<const Volume> Sphere(int size) {
 
 }  // namespace
 
-Status HandOverProbe::Sample(int count) {
+Status WakeUpProbe::Sample(int count) {
   static const std::map<std::string, std::shared_ptr<const Volume>> volumes = {{kQuick, Sphere(kQuickVolume)},
                                                                                {kSlow, Sphere(kSlowVolume)}};
   const Result<std::unique_ptr<LabService>> service = LabService::Start(1, volumes);
