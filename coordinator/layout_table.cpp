@@ -90,6 +90,14 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
   return entry.layout;
 }
 
+std::shared_ptr<const Layout> LayoutTable::FindMade(const Request& request) {
+  const ResolvedPolicy& policy = *request.policy;
+  const auto found = std::ranges::find(entries_, KeyOf(*request.volume, policy, request.slots), &Entry::key);
+  if (found == entries_.end() || policy.dynamic_balance) return nullptr;
+  if (policy.load_metric == LoadMetric::kCost && !found->by_cost) return nullptr;
+  return found->layout;
+}
+
 bool LayoutTable::KnowsCost(const ClassifiedVolume& volume) {
   const Learnt* const learnt = FindLearnt(volume);
   return learnt != nullptr && learnt->cost.any();

@@ -42,6 +42,8 @@ class LayoutTable {
   };
   // The layout to plan the frame with.
   std::shared_ptr<const Layout> Find(const Request& request);
+  // That layout if it is made and cannot change now; null: ask Find. Needs policy, volume and slots alone.
+  std::shared_ptr<const Layout> FindMade(const Request& request);
 
   // Measured costs: seconds.
   bool KnowsCost(const ClassifiedVolume& volume);

@@ -1,5 +1,6 @@
 #include "coordinator/planner.h"
 
+#include <exception>
 #include <utility>
 
 #include "common/base/guarded.h"
@@ -8,7 +9,23 @@
 namespace slabstream {
 
 Result<std::shared_ptr<const PlannedFrame>> Planner::Plan(const PlanRequest& request) {
+  const std::lock_guard lock(mutex_);
   return Guarded("planning", [&] { return TryPlan(request); });
+}
+
+std::optional<Result<std::shared_ptr<const PlannedFrame>>> Planner::PlanAtHand(const PlanRequest& request) try {
+  constexpr std::size_t kMostBoxes = 4096;  // a plan places each of them
+  const std::unique_lock lock(mutex_, std::try_to_lock);
+  if (!lock || LeavesChoice(request.frame.policy)) return std::nullopt;
+  Result<ResolvedPolicy> policy = ResolvePolicy(request.frame, request.summary->description.geometry);
+  if (!policy.ok()) return std::nullopt;
+  std::shared_ptr<const Layout> layout =
+      layouts_.FindMade({.policy = &*policy, .volume = &request.volume, .slots = std::uint32_t(request.roster.slots.size())});
+  if (layout == nullptr || layout->owners.size() > kMostBoxes) return std::nullopt;
+  auto planned = std::make_shared<PlannedFrame>(PlannedFrame{.asked = request, .policy = *std::move(policy), .prediction = {}, .plan = {}});
+  return WithLayout(std::move(planned), std::move(layout));
+} catch (const std::exception&) {
+  return std::nullopt;  // Plan meets the same and says what it is
 }
 
 Result<std::shared_ptr<const PlannedFrame>> Planner::TryPlan(const PlanRequest& request) {
@@ -42,6 +59,12 @@ Result<std::shared_ptr<const PlannedFrame>> Planner::TryPlan(const PlanRequest& 
                                                         .occupied = request.occupied,
                                                         .slots = slots,
                                                         .slab_bytes_target = config_.slab_bytes_target});
+  return WithLayout(std::move(planned), std::move(layout));
+}
+
+Result<std::shared_ptr<const PlannedFrame>> Planner::WithLayout(std::shared_ptr<PlannedFrame> planned,
+                                                                std::shared_ptr<const Layout> layout) {
+  const PlanRequest& request = planned->asked;
   Result<FramePlan> plan = PlanFrame(request.frame, planned->policy, request.volume.dataset(), *request.summary, request.roster,
                                      std::move(layout), request.turn);
   if (!plan.ok()) return plan.status();
@@ -50,6 +73,7 @@ Result<std::shared_ptr<const PlannedFrame>> Planner::TryPlan(const PlanRequest& 
 }
 
 void Planner::Learn(const FrameMeasured& measured) {
+  const std::lock_guard lock(mutex_);
   const PlannedFrame& frame = *measured.frame;
   layouts_.Learn(frame.asked.volume, frame.plan, frame.policy, measured.reports);
   policies_.Learn(frame, measured.reports);

@@ -121,7 +121,7 @@ struct CoordinatorService::Impl {
   Time next_forget;
   const PlanFunction make_plan;
   const CountFunction count_occupied;
-  const std::shared_ptr<Planner> planner;                      // the planning thread's
+  const std::shared_ptr<Planner> planner;                      // the planning thread's, but for plans at hand
   std::map<PlanId, std::shared_ptr<std::atomic<bool>>> plans;  // under way: whether they are dropped
   BackgroundTasks loads{kLoadsAtOnce}, counts{1}, planning{1};
   std::jthread thread;  // owns the sockets and the machine; last member: ends first
@@ -249,6 +249,7 @@ void CoordinatorService::Impl::Perform(CountDataset& action) {
 
 void CoordinatorService::Impl::Perform(PlanRequest& action) {
   const PlanId plan = action.plan;
+  if (auto planned = planner->PlanAtHand(action)) return inbox->Post(NewsOf(Planned{plan, *std::move(planned)}));
   const Status begun = Guarded("planning", [&] {
     const auto& dropped = plans[plan] = std::make_shared<std::atomic<bool>>(false);
     planning.Post([inbox = inbox, planner = planner, make = make_plan, dropped, request = std::move(action)] {
