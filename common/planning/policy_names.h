@@ -1,7 +1,7 @@
 // The names that a Policy may hold besides those of Decompositions(), Assignments() and CombiningSchemes().
 //
-// kAutomatic leaves the choice of decomposition, assignment and combine to ChoosePolicy (coordinator/tuning). As a load metric it means the one
-// that suits the decomposition; if the decomposition is open, both are chosen together.
+// kAutomatic leaves the choice of decomposition, assignment and combine to ChoosePolicy (coordinator/tuning). As a load metric it means the
+// one that suits the decomposition; if the decomposition is open, both are chosen together.
 #pragma once
 
 #include <optional>

@@ -43,7 +43,8 @@ Policy SettledPolicy(const FrameRequest& request, const VolumeGeometry& geometry
 // kView.
 Axis SlabAxis(AxisChoice choice, const DecompositionEntry& decomposition, const Index3& size);
 
-// The policy's load metric. "auto" becomes what suits the decomposition, and stays "auto" while that is open. The policy's names must be known.
+// The policy's load metric. "auto" becomes what suits the decomposition, and stays "auto" while that is open. The policy's names must be
+// known.
 std::string_view LoadMetricOf(const Policy& policy);
 
 // Whether an exact OccupancyGrid improves the policy's layout, or the choice of it. The policy's names must be known.
