@@ -56,7 +56,7 @@ void DeclareHelp(const CommandLine& line) {
       const CLI::App* found = &app;
       std::string full_name = app.get_name();
       for (const std::string& name : *names) {
-        const auto named = found->get_subcommands([&](const CLI::App* sub) { return sub->get_name() == name; });
+        const auto named = found->get_subcommands([&](const CLI::App* command) { return command->get_name() == name; });
         if (named.empty()) return Status::InvalidArgument(fmt::format("there is no command '{}', but {}", name, CommandNames(*found)));
         found = named.front();
         full_name += " " + name;

@@ -112,15 +112,15 @@ struct LayoutMaker::State {
 
   Layout Assign(Partition partition, const ResolvedPolicy& policy) {
     std::vector<BoxId> filled;
-    std::vector<double> costs;
+    std::vector<double> box_costs;
     for (BoxId box = 0; box < partition.boxes().size(); ++box) {
       if (!fields.Shows(partition.boxes()[box])) continue;
       filled.push_back(box);
-      costs.push_back(policy.assignment->by_cost ? CostOf(partition.boxes()[box], policy) : 1);
+      box_costs.push_back(policy.assignment->by_cost ? CostOf(partition.boxes()[box], policy) : 1);
     }
     Layout layout{std::move(partition), {}};
     layout.owners.assign(layout.partition.boxes().size(), kNoSlot);
-    const std::vector<std::uint32_t> owners = policy.assignment->assign({costs, request.slots});
+    const std::vector<std::uint32_t> owners = policy.assignment->assign({box_costs, request.slots});
     for (std::size_t i = 0; i < filled.size(); ++i) layout.owners[filled[i]] = owners[i];
     return layout;
   }

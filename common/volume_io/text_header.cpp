@@ -39,8 +39,8 @@ std::optional<std::vector<double>> TextHeader::Numbers(std::initializer_list<con
     if (word == "none") continue;
     const char* begin = word.data() + (word.size() > 1 && word[0] == '+' ? 1 : 0);
     double number = 0;
-    const auto [end, error] = std::from_chars(begin, word.data() + word.size(), number);
-    if (error != std::errc() || end != word.data() + word.size()) return std::nullopt;
+    const auto [stop, error] = std::from_chars(begin, word.data() + word.size(), number);
+    if (error != std::errc() || stop != word.data() + word.size()) return std::nullopt;
     numbers.push_back(number);
   }
   return numbers.size() == count ? std::optional(numbers) : std::nullopt;

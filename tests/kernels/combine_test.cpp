@@ -168,7 +168,9 @@ TEST_P(CombineFormats, PixelsThatAreNoneNeverPass) {
     const Side side = random.Chance(0.5) ? Side::kFront : Side::kBack;
     LocalImage image = a, same = a;
     const bool accepted = CombineUnchecked(image, view, side, Room(image.bounds, view.bounds, side));
-    if (!spoilt) EXPECT_TRUE(accepted);
+    if (!spoilt) {
+      EXPECT_TRUE(accepted);
+    }
     if (!accepted) {
       ++refused;
       continue;
@@ -179,7 +181,9 @@ TEST_P(CombineFormats, PixelsThatAreNoneNeverPass) {
     if (spoilt) ++hidden;
   }
   EXPECT_GT(refused, 500);
-  if (GetParam() == PixelFormat::kRgba) EXPECT_EQ(hidden, 0) << "over lets everything through";
+  if (GetParam() == PixelFormat::kRgba) {
+    EXPECT_EQ(hidden, 0) << "over lets everything through";
+  }
 }
 
 TEST_P(CombineFormats, EmptyImagesAreNeutral) {
