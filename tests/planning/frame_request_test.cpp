@@ -34,8 +34,8 @@ TEST(ValidateFrameRequest, NamesFieldValueAndLimit) {
   const Case cases[] = {
       {[](auto& r) { r.dataset = ""; }, "dataset has 0 bytes, but must have 1 to 256"},
       {[&](auto& r) { r.dataset = long_name; }, "dataset has 257 bytes"},
-      {[](auto& r) { r.renderer = std::string("teapot"); }, "renderer is 'teapot', but must be one of: splat, zbuffer"},
-      {[](auto& r) { r.parameters["fineness"] = "1"; }, "fineness is '1', but the renderer 'splat' has no such parameter"},
+      {[](auto& r) { r.renderer = "teapot"; }, "renderer is 'teapot', but must be one of: splat, zbuffer"},
+      {[](auto& r) { r.parameters.emplace("fineness", "1"); }, "fineness is '1', but the renderer 'splat' has no such parameter"},
       {[](auto& r) { r.size.width = 0; }, "size.width is 0"},
       {[](auto& r) { r.view.zoom = kNan; }, "view.zoom is nan"},
       {[](auto& r) { r.transfer.choice = ""; }, "transfer.preset has 0 bytes"},
