@@ -52,8 +52,7 @@ struct Subject {
 
 Subject MakeSubject(const Options& options) {
   const RendererKind* const renderer = RequireRenderer(options.renderer).value();
-  const double opacity = HasDepth(renderer->format()) ? kOpaqueSphere : kTranslucentSphere;
-  const BenchCase sphere = SphereCase({SphereClass::kHollow, options.size, 0.05}, opacity, renderer);
+  const BenchCase sphere = SphereCase({SphereClass::kHollow, options.size, 0.05}, SphereOpacity(*renderer), renderer);
   Subject subject;
   subject.volume = LoadBenchVolume(sphere).value();
   subject.summary = Summarize(*subject.volume);

@@ -95,7 +95,8 @@ std::shared_ptr<const Layout> LayoutTable::FindMade(const Request& request) {
   const auto found = std::ranges::find(entries_, KeyOf(*request.volume, policy, request.slots), &Entry::key);
   if (found == entries_.end() || policy.dynamic_balance) return nullptr;
   if (policy.load_metric == LoadMetric::kCost && !found->by_cost) return nullptr;
-  return found->layout;
+  entries_.splice(entries_.begin(), entries_, found);
+  return entries_.front().layout;
 }
 
 bool LayoutTable::KnowsCost(const ClassifiedVolume& volume) {

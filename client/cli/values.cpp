@@ -3,10 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <optional>
 #include <vector>
+
+#include "common/base/parse_number.h"
 
 namespace slabstream {
 namespace {
@@ -15,10 +16,7 @@ namespace {
 template <class T>
 std::optional<T> Convert(std::string_view text) {
   if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
-  T value{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || text.empty()) return std::nullopt;
-  return value;
+  return ParseNumber<T>(text);
 }
 
 // Shortest text that reads back the same; {} of fmt does that for doubles ("0.001", not "0.0010000000000000000208").

@@ -1,11 +1,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <optional>
 #include <string>
 
 #include "common/base/find_named.h"
+#include "common/base/parse_number.h"
 #include "common/combining/schemes.h"
 
 namespace slabstream {
@@ -21,10 +21,9 @@ std::string_view CutFirst(std::optional<std::string_view>& text, char separator)
   return first;
 }
 
-Result<std::uint32_t> ParseNumber(std::string_view what, std::string_view text, std::uint32_t least, std::uint32_t most) {
-  std::uint32_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error == std::errc() && end == text.data() + text.size() && value >= least && value <= most) return value;
+Result<std::uint32_t> ParseArgument(std::string_view what, std::string_view text, std::uint32_t least, std::uint32_t most) {
+  const std::optional<std::uint32_t> value = ParseNumber<std::uint32_t>(text);
+  if (value && *value >= least && *value <= most) return *value;
   return Status::InvalidArgument(fmt::format("{} is '{}', but must be a number in [{}, {}]", what, text, least, most));
 }
 
@@ -34,7 +33,7 @@ Status ParseFactors(std::string_view text, const CombiningEntry& scheme, Combini
       return Status::InvalidArgument(
           fmt::format("{} takes at most {} factor{}", scheme.name, scheme.most_factors, scheme.most_factors == 1 ? "" : "s"));
     }
-    const Result<std::uint32_t> factor = ParseNumber("a factor", CutFirst(rest, 'x'), 2, kMaxFactor);
+    const Result<std::uint32_t> factor = ParseArgument("a factor", CutFirst(rest, 'x'), 2, kMaxFactor);
     if (!factor.ok()) return factor.status();
     arguments.factors.push_back(*factor);
   }
@@ -45,7 +44,7 @@ Status ParseItem(std::string_view item, const CombiningEntry& scheme, CombiningA
   constexpr std::string_view kStrips = "strips=";
   if (scheme.takes_strips && item.starts_with(kStrips)) {
     if (arguments.strips != 0) return Status::InvalidArgument("strips are given twice");
-    const Result<std::uint32_t> strips = ParseNumber("strips", item.substr(kStrips.size()), 1, kMaxStrips);
+    const Result<std::uint32_t> strips = ParseArgument("strips", item.substr(kStrips.size()), 1, kMaxStrips);
     if (!strips.ok()) return strips.status();
     arguments.strips = *strips;
     return Status::Ok();

@@ -24,7 +24,7 @@ struct FrameSetup {
   ValueRange range;                         // data values that the classification table is made for
   const RendererKind* renderer = nullptr;   // of Renderers(); lives as long as the program
   std::vector<double> parameters;           // one value for each of renderer->parameters()
-  PixelFormat format = PixelFormat::kRgba;  // of local images: renderer->format(), so that combining need not know renderers
+  PixelFormat format = PixelFormat::kRgba;  // of local images: renderer->FormatOf(parameters), so that combining need not know renderers
   Camera camera;                            // of the picture, perhaps supersampled
   SheetGrid sheets;                         // the frame grid of renderers that work along slices; empty: the camera's grid
   TransferFunction transfer;

@@ -90,8 +90,8 @@ std::optional<Layout> Rebalance(const Layout& now, std::span<const double> secon
   };
 
   Layout reassigned = Reassign(now, request.slots, seconds);
-  const double after_wake_up = FrameSeconds(reassigned, request.slots, seconds);
-  weigh(std::move(reassigned), FrameSeconds(now, request.slots, seconds), after_wake_up);
+  const double after_reassigning = FrameSeconds(reassigned, request.slots, seconds);
+  weigh(std::move(reassigned), FrameSeconds(now, request.slots, seconds), after_reassigning);
 
   ResolvedPolicy by_cost = *request.policy;
   by_cost.load_metric = LoadMetric::kCost;

@@ -25,7 +25,7 @@ int MostGroups(const LayoutRequest& request, const ResolvedPolicy& policy) {
   const Index3& size = request.summary->description.geometry.size;
   const std::int64_t slots = request.slots;
   const std::int64_t boxes = policy.decomposition->one_axis
-                                 ? size[policy.axis] / request.renderer->reach()
+                                 ? size[policy.axis] / std::max(request.renderer->reach(), 1)
                                  : Box{{0, 0, 0}, size}.voxel_count() / (kSmallestCube * kSmallestCube * kSmallestCube);
   return int(std::clamp<std::int64_t>(boxes / slots, 1, kMaxGroups));
 }

@@ -5,9 +5,8 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 
-#include "common/base/find_named.h"
+#include "common/base/parse_number.h"
 
 // Each renderer's folder defines Kind() in a namespace with the renderer's name.
 #define SLABSTREAM_RENDERER(folder) \
@@ -27,10 +26,8 @@ Result<double> ParseParameter(const RendererParameter& parameter, const std::str
     return Status::InvalidArgument(
         fmt::format("{} is '{}', but must be one of: {}", parameter.name, text, fmt::join(parameter.choices, ", ")));
   }
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  const bool number = error == std::errc{} && end == text.data() + text.size();
-  if (number && value >= parameter.least && value <= parameter.most) return value;
+  const std::optional<double> value = ParseNumber<double>(text);
+  if (value && *value >= parameter.least && *value <= parameter.most) return *value;
   return Status::InvalidArgument(
       fmt::format("{} is '{}', but must be a number in [{}, {}]", parameter.name, text, parameter.least, parameter.most));
 }

@@ -45,6 +45,11 @@ LocalImage ResamplePicture(const LocalImage& frame, const FrameSetup& setup) {
 
 CostView CostViewOf(const FrameSetup& setup) { return {.along = setup.camera.traversal_axis, .pixels_per_voxel = PixelsPerVoxel(setup)}; }
 
+Status RendererKind::SetView(const ViewParameters& view, ImageSize size, FrameSetup& setup) const {
+  setup.camera = MakeSupersampledCamera(view, size, setup.description.geometry);
+  return Status::Ok();
+}
+
 ClassificationTable RendererKind::DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const {
   return Classify(transfer, summary.description, summary.range);
 }

@@ -29,6 +29,8 @@ struct RendererParameter {
   double standard = 0;                    // if the request says nothing; for choices, an index
   double least = 0, most = 0;             // limits of a number
   std::vector<std::string_view> choices;  // by value; empty: a number
+
+  double greatest() const { return choices.empty() ? most : double(choices.size() - 1); }  // valid value
 };
 
 // The direction and scale of a view whose cost is asked for.
@@ -88,8 +90,9 @@ class RendererKind {
   virtual PixelFormat FormatOf(const std::vector<double>& /*parameters*/) const { return facts_.format; }
 
   // Fills in the frame that workers render for a picture of `size` under `view`, both valid: camera, and sheets if the renderer works
-  // along slices. `setup` has its description. InvalidArgument: the frame would be too large.
-  virtual Status SetView(const ViewParameters& view, ImageSize size, FrameSetup& setup) const = 0;
+  // along slices. `setup` has its description. InvalidArgument: the frame would be too large. The default is
+  // the picture's own grid, supersampled where it is minified.
+  virtual Status SetView(const ViewParameters& view, ImageSize size, FrameSetup& setup) const;
 
   // The classification table whose opacity is 0 in exactly the bins that the renderer does not draw. Boxes without a drawn voxel within
   // their reach are not rendered. Empty-space skipping uses it, too.

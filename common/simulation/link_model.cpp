@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <limits>
 
 #include "common/base/find_named.h"
+#include "common/base/parse_number.h"
 
 namespace slabstream {
 namespace {
@@ -14,11 +14,7 @@ constexpr double kBytesAGigabit = 1e9 / 8;
 constexpr double kMaxLatencyMicroseconds = 1e6, kMaxGigabits = 1e6;
 
 // NaN, which lies in no range, if it is no number.
-double ToNumber(std::string_view text) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size() ? value : std::numeric_limits<double>::quiet_NaN();
-}
+double ToNumber(std::string_view text) { return ParseNumber<double>(text).value_or(std::numeric_limits<double>::quiet_NaN()); }
 
 }  // namespace
 

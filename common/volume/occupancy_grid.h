@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -17,6 +18,11 @@ inline constexpr std::int32_t kOccupancyCell = 8;  // voxels
 constexpr Index3 OccupancyCells(const Index3& size) {
   const auto cells = [](std::int32_t voxels) { return (voxels + kOccupancyCell - 1) / kOccupancyCell; };
   return {cells(size.x), cells(size.y), cells(size.z)};
+}
+
+// Place of a cell in OccupancyGrid::cells of a volume with so many cells.
+constexpr std::size_t OccupancyCellNumber(const Index3& cell, const Index3& cells) {
+  return (std::size_t(cell.z) * std::size_t(cells.y) + std::size_t(cell.y)) * std::size_t(cells.x) + std::size_t(cell.x);
 }
 
 // The voxels of a cell.

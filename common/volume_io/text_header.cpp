@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <charconv>
 #include <fstream>
 #include <sstream>
 
+#include "common/base/parse_number.h"
 #include "common/volume_io/raw_volume.h"
 
 namespace slabstream {
@@ -37,11 +37,9 @@ std::optional<std::vector<double>> TextHeader::Numbers(std::initializer_list<con
   std::vector<double> numbers;
   for (std::string word; words >> word;) {
     if (word == "none") continue;
-    const char* begin = word.data() + (word.size() > 1 && word[0] == '+' ? 1 : 0);
-    double number = 0;
-    const auto [stop, error] = std::from_chars(begin, word.data() + word.size(), number);
-    if (error != std::errc() || stop != word.data() + word.size()) return std::nullopt;
-    numbers.push_back(number);
+    const std::optional<double> number = ParseNumber<double>(std::string_view(word).substr(word.size() > 1 && word[0] == '+' ? 1 : 0));
+    if (!number) return std::nullopt;
+    numbers.push_back(*number);
   }
   return numbers.size() == count ? std::optional(numbers) : std::nullopt;
 }
@@ -86,11 +84,7 @@ Result<TextHeader> ReadTextHeader(const std::string& path, char separator, KeyCa
   return header;
 }
 
-std::optional<std::int64_t> ToInteger(const std::string& text) {
-  std::int64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size() ? std::optional(value) : std::nullopt;
-}
+std::optional<std::int64_t> ToInteger(const std::string& text) { return ParseNumber<std::int64_t>(text); }
 
 std::string ToLower(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return char(std::tolower(c)); });

@@ -59,8 +59,7 @@ void ReadRenderer(const v1::FrameSetup& in, FrameSetup& out, Checker& check) {
   std::vector<double> values;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     const auto scope = check.In("parameters", i);
-    const double most = parameters[i].choices.empty() ? parameters[i].most : double(parameters[i].choices.size() - 1);
-    values.push_back(check.Between("", in.parameters(int(i)), parameters[i].least, most));
+    values.push_back(check.Between("", in.parameters(int(i)), parameters[i].least, parameters[i].greatest()));
   }
   SetParameters(std::move(values), out);
 }

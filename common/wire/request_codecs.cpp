@@ -186,7 +186,8 @@ FrameRequest FromProto(const v1::FrameRequest& in, Checker& check) {
   FrameRequest out;
   out.dataset = check.Text("dataset", in.dataset(), 1, kMaxNameBytes);
   if (!in.renderer().empty()) out.renderer = check.Text("renderer", in.renderer(), 1, kMaxNameBytes);
-  for (int i = 0; i < check.Count("parameters", in.parameters_size(), kMaxParameters); ++i) {
+  const int parameters = check.Count("parameters", in.parameters_size(), kMaxParameters);
+  for (int i = 0; i < parameters; ++i) {
     const auto scope = check.In("parameters", std::size_t(i));
     const std::string name = check.Text("name", in.parameters(i).name(), 1, kMaxNameBytes);
     check.That(out.parameters.emplace(name, check.Text("text", in.parameters(i).text(), 1, kMaxNameBytes)).second, "name", "given twice");

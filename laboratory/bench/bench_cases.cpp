@@ -49,6 +49,8 @@ std::string Stem(const std::string& path) {
 
 }  // namespace
 
+double SphereOpacity(const RendererKind& renderer) { return HasDepth(renderer.format()) ? kOpaqueSphere : kTranslucentSphere; }
+
 BenchCase SphereCase(const SphereRequest& sphere, double opacity, const RendererKind* renderer) {
   const bool hollow = sphere.sphere_class == SphereClass::kHollow, points = HasDepth(renderer->format());
   const std::string dataset = SphereName(sphere);

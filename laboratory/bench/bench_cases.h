@@ -31,6 +31,9 @@ BenchCase SphereCase(const SphereRequest& sphere, double opacity, const Renderer
 BenchCase BrainCase();
 inline constexpr double kTranslucentSphere = 0.05, kOpaqueSphere = 0.9;
 
+// The opacity that experiments give a sphere: a renderer that shows surfaces gets an opaque one.
+double SphereOpacity(const RendererKind& renderer);
+
 // A standard case's name, or FILE[:TRANSFER] of a volume file (`at_service`: NAME[:TRANSFER] of a dataset), with TRANSFER as in --transfer.
 // NotFound, InvalidArgument: naming the text.
 Result<BenchCase> ParseBenchCase(const std::string& text, bool at_service);

@@ -57,10 +57,4 @@ const std::vector<StageCost>& CostModel::stages(std::string_view renderer) const
   return found == renderers.end() ? none : found->second;
 }
 
-double CostModel::PredictRender(std::string_view renderer, const WorkUnits& work) const {
-  double sum = 0;
-  for (const StageCost& stage : stages(renderer)) sum += stage.Predict(work);
-  return sum;
-}
-
 }  // namespace slabstream

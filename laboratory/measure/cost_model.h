@@ -59,8 +59,7 @@ struct CostModel {
 
   // As measured on one core of an AMD EPYC (Zen 5, AVX-512); docs/simulation.md says how.
   CostModel();
-  const std::vector<StageCost>& stages(std::string_view renderer) const;         // empty: no constants were measured
-  double PredictRender(std::string_view renderer, const WorkUnits& work) const;  // all stages
+  const std::vector<StageCost>& stages(std::string_view renderer) const;  // empty: no constants were measured
 };
 
 }  // namespace slabstream

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -11,6 +10,7 @@
 #include <sstream>
 #include <utility>
 
+#include "common/base/parse_number.h"
 #include "common/combining/schemes.h"
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
@@ -184,12 +184,11 @@ Result<ReplayChange> ParseReplayChange(std::span<const std::string> texts) {
       if (!link.ok()) return link.status();
       change.link = *link;
     } else if (key == "workers") {
-      int workers = 0;
-      const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), workers);
-      if (error != std::errc() || end != value.data() + value.size() || workers < 1) {
+      const std::optional<int> workers = ParseNumber<int>(value);
+      if (!workers || *workers < 1) {
         return Status::InvalidArgument(fmt::format("--with {}: '{}' is no number of workers from 1 on", text, value));
       }
-      change.workers = workers;
+      change.workers = *workers;
     } else {
       return Status::InvalidArgument(fmt::format("--with {}: must be combine=SCHEME, link=LINK or workers=N", text));
     }

@@ -11,6 +11,7 @@
 #include "common/image/resolve.h"
 #include "common/renderers/mip/projection_mode.h"
 #include "common/renderers/renderer_kind.h"
+#include "common/renderers/sampling_rate.h"
 
 namespace slabstream::mip {
 namespace {
@@ -65,28 +66,21 @@ class MipCost : public AnalyticCost {
 class MipKind : public RendererKind {
  public:
   MipKind()
-      : RendererKind(
-            {.name = "mip",
-             .title = "intensity projection",
-             .purpose = "the largest, least or mean value along each ray, for vessels",
-             .format = PixelFormat::kMaximum,
-             .reach = kHalo,  // 2 would do; like the other renderers, so that all use the same cached voxels
-             .footprint = 1,
-             .stages = {Stage::kSample},
-             .parameters = {
-                 {.name = "sampling-rate", .purpose = "Samples along a ray in each voxel length", .standard = 1, .least = 0.1, .most = 16},
-                 {.name = "projection-mode",
-                  .purpose = "Value of a pixel: the largest, the least or the mean sample along its ray",
-                  .standard = double(ProjectionMode::kMaximum),
-                  .choices = {"maximum", "minimum", "mean"}}}}) {}
+      : RendererKind({.name = "mip",
+                      .title = "intensity projection",
+                      .purpose = "the largest, least or mean value along each ray, for vessels",
+                      .format = PixelFormat::kMaximum,
+                      .reach = kHalo,  // 2 would do; like the other renderers, so that all use the same cached voxels
+                      .footprint = 1,
+                      .stages = {Stage::kSample},
+                      .parameters = {SamplingRate(),
+                                     {.name = "projection-mode",
+                                      .purpose = "Value of a pixel: the largest, the least or the mean sample along its ray",
+                                      .standard = double(ProjectionMode::kMaximum),
+                                      .choices = {"maximum", "minimum", "mean"}}}}) {}
 
   PixelFormat FormatOf(const std::vector<double>& parameters) const override {
     return ProjectionMode(int(parameters[1])) == ProjectionMode::kMean ? PixelFormat::kSum : PixelFormat::kMaximum;
-  }
-
-  Status SetView(const ViewParameters& view, ImageSize size, FrameSetup& setup) const override {
-    setup.camera = MakeSupersampledCamera(view, size, setup.description.geometry);
-    return Status::Ok();
   }
 
   // Whatever its value, a sample may be the one that a pixel shows.

@@ -35,9 +35,7 @@ double RaycastCost::Seconds(const Box& box, const CostView& view) const {
     for (cell[u] = across_u.begin; cell[u] < across_u.end; ++cell[u]) {
       double depth = 0;  // voxel lengths of material
       for (cell[c] = along.begin; cell[c] < along.end; ++cell[c]) {
-        const std::size_t number =
-            (std::size_t(cell.z) * std::size_t(cells.y) + std::size_t(cell.y)) * std::size_t(cells.x) + std::size_t(cell.x);
-        depth += along.ShareInside(cell[c]) * drawn_.cells[number].voxels / kCellArea;
+        depth += along.ShareInside(cell[c]) * drawn_.cells[OccupancyCellNumber(cell, cells)].voxels / kCellArea;
       }
       if (depth <= 0) continue;
       const double area = kCellArea * across_u.ShareInside(cell[u]) * across_v.ShareInside(cell[v]);

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "common/renderers/raycast/raycast_cost.h"
+#include "common/renderers/sampling_rate.h"
 
 namespace slabstream::raycast {
 namespace {
@@ -16,16 +17,7 @@ class RaycastKind : public RendererKind {
                       .reach = kHalo,  // 2 would do; like the other renderers, so that all use the same cached voxels
                       .footprint = 1,
                       .stages = {Stage::kSample},
-                      .parameters = {{.name = "sampling-rate",
-                                      .purpose = "Samples along a ray in each voxel length",
-                                      .standard = 1,
-                                      .least = 0.1,
-                                      .most = 16}}}) {}
-
-  Status SetView(const ViewParameters& view, ImageSize size, FrameSetup& setup) const override {
-    setup.camera = MakeSupersampledCamera(view, size, setup.description.geometry);
-    return Status::Ok();
-  }
+                      .parameters = {SamplingRate()}}) {}
 
   // Interpolation gives all values between those of two voxels, so a sample between two clear voxels may be visible. A voxel counts as
   // drawn if it is at least the lowest visible value: without such a voxel, nothing in its reach shows.

@@ -1,4 +1,5 @@
 // The Z-buffer's planning half: the frame is the picture, supersampled where it is minified; only opaque voxels draw.
+#include "common/renderers/zbuffer/least_opaque.h"
 #include "common/renderers/zbuffer/zbuffer_cost.h"
 
 namespace slabstream::zbuffer {
@@ -15,15 +16,9 @@ class ZBufferKind : public RendererKind {
                       .footprint = 1,
                       .stages = {Stage::kZBuffer, Stage::kShade}}) {}
 
-  Status SetView(const ViewParameters& view, ImageSize size, FrameSetup& setup) const override {
-    setup.camera = MakeSupersampledCamera(view, size, setup.description.geometry);
-    return Status::Ok();
-  }
-
-  // Opaque: at least half of the largest opacity in the volume.
   ClassificationTable DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const override {
     ClassificationTable table = Classify(transfer, summary.description, summary.range);
-    const float least = 0.5F * MaxOpacity(table, summary.description, summary.range);
+    const float least = LeastOpaque(table, summary.description, summary.range);
     for (float& opacity : table.opacity) opacity = opacity >= least ? opacity : 0;
     return table;
   }

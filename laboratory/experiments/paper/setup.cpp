@@ -37,8 +37,7 @@ std::vector<int> PaperSetup::MeasuredWorkers() const {
 
 FrameCase PaperSetup::Frame(const RendererKind* renderer, int size, int workers) const {
   FrameCase frame;
-  const double opacity = HasDepth(renderer->format()) ? kOpaqueSphere : kTranslucentSphere;
-  frame.volume = SphereCase({SphereClass::kHollow, size, kOccupancy}, opacity, renderer);
+  frame.volume = SphereCase({SphereClass::kHollow, size, kOccupancy}, SphereOpacity(*renderer), renderer);
   frame.size = {size, size};
   frame.view.azimuth_degrees = kAzimuth;
   frame.view.elevation_degrees = kElevation;

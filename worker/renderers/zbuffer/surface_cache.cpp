@@ -2,11 +2,13 @@
 
 #include <algorithm>
 
+#include "common/renderers/zbuffer/least_opaque.h"
+
 namespace slabstream {
 
 const Surface& SurfaceCache::OpaqueSurface(SlabData& slab, const FrameSetup& setup, const Box& box) {
   const ClassificationTable& table = slab.Classification(setup);
-  if (BinSelection bins = SelectBins(table, 0.5F * MaxOpacity(table, setup.description, setup.range)); bins != opaque_bins_) {
+  if (BinSelection bins = SelectBins(table, zbuffer::LeastOpaque(table, setup.description, setup.range)); bins != opaque_bins_) {
     surfaces_.clear();
     opaque_bins_ = std::move(bins);
   }
