@@ -1,11 +1,15 @@
 // NIfTI-1 in one file (.nii, .nii.gz). Fields, numbers and formulas are those of nifti1.h, the format's definition.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <map>
 #include <optional>
+#include <vector>
 
 #include "common/volume_io/raw_volume.h"
 
@@ -50,21 +54,11 @@ class NiftiHeader {
   bool swap_ = false;
 };
 
-// NIFTI_TYPE_...
 std::optional<SampleType> ToSampleType(int data_type) {
-  switch (data_type) {
-    case 2: return SampleType::kUint8;
-    case 4: return SampleType::kInt16;
-    case 8: return SampleType::kInt32;
-    case 16: return SampleType::kFloat32;
-    case 64: return SampleType::kFloat64;
-    case 256: return SampleType::kInt8;
-    case 512: return SampleType::kUint16;
-    case 768: return SampleType::kUint32;
-    case 1024: return SampleType::kInt64;
-    case 1280: return SampleType::kUint64;
-    default: return std::nullopt;
-  }
+  static const std::map<int, const char*> kNames = {{2, "uint8"},  {4, "int16"},    {8, "int32"},    {16, "float32"}, {64, "float64"},
+                                                    {256, "int8"}, {512, "uint16"}, {768, "uint32"}, {1024, "int64"}, {1280, "uint64"}};
+  const auto found = kNames.find(data_type);  // NIFTI_TYPE_...
+  return found == kNames.end() ? std::nullopt : SampleTypeNamed(found->second);
 }
 
 // Origin and directions. Like ITK, takes the affine matrix if it leads to the scanner's axes, else the quaternion. Without either they stay
@@ -96,25 +90,20 @@ Result<RawHeader> ReadHeader(const NiftiHeader& fields, const std::string& path)
   const auto wrong = [&](const std::string& why) { return Status::InvalidArgument(path + ": " + why); };
   const std::optional<SampleType> type = ToSampleType(fields.data_type());
   if (!type) {
-    return wrong("NIfTI data type " + std::to_string(fields.data_type()) +
-                 " is not supported, single integers of 8 to 64 bits and floats of 32 and 64 bits are");
+    return wrong(fmt::format("NIfTI data type {} is not supported, single integers of 8 to 64 bits and floats of 32 and 64 bits are",
+                             fields.data_type()));
   }
-  int dimensions = fields.dim(0);
-  if (dimensions < 1 || dimensions > 7) return wrong("has " + std::to_string(dimensions) + " dimensions, must have 3");
-  for (int i = 1; i <= dimensions; ++i) {
-    if (fields.dim(i) < 1) return wrong("dim[" + std::to_string(i) + "] is " + std::to_string(fields.dim(i)) + ", must be at least 1");
-  }
-  while (dimensions > 3 && fields.dim(dimensions) == 1) --dimensions;
-  if (dimensions != 3) return wrong("has " + std::to_string(dimensions) + " dimensions, must have 3");
+  const int dimensions = fields.dim(0);
+  if (dimensions < 1 || dimensions > 7) return wrong(fmt::format("has {} dimensions, must have 3", dimensions));
+  std::vector<double> sizes;
+  for (int i = 1; i <= dimensions; ++i) sizes.push_back(fields.dim(i));
+  const Result<Index3> size = ToSize(path, sizes);
+  if (!size.ok()) return size.status();
 
-  RawHeader header;
-  header.type = *type;
+  RawHeader header{.size = *size, .type = *type};
   constexpr int kMetres = 1, kMicrometres = 3;  // NIFTI_UNITS_...
   const double millimetres = fields.space_unit() == kMetres ? 1000 : fields.space_unit() == kMicrometres ? 0.001 : 1;
-  for (int i = 0; i < 3; ++i) {
-    header.size[i] = fields.dim(i + 1);
-    header.spacing[i] = millimetres * fields.pixdim(i + 1);
-  }
+  header.spacing = millimetres * Vec3{fields.pixdim(1), fields.pixdim(2), fields.pixdim(3)};
   ReadOrientation(fields, millimetres, header);
   // A slope of 0 means that there is none.
   if (fields.slope() != 0 && std::isfinite(fields.slope()) && std::isfinite(fields.intercept())) {
@@ -139,11 +128,9 @@ Result<RawVolume> ReadNifti(const std::string& path) {
   const Result<RawHeader> header = ReadHeader(fields, path);
   if (!header.ok()) return header.status();
 
-  constexpr float kMaxOffset = 1 << 30;  // bytes: floats are exact enough, extensions are smaller
   const float offset = fields.vox_offset();
-  if (!(offset <= kMaxOffset)) {
-    return Status::InvalidArgument(path + ": vox_offset is " + std::to_string(offset) + ", must be at most 2^30");
-  }
+  // So far floats are exact enough, and extensions are smaller.
+  if (!(offset <= 0x1p30F)) return Status::InvalidArgument(fmt::format("{}: vox_offset is {}, must be at most 2^30", path, offset));
   (payload.compressed ? payload.skip : payload.offset) = offset < float{kHeaderBytes} ? kUsualOffset : std::int64_t(offset);
   payload.big_endian = fields.big_endian();
   return ReadSamples(path, *header, payload);

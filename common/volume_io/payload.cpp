@@ -1,5 +1,6 @@
 #include "common/volume_io/payload.h"
 
+#include <fmt/format.h>
 #include <zlib.h>
 
 #include <algorithm>
@@ -14,8 +15,8 @@ constexpr std::size_t kBlock = std::size_t{1} << 16;  // bytes
 constexpr std::int64_t kMaxDeflateRatio = 1032;       // zlib's technical notes: 1032:1 at most
 
 Status Truncated(const Payload& payload, std::int64_t expected, std::int64_t found) {
-  return Status::DataLoss(payload.file.string() + ": truncated: the header speaks of " + std::to_string(expected) +
-                          " bytes of samples, the file has " + std::to_string(found));
+  return Status::DataLoss(
+      fmt::format("{}: truncated: the header speaks of {} bytes of samples, the file has {}", payload.file.string(), expected, found));
 }
 
 Status Damaged(const Payload& payload) { return Status::DataLoss(payload.file.string() + ": the compressed samples are damaged"); }
@@ -115,8 +116,8 @@ Status CheckHolds(const Payload& payload, std::int64_t bytes) {
   const std::int64_t data_bytes = std::max<std::int64_t>(0, std::int64_t(file_bytes) - payload.offset);
   if (!payload.compressed) return data_bytes >= bytes ? Status::Ok() : Truncated(payload, bytes, data_bytes);
   if (data_bytes >= bytes / kMaxDeflateRatio) return Status::Ok();
-  return Status::DataLoss(payload.file.string() + ": truncated: the header speaks of " + std::to_string(bytes) +
-                          " bytes of samples, which " + std::to_string(data_bytes) + " compressed bytes cannot hold");
+  return Status::DataLoss(fmt::format("{}: truncated: the header speaks of {} bytes of samples, which {} compressed bytes cannot hold",
+                                      payload.file.string(), bytes, data_bytes));
 }
 
 Status ReadPayload(const Payload& payload, std::span<std::byte> out) { return Read(payload, out, Extent::kWholeStream); }

@@ -1,29 +1,27 @@
 #include "common/volume_io/raw_volume.h"
 
-#include <algorithm>
+#include <fmt/format.h>
+
 #include <bit>
+#include <cmath>
 
 #include "common/volume/memory_budget.h"
 
 namespace slabstream {
 
-Status CheckSize(const std::string& path, const std::array<std::int64_t, 3>& size) {
+Result<Index3> ToSize(const std::string& path, std::vector<double> sizes) {
+  while (sizes.size() > 3 && sizes.back() == 1) sizes.pop_back();
+  if (sizes.size() != 3) return Status::InvalidArgument(fmt::format("{}: has {} dimensions, must have 3", path, sizes.size()));
+  Index3 size;
   for (const Axis axis : kAxes) {
-    const std::int64_t side = size[std::size_t(Number(axis))];
-    if (side < 1 || side > kMaxVolumeSide) {
-      return Status::InvalidArgument(path + ": the size along " + Letter(axis) + " is " + std::to_string(side) + ", must be in [1, " +
-                                     std::to_string(kMaxVolumeSide) + "]");
+    const double side = sizes[std::size_t(Number(axis))];
+    if (!(side >= 1 && side <= kMaxVolumeSide && side == std::floor(side))) {
+      return Status::InvalidArgument(
+          fmt::format("{}: the size along {} is {}, must be a whole number in [1, {}]", path, Letter(axis), side, kMaxVolumeSide));
     }
+    size[axis] = std::int32_t(side);
   }
-  return Status::Ok();
-}
-
-Result<Payload> FromTheEnd(Payload payload, const std::string& path, std::int64_t sample_bytes) {
-  std::error_code error;
-  const auto file_bytes = std::filesystem::file_size(payload.file, error);
-  if (error) return Status::NotFound(path + ": samples in " + payload.file.string() + ": " + error.message());
-  payload.offset = std::max(payload.offset, std::int64_t(file_bytes) - sample_bytes);
-  return payload;
+  return size;
 }
 
 Result<RawVolume> ReadSamples(const std::string& path, const RawHeader& header, const Payload& payload) {

@@ -30,11 +30,9 @@ struct RawVolume {
   AlignedVector<std::byte> bytes;  // this machine's byte order
 };
 
-// InvalidArgument naming `path`, the axis and the limit, unless every side is in [1, kMaxVolumeSide].
-Status CheckSize(const std::string& path, const std::array<std::int64_t, 3>& size);
-
-// The payload with its offset set so that the samples end the file. NotFound naming `path` and the file, if it does not exist.
-Result<Payload> FromTheEnd(Payload payload, const std::string& path, std::int64_t sample_bytes);
+// A volume's size from what a file says of its dimensions; those of 1 behind the third are left out. InvalidArgument naming `path`: there
+// are not three, or one is no whole number in [1, kMaxVolumeSide].
+Result<Index3> ToSize(const std::string& path, std::vector<double> sizes);
 
 // Checks that the file and the memory are large enough, then takes memory for the samples and reads them.
 Result<RawVolume> ReadSamples(const std::string& path, const RawHeader& header, const Payload& payload);

@@ -1,8 +1,8 @@
 #include "common/volume_io/sample_type.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <span>
 #include <type_traits>
@@ -11,22 +11,21 @@
 namespace slabstream {
 namespace {
 
-template <class Function>
-decltype(auto) Visit(SampleType type, Function&& function) {
-  switch (type) {
-    case SampleType::kInt8: return function(std::int8_t{});
-    case SampleType::kUint8: return function(std::uint8_t{});
-    case SampleType::kInt16: return function(std::int16_t{});
-    case SampleType::kUint16: return function(std::uint16_t{});
-    case SampleType::kInt32: return function(std::int32_t{});
-    case SampleType::kUint32: return function(std::uint32_t{});
-    case SampleType::kInt64: return function(std::int64_t{});
-    case SampleType::kUint64: return function(std::uint64_t{});
-    case SampleType::kFloat32: return function(float{});
-    case SampleType::kFloat64: break;
-  }
-  return function(double{});
-}
+struct TypeTraits {
+  std::string_view name;
+  std::size_t bytes;
+};
+// In the order of SampleType.
+constexpr std::array<TypeTraits, 10> kTypes = {{{"int8", 1},
+                                                {"uint8", 1},
+                                                {"int16", 2},
+                                                {"uint16", 2},
+                                                {"int32", 4},
+                                                {"uint32", 4},
+                                                {"int64", 8},
+                                                {"uint64", 8},
+                                                {"float32", 4},
+                                                {"float64", 8}}};
 
 template <class T>
 std::span<T> SamplesOf(AlignedVector<std::byte>& bytes) {
@@ -96,24 +95,12 @@ KeptSamples Narrow(AlignedVector<std::byte> bytes) {
 
 }  // namespace
 
-std::string_view ToString(SampleType type) {
-  switch (type) {
-    case SampleType::kInt8: return "int8";
-    case SampleType::kUint8: return "uint8";
-    case SampleType::kInt16: return "int16";
-    case SampleType::kUint16: return "uint16";
-    case SampleType::kInt32: return "int32";
-    case SampleType::kUint32: return "uint32";
-    case SampleType::kInt64: return "int64";
-    case SampleType::kUint64: return "uint64";
-    case SampleType::kFloat32: return "float32";
-    case SampleType::kFloat64: break;
-  }
-  return "float64";
-}
+std::string_view ToString(SampleType type) { return kTypes[std::size_t(type)].name; }
+std::size_t BytesPerSample(SampleType type) { return kTypes[std::size_t(type)].bytes; }
 
-std::size_t BytesPerSample(SampleType type) {
-  return Visit(type, [](auto sample) { return sizeof(sample); });
+std::optional<SampleType> SampleTypeNamed(std::string_view name) {
+  const auto found = std::ranges::find(kTypes, name, &TypeTraits::name);
+  return found == kTypes.end() ? std::nullopt : std::optional(SampleType(found - kTypes.begin()));
 }
 
 void SwapByteOrder(SampleType type, AlignedVector<std::byte>& bytes) {

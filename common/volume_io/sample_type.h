@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string_view>
 
 #include "common/base/aligned_buffer.h"
@@ -12,7 +13,8 @@ namespace slabstream {
 
 enum class SampleType : std::uint8_t { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kInt64, kUint64, kFloat32, kFloat64 };
 
-std::string_view ToString(SampleType type);  // "int16"
+std::string_view ToString(SampleType type);                        // "int16"
+std::optional<SampleType> SampleTypeNamed(std::string_view name);  // the inverse
 std::size_t BytesPerSample(SampleType type);
 
 // Turns samples between big and little endian, in place. `bytes` holds whole samples.

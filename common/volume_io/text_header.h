@@ -1,4 +1,4 @@
-// The text header of a NRRD or MetaImage file: lines "key: value" or "key = value".
+// Volume files with a text header, NRRD and MetaImage: lines "key: value" or "key = value", then the samples, or the name of their file.
 #pragma once
 
 #include <cstdint>
@@ -8,13 +8,12 @@
 #include <vector>
 
 #include "common/base/status.h"
-#include "common/math/vec.h"
+#include "common/volume_io/raw_volume.h"
 
 namespace slabstream {
 
-inline constexpr std::size_t kMaxTextHeader = std::size_t{1} << 20;  // bytes
-
 struct TextHeader {
+  std::string path, format;  // for messages
   std::string first_line;
   std::map<std::string, std::string> fields;  // both sides without blanks around them
   std::int64_t end = 0;                       // bytes of the file up to and including the line that ends the header
@@ -22,24 +21,42 @@ struct TextHeader {
   // The value of the first of these keys that the header has.
   std::optional<std::string> Find(std::initializer_list<const char*> keys) const;
   std::optional<std::string> Find(const char* key) const { return Find({key}); }
-  // Its numbers; `if_absent` if the header has none of the keys; nullopt unless the value is exactly `count` numbers. Numbers may be nan,
-  // and grouped as "(1,0,0) (0,1,0) none".
-  std::optional<std::vector<double>> Numbers(std::initializer_list<const char*> keys, std::size_t count,
-                                             std::vector<double> if_absent) const;
+  // Its numbers; `if_absent` if the header has none of the keys. Numbers may be nan, and grouped as "(1,0,0) (0,1,0) none".
+  // InvalidArgument unless the value is exactly `count` numbers.
+  Result<std::vector<double>> Numbers(std::initializer_list<const char*> keys, std::size_t count, std::vector<double> if_absent) const;
+  // The numbers of the field `sizes`, as many as the field `dimension` says. InvalidArgument: they are not.
+  Result<std::vector<double>> Sizes(const char* dimension, const char* sizes) const;
+
+  // Samples in the file `name`, in the header's folder unless the name is absolute, or without a name behind the header. InvalidArgument:
+  // the name stands for several files.
+  Result<Payload> PayloadIn(const std::optional<std::string>& name) const;
+  // How many bytes of the payload's file to skip, as the field `key` with this value says. -1: those in front of the last `sample_bytes`.
+  // InvalidArgument: no number of at least -1. NotFound: no such file.
+  Result<std::int64_t> BytesToSkip(const char* key, const std::string& value, const Payload& payload, std::int64_t sample_bytes) const;
+
+  // InvalidArgument with a message that begins with the path; NotA...: it also says that this is no volume of the format.
+  Status Refused(const std::string& why) const { return Status::InvalidArgument(path + ": " + why); }
+  Status NotAVolume(const std::string& why) const { return Refused("not a " + format + " volume: " + why); }
 };
 
-// NRRD ignores the case of keys, MetaImage does not.
-enum class KeyCase { kAsWritten, kLower };
+// The three of `numbers` from number `first` on.
+inline Vec3 Triple(const std::vector<double>& numbers, std::size_t first = 0) {
+  return {numbers[first], numbers[first + 1], numbers[first + 2]};
+}
 
-// Reads lines until an empty one, one with the key `last_key`, or the end of the file. Skips lines that begin with # and lines without the
-// separator. NotFound: cannot be opened. InvalidArgument: longer than kMaxTextHeader.
-Result<TextHeader> ReadTextHeader(const std::string& path, char separator, KeyCase key_case, const std::string& last_key);
+struct TextFormat {
+  std::string name;
+  std::string first_line;  // how it begins
+  char separator;
+  bool ignores_case;     // of keys: they are found by their lower case
+  std::string last_key;  // ends the header, like an empty line; "": none does
+  std::vector<const char*> required;
+  Result<RawHeader> (*read_header)(const TextHeader& text);
+  Result<Payload> (*find_payload)(const TextHeader& text, std::int64_t sample_bytes);
+};
 
-// A volume's size from the numbers of a header; a number that is not whole is refused like 0. InvalidArgument as CheckSize.
-Result<Index3> ToSize(const std::string& path, const std::vector<double>& sides);
-
-// A whole number, or nullopt.
-std::optional<std::int64_t> ToInteger(const std::string& text);
+// Skips lines of the header that begin with # and lines without the separator. Errors as in volume_reader.h.
+Result<RawVolume> ReadTextVolume(const std::string& path, const TextFormat& format);
 
 std::string ToLower(std::string text);
 

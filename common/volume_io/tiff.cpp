@@ -2,6 +2,7 @@
 //
 // TIFF states no distance between slices, and its resolution is meant for print: spacing is 1 along x and z, and along y the ratio of the
 // two resolutions.
+#include <fmt/format.h>
 #include <tiffio.h>
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "common/volume/memory_budget.h"
 #include "common/volume_io/raw_volume.h"
@@ -19,13 +21,9 @@
 namespace slabstream {
 namespace {
 
-// What libtiff complained about first; the rest are consequences.
-struct Complaint {
-  std::string text;
-};
-
+// Keeps what libtiff complains about first; the rest are consequences.
 int KeepFirst(TIFF*, void* complaint, const char*, const char* format, va_list arguments) {
-  std::string& text = static_cast<Complaint*>(complaint)->text;
+  std::string& text = *static_cast<std::string*>(complaint);
   if (text.empty()) {
     std::array<char, 256> buffer{};
     (void)std::vsnprintf(buffer.data(), buffer.size(), format, arguments);
@@ -49,10 +47,11 @@ class TiffFile {
 
   bool is_open() const { return tiff_ != nullptr; }
   Status Failed(StatusCode code, const std::string& why) const {
-    return {code, path_ + ": " + why + (complaint_->text.empty() ? "" : ": " + complaint_->text)};
+    return {code, path_ + ": " + why + (complaint_->empty() ? "" : ": " + *complaint_)};
   }
   Status Damaged() const { return Failed(StatusCode::kDataLoss, "truncated or damaged"); }
-  Status NotTiff() const { return Failed(StatusCode::kInvalidArgument, "not a TIFF volume"); }
+  Status Refused(const std::string& why) const { return Failed(StatusCode::kInvalidArgument, why); }
+  Status NotTiff() const { return Refused("not a TIFF volume"); }
 
   // Counts the pages to the end of the chain; a broken chain is an error.
   Result<std::int64_t> CountPages() {
@@ -60,7 +59,7 @@ class TiffFile {
     while (TIFFReadDirectory(tiff_.get()) != 0) {
       if (++pages > kMaxVolumeSide) break;
     }
-    if (!complaint_->text.empty()) return Failed(StatusCode::kDataLoss, "truncated or damaged after page " + std::to_string(pages));
+    if (!complaint_->empty()) return Failed(StatusCode::kDataLoss, "truncated or damaged after page " + std::to_string(pages));
     return pages;
   }
   Status GoToFirstPage() { return TIFFSetDirectory(tiff_.get(), 0) != 0 ? Status::Ok() : Damaged(); }
@@ -81,7 +80,7 @@ class TiffFile {
   Status ReadTiles(const RawHeader& header, std::byte* out);
 
   std::string path_;
-  std::unique_ptr<Complaint> complaint_ = std::make_unique<Complaint>();  // its address is the handler's
+  std::unique_ptr<std::string> complaint_ = std::make_unique<std::string>();  // its address is the handler's
   struct Close {
     void operator()(TIFF* tiff) const { TIFFClose(tiff); }
   };
@@ -89,44 +88,27 @@ class TiffFile {
 };
 
 std::optional<SampleType> ToSampleType(unsigned bits, unsigned format) {
-  switch (format) {
-    case SAMPLEFORMAT_UINT:
-    case SAMPLEFORMAT_VOID:
-      return bits == 8    ? std::optional(SampleType::kUint8)
-             : bits == 16 ? std::optional(SampleType::kUint16)
-             : bits == 32 ? std::optional(SampleType::kUint32)
-             : bits == 64 ? std::optional(SampleType::kUint64)
-                          : std::nullopt;
-    case SAMPLEFORMAT_INT:
-      return bits == 8    ? std::optional(SampleType::kInt8)
-             : bits == 16 ? std::optional(SampleType::kInt16)
-             : bits == 32 ? std::optional(SampleType::kInt32)
-             : bits == 64 ? std::optional(SampleType::kInt64)
-                          : std::nullopt;
-    case SAMPLEFORMAT_IEEEFP:
-      return bits == 32 ? std::optional(SampleType::kFloat32) : bits == 64 ? std::optional(SampleType::kFloat64) : std::nullopt;
-    default: return std::nullopt;
-  }
+  const bool is_unsigned = format == SAMPLEFORMAT_UINT || format == SAMPLEFORMAT_VOID;
+  const char* kind = is_unsigned ? "uint" : format == SAMPLEFORMAT_INT ? "int" : format == SAMPLEFORMAT_IEEEFP ? "float" : "";
+  return SampleTypeNamed(kind + std::to_string(bits));
 }
 
 Result<RawHeader> TiffFile::ReadPageHeader() const {
   const auto samples = Field<std::uint16_t>(TIFFTAG_SAMPLESPERPIXEL, 1);
   if (samples != 1 || Field<std::uint16_t>(TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK) == PHOTOMETRIC_PALETTE) {
-    return Failed(StatusCode::kInvalidArgument,
-                  "a colour image (" + std::to_string(samples) + " samples a pixel or a palette), must have 1 sample");
+    return Refused(fmt::format("a colour image ({} samples a pixel or a palette), must have 1 sample", samples));
   }
   const auto bits = Field<std::uint16_t>(TIFFTAG_BITSPERSAMPLE, 1), format = Field<std::uint16_t>(TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_UINT);
   const std::optional<SampleType> type = ToSampleType(bits, format);
   if (!type) {
-    return Failed(StatusCode::kInvalidArgument, "samples of " + std::to_string(bits) + " bits and format " + std::to_string(format) +
-                                                    " are not supported, integers of 8 to 64 bits and floats of 32 and 64 bits are");
+    return Refused(fmt::format(
+        "samples of {} bits and format {} are not supported, integers of 8 to 64 bits and floats of 32 and 64 bits are", bits, format));
   }
   const auto width = Field<std::uint32_t>(TIFFTAG_IMAGEWIDTH, 0), height = Field<std::uint32_t>(TIFFTAG_IMAGELENGTH, 0);
-  if (Status status = CheckSize(path_, {width, height, 1}); !status.ok()) return status;
+  const Result<Index3> size = ToSize(path_, {double(width), double(height), 1});
+  if (!size.ok()) return size.status();
 
-  RawHeader header;
-  header.size = {std::int32_t(width), std::int32_t(height), 1};
-  header.type = *type;
+  RawHeader header{.size = *size, .type = *type};
   const auto x_resolution = Field<float>(TIFFTAG_XRESOLUTION, 0), y_resolution = Field<float>(TIFFTAG_YRESOLUTION, 0);
   if (x_resolution > 0 && y_resolution > 0) header.spacing.y = double(x_resolution) / double(y_resolution);
   return header;
@@ -170,15 +152,16 @@ Status TiffFile::ReadTiles(const RawHeader& header, std::byte* out) {
 
 // Takes memory for a whole volume of pages like `page`, after checking that files of that many bytes can hold it.
 Result<RawVolume> Allocate(const std::string& path, const RawHeader& page, std::int64_t pages, std::int64_t file_bytes) {
-  if (Status status = CheckSize(path, {page.size.x, page.size.y, pages}); !status.ok()) return status;
+  const Result<Index3> size = ToSize(path, {double(page.size.x), double(page.size.y), double(pages)});
+  if (!size.ok()) return size.status();
   RawVolume raw{page, {}};
-  raw.header.size.z = std::int32_t(pages);
+  raw.header.size = *size;
   const std::int64_t needed = raw.header.sample_bytes();
   // More than LZW (1400), deflate (1032) and LZMA (7000) reach; a file that claims more is damaged.
   constexpr std::int64_t kMaxRatio = 8192;
   if (needed / kMaxRatio > file_bytes) {
-    return Status::DataLoss(path + ": truncated: the header speaks of " + std::to_string(needed) + " bytes of samples, the file has " +
-                            std::to_string(file_bytes));
+    return Status::DataLoss(
+        fmt::format("{}: truncated: the header speaks of {} bytes of samples, the file has {}", path, needed, file_bytes));
   }
   if (Status status = CheckFitsMemory(needed, path); !status.ok()) return status;
   raw.bytes.resize(std::size_t(needed));
@@ -194,9 +177,7 @@ std::int64_t FileBytes(const std::string& path) {
 bool SamePage(const RawHeader& a, const RawHeader& b) { return a.size == b.size && a.type == b.type; }
 
 Status Differs(const std::string& what, const RawHeader& page, const RawHeader& first) {
-  const auto text = [](const RawHeader& header) {
-    return std::to_string(header.size.x) + " x " + std::to_string(header.size.y) + " " + std::string(ToString(header.type));
-  };
+  const auto text = [](const RawHeader& header) { return fmt::format("{} x {} {}", header.size.x, header.size.y, ToString(header.type)); };
   return Status::InvalidArgument(what + " is " + text(page) + ", must be " + text(first) + " like the first one");
 }
 
@@ -239,34 +220,22 @@ Result<RawVolume> ReadSlices(const std::string& directory, const std::vector<std
     if (Status status = file.ReadPage(*header, raw->bytes.data() + std::int64_t(slice) * first.sample_bytes()); !status.ok()) return status;
     const Result<std::int64_t> pages = file.CountPages();
     if (!pages.ok()) return pages.status();
-    if (*pages != 1)
-      return Status::InvalidArgument(paths[slice] + ": has " + std::to_string(*pages) + " pages, must have 1 in a directory of slices");
+    if (*pages != 1) return file.Refused(fmt::format("has {} pages, must have 1 in a directory of slices", *pages));
   }
   return std::move(*raw);
 }
 
-// Compares numbers inside names by value: s2 before s10.
-bool NaturallyBefore(const std::string& a, const std::string& b) {
-  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
-  std::size_t i = 0, j = 0;
-  while (i < a.size() && j < b.size()) {
-    if (!is_digit(a[i]) || !is_digit(b[j])) {
-      if (a[i] != b[j]) return a[i] < b[j];
-      ++i, ++j;
-      continue;
-    }
-    const auto number = [&](const std::string& text, std::size_t& at) {
-      const std::size_t begin = at;
-      while (at < text.size() && is_digit(text[at])) ++at;
-      const std::string digits = text.substr(begin, at - begin);
-      return digits.substr(std::min(digits.find_first_not_of('0'), digits.size()));
-    };
-    const std::string m = number(a, i), n = number(b, j);
-    if (m.size() != n.size()) return m.size() < n.size();
-    if (m != n) return m < n;
+// A key that sorts numbers inside names by value, s2 before s10: each becomes a 0, the count of its digits, and its digits.
+std::string NaturalKey(const std::string& name) {
+  std::string key;
+  for (std::size_t i = 0; i < name.size();) {
+    const std::size_t number = std::min(name.find_first_of("0123456789", i), name.size());
+    key.append(name, i, number - i);
+    i = std::min(name.find_first_not_of("0123456789", number), name.size());
+    const std::size_t digits = std::min(name.find_first_not_of('0', number), i);
+    if (number < i) key.append({'0', char(i - digits)}).append(name, digits, i - digits);
   }
-  if (a.size() - i != b.size() - j) return a.size() - i < b.size() - j;
-  return a < b;  // they differ in leading zeros only
+  return key;
 }
 
 }  // namespace
@@ -278,7 +247,7 @@ std::vector<std::string> TiffFilesIn(const std::string& directory) {
     const std::string ending = ToLower(entry.path().extension().string());
     if ((ending == ".tif" || ending == ".tiff") && entry.is_regular_file(error)) paths.push_back(entry.path().string());
   }
-  std::sort(paths.begin(), paths.end(), NaturallyBefore);
+  std::ranges::sort(paths, {}, [](const std::string& path) { return std::pair(NaturalKey(path), path); });
   return paths;
 }
 

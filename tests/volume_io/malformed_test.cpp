@@ -142,7 +142,7 @@ TEST(Malformed, OtherNumbersOfDimensionsAndComponentsFail) {
   };
   expect("v.nii", NiftiHeader({.dimensions = {4, 6}}) + Samples(24), "has 2 dimensions");
   expect("v.nii", NiftiHeader({.dimensions = {4, 3, 2, 5}}) + Samples(120), "has 4 dimensions");
-  expect("v.nii", NiftiHeader({.dimensions = {4, 3, -2}}) + Samples(24), "dim[3] is -2");
+  expect("v.nii", NiftiHeader({.dimensions = {4, 3, -2}}) + Samples(24), "size along z is -2");
   FileBytes rgb = NiftiHeader({});
   rgb[70] = char(128);
   expect("v.nii", rgb + Samples(72), "data type 128");
