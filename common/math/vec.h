@@ -1,8 +1,10 @@
 // Small fixed-size vectors: Vec3 (double, points and directions), Index3 (voxel indices), Axis. No I/O, no allocation.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 
 namespace slabstream {
@@ -43,6 +45,22 @@ struct Index3 {
   friend constexpr bool operator==(const Index3&, const Index3&) = default;
   friend constexpr auto operator<=>(const Index3&, const Index3&) = default;
 };
+
+constexpr Index3 operator+(const Index3& a, const Index3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+constexpr Index3 operator-(const Index3& a, const Index3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+constexpr Index3 operator*(std::int32_t s, const Index3& a) { return {s * a.x, s * a.y, s * a.z}; }
+constexpr Index3 operator/(const Index3& a, std::int32_t s) { return {a.x / s, a.y / s, a.z / s}; }  // rounded towards 0
+constexpr Index3 Min(const Index3& a, const Index3& b) { return {std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)}; }
+constexpr Index3 Max(const Index3& a, const Index3& b) { return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)}; }
+constexpr Index3 Uniform(std::int32_t s) { return {s, s, s}; }
+
+// An array of size.x * size.y * size.z elements, x fastest: how many there are, and the number of the one at `at`, counted from 0.
+constexpr std::size_t CountIn(const Index3& size) { return std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z); }
+constexpr std::size_t NumberIn(const Index3& size, const Index3& at) {
+  return (std::size_t(at.z) * std::size_t(size.y) + std::size_t(at.y)) * std::size_t(size.x) + std::size_t(at.x);
+}
+// How many cubes of `side` along each axis cover `size`.
+constexpr Index3 CubesOver(const Index3& size, std::int32_t side) { return (size + Uniform(side - 1)) / side; }
 
 constexpr Vec3 ToVec3(const Index3& i) { return {double(i.x), double(i.y), double(i.z)}; }
 

@@ -17,7 +17,7 @@ BrickVisibility::BrickVisibility(const VolumeSummary& summary, ClassificationTab
 }
 
 bool BrickVisibility::AnyVisible(const Box& box) const {
-  const auto brick_of = [](std::int32_t voxel) { return voxel / kSummaryBrick; };
+  const auto brick_of = [](std::int32_t voxel) { return voxel / kBrick; };
   for (std::int32_t z = brick_of(box.begin.z); z <= brick_of(box.end.z - 1); ++z) {
     for (std::int32_t y = brick_of(box.begin.y); y <= brick_of(box.end.y - 1); ++y) {
       const std::size_t row =
@@ -31,7 +31,7 @@ bool BrickVisibility::AnyVisible(const Box& box) const {
 }
 
 OccupancyGrid BrickVisibility::VisibleCells() const {
-  static_assert(kSummaryBrick % kOccupancyCell == 0, "a cell lies in one brick");
+  static_assert(kBrick % kOccupancyCell == 0, "a cell lies in one brick");
   OccupancyGrid grid{summary_.description.geometry.size, {}};
   const Index3 cells = OccupancyCells(grid.size);
   grid.cells.reserve(std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z));

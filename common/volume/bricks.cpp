@@ -4,25 +4,30 @@
 
 #include <algorithm>
 #include <cstring>
-#include <type_traits>
 
 #include "common/base/check.h"
 
 namespace slabstream {
 namespace {
 
-// Calls function(first voxel, count, number of the first sample) for the rows of bricks that make up samples [begin, end) of `box`.
-template <class Function>
-void ForEachRun(const Box& box, std::int64_t begin, std::int64_t end, Function&& function) {
+// Calls function(first voxel, samples, count) for the rows of bricks that make up the samples of `box` from byte `begin` on, which are at
+// `bytes`. T: const where Byte is.
+template <class T, class Byte, class Function>
+void ForEachRun(const Box& box, std::uint64_t begin, std::span<Byte> bytes, Function&& function) {
+  CHECK(begin % sizeof(T) == 0 && bytes.size() % sizeof(T) == 0);
+  T* samples = reinterpret_cast<T*>(bytes.data());
+  const auto first = std::int64_t(begin / sizeof(T));
+  auto left = std::int64_t(bytes.size() / sizeof(T));
+  CHECK_LE(first + left, box.voxel_count());
   const Index3 size = box.size();
-  const std::int64_t row = begin / size.x;
-  Index3 voxel = {box.begin.x + std::int32_t(begin % size.x), box.begin.y + std::int32_t(row % size.y),
-                  box.begin.z + std::int32_t(row / size.y)};
-  while (begin < end) {
+  const std::int64_t row = first / size.x;
+  Index3 voxel = box.begin + Index3{std::int32_t(first % size.x), std::int32_t(row % size.y), std::int32_t(row / size.y)};
+  while (left > 0) {
     const std::int32_t brick_end = std::min((voxel.x / kBrick + 1) * kBrick, box.end.x);
-    const auto count = std::int32_t(std::min<std::int64_t>(brick_end - voxel.x, end - begin));
-    function(voxel, count, begin);
-    begin += count;
+    const auto count = std::int32_t(std::min<std::int64_t>(brick_end - voxel.x, left));
+    function(voxel, samples, count);
+    samples += count;
+    left -= count;
     voxel.x += count;
     if (voxel.x < box.end.x) continue;
     voxel.x = box.begin.x;
@@ -31,8 +36,6 @@ void ForEachRun(const Box& box, std::int64_t begin, std::int64_t end, Function&&
     ++voxel.z;
   }
 }
-
-Index3 BrickOf(const Index3& voxel) { return {voxel.x / kBrick, voxel.y / kBrick, voxel.z / kBrick}; }
 
 // Most runs are as long as a brick: with a length known to the compiler, copying takes a few instructions.
 template <class T>
@@ -54,10 +57,8 @@ bool EqualRuns(const T* a, const T* b, std::int32_t count) {
 
 BrickGrid::BrickGrid(const Box& divided) : box(divided) {
   if (box.empty()) return;
-  for (int axis = 0; axis < 3; ++axis) {
-    first[axis] = box.begin[axis] / kBrick;
-    counts[axis] = (box.end[axis] - 1) / kBrick + 1 - first[axis];
-  }
+  first = box.begin / kBrick;
+  counts = CubesOver(box.end, kBrick) - first;
 }
 
 BrickedVoxels::BrickedVoxels(const Box& box, ScalarType type)
@@ -76,7 +77,7 @@ std::byte* BrickedVoxels::TakeBrick(std::size_t bytes) {
 
 template <class T>
 void BrickedVoxels::WriteRun(const Index3& voxel, const T* samples, std::int32_t count) {
-  const Index3 brick = BrickOf(voxel);
+  const Index3 brick = voxel / kBrick;
   const std::size_t number = grid_.Number(brick);
   T* row = reinterpret_cast<T*>(equal_rows_.data()) + number * kBrick;
   std::byte*& own = bricks_[number];
@@ -96,14 +97,8 @@ void BrickedVoxels::WriteRun(const Index3& voxel, const T* samples, std::int32_t
 
 void BrickedVoxels::Write(const Box& box, std::uint64_t begin, std::span<const std::byte> samples) {
   CHECK(grid_.box.Contains(box));
-  VisitScalarType(type_, [&](auto* type) {
-    using T = std::remove_cvref_t<decltype(*type)>;
-    CHECK(begin % sizeof(T) == 0 && samples.size() % sizeof(T) == 0);
-    const auto first = std::int64_t(begin / sizeof(T)), last = first + std::int64_t(samples.size() / sizeof(T));
-    CHECK_LE(last, box.voxel_count());
-    const T* from = reinterpret_cast<const T*>(samples.data());
-    ForEachRun(box, first, last,
-               [&](const Index3& voxel, std::int32_t count, std::int64_t sample) { WriteRun(voxel, from + (sample - first), count); });
+  VisitScalarType(type_, [&]<class T>(const T*) {
+    ForEachRun<const T>(box, begin, samples, [&](const Index3& voxel, const T* from, std::int32_t count) { WriteRun(voxel, from, count); });
   });
 }
 
@@ -118,15 +113,10 @@ BrickedVoxels::BrickedVoxels(const VoxelBlock& block) : BrickedVoxels(block.box,
 
 void VoxelBricks::Read(const Box& box, std::uint64_t begin, std::span<std::byte> samples) const {
   CHECK(grid_.box.Contains(box));
-  VisitScalarType(type_, [&](auto* type) {
-    using T = std::remove_cvref_t<decltype(*type)>;
-    CHECK(begin % sizeof(T) == 0 && samples.size() % sizeof(T) == 0);
-    const auto first = std::int64_t(begin / sizeof(T)), last = first + std::int64_t(samples.size() / sizeof(T));
-    CHECK_LE(last, box.voxel_count());
-    T* to = reinterpret_cast<T*>(samples.data());
-    ForEachRun(box, first, last, [&](const Index3& voxel, std::int32_t count, std::int64_t sample) {
-      const BrickView<T> view = View<T>(BrickOf(voxel));
-      CopyRun(to + (sample - first), view.Row(voxel.y, voxel.z) + (voxel.x - view.begin.x), count);
+  VisitScalarType(type_, [&]<class T>(const T*) {
+    ForEachRun<T>(box, begin, samples, [&](const Index3& voxel, T* to, std::int32_t count) {
+      const BrickView<T> view = View<T>(voxel / kBrick);
+      CopyRun(to, view.Row(voxel.y, voxel.z) + (voxel.x - view.begin.x), count);
     });
   });
 }

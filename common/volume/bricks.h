@@ -17,22 +17,14 @@
 
 namespace slabstream {
 
-inline constexpr std::int32_t kBrick = 16;  // voxels
-
 // A brick is named by its begin divided by kBrick, rounded down, in the whole volume.
 struct BrickGrid {
   BrickGrid() = default;
   explicit BrickGrid(const Box& divided);
 
-  std::size_t size() const { return std::size_t(counts.x) * std::size_t(counts.y) * std::size_t(counts.z); }
-  std::size_t Number(const Index3& brick) const {
-    return (std::size_t(brick.z - first.z) * std::size_t(counts.y) + std::size_t(brick.y - first.y)) * std::size_t(counts.x) +
-           std::size_t(brick.x - first.x);
-  }
-  Box BoxOf(const Index3& brick) const {
-    return Intersection(box, {{brick.x * kBrick, brick.y * kBrick, brick.z * kBrick},
-                              {(brick.x + 1) * kBrick, (brick.y + 1) * kBrick, (brick.z + 1) * kBrick}});
-  }
+  std::size_t size() const { return CountIn(counts); }
+  std::size_t Number(const Index3& brick) const { return NumberIn(counts, brick - first); }
+  Box BoxOf(const Index3& brick) const { return Intersection(box, {kBrick * brick, kBrick * (brick + Uniform(1))}); }
 
   Box box;
   Index3 first, counts;  // bricks

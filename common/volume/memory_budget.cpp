@@ -1,5 +1,7 @@
 #include "common/volume/memory_budget.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <fstream>
 #include <limits>
@@ -43,8 +45,8 @@ Status CheckFitsMemory(std::int64_t bytes, std::string_view what) {
   const std::int64_t available = AvailableMemoryBytes();
   if (bytes <= available) return Status::Ok();
   constexpr std::int64_t kMebi = 1 << 20;
-  return Status::ResourceExhausted(std::string(what) + " needs " + std::to_string(bytes / kMebi) + " MiB of memory, but only " +
-                                   std::to_string(available / kMebi) + " MiB are available");
+  return Status::ResourceExhausted(
+      fmt::format("{} needs {} MiB of memory, but only {} MiB are available", what, bytes / kMebi, available / kMebi));
 }
 
 }  // namespace slabstream

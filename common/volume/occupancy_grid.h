@@ -15,20 +15,11 @@ namespace slabstream {
 inline constexpr std::int32_t kOccupancyCell = 8;  // voxels
 
 // Cells along each axis of a volume of `size` voxels.
-constexpr Index3 OccupancyCells(const Index3& size) {
-  const auto cells = [](std::int32_t voxels) { return (voxels + kOccupancyCell - 1) / kOccupancyCell; };
-  return {cells(size.x), cells(size.y), cells(size.z)};
-}
-
-// Place of a cell in OccupancyGrid::cells of a volume with so many cells.
-constexpr std::size_t OccupancyCellNumber(const Index3& cell, const Index3& cells) {
-  return (std::size_t(cell.z) * std::size_t(cells.y) + std::size_t(cell.y)) * std::size_t(cells.x) + std::size_t(cell.x);
-}
+constexpr Index3 OccupancyCells(const Index3& size) { return CubesOver(size, kOccupancyCell); }
 
 // The voxels of a cell.
 constexpr Box OccupancyCellBox(const Index3& cell, const Index3& size) {
-  const auto voxel = [](const Index3& c) { return Index3{c.x * kOccupancyCell, c.y * kOccupancyCell, c.z * kOccupancyCell}; };
-  return Intersection({voxel(cell), voxel({cell.x + 1, cell.y + 1, cell.z + 1})}, {{0, 0, 0}, size});
+  return Intersection({kOccupancyCell * cell, kOccupancyCell * (cell + Uniform(1))}, {{0, 0, 0}, size});
 }
 
 // The share of cell number `cell` along an axis that lies in `box`.

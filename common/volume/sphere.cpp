@@ -1,11 +1,10 @@
 #include "common/volume/sphere.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
-#include <string>
 
 #include "common/volume/memory_budget.h"
 
@@ -75,28 +74,21 @@ Shells ChooseShells(const SphereRequest& request) {
   return {LastShell(counts, limit, -1, wanted), limit};
 }
 
-std::string Text(double value) {
-  std::array<char, 32> text{};
-  (void)std::snprintf(text.data(), text.size(), "%g", value);
-  return text.data();
-}
-
 Status CheckOccupancy(double value, double low, bool low_allowed, double high, const char* name) {
   if ((low_allowed ? value >= low : value > low) && value <= high) return Status::Ok();
-  return Status::InvalidArgument("occupancy of a " + std::string(name) + " sphere is " + Text(value) + ", must be in " +
-                                 (low_allowed ? "[" : "(") + Text(low) + ", " + Text(high) + "]");
+  return Status::InvalidArgument(
+      fmt::format("occupancy of a {} sphere is {:g}, must be in {}{:g}, {:g}]", name, value, low_allowed ? '[' : '(', low, high));
 }
 
 Status Validate(const SphereRequest& request) {
   if (request.size < kMinSize || request.size > kMaxSize) {
-    return Status::InvalidArgument("size of a sphere is " + std::to_string(request.size) + ", must be in [" + std::to_string(kMinSize) +
-                                   ", " + std::to_string(kMaxSize) + "]");
+    return Status::InvalidArgument(fmt::format("size of a sphere is {}, must be in [{}, {}]", request.size, kMinSize, kMaxSize));
   }
   switch (request.sphere_class) {
     case SphereClass::kHollow: return CheckOccupancy(request.occupancy, kMinHollow, true, kMaxHollow, "hollow");
     case SphereClass::kFilled: return CheckOccupancy(request.occupancy, 0, false, kMaxFilled, "filled");
   }
-  return Status::InvalidArgument("class of a sphere is " + std::to_string(int(request.sphere_class)) + ", must be 1 or 2");
+  return Status::InvalidArgument(fmt::format("class of a sphere is {}, must be 1 or 2", int(request.sphere_class)));
 }
 
 }  // namespace
@@ -107,9 +99,7 @@ Result<Volume> MakeSphere(const SphereRequest& request) {
   Volume volume;
   volume.description.geometry.size = {n, n, n};
   volume.description.type = ScalarType::kUint8;
-  if (Status status = CheckFitsMemory(volume.description.voxel_bytes(), "a sphere of size " + std::to_string(n)); !status.ok()) {
-    return status;
-  }
+  if (Status status = CheckFitsMemory(volume.description.voxel_bytes(), fmt::format("a sphere of size {}", n)); !status.ok()) return status;
 
   volume.block = MakeVoxelBlock(volume.description.geometry.bounds(), ScalarType::kUint8);
   const Shells shells = ChooseShells(request);

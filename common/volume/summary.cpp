@@ -74,7 +74,7 @@ class BrickRow {
   }
 
   StoredRange<T> Brick(std::int32_t brick) const {
-    const std::size_t begin = std::size_t(brick) * kSummaryBrick, end = std::min(begin + kSummaryBrick, low_.size());
+    const std::size_t begin = std::size_t(brick) * kBrick, end = std::min(begin + kBrick, low_.size());
     StoredRange<T> range;
     for (std::size_t x = begin; x < end; ++x) range.Include({low_[x], high_[x]});
     return range;
@@ -132,13 +132,13 @@ void FillSummary(const Volume& volume, VolumeSummary& summary) {
   const auto row_at = [&](std::int32_t y, std::int32_t z) { return volume.block.samples<T>() + volume.block.Offset({0, y, z}); };
 
   tbb::enumerable_thread_specific<Part<T>> parts;
-  summary.bricks.resize(std::size_t(bricks.x) * std::size_t(bricks.y) * std::size_t(bricks.z));
+  summary.bricks.resize(CountIn(bricks));
   tbb::parallel_for(0, bricks.y * bricks.z, [&](std::int32_t row_of_bricks) {
     Part<T>& part = parts.local();
     BrickRow<T> brick_row(size.x);
-    const std::int32_t y_begin = row_of_bricks % bricks.y * kSummaryBrick, z_begin = row_of_bricks / bricks.y * kSummaryBrick;
-    for (std::int32_t z = z_begin; z < std::min(z_begin + kSummaryBrick, size.z); ++z) {
-      for (std::int32_t y = y_begin; y < std::min(y_begin + kSummaryBrick, size.y); ++y) {
+    const std::int32_t y_begin = row_of_bricks % bricks.y * kBrick, z_begin = row_of_bricks / bricks.y * kBrick;
+    for (std::int32_t z = z_begin; z < std::min(z_begin + kBrick, size.z); ++z) {
+      for (std::int32_t y = y_begin; y < std::min(y_begin + kBrick, size.y); ++y) {
         brick_row.Fold(row_at(y, z));
         part.counts.Add(row_at(y, z), size.x);
       }
@@ -187,9 +187,7 @@ void FillSummary(const Volume& volume, VolumeSummary& summary) {
 VolumeSummary Summarize(const Volume& volume) {
   VolumeSummary summary;
   summary.description = volume.description;
-  const Index3 size = volume.description.geometry.size;
-  const auto bricks_along = [](std::int32_t voxels) { return (voxels + kSummaryBrick - 1) / kSummaryBrick; };
-  summary.brick_counts = {bricks_along(size.x), bricks_along(size.y), bricks_along(size.z)};
+  summary.brick_counts = CubesOver(volume.description.geometry.size, kBrick);
   VisitScalarType(volume.description.type, [&]<class T>(const T*) { FillSummary<T>(volume, summary); });
   return summary;
 }

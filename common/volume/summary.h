@@ -1,7 +1,7 @@
 // VolumeSummary: what the planner, the automatic transfer function and `info` know about a volume without its voxels.
 //
-// The volume is divided into bricks of kSummaryBrick voxels a side (the last ones cut off by the volume's border). Each brick keeps the
-// range of data values of its voxels, so bricks tell whether a box can hold anything visible under a transfer function.
+// The volume is divided into bricks (kBrick; the last ones cut off by the volume's border). Each brick keeps the range of data values of
+// its voxels, so bricks tell whether a box can hold anything visible under a transfer function.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,6 @@
 
 namespace slabstream {
 
-inline constexpr std::int32_t kSummaryBrick = 16;  // voxels
 inline constexpr int kHistogramBins = 256;
 
 struct ValueRange {

@@ -16,6 +16,8 @@
 namespace slabstream {
 
 inline constexpr std::int32_t kMaxVolumeSide = 65535;  // voxels along an axis: in-slice positions fit 16 bits
+// Voxels along an axis of a brick: a cube at a global multiple of this, for ranges of values (summary.h) and for storage (bricks.h).
+inline constexpr std::int32_t kBrick = 16;
 
 enum class ScalarType : std::uint8_t { kUint8 = 1, kUint16 = 2, kFloat32 = 3 };
 
@@ -56,10 +58,7 @@ struct VoxelBlock {
   AlignedVector<std::byte> bytes;
 
   // Sample offset (in samples) of a voxel inside `box`.
-  std::int64_t Offset(const Index3& v) const {
-    const Index3 s = box.size();
-    return (std::int64_t(v.z - box.begin.z) * s.y + (v.y - box.begin.y)) * s.x + (v.x - box.begin.x);
-  }
+  std::int64_t Offset(const Index3& v) const { return std::int64_t(NumberIn(box.size(), v - box.begin)); }
   template <class T>
   const T* samples() const {
     return reinterpret_cast<const T*>(bytes.data());

@@ -26,7 +26,7 @@ std::string_view ToString(WorkUnit unit) {
 WorkUnits CountWork(const Box& box, const Camera& camera, double occupied, double drawn, const PixelBounds& bounds, double pixels) {
   WorkUnits work{};
   work[std::size_t(kBox)] = 1;
-  work[std::size_t(kBrickTest)] = double(box.voxel_count()) / (kSummaryBrick * kSummaryBrick * kSummaryBrick);
+  work[std::size_t(kBrickTest)] = double(box.voxel_count()) / (kBrick * kBrick * kBrick);
   work[std::size_t(kOccupied)] = occupied;
   work[std::size_t(kDrawn)] = drawn;
   work[std::size_t(kSheetPixel)] = double(box.size()[camera.traversal_axis]) * double(bounds.pixel_count());

@@ -54,9 +54,9 @@ bool AnyVoxelVisible(const Volume& volume, const ClassificationTable& table, con
 
 Box BoxOfBrick(const VolumeSummary& summary, std::size_t brick) {
   const auto nx = std::size_t(summary.brick_counts.x), ny = std::size_t(summary.brick_counts.y);
-  const Index3 begin = {std::int32_t(brick % nx) * kSummaryBrick, std::int32_t(brick / nx % ny) * kSummaryBrick,
-                        std::int32_t(brick / nx / ny) * kSummaryBrick};
-  return Intersection({begin, {begin.x + kSummaryBrick, begin.y + kSummaryBrick, begin.z + kSummaryBrick}},
+  const Index3 begin = {std::int32_t(brick % nx) * kBrick, std::int32_t(brick / nx % ny) * kBrick,
+                        std::int32_t(brick / nx / ny) * kBrick};
+  return Intersection({begin, {begin.x + kBrick, begin.y + kBrick, begin.z + kBrick}},
                       summary.description.geometry.bounds());
 }
 
@@ -109,7 +109,7 @@ TEST(BrickVisibility, LooksAtEveryBrickThatTheBoxTouches) {
     for (std::int32_t z = 0; z < 33; z += 4) {
       for (std::int32_t y = 0; y < 32; y += 3) {
         for (std::int32_t x = 0; x < 40; x += 3) {
-          const Index3 brick = {x / kSummaryBrick, y / kSummaryBrick, z / kSummaryBrick};
+          const Index3 brick = {x / kBrick, y / kBrick, z / kBrick};
           EXPECT_EQ(bricks.AnyVisible({{x, y, z}, {x + 1, y + 1, z + 1}}), brick == bright);
         }
       }

@@ -15,7 +15,7 @@ inline VolumeSummary FullSummary(const Index3& size) {
   summary.description.geometry.size = size;
   summary.range = {0, 255};
   summary.histogram.fill(std::uint64_t(summary.description.geometry.bounds().voxel_count()) / kHistogramBins);
-  const auto bricks = [](std::int32_t side) { return (side + kSummaryBrick - 1) / kSummaryBrick; };
+  const auto bricks = [](std::int32_t side) { return (side + kBrick - 1) / kBrick; };
   summary.brick_counts = {bricks(size.x), bricks(size.y), bricks(size.z)};
   summary.bricks.assign(std::size_t(summary.brick_counts.x) * std::size_t(summary.brick_counts.y) * std::size_t(summary.brick_counts.z),
                         {0, 255});

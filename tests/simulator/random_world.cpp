@@ -32,7 +32,7 @@ void MakeVolume(Random& random, World& world) {
   auto summary = std::make_shared<VolumeSummary>();
   summary->description.geometry.size = kVolumeSize;
   summary->range = {0, 255};
-  summary->brick_counts = {kVolumeSize.x / kSummaryBrick, kVolumeSize.y / kSummaryBrick, kVolumeSize.z / kSummaryBrick};
+  summary->brick_counts = {kVolumeSize.x / kBrick, kVolumeSize.y / kBrick, kVolumeSize.z / kBrick};
   const double empty = random.Chance(0.05) ? 1 : random.Real(0, 0.8);
   std::vector<ValueRange> layers;
   for (int x = 0; x < summary->brick_counts.x; ++x) layers.push_back(random.Chance(empty) ? ValueRange{0, 10} : ValueRange{0, 200});

@@ -41,13 +41,13 @@ VolumeSummary SummarizeByDefinition(const Volume& volume) {
   summary.description = volume.description;
   const Box bounds = volume.description.geometry.bounds();
   summary.range = range_of(bounds, {0, 0});
-  const auto bricks = [](std::int32_t side) { return int(std::ceil(side / double(kSummaryBrick))); };
+  const auto bricks = [](std::int32_t side) { return int(std::ceil(side / double(kBrick))); };
   summary.brick_counts = {bricks(size.x), bricks(size.y), bricks(size.z)};
   for (int z = 0; z < summary.brick_counts.z; ++z) {
     for (int y = 0; y < summary.brick_counts.y; ++y) {
       for (int x = 0; x < summary.brick_counts.x; ++x) {
-        const Index3 begin = {x * kSummaryBrick, y * kSummaryBrick, z * kSummaryBrick};
-        const Index3 end = {begin.x + kSummaryBrick, begin.y + kSummaryBrick, begin.z + kSummaryBrick};
+        const Index3 begin = {x * kBrick, y * kBrick, z * kBrick};
+        const Index3 end = {begin.x + kBrick, begin.y + kBrick, begin.z + kBrick};
         summary.bricks.push_back(range_of(Intersection({begin, end}, bounds), kNoFiniteValue));
       }
     }

@@ -11,8 +11,6 @@ namespace slabstream {
 
 class BrickRanges {
  public:
-  static constexpr std::int32_t kBrick = slabstream::kBrick;
-
   explicit BrickRanges(const VoxelBricks& voxels);
 
   struct Range {

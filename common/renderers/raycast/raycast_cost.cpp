@@ -35,7 +35,7 @@ double RaycastCost::Seconds(const Box& box, const CostView& view) const {
     for (cell[u] = across_u.begin; cell[u] < across_u.end; ++cell[u]) {
       double depth = 0;  // voxel lengths of material
       for (cell[c] = along.begin; cell[c] < along.end; ++cell[c]) {
-        depth += along.ShareInside(cell[c]) * drawn_.cells[OccupancyCellNumber(cell, cells)].voxels / kCellArea;
+        depth += along.ShareInside(cell[c]) * drawn_.cells[NumberIn(cells, cell)].voxels / kCellArea;
       }
       if (depth <= 0) continue;
       const double area = kCellArea * across_u.ShareInside(cell[u]) * across_v.ShareInside(cell[v]);

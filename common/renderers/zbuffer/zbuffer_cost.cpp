@@ -19,7 +19,7 @@ double ZBufferCost::Seconds(const Box& box, const CostView& view) const {
   for (std::int32_t k = z.begin; k < z.end; ++k) {
     for (std::int32_t j = y.begin; j < y.end; ++j) {
       for (std::int32_t i = x.begin; i < x.end; ++i) {
-        const CellOccupancy& cell = drawn_.cells[OccupancyCellNumber({i, j, k}, cells)];
+        const CellOccupancy& cell = drawn_.cells[NumberIn(cells, {i, j, k})];
         if (cell.voxels == 0) continue;
         const Box whole = OccupancyCellBox({i, j, k}, drawn_.size);
         hull = Hull(hull, Intersection(whole, box));

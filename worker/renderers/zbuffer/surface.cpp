@@ -14,7 +14,7 @@
 namespace slabstream {
 namespace {
 
-static_assert(BrickRanges::kBrick == kFaceBrick);
+static_assert(kBrick == kFaceBrick);
 static_assert(kMaxBins <= 1 << kBinBits);
 
 // One brick's part of a Surface. Faces are numbered from 0.
