@@ -48,22 +48,23 @@ function(slabstream_library name)
   add_library(slabstream::${name} ALIAS ${target})
 endfunction()
 
-# slabstream_program(NAME SOURCES file... LINKS target...): an executable in build/bin.
+# slabstream_program(NAME SOURCES file... LINKS target... [FOLDER name]): an executable in build/bin, or in the folder `name` of the build.
 function(slabstream_program name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
+  cmake_parse_arguments(ARG "" "FOLDER" "SOURCES;LINKS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE slabstream_options ${ARG_LINKS})
+  if(ARG_FOLDER)
+    set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/${ARG_FOLDER})
+  endif()
 endfunction()
 
-# slabstream_test(NAME SOURCES file... LINKS target... [TIMEOUT seconds] [LABELS label...]): a GoogleTest program, one ctest a program.
+# slabstream_test(NAME SOURCES file... LINKS target... [TIMEOUT seconds] [LABELS label...]): a GoogleTest program in build/tests, one ctest.
 function(slabstream_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LINKS;LABELS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
-  add_executable(${name} ${ARG_SOURCES})
-  target_link_libraries(${name} PRIVATE slabstream_options ${ARG_LINKS} slabstream_test_main)
-  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
+  slabstream_program(${name} SOURCES ${ARG_SOURCES} LINKS ${ARG_LINKS} slabstream_test_main FOLDER tests)
   add_test(NAME ${name} COMMAND ${name})
   set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}")
 endfunction()
@@ -71,7 +72,5 @@ endfunction()
 # slabstream_benchmark(NAME SOURCES file... LINKS target...): a Google Benchmark program in build/bench.
 function(slabstream_benchmark name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
-  add_executable(${name} ${ARG_SOURCES})
-  target_link_libraries(${name} PRIVATE slabstream_options ${ARG_LINKS} benchmark::benchmark benchmark::benchmark_main)
-  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bench)
+  slabstream_program(${name} SOURCES ${ARG_SOURCES} LINKS ${ARG_LINKS} benchmark::benchmark benchmark::benchmark_main FOLDER bench)
 endfunction()

@@ -16,21 +16,18 @@ class Bytes {
   Bytes() = default;
   // `owner` keeps `data` alive.
   Bytes(std::shared_ptr<const void> owner, std::span<const std::byte> data) : owner_(std::move(owner)), data_(data) {}
-  explicit Bytes(std::vector<std::byte> data) : Bytes(Owning(std::move(data))) {}
-  explicit Bytes(PooledVector<std::byte> data) : Bytes(Owning(std::move(data))) {}
+  template <class Allocator>
+  explicit Bytes(std::vector<std::byte, Allocator> data) {
+    auto owned = std::make_shared<const std::vector<std::byte, Allocator>>(std::move(data));
+    data_ = *owned;
+    owner_ = std::move(owned);
+  }
 
   std::span<const std::byte> span() const { return data_; }
   std::size_t size() const { return data_.size(); }
   bool empty() const { return data_.empty(); }
 
  private:
-  template <class Vector>
-  static Bytes Owning(Vector data) {
-    auto owned = std::make_shared<const Vector>(std::move(data));
-    const std::span<const std::byte> span = *owned;
-    return {std::move(owned), span};
-  }
-
   std::shared_ptr<const void> owner_;
   std::span<const std::byte> data_;
 };

@@ -37,8 +37,7 @@ OutputFile::OutputFile(OutputFile&& other) noexcept
       target_(std::move(other.target_)),
       temporary_(std::exchange(other.temporary_, {})),
       descriptor_(std::exchange(other.descriptor_, -1)),
-      error_(other.error_),
-      end_(other.end_) {}
+      error_(other.error_) {}
 
 OutputFile::~OutputFile() {
   if (descriptor_ >= 0) ::close(descriptor_);
@@ -62,28 +61,26 @@ void OutputFile::Keep(int error) {
   if (error_ == 0) error_ = error;
 }
 
-void OutputFile::Append(std::span<const std::byte> bytes) {
+template <class WriteSome>
+void OutputFile::WriteAll(std::span<const std::byte> bytes, WriteSome&& write_some) {
   while (error_ == 0 && !bytes.empty()) {
-    const ssize_t count = ::write(descriptor_, bytes.data(), bytes.size());
-    if (count < 0) {
-      if (errno != EINTR) Keep(errno);
-      continue;
+    const ssize_t count = write_some(bytes);
+    if (count >= 0) {
+      bytes = bytes.subspan(std::size_t(count));
+    } else if (errno != EINTR) {
+      Keep(errno);
     }
-    bytes = bytes.subspan(std::size_t(count));
-    end_ += count;
   }
 }
 
+void OutputFile::Append(std::span<const std::byte> bytes) {
+  WriteAll(bytes, [this](std::span<const std::byte> rest) { return ::write(descriptor_, rest.data(), rest.size()); });
+}
+
 void OutputFile::WriteAt(std::int64_t offset, std::span<const std::byte> bytes) {
-  while (error_ == 0 && !bytes.empty()) {
-    const ssize_t count = ::pwrite(descriptor_, bytes.data(), bytes.size(), offset);
-    if (count < 0) {
-      if (errno != EINTR) Keep(errno);
-      continue;
-    }
-    bytes = bytes.subspan(std::size_t(count));
-    offset += count;
-  }
+  WriteAll(bytes, [&](std::span<const std::byte> rest) {
+    return ::pwrite(descriptor_, rest.data(), rest.size(), offset + (rest.data() - bytes.data()));
+  });
 }
 
 Status OutputFile::Close() {

@@ -35,13 +35,15 @@ class OutputFile {
  private:
   OutputFile(std::string path, std::string target, std::string temporary, int descriptor);
   void Keep(int error);  // the first errno stays
+  // write_some(rest) returns the number of bytes written, or -1 with errno.
+  template <class WriteSome>
+  void WriteAll(std::span<const std::byte> bytes, WriteSome&& write_some);
 
   std::string path_;       // as the caller wrote it, for messages
   std::string target_;     // `path_` with links resolved
   std::string temporary_;  // empty: written directly, or already in its place
   int descriptor_ = -1;
   int error_ = 0;  // errno of the first failure
-  std::int64_t end_ = 0;
 };
 
 // Unavailable, naming the path, if it cannot be written.

@@ -1,6 +1,6 @@
-// LargeArray<T>: an array for large data that is written at once; its elements have no constructor. It is a memory mapping of its own,
-// which goes back to the system when it is freed. It asks for huge pages: taking 4 KiB at a time costs more than what is computed into
-// them. Memory that is never written is never taken, and reads as 0.
+// LargeArray<T>: an array for large data; T needs neither constructor nor destructor. It is a memory mapping of its own, which goes back to
+// the system when it is freed. It asks for huge pages: taking 4 KiB at a time costs more than what is computed into them. Memory that is
+// never written is never taken, and reads as 0.
 #pragma once
 
 #include <sys/mman.h>

@@ -9,14 +9,9 @@ namespace slabstream {
 namespace {
 
 spdlog::level::level_enum ToSpdlog(LogLevel level) {
-  switch (level) {
-    case LogLevel::kDebug: return spdlog::level::debug;
-    case LogLevel::kInfo: return spdlog::level::info;
-    case LogLevel::kWarning: return spdlog::level::warn;
-    case LogLevel::kError: return spdlog::level::err;
-    case LogLevel::kOff: return spdlog::level::off;
-  }
-  return spdlog::level::info;
+  using namespace spdlog::level;
+  constexpr level_enum kLevels[] = {debug, info, warn, err, off};  // in the order of LogLevel
+  return kLevels[int(level)];
 }
 
 // Until InitLog, only warnings and errors are written, so that a library user sees no chatter.

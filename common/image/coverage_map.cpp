@@ -42,7 +42,7 @@ std::uint64_t SamplePixels(const LocalImage& image) {
 }
 
 std::int32_t CoverageMap::TilePixels(std::int32_t x, std::int32_t y) const {
-  return std::min(kCoverageTile, frame_width - x * kCoverageTile) * std::min(kCoverageTile, frame_height - y * kCoverageTile);
+  return std::int32_t(OcclusionTileBounds(x, y, frame_width, frame_height).pixel_count());
 }
 
 double CoverageMap::pixels() const {
@@ -66,9 +66,7 @@ CoverageMap FindCoverage(const LocalImage& image, std::int32_t width, std::int32
     }
   }
   for (std::int32_t y = 0; y < map.tiles_y; ++y) {
-    for (std::int32_t x = 0; x < map.tiles_x; ++x) {
-      map.share[std::size_t(y) * std::size_t(map.tiles_x) + std::size_t(x)] /= float(map.TilePixels(x, y));
-    }
+    for (std::int32_t x = 0; x < map.tiles_x; ++x) map.at(x, y) /= float(map.TilePixels(x, y));
   }
   return map;
 }
@@ -80,9 +78,8 @@ CoverageMap UniformCoverage(const PixelBounds& bounds, double pixels, std::int32
   const double density = std::clamp(pixels / double(inside.pixel_count()), 0.0, 1.0);
   for (std::int32_t y = inside.y_begin / kCoverageTile; y * kCoverageTile < inside.y_end; ++y) {
     for (std::int32_t x = inside.x_begin / kCoverageTile; x * kCoverageTile < inside.x_end; ++x) {
-      const PixelBounds tile = {x * kCoverageTile, y * kCoverageTile, (x + 1) * kCoverageTile, (y + 1) * kCoverageTile};
-      map.share[std::size_t(y) * std::size_t(map.tiles_x) + std::size_t(x)] =
-          float(density * double(Intersection(tile, inside).pixel_count()) / map.TilePixels(x, y));
+      const PixelBounds tile = OcclusionTileBounds(x, y, width, height);
+      map.at(x, y) = float(density * double(Intersection(tile, inside).pixel_count()) / double(tile.pixel_count()));
     }
   }
   return map;

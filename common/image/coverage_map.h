@@ -20,6 +20,7 @@ struct CoverageMap {
   std::int32_t tiles_x = 0, tiles_y = 0;
   std::vector<float> share;  // [y][x], of the tile's pixels that are not empty, in [0, 1]
 
+  float& at(std::int32_t x, std::int32_t y) { return share[std::size_t(y) * std::size_t(tiles_x) + std::size_t(x)]; }
   float at(std::int32_t x, std::int32_t y) const { return share[std::size_t(y) * std::size_t(tiles_x) + std::size_t(x)]; }
   // Pixels of tile (x, y).
   std::int32_t TilePixels(std::int32_t x, std::int32_t y) const;
@@ -27,7 +28,7 @@ struct CoverageMap {
   friend bool operator==(const CoverageMap&, const CoverageMap&) = default;
 };
 
-// Images are those of renderers: all pixels are stored.
+// For images as renderers make them, with all pixels stored (no LocalImage::rows).
 //
 // Estimates how many pixels of `image` are not empty. Looks at all pixels of small images, and at a quarter of some 32 rows of larger ones,
 // so that it costs next to nothing.

@@ -9,34 +9,33 @@
 namespace slabstream {
 namespace {
 
-// Columns [begin, end), from bounds.x_begin, of row y that lie in the range; none if begin >= end.
-struct Columns {
-  std::int64_t begin, end;
-};
-
-Columns ColumnsInRange(const PixelBounds& bounds, std::int64_t y, PixelRange range, std::uint64_t frame_width) {
+// What lies in the range of `span`, which is of row y of the frame.
+ColumnSpan InRange(ColumnSpan span, const PixelBounds& bounds, std::int64_t y, PixelRange range, std::uint64_t frame_width) {
   const std::uint64_t row_start = std::uint64_t(y) * frame_width;
-  const auto column = [&](std::uint64_t index) { return index <= row_start ? 0 : std::int64_t(std::min(index - row_start, frame_width)); };
-  return {std::max<std::int64_t>(bounds.x_begin, column(range.begin)) - bounds.x_begin,
-          std::min<std::int64_t>(bounds.x_end, column(range.end)) - bounds.x_begin};
+  const auto column = [&](std::uint64_t index) {
+    return (index <= row_start ? 0 : std::int64_t(std::min(index - row_start, frame_width))) - bounds.x_begin;
+  };
+  const std::int64_t begin = std::max<std::int64_t>(span.begin, column(range.begin));
+  const std::int64_t end = std::min<std::int64_t>(span.end, column(range.end));
+  return begin < end ? ColumnSpan{std::uint32_t(begin), std::uint32_t(end)} : ColumnSpan{};
 }
 
-// `columns` without the empty pixels at both ends. `plane` has a value each `stride`; a pixel is empty if that is `empty`.
+// `span` without the empty pixels at both ends. `plane` has a value each `stride`; a pixel is empty if that is `empty`.
 template <std::size_t stride>
-Columns Narrowed(const float* plane, float empty, Columns columns) {
-  const auto is_empty = [&](std::int64_t x) { return plane[stride * std::size_t(x)] == empty; };
+ColumnSpan Narrowed(const float* plane, float empty, ColumnSpan span) {
+  const auto is_empty = [&](std::uint32_t x) { return plane[stride * x] == empty; };
   // Tests eight pixels a branch, then the rest one by one.
-  const auto are_empty = [&](std::int64_t x) {
+  const auto are_empty = [&](std::uint32_t x) {
     bool all = true;
-    for (std::int64_t i = 0; i < 8; ++i) all &= is_empty(x + i);
+    for (std::uint32_t i = 0; i < 8; ++i) all &= is_empty(x + i);
     return all;
   };
-  auto [begin, end] = columns;
+  auto [begin, end] = span;
   while (begin + 8 <= end && are_empty(begin)) begin += 8;
   while (begin < end && is_empty(begin)) ++begin;
   while (begin + 8 <= end && are_empty(end - 8)) end -= 8;
   while (begin < end && is_empty(end - 1)) --end;
-  return {begin, end};
+  return begin < end ? ColumnSpan{begin, end} : ColumnSpan{};
 }
 
 // Makes the bounds those of the spans.
@@ -44,9 +43,7 @@ void Tighten(ImageView& view) {
   const auto filled = [](const ColumnSpan& row) { return row.begin < row.end; };
   const auto first = std::ranges::find_if(view.rows, filled);
   if (first == view.rows.end()) {
-    const PixelFormat format = view.format;
-    view = {};
-    view.format = format;
+    view = {.format = view.format};
     return;
   }
   const auto last = std::find_if(view.rows.rbegin(), view.rows.rend(), filled);
@@ -77,9 +74,7 @@ std::size_t ImageView::pixel_bytes() const {
 }
 
 ImageView ViewOf(const LocalImage& image) {
-  ImageView view;
-  view.format = image.format;
-  view.bounds = image.bounds;
+  ImageView view{.format = image.format, .bounds = image.bounds};
   if (image.bounds.empty()) return view;
   view.rgba = image.rgba.data();
   if (HasDepth(image.format)) view.depth = image.depth.data();
@@ -95,14 +90,10 @@ ImageView ViewOf(const LocalImage& image, PixelRange range, std::int32_t frame_w
   const PixelBounds& bounds = image.bounds;
   CHECK(bounds.empty() || (bounds.x_begin >= 0 && bounds.y_begin >= 0 && bounds.x_end <= frame_width)) << "the image leaves the frame";
   for (std::size_t y = 0; y < view.rows.size(); ++y) {
-    Columns columns = ColumnsInRange(bounds, bounds.y_begin + std::int64_t(y), range, std::uint64_t(frame_width));
-    columns = {std::max<std::int64_t>(columns.begin, view.rows[y].begin), std::min<std::int64_t>(columns.end, view.rows[y].end)};
+    const ColumnSpan span = InRange(view.rows[y], bounds, bounds.y_begin + std::int64_t(y), range, std::uint64_t(frame_width));
     const std::size_t row = y * view.stride;
-    if (columns.begin < columns.end) {
-      columns = HasDepth(view.format) ? Narrowed<1>(view.depth + row, std::numeric_limits<float>::infinity(), columns)
-                                      : Narrowed<4>(view.rgba + 4 * row + 3, 0, columns);
-    }
-    view.rows[y] = columns.begin < columns.end ? ColumnSpan{std::uint32_t(columns.begin), std::uint32_t(columns.end)} : ColumnSpan{};
+    view.rows[y] = HasDepth(view.format) ? Narrowed<1>(view.depth + row, std::numeric_limits<float>::infinity(), span)
+                                         : Narrowed<4>(view.rgba + 4 * row + 3, 0, span);
   }
   Tighten(view);
   return view;
@@ -128,10 +119,7 @@ std::optional<RunImageHeader> DenseHeader(const ImageView& view) {
 
 void Clip(ImageView& view, PixelRange range, std::int32_t frame_width) {
   for (std::size_t y = 0; y < view.rows.size(); ++y) {
-    const Columns columns = ColumnsInRange(view.bounds, view.bounds.y_begin + std::int64_t(y), range, std::uint64_t(frame_width));
-    ColumnSpan& row = view.rows[y];
-    const std::int64_t begin = std::max<std::int64_t>(row.begin, columns.begin), end = std::min<std::int64_t>(row.end, columns.end);
-    row = begin < end ? ColumnSpan{std::uint32_t(begin), std::uint32_t(end)} : ColumnSpan{};
+    view.rows[y] = InRange(view.rows[y], view.bounds, view.bounds.y_begin + std::int64_t(y), range, std::uint64_t(frame_width));
   }
   Tighten(view);
 }

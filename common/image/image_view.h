@@ -36,12 +36,12 @@ void Clip(ImageView& view, PixelRange range, std::int32_t frame_width);
 
 LocalImage CopyOf(const ImageView& view);  // with the view's rows
 
-// The header of `view` as a dense image whose payload is its colours in place, from view.rgba on. None: its rows do not follow each other,
-// it has depths, or a sample shows more than a few empty pixels, so that runs are shorter.
+// The header of `view` as a dense image (run_image.h). Its payload is the colours where they are, from view.rgba on. None if rows are apart
+// in memory, if the format has depths, or if a sample of the pixels suggests that so many are empty that runs are shorter.
 std::optional<RunImageHeader> DenseHeader(const ImageView& view);
 
-// Encodes the pixels of `view`, which lie in a frame; bounds are the view's. Colours are coded as floats if the format has depths, or if
-// one of them cannot be coded as `color` (ToCodes).
+// Encodes the pixels of `view`; the header has its bounds. Only kRgba images are coded as `color`, and only if all their colours can be
+// (ToCodes); all others as floats.
 RunImage EncodeRuns(const ImageView& view, ColorCoding color = ColorCoding::kFloat32);
 
 }  // namespace slabstream

@@ -44,8 +44,7 @@ OcclusionMask FindHiddenTiles(const LocalImage& image, std::int32_t width, std::
   for (std::int32_t y = 0; y < mask.tiles_y; ++y) {
     for (std::int32_t x = 0; x < mask.tiles_x; ++x) {
       std::uint8_t& hidden = mask.hidden[std::size_t(y) * std::size_t(mask.tiles_x) + std::size_t(x)];
-      const PixelBounds tile =
-          Intersection({x * kOcclusionTile, y * kOcclusionTile, (x + 1) * kOcclusionTile, (y + 1) * kOcclusionTile}, {0, 0, width, height});
+      const PixelBounds tile = OcclusionTileBounds(x, y, width, height);
       if (hidden == 0 && image.bounds.Contains(tile)) hidden = Opaque(image, tile, float(1 - termination)) ? 1 : 0;
     }
   }

@@ -33,6 +33,12 @@ struct OcclusionMask {
 // Tiles along an axis of so many pixels.
 constexpr std::int32_t OcclusionTiles(std::int32_t pixels) { return (pixels + kOcclusionTile - 1) / kOcclusionTile; }
 
+// The pixels of tile (x, y) of a frame of width x height pixels.
+constexpr PixelBounds OcclusionTileBounds(std::int32_t x, std::int32_t y, std::int32_t width, std::int32_t height) {
+  return Intersection(PixelBounds{x * kOcclusionTile, y * kOcclusionTile, (x + 1) * kOcclusionTile, (y + 1) * kOcclusionTile},
+                      {0, 0, width, height});
+}
+
 // Tiles whose pixels all transmit at most `termination`: alpha >= 1 - termination. Pixels outside the image's bounds are empty.
 // `termination` 0, or an image without an opaque tile: an empty mask. `image` is a kRgba image of a frame of width x height pixels.
 // `known`: an earlier result, before more was put behind the same image; its hidden tiles stay hidden and are not tested again.

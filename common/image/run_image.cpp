@@ -1,12 +1,12 @@
 #include "common/image/run_image.h"
 
+#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cstring>
 #include <limits>
-#include <string>
 #include <vector>
 
 #include "common/image/finite.h"
@@ -15,11 +15,6 @@
 
 namespace slabstream {
 namespace {
-
-std::size_t PixelBytes(const RunImageHeader& header) {
-  return 4 * BytesPerChannel(header.color) + (HasDepth(header.format) ? sizeof(float) : 0) +
-         (HasVoxel(header.format) ? sizeof(std::uint32_t) : 0);
-}
 
 constexpr std::size_t kBandRows = 32;  // of one task
 
@@ -34,20 +29,17 @@ struct Band {
 class PayloadWriter {
  public:
   // `payload` has room for PayloadBytes(header); the header must outlive this.
-  PayloadWriter(const RunImageHeader& header, std::byte* payload)
-      : runs_(payload),
-        rgba_(runs_ + sizeof(Run) * header.run_count),
-        depth_(rgba_ + 4 * BytesPerChannel(header.color) * header.pixel_count),
-        voxel_(depth_ + sizeof(float) * header.pixel_count),
-        header_(header) {}
+  PayloadWriter(const RunImageHeader& header, std::byte* payload) : header_(header), layout_(header), payload_(payload) {}
 
   // Run number `index`, whose pixels are those of `view` from `source` on and come after `first` others. False: a colour cannot be coded.
   bool Write(std::size_t index, const Run& run, std::size_t first, const ImageView& view, std::size_t source) const {
     const std::size_t count = run.pixel_count;
-    std::memcpy(runs_ + sizeof(Run) * index, &run, sizeof(Run));
-    if (HasDepth(header_.format)) std::memcpy(depth_ + sizeof(float) * first, view.depth + source, sizeof(float) * count);
-    if (HasVoxel(header_.format)) std::memcpy(voxel_ + sizeof(std::uint32_t) * first, view.voxel + source, sizeof(std::uint32_t) * count);
-    std::byte* const color = rgba_ + 4 * BytesPerChannel(header_.color) * first;
+    std::memcpy(payload_ + sizeof(Run) * index, &run, sizeof(Run));
+    if (HasDepth(header_.format)) std::memcpy(payload_ + layout_.depth + sizeof(float) * first, view.depth + source, sizeof(float) * count);
+    if (HasVoxel(header_.format)) {
+      std::memcpy(payload_ + layout_.voxel + sizeof(std::uint32_t) * first, view.voxel + source, sizeof(std::uint32_t) * count);
+    }
+    std::byte* const color = payload_ + layout_.rgba + 4 * BytesPerChannel(header_.color) * first;
     if (header_.color == ColorCoding::kFloat32) {
       std::memcpy(color, view.rgba + 4 * source, kRgbaBytes * count);
       return true;
@@ -56,16 +48,17 @@ class PayloadWriter {
   }
 
  private:
-  std::byte* runs_;
-  std::byte* rgba_;
-  std::byte* depth_;
-  std::byte* voxel_;
   const RunImageHeader& header_;
+  const PayloadLayout layout_;
+  std::byte* const payload_;
 };
 
-Status Invalid(const std::string& message) { return Status::InvalidArgument("run image: " + message); }
+template <class... Values>
+Status Invalid(fmt::format_string<const Values&...> message, const Values&... values) {
+  return Status::InvalidArgument("run image: " + fmt::format(message, values...));
+}
 Status BadColour(ColorCoding color) {
-  return Invalid(color == ColorCoding::kFloat32 ? "a pixel's colour is not finite" : "a pixel's colour does not lie in [0, 1]");
+  return Invalid("a pixel's colour {}", color == ColorCoding::kFloat32 ? "is not finite" : "does not lie in [0, 1]");
 }
 Status DepthNotFinite() { return Invalid("a pixel's depth is not finite"); }
 
@@ -107,10 +100,26 @@ void ForEachSpan(const float* plane, float empty, std::size_t begin, std::size_t
   }
 }
 
-// `format`: that of the view, or one with fewer planes. If a colour cannot be coded, all stay floats.
-RunImage Encode(const ImageView& view, PixelFormat format, ColorCoding color) {
+constexpr std::uint32_t kRunsPerTask = 16;  // mostly a row each: their pixels stay in a core's cache
+
+// For each task the number of pixels of all runs in front of its first one. One task at least.
+std::vector<std::size_t> FirstPixels(const RunPayload& runs) {
+  std::vector<std::size_t> first = {0};
+  std::size_t pixels = 0;
+  for (std::uint32_t i = 0; i < runs.run_count(); ++i) {
+    if (i > 0 && i % kRunsPerTask == 0) first.push_back(pixels);
+    pixels += runs.ReadRun(i).pixel_count;
+  }
+  return first;
+}
+
+}  // namespace
+
+std::size_t PayloadBytes(const RunImageHeader& header) { return PayloadLayout(header).end; }
+
+RunImage EncodeRuns(const ImageView& view, ColorCoding color) {
   RunImage result;
-  result.header.format = format;
+  result.header.format = view.format;
   result.header.bounds = view.bounds;
 
   std::vector<Band> bands((view.rows.size() + kBandRows - 1) / kBandRows);
@@ -123,7 +132,7 @@ RunImage Encode(const ImageView& view, PixelFormat format, ColorCoding color) {
         band.pixel_count += end - begin;
       };
       const auto [begin, end] = view.rows[y];
-      if (HasDepth(format)) {
+      if (HasDepth(view.format)) {
         ForEachSpan<1>(view.depth + row, std::numeric_limits<float>::infinity(), begin, end, found);
       } else {
         ForEachSpan<4>(view.rgba + 4 * row + 3, 0, begin, end, found);
@@ -138,7 +147,7 @@ RunImage Encode(const ImageView& view, PixelFormat format, ColorCoding color) {
     result.header.pixel_count += band.pixel_count;
   }
   result.header.run_count = std::uint32_t(run_count);
-  if (format == PixelFormat::kRgba) result.header.color = color;
+  if (view.format == PixelFormat::kRgba) result.header.color = color;
 
   result.payload.resize(PayloadBytes(result.header));
   const PayloadWriter writer(result.header, result.payload.data());
@@ -150,97 +159,43 @@ RunImage Encode(const ImageView& view, PixelFormat format, ColorCoding color) {
       pixel += run.pixel_count;
     }
   });
-  if (!coded) return Encode(view, format, ColorCoding::kFloat32);
+  if (!coded) return EncodeRuns(view, ColorCoding::kFloat32);
   return result;
 }
-
-constexpr std::uint32_t kRunsPerTask = 16;  // mostly a row each: their pixels stay in a core's cache
-
-// For each task the number of pixels of all runs in front of its first one. One task at least.
-std::vector<std::size_t> FirstPixels(const RunPayload& runs) {
-  std::vector<std::size_t> first = {0};
-  std::size_t pixels = 0;
-  for (std::uint32_t i = 0; i < runs.run_count(); ++i) {
-    if (i > 0 && i % kRunsPerTask == 0) first.push_back(pixels);
-    pixels += runs.ReadRun(i).pixel_count;
-  }
-  return first;
-}
-
-// The dense form of runs whose table is valid. look(first, count) is called for pixels [first, first + count) of all runs just before they
-// are copied.
-template <class Look>
-LocalImage Decode(const RunImageHeader& header, const RunPayload& runs, Look&& look) {
-  LocalImage image = MakeUnwrittenImage(header.format, header.bounds);
-  const auto place_of = [&](const Run& run) { return std::size_t{run.row} * std::size_t(header.bounds.width()) + run.column; };
-  const std::vector<std::size_t> first_pixels = FirstPixels(runs);
-  tbb::parallel_for(std::size_t{0}, first_pixels.size(), [&](std::size_t task) {
-    const std::size_t begin = task * kRunsPerTask, end = std::min<std::size_t>(begin + kRunsPerTask, runs.run_count());
-    std::size_t source = first_pixels[task], written = 0;
-    if (begin > 0) {
-      const Run before = runs.ReadRun(begin - 1);
-      written = place_of(before) + before.pixel_count;
-    }
-    for (std::size_t i = begin; i < end; ++i) {
-      const Run run = runs.ReadRun(i);
-      const std::size_t target = place_of(run);
-      look(source, run.pixel_count);
-      MakeEmpty(image, written, target);
-      written = target + run.pixel_count;
-      runs.ReadRgba(source, run.pixel_count, &image.rgba[4 * target]);
-      if (HasDepth(header.format)) runs.ReadDepth(source, run.pixel_count, &image.depth[target]);
-      if (HasVoxel(header.format)) runs.ReadVoxel(source, run.pixel_count, &image.voxel[target]);
-      source += run.pixel_count;
-    }
-    if (end == runs.run_count()) MakeEmpty(image, written, std::size_t(header.bounds.pixel_count()));
-  });
-  return image;
-}
-
-}  // namespace
-
-std::size_t PayloadBytes(const RunImageHeader& header) {
-  return sizeof(Run) * std::size_t{header.run_count} + PixelBytes(header) * std::size_t(header.pixel_count);
-}
-
-RunImage EncodeRuns(const ImageView& view, ColorCoding color) { return Encode(view, view.format, color); }
 
 RunImage EncodeRuns(const LocalImage& image, PixelRange range, std::int32_t frame_width) {
   return EncodeRuns(ViewOf(image, range, frame_width));
 }
 
 RunImage EncodePicture(const LocalImage& image) {
-  return Encode(ViewOf(image), HasVoxel(image.format) ? PixelFormat::kRgbaDepth : image.format, ColorCoding::kFloat32);
+  ImageView view = ViewOf(image);
+  if (HasVoxel(view.format)) view.format = PixelFormat::kRgbaDepth;
+  return EncodeRuns(view);
 }
 
 Status ValidateRunHeader(const RunImageHeader& header, const PixelBounds& frame) {
   if (header.format < PixelFormat::kRgba || header.format > PixelFormat::kSum) {
-    return Invalid("format is " + std::to_string(int(header.format)) +
-                   ", but must be 1 (rgba), 2 (depth), 3 (rgba and depth), 4 (maximum) or 5 (sum)");
+    return Invalid("format is {}, but must be 1 (rgba), 2 (depth), 3 (rgba and depth), 4 (maximum) or 5 (sum)", int(header.format));
   }
   const bool coded = header.color == ColorCoding::kHalf || header.color == ColorCoding::kFixed16;
   if (header.color != ColorCoding::kFloat32 && (!coded || header.format != PixelFormat::kRgba)) {
-    return Invalid("color is " + std::to_string(int(header.color)) +
-                   ", but must be 1 (float32), or for colours alone 2 (half) or 3 (fixed16)");
+    return Invalid("color is {}, but must be 1 (float32), or for colours alone 2 (half) or 3 (fixed16)", int(header.color));
   }
   const PixelBounds& bounds = header.bounds;
   // Nothing is computed from the bounds before this: differences of hostile numbers may overflow.
   if (!frame.Contains(bounds) || (bounds.empty() && bounds != PixelBounds{})) {
-    return Invalid("bounds [" + std::to_string(bounds.x_begin) + ", " + std::to_string(bounds.x_end) + ") x [" +
-                   std::to_string(bounds.y_begin) + ", " + std::to_string(bounds.y_end) + ") do not lie in the frame of " +
-                   std::to_string(frame.width()) + " x " + std::to_string(frame.height()) + " pixels");
+    return Invalid("bounds [{}, {}) x [{}, {}) do not lie in the frame of {} x {} pixels", bounds.x_begin, bounds.x_end, bounds.y_begin,
+                   bounds.y_end, frame.width(), frame.height());
   }
   const auto limit = std::uint64_t(bounds.pixel_count());
   if (header.pixel_count > limit) {
-    return Invalid("pixel_count is " + std::to_string(header.pixel_count) + ", but the bounds have " + std::to_string(limit) + " pixels");
+    return Invalid("pixel_count is {}, but the bounds have {} pixels", header.pixel_count, limit);
   }
   if (IsDense(header) && header.pixel_count != limit) {
-    return Invalid("run_count is 0, but there are " + std::to_string(header.pixel_count) + " of the bounds' " + std::to_string(limit) +
-                   " pixels");
+    return Invalid("run_count is 0, but there are {} of the bounds' {} pixels", header.pixel_count, limit);
   }
   if (header.run_count > header.pixel_count) {
-    return Invalid("run_count is " + std::to_string(header.run_count) + ", but there are only " + std::to_string(header.pixel_count) +
-                   " pixels");
+    return Invalid("run_count is {}, but there are only {} pixels", header.run_count, header.pixel_count);
   }
   return Status::Ok();
 }
@@ -248,8 +203,7 @@ Status ValidateRunHeader(const RunImageHeader& header, const PixelBounds& frame)
 Status ValidateRunTable(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame) {
   if (Status status = ValidateRunHeader(header, frame); !status.ok()) return status;
   if (payload.size() != PayloadBytes(header)) {
-    return Invalid("the payload has " + std::to_string(payload.size()) + " bytes, but the header says " +
-                   std::to_string(PayloadBytes(header)));
+    return Invalid("the payload has {} bytes, but the header says {}", payload.size(), PayloadBytes(header));
   }
 
   if (IsDense(header)) return Status::Ok();
@@ -260,19 +214,17 @@ Status ValidateRunTable(const RunImageHeader& header, std::span<const std::byte>
     const Run run = runs.ReadRun(i);
     const std::uint64_t end_column = std::uint64_t{run.column} + run.pixel_count;
     if (run.pixel_count == 0 || run.row >= std::uint32_t(header.bounds.height()) || end_column > std::uint64_t(header.bounds.width())) {
-      return Invalid("run " + std::to_string(i) + " (row " + std::to_string(run.row) + ", column " + std::to_string(run.column) + ", " +
-                     std::to_string(run.pixel_count) + " pixels) is empty or leaves the bounds");
+      return Invalid("run {} (row {}, column {}, {} pixels) is empty or leaves the bounds", i, run.row, run.column, run.pixel_count);
     }
     if (run.row < next_row || (run.row == next_row && run.column < next_column)) {
-      return Invalid("run " + std::to_string(i) + " (row " + std::to_string(run.row) + ", column " + std::to_string(run.column) +
-                     ") overlaps, touches or precedes the run before it");
+      return Invalid("run {} (row {}, column {}) overlaps, touches or precedes the run before it", i, run.row, run.column);
     }
     next_row = run.row;
     next_column = end_column + 1;
     pixels += run.pixel_count;
   }
   if (pixels != header.pixel_count) {
-    return Invalid("runs hold " + std::to_string(pixels) + " pixels, but pixel_count is " + std::to_string(header.pixel_count));
+    return Invalid("runs hold {} pixels, but pixel_count is {}", pixels, header.pixel_count);
   }
   return Status::Ok();
 }
@@ -283,22 +235,33 @@ Status ValidatePixels(const RunImageHeader& header, const RunPayload& runs, std:
   return Status::Ok();
 }
 
-Status ValidateRuns(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame) {
-  if (Status status = ValidateRunTable(header, payload, frame); !status.ok()) return status;
-  return ValidatePixels(header, RunPayload(header, payload), 0, header.pixel_count);
-}
-
-LocalImage DecodeRuns(const RunImageHeader& header, std::span<const std::byte> payload) {
-  return Decode(header, RunPayload(header, payload), [](std::size_t, std::size_t) {});
-}
-
 Result<LocalImage> ReadRuns(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame) {
   if (Status status = ValidateRunTable(header, payload, frame); !status.ok()) return status;
   const RunPayload runs(header, payload);
+  LocalImage image = MakeUnwrittenImage(header.format, header.bounds);
+  const auto place_of = [&](const Run& run) { return std::size_t{run.row} * std::size_t(header.bounds.width()) + run.column; };
+  const std::vector<std::size_t> first_pixels = FirstPixels(runs);
   std::atomic<bool> colours_valid = true, depth_finite = true;
-  LocalImage image = Decode(header, runs, [&](std::size_t first, std::size_t count) {
-    if (!ColoursAreValid(header.color, runs.rgba(first, count))) colours_valid = false;
-    if (HasDepth(header.format) && !AllFinite(runs.depth(first, count))) depth_finite = false;
+  tbb::parallel_for(std::size_t{0}, first_pixels.size(), [&](std::size_t task) {
+    const std::size_t begin = task * kRunsPerTask, end = std::min<std::size_t>(begin + kRunsPerTask, runs.run_count());
+    std::size_t source = first_pixels[task], written = 0;
+    if (begin > 0) {
+      const Run before = runs.ReadRun(begin - 1);
+      written = place_of(before) + before.pixel_count;
+    }
+    for (std::size_t i = begin; i < end; ++i) {
+      const Run run = runs.ReadRun(i);
+      const std::size_t target = place_of(run);
+      if (!ColoursAreValid(header.color, runs.rgba(source, run.pixel_count))) colours_valid = false;
+      if (HasDepth(header.format) && !AllFinite(runs.depth(source, run.pixel_count))) depth_finite = false;
+      MakeEmpty(image, written, target);
+      written = target + run.pixel_count;
+      runs.ReadRgba(source, run.pixel_count, &image.rgba[4 * target]);
+      if (HasDepth(header.format)) runs.ReadDepth(source, run.pixel_count, &image.depth[target]);
+      if (HasVoxel(header.format)) runs.ReadVoxel(source, run.pixel_count, &image.voxel[target]);
+      source += run.pixel_count;
+    }
+    if (end == runs.run_count()) MakeEmpty(image, written, std::size_t(header.bounds.pixel_count()));
   });
   if (!colours_valid) return BadColour(header.color);
   if (!depth_finite) return DepthNotFinite();

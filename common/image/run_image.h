@@ -32,19 +32,14 @@ RunImage EncodeRuns(const LocalImage& image, PixelRange range, std::int32_t fram
 // All pixels of a finished picture, for a client: without the voxel plane.
 RunImage EncodePicture(const LocalImage& image);
 
-// InvalidArgument unless header and payload agree, runs ascend without touching, stay inside the bounds, and no pixel is NaN. After this
-// check DecodeRuns may trust the image. `frame` is the frame's whole rectangle.
-Status ValidateRuns(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame);
-
-// The part of ValidateRuns that needs only the header: the image fits its frame, and so how much memory it may take.
-Status ValidateRunHeader(const RunImageHeader& header, const PixelBounds& frame);
-// All of ValidateRuns but the values of pixels: whoever reads those checks them (ValidatePixels).
-Status ValidateRunTable(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame);
-
-// Dense form. The image must be valid. Rows are decoded in parallel, within the caller's task arena.
-LocalImage DecodeRuns(const RunImageHeader& header, std::span<const std::byte> payload);
-
-// ValidateRuns and DecodeRuns in one pass over the payload.
+// Checks an image from outside and makes its dense form, in one pass over the payload. InvalidArgument unless header and payload agree,
+// runs ascend without touching, stay inside the bounds, and every colour and depth is finite. `frame` is the frame's whole rectangle. Rows
+// are decoded in parallel, within the caller's task arena.
 Result<LocalImage> ReadRuns(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame);
+
+// The part of these checks that needs only the header: the image fits its frame, and so how much memory it may take.
+Status ValidateRunHeader(const RunImageHeader& header, const PixelBounds& frame);
+// All of them but the values of pixels: whoever reads those checks them (ValidatePixels).
+Status ValidateRunTable(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame);
 
 }  // namespace slabstream

@@ -24,6 +24,17 @@ static_assert(sizeof(Run) == 12);
 
 inline constexpr std::size_t kRgbaBytes = 4 * sizeof(float);  // a pixel
 
+// Where the parts of a payload begin and where it ends, in bytes; the runs come first.
+struct PayloadLayout {
+  explicit PayloadLayout(const RunImageHeader& header)
+      : rgba(sizeof(Run) * header.run_count),
+        depth(rgba + 4 * BytesPerChannel(header.color) * header.pixel_count),
+        voxel(depth + (HasDepth(header.format) ? sizeof(float) * header.pixel_count : 0)),
+        end(voxel + (HasVoxel(header.format) ? sizeof(std::uint32_t) * header.pixel_count : 0)) {}
+
+  std::size_t rgba, depth, voxel, end;
+};
+
 class RunPayload {
  public:
   // payload.size() is PayloadBytes(header).
@@ -32,10 +43,8 @@ class RunPayload {
         run_count_(dense_width_ > 0 ? std::uint32_t(header.bounds.height()) : header.run_count),
         color_(header.color),
         color_bytes_(4 * BytesPerChannel(header.color)),
-        runs_(payload.data()),
-        rgba_(runs_ + sizeof(Run) * header.run_count),
-        depth_(rgba_ + color_bytes_ * header.pixel_count),
-        voxel_(depth_ + sizeof(float) * header.pixel_count) {}
+        layout_(header),
+        runs_(payload.data()) {}
 
   std::uint32_t run_count() const { return run_count_; }  // dense image: its rows
   Run ReadRun(std::size_t index) const {
@@ -46,18 +55,18 @@ class RunPayload {
   }
   // Pixels [first, first + count) of all runs: here as bytes (a colour is four floats or codes), below as numbers.
   std::span<const std::byte> rgba(std::size_t first, std::size_t count) const {
-    return {rgba_ + color_bytes_ * first, color_bytes_ * count};
+    return {runs_ + layout_.rgba + color_bytes_ * first, color_bytes_ * count};
   }
   std::span<const std::byte> depth(std::size_t first, std::size_t count) const {
-    return {depth_ + sizeof(float) * first, sizeof(float) * count};
+    return {runs_ + layout_.depth + sizeof(float) * first, sizeof(float) * count};
   }
   std::span<const std::byte> voxel(std::size_t first, std::size_t count) const {
-    return {voxel_ + sizeof(std::uint32_t) * first, sizeof(std::uint32_t) * count};
+    return {runs_ + layout_.voxel + sizeof(std::uint32_t) * first, sizeof(std::uint32_t) * count};
   }
   // Whether the payload can be read in place: colours and depths as floats, voxels as words.
   bool AreFloats() const { return color_ == ColorCoding::kFloat32 && reinterpret_cast<std::uintptr_t>(runs_) % alignof(float) == 0; }
   void ReadRgba(std::size_t first, std::size_t count, float* out) const {
-    const std::byte* const source = rgba_ + color_bytes_ * first;
+    const std::byte* const source = rgba(first, count).data();
     if (color_ == ColorCoding::kFloat32) {
       std::memcpy(out, source, kRgbaBytes * count);
       return;
@@ -71,10 +80,10 @@ class RunPayload {
     }
   }
   void ReadDepth(std::size_t first, std::size_t count, float* out) const {
-    std::memcpy(out, depth_ + sizeof(float) * first, sizeof(float) * count);
+    std::memcpy(out, depth(first, count).data(), sizeof(float) * count);
   }
   void ReadVoxel(std::size_t first, std::size_t count, std::uint32_t* out) const {
-    std::memcpy(out, voxel_ + sizeof(std::uint32_t) * first, sizeof(std::uint32_t) * count);
+    std::memcpy(out, voxel(first, count).data(), sizeof(std::uint32_t) * count);
   }
 
  private:
@@ -82,13 +91,11 @@ class RunPayload {
   const std::uint32_t run_count_;
   const ColorCoding color_;
   const std::size_t color_bytes_;  // a pixel
-  const std::byte* runs_;
-  const std::byte* rgba_;
-  const std::byte* depth_;  // formats with depths only
-  const std::byte* voxel_;  // formats with voxels only
+  const PayloadLayout layout_;
+  const std::byte* const runs_;
 };
 
-// The part of ValidateRuns for the values of pixels [first, first + count) of all runs.
+// The part of the checks of ReadRuns for the values of pixels [first, first + count) of all runs.
 Status ValidatePixels(const RunImageHeader& header, const RunPayload& runs, std::size_t first, std::size_t count);
 
 }  // namespace slabstream

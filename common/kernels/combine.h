@@ -30,7 +30,7 @@ void Combine(LocalImage& image, const ImageView& other, Side side, const PixelBo
 // The same for unchecked pixels, in memory that another process may even write to meanwhile. False: a pixel of the result where `other`
 // has one is invalid (its colour is not finite, or its depth is NaN or -infinity); `image` is then useless.
 [[nodiscard]] bool CombineUnchecked(LocalImage& image, const ImageView& other, Side side, const PixelBounds& room);
-// The same for runs from outside: checks them as ValidateRuns does, while they are combined, and that the combined colours are finite.
+// The same for runs from outside: checks them as ReadRuns does, while they are combined, and that the combined colours are finite.
 // After an error `image` may hold some of them.
 Status CombineRuns(LocalImage& image, const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame, Side side,
                    const PixelBounds& room);

@@ -14,42 +14,34 @@ inline constexpr std::array<Axis, 3> kAxes = {Axis::kX, Axis::kY, Axis::kZ};
 constexpr int Number(Axis axis) { return static_cast<int>(axis); }
 constexpr char Letter(Axis axis) { return static_cast<char>('x' + Number(axis)); }
 
-struct Vec3 {
-  double x = 0, y = 0, z = 0;
+template <class T>
+struct Vector3 {
+  T x = 0, y = 0, z = 0;
 
-  constexpr double operator[](int i) const { return i == 0 ? x : i == 1 ? y : z; }
-  constexpr double& operator[](int i) { return i == 0 ? x : i == 1 ? y : z; }
-  constexpr double operator[](Axis a) const { return (*this)[Number(a)]; }
-  constexpr double& operator[](Axis a) { return (*this)[Number(a)]; }
-  friend constexpr bool operator==(const Vec3&, const Vec3&) = default;
+  constexpr T operator[](int i) const { return i == 0 ? x : i == 1 ? y : z; }
+  constexpr T& operator[](int i) { return i == 0 ? x : i == 1 ? y : z; }
+  constexpr T operator[](Axis a) const { return (*this)[Number(a)]; }
+  constexpr T& operator[](Axis a) { return (*this)[Number(a)]; }
+  friend constexpr bool operator==(const Vector3&, const Vector3&) = default;
+  friend constexpr auto operator<=>(const Vector3&, const Vector3&) = default;
+
+  // By component. Quotients of integers are rounded towards 0.
+  friend constexpr Vector3 operator+(const Vector3& a, const Vector3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+  friend constexpr Vector3 operator-(const Vector3& a, const Vector3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+  friend constexpr Vector3 operator-(const Vector3& a) { return {-a.x, -a.y, -a.z}; }
+  friend constexpr Vector3 operator*(T s, const Vector3& a) { return {s * a.x, s * a.y, s * a.z}; }
+  friend constexpr Vector3 operator*(const Vector3& a, const Vector3& b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
+  friend constexpr Vector3 operator/(const Vector3& a, T s) { return {a.x / s, a.y / s, a.z / s}; }
+  friend constexpr Vector3 operator/(const Vector3& a, const Vector3& b) { return {a.x / b.x, a.y / b.y, a.z / b.z}; }
 };
 
-constexpr Vec3 operator+(const Vec3& a, const Vec3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-constexpr Vec3 operator-(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-constexpr Vec3 operator-(const Vec3& a) { return {-a.x, -a.y, -a.z}; }
-constexpr Vec3 operator*(double s, const Vec3& a) { return {s * a.x, s * a.y, s * a.z}; }
-constexpr Vec3 operator*(const Vec3& a, const Vec3& b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }  // by component
-constexpr Vec3 operator/(const Vec3& a, const Vec3& b) { return {a.x / b.x, a.y / b.y, a.z / b.z}; }  // by component
+using Vec3 = Vector3<double>;
 constexpr double Dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 constexpr Vec3 Cross(const Vec3& a, const Vec3& b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 inline double Length(const Vec3& a) { return std::sqrt(Dot(a, a)); }
 inline Vec3 Normalized(const Vec3& a) { return (1.0 / Length(a)) * a; }
 
-struct Index3 {
-  std::int32_t x = 0, y = 0, z = 0;
-
-  constexpr std::int32_t operator[](int i) const { return i == 0 ? x : i == 1 ? y : z; }
-  constexpr std::int32_t& operator[](int i) { return i == 0 ? x : i == 1 ? y : z; }
-  constexpr std::int32_t operator[](Axis a) const { return (*this)[Number(a)]; }
-  constexpr std::int32_t& operator[](Axis a) { return (*this)[Number(a)]; }
-  friend constexpr bool operator==(const Index3&, const Index3&) = default;
-  friend constexpr auto operator<=>(const Index3&, const Index3&) = default;
-};
-
-constexpr Index3 operator+(const Index3& a, const Index3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-constexpr Index3 operator-(const Index3& a, const Index3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-constexpr Index3 operator*(std::int32_t s, const Index3& a) { return {s * a.x, s * a.y, s * a.z}; }
-constexpr Index3 operator/(const Index3& a, std::int32_t s) { return {a.x / s, a.y / s, a.z / s}; }  // rounded towards 0
+using Index3 = Vector3<std::int32_t>;
 constexpr Index3 Min(const Index3& a, const Index3& b) { return {std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)}; }
 constexpr Index3 Max(const Index3& a, const Index3& b) { return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)}; }
 constexpr Index3 Uniform(std::int32_t s) { return {s, s, s}; }

@@ -1,6 +1,5 @@
 #include "common/volume/box_assembly.h"
 
-#include <algorithm>
 #include <utility>
 
 namespace slabstream {

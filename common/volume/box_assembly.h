@@ -35,8 +35,8 @@ struct BoxAssembly {
 // skipped; without that limit, no voxel that a box of `at_hand` holds is missing.
 BoxAssembly Assemble(const Box& wanted, std::span<const Box> at_hand, std::size_t most_missing = std::numeric_limits<std::size_t>::max());
 
-// The limit for fetching what is missing from another process. Each missing box is a request, which may get lost: there are no more of them
-// than requests for all of `wanted` in pieces of 2^20 voxels.
+// The limit for fetching what is missing from another process. Each missing box takes a request, and a request may get lost. So there are
+// at most as many as it would take to fetch all of `wanted` in pieces of 2^20 voxels.
 inline std::size_t MostMissing(const Box& wanted) { return std::size_t(std::max<std::int64_t>(wanted.voxel_count() >> 20, 1)); }
 
 }  // namespace slabstream

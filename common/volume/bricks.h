@@ -1,6 +1,6 @@
 // Bricks: cubes of kBrick voxels a side, at global multiples of kBrick, cut off by the box that they divide. BrickedVoxels stores the
 // samples of a box brick by brick. If all samples of a brick are equal it keeps one row of them, so empty space takes hardly any memory:
-// most of a segmented scan, and the surroundings of many simulations. Without such bricks nothing is saved and nothing lost.
+// most of a segmented scan, and the surroundings of many simulations.
 //
 // VoxelBricks reads bricks of either kind of storage, VoxelBlock or BrickedVoxels.
 #pragma once
@@ -50,8 +50,8 @@ class BrickedVoxels {
   const BrickGrid& grid() const { return grid_; }
   ScalarType type() const { return type_; }
 
-  // Writes samples of any `box` inside this one, in order, x fastest, from byte `begin` on: whole samples. Several threads may write
-  // different bricks.
+  // Writes part of the samples of `box`, which lies inside this one: whole samples, x fastest, from byte `begin` of the box's samples on.
+  // Several threads may write different bricks.
   void Write(const Box& box, std::uint64_t begin, std::span<const std::byte> samples);
 
   template <class T>
@@ -100,7 +100,7 @@ class VoxelBricks {
   const Box& box() const { return grid_.box; }
   ScalarType type() const { return type_; }
 
-  // Reads samples of any `box` inside this one, in order, x fastest, from byte `begin` on: whole samples.
+  // Reads part of the samples of `box`, which lies inside this one: whole samples, x fastest, from byte `begin` of the box's samples on.
   void Read(const Box& box, std::uint64_t begin, std::span<std::byte> samples) const;
 
   template <class T>

@@ -28,8 +28,8 @@ constexpr double CellShare(const Box& box, Axis axis, std::int32_t cell, const I
   return double(std::max(std::min(box.end[axis], end) - std::max(box.begin[axis], begin), 0)) / (end - begin);
 }
 
-// A set of lines of a cell along x or y: bit kOccupancyCell * z + i is the line at z, and at i along the other of these axes. Both are
-// counted from the cell's first voxel.
+// A bit for each line of a cell that runs along x, or for each that runs along y. Bit kOccupancyCell * z + i is the line at height z and at
+// y = i, or at x = i. Both are counted from the cell's first voxel.
 using LineSet = std::uint64_t;
 static_assert(kOccupancyCell * kOccupancyCell == 64, "a bit for each line");
 

@@ -1,8 +1,8 @@
 // The paper's two test objects (Yagel and Machiraju, section 4), as N^3 volumes of uint8. Deterministic.
 //
-// Class I: a hollow sphere as a DDA-like voxelisation gives it. Class II: all voxels within a radius; the radius is chosen so that the
-// share of occupied voxels is as near to the wanted occupancy as whole shells of equal distance allow. Occupied voxels hold 128 ... 255,
-// rising along x; the rest holds 0.
+// Class I: a hollow sphere, all voxels between two radii. Class II: all voxels within a radius. The outer radius of class I is 0.45 N; the
+// other radius is chosen so that the share of occupied voxels is as near to the wanted occupancy as whole shells of voxels at equal
+// distance from the centre allow. Occupied voxels hold 128 ... 255, rising along x; the rest holds 0.
 #pragma once
 
 #include "common/base/status.h"

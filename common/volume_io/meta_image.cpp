@@ -1,7 +1,6 @@
 // MetaImage with its samples in the same file or in one other (.mha, .mhd), raw or zlib-compressed, by the fields that MetaIO documents.
 #include <optional>
 #include <utility>
-#include <vector>
 
 #include "common/volume_io/text_header.h"
 

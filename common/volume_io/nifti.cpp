@@ -27,7 +27,7 @@ class NiftiHeader {
   }
 
   bool valid() const { return At<std::int32_t>(0) == std::int32_t{kHeaderBytes} && std::memcmp(bytes_.data() + 344, "n+1", 4) == 0; }
-  bool big_endian() const { return swap_ != (std::endian::native == std::endian::big); }
+  bool big_endian() const { return swap_; }
   int dim(int i) const { return At<std::int16_t>(40 + 2 * std::size_t(i)); }
   int data_type() const { return At<std::int16_t>(70); }
   double pixdim(int i) const { return At<float>(76 + 4 * std::size_t(i)); }
@@ -122,7 +122,7 @@ bool BeginsLikeGzip(const std::string& path) {
 Result<RawVolume> ReadNifti(const std::string& path) {
   Payload payload{.file = path, .compressed = BeginsLikeGzip(path)};
   std::array<std::byte, kHeaderBytes> bytes{};
-  if (Status status = ReadPayloadStart(payload, bytes); !status.ok()) return status;
+  if (Status status = ReadPayload(payload, bytes, Extent::kStart); !status.ok()) return status;
   const NiftiHeader fields(bytes);
   if (!fields.valid()) return Status::InvalidArgument(path + ": not a NIfTI volume: the header is not that of NIfTI-1 in one file");
   const Result<RawHeader> header = ReadHeader(fields, path);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <new>
 #include <string>
 #include <vector>
 
@@ -27,7 +28,7 @@ class InflateReader {
   InflateReader(std::ifstream& file, std::int64_t offset) : file_(file), input_(kBlock) {
     file_.seekg(offset);
     constexpr int kLargestWindow = 15, kDetectHeader = 32;  // zlib's inflateInit2: tell gzip from zlib by the header
-    ready_ = inflateInit2(&stream_, kLargestWindow + kDetectHeader) == Z_OK;
+    if (inflateInit2(&stream_, kLargestWindow + kDetectHeader) != Z_OK) throw std::bad_alloc();
   }
   ~InflateReader() { inflateEnd(&stream_); }
   InflateReader(const InflateReader&) = delete;
@@ -36,7 +37,7 @@ class InflateReader {
   // Returns the bytes written to `out`: fewer than its size only at the end of the stream or of the file, or if the stream is damaged.
   std::size_t Read(std::span<std::byte> out) {
     std::size_t done = 0;
-    while (done < out.size() && ready_ && !damaged_) {
+    while (done < out.size() && !damaged_) {
       if (stream_.avail_in == 0 && !Refill()) break;
       if (ended_ && !NextMember()) break;
       const std::size_t room = std::min(out.size() - done, std::size_t{1} << 30);  // zlib counts in 32 bits
@@ -58,7 +59,7 @@ class InflateReader {
     return ended_ && !damaged_;
   }
 
-  bool damaged() const { return damaged_ || !ready_; }
+  bool damaged() const { return damaged_; }
 
  private:
   bool Refill() {
@@ -78,33 +79,23 @@ class InflateReader {
   std::ifstream& file_;
   std::vector<char> input_;
   z_stream stream_{};
-  bool ready_ = false, ended_ = false, damaged_ = false;
+  bool ended_ = false, damaged_ = false;
 };
-
-enum class Extent { kStart, kWholeStream };
 
 Status ReadCompressed(const Payload& payload, std::ifstream& file, std::span<std::byte> out, Extent extent) {
   InflateReader reader(file, payload.offset);
   std::vector<std::byte> skipped(kBlock);
   for (std::int64_t left = payload.skip; left > 0;) {
     const std::size_t wanted = std::min(skipped.size(), std::size_t(left));
-    if (reader.Read(std::span(skipped).first(wanted)) != wanted)
+    if (reader.Read(std::span(skipped).first(wanted)) != wanted) {
       return reader.damaged() ? Damaged(payload) : Truncated(payload, std::int64_t(out.size()), 0);
+    }
     left -= std::int64_t(wanted);
   }
   const std::size_t found = reader.Read(out);
   if (reader.damaged()) return Damaged(payload);
   if (found != out.size()) return Truncated(payload, std::int64_t(out.size()), std::int64_t(found));
   return extent == Extent::kStart || reader.EndsWell() ? Status::Ok() : Damaged(payload);
-}
-
-Status Read(const Payload& payload, std::span<std::byte> out, Extent extent) {
-  std::ifstream file(payload.file, std::ios::binary);
-  if (!file) return Status::NotFound(payload.file.string() + ": cannot be opened for reading");
-  if (payload.compressed) return ReadCompressed(payload, file, out, extent);
-  file.seekg(payload.offset);
-  file.read(reinterpret_cast<char*>(out.data()), std::streamsize(out.size()));
-  return std::size_t(file.gcount()) == out.size() ? Status::Ok() : Truncated(payload, std::int64_t(out.size()), file.gcount());
 }
 
 }  // namespace
@@ -120,8 +111,13 @@ Status CheckHolds(const Payload& payload, std::int64_t bytes) {
                                       payload.file.string(), bytes, data_bytes));
 }
 
-Status ReadPayload(const Payload& payload, std::span<std::byte> out) { return Read(payload, out, Extent::kWholeStream); }
-
-Status ReadPayloadStart(const Payload& payload, std::span<std::byte> out) { return Read(payload, out, Extent::kStart); }
+Status ReadPayload(const Payload& payload, std::span<std::byte> out, Extent extent) {
+  std::ifstream file(payload.file, std::ios::binary);
+  if (!file) return Status::NotFound(payload.file.string() + ": cannot be opened for reading");
+  if (payload.compressed) return ReadCompressed(payload, file, out, extent);
+  file.seekg(payload.offset);
+  file.read(reinterpret_cast<char*>(out.data()), std::streamsize(out.size()));
+  return std::size_t(file.gcount()) == out.size() ? Status::Ok() : Truncated(payload, std::int64_t(out.size()), file.gcount());
+}
 
 }  // namespace slabstream

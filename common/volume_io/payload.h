@@ -23,11 +23,10 @@ struct Payload {
 // reaches. DataLoss: it is not. NotFound: no such file.
 Status CheckHolds(const Payload& payload, std::int64_t bytes);
 
-// Fills `out` with the bytes as they are in the file (byte order is not touched). A compressed stream is read to its end, so that its
-// checksum is verified. DataLoss: truncated or damaged. NotFound: no such file.
-Status ReadPayload(const Payload& payload, std::span<std::byte> out);
+// How far a compressed stream is read: to its end, so that its checksum is verified, or only as far as wanted, as for a header inside it.
+enum class Extent { kStart, kWholeStream };
 
-// The same, but ignores what follows: for headers inside a compressed stream.
-Status ReadPayloadStart(const Payload& payload, std::span<std::byte> out);
+// Fills `out` with the bytes as they are in the file (byte order is not touched). DataLoss: truncated or damaged. NotFound: no such file.
+Status ReadPayload(const Payload& payload, std::span<std::byte> out, Extent extent = Extent::kWholeStream);
 
 }  // namespace slabstream

@@ -33,7 +33,8 @@ Result<RawVolume> ReadSamples(const std::string& path, const RawHeader& header, 
   if (Status status = CheckFitsMemory(header.sample_bytes(), path); !status.ok()) return status;
   RawVolume raw{header, AlignedVector<std::byte>(std::size_t(header.sample_bytes()))};
   if (Status status = ReadPayload(payload, raw.bytes); !status.ok()) return failed(status);
-  if (payload.big_endian != (std::endian::native == std::endian::big)) SwapByteOrder(header.type, raw.bytes);
+  static_assert(std::endian::native == std::endian::little, "this machine's samples are little endian");
+  if (payload.big_endian) SwapByteOrder(header.type, raw.bytes);
   return raw;
 }
 

@@ -1,4 +1,4 @@
-// What each format's reader makes of a file: its description, and its samples as stored. One function a format.
+// What a reader of one format makes of a file: a description of the volume, and the samples in the type that the file has.
 #pragma once
 
 #include <array>

@@ -11,21 +11,10 @@
 namespace slabstream {
 namespace {
 
-struct TypeTraits {
-  std::string_view name;
-  std::size_t bytes;
-};
 // In the order of SampleType.
-constexpr std::array<TypeTraits, 10> kTypes = {{{"int8", 1},
-                                                {"uint8", 1},
-                                                {"int16", 2},
-                                                {"uint16", 2},
-                                                {"int32", 4},
-                                                {"uint32", 4},
-                                                {"int64", 8},
-                                                {"uint64", 8},
-                                                {"float32", 4},
-                                                {"float64", 8}}};
+constexpr std::array<std::string_view, 10> kNames = {"int8",   "uint8", "int16",  "uint16",  "int32",
+                                                     "uint32", "int64", "uint64", "float32", "float64"};
+constexpr std::array<std::size_t, 10> kBytes = {1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
 
 template <class T>
 std::span<T> SamplesOf(AlignedVector<std::byte>& bytes) {
@@ -95,12 +84,12 @@ KeptSamples Narrow(AlignedVector<std::byte> bytes) {
 
 }  // namespace
 
-std::string_view ToString(SampleType type) { return kTypes[std::size_t(type)].name; }
-std::size_t BytesPerSample(SampleType type) { return kTypes[std::size_t(type)].bytes; }
+std::string_view ToString(SampleType type) { return kNames[std::size_t(type)]; }
+std::size_t BytesPerSample(SampleType type) { return kBytes[std::size_t(type)]; }
 
 std::optional<SampleType> SampleTypeNamed(std::string_view name) {
-  const auto found = std::ranges::find(kTypes, name, &TypeTraits::name);
-  return found == kTypes.end() ? std::nullopt : std::optional(SampleType(found - kTypes.begin()));
+  const auto found = std::ranges::find(kNames, name);
+  return found == kNames.end() ? std::nullopt : std::optional(SampleType(found - kNames.begin()));
 }
 
 void SwapByteOrder(SampleType type, AlignedVector<std::byte>& bytes) {

@@ -24,17 +24,17 @@ struct TextHeader {
   // Its numbers; `if_absent` if the header has none of the keys. Numbers may be nan, and grouped as "(1,0,0) (0,1,0) none".
   // InvalidArgument unless the value is exactly `count` numbers.
   Result<std::vector<double>> Numbers(std::initializer_list<const char*> keys, std::size_t count, std::vector<double> if_absent) const;
-  // The numbers of the field `sizes`, as many as the field `dimension` says. InvalidArgument: they are not.
+  // The numbers of the field `sizes`. InvalidArgument unless there are as many as the field `dimension` says.
   Result<std::vector<double>> Sizes(const char* dimension, const char* sizes) const;
 
-  // Samples in the file `name`, in the header's folder unless the name is absolute, or without a name behind the header. InvalidArgument:
-  // the name stands for several files.
+  // Where the samples are. A relative `name` of their file begins at the header's folder; without a name they are behind the header.
+  // InvalidArgument: the name stands for several files.
   Result<Payload> PayloadIn(const std::optional<std::string>& name) const;
-  // How many bytes of the payload's file to skip, as the field `key` with this value says. -1: those in front of the last `sample_bytes`.
-  // InvalidArgument: no number of at least -1. NotFound: no such file.
+  // How many bytes to skip in front of the samples: the value of the field `key`, where -1 means that the samples are the last
+  // `sample_bytes` of the payload's file. InvalidArgument: no number of at least -1. NotFound: no such file.
   Result<std::int64_t> BytesToSkip(const char* key, const std::string& value, const Payload& payload, std::int64_t sample_bytes) const;
 
-  // InvalidArgument with a message that begins with the path; NotA...: it also says that this is no volume of the format.
+  // InvalidArgument. The message names the path, and that of NotAVolume also the format.
   Status Refused(const std::string& why) const { return Status::InvalidArgument(path + ": " + why); }
   Status NotAVolume(const std::string& why) const { return Refused("not a " + format + " volume: " + why); }
 };
@@ -48,9 +48,9 @@ struct TextFormat {
   std::string name;
   std::string first_line;  // how it begins
   char separator;
-  bool ignores_case;     // of keys: they are found by their lower case
-  std::string last_key;  // ends the header, like an empty line; "": none does
-  std::vector<const char*> required;
+  bool ignores_case;                  // of keys: they are found by their lower case
+  std::string last_key;               // ends the header, like an empty line; "": none does
+  std::vector<const char*> required;  // keys of fields that must not be empty
   Result<RawHeader> (*read_header)(const TextHeader& text);
   Result<Payload> (*find_payload)(const TextHeader& text, std::int64_t sample_bytes);
 };

@@ -174,11 +174,16 @@ std::int64_t FileBytes(const std::string& path) {
   return error ? 0 : std::int64_t(bytes);
 }
 
-bool SamePage(const RawHeader& a, const RawHeader& b) { return a.size == b.size && a.type == b.type; }
-
-Status Differs(const std::string& what, const RawHeader& page, const RawHeader& first) {
-  const auto text = [](const RawHeader& header) { return fmt::format("{} x {} {}", header.size.x, header.size.y, ToString(header.type)); };
-  return Status::InvalidArgument(what + " is " + text(page) + ", must be " + text(first) + " like the first one");
+// Reads the current page of `file` as slice number `slice` of the volume. `name`: of the page, for messages.
+Status ReadSlice(TiffFile& file, const std::string& name, std::int64_t slice, RawVolume& volume) {
+  const Result<RawHeader> page = file.ReadPageHeader();
+  if (!page.ok()) return page.status();
+  const RawHeader& wanted = volume.header;
+  if (page->size.x != wanted.size.x || page->size.y != wanted.size.y || page->type != wanted.type) {
+    return Status::InvalidArgument(fmt::format("{} is {} x {} {}, must be {} x {} {} like the first one", name, page->size.x, page->size.y,
+                                               ToString(page->type), wanted.size.x, wanted.size.y, ToString(wanted.type)));
+  }
+  return file.ReadPage(*page, volume.bytes.data() + slice * page->sample_bytes());
 }
 
 Result<RawVolume> ReadPages(const std::string& path) {
@@ -192,10 +197,7 @@ Result<RawVolume> ReadPages(const std::string& path) {
   Result<RawVolume> raw = Allocate(path, *first, *pages, FileBytes(path));
   for (std::int64_t page = 0; raw.ok() && page < *pages; ++page) {
     if (Status status = page == 0 ? file.GoToFirstPage() : file.GoToNextPage(); !status.ok()) return status;
-    const Result<RawHeader> header = file.ReadPageHeader();
-    if (!header.ok()) return header.status();
-    if (!SamePage(*header, *first)) return Differs(path + ": page " + std::to_string(page + 1), *header, *first);
-    if (Status status = file.ReadPage(*header, raw->bytes.data() + page * header->sample_bytes()); !status.ok()) return status;
+    if (Status status = ReadSlice(file, fmt::format("{}: page {}", path, page + 1), page, *raw); !status.ok()) return status;
   }
   return raw;
 }
@@ -204,25 +206,22 @@ Result<RawVolume> ReadSlices(const std::string& directory, const std::vector<std
   std::int64_t file_bytes = 0;
   for (const std::string& path : paths) file_bytes += FileBytes(path);
   std::optional<RawVolume> raw;
-  RawHeader first;
   for (std::size_t slice = 0; slice < paths.size(); ++slice) {
     TiffFile file(paths[slice]);
     if (!file.is_open()) return file.NotTiff();
-    const Result<RawHeader> header = file.ReadPageHeader();
-    if (!header.ok()) return header.status();
     if (!raw) {
-      first = *header;
-      Result<RawVolume> allocated = Allocate(directory, first, std::int64_t(paths.size()), file_bytes);
-      if (!allocated.ok()) return allocated.status();
-      raw = std::move(*allocated);
+      const Result<RawHeader> first = file.ReadPageHeader();
+      if (!first.ok()) return first.status();
+      Result<RawVolume> allocated = Allocate(directory, *first, std::int64_t(paths.size()), file_bytes);
+      if (!allocated.ok()) return allocated;
+      raw = *std::move(allocated);
     }
-    if (!SamePage(*header, first)) return Differs(paths[slice], *header, first);
-    if (Status status = file.ReadPage(*header, raw->bytes.data() + std::int64_t(slice) * first.sample_bytes()); !status.ok()) return status;
+    if (Status status = ReadSlice(file, paths[slice], std::int64_t(slice), *raw); !status.ok()) return status;
     const Result<std::int64_t> pages = file.CountPages();
     if (!pages.ok()) return pages.status();
     if (*pages != 1) return file.Refused(fmt::format("has {} pages, must have 1 in a directory of slices", *pages));
   }
-  return std::move(*raw);
+  return *std::move(raw);
 }
 
 // A key that sorts numbers inside names by value, s2 before s10: each becomes a 0, the count of its digits, and its digits.

@@ -8,7 +8,6 @@
 #include <string_view>
 
 #include "common/base/log.h"
-#include "common/volume/memory_budget.h"
 #include "common/volume_io/raw_volume.h"
 #include "common/volume_io/text_header.h"
 

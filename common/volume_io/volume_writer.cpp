@@ -2,7 +2,6 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <bit>
 #include <filesystem>
 #include <new>
 #include <span>
@@ -53,23 +52,22 @@ FileSamples ToFileSamples(const Volume& volume) {
   return VisitScalarType(type, [&]<class T>(const T*) { return FileSamples{"float", "MET_FLOAT", DataValues<T, float>(volume)}; });
 }
 
-constexpr bool kBigEndian = std::endian::native == std::endian::big;
-
 std::string NrrdHeader(const VolumeGeometry& geometry, const char* type) {
   const auto& [size, spacing] = geometry;
   return fmt::format(
       "NRRD0004\ntype: {}\ndimension: 3\nspace: left-posterior-superior\nsizes: {} {} {}\n"
-      "space directions: ({},0,0) (0,{},0) (0,0,{})\nkinds: domain domain domain\nendian: {}\nencoding: gzip\nspace origin: (0,0,0)\n\n",
-      type, size[0], size[1], size[2], spacing[0], spacing[1], spacing[2], kBigEndian ? "big" : "little");
+      "space directions: ({},0,0) (0,{},0) (0,0,{})\nkinds: domain domain domain\nendian: little\n"
+      "encoding: gzip\nspace origin: (0,0,0)\n\n",
+      type, size[0], size[1], size[2], spacing[0], spacing[1], spacing[2]);
 }
 
 std::string MetaHeader(const VolumeGeometry& geometry, const char* type, const std::string& data_file) {
   const auto& [size, spacing] = geometry;
   return fmt::format(
-      "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = {}\nCompressedData = False\n"
+      "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = False\n"
       "TransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = 0 0 0\nElementSpacing = {} {} {}\nDimSize = {} {} {}\nElementType = {}\n"
       "ElementDataFile = {}\n",
-      kBigEndian ? "True" : "False", spacing[0], spacing[1], spacing[2], size[0], size[1], size[2], type, data_file);
+      spacing[0], spacing[1], spacing[2], size[0], size[1], size[2], type, data_file);
 }
 
 // Appends the bytes as one gzip member.

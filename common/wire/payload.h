@@ -24,7 +24,7 @@ namespace slabstream {
 Bytes PackRuns(Bytes payload, Codec codec, EncodedRuns& runs);
 
 // Returns the runs' payload, PayloadBytes(runs.image) bytes. `runs` has come through Decode. DataLoss naming both values: the payload's
-// length, its digest or its unpacked length is not what `runs` says, or zstd cannot read it. ValidateRuns checks the runs themselves.
+// length, its digest or its unpacked length is not what `runs` says, or zstd cannot read it. ReadRuns checks the runs themselves.
 Result<Bytes> UnpackRuns(const EncodedRuns& runs, const Bytes& payload);
 
 // The same between workers: packs `payload`, PayloadBytes of some image, with zstd. None: it does not get smaller.

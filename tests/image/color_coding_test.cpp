@@ -97,14 +97,14 @@ TEST(ColorCoding, RunsAreHalfAsLongAndComeBackWithinTheBound) {
     const RunImage exact = EncodeRuns(ViewOf(image));
     for (const ColorCoding coding : kCodings) {
       RunImage coded = EncodeRuns(ViewOf(image), coding);
-      ASSERT_EQ(ValidateRuns(coded.header, coded.payload, kFrame), Status::Ok());
       EXPECT_EQ(coded.payload.size(), 12 * exact.header.run_count + 8 * exact.header.pixel_count);
-      const LocalImage a = DecodeRuns(exact.header, exact.payload), b = DecodeRuns(coded.header, coded.payload);
+      const LocalImage a = ReadRuns(exact.header, exact.payload, kFrame).value();
+      const LocalImage b = ReadRuns(coded.header, coded.payload, kFrame).value();
       ASSERT_EQ(a.rgba.size(), b.rgba.size());
       for (std::size_t k = 0; k < a.rgba.size(); ++k) ASSERT_NEAR(a.rgba[k], b.rgba[k], coding == ColorCoding::kHalf ? 0x1p-11 : 8e-6);
       if (coding == ColorCoding::kHalf && coded.header.pixel_count > 0) {  // a code that is no colour
         coded.payload.back() = std::byte{0x7C};
-        EXPECT_EQ(ValidateRuns(coded.header, coded.payload, kFrame).code(), StatusCode::kInvalidArgument);
+        EXPECT_EQ(ReadRuns(coded.header, coded.payload, kFrame).status().code(), StatusCode::kInvalidArgument);
       }
     }
   }
@@ -116,7 +116,7 @@ TEST(ColorCoding, RunsAreHalfAsLongAndComeBackWithinTheBound) {
   EXPECT_EQ(EncodeRuns(ViewOf(depth), ColorCoding::kFixed16).header.color, ColorCoding::kFloat32);
   RunImage wrong = EncodeRuns(ViewOf(depth));
   wrong.header.color = ColorCoding::kHalf;
-  EXPECT_FALSE(ValidateRuns(wrong.header, wrong.payload, kFrame).ok());
+  EXPECT_FALSE(ReadRuns(wrong.header, wrong.payload, kFrame).ok());
 }
 
 }  // namespace

@@ -47,7 +47,7 @@ class ExecutorTest : public testing::Test {
     const AnyMessage message = Decode(sent.header).value();
     const auto& partial = std::get<PartialImage>(message);
     EXPECT_EQ(partial.reports.back().image_bytes, sent.payload.size());
-    return DecodeRuns(partial.image, sent.payload.span());
+    return *ReadRuns(partial.image, sent.payload.span(), partial.image.bounds);
   }
 
   Outputs outputs_;
@@ -114,7 +114,9 @@ TEST_F(ExecutorTest, ReleasedImagesServeTheOrdersThatWereGivenBefore) {
 
 TEST_F(ExecutorTest, DamagedRunsAreRefused) {
   EXPECT_TRUE(CombineIncoming(1, Filled({0, 0, 8, 4}, 0.5F), Side::kBack).status.ok());
-  EXPECT_EQ(CombineIncoming(1, Filled({0, 0, 8, 4}, NAN), Side::kBack).status.code(), StatusCode::kInvalidArgument);
+  // Where a colour is found wrong, part of the image may have been combined: another image than the one looked at below.
+  EXPECT_TRUE(CombineIncoming(2, Filled({0, 0, 8, 4}, 0.5F), Side::kBack).status.ok());
+  EXPECT_EQ(CombineIncoming(2, Filled({0, 0, 8, 4}, NAN), Side::kBack).status.code(), StatusCode::kInvalidArgument);
   RunImage runs = EncodeRuns(Filled({0, 0, 8, 4}, 0.5F), {0, 16 * 8}, 16);
   runs.header.bounds = {0, 0, 1 << 24, 1 << 24};  // would take petabytes
   executor_.Perform(StartCombine{
@@ -170,7 +172,7 @@ TEST_F(ExecutorTest, FinishedFrameIsResolvedAndPacked) {
   EXPECT_GT(frame.reports[0].stage_ns[std::size_t(Stage::kEncode)], 0);
   const Result<Bytes> runs = UnpackRuns(frame.runs, sent.payload);
   ASSERT_TRUE(runs.ok()) << runs.status().message();
-  EXPECT_FLOAT_EQ(PixelAt(DecodeRuns(frame.runs.image, runs->span()), 3, 1).rgba[3], 0.5F);
+  EXPECT_FLOAT_EQ(PixelAt(*ReadRuns(frame.runs.image, runs->span(), frame.runs.image.bounds), 3, 1).rgba[3], 0.5F);
 }
 
 TEST_F(ExecutorTest, EveryChunkIsAnsweredAndDamageIsFound) {
