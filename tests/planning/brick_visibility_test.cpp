@@ -54,10 +54,8 @@ bool AnyVoxelVisible(const Volume& volume, const ClassificationTable& table, con
 
 Box BoxOfBrick(const VolumeSummary& summary, std::size_t brick) {
   const auto nx = std::size_t(summary.brick_counts.x), ny = std::size_t(summary.brick_counts.y);
-  const Index3 begin = {std::int32_t(brick % nx) * kBrick, std::int32_t(brick / nx % ny) * kBrick,
-                        std::int32_t(brick / nx / ny) * kBrick};
-  return Intersection({begin, {begin.x + kBrick, begin.y + kBrick, begin.z + kBrick}},
-                      summary.description.geometry.bounds());
+  const Index3 begin = {std::int32_t(brick % nx) * kBrick, std::int32_t(brick / nx % ny) * kBrick, std::int32_t(brick / nx / ny) * kBrick};
+  return Intersection({begin, {begin.x + kBrick, begin.y + kBrick, begin.z + kBrick}}, summary.description.geometry.bounds());
 }
 
 TEST(BrickVisibility, NeverCallsAVisibleVoxelEmpty) {
