@@ -91,10 +91,7 @@ void DeclareExperiment(const CommandLine& line) {
       "Seed of the random order of the trials")
       ->type_name("N")
       ->default_str("1");
-  sub->add_option("--volume", options->volumes, "A sparse volume of your own, as FILE or FILE:TRANSFER; may be repeated")
-      ->type_name("VOLUME")
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  AddRepeated(*sub, "--volume", options->volumes, "A sparse volume of your own, as FILE or FILE:TRANSFER")->type_name("VOLUME");
   CLI::Option* resume = sub->add_flag_callback(
       "--resume", [options] { options->resume = Resume::kAnyBuild; }, "Continue what DIR holds even if another build or machine began it");
   sub->add_flag_callback(
