@@ -48,10 +48,12 @@ int Run(int argc, char** argv) {
   AddRepeated(app, "--data", data, "A volume to serve, as NAME=FILE, or a directory of volumes that are named after their files")
       ->type_name("NAME=FILE");
   app.add_flag("--compress", compress, "Pack voxels for workers with zstd: pays on links slower than about 300 MB/s, not within a machine");
-  std::string links = "Between workers of different hosts, as NAME or NAME:MICROSECONDS,GBIT, for policies that are 'auto'";
-  for (const LinkPreset& preset : LinkPresets()) links += "\n  " + std::string(preset.name) + ": " + std::string(preset.purpose);
   options.planner.surroundings.link = *ParseLink("--link", kDefaultLink);
-  AddParsed(app, "--link", options.planner.surroundings.link, ParseLink, links)->type_name("LINK")->default_str(kDefaultLink);
+  AddParsed(
+      app, "--link", options.planner.surroundings.link, ParseLink,
+      "Between workers of different hosts, as NAME or NAME:MICROSECONDS,GBIT, for policies that are 'auto'" + Explained(LinkPresets()))
+      ->type_name("LINK")
+      ->default_str(kDefaultLink);
   return RunService(app, argc, argv, "coordinator", [&]() -> Status {
     auto catalogue = MakeCatalogue(data);
     if (!catalogue.ok()) return catalogue.status();

@@ -33,11 +33,8 @@ CLI::Option* AddNamed(CLI::App& app, const std::string& name, std::string& targe
     names.push_back(kAutomatic);
     text += fmt::format("\n  {}: {}", kAutomatic, automatic);
   }
-  for (const auto& entry : entries) {
-    names.push_back(entry.name);
-    text += fmt::format("\n  {}: {}", entry.name, entry.purpose);
-  }
-  return AddParsed(app, name, target, OneOf(std::move(names)), text)->type_name("NAME")->default_str(target);
+  for (const auto& entry : entries) names.push_back(entry.name);
+  return AddParsed(app, name, target, OneOf(std::move(names)), text + Explained(entries))->type_name("NAME")->default_str(target);
 }
 
 // An option that takes one of `names`; each stands for one of `values`.
@@ -200,9 +197,10 @@ CLI::Option* AddEndpoint(CLI::App& app, std::string& endpoint) {
 }
 
 void AddTransferOptions(CLI::App& app, TransferChoice& transfer) {
-  std::string help = "Transfer function: a ParaView colour map (a .json file) or one of these presets";
-  for (const PresetInfo& preset : TransferPresets()) help += fmt::format("\n  {}: {}", preset.name, preset.purpose);
-  AddParsed(app, "--transfer", transfer.choice, ParseTransfer, help)->type_name("TRANSFER")->default_str("auto");
+  AddParsed(app, "--transfer", transfer.choice, ParseTransfer,
+            "Transfer function: a ParaView colour map (a .json file) or one of these presets" + Explained(TransferPresets()))
+      ->type_name("TRANSFER")
+      ->default_str("auto");
   AddNumber(app, "--opacity-distance", transfer.opacity_distance, {0, kMaxOpacityDistance, true},
             "Length of material, in voxels, that has the opacity which the transfer function says");
 }

@@ -55,6 +55,14 @@ CLI::Option* AddInteger(CLI::App& app, const std::string& names, T& target, int 
   return AddParsed(app, names, target, parse, help)->type_name("N")->default_str(std::to_string(target));
 }
 
+// The lines of a help text that explain the entries of a list, each with a name and a purpose.
+template <class Entries>
+std::string Explained(const Entries& entries) {
+  std::string lines;
+  for (const auto& entry : entries) lines.append("\n  ").append(entry.name).append(": ").append(entry.purpose);
+  return lines;
+}
+
 // An option that may be repeated: each time it adds a value.
 CLI::Option* AddRepeated(CLI::App& app, const std::string& names, std::vector<std::string>& target, const std::string& help);
 

@@ -1,7 +1,5 @@
 #include "laboratory/cli/laboratory_commands.h"
 
-#include <fmt/format.h>
-
 #include <CLI/CLI.hpp>
 #include <array>
 #include <iostream>
@@ -60,13 +58,11 @@ void DeclareBench(const CommandLine& line) {
 void DeclareReplay(CLI::App& experiment, std::function<Status()>& run) {
   CLI::App* sub = experiment.add_subcommand("replay", "Simulate recorded frames again, under another policy or on another machine");
   auto options = std::make_shared<ReplayOptions>();
-  std::string links;
-  for (const LinkPreset& preset : LinkPresets()) links += fmt::format("\n  {}: {}", preset.name, preset.purpose);
   sub->add_option("FILE", options->trace_path, "What --trace of render or turntable has written")->required();
   sub->add_option("--with", options->changes,
                   "What is different: combine=SCHEME (as --combine takes it), link=NAME or link=NAME:MICROSECONDS,GBIT, workers=N; may be "
                   "repeated. Links" +
-                      links)
+                      Explained(LinkPresets()))
       ->type_name("KEY=VALUE")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
