@@ -86,14 +86,14 @@ int RunCommandLine(int argc, const char* const* argv, std::span<const DeclareCom
   } catch (const CLI::Success& asked) {  // --help, --version
     return app.exit(asked);
   } catch (const CLI::ParseError& error) {
-    return ExitStatus(name(), Status::InvalidArgument(error.what()));
+    return Finish(name(), Status::InvalidArgument(error.what()));
   }
-  if (!run) return ExitStatus("slabstream", Status::InvalidArgument("a command is needed: " + CommandNames(app)));
+  if (!run) return Finish("slabstream", Status::InvalidArgument("a command is needed: " + CommandNames(app)));
 
   InitLog(name(), LogLevel::kWarning);
   Status status = LimitSimdTargetByEnvironment();
   if (status.ok()) status = run();
-  return ExitStatus(name(), status);
+  return Finish(name(), status);
 }
 
 }  // namespace slabstream

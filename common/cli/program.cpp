@@ -5,6 +5,9 @@
 #include <exception>
 #include <iostream>
 #include <memory>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "common/base/background_tasks.h"
 #include "common/base/large_buffers.h"
@@ -29,7 +32,7 @@ int RunMain(const std::string& name, const std::function<int()>& program) {
   return exit_status;
 }
 
-int ExitStatus(const std::string& who, const Status& status) {
+int Finish(const std::string& who, const Status& status) {
   if (status.ok()) return 0;
   std::string message = status.message();
   std::replace(message.begin(), message.end(), '\n', ' ');
@@ -50,8 +53,9 @@ void SetUp(CLI::App& app, const std::string& version) {
 
 int RunService(CLI::App& app, int argc, const char* const* argv, const std::string& log_name, const std::function<Status()>& serve) {
   std::string log_level = "warning";
-  AddParsed(app, "--log-level", log_level, OneOf({"debug", "info", "warning", "error", "off"}),
-            "What is logged to stderr: debug, info, warning, error or off")
+  std::vector<std::string_view> levels;
+  for (const auto& [name, level] : LogLevelNames()) levels.push_back(name);
+  AddParsed(app, "--log-level", log_level, OneOf(std::move(levels)), "What is logged to stderr: debug, info, warning, error or off")
       ->type_name("NAME")
       ->default_str(log_level);
   try {
@@ -59,10 +63,10 @@ int RunService(CLI::App& app, int argc, const char* const* argv, const std::stri
   } catch (const CLI::Success& asked) {  // --help, --version
     return app.exit(asked);
   } catch (const CLI::ParseError& error) {
-    return ExitStatus(app.get_name(), Status::InvalidArgument(error.what()));
+    return Finish(app.get_name(), Status::InvalidArgument(error.what()));
   }
   InitLog(log_name, LogLevelNames().at(log_level));
-  return ExitStatus(app.get_name(), serve());
+  return Finish(app.get_name(), serve());
 }
 
 }  // namespace slabstream

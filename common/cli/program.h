@@ -12,8 +12,9 @@ namespace slabstream {
 // Runs `program`, which returns the exit status, and catches what it throws (mostly a lack of memory). For main alone.
 int RunMain(const std::string& name, const std::function<int()>& program);
 
-// 0: ok. 2: bad arguments or input. 130: stopped by Ctrl-C. 1: anything else. Unless ok, writes "who: message" as one line to stderr.
-int ExitStatus(const std::string& who, const Status& status);
+// Unless the status is ok, writes "who: message" as one line to stderr. Returns the exit status. 0: ok. 1: the service or the frame failed.
+// 2: bad arguments or input. 130: stopped by Ctrl-C.
+int Finish(const std::string& who, const Status& status);
 
 // The style of help texts, --help and --version.
 void SetUp(CLI::App& app, const std::string& version);
