@@ -7,9 +7,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/cores.h"
 #include "client/cli/option_groups.h"
-#include "common/planning/policy_names.h"
-#include "common/transport/endpoint.h"
-#include "coordinator/tuning/service_machine.h"
+#include "common/simulation/link_model.h"
 
 namespace slabstream {
 namespace {
@@ -82,29 +80,13 @@ void DeclareUp(const CommandLine& line) {
   options->listen = "tcp://127.0.0.1:7420";
   AddInteger(*sub, "--workers", options->workers, 1, kMaxUpWorkers, "Worker processes")->default_str("one a core");
   AddThreads(*sub, options->threads, "Render threads of each worker");
-  sub->add_option("--data", options->data,
-                  "A volume to serve, as NAME=FILE, or a directory of volumes that are named after their files; may be repeated")
-      ->type_name("NAME=FILE")
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  AddParsed(
-      *sub, "--listen", options->listen,
-      [](const std::string& option, const std::string& text) -> Result<std::string> {
-        const Result<Endpoint> endpoint = ParseEndpoint(text, true);
-        if (!endpoint.ok()) return Status::InvalidArgument(option + " " + endpoint.status().message());
-        return text;
-      },
-      "Where clients reach the service; tcp://127.0.0.1:* takes any free port")
+  AddRepeated(*sub, "--data", options->data, "A volume to serve, as NAME=FILE, or a directory of volumes that are named after their files")
+      ->type_name("NAME=FILE");
+  AddParsed(*sub, "--listen", options->listen, EndpointText(true), "Where clients reach the service; tcp://127.0.0.1:* takes any free port")
       ->type_name("ENDPOINT")
       ->default_str(options->listen);
   AddOptionalValue(
-      *sub, "--compress", options->compress, "on",
-      [](const std::string& option, const std::string& text) -> Result<std::string> {
-        constexpr std::string_view kChoices[] = {"auto", "on", "off"};
-        const Result<std::size_t> index = ParseChoice(option, text, kChoices);
-        if (!index.ok()) return index.status();
-        return text;
-      },
+      *sub, "--compress", options->compress, "on", OneOf({"auto", "on", "off"}),
       "Compress images with zstd. auto: between workers whose link is slower than the compression. on, which --compress alone means: all "
       "images between workers, and pictures for clients behind a slow tunnel. off: never")
       ->type_name("[=MODE]")
@@ -112,12 +94,7 @@ void DeclareUp(const CommandLine& line) {
   // Workers of other hosts cannot join yet.
   AddParsed(
       *sub, "--link", options->link,
-      [](const std::string& option, const std::string& text) -> Result<std::string> {
-        const Result<LinkModel> link = ParseLink(option, text);
-        if (!link.ok()) return link.status();
-        return text;
-      },
-      "")
+      [](const std::string& option, const std::string& text) { return TextIf(ParseLink(option, text).status(), text); }, "")
       ->group(kHidden);
   sub->add_flag("--detach", options->detach, "Return when the service is ready; `slabstream down` ends it");
   RunWith(*sub, line.run, options, RunUp);

@@ -11,39 +11,18 @@
 #include <vector>
 
 #include "client/cli/commands.h"
-#include "client/cli/help_formatter.h"
 #include "common/base/log.h"
 #include "common/base/version.h"
+#include "common/cli/program.h"
 #include "common/kernels/simd_target.h"
-#include "common/planning/policy_names.h"
-#include "common/transport/endpoint.h"
-#include "coordinator/tuning/service_machine.h"
 
 namespace slabstream {
 namespace {
-
-constexpr int kExitInterrupted = 130;  // 128 + SIGINT, as shells count
-
-int ExitStatus(const Status& status) {
-  switch (status.code()) {
-    case StatusCode::kOk: return 0;
-    case StatusCode::kInvalidArgument:
-    case StatusCode::kNotFound: return 2;
-    case StatusCode::kCancelled: return kExitInterrupted;
-    default: return 1;
-  }
-}
 
 std::string CommandNames(const CLI::App& app) {
   std::string names;
   for (const CLI::App* sub : app.get_subcommands(nullptr)) names += (names.empty() ? "" : ", ") + sub->get_name();
   return names;
-}
-
-int Complain(const std::string& who, std::string message, int exit_status) {
-  std::replace(message.begin(), message.end(), '\n', ' ');
-  std::cerr << who << ": " << message << std::endl;
-  return exit_status;
 }
 
 // `help COMMAND`, the same as COMMAND --help.
@@ -88,10 +67,8 @@ std::vector<std::string> Arguments(int argc, const char* const* argv) {
 
 int RunCommandLine(int argc, const char* const* argv, std::span<const DeclareCommand> more) {
   CLI::App app("Slabstream renders volumes on CPUs, by any number of worker processes.", "slabstream");
-  app.formatter(std::make_shared<HelpFormatter>());
+  SetUp(app, fmt::format("slabstream {}", Version()));
   app.require_subcommand(0, 1);  // so that words after a command are never taken for another command
-  app.set_help_flag("-h,--help", "Print this text");
-  app.set_version_flag("--version", fmt::format("slabstream {}", Version()), "Print the version");
   std::function<Status()> run;
   const std::string typed = fmt::format("{}", fmt::join(argv, argv + argc, " "));
   const CommandLine line{app, run, typed};
@@ -109,14 +86,14 @@ int RunCommandLine(int argc, const char* const* argv, std::span<const DeclareCom
   } catch (const CLI::Success& asked) {  // --help, --version
     return app.exit(asked);
   } catch (const CLI::ParseError& error) {
-    return Complain(name(), error.what(), 2);
+    return Finish(name(), Status::InvalidArgument(error.what()));
   }
-  if (!run) return Complain("slabstream", "a command is needed: " + CommandNames(app), 2);
+  if (!run) return Finish("slabstream", Status::InvalidArgument("a command is needed: " + CommandNames(app)));
 
   InitLog(name(), LogLevel::kWarning);
   Status status = LimitSimdTargetByEnvironment();
   if (status.ok()) status = run();
-  return status.ok() ? 0 : Complain(name(), status.message(), ExitStatus(status));
+  return Finish(name(), status);
 }
 
 }  // namespace slabstream

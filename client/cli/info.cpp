@@ -9,6 +9,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/input_volume.h"
+#include "common/planning/frame_plan.h"
 #include "common/volume/summary.h"
 
 namespace slabstream {
@@ -91,11 +92,8 @@ Status RunInfo(const InfoOptions& options) {
   if (!loaded.ok()) return loaded.status();
   const VolumeSummary summary = Summarize(*loaded->volume);
 
-  Result<TransferFunction> transfer = std::holds_alternative<TransferFunction>(options.transfer.choice)
-                                          ? Result<TransferFunction>(std::get<TransferFunction>(options.transfer.choice))
-                                          : MakePreset(std::get<std::string>(options.transfer.choice), summary);
+  const Result<TransferFunction> transfer = ResolveTransfer(options.transfer, summary);
   if (!transfer.ok()) return transfer.status();
-  transfer->opacity_distance = options.transfer.opacity_distance;
   const double occupancy = EstimateOccupancy(summary, *transfer);
 
   const std::string name = TransferName(options.transfer);

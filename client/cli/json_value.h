@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "client/cli/values.h"
+#include "common/cli/parse.h"
 
 namespace slabstream {
 

@@ -24,8 +24,8 @@ constexpr char kLeftToThePlanner[] = "what should be fastest for this volume, vi
 
 // An option that takes a name from a list such as Decompositions(), whose entries have a name and a purpose. `automatic`: the purpose of
 // kAutomatic, if the option also takes that.
-template <class T, class Entries>
-CLI::Option* AddNamed(CLI::App& app, const std::string& name, T& target, const Entries& entries, const std::string& help,
+template <class Entries>
+CLI::Option* AddNamed(CLI::App& app, const std::string& name, std::string& target, const Entries& entries, const std::string& help,
                       std::string_view automatic = {}) {
   std::string text = help;
   std::vector<std::string_view> names;
@@ -33,16 +33,8 @@ CLI::Option* AddNamed(CLI::App& app, const std::string& name, T& target, const E
     names.push_back(kAutomatic);
     text += fmt::format("\n  {}: {}", kAutomatic, automatic);
   }
-  for (const auto& entry : entries) {
-    names.push_back(entry.name);
-    text += fmt::format("\n  {}: {}", entry.name, entry.purpose);
-  }
-  const auto parse = [names](const std::string& option, const std::string& value) -> Result<std::string> {
-    const Result<std::size_t> index = ParseChoice(option, value, names);
-    if (!index.ok()) return index.status();
-    return value;
-  };
-  return AddParsed(app, name, target, parse, text)->type_name("NAME")->default_str(target);
+  for (const auto& entry : entries) names.push_back(entry.name);
+  return AddParsed(app, name, target, OneOf(std::move(names)), text + Explained(entries))->type_name("NAME")->default_str(target);
 }
 
 // An option that takes one of `names`; each stands for one of `values`.
@@ -69,12 +61,9 @@ void AddRendererOptions(CLI::App& app, FrameRequest& request) {
       renderers += (renderers.empty() ? "" : " and ") + std::string(kind->name());
     }
   }
-  const auto parse = [](const std::string& option, const std::string& text) -> Result<std::string> {
-    const Result<std::size_t> index = ParseChoice(option, text, RendererNames());
-    if (!index.ok()) return index.status();
-    return text;
-  };
-  AddParsed(app, "--renderer", request.renderer, parse, help)->type_name("NAME")->default_str(std::string(kDefaultRenderer));
+  AddParsed(app, "--renderer", request.renderer, OneOf(RendererNames()), help)
+      ->type_name("NAME")
+      ->default_str(std::string(kDefaultRenderer));
   for (const auto& [name, entry] : parameters) {
     const auto& [parameter, renderers] = entry;
     const bool choice = !parameter->choices.empty();
@@ -189,35 +178,29 @@ void AddPolicyOptions(CLI::App& app, Policy& policy) {
 
 }  // namespace
 
-CLI::Option* AddNumber(CLI::App& app, const std::string& names, double& target, NumberRange range, const std::string& help) {
-  const auto parse = [range](const std::string& option, const std::string& text) { return ParseNumber(option, text, range); };
-  return AddParsed(app, names, target, parse, help)->type_name("NUMBER")->default_str(fmt::format("{}", target));
-}
-
-CLI::Option* AddInteger(CLI::App& app, const std::string& names, int& target, int min, int max, const std::string& help) {
-  const auto parse = [min, max](const std::string& option, const std::string& text) { return ParseInteger(option, text, min, max); };
-  return AddParsed(app, names, target, parse, help)->type_name("N")->default_str(fmt::format("{}", target));
-}
-
 CLI::Option* AddThreads(CLI::App& app, int& threads, const std::string& help) {
   return AddInteger(app, "--threads", threads, 1, int(kMaxThreads), help)->default_str("the cores divided by the workers");
 }
 
-CLI::Option* AddEndpoint(CLI::App& app, std::string& endpoint) {
-  const auto parse = [](const std::string& option, const std::string& text) -> Result<std::string> {
-    const Result<Endpoint> parsed = ParseEndpoint(text, false);
-    if (!parsed.ok()) return Status::InvalidArgument(fmt::format("{} {}", option, parsed.status().message()));
+ParseText EndpointText(bool allow_wildcard) {
+  return [allow_wildcard](const std::string& option, const std::string& text) -> Result<std::string> {
+    const Result<Endpoint> endpoint = ParseEndpoint(text, allow_wildcard);
+    if (!endpoint.ok()) return Status::InvalidArgument(fmt::format("{} {}", option, endpoint.status().message()));
     return text;
   };
-  return AddParsed(app, "--endpoint", endpoint, parse, "Where the service listens")
+}
+
+CLI::Option* AddEndpoint(CLI::App& app, std::string& endpoint) {
+  return AddParsed(app, "--endpoint", endpoint, EndpointText(false), "Where the service listens")
       ->type_name("ENDPOINT")
       ->default_str("$SLABSTREAM_ENDPOINT, or the service that `up` started last");
 }
 
 void AddTransferOptions(CLI::App& app, TransferChoice& transfer) {
-  std::string help = "Transfer function: a ParaView colour map (a .json file) or one of these presets";
-  for (const PresetInfo& preset : TransferPresets()) help += fmt::format("\n  {}: {}", preset.name, preset.purpose);
-  AddParsed(app, "--transfer", transfer.choice, ParseTransfer, help)->type_name("TRANSFER")->default_str("auto");
+  AddParsed(app, "--transfer", transfer.choice, ParseTransfer,
+            "Transfer function: a ParaView colour map (a .json file) or one of these presets" + Explained(TransferPresets()))
+      ->type_name("TRANSFER")
+      ->default_str("auto");
   AddNumber(app, "--opacity-distance", transfer.opacity_distance, {0, kMaxOpacityDistance, true},
             "Length of material, in voxels, that has the opacity which the transfer function says");
 }

@@ -1,43 +1,17 @@
-// Options that several subcommands share, declared with CLI11. An invalid value ends the parse with a CLI::ValidationError whose text is
-// the line for the user.
+// Options that several subcommands share.
 #pragma once
 
 #include <CLI/CLI.hpp>
 #include <functional>
 #include <string>
-#include <utility>
 
 #include "client/cli/options.h"
+#include "common/cli/add_option.h"
 
 namespace slabstream {
 
-// An option `names` ("-o,--output") whose text `parse` turns into a value: parse(option, text) -> Result<T>.
-template <class T, class Parse>
-CLI::Option* AddParsed(CLI::App& app, const std::string& names, T& target, Parse parse, const std::string& help) {
-  const std::string shown = names.substr(0, names.find(','));
-  const auto store = [&target, parse = std::move(parse), shown](const CLI::results_t& texts) {
-    auto value = parse(shown, texts.back());
-    if (!value.ok()) throw CLI::ValidationError(value.status().message());
-    target = *std::move(value);
-    return true;
-  };
-  return app.add_option(names, CLI::callback_t(store), help);
-}
-
-// An option whose value is given with `=` or omitted: --local=4, --local. `bare` stands for an omitted value. The next argument is never
-// taken for its value.
-template <class T, class Parse>
-CLI::Option* AddOptionalValue(CLI::App& app, const std::string& name, T& target, const std::string& bare, Parse parse,
-                              const std::string& help) {
-  const auto given = [bare, parse = std::move(parse)](const std::string& option, const std::string& text) {
-    return parse(option, text == "true" ? bare : text);  // CLI11 passes "true" for the bare form
-  };
-  return AddParsed(app, name, target, given, help)->expected(0);
-}
-
-CLI::Option* AddNumber(CLI::App& app, const std::string& names, double& target, NumberRange range, const std::string& help);
-CLI::Option* AddInteger(CLI::App& app, const std::string& names, int& target, int min, int max, const std::string& help);
-
+// For AddParsed: an endpoint, as ParseEndpoint takes it.
+ParseText EndpointText(bool allow_wildcard);
 CLI::Option* AddEndpoint(CLI::App& app, std::string& endpoint);
 
 // Headings of the help text. Options under kHidden are not shown: old spellings that still work, and options that cannot be used yet.

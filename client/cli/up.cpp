@@ -15,7 +15,7 @@
 #include "client/cli/process.h"
 #include "client/cli/service_state.h"
 #include "client/cli/session.h"
-#include "common/transport/endpoint.h"
+#include "common/base/stop_signals.h"
 
 namespace slabstream {
 namespace {
@@ -29,12 +29,7 @@ constexpr Duration kPatience = seconds(5);       // for an orderly end, then aga
 // While it lives, SIGINT and SIGTERM stay pending until they are asked for, also in threads started meanwhile.
 class BlockedSignals {
  public:
-  BlockedSignals() {
-    sigemptyset(&signals_);
-    sigaddset(&signals_, SIGINT);
-    sigaddset(&signals_, SIGTERM);
-    ::sigprocmask(SIG_BLOCK, &signals_, &before_);
-  }
+  BlockedSignals() { ::sigprocmask(SIG_BLOCK, &signals_, &before_); }
   ~BlockedSignals() { ::sigprocmask(SIG_SETMASK, &before_, nullptr); }
   BlockedSignals(const BlockedSignals&) = delete;
   BlockedSignals& operator=(const BlockedSignals&) = delete;
@@ -45,7 +40,8 @@ class BlockedSignals {
   }
 
  private:
-  sigset_t signals_, before_;
+  const sigset_t signals_ = StopSignals();
+  sigset_t before_;
 };
 
 // The value of "key=value" in the coordinator's ready line; empty if it is not there.

@@ -2,25 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
-#include <optional>
 #include <vector>
 
-#include "common/base/parse_number.h"
+#include "common/cli/parse.h"
 
 namespace slabstream {
 namespace {
-
-// The whole text as a number, or nothing. A leading '+' is fine.
-template <class T>
-std::optional<T> Convert(std::string_view text) {
-  if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
-  return ParseNumber<T>(text);
-}
-
-// Shortest text that reads back the same; {} of fmt does that for doubles ("0.001", not "0.0010000000000000000208").
-std::string RangeText(const NumberRange& range) { return fmt::format("{}{}, {}]", range.min_open ? '(' : '[', range.min, range.max); }
 
 std::vector<std::string_view> Split(std::string_view text, char separator) {
   std::vector<std::string_view> parts;
@@ -33,30 +20,6 @@ std::vector<std::string_view> Split(std::string_view text, char separator) {
 }
 
 }  // namespace
-
-Result<double> ParseNumber(std::string_view option, std::string_view text, const NumberRange& range) {
-  const std::optional<double> value = Convert<double>(text);
-  if (!value || std::isnan(*value)) return Status::InvalidArgument(fmt::format("{} '{}' is not a number", option, text));
-  if (*value < range.min || *value > range.max || (range.min_open && *value == range.min)) {
-    return Status::InvalidArgument(fmt::format("{} {} is out of range {}", option, text, RangeText(range)));
-  }
-  return *value;
-}
-
-Result<int> ParseInteger(std::string_view option, std::string_view text, int min, int max) {
-  const std::optional<long long> value = Convert<long long>(text);
-  if (!value) return Status::InvalidArgument(fmt::format("{} '{}' is not a whole number in [{}, {}]", option, text, min, max));
-  if (*value < min || *value > max) {
-    return Status::InvalidArgument(fmt::format("{} {} is out of range [{}, {}]", option, text, min, max));
-  }
-  return int(*value);
-}
-
-Result<std::size_t> ParseChoice(std::string_view option, std::string_view text, std::span<const std::string_view> choices) {
-  const auto found = std::find(choices.begin(), choices.end(), text);
-  if (found != choices.end()) return std::size_t(found - choices.begin());
-  return Status::InvalidArgument(fmt::format("{} '{}' is not one of {}", option, text, fmt::join(choices, ", ")));
-}
 
 Result<ImageSize> ParseImageSize(std::string_view option, std::string_view text) {
   const std::vector<std::string_view> sides = Split(text, 'x');

@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
-#include "client/cli/values.h"
 #include "common/base/files.h"
+#include "common/cli/parse.h"
 
 namespace slabstream {
 namespace {

@@ -20,13 +20,6 @@ std::string UniqueEndpoint() {
 
 }  // namespace
 
-struct EmbeddedService::Impl {
-  Context& context;
-  WorkerConfig worker_config;
-  std::unique_ptr<CoordinatorService> coordinator;
-  std::vector<std::unique_ptr<WorkerService>> workers;
-};
-
 Result<std::unique_ptr<EmbeddedService>> EmbeddedService::Start(Context& context, EmbeddedOptions options) {
   if (options.workers < 1 || options.workers > kMaxEmbeddedWorkers) {
     return Status::InvalidArgument("workers " + std::to_string(options.workers) + " is out of range [1, " +
@@ -37,38 +30,38 @@ Result<std::unique_ptr<EmbeddedService>> EmbeddedService::Start(Context& context
   options.coordinator.slabs_endpoint = UniqueEndpoint();
   Result<std::unique_ptr<CoordinatorService>> coordinator = CoordinatorService::Start(context, std::move(options.coordinator));
   if (!coordinator.ok()) return coordinator.status();
-  auto impl = std::make_unique<Impl>(Impl{context, std::move(options.worker), std::move(*coordinator), {}});
-  std::unique_ptr<EmbeddedService> service(new EmbeddedService(std::move(impl)));
+  std::unique_ptr<EmbeddedService> service(new EmbeddedService(context, std::move(options.worker), std::move(*coordinator)));
   for (int i = 0; i < options.workers; ++i) {
     if (Status status = service->AddWorker(); !status.ok()) return status;
   }
   // So that the first frame is planned for all of them, not only for those that happen to be quick.
-  for (const auto& worker : service->impl_->workers) worker->WaitUntilRegistered();
+  for (const auto& worker : service->workers_) worker->WaitUntilRegistered();
   return service;
 }
 
-EmbeddedService::EmbeddedService(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+EmbeddedService::EmbeddedService(Context& context, WorkerConfig worker_config, std::unique_ptr<CoordinatorService> coordinator)
+    : context_(context), worker_config_(std::move(worker_config)), coordinator_(std::move(coordinator)) {}
 
 EmbeddedService::~EmbeddedService() {
   // All at once rather than in sequence: each waits for its running tasks.
-  for (const auto& worker : impl_->workers) worker->RequestStop();
-  impl_->coordinator->RequestStop();
+  for (const auto& worker : workers_) worker->RequestStop();
+  coordinator_->RequestStop();
 }
 
-const std::string& EmbeddedService::endpoint() const { return impl_->coordinator->client_endpoint(); }
+const std::string& EmbeddedService::endpoint() const { return coordinator_->client_endpoint(); }
 
 WorkerService& EmbeddedService::worker(int index) {
-  CHECK(index >= 0 && std::size_t(index) < impl_->workers.size()) << "worker " << index;
-  return *impl_->workers[std::size_t(index)];
+  CHECK(index >= 0 && std::size_t(index) < workers_.size()) << "worker " << index;
+  return *workers_[std::size_t(index)];
 }
 
 Status EmbeddedService::AddWorker() {
   WorkerOptions options;
-  options.coordinator_endpoint = impl_->coordinator->worker_endpoint();
-  options.machine = impl_->worker_config;
-  Result<std::unique_ptr<WorkerService>> worker = WorkerService::Start(impl_->context, std::move(options));
+  options.coordinator_endpoint = coordinator_->worker_endpoint();
+  options.machine = worker_config_;
+  Result<std::unique_ptr<WorkerService>> worker = WorkerService::Start(context_, std::move(options));
   if (!worker.ok()) return worker.status();
-  impl_->workers.push_back(std::move(*worker));
+  workers_.push_back(std::move(*worker));
   return Status::Ok();
 }
 

@@ -1,10 +1,9 @@
 // EmbeddedService: the coordinator and workers as threads of this process, over inproc. For `--local` and for tests.
 #pragma once
 
-#include <functional>
-#include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "common/base/status.h"
 #include "common/transport/socket.h"
@@ -29,9 +28,11 @@ class EmbeddedService {
   Status AddWorker();                   // joins the running service
 
  private:
-  struct Impl;
-  explicit EmbeddedService(std::unique_ptr<Impl> impl);
-  std::unique_ptr<Impl> impl_;
+  EmbeddedService(Context& context, WorkerConfig worker_config, std::unique_ptr<CoordinatorService> coordinator);
+  Context& context_;
+  WorkerConfig worker_config_;
+  std::unique_ptr<CoordinatorService> coordinator_;
+  std::vector<std::unique_ptr<WorkerService>> workers_;
 };
 
 }  // namespace slabstream

@@ -1,16 +1,11 @@
 #include "common/wire/checker.h"
 
-#include <array>
-#include <cstdio>
+#include <fmt/format.h>
 
 namespace slabstream {
 namespace {
 
-std::string Number(double value) {
-  std::array<char, 32> text{};
-  (void)std::snprintf(text.data(), text.size(), "%.9g", value);
-  return std::isnan(value) ? "NaN" : text.data();
-}
+std::string Number(double value) { return std::isnan(value) ? "NaN" : fmt::format("{:.9g}", value); }
 
 }  // namespace
 
@@ -34,7 +29,7 @@ void Checker::Adopt(const Status& status) {
 
 double Checker::Between(std::string_view field, double value, double min, double max) {
   if (value >= min && value <= max) return value;
-  FailNumber(field, value, "in [" + Number(min) + ", " + Number(max) + "]");
+  FailNumber(field, value, fmt::format("in [{}, {}]", Number(min), Number(max)));
   return min;
 }
 
@@ -46,25 +41,24 @@ double Checker::Positive(std::string_view field, double value) {
 
 std::string Checker::Text(std::string_view field, const std::string& value, std::size_t min_bytes, std::size_t max_bytes) {
   if (value.size() >= min_bytes && value.size() <= max_bytes) return value;
-  Fail(field,
-       "a text of " + std::to_string(value.size()) + " bytes, expected " + std::to_string(min_bytes) + " to " + std::to_string(max_bytes));
+  Fail(field, fmt::format("a text of {} bytes, expected {} to {}", value.size(), min_bytes, max_bytes));
   return {};
 }
 
 int Checker::Count(std::string_view field, int size, std::size_t max) {
   if (static_cast<std::size_t>(size) <= max) return size;
-  Fail(field, std::to_string(size) + " items, at most " + std::to_string(max));
+  Fail(field, fmt::format("{} items, at most {}", size, max));
   return 0;
 }
 
 void Checker::FailRange(std::string_view field, std::uint64_t value, std::uint64_t min, std::uint64_t max) {
-  Fail(field, std::to_string(value) + " is not in [" + std::to_string(min) + ", " + std::to_string(max) + "]");
+  Fail(field, fmt::format("{} is not in [{}, {}]", value, min, max));
 }
 
 void Checker::FailNumber(std::string_view field, double value, std::string_view expected) {
-  Fail(field, Number(value) + " is not " + std::string(expected));
+  Fail(field, fmt::format("{} is not {}", Number(value), expected));
 }
 
-void Checker::FailEnum(std::string_view field, int wire) { Fail(field, wire == 0 ? "not set" : "unknown value " + std::to_string(wire)); }
+void Checker::FailEnum(std::string_view field, int wire) { Fail(field, wire == 0 ? "not set" : fmt::format("unknown value {}", wire)); }
 
 }  // namespace slabstream

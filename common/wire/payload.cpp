@@ -87,14 +87,6 @@ Status CheckDigest(std::span<const std::byte> bytes, std::uint64_t expected) {
   return Status::DataLoss("payload: digest " + std::to_string(met) + ", the header says " + std::to_string(expected));
 }
 
-// Unpacks a zstd frame of grouped words. Takes memory only if the frame has the expected size.
-Result<Bytes> UnpackGrouped(std::span<const std::byte> packed, std::size_t expected) {
-  if (Status status = CheckContentSize(packed, expected); !status.ok()) return status;
-  PooledVector<std::byte> grouped(expected);
-  if (Status status = Decompress(packed, grouped); !status.ok()) return status;
-  return Bytes(UngroupBySignificance(grouped));
-}
-
 }  // namespace
 
 Bytes PackRuns(Bytes payload, Codec codec, EncodedRuns& runs) {
@@ -112,14 +104,7 @@ Bytes PackRuns(Bytes payload, Codec codec, EncodedRuns& runs) {
 }
 
 Result<Bytes> UnpackRuns(const EncodedRuns& runs, const Bytes& payload) {
-  const std::size_t expected = PayloadBytes(runs.image);
-  if (Status status = CheckLength(payload.size(), runs.encoded_bytes); !status.ok()) return status;
-  if (Status status = CheckDigest(payload.span(), runs.digest); !status.ok()) return status;
-  if (runs.codec == Codec::kRaw) {
-    if (Status status = CheckLength(payload.size(), expected); !status.ok()) return status;
-    return payload;
-  }
-  return UnpackGrouped(payload.span(), expected);
+  return UnpackRuns({runs.codec, runs.encoded_bytes, runs.digest}, payload, PayloadBytes(runs.image));
 }
 
 std::optional<Bytes> PackRuns(std::span<const std::byte> payload, PackedRuns& packed) {
@@ -132,7 +117,14 @@ std::optional<Bytes> PackRuns(std::span<const std::byte> payload, PackedRuns& pa
 Result<Bytes> UnpackRuns(const PackedRuns& packed, const Bytes& payload, std::size_t raw_bytes) {
   if (Status status = CheckLength(payload.size(), packed.bytes); !status.ok()) return status;
   if (Status status = CheckDigest(payload.span(), packed.digest); !status.ok()) return status;
-  return UnpackGrouped(payload.span(), raw_bytes);
+  if (packed.codec == Codec::kRaw) {
+    if (Status status = CheckLength(payload.size(), raw_bytes); !status.ok()) return status;
+    return payload;
+  }
+  if (Status status = CheckContentSize(payload.span(), raw_bytes); !status.ok()) return status;
+  PooledVector<std::byte> grouped(raw_bytes);
+  if (Status status = Decompress(payload.span(), grouped); !status.ok()) return status;
+  return Bytes(UngroupBySignificance(grouped));
 }
 
 Bytes PackChunk(Bytes samples, Codec codec, Chunk& chunk) {

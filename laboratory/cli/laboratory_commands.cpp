@@ -1,7 +1,5 @@
 #include "laboratory/cli/laboratory_commands.h"
 
-#include <fmt/format.h>
-
 #include <CLI/CLI.hpp>
 #include <array>
 #include <iostream>
@@ -60,13 +58,11 @@ void DeclareBench(const CommandLine& line) {
 void DeclareReplay(CLI::App& experiment, std::function<Status()>& run) {
   CLI::App* sub = experiment.add_subcommand("replay", "Simulate recorded frames again, under another policy or on another machine");
   auto options = std::make_shared<ReplayOptions>();
-  std::string links;
-  for (const LinkPreset& preset : LinkPresets()) links += fmt::format("\n  {}: {}", preset.name, preset.purpose);
   sub->add_option("FILE", options->trace_path, "What --trace of render or turntable has written")->required();
   sub->add_option("--with", options->changes,
                   "What is different: combine=SCHEME (as --combine takes it), link=NAME or link=NAME:MICROSECONDS,GBIT, workers=N; may be "
                   "repeated. Links" +
-                      links)
+                      Explained(LinkPresets()))
       ->type_name("KEY=VALUE")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
@@ -91,10 +87,7 @@ void DeclareExperiment(const CommandLine& line) {
       "Seed of the random order of the trials")
       ->type_name("N")
       ->default_str("1");
-  sub->add_option("--volume", options->volumes, "A sparse volume of your own, as FILE or FILE:TRANSFER; may be repeated")
-      ->type_name("VOLUME")
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  AddRepeated(*sub, "--volume", options->volumes, "A sparse volume of your own, as FILE or FILE:TRANSFER")->type_name("VOLUME");
   CLI::Option* resume = sub->add_flag_callback(
       "--resume", [options] { options->resume = Resume::kAnyBuild; }, "Continue what DIR holds even if another build or machine began it");
   sub->add_flag_callback(

@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "client/cli/json_value.h"
-#include "client/cli/values.h"
+#include "common/cli/parse.h"
 #include "common/combining/schemes.h"
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"

@@ -83,9 +83,18 @@ TEST_F(VolumeToolsTest, HelpNamesWhatCanBeChosen) {
 }
 
 TEST_F(VolumeToolsTest, HelpExplainsEveryOptionInWords) {
+  const std::string program = Command({}).front();
+  std::vector<std::vector<std::string>> commands = {{program + "-coordinator"}, {program + "-worker"}};
   for (const char* command : {"render", "turntable", "info", "sphere", "up", "down", "status", "bench", "experiment", "help"}) {
-    const std::string text = MustRun({command, "--help"}).out;
-    for (const char* notation : {"REQUIRED", "{", "}", ":{", " x ", "Needs:", "Excludes:", "=36"}) {
+    commands.push_back({program, command});
+  }
+  for (std::vector<std::string>& arguments : commands) {
+    const std::string command = arguments.back();
+    arguments.push_back("--help");
+    const ProgramResult help = RunningProgram(arguments, directory_).Wait();
+    ASSERT_EQ(help.exit_status, 0) << command;
+    const std::string& text = help.out;
+    for (const char* notation : {"REQUIRED", "{", "}", ":{", " x ", "Needs:", "Excludes:", "=36", "TEXT", "UINT"}) {
       EXPECT_THAT(text, testing::Not(HasSubstr(notation))) << command;
     }
     std::istringstream lines(text);

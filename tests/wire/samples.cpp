@@ -3,6 +3,7 @@
 
 #include <limits>
 #include <string>
+#include <utility>
 
 namespace slabstream {
 namespace {
@@ -95,85 +96,87 @@ FrameRequest Request() {
   return request;
 }
 
-}  // namespace
+// Without a specialisation for each member of AnyMessage, AllSamples does not compile.
+template <class Message>
+std::vector<Message> SamplesOf() = delete;
 
 template <>
-std::vector<Register> Samples() {
+std::vector<Register> SamplesOf() {
   return {{1, 2, "host", "tcp://127.0.0.1:1", 1, 0},
           {kMax64, kMax32, kLongName, kLongEndpoint, kMaxThreads, kMax64, kMax64, true},
           {0, 0, kUmlaut, kOddEndpoint}};
 }
 
 template <>
-std::vector<Welcome> Samples() {
+std::vector<Welcome> SamplesOf() {
   return {{1, 2, 3, "inproc://slabs", 10, 100}, {kMax64, kMax64, kMax32, kLongEndpoint, 60000, 600000}};
 }
 
 template <>
-std::vector<Heartbeat> Samples() {
+std::vector<Heartbeat> SamplesOf() {
   return {{}, {kMax64, kMax64, kMax32, kMax64, kMax64, kMax32}};
 }
 
 template <>
-std::vector<Ping> Samples() {
+std::vector<Ping> SamplesOf() {
   return {{}, {kMax64, kMax64, {0, 1, kMax64}}};
 }
 
 template <>
-std::vector<GroupAssignment> Samples() {
+std::vector<GroupAssignment> SamplesOf() {
   const ViewParameters oblique{Projection::kPerspective, 1e6, -33, 12.5, 0.01, 60};
   return {Assignment(3, {}, Splatting()), Assignment(0, oblique, ZBuffer()), Assignment(16, oblique, Splatting()), BehindOthers()};
 }
 
 template <>
-std::vector<GroupDone> Samples() {
+std::vector<GroupDone> SamplesOf() {
   return {{1, 2, {3, 4, 1023}, {}, {}},
           {kMax64, kMax32, {}, {RankReport{}, FullReport()}, Mask(5, 3)},
           {1, 1, {}, {}, Mask(kMaxOcclusionTiles, 1)}};
 }
 
 template <>
-std::vector<FrameImage> Samples() {
+std::vector<FrameImage> SamplesOf() {
   return {{1, 2, 3, 4, 0, 1, NoRuns(), {}}, {kMax64, kMax32, kMax64, kMax32, 1024, 1024, SomeRuns(), {FullReport()}}};
 }
 
 template <>
-std::vector<WorkerTrouble> Samples() {
+std::vector<WorkerTrouble> SamplesOf() {
   return {{1, 2, {3, 4, 5}, 0, Status::Internal("")}, {kMax64, kMax32, {}, kMax32, Status::InvalidArgument(kLongText), true}};
 }
 
 template <>
-std::vector<Leave> Samples() {
+std::vector<Leave> SamplesOf() {
   return {{}, {kMax64, kMax32}};
 }
 
 template <>
-std::vector<Retire> Samples() {
+std::vector<Retire> SamplesOf() {
   return {{}, {kMax64}};
 }
 
 template <>
-std::vector<Stop> Samples() {
+std::vector<Stop> SamplesOf() {
   return {{}, {kMax64}};
 }
 
 template <>
-std::vector<ChunkRequest> Samples() {
+std::vector<ChunkRequest> SamplesOf() {
   return {{1, 2, 3, kOneVoxel, 0}, {kMax64, kMax32, kMax32, kWholeBox, ChunkCount(kWholeBox, ScalarType::kFloat32) - 1}};
 }
 
 template <>
-std::vector<Chunk> Samples() {
+std::vector<Chunk> SamplesOf() {
   return {{1, 2, kOneVoxel, 0, Codec::kRaw, 1, 1, 0}, {kMax64, kMax32, kWholeBox, 1, Codec::kZstd, kChunkBytes, 9, kMax64}};
 }
 
 template <>
-std::vector<ChunkRefused> Samples() {
+std::vector<ChunkRefused> SamplesOf() {
   return {{1, 2, kOneVoxel, 0, Status::NotFound("no dataset 2")}, {kMax64, kMax32, kWholeBox, 5, Status::Cancelled(kLongText)}};
 }
 
 template <>
-std::vector<PartialImage> Samples() {
+std::vector<PartialImage> SamplesOf() {
   return {{1, 2, {3, 4, 5}, 0, {0, 1}, {0, 0}, NoRuns().image, {}, {}, 0, {}},
           {kMax64,
            kMax32,
@@ -204,17 +207,17 @@ std::vector<PartialImage> Samples() {
 }
 
 template <>
-std::vector<ImageRefused> Samples() {
+std::vector<ImageRefused> SamplesOf() {
   return {{}, {kMax64, kMax32, {3, 4, 5}, 1U << 20U, {17, std::uint64_t{1} << 48U}}};
 }
 
 template <>
-std::vector<ImageReceived> Samples() {
+std::vector<ImageReceived> SamplesOf() {
   return {{}, {kMax64, kMax32, kMax64}};
 }
 
 template <>
-std::vector<SubmitFrame> Samples() {
+std::vector<SubmitFrame> SamplesOf() {
   FrameRequest full;
   full.dataset = kLongName;
   full.renderer = "mip";
@@ -230,12 +233,12 @@ std::vector<SubmitFrame> Samples() {
 }
 
 template <>
-std::vector<FrameProgress> Samples() {
+std::vector<FrameProgress> SamplesOf() {
   return {{}, {kMax64, FramePhase::kRunning, kMax32, 1024, 1024, kMax32, kMax32}, {1, FramePhase::kLoading, 0, 0, 7, 1, 2}};
 }
 
 template <>
-std::vector<FrameReply> Samples() {
+std::vector<FrameReply> SamplesOf() {
   const FrameStatistics statistics{kMax32,  kMax32,    kMax32,    "slab",   "occupied", "x",           kLongName,
                                    kUmlaut, kLongName, -kMaxTime, kMaxTime, kMaxTime,   {FullReport()}};
   FrameStatistics predicted = statistics;
@@ -246,7 +249,7 @@ std::vector<FrameReply> Samples() {
 }
 
 template <>
-std::vector<FrameFailed> Samples() {
+std::vector<FrameFailed> SamplesOf() {
   return {{1, Status::DeadlineExceeded("")},
           {kMax64, Status::DataLoss(kUmlaut)},
           {2, Status::Unavailable("x")},
@@ -254,27 +257,27 @@ std::vector<FrameFailed> Samples() {
 }
 
 template <>
-std::vector<CancelFrame> Samples() {
+std::vector<CancelFrame> SamplesOf() {
   return {{}, {kMax64}};
 }
 
 template <>
-std::vector<ClientPing> Samples() {
+std::vector<ClientPing> SamplesOf() {
   return {{}, {kMax64, {0, kMax64}}};
 }
 
 template <>
-std::vector<ClientPong> Samples() {
+std::vector<ClientPong> SamplesOf() {
   return {{}, {kMax64, kMax64, {kMax64, 0}}};
 }
 
 template <>
-std::vector<StatusQuery> Samples() {
+std::vector<StatusQuery> SamplesOf() {
   return {{}, {kMax64}};
 }
 
 template <>
-std::vector<StatusReply> Samples() {
+std::vector<StatusReply> SamplesOf() {
   StatusReply full{kMax64, kMax64, kMax32, kMax64, kMax32, kMax32, kMax32, kMax64, kMax64, kMax64, {}, {}};
   full.workers = {{1, 2, "", 1, 0, 0, 0, 0, 0}, {kMax32, kMax32, kLongName, kMaxThreads, kMax32, kMax64, kMax64, kMax32, kMax32}};
   full.datasets = {{"a", DatasetState::kUnloaded, {}, {}, ""},
@@ -285,13 +288,25 @@ std::vector<StatusReply> Samples() {
 }
 
 template <>
-std::vector<ShutDown> Samples() {
+std::vector<ShutDown> SamplesOf() {
   return {{}, {kMax64}};
 }
 
 template <>
-std::vector<ShutDownReply> Samples() {
+std::vector<ShutDownReply> SamplesOf() {
   return {{}, {kMax64}};
 }
+
+template <std::size_t... I>
+std::vector<AnyMessage> AllSamplesOf(std::index_sequence<I...>) {
+  std::vector<AnyMessage> all;
+  const auto add = [&all](auto samples) { all.insert(all.end(), samples.begin(), samples.end()); };
+  (add(SamplesOf<std::variant_alternative_t<I, AnyMessage>>()), ...);
+  return all;
+}
+
+}  // namespace
+
+std::vector<AnyMessage> AllSamples() { return AllSamplesOf(std::make_index_sequence<std::variant_size_v<AnyMessage>>()); }
 
 }  // namespace slabstream

@@ -1,4 +1,4 @@
-#include "client/cli/help_formatter.h"
+#include "common/cli/help_formatter.h"
 
 #include <algorithm>
 #include <sstream>

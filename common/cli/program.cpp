@@ -1,0 +1,72 @@
+#include "common/cli/program.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <exception>
+#include <iostream>
+#include <memory>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "common/base/background_tasks.h"
+#include "common/base/large_buffers.h"
+#include "common/base/log.h"
+#include "common/cli/add_option.h"
+#include "common/cli/help_formatter.h"
+
+namespace slabstream {
+
+int RunMain(const std::string& name, const std::function<int()>& program) {
+  KeepFrameBuffers();
+  int exit_status = 1;
+  try {
+    exit_status = program();
+  } catch (const std::exception& error) {
+    std::cerr << name << ": " << error.what() << std::endl;
+  }
+  if (BackgroundTasks::AnyRunning()) {  // a load that takes long does not keep the process
+    std::cout.flush();
+    std::_Exit(exit_status);
+  }
+  return exit_status;
+}
+
+int Finish(const std::string& who, const Status& status) {
+  if (status.ok()) return 0;
+  std::string message = status.message();
+  std::replace(message.begin(), message.end(), '\n', ' ');
+  std::cerr << who << ": " << message << std::endl;
+  switch (status.code()) {
+    case StatusCode::kInvalidArgument:
+    case StatusCode::kNotFound: return 2;
+    case StatusCode::kCancelled: return 130;  // 128 + SIGINT, as shells count
+    default: return 1;
+  }
+}
+
+void SetUp(CLI::App& app, const std::string& version) {
+  app.formatter(std::make_shared<HelpFormatter>());
+  app.set_help_flag("-h,--help", "Print this text");
+  app.set_version_flag("--version", version, "Print the version");
+}
+
+int RunService(CLI::App& app, int argc, const char* const* argv, const std::string& log_name, const std::function<Status()>& serve) {
+  std::string log_level = "warning";
+  std::vector<std::string_view> levels;
+  for (const auto& [name, level] : LogLevelNames()) levels.push_back(name);
+  AddParsed(app, "--log-level", log_level, OneOf(std::move(levels)), "What is logged to stderr: debug, info, warning, error or off")
+      ->type_name("NAME")
+      ->default_str(log_level);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& asked) {  // --help, --version
+    return app.exit(asked);
+  } catch (const CLI::ParseError& error) {
+    return Finish(app.get_name(), Status::InvalidArgument(error.what()));
+  }
+  InitLog(log_name, LogLevelNames().at(log_level));
+  return Finish(app.get_name(), serve());
+}
+
+}  // namespace slabstream

@@ -1,0 +1,25 @@
+// What the main functions of all programs share: the style of their help, one line on stderr for what fails, and the exit status.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+
+#include "common/base/status.h"
+
+namespace slabstream {
+
+// Runs `program`, which returns the exit status, and catches what it throws (mostly a lack of memory). For main alone.
+int RunMain(const std::string& name, const std::function<int()>& program);
+
+// Unless the status is ok, writes "who: message" as one line to stderr. Returns the exit status. 0: ok. 1: the service or the frame failed.
+// 2: bad arguments or input. 130: stopped by Ctrl-C.
+int Finish(const std::string& who, const Status& status);
+
+// The style of help texts, --help and --version.
+void SetUp(CLI::App& app, const std::string& version);
+
+// A program that is one service: adds --log-level, parses, begins to log as `log_name`, and runs `serve`. Returns the exit status.
+int RunService(CLI::App& app, int argc, const char* const* argv, const std::string& log_name, const std::function<Status()>& serve);
+
+}  // namespace slabstream

@@ -1,0 +1,141 @@
+// Messages of the client plane.
+#pragma once
+
+#include "common/wire/request_fields.h"
+#include "slabstream/v1/client.pb.h"
+
+namespace slabstream {
+
+static_assert(v1::FramePhase_MAX == static_cast<int>(FramePhase::kRunning));
+static_assert(v1::DatasetState_MAX == static_cast<int>(DatasetState::kFailed));
+
+void Fields(auto& io, Is<SubmitFrame> auto& m) {
+  using P = v1::SubmitFrame;
+  io.Any(m.request, &P::request, &P::set_request);
+  io.Range("deadline_ms", m.deadline_ms, &P::deadline_ms, &P::set_deadline_ms, 1, 86400000);
+  io.Message("frame", m.frame, &P::frame, &P::mutable_frame);
+}
+
+void Fields(auto& io, Is<FrameProgress> auto& m) {
+  using P = v1::FrameProgress;
+  io.Any(m.request, &P::request, &P::set_request);
+  io.OneOf("phase", m.phase, &P::phase, &P::set_phase, FramePhase::kQueued, FramePhase::kRunning);
+  io.Any(m.queue_position, &P::queue_position, &P::set_queue_position);
+  io.Range("group_count", m.group_count, &P::group_count, &P::set_group_count, 0, kMaxGroups);
+  io.Range("groups_done", m.groups_done, &P::groups_done, &P::set_groups_done, 0, m.group_count);
+  io.Any(m.attempt, &P::attempt, &P::set_attempt);
+  io.Any(m.workers, &P::workers, &P::set_workers);
+}
+
+void Fields(auto& io, Is<FramePrediction> auto& m) {
+  using P = v1::FramePrediction;
+  constexpr double kMost = 1e9;  // of seconds, and of the imbalance
+  io.Between("render_seconds", m.render_seconds, &P::render_seconds, &P::set_render_seconds, 0, kMost);
+  io.Between("combine_seconds", m.combine_seconds, &P::combine_seconds, &P::set_combine_seconds, 0, kMost);
+  io.Between("finish_seconds", m.finish_seconds, &P::finish_seconds, &P::set_finish_seconds, 0, kMost);
+  io.Between("latency_seconds", m.latency_seconds, &P::latency_seconds, &P::set_latency_seconds, 0, kMost);
+  io.Between("imbalance", m.imbalance, &P::imbalance, &P::set_imbalance, 1, kMost);
+}
+
+void Fields(auto& io, Is<FrameStatistics> auto& m) {
+  using P = v1::FrameStatistics;
+  io.Any(m.workers, &P::workers, &P::set_workers);
+  io.Any(m.groups, &P::groups, &P::set_groups);
+  io.Any(m.attempts, &P::attempts, &P::set_attempts);
+  io.Text("decomposition", m.decomposition, &P::decomposition, &P::mutable_decomposition, 0, kMaxNameBytes);
+  io.Text("axis", m.axis, &P::axis, &P::mutable_axis, 0, kMaxNameBytes);
+  io.Text("combine", m.combine, &P::combine, &P::mutable_combine, 0, kMaxNameBytes);
+  io.Text("load_metric", m.load_metric, &P::load_metric, &P::mutable_load_metric, 0, kMaxNameBytes);
+  io.Text("assignment", m.assignment, &P::assignment, &P::mutable_assignment, 0, kMaxNameBytes);
+  io.Text("balance", m.balance, &P::balance, &P::mutable_balance, 0, kMaxNameBytes);
+  io.Any(m.queued_ns, &P::queued_ns, &P::set_queued_ns);
+  io.Any(m.begin_ns, &P::begin_ns, &P::set_begin_ns);
+  io.Any(m.end_ns, &P::end_ns, &P::set_end_ns);
+  io.Messages("reports", m.reports, &P::reports, &P::mutable_reports, kMaxReports);
+  io.Any(m.display, &P::display, &P::set_display);
+  io.Message("grid", m.grid, &P::grid, &P::mutable_grid);
+  io.Optional("predicted", m.predicted, &P::has_predicted, &P::predicted, &P::mutable_predicted);
+}
+
+void Fields(auto& io, Is<FrameReply> auto& m) {
+  using P = v1::FrameReply;
+  io.Any(m.request, &P::request, &P::set_request);
+  io.Message("size", m.size, &P::size, &P::mutable_size);
+  io.Range("group_count", m.group_count, &P::group_count, &P::set_group_count, 1, kMaxGroups);
+  io.Range("groups_done", m.groups_done, &P::groups_done, &P::set_groups_done, 0, m.group_count);
+  io.Message("runs", m.runs, &P::runs, &P::mutable_runs);
+  io.Message("statistics", m.statistics, &P::statistics, &P::mutable_statistics);
+  io.Check([&](Checker& check) {
+    const PixelBounds picture = {0, 0, m.size.width, m.size.height};
+    check.That(picture.Contains(m.runs.image.bounds), "runs.image.bounds", "not inside the picture");
+  });
+}
+
+void Fields(auto& io, Is<FrameFailed> auto& m) {
+  using P = v1::FrameFailed;
+  io.Any(m.request, &P::request, &P::set_request);
+  io.Message("status", m.status, &P::status, &P::mutable_status);
+}
+
+void Fields(auto& io, Is<CancelFrame> auto& m) { io.Any(m.request, &v1::CancelFrame::request, &v1::CancelFrame::set_request); }
+
+void Fields(auto& io, Is<ClientPing> auto& m) {
+  using P = v1::ClientPing;
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  io.Numbers("open", m.open, &P::open, &P::mutable_open, kMaxOpenRequests);
+}
+
+void Fields(auto& io, Is<ClientPong> auto& m) {
+  using P = v1::ClientPong;
+  io.Any(m.epoch, &P::epoch, &P::set_epoch);
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  io.Numbers("known", m.known, &P::known, &P::mutable_known, kMaxOpenRequests);
+}
+
+void Fields(auto& io, Is<StatusQuery> auto& m) { io.Any(m.nonce, &v1::StatusQuery::nonce, &v1::StatusQuery::set_nonce); }
+
+void Fields(auto& io, Is<WorkerStatus> auto& m) {
+  using P = v1::WorkerStatus;
+  io.Any(m.worker, &P::worker, &P::set_worker);
+  io.Any(m.pid, &P::pid, &P::set_pid);
+  io.Text("host", m.host, &P::host, &P::mutable_host, 0, kMaxNameBytes);
+  io.Range("threads", m.threads, &P::threads, &P::set_threads, 1, kMaxThreads);
+  io.Any(m.slot, &P::slot, &P::set_slot);
+  io.Any(m.cached_bytes, &P::cached_bytes, &P::set_cached_bytes);
+  io.Any(m.fetched_bytes, &P::fetched_bytes, &P::set_fetched_bytes);
+  io.Any(m.rendered_ranks, &P::rendered_ranks, &P::set_rendered_ranks);
+  io.Any(m.silent_ms, &P::silent_ms, &P::set_silent_ms);
+}
+
+void Fields(auto& io, Is<DatasetStatus> auto& m) {
+  using P = v1::DatasetStatus;
+  io.Text("name", m.name, &P::name, &P::mutable_name, 1, kMaxNameBytes);
+  io.OneOf("state", m.state, &P::state, &P::set_state, DatasetState::kUnloaded, DatasetState::kFailed);
+  if (m.state == DatasetState::kReady) {
+    io.Message("description", m.description, &P::description, &P::mutable_description);
+    io.Message("range", m.range, &P::range, &P::mutable_range);
+  }
+  if (m.state == DatasetState::kFailed) io.Text("error", m.error, &P::error, &P::mutable_error, 0, kMaxTextBytes);
+}
+
+void Fields(auto& io, Is<StatusReply> auto& m) {
+  using P = v1::StatusReply;
+  io.Any(m.epoch, &P::epoch, &P::set_epoch);
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  io.Any(m.pid, &P::pid, &P::set_pid);
+  io.Any(m.uptime_ms, &P::uptime_ms, &P::set_uptime_ms);
+  io.Any(m.clients, &P::clients, &P::set_clients);
+  io.Any(m.queued, &P::queued, &P::set_queued);
+  io.Any(m.running, &P::running, &P::set_running);
+  io.Any(m.frames_done, &P::frames_done, &P::set_frames_done);
+  io.Any(m.frames_failed, &P::frames_failed, &P::set_frames_failed);
+  io.Any(m.workers_lost, &P::workers_lost, &P::set_workers_lost);
+  io.Messages("workers", m.workers, &P::workers, &P::mutable_workers, kMaxListed);
+  io.Messages("datasets", m.datasets, &P::datasets, &P::mutable_datasets, kMaxListed);
+}
+
+void Fields(auto& io, Is<ShutDown> auto& m) { io.Any(m.nonce, &v1::ShutDown::nonce, &v1::ShutDown::set_nonce); }
+
+void Fields(auto& io, Is<ShutDownReply> auto& m) { io.Any(m.nonce, &v1::ShutDownReply::nonce, &v1::ShutDownReply::set_nonce); }
+
+}  // namespace slabstream

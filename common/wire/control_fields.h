@@ -1,0 +1,158 @@
+// Messages of the control plane.
+#pragma once
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "common/planning/frame_occlusion.h"
+#include "common/wire/plan_fields.h"
+#include "slabstream/v1/control.pb.h"
+
+namespace slabstream {
+
+void Fields(auto& io, Is<Register> auto& m) {
+  using P = v1::Register;
+  io.Any(m.incarnation, &P::incarnation, &P::set_incarnation);
+  io.Any(m.pid, &P::pid, &P::set_pid);
+  io.Text("host", m.host, &P::host, &P::mutable_host, 0, kMaxNameBytes);
+  io.Bytes("images_endpoint", m.images_endpoint, &P::images_endpoint, &P::mutable_images_endpoint, 1, kMaxEndpointBytes);
+  io.Range("threads", m.threads, &P::threads, &P::set_threads, 1, kMaxThreads);
+  io.Any(m.memory_bytes, &P::memory_bytes, &P::set_memory_bytes);
+  io.Any(m.memory_scope, &P::memory_scope, &P::set_memory_scope);
+  io.Any(m.lends_memory, &P::lends_memory, &P::set_lends_memory);
+}
+
+void Fields(auto& io, Is<Welcome> auto& m) {
+  using P = v1::Welcome;
+  io.Any(m.epoch, &P::epoch, &P::set_epoch);
+  io.Any(m.incarnation, &P::incarnation, &P::set_incarnation);
+  io.Range("worker", m.worker, &P::worker, &P::set_worker, 1, kMaxWorkerId);
+  io.Bytes("slabs_endpoint", m.slabs_endpoint, &P::slabs_endpoint, &P::mutable_slabs_endpoint, 1, kMaxEndpointBytes);
+  io.Range("heartbeat_ms", m.heartbeat_ms, &P::heartbeat_ms, &P::set_heartbeat_ms, 10, 60000);
+  io.Range("timeout_ms", m.timeout_ms, &P::timeout_ms, &P::set_timeout_ms, 100, 600000);
+}
+
+void Fields(auto& io, Is<Heartbeat> auto& m) {
+  using P = v1::Heartbeat;
+  io.Any(m.epoch, &P::epoch, &P::set_epoch);
+  io.Any(m.incarnation, &P::incarnation, &P::set_incarnation);
+  io.Any(m.worker, &P::worker, &P::set_worker);
+  io.Any(m.cached_bytes, &P::cached_bytes, &P::set_cached_bytes);
+  io.Any(m.fetched_bytes, &P::fetched_bytes, &P::set_fetched_bytes);
+  io.Any(m.rendered_ranks, &P::rendered_ranks, &P::set_rendered_ranks);
+}
+
+void Fields(auto& io, Is<Ping> auto& m) {
+  using P = v1::Ping;
+  io.Any(m.epoch, &P::epoch, &P::set_epoch);
+  io.Any(m.finished_before, &P::finished_before, &P::set_finished_before);
+  io.Numbers("cancelled", m.cancelled, &P::cancelled, &P::mutable_cancelled, kMaxCancelled);
+}
+
+void Fields(auto& io, Is<Peer> auto& m) {
+  using P = v1::Peer;
+  io.Range("worker", m.worker, &P::worker, &P::set_worker, 1, kMaxWorkerId);
+  io.Bytes("images_endpoint", m.images_endpoint, &P::images_endpoint, &P::mutable_images_endpoint, 1, kMaxEndpointBytes);
+  io.Any(m.memory_scope, &P::memory_scope, &P::set_memory_scope);
+}
+
+// `m` names every worker of the group and the display worker, nobody twice.
+inline void CheckPeers(const GroupAssignment& m, Checker& check) {
+  std::vector<WorkerId> known;
+  known.reserve(m.peers.size());
+  for (const Peer& peer : m.peers) known.push_back(peer.worker);
+  std::sort(known.begin(), known.end());
+  check.That(std::adjacent_find(known.begin(), known.end()) == known.end(), "peers", "a worker appears twice");
+  const auto require = [&](WorkerId worker) {
+    if (!std::binary_search(known.begin(), known.end(), worker)) check.Fail("peers", "worker " + std::to_string(worker) + " is missing");
+  };
+  require(m.display);
+  for (const Placement& placement : m.group.placements) require(placement.worker);
+}
+
+inline void CheckHidden(const GroupAssignment& m, Checker& check) {
+  const auto scope = check.In("hidden");
+  check.That(m.hidden.empty() || m.key.group > 0, "", "a mask for the first group, in front of which there is nothing");
+  check.Adopt(CheckFits(m.hidden, m.setup));
+}
+
+// The plan fits the setup: boxes inside the volume, as many ranks as placements, a schedule that exists.
+inline void CheckGroup(const GroupPlan& group, const FrameSetup& setup, Checker& check) {
+  const auto scope = check.In("group");
+  const Box volume = setup.description.geometry.bounds();
+  for (std::size_t i = 0; i < group.placements.size(); ++i) {
+    const auto placement = check.In("placements", i);
+    check.That(volume.Contains(group.placements[i].box), "box", "not inside the volume");
+  }
+  if (group.schedule.ranks != group.placements.size()) {
+    check.Fail("schedule.ranks",
+               std::to_string(group.schedule.ranks) + ", but there are " + std::to_string(group.placements.size()) + " placements");
+  }
+  if (check.ok()) check.Adopt(CheckScheduleName(group.schedule));
+}
+
+void Fields(auto& io, Is<GroupAssignment> auto& m) {
+  using P = v1::GroupAssignment;
+  io.Any(m.epoch, &P::epoch, &P::set_epoch);
+  io.Message("key", m.key, &P::key, &P::mutable_key);
+  io.Any(m.finished_before, &P::finished_before, &P::set_finished_before);
+  io.Range("group_count", m.group_count, &P::group_count, &P::set_group_count, m.key.group + 1, kMaxGroups);
+  io.Range("first_group", m.first_group, &P::first_group, &P::set_first_group, 0, m.key.group);
+  io.Any(m.previews, &P::previews, &P::set_previews);
+  io.Range("groups_done", m.groups_done, &P::groups_done, &P::set_groups_done, 0, m.key.group);
+  io.Range("display", m.display, &P::display, &P::set_display, 1, kMaxWorkerId);
+  io.Message("setup", m.setup, &P::setup, &P::mutable_setup);
+  io.Message("group", m.group, &P::group, &P::mutable_group);
+  io.Messages("peers", m.peers, &P::peers, &P::mutable_peers, kMaxPeers);
+  io.Message("hidden", m.hidden, &P::hidden, &P::mutable_hidden);
+  io.Check([&](Checker& check) {
+    if (!check.ok()) return;
+    CheckPeers(m, check);
+    CheckHidden(m, check);
+    CheckGroup(m.group, m.setup, check);
+  });
+}
+
+void Fields(auto& io, Is<GroupDone> auto& m) {
+  using P = v1::GroupDone;
+  io.Any(m.epoch, &P::epoch, &P::set_epoch);
+  io.Any(m.worker, &P::worker, &P::set_worker);
+  io.Message("key", m.key, &P::key, &P::mutable_key);
+  io.Messages("reports", m.reports, &P::reports, &P::mutable_reports, kMaxReports);
+  io.Message("hidden", m.hidden, &P::hidden, &P::mutable_hidden);
+}
+
+void Fields(auto& io, Is<FrameImage> auto& m) {
+  using P = v1::FrameImage;
+  io.Any(m.epoch, &P::epoch, &P::set_epoch);
+  io.Any(m.worker, &P::worker, &P::set_worker);
+  io.Any(m.frame, &P::frame, &P::set_frame);
+  io.Any(m.attempt, &P::attempt, &P::set_attempt);
+  io.Range("group_count", m.group_count, &P::group_count, &P::set_group_count, 1, kMaxGroups);
+  io.Range("groups_done", m.groups_done, &P::groups_done, &P::set_groups_done, 0, m.group_count);
+  io.Message("runs", m.runs, &P::runs, &P::mutable_runs);
+  io.Messages("reports", m.reports, &P::reports, &P::mutable_reports, kMaxReports);
+}
+
+void Fields(auto& io, Is<WorkerTrouble> auto& m) {
+  using P = v1::WorkerTrouble;
+  io.Any(m.epoch, &P::epoch, &P::set_epoch);
+  io.Any(m.worker, &P::worker, &P::set_worker);
+  io.Message("key", m.key, &P::key, &P::mutable_key);
+  io.Any(m.unreachable, &P::unreachable, &P::set_unreachable);
+  io.Message("status", m.status, &P::status, &P::mutable_status);
+  io.Any(m.elsewhere, &P::elsewhere, &P::set_elsewhere);
+}
+
+void Fields(auto& io, Is<Leave> auto& m) {
+  using P = v1::Leave;
+  io.Any(m.epoch, &P::epoch, &P::set_epoch);
+  io.Any(m.worker, &P::worker, &P::set_worker);
+}
+
+void Fields(auto& io, Is<Retire> auto& m) { io.Any(m.epoch, &v1::Retire::epoch, &v1::Retire::set_epoch); }
+
+void Fields(auto& io, Is<Stop> auto& m) { io.Any(m.epoch, &v1::Stop::epoch, &v1::Stop::set_epoch); }
+
+}  // namespace slabstream

@@ -1,0 +1,153 @@
+// What workers are told to do.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "common/renderers/registry.h"
+#include "common/wire/request_fields.h"
+
+namespace slabstream {
+
+void Fields(auto& io, Is<Camera> auto& m) {
+  using P = v1::Camera;
+  io.OneOf("projection", m.projection, &P::projection, &P::set_projection, Projection::kOrthographic, Projection::kPerspective);
+  io.Row("x_row", m.x_row, &P::x_row, &P::mutable_x_row);
+  io.Row("y_row", m.y_row, &P::y_row, &P::mutable_y_row);
+  io.Row("w_row", m.w_row, &P::w_row, &P::mutable_w_row);
+  io.Row("depth_row", m.depth_row, &P::depth_row, &P::mutable_depth_row);
+  io.Message("eye", m.eye, &P::eye, &P::mutable_eye);
+  io.Message("view_direction", m.view_direction, &P::view_direction, &P::mutable_view_direction);
+  io.Message("right", m.right, &P::right, &P::mutable_right);
+  io.Message("up", m.up, &P::up, &P::mutable_up);
+  io.Message("spacing", m.spacing, &P::spacing, &P::mutable_spacing);
+  io.Range("supersample", m.supersample, &P::supersample, &P::set_supersample, 1, kMaxSupersample);
+  // Whole final pixels, as many as a picture may have.
+  const std::uint64_t most = std::uint64_t{kMaxImageSide} * std::uint64_t(m.supersample);
+  io.Range("width", m.width, &P::width, &P::set_width, 1, most);
+  io.Range("height", m.height, &P::height, &P::set_height, 1, most);
+  io.OneOf("traversal_axis", m.traversal_axis, &P::traversal_axis, &P::set_traversal_axis, Axis::kX, Axis::kZ);
+  io.Any(m.ascending, &P::ascending, &P::set_ascending);
+  io.Check([&](Checker& check) {
+    constexpr double kTolerance = 1e-6;
+    const auto unit = [](const Vec3& v) { return std::abs(Length(v) - 1) <= kTolerance; };
+    check.That(unit(m.view_direction), "view_direction", "not a unit vector");
+    check.That(unit(m.right), "right", "not a unit vector");
+    check.That(unit(m.up), "up", "not a unit vector");
+    CheckPositive("spacing", m.spacing, check);
+    const std::string supersample = std::to_string(m.supersample);
+    check.That(std::has_single_bit(unsigned(m.supersample)), "supersample", supersample + " is not a power of two");
+    check.That(m.width % m.supersample == 0, "width", std::to_string(m.width) + " is not a multiple of supersample, " + supersample);
+    check.That(m.height % m.supersample == 0, "height", std::to_string(m.height) + " is not a multiple of supersample, " + supersample);
+  });
+}
+
+void Fields(auto& io, Is<SheetGrid> auto& m) {
+  using P = v1::SheetGrid;
+  constexpr double kMost = 1e12;  // keeps sums and products finite
+  io.Between("x_u", m.x_u, &P::x_u, &P::set_x_u, 1 / kMost, kMost);
+  io.Between("x_c", m.x_c, &P::x_c, &P::set_x_c, -kMost, kMost);
+  io.Between("x_0", m.x_0, &P::x_0, &P::set_x_0, -kMost, kMost);
+  io.Between("y_v", m.y_v, &P::y_v, &P::set_y_v, 1 / kMost, kMost);
+  io.Between("y_c", m.y_c, &P::y_c, &P::set_y_c, -kMost, kMost);
+  io.Between("y_0", m.y_0, &P::y_0, &P::set_y_0, -kMost, kMost);
+  io.Between("w_c", m.w_c, &P::w_c, &P::set_w_c, -kMost, kMost);
+  io.Between("w_0", m.w_0, &P::w_0, &P::set_w_0, -kMost, kMost);
+  io.Between("shear_u", m.shear_u, &P::shear_u, &P::set_shear_u, -kMost, kMost);
+  io.Between("shear_v", m.shear_v, &P::shear_v, &P::set_shear_v, -kMost, kMost);
+  io.Range("width", m.width, &P::width, &P::set_width, kGridColumnStep, kMaxGridSide);
+  io.Range("height", m.height, &P::height, &P::set_height, 1, kMaxGridSide);
+  io.Row("from_picture", m.from_picture, &P::from_picture, &P::mutable_from_picture);
+  io.Check(
+      [&](Checker& check) { check.That(m.width % kGridColumnStep == 0, "width", "not a multiple of " + std::to_string(kGridColumnStep)); });
+}
+
+void Fields(auto& io, Is<FrameSetup> auto& m) {  // all but the renderer, its parameters and the sheets
+  using P = v1::FrameSetup;
+  io.Range("dataset", m.dataset, &P::dataset, &P::set_dataset, 1, std::numeric_limits<DatasetId>::max());
+  io.Message("description", m.description, &P::description, &P::mutable_description);
+  io.Message("range", m.range, &P::range, &P::mutable_range);
+  io.Message("camera", m.camera, &P::camera, &P::mutable_camera);
+  io.Message("transfer", m.transfer, &P::transfer, &P::mutable_transfer);
+  io.Message("shading", m.shading, &P::shading, &P::mutable_shading);
+  io.Between("termination", m.termination, &P::termination, &P::set_termination, 0, kMaxTermination);
+  io.Range("halo", m.halo, &P::halo, &P::set_halo, 0, kMaxVolumeSide);
+}
+
+inline void Write(const FrameSetup& in, v1::FrameSetup& out) {
+  WriteFields(in, out);
+  out.set_renderer(std::string(in.renderer->name()));
+  out.mutable_parameters()->Add(in.parameters.begin(), in.parameters.end());
+  if (!in.sheets.empty()) Write(in.sheets, *out.mutable_sheets());
+}
+
+inline void ReadRenderer(const v1::FrameSetup& in, FrameSetup& out, Checker& check) {
+  const Result<const RendererKind*> renderer = RequireRenderer(check.Text("renderer", in.renderer(), 1, kMaxNameBytes));
+  if (!renderer.ok()) return check.Adopt(renderer.status());
+  SetRenderer(**renderer, out);
+  const std::vector<RendererParameter>& parameters = out.renderer->parameters();
+  if (std::size_t(in.parameters_size()) != parameters.size()) {
+    return check.Fail("parameters", std::to_string(in.parameters_size()) + " values, expected " + std::to_string(parameters.size()));
+  }
+  std::vector<double> values;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const auto scope = check.In("parameters", i);
+    values.push_back(check.Between("", in.parameters(int(i)), parameters[i].least, parameters[i].greatest()));
+  }
+  SetParameters(std::move(values), out);
+}
+
+inline void CheckSheets(const FrameSetup& setup, Checker& check) {
+  for (const double k : {-0.5, setup.description.geometry.size[setup.camera.traversal_axis] - 0.5}) {
+    check.That(setup.sheets.w_c * k + setup.sheets.w_0 > 0, "sheets", "a slice lies behind the eye");
+    if (!check.ok()) break;
+    const SlicePlacement slice = PlaceSlice(setup.sheets, k);
+    const FootprintSigma sigma = FootprintIn(setup.sheets, slice);
+    check.That(kFootprintCut * std::max(sigma.u, sigma.v) <= kHalo, "sheets", "footprints reach beyond the halo");
+    check.That(std::max(slice.scale_u, slice.scale_v) <= kMaxSliceScale, "sheets", "a voxel is wider than 24 pixels");
+  }
+}
+
+inline void Read(const v1::FrameSetup& in, FrameSetup& out, Checker& check) {
+  ReadRenderer(in, out, check);  // sets the halo, too
+  ReadFields(in, out, check);
+  if (check.ok() && in.has_sheets() != out.renderer->along_slices()) {
+    check.Fail("sheets", in.has_sheets() ? "not expected by this renderer" : "missing");
+  }
+  if (in.has_sheets()) {
+    {
+      const auto scope = check.In("sheets");
+      Read(in.sheets(), out.sheets, check);
+    }
+    CheckSheets(out, check);
+  }
+  if (check.ok()) check.Adopt(Validate(out.transfer));
+  if (check.ok()) check.Adopt(Validate(out.shading));
+}
+
+void Fields(auto& io, Is<Placement> auto& m) {
+  using P = v1::Placement;
+  io.Any(m.id, &P::id, &P::set_id);
+  io.Message("box", m.box, &P::box, &P::mutable_box);
+  io.Range("worker", m.worker, &P::worker, &P::set_worker, 1, kMaxWorkerId);
+}
+
+void Fields(auto& io, Is<ScheduleName> auto& m) {
+  using P = v1::ScheduleName;
+  io.Text("scheme", m.scheme, &P::scheme, &P::mutable_scheme, 0, kMaxNameBytes);
+  io.Range("ranks", m.ranks, &P::ranks, &P::set_ranks, 0, kMaxRanks);
+  io.Any(m.root, &P::root, &P::set_root);
+}
+
+void Fields(auto& io, Is<GroupPlan> auto& m) {
+  using P = v1::GroupPlan;
+  io.Messages("placements", m.placements, &P::placements, &P::mutable_placements, kMaxRanks);
+  io.Message("schedule", m.schedule, &P::schedule, &P::mutable_schedule);
+  io.OneOf("color", m.color, &P::color, &P::set_color, ColorCoding::kFloat32, ColorCoding::kFixed16);
+}
+
+}  // namespace slabstream

@@ -1,0 +1,137 @@
+// What a client asks for.
+#pragma once
+
+#include <algorithm>
+#include <string>
+#include <variant>
+
+#include "common/planning/validate_request.h"
+#include "common/wire/value_fields.h"
+#include "slabstream/v1/frame.pb.h"
+
+namespace slabstream {
+
+static_assert(v1::Projection_MAX == static_cast<int>(Projection::kPerspective));
+static_assert(v1::AxisChoice_MAX == static_cast<int>(AxisChoice::kView) + 1);
+
+// Validate checks most ranges of these values, once for the whole FrameRequest. Checked here: what a struct cannot hold, what must be known
+// before, and what is not a number, so that the message names the field as the schema does.
+
+void Fields(auto& io, Is<ImageSize> auto& m) {
+  using P = v1::ImageSize;
+  io.Range("width", m.width, &P::width, &P::set_width, 1, kMaxImageSide);
+  io.Range("height", m.height, &P::height, &P::set_height, 1, kMaxImageSide);
+}
+
+void Fields(auto& io, Is<ViewParameters> auto& m) {
+  using P = v1::ViewParameters;
+  io.OneOf("projection", m.projection, &P::projection, &P::set_projection, Projection::kOrthographic, Projection::kPerspective);
+  io.Finite("azimuth_degrees", m.azimuth_degrees, &P::azimuth_degrees, &P::set_azimuth_degrees);
+  io.Finite("elevation_degrees", m.elevation_degrees, &P::elevation_degrees, &P::set_elevation_degrees);
+  io.Finite("roll_degrees", m.roll_degrees, &P::roll_degrees, &P::set_roll_degrees);
+  io.Finite("zoom", m.zoom, &P::zoom, &P::set_zoom);
+  io.Finite("fov_degrees", m.fov_degrees, &P::fov_degrees, &P::set_fov_degrees);
+}
+
+void Fields(auto& io, Is<ColorPoint> auto& m) {
+  using P = v1::ColorPoint;
+  io.Finite("value", m.value, &P::value, &P::set_value);
+  io.Finite("r", m.color.r, &P::r, &P::set_r);
+  io.Finite("g", m.color.g, &P::g, &P::set_g);
+  io.Finite("b", m.color.b, &P::b, &P::set_b);
+}
+
+void Fields(auto& io, Is<OpacityPoint> auto& m) {
+  using P = v1::OpacityPoint;
+  io.Finite("value", m.value, &P::value, &P::set_value);
+  io.Finite("opacity", m.opacity, &P::opacity, &P::set_opacity);
+  io.Finite("midpoint", m.midpoint, &P::midpoint, &P::set_midpoint);
+  io.Finite("sharpness", m.sharpness, &P::sharpness, &P::set_sharpness);
+}
+
+void Fields(auto& io, Is<TransferFunction> auto& m) {
+  using P = v1::TransferFunction;
+  io.Messages("colors", m.colors, &P::colors, &P::mutable_colors, kMaxTransferPoints);
+  io.Messages("opacities", m.opacities, &P::opacities, &P::mutable_opacities, kMaxTransferPoints);
+  io.Finite("opacity_distance", m.opacity_distance, &P::opacity_distance, &P::set_opacity_distance);
+}
+
+inline void Write(const TransferChoice& in, v1::TransferChoice& out) {
+  if (const auto* preset = std::get_if<std::string>(&in.choice)) {
+    out.set_preset(WireText(*preset, kMaxNameBytes));
+  } else {
+    Write(std::get<TransferFunction>(in.choice), *out.mutable_function());
+  }
+  out.set_opacity_distance(in.opacity_distance);
+}
+inline void Read(const v1::TransferChoice& in, TransferChoice& out, Checker& check) {
+  switch (in.choice_case()) {
+    case v1::TransferChoice::kPreset: out.choice = check.Text("preset", in.preset(), 1, kMaxNameBytes); break;
+    case v1::TransferChoice::kFunction: {
+      const auto scope = check.In("function");
+      Read(in.function(), out.choice.emplace<TransferFunction>(), check);
+      break;
+    }
+    case v1::TransferChoice::CHOICE_NOT_SET: check.Fail("choice", "not set, expected preset or function"); break;
+  }
+  out.opacity_distance = check.Finite("opacity_distance", in.opacity_distance());
+}
+
+void Fields(auto& io, Is<Shading> auto& m) {
+  using P = v1::Shading;
+  io.Any(m.phong, &P::phong, &P::set_phong);
+  io.Messages("lights", m.lights, &P::lights, &P::mutable_lights, kMaxLights);
+  io.Finite("ambient", m.ambient, &P::ambient, &P::set_ambient);
+  io.Finite("diffuse", m.diffuse, &P::diffuse, &P::set_diffuse);
+  io.Finite("specular", m.specular, &P::specular, &P::set_specular);
+  io.Finite("shininess", m.shininess, &P::shininess, &P::set_shininess);
+}
+
+void Fields(auto& io, Is<Policy> auto& m) {
+  using P = v1::Policy;
+  io.Text("decomposition", m.decomposition, &P::decomposition, &P::mutable_decomposition, 1, kMaxNameBytes);
+  io.OneOf("axis", m.axis, &P::axis, &P::set_axis, AxisChoice::kX, AxisChoice::kView);
+  io.Range("groups", m.groups, &P::groups, &P::set_groups, 0, kMaxGroups);
+  io.Text("combine", m.combine, &P::combine, &P::mutable_combine, 1, kMaxNameBytes);
+  io.Text("load_metric", m.load_metric, &P::load_metric, &P::mutable_load_metric, 1, kMaxNameBytes);
+  io.Text("assignment", m.assignment, &P::assignment, &P::mutable_assignment, 1, kMaxNameBytes);
+  io.Text("balance", m.balance, &P::balance, &P::mutable_balance, 1, kMaxNameBytes);
+  io.Between("pixel_error", m.pixel_error, &P::pixel_error, &P::set_pixel_error, 0, kMaxPixelError);
+  io.Range("teams", m.teams, &P::teams, &P::set_teams, 0, kMaxTeams);
+}
+
+void Fields(auto& io, Is<FrameRequest> auto& m) {  // all but the parameters
+  using P = v1::FrameRequest;
+  io.Text("dataset", m.dataset, &P::dataset, &P::mutable_dataset, 1, kMaxNameBytes);
+  io.Text("renderer", m.renderer, &P::renderer, &P::mutable_renderer, 0, kMaxNameBytes);
+  io.Message("size", m.size, &P::size, &P::mutable_size);
+  io.Message("view", m.view, &P::view, &P::mutable_view);
+  io.Message("transfer", m.transfer, &P::transfer, &P::mutable_transfer);
+  io.Message("shading", m.shading, &P::shading, &P::mutable_shading);
+  io.Finite("termination", m.termination, &P::termination, &P::set_termination);
+  io.Message("policy", m.policy, &P::policy, &P::mutable_policy);
+  io.Any(m.previews, &P::previews, &P::set_previews);
+}
+
+inline void Write(const FrameRequest& in, v1::FrameRequest& out) {
+  WriteFields(in, out);
+  for (const auto& [name, text] : in.parameters) {
+    v1::Parameter& parameter = *out.add_parameters();
+    parameter.set_name(WireText(name, kMaxNameBytes));
+    parameter.set_text(WireText(text, kMaxNameBytes));
+  }
+}
+inline void Read(const v1::FrameRequest& in, FrameRequest& out, Checker& check) {
+  ReadFields(in, out, check);
+  if (out.renderer.empty()) out.renderer = kDefaultRenderer;
+  out.policy.teams = std::max(out.policy.teams, 1);  // 0: left out
+  const int parameters = check.Count("parameters", in.parameters_size(), kMaxParameters);
+  for (int i = 0; i < parameters; ++i) {
+    const auto scope = check.In("parameters", std::size_t(i));
+    const std::string name = check.Text("name", in.parameters(i).name(), 1, kMaxNameBytes);
+    check.That(out.parameters.emplace(name, check.Text("text", in.parameters(i).text(), 1, kMaxNameBytes)).second, "name", "given twice");
+  }
+  if (check.ok()) check.Adopt(Validate(out));
+}
+
+}  // namespace slabstream

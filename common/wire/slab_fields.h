@@ -1,0 +1,46 @@
+// Messages of the slabs plane.
+#pragma once
+
+#include <algorithm>
+
+#include "common/wire/slab_messages.h"
+#include "common/wire/value_fields.h"
+#include "slabstream/v1/slabs.pb.h"
+
+namespace slabstream {
+
+// For the widest sample type, because only the dataset knows the actual one.
+inline std::uint32_t LastChunk(const Box& box) { return std::max(ChunkCount(box, ScalarType::kFloat32), 1U) - 1; }
+
+void Fields(auto& io, Is<ChunkRequest> auto& m) {
+  using P = v1::ChunkRequest;
+  io.Any(m.epoch, &P::epoch, &P::set_epoch);
+  io.Any(m.worker, &P::worker, &P::set_worker);
+  io.Any(m.dataset, &P::dataset, &P::set_dataset);
+  io.Message("box", m.box, &P::box, &P::mutable_box);
+  io.Range("chunk", m.chunk, &P::chunk, &P::set_chunk, 0, LastChunk(m.box));
+}
+
+void Fields(auto& io, Is<Chunk> auto& m) {
+  using P = v1::Chunk;
+  io.Any(m.epoch, &P::epoch, &P::set_epoch);
+  io.Any(m.dataset, &P::dataset, &P::set_dataset);
+  io.Message("box", m.box, &P::box, &P::mutable_box);
+  io.Range("chunk", m.chunk, &P::chunk, &P::set_chunk, 0, LastChunk(m.box));
+  io.OneOf("codec", m.codec, &P::codec, &P::set_codec, Codec::kRaw, Codec::kZstd);
+  io.Range("raw_bytes", m.raw_bytes, &P::raw_bytes, &P::set_raw_bytes, 1, kChunkBytes);
+  const std::uint32_t least = m.codec == Codec::kRaw ? m.raw_bytes : 1;
+  io.Range("encoded_bytes", m.encoded_bytes, &P::encoded_bytes, &P::set_encoded_bytes, least, m.raw_bytes);
+  io.Any(m.digest, &P::digest, &P::set_digest);
+}
+
+void Fields(auto& io, Is<ChunkRefused> auto& m) {
+  using P = v1::ChunkRefused;
+  io.Any(m.epoch, &P::epoch, &P::set_epoch);
+  io.Any(m.dataset, &P::dataset, &P::set_dataset);
+  io.Message("box", m.box, &P::box, &P::mutable_box);
+  io.Range("chunk", m.chunk, &P::chunk, &P::set_chunk, 0, LastChunk(m.box));
+  io.Message("status", m.status, &P::status, &P::mutable_status);
+}
+
+}  // namespace slabstream
