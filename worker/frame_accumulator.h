@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "worker/group_run.h"
-#include "worker/image_names.h"
 
 namespace slabstream {
 

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "common/combining/schedule_runner.h"
-#include "worker/image_names.h"
+#include "worker/worker_machine.h"
 
 namespace slabstream {
 
@@ -80,7 +80,6 @@ class GroupRun {
   std::uint32_t step_count() const { return std::uint32_t(runner_.order().schedule().steps().size()); }
   Runner MakeRunner();
   void Advance(WorkerActions& actions);
-  void Send(Runner::Taken taken, WorkerActions& actions);
   void MoveLocally(Runner::Taken taken, WorkerActions& actions);
   void Receive(const Runner::Taken& taken, WorkerActions& actions);
   void Merge(Rank rank, ImagePiece piece, WorkerActions& actions);

@@ -10,7 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include "worker/image_names.h"
 #include "worker/slab_fetcher.h"
 
 namespace slabstream {
