@@ -2,20 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
+#include <span>
 #include <utility>
 
 namespace slabstream {
-namespace {
-
-// Row spans, as they travel.
-Bytes PayloadOf(const ImageView& view) {
-  std::vector<std::byte> payload(sizeof(ColumnSpan) * view.rows.size());
-  std::memcpy(payload.data(), view.rows.data(), payload.size());
-  return Bytes(std::move(payload));
-}
-
-}  // namespace
 
 std::optional<Bytes> LentImages::Lend(const LocalImage& image, const ImageView& view, const Peer& to, PartialImage& message) {
   const std::optional<ArenaName> arena = SharedBlocksArena();
@@ -46,7 +36,8 @@ std::optional<Bytes> LentImages::Lend(const LocalImage& image, const ImageView& 
   }
   bytes_ += view.pixel_bytes();
   lent_.push_back(std::move(lent));
-  return PayloadOf(view);
+  const auto spans = std::as_bytes(std::span(view.rows));
+  return Bytes(std::vector<std::byte>(spans.begin(), spans.end()));
 }
 
 std::shared_ptr<const LentImage> LentImages::Find(const GroupKey& key, std::uint32_t step, const PixelRange& pixels) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstring>
 #include <string>
+#include <utility>
 
 namespace slabstream {
 namespace {
@@ -16,9 +17,7 @@ bool BorrowedImage::Intact() const {
   return std::ranges::all_of(planes, [&](const BlockName& plane) { return arena->Holds(plane); });
 }
 
-Status PeerMemory::Open(const ArenaName& name, Time now) { return Map(name, now).status(); }
-
-Result<std::shared_ptr<const MappedArena>> PeerMemory::Map(const ArenaName& name, Time now) {
+Result<std::shared_ptr<const MappedArena>> PeerMemory::Open(const ArenaName& name, Time now) {
   const std::lock_guard lock(mutex_);
   const auto known = std::ranges::find(mappings_, name, &Mapping::name);
   if (known != mappings_.end()) {
@@ -32,7 +31,7 @@ Result<std::shared_ptr<const MappedArena>> PeerMemory::Map(const ArenaName& name
 
 Result<BorrowedImage> PeerMemory::Borrow(const SharedImage& image, PixelFormat format, const Bytes& spans, PixelRange range,
                                          const PixelBounds& frame, Time now) {
-  Result<std::shared_ptr<const MappedArena>> arena = Map(image.arena, now);
+  Result<std::shared_ptr<const MappedArena>> arena = Open(image.arena, now);
   if (!arena.ok()) return arena.status();
   BorrowedImage borrowed;
   borrowed.arena = *std::move(arena);

@@ -2,7 +2,6 @@
 // rank with a complete slab goes next; only one is rendered at a time. Each job pins its slab.
 #pragma once
 
-#include <cstdint>
 #include <map>
 #include <memory>
 #include <optional>

@@ -1,9 +1,8 @@
 // WorkerService: runs a WorkerMachine over ZeroMQ.
 //
-// Threads: one owns all sockets and runs the machine; one renders, with as many helpers as WorkerConfig::threads says; one combines,
-// encodes and unpacks chunks; one makes finished pictures. So one group is rendered while another is combined, and heartbeats are on time
-// whatever is computed. If a task throws, its group fails, and the coordinator is told at once. If the thread that runs the machine throws,
-// the worker leaves and logs why.
+// One thread owns all sockets and runs the machine; those of the Executor compute. So heartbeats are on time whatever is computed. If a
+// task throws, its group fails, and the coordinator is told at once. If the thread that runs the machine throws, the worker leaves and logs
+// why.
 #pragma once
 
 #include <memory>
