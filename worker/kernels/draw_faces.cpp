@@ -3,7 +3,6 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "worker/kernels/draw_faces.cpp"
 #include <hwy/foreach_target.h>
-// Highway wants this order.
 #include <hwy/highway.h>
 
 #include <hwy/cache_control.h>
@@ -13,8 +12,7 @@
 #include <limits>
 
 HWY_BEFORE_NAMESPACE();
-namespace slabstream {
-namespace HWY_NAMESPACE {
+namespace slabstream::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 using FloatTag = hn::CappedTag<float, 16>;  // lanes are faces
@@ -281,8 +279,7 @@ bool AllNearerThan(const KeyBand& band, const PixelBounds& bounds, float depth) 
   return true;
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace slabstream
+}  // namespace slabstream::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE

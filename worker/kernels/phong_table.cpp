@@ -1,9 +1,6 @@
-#include "worker/kernels/phong_table.h"
-
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "worker/kernels/phong_table.cpp"
 #include <hwy/foreach_target.h>
-// Highway wants this order.
 #include <hwy/highway.h>
 
 #include <hwy/contrib/math/math-inl.h>
@@ -15,6 +12,7 @@
 
 #include "common/base/aligned_buffer.h"
 #include "worker/kernels/normal_code.h"
+#include "worker/kernels/phong.h"
 
 #ifndef SLABSTREAM_WORKER_KERNELS_PHONG_TABLE_CPP_  // shared by all instruction sets
 #define SLABSTREAM_WORKER_KERNELS_PHONG_TABLE_CPP_
@@ -44,8 +42,7 @@ inline const CodedNormals& AllNormals() {
 #endif
 
 HWY_BEFORE_NAMESPACE();
-namespace slabstream {
-namespace HWY_NAMESPACE {
+namespace slabstream::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 // `lights`: unit; factors: kPaddedCodes of them.
@@ -78,8 +75,7 @@ void FillTable(const Shading& shading, std::span<const Vec3> lights, const Vec3&
   }
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace slabstream
+}  // namespace slabstream::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE

@@ -3,7 +3,6 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "worker/renderers/raycast/march.cpp"
 #include <hwy/foreach_target.h>
-// Highway wants this order.
 #include <hwy/highway.h>
 
 #include <limits>
@@ -12,8 +11,7 @@
 #include "worker/rays/ray_packet-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace slabstream {
-namespace HWY_NAMESPACE {
+namespace slabstream::HWY_NAMESPACE {
 
 // Central differences, times two, of stored samples around a position, interpolated.
 struct Gradient {
@@ -188,8 +186,7 @@ std::uint64_t MarchFloat(const MarchWork& work, const PixelBounds& tile, float* 
   return March<float>(work, tile, rgba, row);
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace slabstream
+}  // namespace slabstream::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "worker/kernels/phong_table.h"
-
 namespace slabstream {
 namespace {
 

@@ -1,7 +1,5 @@
 #include "worker/renderers/splat/splat_pass.h"
 
-#include <algorithm>
-
 #include "worker/kernels/segment_set.h"
 
 namespace slabstream {
