@@ -221,13 +221,11 @@ void Executor::Perform(const DropSlab& action) { slabs_.erase(action.slab); }
 
 void Executor::Perform(StoreChunk&& action) {
   const auto found = slabs_.find(action.slab);
-  if (found == slabs_.end()) {
-    outbox_.Post(
-        WorkerEvent(ChunkStored{action.slab, action.chunk.box, action.chunk.chunk, Status::NotFound("chunk of a slab that was dropped")}));
-    return;
-  }
-  combine_thread_.Post([this, slab = found->second, store = std::move(action)] {
-    Status status = Guard("slab", [&] { return slab->Store(store.chunk, store.payload); });
+  std::shared_ptr<Slab> slab = found == slabs_.end() ? nullptr : found->second;
+  combine_thread_.Post([this, slab = std::move(slab), store = std::move(action)] {
+    Status status = Guard("slab", [&] {
+      return slab == nullptr ? Status::NotFound("chunk of a slab that was dropped") : slab->Store(store.chunk, store.payload);
+    });
     outbox_.Post(WorkerEvent(ChunkStored{store.slab, store.chunk.box, store.chunk.chunk, std::move(status)}));
   });
 }

@@ -24,8 +24,8 @@ struct WorkerOptions {
   bool share_memory = true;  // lend images to workers of this host
   RendererFactory make_renderer = MakeRenderer;
   TaskHook task_hook;  // of the executor, and for "send"
-  WorkerConfig
-      machine;  // incarnation, pid, host, images_endpoint, memory_scope, lends_memory are filled in by Start; threads: [1, kMaxThreads]
+  // Start fills in incarnation, pid, host, images_endpoint, memory_scope, lends_memory. threads: [1, kMaxThreads].
+  WorkerConfig machine;
 };
 
 class WorkerService {

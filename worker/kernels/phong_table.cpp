@@ -21,17 +21,14 @@ namespace slabstream {
 inline constexpr std::size_t kPaddedCodes = (std::size_t{kNoGradient} + 15) / 16 * 16;
 
 // Unit vectors of all codes, component by component.
-struct CodedNormals {
-  std::array<AlignedVector<float>, 3> component;
-};
+using CodedNormals = std::array<AlignedVector<float>, 3>;
 inline const CodedNormals& AllNormals() {
   static const CodedNormals normals = [] {
     CodedNormals all;
     for (int axis = 0; axis < 3; ++axis) {
-      all.component[std::size_t(axis)].resize(kPaddedCodes);
-      for (std::uint16_t code = 0; code < kNoGradient; ++code) {
-        all.component[std::size_t(axis)][code] = float(DecodeNormal(code)[axis]);
-      }
+      AlignedVector<float>& component = all[std::size_t(axis)];
+      component.resize(kPaddedCodes);
+      for (std::uint16_t code = 0; code < kNoGradient; ++code) component[code] = float(DecodeNormal(code)[axis]);
     }
     return all;
   }();
@@ -53,8 +50,7 @@ void FillTable(const Shading& shading, std::span<const Vec3> lights, const Vec3&
   const auto zero = hn::Zero(d), least = hn::Set(d, float(std::max(std::exp(std::log(1e-9) / shading.shininess), 1e-30)));
   const auto shininess = hn::Set(d, shading.shininess);
   for (std::size_t i = 0; i < kPaddedCodes; i += hn::Lanes(d)) {
-    const auto x = hn::Load(d, &normals.component[0][i]), y = hn::Load(d, &normals.component[1][i]),
-               z = hn::Load(d, &normals.component[2][i]);
+    const auto x = hn::Load(d, &normals[0][i]), y = hn::Load(d, &normals[1][i]), z = hn::Load(d, &normals[2][i]);
     // Not fused: a high power would show the difference between instruction sets.
     const auto along = [&](const Vec3& v) HWY_ATTR {
       return hn::Add(hn::Add(hn::Mul(x, hn::Set(d, float(v.x))), hn::Mul(y, hn::Set(d, float(v.y)))), hn::Mul(z, hn::Set(d, float(v.z))));
