@@ -39,7 +39,7 @@ class GroupRun {
   // An inconsistent assignment is a failure. `names` must outlive the run.
   GroupRun(GroupAssignment assignment, WorkerId self, ImageNames& names);
 
-  const GroupAssignment& assignment() const { return assignment_; }
+  bool HasPeer(WorkerId worker) const { return FindPeer(worker) != nullptr; }
   const GroupKey& key() const { return assignment_.key; }
   const Status& failure() const { return failure_; }
 

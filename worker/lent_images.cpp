@@ -10,14 +10,8 @@ namespace slabstream {
 std::optional<Bytes> LentImages::Lend(const LocalImage& image, const ImageView& view, const Peer& to, PartialImage& message) {
   const std::optional<ArenaName> arena = SharedBlocksArena();
   if (!arena || view.pixel_bytes() < kLeastBytes) return std::nullopt;
-  auto lent = std::make_shared<LentImage>();
-  lent->to = to;
-  lent->view = view;
-  SharedImage shared;
-  shared.arena = *arena;
-  shared.bounds = view.bounds;
-  shared.stride = std::uint32_t(view.stride);
-  shared.first_pixel = std::uint64_t(view.rgba - image.rgba.data()) / 4;
+  auto lent = std::make_shared<LentImage>(LentImage{to, {}, view, {}});
+  SharedImage shared{*arena, view.bounds, std::uint32_t(view.stride), std::uint64_t(view.rgba - image.rgba.data()) / 4, {}};
   std::array<std::optional<BlockPin>, 3> planes = {PinOf(image.rgba), PinOf(image.depth), PinOf(image.voxel)};
   for (std::size_t i = 0; i < (HasDepth(view.format) ? 3U : 1U); ++i) {
     std::optional<BlockPin>& pin = planes[i];

@@ -33,13 +33,8 @@ Result<BorrowedImage> PeerMemory::Borrow(const SharedImage& image, PixelFormat f
                                          const PixelBounds& frame, Time now) {
   Result<std::shared_ptr<const MappedArena>> arena = Open(image.arena, now);
   if (!arena.ok()) return arena.status();
-  BorrowedImage borrowed;
-  borrowed.arena = *std::move(arena);
-  borrowed.planes = image.planes;
+  BorrowedImage borrowed{{.format = format, .bounds = image.bounds, .stride = image.stride, .rows = {}}, *std::move(arena), image.planes};
   ImageView& view = borrowed.view;
-  view.format = format;
-  view.bounds = image.bounds;
-  view.stride = image.stride;
   if (view.bounds.empty() || !frame.Contains(view.bounds)) return Invalid("bounds do not lie in the frame");
   const auto width = std::uint64_t(view.bounds.width()), height = std::uint64_t(view.bounds.height());
   if (spans.size() != sizeof(ColumnSpan) * height) return Invalid(std::to_string(spans.size()) + " bytes of row spans");

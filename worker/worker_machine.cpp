@@ -298,9 +298,7 @@ void WorkerMachine::State::On(const SendFailed& failed) {
 void WorkerMachine::State::On(const PeerUnreachable& peer) {
   for (const auto& [id, frame] : frames) {
     for (const auto& [group, run] : frame.groups) {
-      if (!run) continue;
-      const std::vector<Peer>& peers = run->assignment().peers;
-      if (std::any_of(peers.begin(), peers.end(), [&](const Peer& p) { return p.worker == peer.worker; })) {
+      if (run && run->HasPeer(peer.worker)) {
         Trouble(run->key(), Status::Unavailable(fmt::format("worker {} cannot be reached", peer.worker)), peer.worker);
       }
     }
