@@ -53,7 +53,6 @@ ShadeTables SheetOpacity::Tables(const ClassificationTable& table) const {
   const double voxel_length = std::min({camera.spacing.x, camera.spacing.y, camera.spacing.z});
   const double exponent = central_distance_ / (table.opacity_distance * voxel_length);
   ShadeTables tables;
-  tables.bins = table.size();
   tables.levels = levels_;
   // In levels, a ray's ratio is its length over the spacing of slices.
   constexpr double kBelowLast = 1e-3;  // so that there is always a level above
