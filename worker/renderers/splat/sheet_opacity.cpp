@@ -4,11 +4,6 @@
 #include <cmath>
 
 namespace slabstream {
-namespace {
-
-constexpr int kLevels = 32;  // the interpolation error is then below 1e-4 for any opacity and a field of view of 60 degrees
-
-}  // namespace
 
 SheetOpacity::SheetOpacity(const FrameSetup& setup) : setup_(setup), axes_(AxesOf(setup.camera.traversal_axis)) {
   const Camera& camera = setup.camera;
@@ -29,6 +24,7 @@ SheetOpacity::SheetOpacity(const FrameSetup& setup) : setup_(setup), axes_(AxesO
       largest = std::max(largest, Ratio(q));
     }
   }
+  constexpr int kLevels = 32;  // the interpolation error is then below 1e-4 for any opacity and a field of view of 60 degrees
   levels_ = kLevels;
   levels_per_ratio_ = (kLevels - 1) / std::max(largest - least_ratio_, 1e-9);
 }
