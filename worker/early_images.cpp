@@ -8,7 +8,7 @@ namespace slabstream {
 
 Status EarlyImages::Keep(PartialImage message, Bytes payload) {
   if (const auto group = groups_.find(message.key); group != groups_.end()) {
-    const bool known = std::any_of(group->second.begin(), group->second.end(), [&](const auto& image) {
+    const bool known = std::ranges::any_of(group->second, [&](const auto& image) {
       return image.first.step == message.step && image.first.pixels == message.pixels && image.first.from_worker == message.from_worker;
     });
     if (known) return Status::Ok();
@@ -25,12 +25,10 @@ Status EarlyImages::Keep(PartialImage message, Bytes payload) {
 }
 
 std::vector<std::pair<PartialImage, Bytes>> EarlyImages::Take(const GroupKey& key) {
-  const auto group = groups_.find(key);
-  if (group == groups_.end()) return {};
-  std::vector<std::pair<PartialImage, Bytes>> images = std::move(group->second);
-  groups_.erase(group);
-  for (const auto& image : images) bytes_ -= Cost(image.second);
-  return images;
+  auto group = groups_.extract(key);
+  if (group.empty()) return {};
+  for (const auto& image : group.mapped()) bytes_ -= Cost(image.second);
+  return std::move(group.mapped());
 }
 
 }  // namespace slabstream

@@ -28,8 +28,6 @@ class EarlyImages {
     });
   }
 
-  std::uint64_t bytes() const { return bytes_; }
-
  private:
   static std::uint64_t Cost(const Bytes& payload) { return sizeof(PartialImage) + payload.size(); }
 

@@ -30,11 +30,6 @@ auto WithAllThreads(tbb::task_arena& arena, Work&& work) {
   return arena.execute(work);
 }
 
-// Adds a time span to the last of a message's reports, if there is any.
-void AddStage(std::vector<RankReport>& reports, Stage stage, std::int64_t begin_ns, std::int64_t end_ns) {
-  if (!reports.empty()) AddStage(reports.back(), stage, begin_ns, end_ns);
-}
-
 // The pixels of `view` as runs: the payload, and their header in the message.
 Bytes EncodePixels(const ImageView& view, ColorCoding color, PartialImage& message) {
   RunImage runs = EncodeRuns(view, color);
@@ -56,8 +51,6 @@ std::optional<Bytes> PixelsInPlace(const LocalImage& image, const ImageView& vie
 // The last group that a picture shows.
 GroupKey KeyOf(const FrameImage& message) { return {message.frame, message.attempt, std::max(message.groups_done, 1U) - 1}; }
 
-PixelRange AllPixels(const PixelBounds& frame) { return {0, std::uint64_t(frame.pixel_count())}; }
-
 bool Covers(PixelRange pixels, const PixelBounds& bounds, std::int32_t frame_width) {
   if (bounds.empty()) return true;
   const auto index = [&](std::int32_t x, std::int32_t y) { return std::uint64_t(y) * std::uint64_t(frame_width) + std::uint64_t(x); };
@@ -70,24 +63,20 @@ PixelBounds RoomFor(const PixelBounds& a, const PixelBounds& b, const PixelBound
   return frame.pixel_count() <= kMostPixels ? frame : Union(a, b);
 }
 
-// `view` has only pixels of `pixels`. `fresh`: `image` does not exist yet.
-void CombineView(LocalImage& image, bool fresh, const ImageView& view, const StartCombine& action, PixelRange pixels) {
+// With another image of this worker. `fresh`: `image` does not exist yet.
+void CombineImages(LocalImage& image, bool fresh, const std::shared_ptr<LocalImage>& other, const StartCombine& action, PixelRange pixels) {
+  const bool whole = Covers(pixels, other->bounds, action.frame.width());
+  if (fresh && whole && other.use_count() == 1) {
+    image = std::move(*other);  // already released, and this task is the last holder
+    return;
+  }
+  const ImageView view = whole ? ViewOf(*other) : ViewOf(*other, pixels, action.frame.width());
   if (fresh) {
     image = CopyOf(view);
     return;
   }
   if (action.replace) Erase(image, pixels, action.frame.width());
   Combine(image, view, action.side, RoomFor(image.bounds, view.bounds, action.frame));
-}
-
-// With another image of this worker.
-void CombineImages(LocalImage& image, bool fresh, const std::shared_ptr<LocalImage>& other, const StartCombine& action, PixelRange pixels) {
-  const bool whole = Covers(pixels, other->bounds, action.frame.width());
-  if (fresh && whole && other.use_count() == 1) {
-    image = std::move(*other);  // already released, and this task is the last holder
-  } else {
-    CombineView(image, fresh, whole ? ViewOf(*other) : ViewOf(*other, pixels, action.frame.width()), action, pixels);
-  }
 }
 
 Status CombineIncoming(LocalImage& image, bool fresh, const StartCombine& action, PixelRange pixels) {
@@ -208,17 +197,23 @@ Status Executor::Guard(const char* task, Work&& work) {
   });
 }
 
+template <class Work>
+bool Executor::TrySend(const char* task, const GroupKey& key, Work&& work) {
+  const Status status = Guard(task, [&] {
+    work();
+    return Status::Ok();
+  });
+  if (!status.ok()) outbox_.Post(WorkerEvent(SendFailed{key, status}));
+  return status.ok();
+}
+
 Executor::~Executor() {
   if (last_render_) *last_render_->cancelled = true;
 }
 
 void Executor::Perform(const OpenSlab& action) {
   auto slab = std::make_shared<Slab>(action.slab);
-  for (const OpenSlab::Copy& copy : action.copies) {
-    const auto source = slabs_.find(copy.from);
-    CHECK(source != slabs_.end()) << "the machine copies from slabs that it holds";
-    slab->copies.push_back({source->second, copy.box});
-  }
+  for (const OpenSlab::Copy& copy : action.copies) slab->copies.push_back({SlabOf(copy.from), copy.box});
   slabs_.insert_or_assign(action.slab, std::move(slab));
 }
 
@@ -226,33 +221,28 @@ void Executor::Perform(const DropSlab& action) { slabs_.erase(action.slab); }
 
 void Executor::Perform(StoreChunk&& action) {
   const auto found = slabs_.find(action.slab);
-  if (found == slabs_.end()) {
-    outbox_.Post(
-        WorkerEvent(ChunkStored{action.slab, action.chunk.box, action.chunk.chunk, Status::NotFound("chunk of a slab that was dropped")}));
-    return;
-  }
-  combine_thread_.Post([this, slab = found->second, store = std::move(action)] {
-    Status status = Guard("slab", [&] { return slab->Store(store.chunk, store.payload); });
+  std::shared_ptr<Slab> slab = found == slabs_.end() ? nullptr : found->second;
+  combine_thread_.Post([this, slab = std::move(slab), store = std::move(action)] {
+    Status status = Guard("slab", [&] {
+      return slab == nullptr ? Status::NotFound("chunk of a slab that was dropped") : slab->Store(store.chunk, store.payload);
+    });
     outbox_.Post(WorkerEvent(ChunkStored{store.slab, store.chunk.box, store.chunk.chunk, std::move(status)}));
   });
 }
 
 void Executor::Perform(StartRender&& action) {
-  const auto found = slabs_.find(action.slab);
-  CHECK(found != slabs_.end()) << "the machine renders from slabs that it holds";
+  std::shared_ptr<Slab> slab = SlabOf(action.slab);
   auto image = images_.insert_or_assign(action.image, std::make_shared<LocalImage>()).first->second;
   auto cancelled = std::make_shared<std::atomic<bool>>(false);
   last_render_ = {action.key, cancelled};
-  render_thread_.Post([this, slab = found->second, image = std::move(image), cancelled = std::move(cancelled), render = std::move(action)] {
-    outbox_.Post(WorkerEvent(render_arena_.execute([&] { return Render(render, *slab, *cancelled, *image); })));
-  });
+  render_thread_.Post(
+      [this, slab = std::move(slab), image = std::move(image), cancelled = std::move(cancelled), render = std::move(action)] {
+        outbox_.Post(WorkerEvent(render_arena_.execute([&] { return Render(render, *slab, *cancelled, *image); })));
+      });
 }
 
 RenderDone Executor::Render(const StartRender& action, Slab& slab, const std::atomic<bool>& cancelled, LocalImage& image) {
-  RenderDone done;
-  done.key = action.key;
-  done.rank = action.rank;
-  done.image = action.image;
+  RenderDone done{action.key, action.rank, action.image, {}, {}};
   RankReport& report = done.report;
   const std::int64_t begin = NowNs();
   done.status = Guard("render", [&] {
@@ -270,12 +260,7 @@ RenderDone Executor::Render(const StartRender& action, Slab& slab, const std::at
     report.image_pixels = SamplePixels(image);
     return Status::Ok();
   });
-  if (report.stage_ns[std::size_t(Stage::kRender)] == 0) {
-    const std::int64_t end = NowNs();
-    report.stage_ns[std::size_t(Stage::kRender)] = end - begin;
-    report.spans.insert(report.spans.begin(), {Stage::kRender, begin, end});
-    if (report.spans.size() > kMaxSpans) report.spans.resize(kMaxSpans);
-  }
+  if (report.stage_ns[std::size_t(Stage::kRender)] == 0) AddStage(report, Stage::kRender, begin, NowNs());
   done.slab_bytes = slab.data == nullptr ? 0 : slab.data->bytes();
   return done;
 }
@@ -284,25 +269,27 @@ void Executor::Perform(const CancelRender& action) {
   if (last_render_ && last_render_->key == action.key) *last_render_->cancelled = true;
 }
 
-std::shared_ptr<LocalImage> Executor::FindImage(ImageHandle image) {
+std::shared_ptr<Executor::Slab> Executor::SlabOf(const SlabKey& key) const {
+  const auto found = slabs_.find(key);
+  CHECK(found != slabs_.end()) << "the machine copies and renders from slabs that it holds";
+  return found->second;
+}
+
+std::shared_ptr<LocalImage> Executor::ImageOf(ImageHandle image) const {
   const auto found = images_.find(image);
-  return found == images_.end() ? nullptr : found->second;
+  CHECK(found != images_.end()) << "image " << image << " does not exist";
+  return found->second;
 }
 
 void Executor::Perform(StartCombine&& action) {
-  std::shared_ptr<LocalImage> image = FindImage(action.image);
+  std::shared_ptr<LocalImage>& image = images_[action.image];
   const bool fresh = image == nullptr;
-  if (fresh) image = images_.emplace(action.image, std::make_shared<LocalImage>()).first->second;
-  std::shared_ptr<LocalImage> other = FindImage(action.other);
-  CHECK(action.other == 0 || other != nullptr) << "image " << action.other << " to combine does not exist";
-
-  combine_thread_.Post([this, fresh, image = std::move(image), other = std::move(other), combine = std::move(action)]() mutable {
-    CombineDone done;
-    done.key = combine.key;
-    done.image = combine.image;
-    done.span = {Stage::kCombine, NowNs(), 0};
+  if (fresh) image = std::make_shared<LocalImage>();
+  std::shared_ptr<LocalImage> other = action.other == 0 ? nullptr : ImageOf(action.other);
+  combine_thread_.Post([this, fresh, image = image, other = std::move(other), combine = std::move(action)]() mutable {
+    CombineDone done{combine.key, combine.image, {}, {Stage::kCombine, NowNs(), 0}};
     done.status = Guard("combine", [&] {
-      const PixelRange pixels = combine.pixels == PixelRange{} ? AllPixels(combine.frame) : combine.pixels;
+      const PixelRange pixels = combine.pixels == PixelRange{} ? PixelRange{0, std::uint64_t(combine.frame.pixel_count())} : combine.pixels;
       if (other != nullptr) {
         WithAllThreads(combine_arena_, [&] { CombineImages(*image, fresh, other, combine, pixels); });
         return Status::Ok();
@@ -321,14 +308,14 @@ void Executor::Perform(StartCombine&& action) {
 }
 
 void Executor::Perform(FindHidden&& action) {
-  std::shared_ptr<LocalImage> image = FindImage(action.image);
-  CHECK(image != nullptr) << "image " << action.image << " to look through does not exist";
+  std::shared_ptr<LocalImage> image = ImageOf(action.image);
   combine_thread_.Post([this, image = std::move(image), find = std::move(action)]() mutable {
     HiddenFound found{find.key, find.image, {}};
     const Status status = Guard("hidden tiles", [&] {
       const PixelBounds frame = FrameBounds(*find.setup);
-      if (image->format != PixelFormat::kRgba)
-        return Status::InvalidArgument("hidden tiles: not an image that blends");  // a peer's mistake
+      if (image->format != PixelFormat::kRgba) {  // a peer's mistake
+        return Status::InvalidArgument("hidden tiles: not an image that blends");
+      }
       FillRows(*image);
       found.hidden = FindHiddenTiles(*image, frame.width(), frame.height(), find.setup->termination, std::move(find.known));
       return Status::Ok();
@@ -352,28 +339,25 @@ void Executor::Post(SendPartial& send, Bytes payload, std::int64_t begin_ns) {
 }
 
 void Executor::Perform(SendPartial&& action, const Delivery& delivery) {
-  std::shared_ptr<LocalImage> image = FindImage(action.image);
-  CHECK(image != nullptr) << "image " << action.image << " to send does not exist";
+  std::shared_ptr<LocalImage> image = ImageOf(action.image);
   const auto view_of = [](const LocalImage& of, const SendPartial& send) { return ViewOf(of, send.message.pixels, send.frame.width()); };
   std::optional<ImageView> view;
   std::optional<Bytes> payload;
   // Describing where pixels are takes less time than waking a thread for it.
   if (combine_thread_.Idle()) {
     bool posted = false;
-    const Status status = Guard("encode", [&] {
+    const bool tried = TrySend("encode", action.message.key, [&] {
       const std::int64_t begin = NowNs();
       view = view_of(*image, action);
       payload = PayloadInPlace(*image, *view, delivery, action);
       posted = payload && !MayPack(delivery.bytes_per_second);
       if (posted) Post(action, *std::move(payload), begin);
-      return Status::Ok();
     });
-    if (!status.ok()) return outbox_.Post(WorkerEvent(SendFailed{action.message.key, status}));
-    if (posted) return;
+    if (posted || !tried) return;
   }
   combine_thread_.Post(
       [=, this, image = std::move(image), view = std::move(view), payload = std::move(payload), send = std::move(action)]() mutable {
-        const Status status = Guard("encode", [&] {
+        TrySend("encode", send.message.key, [&] {
           const std::int64_t begin = NowNs();
           if (!view) {
             view = view_of(*image, send);
@@ -381,9 +365,7 @@ void Executor::Perform(SendPartial&& action, const Delivery& delivery) {
           }
           if (!payload) payload = WithAllThreads(combine_arena_, [&] { return EncodePixels(*view, send.color, send.message); });
           Post(send, PackForLink(*std::move(payload), delivery.bytes_per_second, send.message.packed), begin);
-          return Status::Ok();
         });
-        if (!status.ok()) outbox_.Post(WorkerEvent(SendFailed{send.message.key, status}));
       });
 }
 
@@ -391,38 +373,28 @@ void Executor::Resend(const ImageRefused& refused) {
   std::shared_ptr<const LentImage> lent = lent_.Find(refused.key, refused.step, refused.pixels);
   if (lent == nullptr) return;
   combine_thread_.Post([this, lent = std::move(lent)] {
-    const Status status = Guard("encode", [&] {
+    TrySend("encode", lent->message.key, [&] {
       PartialImage message = lent->message;
       message.shared.reset();
       Bytes payload = WithAllThreads(combine_arena_, [&] { return EncodePixels(lent->view, ColorCoding::kFloat32, message); });
       outbox_.Post(OutgoingPartial{lent->to, Encode(message), std::move(payload), 0, message.key});
-      return Status::Ok();
     });
-    if (!status.ok()) outbox_.Post(WorkerEvent(SendFailed{lent->message.key, status}));
   });
 }
 
 void Executor::Perform(SendFrame&& action) {
-  std::shared_ptr<LocalImage> image = FindImage(action.image);
-  CHECK(image != nullptr) << "image " << action.image << " to send does not exist";
+  std::shared_ptr<LocalImage> image = ImageOf(action.image);
   const bool finished = action.message.groups_done == action.message.group_count;
   (finished ? finish_thread_ : combine_thread_).Post([this, finished, image = std::move(image), send = std::move(action)]() mutable {
-    const GroupKey key = KeyOf(send.message);
-    const Status status = Guard("picture", [&] {
-      MakePicture(*image, send, finished ? finish_arena_ : combine_arena_);
-      return Status::Ok();
-    });
-    if (!status.ok()) outbox_.Post(WorkerEvent(SendFailed{key, status}));
+    TrySend("picture", KeyOf(send.message), [&] { MakePicture(*image, send, finished ? finish_arena_ : combine_arena_); });
   });
 }
 
 void Executor::MakePicture(LocalImage& image, SendFrame& send, tbb::task_arena& arena) {
-  std::vector<RankReport>& reports = send.message.reports;
-  if (reports.empty()) {
-    RankReport& report = reports.emplace_back();
-    report.worker = send.message.worker;
-    report.group = std::max(send.message.groups_done, 1U) - 1;
-  }
+  const GroupKey key = KeyOf(send.message);
+  RankReport& report = send.message.reports.emplace_back();
+  report.worker = send.message.worker;
+  report.group = key.group;
   const std::int64_t begin = NowNs();
   std::int64_t resolved_ns = begin;
   RunImage runs = WithAllThreads(arena, [&] {
@@ -433,11 +405,11 @@ void Executor::MakePicture(LocalImage& image, SendFrame& send, tbb::task_arena& 
     resolved_ns = NowNs();
     return EncodePicture(picture);
   });
-  AddStage(reports, Stage::kResolve, begin, resolved_ns);
+  AddStage(report, Stage::kResolve, begin, resolved_ns);
   send.message.runs.image = runs.header;
   const Bytes payload = PackRuns(Bytes(std::move(runs.payload)), frame_codec_, send.message.runs);
-  AddStage(reports, Stage::kEncode, resolved_ns, NowNs());
-  outbox_.Post(OutgoingFrame{KeyOf(send.message), Encode(send.message), payload});
+  AddStage(report, Stage::kEncode, resolved_ns, NowNs());
+  outbox_.Post(OutgoingFrame{key, Encode(send.message), payload});
 }
 
 void Executor::Perform(const ReleaseImage& action) { images_.erase(action.image); }

@@ -16,7 +16,6 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <string>
 #include <string_view>
 #include <variant>
 #include <vector>
@@ -101,8 +100,13 @@ class Executor {
   // Runs `work`, which returns a Status, and catches its exceptions.
   template <class Work>
   Status Guard(const char* task, Work&& work);
+  // The same for work that sends and returns nothing: a failure is posted as SendFailed. False: it failed.
+  template <class Work>
+  bool TrySend(const char* task, const GroupKey& key, Work&& work);
   void Break();
-  std::shared_ptr<LocalImage> FindImage(ImageHandle image);  // null: no such image
+  // The entries of the tables, which exist.
+  std::shared_ptr<Slab> SlabOf(const SlabKey& key) const;
+  std::shared_ptr<LocalImage> ImageOf(ImageHandle image) const;
   void MakePicture(LocalImage& image, SendFrame& send, tbb::task_arena& arena);
   // The payload for pixels that stay where they are until they are read or sent from there. None: they have to be encoded.
   std::optional<Bytes> PayloadInPlace(const LocalImage& image, const ImageView& view, const Delivery& delivery, SendPartial& send);

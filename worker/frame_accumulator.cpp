@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <set>
+#include <utility>
 
 #include "common/base/check.h"
 #include "common/planning/frame_occlusion.h"
@@ -34,11 +35,8 @@ bool FrameAccumulator::OnCombined(const CombineDone& done, WorkerActions& action
     return true;
   }
   std::vector<RankReport>& reports = reports_.back();
-  const auto own = std::find_if(reports.begin(), reports.end(), [&](const RankReport& report) { return report.worker == self_; });
-  if (own != reports.end()) {
-    own->stage_ns[static_cast<int>(Stage::kCombine)] += done.span.end_ns - done.span.begin_ns;
-    if (own->spans.size() < std::size_t(kMaxSpans)) own->spans.push_back(done.span);
-  }
+  const auto own = std::ranges::find(reports, self_, &RankReport::worker);
+  if (own != reports.end()) AddStage(*own, Stage::kCombine, done.span.begin_ns, done.span.end_ns);
   Advance(actions);
   return true;
 }
@@ -68,9 +66,7 @@ void FrameAccumulator::StartGroup(GroupImage group, WorkerActions& actions) {
   group_started_ = true;
   reports_.push_back(std::move(group.reports));
   if (group.pieces.empty() && image_ == 0) {  // a frame that starts with an empty group starts with an empty picture
-    RunImageHeader nothing;
-    nothing.format = setup_->format;
-    group.pieces.push_back({pixels_, {}, 0, {.header = nothing}});
+    group.pieces.push_back({pixels_, {}, 0, {.header = {.format = setup_->format}}});
   }
   std::set<ImageHandle> used;
   for (ImagePiece& piece : group.pieces) {
@@ -117,13 +113,7 @@ void FrameAccumulator::ReportDone(std::uint32_t group, WorkerActions& actions) c
 }
 
 void FrameAccumulator::SendPicture(WorkerActions& actions) {
-  FrameImage message;
-  message.epoch = epoch_;
-  message.worker = self_;
-  message.frame = frame_;
-  message.attempt = attempt_;
-  message.groups_done = groups_done_;
-  message.group_count = group_count_;
+  FrameImage message{epoch_, self_, frame_, attempt_, groups_done_, group_count_, {}, {}};
   message.runs.image.format = setup_->format;
   actions.push_back(SendFrame{std::move(message), image_, setup_});
   if (groups_done_ == group_count_) frame_sent_attempt_ = attempt_;

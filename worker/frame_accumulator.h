@@ -8,11 +8,9 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "worker/group_run.h"
-#include "worker/image_names.h"
 
 namespace slabstream {
 

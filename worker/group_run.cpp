@@ -12,8 +12,6 @@
 namespace slabstream {
 namespace {
 
-std::string Text(const RankInterval& ranks) { return fmt::format("[{}, {})", ranks.begin, ranks.end); }
-
 // False if any of `pixels` has been seen before: a duplicate.
 bool Remember(std::vector<PixelRange>& seen, const PixelRange& pixels) {
   if (std::any_of(seen.begin(), seen.end(), [&](const PixelRange& old) { return Overlap(old, pixels); })) return false;
@@ -73,10 +71,8 @@ void GroupRun::OnRendered(Rank rank, ImageHandle image, RankReport report, Worke
 }
 
 void GroupRun::LeaveOut(Rank rank, RankReport report, WorkerActions& actions) {
-  RunImageHeader nothing;
-  nothing.format = assignment_.setup.format;
   const ImageHandle image = names_.Next();
-  Start({.image = image, .incoming = {.header = nothing}}, rank, actions);
+  Start({.image = image, .incoming = {.header = {.format = assignment_.setup.format}}}, rank, actions);
   OnRendered(rank, image, std::move(report), actions);
 }
 
@@ -97,7 +93,7 @@ void GroupRun::OnPartial(const PartialImage& message, Bytes payload, WorkerActio
 }
 
 void GroupRun::OnCombined(const CombineDone& done, WorkerActions& actions) {
-  const auto started = std::find_if(combining_.begin(), combining_.end(), [&](const auto& combine) { return combine.first == done.image; });
+  const auto started = std::ranges::find(combining_, done.image, &std::pair<ImageHandle, Rank>::first);
   if (started == combining_.end()) return;
   const Rank number = started->second;
   combining_.erase(started);
@@ -107,11 +103,8 @@ void GroupRun::OnCombined(const CombineDone& done, WorkerActions& actions) {
     if (failure_.ok()) failure_ = done.status;
     return;
   }
-  const auto own = std::find_if(rank.reports.begin(), rank.reports.end(), [&](const RankReport& r) { return r.rank == number; });
-  if (own != rank.reports.end()) {
-    own->stage_ns[static_cast<int>(Stage::kCombine)] += done.span.end_ns - done.span.begin_ns;
-    if (own->spans.size() < std::size_t(kMaxSpans)) own->spans.push_back(done.span);
-  }
+  const auto own = std::ranges::find(rank.reports, number, &RankReport::rank);
+  if (own != rank.reports.end()) AddStage(*own, Stage::kCombine, done.span.begin_ns, done.span.end_ns);
   Advance(actions);
 }
 
@@ -158,17 +151,12 @@ void GroupRun::Advance(WorkerActions& actions) {
                        held));
       for (const Held& part : taken->parts) runner_.held(step.from).Put(part);  // Drop releases them
     } else if (taken->kind == StepOrder::Kind::kSend) {
-      Send(*std::move(taken), actions);
+      SendFragments(step.from, taken->parts, taken->index, WorkerOf(step.to), TakeReports(step.from), actions);
+      ReleaseUnused(taken->parts, actions);
     } else {
       MoveLocally(*std::move(taken), actions);
     }
   }
-}
-
-void GroupRun::Send(Runner::Taken taken, WorkerActions& actions) {
-  const Step& step = *taken.step;
-  SendFragments(step.from, taken.parts, taken.index, WorkerOf(step.to), TakeReports(step.from), actions);
-  ReleaseUnused(taken.parts, actions);
 }
 
 void GroupRun::MoveLocally(Runner::Taken taken, WorkerActions& actions) {
@@ -230,8 +218,8 @@ void GroupRun::TakeHome(Rank rank, ImagePiece piece, WorkerActions& actions) {
 void GroupRun::Combine(Rank rank, const Held& held, const ImagePiece& piece, WorkerActions& actions) {
   const std::optional<RankInterval> both = Joined(piece.ranks, held.value.ranks);
   if (!both) {
-    return Fail(
-        fmt::format("images of ranks {} and {} are to be combined, which are not adjacent", Text(piece.ranks), Text(held.value.ranks)));
+    return Fail(fmt::format("images of ranks [{}, {}) and [{}, {}) are to be combined, which are not adjacent", piece.ranks.begin,
+                            piece.ranks.end, held.value.ranks.begin, held.value.ranks.end));
   }
   Start({.image = held.value.image,
          .other = piece.image,
@@ -289,15 +277,17 @@ void GroupRun::SendFragments(Rank rank, const std::vector<Held>& fragments, std:
   const Peer* peer = FindPeer(to);
   if (peer == nullptr) return Fail(fmt::format("worker {} takes part in the group but has no endpoint in it", to));
   for (const Held& fragment : fragments) {
-    PartialImage message;
-    message.epoch = assignment_.epoch;
-    message.from_worker = self_;
-    message.key = key();
-    message.step = step;
-    message.interval = fragment.value.ranks;
-    message.pixels = fragment.pixels;
-    actions.push_back(
-        SendPartial{*peer, std::move(message), fragment.value.image, FrameBounds(assignment_.setup), assignment_.group.color, rank});
+    actions.push_back(SendPartial{.to = *peer,
+                                  .message = {.epoch = assignment_.epoch,
+                                              .from_worker = self_,
+                                              .key = key(),
+                                              .step = step,
+                                              .interval = fragment.value.ranks,
+                                              .pixels = fragment.pixels},
+                                  .image = fragment.value.image,
+                                  .frame = FrameBounds(assignment_.setup),
+                                  .color = assignment_.group.color,
+                                  .rank = rank});
   }
   if (!fragments.empty()) std::get<SendPartial>(actions.back()).message.reports = std::move(reports);
 }

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "common/combining/schedule_runner.h"
-#include "worker/image_names.h"
+#include "worker/worker_machine.h"
 
 namespace slabstream {
 
@@ -39,7 +39,7 @@ class GroupRun {
   // An inconsistent assignment is a failure. `names` must outlive the run.
   GroupRun(GroupAssignment assignment, WorkerId self, ImageNames& names);
 
-  const GroupAssignment& assignment() const { return assignment_; }
+  bool HasPeer(WorkerId worker) const { return FindPeer(worker) != nullptr; }
   const GroupKey& key() const { return assignment_.key; }
   const Status& failure() const { return failure_; }
 
@@ -80,7 +80,6 @@ class GroupRun {
   std::uint32_t step_count() const { return std::uint32_t(runner_.order().schedule().steps().size()); }
   Runner MakeRunner();
   void Advance(WorkerActions& actions);
-  void Send(Runner::Taken taken, WorkerActions& actions);
   void MoveLocally(Runner::Taken taken, WorkerActions& actions);
   void Receive(const Runner::Taken& taken, WorkerActions& actions);
   void Merge(Rank rank, ImagePiece piece, WorkerActions& actions);

@@ -15,20 +15,7 @@ namespace {
 constexpr CodecSpeed kFastest = {2e9, 0};
 constexpr std::size_t kSampleBytes = std::size_t{64} << 10;  // a fraction of a millisecond
 
-}  // namespace
-
-std::optional<Compression> ParseCompression(std::string_view text) {
-  constexpr std::array<std::pair<std::string_view, Compression>, 3> kNames = {
-      {{"auto", Compression::kAuto}, {"on", Compression::kOn}, {"off", Compression::kOff}}};
-  const auto found = std::ranges::find(kNames, text, &std::pair<std::string_view, Compression>::first);
-  return found == kNames.end() ? std::nullopt : std::optional(found->second);
-}
-
-bool PackingPays(double link_bytes_per_second, const CodecSpeed& codec) {
-  // 1 / link > 1 / codec + ratio / link, without the quotients that may be infinite
-  return codec.bytes_per_second * (1 - codec.ratio) > link_bytes_per_second;
-}
-
+// Packs and unpacks a part from the middle of `payload`, the runs of some image.
 CodecSpeed SampleCodec(std::span<const std::byte> payload) {
   constexpr std::size_t kWord = 4;  // the codec packs words
   const std::size_t bytes = std::min(kSampleBytes, payload.size()) / kWord * kWord;
@@ -41,6 +28,20 @@ CodecSpeed SampleCodec(std::span<const std::byte> payload) {
   CHECK(UnpackRuns(packed, *small, bytes).ok());
   const double seconds = std::max(std::chrono::duration<double>(MonotonicNow() - begin).count(), 1e-9);
   return {double(bytes) / seconds, double(small->size()) / double(bytes)};
+}
+
+}  // namespace
+
+std::optional<Compression> ParseCompression(std::string_view text) {
+  constexpr std::array<std::pair<std::string_view, Compression>, 3> kNames = {
+      {{"auto", Compression::kAuto}, {"on", Compression::kOn}, {"off", Compression::kOff}}};
+  const auto found = std::ranges::find(kNames, text, &std::pair<std::string_view, Compression>::first);
+  return found == kNames.end() ? std::nullopt : std::optional(found->second);
+}
+
+bool PackingPays(double link_bytes_per_second, const CodecSpeed& codec) {
+  // 1 / link > 1 / codec + ratio / link, without the quotients that may be infinite
+  return codec.bytes_per_second * (1 - codec.ratio) > link_bytes_per_second;
 }
 
 bool MayPack(double link_bytes_per_second) { return PackingPays(link_bytes_per_second, kFastest); }

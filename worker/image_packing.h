@@ -31,9 +31,6 @@ struct CodecSpeed {
 // `link_bytes_per_second` ≥ 0. 0: always pays; infinity: never pays.
 bool PackingPays(double link_bytes_per_second, const CodecSpeed& codec);
 
-// Packs and unpacks a part from the middle of `payload`, the runs of some image.
-CodecSpeed SampleCodec(std::span<const std::byte> payload);
-
 // False: the link is too fast for any payload to be packed.
 bool MayPack(double link_bytes_per_second);
 

@@ -2,32 +2,16 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
+#include <span>
 #include <utility>
 
 namespace slabstream {
-namespace {
-
-// Row spans, as they travel.
-Bytes PayloadOf(const ImageView& view) {
-  std::vector<std::byte> payload(sizeof(ColumnSpan) * view.rows.size());
-  std::memcpy(payload.data(), view.rows.data(), payload.size());
-  return Bytes(std::move(payload));
-}
-
-}  // namespace
 
 std::optional<Bytes> LentImages::Lend(const LocalImage& image, const ImageView& view, const Peer& to, PartialImage& message) {
   const std::optional<ArenaName> arena = SharedBlocksArena();
   if (!arena || view.pixel_bytes() < kLeastBytes) return std::nullopt;
-  auto lent = std::make_shared<LentImage>();
-  lent->to = to;
-  lent->view = view;
-  SharedImage shared;
-  shared.arena = *arena;
-  shared.bounds = view.bounds;
-  shared.stride = std::uint32_t(view.stride);
-  shared.first_pixel = std::uint64_t(view.rgba - image.rgba.data()) / 4;
+  auto lent = std::make_shared<LentImage>(LentImage{to, {}, view, {}});
+  SharedImage shared{*arena, view.bounds, std::uint32_t(view.stride), std::uint64_t(view.rgba - image.rgba.data()) / 4, {}};
   std::array<std::optional<BlockPin>, 3> planes = {PinOf(image.rgba), PinOf(image.depth), PinOf(image.voxel)};
   for (std::size_t i = 0; i < (HasDepth(view.format) ? 3U : 1U); ++i) {
     std::optional<BlockPin>& pin = planes[i];
@@ -46,7 +30,8 @@ std::optional<Bytes> LentImages::Lend(const LocalImage& image, const ImageView& 
   }
   bytes_ += view.pixel_bytes();
   lent_.push_back(std::move(lent));
-  return PayloadOf(view);
+  const auto spans = std::as_bytes(std::span(view.rows));
+  return Bytes(std::vector<std::byte>(spans.begin(), spans.end()));
 }
 
 std::shared_ptr<const LentImage> LentImages::Find(const GroupKey& key, std::uint32_t step, const PixelRange& pixels) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstring>
 #include <string>
+#include <utility>
 
 namespace slabstream {
 namespace {
@@ -16,9 +17,7 @@ bool BorrowedImage::Intact() const {
   return std::ranges::all_of(planes, [&](const BlockName& plane) { return arena->Holds(plane); });
 }
 
-Status PeerMemory::Open(const ArenaName& name, Time now) { return Map(name, now).status(); }
-
-Result<std::shared_ptr<const MappedArena>> PeerMemory::Map(const ArenaName& name, Time now) {
+Result<std::shared_ptr<const MappedArena>> PeerMemory::Open(const ArenaName& name, Time now) {
   const std::lock_guard lock(mutex_);
   const auto known = std::ranges::find(mappings_, name, &Mapping::name);
   if (known != mappings_.end()) {
@@ -32,15 +31,10 @@ Result<std::shared_ptr<const MappedArena>> PeerMemory::Map(const ArenaName& name
 
 Result<BorrowedImage> PeerMemory::Borrow(const SharedImage& image, PixelFormat format, const Bytes& spans, PixelRange range,
                                          const PixelBounds& frame, Time now) {
-  Result<std::shared_ptr<const MappedArena>> arena = Map(image.arena, now);
+  Result<std::shared_ptr<const MappedArena>> arena = Open(image.arena, now);
   if (!arena.ok()) return arena.status();
-  BorrowedImage borrowed;
-  borrowed.arena = *std::move(arena);
-  borrowed.planes = image.planes;
+  BorrowedImage borrowed{{.format = format, .bounds = image.bounds, .stride = image.stride, .rows = {}}, *std::move(arena), image.planes};
   ImageView& view = borrowed.view;
-  view.format = format;
-  view.bounds = image.bounds;
-  view.stride = image.stride;
   if (view.bounds.empty() || !frame.Contains(view.bounds)) return Invalid("bounds do not lie in the frame");
   const auto width = std::uint64_t(view.bounds.width()), height = std::uint64_t(view.bounds.height());
   if (spans.size() != sizeof(ColumnSpan) * height) return Invalid(std::to_string(spans.size()) + " bytes of row spans");

@@ -5,7 +5,6 @@
 #include <chrono>
 #include <memory>
 #include <mutex>
-#include <utility>
 #include <vector>
 
 #include "common/base/bytes.h"
@@ -32,7 +31,7 @@ class PeerMemory {
   static constexpr Duration kIdle = std::chrono::seconds(10);
 
   // Maps the arena unless it is mapped already. Errors: as MappedArena::Open.
-  Status Open(const ArenaName& name, Time now);
+  Result<std::shared_ptr<const MappedArena>> Open(const ArenaName& name, Time now);
 
   // The pixels of `image` that lie in `range` of `frame`. Accepts any image and payload (`spans`): never reads outside the arena.
   // InvalidArgument: something does not fit. DataLoss: the image is no longer lent. Others: as Open, since an image may wait for longer
@@ -49,7 +48,6 @@ class PeerMemory {
     std::shared_ptr<const MappedArena> arena;
     Time last_used;
   };
-  Result<std::shared_ptr<const MappedArena>> Map(const ArenaName& name, Time now);
 
   std::mutex mutex_;
   std::vector<Mapping> mappings_;  // guarded by mutex_

@@ -24,7 +24,7 @@ void RenderQueue::DropGroup(const GroupKey& key, WorkerActions& actions) {
 
 void RenderQueue::StartNext(WorkerActions& actions) {
   if (running_) return;
-  const auto next = std::find_if(waiting_.begin(), waiting_.end(), [&](const auto& entry) { return slabs_.complete(entry.second.slab); });
+  const auto next = std::ranges::find_if(waiting_, [&](const auto& entry) { return slabs_.complete(entry.second.slab); });
   if (next == waiting_.end()) return;
   running_ = Running{next->first.first, next->first.second, std::move(next->second), names_.Next(), false};
   waiting_.erase(next);
@@ -53,9 +53,7 @@ std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId w
   const SlabFetcher::FetchReport fetched = slabs_.TakeReport(slab);
   report.voxel_bytes = fetched.voxel_bytes;
   if (fetched.voxel_bytes > 0) {
-    const Span span{Stage::kFetch, fetched.begin.time_since_epoch().count(), fetched.end.time_since_epoch().count()};
-    report.stage_ns[static_cast<int>(Stage::kFetch)] += span.end_ns - span.begin_ns;
-    if (report.spans.size() < std::size_t(kMaxSpans)) report.spans.push_back(span);
+    AddStage(report, Stage::kFetch, fetched.begin.time_since_epoch().count(), fetched.end.time_since_epoch().count());
   }
   slabs_.Release(slab);
   if (!done.status.ok()) actions.push_back(ReleaseImage{done.image});

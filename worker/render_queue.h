@@ -2,7 +2,6 @@
 // rank with a complete slab goes next; only one is rendered at a time. Each job pins its slab.
 #pragma once
 
-#include <cstdint>
 #include <map>
 #include <memory>
 #include <optional>
@@ -10,7 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include "worker/image_names.h"
 #include "worker/slab_fetcher.h"
 
 namespace slabstream {

@@ -31,8 +31,12 @@ class SentTallies {
   }
 
  private:
+  struct Tally {
+    std::uint64_t image_bytes = 0;
+    std::vector<Span> encoding;
+  };
   std::mutex mutex_;
-  std::map<std::pair<GroupKey, std::uint32_t>, RankReport> tallies_;  // bytes and encoding by rank; guarded by mutex_
+  std::map<std::pair<GroupKey, std::uint32_t>, Tally> tallies_;  // by rank; guarded by mutex_
 };
 
 }  // namespace slabstream

@@ -55,19 +55,15 @@ std::string HostName() {
 }  // namespace
 
 struct WorkerService::Impl {
-  Impl(Context& service_context, const WorkerConfig& config, Compression user_choice, RendererFactory make_renderer, TaskHook task_hook,
-       Socket control_socket, Socket images_socket)
+  Impl(Context& service_context, WorkerOptions worker_options, Socket control_socket, Socket images_socket)
       : context(service_context),
-        machine(config),
+        options(std::move(worker_options)),
+        machine(options.machine),
         control(std::move(control_socket)),
         images(std::move(images_socket)),
         peers(service_context),
-        scope(config.memory_scope),
-        lends(config.lends_memory),
-        compression(user_choice),
-        hook(std::move(task_hook)),
-        executor(std::in_place, outbox, user_choice == Compression::kOn ? Codec::kZstd : Codec::kRaw, int(config.threads),
-                 std::move(make_renderer), hook) {}
+        executor(std::in_place, outbox, options.compression == Compression::kOn ? Codec::kZstd : Codec::kRaw, int(options.machine.threads),
+                 options.make_renderer, options.task_hook) {}
 
   void Run();
   void Loop();
@@ -79,7 +75,9 @@ struct WorkerService::Impl {
   bool OpenShared(const AnyMessage& message);
   void Refuse(const PartialImage& partial);
   void Acknowledge(const AnyMessage& message, std::size_t payload_bytes);
-  bool OnThisHost(const Peer& peer) const { return scope != 0 && peer.memory_scope == scope; }
+  bool Answer(WorkerId sender, const AnyMessage& message);
+  // Workers with the same scope are on this host; 0: unknown.
+  bool OnThisHost(const Peer& peer) const { return options.machine.memory_scope != 0 && peer.memory_scope == options.machine.memory_scope; }
   bool IsTimed(const Peer& peer) const;
   Delivery DeliveryTo(const Peer& peer) const;
 
@@ -96,16 +94,13 @@ struct WorkerService::Impl {
   void Send(Socket& socket, const AnyMessage& message);
 
   Context& context;
+  const WorkerOptions options;
   WorkerMachine machine;
   Socket control, images;
   std::optional<Socket> slabs;  // once the coordinator has named its endpoint
   std::string slabs_endpoint;
   PeerSockets peers;
   Epoch epoch = 0;
-  const std::uint64_t scope;  // workers with the same scope are on this host; 0: unknown
-  const bool lends;           // its images to these workers
-  const Compression compression;
-  const TaskHook hook;
   LinkRates links;                            // while compression is automatic
   std::map<WorkerId, std::string> endpoints;  // image planes of the epoch's other workers
   std::set<WorkerId> takes_frames_only;       // workers that cannot map memory though they have the same scope
@@ -203,15 +198,19 @@ void WorkerService::Impl::Remember(const AnyMessage& message) {
   }
 }
 
-// A message from a sender with an unknown endpoint gets no answer: the sender asks again.
 void WorkerService::Impl::Acknowledge(const AnyMessage& message, std::size_t payload_bytes) {
   const auto* partial = std::get_if<PartialImage>(&message);
   if (partial == nullptr || partial->acknowledge == 0 || payload_bytes < kLeastAcknowledgedBytes || partial->epoch != epoch) return;
-  const auto sender = endpoints.find(partial->from_worker);
-  if (sender == endpoints.end()) return;
-  const ImageReceived received = {epoch, machine.worker(), partial->acknowledge};
-  const Status sent = peers.Send(sender->second, Encode(received), {}, MonotonicNow());
-  if (!sent.ok()) LogDebug("worker " + std::to_string(partial->from_worker) + " is not reached: " + sent.message());
+  Answer(partial->from_worker, ImageReceived{epoch, machine.worker(), partial->acknowledge});  // without it, the sender asks again
+}
+
+// False: the sender's endpoint is not known yet.
+bool WorkerService::Impl::Answer(WorkerId sender, const AnyMessage& message) {
+  const auto endpoint = endpoints.find(sender);
+  if (endpoint == endpoints.end()) return false;
+  const Status sent = peers.Send(endpoint->second, Encode(message), {}, MonotonicNow());
+  if (!sent.ok()) LogWarning("worker " + std::to_string(sender) + " is not reached: " + sent.message());
+  return true;
 }
 
 // True if the message is for the machine. A shared image is, only if it can be read here.
@@ -225,7 +224,7 @@ bool WorkerService::Impl::OpenShared(const AnyMessage& message) {
   }
   const auto* partial = std::get_if<PartialImage>(&message);
   if (partial == nullptr || !partial->shared) return true;
-  const Status opened = executor->peer_memory().Open(partial->shared->arena, MonotonicNow());
+  const Status opened = executor->peer_memory().Open(partial->shared->arena, MonotonicNow()).status();
   if (opened.ok()) return true;
   if (partial->epoch != epoch) return false;
   LogInfo("an image of worker " + std::to_string(partial->from_worker) + " is asked for in frames: " + opened.message());
@@ -234,14 +233,9 @@ bool WorkerService::Impl::OpenShared(const AnyMessage& message) {
 }
 
 void WorkerService::Impl::Refuse(const PartialImage& partial) {
-  const auto sender = endpoints.find(partial.from_worker);
-  if (sender == endpoints.end()) {  // the group's assignment with the endpoint has not arrived yet
-    if (to_refuse.size() < kMostRefused) to_refuse.push_back(partial);
-    return;
-  }
-  const ImageRefused refused = {partial.epoch, machine.worker(), partial.key, partial.step, partial.pixels};
-  const Status sent = peers.Send(sender->second, Encode(refused), {}, MonotonicNow());
-  if (!sent.ok()) LogWarning("worker " + std::to_string(partial.from_worker) + " is not reached: " + sent.message());
+  if (Answer(partial.from_worker, ImageRefused{partial.epoch, machine.worker(), partial.key, partial.step, partial.pixels})) return;
+  // The group's assignment with the endpoint has not arrived yet.
+  if (to_refuse.size() < kMostRefused) to_refuse.push_back(partial);
 }
 
 void WorkerService::Impl::HandleEvent(const WorkerEvent& event) {
@@ -260,7 +254,7 @@ void WorkerService::Impl::HandleOutput(ExecutorOutput& output) {
     HandleEvent(*event);
   } else if (auto* frame = std::get_if<OutgoingFrame>(&output)) {
     const Status sent = Guarded("send", [&] {
-      if (hook) hook("send");
+      if (options.task_hook) options.task_hook("send");
       return control.Send({}, std::move(frame->header), frame->payload);
     });
     if (!sent.ok()) HandleEvent(SendFailed{frame->key, sent});
@@ -269,7 +263,7 @@ void WorkerService::Impl::HandleOutput(ExecutorOutput& output) {
     if (IsTimed(partial.to)) links.Sent(partial.to.worker, partial.acknowledge, partial.payload.size(), MonotonicNow());
     Status sent;
     const Status tried = Guarded("send", [&] {
-      if (hook) hook("send");
+      if (options.task_hook) options.task_hook("send");
       sent = peers.Send(partial.to.images_endpoint, std::move(partial.header), partial.payload, MonotonicNow());
       return Status::Ok();
     });
@@ -309,14 +303,14 @@ void WorkerService::Impl::Perform(ConnectSlabs& action) {
 }
 
 Delivery WorkerService::Impl::DeliveryTo(const Peer& peer) const {
-  if (lends && OnThisHost(peer) && takes_frames_only.count(peer.worker) == 0) return {.lend = true};
-  if (compression == Compression::kOn) return {.bytes_per_second = 0};
+  if (options.machine.lends_memory && OnThisHost(peer) && takes_frames_only.count(peer.worker) == 0) return {.lend = true};
+  if (options.compression == Compression::kOn) return {.bytes_per_second = 0};
   return IsTimed(peer) ? Delivery{.bytes_per_second = links.Of(peer.worker)} : Delivery{};
 }
 
 // Links within a host are not timed: a lack of processor time would look like a slow link, and packing would worsen it.
 bool WorkerService::Impl::IsTimed(const Peer& peer) const {
-  return compression == Compression::kAuto && !OnThisHost(peer) && peer.images_endpoint.starts_with("tcp://");
+  return options.compression == Compression::kAuto && !OnThisHost(peer) && peer.images_endpoint.starts_with("tcp://");
 }
 
 void WorkerService::Impl::Perform(SendPartial& action) {
@@ -356,8 +350,7 @@ Result<std::unique_ptr<WorkerService>> WorkerService::Start(Context& context, Wo
     }
   }
   config.lends_memory = options.share_memory;
-  auto impl = std::make_unique<Impl>(context, config, options.compression, std::move(options.make_renderer), std::move(options.task_hook),
-                                     std::move(*control), std::move(*images));
+  auto impl = std::make_unique<Impl>(context, std::move(options), std::move(*control), std::move(*images));
   impl->thread = std::jthread([raw = impl.get()] { raw->Run(); });
   return std::unique_ptr<WorkerService>(new WorkerService(std::move(impl)));
 }

@@ -1,9 +1,8 @@
 // WorkerService: runs a WorkerMachine over ZeroMQ.
 //
-// Threads: one owns all sockets and runs the machine; one renders, with as many helpers as WorkerConfig::threads says; one combines,
-// encodes and unpacks chunks; one makes finished pictures. So one group is rendered while another is combined, and heartbeats are on time
-// whatever is computed. If a task throws, its group fails, and the coordinator is told at once. If the thread that runs the machine throws,
-// the worker leaves and logs why.
+// One thread owns all sockets and runs the machine; those of the Executor compute. So heartbeats are on time whatever is computed. If a
+// task throws, its group fails, and the coordinator is told at once. If the thread that runs the machine throws, the worker leaves and logs
+// why.
 #pragma once
 
 #include <memory>
@@ -25,8 +24,8 @@ struct WorkerOptions {
   bool share_memory = true;  // lend images to workers of this host
   RendererFactory make_renderer = MakeRenderer;
   TaskHook task_hook;  // of the executor, and for "send"
-  WorkerConfig
-      machine;  // incarnation, pid, host, images_endpoint, memory_scope, lends_memory are filled in by Start; threads: [1, kMaxThreads]
+  // Start fills in incarnation, pid, host, images_endpoint, memory_scope, lends_memory. threads: [1, kMaxThreads].
+  WorkerConfig machine;
 };
 
 class WorkerService {

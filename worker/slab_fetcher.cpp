@@ -22,11 +22,6 @@ SlabFetcher::Slab* SlabFetcher::Find(Generation slab) {
   return found == slabs_.end() ? nullptr : &found->second;
 }
 
-const SlabFetcher::Slab* SlabFetcher::Find(Generation slab) const {
-  const auto found = slabs_.find(slab);
-  return found == slabs_.end() ? nullptr : &found->second;
-}
-
 SlabFetcher::Slab* SlabFetcher::FindRequested(DatasetId dataset, const ChunkPlace& chunk) {
   for (auto& [generation, slab] : slabs_) {
     if (slab.key.dataset != dataset) continue;
@@ -86,11 +81,7 @@ OpenSlab SlabFetcher::PlanSlab(Slab& slab) {
   return open;
 }
 
-void SlabFetcher::Rendered(Generation slab) {
-  Slab* found = Find(slab);
-  CHECK(found != nullptr) << "slab " << slab;
-  Unpin(std::exchange(found->sources, {}));
-}
+void SlabFetcher::Rendered(Generation slab) { Unpin(std::exchange(slabs_.at(slab).sources, {})); }
 
 // Does not mark the sources as used: they were only copied from.
 void SlabFetcher::Unpin(std::span<const Generation> sources) {
@@ -98,49 +89,35 @@ void SlabFetcher::Unpin(std::span<const Generation> sources) {
 }
 
 void SlabFetcher::Release(Generation slab) {
-  Slab* found = Find(slab);
-  CHECK(found != nullptr) << "slab " << slab;
-  CHECK_LT(0, found->pins);
-  --found->pins;
-  found->last_use = ++use_counter_;
-}
-
-bool SlabFetcher::complete(Generation slab) const {
-  const Slab* found = Find(slab);
-  return found != nullptr && found->is_complete();
-}
-
-SlabKey SlabFetcher::key(Generation slab) const {
-  const Slab* found = Find(slab);
-  CHECK(found != nullptr) << "slab " << slab;
-  return found->key;
+  Slab& released = slabs_.at(slab);
+  CHECK_LT(0, released.pins);
+  --released.pins;
+  released.last_use = ++use_counter_;
 }
 
 SlabFetcher::FetchReport SlabFetcher::TakeReport(Generation slab) {
-  Slab* found = Find(slab);
-  if (found == nullptr) return {};
-  found->requested = false;
-  return std::exchange(found->report, {});
+  slabs_.at(slab).requested = false;
+  return std::exchange(slabs_.at(slab).report, {});
 }
 
 void SlabFetcher::SetBytes(Generation slab, std::uint64_t bytes) {
-  if (Slab* found = Find(slab)) found->bytes = std::max<std::uint64_t>(bytes, found->bytes);
+  std::uint64_t& of_slab = slabs_.at(slab).bytes;
+  of_slab = std::max(of_slab, bytes);
 }
 
 void SlabFetcher::RequestChunks(std::span<const Generation> slabs, Epoch epoch, WorkerId worker, Time now, WorkerActions& actions) {
   for (const Generation generation : slabs) {
-    Slab* slab = Find(generation);
-    if (slab == nullptr || slab->retired) continue;
-    while (!slab->missing.empty()) {
-      const ChunkPlace chunk = slab->missing.back();
-      const std::uint32_t bytes = BytesOfChunk(chunk.box, slab->key.type, chunk.chunk);
+    Slab& slab = slabs_.at(generation);
+    while (!slab.retired && !slab.missing.empty()) {
+      const ChunkPlace chunk = slab.missing.back();
+      const std::uint32_t bytes = BytesOfChunk(chunk.box, slab.key.type, chunk.chunk);
       if (!in_flight_.empty() && in_flight_bytes_ + bytes > config_.credit_bytes) return;
-      slab->missing.pop_back();
+      slab.missing.pop_back();
       in_flight_[{generation, chunk}] = {bytes, now + config_.chunk_timeout, false};
       in_flight_bytes_ += bytes;
-      if (!slab->requested) slab->report.begin = now;
-      slab->requested = true;
-      actions.push_back(SendChunkRequest{{epoch, worker, slab->key.dataset, chunk.box, chunk.chunk}});
+      if (!slab.requested) slab.report.begin = now;
+      slab.requested = true;
+      actions.push_back(SendChunkRequest{{epoch, worker, slab.key.dataset, chunk.box, chunk.chunk}});
     }
   }
 }
@@ -191,8 +168,8 @@ void SlabFetcher::ExpireRequests(Time now) {
   for (const auto& [name, request] : in_flight_) {
     if (!request.storing && request.expiry <= now) expired.push_back(name);
   }
+  const auto waited = std::chrono::duration_cast<std::chrono::milliseconds>(config_.chunk_timeout).count();
   for (const auto& [generation, chunk] : expired) {
-    const auto waited = std::chrono::duration_cast<std::chrono::milliseconds>(config_.chunk_timeout).count();
     Retry(generation, chunk, Status::Unavailable(fmt::format("chunk {} of a slab did not arrive within {} ms", chunk.chunk, waited)));
   }
 }
@@ -239,15 +216,13 @@ void SlabFetcher::RetireCovered(Slab& complete) {
 }
 
 void SlabFetcher::ForgetRequests() {
-  for (auto request = in_flight_.begin(); request != in_flight_.end();) {
-    if (request->second.storing) {
-      ++request;
-      continue;
-    }
-    if (Slab* slab = Find(request->first.first)) slab->missing.push_back(request->first.second);
-    in_flight_bytes_ -= request->second.bytes;
-    request = in_flight_.erase(request);
-  }
+  std::erase_if(in_flight_, [this](const auto& entry) {
+    const auto& [name, request] = entry;
+    if (request.storing) return false;
+    if (Slab* slab = Find(name.first)) slab->missing.push_back(name.second);
+    in_flight_bytes_ -= request.bytes;
+    return true;
+  });
 }
 
 void SlabFetcher::RetireAll() {
@@ -255,10 +230,9 @@ void SlabFetcher::RetireAll() {
 }
 
 void SlabFetcher::Trim(WorkerActions& actions) {
-  for (auto entry = slabs_.begin(); entry != slabs_.end();) {
-    const auto next = std::next(entry);
+  for (auto next = slabs_.begin(); next != slabs_.end();) {
+    const auto entry = next++;
     if (entry->second.pins == 0 && entry->second.retired) Drop(entry->first, actions);
-    entry = next;
   }
   while (cached_bytes() > config_.cache_bytes) {
     const Slab* oldest = nullptr;

@@ -16,7 +16,6 @@
 #include <utility>
 #include <vector>
 
-#include "worker/image_names.h"
 #include "worker/worker_machine.h"
 
 namespace slabstream {
@@ -38,10 +37,11 @@ class SlabFetcher {
   explicit SlabFetcher(const WorkerConfig& config) : config_(config) {}
 
   Generation Acquire(DatasetId dataset, const Box& box, ScalarType type, WorkerActions& actions);
-  void Release(Generation slab);         // once for each Acquire
-  bool complete(Generation slab) const;  // all that must be fetched is stored
-  void Rendered(Generation slab);        // the slab now holds all its voxels itself
-  SlabKey key(Generation slab) const;
+  void Release(Generation slab);  // once for each Acquire
+  // Of acquired slabs.
+  bool complete(Generation slab) const { return slabs_.at(slab).is_complete(); }  // all that must be fetched is stored
+  void Rendered(Generation slab);                                                 // the slab now holds all its voxels itself
+  SlabKey key(Generation slab) const { return slabs_.at(slab).key; }
   FetchReport TakeReport(Generation slab);
   void SetBytes(Generation slab, std::uint64_t bytes);  // including data derived from the voxels
 
@@ -92,8 +92,7 @@ class SlabFetcher {
   };
   using ChunkName = std::pair<Generation, ChunkPlace>;
 
-  Slab* Find(Generation slab);
-  const Slab* Find(Generation slab) const;
+  Slab* Find(Generation slab);  // null: dropped
   Slab* FindRequested(DatasetId dataset, const ChunkPlace& chunk);
   OpenSlab PlanSlab(Slab& slab);
   void Unpin(std::span<const Generation> sources);

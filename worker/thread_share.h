@@ -14,7 +14,6 @@ class ThreadShare {
   ThreadShare(const ThreadShare&) = delete;
   ThreadShare& operator=(const ThreadShare&) = delete;
 
-  int threads() const { return threads_; }
   // The threads of all workers of this process together, now, limited to what one arena can have.
   static int OfProcess();
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <concepts>
 #include <map>
 #include <optional>
 #include <set>
@@ -16,6 +17,9 @@
 #include "worker/slab_fetcher.h"
 
 namespace slabstream {
+
+template <class M, class... Ms>
+concept AnyOf = (std::same_as<M, Ms> || ...);
 
 struct WorkerMachine::State {
   explicit State(WorkerConfig c)
@@ -49,27 +53,12 @@ struct WorkerMachine::State {
   void On(const Chunk& chunk, const Bytes& payload);
   void On(const ChunkRefused& refused, const Bytes&);
   void On(const PartialImage& partial, const Bytes& payload);
-  // Messages that a worker sends, and those of the client plane: not for a worker.
-  void On(const Register&, const Bytes&) {}
-  void On(const Heartbeat&, const Bytes&) {}
-  void On(const GroupDone&, const Bytes&) {}
-  void On(const FrameImage&, const Bytes&) {}
-  void On(const WorkerTrouble&, const Bytes&) {}
-  void On(const Leave&, const Bytes&) {}
-  void On(const ChunkRequest&, const Bytes&) {}
-  void On(const ImageRefused&, const Bytes&) {}   // for the service
-  void On(const ImageReceived&, const Bytes&) {}  // for the service
-  void On(const SubmitFrame&, const Bytes&) {}
-  void On(const FrameProgress&, const Bytes&) {}
-  void On(const FrameReply&, const Bytes&) {}
-  void On(const FrameFailed&, const Bytes&) {}
-  void On(const CancelFrame&, const Bytes&) {}
-  void On(const ClientPing&, const Bytes&) {}
-  void On(const ClientPong&, const Bytes&) {}
-  void On(const StatusQuery&, const Bytes&) {}
-  void On(const StatusReply&, const Bytes&) {}
-  void On(const ShutDown&, const Bytes&) {}
-  void On(const ShutDownReply&, const Bytes&) {}
+  // Drops what a worker sends, what its service handles (ImageRefused, ImageReceived), and the messages of the client plane.
+  template <
+      AnyOf<Register, Heartbeat, GroupDone, FrameImage, WorkerTrouble, Leave, ChunkRequest, ImageRefused, ImageReceived, SubmitFrame,
+            FrameProgress, FrameReply, FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery, StatusReply, ShutDown, ShutDownReply>
+          Message>
+  void On(const Message&, const Bytes&) {}
 
   // ---- registration
   bool Heard(Epoch from);  // false: not from the coordinator that this worker is registered with
@@ -85,7 +74,7 @@ struct WorkerMachine::State {
   GroupRun* FindRun(const GroupKey& key);
   void AfterRun(GroupRun& run);  // ends the run if it failed or is finished: `run` is then gone
   void EndRun(GroupKey key);
-  void AddToFrame(Frame& frame, GroupImage image);
+  void EndRuns(const Frame& frame);
   void CheckAccumulator(FrameId id, Frame& frame);
   void Trouble(const GroupKey& key, Status status, WorkerId unreachable = 0);
   Time NextWake() const;
@@ -204,9 +193,7 @@ void WorkerMachine::State::FinishBefore(FrameId frame) {
 void WorkerMachine::State::DropFrame(FrameId id) {
   const auto found = frames.find(id);
   if (found == frames.end()) return;
-  for (const auto& [group, run] : found->second.groups) {
-    if (run) EndRun(run->key());
-  }
+  EndRuns(found->second);
   if (found->second.accumulator) found->second.accumulator->Drop(actions);
   frames.erase(found);
 }
@@ -249,9 +236,7 @@ void WorkerMachine::State::On(const GroupAssignment& assignment, const Bytes&) {
 }
 
 void WorkerMachine::State::BeginAttempt(FrameId id, Frame& frame, const GroupAssignment& assignment) {
-  for (const auto& [group, run] : frame.groups) {
-    if (run) EndRun(run->key());
-  }
+  EndRuns(frame);
   frame.groups.clear();
   frame.attempt = assignment.key.attempt;
   early.Forget([&](const GroupKey& key) { return key.frame == id && key.attempt < frame.attempt; });
@@ -313,9 +298,7 @@ void WorkerMachine::State::On(const SendFailed& failed) {
 void WorkerMachine::State::On(const PeerUnreachable& peer) {
   for (const auto& [id, frame] : frames) {
     for (const auto& [group, run] : frame.groups) {
-      if (!run) continue;
-      const std::vector<Peer>& peers = run->assignment().peers;
-      if (std::any_of(peers.begin(), peers.end(), [&](const Peer& p) { return p.worker == peer.worker; })) {
+      if (run && run->HasPeer(peer.worker)) {
         Trouble(run->key(), Status::Unavailable(fmt::format("worker {} cannot be reached", peer.worker)), peer.worker);
       }
     }
@@ -334,7 +317,10 @@ void WorkerMachine::State::AfterRun(GroupRun& run) {
   if (!run.failure().ok()) return FailGroup(key, Status(run.failure()));
   std::optional<GroupImage> image = run.TakeGroupImage();
   if (run.finished()) EndRun(key);
-  if (image) AddToFrame(frames.at(key.frame), std::move(*image));
+  if (!image) return;
+  Frame& frame = frames.at(key.frame);
+  frame.accumulator->Add(std::move(*image), actions);
+  CheckAccumulator(key.frame, frame);
 }
 
 // Ends the run, done or not. Late messages of its group are then ignored.
@@ -345,10 +331,10 @@ void WorkerMachine::State::EndRun(GroupKey key) {
   run.reset();
 }
 
-void WorkerMachine::State::AddToFrame(Frame& frame, GroupImage image) {
-  const FrameId id = image.key.frame;
-  frame.accumulator->Add(std::move(image), actions);
-  CheckAccumulator(id, frame);
+void WorkerMachine::State::EndRuns(const Frame& frame) {
+  for (const auto& [group, run] : frame.groups) {
+    if (run) EndRun(run->key());
+  }
 }
 
 void WorkerMachine::State::CheckAccumulator(FrameId id, Frame& frame) {
@@ -356,9 +342,7 @@ void WorkerMachine::State::CheckAccumulator(FrameId id, Frame& frame) {
   Trouble({id, frame.attempt, frame.accumulator->groups_done()}, frame.accumulator->failure());
   frame.accumulator->Drop(actions);
   frame.accumulator.reset();
-  for (const auto& [group, run] : frame.groups) {
-    if (run) EndRun(run->key());
-  }
+  EndRuns(frame);
 }
 
 void WorkerMachine::State::FailGroup(const GroupKey& key, const Status& status) {
@@ -394,7 +378,7 @@ WorkerMachine::WorkerMachine(WorkerConfig config) : state_(std::make_unique<Stat
 WorkerMachine::~WorkerMachine() = default;
 WorkerMachine::WorkerMachine(WorkerMachine&&) noexcept = default;
 
-std::vector<WorkerAction> WorkerMachine::Step(const WorkerEvent& event, Time now) {
+WorkerActions WorkerMachine::Step(const WorkerEvent& event, Time now) {
   State& s = *state_;
   s.now = now;
   if (now > s.wake) s.last_heard += now - s.wake;

@@ -36,7 +36,14 @@
 
 namespace slabstream {
 
-using ImageHandle = std::uint64_t;  // named by the machine, never reused; 0: none
+using ImageHandle = std::uint64_t;  // named by the machine, before the image exists; never reused; 0: none
+class ImageNames {
+ public:
+  ImageHandle Next() { return ++last_; }
+
+ private:
+  ImageHandle last_ = 0;
+};
 
 // One box of voxels (halo included) of one dataset, as it is cached.
 struct SlabKey {
@@ -202,6 +209,7 @@ struct ReleaseImage {
 struct StopProcess {};
 using WorkerAction = std::variant<SendControl, SendChunkRequest, ConnectSlabs, OpenSlab, StoreChunk, DropSlab, StartRender, CancelRender,
                                   StartCombine, FindHidden, SendPartial, SendFrame, ReleaseImage, StopProcess>;
+using WorkerActions = std::vector<WorkerAction>;
 
 class WorkerMachine {
  public:
@@ -209,7 +217,7 @@ class WorkerMachine {
   ~WorkerMachine();
   WorkerMachine(WorkerMachine&&) noexcept;
 
-  std::vector<WorkerAction> Step(const WorkerEvent& event, Time now);
+  WorkerActions Step(const WorkerEvent& event, Time now);
   Time NextWake() const;
 
   bool registered() const;

@@ -12,9 +12,8 @@
 namespace slabstream {
 namespace {
 
-std::size_t IndexOf(const PixelBounds& bounds, std::int32_t x, std::int32_t y) {
-  return std::size_t(y - bounds.y_begin) * std::size_t(bounds.width()) + std::size_t(x - bounds.x_begin);
-}
+// The index of the first pixel of row y.
+std::size_t RowBegin(const PixelBounds& bounds, std::int32_t y) { return std::size_t(y - bounds.y_begin) * std::size_t(bounds.width()); }
 
 TargetPixels At(LocalImage& image, std::size_t pixel) {
   if (!HasDepth(image.format)) return {&image.rgba[4 * pixel], nullptr, nullptr};
@@ -55,12 +54,7 @@ bool CombineRow(PixelFormat format, const SourcePixels& ours, const SourcePixels
   return false;
 }
 
-// Columns [begin, end) of a row of some image; none if begin == end.
-struct Stretch {
-  std::size_t begin = 0, end = 0;
-};
-
-Stretch Hull(const Stretch& a, const Stretch& b) {
+ColumnSpan Hull(const ColumnSpan& a, const ColumnSpan& b) {
   if (a.begin == a.end) return b;
   if (b.begin == b.end) return a;
   return {std::min(a.begin, b.begin), std::max(a.end, b.end)};
@@ -69,7 +63,7 @@ Stretch Hull(const Stretch& a, const Stretch& b) {
 // Pixels of one row, where they are stored, and their columns in the image that they are combined into.
 struct RowPixels {
   SourcePixels first;
-  Stretch columns;
+  ColumnSpan columns;
   SourcePixels At(std::size_t column) const {
     const std::size_t offset = column - columns.begin;
     if (first.depth == nullptr) return {first.rgba + 4 * offset, nullptr, nullptr};
@@ -89,12 +83,12 @@ bool AreFinite(const LocalImage& image, std::size_t first, std::size_t count) {
 // still change.
 template <Values kTheirs>
 bool MergeRow(const RowPixels& ours, const RowPixels& theirs, Side side, LocalImage& image, std::size_t row, bool in_place) {
-  const Stretch a = ours.columns, b = theirs.columns, hull = Hull(a, b);
-  std::array<std::size_t, 4> cuts = {a.begin, a.end, b.begin, b.end};
+  const ColumnSpan a = ours.columns, b = theirs.columns, hull = Hull(a, b);
+  std::array<std::uint32_t, 4> cuts = {a.begin, a.end, b.begin, b.end};
   std::ranges::sort(cuts);
   bool valid = true;
   for (std::size_t i = 0; i + 1 < cuts.size(); ++i) {
-    const std::size_t begin = std::max(cuts[i], hull.begin), end = std::min(cuts[i + 1], hull.end);
+    const std::uint32_t begin = std::max(cuts[i], hull.begin), end = std::min(cuts[i + 1], hull.end);
     if (begin >= end) continue;
     const bool in_ours = begin >= a.begin && end <= a.end, in_theirs = begin >= b.begin && end <= b.end;
     if (in_ours && in_theirs) {
@@ -118,7 +112,7 @@ RowPixels RowOf(const ImageView& view, std::int32_t y, std::int32_t x_begin) {
   if (y < view.bounds.y_begin || y >= view.bounds.y_end) return {};
   const ColumnSpan& row = view.rows[std::size_t(y - view.bounds.y_begin)];
   if (row.begin == row.end) return {};
-  const auto offset = std::size_t(view.bounds.x_begin - x_begin);
+  const auto offset = std::uint32_t(view.bounds.x_begin - x_begin);
   return {At(view, std::size_t(y - view.bounds.y_begin) * view.stride + row.begin), {offset + row.begin, offset + row.end}};
 }
 
@@ -130,22 +124,20 @@ SourcePixels InPlace(const RunImageHeader& header, const RunPayload& runs, std::
           reinterpret_cast<const std::uint32_t*>(runs.voxel(first, count).data())};
 }
 
-ColumnSpan AsSpan(const Stretch& columns) { return {std::uint32_t(columns.begin), std::uint32_t(columns.end)}; }
-
 // Adds `theirs` to row y of an image that has room for it. False: as MergeRow.
 template <Values kTheirs>
 bool MergeInPlace(LocalImage& image, std::int32_t y, const RowPixels& theirs, Side side) {
   if (theirs.columns.begin == theirs.columns.end) return true;
-  const std::size_t row = IndexOf(image.bounds, image.bounds.x_begin, y);
+  const std::size_t row = RowBegin(image.bounds, y);
   ColumnSpan* const span = image.rows.empty() ? nullptr : &image.rows[std::size_t(y - image.bounds.y_begin)];
-  const Stretch columns = span == nullptr ? Stretch{0, std::size_t(image.bounds.width())} : Stretch{span->begin, span->end};
+  const ColumnSpan columns = span == nullptr ? ColumnSpan{0, std::uint32_t(image.bounds.width())} : *span;
   RowPixels ours;
   if (columns.begin < columns.end) {
     const TargetPixels here = At(image, row + columns.begin);
     ours = {{here.rgba, here.depth, here.voxel}, columns};
   }
   const bool valid = MergeRow<kTheirs>(ours, theirs, side, image, row, true);
-  if (span != nullptr) *span = AsSpan(Hull(columns, theirs.columns));
+  if (span != nullptr) *span = Hull(columns, theirs.columns);
   return valid;
 }
 
@@ -167,8 +159,8 @@ bool CombineRows(LocalImage& image, const ImageView& other, Side side, const Pix
   image.rows.resize(std::size_t(room.height()));
   for (std::int32_t y = room.y_begin; y < room.y_end; ++y) {
     const RowPixels a = RowOf(ours, y, room.x_begin), b = RowOf(other, y, room.x_begin);
-    if (!MergeRow<kOther>(a, b, side, image, IndexOf(room, room.x_begin, y), false)) return false;
-    image.rows[std::size_t(y - room.y_begin)] = AsSpan(Hull(a.columns, b.columns));
+    if (!MergeRow<kOther>(a, b, side, image, RowBegin(room, y), false)) return false;
+    image.rows[std::size_t(y - room.y_begin)] = Hull(a.columns, b.columns);
   }
   return true;
 }
@@ -246,7 +238,7 @@ Status CombineRuns(LocalImage& image, const RunImageHeader& header, std::span<co
       }
       pixels = {copy.rgba, copy.depth, copy.voxel};
     }
-    const auto column = std::size_t(header.bounds.x_begin - image.bounds.x_begin) + run.column;
+    const std::uint32_t column = std::uint32_t(header.bounds.x_begin - image.bounds.x_begin) + run.column;
     const std::int32_t y = header.bounds.y_begin + std::int32_t(run.row);
     const RowPixels theirs = {pixels, {column, column + run.pixel_count}};
     if (!floats) {

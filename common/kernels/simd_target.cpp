@@ -25,7 +25,9 @@ std::vector<std::string> SimdTargets() {
   return names;
 }
 
-Status LimitSimdTarget(const std::string& name) {
+Status LimitSimdTargetByEnvironment() {
+  const char* name = std::getenv("SLABSTREAM_SIMD");
+  if (name == nullptr || *name == '\0') return Status::Ok();
   std::string known;
   for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
     if (NameOf(target) == name) {
@@ -34,14 +36,7 @@ Status LimitSimdTarget(const std::string& name) {
     }
     known += (known.empty() ? "" : ", ") + NameOf(target);
   }
-  return Status::InvalidArgument("instruction set '" + name + "' is not one of: " + known);
-}
-
-Status LimitSimdTargetByEnvironment() {
-  const char* name = std::getenv("SLABSTREAM_SIMD");
-  if (name == nullptr || *name == '\0') return Status::Ok();
-  const Status status = LimitSimdTarget(name);
-  return status.ok() ? status : Status::InvalidArgument("SLABSTREAM_SIMD: " + status.message());
+  return Status::InvalidArgument("SLABSTREAM_SIMD: instruction set '" + std::string(name) + "' is not one of: " + known);
 }
 
 }  // namespace slabstream

@@ -9,7 +9,6 @@
 #include "tests/support/simd_targets.h"
 #include "worker/kernels/normal_code.h"
 #include "worker/kernels/phong.h"
-#include "worker/kernels/phong_table.h"
 
 namespace slabstream {
 namespace {
@@ -37,16 +36,7 @@ TEST(NormalCode, HasExactAxesAndOneCodeForNone) {
   EXPECT_EQ(EncodeNormal(infinite, 1, 1), kNoGradient);
 }
 
-TEST(Phong, PowerIsAccurate) {
-  for (double base : {0.0, 1e-300, 0.01, 0.3, 0.7071, 0.9, 0.999, 1 - 1e-9, 1.0}) {
-    for (double exponent : {1.0, 2.5, 20.0, 333.0, 1000.0}) {
-      const double expected = std::pow(base, exponent);
-      EXPECT_NEAR(PowerOfFraction(base, exponent), expected, 1e-9 * expected) << base << " ^ " << exponent;
-    }
-  }
-}
-
-// The bound of phong_table.h.
+// The bound of phong.h.
 TEST(PhongTable, IsTheDefinitionOnEveryInstructionSet) {
   const Vec3 view = Normalized(Vec3{0.3, 0.5, -0.8});
   for (float shininess : {1.0F, 20.0F, 150.0F, 1000.0F}) {
@@ -55,7 +45,10 @@ TEST(PhongTable, IsTheDefinitionOnEveryInstructionSet) {
       Shading shading;
       shading.lights = lights;
       shading.ambient = 0.1F, shading.diffuse = 0.6F, shading.specular = 0.4F, shading.shininess = shininess;
-      const std::vector<PhongFactors> expected = Phong(shading, view).ByNormalCode();
+      const Phong phong(shading, view);
+      std::vector<PhongFactors> expected;
+      for (std::uint16_t code = 0; code < kNoGradient; ++code) expected.push_back(phong.AtNormal(DecodeNormal(code)));
+      expected.push_back(phong.WithoutGradient());
       const double bound = 2e-7 * std::max(20.0, double(shininess)) * double(std::max<std::size_t>(lights.size(), 1));
       ForEachTarget([&] {
         const std::vector<PhongFactors> got = PhongTable(shading, view);

@@ -11,7 +11,7 @@
 #include "tests/support/renderers.h"
 #include "worker/kernels/normal_code.h"
 #include "worker/renderers/splat/splat_cache.h"
-#include "worker/renderers/zbuffer/surface_cache.h"
+#include "worker/renderers/zbuffer/surface.h"
 
 namespace slabstream {
 namespace {
@@ -114,7 +114,7 @@ TEST(Surface, IsTheOpenFacesOfOpaqueVoxels) {
     v[side / 2] += side % 2 == 0 ? -1 : 1;
     return v;
   };
-  const Surface& surface = slab->CacheOf<SurfaceCache>().OpaqueSurface(*slab, setup, box);
+  const Surface surface = FindSurface(slab->voxels(), slab->ranges(), table, SelectBins(table, threshold), {1, 1, 1}, box);
   std::size_t expected = 0;
   for (Index3 v = box.begin; v.z < box.end.z; ++v.z) {
     for (v.y = box.begin.y; v.y < box.end.y; ++v.y) {

@@ -57,15 +57,15 @@ TEST(ShadeOctets, AgreesWithTheReference) {
   std::uniform_real_distribution<float> uniform(0, 1);
   for (int levels : {1, 2, 9}) {
     SCOPED_TRACE(::testing::Message() << "seed " << seed << " levels " << levels);
+    constexpr int kBins = 7;
     ShadeTables tables;
-    tables.bins = 7;
     tables.levels = levels;
     // Some octets are beyond the levels at both ends.
     constexpr float kSlopeStep = 0.1F;
     tables.level_scale = 0.8F * float(levels);
     tables.level_offset = 0.85F * float(levels);
     tables.last_level = 0.999F * float(levels - 1);
-    for (int bin = 0; bin < tables.bins; ++bin) {
+    for (int bin = 0; bin < kBins; ++bin) {
       for (int c = 0; c < 3; ++c) tables.color.push_back(uniform(random));
       for (int level = 0; level < levels; ++level) tables.opacity.push_back(uniform(random));
       tables.color.push_back(tables.opacity[std::size_t(bin * levels)]);
@@ -93,7 +93,6 @@ TEST(ShadeOctets, AgreesWithTheReference) {
 // Between two levels opacities are interpolated.
 TEST(ShadeOctets, InterpolatesBetweenLevels) {
   ShadeTables tables;
-  tables.bins = 1;
   tables.levels = 3;
   tables.level_scale = 1;
   tables.last_level = 1.999F;

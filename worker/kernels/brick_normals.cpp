@@ -3,7 +3,6 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "worker/kernels/brick_normals.cpp"
 #include <hwy/foreach_target.h>
-// Highway wants this order.
 #include <hwy/highway.h>
 
 #include <bit>
@@ -12,8 +11,7 @@
 #include "worker/kernels/normal_code.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace slabstream {
-namespace HWY_NAMESPACE {
+namespace slabstream::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 using D = hn::CappedTag<float, 16>;  // divides kNormalRow and kNormalColumns
@@ -95,8 +93,7 @@ void Encode(const NormalSums& below, const NormalSums& middle, const NormalSums&
   }
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace slabstream
+}  // namespace slabstream::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
@@ -106,18 +103,9 @@ HWY_EXPORT(Sum16);
 HWY_EXPORT(SumFloat);
 HWY_EXPORT(Encode);
 
-template <>
-void SumPlane(const NormalSamples<std::uint8_t>& samples, NormalSums& sums) {
-  HWY_DYNAMIC_DISPATCH(Sum8)(samples, sums);
-}
-template <>
-void SumPlane(const NormalSamples<std::uint16_t>& samples, NormalSums& sums) {
-  HWY_DYNAMIC_DISPATCH(Sum16)(samples, sums);
-}
-template <>
-void SumPlane(const NormalSamples<float>& samples, NormalSums& sums) {
-  HWY_DYNAMIC_DISPATCH(SumFloat)(samples, sums);
-}
+void SumPlane(const NormalSamples<std::uint8_t>& samples, NormalSums& sums) { HWY_DYNAMIC_DISPATCH(Sum8)(samples, sums); }
+void SumPlane(const NormalSamples<std::uint16_t>& samples, NormalSums& sums) { HWY_DYNAMIC_DISPATCH(Sum16)(samples, sums); }
+void SumPlane(const NormalSamples<float>& samples, NormalSums& sums) { HWY_DYNAMIC_DISPATCH(SumFloat)(samples, sums); }
 
 void EncodeNormals(const NormalSums& below, const NormalSums& middle, const NormalSums& above, const NormalScales& scales,
                    std::uint32_t rows, std::uint16_t (*codes)[kNormalRow]) {

@@ -30,8 +30,9 @@ struct NormalScales {
   float z = 0;
 };
 
-template <class T>
-void SumPlane(const NormalSamples<T>& samples, NormalSums& sums);
+void SumPlane(const NormalSamples<std::uint8_t>& samples, NormalSums& sums);
+void SumPlane(const NormalSamples<std::uint16_t>& samples, NormalSums& sums);
+void SumPlane(const NormalSamples<float>& samples, NormalSums& sums);
 
 // codes[y][x] of normal_code.h, for the rows y whose bit is set in `rows`.
 void EncodeNormals(const NormalSums& below, const NormalSums& middle, const NormalSums& above, const NormalScales& scales,

@@ -3,7 +3,6 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "worker/kernels/draw_faces.cpp"
 #include <hwy/foreach_target.h>
-// Highway wants this order.
 #include <hwy/highway.h>
 
 #include <hwy/cache_control.h>
@@ -13,8 +12,7 @@
 #include <limits>
 
 HWY_BEFORE_NAMESPACE();
-namespace slabstream {
-namespace HWY_NAMESPACE {
+namespace slabstream::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 using FloatTag = hn::CappedTag<float, 16>;  // lanes are faces
@@ -229,8 +227,8 @@ HWY_INLINE void DrawStamp(const Stamp& stamp, const FaceBatch& batch, std::size_
 }
 
 template <bool kPerspective>
-HWY_INLINE std::size_t Draw(const FaceProjection& faces, const FaceSite* sites, const FaceNormals* normals, std::uint32_t first,
-                            std::uint32_t count, const KeyBand& band) {
+std::size_t Draw(const FaceProjection& faces, const FaceSite* sites, const FaceNormals* normals, std::uint32_t first, std::uint32_t count,
+                 const KeyBand& band) {
   const auto lanes = std::uint32_t(hn::Lanes(FloatTag()));
   const Stamp stamp(faces);
   FaceBatch batch;
@@ -254,13 +252,10 @@ HWY_INLINE std::size_t Draw(const FaceProjection& faces, const FaceSite* sites, 
   return drawn;
 }
 
-std::size_t DrawOrthographic(const FaceProjection& faces, const FaceSite* sites, const FaceNormals* normals, std::uint32_t first,
-                             std::uint32_t count, const KeyBand& band) {
-  return Draw<false>(faces, sites, normals, first, count, band);
-}
-std::size_t DrawPerspective(const FaceProjection& faces, const FaceSite* sites, const FaceNormals* normals, std::uint32_t first,
-                            std::uint32_t count, const KeyBand& band) {
-  return Draw<true>(faces, sites, normals, first, count, band);
+std::size_t DrawAny(Projection projection, const FaceProjection& faces, const FaceSite* sites, const FaceNormals* normals,
+                    std::uint32_t first, std::uint32_t count, const KeyBand& band) {
+  return projection == Projection::kPerspective ? Draw<true>(faces, sites, normals, first, count, band)
+                                                : Draw<false>(faces, sites, normals, first, count, band);
 }
 
 bool AllNearerThan(const KeyBand& band, const PixelBounds& bounds, float depth) {
@@ -281,20 +276,17 @@ bool AllNearerThan(const KeyBand& band, const PixelBounds& bounds, float depth) 
   return true;
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace slabstream
+}  // namespace slabstream::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace slabstream {
-HWY_EXPORT(DrawOrthographic);
-HWY_EXPORT(DrawPerspective);
+HWY_EXPORT(DrawAny);
 HWY_EXPORT(AllNearerThan);
 
 std::size_t DrawFaces(Projection projection, const FaceProjection& faces, const FaceSite* sites, const FaceNormals* normals,
                       std::uint32_t first, std::uint32_t count, const KeyBand& band) {
-  return projection == Projection::kPerspective ? HWY_DYNAMIC_DISPATCH(DrawPerspective)(faces, sites, normals, first, count, band)
-                                                : HWY_DYNAMIC_DISPATCH(DrawOrthographic)(faces, sites, normals, first, count, band);
+  return HWY_DYNAMIC_DISPATCH(DrawAny)(projection, faces, sites, normals, first, count, band);
 }
 
 bool AllNearer(const KeyBand& band, const PixelBounds& bounds, float depth) {

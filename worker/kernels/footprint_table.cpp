@@ -70,12 +70,8 @@ FirstSamples::FirstSamples(const Lattice& lattice, std::int64_t place, std::int6
   stride_beyond_ = stride - stride_samples_ * step_;
 }
 
-std::int32_t FirstSampleAt(const Lattice& lattice, std::int64_t place, std::int32_t begin, std::int32_t end) {
-  return FirstSamples(lattice, place, 0).In(begin, end);
-}
-
 std::int32_t FirstSampleFrom(const Lattice& lattice, double radius, double voxel, std::int32_t begin, std::int32_t end) {
-  return FirstSampleAt(lattice, ToFixed(voxel - radius + 1), begin, end);
+  return FirstSamples(lattice, ToFixed(voxel - radius + 1), 0).In(begin, end);
 }
 
 }  // namespace slabstream

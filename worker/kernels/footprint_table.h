@@ -70,9 +70,6 @@ class FirstSamples {
   std::int64_t stride_samples_ = 0, stride_beyond_ = 0;  // the same for the stride, rounded down
 };
 
-// The first sample i with At(i) at or beyond `place`, in [begin, end].
-std::int32_t FirstSampleAt(const Lattice& lattice, std::int64_t place, std::int32_t begin, std::int32_t end);
-
 // The first sample whose position u is at or beyond `voxel`, in [begin, end].
 std::int32_t FirstSampleFrom(const Lattice& lattice, double radius, double voxel, std::int32_t begin, std::int32_t end);
 

@@ -23,14 +23,10 @@ class Phong {
   // `view_direction`: physical, unit, away from the eye.
   Phong(const Shading& shading, const Vec3& view_direction);
 
-  // The definition, in double precision. PhongTable (splatting) and ShadeFaces (Z-buffer) are tested against it. The same bits on every
-  // machine.
+  // The definition, in double precision, which tests compare kernels with.
   PhongFactors AtNormal(const Vec3& unit_normal) const;
   PhongFactors WithoutGradient() const;
   const std::vector<Vec3>& lights() const { return lights_; }  // unit directions towards them; the headlight if none was given
-
-  // By normal code (normal_code.h), kNoGradient included.
-  std::vector<PhongFactors> ByNormalCode() const;
 
  private:
   Shading shading_;
@@ -38,8 +34,8 @@ class Phong {
   Vec3 to_viewer_;            // unit
 };
 
-// base^exponent for base in [0, 1] and exponent in [1, 1000], within 1e-9 relative. The same bits everywhere, which std::pow does not
-// guarantee.
-double PowerOfFraction(double base, double exponent);
+// Light by normal code (normal_code.h), kNoGradient included: in single precision, within 2e-7 * max(shininess, 20) of the definition per
+// light.
+std::vector<PhongFactors> PhongTable(const Shading& shading, const Vec3& view_direction);
 
 }  // namespace slabstream

@@ -1,9 +1,6 @@
-#include "worker/kernels/phong_table.h"
-
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "worker/kernels/phong_table.cpp"
 #include <hwy/foreach_target.h>
-// Highway wants this order.
 #include <hwy/highway.h>
 
 #include <hwy/contrib/math/math-inl.h>
@@ -15,6 +12,7 @@
 
 #include "common/base/aligned_buffer.h"
 #include "worker/kernels/normal_code.h"
+#include "worker/kernels/phong.h"
 
 #ifndef SLABSTREAM_WORKER_KERNELS_PHONG_TABLE_CPP_  // shared by all instruction sets
 #define SLABSTREAM_WORKER_KERNELS_PHONG_TABLE_CPP_
@@ -23,17 +21,14 @@ namespace slabstream {
 inline constexpr std::size_t kPaddedCodes = (std::size_t{kNoGradient} + 15) / 16 * 16;
 
 // Unit vectors of all codes, component by component.
-struct CodedNormals {
-  std::array<AlignedVector<float>, 3> component;
-};
+using CodedNormals = std::array<AlignedVector<float>, 3>;
 inline const CodedNormals& AllNormals() {
   static const CodedNormals normals = [] {
     CodedNormals all;
     for (int axis = 0; axis < 3; ++axis) {
-      all.component[std::size_t(axis)].resize(kPaddedCodes);
-      for (std::uint16_t code = 0; code < kNoGradient; ++code) {
-        all.component[std::size_t(axis)][code] = float(DecodeNormal(code)[axis]);
-      }
+      AlignedVector<float>& component = all[std::size_t(axis)];
+      component.resize(kPaddedCodes);
+      for (std::uint16_t code = 0; code < kNoGradient; ++code) component[code] = float(DecodeNormal(code)[axis]);
     }
     return all;
   }();
@@ -44,8 +39,7 @@ inline const CodedNormals& AllNormals() {
 #endif
 
 HWY_BEFORE_NAMESPACE();
-namespace slabstream {
-namespace HWY_NAMESPACE {
+namespace slabstream::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 // `lights`: unit; factors: kPaddedCodes of them.
@@ -56,8 +50,7 @@ void FillTable(const Shading& shading, std::span<const Vec3> lights, const Vec3&
   const auto zero = hn::Zero(d), least = hn::Set(d, float(std::max(std::exp(std::log(1e-9) / shading.shininess), 1e-30)));
   const auto shininess = hn::Set(d, shading.shininess);
   for (std::size_t i = 0; i < kPaddedCodes; i += hn::Lanes(d)) {
-    const auto x = hn::Load(d, &normals.component[0][i]), y = hn::Load(d, &normals.component[1][i]),
-               z = hn::Load(d, &normals.component[2][i]);
+    const auto x = hn::Load(d, &normals[0][i]), y = hn::Load(d, &normals[1][i]), z = hn::Load(d, &normals[2][i]);
     // Not fused: a high power would show the difference between instruction sets.
     const auto along = [&](const Vec3& v) HWY_ATTR {
       return hn::Add(hn::Add(hn::Mul(x, hn::Set(d, float(v.x))), hn::Mul(y, hn::Set(d, float(v.y)))), hn::Mul(z, hn::Set(d, float(v.z))));
@@ -78,8 +71,7 @@ void FillTable(const Shading& shading, std::span<const Vec3> lights, const Vec3&
   }
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace slabstream
+}  // namespace slabstream::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE

@@ -11,8 +11,7 @@
 #endif
 
 HWY_BEFORE_NAMESPACE();
-namespace slabstream {
-namespace HWY_NAMESPACE {
+namespace slabstream::HWY_NAMESPACE {
 
 // base^exponent for base in [0, 1]: 2^(exponent log2(base)). Each multiplication and addition is rounded, so every instruction set gives
 // the same bits. PowerOfFractionFloat in shade_faces_reference.cpp does the same operations in the same order.
@@ -42,8 +41,7 @@ HWY_INLINE V PowerOfFraction(V base, V exponent) {
   return hn::IfThenElseZero(positive, hn::Mul(result, scale));
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace slabstream
+}  // namespace slabstream::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #endif

@@ -3,7 +3,6 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "worker/kernels/shade.cpp"
 #include <hwy/foreach_target.h>
-// Highway wants this order.
 #include <hwy/highway.h>
 
 #include <algorithm>
@@ -24,8 +23,7 @@ inline float LevelOf(const ShadeTables& tables, const OctetWork& octet, float sl
 #endif
 
 HWY_BEFORE_NAMESPACE();
-namespace slabstream {
-namespace HWY_NAMESPACE {
+namespace slabstream::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 #if HWY_TARGET == HWY_SCALAR
@@ -181,8 +179,7 @@ void Clear(std::span<const OctetWork> octets) {
   }
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace slabstream
+}  // namespace slabstream::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE

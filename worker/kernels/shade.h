@@ -14,7 +14,7 @@ namespace slabstream {
 // Made once a frame. A voxel's opacity is its opacity in the sheet. Under perspective this depends on the distance between sheets along the
 // voxel's own ray, so there are tables for `levels` evenly spaced distances; opacities in between are interpolated linearly.
 struct ShadeTables {
-  int bins = 0, levels = 1;
+  int levels = 1;
   AlignedVector<float> color;           // [bin][4]: straight colour, then the opacity of level 0
   AlignedVector<float> opacity;         // [bin][level]; one level: not read
   std::vector<PhongFactors> by_normal;  // by normal code

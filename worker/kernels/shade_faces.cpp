@@ -3,21 +3,18 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "worker/kernels/shade_faces.cpp"
 #include <hwy/foreach_target.h>
-// Highway wants this order.
 #include <hwy/highway.h>
 
 #include <hwy/cache_control.h>
 
 #include <algorithm>
 #include <array>
-#include <numbers>
 
 #include "worker/kernels/draw_faces.h"
 #include "worker/kernels/power-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace slabstream {
-namespace HWY_NAMESPACE {
+namespace slabstream::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 using FloatTag = hn::CappedTag<float, 16>;
@@ -207,8 +204,7 @@ void ShadeRow(const FaceShading& shading, const std::uint64_t* keys, std::int32_
   std::copy_n(last_voxel.begin(), count - whole, voxel + whole);
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace slabstream
+}  // namespace slabstream::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE

@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
+#include "worker/kernels/phong.h"
 #include "worker/kernels/shade_faces.h"
 
 namespace slabstream {
@@ -59,11 +59,10 @@ FaceShading MakeFaceShading(const Camera& camera, const Shading& shading, const 
   const Vec3 to_viewer = -camera.view_direction;
   Copy(to_viewer, out.to_viewer);
   out.phong = shading.phong;
-  for (std::size_t i = 0; i < std::max<std::size_t>(shading.lights.size(), 1); ++i) {
-    const Vec3 light = shading.lights.empty() ? to_viewer : Normalized(shading.lights[i]);
-    Copy(light, out.light[i]);
-    out.light_to_viewer[i] = float(Dot(light, to_viewer));
-    ++out.light_count;
+  const Phong phong(shading, camera.view_direction);
+  for (const Vec3& light : phong.lights()) {
+    Copy(light, out.light[out.light_count]);
+    out.light_to_viewer[out.light_count++] = float(Dot(light, to_viewer));
   }
   out.ambient = shading.ambient;
   out.diffuse = shading.diffuse;

@@ -1,7 +1,5 @@
 #include "worker/renderers/brick_ranges.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <limits>
 #include <type_traits>
@@ -52,10 +50,8 @@ BrickRanges::Range RangeOf(const BrickView<T>& brick, const Box& box) {
 }  // namespace
 
 BrickRanges::BrickRanges(const VoxelBricks& voxels) : grid_(voxels.grid()), ranges_(grid_.size()) {
-  VisitScalarType(voxels.type(), [&](auto* type) {
-    using T = std::remove_cvref_t<decltype(*type)>;
-    tbb::parallel_for(0, grid_.counts.y * grid_.counts.z, [&](std::int32_t row) {
-      Index3 brick = {grid_.first.x, grid_.first.y + row % grid_.counts.y, grid_.first.z + row / grid_.counts.y};
+  VisitScalarType(voxels.type(), [&]<class T>(const T*) {
+    ForEachRowOfBricks(grid_, [&](Index3 brick) {
       for (; brick.x < grid_.first.x + grid_.counts.x; ++brick.x) {
         ranges_[grid_.Number(brick)] = RangeOf(voxels.View<T>(brick), grid_.BoxOf(brick));
       }

@@ -1,6 +1,8 @@
 // BrickRanges: least and greatest stored sample of each brick of a slab. With it, bricks that a transfer function does not show are skipped
-// without reading voxels. Bricks are kBrick voxels a side, at global multiples of kBrick, clipped to the slab.
+// without reading voxels.
 #pragma once
+
+#include <tbb/parallel_for.h>
 
 #include <cstdint>
 #include <vector>
@@ -9,6 +11,14 @@
 
 namespace slabstream {
 
+// Calls function(first brick) for each row of bricks along x. Parallel.
+template <class Function>
+void ForEachRowOfBricks(const BrickGrid& grid, Function&& function) {
+  tbb::parallel_for(0, grid.counts.y * grid.counts.z, [&](std::int32_t row) {
+    function(Index3{grid.first.x, grid.first.y + row % grid.counts.y, grid.first.z + row / grid.counts.y});
+  });
+}
+
 class BrickRanges {
  public:
   explicit BrickRanges(const VoxelBricks& voxels);
@@ -16,8 +26,6 @@ class BrickRanges {
   struct Range {
     float min, max;  // of finite samples; min > max: there is none
   };
-  // Of the brick that holds a voxel.
-  const Range& At(std::int32_t x, std::int32_t y, std::int32_t z) const { return Of({x / kBrick, y / kBrick, z / kBrick}); }
   const Range& Of(const Index3& brick) const { return ranges_[grid_.Number(brick)]; }
   std::size_t bytes() const { return ranges_.capacity() * sizeof(Range); }
 

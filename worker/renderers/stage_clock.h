@@ -19,10 +19,7 @@ class StageClock {
   // Records everything since construction as `stage` too: time and span.
   void Finish(Stage stage) {
     last_ = MonotonicNow();
-    report_.stage_ns[std::size_t(stage)] += (last_ - begin_).count();
-    if (report_.spans.size() < kMaxSpans) {
-      report_.spans.push_back({stage, begin_.time_since_epoch().count(), last_.time_since_epoch().count()});
-    }
+    AddStage(report_, stage, begin_.time_since_epoch().count(), last_.time_since_epoch().count());
   }
 
  private:

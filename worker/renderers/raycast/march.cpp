@@ -3,7 +3,6 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "worker/renderers/raycast/march.cpp"
 #include <hwy/foreach_target.h>
-// Highway wants this order.
 #include <hwy/highway.h>
 
 #include <limits>
@@ -12,8 +11,7 @@
 #include "worker/rays/ray_packet-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace slabstream {
-namespace HWY_NAMESPACE {
+namespace slabstream::HWY_NAMESPACE {
 
 // Central differences, times two, of stored samples around a position, interpolated.
 struct Gradient {
@@ -168,7 +166,7 @@ HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& pac
 }
 
 template <class T>
-HWY_INLINE std::uint64_t March(const MarchWork& work, const PixelBounds& tile, float* HWY_RESTRICT rgba, std::size_t floats_a_row) {
+std::uint64_t March(const MarchWork& work, const PixelBounds& tile, float* HWY_RESTRICT rgba, std::size_t floats_a_row) {
   std::uint64_t shaded = 0;
   ForEachPacket(*work.rays, tile, rgba, floats_a_row, [&](const RayPacket& packet, float* HWY_RESTRICT pixels) HWY_ATTR {
     const std::uint64_t found = MarchPacket<T>(work, packet, pixels);
@@ -178,33 +176,24 @@ HWY_INLINE std::uint64_t March(const MarchWork& work, const PixelBounds& tile, f
   return shaded;
 }
 
-std::uint64_t March8(const MarchWork& work, const PixelBounds& tile, float* rgba, std::size_t row) {
-  return March<std::uint8_t>(work, tile, rgba, row);
-}
-std::uint64_t March16(const MarchWork& work, const PixelBounds& tile, float* rgba, std::size_t row) {
-  return March<std::uint16_t>(work, tile, rgba, row);
-}
-std::uint64_t MarchFloat(const MarchWork& work, const PixelBounds& tile, float* rgba, std::size_t row) {
-  return March<float>(work, tile, rgba, row);
+std::uint64_t MarchAny(const MarchWork& work, const PixelBounds& tile, float* rgba, std::size_t floats_a_row) {
+  switch (work.box->type) {
+    case ScalarType::kUint8: return March<std::uint8_t>(work, tile, rgba, floats_a_row);
+    case ScalarType::kUint16: return March<std::uint16_t>(work, tile, rgba, floats_a_row);
+    case ScalarType::kFloat32: break;
+  }
+  return March<float>(work, tile, rgba, floats_a_row);
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace slabstream
+}  // namespace slabstream::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace slabstream {
-HWY_EXPORT(March8);
-HWY_EXPORT(March16);
-HWY_EXPORT(MarchFloat);
+HWY_EXPORT(MarchAny);
 
 std::uint64_t MarchTile(const MarchWork& work, const PixelBounds& tile, float* rgba, std::size_t floats_a_row) {
-  switch (work.box->type) {
-    case ScalarType::kUint8: return HWY_DYNAMIC_DISPATCH(March8)(work, tile, rgba, floats_a_row);
-    case ScalarType::kUint16: return HWY_DYNAMIC_DISPATCH(March16)(work, tile, rgba, floats_a_row);
-    case ScalarType::kFloat32: break;
-  }
-  return HWY_DYNAMIC_DISPATCH(MarchFloat)(work, tile, rgba, floats_a_row);
+  return HWY_DYNAMIC_DISPATCH(MarchAny)(work, tile, rgba, floats_a_row);
 }
 
 }  // namespace slabstream

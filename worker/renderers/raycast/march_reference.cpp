@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <type_traits>
 
 #include "worker/renderers/raycast/march.h"
 
@@ -102,8 +101,8 @@ class ReferenceMarch {
 }  // namespace
 
 void MarchTileReference(const MarchWork& work, const PixelBounds& tile, float* rgba, std::size_t floats_a_row) {
-  VisitScalarType(work.box->type, [&](auto* type) {
-    const ReferenceMarch<std::remove_cvref_t<decltype(*type)>> march(work);
+  VisitScalarType(work.box->type, [&]<class T>(const T*) {
+    const ReferenceMarch<T> march(work);
     for (std::int32_t y = tile.y_begin; y < tile.y_end; ++y) {
       for (std::int32_t x = tile.x_begin; x < tile.x_end; ++x) {
         const std::array<float, 4> pixel = march.Pixel(x, y);

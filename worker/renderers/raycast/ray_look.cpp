@@ -8,10 +8,6 @@
 namespace slabstream {
 namespace {
 
-bool OneValueABin(const ClassificationTable& table, const VolumeDescription& description) {
-  return description.type != ScalarType::kFloat32 && table.bin_from_stored_scale == 1;
-}
-
 Float3 Divided(const Vec3& direction, const Vec3& spacing) {
   const Vec3 v = direction / spacing;
   return {float(v.x), float(v.y), float(v.z)};
@@ -22,7 +18,7 @@ Float3 Divided(const Vec3& direction, const Vec3& spacing) {
 RayLook MakeRayLook(const ClassificationTable& table, const VolumeDescription& description, const Camera& camera, const Shading& shading,
                     double steps_per_voxel) {
   RayLook look;
-  const bool exact = OneValueABin(table, description);
+  const bool exact = description.type != ScalarType::kFloat32 && table.bin_from_stored_scale == 1;  // a bin for each stored value
   const int fine = exact ? kMaxBins / table.size() : 1;  // entries from one bin to the next: 16 for 8-bit volumes
   const int entries = (table.size() - 1) * fine + 1;
   look.origin = float(table.stored_origin);

@@ -4,7 +4,6 @@
 //   1. once a slab: pad its voxels (RayVolume) and find the range of each small cell
 //   2. once a transfer function: for each cell, find the distance to the nearest visible one (EmptyDistances)
 //   3. once a frame: tiles of pixels are separate tasks; a tile's rays march through the box (March)
-#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -35,10 +34,7 @@ Visibility VisibilityOf(const RayPiece& piece, const VisibleSamples& visible) {
     for (cell.y = 0; cell.y < counts.y; ++cell.y) {
       for (cell.x = 0; cell.x < counts.x; ++cell.x, ++number) {
         if (result.distances[number] != 0) continue;
-        const Box one = {cell, {cell.x + 1, cell.y + 1, cell.z + 1}};
-        cells = cells.empty() ? one
-                              : Box{{std::min(cells.begin.x, cell.x), std::min(cells.begin.y, cell.y), cells.begin.z},
-                                    {std::max(cells.end.x, one.end.x), std::max(cells.end.y, one.end.y), one.end.z}};
+        cells = Hull(cells, {cell, {cell.x + 1, cell.y + 1, cell.z + 1}});
       }
     }
   }

@@ -1,11 +1,8 @@
 // FindCellBeams: two passes over the bricks that may hold anything, with a row of bricks along x as a task. The first pass marks occupied
 // voxels, which determines where each beam's records begin; the second fills in the records.
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <type_traits>
 
 #include "worker/kernels/brick_normals.h"
 #include "worker/renderers/splat/occupied_cells.h"
@@ -24,19 +21,17 @@ class BeamFinder {
  public:
   BeamFinder(const VoxelBricks& voxels, const BrickRanges& ranges, const BinLookup<T>& lookup, const Vec3& spacing)
       : voxels_(voxels), grid_(voxels.grid()), lookup_(lookup), spacing_(spacing), intervals_(lookup.Intervals()), shows_(grid_.size()) {
-    Box& box = beams_.box;
-    box = {grid_.box.end, grid_.box.begin};
-    ForEachBrick([&](const Index3& brick) {
-      const BrickRanges::Range& range = ranges.Of(brick);
-      if (!lookup.AnyBetween(range.min, range.max)) return;
-      shows_[grid_.Number(brick)] = 1;
-      const Box part = grid_.BoxOf(brick);
-      for (int axis = 0; axis < 3; ++axis) {
-        box.begin[axis] = std::min(box.begin[axis], part.begin[axis]);
-        box.end[axis] = std::max(box.end[axis], part.end[axis]);
+    const Index3 begin = grid_.first, end = {begin.x + grid_.counts.x, begin.y + grid_.counts.y, begin.z + grid_.counts.z};
+    for (Index3 brick = begin; brick.z < end.z; ++brick.z) {
+      for (brick.y = begin.y; brick.y < end.y; ++brick.y) {
+        for (brick.x = begin.x; brick.x < end.x; ++brick.x) {
+          const BrickRanges::Range& range = ranges.Of(brick);
+          if (!lookup.AnyBetween(range.min, range.max)) continue;
+          shows_[grid_.Number(brick)] = 1;
+          beams_.box = Hull(beams_.box, grid_.BoxOf(brick));
+        }
       }
-    });
-    if (box.empty()) box = {};
+    }
   }
 
   CellBeams Find() && {
@@ -47,7 +42,8 @@ class BeamFinder {
     beams_.beam_count = std::size_t(box.size().y) * std::size_t(box.size().z);
     beams_.masks = MakeLargeArray<std::uint32_t>(beams_.cells());
     beams_.first_record = MakeLargeArray<std::uint64_t>(beams_.beam_count + 1);
-    ForEachRowOfBricks([this](const Index3& first) { Mark(first); });
+    const BrickGrid bricks(box);
+    ForEachRowOfBricks(bricks, [this](const Index3& first) { Mark(first); });
     std::uint64_t total = 0;
     for (std::size_t beam = 0; beam <= beams_.beam_count; ++beam) {
       const std::uint64_t count = beam < beams_.beam_count ? beams_.first_record[beam] : 0;
@@ -55,30 +51,11 @@ class BeamFinder {
       total += count;
     }
     beams_.records = MakeLargeArray<VoxelRecord>(total);
-    ForEachRowOfBricks([this](const Index3& first) { Fill(first); });
+    ForEachRowOfBricks(bricks, [this](const Index3& first) { Fill(first); });
     return std::move(beams_);
   }
 
  private:
-  template <class Function>
-  void ForEachBrick(Function&& function) const {
-    const Index3 begin = grid_.first, end = {begin.x + grid_.counts.x, begin.y + grid_.counts.y, begin.z + grid_.counts.z};
-    for (Index3 brick = begin; brick.z < end.z; ++brick.z) {
-      for (brick.y = begin.y; brick.y < end.y; ++brick.y) {
-        for (brick.x = begin.x; brick.x < end.x; ++brick.x) function(brick);
-      }
-    }
-  }
-
-  // Of the box of the beams; calls function(first brick).
-  template <class Function>
-  void ForEachRowOfBricks(Function&& function) const {
-    const BrickGrid bricks(beams_.box);
-    tbb::parallel_for(0, bricks.counts.y * bricks.counts.z, [&](std::int32_t row) {
-      function(Index3{bricks.first.x, bricks.first.y + row % bricks.counts.y, bricks.first.z + row / bricks.counts.y});
-    });
-  }
-
   // The row's bricks that may hold anything.
   template <class Function>
   void ForEachShown(Index3 brick, Function&& function) const {
@@ -165,7 +142,7 @@ class BeamFinder {
         for (summed_end = std::max(summed_end, below); summed_end <= above; ++summed_end) {
           NormalSamples<T> samples;
           LoadPlane(box, brick, summed_end, samples);
-          SumPlane<T>(samples, planes[std::size_t(summed_end % 3)]);
+          SumPlane(samples, planes[std::size_t(summed_end % 3)]);
         }
         scales.z = ScaleAt(Axis::kZ, z);
         std::uint16_t codes[kBrick][kBrick];
@@ -240,8 +217,7 @@ class BeamFinder {
 
 CellBeams FindCellBeams(const VoxelBricks& voxels, const BrickRanges& bricks, const ClassificationTable& table,
                         const BinSelection& selection, const Vec3& spacing) {
-  return VisitScalarType(voxels.type(), [&](auto* type) {
-    using T = std::remove_cvref_t<decltype(*type)>;
+  return VisitScalarType(voxels.type(), [&]<class T>(const T*) {
     const BinLookup<T> lookup(table, selection);
     return BeamFinder<T>(voxels, bricks, lookup, spacing).Find();
   });

@@ -25,9 +25,9 @@ inline constexpr std::int32_t kCellVoxels = 32, kCellOctets = kCellVoxels / kOct
 
 // All beams of a slab along `u`. Tasks fill the arrays in parallel.
 struct CellBeams {
-  Axis u = Axis::kX, inner = Axis::kY, outer = Axis::kZ;  // beams are numbered [outer][inner]
-  Box box;                                                // holds all occupied voxels, and little else; empty if there are none
-  std::int32_t first_cell = 0, cell_count = 0;            // along u: cell i begins at voxel 32 * (first_cell + i)
+  Axis u = Axis::kX, inner = Axis::kY;          // beams are numbered [the third axis][inner]
+  Box box;                                      // holds all occupied voxels, and little else; empty if there are none
+  std::int32_t first_cell = 0, cell_count = 0;  // along u: cell i begins at voxel 32 * (first_cell + i)
   std::size_t beam_count = 0;
   LargeArray<std::uint32_t> masks;         // [beam][cell]
   LargeArray<std::uint64_t> first_record;  // [beam], and one more: index of the beam's first record

@@ -3,14 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "worker/kernels/phong_table.h"
-
 namespace slabstream {
-namespace {
-
-constexpr int kLevels = 32;  // the interpolation error is then below 1e-4 for any opacity and a field of view of 60 degrees
-
-}  // namespace
 
 SheetOpacity::SheetOpacity(const FrameSetup& setup) : setup_(setup), axes_(AxesOf(setup.camera.traversal_axis)) {
   const Camera& camera = setup.camera;
@@ -31,6 +24,7 @@ SheetOpacity::SheetOpacity(const FrameSetup& setup) : setup_(setup), axes_(AxesO
       largest = std::max(largest, Ratio(q));
     }
   }
+  constexpr int kLevels = 32;  // the interpolation error is then below 1e-4 for any opacity and a field of view of 60 degrees
   levels_ = kLevels;
   levels_per_ratio_ = (kLevels - 1) / std::max(largest - least_ratio_, 1e-9);
 }
@@ -55,7 +49,6 @@ ShadeTables SheetOpacity::Tables(const ClassificationTable& table) const {
   const double voxel_length = std::min({camera.spacing.x, camera.spacing.y, camera.spacing.z});
   const double exponent = central_distance_ / (table.opacity_distance * voxel_length);
   ShadeTables tables;
-  tables.bins = table.size();
   tables.levels = levels_;
   // In levels, a ray's ratio is its length over the spacing of slices.
   constexpr double kBelowLast = 1e-3;  // so that there is always a level above

@@ -45,7 +45,7 @@ const FootprintTable& Footprints::Get(double sigma) {
 }
 
 std::int32_t FirstPixelWithTap(const Lattice& lattice, std::int32_t voxel, std::int32_t begin, std::int32_t end) {
-  return FirstSampleAt(lattice, std::int64_t{voxel} << 32, begin, end);
+  return FirstSamples(lattice, std::int64_t{voxel} << 32, 0).In(begin, end);
 }
 
 SliceSamples SampleSlice(const FrameSetup& setup, const Box& box, const Box& reach, std::int32_t k, Footprints& footprints) {

@@ -8,7 +8,6 @@
 
 #include <cstdint>
 #include <map>
-#include <vector>
 
 #include "common/frame/frame_setup.h"
 #include "common/image/pixel_bounds.h"

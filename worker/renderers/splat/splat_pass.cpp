@@ -1,18 +1,8 @@
 #include "worker/renderers/splat/splat_pass.h"
 
-#include <algorithm>
-
 #include "worker/kernels/segment_set.h"
 
 namespace slabstream {
-namespace {
-
-PixelBounds WholeSegments(const PixelBounds& b) {
-  if (b.empty()) return {};
-  return {b.x_begin / kSegment * kSegment, b.y_begin, (b.x_end + kSegment - 1) / kSegment * kSegment, b.y_end};
-}
-
-}  // namespace
 
 SplatPass::SplatPass(const OccupiedCells& occupied_cells, const ClassificationTable& table, const FrameSetup& frame_setup, const Box& box,
                      const OcclusionMask& hidden_tiles)
@@ -23,8 +13,9 @@ SplatPass::SplatPass(const OccupiedCells& occupied_cells, const ClassificationTa
     slices.push_back(SampleSlice(setup, box, occupied, k, footprints));
     if (!slices.back().owned.empty()) bounds = Union(bounds, slices.back().owned);
   }
-  bounds = WholeSegments(bounds);
   if (bounds.empty()) return;
+  bounds.x_begin = bounds.x_begin / kSegment * kSegment;
+  bounds.x_end = (bounds.x_end + kSegment - 1) / kSegment * kSegment;
 
   first_octet = occupied.begin[u] / kCellVoxels * kCellOctets;
   octet_count = ((occupied.end[u] - 1) / kCellVoxels + 1) * kCellOctets - first_octet;

@@ -1,15 +1,16 @@
-#include "worker/renderers/splat/splatting.h"
-
+// The splatting pipeline (Westover 1990, one sheet a slice): transform, shade, splat, composite. docs/rendering.md defines what it
+// computes.
 #include <tbb/parallel_for.h>
 
 #include <vector>
 
+#include "worker/renderers/renderer.h"
 #include "worker/renderers/splat/splat_band.h"
 #include "worker/renderers/splat/splat_cache.h"
 #include "worker/renderers/splat/splat_pass.h"
 #include "worker/renderers/stage_clock.h"
 
-namespace slabstream {
+namespace slabstream::splat {
 namespace {
 
 // Rows of a band: few enough to stay in the second-level cache with their beams, enough that few voxels are shaded twice.
@@ -29,31 +30,35 @@ void AddTo(RankReport& sum, const RankReport& part) {
   sum.drawn_voxels += part.drawn_voxels;
 }
 
+class SplattingRenderer : public Renderer {
+ public:
+  Result<LocalImage> Render(SlabData& slab, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
+                            const std::atomic<bool>& cancelled, RankReport& report) override {
+    StageClock clock(report);
+    const ClassificationTable& table = slab.Classification(setup);
+    const OccupiedCells& cells = slab.CacheOf<SplatCache>().Occupied(slab, setup, box);
+    report.occupied_voxels += cells.occupied_in_box;
+    clock.Charge(Stage::kPrepare);
+    LocalImage image = MakeLocalImage(PixelFormat::kRgba, {});
+    if (!cells.occupied.empty()) {
+      const SplatPass pass(cells, table, setup, box, hidden);
+      if (!hidden.HidesAll(pass.bounds)) image = MakeLocalImage(PixelFormat::kRgba, pass.bounds);
+      clock.Charge(Stage::kTransform);
+      const std::int32_t bands = (image.bounds.height() + kBandRows - 1) / kBandRows;
+      std::vector<RankReport> parts(static_cast<std::size_t>(bands));
+      tbb::parallel_for(0, bands, [&](std::int32_t i) {
+        RenderBand(pass, pass.bounds.y_begin + i * kBandRows, cancelled, image, parts[std::size_t(i)]);
+      });
+      for (const RankReport& part : parts) AddTo(report, part);
+    }
+    clock.Finish(Stage::kRender);
+    if (cancelled) return Status::Cancelled("rendering was cancelled");
+    return image;
+  }
+};
+
 }  // namespace
 
-Result<LocalImage> SplattingRenderer::Render(SlabData& slab, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
-                                             const std::atomic<bool>& cancelled, RankReport& report) {
-  StageClock clock(report);
-  const ClassificationTable& table = slab.Classification(setup);
-  const OccupiedCells& cells = slab.CacheOf<SplatCache>().Occupied(slab, setup, box);
-  report.occupied_voxels += cells.occupied_in_box;
-  clock.Charge(Stage::kPrepare);
-  LocalImage image = MakeLocalImage(PixelFormat::kRgba, {});
-  if (!cells.occupied.empty()) {
-    const SplatPass pass(cells, table, setup, box, hidden);
-    if (!hidden.HidesAll(pass.bounds)) image = MakeLocalImage(PixelFormat::kRgba, pass.bounds);
-    clock.Charge(Stage::kTransform);
-    const std::int32_t bands = (image.bounds.height() + kBandRows - 1) / kBandRows;
-    std::vector<RankReport> parts(static_cast<std::size_t>(bands));
-    tbb::parallel_for(
-        0, bands, [&](std::int32_t i) { RenderBand(pass, pass.bounds.y_begin + i * kBandRows, cancelled, image, parts[std::size_t(i)]); });
-    for (const RankReport& part : parts) AddTo(report, part);
-  }
-  clock.Finish(Stage::kRender);
-  if (cancelled) return Status::Cancelled("rendering was cancelled");
-  return image;
-}
+std::unique_ptr<Renderer> MakePixelHalf() { return std::make_unique<SplattingRenderer>(); }
 
-std::unique_ptr<Renderer> splat::MakePixelHalf() { return std::make_unique<SplattingRenderer>(); }
-
-}  // namespace slabstream
+}  // namespace slabstream::splat

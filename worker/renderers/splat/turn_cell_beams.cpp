@@ -77,11 +77,10 @@ void TurnRecords(const CellBeams& from, std::int32_t z, CellBeams& to) {
 }  // namespace
 
 CellBeams TurnCellBeams(const CellBeams& along_x) {
-  CHECK(along_x.u == Axis::kX && along_x.inner == Axis::kY && along_x.outer == Axis::kZ);
+  CHECK(along_x.u == Axis::kX && along_x.inner == Axis::kY);
   CellBeams turned;
   turned.u = Axis::kY;
   turned.inner = Axis::kZ;
-  turned.outer = Axis::kX;
   const Box& box = turned.box = along_x.box;
   if (box.empty()) return turned;
   turned.first_cell = box.begin.y / kCellVoxels;

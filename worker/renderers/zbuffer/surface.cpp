@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <bit>
 #include <memory>
-#include <type_traits>
 
 #include "common/base/check.h"
 #include "worker/kernels/draw_faces.h"
@@ -162,24 +161,17 @@ Surface FindSurface(const VoxelBlock& voxels, const BrickRanges& ranges, const C
                     const Vec3& spacing, const Box& box) {
   const Box inside = Intersection(box, voxels.box);
   if (inside.empty()) return {};
-  Index3 first, count;
-  for (int axis = 0; axis < 3; ++axis) {
-    first[axis] = inside.begin[axis] / kFaceBrick;
-    count[axis] = (inside.end[axis] - 1) / kFaceBrick + 1 - first[axis];
-  }
-  std::vector<BrickFaces> parts(std::size_t(count.x) * std::size_t(count.y) * std::size_t(count.z));
-  VisitScalarType(voxels.type, [&](auto* type) {
-    using T = std::remove_cvref_t<decltype(*type)>;
+  const BrickGrid bricks(inside);
+  std::vector<BrickFaces> parts(bricks.size());
+  VisitScalarType(voxels.type, [&]<class T>(const T*) {
     const BinLookup<T> lookup(table, opaque);
-    tbb::parallel_for(std::int32_t{0}, count.z * count.y, [&](std::int32_t row) {
-      const auto brick = std::make_unique<BrickSurface<T>>(voxels, lookup, spacing);
-      for (std::int32_t x = 0; x < count.x; ++x) {
-        const Index3 origin = {(first.x + x) * kFaceBrick, (first.y + row % count.y) * kFaceBrick, (first.z + row / count.y) * kFaceBrick};
-        const Box cell = {origin, {origin.x + kFaceBrick, origin.y + kFaceBrick, origin.z + kFaceBrick}};
-        const Box own = Intersection(cell, inside);
-        const BrickRanges::Range& range = ranges.At(own.begin.x, own.begin.y, own.begin.z);
+    ForEachRowOfBricks(bricks, [&](Index3 brick) {
+      const auto surface = std::make_unique<BrickSurface<T>>(voxels, lookup, spacing);
+      for (; brick.x < bricks.first.x + bricks.counts.x; ++brick.x) {
+        const BrickRanges::Range& range = ranges.Of(brick);
         if (!lookup.AnyBetween(range.min, range.max)) continue;
-        parts[std::size_t(row) * std::size_t(count.x) + std::size_t(x)] = brick->Find(origin, own);
+        const Index3 origin = {brick.x * kFaceBrick, brick.y * kFaceBrick, brick.z * kFaceBrick};
+        parts[bricks.Number(brick)] = surface->Find(origin, bricks.BoxOf(brick));
       }
     });
   });

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <type_traits>
 
 namespace slabstream {
 namespace {
@@ -41,11 +40,11 @@ void VertexNormals::Compute(const VoxelBlock& voxels, const Vec3& spacing, const
   const Box& box = voxels.box;
   const Filters along_x = FiltersAlong(0, box, spacing.x, origin.x), along_y = FiltersAlong(1, box, spacing.y, origin.y);
   along_z_ = FiltersAlong(2, box, spacing.z, origin.z);
-  VisitScalarType(voxels.type, [&](auto* type) {
-    const auto* all = voxels.samples<std::remove_cvref_t<decltype(*type)>>();
+  VisitScalarType(voxels.type, [&]<class T>(const T*) {
+    const T* all = voxels.samples<T>();
     for (std::int32_t z = 0; z < kSamples; ++z) {
       for (std::int32_t y = 0; y < kSamples; ++y) {
-        const auto* samples = all + voxels.Offset({box.begin.x, Inside(box, 1, origin.y + y - 2), Inside(box, 2, origin.z + z - 2)});
+        const T* samples = all + voxels.Offset({box.begin.x, Inside(box, 1, origin.y + y - 2), Inside(box, 2, origin.z + z - 2)});
         std::array<float, kSamples + 4> row{};
         for (std::int32_t x = 0; x < kSamples; ++x) row[std::size_t(x)] = float(samples[Inside(box, 0, origin.x + x - 2) - box.begin.x]);
         Row& smooth = smooth_x_[std::size_t(z)][std::size_t(y)];

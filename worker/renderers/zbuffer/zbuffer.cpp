@@ -1,21 +1,64 @@
-#include "worker/renderers/zbuffer/zbuffer.h"
-
+// The Z-buffer pipeline. Each opaque voxel is its cell, the box [q - 0.5, q + 0.5) round its centre, and its open faces are drawn. The
+// nearest face along a pixel's ray is visible, and only visible faces are shaded (deferred Phong). There are no holes at any zoom. The
+// picture has the same bits for every partition, machine and thread count: it depends only on pixels and faces, and ties of depth go to the
+// lower voxel index.
+//
+//   1. place the bricks of the surface on the screen and sort them, nearest first
+//   2. cut the image into bands of rows, one task each: no other task touches a band's pixels
+//   3. each band draws its bricks (draw_faces.h), except those behind what is already drawn, then shades its pixels (shade_faces.h)
 #include <hwy/cache_control.h>
 #include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <deque>
 #include <numeric>
 
+#include "common/renderers/zbuffer/least_opaque.h"
 #include "worker/kernels/draw_faces.h"
 #include "worker/kernels/shade_faces.h"
+#include "worker/renderers/renderer.h"
 #include "worker/renderers/stage_clock.h"
 #include "worker/renderers/zbuffer/brick_projection.h"
-#include "worker/renderers/zbuffer/surface_cache.h"
+#include "worker/renderers/zbuffer/surface.h"
 
-namespace slabstream {
+namespace slabstream::zbuffer {
 namespace {
+
+// The surfaces of a slab, kept until the transfer function makes other voxels opaque.
+class SurfaceCache : public SlabCache {
+ public:
+  // Faces of the opaque voxels of `box`. Valid until the next call.
+  const Surface& Of(SlabData& slab, const FrameSetup& setup, const Box& box) {
+    const ClassificationTable& table = slab.Classification(setup);
+    if (BinSelection bins = SelectBins(table, LeastOpaque(table, setup.description, setup.range)); bins != opaque_bins_) {
+      surfaces_.clear();
+      opaque_bins_ = std::move(bins);
+    }
+    const auto kept = std::ranges::find(surfaces_, box, &std::pair<Box, Surface>::first);
+    if (kept != surfaces_.end()) {
+      std::rotate(surfaces_.begin(), kept, kept + 1);
+    } else {
+      if (surfaces_.size() >= kKeptBoxes) surfaces_.pop_back();
+      const BrickRanges& ranges = slab.ranges();  // first: bricks are read faster than the block
+      surfaces_.emplace_front(box, FindSurface(slab.voxels(), ranges, table, opaque_bins_, setup.description.geometry.spacing, box));
+    }
+    return surfaces_.front().second;
+  }
+
+  std::size_t bytes() const override {
+    std::size_t total = 0;
+    for (const auto& [box, surface] : surfaces_) total += surface.bytes();
+    return total;
+  }
+
+ private:
+  static constexpr std::size_t kKeptBoxes = 16;  // several boxes may share a slab
+  BinSelection opaque_bins_;
+  std::deque<std::pair<Box, Surface>> surfaces_;  // most recently used first
+};
 
 // The bricks that may be visible, nearest first, and the pixels that they may touch.
 struct Scene {
@@ -112,56 +155,65 @@ std::size_t DrawBand(const Surface& surface, const Scene& scene, const BrickProj
   return drawn;
 }
 
+class ZBufferRenderer : public Renderer {
+ public:
+  Result<LocalImage> Render(SlabData& slab, const Box& box, const FrameSetup& setup, const OcclusionMask& /*hidden*/,
+                            const std::atomic<bool>& cancelled, RankReport& report) override {
+    StageClock clock(report);
+    const ClassificationTable& table = slab.Classification(setup);
+    const Surface& surface = slab.CacheOf<SurfaceCache>().Of(slab, setup, box);
+    clock.Charge(Stage::kPrepare);
+
+    const BrickProjection projection(setup.camera, setup.description.geometry.size);
+    const Scene scene = PlaceBricks(surface, projection);
+    LocalImage image = MakeUnwrittenImage(PixelFormat::kDepth, scene.bounds);
+    const std::vector<std::int32_t> begins = CutIntoBands(surface, scene, kBandsPerThread * tbb::this_task_arena::max_concurrency());
+    FaceShading shading = MakeFaceShading(setup.camera, setup.shading, setup.description.geometry.size);
+    shading.sites = surface.sites.data();
+    shading.normals = surface.normals.data();
+    std::vector<float> colors;
+    colors.reserve(4 * table.color.size());
+    for (const Rgb& color : table.color) colors.insert(colors.end(), {color.r, color.g, color.b, 1});
+    shading.colors = colors.data();
+    clock.Charge(Stage::kZBuffer);
+
+    std::atomic<std::size_t> drawn = 0;
+    std::atomic<std::int64_t> draw_ns = 0, shade_ns = 0;
+    tbb::parallel_for(std::size_t{1}, begins.size(), [&](std::size_t i) {
+      const Time begin = MonotonicNow();
+      KeyBand band;
+      band.bounds = {scene.bounds.x_begin, begins[i - 1], scene.bounds.x_end, begins[i]};
+      band.stride = std::size_t(band.bounds.width() + kKeyPadding);
+      AlignedVector<std::uint64_t>& keys = keys_.local();
+      keys.resize(std::max(keys.size(), band.stride * std::size_t(band.bounds.height())));
+      band.keys = keys.data();
+      drawn += DrawBand(surface, scene, projection, setup.camera.projection, cancelled, band);
+      const Time middle = MonotonicNow();
+      for (std::int32_t y = band.bounds.y_begin; y < band.bounds.y_end && !cancelled.load(std::memory_order_relaxed); ++y) {
+        const auto width = std::size_t(band.bounds.width()), pixel = std::size_t(y - scene.bounds.y_begin) * width;
+        ShadeFaceRow(shading, band.keys + std::size_t(y - band.bounds.y_begin) * band.stride, band.bounds.x_begin, y, width,
+                     &image.rgba[4 * pixel], &image.depth[pixel], &image.voxel[pixel]);
+      }
+      draw_ns += (middle - begin).count();
+      shade_ns += (MonotonicNow() - middle).count();
+    });
+    report.stage_ns[std::size_t(Stage::kZBuffer)] += draw_ns;
+    report.stage_ns[std::size_t(Stage::kShade)] += shade_ns;
+    report.drawn_voxels += drawn;
+    clock.Finish(Stage::kRender);
+    if (cancelled) return Status::Cancelled("rendering was cancelled");
+    return image;
+  }
+
+ private:
+  // More bands balance the load better, but bricks on the border of two bands are drawn by both.
+  static constexpr int kBandsPerThread = 4;
+
+  tbb::enumerable_thread_specific<AlignedVector<std::uint64_t>> keys_;  // of a band; kept from frame to frame
+};
+
 }  // namespace
 
-Result<LocalImage> ZBufferRenderer::Render(SlabData& slab, const Box& box, const FrameSetup& setup, const OcclusionMask& /*hidden*/,
-                                           const std::atomic<bool>& cancelled, RankReport& report) {
-  StageClock clock(report);
-  const ClassificationTable& table = slab.Classification(setup);
-  const Surface& surface = slab.CacheOf<SurfaceCache>().OpaqueSurface(slab, setup, box);
-  clock.Charge(Stage::kPrepare);
+std::unique_ptr<Renderer> MakePixelHalf() { return std::make_unique<ZBufferRenderer>(); }
 
-  const BrickProjection projection(setup.camera, setup.description.geometry.size);
-  const Scene scene = PlaceBricks(surface, projection);
-  LocalImage image = MakeUnwrittenImage(PixelFormat::kDepth, scene.bounds);
-  const std::vector<std::int32_t> begins = CutIntoBands(surface, scene, kBandsPerThread * tbb::this_task_arena::max_concurrency());
-  FaceShading shading = MakeFaceShading(setup.camera, setup.shading, setup.description.geometry.size);
-  shading.sites = surface.sites.data();
-  shading.normals = surface.normals.data();
-  std::vector<float> colors;
-  colors.reserve(4 * table.color.size());
-  for (const Rgb& color : table.color) colors.insert(colors.end(), {color.r, color.g, color.b, 1});
-  shading.colors = colors.data();
-  clock.Charge(Stage::kZBuffer);
-
-  std::atomic<std::size_t> drawn = 0;
-  std::atomic<std::int64_t> draw_ns = 0, shade_ns = 0;
-  tbb::parallel_for(std::size_t{1}, begins.size(), [&](std::size_t i) {
-    const Time begin = MonotonicNow();
-    KeyBand band;
-    band.bounds = {scene.bounds.x_begin, begins[i - 1], scene.bounds.x_end, begins[i]};
-    band.stride = std::size_t(band.bounds.width() + kKeyPadding);
-    AlignedVector<std::uint64_t>& keys = keys_.local();
-    keys.resize(std::max(keys.size(), band.stride * std::size_t(band.bounds.height())));
-    band.keys = keys.data();
-    drawn += DrawBand(surface, scene, projection, setup.camera.projection, cancelled, band);
-    const Time middle = MonotonicNow();
-    for (std::int32_t y = band.bounds.y_begin; y < band.bounds.y_end && !cancelled.load(std::memory_order_relaxed); ++y) {
-      const auto width = std::size_t(band.bounds.width()), pixel = std::size_t(y - scene.bounds.y_begin) * width;
-      ShadeFaceRow(shading, band.keys + std::size_t(y - band.bounds.y_begin) * band.stride, band.bounds.x_begin, y, width,
-                   &image.rgba[4 * pixel], &image.depth[pixel], &image.voxel[pixel]);
-    }
-    draw_ns += (middle - begin).count();
-    shade_ns += (MonotonicNow() - middle).count();
-  });
-  report.stage_ns[std::size_t(Stage::kZBuffer)] += draw_ns;
-  report.stage_ns[std::size_t(Stage::kShade)] += shade_ns;
-  report.drawn_voxels += drawn;
-  clock.Finish(Stage::kRender);
-  if (cancelled) return Status::Cancelled("rendering was cancelled");
-  return image;
-}
-
-std::unique_ptr<Renderer> zbuffer::MakePixelHalf() { return std::make_unique<ZBufferRenderer>(); }
-
-}  // namespace slabstream
+}  // namespace slabstream::zbuffer
