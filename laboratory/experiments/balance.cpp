@@ -11,7 +11,6 @@
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/figures.h"
 #include "laboratory/experiments/machines.h"
-#include "laboratory/experiments/measured_layouts.h"
 #include "laboratory/experiments/plots.h"
 #include "laboratory/experiments/policies.h"
 #include "laboratory/measure/box_costs.h"
@@ -85,15 +84,16 @@ Json MovingKey(const BenchCase& volume, const Moving& moving, int pixels, int fr
 
 Result<Json> MeasureMoving(ExperimentContext& context, const Balance& balance, const BenchCase& volume, const Moving& moving, int frames) {
   FrameCase frame = balance.Frame(volume, moving.policy, kTableWorkers);
-  Result<MeasuredLayouts> layouts = MeasuredLayouts::Make(context, frame);
-  if (!layouts.ok()) return layouts.status();
-  const LayoutKnowledge& knowledge = layouts->knowledge();
-  Layout layout;
+  const Result<LayoutKnowledge> found = KnowLayout(context, frame);
+  if (!found.ok()) return found.status();
+  const LayoutKnowledge& knowledge = *found;
+  MeasuredLayouts layouts = LayoutsOf(knowledge, frame.workers);
+  std::shared_ptr<const Layout> layout;
   Json numbers = {{"imbalance", Json::array()}, {"slowest_ms", Json::array()}, {"moved_bytes", Json::array()}};
   for (int i = 0; i < frames; ++i) {
     frame.view = BenchView(Projection::kOrthographic, i, kMovingFrames);
-    const Layout& next = layouts->Next(frame);
-    const double moved = i == 0 ? 0 : double(MovedVoxels(layout, next)) * VoxelBytes(knowledge);
+    const std::shared_ptr<const Layout> next = layouts.Next(RequestOf(frame));
+    const double moved = i == 0 ? 0 : double(MovedVoxels(*layout, *next)) * VoxelBytes(knowledge);
     layout = next;
     const Result<FramePlan> plan = PlanOf(context, frame, layout);
     if (!plan.ok()) return plan.status();
@@ -104,7 +104,7 @@ Result<Json> MeasureMoving(ExperimentContext& context, const Balance& balance, c
       seconds[placements[nanoseconds.size()].worker - 1] += cost.seconds;
       nanoseconds.push_back(std::int64_t(cost.seconds * 1e9));
     }
-    layouts->Learn(*plan, nanoseconds);
+    layouts.Learn(*plan, nanoseconds);
     numbers["imbalance"].push_back(Imbalance(seconds));
     numbers["slowest_ms"].push_back(*std::ranges::max_element(seconds) * 1e3);
     numbers["moved_bytes"].push_back(moved);

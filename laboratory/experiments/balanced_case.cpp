@@ -1,7 +1,6 @@
 #include "laboratory/experiments/balanced_case.h"
 
 #include "common/planning/policy_names.h"
-#include "laboratory/experiments/measured_layouts.h"
 #include "laboratory/measure/box_costs.h"
 
 namespace slabstream {
@@ -21,20 +20,21 @@ Json BalancedKey(const FrameCase& frame) {
 }
 
 Result<Json> MeasureBalanced(ExperimentContext& context, const FrameCase& frame) {
-  Result<MeasuredLayouts> layouts = MeasuredLayouts::Make(context, frame);
-  if (!layouts.ok()) return layouts.status();
+  const Result<LayoutKnowledge> knowledge = KnowLayout(context, frame);
+  if (!knowledge.ok()) return knowledge.status();
+  MeasuredLayouts layouts = LayoutsOf(*knowledge, frame.workers);
   Json learnt = Json::array();
   for (int i = 0; i < kBalancedFrames; ++i) {
-    const Result<FramePlan> plan = PlanOf(context, frame, layouts->Next(frame));
+    const Result<FramePlan> plan = PlanOf(context, frame, layouts.Next(RequestOf(frame)));
     if (!plan.ok()) return plan.status();
     const Result<Json> boxes = MeasureBoxes(context, frame, *plan);
     if (!boxes.ok()) return boxes.status();
     std::vector<std::int64_t> nanoseconds;
     for (const Json& seconds : boxes->at("seconds")) nanoseconds.push_back(std::int64_t(seconds.get<double>() * 1e9));
-    layouts->Learn(*plan, nanoseconds);
+    layouts.Learn(*plan, nanoseconds);
     learnt.push_back(nanoseconds);
   }
-  const Result<FramePlan> plan = PlanOf(context, frame, layouts->Next(frame));
+  const Result<FramePlan> plan = PlanOf(context, frame, layouts.Next(RequestOf(frame)));
   if (!plan.ok()) return plan.status();
   Result<Json> boxes = MeasureBoxes(context, frame, *plan);
   if (boxes.ok()) (*boxes)["learnt"] = std::move(learnt);
@@ -53,14 +53,15 @@ Result<std::vector<MeasuredFrame>> RecallBalanced(ExperimentContext& context, co
   const FrameCase balanced = Balanced(frame);
   std::vector<MeasuredFrame> frames;
   for (const Json* repeat : context.log().All(BalancedKey(balanced))) {
-    Result<MeasuredLayouts> layouts = MeasuredLayouts::Make(context, balanced);
-    if (!layouts.ok()) return layouts.status();
+    const Result<LayoutKnowledge> knowledge = KnowLayout(context, balanced);
+    if (!knowledge.ok()) return knowledge.status();
+    MeasuredLayouts layouts = LayoutsOf(*knowledge, balanced.workers);
     for (const Json& learnt : repeat->at("learnt")) {
-      const Result<FramePlan> plan = PlanOf(context, balanced, layouts->Next(balanced));
+      const Result<FramePlan> plan = PlanOf(context, balanced, layouts.Next(RequestOf(balanced)));
       if (!plan.ok()) return plan.status();
-      layouts->Learn(*plan, learnt.get<std::vector<std::int64_t>>());
+      layouts.Learn(*plan, learnt.get<std::vector<std::int64_t>>());
     }
-    Result<FramePlan> plan = PlanOf(context, balanced, layouts->Next(balanced));
+    Result<FramePlan> plan = PlanOf(context, balanced, layouts.Next(RequestOf(balanced)));
     if (!plan.ok()) return plan.status();
     frames.push_back(WithBoxCosts(context, balanced, *std::move(plan), {repeat}));
   }

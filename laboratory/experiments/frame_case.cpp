@@ -209,19 +209,22 @@ LayoutRequest LayoutRequestOf(const LayoutKnowledge& knowledge, int workers) {
   return request;
 }
 
+MeasuredLayouts LayoutsOf(const LayoutKnowledge& knowledge, int workers) {
+  return {knowledge.volume.summary, knowledge.occupied, {kPlannedDataset, knowledge.transfer, knowledge.renderer}, workers};
+}
+
 Result<FramePlan> PlanOf(ExperimentContext& context, const FrameCase& frame) {
   const Result<LayoutKnowledge> knowledge = KnowLayout(context, frame);
   if (!knowledge.ok()) return knowledge.status();
-  return PlanOf(context, frame, MakeLayout(LayoutRequestOf(*knowledge, frame.workers)));
+  return PlanOf(context, frame, std::make_shared<const Layout>(MakeLayout(LayoutRequestOf(*knowledge, frame.workers))));
 }
 
-Result<FramePlan> PlanOf(ExperimentContext& context, const FrameCase& frame, const Layout& layout) {
+Result<FramePlan> PlanOf(ExperimentContext& context, const FrameCase& frame, std::shared_ptr<const Layout> layout) {
   const FrameRequest request = RequestOf(frame);
   if (Status status = Validate(request); !status.ok()) return status;
   const Result<VolumeInUse> volume = context.volumes().Get(frame.volume);
   if (!volume.ok()) return volume.status();
-  return PlanFrame(request, kPlannedDataset, *volume->summary, RosterOf(std::uint32_t(frame.workers)),
-                   std::make_shared<const Layout>(layout));
+  return PlanFrame(request, kPlannedDataset, *volume->summary, RosterOf(std::uint32_t(frame.workers)), std::move(layout));
 }
 
 Result<FrameCase> WithChosenPolicy(ExperimentContext& context, FrameCase frame, const LinkModel& link) {

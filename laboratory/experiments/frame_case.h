@@ -14,6 +14,7 @@
 #include "laboratory/bench/bench_cases.h"
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/measure/cost_model.h"
+#include "laboratory/measure/measured_layouts.h"
 #include "simulator/simulate_frames.h"
 
 namespace slabstream {
@@ -57,7 +58,7 @@ Json PictureKey(std::string_view what, const FrameCase& frame);
 // The service's plan for its first frame. Errors of Validate and PlanFrame.
 Result<FramePlan> PlanOf(ExperimentContext& context, const FrameCase& frame);
 // The same with a given layout.
-Result<FramePlan> PlanOf(ExperimentContext& context, const FrameCase& frame, const Layout& layout);
+Result<FramePlan> PlanOf(ExperimentContext& context, const FrameCase& frame, std::shared_ptr<const Layout> layout);
 inline constexpr DatasetId kPlannedDataset = 1;  // in these plans
 // Makes layouts, as long as `knowledge` lives and the volume is in use.
 struct LayoutKnowledge {
@@ -68,7 +69,7 @@ struct LayoutKnowledge {
   const RendererKind* renderer = nullptr;
 };
 Result<LayoutKnowledge> KnowLayout(ExperimentContext& context, const FrameCase& frame);
-LayoutRequest LayoutRequestOf(const LayoutKnowledge& knowledge, int workers);
+MeasuredLayouts LayoutsOf(const LayoutKnowledge& knowledge, int workers);
 
 // The same frame with a resolved policy: the one that a coordinator of as many workers, one on each host, joined by `link`, would choose
 // before it has seen a frame. Errors as of KnowLayout and ChoosePolicy.

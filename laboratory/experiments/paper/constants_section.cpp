@@ -144,8 +144,7 @@ Result<Fit> FitModel(const PaperSetup& setup, const RendererKind* renderer, cons
        {{"stage", ""}, {"the paper's term", ""}, {"a unit is a", ""}, {"time a unit", "ns"}, {"residual", "%"}, {"prediction error", "%"}},
        {}},
       ""};
-  const CostModel model;
-  for (const StageCost& stage : model.stages(renderer->name())) {
+  for (const StageModel& stage : CostModelOf(renderer->name())) {
     const Result<StageFit> fitted = FitStage(stage, samples);
     if (!fitted.ok()) continue;
     bool first = true;
