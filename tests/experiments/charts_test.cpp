@@ -192,13 +192,13 @@ TEST(Text, NumbersAndEscapes) {
 TEST(Report, PageIsWellFormedAndSelfContained) {
   Report report{kNasty, kNasty, {}};
   for (int i = 0; i < 4; ++i) {
-    report.sections.push_back({kNasty + std::to_string(i),
-                               kNasty,
-                               kNasty,
-                               kNasty,
-                               {Figure{fmt::format("f{}", i), DrawLines({"t", {"x", ""}, {"y", ""}, {}}), kNasty},
-                                Table{fmt::format("t{}", i), kNasty, {{kNasty, kNasty}}, {{kNasty}, {{1, Origin::kPaper}}, {Cell()}}},
-                                Photo{"\x89PNG", kNasty}}});
+    report.sections.push_back(
+        {kNasty + std::to_string(i),
+         kNasty,
+         kNasty,
+         kNasty,
+         {Figure{fmt::format("f{}", i), DrawLines({"t", {"x", ""}, {"y", ""}, {}}), kNasty},
+          Table{fmt::format("t{}", i), kNasty, {kNasty}, {{kNasty}, {FromPaper(1)}, {Cell()}}}, Photo{"\x89PNG", kNasty}}});
   }
   const std::string page = ReportHtml(report, {kNasty, kNasty, kNasty, kNasty, kNasty, kNasty, 2, 1, 1, kNasty});
   EXPECT_EQ(WhyNotWellFormed(page), "");

@@ -15,12 +15,11 @@ void Append(std::vector<Trial>& trials, std::vector<Trial> more) {
 
 }  // namespace
 
-Result<Report> RunPaper(ExperimentContext& context) {
+Report RunPaper(ExperimentContext& context) {
   const PaperSetup setup(context);
   std::vector<Trial> trials;
   for (auto* make : {TransformTrials, FootprintTrials, FrameTrials, ImprovedTrials}) Append(trials, make(setup));
-  if (Status status = context.Run(WithoutDoubles(std::move(trials)), context.quick() ? kQuickRepeats : kRepeats); !status.ok())
-    return status;
+  context.Run(std::move(trials), kRepeats, kQuickRepeats);
 
   Report report;
   report.title = "Data-parallel volume rendering, measured again";
@@ -33,13 +32,13 @@ Result<Report> RunPaper(ExperimentContext& context) {
       "are "
       "thirty years apart; shapes, shares, speed-ups and efficiencies are what to compare.";
   for (auto* make : {TransformSection, FootprintSection, ConstantsSection, CombiningSection}) {
-    if (Status status = report.Add(make(setup)); !status.ok()) return status;
+    report.sections.push_back(make(setup));
   }
   for (const RendererKind* renderer : {Splatting(), ZBuffer()}) {
-    if (Status status = report.Add(PipelineSection(setup, renderer)); !status.ok()) return status;
+    report.sections.push_back(PipelineSection(setup, renderer));
   }
   for (auto* make : {ImprovedSection, ValidationSection, PicturesSection}) {
-    if (Status status = report.Add(make(setup)); !status.ok()) return status;
+    report.sections.push_back(make(setup));
   }
   return report;
 }

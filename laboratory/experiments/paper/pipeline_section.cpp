@@ -101,17 +101,15 @@ double Efficiency(double one, double seconds, int p) { return 100 * one / second
 
 }  // namespace
 
-Result<Section> PipelineSection(const PaperSetup& setup, const RendererKind* renderer) {
+Section PipelineSection(const PaperSetup& setup, const RendererKind* renderer) {
   const Pipeline pipeline = PipelineOf(renderer);
-  const Result<MachineModel> machine = setup.Machine(renderer);
-  if (!machine.ok()) return machine.status();
+  const MachineModel machine = setup.Machine(renderer);
   std::vector<Curve> curves;
   for (const int size : setup.sizes()) {
     Curve& curve = curves.emplace_back(Curve{size, {}});
     for (const int p : setup.workers()) {
-      const Result<PaperFrame> frame = CountAsPaper(setup, setup.Frame(renderer, size, p), *machine);
-      if (!frame.ok()) return frame.status();
-      curve.frames.emplace_back(p, *frame);
+      const PaperFrame frame = CountAsPaper(setup, setup.Frame(renderer, size, p), machine);
+      curve.frames.emplace_back(p, frame);
     }
   }
   const Curve& tabled = *std::ranges::find(curves, setup.table_size(), &Curve::size);
@@ -119,7 +117,7 @@ Result<Section> PipelineSection(const PaperSetup& setup, const RendererKind* ren
   // The table, and the same as bars.
   Table table{pipeline.table,
               fmt::format("Table {}. N = {}: a frame and the share of each stage, per cent", pipeline.table_number, tabled.size),
-              {{"p", ""}, {"time", "ms"}},
+              {"p", "time (ms)"},
               {}};
   BarChart bars{fmt::format("Where a frame's time goes, N = {}", tabled.size),
                 "workers p",
@@ -129,12 +127,12 @@ Result<Section> PipelineSection(const PaperSetup& setup, const RendererKind* ren
                 {}};
   for (const auto& [name, stages] : pipeline.stages) bars.parts.push_back(name);
   bars.parts.emplace_back("combine");
-  for (const std::string& part : bars.parts) table.columns.push_back({part, "%"});
-  table.columns.push_back({"paper: time", "s"});
-  for (const std::string& part : bars.parts) table.columns.push_back({"paper: " + part, "%"});
+  for (const std::string& part : bars.parts) table.columns.emplace_back(part + " (%)");
+  table.columns.emplace_back("paper: time (s)");
+  for (const std::string& part : bars.parts) table.columns.emplace_back("paper: " + part + " (%)");
   for (const auto& [p, frame] : tabled.frames) {
     const std::vector<double> shares = SharesOf(frame, pipeline);
-    std::vector<Cell> row = {Cell::Parameter(p), {frame.seconds * 1e3, frame.origin}};
+    std::vector<Cell> row = {Chosen(p), {frame.seconds * 1e3, frame.origin}};
     for (const double share : shares) row.emplace_back(share, frame.origin);
     BarGroup group{fmt::format("{}", p), {{"here", frame.origin, shares}}};
     const auto found = std::ranges::find(printed::kStageWorkers, p);
@@ -156,15 +154,13 @@ Result<Section> PipelineSection(const PaperSetup& setup, const RendererKind* ren
   const auto& [last_p, last] = tabled.frames.back();
   const double one = tabled.frames.front().second.seconds, paper_one = pipeline.paper_seconds[0],
                paper_last = pipeline.paper_seconds.back(), paper_combining = pipeline.paper_shares.back().back() / 100 * paper_last;
-  Table curve_table{fmt::format("{}-curves", pipeline.figure),
-                    "The curves in numbers",
-                    {{"N", ""}, {"p", ""}, {"time", "ms"}, {"speed-up", ""}, {"efficiency", "%"}},
-                    {}};
+  Table curve_table{
+      fmt::format("{}-curves", pipeline.figure), "The curves in numbers", {"N", "p", "time (ms)", "speed-up", "efficiency (%)"}, {}};
   for (const Curve& curve : curves) {
     const double alone = curve.frames.front().second.seconds;
     for (const auto& [p, frame] : curve.frames) {
-      curve_table.rows.push_back({Cell::Parameter(curve.size),
-                                  Cell::Parameter(p),
+      curve_table.rows.push_back({Chosen(curve.size),
+                                  Chosen(p),
                                   {frame.seconds * 1e3, frame.origin},
                                   {alone / frame.seconds, frame.origin},
                                   {100 * alone / frame.seconds / p, frame.origin}});

@@ -47,10 +47,8 @@ FrameCase PaperSetup::Frame(const RendererKind* renderer, int size, int workers)
   return frame;
 }
 
-Result<MachineModel> PaperSetup::Machine(const RendererKind* renderer) const {
-  const Result<MeasuredFrame> one = Recall(context_, Frame(renderer, table_size(), 1));
-  if (!one.ok()) return one.status();
-  return PaperMachine(context_, one->RenderSeconds(), double(table_size()) * table_size());
+MachineModel PaperSetup::Machine(const RendererKind* renderer) const {
+  return PaperMachine(context_, Recall(context_, Frame(renderer, table_size(), 1)).RenderSeconds(), double(table_size()) * table_size());
 }
 
 std::vector<FrameCase> PaperSetup::Frames() const {
