@@ -21,8 +21,7 @@ Result<BenchCase> ParseSubject(const SubjectOptions& options, const std::string&
   const std::size_t colon = text.find(':', 8);
   const std::optional<int> size = ParseNumber<int>(text.substr(8, colon - 8));
   if (!size) return Status::InvalidArgument(fmt::format("'{}' has no number of voxels after the colon", text));
-  const SphereRequest sphere = {hollow ? SphereClass::kHollow : SphereClass::kFilled, *size, hollow ? 0.05 : 0.4};
-  parsed = SphereCase(sphere, SphereOpacity(*options.renderer), options.renderer);
+  parsed = StandardSphere(hollow ? SphereClass::kHollow : SphereClass::kFilled, *size, options.renderer);
   if (colon != std::string::npos) parsed->transfer.choice = text.substr(colon + 1);
   return parsed;
 }

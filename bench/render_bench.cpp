@@ -27,7 +27,7 @@ constexpr int kAzimuths = 12;
 // Renders `boxes` slabs of the volume, from each view in turn.
 void Render(benchmark::State& state, const Volume& volume, const RendererKind& kind, const std::vector<ViewParameters>& views, int boxes,
             int threads) {
-  const BenchCase look = SphereCase({}, SphereOpacity(kind), &kind);
+  const BenchCase look = StandardSphere(SphereClass::kHollow, kObject, &kind);
   const VolumeSummary summary = Summarize(volume);
   std::vector<FrameSetup> setups;
   for (const ViewParameters& view : views) setups.push_back(MakeFrameSetup(BenchRequest(look, view, {512, 512}), 1, summary).value());

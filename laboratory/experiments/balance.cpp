@@ -39,8 +39,7 @@ struct Balance {
 Balance BalanceOf(const ExperimentContext& context) {
   Balance balance;
   const int size = context.Scaled(context.quick() ? 128 : 300);
-  balance.volumes = {SphereCase({SphereClass::kHollow, size, 0.05}, kTranslucentSphere),
-                     SphereCase({SphereClass::kFilled, size, 0.1}, kTranslucentSphere)};
+  balance.volumes = {StandardSphere(SphereClass::kHollow, size), SphereCase({SphereClass::kFilled, size, 0.1}, kTranslucentSphere)};
   const std::vector<BenchCase> real = RealVolumes(context.options().volumes);
   if (!context.quick() || !context.options().volumes.empty()) balance.volumes.insert(balance.volumes.end(), real.begin(), real.end());
   balance.workers = context.quick() ? std::vector{2, 16, 64} : std::vector{2, 4, 8, 16, 32, 64, 128, 256, 512, 1024};
@@ -56,12 +55,8 @@ Policy WithBoxes(Policy policy, std::string_view assignment) {
 
 // A turning view, frame after frame: the boxes are rendered alone and their times are learnt. Before the next frame the coordinator's own
 // table of layouts may change the layout.
-struct Moving {
-  std::string name;
-  Policy policy;
-};
-std::vector<Moving> MovingPolicies() {
-  std::vector<Moving> policies;
+std::vector<NamedPolicy> MovingPolicies() {
+  std::vector<NamedPolicy> policies;
   for (const NamedPolicy& named : {EqualSlabs(), BalancedTree()}) {
     for (const NamedChoice& balance : BalanceModes()) {
       policies.push_back({fmt::format("{}, {}", named.name, balance.name), named.policy});
@@ -71,12 +66,12 @@ std::vector<Moving> MovingPolicies() {
   return policies;
 }
 
-Json MovingKey(const BenchCase& volume, const Moving& moving, int pixels, int frames) {
+Json MovingKey(const BenchCase& volume, const NamedPolicy& moving, int pixels, int frames) {
   return {{"what", "moving view"},    {"volume", volume.name}, {"policy", moving.name},
           {"workers", kTableWorkers}, {"size", pixels},        {"frames", frames}};
 }
 
-Json MeasureMoving(ExperimentContext& context, const Balance& balance, const BenchCase& volume, const Moving& moving, int frames) {
+Json MeasureMoving(ExperimentContext& context, const Balance& balance, const BenchCase& volume, const NamedPolicy& moving, int frames) {
   FrameCase frame = balance.Frame(volume, moving.policy, kTableWorkers);
   const LayoutKnowledge knowledge = KnowLayout(context, frame);
   MeasuredLayouts layouts = LayoutsOf(knowledge, frame.workers);
@@ -115,7 +110,7 @@ std::vector<Trial> TrialsOf(ExperimentContext& context, const Balance& balance) 
       trials.push_back(BoxCostTrial(context, balance.Frame(volume, named.policy, kTableWorkers)));
       trials.push_back(BoxCostTrial(context, balance.Frame(volume, WithBoxes(named.policy, "cyclic"), kTableWorkers)));
     }
-    for (const Moving& moving : MovingPolicies()) {
+    for (const NamedPolicy& moving : MovingPolicies()) {
       const int frames = MovingFrames(context);
       trials.push_back({MovingKey(volume, moving, balance.pixels, frames),
                         [&context, balance, volume, moving, frames] { return MeasureMoving(context, balance, volume, moving, frames); },
@@ -260,7 +255,7 @@ Section MovingSection(ExperimentContext& context, const Balance& balance) {
   std::string sentence;
   for (const BenchCase& volume : balance.volumes) {
     LineChart chart{TitleOf(volume) + ": imbalance, frame by frame", {"frame", ""}, {"most / mean", ""}, {}};
-    for (const Moving& moving : MovingPolicies()) {
+    for (const NamedPolicy& moving : MovingPolicies()) {
       const std::vector<const Json*> repeats = context.log().All(MovingKey(volume, moving, balance.pixels, MovingFrames(context)));
       const std::vector<Estimate> imbalance = EstimatesOf(repeats, "imbalance"), slowest = EstimatesOf(repeats, "slowest_ms");
       const std::vector<double> moved = MediansOf(repeats, "moved_bytes");

@@ -319,7 +319,6 @@ MeasuredFrame WithBoxCosts(ExperimentContext& context, const FrameCase& frame, F
   measured.boxes.resize(measured.plan.layout->partition.boxes().size());
 
   const std::vector<double> ids = MediansOf(repeats, "ids"), seconds = MediansOf(repeats, "seconds"),
-                            first = MediansOf(repeats, "first_seconds"), occupied = MediansOf(repeats, "occupied_voxels"),
                             drawn = MediansOf(repeats, "drawn_voxels"), covered = MediansOf(repeats, "covered_pixels"),
                             bytes = MediansOf(repeats, "voxel_bytes");
   std::array<std::vector<double>, kStageCount> stages;
@@ -329,8 +328,6 @@ MeasuredFrame WithBoxCosts(ExperimentContext& context, const FrameCase& frame, F
   for (std::size_t i = 0; i < ids.size(); ++i) {
     MeasuredFrame::Cost& box = measured.boxes.at(std::size_t(ids[i]));
     box = {.seconds = seconds[i],
-           .first_seconds = first[i],
-           .occupied_voxels = occupied[i],
            .drawn_voxels = drawn[i],
            .covered_pixels = covered[i],
            .voxel_bytes = bytes[i],

@@ -79,9 +79,9 @@ FrameCase WithChosenPolicy(ExperimentContext& context, FrameCase frame, const Li
 struct MeasuredFrame {
   FramePlan plan;
   struct Cost {
-    double seconds = 0, first_seconds = 0;
+    double seconds = 0;
     std::array<double, kStageCount> stage_seconds{};
-    double occupied_voxels = 0, drawn_voxels = 0, covered_pixels = 0, voxel_bytes = 0;
+    double drawn_voxels = 0, covered_pixels = 0, voxel_bytes = 0;
     WorkUnits work{};
     CoverageMap coverage;
   };

@@ -43,7 +43,7 @@ std::vector<Series> StrongSeries(const ExperimentContext& context, const Rendere
   const std::vector<int> workers = context.quick() ? std::vector{1, 4, 16, 64} : std::vector{1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024};
   const int size = context.Scaled(context.quick() ? 128 : 300), pixels = context.Scaled(512);
   std::vector<Series> all;
-  const BenchCase sphere = SphereCase({SphereClass::kHollow, size, 0.05}, SphereOpacity(*renderer), renderer);
+  const BenchCase sphere = StandardSphere(SphereClass::kHollow, size, renderer);
   for (const NamedPolicy& named : {EqualSlabs(), BalancedTree()}) {
     for (const std::string& scheme : UsualSchemes()) {
       Series series{fmt::format("{}, {}", named.name, scheme), {}};
@@ -74,8 +74,7 @@ std::vector<Series> WeakSeries(const ExperimentContext& context) {
       Series series{fmt::format("{}, {}", renderer->title(), named.name), {}};
       for (const int p : workers) {
         const int size = int(std::lround(one * std::cbrt(double(p))));
-        const BenchCase sphere = SphereCase({SphereClass::kFilled, size, 0.4}, SphereOpacity(*renderer), renderer);
-        series.frames.push_back(FrameOf(sphere, pixels, named.policy, p));
+        series.frames.push_back(FrameOf(StandardSphere(SphereClass::kFilled, size, renderer), pixels, named.policy, p));
       }
       all.push_back(std::move(series));
     }

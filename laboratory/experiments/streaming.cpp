@@ -29,8 +29,7 @@ struct Streams {
 Streams StreamsOf(const ExperimentContext& context) {
   Streams streams;
   const int size = context.Scaled(context.quick() ? 128 : 300);
-  streams.volumes = {SphereCase({SphereClass::kHollow, size, 0.05}, kTranslucentSphere),
-                     SphereCase({SphereClass::kFilled, size, 0.4}, kTranslucentSphere)};
+  streams.volumes = {StandardSphere(SphereClass::kHollow, size), StandardSphere(SphereClass::kFilled, size)};
   const std::vector<BenchCase> real = RealVolumes(context.options().volumes);
   if (!context.quick()) streams.volumes.insert(streams.volumes.end(), real.begin(), real.end());
   streams.groups = context.quick() ? std::vector{1, 2, 4} : std::vector{1, 2, 3, 4, 6, 8, 12, 16};

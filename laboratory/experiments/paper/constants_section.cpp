@@ -11,8 +11,8 @@
 namespace slabstream {
 namespace {
 
-constexpr double kNanoseconds = 1e9, kPaperOccupancy = 0.05;
-constexpr double kVoxels = double(printed::kSize) * printed::kSize * printed::kSize, kPixels = double(printed::kSize) * printed::kSize;
+constexpr double kNanoseconds = 1e9;
+constexpr double kPixels = double(printed::kSize) * printed::kSize, kVoxels = kPixels * printed::kSize, kOccupied = 0.05 * kVoxels;
 const double kRounds = std::log2(30);
 
 // One constant of Eq. 21 or 25: its unit, the printed value, and the value that follows from the printed times of table 5 or 6 for N = 200,
@@ -23,33 +23,25 @@ struct Term {
   std::vector<double> values;  // seconds a unit here, one for each (N, p)
 };
 
-double Share(const std::array<double, 7>& shares, std::size_t at, double seconds) { return shares[at] / 100 * seconds; }
-
 std::vector<Term> SplattingTerms() {
-  const auto at_one = [](std::size_t stage) { return Share(printed::kSplattingShares[stage], 0, printed::kSplattingSeconds[0]); };
-  const double occupied = kPaperOccupancy * kVoxels;
-  return {{"ct", "voxel transformed", printed::kSplattingConstants[0].seconds, at_one(0) / kVoxels, {}},
-          {"csh", "occupied voxel shaded", printed::kSplattingConstants[1].seconds, at_one(1) / occupied, {}},
-          {"csp k²", "occupied voxel splatted", printed::kSplattingConstants[2].seconds, at_one(2) / occupied, {}},
-          {"ccp", "pixel and slice composited", printed::kSplattingConstants[3].seconds, at_one(3) / (kPixels * printed::kSize), {}},
-          {"cco",
-           "pixel and round combined",
-           printed::kSplattingConstants[4].seconds,
-           Share(printed::kSplattingShares[4], 6, printed::kSplattingSeconds[6]) / (kPixels * kRounds),
-           {}}};
+  const auto& constants = printed::kSplattingConstants;
+  const auto share = [](std::size_t stage, std::size_t p) {
+    return printed::kSplattingShares[stage][p] / 100 * printed::kSplattingSeconds[p];
+  };
+  return {{"ct", "voxel transformed", constants[0].seconds, share(0, 0) / kVoxels, {}},
+          {"csh", "occupied voxel shaded", constants[1].seconds, share(1, 0) / kOccupied, {}},
+          {"csp k²", "occupied voxel splatted", constants[2].seconds, share(2, 0) / kOccupied, {}},
+          {"ccp", "pixel and slice composited", constants[3].seconds, share(3, 0) / (kPixels * printed::kSize), {}},
+          {"cco", "pixel and round combined", constants[4].seconds, share(4, 6) / (kPixels * kRounds), {}}};
 }
 
 std::vector<Term> ZBufferTerms() {
-  const auto at_one = [](std::size_t stage) { return Share(printed::kZBufferShares[stage], 0, printed::kZBufferSeconds[0]); };
-  const double occupied = kPaperOccupancy * kVoxels;
-  return {{"ct", "voxel transformed", printed::kZBufferConstants[0].seconds, at_one(0) / kVoxels, {}},
-          {"cz", "occupied voxel drawn", printed::kZBufferConstants[1].seconds, at_one(1) / occupied, {}},
-          {"csh", "covered pixel shaded", printed::kZBufferConstants[2].seconds, at_one(2) / kPixels, {}},
-          {"cco",
-           "pixel and round combined",
-           printed::kZBufferConstants[3].seconds,
-           Share(printed::kZBufferShares[3], 6, printed::kZBufferSeconds[6]) / (kPixels * kRounds),
-           {}}};
+  const auto& constants = printed::kZBufferConstants;
+  const auto share = [](std::size_t stage, std::size_t p) { return printed::kZBufferShares[stage][p] / 100 * printed::kZBufferSeconds[p]; };
+  return {{"ct", "voxel transformed", constants[0].seconds, share(0, 0) / kVoxels, {}},
+          {"cz", "occupied voxel drawn", constants[1].seconds, share(1, 0) / kOccupied, {}},
+          {"csh", "covered pixel shaded", constants[2].seconds, share(2, 0) / kPixels, {}},
+          {"cco", "pixel and round combined", constants[3].seconds, share(3, 6) / (kPixels * kRounds), {}}};
 }
 
 void Note(Term& term, double seconds, double units) {

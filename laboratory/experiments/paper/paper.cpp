@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <iterator>
-
 #include "laboratory/experiments/paper/setup.h"
 
 namespace slabstream {
@@ -9,16 +7,14 @@ namespace {
 
 constexpr int kRepeats = 5, kQuickRepeats = 1;
 
-void Append(std::vector<Trial>& trials, std::vector<Trial> more) {
-  trials.insert(trials.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
-}
-
 }  // namespace
 
 Report RunPaper(ExperimentContext& context) {
   const PaperSetup setup(context);
   std::vector<Trial> trials;
-  for (auto* make : {TransformTrials, FootprintTrials, FrameTrials, ImprovedTrials}) Append(trials, make(setup));
+  for (auto* make : {TransformTrials, FootprintTrials, FrameTrials, ImprovedTrials}) {
+    for (Trial& trial : make(setup)) trials.push_back(std::move(trial));
+  }
   context.Run(std::move(trials), kRepeats, kQuickRepeats);
 
   Report report;

@@ -24,15 +24,8 @@ struct Pipeline {
   const char* figure_number;                                       // "10"
   std::vector<std::pair<std::string, std::vector<Stage>>> stages;  // the paper's name, ours; combining comes last
   std::span<const double> paper_seconds;
-  std::vector<std::vector<double>> paper_shares;  // by stage and combining
+  std::span<const std::array<double, 7>> paper_shares;  // by stage and combining
 };
-
-template <std::size_t stages>
-std::vector<std::vector<double>> Shares(const std::array<std::array<double, 7>, stages>& shares) {
-  std::vector<std::vector<double>> copy;
-  for (const auto& stage : shares) copy.emplace_back(stage.begin(), stage.end());
-  return copy;
-}
 
 Pipeline PipelineOf(const RendererKind* renderer) {
   if (renderer == Splatting()) {
@@ -45,7 +38,7 @@ Pipeline PipelineOf(const RendererKind* renderer) {
         "10",
         {{"transform", {Stage::kTransform}}, {"shade", {Stage::kShade}}, {"splat", {Stage::kSplat}}, {"composite", {Stage::kComposite}}},
         printed::kSplattingSeconds,
-        Shares(printed::kSplattingShares)};
+        printed::kSplattingShares};
   }
   return {
       renderer,
@@ -56,7 +49,7 @@ Pipeline PipelineOf(const RendererKind* renderer) {
       "11",
       {{"transform", {Stage::kTransform}}, {"Z-buffer", {Stage::kZBuffer, Stage::kSplat, Stage::kComposite}}, {"shade", {Stage::kShade}}},
       printed::kZBufferSeconds,
-      Shares(printed::kZBufferShares)};
+      printed::kZBufferShares};
 }
 
 // Shares of a frame's time in per cent, combining last.
@@ -140,7 +133,7 @@ Section PipelineSection(const PaperSetup& setup, const RendererKind* renderer) {
       const auto i = std::size_t(found - printed::kStageWorkers.begin());
       row.emplace_back(pipeline.paper_seconds[i], Origin::kPaper);
       Bar paper{"paper", Origin::kPaper, {}};
-      for (const std::vector<double>& stage : pipeline.paper_shares) {
+      for (const std::array<double, 7>& stage : pipeline.paper_shares) {
         row.emplace_back(stage[i], Origin::kPaper);
         paper.parts.push_back(stage[i]);
       }
