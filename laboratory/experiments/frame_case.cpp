@@ -27,6 +27,20 @@ namespace {
 constexpr int kRenderings = 2;  // rounds of box costs; of two, the lower one counts as the median
 constexpr int kWarmUpFrames = 2, kFinishes = 3;
 constexpr int kLearningFrames = 8;  // to warm up with dynamic balance
+constexpr DatasetId kPlannedDataset = 1;
+
+// Identifies what a picture shows, whoever renders it: the beginning of every key. `what` names the trial.
+Json PictureKey(std::string_view what, const FrameCase& frame) {
+  const ViewParameters& view = frame.view;
+  return {{"what", what},
+          {"volume", frame.volume.dataset},
+          {"look", frame.volume.name},
+          {"renderer", frame.volume.renderer->title()},
+          {"size", {frame.size.width, frame.size.height}},
+          {"view",
+           {view.projection == Projection::kPerspective ? "perspective" : "orthographic", view.azimuth_degrees, view.elevation_degrees,
+            view.zoom}}};
+}
 
 // The parameters that decide where the boxes are.
 void AddPartition(Json& key, const FrameCase& frame) {
@@ -163,18 +177,6 @@ double ExpectedEffort(const FrameCase& frame) {
 
 }  // namespace
 
-Json PictureKey(std::string_view what, const FrameCase& frame) {
-  const ViewParameters& view = frame.view;
-  return {{"what", what},
-          {"volume", frame.volume.dataset},
-          {"look", frame.volume.name},
-          {"renderer", frame.volume.renderer->title()},
-          {"size", {frame.size.width, frame.size.height}},
-          {"view",
-           {view.projection == Projection::kPerspective ? "perspective" : "orthographic", view.azimuth_degrees, view.elevation_degrees,
-            view.zoom}}};
-}
-
 LayoutKnowledge KnowLayout(ExperimentContext& context, const FrameCase& frame) {
   const VolumeInUse volume = context.volumes().Get(frame.volume);
   return {.volume = volume,
@@ -184,23 +186,19 @@ LayoutKnowledge KnowLayout(ExperimentContext& context, const FrameCase& frame) {
           .renderer = frame.volume.renderer};
 }
 
-LayoutRequest LayoutRequestOf(const LayoutKnowledge& knowledge, int workers) {
-  LayoutRequest request{.summary = knowledge.volume.summary.get(),
-                        .transfer = &knowledge.transfer,
-                        .policy = &knowledge.policy,
-                        .renderer = knowledge.renderer,
-                        .slots = std::uint32_t(workers)};
-  if (NeedsOccupancy(knowledge.policy)) request.known.occupied = knowledge.occupied.get();
-  return request;
-}
-
 MeasuredLayouts LayoutsOf(const LayoutKnowledge& knowledge, int workers) {
   return {knowledge.volume.summary, knowledge.occupied, {kPlannedDataset, knowledge.transfer, knowledge.renderer}, workers};
 }
 
 FramePlan PlanOf(ExperimentContext& context, const FrameCase& frame) {
   const LayoutKnowledge knowledge = KnowLayout(context, frame);
-  return PlanOf(context, frame, std::make_shared<const Layout>(MakeLayout(LayoutRequestOf(knowledge, frame.workers))));
+  LayoutRequest request{.summary = knowledge.volume.summary.get(),
+                        .transfer = &knowledge.transfer,
+                        .policy = &knowledge.policy,
+                        .renderer = knowledge.renderer,
+                        .slots = std::uint32_t(frame.workers)};
+  if (NeedsOccupancy(knowledge.policy)) request.known.occupied = knowledge.occupied.get();
+  return PlanOf(context, frame, std::make_shared<const Layout>(MakeLayout(request)));
 }
 
 FramePlan PlanOf(ExperimentContext& context, const FrameCase& frame, std::shared_ptr<const Layout> layout) {
@@ -363,7 +361,7 @@ double SteadySeconds(const MeasuredFrame& frame, const MachineModel& machine, in
   const int window = WindowFor(workers, std::uint32_t(teams), FrameBytes(frame.plan.setup)).frames;
   // Whole rounds of the teams, since teams may end together. The middle half is evaluated.
   const int frames = 4 * teams * std::max((window + teams - 1) / teams, 4);
-  const Timeline timeline = Simulate(frame, machine, frames, FramesAhead(window), false, teams);
+  const Timeline timeline = Simulate(frame, machine, frames, window + 2, false, teams);
   std::vector<double> received;
   for (const SimulatedFrame& simulated : timeline.frames) received.push_back(simulated.received);
   std::sort(received.begin(), received.end());

@@ -53,14 +53,12 @@ Json ServiceKey(const FrameCase& frame);
 Trial ValidationTrial(ExperimentContext& context, const FrameCase& frame, int turns);
 Json ValidationKey(const FrameCase& frame);
 
-// Identifies what a picture shows, whoever renders it: the beginning of every key. `what` names the trial.
-Json PictureKey(std::string_view what, const FrameCase& frame);
 // The service's plan for its first frame. Errors of Validate and PlanFrame.
 FramePlan PlanOf(ExperimentContext& context, const FrameCase& frame);
 // The same with a given layout.
 FramePlan PlanOf(ExperimentContext& context, const FrameCase& frame, std::shared_ptr<const Layout> layout);
-inline constexpr DatasetId kPlannedDataset = 1;  // in these plans
-// Makes layouts, as long as `knowledge` lives and the volume is in use.
+
+// All that layouts of a frame's volume depend on.
 struct LayoutKnowledge {
   VolumeInUse volume;
   std::shared_ptr<const OccupancyGrid> occupied;
@@ -112,6 +110,5 @@ Timeline Simulate(const MeasuredFrame& frame, const MachineModel& machine, int f
 
 // Time from picture to picture, with enough frames requested ahead to keep the service busy: a few more than it has under way.
 double SteadySeconds(const MeasuredFrame& frame, const MachineModel& machine, int teams = 1);
-inline int FramesAhead(int window) { return window + 2; }
 
 }  // namespace slabstream
