@@ -1,243 +1,182 @@
-// How even partitions are: every box of each is rendered alone on one thread (laboratory/measure/box_costs.h), the boxes of a slot are
-// added up, and the slot with the most is compared with the mean, in views from all sides. Then the same in each view after some frames of
-// dynamic balance. For volumes given on the command line; "sphere1:300" is the paper's class-I sphere with N = 300.
+// How even partitions are, and what they cost: every box of each is rendered alone on one thread (laboratory/measure/box_costs.h), in views
+// from all sides; the same again in each view after some frames of dynamic balance. A line a partition, medians over views:
+//
+//   max/mean   render time of the worker that has most, over the mean of all workers (least ... most)
+//   work       render time of all boxes, over that of the whole volume as one box
+//   at most    the efficiency that no schedule exceeds: one over the product of both
+//   predicted  root mean square of (measured - predicted) / predicted over boxes, by AnalyticCost, both relative to their means
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
-#include <string>
-#include <vector>
 
-#include "common/classification/count_occupied.h"
+#include "bench/program.h"
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
 #include "common/planning/balance.h"
-#include "common/planning/measured_cost.h"
 #include "common/planning/placement.h"
-#include "common/renderers/registry.h"
-#include "common/volume/sphere.h"
-#include "common/volume_io/volume_reader.h"
+#include "common/planning/policy_names.h"
 #include "laboratory/measure/box_costs.h"
+#include "laboratory/measure/measured_layouts.h"
 #include "laboratory/measure/statistics.h"
-#include "simulator/simulate_frames.h"
 
 namespace slabstream {
 namespace {
 
 struct Options {
-  std::vector<std::string> volumes, decompositions, splits = {"voxels", "occupied"};
-  Policy policy{.groups = 1};
-  std::string preset = "auto", renderer = "splat";
-  int slots = 16, repeats = 3, size = 512, frames = 5, views = 4;
-  double azimuth = 30, elevation = 20;
+  SubjectOptions subject;
+  std::vector<std::string> decompositions = NamesOf(Decompositions()), splits = {"voxels", "occupied"};
+  Policy policy{.groups = 1, .balance = std::string(kDynamicBalance)};
+  int workers = 16, repeats = 3, frames = 5, views = 4;
   bool verbose = false;
 };
 
-std::shared_ptr<const Volume> Load(const std::string& name) {
-  if (name.rfind("sphere", 0) != 0) return ReadVolume(name).value().volume;
-  const bool hollow = name[6] == '1';
-  const SphereRequest request{hollow ? SphereClass::kHollow : SphereClass::kFilled, std::stoi(name.substr(8)), hollow ? 0.05 : 0.4};
-  return std::make_shared<const Volume>(MakeSphere(request).value());
-}
-
-const RendererKind* RendererOf(const Options& options) { return RequireRenderer(options.renderer).value(); }
-
-FrameRequest MakeRequest(const Options& options, int view) {
-  FrameRequest request;
-  request.dataset = "volume";
-  request.renderer = options.renderer;
-  request.size = {options.size, options.size};
-  request.view = {.azimuth_degrees = options.azimuth + 360.0 * view / options.views, .elevation_degrees = options.elevation};
-  request.transfer.choice = options.preset;
-  request.policy = options.policy;
-  return request;
-}
-
-FrameSetup MakeSetup(const Options& options, const VolumeSummary& summary, int view) {
-  return MakeFrameSetup(MakeRequest(options, view), 1, summary).value();
-}
-
 struct Measured {
-  std::vector<BoxSeconds> boxes;
-  std::vector<double> by_box;  // of the layout; 0: nobody renders it
-  double imbalance = 0;        // of slots
-  double slowest = 0;          // slot, seconds
-  double sum = 0;              // of all boxes
+  FramePlan plan;
+  std::vector<std::int64_t> nanoseconds;  // of its boxes
+  double imbalance = 1, slowest = 0;      // of workers
+  double sum = 0;                         // seconds of all boxes
 };
 
-Measured Measure(const Options& options, const Volume& volume, const FrameSetup& setup, const Layout& layout) {
-  std::vector<Box> boxes;
-  std::vector<std::size_t> numbers;
-  for (std::size_t box = 0; box < layout.owners.size(); ++box) {
-    if (layout.owners[box] == kNoSlot) continue;
-    boxes.push_back(layout.partition.boxes()[box]);
-    numbers.push_back(box);
+Measured Measure(const Subject& subject, const FrameRequest& request, std::shared_ptr<const Layout> layout, int workers, int repeats) {
+  Measured measured{.plan = PlanFrame(request, 1, *subject.summary, RosterOf(std::uint32_t(workers)), std::move(layout)).value()};
+  const std::vector<Placement> placements = PlacementsOf(measured.plan);
+  std::vector<double> seconds(static_cast<std::size_t>(workers));
+  for (const BoxCost& cost : MeasureBoxCosts(*subject.volume, measured.plan, repeats)) {
+    seconds[placements[measured.nanoseconds.size()].worker - 1] += cost.seconds;
+    measured.nanoseconds.push_back(std::int64_t(cost.seconds * 1e9));
+    measured.sum += cost.seconds;
   }
-  Measured measured;
-  measured.by_box.resize(layout.owners.size());
-  std::vector<double> slots(std::size_t(options.slots));
-  const std::vector<BoxCost> costs = MeasureBoxCosts(volume, setup, boxes, options.repeats);
-  for (std::size_t i = 0; i < costs.size(); ++i) {
-    measured.boxes.push_back({costs[i].box, costs[i].seconds});
-    measured.sum += costs[i].seconds;
-    measured.by_box[numbers[i]] = costs[i].seconds;
-    slots[layout.owners[numbers[i]]] += costs[i].seconds;
-  }
-  measured.imbalance = Imbalance(slots);
-  measured.slowest = *std::ranges::max_element(slots);
+  measured.imbalance = Imbalance(seconds);
+  measured.slowest = *std::ranges::max_element(seconds);
   return measured;
 }
 
-// Over views: median, least and largest.
-struct Spread {
-  std::vector<double> values;
-  double median() const { return MedianOf(values).median; }
-};
+double PredictionError(const AnalyticCost& cost, const Measured& measured) {
+  // For views along z there is no prediction.
+  const Axis along = measured.plan.setup.camera.traversal_axis == Axis::kX ? Axis::kX : Axis::kY;
+  const std::vector<Placement> placements = PlacementsOf(measured.plan);
+  double predicted = 0, squares = 0;
+  for (const Placement& placement : placements) predicted += cost.Seconds(placement.box, {.along = along});
+  for (std::size_t i = 0; i < placements.size(); ++i) {
+    const double seconds = cost.Seconds(placements[i].box, {.along = along});
+    if (seconds == 0) continue;  // all its cost is in the halo
+    const double ratio = 1e-9 * double(measured.nanoseconds[i]) / measured.sum / (seconds / predicted);
+    squares += (ratio - 1) * (ratio - 1);
+  }
+  return std::sqrt(squares / double(placements.size()));
+}
 
+// By view.
 struct Outcome {
-  Spread imbalance, slowest, sum, moved;
-  Spread residual;  // root mean square of (measured - predicted) / predicted, over the boxes of a view, both relative to their means
+  std::vector<double> imbalance, slowest, sum, work, bound, error, moved;
 
-  void Add(const Measured& measured, std::int64_t moved_voxels) {
-    imbalance.values.push_back(measured.imbalance);
-    slowest.values.push_back(1e3 * measured.slowest);
-    sum.values.push_back(1e3 * measured.sum);
-    moved.values.push_back(1e-6 * double(moved_voxels));
+  void Add(const Measured& measured, double whole, double prediction_error, double moved_voxels) {
+    imbalance.push_back(measured.imbalance);
+    slowest.push_back(measured.slowest * 1e3);
+    sum.push_back(measured.sum * 1e3);
+    work.push_back(measured.sum / whole);
+    bound.push_back(100 / measured.imbalance / work.back());
+    error.push_back(prediction_error);
+    moved.push_back(moved_voxels * 1e-6);
   }
   std::string Text() const {
-    const auto [least, most] = std::ranges::minmax(imbalance.values);
-    return fmt::format("{:5.3f} ({:5.3f} ... {:5.3f}), slowest {:6.2f} ms, all {:7.2f} ms, predicted to {:4.2f}", imbalance.median(), least,
-                       most, slowest.median(), sum.median(), residual.median());
+    const auto median = [](const std::vector<double>& values) { return MedianOf(values).median; };
+    const auto [least, most] = std::ranges::minmax(imbalance);
+    return fmt::format(
+        "max/mean {:5.3f} ({:5.3f} ... {:5.3f}), slowest {:6.2f} ms, all {:7.2f} ms, work {:4.2f}, at most {:5.1f} %, predicted to "
+        "{:4.2f}, "
+        "{:.1f} Mvoxels moved",
+        median(imbalance), least, most, median(slowest), median(sum), median(work), median(bound), median(error), median(moved));
   }
 };
 
-class Comparison {
- public:
-  Comparison(const Options& options, const std::string& name)
-      : options_(options),
-        name_(name.substr(name.rfind('/') + 1)),
-        volume_(Load(name)),
-        summary_(Summarize(*volume_)),
-        transfer_(MakeSetup(options, summary_, 0).transfer),
-        grid_(CountOccupied(volume_->block, RendererOf(options)->DrawnTable(transfer_, summary_))),
-        cost_(RendererOf(options)->MakeCost({&grid_, &summary_, &transfer_})) {}
-
-  void Run(const Policy& policy) const {
-    FrameRequest frame = MakeRequest(options_, 0);
-    frame.policy = policy;
-    const ResolvedPolicy resolved = ResolvePolicy(frame, summary_.description.geometry).value();
-    const LayoutRequest request{.summary = &summary_,
-                                .transfer = &transfer_,
-                                .policy = &resolved,
-                                .renderer = RendererOf(options_),
-                                .slots = std::uint32_t(options_.slots),
-                                .known = {.occupied = &grid_}};
-    const Layout layout = MakeLayout(request);
-    const auto boxes = std::ranges::count_if(layout.owners, [](std::uint32_t owner) { return owner != kNoSlot; });
-    Outcome fixed, balanced;
-    for (int view = 0; view < options_.views; ++view) {
-      const FrameSetup setup = MakeSetup(options_, summary_, view);
-      Measured measured = Measure(options_, *volume_, setup, layout);
-      fixed.Add(measured, 0);
-      AddResidual(setup, measured, fixed);
-      if (options_.frames > 0) Balance(setup, request, layout, std::move(measured), balanced);
-    }
-    fmt::print("{:22} {:8} {:9} {:10} {:4} boxes, max/mean {}\n", name_, policy.decomposition, LoadMetricOf(policy), policy.assignment,
-               boxes, fixed.Text());
-    if (options_.frames == 0) return;
-    fmt::print("{:48} after {} frames, max/mean {}, {:.1f} Mvoxels moved\n", "", options_.frames, balanced.Text(), balanced.moved.median());
-    std::fflush(stdout);
-  }
-
- private:
-  void AddResidual(const FrameSetup& setup, const Measured& measured, Outcome& outcome) const {
-    const auto axis = std::size_t(std::min(Number(setup.camera.traversal_axis), 1));  // for views along z there is no prediction
-    double predicted = 0, squares = 0;
-    for (const BoxSeconds& box : measured.boxes) predicted += cost_->Seconds(box.box, {.along = Axis(axis)});
-    for (const BoxSeconds& box : measured.boxes) {
-      if (cost_->Seconds(box.box, {.along = Axis(axis)}) == 0) continue;  // all its cost is in the halo
-      const double ratio = box.seconds / measured.sum / (cost_->Seconds(box.box, {.along = Axis(axis)}) / predicted);
-      squares += (ratio - 1) * (ratio - 1);
-    }
-    outcome.residual.values.push_back(std::sqrt(squares / double(measured.boxes.size())));
-  }
-
-  // Same as the coordinator's LayoutTable.
-  void Balance(const FrameSetup& setup, LayoutRequest request, Layout layout, Measured measured, Outcome& outcome) const {
-    MeasuredCost learnt(grid_);
-    std::int64_t moved = 0;
-    std::vector<double> seconds = measured.by_box;  // of this layout, over its frames
-    for (int frame = 0, seen = 1; frame < options_.frames; ++frame, ++seen) {
-      const double weight = std::max(0.2, 1.0 / seen);
-      learnt.Learn(measured.boxes, weight);
-      if (seen == 1) seconds = measured.by_box;
-      for (std::size_t box = 0; box < seconds.size(); ++box) seconds[box] += weight * (measured.by_box[box] - seconds[box]);
-      const WorkField cost = learnt.Field();
-      request.known.cost = &cost;
-      if (std::optional<Layout> better = Rebalance(layout, seconds, request, seen)) {
-        moved += MovedVoxels(layout, *better);
-        layout = *std::move(better);
-        seen = 0;
-      }
-      measured = Measure(options_, *volume_, setup, layout);
-      if (options_.verbose) fmt::print(" {:.3f}{}", measured.imbalance, seen == 0 ? "*" : "");
-    }
-    if (options_.verbose) fmt::print("\n");
-    outcome.Add(measured, moved);
-    AddResidual(setup, measured, outcome);
-  }
-
-  const Options& options_;
-  const std::string name_;
-  const std::shared_ptr<const Volume> volume_;
-  const VolumeSummary summary_;
-  const TransferFunction transfer_;
-  const OccupancyGrid grid_;
-  const std::unique_ptr<AnalyticCost> cost_;
+// The views of a subject, and the render time of the whole volume in each.
+struct View {
+  FrameRequest request;
+  double whole = 0;
 };
 
-void Run(const Options& options) {
-  for (const std::string& name : options.volumes) {
-    const Comparison comparison(options, name);
-    for (const DecompositionEntry& decomposition : Decompositions()) {
-      const std::vector<std::string>& wanted = options.decompositions;
-      if (!wanted.empty() && std::ranges::find(wanted, decomposition.name) == wanted.end()) continue;
+std::vector<View> ViewsOf(const Subject& subject, const Options& options) {
+  std::vector<View> views;
+  for (int i = 0; i < options.views; ++i) {
+    View& view = views.emplace_back(View{.request = subject.request});
+    view.request.view.azimuth_degrees += 360.0 * i / options.views;
+    view.request.policy = {.groups = 1};
+    view.whole = Measure(subject, view.request, nullptr, 1, options.repeats).sum;
+  }
+  return views;
+}
+
+void Compare(const Subject& subject, const std::vector<View>& views, const Policy& policy, const Options& options) {
+  const FrameSetup& setup = subject.setup;
+  const std::unique_ptr<AnalyticCost> cost = setup.renderer->MakeCost({subject.occupied.get(), subject.summary.get(), &setup.transfer});
+  Outcome fixed, balanced;
+  std::size_t boxes = 0;
+  for (View view : views) {
+    view.request.policy = policy;
+    MeasuredLayouts layouts(subject.summary, subject.occupied, ClassifiedVolume(1, setup.transfer, setup.renderer), options.workers);
+    std::shared_ptr<const Layout> layout = layouts.Next(view.request);
+    Measured measured = Measure(subject, view.request, layout, options.workers, options.repeats);
+    fixed.Add(measured, view.whole, PredictionError(*cost, measured), 0);
+    boxes = measured.nanoseconds.size();
+    double moved = 0;
+    for (int frame = 0; frame < options.frames; ++frame) {
+      layouts.Learn(measured.plan, measured.nanoseconds);
+      const std::shared_ptr<const Layout> next = layouts.Next(view.request);
+      moved += double(MovedVoxels(*layout, *next));
+      measured = Measure(subject, view.request, next, options.workers, options.repeats);
+      if (options.verbose) fmt::print(" {:.3f}{}", measured.imbalance, next != layout ? "*" : "");
+      layout = next;
+    }
+    if (options.verbose && options.frames > 0) fmt::print("\n");
+    balanced.Add(measured, view.whole, PredictionError(*cost, measured), moved);
+  }
+  fmt::print("{:22} {:8} {:9} {:10} {:4} boxes, {}\n", subject.name, policy.decomposition, LoadMetricOf(policy), policy.assignment, boxes,
+             fixed.Text());
+  if (options.frames > 0) fmt::print("{:46} after {} frames, {}\n", "", options.frames, balanced.Text());
+  (void)std::fflush(stdout);
+}
+
+Status Run(const Options& options) {
+  for (const std::string& text : options.subject.volumes) {
+    const Result<Subject> subject = LoadSubject(options.subject, text);
+    if (!subject.ok()) return subject.status();
+    const std::vector<View> views = ViewsOf(*subject, options);
+    for (const std::string& decomposition : options.decompositions) {
       Policy policy = options.policy;
-      policy.decomposition = decomposition.name;
+      policy.decomposition = decomposition;
       for (const std::string& split : options.splits) {
         policy.load_metric = split;
-        if (decomposition.name == "octree" && split != decomposition.load_metric) continue;  // blind to work
-        comparison.Run(policy);
+        if (decomposition == "octree" && split != "voxels") continue;  // blind to work
+        Compare(*subject, views, policy, options);
       }
     }
   }
+  return Status::Ok();
 }
 
 }  // namespace
 }  // namespace slabstream
 
 int main(int argc, char** argv) {
-  slabstream::Options options;
-  CLI::App app("Imbalance of partitions");
-  app.add_option("VOLUME", options.volumes, "Files, or sphere1:N and sphere2:N")->required();
-  app.add_option("--transfer", options.preset, "A preset");
-  app.add_option("--renderer", options.renderer)->check(CLI::IsMember({"splat", "zbuffer"}));
-  app.add_option("--decomposition", options.decompositions, "Only these");
-  app.add_option("--split", options.splits)->check(CLI::IsMember({"voxels", "occupied"}));
-  std::vector<std::string> assignments;
-  for (const slabstream::AssignmentEntry& assignment : slabstream::Assignments()) assignments.emplace_back(assignment.name);
-  app.add_option("--assignment", options.policy.assignment)->check(CLI::IsMember(assignments));
-  app.add_option("--slots", options.slots)->check(CLI::Range(1, 4096));
-  app.add_option("--groups", options.policy.groups)->check(CLI::Range(1, slabstream::kMaxGroups));
-  app.add_option("--frames", options.frames, "Of dynamic balance")->check(CLI::Range(0, 1000));
-  app.add_option("--views", options.views, "Azimuths, all round")->check(CLI::Range(1, 1000));
-  app.add_option("--repeats", options.repeats)->check(CLI::Range(1, 1000));
-  app.add_option("--size", options.size)->check(CLI::Range(1, 8192));
-  app.add_option("--azimuth", options.azimuth, "Of the first view");
-  app.add_option("--elevation", options.elevation);
-  app.add_flag("--verbose", options.verbose, "Imbalance frame by frame; * where boxes changed");
-  CLI11_PARSE(app, argc, argv);
-  slabstream::Run(options);
-  return 0;
+  using namespace slabstream;  // NOLINT(google-build-using-namespace): the program's own
+  Options options;
+  CLI::App app("How even partitions are, and how much more work they are than the whole volume", "balance_bench");
+  AddSubjectOptions(app, options.subject);
+  AddList(app, "--decomposition", options.decompositions, CLI::IsMember(options.decompositions), "Partitions to compare");
+  AddList(app, "--split", options.splits, CLI::IsMember({"voxels", "occupied"}), "What boxes have equal shares of");
+  app.add_option("--assignment", options.policy.assignment, "Which worker owns which box")
+      ->check(CLI::IsMember(NamesOf(Assignments())).description(""))
+      ->type_name("NAME");
+  app.add_flag_callback(
+      "--along-view", [&options] { options.policy.axis = AxisChoice::kView; },
+      "Cut along the axis on which the view's slices are traversed");
+  AddInteger(app, "--workers", options.workers, 1, 4096, "Workers that share a frame");
+  AddInteger(app, "--groups", options.policy.groups, 1, kMaxGroups, "Groups of boxes");
+  AddInteger(app, "--frames", options.frames, 0, 1000, "Of dynamic balance");
+  AddInteger(app, "--views", options.views, 1, 1000, "Azimuths, all round");
+  AddInteger(app, "--repeats", options.repeats, 1, 1000, "Renderings of each box");
+  app.add_flag("--verbose", options.verbose, "Print the imbalance frame by frame; * where boxes changed");
+  return RunProgram(app, argc, argv, [&options] { return Run(options); });
 }

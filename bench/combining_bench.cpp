@@ -2,9 +2,6 @@
 // the workers are the real ones (machine, executor, sockets) with a renderer that returns a prepared picture; this program plays their
 // coordinator. Time runs from the moment at which the last rank holds its picture to the end of the last combining step at the root.
 //
-//   build/bin/combining_bench [--ranks 2,4,8,16] [--size 1024] [--schemes fan-in,direct-send,...] [--repeats N] [--images full,sparse]
-//                             [--links shared,ipc,tcp] [--color float32|half|fixed16] [--compress auto|on|off]
-//
 // Pictures are premultiplied float RGBA, combined by over. "sparse": each rank has a square of 20 % of the picture, and these slide from
 // one corner to the other; they compress better than any rendered picture. Each line is a case: median, 10th and 90th percentile in
 // milliseconds; the median until the coordinator knows; the processor time of all workers for a frame, without making the pictures (if
@@ -13,7 +10,6 @@
 // other: a process writes those of p - 1 ranks to a plain socket, another reads them, from and to memory that both keep.
 #include <arpa/inet.h>
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <pthread.h>
@@ -23,21 +19,16 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <ctime>
-#include <string>
-#include <thread>
-#include <vector>
 
+#include "bench/program.h"
 #include "common/base/check.h"
-#include "common/base/large_buffers.h"
 #include "common/combining/schemes.h"
-#include "common/renderers/registry.h"
 #include "common/transport/socket.h"
 #include "common/wire/any_message.h"
 #include "common/wire/payload.h"
@@ -142,7 +133,6 @@ class PreparedPicture : public Renderer {
 
 [[noreturn]] void RunWorker(const Case& config, Rank rank, const std::string& directory, Shared& shared) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  KeepFrameBuffers();
   Context context;
   WorkerOptions options;
   options.coordinator_endpoint = "ipc://" + directory + "/control";
@@ -387,7 +377,7 @@ void MeasureLoopback(std::int32_t size, Rank ranks, int repeats) {
   ::waitpid(reader, nullptr, 0);
 }
 
-int Run(int argc, char** argv) {
+struct Options {
   std::vector<Rank> ranks = {2, 4, 8, 16};
   std::vector<std::int32_t> sizes = {1024, 512};
   std::vector<std::string> schemes = {"fan-in",          "centralized", "chain",       "tree:4",
@@ -395,47 +385,56 @@ int Run(int argc, char** argv) {
   std::vector<std::string> images = {"full", "sparse"}, links = {"shared", "tcp"};
   int repeats = 50;
   ColorCoding color = ColorCoding::kFloat32;
-  std::string compress = "auto";
-  CLI::App app("Times combining among worker processes of this host.");
-  app.add_option("--ranks", ranks)->delimiter(',')->check(CLI::Range(1, 64));
-  app.add_option("--size", sizes, "pixels a side, multiples of 8")->delimiter(',')->check(CLI::Range(8, 8192));
-  app.add_option("--schemes", schemes)->delimiter(';');
-  app.add_option("--images", images)->delimiter(',')->check(CLI::IsMember({"full", "sparse"}));
-  app.add_option("--links", links)->delimiter(',')->check(CLI::IsMember({"shared", "ipc", "tcp"}));
-  app.add_option("--color", color)
-      ->transform(CLI::CheckedTransformer(std::map<std::string, ColorCoding>{
-          {"float32", ColorCoding::kFloat32}, {"half", ColorCoding::kHalf}, {"fixed16", ColorCoding::kFixed16}}));
-  app.add_option("--compress", compress)->check(CLI::IsMember({"auto", "on", "off"}));
-  app.add_option("--repeats", repeats)->check(CLI::Range(1, 100000));
-  CLI11_PARSE(app, argc, argv);
-  for (const std::string& scheme : schemes) {
-    if (const auto parsed = ParseCombining(scheme); !parsed.ok()) {
-      (void)std::fprintf(stderr, "combining_bench: --schemes %s\n", parsed.status().message().c_str());
-      return 2;
-    }
-  }
-  for (const std::string& link : links) {
-    for (const std::int32_t size : sizes) {
-      for (const std::string& image : images) {
-        for (const Rank count : ranks) {
-          if (link == "tcp" && image == "full") MeasureLoopback(size, count, repeats);
+  Compression compression = Compression::kAuto;
+};
+
+// A case at a time, in a process of its own.
+Status Run(const Options& options) {
+  for (const std::string& link : options.links) {
+    for (const std::int32_t size : options.sizes) {
+      for (const std::string& image : options.images) {
+        for (const Rank ranks : options.ranks) {
+          if (link == "tcp" && image == "full") MeasureLoopback(size, ranks, options.repeats);
           const pid_t child = ::fork();
           CHECK(child >= 0);
           if (child == 0) {
-            RunCase({count, size, image == "sparse", link, color, *ParseCompression(compress)}, schemes, repeats);
+            RunCase({ranks, size, image == "sparse", link, options.color, options.compression}, options.schemes, options.repeats);
             std::_Exit(0);
           }
           int status = 0;
           ::waitpid(child, &status, 0);
-          if (status != 0) return 1;
+          if (status != 0) return Status::Internal("a case has failed");
         }
       }
     }
   }
-  return 0;
+  return Status::Ok();
 }
 
 }  // namespace
 }  // namespace slabstream
 
-int main(int argc, char** argv) { return slabstream::Run(argc, argv); }
+int main(int argc, char** argv) {
+  using namespace slabstream;  // NOLINT(google-build-using-namespace): the program's own
+  Options options;
+  CLI::App app("Times combining among worker processes of this host", "combining_bench");
+  const CLI::Validator scheme([](const std::string& text) { return ParseCombining(text).status().message(); }, "");
+  AddList(app, "--ranks", options.ranks, CLI::Range(1, 64), "Numbers of workers");
+  AddList(app, "--size", options.sizes, CLI::Range(8, 8192), "Pixels a side, multiples of 8");
+  AddList(app, "--schemes", options.schemes, scheme, "Combining schemes, separated by semicolons", ';');
+  AddList(app, "--images", options.images, CLI::IsMember({"full", "sparse"}), "What the pictures fill");
+  AddList(app, "--links", options.links, CLI::IsMember({"shared", "ipc", "tcp"}), "How images travel");
+  app.add_option("--color", options.color, "Coding of colours that are sent: float32, half or fixed16")
+      ->transform(
+          CLI::CheckedTransformer(std::map<std::string, ColorCoding>{
+                                      {"float32", ColorCoding::kFloat32}, {"half", ColorCoding::kHalf}, {"fixed16", ColorCoding::kFixed16}})
+              .description(""))
+      ->type_name("NAME");
+  const auto compression = [](const std::string&, const std::string& text) -> Result<Compression> {
+    if (const auto parsed = ParseCompression(text)) return *parsed;
+    return Status::InvalidArgument(fmt::format("--compress is '{}', but must be auto, on or off", text));
+  };
+  AddParsed(app, "--compress", options.compression, compression, "Whether images are packed: auto, on or off")->type_name("NAME");
+  AddInteger(app, "--repeats", options.repeats, 1, 100000, "Frames of each scheme");
+  return RunProgram(app, argc, argv, [&options] { return Run(options); });
+}

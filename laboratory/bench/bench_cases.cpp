@@ -35,11 +35,6 @@ std::string SphereName(const SphereRequest& sphere) {
   return sphere.occupancy == StandardOccupancy(sphere.sphere_class) ? name : fmt::format("{}-{:g}", name, sphere.occupancy);
 }
 
-BenchCase StandardSphere(SphereClass sphere_class, int size, double opacity,
-                         const RendererKind* renderer = FindRenderer(kDefaultRenderer)) {
-  return SphereCase({sphere_class, size, StandardOccupancy(sphere_class)}, opacity, renderer);
-}
-
 // "volumes/head.nii.gz" is "head", as in the catalogue of a service.
 std::string Stem(const std::string& path) {
   const std::filesystem::path name = std::filesystem::path(path).lexically_normal().filename();
@@ -49,7 +44,10 @@ std::string Stem(const std::string& path) {
 
 }  // namespace
 
-double SphereOpacity(const RendererKind& renderer) { return HasDepth(renderer.format()) ? kOpaqueSphere : kTranslucentSphere; }
+BenchCase StandardSphere(SphereClass sphere_class, int size, const RendererKind* renderer) {
+  return SphereCase({sphere_class, size, StandardOccupancy(sphere_class)},
+                    HasDepth(renderer->format()) ? kOpaqueSphere : kTranslucentSphere, renderer);
+}
 
 BenchCase SphereCase(const SphereRequest& sphere, double opacity, const RendererKind* renderer) {
   const bool hollow = sphere.sphere_class == SphereClass::kHollow, points = HasDepth(renderer->format());
@@ -75,16 +73,16 @@ BenchCase BrainCase() {
 
 const std::vector<BenchCase>& StandardBenchCases() {
   static const std::vector<BenchCase> cases = {
-      StandardSphere(SphereClass::kHollow, 256, kTranslucentSphere),
-      StandardSphere(SphereClass::kFilled, 256, kTranslucentSphere),
-      StandardSphere(SphereClass::kHollow, 256, kOpaqueSphere),
-      StandardSphere(SphereClass::kFilled, 256, kOpaqueSphere),
-      StandardSphere(SphereClass::kHollow, 512, kTranslucentSphere),
-      StandardSphere(SphereClass::kHollow, 256, kOpaqueSphere, FindRenderer("zbuffer")),
-      StandardSphere(SphereClass::kHollow, 256, kTranslucentSphere, FindRenderer("raycast")),
-      StandardSphere(SphereClass::kFilled, 256, kTranslucentSphere, FindRenderer("raycast")),
-      StandardSphere(SphereClass::kHollow, 256, kTranslucentSphere, FindRenderer("mip")),
-      StandardSphere(SphereClass::kFilled, 256, kTranslucentSphere, FindRenderer("mip")),
+      StandardSphere(SphereClass::kHollow, 256),
+      StandardSphere(SphereClass::kFilled, 256),
+      SphereCase({SphereClass::kHollow, 256, kHollowOccupancy}, kOpaqueSphere),
+      SphereCase({SphereClass::kFilled, 256, kFilledOccupancy}, kOpaqueSphere),
+      StandardSphere(SphereClass::kHollow, 512),
+      StandardSphere(SphereClass::kHollow, 256, FindRenderer("zbuffer")),
+      StandardSphere(SphereClass::kHollow, 256, FindRenderer("raycast")),
+      StandardSphere(SphereClass::kFilled, 256, FindRenderer("raycast")),
+      StandardSphere(SphereClass::kHollow, 256, FindRenderer("mip")),
+      StandardSphere(SphereClass::kFilled, 256, FindRenderer("mip")),
       BrainCase(),
   };
   return cases;

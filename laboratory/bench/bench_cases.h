@@ -26,13 +26,13 @@ struct BenchCase {
 
 const std::vector<BenchCase>& StandardBenchCases();
 
-// Builds the standard cases: a sphere whose occupied voxels have this opacity, and the MRI brain of Debian's package mricron-data.
+// A sphere whose occupied voxels have this opacity.
 BenchCase SphereCase(const SphereRequest& sphere, double opacity, const RendererKind* renderer = FindRenderer(kDefaultRenderer));
-BenchCase BrainCase();
+// With the occupancy of its class, 5 or 40 %. A renderer that shows surfaces gets an opaque one.
+BenchCase StandardSphere(SphereClass sphere_class, int size, const RendererKind* renderer = FindRenderer(kDefaultRenderer));
 inline constexpr double kTranslucentSphere = 0.05, kOpaqueSphere = 0.9;
-
-// The opacity that experiments give a sphere: a renderer that shows surfaces gets an opaque one.
-double SphereOpacity(const RendererKind& renderer);
+// The MRI brain of Debian's package mricron-data.
+BenchCase BrainCase();
 
 // A standard case's name, or FILE[:TRANSFER] of a volume file (`at_service`: NAME[:TRANSFER] of a dataset), with TRANSFER as in --transfer.
 // NotFound, InvalidArgument: naming the text.

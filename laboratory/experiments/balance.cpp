@@ -11,7 +11,6 @@
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/figures.h"
 #include "laboratory/experiments/machines.h"
-#include "laboratory/experiments/measured_layouts.h"
 #include "laboratory/experiments/plots.h"
 #include "laboratory/experiments/policies.h"
 #include "laboratory/measure/box_costs.h"
@@ -37,14 +36,12 @@ struct Balance {
   }
 };
 
-Result<Balance> BalanceOf(const ExperimentContext& context) {
+Balance BalanceOf(const ExperimentContext& context) {
   Balance balance;
   const int size = context.Scaled(context.quick() ? 128 : 300);
-  balance.volumes = {SphereCase({SphereClass::kHollow, size, 0.05}, kTranslucentSphere),
-                     SphereCase({SphereClass::kFilled, size, 0.1}, kTranslucentSphere)};
-  Result<std::vector<BenchCase>> real = RealVolumes(context.options().volumes);
-  if (!real.ok()) return real.status();
-  if (!context.quick() || !context.options().volumes.empty()) balance.volumes.insert(balance.volumes.end(), real->begin(), real->end());
+  balance.volumes = {StandardSphere(SphereClass::kHollow, size), SphereCase({SphereClass::kFilled, size, 0.1}, kTranslucentSphere)};
+  const std::vector<BenchCase> real = RealVolumes(context.options().volumes);
+  if (!context.quick() || !context.options().volumes.empty()) balance.volumes.insert(balance.volumes.end(), real.begin(), real.end());
   balance.workers = context.quick() ? std::vector{2, 16, 64} : std::vector{2, 4, 8, 16, 32, 64, 128, 256, 512, 1024};
   balance.pixels = context.Scaled(512);
   return balance;
@@ -56,19 +53,10 @@ Policy WithBoxes(Policy policy, std::string_view assignment) {
   return policy;
 }
 
-double VoxelBytes(const LayoutKnowledge& knowledge) {
-  const VolumeDescription& description = knowledge.volume.summary->description;
-  return double(BytesPerSample(description.type));
-}
-
 // A turning view, frame after frame: the boxes are rendered alone and their times are learnt. Before the next frame the coordinator's own
 // table of layouts may change the layout.
-struct Moving {
-  std::string name;
-  Policy policy;
-};
-std::vector<Moving> MovingPolicies() {
-  std::vector<Moving> policies;
+std::vector<NamedPolicy> MovingPolicies() {
+  std::vector<NamedPolicy> policies;
   for (const NamedPolicy& named : {EqualSlabs(), BalancedTree()}) {
     for (const NamedChoice& balance : BalanceModes()) {
       policies.push_back({fmt::format("{}, {}", named.name, balance.name), named.policy});
@@ -78,33 +66,32 @@ std::vector<Moving> MovingPolicies() {
   return policies;
 }
 
-Json MovingKey(const BenchCase& volume, const Moving& moving, int pixels, int frames) {
+Json MovingKey(const BenchCase& volume, const NamedPolicy& moving, int pixels, int frames) {
   return {{"what", "moving view"},    {"volume", volume.name}, {"policy", moving.name},
           {"workers", kTableWorkers}, {"size", pixels},        {"frames", frames}};
 }
 
-Result<Json> MeasureMoving(ExperimentContext& context, const Balance& balance, const BenchCase& volume, const Moving& moving, int frames) {
+Json MeasureMoving(ExperimentContext& context, const Balance& balance, const BenchCase& volume, const NamedPolicy& moving, int frames) {
   FrameCase frame = balance.Frame(volume, moving.policy, kTableWorkers);
-  Result<MeasuredLayouts> layouts = MeasuredLayouts::Make(context, frame);
-  if (!layouts.ok()) return layouts.status();
-  const LayoutKnowledge& knowledge = layouts->knowledge();
-  Layout layout;
+  const LayoutKnowledge knowledge = KnowLayout(context, frame);
+  MeasuredLayouts layouts = LayoutsOf(knowledge, frame.workers);
+  const auto voxel_bytes = double(BytesPerSample(knowledge.volume.summary->description.type));
+  std::shared_ptr<const Layout> layout;
   Json numbers = {{"imbalance", Json::array()}, {"slowest_ms", Json::array()}, {"moved_bytes", Json::array()}};
   for (int i = 0; i < frames; ++i) {
     frame.view = BenchView(Projection::kOrthographic, i, kMovingFrames);
-    const Layout& next = layouts->Next(frame);
-    const double moved = i == 0 ? 0 : double(MovedVoxels(layout, next)) * VoxelBytes(knowledge);
+    const std::shared_ptr<const Layout> next = layouts.Next(RequestOf(frame));
+    const double moved = i == 0 ? 0 : double(MovedVoxels(*layout, *next)) * voxel_bytes;
     layout = next;
-    const Result<FramePlan> plan = PlanOf(context, frame, layout);
-    if (!plan.ok()) return plan.status();
-    const std::vector<Placement> placements = PlacementsOf(*plan);
+    const FramePlan plan = PlanOf(context, frame, layout);
+    const std::vector<Placement> placements = PlacementsOf(plan);
     std::vector<double> seconds(std::size_t(frame.workers));
     std::vector<std::int64_t> nanoseconds;
-    for (const BoxCost& cost : MeasureBoxCosts(*knowledge.volume.volume, *plan, kRenderings)) {
+    for (const BoxCost& cost : MeasureBoxCosts(*knowledge.volume.volume, plan, kRenderings)) {
       seconds[placements[nanoseconds.size()].worker - 1] += cost.seconds;
       nanoseconds.push_back(std::int64_t(cost.seconds * 1e9));
     }
-    layouts->Learn(*plan, nanoseconds);
+    layouts.Learn(plan, nanoseconds);
     numbers["imbalance"].push_back(Imbalance(seconds));
     numbers["slowest_ms"].push_back(*std::ranges::max_element(seconds) * 1e3);
     numbers["moved_bytes"].push_back(moved);
@@ -123,29 +110,22 @@ std::vector<Trial> TrialsOf(ExperimentContext& context, const Balance& balance) 
       trials.push_back(BoxCostTrial(context, balance.Frame(volume, named.policy, kTableWorkers)));
       trials.push_back(BoxCostTrial(context, balance.Frame(volume, WithBoxes(named.policy, "cyclic"), kTableWorkers)));
     }
-    for (const Moving& moving : MovingPolicies()) {
+    for (const NamedPolicy& moving : MovingPolicies()) {
       const int frames = MovingFrames(context);
       trials.push_back({MovingKey(volume, moving, balance.pixels, frames),
                         [&context, balance, volume, moving, frames] { return MeasureMoving(context, balance, volume, moving, frames); },
                         frames * 20.0});
     }
   }
-  return WithoutDoubles(std::move(trials));
+  return trials;
 }
 
 Table NewTable(const std::string& name, const std::string& title) {
-  return {name,
-          title,
-          {{"policy", ""},
-           {"p", ""},
-           {"boxes", ""},
-           {"imbalance", ""},
-           {"idle", "%"},
-           {"frame", "ms"},
-           {"picture to picture", "ms"},
-           {"image bytes", "MB"},
-           {"voxels to send", "MB"}},
-          {}};
+  return {
+      name,
+      title,
+      {"policy", "p", "boxes", "imbalance", "idle (%)", "frame (ms)", "picture to picture (ms)", "image bytes (MB)", "voxels to send (MB)"},
+      {}};
 }
 
 struct Outcome {
@@ -153,26 +133,18 @@ struct Outcome {
   double imbalance = 1;
 };
 
-Result<Outcome> AddRow(ExperimentContext& context, const FrameCase& frame, const std::string& name, Table& table) {
-  const Result<MeasuredFrame> measured = Recall(context, frame);
-  if (!measured.ok()) return measured.status();
-  const Result<FrameFigures> figures = FindFigures(*measured, Cluster(context, Link(kLink)));
-  if (!figures.ok()) return figures.status();
+Outcome AddRow(ExperimentContext& context, const FrameCase& frame, const std::string& name, Table& table) {
+  const MeasuredFrame measured = Recall(context, frame);
+  const FrameFigures figures = FindFigures(measured, Cluster(context, Link(kLink)));
   double boxes = 0, bytes = 0;
-  for (const MeasuredFrame::Cost& box : measured->boxes) {
+  for (const MeasuredFrame::Cost& box : measured.boxes) {
     boxes += box.seconds > 0 ? 1 : 0;
     bytes += box.voxel_bytes;
   }
-  const Outcome outcome{*figures, Imbalance(measured->WorkerSeconds())};
-  table.rows.push_back({name,
-                        Cell::Parameter(frame.workers),
-                        Cell::Parameter(boxes),
-                        {outcome.imbalance, Origin::kMeasured},
-                        {figures->idle_share * 100, Origin::kSimulated},
-                        {figures->latency_seconds * 1e3, Origin::kSimulated},
-                        {figures->steady_seconds * 1e3, Origin::kSimulated},
-                        {figures->image_bytes * 1e-6, Origin::kSimulated},
-                        {bytes * 1e-6, Origin::kMeasured}});
+  const Outcome outcome{figures, Imbalance(measured.WorkerSeconds())};
+  table.rows.push_back({name, Chosen(frame.workers), Chosen(boxes), Measured(outcome.imbalance), Simulated(figures.idle_share * 100),
+                        Simulated(figures.latency_seconds * 1e3), Simulated(figures.steady_seconds * 1e3),
+                        Simulated(figures.image_bytes * 1e-6), Measured(bytes * 1e-6)});
   return outcome;
 }
 
@@ -180,7 +152,7 @@ Result<Outcome> AddRow(ExperimentContext& context, const FrameCase& frame, const
 std::string SplitWords(const std::string& split) { return split == "occupied" ? "occupied voxels" : split; }
 
 // Partitions over workers.
-Result<Section> PartitionSection(ExperimentContext& context, const Balance& balance, const BenchCase& volume) {
+Section PartitionSection(ExperimentContext& context, const Balance& balance, const BenchCase& volume) {
   const std::string title = TitleOf(volume);
   Table table = NewTable("partitions-" + volume.dataset, fmt::format("{}: one box a worker", title));
   // One chart for each split: a chart with more lines than the palette has colours would be unreadable.
@@ -190,11 +162,10 @@ Result<Section> PartitionSection(ExperimentContext& context, const Balance& bala
     const std::string& split = named.policy.load_metric;
     LineSeries even{named.policy.decomposition, Origin::kMeasured, {}}, time{named.policy.decomposition, Origin::kSimulated, {}};
     for (const int p : balance.workers) {
-      const Result<Outcome> outcome = AddRow(context, balance.Frame(volume, named.policy, p), named.name, table);
-      if (!outcome.ok()) return outcome.status();
-      even.points.push_back({double(p), outcome->imbalance});
-      time.points.push_back({double(p), outcome->figures.steady_seconds * 1e3});
-      if (p == kTableWorkers) at_table[named.name] = outcome->imbalance;
+      const Outcome outcome = AddRow(context, balance.Frame(volume, named.policy, p), named.name, table);
+      even.points.push_back({double(p), outcome.imbalance});
+      time.points.push_back({double(p), outcome.figures.steady_seconds * 1e3});
+      if (p == kTableWorkers) at_table[named.name] = outcome.imbalance;
     }
     const AxisSpec workers = WorkersAxis();
     imbalance.try_emplace(
@@ -229,10 +200,9 @@ Result<Section> PartitionSection(ExperimentContext& context, const Balance& bala
                                        "As many frames asked for ahead as keep all workers busy."});
   }
   for (const NamedPolicy& named : {EqualSlabs(), BalancedTree()}) {
-    const Result<MeasuredFrame> measured = Recall(context, balance.Frame(volume, named.policy, kTableWorkers));
-    if (!measured.ok()) return measured.status();
+    const MeasuredFrame measured = Recall(context, balance.Frame(volume, named.policy, kTableWorkers));
     section.blocks.emplace_back(BoxCostFigure(fmt::format("boxes-{}-{}", volume.dataset, Slug(named.name)),
-                                              fmt::format("{}, p = {}: {}", title, kTableWorkers, named.name), *measured,
+                                              fmt::format("{}, p = {}: {}", title, kTableWorkers, named.name), measured,
                                               "Render time of every box that the cut meets."));
   }
   section.blocks.emplace_back(std::move(table));
@@ -240,7 +210,7 @@ Result<Section> PartitionSection(ExperimentContext& context, const Balance& bala
 }
 
 // Assignments, where workers have several boxes.
-Result<Section> AssignmentSection(ExperimentContext& context, const Balance& balance) {
+Section AssignmentSection(ExperimentContext& context, const Balance& balance) {
   Section section;
   section.title = "Assignments";
   section.question = fmt::format("With {} boxes a worker, who should own which?", kBoxesAWorker);
@@ -257,11 +227,10 @@ Result<Section> AssignmentSection(ExperimentContext& context, const Balance& bal
       BarGroup group{named.name, {}};
       for (const AssignmentEntry& assignment : Assignments()) {
         const std::string name = fmt::format("{}, {}", named.name, assignment.name);
-        const Result<Outcome> outcome =
+        const Outcome outcome =
             AddRow(context, balance.Frame(volume, WithBoxes(named.policy, assignment.name), kTableWorkers), name, table);
-        if (!outcome.ok()) return outcome.status();
-        group.bars.push_back({std::string(assignment.name), Origin::kMeasured, {outcome->imbalance}});
-        best = std::min(best, {outcome->imbalance, name});
+        group.bars.push_back({std::string(assignment.name), Origin::kMeasured, {outcome.imbalance}});
+        best = std::min(best, {outcome.imbalance, name});
       }
       chart.groups.push_back(std::move(group));
     }
@@ -274,7 +243,7 @@ Result<Section> AssignmentSection(ExperimentContext& context, const Balance& bal
 }
 
 // A moving view, static and dynamic.
-Result<Section> MovingSection(ExperimentContext& context, const Balance& balance) {
+Section MovingSection(ExperimentContext& context, const Balance& balance) {
   Section section;
   section.title = "Static and dynamic balance under a moving view";
   section.question = "Does learning from earlier frames keep workers even while the view turns, and what does it move?";
@@ -282,26 +251,19 @@ Result<Section> MovingSection(ExperimentContext& context, const Balance& balance
       "p = {}, a turn of {} frames, of which {} are rendered box by box. dynamic: what boxes took is learnt, and boxes are cut anew or "
       "handed over between frames where the coordinator finds that it pays; the voxels that then change owner are counted.",
       kTableWorkers, kMovingFrames, MovingFrames(context));
-  Table table{"moving-view",
-              "A moving view",
-              {{"volume", ""}, {"policy", ""}, {"frame", ""}, {"imbalance", ""}, {"slowest worker", "ms"}, {"voxels moved", "MB"}},
-              {}};
+  Table table{"moving-view", "A moving view", {"volume", "policy", "frame", "imbalance", "slowest worker (ms)", "voxels moved (MB)"}, {}};
   std::string sentence;
   for (const BenchCase& volume : balance.volumes) {
     LineChart chart{TitleOf(volume) + ": imbalance, frame by frame", {"frame", ""}, {"most / mean", ""}, {}};
-    for (const Moving& moving : MovingPolicies()) {
+    for (const NamedPolicy& moving : MovingPolicies()) {
       const std::vector<const Json*> repeats = context.log().All(MovingKey(volume, moving, balance.pixels, MovingFrames(context)));
       const std::vector<Estimate> imbalance = EstimatesOf(repeats, "imbalance"), slowest = EstimatesOf(repeats, "slowest_ms");
       const std::vector<double> moved = MediansOf(repeats, "moved_bytes");
       LineSeries series{moving.name, Origin::kMeasured, {}};
       for (std::size_t i = 0; i < imbalance.size(); ++i) {
         series.points.push_back({double(i + 1), imbalance[i].median, imbalance[i].low, imbalance[i].high});
-        table.rows.push_back({TitleOf(volume),
-                              moving.name,
-                              Cell::Parameter(double(i + 1)),
-                              Cell(imbalance[i], Origin::kMeasured),
-                              Cell(slowest[i], Origin::kMeasured),
-                              {moved[i] * 1e-6, Origin::kMeasured}});
+        table.rows.push_back(
+            {TitleOf(volume), moving.name, Chosen(double(i + 1)), Measured(imbalance[i]), Measured(slowest[i]), Measured(moved[i] * 1e-6)});
       }
       chart.series.push_back(std::move(series));
       if (moving.name != "kd-tree by occupied, dynamic") continue;
@@ -318,20 +280,19 @@ Result<Section> MovingSection(ExperimentContext& context, const Balance& balance
 
 }  // namespace
 
-Result<Report> RunBalance(ExperimentContext& context) {
-  const Result<Balance> balance = BalanceOf(context);
-  if (!balance.ok()) return balance.status();
-  if (Status status = context.Run(TrialsOf(context, *balance), context.quick() ? kQuickRepeats : kRepeats); !status.ok()) return status;
+Report RunBalance(ExperimentContext& context) {
+  const Balance balance = BalanceOf(context);
+  context.Run(TrialsOf(context, balance), kRepeats, kQuickRepeats);
   Report report;
   report.title = "Balance: partitions, assignments and learning";
   report.summary =
       "Sparse volumes give equal slabs very unequal work. Every partition, divided by voxels and by occupied voxels, every assignment, and "
       "boxes that change while the view moves: who is idle, what travels, how long a frame takes.";
-  for (const BenchCase& volume : balance->volumes) {
-    if (Status status = report.Add(PartitionSection(context, *balance, volume)); !status.ok()) return status;
+  for (const BenchCase& volume : balance.volumes) {
+    report.sections.push_back(PartitionSection(context, balance, volume));
   }
-  if (Status status = report.Add(AssignmentSection(context, *balance)); !status.ok()) return status;
-  if (Status status = report.Add(MovingSection(context, *balance)); !status.ok()) return status;
+  report.sections.push_back(AssignmentSection(context, balance));
+  report.sections.push_back(MovingSection(context, balance));
   return report;
 }
 

@@ -1,16 +1,9 @@
 #include "laboratory/experiments/balanced_case.h"
 
 #include "common/planning/policy_names.h"
-#include "laboratory/experiments/measured_layouts.h"
-#include "laboratory/measure/box_costs.h"
 
 namespace slabstream {
 namespace {
-
-FrameCase Balanced(FrameCase frame) {
-  frame.policy.balance = kDynamicBalance;
-  return frame;
-}
 
 Json BalancedKey(const FrameCase& frame) {
   Json key = BoxCostKey(frame);
@@ -20,49 +13,40 @@ Json BalancedKey(const FrameCase& frame) {
   return key;
 }
 
-Result<Json> MeasureBalanced(ExperimentContext& context, const FrameCase& frame) {
-  Result<MeasuredLayouts> layouts = MeasuredLayouts::Make(context, frame);
-  if (!layouts.ok()) return layouts.status();
+Json MeasureBalanced(ExperimentContext& context, const FrameCase& frame) {
+  MeasuredLayouts layouts = LayoutsOf(KnowLayout(context, frame), frame.workers);
   Json learnt = Json::array();
   for (int i = 0; i < kBalancedFrames; ++i) {
-    const Result<FramePlan> plan = PlanOf(context, frame, layouts->Next(frame));
-    if (!plan.ok()) return plan.status();
-    const Result<Json> boxes = MeasureBoxes(context, frame, *plan);
-    if (!boxes.ok()) return boxes.status();
+    const FramePlan plan = PlanOf(context, frame, layouts.Next(RequestOf(frame)));
     std::vector<std::int64_t> nanoseconds;
-    for (const Json& seconds : boxes->at("seconds")) nanoseconds.push_back(std::int64_t(seconds.get<double>() * 1e9));
-    layouts->Learn(*plan, nanoseconds);
+    const Json boxes = MeasureBoxes(context, frame, plan);
+    for (const Json& seconds : boxes.at("seconds")) nanoseconds.push_back(std::int64_t(seconds.get<double>() * 1e9));
+    layouts.Learn(plan, nanoseconds);
     learnt.push_back(nanoseconds);
   }
-  const Result<FramePlan> plan = PlanOf(context, frame, layouts->Next(frame));
-  if (!plan.ok()) return plan.status();
-  Result<Json> boxes = MeasureBoxes(context, frame, *plan);
-  if (boxes.ok()) (*boxes)["learnt"] = std::move(learnt);
+  Json boxes = MeasureBoxes(context, frame, PlanOf(context, frame, layouts.Next(RequestOf(frame))));
+  boxes["learnt"] = std::move(learnt);
   return boxes;
 }
 
 }  // namespace
 
-Trial BalancedTrial(ExperimentContext& context, const FrameCase& frame) {
-  const FrameCase balanced = Balanced(frame);
-  return {BalancedKey(balanced), [&context, balanced] { return MeasureBalanced(context, balanced); },
-          (kBalancedFrames + 1) * BoxCostTrial(context, balanced).effort};
+bool IsDynamic(const FrameCase& frame) { return frame.policy.balance == kDynamicBalance; }
+
+Trial CostTrial(ExperimentContext& context, const FrameCase& frame) {
+  Trial boxes = BoxCostTrial(context, frame);
+  if (!IsDynamic(frame)) return boxes;
+  return {BalancedKey(frame), [&context, frame] { return MeasureBalanced(context, frame); }, (kBalancedFrames + 1) * boxes.effort};
 }
 
-Result<std::vector<MeasuredFrame>> RecallBalanced(ExperimentContext& context, const FrameCase& frame) {
-  const FrameCase balanced = Balanced(frame);
+std::vector<MeasuredFrame> RecallBalanced(ExperimentContext& context, const FrameCase& frame) {
   std::vector<MeasuredFrame> frames;
-  for (const Json* repeat : context.log().All(BalancedKey(balanced))) {
-    Result<MeasuredLayouts> layouts = MeasuredLayouts::Make(context, balanced);
-    if (!layouts.ok()) return layouts.status();
+  for (const Json* repeat : context.log().All(BalancedKey(frame))) {
+    MeasuredLayouts layouts = LayoutsOf(KnowLayout(context, frame), frame.workers);
     for (const Json& learnt : repeat->at("learnt")) {
-      const Result<FramePlan> plan = PlanOf(context, balanced, layouts->Next(balanced));
-      if (!plan.ok()) return plan.status();
-      layouts->Learn(*plan, learnt.get<std::vector<std::int64_t>>());
+      layouts.Learn(PlanOf(context, frame, layouts.Next(RequestOf(frame))), learnt.get<std::vector<std::int64_t>>());
     }
-    Result<FramePlan> plan = PlanOf(context, balanced, layouts->Next(balanced));
-    if (!plan.ok()) return plan.status();
-    frames.push_back(WithBoxCosts(context, balanced, *std::move(plan), {repeat}));
+    frames.push_back(WithBoxCosts(context, frame, PlanOf(context, frame, layouts.Next(RequestOf(frame))), {repeat}));
   }
   return frames;
 }

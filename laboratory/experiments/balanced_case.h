@@ -8,10 +8,12 @@ namespace slabstream {
 
 inline constexpr int kBalancedFrames = 6;  // to learn from, with each box measured once
 
-// Assumes dynamic balance, whatever the policy says.
-Trial BalancedTrial(ExperimentContext& context, const FrameCase& frame);
+bool IsDynamic(const FrameCase& frame);
 
-// One for each repeat, because layouts differ. The trial, and FinishTrial, must have been run.
-Result<std::vector<MeasuredFrame>> RecallBalanced(ExperimentContext& context, const FrameCase& frame);
+// The trial that measures the frame's boxes: BoxCostTrial, or this one of a frame with dynamic balance.
+Trial CostTrial(ExperimentContext& context, const FrameCase& frame);
+
+// One for each repeat, because layouts differ. The frame has dynamic balance; the trial, and FinishTrial, must have been run.
+std::vector<MeasuredFrame> RecallBalanced(ExperimentContext& context, const FrameCase& frame);
 
 }  // namespace slabstream

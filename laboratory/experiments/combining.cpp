@@ -83,7 +83,7 @@ Computing RunSchedule(const Schedule& schedule, std::vector<LocalImage>& images,
 }
 
 Trial MeasureOperators(const Combining& c, std::uint64_t seed) {
-  const auto run = [=]() -> Result<Json> {
+  const auto run = [=]() -> Json {
     const SharedSchedule schedule = DeriveSchedule(ScheduleOf(c), {0, std::uint64_t(c.side) * std::uint64_t(c.side)}).value();
     tbb::task_arena one_thread(1);
     Computing computing{.seconds = std::numeric_limits<double>::infinity()};
@@ -103,7 +103,7 @@ Trial MeasureOperators(const Combining& c, std::uint64_t seed) {
 }
 
 // Time until the picture is complete at the display worker, on a machine of this link, if boxes are rendered in no time.
-Result<double> CombiningSeconds(const ExperimentContext& context, const Combining& c, const LinkModel& link) {
+double CombiningSeconds(const ExperimentContext& context, const Combining& c, const LinkModel& link) {
   FramePlan plan;
   const Index3 size = {8, 8, c.ranks};
   VolumeSummary summary;
@@ -124,19 +124,13 @@ Result<double> CombiningSeconds(const ExperimentContext& context, const Combinin
   for (const CoverageMap& map : coverage) input.boxes.push_back({0, &map, 0});
   MachineModel machine = Cluster(context, link);
   machine.plan_seconds = machine.message_seconds = machine.client_seconds = 0;
-  const Result<Timeline> timeline = SimulateFrames(std::span(&input, 1), machine, {1, false});
-  if (!timeline.ok()) return timeline.status();
-  return timeline->frames.front().latency();
+  return OrThrow(SimulateFrames(std::span(&input, 1), machine, {1, false})).frames.front().latency();
 }
 
 Trial SimulateCombining(const ExperimentContext& context, const Combining& c, const LinkPreset& link) {
   Json key = KeyOf("combining", c);
   key["link"] = link.name;
-  const auto run = [&context, c, link = link.link]() -> Result<Json> {
-    const Result<double> seconds = CombiningSeconds(context, c, link);
-    if (!seconds.ok()) return seconds.status();
-    return Json{{"seconds", *seconds}};
-  };
+  const auto run = [&context, c, link = link.link] { return Json{{"seconds", CombiningSeconds(context, c, link)}}; };
   return {std::move(key), run, 0.02 + 1e-4 * c.ranks, false};
 }
 
@@ -180,8 +174,7 @@ class CombiningReport {
         for (const int ranks : sweeps_.measured_ranks) {
           const Combining c{scheme, ranks, sweeps_.side_at, share};
           const Estimate e = EstimateOf(context_.log(), KeyOf("operators", c), "seconds").Times(1e3);
-          table.rows.push_back(
-              {scheme, Cell::Parameter(ranks), Cell::Parameter(c.side), Cell::Parameter(share * 100), "none", Cell(e, Origin::kMeasured)});
+          table.rows.push_back({scheme, Chosen(ranks), Chosen(c.side), Chosen(share * 100), "none", Measured(e)});
           if (share == 1) series.points.push_back({double(ranks), e.median, e.low, e.high});
           if (scheme == "fan-in" && ranks == sweeps_.measured_ranks.back()) (share == 1 ? full : sparse) = e.median;
         }
@@ -305,7 +298,7 @@ class CombiningReport {
 
  private:
   static Table NewTable(const std::string& name, const std::string& title) {
-    return {name, title, {{"scheme", ""}, {"p", ""}, {"side", "pixels"}, {"active", "%"}, {"link", ""}, {"time", "ms"}}, {}};
+    return {name, title, {"scheme", "p", "side (pixels)", "active (%)", "link", "time (ms)"}, {}};
   }
   static std::string Method() {
     return "Schedules in virtual time on machines of this one's speed (its operators are measured in this run), all images ready at once, "
@@ -320,8 +313,7 @@ class CombiningReport {
   }
   double Add(Table& table, const Combining& c, std::string_view link) const {
     const double ms = Milliseconds(c, link);
-    table.rows.push_back({c.scheme, Cell::Parameter(c.ranks), Cell::Parameter(c.side), Cell::Parameter(c.share * 100), std::string(link),
-                          Cell(ms, Origin::kSimulated)});
+    table.rows.push_back({c.scheme, Chosen(c.ranks), Chosen(c.side), Chosen(c.share * 100), std::string(link), Simulated(ms)});
     return ms;
   }
 
@@ -331,7 +323,7 @@ class CombiningReport {
 
 }  // namespace
 
-Result<Report> RunCombining(ExperimentContext& context) {
+Report RunCombining(ExperimentContext& context) {
   const Sweeps sweeps = SweepsOf(context);
   std::vector<Trial> measured = {HostTrial()}, simulated;
   for (const std::string& scheme : AllSchemes()) {
@@ -353,10 +345,9 @@ Result<Report> RunCombining(ExperimentContext& context) {
       add(sweeps.ranks_at, sweeps.side_at, sweeps.sparse);
     }
   }
-  const int repeats = context.quick() ? kQuickRepeats : kRepeats;
   // Simulations need the measurements.
-  if (Status status = context.Run(measured, repeats); !status.ok()) return status;
-  if (Status status = context.Run(WithoutDoubles(std::move(simulated)), repeats); !status.ok()) return status;
+  context.Run(std::move(measured), kRepeats, kQuickRepeats);
+  context.Run(std::move(simulated), kRepeats, kQuickRepeats);
 
   CombiningReport sections(context, sweeps);
   Report report;

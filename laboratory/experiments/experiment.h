@@ -1,6 +1,6 @@
 // Experiments: `slabstream experiment NAME -o DIR` runs one. Each is one file and one line in Experiments(). An experiment lists the trials
 // that it needs (trials.h), has them run, and makes a report of their numbers (report/document.h). The rest is the same for all
-// (run_experiment.cpp): folder, resumption, progress, provenance, files.
+// (run_experiment.cpp): folder, resumption, progress, provenance, files. All of this throws Failure (failure.h).
 #pragma once
 
 #include <cstdint>
@@ -41,8 +41,9 @@ class ExperimentContext {
   int Scaled(int side) const;  // a sphere's side or a picture's, at least kLeastScaledSide
   VolumeCache& volumes() { return volumes_; }
 
-  // Runs the trials that the log does not hold yet. `repeats` applies if the user gave no number.
-  Status Run(const std::vector<Trial>& trials, int repeats);
+  // Runs the trials that the log does not hold yet, one for each key. `repeats`, or `quick_repeats` of a quick run, applies if the user
+  // gave no number.
+  void Run(std::vector<Trial> trials, int repeats, int quick_repeats);
   const TrialLog& log() const { return log_; }
   int repeats() const { return repeats_; }  // of the last Run
 
@@ -57,21 +58,21 @@ class ExperimentContext {
 struct Experiment {
   std::string_view name;
   std::string_view purpose;  // one line for --list
-  Result<Report> (*run)(ExperimentContext&);
+  Report (*run)(ExperimentContext&);
   // Checks the options before a folder is made; null: the checks common to all experiments suffice.
-  Status (*check)(const ExperimentOptions&) = nullptr;
+  void (*check)(const ExperimentOptions&) = nullptr;
   bool takes_file = false;  // ExperimentOptions::sweep_file
 };
 
 // The only list.
 const std::vector<Experiment>& Experiments();
 
-Result<Report> RunPaper(ExperimentContext& context);
-Result<Report> RunBalance(ExperimentContext& context);
-Result<Report> RunCombining(ExperimentContext& context);
-Result<Report> RunStreaming(ExperimentContext& context);
-Result<Report> RunScaling(ExperimentContext& context);
-Result<Report> RunSweep(ExperimentContext& context);
-Status CheckSweepFile(const ExperimentOptions& options);
+Report RunPaper(ExperimentContext& context);
+Report RunBalance(ExperimentContext& context);
+Report RunCombining(ExperimentContext& context);
+Report RunStreaming(ExperimentContext& context);
+Report RunScaling(ExperimentContext& context);
+Report RunSweep(ExperimentContext& context);
+void CheckSweepFile(const ExperimentOptions& options);
 
 }  // namespace slabstream

@@ -15,6 +15,11 @@ struct FrameFigures {
 };
 
 // `teams` of the size of the frame's take frames in turn.
-Result<FrameFigures> FindFigures(const MeasuredFrame& frame, const MachineModel& machine, int teams = 1);
+FrameFigures FindFigures(const MeasuredFrame& frame, const MachineModel& machine, int teams = 1);
+
+// The same of a frame whose CostTrial and FinishTrial were run. With dynamic balance every repeat has its own boxes: the repeat with the
+// median of `by` counts.
+FrameFigures RecallFigures(ExperimentContext& context, const FrameCase& frame, const MachineModel& machine, double FrameFigures::*by,
+                           int teams = 1);
 
 }  // namespace slabstream

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 #include <utility>
 
 #include "client/cli/frame_summary.h"
@@ -28,6 +27,20 @@ namespace {
 constexpr int kRenderings = 2;  // rounds of box costs; of two, the lower one counts as the median
 constexpr int kWarmUpFrames = 2, kFinishes = 3;
 constexpr int kLearningFrames = 8;  // to warm up with dynamic balance
+constexpr DatasetId kPlannedDataset = 1;
+
+// Identifies what a picture shows, whoever renders it: the beginning of every key. `what` names the trial.
+Json PictureKey(std::string_view what, const FrameCase& frame) {
+  const ViewParameters& view = frame.view;
+  return {{"what", what},
+          {"volume", frame.volume.dataset},
+          {"look", frame.volume.name},
+          {"renderer", frame.volume.renderer->title()},
+          {"size", {frame.size.width, frame.size.height}},
+          {"view",
+           {view.projection == Projection::kPerspective ? "perspective" : "orthographic", view.azimuth_degrees, view.elevation_degrees,
+            view.zoom}}};
+}
 
 // The parameters that decide where the boxes are.
 void AddPartition(Json& key, const FrameCase& frame) {
@@ -72,11 +85,6 @@ CoverageMap CoverageOf(const Json& json, const PixelBounds& frame) {
   return coverage;
 }
 
-Result<Json> MeasurePlannedBoxes(ExperimentContext& context, const FrameCase& frame) {
-  const Result<FramePlan> plan = PlanOf(context, frame);
-  return plan.ok() ? MeasureBoxes(context, frame, *plan) : plan.status();
-}
-
 }  // namespace
 
 const RendererKind* Splatting() { return FindRenderer("splat"); }
@@ -88,9 +96,8 @@ FrameRequest RequestOf(const FrameCase& frame) {
   return request;
 }
 
-Result<Json> MeasureBoxes(ExperimentContext& context, const FrameCase& frame, const FramePlan& plan) {
-  const Result<VolumeInUse> volume = context.volumes().Get(frame.volume);
-  if (!volume.ok()) return volume.status();
+Json MeasureBoxes(ExperimentContext& context, const FrameCase& frame, const FramePlan& plan) {
+  const VolumeInUse volume = context.volumes().Get(frame.volume);
   Json numbers = {{"ids", Json::array()}};
   for (const char* list :
        {"seconds", "first_seconds", "occupied_voxels", "drawn_voxels", "covered_pixels", "voxel_bytes", "work", "coverage"}) {
@@ -98,7 +105,7 @@ Result<Json> MeasureBoxes(ExperimentContext& context, const FrameCase& frame, co
   }
   for (int stage = 0; stage < kStageCount; ++stage) numbers["stages"][std::string(ToString(Stage(stage)))] = Json::array();
   for (const Placement& placement : PlacementsOf(plan)) numbers["ids"].push_back(placement.id);
-  for (const BoxCost& cost : MeasureBoxCosts(*volume->volume, plan, kRenderings)) {
+  for (const BoxCost& cost : MeasureBoxCosts(*volume.volume, plan, kRenderings)) {
     numbers["seconds"].push_back(cost.seconds);
     numbers["first_seconds"].push_back(cost.first_seconds);
     numbers["occupied_voxels"].push_back(cost.occupied_voxels);
@@ -117,37 +124,32 @@ Result<Json> MeasureBoxes(ExperimentContext& context, const FrameCase& frame, co
 
 namespace {
 
-Result<Json> MeasureFinish(ExperimentContext& context, const FrameCase& frame) {
+Json MeasureFinish(ExperimentContext& context, const FrameCase& frame) {
   FrameCase whole = frame;
   whole.workers = 1;
   whole.policy = {.groups = 1};
-  const Result<VolumeInUse> volume = context.volumes().Get(frame.volume);
-  if (!volume.ok()) return volume.status();
-  const Result<FramePlan> plan = PlanOf(context, whole);
-  if (!plan.ok()) return plan.status();
-  const PictureCost cost = MeasurePictureCost(*volume->volume, plan->setup, kFinishes);
+  const VolumeInUse volume = context.volumes().Get(frame.volume);
+  const FramePlan plan = PlanOf(context, whole);
+  const PictureCost cost = MeasurePictureCost(*volume.volume, plan.setup, kFinishes);
   return Json{{"finish_seconds", cost.finish_seconds}, {"receive_seconds", cost.receive_seconds}};
 }
 
 int WarmUpFrames(const Policy& policy) { return policy.balance == kDynamicBalance ? kLearningFrames : kWarmUpFrames; }
 
-Result<Json> MeasureService(ExperimentContext& context, const FrameCase& frame, int frames) {
-  Result<VolumeInUse> volume = context.volumes().Get(frame.volume);
-  if (!volume.ok()) return volume.status();
-  Result<Session> session = Session::OpenLocal({.local_workers = frame.workers, .local_threads = 1},
-                                               [held = volume->volume]() -> Result<std::shared_ptr<const Volume>> { return held; });
-  if (!session.ok()) return session.status();
+Json MeasureService(ExperimentContext& context, const FrameCase& frame, int frames) {
+  const VolumeInUse volume = context.volumes().Get(frame.volume);
+  Session session = OrThrow(Session::OpenLocal({.local_workers = frame.workers, .local_threads = 1},
+                                               [held = volume.volume]() -> Result<std::shared_ptr<const Volume>> { return held; }));
   FrameRequest request = RequestOf(frame);
-  request.dataset = session->dataset();
+  request.dataset = session.dataset();
   std::vector<double> latencies, imbalances, idle_shares, image_bytes;
   std::array<std::vector<double>, kStageCount> stages;
   const int warm_up = WarmUpFrames(frame.policy);
   for (int i = 0; i < warm_up + frames; ++i) {
-    const Result<Picture> picture = session->client().Render(request);
-    if (!picture.ok()) return picture.status();
+    const Picture picture = OrThrow(session.client().Render(request));
     if (i < warm_up) continue;
-    const FrameSummary summary = Summarize(picture->statistics);
-    latencies.push_back(double(picture->latency.count()) * 1e-6);
+    const FrameSummary summary = Summarize(picture.statistics);
+    latencies.push_back(double(picture.latency.count()) * 1e-6);
     imbalances.push_back(summary.imbalance);
     idle_shares.push_back(summary.idle_share);
     image_bytes.push_back(double(summary.image_bytes));
@@ -175,70 +177,50 @@ double ExpectedEffort(const FrameCase& frame) {
 
 }  // namespace
 
-Json PictureKey(std::string_view what, const FrameCase& frame) {
-  const ViewParameters& view = frame.view;
-  return {{"what", what},
-          {"volume", frame.volume.dataset},
-          {"look", frame.volume.name},
-          {"renderer", frame.volume.renderer->title()},
-          {"size", {frame.size.width, frame.size.height}},
-          {"view",
-           {view.projection == Projection::kPerspective ? "perspective" : "orthographic", view.azimuth_degrees, view.elevation_degrees,
-            view.zoom}}};
+LayoutKnowledge KnowLayout(ExperimentContext& context, const FrameCase& frame) {
+  const VolumeInUse volume = context.volumes().Get(frame.volume);
+  return {.volume = volume,
+          .occupied = context.volumes().Occupied(frame.volume),
+          .transfer = OrThrow(ResolveTransfer(frame.volume.transfer, *volume.summary)),
+          .policy = OrThrow(ResolvePolicy(RequestOf(frame), volume.summary->description.geometry)),
+          .renderer = frame.volume.renderer};
 }
 
-Result<LayoutKnowledge> KnowLayout(ExperimentContext& context, const FrameCase& frame) {
-  const Result<VolumeInUse> volume = context.volumes().Get(frame.volume);
-  if (!volume.ok()) return volume.status();
-  const Result<std::shared_ptr<const OccupancyGrid>> occupied = context.volumes().Occupied(frame.volume);
-  if (!occupied.ok()) return occupied.status();
-  Result<TransferFunction> transfer = ResolveTransfer(frame.volume.transfer, *volume->summary);
-  if (!transfer.ok()) return transfer.status();
-  Result<ResolvedPolicy> policy = ResolvePolicy(RequestOf(frame), volume->summary->description.geometry);
-  if (!policy.ok()) return policy.status();
-  return LayoutKnowledge{*volume, *occupied, *std::move(transfer), *std::move(policy), frame.volume.renderer};
+MeasuredLayouts LayoutsOf(const LayoutKnowledge& knowledge, int workers) {
+  return {knowledge.volume.summary, knowledge.occupied, {kPlannedDataset, knowledge.transfer, knowledge.renderer}, workers};
 }
 
-LayoutRequest LayoutRequestOf(const LayoutKnowledge& knowledge, int workers) {
+FramePlan PlanOf(ExperimentContext& context, const FrameCase& frame) {
+  const LayoutKnowledge knowledge = KnowLayout(context, frame);
   LayoutRequest request{.summary = knowledge.volume.summary.get(),
                         .transfer = &knowledge.transfer,
                         .policy = &knowledge.policy,
                         .renderer = knowledge.renderer,
-                        .slots = std::uint32_t(workers)};
+                        .slots = std::uint32_t(frame.workers)};
   if (NeedsOccupancy(knowledge.policy)) request.known.occupied = knowledge.occupied.get();
-  return request;
+  return PlanOf(context, frame, std::make_shared<const Layout>(MakeLayout(request)));
 }
 
-Result<FramePlan> PlanOf(ExperimentContext& context, const FrameCase& frame) {
-  const Result<LayoutKnowledge> knowledge = KnowLayout(context, frame);
-  if (!knowledge.ok()) return knowledge.status();
-  return PlanOf(context, frame, MakeLayout(LayoutRequestOf(*knowledge, frame.workers)));
-}
-
-Result<FramePlan> PlanOf(ExperimentContext& context, const FrameCase& frame, const Layout& layout) {
+FramePlan PlanOf(ExperimentContext& context, const FrameCase& frame, std::shared_ptr<const Layout> layout) {
   const FrameRequest request = RequestOf(frame);
-  if (Status status = Validate(request); !status.ok()) return status;
-  const Result<VolumeInUse> volume = context.volumes().Get(frame.volume);
-  if (!volume.ok()) return volume.status();
-  return PlanFrame(request, kPlannedDataset, *volume->summary, RosterOf(std::uint32_t(frame.workers)),
-                   std::make_shared<const Layout>(layout));
+  OrThrow(Validate(request));
+  const VolumeInUse volume = context.volumes().Get(frame.volume);
+  return OrThrow(PlanFrame(request, kPlannedDataset, *volume.summary, RosterOf(std::uint32_t(frame.workers)), std::move(layout)));
 }
 
-Result<FrameCase> WithChosenPolicy(ExperimentContext& context, FrameCase frame, const LinkModel& link) {
+FrameCase WithChosenPolicy(ExperimentContext& context, FrameCase frame, const LinkModel& link) {
   if (!LeavesChoice(frame.policy)) return frame;
   FrameCase fixed = frame;
   fixed.policy = FixedPolicy(frame.policy);
-  const Result<LayoutKnowledge> knowledge = KnowLayout(context, fixed);
-  if (!knowledge.ok()) return knowledge.status();
+  const LayoutKnowledge knowledge = KnowLayout(context, fixed);
   const FrameRequest request = RequestOf(frame);
   const MachineModel machine = ServiceMachine(std::vector<HostedWorker>(std::size_t(frame.workers)), {.link = link});
-  const Result<PolicyChoice> choice = ChoosePolicy({.frame = &request,
-                                                    .summary = knowledge->volume.summary.get(),
-                                                    .known = {.occupied = knowledge->occupied.get()},
+  const PolicyChoice choice = OrThrow(ChoosePolicy({.frame = &request,
+                                                    .summary = knowledge.volume.summary.get(),
+                                                    .known = {.occupied = knowledge.occupied.get()},
                                                     .slots = std::uint32_t(frame.workers),
-                                                    .machine = &machine});
-  if (!choice.ok()) return choice.status();
-  frame.policy = AskFor(choice->policy);
+                                                    .machine = &machine}));
+  frame.policy = AskFor(choice.policy);
   return frame;
 }
 
@@ -259,7 +241,8 @@ Json ServiceKey(const FrameCase& frame) {
 }
 
 Trial BoxCostTrial(ExperimentContext& context, const FrameCase& frame) {
-  return {BoxCostKey(frame), [&context, frame] { return MeasurePlannedBoxes(context, frame); }, (1 + kRenderings) * ExpectedEffort(frame)};
+  return {BoxCostKey(frame), [&context, frame] { return MeasureBoxes(context, frame, PlanOf(context, frame)); },
+          (1 + kRenderings) * ExpectedEffort(frame)};
 }
 Trial FinishTrial(ExperimentContext& context, const FrameCase& frame) {
   FrameCase whole = frame;
@@ -278,22 +261,14 @@ Json ValidationKey(const FrameCase& frame) {
 }
 
 Trial ValidationTrial(ExperimentContext& context, const FrameCase& frame, int turns) {
-  const auto validate = [&context, frame, turns]() -> Result<Json> {
-    const Result<VolumeInUse> volume = context.volumes().Get(frame.volume);
-    if (!volume.ok()) return volume.status();
-    const ValidationCase what{frame.volume.name, volume->volume, RequestOf(frame), frame.workers};
-    const Result<ValidationRow> row = ValidateSimulation(what, {.views = 1, .turns = turns});
-    if (!row.ok()) return row.status();
-    const ValidatedView& view = row->views.front();
+  const auto validate = [&context, frame, turns]() -> Json {
+    const VolumeInUse volume = context.volumes().Get(frame.volume);
+    const ValidationCase what{frame.volume.name, volume.volume, RequestOf(frame), frame.workers};
+    const ValidationRow row = OrThrow(ValidateSimulation(what, {.views = 1, .turns = turns}));
+    const ValidatedView& view = row.views.front();
     return Json{{"measured_ms", view.measured.latency * 1e3}, {"simulated_ms", view.simulated.latency * 1e3}};
   };
   return {ValidationKey(frame), validate, 4 * turns * ExpectedEffort(frame)};  // the service's frames and the boxes, twice each
-}
-
-std::vector<Trial> WithoutDoubles(std::vector<Trial> trials) {
-  std::set<std::string> seen;
-  std::erase_if(trials, [&](const Trial& trial) { return !seen.insert(trial.key.dump()).second; });
-  return trials;
 }
 
 FrameInput MeasuredFrame::Input() const {
@@ -322,17 +297,14 @@ double MeasuredFrame::StageSeconds(Stage stage) const {
   return sum;
 }
 
-Result<MeasuredFrame> Recall(ExperimentContext& context, const FrameCase& frame) {
-  Result<FramePlan> plan = PlanOf(context, frame);
-  if (!plan.ok()) return plan.status();
-  return WithBoxCosts(context, frame, *std::move(plan), context.log().All(BoxCostKey(frame)));
+MeasuredFrame Recall(ExperimentContext& context, const FrameCase& frame) {
+  return WithBoxCosts(context, frame, PlanOf(context, frame), context.log().All(BoxCostKey(frame)));
 }
 
-Result<std::vector<MeasuredFrame>> RecallRepeats(ExperimentContext& context, const FrameCase& frame) {
-  const Result<FramePlan> plan = PlanOf(context, frame);
-  if (!plan.ok()) return plan.status();
+std::vector<MeasuredFrame> RecallRepeats(ExperimentContext& context, const FrameCase& frame) {
+  const FramePlan plan = PlanOf(context, frame);
   std::vector<MeasuredFrame> frames;
-  for (const Json* repeat : context.log().All(BoxCostKey(frame))) frames.push_back(WithBoxCosts(context, frame, *plan, {repeat}));
+  for (const Json* repeat : context.log().All(BoxCostKey(frame))) frames.push_back(WithBoxCosts(context, frame, plan, {repeat}));
   return frames;
 }
 
@@ -345,7 +317,6 @@ MeasuredFrame WithBoxCosts(ExperimentContext& context, const FrameCase& frame, F
   measured.boxes.resize(measured.plan.layout->partition.boxes().size());
 
   const std::vector<double> ids = MediansOf(repeats, "ids"), seconds = MediansOf(repeats, "seconds"),
-                            first = MediansOf(repeats, "first_seconds"), occupied = MediansOf(repeats, "occupied_voxels"),
                             drawn = MediansOf(repeats, "drawn_voxels"), covered = MediansOf(repeats, "covered_pixels"),
                             bytes = MediansOf(repeats, "voxel_bytes");
   std::array<std::vector<double>, kStageCount> stages;
@@ -355,8 +326,6 @@ MeasuredFrame WithBoxCosts(ExperimentContext& context, const FrameCase& frame, F
   for (std::size_t i = 0; i < ids.size(); ++i) {
     MeasuredFrame::Cost& box = measured.boxes.at(std::size_t(ids[i]));
     box = {.seconds = seconds[i],
-           .first_seconds = first[i],
-           .occupied_voxels = occupied[i],
            .drawn_voxels = drawn[i],
            .covered_pixels = covered[i],
            .voxel_bytes = bytes[i],
@@ -375,7 +344,7 @@ void FillImages(MeasuredFrame& frame) {
   }
 }
 
-Result<Timeline> Simulate(const MeasuredFrame& frame, const MachineModel& machine, int frames, int in_flight, bool keep_spans, int teams) {
+Timeline Simulate(const MeasuredFrame& frame, const MachineModel& machine, int frames, int in_flight, bool keep_spans, int teams) {
   const Roster everybody = RosterOf(frame.plan.slots * std::uint32_t(teams));
   std::vector<FramePlan> plans;  // the distinct plans
   for (std::size_t turn = 0; turn < std::min(std::size_t(frames), everybody.slots.size()); ++turn) {
@@ -384,18 +353,17 @@ Result<Timeline> Simulate(const MeasuredFrame& frame, const MachineModel& machin
   }
   std::vector<FrameInput> inputs(std::size_t(frames), frame.Input());
   for (std::size_t i = 0; i < inputs.size(); ++i) inputs[i].plan = &plans[i % plans.size()];
-  return SimulateFrames(inputs, machine, {in_flight, keep_spans});
+  return OrThrow(SimulateFrames(inputs, machine, {in_flight, keep_spans}));
 }
 
-Result<double> SteadySeconds(const MeasuredFrame& frame, const MachineModel& machine, int teams) {
+double SteadySeconds(const MeasuredFrame& frame, const MachineModel& machine, int teams) {
   const std::size_t workers = std::size_t(frame.plan.slots) * std::size_t(teams);
   const int window = WindowFor(workers, std::uint32_t(teams), FrameBytes(frame.plan.setup)).frames;
   // Whole rounds of the teams, since teams may end together. The middle half is evaluated.
   const int frames = 4 * teams * std::max((window + teams - 1) / teams, 4);
-  const Result<Timeline> timeline = Simulate(frame, machine, frames, FramesAhead(window), false, teams);
-  if (!timeline.ok()) return timeline.status();
+  const Timeline timeline = Simulate(frame, machine, frames, window + 2, false, teams);
   std::vector<double> received;
-  for (const SimulatedFrame& simulated : timeline->frames) received.push_back(simulated.received);
+  for (const SimulatedFrame& simulated : timeline.frames) received.push_back(simulated.received);
   std::sort(received.begin(), received.end());
   return (received[std::size_t(3 * frames / 4) - 1] - received[std::size_t(frames / 4) - 1]) / (frames / 2);
 }

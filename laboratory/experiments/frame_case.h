@@ -14,6 +14,7 @@
 #include "laboratory/bench/bench_cases.h"
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/measure/cost_model.h"
+#include "laboratory/measure/measured_layouts.h"
 #include "simulator/simulate_frames.h"
 
 namespace slabstream {
@@ -52,14 +53,12 @@ Json ServiceKey(const FrameCase& frame);
 Trial ValidationTrial(ExperimentContext& context, const FrameCase& frame, int turns);
 Json ValidationKey(const FrameCase& frame);
 
-// Identifies what a picture shows, whoever renders it: the beginning of every key. `what` names the trial.
-Json PictureKey(std::string_view what, const FrameCase& frame);
 // The service's plan for its first frame. Errors of Validate and PlanFrame.
-Result<FramePlan> PlanOf(ExperimentContext& context, const FrameCase& frame);
+FramePlan PlanOf(ExperimentContext& context, const FrameCase& frame);
 // The same with a given layout.
-Result<FramePlan> PlanOf(ExperimentContext& context, const FrameCase& frame, const Layout& layout);
-inline constexpr DatasetId kPlannedDataset = 1;  // in these plans
-// Makes layouts, as long as `knowledge` lives and the volume is in use.
+FramePlan PlanOf(ExperimentContext& context, const FrameCase& frame, std::shared_ptr<const Layout> layout);
+
+// All that layouts of a frame's volume depend on.
 struct LayoutKnowledge {
   VolumeInUse volume;
   std::shared_ptr<const OccupancyGrid> occupied;
@@ -67,23 +66,20 @@ struct LayoutKnowledge {
   ResolvedPolicy policy;
   const RendererKind* renderer = nullptr;
 };
-Result<LayoutKnowledge> KnowLayout(ExperimentContext& context, const FrameCase& frame);
-LayoutRequest LayoutRequestOf(const LayoutKnowledge& knowledge, int workers);
+LayoutKnowledge KnowLayout(ExperimentContext& context, const FrameCase& frame);
+MeasuredLayouts LayoutsOf(const LayoutKnowledge& knowledge, int workers);
 
 // The same frame with a resolved policy: the one that a coordinator of as many workers, one on each host, joined by `link`, would choose
 // before it has seen a frame. Errors as of KnowLayout and ChoosePolicy.
-Result<FrameCase> WithChosenPolicy(ExperimentContext& context, FrameCase frame, const LinkModel& link);
-
-// Removes trials whose key has occurred before.
-std::vector<Trial> WithoutDoubles(std::vector<Trial> trials);
+FrameCase WithChosenPolicy(ExperimentContext& context, FrameCase frame, const LinkModel& link);
 
 // A planned frame with the measured costs of its boxes: medians over repeats.
 struct MeasuredFrame {
   FramePlan plan;
   struct Cost {
-    double seconds = 0, first_seconds = 0;
+    double seconds = 0;
     std::array<double, kStageCount> stage_seconds{};
-    double occupied_voxels = 0, drawn_voxels = 0, covered_pixels = 0, voxel_bytes = 0;
+    double drawn_voxels = 0, covered_pixels = 0, voxel_bytes = 0;
     WorkUnits work{};
     CoverageMap coverage;
   };
@@ -96,12 +92,12 @@ struct MeasuredFrame {
   double StageSeconds(Stage stage) const;     // of all
 };
 // Both trials must have been run.
-Result<MeasuredFrame> Recall(ExperimentContext& context, const FrameCase& frame);
+MeasuredFrame Recall(ExperimentContext& context, const FrameCase& frame);
 // The same for each repeat of the box costs separately.
-Result<std::vector<MeasuredFrame>> RecallRepeats(ExperimentContext& context, const FrameCase& frame);
+std::vector<MeasuredFrame> RecallRepeats(ExperimentContext& context, const FrameCase& frame);
 
 // The numbers of a BoxCostTrial for a plan of the frame, and the plan with such numbers.
-Result<Json> MeasureBoxes(ExperimentContext& context, const FrameCase& frame, const FramePlan& plan);
+Json MeasureBoxes(ExperimentContext& context, const FrameCase& frame, const FramePlan& plan);
 MeasuredFrame WithBoxCosts(ExperimentContext& context, const FrameCase& frame, FramePlan plan, const std::vector<const Json*>& repeats);
 
 // Pretends that every image fills the whole frame, as the paper's did: no empty pixel is left out.
@@ -109,11 +105,10 @@ void FillImages(MeasuredFrame& frame);
 
 // The same frame over and over: a client's view who asks for `frames` frames, `in_flight` ahead. Even the first is warm: voxels are cached
 // and normals made. The frame's workers are one of `teams` teams of equal size (common/planning/team.h).
-Result<Timeline> Simulate(const MeasuredFrame& frame, const MachineModel& machine, int frames = 1, int in_flight = 1,
-                          bool keep_spans = false, int teams = 1);
+Timeline Simulate(const MeasuredFrame& frame, const MachineModel& machine, int frames = 1, int in_flight = 1, bool keep_spans = false,
+                  int teams = 1);
 
 // Time from picture to picture, with enough frames requested ahead to keep the service busy: a few more than it has under way.
-Result<double> SteadySeconds(const MeasuredFrame& frame, const MachineModel& machine, int teams = 1);
-inline int FramesAhead(int window) { return window + 2; }
+double SteadySeconds(const MeasuredFrame& frame, const MachineModel& machine, int teams = 1);
 
 }  // namespace slabstream

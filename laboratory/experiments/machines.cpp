@@ -33,10 +33,8 @@ constexpr Found kNumbers[] = {
 }  // namespace
 
 Trial HostTrial() {
-  const auto run = []() -> Result<Json> {
-    const Result<Calibration> calibration = CalibrateThisHost(1);
-    if (!calibration.ok()) return calibration.status();
-    MachineModel machine = calibration->machine;
+  const auto run = []() -> Json {
+    MachineModel machine = OrThrow(CalibrateThisHost(1)).machine;
     // Between hosts pixels travel in messages, instead of being lent. Hosts have one thread for it.
     tbb::task_arena one_thread(1);
     machine.combining = one_thread.execute([] { return MeasureCombining(Transfer::kMessage); });
@@ -47,11 +45,7 @@ Trial HostTrial() {
   return {HostKey(), run, 50};
 }
 
-LinkModel Link(std::string_view preset) {
-  const Result<LinkModel> link = ParseLink("link", preset);
-  CHECK(link.ok()) << link.status().message();
-  return *link;
-}
+LinkModel Link(std::string_view preset) { return ParseLink("link", preset).value(); }
 
 MachineModel Cluster(const ExperimentContext& context, const LinkModel& link) {
   MachineModel machine;

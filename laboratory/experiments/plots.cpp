@@ -31,7 +31,7 @@ Figure TimelineFigure(const std::string& name, const std::string& title, const T
                       const std::string& caption, std::uint32_t most_workers) {
   constexpr double kMilliseconds = 1e3;
   const std::uint32_t workers = std::min(timeline.workers, most_workers);
-  GanttChart chart{title, "ms", Origin::kSimulated, {"render", "combine", "encode", "make the picture", "pixels arrive"}, {}};
+  GanttChart chart{title, {"render", "combine", "encode", "make the picture", "pixels arrive"}, {}};
   for (std::uint32_t i = 0; i < workers; ++i) {
     for (const char* what : {"renders", "combines", "makes pictures", "receives"})
       chart.lanes.push_back({fmt::format("worker {} {}", i + 1, what), {}});
@@ -57,7 +57,7 @@ Figure TimelineFigure(const std::string& name, const std::string& title, const T
 }
 
 Figure BoxCostFigure(const std::string& name, const std::string& title, const MeasuredFrame& frame, const std::string& caption) {
-  HeatMap map{title, "render time of a box (ms)", Origin::kMeasured, {}};
+  HeatMap map{title, "render time of a box (ms)", {}};
   const Index3 size = frame.plan.setup.description.geometry.size;
   struct Cut {
     Axis across, right, up;

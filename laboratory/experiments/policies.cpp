@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include "common/base/check.h"
 #include "common/combining/schemes.h"
 #include "common/decomposition/decomposition.h"
 
@@ -11,12 +10,9 @@ namespace slabstream {
 std::vector<NamedPolicy> AllPartitions() {
   std::vector<NamedPolicy> policies;
   for (const DecompositionEntry& entry : Decompositions()) {
-    for (const std::string_view split : {"voxels", "occupied"}) {
-      NamedPolicy named{fmt::format("{} by {}", entry.name, split), {}};
-      named.policy.decomposition = entry.name;
-      named.policy.load_metric = split;
-      named.policy.groups = 1;
-      policies.push_back(std::move(named));
+    for (const std::string split : {"voxels", "occupied"}) {
+      policies.push_back(
+          {fmt::format("{} by {}", entry.name, split), {.decomposition = std::string(entry.name), .load_metric = split, .groups = 1}});
     }
   }
   return policies;
@@ -24,21 +20,13 @@ std::vector<NamedPolicy> AllPartitions() {
 
 NamedPolicy EqualSlabs() { return AllPartitions().front(); }
 
-NamedPolicy BalancedTree() {
-  NamedPolicy tree{"kd-tree by occupied", {}};
-  tree.policy.decomposition = "kd-tree";
-  tree.policy.load_metric = "occupied";
-  tree.policy.groups = 1;
-  return tree;
-}
+NamedPolicy BalancedTree() { return {"kd-tree by occupied", {.decomposition = "kd-tree", .load_metric = "occupied", .groups = 1}}; }
 
 std::vector<NamedPolicy> PartitionsAlongTheView() {
   std::vector<NamedPolicy> policies;
-  for (const char* decomposition : {"slab", "kd-tree"}) {
-    NamedPolicy named{fmt::format("{} along the view", decomposition), BalancedTree().policy};
-    named.policy.decomposition = decomposition;
-    named.policy.axis = AxisChoice::kView;
-    policies.push_back(std::move(named));
+  for (const std::string decomposition : {"slab", "kd-tree"}) {
+    policies.push_back({fmt::format("{} along the view", decomposition),
+                        {.decomposition = decomposition, .load_metric = "occupied", .axis = AxisChoice::kView, .groups = 1}});
   }
   return policies;
 }

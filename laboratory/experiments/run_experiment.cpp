@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <ctime>
 #include <iostream>
+#include <set>
 
 #include "client/cli/interrupt.h"
 #include "commit.h"
@@ -21,13 +22,11 @@ namespace slabstream {
 namespace {
 
 // Everything that decides the set of trials.
-Result<Json> Parameters(const ExperimentOptions& options) {
+Json Parameters(const ExperimentOptions& options) {
   Json parameters = {{"seed", options.seed},   {"repeats", options.repeats}, {"quick", options.quick},
                      {"scale", options.scale}, {"volumes", options.volumes}, {"sweep", Json()}};
   if (!options.sweep_file.empty()) {
-    const Result<std::string> text = ReadTextFile(options.sweep_file, kMaxSweepBytes);
-    if (!text.ok()) return text.status();
-    const Json sweep = Json::parse(*text, nullptr, false);
+    const Json sweep = Json::parse(OrThrow(ReadTextFile(options.sweep_file, kMaxSweepBytes)), nullptr, false);
     parameters["sweep"] = sweep.is_discarded() ? Json() : sweep;  // the experiment reports its errors
   }
   return parameters;
@@ -38,6 +37,37 @@ std::string NowUtc() {
   return fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(now));
 }
 
+void Run(const ExperimentOptions& options) {
+  const Experiment* experiment = FindNamed(Experiments(), options.name);
+  if (experiment == nullptr) throw Failure(Status::NotFound(fmt::format("NAME '{}' is no experiment (--list names them)", options.name)));
+  if (experiment->takes_file != !options.sweep_file.empty()) {
+    throw Failure(Status::InvalidArgument(
+        experiment->takes_file ? fmt::format("experiment '{}' needs a FILE", options.name)
+                               : fmt::format("experiment '{}' takes no FILE, '{}' was given", options.name, options.sweep_file)));
+  }
+  const MachineInfo machine = DescribeMachine();
+  const std::string machine_text = fmt::format("{}, {} cores, {}", machine.cpu, machine.cores, machine.simd);
+  const Json parameters = Parameters(options);
+  (void)RealVolumes(options.volumes);
+  if (experiment->check != nullptr) experiment->check(options);
+  TrialLog log = OrThrow(TrialLog::Open(options.folder, {options.name, parameters, SLABSTREAM_COMMIT, machine_text}, options.resume));
+  if (log.size() > 0) std::cout << fmt::format("continues with {} trials that are done\n", log.size()) << std::flush;
+
+  Wakeup wakeup;
+  const InterruptGuard interrupt(wakeup);
+  ExperimentContext context(options, std::move(log), [&interrupt] { return interrupt.interrupted(); });
+  const Report report = experiment->run(context);
+  if (interrupt.interrupted()) throw Failure(Status::Cancelled("interrupted while the report was made; the same command continues"));
+
+  const Provenance provenance{options.name, std::string(Version()), SLABSTREAM_COMMIT, options.command,   machine.cpu,
+                              machine.simd, machine.cores,          options.seed,      context.repeats(), NowUtc()};
+  OrThrow(WriteReport(report, provenance, options.folder));
+  for (const Section& section : report.sections) {
+    if (!section.answer.empty()) std::cout << fmt::format("{}: {}\n", section.title, section.answer);
+  }
+  std::cout << fmt::format("wrote {}/report.html\n", options.folder);
+}
+
 }  // namespace
 
 ExperimentContext::ExperimentContext(ExperimentOptions options, TrialLog log, std::function<bool()> interrupted)
@@ -45,10 +75,12 @@ ExperimentContext::ExperimentContext(ExperimentOptions options, TrialLog log, st
 
 int ExperimentContext::Scaled(int side) const { return std::max(kLeastScaledSide, int(side * options_.scale + 0.5)); }
 
-Status ExperimentContext::Run(const std::vector<Trial>& trials, int repeats) {
-  repeats_ = options_.repeats > 0 ? options_.repeats : repeats;
+void ExperimentContext::Run(std::vector<Trial> trials, int repeats, int quick_repeats) {
+  repeats_ = options_.repeats > 0 ? options_.repeats : quick() ? quick_repeats : repeats;
+  std::set<std::string> keys;
+  std::erase_if(trials, [&](const Trial& trial) { return !keys.insert(trial.key.dump()).second; });
   std::cout << fmt::format("{} kinds of trials, repeats: {}\n", trials.size(), repeats_) << std::flush;
-  return RunTrials(trials, {options_.seed, repeats_, ::isatty(STDERR_FILENO) == 1, interrupted_}, log_);
+  RunTrials(trials, {options_.seed, repeats_, ::isatty(STDERR_FILENO) == 1, interrupted_}, log_);
 }
 
 std::string ExperimentList() {
@@ -58,38 +90,11 @@ std::string ExperimentList() {
 }
 
 Status RunExperiment(const ExperimentOptions& options) {
-  const Experiment* experiment = FindNamed(Experiments(), options.name);
-  if (experiment == nullptr) return Status::NotFound(fmt::format("NAME '{}' is no experiment (--list names them)", options.name));
-  if (experiment->takes_file != !options.sweep_file.empty()) {
-    return Status::InvalidArgument(experiment->takes_file
-                                       ? fmt::format("experiment '{}' needs a FILE", options.name)
-                                       : fmt::format("experiment '{}' takes no FILE, '{}' was given", options.name, options.sweep_file));
+  try {
+    Run(options);
+  } catch (const Failure& failure) {
+    return failure.status();
   }
-  const MachineInfo machine = DescribeMachine();
-  const std::string machine_text = fmt::format("{}, {} cores, {}", machine.cpu, machine.cores, machine.simd);
-  Result<Json> parameters = Parameters(options);
-  if (!parameters.ok()) return parameters.status();
-  if (const auto volumes = RealVolumes(options.volumes); !volumes.ok()) return volumes.status();
-  if (Status status = experiment->check == nullptr ? Status() : experiment->check(options); !status.ok()) return status;
-  Result<TrialLog> log =
-      TrialLog::Open(options.folder, {options.name, *std::move(parameters), SLABSTREAM_COMMIT, machine_text}, options.resume);
-  if (!log.ok()) return log.status();
-  if (log->size() > 0) std::cout << fmt::format("continues with {} trials that are done\n", log->size()) << std::flush;
-
-  Wakeup wakeup;
-  const InterruptGuard interrupt(wakeup);
-  ExperimentContext context(options, *std::move(log), [&interrupt] { return interrupt.interrupted(); });
-  const Result<Report> report = experiment->run(context);
-  if (!report.ok()) return report.status();
-  if (interrupt.interrupted()) return Status::Cancelled("interrupted while the report was made; the same command continues");
-
-  const Provenance provenance{options.name, std::string(Version()), SLABSTREAM_COMMIT, options.command,   machine.cpu,
-                              machine.simd, machine.cores,          options.seed,      context.repeats(), NowUtc()};
-  if (Status status = WriteReport(*report, provenance, options.folder); !status.ok()) return status;
-  for (const Section& section : report->sections) {
-    if (!section.answer.empty()) std::cout << fmt::format("{}: {}\n", section.title, section.answer);
-  }
-  std::cout << fmt::format("wrote {}/report.html\n", options.folder);
   return Status::Ok();
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/planning/policy_names.h"
 #include "common/renderers/registry.h"
 #include "laboratory/experiments/balanced_case.h"
 #include "laboratory/experiments/experiment.h"
@@ -29,7 +30,6 @@ struct Series {
   std::string name;
   std::vector<FrameCase> frames;  // by workers, 1 first
   int team = 0;                   // workers that share a frame; 0: all workers of the frame
-  bool dynamic = false;           // balance
 
   int TeamOf(const FrameCase& frame) const { return team == 0 ? frame.workers : std::min(team, frame.workers); }
   // The frame that is measured for it.
@@ -43,25 +43,24 @@ std::vector<Series> StrongSeries(const ExperimentContext& context, const Rendere
   const std::vector<int> workers = context.quick() ? std::vector{1, 4, 16, 64} : std::vector{1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024};
   const int size = context.Scaled(context.quick() ? 128 : 300), pixels = context.Scaled(512);
   std::vector<Series> all;
-  const BenchCase sphere = SphereCase({SphereClass::kHollow, size, 0.05}, SphereOpacity(*renderer), renderer);
+  const BenchCase sphere = StandardSphere(SphereClass::kHollow, size, renderer);
   for (const NamedPolicy& named : {EqualSlabs(), BalancedTree()}) {
     for (const std::string& scheme : UsualSchemes()) {
       Series series{fmt::format("{}, {}", named.name, scheme), {}};
       Policy policy = named.policy;
       policy.combine = scheme;
       for (const int p : workers) series.frames.push_back(FrameOf(sphere, pixels, policy, p));
-      if (std::ranges::find(all, series.name, &Series::name) == all.end()) all.push_back(std::move(series));
+      all.push_back(std::move(series));
     }
   }
-  const auto slabs_over = [&](int most_workers) {
-    std::vector<FrameCase> frames;
-    for (const int p : workers) {
-      if (p <= most_workers) frames.push_back(FrameOf(sphere, pixels, EqualSlabs().policy, p));
-    }
-    return frames;
-  };
-  all.push_back({.name = "slabs, dynamic balance", .frames = slabs_over(kMostDynamicWorkers), .dynamic = true});
-  all.push_back({.name = fmt::format("slabs, teams of {}", kTeam), .frames = slabs_over(workers.back()), .team = kTeam});
+  Series dynamic{"slabs, dynamic balance", {}}, teams{fmt::format("slabs, teams of {}", kTeam), {}, kTeam};
+  Policy balanced = EqualSlabs().policy;
+  balanced.balance = kDynamicBalance;
+  for (const int p : workers) {
+    if (p <= kMostDynamicWorkers) dynamic.frames.push_back(FrameOf(sphere, pixels, balanced, p));
+    teams.frames.push_back(FrameOf(sphere, pixels, EqualSlabs().policy, p));
+  }
+  all.insert(all.end(), {std::move(dynamic), std::move(teams)});
   return all;
 }
 
@@ -75,32 +74,12 @@ std::vector<Series> WeakSeries(const ExperimentContext& context) {
       Series series{fmt::format("{}, {}", renderer->title(), named.name), {}};
       for (const int p : workers) {
         const int size = int(std::lround(one * std::cbrt(double(p))));
-        const BenchCase sphere = SphereCase({SphereClass::kFilled, size, 0.4}, SphereOpacity(*renderer), renderer);
-        series.frames.push_back(FrameOf(sphere, pixels, named.policy, p));
+        series.frames.push_back(FrameOf(StandardSphere(SphereClass::kFilled, size, renderer), pixels, named.policy, p));
       }
-      if (std::ranges::find(all, series.name, &Series::name) == all.end()) all.push_back(std::move(series));
+      all.push_back(std::move(series));
     }
   }
   return all;
-}
-
-Result<FrameFigures> FiguresOf(ExperimentContext& context, const Series& series, const FrameCase& frame, const MachineModel& machine) {
-  const int teams = frame.workers / series.TeamOf(frame);
-  if (!series.dynamic) {
-    const Result<MeasuredFrame> measured = Recall(context, series.Shared(frame));
-    return measured.ok() ? FindFigures(*measured, machine, teams) : measured.status();
-  }
-  // Layouts differ from repeat to repeat: takes the median one.
-  const Result<std::vector<MeasuredFrame>> measured = RecallBalanced(context, series.Shared(frame));
-  if (!measured.ok()) return measured.status();
-  std::vector<FrameFigures> all;
-  for (const MeasuredFrame& repeat : *measured) {
-    const Result<FrameFigures> figures = FindFigures(repeat, machine, teams);
-    if (!figures.ok()) return figures.status();
-    all.push_back(*figures);
-  }
-  std::ranges::sort(all, {}, &FrameFigures::steady_seconds);
-  return all[all.size() / 2];
 }
 
 // A section of the report.
@@ -117,17 +96,10 @@ std::vector<Kind> KindsOf(const ExperimentContext& context) {
 }
 
 // Efficiency by the time from picture to picture. The ideal time is one / p for strong scaling, one for weak scaling.
-Result<Section> SectionOf(ExperimentContext& context, const Kind& kind) {
+Section SectionOf(ExperimentContext& context, const Kind& kind) {
   Table table{kind.slug,
               kind.title,
-              {{"series", ""},
-               {"p", ""},
-               {"volume", ""},
-               {"frame", "ms"},
-               {"picture to picture", "ms"},
-               {"efficiency", "%"},
-               {"imbalance", ""},
-               {"idle", "%"}},
+              {"series", "p", "volume", "frame (ms)", "picture to picture (ms)", "efficiency (%)", "imbalance", "idle (%)"},
               {}};
   LineChart times{
       kind.weak ? "Picture to picture, as many voxels a worker" : "Picture to picture", WorkersAxis(), {"time", "ms", AxisScale::kLog}, {}};
@@ -141,20 +113,15 @@ Result<Section> SectionOf(ExperimentContext& context, const Kind& kind) {
     LineSeries time{series.name, Origin::kSimulated, {}}, efficiency = time;
     double one = 0;
     for (const FrameCase& frame : series.frames) {
-      const Result<FrameFigures> figures = FiguresOf(context, series, frame, machine);
-      if (!figures.ok()) return figures.status();
-      if (frame.workers == 1) one = figures->steady_seconds;
-      const double percent = 100 * one / figures->steady_seconds / (kind.weak ? 1 : frame.workers);
-      time.points.push_back({double(frame.workers), figures->steady_seconds * 1e3});
+      const FrameFigures figures =
+          RecallFigures(context, series.Shared(frame), machine, &FrameFigures::steady_seconds, frame.workers / series.TeamOf(frame));
+      if (frame.workers == 1) one = figures.steady_seconds;
+      const double percent = 100 * one / figures.steady_seconds / (kind.weak ? 1 : frame.workers);
+      time.points.push_back({double(frame.workers), figures.steady_seconds * 1e3});
       efficiency.points.push_back({double(frame.workers), percent});
-      table.rows.push_back({series.name,
-                            Cell::Parameter(frame.workers),
-                            frame.volume.dataset,
-                            {figures->latency_seconds * 1e3, Origin::kSimulated},
-                            {figures->steady_seconds * 1e3, Origin::kSimulated},
-                            {percent, Origin::kSimulated},
-                            {figures->imbalance, Origin::kSimulated},
-                            {figures->idle_share * 100, Origin::kSimulated}});
+      table.rows.push_back({series.name, Chosen(frame.workers), frame.volume.dataset, Simulated(figures.latency_seconds * 1e3),
+                            Simulated(figures.steady_seconds * 1e3), Simulated(percent), Simulated(figures.imbalance),
+                            Simulated(figures.idle_share * 100)});
     }
     const auto half = std::ranges::find_if(efficiency.points, [](const LinePoint& point) { return point.y < 50; });
     sentence += fmt::format("{}{}: {}", sentence.empty() ? "" : "; ", series.name,
@@ -184,25 +151,24 @@ Result<Section> SectionOf(ExperimentContext& context, const Kind& kind) {
 
 }  // namespace
 
-Result<Report> RunScaling(ExperimentContext& context) {
+Report RunScaling(ExperimentContext& context) {
   const std::vector<Kind> kinds = KindsOf(context);
   std::vector<Trial> trials = {HostTrial()};
   for (const Kind& kind : kinds) {
     for (const Series& series : kind.series) {
       for (const FrameCase& frame : series.frames) {
         const FrameCase shared = series.Shared(frame);
-        trials.push_back(series.dynamic ? BalancedTrial(context, shared) : BoxCostTrial(context, shared));
+        trials.push_back(CostTrial(context, shared));
         trials.push_back(FinishTrial(context, shared));
       }
     }
   }
-  if (Status status = context.Run(WithoutDoubles(std::move(trials)), context.quick() ? kQuickRepeats : kRepeats); !status.ok())
-    return status;
+  context.Run(std::move(trials), kRepeats, kQuickRepeats);
   Report report;
   report.title = "Strong and weak scaling";
   report.summary = "How far more workers help, with one volume for all of them and with as much volume for each.";
   for (const Kind& kind : kinds) {
-    if (Status status = report.Add(SectionOf(context, kind)); !status.ok()) return status;
+    report.sections.push_back(SectionOf(context, kind));
   }
   return report;
 }

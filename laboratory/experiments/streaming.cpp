@@ -26,14 +26,12 @@ struct Streams {
   }
 };
 
-Result<Streams> StreamsOf(const ExperimentContext& context) {
+Streams StreamsOf(const ExperimentContext& context) {
   Streams streams;
   const int size = context.Scaled(context.quick() ? 128 : 300);
-  streams.volumes = {SphereCase({SphereClass::kHollow, size, 0.05}, kTranslucentSphere),
-                     SphereCase({SphereClass::kFilled, size, 0.4}, kTranslucentSphere)};
-  Result<std::vector<BenchCase>> real = RealVolumes(context.options().volumes);
-  if (!real.ok()) return real.status();
-  if (!context.quick()) streams.volumes.insert(streams.volumes.end(), real->begin(), real->end());
+  streams.volumes = {StandardSphere(SphereClass::kHollow, size), StandardSphere(SphereClass::kFilled, size)};
+  const std::vector<BenchCase> real = RealVolumes(context.options().volumes);
+  if (!context.quick()) streams.volumes.insert(streams.volumes.end(), real.begin(), real.end());
   streams.groups = context.quick() ? std::vector{1, 2, 4} : std::vector{1, 2, 3, 4, 6, 8, 12, 16};
   streams.workers = context.quick() ? std::vector{2, 8} : std::vector{2, 4, 16};
   streams.pixels = context.Scaled(512);
@@ -59,20 +57,18 @@ double WindowBytes(const MeasuredFrame& frame) {
 
 }  // namespace
 
-Result<Report> RunStreaming(ExperimentContext& context) {
-  const Result<Streams> streams = StreamsOf(context);
-  if (!streams.ok()) return streams.status();
+Report RunStreaming(ExperimentContext& context) {
+  const Streams streams = StreamsOf(context);
   std::vector<Trial> trials = {HostTrial()};
-  for (const BenchCase& volume : streams->volumes) {
-    trials.push_back(FinishTrial(context, streams->Frame(volume, 1, 1)));
-    trials.push_back(BoxCostTrial(context, streams->Frame(volume, 1, 1)));
-    for (const int groups : streams->groups) {
-      for (const int p : streams->workers) trials.push_back(BoxCostTrial(context, streams->Frame(volume, p, groups)));
-      trials.push_back(ServiceTrial(context, streams->Frame(volume, 2, groups), kServiceFrames));
+  for (const BenchCase& volume : streams.volumes) {
+    trials.push_back(FinishTrial(context, streams.Frame(volume, 1, 1)));
+    trials.push_back(BoxCostTrial(context, streams.Frame(volume, 1, 1)));
+    for (const int groups : streams.groups) {
+      for (const int p : streams.workers) trials.push_back(BoxCostTrial(context, streams.Frame(volume, p, groups)));
+      trials.push_back(ServiceTrial(context, streams.Frame(volume, 2, groups), kServiceFrames));
     }
   }
-  if (Status status = context.Run(WithoutDoubles(std::move(trials)), context.quick() ? kQuickRepeats : kRepeats); !status.ok())
-    return status;
+  context.Run(std::move(trials), kRepeats, kQuickRepeats);
 
   Report report;
   report.title = "Streaming: groups of slabs";
@@ -81,50 +77,33 @@ Result<Report> RunStreaming(ExperimentContext& context) {
       "one is combined. More groups need less memory "
       "and show a first preview sooner; what do they cost?";
   const MachineModel machine = Cluster(context, Link("10gbit"));
-  for (const BenchCase& volume : streams->volumes) {
+  for (const BenchCase& volume : streams.volumes) {
     Table table{fmt::format("groups-{}", volume.dataset),
                 volume.purpose,
-                {{"p", ""},
-                 {"groups", ""},
-                 {"frame", "ms"},
-                 {"first preview", "ms"},
-                 {"picture to picture", "ms"},
-                 {"efficiency", "%"},
-                 {"voxels of a worker", "MiB"},
-                 {"service at p = 2", "ms"}},
+                {"p", "groups", "frame (ms)", "first preview (ms)", "picture to picture (ms)", "efficiency (%)", "voxels of a worker (MiB)",
+                 "service at p = 2 (ms)"},
                 {}};
     LineChart efficiency{"Efficiency, frames asked for ahead", {"groups", ""}, {"efficiency", "%", AxisScale::kLinear, true}, {}};
     LineChart memory{"Voxels that a worker must hold", {"groups", ""}, {"memory", "MiB", AxisScale::kLinear, true}, {}};
     LineChart preview{"Time to the first preview", {"groups", ""}, {"time", "ms", AxisScale::kLinear, true}, {}};
-    const Result<MeasuredFrame> whole = Recall(context, streams->Frame(volume, 1, 1));
-    if (!whole.ok()) return whole.status();
-    const Result<FrameFigures> one = FindFigures(*whole, machine);
-    if (!one.ok()) return one.status();
+    const FrameFigures one = FindFigures(Recall(context, streams.Frame(volume, 1, 1)), machine);
     std::string sentence;
-    for (const int p : streams->workers) {
+    for (const int p : streams.workers) {
       LineSeries of_efficiency{fmt::format("p = {}", p), Origin::kSimulated, {}}, of_memory{of_efficiency.name, Origin::kMeasured, {}},
           of_preview = of_efficiency, of_frame{fmt::format("p = {}, whole frame", p), Origin::kSimulated, {}};
-      for (const int groups : streams->groups) {
-        const FrameCase frame = streams->Frame(volume, p, groups);
-        const Result<MeasuredFrame> measured = Recall(context, frame);
-        if (!measured.ok()) return measured.status();
-        const Result<FrameFigures> figures = FindFigures(*measured, machine);
-        if (!figures.ok()) return figures.status();
-        const double percent = 100 * one->steady_seconds / figures->steady_seconds / p, mebibytes = WindowBytes(*measured) / kMebibyte;
+      for (const int groups : streams.groups) {
+        const FrameCase frame = streams.Frame(volume, p, groups);
+        const MeasuredFrame measured = Recall(context, frame);
+        const FrameFigures figures = FindFigures(measured, machine);
+        const double percent = 100 * one.steady_seconds / figures.steady_seconds / p, mebibytes = WindowBytes(measured) / kMebibyte;
         of_efficiency.points.push_back({double(groups), percent});
         of_memory.points.push_back({double(groups), mebibytes});
-        of_preview.points.push_back({double(groups), figures->preview_seconds * 1e3});
-        of_frame.points.push_back({double(groups), figures->latency_seconds * 1e3});
+        of_preview.points.push_back({double(groups), figures.preview_seconds * 1e3});
+        of_frame.points.push_back({double(groups), figures.latency_seconds * 1e3});
         Cell service;
-        if (p == 2) service = Cell(EstimateOf(context.log(), ServiceKey(frame), "latency_ms"), Origin::kMeasured);
-        table.rows.push_back({Cell::Parameter(p),
-                              Cell::Parameter(groups),
-                              {figures->latency_seconds * 1e3, Origin::kSimulated},
-                              {figures->preview_seconds * 1e3, Origin::kSimulated},
-                              {figures->steady_seconds * 1e3, Origin::kSimulated},
-                              {percent, Origin::kSimulated},
-                              {mebibytes, Origin::kMeasured},
-                              service});
+        if (p == 2) service = Measured(EstimateOf(context.log(), ServiceKey(frame), "latency_ms"));
+        table.rows.push_back({Chosen(p), Chosen(groups), Simulated(figures.latency_seconds * 1e3), Simulated(figures.preview_seconds * 1e3),
+                              Simulated(figures.steady_seconds * 1e3), Simulated(percent), Measured(mebibytes), service});
       }
       const LinePoint first = of_preview.points.front(), last = of_preview.points.back();
       sentence = fmt::format(
@@ -146,20 +125,18 @@ Result<Report> RunStreaming(ExperimentContext& context) {
         "as keep all workers busy, "
         "with one worker and one group. A worker must hold the slabs of two groups and their halos; those it has room for besides stay "
         "cached.",
-        streams->pixels);
+        streams.pixels);
     section.answer = sentence;
     section.blocks = {Figure{"efficiency-" + volume.dataset, DrawLines(efficiency),
                              "What more groups cost: halos are rendered again and again, and every group has its own combining."},
                       Figure{"memory-" + volume.dataset, DrawLines(memory), "Counted from the boxes: two groups with their halos."},
                       Figure{"preview-" + volume.dataset, DrawLines(preview), "The nearest group alone, and all of the frame."},
                       std::move(table)};
-    const Result<MeasuredFrame> shown = Recall(context, streams->Frame(volume, streams->workers[1], streams->groups[2]));
-    if (!shown.ok()) return shown.status();
-    const Result<Timeline> timeline = Simulate(*shown, machine, 3, 3, true);
-    if (!timeline.ok()) return timeline.status();
-    section.blocks.emplace_back(TimelineFigure(
-        "timeline-" + volume.dataset, fmt::format("Three frames, p = {}, {} groups", streams->workers[1], streams->groups[2]), *timeline, 0,
-        timeline->end, "Group g + 1 renders while group g is combined, across frames too."));
+    const MeasuredFrame shown = Recall(context, streams.Frame(volume, streams.workers[1], streams.groups[2]));
+    const Timeline timeline = Simulate(shown, machine, 3, 3, true);
+    section.blocks.emplace_back(
+        TimelineFigure("timeline-" + volume.dataset, fmt::format("Three frames, p = {}, {} groups", streams.workers[1], streams.groups[2]),
+                       timeline, 0, timeline.end, "Group g + 1 renders while group g is combined, across frames too."));
     report.sections.push_back(std::move(section));
   }
   return report;

@@ -19,14 +19,14 @@ namespace {
 
 constexpr int kRepeats = 3, kQuickRepeats = 1, kServiceFrames = 5, kMeasuredWorkers = 2;
 
-Result<Sweep> ReadSweep(const ExperimentOptions& options) {
+Sweep ReadSweep(const ExperimentOptions& options) {
   const Result<std::string> text = ReadTextFile(options.sweep_file, kMaxSweepBytes);
-  if (!text.ok()) return Status(text.status().code(), "FILE " + text.status().message());
-  return ParseSweep(options.sweep_file, *text);
+  if (!text.ok()) throw Failure(Status(text.status().code(), "FILE " + text.status().message()));
+  return OrThrow(ParseSweep(options.sweep_file, *text));
 }
 
-Result<FrameCase> FrameOf(ExperimentContext& context, const Sweep& sweep, const BenchCase& volume, const RendererKind* renderer,
-                          const SweepView& view, const SweepPolicy& policy, int workers, const SweepLink& link) {
+FrameCase FrameOf(ExperimentContext& context, const Sweep& sweep, const BenchCase& volume, const RendererKind* renderer,
+                  const SweepView& view, const SweepPolicy& policy, int workers, const SweepLink& link) {
   FrameCase frame{volume, sweep.size, view.view, policy.policy, workers};
   frame.volume.renderer = renderer;
   return WithChosenPolicy(context, std::move(frame), link.link);
@@ -37,123 +37,76 @@ std::string PolicyText(const SweepPolicy& asked, const Policy& chosen) {
   return LeavesChoice(asked.policy) ? fmt::format("{}: {}", asked.name, Describe(chosen)) : asked.name;
 }
 
-bool IsDynamic(const FrameCase& frame) { return frame.policy.balance == kDynamicBalance; }
-
-// Figures of a frame over a link. With dynamic balance every repeat has its own boxes: the repeat with the median frame time counts.
-Result<FrameFigures> FiguresOf(ExperimentContext& context, const FrameCase& frame, const LinkModel& link) {
-  std::vector<MeasuredFrame> measured;
-  if (IsDynamic(frame)) {
-    Result<std::vector<MeasuredFrame>> balanced = RecallBalanced(context, frame);
-    if (!balanced.ok()) return balanced.status();
-    measured = *std::move(balanced);
-  } else {
-    Result<MeasuredFrame> planned = Recall(context, frame);
-    if (!planned.ok()) return planned.status();
-    measured.push_back(*std::move(planned));
-  }
-  std::vector<FrameFigures> all;
-  for (const MeasuredFrame& one : measured) {
-    const Result<FrameFigures> figures = FindFigures(one, Cluster(context, link));
-    if (!figures.ok()) return figures.status();
-    all.push_back(*figures);
-  }
-  std::ranges::sort(all, {}, &FrameFigures::latency_seconds);
-  return all[all.size() / 2];
-}
-
 template <class Use>
-Status ForEachPicture(const Sweep& sweep, Use&& use) {
+void ForEachPicture(const Sweep& sweep, Use&& use) {
   for (const BenchCase& volume : sweep.volumes) {
     for (const RendererKind* renderer : sweep.renderers) {
       for (const SweepView& view : sweep.views) {
-        if (Status status = use(volume, renderer, view); !status.ok()) return status;
+        use(volume, renderer, view);
       }
     }
   }
-  return Status::Ok();
 }
 
-Result<std::vector<Trial>> TrialsOf(ExperimentContext& context, const Sweep& sweep) {
+std::vector<Trial> TrialsOf(ExperimentContext& context, const Sweep& sweep) {
   std::vector<Trial> trials = {HostTrial()};
-  const Status done = ForEachPicture(sweep, [&](const BenchCase& volume, const RendererKind* renderer, const SweepView& view) -> Status {
+  ForEachPicture(sweep, [&](const BenchCase& volume, const RendererKind* renderer, const SweepView& view) {
     for (const SweepPolicy& policy : sweep.policies) {
       for (const int p : sweep.workers) {
         for (const SweepLink& link : sweep.links) {
-          const Result<FrameCase> frame = FrameOf(context, sweep, volume, renderer, view, policy, p, link);
-          if (!frame.ok()) return frame.status();
-          trials.push_back(IsDynamic(*frame) ? BalancedTrial(context, *frame) : BoxCostTrial(context, *frame));
-          trials.push_back(FinishTrial(context, *frame));
-          if (p <= kMeasuredWorkers) trials.push_back(ServiceTrial(context, *frame, kServiceFrames));
+          const FrameCase frame = FrameOf(context, sweep, volume, renderer, view, policy, p, link);
+          trials.push_back(CostTrial(context, frame));
+          trials.push_back(FinishTrial(context, frame));
+          if (p <= kMeasuredWorkers) trials.push_back(ServiceTrial(context, frame, kServiceFrames));
         }
       }
     }
-    return Status::Ok();
   });
-  if (!done.ok()) return done;
-  return WithoutDoubles(std::move(trials));
+  return trials;
 }
 
 }  // namespace
 
-Status CheckSweepFile(const ExperimentOptions& options) { return ReadSweep(options).status(); }
+void CheckSweepFile(const ExperimentOptions& options) { (void)ReadSweep(options); }
 
-Result<Report> RunSweep(ExperimentContext& context) {
-  const Result<Sweep> sweep = ReadSweep(context.options());
-  if (!sweep.ok()) return sweep.status();
-  Result<std::vector<Trial>> trials = TrialsOf(context, *sweep);
-  if (!trials.ok()) return trials.status();
-  if (Status status = context.Run(*std::move(trials), context.quick() ? kQuickRepeats : kRepeats); !status.ok()) return status;
+Report RunSweep(ExperimentContext& context) {
+  const Sweep sweep = ReadSweep(context.options());
+  context.Run(TrialsOf(context, sweep), kRepeats, kQuickRepeats);
 
   Report report;
-  report.title = sweep->title;
+  report.title = sweep.title;
   report.summary = fmt::format("A sweep of your own: {} volumes, {} renderers, {} views, {} policies, {} numbers of workers and {} links.",
-                               sweep->volumes.size(), sweep->renderers.size(), sweep->views.size(), sweep->policies.size(),
-                               sweep->workers.size(), sweep->links.size());
-  const Status status = ForEachPicture(*sweep, [&](const BenchCase& volume, const RendererKind* renderer, const SweepView& view) -> Status {
+                               sweep.volumes.size(), sweep.renderers.size(), sweep.views.size(), sweep.policies.size(),
+                               sweep.workers.size(), sweep.links.size());
+  ForEachPicture(sweep, [&](const BenchCase& volume, const RendererKind* renderer, const SweepView& view) {
     const std::string title = fmt::format("{}, {}, {}", volume.name, renderer->title(), view.name), name = Slug(title);
     Table table{name,
                 title,
-                {{"policy", ""},
-                 {"p", ""},
-                 {"link", ""},
-                 {"frame", "ms"},
-                 {"picture to picture", "ms"},
-                 {"first preview", "ms"},
-                 {"imbalance", ""},
-                 {"idle", "%"},
-                 {"image bytes", "MB"},
-                 {"service here", "ms"}},
+                {"policy", "p", "link", "frame (ms)", "picture to picture (ms)", "first preview (ms)", "imbalance", "idle (%)",
+                 "image bytes (MB)", "service here (ms)"},
                 {}};
     LineChart chart{title, WorkersAxis(), {"frame", "ms", AxisScale::kLog}, {}};
     std::pair<double, std::string> fastest{0, ""};
-    for (const SweepPolicy& policy : sweep->policies) {
-      for (const SweepLink& link : sweep->links) {
-        LineSeries series{sweep->links.size() == 1 ? policy.name : fmt::format("{}, {}", policy.name, link.name), Origin::kSimulated, {}};
+    for (const SweepPolicy& policy : sweep.policies) {
+      for (const SweepLink& link : sweep.links) {
+        LineSeries series{sweep.links.size() == 1 ? policy.name : fmt::format("{}, {}", policy.name, link.name), Origin::kSimulated, {}};
         LineSeries measured{series.name, Origin::kMeasured, {}};
-        for (const int p : sweep->workers) {
-          const Result<FrameCase> frame = FrameOf(context, *sweep, volume, renderer, view, policy, p, link);
-          if (!frame.ok()) return frame.status();
-          const Result<FrameFigures> figures = FiguresOf(context, *frame, link.link);
-          if (!figures.ok()) return figures.status();
-          const double ms = figures->latency_seconds * 1e3;
+        for (const int p : sweep.workers) {
+          const FrameCase frame = FrameOf(context, sweep, volume, renderer, view, policy, p, link);
+          const FrameFigures figures = RecallFigures(context, frame, Cluster(context, link.link), &FrameFigures::latency_seconds);
+          const double ms = figures.latency_seconds * 1e3;
           Cell service;
           if (p <= kMeasuredWorkers) {
-            const Estimate e = EstimateOf(context.log(), ServiceKey(*frame), "latency_ms");
-            service = Cell(e, Origin::kMeasured);
+            const Estimate e = EstimateOf(context.log(), ServiceKey(frame), "latency_ms");
+            service = Measured(e);
             measured.points.push_back({double(p), e.median, e.low, e.high});
           }
           series.points.push_back({double(p), ms});
           if (fastest.second.empty() || ms < fastest.first)
             fastest = {ms, fmt::format("{} on {} workers over {}", policy.name, p, link.name)};
-          table.rows.push_back({PolicyText(policy, frame->policy),
-                                Cell::Parameter(p),
-                                link.name,
-                                {ms, Origin::kSimulated},
-                                {figures->steady_seconds * 1e3, Origin::kSimulated},
-                                {figures->preview_seconds * 1e3, Origin::kSimulated},
-                                {figures->imbalance, Origin::kSimulated},
-                                {figures->idle_share * 100, Origin::kSimulated},
-                                {figures->image_bytes * 1e-6, Origin::kSimulated},
+          table.rows.push_back({PolicyText(policy, frame.policy), Chosen(p), link.name, Simulated(ms),
+                                Simulated(figures.steady_seconds * 1e3), Simulated(figures.preview_seconds * 1e3),
+                                Simulated(figures.imbalance), Simulated(figures.idle_share * 100), Simulated(figures.image_bytes * 1e-6),
                                 service});
         }
         std::ranges::sort(series.points, {}, &LinePoint::x);
@@ -170,9 +123,7 @@ Result<Report> RunSweep(ExperimentContext& context) {
     section.answer = fmt::format("The fastest frame takes {} ms: {}.", FormatNumber(fastest.first), fastest.second);
     section.blocks = {Figure{name, DrawLines(chart), "Time of a frame that nobody asked for ahead."}, std::move(table)};
     report.sections.push_back(std::move(section));
-    return Status::Ok();
   });
-  if (!status.ok()) return status;
   return report;
 }
 

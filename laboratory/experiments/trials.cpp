@@ -44,13 +44,21 @@ std::string TimeLeft(double seconds) {
   return fmt::format("about {:.0f} min left", seconds / 60);
 }
 
+Json NumbersOf(const Trial& trial) {
+  try {
+    return trial.run();
+  } catch (const Failure& failure) {
+    throw Failure(Status(failure.status().code(), fmt::format("trial {}: {}", trial.key.dump(), failure.status().message())));
+  }
+}
+
 const Json& Field(const Json& numbers, const std::string& name) {
   return name.front() == '/' ? numbers.at(Json::json_pointer(name)) : numbers.at(name);
 }
 
 }  // namespace
 
-Status RunTrials(const std::vector<Trial>& trials, const TrialSchedule& schedule, TrialLog& log) {
+void RunTrials(const std::vector<Trial>& trials, const TrialSchedule& schedule, TrialLog& log) {
   std::set<std::string> keys;
   for (const Trial& trial : trials) CHECK(keys.insert(trial.key.dump()).second) << "two trials have the key " << trial.key.dump();
 
@@ -63,18 +71,15 @@ Status RunTrials(const std::vector<Trial>& trials, const TrialSchedule& schedule
   const Time begin = MonotonicNow();
   for (std::size_t i = 0; i < runs.size(); ++i) {
     if (schedule.interrupted && schedule.interrupted()) {
-      return Status::Cancelled(fmt::format("interrupted after {} of {} trials; the same command continues", i, runs.size()));
+      throw Failure(Status::Cancelled(fmt::format("interrupted after {} of {} trials; the same command continues", i, runs.size())));
     }
     const Trial& trial = *runs[i].trial;
     const double passed = std::chrono::duration<double>(MonotonicNow() - begin).count();
     const std::string left = effort_done > 0 ? ", " + TimeLeft(passed / effort_done * (effort - effort_done)) : "";
     bar.Show(effort_done, fmt::format("trial {} of {}{}", i + 1, runs.size(), left));
-    Result<Json> numbers = trial.run();
-    if (!numbers.ok()) return Status(numbers.status().code(), fmt::format("trial {}: {}", trial.key.dump(), numbers.status().message()));
-    if (Status status = log.Append(trial.key, runs[i].repeat, *std::move(numbers)); !status.ok()) return status;
+    OrThrow(log.Append(trial.key, runs[i].repeat, NumbersOf(trial)));
     effort_done += trial.effort;
   }
-  return Status::Ok();
 }
 
 std::vector<double> ValuesOf(const TrialLog& log, const Json& key, const std::string& number) {

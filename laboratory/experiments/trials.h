@@ -7,16 +7,17 @@
 #include <string>
 #include <vector>
 
+#include "laboratory/experiments/failure.h"
 #include "laboratory/experiments/trial_log.h"
 #include "laboratory/measure/statistics.h"
 
 namespace slabstream {
 
 struct Trial {
-  Json key;                           // its parameters, an object; holds all that decides its numbers, and is unique
-  std::function<Result<Json>()> run;  // numbers by name, an object; must not depend on what ran before
-  double effort = 1;                  // expected time relative to other trials, for the time left
-  bool repeat = true;                 // false: its numbers are computed, so once is enough
+  Json key;                   // its parameters, an object; holds all that decides its numbers, and is unique
+  std::function<Json()> run;  // numbers by name, an object; must not depend on what ran before; may throw Failure
+  double effort = 1;          // expected time relative to other trials, for the time left
+  bool repeat = true;         // false: its numbers are computed, so once is enough
 };
 
 struct TrialSchedule {
@@ -26,9 +27,9 @@ struct TrialSchedule {
   std::function<bool()> interrupted;  // asked between trials
 };
 
-// Runs the trials that the log does not hold yet. Cancelled if interrupted; the first failed trial ends the run, and the error names its
-// key.
-Status RunTrials(const std::vector<Trial>& trials, const TrialSchedule& schedule, TrialLog& log);
+// Runs the trials that the log does not hold yet. Throws Failure: Cancelled if interrupted; the error of the first trial that failed, which
+// ends the run, with its key.
+void RunTrials(const std::vector<Trial>& trials, const TrialSchedule& schedule, TrialLog& log);
 
 // All repeats of a number, given by name or, with a leading slash, by JSON pointer. CHECKs that the trial was run and has the number.
 std::vector<double> ValuesOf(const TrialLog& log, const Json& key, const std::string& number);

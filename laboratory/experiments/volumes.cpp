@@ -11,16 +11,15 @@
 
 namespace slabstream {
 
-Result<VolumeInUse> VolumeCache::Get(const BenchCase& volume) {
+VolumeInUse VolumeCache::Get(const BenchCase& volume) {
   const auto found = std::ranges::find(held_, volume.dataset, &Held::dataset);
   if (found != held_.end()) {
     held_.splice(held_.begin(), held_, found);
     return found->volume;
   }
-  Result<std::shared_ptr<const Volume>> loaded = LoadBenchVolume(volume);
-  if (!loaded.ok()) return loaded.status();
-  auto summary = std::make_shared<const VolumeSummary>(Summarize(**loaded));
-  held_.push_front({volume.dataset, {*std::move(loaded), std::move(summary)}});
+  std::shared_ptr<const Volume> loaded = OrThrow(LoadBenchVolume(volume));
+  auto summary = std::make_shared<const VolumeSummary>(Summarize(*loaded));
+  held_.push_front({volume.dataset, {std::move(loaded), std::move(summary)}});
   std::size_t bytes = 0;
   const auto first_too_many = std::find_if(std::next(held_.begin()), held_.end(), [&](const Held& held) {
     bytes += held.volume.volume->block.bytes.size();
@@ -30,15 +29,13 @@ Result<VolumeInUse> VolumeCache::Get(const BenchCase& volume) {
   return held_.front().volume;
 }
 
-Result<std::shared_ptr<const OccupancyGrid>> VolumeCache::Occupied(const BenchCase& volume) {
+std::shared_ptr<const OccupancyGrid> VolumeCache::Occupied(const BenchCase& volume) {
   std::shared_ptr<const OccupancyGrid>& grid = occupied_[{volume.name, volume.renderer}];
   if (grid != nullptr) return grid;
-  const Result<VolumeInUse> in_use = Get(volume);
-  if (!in_use.ok()) return in_use.status();
-  const VolumeSummary& summary = *in_use->summary;
-  const Result<TransferFunction> transfer = ResolveTransfer(volume.transfer, summary);
-  if (!transfer.ok()) return transfer.status();
-  grid = std::make_shared<const OccupancyGrid>(CountOccupied(in_use->volume->block, volume.renderer->DrawnTable(*transfer, summary)));
+  const VolumeInUse in_use = Get(volume);
+  const VolumeSummary& summary = *in_use.summary;
+  const TransferFunction transfer = OrThrow(ResolveTransfer(volume.transfer, summary));
+  grid = std::make_shared<const OccupancyGrid>(CountOccupied(in_use.volume->block, volume.renderer->DrawnTable(transfer, summary)));
   return grid;
 }
 
@@ -49,11 +46,11 @@ std::string TitleOf(const BenchCase& volume) {
                      sphere->occupancy * 100);
 }
 
-Result<std::vector<BenchCase>> RealVolumes(const std::vector<std::string>& named) {
+std::vector<BenchCase> RealVolumes(const std::vector<std::string>& named) {
   std::vector<BenchCase> volumes;
   for (const std::string& text : named) {
     Result<BenchCase> parsed = ParseBenchCase(text, false);
-    if (!parsed.ok()) return Status(parsed.status().code(), "--volume: " + parsed.status().message());
+    if (!parsed.ok()) throw Failure(Status(parsed.status().code(), "--volume: " + parsed.status().message()));
     volumes.push_back(*std::move(parsed));
   }
   const BenchCase brain = BrainCase();

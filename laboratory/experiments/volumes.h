@@ -8,11 +8,11 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/status.h"
 #include "common/volume/occupancy_grid.h"
 #include "common/volume/summary.h"
 #include "common/volume/volume.h"
 #include "laboratory/bench/bench_cases.h"
+#include "laboratory/experiments/failure.h"
 
 namespace slabstream {
 
@@ -26,9 +26,9 @@ class VolumeCache {
  public:
   explicit VolumeCache(std::size_t budget_bytes = std::size_t{1} << 30) : budget_bytes_(budget_bytes) {}
   // Makes or reads the volume if it is not held. Cases of one dataset share their volume.
-  Result<VolumeInUse> Get(const BenchCase& volume);
+  VolumeInUse Get(const BenchCase& volume);
   // The voxels that its renderer draws under its transfer function.
-  Result<std::shared_ptr<const OccupancyGrid>> Occupied(const BenchCase& volume);
+  std::shared_ptr<const OccupancyGrid> Occupied(const BenchCase& volume);
 
  private:
   struct Held {
@@ -44,6 +44,6 @@ class VolumeCache {
 std::string TitleOf(const BenchCase& volume);
 
 // The volumes that the user named, or the installed real volumes, such as the brain, beside the spheres. Errors of ParseBenchCase.
-Result<std::vector<BenchCase>> RealVolumes(const std::vector<std::string>& named);
+std::vector<BenchCase> RealVolumes(const std::vector<std::string>& named);
 
 }  // namespace slabstream

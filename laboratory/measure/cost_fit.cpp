@@ -24,7 +24,7 @@ struct System {
   VectorXd ones;
 };
 
-System MakeSystem(const StageCost& stage, std::span<const CostSample* const> samples) {
+System MakeSystem(const StageModel& stage, std::span<const CostSample* const> samples) {
   System system{MatrixXd(Eigen::Index(samples.size()), Eigen::Index(stage.units.size())), VectorXd::Ones(Eigen::Index(samples.size()))};
   for (std::size_t row = 0; row < samples.size(); ++row) {
     for (std::size_t column = 0; column < stage.units.size(); ++column) {
@@ -83,7 +83,7 @@ VectorXd SolveNonNegative(const MatrixXd& a, const VectorXd& b, std::vector<Eige
   return x;
 }
 
-VectorXd FitConstants(const StageCost& stage, std::span<const CostSample* const> samples, std::vector<Eigen::Index>& free) {
+VectorXd FitConstants(const StageModel& stage, std::span<const CostSample* const> samples, std::vector<Eigen::Index>& free) {
   const System system = MakeSystem(stage, samples);
   const VectorXd lengths = ColumnLengths(system.units);
   return SolveNonNegative(system.units * lengths.cwiseInverse().asDiagonal(), system.ones, free).cwiseQuotient(lengths);
@@ -113,13 +113,7 @@ VectorXd HalfWidths(const System& system, const std::vector<Eigen::Index>& colum
   return widths;
 }
 
-StageCost WithConstants(StageCost stage, const VectorXd& seconds) {
-  stage.seconds = {};
-  for (std::size_t i = 0; i < stage.units.size(); ++i) stage.seconds[std::size_t(stage.units[i])] = seconds[Eigen::Index(i)];
-  return stage;
-}
-
-std::vector<TermFit> MakeTerms(const StageCost& stage, const System& system, const VectorXd& seconds,
+std::vector<TermFit> MakeTerms(const StageModel& stage, const System& system, const VectorXd& seconds,
                                const std::vector<Eigen::Index>& free) {
   const VectorXd widths = HalfWidths(system, free, seconds);
   // A constant held at 0 gets the upper bound of the fit with all columns.
@@ -138,7 +132,7 @@ std::vector<TermFit> MakeTerms(const StageCost& stage, const System& system, con
 }
 
 // Each sample's time as predicted by the fit to the other folds; sample i is in fold i mod kFolds.
-std::vector<double> CrossPredict(const StageCost& stage, std::span<const CostSample* const> samples) {
+std::vector<double> CrossPredict(const StageModel& stage, std::span<const CostSample* const> samples) {
   std::vector<double> predicted(samples.size());
   for (int fold = 0; fold < kFolds; ++fold) {
     std::vector<const CostSample*> others;
@@ -146,15 +140,19 @@ std::vector<double> CrossPredict(const StageCost& stage, std::span<const CostSam
       if (int(i % kFolds) != fold) others.push_back(samples[i]);
     }
     std::vector<Eigen::Index> free;
-    const StageCost fitted = WithConstants(stage, FitConstants(stage, others, free));
-    for (std::size_t i = std::size_t(fold); i < samples.size(); i += kFolds) predicted[i] = fitted.Predict(samples[i]->work);
+    const VectorXd seconds = FitConstants(stage, others, free);
+    for (std::size_t i = std::size_t(fold); i < samples.size(); i += kFolds) {
+      for (std::size_t unit = 0; unit < stage.units.size(); ++unit) {
+        predicted[i] += seconds[Eigen::Index(unit)] * samples[i]->work[std::size_t(stage.units[unit])];
+      }
+    }
   }
   return predicted;
 }
 
 }  // namespace
 
-Result<StageFit> FitStage(const StageCost& stage, std::span<const CostSample> samples) {
+Result<StageFit> FitStage(const StageModel& stage, std::span<const CostSample> samples) {
   std::vector<const CostSample*> used;
   for (const CostSample& sample : samples) {
     if (Measured(sample, stage.stage) > 0) used.push_back(&sample);
@@ -163,42 +161,19 @@ Result<StageFit> FitStage(const StageCost& stage, std::span<const CostSample> sa
     return Status::InvalidArgument(fmt::format("the stage {} took time in {} samples, but {} constants need at least {}",
                                                ToString(stage.stage), used.size(), stage.units.size(), kSamplesATerm * stage.units.size()));
   }
-
   std::vector<Eigen::Index> free;
   const VectorXd seconds = FitConstants(stage, used, free);
   const System system = MakeSystem(stage, used);
-  StageFit fit;
-  fit.cost = WithConstants(stage, seconds);
-  fit.terms = MakeTerms(stage, system, seconds, free);
-  fit.residual = std::sqrt((system.units * seconds - system.ones).squaredNorm() / double(used.size()));
   const std::vector<double> predicted = CrossPredict(stage, used);
   double missed = 0, measured = 0;
   for (std::size_t i = 0; i < used.size(); ++i) {
     const double time = Measured(*used[i], stage.stage);
-    fit.samples.push_back({std::size_t(used[i] - samples.data()), time, predicted[i]});
     missed += std::abs(predicted[i] - time);
     measured += time;
   }
-  fit.prediction_error = missed / measured;
-  return fit;
-}
-
-Result<CostFit> FitCosts(std::span<const StageCost> stages, std::span<const CostSample> samples) {
-  CostFit fit;
-  std::vector<double> missing(samples.size());  // measured minus predicted, all stages
-  double missed = 0, measured = 0;
-  for (const StageCost& stage : stages) {
-    Result<StageFit> of_stage = FitStage(stage, samples);
-    if (!of_stage.ok()) return of_stage.status();
-    for (const PredictedSample& sample : of_stage->samples) {
-      missing[sample.index] += sample.measured - sample.predicted;
-      measured += sample.measured;
-    }
-    fit.stages.push_back(*std::move(of_stage));
-  }
-  for (const double seconds : missing) missed += std::abs(seconds);
-  fit.prediction_error = missed / measured;
-  return fit;
+  return StageFit{.terms = MakeTerms(stage, system, seconds, free),
+                  .residual = std::sqrt((system.units * seconds - system.ones).squaredNorm() / double(used.size())),
+                  .prediction_error = missed / measured};
 }
 
 }  // namespace slabstream

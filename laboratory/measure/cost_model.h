@@ -1,5 +1,5 @@
-// CostModel: the time of each stage of rendering a box, as in the paper's model (Yagel and Machiraju, Eq. 20 and 25), in the units that our
-// renderers count. Experiments fit its constants and print them beside the paper's. Plans do not use it: they use AnalyticCost
+// The cost model: the time of each stage of rendering a box, as in the paper's model (Yagel and Machiraju, Eq. 20 and 25), in the units
+// that our renderers count. Experiments fit its constants and print them beside the paper's. Plans do not use it: they use AnalyticCost
 // (common/renderers/renderer_kind.h).
 //
 //   paper                             here, a box                                  why
@@ -16,10 +16,6 @@
 
 #include <array>
 #include <cstdint>
-#include <functional>
-#include <map>
-#include <span>
-#include <string>
 #include <string_view>
 #include <vector>
 
@@ -46,20 +42,13 @@ using WorkUnits = std::array<double, kWorkUnitCount>;  // the amount of each
 // For one box under one view, from a renderer's report. `bounds`: of its image.
 WorkUnits CountWork(const Box& box, const Camera& camera, double occupied, double drawn, const PixelBounds& bounds, double pixels);
 
-struct StageCost {
+struct StageModel {
   Stage stage = Stage::kRender;
   std::string_view symbol;      // of the paper
-  std::vector<WorkUnit> units;  // the units that it depends on
-  WorkUnits seconds{};          // of each of them; 0 for the others
-  double Predict(const WorkUnits& work) const;
+  std::vector<WorkUnit> units;  // the units that its time is a sum of, each with a constant
 };
 
-struct CostModel {
-  std::map<std::string, std::vector<StageCost>, std::less<>> renderers;  // by name: the stages of a rendering
-
-  // As measured on one core of an AMD EPYC (Zen 5, AVX-512); docs/simulation.md says how.
-  CostModel();
-  const std::vector<StageCost>& stages(std::string_view renderer) const;  // empty: no constants were measured
-};
+// The stages of a rendering; empty: there is no model of this renderer.
+const std::vector<StageModel>& CostModelOf(std::string_view renderer);
 
 }  // namespace slabstream

@@ -41,17 +41,15 @@ FrameParts PartsOf(const Timeline& timeline) {
   return parts;
 }
 
-double Quantile(const std::vector<FrameParts>& frames, double FrameParts::*part, double share) {
+double QuantileOf(const std::vector<FrameParts>& frames, double FrameParts::*part, double share) {
   std::vector<double> values;
   for (const FrameParts& frame : frames) values.push_back(frame.*part);
-  const auto at = values.begin() + std::ptrdiff_t(std::min<double>(share * double(values.size()), double(values.size() - 1)));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
+  return Quantile(std::move(values), share);
 }
 
 FrameParts Median(const std::vector<FrameParts>& frames) {
-  return {Quantile(frames, &FrameParts::render, 0.5), Quantile(frames, &FrameParts::picture, 0.5),
-          Quantile(frames, &FrameParts::latency, 0.5)};
+  return {QuantileOf(frames, &FrameParts::render, 0.5), QuantileOf(frames, &FrameParts::picture, 0.5),
+          QuantileOf(frames, &FrameParts::latency, 0.5)};
 }
 
 // Everything that belongs to one view.
@@ -151,7 +149,7 @@ Result<ValidationRow> ValidateSimulation(const ValidationCase& what, const Valid
   if (what.workers == 2) row.slowdown = MedianOf(std::move(slowdowns));
   for (const View& view : *views) {
     const auto quartile = [&](const std::vector<FrameParts>& frames, double share) {
-      return Quantile(frames, &FrameParts::latency, share);
+      return QuantileOf(frames, &FrameParts::latency, share);
     };
     row.views.push_back({Median(view.measured), Median(view.simulated), quartile(view.measured, 0.25), quartile(view.measured, 0.75),
                          quartile(view.simulated, 0.25), quartile(view.simulated, 0.75)});

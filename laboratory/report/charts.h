@@ -48,7 +48,7 @@ struct BarChart {
 };
 std::string DrawBars(const BarChart& chart);
 
-// A timeline: lanes from above, spans in time.
+// A simulated timeline: lanes from above, spans in milliseconds.
 struct GanttSpan {
   double begin = 0, end = 0;
   int kind = 0;       // of GanttChart::kinds: its colour
@@ -61,14 +61,12 @@ struct GanttLane {
 };
 struct GanttChart {
   std::string title;
-  std::string unit;  // of time
-  Origin origin = Origin::kSimulated;
   std::vector<std::string> kinds;
   std::vector<GanttLane> lanes;
 };
 std::string DrawGantt(const GanttChart& chart);
 
-// Heat maps: rectangles of a plane coloured by value, several planes side by side with one scale.
+// Heat maps of what was measured: rectangles of a plane coloured by value, several planes side by side with one scale.
 struct HeatRect {
   double x_begin = 0, y_begin = 0, x_end = 0, y_end = 0;
   double value = 0;
@@ -83,7 +81,6 @@ struct HeatPanel {
 struct HeatMap {
   std::string title;
   std::string value_label;  // with its unit
-  Origin origin = Origin::kMeasured;
   std::vector<HeatPanel> panels;
 };
 std::string DrawHeatMap(const HeatMap& map);

@@ -9,12 +9,6 @@
 
 namespace slabstream {
 
-Status Report::Add(Result<Section> section) {
-  if (!section.ok()) return section.status();
-  sections.push_back(*std::move(section));
-  return Status::Ok();
-}
-
 nlohmann::ordered_json ReportJson(const Report& report, const Provenance& p) {
   nlohmann::ordered_json json = {{"experiment", p.experiment},
                                  {"version", p.version},

@@ -45,9 +45,6 @@ struct Provenance {
 struct Report {
   std::string title, summary;
   std::vector<Section> sections;
-
-  // Appends the section. Returns its error if there is none.
-  Status Add(Result<Section> section);
 };
 
 std::string ReportHtml(const Report& report, const Provenance& provenance);             // one file, nothing to load

@@ -21,7 +21,7 @@ std::string DrawGantt(const GanttChart& chart) {
     names = std::max(names, TextWidth(lane.name));
     for (const GanttSpan& span : lane.spans) times.push_back(span.end);
   }
-  const ChartAxis time({"time", chart.unit, AxisScale::kLinear, true, true}, times);
+  const ChartAxis time({"time", "ms", AxisScale::kLinear, true, true}, times);
   Legend legend{Legend::Swatch::kBar, {}, {}};
   for (const std::string& kind : chart.kinds) legend.entries.push_back({kind, Origin::kMeasured});
   const double lane_height = chart.lanes.size() > 48 ? 9 : kLabelledLane;
@@ -42,7 +42,7 @@ std::string DrawGantt(const GanttChart& chart) {
     for (const GanttSpan& span : lane.spans) {
       const double x = area.x + time.At(span.begin) * area.width, width = (time.At(span.end) - time.At(span.begin)) * area.width;
       canvas.Bar(x, top + 2, std::max(width, 0.4), lane_height - 4, span.kind, Origin::kMeasured,
-                 fmt::format("{}: {}, {} to {} {}", lane.name, span.hint, FormatNumber(span.begin), FormatNumber(span.end), chart.unit));
+                 fmt::format("{}: {}, {} to {} ms", lane.name, span.hint, FormatNumber(span.begin), FormatNumber(span.end)));
       if (lane_height >= kLabelledLane && width > TextWidth(span.label) + 2)
         canvas.Text({x + width / 2, top + lane_height / 2 + 3.4}, span.label, TextAnchor::kMiddle, "mark");
     }
@@ -50,7 +50,7 @@ std::string DrawGantt(const GanttChart& chart) {
   canvas.Line({area.x, area.y}, {area.x, area.y + area.height}, "axis");
   canvas.Line({area.x, area.y + area.height}, {area.x + area.width, area.y + area.height}, "axis");
   DrawHorizontalAxis(canvas, area, time);
-  canvas.Text({8, area.y + area.height + 38}, OriginWords(chart.origin), TextAnchor::kStart, "small");
+  canvas.Text({8, area.y + area.height + 38}, OriginWords(Origin::kSimulated), TextAnchor::kStart, "small");
   DrawLegend(canvas, legend, {area.x + area.width, area.y});
   return std::move(canvas).Finish();
 }

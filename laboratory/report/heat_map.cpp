@@ -52,7 +52,7 @@ std::string DrawHeatMap(const HeatMap& map) {
   canvas.Text({scale_x + kScaleWidth + 6, kTop + 10}, FormatNumber(top_value));
   canvas.Text({scale_x + kScaleWidth + 6, kTop + kPanel}, "0");
   canvas.VerticalText({scale_x + kScaleWidth + 22, kTop + kPanel / 2}, map.value_label);
-  canvas.Text({8, kTop + kPanel + kBottom - 6}, OriginWords(map.origin), TextAnchor::kStart, "small");
+  canvas.Text({8, kTop + kPanel + kBottom - 6}, OriginWords(Origin::kMeasured), TextAnchor::kStart, "small");
   return std::move(canvas).Finish();
 }
 

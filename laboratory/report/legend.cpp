@@ -1,6 +1,7 @@
 #include "laboratory/report/legend.h"
 
 #include <algorithm>
+#include <array>
 
 #include "common/base/check.h"
 
@@ -26,12 +27,8 @@ double TextWidth(const std::string& text) {
 }
 
 std::string OriginWords(Origin origin) {
-  switch (origin) {
-    case Origin::kMeasured: return "measured here";
-    case Origin::kSimulated: return "simulated";
-    case Origin::kPaper: break;
-  }
-  return "from the paper";
+  constexpr std::array<const char*, 3> kWords = {"measured here", "simulated", "from the paper"};
+  return kWords[std::size_t(origin)];
 }
 
 int Legend::ColorOf(const std::string& name) const {

@@ -28,7 +28,7 @@ double LegendWidth(const Legend& legend);  // pixels, margins included
 double LegendHeight(const Legend& legend);
 void DrawLegend(SvgCanvas& canvas, const Legend& legend, SvgPoint top_left);
 
-// "measured here", "simulated from measured costs", "from the paper".
+// "measured here", "simulated", "from the paper".
 std::string OriginWords(Origin origin);
 
 // Approximate width of a text in the charts' font.

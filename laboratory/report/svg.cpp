@@ -59,12 +59,8 @@ const std::string& StyleSheet() {
 }
 
 std::string_view AnchorName(TextAnchor anchor) {
-  switch (anchor) {
-    case TextAnchor::kStart: return "start";
-    case TextAnchor::kMiddle: return "middle";
-    case TextAnchor::kEnd: break;
-  }
-  return "end";
+  constexpr std::array<std::string_view, 3> kNames = {"start", "middle", "end"};
+  return kNames[std::size_t(anchor)];
 }
 
 // The number of the class; that of texts comes after the palette.
@@ -73,12 +69,8 @@ int ColorClass(int color) { return color == kPlainColor ? kPaletteSize : color %
 }  // namespace
 
 std::string_view ToString(Origin origin) {
-  switch (origin) {
-    case Origin::kMeasured: return "measured";
-    case Origin::kSimulated: return "simulated";
-    case Origin::kPaper: break;
-  }
-  return "paper";
+  constexpr std::array<std::string_view, 3> kNames = {"measured", "simulated", "paper"};
+  return kNames[std::size_t(origin)];
 }
 
 SvgCanvas::SvgCanvas(double width, double height, std::string_view title) {

@@ -17,8 +17,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMostOpenRows = 24;
 
-std::string Heading(const Column& column) { return column.unit.empty() ? column.name : fmt::format("{} ({})", column.name, column.unit); }
-
 template <class Has>
 bool AnyCell(const Table& table, std::size_t column, Has has) {
   return std::ranges::any_of(table.rows, [&](const std::vector<Cell>& row) { return has(row[column]); });
@@ -54,17 +52,21 @@ Cell::Cell(const Estimate& estimate, Origin from) : number(estimate.median), ori
   }
 }
 
-Cell Cell::Parameter(double value) {
+Cell Chosen(double number) {
   Cell cell;
-  cell.number = value;
+  cell.number = number;
   return cell;
+}
+
+Column::Column(std::string text) : heading(std::move(text)), name(heading.substr(0, heading.find(" ("))) {
+  if (name.size() < heading.size()) unit = heading.substr(name.size() + 2, heading.size() - name.size() - 3);
 }
 
 std::string TableCsv(const Table& table) {
   std::vector<std::string> header;
   for (std::size_t c = 0; c < table.columns.size(); ++c) {
     const Column& column = table.columns[c];
-    header.push_back(CsvField(Heading(column)));
+    header.push_back(CsvField(column.heading));
     if (AnyCell(table, c, HasInterval)) header.insert(header.end(), {CsvField(column.name + " low"), CsvField(column.name + " high")});
     if (AnyCell(table, c, HasOrigin)) header.push_back(CsvField(column.name + " origin"));
   }
@@ -108,7 +110,7 @@ std::string TableHtml(const Table& table) {
       "<div class=\"table\"><table><caption>{} <a download=\"{}.csv\" href=\"data:text/csv;charset=utf-8;base64,{}\">CSV</a></caption>"
       "<thead><tr>",
       Escape(table.title), Escape(table.name), Base64(TableCsv(table)));
-  for (const Column& column : table.columns) html += fmt::format("<th>{}</th>", Escape(Heading(column)));
+  for (const Column& column : table.columns) html += fmt::format("<th>{}</th>", Escape(column.heading));
   html += "</tr></thead><tbody>\n";
   bool told = false;
   for (const std::vector<Cell>& row : table.rows) {

@@ -19,16 +19,23 @@ struct Cell {
   Cell(const char* words) : text(words) {}             // NOLINT(google-explicit-constructor)
   Cell(double value, Origin from) : number(value), origin(from) {}
   Cell(const Estimate& estimate, Origin from);
-  static Cell Parameter(double value);  // a chosen number, not a result: it has no origin
 
   std::string text;
   std::optional<double> number, low, high;
   std::optional<Origin> origin;
 };
 
+inline Cell Measured(const auto& number) { return {number, Origin::kMeasured}; }
+inline Cell Simulated(const auto& number) { return {number, Origin::kSimulated}; }
+inline Cell FromPaper(double number) { return {number, Origin::kPaper}; }
+Cell Chosen(double number);  // no result, so it has no origin
+
 struct Column {
-  std::string name;  // unique in its table
-  std::string unit;  // empty: a plain number or a text
+  // "frame (ms)" or "p": the name, which is unique in its table, and the unit in brackets unless it is a plain number or a text.
+  Column(std::string text);                                // NOLINT(google-explicit-constructor): columns read as a list of headings
+  Column(const char* text) : Column(std::string(text)) {}  // NOLINT(google-explicit-constructor)
+
+  std::string heading, name, unit;
 };
 
 struct Table {
@@ -41,8 +48,8 @@ struct Table {
 // RFC 4180 with a header line "name (unit)". A column with intervals is followed by "name low" and "name high", one with origins by "name
 // origin".
 std::string TableCsv(const Table& table);
-nlohmann::ordered_json TableJson(
-    const Table& table);                    // {name, title, columns: [...], rows: [{column: value or {value, low, high, origin}}]}
+// {name, title, columns: [...], rows: [{column: value or {value, low, high, origin}}]}
+nlohmann::ordered_json TableJson(const Table& table);
 std::string TableHtml(const Table& table);  // holds the CSV too, to be saved; a long one is folded
 
 }  // namespace slabstream

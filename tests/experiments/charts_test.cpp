@@ -126,11 +126,10 @@ TEST(Charts, BarsGanttAndHeatMap) {
                        {"share", "%"},
                        {"a", kNasty},
                        {{"1", {{kNasty, Origin::kMeasured, {0, 0}}, {"p", Origin::kPaper, {30, 70}}}}, {"2", {}}}}));
-  ExpectGood(DrawGantt({kNasty, "ms", Origin::kSimulated, {kNasty}, {}}));
-  ExpectGood(
-      DrawGantt({kNasty, "ms", Origin::kSimulated, {"a", "b"}, {{kNasty, {{0, 1, 0, kNasty, kNasty}, {1, 1, 1, "", ""}}}, {"empty", {}}}}));
-  ExpectGood(DrawHeatMap({kNasty, kNasty, Origin::kMeasured, {}}));
-  ExpectGood(DrawHeatMap({kNasty, "ms", Origin::kMeasured, {{"cut", "x", "y", 10, 5, {{0, 0, 10, 5, 0, ""}, {2, 2, 3, 3, 7, kNasty}}}}}));
+  ExpectGood(DrawGantt({kNasty, {kNasty}, {}}));
+  ExpectGood(DrawGantt({kNasty, {"a", "b"}, {{kNasty, {{0, 1, 0, kNasty, kNasty}, {1, 1, 1, "", ""}}}, {"empty", {}}}}));
+  ExpectGood(DrawHeatMap({kNasty, kNasty, {}}));
+  ExpectGood(DrawHeatMap({kNasty, "ms", {{"cut", "x", "y", 10, 5, {{0, 0, 10, 5, 0, ""}, {2, 2, 3, 3, 7, kNasty}}}}}));
 }
 
 TEST(ChartAxis, CoversItsValuesAndHasAFewMarks) {
@@ -192,13 +191,13 @@ TEST(Text, NumbersAndEscapes) {
 TEST(Report, PageIsWellFormedAndSelfContained) {
   Report report{kNasty, kNasty, {}};
   for (int i = 0; i < 4; ++i) {
-    report.sections.push_back({kNasty + std::to_string(i),
-                               kNasty,
-                               kNasty,
-                               kNasty,
-                               {Figure{fmt::format("f{}", i), DrawLines({"t", {"x", ""}, {"y", ""}, {}}), kNasty},
-                                Table{fmt::format("t{}", i), kNasty, {{kNasty, kNasty}}, {{kNasty}, {{1, Origin::kPaper}}, {Cell()}}},
-                                Photo{"\x89PNG", kNasty}}});
+    report.sections.push_back(
+        {kNasty + std::to_string(i),
+         kNasty,
+         kNasty,
+         kNasty,
+         {Figure{fmt::format("f{}", i), DrawLines({"t", {"x", ""}, {"y", ""}, {}}), kNasty},
+          Table{fmt::format("t{}", i), kNasty, {kNasty}, {{kNasty}, {FromPaper(1)}, {Cell()}}}, Photo{"\x89PNG", kNasty}}});
   }
   const std::string page = ReportHtml(report, {kNasty, kNasty, kNasty, kNasty, kNasty, kNasty, 2, 1, 1, kNasty});
   EXPECT_EQ(WhyNotWellFormed(page), "");

@@ -14,10 +14,7 @@ using testing::HasSubstr;
 
 Table Example() {
   const Estimate e = MedianOf({1, 2, 3});
-  return {"t",
-          "A table",
-          {{"what", ""}, {"time", "ms"}, {"N", ""}},
-          {{"a, \"b\"", Cell(e, Origin::kMeasured), Cell::Parameter(7)}, {"c", {0.1, Origin::kPaper}, {}}}};
+  return {"t", "A table", {"what", "time (ms)", "N"}, {{"a, \"b\"", Measured(e), Chosen(7)}, {"c", FromPaper(0.1), {}}}};
 }
 
 TEST(Table, CsvTellsIntervalAndOrigin) {

@@ -25,7 +25,7 @@ std::vector<Trial> Trials(std::map<std::string, int>& runs, std::vector<int>* or
   std::vector<Trial> trials;
   for (int i = 0; i < kTrials; ++i) {
     Trial trial{{{"i", i}}, nullptr, 1.0 + i, i != 3};
-    trial.run = [&runs, order, i]() -> Result<Json> {
+    trial.run = [&runs, order, i] {
       ++runs[std::to_string(i)];
       if (order != nullptr) order->push_back(i);
       return Json{{"value", i * 1.1}, {"list", {i, 2.0 * i}}};
@@ -33,6 +33,16 @@ std::vector<Trial> Trials(std::map<std::string, int>& runs, std::vector<int>* or
     trials.push_back(std::move(trial));
   }
   return trials;
+}
+
+template <class Work>
+Status StatusOf(Work&& work) {
+  try {
+    work();
+  } catch (const Failure& failure) {
+    return failure.status();
+  }
+  return Status::Ok();
 }
 
 std::string ReadAll(const std::string& path) {
@@ -51,7 +61,7 @@ TEST(Trials, RunsEveryRepeatInARandomOrderOfTheSeed) {
     Result<TrialLog> log = Open(folder);
     ASSERT_TRUE(log.ok());
     std::map<std::string, int> runs;
-    ASSERT_TRUE(RunTrials(Trials(runs, &orders.emplace_back()), {std::uint64_t(seed), kRepeats, false, {}}, *log).ok());
+    RunTrials(Trials(runs, &orders.emplace_back()), {std::uint64_t(seed), kRepeats, false, {}}, *log);
     for (int i = 0; i < kTrials; ++i) EXPECT_EQ(runs[std::to_string(i)], i == 3 ? 1 : kRepeats);
     // Repeats are interleaved: the first round holds every trial once.
     std::vector<int> round(orders.back().begin(), orders.back().begin() + kTrials);
@@ -72,7 +82,7 @@ TEST(Trials, InterruptedAnywhereItEndsLikeOneInOneGo) {
   std::map<std::string, int> whole_runs;
   {
     Result<TrialLog> log = Open(whole);
-    ASSERT_TRUE(RunTrials(Trials(whole_runs), {4, kRepeats, false, {}}, *log).ok());
+    RunTrials(Trials(whole_runs), {4, kRepeats, false, {}}, *log);
   }
   for (int repeat = 0; repeat < 20; ++repeat) {
     const TemporaryDirectory folder;
@@ -82,7 +92,7 @@ TEST(Trials, InterruptedAnywhereItEndsLikeOneInOneGo) {
       Result<TrialLog> log = Open(folder);
       ASSERT_TRUE(log.ok()) << log.status().message();
       int left = random.Integer(0, 6);
-      const Status status = RunTrials(Trials(runs), {4, kRepeats, false, [&left] { return left-- == 0; }}, *log);
+      const Status status = StatusOf([&] { RunTrials(Trials(runs), {4, kRepeats, false, [&left] { return left-- == 0; }}, *log); });
       done = status.ok();
       if (!done) {
         EXPECT_EQ(status.code(), StatusCode::kCancelled);
@@ -99,14 +109,14 @@ TEST(Trials, ALineThatACrashCutShortIsMeasuredAgain) {
   std::map<std::string, int> runs;
   {
     Result<TrialLog> log = Open(folder);
-    ASSERT_TRUE(RunTrials(Trials(runs), {4, kRepeats, false, {}}, *log).ok());
+    RunTrials(Trials(runs), {4, kRepeats, false, {}}, *log);
   }
   const std::string path = folder / "run/trials.jsonl", whole = ReadAll(path);
   for (std::size_t cut = whole.size() - 60; cut < whole.size(); ++cut) {
     std::ofstream(path, std::ios::trunc) << whole.substr(0, cut);
     Result<TrialLog> log = Open(folder);
     ASSERT_TRUE(log.ok()) << log.status().message();
-    ASSERT_TRUE(RunTrials(Trials(runs), {4, kRepeats, false, {}}, *log).ok());
+    RunTrials(Trials(runs), {4, kRepeats, false, {}}, *log);
     EXPECT_EQ(ReadAll(path), whole);
   }
 }
@@ -116,8 +126,8 @@ TEST(Trials, AFailureNamesItsTrialAndKeepsTheOthers) {
   Result<TrialLog> log = Open(folder);
   std::map<std::string, int> runs;
   std::vector<Trial> trials = Trials(runs);
-  trials[2].run = []() -> Result<Json> { return Status::Unavailable("no worker"); };
-  const Status status = RunTrials(trials, {4, kRepeats, false, {}}, *log);
+  trials[2].run = []() -> Json { throw Failure(Status::Unavailable("no worker")); };
+  const Status status = StatusOf([&] { RunTrials(trials, {4, kRepeats, false, {}}, *log); });
   EXPECT_EQ(status, Status::Unavailable("trial {\"i\":2}: no worker"));
 }
 

@@ -19,65 +19,53 @@ FrameCase With(FrameCase frame, const char* scheme) {
 
 }  // namespace
 
-Result<Section> CombiningSection(const PaperSetup& setup) {
-  const Result<MachineModel> machine = setup.Machine(Splatting());
-  if (!machine.ok()) return machine.status();
+Section CombiningSection(const PaperSetup& setup) {
+  const MachineModel machine = setup.Machine(Splatting());
   Table table{"table-2-combining",
               fmt::format("Table 2. A frame by splatting, N = {}, on the paper's bus scaled to these processors", setup.table_size()),
-              {{"p", ""},
-               {"whole images: centralised", "ms"},
-               {"whole images: hierarchical", "ms"},
-               {"whole images: speed-up", ""},
-               {"without empty pixels: centralised", "ms"},
-               {"without empty pixels: hierarchical", "ms"},
-               {"paper: centralised", "s"},
-               {"paper: hierarchical", "s"},
-               {"paper: speed-up", ""}},
+              {"p", "whole images: centralised (ms)", "whole images: hierarchical (ms)", "whole images: speed-up",
+               "without empty pixels: centralised (ms)", "without empty pixels: hierarchical (ms)", "paper: centralised (s)",
+               "paper: hierarchical (s)", "paper: speed-up"},
               {}};
   double last_ratio = 1, last_gain = 1;
   int last_p = 1;
   for (const int p : setup.workers()) {
     if (p == 1) continue;
     const FrameCase frame = setup.Frame(Splatting(), setup.table_size(), p);
-    std::vector<Cell> row = {Cell::Parameter(p)};
+    std::vector<Cell> row = {Chosen(p)};
     std::array<double, 4> seconds{};
     std::size_t at = 0;
     for (const Images images : {Images::kWhole, Images::kWithoutEmpty}) {
       for (const char* scheme : {"centralized", "fan-in"}) {
-        const Result<PaperFrame> counted = CountAsPaper(setup, With(frame, scheme), *machine, images);
-        if (!counted.ok()) return counted.status();
-        seconds[at++] = counted->seconds;
-        row.emplace_back(counted->seconds * 1e3, counted->origin);
+        const PaperFrame counted = CountAsPaper(setup, With(frame, scheme), machine, images);
+        seconds[at++] = counted.seconds;
+        row.emplace_back(counted.seconds * 1e3, counted.origin);
       }
       if (images == Images::kWhole) row.emplace_back(seconds[0] / seconds[1], Origin::kSimulated);
     }
     last_ratio = seconds[0] / seconds[1];
     last_gain = seconds[1] / std::min(seconds[2], seconds[3]);
     last_p = p;
-    const auto found = std::ranges::find(printed::kWorkers, p);
-    if (found == printed::kWorkers.end()) {
-      row.resize(table.columns.size());
-    } else {
+    if (const auto found = std::ranges::find(printed::kWorkers, p); found != printed::kWorkers.end()) {
       const auto i = std::size_t(found - printed::kWorkers.begin());
-      row.insert(row.end(), {{printed::kCentralized[i], Origin::kPaper},
-                             {printed::kHierarchical[i], Origin::kPaper},
-                             {printed::kCentralized[i] / printed::kHierarchical[i], Origin::kPaper}});
+      row.insert(row.end(), {FromPaper(printed::kCentralized[i]), FromPaper(printed::kHierarchical[i]),
+                             FromPaper(printed::kCentralized[i] / printed::kHierarchical[i])});
     }
+    row.resize(table.columns.size());
     table.rows.push_back(std::move(row));
   }
 
   LineChart chart{"Figure 9: combining, hierarchical", WorkersAxis(AxisScale::kLinear), {"time", "ms", AxisScale::kLinear, true}, {}};
-  Table curve{"figure-9-combining", "Figure 9 in numbers", {{"N", ""}, {"p", ""}, {"combining", "ms"}}, {}};
+  Table curve{"figure-9-combining", "Figure 9 in numbers", {"N", "p", "combining (ms)"}, {}};
   double at_half = 0, at_full = 0;
   for (const int size : setup.sizes()) {
     LineSeries series{fmt::format("N = {}", size), Origin::kSimulated, {}};
     for (const int p : setup.workers()) {
       if (p == 1) continue;
-      const Result<PaperFrame> frame = CountAsPaper(setup, setup.Frame(Splatting(), size, p), *machine);
-      if (!frame.ok()) return frame.status();
-      const double ms = frame->combine_seconds * 1e3;
+      const PaperFrame frame = CountAsPaper(setup, setup.Frame(Splatting(), size, p), machine);
+      const double ms = frame.combine_seconds * 1e3;
       series.points.push_back({double(p), ms});
-      curve.rows.push_back({Cell::Parameter(size), Cell::Parameter(p), {ms, Origin::kSimulated}});
+      curve.rows.push_back({Chosen(size), Chosen(p), Simulated(ms)});
       if (p == 5) at_half = ms;
       at_full = ms;
     }

@@ -11,8 +11,8 @@
 namespace slabstream {
 namespace {
 
-constexpr double kNanoseconds = 1e9, kPaperOccupancy = 0.05;
-constexpr double kVoxels = double(printed::kSize) * printed::kSize * printed::kSize, kPixels = double(printed::kSize) * printed::kSize;
+constexpr double kNanoseconds = 1e9;
+constexpr double kPixels = double(printed::kSize) * printed::kSize, kVoxels = kPixels * printed::kSize, kOccupied = 0.05 * kVoxels;
 const double kRounds = std::log2(30);
 
 // One constant of Eq. 21 or 25: its unit, the printed value, and the value that follows from the printed times of table 5 or 6 for N = 200,
@@ -23,55 +23,45 @@ struct Term {
   std::vector<double> values;  // seconds a unit here, one for each (N, p)
 };
 
-double Share(const std::array<double, 7>& shares, std::size_t at, double seconds) { return shares[at] / 100 * seconds; }
-
 std::vector<Term> SplattingTerms() {
-  const auto at_one = [](std::size_t stage) { return Share(printed::kSplattingShares[stage], 0, printed::kSplattingSeconds[0]); };
-  const double occupied = kPaperOccupancy * kVoxels;
-  return {{"ct", "voxel transformed", printed::kSplattingConstants[0].seconds, at_one(0) / kVoxels, {}},
-          {"csh", "occupied voxel shaded", printed::kSplattingConstants[1].seconds, at_one(1) / occupied, {}},
-          {"csp k²", "occupied voxel splatted", printed::kSplattingConstants[2].seconds, at_one(2) / occupied, {}},
-          {"ccp", "pixel and slice composited", printed::kSplattingConstants[3].seconds, at_one(3) / (kPixels * printed::kSize), {}},
-          {"cco",
-           "pixel and round combined",
-           printed::kSplattingConstants[4].seconds,
-           Share(printed::kSplattingShares[4], 6, printed::kSplattingSeconds[6]) / (kPixels * kRounds),
-           {}}};
+  const auto& constants = printed::kSplattingConstants;
+  const auto share = [](std::size_t stage, std::size_t p) {
+    return printed::kSplattingShares[stage][p] / 100 * printed::kSplattingSeconds[p];
+  };
+  return {{"ct", "voxel transformed", constants[0].seconds, share(0, 0) / kVoxels, {}},
+          {"csh", "occupied voxel shaded", constants[1].seconds, share(1, 0) / kOccupied, {}},
+          {"csp k²", "occupied voxel splatted", constants[2].seconds, share(2, 0) / kOccupied, {}},
+          {"ccp", "pixel and slice composited", constants[3].seconds, share(3, 0) / (kPixels * printed::kSize), {}},
+          {"cco", "pixel and round combined", constants[4].seconds, share(4, 6) / (kPixels * kRounds), {}}};
 }
 
 std::vector<Term> ZBufferTerms() {
-  const auto at_one = [](std::size_t stage) { return Share(printed::kZBufferShares[stage], 0, printed::kZBufferSeconds[0]); };
-  const double occupied = kPaperOccupancy * kVoxels;
-  return {{"ct", "voxel transformed", printed::kZBufferConstants[0].seconds, at_one(0) / kVoxels, {}},
-          {"cz", "occupied voxel drawn", printed::kZBufferConstants[1].seconds, at_one(1) / occupied, {}},
-          {"csh", "covered pixel shaded", printed::kZBufferConstants[2].seconds, at_one(2) / kPixels, {}},
-          {"cco",
-           "pixel and round combined",
-           printed::kZBufferConstants[3].seconds,
-           Share(printed::kZBufferShares[3], 6, printed::kZBufferSeconds[6]) / (kPixels * kRounds),
-           {}}};
+  const auto& constants = printed::kZBufferConstants;
+  const auto share = [](std::size_t stage, std::size_t p) { return printed::kZBufferShares[stage][p] / 100 * printed::kZBufferSeconds[p]; };
+  return {{"ct", "voxel transformed", constants[0].seconds, share(0, 0) / kVoxels, {}},
+          {"cz", "occupied voxel drawn", constants[1].seconds, share(1, 0) / kOccupied, {}},
+          {"csh", "covered pixel shaded", constants[2].seconds, share(2, 0) / kPixels, {}},
+          {"cco", "pixel and round combined", constants[3].seconds, share(3, 6) / (kPixels * kRounds), {}}};
 }
 
 void Note(Term& term, double seconds, double units) {
   if (units > 0 && seconds > 0) term.values.push_back(seconds / units);
 }
 
-Status Collect(const PaperSetup& setup, const RendererKind* renderer, std::vector<Term>& terms) {
-  const Result<MachineModel> machine = setup.Machine(renderer);
-  if (!machine.ok()) return machine.status();
+void Collect(const PaperSetup& setup, const RendererKind* renderer, std::vector<Term>& terms) {
+  const MachineModel machine = setup.Machine(renderer);
   for (const int size : setup.sizes()) {
     for (const int p : setup.workers()) {
       const FrameCase frame = setup.Frame(renderer, size, p);
-      const Result<MeasuredFrame> measured = Recall(setup.context(), frame);
-      if (!measured.ok()) return measured.status();
+      const MeasuredFrame measured = Recall(setup.context(), frame);
       double occupied = 0, covered = 0;
-      for (const MeasuredFrame::Cost& box : measured->boxes) {
+      for (const MeasuredFrame::Cost& box : measured.boxes) {
         occupied += box.drawn_voxels;
         covered += box.covered_pixels;
       }
-      const auto pixels = double(FrameBounds(measured->plan.setup).pixel_count());
+      const auto pixels = double(FrameBounds(measured.plan.setup).pixel_count());
       const double voxels = double(size) * size * size;
-      const auto seconds = [&](Stage stage) { return measured->StageSeconds(stage); };
+      const auto seconds = [&](Stage stage) { return measured.StageSeconds(stage); };
       Note(terms[0], seconds(Stage::kTransform), voxels);
       if (renderer == Splatting()) {
         Note(terms[1], seconds(Stage::kShade), occupied);
@@ -82,24 +72,17 @@ Status Collect(const PaperSetup& setup, const RendererKind* renderer, std::vecto
         Note(terms[2], seconds(Stage::kShade), covered);
       }
       if (p == 1) continue;
-      const Result<PaperFrame> counted = CountAsPaper(setup, frame, *machine);
-      if (!counted.ok()) return counted.status();
-      Note(terms.back(), counted->combine_seconds, pixels * std::log2(p));
+      const PaperFrame counted = CountAsPaper(setup, frame, machine);
+      Note(terms.back(), counted.combine_seconds, pixels * std::log2(p));
     }
   }
-  return Status::Ok();
 }
 
 Table TableOf(const std::string& name, const std::string& title, const std::vector<Term>& terms) {
   Table table{name,
               title,
-              {{"constant", ""},
-               {"a unit is a", ""},
-               {"here: median", "ns"},
-               {"here: largest", "ns"},
-               {"paper: printed bound", "ns"},
-               {"paper: from its times", "ns"},
-               {"from its times / here", ""}},
+              {"constant", "a unit is a", "here: median (ns)", "here: largest (ns)", "paper: printed bound (ns)",
+               "paper: from its times (ns)", "from its times / here"},
               {}};
   for (const Term& term : terms) {
     const Origin origin = term.symbol == "cco" ? Origin::kSimulated : Origin::kMeasured;
@@ -111,7 +94,7 @@ Table TableOf(const std::string& name, const std::string& title, const std::vect
     } else {
       row.insert(row.end(), {Cell(MedianOf(values), origin), Cell(*std::ranges::max_element(values), origin)});
     }
-    row.insert(row.end(), {{term.printed * kNanoseconds, Origin::kPaper}, {term.from_times * kNanoseconds, Origin::kPaper}});
+    row.insert(row.end(), {FromPaper(term.printed * kNanoseconds), FromPaper(term.from_times * kNanoseconds)});
     row.push_back(values.empty() ? Cell() : Cell(term.from_times * kNanoseconds / MedianOf(values).median, origin));
     table.rows.push_back(std::move(row));
   }
@@ -124,13 +107,12 @@ struct Fit {
   Table table;
   std::string errors;  // "shade 4 %, splat 12 %"
 };
-Result<Fit> FitModel(const PaperSetup& setup, const RendererKind* renderer, const std::string& name, const std::string& title) {
+Fit FitModel(const PaperSetup& setup, const RendererKind* renderer, const std::string& name, const std::string& title) {
   std::vector<CostSample> samples;
   for (const int size : setup.sizes()) {
     for (const int p : setup.workers()) {
-      const Result<MeasuredFrame> measured = Recall(setup.context(), setup.Frame(renderer, size, p));
-      if (!measured.ok()) return measured.status();
-      for (const MeasuredFrame::Cost& box : measured->boxes) {
+      const MeasuredFrame measured = Recall(setup.context(), setup.Frame(renderer, size, p));
+      for (const MeasuredFrame::Cost& box : measured.boxes) {
         if (box.seconds <= 0) continue;
         CostSample& sample = samples.emplace_back(CostSample{.work = box.work, .stage_ns = {}});
         for (std::size_t stage = 0; stage < sample.stage_ns.size(); ++stage)
@@ -138,14 +120,8 @@ Result<Fit> FitModel(const PaperSetup& setup, const RendererKind* renderer, cons
       }
     }
   }
-  Fit fit{
-      {name,
-       title,
-       {{"stage", ""}, {"the paper's term", ""}, {"a unit is a", ""}, {"time a unit", "ns"}, {"residual", "%"}, {"prediction error", "%"}},
-       {}},
-      ""};
-  const CostModel model;
-  for (const StageCost& stage : model.stages(renderer->name())) {
+  Fit fit{{name, title, {"stage", "the paper's term", "a unit is a", "time a unit (ns)", "residual (%)", "prediction error (%)"}, {}}, ""};
+  for (const StageModel& stage : CostModelOf(renderer->name())) {
     const Result<StageFit> fitted = FitStage(stage, samples);
     if (!fitted.ok()) continue;
     bool first = true;
@@ -156,7 +132,7 @@ Result<Fit> FitModel(const PaperSetup& setup, const RendererKind* renderer, cons
       constant.low = term.low * kNanoseconds;
       constant.high = term.high * kNanoseconds;
       row.push_back(std::move(constant));
-      if (first) row.insert(row.end(), {{100 * fitted->residual, Origin::kMeasured}, {100 * fitted->prediction_error, Origin::kMeasured}});
+      if (first) row.insert(row.end(), {Measured(100 * fitted->residual), Measured(100 * fitted->prediction_error)});
       row.resize(fit.table.columns.size());
       fit.table.rows.push_back(std::move(row));
       first = false;
@@ -168,15 +144,13 @@ Result<Fit> FitModel(const PaperSetup& setup, const RendererKind* renderer, cons
 
 }  // namespace
 
-Result<Section> ConstantsSection(const PaperSetup& setup) {
+Section ConstantsSection(const PaperSetup& setup) {
   std::vector<Term> splatting = SplattingTerms(), zbuffer = ZBufferTerms();
-  if (Status status = Collect(setup, Splatting(), splatting); !status.ok()) return status;
-  if (Status status = Collect(setup, ZBuffer(), zbuffer); !status.ok()) return status;
+  Collect(setup, Splatting(), splatting);
+  Collect(setup, ZBuffer(), zbuffer);
 
-  const Result<Fit> splatting_fit = FitModel(setup, Splatting(), "fit-splatting", "Our own model of splatting, fitted");
-  if (!splatting_fit.ok()) return splatting_fit.status();
-  const Result<Fit> zbuffer_fit = FitModel(setup, ZBuffer(), "fit-zbuffer", "Our own model of the Z-buffer, fitted");
-  if (!zbuffer_fit.ok()) return zbuffer_fit.status();
+  const Fit splatting_fit = FitModel(setup, Splatting(), "fit-splatting", "Our own model of splatting, fitted");
+  const Fit zbuffer_fit = FitModel(setup, ZBuffer(), "fit-zbuffer", "Our own model of the Z-buffer, fitted");
 
   Section section;
   section.title = "Constants: tables 3 and 4";
@@ -196,10 +170,10 @@ Result<Section> ConstantsSection(const PaperSetup& setup) {
       "draws it into a Z-buffer {} times as fast; compositing takes a pixel and slice {} times less, because empty ones cost nothing. "
       "Combining, which cannot skip pixels of whole images, gained least: {} times. The fitted model predicts slabs it has not seen with a "
       "mean error of: {} (splatting); {} (Z-buffer). So frames are simulated from measured slabs, not from constants.",
-      ratio(splatting[1]), ratio(splatting[2]), ratio(zbuffer[1]), ratio(splatting[3]), ratio(splatting.back()), splatting_fit->errors,
-      zbuffer_fit->errors);
+      ratio(splatting[1]), ratio(splatting[2]), ratio(zbuffer[1]), ratio(splatting[3]), ratio(splatting.back()), splatting_fit.errors,
+      zbuffer_fit.errors);
   section.blocks = {TableOf("table-3-constants-splatting", "Table 3. Splatting, Eq. 21", splatting),
-                    TableOf("table-4-constants-zbuffer", "Table 4. Z-buffer, Eq. 25", zbuffer), splatting_fit->table, zbuffer_fit->table};
+                    TableOf("table-4-constants-zbuffer", "Table 4. Z-buffer, Eq. 25", zbuffer), splatting_fit.table, zbuffer_fit.table};
   return section;
 }
 

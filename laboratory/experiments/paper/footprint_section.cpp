@@ -25,7 +25,7 @@ Json WidthKey(int side, int k) { return {{"what", "footprint"}, {"N", side}, {"k
 double SigmaOf(int k) { return (k - 0.5) / 6; }
 
 Trial MeasureWidth(int side, int k) {
-  const auto run = [=]() -> Result<Json> {
+  const auto run = [=]() -> Json {
     DenseSlice slice(side, SigmaOf(k), 1);
     const auto fastest = [&](void (DenseSlice::*splat)()) {
       double best = std::numeric_limits<double>::infinity();
@@ -50,11 +50,10 @@ double SplatSeconds(const MeasuredFrame::Cost& box) {
   return box.stage_seconds[std::size_t(Stage::kTransform)] + box.stage_seconds[std::size_t(Stage::kSplat)];
 }
 // Milliseconds of the slowest slab.
-Result<Estimate> SlowestSplat(const PaperSetup& setup, const FrameCase& frame) {
-  const Result<std::vector<MeasuredFrame>> repeats = RecallRepeats(setup.context(), frame);
-  if (!repeats.ok()) return repeats.status();
+Estimate SlowestSplat(const PaperSetup& setup, const FrameCase& frame) {
+  const std::vector<MeasuredFrame> repeats = RecallRepeats(setup.context(), frame);
   std::vector<double> slowest;
-  for (const MeasuredFrame& repeat : *repeats) {
+  for (const MeasuredFrame& repeat : repeats) {
     double& most = slowest.emplace_back(0);
     for (const MeasuredFrame::Cost& box : repeat.boxes) most = std::max(most, SplatSeconds(box) * 1e3);
   }
@@ -89,18 +88,16 @@ std::vector<Trial> FootprintTrials(const PaperSetup& setup) {
   return trials;
 }
 
-Result<Section> FootprintSection(const PaperSetup& setup) {
-  Table table{
-      "figure-8-splatting", "Figure 8 in numbers", {{"curve", ""}, {"N", ""}, {"p", ""}, {"k", ""}, {"C", "%"}, {"time", "ms"}}, {}};
+Section FootprintSection(const PaperSetup& setup) {
+  Table table{"figure-8-splatting", "Figure 8 in numbers", {"curve", "N", "p", "k", "C (%)", "time (ms)"}, {}};
 
   LineChart by_workers{"Figure 8a: splatting a worker's slab", WorkersAxis(AxisScale::kLinear), {"time", "ms", AxisScale::kLog}, {}};
   for (const int size : setup.sizes()) {
     LineSeries series{fmt::format("N = {}", size), Origin::kMeasured, {}};
     for (const int p : setup.workers()) {
-      const Result<Estimate> ms = SlowestSplat(setup, setup.Frame(Splatting(), size, p));
-      if (!ms.ok()) return ms.status();
-      series.points.push_back(PointOf(p, *ms));
-      table.rows.push_back({"a: slab", Cell::Parameter(size), Cell::Parameter(p), {}, {}, Cell(*ms, Origin::kMeasured)});
+      const Estimate ms = SlowestSplat(setup, setup.Frame(Splatting(), size, p));
+      series.points.push_back(PointOf(p, ms));
+      table.rows.push_back({"a: slab", Chosen(size), Chosen(p), {}, {}, Measured(ms)});
     }
     by_workers.series.push_back(std::move(series));
   }
@@ -115,8 +112,7 @@ Result<Section> FootprintSection(const PaperSetup& setup) {
     for (auto [series, number] : {std::pair{&plain, "plain_seconds"}, {&kernels, "kernel_seconds"}}) {
       const Estimate ms = EstimateOf(setup.context().log(), key, number).Times(1e3);
       series->points.push_back(PointOf(k, ms));
-      table.rows.push_back(
-          {"b: " + series->name, Cell::Parameter(setup.large_size()), {}, Cell::Parameter(k), {}, Cell(ms, Origin::kMeasured)});
+      table.rows.push_back({"b: " + series->name, Chosen(setup.large_size()), {}, Chosen(k), {}, Measured(ms)});
     }
   }
   const double plain_power = Exponent(plain.points), kernel_power = Exponent(kernels.points);
@@ -128,15 +124,9 @@ Result<Section> FootprintSection(const PaperSetup& setup) {
                          {}};
   LineSeries occupancy{"class II", Origin::kMeasured, {}};
   for (const double c : kOccupancies) {
-    const Result<Estimate> ms = SlowestSplat(setup, OccupancyFrame(setup, c));
-    if (!ms.ok()) return ms.status();
-    occupancy.points.push_back(PointOf(c * 100, *ms));
-    table.rows.push_back({"c: occupancy",
-                          Cell::Parameter(setup.large_size()),
-                          Cell::Parameter(kFigureWorkers),
-                          {},
-                          Cell::Parameter(c * 100),
-                          Cell(*ms, Origin::kMeasured)});
+    const Estimate ms = SlowestSplat(setup, OccupancyFrame(setup, c));
+    occupancy.points.push_back(PointOf(c * 100, ms));
+    table.rows.push_back({"c: occupancy", Chosen(setup.large_size()), Chosen(kFigureWorkers), {}, Chosen(c * 100), Measured(ms)});
   }
   const double growth = occupancy.points.back().y / occupancy.points.front().y,
                occupied = occupancy.points.back().x / occupancy.points.front().x;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 
+#include "common/planning/policy_names.h"
 #include "common/renderers/registry.h"
 #include "laboratory/experiments/balanced_case.h"
 #include "laboratory/experiments/machines.h"
@@ -35,18 +36,8 @@ FrameCase With(FrameCase frame, const Policy& policy) {
   return frame;
 }
 
-// The paper's machine with the costs that it counts, or a cluster of today with all costs.
-Result<MachineModel> MachineOf(const PaperSetup& setup, const RendererKind* renderer, std::string_view link) {
-  if (link == "pvs") return setup.Machine(renderer);
-  return Cluster(setup.context(), Link(link));
-}
-
 // Seconds of one frame if nobody asks for the next before it is there.
-Result<double> AloneSeconds(const MeasuredFrame& frame, const MachineModel& machine) {
-  const Result<Timeline> timeline = Simulate(frame, machine);
-  if (!timeline.ok()) return timeline.status();
-  return timeline->frames.front().latency();
-}
+double AloneSeconds(const MeasuredFrame& frame, const MachineModel& machine) { return Simulate(frame, machine).frames.front().latency(); }
 
 // One way to render frames with p workers, and its result.
 struct Outcome {
@@ -63,6 +54,10 @@ std::vector<NamedPolicy> BalancedPartitions(int workers) {
   if (workers == 1) return {};
   std::vector<NamedPolicy> partitions = PartitionsAlongTheView();
   partitions.insert(partitions.begin(), {EqualSlabs(), BalancedTree()});
+  for (NamedPolicy& named : partitions) {
+    named.name += ", dynamic";
+    named.policy.balance = kDynamicBalance;
+  }
   return partitions;
 }
 
@@ -76,30 +71,24 @@ std::vector<NamedPolicy> Partitions() {
 // Frames of one pipeline and size on one machine, however they are divided.
 class Improved {
  public:
-  static Result<Improved> Make(const PaperSetup& setup, const RendererKind* renderer, int size, std::string_view link) {
-    Result<MachineModel> machine = MachineOf(setup, renderer, link);
-    if (!machine.ok()) return machine.status();
-    return Improved(setup, renderer, size, link, *std::move(machine));
-  }
+  Improved(const PaperSetup& setup, const RendererKind* renderer, int size, std::string_view link)
+      : setup_(setup),
+        renderer_(renderer),
+        size_(size),
+        paper_(link == "pvs"),
+        machine_(paper_ ? setup.Machine(renderer) : Cluster(setup.context(), Link(link))) {}
 
   // The best of all partitions and the schemes that suit a link, with `team` of `workers` on a frame.
-  Result<Outcome> FindBest(int workers, int team) const {
+  Outcome FindBest(int workers, int team) const {
     Outcome best;
     for (const NamedPolicy& named : Partitions()) {
-      const FrameCase frame = With(setup_.Frame(renderer_, size_, team), named.policy);
-      const Result<MeasuredFrame> measured = Recall(setup_.context(), frame);
-      if (!measured.ok()) return measured.status();
-      if (Status status = Try(*measured, named.name, workers, best); !status.ok()) return status;
+      Try(Recall(setup_.context(), With(setup_.Frame(renderer_, size_, team), named.policy)), named.name, workers, best);
     }
     for (const NamedPolicy& named : BalancedPartitions(team)) {
-      const FrameCase frame = With(setup_.Frame(renderer_, size_, team), named.policy);
-      const Result<std::vector<MeasuredFrame>> measured = RecallBalanced(setup_.context(), frame);
-      if (!measured.ok()) return measured.status();
       // The median repeat, so that the luckiest does not count.
-      std::vector<Outcome> outcomes(measured->size());
-      for (std::size_t i = 0; i < outcomes.size(); ++i) {
-        const std::string name = fmt::format("{}, dynamic", named.name);
-        if (Status status = Try((*measured)[i], name, workers, outcomes[i]); !status.ok()) return status;
+      std::vector<Outcome> outcomes;
+      for (const MeasuredFrame& repeat : RecallBalanced(setup_.context(), With(setup_.Frame(renderer_, size_, team), named.policy))) {
+        Try(repeat, named.name, workers, outcomes.emplace_back());
       }
       std::ranges::sort(outcomes, {}, &Outcome::seconds);
       const Outcome& middle = outcomes[outcomes.size() / 2];
@@ -109,47 +98,37 @@ class Improved {
   }
 
   // Equal slabs, one frame after the other, as measured in the paper.
-  Result<double> PlainSeconds(int workers) const {
-    Result<MeasuredFrame> measured = Recall(setup_.context(), setup_.Frame(renderer_, size_, workers));
-    if (!measured.ok()) return measured.status();
-    Count(*measured);
-    return AloneSeconds(*measured, machine_);
+  double PlainSeconds(int workers) const {
+    MeasuredFrame measured = Recall(setup_.context(), setup_.Frame(renderer_, size_, workers));
+    Count(measured);
+    return AloneSeconds(measured, machine_);
   }
 
  private:
-  Improved(const PaperSetup& setup, const RendererKind* renderer, int size, std::string_view link, MachineModel machine)
-      : setup_(setup), renderer_(renderer), size_(size), paper_(link == "pvs"), machine_(std::move(machine)) {}
-
   // The paper's times end with the combined image.
   void Count(MeasuredFrame& frame) const {
     if (paper_) frame.finish_seconds = frame.receive_seconds = 0;
   }
 
-  Status Try(MeasuredFrame frame, const std::string& name, int workers, Outcome& best) const {
+  void Try(MeasuredFrame frame, const std::string& name, int workers, Outcome& best) const {
     Count(frame);
     for (const std::string& scheme : UsualSchemes()) {
       frame.plan.combine = scheme;
-      const Result<double> seconds = SteadySeconds(frame, machine_, workers / int(frame.plan.slots));
-      if (!seconds.ok()) return seconds.status();
-      if (!best.policy.empty() && *seconds >= best.seconds) continue;
-      const Result<double> alone = AloneSeconds(frame, machine_);
-      if (!alone.ok()) return alone.status();
-      const std::vector<double> of_workers = frame.WorkerSeconds();
-      const bool divided = frame.plan.slots > 1;
-      best = {divided ? name + ", " + scheme : "whole frames",
-              int(frame.plan.slots),
-              *seconds,
-              *alone,
-              frame.RenderSeconds(),
-              *std::ranges::max_element(of_workers)};
+      const double seconds = SteadySeconds(frame, machine_, workers / int(frame.plan.slots));
+      if (!best.policy.empty() && seconds >= best.seconds) continue;
+      best = {.policy = frame.plan.slots > 1 ? name + ", " + scheme : "whole frames",
+              .team = int(frame.plan.slots),
+              .seconds = seconds,
+              .alone = AloneSeconds(frame, machine_),
+              .render = frame.RenderSeconds(),
+              .most = std::ranges::max(frame.WorkerSeconds())};
     }
-    return Status::Ok();
   }
 
   const PaperSetup& setup_;
   const RendererKind* renderer_;
   int size_;
-  bool paper_;
+  bool paper_;  // the paper's machine with the costs that it counts; else a cluster of today with all costs
   MachineModel machine_;
 };
 
@@ -175,32 +154,21 @@ std::vector<Trial> ImprovedTrials(const PaperSetup& setup) {
     for (const int size : Sizes(setup)) {
       for (const int p : shared) {
         const FrameCase frame = setup.Frame(renderer, size, p);
-        for (const NamedPolicy& named : Partitions()) trials.push_back(BoxCostTrial(setup.context(), With(frame, named.policy)));
-        for (const NamedPolicy& named : BalancedPartitions(p)) trials.push_back(BalancedTrial(setup.context(), With(frame, named.policy)));
+        for (const NamedPolicy& named : Partitions()) trials.push_back(CostTrial(setup.context(), With(frame, named.policy)));
+        for (const NamedPolicy& named : BalancedPartitions(p)) trials.push_back(CostTrial(setup.context(), With(frame, named.policy)));
       }
     }
   }
   return trials;
 }
 
-Result<Section> ImprovedSection(const PaperSetup& setup) {
-  Table table{"streaming-and-balance",
-              "Efficiency with streaming and balance",
-              {{"pipeline", ""},
-               {"N", ""},
-               {"link", ""},
-               {"p", ""},
-               {"workers a frame", ""},
-               {"one frame at a time", "%"},
-               {"streaming and balanced", "%"},
-               {"no schedule exceeds", "%"},
-               {"work of all boxes / of the whole", ""},
-               {"longest / mean", ""},
-               {"best policy", ""},
-               {"picture to picture", "ms"},
-               {"one frame", "ms"},
-               {"volumes held", ""}},
-              {}};
+Section ImprovedSection(const PaperSetup& setup) {
+  Table table{
+      "streaming-and-balance",
+      "Efficiency with streaming and balance",
+      {"pipeline", "N", "link", "p", "workers a frame", "one frame at a time (%)", "streaming and balanced (%)", "no schedule exceeds (%)",
+       "work of all boxes / of the whole", "longest / mean", "best policy", "picture to picture (ms)", "one frame (ms)", "volumes held"},
+      {}};
   Section section;
   std::string everybody, teams;
   const int most_workers = Workers(setup).back();
@@ -219,33 +187,18 @@ Result<Section> ImprovedSection(const PaperSetup& setup) {
       for (const char* link : kLinks) {
         const std::string name = fmt::format("N = {}, {}", size, link);
         LineSeries series{name, Origin::kSimulated, {}}, team_series = series;
-        Result<Improved> improved = Improved::Make(setup, renderer, size, link);
-        if (!improved.ok()) return improved.status();
-        const Result<Outcome> one = improved->FindBest(1, 1);
-        if (!one.ok()) return one.status();
-        const Result<double> plain_one = improved->PlainSeconds(1);
-        if (!plain_one.ok()) return plain_one.status();
+        const Improved improved(setup, renderer, size, link);
+        const Outcome one = improved.FindBest(1, 1);
+        const double plain_one = improved.PlainSeconds(1);
         for (const int p : Workers(setup)) {
-          const Result<double> plain = improved->PlainSeconds(p);
-          if (!plain.ok()) return plain.status();
+          const double plain = improved.PlainSeconds(p);
           for (const int team : TeamSizes(p)) {
-            const Result<Outcome> best = improved->FindBest(p, team);
-            if (!best.ok()) return best.status();
-            const double efficiency = 100 * one->seconds / best->seconds / p, limit = 100 * one->render / team / best->most;
-            table.rows.push_back({std::string(renderer->title()),
-                                  Cell::Parameter(size),
-                                  link,
-                                  Cell::Parameter(p),
-                                  Cell::Parameter(team),
-                                  team == p ? Cell(100 * *plain_one / *plain / p, Origin::kSimulated) : Cell(),
-                                  {efficiency, Origin::kSimulated},
-                                  {limit, Origin::kMeasured},
-                                  {best->render / one->render, Origin::kMeasured},
-                                  {best->most * team / best->render, Origin::kMeasured},
-                                  best->policy,
-                                  {best->seconds * 1e3, Origin::kSimulated},
-                                  {best->alone * 1e3, Origin::kSimulated},
-                                  Cell::Parameter(p / team)});
+            const Outcome best = improved.FindBest(p, team);
+            const double efficiency = 100 * one.seconds / best.seconds / p, limit = 100 * one.render / team / best.most;
+            table.rows.push_back({std::string(renderer->title()), Chosen(size), link, Chosen(p), Chosen(team),
+                                  team == p ? Simulated(100 * plain_one / plain / p) : Cell(), Simulated(efficiency), Measured(limit),
+                                  Measured(best.render / one.render), Measured(best.most * team / best.render), best.policy,
+                                  Simulated(best.seconds * 1e3), Simulated(best.alone * 1e3), Chosen(p / team)});
             if (team == p) series.points.push_back({double(p), efficiency});
             if (p != most_workers) continue;
             team_series.points.push_back({double(team), efficiency});
@@ -253,8 +206,8 @@ Result<Section> ImprovedSection(const PaperSetup& setup) {
             if (team == p) {
               everybody +=
                   fmt::format("{}{} {:.0f} % ({}; boxes take {:.2f} times as long as the whole, the longest {:.2f} times the mean)",
-                              everybody.empty() ? "" : ", ", renderer->title(), efficiency, link, best->render / one->render,
-                              best->most * team / best->render);
+                              everybody.empty() ? "" : ", ", renderer->title(), efficiency, link, best.render / one.render,
+                              best.most * team / best.render);
             } else if (team <= 2) {
               teams +=
                   fmt::format("{}{} {:.0f} % in teams of {} ({})", teams.empty() ? "" : ", ", renderer->title(), efficiency, team, link);
@@ -283,17 +236,14 @@ Result<Section> ImprovedSection(const PaperSetup& setup) {
   // The timeline of a few frames.
   const int p = Workers(setup)[std::min<std::size_t>(1, Workers(setup).size() - 1)];
   const FrameCase shown = setup.Frame(Splatting(), setup.large_size(), p);
-  const Result<MeasuredFrame> slabs = Recall(setup.context(), shown);
-  if (!slabs.ok()) return slabs.status();
+  const MeasuredFrame slabs = Recall(setup.context(), shown);
   const NamedPolicy balanced = BalancedTree();
-  const Result<MeasuredFrame> even = Recall(setup.context(), With(shown, balanced.policy));
-  if (!even.ok()) return even.status();
-  for (const auto& [name, frame] : {std::pair{std::string("equal slabs"), &*slabs}, {balanced.name, &*even}}) {
-    const Result<Timeline> timeline = Simulate(*frame, Cluster(setup.context(), Link("10gbit")), 6, 4, true);
-    if (!timeline.ok()) return timeline.status();
+  const MeasuredFrame even = Recall(setup.context(), With(shown, balanced.policy));
+  for (const auto& [name, frame] : {std::pair{std::string("equal slabs"), &slabs}, {balanced.name, &even}}) {
+    const Timeline timeline = Simulate(*frame, Cluster(setup.context(), Link("10gbit")), 6, 4, true);
     section.blocks.emplace_back(
-        TimelineFigure("timeline-" + Slug(name), fmt::format("Three frames on {} workers: {}", p, name), *timeline,
-                       timeline->frames[1].received, timeline->frames[4].received,
+        TimelineFigure("timeline-" + Slug(name), fmt::format("Three frames on {} workers: {}", p, name), timeline,
+                       timeline.frames[1].received, timeline.frames[4].received,
                        "What each worker's two threads do, and when pixels arrive at it; 10 Gbit/s switched, frames asked for ahead."));
     section.blocks.emplace_back(BoxCostFigure("box-costs-" + Slug(name), fmt::format("Render time by box on {} workers: {}", p, name),
                                               *frame, "Every box rendered alone, on one thread."));

@@ -10,13 +10,12 @@ constexpr std::array<Stage, 5> kStages = {Stage::kTransform, Stage::kShade, Stag
 
 }  // namespace
 
-Result<PaperFrame> CountAsPaper(const PaperSetup& setup, const FrameCase& frame, const MachineModel& machine, Images images) {
-  Result<MeasuredFrame> measured = Recall(setup.context(), frame);
-  if (!measured.ok()) return measured.status();
-  measured->finish_seconds = measured->receive_seconds = 0;
-  if (images == Images::kWhole) FillImages(*measured);
+PaperFrame CountAsPaper(const PaperSetup& setup, const FrameCase& frame, const MachineModel& machine, Images images) {
+  MeasuredFrame measured = Recall(setup.context(), frame);
+  measured.finish_seconds = measured.receive_seconds = 0;
+  if (images == Images::kWhole) FillImages(measured);
   PaperFrame counted;
-  for (const MeasuredFrame::Cost& box : measured->boxes) {  // one for each worker
+  for (const MeasuredFrame::Cost& box : measured.boxes) {  // one for each worker
     if (box.seconds <= counted.render_seconds) continue;
     counted.render_seconds = box.seconds;
     counted.stage_seconds = {};
@@ -31,9 +30,8 @@ Result<PaperFrame> CountAsPaper(const PaperSetup& setup, const FrameCase& frame,
     counted.seconds = counted.render_seconds;
     return counted;
   }
-  const Result<Timeline> timeline = Simulate(*measured, machine);
-  if (!timeline.ok()) return timeline.status();
-  counted.seconds = std::max(timeline->frames.front().latency(), counted.render_seconds);
+  const Timeline timeline = Simulate(measured, machine);
+  counted.seconds = std::max(timeline.frames.front().latency(), counted.render_seconds);
   counted.origin = Origin::kSimulated;
   counted.combine_seconds = counted.seconds - counted.render_seconds;
   return counted;

@@ -18,7 +18,6 @@ struct PaperFrame {
   double combine_seconds = 0;                       // the rest
   std::array<double, kStageCount> stage_seconds{};  // of that worker; they sum to render_seconds
 };
-Result<PaperFrame> CountAsPaper(const PaperSetup& setup, const FrameCase& frame, const MachineModel& machine,
-                                Images images = Images::kWhole);
+PaperFrame CountAsPaper(const PaperSetup& setup, const FrameCase& frame, const MachineModel& machine, Images images = Images::kWhole);
 
 }  // namespace slabstream

@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <iterator>
-
 #include "laboratory/experiments/paper/setup.h"
 
 namespace slabstream {
@@ -9,18 +7,15 @@ namespace {
 
 constexpr int kRepeats = 5, kQuickRepeats = 1;
 
-void Append(std::vector<Trial>& trials, std::vector<Trial> more) {
-  trials.insert(trials.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
-}
-
 }  // namespace
 
-Result<Report> RunPaper(ExperimentContext& context) {
+Report RunPaper(ExperimentContext& context) {
   const PaperSetup setup(context);
   std::vector<Trial> trials;
-  for (auto* make : {TransformTrials, FootprintTrials, FrameTrials, ImprovedTrials}) Append(trials, make(setup));
-  if (Status status = context.Run(WithoutDoubles(std::move(trials)), context.quick() ? kQuickRepeats : kRepeats); !status.ok())
-    return status;
+  for (auto* make : {TransformTrials, FootprintTrials, FrameTrials, ImprovedTrials}) {
+    for (Trial& trial : make(setup)) trials.push_back(std::move(trial));
+  }
+  context.Run(std::move(trials), kRepeats, kQuickRepeats);
 
   Report report;
   report.title = "Data-parallel volume rendering, measured again";
@@ -33,13 +28,13 @@ Result<Report> RunPaper(ExperimentContext& context) {
       "are "
       "thirty years apart; shapes, shares, speed-ups and efficiencies are what to compare.";
   for (auto* make : {TransformSection, FootprintSection, ConstantsSection, CombiningSection}) {
-    if (Status status = report.Add(make(setup)); !status.ok()) return status;
+    report.sections.push_back(make(setup));
   }
   for (const RendererKind* renderer : {Splatting(), ZBuffer()}) {
-    if (Status status = report.Add(PipelineSection(setup, renderer)); !status.ok()) return status;
+    report.sections.push_back(PipelineSection(setup, renderer));
   }
   for (auto* make : {ImprovedSection, ValidationSection, PicturesSection}) {
-    if (Status status = report.Add(make(setup)); !status.ok()) return status;
+    report.sections.push_back(make(setup));
   }
   return report;
 }

@@ -24,15 +24,8 @@ struct Pipeline {
   const char* figure_number;                                       // "10"
   std::vector<std::pair<std::string, std::vector<Stage>>> stages;  // the paper's name, ours; combining comes last
   std::span<const double> paper_seconds;
-  std::vector<std::vector<double>> paper_shares;  // by stage and combining
+  std::span<const std::array<double, 7>> paper_shares;  // by stage and combining
 };
-
-template <std::size_t stages>
-std::vector<std::vector<double>> Shares(const std::array<std::array<double, 7>, stages>& shares) {
-  std::vector<std::vector<double>> copy;
-  for (const auto& stage : shares) copy.emplace_back(stage.begin(), stage.end());
-  return copy;
-}
 
 Pipeline PipelineOf(const RendererKind* renderer) {
   if (renderer == Splatting()) {
@@ -45,7 +38,7 @@ Pipeline PipelineOf(const RendererKind* renderer) {
         "10",
         {{"transform", {Stage::kTransform}}, {"shade", {Stage::kShade}}, {"splat", {Stage::kSplat}}, {"composite", {Stage::kComposite}}},
         printed::kSplattingSeconds,
-        Shares(printed::kSplattingShares)};
+        printed::kSplattingShares};
   }
   return {
       renderer,
@@ -56,7 +49,7 @@ Pipeline PipelineOf(const RendererKind* renderer) {
       "11",
       {{"transform", {Stage::kTransform}}, {"Z-buffer", {Stage::kZBuffer, Stage::kSplat, Stage::kComposite}}, {"shade", {Stage::kShade}}},
       printed::kZBufferSeconds,
-      Shares(printed::kZBufferShares)};
+      printed::kZBufferShares};
 }
 
 // Shares of a frame's time in per cent, combining last.
@@ -101,17 +94,15 @@ double Efficiency(double one, double seconds, int p) { return 100 * one / second
 
 }  // namespace
 
-Result<Section> PipelineSection(const PaperSetup& setup, const RendererKind* renderer) {
+Section PipelineSection(const PaperSetup& setup, const RendererKind* renderer) {
   const Pipeline pipeline = PipelineOf(renderer);
-  const Result<MachineModel> machine = setup.Machine(renderer);
-  if (!machine.ok()) return machine.status();
+  const MachineModel machine = setup.Machine(renderer);
   std::vector<Curve> curves;
   for (const int size : setup.sizes()) {
     Curve& curve = curves.emplace_back(Curve{size, {}});
     for (const int p : setup.workers()) {
-      const Result<PaperFrame> frame = CountAsPaper(setup, setup.Frame(renderer, size, p), *machine);
-      if (!frame.ok()) return frame.status();
-      curve.frames.emplace_back(p, *frame);
+      const PaperFrame frame = CountAsPaper(setup, setup.Frame(renderer, size, p), machine);
+      curve.frames.emplace_back(p, frame);
     }
   }
   const Curve& tabled = *std::ranges::find(curves, setup.table_size(), &Curve::size);
@@ -119,7 +110,7 @@ Result<Section> PipelineSection(const PaperSetup& setup, const RendererKind* ren
   // The table, and the same as bars.
   Table table{pipeline.table,
               fmt::format("Table {}. N = {}: a frame and the share of each stage, per cent", pipeline.table_number, tabled.size),
-              {{"p", ""}, {"time", "ms"}},
+              {"p", "time (ms)"},
               {}};
   BarChart bars{fmt::format("Where a frame's time goes, N = {}", tabled.size),
                 "workers p",
@@ -129,12 +120,12 @@ Result<Section> PipelineSection(const PaperSetup& setup, const RendererKind* ren
                 {}};
   for (const auto& [name, stages] : pipeline.stages) bars.parts.push_back(name);
   bars.parts.emplace_back("combine");
-  for (const std::string& part : bars.parts) table.columns.push_back({part, "%"});
-  table.columns.push_back({"paper: time", "s"});
-  for (const std::string& part : bars.parts) table.columns.push_back({"paper: " + part, "%"});
+  for (const std::string& part : bars.parts) table.columns.emplace_back(part + " (%)");
+  table.columns.emplace_back("paper: time (s)");
+  for (const std::string& part : bars.parts) table.columns.emplace_back("paper: " + part + " (%)");
   for (const auto& [p, frame] : tabled.frames) {
     const std::vector<double> shares = SharesOf(frame, pipeline);
-    std::vector<Cell> row = {Cell::Parameter(p), {frame.seconds * 1e3, frame.origin}};
+    std::vector<Cell> row = {Chosen(p), {frame.seconds * 1e3, frame.origin}};
     for (const double share : shares) row.emplace_back(share, frame.origin);
     BarGroup group{fmt::format("{}", p), {{"here", frame.origin, shares}}};
     const auto found = std::ranges::find(printed::kStageWorkers, p);
@@ -142,7 +133,7 @@ Result<Section> PipelineSection(const PaperSetup& setup, const RendererKind* ren
       const auto i = std::size_t(found - printed::kStageWorkers.begin());
       row.emplace_back(pipeline.paper_seconds[i], Origin::kPaper);
       Bar paper{"paper", Origin::kPaper, {}};
-      for (const std::vector<double>& stage : pipeline.paper_shares) {
+      for (const std::array<double, 7>& stage : pipeline.paper_shares) {
         row.emplace_back(stage[i], Origin::kPaper);
         paper.parts.push_back(stage[i]);
       }
@@ -156,15 +147,13 @@ Result<Section> PipelineSection(const PaperSetup& setup, const RendererKind* ren
   const auto& [last_p, last] = tabled.frames.back();
   const double one = tabled.frames.front().second.seconds, paper_one = pipeline.paper_seconds[0],
                paper_last = pipeline.paper_seconds.back(), paper_combining = pipeline.paper_shares.back().back() / 100 * paper_last;
-  Table curve_table{fmt::format("{}-curves", pipeline.figure),
-                    "The curves in numbers",
-                    {{"N", ""}, {"p", ""}, {"time", "ms"}, {"speed-up", ""}, {"efficiency", "%"}},
-                    {}};
+  Table curve_table{
+      fmt::format("{}-curves", pipeline.figure), "The curves in numbers", {"N", "p", "time (ms)", "speed-up", "efficiency (%)"}, {}};
   for (const Curve& curve : curves) {
     const double alone = curve.frames.front().second.seconds;
     for (const auto& [p, frame] : curve.frames) {
-      curve_table.rows.push_back({Cell::Parameter(curve.size),
-                                  Cell::Parameter(p),
+      curve_table.rows.push_back({Chosen(curve.size),
+                                  Chosen(p),
                                   {frame.seconds * 1e3, frame.origin},
                                   {alone / frame.seconds, frame.origin},
                                   {100 * alone / frame.seconds / p, frame.origin}});

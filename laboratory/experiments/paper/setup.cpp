@@ -12,7 +12,6 @@ namespace slabstream {
 namespace {
 
 constexpr int kValidationTurns = 7;
-constexpr double kOccupancy = 0.05;  // of class I
 // Oblique, so that no slab hides behind another, and slices are seen neither edge-on nor face-on.
 constexpr double kAzimuth = 30, kElevation = 20;
 
@@ -37,7 +36,7 @@ std::vector<int> PaperSetup::MeasuredWorkers() const {
 
 FrameCase PaperSetup::Frame(const RendererKind* renderer, int size, int workers) const {
   FrameCase frame;
-  frame.volume = SphereCase({SphereClass::kHollow, size, kOccupancy}, SphereOpacity(*renderer), renderer);
+  frame.volume = StandardSphere(SphereClass::kHollow, size, renderer);
   frame.size = {size, size};
   frame.view.azimuth_degrees = kAzimuth;
   frame.view.elevation_degrees = kElevation;
@@ -47,10 +46,8 @@ FrameCase PaperSetup::Frame(const RendererKind* renderer, int size, int workers)
   return frame;
 }
 
-Result<MachineModel> PaperSetup::Machine(const RendererKind* renderer) const {
-  const Result<MeasuredFrame> one = Recall(context_, Frame(renderer, table_size(), 1));
-  if (!one.ok()) return one.status();
-  return PaperMachine(context_, one->RenderSeconds(), double(table_size()) * table_size());
+MachineModel PaperSetup::Machine(const RendererKind* renderer) const {
+  return PaperMachine(context_, Recall(context_, Frame(renderer, table_size(), 1)).RenderSeconds(), double(table_size()) * table_size());
 }
 
 std::vector<FrameCase> PaperSetup::Frames() const {

@@ -25,7 +25,7 @@ class PaperSetup {
   FrameCase Frame(const RendererKind* renderer, int size, int workers) const;
 
   // PaperMachine for the time of a frame of the tables' N on this machine.
-  Result<MachineModel> Machine(const RendererKind* renderer) const;
+  MachineModel Machine(const RendererKind* renderer) const;
 
   // All of (renderer, size, workers).
   std::vector<FrameCase> Frames() const;
@@ -37,16 +37,16 @@ class PaperSetup {
 
 // Sections: the measurements that they need, and their texts.
 std::vector<Trial> TransformTrials(const PaperSetup& setup);
-Result<Section> TransformSection(const PaperSetup& setup);
+Section TransformSection(const PaperSetup& setup);
 std::vector<Trial> FootprintTrials(const PaperSetup& setup);
-Result<Section> FootprintSection(const PaperSetup& setup);
+Section FootprintSection(const PaperSetup& setup);
 std::vector<Trial> FrameTrials(const PaperSetup& setup);
-Result<Section> ValidationSection(const PaperSetup& setup);
-Result<Section> CombiningSection(const PaperSetup& setup);
-Result<Section> ConstantsSection(const PaperSetup& setup);
-Result<Section> PipelineSection(const PaperSetup& setup, const RendererKind* renderer);
+Section ValidationSection(const PaperSetup& setup);
+Section CombiningSection(const PaperSetup& setup);
+Section ConstantsSection(const PaperSetup& setup);
+Section PipelineSection(const PaperSetup& setup, const RendererKind* renderer);
 std::vector<Trial> ImprovedTrials(const PaperSetup& setup);
-Result<Section> ImprovedSection(const PaperSetup& setup);
-Result<Section> PicturesSection(const PaperSetup& setup);
+Section ImprovedSection(const PaperSetup& setup);
+Section PicturesSection(const PaperSetup& setup);
 
 }  // namespace slabstream

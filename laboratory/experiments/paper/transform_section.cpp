@@ -32,7 +32,7 @@ Json Key(int size, int workers, std::string_view loop) {
 }
 
 Trial Measure(int size, int workers, const Loop& loop) {
-  const auto run = [=]() -> Result<Json> {
+  const auto run = [=]() -> Json {
     const Index3 slab = SlabOf(size, workers);
     TransformedPoints points(slab);
     loop.store(kMatrix, slab, points);  // allocates the memory
@@ -59,7 +59,7 @@ std::vector<Trial> TransformTrials(const PaperSetup& setup) {
   return trials;
 }
 
-Result<Section> TransformSection(const PaperSetup& setup) {
+Section TransformSection(const PaperSetup& setup) {
   const TrialLog& log = setup.context().log();
   const auto estimate = [&](int size, int p, const Loop& loop) { return EstimateOf(log, Key(size, p, loop.name), "seconds"); };
 
@@ -80,14 +80,8 @@ Result<Section> TransformSection(const PaperSetup& setup) {
 
   Table table{"table-1-transform",
               fmt::format("Table 1. Transform of a slab, N = {}", setup.table_size()),
-              {{"p", ""},
-               {"product", "ms"},
-               {"product in vectors", "ms"},
-               {"increments in vectors", "ms"},
-               {"speed-up", ""},
-               {"paper: product", "ms"},
-               {"paper: increments", "ms"},
-               {"paper: speed-up", ""}},
+              {"p", "product (ms)", "product in vectors (ms)", "increments in vectors (ms)", "speed-up", "paper: product (ms)",
+               "paper: increments (ms)", "paper: speed-up"},
               {}};
   double least = std::numeric_limits<double>::infinity(), most = 0;
   for (const int p : setup.workers()) {
@@ -95,20 +89,14 @@ Result<Section> TransformSection(const PaperSetup& setup) {
                  increments = estimate(setup.table_size(), p, kIncrements).median;
     least = std::min(least, product / increments);
     most = std::max(most, product / increments);
-    std::vector<Cell> row = {Cell::Parameter(p),
-                             {product * 1e3, Origin::kMeasured},
-                             {estimate(setup.table_size(), p, kProductVector).median * 1e3, Origin::kMeasured},
-                             {increments * 1e3, Origin::kMeasured},
-                             {product / increments, Origin::kMeasured}};
-    const auto found = std::ranges::find(printed::kWorkers, p);
-    if (found == printed::kWorkers.end()) {
-      row.resize(table.columns.size());
-    } else {
+    std::vector<Cell> row = {Chosen(p), Measured(product * 1e3), Measured(estimate(setup.table_size(), p, kProductVector).median * 1e3),
+                             Measured(increments * 1e3), Measured(product / increments)};
+    if (const auto found = std::ranges::find(printed::kWorkers, p); found != printed::kWorkers.end()) {
       const auto i = std::size_t(found - printed::kWorkers.begin());
-      row.insert(row.end(), {{printed::kTransformProduct[i] * 1e3, Origin::kPaper},
-                             {printed::kTransformIncrements[i] * 1e3, Origin::kPaper},
-                             {printed::kTransformProduct[i] / printed::kTransformIncrements[i], Origin::kPaper}});
+      row.insert(row.end(), {FromPaper(printed::kTransformProduct[i] * 1e3), FromPaper(printed::kTransformIncrements[i] * 1e3),
+                             FromPaper(printed::kTransformProduct[i] / printed::kTransformIncrements[i])});
     }
+    row.resize(table.columns.size());
     table.rows.push_back(std::move(row));
   }
 

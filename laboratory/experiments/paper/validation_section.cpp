@@ -40,11 +40,8 @@ std::string Conclusion(const std::vector<double>& errors) {
 
 }  // namespace
 
-Result<Section> ValidationSection(const PaperSetup& setup) {
-  Table table{"validation",
-              "Simulated and measured frames",
-              {{"pipeline", ""}, {"N", ""}, {"p", ""}, {"measured", "ms"}, {"simulated", "ms"}, {"error", "%"}},
-              {}};
+Section ValidationSection(const PaperSetup& setup) {
+  Table table{"validation", "Simulated and measured frames", {"pipeline", "N", "p", "measured (ms)", "simulated (ms)", "error (%)"}, {}};
   LineChart chart{
       "Simulated frames against measured ones", {"measured frame", "ms", AxisScale::kLog}, {"error of the simulation", "%"}, {}};
   struct Errors {
@@ -63,8 +60,8 @@ Result<Section> ValidationSection(const PaperSetup& setup) {
         const double error = error_against(measured.median);
         Errors& errors = by_workers[p];
         (measured.median >= kLongMilliseconds ? errors.long_frames : errors.short_frames).push_back(std::abs(error));
-        table.rows.push_back({std::string(renderer->title()), Cell::Parameter(size), Cell::Parameter(p), Cell(measured, Origin::kMeasured),
-                              Cell(simulated, Origin::kSimulated), Cell(error, Origin::kSimulated)});
+        table.rows.push_back(
+            {std::string(renderer->title()), Chosen(size), Chosen(p), Measured(measured), Simulated(simulated), Simulated(error)});
         series.points.push_back({measured.median, error, error_against(measured.high), error_against(measured.low)});
         least = std::min(least, measured.median);
         most = std::max(most, measured.median);

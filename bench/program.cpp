@@ -1,0 +1,82 @@
+#include "bench/program.h"
+
+#include <cstdio>
+
+#include "client/cli/help_formatter.h"
+#include "common/base/large_buffers.h"
+#include "common/base/parse_number.h"
+#include "common/classification/count_occupied.h"
+
+namespace slabstream {
+namespace {
+
+Result<BenchCase> ParseSubject(const SubjectOptions& options, const std::string& text) {
+  Result<BenchCase> parsed = Status::InvalidArgument("");
+  const bool hollow = text.starts_with("sphere1:");
+  if (!hollow && !text.starts_with("sphere2:")) {
+    parsed = ParseBenchCase(text, false);
+    if (parsed.ok()) parsed->renderer = options.renderer;
+    return parsed;
+  }
+  const std::size_t colon = text.find(':', 8);
+  const std::optional<int> size = ParseNumber<int>(text.substr(8, colon - 8));
+  if (!size) return Status::InvalidArgument(fmt::format("'{}' has no number of voxels after the colon", text));
+  parsed = StandardSphere(hollow ? SphereClass::kHollow : SphereClass::kFilled, *size, options.renderer);
+  if (colon != std::string::npos) parsed->transfer.choice = text.substr(colon + 1);
+  return parsed;
+}
+
+}  // namespace
+
+int RunProgram(CLI::App& app, int argc, const char* const* argv, const std::function<Status()>& run) {
+  KeepFrameBuffers();
+  app.formatter(std::make_shared<HelpFormatter>());
+  app.set_help_flag("-h,--help", "Print this text");
+  Status status;
+  try {
+    app.parse(argc, argv);
+    status = run();
+  } catch (const CLI::Success& asked) {  // --help
+    return app.exit(asked);
+  } catch (const CLI::ParseError& error) {
+    status = Status::InvalidArgument(error.what());
+  }
+  if (status.ok()) return 0;
+  fmt::print(stderr, "{}: {}\n", app.get_name(), status.message());
+  return 2;
+}
+
+CLI::Option* AddRenderer(CLI::App& app, const RendererKind*& target, const std::string& help) {
+  const auto parse = [](const std::string&, const std::string& text) { return RequireRenderer(text); };
+  return AddParsed(app, "--renderer", target, parse, fmt::format("{}: {}", help, fmt::join(RendererNames(), ", ")))
+      ->type_name("NAME")
+      ->default_str(target == nullptr ? "" : std::string(target->name()));
+}
+
+void AddSubjectOptions(CLI::App& app, SubjectOptions& options) {
+  app.add_option("VOLUME", options.volumes, "Standard cases of `slabstream bench`, FILE[:TRANSFER], or sphere1:N and sphere2:N[:PRESET]")
+      ->required();
+  AddRenderer(app, options.renderer);
+  AddInteger(app, "--size", options.size, 1, kMaxImageSide, "Pixels a side");
+  AddNumber(app, "--azimuth", options.azimuth, {-kMaxAngleDegrees, kMaxAngleDegrees}, "Degrees that the eye turns about +z");
+  AddNumber(app, "--elevation", options.elevation, {-kMaxAngleDegrees, kMaxAngleDegrees}, "Degrees that the eye is lifted towards +z");
+  AddNumber(app, "--zoom", options.zoom, {kMinZoom, kMaxZoom}, "Magnification");
+}
+
+Result<Subject> LoadSubject(const SubjectOptions& options, const std::string& text) {
+  const Result<BenchCase> parsed = ParseSubject(options, text);
+  if (!parsed.ok()) return parsed.status();
+  const Result<std::shared_ptr<const Volume>> volume = LoadBenchVolume(*parsed);
+  if (!volume.ok()) return volume.status();
+  Subject subject{.name = parsed->name, .volume = *volume, .summary = std::make_shared<const VolumeSummary>(Summarize(**volume))};
+  const ViewParameters view{.azimuth_degrees = options.azimuth, .elevation_degrees = options.elevation, .zoom = options.zoom};
+  subject.request = BenchRequest(*parsed, view, {options.size, options.size});
+  Result<FrameSetup> setup = MakeFrameSetup(subject.request, 1, *subject.summary);
+  if (!setup.ok()) return setup.status();
+  subject.setup = *std::move(setup);
+  subject.occupied = std::make_shared<const OccupancyGrid>(
+      CountOccupied(subject.volume->block, parsed->renderer->DrawnTable(subject.setup.transfer, *subject.summary)));
+  return subject;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,132 @@
+// Renderings of the paper's spheres at 512 x 512 by every renderer, stage by stage, from the second frame on:
+//
+//   Boxes       both spheres, N = 200, as one box and as two boxes one after the other (p = 1, 2), on one thread
+//   Turn        the hollow sphere, N = 200 and 256, in both projections from 12 azimuths one after the other, by 1 and 2 threads
+//   EmptySpace  the hollow sphere of 128^3 voxels alone, and in the middle of 256^3 and 512^3 voxels, at a zoom that shows it in one size
+//
+// Time is of a frame. Counters of stages are milliseconds a frame, summed over threads and boxes; `finish` is making the picture from the
+// frame.
+#include <benchmark/benchmark.h>
+#include <tbb/task_arena.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstring>
+
+#include "common/decomposition/decomposition.h"
+#include "common/planning/frame_plan.h"
+#include "laboratory/bench/bench_cases.h"
+#include "worker/renderers/renderer.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::int32_t kObject = 128;  // a side of the sphere in empty space
+constexpr int kAzimuths = 12;
+
+// Renders `boxes` slabs of the volume, from each view in turn.
+void Render(benchmark::State& state, const Volume& volume, const RendererKind& kind, const std::vector<ViewParameters>& views, int boxes,
+            int threads) {
+  const BenchCase look = StandardSphere(SphereClass::kHollow, kObject, &kind);
+  const VolumeSummary summary = Summarize(volume);
+  std::vector<FrameSetup> setups;
+  for (const ViewParameters& view : views) setups.push_back(MakeFrameSetup(BenchRequest(look, view, {512, 512}), 1, summary).value());
+
+  const WorkField voxels = WorkField::Uniform(volume.description.geometry.size);
+  const Partition partition = MakeSlabs({.work = &voxels, .boxes = boxes});
+  std::vector<std::unique_ptr<SlabData>> slabs;
+  for (const Box& box : partition.boxes()) {
+    slabs.push_back(std::make_unique<SlabData>(BrickedVoxels(CutBlock(volume.block, SlabBox(box, setups[0])))));
+  }
+
+  const std::unique_ptr<Renderer> renderer = MakeRenderer(kind);
+  const std::atomic<bool> cancelled{false};
+  tbb::task_arena arena(threads);
+  std::chrono::duration<double, std::milli> finish{};
+  std::size_t frame = 0;
+  const auto render = [&](RankReport& report) {
+    arena.execute([&] {
+      const FrameSetup& setup = setups[frame++ % setups.size()];
+      LocalImage image;
+      for (std::size_t i = 0; i < slabs.size(); ++i) {
+        image = renderer->Render(*slabs[i], partition.boxes()[i], setup, {}, cancelled, report).value();
+        benchmark::DoNotOptimize(image.rgba.data());
+      }
+      const auto begin = std::chrono::steady_clock::now();
+      benchmark::DoNotOptimize(kind.Finish(image, setup));
+      finish += std::chrono::steady_clock::now() - begin;
+    });
+  };
+  RankReport first, report;
+  render(first);
+  finish = {};
+  for (auto _ : state) {
+    report.spans.clear();
+    render(report);
+  }
+
+  const auto frames = double(state.iterations());
+  state.SetLabel(std::string(kind.name()));
+  state.counters["first_prepare"] = double(first.stage_ns[std::size_t(Stage::kPrepare)]) / 1e6;
+  for (const Stage stage : kind.stages()) {
+    state.counters[std::string(ToString(stage))] = double(report.stage_ns[std::size_t(stage)]) / 1e6 / frames;
+  }
+  state.counters["finish"] = finish.count() / frames;
+  state.counters["drawn"] = double(report.drawn_voxels) / frames;
+  double slab_bytes = 0;
+  for (const auto& slab : slabs) slab_bytes += double(slab->bytes());
+  state.counters["slab_MB"] = slab_bytes / 1e6;
+}
+
+const RendererKind& KindAt(std::int64_t index) { return *Renderers()[std::size_t(index)]; }
+
+std::vector<std::int64_t> EveryRenderer() { return benchmark::CreateDenseRange(0, std::int64_t(Renderers().size()) - 1, 1); }
+
+void Boxes(benchmark::State& state) {
+  const auto sphere = SphereClass(state.range(0));
+  const Volume volume = MakeSphere({sphere, 200, sphere == SphereClass::kHollow ? 0.05 : 0.40}).value();
+  Render(state, volume, KindAt(state.range(2)), {{.azimuth_degrees = 30, .elevation_degrees = 20}}, int(state.range(1)), 1);
+}
+BENCHMARK(Boxes)->ArgNames({"class", "p", "renderer"})->ArgsProduct({{1, 2}, {1, 2}, EveryRenderer()})->Unit(benchmark::kMillisecond);
+
+void Turn(benchmark::State& state) {
+  std::vector<ViewParameters> views;
+  for (int i = 0; i < kAzimuths; ++i) views.push_back(BenchView(Projection(state.range(1)), i, kAzimuths));
+  const Volume volume = MakeSphere({SphereClass::kHollow, int(state.range(0)), 0.05}).value();
+  Render(state, volume, KindAt(state.range(3)), views, 1, int(state.range(2)));
+}
+BENCHMARK(Turn)
+    ->ArgNames({"N", "projection", "threads", "renderer"})
+    ->ArgsProduct({{200, 256}, {int(Projection::kOrthographic), int(Projection::kPerspective)}, {1, 2}, EveryRenderer()})
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
+
+Volume Surround(const Volume& object, std::int32_t side) {
+  Volume volume = object;
+  volume.description.geometry.size = {side, side, side};
+  volume.block = MakeVoxelBlock(volume.description.geometry.bounds(), object.block.type);
+  const std::int32_t border = (side - kObject) / 2;
+  for (Index3 v; v.z < kObject; ++v.z) {
+    for (v.y = 0; v.y < kObject; ++v.y) {
+      std::memcpy(&volume.block.bytes[std::size_t(volume.block.Offset({border, v.y + border, v.z + border}))],
+                  &object.block.bytes[std::size_t(object.block.Offset({0, v.y, v.z}))], std::size_t{kObject});
+    }
+  }
+  return volume;
+}
+
+void EmptySpace(benchmark::State& state) {
+  const auto side = std::int32_t(state.range(0));
+  const Volume volume = Surround(MakeSphere({SphereClass::kHollow, kObject, 0.05}).value(), side);
+  const ViewParameters view{.azimuth_degrees = 30, .elevation_degrees = 20, .zoom = double(side) / kObject};
+  Render(state, volume, KindAt(state.range(1)), {view}, 1, tbb::task_arena::automatic);
+}
+BENCHMARK(EmptySpace)
+    ->ArgNames({"side", "renderer"})
+    ->ArgsProduct({{128, 256, 512}, EveryRenderer()})
+    ->MeasureProcessCPUTime()
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace slabstream
