@@ -1,4 +1,4 @@
-// EventQueue: virtual time. What is due next runs next; equal times run in the order in which they were planned.
+// EventQueue: virtual time, in seconds. What is due next runs next; equal times run in the order in which they were planned.
 #pragma once
 
 #include <algorithm>
@@ -13,40 +13,46 @@
 
 namespace slabstream {
 
-// Instant: Time, or double for seconds.
-template <class Instant>
 class EventQueue {
  public:
-  using Delay = decltype(Instant() - Instant());
-
-  explicit EventQueue(Instant start) : now_(start) {}
-
-  Instant now() const { return now_; }
-  void At(Instant when, std::function<void()> what) { events_.push({std::max(when, now_), ++planned_, std::move(what)}); }
-  void After(Delay delay, std::function<void()> what) { At(now_ + delay, std::move(what)); }
+  double now() const { return now_; }
+  void At(double when, std::function<void()> what) {
+    if (unused_.empty()) {
+      unused_.push_back(std::uint32_t(actions_.size()));
+      actions_.emplace_back();
+    }
+    const std::uint32_t action = unused_.back();
+    unused_.pop_back();
+    actions_[action] = std::move(what);
+    events_.push({std::max(when, now_), ++planned_, action});
+  }
+  void After(Duration delay, std::function<void()> what) { At(now_ + std::chrono::duration<double>(delay).count(), std::move(what)); }
 
   bool empty() const { return events_.empty(); }
-  Instant next() const { return events_.top().when; }
+  double next() const { return events_.top().when; }
   void RunNext() {
-    Event event = std::move(const_cast<Event&>(events_.top()));  // it is popped at once
+    const Event event = events_.top();
     events_.pop();
     now_ = event.when;
-    event.what();
+    unused_.push_back(event.action);
+    std::exchange(actions_[event.action], nullptr)();
   }
   // Something outside of the queue happens, not before now and not after the next event.
-  void AdvanceTo(Instant now) { now_ = now; }
+  void AdvanceTo(double now) { now_ = now; }
 
  private:
-  struct Event {
-    Instant when{};
+  struct Event {  // small, since the queue moves it often
+    double when = 0;
     std::uint64_t number = 0;
-    std::function<void()> what;
+    std::uint32_t action = 0;
     friend bool operator<(const Event& a, const Event& b) { return std::tie(b.when, b.number) < std::tie(a.when, a.number); }
   };
 
-  Instant now_;
+  double now_ = 0;
   std::uint64_t planned_ = 0;
   std::priority_queue<Event> events_;
+  std::vector<std::function<void()>> actions_;
+  std::vector<std::uint32_t> unused_;  // places in actions_
 };
 
 }  // namespace slabstream

@@ -5,24 +5,20 @@
 namespace slabstream {
 namespace {
 
-// The seconds of [begin, end) that the intervals cover.
-double CoveredSeconds(std::vector<std::pair<double, double>> intervals, double begin, double end) {
-  std::sort(intervals.begin(), intervals.end());
-  double covered = 0, reached = begin;
-  for (const auto& [from, to] : intervals) {
-    const double first = std::max(from, reached), last = std::min(to, end);
-    if (last <= first) continue;
-    covered += last - first;
-    reached = last;
-  }
+// The seconds of [begin, end] in `intervals`, which lie apart.
+double CoveredSeconds(const std::vector<std::pair<double, double>>& intervals, double begin, double end) {
+  double covered = 0;
+  for (const auto& [from, to] : intervals) covered += std::max(std::min(to, end) - std::max(from, begin), 0.0);
   return covered;
 }
 
 }  // namespace
 
-void FrameAccount::Add(const LaneTask& task, double end) {
-  if (task.work == Work::kRender) render_seconds_[task.worker] += end - task.begin;
-  busy_[task.worker].emplace_back(task.begin, end);
+void FrameAccount::Add(std::uint32_t worker, Lane lane, double begin, double end) {
+  if (lane == Lane::kRender) render_seconds_[worker] += end - begin;
+  std::vector<std::pair<double, double>>& busy = busy_[worker];
+  for (; !busy.empty() && busy.back().second >= begin; busy.pop_back()) begin = std::min(begin, busy.back().first);
+  busy.emplace_back(begin, end);
 }
 
 void FrameAccount::Close(std::size_t slots, SimulatedFrame& result) const {

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "common/simulation/timeline.h"
-#include "simulator/worker_lanes.h"
 
 namespace slabstream {
 
@@ -14,14 +13,15 @@ class FrameAccount {
  public:
   explicit FrameAccount(std::size_t workers) : render_seconds_(workers), busy_(workers) {}
 
-  void Add(const LaneTask& task, double end);
+  // Work of one lane, [begin, end]. `end` does not decrease from call to call.
+  void Add(std::uint32_t worker, Lane lane, double begin, double end);
 
   // Writes imbalance and idle share; `result` says when the frame was planned and done, `slots` how many workers it was planned for.
   void Close(std::size_t slots, SimulatedFrame& result) const;
 
  private:
   std::vector<double> render_seconds_;                        // by worker
-  std::vector<std::vector<std::pair<double, double>>> busy_;  // by worker: from, to
+  std::vector<std::vector<std::pair<double, double>>> busy_;  // by worker: when any lane works; apart, in order of time
 };
 
 }  // namespace slabstream

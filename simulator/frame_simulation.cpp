@@ -1,22 +1,20 @@
 #include "simulator/frame_simulation.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstring>
 #include <limits>
-#include <optional>
+#include <random>
 #include <set>
-#include <string>
 #include <utility>
 
 #include "common/base/check.h"
+#include "common/base/overloaded.h"
 
 namespace slabstream {
 namespace {
 
 constexpr Duration kNever = std::chrono::hours(24 * 40);  // as milliseconds it fits 32 bits
 constexpr Epoch kEpoch = 1;
-constexpr PeerToken kClient = ~PeerToken{0};
+constexpr PeerToken kClient = ~std::uint32_t{0};
 constexpr char kDataset[] = "simulated";
 
 std::vector<WorkerId> WorkersOf(std::span<const FrameInput> frames) {
@@ -39,15 +37,14 @@ CoordinatorConfig MakeCoordinatorConfig() {
   return config;
 }
 
-WorkerMachine MakeWorker(std::uint32_t index) {
+WorkerConfig MakeWorkerConfig(std::uint32_t index) {
   WorkerConfig config;
   config.incarnation = index + 1;
-  config.images_endpoint = std::to_string(index);
   config.cache_bytes = 0;  // costs alone say whether voxels are fetched, whatever earlier frames had
   config.credit_bytes = ~std::uint64_t{0} >> 1U;
   config.register_interval = config.chunk_timeout = kNever;
   config.early_image_bytes = ~std::uint64_t{0} >> 1U;
-  return WorkerMachine(std::move(config));
+  return config;
 }
 
 // The plan as the machines get it: workers by index, and for each box one voxel of its own in a volume without a halo. The dataset says
@@ -70,17 +67,25 @@ FramePlan PlanForMachines(const FramePlan& plan, std::uint32_t frame, const std:
   return out;
 }
 
-// The number of filled pixels, in place of a message's pixels.
-Bytes Note(double filled) {
-  std::vector<std::byte> note(sizeof(filled));
-  std::memcpy(note.data(), &filled, sizeof(filled));
-  return Bytes(std::move(note));
+Stage StageOf(const Job& job) {
+  return std::visit(Overloaded{[](const StartRender&) { return Stage::kRender; }, [](const SendPartial&) { return Stage::kEncode; },
+                               [](const SendFrame&) { return Stage::kResolve; }, [](const auto&) { return Stage::kCombine; }},
+                    job.action);
 }
 
-double FilledOf(const Bytes& note) {
-  double filled = 0;
-  if (!note.empty()) std::memcpy(&filled, note.span().data(), sizeof(filled));
-  return filled;
+GroupKey KeyOf(const Job& job) {
+  return std::visit(Overloaded{[](const StoreChunk&) { return GroupKey{}; }, [](const SendPartial& send) { return send.message.key; },
+                               [](const SendFrame& send) {
+                                 return GroupKey{send.message.frame, send.message.attempt, send.message.group_count - 1};
+                               },
+                               [](const auto& action) { return action.key; }},
+                    job.action);
+}
+
+Rank RankOf(const Job& job) {
+  return std::visit(Overloaded{[](const StartRender& render) { return render.rank; }, [](const SendPartial& send) { return send.rank; },
+                               [](const auto&) { return Rank{0}; }},
+                    job.action);
 }
 
 }  // namespace
@@ -91,38 +96,27 @@ FrameSimulation::FrameSimulation(std::span<const FrameInput> frames, const Machi
       options_(options),
       ids_(WorkersOf(frames)),
       network_(machine.link, std::uint32_t(ids_.size()) + 1),  // the last end is the coordinator's
-      threads_(machine.wake_ups, std::uint32_t(ids_.size())),
-      lanes_(machine, std::uint32_t(ids_.size()), threads_),
-      coordinator_(MakeCoordinatorConfig()) {
-  for (Index worker = 0; worker < ids_.size(); ++worker) workers_.push_back(MakeWorker(worker));
+      service_(machine, *this) {
   timeline_.workers = std::uint32_t(ids_.size());
   timeline_.frames.resize(frames.size());
 }
 
 Timeline FrameSimulation::Run() {
-  Register();
+  service_.StartCoordinator(MakeCoordinatorConfig());
+  for (Node node = 0; node < ids_.size(); ++node) service_.AddWorker(MakeWorkerConfig(node));
+  while (service_.next() < service_.now() + std::chrono::duration<double>(kNever / 2).count()) service_.RunNext();
+  origin_ = service_.now();
+  service_.threads().AllActive(origin_);
   for (int i = 0; i < options_.in_flight; ++i) Submit();
-  while (true) {
-    const double task_time = lanes_.NextTime();
-    const double event_time = queue_.empty() ? std::numeric_limits<double>::infinity() : queue_.next();
-    if (task_time > event_time) {
-      queue_.RunNext();
-    } else if (task_time == std::numeric_limits<double>::infinity()) {
-      break;
-    } else {
-      queue_.AdvanceTo(task_time);
-      if (std::optional<LaneTask> done = lanes_.Step()) OnDone(*done);
-    }
+  while (received_ < inputs_.size()) {
+    CHECK_LT(service_.next(), std::chrono::duration<double>(kNever / 2).count())
+        << "a frame does not end: its schedule cannot be carried out";
+    service_.RunNext();
   }
-  for (const SimulatedFrame& frame : timeline_.frames) {
-    CHECK_GT(frame.received, 0) << "a frame did not end: its schedule cannot be carried out";
-    timeline_.end = std::max(timeline_.end, frame.received);
-  }
+  timeline_.end = now();
   if (timeline_.end > 0) timeline_.render_share = render_seconds_ / (timeline_.end * double(timeline_.workers));
   return std::move(timeline_);
 }
-
-Time FrameSimulation::MachineTime() const { return Time(std::chrono::seconds(1000)) + Duration(std::llround(now() * 1e9)); }
 
 // ---------------------------------------------------------------- the client
 
@@ -134,15 +128,25 @@ void FrameSimulation::Submit() {
   submit.deadline_ms = ~std::uint32_t{0};
   submit.frame.dataset = kDataset;
   submit.frame.transfer.choice = TransferFunction{};
-  queue_.At(threads_.Begin(Threads::kCoordinator, now() + machine_.link.latency_seconds), [this, submit] {
-    Tell(FromClient{kClient, submit});
-  });
+  const double arrival = service_.threads().Begin(Threads::kCoordinator, service_.now() + machine_.link.latency_seconds);
+  service_.TellCoordinator(arrival, FromClient{kClient, std::move(submit)});
+}
+
+void FrameSimulation::Perform(ToClient& action) {
+  if (const auto* failed = std::get_if<FrameFailed>(&action.message)) CHECK(false) << failed->status.message();
+  const auto* reply = std::get_if<FrameReply>(&action.message);
+  if (reply == nullptr) return;  // news of progress travels for free
+  const auto frame = std::uint32_t(reply->request - 1);
+  timeline_.frames[frame].done = now();
+  const double arrival = service_.threads().Begin(Threads::kClient, service_.coordinator_free() + machine_.client_seconds);
+  service_.queue().At(arrival + inputs_[frame].receive_seconds, [this, frame] { OnPicture(frame); });
 }
 
 void FrameSimulation::OnPicture(std::uint32_t frame) {
   SimulatedFrame& result = timeline_.frames[frame];
   result.received = now();
-  threads_.Active(Threads::kClient, now());
+  ++received_;
+  service_.threads().Active(Threads::kClient, service_.now());
   frames_.at(frame).account.Close(plan(frame).slots, result);
   frames_.erase(frame);
   Submit();
@@ -150,83 +154,32 @@ void FrameSimulation::OnPicture(std::uint32_t frame) {
 
 // ---------------------------------------------------------------- the coordinator
 
-// Before time begins, at no cost.
-void FrameSimulation::Register() {
-  for (Index worker = 0; worker < ids_.size(); ++worker) StepWorker(worker, Tick{});
-  registering_ = false;
-}
-
-void FrameSimulation::Tell(const CoordinatorEvent& event) {
-  coordinator_free_ = std::max(coordinator_free_, now()) + machine_.message_seconds;
-  StepCoordinator(event);
-  threads_.Active(Threads::kCoordinator, coordinator_free_);
-}
-
-void FrameSimulation::StepCoordinator(const CoordinatorEvent& event) {
-  const auto step = [this](const CoordinatorEvent& e) {
-    for (CoordinatorAction& action : coordinator_.Step(e, MachineTime())) {
-      std::visit([this](auto& a) { Perform(a); }, action);
-    }
-  };
-  step(event);
-  while (!coordinator_events_.empty()) {
-    const CoordinatorEvent next = std::move(coordinator_events_.front());
-    coordinator_events_.pop_front();
-    step(next);
-  }
-}
-
-double FrameSimulation::CoordinatorSends() {
-  coordinator_free_ += machine_.message_seconds;
-  return coordinator_free_ + machine_.link.latency_seconds;
-}
-
-void FrameSimulation::Perform(ToWorker& action) {
-  const auto worker = Index(action.to);
-  if (registering_) {
-    worker_events_.emplace_back(worker, MessageReceived{std::move(action.message), {}});
-    return;
-  }
-  const double arrival = CoordinatorSends();
-  const auto* assignment = std::get_if<GroupAssignment>(&action.message);
-  if (assignment != nullptr) BeginGroup(*assignment);
-  // Pings do not change any time.
-  queue_.At(assignment != nullptr ? threads_.Begin(Threads::Machine(worker), arrival) : arrival,
-            [this, worker, message = std::move(action.message)]() mutable {
-              StepWorker(worker, MessageReceived{std::move(message), {}});
-            });
-}
-
-void FrameSimulation::Perform(const ToClient& action) {
-  if (const auto* failed = std::get_if<FrameFailed>(&action.message)) CHECK(false) << failed->status.message();
-  const auto* reply = std::get_if<FrameReply>(&action.message);
-  if (reply == nullptr) return;  // news of progress travels for free
-  const auto frame = std::uint32_t(reply->request - 1);
-  timeline_.frames[frame].done = now();
-  queue_.At(threads_.Begin(Threads::kClient, coordinator_free_ + machine_.client_seconds) + inputs_[frame].receive_seconds,
-            [this, frame] { OnPicture(frame); });
-}
-
 void FrameSimulation::Perform(const LoadDataset& action) {
-  coordinator_events_.push_back(DatasetLoaded{action.name, action.dataset, std::make_shared<const VolumeSummary>()});
+  service_.TellCoordinator(service_.now(), DatasetLoaded{action.name, action.dataset, std::make_shared<const VolumeSummary>()});
 }
 
 void FrameSimulation::Perform(const PlanRequest& action) {
   const std::uint32_t frame = planned_++;  // one client's requests are served in order
   CHECK_LT(frame, inputs_.size()) << "a frame is planned twice";
-  timeline_.frames[frame].planned = coordinator_free_;
+  timeline_.frames[frame].planned = service_.coordinator_free() - origin_;
   frames_.emplace(frame, Frame{{}, FrameAccount(ids_.size())});
   auto planned = std::make_shared<PlannedFrame>(PlannedFrame{.asked = action,
                                                              .policy = ResolvePolicy(action.frame, {}).value(),
                                                              .prediction = {},
                                                              .plan = PlanForMachines(plan(frame), frame, ids_)});
-  planner_free_ = std::max(planner_free_, threads_.Begin(Threads::kPlanner, coordinator_free_)) + machine_.plan_seconds;
-  threads_.Active(Threads::kPlanner, planner_free_);
-  queue_.At(threads_.Begin(Threads::kCoordinator, planner_free_), [this, id = action.plan, planned] {
-    coordinator_free_ = std::max(coordinator_free_, now());
-    StepCoordinator(Planned{id, std::shared_ptr<const PlannedFrame>(planned)});
-    threads_.Active(Threads::kCoordinator, coordinator_free_);
-  });
+  Threads& threads = service_.threads();
+  planner_free_ = std::max(planner_free_, threads.Begin(Threads::kPlanner, service_.coordinator_free())) + machine_.plan_seconds;
+  threads.Active(Threads::kPlanner, planner_free_);
+  service_.TellCoordinator(threads.Begin(Threads::kCoordinator, planner_free_),
+                           Planned{action.plan, std::shared_ptr<const PlannedFrame>(std::move(planned))});
+}
+
+void FrameSimulation::BeforeStep(const CoordinatorEvent& event) {
+  const auto* heard = std::get_if<FromWorker>(&event);
+  const auto* done = heard == nullptr ? nullptr : std::get_if<GroupDone>(&heard->message);
+  if (done == nullptr) return;
+  timeline_.frames[FrameOf(done->key)].groups_done.push_back(now() + machine_.message_seconds);
+  frames_.at(FrameOf(done->key)).groups.erase(done->key.group);
 }
 
 // The first assignment of a group begins it.
@@ -243,172 +196,141 @@ void FrameSimulation::BeginGroup(const GroupAssignment& assignment) {
                  Group{UnionCoverage(coverage, bounds.width(), bounds.height()), std::uint32_t(schedule->steps().size())});
 }
 
-// ---------------------------------------------------------------- workers
+// ---------------------------------------------------------------- work
 
-void FrameSimulation::StepWorker(Index first, const WorkerEvent& event) {
-  const auto step = [this](Index worker, const WorkerEvent& e) {
-    for (WorkerAction& action : workers_[worker].Step(e, MachineTime())) {
-      std::visit([&](auto& a) { Perform(worker, a); }, action);
-    }
-  };
-  step(first, event);
-  while (!worker_events_.empty()) {
-    const auto [worker, next] = std::move(worker_events_.front());
-    worker_events_.pop_front();
-    step(worker, next);
+std::optional<WorkCost> FrameSimulation::Begin(Job& job) {
+  using Cost = std::optional<WorkCost>;
+  return std::visit(
+      Overloaded{[&](const StoreChunk&) { return Cost(); }, [&](const StartRender& action) { return Cost(CostOf(job.node, action)); },
+                 [&](const SendPartial& action) { return Cost(CostOf(job, action)); },
+                 [&](const auto& action) { return Cost(CostOf(action)); }},
+      job.action);
+}
+
+WorkCost FrameSimulation::CostOf(Node node, const StartRender& action) const {
+  const std::uint32_t frame = FrameOf(action.key);
+  return {inputs_[frame].boxes[action.placement.id].seconds * Slowness(frame, node), double(machine_.threads)};
+}
+
+// Depends on seed, frame and worker alone.
+double FrameSimulation::Slowness(std::uint32_t frame, Node node) const {
+  const Stragglers& stragglers = machine_.stragglers;
+  if (stragglers.probability <= 0) return 1;
+  std::seed_seq seed{std::uint32_t(stragglers.seed), std::uint32_t(stragglers.seed >> 32), frame, node};
+  std::mt19937 engine(seed);
+  return double(engine()) < stragglers.probability * 0x1p32 ? stragglers.factor : 1;
+}
+
+WorkCost FrameSimulation::CostOf(const StartCombine& action) {
+  const bool all = action.pixels.begin >= action.pixels.end;
+  const PixelRange pixels = all ? PixelRange{0, std::uint64_t(action.frame.pixel_count())} : action.pixels;
+  const CombiningCosts& costs = machine_.combining;
+  return {(action.other == 0 ? costs.combine_pixel : costs.local_pixel) * GroupOf(action.key).coverage.Of(action.ranks, pixels).filled};
+}
+
+WorkCost FrameSimulation::CostOf(const FindHidden& action) const {
+  return {machine_.combining.hidden_pixel * double(FrameBounds(*action.setup).pixel_count())};
+}
+
+WorkCost FrameSimulation::CostOf(Job& job, const SendPartial& action) {
+  const CombiningCosts& costs = machine_.combining;
+  const PixelFormat format = plan(FrameOf(action.message.key)).setup.format;
+  const ColorCoding color = format == PixelFormat::kRgba ? action.color : ColorCoding::kFloat32;  // others are never coded
+  const double color_share = double(BytesPerChannel(color)) / double(BytesPerChannel(ColorCoding::kFloat32));
+  const UnionCoverage::Amount amount = GroupOf(action.message.key).coverage.Of(action.message.interval, action.message.pixels);
+  job.pixels = amount.filled;
+  job.bytes = amount.filled * (HasDepth(format) ? costs.depth_bytes : costs.rgba_bytes * color_share) + amount.runs * costs.run_bytes;
+  // The thread that owns the sockets announces a lent image itself if that is quicker, as in workers.
+  return {costs.scan_pixel * amount.scanned + costs.encode_pixel * amount.filled, 1, costs.lent && service_.Idle(job.node, Lane::kCombine)};
+}
+
+WorkCost FrameSimulation::CostOf(const SendFrame& action) const {
+  const std::uint32_t frame = frame_of_.at(action.message.frame);
+  return {inputs_[frame].finish_seconds, double(std::max(machine_.threads, machine_.picture_threads))};
+}
+
+void FrameSimulation::OnWorked(const Job& job, const LaneTask& task) {
+  const GroupKey key = KeyOf(job);
+  const std::uint32_t frame = FrameOf(key);
+  const Stage stage = StageOf(job);
+  const double begin = task.begin - origin_;
+  timeline_.frames[frame].stage_seconds[std::size_t(stage)] += now() - begin;
+  frames_.at(frame).account.Add(task.worker, task.lane, begin, now());
+  if (options_.keep_spans) timeline_.spans.push_back({frame, key.group, task.worker, task.lane, RankOf(job), stage, begin, now()});
+  if (stage == Stage::kRender) render_seconds_ += now() - begin;
+}
+
+WorkerEvent FrameSimulation::Answer(Job& job) {
+  return std::visit(Overloaded{[](const StartRender& a) -> WorkerEvent {
+                                 return RenderDone{
+                                     .key = a.key, .rank = a.rank, .image = a.image, .status = {}, .report = {}, .slab_bytes = 1};
+                               },
+                               [](const StoreChunk& a) -> WorkerEvent {
+                                 return ChunkStored{a.slab, a.chunk.box, a.chunk.chunk, {}};
+                               },
+                               [](const StartCombine& a) -> WorkerEvent {
+                                 return CombineDone{a.key, a.image, {}, {}};
+                               },
+                               [](const FindHidden& a) -> WorkerEvent {
+                                 return HiddenFound{a.key, a.image, {}};
+                               },
+                               [](const auto&) -> WorkerEvent { return Tick{}; }},
+                    job.action);
+}
+
+// ---------------------------------------------------------------- messages
+
+Arrivals FrameSimulation::ToWorker(Node, AnyMessage& message, double sent) {
+  if (const auto* assignment = std::get_if<GroupAssignment>(&message)) BeginGroup(*assignment);
+  return Arrivals::At(sent + machine_.link.latency_seconds);
+}
+
+Arrivals FrameSimulation::ToCoordinator(Node, AnyMessage& message) {
+  if (const auto* trouble = std::get_if<WorkerTrouble>(&message)) CHECK(false) << trouble->status.message();
+  return Arrivals::At(service_.now() + machine_.link.latency_seconds);
+}
+
+Arrivals FrameSimulation::ToPeer(Node to, Job& sends) {
+  const PartialImage& image = std::get<SendPartial>(sends.action).message;
+  SimulatedMessage message{.frame = FrameOf(image.key),
+                           .group = image.key.group,
+                           .step = image.step,
+                           .from = sends.node,
+                           .to = to,
+                           .pixels = sends.pixels,
+                           .bytes = sends.bytes};
+  if (message.step == GroupOf(image.key).steps) {
+    message.kind = SimulatedMessage::Kind::kGroupImage;
+    message.step = 0;
   }
+  SimulatedFrame& frame = timeline_.frames[message.frame];
+  frame.image_bytes += message.bytes;
+  ++frame.messages;
+  return Arrivals::At(Travel(message, service_.now()));
 }
 
-void FrameSimulation::Perform(Index worker, SendControl& action) {
-  if (const auto* trouble = std::get_if<WorkerTrouble>(&action.message)) CHECK(false) << trouble->status.message();
-  if (registering_) return StepCoordinator(FromWorker{worker, std::move(action.message), {}});
-  queue_.At(threads_.Begin(Threads::kCoordinator, now() + machine_.link.latency_seconds),
-            [this, worker, message = std::move(action.message)] {
-              const auto* done = std::get_if<GroupDone>(&message);
-              const GroupKey key = done != nullptr ? done->key : GroupKey{};
-              Tell(FromWorker{worker, message, {}});
-              if (done == nullptr) return;
-              const std::uint32_t frame = frame_of_.at(key.frame);
-              timeline_.frames[frame].groups_done.push_back(now() + machine_.message_seconds);
-              frames_.at(frame).groups.erase(key.group);
-            });
-}
-
-void FrameSimulation::Perform(Index worker, SendChunkRequest& action) {
+void FrameSimulation::Perform(Node node, SendChunkRequest& action) {
   const ChunkRequest& request = action.request;
   const std::uint32_t frame = request.dataset - 1;
   const double bytes = inputs_[frame].boxes[std::size_t(request.box.begin.z)].voxel_bytes;
   Chunk chunk{.epoch = request.epoch, .dataset = request.dataset, .box = request.box, .chunk = request.chunk, .raw_bytes = 1};
-  if (bytes == 0) {  // it holds them: no time passes
-    worker_events_.emplace_back(worker, MessageReceived{chunk, {}});
-    return;
+  double arrival = service_.now();  // if it holds them
+  if (bytes > 0) {
+    timeline_.frames[frame].voxel_bytes += bytes;
+    const SimulatedMessage message{
+        .kind = SimulatedMessage::Kind::kVoxels, .frame = frame, .from = Node(ids_.size()), .to = node, .bytes = bytes};
+    arrival = service_.threads().Begin(Threads::Machine(node), Travel(message, service_.now() + machine_.link.latency_seconds));
   }
-  timeline_.frames[frame].voxel_bytes += bytes;
-  SimulatedMessage message{
-      .kind = SimulatedMessage::Kind::kVoxels, .frame = frame, .from = Index(ids_.size()), .to = worker, .bytes = bytes};
-  queue_.At(Travel(message, now() + machine_.link.latency_seconds), [this, worker, chunk] {
-    StepWorker(worker, MessageReceived{chunk, {}});
-  });
+  service_.queue().At(arrival, [this, node, chunk] { service_.StepWorker(node, MessageReceived{chunk, {}}); });
 }
 
-void FrameSimulation::Perform(Index worker, StoreChunk& action) {
-  worker_events_.emplace_back(worker, ChunkStored{action.slab, action.chunk.box, action.chunk.chunk, {}});
-}
-
-LaneTask FrameSimulation::MakeTask(Work work, Index worker, const GroupKey& key) const {
-  LaneTask task;
-  task.work = work;
-  task.frame = frame_of_.at(key.frame);
-  task.group = key.group;
-  task.worker = worker;
-  return task;
-}
-
-void FrameSimulation::Perform(Index worker, StartRender& action) {
-  LaneTask task = MakeTask(Work::kRender, worker, action.key);
-  task.rank = action.rank;
-  task.seconds = inputs_[task.frame].boxes[action.placement.id].seconds;
-  task.threads = double(machine_.threads);
-  task.then = [this, worker, key = action.key, rank = action.rank, image = action.image] {
-    StepWorker(worker, RenderDone{.key = key, .rank = rank, .image = image, .status = {}, .report = {}, .slab_bytes = 1});
-  };
-  AddTask(std::move(task));
-}
-
-void FrameSimulation::Perform(Index worker, StartCombine& action) {
-  LaneTask task = MakeTask(Work::kCombine, worker, action.key);
-  if (action.other == 0) {
-    task.seconds = machine_.combining.combine_pixel * FilledOf(action.incoming.payload);
-  } else {
-    const PixelRange pixels =
-        action.pixels.begin < action.pixels.end ? action.pixels : PixelRange{0, std::uint64_t(action.frame.pixel_count())};
-    task.seconds = machine_.combining.local_pixel * GroupOf(action.key).coverage.Of(action.ranks, pixels).filled;
-  }
-  task.then = [this, worker, key = action.key, image = action.image] { StepWorker(worker, CombineDone{key, image, {}, {}}); };
-  AddTask(std::move(task));
-}
-
-void FrameSimulation::Perform(Index worker, FindHidden& action) {
-  LaneTask task = MakeTask(Work::kCombine, worker, action.key);
-  task.seconds = machine_.combining.hidden_pixel * double(FrameBounds(*action.setup).pixel_count());
-  task.then = [this, worker, key = action.key, image = action.image] { StepWorker(worker, HiddenFound{key, image, {}}); };
-  AddTask(std::move(task));
-}
-
-void FrameSimulation::Perform(Index worker, SendPartial& action) {
-  LaneTask task = MakeTask(Work::kEncode, worker, action.message.key);
-  task.rank = action.rank;
-  const Group& group = GroupOf(action.message.key);
-  const UnionCoverage::Amount amount = group.coverage.Of(action.message.interval, action.message.pixels);
-  const CombiningCosts& costs = machine_.combining;
-  task.seconds = costs.scan_pixel * amount.scanned + costs.encode_pixel * amount.filled;
-  // The thread that owns the sockets announces a lent image itself if that is quicker, as in workers.
-  task.direct = costs.lent && lanes_.Idle(worker, Lane::kCombine);
-  if (unused_parcels_.empty()) unused_parcels_.push_back(&parcels_.emplace_back());
-  Parcel* parcel = unused_parcels_.back();
-  unused_parcels_.pop_back();
-  SimulatedMessage message{
-      .frame = task.frame, .group = task.group, .step = action.message.step, .from = worker, .to = action.to.worker - 1};
-  if (message.step == group.steps) {
-    message.kind = SimulatedMessage::Kind::kGroupImage;
-    message.step = 0;
-  }
-  *parcel = {message, amount, action.color, std::move(action.message)};
-  task.then = [this, parcel] { Transfer(parcel); };
-  AddTask(std::move(task));
-}
-
-void FrameSimulation::Perform(Index worker, SendFrame& action) {
-  const std::uint32_t frame = frame_of_.at(action.message.frame);
-  LaneTask task = MakeTask(Work::kFinish, worker, {action.message.frame, 0, action.message.group_count - 1});
-  task.seconds = inputs_[frame].finish_seconds;
-  task.threads = double(std::max(machine_.threads, machine_.picture_threads));
-  task.then = [this, worker, message = std::move(action.message)] {
-    queue_.At(threads_.Begin(Threads::kCoordinator, now() + machine_.link.latency_seconds), [this, worker, message] {
-      Tell(FromWorker{worker, message, {}});
-    });
-  };
-  AddTask(std::move(task));
-}
-
-void FrameSimulation::OnDone(LaneTask& task) {
-  SimulatedFrame& result = timeline_.frames[task.frame];
-  const Stage stage = StageOf(task.work);
-  result.stage_seconds[std::size_t(stage)] += now() - task.begin;
-  frames_.at(task.frame).account.Add(task, now());
-  if (options_.keep_spans)
-    timeline_.spans.push_back({task.frame, task.group, task.worker, LaneOf(task.work), task.rank, stage, task.begin, now()});
-  if (task.work == Work::kRender) render_seconds_ += now() - task.begin;
-  if (task.direct) return task.then();  // the thread that owns the sockets did it itself
-  queue_.At(threads_.Begin(Threads::Machine(task.worker), now()), std::move(task.then));
-}
-
-// ---------------------------------------------------------------- messages with pixels or voxels
-
-void FrameSimulation::Transfer(Parcel* parcel) {
-  const CombiningCosts& costs = machine_.combining;
-  SimulatedMessage& message = parcel->message;
-  const UnionCoverage::Amount& amount = parcel->amount;
-  const PixelFormat format = plan(message.frame).setup.format;
-  const ColorCoding color = format == PixelFormat::kRgba ? parcel->color : ColorCoding::kFloat32;  // others are never coded
-  const double color_share = double(BytesPerChannel(color)) / double(BytesPerChannel(ColorCoding::kFloat32));
-  message.pixels = amount.filled;
-  message.bytes = amount.filled * (HasDepth(format) ? costs.depth_bytes : costs.rgba_bytes * color_share) + amount.runs * costs.run_bytes;
-  timeline_.frames[message.frame].image_bytes += message.bytes;
-  ++timeline_.frames[message.frame].messages;
-  queue_.At(Travel(message, now()), [this, parcel] {
-    unused_parcels_.push_back(parcel);
-    StepWorker(parcel->message.to, MessageReceived{std::move(parcel->image), Note(parcel->amount.filled)});
-  });
-}
-
-double FrameSimulation::Travel(SimulatedMessage& message, double sent) {
+double FrameSimulation::Travel(SimulatedMessage message, double sent) {
   const Network::Passage passage = network_.Send(message.from, message.to, message.bytes, sent);
-  message.ready = sent;
-  message.begin = passage.begin;
-  message.end = passage.end;
+  message.ready = sent - origin_;
+  message.begin = passage.begin - origin_;
+  message.end = passage.end - origin_;
   if (options_.keep_spans) timeline_.messages.push_back(message);
-  return threads_.Begin(Threads::Machine(message.to), passage.end);
+  return passage.end;
 }
 
 }  // namespace slabstream

@@ -19,8 +19,8 @@ class Threads {
   static Id Machine(std::uint32_t worker) { return 3 + 4 * Id{worker}; }
   static Id Of(std::uint32_t worker, Lane lane) { return Machine(worker) + 1 + Id(lane); }
 
-  // All have been at work until time 0.
-  Threads(const WakeUps& costs, std::uint32_t workers) : costs_(costs), active_until_(Machine(workers)) {}
+  explicit Threads(const WakeUps& costs) : costs_(costs), active_until_(Machine(0)) {}
+  void AddWorker() { active_until_.resize(active_until_.size() + 4); }
 
   // When the thread begins with what it is handed at `now`; it is at work then.
   double Begin(Id thread, double now) {
@@ -30,6 +30,9 @@ class Threads {
   }
   // It is at work until then.
   void Active(Id thread, double until) { active_until_[thread] = until > active_until_[thread] ? until : active_until_[thread]; }
+  void AllActive(double until) {
+    for (Id thread = 0; thread < active_until_.size(); ++thread) Active(thread, until);
+  }
 
  private:
   const WakeUps costs_;

@@ -9,10 +9,8 @@
 #include <functional>
 #include <optional>
 #include <queue>
-#include <unordered_map>
 #include <vector>
 
-#include "common/combining/schedule.h"
 #include "common/simulation/machine_model.h"
 #include "common/simulation/processors.h"
 #include "common/simulation/timeline.h"
@@ -20,30 +18,33 @@
 
 namespace slabstream {
 
-enum class Work : std::uint8_t { kRender, kEncode, kCombine, kFinish };
-Lane LaneOf(Work work);
-Stage StageOf(Work work);  // kRender, kEncode, kCombine or kResolve
+using Node = std::uint32_t;  // a worker process of a simulation: 0, 1, ... in the order in which they began
+
+struct WorkCost {
+  double seconds = 0;   // of one thread of a worker of speed 1
+  double threads = 1;   // that share the work
+  bool direct = false;  // the thread that owns the sockets does it itself: nothing is handed over
+};
 
 struct LaneTask {
-  Work work = Work::kRender;
-  std::uint32_t frame = 0, group = 0;
-  std::uint32_t worker = 0;    // the worker that does it
-  Rank rank = 0;               // the rank that it is done for
-  double seconds = 0;          // of one thread of a worker of speed 1
-  double threads = 1;          // threads that do it together
-  bool direct = false;         // done by the thread that orders it: nothing is handed over
-  double begin = 0;            // once it has begun
-  std::function<void()> then;  // called when the thread that ordered it knows that it is done
+  Lane lane = Lane::kRender;
+  Node worker = 0;
+  std::uint32_t job = 0;  // any number; no two tasks in lanes have the same
+  WorkCost cost;
+  double begin = 0;  // once it has begun
 };
 
 class WorkerLanes {
  public:
   // `machine` and `threads` outlive the object.
-  WorkerLanes(const MachineModel& machine, std::uint32_t workers, Threads& threads);
+  WorkerLanes(const MachineModel& machine, Threads& threads);
+  void AddWorker() { workers_.emplace_back(); }
 
   // Queues the task, or hands it over to its lane. `now` may not go back from call to call.
-  void Add(LaneTask task, double now);
-  bool Idle(std::uint32_t worker, Lane lane) const;  // and nothing waits
+  void Add(const LaneTask& task, double now);
+  bool Idle(Node worker, Lane lane) const;  // and nothing waits
+  // What runs in the lane, if anything does, ends now.
+  void EndNow(Node worker, Lane lane, double now);
 
   // When a task begins or ends next if none is added before: infinity if none is under way.
   double NextTime();
@@ -52,7 +53,8 @@ class WorkerLanes {
 
  private:
   struct LaneState {
-    bool taken = false;  // by a task that was handed over and has not ended
+    bool taken = false;                    // by a task that was handed over and has not ended
+    std::optional<std::uint32_t> running;  // its job
     std::deque<LaneTask> waiting;
   };
   using Worker = std::array<LaneState, 3>;  // by Lane
@@ -64,10 +66,11 @@ class WorkerLanes {
     friend bool operator>(const Start& a, const Start& b) { return a.time != b.time ? a.time > b.time : a.order > b.order; }
   };
 
-  void WakeUp(LaneTask task, double now);
+  LaneState& StateOf(Node worker, Lane lane) { return workers_[worker][std::size_t(lane)]; }
+  std::uint32_t HostOf(Node worker) const;
+  void WakeUp(const LaneTask& task, double now);
   void Begin(LaneTask task, double now);
-  double SpeedOf(std::uint32_t worker) const;
-  double Slowness(std::uint32_t frame, std::uint32_t worker) const;
+  double SpeedOf(Node worker) const;
 
   const MachineModel& machine_;
   Threads& threads_;
@@ -75,8 +78,7 @@ class WorkerLanes {
   std::priority_queue<Start, std::vector<Start>, std::greater<>> starts_;  // of tasks that were handed over
   std::uint64_t wake_ups_ = 0;
   std::vector<Worker> workers_;
-  std::unordered_map<std::uint64_t, LaneTask> running_;
-  std::uint64_t tasks_started_ = 0;
+  std::vector<LaneTask> running_;  // by job
 };
 
 }  // namespace slabstream

@@ -174,9 +174,11 @@ void GroupRun::Receive(const Runner::Taken& taken, WorkerActions& actions) {
 }
 
 void GroupRun::Merge(Rank rank, ImagePiece piece, WorkerActions& actions) {
-  const std::vector<Held> held = runner_.held(rank).Within(piece.pixels);
   // The usual case: the piece goes straight into the only image.
-  if (piece.image == 0 && held.size() == 1 && held[0].pixels == piece.pixels) return Combine(rank, held[0], piece, actions);
+  if (const Held* only = runner_.held(rank).Find(piece.pixels); only != nullptr && piece.image == 0) {
+    return Combine(rank, Held(*only), piece, actions);
+  }
+  const std::vector<Held> held = runner_.held(rank).Within(piece.pixels);
   if (held.empty() && ComesHome(rank, piece)) return TakeHome(rank, std::move(piece), actions);
   const bool incoming = piece.image == 0;
   if (incoming) {
@@ -228,8 +230,7 @@ void GroupRun::Combine(Rank rank, const Held& held, const ImagePiece& piece, Wor
          .pixels = held.pixels == frame_ ? PixelRange{} : held.pixels,
          .ranks = piece.ranks},
         rank, actions);
-  runner_.held(rank).Take(held.pixels);
-  runner_.held(rank).Put({held.pixels, {*both, held.value.image}});
+  runner_.held(rank).Replace({held.pixels, {*both, held.value.image}});
 }
 
 void GroupRun::Start(StartCombine combine, Rank rank, WorkerActions& actions) {

@@ -43,6 +43,12 @@ class Fragments {
     return parts;
   }
 
+  // The fragment of exactly these pixels; null: there is none.
+  const Fragment<Value>* Find(const PixelRange& range) const {
+    const auto place = FirstAfter(range.begin);
+    return place != list_.end() && place->pixels == range ? &*place : nullptr;
+  }
+
   // Removes what lies in `range` and returns it. Fragments at the ends of the range are cut.
   List Take(const PixelRange& range) {
     List taken = Within(range);
@@ -72,6 +78,16 @@ class Fragments {
     } else {
       list_.insert(place, fragment);
     }
+  }
+
+  // Puts `fragment` in place of what lies in its pixels.
+  void Replace(const Fragment<Value>& fragment) {
+    if (const Fragment<Value>* held = Find(fragment.pixels)) {
+      list_.erase(list_.begin() + (held - list_.data()));
+    } else {
+      Take(fragment.pixels);
+    }
+    Put(fragment);
   }
 
   // Adds a fragment. Where nothing is held, it is stored as it is; elsewhere merge(held, value) returns the combined value. False if merge

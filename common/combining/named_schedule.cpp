@@ -56,10 +56,15 @@ IndexedSchedule::IndexedSchedule(Schedule schedule) : schedule_(std::move(schedu
   }
   for (Rank rank = 0; rank < schedule_.ranks; ++rank) first_of_rank_[rank + 1] += first_of_rank_[rank];
   by_rank_.resize(first_of_rank_.back());
-  std::vector<std::uint32_t> next(first_of_rank_.begin(), first_of_rank_.end() - 1);
+  std::vector<std::uint32_t> count(schedule_.ranks);
+  const auto add = [&](Rank rank, std::uint32_t step) {
+    by_rank_[first_of_rank_[rank] + count[rank]] = step;
+    return count[rank]++;
+  };
+  places_.reserve(schedule_.steps.size());
   for (std::uint32_t i = 0; i < schedule_.steps.size(); ++i) {
-    by_rank_[next[schedule_.steps[i].from]++] = i;
-    by_rank_[next[schedule_.steps[i].to]++] = i;
+    const Step& step = schedule_.steps[i];
+    places_.push_back({.sender = add(step.from, i), .receiver = add(step.to, i)});
   }
 }
 

@@ -35,10 +35,17 @@ class IndexedSchedule {
   std::span<const std::uint32_t> StepsOf(Rank rank) const {
     return std::span(by_rank_).subspan(first_of_rank_[rank], first_of_rank_[rank + 1] - first_of_rank_[rank]);
   }
+  // Where the step stands in StepsOf its sender and its receiver.
+  std::uint32_t PlaceAtSender(std::uint32_t step) const { return places_[step].sender; }
+  std::uint32_t PlaceAtReceiver(std::uint32_t step) const { return places_[step].receiver; }
 
  private:
+  struct Places {
+    std::uint32_t sender = 0, receiver = 0;
+  };
   Schedule schedule_;
   std::vector<std::uint32_t> by_rank_, first_of_rank_;
+  std::vector<Places> places_;  // by step
 };
 
 using SharedSchedule = std::shared_ptr<const IndexedSchedule>;

@@ -7,10 +7,10 @@
 
 #include <cstdint>
 #include <optional>
-#include <set>
 #include <span>
 #include <vector>
 
+#include "common/base/index_set.h"
 #include "common/combining/named_schedule.h"
 
 namespace slabstream {
@@ -64,12 +64,13 @@ class StepOrder {
     std::uint32_t open_steps = 0;
     std::uint32_t combining = 0;
     bool rendered = false;
-    std::set<std::uint32_t> possible;  // turns that wait only for their ranks to be free
     bool free() const { return rendered && combining == 0; }
   };
 
   std::optional<std::uint32_t> FindRank(Rank rank) const;
-  std::optional<std::uint32_t> FindTurn(Rank rank, std::uint32_t step) const;
+  // The part of the step's sender or receiver in it, if that rank is here.
+  std::optional<std::uint32_t> FindSending(std::uint32_t step) const;
+  std::optional<std::uint32_t> FindReceiving(std::uint32_t step) const;
   RankState& At(Rank rank);
   const RankState& At(Rank rank) const;
   const Step& StepOf(const Turn& turn) const { return schedule_->steps()[turn.step]; }
@@ -84,7 +85,8 @@ class StepOrder {
   std::vector<Turn> turns_;       // rank by rank, each in order of steps
   // The turns that wait for turn i: [first_waiter_[i], first_waiter_[i + 1]) of waiters_.
   std::vector<std::uint32_t> first_waiter_, waiters_;
-  std::set<std::uint32_t> changed_;  // ranks at which a turn may have become possible
+  IndexSet possible_;  // turns that wait only for their ranks to be free
+  IndexSet changed_;   // ranks at which a turn may have become possible
 };
 
 }  // namespace slabstream

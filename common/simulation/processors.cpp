@@ -7,9 +7,6 @@
 
 namespace slabstream {
 
-Processors::Processors(std::uint32_t hosts, double cores, double memory_slowdown)
-    : cores_(cores), memory_slowdown_(memory_slowdown), hosts_(hosts) {}
-
 void Processors::AdvanceTo(Host& host, double now) const {
   for (Task& task : host.tasks) task.left -= (now - host.since) * host.speed;
   host.since = now;
@@ -30,8 +27,15 @@ void Processors::Predict(std::uint32_t number) {
 }
 
 void Processors::Start(std::uint32_t host, std::uint64_t task, double seconds, double threads, double now) {
+  if (hosts_.size() <= host) hosts_.resize(host + 1);
   AdvanceTo(hosts_[host], now);
   hosts_[host].tasks.push_back({task, seconds, threads});
+  Predict(host);
+}
+
+void Processors::EndNow(std::uint32_t host, std::uint64_t task, double now) {
+  AdvanceTo(hosts_[host], now);
+  std::ranges::find(hosts_[host].tasks, task, &Task::name)->left = 0;
   Predict(host);
 }
 

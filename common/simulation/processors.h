@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <queue>
 #include <vector>
 
@@ -11,11 +12,13 @@ namespace slabstream {
 class Processors {
  public:
   // `cores` of each host, > 0; `memory_slowdown` in [0, 1).
-  Processors(std::uint32_t hosts, double cores, double memory_slowdown);
+  Processors(double cores, double memory_slowdown) : cores_(cores), memory_slowdown_(memory_slowdown) {}
 
   // Starts a task that takes `seconds` if nothing slows it down, and keeps `threads` busy. `task` is any name for it. `now` must not
   // decrease from call to call.
   void Start(std::uint32_t host, std::uint64_t task, double seconds, double threads, double now);
+  // A task that runs there is done now: Finish comes next to it, but for others that end now.
+  void EndNow(std::uint32_t host, std::uint64_t task, double now);
 
   struct Completion {
     double time = 0;

@@ -26,8 +26,18 @@ class UnionCoverage {
   Amount Of(RankInterval ranks, PixelRange pixels) const;
 
  private:
+  struct TileRow {
+    double filled = 0, runs = 0;           // of each row of pixels
+    std::int32_t first_tile = 0, end = 0;  // that are not empty, and what lies between them
+  };
+  // share(x): of tile x of the row that is filled.
+  template <class Share>
+  TileRow Sum(Share&& share) const;
+  TileRow RowOf(RankInterval ranks, std::int32_t y) const;
+
   const std::int32_t width_, height_, tiles_x_, tiles_y_;
   std::vector<double> log_empty_;  // [rank][tile]: of ranks [0, rank), the sum of log(1 - share)
+  std::vector<TileRow> single_;    // [rank][row of tiles]: of one rank. Most questions are about these
 };
 
 }  // namespace slabstream

@@ -15,7 +15,7 @@ constexpr double kAwake = 21e-6, kAsleep = 83e-6;
 
 // Frames of one worker as the simulation has them on a machine with these wake-ups, one after the other.
 std::vector<FrameInstants> SimulatedInstants(double render, int count) {
-  MachineModel machine = FreeMachine();
+  MachineModel machine = WithoutDelays();
   machine.wake_ups = {.awake = kAwake, .asleep = kAsleep};
   MadeFrame frame(1, 1, 16, 1, render, "fan-in");
   frame.finish_seconds = 10e-6;

@@ -20,7 +20,7 @@ std::map<std::uint64_t, double> RunAll(Processors& processors) {
 }
 
 TEST(Processors, TasksWithACoreOfTheirOwnDoNotMind) {
-  Processors processors(2, 2, 0);
+  Processors processors(2, 0);
   processors.Start(0, 1, 3, 1, 0);
   processors.Start(0, 2, 1, 1, 1);
   processors.Start(1, 3, 5, 2, 1);
@@ -28,7 +28,7 @@ TEST(Processors, TasksWithACoreOfTheirOwnDoNotMind) {
 }
 
 TEST(Processors, TasksShareTheCoresThatThereAre) {
-  Processors processors(1, 1, 0);
+  Processors processors(1, 0);
   processors.Start(0, 1, 2, 1, 0);
   processors.Start(0, 2, 1, 1, 1);  // from now on each at half speed: both have 1 s left
   const auto ends = RunAll(processors);
@@ -37,12 +37,20 @@ TEST(Processors, TasksShareTheCoresThatThereAre) {
 }
 
 TEST(Processors, BusyNeighboursSlowDown) {
-  Processors processors(1, 4, 0.25);
+  Processors processors(4, 0.25);
   processors.Start(0, 1, 1, 1, 0);
   processors.Start(0, 2, 4, 1, 0);
   const auto ends = RunAll(processors);
   EXPECT_DOUBLE_EQ(ends.at(1), 1.25);
   EXPECT_DOUBLE_EQ(ends.at(2), 1.25 + 3);
+}
+
+TEST(Processors, ATaskThatIsEndedFreesItsCore) {
+  Processors processors(1, 0);
+  processors.Start(0, 1, 4, 1, 0);
+  processors.Start(0, 2, 2, 1, 0);  // each at half speed
+  processors.EndNow(0, 1, 1);
+  EXPECT_EQ(RunAll(processors), (std::map<std::uint64_t, double>{{1, 1}, {2, 2.5}}));
 }
 
 // Whatever is started when: with one thread a task, no core is idle while work waits, and none does more than a second's work a second.
@@ -51,7 +59,7 @@ TEST(Processors, WorkIsConserved) {
   SCOPED_TRACE(random.trace());
   for (int run = 0; run < 20; ++run) {
     const int cores = random.Integer(1, 4);
-    Processors processors(1, cores, 0);
+    Processors processors(cores, 0);
     double work = 0, end = 0;
     for (std::uint64_t task = 0; task < 20; ++task) {
       const double seconds = random.Real(0, 2);

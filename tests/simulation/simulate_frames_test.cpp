@@ -25,7 +25,7 @@ constexpr double kRelative = 1e-5;  // a full tile counts as full but for e^-16
 
 // Of a machine on which bringing a whole image over a wire takes `transfer` seconds and combining it `combine`.
 MachineModel SimpleMachine(Contention contention, double transfer, double combine) {
-  MachineModel machine = FreeMachine();
+  MachineModel machine = WithoutDelays();
   machine.link = {contention, 0, 24.0 * kSide * kSide / transfer};
   machine.combining.combine_pixel = combine / (kSide * kSide);
   return machine;
@@ -37,7 +37,7 @@ double Latency(const std::string& combining, std::uint32_t workers, double rende
 }
 
 TEST(SimulateFrames, OneWorkerTakesTheSumOfWhatThereIsToDo) {
-  MachineModel machine = FreeMachine();
+  MachineModel machine = WithoutDelays();
   machine.link.latency_seconds = 0.01;
   machine.plan_seconds = 0.1;
   machine.message_seconds = 0.001;
@@ -54,7 +54,7 @@ TEST(SimulateFrames, OneWorkerTakesTheSumOfWhatThereIsToDo) {
 
 // From thread to thread: client, coordinator, planner, coordinator, worker, render lane, worker, finish lane, worker, coordinator, client.
 TEST(SimulateFrames, EveryWakeUpTakesItsTime) {
-  MachineModel machine = FreeMachine();
+  MachineModel machine = WithoutDelays();
   machine.wake_ups = {.awake = 0.01, .asleep = 0.07, .doze = 0};
   MadeFrame frame(1, 1, kSide, 1, 2, "fan-in");
   frame.finish_seconds = 0.5;
@@ -70,7 +70,7 @@ TEST(SimulateFrames, EveryWakeUpTakesItsTime) {
 // An image of another worker comes in addition: told of by its worker, at the other one, at its combining lane and back. One that travels
 // is encoded by a lane of its own first.
 TEST(SimulateFrames, WakeUpsOfAnImageDependOnHowItTravels) {
-  MachineModel machine = FreeMachine();
+  MachineModel machine = WithoutDelays();
   machine.wake_ups = {.awake = 0.01, .asleep = 0.01};
   const MadeFrame one(1, 1, kSide, 1, 2, "fan-in"), two(2, 1, kSide, 1, 2, "fan-in");
   const double alone = Simulate({one.input()}, machine).frames[0].latency();
@@ -80,7 +80,7 @@ TEST(SimulateFrames, WakeUpsOfAnImageDependOnHowItTravels) {
 }
 
 TEST(SimulateFrames, ARenderingIsOrderedWhenTheLastOneIsKnown) {
-  MachineModel machine = FreeMachine();
+  MachineModel machine = WithoutDelays();
   machine.wake_ups = {.awake = 0.01, .asleep = 0.01};
   const MadeFrame frame(1, 2, kSide, 1, 2, "fan-in");
   const Timeline timeline = Simulate({frame.input()}, machine);
@@ -94,7 +94,7 @@ TEST(SimulateFrames, ColoursInFewerBitsAreFewerBytes) {
     for (const ColorCoding color : {ColorCoding::kFloat32, ColorCoding::kHalf, ColorCoding::kFixed16}) {
       MadeFrame frame(5, 2, kSide, 0.5, 1, "fan-in", renderer);
       for (GroupPlan& group : frame.plan().groups) group.color = color;
-      bytes[color] = Simulate({frame.input()}, FreeMachine()).frames[0].image_bytes;
+      bytes[color] = Simulate({frame.input()}, WithoutDelays()).frames[0].image_bytes;
     }
     const double share = renderer->format() == PixelFormat::kRgba ? 0.5 : 1;  // others are never coded
     EXPECT_GT(bytes[ColorCoding::kFloat32], 0);
@@ -150,7 +150,7 @@ TEST(SimulateFrames, DirectSendDividesTheWork) {
 TEST(SimulateFrames, PerfectBalanceWithoutCommunicationIsPerfect) {
   for (const std::uint32_t p : {1U, 3U, 30U}) {
     const MadeFrame frame(p, 4, kSide, 0.5, 1, "fan-in");
-    const Timeline timeline = Simulate({frame.input(), frame.input(), frame.input()}, FreeMachine(), 2);
+    const Timeline timeline = Simulate({frame.input(), frame.input(), frame.input()}, WithoutDelays(), 2);
     EXPECT_NEAR(timeline.render_share, 1, 1e-9);
     EXPECT_NEAR(timeline.end, 12, 1e-9);
     for (const SimulatedFrame& result : timeline.frames) EXPECT_NEAR(result.imbalance, 1, 1e-12);
@@ -171,13 +171,13 @@ TEST(SimulateFrames, GroupsHideTheirCombining) {
 TEST(SimulateFrames, ImbalanceAndIdleShareAreThoseOfTheReports) {
   MadeFrame frame(4, 1, kSide, 0.5, 1, "fan-in");
   frame.costs()[2].seconds = 3;
-  const SimulatedFrame result = Simulate({frame.input()}, FreeMachine()).frames[0];
+  const SimulatedFrame result = Simulate({frame.input()}, WithoutDelays()).frames[0];
   EXPECT_NEAR(result.imbalance, 3 / 1.5, 1e-9);
   EXPECT_NEAR(result.idle_share, 1 - 6.0 / 12, 1e-9);
 }
 
 TEST(SimulateFrames, SpeedsAndThreadsScaleRendering) {
-  MachineModel machine = FreeMachine();
+  MachineModel machine = WithoutDelays();
   machine.speeds = {2};
   machine.threads = 4;
   machine.serial_share = 0.1;
@@ -186,7 +186,7 @@ TEST(SimulateFrames, SpeedsAndThreadsScaleRendering) {
 }
 
 TEST(SimulateFrames, WorkersOfOneHostShareItsCores) {
-  MachineModel machine = FreeMachine();
+  MachineModel machine = WithoutDelays();
   machine.workers_a_host = 4;
   machine.cores_a_host = 2;
   const MadeFrame frame(4, 1, kSide, 0.5, 1, "fan-in");
@@ -196,7 +196,7 @@ TEST(SimulateFrames, WorkersOfOneHostShareItsCores) {
 }
 
 TEST(SimulateFrames, VoxelsComeBeforeRendering) {
-  MachineModel machine = FreeMachine();
+  MachineModel machine = WithoutDelays();
   machine.link = {Contention::kSwitched, 0, 100};
   MadeFrame frame(2, 1, kSide, 0, 1, "fan-in");
   for (RenderCost& cost : frame.costs()) cost.voxel_bytes = 500;
@@ -206,7 +206,7 @@ TEST(SimulateFrames, VoxelsComeBeforeRendering) {
 }
 
 TEST(SimulateFrames, StragglersDependOnTheSeedAlone) {
-  MachineModel machine = FreeMachine();
+  MachineModel machine = WithoutDelays();
   machine.stragglers = {0.2, 3, 1};
   const MadeFrame frame(50, 1, kSide, 0.5, 1, "fan-in");
   const std::vector<FrameInput> frames(20, frame.input());
@@ -374,14 +374,14 @@ TEST(SimulateFrames, PicturesAreMadeBesideEachOtherIfWorkersTakeTurns) {
       inputs->push_back(frames.back()->input());
     }
   }
-  const double turns = Simulate(taking_turns, FreeMachine(), 16).end, one = Simulate(one_displays, FreeMachine(), 16).end;
+  const double turns = Simulate(taking_turns, WithoutDelays(), 16).end, one = Simulate(one_displays, WithoutDelays(), 16).end;
   EXPECT_NEAR(turns, 40 + 4, 1e-9) << "rendering and the last picture";
   EXPECT_NEAR(one, 1 + 40 * 4, 1e-9) << "picture after picture";
 }
 
 // A worker of one core renders, combines and makes pictures one after the other, whatever number of threads it has.
 TEST(SimulateFrames, AThreadIsNoCore) {
-  MachineModel machine = FreeMachine();
+  MachineModel machine = WithoutDelays();
   const MadeFrame frame(1, 1, kSide, 0.5, 1, "fan-in");
   FrameInput input = frame.input();
   input.finish_seconds = 0.5;
@@ -393,7 +393,7 @@ TEST(SimulateFrames, AThreadIsNoCore) {
 }
 
 TEST(SimulateFrames, WorkersOfOneProcessMakeAPictureTogether) {
-  MachineModel machine = FreeMachine();
+  MachineModel machine = WithoutDelays();
   const MadeFrame frame(2, 1, kSide, 0.5, 1, "fan-in");
   FrameInput input = frame.input();
   input.finish_seconds = 1;
@@ -405,7 +405,7 @@ TEST(SimulateFrames, WorkersOfOneProcessMakeAPictureTogether) {
 }
 
 TEST(SimulateFrames, FewerCoresNeverHelpAlone) {
-  MachineModel machine = FreeMachine();
+  MachineModel machine = WithoutDelays();
   machine.workers_a_host = 8;
   const MadeFrame frame(8, 2, kSide, 0.5, 1, "fan-in");
   double last = 0;
@@ -420,7 +420,7 @@ TEST(SimulateFrames, AThousandWorkersTakeEachStepOfTheScheduleOnce) {
   constexpr std::uint32_t kWorkers = 1024;
   for (const char* scheme : {"fan-in", "radix-k"}) {
     const MadeFrame frame(kWorkers, 1, kSide, 0.5, 1, scheme);
-    const Timeline timeline = SimulateFrames(std::vector{frame.input()}, FreeMachine(), {.keep_spans = false}).value();
+    const Timeline timeline = SimulateFrames(std::vector{frame.input()}, WithoutDelays(), {.keep_spans = false}).value();
     const PixelRange pixels = {0, std::uint64_t(kSide) * kSide};
     EXPECT_EQ(timeline.frames[0].messages, DeriveSchedule({scheme, kWorkers, 0}, pixels).value()->steps().size()) << scheme;
     EXPECT_NEAR(timeline.frames[0].latency(), 1, 1e-9) << scheme;

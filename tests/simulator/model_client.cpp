@@ -14,7 +14,7 @@ constexpr int kSubmissions = 4;
 
 void ModelClient::Submit(SubmitFrame submit) {
   if (vanished_) return;
-  if (open_.empty()) last_pong_ = queue_.now();
+  if (open_.empty()) last_pong_ = service_.time();
   open_[submit.request] = {submit, 0, 1};
   send_(std::move(submit));
   if (!pinging_) Ping();
@@ -29,7 +29,7 @@ void ModelClient::Cancel(RequestId request) {
 void ModelClient::Ping() {
   pinging_ = !idle();
   if (!pinging_) return;
-  if (queue_.now() >= last_pong_ + kPatience) {
+  if (service_.time() >= last_pong_ + kPatience) {
     while (!open_.empty()) End(open_.begin()->first, {Status::Unavailable("the service does not answer"), {}, true});
     pinging_ = false;
     return;
@@ -38,7 +38,7 @@ void ModelClient::Ping() {
   for (const auto& [request, open] : open_) ping.open.push_back(request);
   asked_[ping.nonce] = ping.open;
   send_(std::move(ping));
-  queue_.After(kPingInterval, [this] { Ping(); });
+  service_.queue().After(kPingInterval, [this] { Ping(); });
 }
 
 void ModelClient::Deliver(const AnyMessage& message) {
@@ -53,7 +53,7 @@ void ModelClient::Deliver(const AnyMessage& message) {
   } else if (const auto* pong = std::get_if<ClientPong>(&message)) {
     const auto asked = asked_.find(pong->nonce);
     if (asked == asked_.end()) return;
-    last_pong_ = queue_.now();
+    last_pong_ = service_.time();
     for (const RequestId request : asked->second) {
       const auto open = open_.find(request);
       if (open == open_.end()) continue;

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "common/wire/any_message.h"
-#include "simulator/event_queue.h"
+#include "simulator/simulated_service.h"
 
 namespace slabstream {
 
@@ -16,7 +16,7 @@ class ModelClient {
  public:
   using Send = std::function<void(AnyMessage)>;
 
-  ModelClient(EventQueue<Time>& queue, Send send) : queue_(queue), send_(std::move(send)) {}
+  ModelClient(SimulatedService& service, Send send) : service_(service), send_(std::move(send)) {}
 
   struct Ended {
     Status status;  // ok: the picture arrived
@@ -45,7 +45,7 @@ class ModelClient {
   void Ping();
   void End(RequestId request, Ended how);
 
-  EventQueue<Time>& queue_;
+  SimulatedService& service_;
   Send send_;
   std::map<RequestId, Open> open_;
   std::map<RequestId, Ended> ended_;

@@ -2,64 +2,41 @@
 
 #include <algorithm>
 
+#include "common/base/overloaded.h"
 #include "common/volume/box_assembly.h"
 #include "tests/simulator/model_occlusion.h"
 
 namespace slabstream {
 
-ModelWorker::ModelWorker(int node, WorkerConfig config, const WorkerSpeed& speed, const Faults& faults, Random& random,
-                         EventQueue<Time>& queue, WorkerNetwork& network)
-    : node_(node),
-      config_(config),
-      speed_(speed),
-      faults_(faults),
-      random_(random),
-      queue_(queue),
-      network_(network),
-      machine_(std::move(config)),
-      combine_thread_free_(queue.now()),
-      finish_thread_free_(queue.now()) {}
-
-void ModelWorker::Start() { Step(Tick{}); }
-
-void ModelWorker::Step(const WorkerEvent& event) {
-  if (!alive_) return;
-  for (WorkerAction& action : machine_.Step(event, queue_.now())) {
-    std::visit([this](const auto& a) { Perform(a); }, action);
-  }
-  CheckCredit();
-  const Time wake = machine_.NextWake();
-  if (wake != Time::max()) alarm_.Set(queue_, wake, [this] { Wake(); });
+WorkCost ModelWorker::Begin(Job& job) {
+  return {std::visit([&](const auto& action) { return Begin(job, action); }, job.action)};
 }
 
-void ModelWorker::Wake() {
-  if (!alive_) return;
-  const Time wake = machine_.NextWake();
-  if (wake > queue_.now()) return alarm_.Set(queue_, wake, [this] { Wake(); });
-  Step(Tick{});
-  idle_wakes_ = machine_.NextWake() <= queue_.now() ? idle_wakes_ + 1 : 0;
-  ASSERT_LT(idle_wakes_, 10) << "worker node " << node_ << " spins";
+WorkerEvent ModelWorker::Answer(Job& job) {
+  return std::visit(Overloaded{[&](const StartRender& action) -> WorkerEvent { return Rendered(action, job.cancelled); },
+                               [&](const StoreChunk& action) -> WorkerEvent { return Stored(action); },
+                               [&](const StartCombine& action) -> WorkerEvent {
+                                 const bool fails = random_.Chance(faults_.fail_combine);
+                                 const Status status = fails ? Status::ResourceExhausted("no memory to combine") : Status::Ok();
+                                 return CombineDone{action.key, action.image, status, {Stage::kCombine, 0, 1}};
+                               },
+                               [&](const FindHidden& action) -> WorkerEvent {
+                                 return HiddenFound{action.key, action.image, std::move(hidden_.extract(action.image).mapped())};
+                               },
+                               [](const auto&) -> WorkerEvent { return Tick{}; }},
+                    job.action);
 }
 
-Time ModelWorker::After(Time& free, Duration work) const {
-  free = std::max(free, queue_.now()) + work;
-  return free;
-}
-
-void ModelWorker::Perform(const SendControl& action) { network_.ToCoordinator(node_, action.message, {}); }
-
-void ModelWorker::Perform(const SendChunkRequest& action) {
-  const ChunkRequest& request = action.request;
+void ModelWorker::OnRequest(const ChunkRequest& request) {
   const std::uint64_t total = std::uint64_t(request.box.voxel_count());  // the simulated volumes have one byte a voxel
   const std::uint64_t bytes = std::min<std::uint64_t>(kChunkBytes, total - std::uint64_t(request.chunk) * kChunkBytes);
-  requested_[{request.dataset, request.box, request.chunk}] = {bytes, queue_.now()};
-  network_.ToSlabServer(node_, request);
+  requested_[{request.dataset, request.box, request.chunk}] = {bytes, service_.time()};
 }
 
 // The credit bounds what is requested and not stored. A request that has expired no longer counts: its answer is taken for lost.
 void ModelWorker::CheckCredit() {
-  if (!machine_.registered()) requested_.clear();
-  std::erase_if(requested_, [&](const auto& entry) { return entry.second.requested + config_.chunk_timeout <= queue_.now(); });
+  if (!service_.worker(node_).registered()) requested_.clear();
+  std::erase_if(requested_, [&](const auto& entry) { return entry.second.requested + config_.chunk_timeout <= service_.time(); });
   std::uint64_t bytes = 0;
   for (const auto& [name, outstanding] : requested_) bytes += outstanding.bytes;
   if (requested_.size() > 1) {
@@ -76,19 +53,21 @@ void ModelWorker::Perform(const OpenSlab& action) {
   }
 }
 
-void ModelWorker::Perform(const StoreChunk& action) {
+double ModelWorker::Begin(Job&, const StoreChunk& action) {
   EXPECT_EQ(slabs_.count(action.slab), 1U) << "a chunk is stored in a slab that is not open";
   EXPECT_TRUE(action.slab.box.Contains(action.chunk.box));
-  queue_.At(CombineThread(speed_.store), [this, slab = action.slab, box = action.chunk.box, chunk = action.chunk.chunk] {
-    requested_.erase({slab.dataset, box, chunk});
-    Status status;
-    if (random_.Chance(faults_.damage_chunk)) {
-      status = Status::DataLoss("digest of a chunk");
-    } else if (const auto open = slabs_.find(slab); open != slabs_.end()) {
-      open->second.chunks[box].insert(chunk);
-    }
-    Step(ChunkStored{slab, box, chunk, status});
-  });
+  return speed_.store;
+}
+
+ChunkStored ModelWorker::Stored(const StoreChunk& store) {
+  requested_.erase({store.slab.dataset, store.chunk.box, store.chunk.chunk});
+  Status status;
+  if (random_.Chance(faults_.damage_chunk)) {
+    status = Status::DataLoss("digest of a chunk");
+  } else if (const auto open = slabs_.find(store.slab); open != slabs_.end()) {
+    open->second.chunks[store.chunk.box].insert(store.chunk.chunk);
+  }
+  return {store.slab, store.chunk.box, store.chunk.chunk, status};
 }
 
 // All chunks of the boxes that it has any of, and these with the copied ones tile it.
@@ -110,29 +89,27 @@ void ModelWorker::Perform(const DropSlab& action) {
     for (const OpenSlab::Copy& copy : slab.copied)
       EXPECT_TRUE(slab.rendered || copy.from != action.slab) << "a slab is dropped that is copied from";
   }
-  EXPECT_FALSE(rendering_ && rendering_->slab == action.slab) << "a slab is dropped while it is rendered from";
+  EXPECT_NE(rendering_, action.slab) << "a slab is dropped while it is rendered from";
 }
 
-void ModelWorker::Perform(const StartRender& action) {
+double ModelWorker::Begin(Job&, const StartRender& action) {
   EXPECT_FALSE(rendering_.has_value()) << "two renders at a time";
   EXPECT_TRUE(Complete(action.slab)) << "a slab is rendered from before it is complete";
   EXPECT_TRUE(action.slab.box.Contains(SlabBox(action.placement.box, *action.setup))) << "a slab without the voxels of its box";
   EXPECT_EQ(action.slab.dataset, action.setup->dataset);
-  rendering_ = action;
-  const std::uint64_t number = ++render_number_;
-  const Status status = random_.Chance(faults_.fail_render) ? Status::ResourceExhausted("no memory to render") : Status::Ok();
-  const Duration time(random_.Integer<std::int64_t>(speed_.render.count() / 2, speed_.render.count() * 2));
-  queue_.After(time, [this, number, status, time] { FinishRender(number, status, time); });
+  rendering_ = action.slab;
+  render_seconds_ = speed_.render * random_.Real(0.5, 2);
+  return render_seconds_;
 }
 
-void ModelWorker::Perform(const CancelRender& action) {
-  if (!rendering_ || rendering_->key != action.key || random_.Chance(0.3)) return;  // sometimes too late
-  queue_.After(speed_.store, [this, number = render_number_] { FinishRender(number, Status::Cancelled("render"), {}); });
-}
-
-void ModelWorker::FinishRender(std::uint64_t number, Status status, Duration time) {
-  if (!alive_ || !rendering_ || number != render_number_) return;  // ended already
-  const StartRender render = *std::exchange(rendering_, std::nullopt);
+RenderDone ModelWorker::Rendered(const StartRender& render, bool cancelled) {
+  rendering_.reset();
+  Status status;
+  if (cancelled) {
+    status = Status::Cancelled("render");
+  } else if (random_.Chance(faults_.fail_render)) {
+    status = Status::ResourceExhausted("no memory to render");
+  }
   if (status.ok()) {
     slabs_.at(render.slab).rendered = true;
     const PixelBounds frame = FrameBounds(*render.setup);
@@ -144,40 +121,33 @@ void ModelWorker::FinishRender(std::uint64_t number, Status status, Duration tim
     images_.FailRender(render.image);
   }
   RankReport report;
-  report.stage_ns[std::size_t(Stage::kRender)] = time.count();
-  Step(RenderDone{render.key, render.rank, render.image, std::move(status), report, std::uint64_t(render.slab.box.voxel_count()) * 2});
+  report.stage_ns[std::size_t(Stage::kRender)] = std::int64_t(render_seconds_ * 1e9);
+  return {render.key, render.rank, render.image, std::move(status), report, std::uint64_t(render.slab.box.voxel_count()) * 2};
 }
 
-void ModelWorker::Perform(const StartCombine& action) {
+double ModelWorker::Begin(Job&, const StartCombine& action) {
   images_.Combine(action);
-  const Status status = random_.Chance(faults_.fail_combine) ? Status::ResourceExhausted("no memory to combine") : Status::Ok();
-  queue_.At(CombineThread(speed_.combine), [this, key = action.key, image = action.image, status] {
-    Step(CombineDone{key, image, status, {Stage::kCombine, 0, 1}});
-  });
+  return speed_.combine;
 }
 
-void ModelWorker::Perform(const FindHidden& action) {
+double ModelWorker::Begin(Job&, const FindHidden& action) {
   EXPECT_TRUE(UsesOcclusion(*action.setup)) << "nothing may be left out of this frame";
-  HiddenFound found{action.key, action.image, FindOpaqueTiles(images_.Get(action.image), FrameBounds(*action.setup))};
+  OcclusionMask found = FindOpaqueTiles(images_.Get(action.image), FrameBounds(*action.setup));
   ForEachTile(action.known, [&](std::int32_t x, std::int32_t y, bool hidden) {
-    EXPECT_TRUE(!hidden || found.hidden.Hides(x * kOcclusionTile, y * kOcclusionTile)) << "what was hidden is no longer";
+    EXPECT_TRUE(!hidden || found.Hides(x * kOcclusionTile, y * kOcclusionTile)) << "what was hidden is no longer";
   });
-  queue_.At(CombineThread(speed_.store), [this, found = std::move(found)] { Step(found); });
+  EXPECT_TRUE(hidden_.emplace(action.image, std::move(found)).second) << "hidden tiles of an image are looked for twice at a time";
+  return speed_.store;
 }
 
-void ModelWorker::Perform(const SendPartial& action) {
-  queue_.At(CombineThread(speed_.combine),
-            [this, to = action.to, message = action.message, payload = images_.Encode(action.image, action.message.pixels)] {
-              if (alive_) network_.ToPeer(node_, to, message, payload);
-            });
+double ModelWorker::Begin(Job& job, const SendPartial& action) {
+  job.payload = images_.Encode(action.image, action.message.pixels);
+  return speed_.combine;
 }
 
-void ModelWorker::Perform(const SendFrame& action) {
-  const bool finished = action.message.groups_done == action.message.group_count;
-  queue_.At(After(finished ? finish_thread_free_ : combine_thread_free_, speed_.finish),
-            [this, message = action.message, payload = PackSymbols(images_.Get(action.image))] {
-              if (alive_) network_.ToCoordinator(node_, message, payload);
-            });
+double ModelWorker::Begin(Job& job, const SendFrame& action) {
+  job.payload = PackSymbols(images_.Get(action.image));
+  return speed_.finish;
 }
 
 void ModelWorker::Perform(const StopProcess&) {

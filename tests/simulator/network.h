@@ -1,11 +1,12 @@
-// FaultyNetwork: moves messages between the ends of a simulated world, and loses, delays, duplicates and reorders them.
+// FaultyNetwork: when messages between the ends of a simulated world arrive. It loses, delays, duplicates and reorders them.
 #pragma once
 
-#include <functional>
+#include <algorithm>
+#include <chrono>
 #include <map>
 #include <utility>
 
-#include "simulator/event_queue.h"
+#include "simulator/conditions.h"
 #include "tests/simulator/faults.h"
 
 namespace slabstream {
@@ -14,34 +15,34 @@ class FaultyNetwork {
  public:
   using Link = std::pair<int, int>;  // from, to: any numbers that name ends
 
-  FaultyNetwork(EventQueue<Time>& queue, Random& random, const Faults& faults, Duration latency)
-      : queue_(queue), random_(random), faults_(faults), latency_(latency) {}
+  FaultyNetwork(Random& random, const Faults& faults, Duration latency) : random_(random), faults_(faults), latency_(latency) {}
 
-  // Calls `deliver` never, once or twice, later.
-  void Send(const Link& link, const std::function<void()>& deliver) {
-    if (!calm_ && random_.Chance(faults_.lose)) return;
-    const int copies = !calm_ && random_.Chance(faults_.duplicate) ? 2 : 1;
-    for (int i = 0; i < copies; ++i) queue_.At(Arrival(link), deliver);
+  // Of a message that leaves now.
+  Arrivals Send(const Link& link, double now) {
+    Arrivals arrivals;
+    if (!calm_ && random_.Chance(faults_.lose)) return arrivals;
+    arrivals.count = !calm_ && random_.Chance(faults_.duplicate) ? 2 : 1;
+    for (int i = 0; i < arrivals.count; ++i) arrivals.times[i] = Arrival(link, now);
+    return arrivals;
   }
 
   void CalmDown() { calm_ = true; }  // no more faults
 
  private:
-  Time Arrival(const Link& link) {
+  double Arrival(const Link& link, double now) {
     Duration delay = latency_ + Duration(random_.Integer<std::int64_t>(0, latency_.count()));
     if (!calm_ && random_.Chance(faults_.delay)) delay += Duration(random_.Integer<std::int64_t>(0, faults_.max_delay.count()));
-    Time arrival = queue_.now() + delay;
+    const double arrival = now + std::chrono::duration<double>(delay).count();
     if (faults_.reorder) return arrival;
-    Time& last = last_arrival_[link];
+    double& last = last_arrival_[link];
     last = std::max(last, arrival);
     return last;
   }
 
-  EventQueue<Time>& queue_;
   Random& random_;
   const Faults& faults_;
   const Duration latency_;
-  std::map<Link, Time> last_arrival_;
+  std::map<Link, double> last_arrival_;
   bool calm_ = false;
 };
 

@@ -49,10 +49,10 @@ void MakeVolume(Random& random, World& world) {
 World RandomWorld(Random& random, const Faults& faults) {
   World world;
   MakeVolume(random, world);
-  world.speed.render = milliseconds(random.Chance(0.1) ? 300 : random.Integer(1, 40));
-  world.speed.combine = std::chrono::microseconds(random.Integer(10, 5000));
-  world.speed.store = std::chrono::microseconds(random.Integer(10, 1000));
-  world.speed.finish = std::chrono::microseconds(random.Integer(10, 20000));
+  world.speed.render = random.Chance(0.1) ? 0.3 : random.Real(0.001, 0.04);
+  world.speed.combine = random.Real(10e-6, 5e-3);
+  world.speed.store = random.Real(10e-6, 1e-3);
+  world.speed.finish = random.Real(10e-6, 20e-3);
   world.worker_config.register_interval = milliseconds(500);
   world.worker_config.chunk_timeout = seconds(1);
   world.worker_config.chunk_attempts = 6;

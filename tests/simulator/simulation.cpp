@@ -17,8 +17,8 @@ constexpr Duration kBound = milliseconds(kDeadlineMs) + seconds(30);  // until e
 constexpr Duration kTroubled = seconds(5);                            // requests are made and things break in this time
 constexpr Duration kSettle = seconds(14);                             // long enough for every time-out of the machines below
 
-// Ends of links, and names of connections: workers 0, 1, ...; clients from kClientNodes on.
-constexpr int kClientNodes = 1 << 20;
+// Ends of links, and names of connections: workers 0, 1, ...; clients from kClientEnds on.
+constexpr int kClientEnds = 1 << 20;
 constexpr int kCoordinatorEnd = -1, kSlabServerEnd = -2;
 
 // What the other end would decode.
@@ -34,35 +34,31 @@ Simulation::Simulation(std::uint64_t seed, Tally& tally)
     : random_(seed),
       tally_(tally),
       faults_(RandomFaults(random_)),
-      network_(queue_, random_, faults_, std::chrono::microseconds(random_.Integer(50, 5000))),
+      network_(random_, faults_, std::chrono::microseconds(random_.Integer(50, 5000))),
       encode_messages_(random_.Chance(0.02)),
       world_(RandomWorld(random_, faults_)),
-      witness_(faults_, tally) {}
-
-Simulation::~Simulation() = default;
+      witness_(faults_, tally),
+      service_(machine_, *this) {}
 
 // ---------------------------------------------------------------- the world
 
 void Simulation::AddWorker(Duration after) {
-  queue_.After(after, [this] {
-    const int node = int(workers_.size());
-    WorkerNetwork& network = *this;
+  service_.queue().After(after, [this] {
     WorkerConfig config = world_.worker_config;
     config.incarnation = random_.Integer<Incarnation>(1, std::uint64_t{1} << 62);
-    config.images_endpoint = "worker:" + std::to_string(node);
-    workers_.push_back(std::make_unique<ModelWorker>(node, config, world_.speed, faults_, random_, queue_, network));
-    workers_.back()->Start();
+    workers_.emplace_back(Node(workers_.size()), config, world_.speed, faults_, random_, service_);
+    service_.AddWorker(std::move(config));
   });
 }
 
 void Simulation::KillWorker() {
-  std::vector<int> alive;
-  for (int node = 0; node < int(workers_.size()); ++node) {
-    if (workers_[node]->alive()) alive.push_back(node);
+  std::vector<Node> alive;
+  for (Node node = 0; node < workers_.size(); ++node) {
+    if (service_.alive(node)) alive.push_back(node);
   }
   if (alive.empty()) return;
-  const int victim = alive[random_.Integer<std::size_t>(0, alive.size() - 1)];
-  workers_[victim]->Kill();
+  const Node victim = alive[random_.Integer<std::size_t>(0, alive.size() - 1)];
+  service_.KillWorker(victim);
   ++tally_.workers_killed;
   if (!random_.Chance(faults_.silent_kill)) told_dead_.insert(victim);
   if (alive.size() == 1) workerless_ = true;
@@ -78,25 +74,23 @@ void Simulation::StartCoordinator() {
   config.worker_wait = seconds(5);
   config.vacancy_grace = milliseconds(random_.Integer(500, 8000));
   config.stall_timeout = seconds(4);
-  const std::uint64_t generation = coordinator_ == nullptr ? 1 : coordinator_->generation + 1;
-  if (coordinator_ != nullptr) dead_coordinators_.push_back(std::move(coordinator_));
-  const Epoch epoch = config.epoch;
-  coordinator_ = std::unique_ptr<Coordinator>(new Coordinator{FrameMachine(std::move(config)), Planner(), epoch, {}, generation, true, 0});
+  epoch_ = config.epoch;
+  planner_.emplace();
   witness_.OnRestart();
-  StepCoordinator(CoordinatorTick{});
+  service_.StartCoordinator(std::move(config));
 }
 
 void Simulation::RestartCoordinator() {
-  if (!coordinator_->alive) return;
-  coordinator_->alive = false;
+  if (!service_.coordinator_runs()) return;
+  service_.StopCoordinator();
   ++tally_.coordinator_restarts;
-  queue_.After(milliseconds(random_.Integer(1, 6000)), [this] { StartCoordinator(); });
+  service_.queue().After(milliseconds(random_.Integer(1, 6000)), [this] { StartCoordinator(); });
 }
 
 // Everything that happens beside messages, somewhere in `span` from now on.
 void Simulation::PlanTroubles(Duration span) {
   const auto somewhere = [&](std::function<void()> what) {
-    queue_.After(Duration(random_.Integer<std::int64_t>(0, span.count())), std::move(what));
+    service_.queue().After(Duration(random_.Integer<std::int64_t>(0, span.count())), std::move(what));
   };
   for (int i = 0; i < faults_.worker_kills; ++i) somewhere([this] { KillWorker(); });
   for (int i = 0; i < faults_.workers_joining; ++i) somewhere([this] { AddWorker({}); });
@@ -111,9 +105,11 @@ bool Simulation::Idle() const {
          std::all_of(clients_.begin(), clients_.end(), [](const auto& client) { return client->idle(); });
 }
 
-void Simulation::RunUntil(Time bound, bool until_idle) {
-  while (!queue_.empty() && queue_.next() <= bound && !testing::Test::HasFatalFailure()) {
-    queue_.RunNext();
+void Simulation::RunUntil(Duration from_now, bool until_idle) {
+  const double end = service_.now() + std::chrono::duration<double>(from_now).count();
+  while (service_.next() <= end && !testing::Test::HasFatalFailure()) {
+    service_.RunNext();
+    ASSERT_LT(service_.spins(), 10) << "a machine wants to be woken at once, again and again";
     if (until_idle && Idle()) return;
   }
 }
@@ -125,7 +121,8 @@ void Simulation::Run() {
   for (int i = 0; i < workers; ++i) AddWorker(faults_.none() ? Duration{} : Duration(milliseconds(random_.Integer(0, 500))));
   const int clients = random_.Integer(1, 3);
   for (int i = 0; i < clients; ++i) {
-    clients_.push_back(std::make_unique<ModelClient>(queue_, [this, i](AnyMessage message) { FromClientNode(i, std::move(message)); }));
+    clients_.push_back(
+        std::make_unique<ModelClient>(service_, [this, i](const AnyMessage& message) { FromClientNode(std::size_t(i), message); }));
   }
   // Without faults nobody asks before all workers are there: slots, and so slabs, then stay as they are.
   const Duration first = faults_.none() ? Duration(milliseconds(500)) : Duration{};
@@ -134,11 +131,11 @@ void Simulation::Run() {
     for (int r = 1; r <= requests; ++r) {
       ++requests_planned_;
       const Duration when = first + Duration(random_.Integer<std::int64_t>(0, Duration(kTroubled).count() / 2));
-      queue_.After(when, [this, c = client.get(), r] {
+      service_.queue().After(when, [this, c = client.get(), r] {
         ++requests_made_;
         c->Submit(RandomRequest(random_, world_.policy, RequestId(r), kDeadlineMs));
         if (random_.Chance(faults_.cancel)) {
-          queue_.After(milliseconds(random_.Integer(0, 1000)), [c, r] { c->Cancel(RequestId(r)); });
+          service_.queue().After(milliseconds(random_.Integer(0, 1000)), [c, r] { c->Cancel(RequestId(r)); });
         }
       });
     }
@@ -146,10 +143,10 @@ void Simulation::Run() {
   PlanTroubles(kTroubled);
   tally_.requests += requests_planned_;
 
-  RunUntil(queue_.now() + kTroubled + kBound, true);
+  RunUntil(kTroubled + kBound, true);
   CheckOutcome();
   network_.CalmDown();
-  RunUntil(queue_.now() + kTroubled + kSettle, false);
+  RunUntil(kTroubled + kSettle, false);
   CheckRest();
 }
 
@@ -184,154 +181,134 @@ void Simulation::CheckOutcome() {
 
 // After a while without work and faults, nothing is left of any frame; then the service goes down.
 void Simulation::CheckRest() {
-  ASSERT_TRUE(coordinator_->alive);
-  for (const auto& worker : workers_) {
-    if (!worker->alive() || worker->stopped()) continue;
-    EXPECT_EQ(worker->images(), 0U) << worker->config().images_endpoint;
-    EXPECT_TRUE(worker->machine().registered()) << worker->config().images_endpoint;
+  ASSERT_TRUE(service_.coordinator_runs());
+  for (Node node = 0; node < workers_.size(); ++node) {
+    if (!service_.alive(node) || workers_[node].stopped()) continue;
+    EXPECT_EQ(workers_[node].images(), 0U) << node;
+    EXPECT_TRUE(service_.worker(node).registered()) << node;
   }
-  const PeerToken monitor = TokenOf(kClientNodes + int(clients_.size()));
-  StepCoordinator(FromClient{monitor, StatusQuery{1}});
+  const PeerToken monitor = TokenOfClient(clients_.size());
+  service_.StepCoordinator(FromClient{monitor, StatusQuery{1}});
   ASSERT_TRUE(status_.has_value());
   EXPECT_EQ(status_->queued, 0U);
   EXPECT_EQ(status_->running, 0U);
-  StepCoordinator(FromClient{monitor, ShutDown{2}});
-  EXPECT_FALSE(coordinator_->alive);
-  RunUntil(queue_.now() + seconds(1), false);
-  for (const auto& worker : workers_) EXPECT_TRUE(!worker->alive() || worker->stopped()) << worker->config().images_endpoint;
+  service_.StepCoordinator(FromClient{monitor, ShutDown{2}});
+  EXPECT_FALSE(service_.coordinator_runs());
+  RunUntil(seconds(1), false);
+  for (Node node = 0; node < workers_.size(); ++node) EXPECT_TRUE(!service_.alive(node) || workers_[node].stopped()) << node;
 }
 
 // ---------------------------------------------------------------- the coordinator
 
-void Simulation::StepCoordinator(const CoordinatorEvent& event) {
-  if (!coordinator_->alive) return;
-  for (const CoordinatorAction& action : coordinator_->machine.Step(event, queue_.now())) {
-    std::visit([&](const auto& a) { Perform(event, a); }, action);
-  }
-  WakeCoordinator();
-}
-
-void Simulation::WakeCoordinator() {
-  Coordinator* coordinator = coordinator_.get();
-  if (!coordinator->alive || coordinator->machine.NextWake() == Time::max()) return;
-  coordinator->alarm.Set(queue_, coordinator->machine.NextWake(), [this, coordinator] {
-    if (!coordinator->alive) return;
-    if (coordinator->machine.NextWake() > queue_.now()) return WakeCoordinator();
-    StepCoordinator(CoordinatorTick{});
-    coordinator->idle_wakes = coordinator->machine.NextWake() <= queue_.now() ? coordinator->idle_wakes + 1 : 0;
-    ASSERT_LT(coordinator->idle_wakes, 10) << "the coordinator spins";
-  });
-}
-
-void Simulation::Perform(const CoordinatorEvent&, const ToWorker& action) {
-  const auto* assignment = std::get_if<GroupAssignment>(&action.message);
-  if (assignment != nullptr) witness_.OnAssignment(*assignment, workers_.size(), world_.policy.teams);
-  if (const auto* ping = std::get_if<Ping>(&action.message)) witness_.OnPing(*ping);
-  const int node = NodeOf(action.to);
-  if (action.to != TokenOf(node)) return;  // a connection of a coordinator that is gone
-  if (told_dead_.count(node) > 0) {
-    queue_.After({}, [this, token = action.to] { StepCoordinator(WorkerGone{token}); });
-    return;
-  }
-  network_.Send({kCoordinatorEnd, node}, [this, node, message = OnTheWay(action.message)] { workers_[node]->Deliver(message, {}); });
-}
-
-void Simulation::Perform(const CoordinatorEvent& event, const ToClient& action) {
-  const int client = NodeOf(action.to) - kClientNodes;
+void Simulation::Perform(ToClient& action) {
   if (const auto* reply = std::get_if<FrameReply>(&action.message)) {
-    const auto* from_worker = std::get_if<FromWorker>(&event);
+    const auto* from_worker = std::get_if<FromWorker>(cause_);
     const auto* image = from_worker == nullptr ? nullptr : std::get_if<FrameImage>(&from_worker->message);
     if (image != nullptr) witness_.OnPicture(*image, action.payload, *reply);
   }
   if (const auto* status = std::get_if<StatusReply>(&action.message)) status_ = *status;
-  if (client < 0 || client >= int(clients_.size()) || action.to != TokenOf(kClientNodes + client)) return;
-  network_.Send({kCoordinatorEnd, kClientNodes + client},
-                [this, client, message = OnTheWay(action.message)] { clients_[client]->Deliver(message); });
+  for (std::size_t client = 0; client < clients_.size(); ++client) {
+    if (action.to != TokenOfClient(client)) continue;
+    const Arrivals arrivals = network_.Send({kCoordinatorEnd, kClientEnds + int(client)}, service_.now());
+    for (int i = 0; i < arrivals.count; ++i) {
+      service_.queue().At(arrivals.times[i], [c = clients_[client].get(), message = OnTheWay(action.message)] { c->Deliver(message); });
+    }
+  }
 }
 
-void Simulation::Perform(const CoordinatorEvent&, const LoadDataset& action) {
+void Simulation::Perform(const LoadDataset& action) {
   CoordinatorEvent loaded = DatasetLoaded{action.name, action.dataset, world_.summary};
   if (random_.Chance(faults_.fail_load)) loaded = DatasetFailed{action.name, Status::NotFound("the file of the volume is gone")};
-  queue_.After(milliseconds(random_.Integer(1, 300)), [this, loaded, generation = coordinator_->generation] {
-    if (coordinator_->generation == generation) StepCoordinator(loaded);
-  });
+  service_.TellCoordinator(service_.now() + random_.Real(0.001, 0.3), loaded);
 }
 
-void Simulation::Perform(const CoordinatorEvent&, const CountDataset& action) {
+void Simulation::Perform(const CountDataset& action) {
   ++tally_.counts;
   OccupiedCounted counted{action.count, world_.occupied};
   if (random_.Chance(faults_.fail_load)) counted.grid = Status::ResourceExhausted("not enough memory to count");
   // Once, or twice, and with news of a count that nobody asked for.
   const int times = faults_.none() ? 1 : random_.Integer(1, 2);
   for (int i = 0; i < times; ++i) {
-    queue_.After(milliseconds(random_.Integer(1, 300)), [this, counted, i, generation = coordinator_->generation] {
-      if (coordinator_->generation != generation) return;
-      if (i == 1) StepCoordinator(OccupiedCounted{counted.count + 1000000, world_.occupied});
-      StepCoordinator(counted);
-    });
+    const double when = service_.now() + random_.Real(0.001, 0.3);
+    if (i == 1) service_.TellCoordinator(when, OccupiedCounted{counted.count + 1000000, world_.occupied});
+    service_.TellCoordinator(when, counted);
   }
 }
 
 // Plans come late, and not always in the order in which they were asked for.
-void Simulation::Perform(const CoordinatorEvent&, const PlanRequest& action) {
-  Planned planned{action.plan, coordinator_->planner.Plan(action)};
+void Simulation::Perform(const PlanRequest& action) {
+  Planned planned{action.plan, planner_->Plan(action)};
   if (random_.Chance(faults_.fail_load / 5)) planned.frame = Status::ResourceExhausted("not enough memory to plan");
-  queue_.After(std::chrono::microseconds(random_.Integer(0, faults_.none() ? 200 : 100000)),
-               [this, planned, generation = coordinator_->generation] {
-                 if (coordinator_->generation == generation) StepCoordinator(planned);
-               });
+  service_.TellCoordinator(service_.now() + random_.Real(0, faults_.none() ? 200e-6 : 0.1), std::move(planned));
 }
-
-void Simulation::Perform(const CoordinatorEvent&, const StopService&) { coordinator_->alive = false; }
 
 // ---------------------------------------------------------------- messages
 
 AnyMessage Simulation::OnTheWay(const AnyMessage& message) const { return encode_messages_ ? OverTheWire(message) : message; }
 
-void Simulation::ToCoordinator(int node, AnyMessage message, Bytes payload) {
-  if (const auto* done = std::get_if<GroupDone>(&message); done != nullptr && done->epoch == coordinator_->epoch)
-    witness_.OnGroupDone(*done);
-  network_.Send({node, kCoordinatorEnd}, [this, node, message = OnTheWay(message), payload = std::move(payload)] {
-    StepCoordinator(FromWorker{TokenOf(node), message, payload});
-  });
-}
-
-void Simulation::ToSlabServer(int node, ChunkRequest request) {
-  network_.Send({node, kSlabServerEnd}, [this, node, request = std::get<ChunkRequest>(OnTheWay(request))] {
-    if (!coordinator_->alive) return;
-    AnyMessage answer;
-    if (request.epoch != coordinator_->epoch) {
-      answer =
-          ChunkRefused{coordinator_->epoch, request.dataset, request.box, request.chunk, Status::NotFound("another coordinator's epoch")};
-    } else {
-      const auto total = std::uint64_t(request.box.voxel_count());
-      Chunk chunk;
-      chunk.epoch = request.epoch;
-      chunk.dataset = request.dataset;
-      chunk.box = request.box;
-      chunk.chunk = request.chunk;
-      chunk.raw_bytes = std::uint32_t(std::min<std::uint64_t>(kChunkBytes, total - std::uint64_t(request.chunk) * kChunkBytes));
-      chunk.encoded_bytes = chunk.raw_bytes;
-      answer = chunk;
-    }
-    network_.Send({kSlabServerEnd, node}, [this, node, answer = OnTheWay(answer)] { workers_[node]->Deliver(answer, {}); });
-  });
-}
-
-void Simulation::ToPeer(int node, const Peer& to, PartialImage message, Bytes payload) {
-  const int target = std::stoi(to.images_endpoint.substr(to.images_endpoint.find(':') + 1));
-  if (told_dead_.count(target) > 0 && random_.Chance(0.3)) {
-    queue_.After({}, [this, node, worker = to.worker] { workers_[node]->TellPeerUnreachable(worker); });
-    return;
+Arrivals Simulation::ToWorker(Node to, AnyMessage& message, double sent) {
+  if (const auto* assignment = std::get_if<GroupAssignment>(&message)) {
+    witness_.OnAssignment(*assignment, workers_.size(), world_.policy.teams);
   }
-  network_.Send({node, target},
-                [this, target, message = OnTheWay(message), payload = std::move(payload)] { workers_[target]->Deliver(message, payload); });
+  if (const auto* ping = std::get_if<Ping>(&message)) witness_.OnPing(*ping);
+  if (told_dead_.contains(to)) return {.nobody = true};
+  message = OnTheWay(message);
+  return network_.Send({kCoordinatorEnd, int(to)}, sent);
 }
 
-void Simulation::FromClientNode(int client, AnyMessage message) {
-  network_.Send({kClientNodes + client, kCoordinatorEnd}, [this, client, message = OnTheWay(message)] {
-    StepCoordinator(FromClient{TokenOf(kClientNodes + client), message});
-  });
+Arrivals Simulation::ToCoordinator(Node from, AnyMessage& message) {
+  if (const auto* done = std::get_if<GroupDone>(&message); done != nullptr && done->epoch == epoch_) witness_.OnGroupDone(*done);
+  message = OnTheWay(message);
+  return network_.Send({int(from), kCoordinatorEnd}, service_.now());
+}
+
+Arrivals Simulation::ToPeer(Node to, Job& sends) {
+  if (told_dead_.contains(to) && random_.Chance(0.3)) return {.nobody = true};
+  PartialImage& image = std::get<SendPartial>(sends.action).message;
+  image = std::get<PartialImage>(OnTheWay(image));
+  return network_.Send({int(sends.node), int(to)}, service_.now());
+}
+
+void Simulation::Perform(Node node, SendChunkRequest& action) {
+  workers_[node].OnRequest(action.request);
+  const ChunkRequest request = std::get<ChunkRequest>(OnTheWay(action.request));
+  const Arrivals asked = network_.Send({int(node), kSlabServerEnd}, service_.now());
+  for (int i = 0; i < asked.count; ++i) {
+    service_.queue().At(asked.times[i], [this, node, request] {
+      if (!service_.coordinator_runs()) return;
+      const AnyMessage answer = OnTheWay(AnswerOf(request));
+      const Arrivals answered = network_.Send({kSlabServerEnd, int(node)}, service_.now());
+      for (int j = 0; j < answered.count; ++j) {
+        service_.queue().At(answered.times[j], [this, node, answer] { service_.StepWorker(node, MessageReceived{answer, {}}); });
+      }
+    });
+  }
+}
+
+AnyMessage Simulation::AnswerOf(const ChunkRequest& request) const {
+  if (request.epoch != epoch_) {
+    return ChunkRefused{epoch_, request.dataset, request.box, request.chunk, Status::NotFound("another coordinator's epoch")};
+  }
+  const auto total = std::uint64_t(request.box.voxel_count());
+  Chunk chunk;
+  chunk.epoch = request.epoch;
+  chunk.dataset = request.dataset;
+  chunk.box = request.box;
+  chunk.chunk = request.chunk;
+  chunk.raw_bytes = std::uint32_t(std::min<std::uint64_t>(kChunkBytes, total - std::uint64_t(request.chunk) * kChunkBytes));
+  chunk.encoded_bytes = chunk.raw_bytes;
+  return chunk;
+}
+
+PeerToken Simulation::TokenOfClient(std::size_t client) const { return service_.TokenOf(Node(kClientEnds + int(client))); }
+
+void Simulation::FromClientNode(std::size_t client, const AnyMessage& message) {
+  const Arrivals arrivals = network_.Send({kClientEnds + int(client), kCoordinatorEnd}, service_.now());
+  for (int i = 0; i < arrivals.count; ++i) {
+    service_.queue().At(arrivals.times[i], [this, client, message = OnTheWay(message)] {
+      service_.StepCoordinator(FromClient{TokenOfClient(client), message});
+    });
+  }
 }
 
 }  // namespace slabstream

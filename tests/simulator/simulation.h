@@ -12,15 +12,15 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <optional>
 #include <set>
 #include <vector>
 
-#include "coordinator/frame_machine.h"
 #include "coordinator/planner.h"
-#include "simulator/event_queue.h"
-#include "tests/simulator/alarm.h"
+#include "simulator/conditions.h"
+#include "simulator/simulated_service.h"
 #include "tests/simulator/faults.h"
 #include "tests/simulator/frame_witness.h"
 #include "tests/simulator/model_client.h"
@@ -28,25 +28,16 @@
 #include "tests/simulator/network.h"
 #include "tests/simulator/random_world.h"
 #include "tests/simulator/tally.h"
+#include "tests/support/machine_models.h"
 
 namespace slabstream {
 
-class Simulation : private WorkerNetwork {
+class Simulation : private Conditions {
  public:
   Simulation(std::uint64_t seed, Tally& tally);
-  ~Simulation() override;
   void Run();
 
  private:
-  struct Coordinator {
-    FrameMachine machine;
-    Planner planner;
-    Epoch epoch = 0;
-    Alarm alarm;
-    std::uint64_t generation = 0;
-    bool alive = true;
-    int idle_wakes = 0;
-  };
   // ---- the world
   void AddWorker(Duration after);
   void KillWorker();
@@ -54,47 +45,51 @@ class Simulation : private WorkerNetwork {
   void RestartCoordinator();
   void PlanTroubles(Duration span);
   bool Idle() const;
-  void RunUntil(Time bound, bool until_idle);
+  void RunUntil(Duration from_now, bool until_idle);
   void CheckOutcome();
   void CheckRest();
-
-  // ---- the coordinator
-  void StepCoordinator(const CoordinatorEvent& event);
-  void WakeCoordinator();
-  void Perform(const CoordinatorEvent& event, const ToWorker& action);
-  void Perform(const CoordinatorEvent& event, const ToClient& action);
-  void Perform(const CoordinatorEvent& event, const LoadDataset& action);
-  void Perform(const CoordinatorEvent& event, const CountDataset& action);
-  void Perform(const CoordinatorEvent& event, const PlanRequest& action);
-  void Perform(const CoordinatorEvent&, const DropPlan&) {}
-  void Perform(const CoordinatorEvent&, const FrameMeasured& action) { coordinator_->planner.Learn(action); }
-  void Perform(const CoordinatorEvent& event, const StopService&);
-
-  // ---- messages
+  PeerToken TokenOfClient(std::size_t client) const;
   AnyMessage OnTheWay(const AnyMessage& message) const;
-  void ToCoordinator(int node, AnyMessage message, Bytes payload) override;
-  void ToSlabServer(int node, ChunkRequest request) override;
-  void ToPeer(int node, const Peer& to, PartialImage message, Bytes payload) override;
-  void FromClientNode(int client, AnyMessage message);
-  // Names of connections: a restarted coordinator sees new ones.
-  PeerToken TokenOf(int node) const { return PeerToken(coordinator_->generation) << 32 | std::uint32_t(node); }
-  static int NodeOf(PeerToken token) { return int(token & 0xffffffffU); }
+  void FromClientNode(std::size_t client, const AnyMessage& message);
+  AnyMessage AnswerOf(const ChunkRequest& request) const;
+
+  // ---- Conditions
+  std::optional<WorkCost> Begin(Job& job) override { return workers_[job.node].Begin(job); }
+  WorkerEvent Answer(Job& job) override { return workers_[job.node].Answer(job); }
+  bool CancelsInTime() override { return random_.Chance(0.7); }
+  void Perform(Node node, SendChunkRequest& action) override;
+  void Perform(Node node, const OpenSlab& action) override { workers_[node].Perform(action); }
+  void Perform(Node node, const DropSlab& action) override { workers_[node].Perform(action); }
+  void Perform(Node node, const ReleaseImage& action) override { workers_[node].Perform(action); }
+  void Perform(Node node, const StopProcess& action) override { workers_[node].Perform(action); }
+  void AfterStep(Node node) override { workers_[node].CheckCredit(); }
+  Arrivals ToWorker(Node to, AnyMessage& message, double sent) override;
+  Arrivals ToCoordinator(Node from, AnyMessage& message) override;
+  Arrivals ToPeer(Node to, Job& sends) override;
+  void BeforeStep(const CoordinatorEvent& event) override { cause_ = &event; }
+  void Perform(ToClient& action) override;
+  void Perform(const LoadDataset& action) override;
+  void Perform(const CountDataset& action) override;
+  void Perform(const PlanRequest& action) override;
+  void Perform(const FrameMeasured& action) override { planner_->Learn(action); }
 
   Random random_;
   Tally& tally_;
-  EventQueue<Time> queue_{Time(std::chrono::seconds(1000))};
   Faults faults_;
   FaultyNetwork network_;
   const bool encode_messages_;  // in a few worlds messages are encoded and decoded on their way
   bool workerless_ = false;     // for a moment no worker was alive
   const World world_;
   FrameWitness witness_;
-  std::unique_ptr<Coordinator> coordinator_;
-  std::vector<std::unique_ptr<Coordinator>> dead_coordinators_;  // events that are still planned refer to them
-  std::vector<std::unique_ptr<ModelWorker>> workers_;            // by node
+  const MachineModel machine_ = WithoutDelays();  // what takes how long is up to the world
+  SimulatedService service_;
+  std::optional<Planner> planner_;   // of the coordinator
+  Epoch epoch_ = 0;                  // of the coordinator
+  std::deque<ModelWorker> workers_;  // by node
   std::vector<std::unique_ptr<ModelClient>> clients_;
-  std::set<int> told_dead_;  // worker nodes whose death the sockets notice
+  std::set<Node> told_dead_;  // workers whose death the sockets notice
   std::size_t requests_planned_ = 0, requests_made_ = 0;
+  const CoordinatorEvent* cause_ = nullptr;  // what the coordinator deals with
   std::optional<StatusReply> status_;
 };
 

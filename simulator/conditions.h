@@ -1,0 +1,68 @@
+// Conditions: all that the machines of a simulated service do not decide. How long work takes and what it gives; when messages arrive, and
+// whether; what clients do; what a dataset holds. Costs stand behind one kind of simulation (FrameSimulation), faults behind another (the
+// tests). Every function is called at the virtual time at which it happens.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <variant>
+
+#include "coordinator/frame_machine.h"
+#include "simulator/worker_lanes.h"
+#include "worker/worker_machine.h"
+
+namespace slabstream {
+
+// What a thread of a worker does. It stays until its result, or the last copy of its message, has arrived.
+struct Job {
+  Node node = 0;  // its worker
+  std::variant<StartRender, StoreChunk, StartCombine, FindHidden, SendPartial, SendFrame> action;
+  bool cancelled = false;        // a StartRender
+  Bytes payload;                 // of the message that it sends
+  double bytes = 0, pixels = 0;  // of that message: what links carry; pixels that are not empty
+  int copies = 0;                // of it that have not arrived
+};
+
+// When copies of a message arrive: at most two.
+struct Arrivals {
+  std::array<double, 2> times{};
+  int count = 0;
+  bool nobody = false;  // the sender learns at once that nobody is there
+
+  static Arrivals At(double time) { return {{time}, 1}; }
+};
+
+class Conditions {
+ public:
+  virtual ~Conditions() = default;
+
+  // ---- workers
+  // The job is ordered. Fills in what it sends. No cost: it is done now, by no thread.
+  virtual std::optional<WorkCost> Begin(Job& job) = 0;
+  virtual void OnWorked(const Job&, const LaneTask&) {}  // its thread is done with it, now
+  // The answer to StartRender, StoreChunk, StartCombine or FindHidden.
+  virtual WorkerEvent Answer(Job& job) = 0;
+  virtual bool CancelsInTime() { return false; }  // a rendering that is to be cancelled: it ends now
+  virtual void Perform(Node node, SendChunkRequest& action) = 0;
+  virtual void Perform(Node, const OpenSlab&) {}
+  virtual void Perform(Node, const DropSlab&) {}
+  virtual void Perform(Node, const ReleaseImage&) {}
+  virtual void Perform(Node, const StopProcess&) {}
+  virtual void AfterStep(Node) {}
+
+  // ---- messages. They may be changed on their way; the coordinator's leave at `sent`
+  virtual Arrivals ToWorker(Node to, AnyMessage& message, double sent) = 0;
+  virtual Arrivals ToCoordinator(Node from, AnyMessage& message) = 0;
+  virtual Arrivals ToPeer(Node to, Job& sends) = 0;  // its SendPartial
+
+  // ---- the coordinator
+  virtual void BeforeStep(const CoordinatorEvent&) {}
+  virtual void Perform(ToClient& action) = 0;
+  virtual void Perform(const LoadDataset& action) = 0;
+  virtual void Perform(const CountDataset& action) = 0;
+  virtual void Perform(const PlanRequest& action) = 0;
+  virtual void Perform(const FrameMeasured&) {}
+};
+
+}  // namespace slabstream

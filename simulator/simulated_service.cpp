@@ -1,0 +1,206 @@
+#include "simulator/simulated_service.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <string>
+
+#include "common/base/parse_number.h"
+
+namespace slabstream {
+namespace {
+
+constexpr Time kStart{std::chrono::seconds(1000)};
+
+Lane LaneOf(const Job& job) {
+  if (std::holds_alternative<StartRender>(job.action)) return Lane::kRender;
+  const auto* frame = std::get_if<SendFrame>(&job.action);
+  const bool last = frame != nullptr && frame->message.groups_done == frame->message.group_count;
+  return last ? Lane::kFinish : Lane::kCombine;  // previews are made where images are combined
+}
+
+}  // namespace
+
+SimulatedService::SimulatedService(const MachineModel& machine, Conditions& conditions)
+    : machine_(machine), conditions_(conditions), threads_(machine.wake_ups), lanes_(machine, threads_) {}
+
+Time SimulatedService::TimeAt(double seconds) { return kStart + Duration(std::llround(seconds * 1e9)); }
+double SimulatedService::SecondsAt(Time time) { return std::chrono::duration<double>(time - kStart).count(); }
+
+double SimulatedService::next() { return std::min(queue_.empty() ? kNever : queue_.next(), lanes_.NextTime()); }
+
+void SimulatedService::RunNext() {
+  const double task_time = lanes_.NextTime();
+  if (!queue_.empty() && queue_.next() < task_time) return queue_.RunNext();
+  queue_.AdvanceTo(task_time);
+  if (const std::optional<LaneTask> done = lanes_.Step()) OnWorked(*done);
+}
+
+// One event at most is planned that is not too late.
+void SimulatedService::SetAlarm(double& alarm, Time wake, std::function<void()> ring) {
+  if (wake == Time::max() || SecondsAt(wake) >= alarm) return;
+  alarm = std::max(SecondsAt(wake), now());
+  queue_.At(alarm, std::move(ring));
+}
+
+// ---------------------------------------------------------------- the coordinator
+
+void SimulatedService::StartCoordinator(CoordinatorConfig config) {
+  coordinator_ = std::make_unique<FrameMachine>(std::move(config));
+  coordinator_runs_ = true;
+  ++generation_;
+  coordinator_alarm_ = kNever;
+  StepCoordinator(CoordinatorTick{});
+}
+
+std::optional<Node> SimulatedService::NodeOf(PeerToken token) const {
+  return token >> 32U == generation_ ? std::optional(Node(token)) : std::nullopt;
+}
+
+void SimulatedService::TellCoordinator(double when, CoordinatorEvent event) {
+  queue_.At(when, [this, generation = generation_, event = std::move(event)] {
+    if (generation == generation_) StepCoordinator(event);
+  });
+}
+
+void SimulatedService::StepCoordinator(const CoordinatorEvent& event) {
+  if (!coordinator_runs_) return;
+  const bool message = std::holds_alternative<FromWorker>(event) || std::holds_alternative<FromClient>(event);
+  coordinator_free_ = std::max(coordinator_free_, now()) + (message ? machine_.message_seconds : 0);
+  conditions_.BeforeStep(event);
+  for (CoordinatorAction& action : coordinator_->Step(event, time())) {
+    std::visit([this](auto& a) { Perform(a); }, action);
+  }
+  threads_.Active(Threads::kCoordinator, coordinator_free_);
+  if (coordinator_runs_) SetAlarm(coordinator_alarm_, coordinator_->NextWake(), [this, g = generation_] { WakeCoordinator(g); });
+}
+
+void SimulatedService::WakeCoordinator(std::uint64_t generation) {
+  if (generation != generation_ || !coordinator_runs_ || now() != coordinator_alarm_) return;
+  coordinator_alarm_ = kNever;
+  const bool due = coordinator_->NextWake() <= time();
+  if (!due) return SetAlarm(coordinator_alarm_, coordinator_->NextWake(), [this, generation] { WakeCoordinator(generation); });
+  StepCoordinator(CoordinatorTick{});
+  CountSpin(coordinator_->NextWake());
+}
+
+void SimulatedService::Perform(ToWorker& action) {
+  const std::optional<Node> node = NodeOf(action.to);
+  if (!node) return;
+  coordinator_free_ += machine_.message_seconds;
+  const bool wakes = std::holds_alternative<GroupAssignment>(action.message);  // pings do not change any time
+  const Arrivals arrivals = conditions_.ToWorker(*node, action.message, coordinator_free_);
+  if (arrivals.nobody) TellCoordinator(now(), WorkerGone{action.to});
+  for (int i = 0; i < arrivals.count; ++i) {
+    const double arrival = wakes ? threads_.Begin(Threads::Machine(*node), arrivals.times[i]) : arrivals.times[i];
+    queue_.At(arrival, [this, to = *node, message = action.message] { StepWorker(to, MessageReceived{message, {}}); });
+  }
+}
+
+// ---------------------------------------------------------------- workers
+
+Node SimulatedService::AddWorker(WorkerConfig config) {
+  const auto node = Node(workers_.size());
+  config.images_endpoint = std::to_string(node);
+  workers_.push_back({WorkerMachine(std::move(config))});
+  threads_.AddWorker();
+  lanes_.AddWorker();
+  StepWorker(node, Tick{});
+  return node;
+}
+
+void SimulatedService::StepWorker(Node node, const WorkerEvent& event) {
+  Worker& worker = workers_[node];
+  if (!worker.alive) return;
+  for (WorkerAction& action : worker.machine.Step(event, time())) {
+    std::visit([&](auto& a) { Perform(node, a); }, action);
+  }
+  conditions_.AfterStep(node);
+  SetAlarm(worker.alarm, worker.machine.NextWake(), [this, node] { WakeWorker(node); });
+}
+
+void SimulatedService::WakeWorker(Node node) {
+  Worker& worker = workers_[node];
+  if (!worker.alive || now() != worker.alarm) return;
+  worker.alarm = kNever;
+  const bool due = worker.machine.NextWake() <= time();
+  if (!due) return SetAlarm(worker.alarm, worker.machine.NextWake(), [this, node] { WakeWorker(node); });
+  StepWorker(node, Tick{});
+  CountSpin(worker.machine.NextWake());
+}
+
+void SimulatedService::Perform(Node node, CancelRender& action) {
+  const std::optional<std::uint32_t> place = workers_[node].rendering;
+  if (!place || std::get<StartRender>(jobs_[*place].action).key != action.key || !conditions_.CancelsInTime()) return;
+  jobs_[*place].cancelled = true;
+  lanes_.EndNow(node, Lane::kRender, now());
+}
+
+std::uint32_t SimulatedService::Order(Job job) {
+  if (unused_jobs_.empty()) {
+    unused_jobs_.push_back(std::uint32_t(jobs_.size()));
+    jobs_.emplace_back();
+  }
+  const std::uint32_t place = unused_jobs_.back();
+  unused_jobs_.pop_back();
+  Job& ordered = jobs_[place] = std::move(job);
+  if (const std::optional<WorkCost> cost = conditions_.Begin(ordered)) {
+    lanes_.Add({.lane = LaneOf(ordered), .worker = ordered.node, .job = place, .cost = *cost}, now());
+  } else {
+    queue_.At(now(), [this, place] { Finish(place); });
+  }
+  return place;
+}
+
+void SimulatedService::OnWorked(const LaneTask& task) {
+  conditions_.OnWorked(jobs_[task.job], task);
+  if (task.cost.direct) return Finish(task.job);
+  queue_.At(threads_.Begin(Threads::Machine(task.worker), now()), [this, place = task.job] { Finish(place); });
+}
+
+// The thread that owns the sockets learns that the job is done.
+void SimulatedService::Finish(std::uint32_t place) {
+  Job& job = jobs_[place];
+  const Node node = job.node;
+  if (workers_[node].alive && std::holds_alternative<SendPartial>(job.action)) return SendToPeer(place);
+  unused_jobs_.push_back(place);
+  if (!workers_[node].alive) return;
+  if (auto* frame = std::get_if<SendFrame>(&job.action)) {
+    return SendToCoordinator(node, std::move(frame->message), std::move(job.payload));
+  }
+  if (std::holds_alternative<StartRender>(job.action)) workers_[node].rendering.reset();
+  StepWorker(node, conditions_.Answer(job));
+}
+
+void SimulatedService::SendToCoordinator(Node from, AnyMessage message, Bytes payload) {
+  const Arrivals arrivals = conditions_.ToCoordinator(from, message);
+  for (int i = 0; i < arrivals.count; ++i) {
+    queue_.At(threads_.Begin(Threads::kCoordinator, arrivals.times[i]), [this, from, message, payload] {
+      StepCoordinator(FromWorker{TokenOf(from), message, payload});
+    });
+  }
+}
+
+void SimulatedService::SendToPeer(std::uint32_t place) {
+  Job& job = jobs_[place];
+  const auto& send = std::get<SendPartial>(job.action);
+  const Node to = ParseNumber<Node>(send.to.images_endpoint).value();
+  const Arrivals arrivals = conditions_.ToPeer(to, job);
+  job.copies = arrivals.count;
+  if (arrivals.nobody) queue_.At(now(), [this, node = job.node, who = send.to.worker] { StepWorker(node, PeerUnreachable{who}); });
+  if (arrivals.count == 0) unused_jobs_.push_back(place);
+  for (int i = 0; i < arrivals.count; ++i) {
+    queue_.At(threads_.Begin(Threads::Machine(to), arrivals.times[i]), [this, to, place] { Deliver(to, place); });
+  }
+}
+
+void SimulatedService::Deliver(Node to, std::uint32_t place) {
+  Job& job = jobs_[place];
+  auto& message = std::get<SendPartial>(job.action).message;
+  if (--job.copies > 0) return StepWorker(to, MessageReceived{message, job.payload});
+  MessageReceived received{std::move(message), std::move(job.payload)};
+  unused_jobs_.push_back(place);
+  StepWorker(to, received);
+}
+
+}  // namespace slabstream

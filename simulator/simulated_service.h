@@ -1,0 +1,116 @@
+// SimulatedService: the machines of a coordinator and its workers in virtual time, as the service runs them with threads and sockets. It
+// steps a machine when something happens to it and wakes it when it asks for that; passes messages; and has each worker's threads do what
+// the machine starts. Conditions say what comes of all this, and when.
+//
+// Everything that happens is an event at a time: a message arrives, or a thread is done. The machine concerned takes one step, and its
+// actions become messages and jobs. Threads that hand something over wake each other (Threads).
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "simulator/conditions.h"
+#include "simulator/event_queue.h"
+#include "simulator/threads.h"
+#include "simulator/worker_lanes.h"
+
+namespace slabstream {
+
+class SimulatedService {
+ public:
+  // Both outlive the object. Of the machine: speeds, threads' wake-ups, cores, message_seconds.
+  SimulatedService(const MachineModel& machine, Conditions& conditions);
+
+  EventQueue& queue() { return queue_; }
+  double now() const { return queue_.now(); }
+  Time time() const { return TimeAt(now()); }  // as machines see it
+  // When the next event is due; infinity: nothing happens any more.
+  double next();
+  void RunNext();
+
+  // ---- the coordinator
+  void StartCoordinator(CoordinatorConfig config);  // in place of the last one, whose connections are gone
+  void StopCoordinator() { coordinator_runs_ = false; }
+  bool coordinator_runs() const { return coordinator_runs_; }
+  double coordinator_free() const { return coordinator_free_; }  // its thread has done what it has heard of
+  // At `when`, if it is still the same coordinator.
+  void TellCoordinator(double when, CoordinatorEvent event);
+  void StepCoordinator(const CoordinatorEvent& event);
+  // Names of connections of the coordinator at hand.
+  PeerToken TokenOf(Node node) const { return generation_ << 32U | node; }
+  std::optional<Node> NodeOf(PeerToken token) const;
+
+  // ---- workers
+  Node AddWorker(WorkerConfig config);  // its images_endpoint is its node
+  void KillWorker(Node node) { workers_[node].alive = false; }
+  std::size_t workers() const { return workers_.size(); }
+  bool alive(Node node) const { return workers_[node].alive; }
+  const WorkerMachine& worker(Node node) const { return workers_[node].machine; }
+  void StepWorker(Node node, const WorkerEvent& event);
+  bool Idle(Node node, Lane lane) const { return lanes_.Idle(node, lane); }
+  // How often in a row a machine asked to be woken at once, the coordinator's included.
+  int spins() const { return spins_; }
+
+  Threads& threads() { return threads_; }
+
+ private:
+  static constexpr double kNever = std::numeric_limits<double>::infinity();
+  struct Worker {
+    WorkerMachine machine;
+    bool alive = true;
+    double alarm = kNever;                   // planned
+    std::optional<std::uint32_t> rendering;  // a job
+  };
+
+  static Time TimeAt(double seconds);
+  static double SecondsAt(Time time);
+  void SetAlarm(double& alarm, Time wake, std::function<void()> ring);
+  void WakeCoordinator(std::uint64_t generation);
+  void WakeWorker(Node node);
+  void CountSpin(Time next_wake) { spins_ = next_wake <= time() ? spins_ + 1 : 0; }
+
+  void Perform(ToWorker& action);
+  void Perform(DropPlan&) {}
+  void Perform(StopService&) { StopCoordinator(); }
+  void Perform(auto& action) { conditions_.Perform(action); }
+
+  void Perform(Node node, SendControl& action) { SendToCoordinator(node, std::move(action.message), {}); }
+  void Perform(Node, ConnectSlabs&) {}
+  void Perform(Node node, CancelRender& action);
+  void Perform(Node node, StartRender& action) { workers_[node].rendering = Order({node, std::move(action)}); }
+  void Perform(Node node, StoreChunk& action) { Order({node, std::move(action)}); }
+  void Perform(Node node, StartCombine& action) { Order({node, std::move(action)}); }
+  void Perform(Node node, FindHidden& action) { Order({node, std::move(action)}); }
+  void Perform(Node node, SendPartial& action) { Order({node, std::move(action)}); }
+  void Perform(Node node, SendFrame& action) { Order({node, std::move(action)}); }
+  void Perform(Node node, auto& action) { conditions_.Perform(node, action); }
+
+  std::uint32_t Order(Job job);  // its place
+  void OnWorked(const LaneTask& task);
+  void Finish(std::uint32_t place);
+  void SendToCoordinator(Node from, AnyMessage message, Bytes payload);
+  void SendToPeer(std::uint32_t place);
+  void Deliver(Node to, std::uint32_t place);
+
+  const MachineModel& machine_;
+  Conditions& conditions_;
+  EventQueue queue_;
+  Threads threads_;
+  WorkerLanes lanes_;
+  std::unique_ptr<FrameMachine> coordinator_;
+  bool coordinator_runs_ = false;
+  std::uint64_t generation_ = 0;  // of the coordinator
+  double coordinator_free_ = 0, coordinator_alarm_ = kNever;
+  std::deque<Worker> workers_;  // by node
+  std::deque<Job> jobs_;
+  std::vector<std::uint32_t> unused_jobs_;  // places: a direct send of p ranks has p^2 of them
+  int spins_ = 0;
+};
+
+}  // namespace slabstream
