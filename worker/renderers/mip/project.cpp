@@ -39,22 +39,24 @@ HWY_INLINE Floats ValueOf(const ProjectWork& work, Floats samples) {
   return hn::Abs(hn::Min(hn::Max(value, hn::Zero(FloatTag())), Set(1)));  // without a sign of 0
 }
 
-// Returns whether any of a packet's rays has a sample in the box; `pixels` then holds them all.
+// What a packet's rays have found: the largest sign * sample so far, and which sample it was.
+struct Findings {
+  Floats best, at;
+  Mask any;
+};
+
+// Searches the samples [k, end) of each ray, which advances separately. It ends when it has found the box's extreme.
 template <class T>
-HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet, float* HWY_RESTRICT pixels) {
+HWY_INLINE void Search(const ProjectWork& work, const RayPacket& packet, Floats k, Floats end, Findings& found) {
   const FloatTag df;
   const RayBox& box = *work.box;
-  const SampleInterval owned = OwnedSamples(packet, box);
   const LeapScales leaps = LeapScalesOf(packet);
   const auto sign = Set(work.sign), most = Set(work.bounds->most);
   const Index3& cells = box.cells;
   const Index3& blocks = work.bounds->block_counts;
-  // Each ray advances separately: its next sample is k. It ends behind the box, or when it has found the box's extreme.
-  auto k = owned.begin;
-  auto alive = hn::Lt(k, owned.end);
-  auto best = Set(std::numeric_limits<float>::lowest());
-  auto found = hn::Lt(best, best);  // none
-  bool rising = true;               // most of the last samples were larger than those before
+  const auto searching = [&](Mask alive) HWY_ATTR { return hn::And(alive, hn::And(hn::Lt(k, end), hn::Lt(found.best, most))); };
+  auto alive = hn::And(hn::Lt(k, end), hn::Lt(found.best, most));
+  bool rising = false;  // most of the last samples were larger than those before
   while (!hn::AllFalse(df, alive)) {
     const SamplePlace place = PlaceSample(packet, box, k);
     // Rays leap over blocks and cells whose bound does not exceed what was found; the others go on to their next sample.
@@ -62,33 +64,50 @@ HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet
     auto steps = Set(1);
     if (!rising) {
       const auto block = hn::GatherIndex(df, work.bounds->blocks.data(), CellOf<kBlockShift>(place, blocks, alive));
-      const auto dull_block = hn::Le(block, best);
+      const auto dull_block = hn::Le(block, found.best);
       steps = hn::IfThenElse(dull_block, StepsWithin<kBlockShift>(box, leaps, place, Set(1)), steps);
       sampled = hn::AndNot(dull_block, sampled);
       if (!hn::AllFalse(df, sampled)) {
         const auto cell = hn::GatherIndex(df, work.bounds->cells.data(), CellOf<kCellShift>(place, cells, sampled));
-        const auto dull_cell = hn::AndNot(dull_block, hn::Le(cell, best));
+        const auto dull_cell = hn::AndNot(dull_block, hn::Le(cell, found.best));
         steps = hn::IfThenElse(dull_cell, StepsWithin<kCellShift>(box, leaps, place, Set(1)), steps);
         sampled = hn::AndNot(dull_cell, sampled);
       }
     }
+    if (!hn::AllFalse(df, sampled)) {
+      const Samples samples = SamplesAt<T>(box, place, sampled);
+      const auto candidate = hn::Mul(samples.values, sign);
+      const auto larger = hn::And(samples.valid, hn::Gt(candidate, found.best));
+      rising = hn::CountTrue(df, larger) > kLanes / 2;
+      found.best = hn::IfThenElse(larger, candidate, found.best);
+      found.at = hn::IfThenElse(larger, k, found.at);
+      found.any = hn::Or(found.any, samples.valid);
+    }
     k = hn::Add(k, steps);
-    alive = hn::And(alive, hn::Lt(k, owned.end));
-    if (hn::AllFalse(df, sampled)) continue;
-
-    const Samples samples = SamplesAt<T>(box, place, sampled);
-    const auto candidate = hn::Mul(samples.values, sign);
-    const auto larger = hn::And(samples.valid, hn::Gt(candidate, best));
-    rising = hn::CountTrue(df, larger) > kLanes / 2;
-    best = hn::IfThenElse(larger, candidate, best);
-    found = hn::Or(found, samples.valid);
-    alive = hn::And(alive, hn::Lt(best, most));
+    alive = searching(alive);
   }
-  if (hn::AllFalse(df, found)) return false;
-  auto value = ValueOf(work, hn::Mul(best, sign));
-  if (work.complement) value = hn::Sub(Set(1), value);
+}
+
+// Returns whether any of a packet's rays has a sample in the box; `pixels` then holds them all. Rays search from sample `hint` on, first
+// forwards, then backwards: the nearer it is to a ray's extreme, the more is leapt over. It becomes the extreme's sample.
+template <class T>
+HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet, Floats& hint, float* HWY_RESTRICT pixels) {
+  const FloatTag df;
+  const SampleInterval owned = OwnedSamples(packet, *work.box);
+  const auto start = hn::Min(hn::Max(hint, owned.begin), owned.end), one = Set(1);
+  Findings found = {Set(std::numeric_limits<float>::lowest()), start, hn::Lt(one, hn::Zero(df))};
+  Search<T>(work, packet, start, owned.end, found);
+  // Backwards: sample -k of the reversed ray is sample k, bit for bit.
+  RayPacket reversed = packet;
+  for (Floats& move : reversed.move) move = hn::Neg(move);
+  Findings before = {found.best, hn::Neg(found.at), found.any};
+  Search<T>(work, reversed, hn::Sub(one, start), hn::Sub(one, owned.begin), before);
+  hint = hn::Neg(before.at);
+  if (hn::AllFalse(df, before.any)) return false;
+  auto value = ValueOf(work, hn::Mul(before.best, Set(work.sign)));
+  if (work.complement) value = hn::Sub(one, value);
   const auto zero = hn::Zero(df);
-  hn::StoreInterleaved4(hn::IfThenElseZero(found, value), zero, zero, hn::IfThenElseZero(found, Set(1)), df, pixels);
+  hn::StoreInterleaved4(hn::IfThenElseZero(before.any, value), zero, zero, hn::IfThenElseZero(before.any, one), df, pixels);
   return true;
 }
 
@@ -121,8 +140,9 @@ HWY_INLINE bool SumOfPacket(const ProjectWork& work, const RayPacket& packet, fl
 
 template <class T>
 HWY_INLINE void Project(const ProjectWork& work, const PixelBounds& tile, float* HWY_RESTRICT pixels, std::size_t floats_a_row) {
+  Floats hint = hn::Zero(FloatTag());
   ForEachPacket(*work.rays, tile, pixels, floats_a_row, [&](const RayPacket& packet, float* HWY_RESTRICT result) HWY_ATTR {
-    return work.bounds != nullptr ? ExtremeOfPacket<T>(work, packet, result) : SumOfPacket<T>(work, packet, result);
+    return work.bounds != nullptr ? ExtremeOfPacket<T>(work, packet, hint, result) : SumOfPacket<T>(work, packet, result);
   });
 }
 
