@@ -68,14 +68,14 @@ HWY_INLINE void Search(const ProjectWork& work, const RayPacket& packet, Floats 
       steps = hn::IfThenElse(dull_block, StepsWithin<kBlockShift>(box, leaps, place, Set(1)), steps);
       sampled = hn::AndNot(dull_block, sampled);
       if (!hn::AllFalse(df, sampled)) {
-        const auto cell = hn::GatherIndex(df, work.bounds->cells.data(), CellOf<kCellShift>(place, cells, sampled));
+        const auto cell = hn::GatherIndex(df, work.bounds->cells.data(), CellOf<kCellShift>(place, cells, alive));
         const auto dull_cell = hn::AndNot(dull_block, hn::Le(cell, found.best));
         steps = hn::IfThenElse(dull_cell, StepsWithin<kCellShift>(box, leaps, place, Set(1)), steps);
         sampled = hn::AndNot(dull_cell, sampled);
       }
     }
     if (!hn::AllFalse(df, sampled)) {
-      const Samples samples = SamplesAt<T>(box, place, sampled);
+      const Samples samples = SamplesAt<T>(box, place, alive);
       const auto candidate = hn::Mul(samples.values, sign);
       const auto larger = hn::And(samples.valid, hn::Gt(candidate, found.best));
       rising = hn::CountTrue(df, larger) > kLanes / 2;
