@@ -45,69 +45,74 @@ struct Findings {
   Mask any;
 };
 
-// Searches the samples [k, end) of each ray, which advances separately. It ends when it has found the box's extreme.
+// A search along the rays of a packet, which advance separately.
+struct Search {
+  Floats k, direction;  // next sample of each ray; 1: forwards, -1: backwards
+  LeapScales leaps;     // in this direction
+  bool rising = false;  // most of the last samples were larger than those before
+};
+
+// Goes on by one sample or leap. Returns false if there is none: all rays have left the box or found its extreme.
 template <class T>
-HWY_INLINE void Search(const ProjectWork& work, const RayPacket& packet, Floats k, Floats end, Findings& found) {
+HWY_INLINE bool Advance(const ProjectWork& work, const RayPacket& packet, const SampleInterval& owned, Search& search, Findings& found) {
   const FloatTag df;
   const RayBox& box = *work.box;
-  const LeapScales leaps = LeapScalesOf(packet);
-  const auto sign = Set(work.sign), most = Set(work.bounds->most);
-  const Index3& cells = box.cells;
-  const Index3& blocks = work.bounds->block_counts;
-  const auto searching = [&](Mask alive) HWY_ATTR { return hn::And(alive, hn::And(hn::Lt(k, end), hn::Lt(found.best, most))); };
-  auto alive = hn::And(hn::Lt(k, end), hn::Lt(found.best, most));
-  bool rising = false;  // most of the last samples were larger than those before
-  while (!hn::AllFalse(df, alive)) {
-    const SamplePlace place = PlaceSample(packet, box, k);
-    // Rays leap over blocks and cells whose bound does not exceed what was found; the others go on to their next sample.
-    auto sampled = alive;
-    auto steps = Set(1);
-    if (!rising) {
-      const auto block = hn::GatherIndex(df, work.bounds->blocks.data(), CellOf<kBlockShift>(place, blocks, alive));
-      const auto dull_block = hn::Le(block, found.best);
-      steps = hn::IfThenElse(dull_block, StepsWithin<kBlockShift>(box, leaps, place, Set(1)), steps);
-      sampled = hn::AndNot(dull_block, sampled);
-      if (!hn::AllFalse(df, sampled)) {
-        const auto cell = hn::GatherIndex(df, work.bounds->cells.data(), CellOf<kCellShift>(place, cells, alive));
-        const auto dull_cell = hn::AndNot(dull_block, hn::Le(cell, found.best));
-        steps = hn::IfThenElse(dull_cell, StepsWithin<kCellShift>(box, leaps, place, Set(1)), steps);
-        sampled = hn::AndNot(dull_cell, sampled);
-      }
-    }
+  const SampleBounds& bounds = *work.bounds;
+  const auto inside = hn::And(hn::Ge(search.k, owned.begin), hn::Lt(search.k, owned.end));
+  const auto alive = hn::And(inside, hn::Lt(found.best, Set(bounds.most)));
+  if (hn::AllFalse(df, alive)) return false;
+  const SamplePlace place = PlaceSample(packet, box, search.k);
+  // Rays leap over blocks and cells whose bound does not exceed what was found; the others go on to their next sample.
+  auto sampled = alive;
+  auto steps = Set(1);
+  if (!search.rising) {
+    const auto block = hn::GatherIndex(df, bounds.blocks.data(), CellOf<kBlockShift>(place, bounds.block_counts, alive));
+    const auto dull_block = hn::Le(block, found.best);
+    steps = hn::IfThenElse(dull_block, StepsWithin<kBlockShift>(box, search.leaps, place, Set(1)), steps);
+    sampled = hn::AndNot(dull_block, sampled);
     if (!hn::AllFalse(df, sampled)) {
-      const Samples samples = SamplesAt<T>(box, place, alive);
-      const auto candidate = hn::Mul(samples.values, sign);
-      const auto larger = hn::And(samples.valid, hn::Gt(candidate, found.best));
-      rising = hn::CountTrue(df, larger) > kLanes / 2;
-      found.best = hn::IfThenElse(larger, candidate, found.best);
-      found.at = hn::IfThenElse(larger, k, found.at);
-      found.any = hn::Or(found.any, samples.valid);
+      const auto cell = hn::GatherIndex(df, bounds.cells.data(), CellOf<kCellShift>(place, box.cells, alive));
+      const auto dull_cell = hn::AndNot(dull_block, hn::Le(cell, found.best));
+      steps = hn::IfThenElse(dull_cell, StepsWithin<kCellShift>(box, search.leaps, place, Set(1)), steps);
+      sampled = hn::AndNot(dull_cell, sampled);
     }
-    k = hn::Add(k, steps);
-    alive = searching(alive);
   }
+  // If one ray takes its sample, all that are alive do: then its address need not wait for the bounds.
+  if (!hn::AllFalse(df, sampled)) {
+    const Samples samples = SamplesAt<T>(box, place, alive);
+    const auto candidate = hn::Mul(samples.values, Set(work.sign));
+    const auto larger = hn::And(samples.valid, hn::Gt(candidate, found.best));
+    search.rising = hn::CountTrue(df, larger) > kLanes / 2;
+    found.best = hn::IfThenElse(larger, candidate, found.best);
+    found.at = hn::IfThenElse(larger, search.k, found.at);
+    found.any = hn::Or(found.any, samples.valid);
+  }
+  search.k = hn::MulAdd(steps, search.direction, search.k);  // whole numbers: exact
+  return true;
 }
 
-// Returns whether any of a packet's rays has a sample in the box; `pixels` then holds them all. Rays search from sample `hint` on, first
-// forwards, then backwards: the nearer it is to a ray's extreme, the more is leapt over. It becomes the extreme's sample.
+// Returns whether any of a packet's rays has a sample in the box; `pixels` then holds them all. Rays search from sample `hint` on in both
+// directions: the nearer it is to a ray's extreme, the more is leapt over. It becomes the extreme's sample.
 template <class T>
 HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet, Floats& hint, float* HWY_RESTRICT pixels) {
   const FloatTag df;
   const SampleInterval owned = OwnedSamples(packet, *work.box);
   const auto start = hn::Min(hn::Max(hint, owned.begin), owned.end), one = Set(1);
   Findings found = {Set(std::numeric_limits<float>::lowest()), start, hn::Lt(one, hn::Zero(df))};
-  Search<T>(work, packet, start, owned.end, found);
-  // Backwards: sample -k of the reversed ray is sample k, bit for bit.
   RayPacket reversed = packet;
   for (Floats& move : reversed.move) move = hn::Neg(move);
-  Findings before = {found.best, hn::Neg(found.at), found.any};
-  Search<T>(work, reversed, hn::Sub(one, start), hn::Sub(one, owned.begin), before);
-  hint = hn::Neg(before.at);
-  if (hn::AllFalse(df, before.any)) return false;
-  auto value = ValueOf(work, hn::Mul(before.best, Set(work.sign)));
+  Search forwards = {start, one, LeapScalesOf(packet)}, backwards = {hn::Sub(start, one), Set(-1), LeapScalesOf(reversed)};
+  // In turns: while one waits for memory, the other goes on.
+  for (bool ahead = true, behind = true; ahead || behind;) {
+    ahead = ahead && Advance<T>(work, packet, owned, forwards, found);
+    behind = behind && Advance<T>(work, packet, owned, backwards, found);
+  }
+  hint = found.at;
+  if (hn::AllFalse(df, found.any)) return false;
+  auto value = ValueOf(work, hn::Mul(found.best, Set(work.sign)));
   if (work.complement) value = hn::Sub(one, value);
   const auto zero = hn::Zero(df);
-  hn::StoreInterleaved4(hn::IfThenElseZero(before.any, value), zero, zero, hn::IfThenElseZero(before.any, one), df, pixels);
+  hn::StoreInterleaved4(hn::IfThenElseZero(found.any, value), zero, zero, hn::IfThenElseZero(found.any, one), df, pixels);
   return true;
 }
 
@@ -140,7 +145,7 @@ HWY_INLINE bool SumOfPacket(const ProjectWork& work, const RayPacket& packet, fl
 
 template <class T>
 HWY_INLINE void Project(const ProjectWork& work, const PixelBounds& tile, float* HWY_RESTRICT pixels, std::size_t floats_a_row) {
-  Floats hint = hn::Zero(FloatTag());
+  Floats hint = Set(float((work.box->reach.begin + work.box->reach.end) / 2));
   ForEachPacket(*work.rays, tile, pixels, floats_a_row, [&](const RayPacket& packet, float* HWY_RESTRICT result) HWY_ATTR {
     return work.bounds != nullptr ? ExtremeOfPacket<T>(work, packet, hint, result) : SumOfPacket<T>(work, packet, result);
   });
