@@ -91,23 +91,30 @@ HWY_INLINE bool Advance(const ProjectWork& work, const RayPacket& packet, const 
   return true;
 }
 
-// Returns whether any of a packet's rays has a sample in the box; `pixels` then holds them all. Rays search from sample `hint` on in both
-// directions: the nearer it is to a ray's extreme, the more is leapt over. It becomes the extreme's sample.
+// Where the searches of a packet begin. Together they pass all samples if behind >= ahead - 1.
+struct Hint {
+  Floats ahead, behind;
+};
+
+// Returns whether any of a packet's rays has a sample in the box; `pixels` then holds them all. The nearer the hint is to a ray's extreme,
+// the more is leapt over. It becomes the extreme's sample, for the next packet.
 template <class T>
-HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet, Floats& hint, float* HWY_RESTRICT pixels) {
+HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet, Hint& hint, float* HWY_RESTRICT pixels) {
   const FloatTag df;
   const SampleInterval owned = OwnedSamples(packet, *work.box);
-  const auto start = hn::Min(hn::Max(hint, owned.begin), owned.end), one = Set(1);
-  Findings found = {Set(std::numeric_limits<float>::lowest()), start, hn::Lt(one, hn::Zero(df))};
+  const auto one = Set(1);
+  Findings found = {Set(std::numeric_limits<float>::lowest()), owned.begin, hn::Lt(one, hn::Zero(df))};
   RayPacket reversed = packet;
   for (Floats& move : reversed.move) move = hn::Neg(move);
-  Search forwards = {start, one, LeapScalesOf(packet)}, backwards = {hn::Sub(start, one), Set(-1), LeapScalesOf(reversed)};
+  Search forwards = {hn::Max(hint.ahead, owned.begin), one, LeapScalesOf(packet)};
+  Search backwards = {hn::Min(hint.behind, hn::Sub(owned.end, one)), Set(-1), LeapScalesOf(reversed)};
   // In turns: while one waits for memory, the other goes on.
   for (bool ahead = true, behind = true; ahead || behind;) {
     ahead = ahead && Advance<T>(work, packet, owned, forwards, found);
     behind = behind && Advance<T>(work, packet, owned, backwards, found);
   }
-  hint = found.at;
+  const auto mean = hn::Floor(hn::Mul(hn::SumOfLanes(df, found.at), Set(1.0F / float(kLanes))));
+  hint = {mean, hn::Sub(mean, one)};
   if (hn::AllFalse(df, found.any)) return false;
   auto value = ValueOf(work, hn::Mul(found.best, Set(work.sign)));
   if (work.complement) value = hn::Sub(one, value);
@@ -145,7 +152,7 @@ HWY_INLINE bool SumOfPacket(const ProjectWork& work, const RayPacket& packet, fl
 
 template <class T>
 HWY_INLINE void Project(const ProjectWork& work, const PixelBounds& tile, float* HWY_RESTRICT pixels, std::size_t floats_a_row) {
-  Floats hint = Set(float((work.box->reach.begin + work.box->reach.end) / 2));
+  Hint hint = {hn::Zero(FloatTag()), Set(1e9F)};  // none: the first packet searches from both ends
   ForEachPacket(*work.rays, tile, pixels, floats_a_row, [&](const RayPacket& packet, float* HWY_RESTRICT result) HWY_ATTR {
     return work.bounds != nullptr ? ExtremeOfPacket<T>(work, packet, hint, result) : SumOfPacket<T>(work, packet, result);
   });
