@@ -49,7 +49,7 @@ struct Findings {
 struct Search {
   Floats k, direction;  // next sample of each ray; 1: forwards, -1: backwards
   LeapScales leaps;     // in this direction
-  bool rising = false;  // most of the last samples were larger than those before
+  int blind = 0;        // next samples that are taken without a look at bounds
 };
 
 // Goes on by one sample or leap. Returns false if there is none: all rays have left the box or found its extreme.
@@ -65,7 +65,9 @@ HWY_INLINE bool Advance(const ProjectWork& work, const RayPacket& packet, const 
   // Rays leap over blocks and cells whose bound does not exceed what was found; the others go on to their next sample.
   auto sampled = alive;
   auto steps = Set(1);
-  if (!search.rising) {
+  if (search.blind > 0) {
+    --search.blind;
+  } else {
     const auto block = hn::GatherIndex(df, bounds.blocks.data(), CellOf<kBlockShift>(place, bounds.block_counts, alive));
     const auto dull_block = hn::Le(block, found.best);
     steps = hn::IfThenElse(dull_block, StepsWithin<kBlockShift>(box, search.leaps, place, Set(1)), steps);
@@ -76,13 +78,14 @@ HWY_INLINE bool Advance(const ProjectWork& work, const RayPacket& packet, const 
       steps = hn::IfThenElse(dull_cell, StepsWithin<kCellShift>(box, search.leaps, place, Set(1)), steps);
       sampled = hn::AndNot(dull_cell, sampled);
     }
+    // Where no ray leaps, none will on the next few samples: they are mostly in the same cells.
+    if (hn::AllFalse(df, hn::AndNot(sampled, alive))) search.blind = 2;
   }
   // If one ray takes its sample, all that are alive do: then its address need not wait for the bounds.
   if (!hn::AllFalse(df, sampled)) {
     const Samples samples = SamplesAt<T>(box, place, alive);
     const auto candidate = hn::Mul(samples.values, Set(work.sign));
     const auto larger = hn::And(samples.valid, hn::Gt(candidate, found.best));
-    search.rising = hn::CountTrue(df, larger) > kLanes / 2;
     found.best = hn::IfThenElse(larger, candidate, found.best);
     found.at = hn::IfThenElse(larger, search.k, found.at);
     found.any = hn::Or(found.any, samples.valid);
@@ -91,13 +94,13 @@ HWY_INLINE bool Advance(const ProjectWork& work, const RayPacket& packet, const 
   return true;
 }
 
-// Where the searches of a packet begin. Together they pass all samples if behind >= ahead - 1.
+// The samples at which the searches of a packet begin. Together they pass all samples if behind >= ahead - 1.
 struct Hint {
   Floats ahead, behind;
 };
 
-// Returns whether any of a packet's rays has a sample in the box; `pixels` then holds them all. The nearer the hint is to a ray's extreme,
-// the more is leapt over. It becomes the extreme's sample, for the next packet.
+// Returns whether any of a packet's rays has a sample in the box; `pixels` then holds them all. The nearer the hint is to the extremes of
+// its rays, the more is leapt over. It becomes their mean place, for the next packet.
 template <class T>
 HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet, Hint& hint, float* HWY_RESTRICT pixels) {
   const FloatTag df;
@@ -106,13 +109,14 @@ HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet
   Findings found = {Set(std::numeric_limits<float>::lowest()), owned.begin, hn::Lt(one, hn::Zero(df))};
   RayPacket reversed = packet;
   for (Floats& move : reversed.move) move = hn::Neg(move);
-  Search forwards = {hn::Max(hint.ahead, owned.begin), one, LeapScalesOf(packet)};
+  Search forwards = {hn::Max(hint.ahead, owned.begin), one, LeapScalesOf(packet), 1};
   Search backwards = {hn::Min(hint.behind, hn::Sub(owned.end, one)), Set(-1), LeapScalesOf(reversed)};
   // In turns: while one waits for memory, the other goes on.
   for (bool ahead = true, behind = true; ahead || behind;) {
     ahead = ahead && Advance<T>(work, packet, owned, forwards, found);
     behind = behind && Advance<T>(work, packet, owned, backwards, found);
   }
+  // One hint for all: rays that stay together read the same memory.
   const auto mean = hn::Floor(hn::Mul(hn::SumOfLanes(df, found.at), Set(1.0F / float(kLanes))));
   hint = {mean, hn::Sub(mean, one)};
   if (hn::AllFalse(df, found.any)) return false;
