@@ -167,8 +167,9 @@ HWY_INLINE SamplePlace PlaceSample(const RayPacket& packet, const RayBox& box, F
 // Index of the cell; 0 where not `owned`. kShift: log2 of the cell's side in voxels.
 template <int kShift>
 HWY_INLINE Ints CellOf(const SamplePlace& place, const Index3& cells, Mask owned) {
-  const auto row = hn::Add(hn::Mul(hn::ShiftRight<kShift>(place.voxel[2]), SetInt(cells.y)), hn::ShiftRight<kShift>(place.voxel[1]));
-  const auto index = hn::Add(hn::Mul(row, SetInt(cells.x)), hn::ShiftRight<kShift>(place.voxel[0]));
+  const auto slice = hn::Mul(hn::ShiftRight<kShift>(place.voxel[2]), SetInt(cells.x * cells.y));
+  const auto row = hn::Mul(hn::ShiftRight<kShift>(place.voxel[1]), SetInt(cells.x));
+  const auto index = hn::Add(hn::Add(slice, row), hn::ShiftRight<kShift>(place.voxel[0]));
   return hn::IfThenElseZero(hn::RebindMask(IntTag(), owned), index);
 }
 

@@ -39,56 +39,91 @@ HWY_INLINE Floats ValueOf(const ProjectWork& work, Floats samples) {
   return hn::Abs(hn::Min(hn::Max(value, hn::Zero(FloatTag())), Set(1)));  // without a sign of 0
 }
 
-// Returns whether any of a packet's rays has a sample in the box; `pixels` then holds them all.
+// What a packet's rays have found: the largest sign * sample so far, and which sample it was.
+struct Findings {
+  Floats best, at;
+  Mask any;
+};
+
+// A search along the rays of a packet, which advance separately.
+struct Search {
+  Floats k, direction;  // next sample of each ray; 1: forwards, -1: backwards
+  LeapScales leaps;     // in this direction
+  int blind = 0;        // next samples that are taken without a look at bounds
+};
+
+// Goes on by one sample or leap. Returns false if there is none: all rays have left the box or found its extreme.
 template <class T>
-HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet, float* HWY_RESTRICT pixels) {
+HWY_INLINE bool Advance(const ProjectWork& work, const RayPacket& packet, const SampleInterval& owned, Search& search, Findings& found) {
   const FloatTag df;
   const RayBox& box = *work.box;
-  const SampleInterval owned = OwnedSamples(packet, box);
-  const LeapScales leaps = LeapScalesOf(packet);
-  const auto sign = Set(work.sign), most = Set(work.bounds->most);
-  const Index3& cells = box.cells;
-  const Index3& blocks = work.bounds->block_counts;
-  // Each ray advances separately: its next sample is k. It ends behind the box, or when it has found the box's extreme.
-  auto k = owned.begin;
-  auto alive = hn::Lt(k, owned.end);
-  auto best = Set(std::numeric_limits<float>::lowest());
-  auto found = hn::Lt(best, best);  // none
-  bool rising = true;               // most of the last samples were larger than those before
-  while (!hn::AllFalse(df, alive)) {
-    const SamplePlace place = PlaceSample(packet, box, k);
-    // Rays leap over blocks and cells whose bound does not exceed what was found; the others go on to their next sample.
-    auto sampled = alive;
-    auto steps = Set(1);
-    if (!rising) {
-      const auto block = hn::GatherIndex(df, work.bounds->blocks.data(), CellOf<kBlockShift>(place, blocks, alive));
-      const auto dull_block = hn::Le(block, best);
-      steps = hn::IfThenElse(dull_block, StepsWithin<kBlockShift>(box, leaps, place, Set(1)), steps);
-      sampled = hn::AndNot(dull_block, sampled);
-      if (!hn::AllFalse(df, sampled)) {
-        const auto cell = hn::GatherIndex(df, work.bounds->cells.data(), CellOf<kCellShift>(place, cells, sampled));
-        const auto dull_cell = hn::AndNot(dull_block, hn::Le(cell, best));
-        steps = hn::IfThenElse(dull_cell, StepsWithin<kCellShift>(box, leaps, place, Set(1)), steps);
-        sampled = hn::AndNot(dull_cell, sampled);
-      }
+  const SampleBounds& bounds = *work.bounds;
+  const auto inside = hn::And(hn::Ge(search.k, owned.begin), hn::Lt(search.k, owned.end));
+  const auto alive = hn::And(inside, hn::Lt(found.best, Set(bounds.most)));
+  if (hn::AllFalse(df, alive)) return false;
+  const SamplePlace place = PlaceSample(packet, box, search.k);
+  // Rays leap over blocks and cells whose bound does not exceed what was found; the others go on to their next sample.
+  auto sampled = alive;
+  auto steps = Set(1);
+  if (search.blind > 0) {
+    --search.blind;
+  } else {
+    const auto block = hn::GatherIndex(df, bounds.blocks.data(), CellOf<kBlockShift>(place, bounds.block_counts, alive));
+    const auto dull_block = hn::Le(block, found.best);
+    steps = hn::IfThenElse(dull_block, StepsWithin<kBlockShift>(box, search.leaps, place, Set(1)), steps);
+    sampled = hn::AndNot(dull_block, sampled);
+    if (!hn::AllFalse(df, sampled)) {
+      const auto cell = hn::GatherIndex(df, bounds.cells.data(), CellOf<kCellShift>(place, box.cells, alive));
+      const auto dull_cell = hn::AndNot(dull_block, hn::Le(cell, found.best));
+      steps = hn::IfThenElse(dull_cell, StepsWithin<kCellShift>(box, search.leaps, place, Set(1)), steps);
+      sampled = hn::AndNot(dull_cell, sampled);
     }
-    k = hn::Add(k, steps);
-    alive = hn::And(alive, hn::Lt(k, owned.end));
-    if (hn::AllFalse(df, sampled)) continue;
-
-    const Samples samples = SamplesAt<T>(box, place, sampled);
-    const auto candidate = hn::Mul(samples.values, sign);
-    const auto larger = hn::And(samples.valid, hn::Gt(candidate, best));
-    rising = hn::CountTrue(df, larger) > kLanes / 2;
-    best = hn::IfThenElse(larger, candidate, best);
-    found = hn::Or(found, samples.valid);
-    alive = hn::And(alive, hn::Lt(best, most));
+    // Where no ray leaps, none will on the next few samples: they are mostly in the same cells.
+    if (hn::AllFalse(df, hn::AndNot(sampled, alive))) search.blind = 2;
   }
-  if (hn::AllFalse(df, found)) return false;
-  auto value = ValueOf(work, hn::Mul(best, sign));
-  if (work.complement) value = hn::Sub(Set(1), value);
+  // If one ray takes its sample, all that are alive do: then its address need not wait for the bounds.
+  if (!hn::AllFalse(df, sampled)) {
+    const Samples samples = SamplesAt<T>(box, place, alive);
+    const auto candidate = hn::Mul(samples.values, Set(work.sign));
+    const auto larger = hn::And(samples.valid, hn::Gt(candidate, found.best));
+    found.best = hn::IfThenElse(larger, candidate, found.best);
+    found.at = hn::IfThenElse(larger, search.k, found.at);
+    found.any = hn::Or(found.any, samples.valid);
+  }
+  search.k = hn::MulAdd(steps, search.direction, search.k);  // whole numbers: exact
+  return true;
+}
+
+// The samples at which the searches of a packet begin. Together they pass all samples if behind >= ahead - 1.
+struct Hint {
+  Floats ahead, behind;
+};
+
+// Returns whether any of a packet's rays has a sample in the box; `pixels` then holds them all. The nearer the hint is to the extremes of
+// its rays, the more is leapt over. It becomes their mean place, for the next packet.
+template <class T>
+HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet, Hint& hint, float* HWY_RESTRICT pixels) {
+  const FloatTag df;
+  const SampleInterval owned = OwnedSamples(packet, *work.box);
+  const auto one = Set(1);
+  Findings found = {Set(std::numeric_limits<float>::lowest()), owned.begin, hn::Lt(one, hn::Zero(df))};
+  RayPacket reversed = packet;
+  for (Floats& move : reversed.move) move = hn::Neg(move);
+  Search forwards = {hn::Max(hint.ahead, owned.begin), one, LeapScalesOf(packet), 1};
+  Search backwards = {hn::Min(hint.behind, hn::Sub(owned.end, one)), Set(-1), LeapScalesOf(reversed)};
+  // In turns: while one waits for memory, the other goes on.
+  for (bool ahead = true, behind = true; ahead || behind;) {
+    ahead = ahead && Advance<T>(work, packet, owned, forwards, found);
+    behind = behind && Advance<T>(work, packet, owned, backwards, found);
+  }
+  // One hint for all: rays that stay together read the same memory.
+  const auto mean = hn::Floor(hn::Mul(hn::SumOfLanes(df, found.at), Set(1.0F / float(kLanes))));
+  hint = {mean, hn::Sub(mean, one)};
+  if (hn::AllFalse(df, found.any)) return false;
+  auto value = ValueOf(work, hn::Mul(found.best, Set(work.sign)));
+  if (work.complement) value = hn::Sub(one, value);
   const auto zero = hn::Zero(df);
-  hn::StoreInterleaved4(hn::IfThenElseZero(found, value), zero, zero, hn::IfThenElseZero(found, Set(1)), df, pixels);
+  hn::StoreInterleaved4(hn::IfThenElseZero(found.any, value), zero, zero, hn::IfThenElseZero(found.any, one), df, pixels);
   return true;
 }
 
@@ -121,8 +156,9 @@ HWY_INLINE bool SumOfPacket(const ProjectWork& work, const RayPacket& packet, fl
 
 template <class T>
 HWY_INLINE void Project(const ProjectWork& work, const PixelBounds& tile, float* HWY_RESTRICT pixels, std::size_t floats_a_row) {
+  Hint hint = {hn::Zero(FloatTag()), Set(1e9F)};  // none: the first packet searches from both ends
   ForEachPacket(*work.rays, tile, pixels, floats_a_row, [&](const RayPacket& packet, float* HWY_RESTRICT result) HWY_ATTR {
-    return work.bounds != nullptr ? ExtremeOfPacket<T>(work, packet, result) : SumOfPacket<T>(work, packet, result);
+    return work.bounds != nullptr ? ExtremeOfPacket<T>(work, packet, hint, result) : SumOfPacket<T>(work, packet, result);
   });
 }
 
