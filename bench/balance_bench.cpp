@@ -222,7 +222,7 @@ int main(int argc, char** argv) {
   CLI::App app("Imbalance of partitions");
   app.add_option("VOLUME", options.volumes, "Files, or sphere1:N and sphere2:N")->required();
   app.add_option("--transfer", options.preset, "A preset");
-  app.add_option("--renderer", options.renderer)->check(CLI::IsMember({"splat", "zbuffer"}));
+  app.add_option("--renderer", options.renderer)->check(CLI::IsMember(slabstream::RendererNames()));
   app.add_option("--decomposition", options.decompositions, "Only these");
   app.add_option("--split", options.splits)->check(CLI::IsMember({"voxels", "occupied"}));
   std::vector<std::string> assignments;

@@ -32,7 +32,8 @@ PolicyTable::Kind PolicyTable::KindOf(const Request& request) {
   return {.projection = frame.view.projection,
           .traversal_axis = MakeCamera(frame.view, frame.size, request.summary->description.geometry).traversal_axis,
           .zoom_octave = std::ilogb(frame.view.zoom),
-          .size = frame.size};
+          .size = frame.size,
+          .parameters = frame.parameters};
 }
 
 Result<ChosenPolicy> PolicyTable::Choose(const Request& request, Entry& entry, const Kind& kind, const Policy& open,

@@ -53,12 +53,13 @@ class PolicyTable {
   void Learn(const PlannedFrame& frame, std::span<const RankReport> reports);
 
  private:
-  // Views of a kind look at the same slices at about the same size.
+  // Views of a kind look at the same slices at about the same size, rendered alike.
   struct Kind {
     Projection projection = Projection::kOrthographic;
     Axis traversal_axis = Axis::kX;
     int zoom_octave = 0;
     ImageSize size;
+    ParameterTexts parameters;
     friend bool operator==(const Kind&, const Kind&) = default;
   };
   struct Choice {

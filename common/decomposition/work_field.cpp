@@ -7,13 +7,14 @@
 #include <numeric>
 
 #include "common/base/check.h"
+#include "common/calibration/calibration.h"
 
 namespace slabstream {
 
 std::vector<double> CellWork(const OccupancyGrid& grid) {
   std::vector<double> work;
   work.reserve(grid.cells.size());
-  for (const CellOccupancy& cell : grid.cells) work.push_back(cell.voxels > 0 ? cell.voxels + kCellWork : 0);
+  for (const CellOccupancy& cell : grid.cells) work.push_back(cell.voxels > 0 ? cell.voxels + calibration::kCellWork : 0);
   return work;
 }
 

@@ -35,7 +35,7 @@ double VoxelPixels(const FrameSetup& setup) {
 BoxEstimator::BoxEstimator(const FrameSetup& setup, const VolumeSummary& summary, const OccupancyGrid& occupied, const WorkField* measured,
                            std::int32_t pixel_side)
     : setup_(setup),
-      cost_(*setup.renderer, {&occupied, &summary, &setup.transfer}, measured),
+      cost_(*setup.renderer, {&occupied, &summary, &setup.transfer, setup.parameters}, measured),
       view_(CostViewOf(setup)),
       frame_(FrameBounds(setup)),
       pixel_side_(pixel_side),

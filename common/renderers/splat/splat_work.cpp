@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "common/calibration/calibration.h"
 #include "common/volume/cell_range.h"
 
 namespace slabstream::splat {
@@ -11,8 +12,8 @@ namespace {
 
 constexpr std::int32_t kRim = 2;                 // voxels on either side of a sample that reach it
 constexpr std::int32_t kLayer = kOccupancyCell;  // bits from a line of a cell to the one above it
-// Mean optical depth of a segment's rays when the last of them is opaque: exp(-6.93) is kDefaultTermination. The factor was fitted.
-constexpr float kOpaqueDepth = 1.5F * 6.93F;
+// Mean optical depth of a segment's rays when the last of them is opaque: exp(-6.93) is kDefaultTermination.
+constexpr float kOpaqueDepth = calibration::splat::kOpaqueDepth * 6.93F;
 constexpr double kMostPixels = 2;  // a voxel, as SheetGrid has it
 
 // tan(elevation) / cos(azimuth), at 20 and 30 degrees: how far a ray rises for each unit across the slices.
