@@ -216,7 +216,7 @@ CLI::Option* AddEndpoint(CLI::App& app, std::string& endpoint) {
 
 void AddTransferOptions(CLI::App& app, TransferChoice& transfer) {
   std::string help = "Transfer function: a ParaView colour map (a .json file) or one of these presets";
-  for (const PresetInfo& preset : TransferPresets()) help += fmt::format("\n  {}: {}", preset.name, preset.purpose);
+  for (const TransferPreset& preset : TransferPresets()) help += fmt::format("\n  {}: {}", preset.name, preset.purpose);
   AddParsed(app, "--transfer", transfer.choice, ParseTransfer, help)->type_name("TRANSFER")->default_str("auto");
   AddNumber(app, "--opacity-distance", transfer.opacity_distance, {0, kMaxOpacityDistance, true},
             "Length of material, in voxels, that has the opacity which the transfer function says");
