@@ -53,7 +53,7 @@ int Run(int argc, char** argv) {
   }
   const auto parsed_link = slabstream::ParseLink("--link", link);
   if (!parsed_link.ok()) return Fail(parsed_link.status());
-  options.planner.surroundings.link = *parsed_link;
+  options.surroundings.link = *parsed_link;
   auto catalogue = slabstream::MakeCatalogue(data);
   if (!catalogue.ok()) return Fail(catalogue.status());
   options.catalogue = std::move(*catalogue);
