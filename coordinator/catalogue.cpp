@@ -1,5 +1,7 @@
 #include "coordinator/catalogue.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
@@ -32,9 +34,9 @@ VolumeLoader LoaderOf(const std::string& path) {
 }
 
 Status Add(Catalogue& catalogue, const std::string& name, const fs::path& path, const std::string& argument) {
-  if (name.empty() || name.size() > kMaxNameBytes || !std::all_of(name.begin(), name.end(), AllowedInName)) {
-    return Status::InvalidArgument("--data " + argument + ": dataset name \"" + name + "\" must have 1 to " +
-                                   std::to_string(kMaxNameBytes) + " letters, digits, '.', '_' or '-'");
+  if (name.empty() || name.size() > kMaxNameBytes || !std::ranges::all_of(name, AllowedInName)) {
+    return Status::InvalidArgument(
+        fmt::format("--data {}: dataset name \"{}\" must have 1 to {} letters, digits, '.', '_' or '-'", argument, name, kMaxNameBytes));
   }
   if (!catalogue.emplace(name, LoaderOf(path.string())).second) {
     return Status::InvalidArgument("--data " + argument + ": there is already a dataset named \"" + name + "\"");
@@ -54,7 +56,7 @@ Status AddDirectory(Catalogue& catalogue, const fs::path& directory, const std::
   }
   if (error) return Status::NotFound("--data " + argument + ": cannot read the directory: " + error.message());
   if (found.empty()) return Status::InvalidArgument("--data " + argument + ": no volume file in this directory");
-  std::sort(found.begin(), found.end());
+  std::ranges::sort(found);
   for (const fs::path& path : found) {
     if (Status status = Add(catalogue, Stem(path), path, argument); !status.ok()) return status;
   }

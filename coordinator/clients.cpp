@@ -12,7 +12,7 @@ void ClientTable::Touch(PeerToken client, Time now) {
   if (found != clients_.end()) found->second.last_heard = now;
 }
 
-void ClientTable::Forget(PeerToken client) { clients_.erase(client); }
+bool ClientTable::Forget(PeerToken client) { return clients_.erase(client) > 0; }
 
 void ClientTable::Postpone(Duration duration) {
   for (auto& [token, client] : clients_) client.last_heard += duration;
@@ -46,7 +46,7 @@ Answer* ClientTable::FindAnswer(PeerToken token, RequestId request) {
   const auto client = clients_.find(token);
   if (client == clients_.end()) return nullptr;
   auto& answers = client->second.answers;
-  const auto answer = std::find_if(answers.begin(), answers.end(), [request](const Answer& a) { return a.request == request; });
+  const auto answer = std::ranges::find(answers, request, &Answer::request);
   return answer == answers.end() ? nullptr : &*answer;
 }
 

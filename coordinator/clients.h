@@ -33,10 +33,9 @@ class ClientTable {
 
   void Meet(PeerToken client, Time now);   // heard; from now on it has an entry
   void Touch(PeerToken client, Time now);  // heard, if it has one
-  void Forget(PeerToken client);
-  void Postpone(Duration duration);  // all silences begin later, since the listener itself was asleep
+  bool Forget(PeerToken client);           // true: it had one
+  void Postpone(Duration duration);        // all silences begin later, since the listener itself was asleep
 
-  bool Knows(PeerToken client) const { return clients_.contains(client); }
   std::vector<PeerToken> Silent(Time now) const;
   std::size_t size() const { return clients_.size(); }
   Time NextWake() const;  // the next silence

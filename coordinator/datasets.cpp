@@ -1,11 +1,15 @@
 #include "coordinator/datasets.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <ranges>
 #include <utility>
 
 namespace slabstream {
 
 namespace {
-constexpr int kNamesInMessage = 12;
+constexpr std::size_t kNamesInMessage = 12;
 }
 
 DatasetTable::DatasetTable(const std::vector<std::string>& names) {
@@ -19,14 +23,10 @@ const DatasetTable::Entry* DatasetTable::Find(const std::string& name) const {
 
 Status DatasetTable::NoSuchDataset(const std::string& name) const {
   if (entries_.empty()) return Status::NotFound("no dataset \"" + name + "\": the catalogue is empty");
-  std::string known;
-  int listed = 0;
-  for (const auto& [other, entry] : entries_) {
-    if (listed == kNamesInMessage) break;
-    known += (listed++ == 0 ? "" : ", ") + other;
-  }
-  if (entries_.size() > kNamesInMessage) known += " and " + std::to_string(entries_.size() - kNamesInMessage) + " more";
-  return Status::NotFound("no dataset \"" + name + "\": the catalogue has " + known);
+  const auto names = entries_ | std::views::keys | std::views::take(kNamesInMessage);
+  const std::string more = entries_.size() > kNamesInMessage ? fmt::format(" and {} more", entries_.size() - kNamesInMessage) : "";
+  return Status::NotFound(
+      fmt::format("no dataset \"{}\": the catalogue has {}{}", name, fmt::join(names.begin(), names.end(), ", "), more));
 }
 
 DatasetId DatasetTable::BeginLoad(const std::string& name) {

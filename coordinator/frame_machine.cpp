@@ -21,19 +21,11 @@ constexpr std::size_t kPlansAhead = 1;
 
 void FrameMachine::State::On(const DatasetLoaded& event) {
   if (!datasets.Loaded(event.name, event.dataset, event.summary)) return;
-  std::vector<std::pair<OpenRequest, Status>> failed;
-  queue.Update([&](OpenRequest& request) {
-    if (request.submit.frame.dataset != event.name) return;
-    if (Status status = FindVolume(request); !status.ok()) {
-      failed.emplace_back(request, std::move(status));
-    } else {
-      SendQueued(request);
-    }
+  const auto waits = [&](const OpenRequest& request) { return request.submit.frame.dataset == event.name && !request.volume; };
+  queue.ForEach([&](OpenRequest& request) {
+    if (waits(request) && FindVolume(request).ok()) SendQueued(request);
   });
-  for (const auto& [request, status] : failed) {
-    queue.Extract([&](const OpenRequest& queued) { return queued.Is(request.client, request.submit.request); });
-    FailRequest(request, status);
-  }
+  for (OpenRequest& request : queue.Extract(waits)) FailRequest(request, FindVolume(request));
 }
 
 void FrameMachine::State::On(const DatasetFailed& event) {
@@ -55,7 +47,7 @@ void FrameMachine::State::On(const OccupiedCounted& event) {
 void FrameMachine::State::On(const Planned& event) {
   planning.erase(event.plan);
   if (event.frame.ok()) {
-    queue.Update([&](OpenRequest& request) {
+    queue.ForEach([&](OpenRequest& request) {
       if (request.plan == event.plan) request.planned = *event.frame;
     });
   } else {
@@ -116,8 +108,7 @@ PlanRequest FrameMachine::State::MakePlanRequest(const OpenRequest& request) {
                   .summary = datasets.Find(frame.dataset)->summary,
                   .occupied = request.needs_occupancy ? occupancy.Find(*request.volume) : nullptr,
                   .roster = std::move(team.roster),
-                  .turn = team.turn,
-                  .workers = {}};
+                  .turn = team.turn};
   for (const Member& member : roster.members()) {
     const Register& worker = member.description;
     ask.workers.push_back({worker.memory_scope, worker.lends_memory, worker.threads, worker.pid});
@@ -254,7 +245,7 @@ void FrameMachine::State::StopAll(const AnyMessage& goodbye, const std::string& 
   stopped = true;
 }
 
-Time FrameMachine::State::NextWake() const {
+Time FrameMachine::State::NextWake() {
   Time next = std::min(roster.NextWake(), clients.NextWake());
   const auto consider = [&](const OpenRequest& request) {
     next = std::min(next, request.deadline());

@@ -38,7 +38,7 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const SubmitFrame& m
 Status FrameMachine::State::Admissible(PeerToken client, const SubmitFrame& message) const {
   if (datasets.Find(message.frame.dataset) == nullptr) return datasets.NoSuchDataset(message.frame.dataset);
   if (Status names = CheckNames(message.frame.policy); !names.ok()) return names;
-  const auto running = std::count_if(frames.begin(), frames.end(), [&](const RunningFrame& f) { return f.request().client == client; });
+  const auto running = std::ranges::count(frames, client, [](const RunningFrame& frame) { return frame.request().client; });
   if (queue.CountOf(client) + std::size_t(running) >= kMaxOpenRequests) {
     return Status::ResourceExhausted("this client has " + std::to_string(kMaxOpenRequests) +
                                      " open requests, which is the limit of a client");
@@ -132,8 +132,7 @@ void FrameMachine::State::FailRequest(const OpenRequest& request, const Status& 
 }
 
 void FrameMachine::State::FreeClient(PeerToken client) {
-  if (!clients.Knows(client)) return;
-  clients.Forget(client);
+  if (!clients.Forget(client)) return;
   queue.Extract([client](const OpenRequest& request) { return request.client == client; });
   std::vector<FrameId> orphans;
   for (const RunningFrame& frame : frames) {

@@ -135,7 +135,7 @@ struct FrameMachine::State {
   void RemoveWorker(WorkerId worker);
   void StopAll(const AnyMessage& goodbye, const std::string& reason);
   Ping MakePing() const { return {.epoch = config.epoch, .finished_before = frames.finished_before(), .cancelled = frames.cancelled()}; }
-  Time NextWake() const;
+  Time NextWake();
 
   // ---- actions
   void SendWorker(WorkerId worker, AnyMessage message) {

@@ -22,12 +22,12 @@ void FramesInFlight::Remove(FrameId id) {
 }
 
 RunningFrame* FramesInFlight::Find(FrameId id) {
-  const auto frame = std::find_if(frames_.begin(), frames_.end(), [id](const RunningFrame& f) { return f.id() == id; });
+  const auto frame = std::ranges::find(frames_, id, &RunningFrame::id);
   return frame == frames_.end() ? nullptr : &*frame;
 }
 
 RunningFrame* FramesInFlight::FindRequest(PeerToken client, RequestId request) {
-  const auto frame = std::find_if(frames_.begin(), frames_.end(), [&](const RunningFrame& f) { return f.request().Is(client, request); });
+  const auto frame = std::ranges::find_if(frames_, [&](const RunningFrame& f) { return f.request().Is(client, request); });
   return frame == frames_.end() ? nullptr : &*frame;
 }
 
@@ -51,7 +51,7 @@ FramesInFlight::Choice FramesInFlight::Next(std::size_t workers) {
   std::uint32_t unfinished = 0;
   for (const RunningFrame& frame : frames_) unfinished += frame.unfinished_groups();
   if (unfinished >= std::uint32_t(window.groups)) return {};
-  const auto next = std::find_if(frames_.begin(), frames_.end(), [](const RunningFrame& frame) {
+  const auto next = std::ranges::find_if(frames_, [](const RunningFrame& frame) {
     const bool masked = UsesOcclusion(frame.plan().setup);
     return frame.CanHandOut() && (!masked || frame.unfinished_groups() < std::uint32_t(kMaskedGroups));
   });

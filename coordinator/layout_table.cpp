@@ -57,7 +57,6 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
                      .policy = &policy,
                      .renderer = request.volume->renderer(),
                      .slots = request.slots,
-                     .slab_bytes_target = request.slab_bytes_target,
                      .known = {.occupied = request.occupied.get()}};
   std::optional<WorkField> cost;
   const auto with_cost = [&]() -> const LayoutRequest& {
@@ -65,7 +64,7 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
     return make;
   };
 
-  const auto found = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& entry) { return entry.key == key; });
+  const auto found = std::ranges::find(entries_, key, &Entry::key);
   if (found == entries_.end()) {
     entries_.push_front({std::move(key), std::make_shared<const Layout>(MakeLayout(with_cost())), known, 0, 0, {}});
     KeepFirst(entries_, kMaxKept);
@@ -116,8 +115,8 @@ void LayoutTable::Learn(const ClassifiedVolume& volume, const FramePlan& plan, c
   const std::map<BoxId, double> seconds = SecondsOf(*plan.layout, reports);
   if (seconds.empty()) return;
   const Key key = KeyOf(volume, policy, plan.slots);
-  const auto entry = std::find_if(entries_.begin(), entries_.end(),
-                                  [&](const Entry& e) { return e.key == key && (e.layout == plan.layout || *e.layout == *plan.layout); });
+  const auto is_of = [&](const Entry& e) { return e.key == key && (e.layout == plan.layout || *e.layout == *plan.layout); };
+  const auto entry = std::ranges::find_if(entries_, is_of);
   // The first frame of a layout counts most; a frame of a layout that has been changed since counts as an average one.
   double weight = kLeastWeight;
   if (entry != entries_.end()) {

@@ -38,7 +38,6 @@ class LayoutTable {
     const VolumeSummary* summary = nullptr;
     std::shared_ptr<const OccupancyGrid> occupied;  // null: the policy does not need it
     std::uint32_t slots = 1;
-    std::int64_t slab_bytes_target = kSlabBytesTarget;
   };
   // The layout to plan the frame with.
   std::shared_ptr<const Layout> Find(const Request& request);

@@ -48,9 +48,9 @@ int Run(int argc, char** argv) {
   AddRepeated(app, "--data", data, "A volume to serve, as NAME=FILE, or a directory of volumes that are named after their files")
       ->type_name("NAME=FILE");
   app.add_flag("--compress", compress, "Pack voxels for workers with zstd: pays on links slower than about 300 MB/s, not within a machine");
-  options.planner.surroundings.link = *ParseLink("--link", kDefaultLink);
+  options.surroundings.link = *ParseLink("--link", kDefaultLink);
   AddParsed(
-      app, "--link", options.planner.surroundings.link, ParseLink,
+      app, "--link", options.surroundings.link, ParseLink,
       "Between workers of different hosts, as NAME or NAME:MICROSECONDS,GBIT, for policies that are 'auto'" + Explained(LinkPresets()))
       ->type_name("LINK")
       ->default_str(kDefaultLink);

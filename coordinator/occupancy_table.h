@@ -23,8 +23,8 @@ class OccupancyTable {
   bool Counting(const ClassifiedVolume& volume) const;
   CountId Begin(const ClassifiedVolume& volume);  // neither found nor counting
 
-  // The end of a count. False: there is none with this id under way; nothing changes.
-  bool Counted(CountId count, std::shared_ptr<const OccupancyGrid> grid);
+  // The end of a count. If there is none with this id under way, nothing changes.
+  void Counted(CountId count, std::shared_ptr<const OccupancyGrid> grid);
   // Likewise; returns the volume whose count failed. It may be begun anew.
   std::optional<ClassifiedVolume> Failed(CountId count);
 
@@ -34,6 +34,8 @@ class OccupancyTable {
     CountId count = 0;
     std::shared_ptr<const OccupancyGrid> grid;  // null: under way
   };
+  std::list<Entry>::iterator UnderWay(CountId count);
+
   std::list<Entry> entries_;  // most recently used first
   CountId last_count_ = 0;
 };

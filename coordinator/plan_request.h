@@ -25,15 +25,15 @@ struct PlanRequest {
   std::shared_ptr<const OccupancyGrid> occupied;  // of it; null: the policy does not need it (NeedsOccupancy)
   Roster roster;                                  // of the frame's team, with a worker in it
   Turn turn;
-  std::vector<HostedWorker> workers;  // all of the service: an open policy is chosen for them
+  std::vector<HostedWorker> workers = {};  // all of the service: an open policy is chosen for them
 };
 
 struct PlannedFrame {
   PlanRequest asked;
-  ResolvedPolicy policy;                      // policy that the plan was made by
-  std::optional<FramePrediction> prediction;  // none: the policy was not open, or the frame is too much to simulate
-  double render_scale = 1;                    // used for the prediction (PolicyTable)
-  FramePlan plan;
+  ResolvedPolicy policy = {};                      // policy that the plan was made by
+  std::optional<FramePrediction> prediction = {};  // none: the policy was not open, or the frame is too much to simulate
+  double render_scale = 1;                         // used for the prediction (PolicyTable)
+  FramePlan plan = {};
 
   bool teaches() const { return asked.occupied != nullptr || prediction; }  // render times help to plan coming frames
 };

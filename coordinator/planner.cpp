@@ -22,54 +22,39 @@ std::optional<Result<std::shared_ptr<const PlannedFrame>>> Planner::PlanAtHand(c
   std::shared_ptr<const Layout> layout =
       layouts_.FindMade({.policy = &*policy, .volume = &request.volume, .slots = std::uint32_t(request.roster.slots.size())});
   if (layout == nullptr || layout->owners.size() > kMostBoxes) return std::nullopt;
-  auto planned = std::make_shared<PlannedFrame>(PlannedFrame{.asked = request, .policy = *std::move(policy), .prediction = {}, .plan = {}});
-  return WithLayout(std::move(planned), std::move(layout));
+  return WithLayout({.asked = request, .policy = *std::move(policy)}, std::move(layout));
 } catch (const std::exception&) {
   return std::nullopt;  // Plan meets the same and says what it is
 }
 
 Result<std::shared_ptr<const PlannedFrame>> Planner::TryPlan(const PlanRequest& request) {
-  auto planned = std::make_shared<PlannedFrame>(PlannedFrame{.asked = request, .policy = {}, .prediction = {}, .plan = {}});
-  const VolumeGeometry& geometry = request.summary->description.geometry;
-  const auto slots = std::uint32_t(request.roster.slots.size());
+  PlannedFrame planned{.asked = request};
   if (LeavesChoice(request.frame.policy)) {
-    FrameRequest frame = request.frame;
-    frame.policy = SettledPolicy(frame, geometry);
-    const MachineModel machine = ServiceMachine(request.workers, config_.surroundings);
-    const Result<ChosenPolicy> chosen = policies_.Find({.frame = &frame,
-                                                        .volume = &request.volume,
-                                                        .summary = request.summary.get(),
-                                                        .occupied = request.occupied,
-                                                        .slots = slots,
-                                                        .machine = &machine,
-                                                        .slab_bytes_target = config_.slab_bytes_target,
-                                                        .layouts = &layouts_});
+    Result<ChosenPolicy> chosen = policies_.Find(request, ServiceMachine(request.workers, surroundings_), layouts_);
     if (!chosen.ok()) return chosen.status();
-    planned->policy = chosen->policy;
-    planned->prediction = chosen->prediction;
-    planned->render_scale = chosen->render_scale;
+    planned.policy = std::move(chosen->policy);
+    planned.prediction = chosen->prediction;
+    planned.render_scale = chosen->render_scale;
   } else {
-    Result<ResolvedPolicy> policy = ResolvePolicy(request.frame, geometry);
+    Result<ResolvedPolicy> policy = ResolvePolicy(request.frame, request.summary->description.geometry);
     if (!policy.ok()) return policy.status();
-    planned->policy = *std::move(policy);
+    planned.policy = *std::move(policy);
   }
-  std::shared_ptr<const Layout> layout = layouts_.Find({.policy = &planned->policy,
+  std::shared_ptr<const Layout> layout = layouts_.Find({.policy = &planned.policy,
                                                         .volume = &request.volume,
                                                         .summary = request.summary.get(),
                                                         .occupied = request.occupied,
-                                                        .slots = slots,
-                                                        .slab_bytes_target = config_.slab_bytes_target});
+                                                        .slots = std::uint32_t(request.roster.slots.size())});
   return WithLayout(std::move(planned), std::move(layout));
 }
 
-Result<std::shared_ptr<const PlannedFrame>> Planner::WithLayout(std::shared_ptr<PlannedFrame> planned,
-                                                                std::shared_ptr<const Layout> layout) {
-  const PlanRequest& request = planned->asked;
-  Result<FramePlan> plan = PlanFrame(request.frame, planned->policy, request.volume.dataset(), *request.summary, request.roster,
-                                     std::move(layout), request.turn);
+Result<std::shared_ptr<const PlannedFrame>> Planner::WithLayout(PlannedFrame planned, std::shared_ptr<const Layout> layout) {
+  const PlanRequest& request = planned.asked;
+  Result<FramePlan> plan =
+      PlanFrame(request.frame, planned.policy, request.volume.dataset(), *request.summary, request.roster, std::move(layout), request.turn);
   if (!plan.ok()) return plan.status();
-  planned->plan = *std::move(plan);
-  return std::shared_ptr<const PlannedFrame>(std::move(planned));
+  planned.plan = *std::move(plan);
+  return std::make_shared<const PlannedFrame>(std::move(planned));
 }
 
 void Planner::Learn(const FrameMeasured& measured) {

@@ -15,14 +15,10 @@
 
 namespace slabstream {
 
-struct PlannerConfig {
-  std::int64_t slab_bytes_target = kSlabBytesTarget;
-  ServiceSurroundings surroundings;  // what policies are chosen for
-};
-
 class Planner {
  public:
-  explicit Planner(PlannerConfig config = {}) : config_(std::move(config)) {}
+  // `surroundings`: what open policies are chosen for.
+  explicit Planner(const ServiceSurroundings& surroundings = {}) : surroundings_(surroundings) {}
 
   // Errors as of PlanFrame and ChoosePolicy; ResourceExhausted or Internal for exceptions.
   Result<std::shared_ptr<const PlannedFrame>> Plan(const PlanRequest& request);
@@ -36,10 +32,9 @@ class Planner {
 
  private:
   Result<std::shared_ptr<const PlannedFrame>> TryPlan(const PlanRequest& request);
-  static Result<std::shared_ptr<const PlannedFrame>> WithLayout(std::shared_ptr<PlannedFrame> planned,
-                                                                std::shared_ptr<const Layout> layout);
+  static Result<std::shared_ptr<const PlannedFrame>> WithLayout(PlannedFrame planned, std::shared_ptr<const Layout> layout);
 
-  const PlannerConfig config_;
+  const ServiceSurroundings surroundings_;
   std::mutex mutex_;  // guards what follows
   LayoutTable layouts_;
   PolicyTable policies_;

@@ -27,46 +27,49 @@ double RenderSeconds(std::span<const RankReport> reports) {
 
 }  // namespace
 
-PolicyTable::Kind PolicyTable::KindOf(const Request& request) {
-  const FrameRequest& frame = *request.frame;
+PolicyTable::Kind PolicyTable::KindOf(const PlanRequest& request) {
+  const FrameRequest& frame = request.frame;
   return {.projection = frame.view.projection,
           .traversal_axis = MakeCamera(frame.view, frame.size, request.summary->description.geometry).traversal_axis,
           .zoom_octave = std::ilogb(frame.view.zoom),
-          .size = frame.size};
+          .size = frame.size,
+          .parameters = frame.parameters};
 }
 
-Result<ChosenPolicy> PolicyTable::Choose(const Request& request, Entry& entry, const Kind& kind, const Policy& open,
+PolicyTable::Key PolicyTable::KeyOf(const PlanRequest& request) {
+  return {request.volume, SettledPolicy(request.frame, request.summary->description.geometry), std::uint32_t(request.roster.slots.size())};
+}
+
+Result<ChosenPolicy> PolicyTable::Choose(const PlanRequest& request, LayoutTable& layouts, Entry& entry, const Policy& open,
                                          const ResolvedPolicy* now) {
-  const std::optional<WorkField> cost = entry.by_cost ? request.layouts->KnownCost(*request.volume) : std::nullopt;
-  FrameRequest frame = *request.frame;
+  const std::optional<WorkField> cost = entry.by_cost ? layouts.KnownCost(request.volume) : std::nullopt;
+  FrameRequest frame = request.frame;
   frame.policy = open;
   const Result<PolicyChoice> choice = ChoosePolicy({.frame = &frame,
-                                                    .summary = request.summary,
+                                                    .summary = request.summary.get(),
                                                     .known = {.occupied = request.occupied.get(), .cost = cost ? &*cost : nullptr},
-                                                    .slots = request.slots,
-                                                    .machine = request.machine,
-                                                    .slab_bytes_target = request.slab_bytes_target,
+                                                    .slots = entry.key.slots,
+                                                    .machine = &entry.machine,
                                                     .render_scale = entry.render_scale,
                                                     .now = now,
                                                     .least_gain = kRevisitGain});
   if (!choice.ok()) return choice.status();
-  ChosenPolicy chosen{choice->policy, choice->prediction, entry.render_scale};
-  const auto same = std::ranges::find(entry.choices, kind, &Choice::kind);
-  if (same != entry.choices.end()) entry.choices.erase(same);
+  const ChosenPolicy chosen{choice->policy, choice->prediction, entry.render_scale};
+  const Kind kind = KindOf(request);
+  entry.choices.remove_if([&](const Choice& same) { return same.kind == kind; });
   entry.choices.push_front({kind, chosen, entry.frames_seen});
   KeepFirst(entry.choices, kMaxKinds);
   return chosen;
 }
 
-Result<ChosenPolicy> PolicyTable::Find(const Request& request) {
-  const Kind kind = KindOf(request);
-  Key key{*request.volume, request.frame->policy, request.slots};
+Result<ChosenPolicy> PolicyTable::Find(const PlanRequest& request, const MachineModel& machine, LayoutTable& layouts) {
+  Key key = KeyOf(request);
   const auto found = std::ranges::find(entries_, key, &Entry::key);
-  if (found == entries_.end() || found->machine != *request.machine) {
+  if (found == entries_.end() || found->machine != machine) {
     if (found != entries_.end()) entries_.erase(found);
-    Entry entry{.key = std::move(key), .machine = *request.machine};
-    entry.by_cost = request.layouts->KnowsCost(*request.volume);
-    Result<ChosenPolicy> chosen = Choose(request, entry, kind, entry.key.asked, nullptr);
+    Entry entry{.key = std::move(key), .machine = machine};
+    entry.by_cost = layouts.KnowsCost(request.volume);
+    Result<ChosenPolicy> chosen = Choose(request, layouts, entry, entry.key.asked, nullptr);
     if (!chosen.ok()) return chosen;
     entries_.push_front(std::move(entry));
     KeepFirst(entries_, kMaxKept);
@@ -75,33 +78,32 @@ Result<ChosenPolicy> PolicyTable::Find(const Request& request) {
   entries_.splice(entries_.begin(), entries_, found);
   Entry& entry = entries_.front();
   const ResolvedPolicy holds = entry.choices.front().chosen.policy;
-  if (!entry.by_cost && request.layouts->KnowsCost(*request.volume)) {
+  if (!entry.by_cost && layouts.KnowsCost(request.volume)) {
     entry.by_cost = true;
     entry.render_scale = 1;  // costs are seconds now
     entry.frames_seen = 0;
     entry.choices.clear();
-    Result<ChosenPolicy> chosen = Choose(request, entry, kind, entry.key.asked, &holds);
+    Result<ChosenPolicy> chosen = Choose(request, layouts, entry, entry.key.asked, &holds);
     if (!chosen.ok()) entries_.pop_front();
     return chosen;
   }
-  const auto choice = std::ranges::find(entry.choices, kind, &Choice::kind);
+  const auto choice = std::ranges::find(entry.choices, KindOf(request), &Choice::kind);
   if (choice == entry.choices.end()) {
     Policy open = AskFor(holds);
     open.combine = entry.key.asked.combine;
-    return Choose(request, entry, kind, open, nullptr);
+    return Choose(request, layouts, entry, open, nullptr);
   }
   const int seen = entry.frames_seen;
   const int due =
       seen < kMostFramesAPrediction ? int(std::bit_floor(unsigned(seen))) : seen / kMostFramesAPrediction * kMostFramesAPrediction;
-  if (choice->made_after < due) return Choose(request, entry, kind, AskFor(choice->chosen.policy), nullptr);
+  if (choice->made_after < due) return Choose(request, layouts, entry, AskFor(choice->chosen.policy), nullptr);
   entry.choices.splice(entry.choices.begin(), entry.choices, choice);
   return choice->chosen;
 }
 
 void PolicyTable::Learn(const PlannedFrame& frame, std::span<const RankReport> reports) {
   if (!frame.prediction || frame.prediction->render_seconds <= 0) return;
-  const Policy asked = SettledPolicy(frame.asked.frame, frame.asked.summary->description.geometry);
-  const auto entry = std::ranges::find(entries_, Key{frame.asked.volume, asked, frame.plan.slots}, &Entry::key);
+  const auto entry = std::ranges::find(entries_, KeyOf(frame.asked), &Entry::key);
   const double seconds = RenderSeconds(reports);
   if (entry == entries_.end() || seconds <= 0) return;
   const double weight = std::max(kLeastWeight, 1.0 / ++entry->frames_seen);

@@ -36,29 +36,21 @@ class PolicyTable {
   static constexpr double kLeastWeight = 0.2;        // of a frame's render time, however many came before it
   static constexpr int kMostFramesAPrediction = 64;  // it is made anew after 1, 2, 4 ... frames, later after every so many
 
-  struct Request {
-    const FrameRequest* frame = nullptr;       // its policy has known names (CheckNames)
-    const ClassifiedVolume* volume = nullptr;  // of the frame
-    const VolumeSummary* summary = nullptr;
-    std::shared_ptr<const OccupancyGrid> occupied;  // null: not counted
-    std::uint32_t slots = 1;
-    const MachineModel* machine = nullptr;
-    std::int64_t slab_bytes_target = kSlabBytesTarget;
-    LayoutTable* layouts = nullptr;  // source of measured costs
-  };
+  // The policy for the frame of `request`, which leaves a choice. `machine`: of its workers. `layouts`: the source of measured costs.
   // Errors as of ChoosePolicy.
-  Result<ChosenPolicy> Find(const Request& request);
+  Result<ChosenPolicy> Find(const PlanRequest& request, const MachineModel& machine, LayoutTable& layouts);
 
   // Learns from a finished frame, if it had a prediction.
   void Learn(const PlannedFrame& frame, std::span<const RankReport> reports);
 
  private:
-  // Views of a kind look at the same slices at about the same size.
+  // Views of a kind look at the same slices at about the same size, rendered alike.
   struct Kind {
     Projection projection = Projection::kOrthographic;
     Axis traversal_axis = Axis::kX;
     int zoom_octave = 0;
     ImageSize size;
+    ParameterTexts parameters;
     friend bool operator==(const Kind&, const Kind&) = default;
   };
   struct Choice {
@@ -68,7 +60,7 @@ class PolicyTable {
   };
   struct Key {
     ClassifiedVolume volume;
-    Policy asked;
+    Policy asked;  // settled (SettledPolicy)
     std::uint32_t slots = 1;
     friend bool operator==(const Key&, const Key&) = default;
   };
@@ -80,8 +72,10 @@ class PolicyTable {
     int frames_seen = 0;
     std::list<Choice> choices;  // by kind; most recently used first; they differ only in `combine`
   };
-  static Kind KindOf(const Request& request);
-  Result<ChosenPolicy> Choose(const Request& request, Entry& entry, const Kind& kind, const Policy& open, const ResolvedPolicy* now);
+  static Kind KindOf(const PlanRequest& request);
+  static Key KeyOf(const PlanRequest& request);
+  static Result<ChosenPolicy> Choose(const PlanRequest& request, LayoutTable& layouts, Entry& entry, const Policy& open,
+                                     const ResolvedPolicy* now);
 
   std::list<Entry> entries_;  // most recently used first
 };

@@ -6,14 +6,14 @@
 namespace slabstream {
 
 void RequestQueue::Push(OpenRequest request) {
-  auto queue = std::find_if(turn_.begin(), turn_.end(), [&](const ClientQueue& q) { return q.client == request.client; });
+  auto queue = std::ranges::find(turn_, request.client, &ClientQueue::client);
   if (queue == turn_.end()) queue = turn_.insert(queue, ClientQueue{.client = request.client});
   queue->requests.push_back(std::move(request));
 }
 
 std::optional<OpenRequest> RequestQueue::TakeNext(const Predicate& ready) {
   for (auto queue = turn_.begin(); queue != turn_.end(); ++queue) {
-    const auto found = std::find_if(queue->requests.begin(), queue->requests.end(), ready);
+    const auto found = std::ranges::find_if(queue->requests, ready);
     if (found == queue->requests.end()) continue;
     OpenRequest request = std::move(*found);
     queue->requests.erase(found);
@@ -40,15 +40,9 @@ std::vector<OpenRequest> RequestQueue::Extract(const Predicate& wanted) {
   return extracted;
 }
 
-void RequestQueue::ForEach(const std::function<void(const OpenRequest&)>& visit) const {
-  for (const ClientQueue& queue : turn_) {
-    for (const OpenRequest& request : queue.requests) visit(request);
-  }
-}
-
-void RequestQueue::Update(const std::function<void(OpenRequest&)>& change) {
+void RequestQueue::ForEach(const std::function<void(OpenRequest&)>& visit) {
   for (ClientQueue& queue : turn_) {
-    for (OpenRequest& request : queue.requests) change(request);
+    for (OpenRequest& request : queue.requests) visit(request);
   }
 }
 
@@ -65,10 +59,8 @@ void RequestQueue::VisitInTurn(const std::function<bool(OpenRequest&)>& visit) {
 }
 
 bool RequestQueue::Contains(PeerToken client, RequestId request) const {
-  return std::any_of(turn_.begin(), turn_.end(), [&](const ClientQueue& queue) {
-    return queue.client == client &&
-           std::any_of(queue.requests.begin(), queue.requests.end(), [&](const OpenRequest& r) { return r.submit.request == request; });
-  });
+  const auto queue = std::ranges::find(turn_, client, &ClientQueue::client);
+  return queue != turn_.end() && std::ranges::any_of(queue->requests, [&](const OpenRequest& r) { return r.Is(client, request); });
 }
 
 std::size_t RequestQueue::size() const {
@@ -78,28 +70,18 @@ std::size_t RequestQueue::size() const {
 }
 
 std::size_t RequestQueue::CountOf(PeerToken client) const {
-  const auto queue = std::find_if(turn_.begin(), turn_.end(), [&](const ClientQueue& q) { return q.client == client; });
+  const auto queue = std::ranges::find(turn_, client, &ClientQueue::client);
   return queue == turn_.end() ? 0 : queue->requests.size();
 }
 
-std::uint32_t RequestQueue::PositionOf(PeerToken client, RequestId request) const {
-  const auto own = std::find_if(turn_.begin(), turn_.end(), [&](const ClientQueue& q) { return q.client == client; });
-  CHECK(own != turn_.end()) << "client " << client;
-  const auto found =
-      std::find_if(own->requests.begin(), own->requests.end(), [&](const OpenRequest& r) { return r.submit.request == request; });
-  CHECK(found != own->requests.end()) << "request " << request;
-  // Before its turn, `before` requests of each client behind it in turn are served, and one more of each client in front of it.
-  const std::size_t before = std::size_t(found - own->requests.begin());
-  std::size_t position = before;
-  std::size_t served = before + 1;
-  for (auto queue = turn_.begin(); queue != turn_.end(); ++queue) {
-    if (queue == own) {
-      served = before;
-    } else {
-      position += std::min(queue->requests.size(), served);
-    }
-  }
-  return std::uint32_t(position);
+std::uint32_t RequestQueue::PositionOf(PeerToken client, RequestId request) {
+  std::uint32_t position = 0;
+  VisitInTurn([&](const OpenRequest& r) {
+    if (r.Is(client, request)) return false;
+    ++position;
+    return true;
+  });
+  return position;
 }
 
 }  // namespace slabstream

@@ -40,22 +40,21 @@ class RequestQueue {
   std::optional<OpenRequest> TakeNext(const Predicate& ready);
   std::vector<OpenRequest> Extract(const Predicate& wanted);  // takes all of them out, wherever they stand
 
-  void ForEach(const std::function<void(const OpenRequest&)>& visit) const;  // in turn of clients, then in order of arrival
-  void Update(const std::function<void(OpenRequest&)>& change);              // likewise
+  void ForEach(const std::function<void(OpenRequest&)>& visit);  // in turn of clients, then in order of arrival
   // In the order in which they are served if all are ready, until `visit` returns false.
   void VisitInTurn(const std::function<bool(OpenRequest&)>& visit);
   bool Contains(PeerToken client, RequestId request) const;
   std::size_t size() const;
   std::size_t CountOf(PeerToken client) const;
-  // Frames that are served before this one if all are ready. The request must be there.
-  std::uint32_t PositionOf(PeerToken client, RequestId request) const;
+  // Frames that are served before this one if all are ready. All of them, if it is not there.
+  std::uint32_t PositionOf(PeerToken client, RequestId request);
 
  private:
   struct ClientQueue {
     PeerToken client = 0;
     std::deque<OpenRequest> requests;  // never empty
   };
-  std::list<ClientQueue> turn_;  // the front is served next
+  std::list<ClientQueue> turn_;  // the front is served next; client by client
 };
 
 }  // namespace slabstream

@@ -3,19 +3,30 @@
 #include <algorithm>
 
 namespace slabstream {
+namespace {
+
+template <class Predicate>
+std::vector<WorkerId> IdsOf(const std::vector<Member>& members, Predicate&& wanted) {
+  std::vector<WorkerId> ids;
+  for (const Member& member : members) {
+    if (wanted(member)) ids.push_back(member.id);
+  }
+  return ids;
+}
+
+Incarnation IncarnationOf(const Member& member) { return member.description.incarnation; }
+
+}  // namespace
 
 std::vector<WorkerId> LiveRoster::ReplacedBy(const Register& message, PeerToken from) const {
-  std::vector<WorkerId> replaced;
-  for (const Member& member : members_) {
+  return IdsOf(members_, [&](const Member& member) {
     const bool same_place = member.peer == from || member.description.images_endpoint == message.images_endpoint;
-    if (same_place && member.description.incarnation != message.incarnation) replaced.push_back(member.id);
-  }
-  return replaced;
+    return same_place && IncarnationOf(member) != message.incarnation;
+  });
 }
 
 WorkerId LiveRoster::Admit(const Register& message, PeerToken from, Time now) {
-  const auto known =
-      std::find_if(members_.begin(), members_.end(), [&](const Member& m) { return m.description.incarnation == message.incarnation; });
+  const auto known = std::ranges::find(members_, message.incarnation, IncarnationOf);
   if (known != members_.end()) {
     known->peer = from;
     known->description = message;
@@ -23,7 +34,7 @@ WorkerId LiveRoster::Admit(const Register& message, PeerToken from, Time now) {
     return known->id;
   }
   members_.push_back({.id = ++last_id_, .peer = from, .description = message, .last_heard = now});
-  auto slot = std::find_if(slots_.begin(), slots_.end(), [](const Slot& s) { return s.worker == 0; });
+  auto slot = std::ranges::find(slots_, WorkerId{0}, &Slot::worker);
   if (slot == slots_.end()) slot = slots_.insert(slot, Slot{});
   slot->worker = last_id_;
   ++version_;
@@ -31,8 +42,7 @@ WorkerId LiveRoster::Admit(const Register& message, PeerToken from, Time now) {
 }
 
 LiveRoster::News LiveRoster::Hear(const Heartbeat& message, PeerToken from, Time now) {
-  const auto member =
-      std::find_if(members_.begin(), members_.end(), [&](const Member& m) { return m.description.incarnation == message.incarnation; });
+  const auto member = std::ranges::find(members_, message.incarnation, IncarnationOf);
   if (member == members_.end()) return {};
   if (member->id != message.worker) return {.stale = true};
   // Counters never fall within one life, so an old heartbeat that arrives late is no progress.
@@ -70,28 +80,20 @@ void LiveRoster::Postpone(Duration duration) {
 }
 
 const Member* LiveRoster::Find(WorkerId worker) const {
-  const auto member = std::find_if(members_.begin(), members_.end(), [worker](const Member& m) { return m.id == worker; });
+  const auto member = std::ranges::find(members_, worker, &Member::id);
   return member == members_.end() ? nullptr : &*member;
 }
 
 std::vector<WorkerId> LiveRoster::At(PeerToken peer) const {
-  std::vector<WorkerId> workers;
-  for (const Member& member : members_) {
-    if (member.peer == peer) workers.push_back(member.id);
-  }
-  return workers;
+  return IdsOf(members_, [peer](const Member& member) { return member.peer == peer; });
 }
 
 std::vector<WorkerId> LiveRoster::Silent(Time now) const {
-  std::vector<WorkerId> workers;
-  for (const Member& member : members_) {
-    if (now >= member.last_heard + timeout_) workers.push_back(member.id);
-  }
-  return workers;
+  return IdsOf(members_, [&](const Member& member) { return now >= member.last_heard + timeout_; });
 }
 
 std::uint32_t LiveRoster::SlotOf(WorkerId worker) const {
-  const auto slot = std::find_if(slots_.begin(), slots_.end(), [worker](const Slot& s) { return s.worker == worker; });
+  const auto slot = std::ranges::find(slots_, worker, &Slot::worker);
   CHECK(worker != 0 && slot != slots_.end()) << "worker " << worker << " has no slot";
   return std::uint32_t(slot - slots_.begin());
 }
@@ -104,9 +106,7 @@ Roster LiveRoster::slots() const {
 
 Roster LiveRoster::Refill(const Roster& planned) const {
   Roster refilled = planned;
-  const auto used = [&](WorkerId worker) {
-    return std::find(refilled.slots.begin(), refilled.slots.end(), worker) != refilled.slots.end();
-  };
+  const auto used = [&](WorkerId worker) { return std::ranges::find(refilled.slots, worker) != refilled.slots.end(); };
   for (WorkerId& worker : refilled.slots) {
     if (Find(worker) == nullptr) worker = 0;
   }
@@ -114,7 +114,7 @@ Roster LiveRoster::Refill(const Roster& planned) const {
     if (refilled.slots[i] == 0 && !used(slots_[i].worker)) refilled.slots[i] = slots_[i].worker;
   }
   for (const Member& member : members_) {
-    const auto vacant = std::find(refilled.slots.begin(), refilled.slots.end(), WorkerId{0});
+    const auto vacant = std::ranges::find(refilled.slots, WorkerId{0});
     if (vacant != refilled.slots.end() && !used(member.id)) *vacant = member.id;
   }
   return refilled;

@@ -1,6 +1,10 @@
 #include "coordinator/running_frame.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <iterator>
+#include <ranges>
 #include <string>
 #include <utility>
 
@@ -12,7 +16,7 @@ namespace slabstream {
 namespace {
 
 void AddOnce(std::vector<WorkerId>& workers, WorkerId worker) {
-  if (worker != 0 && std::find(workers.begin(), workers.end(), worker) == workers.end()) workers.push_back(worker);
+  if (worker != 0 && std::ranges::find(workers, worker) == workers.end()) workers.push_back(worker);
 }
 
 std::string WorkerName(WorkerId worker) { return "worker " + std::to_string(worker); }
@@ -43,7 +47,7 @@ bool RunningFrame::waiting() const { return !attempt_due_ && (next_group_ > grou
 bool RunningFrame::HasPart(WorkerId worker) const {
   if (worker == plan_.display) return true;
   return std::any_of(plan_.groups.begin() + groups_done_, plan_.groups.end(), [worker](const GroupPlan& group) {
-    return std::any_of(group.placements.begin(), group.placements.end(), [worker](const Placement& p) { return p.worker == worker; });
+    return std::ranges::find(group.placements, worker, &Placement::worker) != group.placements.end();
   });
 }
 
@@ -207,9 +211,8 @@ Status RunningFrame::Expire(Time now) {
 
 Status RunningFrame::CountStall(const Status& reason, Duration pause, Time now) {
   if (++stalls_ >= limits_.max_stalls) {
-    return Status(reason.code(), reason.message() + " (" + std::to_string(groups_done_) + " of " + std::to_string(group_count()) +
-                                     " groups were done at attempt " + std::to_string(attempt()) + "; " + std::to_string(stalls_) +
-                                     " failures in a row is the limit)");
+    return Status(reason.code(), fmt::format("{} ({} of {} groups were done at attempt {}; {} failures in a row is the limit)",
+                                             reason.message(), groups_done_, group_count(), attempt(), stalls_));
   }
   attempt_due_ = now + pause;
   return Status::Ok();
@@ -251,8 +254,7 @@ FrameStatistics RunningFrame::Statistics(Time now) const {
                              .grid = FrameBounds(plan_.setup),
                              .predicted = request_.planned->prediction};
   const auto append = [&](const std::vector<RankReport>& reports) {
-    const std::size_t room = kMaxReports - statistics.reports.size();
-    statistics.reports.insert(statistics.reports.end(), reports.begin(), reports.begin() + std::ptrdiff_t(std::min(room, reports.size())));
+    std::ranges::copy(reports | std::views::take(kMaxReports - statistics.reports.size()), std::back_inserter(statistics.reports));
   };
   for (const auto& reports : reports_) append(reports);
   append(display_reports_);

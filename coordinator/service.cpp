@@ -52,23 +52,20 @@ bool MostBricksAreEqual(const VolumeSummary& summary) {
 struct News {
   CoordinatorEvent event;
   DatasetId dataset = 0;
-  SlabServer::Samples samples;
+  SlabServer::Samples samples = {};
 };
-
-News NewsOf(CoordinatorEvent event) { return {.event = std::move(event), .dataset = 0, .samples = {}}; }
 
 Result<News> Load(const VolumeLoader& loader, const LoadDataset& action) {
   const Result<std::shared_ptr<const Volume>> volume = loader();
   if (!volume.ok()) return volume.status();
   auto summary = std::make_shared<const VolumeSummary>(Summarize(**volume));
-  News news{.event = {}, .dataset = action.dataset, .samples = {}};
+  SlabServer::Samples samples;
   if (MostBricksAreEqual(*summary)) {
-    news.samples.bricks = std::make_shared<const BrickedVoxels>((*volume)->block);
+    samples.bricks = std::make_shared<const BrickedVoxels>((*volume)->block);
   } else {
-    news.samples.volume = *volume;
+    samples.volume = *volume;
   }
-  news.event = DatasetLoaded{action.name, action.dataset, std::move(summary)};
-  return news;
+  return News{DatasetLoaded{action.name, action.dataset, std::move(summary)}, action.dataset, std::move(samples)};
 }
 
 Result<std::shared_ptr<const OccupancyGrid>> Count(const CountFunction& count, const SlabServer::Samples& samples,
@@ -88,7 +85,7 @@ struct CoordinatorService::Impl {
         slabs(std::move(slab_server)),
         make_plan(std::move(service_options.make_plan)),
         count_occupied(std::move(service_options.count_occupied)),
-        planner(std::make_shared<Planner>(std::move(service_options.planner))) {}
+        planner(std::make_shared<Planner>(service_options.surroundings)) {}
 
   void Run();
   void Loop();
@@ -186,7 +183,7 @@ void CoordinatorService::Impl::Send(Socket& socket, PeerTable& peers, PeerToken 
   if (sent.ok()) return;
   LogDebug(std::string(NameOf(message)) + " not sent: " + sent.message());
   peers.Forget(to);
-  inbox->Post(NewsOf(gone));
+  inbox->Post({gone});
 }
 
 void CoordinatorService::Impl::ReceiveFromWorkers() {
@@ -227,38 +224,38 @@ void CoordinatorService::Impl::Perform(LoadDataset& action) {
   const auto load = [loader = catalogue.at(action.name), action] {
     const std::string barrier = "dataset \"" + action.name + "\" could not be loaded";
     Result<News> loaded = Guarded(barrier.c_str(), [&] { return Load(loader, action); });
-    return loaded.ok() ? *std::move(loaded) : NewsOf(DatasetFailed{action.name, loaded.status()});
+    return loaded.ok() ? *std::move(loaded) : News{DatasetFailed{action.name, loaded.status()}};
   };
   const Status begun = Guarded("loading", [&] {
     loads.Post([inbox = inbox, load] { inbox->Post(load()); });
     return Status::Ok();
   });
-  if (!begun.ok()) inbox->Post(NewsOf(DatasetFailed{action.name, begun}));
+  if (!begun.ok()) inbox->Post({DatasetFailed{action.name, begun}});
 }
 
 void CoordinatorService::Impl::Perform(CountDataset& action) {
   const Status begun = Guarded("counting of occupied voxels", [&] {
     counts.Post([inbox = inbox, count = count_occupied, samples = slabs->Find(action.volume.dataset()), action] {
       auto grid = Guarded("counting of occupied voxels", [&] { return Count(count, samples, action); });
-      inbox->Post(NewsOf(OccupiedCounted{action.count, std::move(grid)}));
+      inbox->Post({OccupiedCounted{action.count, std::move(grid)}});
     });
     return Status::Ok();
   });
-  if (!begun.ok()) inbox->Post(NewsOf(OccupiedCounted{action.count, begun}));
+  if (!begun.ok()) inbox->Post({OccupiedCounted{action.count, begun}});
 }
 
 void CoordinatorService::Impl::Perform(PlanRequest& action) {
   const PlanId plan = action.plan;
-  if (auto planned = planner->PlanAtHand(action)) return inbox->Post(NewsOf(Planned{plan, *std::move(planned)}));
+  if (auto planned = planner->PlanAtHand(action)) return inbox->Post({Planned{plan, *std::move(planned)}});
   const Status begun = Guarded("planning", [&] {
     const auto& dropped = plans[plan] = std::make_shared<std::atomic<bool>>(false);
     planning.Post([inbox = inbox, planner = planner, make = make_plan, dropped, request = std::move(action)] {
       if (*dropped) return;
-      inbox->Post(NewsOf(Planned{request.plan, Guarded("planning", [&] { return make(*planner, request); })}));
+      inbox->Post({Planned{request.plan, Guarded("planning", [&] { return make(*planner, request); })}});
     });
     return Status::Ok();
   });
-  if (!begun.ok()) inbox->Post(NewsOf(Planned{plan, begun}));
+  if (!begun.ok()) inbox->Post({Planned{plan, begun}});
 }
 
 void CoordinatorService::Impl::Perform(DropPlan& action) {
@@ -308,8 +305,8 @@ Result<std::unique_ptr<CoordinatorService>> CoordinatorService::Start(Context& c
 
   options.machine.pid = static_cast<std::uint32_t>(::getpid());
   options.machine.slabs_endpoint = (*slabs)->endpoint();
-  options.planner.surroundings.memory_scope = SharedMemoryScope();
-  options.planner.surroundings.cores = std::int32_t(std::max(std::thread::hardware_concurrency(), 1U));
+  options.surroundings.memory_scope = SharedMemoryScope();
+  options.surroundings.cores = std::int32_t(std::max(std::thread::hardware_concurrency(), 1U));
   options.machine.datasets.clear();
   for (const auto& [name, loader] : options.catalogue) options.machine.datasets.push_back(name);
   auto impl = std::make_unique<Impl>(std::move(options), std::move(*clients), std::move(*control), std::move(*slabs));

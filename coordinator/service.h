@@ -24,13 +24,13 @@ using CountFunction = std::function<OccupancyGrid(const VoxelBricks&, const Clas
 using PlanFunction = std::function<Result<std::shared_ptr<const PlannedFrame>>(Planner&, const PlanRequest&)>;
 
 struct CoordinatorOptions {
-  std::string client_endpoint;  // bound; a wildcard port is read back
-  std::string worker_endpoint;  // bound; empty: WorkerEndpointFor(client_endpoint)
-  std::string slabs_endpoint;   // bound; empty: any port, ".slabs" beside an ipc path or inproc name
-  Catalogue catalogue;          // name -> how to load it
-  Codec codec = Codec::kRaw;    // of voxels on their way to workers; zstd pays if the link is slower than packing
-  CoordinatorConfig machine;    // epoch, pid, slabs_endpoint and datasets are filled in by Start
-  PlannerConfig planner;        // surroundings, except the link, are filled in by Start
+  std::string client_endpoint;       // bound; a wildcard port is read back
+  std::string worker_endpoint;       // bound; empty: WorkerEndpointFor(client_endpoint)
+  std::string slabs_endpoint;        // bound; empty: any port, ".slabs" beside an ipc path or inproc name
+  Catalogue catalogue;               // name -> how to load it
+  Codec codec = Codec::kRaw;         // of voxels on their way to workers; zstd pays if the link is slower than packing
+  CoordinatorConfig machine;         // epoch, pid, slabs_endpoint and datasets are filled in by Start
+  ServiceSurroundings surroundings;  // except the link, filled in by Start
   PlanFunction make_plan = &Planner::Plan;
   CountFunction count_occupied = CountOccupied;
 };

@@ -1,9 +1,10 @@
 #include "coordinator/slab_server.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <sstream>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -18,14 +19,7 @@ namespace slabstream {
 namespace {
 
 std::string Text(const Box& box) {
-  std::ostringstream text;
-  const auto range = [&](std::int32_t begin, std::int32_t end) { text << '[' << begin << ", " << end << ')'; };
-  range(box.begin.x, box.end.x);
-  text << " x ";
-  range(box.begin.y, box.end.y);
-  text << " x ";
-  range(box.begin.z, box.end.z);
-  return text.str();
+  return fmt::format("[{}, {}) x [{}, {}) x [{}, {})", box.begin.x, box.end.x, box.begin.y, box.end.y, box.begin.z, box.end.z);
 }
 
 }  // namespace
@@ -72,12 +66,13 @@ Bytes SlabServer::Cut(const Samples& samples, const Box& part, std::uint64_t beg
 
 Status SlabServer::Check(const ChunkRequest& request, Epoch epoch, const Samples& samples) {
   if (request.epoch != epoch) return Status::NotFound("chunk request: epoch of another coordinator");
-  if (!samples.any()) return Status::NotFound("chunk request: no dataset " + std::to_string(request.dataset));
+  if (!samples.any()) return Status::NotFound(fmt::format("chunk request: no dataset {}", request.dataset));
   if (request.box.empty() || !samples.box().Contains(request.box)) {
-    return Status::InvalidArgument("chunk request: box " + Text(request.box) + " is not inside the volume " + Text(samples.box()));
+    return Status::InvalidArgument(
+        fmt::format("chunk request: box {} is not inside the volume {}", Text(request.box), Text(samples.box())));
   }
   if (const std::uint32_t count = ChunkCount(request.box, samples.type()); request.chunk >= count) {
-    return Status::InvalidArgument("chunk request: chunk " + std::to_string(request.chunk) + " is not below " + std::to_string(count));
+    return Status::InvalidArgument(fmt::format("chunk request: chunk {} is not below {}", request.chunk, count));
   }
   return Status::Ok();
 }
@@ -112,9 +107,8 @@ void SlabServer::Answer(const Incoming& incoming) {
     const std::uint64_t begin = std::uint64_t{request->chunk} * kChunkBytes;
     Chunk chunk{.epoch = epoch_, .dataset = request->dataset, .box = request->box, .chunk = request->chunk};
     const Bytes payload = PackChunk(Cut(samples, request->box, begin, std::min(begin + kChunkBytes, box_bytes)), codec_, chunk);
-    if (const Status sent = socket_.Send(incoming.identity, Encode(chunk), payload); !sent.ok()) {
-      LogDebug("slabs plane: " + sent.message());  // it has gone, or asks again when its request times out
-    }
+    const Status sent = socket_.Send(incoming.identity, Encode(chunk), payload);
+    if (!sent.ok()) LogDebug("slabs plane: " + sent.message());  // it has gone, or asks again when its request times out
     return Status::Ok();
   });
   if (served.ok()) return;

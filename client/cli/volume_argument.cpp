@@ -30,7 +30,7 @@ Result<std::variant<std::string, TransferFunction>> ParseTransfer(const std::str
     return Choice(*std::move(transfer));
   }
   std::vector<std::string_view> names;
-  for (const PresetInfo& preset : TransferPresets()) names.push_back(preset.name);
+  for (const TransferPreset& preset : TransferPresets()) names.push_back(preset.name);
   const Result<std::size_t> index = ParseChoice(option, text, names);
   if (!index.ok()) return Status::InvalidArgument(index.status().message() + ", nor a .json file");
   return Choice(text);

@@ -1,4 +1,6 @@
 // ParaView's colour-map JSON, as Edit Color Map > Choose Preset > Export writes it.
+#include <fmt/format.h>
+
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -16,15 +18,13 @@ Result<std::vector<double>> ReadCurve(const Json& preset, const char* field) {
   const Json& array = preset.at(field);
   if (!array.is_array()) return Status::InvalidArgument(std::string(field) + " is not an array");
   if (array.empty() || array.size() % kNumbersPerPoint != 0 || array.size() / kNumbersPerPoint > std::size_t{kMaxTransferPoints}) {
-    return Status::InvalidArgument(std::string(field) + " has " + std::to_string(array.size()) + " numbers, must be 4 a point and 1 to " +
-                                   std::to_string(kMaxTransferPoints) + " points");
+    return Status::InvalidArgument(
+        fmt::format("{} has {} numbers, must be 4 a point and 1 to {} points", field, array.size(), kMaxTransferPoints));
   }
   std::vector<double> numbers;
   numbers.reserve(array.size());
   for (const Json& number : array) {
-    if (!number.is_number()) {
-      return Status::InvalidArgument(std::string(field) + "[" + std::to_string(numbers.size()) + "] is not a number");
-    }
+    if (!number.is_number()) return Status::InvalidArgument(fmt::format("{}[{}] is not a number", field, numbers.size()));
     numbers.push_back(number.get<double>());
   }
   return numbers;

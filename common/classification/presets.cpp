@@ -1,10 +1,12 @@
 // The built-in transfer functions. CT has a unit, so its presets are anchored to materials; the others are fitted to the histogram.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numeric>
 
-#include "common/classification/automatic_transfer.h"
+#include "common/base/find_named.h"
 #include "common/classification/histogram_analysis.h"
 #include "common/classification/transfer_function.h"
 
@@ -26,6 +28,58 @@ TransferFunction Opaque(const VolumeSummary& summary) {
   // A step half way to the second of 256 values: between 0 and 1 in an 8-bit volume.
   const double second = std::lerp(double(min), double(max), 1.0 / 255);
   return {{{min, kCold}, {max, kWarm}}, {{min, 0, 0.5, 1}, {second, 1}}};
+}
+
+// ---- Whatever differs from the background
+
+// One stop of a side's curves: the share of the side's voxels that lie nearer to the background.
+struct Stop {
+  double quantile;
+  double opacity;  // as a multiple of the median's
+  Rgb above, below;
+};
+constexpr std::array<Stop, 5> kStops = {{
+    {0.02, 0.05, {0.52F, 0.22F, 0.14F}, {0.12F, 0.22F, 0.48F}},
+    {0.20, 0.35, {0.75F, 0.42F, 0.26F}, {0.18F, 0.40F, 0.68F}},
+    {0.50, 1.00, {0.90F, 0.66F, 0.44F}, {0.36F, 0.61F, 0.84F}},
+    {0.85, 3.00, {0.97F, 0.88F, 0.70F}, {0.66F, 0.85F, 0.95F}},
+    {0.995, 6.00, {1.00F, 0.98F, 0.93F}, {0.92F, 0.98F, 1.00F}},
+}};
+constexpr double kMaxOpacity = 0.95;
+
+// The opacity per voxel length at which a mean stretch of material (its share of the volume's side) lets 2 % of the light through.
+double MedianOpacity(const VolumeSummary& summary, double share) {
+  const double side = std::cbrt(double(summary.description.geometry.bounds().voxel_count()));
+  const double stretch = std::max(share * side, 1.0);  // voxels
+  return std::clamp(1 - std::pow(0.02, 1 / stretch), 0.1, 0.5);
+}
+
+// Shows what differs from the background. Opacities and colours are spread over the quantiles of those values: warm colours above the
+// background, cold ones below. A ray through an average stretch of material comes out nearly opaque. A volume of one value becomes a
+// translucent block.
+TransferFunction Automatic(const VolumeSummary& summary) {
+  const auto [above, below] = FindForeground(summary);
+  const double median = MedianOpacity(summary, above.share + below.share);
+  TransferFunction transfer;
+  const auto add = [&](double value, double opacity, const Rgb& color) {
+    transfer.opacities.push_back({value, std::min(opacity * median, kMaxOpacity)});
+    transfer.colors.push_back({value, color});
+  };
+  if (below.share > 0) {
+    for (auto stop = kStops.rbegin(); stop != kStops.rend(); ++stop) {
+      add(Quantile(summary, below, 1 - stop->quantile), stop->opacity, stop->below);
+    }
+    add(BinBorder(summary.range, below.last + 1), 0, kStops.front().below);
+  }
+  if (above.share > 0) {
+    add(BinBorder(summary.range, above.first), 0, kStops.front().above);
+    for (const Stop& stop : kStops) add(Quantile(summary, above, stop.quantile), stop.opacity, stop.above);
+  }
+  if (transfer.opacities.empty()) {
+    transfer.opacities = {{summary.range.min, 0.05}};
+    transfer.colors = {{summary.range.min, kStops[2].above}};
+  }
+  return transfer;
 }
 
 // ---- CT
@@ -138,44 +192,27 @@ TransferFunction Simulation(const VolumeSummary& summary) {
           {{begin, 0}, {at(0.40), 0.02}, {at(0.75), 0.08}, {at(0.93), 0.25}, {at(0.998), 0.7}}};
 }
 
-struct Preset {
-  PresetInfo info;
-  TransferFunction (*make)(const VolumeSummary&);
-};
-
-// The only list.
-constexpr std::array kPresets = {
-    Preset{{"auto", "from the histogram: whatever differs from the background"}, AutomaticTransfer},
-    Preset{{"gray-ramp", "black to white and clear to opaque over the value range"}, GrayRamp},
-    Preset{{"opaque", "everything above the lowest value, solid: masks, voxelised objects"}, Opaque},
-    Preset{{"ct-bone", "CT: bones"}, CtBone},
-    Preset{{"ct-soft-tissue", "CT: bones in a veil of muscle"}, CtSoftTissue},
-    Preset{{"ct-skin", "CT: the skin, solid"}, CtSkin},
-    Preset{{"mri-brain", "MRI: the surface of a brain whose skull was removed"}, MriBrain},
-    Preset{{"mri-head", "MRI: a whole head, the skin as a veil"}, MriHead},
-    Preset{{"angiography", "CT or MR angiography: the vessels"}, Angiography},
-    Preset{{"simulation", "simulations: glowing gas"}, Simulation},
-};
-
 }  // namespace
 
-const std::vector<PresetInfo>& TransferPresets() {
-  static const std::vector<PresetInfo> infos = [] {
-    std::vector<PresetInfo> list;
-    list.reserve(kPresets.size());
-    for (const Preset& preset : kPresets) list.push_back(preset.info);
-    return list;
-  }();
-  return infos;
+const std::vector<TransferPreset>& TransferPresets() {
+  static const std::vector<TransferPreset> presets = {
+      {"auto", "from the histogram: whatever differs from the background", Automatic},
+      {"gray-ramp", "black to white and clear to opaque over the value range", GrayRamp},
+      {"opaque", "everything above the lowest value, solid: masks, voxelised objects", Opaque},
+      {"ct-bone", "CT: bones", CtBone},
+      {"ct-soft-tissue", "CT: bones in a veil of muscle", CtSoftTissue},
+      {"ct-skin", "CT: the skin, solid", CtSkin},
+      {"mri-brain", "MRI: the surface of a brain whose skull was removed", MriBrain},
+      {"mri-head", "MRI: a whole head, the skin as a veil", MriHead},
+      {"angiography", "CT or MR angiography: the vessels", Angiography},
+      {"simulation", "simulations: glowing gas", Simulation},
+  };
+  return presets;
 }
 
 Result<TransferFunction> MakePreset(std::string_view name, const VolumeSummary& summary) {
-  std::string names;
-  for (const Preset& preset : kPresets) {
-    if (preset.info.name == name) return preset.make(summary);
-    names += (names.empty() ? "" : ", ") + std::string(preset.info.name);
-  }
-  return Status::NotFound("no transfer function is named '" + std::string(name) + "', there are " + names);
+  if (const TransferPreset* preset = FindNamed(TransferPresets(), name)) return preset->make(summary);
+  return Status::NotFound(fmt::format("no transfer function is named '{}', there are {}", name, NamesOf(TransferPresets())));
 }
 
 }  // namespace slabstream

@@ -1,28 +1,22 @@
 #include "common/classification/transfer_function.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 
 namespace slabstream {
 namespace {
 
-std::string Text(double value) {
-  std::array<char, 32> text{};
-  (void)std::snprintf(text.data(), text.size(), "%g", value);
-  return text.data();
-}
-
 Status WrongField(std::string_view curve, std::size_t point, std::string_view field, double value, std::string_view limit) {
-  return Status::InvalidArgument("transfer function: " + std::string(field) + " of " + std::string(curve) + " point " +
-                                 std::to_string(point) + " is " + Text(value) + ", must be " + std::string(limit));
+  return Status::InvalidArgument(
+      fmt::format("transfer function: {} of {} point {} is {:g}, must be {}", field, curve, point, value, limit));
 }
 
 Status CheckCount(std::string_view curve, std::size_t count) {
   if (count >= 1 && count <= std::size_t{kMaxTransferPoints}) return Status::Ok();
-  return Status::InvalidArgument("transfer function: number of " + std::string(curve) + " points is " + std::to_string(count) +
-                                 ", must be in [1, " + std::to_string(kMaxTransferPoints) + "]");
+  return Status::InvalidArgument(
+      fmt::format("transfer function: number of {} points is {}, must be in [1, {}]", curve, count, kMaxTransferPoints));
 }
 
 template <class Point>
@@ -30,7 +24,7 @@ Status CheckValues(std::string_view curve, const std::vector<Point>& points) {
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!std::isfinite(points[i].value)) return WrongField(curve, i, "value", points[i].value, "finite");
     if (i > 0 && points[i].value < points[i - 1].value) {
-      return WrongField(curve, i, "value", points[i].value, "at least that of the point before, " + Text(points[i - 1].value));
+      return WrongField(curve, i, "value", points[i].value, fmt::format("at least that of the point before, {:g}", points[i - 1].value));
     }
   }
   return Status::Ok();
@@ -98,10 +92,10 @@ Status Validate(const TransferFunction& transfer) {
   if (Status status = CheckValues("colour", transfer.colors); !status.ok()) return status;
   if (Status status = CheckValues("opacity", transfer.opacities); !status.ok()) return status;
   for (std::size_t i = 0; i < transfer.colors.size(); ++i) {
-    const Rgb& color = transfer.colors[i].color;
-    if (outside(color.r, 0, 1)) return WrongField("colour", i, "red", color.r, "in [0, 1]");
-    if (outside(color.g, 0, 1)) return WrongField("colour", i, "green", color.g, "in [0, 1]");
-    if (outside(color.b, 0, 1)) return WrongField("colour", i, "blue", color.b, "in [0, 1]");
+    const auto [r, g, b] = transfer.colors[i].color;
+    if (outside(r, 0, 1)) return WrongField("colour", i, "red", r, "in [0, 1]");
+    if (outside(g, 0, 1)) return WrongField("colour", i, "green", g, "in [0, 1]");
+    if (outside(b, 0, 1)) return WrongField("colour", i, "blue", b, "in [0, 1]");
   }
   for (std::size_t i = 0; i < transfer.opacities.size(); ++i) {
     const OpacityPoint& point = transfer.opacities[i];
@@ -110,8 +104,8 @@ Status Validate(const TransferFunction& transfer) {
     if (outside(point.sharpness, 0, 1)) return WrongField("opacity", i, "sharpness", point.sharpness, "in [0, 1]");
   }
   if (!(transfer.opacity_distance > 0 && transfer.opacity_distance <= kMaxOpacityDistance)) {
-    return Status::InvalidArgument("transfer function: opacity distance is " + Text(transfer.opacity_distance) +
-                                   " voxel lengths, must be in (0, " + Text(kMaxOpacityDistance) + "]");
+    return Status::InvalidArgument(fmt::format("transfer function: opacity distance is {:g} voxel lengths, must be in (0, {:g}]",
+                                               transfer.opacity_distance, kMaxOpacityDistance));
   }
   return Status::Ok();
 }

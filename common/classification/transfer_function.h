@@ -66,11 +66,13 @@ Result<TransferFunction> ParseParaViewColorMap(std::string_view json, std::strin
 std::string FormatParaViewColorMap(const TransferFunction& transfer, std::string_view name);
 
 // Built-in transfer functions, chosen by name; "auto" is made from the histogram of the volume.
-struct PresetInfo {
+struct TransferPreset {
   std::string_view name;     // what --transfer takes
   std::string_view purpose;  // one line for --help
+  TransferFunction (*make)(const VolumeSummary&);
 };
-const std::vector<PresetInfo>& TransferPresets();
+// The only list.
+const std::vector<TransferPreset>& TransferPresets();
 
 // NotFound naming the presets there are.
 Result<TransferFunction> MakePreset(std::string_view name, const VolumeSummary& summary);

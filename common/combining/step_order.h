@@ -22,7 +22,6 @@ class StepOrder {
 
   const IndexedSchedule& schedule() const { return *schedule_; }
   const std::vector<Rank>& ranks() const { return numbers_; }
-  bool Here(Rank rank) const { return FindRank(rank).has_value(); }
 
   // The functions below take ranks that are here.
   void OnRendered(Rank rank);

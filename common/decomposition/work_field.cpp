@@ -1,19 +1,19 @@
 #include "common/decomposition/work_field.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <numeric>
 
 #include "common/base/check.h"
+#include "common/calibration/calibration.h"
 
 namespace slabstream {
 
 std::vector<double> CellWork(const OccupancyGrid& grid) {
   std::vector<double> work;
   work.reserve(grid.cells.size());
-  for (const CellOccupancy& cell : grid.cells) work.push_back(cell.voxels > 0 ? cell.voxels + kCellWork : 0);
+  for (const CellOccupancy& cell : grid.cells) work.push_back(cell.voxels > 0 ? cell.voxels + calibration::kCellWork : 0);
   return work;
 }
 
@@ -49,24 +49,23 @@ void WorkField::SumUp(std::span<const double> steps) {
 
 double WorkField::Before(const Index3& corner) const {
   // Between corners of cells, trilinearly: work is even within a cell.
-  std::array<std::size_t, 3> low{};
-  std::array<double, 3> share{};
+  Index3 low;
+  Vec3 share;
   for (const Axis axis : kAxes) {
-    const auto i = std::size_t(Number(axis));
-    low[i] = std::size_t(corner[axis] / kOccupancyCell);
-    const std::int32_t width = std::min(size_[axis] - std::int32_t(low[i]) * kOccupancyCell, kOccupancyCell);
-    share[i] = width > 0 ? double(corner[axis] % kOccupancyCell) / width : 0;
+    low[axis] = corner[axis] / kOccupancyCell;
+    const std::int32_t width = std::min(size_[axis] - low[axis] * kOccupancyCell, kOccupancyCell);
+    share[axis] = width > 0 ? double(corner[axis] % kOccupancyCell) / width : 0;
   }
-  const auto along_x = [&](std::size_t y, std::size_t z) {
-    const double* row = &sums_[(z * std::size_t(corners_.y) + y) * std::size_t(corners_.x)];
-    return share[0] == 0 ? row[low[0]] : row[low[0]] + share[0] * (row[low[0] + 1] - row[low[0]]);
+  const auto along_x = [&](std::int32_t y, std::int32_t z) {
+    const double* row = &sums_[NumberIn(corners_, {0, y, z})];
+    return share.x == 0 ? row[low.x] : row[low.x] + share.x * (row[low.x + 1] - row[low.x]);
   };
-  const auto along_y = [&](std::size_t z) {
-    const double a = along_x(low[1], z);
-    return share[1] == 0 ? a : a + share[1] * (along_x(low[1] + 1, z) - a);
+  const auto along_y = [&](std::int32_t z) {
+    const double a = along_x(low.y, z);
+    return share.y == 0 ? a : a + share.y * (along_x(low.y + 1, z) - a);
   };
-  const double a = along_y(low[2]);
-  return share[2] == 0 ? a : a + share[2] * (along_y(low[2] + 1) - a);
+  const double a = along_y(low.z);
+  return share.z == 0 ? a : a + share.z * (along_y(low.z + 1) - a);
 }
 
 double WorkField::Sum(const Box& box) const {
@@ -83,9 +82,7 @@ double WorkField::Sum(const Box& box) const {
 }
 
 double WorkField::StepsOf(const Index3& begin, const Index3& end) const {
-  const auto at = [&](std::int32_t x, std::int32_t y, std::int32_t z) {
-    return sums_[(std::size_t(z) * std::size_t(corners_.y) + std::size_t(y)) * std::size_t(corners_.x) + std::size_t(x)];
-  };
+  const auto at = [&](std::int32_t x, std::int32_t y, std::int32_t z) { return sums_[NumberIn(corners_, {x, y, z})]; };
   return at(end.x, end.y, end.z) - at(begin.x, end.y, end.z) - at(end.x, begin.y, end.z) - at(end.x, end.y, begin.z) +
          at(begin.x, begin.y, end.z) + at(begin.x, end.y, begin.z) + at(end.x, begin.y, begin.z) - at(begin.x, begin.y, begin.z);
 }

@@ -12,10 +12,7 @@
 
 namespace slabstream {
 
-// Work of every cell of the grid, estimated from occupied voxels: 1 for each, and kCellWork more for a cell that has any. Voxels are shaded
-// and filtered one by one, but rows of pixels are composited in segments, however little of them is covered: over five volumes and all
-// decompositions, splatting took as long for a touched cell as for some 600 voxels (bench/balance_bench).
-inline constexpr double kCellWork = 512;
+// Work of every cell of the grid, estimated from occupied voxels: 1 for each, and calibration::kCellWork more for a cell that has any.
 std::vector<double> CellWork(const OccupancyGrid& grid);
 
 class WorkField {

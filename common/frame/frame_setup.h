@@ -2,6 +2,7 @@
 // changes: a new plan after the loss of a worker changes only who does what.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -39,6 +40,28 @@ PixelBounds FrameBounds(const FrameSetup& setup);
 inline PixelRange WholeFrame(const FrameSetup& setup) { return {0, std::uint64_t(FrameBounds(setup).pixel_count())}; }
 // Memory of an image of the whole frame.
 std::int64_t FrameBytes(const FrameSetup& setup);
+
+// A rectangle of the frame, in pixels; empty until something is added.
+struct FrameArea {
+  double x_begin = 1e9, y_begin = 1e9, x_end = -1e9, y_end = -1e9;
+
+  bool empty() const { return x_begin >= x_end || y_begin >= y_end; }
+  double area() const { return empty() ? 0 : (x_end - x_begin) * (y_end - y_begin); }
+  // Grows to hold `other`.
+  void Add(const FrameArea& other) {
+    x_begin = std::min(x_begin, other.x_begin);
+    y_begin = std::min(y_begin, other.y_begin);
+    x_end = std::max(x_end, other.x_end);
+    y_end = std::max(y_end, other.y_end);
+  }
+};
+inline FrameArea Intersection(const FrameArea& a, const FrameArea& b) {
+  return {std::max(a.x_begin, b.x_begin), std::max(a.y_begin, b.y_begin), std::min(a.x_end, b.x_end), std::min(a.y_end, b.y_end)};
+}
+
+// Where `box` (not empty) lies in the frame, and perhaps beyond it. In a frame along slices, footprints reach so many voxels before and
+// behind the box along the slices' two axes.
+FrameArea ProjectBox(const Box& box, const FrameSetup& setup, std::int32_t before, std::int32_t behind);
 
 // Pixels of the frame that samples of `box` can lie in, whatever its voxels.
 PixelBounds ReachOf(const Box& box, const FrameSetup& setup);

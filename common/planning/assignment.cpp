@@ -9,32 +9,28 @@
 
 namespace slabstream {
 
-const std::vector<AssignmentEntry>& Assignments() {
-  static const std::vector<AssignmentEntry> entries = {
-      {"cyclic", "box after box to worker after worker", AssignCyclic},
-      {"contiguous", "neighbouring boxes to one worker", AssignContiguous},
-      {"greedy", "the costliest box left to the worker with least to do", AssignGreedy, true},
-  };
-  return entries;
-}
+namespace {
 
+// Box i belongs to slot i mod slots.
 std::vector<std::uint32_t> AssignCyclic(const AssignmentRequest& request) {
   std::vector<std::uint32_t> slots(request.costs.size());
   for (std::size_t box = 0; box < slots.size(); ++box) slots[box] = std::uint32_t(box % request.slots);
   return slots;
 }
 
+// Each slot owns consecutive boxes; the numbers of boxes of two slots differ by at most one.
 std::vector<std::uint32_t> AssignContiguous(const AssignmentRequest& request) {
   std::vector<std::uint32_t> slots(request.costs.size());
   for (std::size_t box = 0; box < slots.size(); ++box) slots[box] = std::uint32_t(box * request.slots / slots.size());
   return slots;
 }
 
+// Takes boxes in descending order of cost and gives each to the slot with the least cost so far (longest processing time first: Graham,
+// "Bounds on multiprocessing timing anomalies", 1969: at most 4/3 of the optimum). Ties go in the order of boxes and slots.
 std::vector<std::uint32_t> AssignGreedy(const AssignmentRequest& request) {
   std::vector<std::size_t> costliest_first(request.costs.size());
   std::iota(costliest_first.begin(), costliest_first.end(), std::size_t{0});
-  std::stable_sort(costliest_first.begin(), costliest_first.end(),
-                   [&](std::size_t a, std::size_t b) { return request.costs[a] > request.costs[b]; });
+  std::ranges::stable_sort(costliest_first, std::greater<>(), [&](std::size_t box) { return request.costs[box]; });
   // Load of a slot: time, number of boxes, slot; least first. The number of boxes spreads boxes that cost nothing.
   using Load = std::tuple<double, std::uint32_t, std::uint32_t>;
   std::priority_queue<Load, std::vector<Load>, std::greater<>> loads;
@@ -47,6 +43,17 @@ std::vector<std::uint32_t> AssignGreedy(const AssignmentRequest& request) {
     loads.push({time + request.costs[box], boxes + 1, slot});
   }
   return slots;
+}
+
+}  // namespace
+
+const std::vector<AssignmentEntry>& Assignments() {
+  static const std::vector<AssignmentEntry> entries = {
+      {"cyclic", "box after box to worker after worker", AssignCyclic},
+      {"contiguous", "neighbouring boxes to one worker", AssignContiguous},
+      {"greedy", "the costliest box left to the worker with least to do", AssignGreedy, true},
+  };
+  return entries;
 }
 
 }  // namespace slabstream

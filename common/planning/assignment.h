@@ -23,12 +23,4 @@ struct AssignmentEntry {
 // The only list.
 const std::vector<AssignmentEntry>& Assignments();
 
-// Box i belongs to slot i mod slots.
-std::vector<std::uint32_t> AssignCyclic(const AssignmentRequest& request);
-// Each slot owns consecutive boxes; the numbers of boxes of two slots differ by at most one.
-std::vector<std::uint32_t> AssignContiguous(const AssignmentRequest& request);
-// Takes boxes in descending order of cost and gives each to the slot with the least cost so far (longest processing time first: Graham,
-// "Bounds on multiprocessing timing anomalies", 1969: at most 4/3 of the optimum). Ties go in the order of boxes and slots.
-std::vector<std::uint32_t> AssignGreedy(const AssignmentRequest& request);
-
 }  // namespace slabstream

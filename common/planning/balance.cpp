@@ -7,11 +7,16 @@
 #include <vector>
 
 #include "common/base/check.h"
+#include "common/calibration/calibration.h"
 #include "common/view/sheet_grid.h"
 #include "common/volume/box_assembly.h"
 
 namespace slabstream {
 namespace {
+
+constexpr double kFrames = 1000;              // within which a change must pay
+constexpr double kLeastGain = 0.02;           // share of the frame's render time that a change must save; times 1 + 1/n after n frames
+constexpr double kLeastGainOfNewBoxes = 0.1;  // share of the frame's render time that new boxes must save beyond resized ones
 
 std::vector<double> SlotSeconds(const Layout& layout, std::uint32_t slots, std::span<const double> seconds) {
   CHECK_EQ(seconds.size(), layout.owners.size());
@@ -74,16 +79,15 @@ Layout Reassign(const Layout& layout, std::uint32_t slots, std::span<const doubl
   return changed;
 }
 
-std::optional<Layout> Rebalance(const Layout& now, std::span<const double> seconds, const LayoutRequest& request, int frames_seen,
-                                const BalanceTerms& terms) {
+std::optional<Layout> Rebalance(const Layout& now, std::span<const double> seconds, const LayoutRequest& request, int frames_seen) {
   CHECK(request.known.cost != nullptr);
   CHECK_GE(frames_seen, 1);
-  const double voxel_seconds = double(BytesPerSample(request.summary->description.type)) / terms.bytes_per_second;
-  const double least_gain = terms.least_gain * (1 + 1.0 / frames_seen);
+  const double voxel_seconds = double(BytesPerSample(request.summary->description.type)) / calibration::service::kVoxelRate;
+  const double least_gain = kLeastGain * (1 + 1.0 / frames_seen);
   std::optional<Layout> chosen;
   double most_won = 0;
   const auto weigh = [&](Layout candidate, double before, double after) {
-    const double won = terms.frames * (before - after) - double(MovedVoxels(now, candidate)) * voxel_seconds;
+    const double won = kFrames * (before - after) - double(MovedVoxels(now, candidate)) * voxel_seconds;
     if (before - after <= least_gain * before || won <= most_won) return;
     most_won = won;
     chosen = std::move(candidate);
@@ -107,7 +111,7 @@ std::optional<Layout> Rebalance(const Layout& now, std::span<const double> secon
   Layout resized = MakeLayout(other_boxes);
   const double after_resizing = predicted(resized);
   weigh(std::move(resized), before, after_resizing);
-  if (after_cut < (1 - terms.least_gain_of_new_boxes) * after_resizing) weigh(std::move(cut_anew), before, after_cut);
+  if (after_cut < (1 - kLeastGainOfNewBoxes) * after_resizing) weigh(std::move(cut_anew), before, after_cut);
   return chosen;
 }
 

@@ -15,13 +15,6 @@
 
 namespace slabstream {
 
-struct BalanceTerms {
-  double bytes_per_second = 5e8;         // rate at which voxels reach their new owners and are prepared for rendering
-  double frames = 1000;                  // number of frames within which a change must pay
-  double least_gain = 0.02;              // share of the frame's render time that a change must save; times 1 + 1/n after n frames
-  double least_gain_of_new_boxes = 0.1;  // share of the frame's render time that new boxes must save beyond resized ones
-};
-
 // Predicted seconds of each box, from the cost of cells in `cost`; 0 if nobody renders the box.
 std::vector<double> PredictedSeconds(const Layout& layout, const WorkField& cost);
 
@@ -38,7 +31,6 @@ Layout Reassign(const Layout& layout, std::uint32_t slots, std::span<const doubl
 // The layout to change to, if any. `request` is what `now` was made for, with known.cost; `seconds` are the times of the boxes of `now` in
 // `frames_seen` >= 1 frames. Comparisons use one kind of time on both sides: measured times of boxes to hand over, costs of cells to cut
 // anew, because cells resolve boxes no more finely than they are large.
-std::optional<Layout> Rebalance(const Layout& now, std::span<const double> seconds, const LayoutRequest& request, int frames_seen,
-                                const BalanceTerms& terms = {});
+std::optional<Layout> Rebalance(const Layout& now, std::span<const double> seconds, const LayoutRequest& request, int frames_seen);
 
 }  // namespace slabstream

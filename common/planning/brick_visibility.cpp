@@ -20,10 +20,9 @@ bool BrickVisibility::AnyVisible(const Box& box) const {
   const auto brick_of = [](std::int32_t voxel) { return voxel / kBrick; };
   for (std::int32_t z = brick_of(box.begin.z); z <= brick_of(box.end.z - 1); ++z) {
     for (std::int32_t y = brick_of(box.begin.y); y <= brick_of(box.end.y - 1); ++y) {
-      const std::size_t row =
-          (std::size_t(z) * std::size_t(summary_.brick_counts.y) + std::size_t(y)) * std::size_t(summary_.brick_counts.x);
+      const ValueRange* const row = &summary_.bricks[NumberIn(summary_.brick_counts, {0, y, z})];
       for (std::int32_t x = brick_of(box.begin.x); x <= brick_of(box.end.x - 1); ++x) {
-        if (Visible(summary_.bricks[row + std::size_t(x)])) return true;
+        if (Visible(row[x])) return true;
       }
     }
   }

@@ -1,9 +1,9 @@
 // ClassifiedVolume: a loaded volume under one transfer function, as one renderer draws it. Occupied voxels, layouts, chosen policies and
-// learnt costs belong to one of these, so it is their key. The hash is computed once; copies share the transfer function.
+// learnt costs belong to one of these, so it is their key. Copies share the transfer function.
 #pragma once
 
-#include <cstddef>
 #include <memory>
+#include <utility>
 
 #include "common/planning/frame_plan.h"
 
@@ -11,28 +11,21 @@ namespace slabstream {
 
 class ClassifiedVolume {
  public:
-  ClassifiedVolume(DatasetId dataset, TransferFunction transfer, const RendererKind* renderer);
+  ClassifiedVolume(DatasetId dataset, TransferFunction transfer, const RendererKind* renderer)
+      : dataset_(dataset), transfer_(std::make_shared<const TransferFunction>(std::move(transfer))), renderer_(renderer) {}
 
   DatasetId dataset() const { return dataset_; }
   const TransferFunction& transfer() const { return *transfer_; }
   const RendererKind* renderer() const { return renderer_; }
-  std::size_t hash() const { return hash_; }
 
   friend bool operator==(const ClassifiedVolume& a, const ClassifiedVolume& b) {
-    return a.hash_ == b.hash_ && a.dataset_ == b.dataset_ && a.renderer_ == b.renderer_ &&
-           (a.transfer_ == b.transfer_ || *a.transfer_ == *b.transfer_);
+    return a.dataset_ == b.dataset_ && a.renderer_ == b.renderer_ && (a.transfer_ == b.transfer_ || *a.transfer_ == *b.transfer_);
   }
 
  private:
   DatasetId dataset_;
   std::shared_ptr<const TransferFunction> transfer_;
   const RendererKind* renderer_;
-  std::size_t hash_;
 };
 
 }  // namespace slabstream
-
-template <>
-struct std::hash<slabstream::ClassifiedVolume> {
-  std::size_t operator()(const slabstream::ClassifiedVolume& volume) const { return volume.hash(); }
-};

@@ -105,10 +105,7 @@ struct LayoutMaker::State {
     return {Costs().Analytic(box, {.along = Axis::kX}), Costs().Analytic(box, {.along = Axis::kY})};
   }
 
-  double CostOf(const Box& box, const ResolvedPolicy& policy) {
-    if (!NeedsOccupancy(policy)) return double(box.voxel_count());
-    return (Costs().Seconds(box, {.along = Axis::kX}) + Costs().Seconds(box, {.along = Axis::kY})) / 2;
-  }
+  double MeanSeconds(const Box& box) { return (Costs().Seconds(box, {.along = Axis::kX}) + Costs().Seconds(box, {.along = Axis::kY})) / 2; }
 
   Layout Assign(Partition partition, const ResolvedPolicy& policy) {
     std::vector<BoxId> filled;
@@ -116,7 +113,7 @@ struct LayoutMaker::State {
     for (BoxId box = 0; box < partition.boxes().size(); ++box) {
       if (!fields.Shows(partition.boxes()[box])) continue;
       filled.push_back(box);
-      box_costs.push_back(policy.assignment->by_cost ? CostOf(partition.boxes()[box], policy) : 1);
+      box_costs.push_back(policy.assignment->by_cost ? MeanSeconds(partition.boxes()[box]) : 1);
     }
     Layout layout{std::move(partition), {}};
     layout.owners.assign(layout.partition.boxes().size(), kNoSlot);

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "common/base/check.h"
+#include "common/volume/cells_along.h"
 
 namespace slabstream {
 namespace {
@@ -12,15 +13,14 @@ namespace {
 template <class Function>
 void ForEachCell(const Index3& size, const Box& box, Function&& function) {
   const Index3 cells = OccupancyCells(size);
-  const auto cell_of = [](std::int32_t voxel) { return voxel / kOccupancyCell; };
-  const std::int32_t first_x = cell_of(box.begin.x);
+  const CellsAlong xs(box, Axis::kX), ys(box, Axis::kY), zs(box, Axis::kZ);
   std::vector<double> shares_x;
-  for (std::int32_t x = first_x; x <= cell_of(box.end.x - 1); ++x) shares_x.push_back(CellShare(box, Axis::kX, x, size));
-  for (std::int32_t z = cell_of(box.begin.z); z <= cell_of(box.end.z - 1); ++z) {
+  for (std::int32_t x = xs.begin; x < xs.end; ++x) shares_x.push_back(CellShare(box, Axis::kX, x, size));
+  for (std::int32_t z = zs.begin; z < zs.end; ++z) {
     const double share_z = CellShare(box, Axis::kZ, z, size);
-    for (std::int32_t y = cell_of(box.begin.y); y <= cell_of(box.end.y - 1); ++y) {
+    for (std::int32_t y = ys.begin; y < ys.end; ++y) {
       const double share_yz = share_z * CellShare(box, Axis::kY, y, size);
-      std::size_t cell = (std::size_t(z) * std::size_t(cells.y) + std::size_t(y)) * std::size_t(cells.x) + std::size_t(first_x);
+      std::size_t cell = NumberIn(cells, {xs.begin, y, z});
       for (const double share_x : shares_x) function(cell++, share_x * share_yz);
     }
   }

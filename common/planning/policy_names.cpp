@@ -16,7 +16,7 @@ const std::vector<NamedChoice>& LoadMetrics() {
 
 std::optional<LoadMetric> FindLoadMetric(std::string_view name) {
   const std::vector<NamedChoice>& choices = LoadMetrics();
-  const auto found = std::find_if(choices.begin() + 1, choices.end(), [name](const NamedChoice& choice) { return choice.name == name; });
+  const auto found = std::ranges::find(choices.begin() + 1, choices.end(), name, &NamedChoice::name);
   if (found == choices.end()) return std::nullopt;
   return LoadMetric(found - choices.begin() - 1);
 }

@@ -12,23 +12,18 @@ namespace slabstream {
 namespace {
 
 template <class Entry>
-Status CheckName(std::string_view field, std::string_view name, const std::vector<Entry>& entries) {
-  if (FindNamed(entries, name) != nullptr) return Status::Ok();
-  return Status::InvalidArgument(fmt::format("{} is '{}', but must be one of: {}", field, name, NamesOf(entries)));
-}
-
-template <class Entry>
-Status CheckOpenName(std::string_view field, std::string_view name, const std::vector<Entry>& entries) {
-  if (name == kAutomatic || FindNamed(entries, name) != nullptr) return Status::Ok();
-  return Status::InvalidArgument(fmt::format("{} is '{}', but must be one of: {}, {}", field, name, kAutomatic, NamesOf(entries)));
+Status CheckName(std::string_view field, std::string_view name, const std::vector<Entry>& entries, bool may_be_open = false) {
+  if ((may_be_open && name == kAutomatic) || FindNamed(entries, name) != nullptr) return Status::Ok();
+  const std::string open = may_be_open ? fmt::format("{}, ", kAutomatic) : "";
+  return Status::InvalidArgument(fmt::format("{} is '{}', but must be one of: {}{}", field, name, open, NamesOf(entries)));
 }
 
 }  // namespace
 
 Status CheckNames(const Policy& policy) {
-  if (Status s = CheckOpenName("policy.decomposition", policy.decomposition, Decompositions()); !s.ok()) return s;
+  if (Status s = CheckName("policy.decomposition", policy.decomposition, Decompositions(), true); !s.ok()) return s;
   if (Status s = CheckName("policy.load_metric", policy.load_metric, LoadMetrics()); !s.ok()) return s;
-  if (Status s = CheckOpenName("policy.assignment", policy.assignment, Assignments()); !s.ok()) return s;
+  if (Status s = CheckName("policy.assignment", policy.assignment, Assignments(), true); !s.ok()) return s;
   if (Status s = CheckName("policy.balance", policy.balance, BalanceModes()); !s.ok()) return s;
   if (policy.combine == kAutomatic) return Status::Ok();
   if (const auto scheme = ParseCombining(policy.combine); !scheme.ok()) {
@@ -49,17 +44,16 @@ Result<ResolvedPolicy> ResolvePolicy(const FrameRequest& request, const VolumeGe
   if (LeavesChoice(policy)) {
     return Status::InvalidArgument("policy: 'auto' leaves a choice, which must be made before a frame is planned");
   }
-  ResolvedPolicy resolved;
-  resolved.decomposition = FindNamed(Decompositions(), policy.decomposition);
-  resolved.load_metric = FindLoadMetric(LoadMetricOf(policy)).value();
-  resolved.axis = SlabAxis(policy.axis, *resolved.decomposition, geometry.size);
-  resolved.groups = policy.groups;
-  resolved.assignment = FindNamed(Assignments(), policy.assignment);
-  resolved.dynamic_balance = policy.balance == kDynamicBalance;
-  resolved.combine = policy.combine;
-  resolved.pixel_error = policy.pixel_error;
-  resolved.teams = policy.teams;
-  return resolved;
+  const DecompositionEntry* const decomposition = FindNamed(Decompositions(), policy.decomposition);
+  return ResolvedPolicy{.decomposition = decomposition,
+                        .load_metric = FindLoadMetric(LoadMetricOf(policy)).value(),
+                        .axis = SlabAxis(policy.axis, *decomposition, geometry.size),
+                        .groups = policy.groups,
+                        .assignment = FindNamed(Assignments(), policy.assignment),
+                        .dynamic_balance = policy.balance == kDynamicBalance,
+                        .combine = policy.combine,
+                        .pixel_error = policy.pixel_error,
+                        .teams = policy.teams};
 }
 
 Policy AskFor(const ResolvedPolicy& policy) {

@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -55,6 +56,7 @@ struct CostBasis {
   const OccupancyGrid* drawn = nullptr;  // voxels that the renderer draws (RendererKind::DrawnTable)
   const VolumeSummary* summary = nullptr;
   const TransferFunction* transfer = nullptr;
+  std::span<const double> parameters;  // one value for each of the renderer's parameters(); empty: the defaults
 };
 
 class RendererKind {

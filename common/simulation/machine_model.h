@@ -6,20 +6,21 @@
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/calibration/calibration.h"
 #include "common/simulation/link_model.h"
 
 namespace slabstream {
 
 // Costs of a worker's combining thread, for each pixel that is not empty.
 struct CombiningCosts {
-  double scan_pixel = 0.2e-9;     // searched for runs, empty or not
-  double encode_pixel = 1.5e-9;   // copied into a message
-  double combine_pixel = 1.5e-9;  // from a message, checked, onto what is there
-  double local_pixel = 1e-9;      // of one image of this worker onto another one
-  double hidden_pixel = 0.1e-9;   // of the frame: searched for opaque tiles (FindHiddenTiles)
-  std::int32_t run_bytes = 12;    // a run in a message
-  std::int32_t rgba_bytes = 16;   // a pixel in a message: splatting, colours as floats
-  std::int32_t depth_bytes = 24;  // a pixel in a message: Z-buffer
+  double scan_pixel = calibration::combining::kScan;        // searched for runs, empty or not
+  double encode_pixel = calibration::combining::kEncode;    // copied into a message
+  double combine_pixel = calibration::combining::kCombine;  // from a message, checked, onto what is there
+  double local_pixel = calibration::combining::kLocal;      // of one image of this worker onto another one
+  double hidden_pixel = calibration::combining::kHidden;    // of the frame: searched for opaque tiles (FindHiddenTiles)
+  std::int32_t run_bytes = 12;                              // a run in a message
+  std::int32_t rgba_bytes = 16;                             // a pixel in a message: splatting, colours as floats
+  std::int32_t depth_bytes = 24;                            // a pixel in a message: Z-buffer
   // Images are lent: their pixels stay where they are. The thread that owns the sockets announces them itself if the combining thread is
   // idle.
   bool lent = false;
@@ -29,9 +30,9 @@ struct CombiningCosts {
 // Seconds from one thread's handing something over (a message, a task, a result) until another one has begun with it: to encode and decode
 // it, to decide what to do, and to wake a sleeping thread. The same for all threads of the service and its clients.
 struct WakeUps {
-  double awake = 25e-6;   // to a thread that was at work a moment ago
-  double asleep = 60e-6;  // to one that has waited for `doze` seconds or longer; its core slept, too, or did other work
-  double doze = 500e-6;
+  double awake = calibration::service::kAwake;    // to a thread that was at work a moment ago
+  double asleep = calibration::service::kAsleep;  // to one that has waited `doze` seconds or longer: its core slept or did other work
+  double doze = calibration::service::kDoze;
   friend bool operator==(const WakeUps&, const WakeUps&) = default;
 };
 
@@ -53,7 +54,7 @@ struct MachineModel {
   std::int32_t threads = 1;          // render threads of each worker
   std::int32_t picture_threads = 0;  // threads that make a picture (`threads` if that is more): workers of one process share theirs
   // Speed-up of making the picture (resampling, encoding) and of rendering by n threads: n / (1 + (n - 1) * serial_share).
-  double serial_share = 0.02;
+  double serial_share = calibration::service::kSerialShare;
 
   // Workers [i * workers_a_host, ...) share a host. If more threads are busy than it has cores, they share the cores equally; each busy
   // thread besides the first slows the others down by `memory_slowdown`, since they share caches and memory. 0: a host for each worker.
@@ -61,9 +62,9 @@ struct MachineModel {
   std::int32_t cores_a_host = 1;
   double memory_slowdown = 0;  // [0, 1)
 
-  double plan_seconds = 200e-6;   // the coordinator plans a frame
-  double message_seconds = 5e-6;  // the coordinator sends or takes a message, one after the other
-  double client_seconds = 50e-6;  // the picture's way from the coordinator to the client, without wake-up and decoding
+  double plan_seconds = calibration::service::kPlan;        // the coordinator plans a frame
+  double message_seconds = calibration::service::kMessage;  // the coordinator sends or takes a message, one after the other
+  double client_seconds = calibration::service::kClient;    // the picture's way from coordinator to client, without wake-up and decoding
   friend bool operator==(const MachineModel&, const MachineModel&) = default;
 };
 

@@ -1,26 +1,12 @@
 #include "common/stats/report.h"
 
-#include "common/base/check.h"
-
 namespace slabstream {
 
 std::string_view ToString(Stage stage) {
-  switch (stage) {
-    case Stage::kFetch: return "fetch";
-    case Stage::kPrepare: return "prepare";
-    case Stage::kTransform: return "transform";
-    case Stage::kShade: return "shade";
-    case Stage::kSplat: return "splat";
-    case Stage::kComposite: return "composite";
-    case Stage::kZBuffer: return "z_buffer";
-    case Stage::kCombine: return "combine";
-    case Stage::kEncode: return "encode";
-    case Stage::kResolve: return "resolve";
-    case Stage::kRender: return "render";
-    case Stage::kSample: return "sample";
-  }
-  CHECK(false) << "no such stage: " << int(stage);
-  return "";
+  static constexpr auto kNames = std::to_array<std::string_view>(
+      {"fetch", "prepare", "transform", "shade", "splat", "composite", "z_buffer", "combine", "encode", "resolve", "render", "sample"});
+  static_assert(kNames.size() == kStageCount);
+  return kNames.at(std::size_t(stage));
 }
 
 void AddStage(RankReport& report, Stage stage, std::int64_t begin_ns, std::int64_t end_ns) {

@@ -84,8 +84,6 @@ Status Validate(const ImageSize& size) {
   return InRange("size.width * size.height", double(size.width) * size.height, 1, double(kMaxImagePixels));
 }
 
-namespace {
-
 Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry, bool supersampled) {
   const bool perspective = view.projection == Projection::kPerspective;
   const Vec3 spacing = geometry.spacing;
@@ -132,16 +130,6 @@ Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeomet
   camera.traversal_axis = NearestAxis(frame.forward);
   camera.ascending = frame.forward[camera.traversal_axis] > 0;
   return camera;
-}
-
-}  // namespace
-
-Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry) {
-  return MakeCamera(view, size, geometry, false);
-}
-
-Camera MakeSupersampledCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry) {
-  return MakeCamera(view, size, geometry, true);
 }
 
 Camera::ImagePoint Camera::Project(const Vec3& data_point) const {

@@ -81,8 +81,10 @@ struct Camera {
   friend bool operator==(const Camera&, const Camera&) = default;
 };
 
-// `view` and `size` valid. The first one has supersample 1.
-Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry);
-Camera MakeSupersampledCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry);
+// `view` and `size` valid. Not `supersampled`: supersample is 1.
+Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry, bool supersampled = false);
+inline Camera MakeSupersampledCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry) {
+  return MakeCamera(view, size, geometry, true);
+}
 
 }  // namespace slabstream

@@ -35,7 +35,7 @@ double VoxelPixels(const FrameSetup& setup) {
 BoxEstimator::BoxEstimator(const FrameSetup& setup, const VolumeSummary& summary, const OccupancyGrid& occupied, const WorkField* measured,
                            std::int32_t pixel_side)
     : setup_(setup),
-      cost_(*setup.renderer, {&occupied, &summary, &setup.transfer}, measured),
+      cost_(*setup.renderer, {&occupied, &summary, &setup.transfer, setup.parameters}, measured),
       view_(CostViewOf(setup)),
       frame_(FrameBounds(setup)),
       pixel_side_(pixel_side),
@@ -52,45 +52,10 @@ BoxEstimator::BoxEstimator(const FrameSetup& setup, const VolumeSummary& summary
   const CellOccupancy* next = occupied.cells.data();
   for (std::int32_t z = 0; z < fine.z; ++z) {
     for (std::int32_t y = 0; y < fine.y; ++y) {
-      double* const row = &cell_[(std::size_t(z / factor) * std::size_t(cells_.y) + std::size_t(y / factor)) * std::size_t(cells_.x)];
-      for (std::int32_t x = 0; x < fine.x; ++x) {
-        row[x / factor] += (next++)->voxels;
-      }
+      double* const row = &cell_[NumberIn(cells_, {0, y / factor, z / factor})];
+      for (std::int32_t x = 0; x < fine.x; ++x) row[x / factor] += (next++)->voxels;
     }
   }
-}
-
-BoxEstimator::Rectangle BoxEstimator::Hull(const Rectangle& a, const Rectangle& b) {
-  return {std::min(a.x_begin, b.x_begin), std::min(a.y_begin, b.y_begin), std::max(a.x_end, b.x_end), std::max(a.y_end, b.y_end)};
-}
-
-BoxEstimator::Rectangle BoxEstimator::Intersection(const Rectangle& a, const Rectangle& b) {
-  return {std::max(a.x_begin, b.x_begin), std::max(a.y_begin, b.y_begin), std::min(a.x_end, b.x_end), std::min(a.y_end, b.y_end)};
-}
-
-BoxEstimator::Rectangle BoxEstimator::Project(const Box& box) const {
-  Rectangle r = Nothing();
-  const auto take = [&r](double x, double y) {
-    r.x_begin = std::min(r.x_begin, x);
-    r.x_end = std::max(r.x_end, x);
-    r.y_begin = std::min(r.y_begin, y);
-    r.y_end = std::max(r.y_end, y);
-  };
-  if (!setup_.sheets.empty()) {
-    const auto [c, u, v] = AxesOf(setup_.camera.traversal_axis);
-    for (const std::int32_t k : {box.begin[c], box.end[c] - 1}) {
-      const SlicePlacement slice = PlaceSlice(setup_.sheets, k);
-      take(slice.scale_u * (box.begin[u] - 1) + slice.offset_u, slice.scale_v * (box.begin[v] - 1) + slice.offset_v);
-      take(slice.scale_u * box.end[u] + slice.offset_u, slice.scale_v * box.end[v] + slice.offset_v);
-    }
-  } else {
-    for (int corner = 0; corner < 8; ++corner) {
-      const auto at = [&](Axis axis) { return ((corner >> Number(axis) & 1) != 0 ? box.end[axis] : box.begin[axis]) - 0.5; };
-      const Camera::ImagePoint point = setup_.camera.Project({at(Axis::kX), at(Axis::kY), at(Axis::kZ)});
-      take(point.x, point.y);
-    }
-  }
-  return r;
 }
 
 BoxEstimator::Estimate BoxEstimator::Of(const Box& box) const {
@@ -98,9 +63,9 @@ BoxEstimator::Estimate BoxEstimator::Of(const Box& box) const {
   Estimate estimate{0, UniformCoverage({}, 0, width, height)};
   CoverageMap& coverage = estimate.coverage;
   const double tile_side = double(kCoverageTile) * pixel_side_;
-  const Rectangle frame{0, 0, double(frame_.x_end), double(frame_.y_end)};
+  const FrameArea frame{0, 0, double(frame_.x_end), double(frame_.y_end)};
   struct Tile {
-    Rectangle reached = Nothing();
+    FrameArea reached;
     double hits = 0;  // pixels, each as often as it is hit
   };
   std::vector<Tile> tiles(coverage.share.size());
@@ -111,15 +76,15 @@ BoxEstimator::Estimate BoxEstimator::Of(const Box& box) const {
   for (std::int32_t z = first(Axis::kZ); z <= last(Axis::kZ); ++z) {
     for (std::int32_t y = first(Axis::kY); y <= last(Axis::kY); ++y) {
       for (std::int32_t x = first(Axis::kX); x <= last(Axis::kX); ++x) {
-        const double voxels = cell_[(std::size_t(z) * std::size_t(cells_.y) + std::size_t(y)) * std::size_t(cells_.x) + std::size_t(x)];
+        const double voxels = cell_[NumberIn(cells_, {x, y, z})];
         if (voxels == 0) continue;
-        const Box whole = slabstream::Intersection({{x * side_, y * side_, z * side_}, {(x + 1) * side_, (y + 1) * side_, (z + 1) * side_}},
-                                                   {{0, 0, 0}, size_});
-        const Box part = slabstream::Intersection(whole, box);
+        const Box whole =
+            Intersection({{x * side_, y * side_, z * side_}, {(x + 1) * side_, (y + 1) * side_, (z + 1) * side_}}, {{0, 0, 0}, size_});
+        const Box part = Intersection(whole, box);
         const double share = double(part.voxel_count()) / double(whole.voxel_count());
         occupied += share * voxels;
-        const Rectangle r = Project(part);
-        const Rectangle seen = Intersection(r, frame);
+        const FrameArea r = ProjectBox(part, setup_, 1, 0);
+        const FrameArea seen = Intersection(r, frame);
         if (seen.empty()) continue;
         const double seen_share = share * seen.area() / r.area();
         inside += seen_share * voxels;
@@ -127,10 +92,10 @@ BoxEstimator::Estimate BoxEstimator::Of(const Box& box) const {
         const auto tile_of = [&](double pixel, std::int32_t count) { return std::min(std::int32_t(pixel / tile_side), count - 1); };
         for (std::int32_t ty = tile_of(seen.y_begin, coverage.tiles_y); ty <= tile_of(seen.y_end, coverage.tiles_y); ++ty) {
           for (std::int32_t tx = tile_of(seen.x_begin, coverage.tiles_x); tx <= tile_of(seen.x_end, coverage.tiles_x); ++tx) {
-            const Rectangle reached = Intersection(seen, {tx * tile_side, ty * tile_side, (tx + 1) * tile_side, (ty + 1) * tile_side});
+            const FrameArea reached = Intersection(seen, {tx * tile_side, ty * tile_side, (tx + 1) * tile_side, (ty + 1) * tile_side});
             if (reached.empty()) continue;
             Tile& tile = tiles[std::size_t(ty) * std::size_t(coverage.tiles_x) + std::size_t(tx)];
-            tile.reached = Hull(tile.reached, reached);
+            tile.reached.Add(reached);
             tile.hits += hits_a_pixel * reached.area();
           }
         }

@@ -30,16 +30,6 @@ class BoxEstimator {
   Estimate Of(const Box& box) const;  // inside the volume, not empty
 
  private:
-  struct Rectangle {
-    double x_begin, y_begin, x_end, y_end;  // pixels of the true frame
-    bool empty() const { return x_begin >= x_end || y_begin >= y_end; }
-    double area() const { return empty() ? 0 : (x_end - x_begin) * (y_end - y_begin); }
-  };
-  static Rectangle Nothing() { return {1e9, 1e9, -1e9, -1e9}; }
-  static Rectangle Hull(const Rectangle& a, const Rectangle& b);
-  static Rectangle Intersection(const Rectangle& a, const Rectangle& b);
-  Rectangle Project(const Box& box) const;
-
   const FrameSetup& setup_;
   const CostEstimator cost_;
   const CostView view_;

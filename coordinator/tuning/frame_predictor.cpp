@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "common/base/check.h"
+#include "common/calibration/calibration.h"
 #include "common/combining/schemes.h"
 #include "common/image/occlusion_mask.h"
 #include "common/planning/placement.h"
@@ -13,18 +14,14 @@
 namespace slabstream {
 namespace {
 
-// Seconds a pixel, one thread: resampling the accumulated frame to a pixel of the picture, averaging supersampled ones, encoding the
-// picture; checking and decoding it at the client. As laboratory/measure/frame_costs.h measures them.
-constexpr double kResamplePixel = 4.5e-9, kResolvePixel = 1.5e-9, kEncodePixel = 2.5e-9, kReceivePixel = 1.2e-9;
-
 double PicturePixels(const FrameSetup& setup) {
   return double(setup.camera.width) * setup.camera.height / (double(setup.camera.supersample) * setup.camera.supersample);
 }
 
 double FinishSeconds(const FrameSetup& setup) {
-  double seconds = kEncodePixel * PicturePixels(setup);
-  if (!setup.sheets.empty()) seconds += kResamplePixel * PicturePixels(setup);
-  if (setup.camera.supersample > 1) seconds += kResolvePixel * double(FrameBounds(setup).pixel_count());
+  double seconds = calibration::picture::kEncode * PicturePixels(setup);
+  if (!setup.sheets.empty()) seconds += calibration::picture::kResample * PicturePixels(setup);
+  if (setup.camera.supersample > 1) seconds += calibration::picture::kResolve * double(FrameBounds(setup).pixel_count());
   return seconds;
 }
 
@@ -75,7 +72,7 @@ FramePredictor::FramePredictor(const FrameSetup& setup, const VolumeSummary& sum
       coarse_(Coarse(setup, pixel_side_)),
       estimator_(setup, summary, occupied, measured, pixel_side_),
       finish_seconds_(FinishSeconds(setup)),
-      receive_seconds_(kReceivePixel * PicturePixels(setup)),
+      receive_seconds_(calibration::picture::kReceive * PicturePixels(setup)),
       machine_(WithCoarsePixels(machine, pixel_side_)),
       roster_(RosterOf(slots)) {
   CHECK_GE(slots, 1U);

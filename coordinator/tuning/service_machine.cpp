@@ -2,19 +2,18 @@
 
 #include <algorithm>
 
+#include "common/calibration/calibration.h"
+
 namespace slabstream {
 namespace {
-
-constexpr double kLoopbackRate = 6e9;  // bytes a second: 16 MiB in 2.7 ms
 
 // Pixels stay where they are: only the beginnings and ends of rows are sent.
 void LendImages(MachineModel& machine) {
   machine.link.bytes_per_second = 1e12;
-  machine.combining = {.scan_pixel = 0.03e-9,
+  machine.combining = {.scan_pixel = calibration::combining::kLentScan,
                        .encode_pixel = 0,
-                       .combine_pixel = 0.45e-9,
-                       .local_pixel = 0.45e-9,
-                       .hidden_pixel = 0.1e-9,
+                       .combine_pixel = calibration::combining::kLentCombine,
+                       .local_pixel = calibration::combining::kLentLocal,
                        .run_bytes = 8,
                        .rgba_bytes = 0,
                        .depth_bytes = 0,
@@ -39,13 +38,13 @@ MachineModel ServiceMachine(std::span<const HostedWorker> workers, const Service
     machine.link = surroundings.link;
     return machine;
   }
-  machine.link = {Contention::kNone, 0, kLoopbackRate};
+  machine.link = {Contention::kNone, 0, calibration::service::kLoopbackRate};
   if (std::ranges::all_of(workers, &HostedWorker::lends_memory)) LendImages(machine);
   machine.plan_seconds = machine.message_seconds = machine.client_seconds = 0;  // in the wake-ups, which are measured as a whole
   const bool coordinators_host = !workers.empty() && workers.front().memory_scope == surroundings.memory_scope;
   machine.workers_a_host = std::int32_t(std::max<std::size_t>(workers.size(), 1));
   machine.cores_a_host = std::max<std::int32_t>(coordinators_host ? surroundings.cores : std::int32_t(threads), 1);
-  machine.memory_slowdown = 0.03;
+  machine.memory_slowdown = calibration::service::kMemorySlowdown;
   const bool one_process =
       std::ranges::all_of(workers, [&](const HostedWorker& worker) { return worker.pid != 0 && worker.pid == workers.front().pid; });
   if (one_process) machine.picture_threads = std::min(machine.workers_a_host * machine.threads, machine.cores_a_host);

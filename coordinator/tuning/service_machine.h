@@ -22,8 +22,7 @@ struct ServiceSurroundings {
 
 // If all workers share a host, they share its cores: those of the coordinator's host if it is theirs, else as many as they have threads.
 // They lend each other their images; if one of them does not, all images count as messages through the host's loopback. Otherwise each
-// worker counts as a host of its own behind `link`, images travel in messages, and the slowest link decides. Constants were measured on two
-// cores of an AMD EPYC (Zen 5) by laboratory/measure/calibrate.h, the loopback's by bench/combining_bench.
+// worker counts as a host of its own behind `link`, images travel in messages, and the slowest link decides.
 MachineModel ServiceMachine(std::span<const HostedWorker> workers, const ServiceSurroundings& surroundings);
 
 }  // namespace slabstream

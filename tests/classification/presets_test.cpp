@@ -25,7 +25,7 @@ double OpacityAt(const TransferFunction& transfer, double value) { return transf
 
 TEST(Presets, AreValidAndNamedOnceEach) {
   std::vector<std::string_view> names;
-  for (const PresetInfo& info : TransferPresets()) {
+  for (const TransferPreset& info : TransferPresets()) {
     EXPECT_THAT(names, testing::Not(testing::Contains(info.name)));
     names.push_back(info.name);
     EXPECT_FALSE(info.purpose.empty());
@@ -55,7 +55,7 @@ TEST(Presets, AreValidForEveryHistogram) {
     for (int n = 0; n < filled; ++n) {
       summary.histogram[random.Integer<std::size_t>(0, kHistogramBins - 1)] = random.Integer<std::uint64_t>(0, 1) << random.Integer(0, 40);
     }
-    for (const PresetInfo& info : TransferPresets()) {
+    for (const TransferPreset& info : TransferPresets()) {
       const Result<TransferFunction> transfer = MakePreset(info.name, summary);
       ASSERT_TRUE(transfer.ok());
       EXPECT_TRUE(Validate(*transfer).ok()) << info.name << ": " << Validate(*transfer).message();

@@ -14,7 +14,7 @@ TEST(Neighbours, SlowdownIsWhatTwoSimulatedRenderingsHad) {
   SCOPED_TRACE(random.trace());
   for (int i = 0; i < 100; ++i) {
     const double slowdown = random.Real(0, 0.9), first = random.Real(0.1, 1), second = random.Real(0.1, 1);
-    Processors processors(1, 2, slowdown);
+    Processors processors(2, slowdown);
     processors.Start(0, 0, first, 1, 0);
     processors.Start(0, 1, second, 1, 0);
     processors.Finish();

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "common/base/find_named.h"
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
 #include "common/planning/measured_cost.h"
@@ -50,7 +51,7 @@ TEST(Assignments, GreedyKeepsWithinGrahamsBound) {
     for (double& cost : costs) cost = std::exp(random.Real(-2, 2));
     const auto slots = random.Integer<std::uint32_t>(1, 13);
     std::vector<double> loads(slots);
-    const std::vector<std::uint32_t> owners = AssignGreedy({costs, slots});
+    const std::vector<std::uint32_t> owners = FindNamed(Assignments(), "greedy")->assign({costs, slots});
     for (std::size_t box = 0; box < costs.size(); ++box) loads[owners[box]] += costs[box];
     // Of any assignment: not below the mean, nor below the costliest box, nor below two of the slots + 1 costliest.
     double least = std::max(std::accumulate(costs.begin(), costs.end(), 0.0) / slots, *std::max_element(costs.begin(), costs.end()));

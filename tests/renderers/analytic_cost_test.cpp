@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "common/planning/layout.h"
+#include "common/renderers/sampling_rate.h"
 #include "common/renderers/splat/splat_cost.h"
-#include "common/renderers/zbuffer/zbuffer_cost.h"
 #include "tests/planning/support.h"
 #include "tests/support/random_box.h"
 #include "tests/support/renderers.h"
@@ -79,7 +79,7 @@ TEST(AnalyticCost, IsNothingWhereNothingIsNear) {
   EXPECT_GT(Of(cost, {{9, 0, 0}, {64, 64, 64}})[1], 0);
   EXPECT_EQ(Of(cost, {{0, 0, 10}, {64, 64, 64}}), nothing);
   EXPECT_GT(Of(cost, {{0, 0, 9}, {64, 64, 64}})[0], 0);
-  EXPECT_EQ(Of(zbuffer::ZBufferCost(grid), {{8, 0, 0}, {64, 64, 64}}), nothing);
+  EXPECT_EQ(Of(*ZBuffer()->MakeCost({.drawn = &grid}), {{8, 0, 0}, {64, 64, 64}}), nothing);
 }
 
 TEST(AnalyticCost, KnowsWhichRowsOfACellHoldAnything) {
@@ -150,6 +150,29 @@ TEST(AnalyticCost, GrowsWithTheBoxAndWithTheNumberOfBoxes) {
       EXPECT_GE(Of(cost, lower)[view] + Of(cost, upper)[view], Of(cost, whole)[view] * (1 - 1e-12)) << "round " << round;
     }
   }
+}
+
+TEST(AnalyticCost, FollowsTheSamplingRate) {
+  OccupancyGrid grid = EmptyGrid({64, 64, 64});
+  for (CellOccupancy& cell : grid.cells) cell = FullCell({{0, 0, 0}, {8, 8, 8}});
+  const VolumeSummary summary = FullSummary(grid.size);
+  const TransferFunction transfer{.colors = {{0, {1, 1, 1}}}, .opacities = {{0, 0.001}}};  // dense, and nothing is hidden
+  int with_rate = 0;
+  for (const RendererKind* renderer : Renderers()) {
+    if (renderer->parameters().empty() || renderer->parameters().front().name != SamplingRate().name) continue;
+    SCOPED_TRACE(renderer->name());
+    ++with_rate;
+    std::vector<double> parameters;
+    for (const RendererParameter& parameter : renderer->parameters()) parameters.push_back(parameter.standard);
+    const auto at_rate = [&](double rate) {
+      parameters.front() = rate;
+      return renderer->MakeCost({&grid, &summary, &transfer, parameters})->Seconds({{0, 0, 0}, grid.size}, {});
+    };
+    EXPECT_EQ(at_rate(1), renderer->MakeCost({&grid, &summary, &transfer})->Seconds({{0, 0, 0}, grid.size}, {})) << "the default";
+    EXPECT_NEAR(at_rate(2) / at_rate(1), 2, 0.2);
+    EXPECT_NEAR((at_rate(4) - at_rate(2)) / (at_rate(2) - at_rate(1)), 2, 1e-9) << "what is left is done once a box and once a pixel";
+  }
+  EXPECT_GE(with_rate, 2);
 }
 
 TEST(AnalyticCost, OfALongBoxIsLessSeenFromItsSide) {

@@ -49,23 +49,23 @@ CellRanges FindCellRanges(const PaddedVoxels& voxels) {
   // + 1.
   const Index3 size = voxels.box.size();
   CellRanges cells;
-  for (int axis = 0; axis < 3; ++axis) cells.grid.counts[axis] = (size[axis] + 1 + kCellSide - 1) / kCellSide;
-  cells.ranges.resize(cells.grid.size());
+  cells.counts = CubesOver(size + Uniform(1), kCellSide);
+  cells.ranges.resize(CountIn(cells.counts));
   const auto end_of = [](std::int32_t cell, std::int32_t voxels_along) { return std::min((cell + 1) * kCellSide + 1, voxels_along + 2); };
   VisitScalarType(voxels.type, [&](auto* type) {
     using T = std::remove_cvref_t<decltype(*type)>;
     const T* const first = reinterpret_cast<const T*>(voxels.samples.get()) + voxels.slice + voxels.row + 1;
-    tbb::parallel_for(0, cells.grid.counts.z, [&](std::int32_t cell_z) {
+    tbb::parallel_for(0, cells.counts.z, [&](std::int32_t cell_z) {
       ColumnRanges<T> columns(std::size_t(size.x) + 2);
-      for (std::int32_t cell_y = 0; cell_y < cells.grid.counts.y; ++cell_y) {
+      for (std::int32_t cell_y = 0; cell_y < cells.counts.y; ++cell_y) {
         columns.Clear();
         for (std::int32_t z = cell_z * kCellSide; z < end_of(cell_z, size.z); ++z) {
           for (std::int32_t y = cell_y * kCellSide; y < end_of(cell_y, size.y); ++y) {
             columns.Include(first + z * voxels.slice + std::ptrdiff_t{y} * voxels.row);
           }
         }
-        CellRange* const row = &cells.ranges[cells.grid.Number({0, cell_y, cell_z})];
-        for (std::int32_t cell_x = 0; cell_x < cells.grid.counts.x; ++cell_x) {
+        CellRange* const row = &cells.ranges[NumberIn(cells.counts, {0, cell_y, cell_z})];
+        for (std::int32_t cell_x = 0; cell_x < cells.counts.x; ++cell_x) {
           row[cell_x] = columns.Of(std::size_t(cell_x) * kCellSide, std::size_t(end_of(cell_x, size.x)));
         }
       }

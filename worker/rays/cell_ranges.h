@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "common/math/vec.h"
 #include "worker/rays/padded_voxels.h"
 
 namespace slabstream {
@@ -14,22 +15,12 @@ namespace slabstream {
 inline constexpr int kCellShift = 2;
 inline constexpr std::int32_t kCellSide = 1 << kCellShift;  // voxels
 
-// Cells of the box of padded voxels, x fastest.
-struct CellGrid {
-  Index3 counts;
-
-  std::size_t size() const { return std::size_t(counts.x) * std::size_t(counts.y) * std::size_t(counts.z); }
-  std::size_t Number(const Index3& cell) const {
-    return (std::size_t(cell.z) * std::size_t(counts.y) + std::size_t(cell.y)) * std::size_t(counts.x) + std::size_t(cell.x);
-  }
-};
-
 struct CellRange {
   float min, max;  // stored samples, finite ones; min > max: there is none
 };
 
 struct CellRanges {
-  CellGrid grid;
+  Index3 counts;  // of cells, which cover the padded voxels; x fastest
   std::vector<CellRange> ranges;
 
   std::size_t bytes() const { return ranges.capacity() * sizeof(CellRange); }

@@ -4,7 +4,7 @@
 
 namespace slabstream {
 
-RayBox MakeRayBox(const PaddedVoxels& voxels, const CellGrid& cells, const Box& box, const SampledRegion& sampled, const ViewRays& rays,
+RayBox MakeRayBox(const PaddedVoxels& voxels, const Index3& cells, const Box& box, const SampledRegion& sampled, const ViewRays& rays,
                   const Camera& camera) {
   RayBox result;
   result.type = voxels.type;
@@ -12,7 +12,7 @@ RayBox MakeRayBox(const PaddedVoxels& voxels, const CellGrid& cells, const Box& 
   result.origin = {voxels.box.begin.x - 1, voxels.box.begin.y - 1, voxels.box.begin.z - 1};
   result.row = voxels.row;
   result.slice = std::int32_t(voxels.slice);
-  result.cells = cells.counts;
+  result.cells = cells;
   const SampledRegion owned = WholeBox(box);
   Vec3 low, high;
   bool empty = false;

@@ -12,7 +12,7 @@ struct RayBox {
   const std::byte* samples = nullptr;  // of voxel origin - 1: PaddedVoxels::samples
   Index3 origin;                       // of the voxels' box, less 1: no sample has a floor below
   std::int32_t row = 0, slice = 0;     // samples from voxel to voxel along y and z
-  Index3 cells;                        // CellGrid::counts
+  Index3 cells;                        // CellRanges::counts
   Float3 low{}, high{};                // the box owns the positions p with low <= p < high on every axis
   RayReach reach;                      // of the positions that may matter
   bool at_border = false;              // the box touches the volume's border
@@ -25,7 +25,7 @@ inline constexpr std::size_t kMostRayBytes = (std::size_t{1} << 31) - 1;
 struct SampledRegion {
   Vec3 low, high;
 };
-RayBox MakeRayBox(const PaddedVoxels& voxels, const CellGrid& cells, const Box& box, const SampledRegion& sampled, const ViewRays& rays,
+RayBox MakeRayBox(const PaddedVoxels& voxels, const Index3& cells, const Box& box, const SampledRegion& sampled, const ViewRays& rays,
                   const Camera& camera);
 
 // All positions that the box owns.

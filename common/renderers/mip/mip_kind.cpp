@@ -7,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include "common/calibration/calibration.h"
 #include "common/image/local_image.h"
 #include "common/image/resolve.h"
 #include "common/renderers/mip/projection_mode.h"
@@ -53,14 +54,15 @@ double ValueOf(const float* pixel, ProjectionMode mode) {
 // The time of a box is that of its samples, along the rays of all pixels that it covers.
 class MipCost : public AnalyticCost {
  public:
+  explicit MipCost(double sampling_rate) : sampling_rate_(sampling_rate) {}
   double Seconds(const Box& box, const CostView& view) const override {
     const double pixels = view.pixels_per_voxel * view.pixels_per_voxel;
-    return kBox + kVoxel * double(box.voxel_count()) * pixels;
+    namespace cost = calibration::mip;
+    return cost::kBox + cost::kSample * sampling_rate_ * double(box.voxel_count()) * pixels;
   }
 
  private:
-  // Seconds of one thread: for a box, and for a voxel at one pixel a voxel.
-  static constexpr double kBox = 30e-6, kVoxel = 4e-9;
+  const double sampling_rate_;
 };
 
 class MipKind : public RendererKind {
@@ -90,7 +92,9 @@ class MipKind : public RendererKind {
     table.max_opacity = 1;
     return table;
   }
-  std::unique_ptr<AnalyticCost> MakeCost(const CostBasis& /*basis*/) const override { return std::make_unique<MipCost>(); }
+  std::unique_ptr<AnalyticCost> MakeCost(const CostBasis& basis) const override {
+    return std::make_unique<MipCost>(SamplingRateOf(basis.parameters));
+  }
 
   LocalImage Finish(const LocalImage& frame, const FrameSetup& setup) const override {
     const ColorTable table(setup);

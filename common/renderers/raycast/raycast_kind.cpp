@@ -1,11 +1,60 @@
 // The ray caster's planning half: the frame is the picture, supersampled where it is minified; images blend front to back.
 #include <algorithm>
+#include <cmath>
 
-#include "common/renderers/raycast/raycast_cost.h"
+#include "common/calibration/calibration.h"
+#include "common/renderers/renderer_kind.h"
 #include "common/renderers/sampling_rate.h"
+#include "common/volume/cells_along.h"
 
 namespace slabstream::raycast {
 namespace {
+
+// The extinction of a voxel length of the largest opacity that many voxels have, finite, >= 0.
+double Extinction(const CostBasis& basis) {
+  const ClassificationTable table = Classify(*basis.transfer, basis.summary->description, basis.summary->range);
+  return -std::log1p(-std::min(double(table.max_opacity), 0.999)) / table.opacity_distance;
+}
+
+// The time of a box is that of the pixels that it covers and of their shaded samples.
+class RaycastCost : public AnalyticCost {
+ public:
+  explicit RaycastCost(const CostBasis& basis)
+      : drawn_(*basis.drawn), opaque_depth_(kEnd / std::max(Extinction(basis), 1e-9)), sampling_rate_(SamplingRateOf(basis.parameters)) {}
+
+  double Seconds(const Box& box, const CostView& view) const override {
+    // Columns of cells along the view: material behind opaque material is not sampled.
+    const auto [c, u, v] = AxesOf(view.along);
+    const CellsAlong along(box, c), across_u(box, u), across_v(box, v);
+    const Index3 cells = OccupancyCells(drawn_.size);
+    constexpr double kCellArea = double(kOccupancyCell) * kOccupancyCell;
+    double depths = 0, covered = 0;  // voxel lengths of sampled material, and rays, at a pixel a voxel
+    Index3 cell;
+    for (cell[v] = across_v.begin; cell[v] < across_v.end; ++cell[v]) {
+      for (cell[u] = across_u.begin; cell[u] < across_u.end; ++cell[u]) {
+        double depth = 0;  // voxel lengths of material
+        for (cell[c] = along.begin; cell[c] < along.end; ++cell[c]) {
+          depth += along.ShareInside(cell[c]) * drawn_.cells[NumberIn(cells, cell)].voxels / kCellArea;
+        }
+        if (depth <= 0) continue;
+        const double area = kCellArea * across_u.ShareInside(cell[u]) * across_v.ShareInside(cell[v]);
+        depths += area * std::min(depth, opaque_depth_);
+        covered += area;
+      }
+    }
+    if (covered <= 0) return 0;
+    namespace cost = calibration::raycast;
+    const double pixels = view.pixels_per_voxel * view.pixels_per_voxel;
+    return cost::kBox + pixels * (cost::kPixel * covered + cost::kSample * sampling_rate_ * depths);
+  }
+
+ private:
+  static constexpr double kEnd = 6.9;  // -ln of the transmittance at which rays end by default, 1/1024
+
+  const OccupancyGrid& drawn_;
+  const double opaque_depth_;  // voxel lengths of material after which rays end
+  const double sampling_rate_;
+};
 
 class RaycastKind : public RendererKind {
  public:

@@ -6,20 +6,9 @@
 #include <utility>
 #include <vector>
 
+#include "common/calibration/calibration.h"
+
 namespace slabstream::splat {
-namespace {
-
-// Seconds of one thread, at about a pixel a voxel: for a box; for each of its slices; for each row of samples that is not empty, in each
-// slice; for each segment of a row that is not empty; for each run of such segments; for each octet of voxels that is shaded.
-//
-// Fitted to kd-trees and beams of 8 and 16 boxes of equal numbers of voxels and of occupied voxels, over a class-I sphere, vessels,
-// heptane, bonsai and an MR brain in views along x and along y. Root mean square of the relative error over 16 boxes, in brackets when
-// fitted to the other four volumes: sphere 0.05 (0.05), vessels 0.05 (0.06), heptane 0.05 (0.05), bonsai 0.11 (0.12: its pot is denser than
-// its median voxel), MR brain 0.07 (0.07). bench/balance_bench measures it for any volume.
-constexpr double kBox = 39e-6, kSlice = 1e-6, kRow = 49e-9, kSegment = 7.5e-9, kRun = 16e-9, kOctet = 18e-9;
-
-}  // namespace
-
 double MedianExtinction(const TransferFunction& transfer, const VolumeSummary& summary) {
   constexpr double kMostOpacity = 0.999;  // 1 would be infinite
   const ClassificationTable table = Classify(transfer, summary.description, summary.range);
@@ -49,8 +38,10 @@ double MedianExtinction(const TransferFunction& transfer, const VolumeSummary& s
 double SplatCost::SecondsAlong(const Box& box, Axis along, double scale) const {
   const SplatCounts counts = work_.Count(box, along);
   if (counts.rows == 0) return 0;
-  return kBox + kSlice * counts.slices + scale * (kRow * counts.rows + scale * kSegment * counts.segments + kRun * counts.runs) +
-         kOctet * counts.octets;
+  namespace cost = calibration::splat;
+  return cost::kBox + cost::kSlice * counts.slices +
+         scale * (cost::kRow * counts.rows + scale * cost::kSegment * counts.segments + cost::kRun * counts.runs) +
+         cost::kOctet * counts.octets;
 }
 
 double SplatCost::Seconds(const Box& box, const CostView& view) const {

@@ -4,15 +4,16 @@
 #include <cmath>
 #include <vector>
 
-#include "common/volume/cell_range.h"
+#include "common/calibration/calibration.h"
+#include "common/volume/cells_along.h"
 
 namespace slabstream::splat {
 namespace {
 
 constexpr std::int32_t kRim = 2;                 // voxels on either side of a sample that reach it
 constexpr std::int32_t kLayer = kOccupancyCell;  // bits from a line of a cell to the one above it
-// Mean optical depth of a segment's rays when the last of them is opaque: exp(-6.93) is kDefaultTermination. The factor was fitted.
-constexpr float kOpaqueDepth = 1.5F * 6.93F;
+// Mean optical depth of a segment's rays when the last of them is opaque: exp(-6.93) is kDefaultTermination.
+constexpr float kOpaqueDepth = calibration::splat::kOpaqueDepth * 6.93F;
 constexpr double kMostPixels = 2;  // a voxel, as SheetGrid has it
 
 // tan(elevation) / cos(azimuth), at 20 and 30 degrees: how far a ray rises for each unit across the slices.
@@ -82,7 +83,7 @@ double SplatWork::PixelsPerVoxel(Axis axis) const { return std::min(spacing_[axi
 
 SplatCounts SplatWork::Count(const Box& box, Axis along) const {
   const Axis beam = along == Axis::kX ? Axis::kY : Axis::kX;
-  const CellRange slices(box, along), beams(Grown(box, kRim, {{0, 0, 0}, grid_.size}), beam), layers(box, Axis::kZ);
+  const CellsAlong slices(box, along), beams(Grown(box, kRim, {{0, 0, 0}, grid_.size}), beam), layers(box, Axis::kZ);
   const Index3 cells = OccupancyCells(grid_.size);
   const auto step = [&](Axis axis) { return axis == Axis::kX ? 1 : axis == Axis::kY ? cells.x : std::ptrdiff_t{cells.x} * cells.y; };
   const auto lines_of = [&](const CellOccupancy& cell) { return beam == Axis::kX ? cell.lines_x : cell.lines_y; };

@@ -1,9 +1,46 @@
 // The Z-buffer's planning half: the frame is the picture, supersampled where it is minified; only opaque voxels draw.
+#include "common/calibration/calibration.h"
+#include "common/renderers/renderer_kind.h"
 #include "common/renderers/zbuffer/least_opaque.h"
-#include "common/renderers/zbuffer/zbuffer_cost.h"
+#include "common/volume/cells_along.h"
 
 namespace slabstream::zbuffer {
 namespace {
+
+// The time of a box is that of the cells through which surfaces pass, and of its pixels.
+class ZBufferCost : public AnalyticCost {
+ public:
+  explicit ZBufferCost(const OccupancyGrid& drawn) : drawn_(drawn) {}
+
+  double Seconds(const Box& box, const CostView& view) const override {
+    const CellsAlong x(box, Axis::kX), y(box, Axis::kY), z(box, Axis::kZ);
+    const Index3 cells = OccupancyCells(drawn_.size);
+    double surface_cells = 0;
+    Box hull;  // of the cells that hold anything
+    for (std::int32_t k = z.begin; k < z.end; ++k) {
+      for (std::int32_t j = y.begin; j < y.end; ++j) {
+        for (std::int32_t i = x.begin; i < x.end; ++i) {
+          const CellOccupancy& cell = drawn_.cells[NumberIn(cells, {i, j, k})];
+          if (cell.voxels == 0) continue;
+          const Box whole = OccupancyCellBox({i, j, k}, drawn_.size);
+          hull = Hull(hull, Intersection(whole, box));
+          if (cell.voxels == whole.voxel_count()) continue;  // no surface inside
+          surface_cells += x.ShareInside(i) * y.ShareInside(j) * z.ShareInside(k);
+        }
+      }
+    }
+    if (hull.empty()) return 0;
+    // The area of the hull's projection at a small elevation, on average over all azimuths: the mean of |cos| and |sin| is 2 / pi, and a
+    // third of what lies flat is seen.
+    const Index3 size = hull.size();
+    const double width = 0.64 * (size.x + size.y), pixels = width * (size.z + width / 3);
+    namespace cost = calibration::zbuffer;
+    return cost::kBox + cost::kSurfaceCell * surface_cells + cost::kPixel * pixels * view.pixels_per_voxel * view.pixels_per_voxel;
+  }
+
+ private:
+  const OccupancyGrid& drawn_;
+};
 
 class ZBufferKind : public RendererKind {
  public:

@@ -68,7 +68,7 @@ class MipRenderer : public Renderer {
       const RayPiece& piece = pieces[number];
       const Box part = Intersection(box, piece.voxels.box);
       if (part.empty()) continue;
-      const RayBox ray_box = MakeRayBox(piece.voxels, piece.cells.grid, part, WholeBox(part), rays, setup.camera);
+      const RayBox ray_box = MakeRayBox(piece.voxels, piece.cells.counts, part, WholeBox(part), rays, setup.camera);
       work.box = &ray_box;
       work.bounds = bounds == nullptr ? nullptr : &(*bounds)[number];
       LocalImage layer = MakeLocalImage(setup.format, ray_box.reach.pixels);

@@ -7,19 +7,18 @@ namespace slabstream {
 
 SampleBounds BoundSamples(const CellRanges& cells, float sign) {
   constexpr int kCellsABlock = kBlockShift - kCellShift;  // log2
-  const Index3& counts = cells.grid.counts;
+  const Index3& counts = cells.counts;
   SampleBounds bounds;
   bounds.cells.reserve(cells.ranges.size());
-  for (int axis = 0; axis < 3; ++axis) bounds.block_counts[axis] = ((counts[axis] - 1) >> kCellsABlock) + 1;
-  const CellGrid blocks{bounds.block_counts};
-  bounds.blocks.assign(blocks.size(), std::numeric_limits<float>::lowest());
+  bounds.block_counts = CubesOver(counts, 1 << kCellsABlock);
+  bounds.blocks.assign(CountIn(bounds.block_counts), std::numeric_limits<float>::lowest());
   for (Index3 cell; cell.z < counts.z; ++cell.z) {
     for (cell.y = 0; cell.y < counts.y; ++cell.y) {
       for (cell.x = 0; cell.x < counts.x; ++cell.x) {
-        const CellRange& range = cells.ranges[cells.grid.Number(cell)];
+        const CellRange& range = cells.ranges[NumberIn(counts, cell)];
         const float bound = range.min > range.max ? std::numeric_limits<float>::lowest() : sign > 0 ? range.max : -range.min;
         bounds.cells.push_back(bound);
-        float& block = bounds.blocks[blocks.Number({cell.x >> kCellsABlock, cell.y >> kCellsABlock, cell.z >> kCellsABlock})];
+        float& block = bounds.blocks[NumberIn(bounds.block_counts, cell / (1 << kCellsABlock))];
         block = std::max(block, bound);
       }
     }

@@ -49,7 +49,7 @@ std::vector<std::uint8_t> EmptyDistances(const CellRanges& cells, const VisibleS
   for (std::size_t i = 0; i < cells.ranges.size(); ++i) {
     if (visible.AnyBetween(cells.ranges[i].min, cells.ranges[i].max)) distance[i] = 0;
   }
-  const Index3& counts = cells.grid.counts;
+  const Index3& counts = cells.counts;
   Sweep sweep(counts, distance.data());
   for (std::int32_t z = 0; z < counts.z; ++z) {
     for (std::int32_t y = 0; y < counts.y; ++y) sweep.Visit(y, z, -1);

@@ -27,7 +27,7 @@ struct Visibility {
 
 Visibility VisibilityOf(const RayPiece& piece, const VisibleSamples& visible) {
   Visibility result{EmptyDistances(piece.cells, visible), {{1, 0, 0}, {0, 0, 0}}};
-  const Index3& counts = piece.cells.grid.counts;
+  const Index3& counts = piece.cells.counts;
   Box cells;
   std::size_t number = 0;
   for (Index3 cell; cell.z < counts.z; ++cell.z) {
@@ -95,7 +95,7 @@ class RaycastRenderer : public Renderer {
       const RayPiece& piece = pieces[number];
       const Box part = Intersection(box, piece.voxels.box);
       if (part.empty()) continue;
-      const RayBox ray_box = MakeRayBox(piece.voxels, piece.cells.grid, part, visible[number].region, rays, setup.camera);
+      const RayBox ray_box = MakeRayBox(piece.voxels, piece.cells.counts, part, visible[number].region, rays, setup.camera);
       const MarchWork work = {&rays, &ray_box, &look, visible[number].distances.data(), float(setup.termination)};
       LocalImage layer = MakeLocalImage(setup.format, ray_box.reach.pixels);
       RenderTiles(layer, hidden, cancelled, report, [&](const PixelBounds& tile, float* rgba, std::size_t floats_a_row) {

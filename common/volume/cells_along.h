@@ -1,4 +1,4 @@
-// CellRange: the cells of an OccupancyGrid that a box touches along one axis, and how much of each lies inside.
+// CellsAlong: the cells of an OccupancyGrid that a box touches along one axis, and how much of each lies inside.
 #pragma once
 
 #include <algorithm>
@@ -8,10 +8,10 @@
 
 namespace slabstream {
 
-class CellRange {
+class CellsAlong {
  public:
   // `box` is not empty.
-  CellRange(const Box& box, Axis axis)
+  CellsAlong(const Box& box, Axis axis)
       : begin(box.begin[axis] / kOccupancyCell),
         end((box.end[axis] - 1) / kOccupancyCell + 1),
         first_voxel_(box.begin[axis]),
