@@ -1,11 +1,9 @@
 #include "bench/program.h"
 
-#include <cstdio>
-
-#include "client/cli/help_formatter.h"
-#include "common/base/large_buffers.h"
 #include "common/base/parse_number.h"
+#include "common/base/version.h"
 #include "common/classification/count_occupied.h"
+#include "common/cli/program.h"
 
 namespace slabstream {
 namespace {
@@ -29,21 +27,8 @@ Result<BenchCase> ParseSubject(const SubjectOptions& options, const std::string&
 }  // namespace
 
 int RunProgram(CLI::App& app, int argc, const char* const* argv, const std::function<Status()>& run) {
-  KeepFrameBuffers();
-  app.formatter(std::make_shared<HelpFormatter>());
-  app.set_help_flag("-h,--help", "Print this text");
-  Status status;
-  try {
-    app.parse(argc, argv);
-    status = run();
-  } catch (const CLI::Success& asked) {  // --help
-    return app.exit(asked);
-  } catch (const CLI::ParseError& error) {
-    status = Status::InvalidArgument(error.what());
-  }
-  if (status.ok()) return 0;
-  fmt::print(stderr, "{}: {}\n", app.get_name(), status.message());
-  return 2;
+  SetUp(app, std::string(Version()));
+  return RunMain(app.get_name(), [&] { return ParseAndRun(app, argc, argv, run); });
 }
 
 CLI::Option* AddRenderer(CLI::App& app, const RendererKind*& target, const std::string& help) {

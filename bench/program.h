@@ -19,7 +19,7 @@
 
 namespace slabstream {
 
-// Parses the command line and runs; returns the exit status. What is wrong is told in a line on stderr, with status 2.
+// Parses the command line and runs; returns the exit status. For main alone.
 int RunProgram(CLI::App& app, int argc, const char* const* argv, const std::function<Status()>& run);
 
 // A list in one argument: "A,B". CLI11 checks each entry.

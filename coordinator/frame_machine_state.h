@@ -6,13 +6,13 @@
 //   frame_machine_clients.cpp   messages of clients and the ends of their requests
 #pragma once
 
-#include <concepts>
 #include <optional>
 #include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "common/base/any_of.h"
 #include "coordinator/clients.h"
 #include "coordinator/datasets.h"
 #include "coordinator/frame_machine.h"
@@ -22,9 +22,6 @@
 #include "coordinator/roster.h"
 
 namespace slabstream {
-
-template <class M, class... Ms>
-concept AnyOf = (std::same_as<M, Ms> || ...);
 
 inline std::uint32_t Milliseconds(Duration duration) {
   return std::uint32_t(std::chrono::duration_cast<std::chrono::milliseconds>(duration).count());

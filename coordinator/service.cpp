@@ -125,10 +125,7 @@ struct CoordinatorService::Impl {
 };
 
 void CoordinatorService::Impl::Run() {
-  const Status ended = Guarded("coordinator", [&] {
-    Loop();
-    return Status::Ok();
-  });
+  const Status ended = Guarded("coordinator", [&] { Loop(); });
   if (!ended.ok()) {
     LogError("the coordinator stops: " + ended.message());
     (void)Guarded("coordinator", [&] {
@@ -226,10 +223,7 @@ void CoordinatorService::Impl::Perform(LoadDataset& action) {
     Result<News> loaded = Guarded(barrier.c_str(), [&] { return Load(loader, action); });
     return loaded.ok() ? *std::move(loaded) : News{DatasetFailed{action.name, loaded.status()}};
   };
-  const Status begun = Guarded("loading", [&] {
-    loads.Post([inbox = inbox, load] { inbox->Post(load()); });
-    return Status::Ok();
-  });
+  const Status begun = Guarded("loading", [&] { loads.Post([inbox = inbox, load] { inbox->Post(load()); }); });
   if (!begun.ok()) inbox->Post({DatasetFailed{action.name, begun}});
 }
 
@@ -239,7 +233,6 @@ void CoordinatorService::Impl::Perform(CountDataset& action) {
       auto grid = Guarded("counting of occupied voxels", [&] { return Count(count, samples, action); });
       inbox->Post({OccupiedCounted{action.count, std::move(grid)}});
     });
-    return Status::Ok();
   });
   if (!begun.ok()) inbox->Post({OccupiedCounted{action.count, begun}});
 }
@@ -253,7 +246,6 @@ void CoordinatorService::Impl::Perform(PlanRequest& action) {
       if (*dropped) return;
       inbox->Post({Planned{request.plan, Guarded("planning", [&] { return make(*planner, request); })}});
     });
-    return Status::Ok();
   });
   if (!begun.ok()) inbox->Post({Planned{plan, begun}});
 }
@@ -267,16 +259,10 @@ void CoordinatorService::Impl::Perform(DropPlan& action) {
 
 void CoordinatorService::Impl::Perform(FrameMeasured& action) {
   const auto learn = [planner = planner, measured = std::move(action)] {
-    const Status learnt = Guarded("learning from a frame", [&] {
-      planner->Learn(measured);
-      return Status::Ok();
-    });
+    const Status learnt = Guarded("learning from a frame", [&] { planner->Learn(measured); });
     if (!learnt.ok()) LogWarning(learnt.message());
   };
-  const Status begun = Guarded("learning from a frame", [&] {
-    planning.Post(learn);
-    return Status::Ok();
-  });
+  const Status begun = Guarded("learning from a frame", [&] { planning.Post(learn); });
   if (!begun.ok()) LogWarning(begun.message());
 }
 

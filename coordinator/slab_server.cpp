@@ -84,10 +84,7 @@ void SlabServer::Run(const std::stop_token& stop) {
     while (!stop.stop_requested()) {
       const std::optional<Incoming> incoming = socket_.TryReceive();
       if (!incoming) break;
-      const Status answered = Guarded("slabs plane", [&] {
-        Answer(*incoming);
-        return Status::Ok();
-      });
+      const Status answered = Guarded("slabs plane", [&] { Answer(*incoming); });
       if (!answered.ok()) LogWarning(answered.message());  // the worker asks again when its request times out
     }
   }

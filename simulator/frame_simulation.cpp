@@ -198,18 +198,9 @@ void FrameSimulation::BeginGroup(const GroupAssignment& assignment) {
 
 // ---------------------------------------------------------------- work
 
-std::optional<WorkCost> FrameSimulation::Begin(Job& job) {
-  using Cost = std::optional<WorkCost>;
-  return std::visit(
-      Overloaded{[&](const StoreChunk&) { return Cost(); }, [&](const StartRender& action) { return Cost(CostOf(job.node, action)); },
-                 [&](const SendPartial& action) { return Cost(CostOf(job, action)); },
-                 [&](const auto& action) { return Cost(CostOf(action)); }},
-      job.action);
-}
-
-WorkCost FrameSimulation::CostOf(Node node, const StartRender& action) const {
+auto FrameSimulation::CostOf(const Job& job, const StartRender& action) const -> Cost {
   const std::uint32_t frame = FrameOf(action.key);
-  return {inputs_[frame].boxes[action.placement.id].seconds * Slowness(frame, node), double(machine_.threads)};
+  return {{inputs_[frame].boxes[action.placement.id].seconds * Slowness(frame, job.node), double(machine_.threads)}};
 }
 
 // Depends on seed, frame and worker alone.
@@ -221,18 +212,18 @@ double FrameSimulation::Slowness(std::uint32_t frame, Node node) const {
   return double(engine()) < stragglers.probability * 0x1p32 ? stragglers.factor : 1;
 }
 
-WorkCost FrameSimulation::CostOf(const StartCombine& action) {
+auto FrameSimulation::CostOf(const Job&, const StartCombine& action) -> Cost {
   const bool all = action.pixels.begin >= action.pixels.end;
   const PixelRange pixels = all ? PixelRange{0, std::uint64_t(action.frame.pixel_count())} : action.pixels;
   const CombiningCosts& costs = machine_.combining;
-  return {(action.other == 0 ? costs.combine_pixel : costs.local_pixel) * GroupOf(action.key).coverage.Of(action.ranks, pixels).filled};
+  return {{(action.other == 0 ? costs.combine_pixel : costs.local_pixel) * GroupOf(action.key).coverage.Of(action.ranks, pixels).filled}};
 }
 
-WorkCost FrameSimulation::CostOf(const FindHidden& action) const {
-  return {machine_.combining.hidden_pixel * double(FrameBounds(*action.setup).pixel_count())};
+auto FrameSimulation::CostOf(const Job&, const FindHidden& action) const -> Cost {
+  return {{machine_.combining.hidden_pixel * double(FrameBounds(*action.setup).pixel_count())}};
 }
 
-WorkCost FrameSimulation::CostOf(Job& job, const SendPartial& action) {
+auto FrameSimulation::CostOf(Job& job, const SendPartial& action) -> Cost {
   const CombiningCosts& costs = machine_.combining;
   const PixelFormat format = plan(FrameOf(action.message.key)).setup.format;
   const ColorCoding color = format == PixelFormat::kRgba ? action.color : ColorCoding::kFloat32;  // others are never coded
@@ -241,12 +232,13 @@ WorkCost FrameSimulation::CostOf(Job& job, const SendPartial& action) {
   job.pixels = amount.filled;
   job.bytes = amount.filled * (HasDepth(format) ? costs.depth_bytes : costs.rgba_bytes * color_share) + amount.runs * costs.run_bytes;
   // The thread that owns the sockets announces a lent image itself if that is quicker, as in workers.
-  return {costs.scan_pixel * amount.scanned + costs.encode_pixel * amount.filled, 1, costs.lent && service_.Idle(job.node, Lane::kCombine)};
+  return {
+      {costs.scan_pixel * amount.scanned + costs.encode_pixel * amount.filled, 1, costs.lent && service_.Idle(job.node, Lane::kCombine)}};
 }
 
-WorkCost FrameSimulation::CostOf(const SendFrame& action) const {
-  const std::uint32_t frame = frame_of_.at(action.message.frame);
-  return {inputs_[frame].finish_seconds, double(std::max(machine_.threads, machine_.picture_threads))};
+auto FrameSimulation::CostOf(const Job&, const SendFrame& action) const -> Cost {
+  const double seconds = inputs_[frame_of_.at(action.message.frame)].finish_seconds;
+  return {{seconds, double(std::max(machine_.threads, machine_.picture_threads))}};
 }
 
 void FrameSimulation::OnWorked(const Job& job, const LaneTask& task) {

@@ -46,7 +46,9 @@ class FrameSimulation : private Conditions {
   void OnPicture(std::uint32_t frame);
 
   // ---- Conditions
-  std::optional<WorkCost> Begin(Job& job) override;
+  std::optional<WorkCost> Begin(Job& job) override {
+    return std::visit([&](const auto& action) { return CostOf(job, action); }, job.action);
+  }
   void OnWorked(const Job& job, const LaneTask& task) override;
   WorkerEvent Answer(Job& job) override;
   void Perform(Node node, SendChunkRequest& action) override;
@@ -59,11 +61,13 @@ class FrameSimulation : private Conditions {
   void Perform(const CountDataset&) override {}
   void Perform(const PlanRequest& action) override;
 
-  WorkCost CostOf(Node node, const StartRender& action) const;
-  WorkCost CostOf(const StartCombine& action);
-  WorkCost CostOf(const FindHidden& action) const;
-  WorkCost CostOf(Job& job, const SendPartial& action);
-  WorkCost CostOf(const SendFrame& action) const;
+  using Cost = std::optional<WorkCost>;
+  Cost CostOf(const Job& job, const StartRender& action) const;
+  Cost CostOf(const Job&, const StoreChunk&) const { return {}; }
+  Cost CostOf(const Job&, const StartCombine& action);
+  Cost CostOf(const Job&, const FindHidden& action) const;
+  Cost CostOf(Job& job, const SendPartial& action);
+  Cost CostOf(const Job&, const SendFrame& action) const;
   double Slowness(std::uint32_t frame, Node node) const;
   void BeginGroup(const GroupAssignment& assignment);
   // When the last byte arrives of a message that leaves at `sent`. Fills in the message's times.

@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/base/any_of.h"
 #include "simulator/conditions.h"
 #include "simulator/event_queue.h"
 #include "simulator/threads.h"
@@ -49,7 +50,6 @@ class SimulatedService {
   // ---- workers
   Node AddWorker(WorkerConfig config);  // its images_endpoint is its node
   void KillWorker(Node node) { workers_[node].alive = false; }
-  std::size_t workers() const { return workers_.size(); }
   bool alive(Node node) const { return workers_[node].alive; }
   const WorkerMachine& worker(Node node) const { return workers_[node].machine; }
   void StepWorker(Node node, const WorkerEvent& event);
@@ -84,11 +84,9 @@ class SimulatedService {
   void Perform(Node, ConnectSlabs&) {}
   void Perform(Node node, CancelRender& action);
   void Perform(Node node, StartRender& action) { workers_[node].rendering = Order({node, std::move(action)}); }
-  void Perform(Node node, StoreChunk& action) { Order({node, std::move(action)}); }
-  void Perform(Node node, StartCombine& action) { Order({node, std::move(action)}); }
-  void Perform(Node node, FindHidden& action) { Order({node, std::move(action)}); }
-  void Perform(Node node, SendPartial& action) { Order({node, std::move(action)}); }
-  void Perform(Node node, SendFrame& action) { Order({node, std::move(action)}); }
+  void Perform(Node node, AnyOf<StoreChunk, StartCombine, FindHidden, SendPartial, SendFrame> auto& action) {
+    Order({node, std::move(action)});
+  }
   void Perform(Node node, auto& action) { conditions_.Perform(node, action); }
 
   std::uint32_t Order(Job job);  // its place

@@ -123,16 +123,14 @@ struct Executor::Slab {
   Status Store(const Chunk& chunk, const Bytes& payload) {
     if (chunk.box.empty() || !key.box.Contains(chunk.box) || chunk.dataset != key.dataset) return Status::DataLoss("chunk of another slab");
     if (data != nullptr) return Status::Ok();  // a duplicate after the slab was complete
-    const std::uint64_t total = std::uint64_t(chunk.box.voxel_count()) * BytesPerSample(key.type);
-    const std::uint64_t begin = std::uint64_t{chunk.chunk} * kChunkBytes;
-    if (begin >= total || chunk.raw_bytes != std::min<std::uint64_t>(kChunkBytes, total - begin)) {
+    if (chunk.chunk >= ChunkCount(chunk.box, key.type) || chunk.raw_bytes != BytesOfChunk(chunk.box, key.type, chunk.chunk)) {
       return Status::DataLoss("chunk " + std::to_string(chunk.chunk) + " of " + std::to_string(chunk.raw_bytes) +
-                              " bytes does not fit a box of " + std::to_string(total));
+                              " bytes does not fit its box");
     }
     if (!voxels) voxels.emplace(key.box, key.type);
     unpacked.resize(chunk.raw_bytes);
     if (Status status = UnpackChunk(chunk, payload.span(), unpacked); !status.ok()) return status;
-    voxels->Write(chunk.box, begin, unpacked);
+    voxels->Write(chunk.box, std::uint64_t{chunk.chunk} * kChunkBytes, unpacked);
     return Status::Ok();
   }
 

@@ -115,10 +115,7 @@ struct WorkerService::Impl {
 };
 
 void WorkerService::Impl::Run() {
-  const Status ended = Guarded("worker", [&] {
-    Loop();
-    return Status::Ok();
-  });
+  const Status ended = Guarded("worker", [&] { Loop(); });
   if (!ended.ok()) {
     LogError("the worker leaves: " + ended.message());
     (void)Guarded("worker", [&] {
@@ -265,7 +262,6 @@ void WorkerService::Impl::HandleOutput(ExecutorOutput& output) {
     const Status tried = Guarded("send", [&] {
       if (options.task_hook) options.task_hook("send");
       sent = peers.Send(partial.to.images_endpoint, std::move(partial.header), partial.payload, MonotonicNow());
-      return Status::Ok();
     });
     if (!tried.ok()) return HandleEvent(SendFailed{partial.key, tried});  // no fault of the peer's
     if (sent.ok()) return;

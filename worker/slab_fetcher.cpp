@@ -8,14 +8,6 @@
 #include "common/volume/box_assembly.h"
 
 namespace slabstream {
-namespace {
-
-std::uint32_t BytesOfChunk(const Box& box, ScalarType type, std::uint32_t chunk) {
-  const std::uint64_t total = std::uint64_t(box.voxel_count()) * BytesPerSample(type);
-  return std::uint32_t(std::min<std::uint64_t>(kChunkBytes, total - std::uint64_t(chunk) * kChunkBytes));
-}
-
-}  // namespace
 
 SlabFetcher::Slab* SlabFetcher::Find(Generation slab) {
   const auto found = slabs_.find(slab);

@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <concepts>
 #include <map>
 #include <optional>
 #include <set>
 #include <utility>
 
+#include "common/base/any_of.h"
 #include "common/planning/frame_occlusion.h"
 #include "worker/early_images.h"
 #include "worker/frame_accumulator.h"
@@ -17,9 +17,6 @@
 #include "worker/slab_fetcher.h"
 
 namespace slabstream {
-
-template <class M, class... Ms>
-concept AnyOf = (std::same_as<M, Ms> || ...);
 
 struct WorkerMachine::State {
   explicit State(WorkerConfig c)

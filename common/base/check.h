@@ -1,4 +1,4 @@
-// CHECK and DCHECK: for our own mistakes only. A failed check prints file, line, the condition, both operands where there are two,
+// CHECK: for our own mistakes only. A failed check prints file, line, the condition, both operands where there are two,
 // what was streamed in, and aborts. Bad input from outside is a Status (status.h), never a CHECK.
 //
 //   CHECK(ready) << "while rendering group " << g;
@@ -39,9 +39,3 @@ struct Voidify {
 #define CHECK_LE(a, b) SLABSTREAM_CHECK_OP(a, <=, b)
 #define CHECK_GT(a, b) SLABSTREAM_CHECK_OP(a, >, b)
 #define CHECK_GE(a, b) SLABSTREAM_CHECK_OP(a, >=, b)
-
-#ifdef NDEBUG
-#define DCHECK(condition) CHECK(true || (condition))
-#else
-#define DCHECK(condition) CHECK(condition)
-#endif

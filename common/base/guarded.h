@@ -26,11 +26,16 @@ inline Status CurrentFailure(const std::string& what) {
   }
 }
 
-// Returns what `work` returns, a Status or Result; if it throws, CurrentFailure(what).
+// Returns what `work` returns, a Status or Result (Ok if it returns nothing); if it throws, CurrentFailure(what).
 template <class Work>
-std::invoke_result_t<Work> Guarded(const char* what, Work&& work) {
+auto Guarded(const char* what, Work&& work) -> std::conditional_t<std::is_void_v<decltype(work())>, Status, decltype(work())> {
   try {
-    return work();
+    if constexpr (std::is_void_v<decltype(work())>) {
+      work();
+      return Status::Ok();
+    } else {
+      return work();
+    }
   } catch (...) {
     return CurrentFailure(what);
   }

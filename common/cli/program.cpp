@@ -51,13 +51,7 @@ void SetUp(CLI::App& app, const std::string& version) {
   app.set_version_flag("--version", version, "Print the version");
 }
 
-int RunService(CLI::App& app, int argc, const char* const* argv, const std::string& log_name, const std::function<Status()>& serve) {
-  std::string log_level = "warning";
-  std::vector<std::string_view> levels;
-  for (const auto& [name, level] : LogLevelNames()) levels.push_back(name);
-  AddParsed(app, "--log-level", log_level, OneOf(std::move(levels)), "What is logged to stderr: debug, info, warning, error or off")
-      ->type_name("NAME")
-      ->default_str(log_level);
+int ParseAndRun(CLI::App& app, int argc, const char* const* argv, const std::function<Status()>& run) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& asked) {  // --help, --version
@@ -65,8 +59,20 @@ int RunService(CLI::App& app, int argc, const char* const* argv, const std::stri
   } catch (const CLI::ParseError& error) {
     return Finish(app.get_name(), Status::InvalidArgument(error.what()));
   }
-  InitLog(log_name, LogLevelNames().at(log_level));
-  return Finish(app.get_name(), serve());
+  return Finish(app.get_name(), run());
+}
+
+int RunService(CLI::App& app, int argc, const char* const* argv, const std::string& log_name, const std::function<Status()>& serve) {
+  std::string log_level = "warning";
+  std::vector<std::string_view> levels;
+  for (const auto& [name, level] : LogLevelNames()) levels.push_back(name);
+  AddParsed(app, "--log-level", log_level, OneOf(std::move(levels)), "What is logged to stderr: debug, info, warning, error or off")
+      ->type_name("NAME")
+      ->default_str(log_level);
+  return ParseAndRun(app, argc, argv, [&] {
+    InitLog(log_name, LogLevelNames().at(log_level));
+    return serve();
+  });
 }
 
 }  // namespace slabstream

@@ -19,6 +19,9 @@ int Finish(const std::string& who, const Status& status);
 // The style of help texts, --help and --version.
 void SetUp(CLI::App& app, const std::string& version);
 
+// Parses, and runs `run`. Returns the exit status.
+int ParseAndRun(CLI::App& app, int argc, const char* const* argv, const std::function<Status()>& run);
+
 // A program that is one service: adds --log-level, parses, begins to log as `log_name`, and runs `serve`. Returns the exit status.
 int RunService(CLI::App& app, int argc, const char* const* argv, const std::string& log_name, const std::function<Status()>& serve);
 

@@ -66,7 +66,7 @@ class Fragments {
   // `fragment` must not overlap another one. Neighbours with equal values become one.
   void Put(const Fragment<Value>& fragment) {
     auto place = list_.begin() + (FirstAfter(fragment.pixels.begin) - list_.cbegin());
-    DCHECK(place == list_.end() || fragment.pixels.end <= place->pixels.begin);
+    CHECK(place == list_.end() || fragment.pixels.end <= place->pixels.begin);
     const bool joins_next = place != list_.end() && place->pixels.begin == fragment.pixels.end && place->value == fragment.value;
     const bool joins_last =
         place != list_.begin() && (place - 1)->pixels.end == fragment.pixels.begin && (place - 1)->value == fragment.value;

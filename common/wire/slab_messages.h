@@ -5,6 +5,7 @@
 // and a lost message is requested again. The coordinator keeps no state about it.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include "common/base/status.h"
@@ -18,6 +19,11 @@ inline constexpr std::uint32_t kChunkBytes = 1U << 20;  // multiple of every sam
 inline std::uint32_t ChunkCount(const Box& box, ScalarType type) {
   const std::uint64_t bytes = std::uint64_t(box.voxel_count()) * BytesPerSample(type);
   return std::uint32_t((bytes + kChunkBytes - 1) / kChunkBytes);
+}
+// Of samples in chunk `chunk`, below ChunkCount.
+inline std::uint32_t BytesOfChunk(const Box& box, ScalarType type, std::uint32_t chunk) {
+  const std::uint64_t total = std::uint64_t(box.voxel_count()) * BytesPerSample(type);
+  return std::uint32_t(std::min<std::uint64_t>(kChunkBytes, total - std::uint64_t{chunk} * kChunkBytes));
 }
 
 struct ChunkRequest {

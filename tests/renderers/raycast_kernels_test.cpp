@@ -25,7 +25,7 @@ struct Scene {
         cells(FindCellRanges(padded)),
         look(MakeRayLook(Classify(setup.transfer, setup.description, setup.range), setup.description, camera, setup.shading, rate)),
         distances(EmptyDistances(cells, VisibleSamples(look))),
-        ray_box(MakeRayBox(padded, cells.grid, box, WholeBox(box), rays, camera)) {}
+        ray_box(MakeRayBox(padded, cells.counts, box, WholeBox(box), rays, camera)) {}
 
   MarchWork Work(float termination = 0) const { return {&rays, &ray_box, &look, distances.data(), termination}; }
 
@@ -98,12 +98,12 @@ TEST(EmptyDistances, AreChebyshevDistancesToTheNearestVisibleCell) {
     SetupOptions options;
     const FrameSetup setup = MakeSetup(volume, options);
     const Scene scene(volume, volume.block.box, setup, 1);
-    const Index3& n = scene.cells.grid.counts;
+    const Index3& n = scene.cells.counts;
     std::vector<Index3> visible;
     for (Index3 c; c.z < n.z; ++c.z) {
       for (c.y = 0; c.y < n.y; ++c.y) {
         for (c.x = 0; c.x < n.x; ++c.x) {
-          if (scene.cells.ranges[scene.cells.grid.Number(c)].max > 0) visible.push_back(c);
+          if (scene.cells.ranges[NumberIn(n, c)].max > 0) visible.push_back(c);
         }
       }
     }
@@ -113,7 +113,7 @@ TEST(EmptyDistances, AreChebyshevDistancesToTheNearestVisibleCell) {
           int nearest = 255;
           for (const Index3& v : visible)
             nearest = std::min(nearest, std::max({std::abs(v.x - c.x), std::abs(v.y - c.y), std::abs(v.z - c.z)}));
-          ASSERT_EQ(int(scene.distances[scene.cells.grid.Number(c)]), nearest) << c.x << "," << c.y << "," << c.z;
+          ASSERT_EQ(int(scene.distances[NumberIn(n, c)]), nearest) << c.x << "," << c.y << "," << c.z;
         }
       }
     }

@@ -28,8 +28,7 @@ WorkerEvent ModelWorker::Answer(Job& job) {
 }
 
 void ModelWorker::OnRequest(const ChunkRequest& request) {
-  const std::uint64_t total = std::uint64_t(request.box.voxel_count());  // the simulated volumes have one byte a voxel
-  const std::uint64_t bytes = std::min<std::uint64_t>(kChunkBytes, total - std::uint64_t(request.chunk) * kChunkBytes);
+  const std::uint32_t bytes = BytesOfChunk(request.box, ScalarType::kUint8, request.chunk);
   requested_[{request.dataset, request.box, request.chunk}] = {bytes, service_.time()};
 }
 

@@ -289,13 +289,12 @@ AnyMessage Simulation::AnswerOf(const ChunkRequest& request) const {
   if (request.epoch != epoch_) {
     return ChunkRefused{epoch_, request.dataset, request.box, request.chunk, Status::NotFound("another coordinator's epoch")};
   }
-  const auto total = std::uint64_t(request.box.voxel_count());
   Chunk chunk;
   chunk.epoch = request.epoch;
   chunk.dataset = request.dataset;
   chunk.box = request.box;
   chunk.chunk = request.chunk;
-  chunk.raw_bytes = std::uint32_t(std::min<std::uint64_t>(kChunkBytes, total - std::uint64_t(request.chunk) * kChunkBytes));
+  chunk.raw_bytes = BytesOfChunk(request.box, ScalarType::kUint8, request.chunk);
   chunk.encoded_bytes = chunk.raw_bytes;
   return chunk;
 }
