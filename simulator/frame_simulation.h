@@ -46,6 +46,7 @@ class FrameSimulation : private Conditions {
   void OnPicture(std::uint32_t frame);
 
   // ---- Conditions
+  using Conditions::Perform;
   std::optional<WorkCost> Begin(Job& job) override {
     return std::visit([&](const auto& action) { return CostOf(job, action); }, job.action);
   }

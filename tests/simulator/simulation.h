@@ -54,6 +54,7 @@ class Simulation : private Conditions {
   AnyMessage AnswerOf(const ChunkRequest& request) const;
 
   // ---- Conditions
+  using Conditions::Perform;
   std::optional<WorkCost> Begin(Job& job) override { return workers_[job.node].Begin(job); }
   WorkerEvent Answer(Job& job) override { return workers_[job.node].Answer(job); }
   bool CancelsInTime() override { return random_.Chance(0.7); }
