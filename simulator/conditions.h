@@ -18,7 +18,7 @@ namespace slabstream {
 struct Job {
   Node node = 0;  // its worker
   std::variant<StartRender, StoreChunk, StartCombine, FindHidden, SendPartial, SendFrame> action;
-  bool cancelled = false;        // a StartRender
+  bool cancelled = false;        // its rendering, in time
   Bytes payload;                 // of the message that it sends
   double bytes = 0, pixels = 0;  // of that message: what links carry; pixels that are not empty
   int copies = 0;                // of it that have not arrived

@@ -93,7 +93,7 @@ void SimulatedService::Perform(ToWorker& action) {
   if (arrivals.nobody) TellCoordinator(now(), WorkerGone{action.to});
   for (int i = 0; i < arrivals.count; ++i) {
     const double arrival = wakes ? threads_.Begin(Threads::Machine(*node), arrivals.times[i]) : arrivals.times[i];
-    queue_.At(arrival, [this, to = *node, message = action.message] { StepWorker(to, MessageReceived{message, {}}); });
+    queue_.At(arrival, [this, to = *node, received = WorkerEvent(MessageReceived{action.message, {}})] { StepWorker(to, received); });
   }
 }
 
@@ -198,7 +198,7 @@ void SimulatedService::Deliver(Node to, std::uint32_t place) {
   Job& job = jobs_[place];
   auto& message = std::get<SendPartial>(job.action).message;
   if (--job.copies > 0) return StepWorker(to, MessageReceived{message, job.payload});
-  MessageReceived received{std::move(message), std::move(job.payload)};
+  const WorkerEvent received = MessageReceived{std::move(message), std::move(job.payload)};
   unused_jobs_.push_back(place);
   StepWorker(to, received);
 }

@@ -25,7 +25,7 @@ namespace slabstream {
 
 class SimulatedService {
  public:
-  // Both outlive the object. Of the machine: speeds, threads' wake-ups, cores, message_seconds.
+  // Both outlive the object. Of the machine it uses the speeds, the cores, the wake-ups, serial_share and message_seconds.
   SimulatedService(const MachineModel& machine, Conditions& conditions);
 
   EventQueue& queue() { return queue_; }

@@ -125,7 +125,7 @@ struct Executor::Slab {
     if (data != nullptr) return Status::Ok();  // a duplicate after the slab was complete
     if (chunk.chunk >= ChunkCount(chunk.box, key.type) || chunk.raw_bytes != BytesOfChunk(chunk.box, key.type, chunk.chunk)) {
       return Status::DataLoss("chunk " + std::to_string(chunk.chunk) + " of " + std::to_string(chunk.raw_bytes) +
-                              " bytes does not fit its box");
+                              " bytes does not fit a box of " + std::to_string(chunk.box.voxel_count()) + " voxels");
     }
     if (!voxels) voxels.emplace(key.box, key.type);
     unpacked.resize(chunk.raw_bytes);
@@ -189,7 +189,7 @@ void Executor::Break() {
 
 template <class Work>
 Status Executor::Guard(const char* task, Work&& work) {
-  return Guarded(task, [&]() -> Status {
+  return Guarded(task, [&] {
     if (hook_) hook_(task);
     return work();
   });
@@ -197,10 +197,7 @@ Status Executor::Guard(const char* task, Work&& work) {
 
 template <class Work>
 bool Executor::TrySend(const char* task, const GroupKey& key, Work&& work) {
-  const Status status = Guard(task, [&] {
-    work();
-    return Status::Ok();
-  });
+  const Status status = Guard(task, work);
   if (!status.ok()) outbox_.Post(WorkerEvent(SendFailed{key, status}));
   return status.ok();
 }

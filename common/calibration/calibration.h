@@ -31,7 +31,7 @@ inline constexpr double kSurfaceCell = 230e-9;  // a cell through which a surfac
 inline constexpr double kPixel = 1.5e-9;        // of the image
 }  // namespace zbuffer
 
-// Ray casting (common/renderers/raycast), with the two spheres of 256 voxels a side that `slabstream bench` renders.
+// Ray casting (common/renderers/raycast). Measured with the two spheres of 256 voxels a side that `slabstream bench` renders.
 //   balance_bench VOLUME --renderer raycast --decomposition kd-tree --split occupied
 namespace raycast {
 inline constexpr double kBox = 30e-6;

@@ -1,4 +1,4 @@
-// The transform of all voxels of a slab, x fastest, into three arrays of coordinates: as a matrix product for each voxel, and by running
+// Two ways to transform all voxels of a slab, x fastest, into three arrays of coordinates: a matrix product for each voxel, and running
 // additions (the paper's seed, voxel, beam and slice phases).
 //
 // The scalar loop is compiled without automatic vectorisation; vector loops use Highway, for the best instruction set of the machine.
