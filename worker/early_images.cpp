@@ -9,7 +9,8 @@ namespace slabstream {
 Status EarlyImages::Keep(PartialImage message, Bytes payload) {
   if (const auto group = groups_.find(message.key); group != groups_.end()) {
     const bool known = std::ranges::any_of(group->second, [&](const auto& image) {
-      return image.first.step == message.step && image.first.pixels == message.pixels && image.first.from_worker == message.from_worker;
+      return image.first.epoch == message.epoch && image.first.step == message.step && image.first.pixels == message.pixels &&
+             image.first.from_worker == message.from_worker;
     });
     if (known) return Status::Ok();
   }

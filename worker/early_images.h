@@ -1,4 +1,4 @@
-// EarlyImages: PartialImages that arrived before the assignment of their group, within a byte limit.
+// EarlyImages: PartialImages that arrived before the assignment of their group, or before the Welcome, within a byte limit.
 #pragma once
 
 #include <cstdint>
@@ -18,14 +18,17 @@ class EarlyImages {
   Status Keep(PartialImage message, Bytes payload);
   std::vector<std::pair<PartialImage, Bytes>> Take(const GroupKey& key);
 
-  // Forgets the images of every group for which `over(key)` is true.
+  // Forgets the images for which `over(message)` is true.
   template <class Predicate>
   void Forget(Predicate over) {
-    std::erase_if(groups_, [&](const auto& group) {
-      if (!over(group.first)) return false;
-      for (const auto& image : group.second) bytes_ -= Cost(image.second);
-      return true;
-    });
+    for (auto& [key, images] : groups_) {
+      std::erase_if(images, [&](const auto& image) {
+        const bool forgotten = over(image.first);
+        if (forgotten) bytes_ -= Cost(image.second);
+        return forgotten;
+      });
+    }
+    std::erase_if(groups_, [](const auto& group) { return group.second.empty(); });
   }
 
  private:

@@ -67,7 +67,7 @@ struct WorkerService::Impl {
 
   void Run();
   void Loop();
-  void Receive(Socket& socket, const char* plane);
+  void Receive(Socket& socket, Plane plane);
   void HandleEvent(const WorkerEvent& event);
   void HandleOutput(ExecutorOutput& output);
   void SetRegistered();
@@ -138,9 +138,9 @@ void WorkerService::Impl::Loop() {
     Wait(sockets, &outbox.wakeup(), std::clamp(machine.NextWake() - MonotonicNow(), Duration::zero(), kLongestWait));
     if (executor->broken()) throw std::runtime_error("a task could not report its failure");
     for (ExecutorOutput& output : outbox.TakeAll()) HandleOutput(output);
-    Receive(control, "control");
-    Receive(images, "images");
-    if (slabs) Receive(*slabs, "slabs");
+    Receive(control, Plane::kControl);
+    Receive(images, Plane::kImages);
+    if (slabs) Receive(*slabs, Plane::kSlabs);
     const Time now = MonotonicNow();
     if (machine.NextWake() <= now) HandleEvent(Tick{});
     if (stop_requested && stop_deadline == Time::max()) {
@@ -152,14 +152,15 @@ void WorkerService::Impl::Loop() {
   }
 }
 
-void WorkerService::Impl::Receive(Socket& socket, const char* plane) {
+// Only what belongs to the plane is heard: everybody may send to the images plane, the coordinator alone to the others.
+void WorkerService::Impl::Receive(Socket& socket, Plane plane) {
   for (int i = 0; i < kReceiveBatch; ++i) {
     std::optional<Incoming> incoming = socket.TryReceive();
     if (!incoming) return;
     Result<AnyMessage> message = Guarded("decoding", [&] { return Decode(incoming->parts[0].span()); });
     Bytes payload = incoming->parts.size() > 1 ? std::move(incoming->parts[1]) : Bytes();
-    if (!message.ok() || payload.size() != ExpectedPayloadBytes(*message)) {
-      LogWarning(std::string(plane) + " plane: dropped a message: " +
+    if (!message.ok() || PlaneOf(*message) != plane || payload.size() != ExpectedPayloadBytes(*message)) {
+      LogWarning(std::string(NameOf(plane)) + " plane: dropped a message: " +
                  (message.ok() ? std::string(NameOf(*message)) + " with a payload of " + std::to_string(payload.size()) + " bytes"
                                : message.status().message()));
       continue;
@@ -223,7 +224,7 @@ bool WorkerService::Impl::OpenShared(const AnyMessage& message) {
   if (partial == nullptr || !partial->shared) return true;
   const Status opened = executor->peer_memory().Open(partial->shared->arena, MonotonicNow()).status();
   if (opened.ok()) return true;
-  if (partial->epoch != epoch) return false;
+  if (epoch != 0 && partial->epoch != epoch) return false;  // 0: it may have overtaken the first Welcome
   LogInfo("an image of worker " + std::to_string(partial->from_worker) + " is asked for in frames: " + opened.message());
   Refuse(*partial);
   return false;

@@ -118,6 +118,7 @@ void WorkerMachine::State::On(const Welcome& welcome, const Bytes&) {
   timeout = std::chrono::milliseconds(welcome.timeout_ms);
   last_heard = now;
   next_heartbeat = now;
+  early.Forget([&](const PartialImage& image) { return image.epoch != epoch; });
   if (slabs_epoch != epoch) slabs.RetireAll();
   slabs_epoch = epoch;
   actions.push_back(ConnectSlabs{welcome.slabs_endpoint});
@@ -138,7 +139,7 @@ void WorkerMachine::State::On(const StopRequested&) {
 
 void WorkerMachine::State::Unregister() {
   while (!frames.empty()) DropFrame(frames.begin()->first);
-  early.Forget([](const GroupKey&) { return true; });
+  early.Forget([](const PartialImage&) { return true; });
   finished_before = 0;
   cancelled.clear();
   slabs.ForgetRequests();
@@ -184,7 +185,7 @@ void WorkerMachine::State::FinishBefore(FrameId frame) {
   finished_before = std::max(finished_before, frame);
   while (!frames.empty() && frames.begin()->first < finished_before) DropFrame(frames.begin()->first);
   cancelled.erase(cancelled.begin(), cancelled.lower_bound(finished_before));
-  early.Forget([&](const GroupKey& key) { return Over(key.frame); });
+  early.Forget([&](const PartialImage& image) { return Over(image.key.frame); });
 }
 
 void WorkerMachine::State::DropFrame(FrameId id) {
@@ -236,7 +237,7 @@ void WorkerMachine::State::BeginAttempt(FrameId id, Frame& frame, const GroupAss
   EndRuns(frame);
   frame.groups.clear();
   frame.attempt = assignment.key.attempt;
-  early.Forget([&](const GroupKey& key) { return key.frame == id && key.attempt < frame.attempt; });
+  early.Forget([&](const PartialImage& image) { return image.key.frame == id && image.key.attempt < frame.attempt; });
   if (!frame.accumulator) return;
   if (assignment.display == worker) {
     frame.accumulator->SetAttempt(frame.attempt);
@@ -247,7 +248,9 @@ void WorkerMachine::State::BeginAttempt(FrameId id, Frame& frame, const GroupAss
 }
 
 void WorkerMachine::State::On(const PartialImage& partial, const Bytes& payload) {
-  if (worker == 0 || partial.epoch != epoch || Over(partial.key.frame)) return;
+  // Once the coordinator has admitted this worker, others send it images, and these may overtake the Welcome.
+  if (worker == 0) return (void)early.Keep(partial, payload);
+  if (partial.epoch != epoch || Over(partial.key.frame)) return;
   const auto frame = frames.find(partial.key.frame);
   if (frame != frames.end()) {
     if (partial.key.attempt < frame->second.attempt) return;

@@ -13,8 +13,8 @@
 //                     it is in, a receive waits for its PartialImage; ranks of this same worker combine without a message
 //   root is complete  the group image goes to the display worker. It accumulates groups front to back (early ones wait), reports GroupDone
 //                     (with the tiles hidden by then), sends a preview if wanted, and after the last group the frame
-// PartialImages that arrive before their assignment are kept, within a byte limit; those of finished frames and older attempts are dropped.
-// A second copy of any message changes nothing.
+// PartialImages that arrive before their assignment or before the Welcome are kept, within a byte limit; those of finished frames and older
+// attempts are dropped. A second copy of any message changes nothing.
 //
 // The executor must: run StartRender, StartCombine, FindHidden and StoreChunk on other threads and answer each with exactly one event; run
 // StartCombine, FindHidden, SendPartial and SendFrame in the order given; call Step(Tick) no later than NextWake(). If it calls late, the

@@ -2,8 +2,10 @@
 
 #include <google/protobuf/stubs/logging.h>
 
+#include <array>
 #include <string>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 
 #include "common/wire/client_fields.h"
@@ -105,7 +107,29 @@ std::size_t PayloadBytesOf(const Message&) {
   return 0;
 }
 
+// The place of a message in AnyMessage.
+template <class Message, std::size_t I = 0>
+constexpr std::size_t IndexOf() {
+  if constexpr (std::is_same_v<std::variant_alternative_t<I, AnyMessage>, Message>) {
+    return I;
+  } else {
+    return IndexOf<Message, I + 1>();
+  }
+}
+
 }  // namespace
+
+Plane PlaneOf(const AnyMessage& message) {
+  const std::size_t index = message.index();
+  if (index < IndexOf<ChunkRequest>()) return Plane::kControl;
+  if (index < IndexOf<PartialImage>()) return Plane::kSlabs;
+  return index < IndexOf<SubmitFrame>() ? Plane::kImages : Plane::kClient;
+}
+
+std::string_view NameOf(Plane plane) {
+  constexpr std::array<std::string_view, 4> kNames = {"control", "slabs", "images", "client"};
+  return kNames.at(std::size_t(plane));
+}
 
 std::vector<std::byte> Encode(const AnyMessage& message) {
   Envelope envelope;

@@ -23,10 +23,17 @@ namespace slabstream {
 inline constexpr std::uint32_t kWireVersion = 1;
 inline constexpr std::size_t kMaxHeaderBytes = std::size_t{64} << 20;
 
+// In the order of planes: control, slabs, images, client.
 using AnyMessage =
     std::variant<Register, Welcome, Heartbeat, Ping, GroupAssignment, GroupDone, FrameImage, WorkerTrouble, Leave, Retire, Stop,
                  ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused, ImageReceived, SubmitFrame, FrameProgress, FrameReply,
                  FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery, StatusReply, ShutDown, ShutDownReply>;
+
+// The sockets that messages travel on: between coordinator and workers, between workers, and between clients and coordinator. Each message
+// belongs to one: to that of the header that declares it.
+enum class Plane { kControl, kSlabs, kImages, kClient };
+Plane PlaneOf(const AnyMessage& message);
+std::string_view NameOf(Plane plane);  // "control": for logs
 
 std::vector<std::byte> Encode(const AnyMessage& message);
 

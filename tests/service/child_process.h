@@ -55,6 +55,15 @@ class ChildProcess {
     if (pid_ > 0) ::kill(pid_, signal_number);
   }
 
+  // Stops it. Returns when all its threads have stopped.
+  void Stop() {
+    Kill(SIGSTOP);
+    int status = 0;
+    while (::waitpid(pid_, &status, WUNTRACED) < 0 && errno == EINTR) {
+    }
+    CHECK(WIFSTOPPED(status));
+  }
+
   // Blocks until the process has ended. Its exit status, or minus the signal that ended it.
   int Wait() {
     if (pid_ <= 0) return 0;

@@ -73,6 +73,7 @@ TEST(HostilePeers, GarbageIsDroppedOnEveryPlane) {
     ASSERT_TRUE(picture.ok()) << picture.status().message();
     EXPECT_LE(LargestDifference(picture->image, RenderDirectly(request, *volume), request.size), AllowedDifference(request));
   }
+  EXPECT_EQ(client.QueryStatus().value().workers_lost, 0U) << "nobody but the coordinator may send a worker away";
 }
 
 TEST(HostilePeers, EndpointsAreChecked) {

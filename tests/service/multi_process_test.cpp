@@ -107,7 +107,7 @@ TEST_F(MultiProcessTest, StoppedWorkerComesBackAndCostsOneAttemptAtMost) {
   Client client = Connect();
   AwaitWorkers(client, 3);
   ASSERT_TRUE(client.Render(TestRequest(Splatting(), 0)).ok());
-  workers_[1].Kill(SIGSTOP);
+  workers_[1].Stop();
   const RequestId request = client.Submit(TestRequest(Splatting(), 30));
   const Result<Picture> picture = Await(client, request, [] {});
   ASSERT_TRUE(picture.ok()) << picture.status().message();

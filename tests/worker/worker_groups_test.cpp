@@ -63,6 +63,19 @@ TEST_F(WorkerGroupsTest, KeepsImagesThatComeBeforeTheirAssignment) {
   EXPECT_THAT(done[0].reports, SizeIs(2));
 }
 
+TEST_F(WorkerGroupsTest, KeepsImagesThatComeBeforeTheWelcome) {
+  Start(Config(), false);
+  Tell(Tick{});
+  const GroupAssignment assignment = Assignment(1, {kSelf, kPeer});
+  PartialImage foreign = FromPeer(assignment.key);
+  foreign.epoch = kEpoch + 1;
+  EXPECT_THAT(Tell(foreign), IsEmpty());
+  EXPECT_THAT(Tell(FromPeer(assignment.key)), IsEmpty());
+  Tell(WelcomeTo(1000));
+  const Actions rendered = Rendered(All<StartRender>(Feed(Tell(assignment))).at(0));
+  EXPECT_THAT(All<StartCombine>(rendered), SizeIs(1)) << "with the image of its epoch";
+}
+
 TEST_F(WorkerGroupsTest, EarlyImagesAreBounded) {
   WorkerConfig config = Config();
   config.early_image_bytes = 10000;
