@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <deque>
 #include <map>
 #include <random>
 #include <thread>
@@ -89,7 +90,7 @@ struct CoordinatorService::Impl {
 
   void Run();
   void Loop();
-  void HandleEvent(const CoordinatorEvent& event);
+  void HandleEvent(CoordinatorEvent event);  // and what follows from it
   void ReceiveFromClients();
   void ReceiveFromWorkers();
   void Send(Socket& socket, PeerTable& peers, PeerToken to, const AnyMessage& message, const Bytes& payload, const CoordinatorEvent& gone);
@@ -110,7 +111,8 @@ struct CoordinatorService::Impl {
   Socket clients, control;
   PeerTable client_peers, worker_peers;
   std::unique_ptr<SlabServer> slabs;
-  // From the other threads and from failed sends; its wakeup also signals stop_requested. Tasks that outlive the service share it.
+  std::deque<CoordinatorEvent> following;  // what actions led to: heard after all actions of the event at hand
+  // From the other threads; its wakeup also signals stop_requested. Tasks that outlive the service share it.
   const std::shared_ptr<Mailbox<News>> inbox = std::make_shared<Mailbox<News>>();
   std::atomic<bool> stop_requested = false;
   std::atomic<bool> stopped = false;
@@ -145,7 +147,7 @@ void CoordinatorService::Impl::Loop() {
     Wait(sockets, &inbox->wakeup(), std::clamp(machine.NextWake() - MonotonicNow(), Duration::zero(), kLongestWait));
     for (News& news : inbox->TakeAll()) {
       if (news.samples.any()) slabs->Publish(news.dataset, std::move(news.samples));
-      HandleEvent(news.event);
+      HandleEvent(std::move(news.event));
     }
     ReceiveFromWorkers();
     ReceiveFromClients();
@@ -163,10 +165,15 @@ void CoordinatorService::Impl::Loop() {
   }
 }
 
-void CoordinatorService::Impl::HandleEvent(const CoordinatorEvent& event) {
-  if (const auto* planned = std::get_if<Planned>(&event)) plans.erase(planned->plan);
-  for (CoordinatorAction& action : machine.Step(event, MonotonicNow())) {
-    std::visit([this](auto& each) { Perform(each); }, action);
+void CoordinatorService::Impl::HandleEvent(CoordinatorEvent event) {
+  following.push_back(std::move(event));
+  while (!following.empty()) {
+    const CoordinatorEvent next = std::move(following.front());
+    following.pop_front();
+    if (const auto* planned = std::get_if<Planned>(&next)) plans.erase(planned->plan);
+    for (CoordinatorAction& action : machine.Step(next, MonotonicNow())) {
+      std::visit([this](auto& each) { Perform(each); }, action);
+    }
   }
 }
 
@@ -180,7 +187,7 @@ void CoordinatorService::Impl::Send(Socket& socket, PeerTable& peers, PeerToken 
   if (sent.ok()) return;
   LogDebug(std::string(NameOf(message)) + " not sent: " + sent.message());
   peers.Forget(to);
-  inbox->Post({gone});
+  following.push_back(gone);
 }
 
 void CoordinatorService::Impl::ReceiveFromWorkers() {
@@ -224,7 +231,7 @@ void CoordinatorService::Impl::Perform(LoadDataset& action) {
     return loaded.ok() ? *std::move(loaded) : News{DatasetFailed{action.name, loaded.status()}};
   };
   const Status begun = Guarded("loading", [&] { loads.Post([inbox = inbox, load] { inbox->Post(load()); }); });
-  if (!begun.ok()) inbox->Post({DatasetFailed{action.name, begun}});
+  if (!begun.ok()) following.push_back(DatasetFailed{action.name, begun});
 }
 
 void CoordinatorService::Impl::Perform(CountDataset& action) {
@@ -234,12 +241,15 @@ void CoordinatorService::Impl::Perform(CountDataset& action) {
       inbox->Post({OccupiedCounted{action.count, std::move(grid)}});
     });
   });
-  if (!begun.ok()) inbox->Post({OccupiedCounted{action.count, begun}});
+  if (!begun.ok()) following.push_back(OccupiedCounted{action.count, begun});
 }
 
 void CoordinatorService::Impl::Perform(PlanRequest& action) {
   const PlanId plan = action.plan;
-  if (auto planned = planner->PlanAtHand(action)) return inbox->Post({Planned{plan, *std::move(planned)}});
+  if (auto planned = planner->PlanAtHand(action)) {
+    following.push_back(Planned{plan, *std::move(planned)});
+    return;
+  }
   const Status begun = Guarded("planning", [&] {
     const auto& dropped = plans[plan] = std::make_shared<std::atomic<bool>>(false);
     planning.Post([inbox = inbox, planner = planner, make = make_plan, dropped, request = std::move(action)] {
@@ -247,7 +257,7 @@ void CoordinatorService::Impl::Perform(PlanRequest& action) {
       inbox->Post({Planned{request.plan, Guarded("planning", [&] { return make(*planner, request); })}});
     });
   });
-  if (!begun.ok()) inbox->Post({Planned{plan, begun}});
+  if (!begun.ok()) following.push_back(Planned{plan, begun});
 }
 
 void CoordinatorService::Impl::Perform(DropPlan& action) {
