@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <ranges>
+#include <string>
 #include <utility>
 
 namespace slabstream {
@@ -23,10 +23,12 @@ const DatasetTable::Entry* DatasetTable::Find(const std::string& name) const {
 
 Status DatasetTable::NoSuchDataset(const std::string& name) const {
   if (entries_.empty()) return Status::NotFound("no dataset \"" + name + "\": the catalogue is empty");
-  const auto names = entries_ | std::views::keys | std::views::take(kNamesInMessage);
+  std::vector<std::string> names;
+  for (const auto& [known, entry] : entries_) {
+    if (names.size() < kNamesInMessage) names.push_back(known);
+  }
   const std::string more = entries_.size() > kNamesInMessage ? fmt::format(" and {} more", entries_.size() - kNamesInMessage) : "";
-  return Status::NotFound(
-      fmt::format("no dataset \"{}\": the catalogue has {}{}", name, fmt::join(names.begin(), names.end(), ", "), more));
+  return Status::NotFound(fmt::format("no dataset \"{}\": the catalogue has {}{}", name, fmt::join(names, ", "), more));
 }
 
 DatasetId DatasetTable::BeginLoad(const std::string& name) {

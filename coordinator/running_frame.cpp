@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <iterator>
-#include <ranges>
 #include <string>
 #include <utility>
 
@@ -254,7 +253,7 @@ FrameStatistics RunningFrame::Statistics(Time now) const {
                              .grid = FrameBounds(plan_.setup),
                              .predicted = request_.planned->prediction};
   const auto append = [&](const std::vector<RankReport>& reports) {
-    std::ranges::copy(reports | std::views::take(kMaxReports - statistics.reports.size()), std::back_inserter(statistics.reports));
+    std::copy_n(reports.begin(), std::min(reports.size(), kMaxReports - statistics.reports.size()), std::back_inserter(statistics.reports));
   };
   for (const auto& reports : reports_) append(reports);
   append(display_reports_);

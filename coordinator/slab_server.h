@@ -11,6 +11,7 @@
 #include <string>
 #include <thread>
 
+#include "common/base/check.h"
 #include "common/base/status.h"
 #include "common/transport/socket.h"
 #include "common/volume/bricks.h"
@@ -27,7 +28,11 @@ class SlabServer {
     std::shared_ptr<const BrickedVoxels> bricks = nullptr;
 
     bool any() const { return volume != nullptr || bricks != nullptr; }
-    const Box& box() const { return volume != nullptr ? volume->block.box : bricks->grid().box; }
+    // The others want any().
+    const Box& box() const {
+      CHECK(any());
+      return volume != nullptr ? volume->block.box : bricks->grid().box;
+    }
     ScalarType type() const { return volume != nullptr ? volume->block.type : bricks->type(); }
     VoxelBricks view() const { return volume != nullptr ? VoxelBricks(volume->block) : VoxelBricks(*bricks); }
   };

@@ -43,7 +43,7 @@ void JsonValue::Each(const Read& read, std::size_t least) const {
 
 JsonValue JsonValue::At(const char* field) const {
   static const Json kMissing;
-  const JsonValue found(Has(field) ? (*json_)[field] : kMissing, place_ + "." + field, *mistake_);
+  JsonValue found(Has(field) ? (*json_)[field] : kMissing, place_ + "." + field, *mistake_);
   if (!json_->is_object()) Complain(fmt::format("{} must be an object", Shown()));
   if (!Has(field)) found.Complain("is missing");
   return found;

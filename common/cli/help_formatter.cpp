@@ -18,7 +18,7 @@ std::string Wrapped(const std::string& text) {
       const std::size_t at = line.rfind(' ', kTextWidth);
       if (at == std::string::npos || at <= indent.size()) break;
       wrapped += line.substr(0, at) + "\n";
-      line = indent + line.substr(at + 1);
+      line.replace(0, at + 1, indent);
     }
     wrapped += line + "\n";
   }

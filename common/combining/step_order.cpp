@@ -39,8 +39,7 @@ void StepOrder::FindWaits() {
         for (const auto& fragment : latest.Within(pixels)) earlier.push_back(fragment.value);
       }
       std::ranges::sort(earlier);
-      const auto repeated = std::ranges::unique(earlier);
-      earlier.erase(repeated.begin(), repeated.end());
+      earlier.erase(std::unique(earlier.begin(), earlier.end()), earlier.end());
       for (const std::uint32_t first : earlier) {
         order.emplace_back(first, turn);
         ++first_waiter_[first + 1];

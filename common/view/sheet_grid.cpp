@@ -54,9 +54,10 @@ SheetGrid MakeSheetGrid(const Camera& camera, const VolumeGeometry& geometry) {
   }
 
   // Pixels of the picture a voxel, at the centre.
+  const double u_centre = centre[u], v_centre = centre[v];
   const auto pixels_per_voxel = [&](std::size_t column) {
     const auto at_centre = [&](std::size_t row) {
-      return picture_from_plane[3 * row] * centre[u] + picture_from_plane[3 * row + 1] * centre[v] + picture_from_plane[3 * row + 2];
+      return picture_from_plane[3 * row] * u_centre + picture_from_plane[3 * row + 1] * v_centre + picture_from_plane[3 * row + 2];
     };
     const double w = at_centre(2), x = at_centre(0) / w, y = at_centre(1) / w;
     const double by_x = (picture_from_plane[column] - x * picture_from_plane[6 + column]) / w;

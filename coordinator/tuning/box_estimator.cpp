@@ -21,7 +21,7 @@ double VoxelPixels(const FrameSetup& setup) {
   }
   // The mean of the areas of its three faces, as the eye sees them.
   const Camera::ImagePoint origin = setup.camera.Project(middle);
-  double edges[3];
+  double edges[3] = {};
   for (const Axis axis : kAxes) {
     Vec3 next = middle;
     next[axis] += 1;

@@ -67,7 +67,7 @@ Json CoverageJson(const CoverageMap& coverage) {
   if (x_end <= x_begin) return Json::array();
   Json json = {x_begin, y_begin, x_end - x_begin, y_end - y_begin};
   for (std::int32_t y = y_begin; y < y_end; ++y) {
-    for (std::int32_t x = x_begin; x < x_end; ++x) json.push_back(int(coverage.at(x, y) * float(coverage.TilePixels(x, y)) + 0.5F));
+    for (std::int32_t x = x_begin; x < x_end; ++x) json.push_back(std::lround(coverage.at(x, y) * float(coverage.TilePixels(x, y))));
   }
   return json;
 }
@@ -80,7 +80,7 @@ CoverageMap CoverageOf(const Json& json, const PixelBounds& frame) {
   for (std::int32_t i = 0; i < width * height; ++i) {
     const std::int32_t x = x_begin + i % width, y = y_begin + i / width;
     coverage.share[std::size_t(y) * std::size_t(coverage.tiles_x) + std::size_t(x)] =
-        json[std::size_t(4 + i)].get<float>() / float(coverage.TilePixels(x, y));
+        json[std::size_t(i) + 4].get<float>() / float(coverage.TilePixels(x, y));
   }
   return coverage;
 }
@@ -365,7 +365,7 @@ double SteadySeconds(const MeasuredFrame& frame, const MachineModel& machine, in
   std::vector<double> received;
   for (const SimulatedFrame& simulated : timeline.frames) received.push_back(simulated.received);
   std::sort(received.begin(), received.end());
-  return (received[std::size_t(3 * frames / 4) - 1] - received[std::size_t(frames / 4) - 1]) / (frames / 2);
+  return (received[std::size_t(3 * frames / 4) - 1] - received[std::size_t(frames / 4) - 1]) / (frames * 0.5);
 }
 
 }  // namespace slabstream

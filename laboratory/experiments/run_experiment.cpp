@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <ctime>
 #include <iostream>
 #include <set>
@@ -73,7 +74,7 @@ void Run(const ExperimentOptions& options) {
 ExperimentContext::ExperimentContext(ExperimentOptions options, TrialLog log, std::function<bool()> interrupted)
     : options_(std::move(options)), log_(std::move(log)), interrupted_(std::move(interrupted)) {}
 
-int ExperimentContext::Scaled(int side) const { return std::max(kLeastScaledSide, int(side * options_.scale + 0.5)); }
+int ExperimentContext::Scaled(int side) const { return std::max(kLeastScaledSide, int(std::lround(side * options_.scale))); }
 
 void ExperimentContext::Run(std::vector<Trial> trials, int repeats, int quick_repeats) {
   repeats_ = options_.repeats > 0 ? options_.repeats : quick() ? quick_repeats : repeats;

@@ -110,7 +110,8 @@ Section SectionOf(ExperimentContext& context, const Kind& kind) {
   const MachineModel machine = Cluster(context, Link(kLink));
   std::string sentence;
   for (const Series& series : kind.series) {
-    LineSeries time{series.name, Origin::kSimulated, {}}, efficiency = time;
+    LineSeries time{series.name, Origin::kSimulated, {}};
+    LineSeries efficiency = time;
     double one = 0;
     for (const FrameCase& frame : series.frames) {
       const FrameFigures figures =

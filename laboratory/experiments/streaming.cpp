@@ -89,8 +89,9 @@ Report RunStreaming(ExperimentContext& context) {
     const FrameFigures one = FindFigures(Recall(context, streams.Frame(volume, 1, 1)), machine);
     std::string sentence;
     for (const int p : streams.workers) {
-      LineSeries of_efficiency{fmt::format("p = {}", p), Origin::kSimulated, {}}, of_memory{of_efficiency.name, Origin::kMeasured, {}},
-          of_preview = of_efficiency, of_frame{fmt::format("p = {}, whole frame", p), Origin::kSimulated, {}};
+      LineSeries of_efficiency{fmt::format("p = {}", p), Origin::kSimulated, {}};
+      LineSeries of_memory{of_efficiency.name, Origin::kMeasured, {}}, of_preview = of_efficiency;
+      LineSeries of_frame{fmt::format("p = {}, whole frame", p), Origin::kSimulated, {}};
       for (const int groups : streams.groups) {
         const FrameCase frame = streams.Frame(volume, p, groups);
         const MeasuredFrame measured = Recall(context, frame);

@@ -30,6 +30,7 @@ constexpr int kMaxSphere = 1024;
 template <class Entries>
 std::vector<std::string_view> NamesIn(const Entries& entries) {
   std::vector<std::string_view> names;
+  names.reserve(entries.size());
   for (const auto& entry : entries) names.push_back(entry.name);
   return names;
 }

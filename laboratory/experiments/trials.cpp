@@ -94,6 +94,7 @@ std::vector<Estimate> EstimatesOf(const std::vector<const Json*>& repeats, const
   std::vector<Estimate> estimates;
   for (std::size_t i = 0; i < Field(*repeats.front(), list).size(); ++i) {
     std::vector<double> values;
+    values.reserve(repeats.size());
     for (const Json* numbers : repeats) values.push_back(Field(*numbers, list).at(i).get<double>());
     estimates.push_back(MedianOf(std::move(values)));
   }

@@ -4,12 +4,12 @@
 
 namespace slabstream {
 
-Result<std::unique_ptr<LabService>> LabService::Start(int workers, std::map<std::string, std::shared_ptr<const Volume>> volumes) {
+Result<std::unique_ptr<LabService>> LabService::Start(int workers, const std::map<std::string, std::shared_ptr<const Volume>>& volumes) {
   std::unique_ptr<LabService> lab(new LabService());
   EmbeddedOptions options;
   options.workers = workers;
-  for (auto& [name, volume] : volumes) {
-    options.coordinator.catalogue[name] = [volume = std::move(volume)]() -> Result<std::shared_ptr<const Volume>> { return volume; };
+  for (const auto& [name, volume] : volumes) {
+    options.coordinator.catalogue[name] = [volume = volume]() -> Result<std::shared_ptr<const Volume>> { return volume; };
   }
   Result<std::unique_ptr<EmbeddedService>> service = EmbeddedService::Start(lab->context_, std::move(options));
   if (!service.ok()) return service.status();

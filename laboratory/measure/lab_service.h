@@ -20,7 +20,7 @@ struct TimedPicture {
 class LabService {
  public:
   // `workers` of one render thread each. Fails with the service.
-  static Result<std::unique_ptr<LabService>> Start(int workers, std::map<std::string, std::shared_ptr<const Volume>> volumes);
+  static Result<std::unique_ptr<LabService>> Start(int workers, const std::map<std::string, std::shared_ptr<const Volume>>& volumes);
 
   // One frame at a time; request.dataset is one of the volumes' names. Fails with the frame.
   Result<TimedPicture> Render(const FrameRequest& request);

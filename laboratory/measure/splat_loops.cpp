@@ -1,6 +1,7 @@
 #include "laboratory/measure/splat_loops.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "worker/kernels/splat.h"
 
@@ -58,7 +59,7 @@ void DenseSlice::SplatByKernels() {
 
 // One voxel after the other, with a table of its footprint's weights as above.
 void DenseSlice::SplatPlainly() {
-  const std::int32_t taps = footprint_.taps, k = std::int32_t(taps * 0x1p32 / double(lattice_.step) + 0.5);
+  const std::int32_t taps = footprint_.taps, k = std::int32_t(std::lround(taps * 0x1p32 / double(lattice_.step)));
   const auto pixels = std::size_t(pixels_), sheet_row = std::size_t(pixels_ + 2 * kMargin);
   std::ranges::fill(sheet_, 0.0F);
   std::vector<float> along(static_cast<std::size_t>(k));

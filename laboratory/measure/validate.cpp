@@ -43,6 +43,7 @@ FrameParts PartsOf(const Timeline& timeline) {
 
 double QuantileOf(const std::vector<FrameParts>& frames, double FrameParts::*part, double share) {
   std::vector<double> values;
+  values.reserve(frames.size());
   for (const FrameParts& frame : frames) values.push_back(frame.*part);
   return Quantile(std::move(values), share);
 }

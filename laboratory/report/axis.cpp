@@ -63,7 +63,7 @@ ChartAxis::ChartAxis(AxisSpec spec, const std::vector<double>& values) : spec_(s
   if (spec_.at_values) {
     std::vector<double> distinct = shown;
     std::ranges::sort(distinct);
-    distinct.erase(std::ranges::unique(distinct).begin(), distinct.end());
+    distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
     if (distinct.size() >= 2 && distinct.size() <= kMostValueMarks) {
       marks_ = std::move(distinct);
       low_ = log ? std::log10(marks_.front()) : marks_.front();

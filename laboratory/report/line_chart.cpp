@@ -51,6 +51,7 @@ std::string DrawLines(const LineChart& chart) {
     std::vector<LinePoint> shown;
     std::ranges::copy_if(series.points, std::back_inserter(shown), [&](const LinePoint& p) { return x.Shows(p.x) && y.Shows(p.y); });
     std::vector<SvgPoint> curve;
+    curve.reserve(shown.size());
     for (const LinePoint& point : shown) curve.push_back(place(point.x, point.y));
     canvas.Polyline(curve, color, series.reference ? std::nullopt : std::optional(series.origin));
     if (series.reference) continue;

@@ -172,8 +172,9 @@ constexpr std::int32_t kStampPixels = kStampSide * kStampSide;
 struct Stamp {
   explicit Stamp(const FaceProjection& faces) {
     for (std::int32_t i = 0; i < kStampPixels; ++i) {
+      const std::int32_t row = i / kStampSide;
       right[i] = float(i % kStampSide);
-      below[i] = float(i / kStampSide);
+      below[i] = float(row);
     }
     const FloatTag df;
     for (std::size_t i = 0; i < kStampPixels; i += hn::Lanes(df)) {

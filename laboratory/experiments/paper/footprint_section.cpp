@@ -80,6 +80,7 @@ double Exponent(std::vector<LinePoint> points) {
 
 std::vector<Trial> FootprintTrials(const PaperSetup& setup) {
   std::vector<Trial> trials;
+  trials.reserve(std::size(kWidths) + 2 * std::size(kOccupancies));
   for (const int k : kWidths) trials.push_back(MeasureWidth(setup.large_size(), k));
   for (const double occupancy : kOccupancies) {
     trials.push_back(BoxCostTrial(setup.context(), OccupancyFrame(setup, occupancy)));

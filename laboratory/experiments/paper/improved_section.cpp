@@ -116,7 +116,7 @@ class Improved {
       frame.plan.combine = scheme;
       const double seconds = SteadySeconds(frame, machine_, workers / int(frame.plan.slots));
       if (!best.policy.empty() && seconds >= best.seconds) continue;
-      best = {.policy = frame.plan.slots > 1 ? name + ", " + scheme : "whole frames",
+      best = {.policy = frame.plan.slots > 1 ? fmt::format("{}, {}", name, scheme) : "whole frames",
               .team = int(frame.plan.slots),
               .seconds = seconds,
               .alone = AloneSeconds(frame, machine_),
@@ -186,19 +186,21 @@ Section ImprovedSection(const PaperSetup& setup) {
     for (const int size : Sizes(setup)) {
       for (const char* link : kLinks) {
         const std::string name = fmt::format("N = {}, {}", size, link);
-        LineSeries series{name, Origin::kSimulated, {}}, team_series = series;
+        LineSeries series{name, Origin::kSimulated, {}};
+        LineSeries team_series = series;
         const Improved improved(setup, renderer, size, link);
         const Outcome one = improved.FindBest(1, 1);
         const double plain_one = improved.PlainSeconds(1);
         for (const int p : Workers(setup)) {
           const double plain = improved.PlainSeconds(p);
           for (const int team : TeamSizes(p)) {
+            const int team_count = p / team;
             const Outcome best = improved.FindBest(p, team);
             const double efficiency = 100 * one.seconds / best.seconds / p, limit = 100 * one.render / team / best.most;
             table.rows.push_back({std::string(renderer->title()), Chosen(size), link, Chosen(p), Chosen(team),
                                   team == p ? Simulated(100 * plain_one / plain / p) : Cell(), Simulated(efficiency), Measured(limit),
                                   Measured(best.render / one.render), Measured(best.most * team / best.render), best.policy,
-                                  Simulated(best.seconds * 1e3), Simulated(best.alone * 1e3), Chosen(p / team)});
+                                  Simulated(best.seconds * 1e3), Simulated(best.alone * 1e3), Chosen(team_count)});
             if (team == p) series.points.push_back({double(p), efficiency});
             if (p != most_workers) continue;
             team_series.points.push_back({double(team), efficiency});
