@@ -76,18 +76,19 @@ void GroupRun::LeaveOut(Rank rank, RankReport report, WorkerActions& actions) {
   OnRendered(rank, image, std::move(report), actions);
 }
 
-void GroupRun::OnPartial(const PartialImage& message, Bytes payload, WorkerActions& actions) {
+void GroupRun::OnPartial(PartialImage message, Bytes payload, WorkerActions& actions) {
   const GroupPlan& group = assignment_.group;
   if (!failure_.ok() || group.placements.empty() || PixelCount(message.pixels) == 0) return;
-  if (message.step == step_count()) return CollectGroupPiece(message, std::move(payload));
+  if (message.step == step_count()) return CollectGroupPiece(std::move(message), std::move(payload));
   if (!runner_.order().Awaited(message.step)) return;
   const Step& step = runner_.order().schedule().steps()[message.step];
   const bool inside = message.pixels.begin >= step.pixels.begin && message.pixels.end <= step.pixels.end;
   if (WorkerOf(step.from) != message.from_worker || !inside) return;
   Arrivals& arrivals = arrivals_[message.step];
   if (!Remember(arrivals.seen, message.pixels)) return;
-  arrivals.waiting.push_back({message.pixels, message.interval, 0, {message.image, message.shared, message.packed, std::move(payload)}});
-  Append(arrivals.reports, message.reports);
+  arrivals.waiting.push_back(
+      {message.pixels, message.interval, 0, {message.image, std::move(message.shared), message.packed, std::move(payload)}});
+  Append(arrivals.reports, std::move(message.reports));
   runner_.order().OnArrived(message.step, PixelCount(message.pixels));
   Advance(actions);
 }
@@ -262,15 +263,15 @@ void GroupRun::FinishRoot(WorkerActions& actions) {
   group_pixels_ = held;
 }
 
-void GroupRun::CollectGroupPiece(const PartialImage& message, Bytes payload) {
+void GroupRun::CollectGroupPiece(PartialImage message, Bytes payload) {
   const bool from_root = WorkerOf(root()) == message.from_worker && !Mine(root());
   const bool whole = message.interval == RankInterval{0, assignment_.group.schedule.ranks};
   if (assignment_.display != self_ || !from_root || !whole || message.pixels.end > frame_.end) return;
   if (group_image_taken_ || !Remember(group_pieces_.seen, message.pixels)) return;
   group_pieces_.waiting.push_back(
-      {message.pixels, message.interval, 0, {message.image, message.shared, message.packed, std::move(payload)}});
+      {message.pixels, message.interval, 0, {message.image, std::move(message.shared), message.packed, std::move(payload)}});
   group_pixels_ += PixelCount(message.pixels);
-  Append(group_pieces_.reports, message.reports);
+  Append(group_pieces_.reports, std::move(message.reports));
 }
 
 void GroupRun::SendFragments(Rank rank, const std::vector<Held>& fragments, std::uint32_t step, WorkerId to,

@@ -41,13 +41,15 @@ class GroupRun {
 
   bool HasPeer(WorkerId worker) const { return FindPeer(worker) != nullptr; }
   const GroupKey& key() const { return assignment_.key; }
+  const std::vector<Rank>& ranks() const { return runner_.order().ranks(); }  // of this worker; none if the assignment is inconsistent
+  const Placement& placement(Rank rank) const { return assignment_.group.placements[rank]; }
   const Status& failure() const { return failure_; }
 
   // Takes over `image`, the picture of one of this worker's ranks.
   void OnRendered(Rank rank, ImageHandle image, RankReport report, WorkerActions& actions);
   // One of this worker's ranks draws nothing: it is not rendered and its picture is empty.
   void LeaveOut(Rank rank, RankReport report, WorkerActions& actions);
-  void OnPartial(const PartialImage& message, Bytes payload, WorkerActions& actions);
+  void OnPartial(PartialImage message, Bytes payload, WorkerActions& actions);
   void OnCombined(const CombineDone& done, WorkerActions& actions);
 
   std::optional<GroupImage> TakeGroupImage();  // display worker, once
@@ -89,7 +91,7 @@ class GroupRun {
   // Fills in key and frame.
   void Start(StartCombine combine, Rank rank, WorkerActions& actions);
   void FinishRoot(WorkerActions& actions);
-  void CollectGroupPiece(const PartialImage& message, Bytes payload);
+  void CollectGroupPiece(PartialImage message, Bytes payload);
   // The messages carry `reports`.
   void SendFragments(Rank rank, const std::vector<Held>& fragments, std::uint32_t step, WorkerId to, std::vector<RankReport> reports,
                      WorkerActions& actions);
