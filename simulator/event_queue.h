@@ -2,9 +2,9 @@
 #pragma once
 
 #include <algorithm>
-#include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <queue>
 #include <utility>
 #include <vector>
 
@@ -23,14 +23,15 @@ class EventQueue {
     const std::uint32_t action = unused_.back();
     unused_.pop_back();
     actions_[action] = std::move(what);
-    Push({std::max(when, now_), ++planned_, action});
+    events_.push({std::max(when, now_), ++planned_, action});
   }
   void After(Duration delay, std::function<void()> what) { At(now_ + std::chrono::duration<double>(delay).count(), std::move(what)); }
 
   bool empty() const { return events_.empty(); }
-  double next() const { return events_.front().when; }
+  double next() const { return events_.top().when; }
   void RunNext() {
-    const Event event = Pop();
+    const Event event = events_.top();
+    events_.pop();
     now_ = event.when;
     unused_.push_back(event.action);
     std::exchange(actions_[event.action], nullptr)();
@@ -43,41 +44,12 @@ class EventQueue {
     double when = 0;
     std::uint64_t number : 36 = 0;  // in the order in which they were planned
     std::uint64_t action : 28 = 0;
-    bool Before(const Event& other) const { return when != other.when ? when < other.when : number < other.number; }
+    friend bool operator<(const Event& a, const Event& b) { return a.when != b.when ? a.when > b.when : a.number > b.number; }
   };
-
-  // The events are a heap: the children of event i are 4 i + 1 to 4 i + 4. With four of them, half as many places far apart are touched as
-  // with two.
-  static constexpr std::size_t kChildren = 4;
-  void Push(const Event& event) {
-    std::size_t place = events_.size();
-    events_.push_back(event);
-    for (std::size_t parent; place > 0 && event.Before(events_[parent = (place - 1) / kChildren]); place = parent) {
-      events_[place] = events_[parent];
-    }
-    events_[place] = event;
-  }
-  Event Pop() {
-    const Event first = events_.front(), last = events_.back();
-    events_.pop_back();
-    std::size_t place = 0;
-    for (std::size_t child = 1; child < events_.size(); child = kChildren * place + 1) {
-      const std::size_t end = std::min(child + kChildren, events_.size());
-      std::size_t least = child;
-      for (++child; child < end; ++child) {
-        if (events_[child].Before(events_[least])) least = child;
-      }
-      if (!events_[least].Before(last)) break;
-      events_[place] = events_[least];
-      place = least;
-    }
-    if (!events_.empty()) events_[place] = last;
-    return first;
-  }
 
   double now_ = 0;
   std::uint64_t planned_ = 0;
-  std::vector<Event> events_;
+  std::priority_queue<Event> events_;
   std::vector<std::function<void()>> actions_;
   std::vector<std::uint32_t> unused_;  // places in actions_
 };

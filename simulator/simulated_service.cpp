@@ -111,7 +111,7 @@ Node SimulatedService::AddWorker(WorkerConfig config) {
   return node;
 }
 
-void SimulatedService::StepWorker(Node node, WorkerEvent event) {
+void SimulatedService::StepWorker(Node node, WorkerEvent&& event) {
   Worker& worker = workers_[node];
   if (!worker.alive) return;
   WorkerActions actions = worker.machine.Step(std::move(event), time(), std::move(actions_));

@@ -52,7 +52,7 @@ class SimulatedService {
   void KillWorker(Node node) { workers_[node].alive = false; }
   bool alive(Node node) const { return workers_[node].alive; }
   const WorkerMachine& worker(Node node) const { return workers_[node].machine; }
-  void StepWorker(Node node, WorkerEvent event);
+  void StepWorker(Node node, WorkerEvent&& event);
   bool Idle(Node node, Lane lane) const { return lanes_.Idle(node, lane); }
   // How often in a row a machine asked to be woken at once, the coordinator's included.
   int spins() const { return spins_; }

@@ -10,7 +10,6 @@
 #include <cstdint>
 #include <map>
 #include <optional>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -70,10 +69,12 @@ class GroupRun {
     ImageHandle own = 0;              // its picture, once rendered
     std::vector<RankReport> reports;  // on their way with this rank
   };
-  struct Arrivals {  // for one step that this worker receives, or for the group image
-    std::vector<PixelRange> seen;
-    std::vector<ImagePiece> waiting;
-    std::vector<RankReport> reports;
+  struct Arrivals {                            // for one step that this worker receives, or for the group image
+    std::vector<ImagePiece> pieces;            // at most one of any pixel. Those that were taken have no image any more
+    std::size_t taken = 0;                     // the first ones
+    std::vector<RankReport> reports;           // not taken
+    bool Has(const PixelRange& pixels) const;  // some of them
+    void Add(PartialImage message, Bytes payload);
   };
 
   bool Mine(Rank rank) const { return ranks_.contains(rank); }
@@ -85,7 +86,8 @@ class GroupRun {
   void MoveLocally(Runner::Taken taken, WorkerActions& actions);
   void Receive(const Runner::Taken& taken, WorkerActions& actions);
   void Merge(Rank rank, ImagePiece piece, WorkerActions& actions);
-  void Combine(Rank rank, const Held& held, const ImagePiece& piece, WorkerActions& actions);
+  // Passes on `incoming`, what has come of the piece.
+  void Combine(Rank rank, const Held& held, const ImagePiece& piece, IncomingImage incoming, WorkerActions& actions);
   bool ComesHome(Rank rank, const ImagePiece& piece) const;
   void TakeHome(Rank rank, ImagePiece piece, WorkerActions& actions);
   // Fills in key and frame.
@@ -107,9 +109,9 @@ class GroupRun {
   const PixelRange frame_;
   Status failure_;
   Runner runner_;
-  std::map<Rank, RankState> ranks_;                       // of this worker
-  std::unordered_map<std::uint32_t, Arrivals> arrivals_;  // by step, for incomplete steps
-  std::vector<std::pair<ImageHandle, Rank>> combining_;   // StartCombine without CombineDone
+  std::map<Rank, RankState> ranks_;                      // of this worker
+  std::vector<Arrivals> arrivals_;                       // by turn (StepOrder)
+  std::vector<std::pair<ImageHandle, Rank>> combining_;  // StartCombine without CombineDone
   bool root_done_ = false;
   Arrivals group_pieces_;           // display worker
   std::uint64_t group_pixels_ = 0;  // in them

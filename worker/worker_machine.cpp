@@ -379,7 +379,7 @@ WorkerMachine::WorkerMachine(WorkerConfig config) : state_(std::make_unique<Stat
 WorkerMachine::~WorkerMachine() = default;
 WorkerMachine::WorkerMachine(WorkerMachine&&) noexcept = default;
 
-WorkerActions WorkerMachine::Step(WorkerEvent event, Time now, WorkerActions memory) {
+WorkerActions WorkerMachine::Step(WorkerEvent&& event, Time now, WorkerActions memory) {
   State& s = *state_;
   memory.clear();
   s.actions = std::move(memory);

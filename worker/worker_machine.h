@@ -222,7 +222,7 @@ class WorkerMachine {
   WorkerMachine(WorkerMachine&&) noexcept;
 
   // Whoever gives back the last step's actions saves the allocation of the next ones. Their contents do not matter.
-  WorkerActions Step(WorkerEvent event, Time now, WorkerActions memory = {});
+  WorkerActions Step(WorkerEvent&& event, Time now, WorkerActions memory = {});
   Time NextWake() const;
 
   bool registered() const;

@@ -88,17 +88,17 @@ void StepOrder::OnCombined(Rank rank) {
 }
 
 void StepOrder::OnArrived(std::uint32_t step, std::uint64_t pixels) {
-  CHECK(Awaited(step)) << "step " << step;
-  const std::uint32_t index = *FindReceiving(step);
-  turns_[index].arrived += pixels;
-  turns_[index].untaken = true;
-  Offer(index);
+  const std::optional<std::uint32_t> turn = Awaited(step);
+  CHECK(turn) << "step " << step;
+  turns_[*turn].arrived += pixels;
+  turns_[*turn].untaken = true;
+  Offer(*turn);
 }
 
-bool StepOrder::Awaited(std::uint32_t step) const {
-  if (step >= schedule_->steps().size()) return false;
+std::optional<std::uint32_t> StepOrder::Awaited(std::uint32_t step) const {
+  if (step >= schedule_->steps().size()) return std::nullopt;
   const std::optional<std::uint32_t> turn = FindReceiving(step);
-  return turn && turns_[*turn].partner == kElsewhere && !turns_[*turn].taken;
+  return turn && turns_[*turn].partner == kElsewhere && !turns_[*turn].taken ? turn : std::nullopt;
 }
 
 // Offers the turn to TakeNext if it waits only for its ranks to be free.
@@ -134,13 +134,14 @@ std::optional<StepOrder::Taken> StepOrder::TakeNext() {
       Turn& turn = turns_[index];
       const bool moves = turn.partner != kElsewhere;
       if (moves && !ranks_[turns_[turn.partner].rank].free()) continue;
-      const Taken taken = {moves ? Kind::kMove : Sends(turn) ? Kind::kSend : Kind::kReceive, turn.step};
-      if (taken.kind == Kind::kReceive && turn.arrived < PixelCount(StepOf(turn).pixels)) {
-        turn.untaken = false;
-        possible_.Erase(index);
-      } else {
+      Taken taken = {moves ? Kind::kMove : Sends(turn) ? Kind::kSend : Kind::kReceive, turn.step, index};
+      taken.last = taken.kind != Kind::kReceive || turn.arrived >= PixelCount(StepOf(turn).pixels);
+      if (taken.last) {
         Close(index);
         if (moves) Close(turn.partner);
+      } else {
+        turn.untaken = false;
+        possible_.Erase(index);
       }
       return taken;
     }
