@@ -135,55 +135,45 @@ void SimulatedService::WakeWorker(Node node) {
 
 void SimulatedService::Perform(Node node, CancelRender& action) {
   const std::optional<std::uint32_t> place = workers_[node].rendering;
-  if (!place || std::get<StartRender>(jobs_[*place]->action).key != action.key || !conditions_.CancelsInTime()) return;
-  jobs_[*place]->cancelled = true;
+  if (!place || std::get<StartRender>(JobAt(*place).action).key != action.key || !conditions_.CancelsInTime()) return;
+  JobAt(*place).cancelled = true;
   lanes_.EndNow(node, Lane::kRender, now());
 }
 
-std::uint32_t SimulatedService::FreePlace() {
+std::uint32_t SimulatedService::Order(Job&& job) {
   if (unused_jobs_.empty()) {
-    unused_jobs_.push_back(std::uint32_t(jobs_.size()));
-    jobs_.emplace_back();
+    jobs_.push_back(std::make_unique<Job[]>(kChunk));
+    for (std::size_t i = 1; i <= kChunk; ++i) unused_jobs_.push_back(std::uint32_t(jobs_.size() * kChunk - i));
   }
   const std::uint32_t place = unused_jobs_.back();
   unused_jobs_.pop_back();
-  return place;
-}
-
-void SimulatedService::Begin(std::uint32_t place) {
-  Job& job = *jobs_[place];
-  if (const std::optional<WorkCost> cost = conditions_.Begin(job)) {
-    lanes_.Add({.lane = LaneOf(job), .worker = job.node, .job = place, .cost = *cost}, now());
+  Job& ordered = JobAt(place) = std::move(job);
+  if (const std::optional<WorkCost> cost = conditions_.Begin(ordered)) {
+    lanes_.Add({.lane = LaneOf(ordered), .worker = ordered.node, .job = place, .cost = *cost}, now());
   } else {
     queue_.At(now(), [this, place] { Finish(place); });
   }
-}
-
-void SimulatedService::Free(std::uint32_t place) {
-  jobs_[place].reset();
-  unused_jobs_.push_back(place);
+  return place;
 }
 
 void SimulatedService::OnWorked(const LaneTask& task) {
-  conditions_.OnWorked(*jobs_[task.job], task);
+  conditions_.OnWorked(JobAt(task.job), task);
   if (task.cost.direct) return Finish(task.job);
   queue_.At(threads_.Begin(Threads::Machine(task.worker), now()), [this, place = task.job] { Finish(place); });
 }
 
 // The thread that owns the sockets learns that the job is done.
 void SimulatedService::Finish(std::uint32_t place) {
-  const Node node = jobs_[place]->node;
-  if (!workers_[node].alive) return Free(place);
-  if (std::holds_alternative<SendPartial>(jobs_[place]->action)) return SendToPeer(place);
-  Job& job = *jobs_[place];
+  Job& job = JobAt(place);
+  const Node node = job.node;
+  if (workers_[node].alive && std::holds_alternative<SendPartial>(job.action)) return SendToPeer(place);
+  unused_jobs_.push_back(place);
+  if (!workers_[node].alive) return;
   if (auto* frame = std::get_if<SendFrame>(&job.action)) {
-    SendToCoordinator(node, std::move(frame->message), std::move(job.payload));
-    return Free(place);
+    return SendToCoordinator(node, std::move(frame->message), std::move(job.payload));
   }
   if (std::holds_alternative<StartRender>(job.action)) workers_[node].rendering.reset();
-  WorkerEvent answer = conditions_.Answer(job);
-  Free(place);
-  StepWorker(node, std::move(answer));
+  StepWorker(node, conditions_.Answer(job));
 }
 
 void SimulatedService::SendToCoordinator(Node from, AnyMessage message, Bytes payload) {
@@ -196,24 +186,24 @@ void SimulatedService::SendToCoordinator(Node from, AnyMessage message, Bytes pa
 }
 
 void SimulatedService::SendToPeer(std::uint32_t place) {
-  Job& job = *jobs_[place];
+  Job& job = JobAt(place);
   const auto& send = std::get<SendPartial>(job.action);
   const Node to = ParseNumber<Node>(send.to.images_endpoint).value();
   const Arrivals arrivals = conditions_.ToPeer(to, job);
   job.copies = arrivals.count;
   if (arrivals.nobody) queue_.At(now(), [this, node = job.node, who = send.to.worker] { StepWorker(node, PeerUnreachable{who}); });
-  if (arrivals.count == 0) return Free(place);
+  if (arrivals.count == 0) return unused_jobs_.push_back(place);
   for (int i = 0; i < arrivals.count; ++i) {
     queue_.At(threads_.Begin(Threads::Machine(to), arrivals.times[i]), [this, to, place] { Deliver(to, place); });
   }
 }
 
 void SimulatedService::Deliver(Node to, std::uint32_t place) {
-  Job& job = *jobs_[place];
+  Job& job = JobAt(place);
   auto& message = std::get<SendPartial>(job.action).message;
   if (--job.copies > 0) return StepWorker(to, MessageReceived{message, job.payload});
   MessageReceived received{std::move(message), std::move(job.payload)};
-  Free(place);
+  unused_jobs_.push_back(place);
   StepWorker(to, std::move(received));
 }
 

@@ -83,20 +83,14 @@ class SimulatedService {
   void Perform(Node node, SendControl& action) { SendToCoordinator(node, std::move(action).Take(), {}); }
   void Perform(Node, ConnectSlabs&) {}
   void Perform(Node node, CancelRender& action);
-  void Perform(Node node, StartRender& action) { workers_[node].rendering = Order(node, action); }
-  void Perform(Node node, AnyOf<StoreChunk, StartCombine, FindHidden, SendPartial, SendFrame> auto& action) { Order(node, action); }
+  void Perform(Node node, StartRender& action) { workers_[node].rendering = Order({node, std::move(action)}); }
+  void Perform(Node node, AnyOf<StoreChunk, StartCombine, FindHidden, SendPartial, SendFrame> auto& action) {
+    Order({node, std::move(action)});
+  }
   void Perform(Node node, auto& action) { conditions_.Perform(node, action); }
 
-  // Returns the place of the job.
-  std::uint32_t Order(Node node, auto& action) {
-    const std::uint32_t place = FreePlace();
-    jobs_[place].emplace(node, std::move(action));
-    Begin(place);
-    return place;
-  }
-  std::uint32_t FreePlace();
-  void Begin(std::uint32_t place);
-  void Free(std::uint32_t place);
+  std::uint32_t Order(Job&& job);  // its place
+  Job& JobAt(std::uint32_t place) { return jobs_[place / kChunk][place % kChunk]; }
   void OnWorked(const LaneTask& task);
   void Finish(std::uint32_t place);
   void SendToCoordinator(Node from, AnyMessage message, Bytes payload);
@@ -112,9 +106,10 @@ class SimulatedService {
   bool coordinator_runs_ = false;
   std::uint64_t generation_ = 0;  // of the coordinator
   double coordinator_free_ = 0, coordinator_alarm_ = kNever;
-  std::deque<Worker> workers_;  // by node
-  WorkerActions actions_;       // memory for those of a step
-  std::deque<std::optional<Job>> jobs_;
+  std::deque<Worker> workers_;               // by node
+  WorkerActions actions_;                    // memory for those of a step
+  static constexpr std::size_t kChunk = 64;  // jobs: the table of chunks stays small, and no job ever moves
+  std::vector<std::unique_ptr<Job[]>> jobs_;
   std::vector<std::uint32_t> unused_jobs_;  // places: a direct send of p ranks has p^2 of them
   int spins_ = 0;
 };

@@ -36,7 +36,7 @@ bool GroupRun::Arrivals::Has(const PixelRange& pixels) const {
   return std::ranges::any_of(pieces, [&](const ImagePiece& piece) { return Overlap(piece.pixels, pixels); });
 }
 
-void GroupRun::Arrivals::Add(PartialImage message, Bytes payload) {
+void GroupRun::Arrivals::Add(PartialImage&& message, Bytes payload) {
   pieces.push_back({message.pixels, message.interval, 0, {message.image, std::move(message.shared), message.packed, std::move(payload)}});
   Append(reports, std::move(message.reports));
 }
@@ -178,7 +178,7 @@ void GroupRun::Receive(const Runner::Taken& taken, WorkerActions& actions) {
   if (taken.last) arrivals = {};
 }
 
-void GroupRun::Merge(Rank rank, ImagePiece piece, WorkerActions& actions) {
+void GroupRun::Merge(Rank rank, ImagePiece&& piece, WorkerActions& actions) {
   // The usual case: the piece goes straight into the only image.
   if (const Held* only = runner_.held(rank).Find(piece.pixels); only != nullptr && piece.image == 0) {
     return Combine(rank, Held(*only), piece, std::move(piece.incoming), actions);
@@ -210,7 +210,7 @@ bool GroupRun::ComesHome(Rank rank, const ImagePiece& piece) const {
   return own != 0 && piece.image != own && piece.ranks.begin <= rank && rank < piece.ranks.end && Uses(rank, own);
 }
 
-void GroupRun::TakeHome(Rank rank, ImagePiece piece, WorkerActions& actions) {
+void GroupRun::TakeHome(Rank rank, ImagePiece&& piece, WorkerActions& actions) {
   const ImageHandle own = ranks_.at(rank).own;
   Start({.image = own,
          .other = piece.image,
@@ -222,7 +222,7 @@ void GroupRun::TakeHome(Rank rank, ImagePiece piece, WorkerActions& actions) {
   runner_.held(rank).Put({piece.pixels, {piece.ranks, own}});
 }
 
-void GroupRun::Combine(Rank rank, const Held& held, const ImagePiece& piece, IncomingImage incoming, WorkerActions& actions) {
+void GroupRun::Combine(Rank rank, const Held& held, const ImagePiece& piece, IncomingImage&& incoming, WorkerActions& actions) {
   const std::optional<RankInterval> both = Joined(piece.ranks, held.value.ranks);
   if (!both) {
     return Fail(fmt::format("images of ranks [{}, {}) and [{}, {}) are to be combined, which are not adjacent", piece.ranks.begin,
@@ -238,7 +238,7 @@ void GroupRun::Combine(Rank rank, const Held& held, const ImagePiece& piece, Inc
   runner_.held(rank).Replace({held.pixels, {*both, held.value.image}});
 }
 
-void GroupRun::Start(StartCombine combine, Rank rank, WorkerActions& actions) {
+void GroupRun::Start(StartCombine&& combine, Rank rank, WorkerActions& actions) {
   combine.key = key();
   combine.frame = FrameBounds(assignment_.setup);
   combining_.emplace_back(combine.image, rank);
@@ -267,7 +267,7 @@ void GroupRun::FinishRoot(WorkerActions& actions) {
   group_pixels_ = held;
 }
 
-void GroupRun::CollectGroupPiece(PartialImage message, Bytes payload) {
+void GroupRun::CollectGroupPiece(PartialImage&& message, Bytes payload) {
   const bool from_root = WorkerOf(root()) == message.from_worker && !Mine(root());
   const bool whole = message.interval == RankInterval{0, assignment_.group.schedule.ranks};
   if (assignment_.display != self_ || !from_root || !whole || message.pixels.end > frame_.end) return;

@@ -74,7 +74,7 @@ class GroupRun {
     std::size_t taken = 0;                     // the first ones
     std::vector<RankReport> reports;           // not taken
     bool Has(const PixelRange& pixels) const;  // some of them
-    void Add(PartialImage message, Bytes payload);
+    void Add(PartialImage&& message, Bytes payload);
   };
 
   bool Mine(Rank rank) const { return ranks_.contains(rank); }
@@ -85,15 +85,15 @@ class GroupRun {
   void Advance(WorkerActions& actions);
   void MoveLocally(Runner::Taken taken, WorkerActions& actions);
   void Receive(const Runner::Taken& taken, WorkerActions& actions);
-  void Merge(Rank rank, ImagePiece piece, WorkerActions& actions);
+  void Merge(Rank rank, ImagePiece&& piece, WorkerActions& actions);
   // Passes on `incoming`, what has come of the piece.
-  void Combine(Rank rank, const Held& held, const ImagePiece& piece, IncomingImage incoming, WorkerActions& actions);
+  void Combine(Rank rank, const Held& held, const ImagePiece& piece, IncomingImage&& incoming, WorkerActions& actions);
   bool ComesHome(Rank rank, const ImagePiece& piece) const;
-  void TakeHome(Rank rank, ImagePiece piece, WorkerActions& actions);
+  void TakeHome(Rank rank, ImagePiece&& piece, WorkerActions& actions);
   // Fills in key and frame.
-  void Start(StartCombine combine, Rank rank, WorkerActions& actions);
+  void Start(StartCombine&& combine, Rank rank, WorkerActions& actions);
   void FinishRoot(WorkerActions& actions);
-  void CollectGroupPiece(PartialImage message, Bytes payload);
+  void CollectGroupPiece(PartialImage&& message, Bytes payload);
   // The messages carry `reports`.
   void SendFragments(Rank rank, const std::vector<Held>& fragments, std::uint32_t step, WorkerId to, std::vector<RankReport> reports,
                      WorkerActions& actions);

@@ -17,7 +17,11 @@ StepOrder::StepOrder(SharedSchedule schedule, std::vector<Rank> ranks)
     ranks_[i].turn_end = std::uint32_t(turns_.size());
     ranks_[i].open_steps = ranks_[i].turn_end - ranks_[i].first_turn;
   }
-  for (Turn& turn : turns_) turn.partner = (Sends(turn) ? FindReceiving(turn.step) : FindSending(turn.step)).value_or(kElsewhere);
+  for (Turn& turn : turns_) {
+    turn.sends = StepOf(turn).from == numbers_[turn.rank];
+    turn.missing = PixelCount(StepOf(turn).pixels);
+    turn.partner = (turn.sends ? FindReceiving(turn.step) : FindSending(turn.step)).value_or(kElsewhere);
+  }
   possible_ = IndexSet(std::uint32_t(turns_.size()));
   changed_ = IndexSet(std::uint32_t(ranks_.size()));
   FindWaits();
@@ -90,7 +94,7 @@ void StepOrder::OnCombined(Rank rank) {
 void StepOrder::OnArrived(std::uint32_t step, std::uint64_t pixels) {
   const std::optional<std::uint32_t> turn = Awaited(step);
   CHECK(turn) << "step " << step;
-  turns_[*turn].arrived += pixels;
+  turns_[*turn].missing -= std::min(turns_[*turn].missing, pixels);
   turns_[*turn].untaken = true;
   Offer(*turn);
 }
@@ -108,7 +112,7 @@ void StepOrder::Offer(std::uint32_t index) {
   if (turn.partner != kElsewhere) {
     if (turns_[turn.partner].waits > 0) return;
     possible_.Insert(turn.partner);
-  } else if (!Sends(turn) && !turn.untaken) {
+  } else if (!turn.sends && !turn.untaken) {
     return;
   }
   possible_.Insert(index);
@@ -134,8 +138,8 @@ std::optional<StepOrder::Taken> StepOrder::TakeNext() {
       Turn& turn = turns_[index];
       const bool moves = turn.partner != kElsewhere;
       if (moves && !ranks_[turns_[turn.partner].rank].free()) continue;
-      Taken taken = {moves ? Kind::kMove : Sends(turn) ? Kind::kSend : Kind::kReceive, turn.step, index};
-      taken.last = taken.kind != Kind::kReceive || turn.arrived >= PixelCount(StepOf(turn).pixels);
+      Taken taken = {moves ? Kind::kMove : turn.sends ? Kind::kSend : Kind::kReceive, turn.step, index};
+      taken.last = taken.kind != Kind::kReceive || turn.missing == 0;
       if (taken.last) {
         Close(index);
         if (moves) Close(turn.partner);

@@ -58,8 +58,9 @@ class StepOrder {
     std::uint32_t rank = 0;              // index into ranks_
     std::uint32_t partner = kElsewhere;  // the other rank's turn, if that rank is here too
     std::uint32_t waits = 0;             // number of earlier turns of the rank to wait for
-    std::uint64_t arrived = 0;           // pixels, of a step from elsewhere
-    bool untaken = false;                // some of them are not taken
+    std::uint64_t missing = 0;           // pixels of a step from elsewhere that have not arrived
+    bool sends = false;                  // or it receives
+    bool untaken = false;                // some pixels have arrived and are not taken
     bool taken = false;
   };
   struct RankState {
@@ -77,7 +78,6 @@ class StepOrder {
   RankState& At(Rank rank);
   const RankState& At(Rank rank) const;
   const Step& StepOf(const Turn& turn) const { return schedule_->steps()[turn.step]; }
-  bool Sends(const Turn& turn) const { return StepOf(turn).from == numbers_[turn.rank]; }
   void FindWaits();
   void Offer(std::uint32_t turn);
   void Close(std::uint32_t turn);
