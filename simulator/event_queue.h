@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <functional>
 #include <queue>
-#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -43,9 +42,9 @@ class EventQueue {
  private:
   struct Event {  // small, since the queue moves it often
     double when = 0;
-    std::uint64_t number = 0;
-    std::uint32_t action = 0;
-    friend bool operator<(const Event& a, const Event& b) { return std::tie(b.when, b.number) < std::tie(a.when, a.number); }
+    std::uint64_t number : 36 = 0;  // in the order in which they were planned
+    std::uint64_t action : 28 = 0;
+    friend bool operator<(const Event& a, const Event& b) { return a.when != b.when ? a.when > b.when : a.number > b.number; }
   };
 
   double now_ = 0;

@@ -110,8 +110,8 @@ Timeline FrameSimulation::Run() {
   service_.threads().AllActive(origin_);
   for (int i = 0; i < options_.in_flight; ++i) Submit();
   while (received_ < inputs_.size()) {
-    CHECK_LT(service_.next(), origin_ + kAlarm) << "a frame does not end: its schedule cannot be carried out";
     service_.RunNext();
+    CHECK_LT(service_.now(), origin_ + kAlarm) << "a frame does not end: its schedule cannot be carried out";
   }
   timeline_.end = now();
   if (timeline_.end > 0) timeline_.render_share = render_seconds_ / (timeline_.end * double(timeline_.workers));

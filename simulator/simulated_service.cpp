@@ -93,7 +93,9 @@ void SimulatedService::Perform(ToWorker& action) {
   if (arrivals.nobody) TellCoordinator(now(), WorkerGone{action.to});
   for (int i = 0; i < arrivals.count; ++i) {
     const double arrival = wakes ? threads_.Begin(Threads::Machine(*node), arrivals.times[i]) : arrivals.times[i];
-    queue_.At(arrival, [this, to = *node, received = WorkerEvent(MessageReceived{action.message, {}})] { StepWorker(to, received); });
+    AnyMessage message = i + 1 < arrivals.count ? action.message : std::move(action.message);
+    queue_.At(arrival,
+              [this, to = *node, received = MessageReceived{std::move(message), {}}]() mutable { StepWorker(to, std::move(received)); });
   }
 }
 
@@ -109,12 +111,14 @@ Node SimulatedService::AddWorker(WorkerConfig config) {
   return node;
 }
 
-void SimulatedService::StepWorker(Node node, const WorkerEvent& event) {
+void SimulatedService::StepWorker(Node node, WorkerEvent&& event) {
   Worker& worker = workers_[node];
   if (!worker.alive) return;
-  for (WorkerAction& action : worker.machine.Step(event, time())) {
+  WorkerActions actions = worker.machine.Step(std::move(event), time(), std::move(actions_));
+  for (WorkerAction& action : actions) {
     std::visit([&](auto& a) { Perform(node, a); }, action);
   }
+  actions_ = std::move(actions);
   conditions_.AfterStep(node);
   SetAlarm(worker.alarm, worker.machine.NextWake(), [this, node] { WakeWorker(node); });
 }
@@ -131,19 +135,19 @@ void SimulatedService::WakeWorker(Node node) {
 
 void SimulatedService::Perform(Node node, CancelRender& action) {
   const std::optional<std::uint32_t> place = workers_[node].rendering;
-  if (!place || std::get<StartRender>(jobs_[*place].action).key != action.key || !conditions_.CancelsInTime()) return;
-  jobs_[*place].cancelled = true;
+  if (!place || std::get<StartRender>(JobAt(*place).action).key != action.key || !conditions_.CancelsInTime()) return;
+  JobAt(*place).cancelled = true;
   lanes_.EndNow(node, Lane::kRender, now());
 }
 
-std::uint32_t SimulatedService::Order(Job job) {
+std::uint32_t SimulatedService::Order(Job&& job) {
   if (unused_jobs_.empty()) {
-    unused_jobs_.push_back(std::uint32_t(jobs_.size()));
-    jobs_.emplace_back();
+    jobs_.push_back(std::make_unique<Job[]>(kChunk));
+    for (std::size_t i = 1; i <= kChunk; ++i) unused_jobs_.push_back(std::uint32_t(jobs_.size() * kChunk - i));
   }
   const std::uint32_t place = unused_jobs_.back();
   unused_jobs_.pop_back();
-  Job& ordered = jobs_[place] = std::move(job);
+  Job& ordered = JobAt(place) = std::move(job);
   if (const std::optional<WorkCost> cost = conditions_.Begin(ordered)) {
     lanes_.Add({.lane = LaneOf(ordered), .worker = ordered.node, .job = place, .cost = *cost}, now());
   } else {
@@ -153,14 +157,14 @@ std::uint32_t SimulatedService::Order(Job job) {
 }
 
 void SimulatedService::OnWorked(const LaneTask& task) {
-  conditions_.OnWorked(jobs_[task.job], task);
+  conditions_.OnWorked(JobAt(task.job), task);
   if (task.cost.direct) return Finish(task.job);
   queue_.At(threads_.Begin(Threads::Machine(task.worker), now()), [this, place = task.job] { Finish(place); });
 }
 
 // The thread that owns the sockets learns that the job is done.
 void SimulatedService::Finish(std::uint32_t place) {
-  Job& job = jobs_[place];
+  Job& job = JobAt(place);
   const Node node = job.node;
   if (workers_[node].alive && std::holds_alternative<SendPartial>(job.action)) return SendToPeer(place);
   unused_jobs_.push_back(place);
@@ -182,25 +186,25 @@ void SimulatedService::SendToCoordinator(Node from, AnyMessage message, Bytes pa
 }
 
 void SimulatedService::SendToPeer(std::uint32_t place) {
-  Job& job = jobs_[place];
+  Job& job = JobAt(place);
   const auto& send = std::get<SendPartial>(job.action);
   const Node to = ParseNumber<Node>(send.to.images_endpoint).value();
   const Arrivals arrivals = conditions_.ToPeer(to, job);
   job.copies = arrivals.count;
   if (arrivals.nobody) queue_.At(now(), [this, node = job.node, who = send.to.worker] { StepWorker(node, PeerUnreachable{who}); });
-  if (arrivals.count == 0) unused_jobs_.push_back(place);
+  if (arrivals.count == 0) return unused_jobs_.push_back(place);
   for (int i = 0; i < arrivals.count; ++i) {
     queue_.At(threads_.Begin(Threads::Machine(to), arrivals.times[i]), [this, to, place] { Deliver(to, place); });
   }
 }
 
 void SimulatedService::Deliver(Node to, std::uint32_t place) {
-  Job& job = jobs_[place];
+  Job& job = JobAt(place);
   auto& message = std::get<SendPartial>(job.action).message;
   if (--job.copies > 0) return StepWorker(to, MessageReceived{message, job.payload});
-  const WorkerEvent received = MessageReceived{std::move(message), std::move(job.payload)};
+  MessageReceived received{std::move(message), std::move(job.payload)};
   unused_jobs_.push_back(place);
-  StepWorker(to, received);
+  StepWorker(to, std::move(received));
 }
 
 }  // namespace slabstream

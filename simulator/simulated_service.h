@@ -52,7 +52,7 @@ class SimulatedService {
   void KillWorker(Node node) { workers_[node].alive = false; }
   bool alive(Node node) const { return workers_[node].alive; }
   const WorkerMachine& worker(Node node) const { return workers_[node].machine; }
-  void StepWorker(Node node, const WorkerEvent& event);
+  void StepWorker(Node node, WorkerEvent&& event);
   bool Idle(Node node, Lane lane) const { return lanes_.Idle(node, lane); }
   // How often in a row a machine asked to be woken at once, the coordinator's included.
   int spins() const { return spins_; }
@@ -80,7 +80,7 @@ class SimulatedService {
   void Perform(StopService&) { StopCoordinator(); }
   void Perform(auto& action) { conditions_.Perform(action); }
 
-  void Perform(Node node, SendControl& action) { SendToCoordinator(node, std::move(action.message), {}); }
+  void Perform(Node node, SendControl& action) { SendToCoordinator(node, std::move(action).Take(), {}); }
   void Perform(Node, ConnectSlabs&) {}
   void Perform(Node node, CancelRender& action);
   void Perform(Node node, StartRender& action) { workers_[node].rendering = Order({node, std::move(action)}); }
@@ -89,7 +89,8 @@ class SimulatedService {
   }
   void Perform(Node node, auto& action) { conditions_.Perform(node, action); }
 
-  std::uint32_t Order(Job job);  // its place
+  std::uint32_t Order(Job&& job);  // its place
+  Job& JobAt(std::uint32_t place) { return jobs_[place / kChunk][place % kChunk]; }
   void OnWorked(const LaneTask& task);
   void Finish(std::uint32_t place);
   void SendToCoordinator(Node from, AnyMessage message, Bytes payload);
@@ -105,8 +106,10 @@ class SimulatedService {
   bool coordinator_runs_ = false;
   std::uint64_t generation_ = 0;  // of the coordinator
   double coordinator_free_ = 0, coordinator_alarm_ = kNever;
-  std::deque<Worker> workers_;  // by node
-  std::deque<Job> jobs_;
+  std::deque<Worker> workers_;               // by node
+  WorkerActions actions_;                    // memory for those of a step
+  static constexpr std::size_t kChunk = 64;  // jobs: the table of chunks stays small, and no job ever moves
+  std::vector<std::unique_ptr<Job[]>> jobs_;
   std::vector<std::uint32_t> unused_jobs_;  // places: a direct send of p ranks has p^2 of them
   int spins_ = 0;
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 namespace slabstream {
 
@@ -18,10 +19,10 @@ void WorkerLanes::Add(const LaneTask& task, double now) {
   WakeUp(task, now);
 }
 
-bool WorkerLanes::Idle(Node worker, Lane lane) const { return !workers_[worker][std::size_t(lane)].taken; }
+bool WorkerLanes::Idle(Node worker, Lane lane) const { return !lanes_[NumberOf(worker, lane)].taken; }
 
 void WorkerLanes::EndNow(Node worker, Lane lane, double now) {
-  if (const auto job = StateOf(worker, lane).running) processors_.EndNow(HostOf(worker), *job, now);
+  if (StateOf(worker, lane).running) processors_.EndNow(HostOf(worker), NumberOf(worker, lane), now);
 }
 
 double WorkerLanes::NextTime() {
@@ -37,10 +38,9 @@ std::optional<LaneTask> WorkerLanes::Step() {
     return std::nullopt;
   }
   const Processors::Completion done = processors_.Finish();
-  const LaneTask task = running_[done.task];
+  LaneState& state = lanes_[done.task];
+  const LaneTask task = *std::exchange(state.running, std::nullopt);
   threads_.Active(task.cost.direct ? Threads::Machine(task.worker) : Threads::Of(task.worker, task.lane), done.time);
-  LaneState& state = StateOf(task.worker, task.lane);
-  state.running.reset();
   state.taken = !state.waiting.empty();
   if (state.taken) {  // a task in a lane's own queue needs no wake-up
     const LaneTask next = state.waiting.front();
@@ -61,10 +61,8 @@ void WorkerLanes::Begin(LaneTask task, double now) {
   task.begin = now;
   const auto& [seconds, threads, direct] = task.cost;
   const double each = seconds * (1 + (threads - 1) * machine_.serial_share) / threads / SpeedOf(task.worker);
-  processors_.Start(HostOf(task.worker), task.job, each, threads, now);
-  StateOf(task.worker, task.lane).running = task.job;
-  if (running_.size() <= task.job) running_.resize(task.job + 1);
-  running_[task.job] = task;
+  processors_.Start(HostOf(task.worker), NumberOf(task.worker, task.lane), each, threads, now);
+  StateOf(task.worker, task.lane).running = task;
 }
 
 std::uint32_t WorkerLanes::HostOf(Node worker) const { return worker / std::uint32_t(std::max(machine_.workers_a_host, 1)); }

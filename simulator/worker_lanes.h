@@ -3,7 +3,6 @@
 // share its cores (Processors).
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -29,7 +28,7 @@ struct WorkCost {
 struct LaneTask {
   Lane lane = Lane::kRender;
   Node worker = 0;
-  std::uint32_t job = 0;  // any number; no two tasks in lanes have the same
+  std::uint32_t job = 0;  // any number
   WorkCost cost;
   double begin = 0;  // once it has begun
 };
@@ -38,7 +37,7 @@ class WorkerLanes {
  public:
   // `machine` and `threads` outlive the object.
   WorkerLanes(const MachineModel& machine, Threads& threads);
-  void AddWorker() { workers_.emplace_back(); }
+  void AddWorker() { lanes_.resize(lanes_.size() + kLanes); }
 
   // Queues the task, or hands it over to its lane. `now` may not go back from call to call.
   void Add(const LaneTask& task, double now);
@@ -53,11 +52,11 @@ class WorkerLanes {
 
  private:
   struct LaneState {
-    bool taken = false;                    // by a task that was handed over and has not ended
-    std::optional<std::uint32_t> running;  // its job
+    bool taken = false;               // by a task that was handed over and has not ended
+    std::optional<LaneTask> running;  // once it has begun
     std::deque<LaneTask> waiting;
   };
-  using Worker = std::array<LaneState, 3>;  // by Lane
+  static constexpr std::size_t kLanes = 3;  // of a worker, by Lane
 
   struct Start {
     double time = 0;
@@ -66,7 +65,8 @@ class WorkerLanes {
     friend bool operator>(const Start& a, const Start& b) { return a.time != b.time ? a.time > b.time : a.order > b.order; }
   };
 
-  LaneState& StateOf(Node worker, Lane lane) { return workers_[worker][std::size_t(lane)]; }
+  static std::size_t NumberOf(Node worker, Lane lane) { return kLanes * worker + std::size_t(lane); }
+  LaneState& StateOf(Node worker, Lane lane) { return lanes_[NumberOf(worker, lane)]; }
   std::uint32_t HostOf(Node worker) const;
   void WakeUp(const LaneTask& task, double now);
   void Begin(LaneTask task, double now);
@@ -77,8 +77,7 @@ class WorkerLanes {
   Processors processors_;
   std::priority_queue<Start, std::vector<Start>, std::greater<>> starts_;  // of tasks that were handed over
   std::uint64_t wake_ups_ = 0;
-  std::vector<Worker> workers_;
-  std::vector<LaneTask> running_;  // by job
+  std::vector<LaneState> lanes_;  // worker by worker. Their numbers are the names of what they run on processors
 };
 
 }  // namespace slabstream

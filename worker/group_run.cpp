@@ -12,14 +12,8 @@
 namespace slabstream {
 namespace {
 
-// False if any of `pixels` has been seen before: a duplicate.
-bool Remember(std::vector<PixelRange>& seen, const PixelRange& pixels) {
-  if (std::any_of(seen.begin(), seen.end(), [&](const PixelRange& old) { return Overlap(old, pixels); })) return false;
-  seen.push_back(pixels);
-  return true;
-}
-
 void Append(std::vector<RankReport>& reports, std::vector<RankReport> more) {
+  if (reports.empty()) return reports.swap(more);
   reports.insert(reports.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
 }
 
@@ -38,12 +32,22 @@ std::vector<Rank> RanksOf(const GroupPlan& group, WorkerId worker) {
 
 }  // namespace
 
+bool GroupRun::Arrivals::Has(const PixelRange& pixels) const {
+  return std::ranges::any_of(pieces, [&](const ImagePiece& piece) { return Overlap(piece.pixels, pixels); });
+}
+
+void GroupRun::Arrivals::Add(PartialImage&& message, Bytes payload) {
+  pieces.push_back({message.pixels, message.interval, 0, {message.image, std::move(message.shared), message.packed, std::move(payload)}});
+  Append(reports, std::move(message.reports));
+}
+
 GroupRun::GroupRun(GroupAssignment assignment, WorkerId self, ImageNames& names)
     : assignment_(PeersByWorker(std::move(assignment))),
       self_(self),
       names_(names),
       frame_(WholeFrame(assignment_.setup)),
-      runner_(MakeRunner()) {
+      runner_(MakeRunner()),
+      arrivals_(runner_.order().turn_count()) {
   for (const Rank rank : runner_.order().ranks()) ranks_[rank];
 }
 
@@ -76,19 +80,18 @@ void GroupRun::LeaveOut(Rank rank, RankReport report, WorkerActions& actions) {
   OnRendered(rank, image, std::move(report), actions);
 }
 
-void GroupRun::OnPartial(const PartialImage& message, Bytes payload, WorkerActions& actions) {
+void GroupRun::OnPartial(PartialImage message, Bytes payload, WorkerActions& actions) {
   const GroupPlan& group = assignment_.group;
   if (!failure_.ok() || group.placements.empty() || PixelCount(message.pixels) == 0) return;
-  if (message.step == step_count()) return CollectGroupPiece(message, std::move(payload));
-  if (!runner_.order().Awaited(message.step)) return;
+  if (message.step == step_count()) return CollectGroupPiece(std::move(message), std::move(payload));
+  const std::optional<std::uint32_t> turn = runner_.order().Awaited(message.step);
+  if (!turn) return;
   const Step& step = runner_.order().schedule().steps()[message.step];
   const bool inside = message.pixels.begin >= step.pixels.begin && message.pixels.end <= step.pixels.end;
   if (WorkerOf(step.from) != message.from_worker || !inside) return;
-  Arrivals& arrivals = arrivals_[message.step];
-  if (!Remember(arrivals.seen, message.pixels)) return;
-  arrivals.waiting.push_back({message.pixels, message.interval, 0, {message.image, message.shared, message.packed, std::move(payload)}});
-  Append(arrivals.reports, message.reports);
+  if (arrivals_[*turn].Has(message.pixels)) return;
   runner_.order().OnArrived(message.step, PixelCount(message.pixels));
+  arrivals_[*turn].Add(std::move(message), std::move(payload));
   Advance(actions);
 }
 
@@ -113,7 +116,7 @@ std::optional<GroupImage> GroupRun::TakeGroupImage() {
   const bool empty = assignment_.group.placements.empty();
   if (!empty && group_pixels_ != PixelCount(frame_)) return std::nullopt;
   group_image_taken_ = true;
-  return GroupImage{key(), std::move(group_pieces_.waiting), std::move(group_pieces_.reports)};
+  return GroupImage{key(), std::move(group_pieces_.pieces), std::move(group_pieces_.reports)};
 }
 
 bool GroupRun::finished() const {
@@ -127,7 +130,7 @@ void GroupRun::Drop(WorkerActions& actions) {
     const std::vector<Held> of_rank = runner_.held(rank).Take(frame_);
     held.insert(held.end(), of_rank.begin(), of_rank.end());
   }
-  for (const ImagePiece& piece : group_pieces_.waiting) {
+  for (const ImagePiece& piece : group_pieces_.pieces) {
     if (piece.image != 0) held.push_back({piece.pixels, {piece.ranks, piece.image}});
   }
   ReleaseUnused(held, actions);
@@ -167,16 +170,18 @@ void GroupRun::MoveLocally(Runner::Taken taken, WorkerActions& actions) {
 }
 
 void GroupRun::Receive(const Runner::Taken& taken, WorkerActions& actions) {
-  Arrivals& arrivals = arrivals_.at(taken.index);
-  for (ImagePiece& piece : std::exchange(arrivals.waiting, {})) Merge(taken.step->to, std::move(piece), actions);
+  Arrivals& arrivals = arrivals_[taken.turn];
+  for (; arrivals.taken < arrivals.pieces.size(); ++arrivals.taken) {
+    Merge(taken.step->to, std::move(arrivals.pieces[arrivals.taken]), actions);
+  }
   Append(ranks_.at(taken.step->to).reports, std::exchange(arrivals.reports, {}));
-  if (!runner_.order().Awaited(taken.index)) arrivals_.erase(taken.index);
+  if (taken.last) arrivals = {};
 }
 
-void GroupRun::Merge(Rank rank, ImagePiece piece, WorkerActions& actions) {
+void GroupRun::Merge(Rank rank, ImagePiece&& piece, WorkerActions& actions) {
   // The usual case: the piece goes straight into the only image.
   if (const Held* only = runner_.held(rank).Find(piece.pixels); only != nullptr && piece.image == 0) {
-    return Combine(rank, Held(*only), piece, actions);
+    return Combine(rank, Held(*only), piece, std::move(piece.incoming), actions);
   }
   const std::vector<Held> held = runner_.held(rank).Within(piece.pixels);
   if (held.empty() && ComesHome(rank, piece)) return TakeHome(rank, std::move(piece), actions);
@@ -192,7 +197,7 @@ void GroupRun::Merge(Rank rank, ImagePiece piece, WorkerActions& actions) {
   for (const Held& part : held) {
     take_gap(part.pixels.begin);
     gap_begin = part.pixels.end;
-    Combine(rank, part, piece, actions);
+    Combine(rank, part, piece, {}, actions);
   }
   take_gap(piece.pixels.end);
   if (incoming) ReleaseUnused({{piece.pixels, {piece.ranks, piece.image}}}, actions);
@@ -205,7 +210,7 @@ bool GroupRun::ComesHome(Rank rank, const ImagePiece& piece) const {
   return own != 0 && piece.image != own && piece.ranks.begin <= rank && rank < piece.ranks.end && Uses(rank, own);
 }
 
-void GroupRun::TakeHome(Rank rank, ImagePiece piece, WorkerActions& actions) {
+void GroupRun::TakeHome(Rank rank, ImagePiece&& piece, WorkerActions& actions) {
   const ImageHandle own = ranks_.at(rank).own;
   Start({.image = own,
          .other = piece.image,
@@ -217,7 +222,7 @@ void GroupRun::TakeHome(Rank rank, ImagePiece piece, WorkerActions& actions) {
   runner_.held(rank).Put({piece.pixels, {piece.ranks, own}});
 }
 
-void GroupRun::Combine(Rank rank, const Held& held, const ImagePiece& piece, WorkerActions& actions) {
+void GroupRun::Combine(Rank rank, const Held& held, const ImagePiece& piece, IncomingImage&& incoming, WorkerActions& actions) {
   const std::optional<RankInterval> both = Joined(piece.ranks, held.value.ranks);
   if (!both) {
     return Fail(fmt::format("images of ranks [{}, {}) and [{}, {}) are to be combined, which are not adjacent", piece.ranks.begin,
@@ -225,7 +230,7 @@ void GroupRun::Combine(Rank rank, const Held& held, const ImagePiece& piece, Wor
   }
   Start({.image = held.value.image,
          .other = piece.image,
-         .incoming = piece.incoming,
+         .incoming = std::move(incoming),
          .side = piece.ranks.end == held.value.ranks.begin ? Side::kFront : Side::kBack,
          .pixels = held.pixels == frame_ ? PixelRange{} : held.pixels,
          .ranks = piece.ranks},
@@ -233,7 +238,7 @@ void GroupRun::Combine(Rank rank, const Held& held, const ImagePiece& piece, Wor
   runner_.held(rank).Replace({held.pixels, {*both, held.value.image}});
 }
 
-void GroupRun::Start(StartCombine combine, Rank rank, WorkerActions& actions) {
+void GroupRun::Start(StartCombine&& combine, Rank rank, WorkerActions& actions) {
   combine.key = key();
   combine.frame = FrameBounds(assignment_.setup);
   combining_.emplace_back(combine.image, rank);
@@ -257,20 +262,18 @@ void GroupRun::FinishRoot(WorkerActions& actions) {
     ReleaseUnused(parts, actions);
     return;
   }
-  for (const Held& part : parts) group_pieces_.waiting.push_back({part.pixels, part.value.ranks, part.value.image, {}});
+  for (const Held& part : parts) group_pieces_.pieces.push_back({part.pixels, part.value.ranks, part.value.image, {}});
   Append(group_pieces_.reports, TakeReports(root()));
   group_pixels_ = held;
 }
 
-void GroupRun::CollectGroupPiece(const PartialImage& message, Bytes payload) {
+void GroupRun::CollectGroupPiece(PartialImage&& message, Bytes payload) {
   const bool from_root = WorkerOf(root()) == message.from_worker && !Mine(root());
   const bool whole = message.interval == RankInterval{0, assignment_.group.schedule.ranks};
   if (assignment_.display != self_ || !from_root || !whole || message.pixels.end > frame_.end) return;
-  if (group_image_taken_ || !Remember(group_pieces_.seen, message.pixels)) return;
-  group_pieces_.waiting.push_back(
-      {message.pixels, message.interval, 0, {message.image, message.shared, message.packed, std::move(payload)}});
+  if (group_image_taken_ || group_pieces_.Has(message.pixels)) return;
   group_pixels_ += PixelCount(message.pixels);
-  Append(group_pieces_.reports, message.reports);
+  group_pieces_.Add(std::move(message), std::move(payload));
 }
 
 void GroupRun::SendFragments(Rank rank, const std::vector<Held>& fragments, std::uint32_t step, WorkerId to,

@@ -10,7 +10,6 @@
 #include <cstdint>
 #include <map>
 #include <optional>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -41,13 +40,15 @@ class GroupRun {
 
   bool HasPeer(WorkerId worker) const { return FindPeer(worker) != nullptr; }
   const GroupKey& key() const { return assignment_.key; }
+  const std::vector<Rank>& ranks() const { return runner_.order().ranks(); }  // of this worker; none if the assignment is inconsistent
+  const Placement& placement(Rank rank) const { return assignment_.group.placements[rank]; }
   const Status& failure() const { return failure_; }
 
   // Takes over `image`, the picture of one of this worker's ranks.
   void OnRendered(Rank rank, ImageHandle image, RankReport report, WorkerActions& actions);
   // One of this worker's ranks draws nothing: it is not rendered and its picture is empty.
   void LeaveOut(Rank rank, RankReport report, WorkerActions& actions);
-  void OnPartial(const PartialImage& message, Bytes payload, WorkerActions& actions);
+  void OnPartial(PartialImage message, Bytes payload, WorkerActions& actions);
   void OnCombined(const CombineDone& done, WorkerActions& actions);
 
   std::optional<GroupImage> TakeGroupImage();  // display worker, once
@@ -68,10 +69,12 @@ class GroupRun {
     ImageHandle own = 0;              // its picture, once rendered
     std::vector<RankReport> reports;  // on their way with this rank
   };
-  struct Arrivals {  // for one step that this worker receives, or for the group image
-    std::vector<PixelRange> seen;
-    std::vector<ImagePiece> waiting;
-    std::vector<RankReport> reports;
+  struct Arrivals {                            // for one step that this worker receives, or for the group image
+    std::vector<ImagePiece> pieces;            // at most one of any pixel. Those that were taken have no image any more
+    std::size_t taken = 0;                     // the first ones
+    std::vector<RankReport> reports;           // not taken
+    bool Has(const PixelRange& pixels) const;  // some of them
+    void Add(PartialImage&& message, Bytes payload);
   };
 
   bool Mine(Rank rank) const { return ranks_.contains(rank); }
@@ -82,14 +85,15 @@ class GroupRun {
   void Advance(WorkerActions& actions);
   void MoveLocally(Runner::Taken taken, WorkerActions& actions);
   void Receive(const Runner::Taken& taken, WorkerActions& actions);
-  void Merge(Rank rank, ImagePiece piece, WorkerActions& actions);
-  void Combine(Rank rank, const Held& held, const ImagePiece& piece, WorkerActions& actions);
+  void Merge(Rank rank, ImagePiece&& piece, WorkerActions& actions);
+  // Passes on `incoming`, what has come of the piece.
+  void Combine(Rank rank, const Held& held, const ImagePiece& piece, IncomingImage&& incoming, WorkerActions& actions);
   bool ComesHome(Rank rank, const ImagePiece& piece) const;
-  void TakeHome(Rank rank, ImagePiece piece, WorkerActions& actions);
+  void TakeHome(Rank rank, ImagePiece&& piece, WorkerActions& actions);
   // Fills in key and frame.
-  void Start(StartCombine combine, Rank rank, WorkerActions& actions);
+  void Start(StartCombine&& combine, Rank rank, WorkerActions& actions);
   void FinishRoot(WorkerActions& actions);
-  void CollectGroupPiece(const PartialImage& message, Bytes payload);
+  void CollectGroupPiece(PartialImage&& message, Bytes payload);
   // The messages carry `reports`.
   void SendFragments(Rank rank, const std::vector<Held>& fragments, std::uint32_t step, WorkerId to, std::vector<RankReport> reports,
                      WorkerActions& actions);
@@ -105,9 +109,9 @@ class GroupRun {
   const PixelRange frame_;
   Status failure_;
   Runner runner_;
-  std::map<Rank, RankState> ranks_;                       // of this worker
-  std::unordered_map<std::uint32_t, Arrivals> arrivals_;  // by step, for incomplete steps
-  std::vector<std::pair<ImageHandle, Rank>> combining_;   // StartCombine without CombineDone
+  std::map<Rank, RankState> ranks_;                      // of this worker
+  std::vector<Arrivals> arrivals_;                       // by turn (StepOrder)
+  std::vector<std::pair<ImageHandle, Rank>> combining_;  // StartCombine without CombineDone
   bool root_done_ = false;
   Arrivals group_pieces_;           // display worker
   std::uint64_t group_pixels_ = 0;  // in them

@@ -68,7 +68,7 @@ struct WorkerService::Impl {
   void Run();
   void Loop();
   void Receive(Socket& socket, Plane plane);
-  void HandleEvent(const WorkerEvent& event);
+  void HandleEvent(WorkerEvent event);
   void HandleOutput(ExecutorOutput& output);
   void SetRegistered();
   void Remember(const AnyMessage& message);
@@ -236,8 +236,8 @@ void WorkerService::Impl::Refuse(const PartialImage& partial) {
   if (to_refuse.size() < kMostRefused) to_refuse.push_back(partial);
 }
 
-void WorkerService::Impl::HandleEvent(const WorkerEvent& event) {
-  for (WorkerAction& action : machine.Step(event, MonotonicNow())) {
+void WorkerService::Impl::HandleEvent(WorkerEvent event) {
+  for (WorkerAction& action : machine.Step(std::move(event), MonotonicNow())) {
     std::visit([this](auto& each) { Perform(each); }, action);
   }
   if (machine.registered()) SetRegistered();
@@ -248,8 +248,8 @@ void WorkerService::Impl::SetRegistered() {
 }
 
 void WorkerService::Impl::HandleOutput(ExecutorOutput& output) {
-  if (const auto* event = std::get_if<WorkerEvent>(&output)) {
-    HandleEvent(*event);
+  if (auto* event = std::get_if<WorkerEvent>(&output)) {
+    HandleEvent(std::move(*event));
   } else if (auto* frame = std::get_if<OutgoingFrame>(&output)) {
     const Status sent = Guarded("send", [&] {
       if (options.task_hook) options.task_hook("send");
@@ -279,7 +279,7 @@ void WorkerService::Impl::Send(Socket& socket, const AnyMessage& message) {
 
 void WorkerService::Impl::Perform(SendControl& action) {
   if (auto* done = std::get_if<GroupDone>(&action.message)) executor->AddSent(done->key, done->reports);
-  Send(control, action.message);
+  Send(control, std::move(action).Take());
 }
 
 void WorkerService::Impl::Perform(SendChunkRequest& action) {

@@ -34,6 +34,7 @@ SlabFetcher::Generation SlabFetcher::Acquire(DatasetId dataset, const Box& box, 
     best = &slabs_[generation];
     best->key = {dataset, box, type, generation};
     best->bytes = std::uint64_t(box.voxel_count()) * BytesPerSample(type);
+    cached_bytes_ += best->bytes;
     best->pins = 1;
     OpenSlab open = PlanSlab(*best);
     if (best->is_complete()) RetireCovered(*best);
@@ -94,6 +95,7 @@ SlabFetcher::FetchReport SlabFetcher::TakeReport(Generation slab) {
 
 void SlabFetcher::SetBytes(Generation slab, std::uint64_t bytes) {
   std::uint64_t& of_slab = slabs_.at(slab).bytes;
+  cached_bytes_ += std::max(of_slab, bytes) - of_slab;
   of_slab = std::max(of_slab, bytes);
 }
 
@@ -239,13 +241,8 @@ void SlabFetcher::Trim(WorkerActions& actions) {
 void SlabFetcher::Drop(Generation slab, WorkerActions& actions) {
   actions.push_back(DropSlab{slabs_.at(slab).key});
   Unpin(slabs_.at(slab).sources);
+  cached_bytes_ -= slabs_.at(slab).bytes;
   slabs_.erase(slab);
-}
-
-std::uint64_t SlabFetcher::cached_bytes() const {
-  std::uint64_t bytes = 0;
-  for (const auto& [generation, slab] : slabs_) bytes += slab.bytes;
-  return bytes;
 }
 
 }  // namespace slabstream

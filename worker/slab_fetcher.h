@@ -60,7 +60,7 @@ class SlabFetcher {
   void RetireAll();       // another coordinator: no slab may be used again
   void Trim(WorkerActions& actions);
 
-  std::uint64_t cached_bytes() const;
+  std::uint64_t cached_bytes() const { return cached_bytes_; }
   std::uint64_t fetched_bytes() const { return fetched_bytes_; }
 
  private:
@@ -105,6 +105,7 @@ class SlabFetcher {
   std::map<Generation, Slab> slabs_;
   std::map<ChunkName, InFlight> in_flight_;  // outlives its slab: the credit is used until the chunk is stored or expires
   std::uint64_t in_flight_bytes_ = 0;
+  std::uint64_t cached_bytes_ = 0;  // of slabs_
   Generation last_generation_ = 0;
   std::uint64_t use_counter_ = 0;
   std::uint64_t fetched_bytes_ = 0;

@@ -30,8 +30,8 @@ struct WorkerMachine::State {
   };
 
   // ---- input from the coordinator and the executor. `actions` and `now` are those of the running Step.
-  void On(const MessageReceived& event) {
-    std::visit([&](const auto& message) { On(message, event.payload); }, event.message);
+  void On(MessageReceived&& event) {
+    std::visit([&](auto& message) { On(std::move(message), event.payload); }, event.message);
   }
   void On(const ChunkStored& stored) { slabs.OnStored(stored, now); }
   void On(const RenderDone& done);
@@ -44,12 +44,12 @@ struct WorkerMachine::State {
 
   void On(const Welcome& welcome, const Bytes&);
   void On(const Ping& ping, const Bytes&);
-  void On(const GroupAssignment& assignment, const Bytes&);
+  void On(GroupAssignment&& assignment, const Bytes&);
   void On(const Retire&, const Bytes&);
   void On(const Stop& stop, const Bytes&);
   void On(const Chunk& chunk, const Bytes& payload);
   void On(const ChunkRefused& refused, const Bytes&);
-  void On(const PartialImage& partial, const Bytes& payload);
+  void On(PartialImage&& partial, const Bytes& payload);
   // Drops what a worker sends, what its service handles (ImageRefused, ImageReceived), and the messages of the client plane.
   template <
       AnyOf<Register, Heartbeat, GroupDone, FrameImage, WorkerTrouble, Leave, ChunkRequest, ImageRefused, ImageReceived, SubmitFrame,
@@ -196,7 +196,7 @@ void WorkerMachine::State::DropFrame(FrameId id) {
   frames.erase(found);
 }
 
-void WorkerMachine::State::On(const GroupAssignment& assignment, const Bytes&) {
+void WorkerMachine::State::On(GroupAssignment&& assignment, const Bytes&) {
   if (!Heard(assignment.epoch)) return;
   FinishBefore(assignment.finished_before);
   const GroupKey key = assignment.key;
@@ -216,12 +216,12 @@ void WorkerMachine::State::On(const GroupAssignment& assignment, const Bytes&) {
     if (frame.accumulator->Has(key.group)) return frame.accumulator->Confirm(key.group, actions);
   }
 
-  GroupRun& run = entry->second.emplace(assignment, worker, names);
   const auto setup = std::make_shared<const FrameSetup>(assignment.setup);
   const auto hidden = std::make_shared<const OcclusionMask>(assignment.hidden);
-  for (Rank rank = 0; rank < assignment.group.placements.size() && run.failure().ok(); ++rank) {
-    const Placement& placement = assignment.group.placements[rank];
-    if (placement.worker != worker) continue;
+  GroupRun& run = entry->second.emplace(std::move(assignment), worker, names);
+  for (const Rank rank : run.ranks()) {
+    if (!run.failure().ok()) break;
+    const Placement& placement = run.placement(rank);
     if (HidesBox(*hidden, placement.box, *setup)) {
       run.LeaveOut(rank, {.worker = worker, .group = key.group, .rank = rank, .box = placement.id}, actions);
       ++rendered_ranks;
@@ -229,7 +229,7 @@ void WorkerMachine::State::On(const GroupAssignment& assignment, const Bytes&) {
       renders.Add(key, rank, placement, setup, hidden, actions);
     }
   }
-  for (auto& [partial, payload] : early.Take(key)) run.OnPartial(partial, std::move(payload), actions);
+  for (auto& [partial, payload] : early.Take(key)) run.OnPartial(std::move(partial), std::move(payload), actions);
   AfterRun(run);
 }
 
@@ -247,9 +247,9 @@ void WorkerMachine::State::BeginAttempt(FrameId id, Frame& frame, const GroupAss
   }
 }
 
-void WorkerMachine::State::On(const PartialImage& partial, const Bytes& payload) {
+void WorkerMachine::State::On(PartialImage&& partial, const Bytes& payload) {
   // Once the coordinator has admitted this worker, others send it images, and these may overtake the Welcome.
-  if (worker == 0) return (void)early.Keep(partial, payload);
+  if (worker == 0) return (void)early.Keep(std::move(partial), payload);
   if (partial.epoch != epoch || Over(partial.key.frame)) return;
   const auto frame = frames.find(partial.key.frame);
   if (frame != frames.end()) {
@@ -257,12 +257,13 @@ void WorkerMachine::State::On(const PartialImage& partial, const Bytes& payload)
     if (partial.key.attempt == frame->second.attempt) {
       if (const auto group = frame->second.groups.find(partial.key.group); group != frame->second.groups.end()) {
         if (!group->second) return;  // over
-        group->second->OnPartial(partial, payload, actions);
+        group->second->OnPartial(std::move(partial), payload, actions);
         return AfterRun(*group->second);
       }
     }
   }
-  if (const Status kept = early.Keep(partial, payload); !kept.ok()) Trouble(partial.key, kept);
+  const GroupKey key = partial.key;
+  if (const Status kept = early.Keep(std::move(partial), payload); !kept.ok()) Trouble(key, kept);
 }
 
 void WorkerMachine::State::On(const RenderDone& done) {
@@ -378,11 +379,13 @@ WorkerMachine::WorkerMachine(WorkerConfig config) : state_(std::make_unique<Stat
 WorkerMachine::~WorkerMachine() = default;
 WorkerMachine::WorkerMachine(WorkerMachine&&) noexcept = default;
 
-WorkerActions WorkerMachine::Step(const WorkerEvent& event, Time now) {
+WorkerActions WorkerMachine::Step(WorkerEvent&& event, Time now, WorkerActions memory) {
   State& s = *state_;
+  memory.clear();
+  s.actions = std::move(memory);
   s.now = now;
   if (now > s.wake) s.last_heard += now - s.wake;
-  std::visit([&](const auto& e) { s.On(e); }, event);
+  std::visit([&](auto& e) { s.On(std::move(e)); }, event);
   s.slabs.ExpireRequests(now);
   s.ReportSlabFailures();
   if (!s.ended) s.KeepTime();

@@ -26,6 +26,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -124,7 +125,10 @@ using WorkerEvent =
 
 // ---- actions
 struct SendControl {
-  AnyMessage message;
+  std::variant<Register, Heartbeat, GroupDone, WorkerTrouble, Leave> message;
+  AnyMessage Take() && {
+    return std::visit([](auto& each) { return AnyMessage(std::move(each)); }, message);
+  }
 };
 struct SendChunkRequest {
   ChunkRequest request;
@@ -217,7 +221,8 @@ class WorkerMachine {
   ~WorkerMachine();
   WorkerMachine(WorkerMachine&&) noexcept;
 
-  WorkerActions Step(const WorkerEvent& event, Time now);
+  // Whoever gives back the last step's actions saves the allocation of the next ones. Their contents do not matter.
+  WorkerActions Step(WorkerEvent&& event, Time now, WorkerActions memory = {});
   Time NextWake() const;
 
   bool registered() const;

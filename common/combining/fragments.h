@@ -82,11 +82,14 @@ class Fragments {
 
   // Puts `fragment` in place of what lies in its pixels.
   void Replace(const Fragment<Value>& fragment) {
-    if (const Fragment<Value>* held = Find(fragment.pixels)) {
-      list_.erase(list_.begin() + (held - list_.data()));
-    } else {
-      Take(fragment.pixels);
+    const auto place = list_.begin() + (FirstAfter(fragment.pixels.begin) - list_.cbegin());
+    const auto differs = [&](const Fragment<Value>& neighbour) { return neighbour.value != fragment.value; };
+    const bool exact = place != list_.end() && place->pixels == fragment.pixels;
+    if (exact && (place == list_.begin() || differs(place[-1])) && (place + 1 == list_.end() || differs(place[1]))) {
+      place->value = fragment.value;  // the usual case: nothing moves
+      return;
     }
+    Take(fragment.pixels);
     Put(fragment);
   }
 

@@ -44,15 +44,16 @@ class ScheduleRunner {
 
   struct Taken {
     StepOrder::Kind kind = StepOrder::Kind::kSend;
-    std::uint32_t index = 0;
+    std::uint32_t index = 0, turn = 0;  // of the step
+    bool last = true;                   // as StepOrder says
     const Step* step = nullptr;
     Parts parts;  // kSend, kMove: what `from` held of the step's pixels, perhaps not all; now removed from it
   };
   std::optional<Taken> TakeNext() {
     const std::optional<StepOrder::Taken> next = order_.TakeNext();
     if (!next) return std::nullopt;
-    Taken taken = {next->kind, next->step, &order_.schedule().steps()[next->step], {}};
-    if (taken.kind != StepOrder::Kind::kReceive) taken.parts = held(taken.step->from).Take(taken.step->pixels);
+    Taken taken = {next->kind, next->step, next->turn, next->last, &order_.schedule().steps()[next->step], {}};
+    if (next->kind != StepOrder::Kind::kReceive) taken.parts = held(taken.step->from).Take(taken.step->pixels);
     return taken;
   }
 

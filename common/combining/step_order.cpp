@@ -17,7 +17,11 @@ StepOrder::StepOrder(SharedSchedule schedule, std::vector<Rank> ranks)
     ranks_[i].turn_end = std::uint32_t(turns_.size());
     ranks_[i].open_steps = ranks_[i].turn_end - ranks_[i].first_turn;
   }
-  for (Turn& turn : turns_) turn.partner = (Sends(turn) ? FindReceiving(turn.step) : FindSending(turn.step)).value_or(kElsewhere);
+  for (Turn& turn : turns_) {
+    turn.sends = StepOf(turn).from == numbers_[turn.rank];
+    turn.missing = PixelCount(StepOf(turn).pixels);
+    turn.partner = (turn.sends ? FindReceiving(turn.step) : FindSending(turn.step)).value_or(kElsewhere);
+  }
   possible_ = IndexSet(std::uint32_t(turns_.size()));
   changed_ = IndexSet(std::uint32_t(ranks_.size()));
   FindWaits();
@@ -87,17 +91,17 @@ void StepOrder::OnCombined(Rank rank) {
 }
 
 void StepOrder::OnArrived(std::uint32_t step, std::uint64_t pixels) {
-  CHECK(Awaited(step)) << "step " << step;
-  const std::uint32_t index = *FindReceiving(step);
-  turns_[index].arrived += pixels;
-  turns_[index].untaken = true;
-  Offer(index);
+  const std::optional<std::uint32_t> turn = Awaited(step);
+  CHECK(turn) << "step " << step;
+  turns_[*turn].missing -= std::min(turns_[*turn].missing, pixels);
+  turns_[*turn].untaken = true;
+  Offer(*turn);
 }
 
-bool StepOrder::Awaited(std::uint32_t step) const {
-  if (step >= schedule_->steps().size()) return false;
+std::optional<std::uint32_t> StepOrder::Awaited(std::uint32_t step) const {
+  if (step >= schedule_->steps().size()) return std::nullopt;
   const std::optional<std::uint32_t> turn = FindReceiving(step);
-  return turn && turns_[*turn].partner == kElsewhere && !turns_[*turn].taken;
+  return turn && turns_[*turn].partner == kElsewhere && !turns_[*turn].taken ? turn : std::nullopt;
 }
 
 // Offers the turn to TakeNext if it waits only for its ranks to be free.
@@ -107,7 +111,7 @@ void StepOrder::Offer(std::uint32_t index) {
   if (turn.partner != kElsewhere) {
     if (turns_[turn.partner].waits > 0) return;
     possible_.Insert(turn.partner);
-  } else if (!Sends(turn) && !turn.untaken) {
+  } else if (!turn.sends && !turn.untaken) {
     return;
   }
   possible_.Insert(index);
@@ -133,13 +137,14 @@ std::optional<StepOrder::Taken> StepOrder::TakeNext() {
       Turn& turn = turns_[index];
       const bool moves = turn.partner != kElsewhere;
       if (moves && !ranks_[turns_[turn.partner].rank].free()) continue;
-      const Taken taken = {moves ? Kind::kMove : Sends(turn) ? Kind::kSend : Kind::kReceive, turn.step};
-      if (taken.kind == Kind::kReceive && turn.arrived < PixelCount(StepOf(turn).pixels)) {
-        turn.untaken = false;
-        possible_.Erase(index);
-      } else {
+      Taken taken = {moves ? Kind::kMove : turn.sends ? Kind::kSend : Kind::kReceive, turn.step, index};
+      taken.last = taken.kind != Kind::kReceive || turn.missing == 0;
+      if (taken.last) {
         Close(index);
         if (moves) Close(turn.partner);
+      } else {
+        turn.untaken = false;
+        possible_.Erase(index);
       }
       return taken;
     }

@@ -27,16 +27,20 @@ class StepOrder {
   void OnRendered(Rank rank);
   void OnCombineStarted(Rank rank) { ++At(rank).combining; }
   void OnCombined(Rank rank);
+  // A turn is the part of a rank that is here in a step: [0, turn_count()).
+  std::uint32_t turn_count() const { return std::uint32_t(turns_.size()); }
+  // The receiver's turn if the step goes from a rank elsewhere to one here, and not all of its pixels have been taken.
+  std::optional<std::uint32_t> Awaited(std::uint32_t step) const;
   // `pixels` of the step have come from a rank that is not here. The step is Awaited and has not had these pixels yet.
   void OnArrived(std::uint32_t step, std::uint64_t pixels);
-  // True if the step goes from a rank elsewhere to one here, and not all of its pixels have been taken.
-  bool Awaited(std::uint32_t step) const;
 
   // kReceive: all pixels that have arrived and are not taken yet. It comes again if more arrive. kMove: between two ranks that are here.
   enum class Kind : std::uint8_t { kSend, kReceive, kMove };
   struct Taken {
     Kind kind = Kind::kSend;
     std::uint32_t step = 0;
+    std::uint32_t turn = 0;  // kMove: one of the two
+    bool last = true;        // false: more of the step's pixels are to arrive
   };
   // A step that may be taken now; it counts as taken. None: wait for the next event.
   std::optional<Taken> TakeNext();
@@ -49,13 +53,14 @@ class StepOrder {
  private:
   static constexpr std::uint32_t kElsewhere = ~std::uint32_t{0};
 
-  struct Turn {  // a rank's part in a step
+  struct Turn {
     std::uint32_t step = 0;
     std::uint32_t rank = 0;              // index into ranks_
     std::uint32_t partner = kElsewhere;  // the other rank's turn, if that rank is here too
     std::uint32_t waits = 0;             // number of earlier turns of the rank to wait for
-    std::uint64_t arrived = 0;           // pixels, of a step from elsewhere
-    bool untaken = false;                // some of them are not taken
+    std::uint64_t missing = 0;           // pixels of a step from elsewhere that have not arrived
+    bool sends = false;                  // or it receives
+    bool untaken = false;                // some pixels have arrived and are not taken
     bool taken = false;
   };
   struct RankState {
@@ -73,7 +78,6 @@ class StepOrder {
   RankState& At(Rank rank);
   const RankState& At(Rank rank) const;
   const Step& StepOf(const Turn& turn) const { return schedule_->steps()[turn.step]; }
-  bool Sends(const Turn& turn) const { return StepOf(turn).from == numbers_[turn.rank]; }
   void FindWaits();
   void Offer(std::uint32_t turn);
   void Close(std::uint32_t turn);

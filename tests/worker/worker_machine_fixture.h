@@ -58,7 +58,7 @@ class WorkerMachineTest : public testing::Test {
     return {epoch, incarnation, worker, "inproc://slabs", 500, 6000};
   }
 
-  Actions Tell(const WorkerEvent& event) { return machine->Step(event, now); }
+  Actions Tell(WorkerEvent event) { return machine->Step(std::move(event), now); }
   Actions Tell(const AnyMessage& message, Bytes payload = {}) { return Tell(WorkerEvent(MessageReceived{message, std::move(payload)})); }
   // Ticks at the end, and before that whenever the machine asks for it.
   Actions After(Duration time) {
