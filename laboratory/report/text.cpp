@@ -45,6 +45,13 @@ std::string FormatAbout(double value) {
   return FormatNumber(std::round(value / unit) * unit);
 }
 
+std::string FormatSpeed(double ratio) {
+  constexpr double kSame = 1.02;
+  if (ratio >= kSame) return fmt::format("{:.1f} times as fast", ratio);
+  if (ratio * kSame <= 1) return fmt::format("{:.1f} times as slow", 1 / ratio);
+  return "as fast";
+}
+
 std::string Slug(std::string_view text) {
   std::string slug;
   for (const char c : text) {

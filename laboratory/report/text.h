@@ -16,6 +16,9 @@ std::string FormatNumber(double value);
 // Two significant digits, for ratios of low precision: "16000", "1.5".
 std::string FormatAbout(double value);
 
+// How a time compares with another, from `before` / `after`: "2.1 times as fast", "1.3 times as slow", and within 2 % "as fast".
+std::string FormatSpeed(double ratio);
+
 // "a", "a-b-c" from any text: fit for a file name, an id or a link.
 std::string Slug(std::string_view text);
 

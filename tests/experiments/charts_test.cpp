@@ -183,6 +183,10 @@ TEST(Text, NumbersAndEscapes) {
   EXPECT_EQ(FormatAbout(16357), "16000");
   EXPECT_EQ(FormatAbout(0.01251), "0.013");
   EXPECT_EQ(FormatAbout(0), "0");
+  EXPECT_EQ(FormatSpeed(2.14), "2.1 times as fast");
+  EXPECT_EQ(FormatSpeed(0.8), "1.2 times as slow");
+  EXPECT_EQ(FormatSpeed(1.01), "as fast");
+  EXPECT_EQ(FormatSpeed(0.99), "as fast");
   EXPECT_EQ(Escape("a<b & \"c\" 'd'"), "a&lt;b &amp; &quot;c&quot; &#39;d&#39;");
   EXPECT_EQ(Slug("Figure 10a: N³, p"), "figure-10a-n-p");
   EXPECT_EQ(Slug("..."), "a");

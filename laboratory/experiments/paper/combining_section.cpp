@@ -7,6 +7,7 @@
 #include "laboratory/experiments/paper/printed.h"
 #include "laboratory/experiments/plots.h"
 #include "laboratory/report/charts.h"
+#include "laboratory/report/text.h"
 
 namespace slabstream {
 namespace {
@@ -27,7 +28,7 @@ Section CombiningSection(const PaperSetup& setup) {
                "without empty pixels: centralised (ms)", "without empty pixels: hierarchical (ms)", "paper: centralised (s)",
                "paper: hierarchical (s)", "paper: speed-up"},
               {}};
-  double last_ratio = 1, last_gain = 1;
+  std::array<double, 4> last{};  // seconds; whole images: centralised, hierarchical; the same without empty pixels
   int last_p = 1;
   for (const int p : setup.workers()) {
     if (p == 1) continue;
@@ -43,8 +44,7 @@ Section CombiningSection(const PaperSetup& setup) {
       }
       if (images == Images::kWhole) row.emplace_back(seconds[0] / seconds[1], Origin::kSimulated);
     }
-    last_ratio = seconds[0] / seconds[1];
-    last_gain = seconds[1] / std::min(seconds[2], seconds[3]);
+    last = seconds;
     last_p = p;
     if (const auto found = std::ranges::find(printed::kWorkers, p); found != printed::kWorkers.end()) {
       const auto i = std::size_t(found - printed::kWorkers.begin());
@@ -77,16 +77,18 @@ Section CombiningSection(const PaperSetup& setup) {
   section.question = "What does a tree of workers gain over one worker that combines all images, and how does combining grow with p?";
   section.method =
       "The schedules of Slabstream are run in virtual time with the measured cost of each slab. The machine joins processors like these by "
-      "a bus that bears the same "
-      "relation to a frame's time on one processor as the paper's did; it counts what the paper counts, until the combined image lies at "
+      "a bus whose time for an image, relative to a frame on one "
+      "processor, follows from the paper's centralised times; it counts what the paper counts, until the combined image lies at "
       "one worker. Whole images are "
-      "what the paper sends; Slabstream leaves empty pixels out, and a slab of a sphere fills a narrow band. Combining is what a frame "
+      "what the paper sends; Slabstream leaves empty pixels out. Combining is what a frame "
       "takes longer than its slowest slab.";
   section.answer = fmt::format(
-      "At p = {} the tree makes the frame {:.1f} times as fast as the centralised scheme (the paper at p = 30: 2.2), and leaving empty "
-      "pixels out makes it {:.1f} times as fast again; at "
+      "At p = {}, with whole images, the tree is {} as the centralised scheme (the paper at p = {}: {:.1f} times as fast). Without empty "
+      "pixels the tree is {} as with whole images, the centralised scheme {}. At "
       "N = {} combining grows {:.1f} times from p = 5 to p = {}, while the workers grow {:.0f} times.",
-      last_p, last_ratio, last_gain, setup.large_size(), at_half > 0 ? at_full / at_half : 0, last_p, last_p / 5.0);
+      last_p, FormatSpeed(last[0] / last[1]), printed::kWorkers.back(), printed::kCentralized.back() / printed::kHierarchical.back(),
+      FormatSpeed(last[1] / last[3]), FormatSpeed(last[0] / last[2]), setup.large_size(), at_half > 0 ? at_full / at_half : 0, last_p,
+      last_p / 5.0);
   section.blocks = {std::move(table),
                     Figure{"figure-9-combining", DrawLines(chart),
                            "A frame less its slowest slab. The paper prints its curves without numbers (they end below 3.5 s at N = 300); "

@@ -21,8 +21,7 @@ Report RunPaper(ExperimentContext& context) {
   report.title = "Data-parallel volume rendering, measured again";
   report.summary =
       "Yagel and Machiraju divided volumes into slabs, rendered each on a processor of its own and combined the images. Every table and "
-      "figure "
-      "of their paper, with the same N, p, k and C, on today's processors: measured where this machine can (kernels, each slab rendered "
+      "figure of their paper, with the same N and p, on today's processors: measured where this machine can (kernels, each slab rendered "
       "alone, one and "
       "two workers), simulated from the measured costs of the slabs elsewhere, and theirs beside it. Times of this machine and of theirs "
       "are "
