@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <set>
 #include <vector>
 
 #include "tests/renderers/render_support.h"
@@ -81,6 +82,7 @@ TEST(SurfaceCache, FindsNothingAnewForFortyBoxesInTurn) {
   std::vector<const FaceSite*> again;
   for (const Box& box : FortyBoxes()) again.push_back(cache.Of(*slab, setup, box).sites.data());
   EXPECT_EQ(sites, again);
+  EXPECT_EQ(std::set(sites.begin(), sites.end()).size(), sites.size()) << "memory of a dropped surface was used again";
 }
 
 TEST(SplatCache, FindsNothingAnewForFortyBoxesAlongThreeAxes) {
@@ -96,6 +98,7 @@ TEST(SplatCache, FindsNothingAnewForFortyBoxesAlongThreeAxes) {
     }
   }
   EXPECT_EQ(first, again);
+  EXPECT_EQ(std::set(first.begin(), first.end()).size(), first.size()) << "memory of dropped cells was used again";
 }
 
 // A surface joined from what is known of other boxes has the bits of a fresh one, along every axis and at every place in a brick.
