@@ -36,10 +36,8 @@ std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId w
   if (!running_ || running_->image != done.image) return std::nullopt;
   const Running job = *std::exchange(running_, std::nullopt);
   const SlabFetcher::Generation slab = job.job.slab;
-  if (done.status.ok()) {
-    slabs_.Rendered(slab);
-    slabs_.SetBytes(slab, done.slab_bytes);
-  }
+  if (done.status.ok()) slabs_.Rendered(slab);
+  slabs_.SetBytes(slab, done.slab_bytes);  // a cancelled frame derives data too
   if (job.dropped) {
     slabs_.Release(slab);
     actions.push_back(ReleaseImage{done.image});

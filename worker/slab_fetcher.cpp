@@ -8,6 +8,11 @@
 #include "common/volume/box_assembly.h"
 
 namespace slabstream {
+namespace {
+
+std::uint64_t RawBytes(const SlabKey& key) { return std::uint64_t(key.box.voxel_count()) * BytesPerSample(key.type); }
+
+}  // namespace
 
 SlabFetcher::Slab* SlabFetcher::Find(Generation slab) {
   const auto found = slabs_.find(slab);
@@ -33,7 +38,7 @@ SlabFetcher::Generation SlabFetcher::Acquire(DatasetId dataset, const Box& box, 
     const Generation generation = ++last_generation_;
     best = &slabs_[generation];
     best->key = {dataset, box, type, generation};
-    best->bytes = std::uint64_t(box.voxel_count()) * BytesPerSample(type);
+    best->bytes = RawBytes(best->key);
     cached_bytes_ += best->bytes;
     best->pins = 1;
     OpenSlab open = PlanSlab(*best);
@@ -94,9 +99,10 @@ SlabFetcher::FetchReport SlabFetcher::TakeReport(Generation slab) {
 }
 
 void SlabFetcher::SetBytes(Generation slab, std::uint64_t bytes) {
-  std::uint64_t& of_slab = slabs_.at(slab).bytes;
-  cached_bytes_ += std::max(of_slab, bytes) - of_slab;
-  of_slab = std::max(of_slab, bytes);
+  Slab& of_slab = slabs_.at(slab);
+  cached_bytes_ -= of_slab.bytes;
+  of_slab.bytes = std::max(RawBytes(of_slab.key), bytes);
+  cached_bytes_ += of_slab.bytes;
 }
 
 void SlabFetcher::RequestChunks(std::span<const Generation> slabs, Epoch epoch, WorkerId worker, Time now, WorkerActions& actions) {

@@ -43,7 +43,8 @@ class SlabFetcher {
   void Rendered(Generation slab);                                                 // the slab now holds all its voxels itself
   SlabKey key(Generation slab) const { return slabs_.at(slab).key; }
   FetchReport TakeReport(Generation slab);
-  void SetBytes(Generation slab, std::uint64_t bytes);  // including data derived from the voxels
+  // The slab's memory, with what was derived from its voxels; it may fall. Counts as at least the samples.
+  void SetBytes(Generation slab, std::uint64_t bytes);
 
   // Requests missing chunks of these slabs within the credit (one chunk is always allowed).
   void RequestChunks(std::span<const Generation> slabs, Epoch epoch, WorkerId worker, Time now, WorkerActions& actions);

@@ -149,6 +149,21 @@ TEST_F(WorkerSlabsTest, DropsTheOldestUnusedSlabAboveItsBudget) {
   EXPECT_THAT(All<DropSlab>(Tell(Assignment(1, {kSelf}, 2, 3))), ElementsAre(testing::Field(&DropSlab::slab, oldest)));
 }
 
+// What renderers derive from voxels grows and shrinks with the frames.
+TEST_F(WorkerSlabsTest, CountsTheBytesThatTheLastFrameOfASlabReported) {
+  constexpr std::uint64_t kVoxels = 128U * 128 * 72;
+  FrameId frame = 0;
+  const auto cached_after = [&](std::uint64_t slab_bytes, const Status& status) {
+    const StartRender render = All<StartRender>(Feed(Tell(Assignment(++frame, {kSelf})))).at(0);
+    Tell(RenderDone{render.key, render.rank, render.image, status, {}, slab_bytes});
+    return Sent<Heartbeat>(After(seconds(2))).back().cached_bytes;
+  };
+  EXPECT_EQ(cached_after(5 * kVoxels, {}), 5 * kVoxels);
+  EXPECT_EQ(cached_after(2 * kVoxels, {}), 2 * kVoxels);
+  EXPECT_EQ(cached_after(kVoxels / 2, {}), kVoxels) << "bricks of one value take less, but any of them may be written";
+  EXPECT_EQ(cached_after(3 * kVoxels, Status::Internal("render")), 3 * kVoxels) << "derived before the frame failed";
+}
+
 TEST_F(WorkerSlabsTest, AnotherCoordinatorMeansOtherVoxels) {
   const auto first = All<StartRender>(Feed(Tell(Assignment(1, {kSelf})))).at(0);
   Rendered(first);

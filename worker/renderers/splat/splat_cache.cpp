@@ -1,6 +1,6 @@
 #include "worker/renderers/splat/splat_cache.h"
 
-#include <algorithm>
+#include <utility>
 
 namespace slabstream {
 
@@ -16,20 +16,15 @@ const CellBeams& SplatCache::Beams(SlabData& slab, const FrameSetup& setup, Axis
 
 const OccupiedCells& SplatCache::Occupied(SlabData& slab, const FrameSetup& setup, const Box& box) {
   if (BinSelection bins = SelectBins(slab.Classification(setup), 0); bins != occupied_bins_) {
-    occupied_.clear();
+    for (auto& of_axis : occupied_) of_axis.Clear();
     along_x_.reset();
     along_y_.reset();
     occupied_bins_ = std::move(bins);
   }
   const Axis axis = setup.camera.traversal_axis;
-  const auto kept = std::ranges::find_if(occupied_, [&](const auto& entry) { return entry.first == box && entry.second.axes.c == axis; });
-  if (kept != occupied_.end()) {
-    std::rotate(occupied_.begin(), kept, kept + 1);
-  } else {
-    if (occupied_.size() >= kKeptViews) occupied_.pop_back();
-    occupied_.emplace_front(box, CellsOf(Beams(slab, setup, AxesOf(axis).u), axis, box));
-  }
-  return occupied_.front().second;
+  auto& of_axis = occupied_[std::size_t(axis)];
+  if (const OccupiedCells* kept = of_axis.Find(box)) return *kept;
+  return of_axis.Add(box, CellsOf(Beams(slab, setup, AxesOf(axis).u), axis, box), slab.bricks().box().voxel_count());
 }
 
 std::size_t SplatCache::bytes() const { return (along_x_ ? along_x_->bytes() : 0) + (along_y_ ? along_y_->bytes() : 0); }

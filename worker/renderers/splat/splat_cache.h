@@ -1,11 +1,11 @@
 // SplatCache: the occupied voxels of a slab, by beams. Splatting keeps them between frames until the transfer function shows other voxels.
 #pragma once
 
+#include <array>
 #include <cstddef>
-#include <deque>
 #include <optional>
-#include <utility>
 
+#include "worker/renderers/recent_boxes.h"
 #include "worker/renderers/slab_data.h"
 #include "worker/renderers/splat/occupied_cells.h"
 
@@ -21,10 +21,9 @@ class SplatCache : public SlabCache {
  private:
   const CellBeams& Beams(SlabData& slab, const FrameSetup& setup, Axis u);
 
-  static constexpr std::size_t kKeptViews = 8;
   BinSelection occupied_bins_;
   std::optional<CellBeams> along_x_, along_y_;
-  std::deque<std::pair<Box, OccupiedCells>> occupied_;  // by the box they were made for; most recently used first
+  std::array<RecentBoxes<OccupiedCells>, 3> occupied_;  // by traversal axis; they refer to the beams
 };
 
 }  // namespace slabstream

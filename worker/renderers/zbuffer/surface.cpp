@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <bit>
 #include <memory>
+#include <tuple>
+#include <utility>
 
 #include "common/base/check.h"
 #include "worker/kernels/draw_faces.h"
@@ -132,21 +134,48 @@ class BrickSurface {
   std::array<std::uint32_t, std::size_t{kSides} * kFaceBrick * kFaceBrick> open_{};
 };
 
-Surface Join(std::vector<BrickFaces> parts) {
+// The order of bricks in a surface.
+bool InOrder(const Index3& a, const Index3& b) { return std::tie(a.z, a.y, a.x) < std::tie(b.z, b.y, b.x); }
+
+// One brick's faces where they lie: in BrickFaces or in a known surface.
+struct FoundFaces {
+  SurfaceBrick brick;  // numbers faces of the arrays
+  const FaceSite* sites = nullptr;
+  const FaceNormals* normals = nullptr;
+};
+
+// The faces of `part` of the brick at `origin`. False: no known box holds just this part of it.
+bool FindKnown(std::span<const KnownSurface> known, const Index3& origin, const Box& part, FoundFaces& faces) {
+  const Box whole = {origin, origin + Uniform(kFaceBrick)};
+  const auto same = std::ranges::find_if(known, [&](const KnownSurface& other) { return Intersection(other.box, whole) == part; });
+  if (same == known.end()) return false;
+  const std::vector<SurfaceBrick>& bricks = same->surface->bricks;
+  const auto brick = std::ranges::lower_bound(bricks, origin, InOrder, &SurfaceBrick::origin);
+  if (brick != bricks.end() && brick->origin == origin) {
+    faces = {*brick, same->surface->sites.data(), same->surface->normals.data()};
+  }
+  return true;
+}
+
+Surface Join(std::span<const FoundFaces> parts) {
   Surface surface;
+  std::vector<std::uint32_t> begins(parts.size());
   std::size_t faces = 0;
-  for (BrickFaces& part : parts) {
-    for (std::uint32_t& begin : part.brick.side_begin) begin += std::uint32_t(faces);
-    faces += part.sites.size();
-    if (!part.sites.empty()) surface.bricks.push_back(part.brick);
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    begins[i] = std::uint32_t(faces);
+    if (parts[i].brick.face_count() == 0) continue;
+    SurfaceBrick& brick = surface.bricks.emplace_back(parts[i].brick);
+    for (std::uint32_t& begin : brick.side_begin) begin += begins[i] - parts[i].brick.side_begin[0];
+    faces += brick.face_count();
   }
   CHECK_LT(faces, std::size_t{1} << 29) << "faces of one box: kernels address their normals by 32 bits";
   surface.sites.resize(faces + kSitesReadAhead);
   surface.normals.resize(faces);
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) {
-    const BrickFaces& part = parts[i];
-    std::ranges::copy(part.sites, surface.sites.begin() + std::ptrdiff_t(part.brick.side_begin[0]));
-    std::ranges::copy(part.normals, surface.normals.begin() + std::ptrdiff_t(part.brick.side_begin[0]));
+    const auto& [brick, sites, normals] = parts[i];
+    if (brick.face_count() == 0) return;
+    std::copy_n(sites + brick.side_begin[0], brick.face_count(), surface.sites.data() + begins[i]);
+    std::copy_n(normals + brick.side_begin[0], brick.face_count(), surface.normals.data() + begins[i]);
   });
   return surface;
 }
@@ -158,24 +187,29 @@ std::size_t Surface::bytes() const {
 }
 
 Surface FindSurface(const VoxelBlock& voxels, const BrickRanges& ranges, const ClassificationTable& table, const BinSelection& opaque,
-                    const Vec3& spacing, const Box& box) {
+                    const Vec3& spacing, const Box& box, std::span<const KnownSurface> known) {
   const Box inside = Intersection(box, voxels.box);
   if (inside.empty()) return {};
   const BrickGrid bricks(inside);
-  std::vector<BrickFaces> parts(bricks.size());
+  std::vector<BrickFaces> made(bricks.size());
+  std::vector<FoundFaces> parts(bricks.size());
   VisitScalarType(voxels.type, [&]<class T>(const T*) {
     const BinLookup<T> lookup(table, opaque);
     ForEachRowOfBricks(bricks, [&](Index3 brick) {
-      const auto surface = std::make_unique<BrickSurface<T>>(voxels, lookup, spacing);
+      std::unique_ptr<BrickSurface<T>> surface;  // large: only where something is found anew
       for (; brick.x < bricks.first.x + bricks.counts.x; ++brick.x) {
         const BrickRanges::Range& range = ranges.Of(brick);
         if (!lookup.AnyBetween(range.min, range.max)) continue;
         const Index3 origin = {brick.x * kFaceBrick, brick.y * kFaceBrick, brick.z * kFaceBrick};
-        parts[bricks.Number(brick)] = surface->Find(origin, bricks.BoxOf(brick));
+        const std::size_t number = bricks.Number(brick);
+        if (FindKnown(known, origin, bricks.BoxOf(brick), parts[number])) continue;
+        if (surface == nullptr) surface = std::make_unique<BrickSurface<T>>(voxels, lookup, spacing);
+        made[number] = surface->Find(origin, bricks.BoxOf(brick));
+        parts[number] = {made[number].brick, made[number].sites.data(), made[number].normals.data()};
       }
     });
   });
-  return Join(std::move(parts));
+  return Join(parts);
 }
 
 }  // namespace slabstream

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "common/base/aligned_buffer.h"
@@ -31,9 +32,16 @@ struct Surface {
   std::size_t bytes() const;
 };
 
-// Looks up neighbours in all of `voxels`, including the halo (of at least 2 voxels); outside the volume nothing is opaque. Runs on the
+// A surface at hand of a box of the same volume, made with the same table and selection.
+struct KnownSurface {
+  Box box;
+  const Surface* surface = nullptr;
+};
+
+// Looks up neighbours in all of `voxels`, including the halo (of at least 2 voxels); outside the volume nothing is opaque. A brick's faces
+// depend only on the part of it that the box holds: where a box of `known` holds the same part, they are copied from there. Runs on the
 // threads of the calling task arena.
 Surface FindSurface(const VoxelBlock& voxels, const BrickRanges& ranges, const ClassificationTable& table, const BinSelection& opaque,
-                    const Vec3& spacing, const Box& box);
+                    const Vec3& spacing, const Box& box, std::span<const KnownSurface> known = {});
 
 }  // namespace slabstream

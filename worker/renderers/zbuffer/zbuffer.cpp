@@ -13,52 +13,18 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <deque>
 #include <numeric>
 
-#include "common/renderers/zbuffer/least_opaque.h"
 #include "worker/kernels/draw_faces.h"
 #include "worker/kernels/shade_faces.h"
 #include "worker/renderers/renderer.h"
 #include "worker/renderers/stage_clock.h"
 #include "worker/renderers/zbuffer/brick_projection.h"
 #include "worker/renderers/zbuffer/surface.h"
+#include "worker/renderers/zbuffer/surface_cache.h"
 
 namespace slabstream::zbuffer {
 namespace {
-
-// The surfaces of a slab, kept until the transfer function makes other voxels opaque.
-class SurfaceCache : public SlabCache {
- public:
-  // Faces of the opaque voxels of `box`. Valid until the next call.
-  const Surface& Of(SlabData& slab, const FrameSetup& setup, const Box& box) {
-    const ClassificationTable& table = slab.Classification(setup);
-    if (BinSelection bins = SelectBins(table, LeastOpaque(table, setup.description, setup.range)); bins != opaque_bins_) {
-      surfaces_.clear();
-      opaque_bins_ = std::move(bins);
-    }
-    const auto kept = std::ranges::find(surfaces_, box, &std::pair<Box, Surface>::first);
-    if (kept != surfaces_.end()) {
-      std::rotate(surfaces_.begin(), kept, kept + 1);
-    } else {
-      if (surfaces_.size() >= kKeptBoxes) surfaces_.pop_back();
-      const BrickRanges& ranges = slab.ranges();  // first: bricks are read faster than the block
-      surfaces_.emplace_front(box, FindSurface(slab.voxels(), ranges, table, opaque_bins_, setup.description.geometry.spacing, box));
-    }
-    return surfaces_.front().second;
-  }
-
-  std::size_t bytes() const override {
-    std::size_t total = 0;
-    for (const auto& [box, surface] : surfaces_) total += surface.bytes();
-    return total;
-  }
-
- private:
-  static constexpr std::size_t kKeptBoxes = 16;  // several boxes may share a slab
-  BinSelection opaque_bins_;
-  std::deque<std::pair<Box, Surface>> surfaces_;  // most recently used first
-};
 
 // The bricks that may be visible, nearest first, and the pixels that they may touch.
 struct Scene {
