@@ -41,12 +41,19 @@ Json ViewJson(const ViewParameters& view) {
           {"fov", fov}};
 }
 
+// The shortest decimal that means this float: 0.2, not 0.20000000298023224.
+double Decimal(float value) { return std::stod(fmt::format("{}", value)); }
+
 Json ShadingJson(const Shading& shading) {
   const auto& [phong, lights, ambient, diffuse, specular, shininess] = shading;
   Json directions = Json::array();
   for (const Vec3& light : lights) directions.push_back(Json::array({light.x, light.y, light.z}));
-  return {{"phong", phong},     {"lights", directions}, {"ambient", ambient},
-          {"diffuse", diffuse}, {"specular", specular}, {"shininess", shininess}};
+  return {{"phong", phong},
+          {"lights", directions},
+          {"ambient", Decimal(ambient)},
+          {"diffuse", Decimal(diffuse)},
+          {"specular", Decimal(specular)},
+          {"shininess", Decimal(shininess)}};
 }
 
 Json PolicyJson(const Policy& policy) {

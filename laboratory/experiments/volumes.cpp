@@ -101,6 +101,10 @@ std::vector<BenchCase> RealVolumes(const std::vector<std::string>& named) {
     Result<BenchCase> parsed = ParseBenchCase(text, false);
     if (!parsed.ok()) throw Failure(Status(parsed.status().code(), "--volume: " + parsed.status().message()));
     volumes.push_back(*std::move(parsed));
+    BenchCase& volume = volumes.back();
+    const std::string stem = volume.dataset;
+    const auto is_taken = [&](const BenchCase& other) { return &other != &volume && other.dataset == volume.dataset; };
+    for (int number = 2; std::ranges::any_of(volumes, is_taken); ++number) volume.dataset = fmt::format("{}-{}", stem, number);
   }
   const BenchCase brain = BrainCase();
   std::error_code error;

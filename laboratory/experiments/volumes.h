@@ -50,6 +50,7 @@ class VolumeCache {
 std::string TitleOf(const BenchCase& volume);
 
 // The volumes that the user named, or the installed real volumes, such as the brain, beside the spheres. Errors of ParseBenchCase.
+// Their datasets differ, because tables and figures are called after them: of two files v.nrrd the second is "v-2".
 std::vector<BenchCase> RealVolumes(const std::vector<std::string>& named);
 
 }  // namespace slabstream

@@ -243,6 +243,18 @@ TEST_F(Keys, TwoFilesOfOneNameAreTwoVolumes) {
   EXPECT_EQ(FinishKey(context_, one), FinishKey(context_, one));
 }
 
+TEST_F(Keys, TwoFilesOfOneNameHaveTheirOwnFigures) {
+  std::vector<std::string> paths;
+  for (const char* directory : {"a", "b", "c"}) {
+    std::filesystem::create_directory(folder_ / directory);
+    paths.push_back((folder_ / directory) + "/v.nrrd");
+    ASSERT_TRUE(WriteVolume(MakeSphere({SphereClass::kFilled, 8, 0.3}).value(), paths.back()).ok());
+  }
+  std::vector<std::string> names;
+  for (const BenchCase& volume : RealVolumes(paths)) names.push_back(volume.dataset);
+  EXPECT_EQ(names, (std::vector<std::string>{"v", "v-2", "v-3"}));
+}
+
 TEST_F(Keys, AFileThatIsWrittenAnewIsAnotherVolume) {
   const std::string path = folder_ / "v.nrrd";
   const auto write = [&](double occupancy) {
