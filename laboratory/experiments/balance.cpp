@@ -11,6 +11,7 @@
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/figures.h"
 #include "laboratory/experiments/machines.h"
+#include "laboratory/experiments/moving_view.h"
 #include "laboratory/experiments/plots.h"
 #include "laboratory/experiments/policies.h"
 #include "laboratory/measure/box_costs.h"
@@ -23,8 +24,6 @@ namespace {
 constexpr int kRepeats = 3, kQuickRepeats = 1;
 constexpr int kTableWorkers = 16;  // p of the tables that compare partitions
 constexpr int kBoxesAWorker = 4;   // to compare assignments: with one box each they have no choice
-constexpr int kMovingFrames = 24;  // in a turn
-constexpr int kRenderings = 3;
 constexpr std::string_view kLink = "10gbit";
 
 struct Balance {
@@ -53,8 +52,6 @@ Policy WithBoxes(Policy policy, std::string_view assignment) {
   return policy;
 }
 
-// A turning view, frame after frame: the boxes are rendered alone and their times are learnt. Before the next frame the coordinator's own
-// table of layouts may change the layout.
 std::vector<NamedPolicy> MovingPolicies() {
   std::vector<NamedPolicy> policies;
   for (const NamedPolicy& named : {EqualSlabs(), BalancedTree()}) {
@@ -66,37 +63,10 @@ std::vector<NamedPolicy> MovingPolicies() {
   return policies;
 }
 
-Json MovingKey(const BenchCase& volume, const NamedPolicy& moving, int pixels, int frames) {
-  return {{"what", "moving view"},    {"volume", volume.name}, {"policy", moving.name},
-          {"workers", kTableWorkers}, {"size", pixels},        {"frames", frames}};
-}
-
-Json MeasureMoving(ExperimentContext& context, const Balance& balance, const BenchCase& volume, const NamedPolicy& moving, int frames) {
-  FrameCase frame = balance.Frame(volume, moving.policy, kTableWorkers);
-  const LayoutKnowledge knowledge = KnowLayout(context, frame);
-  MeasuredLayouts layouts = LayoutsOf(knowledge, frame.workers);
-  const auto voxel_bytes = double(BytesPerSample(knowledge.volume.summary->description.type));
-  std::shared_ptr<const Layout> layout;
-  Json numbers = {{"imbalance", Json::array()}, {"slowest_ms", Json::array()}, {"moved_bytes", Json::array()}};
-  for (int i = 0; i < frames; ++i) {
-    frame.view = BenchView(Projection::kOrthographic, i, kMovingFrames);
-    const std::shared_ptr<const Layout> next = layouts.Next(RequestOf(frame));
-    const double moved = i == 0 ? 0 : double(MovedVoxels(*layout, *next)) * voxel_bytes;
-    layout = next;
-    const FramePlan plan = PlanOf(context, frame, layout);
-    const std::vector<Placement> placements = PlacementsOf(plan);
-    std::vector<double> seconds(std::size_t(frame.workers));
-    std::vector<std::int64_t> nanoseconds;
-    for (const BoxCost& cost : MeasureBoxCosts(*knowledge.volume.volume, plan, kRenderings)) {
-      seconds[placements[nanoseconds.size()].worker - 1] += cost.seconds;
-      nanoseconds.push_back(std::int64_t(cost.seconds * 1e9));
-    }
-    layouts.Learn(plan, nanoseconds);
-    numbers["imbalance"].push_back(Imbalance(seconds));
-    numbers["slowest_ms"].push_back(*std::ranges::max_element(seconds) * 1e3);
-    numbers["moved_bytes"].push_back(moved);
-  }
-  return numbers;
+FrameCase MovingFrame(const Balance& balance, const BenchCase& volume, const NamedPolicy& moving) {
+  FrameCase first = balance.Frame(volume, moving.policy, kTableWorkers);
+  first.view = BenchView(Projection::kOrthographic, 0, kMovingFrames);
+  return first;
 }
 
 int MovingFrames(const ExperimentContext& context) { return context.quick() ? 6 : kMovingFrames; }
@@ -108,13 +78,12 @@ std::vector<Trial> TrialsOf(ExperimentContext& context, const Balance& balance) 
       trials.push_back(FinishTrial(context, balance.Frame(volume, named.policy, 1)));
       for (const int p : balance.workers) trials.push_back(BoxCostTrial(context, balance.Frame(volume, named.policy, p)));
       trials.push_back(BoxCostTrial(context, balance.Frame(volume, named.policy, kTableWorkers)));
-      trials.push_back(BoxCostTrial(context, balance.Frame(volume, WithBoxes(named.policy, "cyclic"), kTableWorkers)));
+      for (const AssignmentEntry& assignment : Assignments()) {
+        trials.push_back(BoxCostTrial(context, balance.Frame(volume, WithBoxes(named.policy, assignment.name), kTableWorkers)));
+      }
     }
     for (const NamedPolicy& moving : MovingPolicies()) {
-      const int frames = MovingFrames(context);
-      trials.push_back({MovingKey(volume, moving, balance.pixels, frames),
-                        [&context, balance, volume, moving, frames] { return MeasureMoving(context, balance, volume, moving, frames); },
-                        frames * 20.0});
+      trials.push_back(MovingTrial(context, MovingFrame(balance, volume, moving), MovingFrames(context)));
     }
   }
   return trials;
@@ -256,7 +225,8 @@ Section MovingSection(ExperimentContext& context, const Balance& balance) {
   for (const BenchCase& volume : balance.volumes) {
     LineChart chart{TitleOf(volume) + ": imbalance, frame by frame", {"frame", ""}, {"most / mean", ""}, {}};
     for (const NamedPolicy& moving : MovingPolicies()) {
-      const std::vector<const Json*> repeats = context.log().All(MovingKey(volume, moving, balance.pixels, MovingFrames(context)));
+      const Json key = MovingKey(context, MovingFrame(balance, volume, moving), MovingFrames(context));
+      const std::vector<const Json*> repeats = context.log().All(key);
       const std::vector<Estimate> imbalance = EstimatesOf(repeats, "imbalance"), slowest = EstimatesOf(repeats, "slowest_ms");
       const std::vector<double> moved = MediansOf(repeats, "moved_bytes");
       LineSeries series{moving.name, Origin::kMeasured, {}};

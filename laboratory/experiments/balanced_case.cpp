@@ -1,16 +1,13 @@
 #include "laboratory/experiments/balanced_case.h"
 
 #include "common/planning/policy_names.h"
+#include "laboratory/experiments/frame_keys.h"
 
 namespace slabstream {
 namespace {
 
-Json BalancedKey(const FrameCase& frame) {
-  Json key = BoxCostKey(frame);
-  key["what"] = "balanced box costs";
-  key["assignment"] = frame.policy.assignment;
-  key["frames"] = kBalancedFrames;
-  return key;
+KeyedFrame ForBalanced(ExperimentContext& context, const FrameCase& frame) {
+  return WithoutCombining(context, "balanced box costs", frame, {{"frames", kBalancedFrames}});
 }
 
 Json MeasureBalanced(ExperimentContext& context, const FrameCase& frame) {
@@ -31,17 +28,21 @@ Json MeasureBalanced(ExperimentContext& context, const FrameCase& frame) {
 
 }  // namespace
 
+Json BalancedKey(ExperimentContext& context, const FrameCase& frame) { return ForBalanced(context, frame).key; }
+
 bool IsDynamic(const FrameCase& frame) { return frame.policy.balance == kDynamicBalance; }
 
 Trial CostTrial(ExperimentContext& context, const FrameCase& frame) {
   Trial boxes = BoxCostTrial(context, frame);
   if (!IsDynamic(frame)) return boxes;
-  return {BalancedKey(frame), [&context, frame] { return MeasureBalanced(context, frame); }, (kBalancedFrames + 1) * boxes.effort};
+  const KeyedFrame keyed = ForBalanced(context, frame);
+  const auto run = [&context, frame = keyed.frame] { return MeasureBalanced(context, frame); };
+  return keyed.MakeTrial(context, run, (kBalancedFrames + 1) * boxes.effort);
 }
 
 std::vector<MeasuredFrame> RecallBalanced(ExperimentContext& context, const FrameCase& frame) {
   std::vector<MeasuredFrame> frames;
-  for (const Json* repeat : context.log().All(BalancedKey(frame))) {
+  for (const Json* repeat : context.log().All(BalancedKey(context, frame))) {
     MeasuredLayouts layouts = LayoutsOf(KnowLayout(context, frame), frame.workers);
     for (const Json& learnt : repeat->at("learnt")) {
       layouts.Learn(PlanOf(context, frame, layouts.Next(RequestOf(frame))), learnt.get<std::vector<std::int64_t>>());

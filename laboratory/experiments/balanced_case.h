@@ -12,6 +12,8 @@ bool IsDynamic(const FrameCase& frame);
 
 // The trial that measures the frame's boxes: BoxCostTrial, or this one of a frame with dynamic balance.
 Trial CostTrial(ExperimentContext& context, const FrameCase& frame);
+// The key of the latter.
+Json BalancedKey(ExperimentContext& context, const FrameCase& frame);
 
 // One for each repeat, because layouts differ. The frame has dynamic balance; the trial, and FinishTrial, must have been run.
 std::vector<MeasuredFrame> RecallBalanced(ExperimentContext& context, const FrameCase& frame);

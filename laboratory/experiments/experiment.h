@@ -34,14 +34,14 @@ inline constexpr double kMinScale = 0.05;
 // The environment of an experiment.
 class ExperimentContext {
  public:
-  ExperimentContext(ExperimentOptions options, TrialLog log, std::function<bool()> interrupted);
+  ExperimentContext(ExperimentOptions options, TrialLog log, std::function<bool()> interrupted, VolumeCache volumes = VolumeCache());
 
   const ExperimentOptions& options() const { return options_; }
   bool quick() const { return options_.quick; }
   int Scaled(int side) const;  // a sphere's side or a picture's, at least kLeastScaledSide
   VolumeCache& volumes() { return volumes_; }
 
-  // Runs the trials that the log does not hold yet, one for each key. `repeats`, or `quick_repeats` of a quick run, applies if the user
+  // Runs the trials that the log does not hold yet, each once (Distinct). `repeats`, or `quick_repeats` of a quick run, applies if the user
   // gave no number.
   void Run(std::vector<Trial> trials, int repeats, int quick_repeats);
   const TrialLog& log() const { return log_; }

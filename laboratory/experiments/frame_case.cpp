@@ -17,6 +17,7 @@
 #include "common/renderers/registry.h"
 #include "coordinator/tuning/choose_policy.h"
 #include "coordinator/tuning/service_machine.h"
+#include "laboratory/experiments/frame_keys.h"
 #include "laboratory/measure/box_costs.h"
 #include "laboratory/measure/frame_costs.h"
 #include "laboratory/measure/validate.h"
@@ -28,29 +29,6 @@ constexpr int kRenderings = 2;  // rounds of box costs; of two, the lower one co
 constexpr int kWarmUpFrames = 2, kFinishes = 3;
 constexpr int kLearningFrames = 8;  // to warm up with dynamic balance
 constexpr DatasetId kPlannedDataset = 1;
-
-// Identifies what a picture shows, whoever renders it: the beginning of every key. `what` names the trial.
-Json PictureKey(std::string_view what, const FrameCase& frame) {
-  const ViewParameters& view = frame.view;
-  return {{"what", what},
-          {"volume", frame.volume.dataset},
-          {"look", frame.volume.name},
-          {"renderer", frame.volume.renderer->title()},
-          {"size", {frame.size.width, frame.size.height}},
-          {"view",
-           {view.projection == Projection::kPerspective ? "perspective" : "orthographic", view.azimuth_degrees, view.elevation_degrees,
-            view.zoom}}};
-}
-
-// The parameters that decide where the boxes are.
-void AddPartition(Json& key, const FrameCase& frame) {
-  const Policy& policy = frame.policy;
-  key["decomposition"] = policy.decomposition;
-  key["split"] = LoadMetricOf(policy);
-  key["axis"] = int(policy.axis);
-  key["groups"] = policy.groups;
-  key["workers"] = frame.workers;
-}
 
 // Counts of non-empty pixels, tile by tile, in the smallest rectangle of tiles that holds all: [x, y, width, height, count, ...].
 Json CoverageJson(const CoverageMap& coverage) {
@@ -125,11 +103,8 @@ Json MeasureBoxes(ExperimentContext& context, const FrameCase& frame, const Fram
 namespace {
 
 Json MeasureFinish(ExperimentContext& context, const FrameCase& frame) {
-  FrameCase whole = frame;
-  whole.workers = 1;
-  whole.policy = {.groups = 1};
   const VolumeInUse volume = context.volumes().Get(frame.volume);
-  const FramePlan plan = PlanOf(context, whole);
+  const FramePlan plan = PlanOf(context, frame);
   const PictureCost cost = MeasurePictureCost(*volume.volume, plan.setup, kFinishes);
   return Json{{"finish_seconds", cost.finish_seconds}, {"receive_seconds", cost.receive_seconds}};
 }
@@ -224,51 +199,50 @@ FrameCase WithChosenPolicy(ExperimentContext& context, FrameCase frame, const Li
   return frame;
 }
 
-Json BoxCostKey(const FrameCase& frame) {
-  Json key = PictureKey("box costs", frame);
-  AddPartition(key, frame);
-  return key;
+namespace {
+
+KeyedFrame ForService(ExperimentContext& context, const FrameCase& frame, int frames) {
+  return WholeCase(context, "service", frame, {{"frames", frames}});
 }
-Json FinishKey(const FrameCase& frame) { return PictureKey("picture", frame); }
-Json ServiceKey(const FrameCase& frame) {
-  Json key = PictureKey("service", frame);
-  AddPartition(key, frame);
-  key["assignment"] = frame.policy.assignment;
-  key["combine"] = frame.policy.combine;
-  key["balance"] = frame.policy.balance;
-  key["pixel_error"] = frame.policy.pixel_error;
-  return key;
+KeyedFrame ForValidation(ExperimentContext& context, const FrameCase& frame, int turns) {
+  return WholeCase(context, "validation", frame, {{"turns", turns}});
 }
 
-Trial BoxCostTrial(ExperimentContext& context, const FrameCase& frame) {
-  return {BoxCostKey(frame), [&context, frame] { return MeasureBoxes(context, frame, PlanOf(context, frame)); },
-          (1 + kRenderings) * ExpectedEffort(frame)};
+Json MeasureValidation(ExperimentContext& context, const FrameCase& frame, int turns) {
+  const VolumeInUse volume = context.volumes().Get(frame.volume);
+  const ValidationCase what{frame.volume.name, volume.volume, RequestOf(frame), frame.workers};
+  const ValidationRow row = OrThrow(ValidateSimulation(what, {.views = 1, .turns = turns}));
+  const ValidatedView& view = row.views.front();
+  return Json{{"measured_ms", view.measured.latency * 1e3}, {"simulated_ms", view.simulated.latency * 1e3}};
 }
-Trial FinishTrial(ExperimentContext& context, const FrameCase& frame) {
-  FrameCase whole = frame;
-  whole.workers = 1;
-  return {FinishKey(frame), [&context, frame] { return MeasureFinish(context, frame); }, ExpectedEffort(whole)};
+
+}  // namespace
+
+Json BoxCostKey(ExperimentContext& context, const FrameCase& frame) { return ForBoxCosts(context, frame).key; }
+Trial BoxCostTrial(ExperimentContext& context, const FrameCase& asked) {
+  const KeyedFrame keyed = ForBoxCosts(context, asked);
+  const auto run = [&context, frame = keyed.frame] { return MeasureBoxes(context, frame, PlanOf(context, frame)); };
+  return keyed.MakeTrial(context, run, (1 + kRenderings) * ExpectedEffort(keyed.frame));
 }
+
+Json FinishKey(ExperimentContext& context, const FrameCase& frame) { return ForFinish(context, frame).key; }
+Trial FinishTrial(ExperimentContext& context, const FrameCase& asked) {
+  const KeyedFrame keyed = ForFinish(context, asked);
+  return keyed.MakeTrial(
+      context, [&context, frame = keyed.frame] { return MeasureFinish(context, frame); }, ExpectedEffort(keyed.frame));
+}
+
+Json ServiceKey(ExperimentContext& context, const FrameCase& frame, int frames) { return ForService(context, frame, frames).key; }
 Trial ServiceTrial(ExperimentContext& context, const FrameCase& frame, int frames) {
-  return {ServiceKey(frame), [&context, frame, frames] { return MeasureService(context, frame, frames); },
-          (2 + WarmUpFrames(frame.policy) + frames) * ExpectedEffort(frame)};
+  const auto run = [&context, frame, frames] { return MeasureService(context, frame, frames); };
+  return ForService(context, frame, frames).MakeTrial(context, run, (2 + WarmUpFrames(frame.policy) + frames) * ExpectedEffort(frame));
 }
 
-Json ValidationKey(const FrameCase& frame) {
-  Json key = PictureKey("validation", frame);
-  AddPartition(key, frame);
-  return key;
-}
-
+Json ValidationKey(ExperimentContext& context, const FrameCase& frame, int turns) { return ForValidation(context, frame, turns).key; }
 Trial ValidationTrial(ExperimentContext& context, const FrameCase& frame, int turns) {
-  const auto validate = [&context, frame, turns]() -> Json {
-    const VolumeInUse volume = context.volumes().Get(frame.volume);
-    const ValidationCase what{frame.volume.name, volume.volume, RequestOf(frame), frame.workers};
-    const ValidationRow row = OrThrow(ValidateSimulation(what, {.views = 1, .turns = turns}));
-    const ValidatedView& view = row.views.front();
-    return Json{{"measured_ms", view.measured.latency * 1e3}, {"simulated_ms", view.simulated.latency * 1e3}};
-  };
-  return {ValidationKey(frame), validate, 4 * turns * ExpectedEffort(frame)};  // the service's frames and the boxes, twice each
+  const auto run = [&context, frame, turns] { return MeasureValidation(context, frame, turns); };
+  // The service's frames and the boxes, twice each.
+  return ForValidation(context, frame, turns).MakeTrial(context, run, 4 * turns * ExpectedEffort(frame));
 }
 
 FrameInput MeasuredFrame::Input() const {
@@ -298,22 +272,22 @@ double MeasuredFrame::StageSeconds(Stage stage) const {
 }
 
 MeasuredFrame Recall(ExperimentContext& context, const FrameCase& frame) {
-  return WithBoxCosts(context, frame, PlanOf(context, frame), context.log().All(BoxCostKey(frame)));
+  return WithBoxCosts(context, frame, PlanOf(context, frame), context.log().All(BoxCostKey(context, frame)));
 }
 
 std::vector<MeasuredFrame> RecallRepeats(ExperimentContext& context, const FrameCase& frame) {
   const FramePlan plan = PlanOf(context, frame);
   std::vector<MeasuredFrame> frames;
-  for (const Json* repeat : context.log().All(BoxCostKey(frame))) frames.push_back(WithBoxCosts(context, frame, plan, {repeat}));
+  for (const Json* repeat : context.log().All(BoxCostKey(context, frame))) frames.push_back(WithBoxCosts(context, frame, plan, {repeat}));
   return frames;
 }
 
 MeasuredFrame WithBoxCosts(ExperimentContext& context, const FrameCase& frame, FramePlan plan, const std::vector<const Json*>& repeats) {
-  CHECK(!repeats.empty()) << BoxCostKey(frame).dump();
+  CHECK(!repeats.empty()) << BoxCostKey(context, frame).dump();
   MeasuredFrame measured{std::move(plan),
                          {},
-                         EstimateOf(context.log(), FinishKey(frame), "finish_seconds").median,
-                         EstimateOf(context.log(), FinishKey(frame), "receive_seconds").median};
+                         EstimateOf(context.log(), FinishKey(context, frame), "finish_seconds").median,
+                         EstimateOf(context.log(), FinishKey(context, frame), "receive_seconds").median};
   measured.boxes.resize(measured.plan.layout->partition.boxes().size());
 
   const std::vector<double> ids = MediansOf(repeats, "ids"), seconds = MediansOf(repeats, "seconds"),

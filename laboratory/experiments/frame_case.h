@@ -33,25 +33,27 @@ const RendererKind* ZBuffer();
 
 FrameRequest RequestOf(const FrameCase& frame);
 
-// Box costs depend on the partition and the view, not on the assignment or the combining scheme: cases that differ only in these share one
-// trial (and key).
+// The keys of trials hold all that decides their numbers (frame_keys.h).
+
+// Box costs depend on the partition and the view, not on how images are combined. Boxes of equal volume do not depend on the assignment
+// either. Cases that differ only in such fields share one trial.
 Trial BoxCostTrial(ExperimentContext& context, const FrameCase& frame);
-Json BoxCostKey(const FrameCase& frame);
+Json BoxCostKey(ExperimentContext& context, const FrameCase& frame);
 
 // Times on one thread: "finish_seconds" to make the picture from the accumulated frame and encode it, "receive_seconds" for the client to
 // decode it.
 Trial FinishTrial(ExperimentContext& context, const FrameCase& frame);
-Json FinishKey(const FrameCase& frame);
+Json FinishKey(ExperimentContext& context, const FrameCase& frame);
 
 // Frames of the embedded service with frame.workers workers of one thread each, one frame in flight, after two warm-up frames. Numbers:
 // "latency_ms" (the median of `frames`), "stages_ms" by name, "imbalance", "idle_share", "image_bytes".
 Trial ServiceTrial(ExperimentContext& context, const FrameCase& frame, int frames);
-Json ServiceKey(const FrameCase& frame);
+Json ServiceKey(ExperimentContext& context, const FrameCase& frame, int frames);
 
 // The same frame measured with the service and simulated, in turns (laboratory/measure/validate.h), for frame.workers of 1 or 2:
 // "measured_ms" and "simulated_ms".
 Trial ValidationTrial(ExperimentContext& context, const FrameCase& frame, int turns);
-Json ValidationKey(const FrameCase& frame);
+Json ValidationKey(ExperimentContext& context, const FrameCase& frame, int turns);
 
 // The service's plan for its first frame. Errors of Validate and PlanFrame.
 FramePlan PlanOf(ExperimentContext& context, const FrameCase& frame);

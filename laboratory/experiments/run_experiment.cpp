@@ -8,7 +8,6 @@
 #include <cmath>
 #include <ctime>
 #include <iostream>
-#include <set>
 
 #include "client/cli/interrupt.h"
 #include "commit.h"
@@ -17,18 +16,25 @@
 #include "common/base/version.h"
 #include "common/transport/socket.h"
 #include "laboratory/bench/bench_machine.h"
+#include "laboratory/experiments/request_json.h"
 #include "laboratory/experiments/sweep_file.h"
 
 namespace slabstream {
 namespace {
 
 // Everything that decides the set of trials.
-Json Parameters(const ExperimentOptions& options) {
+Json Parameters(const ExperimentOptions& options, VolumeCache& volumes) {
   Json parameters = {{"seed", options.seed},   {"repeats", options.repeats}, {"quick", options.quick},
                      {"scale", options.scale}, {"volumes", options.volumes}, {"sweep", Json()}};
   if (!options.sweep_file.empty()) {
-    const Json sweep = Json::parse(OrThrow(ReadTextFile(options.sweep_file, kMaxSweepBytes)), nullptr, false);
-    parameters["sweep"] = sweep.is_discarded() ? Json() : sweep;  // the experiment reports its errors
+    parameters["sweep"] = Json::parse(OrThrow(ReadTextFile(options.sweep_file, kMaxSweepBytes)), nullptr, false);
+  }
+  // Texts that name files do not say what is in them.
+  const std::vector<BenchCase> named =
+      options.sweep_file.empty() ? RealVolumes(options.volumes) : OrThrow(ReadSweep(options.sweep_file)).volumes;
+  parameters["contents"] = Json::array();
+  for (const BenchCase& volume : named) {
+    parameters["contents"].push_back({{"volume", volumes.Identity(volume)}, {"transfer", TransferJson(volume.transfer)}});
   }
   return parameters;
 }
@@ -48,15 +54,16 @@ void Run(const ExperimentOptions& options) {
   }
   const MachineInfo machine = DescribeMachine();
   const std::string machine_text = fmt::format("{}, {} cores, {}", machine.cpu, machine.cores, machine.simd);
-  const Json parameters = Parameters(options);
-  (void)RealVolumes(options.volumes);
   if (experiment->check != nullptr) experiment->check(options);
+  VolumeCache volumes;
+  const Json parameters = Parameters(options, volumes);
   TrialLog log = OrThrow(TrialLog::Open(options.folder, {options.name, parameters, SLABSTREAM_COMMIT, machine_text}, options.resume));
   if (log.size() > 0) std::cout << fmt::format("continues with {} trials that are done\n", log.size()) << std::flush;
 
   Wakeup wakeup;
   const InterruptGuard interrupt(wakeup);
-  ExperimentContext context(options, std::move(log), [&interrupt] { return interrupt.interrupted(); });
+  ExperimentContext context(
+      options, std::move(log), [&interrupt] { return interrupt.interrupted(); }, std::move(volumes));
   const Report report = experiment->run(context);
   if (interrupt.interrupted()) throw Failure(Status::Cancelled("interrupted while the report was made; the same command continues"));
 
@@ -71,15 +78,14 @@ void Run(const ExperimentOptions& options) {
 
 }  // namespace
 
-ExperimentContext::ExperimentContext(ExperimentOptions options, TrialLog log, std::function<bool()> interrupted)
-    : options_(std::move(options)), log_(std::move(log)), interrupted_(std::move(interrupted)) {}
+ExperimentContext::ExperimentContext(ExperimentOptions options, TrialLog log, std::function<bool()> interrupted, VolumeCache volumes)
+    : options_(std::move(options)), log_(std::move(log)), interrupted_(std::move(interrupted)), volumes_(std::move(volumes)) {}
 
 int ExperimentContext::Scaled(int side) const { return std::max(kLeastScaledSide, int(std::lround(side * options_.scale))); }
 
 void ExperimentContext::Run(std::vector<Trial> trials, int repeats, int quick_repeats) {
   repeats_ = options_.repeats > 0 ? options_.repeats : quick() ? quick_repeats : repeats;
-  std::set<std::string> keys;
-  std::erase_if(trials, [&](const Trial& trial) { return !keys.insert(trial.key.dump()).second; });
+  trials = Distinct(std::move(trials));
   std::cout << fmt::format("{} kinds of trials, repeats: {}\n", trials.size(), repeats_) << std::flush;
   RunTrials(trials, {options_.seed, repeats_, ::isatty(STDERR_FILENO) == 1, interrupted_}, log_);
 }

@@ -102,7 +102,7 @@ Report RunStreaming(ExperimentContext& context) {
         of_preview.points.push_back({double(groups), figures.preview_seconds * 1e3});
         of_frame.points.push_back({double(groups), figures.latency_seconds * 1e3});
         Cell service;
-        if (p == 2) service = Measured(EstimateOf(context.log(), ServiceKey(frame), "latency_ms"));
+        if (p == 2) service = Measured(EstimateOf(context.log(), ServiceKey(context, frame, kServiceFrames), "latency_ms"));
         table.rows.push_back({Chosen(p), Chosen(groups), Simulated(figures.latency_seconds * 1e3), Simulated(figures.preview_seconds * 1e3),
                               Simulated(figures.steady_seconds * 1e3), Simulated(percent), Measured(mebibytes), service});
       }

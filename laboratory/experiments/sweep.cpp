@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "common/base/files.h"
 #include "common/planning/policy_names.h"
 #include "common/renderers/registry.h"
 #include "laboratory/experiments/balanced_case.h"
@@ -18,12 +17,6 @@ namespace slabstream {
 namespace {
 
 constexpr int kRepeats = 3, kQuickRepeats = 1, kServiceFrames = 5, kMeasuredWorkers = 2;
-
-Sweep ReadSweep(const ExperimentOptions& options) {
-  const Result<std::string> text = ReadTextFile(options.sweep_file, kMaxSweepBytes);
-  if (!text.ok()) throw Failure(Status(text.status().code(), "FILE " + text.status().message()));
-  return OrThrow(ParseSweep(options.sweep_file, *text));
-}
 
 FrameCase FrameOf(ExperimentContext& context, const Sweep& sweep, const BenchCase& volume, const RendererKind* renderer,
                   const SweepView& view, const SweepPolicy& policy, int workers, const SweepLink& link) {
@@ -67,10 +60,10 @@ std::vector<Trial> TrialsOf(ExperimentContext& context, const Sweep& sweep) {
 
 }  // namespace
 
-void CheckSweepFile(const ExperimentOptions& options) { (void)ReadSweep(options); }
+void CheckSweepFile(const ExperimentOptions& options) { OrThrow(ReadSweep(options.sweep_file).status()); }
 
 Report RunSweep(ExperimentContext& context) {
-  const Sweep sweep = ReadSweep(context.options());
+  const Sweep sweep = OrThrow(ReadSweep(context.options().sweep_file));
   context.Run(TrialsOf(context, sweep), kRepeats, kQuickRepeats);
 
   Report report;
@@ -97,7 +90,7 @@ Report RunSweep(ExperimentContext& context) {
           const double ms = figures.latency_seconds * 1e3;
           Cell service;
           if (p <= kMeasuredWorkers) {
-            const Estimate e = EstimateOf(context.log(), ServiceKey(frame), "latency_ms");
+            const Estimate e = EstimateOf(context.log(), ServiceKey(context, frame, kServiceFrames), "latency_ms");
             service = Measured(e);
             measured.points.push_back({double(p), e.median, e.low, e.high});
           }

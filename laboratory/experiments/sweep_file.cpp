@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "client/cli/json_value.h"
+#include "common/base/files.h"
 #include "common/cli/parse.h"
 #include "common/combining/schemes.h"
 #include "common/decomposition/decomposition.h"
@@ -201,6 +202,12 @@ Result<Sweep> ParseSweep(const std::string& path, std::string_view text) {
   if (!mistake && cases > kMaxSweepCases) mistake = fmt::format("{} cases are too many: at most {}", cases, kMaxSweepCases);
   if (mistake) return Status::InvalidArgument(fmt::format("FILE '{}': {}", path, *mistake));
   return sweep;
+}
+
+Result<Sweep> ReadSweep(const std::string& path) {
+  const Result<std::string> text = ReadTextFile(path, kMaxSweepBytes);
+  if (!text.ok()) return Status(text.status().code(), "FILE " + text.status().message());
+  return ParseSweep(path, *text);
 }
 
 }  // namespace slabstream

@@ -47,5 +47,7 @@ std::string Describe(const Policy& policy);
 // InvalidArgument in one line naming `path`, the field by its place ("policies[1].combine"), the value and what is allowed. NotFound: a
 // volume file does not exist.
 Result<Sweep> ParseSweep(const std::string& path, std::string_view text);
+// The same of a file; also fails if it cannot be read.
+Result<Sweep> ReadSweep(const std::string& path);
 
 }  // namespace slabstream

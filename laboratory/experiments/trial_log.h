@@ -24,7 +24,7 @@ using Json = nlohmann::ordered_json;
 // Trials of two runs may be mixed only if these agree.
 struct RunIdentity {
   std::string experiment;
-  Json parameters;              // everything that decides the set of trials: seed, repeats, quick, volumes, the sweep's text
+  Json parameters;  // everything that decides the set of trials: seed, repeats, quick, volumes and what they hold, the sweep's text
   std::string commit, machine;  // who measured
 };
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <map>
 #include <optional>
 #include <random>
 #include <set>
@@ -57,6 +58,19 @@ const Json& Field(const Json& numbers, const std::string& name) {
 }
 
 }  // namespace
+
+std::vector<Trial> Distinct(std::vector<Trial> trials) {
+  std::map<std::string, Json> inputs;  // by key
+  std::erase_if(trials, [&](const Trial& trial) {
+    const auto [found, is_new] = inputs.emplace(trial.key.dump(), trial.inputs);
+    if (!is_new && found->second != trial.inputs) {
+      throw Failure(Status::Internal(fmt::format("two different trials have the key {}: one of {}, one of {}", found->first,
+                                                 found->second.dump(), trial.inputs.dump())));
+    }
+    return !is_new;
+  });
+  return trials;
+}
 
 void RunTrials(const std::vector<Trial>& trials, const TrialSchedule& schedule, TrialLog& log) {
   std::set<std::string> keys;

@@ -14,10 +14,11 @@
 namespace slabstream {
 
 struct Trial {
-  Json key;                   // its parameters, an object; holds all that decides its numbers, and is unique
+  Json key;                   // its parameters, an object; holds all that decides its numbers
   std::function<Json()> run;  // numbers by name, an object; must not depend on what ran before; may throw Failure
   double effort = 1;          // expected time relative to other trials, for the time left
   bool repeat = true;         // false: its numbers are computed, so once is enough
+  Json inputs;                // all that `run` is given, however the key tells it; null: the key says it all
 };
 
 struct TrialSchedule {
@@ -27,8 +28,12 @@ struct TrialSchedule {
   std::function<bool()> interrupted;  // asked between trials
 };
 
-// Runs the trials that the log does not hold yet. Throws Failure: Cancelled if interrupted; the error of the first trial that failed, which
-// ends the run, with its key.
+// Each trial once, however many sections ask for it, in the order of their first mention. Throws Failure: Internal if trials of one key
+// have different inputs, since one of them would get the numbers of the other.
+std::vector<Trial> Distinct(std::vector<Trial> trials);
+
+// Runs the trials that the log does not hold yet. Their keys differ. Throws Failure: Cancelled if interrupted; the error of the first trial
+// that failed, which ends the run, with its key.
 void RunTrials(const std::vector<Trial>& trials, const TrialSchedule& schedule, TrialLog& log);
 
 // All repeats of a number, given by name or, with a leading slash, by JSON pointer. CHECKs that the trial was run and has the number.

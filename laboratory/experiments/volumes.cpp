@@ -11,15 +11,57 @@
 
 namespace slabstream {
 
+namespace {
+
+Json SphereJson(const SphereRequest& sphere) {
+  const auto& [sphere_class, size, occupancy] = sphere;
+  return {{"class", int(sphere_class)}, {"size", size}, {"occupancy", occupancy}};
+}
+
+std::string CanonicalPath(const std::string& path) {
+  std::error_code error;
+  const std::filesystem::path canonical = std::filesystem::canonical(path, error);
+  return error ? path : canonical.string();  // the reader reports the error
+}
+
+Json FileJson(const std::string& path, const Volume& volume) {
+  const auto& [geometry, type, mapping] = volume.description;
+  const auto& [size, spacing] = geometry;
+  const auto& [scale, offset] = mapping;
+  const AlignedVector<std::byte>& bytes = volume.block.bytes;
+  return {{"file", path},
+          {"voxels", Json::array({size.x, size.y, size.z})},
+          {"spacing", Json::array({spacing.x, spacing.y, spacing.z})},
+          {"bytes", bytes.size()},
+          {"type", int(type)},
+          {"mapping", Json::array({scale, offset})},
+          {"digest", DigestText({reinterpret_cast<const char*>(bytes.data()), bytes.size()})}};
+}
+
+// What a case's volume is made or read from: cases of one source have one volume.
+std::string SourceOf(const BenchCase& volume) {
+  const auto* path = std::get_if<std::string>(&volume.volume);
+  return path != nullptr ? CanonicalPath(*path) : SphereJson(std::get<SphereRequest>(volume.volume)).dump();
+}
+
+}  // namespace
+
 VolumeInUse VolumeCache::Get(const BenchCase& volume) {
-  const auto found = std::ranges::find(held_, volume.dataset, &Held::dataset);
+  std::string source = SourceOf(volume);
+  const auto found = std::ranges::find(held_, source, &Held::source);
   if (found != held_.end()) {
     held_.splice(held_.begin(), held_, found);
     return found->volume;
   }
   std::shared_ptr<const Volume> loaded = OrThrow(LoadBenchVolume(volume));
+  if (std::holds_alternative<std::string>(volume.volume)) {
+    const Json identity = FileJson(source, *loaded);
+    if (read_.emplace(source, identity).first->second != identity) {
+      throw Failure(Status::InvalidArgument(fmt::format("'{}' has changed since this run began", source)));
+    }
+  }
   auto summary = std::make_shared<const VolumeSummary>(Summarize(*loaded));
-  held_.push_front({volume.dataset, {std::move(loaded), std::move(summary)}});
+  held_.push_front({std::move(source), {std::move(loaded), std::move(summary)}});
   std::size_t bytes = 0;
   const auto first_too_many = std::find_if(std::next(held_.begin()), held_.end(), [&](const Held& held) {
     bytes += held.volume.volume->block.bytes.size();
@@ -29,8 +71,15 @@ VolumeInUse VolumeCache::Get(const BenchCase& volume) {
   return held_.front().volume;
 }
 
+Json VolumeCache::Identity(const BenchCase& volume) {
+  if (const auto* sphere = std::get_if<SphereRequest>(&volume.volume)) return SphereJson(*sphere);
+  const std::string source = SourceOf(volume);
+  if (!read_.contains(source)) (void)Get(volume);
+  return read_.at(source);
+}
+
 std::shared_ptr<const OccupancyGrid> VolumeCache::Occupied(const BenchCase& volume) {
-  std::shared_ptr<const OccupancyGrid>& grid = occupied_[{volume.name, volume.renderer}];
+  std::shared_ptr<const OccupancyGrid>& grid = occupied_[{Identity(volume).dump() + TransferJson(volume.transfer).dump(), volume.renderer}];
   if (grid != nullptr) return grid;
   const VolumeInUse in_use = Get(volume);
   const VolumeSummary& summary = *in_use.summary;
@@ -52,6 +101,10 @@ std::vector<BenchCase> RealVolumes(const std::vector<std::string>& named) {
     Result<BenchCase> parsed = ParseBenchCase(text, false);
     if (!parsed.ok()) throw Failure(Status(parsed.status().code(), "--volume: " + parsed.status().message()));
     volumes.push_back(*std::move(parsed));
+    BenchCase& volume = volumes.back();
+    const std::string stem = volume.dataset;
+    const auto is_taken = [&](const BenchCase& other) { return &other != &volume && other.dataset == volume.dataset; };
+    for (int number = 2; std::ranges::any_of(volumes, is_taken); ++number) volume.dataset = fmt::format("{}-{}", stem, number);
   }
   const BenchCase brain = BrainCase();
   std::error_code error;

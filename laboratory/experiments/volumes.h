@@ -13,6 +13,7 @@
 #include "common/volume/volume.h"
 #include "laboratory/bench/bench_cases.h"
 #include "laboratory/experiments/failure.h"
+#include "laboratory/experiments/request_json.h"
 
 namespace slabstream {
 
@@ -25,25 +26,31 @@ struct VolumeInUse {
 class VolumeCache {
  public:
   explicit VolumeCache(std::size_t budget_bytes = std::size_t{1} << 30) : budget_bytes_(budget_bytes) {}
-  // Makes or reads the volume if it is not held. Cases of one dataset share their volume.
+  // Makes or reads the volume if it is not held. Cases of one sphere or one file share their volume. InvalidArgument: the file was read
+  // before and has changed since; errors of LoadBenchVolume.
   VolumeInUse Get(const BenchCase& volume);
+  // What the volume holds, whatever its name. A sphere: class, size and occupancy. A file: its path, its description and a digest of its
+  // voxels, as they were when it was first read; so a header stands for its detached data, too. Errors of Get.
+  Json Identity(const BenchCase& volume);
   // The voxels that its renderer draws under its transfer function.
   std::shared_ptr<const OccupancyGrid> Occupied(const BenchCase& volume);
 
  private:
   struct Held {
-    std::string dataset;
+    std::string source;
     VolumeInUse volume;
   };
   std::size_t budget_bytes_;
-  std::list<Held> held_;                                                                                  // most recently used first
-  std::map<std::pair<std::string, const RendererKind*>, std::shared_ptr<const OccupancyGrid>> occupied_;  // by name of the case
+  std::list<Held> held_;              // most recently used first
+  std::map<std::string, Json> read_;  // identities of files by canonical path
+  std::map<std::pair<std::string, const RendererKind*>, std::shared_ptr<const OccupancyGrid>> occupied_;  // by identity and transfer
 };
 
 // The name in reports: "class I, N = 300, 5 % occupied"; a file by its dataset's name.
 std::string TitleOf(const BenchCase& volume);
 
 // The volumes that the user named, or the installed real volumes, such as the brain, beside the spheres. Errors of ParseBenchCase.
+// Their datasets differ, because tables and figures are called after them: of two files v.nrrd the second is "v-2".
 std::vector<BenchCase> RealVolumes(const std::vector<std::string>& named);
 
 }  // namespace slabstream

@@ -68,7 +68,7 @@ Result<std::vector<View>> MakeViews(const ValidationCase& what, int count) {
   for (int i = 0; i < count; ++i) {
     View& view = views.emplace_back(View{.request = what.request});
     view.request.dataset = kDataset;
-    view.request.view.azimuth_degrees = 360.0 * i / count;
+    view.request.view.azimuth_degrees += 360.0 * i / count;
     Result<FramePlan> plan = PlanFrame(view.request, 1, summary, roster);
     if (!plan.ok()) return plan.status();
     view.plan = *std::move(plan);
@@ -152,8 +152,8 @@ Result<ValidationRow> ValidateSimulation(const ValidationCase& what, const Valid
     const auto quartile = [&](const std::vector<FrameParts>& frames, double share) {
       return QuantileOf(frames, &FrameParts::latency, share);
     };
-    row.views.push_back({Median(view.measured), Median(view.simulated), quartile(view.measured, 0.25), quartile(view.measured, 0.75),
-                         quartile(view.simulated, 0.25), quartile(view.simulated, 0.75)});
+    row.views.push_back({view.request.view, Median(view.measured), Median(view.simulated), quartile(view.measured, 0.25),
+                         quartile(view.measured, 0.75), quartile(view.simulated, 0.25), quartile(view.simulated, 0.75)});
   }
   return row;
 }

@@ -25,12 +25,12 @@ namespace slabstream {
 struct ValidationCase {
   std::string name;
   std::shared_ptr<const Volume> volume;
-  FrameRequest request;  // azimuth and dataset are filled in
+  FrameRequest request;  // of the first view; the dataset is filled in
   int workers = 1;       // or 2
 };
 
 struct ValidationOptions {
-  int views = 4;   // azimuths, evenly over a turn of the volume
+  int views = 4;   // evenly over a turn of the volume, from the azimuth of the request on
   int turns = 15;  // frames of each view
 };
 
@@ -42,6 +42,7 @@ struct FrameParts {
 };
 
 struct ValidatedView {
+  ViewParameters view;
   FrameParts measured, simulated;              // medians over turns, each part separately
   double measured_low = 0, measured_high = 0;  // quartiles of the latency: the noise of the machine
   double simulated_low = 0, simulated_high = 0;

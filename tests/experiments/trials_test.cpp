@@ -131,6 +131,21 @@ TEST(Trials, AFailureNamesItsTrialAndKeepsTheOthers) {
   EXPECT_EQ(status, Status::Unavailable("trial {\"i\":2}: no worker"));
 }
 
+TEST(Trials, AskedForTwiceIsOneTrial) {
+  const Json key = {{"what", "boxes"}}, inputs = {{"roll", 0}};
+  const std::vector<Trial> trials =
+      Distinct({{.key = key, .inputs = inputs}, {.key = {{"what", "picture"}}, .inputs = inputs}, {.key = key, .inputs = inputs}});
+  ASSERT_EQ(trials.size(), 2U);
+  EXPECT_EQ(trials[0].key, key);
+}
+
+TEST(Trials, OneKeyOfDifferentInputsIsAnErrorThatNamesThem) {
+  const Json key = {{"what", "boxes"}};
+  const Status status = StatusOf([&] { Distinct({{.key = key, .inputs = {{"roll", 0}}}, {.key = key, .inputs = {{"roll", 45}}}}); });
+  EXPECT_EQ(status.code(), StatusCode::kInternal);
+  for (const char* says : {R"({"what":"boxes"})", R"({"roll":0})", R"({"roll":45})"}) EXPECT_THAT(status.message(), HasSubstr(says));
+}
+
 TEST(TrialLog, RefusesAnotherRunInOneLine) {
   const TemporaryDirectory folder;
   ASSERT_TRUE(Open(folder).ok());

@@ -41,6 +41,18 @@ TEST(Validation, HasBothSidesOfEveryView) {
   }
 }
 
+TEST(Validation, TurnsFromTheAzimuthOfTheRequest) {
+  ValidationCase what = SmallCase(Splatting(), 1);
+  what.request.view.azimuth_degrees = 30;
+  what.request.view.roll_degrees = 5;
+  const Result<ValidationRow> row = ValidateSimulation(what, {.views = 2, .turns = 1});
+  ASSERT_TRUE(row.ok()) << row.status().message();
+  ASSERT_EQ(row->views.size(), 2U);
+  EXPECT_EQ(row->views[0].view, what.request.view);
+  EXPECT_EQ(row->views[1].view.azimuth_degrees, 210);
+  EXPECT_EQ(row->views[1].view.roll_degrees, 5);
+}
+
 TEST(Validation, RefusesMoreWorkersThanItCanMeasureSideBySide) {
   const Result<ValidationRow> row = ValidateSimulation(SmallCase(Splatting(), 3), {});
   EXPECT_EQ(row.status().code(), StatusCode::kInvalidArgument);

@@ -11,7 +11,6 @@
 namespace slabstream {
 namespace {
 
-constexpr int kValidationTurns = 7;
 // Oblique, so that no slab hides behind another, and slices are seen neither edge-on nor face-on.
 constexpr double kAzimuth = 30, kElevation = 20;
 

@@ -8,6 +8,8 @@
 
 namespace slabstream {
 
+inline constexpr int kValidationTurns = 7;
+
 class PaperSetup {
  public:
   explicit PaperSetup(ExperimentContext& context);

@@ -54,8 +54,9 @@ Section ValidationSection(const PaperSetup& setup) {
       LineSeries series{fmt::format("{}, p = {}", renderer->title(), p), Origin::kSimulated, {}};
       for (const int size : setup.sizes()) {
         const FrameCase frame = setup.Frame(renderer, size, p);
-        const Estimate measured = EstimateOf(setup.context().log(), ValidationKey(frame), "measured_ms");
-        const Estimate simulated = EstimateOf(setup.context().log(), ValidationKey(frame), "simulated_ms");
+        const Json key = ValidationKey(setup.context(), frame, kValidationTurns);
+        const Estimate measured = EstimateOf(setup.context().log(), key, "measured_ms");
+        const Estimate simulated = EstimateOf(setup.context().log(), key, "simulated_ms");
         const auto error_against = [&](double ms) { return 100 * (simulated.median / ms - 1); };
         const double error = error_against(measured.median);
         Errors& errors = by_workers[p];

@@ -1,0 +1,106 @@
+#include "laboratory/experiments/request_json.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <span>
+#include <variant>
+
+#include "common/wire/digest.h"
+
+namespace slabstream {
+namespace {
+
+// Structured bindings name every field of a type: if there is one more, they do not compile.
+
+Json FunctionJson(const TransferFunction& function) {
+  const auto& [colors, opacities, opacity_distance] = function;
+  Json color_points = Json::array(), opacity_points = Json::array();
+  for (const auto& [value, color] : colors) {
+    const auto& [r, g, b] = color;
+    color_points.push_back(Json::array({value, r, g, b}));
+  }
+  for (const auto& [value, opacity, midpoint, sharpness] : opacities) {
+    opacity_points.push_back(Json::array({value, opacity, midpoint, sharpness}));
+  }
+  return {{"colors", color_points}, {"opacities", opacity_points}, {"opacity_distance", opacity_distance}};
+}
+
+Json SizeJson(const ImageSize& size) {
+  const auto& [width, height] = size;
+  return Json::array({width, height});
+}
+
+Json ViewJson(const ViewParameters& view) {
+  const auto& [projection, azimuth, elevation, roll, zoom, fov] = view;
+  return {{"projection", projection == Projection::kPerspective ? "perspective" : "orthographic"},
+          {"azimuth", azimuth},
+          {"elevation", elevation},
+          {"roll", roll},
+          {"zoom", zoom},
+          {"fov", fov}};
+}
+
+// The shortest decimal that means this float: 0.2, not 0.20000000298023224.
+double Decimal(float value) { return std::stod(fmt::format("{}", value)); }
+
+Json ShadingJson(const Shading& shading) {
+  const auto& [phong, lights, ambient, diffuse, specular, shininess] = shading;
+  Json directions = Json::array();
+  for (const Vec3& light : lights) directions.push_back(Json::array({light.x, light.y, light.z}));
+  return {{"phong", phong},
+          {"lights", directions},
+          {"ambient", Decimal(ambient)},
+          {"diffuse", Decimal(diffuse)},
+          {"specular", Decimal(specular)},
+          {"shininess", Decimal(shininess)}};
+}
+
+Json PolicyJson(const Policy& policy) {
+  constexpr std::array<const char*, 5> kAxes = {"x", "y", "z", "auto", "view"};  // by AxisChoice
+  const auto& [decomposition, split, axis, groups, assignment, balance, combine, pixel_error, teams] = policy;
+  return {{"decomposition", decomposition},
+          {"split", split},
+          {"axis", kAxes.at(std::size_t(axis))},
+          {"groups", groups},
+          {"assignment", assignment},
+          {"balance", balance},
+          {"combine", combine},
+          {"pixel_error", pixel_error},
+          {"teams", teams}};
+}
+
+}  // namespace
+
+std::string DigestText(std::string_view bytes) { return fmt::format("{:016x}", Digest(std::as_bytes(std::span(bytes)))); }
+
+Json TransferJson(const TransferChoice& transfer) {
+  const auto& [choice, opacity_distance] = transfer;
+  const auto* preset = std::get_if<std::string>(&choice);
+  Json json = Json::object();
+  if (preset != nullptr) {
+    json["preset"] = *preset;
+  } else {
+    json["function"] = DigestText(FunctionJson(std::get<TransferFunction>(choice)).dump());
+  }
+  json["opacity_distance"] = opacity_distance;
+  return json;
+}
+
+Json RequestJson(const FrameRequest& request) {
+  const auto& [dataset, renderer, parameters, size, view, transfer, shading, termination, policy, previews] = request;
+  Json texts = Json::object();
+  for (const auto& [name, text] : parameters) texts[name] = text;
+  return {{"dataset", dataset},
+          {"renderer", renderer},
+          {"parameters", texts},
+          {"size", SizeJson(size)},
+          {"view", ViewJson(view)},
+          {"transfer", TransferJson(transfer)},
+          {"shading", ShadingJson(shading)},
+          {"termination", termination},
+          {"previews", previews},
+          {"policy", PolicyJson(policy)}};
+}
+
+}  // namespace slabstream
