@@ -157,12 +157,12 @@ void GroupRun::Advance(WorkerActions& actions) {
       SendFragments(step.from, taken->parts, taken->index, WorkerOf(step.to), TakeReports(step.from), actions);
       ReleaseUnused(taken->parts, actions);
     } else {
-      MoveLocally(*std::move(taken), actions);
+      MoveLocally(*taken, actions);
     }
   }
 }
 
-void GroupRun::MoveLocally(Runner::Taken taken, WorkerActions& actions) {
+void GroupRun::MoveLocally(const Runner::Taken& taken, WorkerActions& actions) {
   const Step& step = *taken.step;
   for (const Held& part : taken.parts) Merge(step.to, {part.pixels, part.value.ranks, part.value.image, {}}, actions);
   ReleaseUnused(taken.parts, actions);
@@ -305,8 +305,7 @@ void GroupRun::ReleaseUnused(const std::vector<Held>& taken, WorkerActions& acti
   std::vector<ImageHandle> images;
   for (const Held& part : taken) images.push_back(part.value.image);
   std::ranges::sort(images);
-  const auto repeated = std::ranges::unique(images);
-  images.erase(repeated.begin(), repeated.end());
+  images.erase(std::unique(images.begin(), images.end()), images.end());
   for (const ImageHandle image : images) {
     if (std::ranges::none_of(ranks_, [&](const auto& rank) { return Uses(rank.first, image); })) actions.push_back(ReleaseImage{image});
   }

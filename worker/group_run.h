@@ -83,7 +83,7 @@ class GroupRun {
   std::uint32_t step_count() const { return std::uint32_t(runner_.order().schedule().steps().size()); }
   Runner MakeRunner();
   void Advance(WorkerActions& actions);
-  void MoveLocally(Runner::Taken taken, WorkerActions& actions);
+  void MoveLocally(const Runner::Taken& taken, WorkerActions& actions);
   void Receive(const Runner::Taken& taken, WorkerActions& actions);
   void Merge(Rank rank, ImagePiece&& piece, WorkerActions& actions);
   // Passes on `incoming`, what has come of the piece.
