@@ -303,6 +303,7 @@ bool GroupRun::Uses(Rank rank, ImageHandle image) const {
 // Releases the images of taken fragments, once each, unless other fragments still use them.
 void GroupRun::ReleaseUnused(const std::vector<Held>& taken, WorkerActions& actions) {
   std::vector<ImageHandle> images;
+  images.reserve(taken.size());
   for (const Held& part : taken) images.push_back(part.value.image);
   std::ranges::sort(images);
   images.erase(std::unique(images.begin(), images.end()), images.end());
