@@ -194,12 +194,10 @@ void CoordinatorService::Impl::ReceiveFromWorkers() {
   for (int i = 0; i < kReceiveBatch; ++i) {
     std::optional<Incoming> incoming = control.TryReceive();
     if (!incoming) return;
-    Result<AnyMessage> message = Guarded("decoding", [&] { return Decode(incoming->parts[0].span()); });
     Bytes payload = incoming->parts.size() > 1 ? std::move(incoming->parts[1]) : Bytes();
-    if (!message.ok() || payload.size() != ExpectedPayloadBytes(*message)) {
-      LogWarning("control plane: dropped a message: " +
-                 (message.ok() ? std::string(NameOf(*message)) + " with a payload of " + std::to_string(payload.size()) + " bytes"
-                               : message.status().message()));
+    Result<AnyMessage> message = Guarded("decoding", [&] { return DecodeOn(Plane::kControl, incoming->parts[0].span(), payload.size()); });
+    if (!message.ok()) {
+      LogWarning("control plane: dropped a message: " + message.status().message());
       continue;
     }
     HandleEvent(FromWorker{worker_peers.Heard(incoming->identity, MonotonicNow()), std::move(*message), std::move(payload)});

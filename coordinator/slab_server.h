@@ -28,7 +28,7 @@ class SlabServer {
     std::shared_ptr<const BrickedVoxels> bricks = nullptr;
 
     bool any() const { return volume != nullptr || bricks != nullptr; }
-    // The others want any().
+    // What follows needs any().
     const Box& box() const {
       CHECK(any());
       return volume != nullptr ? volume->block.box : bricks->grid().box;

@@ -176,7 +176,7 @@ void SimulatedService::Finish(std::uint32_t place) {
   StepWorker(node, conditions_.Answer(job));
 }
 
-void SimulatedService::SendToCoordinator(Node from, AnyMessage message, Bytes payload) {
+void SimulatedService::SendToCoordinator(Node from, AnyMessage message, const Bytes& payload) {
   const Arrivals arrivals = conditions_.ToCoordinator(from, message);
   for (int i = 0; i < arrivals.count; ++i) {
     queue_.At(threads_.Begin(Threads::kCoordinator, arrivals.times[i]), [this, from, message, payload] {

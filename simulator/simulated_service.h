@@ -93,7 +93,7 @@ class SimulatedService {
   Job& JobAt(std::uint32_t place) { return jobs_[place / kChunk][place % kChunk]; }
   void OnWorked(const LaneTask& task);
   void Finish(std::uint32_t place);
-  void SendToCoordinator(Node from, AnyMessage message, Bytes payload);
+  void SendToCoordinator(Node from, AnyMessage message, const Bytes& payload);
   void SendToPeer(std::uint32_t place);
   void Deliver(Node to, std::uint32_t place);
 

@@ -157,12 +157,10 @@ void WorkerService::Impl::Receive(Socket& socket, Plane plane) {
   for (int i = 0; i < kReceiveBatch; ++i) {
     std::optional<Incoming> incoming = socket.TryReceive();
     if (!incoming) return;
-    Result<AnyMessage> message = Guarded("decoding", [&] { return Decode(incoming->parts[0].span()); });
     Bytes payload = incoming->parts.size() > 1 ? std::move(incoming->parts[1]) : Bytes();
-    if (!message.ok() || PlaneOf(*message) != plane || payload.size() != ExpectedPayloadBytes(*message)) {
-      LogWarning(std::string(NameOf(plane)) + " plane: dropped a message: " +
-                 (message.ok() ? std::string(NameOf(*message)) + " with a payload of " + std::to_string(payload.size()) + " bytes"
-                               : message.status().message()));
+    Result<AnyMessage> message = Guarded("decoding", [&] { return DecodeOn(plane, incoming->parts[0].span(), payload.size()); });
+    if (!message.ok()) {
+      LogWarning(std::string(NameOf(plane)) + " plane: dropped a message: " + message.status().message());
       continue;
     }
     Remember(*message);

@@ -163,6 +163,18 @@ Result<AnyMessage> Decode(std::span<const std::byte> header) {
   return result;
 }
 
+Result<AnyMessage> DecodeOn(Plane plane, std::span<const std::byte> header, std::size_t payload_bytes) {
+  Result<AnyMessage> message = Decode(header);
+  if (!message.ok()) return message;
+  const std::string name(NameOf(*message));
+  if (PlaneOf(*message) != plane)
+    return Status::InvalidArgument(name + " belongs to the " + std::string(NameOf(PlaneOf(*message))) + " plane");
+  if (payload_bytes != ExpectedPayloadBytes(*message)) {
+    return Status::InvalidArgument(name + " with a payload of " + std::to_string(payload_bytes) + " bytes");
+  }
+  return message;
+}
+
 std::optional<FrameFailed> RefusalOf(std::span<const std::byte> header, const Status& why) {
   Envelope envelope;
   if (!Parse(header, envelope).ok() || !envelope.has_submit_frame()) return std::nullopt;

@@ -41,6 +41,10 @@ std::vector<std::byte> Encode(const AnyMessage& message);
 // undecodable bytes. The result keeps everything that the structs' comments promise; nobody checks again.
 Result<AnyMessage> Decode(std::span<const std::byte> header);
 
+// Decode for a socket that carries one plane. InvalidArgument also for a message of another plane, and for a payload frame that is not as
+// long as the header says.
+Result<AnyMessage> DecodeOn(Plane plane, std::span<const std::byte> header, std::size_t payload_bytes);
+
 // The answer to a SubmitFrame that Decode has refused, so that its client hears why; nullopt for every other header.
 std::optional<FrameFailed> RefusalOf(std::span<const std::byte> header, const Status& why);
 

@@ -24,7 +24,8 @@ using Json = nlohmann::ordered_json;
 // Trials of two runs may be mixed only if these agree.
 struct RunIdentity {
   std::string experiment;
-  Json parameters;  // everything that decides the set of trials: seed, repeats, quick, volumes and what they hold, the sweep's text
+  // All that decides which trials there are: the seed, the repeats, whether the run is quick, the volumes and what they hold, the sweep.
+  Json parameters;
   std::string commit, machine;  // who measured
 };
 

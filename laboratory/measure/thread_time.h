@@ -3,9 +3,12 @@
 
 #include <time.h>
 
+#include <cstddef>
 #include <utility>
+#include <vector>
 
 #include "common/base/check.h"
+#include "laboratory/measure/statistics.h"
 
 namespace slabstream {
 
@@ -20,6 +23,14 @@ double SecondsOf(Work&& work) {
   const double begin = ThreadSeconds();
   std::forward<Work>(work)();
   return ThreadSeconds() - begin;
+}
+
+// The median of `runs` runs.
+template <class Work>
+double MedianSecondsOf(int runs, Work&& work) {
+  std::vector<double> seconds(static_cast<std::size_t>(runs));
+  for (double& each : seconds) each = SecondsOf(work);
+  return MedianOf(std::move(seconds)).median;
 }
 
 }  // namespace slabstream

@@ -1,5 +1,6 @@
 // Two ways to transform all voxels of a slab, x fastest, into three arrays of coordinates: a matrix product for each voxel, and running
-// additions (the paper's seed, voxel, beam and slice phases).
+// additions. They run along a beam in vectors, from beam to beam and slice to slice one coordinate after the other; the paper's phases add
+// whole beams and slices.
 //
 // The scalar loop is compiled without automatic vectorisation; vector loops use Highway, for the best instruction set of the machine.
 #pragma once

@@ -179,8 +179,9 @@ Section ConstantsSection(const PaperSetup& setup) {
       "none below 0), with 95 % intervals. Residual: root mean square of what the fit leaves, relative. Prediction error: mean error "
       "of predicting a fifth of the slabs from the other four fifths, over the mean time.";
   section.answer = fmt::format(
-      "What the paper's times give for a unit, over what it takes one processor of today: splatting {}; Z-buffer {}. Units are the "
-      "paper's, so a stage that skips work gains more than its processor did. The fitted model predicts slabs it has not seen with a "
+      "What the paper's times give for a unit, over what it takes one processor of today: splatting {}; Z-buffer {}. We count "
+      "drawn voxels and faces where the paper counts occupied voxels, and skip empty space. The fitted model predicts slabs it has not "
+      "seen with a "
       "mean error of: {} (splatting); {} (Z-buffer). Frames are simulated from measured slabs, not from constants.",
       GainsOf(splatting), GainsOf(zbuffer), splatting_fit.errors, zbuffer_fit.errors);
   section.blocks = {TableOf("table-3-constants-splatting", "Table 3. Splatting, Eq. 21", splatting),

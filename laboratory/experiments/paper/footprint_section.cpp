@@ -26,13 +26,8 @@ double SigmaOf(int k) { return (k - 0.5) / 6; }
 Trial MeasureWidth(int side, int k) {
   const auto run = [=]() -> Json {
     DenseSlice slice(side, SigmaOf(k), 1);
-    const auto median = [&](void (DenseSlice::*splat)()) {
-      std::vector<double> seconds;
-      for (int i = 0; i < kRuns; ++i) seconds.push_back(SecondsOf([&] { (slice.*splat)(); }));
-      return MedianOf(std::move(seconds)).median;
-    };
-    return Json{{"plain_seconds", median(&DenseSlice::SplatPlainly)},
-                {"kernel_seconds", median(&DenseSlice::SplatByKernels)},
+    return Json{{"plain_seconds", MedianSecondsOf(kRuns, [&] { slice.SplatPlainly(); })},
+                {"kernel_seconds", MedianSecondsOf(kRuns, [&] { slice.SplatByKernels(); })},
                 {"taps", slice.taps()}};
   };
   return {WidthKey(side, k), run, 0.05 + double(side) * side * k * k * 1e-8};

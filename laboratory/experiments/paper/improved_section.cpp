@@ -214,8 +214,7 @@ Section ImprovedSection(const PaperSetup& setup) {
                               everybody.empty() ? "" : ", ", renderer->title(), efficiency, link, best.render / one.render,
                               best.most * team / best.render);
             } else if (team <= 2) {
-              teams +=
-                  fmt::format("{}{} {:.0f} % in teams of {} ({})", teams.empty() ? "" : ", ", renderer->title(), efficiency, team, link);
+              teams += fmt::format("{}{} {:.0f} % (teams of {}, {})", teams.empty() ? "" : ", ", renderer->title(), efficiency, team, link);
             }
           }
         }
@@ -265,7 +264,7 @@ Section ImprovedSection(const PaperSetup& setup) {
       "pictures to the client is on neither.";
   section.answer = fmt::format(
       "At N = {} and p = {}. One frame at a time in equal slabs, efficiency by latency: {} (the paper at N = {}, p = {}: {}). "
-      "Frames asked for ahead, efficiency by throughput, all workers on every frame: {}. {}.",
+      "Frames asked for ahead, efficiency by throughput, all workers on every frame: {}; in teams: {}.",
       setup.table_size(), most_workers, plainly, printed::kSize, printed::kStageWorkers.back(), printed_efficiency, everybody, teams);
   return section;
 }

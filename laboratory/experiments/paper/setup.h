@@ -22,8 +22,8 @@ class PaperSetup {
   int large_size() const { return sizes_.back(); }              // N of its figures 8b and 8c
   int Scaled(int side) const { return context_.Scaled(side); }
 
-  // Class I with 5 % of its voxels occupied, equal slabs, one group, on sqrt(3) N x sqrt(3) N pixels: a pixel a voxel, and the whole cube
-  // is in view however it is turned.
+  // Class I with 5 % of its voxels occupied, equal slabs, one group, on N x N pixels at zoom sqrt(3): a pixel a voxel. The whole sphere is
+  // in view however it is turned.
   FrameCase Frame(const RendererKind* renderer, int size, int workers) const;
 
   // PaperMachine for the time of a frame of the tables' N on this machine.

@@ -36,9 +36,7 @@ Trial Measure(int size, int workers, const Loop& loop) {
     const Index3 slab = SlabOf(size, workers);
     TransformedPoints points(slab);
     loop.store(kMatrix, slab, points);  // allocates the memory
-    std::vector<double> seconds;
-    for (int i = 0; i < kRuns; ++i) seconds.push_back(SecondsOf([&] { loop.store(kMatrix, slab, points); }));
-    return Json{{"seconds", MedianOf(std::move(seconds)).median}};
+    return Json{{"seconds", MedianSecondsOf(kRuns, [&] { loop.store(kMatrix, slab, points); })}};
   };
   return {Key(size, workers, loop.name), run, 0.02 + double(size) * size * size / workers * 2e-8};
 }
