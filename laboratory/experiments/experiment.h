@@ -12,6 +12,7 @@
 #include "laboratory/experiments/trials.h"
 #include "laboratory/experiments/volumes.h"
 #include "laboratory/report/document.h"
+#include "laboratory/results/results.h"
 
 namespace slabstream {
 
@@ -61,7 +62,8 @@ struct Experiment {
   Report (*run)(ExperimentContext&);
   // Checks the options before a folder is made; null: the checks common to all experiments suffice.
   void (*check)(const ExperimentOptions&) = nullptr;
-  bool takes_file = false;  // ExperimentOptions::sweep_file
+  bool takes_file = false;                               // ExperimentOptions::sweep_file
+  void (*find)(ExperimentContext&, Results&) = nullptr;  // instead of run
 };
 
 // The only list.
@@ -70,7 +72,7 @@ const std::vector<Experiment>& Experiments();
 Report RunPaper(ExperimentContext& context);
 Report RunBalance(ExperimentContext& context);
 Report RunCombining(ExperimentContext& context);
-Report RunStreaming(ExperimentContext& context);
+void RunStreaming(ExperimentContext& context, Results& results);
 Report RunScaling(ExperimentContext& context);
 Report RunSweep(ExperimentContext& context);
 void CheckSweepFile(const ExperimentOptions& options);

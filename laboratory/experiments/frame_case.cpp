@@ -74,6 +74,37 @@ FrameRequest RequestOf(const FrameCase& frame) {
   return request;
 }
 
+namespace {
+
+std::string AnglesOf(const ViewParameters& view) {
+  const auto& [projection, azimuth, elevation, roll, zoom, fov] = view;
+  std::string name = fmt::format("{:.4g}/{:.4g}", azimuth, elevation);
+  if (roll != 0) name += fmt::format(" roll {:.4g}", roll);
+  if (zoom != 1) name += fmt::format(" zoom {:.4g}", zoom);
+  if (projection == Projection::kPerspective) name += fmt::format(" fov {:.4g}", fov);
+  return name;
+}
+
+}  // namespace
+
+Json ColumnsOf(const FrameCase& frame) {
+  const auto& [decomposition, load_metric, axis, groups, assignment, balance, combine, pixel_error, teams] = frame.policy;
+  Json columns = ColumnsOf(frame.volume);
+  columns.update(Json{{"workers", frame.workers},
+                      {"view", AnglesOf(frame.view)},
+                      {"pixels", std::min(frame.size.width, frame.size.height)},
+                      {"renderer", frame.volume.renderer->name()},
+                      {"decomposition", decomposition},
+                      {"axis", NameOf(axis)},
+                      {"split", LoadMetricOf(frame.policy)},
+                      {"assignment", assignment},
+                      {"balance", balance},
+                      {"combine", combine},
+                      {"groups", groups},
+                      {"teams", teams}});
+  return columns;
+}
+
 Json MeasureBoxes(ExperimentContext& context, const FrameCase& frame, const FramePlan& plan) {
   const VolumeInUse volume = context.volumes().Get(frame.volume);
   Json numbers = {{"ids", Json::array()}};

@@ -33,6 +33,9 @@ const RendererKind* ZBuffer();
 
 FrameRequest RequestOf(const FrameCase& frame);
 
+// The columns of results that a frame fills (laboratory/results/columns.h). Those of the policy say what was asked for.
+Json ColumnsOf(const FrameCase& frame);
+
 // The keys of trials hold all that decides their numbers (frame_keys.h).
 
 // Box costs depend on the partition and the view, not on how images are combined. Boxes of equal volume do not depend on the assignment

@@ -47,14 +47,32 @@ Trial HostTrial() {
 
 LinkModel Link(std::string_view preset) { return ParseLink("link", preset).value(); }
 
-MachineModel Cluster(const ExperimentContext& context, const LinkModel& link) {
-  MachineModel machine;
-  for (const Found& number : kNumbers) number.of(machine) = EstimateOf(context.log(), HostKey(), number.name).median;
+namespace {
+
+MachineModel JoinedBy(MachineModel machine, const LinkModel& link) {
   machine.message_seconds = MachineModel().message_seconds;  // over sockets; threads of one process need none
   machine.link = link;
   machine.workers_a_host = 1;
   machine.cores_a_host = kCoresAHost;
   return machine;
+}
+
+}  // namespace
+
+MachineModel Cluster(const ExperimentContext& context, const LinkModel& link) {
+  MachineModel machine;
+  for (const Found& number : kNumbers) number.of(machine) = EstimateOf(context.log(), HostKey(), number.name).median;
+  return JoinedBy(machine, link);
+}
+
+std::vector<MachineModel> Clusters(const ExperimentContext& context, const LinkModel& link) {
+  std::vector<MachineModel> machines;
+  for (const Json* numbers : context.log().All(HostKey())) {
+    MachineModel& machine = machines.emplace_back();
+    for (const Found& number : kNumbers) number.of(machine) = numbers->at(number.name).get<double>();
+    machine = JoinedBy(machine, link);
+  }
+  return machines;
 }
 
 MachineModel PaperMachine(const ExperimentContext& context, double frame_seconds, double pixels) {

@@ -2,7 +2,6 @@
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -18,9 +17,12 @@
 #include "laboratory/bench/bench_machine.h"
 #include "laboratory/experiments/request_json.h"
 #include "laboratory/experiments/sweep_file.h"
+#include "laboratory/measure/other_load.h"
 
 namespace slabstream {
 namespace {
+
+Json ReferenceLoopKey() { return {{"what", "reference loop"}}; }
 
 // Everything that decides the set of trials.
 Json Parameters(const ExperimentOptions& options, VolumeCache& volumes) {
@@ -44,6 +46,47 @@ std::string NowUtc() {
   return fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(now));
 }
 
+// How the run went: what results are worth.
+void AddConduct(Results& results, const TrialLog& log) {
+  std::vector<double> loads = log.other_loads();
+  if (!loads.empty()) {
+    const auto [least, most] = std::ranges::minmax(loads);
+    const int count = int(loads.size());
+    results.Add({{"part", "conduct"}}, "other_load", Estimate{MedianOf(std::move(loads)).median, least, most, 1, count}, Origin::kMeasured);
+  }
+  const std::vector<double> loops = ValuesOf(log, ReferenceLoopKey(), "seconds");
+  const auto [fastest, slowest] = std::ranges::minmax(loops);
+  results.Add({{"part", "conduct"}}, "drift",
+              Estimate{loops.back() / loops.front(), fastest / loops.front(), slowest / loops.front(), 1, int(loops.size())},
+              Origin::kMeasured);
+}
+
+// What the results do not say about the run, for the page: run.json.
+Json RunJson(const ExperimentContext& context, const MachineInfo& machine) {
+  const ExperimentOptions& options = context.options();
+  return {{"experiment", options.name},
+          {"version", Version()},
+          {"commit", SLABSTREAM_COMMIT},
+          {"command", options.command},
+          {"machine", {{"cpu", machine.cpu}, {"cores", machine.cores}, {"simd", machine.simd}}},
+          {"seed", options.seed},
+          {"repeats", context.repeats()},
+          {"quick", options.quick},
+          {"scale", options.scale},
+          {"date", NowUtc()}};
+}
+
+void Find(const Experiment& experiment, ExperimentContext& context, const MachineInfo& machine, const std::string& machine_text) {
+  const std::string& folder = context.options().folder;
+  Results results({std::string(experiment.name), SLABSTREAM_COMMIT, machine_text});
+  experiment.find(context, results);
+  AddConduct(results, context.log());
+  OrThrow(results.Write(folder));
+  OrThrow(WriteTextFile(folder + "/run.json", RunJson(context, machine).dump(1) + "\n"));
+  std::cout << fmt::format("wrote {0} values to {1}/results.csv and results.jsonl\npython3 -m slabstream_lab {1} draws them\n",
+                           results.rows().size(), folder);
+}
+
 void Run(const ExperimentOptions& options) {
   const Experiment* experiment = FindNamed(Experiments(), options.name);
   if (experiment == nullptr) throw Failure(Status::NotFound(fmt::format("NAME '{}' is no experiment (--list names them)", options.name)));
@@ -64,6 +107,7 @@ void Run(const ExperimentOptions& options) {
   const InterruptGuard interrupt(wakeup);
   ExperimentContext context(
       options, std::move(log), [&interrupt] { return interrupt.interrupted(); }, std::move(volumes));
+  if (experiment->find != nullptr) return Find(*experiment, context, machine, machine_text);
   const Report report = experiment->run(context);
   if (interrupt.interrupted()) throw Failure(Status::Cancelled("interrupted while the report was made; the same command continues"));
 
@@ -87,7 +131,13 @@ void ExperimentContext::Run(std::vector<Trial> trials, int repeats, int quick_re
   repeats_ = options_.repeats > 0 ? options_.repeats : quick() ? quick_repeats : repeats;
   trials = Distinct(std::move(trials));
   std::cout << fmt::format("{} kinds of trials, repeats: {}\n", trials.size(), repeats_) << std::flush;
-  RunTrials(trials, {options_.seed, repeats_, ::isatty(STDERR_FILENO) == 1, interrupted_}, log_);
+  // Before and after: a machine that became slower shows.
+  const auto time_reference_loop = [this] {
+    OrThrow(log_.Append(ReferenceLoopKey(), int(log_.All(ReferenceLoopKey()).size()), {{"seconds", ReferenceLoopSeconds()}}));
+  };
+  time_reference_loop();
+  RunTrials(trials, {options_.seed, repeats_, true, interrupted_}, log_);
+  time_reference_loop();
 }
 
 std::string ExperimentList() {

@@ -95,6 +95,14 @@ std::string TitleOf(const BenchCase& volume) {
                      sphere->occupancy * 100);
 }
 
+Json ColumnsOf(const BenchCase& volume) {
+  Json columns = {{"volume", volume.dataset}};
+  if (const auto* sphere = std::get_if<SphereRequest>(&volume.volume)) {
+    columns.update(Json{{"n", sphere->size}, {"occupancy", sphere->occupancy}});
+  }
+  return columns;
+}
+
 std::vector<BenchCase> RealVolumes(const std::vector<std::string>& named) {
   std::vector<BenchCase> volumes;
   for (const std::string& text : named) {

@@ -48,6 +48,8 @@ class VolumeCache {
 
 // The name in reports: "class I, N = 300, 5 % occupied"; a file by its dataset's name.
 std::string TitleOf(const BenchCase& volume);
+// The columns of results that a volume fills: volume; n and occupancy of spheres.
+Json ColumnsOf(const BenchCase& volume);
 
 // The volumes that the user named, or the installed real volumes, such as the brain, beside the spheres. Errors of ParseBenchCase.
 // Their datasets differ, because tables and figures are called after them: of two files v.nrrd the second is "v-2".

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "laboratory/report/axis.h"
-#include "laboratory/report/origin.h"
+#include "laboratory/results/origin.h"
 
 namespace slabstream {
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "laboratory/report/origin.h"
 #include "laboratory/report/svg.h"
+#include "laboratory/results/origin.h"
 
 namespace slabstream {
 

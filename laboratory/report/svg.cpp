@@ -68,11 +68,6 @@ int ColorClass(int color) { return color == kPlainColor ? kPaletteSize : color %
 
 }  // namespace
 
-std::string_view ToString(Origin origin) {
-  constexpr std::array<std::string_view, 3> kNames = {"measured", "simulated", "paper"};
-  return kNames[std::size_t(origin)];
-}
-
 SvgCanvas::SvgCanvas(double width, double height, std::string_view title) {
   text_ = fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"ss\" role=\"img\" width=\"{0:.0f}\" height=\"{1:.0f}\" viewBox=\"0 0 {0:.0f} "

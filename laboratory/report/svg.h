@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "laboratory/report/origin.h"
+#include "laboratory/results/origin.h"
 
 namespace slabstream {
 

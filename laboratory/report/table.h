@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "laboratory/measure/statistics.h"
-#include "laboratory/report/origin.h"
+#include "laboratory/results/origin.h"
 
 namespace slabstream {
 
