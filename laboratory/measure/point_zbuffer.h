@@ -1,0 +1,39 @@
+// PointZBuffer: Z-buffering of voxel points, as the paper's pipeline has it (Yagel and Machiraju, sections 3.1 and 3.5): the centre of each
+// occupied voxel is transformed and written to the one pixel that it falls on, if it is the nearest so far. Nothing is reconstructed, so
+// magnified surfaces have holes. For comparison with the renderer, which draws whole faces of voxels.
+//
+// Slices are transformed one at a time by the incremental scheme: each is the one before it plus a row of the matrix (transform_loops.h).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/view/camera.h"
+#include "laboratory/measure/transform_loops.h"
+
+namespace slabstream {
+
+// From voxel indices to pixels and depth. Orthographic cameras only.
+TransformMatrix MatrixOf(const Camera& camera);
+
+class PointZBuffer {
+ public:
+  explicit PointZBuffer(ImageSize size);
+
+  // Draws into an empty image. `occupied`: a byte a voxel, x fastest; all but 0 are.
+  void Draw(const TransformMatrix& matrix, const Index3& size, const std::uint8_t* occupied);
+
+  bool Written(std::size_t pixel) const { return voxel_[pixel] != 0; }
+  // Of all pixels, row by row: the number that are `covered` and not written, and the number of covered ones.
+  struct Holes {
+    std::size_t holes = 0, covered = 0;
+  };
+  Holes HolesIn(const std::vector<bool>& covered) const;
+
+ private:
+  ImageSize size_;
+  std::vector<float> depth_;          // by pixel
+  std::vector<std::uint32_t> voxel_;  // by pixel: the index of the nearest voxel, from 1; 0: none. Deferred shading would need it
+};
+
+}  // namespace slabstream
