@@ -1,7 +1,9 @@
 #include "laboratory/measure/point_zbuffer.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "common/base/check.h"
 
@@ -40,13 +42,17 @@ void PointZBuffer::Draw(const TransformMatrix& matrix, const Index3& size, const
   }
 }
 
-PointZBuffer::Holes PointZBuffer::HolesIn(const std::vector<bool>& covered) const {
-  CHECK_EQ(covered.size(), voxel_.size());
+PointZBuffer::Holes PointZBuffer::HolesIn(const std::vector<float>& faces) const {
+  CHECK_EQ(faces.size(), voxel_.size());
   Holes holes;
-  for (std::size_t pixel = 0; pixel < covered.size(); ++pixel) {
-    if (!covered[pixel]) continue;
+  for (std::size_t pixel = 0; pixel < faces.size(); ++pixel) {
+    if (!std::isfinite(faces[pixel])) continue;
     ++holes.covered;
-    if (!Written(pixel)) ++holes.holes;
+    if (!Written(pixel)) {
+      ++holes.empty;
+    } else if (depth_[pixel] > faces[pixel] + std::numbers::sqrt3_v<float>) {
+      ++holes.behind;
+    }
   }
   return holes;
 }

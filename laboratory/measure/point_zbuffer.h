@@ -1,6 +1,7 @@
 // PointZBuffer: Z-buffering of voxel points, as the paper's pipeline has it (Yagel and Machiraju, sections 3.1 and 3.5): the centre of each
 // occupied voxel is transformed and written to the one pixel that it falls on, if it is the nearest so far. Nothing is reconstructed, so
-// magnified surfaces have holes. For comparison with the renderer, which draws whole faces of voxels.
+// magnified surfaces have holes, through which one sees what lies behind, or nothing. For comparison with the renderer, which draws whole
+// faces of voxels.
 //
 // Slices are transformed one at a time by the incremental scheme: each is the one before it plus a row of the matrix (transform_loops.h).
 #pragma once
@@ -24,11 +25,13 @@ class PointZBuffer {
   void Draw(const TransformMatrix& matrix, const Index3& size, const std::uint8_t* occupied);
 
   bool Written(std::size_t pixel) const { return voxel_[pixel] != 0; }
-  // Of all pixels, row by row: the number that are `covered` and not written, and the number of covered ones.
+  // Pixels, compared with the depths of faces, row by row, +infinity where there is none, for voxels of spacing 1.
   struct Holes {
-    std::size_t holes = 0, covered = 0;
+    std::size_t covered = 0;  // by a face
+    std::size_t empty = 0;    // of these: not written
+    std::size_t behind = 0;   // of these: the voxel lies more than a voxel's diagonal behind the face, so it is not the face's
   };
-  Holes HolesIn(const std::vector<bool>& covered) const;
+  Holes HolesIn(const std::vector<float>& faces) const;
 
  private:
   ImageSize size_;

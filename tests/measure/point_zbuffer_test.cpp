@@ -18,16 +18,37 @@ PointZBuffer::Holes HolesOfPlane(int n, int magnified) {
   const int side = n * magnified;
   PointZBuffer points({side, side});
   points.Draw(matrix, {n, n, n}, voxels.data());
-  return points.HolesIn(std::vector<bool>(std::size_t(side * side), true));
+  std::vector<float> faces(std::size_t(side * side));  // of the front of the cells
+  for (int row = 0; row < side; ++row) {
+    for (int column = 0; column < side; ++column) faces[std::size_t(row * side + column)] = float(column / magnified) + 0.5F;
+  }
+  return points.HolesIn(faces);
 }
 
 TEST(PointZBuffer, APlaneAt45DegreesHasItsHoles) {
   for (const int n : {1, 2, 5, 8, 33, 64}) {
     const auto voxels = std::size_t(n * n);
-    EXPECT_EQ(HolesOfPlane(n, 1).holes, 0U) << n;
+    EXPECT_EQ(HolesOfPlane(n, 1).empty, 0U) << n;
     EXPECT_EQ(HolesOfPlane(n, 2).covered, 4 * voxels) << n;
-    EXPECT_EQ(HolesOfPlane(n, 2).holes, 3 * voxels) << n;
-    EXPECT_EQ(HolesOfPlane(n, 3).holes, 8 * voxels) << n;
+    EXPECT_EQ(HolesOfPlane(n, 2).empty, 3 * voxels) << n;
+    EXPECT_EQ(HolesOfPlane(n, 3).empty, 8 * voxels) << n;
+    EXPECT_EQ(HolesOfPlane(n, 3).behind, 0U) << n;
+  }
+}
+
+// A wall at z = 0 and another one at z = 5, magnified twice and seen askew: the second one is 5 columns to the right and shows in the
+// first one's holes.
+TEST(PointZBuffer, HolesShowWhatLiesBehind) {
+  constexpr int kBack = 5;
+  for (const int n : {6, 7, 20, 41}) {
+    std::vector<std::uint8_t> voxels(std::size_t(n * n * (kBack + 1)));
+    std::fill_n(voxels.begin(), n * n, std::uint8_t{1});
+    std::fill_n(voxels.end() - n * n, n * n, std::uint8_t{1});
+    PointZBuffer points({2 * n, 2 * n});
+    points.Draw({{{2, 0, 1, 1}, {0, 2, 0, 1}, {0, 0, 1, 1}}}, {n, n, kBack + 1}, voxels.data());
+    const PointZBuffer::Holes holes = points.HolesIn(std::vector<float>(std::size_t(4 * n * n), 0.5F));
+    EXPECT_EQ(holes.behind, std::size_t(n * (n - 3))) << n;  // columns 6, 8, ...
+    EXPECT_EQ(holes.empty, std::size_t(4 * n * n - n * n - n * (n - 3))) << n;
   }
 }
 

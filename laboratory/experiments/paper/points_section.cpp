@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "laboratory/experiments/paper/render_alone.h"
 #include "laboratory/experiments/paper/setup.h"
@@ -43,17 +44,16 @@ PointZBuffer Draw(const PointsCase& of, const Volume& volume, double* seconds = 
   return points;
 }
 
-std::vector<bool> CoveredByFaces(ExperimentContext& context, const PointsCase& of) {
+// Of the whole picture; +infinity where there is no face.
+std::vector<float> DepthsOfFaces(ExperimentContext& context, const PointsCase& of) {
   const Picture picture = RenderAlone(context, of.frame.volume, of.frame.view, of.side());
   const PixelBounds& bounds = picture.image.bounds;
-  std::vector<bool> covered(std::size_t(of.side()) * std::size_t(of.side()));
-  std::size_t i = 3;  // the alpha of a pixel
-  for (int y = bounds.y_begin; y < bounds.y_end; ++y) {
-    for (int x = bounds.x_begin; x < bounds.x_end; ++x, i += 4) {
-      covered[std::size_t(y) * std::size_t(of.side()) + std::size_t(x)] = picture.image.rgba[i] > 0;
-    }
+  std::vector<float> depths(std::size_t(of.side()) * std::size_t(of.side()), std::numeric_limits<float>::infinity());
+  for (int row = 0; row < bounds.height(); ++row) {
+    const auto first = picture.image.depth.begin() + std::ptrdiff_t{row} * bounds.width();
+    std::copy_n(first, bounds.width(), depths.begin() + std::ptrdiff_t{bounds.y_begin + row} * of.side() + bounds.x_begin);
   }
-  return covered;
+  return depths;
 }
 
 // Transform and Z-buffer without shading, which is all that the points do. Stages are in elapsed time; their share of the rendering's
@@ -97,9 +97,10 @@ void AddPoints(const PaperSetup& setup, Results& results) {
     add("points", "run_time", EstimateOf(setup.context().log(), of.Key(), "seconds"));
     add("faces", "run_time", SecondsOfFaces(setup, of));
     const PointZBuffer points = Draw(of, *setup.context().volumes().Get(of.frame.volume).volume);
-    const auto [holes, covered] = points.HolesIn(CoveredByFaces(setup.context(), of));
-    add("covered pixels", "count", double(covered));
-    add("holes", "count", double(holes));
+    const PointZBuffer::Holes holes = points.HolesIn(DepthsOfFaces(setup.context(), of));
+    add("covered pixels", "count", double(holes.covered));
+    add("empty pixels", "count", double(holes.empty));
+    add("pixels of voxels behind", "count", double(holes.behind));
   }
 }
 

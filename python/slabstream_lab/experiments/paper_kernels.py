@@ -29,7 +29,7 @@ def power_text(points: Points, x: str) -> str:
         return ""
     mean_x, mean_y = (sum(column) / len(logs) for column in zip(*logs))
     power = sum((a - mean_x) * (b - mean_y) for a, b in logs) / sum((a - mean_x) ** 2 for a, _ in logs)
-    over = f"({x} = {points[0][0]} to {points[-1][0]})"
+    over = f"({x} = {points[0][0]} to {points[-1][0]}{', one repeat each' if any(y.repeats == 1 for _, y in points) else ''})"
     if abs(power) < 0.1:
         return f"stays within {x} to the power of {number_text(power, 1)} {over}"
     return f"{'grows' if power > 0 else 'falls'} as {x} to the power of {number_text(power, 2)} {over}"
@@ -39,18 +39,15 @@ def compared_text(ratios: Mapping[str, Value], of: str) -> str:
     """How a method compares with another one over several cases, from time of the other over its own."""
     if not all(ratio.ranks for ratio in ratios.values()):
         return f"not ranked against {of}"
-    groups = {
-        "faster": [r for r in ratios.values() if r.low > 1],
-        "tied": [r for r in ratios.values() if r.low <= 1 <= r.high],
-        "slower": [r for r in ratios.values() if r.high < 1],
-    }
-    ends = sorted(ratios.values(), key=lambda ratio: ratio.value)
-    worst, best = speed_text(ends[0]), speed_text(ends[-1], of)
-    span = best if len(ends) == 1 or worst == speed_text(ends[-1]) else f"from {worst} to {best}"
-    if len(groups["tied"]) == len(ends):
-        return f"as fast as {of} (ties)"
-    counts = ", ".join(f"{what} in {len(group)}" for what, group in groups.items() if group)
-    return f"{span} ({counts} of {len(ends)} cases)"
+    faster, slower = (sorted(r.value for r in ratios.values() if apart(r)) for apart in (lambda r: r.low > 1, lambda r: r.high < 1))
+    parts = []
+    for found, word in ((faster, "fast"), ([1 / value for value in reversed(slower)], "slow")):
+        if found:
+            ends = list(dict.fromkeys(number_text(value, 2) for value in (found[0], found[-1])))
+            parts.append(f"{' to '.join(ends)} times as {word} as {of} in {len(found)} of {len(ratios)} cases")
+    if ties := len(ratios) - len(faster) - len(slower):
+        parts.append(f"as fast{'' if parts else f' as {of}'} (a tie) in {ties} of {len(ratios)}{'' if parts else ' cases'}")
+    return ", ".join(parts)
 
 
 def _transform(run: Run) -> Section:
@@ -224,23 +221,24 @@ def _splatting(run: Run) -> Section:
     wide = [k for k in widths if k >= 9] if sum(k >= 9 for k in widths) >= 2 else widths
     for loop in loops:
         if growth := power_text([(k, slice_time(loop, k)) for k in wide], "k"):
-            texts.append(f"{loop} {growth}")
-    growths = [f"The time of a filled slice {'; '.join(texts)} (the paper, not in vectors: quadratic)."] if texts else []
+            texts.append(f"by '{loop}' {growth}")
+    growths = [f"The time of a filled slice, splatted {'; '.join(texts)} (the paper, not in vectors: quadratic)."] if texts else []
+    span = f"k = {widths[0]}" + (f" to {widths[-1]}" if len(widths) > 1 else "")
     pairs = [("phases", "plain, no vectors", "the plain loop without vectors"), ("kernels", "phases", "the phases")]
     compared = [
-        f"For k = {widths[0]} to {widths[-1]} on a filled slice, {loop} are "
+        f"For {span} on a filled slice, {loop} are "
         f"{compared_text({str(k): slice_time(of, k).over(slice_time(loop, k)) for k in widths}, name)}."
         for loop, of, name in pairs
     ]
     sparse = speed_text(sparse_time("plain, no vectors", shares[0]).over(sparse_time("phases", shares[0])), "the plain loop")
-    compared.append(f"With {shares[0]:.0%} of the voxels occupied and k = 5, phases, which splat empty voxels too, are {sparse}.")
+    compared.append(f"With {shares[0] * 100:g} % of the voxels occupied and k = 5, phases, which splat empty voxels too, are {sparse}.")
     (first, few), (last, many) = spheres[0], spheres[-1]
     ratio = many.over(few)
     change = f"{ratio.text()} times as long" if not ratio.low <= 1 <= ratio.high else "no longer (a tie)"
     compared.append(
-        f"From {first:.0%} to {last:.0%} occupied voxels of class II, {last / first:.0f} times as many, the slowest slab takes {change} "
+        f"From {first * 100:g} % to {last * 100:g} % occupied voxels of class II, {last / first:.0f} times as many, the slowest slab takes {change} "
         "(the paper: linear)." if few.ranks and many.ranks else
-        f"From {first:.0%} to {last:.0%} occupied voxels of class II, the slowest slab takes {few.text()} and {many.text()} (one repeat)."
+        f"From {first * 100:g} % to {last * 100:g} % occupied voxels of class II, the slowest slab takes {few.text()} and {many.text()} (one repeat)."
     )
     return Section(
         "Splatting: figure 8",
@@ -320,12 +318,16 @@ def _points(run: Run) -> Section:
     def count(variant: str, n: int, view: str) -> Value:
         return run.value("count", part="points", variant=variant, n=n, view=view)
 
-    def holes(n: int, view: str) -> Value:
+    def share(variant: str, n: int, view: str) -> Value:
         covered = count("covered pixels", n, view)
-        return count("holes", n, view).over(covered).percent() if covered.value else Value.exact(0, "%")
+        return count(variant, n, view).over(covered).percent() if covered.value else Value.exact(0, "%")
+
+    def holes(n: int, view: str) -> Value:
+        empty, behind = (share(variant, n, view) for variant in ("empty pixels", "pixels of voxels behind"))
+        return Value.exact(empty.value + behind.value, "%")
 
     n = sizes[-1]
-    shares = [f"{holes(n, view).text()} % at {view}" for view in views]
+    shares = [f"{holes(n, view).value:.1f} % at {scale[view]:g}" for view in views]
     ratios = {f"{size}, {view}": time("points", size, view).over(time("faces", size, view)) for size in sizes for view in views}
     return Section(
         "Holes: Z-buffering of voxel points",
@@ -333,15 +335,13 @@ def _points(run: Run) -> Section:
         "Points, as in the paper: each occupied voxel of a class-I sphere writes the one pixel that its centre falls on, if it is the "
         "nearest; all voxels are transformed, slice by slice, from an array. Faces: the renderer's Z-buffer stage with its transform, which "
         "draws the faces of voxels and has found the surface beforehand. One thread, N x N pixels, neither is shaded. A pixel that a face "
-        "covers is a hole if no point has written it. A magnified sphere is cut off by the picture's border.",
-        f"At N = {n}, points leave holes in {', '.join(shares[:-1])} and {shares[-1]} of the covered pixels. Drawing faces is "
-        f"{compared_text(ratios, 'drawing points')}."
-        if len(shares) > 1
-        else "",
+        "covers is a hole if no point has written it, or one of a voxel that lies more than a voxel's diagonal behind the face. A magnified sphere is cut off by the picture's border.",
+        f"At N = {n}, of the covered pixels {', '.join(shares[:-1])} and {shares[-1]} pixels a voxel are holes. Drawing faces is "
+        f"{compared_text(ratios, 'drawing points')}.",
         [
             Table(
                 "Points and faces",
-                ["N", "pixels a voxel", "points", "faces", "points over faces", "covered pixels", "holes", "share of holes"],
+                ["N", "pixels a voxel", "points", "faces", "points over faces", "covered pixels", "empty", "a voxel behind", "holes"],
                 [
                     [
                         size,
@@ -350,7 +350,8 @@ def _points(run: Run) -> Section:
                         time("faces", size, view),
                         time("points", size, view).over(time("faces", size, view)),
                         int(count("covered pixels", size, view).value),
-                        int(count("holes", size, view).value),
+                        share("empty pixels", size, view),
+                        share("pixels of voxels behind", size, view),
                         holes(size, view),
                     ]
                     for size in sizes
@@ -359,7 +360,7 @@ def _points(run: Run) -> Section:
             ),
             plots.lines(
                 "holes",
-                "Covered pixels that no point has written",
+                "Covered pixels that show no point of their surface",
                 {f"N = {size}": [(scale[view], holes(size, view)) for view in views] for size in sizes},
                 "pixels a voxel",
                 "share of holes",
