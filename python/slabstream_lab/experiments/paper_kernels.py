@@ -105,7 +105,7 @@ def _transform(run: Run) -> Section:
             f"At p = {p} the time of the phases in vectors {growth}; the paper's two printed times at p = 15 grow as N to the power of "
             f"{number_text(math.log(cubic[1][1].value / cubic[0][1].value) / math.log(2), 2)} (N = 150 to 300)."
         )
-    texts += _error_texts(run, sizes)
+    texts.append(_error_text(run, sizes))
     series = {f"N = {n}": [(p, get("phases", n, p)) for p in workers] for n in sizes}
     series[f"N = {printed_n}, paper"] = [(p, phases) for p, (_, phases) in paper.items() if phases]
     return Section(
@@ -113,8 +113,8 @@ def _transform(run: Run) -> Section:
         "How much do the paper's incremental phases gain over a matrix product for every voxel, what does each phase cost, and how large "
         "are the accumulated errors?",
         "The largest slab of a worker, N x N x ceil(N/p) voxels, is transformed into three stored arrays of coordinates, on one thread. "
-        "The seed phase multiplies one voxel by the matrix. The voxel phase adds the step along a beam, one voxel after the other; the beam "
-        "phase adds a whole beam to the next one; the slice phase adds a whole slice to the next one. Both the product and the phases are "
+        "The seed phase multiplies one voxel by the matrix. The voxel phase adds the step along a beam, one voxel after the other; the "
+        "beam phase adds a whole beam to the next one; the slice phase adds a whole slice to the next one. Both the product and the phases are "
         "measured compiled without vectors, and in vectors of the machine's best instruction set. Running beams add along each beam in "
         "vectors and start each beam from one number. The transform needs no communication, so the slab of one worker is measured for "
         "every p. The renderers of Slabstream do not run it in this form.",
@@ -166,8 +166,8 @@ def _phases(run: Run, n: int, workers: list[int]) -> Table:
     first = ["seed", "voxel", "beam", "slice"]
     ends = [workers[0], workers[-1]] if len(workers) > 1 else workers
     return Table(
-        f"Equations 8 to 11: operations and time of each phase, N = {n}. Short phases are repeated for one time, so they find their data in "
-        "the cache. The paper counts 12 additions and 16 products for the seed; the matrix has three rows here",
+        f"Equations 8 to 11: operations and time of each phase, N = {n}. Short phases are repeated for one time, so they find their data "
+        "in the cache. The paper counts 12 additions and 16 products for the seed; the matrix has three rows here",
         ["p", "phase", "additions", "products", "time, vectors", "time an operation", "time, no vectors"],
         [row for p in ends for row in rows(p, "phases", first) + rows(p, "phases, first slice by products", ["first slice"])],
     )
@@ -185,17 +185,13 @@ def _errors(run: Run, sizes: list[int], methods: list[str]) -> Table:
     )
 
 
-def _error_texts(run: Run, sizes: list[int]) -> list[str]:
+def _error_text(run: Run, sizes: list[int]) -> str:
     n = sizes[-1]
     phases, remedy = _offset(run, "phases", n).value, _offset(run, "phases, first slice by products", n).value
     growth = power_text([(size, _offset(run, "phases", size)) for size in sizes], "N")
-    texts = [f"The largest error of the phases {growth}; at N = {n} it is {number_text(phases, 2)} pixels" if growth else
-             f"The largest error of the phases at N = {n} is {number_text(phases, 2)} pixels"]
-    if remedy < phases:
-        change = f"lowers it to {number_text(remedy, 2)}"
-    else:
-        change = f"does not lower it ({number_text(remedy, 2)})"
-    return [f"{texts[0]}, and the paper's remedy, products for the first slice, {change}."]
+    change = f"lowers it to {number_text(remedy, 2)}" if remedy < phases else f"does not lower it ({number_text(remedy, 2)})"
+    text = f"The largest error of the phases {growth}; at N = {n} it" if growth else f"The largest error of the phases at N = {n}"
+    return f"{text} is {number_text(phases, 2)} pixels, and the paper's remedy, products for the first slice, {change}."
 
 
 def _splatting(run: Run) -> Section:
@@ -215,7 +211,8 @@ def _splatting(run: Run) -> Section:
         return run.value("run_time", part="slice over occupancy", variant=loop, occupancy=c)
 
     shares = sorted(run.distinct("occupancy", part="slice over occupancy"))
-    spheres = [(c, run.value("run_time", part="splat over occupancy", occupancy=c)) for c in sorted(run.distinct("occupancy", **over_occupancy))]
+    occupancies = sorted(run.distinct("occupancy", **over_occupancy))
+    spheres = [(c, run.value("run_time", part="splat over occupancy", occupancy=c)) for c in occupancies]
     texts = []
     # Below this width the other work of a voxel weighs on the plain loop.
     wide = [k for k in widths if k >= 9] if sum(k >= 9 for k in widths) >= 2 else widths
@@ -223,27 +220,28 @@ def _splatting(run: Run) -> Section:
         if growth := power_text([(k, slice_time(loop, k)) for k in wide], "k"):
             texts.append(f"by '{loop}' {growth}")
     growths = [f"The time of a filled slice, splatted {'; '.join(texts)} (the paper, not in vectors: quadratic)."] if texts else []
-    span = f"k = {widths[0]}" + (f" to {widths[-1]}" if len(widths) > 1 else "")
+    over = f"k = {widths[0]}" + (f" to {widths[-1]}" if len(widths) > 1 else "")
     pairs = [("phases", "plain, no vectors", "the plain loop without vectors"), ("kernels", "phases", "the phases")]
     compared = [
-        f"For {span} on a filled slice, {loop} are "
+        f"For {over} on a filled slice, {loop} are "
         f"{compared_text({str(k): slice_time(of, k).over(slice_time(loop, k)) for k in widths}, name)}."
         for loop, of, name in pairs
     ]
     sparse = speed_text(sparse_time("plain, no vectors", shares[0]).over(sparse_time("phases", shares[0])), "the plain loop")
     compared.append(f"With {shares[0] * 100:g} % of the voxels occupied and k = 5, phases, which splat empty voxels too, are {sparse}.")
     (first, few), (last, many) = spheres[0], spheres[-1]
-    ratio = many.over(few)
-    change = f"{ratio.text()} times as long" if not ratio.low <= 1 <= ratio.high else "no longer (a tie)"
-    compared.append(
-        f"From {first * 100:g} % to {last * 100:g} % occupied voxels of class II, {last / first:.0f} times as many, the slowest slab takes {change} "
-        "(the paper: linear)." if few.ranks and many.ranks else
-        f"From {first * 100:g} % to {last * 100:g} % occupied voxels of class II, the slowest slab takes {few.text()} and {many.text()} (one repeat)."
-    )
+    ratio, span = many.over(few), f"From {first * 100:g} % to {last * 100:g} % occupied voxels of class II, {last / first:.0f} times as many,"
+    if not ratio.ranks:
+        change = f"takes {few.text()} and {many.text()} (not ranked)"
+    elif ratio.low <= 1 <= ratio.high:
+        change = "takes as long (a tie)"
+    else:
+        change = f"takes {ratio.text()} times as long"
+    compared.append(f"{span} the slowest slab {change} (the paper: linear).")
     return Section(
         "Splatting: figure 8",
-        "How does splatting grow with the workers, with the width of the footprint and with occupancy, and what do the phases gain that the "
-        "paper proposes in section 5.1?",
+        "How does splatting grow with the workers, with the width of the footprint and with occupancy, and what do the phases gain that "
+        "the paper proposes in section 5.1?",
         "a: class-I spheres in equal slabs; the slab that takes longest, rendered alone on one thread (places of voxels and splatting). "
         f"b: a filled slice of {side} x {side} voxels at a pixel a voxel, splatted and composited in three ways that make the same pixels. "
         "Plain: each voxel adds k x k weighted pixels, compiled without vectors, as the paper's. Phases: for each of the k x k offsets in "
@@ -333,9 +331,10 @@ def _points(run: Run) -> Section:
         "Holes: Z-buffering of voxel points",
         "How many holes does the paper's Z-buffer leave, and what do faces cost, which leave none?",
         "Points, as in the paper: each occupied voxel of a class-I sphere writes the one pixel that its centre falls on, if it is the "
-        "nearest; all voxels are transformed, slice by slice, from an array. Faces: the renderer's Z-buffer stage with its transform, which "
-        "draws the faces of voxels and has found the surface beforehand. One thread, N x N pixels, neither is shaded. A pixel that a face "
-        "covers is a hole if no point has written it, or one of a voxel that lies more than a voxel's diagonal behind the face. A magnified sphere is cut off by the picture's border.",
+        "nearest; all voxels are transformed, slice by slice, from an array. Faces: the renderer's Z-buffer stage with its transform, "
+        "which draws the faces of voxels and has found the surface beforehand. One thread, N x N pixels, neither is shaded. A pixel that a face "
+        "covers is a hole if no point has written it, or one of a voxel that lies more than a voxel's diagonal behind the "
+        "face. A magnified sphere is cut off by the picture's border.",
         f"At N = {n}, of the covered pixels {', '.join(shares[:-1])} and {shares[-1]} pixels a voxel are holes. Drawing faces is "
         f"{compared_text(ratios, 'drawing points')}.",
         [
