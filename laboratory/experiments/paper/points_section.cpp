@@ -56,13 +56,11 @@ std::vector<float> DepthsOfFaces(ExperimentContext& context, const PointsCase& o
   return depths;
 }
 
-// Transform and Z-buffer without shading, which is all that the points do. Stages are in elapsed time; their share of the rendering's
-// processor time leaves out what else the machine did.
+// Transform and Z-buffer without shading, which is all that the points do.
 Estimate SecondsOfFaces(const PaperSetup& setup, const PointsCase& of) {
   std::vector<double> seconds;
   for (const MeasuredFrame& repeat : RecallRepeats(setup.context(), of.frame)) {
-    const auto stage = [&](Stage s) { return repeat.StageSeconds(s); };
-    seconds.push_back(repeat.RenderSeconds() * (stage(Stage::kTransform) + stage(Stage::kZBuffer)) / stage(Stage::kRender));
+    seconds.push_back(repeat.StageSeconds(Stage::kTransform) + repeat.StageSeconds(Stage::kZBuffer));
   }
   return MedianOf(std::move(seconds));
 }

@@ -37,16 +37,19 @@ def power_text(points: Points, x: str) -> str:
 
 def compared_text(ratios: Mapping[str, Value], of: str) -> str:
     """How a method compares with another one over several cases, from time of the other over its own."""
-    if not all(ratio.ranks for ratio in ratios.values()):
+    ranked = [ratio for ratio in ratios.values() if ratio.ranks]
+    if not ranked:
         return f"not ranked against {of}"
-    faster, slower = (sorted(r.value for r in ratios.values() if apart(r)) for apart in (lambda r: r.low > 1, lambda r: r.high < 1))
+    faster, slower = (sorted(r.value for r in ranked if apart(r)) for apart in (lambda r: r.low > 1, lambda r: r.high < 1))
     parts = []
     for found, word in ((faster, "fast"), ([1 / value for value in reversed(slower)], "slow")):
         if found:
             ends = list(dict.fromkeys(number_text(value, 2) for value in (found[0], found[-1])))
             parts.append(f"{' to '.join(ends)} times as {word} as {of} in {len(found)} of {len(ratios)} cases")
-    if ties := len(ratios) - len(faster) - len(slower):
+    if ties := len(ranked) - len(faster) - len(slower):
         parts.append(f"as fast{'' if parts else f' as {of}'} (a tie) in {ties} of {len(ratios)}{'' if parts else ' cases'}")
+    if unranked := len(ratios) - len(ranked):
+        parts.append(f"not ranked in {unranked} of {len(ratios)}")
     return ", ".join(parts)
 
 
@@ -114,8 +117,8 @@ def _transform(run: Run) -> Section:
         "are the accumulated errors?",
         "The largest slab of a worker, N x N x ceil(N/p) voxels, is transformed into three stored arrays of coordinates, on one thread. "
         "The seed phase multiplies one voxel by the matrix. The voxel phase adds the step along a beam, one voxel after the other; the "
-        "beam phase adds a whole beam to the next one; the slice phase adds a whole slice to the next one. Both the product and the phases are "
-        "measured compiled without vectors, and in vectors of the machine's best instruction set. Running beams add along each beam in "
+        "beam phase adds a whole beam to the next one; the slice phase adds a whole slice to the next one. Both the product and the phases "
+        "are measured compiled without vectors, and in vectors of the machine's best instruction set. Running beams add along each beam in "
         "vectors and start each beam from one number. The transform needs no communication, so the slab of one worker is measured for "
         "every p. The renderers of Slabstream do not run it in this form.",
         " ".join(texts),
@@ -230,7 +233,8 @@ def _splatting(run: Run) -> Section:
     sparse = speed_text(sparse_time("plain, no vectors", shares[0]).over(sparse_time("phases", shares[0])), "the plain loop")
     compared.append(f"With {shares[0] * 100:g} % of the voxels occupied and k = 5, phases, which splat empty voxels too, are {sparse}.")
     (first, few), (last, many) = spheres[0], spheres[-1]
-    ratio, span = many.over(few), f"From {first * 100:g} % to {last * 100:g} % occupied voxels of class II, {last / first:.0f} times as many,"
+    ratio = many.over(few)
+    span = f"From {first * 100:g} % to {last * 100:g} % occupied voxels of class II, {last / first:.0f} times as many,"
     if not ratio.ranks:
         change = f"takes {few.text()} and {many.text()} (not ranked)"
     elif ratio.low <= 1 <= ratio.high:
@@ -332,8 +336,8 @@ def _points(run: Run) -> Section:
         "How many holes does the paper's Z-buffer leave, and what do faces cost, which leave none?",
         "Points, as in the paper: each occupied voxel of a class-I sphere writes the one pixel that its centre falls on, if it is the "
         "nearest; all voxels are transformed, slice by slice, from an array. Faces: the renderer's Z-buffer stage with its transform, "
-        "which draws the faces of voxels and has found the surface beforehand. One thread, N x N pixels, neither is shaded. A pixel that a face "
-        "covers is a hole if no point has written it, or one of a voxel that lies more than a voxel's diagonal behind the "
+        "which draws the faces of voxels and has found the surface beforehand. One thread, N x N pixels, neither is shaded. A pixel that a "
+        "face covers is a hole if no point has written it, or one of a voxel that lies more than a voxel's diagonal behind the "
         "face. A magnified sphere is cut off by the picture's border.",
         f"At N = {n}, of the covered pixels {', '.join(shares[:-1])} and {shares[-1]} pixels a voxel are holes. Drawing faces is "
         f"{compared_text(ratios, 'drawing points')}.",
