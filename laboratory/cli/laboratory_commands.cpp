@@ -1,10 +1,14 @@
 #include "laboratory/cli/laboratory_commands.h"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
 #include <iostream>
 #include <limits>
 #include <memory>
+#include <set>
 #include <string_view>
 
 #include "client/cli/option_groups.h"
@@ -12,6 +16,7 @@
 #include "laboratory/bench/bench.h"
 #include "laboratory/experiments/run_experiment.h"
 #include "laboratory/measure/replay.h"
+#include "laboratory/measure/splat_loops.h"
 
 namespace slabstream {
 namespace {
@@ -69,6 +74,19 @@ void DeclareReplay(CLI::App& experiment, std::function<Status()>& run) {
   sub->callback([options, &run] { run = [options] { return RunReplay(*options, std::cout); }; });
 }
 
+// "3,5,7", ascending and each once in the result.
+Result<std::vector<int>> ParseFootprints(const std::string& option, const std::string& text) {
+  std::set<int> widths;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    const Result<int> width = ParseInteger(option, text.substr(begin, end - begin), kMinFootprint, kMaxFootprint);
+    if (!width.ok()) return width.status();
+    widths.insert(*width);
+    begin = end + 1;
+  }
+  return std::vector(widths.begin(), widths.end());
+}
+
 void DeclareExperiment(const CommandLine& line) {
   CLI::App* sub = line.app.add_subcommand("experiment", "Compare ways of dividing, combining and streaming, and write a report");
   auto options = std::make_shared<ExperimentOptions>();
@@ -87,6 +105,11 @@ void DeclareExperiment(const CommandLine& line) {
       "Seed of the random order of the trials")
       ->type_name("N")
       ->default_str("1");
+  AddParsed(*sub, "--footprints", options->footprints, ParseFootprints,
+            fmt::format("For paper: diameters of the footprints of figure 8b in pixels, each from {} to {}, such as 3,5,7", kMinFootprint,
+                        kMaxFootprint))
+      ->type_name("K,...")
+      ->default_str("3,5,9,13,17,25");
   AddRepeated(*sub, "--volume", options->volumes, "A sparse volume of your own, as FILE or FILE:TRANSFER")->type_name("VOLUME");
   CLI::Option* resume = sub->add_flag_callback(
       "--resume", [options] { options->resume = Resume::kAnyBuild; }, "Continue what DIR holds even if another build or machine began it");

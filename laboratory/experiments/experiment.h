@@ -25,6 +25,7 @@ struct ExperimentOptions {
   std::uint64_t seed = 1;
   int repeats = 0;  // [1, kMaxRepeats]; 0: the experiment's own number
   Resume resume = Resume::kSame;
+  std::vector<int> footprints;       // of `paper`: diameters of footprints, ascending; none: the experiment's own
   std::vector<std::string> volumes;  // FILE[:TRANSFER], beside or instead of the standard ones
   bool list = false;
   std::string command;  // as it was typed
@@ -64,12 +65,13 @@ struct Experiment {
   void (*check)(const ExperimentOptions&) = nullptr;
   bool takes_file = false;                               // ExperimentOptions::sweep_file
   void (*find)(ExperimentContext&, Results&) = nullptr;  // instead of run
+  bool takes_footprints = false;                         // ExperimentOptions::footprints
 };
 
 // The only list.
 const std::vector<Experiment>& Experiments();
 
-Report RunPaper(ExperimentContext& context);
+void RunPaper(ExperimentContext& context, Results& results);
 Report RunBalance(ExperimentContext& context);
 Report RunCombining(ExperimentContext& context);
 void RunStreaming(ExperimentContext& context, Results& results);

@@ -26,8 +26,8 @@ Json ReferenceLoopKey() { return {{"what", "reference loop"}}; }
 
 // Everything that decides the set of trials.
 Json Parameters(const ExperimentOptions& options, VolumeCache& volumes) {
-  Json parameters = {{"seed", options.seed},   {"repeats", options.repeats}, {"quick", options.quick},
-                     {"scale", options.scale}, {"volumes", options.volumes}, {"sweep", Json()}};
+  Json parameters = {{"seed", options.seed},       {"repeats", options.repeats},       {"quick", options.quick}, {"scale", options.scale},
+                     {"volumes", options.volumes}, {"footprints", options.footprints}, {"sweep", Json()}};
   if (!options.sweep_file.empty()) {
     parameters["sweep"] = Json::parse(OrThrow(ReadTextFile(options.sweep_file, kMaxSweepBytes)), nullptr, false);
   }
@@ -94,6 +94,9 @@ void Run(const ExperimentOptions& options) {
     throw Failure(Status::InvalidArgument(
         experiment->takes_file ? fmt::format("experiment '{}' needs a FILE", options.name)
                                : fmt::format("experiment '{}' takes no FILE, '{}' was given", options.name, options.sweep_file)));
+  }
+  if (!options.footprints.empty() && !experiment->takes_footprints) {
+    throw Failure(Status::InvalidArgument(fmt::format("experiment '{}' takes no --footprints", options.name)));
   }
   const MachineInfo machine = DescribeMachine();
   const std::string machine_text = fmt::format("{}, {} cores, {}", machine.cpu, machine.cores, machine.simd);

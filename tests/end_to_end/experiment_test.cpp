@@ -99,6 +99,9 @@ TEST_F(ExperimentTest, WhatIsWrongIsToldInALine) {
       {{"experiment", "paper", "some.json", "-o", "x"}, "takes no FILE"},
       {{"experiment", "paper", "-o", "x", "--scale", "2"}, "--scale"},
       {{"experiment", "paper", "-o", "x", "--repeats", "0"}, "--repeats"},
+      {{"experiment", "paper", "-o", "x", "--footprints", "3,99"}, "--footprints 99"},
+      {{"experiment", "paper", "-o", "x", "--footprints", "3,,5"}, "--footprints ''"},
+      {{"experiment", "streaming", "-o", "x", "--footprints", "3"}, "'streaming' takes no --footprints"},
       {{"experiment", "paper", "-o", "x", "--volume", "none.nrrd"}, "none.nrrd"},
       {{"experiment", "paper", "-o", "/proc/x"}, "/proc/x"},
   };

@@ -37,11 +37,13 @@ class PaperSetup {
   std::vector<int> sizes_, workers_;
 };
 
-// Sections: the measurements that they need, and their texts.
+// Sections: the measurements that they need, and what they find.
 std::vector<Trial> TransformTrials(const PaperSetup& setup);
-Section TransformSection(const PaperSetup& setup);
+void AddTransform(const PaperSetup& setup, Results& results);
 std::vector<Trial> FootprintTrials(const PaperSetup& setup);
-Section FootprintSection(const PaperSetup& setup);
+void AddFootprint(const PaperSetup& setup, Results& results);
+std::vector<Trial> PointsTrials(const PaperSetup& setup);
+void AddPoints(const PaperSetup& setup, Results& results);
 std::vector<Trial> FrameTrials(const PaperSetup& setup);
 Section ValidationSection(const PaperSetup& setup);
 Section CombiningSection(const PaperSetup& setup);
@@ -49,6 +51,6 @@ Section ConstantsSection(const PaperSetup& setup);
 Section PipelineSection(const PaperSetup& setup, const RendererKind* renderer);
 std::vector<Trial> ImprovedTrials(const PaperSetup& setup);
 Section ImprovedSection(const PaperSetup& setup);
-Section PicturesSection(const PaperSetup& setup);
+void AddPictures(const PaperSetup& setup, Results& results);
 
 }  // namespace slabstream
