@@ -69,7 +69,7 @@ struct Experiment {
 // The only list.
 const std::vector<Experiment>& Experiments();
 
-Report RunPaper(ExperimentContext& context);
+void RunPaper(ExperimentContext& context, Results& results);
 Report RunBalance(ExperimentContext& context);
 Report RunCombining(ExperimentContext& context);
 void RunStreaming(ExperimentContext& context, Results& results);

@@ -4,7 +4,7 @@ namespace slabstream {
 
 const std::vector<Experiment>& Experiments() {
   static const std::vector<Experiment> experiments = {
-      {"paper", "every table and figure of Yagel and Machiraju, theirs beside ours", RunPaper},
+      {"paper", "every table and figure of Yagel and Machiraju, theirs beside ours", nullptr, nullptr, false, RunPaper},
       {"balance", "partitions, splits and assignments: who is idle, what travels, how long a frame takes, 2 to 1024 workers", RunBalance},
       {"combining", "combining schemes over picture sizes, active pixels, workers and links", RunCombining},
       {"streaming", "groups against efficiency, memory of a worker and the time to the first preview", nullptr, nullptr, false,
