@@ -1,6 +1,7 @@
-// Our own model of the stages (laboratory/measure/cost_model.h), fitted to every slab of every N and p.
+// Our own model of the stages (laboratory/measure/cost_model.h), fitted to every slab of every N and p, and the cost of combining a pixel.
 #include <cmath>
 
+#include "laboratory/experiments/machines.h"
 #include "laboratory/experiments/paper/setup.h"
 #include "laboratory/measure/cost_fit.h"
 
@@ -25,6 +26,12 @@ std::vector<CostSample> SlabsOf(const PaperSetup& setup, const RendererKind* ren
 }  // namespace
 
 void AddConstants(const PaperSetup& setup, Results& results) {
+  std::vector<double> pixels;  // of a colour image, written, read and composited by our operators
+  for (const MachineModel& machine : Clusters(setup.context(), Link("10gbit"))) {
+    pixels.push_back(machine.combining.scan_pixel + machine.combining.encode_pixel + machine.combining.combine_pixel);
+  }
+  results.Add({{"part", "combining-pixel"}, {"renderer", Splatting()->name()}, {"stage", "combine"}}, "constant",
+              MedianOf(std::move(pixels)), Origin::kMeasured);
   for (const RendererKind* renderer : {Splatting(), ZBuffer()}) {
     const std::vector<CostSample> slabs = SlabsOf(setup, renderer);
     for (const StageModel& stage : CostModelOf(renderer->name())) {

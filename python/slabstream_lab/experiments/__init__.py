@@ -1,4 +1,4 @@
 """The pages: one module an experiment, with page(run) -> Page."""
-from . import streaming
+from . import paper, streaming
 
-PAGES = {"streaming": streaming.page}
+PAGES = {"paper": paper.page, "streaming": streaming.page}
