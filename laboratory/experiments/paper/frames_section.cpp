@@ -1,4 +1,4 @@
-// The frames of tables 2, 5 and 6 and figures 8a, 9, 10 and 11.
+// The frames of tables 2, 5 and 6 and figures 9, 10 and 11.
 #include <algorithm>
 #include <array>
 #include <map>
@@ -60,8 +60,6 @@ void Add(const PaperSetup& setup, const Asked& asked, const std::vector<MachineM
       const double stage_seconds = longest.stage_seconds[std::size_t(stage)] * scale;
       if (stage_seconds > 0) stages[std::string(ToString(stage))].push_back(stage_seconds);
     }
-    stages["places and splat"].push_back(
-        scale * (longest.stage_seconds[std::size_t(Stage::kTransform)] + longest.stage_seconds[std::size_t(Stage::kSplat)]));
     counts["drawn voxels of the worker that renders longest"].push_back(longest.drawn_voxels);
     counts["covered pixels of the worker that renders longest"].push_back(longest.covered_pixels);
   }

@@ -1,4 +1,4 @@
-"""Frames of `experiment paper`: tables 2, 5 and 6, figures 8 to 11, and efficiency over grain."""
+"""Frames of `experiment paper`: tables 2, 5 and 6, figures 8c to 11, and efficiency over grain."""
 from __future__ import annotations
 
 import dataclasses
@@ -11,7 +11,6 @@ from ..results import Run
 from ..value import Value, speed_text
 
 TITLES = {"splat": "splatting", "zbuffer": "the Z-buffer"}
-SPLATTING = "places and splat"  # the paper's splatting stage turns voxels into pixels of slices; ours also finds where they lie
 
 
 def sections(run: Run) -> list[Section]:
@@ -152,11 +151,11 @@ def _combining(frames: Frames) -> Section:
     nearest = "; ".join(f"{name}: {_sentence(log, linear)}" for name, (log, linear, origin) in fits.items() if origin == "paper")
     ours = [_closer(log, linear) for log, linear, origin in fits.values() if origin != "paper"]
     answer = (
-        f"At p = {p}, with whole images, a frame with hierarchical combining is {speed_text(rows[-1][3], 'one with centralised combining')}{paper}. "
-        f"Without empty pixels a frame with hierarchical combining is {speed_text(without['fan-in'], 'one with whole images')}, and one with "
-        f"centralised combining is {speed_text(without['centralized'], 'one with whole images')}. Of the printed times, {nearest}. "
-        f"Of our {len(ours)} curves, {ours.count('log2 p')} are closer to c log2 p, {ours.count('p')} closer to c p, and "
-        f"{ours.count('as close')} as close to both."
+        f"At p = {p}, with whole images, a frame with hierarchical combining is "
+        f"{speed_text(rows[-1][3], 'one with centralised combining')}{paper}. Without empty pixels a frame with hierarchical combining is "
+        f"{speed_text(without['fan-in'], 'one with whole images')}, and one with centralised combining is "
+        f"{speed_text(without['centralized'], 'one with whole images')}. Of the printed times, {nearest}. Of our {len(ours)} curves, "
+        f"{ours.count('log2 p')} are closer to c log2 p, {ours.count('p')} closer to c p, and {ours.count('as close')} as close to both."
     )
     return Section(
         "Combining: table 2 and figure 9",
@@ -201,60 +200,38 @@ def _sentence(log: Fit, linear: Fit) -> str:
     return f"residuals of c log2 p and c p are {residuals}, " + ("as close" if closer == "as close" else f"closer to c {closer}")
 
 
-# ---------------------------------------------------------------- splatting alone
+# ---------------------------------------------------------------- occupancy
 
 
 def _splatting(frames: Frames) -> Section:
-    def get(n: int, p: int) -> Value | None:
-        return frames.find("stage_time", "splat", n, p, stage=SPLATTING)
-
-    curves = {f"N = {n}": [(p, v) for p in frames.workers if (v := get(n, p))] for n in frames.sizes}
     rows = frames.run.select(part="figure-8c").sort_values("occupancy")
-    by_occupancy = plots.points_of(rows, "occupancy")
-    n, p = frames.sizes[-1], int(rows["workers"].iloc[0])
-    line = _straight_line([(c, v.value) for c, v in by_occupancy])
-    (least_c, least), (most_c, most) = by_occupancy[0], by_occupancy[-1]
-    last = frames.workers[-1]
-    one, many = get(n, 1), get(n, last)
-    fall = one.over(many) if one and many else None
+    points = plots.points_of(rows, "occupancy")
+    (n,), p = frames.run.distinct("n", part="figure-8c"), int(rows["workers"].iloc[0])
+    start, left = _straight_line([(c, v.value) for c, v in points])
+    (least_c, least), (most_c, most) = points[0], points[-1]
     answer = (
-        (f"At N = {n} the slab that takes longest is {speed_text(fall, 'the whole volume')} at p = {last}. " if fall else "")
-        + f"From C = {least_c * 100:.0f} % to {most_c * 100:.0f} %, {most_c / least_c:.0f} times as many voxels, splatting takes "
-        f"{most.over(least).text()} times as long. The straight line of least squares leaves {100 * line[1]:.0f} % (the paper: linear), and "
-        f"{100 * line[0] / most.value:.0f} % of the time at C = {most_c * 100:.0f} % does not depend on C by that line."
+        f"From C = {least_c * 100:.0f} % to {most_c * 100:.0f} %, {most_c / least_c:.0f} times as many voxels, splatting takes "
+        f"{most.over(least).text()} times as long. The straight line of least squares leaves {100 * left:.0f} % (the paper: linear), and "
+        f"{100 * start / most.value:.0f} % of the time at C = {most_c * 100:.0f} % does not depend on C by that line."
     )
     return Section(
-        "Splatting: figures 8a and 8c",
-        "How does the splatting stage grow with the workers and with occupancy?",
-        "Places of voxels and splatting, on one thread, of the slab that takes longest. a: class-I spheres in slabs of whole slices. c: the "
-        f"paper's class II, N = {frames.run.distinct('n', part='figure-8c')[0]}, p = {p}: each worker's slab holds a ball clipped by the "
-        "slab, with at most C N³/p voxels; all slabs are alike, and one is rendered. The view sets the width of our footprint, 4 to 6 "
-        "voxels; the paper's is k = 5.",
+        "Splatting: figure 8c",
+        "How does the splatting stage grow with occupancy?",
+        f"The paper's class II, N = {n}, p = {p}: each worker's slab holds a ball clipped by the slab, with at most C N³/p voxels. All "
+        "slabs are alike, and one is rendered on one thread: places of voxels and splatting. The view sets the width of our footprint, 4 "
+        "to 6 voxels; the paper's is k = 5. What the line leaves is the root mean square over the mean.",
         answer,
         [
             plots.lines(
-                "figure-8a-splatting",
-                "Figure 8a: splatting of a worker",
-                curves,
-                "workers p",
-                "time",
-                "The slab that takes longest. The paper prints its curves without numbers.",
-                log_y=True,
-                marks=True,
-            ),
-            Table(
-                "Figure 8a in numbers", ["p", *curves], [[p, *(get(n, p) for n in frames.sizes)] for p in frames.workers]
-            ),
-            plots.lines(
                 "figure-8c-occupancy",
-                f"Figure 8c: splatting against occupancy, p = {p}",
-                {"class II in each slab": by_occupancy},
+                f"Figure 8c: splatting against occupancy, N = {n}, p = {p}",
+                {"class II in each slab": points},
                 "occupied share C of a slab",
                 "time",
                 "The paper's curve ends between 80 and 90 s at C = 1.",
                 from_zero=True,
             ),
-            Table("Figure 8c in numbers", ["C (%)", "time"], [[f"{c * 100:.0f}", v] for c, v in by_occupancy]),
+            Table("Figure 8c in numbers", ["C (%)", "time"], [[round(c * 100), v] for c, v in points]),
         ],
     )
 
@@ -376,14 +353,17 @@ def _pipeline(frames: Frames, pipeline: Pipeline) -> Section:
     return Section(
         pipeline.title,
         f"How long does a frame by {TITLES[renderer]} take, how much do p workers gain, and where does the time go?",
-        "As the paper did it: class-I spheres of 5 %, slabs of N/p whole slices, hierarchical combining of whole images, one frame at a time, "
-        "nobody balanced. Slabs are measured one by one; with p = 1 that is the whole frame. For more workers the combining is simulated on "
-        "the paper's machine. Shares are of the sum of the medians: stages of the worker that renders longest, and what combining adds to it. Our "
-        f"default axis does not change with the view, so no voxel moves; slices are then divided.{pipeline.remark}",
+        "As the paper did it: class-I spheres of 5 %, slabs of N/p whole slices, hierarchical combining of whole images, one frame at a "
+        "time, nobody balanced. Slabs are measured one by one; with p = 1 that is the whole frame. For more workers the combining is "
+        "simulated on the paper's machine. Shares are of the sum of the medians: stages of the worker that renders longest, and what "
+        "combining adds to it. Our default axis does not change with the view, so no voxel moves; slices are then "
+        f"divided.{pipeline.remark}",
         answer,
         [
             stages,
-            plots.stacked(f"figure-{number}-stages", f"Where a frame's time goes, N = {n}", bars, "share (%)", "By workers, ours and the paper's."),
+            plots.stacked(
+                f"figure-{number}-stages", f"Where a frame's time goes, N = {n}", bars, "share (%)", "By workers, ours and the paper's."
+            ),
             plots.lines(
                 f"figure-{number}a-time",
                 f"Figure {number}a: time of a frame",
