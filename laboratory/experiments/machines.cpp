@@ -75,17 +75,4 @@ std::vector<MachineModel> Clusters(const ExperimentContext& context, const LinkM
   return machines;
 }
 
-MachineModel PaperMachine(const ExperimentContext& context, double frame_seconds, double pixels) {
-  // For N = 200 and p = 10 ... 30 centralised combining takes about 0.20 s an image (table 2 less the other stages of table 5). Compositing
-  // takes 0.117 s of it (table 5, p = 1: 32 % of 72.89 s for 200 slices), writing and reading the rest.
-  constexpr double kImageShare = 0.083 / 72.89;
-  MachineModel machine = Cluster(context, Link("pvs"));
-  machine.link.bytes_per_second = pixels * machine.combining.rgba_bytes / (kImageShare * frame_seconds);
-  machine.plan_seconds = machine.message_seconds = machine.client_seconds = 0;
-  machine.cores_a_host = 1;  // its workers were single processors
-  machine.wake_ups = {.awake = 0, .asleep = 0};
-  machine.combining.hidden_pixel = 0;
-  return machine;
-}
-
 }  // namespace slabstream

@@ -10,11 +10,15 @@ constexpr int kRepeats = 5, kQuickRepeats = 1;
 void RunPaper(ExperimentContext& context, Results& results) {
   const PaperSetup setup(context);
   std::vector<Trial> trials;
-  for (auto* make : {TransformTrials, FootprintTrials, PointsTrials}) {
+  for (auto* make :
+       {TransformTrials, FootprintTrials, PointsTrials, FrameTrials, OccupancyTrials, ImprovedTrials, ClaimTrials, ValidationTrials}) {
     for (Trial& trial : make(setup)) trials.push_back(std::move(trial));
   }
   context.Run(std::move(trials), kRepeats, kQuickRepeats);
-  for (auto* add : {AddTransform, AddFootprint, AddPoints, AddPictures}) add(setup, results);
+  for (auto* add : {AddTransform, AddFootprint, AddPoints, AddFrames, AddOccupancy, AddModel, AddConstants, AddImproved, AddClaims,
+                    AddValidation, AddPictures}) {
+    add(setup, results);
+  }
 }
 
 }  // namespace slabstream

@@ -19,7 +19,7 @@ _LIKE_WITH_LIKE = {
 
 
 def sections(run: Run) -> list[Section]:
-    return [_transform(run), _splatting(run), _points(run), _pictures(run)]
+    return [_transform(run), _splatting(run), _points(run)]
 
 
 def power_text(points: Points, x: str) -> str:
@@ -383,7 +383,7 @@ _SOURCES = {
 }
 
 
-def _pictures(run: Run) -> Section:
+def pictures(run: Run) -> Section:
     pictures = run.attached("pictures")
     heads = pictures[pictures["figure"] == "Figure 12"]
     if heads.empty:
