@@ -18,7 +18,7 @@ def sections(run: Run) -> list[Section]:
 
 # ---------------------------------------------------------------- streaming and balance
 
-LINKS = {"paper": "the paper's machine", "10gbit": "10 Gbit/s"}
+LINKS = ("paper", "10gbit")
 
 
 class _Beyond:
@@ -61,7 +61,7 @@ def _beyond(run: Run, frames: Frames) -> Section:
     p_last = workers[-1]
     for renderer, table in (("splat", "table 5"), ("zbuffer", "table 6")):
         curves: dict[str, list[tuple[float, Value]]] = {}
-        for link, link_text in LINKS.items():
+        for link in LINKS:
             for p in workers:
                 whole = link == "paper"
                 kinds = {"without empty pixels": "", **({"whole images": ", whole images"} if whole else {})}
