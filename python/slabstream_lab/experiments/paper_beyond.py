@@ -274,7 +274,7 @@ def _validation(run: Run) -> Section:
     if not long_errors:
         verdict = f"No frame took {LONG * 1e3:.0f} ms: this run does not tell how far times of long frames are off"
     elif statistics.median(long_errors) > 100 * GOOD:
-        verdict = f"Long frames are off by more than {100 * GOOD:.0f} % in the median: simulated times show an order of magnitude"
+        verdict = f"Long frames are off by more than {100 * GOOD:.0f} % in the median"
     else:
         verdict = f"Long frames agree within {100 * GOOD:.0f} % in the median"
     return Section(
