@@ -211,8 +211,8 @@ def _splatting(frames: Frames) -> Section:
     (least_c, least), (most_c, most) = points[0], points[-1]
     answer = (
         f"From C = {least_c * 100:.0f} % to {most_c * 100:.0f} %, {most_c / least_c:.0f} times as many voxels, splatting takes "
-        f"{most.over(least).text()} times as long. The straight line of least squares leaves {100 * left:.0f} % (the paper: linear), and "
-        f"{100 * start / most.value:.0f} % of the time at C = {most_c * 100:.0f} % does not depend on C by that line."
+        f"{most.over(least).text()} times as long. The straight line of least squares leaves {100 * left:.0f} % (the paper: linear) and "
+        f"begins {'above' if start > 0 else 'below'} 0, at {100 * start / most.value:+.0f} % of the time at C = {most_c * 100:.0f} %."
     )
     return Section(
         "Splatting: figure 8c",

@@ -7,7 +7,7 @@ from typing import Callable
 from .. import plots
 from ..page import Section, Table
 from ..results import Run, value_of
-from ..value import Value
+from ..value import Value, number_text
 from .paper_frames import TITLES, Frames, size_text
 
 GOOD = 0.10  # an error up to which a model gives a number back
@@ -110,7 +110,7 @@ def _constants(run: Run, frames: Frames) -> Section:
             gain = from_times.over(here) if from_times and here else None
             rows.append([symbol, equation, unit, here, largest, from_times, bound, gain, *_own_unit(frames, renderer, stage)])
             if gain:
-                found.append(f"{symbol} of {TITLES[renderer]} {gain.value:.3g}")
+                found.append(f"{symbol} of {TITLES[renderer]} {number_text(gain.value, 3)}")
             if bound and from_times:
                 bounds.append((bound.value / from_times.value, f"{symbol} of {TITLES[renderer]}"))
         number = printed_table.split()[1]
