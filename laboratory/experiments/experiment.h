@@ -71,7 +71,7 @@ const std::vector<Experiment>& Experiments();
 
 Report RunPaper(ExperimentContext& context);
 Report RunBalance(ExperimentContext& context);
-Report RunCombining(ExperimentContext& context);
+void RunCombining(ExperimentContext& context, Results& results);
 void RunStreaming(ExperimentContext& context, Results& results);
 Report RunScaling(ExperimentContext& context);
 Report RunSweep(ExperimentContext& context);

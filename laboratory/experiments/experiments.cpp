@@ -6,7 +6,7 @@ const std::vector<Experiment>& Experiments() {
   static const std::vector<Experiment> experiments = {
       {"paper", "every table and figure of Yagel and Machiraju, theirs beside ours", RunPaper},
       {"balance", "partitions, splits and assignments: who is idle, what travels, how long a frame takes, 2 to 1024 workers", RunBalance},
-      {"combining", "combining schemes over picture sizes, active pixels, workers and links", RunCombining},
+      {"combining", "combining schemes over picture sizes, active pixels, workers and links", nullptr, nullptr, false, RunCombining},
       {"streaming", "groups against efficiency, memory of a worker and the time to the first preview", nullptr, nullptr, false,
        RunStreaming},
       {"scaling", "strong and weak scaling of both pipelines", RunScaling},

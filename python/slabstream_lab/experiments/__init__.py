@@ -1,4 +1,4 @@
 """The pages: one module an experiment, with page(run) -> Page."""
-from . import streaming
+from . import combining, streaming
 
-PAGES = {"streaming": streaming.page}
+PAGES = {"combining": combining.page, "streaming": streaming.page}
