@@ -73,7 +73,7 @@ Report RunPaper(ExperimentContext& context);
 Report RunBalance(ExperimentContext& context);
 void RunCombining(ExperimentContext& context, Results& results);
 void RunStreaming(ExperimentContext& context, Results& results);
-Report RunScaling(ExperimentContext& context);
+void RunScaling(ExperimentContext& context, Results& results);
 Report RunSweep(ExperimentContext& context);
 void CheckSweepFile(const ExperimentOptions& options);
 

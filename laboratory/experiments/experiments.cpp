@@ -9,7 +9,7 @@ const std::vector<Experiment>& Experiments() {
       {"combining", "combining schemes over picture sizes, active pixels, workers and links", nullptr, nullptr, false, RunCombining},
       {"streaming", "groups against efficiency, memory of a worker and the time to the first preview", nullptr, nullptr, false,
        RunStreaming},
-      {"scaling", "strong and weak scaling of both pipelines", RunScaling},
+      {"scaling", "strong and weak scaling of both pipelines", nullptr, nullptr, false, RunScaling},
       {"sweep", "your own: volumes, views, policies and workers named by a FILE.json (docs/experiments.md)", RunSweep, CheckSweepFile,
        true},
   };

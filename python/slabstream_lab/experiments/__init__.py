@@ -1,4 +1,4 @@
 """The pages: one module an experiment, with page(run) -> Page."""
-from . import combining, streaming
+from . import combining, scaling, streaming
 
-PAGES = {"combining": combining.page, "streaming": streaming.page}
+PAGES = {"combining": combining.page, "scaling": scaling.page, "streaming": streaming.page}

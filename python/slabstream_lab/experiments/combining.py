@@ -95,7 +95,7 @@ def _operators(run: Run) -> Section:
         f"Least time at p = {p}, {_percent(full)} active: {_least(run, part=part, variant=part, workers=p, active=full)}; "
         f"{_percent(sparse)} active: {_least(run, part=part, variant=part, workers=p, active=sparse)}. "
         f"{_gain(run, 'run_time', sparse, full, part=part, workers=p)} "
-        + (f"Page faults fell into timed runs of {disturbed} of {len(rows)} cases." if disturbed else "No page fault fell into a timed run."),
+        + (f"Page faults fell into timed runs of {disturbed} of {len(rows)} cases." if disturbed else "No page fault was timed."),
         [
             _over(
                 run,
@@ -155,7 +155,7 @@ def _over_pictures(run: Run) -> Section:
     return Section(
         "Over pictures",
         "How does combining grow with the picture and with what images fill of it?",
-        SIMULATED + f"Link {link}, p = {p}. Images of different sizes are full; those with different active pixels have {pixels} x {pixels}.",
+        SIMULATED + f"Link {link}, p = {p}. Images of different sizes are full; active pixels are varied at {pixels} x {pixels}.",
         "Least time: "
         + "; ".join(f"{side} x {side} pixels: {by_size[side]}" for side in (sizes[0], sizes[-1]))
         + f"; {_percent(shares[0])} of {pixels} x {pixels} pixels active: {by_share[shares[0]]}. "
