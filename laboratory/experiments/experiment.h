@@ -74,7 +74,7 @@ Report RunBalance(ExperimentContext& context);
 void RunCombining(ExperimentContext& context, Results& results);
 void RunStreaming(ExperimentContext& context, Results& results);
 void RunScaling(ExperimentContext& context, Results& results);
-Report RunSweep(ExperimentContext& context);
+void RunSweep(ExperimentContext& context, Results& results);
 void CheckSweepFile(const ExperimentOptions& options);
 
 }  // namespace slabstream

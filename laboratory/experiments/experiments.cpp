@@ -10,8 +10,8 @@ const std::vector<Experiment>& Experiments() {
       {"streaming", "groups against efficiency, memory of a worker and the time to the first preview", nullptr, nullptr, false,
        RunStreaming},
       {"scaling", "strong and weak scaling of both pipelines", nullptr, nullptr, false, RunScaling},
-      {"sweep", "your own: volumes, views, policies and workers named by a FILE.json (docs/experiments.md)", RunSweep, CheckSweepFile,
-       true},
+      {"sweep", "your own: volumes, views, policies and workers named by a FILE.json (docs/experiments.md)", nullptr, CheckSweepFile, true,
+       RunSweep},
   };
   return experiments;
 }
