@@ -73,10 +73,10 @@ const std::vector<Experiment>& Experiments();
 
 void RunPaper(ExperimentContext& context, Results& results);
 Report RunBalance(ExperimentContext& context);
-Report RunCombining(ExperimentContext& context);
+void RunCombining(ExperimentContext& context, Results& results);
 void RunStreaming(ExperimentContext& context, Results& results);
-Report RunScaling(ExperimentContext& context);
-Report RunSweep(ExperimentContext& context);
+void RunScaling(ExperimentContext& context, Results& results);
+void RunSweep(ExperimentContext& context, Results& results);
 void CheckSweepFile(const ExperimentOptions& options);
 
 }  // namespace slabstream

@@ -18,15 +18,6 @@ FrameFigures FindFigures(const MeasuredFrame& frame, const MachineModel& machine
           .image_bytes = first.image_bytes};
 }
 
-FrameFigures RecallFigures(ExperimentContext& context, const FrameCase& frame, const MachineModel& machine, double FrameFigures::*by,
-                           int teams) {
-  if (!IsDynamic(frame)) return FindFigures(Recall(context, frame), machine, teams);
-  std::vector<FrameFigures> repeats;
-  for (const MeasuredFrame& repeat : RecallBalanced(context, frame)) repeats.push_back(FindFigures(repeat, machine, teams));
-  std::ranges::sort(repeats, {}, by);
-  return repeats[repeats.size() / 2];
-}
-
 std::vector<FrameFigures> RecallFigures(ExperimentContext& context, const FrameCase& frame, const LinkModel& link, int teams) {
   const std::vector<MachineModel> machines = Clusters(context, link);
   const std::vector<MeasuredFrame> frames = IsDynamic(frame) ? RecallBalanced(context, frame) : RecallRepeats(context, frame);

@@ -25,7 +25,7 @@
 namespace slabstream {
 namespace {
 
-constexpr int kRenderings = 2;  // rounds of box costs; of two, the lower one counts as the median
+constexpr int kRenderings = 2;  // rounds of box costs
 constexpr int kWarmUpFrames = 2, kFinishes = 3;
 constexpr int kLearningFrames = 8;  // to warm up with dynamic balance
 constexpr DatasetId kPlannedDataset = 1;
@@ -71,6 +71,9 @@ const RendererKind* ZBuffer() { return FindRenderer("zbuffer"); }
 FrameRequest RequestOf(const FrameCase& frame) {
   FrameRequest request = BenchRequest(frame.volume, frame.view, frame.size);
   request.policy = frame.policy;
+  request.parameters = frame.look.parameters;
+  request.shading = frame.look.shading;
+  request.termination = frame.look.termination;
   return request;
 }
 

@@ -19,12 +19,20 @@
 
 namespace slabstream {
 
+// What a request says about the look beside renderer and transfer function.
+struct Look {
+  ParameterTexts parameters;  // of the renderer
+  Shading shading;
+  double termination = kDefaultTermination;
+};
+
 struct FrameCase {
-  BenchCase volume;  // with the renderer and the look
+  BenchCase volume;  // with the renderer and the transfer function
   ImageSize size;
   ViewParameters view;
   Policy policy;
   int workers = 1;
+  Look look = {};
 };
 
 // The renderers of the paper.

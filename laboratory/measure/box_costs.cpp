@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <type_traits>
+#include <utility>
 
 #include "common/base/check.h"
 #include "laboratory/measure/lab_worker.h"
+#include "laboratory/measure/statistics.h"
 
 namespace slabstream {
 
@@ -36,10 +39,16 @@ std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FrameSetup& set
     }
   }
   for (std::size_t i = 0; i < boxes.size(); ++i) {
-    const auto middle = again[i].begin() + (again[i].end() - again[i].begin() - 1) / 2;
-    std::ranges::nth_element(again[i], middle, {}, &BoxRendering::processor_seconds);
-    costs[i].seconds = middle->processor_seconds;
-    costs[i].stage_ns = middle->report.stage_ns;
+    const auto median = [&](auto&& number) {
+      std::vector<double> numbers;
+      for (const BoxRendering& rendering : again[i]) numbers.push_back(double(number(rendering)));
+      return MedianOf(std::move(numbers)).median;
+    };
+    costs[i].seconds = median([](const BoxRendering& r) { return r.processor_seconds; });
+    for (std::size_t stage = 0; stage < costs[i].stage_ns.size(); ++stage) {
+      using Nanoseconds = std::remove_reference_t<decltype(costs[i].stage_ns[stage])>;
+      costs[i].stage_ns[stage] = Nanoseconds(median([stage](const BoxRendering& r) { return r.report.stage_ns[stage]; }));
+    }
   }
   return costs;
 }

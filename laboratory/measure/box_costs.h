@@ -19,8 +19,8 @@ namespace slabstream {
 struct BoxCost {
   Box box;
   double first_seconds = 0;           // processor time of the first rendering
-  double seconds = 0;                 // median of the later ones (of two the lower); the minimum is luck, since cores are at times quicker
-  StageTimes stage_ns{};              // of that rendering, in elapsed time
+  double seconds = 0;                 // median of the later ones; the minimum is luck, since cores are at times quicker
+  StageTimes stage_ns{};              // median of each, in elapsed time
   std::uint64_t occupied_voxels = 0;  // in the box, under the transfer function; splatting
   std::uint64_t drawn_voxels = 0;     // that went through splat or Z-buffer
   PixelBounds bounds;                 // of its local image

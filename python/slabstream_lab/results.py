@@ -63,6 +63,13 @@ class Run:
         found = self.select(**columns)[column].dropna().unique().tolist()
         return [int(x) if isinstance(x, float) and x.is_integer() else x for x in found]
 
+    def only(self, column: str, **columns: Any) -> Any:
+        """The one value that a column has in these rows. ResultsError if there are none or several."""
+        found = self.distinct(column, **columns)
+        if len(found) != 1:
+            raise ResultsError(f"{len(found)} values of '{column}' for {columns}, where one is expected")
+        return found[0]
+
     def attached(self, name: str) -> pandas.DataFrame:
         """The table NAME.csv beside the results."""
         if self.folder is None or not (self.folder / f"{name}.csv").exists():

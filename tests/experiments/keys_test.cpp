@@ -155,7 +155,10 @@ TEST_F(Keys, HoldWhatDecidesTheirNumbers) {
                     {"occupancy", [](F& f) { std::get<SphereRequest>(f.volume.volume).occupancy = 0.11; }},
                     {"renderer", [](F& f) { f.volume.renderer = ZBuffer(); }},
                     {"width", [](F& f) { ++f.size.width; }},
-                    {"height", [](F& f) { ++f.size.height; }}}};
+                    {"height", [](F& f) { ++f.size.height; }},
+                    {"parameters", [](F& f) { f.look.parameters["sampling-rate"] = "2"; }},
+                    {"termination", [](F& f) { f.look.termination = 0; }},
+                    {"lighting", [](F& f) { f.look.shading.phong = false; }}}};
   Add<F, ViewParameters>(
       everything.changes, ChangesOfView(), [](F & f) -> auto& { return f.view; });
   Add<F, TransferChoice>(

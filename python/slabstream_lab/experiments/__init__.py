@@ -1,4 +1,11 @@
 """The pages: one module an experiment, with page(run) -> Page."""
-from . import paper, streaming
+from . import balance, combining, paper, scaling, streaming, sweep
 
-PAGES = {"paper": paper.page, "streaming": streaming.page}
+PAGES = {
+    "paper": paper.page,
+    "balance": balance.page,
+    "combining": combining.page,
+    "streaming": streaming.page,
+    "scaling": scaling.page,
+    "sweep": sweep.page,
+}
