@@ -9,12 +9,27 @@
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/frame/frame_request.h"
 #include "laboratory/experiments/trials.h"
 #include "laboratory/experiments/volumes.h"
 #include "laboratory/report/document.h"
 #include "laboratory/results/results.h"
 
+namespace CLI {
+class App;
+}
+
 namespace slabstream {
+
+// What an experiment lets the user choose besides the options of all. Empty: its own choice. An experiment that does not offer an option
+// (Experiment::declare) leaves it empty.
+struct OwnOptions {
+  std::vector<std::string> cases;             // volumes instead of the standard ones, as ParseBenchCase takes them
+  std::vector<int> workers;                   // numbers of workers
+  std::vector<const RendererKind*> renderers;
+  std::vector<std::string> views;             // sequences of views
+  std::vector<TransferChoice> transfers;      // two: the transfer function changes from one to the other in the middle of a sequence
+};
 
 struct ExperimentOptions {
   std::string name;
@@ -28,6 +43,7 @@ struct ExperimentOptions {
   std::vector<std::string> volumes;  // FILE[:TRANSFER], beside or instead of the standard ones
   bool list = false;
   std::string command;  // as it was typed
+  OwnOptions own;
 };
 inline constexpr int kMaxRepeats = 1000, kLeastScaledSide = 8;
 inline constexpr double kMinScale = 0.05;
@@ -64,13 +80,16 @@ struct Experiment {
   void (*check)(const ExperimentOptions&) = nullptr;
   bool takes_file = false;                               // ExperimentOptions::sweep_file
   void (*find)(ExperimentContext&, Results&) = nullptr;  // instead of run
+  void (*declare)(CLI::App&, OwnOptions&) = nullptr;     // adds the options that it alone has; null: none
 };
 
 // The only list.
 const std::vector<Experiment>& Experiments();
 
 Report RunPaper(ExperimentContext& context);
-Report RunBalance(ExperimentContext& context);
+void RunBalance(ExperimentContext& context, Results& results);
+void CheckBalance(const ExperimentOptions& options);
+void DeclareBalance(CLI::App& app, OwnOptions& options);
 Report RunCombining(ExperimentContext& context);
 void RunStreaming(ExperimentContext& context, Results& results);
 Report RunScaling(ExperimentContext& context);

@@ -5,7 +5,8 @@ namespace slabstream {
 const std::vector<Experiment>& Experiments() {
   static const std::vector<Experiment> experiments = {
       {"paper", "every table and figure of Yagel and Machiraju, theirs beside ours", RunPaper},
-      {"balance", "partitions, splits and assignments: who is idle, what travels, how long a frame takes, 2 to 1024 workers", RunBalance},
+      {"balance", "load balance of sparse volumes: partitions, views that move, a slow worker, and how good `auto` is", nullptr,
+       CheckBalance, false, RunBalance, DeclareBalance},
       {"combining", "combining schemes over picture sizes, active pixels, workers and links", RunCombining},
       {"streaming", "groups against efficiency, memory of a worker and the time to the first preview", nullptr, nullptr, false,
        RunStreaming},

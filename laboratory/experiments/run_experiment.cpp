@@ -31,9 +31,14 @@ Json Parameters(const ExperimentOptions& options, VolumeCache& volumes) {
   if (!options.sweep_file.empty()) {
     parameters["sweep"] = Json::parse(OrThrow(ReadTextFile(options.sweep_file, kMaxSweepBytes)), nullptr, false);
   }
+  const auto& [cases, workers, renderers, views, transfers] = options.own;
+  parameters["own"] = {
+      {"cases", cases}, {"workers", workers}, {"renderers", Json::array()}, {"views", views}, {"transfers", Json::array()}};
+  for (const RendererKind* renderer : renderers) parameters["own"]["renderers"].push_back(renderer->name());
+  for (const TransferChoice& transfer : transfers) parameters["own"]["transfers"].push_back(TransferJson(transfer));
   // Texts that name files do not say what is in them.
-  const std::vector<BenchCase> named =
-      options.sweep_file.empty() ? RealVolumes(options.volumes) : OrThrow(ReadSweep(options.sweep_file)).volumes;
+  std::vector<BenchCase> named = options.sweep_file.empty() ? RealVolumes(options.volumes) : OrThrow(ReadSweep(options.sweep_file)).volumes;
+  std::ranges::move(NamedVolumes("VOLUME", cases), std::back_inserter(named));
   parameters["contents"] = Json::array();
   for (const BenchCase& volume : named) {
     parameters["contents"].push_back({{"volume", volumes.Identity(volume)}, {"transfer", TransferJson(volume.transfer)}});
@@ -90,11 +95,9 @@ void Find(const Experiment& experiment, ExperimentContext& context, const Machin
 void Run(const ExperimentOptions& options) {
   const Experiment* experiment = FindNamed(Experiments(), options.name);
   if (experiment == nullptr) throw Failure(Status::NotFound(fmt::format("NAME '{}' is no experiment (--list names them)", options.name)));
-  if (experiment->takes_file != !options.sweep_file.empty()) {
-    throw Failure(Status::InvalidArgument(
-        experiment->takes_file ? fmt::format("experiment '{}' needs a FILE", options.name)
-                               : fmt::format("experiment '{}' takes no FILE, '{}' was given", options.name, options.sweep_file)));
-  }
+  if (experiment->takes_file && options.sweep_file.empty())
+    throw Failure(Status::InvalidArgument(fmt::format("experiment '{}' needs a FILE", options.name)));
+  if (options.folder.empty()) throw Failure(Status::InvalidArgument("-o (--output) is missing: the folder for the results"));
   const MachineInfo machine = DescribeMachine();
   const std::string machine_text = fmt::format("{}, {} cores, {}", machine.cpu, machine.cores, machine.simd);
   if (experiment->check != nullptr) experiment->check(options);

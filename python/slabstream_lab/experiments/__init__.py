@@ -1,4 +1,4 @@
 """The pages: one module an experiment, with page(run) -> Page."""
-from . import streaming
+from . import balance, streaming
 
-PAGES = {"streaming": streaming.page}
+PAGES = {"balance": balance.page, "streaming": streaming.page}
