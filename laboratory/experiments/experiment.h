@@ -24,11 +24,11 @@ namespace slabstream {
 // What an experiment lets the user choose besides the options of all. Empty: its own choice. An experiment that does not offer an option
 // (Experiment::declare) leaves it empty.
 struct OwnOptions {
-  std::vector<std::string> cases;             // volumes instead of the standard ones, as ParseBenchCase takes them
-  std::vector<int> workers;                   // numbers of workers
+  std::vector<std::string> cases;  // volumes instead of the standard ones, as ParseBenchCase takes them
+  std::vector<int> workers;        // numbers of workers
   std::vector<const RendererKind*> renderers;
-  std::vector<std::string> views;             // sequences of views
-  std::vector<TransferChoice> transfers;      // two: the transfer function changes from one to the other in the middle of a sequence
+  std::vector<std::string> views;         // sequences of views
+  std::vector<TransferChoice> transfers;  // two: the transfer function changes from one to the other in the middle of a sequence
 };
 
 struct ExperimentOptions {
