@@ -9,12 +9,27 @@
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/frame/frame_request.h"
 #include "laboratory/experiments/trials.h"
 #include "laboratory/experiments/volumes.h"
-#include "laboratory/report/document.h"
 #include "laboratory/results/results.h"
 
+namespace CLI {
+class App;
+}
+
 namespace slabstream {
+
+// What an experiment lets the user choose besides the options of all. Empty: its own choice. An experiment that does not offer an option
+// (Experiment::declare) leaves it empty.
+struct OwnOptions {
+  std::vector<std::string> cases;  // volumes instead of the standard ones, as ParseBenchCase takes them
+  std::vector<int> workers;        // numbers of workers
+  std::vector<const RendererKind*> renderers;
+  std::vector<std::string> views;         // sequences of views
+  std::vector<int> footprints;            // diameters of footprints, pixels
+  std::vector<TransferChoice> transfers;  // two: the transfer function changes from one to the other in the middle of a sequence
+};
 
 struct ExperimentOptions {
   std::string name;
@@ -25,10 +40,10 @@ struct ExperimentOptions {
   std::uint64_t seed = 1;
   int repeats = 0;  // [1, kMaxRepeats]; 0: the experiment's own number
   Resume resume = Resume::kSame;
-  std::vector<int> footprints;       // of `paper`: diameters of footprints, ascending; none: the experiment's own
   std::vector<std::string> volumes;  // FILE[:TRANSFER], beside or instead of the standard ones
   bool list = false;
   std::string command;  // as it was typed
+  OwnOptions own;
 };
 inline constexpr int kMaxRepeats = 1000, kLeastScaledSide = 8;
 inline constexpr double kMinScale = 0.05;
@@ -48,6 +63,7 @@ class ExperimentContext {
   void Run(std::vector<Trial> trials, int repeats, int quick_repeats);
   const TrialLog& log() const { return log_; }
   int repeats() const { return repeats_; }  // of the last Run
+  bool interrupted() const { return interrupted_ && interrupted_(); }
 
  private:
   ExperimentOptions options_;
@@ -60,19 +76,21 @@ class ExperimentContext {
 struct Experiment {
   std::string_view name;
   std::string_view purpose;  // one line for --list
-  Report (*run)(ExperimentContext&);
+  void (*run)(ExperimentContext&, Results&);
+  void (*declare)(CLI::App&, OwnOptions&) = nullptr;  // adds the options that it alone has; null: none
   // Checks the options before a folder is made; null: the checks common to all experiments suffice.
   void (*check)(const ExperimentOptions&) = nullptr;
-  bool takes_file = false;                               // ExperimentOptions::sweep_file
-  void (*find)(ExperimentContext&, Results&) = nullptr;  // instead of run
-  bool takes_footprints = false;                         // ExperimentOptions::footprints
+  bool takes_file = false;  // ExperimentOptions::sweep_file
 };
 
 // The only list.
 const std::vector<Experiment>& Experiments();
 
 void RunPaper(ExperimentContext& context, Results& results);
-Report RunBalance(ExperimentContext& context);
+void DeclarePaper(CLI::App& app, OwnOptions& options);
+void RunBalance(ExperimentContext& context, Results& results);
+void CheckBalance(const ExperimentOptions& options);
+void DeclareBalance(CLI::App& app, OwnOptions& options);
 void RunCombining(ExperimentContext& context, Results& results);
 void RunStreaming(ExperimentContext& context, Results& results);
 void RunScaling(ExperimentContext& context, Results& results);

@@ -109,7 +109,10 @@ Json ColumnsOf(const FrameCase& frame) {
 }
 
 Json MeasureBoxes(ExperimentContext& context, const FrameCase& frame, const FramePlan& plan) {
-  const VolumeInUse volume = context.volumes().Get(frame.volume);
+  return NumbersOf(MeasureBoxCosts(*context.volumes().Get(frame.volume).volume, plan, kRenderings), plan);
+}
+
+Json NumbersOf(const std::vector<BoxCost>& costs, const FramePlan& plan) {
   Json numbers = {{"ids", Json::array()}};
   for (const char* list :
        {"seconds", "first_seconds", "occupied_voxels", "drawn_voxels", "covered_pixels", "voxel_bytes", "work", "coverage"}) {
@@ -117,7 +120,7 @@ Json MeasureBoxes(ExperimentContext& context, const FrameCase& frame, const Fram
   }
   for (int stage = 0; stage < kStageCount; ++stage) numbers["stages"][std::string(ToString(Stage(stage)))] = Json::array();
   for (const Placement& placement : PlacementsOf(plan)) numbers["ids"].push_back(placement.id);
-  for (const BoxCost& cost : MeasureBoxCosts(*volume.volume, plan, kRenderings)) {
+  for (const BoxCost& cost : costs) {
     numbers["seconds"].push_back(cost.seconds);
     numbers["first_seconds"].push_back(cost.first_seconds);
     numbers["occupied_voxels"].push_back(cost.occupied_voxels);
@@ -195,8 +198,10 @@ LayoutKnowledge KnowLayout(ExperimentContext& context, const FrameCase& frame) {
           .renderer = frame.volume.renderer};
 }
 
+ClassifiedVolume ClassifiedOf(const LayoutKnowledge& knowledge) { return {kPlannedDataset, knowledge.transfer, knowledge.renderer}; }
+
 MeasuredLayouts LayoutsOf(const LayoutKnowledge& knowledge, int workers) {
-  return {knowledge.volume.summary, knowledge.occupied, {kPlannedDataset, knowledge.transfer, knowledge.renderer}, workers};
+  return {knowledge.volume.summary, knowledge.occupied, ClassifiedOf(knowledge), workers};
 }
 
 FramePlan PlanOf(ExperimentContext& context, const FrameCase& frame) {
@@ -281,7 +286,8 @@ Trial ValidationTrial(ExperimentContext& context, const FrameCase& frame, int tu
 
 FrameInput MeasuredFrame::Input() const {
   FrameInput input{&plan, {}, finish_seconds, receive_seconds};
-  for (const Cost& box : boxes) input.boxes.push_back({box.seconds, box.coverage.share.empty() ? nullptr : &box.coverage, 0});
+  for (const Cost& box : boxes)
+    input.boxes.push_back({box.seconds, box.coverage.share.empty() ? nullptr : &box.coverage, box.fetched_bytes});
   return input;
 }
 
@@ -291,6 +297,14 @@ std::vector<double> MeasuredFrame::WorkerSeconds() const {
     for (const Placement& placement : group.placements) seconds[placement.worker - 1] += boxes[placement.id].seconds;
   }
   return seconds;
+}
+
+double MeasuredFrame::MostVoxelBytes() const {
+  std::vector<double> bytes(plan.slots);
+  for (const GroupPlan& group : plan.groups) {
+    for (const Placement& placement : group.placements) bytes[placement.worker - 1] += boxes[placement.id].voxel_bytes;
+  }
+  return *std::ranges::max_element(bytes);
 }
 
 double MeasuredFrame::RenderSeconds() const {

@@ -26,14 +26,19 @@ Json ReferenceLoopKey() { return {{"what", "reference loop"}}; }
 
 // Everything that decides the set of trials.
 Json Parameters(const ExperimentOptions& options, VolumeCache& volumes) {
-  Json parameters = {{"seed", options.seed},       {"repeats", options.repeats},       {"quick", options.quick}, {"scale", options.scale},
-                     {"volumes", options.volumes}, {"footprints", options.footprints}, {"sweep", Json()}};
+  Json parameters = {{"seed", options.seed},   {"repeats", options.repeats}, {"quick", options.quick},
+                     {"scale", options.scale}, {"volumes", options.volumes}, {"sweep", Json()}};
   if (!options.sweep_file.empty()) {
     parameters["sweep"] = Json::parse(OrThrow(ReadTextFile(options.sweep_file, kMaxSweepBytes)), nullptr, false);
   }
+  const auto& [cases, workers, renderers, views, footprints, transfers] = options.own;
+  parameters["own"] = {{"cases", cases}, {"workers", workers},       {"renderers", Json::array()},
+                       {"views", views}, {"footprints", footprints}, {"transfers", Json::array()}};
+  for (const RendererKind* renderer : renderers) parameters["own"]["renderers"].push_back(renderer->name());
+  for (const TransferChoice& transfer : transfers) parameters["own"]["transfers"].push_back(TransferJson(transfer));
   // Texts that name files do not say what is in them.
-  const std::vector<BenchCase> named =
-      options.sweep_file.empty() ? RealVolumes(options.volumes) : OrThrow(ReadSweep(options.sweep_file)).volumes;
+  std::vector<BenchCase> named = options.sweep_file.empty() ? RealVolumes(options.volumes) : OrThrow(ReadSweep(options.sweep_file)).volumes;
+  std::ranges::move(NamedVolumes("VOLUME", cases), std::back_inserter(named));
   parameters["contents"] = Json::array();
   for (const BenchCase& volume : named) {
     parameters["contents"].push_back({{"volume", volumes.Identity(volume)}, {"transfer", TransferJson(volume.transfer)}});
@@ -79,25 +84,21 @@ Json RunJson(const ExperimentContext& context, const MachineInfo& machine) {
 void Find(const Experiment& experiment, ExperimentContext& context, const MachineInfo& machine, const std::string& machine_text) {
   const std::string& folder = context.options().folder;
   Results results({std::string(experiment.name), SLABSTREAM_COMMIT, machine_text});
-  experiment.find(context, results);
+  experiment.run(context, results);
+  if (context.interrupted()) throw Failure(Status::Cancelled("interrupted while results were made; the same command continues"));
   AddConduct(results, context.log());
   OrThrow(results.Write(folder));
   OrThrow(WriteTextFile(folder + "/run.json", RunJson(context, machine).dump(1) + "\n"));
-  std::cout << fmt::format("wrote {0} values to {1}/results.csv and results.jsonl\npython3 -m slabstream_lab {1} draws them\n",
-                           results.rows().size(), folder);
+  std::cout << fmt::format("wrote {0} values to {1}/results.csv and results.jsonl\nslabstream-lab {1} draws them\n", results.rows().size(),
+                           folder);
 }
 
 void Run(const ExperimentOptions& options) {
   const Experiment* experiment = FindNamed(Experiments(), options.name);
   if (experiment == nullptr) throw Failure(Status::NotFound(fmt::format("NAME '{}' is no experiment (--list names them)", options.name)));
-  if (experiment->takes_file != !options.sweep_file.empty()) {
-    throw Failure(Status::InvalidArgument(
-        experiment->takes_file ? fmt::format("experiment '{}' needs a FILE", options.name)
-                               : fmt::format("experiment '{}' takes no FILE, '{}' was given", options.name, options.sweep_file)));
-  }
-  if (!options.footprints.empty() && !experiment->takes_footprints) {
-    throw Failure(Status::InvalidArgument(fmt::format("experiment '{}' takes no --footprints", options.name)));
-  }
+  if (experiment->takes_file && options.sweep_file.empty())
+    throw Failure(Status::InvalidArgument(fmt::format("experiment '{}' needs a FILE", options.name)));
+  if (options.folder.empty()) throw Failure(Status::InvalidArgument("-o (--output) is missing: the folder for the results"));
   const MachineInfo machine = DescribeMachine();
   const std::string machine_text = fmt::format("{}, {} cores, {}", machine.cpu, machine.cores, machine.simd);
   if (experiment->check != nullptr) experiment->check(options);
@@ -110,17 +111,7 @@ void Run(const ExperimentOptions& options) {
   const InterruptGuard interrupt(wakeup);
   ExperimentContext context(
       options, std::move(log), [&interrupt] { return interrupt.interrupted(); }, std::move(volumes));
-  if (experiment->find != nullptr) return Find(*experiment, context, machine, machine_text);
-  const Report report = experiment->run(context);
-  if (interrupt.interrupted()) throw Failure(Status::Cancelled("interrupted while the report was made; the same command continues"));
-
-  const Provenance provenance{options.name, std::string(Version()), SLABSTREAM_COMMIT, options.command,   machine.cpu,
-                              machine.simd, machine.cores,          options.seed,      context.repeats(), NowUtc()};
-  OrThrow(WriteReport(report, provenance, options.folder));
-  for (const Section& section : report.sections) {
-    if (!section.answer.empty()) std::cout << fmt::format("{}: {}\n", section.title, section.answer);
-  }
-  std::cout << fmt::format("wrote {}/report.html\n", options.folder);
+  Find(*experiment, context, machine, machine_text);
 }
 
 }  // namespace

@@ -12,9 +12,10 @@
 
 namespace slabstream {
 
-std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FrameSetup& setup, std::span<const Box> boxes, int repeats) {
+namespace {
+
+std::vector<BoxCost> Measure(LabWorker& worker, const FrameSetup& setup, std::span<const Box> boxes, int repeats) {
   CHECK_GE(repeats, 1);
-  LabWorker worker(volume);
   std::vector<BoxCost> costs;
   for (const Box& box : boxes) {
     const BoxRendering first = worker.Render(box, setup);
@@ -26,7 +27,7 @@ std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FrameSetup& set
     cost.bounds = first.image.bounds;
     cost.coverage = FindCoverage(first.image, FrameBounds(setup).width(), FrameBounds(setup).height());
     cost.covered_pixels = std::uint64_t(std::llround(cost.coverage.pixels()));
-    cost.voxel_bytes = std::uint64_t(SlabBox(box, setup).voxel_count()) * BytesPerSample(volume.block.type);
+    cost.voxel_bytes = std::uint64_t(SlabBox(box, setup).voxel_count()) * BytesPerSample(setup.description.type);
   }
   // In rounds: a moment in which the machine is slower or quicker affects only part of a box's times. Each round renders a box twice, and
   // the second time counts: a worker's caches hold what it rendered last, not other workers' boxes.
@@ -53,10 +54,22 @@ std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FrameSetup& set
   return costs;
 }
 
-std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FramePlan& plan, int repeats) {
+}  // namespace
+
+std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FrameSetup& setup, std::span<const Box> boxes, int repeats) {
+  LabWorker worker(volume);
+  return Measure(worker, setup, boxes, repeats);
+}
+
+std::vector<BoxCost> MeasureBoxCosts(LabWorker& worker, const FramePlan& plan, int repeats) {
   std::vector<Box> boxes;
   for (const Placement& placement : PlacementsOf(plan)) boxes.push_back(placement.box);
-  return MeasureBoxCosts(volume, plan.setup, boxes, repeats);
+  return Measure(worker, plan.setup, boxes, repeats);
+}
+
+std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FramePlan& plan, int repeats) {
+  LabWorker worker(volume);
+  return MeasureBoxCosts(worker, plan, repeats);
 }
 
 double Imbalance(std::span<const double> seconds) {

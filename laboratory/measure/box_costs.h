@@ -16,6 +16,8 @@
 
 namespace slabstream {
 
+class LabWorker;
+
 struct BoxCost {
   Box box;
   double first_seconds = 0;           // processor time of the first rendering
@@ -36,6 +38,8 @@ std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FrameSetup& set
 
 // The boxes that a plan renders, in the order of PlacementsOf(plan).
 std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FramePlan& plan, int repeats);
+// The same by a worker that may have rendered boxes of earlier frames and then keeps what it made for them.
+std::vector<BoxCost> MeasureBoxCosts(LabWorker& worker, const FramePlan& plan, int repeats);
 
 // Largest / mean of the boxes' `seconds`: 1 is perfect balance, and the value if all costs are 0. With `slots` owners of several boxes
 // each, sum their boxes first.

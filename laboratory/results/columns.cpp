@@ -25,7 +25,7 @@ std::span<const Column> CaseColumns() {
       {"stage", "stage of a frame: transform, splat, combine; or a phase of what `variant` names"},
       {"active", "share of an image's pixels that are not empty, in [0, 1]"},
       {"k", "diameter of a splat's footprint in pixels"},
-      {"step", "place in a sequence of views, from 0"},
+      {"step", "place in a sequence of views, from 0; a sequence without it: the mean over its steps"},
       {"box", "number of a box of the partition"},
   };
   return kColumns;

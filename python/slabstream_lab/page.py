@@ -25,7 +25,8 @@ class Table:
         scales: list[tuple[float, str] | None] = []
         for i in range(len(self.columns)):
             values = [row[i] for row in self.rows if isinstance(row[i], Value)]
-            middle = sorted(abs(v.value) for v in values)[len(values) // 2] if values else 0
+            sizes = sorted(abs(v.value) for v in values if v.value != 0)
+            middle = sizes[len(sizes) // 2] if sizes else 0
             scales.append(scale_of(values[0].unit, middle) if values else None)
         return scales
 

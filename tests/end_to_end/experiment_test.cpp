@@ -17,6 +17,7 @@ namespace {
 
 using nlohmann::json;
 using testing::HasSubstr;
+using testing::Not;
 
 class ExperimentTest : public EndToEndTest {
  protected:
@@ -53,6 +54,24 @@ class ExperimentTest : public EndToEndTest {
     }
     EXPECT_GE(plots, 1U);
   }
+
+  // Of an experiment whose page slabstream-lab draws.
+  void ExpectResults(const std::string& folder, const std::string& experiment) {
+    const json run = json::parse(ReadFile(folder + "/run.json"));
+    EXPECT_EQ(run["experiment"], experiment);
+    EXPECT_NE(run["commit"], "");
+    EXPECT_THAT(run["command"].get<std::string>(), HasSubstr("experiment " + experiment));
+    EXPECT_GE(run["machine"]["cores"], 1);
+    std::istringstream lines(ReadFile(folder + "/results.jsonl")), table(ReadFile(folder + "/results.csv"));
+    std::string line, row;
+    EXPECT_TRUE(std::getline(table, row)) << "the names of the columns";
+    std::size_t values = 0;
+    for (; std::getline(lines, line); ++values) {
+      EXPECT_EQ(json::parse(line)["experiment"], experiment);
+      EXPECT_TRUE(std::getline(table, row)) << "as many rows as lines";
+    }
+    EXPECT_GE(values, 1U);
+  }
 };
 
 TEST_F(ExperimentTest, EveryListedExperimentLeavesAReport) {
@@ -60,7 +79,7 @@ TEST_F(ExperimentTest, EveryListedExperimentLeavesAReport) {
   for (const std::string name : {"paper", "balance", "combining", "streaming", "scaling"}) {
     EXPECT_THAT(list, HasSubstr(name));
     MustRun({"experiment", name, "-o", name, "--quick", "--scale", "0.15"});
-    ExpectReport(name, name);
+    (name == "balance" || name == "streaming") ? ExpectResults(name, name) : ExpectReport(name, name);
   }
   const json paper = json::parse(ReadFile("paper/result.json"));
   std::set<std::string> names;
@@ -103,7 +122,25 @@ TEST_F(ExperimentTest, ContinuesWhereCtrlCStoppedIt) {
   EXPECT_THAT(other.err, HasSubstr("holds a run with repeats 20, not 21"));
   MustRun(arguments);
   EXPECT_EQ(ReadFile("out/trials.jsonl").substr(0, before.size()), before);
-  ExpectReport("out", "streaming");
+  ExpectResults("out", "streaming");
+}
+
+TEST_F(ExperimentTest, BalanceOfAUsersOwnVolume) {
+  MakeSphere("ball.nrrd", 2, 24);
+  MustRun({"experiment", "balance", "ball.nrrd:auto", "-o", "out", "--quick", "--scale", "0.1", "--workers", "3", "--renderer",
+           "mip,raycast", "--views", "fly-through", "--transfer", "opaque,gray-ramp"});
+  ExpectResults("out", "balance");
+  const std::string results = ReadFile("out/results.csv");
+  for (const char* word : {"ball", "mip", "raycast", "fly-through"}) EXPECT_THAT(results, HasSubstr(word));
+  EXPECT_THAT(results, Not(HasSubstr("class1")));
+  EXPECT_EQ(Slabstream({"experiment", "balance", "ball.nrrd:auto", "-o", "out", "--quick", "--scale", "0.1"}).exit_status, 2)
+      << "other options are another run";
+}
+
+TEST_F(ExperimentTest, OptionsBelongToTheirExperiment) {
+  EXPECT_THAT(MustRun({"experiment", "balance", "--help"}).out, HasSubstr("--views"));
+  EXPECT_THAT(MustRun({"experiment", "paper", "--help"}).out, Not(HasSubstr("--views")));
+  MustRun({"experiment", "--quick", "--scale", "0.15", "-o", "out", "streaming"});  // options may stand before the name
 }
 
 TEST_F(ExperimentTest, WhatIsWrongIsToldInALine) {
@@ -113,7 +150,13 @@ TEST_F(ExperimentTest, WhatIsWrongIsToldInALine) {
       {{"experiment", "cake", "-o", "x"}, "'cake' is no experiment"},
       {{"experiment", "sweep", "-o", "x"}, "needs a FILE"},
       {{"experiment", "sweep", "none.json", "-o", "x"}, "'none.json' does not exist"},
-      {{"experiment", "paper", "some.json", "-o", "x"}, "takes no FILE"},
+      {{"experiment", "paper", "some.json", "-o", "x"}, "some.json"},
+      {{"experiment", "balance", "-o", "x", "--views", "sideways"}, "--views 'sideways'"},
+      {{"experiment", "balance", "-o", "x", "--workers", "2,0"}, "--workers 0"},
+      {{"experiment", "balance", "-o", "x", "--renderer", "crayon"}, "--renderer 'crayon'"},
+      {{"experiment", "balance", "-o", "x", "--transfer", "opaque"}, "--transfer"},
+      {{"experiment", "balance", "none.nrrd", "-o", "x"}, "none.nrrd"},
+      {{"experiment", "paper", "-o", "x", "--views", "turntable"}, "--views"},
       {{"experiment", "paper", "-o", "x", "--scale", "2"}, "--scale"},
       {{"experiment", "paper", "-o", "x", "--repeats", "0"}, "--repeats"},
       {{"experiment", "paper", "-o", "x", "--footprints", "3,99"}, "--footprints 99"},

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <set>
 
 #include "laboratory/experiments/paper/setup.h"
 #include "laboratory/measure/splat_loops.h"
@@ -38,9 +39,9 @@ Trial Measure(const SliceCase& of) {
 }
 
 std::vector<SliceCase> SlicesOf(const PaperSetup& setup) {
-  const std::vector<int>& named = setup.context().options().footprints;
+  const std::vector<int>& named = setup.context().options().own.footprints;
   std::vector<SliceCase> slices;
-  for (const int k : named.empty() ? std::vector(std::begin(kWidths), std::end(kWidths)) : named) {
+  for (const int k : named.empty() ? std::set(std::begin(kWidths), std::end(kWidths)) : std::set(named.begin(), named.end())) {
     slices.push_back({"slice over k", setup.large_size(), k, 1});
   }
   for (const double occupancy : kSliceOccupancies) slices.push_back({"slice over occupancy", setup.large_size(), kPaperWidth, occupancy});

@@ -1,4 +1,8 @@
+#include <fmt/format.h>
+
+#include "common/cli/add_option.h"
 #include "laboratory/experiments/paper/setup.h"
+#include "laboratory/measure/splat_loops.h"
 
 namespace slabstream {
 namespace {
@@ -6,6 +10,14 @@ namespace {
 constexpr int kRepeats = 5, kQuickRepeats = 1;
 
 }  // namespace
+
+void DeclarePaper(CLI::App& app, OwnOptions& options) {
+  AddParsedList(
+      app, "--footprints", options.footprints,
+      [](const std::string& option, const std::string& text) { return ParseInteger(option, text, kMinFootprint, kMaxFootprint); },
+      fmt::format("Diameters of the footprints of figure 8b in pixels, each from {} to {}", kMinFootprint, kMaxFootprint))
+      ->default_str("3,5,9,13,17,25");
+}
 
 void RunPaper(ExperimentContext& context, Results& results) {
   const PaperSetup setup(context);
