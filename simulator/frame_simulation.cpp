@@ -128,9 +128,8 @@ void FrameSimulation::Submit() {
   submit.deadline_ms = ~std::uint32_t{0};
   submit.frame.dataset = kDataset;
   submit.frame.transfer.choice = TransferFunction{};
-  // A connection keeps the order of its messages, even if the coordinator sleeps for the first of two and is awake for the second.
-  asked_ = std::max(asked_, service_.threads().Begin(Threads::kCoordinator, service_.now() + machine_.link.latency_seconds));
-  service_.TellCoordinator(asked_, FromClient{kClient, std::move(submit)});
+  const double arrival = service_.threads().Begin(Threads::kCoordinator, service_.now() + machine_.link.latency_seconds);
+  service_.TellCoordinator(arrival, FromClient{kClient, std::move(submit)});
 }
 
 void FrameSimulation::Perform(ToClient& action) {

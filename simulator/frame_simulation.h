@@ -84,7 +84,6 @@ class FrameSimulation : private Conditions {
   double planner_free_ = 0;
 
   std::uint32_t submitted_ = 0, planned_ = 0, received_ = 0;  // frames
-  double asked_ = 0;                                          // when the coordinator begins with the last request
   std::map<FrameId, std::uint32_t> frame_of_;
   std::map<std::uint32_t, Frame> frames_;  // that are under way
   double render_seconds_ = 0;

@@ -179,10 +179,9 @@ void SimulatedService::Finish(std::uint32_t place) {
 void SimulatedService::SendToCoordinator(Node from, AnyMessage message, const Bytes& payload) {
   const Arrivals arrivals = conditions_.ToCoordinator(from, message);
   for (int i = 0; i < arrivals.count; ++i) {
-    // A connection keeps the order of its messages, even if the coordinator sleeps for the first of two and is awake for the second.
-    double& heard = workers_[from].heard;
-    heard = std::max(heard, threads_.Begin(Threads::kCoordinator, arrivals.times[i]));
-    queue_.At(heard, [this, from, message, payload] { StepCoordinator(FromWorker{TokenOf(from), message, payload}); });
+    queue_.At(threads_.Begin(Threads::kCoordinator, arrivals.times[i]), [this, from, message, payload] {
+      StepCoordinator(FromWorker{TokenOf(from), message, payload});
+    });
   }
 }
 

@@ -65,7 +65,6 @@ class SimulatedService {
     WorkerMachine machine;
     bool alive = true;
     double alarm = kNever;                   // planned
-    double heard = 0;                        // when the coordinator begins with the last message
     std::optional<std::uint32_t> rendering;  // a job
   };
 
