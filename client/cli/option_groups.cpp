@@ -128,8 +128,11 @@ void AddLookOptions(CLI::App& app, FrameRequest& request, PictureFormat& format)
   app.option_defaults()->group("Look");
   AddRendererOptions(app, request);
   AddTransferOptions(app, request.transfer);
-  AddChoice<bool, 2>(app, "--shading", request.shading.phong, {"phong", "none"}, {true, false},
-                     "Lighting; phong: lit surfaces; none: the material's own colours")
+  AddChoice<ShadingModel, 3>(
+      app, "--shading", request.shading.model, {"phong", "none", "depth-gradient"},
+      {ShadingModel::kPhong, ShadingModel::kNone, ShadingModel::kDepthGradient},
+      "Lighting; phong: lit surfaces; none: the material's own colours; depth-gradient: lit surfaces, with normals from "
+      "the depths of the picture; zbuffer only")
       ->default_str("phong");
   app.add_option("--light", CLI::callback_t([&request](const CLI::results_t& texts) {
                    request.shading.lights.clear();

@@ -42,7 +42,12 @@ Status Validate(const FrameRequest& request) {
   if (Status s = ValidateName("dataset", request.dataset); !s.ok()) return s;
   const Result<const RendererKind*> renderer = RequireRenderer(request.renderer);
   if (!renderer.ok()) return renderer.status();
-  if (const auto parameters = ParseParameters(**renderer, request.parameters); !parameters.ok()) return parameters.status();
+  const auto parameters = ParseParameters(**renderer, request.parameters);
+  if (!parameters.ok()) return parameters.status();
+  if (request.shading.model == ShadingModel::kDepthGradient && (*renderer)->FormatOf(*parameters) != PixelFormat::kDepth) {
+    return Status::InvalidArgument("shading 'depth-gradient' needs a renderer with depths, such as zbuffer, not '" + request.renderer +
+                                   "'");
+  }
   if (Status s = Validate(request.size); !s.ok()) return s;
   if (Status s = Validate(request.view); !s.ok()) return s;
   if (Status s = Validate(request.transfer); !s.ok()) return s;

@@ -1,6 +1,7 @@
-// How surfaces are lit: Phong (1975) with white lights at infinity, or not at all.
+// How surfaces are lit: by Phong (1975) with white lights at infinity, or not at all.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "common/base/status.h"
@@ -10,8 +11,14 @@ namespace slabstream {
 
 inline constexpr int kMaxLights = 8;
 
+enum class ShadingModel : std::uint8_t {
+  kPhong = 0,          // normals from the voxels
+  kNone = 1,           // the colours of the transfer function
+  kDepthGradient = 2,  // Phong with normals from the depths of the finished frame; renderers with depths only
+};
+
 struct Shading {
-  bool phong = true;
+  ShadingModel model = ShadingModel::kPhong;
   std::vector<Vec3> lights;  // directions towards the lights in volume axes (physical), not zero; empty: a headlight
   // Ambient and diffuse add up to 1: a surface that faces a single light has exactly the colour of its transfer function.
   float ambient = 0.2F, diffuse = 0.8F, specular = 0.2F;  // [0, 1]

@@ -79,7 +79,7 @@ inline void Read(const v1::TransferChoice& in, TransferChoice& out, Checker& che
 
 void Fields(auto& io, Is<Shading> auto& m) {
   using P = v1::Shading;
-  io.Any(m.phong, &P::phong, &P::set_phong);
+  io.OneOf("model", m.model, &P::model, &P::set_model, ShadingModel::kPhong, ShadingModel::kDepthGradient);
   io.Messages("lights", m.lights, &P::lights, &P::mutable_lights, kMaxLights);
   io.Finite("ambient", m.ambient, &P::ambient, &P::set_ambient);
   io.Finite("diffuse", m.diffuse, &P::diffuse, &P::set_diffuse);

@@ -45,15 +45,11 @@ Json ViewJson(const ViewParameters& view) {
 double Decimal(float value) { return std::stod(fmt::format("{}", value)); }
 
 Json ShadingJson(const Shading& shading) {
-  const auto& [phong, lights, ambient, diffuse, specular, shininess] = shading;
+  const auto& [model, lights, ambient, diffuse, specular, shininess] = shading;
   Json directions = Json::array();
   for (const Vec3& light : lights) directions.push_back(Json::array({light.x, light.y, light.z}));
-  return {{"phong", phong},
-          {"lights", directions},
-          {"ambient", Decimal(ambient)},
-          {"diffuse", Decimal(diffuse)},
-          {"specular", Decimal(specular)},
-          {"shininess", Decimal(shininess)}};
+  return {{"model", int(model)},         {"lights", directions},          {"ambient", Decimal(ambient)},
+          {"diffuse", Decimal(diffuse)}, {"specular", Decimal(specular)}, {"shininess", Decimal(shininess)}};
 }
 
 Json PolicyJson(const Policy& policy) {

@@ -125,12 +125,12 @@ SweepRenderer ReadRenderer(const JsonValue& value) {
     return read;
   }
   if (value.Has("renderer")) read.kind = kind_of(value.At("renderer"));
-  constexpr std::array<std::string_view, 2> kShadings = {"phong", "none"};
+  constexpr std::array<std::string_view, 3> kShadings = {"phong", "none", "depth-gradient"};  // by ShadingModel
   Look& look = read.look;
   std::vector<std::pair<std::string, JsonValue::Read>> fields = {
       {"name", [&](const JsonValue& v) { read.name = v.Text(); }},
       {"renderer", [](const JsonValue&) {}},
-      {"shading", [&](const JsonValue& v) { look.shading.phong = v.OneOf(kShadings) == 0; }},
+      {"shading", [&](const JsonValue& v) { look.shading.model = ShadingModel(v.OneOf(kShadings)); }},
       {"lights",
        [&](const JsonValue& v) {
          v.Each([&](const JsonValue& light) { look.shading.lights.push_back(ReadLight(light)); }, 0);

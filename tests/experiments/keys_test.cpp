@@ -79,9 +79,18 @@ Changes<Policy> ChangesOfCombining() {
 
 Changes<Shading> ChangesOfShading() {
   return {
-      {"phong", [](auto& s) { s.phong = false; }},        {"lights", [](auto& s) { s.lights = {{1, 0, 0}}; }},
-      {"light", [](auto& s) { s.lights = {{1, 0, 1}}; }}, {"ambient", [](auto& s) { s.ambient = 0.3F; }},
-      {"diffuse", [](auto& s) { s.diffuse = 0.7F; }},     {"specular", [](auto& s) { s.specular = 0.3F; }},
+      {"model", [](auto& s) { s.model = ShadingModel::kNone; }},
+      {"lights",
+       [](auto& s) {
+         s.lights = {{1, 0, 0}};
+       }},
+      {"light",
+       [](auto& s) {
+         s.lights = {{1, 0, 1}};
+       }},
+      {"ambient", [](auto& s) { s.ambient = 0.3F; }},
+      {"diffuse", [](auto& s) { s.diffuse = 0.7F; }},
+      {"specular", [](auto& s) { s.specular = 0.3F; }},
       {"shininess", [](auto& s) { s.shininess = 30; }},
   };
 }

@@ -14,7 +14,7 @@ TEST(PlanFrame, SetupHoldsWhatTheRequestAsksFor) {
   request.renderer = ZBuffer()->name();
   request.termination = 0.25;
   request.transfer.opacity_distance = 3;
-  request.shading.phong = false;
+  request.shading.model = ShadingModel::kNone;
   request.size = {100, 50};
   const VolumeSummary summary = FullSummary({40, 41, 42});
   const FrameSetup setup = Plan(request, summary, FullRoster(2)).setup;

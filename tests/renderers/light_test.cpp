@@ -8,7 +8,7 @@
 
 #include "tests/support/simd_targets.h"
 #include "worker/kernels/normal_code.h"
-#include "worker/kernels/phong.h"
+#include "worker/kernels/phong_table.h"
 
 namespace slabstream {
 namespace {
@@ -61,7 +61,7 @@ TEST(PhongTable, IsTheDefinitionOnEveryInstructionSet) {
     }
   }
   Shading plain;
-  plain.phong = false;
+  plain.model = ShadingModel::kNone;
   for (const PhongFactors& factors : PhongTable(plain, view)) {
     EXPECT_EQ(factors.diffuse, 1);
     EXPECT_EQ(factors.specular, 0);
@@ -82,7 +82,7 @@ TEST(Phong, LightsBothSidesAndEveryLight) {
   EXPECT_FLOAT_EQ(phong.WithoutGradient().specular, 0.0F);
   EXPECT_FLOAT_EQ(phong.AtNormal({0, 1, 0}).diffuse, 0.1F);  // both graze: the rim is ambient
   EXPECT_FLOAT_EQ(phong.AtNormal({0, 1, 0}).specular, 0.0F);
-  shading.phong = false;
+  shading.model = ShadingModel::kNone;
   EXPECT_FLOAT_EQ(Phong(shading, {0, 0, -1}).AtNormal({1, 0, 0}).diffuse, 1.0F);
 }
 

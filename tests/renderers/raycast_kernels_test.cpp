@@ -63,7 +63,7 @@ TEST(MarchTile, AgreesWithTheReference) {
     options.view.zoom *= i % 5 == 0 ? 4 : 1;
     options.transfer = Ramp(random.Real(0.05, 0.9));
     if (i % 3 == 0) options.transfer.opacities = {{90, 0, 0.5, 0}, {110, 0.7, 0.5, 0}, {130, 0, 0.5, 0}};
-    options.shading.phong = i % 7 != 3;
+    if (i % 7 == 3) options.shading.model = ShadingModel::kNone;
     if (i % 2 == 1) options.shading.lights = {{1, 2, 3}, {-1, 0.3, -0.2}};
     options.size = {45, 38};
     FrameSetup setup = MakeSetup(volume, options);

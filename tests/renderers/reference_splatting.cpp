@@ -7,7 +7,7 @@
 
 #include "common/classification/classification_table.h"
 #include "common/kernels/resample.h"
-#include "worker/kernels/phong.h"
+#include "worker/kernels/phong_table.h"
 
 namespace slabstream::testing {
 namespace {

@@ -39,7 +39,7 @@ TEST(Splatting, IsItsDefinition) {
         SetupOptions options;
         options.view = RandomView(projection, random);
         options.transfer = Ramp(0.3);
-        options.shading.phong = type != ScalarType::kUint16;
+        if (type == ScalarType::kUint16) options.shading.model = ShadingModel::kNone;
         options.shading.lights = {{1, 2, 3}, {-1, 0, 0.5}};
         ExpectIsItsDefinition(volume, MakeSetup(volume, options));
       }
@@ -282,7 +282,7 @@ TEST(Splatting, SamplesThatAreNotFiniteAreEmpty) {
   const Volume empty = MakeVolume(geometry, ScalarType::kFloat32, plain);
   SetupOptions options;
   options.transfer = Uniform(0.5, {1, 1, 1});
-  options.shading.phong = false;
+  options.shading.model = ShadingModel::kNone;
   const FrameSetup setup = MakeSetup(empty, options);
   EXPECT_EQ(LargestDifference(RenderWhole(holed, setup), RenderWhole(empty, setup)), 0);
 }

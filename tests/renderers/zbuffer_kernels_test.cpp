@@ -7,10 +7,10 @@
 #include <cmath>
 #include <random>
 
+#include "common/view/phong.h"
 #include "tests/renderers/render_support.h"
 #include "tests/support/simd_targets.h"
 #include "worker/kernels/draw_faces.h"
-#include "worker/kernels/phong.h"
 #include "worker/kernels/shade_faces.h"
 #include "worker/renderers/zbuffer/brick_projection.h"
 #include "worker/renderers/zbuffer/vertex_normals.h"
@@ -168,8 +168,10 @@ struct RandomFaces {
 };
 
 TEST(ShadeFaces, IsTheSameBitsOnEveryInstructionSet) {
-  const std::vector<Shading> shadings = {
-      {}, {false}, {true, {{1, 2, 3}}, 0.1F, 0.9F, 0.5F, 1}, {true, {{1, 0, 0}, {0, -1, 0.3}, {-1, -1, -1}}, 0.3F, 0.3F, 1, 1000}};
+  const std::vector<Shading> shadings = {{},
+                                         {ShadingModel::kNone},
+                                         {ShadingModel::kPhong, {{1, 2, 3}}, 0.1F, 0.9F, 0.5F, 1},
+                                         {ShadingModel::kPhong, {{1, 0, 0}, {0, -1, 0.3}, {-1, -1, -1}}, 0.3F, 0.3F, 1, 1000}};
   for (Projection projection : kProjections) {
     for (unsigned seed = 70; seed < 80; ++seed) {
       SCOPED_TRACE(seed);
@@ -198,7 +200,7 @@ TEST(ShadeFaces, IsPhong) {
     RandomFaces faces(seed);
     std::mt19937 random(seed);
     for (FaceNormals& corners : faces.normals) corners.fill(corners[0]);
-    Shading shading{true, {{1, 2, 3}, {-3, 1, 0}}, 0.1F, 0.4F, 0.5F, std::exp2(float(seed - 80))};
+    Shading shading{ShadingModel::kPhong, {{1, 2, 3}, {-3, 1, 0}}, 0.1F, 0.4F, 0.5F, std::exp2(float(seed - 80))};
     if (seed % 2 == 0) shading.lights.clear();
     const Camera camera = MakeCamera(RandomView(Projection::kPerspective, random), {100, 80}, kGeometry);
     const FaceShading kernel = faces.Shading(camera, shading);

@@ -87,7 +87,7 @@ TEST(ZBuffer, BallHasItsSilhouetteDepthAndShade) {
     options.view.zoom = 1.4;
     options.size = {128, 128};
     options.transfer.opacities = {{0, 0, 0.5, 0}, {200, 1, 0.5, 0}};  // half opaque on the surface
-    options.shading = {true, {}, 0, 1, 0, 1};                         // the headlight's diffuse part only
+    options.shading = {ShadingModel::kPhong, {}, 0, 1, 0, 1};         // the headlight's diffuse part only
     const FrameSetup setup = MakeSetup(ball, options);
     const LocalImage image = RenderWhole(ball, setup);
     for (int y = 0; y < setup.camera.height; ++y) {

@@ -36,7 +36,7 @@ TransferFunction Curve() {
 }
 
 Shading ManyLights() {
-  Shading shading{.phong = false, .lights = {}, .ambient = 0, .diffuse = 1, .specular = 0.5F, .shininess = 1000};
+  Shading shading{.model = ShadingModel::kNone, .lights = {}, .ambient = 0, .diffuse = 1, .specular = 0.5F, .shininess = 1000};
   for (int i = 0; i < kMaxLights; ++i) shading.lights.push_back({-1.0 * i, 1e-3, 1e3});
   return shading;
 }

@@ -12,7 +12,7 @@
 
 #include "common/base/aligned_buffer.h"
 #include "worker/kernels/normal_code.h"
-#include "worker/kernels/phong.h"
+#include "worker/kernels/phong_table.h"
 
 #ifndef SLABSTREAM_WORKER_KERNELS_PHONG_TABLE_CPP_  // shared by all instruction sets
 #define SLABSTREAM_WORKER_KERNELS_PHONG_TABLE_CPP_
@@ -82,7 +82,7 @@ std::vector<PhongFactors> PhongTable(const Shading& shading, const Vec3& view_di
   static_assert(sizeof(PhongFactors) == 2 * sizeof(float));
   const Phong phong(shading, view_direction);
   std::vector<PhongFactors> factors(kPaddedCodes + 1);
-  if (shading.phong) HWY_DYNAMIC_DISPATCH(FillTable)(shading, phong.lights(), -view_direction, factors.data());
+  if (shading.model != ShadingModel::kNone) HWY_DYNAMIC_DISPATCH(FillTable)(shading, phong.lights(), -view_direction, factors.data());
   factors.resize(kNormalCodes);
   factors[kNoGradient] = phong.WithoutGradient();
   return factors;

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/base/aligned_buffer.h"
-#include "worker/kernels/phong.h"
+#include "worker/kernels/phong_table.h"
 #include "worker/kernels/voxel_record.h"
 
 namespace slabstream {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "worker/kernels/phong.h"
+#include "common/view/phong.h"
 #include "worker/kernels/shade_faces.h"
 
 namespace slabstream {
@@ -58,7 +58,7 @@ FaceShading MakeFaceShading(const Camera& camera, const Shading& shading, const 
 
   const Vec3 to_viewer = -camera.view_direction;
   Copy(to_viewer, out.to_viewer);
-  out.phong = shading.phong;
+  out.phong = shading.model == ShadingModel::kPhong;
   const Phong phong(shading, camera.view_direction);
   for (const Vec3& light : phong.lights()) {
     Copy(light, out.light[out.light_count]);
@@ -69,7 +69,7 @@ FaceShading MakeFaceShading(const Camera& camera, const Shading& shading, const 
   out.specular = shading.specular;
   out.shininess = shading.shininess;
   // |N.L| is 1/2 on average over all directions of N.
-  if (shading.phong) out.diffuse_without_normal = shading.ambient + shading.diffuse * 0.5F * float(out.light_count);
+  if (out.phong) out.diffuse_without_normal = shading.ambient + shading.diffuse * 0.5F * float(out.light_count);
   out.bricks_x = std::uint32_t(volume_size.x + kFaceBrick - 1) / kFaceBrick;
   out.bricks_y = std::uint32_t(volume_size.y + kFaceBrick - 1) / kFaceBrick;
   return out;

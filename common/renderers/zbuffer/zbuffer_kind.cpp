@@ -1,6 +1,7 @@
 // The Z-buffer's planning half: the frame is the picture, supersampled where it is minified; only opaque voxels draw.
 #include "common/calibration/calibration.h"
 #include "common/renderers/renderer_kind.h"
+#include "common/renderers/zbuffer/depth_shading.h"
 #include "common/renderers/zbuffer/least_opaque.h"
 #include "common/volume/cells_along.h"
 
@@ -60,6 +61,14 @@ class ZBufferKind : public RendererKind {
     return table;
   }
   std::unique_ptr<AnalyticCost> MakeCost(const CostBasis& basis) const override { return std::make_unique<ZBufferCost>(*basis.drawn); }
+
+  LocalImage Finish(const LocalImage& frame, const FrameSetup& setup) const override {
+    if (setup.shading.model != ShadingModel::kDepthGradient) return RendererKind::Finish(frame, setup);
+    return RendererKind::Finish(ShadeByDepth(frame, setup), setup);
+  }
+  bool FrameIsPicture(const FrameSetup& setup) const override {
+    return setup.shading.model != ShadingModel::kDepthGradient && RendererKind::FrameIsPicture(setup);
+  }
 };
 
 }  // namespace

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "worker/kernels/phong.h"
+#include "common/view/phong.h"
 
 namespace slabstream {
 namespace {
@@ -38,7 +38,7 @@ RayLook MakeRayLook(const ClassificationTable& table, const VolumeDescription& d
 
   const Phong phong(shading, camera.view_direction);
   const Vec3 to_viewer = -camera.view_direction;
-  look.phong = shading.phong;
+  look.phong = shading.model == ShadingModel::kPhong;
   look.inverse_spacing = Divided({1, 1, 1}, camera.spacing);
   look.viewer = Divided(to_viewer, camera.spacing);
   for (const Vec3& light : phong.lights()) look.lights.push_back({Divided(light, camera.spacing), float(Dot(light, to_viewer))});

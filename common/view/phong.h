@@ -34,8 +34,4 @@ class Phong {
   Vec3 to_viewer_;            // unit
 };
 
-// Light by normal code (normal_code.h), kNoGradient included: in single precision, within 2e-7 * max(shininess, 20) of the definition per
-// light.
-std::vector<PhongFactors> PhongTable(const Shading& shading, const Vec3& view_direction);
-
 }  // namespace slabstream

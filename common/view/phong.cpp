@@ -1,4 +1,4 @@
-#include "worker/kernels/phong.h"
+#include "common/view/phong.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@ Phong::Phong(const Shading& shading, const Vec3& view_direction) : shading_(shad
 }
 
 PhongFactors Phong::AtNormal(const Vec3& unit_normal) const {
-  if (!shading_.phong) return {};
+  if (shading_.model == ShadingModel::kNone) return {};
   double diffuse = 0, specular = 0;
   for (const Vec3& light : lights_) {
     const double n_l = Dot(unit_normal, light);
@@ -23,7 +23,7 @@ PhongFactors Phong::AtNormal(const Vec3& unit_normal) const {
 }
 
 PhongFactors Phong::WithoutGradient() const {
-  if (!shading_.phong) return {};
+  if (shading_.model == ShadingModel::kNone) return {};
   constexpr double kMean = 0.5;  // of |N.L| over all directions of N
   return {float(shading_.ambient + shading_.diffuse * kMean * double(lights_.size())), 0.0F};
 }
