@@ -188,10 +188,10 @@ void SimulatedService::SendToCoordinator(Node from, AnyMessage message, const By
 void SimulatedService::SendToPeer(std::uint32_t place) {
   Job& job = JobAt(place);
   const auto& send = std::get<SendPartial>(job.action);
-  const Node to = ParseNumber<Node>(send.to.images_endpoint).value();
+  const Node to = ParseNumber<Node>(send.to->images_endpoint).value();
   const Arrivals arrivals = conditions_.ToPeer(to, job);
   job.copies = arrivals.count;
-  if (arrivals.nobody) queue_.At(now(), [this, node = job.node, who = send.to.worker] { StepWorker(node, PeerUnreachable{who}); });
+  if (arrivals.nobody) queue_.At(now(), [this, node = job.node, who = send.to->worker] { StepWorker(node, PeerUnreachable{who}); });
   if (arrivals.count == 0) return unused_jobs_.push_back(place);
   for (int i = 0; i < arrivals.count; ++i) {
     queue_.At(threads_.Begin(Threads::Machine(to), arrivals.times[i]), [this, to, place] { Deliver(to, place); });

@@ -229,7 +229,7 @@ void WorkerMachine::State::On(GroupAssignment&& assignment, const Bytes&) {
       renders.Add(key, rank, placement, setup, hidden, actions);
     }
   }
-  for (auto& [partial, payload] : early.Take(key)) run.OnPartial(std::move(partial), std::move(payload), actions);
+  for (auto& [partial, payload] : early.Take(key)) run.OnPartial(std::move(partial), payload, actions);
   AfterRun(run);
 }
 

@@ -11,6 +11,9 @@ namespace slabstream {
 
 StepOrder::StepOrder(SharedSchedule schedule, std::vector<Rank> ranks)
     : schedule_(std::move(schedule)), numbers_(std::move(ranks)), ranks_(numbers_.size()) {
+  std::size_t turns = 1;
+  for (const Rank rank : numbers_) turns += schedule_->StepsOf(rank).size();
+  turns_.reserve(turns);
   for (std::uint32_t i = 0; i < numbers_.size(); ++i) {
     ranks_[i].first_turn = std::uint32_t(turns_.size());
     for (const std::uint32_t step : schedule_->StepsOf(numbers_[i])) turns_.push_back({.step = step, .rank = i});
@@ -22,40 +25,42 @@ StepOrder::StepOrder(SharedSchedule schedule, std::vector<Rank> ranks)
     turn.missing = PixelCount(StepOf(turn).pixels);
     turn.partner = (turn.sends ? FindReceiving(turn.step) : FindSending(turn.step)).value_or(kElsewhere);
   }
-  possible_ = IndexSet(std::uint32_t(turns_.size()));
+  turns_.emplace_back();
+  possible_ = IndexSet(turn_count());
   changed_ = IndexSet(std::uint32_t(ranks_.size()));
   FindWaits();
-  for (std::uint32_t turn = 0; turn < turns_.size(); ++turn) Offer(turn);
+  for (std::uint32_t turn = 0; turn < turn_count(); ++turn) Offer(turn);
 }
 
 void StepOrder::FindWaits() {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> order;  // (turn, another one that waits for it)
+  order.reserve(turns_.size());
   std::vector<std::uint32_t> earlier;
-  first_waiter_.resize(turns_.size() + 1);
+  const auto wait = [&](std::uint32_t first, std::uint32_t turn) {
+    order.emplace_back(first, turn);
+    ++turns_[first + 1].first_waiter;
+    ++turns_[turn].waits;
+  };
   for (const RankState& rank : ranks_) {
     Fragments<std::uint32_t> latest;  // the last turn that touches a pixel
     for (std::uint32_t turn = rank.first_turn; turn < rank.turn_end; ++turn) {
-      earlier.clear();
       const PixelRange& pixels = StepOf(turns_[turn]).pixels;
-      if (const auto* only = latest.Find(pixels)) {
-        earlier.push_back(only->value);
-      } else {
-        for (const auto& fragment : latest.Within(pixels)) earlier.push_back(fragment.value);
+      if (const auto only = latest.Exchange({pixels, turn})) {  // the usual case
+        wait(*only, turn);
+        continue;
       }
+      earlier.clear();
+      for (const auto& fragment : latest.Within(pixels)) earlier.push_back(fragment.value);
       std::ranges::sort(earlier);
       earlier.erase(std::unique(earlier.begin(), earlier.end()), earlier.end());
-      for (const std::uint32_t first : earlier) {
-        order.emplace_back(first, turn);
-        ++first_waiter_[first + 1];
-      }
-      turns_[turn].waits = std::uint32_t(earlier.size());
+      for (const std::uint32_t first : earlier) wait(first, turn);
       latest.Replace({pixels, turn});
     }
   }
-  std::partial_sum(first_waiter_.begin(), first_waiter_.end(), first_waiter_.begin());
+  for (std::size_t turn = 1; turn < turns_.size(); ++turn) turns_[turn].first_waiter += turns_[turn - 1].first_waiter;
   waiters_.resize(order.size());
-  std::vector<std::uint32_t> next = first_waiter_;
-  for (const auto& [first, waiter] : order) waiters_[next[first]++] = waiter;
+  std::vector<std::uint32_t> filled(turns_.size());  // waiters of each turn
+  for (const auto& [first, waiter] : order) waiters_[turns_[first].first_waiter + filled[first]++] = waiter;
 }
 
 std::optional<std::uint32_t> StepOrder::FindRank(Rank rank) const {
@@ -90,12 +95,10 @@ void StepOrder::OnCombined(Rank rank) {
   if (--ranks_[index].combining == 0) changed_.Insert(index);
 }
 
-void StepOrder::OnArrived(std::uint32_t step, std::uint64_t pixels) {
-  const std::optional<std::uint32_t> turn = Awaited(step);
-  CHECK(turn) << "step " << step;
-  turns_[*turn].missing -= std::min(turns_[*turn].missing, pixels);
-  turns_[*turn].untaken = true;
-  Offer(*turn);
+void StepOrder::OnArrived(std::uint32_t turn, std::uint64_t pixels) {
+  turns_[turn].missing -= std::min(turns_[turn].missing, pixels);
+  turns_[turn].untaken = true;
+  Offer(turn);
 }
 
 std::optional<std::uint32_t> StepOrder::Awaited(std::uint32_t step) const {
@@ -123,7 +126,7 @@ void StepOrder::Close(std::uint32_t index) {
   turns_[index].taken = true;
   possible_.Erase(index);
   --ranks_[turns_[index].rank].open_steps;
-  for (std::uint32_t i = first_waiter_[index]; i < first_waiter_[index + 1]; ++i) {
+  for (std::uint32_t i = turns_[index].first_waiter; i < turns_[index + 1].first_waiter; ++i) {
     if (--turns_[waiters_[i]].waits == 0) Offer(waiters_[i]);
   }
 }

@@ -28,11 +28,11 @@ class StepOrder {
   void OnCombineStarted(Rank rank) { ++At(rank).combining; }
   void OnCombined(Rank rank);
   // A turn is the part of a rank that is here in a step: [0, turn_count()).
-  std::uint32_t turn_count() const { return std::uint32_t(turns_.size()); }
+  std::uint32_t turn_count() const { return std::uint32_t(turns_.size()) - 1; }
   // The receiver's turn if the step goes from a rank elsewhere to one here, and not all of its pixels have been taken.
   std::optional<std::uint32_t> Awaited(std::uint32_t step) const;
-  // `pixels` of the step have come from a rank that is not here. The step is Awaited and has not had these pixels yet.
-  void OnArrived(std::uint32_t step, std::uint64_t pixels);
+  // `pixels` have come from a rank that is not here. The turn is that of an Awaited step, which has not had these pixels yet.
+  void OnArrived(std::uint32_t turn, std::uint64_t pixels);
 
   // kReceive: all pixels that have arrived and are not taken yet. It comes again if more arrive. kMove: between two ranks that are here.
   enum class Kind : std::uint8_t { kSend, kReceive, kMove };
@@ -53,15 +53,16 @@ class StepOrder {
  private:
   static constexpr std::uint32_t kElsewhere = ~std::uint32_t{0};
 
-  struct Turn {
+  struct Turn {  // half a cache line: a schedule may have a million of them
     std::uint32_t step = 0;
     std::uint32_t rank = 0;              // index into ranks_
     std::uint32_t partner = kElsewhere;  // the other rank's turn, if that rank is here too
-    std::uint32_t waits = 0;             // number of earlier turns of the rank to wait for
+    std::uint32_t first_waiter = 0;      // those that wait for this one: waiters_[first_waiter, first_waiter of the next turn)
     std::uint64_t missing = 0;           // pixels of a step from elsewhere that have not arrived
-    bool sends = false;                  // or it receives
-    bool untaken = false;                // some pixels have arrived and are not taken
-    bool taken = false;
+    std::uint32_t waits : 29 = 0;        // number of earlier turns of the rank to wait for
+    bool sends : 1 = false;              // or it receives
+    bool untaken : 1 = false;            // some pixels have arrived and are not taken
+    bool taken : 1 = false;
   };
   struct RankState {
     std::uint32_t first_turn = 0, turn_end = 0;
@@ -85,9 +86,8 @@ class StepOrder {
   SharedSchedule schedule_;
   std::vector<Rank> numbers_;
   std::vector<RankState> ranks_;  // of numbers_
-  std::vector<Turn> turns_;       // rank by rank, each in order of steps
-  // The turns that wait for turn i: [first_waiter_[i], first_waiter_[i + 1]) of waiters_.
-  std::vector<std::uint32_t> first_waiter_, waiters_;
+  std::vector<Turn> turns_;       // rank by rank, each in order of steps; the last one is none
+  std::vector<std::uint32_t> waiters_;
   IndexSet possible_;  // turns that wait only for their ranks to be free
   IndexSet changed_;   // ranks at which a turn may have become possible
 };
