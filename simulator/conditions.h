@@ -17,11 +17,12 @@ namespace slabstream {
 // What a thread of a worker does. It stays until its result, or the last copy of its message, has arrived.
 struct Job {
   Node node = 0;  // its worker
+  Node to = 0;    // of the message that it sends to another worker
   std::variant<StartRender, StoreChunk, StartCombine, FindHidden, SendPartial, SendFrame> action;
-  bool cancelled = false;        // its rendering, in time
-  Bytes payload;                 // of the message that it sends
+  Rare<Bytes> payload;           // of the message that it sends; none: it has no bytes
   double bytes = 0, pixels = 0;  // of that message: what links carry; pixels that are not empty
-  int copies = 0;                // of it that have not arrived
+  std::uint8_t copies = 0;       // of it that have not arrived
+  bool cancelled = false;        // its rendering, in time
 };
 
 // When copies of a message arrive: at most two.
