@@ -209,13 +209,15 @@ void SimulatedService::SendToPeer(std::uint32_t place) {
   job.copies = std::uint8_t(arrivals.count);
   if (arrivals.nobody) queue_.At(now(), [this, node = job.node, who = to.worker] { StepWorker(node, PeerUnreachable{who}); });
   if (arrivals.count == 0) return unused_jobs_.push_back(place);
-  for (int i = 0; i < arrivals.count; ++i) queue_.TellAt(threads_.Begin(Threads::Machine(job.to), arrivals.times[i]), 2 * place + 1);
+  for (int i = 0; i < arrivals.count; ++i)
+    queue_.TellAt(threads_.Begin(Threads::Machine(job.to), arrivals.times[i]), 2 * place + 1, job.to);
 }
 
 void SimulatedService::Deliver(std::uint32_t place) {
   Job& job = JobAt(place);
   auto& message = std::get<SendPartial>(job.action).message;
   const Node to = job.to;
+  queue_.NextOf(to);
   if (--job.copies > 0) return StepWorker(to, MessageReceived{message, job.payload ? *job.payload : Bytes()});
   MessageReceived received{std::move(message), TakePayload(job)};
   unused_jobs_.push_back(place);

@@ -295,7 +295,7 @@ void Executor::Perform(StartCombine&& action) {
       }
       return WithAllThreads(combine_arena_, [&] {
         return combine.incoming->shared ? CombineBorrowed(*image, fresh, combine, pixels, peer_memory_)
-                                       : CombineIncoming(*image, fresh, combine, pixels);
+                                        : CombineIncoming(*image, fresh, combine, pixels);
       });
     });
     done.span.end_ns = NowNs();

@@ -31,6 +31,12 @@ ImagePiece PieceOf(PartialImage& message, const Bytes& payload) {
   return piece;
 }
 
+std::vector<WorkerId> WorkersOf(const GroupPlan& group) {
+  std::vector<WorkerId> workers;
+  for (const Placement& placement : group.placements) workers.push_back(placement.worker);
+  return workers;
+}
+
 std::vector<Rank> RanksOf(const GroupPlan& group, WorkerId worker) {
   std::vector<Rank> ranks;
   for (Rank rank = 0; rank < group.placements.size(); ++rank) {
@@ -44,11 +50,11 @@ std::vector<Rank> RanksOf(const GroupPlan& group, WorkerId worker) {
 GroupRun::GroupRun(GroupAssignment assignment, WorkerId self, ImageNames& names)
     : peers_(ByWorker(std::exchange(assignment.peers, {}))),
       assignment_(std::move(assignment)),
+      workers_(WorkersOf(assignment_.group)),
       self_(self),
       names_(names),
       frame_(WholeFrame(assignment_.setup)),
       runner_(MakeRunner()),
-      first_arrival_(runner_.order().turn_count(), kNone),
       group_image_{key(), {}, {}} {
   for (const Rank rank : runner_.order().ranks()) ranks_[rank];
 }
@@ -94,12 +100,12 @@ void GroupRun::OnPartial(PartialImage&& message, const Bytes& payload, WorkerAct
   if (HasArrived(*turn, message.pixels)) return;
   runner_.order().OnArrived(*turn, PixelCount(message.pixels));
   Keep(*turn, PieceOf(message, payload));
-  Append(ranks_.at(step.to).reports, std::move(message.reports));
+  if (!message.reports.empty()) Append(ranks_.at(step.to).reports, std::move(message.reports));
   Advance(actions);
 }
 
-bool GroupRun::HasArrived(std::uint32_t turn, const PixelRange& pixels) const {
-  for (std::uint32_t place = first_arrival_[turn]; place != kNone; place = arrivals_[place].next) {
+bool GroupRun::HasArrived(std::uint32_t turn, const PixelRange& pixels) {
+  for (std::uint32_t place = runner_.order().note(turn); place != kNone; place = arrivals_[place].next) {
     if (Overlap(arrivals_[place].piece.pixels, pixels)) return true;
   }
   return false;
@@ -113,26 +119,27 @@ void GroupRun::Keep(std::uint32_t turn, ImagePiece&& piece) {
   }
   const std::uint32_t place = std::exchange(unused_arrival_, arrivals_[unused_arrival_].next);
   arrivals_[place] = {.piece = std::move(piece)};
-  std::uint32_t* link = &first_arrival_[turn];
+  std::uint32_t* link = &runner_.order().note(turn);
   while (*link != kNone) link = &arrivals_[*link].next;
   *link = place;
 }
 
-void GroupRun::OnCombined(const CombineDone& done, WorkerActions& actions) {
+bool GroupRun::OnCombined(const CombineDone& done, WorkerActions& actions) {
   const auto started = std::ranges::find(combining_, done.image, &std::pair<ImageHandle, Rank>::first);
-  if (started == combining_.end()) return;
+  if (started == combining_.end()) return false;
   const Rank number = started->second;
   combining_.erase(started);
   RankState& rank = ranks_.at(number);
   runner_.order().OnCombined(number);
   if (!done.status.ok()) {
     if (failure_.ok()) failure_ = done.status;
-    return;
+    return true;
   }
   if (!rank.reports.empty() && rank.reports.front().rank == number) {
     AddStage(rank.reports.front(), Stage::kCombine, done.span.begin_ns, done.span.end_ns);
   }
   Advance(actions);
+  return true;
 }
 
 std::optional<GroupImage> GroupRun::TakeGroupImage() {
@@ -194,13 +201,13 @@ void GroupRun::MoveLocally(const Runner::Taken& taken, WorkerActions& actions) {
 }
 
 void GroupRun::Receive(const Runner::Taken& taken, WorkerActions& actions) {
+  std::uint32_t& first = runner_.order().note(taken.turn);
   std::uint32_t last = kNone;
-  for (std::uint32_t place = first_arrival_[taken.turn]; place != kNone; place = arrivals_[place].next) {
+  for (std::uint32_t place = first; place != kNone; place = arrivals_[place].next) {
     Arrival& arrival = arrivals_[last = place];
-    if (!std::exchange(arrival.taken, true)) Merge(taken.step->to, std::move(arrival.piece), actions);
+    if (!std::exchange(arrival.taken, true)) Merge(taken.rank, std::move(arrival.piece), actions);
   }
-  if (!taken.last) return;
-  arrivals_[last].next = std::exchange(unused_arrival_, std::exchange(first_arrival_[taken.turn], kNone));
+  if (taken.last) arrivals_[last].next = std::exchange(unused_arrival_, std::exchange(first, kNone));
 }
 
 void GroupRun::Merge(Rank rank, ImagePiece&& piece, WorkerActions& actions) {
@@ -303,8 +310,8 @@ void GroupRun::CollectGroupPiece(PartialImage&& message, const Bytes& payload) {
   Append(group_image_.reports, std::move(message.reports));
 }
 
-void GroupRun::SendFragments(Rank rank, std::span<const Held> fragments, std::uint32_t step, WorkerId to,
-                             std::vector<RankReport> reports, WorkerActions& actions) {
+void GroupRun::SendFragments(Rank rank, std::span<const Held> fragments, std::uint32_t step, WorkerId to, std::vector<RankReport> reports,
+                             WorkerActions& actions) {
   const Peer* peer = FindPeer(to);
   if (peer == nullptr) return Fail(fmt::format("worker {} takes part in the group but has no endpoint in it", to));
   for (const Held& fragment : fragments) {

@@ -51,7 +51,7 @@ class GroupRun {
   // One of this worker's ranks draws nothing: it is not rendered and its picture is empty.
   void LeaveOut(Rank rank, RankReport report, WorkerActions& actions);
   void OnPartial(PartialImage&& message, const Bytes& payload, WorkerActions& actions);
-  void OnCombined(const CombineDone& done, WorkerActions& actions);
+  bool OnCombined(const CombineDone& done, WorkerActions& actions);  // false: not one of its combines
 
   std::optional<GroupImage> TakeGroupImage();  // display worker, once
   bool finished() const;                       // this worker has nothing more to do for the group, and holds nothing of it
@@ -71,15 +71,15 @@ class GroupRun {
     ImageHandle own = 0;              // its picture, once rendered
     std::vector<RankReport> reports;  // on their way with this rank: its own, then those that have come
   };
-  static constexpr std::uint32_t kNone = ~std::uint32_t{0};
-  struct Arrival {  // a place in arrivals_
+  static constexpr std::uint32_t kNone = StepOrder::kNoNote;
+  struct Arrival {  // a place in arrivals_. The first one of a step is noted for its turn
     ImagePiece piece;
     bool taken = false;          // the piece has no image any more
     std::uint32_t next = kNone;  // the next piece of the step, or the next unused place
   };
 
   bool Mine(Rank rank) const { return ranks_.contains(rank); }
-  WorkerId WorkerOf(Rank rank) const { return assignment_.group.placements[rank].worker; }
+  WorkerId WorkerOf(Rank rank) const { return workers_[rank]; }
   Rank root() const { return assignment_.group.schedule.root; }
   std::uint32_t step_count() const { return std::uint32_t(runner_.order().schedule().steps().size()); }
   Runner MakeRunner();
@@ -87,7 +87,7 @@ class GroupRun {
   void MoveLocally(const Runner::Taken& taken, WorkerActions& actions);
   void Receive(const Runner::Taken& taken, WorkerActions& actions);
   void Keep(std::uint32_t turn, ImagePiece&& piece);
-  bool HasArrived(std::uint32_t turn, const PixelRange& pixels) const;  // some of them
+  bool HasArrived(std::uint32_t turn, const PixelRange& pixels);  // some of them
   void Merge(Rank rank, ImagePiece&& piece, WorkerActions& actions);
   // Passes on `incoming`, what has come of the piece.
   void Combine(Rank rank, const Held& held, const ImagePiece& piece, Rare<IncomingImage>&& incoming, WorkerActions& actions);
@@ -108,14 +108,14 @@ class GroupRun {
 
   const std::shared_ptr<const std::vector<Peer>> peers_;  // by ascending worker
   const GroupAssignment assignment_;                      // without its peers
+  const std::vector<WorkerId> workers_;                   // by rank
   const WorkerId self_;
   ImageNames& names_;
   const PixelRange frame_;
   Status failure_;
   Runner runner_;
   std::map<Rank, RankState> ranks_;                      // of this worker
-  std::vector<std::uint32_t> first_arrival_;             // by turn (StepOrder): a place, or kNone. At most one piece of any pixel
-  std::vector<Arrival> arrivals_;                        // of all steps
+  std::vector<Arrival> arrivals_;                        // of all steps; at most one piece of any pixel
   std::uint32_t unused_arrival_ = kNone;                 // the first unused place
   std::vector<std::pair<ImageHandle, Rank>> combining_;  // StartCombine without CombineDone
   bool root_done_ = false;

@@ -168,9 +168,9 @@ struct StartRender {
 struct CancelRender {
   GroupKey key;
 };  // the running one, if it belongs to this group; RenderDone still comes
-// Combines `other` (if 0: the incoming image; none is an empty one) into `image`. If `image` names no image yet, it becomes a copy of the other one. Only the
-// pixels of `pixels` count in the other one: an image may hold pixels that have been passed on. `other` stays unchanged and needs its own
-// release. -> CombineDone
+// Combines `other` (if 0: the incoming image; none is an empty one) into `image`. If `image` names no image yet, it becomes a copy of the
+// other one. Only the pixels of `pixels` count in the other one: an image may hold pixels that have been passed on. `other` stays unchanged
+// and needs its own release. -> CombineDone
 struct StartCombine {
   GroupKey key;
   ImageHandle image = 0;

@@ -44,6 +44,7 @@ class ScheduleRunner {
   struct Taken {
     StepOrder::Kind kind = StepOrder::Kind::kSend;
     std::uint32_t index = 0, turn = 0;  // of the step
+    Rank rank = 0;                      // that takes it; kMove: one of the two
     bool last = true;                   // as StepOrder says
     const Step* step = nullptr;
     // kSend, kMove: what `from` held of the step's pixels, perhaps not all; now removed from it. Valid until the next call.
@@ -52,7 +53,7 @@ class ScheduleRunner {
   std::optional<Taken> TakeNext() {
     const std::optional<StepOrder::Taken> next = order_.TakeNext();
     if (!next) return std::nullopt;
-    Taken taken = {next->kind, next->step, next->turn, next->last, &order_.schedule().steps()[next->step], {}};
+    Taken taken = {next->kind, next->step, next->turn, next->rank, next->last, &order_.schedule().steps()[next->step], {}};
     if (next->kind == StepOrder::Kind::kReceive) return taken;
     parts_.clear();
     held(taken.step->from).Take(taken.step->pixels, parts_);

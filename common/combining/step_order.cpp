@@ -11,10 +11,11 @@ namespace slabstream {
 
 StepOrder::StepOrder(SharedSchedule schedule, std::vector<Rank> ranks)
     : schedule_(std::move(schedule)), numbers_(std::move(ranks)), ranks_(numbers_.size()) {
-  std::size_t turns = 1;
+  std::size_t turns = 0;
   for (const Rank rank : numbers_) turns += schedule_->StepsOf(rank).size();
   turns_.reserve(turns);
   for (std::uint32_t i = 0; i < numbers_.size(); ++i) {
+    ranks_[i].number = numbers_[i];
     ranks_[i].first_turn = std::uint32_t(turns_.size());
     for (const std::uint32_t step : schedule_->StepsOf(numbers_[i])) turns_.push_back({.step = step, .rank = i});
     ranks_[i].turn_end = std::uint32_t(turns_.size());
@@ -25,7 +26,6 @@ StepOrder::StepOrder(SharedSchedule schedule, std::vector<Rank> ranks)
     turn.missing = PixelCount(StepOf(turn).pixels);
     turn.partner = (turn.sends ? FindReceiving(turn.step) : FindSending(turn.step)).value_or(kElsewhere);
   }
-  turns_.emplace_back();
   possible_ = IndexSet(turn_count());
   changed_ = IndexSet(std::uint32_t(ranks_.size()));
   FindWaits();
@@ -35,10 +35,10 @@ StepOrder::StepOrder(SharedSchedule schedule, std::vector<Rank> ranks)
 void StepOrder::FindWaits() {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> order;  // (turn, another one that waits for it)
   order.reserve(turns_.size());
-  std::vector<std::uint32_t> earlier;
+  std::vector<std::uint32_t> earlier, waiters(turns_.size());
   const auto wait = [&](std::uint32_t first, std::uint32_t turn) {
     order.emplace_back(first, turn);
-    ++turns_[first + 1].first_waiter;
+    ++waiters[first];
     ++turns_[turn].waits;
   };
   for (const RankState& rank : ranks_) {
@@ -54,19 +54,29 @@ void StepOrder::FindWaits() {
       std::ranges::sort(earlier);
       earlier.erase(std::unique(earlier.begin(), earlier.end()), earlier.end());
       for (const std::uint32_t first : earlier) wait(first, turn);
-      latest.Replace({pixels, turn});
+      if (earlier.empty()) {
+        latest.Put({pixels, turn});
+      } else {
+        latest.Replace({pixels, turn});
+      }
     }
   }
-  for (std::size_t turn = 1; turn < turns_.size(); ++turn) turns_[turn].first_waiter += turns_[turn - 1].first_waiter;
-  waiters_.resize(order.size());
-  std::vector<std::uint32_t> filled(turns_.size());  // waiters of each turn
-  for (const auto& [first, waiter] : order) waiters_[turns_[first].first_waiter + filled[first]++] = waiter;
+  for (std::uint32_t turn = 0; turn < turns_.size(); ++turn) {
+    if (waiters[turn] < 2) continue;
+    turns_[turn].many_waiters = true;
+    turns_[turn].first_waiter = std::uint32_t(waiters_.size());
+    waiters_.resize(waiters_.size() + 1 + waiters[turn]);
+  }
+  for (const auto& [first, waiter] : order) {
+    const std::uint32_t place = turns_[first].first_waiter;
+    (turns_[first].many_waiters ? waiters_[place + ++waiters_[place]] : turns_[first].first_waiter) = waiter;
+  }
 }
 
 std::optional<std::uint32_t> StepOrder::FindRank(Rank rank) const {
-  const auto found = std::ranges::lower_bound(numbers_, rank);
-  if (found == numbers_.end() || *found != rank) return std::nullopt;
-  return std::uint32_t(found - numbers_.begin());
+  const auto found = std::ranges::lower_bound(ranks_, rank, {}, &RankState::number);
+  if (found == ranks_.end() || found->number != rank) return std::nullopt;
+  return std::uint32_t(found - ranks_.begin());
 }
 
 std::optional<std::uint32_t> StepOrder::FindSending(std::uint32_t step) const {
@@ -123,11 +133,17 @@ void StepOrder::Offer(std::uint32_t index) {
 
 // Marks the turn as taken; those that wait for it wait for one less.
 void StepOrder::Close(std::uint32_t index) {
-  turns_[index].taken = true;
+  Turn& turn = turns_[index];
+  turn.taken = true;
   possible_.Erase(index);
-  --ranks_[turns_[index].rank].open_steps;
-  for (std::uint32_t i = turns_[index].first_waiter; i < turns_[index + 1].first_waiter; ++i) {
-    if (--turns_[waiters_[i]].waits == 0) Offer(waiters_[i]);
+  --ranks_[turn.rank].open_steps;
+  const auto wait_less = [&](std::uint32_t waiter) {
+    if (--turns_[waiter].waits == 0) Offer(waiter);
+  };
+  if (turn.many_waiters) {
+    std::ranges::for_each(std::span(waiters_).subspan(turn.first_waiter + 1, waiters_[turn.first_waiter]), wait_less);
+  } else if (turn.first_waiter != kElsewhere) {
+    wait_less(turn.first_waiter);
   }
 }
 
@@ -140,7 +156,7 @@ std::optional<StepOrder::Taken> StepOrder::TakeNext() {
       Turn& turn = turns_[index];
       const bool moves = turn.partner != kElsewhere;
       if (moves && !ranks_[turns_[turn.partner].rank].free()) continue;
-      Taken taken = {moves ? Kind::kMove : turn.sends ? Kind::kSend : Kind::kReceive, turn.step, index};
+      Taken taken = {moves ? Kind::kMove : turn.sends ? Kind::kSend : Kind::kReceive, turn.step, index, rank.number};
       taken.last = taken.kind != Kind::kReceive || turn.missing == 0;
       if (taken.last) {
         Close(index);

@@ -58,8 +58,7 @@ Schedule MakeSwap(const ScheduleRequest& request, std::span<const std::uint32_t>
     const Rank begin = first(m), end = first(m + 1);
     rank_of[m] = request.root >= begin && request.root < end ? request.root : begin;
     std::uint32_t turn = 0;
-    ForEachInsideOut(rank_of[m] - begin, end - begin,
-                     [&](std::uint32_t from) { add(turn++, begin + from, rank_of[m], request.pixels); });
+    ForEachInsideOut(rank_of[m] - begin, end - begin, [&](std::uint32_t from) { add(turn++, begin + from, rank_of[m], request.pixels); });
     round = std::max(round, turn);
   }
 

@@ -46,8 +46,8 @@ struct PartialImage {
   RunImageHeader image;    // of a shared image, only the format
   Rare<SharedImage> shared;
   Rare<PackedRuns> packed;          // not of a shared image
-  std::uint64_t acknowledge = 0;     // not 0: the sender waits for ImageReceived with this number
-  std::vector<RankReport> reports;   // of the ranks in `interval` that have not been passed on yet
+  std::uint64_t acknowledge = 0;    // not 0: the sender waits for ImageReceived with this number
+  std::vector<RankReport> reports;  // of the ranks in `interval` that have not been passed on yet
   friend bool operator==(const PartialImage&, const PartialImage&) = default;
 };
 

@@ -158,7 +158,8 @@ TEST(GroupRun, EveryScheduleGivesTheGroupImageOnceInOrder) {
       for (Rank rank = 0; rank < ranks; ++rank) all[rank] = rank;
       SymbolicImage picture;
       for (const ImagePiece& piece : display.group_image->pieces) {
-        const SymbolicImage source = piece.image == 0 ? UnpackSymbols(piece.incoming ? piece.incoming->payload : Bytes()) : display.images.Get(piece.image);
+        const SymbolicImage source =
+            piece.image == 0 ? UnpackSymbols(piece.incoming ? piece.incoming->payload : Bytes()) : display.images.Get(piece.image);
         for (std::uint64_t i = piece.pixels.begin; i < piece.pixels.end; ++i) EXPECT_TRUE(picture.emplace(i, source.at(i)).second);
       }
       EXPECT_EQ(picture.size(), kFrame.end);
