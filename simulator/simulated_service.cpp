@@ -163,7 +163,12 @@ std::uint32_t SimulatedService::Order(Node node, Action& action) {
   Job& job = JobAt(place);
   job.node = node;
   job.cancelled = false;
-  const Action& ordered = job.action.emplace<Action>(std::move(action));
+  if constexpr (std::is_same_v<Action, SendPartial>) {
+    const std::shared_ptr<const Peer> peer = std::move(action.to);  // not kept: its owners would be counted when they are in no cache
+    job.to = ParseNumber<Node>(peer->images_endpoint).value();
+    job.receiver = peer->worker;
+  }
+  const Action& ordered = job.action.template emplace<Action>(std::move(action));
   if (const std::optional<WorkCost> cost = conditions_.Begin(job)) {
     lanes_.Add({.lane = LaneOf(ordered), .worker = node, .job = place, .cost = *cost}, now());
   } else {
@@ -203,11 +208,9 @@ void SimulatedService::SendToCoordinator(Node from, AnyMessage message, const By
 
 void SimulatedService::SendToPeer(std::uint32_t place) {
   Job& job = JobAt(place);
-  const Peer& to = *std::get<SendPartial>(job.action).to;
-  job.to = ParseNumber<Node>(to.images_endpoint).value();
   const Arrivals arrivals = conditions_.ToPeer(job.to, job);
   job.copies = std::uint8_t(arrivals.count);
-  if (arrivals.nobody) queue_.At(now(), [this, node = job.node, who = to.worker] { StepWorker(node, PeerUnreachable{who}); });
+  if (arrivals.nobody) queue_.At(now(), [this, node = job.node, who = job.receiver] { StepWorker(node, PeerUnreachable{who}); });
   if (arrivals.count == 0) return unused_jobs_.push_back(place);
   for (int i = 0; i < arrivals.count; ++i)
     queue_.TellAt(threads_.Begin(Threads::Machine(job.to), arrivals.times[i]), 2 * place + 1, job.to);
