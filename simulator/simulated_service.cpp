@@ -142,16 +142,6 @@ void SimulatedService::Perform(Node node, CancelRender& action) {
   lanes_.EndNow(node, Lane::kRender, now());
 }
 
-std::uint32_t SimulatedService::FindPlace() {
-  if (unused_jobs_.empty()) {
-    jobs_.push_back(std::make_unique<Job[]>(kChunk));
-    for (std::size_t i = 1; i <= kChunk; ++i) unused_jobs_.push_back(std::uint32_t(jobs_.size() * kChunk - i));
-  }
-  const std::uint32_t place = unused_jobs_.back();
-  unused_jobs_.pop_back();
-  return place;
-}
-
 // Previews are made where images are combined.
 Lane SimulatedService::LaneOf(const SendFrame& frame) {
   return frame.message.groups_done == frame.message.group_count ? Lane::kFinish : Lane::kCombine;
@@ -159,10 +149,16 @@ Lane SimulatedService::LaneOf(const SendFrame& frame) {
 
 template <class Action>
 std::uint32_t SimulatedService::Order(Node node, Action& action) {
-  const std::uint32_t place = FindPlace();
+  if (unused_jobs_.empty()) {
+    jobs_.push_back(std::make_unique<Job[]>(kChunk));
+    for (std::size_t i = 1; i <= kChunk; ++i) unused_jobs_.push_back(std::uint32_t(jobs_.size() * kChunk - i));
+  }
+  const std::uint32_t place = unused_jobs_.back();
+  unused_jobs_.pop_back();
   Job& job = JobAt(place);
   job.node = node;
   job.cancelled = false;
+  job.payload.reset();
   if constexpr (std::is_same_v<Action, SendPartial>) {
     const std::shared_ptr<const Peer> peer = std::move(action.to);  // not kept: its owners would be counted when they are in no cache
     job.to = ParseNumber<Node>(peer->images_endpoint).value();

@@ -91,7 +91,6 @@ class SimulatedService {
 
   template <class Action>
   std::uint32_t Order(Node node, Action& action);  // the job's place
-  std::uint32_t FindPlace();
   static Lane LaneOf(const auto&) { return Lane::kCombine; }
   static Lane LaneOf(const StartRender&) { return Lane::kRender; }
   static Lane LaneOf(const SendFrame& frame);

@@ -17,7 +17,6 @@ class Rare {
     value_ = std::move(other.value_);
     return *this;
   }
-  ~Rare() = default;
 
   T& emplace() { return *(value_ = std::make_unique<T>()); }
   void reset() { value_.reset(); }
