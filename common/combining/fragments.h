@@ -59,7 +59,8 @@ class Fragments {
       taken.push_back({{std::max(last->pixels.begin, range.begin), std::min(last->pixels.end, range.end)}, last->value});
     }
     if (first == last) return;
-    const bool keeps_begin = first->pixels.begin<range.begin, keeps_end = last[-1].pixels.end> range.end;
+    const bool keeps_begin = first->pixels.begin < range.begin;
+    const bool keeps_end = range.end < last[-1].pixels.end;
     if (keeps_begin && keeps_end && last - first == 1) {
       const Fragment<Value> rest = {{range.end, first->pixels.end}, first->value};
       first->pixels.end = range.begin;
