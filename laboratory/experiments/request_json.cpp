@@ -68,8 +68,8 @@ Json PolicyJson(const Policy& policy) {
 }  // namespace
 
 std::string_view NameOf(AxisChoice axis) {
-  constexpr std::array<std::string_view, 5> kAxes = {"x", "y", "z", "auto", "view"};
-  return kAxes.at(std::size_t(axis));
+  constexpr std::array<std::string_view, 5> kNames = {"x", "y", "z", "auto", "view"};
+  return kNames.at(std::size_t(axis));
 }
 
 std::string DigestText(std::string_view bytes) { return fmt::format("{:016x}", Digest(std::as_bytes(std::span(bytes)))); }

@@ -32,7 +32,7 @@ TEST(SweepFile, ReadsWhatItSays) {
   EXPECT_EQ(sweep->renderers[1].name, "fine");
   EXPECT_EQ(sweep->renderers[1].kind, FindRenderer("raycast"));
   EXPECT_EQ(sweep->renderers[1].look.parameters, (ParameterTexts{{"sampling-rate", "2"}}));
-  EXPECT_FALSE(sweep->renderers[1].look.shading.phong);
+  EXPECT_EQ(sweep->renderers[1].look.shading.model, ShadingModel::kNone);
   EXPECT_EQ(sweep->renderers[1].look.shading.lights, (std::vector<Vec3>{{1, 0, 0.5}}));
   EXPECT_EQ(sweep->renderers[1].look.termination, 0);
   EXPECT_EQ(sweep->policies[1].policy.axis, AxisChoice::kX);
@@ -90,7 +90,7 @@ TEST(SweepFile, TellsWhatIsWrongInOneLineThatNamesFieldValueAndLimit) {
       {"\"teams\": 2", "\"teams\": 0", "policies[1].teams: 0 must be a whole number in [1, 1024]"},
       {"\"sampling-rate\": 2", "\"sampling-rate\": 99", "renderers[1].sampling-rate: 99 must be a number in ["},
       {"\"sampling-rate\": 2", "\"slope\": 2", "renderers[1]: 'slope' is no field; there are name, renderer, shading"},
-      {"\"none\"", "\"flat\"", "renderers[1].shading: \"flat\" must be one of phong, none"},
+      {"\"none\"", "\"flat\"", "renderers[1].shading: \"flat\" must be one of phong, none, depth-gradient"},
       {"[1, 0, 0.5]", "[0, 0, 0]", "renderers[1].lights[0]: light 0,0,0 has no direction"},
       {"[1, 0, 0.5]", "[1, 0]", "renderers[1].lights[0]: light '1,0' is not X,Y,Z"},
       {"\"termination\": 0", "\"termination\": 1", "renderers[1].termination: 1 must be a number in [0, 0.5]"},
