@@ -34,15 +34,18 @@ CLI::Option* AddParsedList(CLI::App& app, const std::string& name, std::vector<T
   const auto store = [&target, parse = std::move(parse), name](const CLI::results_t& texts) {
     target.clear();
     for (const std::string& text : texts) {
-      auto value = parse(name, text);
-      if (!value.ok()) throw CLI::ValidationError(value.status().message());
-      if (std::find(target.begin(), target.end(), *value) == target.end()) target.push_back(*std::move(value));
+      for (std::size_t begin = 0; begin <= text.size();) {
+        const std::size_t end = std::min(text.find(',', begin), text.size());
+        auto value = parse(name, text.substr(begin, end - begin));
+        if (!value.ok()) throw CLI::ValidationError(value.status().message());
+        if (std::find(target.begin(), target.end(), *value) == target.end()) target.push_back(*std::move(value));
+        begin = end + 1;
+      }
     }
     return true;
   };
   return app.add_option(name, CLI::callback_t(store), help)
       ->expected(1)
-      ->delimiter(',')
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
       ->type_name("LIST");
 }
