@@ -303,8 +303,8 @@ void RunCase(const Case& config, const std::vector<std::string>& schemes, int re
     for (const std::string& scheme : schemes) {
       const Times times = coordinator.Measure(scheme, repeats);
       fmt::print("{:6} {:5} {:6} p {:3}  {:20} {:8.2f} [{:.2f}, {:.2f}]  reported {:8.2f}  processor {:8.2f}  pixels/filled {:.2f}\n",
-                 config.link, config.size, config.sparse ? "sparse" : "full", config.ranks, scheme, Quantile(times.combined, 0.5),
-                 Quantile(times.combined, 0.1), Quantile(times.combined, 0.9), Quantile(times.reported, 0.5), times.processor,
+                 config.link, config.size, config.sparse ? "sparse" : "full", config.ranks, scheme, MedianOf(times.combined).median,
+                 Quantile(times.combined, 0.1), Quantile(times.combined, 0.9), MedianOf(times.reported).median, times.processor,
                  times.pixels_over_filled);
       (void)std::fflush(stdout);
     }
@@ -370,7 +370,7 @@ void MeasureLoopback(std::int32_t size, Rank ranks, int repeats) {
   times.erase(times.begin(), times.begin() + kWarmUp);
   const double processor = double(busy_ns() - begin_busy_ns) / 1e6 / repeats;
   fmt::print("tcp    {:5} full   p {:3}  {:20} {:8.2f} [{:.2f}, {:.2f}]  {:17} processor {:8.2f}\n", size, ranks, "bytes alone",
-             Quantile(times, 0.5), Quantile(times, 0.1), Quantile(times, 0.9), "", processor);
+             MedianOf(times).median, Quantile(times, 0.1), Quantile(times, 0.9), "", processor);
   (void)std::fflush(stdout);  // before the next fork
   ::close(socket);
   ::close(listener);

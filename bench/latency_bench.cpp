@@ -80,7 +80,7 @@ void PrintHead() {
 
 void PrintRow(const std::string& name, const Measured& measured) {
   const auto cell = [](const std::vector<double>& values) {
-    return fmt::format("{:.2f} ({:.2f})", Quantile(values, 0.5), Quantile(values, 0.95));
+    return fmt::format("{:.2f} ({:.2f})", MedianOf(values).median, Quantile(values, 0.95));
   };
   fmt::print("{:12} {:>16} {:>16} {:>16} {:>16} {:>16}\n", name, cell(measured.latency), cell(measured.render), cell(measured.finish),
              cell(measured.beside), cell(measured.before));

@@ -14,14 +14,17 @@
 
 namespace slabstream {
 
-// What a thread of a worker does. It stays until its result, or the last copy of its message, has arrived.
-struct Job {
-  Node node = 0;  // its worker
-  std::variant<StartRender, StoreChunk, StartCombine, FindHidden, SendPartial, SendFrame> action;
+// What a thread of a worker does. It stays until its result, or the last copy of its message, has arrived. In whole cache lines: there may
+// be a million, and each is looked at when the others have filled the caches.
+struct alignas(64) Job {
+  Node node = 0;                 // its worker
+  std::uint8_t copies = 0;       // of the message that it sends: that have not arrived
   bool cancelled = false;        // its rendering, in time
-  Bytes payload;                 // of the message that it sends
+  Node to = 0;                   // of a message to another worker
+  WorkerId receiver = 0;         // that worker, as the sender knows it
   double bytes = 0, pixels = 0;  // of that message: what links carry; pixels that are not empty
-  int copies = 0;                // of it that have not arrived
+  Rare<Bytes> payload;           // of the message that it sends; none: it has no bytes
+  std::variant<StartRender, StoreChunk, StartCombine, FindHidden, SendPartial, SendFrame> action;
 };
 
 // When copies of a message arrive: at most two.

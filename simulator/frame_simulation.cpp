@@ -200,7 +200,7 @@ void FrameSimulation::BeginGroup(const GroupAssignment& assignment) {
 
 auto FrameSimulation::CostOf(const Job& job, const StartRender& action) const -> Cost {
   const std::uint32_t frame = FrameOf(action.key);
-  return {{inputs_[frame].boxes[action.placement.id].seconds * Slowness(frame, job.node), double(machine_.threads)}};
+  return {{inputs_[frame].boxes[action.placement.id].seconds * Slowness(frame, job.node), machine_.threads}};
 }
 
 // Depends on seed, frame and worker alone.
@@ -238,7 +238,7 @@ auto FrameSimulation::CostOf(Job& job, const SendPartial& action) -> Cost {
 
 auto FrameSimulation::CostOf(const Job&, const SendFrame& action) const -> Cost {
   const double seconds = inputs_[frame_of_.at(action.message.frame)].finish_seconds;
-  return {{seconds, double(std::max(machine_.threads, machine_.picture_threads))}};
+  return {{seconds, std::max(machine_.threads, machine_.picture_threads)}};
 }
 
 void FrameSimulation::OnWorked(const Job& job, const LaneTask& task) {

@@ -12,17 +12,19 @@ namespace {
 
 constexpr Time kStart{std::chrono::seconds(1000)};
 
-Lane LaneOf(const Job& job) {
-  if (std::holds_alternative<StartRender>(job.action)) return Lane::kRender;
-  const auto* frame = std::get_if<SendFrame>(&job.action);
-  const bool last = frame != nullptr && frame->message.groups_done == frame->message.group_count;
-  return last ? Lane::kFinish : Lane::kCombine;  // previews are made where images are combined
+Bytes TakePayload(Job& job) {
+  const Rare<Bytes> payload = std::move(job.payload);
+  return payload ? *payload : Bytes();
 }
 
 }  // namespace
 
 SimulatedService::SimulatedService(const MachineModel& machine, Conditions& conditions)
-    : machine_(machine), conditions_(conditions), threads_(machine.wake_ups), lanes_(machine, threads_) {}
+    : machine_(machine),
+      conditions_(conditions),
+      queue_([this](std::uint32_t number) { OnNumber(number); }),
+      threads_(machine.wake_ups),
+      lanes_(machine, threads_) {}
 
 Time SimulatedService::TimeAt(double seconds) { return kStart + Duration(std::llround(seconds * 1e9)); }
 double SimulatedService::SecondsAt(Time time) { return std::chrono::duration<double>(time - kStart).count(); }
@@ -37,10 +39,10 @@ void SimulatedService::RunNext() {
 }
 
 // One event at most is planned that is not too late.
-void SimulatedService::SetAlarm(double& alarm, Time wake, std::function<void()> ring) {
+void SimulatedService::SetAlarm(double& alarm, Time wake, auto&& ring) {
   if (wake == Time::max() || SecondsAt(wake) >= alarm) return;
   alarm = std::max(SecondsAt(wake), now());
-  queue_.At(alarm, std::move(ring));
+  queue_.At(alarm, std::forward<decltype(ring)>(ring));
 }
 
 // ---------------------------------------------------------------- the coordinator
@@ -140,18 +142,33 @@ void SimulatedService::Perform(Node node, CancelRender& action) {
   lanes_.EndNow(node, Lane::kRender, now());
 }
 
-std::uint32_t SimulatedService::Order(Job&& job) {
+// Previews are made where images are combined.
+Lane SimulatedService::LaneOf(const SendFrame& frame) {
+  return frame.message.groups_done == frame.message.group_count ? Lane::kFinish : Lane::kCombine;
+}
+
+template <class Action>
+std::uint32_t SimulatedService::Order(Node node, Action& action) {
   if (unused_jobs_.empty()) {
     jobs_.push_back(std::make_unique<Job[]>(kChunk));
     for (std::size_t i = 1; i <= kChunk; ++i) unused_jobs_.push_back(std::uint32_t(jobs_.size() * kChunk - i));
   }
   const std::uint32_t place = unused_jobs_.back();
   unused_jobs_.pop_back();
-  Job& ordered = JobAt(place) = std::move(job);
-  if (const std::optional<WorkCost> cost = conditions_.Begin(ordered)) {
-    lanes_.Add({.lane = LaneOf(ordered), .worker = ordered.node, .job = place, .cost = *cost}, now());
+  Job& job = JobAt(place);
+  job.node = node;
+  job.cancelled = false;
+  job.payload.reset();
+  if constexpr (std::is_same_v<Action, SendPartial>) {
+    const std::shared_ptr<const Peer> peer = std::move(action.to);  // not kept: its owners would be counted when they are in no cache
+    job.to = ParseNumber<Node>(peer->images_endpoint).value();
+    job.receiver = peer->worker;
+  }
+  const Action& ordered = job.action.template emplace<Action>(std::move(action));
+  if (const std::optional<WorkCost> cost = conditions_.Begin(job)) {
+    lanes_.Add({.lane = LaneOf(ordered), .worker = node, .job = place, .cost = *cost}, now());
   } else {
-    queue_.At(now(), [this, place] { Finish(place); });
+    queue_.TellAt(now(), 2 * place);
   }
   return place;
 }
@@ -159,7 +176,7 @@ std::uint32_t SimulatedService::Order(Job&& job) {
 void SimulatedService::OnWorked(const LaneTask& task) {
   conditions_.OnWorked(JobAt(task.job), task);
   if (task.cost.direct) return Finish(task.job);
-  queue_.At(threads_.Begin(Threads::Machine(task.worker), now()), [this, place = task.job] { Finish(place); });
+  queue_.TellAt(threads_.Begin(Threads::Machine(task.worker), now()), 2 * task.job);
 }
 
 // The thread that owns the sockets learns that the job is done.
@@ -170,7 +187,7 @@ void SimulatedService::Finish(std::uint32_t place) {
   unused_jobs_.push_back(place);
   if (!workers_[node].alive) return;
   if (auto* frame = std::get_if<SendFrame>(&job.action)) {
-    return SendToCoordinator(node, std::move(frame->message), std::move(job.payload));
+    return SendToCoordinator(node, std::move(frame->message), TakePayload(job));
   }
   if (std::holds_alternative<StartRender>(job.action)) workers_[node].rendering.reset();
   StepWorker(node, conditions_.Answer(job));
@@ -187,22 +204,21 @@ void SimulatedService::SendToCoordinator(Node from, AnyMessage message, const By
 
 void SimulatedService::SendToPeer(std::uint32_t place) {
   Job& job = JobAt(place);
-  const auto& send = std::get<SendPartial>(job.action);
-  const Node to = ParseNumber<Node>(send.to.images_endpoint).value();
-  const Arrivals arrivals = conditions_.ToPeer(to, job);
-  job.copies = arrivals.count;
-  if (arrivals.nobody) queue_.At(now(), [this, node = job.node, who = send.to.worker] { StepWorker(node, PeerUnreachable{who}); });
+  const Arrivals arrivals = conditions_.ToPeer(job.to, job);
+  job.copies = std::uint8_t(arrivals.count);
+  if (arrivals.nobody) queue_.At(now(), [this, node = job.node, who = job.receiver] { StepWorker(node, PeerUnreachable{who}); });
   if (arrivals.count == 0) return unused_jobs_.push_back(place);
-  for (int i = 0; i < arrivals.count; ++i) {
-    queue_.At(threads_.Begin(Threads::Machine(to), arrivals.times[i]), [this, to, place] { Deliver(to, place); });
-  }
+  for (int i = 0; i < arrivals.count; ++i)
+    queue_.TellAt(threads_.Begin(Threads::Machine(job.to), arrivals.times[i]), 2 * place + 1, job.to);
 }
 
-void SimulatedService::Deliver(Node to, std::uint32_t place) {
+void SimulatedService::Deliver(std::uint32_t place) {
   Job& job = JobAt(place);
   auto& message = std::get<SendPartial>(job.action).message;
-  if (--job.copies > 0) return StepWorker(to, MessageReceived{message, job.payload});
-  MessageReceived received{std::move(message), std::move(job.payload)};
+  const Node to = job.to;
+  queue_.NextOf(to);
+  if (--job.copies > 0) return StepWorker(to, MessageReceived{message, job.payload ? *job.payload : Bytes()});
+  MessageReceived received{std::move(message), TakePayload(job)};
   unused_jobs_.push_back(place);
   StepWorker(to, std::move(received));
 }

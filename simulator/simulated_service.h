@@ -70,7 +70,9 @@ class SimulatedService {
 
   static Time TimeAt(double seconds);
   static double SecondsAt(Time time);
-  void SetAlarm(double& alarm, Time wake, std::function<void()> ring);
+  void SetAlarm(double& alarm, Time wake, auto&& ring);
+  // Events of jobs, by number: 2 * place, or more by one if its message arrives rather than its thread is done.
+  void OnNumber(std::uint32_t number) { number % 2 == 0 ? Finish(number / 2) : Deliver(number / 2); }
   void WakeCoordinator(std::uint64_t generation);
   void WakeWorker(Node node);
   void CountSpin(Time next_wake) { spins_ = next_wake <= time() ? spins_ + 1 : 0; }
@@ -83,19 +85,21 @@ class SimulatedService {
   void Perform(Node node, SendControl& action) { SendToCoordinator(node, std::move(action).Take(), {}); }
   void Perform(Node, ConnectSlabs&) {}
   void Perform(Node node, CancelRender& action);
-  void Perform(Node node, StartRender& action) { workers_[node].rendering = Order({node, std::move(action)}); }
-  void Perform(Node node, AnyOf<StoreChunk, StartCombine, FindHidden, SendPartial, SendFrame> auto& action) {
-    Order({node, std::move(action)});
-  }
+  void Perform(Node node, StartRender& action) { workers_[node].rendering = Order(node, action); }
+  void Perform(Node node, AnyOf<StoreChunk, StartCombine, FindHidden, SendPartial, SendFrame> auto& action) { Order(node, action); }
   void Perform(Node node, auto& action) { conditions_.Perform(node, action); }
 
-  std::uint32_t Order(Job&& job);  // its place
+  template <class Action>
+  std::uint32_t Order(Node node, Action& action);  // the job's place
+  static Lane LaneOf(const auto&) { return Lane::kCombine; }
+  static Lane LaneOf(const StartRender&) { return Lane::kRender; }
+  static Lane LaneOf(const SendFrame& frame);
   Job& JobAt(std::uint32_t place) { return jobs_[place / kChunk][place % kChunk]; }
   void OnWorked(const LaneTask& task);
   void Finish(std::uint32_t place);
   void SendToCoordinator(Node from, AnyMessage message, const Bytes& payload);
   void SendToPeer(std::uint32_t place);
-  void Deliver(Node to, std::uint32_t place);
+  void Deliver(std::uint32_t place);
 
   const MachineModel& machine_;
   Conditions& conditions_;

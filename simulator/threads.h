@@ -2,6 +2,7 @@
 // be woken, on a core that may sleep, too, and finds its data out of the caches (WakeUps).
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -19,12 +20,22 @@ class Threads {
   static Id Machine(std::uint32_t worker) { return 3 + 4 * Id{worker}; }
   static Id Of(std::uint32_t worker, Lane lane) { return Machine(worker) + 1 + Id(lane); }
 
-  explicit Threads(const WakeUps& costs) : costs_(costs), active_until_(Machine(0)) {}
-  void AddWorker() { active_until_.resize(active_until_.size() + 4); }
+  explicit Threads(const WakeUps& costs) : costs_(costs), active_until_(Machine(0)), woken_(Machine(0)) {}
+  void AddWorker() {
+    active_until_.resize(active_until_.size() + 4);
+    woken_.resize(active_until_.size());
+  }
 
   // When the thread begins with what it is handed at `now`; it is at work then.
   double Begin(Id thread, double now) {
-    const double begin = now + (now - active_until_[thread] < costs_.doze ? costs_.awake : costs_.asleep);
+    Waking& woken = woken_[thread];
+    const bool asleep = now - active_until_[thread] >= costs_.doze;
+    double begin = now + (asleep ? costs_.asleep : costs_.awake);
+    if (asleep) {
+      woken = {now, begin};
+    } else if (now >= woken.from && now < woken.until) {
+      begin = std::max(begin, woken.until);  // what comes while it is woken does not overtake what woke it
+    }
     Active(thread, begin);
     return begin;
   }
@@ -37,6 +48,10 @@ class Threads {
  private:
   const WakeUps costs_;
   std::vector<double> active_until_;
+  struct Waking {
+    double from = 0, until = 0;
+  };
+  std::vector<Waking> woken_;  // when each thread was last woken
 };
 
 }  // namespace slabstream

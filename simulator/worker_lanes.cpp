@@ -14,9 +14,12 @@ WorkerLanes::WorkerLanes(const MachineModel& machine, Threads& threads)
 
 void WorkerLanes::Add(const LaneTask& task, double now) {
   LaneState& lane = StateOf(task.worker, task.lane);
-  if (lane.taken) return lane.waiting.push_back(task);
+  if (lane.taken) return lane.waiting.push_back({task.job, task.cost});
   lane.taken = true;
-  WakeUp(task, now);
+  lane.task = task;
+  const double begin = task.cost.direct ? now : threads_.Begin(Threads::Of(task.worker, task.lane), now);
+  if (begin == now) return Begin(NumberOf(task.worker, task.lane), now);
+  starts_.push({begin, wake_ups_++, NumberOf(task.worker, task.lane)});
 }
 
 bool WorkerLanes::Idle(Node worker, Lane lane) const { return !lanes_[NumberOf(worker, lane)].taken; }
@@ -34,35 +37,32 @@ std::optional<LaneTask> WorkerLanes::Step() {
   if (!starts_.empty() && starts_.top().time < processors_.NextTime()) {
     const Start start = starts_.top();
     starts_.pop();
-    Begin(start.task, start.time);
+    Begin(start.lane, start.time);
     return std::nullopt;
   }
   const Processors::Completion done = processors_.Finish();
   LaneState& state = lanes_[done.task];
-  const LaneTask task = *std::exchange(state.running, std::nullopt);
+  const LaneTask task = state.task;
+  state.running = false;
   threads_.Active(task.cost.direct ? Threads::Machine(task.worker) : Threads::Of(task.worker, task.lane), done.time);
   state.taken = !state.waiting.empty();
   if (state.taken) {  // a task in a lane's own queue needs no wake-up
-    const LaneTask next = state.waiting.front();
+    state.task.job = state.waiting.front().job;
+    state.task.cost = state.waiting.front().cost;
     state.waiting.pop_front();
-    Begin(next, done.time);
+    Begin(done.task, done.time);
   }
   return task;
 }
 
-void WorkerLanes::WakeUp(const LaneTask& task, double now) {
-  const double begin = task.cost.direct ? now : threads_.Begin(Threads::Of(task.worker, task.lane), now);
-  if (begin == now) return Begin(task, now);
-  starts_.push({begin, wake_ups_++, task});
-}
-
 // Only the first thread does the serial share of the work.
-void WorkerLanes::Begin(LaneTask task, double now) {
+void WorkerLanes::Begin(std::size_t lane, double now) {
+  LaneTask& task = lanes_[lane].task;
   task.begin = now;
+  lanes_[lane].running = true;
   const auto& [seconds, threads, direct] = task.cost;
   const double each = seconds * (1 + (threads - 1) * machine_.serial_share) / threads / SpeedOf(task.worker);
-  processors_.Start(HostOf(task.worker), NumberOf(task.worker, task.lane), each, threads, now);
-  StateOf(task.worker, task.lane).running = task;
+  processors_.Start(HostOf(task.worker), lane, each, threads, now);
 }
 
 std::uint32_t WorkerLanes::HostOf(Node worker) const { return worker / std::uint32_t(std::max(machine_.workers_a_host, 1)); }

@@ -20,9 +20,9 @@ namespace slabstream {
 using Node = std::uint32_t;  // a worker process of a simulation: 0, 1, ... in the order in which they began
 
 struct WorkCost {
-  double seconds = 0;   // of one thread of a worker of speed 1
-  double threads = 1;   // that share the work
-  bool direct = false;  // the thread that owns the sockets does it itself: nothing is handed over
+  double seconds = 0;        // of one thread of a worker of speed 1
+  std::int32_t threads = 1;  // that share the work
+  bool direct = false;       // the thread that owns the sockets does it itself: nothing is handed over
 };
 
 struct LaneTask {
@@ -51,25 +51,29 @@ class WorkerLanes {
   std::optional<LaneTask> Step();
 
  private:
+  struct Waiting {
+    std::uint32_t job = 0;
+    WorkCost cost;
+  };
   struct LaneState {
-    bool taken = false;               // by a task that was handed over and has not ended
-    std::optional<LaneTask> running;  // once it has begun
-    std::deque<LaneTask> waiting;
+    bool taken = false;    // by a task that was handed over and has not ended
+    bool running = false;  // that task has begun
+    LaneTask task;         // the one that has taken it
+    std::deque<Waiting> waiting;
   };
   static constexpr std::size_t kLanes = 3;  // of a worker, by Lane
 
   struct Start {
     double time = 0;
     std::uint64_t order = 0;
-    LaneTask task;
+    std::size_t lane = 0;  // its number
     friend bool operator>(const Start& a, const Start& b) { return a.time != b.time ? a.time > b.time : a.order > b.order; }
   };
 
   static std::size_t NumberOf(Node worker, Lane lane) { return kLanes * worker + std::size_t(lane); }
   LaneState& StateOf(Node worker, Lane lane) { return lanes_[NumberOf(worker, lane)]; }
   std::uint32_t HostOf(Node worker) const;
-  void WakeUp(const LaneTask& task, double now);
-  void Begin(LaneTask task, double now);
+  void Begin(std::size_t lane, double now);
   double SpeedOf(Node worker) const;
 
   const MachineModel& machine_;

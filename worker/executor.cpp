@@ -80,9 +80,9 @@ void CombineImages(LocalImage& image, bool fresh, const std::shared_ptr<LocalIma
 }
 
 Status CombineIncoming(LocalImage& image, bool fresh, const StartCombine& action, PixelRange pixels) {
-  const RunImageHeader& header = action.incoming.header;
-  Bytes payload = action.incoming.payload;
-  if (const std::optional<PackedRuns>& packed = action.incoming.packed) {
+  const RunImageHeader& header = action.incoming->header;
+  Bytes payload = action.incoming->payload;
+  if (const Rare<PackedRuns>& packed = action.incoming->packed) {
     if (Status fits = ValidateRunHeader(header, action.frame); !fits.ok()) return fits;
     Result<Bytes> unpacked = UnpackRuns(*packed, payload, PayloadBytes(header));
     if (!unpacked.ok()) return unpacked.status();
@@ -98,7 +98,7 @@ Status CombineIncoming(LocalImage& image, bool fresh, const StartCombine& action
 }
 
 Status CombineBorrowed(LocalImage& image, bool fresh, const StartCombine& action, PixelRange pixels, PeerMemory& memory) {
-  const IncomingImage& incoming = action.incoming;
+  const IncomingImage& incoming = *action.incoming;
   const Result<BorrowedImage> borrowed =
       memory.Borrow(*incoming.shared, incoming.header.format, incoming.payload, pixels, action.frame, MonotonicNow());
   if (!borrowed.ok()) return borrowed.status();
@@ -289,12 +289,13 @@ void Executor::Perform(StartCombine&& action) {
         WithAllThreads(combine_arena_, [&] { CombineImages(*image, fresh, other, combine, pixels); });
         return Status::Ok();
       }
-      if (!fresh && image->format != combine.incoming.header.format) {
+      if (!combine.incoming) combine.incoming.emplace();
+      if (!fresh && image->format != combine.incoming->header.format) {
         return Status::InvalidArgument("PartialImage.image.format is not that of the frame");
       }
       return WithAllThreads(combine_arena_, [&] {
-        return combine.incoming.shared ? CombineBorrowed(*image, fresh, combine, pixels, peer_memory_)
-                                       : CombineIncoming(*image, fresh, combine, pixels);
+        return combine.incoming->shared ? CombineBorrowed(*image, fresh, combine, pixels, peer_memory_)
+                                        : CombineIncoming(*image, fresh, combine, pixels);
       });
     });
     done.span.end_ns = NowNs();
@@ -322,7 +323,7 @@ void Executor::Perform(FindHidden&& action) {
 
 std::optional<Bytes> Executor::PayloadInPlace(const LocalImage& image, const ImageView& view, const Delivery& delivery, SendPartial& send) {
   if (delivery.lend) {
-    if (std::optional<Bytes> spans = lent_.Lend(image, view, send.to, send.message)) return spans;
+    if (std::optional<Bytes> spans = lent_.Lend(image, view, *send.to, send.message)) return spans;
   }
   return send.color == ColorCoding::kFloat32 ? PixelsInPlace(image, view, send.message) : std::nullopt;
 }
@@ -330,7 +331,7 @@ std::optional<Bytes> Executor::PayloadInPlace(const LocalImage& image, const Ima
 void Executor::Post(SendPartial& send, Bytes payload, std::int64_t begin_ns) {
   sent_.Add(send.message.key, send.rank, payload.size(), begin_ns, NowNs());
   sent_.MoveInto(send.message.key, send.message.reports);
-  outbox_.Post(OutgoingPartial{std::move(send.to), Encode(send.message), std::move(payload), send.message.acknowledge, send.message.key});
+  outbox_.Post(OutgoingPartial{*send.to, Encode(send.message), std::move(payload), send.message.acknowledge, send.message.key});
 }
 
 void Executor::Perform(SendPartial&& action, const Delivery& delivery) {

@@ -66,7 +66,7 @@ void FrameAccumulator::StartGroup(GroupImage group, WorkerActions& actions) {
   group_started_ = true;
   reports_.push_back(std::move(group.reports));
   if (group.pieces.empty() && image_ == 0) {  // a frame that starts with an empty group starts with an empty picture
-    group.pieces.push_back({pixels_, {}, 0, {.header = {.format = setup_->format}}});
+    group.pieces.push_back({pixels_, {}, 0, IncomingImage{.header = {.format = setup_->format}}});
   }
   std::set<ImageHandle> used;
   for (ImagePiece& piece : group.pieces) {

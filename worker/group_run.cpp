@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <iterator>
 #include <string>
 #include <utility>
@@ -17,9 +18,23 @@ void Append(std::vector<RankReport>& reports, std::vector<RankReport> more) {
   reports.insert(reports.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
 }
 
-GroupAssignment PeersByWorker(GroupAssignment assignment) {
-  if (!std::ranges::is_sorted(assignment.peers, {}, &Peer::worker)) std::ranges::sort(assignment.peers, {}, &Peer::worker);
-  return assignment;
+std::shared_ptr<const std::vector<Peer>> ByWorker(std::vector<Peer> peers) {
+  if (!std::ranges::is_sorted(peers, {}, &Peer::worker)) std::ranges::sort(peers, {}, &Peer::worker);
+  return std::make_shared<const std::vector<Peer>>(std::move(peers));
+}
+
+ImagePiece PieceOf(PartialImage& message, const Bytes& payload) {
+  ImagePiece piece{message.pixels, message.interval, 0, {}};
+  if (message.image != RunImageHeader{} || message.shared || message.packed || !payload.empty()) {
+    piece.incoming = IncomingImage{message.image, std::move(message.shared), std::move(message.packed), payload};
+  }
+  return piece;
+}
+
+std::vector<WorkerId> WorkersOf(const GroupPlan& group) {
+  std::vector<WorkerId> workers;
+  for (const Placement& placement : group.placements) workers.push_back(placement.worker);
+  return workers;
 }
 
 std::vector<Rank> RanksOf(const GroupPlan& group, WorkerId worker) {
@@ -32,22 +47,15 @@ std::vector<Rank> RanksOf(const GroupPlan& group, WorkerId worker) {
 
 }  // namespace
 
-bool GroupRun::Arrivals::Has(const PixelRange& pixels) const {
-  return std::ranges::any_of(pieces, [&](const ImagePiece& piece) { return Overlap(piece.pixels, pixels); });
-}
-
-void GroupRun::Arrivals::Add(PartialImage&& message, Bytes payload) {
-  pieces.push_back({message.pixels, message.interval, 0, {message.image, std::move(message.shared), message.packed, std::move(payload)}});
-  Append(reports, std::move(message.reports));
-}
-
 GroupRun::GroupRun(GroupAssignment assignment, WorkerId self, ImageNames& names)
-    : assignment_(PeersByWorker(std::move(assignment))),
+    : peers_(ByWorker(std::exchange(assignment.peers, {}))),
+      assignment_(std::move(assignment)),
+      workers_(WorkersOf(assignment_.group)),
       self_(self),
       names_(names),
       frame_(WholeFrame(assignment_.setup)),
       runner_(MakeRunner()),
-      arrivals_(runner_.order().turn_count()) {
+      group_image_{key(), {}, {}} {
   for (const Rank rank : runner_.order().ranks()) ranks_[rank];
 }
 
@@ -69,46 +77,69 @@ void GroupRun::OnRendered(Rank rank, ImageHandle image, RankReport report, Worke
   CHECK(Mine(rank)) << "rank " << rank;
   RankState& state = ranks_.at(rank);
   state.own = image;
-  state.reports.push_back(std::move(report));
+  state.reports.insert(state.reports.begin(), std::move(report));
   runner_.OnRendered(rank, {{rank, rank + 1}, image});
   Advance(actions);
 }
 
 void GroupRun::LeaveOut(Rank rank, RankReport report, WorkerActions& actions) {
   const ImageHandle image = names_.Next();
-  Start({.image = image, .incoming = {.header = {.format = assignment_.setup.format}}}, rank, actions);
+  Start({.image = image, .incoming = IncomingImage{.header = {.format = assignment_.setup.format}}}, rank, actions);
   OnRendered(rank, image, std::move(report), actions);
 }
 
-void GroupRun::OnPartial(PartialImage message, Bytes payload, WorkerActions& actions) {
+void GroupRun::OnPartial(PartialImage&& message, const Bytes& payload, WorkerActions& actions) {
   const GroupPlan& group = assignment_.group;
   if (!failure_.ok() || group.placements.empty() || PixelCount(message.pixels) == 0) return;
-  if (message.step == step_count()) return CollectGroupPiece(std::move(message), std::move(payload));
+  if (message.step == step_count()) return CollectGroupPiece(std::move(message), payload);
   const std::optional<std::uint32_t> turn = runner_.order().Awaited(message.step);
   if (!turn) return;
   const Step& step = runner_.order().schedule().steps()[message.step];
   const bool inside = message.pixels.begin >= step.pixels.begin && message.pixels.end <= step.pixels.end;
   if (WorkerOf(step.from) != message.from_worker || !inside) return;
-  if (arrivals_[*turn].Has(message.pixels)) return;
-  runner_.order().OnArrived(message.step, PixelCount(message.pixels));
-  arrivals_[*turn].Add(std::move(message), std::move(payload));
+  if (HasArrived(*turn, message.pixels)) return;
+  runner_.order().OnArrived(*turn, PixelCount(message.pixels));
+  Keep(*turn, PieceOf(message, payload));
+  if (!message.reports.empty()) Append(ranks_.at(step.to).reports, std::move(message.reports));
   Advance(actions);
 }
 
-void GroupRun::OnCombined(const CombineDone& done, WorkerActions& actions) {
+bool GroupRun::HasArrived(std::uint32_t turn, const PixelRange& pixels) {
+  for (std::uint32_t place = runner_.order().note(turn); place != kNone; place = arrivals_[place].next) {
+    if (Overlap(arrivals_[place].piece.pixels, pixels)) return true;
+  }
+  return false;
+}
+
+// Behind the step's other pieces.
+void GroupRun::Keep(std::uint32_t turn, ImagePiece&& piece) {
+  if (unused_arrival_ == kNone) {
+    unused_arrival_ = std::uint32_t(arrivals_.size());
+    arrivals_.emplace_back();
+  }
+  const std::uint32_t place = std::exchange(unused_arrival_, arrivals_[unused_arrival_].next);
+  arrivals_[place] = {.piece = std::move(piece)};
+  std::uint32_t* link = &runner_.order().note(turn);
+  while (*link != kNone) link = &arrivals_[*link].next;
+  *link = place;
+}
+
+bool GroupRun::OnCombined(const CombineDone& done, WorkerActions& actions) {
   const auto started = std::ranges::find(combining_, done.image, &std::pair<ImageHandle, Rank>::first);
-  if (started == combining_.end()) return;
+  if (started == combining_.end()) return false;
   const Rank number = started->second;
   combining_.erase(started);
   RankState& rank = ranks_.at(number);
   runner_.order().OnCombined(number);
   if (!done.status.ok()) {
     if (failure_.ok()) failure_ = done.status;
-    return;
+    return true;
   }
-  const auto own = std::ranges::find(rank.reports, number, &RankReport::rank);
-  if (own != rank.reports.end()) AddStage(*own, Stage::kCombine, done.span.begin_ns, done.span.end_ns);
+  if (!rank.reports.empty() && rank.reports.front().rank == number) {
+    AddStage(rank.reports.front(), Stage::kCombine, done.span.begin_ns, done.span.end_ns);
+  }
   Advance(actions);
+  return true;
 }
 
 std::optional<GroupImage> GroupRun::TakeGroupImage() {
@@ -116,7 +147,7 @@ std::optional<GroupImage> GroupRun::TakeGroupImage() {
   const bool empty = assignment_.group.placements.empty();
   if (!empty && group_pixels_ != PixelCount(frame_)) return std::nullopt;
   group_image_taken_ = true;
-  return GroupImage{key(), std::move(group_pieces_.pieces), std::move(group_pieces_.reports)};
+  return std::move(group_image_);
 }
 
 bool GroupRun::finished() const {
@@ -130,14 +161,14 @@ void GroupRun::Drop(WorkerActions& actions) {
     const std::vector<Held> of_rank = runner_.held(rank).Take(frame_);
     held.insert(held.end(), of_rank.begin(), of_rank.end());
   }
-  for (const ImagePiece& piece : group_pieces_.pieces) {
+  for (const ImagePiece& piece : group_image_.pieces) {
     if (piece.image != 0) held.push_back({piece.pixels, {piece.ranks, piece.image}});
   }
   ReleaseUnused(held, actions);
   ranks_.clear();
   arrivals_.clear();
   combining_.clear();
-  group_pieces_ = {};
+  group_image_ = {};
 }
 
 void GroupRun::Advance(WorkerActions& actions) {
@@ -170,12 +201,13 @@ void GroupRun::MoveLocally(const Runner::Taken& taken, WorkerActions& actions) {
 }
 
 void GroupRun::Receive(const Runner::Taken& taken, WorkerActions& actions) {
-  Arrivals& arrivals = arrivals_[taken.turn];
-  for (; arrivals.taken < arrivals.pieces.size(); ++arrivals.taken) {
-    Merge(taken.step->to, std::move(arrivals.pieces[arrivals.taken]), actions);
+  std::uint32_t& first = runner_.order().note(taken.turn);
+  std::uint32_t last = kNone;
+  for (std::uint32_t place = first; place != kNone; place = arrivals_[place].next) {
+    Arrival& arrival = arrivals_[last = place];
+    if (!std::exchange(arrival.taken, true)) Merge(taken.rank, std::move(arrival.piece), actions);
   }
-  Append(ranks_.at(taken.step->to).reports, std::exchange(arrivals.reports, {}));
-  if (taken.last) arrivals = {};
+  if (taken.last) arrivals_[last].next = std::exchange(unused_arrival_, std::exchange(first, kNone));
 }
 
 void GroupRun::Merge(Rank rank, ImagePiece&& piece, WorkerActions& actions) {
@@ -200,7 +232,7 @@ void GroupRun::Merge(Rank rank, ImagePiece&& piece, WorkerActions& actions) {
     Combine(rank, part, piece, {}, actions);
   }
   take_gap(piece.pixels.end);
-  if (incoming) ReleaseUnused({{piece.pixels, {piece.ranks, piece.image}}}, actions);
+  if (incoming) ReleaseUnused(std::array{Held{piece.pixels, {piece.ranks, piece.image}}}, actions);
 }
 
 // True if the rank passed these pixels on before and now gets them back, combined with others: then their reader has finished, and their
@@ -222,7 +254,7 @@ void GroupRun::TakeHome(Rank rank, ImagePiece&& piece, WorkerActions& actions) {
   runner_.held(rank).Put({piece.pixels, {piece.ranks, own}});
 }
 
-void GroupRun::Combine(Rank rank, const Held& held, const ImagePiece& piece, IncomingImage&& incoming, WorkerActions& actions) {
+void GroupRun::Combine(Rank rank, const Held& held, const ImagePiece& piece, Rare<IncomingImage>&& incoming, WorkerActions& actions) {
   const std::optional<RankInterval> both = Joined(piece.ranks, held.value.ranks);
   if (!both) {
     return Fail(fmt::format("images of ranks [{}, {}) and [{}, {}) are to be combined, which are not adjacent", piece.ranks.begin,
@@ -262,26 +294,28 @@ void GroupRun::FinishRoot(WorkerActions& actions) {
     ReleaseUnused(parts, actions);
     return;
   }
-  for (const Held& part : parts) group_pieces_.pieces.push_back({part.pixels, part.value.ranks, part.value.image, {}});
-  Append(group_pieces_.reports, TakeReports(root()));
+  for (const Held& part : parts) group_image_.pieces.push_back({part.pixels, part.value.ranks, part.value.image, {}});
+  Append(group_image_.reports, TakeReports(root()));
   group_pixels_ = held;
 }
 
-void GroupRun::CollectGroupPiece(PartialImage&& message, Bytes payload) {
+void GroupRun::CollectGroupPiece(PartialImage&& message, const Bytes& payload) {
   const bool from_root = WorkerOf(root()) == message.from_worker && !Mine(root());
   const bool whole = message.interval == RankInterval{0, assignment_.group.schedule.ranks};
   if (assignment_.display != self_ || !from_root || !whole || message.pixels.end > frame_.end) return;
-  if (group_image_taken_ || group_pieces_.Has(message.pixels)) return;
+  const auto known = [&](const ImagePiece& piece) { return Overlap(piece.pixels, message.pixels); };
+  if (group_image_taken_ || std::ranges::any_of(group_image_.pieces, known)) return;
   group_pixels_ += PixelCount(message.pixels);
-  group_pieces_.Add(std::move(message), std::move(payload));
+  group_image_.pieces.push_back(PieceOf(message, payload));
+  Append(group_image_.reports, std::move(message.reports));
 }
 
-void GroupRun::SendFragments(Rank rank, const std::vector<Held>& fragments, std::uint32_t step, WorkerId to,
-                             std::vector<RankReport> reports, WorkerActions& actions) {
+void GroupRun::SendFragments(Rank rank, std::span<const Held> fragments, std::uint32_t step, WorkerId to, std::vector<RankReport> reports,
+                             WorkerActions& actions) {
   const Peer* peer = FindPeer(to);
   if (peer == nullptr) return Fail(fmt::format("worker {} takes part in the group but has no endpoint in it", to));
   for (const Held& fragment : fragments) {
-    actions.push_back(SendPartial{.to = *peer,
+    actions.push_back(SendPartial{.to = {peers_, peer},
                                   .message = {.epoch = assignment_.epoch,
                                               .from_worker = self_,
                                               .key = key(),
@@ -301,15 +335,17 @@ bool GroupRun::Uses(Rank rank, ImageHandle image) const {
 }
 
 // Releases the images of taken fragments, once each, unless other fragments still use them.
-void GroupRun::ReleaseUnused(const std::vector<Held>& taken, WorkerActions& actions) {
+void GroupRun::ReleaseUnused(std::span<const Held> taken, WorkerActions& actions) {
+  const auto release = [&](ImageHandle image) {
+    if (std::ranges::none_of(ranks_, [&](const auto& rank) { return Uses(rank.first, image); })) actions.push_back(ReleaseImage{image});
+  };
+  if (taken.size() == 1) return release(taken.front().value.image);
   std::vector<ImageHandle> images;
   images.reserve(taken.size());
   for (const Held& part : taken) images.push_back(part.value.image);
   std::ranges::sort(images);
   images.erase(std::unique(images.begin(), images.end()), images.end());
-  for (const ImageHandle image : images) {
-    if (std::ranges::none_of(ranks_, [&](const auto& rank) { return Uses(rank.first, image); })) actions.push_back(ReleaseImage{image});
-  }
+  std::ranges::for_each(images, release);
 }
 
 // Reports leave with the rank's last pixels, so that they include all its combining.
@@ -318,8 +354,8 @@ std::vector<RankReport> GroupRun::TakeReports(Rank rank) {
 }
 
 const Peer* GroupRun::FindPeer(WorkerId worker) const {
-  const auto found = std::ranges::lower_bound(assignment_.peers, worker, {}, &Peer::worker);
-  return found == assignment_.peers.end() || found->worker != worker ? nullptr : &*found;
+  const auto found = std::ranges::lower_bound(*peers_, worker, {}, &Peer::worker);
+  return found == peers_->end() || found->worker != worker ? nullptr : &*found;
 }
 
 void GroupRun::Fail(std::string why) {

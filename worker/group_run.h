@@ -9,7 +9,9 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -23,7 +25,7 @@ struct ImagePiece {
   PixelRange pixels;
   RankInterval ranks;
   ImageHandle image = 0;
-  IncomingImage incoming;
+  Rare<IncomingImage> incoming;  // none: an empty image
 };
 
 // All pixels of a group, on the display worker; an empty group has no pieces. The taker owns the images.
@@ -48,8 +50,8 @@ class GroupRun {
   void OnRendered(Rank rank, ImageHandle image, RankReport report, WorkerActions& actions);
   // One of this worker's ranks draws nothing: it is not rendered and its picture is empty.
   void LeaveOut(Rank rank, RankReport report, WorkerActions& actions);
-  void OnPartial(PartialImage message, Bytes payload, WorkerActions& actions);
-  void OnCombined(const CombineDone& done, WorkerActions& actions);
+  void OnPartial(PartialImage&& message, const Bytes& payload, WorkerActions& actions);
+  bool OnCombined(const CombineDone& done, WorkerActions& actions);  // false: not one of its combines
 
   std::optional<GroupImage> TakeGroupImage();  // display worker, once
   bool finished() const;                       // this worker has nothing more to do for the group, and holds nothing of it
@@ -67,54 +69,58 @@ class GroupRun {
   using Held = Fragment<ImagePart>;
   struct RankState {
     ImageHandle own = 0;              // its picture, once rendered
-    std::vector<RankReport> reports;  // on their way with this rank
+    std::vector<RankReport> reports;  // on their way with this rank: its own, then those that have come
   };
-  struct Arrivals {                            // for one step that this worker receives, or for the group image
-    std::vector<ImagePiece> pieces;            // at most one of any pixel. Those that were taken have no image any more
-    std::size_t taken = 0;                     // the first ones
-    std::vector<RankReport> reports;           // not taken
-    bool Has(const PixelRange& pixels) const;  // some of them
-    void Add(PartialImage&& message, Bytes payload);
+  static constexpr std::uint32_t kNone = StepOrder::kNoNote;
+  struct Arrival {  // a place in arrivals_. The first one of a step is noted for its turn
+    ImagePiece piece;
+    bool taken = false;          // the piece has no image any more
+    std::uint32_t next = kNone;  // the next piece of the step, or the next unused place
   };
 
   bool Mine(Rank rank) const { return ranks_.contains(rank); }
-  WorkerId WorkerOf(Rank rank) const { return assignment_.group.placements[rank].worker; }
+  WorkerId WorkerOf(Rank rank) const { return workers_[rank]; }
   Rank root() const { return assignment_.group.schedule.root; }
   std::uint32_t step_count() const { return std::uint32_t(runner_.order().schedule().steps().size()); }
   Runner MakeRunner();
   void Advance(WorkerActions& actions);
   void MoveLocally(const Runner::Taken& taken, WorkerActions& actions);
   void Receive(const Runner::Taken& taken, WorkerActions& actions);
+  void Keep(std::uint32_t turn, ImagePiece&& piece);
+  bool HasArrived(std::uint32_t turn, const PixelRange& pixels);  // some of them
   void Merge(Rank rank, ImagePiece&& piece, WorkerActions& actions);
   // Passes on `incoming`, what has come of the piece.
-  void Combine(Rank rank, const Held& held, const ImagePiece& piece, IncomingImage&& incoming, WorkerActions& actions);
+  void Combine(Rank rank, const Held& held, const ImagePiece& piece, Rare<IncomingImage>&& incoming, WorkerActions& actions);
   bool ComesHome(Rank rank, const ImagePiece& piece) const;
   void TakeHome(Rank rank, ImagePiece&& piece, WorkerActions& actions);
   // Fills in key and frame.
   void Start(StartCombine&& combine, Rank rank, WorkerActions& actions);
   void FinishRoot(WorkerActions& actions);
-  void CollectGroupPiece(PartialImage&& message, Bytes payload);
+  void CollectGroupPiece(PartialImage&& message, const Bytes& payload);
   // The messages carry `reports`.
-  void SendFragments(Rank rank, const std::vector<Held>& fragments, std::uint32_t step, WorkerId to, std::vector<RankReport> reports,
+  void SendFragments(Rank rank, std::span<const Held> fragments, std::uint32_t step, WorkerId to, std::vector<RankReport> reports,
                      WorkerActions& actions);
   bool Uses(Rank rank, ImageHandle image) const;
-  void ReleaseUnused(const std::vector<Held>& taken, WorkerActions& actions);
+  void ReleaseUnused(std::span<const Held> taken, WorkerActions& actions);
   std::vector<RankReport> TakeReports(Rank rank);
-  const Peer* FindPeer(WorkerId worker) const;
+  const Peer* FindPeer(WorkerId worker) const;  // null: no peer
   void Fail(std::string why);
 
-  const GroupAssignment assignment_;  // peers by ascending worker
+  const std::shared_ptr<const std::vector<Peer>> peers_;  // by ascending worker
+  const GroupAssignment assignment_;                      // without its peers
+  const std::vector<WorkerId> workers_;                   // by rank
   const WorkerId self_;
   ImageNames& names_;
   const PixelRange frame_;
   Status failure_;
   Runner runner_;
   std::map<Rank, RankState> ranks_;                      // of this worker
-  std::vector<Arrivals> arrivals_;                       // by turn (StepOrder)
+  std::vector<Arrival> arrivals_;                        // of all steps; at most one piece of any pixel
+  std::uint32_t unused_arrival_ = kNone;                 // the first unused place
   std::vector<std::pair<ImageHandle, Rank>> combining_;  // StartCombine without CombineDone
   bool root_done_ = false;
-  Arrivals group_pieces_;           // display worker
-  std::uint64_t group_pixels_ = 0;  // in them
+  GroupImage group_image_;          // display worker: what has come of it
+  std::uint64_t group_pixels_ = 0;  // in its pieces
   bool group_image_taken_ = false;
 };
 

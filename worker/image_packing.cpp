@@ -46,7 +46,7 @@ bool PackingPays(double link_bytes_per_second, const CodecSpeed& codec) {
 
 bool MayPack(double link_bytes_per_second) { return PackingPays(link_bytes_per_second, kFastest); }
 
-Bytes PackForLink(Bytes payload, double link_bytes_per_second, std::optional<PackedRuns>& packed) {
+Bytes PackForLink(Bytes payload, double link_bytes_per_second, Rare<PackedRuns>& packed) {
   packed.reset();
   if (payload.empty() || !MayPack(link_bytes_per_second)) return payload;
   if (!PackingPays(link_bytes_per_second, SampleCodec(payload.span()))) return payload;

@@ -35,6 +35,6 @@ bool PackingPays(double link_bytes_per_second, const CodecSpeed& codec);
 bool MayPack(double link_bytes_per_second);
 
 // `payload`, packed if that pays (then `packed` says how). Takes processor time only if the link may be slow enough.
-Bytes PackForLink(Bytes payload, double link_bytes_per_second, std::optional<PackedRuns>& packed);
+Bytes PackForLink(Bytes payload, double link_bytes_per_second, Rare<PackedRuns>& packed);
 
 }  // namespace slabstream

@@ -309,8 +309,8 @@ bool WorkerService::Impl::IsTimed(const Peer& peer) const {
 }
 
 void WorkerService::Impl::Perform(SendPartial& action) {
-  const Delivery delivery = DeliveryTo(action.to);
-  if (IsTimed(action.to)) action.message.acknowledge = links.Ask(action.to.worker, MonotonicNow());
+  const Delivery delivery = DeliveryTo(*action.to);
+  if (IsTimed(*action.to)) action.message.acknowledge = links.Ask(action.to->worker, MonotonicNow());
   executor->Perform(std::move(action), delivery);
 }
 

@@ -74,32 +74,36 @@ struct WorkerMachine::State {
   void EndRuns(const Frame& frame);
   void CheckAccumulator(FrameId id, Frame& frame);
   void Trouble(const GroupKey& key, Status status, WorkerId unreachable = 0);
+  void Tend();  // what is due, and what voxels and renderings need
   Time NextWake() const;
   void FailGroup(const GroupKey& key, const Status& status);
   void ReportSlabFailures();
 
   const WorkerConfig config;
   Incarnation incarnation;  // of the current registration
-  Epoch epoch = 0;          // while registered
-  WorkerId worker = 0;      // 0: unregistered
   Epoch slabs_epoch = 0;    // epoch of the cached volumes
   Duration heartbeat{}, timeout{};
-  Time next_heartbeat, last_heard;
+  Time next_heartbeat;
   Time next_register = Time::min();
-  Time wake = Time::max();  // returned at the end of the last Step
+  std::uint32_t rendered_ranks = 0;
   bool ended = false;
-
   ImageNames names;
   SlabFetcher slabs;
   RenderQueue renders;
   EarlyImages early;
+
+  // All that most steps need.
+  Epoch epoch = 0;                 // while registered
+  WorkerId worker = 0;             // 0: unregistered
+  bool brief = false;              // this Step has only to do with images: voxels, renderings and the coordinator are as they were
+  GroupRun* latest_run = nullptr;  // that was found; null if it has ended
+  Time last_heard;
+  Time wake = NextWake();  // as of the last Step
+  Time now;
+  WorkerActions actions;
   std::map<FrameId, Frame> frames;
   FrameId finished_before = 0;
   std::set<FrameId> cancelled;  // not below finished_before
-  std::uint32_t rendered_ranks = 0;
-
-  Time now;
-  WorkerActions actions;
 };
 
 // ---------------------------------------------------------------- registration
@@ -229,7 +233,7 @@ void WorkerMachine::State::On(GroupAssignment&& assignment, const Bytes&) {
       renders.Add(key, rank, placement, setup, hidden, actions);
     }
   }
-  for (auto& [partial, payload] : early.Take(key)) run.OnPartial(std::move(partial), std::move(payload), actions);
+  for (auto& [partial, payload] : early.Take(key)) run.OnPartial(std::move(partial), payload, actions);
   AfterRun(run);
 }
 
@@ -250,17 +254,16 @@ void WorkerMachine::State::BeginAttempt(FrameId id, Frame& frame, const GroupAss
 void WorkerMachine::State::On(PartialImage&& partial, const Bytes& payload) {
   // Once the coordinator has admitted this worker, others send it images, and these may overtake the Welcome.
   if (worker == 0) return (void)early.Keep(std::move(partial), payload);
-  if (partial.epoch != epoch || Over(partial.key.frame)) return;
+  if (partial.epoch != epoch) return;
+  if (GroupRun* run = FindRun(partial.key)) {
+    run->OnPartial(std::move(partial), payload, actions);
+    return AfterRun(*run);
+  }
+  if (Over(partial.key.frame)) return;
   const auto frame = frames.find(partial.key.frame);
   if (frame != frames.end()) {
     if (partial.key.attempt < frame->second.attempt) return;
-    if (partial.key.attempt == frame->second.attempt) {
-      if (const auto group = frame->second.groups.find(partial.key.group); group != frame->second.groups.end()) {
-        if (!group->second) return;  // over
-        group->second->OnPartial(std::move(partial), payload, actions);
-        return AfterRun(*group->second);
-      }
-    }
+    if (partial.key.attempt == frame->second.attempt && frame->second.groups.contains(partial.key.group)) return;  // over
   }
   const GroupKey key = partial.key;
   if (const Status kept = early.Keep(std::move(partial), payload); !kept.ok()) Trouble(key, kept);
@@ -277,13 +280,10 @@ void WorkerMachine::State::On(const RenderDone& done) {
 }
 
 void WorkerMachine::State::On(const CombineDone& done) {
-  if (const auto frame = frames.find(done.key.frame); frame != frames.end() && frame->second.accumulator) {
-    if (frame->second.accumulator->OnCombined(done, actions)) return CheckAccumulator(frame->first, frame->second);
-  }
-  if (GroupRun* run = FindRun(done.key)) {
-    run->OnCombined(done, actions);
-    AfterRun(*run);
-  }
+  if (GroupRun* run = FindRun(done.key); run != nullptr && run->OnCombined(done, actions)) return AfterRun(*run);
+  const auto frame = frames.find(done.key.frame);
+  if (frame == frames.end() || !frame->second.accumulator) return;
+  if (frame->second.accumulator->OnCombined(done, actions)) CheckAccumulator(frame->first, frame->second);
 }
 
 void WorkerMachine::State::On(const HiddenFound& found) {
@@ -307,10 +307,11 @@ void WorkerMachine::State::On(const PeerUnreachable& peer) {
 }
 
 GroupRun* WorkerMachine::State::FindRun(const GroupKey& key) {
+  if (latest_run != nullptr && latest_run->key() == key) return latest_run;
   const auto frame = frames.find(key.frame);
   if (frame == frames.end() || frame->second.attempt != key.attempt) return nullptr;
   const auto group = frame->second.groups.find(key.group);
-  return group == frame->second.groups.end() || !group->second ? nullptr : &*group->second;
+  return group == frame->second.groups.end() || !group->second ? nullptr : latest_run = &*group->second;
 }
 
 void WorkerMachine::State::AfterRun(GroupRun& run) {
@@ -326,6 +327,8 @@ void WorkerMachine::State::AfterRun(GroupRun& run) {
 
 // Ends the run, done or not. Late messages of its group are then ignored.
 void WorkerMachine::State::EndRun(GroupKey key) {
+  brief = false;
+  latest_run = nullptr;
   renders.DropGroup(key, actions);
   std::optional<GroupRun>& run = frames.at(key.frame).groups.at(key.group);
   run->Drop(actions);
@@ -384,18 +387,25 @@ WorkerActions WorkerMachine::Step(WorkerEvent&& event, Time now, WorkerActions m
   memory.clear();
   s.actions = std::move(memory);
   s.now = now;
-  if (now > s.wake) s.last_heard += now - s.wake;
+  if (s.worker != 0 && now > s.wake) s.last_heard += now - s.wake;
+  const auto* message = std::get_if<MessageReceived>(&event);
+  s.brief = now < s.wake &&
+            (message != nullptr ? std::holds_alternative<PartialImage>(message->message) : std::holds_alternative<CombineDone>(event));
   std::visit([&](auto& e) { s.On(std::move(e)); }, event);
-  s.slabs.ExpireRequests(now);
-  s.ReportSlabFailures();
-  if (!s.ended) s.KeepTime();
-  if (s.worker != 0) {
-    s.slabs.RequestChunks(s.renders.SlabsInOrder(), s.epoch, s.worker, now, s.actions);
-    s.renders.StartNext(s.actions);
-  }
-  s.slabs.Trim(s.actions);
-  s.wake = s.NextWake();
+  if (!s.brief) s.Tend();
   return std::exchange(s.actions, {});
+}
+
+void WorkerMachine::State::Tend() {
+  slabs.ExpireRequests(now);
+  ReportSlabFailures();
+  if (!ended) KeepTime();
+  if (worker != 0) {
+    slabs.RequestChunks(renders.SlabsInOrder(), epoch, worker, now, actions);
+    renders.StartNext(actions);
+  }
+  slabs.Trim(actions);
+  wake = NextWake();
 }
 
 Time WorkerMachine::State::NextWake() const {
@@ -404,7 +414,7 @@ Time WorkerMachine::State::NextWake() const {
   return std::min({next_heartbeat, last_heard + timeout, slabs.NextExpiry()});
 }
 
-Time WorkerMachine::NextWake() const { return state_->NextWake(); }
+Time WorkerMachine::NextWake() const { return state_->wake; }
 
 bool WorkerMachine::registered() const { return state_->worker != 0; }
 WorkerId WorkerMachine::worker() const { return state_->worker; }

@@ -31,6 +31,7 @@
 #include <vector>
 
 #include "common/base/bytes.h"
+#include "common/base/rare.h"
 #include "common/base/time.h"
 #include "common/kernels/combine.h"
 #include "common/wire/any_message.h"
@@ -75,8 +76,8 @@ struct WorkerConfig {
 // The pixels of a PartialImage: runs, or another process' memory.
 struct IncomingImage {
   RunImageHeader header;
-  std::optional<SharedImage> shared;
-  std::optional<PackedRuns> packed;
+  Rare<SharedImage> shared;
+  Rare<PackedRuns> packed;
   Bytes payload;
 };
 
@@ -167,14 +168,14 @@ struct StartRender {
 struct CancelRender {
   GroupKey key;
 };  // the running one, if it belongs to this group; RenderDone still comes
-// Combines `other` (if 0: the incoming image) into `image`. If `image` names no image yet, it becomes a copy of the other one. Only the
-// pixels of `pixels` count in the other one: an image may hold pixels that have been passed on. `other` stays unchanged and needs its own
-// release. -> CombineDone
+// Combines `other` (if 0: the incoming image; none is an empty one) into `image`. If `image` names no image yet, it becomes a copy of the
+// other one. Only the pixels of `pixels` count in the other one: an image may hold pixels that have been passed on. `other` stays unchanged
+// and needs its own release. -> CombineDone
 struct StartCombine {
   GroupKey key;
   ImageHandle image = 0;
   ImageHandle other = 0;
-  IncomingImage incoming;
+  Rare<IncomingImage> incoming;
   Side side = Side::kBack;
   bool replace = false;  // instead: `pixels` of `image`, which have been passed on, are replaced by those of the other one
   PixelRange pixels;     // of the frame; empty: all
@@ -191,7 +192,7 @@ struct FindHidden {
 // Sends message.pixels of `image`. Fills in how they travel, and adds bytes and times of messages to the reports of this worker's ranks. ->
 // SendFailed, or nothing.
 struct SendPartial {
-  Peer to;
+  std::shared_ptr<const Peer> to;
   PartialImage message;
   ImageHandle image = 0;
   PixelBounds frame;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -25,6 +26,28 @@ CLI::Option* AddParsed(CLI::App& app, const std::string& names, T& target, Parse
     return true;
   };
   return app.add_option(names, CLI::callback_t(store), help);
+}
+
+// An option whose values are separated by commas, or given one by one by repeating it; `parse` turns each into a T. Each value counts once.
+template <class T, class Parse>
+CLI::Option* AddParsedList(CLI::App& app, const std::string& name, std::vector<T>& target, Parse parse, const std::string& help) {
+  const auto store = [&target, parse = std::move(parse), name](const CLI::results_t& texts) {
+    target.clear();
+    for (const std::string& text : texts) {
+      for (std::size_t begin = 0; begin <= text.size();) {
+        const std::size_t end = std::min(text.find(',', begin), text.size());
+        auto value = parse(name, text.substr(begin, end - begin));
+        if (!value.ok()) throw CLI::ValidationError(value.status().message());
+        if (std::find(target.begin(), target.end(), *value) == target.end()) target.push_back(*std::move(value));
+        begin = end + 1;
+      }
+    }
+    return true;
+  };
+  return app.add_option(name, CLI::callback_t(store), help)
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+      ->type_name("LIST");
 }
 
 // An option whose value is given with `=` or omitted: --local=4, --local. `bare` stands for an omitted value. The next argument is never

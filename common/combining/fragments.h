@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cstdint>
 #include <optional>
+#include <ranges>
+#include <utility>
 #include <vector>
 
 #include "common/base/check.h"
@@ -22,10 +24,10 @@ struct Fragment {
   friend bool operator==(const Fragment&, const Fragment&) = default;
 };
 
-template <class Value>
-std::uint64_t PixelCount(const std::vector<Fragment<Value>>& fragments) {
+template <std::ranges::range Fragments>
+std::uint64_t PixelCount(const Fragments& fragments) {
   std::uint64_t pixels = 0;
-  for (const Fragment<Value>& fragment : fragments) pixels += PixelCount(fragment.pixels);
+  for (const auto& fragment : fragments) pixels += PixelCount(fragment.pixels);
   return pixels;
 }
 
@@ -49,17 +51,29 @@ class Fragments {
     return place != list_.end() && place->pixels == range ? &*place : nullptr;
   }
 
-  // Removes what lies in `range` and returns it. Fragments at the ends of the range are cut.
+  // Removes what lies in `range` and adds it to `taken`. Fragments at the ends of the range are cut.
+  void Take(const PixelRange& range, List& taken) {
+    auto first = list_.begin() + (FirstAfter(range.begin) - list_.cbegin());
+    auto last = first;
+    for (; last != list_.end() && last->pixels.begin < range.end; ++last) {
+      taken.push_back({{std::max(last->pixels.begin, range.begin), std::min(last->pixels.end, range.end)}, last->value});
+    }
+    if (first == last) return;
+    const bool keeps_begin = first->pixels.begin < range.begin;
+    const bool keeps_end = range.end < last[-1].pixels.end;
+    if (keeps_begin && keeps_end && last - first == 1) {
+      const Fragment<Value> rest = {{range.end, first->pixels.end}, first->value};
+      first->pixels.end = range.begin;
+      list_.insert(last, rest);
+      return;
+    }
+    if (keeps_begin) (first++)->pixels.end = range.begin;
+    if (keeps_end) (--last)->pixels.begin = range.end;
+    list_.erase(first, last);
+  }
   List Take(const PixelRange& range) {
-    List taken = Within(range);
-    if (taken.empty()) return taken;
-    const auto first = list_.begin() + (FirstAfter(range.begin) - list_.cbegin());
-    const auto last = first + std::ptrdiff_t(taken.size());
-    const Fragment<Value> before = {{first->pixels.begin, range.begin}, first->value};
-    const Fragment<Value> after = {{range.end, (last - 1)->pixels.end}, (last - 1)->value};
-    auto place = list_.erase(first, last);
-    if (PixelCount(after.pixels) > 0) place = list_.insert(place, after);
-    if (PixelCount(before.pixels) > 0) list_.insert(place, before);
+    List taken;
+    Take(range, taken);
     return taken;
   }
 
@@ -82,15 +96,18 @@ class Fragments {
 
   // Puts `fragment` in place of what lies in its pixels.
   void Replace(const Fragment<Value>& fragment) {
-    const auto place = list_.begin() + (FirstAfter(fragment.pixels.begin) - list_.cbegin());
-    const auto differs = [&](const Fragment<Value>& neighbour) { return neighbour.value != fragment.value; };
-    const bool exact = place != list_.end() && place->pixels == fragment.pixels;
-    if (exact && (place == list_.begin() || differs(place[-1])) && (place + 1 == list_.end() || differs(place[1]))) {
-      place->value = fragment.value;  // the usual case: nothing moves
-      return;
-    }
+    if (Exchange(fragment)) return;
     Take(fragment.pixels);
     Put(fragment);
+  }
+
+  // The same if there is a fragment of exactly these pixels, and nothing moves: returns its value. None: nothing has changed.
+  std::optional<Value> Exchange(const Fragment<Value>& fragment) {
+    const auto place = list_.begin() + (FirstAfter(fragment.pixels.begin) - list_.cbegin());
+    const auto joins = [&](const Fragment<Value>& neighbour) { return neighbour.value == fragment.value; };
+    if (place == list_.end() || place->pixels != fragment.pixels) return std::nullopt;
+    if ((place != list_.begin() && joins(place[-1])) || (place + 1 != list_.end() && joins(place[1]))) return std::nullopt;
+    return std::exchange(place->value, fragment.value);
   }
 
   // Adds a fragment. Where nothing is held, it is stored as it is; elsewhere merge(held, value) returns the combined value. False if merge

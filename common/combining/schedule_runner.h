@@ -8,6 +8,7 @@
 #include <map>
 #include <numeric>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -25,8 +26,6 @@ inline std::vector<Rank> AllRanks(Rank ranks) {
 template <class Value>
 class ScheduleRunner {
  public:
-  using Parts = typename Fragments<Value>::List;
-
   // As StepOrder's constructor. `frame`: all pixels of the schedule.
   ScheduleRunner(SharedSchedule schedule, PixelRange frame, std::vector<Rank> ranks)
       : order_(std::move(schedule), std::move(ranks)), frame_(frame) {
@@ -45,15 +44,20 @@ class ScheduleRunner {
   struct Taken {
     StepOrder::Kind kind = StepOrder::Kind::kSend;
     std::uint32_t index = 0, turn = 0;  // of the step
+    Rank rank = 0;                      // that takes it; kMove: one of the two
     bool last = true;                   // as StepOrder says
     const Step* step = nullptr;
-    Parts parts;  // kSend, kMove: what `from` held of the step's pixels, perhaps not all; now removed from it
+    // kSend, kMove: what `from` held of the step's pixels, perhaps not all; now removed from it. Valid until the next call.
+    std::span<const Fragment<Value>> parts;
   };
   std::optional<Taken> TakeNext() {
     const std::optional<StepOrder::Taken> next = order_.TakeNext();
     if (!next) return std::nullopt;
-    Taken taken = {next->kind, next->step, next->turn, next->last, &order_.schedule().steps()[next->step], {}};
-    if (next->kind != StepOrder::Kind::kReceive) taken.parts = held(taken.step->from).Take(taken.step->pixels);
+    Taken taken = {next->kind, next->step, next->turn, next->rank, next->last, &order_.schedule().steps()[next->step], {}};
+    if (next->kind == StepOrder::Kind::kReceive) return taken;
+    parts_.clear();
+    held(taken.step->from).Take(taken.step->pixels, parts_);
+    taken.parts = parts_;
     return taken;
   }
 
@@ -64,6 +68,7 @@ class ScheduleRunner {
   StepOrder order_;
   PixelRange frame_;
   std::map<Rank, Fragments<Value>> held_;
+  typename Fragments<Value>::List parts_;  // that were taken last
 };
 
 }  // namespace slabstream

@@ -11,7 +11,11 @@ namespace slabstream {
 
 StepOrder::StepOrder(SharedSchedule schedule, std::vector<Rank> ranks)
     : schedule_(std::move(schedule)), numbers_(std::move(ranks)), ranks_(numbers_.size()) {
+  std::size_t turns = 0;
+  for (const Rank rank : numbers_) turns += schedule_->StepsOf(rank).size();
+  turns_.reserve(turns);
   for (std::uint32_t i = 0; i < numbers_.size(); ++i) {
+    ranks_[i].number = numbers_[i];
     ranks_[i].first_turn = std::uint32_t(turns_.size());
     for (const std::uint32_t step : schedule_->StepsOf(numbers_[i])) turns_.push_back({.step = step, .rank = i});
     ranks_[i].turn_end = std::uint32_t(turns_.size());
@@ -22,46 +26,57 @@ StepOrder::StepOrder(SharedSchedule schedule, std::vector<Rank> ranks)
     turn.missing = PixelCount(StepOf(turn).pixels);
     turn.partner = (turn.sends ? FindReceiving(turn.step) : FindSending(turn.step)).value_or(kElsewhere);
   }
-  possible_ = IndexSet(std::uint32_t(turns_.size()));
+  possible_ = IndexSet(turn_count());
   changed_ = IndexSet(std::uint32_t(ranks_.size()));
   FindWaits();
-  for (std::uint32_t turn = 0; turn < turns_.size(); ++turn) Offer(turn);
+  for (std::uint32_t turn = 0; turn < turn_count(); ++turn) Offer(turn);
 }
 
 void StepOrder::FindWaits() {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> order;  // (turn, another one that waits for it)
-  std::vector<std::uint32_t> earlier;
-  first_waiter_.resize(turns_.size() + 1);
+  order.reserve(turns_.size());
+  std::vector<std::uint32_t> earlier, waiters(turns_.size());
+  const auto wait = [&](std::uint32_t first, std::uint32_t turn) {
+    order.emplace_back(first, turn);
+    ++waiters[first];
+    ++turns_[turn].waits;
+  };
   for (const RankState& rank : ranks_) {
     Fragments<std::uint32_t> latest;  // the last turn that touches a pixel
     for (std::uint32_t turn = rank.first_turn; turn < rank.turn_end; ++turn) {
-      earlier.clear();
       const PixelRange& pixels = StepOf(turns_[turn]).pixels;
-      if (const auto* only = latest.Find(pixels)) {
-        earlier.push_back(only->value);
-      } else {
-        for (const auto& fragment : latest.Within(pixels)) earlier.push_back(fragment.value);
+      if (const auto only = latest.Exchange({pixels, turn})) {  // the usual case
+        wait(*only, turn);
+        continue;
       }
+      earlier.clear();
+      for (const auto& fragment : latest.Within(pixels)) earlier.push_back(fragment.value);
       std::ranges::sort(earlier);
       earlier.erase(std::unique(earlier.begin(), earlier.end()), earlier.end());
-      for (const std::uint32_t first : earlier) {
-        order.emplace_back(first, turn);
-        ++first_waiter_[first + 1];
+      for (const std::uint32_t first : earlier) wait(first, turn);
+      if (earlier.empty()) {
+        latest.Put({pixels, turn});
+      } else {
+        latest.Replace({pixels, turn});
       }
-      turns_[turn].waits = std::uint32_t(earlier.size());
-      latest.Replace({pixels, turn});
     }
   }
-  std::partial_sum(first_waiter_.begin(), first_waiter_.end(), first_waiter_.begin());
-  waiters_.resize(order.size());
-  std::vector<std::uint32_t> next = first_waiter_;
-  for (const auto& [first, waiter] : order) waiters_[next[first]++] = waiter;
+  for (std::uint32_t turn = 0; turn < turns_.size(); ++turn) {
+    if (waiters[turn] < 2) continue;
+    turns_[turn].many_waiters = true;
+    turns_[turn].first_waiter = std::uint32_t(waiters_.size());
+    waiters_.resize(waiters_.size() + 1 + waiters[turn]);
+  }
+  for (const auto& [first, waiter] : order) {
+    const std::uint32_t place = turns_[first].first_waiter;
+    (turns_[first].many_waiters ? waiters_[place + ++waiters_[place]] : turns_[first].first_waiter) = waiter;
+  }
 }
 
 std::optional<std::uint32_t> StepOrder::FindRank(Rank rank) const {
-  const auto found = std::ranges::lower_bound(numbers_, rank);
-  if (found == numbers_.end() || *found != rank) return std::nullopt;
-  return std::uint32_t(found - numbers_.begin());
+  const auto found = std::ranges::lower_bound(ranks_, rank, {}, &RankState::number);
+  if (found == ranks_.end() || found->number != rank) return std::nullopt;
+  return std::uint32_t(found - ranks_.begin());
 }
 
 std::optional<std::uint32_t> StepOrder::FindSending(std::uint32_t step) const {
@@ -90,12 +105,10 @@ void StepOrder::OnCombined(Rank rank) {
   if (--ranks_[index].combining == 0) changed_.Insert(index);
 }
 
-void StepOrder::OnArrived(std::uint32_t step, std::uint64_t pixels) {
-  const std::optional<std::uint32_t> turn = Awaited(step);
-  CHECK(turn) << "step " << step;
-  turns_[*turn].missing -= std::min(turns_[*turn].missing, pixels);
-  turns_[*turn].untaken = true;
-  Offer(*turn);
+void StepOrder::OnArrived(std::uint32_t turn, std::uint64_t pixels) {
+  turns_[turn].missing -= std::min(turns_[turn].missing, pixels);
+  turns_[turn].untaken = true;
+  Offer(turn);
 }
 
 std::optional<std::uint32_t> StepOrder::Awaited(std::uint32_t step) const {
@@ -120,11 +133,17 @@ void StepOrder::Offer(std::uint32_t index) {
 
 // Marks the turn as taken; those that wait for it wait for one less.
 void StepOrder::Close(std::uint32_t index) {
-  turns_[index].taken = true;
+  Turn& turn = turns_[index];
+  turn.taken = true;
   possible_.Erase(index);
-  --ranks_[turns_[index].rank].open_steps;
-  for (std::uint32_t i = first_waiter_[index]; i < first_waiter_[index + 1]; ++i) {
-    if (--turns_[waiters_[i]].waits == 0) Offer(waiters_[i]);
+  --ranks_[turn.rank].open_steps;
+  const auto wait_less = [&](std::uint32_t waiter) {
+    if (--turns_[waiter].waits == 0) Offer(waiter);
+  };
+  if (turn.many_waiters) {
+    std::ranges::for_each(std::span(waiters_).subspan(turn.first_waiter + 1, waiters_[turn.first_waiter]), wait_less);
+  } else if (turn.first_waiter != kElsewhere) {
+    wait_less(turn.first_waiter);
   }
 }
 
@@ -137,7 +156,7 @@ std::optional<StepOrder::Taken> StepOrder::TakeNext() {
       Turn& turn = turns_[index];
       const bool moves = turn.partner != kElsewhere;
       if (moves && !ranks_[turns_[turn.partner].rank].free()) continue;
-      Taken taken = {moves ? Kind::kMove : turn.sends ? Kind::kSend : Kind::kReceive, turn.step, index};
+      Taken taken = {moves ? Kind::kMove : turn.sends ? Kind::kSend : Kind::kReceive, turn.step, index, rank.number};
       taken.last = taken.kind != Kind::kReceive || turn.missing == 0;
       if (taken.last) {
         Close(index);

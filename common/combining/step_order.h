@@ -29,10 +29,13 @@ class StepOrder {
   void OnCombined(Rank rank);
   // A turn is the part of a rank that is here in a step: [0, turn_count()).
   std::uint32_t turn_count() const { return std::uint32_t(turns_.size()); }
+  // The caller may note any number for a turn.
+  static constexpr std::uint32_t kNoNote = ~std::uint32_t{0};
+  std::uint32_t& note(std::uint32_t turn) { return turns_[turn].note; }
   // The receiver's turn if the step goes from a rank elsewhere to one here, and not all of its pixels have been taken.
   std::optional<std::uint32_t> Awaited(std::uint32_t step) const;
-  // `pixels` of the step have come from a rank that is not here. The step is Awaited and has not had these pixels yet.
-  void OnArrived(std::uint32_t step, std::uint64_t pixels);
+  // `pixels` have come from a rank that is not here. The turn is that of an Awaited step, which has not had these pixels yet.
+  void OnArrived(std::uint32_t turn, std::uint64_t pixels);
 
   // kReceive: all pixels that have arrived and are not taken yet. It comes again if more arrive. kMove: between two ranks that are here.
   enum class Kind : std::uint8_t { kSend, kReceive, kMove };
@@ -40,6 +43,7 @@ class StepOrder {
     Kind kind = Kind::kSend;
     std::uint32_t step = 0;
     std::uint32_t turn = 0;  // kMove: one of the two
+    Rank rank = 0;           // of that turn
     bool last = true;        // false: more of the step's pixels are to arrive
   };
   // A step that may be taken now; it counts as taken. None: wait for the next event.
@@ -53,17 +57,21 @@ class StepOrder {
  private:
   static constexpr std::uint32_t kElsewhere = ~std::uint32_t{0};
 
-  struct Turn {
+  struct Turn {  // half a cache line: there may be millions, and each is looked at when the others have filled the caches
     std::uint32_t step = 0;
-    std::uint32_t rank = 0;              // index into ranks_
-    std::uint32_t partner = kElsewhere;  // the other rank's turn, if that rank is here too
-    std::uint32_t waits = 0;             // number of earlier turns of the rank to wait for
-    std::uint64_t missing = 0;           // pixels of a step from elsewhere that have not arrived
-    bool sends = false;                  // or it receives
-    bool untaken = false;                // some pixels have arrived and are not taken
-    bool taken = false;
+    std::uint32_t rank = 0;                   // index into ranks_
+    std::uint32_t partner = kElsewhere;       // the other rank's turn, if that rank is here too
+    std::uint32_t first_waiter = kElsewhere;  // the only turn that waits for this one; of many, their place in waiters_
+    std::uint32_t note = kNoNote;
+    std::uint32_t waits : 28 = 0;   // number of earlier turns of the rank to wait for
+    bool many_waiters : 1 = false;  // wait for this one
+    bool sends : 1 = false;         // or it receives
+    bool untaken : 1 = false;       // some pixels have arrived and are not taken
+    bool taken : 1 = false;
+    std::uint64_t missing = 0;  // pixels of a step from elsewhere that have not arrived
   };
   struct RankState {
+    Rank number = 0;
     std::uint32_t first_turn = 0, turn_end = 0;
     std::uint32_t open_steps = 0;
     std::uint32_t combining = 0;
@@ -84,12 +92,11 @@ class StepOrder {
 
   SharedSchedule schedule_;
   std::vector<Rank> numbers_;
-  std::vector<RankState> ranks_;  // of numbers_
-  std::vector<Turn> turns_;       // rank by rank, each in order of steps
-  // The turns that wait for turn i: [first_waiter_[i], first_waiter_[i + 1]) of waiters_.
-  std::vector<std::uint32_t> first_waiter_, waiters_;
-  IndexSet possible_;  // turns that wait only for their ranks to be free
-  IndexSet changed_;   // ranks at which a turn may have become possible
+  std::vector<RankState> ranks_;        // of numbers_; most lookups touch only these
+  std::vector<Turn> turns_;             // rank by rank, each in order of steps
+  std::vector<std::uint32_t> waiters_;  // of turns with many: their number, then they
+  IndexSet possible_;                   // turns that wait only for their ranks to be free
+  IndexSet changed_;                    // ranks at which a turn may have become possible
 };
 
 }  // namespace slabstream

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <numeric>
+#include <optional>
 
 #include "common/combining/steps.h"
 
@@ -57,30 +58,33 @@ Schedule MakeSwap(const ScheduleRequest& request, std::span<const std::uint32_t>
     const Rank begin = first(m), end = first(m + 1);
     rank_of[m] = request.root >= begin && request.root < end ? request.root : begin;
     std::uint32_t turn = 0;
-    ForEachInsideOut(rank_of[m] - begin, end - begin,
-                     [&](std::uint32_t, std::uint32_t from) { add(turn++, begin + from, rank_of[m], request.pixels); });
+    ForEachInsideOut(rank_of[m] - begin, end - begin, [&](std::uint32_t from) { add(turn++, begin + from, rank_of[m], request.pixels); });
     round = std::max(round, turn);
   }
 
+  std::ranges::stable_sort(schedule.steps, {}, &Step::round);
+
   // Members whose numbers differ in one digit to the base of the factors share what they hold.
   std::vector<PixelRange> held(members, request.pixels);
+  std::vector<std::uint32_t> digit(members);
   std::uint32_t stride = 1;
   for (const std::uint32_t factor : used) {
     for (std::uint32_t m = 0; m < members; ++m) {
-      const std::uint32_t digit = m / stride % factor;
-      held[m] = Share(held[m], digit, factor);
-      ForEachInsideOut(digit, factor, [&](std::uint32_t turn, std::uint32_t from) {
-        add(round + turn, rank_of[m + stride * from - stride * digit], rank_of[m], held[m]);
-      });
+      digit[m] = m / stride % factor;
+      held[m] = Share(held[m], digit[m], factor);
     }
-    round += InsideOutTurns(factor);
+    for (std::uint32_t turn = 0; turn < InsideOutTurns(factor); ++turn, ++round) {
+      for (std::uint32_t m = 0; m < members; ++m) {
+        const std::optional<std::uint32_t> from = InsideOut(turn, digit[m], factor);
+        if (from) add(round, rank_of[m + stride * *from - stride * digit[m]], rank_of[m], held[m]);
+      }
+    }
     stride *= factor;
   }
 
   for (std::uint32_t m = 0; m < members; ++m) {
     if (rank_of[m] != request.root) add(round, rank_of[m], request.root, held[m]);
   }
-  std::ranges::stable_sort(schedule.steps, {}, &Step::round);
   return schedule;
 }
 

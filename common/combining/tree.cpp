@@ -21,7 +21,7 @@ Schedule MakeTree(const ScheduleRequest& request, std::uint32_t k, std::uint32_t
         members.push_back(holder(m, std::min(m + width, ranks)));
       const auto to = std::uint32_t(std::ranges::find(members, holder(begin, std::min(begin + k * width, ranks))) - members.begin());
       std::uint32_t round = first_round;  // one for each image that is taken: a rank takes one whole image at a time
-      ForEachInsideOut(to, std::uint32_t(members.size()), [&](std::uint32_t, std::uint32_t from) {
+      ForEachInsideOut(to, std::uint32_t(members.size()), [&](std::uint32_t from) {
         whole.steps.push_back({round++, members[from], members[to], request.pixels});
       });
       next_round = std::max(next_round, round);

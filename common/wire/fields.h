@@ -89,9 +89,9 @@ class Writer {
   void Message(std::string_view, const Struct& value, const Inner& (P::*)() const, Inner* (P::*edit)()) {
     Write(value, *(out_.*edit)());
   }
-  template <class Struct, class Inner>
-  void Optional(std::string_view, const std::optional<Struct>& value, bool (P::*)() const, const Inner& (P::*)() const,
-                Inner* (P::*edit)()) {
+  // An optional or rare struct.
+  template <class Inner>
+  void Optional(std::string_view, const auto& value, bool (P::*)() const, const Inner& (P::*)() const, Inner* (P::*edit)()) {
     if (value) Write(*value, *(out_.*edit)());
   }
   template <class Struct, class Inner>
@@ -169,9 +169,8 @@ class Reader {
     const auto scope = check_.In(field);
     Read((in_.*get)(), value, check_);
   }
-  template <class Struct, class Inner>
-  void Optional(std::string_view field, std::optional<Struct>& value, bool (P::*has)() const, const Inner& (P::*get)() const,
-                Inner* (P::*edit)()) {
+  template <class Inner>
+  void Optional(std::string_view field, auto& value, bool (P::*has)() const, const Inner& (P::*get)() const, Inner* (P::*edit)()) {
     if ((in_.*has)()) Message(field, value.emplace(), get, edit);
   }
   // At most `max` items.

@@ -2,9 +2,9 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <vector>
 
+#include "common/base/rare.h"
 #include "common/base/shared_arena.h"
 #include "common/image/image_view.h"
 #include "common/wire/control_messages.h"
@@ -44,10 +44,10 @@ struct PartialImage {
   RankInterval interval;   // ranks whose images these pixels hold
   PixelRange pixels;       // of the frame, as in the step
   RunImageHeader image;    // of a shared image, only the format
-  std::optional<SharedImage> shared;
-  std::optional<PackedRuns> packed;  // not of a shared image
-  std::uint64_t acknowledge = 0;     // not 0: the sender waits for ImageReceived with this number
-  std::vector<RankReport> reports;   // of the ranks in `interval` that have not been passed on yet
+  Rare<SharedImage> shared;
+  Rare<PackedRuns> packed;          // not of a shared image
+  std::uint64_t acknowledge = 0;    // not 0: the sender waits for ImageReceived with this number
+  std::vector<RankReport> reports;  // of the ranks in `interval` that have not been passed on yet
   friend bool operator==(const PartialImage&, const PartialImage&) = default;
 };
 

@@ -21,7 +21,11 @@ namespace slabstream {
 namespace {
 
 constexpr DatasetId kAnyDataset = 1;
-constexpr int kGroupFactors[] = {1, 2, 4};  // times the fewest that memory allows
+constexpr int kGroupFactors[] = {1, 2, 4};        // times the fewest that memory allows
+constexpr int kPartitionGroupFactors[] = {1, 2};  // likewise, to judge partitions
+// To judge partitions, where the scheme is open: a tree, and two that divide the picture among the workers. How well a partition does
+// depends on them, since boxes whose images overlap little are quick to exchange.
+constexpr const char* kPartitionSchemes[] = {"fan-in", "radix-k", "direct-send"};
 
 // Schemes by the names of their entries, and with arguments: trees of other arity, more strips.
 std::vector<std::string> SchemesToTry() {
@@ -61,7 +65,7 @@ class Search {
   }
 
   PolicyChoice Run() {
-    TryLayout(best_);
+    TryLayout(best_, open_partition_);
     if (open_partition_) ChoosePartition();
     if (open_owners_) ChooseOwners();
     if (asked_.combine == kAutomatic) ChooseScheme();
@@ -86,8 +90,12 @@ class Search {
         policy.decomposition = &entry;
         policy.load_metric = metric;
         policy.axis = SlabAxis(asked_.axis, entry, question_.summary->description.geometry.size);
-        policy.groups = FewestGroupsOf(policy);
-        TryLayout(policy);
+        const int fewest = FewestGroupsOf(policy);
+        for (const int factor : kPartitionGroupFactors) {
+          if (factor > 1 && asked_.groups > 0) break;
+          policy.groups = std::min(factor * fewest, kMaxGroups);
+          TryLayout(policy, true);
+        }
       }
     }
   }
@@ -101,7 +109,7 @@ class Search {
         ResolvedPolicy policy = start;
         if (asked_.assignment == kAutomatic) policy.assignment = &entry;
         policy.groups = std::min(factor * fewest, kMaxGroups);
-        TryLayout(policy);
+        TryLayout(policy, false);
       }
     }
   }
@@ -115,21 +123,33 @@ class Search {
     }
   }
 
-  // Layouts that have been tried under another name are not tried again.
-  void TryLayout(const ResolvedPolicy& policy) {
+  // Layouts that have been tried under another name are not tried again. `schemes`: under all kPartitionSchemes, if the scheme is open.
+  void TryLayout(ResolvedPolicy policy, bool schemes) {
     Layout layout = layouts_.Make(policy);
     if (std::ranges::find(tried_, layout) != tried_.end()) return;
     tried_.push_back(layout);
     FramePredictor::Prepared prepared = predictor_.Prepare(std::move(layout));
+    const bool is_now = question_.now != nullptr && tried_.size() == 1;
+    // What holds has voxels where they are; another layout moves them. Its own schemes and the next layouts are compared as any others.
+    const double least_gain = holds_now_ && !is_now ? std::max(kLeastGain, question_.least_gain) : kLeastGain;
     // A requested scheme may have too many steps to be tried: the default one then compares the layouts.
     std::optional<FramePrediction> prediction = predictor_.Predict(prepared, policy.combine);
     const bool stands_in = !prediction;
     if (stands_in) prediction = predictor_.Predict(prepared, Policy{}.combine);
-    const bool holds = question_.now != nullptr && best_ == *question_.now;
-    if (prediction && Consider(policy, *prediction, holds ? std::max(kLeastGain, question_.least_gain) : kLeastGain)) {
-      prepared_ = std::move(prepared);
-      stands_in_ = stands_in;
+    bool better = prediction && Consider(policy, *prediction, least_gain);
+    if (better) stands_in_ = stands_in;
+    for (const char* const scheme : kPartitionSchemes) {
+      if (!schemes || asked_.combine != kAutomatic || scheme == policy.combine) continue;
+      ResolvedPolicy other = policy;
+      other.combine = scheme;
+      prediction = predictor_.Predict(prepared, scheme);
+      if (!prediction || !Consider(other, *prediction, better ? kLeastGain : least_gain)) continue;
+      better = true;
+      stands_in_ = false;
     }
+    if (!better) return;
+    holds_now_ = is_now;
+    prepared_ = std::move(prepared);
   }
 
   bool Consider(const ResolvedPolicy& policy, const FramePrediction& prediction, double least_gain) {
@@ -148,6 +168,7 @@ class Search {
   ResolvedPolicy best_;
   std::optional<FramePrediction> prediction_;  // of best_; prepared_ is its layout
   FramePredictor::Prepared prepared_;
+  bool holds_now_ = false;  // best_ has the layout of question_.now
   bool stands_in_ = false;  // prediction_ is for the default scheme in place of best_'s
   std::vector<Layout> tried_;
   int predicted_ = 0;

@@ -1,15 +1,20 @@
 #include "laboratory/cli/laboratory_commands.h"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
 #include <iostream>
 #include <limits>
 #include <memory>
+#include <set>
 #include <string_view>
 
 #include "client/cli/option_groups.h"
 #include "common/renderers/registry.h"
 #include "laboratory/bench/bench.h"
+#include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/run_experiment.h"
 #include "laboratory/measure/replay.h"
 
@@ -69,34 +74,45 @@ void DeclareReplay(CLI::App& experiment, std::function<Status()>& run) {
   sub->callback([options, &run] { run = [options] { return RunReplay(*options, std::cout); }; });
 }
 
-void DeclareExperiment(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("experiment", "Compare ways of dividing, combining and streaming, and write a report");
-  auto options = std::make_shared<ExperimentOptions>();
-  options->command = line.typed;
-  sub->add_option("NAME", options->name, "Which one\n" + ExperimentList());
-  sub->add_option("FILE", options->sweep_file, "For sweep: what to vary (JSON, docs/experiments.md)");
-  CLI::Option* output =
-      sub->add_option("-o,--output", options->folder, "Folder for the report and all measurements; made if it does not exist")
-          ->type_name("DIR");
-  sub->add_flag("--quick", options->quick, "Take a tenth of the time: fewer sizes, workers and repeats");
-  AddNumber(*sub, "--scale", options->scale, {kMinScale, 1}, "Scale the sides of spheres and pictures, to try things out");
-  AddInteger(*sub, "--repeats", options->repeats, 1, kMaxRepeats, "How often everything is measured")->default_str("the experiment's own");
+// The options of all experiments, which may stand before or after the experiment's name.
+void AddCommonOptions(CLI::App& app, ExperimentOptions& options) {
+  app.add_option("-o,--output", options.folder, "Folder for the results and all measurements; made if it does not exist")->type_name("DIR");
+  app.add_flag("--quick", options.quick, "Take a tenth of the time: fewer sizes, workers and repeats");
+  AddNumber(app, "--scale", options.scale, {kMinScale, 1}, "Scale the sides of spheres and pictures, to try things out");
+  AddInteger(app, "--repeats", options.repeats, 1, kMaxRepeats, "How often everything is measured")->default_str("the experiment's own");
   AddParsed(
-      *sub, "--seed", options->seed,
+      app, "--seed", options.seed,
       [](const std::string& option, const std::string& text) { return ParseInteger(option, text, 0, std::numeric_limits<int>::max()); },
       "Seed of the random order of the trials")
       ->type_name("N")
       ->default_str("1");
-  AddRepeated(*sub, "--volume", options->volumes, "A sparse volume of your own, as FILE or FILE:TRANSFER")->type_name("VOLUME");
-  CLI::Option* resume = sub->add_flag_callback(
-      "--resume", [options] { options->resume = Resume::kAnyBuild; }, "Continue what DIR holds even if another build or machine began it");
-  sub->add_flag_callback(
-         "--fresh", [options] { options->resume = Resume::kNever; }, "Begin again: delete what DIR holds")
+  AddRepeated(app, "--volume", options.volumes, "A sparse volume of your own beside the spheres, as FILE or FILE:TRANSFER")
+      ->type_name("VOLUME");
+  CLI::Option* resume = app.add_flag_callback(
+      "--resume", [&options] { options.resume = Resume::kAnyBuild; }, "Continue what DIR holds even if another build or machine began it");
+  app.add_flag_callback(
+         "--fresh", [&options] { options.resume = Resume::kNever; }, "Begin again: delete what DIR holds")
       ->excludes(resume);
+}
+
+void DeclareExperiment(const CommandLine& line) {
+  CLI::App* sub = line.app.add_subcommand("experiment", "Compare ways of dividing, combining and streaming, and write the results");
+  sub->require_subcommand(0, 1);
+  auto options = std::make_shared<ExperimentOptions>();
+  options->command = line.typed;
+  sub->add_option("NAME", options->name)->group(kHidden);  // of no experiment: the others are subcommands
   sub->add_flag("--list", options->list, "List the experiments");
+  AddCommonOptions(*sub, *options);
+  for (const Experiment& experiment : Experiments()) {
+    CLI::App* one = sub->add_subcommand(std::string(experiment.name), std::string(experiment.purpose));
+    if (experiment.takes_file) one->add_option("FILE", options->sweep_file, "What to vary (JSON, docs/experiments.md)");
+    if (experiment.declare != nullptr) experiment.declare(*one, options->own);
+    AddCommonOptions(*one, *options);
+    one->callback([options, &experiment] { options->name = experiment.name; });
+  }
   DeclareReplay(*sub, line.run);
-  sub->callback([options, &run = line.run, output, sub] {
-    if (!sub->get_subcommands().empty()) return;
+  sub->callback([options, &run = line.run] {
+    if (run) return;  // replay
     if (options->list) {
       run = [] {
         std::cout << ExperimentList();
@@ -105,7 +121,6 @@ void DeclareExperiment(const CommandLine& line) {
       return;
     }
     if (options->name.empty()) throw CLI::ValidationError("NAME is missing (--list names the experiments)");
-    if (output->count() == 0) throw CLI::RequiredError("--output");
     run = [options] { return RunExperiment(*options); };
   });
 }

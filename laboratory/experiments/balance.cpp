@@ -1,269 +1,376 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <map>
+#include <array>
 #include <numeric>
+#include <string_view>
 
+#include "client/cli/volume_argument.h"
+#include "common/cli/add_option.h"
 #include "common/planning/assignment.h"
 #include "common/planning/balance.h"
+#include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
+#include "coordinator/tuning/box_estimator.h"
+#include "laboratory/experiments/attachments.h"
+#include "laboratory/experiments/balanced_case.h"
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/figures.h"
 #include "laboratory/experiments/machines.h"
-#include "laboratory/experiments/moving_view.h"
-#include "laboratory/experiments/plots.h"
 #include "laboratory/experiments/policies.h"
-#include "laboratory/measure/box_costs.h"
-#include "laboratory/report/charts.h"
-#include "laboratory/report/text.h"
+#include "laboratory/experiments/view_sequence.h"
 
 namespace slabstream {
 namespace {
 
-constexpr int kRepeats = 3, kQuickRepeats = 1;
-constexpr int kTableWorkers = 16;  // p of the tables that compare partitions
-constexpr int kBoxesAWorker = 4;   // to compare assignments: with one box each they have no choice
-constexpr std::string_view kLink = "10gbit";
+constexpr int kRepeats = 3, kQuickRepeats = 1, kMostWorkers = 4096;
+constexpr int kBoxesAWorker = 4;                                         // to compare assignments: with one box each they have no choice
+constexpr std::array<std::string_view, 2> kLinks = {"10gbit", "1gbit"};  // the first one wherever there is one link
+constexpr std::string_view kCombine = "radix-k";                         // wherever partitions alone are compared
+constexpr std::array<std::string_view, 3> kSchemes = {"fan-in", kCombine, "direct-send"};
+constexpr std::array<int, 2> kGroups = {1, 2};
 
 struct Balance {
-  std::vector<BenchCase> volumes;
+  std::vector<BenchCase> volumes;  // a volume for each of its renderers
   std::vector<int> workers;
-  int pixels = 512;
+  std::vector<const ViewMotion*> motions;
+  std::optional<TransferChoice> later;  // of sequences
+  std::vector<Policy> moving;           // to be compared in sequences
+  int pixels = 512, steps = 8;
+
+  int TableWorkers() const { return workers[workers.size() / 2]; }
   FrameCase Frame(const BenchCase& volume, const Policy& policy, int p) const {
     return {volume, {pixels, pixels}, BenchView(Projection::kOrthographic, 1, 12), policy, p};
   }
+  ViewSequence Sequence(const BenchCase& volume, const Policy& policy, int p, const ViewMotion& motion, bool slowed = false) const {
+    return {Frame(volume, policy, p), &motion, steps, later, slowed};
+  }
 };
 
-Balance BalanceOf(const ExperimentContext& context) {
-  Balance balance;
-  const int size = context.Scaled(context.quick() ? 128 : 300);
-  balance.volumes = {StandardSphere(SphereClass::kHollow, size), SphereCase({SphereClass::kFilled, size, 0.1}, kTranslucentSphere)};
-  const std::vector<BenchCase> real = RealVolumes(context.options().volumes);
-  if (!context.quick() || !context.options().volumes.empty()) balance.volumes.insert(balance.volumes.end(), real.begin(), real.end());
-  balance.workers = context.quick() ? std::vector{2, 16, 64} : std::vector{2, 4, 8, 16, 32, 64, 128, 256, 512, 1024};
-  balance.pixels = context.Scaled(512);
-  return balance;
+std::vector<BenchCase> VolumesOf(const ExperimentContext& context) {
+  const OwnOptions& own = context.options().own;
+  std::vector<std::string> named = own.cases;
+  named.insert(named.end(), context.options().volumes.begin(), context.options().volumes.end());
+  const int size = context.Scaled(context.quick() ? 128 : 200);
+  std::vector<BenchCase> volumes;
+  const auto add_with = [&](const RendererKind* renderer) {
+    const std::size_t begin = volumes.size();
+    if (own.cases.empty()) {
+      const RendererKind* const kind = renderer != nullptr ? renderer : FindRenderer(kDefaultRenderer);
+      for (const SphereClass sphere : {SphereClass::kHollow, SphereClass::kFilled}) volumes.push_back(StandardSphere(sphere, size, kind));
+      if (!context.quick() || !named.empty()) std::ranges::move(RealVolumes(named), std::back_inserter(volumes));
+    } else {
+      std::ranges::move(NamedVolumes("VOLUME", named), std::back_inserter(volumes));
+    }
+    for (std::size_t i = begin; i < volumes.size(); ++i) {
+      if (renderer != nullptr) volumes[i].renderer = renderer;
+      if (!own.transfers.empty()) volumes[i].transfer = own.transfers.front();
+    }
+  };
+  if (own.renderers.empty()) add_with(nullptr);
+  for (const RendererKind* renderer : own.renderers) add_with(renderer);
+  return volumes;
 }
 
-Policy WithBoxes(Policy policy, std::string_view assignment) {
-  policy.groups = kBoxesAWorker;
+Policy Combined(Policy policy, std::string_view combine, int groups = 1, std::string_view assignment = "cyclic") {
+  policy.combine = combine;
+  policy.groups = groups;
   policy.assignment = assignment;
   return policy;
 }
 
-std::vector<NamedPolicy> MovingPolicies() {
-  std::vector<NamedPolicy> policies;
-  for (const NamedPolicy& named : {EqualSlabs(), BalancedTree()}) {
-    for (const NamedChoice& balance : BalanceModes()) {
-      policies.push_back({fmt::format("{}, {}", named.name, balance.name), named.policy});
-      policies.back().policy.balance = balance.name;
+Balance BalanceOf(const ExperimentContext& context) {
+  const OwnOptions& own = context.options().own;
+  Balance balance{.volumes = VolumesOf(context), .pixels = context.Scaled(512), .steps = context.quick() ? 4 : 8};
+  balance.workers = !own.workers.empty() ? own.workers : context.quick() ? std::vector{2, 16} : std::vector{2, 16, 64};
+  std::ranges::sort(balance.workers);
+  const std::size_t standard = context.quick() ? 1 : 2;
+  for (const ViewMotion& motion : ViewMotions()) {
+    const bool wanted =
+        own.views.empty() ? balance.motions.size() < standard : std::ranges::find(own.views, motion.name) != own.views.end();
+    if (wanted) balance.motions.push_back(&motion);
+  }
+  if (!own.transfers.empty()) balance.later = own.transfers.back();
+  for (const NamedPolicy& named : {EqualSlabs(), BalancedSlabs(), BalancedTree()}) {
+    for (const NamedChoice& mode : BalanceModes()) {
+      balance.moving.push_back(Combined(named.policy, kCombine));
+      balance.moving.back().balance = mode.name;
     }
   }
+  return balance;
+}
+
+// Boxes by occupied voxels are cut for their owners, so that the assignment has little left to do.
+std::vector<NamedPolicy> PartitionsByVoxels() {
+  std::vector<NamedPolicy> policies = AllPartitions();
+  std::erase_if(policies, [](const NamedPolicy& named) { return named.policy.load_metric != "voxels"; });
   return policies;
 }
 
-FrameCase MovingFrame(const Balance& balance, const BenchCase& volume, const NamedPolicy& moving) {
-  FrameCase first = balance.Frame(volume, moving.policy, kTableWorkers);
-  first.view = BenchView(Projection::kOrthographic, 0, kMovingFrames);
-  return first;
+Policy Automatic() {
+  Policy policy;
+  policy.decomposition = policy.load_metric = policy.assignment = policy.combine = kAutomatic;
+  return policy;
 }
-
-int MovingFrames(const ExperimentContext& context) { return context.quick() ? 6 : kMovingFrames; }
 
 std::vector<Trial> TrialsOf(ExperimentContext& context, const Balance& balance) {
   std::vector<Trial> trials = {HostTrial()};
   for (const BenchCase& volume : balance.volumes) {
+    const auto add_boxes = [&](const Policy& policy, int p) { trials.push_back(BoxCostTrial(context, balance.Frame(volume, policy, p))); };
+    trials.push_back(FinishTrial(context, balance.Frame(volume, {}, 1)));
+    add_boxes(Combined(EqualSlabs().policy, kCombine), 1);
     for (const NamedPolicy& named : AllPartitions()) {
-      trials.push_back(FinishTrial(context, balance.Frame(volume, named.policy, 1)));
-      for (const int p : balance.workers) trials.push_back(BoxCostTrial(context, balance.Frame(volume, named.policy, p)));
-      trials.push_back(BoxCostTrial(context, balance.Frame(volume, named.policy, kTableWorkers)));
-      for (const AssignmentEntry& assignment : Assignments()) {
-        trials.push_back(BoxCostTrial(context, balance.Frame(volume, WithBoxes(named.policy, assignment.name), kTableWorkers)));
+      for (const int p : balance.workers) {
+        for (const int groups : kGroups) add_boxes(Combined(named.policy, kCombine, groups), p);
       }
     }
-    for (const NamedPolicy& moving : MovingPolicies()) {
-      trials.push_back(MovingTrial(context, MovingFrame(balance, volume, moving), MovingFrames(context)));
+    for (const NamedPolicy& named : PartitionsByVoxels()) {
+      for (const AssignmentEntry& assignment : Assignments())
+        add_boxes(Combined(named.policy, kCombine, kBoxesAWorker, assignment.name), balance.TableWorkers());
     }
+    for (const int p : balance.workers) {
+      for (const std::string_view link : kLinks)
+        trials.push_back(BoxCostTrial(context, WithChosenPolicy(context, balance.Frame(volume, Automatic(), p), Link(link))));
+      for (const ViewMotion* motion : balance.motions) {
+        for (const Policy& policy : balance.moving) {
+          const ViewSequence sequence = balance.Sequence(volume, policy, p, *motion);
+          for (int step = 0; step < balance.steps; ++step) trials.push_back(FinishTrial(context, FrameOf(sequence, step)));
+          trials.push_back(SequenceTrial(context, sequence));
+        }
+      }
+    }
+    for (const Policy& policy : balance.moving)
+      trials.push_back(SequenceTrial(context, balance.Sequence(volume, policy, balance.TableWorkers(), *balance.motions.front(), true)));
   }
   return trials;
 }
 
-Table NewTable(const std::string& name, const std::string& title) {
-  return {
-      name,
-      title,
-      {"policy", "p", "boxes", "imbalance", "idle (%)", "frame (ms)", "picture to picture (ms)", "image bytes (MB)", "voxels to send (MB)"},
-      {}};
+Json CaseOf(std::string_view part, const FrameCase& frame, std::string_view link = "") {
+  Json of = {{"part", part}};
+  of.update(ColumnsOf(frame));
+  if (link.empty()) {
+    of.erase("combine");  // what is measured does not depend on it
+  } else {
+    of["link"] = link;
+  }
+  return of;
 }
 
-struct Outcome {
-  FrameFigures figures;
-  double imbalance = 1;
-};
+Estimate Exact(double value) { return {value, value, value, 1, 0}; }
 
-Outcome AddRow(ExperimentContext& context, const FrameCase& frame, const std::string& name, Table& table) {
-  const MeasuredFrame measured = Recall(context, frame);
-  const FrameFigures figures = FindFigures(measured, Cluster(context, Link(kLink)));
-  double boxes = 0, bytes = 0;
-  for (const MeasuredFrame::Cost& box : measured.boxes) {
-    boxes += box.seconds > 0 ? 1 : 0;
-    bytes += box.voxel_bytes;
+// What boxes alone tell.
+void AddBoxFigures(Results& results, const Json& of, const std::vector<MeasuredFrame>& repeats) {
+  std::vector<double> imbalance, sum, longest;
+  for (const MeasuredFrame& frame : repeats) {
+    const std::vector<double> seconds = frame.WorkerSeconds();
+    imbalance.push_back(Imbalance(seconds));
+    sum.push_back(frame.RenderSeconds());
+    longest.push_back(*std::ranges::max_element(seconds));
   }
-  const Outcome outcome{figures, Imbalance(measured.WorkerSeconds())};
-  table.rows.push_back({name, Chosen(frame.workers), Chosen(boxes), Measured(outcome.imbalance), Simulated(figures.idle_share * 100),
-                        Simulated(figures.latency_seconds * 1e3), Simulated(figures.steady_seconds * 1e3),
-                        Simulated(figures.image_bytes * 1e-6), Measured(bytes * 1e-6)});
-  return outcome;
+  results.Add(of, "imbalance", MedianOf(std::move(imbalance)), Origin::kMeasured);
+  results.Add(of, "render_time", MedianOf(std::move(sum)), Origin::kMeasured);
+  results.Add(of, "longest_render_time", MedianOf(std::move(longest)), Origin::kMeasured);
+  results.Add(of, "memory", Exact(repeats.front().MostVoxelBytes()), Origin::kMeasured);
 }
 
-// "boxes of equal ..."
-std::string SplitWords(const std::string& split) { return split == "occupied" ? "occupied voxels" : split; }
+// Latencies of one frame, by link and repeat.
+using Latencies = std::vector<std::vector<double>>;
 
-// Partitions over workers.
-Section PartitionSection(ExperimentContext& context, const Balance& balance, const BenchCase& volume) {
-  const std::string title = TitleOf(volume);
-  Table table = NewTable("partitions-" + volume.dataset, fmt::format("{}: one box a worker", title));
-  // One chart for each split: a chart with more lines than the palette has colours would be unreadable.
-  std::map<std::string, LineChart> imbalance, times;
-  std::map<std::string, double> at_table;
-  for (const NamedPolicy& named : AllPartitions()) {
-    const std::string& split = named.policy.load_metric;
-    LineSeries even{named.policy.decomposition, Origin::kMeasured, {}}, time{named.policy.decomposition, Origin::kSimulated, {}};
-    for (const int p : balance.workers) {
-      const Outcome outcome = AddRow(context, balance.Frame(volume, named.policy, p), named.name, table);
-      even.points.push_back({double(p), outcome.imbalance});
-      time.points.push_back({double(p), outcome.figures.steady_seconds * 1e3});
-      if (p == kTableWorkers) at_table[named.name] = outcome.imbalance;
-    }
-    const AxisSpec workers = WorkersAxis();
-    imbalance.try_emplace(
-        split,
-        LineChart{
-            fmt::format("{}: imbalance, boxes of equal {}", title, SplitWords(split)), workers, {"most / mean", "", AxisScale::kLog}, {}});
-    times.try_emplace(split, LineChart{fmt::format("{}: picture to picture, boxes of equal {}", title, SplitWords(split)),
-                                       workers,
-                                       {"time", "ms", AxisScale::kLog},
-                                       {}});
-    imbalance.at(split).series.push_back(std::move(even));
-    times.at(split).series.push_back(std::move(time));
+Latencies AddLatency(ExperimentContext& context, Results& results, std::string_view part, const FrameCase& frame,
+                     std::span<const std::string_view> links) {
+  const std::vector<MeasuredFrame> repeats = RecallRepeats(context, frame);
+  Latencies latencies;
+  for (const std::string_view link : links) {
+    const std::vector<MachineModel> machines = Clusters(context, Link(link));
+    std::vector<double>& seconds = latencies.emplace_back();
+    for (std::size_t i = 0; i < std::min(repeats.size(), machines.size()); ++i)
+      seconds.push_back(Simulate(repeats[i], machines[i]).frames.front().latency());
+    results.Add(CaseOf(part, frame, link), "latency", MedianOf(seconds), Origin::kSimulated);
   }
-  const auto best = std::ranges::min_element(at_table, {}, [](const auto& entry) { return entry.second; });
-  Section section;
-  section.title = "Partitions: " + title;
-  section.question = "Which partition gives workers equal work?";
-  section.method = fmt::format(
-      "{0} x {0} pixels, one box a worker. Every box is rendered alone on one thread; imbalance is the longest of the workers' render "
-      "times over their mean. "
-      "Frames are simulated on a switched network of 10 Gbit/s with all that a service does around a frame.",
-      balance.pixels);
-  section.answer =
-      fmt::format("At p = {} equal slabs have an imbalance of {:.2f}, the kd-tree by occupied voxels {:.2f}; the best is {} with {:.2f}.",
-                  kTableWorkers, at_table[EqualSlabs().name], at_table[BalancedTree().name], best->first, best->second);
-  for (const auto& [split, chart] : imbalance) {
-    section.blocks.emplace_back(Figure{fmt::format("imbalance-{}-{}", volume.dataset, split), DrawLines(chart),
-                                       "Render times of workers; 1 is perfect. Workers whose box shows nothing count with no time."});
-  }
-  for (const auto& [split, chart] : times) {
-    section.blocks.emplace_back(Figure{fmt::format("time-{}-{}", volume.dataset, split), DrawLines(chart),
-                                       "As many frames asked for ahead as keep all workers busy."});
-  }
-  for (const NamedPolicy& named : {EqualSlabs(), BalancedTree()}) {
-    const MeasuredFrame measured = Recall(context, balance.Frame(volume, named.policy, kTableWorkers));
-    section.blocks.emplace_back(BoxCostFigure(fmt::format("boxes-{}-{}", volume.dataset, Slug(named.name)),
-                                              fmt::format("{}, p = {}: {}", title, kTableWorkers, named.name), measured,
-                                              "Render time of every box that the cut meets."));
-  }
-  section.blocks.emplace_back(std::move(table));
-  return section;
+  return latencies;
 }
 
-// Assignments, where workers have several boxes.
-Section AssignmentSection(ExperimentContext& context, const Balance& balance) {
-  Section section;
-  section.title = "Assignments";
-  section.question = fmt::format("With {} boxes a worker, who should own which?", kBoxesAWorker);
-  section.method = fmt::format(
-      "p = {}, {} groups. greedy gives the costliest box that is left to the worker that has least, by occupied voxels; what boxes really "
-      "take is measured.",
-      kTableWorkers, kBoxesAWorker);
-  std::string sentence;
-  for (const BenchCase& volume : balance.volumes) {
-    Table table = NewTable("assignments-" + volume.dataset, fmt::format("{}: {} boxes a worker", TitleOf(volume), kBoxesAWorker));
-    BarChart chart{TitleOf(volume) + ": imbalance by assignment", "partition", {"most / mean", ""}, {}, {}};
-    std::pair<double, std::string> best{std::numeric_limits<double>::infinity(), ""};
+// Compared repeat by repeat, because the repeats of both were simulated on the same machines: what differs from machine to machine affects
+// both.
+void AddSpeed(Results& results, Json of, std::string_view against, const std::vector<double>& reference,
+              const std::vector<double>& seconds) {
+  std::vector<double> speeds;
+  for (std::size_t i = 0; i < std::min(reference.size(), seconds.size()); ++i) speeds.push_back(reference[i] / seconds[i]);
+  of["variant"] = against;
+  results.Add(of, "speed", MedianOf(std::move(speeds)), Origin::kSimulated);
+}
+
+// Every partition under every scheme, and what `auto` takes.
+void AddPolicies(ExperimentContext& context, const Balance& balance, const BenchCase& volume, Results& results) {
+  const FrameCase whole = balance.Frame(volume, Combined(EqualSlabs().policy, kCombine), 1);
+  AddBoxFigures(results, CaseOf("partition", whole), RecallRepeats(context, whole));
+  AddLatency(context, results, "policy", whole, kLinks);
+  for (const int p : balance.workers) {
+    std::array<std::vector<double>, kLinks.size()> best;  // latencies of the policy whose median is least
+    const auto consider = [&best](std::size_t link, const std::vector<double>& seconds) {
+      if (best[link].empty() || MedianOf(seconds).median < MedianOf(best[link]).median) best[link] = seconds;
+    };
     for (const NamedPolicy& named : AllPartitions()) {
-      BarGroup group{named.name, {}};
-      for (const AssignmentEntry& assignment : Assignments()) {
-        const std::string name = fmt::format("{}, {}", named.name, assignment.name);
-        const Outcome outcome =
-            AddRow(context, balance.Frame(volume, WithBoxes(named.policy, assignment.name), kTableWorkers), name, table);
-        group.bars.push_back({std::string(assignment.name), Origin::kMeasured, {outcome.imbalance}});
-        best = std::min(best, {outcome.imbalance, name});
+      if (p == 1) break;
+      const FrameCase boxes = balance.Frame(volume, Combined(named.policy, kCombine), p);
+      AddBoxFigures(results, CaseOf("partition", boxes), RecallRepeats(context, boxes));
+      for (const int groups : kGroups) {
+        for (const std::string_view scheme : kSchemes) {
+          const FrameCase frame = balance.Frame(volume, Combined(named.policy, scheme, groups), p);
+          const Latencies latencies = AddLatency(context, results, "policy", frame, kLinks);
+          for (std::size_t link = 0; link < kLinks.size(); ++link) consider(link, latencies[link]);
+        }
       }
-      chart.groups.push_back(std::move(group));
     }
-    sentence += fmt::format("{}{}: {} ({:.2f})", sentence.empty() ? "" : "; ", TitleOf(volume), best.second, best.first);
-    section.blocks.emplace_back(Figure{"assignments-" + volume.dataset, DrawBars(chart), "1 is perfect."});
-    section.blocks.emplace_back(std::move(table));
+    for (std::size_t link = 0; link < kLinks.size(); ++link) {
+      if (p == 1) break;
+      const FrameCase chosen = WithChosenPolicy(context, balance.Frame(volume, Automatic(), p), Link(kLinks[link]));
+      const std::vector<double> seconds = AddLatency(context, results, "auto", chosen, std::span(&kLinks[link], 1)).front();
+      consider(link, seconds);
+      AddSpeed(results, CaseOf("auto", chosen, kLinks[link]), "best policy", best[link], seconds);
+    }
   }
-  section.answer = "Most even, " + sentence + ".";
-  return section;
 }
 
-// A moving view, static and dynamic.
-Section MovingSection(ExperimentContext& context, const Balance& balance) {
-  Section section;
-  section.title = "Static and dynamic balance under a moving view";
-  section.question = "Does learning from earlier frames keep workers even while the view turns, and what does it move?";
-  section.method = fmt::format(
-      "p = {}, a turn of {} frames, of which {} are rendered box by box. dynamic: what boxes took is learnt, and boxes are cut anew or "
-      "handed over between frames where the coordinator finds that it pays; the voxels that then change owner are counted.",
-      kTableWorkers, kMovingFrames, MovingFrames(context));
-  Table table{"moving-view", "A moving view", {"volume", "policy", "frame", "imbalance", "slowest worker (ms)", "voxels moved (MB)"}, {}};
-  std::string sentence;
-  for (const BenchCase& volume : balance.volumes) {
-    LineChart chart{TitleOf(volume) + ": imbalance, frame by frame", {"frame", ""}, {"most / mean", ""}, {}};
-    for (const NamedPolicy& moving : MovingPolicies()) {
-      const Json key = MovingKey(context, MovingFrame(balance, volume, moving), MovingFrames(context));
-      const std::vector<const Json*> repeats = context.log().All(key);
-      const std::vector<Estimate> imbalance = EstimatesOf(repeats, "imbalance"), slowest = EstimatesOf(repeats, "slowest_ms");
-      const std::vector<double> moved = MediansOf(repeats, "moved_bytes");
-      LineSeries series{moving.name, Origin::kMeasured, {}};
-      for (std::size_t i = 0; i < imbalance.size(); ++i) {
-        series.points.push_back({double(i + 1), imbalance[i].median, imbalance[i].low, imbalance[i].high});
-        table.rows.push_back(
-            {TitleOf(volume), moving.name, Chosen(double(i + 1)), Measured(imbalance[i]), Measured(slowest[i]), Measured(moved[i] * 1e-6)});
-      }
-      chart.series.push_back(std::move(series));
-      if (moving.name != "kd-tree by occupied, dynamic") continue;
-      const std::size_t sixth = std::min<std::size_t>(5, imbalance.size() - 1);
-      sentence += fmt::format("{}{} {:.2f} after {} frames, {:.1f} MB moved in all", sentence.empty() ? "" : "; ", TitleOf(volume),
-                              imbalance[sixth].median, sixth, std::accumulate(moved.begin(), moved.end(), 0.0) * 1e-6);
+// What the planner expects boxes to take before it has seen a frame, beside what they take.
+void AddBoxes(ExperimentContext& context, const Balance& balance, const BenchCase& volume, Results& results) {
+  for (const NamedPolicy& named : {EqualSlabs(), BalancedTree()}) {
+    const FrameCase frame = balance.Frame(volume, Combined(named.policy, kCombine), balance.TableWorkers());
+    const std::vector<MeasuredFrame> repeats = RecallRepeats(context, frame);
+    const FramePlan& plan = repeats.front().plan;
+    const LayoutKnowledge known = KnowLayout(context, frame);
+    const BoxEstimator estimator(plan.setup, *known.volume.summary, *known.occupied, nullptr, 1);
+    for (const Placement& placement : PlacementsOf(plan)) {
+      Json of = CaseOf("box", frame);
+      of["box"] = placement.id;
+      std::vector<double> seconds;
+      for (const MeasuredFrame& repeat : repeats) seconds.push_back(repeat.boxes[placement.id].seconds);
+      results.Add(of, "box_time", MedianOf(std::move(seconds)), Origin::kMeasured);
+      results.Add(of, "estimated_box_time", Exact(estimator.Of(placement.box).seconds), Origin::kSimulated);
     }
-    section.blocks.emplace_back(Figure{"moving-" + volume.dataset, DrawLines(chart), "Medians over repeats, frame by frame."});
+    AttachBoxes(results, fmt::format("boxes-{}-{}-{}", volume.dataset, volume.renderer->name(), named.policy.decomposition),
+                Recall(context, frame));
   }
-  section.answer = "The kd-tree with dynamic balance: " + sentence + ".";
-  section.blocks.emplace_back(std::move(table));
-  return section;
+}
+
+void AddAssignments(ExperimentContext& context, const Balance& balance, const BenchCase& volume, Results& results) {
+  for (const NamedPolicy& named : PartitionsByVoxels()) {
+    for (const AssignmentEntry& assignment : Assignments()) {
+      const FrameCase frame =
+          balance.Frame(volume, Combined(named.policy, kCombine, kBoxesAWorker, assignment.name), balance.TableWorkers());
+      AddBoxFigures(results, CaseOf("assignment", frame), RecallRepeats(context, frame));
+    }
+  }
+}
+
+// Each step, and without `step` the mean over the steps. Returns the mean latencies by repeat.
+std::vector<double> AddSequence(ExperimentContext& context, const ViewSequence& sequence, std::string_view part, Results& results) {
+  struct Figure {
+    const char* metric;
+    std::vector<std::vector<double>> values;  // by step and repeat
+    std::vector<double> means;                // by repeat
+  };
+  const std::vector<MachineModel> machines = Clusters(context, Link(kLinks.front()));
+  std::vector<Figure> figures = {{"latency", {}, {}}, {"imbalance", {}, {}}, {"voxel_bytes", {}, {}}};
+  for (Figure& figure : figures) figure.values.resize(std::size_t(sequence.steps));
+  const std::vector<SequenceFrames> repeats = RecallSequence(context, sequence);
+  for (std::size_t repeat = 0; repeat < std::min(repeats.size(), machines.size()); ++repeat) {
+    std::array<double, 3> sums{};
+    for (std::size_t step = 0; step < repeats[repeat].size(); ++step) {
+      const MeasuredFrame& frame = repeats[repeat][step];
+      const double fetched = std::transform_reduce(frame.boxes.begin(), frame.boxes.end(), 0.0, std::plus(),
+                                                   [](const MeasuredFrame::Cost& box) { return box.fetched_bytes; });
+      const std::array<double, 3> found = {Simulate(frame, machines[repeat]).frames.front().latency(), Imbalance(frame.WorkerSeconds()),
+                                           fetched};
+      for (std::size_t i = 0; i < figures.size(); ++i) {
+        figures[i].values[step].push_back(found[i]);
+        sums[i] += found[i];
+      }
+    }
+    for (std::size_t i = 0; i < figures.size(); ++i) figures[i].means.push_back(sums[i] / sequence.steps);
+  }
+  Json of = CaseOf(part, sequence.frame, kLinks.front());
+  of["view"] = sequence.motion->name;
+  for (const Figure& figure : figures) {
+    const Origin origin = figure.metric == std::string_view("latency") ? Origin::kSimulated : Origin::kMeasured;
+    results.Add(of, figure.metric, MedianOf(figure.means), origin);
+    for (std::size_t step = 0; step < figure.values.size(); ++step) {
+      Json at = of;
+      at["step"] = step;
+      results.Add(at, figure.metric, MedianOf(figure.values[step]), origin);
+    }
+  }
+  return figures.front().means;
+}
+
+// Every method under the same views. The first one is equal slabs with static balance, and each dynamic one follows its static one.
+void AddSequences(ExperimentContext& context, const Balance& balance, const BenchCase& volume, int p, const ViewMotion& motion, bool slowed,
+                  Results& results) {
+  const std::string_view part = slowed ? "slowed" : "sequence";
+  std::vector<double> slabs, before;
+  for (const Policy& policy : balance.moving) {
+    const ViewSequence sequence = balance.Sequence(volume, policy, p, motion, slowed);
+    std::vector<double> seconds = AddSequence(context, sequence, part, results);
+    if (slabs.empty()) slabs = seconds;
+    Json of = CaseOf(part, sequence.frame, kLinks.front());
+    of["view"] = motion.name;
+    AddSpeed(results, of, "equal slabs", slabs, seconds);
+    if (IsDynamic(sequence.frame)) AddSpeed(results, of, "static", before, seconds);
+    before = std::move(seconds);
+  }
 }
 
 }  // namespace
 
-Report RunBalance(ExperimentContext& context) {
+void DeclareBalance(CLI::App& app, OwnOptions& options) {
+  app.add_option("VOLUME", options.cases,
+                 "Volumes instead of the standard ones: FILE, FILE:TRANSFER or a case of `slabstream bench --list`, such as class1-256");
+  AddParsedList(
+      app, "--workers", options.workers,
+      [](const std::string& option, const std::string& text) { return ParseInteger(option, text, 1, kMostWorkers); },
+      "Numbers of workers (default: 2,16,64; with --quick 2,16)");
+  AddParsedList(
+      app, "--renderer", options.renderers,
+      [](const std::string& option, const std::string& text) -> Result<const RendererKind*> {
+        const Result<std::size_t> index = ParseChoice(option, text, RendererNames());
+        if (!index.ok()) return index.status();
+        return Renderers()[*index];
+      },
+      "How voxels become a picture; every volume is rendered by each (default: splat)");
+  std::vector<std::string_view> names;
+  for (const ViewMotion& motion : ViewMotions()) names.push_back(motion.name);
+  AddParsedList(app, "--views", options.views, OneOf(names),
+                "Sequences of views (default: turntable,zoom-in; with --quick turntable)" + Explained(ViewMotions()));
+  AddParsedList(
+      app, "--transfer", options.transfers,
+      [](const std::string& option, const std::string& text) -> Result<TransferChoice> {
+        auto parsed = ParseTransfer(option, text);
+        if (!parsed.ok()) return parsed.status();
+        return TransferChoice{*std::move(parsed)};
+      },
+      "Two transfer functions, as for `slabstream render`: in the middle of each sequence the first gives way to the second")
+      ->type_name("A,B");
+}
+
+void CheckBalance(const ExperimentOptions& options) {
+  const std::size_t transfers = options.own.transfers.size();
+  if (transfers != 0 && transfers != 2)
+    throw Failure(
+        Status::InvalidArgument(fmt::format("--transfer needs two transfer functions that differ, A,B; {} was given", transfers)));
+}
+
+void RunBalance(ExperimentContext& context, Results& results) {
   const Balance balance = BalanceOf(context);
   context.Run(TrialsOf(context, balance), kRepeats, kQuickRepeats);
-  Report report;
-  report.title = "Balance: partitions, assignments and learning";
-  report.summary =
-      "Sparse volumes give equal slabs very unequal work. Every partition, divided by voxels and by occupied voxels, every assignment, and "
-      "boxes that change while the view moves: who is idle, what travels, how long a frame takes.";
   for (const BenchCase& volume : balance.volumes) {
-    report.sections.push_back(PartitionSection(context, balance, volume));
+    AddPolicies(context, balance, volume, results);
+    AddBoxes(context, balance, volume, results);
+    AddAssignments(context, balance, volume, results);
+    for (const ViewMotion* motion : balance.motions) {
+      for (const int p : balance.workers) AddSequences(context, balance, volume, p, *motion, false, results);
+    }
+    AddSequences(context, balance, volume, balance.TableWorkers(), *balance.motions.front(), true, results);
   }
-  report.sections.push_back(AssignmentSection(context, balance));
-  report.sections.push_back(MovingSection(context, balance));
-  return report;
 }
 
 }  // namespace slabstream

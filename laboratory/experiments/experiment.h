@@ -9,11 +9,27 @@
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/frame/frame_request.h"
 #include "laboratory/experiments/trials.h"
 #include "laboratory/experiments/volumes.h"
-#include "laboratory/report/document.h"
+#include "laboratory/results/results.h"
+
+namespace CLI {
+class App;
+}
 
 namespace slabstream {
+
+// What an experiment lets the user choose besides the options of all. Empty: its own choice. An experiment that does not offer an option
+// (Experiment::declare) leaves it empty.
+struct OwnOptions {
+  std::vector<std::string> cases;  // volumes instead of the standard ones, as ParseBenchCase takes them
+  std::vector<int> workers;        // numbers of workers
+  std::vector<const RendererKind*> renderers;
+  std::vector<std::string> views;         // sequences of views
+  std::vector<int> footprints;            // diameters of footprints, pixels
+  std::vector<TransferChoice> transfers;  // two: the transfer function changes from one to the other in the middle of a sequence
+};
 
 struct ExperimentOptions {
   std::string name;
@@ -27,6 +43,7 @@ struct ExperimentOptions {
   std::vector<std::string> volumes;  // FILE[:TRANSFER], beside or instead of the standard ones
   bool list = false;
   std::string command;  // as it was typed
+  OwnOptions own;
 };
 inline constexpr int kMaxRepeats = 1000, kLeastScaledSide = 8;
 inline constexpr double kMinScale = 0.05;
@@ -46,6 +63,7 @@ class ExperimentContext {
   void Run(std::vector<Trial> trials, int repeats, int quick_repeats);
   const TrialLog& log() const { return log_; }
   int repeats() const { return repeats_; }  // of the last Run
+  bool interrupted() const { return interrupted_ && interrupted_(); }
 
  private:
   ExperimentOptions options_;
@@ -58,7 +76,8 @@ class ExperimentContext {
 struct Experiment {
   std::string_view name;
   std::string_view purpose;  // one line for --list
-  Report (*run)(ExperimentContext&);
+  void (*run)(ExperimentContext&, Results&);
+  void (*declare)(CLI::App&, OwnOptions&) = nullptr;  // adds the options that it alone has; null: none
   // Checks the options before a folder is made; null: the checks common to all experiments suffice.
   void (*check)(const ExperimentOptions&) = nullptr;
   bool takes_file = false;  // ExperimentOptions::sweep_file
@@ -67,12 +86,15 @@ struct Experiment {
 // The only list.
 const std::vector<Experiment>& Experiments();
 
-Report RunPaper(ExperimentContext& context);
-Report RunBalance(ExperimentContext& context);
-Report RunCombining(ExperimentContext& context);
-Report RunStreaming(ExperimentContext& context);
-Report RunScaling(ExperimentContext& context);
-Report RunSweep(ExperimentContext& context);
+void RunPaper(ExperimentContext& context, Results& results);
+void DeclarePaper(CLI::App& app, OwnOptions& options);
+void RunBalance(ExperimentContext& context, Results& results);
+void CheckBalance(const ExperimentOptions& options);
+void DeclareBalance(CLI::App& app, OwnOptions& options);
+void RunCombining(ExperimentContext& context, Results& results);
+void RunStreaming(ExperimentContext& context, Results& results);
+void RunScaling(ExperimentContext& context, Results& results);
+void RunSweep(ExperimentContext& context, Results& results);
 void CheckSweepFile(const ExperimentOptions& options);
 
 }  // namespace slabstream

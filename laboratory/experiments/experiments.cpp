@@ -4,13 +4,14 @@ namespace slabstream {
 
 const std::vector<Experiment>& Experiments() {
   static const std::vector<Experiment> experiments = {
-      {"paper", "every table and figure of Yagel and Machiraju, theirs beside ours", RunPaper},
-      {"balance", "partitions, splits and assignments: who is idle, what travels, how long a frame takes, 2 to 1024 workers", RunBalance},
+      {"paper", "every table and figure of Yagel and Machiraju, theirs beside ours", RunPaper, DeclarePaper},
+      {"balance", "load balance of sparse volumes: partitions, views that move, a slow worker, and how good `auto` is", RunBalance,
+       DeclareBalance, CheckBalance},
       {"combining", "combining schemes over picture sizes, active pixels, workers and links", RunCombining},
       {"streaming", "groups against efficiency, memory of a worker and the time to the first preview", RunStreaming},
       {"scaling", "strong and weak scaling of both pipelines", RunScaling},
-      {"sweep", "your own: volumes, views, policies and workers named by a FILE.json (docs/experiments.md)", RunSweep, CheckSweepFile,
-       true},
+      {"sweep", "your own: volumes, views, policies and workers named by a FILE.json (docs/experiments.md)", RunSweep, nullptr,
+       CheckSweepFile, true},
   };
   return experiments;
 }

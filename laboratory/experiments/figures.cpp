@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "laboratory/experiments/balanced_case.h"
+#include "laboratory/experiments/machines.h"
 
 namespace slabstream {
 
@@ -17,13 +18,27 @@ FrameFigures FindFigures(const MeasuredFrame& frame, const MachineModel& machine
           .image_bytes = first.image_bytes};
 }
 
-FrameFigures RecallFigures(ExperimentContext& context, const FrameCase& frame, const MachineModel& machine, double FrameFigures::*by,
-                           int teams) {
-  if (!IsDynamic(frame)) return FindFigures(Recall(context, frame), machine, teams);
+std::vector<FrameFigures> RecallFigures(ExperimentContext& context, const FrameCase& frame, const LinkModel& link, int teams) {
+  const std::vector<MachineModel> machines = Clusters(context, link);
+  const std::vector<MeasuredFrame> frames = IsDynamic(frame) ? RecallBalanced(context, frame) : RecallRepeats(context, frame);
   std::vector<FrameFigures> repeats;
-  for (const MeasuredFrame& repeat : RecallBalanced(context, frame)) repeats.push_back(FindFigures(repeat, machine, teams));
-  std::ranges::sort(repeats, {}, by);
-  return repeats[repeats.size() / 2];
+  for (std::size_t i = 0; i < std::min(frames.size(), machines.size()); ++i) repeats.push_back(FindFigures(frames[i], machines[i], teams));
+  return repeats;
+}
+
+void AddFigures(Results& results, const Json& of, const std::vector<FrameFigures>& repeats) {
+  struct Field {
+    const char* metric;
+    double FrameFigures::*figure;
+  };
+  constexpr Field kFields[] = {{"latency", &FrameFigures::latency_seconds}, {"preview", &FrameFigures::preview_seconds},
+                               {"period", &FrameFigures::steady_seconds},   {"imbalance", &FrameFigures::imbalance},
+                               {"idle_share", &FrameFigures::idle_share},   {"image_bytes", &FrameFigures::image_bytes}};
+  for (const Field& field : kFields) {
+    std::vector<double> values;
+    for (const FrameFigures& repeat : repeats) values.push_back(repeat.*field.figure);
+    results.Add(of, field.metric, MedianOf(std::move(values)), Origin::kSimulated);
+  }
 }
 
 }  // namespace slabstream

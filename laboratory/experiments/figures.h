@@ -1,7 +1,10 @@
 // FrameFigures: the figures by which ways to render are compared, from one simulated run.
 #pragma once
 
+#include <vector>
+
 #include "laboratory/experiments/frame_case.h"
+#include "laboratory/results/results.h"
 
 namespace slabstream {
 
@@ -17,9 +20,11 @@ struct FrameFigures {
 // `teams` of the size of the frame's take frames in turn.
 FrameFigures FindFigures(const MeasuredFrame& frame, const MachineModel& machine, int teams = 1);
 
-// The same of a frame whose CostTrial and FinishTrial were run. With dynamic balance every repeat has its own boxes: the repeat with the
-// median of `by` counts.
-FrameFigures RecallFigures(ExperimentContext& context, const FrameCase& frame, const MachineModel& machine, double FrameFigures::*by,
-                           int teams = 1);
+// The same for every repeat of a frame whose CostTrial and FinishTrial were run: repeat i of the boxes on repeat i of the machine
+// (Clusters).
+std::vector<FrameFigures> RecallFigures(ExperimentContext& context, const FrameCase& frame, const LinkModel& link, int teams = 1);
+
+// Adds each figure as a metric: latency, preview, period, imbalance, idle_share, image_bytes.
+void AddFigures(Results& results, const Json& of, const std::vector<FrameFigures>& repeats);
 
 }  // namespace slabstream

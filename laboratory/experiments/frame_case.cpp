@@ -25,7 +25,7 @@
 namespace slabstream {
 namespace {
 
-constexpr int kRenderings = 2;  // rounds of box costs; of two, the lower one counts as the median
+constexpr int kRenderings = 2;  // rounds of box costs
 constexpr int kWarmUpFrames = 2, kFinishes = 3;
 constexpr int kLearningFrames = 8;  // to warm up with dynamic balance
 constexpr DatasetId kPlannedDataset = 1;
@@ -71,11 +71,48 @@ const RendererKind* ZBuffer() { return FindRenderer("zbuffer"); }
 FrameRequest RequestOf(const FrameCase& frame) {
   FrameRequest request = BenchRequest(frame.volume, frame.view, frame.size);
   request.policy = frame.policy;
+  request.parameters = frame.look.parameters;
+  request.shading = frame.look.shading;
+  request.termination = frame.look.termination;
   return request;
 }
 
+namespace {
+
+std::string AnglesOf(const ViewParameters& view) {
+  const auto& [projection, azimuth, elevation, roll, zoom, fov] = view;
+  std::string name = fmt::format("{:.4g}/{:.4g}", azimuth, elevation);
+  if (roll != 0) name += fmt::format(" roll {:.4g}", roll);
+  if (zoom != 1) name += fmt::format(" zoom {:.4g}", zoom);
+  if (projection == Projection::kPerspective) name += fmt::format(" fov {:.4g}", fov);
+  return name;
+}
+
+}  // namespace
+
+Json ColumnsOf(const FrameCase& frame) {
+  const auto& [decomposition, load_metric, axis, groups, assignment, balance, combine, pixel_error, teams] = frame.policy;
+  Json columns = ColumnsOf(frame.volume);
+  columns.update(Json{{"workers", frame.workers},
+                      {"view", AnglesOf(frame.view)},
+                      {"pixels", std::min(frame.size.width, frame.size.height)},
+                      {"renderer", frame.volume.renderer->name()},
+                      {"decomposition", decomposition},
+                      {"axis", NameOf(axis)},
+                      {"split", LoadMetricOf(frame.policy)},
+                      {"assignment", assignment},
+                      {"balance", balance},
+                      {"combine", combine},
+                      {"groups", groups},
+                      {"teams", teams}});
+  return columns;
+}
+
 Json MeasureBoxes(ExperimentContext& context, const FrameCase& frame, const FramePlan& plan) {
-  const VolumeInUse volume = context.volumes().Get(frame.volume);
+  return NumbersOf(MeasureBoxCosts(*context.volumes().Get(frame.volume).volume, plan, kRenderings), plan);
+}
+
+Json NumbersOf(const std::vector<BoxCost>& costs, const FramePlan& plan) {
   Json numbers = {{"ids", Json::array()}};
   for (const char* list :
        {"seconds", "first_seconds", "occupied_voxels", "drawn_voxels", "covered_pixels", "voxel_bytes", "work", "coverage"}) {
@@ -83,7 +120,7 @@ Json MeasureBoxes(ExperimentContext& context, const FrameCase& frame, const Fram
   }
   for (int stage = 0; stage < kStageCount; ++stage) numbers["stages"][std::string(ToString(Stage(stage)))] = Json::array();
   for (const Placement& placement : PlacementsOf(plan)) numbers["ids"].push_back(placement.id);
-  for (const BoxCost& cost : MeasureBoxCosts(*volume.volume, plan, kRenderings)) {
+  for (const BoxCost& cost : costs) {
     numbers["seconds"].push_back(cost.seconds);
     numbers["first_seconds"].push_back(cost.first_seconds);
     numbers["occupied_voxels"].push_back(cost.occupied_voxels);
@@ -161,8 +198,10 @@ LayoutKnowledge KnowLayout(ExperimentContext& context, const FrameCase& frame) {
           .renderer = frame.volume.renderer};
 }
 
+ClassifiedVolume ClassifiedOf(const LayoutKnowledge& knowledge) { return {kPlannedDataset, knowledge.transfer, knowledge.renderer}; }
+
 MeasuredLayouts LayoutsOf(const LayoutKnowledge& knowledge, int workers) {
-  return {knowledge.volume.summary, knowledge.occupied, {kPlannedDataset, knowledge.transfer, knowledge.renderer}, workers};
+  return {knowledge.volume.summary, knowledge.occupied, ClassifiedOf(knowledge), workers};
 }
 
 FramePlan PlanOf(ExperimentContext& context, const FrameCase& frame) {
@@ -247,7 +286,8 @@ Trial ValidationTrial(ExperimentContext& context, const FrameCase& frame, int tu
 
 FrameInput MeasuredFrame::Input() const {
   FrameInput input{&plan, {}, finish_seconds, receive_seconds};
-  for (const Cost& box : boxes) input.boxes.push_back({box.seconds, box.coverage.share.empty() ? nullptr : &box.coverage, 0});
+  for (const Cost& box : boxes)
+    input.boxes.push_back({box.seconds, box.coverage.share.empty() ? nullptr : &box.coverage, box.fetched_bytes});
   return input;
 }
 
@@ -257,6 +297,14 @@ std::vector<double> MeasuredFrame::WorkerSeconds() const {
     for (const Placement& placement : group.placements) seconds[placement.worker - 1] += boxes[placement.id].seconds;
   }
   return seconds;
+}
+
+double MeasuredFrame::MostVoxelBytes() const {
+  std::vector<double> bytes(plan.slots);
+  for (const GroupPlan& group : plan.groups) {
+    for (const Placement& placement : group.placements) bytes[placement.worker - 1] += boxes[placement.id].voxel_bytes;
+  }
+  return *std::ranges::max_element(bytes);
 }
 
 double MeasuredFrame::RenderSeconds() const {

@@ -13,18 +13,27 @@
 #include "common/stats/report.h"
 #include "laboratory/bench/bench_cases.h"
 #include "laboratory/experiments/experiment.h"
+#include "laboratory/measure/box_costs.h"
 #include "laboratory/measure/cost_model.h"
 #include "laboratory/measure/measured_layouts.h"
 #include "simulator/simulate_frames.h"
 
 namespace slabstream {
 
+// What a request says about the look beside renderer and transfer function.
+struct Look {
+  ParameterTexts parameters;  // of the renderer
+  Shading shading;
+  double termination = kDefaultTermination;
+};
+
 struct FrameCase {
-  BenchCase volume;  // with the renderer and the look
+  BenchCase volume;  // with the renderer and the transfer function
   ImageSize size;
   ViewParameters view;
   Policy policy;
   int workers = 1;
+  Look look = {};
 };
 
 // The renderers of the paper.
@@ -32,6 +41,9 @@ const RendererKind* Splatting();
 const RendererKind* ZBuffer();
 
 FrameRequest RequestOf(const FrameCase& frame);
+
+// The columns of results that a frame fills (laboratory/results/columns.h). Those of the policy say what was asked for.
+Json ColumnsOf(const FrameCase& frame);
 
 // The keys of trials hold all that decides their numbers (frame_keys.h).
 
@@ -69,6 +81,7 @@ struct LayoutKnowledge {
   const RendererKind* renderer = nullptr;
 };
 LayoutKnowledge KnowLayout(ExperimentContext& context, const FrameCase& frame);
+ClassifiedVolume ClassifiedOf(const LayoutKnowledge& knowledge);
 MeasuredLayouts LayoutsOf(const LayoutKnowledge& knowledge, int workers);
 
 // The same frame with a resolved policy: the one that a coordinator of as many workers, one on each host, joined by `link`, would choose
@@ -81,7 +94,9 @@ struct MeasuredFrame {
   struct Cost {
     double seconds = 0;
     std::array<double, kStageCount> stage_seconds{};
-    double drawn_voxels = 0, covered_pixels = 0, voxel_bytes = 0;
+    double drawn_voxels = 0, covered_pixels = 0;
+    double voxel_bytes = 0;    // of the box and its halo
+    double fetched_bytes = 0;  // of these, those that its worker must fetch before it renders
     WorkUnits work{};
     CoverageMap coverage;
   };
@@ -90,6 +105,7 @@ struct MeasuredFrame {
 
   FrameInput Input() const;                   // for SimulateFrames, valid as long as this lives
   std::vector<double> WorkerSeconds() const;  // render time of each worker, including workers without a box
+  double MostVoxelBytes() const;              // voxels, with halos, of the worker that holds most
   double RenderSeconds() const;               // of all
   double StageSeconds(Stage stage) const;     // of all
 };
@@ -100,6 +116,7 @@ std::vector<MeasuredFrame> RecallRepeats(ExperimentContext& context, const Frame
 
 // The numbers of a BoxCostTrial for a plan of the frame, and the plan with such numbers.
 Json MeasureBoxes(ExperimentContext& context, const FrameCase& frame, const FramePlan& plan);
+Json NumbersOf(const std::vector<BoxCost>& costs, const FramePlan& plan);
 MeasuredFrame WithBoxCosts(ExperimentContext& context, const FrameCase& frame, FramePlan plan, const std::vector<const Json*>& repeats);
 
 // Pretends that every image fills the whole frame, as the paper's did: no empty pixel is left out.

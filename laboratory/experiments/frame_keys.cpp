@@ -25,7 +25,7 @@ void LeaveOutCombining(KeyedFrame& keyed) {
 
 Json CaseJson(ExperimentContext& context, const FrameCase& frame) {
   // All fields are named: if there is one more, this does not compile. RequestOf takes those that are not mentioned below.
-  const auto& [volume, size, view, policy, workers] = frame;
+  const auto& [volume, size, view, policy, workers, look] = frame;
   const auto& [name, purpose, dataset, source, renderer, transfer, opacity] = volume;
   Json json = {{"look", name}, {"volume", context.volumes().Identity(volume)}};
   if (opacity) json["opacity"] = *opacity;  // for readers: the transfer function decides

@@ -47,9 +47,9 @@ Trial HostTrial() {
 
 LinkModel Link(std::string_view preset) { return ParseLink("link", preset).value(); }
 
-MachineModel Cluster(const ExperimentContext& context, const LinkModel& link) {
-  MachineModel machine;
-  for (const Found& number : kNumbers) number.of(machine) = EstimateOf(context.log(), HostKey(), number.name).median;
+namespace {
+
+MachineModel JoinedBy(MachineModel machine, const LinkModel& link) {
   machine.message_seconds = MachineModel().message_seconds;  // over sockets; threads of one process need none
   machine.link = link;
   machine.workers_a_host = 1;
@@ -57,17 +57,22 @@ MachineModel Cluster(const ExperimentContext& context, const LinkModel& link) {
   return machine;
 }
 
-MachineModel PaperMachine(const ExperimentContext& context, double frame_seconds, double pixels) {
-  // For N = 200 and p = 10 ... 30 centralised combining takes about 0.20 s an image (table 2 less the other stages of table 5). Compositing
-  // takes 0.117 s of it (table 5, p = 1: 32 % of 72.89 s for 200 slices), writing and reading the rest.
-  constexpr double kImageShare = 0.083 / 72.89;
-  MachineModel machine = Cluster(context, Link("pvs"));
-  machine.link.bytes_per_second = pixels * machine.combining.rgba_bytes / (kImageShare * frame_seconds);
-  machine.plan_seconds = machine.message_seconds = machine.client_seconds = 0;
-  machine.cores_a_host = 1;  // its workers were single processors
-  machine.wake_ups = {.awake = 0, .asleep = 0};
-  machine.combining.hidden_pixel = 0;
-  return machine;
+}  // namespace
+
+MachineModel Cluster(const ExperimentContext& context, const LinkModel& link) {
+  MachineModel machine;
+  for (const Found& number : kNumbers) number.of(machine) = EstimateOf(context.log(), HostKey(), number.name).median;
+  return JoinedBy(machine, link);
+}
+
+std::vector<MachineModel> Clusters(const ExperimentContext& context, const LinkModel& link) {
+  std::vector<MachineModel> machines;
+  for (const Json* numbers : context.log().All(HostKey())) {
+    MachineModel& machine = machines.emplace_back();
+    for (const Found& number : kNumbers) number.of(machine) = numbers->at(number.name).get<double>();
+    machine = JoinedBy(machine, link);
+  }
+  return machines;
 }
 
 }  // namespace slabstream

@@ -20,6 +20,8 @@ std::vector<NamedPolicy> AllPartitions() {
 
 NamedPolicy EqualSlabs() { return AllPartitions().front(); }
 
+NamedPolicy BalancedSlabs() { return AllPartitions().at(1); }
+
 NamedPolicy BalancedTree() { return {"kd-tree by occupied", {.decomposition = "kd-tree", .load_metric = "occupied", .groups = 1}}; }
 
 std::vector<NamedPolicy> PartitionsAlongTheView() {

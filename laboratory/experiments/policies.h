@@ -16,8 +16,9 @@ struct NamedPolicy {
 
 // Every decomposition, divided by voxels and by occupied voxels.
 std::vector<NamedPolicy> AllPartitions();
-// Two of them: the paper's, and one meant to balance.
+// Three of them: the paper's, and two meant to balance.
 NamedPolicy EqualSlabs();
+NamedPolicy BalancedSlabs();
 NamedPolicy BalancedTree();
 // Boxes cut along the traversal axis of the view, by occupied voxels: the least work at borders, but the most voxels to move when another
 // axis becomes the traversal axis.

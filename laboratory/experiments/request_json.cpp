@@ -53,11 +53,10 @@ Json ShadingJson(const Shading& shading) {
 }
 
 Json PolicyJson(const Policy& policy) {
-  constexpr std::array<const char*, 5> kAxes = {"x", "y", "z", "auto", "view"};  // by AxisChoice
   const auto& [decomposition, split, axis, groups, assignment, balance, combine, pixel_error, teams] = policy;
   return {{"decomposition", decomposition},
           {"split", split},
-          {"axis", kAxes.at(std::size_t(axis))},
+          {"axis", NameOf(axis)},
           {"groups", groups},
           {"assignment", assignment},
           {"balance", balance},
@@ -67,6 +66,11 @@ Json PolicyJson(const Policy& policy) {
 }
 
 }  // namespace
+
+std::string_view NameOf(AxisChoice axis) {
+  constexpr std::array<std::string_view, 5> kNames = {"x", "y", "z", "auto", "view"};
+  return kNames.at(std::size_t(axis));
+}
 
 std::string DigestText(std::string_view bytes) { return fmt::format("{:016x}", Digest(std::as_bytes(std::span(bytes)))); }
 

@@ -2,7 +2,6 @@
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -18,9 +17,12 @@
 #include "laboratory/bench/bench_machine.h"
 #include "laboratory/experiments/request_json.h"
 #include "laboratory/experiments/sweep_file.h"
+#include "laboratory/measure/other_load.h"
 
 namespace slabstream {
 namespace {
+
+Json ReferenceLoopKey() { return {{"what", "reference loop"}}; }
 
 // Everything that decides the set of trials.
 Json Parameters(const ExperimentOptions& options, VolumeCache& volumes) {
@@ -29,9 +31,14 @@ Json Parameters(const ExperimentOptions& options, VolumeCache& volumes) {
   if (!options.sweep_file.empty()) {
     parameters["sweep"] = Json::parse(OrThrow(ReadTextFile(options.sweep_file, kMaxSweepBytes)), nullptr, false);
   }
+  const auto& [cases, workers, renderers, views, footprints, transfers] = options.own;
+  parameters["own"] = {{"cases", cases}, {"workers", workers},       {"renderers", Json::array()},
+                       {"views", views}, {"footprints", footprints}, {"transfers", Json::array()}};
+  for (const RendererKind* renderer : renderers) parameters["own"]["renderers"].push_back(renderer->name());
+  for (const TransferChoice& transfer : transfers) parameters["own"]["transfers"].push_back(TransferJson(transfer));
   // Texts that name files do not say what is in them.
-  const std::vector<BenchCase> named =
-      options.sweep_file.empty() ? RealVolumes(options.volumes) : OrThrow(ReadSweep(options.sweep_file)).volumes;
+  std::vector<BenchCase> named = options.sweep_file.empty() ? RealVolumes(options.volumes) : OrThrow(ReadSweep(options.sweep_file)).volumes;
+  std::ranges::move(NamedVolumes("VOLUME", cases), std::back_inserter(named));
   parameters["contents"] = Json::array();
   for (const BenchCase& volume : named) {
     parameters["contents"].push_back({{"volume", volumes.Identity(volume)}, {"transfer", TransferJson(volume.transfer)}});
@@ -44,14 +51,54 @@ std::string NowUtc() {
   return fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(now));
 }
 
+// How the run went: what results are worth.
+void AddConduct(Results& results, const TrialLog& log) {
+  std::vector<double> loads = log.other_loads();
+  if (!loads.empty()) {
+    const auto [least, most] = std::ranges::minmax(loads);
+    const int count = int(loads.size());
+    results.Add({{"part", "conduct"}}, "other_load", Estimate{MedianOf(std::move(loads)).median, least, most, 1, count}, Origin::kMeasured);
+  }
+  const std::vector<double> loops = ValuesOf(log, ReferenceLoopKey(), "seconds");
+  const auto [fastest, slowest] = std::ranges::minmax(loops);
+  results.Add({{"part", "conduct"}}, "drift",
+              Estimate{loops.back() / loops.front(), fastest / loops.front(), slowest / loops.front(), 1, int(loops.size())},
+              Origin::kMeasured);
+}
+
+// What the results do not say about the run, for the page: run.json.
+Json RunJson(const ExperimentContext& context, const MachineInfo& machine) {
+  const ExperimentOptions& options = context.options();
+  return {{"experiment", options.name},
+          {"version", Version()},
+          {"commit", SLABSTREAM_COMMIT},
+          {"command", options.command},
+          {"machine", {{"cpu", machine.cpu}, {"cores", machine.cores}, {"simd", machine.simd}}},
+          {"seed", options.seed},
+          {"repeats", context.repeats()},
+          {"quick", options.quick},
+          {"scale", options.scale},
+          {"date", NowUtc()}};
+}
+
+void Find(const Experiment& experiment, ExperimentContext& context, const MachineInfo& machine, const std::string& machine_text) {
+  const std::string& folder = context.options().folder;
+  Results results({std::string(experiment.name), SLABSTREAM_COMMIT, machine_text});
+  experiment.run(context, results);
+  if (context.interrupted()) throw Failure(Status::Cancelled("interrupted while results were made; the same command continues"));
+  AddConduct(results, context.log());
+  OrThrow(results.Write(folder));
+  OrThrow(WriteTextFile(folder + "/run.json", RunJson(context, machine).dump(1) + "\n"));
+  std::cout << fmt::format("wrote {0} values to {1}/results.csv and results.jsonl\nslabstream-lab {1} draws them\n", results.rows().size(),
+                           folder);
+}
+
 void Run(const ExperimentOptions& options) {
   const Experiment* experiment = FindNamed(Experiments(), options.name);
   if (experiment == nullptr) throw Failure(Status::NotFound(fmt::format("NAME '{}' is no experiment (--list names them)", options.name)));
-  if (experiment->takes_file != !options.sweep_file.empty()) {
-    throw Failure(Status::InvalidArgument(
-        experiment->takes_file ? fmt::format("experiment '{}' needs a FILE", options.name)
-                               : fmt::format("experiment '{}' takes no FILE, '{}' was given", options.name, options.sweep_file)));
-  }
+  if (experiment->takes_file && options.sweep_file.empty())
+    throw Failure(Status::InvalidArgument(fmt::format("experiment '{}' needs a FILE", options.name)));
+  if (options.folder.empty()) throw Failure(Status::InvalidArgument("-o (--output) is missing: the folder for the results"));
   const MachineInfo machine = DescribeMachine();
   const std::string machine_text = fmt::format("{}, {} cores, {}", machine.cpu, machine.cores, machine.simd);
   if (experiment->check != nullptr) experiment->check(options);
@@ -64,16 +111,7 @@ void Run(const ExperimentOptions& options) {
   const InterruptGuard interrupt(wakeup);
   ExperimentContext context(
       options, std::move(log), [&interrupt] { return interrupt.interrupted(); }, std::move(volumes));
-  const Report report = experiment->run(context);
-  if (interrupt.interrupted()) throw Failure(Status::Cancelled("interrupted while the report was made; the same command continues"));
-
-  const Provenance provenance{options.name, std::string(Version()), SLABSTREAM_COMMIT, options.command,   machine.cpu,
-                              machine.simd, machine.cores,          options.seed,      context.repeats(), NowUtc()};
-  OrThrow(WriteReport(report, provenance, options.folder));
-  for (const Section& section : report.sections) {
-    if (!section.answer.empty()) std::cout << fmt::format("{}: {}\n", section.title, section.answer);
-  }
-  std::cout << fmt::format("wrote {}/report.html\n", options.folder);
+  Find(*experiment, context, machine, machine_text);
 }
 
 }  // namespace
@@ -87,7 +125,13 @@ void ExperimentContext::Run(std::vector<Trial> trials, int repeats, int quick_re
   repeats_ = options_.repeats > 0 ? options_.repeats : quick() ? quick_repeats : repeats;
   trials = Distinct(std::move(trials));
   std::cout << fmt::format("{} kinds of trials, repeats: {}\n", trials.size(), repeats_) << std::flush;
-  RunTrials(trials, {options_.seed, repeats_, ::isatty(STDERR_FILENO) == 1, interrupted_}, log_);
+  // Before and after: a machine that became slower shows.
+  const auto time_reference_loop = [this] {
+    OrThrow(log_.Append(ReferenceLoopKey(), int(log_.All(ReferenceLoopKey()).size()), {{"seconds", ReferenceLoopSeconds()}}));
+  };
+  time_reference_loop();
+  RunTrials(trials, {options_.seed, repeats_, true, interrupted_}, log_);
+  time_reference_loop();
 }
 
 std::string ExperimentList() {

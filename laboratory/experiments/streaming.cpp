@@ -1,19 +1,16 @@
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <cmath>
+#include <string_view>
 
+#include "laboratory/experiments/attachments.h"
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/figures.h"
 #include "laboratory/experiments/machines.h"
-#include "laboratory/experiments/plots.h"
-#include "laboratory/report/charts.h"
 
 namespace slabstream {
 namespace {
 
 constexpr int kRepeats = 5, kQuickRepeats = 1, kServiceFrames = 5;
-constexpr double kMebibyte = 1 << 20;
+constexpr std::string_view kLink = "10gbit";
 
 struct Streams {
   std::vector<BenchCase> volumes;
@@ -57,7 +54,7 @@ double WindowBytes(const MeasuredFrame& frame) {
 
 }  // namespace
 
-Report RunStreaming(ExperimentContext& context) {
+void RunStreaming(ExperimentContext& context, Results& results) {
   const Streams streams = StreamsOf(context);
   std::vector<Trial> trials = {HostTrial()};
   for (const BenchCase& volume : streams.volumes) {
@@ -70,77 +67,25 @@ Report RunStreaming(ExperimentContext& context) {
   }
   context.Run(std::move(trials), kRepeats, kQuickRepeats);
 
-  Report report;
-  report.title = "Streaming: groups of slabs";
-  report.summary =
-      "A volume is divided into groups of slabs that pass through the workers one after the other: the next group renders while the last "
-      "one is combined. More groups need less memory "
-      "and show a first preview sooner; what do they cost?";
-  const MachineModel machine = Cluster(context, Link("10gbit"));
+  const auto add = [&](const FrameCase& frame) {
+    Json of = ColumnsOf(frame);
+    of["link"] = kLink;
+    AddFigures(results, of, RecallFigures(context, frame, Link(kLink)));
+    results.Add(of, "memory", WindowBytes(Recall(context, frame)), Origin::kMeasured);
+  };
   for (const BenchCase& volume : streams.volumes) {
-    Table table{fmt::format("groups-{}", volume.dataset),
-                volume.purpose,
-                {"p", "groups", "frame (ms)", "first preview (ms)", "picture to picture (ms)", "efficiency (%)", "voxels of a worker (MiB)",
-                 "service at p = 2 (ms)"},
-                {}};
-    LineChart efficiency{"Efficiency, frames asked for ahead", {"groups", ""}, {"efficiency", "%", AxisScale::kLinear, true}, {}};
-    LineChart memory{"Voxels that a worker must hold", {"groups", ""}, {"memory", "MiB", AxisScale::kLinear, true}, {}};
-    LineChart preview{"Time to the first preview", {"groups", ""}, {"time", "ms", AxisScale::kLinear, true}, {}};
-    const FrameFigures one = FindFigures(Recall(context, streams.Frame(volume, 1, 1)), machine);
-    std::string sentence;
-    for (const int p : streams.workers) {
-      LineSeries of_efficiency{fmt::format("p = {}", p), Origin::kSimulated, {}};
-      LineSeries of_memory{of_efficiency.name, Origin::kMeasured, {}}, of_preview = of_efficiency;
-      LineSeries of_frame{fmt::format("p = {}, whole frame", p), Origin::kSimulated, {}};
-      for (const int groups : streams.groups) {
-        const FrameCase frame = streams.Frame(volume, p, groups);
-        const MeasuredFrame measured = Recall(context, frame);
-        const FrameFigures figures = FindFigures(measured, machine);
-        const double percent = 100 * one.steady_seconds / figures.steady_seconds / p, mebibytes = WindowBytes(measured) / kMebibyte;
-        of_efficiency.points.push_back({double(groups), percent});
-        of_memory.points.push_back({double(groups), mebibytes});
-        of_preview.points.push_back({double(groups), figures.preview_seconds * 1e3});
-        of_frame.points.push_back({double(groups), figures.latency_seconds * 1e3});
-        Cell service;
-        if (p == 2) service = Measured(EstimateOf(context.log(), ServiceKey(context, frame, kServiceFrames), "latency_ms"));
-        table.rows.push_back({Chosen(p), Chosen(groups), Simulated(figures.latency_seconds * 1e3), Simulated(figures.preview_seconds * 1e3),
-                              Simulated(figures.steady_seconds * 1e3), Simulated(percent), Measured(mebibytes), service});
-      }
-      const LinePoint first = of_preview.points.front(), last = of_preview.points.back();
-      sentence = fmt::format(
-          "At p = {}, {:.0f} groups instead of one show a first preview after {:.1f} ms instead of {:.1f} ms and a worker must hold {:.1f} "
-          "MiB of voxels instead of {:.1f} MiB; efficiency goes "
-          "from {:.0f} % to {:.0f} %.",
-          p, last.x, last.y, first.y, of_memory.points.back().y, of_memory.points.front().y, of_efficiency.points.front().y,
-          of_efficiency.points.back().y);
-      efficiency.series.push_back(std::move(of_efficiency));
-      memory.series.push_back(std::move(of_memory));
-      preview.series.insert(preview.series.end(), {std::move(of_preview), std::move(of_frame)});
+    add(streams.Frame(volume, 1, 1));
+    for (const int groups : streams.groups) {
+      for (const int p : streams.workers) add(streams.Frame(volume, p, groups));
+      const FrameCase two = streams.Frame(volume, 2, groups);
+      Json of = ColumnsOf(two);
+      of["link"] = "host";
+      results.Add(of, "latency", EstimateOf(context.log(), ServiceKey(context, two, kServiceFrames), "latency_ms").Times(1e-3),
+                  Origin::kMeasured);
     }
-    Section section;
-    section.title = volume.dataset;
-    section.question = fmt::format("{}: how many groups?", volume.purpose);
-    section.method = fmt::format(
-        "Equal slabs, {0} x {0} pixels, the tree; every slab is rendered alone on one thread, frames are simulated on a switched network "
-        "of 10 Gbit/s with all that a service does around a frame. Efficiency compares picture to picture, as many frames asked for ahead "
-        "as keep all workers busy, "
-        "with one worker and one group. A worker must hold the slabs of two groups and their halos; those it has room for besides stay "
-        "cached.",
-        streams.pixels);
-    section.answer = sentence;
-    section.blocks = {Figure{"efficiency-" + volume.dataset, DrawLines(efficiency),
-                             "What more groups cost: halos are rendered again and again, and every group has its own combining."},
-                      Figure{"memory-" + volume.dataset, DrawLines(memory), "Counted from the boxes: two groups with their halos."},
-                      Figure{"preview-" + volume.dataset, DrawLines(preview), "The nearest group alone, and all of the frame."},
-                      std::move(table)};
     const MeasuredFrame shown = Recall(context, streams.Frame(volume, streams.workers[1], streams.groups[2]));
-    const Timeline timeline = Simulate(shown, machine, 3, 3, true);
-    section.blocks.emplace_back(
-        TimelineFigure("timeline-" + volume.dataset, fmt::format("Three frames, p = {}, {} groups", streams.workers[1], streams.groups[2]),
-                       timeline, 0, timeline.end, "Group g + 1 renders while group g is combined, across frames too."));
-    report.sections.push_back(std::move(section));
+    AttachTimeline(results, "timeline-" + volume.dataset, Simulate(shown, Cluster(context, Link(kLink)), 3, 3, true));
   }
-  return report;
 }
 
 }  // namespace slabstream

@@ -2,122 +2,90 @@
 
 #include <algorithm>
 
-#include "common/planning/policy_names.h"
-#include "common/renderers/registry.h"
 #include "laboratory/experiments/balanced_case.h"
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/figures.h"
 #include "laboratory/experiments/machines.h"
-#include "laboratory/experiments/plots.h"
 #include "laboratory/experiments/sweep_file.h"
-#include "laboratory/report/charts.h"
-#include "laboratory/report/text.h"
 
 namespace slabstream {
 namespace {
 
 constexpr int kRepeats = 3, kQuickRepeats = 1, kServiceFrames = 5, kMeasuredWorkers = 2;
 
-FrameCase FrameOf(ExperimentContext& context, const Sweep& sweep, const BenchCase& volume, const RendererKind* renderer,
-                  const SweepView& view, const SweepPolicy& policy, int workers, const SweepLink& link) {
-  FrameCase frame{volume, sweep.size, view.view, policy.policy, workers};
-  frame.volume.renderer = renderer;
-  return WithChosenPolicy(context, std::move(frame), link.link);
-}
+// One value of everything that a sweep varies.
+struct SweepCase {
+  Json columns;
+  LinkModel link;
+  FrameCase frame;  // of all workers
+  FrameCase team;   // of the workers of one team: what is measured box by box, and simulated
+  int teams = 1;
+  bool served = false;  // also measured with the service
+};
 
-// The policy's name in the table.
-std::string PolicyText(const SweepPolicy& asked, const Policy& chosen) {
-  return LeavesChoice(asked.policy) ? fmt::format("{}: {}", asked.name, Describe(chosen)) : asked.name;
-}
-
-template <class Use>
-void ForEachPicture(const Sweep& sweep, Use&& use) {
+std::vector<SweepCase> CasesOf(ExperimentContext& context, const Sweep& sweep) {
+  std::vector<SweepCase> cases;
+  const auto add = [&](const BenchCase& volume, const SweepRenderer& renderer, const SweepView& view, const SweepPolicy& policy,
+                       int workers, const SweepLink& link) {
+    SweepCase& c = cases.emplace_back();
+    c.link = link.link;
+    c.teams = std::min(policy.policy.teams, workers);
+    c.team = {volume, sweep.size, view.view, policy.policy, workers / c.teams, renderer.look};
+    c.team.volume.renderer = renderer.kind;
+    c.team.policy.teams = 1;
+    c.team = WithChosenPolicy(context, std::move(c.team), link.link);
+    c.frame = c.team;
+    c.frame.workers = workers;
+    c.frame.policy.teams = policy.policy.teams;
+    // The service has no link to vary: it follows the choice for the first one.
+    c.served = workers <= kMeasuredWorkers && link.name == sweep.links.front().name;
+    c.columns = ColumnsOf(c.frame);
+    c.columns.update(Json{{"part", fmt::format("{}, {}, {}", volume.name, renderer.name, view.name)},
+                          {"volume", volume.name},
+                          {"view", view.name},
+                          {"teams", c.teams},
+                          {"variant", policy.name},
+                          {"link", link.name}});
+    if (c.team.policy.groups == 0) c.columns["groups"] = PlanOf(context, c.team).groups.size();
+  };
   for (const BenchCase& volume : sweep.volumes) {
-    for (const RendererKind* renderer : sweep.renderers) {
+    for (const SweepRenderer& renderer : sweep.renderers) {
       for (const SweepView& view : sweep.views) {
-        use(volume, renderer, view);
-      }
-    }
-  }
-}
-
-std::vector<Trial> TrialsOf(ExperimentContext& context, const Sweep& sweep) {
-  std::vector<Trial> trials = {HostTrial()};
-  ForEachPicture(sweep, [&](const BenchCase& volume, const RendererKind* renderer, const SweepView& view) {
-    for (const SweepPolicy& policy : sweep.policies) {
-      for (const int p : sweep.workers) {
-        for (const SweepLink& link : sweep.links) {
-          const FrameCase frame = FrameOf(context, sweep, volume, renderer, view, policy, p, link);
-          trials.push_back(CostTrial(context, frame));
-          trials.push_back(FinishTrial(context, frame));
-          if (p <= kMeasuredWorkers) trials.push_back(ServiceTrial(context, frame, kServiceFrames));
+        for (const SweepPolicy& policy : sweep.policies) {
+          for (const int p : sweep.workers) {
+            for (const SweepLink& link : sweep.links) add(volume, renderer, view, policy, p, link);
+          }
         }
       }
     }
-  });
-  return trials;
+  }
+  return cases;
 }
 
 }  // namespace
 
-void CheckSweepFile(const ExperimentOptions& options) { OrThrow(ReadSweep(options.sweep_file).status()); }
+void CheckSweepFile(const ExperimentOptions& options) { (void)OrThrow(ReadSweep(options.sweep_file)); }
 
-Report RunSweep(ExperimentContext& context) {
+void RunSweep(ExperimentContext& context, Results& results) {
   const Sweep sweep = OrThrow(ReadSweep(context.options().sweep_file));
-  context.Run(TrialsOf(context, sweep), kRepeats, kQuickRepeats);
+  const std::vector<SweepCase> cases = CasesOf(context, sweep);
+  std::vector<Trial> trials = {HostTrial()};
+  for (const SweepCase& c : cases) {
+    trials.push_back(CostTrial(context, c.team));
+    trials.push_back(FinishTrial(context, c.team));
+    if (c.served) trials.push_back(ServiceTrial(context, c.frame, kServiceFrames));
+  }
+  context.Run(std::move(trials), kRepeats, kQuickRepeats);
 
-  Report report;
-  report.title = sweep.title;
-  report.summary = fmt::format("A sweep of your own: {} volumes, {} renderers, {} views, {} policies, {} numbers of workers and {} links.",
-                               sweep.volumes.size(), sweep.renderers.size(), sweep.views.size(), sweep.policies.size(),
-                               sweep.workers.size(), sweep.links.size());
-  ForEachPicture(sweep, [&](const BenchCase& volume, const RendererKind* renderer, const SweepView& view) {
-    const std::string title = fmt::format("{}, {}, {}", volume.name, renderer->title(), view.name), name = Slug(title);
-    Table table{name,
-                title,
-                {"policy", "p", "link", "frame (ms)", "picture to picture (ms)", "first preview (ms)", "imbalance", "idle (%)",
-                 "image bytes (MB)", "service here (ms)"},
-                {}};
-    LineChart chart{title, WorkersAxis(), {"frame", "ms", AxisScale::kLog}, {}};
-    std::pair<double, std::string> fastest{0, ""};
-    for (const SweepPolicy& policy : sweep.policies) {
-      for (const SweepLink& link : sweep.links) {
-        LineSeries series{sweep.links.size() == 1 ? policy.name : fmt::format("{}, {}", policy.name, link.name), Origin::kSimulated, {}};
-        LineSeries measured{series.name, Origin::kMeasured, {}};
-        for (const int p : sweep.workers) {
-          const FrameCase frame = FrameOf(context, sweep, volume, renderer, view, policy, p, link);
-          const FrameFigures figures = RecallFigures(context, frame, Cluster(context, link.link), &FrameFigures::latency_seconds);
-          const double ms = figures.latency_seconds * 1e3;
-          Cell service;
-          if (p <= kMeasuredWorkers) {
-            const Estimate e = EstimateOf(context.log(), ServiceKey(context, frame, kServiceFrames), "latency_ms");
-            service = Measured(e);
-            measured.points.push_back({double(p), e.median, e.low, e.high});
-          }
-          series.points.push_back({double(p), ms});
-          if (fastest.second.empty() || ms < fastest.first)
-            fastest = {ms, fmt::format("{} on {} workers over {}", policy.name, p, link.name)};
-          table.rows.push_back({PolicyText(policy, frame.policy), Chosen(p), link.name, Simulated(ms),
-                                Simulated(figures.steady_seconds * 1e3), Simulated(figures.preview_seconds * 1e3),
-                                Simulated(figures.imbalance), Simulated(figures.idle_share * 100), Simulated(figures.image_bytes * 1e-6),
-                                service});
-        }
-        std::ranges::sort(series.points, {}, &LinePoint::x);
-        std::ranges::sort(measured.points, {}, &LinePoint::x);
-        chart.series.push_back(std::move(series));
-        if (!measured.points.empty()) chart.series.push_back(std::move(measured));
-      }
-    }
-    Section section;
-    section.title = title;
-    section.method =
-        "Every box rendered alone on one thread; frames simulated from their costs; up to two workers also by the service in this process, "
-        "whose workers share one machine. With dynamic balance boxes are those that some frames of the same view have led to.";
-    section.answer = fmt::format("The fastest frame takes {} ms: {}.", FormatNumber(fastest.first), fastest.second);
-    section.blocks = {Figure{name, DrawLines(chart), "Time of a frame that nobody asked for ahead."}, std::move(table)};
-    report.sections.push_back(std::move(section));
-  });
-  return report;
+  for (const SweepCase& c : cases) {
+    AddFigures(results, c.columns, RecallFigures(context, c.team, c.link, c.teams));
+    if (!c.served) continue;
+    Json here = c.columns;
+    here["link"] = "host";
+    results.Add(here, "latency", EstimateOf(context.log(), ServiceKey(context, c.frame, kServiceFrames), "latency_ms").Times(1e-3),
+                Origin::kMeasured);
+  }
+  results.Attach("sweep", {{{"title", sweep.title}}});
 }
 
 }  // namespace slabstream

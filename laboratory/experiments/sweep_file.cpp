@@ -13,6 +13,8 @@
 #include <utility>
 
 #include "client/cli/json_value.h"
+#include "client/cli/values.h"
+#include "client/cli/volume_argument.h"
 #include "common/base/files.h"
 #include "common/cli/parse.h"
 #include "common/combining/schemes.h"
@@ -21,7 +23,7 @@
 #include "common/planning/layout.h"
 #include "common/planning/policy_names.h"
 #include "common/renderers/registry.h"
-#include "laboratory/experiments/frame_case.h"
+#include "laboratory/experiments/request_json.h"
 
 namespace slabstream {
 namespace {
@@ -49,9 +51,15 @@ BenchCase ReadVolume(const JsonValue& value) {
     value.Complain(fmt::format("{} must have either 'sphere' or 'file'", value.Shown()));
     return {};
   }
+  if (value.Has("opacity") && (value.Has("file") || value.Has("transfer"))) {
+    value.Complain("'opacity' is that of a sphere without 'transfer'");
+    return {};
+  }
   SphereRequest sphere;
   double opacity = kTranslucentSphere;
-  std::string file, transfer;
+  BenchCase volume;
+  std::string name, transfer_name;
+  TransferChoice transfer;
   value.Fields({{"sphere",
                  [&](const JsonValue& v) {
                    v.Fields({{"class", [&](const JsonValue& c) { sphere.sphere_class = SphereClass(c.Integer(1, 2)); }},
@@ -64,17 +72,84 @@ BenchCase ReadVolume(const JsonValue& value) {
                  [&](const JsonValue& v) {
                    opacity = v.Number({0, 1, true});
                  }},
-                {"file", [&](const JsonValue& v) { file = v.Text(); }},
-                {"transfer", [&](const JsonValue& v) { transfer = v.Text(); }}});
-  if (!value.Has("file")) {
-    if (value.Has("transfer")) value.Complain("a sphere has 'opacity', not 'transfer'");
-    return SphereCase(sphere, opacity);
+                {"file",
+                 [&](const JsonValue& v) {
+                   if (Result<BenchCase> parsed = ParseBenchCase(v.Text(), false); parsed.ok()) {
+                     volume = *std::move(parsed);
+                   } else {
+                     v.Complain(parsed.status().message());
+                   }
+                 }},
+                {"transfer",
+                 [&](const JsonValue& v) {
+                   transfer_name = v.Text();
+                   if (auto parsed = ParseTransfer("transfer", transfer_name); parsed.ok()) {
+                     transfer.choice = *std::move(parsed);
+                   } else {
+                     v.Complain(parsed.status().message());
+                   }
+                 }},
+                {"opacity_distance",
+                 [&](const JsonValue& v) {
+                   transfer.opacity_distance = v.Number({0, kMaxOpacityDistance, true});
+                 }},
+                {"name", [&](const JsonValue& v) { name = v.Text(); }}});
+  if (value.Has("sphere")) volume = SphereCase(sphere, opacity);
+  if (value.Has("transfer")) {
+    volume.transfer.choice = std::move(transfer.choice);
+    volume.opacity.reset();
+    volume.name = fmt::format("{}-{}", volume.dataset, std::filesystem::path(transfer_name).stem().string());
   }
-  if (value.Has("opacity")) value.Complain("a file has 'transfer', not 'opacity'");
-  Result<BenchCase> parsed = ParseBenchCase(transfer.empty() ? file : file + ":" + transfer, false);
-  if (parsed.ok()) return *std::move(parsed);
-  value.Complain(parsed.status().message());
+  volume.transfer.opacity_distance = transfer.opacity_distance;
+  if (!name.empty()) volume.name = name;
+  return volume;
+}
+
+// A direction as --light takes it.
+Vec3 ReadLight(const JsonValue& value) {
+  std::vector<std::string> coordinates;
+  value.Each([&](const JsonValue& v) { coordinates.push_back(v.Shown()); });
+  const Result<Vec3> light = ParseDirection("light", fmt::format("{}", fmt::join(coordinates, ",")));
+  if (light.ok()) return *light;
+  value.Complain(light.status().message());
   return {};
+}
+
+// The name of a renderer, or an object with the parameters of that renderer and what else decides the look.
+SweepRenderer ReadRenderer(const JsonValue& value) {
+  const auto kind_of = [](const JsonValue& v) { return Renderers()[v.OneOf(RendererNames())]; };
+  SweepRenderer read;
+  if (value.Shown().starts_with('"')) {
+    read.kind = kind_of(value);
+    read.name = read.kind->name();
+    return read;
+  }
+  if (value.Has("renderer")) read.kind = kind_of(value.At("renderer"));
+  constexpr std::array<std::string_view, 3> kShadings = {"phong", "none", "depth-gradient"};  // by ShadingModel
+  Look& look = read.look;
+  std::vector<std::pair<std::string, JsonValue::Read>> fields = {
+      {"name", [&](const JsonValue& v) { read.name = v.Text(); }},
+      {"renderer", [](const JsonValue&) {}},
+      {"shading", [&](const JsonValue& v) { look.shading.model = ShadingModel(v.OneOf(kShadings)); }},
+      {"lights",
+       [&](const JsonValue& v) {
+         v.Each([&](const JsonValue& light) { look.shading.lights.push_back(ReadLight(light)); }, 0);
+         if (look.shading.lights.size() > kMaxLights)
+           v.Complain(fmt::format("{} lights are too many: at most {}", look.shading.lights.size(), kMaxLights));
+       }},
+      {"termination", [&](const JsonValue& v) {
+         look.termination = v.Number({0, kMaxTermination});
+       }}};
+  for (const RendererParameter& parameter : read.kind->parameters()) {
+    fields.emplace_back(parameter.name, [&](const JsonValue& v) {
+      look.parameters[std::string(parameter.name)] = parameter.choices.empty()
+                                                         ? fmt::format("{}", v.Number({parameter.least, parameter.most}))
+                                                         : std::string(parameter.choices[v.OneOf(parameter.choices)]);
+    });
+  }
+  value.Fields(fields);
+  if (read.name.empty()) read.name = read.kind->name();
+  return read;
 }
 
 SweepView ReadView(const JsonValue& value, std::size_t index) {
@@ -114,7 +189,8 @@ SweepPolicy ReadPolicy(const JsonValue& value) {
                  [&](const JsonValue& v) {
                    policy.pixel_error = v.Number({0, kMaxPixelError});
                  }},
-                {"groups", [&](const JsonValue& v) { policy.groups = v.Integer(1, kMaxGroups); }},
+                {"groups", [&](const JsonValue& v) { policy.groups = v.Integer(0, kMaxGroups); }},
+                {"teams", [&](const JsonValue& v) { policy.teams = v.Integer(1, kMaxTeams); }},
                 {"combine", [&](const JsonValue& v) {
                    policy.combine = v.Text();
                    if (policy.combine == kAutomatic) return;
@@ -137,6 +213,16 @@ void ReadSize(const JsonValue& value, ImageSize& size) {
     value.Complain(fmt::format("{} has more than {} pixels", value.Shown(), kMaxImagePixels));
 }
 
+// A simulated frame has one kind of team.
+void CheckTeamsAreEqual(const Sweep& sweep, std::optional<std::string>& mistake) {
+  for (std::size_t i = 0; i < sweep.policies.size(); ++i) {
+    for (const int p : sweep.workers) {
+      const int teams = sweep.policies[i].policy.teams;
+      if (teams < p && p % teams != 0 && !mistake) mistake = fmt::format("policies[{}].teams: {} must divide {} workers", i, teams, p);
+    }
+  }
+}
+
 // Names distinguish cases.
 template <class T>
 void CheckNamesDiffer(const std::vector<T>& entries, const char* list, std::optional<std::string>& mistake) {
@@ -149,8 +235,12 @@ void CheckNamesDiffer(const std::vector<T>& entries, const char* list, std::opti
 }  // namespace
 
 std::string Describe(const Policy& policy) {
-  return fmt::format("{} by {}, {}, {}, {} groups, {}{}", policy.decomposition, LoadMetricOf(policy), policy.assignment, policy.balance,
-                     policy.groups, policy.combine, policy.pixel_error > 0 ? fmt::format(", error {}", policy.pixel_error) : "");
+  std::string text = fmt::format("{} by {}, {}, {}, {} groups, {}", policy.decomposition, LoadMetricOf(policy), policy.assignment,
+                                 policy.balance, policy.groups == 0 ? kAutomatic : std::to_string(policy.groups), policy.combine);
+  if (policy.axis != AxisChoice::kAuto) text += fmt::format(", axis {}", NameOf(policy.axis));
+  if (policy.teams > 1) text += fmt::format(", {} teams", policy.teams);
+  if (policy.pixel_error > 0) text += fmt::format(", error {}", policy.pixel_error);
+  return text;
 }
 
 Result<Sweep> ParseSweep(const std::string& path, std::string_view text) {
@@ -169,8 +259,7 @@ Result<Sweep> ParseSweep(const std::string& path, std::string_view text) {
       {{"title", [&](const JsonValue& v) { sweep.title = v.Text(); }},
        {"size", [&](const JsonValue& v) { ReadSize(v, sweep.size); }},
        {"volumes", [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.volumes.push_back(ReadVolume(e)); }); }},
-       {"renderers",
-        [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.renderers.push_back(Renderers()[e.OneOf(RendererNames())]); }); }},
+       {"renderers", [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.renderers.push_back(ReadRenderer(e)); }); }},
        {"views", [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.views.push_back(ReadView(e, sweep.views.size())); }); }},
        {"policies", [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.policies.push_back(ReadPolicy(e)); }); }},
        {"workers",
@@ -190,13 +279,15 @@ Result<Sweep> ParseSweep(const std::string& path, std::string_view text) {
     if (!mistake && !json.contains(needed)) mistake = fmt::format("'{}' is missing", needed);
   }
   if (sweep.title.empty()) sweep.title = "Sweep";
-  if (sweep.renderers.empty()) sweep.renderers = {FindRenderer(kDefaultRenderer)};
+  if (sweep.renderers.empty()) sweep.renderers = {{.name = std::string(kDefaultRenderer)}};
   if (sweep.views.empty()) sweep.views = {{"view 1", BenchView(Projection::kOrthographic, 1, 12)}};
   if (sweep.links.empty()) sweep.links = {{"10gbit", *ParseLink("link", "10gbit")}};
   CheckNamesDiffer(sweep.volumes, "volumes", mistake);
+  CheckNamesDiffer(sweep.renderers, "renderers", mistake);
   CheckNamesDiffer(sweep.views, "views", mistake);
   CheckNamesDiffer(sweep.policies, "policies", mistake);
   CheckNamesDiffer(sweep.links, "links", mistake);
+  CheckTeamsAreEqual(sweep, mistake);
   const std::size_t cases = sweep.volumes.size() * sweep.renderers.size() * sweep.views.size() * sweep.policies.size() *
                             sweep.workers.size() * sweep.links.size();
   if (!mistake && cases > kMaxSweepCases) mistake = fmt::format("{} cases are too many: at most {}", cases, kMaxSweepCases);

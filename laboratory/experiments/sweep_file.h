@@ -9,6 +9,7 @@
 #include "common/frame/frame_request.h"
 #include "common/simulation/link_model.h"
 #include "laboratory/bench/bench_cases.h"
+#include "laboratory/experiments/frame_case.h"
 
 namespace slabstream {
 
@@ -16,6 +17,11 @@ inline constexpr std::size_t kMaxSweepBytes = std::size_t{1} << 20;
 inline constexpr int kMaxSweepWorkers = 4096;
 inline constexpr std::size_t kMaxSweepCases = 10000;
 
+struct SweepRenderer {
+  std::string name;
+  const RendererKind* kind = FindRenderer(kDefaultRenderer);
+  Look look = {};
+};
 struct SweepPolicy {
   std::string name;
   Policy policy;
@@ -33,7 +39,7 @@ struct SweepLink {
 struct Sweep {
   std::string title;
   std::vector<BenchCase> volumes;
-  std::vector<const RendererKind*> renderers;
+  std::vector<SweepRenderer> renderers;
   std::vector<SweepView> views;
   std::vector<SweepPolicy> policies;
   std::vector<int> workers;
@@ -44,8 +50,7 @@ struct Sweep {
 // The name of a policy that was given none.
 std::string Describe(const Policy& policy);
 
-// InvalidArgument in one line naming `path`, the field by its place ("policies[1].combine"), the value and what is allowed. NotFound: a
-// volume file does not exist.
+// InvalidArgument in one line naming `path`, the field by its place ("policies[1].combine"), the value and what is allowed.
 Result<Sweep> ParseSweep(const std::string& path, std::string_view text);
 // The same of a file; also fails if it cannot be read.
 Result<Sweep> ReadSweep(const std::string& path);

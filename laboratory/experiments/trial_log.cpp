@@ -80,6 +80,7 @@ Status TrialLog::Load(const std::string& path) {
         !trial.contains("numbers")) {
       return Status::InvalidArgument(fmt::format("'{}' line {} is not a trial; --fresh begins anew", path, number));
     }
+    if (const Json load = trial.value("other_load", Json()); load.is_number()) other_loads_.push_back(load.get<double>());
     trials_[{trial["key"].dump(), trial["repeat"].get<int>()}] = std::move(trial["numbers"]);
     whole_lines += line.size() + 1;
   }
@@ -99,8 +100,12 @@ std::vector<const Json*> TrialLog::All(const Json& key) const {
   return all;
 }
 
-Status TrialLog::Append(const Json& key, int repeat, Json numbers) {
-  const Json line = {{"key", key}, {"repeat", repeat}, {"numbers", numbers}};
+Status TrialLog::Append(const Json& key, int repeat, Json numbers, std::optional<double> other_load) {
+  Json line = {{"key", key}, {"repeat", repeat}, {"numbers", numbers}};
+  if (other_load) {
+    line["other_load"] = *other_load;
+    other_loads_.push_back(*other_load);
+  }
   file_ << line.dump() + "\n" << std::flush;
   if (!file_) return Status::Unavailable(fmt::format("cannot write '{}': {}", path_, std::strerror(errno)));
   trials_[{key.dump(), repeat}] = std::move(numbers);

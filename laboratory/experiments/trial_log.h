@@ -1,7 +1,8 @@
 // TrialLog: keeps measurements on disk trial by trial, so that an interrupted run continues where it stopped.
 //
 // A folder holds `experiment.json` (the identity of the run: RunIdentity) and `trials.jsonl`: one line a finished trial,
-//   {"key": {...}, "repeat": 0, "numbers": {...}}
+//   {"key": {...}, "repeat": 0, "numbers": {...}, "other_load": 0.01}
+// "other_load" is missing if the trial was too short for it (laboratory/measure/other_load.h).
 // A line is written as soon as its trial ends. A line cut short by a crash is dropped when the folder is opened again; any other unreadable
 // line is an error that names it.
 #pragma once
@@ -48,7 +49,9 @@ class TrialLog {
   std::vector<const Json*> All(const Json& key) const;
   std::size_t size() const { return trials_.size(); }
 
-  Status Append(const Json& key, int repeat, Json numbers);
+  Status Append(const Json& key, int repeat, Json numbers, std::optional<double> other_load = std::nullopt);
+  // Of all trials that have one.
+  const std::vector<double>& other_loads() const { return other_loads_; }
 
  private:
   TrialLog() = default;
@@ -57,6 +60,7 @@ class TrialLog {
   std::string path_;
   std::ofstream file_;
   std::map<std::pair<std::string, int>, Json> trials_;  // by dumped key and repeat
+  std::vector<double> other_loads_;
 };
 
 }  // namespace slabstream

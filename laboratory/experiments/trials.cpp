@@ -1,6 +1,7 @@
 #include "laboratory/experiments/trials.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -13,9 +14,12 @@
 #include "client/cli/progress_bar.h"
 #include "common/base/check.h"
 #include "common/base/time.h"
+#include "laboratory/measure/other_load.h"
 
 namespace slabstream {
 namespace {
+
+constexpr std::chrono::seconds kBetweenLines{10};  // of progress, where there is no terminal
 
 struct Run {
   const Trial* trial = nullptr;
@@ -82,7 +86,9 @@ void RunTrials(const std::vector<Trial>& trials, const TrialSchedule& schedule, 
   for (const Run& run : runs) effort += run.trial->effort;
 
   ProgressBar bar(schedule.progress, effort);
+  const bool terminal = ::isatty(STDERR_FILENO) == 1;
   const Time begin = MonotonicNow();
+  Time told = begin;
   for (std::size_t i = 0; i < runs.size(); ++i) {
     if (schedule.interrupted && schedule.interrupted()) {
       throw Failure(Status::Cancelled(fmt::format("interrupted after {} of {} trials; the same command continues", i, runs.size())));
@@ -90,8 +96,13 @@ void RunTrials(const std::vector<Trial>& trials, const TrialSchedule& schedule, 
     const Trial& trial = *runs[i].trial;
     const double passed = std::chrono::duration<double>(MonotonicNow() - begin).count();
     const std::string left = effort_done > 0 ? ", " + TimeLeft(passed / effort_done * (effort - effort_done)) : "";
-    bar.Show(effort_done, fmt::format("trial {} of {}{}", i + 1, runs.size(), left));
-    OrThrow(log.Append(trial.key, runs[i].repeat, NumbersOf(trial)));
+    if (terminal || MonotonicNow() - told >= kBetweenLines) {
+      bar.Show(effort_done, fmt::format("trial {} of {}{}", i + 1, runs.size(), left));
+      told = MonotonicNow();
+    }
+    const OtherLoad others;
+    Json numbers = NumbersOf(trial);
+    OrThrow(log.Append(trial.key, runs[i].repeat, std::move(numbers), others.Share()));
     effort_done += trial.effort;
   }
 }

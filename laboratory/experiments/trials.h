@@ -24,7 +24,7 @@ struct Trial {
 struct TrialSchedule {
   std::uint64_t seed = 1;
   int repeats = 1;
-  bool progress = false;              // a bar with the time left, on stderr
+  bool progress = false;              // on stderr, with the time left: a bar, or a line now and then without a terminal
   std::function<bool()> interrupted;  // asked between trials
 };
 

@@ -95,17 +95,30 @@ std::string TitleOf(const BenchCase& volume) {
                      sphere->occupancy * 100);
 }
 
-std::vector<BenchCase> RealVolumes(const std::vector<std::string>& named) {
+Json ColumnsOf(const BenchCase& volume) {
+  Json columns = {{"volume", volume.dataset}};
+  if (const auto* sphere = std::get_if<SphereRequest>(&volume.volume)) {
+    columns.update(Json{{"n", sphere->size}, {"occupancy", sphere->occupancy}});
+  }
+  return columns;
+}
+
+std::vector<BenchCase> NamedVolumes(const std::string& option, const std::vector<std::string>& named) {
   std::vector<BenchCase> volumes;
   for (const std::string& text : named) {
     Result<BenchCase> parsed = ParseBenchCase(text, false);
-    if (!parsed.ok()) throw Failure(Status(parsed.status().code(), "--volume: " + parsed.status().message()));
+    if (!parsed.ok()) throw Failure(Status(parsed.status().code(), option + ": " + parsed.status().message()));
     volumes.push_back(*std::move(parsed));
     BenchCase& volume = volumes.back();
     const std::string stem = volume.dataset;
     const auto is_taken = [&](const BenchCase& other) { return &other != &volume && other.dataset == volume.dataset; };
     for (int number = 2; std::ranges::any_of(volumes, is_taken); ++number) volume.dataset = fmt::format("{}-{}", stem, number);
   }
+  return volumes;
+}
+
+std::vector<BenchCase> RealVolumes(const std::vector<std::string>& named) {
+  std::vector<BenchCase> volumes = NamedVolumes("--volume", named);
   const BenchCase brain = BrainCase();
   std::error_code error;
   if (volumes.empty() && std::filesystem::exists(std::get<std::string>(brain.volume), error)) volumes.push_back(brain);

@@ -48,9 +48,14 @@ class VolumeCache {
 
 // The name in reports: "class I, N = 300, 5 % occupied"; a file by its dataset's name.
 std::string TitleOf(const BenchCase& volume);
+// The columns of results that a volume fills: volume; n and occupancy of spheres.
+Json ColumnsOf(const BenchCase& volume);
 
-// The volumes that the user named, or the installed real volumes, such as the brain, beside the spheres. Errors of ParseBenchCase.
-// Their datasets differ, because tables and figures are called after them: of two files v.nrrd the second is "v-2".
+// The volumes that a user named after `option`. Errors of ParseBenchCase. Their datasets differ, because tables and figures are called
+// after them: of two files v.nrrd the second is "v-2".
+std::vector<BenchCase> NamedVolumes(const std::string& option, const std::vector<std::string>& named);
+
+// NamedVolumes, or if there are none the installed real volumes, such as the brain, beside the spheres.
 std::vector<BenchCase> RealVolumes(const std::vector<std::string>& named);
 
 }  // namespace slabstream

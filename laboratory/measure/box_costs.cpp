@@ -3,15 +3,19 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <type_traits>
+#include <utility>
 
 #include "common/base/check.h"
 #include "laboratory/measure/lab_worker.h"
+#include "laboratory/measure/statistics.h"
 
 namespace slabstream {
 
-std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FrameSetup& setup, std::span<const Box> boxes, int repeats) {
+namespace {
+
+std::vector<BoxCost> Measure(LabWorker& worker, const FrameSetup& setup, std::span<const Box> boxes, int repeats) {
   CHECK_GE(repeats, 1);
-  LabWorker worker(volume);
   std::vector<BoxCost> costs;
   for (const Box& box : boxes) {
     const BoxRendering first = worker.Render(box, setup);
@@ -23,7 +27,7 @@ std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FrameSetup& set
     cost.bounds = first.image.bounds;
     cost.coverage = FindCoverage(first.image, FrameBounds(setup).width(), FrameBounds(setup).height());
     cost.covered_pixels = std::uint64_t(std::llround(cost.coverage.pixels()));
-    cost.voxel_bytes = std::uint64_t(SlabBox(box, setup).voxel_count()) * BytesPerSample(volume.block.type);
+    cost.voxel_bytes = std::uint64_t(SlabBox(box, setup).voxel_count()) * BytesPerSample(setup.description.type);
   }
   // In rounds: a moment in which the machine is slower or quicker affects only part of a box's times. Each round renders a box twice, and
   // the second time counts: a worker's caches hold what it rendered last, not other workers' boxes.
@@ -36,18 +40,36 @@ std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FrameSetup& set
     }
   }
   for (std::size_t i = 0; i < boxes.size(); ++i) {
-    const auto middle = again[i].begin() + (again[i].end() - again[i].begin() - 1) / 2;
-    std::ranges::nth_element(again[i], middle, {}, &BoxRendering::processor_seconds);
-    costs[i].seconds = middle->processor_seconds;
-    costs[i].stage_ns = middle->report.stage_ns;
+    const auto median = [&](auto&& number) {
+      std::vector<double> numbers;
+      for (const BoxRendering& rendering : again[i]) numbers.push_back(double(number(rendering)));
+      return MedianOf(std::move(numbers)).median;
+    };
+    costs[i].seconds = median([](const BoxRendering& r) { return r.processor_seconds; });
+    for (std::size_t stage = 0; stage < costs[i].stage_ns.size(); ++stage) {
+      using Nanoseconds = std::remove_reference_t<decltype(costs[i].stage_ns[stage])>;
+      costs[i].stage_ns[stage] = Nanoseconds(median([stage](const BoxRendering& r) { return r.report.stage_ns[stage]; }));
+    }
   }
   return costs;
 }
 
-std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FramePlan& plan, int repeats) {
+}  // namespace
+
+std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FrameSetup& setup, std::span<const Box> boxes, int repeats) {
+  LabWorker worker(volume);
+  return Measure(worker, setup, boxes, repeats);
+}
+
+std::vector<BoxCost> MeasureBoxCosts(LabWorker& worker, const FramePlan& plan, int repeats) {
   std::vector<Box> boxes;
   for (const Placement& placement : PlacementsOf(plan)) boxes.push_back(placement.box);
-  return MeasureBoxCosts(volume, plan.setup, boxes, repeats);
+  return Measure(worker, plan.setup, boxes, repeats);
+}
+
+std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FramePlan& plan, int repeats) {
+  LabWorker worker(volume);
+  return MeasureBoxCosts(worker, plan, repeats);
 }
 
 double Imbalance(std::span<const double> seconds) {

@@ -16,11 +16,13 @@
 
 namespace slabstream {
 
+class LabWorker;
+
 struct BoxCost {
   Box box;
   double first_seconds = 0;           // processor time of the first rendering
-  double seconds = 0;                 // median of the later ones (of two the lower); the minimum is luck, since cores are at times quicker
-  StageTimes stage_ns{};              // of that rendering, in elapsed time
+  double seconds = 0;                 // median of the later ones; the minimum is luck, since cores are at times quicker
+  StageTimes stage_ns{};              // median of each, in elapsed time
   std::uint64_t occupied_voxels = 0;  // in the box, under the transfer function; splatting
   std::uint64_t drawn_voxels = 0;     // that went through splat or Z-buffer
   PixelBounds bounds;                 // of its local image
@@ -36,6 +38,8 @@ std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FrameSetup& set
 
 // The boxes that a plan renders, in the order of PlacementsOf(plan).
 std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FramePlan& plan, int repeats);
+// The same by a worker that may have rendered boxes of earlier frames and then keeps what it made for them.
+std::vector<BoxCost> MeasureBoxCosts(LabWorker& worker, const FramePlan& plan, int repeats);
 
 // Largest / mean of the boxes' `seconds`: 1 is perfect balance, and the value if all costs are 0. With `slots` owners of several boxes
 // each, sum their boxes first.

@@ -18,7 +18,13 @@ class MeasuredLayouts {
                   int workers)
       : summary_(std::move(summary)), occupied_(std::move(occupied)), volume_(std::move(volume)), slots_(std::uint32_t(workers)) {}
 
-  // The layout of the next frame, which may differ only in its view from the one before. The request is valid.
+  // From the next frame on, the volume is shown under another transfer function, under which it draws `occupied`.
+  void Show(std::shared_ptr<const OccupancyGrid> occupied, ClassifiedVolume volume) {
+    occupied_ = std::move(occupied);
+    volume_ = std::move(volume);
+  }
+
+  // The layout of the next frame, which may differ from the one before only in its view and what Show said. The request is valid.
   std::shared_ptr<const Layout> Next(const FrameRequest& request) {
     policy_ = ResolvePolicy(request, summary_->description.geometry).value();
     return table_.Find({&policy_, &volume_, summary_.get(), occupied_, slots_});

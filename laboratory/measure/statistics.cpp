@@ -17,6 +17,19 @@ double MedianCoverage(int count, int k) {
   return std::max(0.0, 1 - 2 * below);
 }
 
+namespace {
+
+bool HasTwoModes(const std::vector<double>& sorted, double median) {
+  for (std::size_t upper = 2; upper + 2 <= sorted.size(); ++upper) {
+    const double gap = sorted[upper] - sorted[upper - 1];
+    const double widest = std::max(sorted[upper - 1] - sorted.front(), sorted.back() - sorted[upper]);
+    if (gap > 0.1 * std::abs(median) && gap > 2 * widest) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
 Estimate MedianOf(std::vector<double> values, double confidence) {
   if (values.empty()) return {};
   std::sort(values.begin(), values.end());
@@ -27,6 +40,7 @@ Estimate MedianOf(std::vector<double> values, double confidence) {
   estimate.low = values[std::size_t(k - 1)];
   estimate.high = values[std::size_t(count - k)];
   estimate.coverage = estimate.low == estimate.high ? 1 : MedianCoverage(count, k);
+  estimate.two_modes = HasTwoModes(values, estimate.median);
   return estimate;
 }
 

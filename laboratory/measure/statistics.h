@@ -15,9 +15,11 @@ struct Estimate {
   double median = 0, low = 0, high = 0;
   double coverage = 0;  // confidence of [low, high], in [0, 1]
   int count = 0;
+  // The values fall into two heaps of at least two values: the gap between these is wider than a tenth of the median and twice each heap.
+  bool two_modes = false;
 
   // In another unit: factor > 0.
-  Estimate Times(double factor) const { return {median * factor, low * factor, high * factor, coverage, count}; }
+  Estimate Times(double factor) const { return {median * factor, low * factor, high * factor, coverage, count, two_modes}; }
 };
 Estimate MedianOf(std::vector<double> values, double confidence = 0.95);  // no values: all zero
 

@@ -35,7 +35,7 @@ void StoreProduct(const TransformMatrix& matrix, const Index3& size, Transformed
 }
 
 // A vector of neighbours along the beam, moved on by one addition.
-void StoreIncrements(const TransformMatrix& matrix, const Index3& size, TransformedPoints& points) {
+void RunningBeams(const TransformMatrix& matrix, const Index3& size, TransformedPoints& points) {
   const FloatTag d;
   const int lanes = int(hn::Lanes(d));
   for (std::size_t c = 0; c < 3; ++c) {
@@ -54,6 +54,27 @@ void StoreIncrements(const TransformMatrix& matrix, const Index3& size, Transfor
   }
 }
 
+// Vectors may run over the end here too: what lies behind `to` is not written yet, or there is room.
+void AddStepTo(const float* from, float* to, std::size_t count, float step) {
+  const FloatTag d;
+  const auto steps = hn::Set(d, step);
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) hn::StoreU(hn::Add(hn::LoadU(d, from + i), steps), d, to + i);
+}
+
+// `vectors` vectors of this length, each from the one before it.
+void AddVectors(float* values, int vectors, std::size_t length, float step) {
+  for (int i = 1; i < vectors; ++i, values += length) AddStepTo(values, values + length, length, step);
+}
+
+void BeamPhase(const TransformMatrix& matrix, const Index3& size, TransformedPoints& points) {
+  for (std::size_t c = 0; c < 3; ++c) AddVectors(points.components[c].data(), size.y, std::size_t(size.x), matrix[c][1]);
+}
+
+void SlicePhase(const TransformMatrix& matrix, const Index3& size, TransformedPoints& points) {
+  const std::size_t slice = std::size_t(size.x) * std::size_t(size.y);
+  for (std::size_t c = 0; c < 3; ++c) AddVectors(points.components[c].data(), size.z, slice, matrix[c][2]);
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace slabstream
 HWY_AFTER_NAMESPACE();
@@ -61,14 +82,24 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace slabstream {
 HWY_EXPORT(StoreProduct);
-HWY_EXPORT(StoreIncrements);
+HWY_EXPORT(RunningBeams);
+HWY_EXPORT(AddStepTo);
+HWY_EXPORT(BeamPhase);
+HWY_EXPORT(SlicePhase);
 
-void StoreProductVector(const TransformMatrix& matrix, const Index3& size, TransformedPoints& points) {
+void ProductVector(const TransformMatrix& matrix, const Index3& size, TransformedPoints& points) {
   HWY_DYNAMIC_DISPATCH(StoreProduct)(matrix, size, points);
 }
-void StoreIncrementsVector(const TransformMatrix& matrix, const Index3& size, TransformedPoints& points) {
-  HWY_DYNAMIC_DISPATCH(StoreIncrements)(matrix, size, points);
+void RunningBeamsVector(const TransformMatrix& matrix, const Index3& size, TransformedPoints& points) {
+  HWY_DYNAMIC_DISPATCH(RunningBeams)(matrix, size, points);
 }
+void BeamPhaseVector(const TransformMatrix& matrix, const Index3& size, TransformedPoints& points) {
+  HWY_DYNAMIC_DISPATCH(BeamPhase)(matrix, size, points);
+}
+void SlicePhaseVector(const TransformMatrix& matrix, const Index3& size, TransformedPoints& points) {
+  HWY_DYNAMIC_DISPATCH(SlicePhase)(matrix, size, points);
+}
+void AddStep(const float* from, float* to, std::size_t count, float step) { HWY_DYNAMIC_DISPATCH(AddStepTo)(from, to, count, step); }
 
 }  // namespace slabstream
 #endif

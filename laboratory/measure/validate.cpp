@@ -41,16 +41,16 @@ FrameParts PartsOf(const Timeline& timeline) {
   return parts;
 }
 
-double QuantileOf(const std::vector<FrameParts>& frames, double FrameParts::*part, double share) {
+std::vector<double> PartOf(const std::vector<FrameParts>& frames, double FrameParts::*part) {
   std::vector<double> values;
   values.reserve(frames.size());
   for (const FrameParts& frame : frames) values.push_back(frame.*part);
-  return Quantile(std::move(values), share);
+  return values;
 }
 
-FrameParts Median(const std::vector<FrameParts>& frames) {
-  return {QuantileOf(frames, &FrameParts::render, 0.5), QuantileOf(frames, &FrameParts::picture, 0.5),
-          QuantileOf(frames, &FrameParts::latency, 0.5)};
+FrameParts MedianParts(const std::vector<FrameParts>& frames) {
+  const auto median = [&](double FrameParts::*part) { return MedianOf(PartOf(frames, part)).median; };
+  return {median(&FrameParts::render), median(&FrameParts::picture), median(&FrameParts::latency)};
 }
 
 // Everything that belongs to one view.
@@ -150,9 +150,9 @@ Result<ValidationRow> ValidateSimulation(const ValidationCase& what, const Valid
   if (what.workers == 2) row.slowdown = MedianOf(std::move(slowdowns));
   for (const View& view : *views) {
     const auto quartile = [&](const std::vector<FrameParts>& frames, double share) {
-      return QuantileOf(frames, &FrameParts::latency, share);
+      return Quantile(PartOf(frames, &FrameParts::latency), share);
     };
-    row.views.push_back({view.request.view, Median(view.measured), Median(view.simulated), quartile(view.measured, 0.25),
+    row.views.push_back({view.request.view, MedianParts(view.measured), MedianParts(view.simulated), quartile(view.measured, 0.25),
                          quartile(view.measured, 0.75), quartile(view.simulated, 0.25), quartile(view.simulated, 0.75)});
   }
   return row;

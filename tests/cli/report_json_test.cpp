@@ -50,7 +50,7 @@ TEST(StatsJsonTest, SetsWhatHappenedBesideWhatWasPredicted) {
   std::vector<FrameRecord> frames = TwoFrames();
   frames[1].statistics.predicted =
       FramePrediction{.render_seconds = 0.004, .combine_seconds = 0.001, .finish_seconds = 0, .latency_seconds = 0.05, .imbalance = 1};
-  const json stats = json::parse(StatsJson({}, frames));
+  const json stats = json::parse(StatsJson(FrameOptions(), frames));
   EXPECT_FALSE(stats["frames"][0].contains("predicted")) << "its policy left no choice";
   const json& frame = stats["frames"][1];
   EXPECT_EQ(frame["predicted"]["render_ms"], 4.0);

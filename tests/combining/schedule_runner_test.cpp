@@ -60,9 +60,10 @@ class World {
         } else {
           events_.emplace_back([this, index = taken->index, part] {
             StepOrder& order = this->runner(schedule_->steps()[index].to).order();
-            ASSERT_TRUE(order.Awaited(index));
+            const std::optional<std::uint32_t> turn = order.Awaited(index);
+            ASSERT_TRUE(turn);
             arrived_[index].push_back(part);
-            order.OnArrived(index, PixelCount(part.pixels));
+            order.OnArrived(*turn, PixelCount(part.pixels));
           });
         }
       }
@@ -104,13 +105,13 @@ TEST(ScheduleRunner, EveryScheduleEndsAtItsRootWhateverTheOrderOfEvents) {
 TEST(ScheduleRunner, ARankThatIsNotRenderedOrIsCombiningWaits) {
   ScheduleRunner<RankInterval> runner(Derive({"centralized", 3, 0}), kFrame, {0});
   ASSERT_TRUE(runner.order().Awaited(0));
-  runner.order().OnArrived(0, 240);
+  runner.order().OnArrived(runner.order().Awaited(0).value(), 240);
   EXPECT_FALSE(runner.TakeNext());
   runner.OnRendered(0, {0, 1});
   EXPECT_TRUE(runner.TakeNext());
   EXPECT_FALSE(runner.order().Awaited(0));
   runner.order().OnCombineStarted(0);
-  runner.order().OnArrived(1, 240);
+  runner.order().OnArrived(runner.order().Awaited(1).value(), 240);
   EXPECT_FALSE(runner.TakeNext());
   EXPECT_FALSE(runner.order().Done(0));
   runner.order().OnCombined(0);
@@ -126,7 +127,7 @@ TEST(ScheduleRunner, StepsOfTheSamePixelsKeepTheirOrderAndOthersDoNotWait) {
     return std::uint32_t(std::ranges::find_if(steps, [&](const Step& s) { return s.to == to && s.pixels.begin == begin; }) - steps.begin());
   };
   EXPECT_FALSE(runner.TakeNext()) << "what is sent on waits for what comes in";
-  runner.order().OnArrived(index(1, 120), 120);
+  runner.order().OnArrived(runner.order().Awaited(index(1, 120)).value(), 120);
   EXPECT_EQ(runner.TakeNext()->index, index(1, 120)) << "the second strip came first";
   EXPECT_EQ(runner.TakeNext()->index, index(0, 120));
   EXPECT_FALSE(runner.TakeNext());
@@ -135,11 +136,11 @@ TEST(ScheduleRunner, StepsOfTheSamePixelsKeepTheirOrderAndOthersDoNotWait) {
 TEST(ScheduleRunner, AReceiveComesAgainUntilAllPixelsAreThere) {
   ScheduleRunner<RankInterval> runner(Derive({"fan-in", 2, 0}), kFrame, {0});
   runner.OnRendered(0, {0, 1});
-  runner.order().OnArrived(0, 100);
+  runner.order().OnArrived(runner.order().Awaited(0).value(), 100);
   EXPECT_TRUE(runner.TakeNext());
   EXPECT_FALSE(runner.TakeNext());
   EXPECT_TRUE(runner.order().Awaited(0));
-  runner.order().OnArrived(0, 140);
+  runner.order().OnArrived(runner.order().Awaited(0).value(), 140);
   EXPECT_TRUE(runner.TakeNext());
   EXPECT_FALSE(runner.order().Awaited(0));
 }

@@ -1,11 +1,13 @@
 // `experiment`: what is listed runs and leaves a report; what is interrupted continues; what is wrong is told in a line.
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <set>
+#include <sstream>
+#include <string_view>
 
 #include "tests/end_to_end/program.h"
 #include "tests/support/well_formed.h"
@@ -15,43 +17,48 @@ namespace {
 
 using nlohmann::json;
 using testing::HasSubstr;
+using testing::Not;
 
 class ExperimentTest : public EndToEndTest {
  protected:
-  void ExpectReport(const std::string& folder, const std::string& experiment) {
-    const json result = json::parse(ReadFile(folder + "/result.json"));
-    EXPECT_EQ(result["experiment"], experiment);
-    EXPECT_NE(result["commit"], "");
-    EXPECT_THAT(result["command"].get<std::string>(), HasSubstr("experiment " + experiment));
-    EXPECT_GE(result["machine"]["cores"], 1);
-    EXPECT_FALSE(result["tables"].empty());
-    for (const json& table : result["tables"]) {
-      EXPECT_TRUE(std::filesystem::exists(Path(folder + "/" + table["name"].get<std::string>() + ".csv"))) << table["name"];
-      EXPECT_FALSE(table["rows"].empty()) << table["name"];
-    }
+  std::vector<json> RowsOf(const std::string& folder) {
+    std::vector<json> rows;
+    std::istringstream lines(ReadFile(folder + "/results.jsonl"));
+    for (std::string line; std::getline(lines, line);) rows.push_back(json::parse(line));
+    return rows;
+  }
+  void ExpectResults(const std::string& folder, const std::string& experiment) {
+    const json run = json::parse(ReadFile(folder + "/run.json"));
+    EXPECT_EQ(run["experiment"], experiment);
+    EXPECT_NE(run["commit"], "");
+    EXPECT_THAT(run["command"].get<std::string>(), HasSubstr("experiment "));
+    EXPECT_GE(run["machine"]["cores"], 1);
+    const std::vector<json> rows = RowsOf(folder);
+    EXPECT_FALSE(rows.empty());
+    for (const json& row : rows) EXPECT_EQ(row["experiment"], experiment);
+    const std::string csv = ReadFile(folder + "/results.csv");
+    EXPECT_EQ(std::ranges::count(csv, '\n'), std::ptrdiff_t(rows.size()) + 1);
+  }
+  // Where Python has what slabstream-lab needs.
+  void ExpectPage(const std::string& folder) {
+    if (std::string_view(SLABSTREAM_LAB_PYTHON).empty()) return;
+    RunningProgram lab({SLABSTREAM_LAB_PYTHON, SLABSTREAM_SOURCE_DIRECTORY "/python/slabstream-lab", folder}, directory_);
+    const ProgramResult result = lab.Wait();
+    EXPECT_EQ(result.exit_status, 0) << result.err;
+    EXPECT_THAT(result.out, HasSubstr("wrote " + folder + "/report.html"));
     EXPECT_EQ(WhyNotWellFormed(ReadFile(folder + "/report.html")), "");
-    std::size_t plots = 0;
-    for (const auto& entry : std::filesystem::directory_iterator(Path(folder + "/plots"))) {
-      EXPECT_EQ(WhyNotWellFormed(ReadFile(folder + "/plots/" + entry.path().filename().string())), "") << entry.path();
-      ++plots;
-    }
-    EXPECT_GE(plots, 1U);
+    EXPECT_FALSE(std::filesystem::is_empty(Path(folder + "/plots")));
   }
 };
 
-TEST_F(ExperimentTest, EveryListedExperimentLeavesAReport) {
+TEST_F(ExperimentTest, EveryListedExperimentLeavesResultsAndAPage) {
   const std::string list = MustRun({"experiment", "--list"}).out;
   for (const std::string name : {"paper", "balance", "combining", "streaming", "scaling"}) {
     EXPECT_THAT(list, HasSubstr(name));
     MustRun({"experiment", name, "-o", name, "--quick", "--scale", "0.15"});
-    ExpectReport(name, name);
+    ExpectResults(name, name);
+    ExpectPage(name);
   }
-  const json paper = json::parse(ReadFile("paper/result.json"));
-  std::set<std::string> names;
-  for (const json& table : paper["tables"]) names.insert(table["name"]);
-  for (const char* name : {"table-1-transform", "table-2-combining", "table-3-constants-splatting", "table-4-constants-zbuffer",
-                           "table-5-splatting", "table-6-zbuffer"})
-    EXPECT_EQ(names.count(name), 1U) << name;
 }
 
 TEST_F(ExperimentTest, SweepOfAUsersOwn) {
@@ -60,8 +67,10 @@ TEST_F(ExperimentTest, SweepOfAUsersOwn) {
     "policies": [{}, {"decomposition": "kd-tree", "combine": "radix-k"},
                  {"name": "open", "decomposition": "auto", "split": "auto", "assignment": "auto", "combine": "auto"}], "workers": [1, 3]})";
   MustRun({"experiment", "sweep", "sweep.json", "-o", "out"});
-  ExpectReport("out", "sweep");
-  EXPECT_EQ(json::parse(ReadFile("out/result.json"))["tables"][0]["rows"].size(), 6U);
+  ExpectResults("out", "sweep");
+  ExpectPage("out");
+  const std::vector<json> rows = RowsOf("out");
+  EXPECT_EQ(std::ranges::count_if(rows, [](const json& row) { return row["metric"] == "period"; }), 6);
 
   std::ofstream(Path("bad.json")) << R"({"volumes": [{"file": "ball.nrrd"}], "policies": [{}], "workers": [-1]})";
   const ProgramResult bad = Slabstream({"experiment", "sweep", "bad.json", "-o", "bad"});
@@ -86,7 +95,25 @@ TEST_F(ExperimentTest, ContinuesWhereCtrlCStoppedIt) {
   EXPECT_THAT(other.err, HasSubstr("holds a run with repeats 20, not 21"));
   MustRun(arguments);
   EXPECT_EQ(ReadFile("out/trials.jsonl").substr(0, before.size()), before);
-  ExpectReport("out", "streaming");
+  ExpectResults("out", "streaming");
+}
+
+TEST_F(ExperimentTest, BalanceOfAUsersOwnVolume) {
+  MakeSphere("ball.nrrd", 2, 24);
+  MustRun({"experiment", "balance", "ball.nrrd:auto", "-o", "out", "--quick", "--scale", "0.1", "--workers", "3", "--renderer",
+           "mip,raycast", "--views", "fly-through", "--transfer", "opaque,gray-ramp"});
+  ExpectResults("out", "balance");
+  const std::string results = ReadFile("out/results.csv");
+  for (const char* word : {"ball", "mip", "raycast", "fly-through"}) EXPECT_THAT(results, HasSubstr(word));
+  EXPECT_THAT(results, Not(HasSubstr("class1")));
+  EXPECT_EQ(Slabstream({"experiment", "balance", "ball.nrrd:auto", "-o", "out", "--quick", "--scale", "0.1"}).exit_status, 2)
+      << "other options are another run";
+}
+
+TEST_F(ExperimentTest, OptionsBelongToTheirExperiment) {
+  EXPECT_THAT(MustRun({"experiment", "balance", "--help"}).out, HasSubstr("--views"));
+  EXPECT_THAT(MustRun({"experiment", "paper", "--help"}).out, Not(HasSubstr("--views")));
+  MustRun({"experiment", "--quick", "--scale", "0.15", "-o", "out", "streaming"});  // options may stand before the name
 }
 
 TEST_F(ExperimentTest, WhatIsWrongIsToldInALine) {
@@ -96,9 +123,18 @@ TEST_F(ExperimentTest, WhatIsWrongIsToldInALine) {
       {{"experiment", "cake", "-o", "x"}, "'cake' is no experiment"},
       {{"experiment", "sweep", "-o", "x"}, "needs a FILE"},
       {{"experiment", "sweep", "none.json", "-o", "x"}, "'none.json' does not exist"},
-      {{"experiment", "paper", "some.json", "-o", "x"}, "takes no FILE"},
+      {{"experiment", "paper", "some.json", "-o", "x"}, "some.json"},
+      {{"experiment", "balance", "-o", "x", "--views", "sideways"}, "--views 'sideways'"},
+      {{"experiment", "balance", "-o", "x", "--workers", "2,0"}, "--workers 0"},
+      {{"experiment", "balance", "-o", "x", "--renderer", "crayon"}, "--renderer 'crayon'"},
+      {{"experiment", "balance", "-o", "x", "--transfer", "opaque"}, "--transfer"},
+      {{"experiment", "balance", "none.nrrd", "-o", "x"}, "none.nrrd"},
+      {{"experiment", "paper", "-o", "x", "--views", "turntable"}, "--views"},
       {{"experiment", "paper", "-o", "x", "--scale", "2"}, "--scale"},
       {{"experiment", "paper", "-o", "x", "--repeats", "0"}, "--repeats"},
+      {{"experiment", "paper", "-o", "x", "--footprints", "3,99"}, "--footprints 99"},
+      {{"experiment", "paper", "-o", "x", "--footprints", "3,,5"}, "--footprints ''"},
+      {{"experiment", "streaming", "-o", "x", "--footprints", "3"}, "--footprints"},
       {{"experiment", "paper", "-o", "x", "--volume", "none.nrrd"}, "none.nrrd"},
       {{"experiment", "paper", "-o", "/proc/x"}, "/proc/x"},
   };

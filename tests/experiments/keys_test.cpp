@@ -12,9 +12,9 @@
 #include "common/volume_io/volume_reader.h"
 #include "laboratory/experiments/balanced_case.h"
 #include "laboratory/experiments/frame_keys.h"
-#include "laboratory/experiments/moving_view.h"
 #include "laboratory/experiments/request_json.h"
 #include "laboratory/experiments/sweep_file.h"
+#include "laboratory/experiments/view_sequence.h"
 #include "tests/support/temporary_directory.h"
 
 namespace slabstream {
@@ -102,6 +102,8 @@ FrameCase Example() {
   return frame;
 }
 
+ViewSequence SequenceOf(const FrameCase& frame, int steps) { return {frame, &ViewMotions().front(), steps, std::nullopt, false}; }
+
 // Changes of a part, as changes of the whole.
 template <class Whole, class Part>
 void Add(Changes<Whole>& all, const Changes<Part>& changes, Part& (*part)(Whole&)) {
@@ -147,10 +149,10 @@ TEST_F(Keys, EveryFieldOfARequestIsInItsJson) {
 }
 
 TEST_F(Keys, HoldWhatDecidesTheirNumbers) {
-  enum Kind : unsigned { kBoxes = 1, kPicture = 2, kService = 4, kValidation = 8, kBalanced = 16, kMoving = 32, kAll = 63 };
+  enum Kind : unsigned { kBoxes = 1, kPicture = 2, kService = 4, kValidation = 8, kBalanced = 16, kSequence = 32, kAll = 63 };
   const auto keys_of = [&](const FrameCase& frame) {
     return std::vector<Json>{BoxCostKey(context_, frame),       FinishKey(context_, frame),   ServiceKey(context_, frame, 5),
-                             ValidationKey(context_, frame, 7), BalancedKey(context_, frame), MovingKey(context_, frame, 6)};
+                             ValidationKey(context_, frame, 7), BalancedKey(context_, frame), SequenceKey(context_, SequenceOf(frame, 6))};
   };
   struct Group {
     unsigned decides;
@@ -164,9 +166,13 @@ TEST_F(Keys, HoldWhatDecidesTheirNumbers) {
                     {"occupancy", [](F& f) { std::get<SphereRequest>(f.volume.volume).occupancy = 0.11; }},
                     {"renderer", [](F& f) { f.volume.renderer = ZBuffer(); }},
                     {"width", [](F& f) { ++f.size.width; }},
-                    {"height", [](F& f) { ++f.size.height; }}}};
+                    {"height", [](F& f) { ++f.size.height; }},
+                    {"parameters", [](F& f) { f.look.parameters["sampling-rate"] = "2"; }},
+                    {"termination", [](F& f) { f.look.termination = 0; }},
+                    {"lighting", [](F& f) { f.look.shading.model = ShadingModel::kNone; }}}};
+  Group views{kAll & ~kSequence, {}};  // a sequence has views of its own
   Add<F, ViewParameters>(
-      everything.changes, ChangesOfView(), [](F & f) -> auto& { return f.view; });
+      views.changes, ChangesOfView(), [](F & f) -> auto& { return f.view; });
   Add<F, TransferChoice>(
       everything.changes, ChangesOfTransfer(), [](F & f) -> auto& { return f.volume.transfer; });
   const auto policy = [](F& f) -> Policy& { return f.policy; };
@@ -178,7 +184,7 @@ TEST_F(Keys, HoldWhatDecidesTheirNumbers) {
   Add<F, Policy>(combining.changes, ChangesOfCombining(), policy);
 
   const std::vector<Json> example = keys_of(Example());
-  for (const Group& group : {nothing, everything, partition, owners, combining}) {
+  for (const Group& group : {nothing, everything, views, partition, owners, combining}) {
     for (const auto& [name, change] : group.changes) {
       FrameCase frame = Example();
       change(frame);
@@ -193,7 +199,25 @@ TEST_F(Keys, HoldWhatDecidesTheirNumbers) {
 TEST_F(Keys, HoldHowMuchIsMeasured) {
   EXPECT_NE(ServiceKey(context_, Example(), 5), ServiceKey(context_, Example(), 6));
   EXPECT_NE(ValidationKey(context_, Example(), 5), ValidationKey(context_, Example(), 6));
-  EXPECT_NE(MovingKey(context_, Example(), 5), MovingKey(context_, Example(), 6));
+  EXPECT_NE(SequenceKey(context_, SequenceOf(Example(), 5)), SequenceKey(context_, SequenceOf(Example(), 6)));
+}
+
+TEST_F(Keys, OfSequencesHoldTheWayTheTransferFunctionAndWhatIsLearnt) {
+  FrameCase dynamic = Example();
+  dynamic.policy.balance = "dynamic";
+  for (const FrameCase& frame : {Example(), dynamic}) {
+    const ViewSequence sequence = SequenceOf(frame, 4);
+    const Json key = SequenceKey(context_, sequence);
+    ViewSequence other = sequence;
+    other.motion = &ViewMotions().back();
+    EXPECT_NE(SequenceKey(context_, other), key);
+    other = sequence;
+    other.later = TransferChoice{};
+    EXPECT_NE(SequenceKey(context_, other), key);
+    other = sequence;
+    other.slowed = true;  // without learning, the same boxes are measured
+    EXPECT_EQ(SequenceKey(context_, other) != key, frame.policy.balance == "dynamic");
+  }
 }
 
 TEST_F(Keys, ReadPlainly) {

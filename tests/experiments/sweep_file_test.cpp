@@ -14,9 +14,9 @@ using testing::HasSubstr;
 constexpr const char* kGood = R"({
   "title": "two", "size": [300, 200],
   "volumes": [{"sphere": {"class": 2, "size": 40, "occupancy": 0.3}, "opacity": 0.2}],
-  "renderers": ["splat", "zbuffer"],
+  "renderers": ["splat", {"name": "fine", "renderer": "raycast", "sampling-rate": 2, "shading": "none", "lights": [[1, 0, 0.5]], "termination": 0}],
   "views": [{"azimuth": 30}, {"name": "close", "projection": "perspective", "zoom": 2}],
-  "policies": [{"combine": "fan-in"}, {"name": "even", "decomposition": "kd-tree", "split": "occupied", "assignment": "greedy", "groups": 2, "combine": "tree:4,strips=8", "balance": "dynamic", "pixel_error": 0.001}],
+  "policies": [{"combine": "fan-in"}, {"name": "even", "decomposition": "kd-tree", "split": "occupied", "assignment": "greedy", "groups": 2, "combine": "tree:4,strips=8", "balance": "dynamic", "pixel_error": 0.001, "axis": "x", "teams": 2}],
   "workers": [1, 16],
   "links": ["10gbit", "1gbit:30,1"]
 })";
@@ -27,7 +27,16 @@ TEST(SweepFile, ReadsWhatItSays) {
   EXPECT_EQ(sweep->title, "two");
   EXPECT_EQ(sweep->size, (ImageSize{300, 200}));
   EXPECT_EQ(sweep->volumes[0].opacity, 0.2);
-  EXPECT_EQ(sweep->renderers.size(), 2U);
+  ASSERT_EQ(sweep->renderers.size(), 2U);
+  EXPECT_EQ(sweep->renderers[0].name, "splat");
+  EXPECT_EQ(sweep->renderers[1].name, "fine");
+  EXPECT_EQ(sweep->renderers[1].kind, FindRenderer("raycast"));
+  EXPECT_EQ(sweep->renderers[1].look.parameters, (ParameterTexts{{"sampling-rate", "2"}}));
+  EXPECT_EQ(sweep->renderers[1].look.shading.model, ShadingModel::kNone);
+  EXPECT_EQ(sweep->renderers[1].look.shading.lights, (std::vector<Vec3>{{1, 0, 0.5}}));
+  EXPECT_EQ(sweep->renderers[1].look.termination, 0);
+  EXPECT_EQ(sweep->policies[1].policy.axis, AxisChoice::kX);
+  EXPECT_EQ(sweep->policies[1].policy.teams, 2);
   EXPECT_EQ(sweep->views[0].name, "view 1");
   EXPECT_EQ(sweep->views[1].view.zoom, 2);
   EXPECT_EQ(sweep->policies[0].name, "slab by voxels, cyclic, static, 1 groups, fan-in");
@@ -49,7 +58,8 @@ TEST(SweepFile, LeavesNamesOpen) {
 TEST(SweepFile, HasDefaults) {
   const Result<Sweep> sweep = ParseSweep("s.json", R"({"volumes": [{"sphere": {}}], "policies": [{}], "workers": [2]})");
   ASSERT_TRUE(sweep.ok()) << sweep.status().message();
-  EXPECT_EQ(sweep->renderers, std::vector{FindRenderer("splat")});
+  ASSERT_EQ(sweep->renderers.size(), 1U);
+  EXPECT_EQ(sweep->renderers[0].kind, FindRenderer("splat"));
   EXPECT_EQ(sweep->views.size(), 1U);
   EXPECT_EQ(sweep->links[0].name, "10gbit");
 }
@@ -75,7 +85,18 @@ TEST(SweepFile, TellsWhatIsWrongInOneLineThatNamesFieldValueAndLimit) {
       {"\"greedy\"", "\"lots\"", "policies[1].assignment: \"lots\" must be one of cyclic"},
       {"\"dynamic\"", "\"always\"", "policies[1].balance: \"always\" must be one of static, dynamic"},
       {"0.001", "2", "policies[1].pixel_error: 2 must be a number in [0, "},
-      {"\"groups\": 2", "\"groups\": 0", "policies[1].groups: 0 must be a whole number in [1, "},
+      {"\"groups\": 2", "\"groups\": -1", "policies[1].groups: -1 must be a whole number in [0, 1024]"},
+      {"\"teams\": 2", "\"teams\": 3", "policies[1].teams: 3 must divide 16 workers"},
+      {"\"teams\": 2", "\"teams\": 0", "policies[1].teams: 0 must be a whole number in [1, 1024]"},
+      {"\"sampling-rate\": 2", "\"sampling-rate\": 99", "renderers[1].sampling-rate: 99 must be a number in ["},
+      {"\"sampling-rate\": 2", "\"slope\": 2", "renderers[1]: 'slope' is no field; there are name, renderer, shading"},
+      {"\"none\"", "\"flat\"", "renderers[1].shading: \"flat\" must be one of phong, none, depth-gradient"},
+      {"[1, 0, 0.5]", "[0, 0, 0]", "renderers[1].lights[0]: light 0,0,0 has no direction"},
+      {"[1, 0, 0.5]", "[1, 0]", "renderers[1].lights[0]: light '1,0' is not X,Y,Z"},
+      {"\"termination\": 0", "\"termination\": 1", "renderers[1].termination: 1 must be a number in [0, 0.5]"},
+      {"\"opacity\": 0.2", "\"transfer\": \"cake\"", "volumes[0].transfer: "},
+      {"\"opacity\": 0.2", "\"opacity_distance\": 0", "volumes[0].opacity_distance: 0 must be a number in (0, 1000000]"},
+      {"\"opacity\": 0.2", "\"opacity\": 0.2, \"transfer\": \"auto\"", "volumes[0]: 'opacity' is that of a sphere without"},
       {"\"groups\": 2", "\"group\": 2", "policies[1]: 'group' is no field"},
       {"\"1gbit:30,1\"", "\"string\"", "links[1]: "},
       {"\"1gbit:30,1\"", "7", "links[1]: 7 must be a text"},
@@ -84,7 +105,8 @@ TEST(SweepFile, TellsWhatIsWrongInOneLineThatNamesFieldValueAndLimit) {
       {"\"close\"", "\"view 1\"", "views: two of them are called 'view 1'"},
       {"\"occupancy\": 0.3", "\"occupancy\": 0.9", "volumes[0].sphere.occupancy: 0.9 must be a number in (0, 0.52]"},
       {"\"class\": 2", "\"class\": 3", "volumes[0].sphere.class: 3 must be a whole number in [1, 2]"},
-      {"{\"sphere\": {\"class\": 2, \"size\": 40, \"occupancy\": 0.3}, \"opacity\": 0.2}", "{\"file\": \"/no/such.nrrd\"}", "volumes[0]: "},
+      {"{\"sphere\": {\"class\": 2, \"size\": 40, \"occupancy\": 0.3}, \"opacity\": 0.2}", "{\"file\": \"/no/such.nrrd\"}",
+       "volumes[0].file: "},
       {"{\"sphere\": {\"class\": 2, \"size\": 40, \"occupancy\": 0.3}, \"opacity\": 0.2}", "{}", "must have either 'sphere' or 'file'"},
       {"[300, 200]", "[300]", "size: [300] must be [width, height]"},
       {"[300, 200]", "0", "size: 0 must be a whole number in [1, "},

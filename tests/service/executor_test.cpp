@@ -31,7 +31,7 @@ class ExecutorTest : public testing::Test {
     RunImage runs = EncodeRuns(image, {0, 16 * 8}, 16);
     executor_.Perform(StartCombine{.key = kKey,
                                    .image = into,
-                                   .incoming = {.header = runs.header, .payload = Bytes(std::move(runs.payload))},
+                                   .incoming = IncomingImage{.header = runs.header, .payload = Bytes(std::move(runs.payload))},
                                    .side = side,
                                    .frame = kFrame});
     return outputs_.NextEvent<CombineDone>();
@@ -39,7 +39,8 @@ class ExecutorTest : public testing::Test {
   // What the image would be sent as: its pixels.
   LocalImage PixelsOf(ImageHandle image, PixelRange pixels = {0, 16 * 8}) {
     executor_.Perform(
-        SendPartial{.message = {.epoch = 1, .from_worker = 1, .key = kKey, .interval = {0, 1}, .pixels = pixels, .reports = {RankReport{}}},
+        SendPartial{.to = std::make_shared<Peer>(),
+                    .message = {.epoch = 1, .from_worker = 1, .key = kKey, .interval = {0, 1}, .pixels = pixels, .reports = {RankReport{}}},
                     .image = image,
                     .frame = kFrame},
         {});
@@ -79,6 +80,7 @@ TEST_F(ExecutorTest, ReportsTellOfAllMessagesOfTheirRank) {
   const auto send = [&](Rank rank, PixelRange pixels, std::vector<RankReport> reports) {
     executor_.Perform(
         SendPartial{
+            .to = std::make_shared<Peer>(),
             .message = {.epoch = 1, .from_worker = 1, .key = kKey, .interval = {0, 1}, .pixels = pixels, .reports = std::move(reports)},
             .image = 1,
             .frame = kFrame,
@@ -119,8 +121,10 @@ TEST_F(ExecutorTest, DamagedRunsAreRefused) {
   EXPECT_EQ(CombineIncoming(2, Filled({0, 0, 8, 4}, NAN), Side::kBack).status.code(), StatusCode::kInvalidArgument);
   RunImage runs = EncodeRuns(Filled({0, 0, 8, 4}, 0.5F), {0, 16 * 8}, 16);
   runs.header.bounds = {0, 0, 1 << 24, 1 << 24};  // would take petabytes
-  executor_.Perform(StartCombine{
-      .key = kKey, .image = 1, .incoming = {.header = runs.header, .payload = Bytes(std::move(runs.payload))}, .frame = kFrame});
+  executor_.Perform(StartCombine{.key = kKey,
+                                 .image = 1,
+                                 .incoming = IncomingImage{.header = runs.header, .payload = Bytes(std::move(runs.payload))},
+                                 .frame = kFrame});
   EXPECT_FALSE(outputs_.NextEvent<CombineDone>().status.ok());
   EXPECT_FALSE(CombineIncoming(1, MakeLocalImage(PixelFormat::kDepth, {0, 0, 8, 4}), Side::kBack).status.ok());
   EXPECT_FLOAT_EQ(PixelAt(PixelsOf(1), 7, 3).rgba[3], 0.5F) << "the image is as it was";
@@ -134,8 +138,10 @@ TEST_F(ExecutorTest, HiddenTilesAreThoseOfWhatWasCombinedBefore) {
   const PixelBounds frame = FrameBounds(setup);
   const auto combine = [&](const PixelBounds& bounds, float alpha) {
     RunImage runs = EncodeRuns(Filled(bounds, alpha), WholeFrame(setup), frame.width());
-    executor_.Perform(StartCombine{
-        .key = kKey, .image = 1, .incoming = {.header = runs.header, .payload = Bytes(std::move(runs.payload))}, .frame = frame});
+    executor_.Perform(StartCombine{.key = kKey,
+                                   .image = 1,
+                                   .incoming = IncomingImage{.header = runs.header, .payload = Bytes(std::move(runs.payload))},
+                                   .frame = frame});
   };
   combine({0, 0, 20, 8}, 1);
   executor_.Perform(FindHidden{kKey, 1, shared, {}});

@@ -180,7 +180,7 @@ class TwoExecutors : public testing::Test {
     Status Combine(ImageHandle into, const PartialImage& message, const Bytes& payload, bool replace = false) {
       executor.Perform(StartCombine{.key = kKey,
                                     .image = into,
-                                    .incoming = {message.image, message.shared, message.packed, payload},
+                                    .incoming = IncomingImage{message.image, message.shared, message.packed, payload},
                                     .side = Side::kBack,
                                     .replace = replace,
                                     .pixels = message.pixels,
@@ -188,7 +188,7 @@ class TwoExecutors : public testing::Test {
       return outputs.NextEvent<CombineDone>().status;
     }
     std::pair<PartialImage, Bytes> Send(ImageHandle image, bool lend) {
-      executor.Perform(SendPartial{{2, "inproc://two", 7},
+      executor.Perform(SendPartial{std::make_shared<Peer>(Peer{2, "inproc://two", 7}),
                                    {.epoch = 1, .from_worker = 1, .key = kKey, .step = 4, .interval = {0, 1}, .pixels = kWhole},
                                    image,
                                    kFrame},

@@ -62,7 +62,7 @@ class SymbolicImages {
   }
 
   void Combine(const StartCombine& combine) {
-    SymbolicImage source = combine.other == 0 ? UnpackSymbols(combine.incoming.payload) : Get(combine.other);
+    SymbolicImage source = combine.other == 0 ? UnpackSymbols(combine.incoming ? combine.incoming->payload : Bytes()) : Get(combine.other);
     if (combine.pixels.begin < combine.pixels.end) source = Within(source, combine.pixels);
     EXPECT_EQ(released_.count(combine.image), 0U) << "image " << combine.image << " is combined into after its release";
     SymbolicImage& image = images_[combine.image];

@@ -133,6 +133,26 @@ TEST(ChoosePolicy, DividesWhatLiesInACornerByWork) {
   EXPECT_LT(chosen.prediction->imbalance, 1.5);
 }
 
+// Partitions are judged under several schemes and numbers of groups: none of these is left out for doing badly under another.
+TEST(ChoosePolicy, NoPartitionWithAFewSchemesAndGroupsIsMuchBetter) {
+  for (const std::uint32_t slots : {2U, 8U, 13U}) {
+    Question question{.summary = SummaryWith({96, 96, 96}, [](const Index3& b) { return b.x + b.y + b.z < 5; }), .slots = slots};
+    question.machine.link = {Contention::kSwitched, 50e-6, 125e6};
+    const double chosen = question.Choose(Automatic()).prediction->latency_seconds;
+    for (const DecompositionEntry& entry : Decompositions()) {
+      for (const char* split : {"voxels", "occupied"}) {
+        for (const char* scheme : {"fan-in", "radix-k", "direct-send"}) {
+          for (const int groups : {1, 2}) {
+            const Policy policy{.decomposition = std::string(entry.name), .load_metric = split, .groups = groups, .combine = scheme};
+            EXPECT_LE((1 - kLeastGain) * chosen, question.Choose(policy).prediction->latency_seconds)
+                << entry.name << " by " << split << ", " << scheme << ", " << groups << ", p = " << slots;
+          }
+        }
+      }
+    }
+  }
+}
+
 TEST(ChoosePolicy, KeepsWhatHoldsUnlessEnoughIsGained) {
   Question question{.summary = SummaryWith({192, 192, 192}, [](const Index3& b) { return b.z < 3 && b.x < 6; }), .slots = 8};
   question.request.policy = Automatic();

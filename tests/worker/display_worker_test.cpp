@@ -41,7 +41,7 @@ TEST_F(DisplayWorkerTest, AFrameOfEmptyGroupsIsAnEmptyPicture) {
   const auto combine = All<StartCombine>(Tell(Assignment(1, {})));
   ASSERT_THAT(combine, SizeIs(1));
   EXPECT_EQ(combine[0].other, 0U);
-  EXPECT_EQ(combine[0].incoming.header.run_count, 0U);
+  EXPECT_EQ(combine[0].incoming->header.run_count, 0U);
   const Actions done = Combined(combine[0]);
   EXPECT_THAT(Sent<GroupDone>(done), SizeIs(1));
   ASSERT_THAT(All<SendFrame>(done), SizeIs(1));

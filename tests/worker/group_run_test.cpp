@@ -92,7 +92,7 @@ class Cluster {
     const Message message = messages_[which];
     if (random_.Chance(0.7)) messages_.erase(messages_.begin() + std::ptrdiff_t(which));  // else it comes once more
     WorkerActions actions;
-    worker(message.to).run->OnPartial(message.partial, message.payload, actions);
+    worker(message.to).run->OnPartial(PartialImage(message.partial), message.payload, actions);
     Perform(worker(message.to), actions);
   }
 
@@ -102,7 +102,7 @@ class Cluster {
         worker.images.Combine(*combine);
         worker.combined.push_back({combine->key, combine->image, {}, {Stage::kCombine, 0, 10}});
       } else if (const auto* send = std::get_if<SendPartial>(&action)) {
-        messages_.push_back({send->to.worker, send->message, worker.images.Encode(send->image, send->message.pixels)});
+        messages_.push_back({send->to->worker, send->message, worker.images.Encode(send->image, send->message.pixels)});
         ++messages_sent_;
       } else if (const auto* release = std::get_if<ReleaseImage>(&action)) {
         worker.images.Release(release->image);
@@ -158,7 +158,8 @@ TEST(GroupRun, EveryScheduleGivesTheGroupImageOnceInOrder) {
       for (Rank rank = 0; rank < ranks; ++rank) all[rank] = rank;
       SymbolicImage picture;
       for (const ImagePiece& piece : display.group_image->pieces) {
-        const SymbolicImage source = piece.image == 0 ? UnpackSymbols(piece.incoming.payload) : display.images.Get(piece.image);
+        const SymbolicImage source =
+            piece.image == 0 ? UnpackSymbols(piece.incoming ? piece.incoming->payload : Bytes()) : display.images.Get(piece.image);
         for (std::uint64_t i = piece.pixels.begin; i < piece.pixels.end; ++i) EXPECT_TRUE(picture.emplace(i, source.at(i)).second);
       }
       EXPECT_EQ(picture.size(), kFrame.end);
@@ -220,7 +221,7 @@ TEST(GroupRun, ImagesOfRanksThatAreNotAdjacentAreAFailure) {
   wrong.from_worker = 2;
   wrong.interval = {2, 3};
   wrong.pixels = kFrame;
-  run.OnPartial(wrong, {}, actions);
+  run.OnPartial(PartialImage(wrong), {}, actions);
   EXPECT_EQ(run.failure().code(), StatusCode::kInternal);
   EXPECT_NE(run.failure().message().find("not adjacent"), std::string::npos) << run.failure().message();
 }
@@ -250,10 +251,10 @@ TEST(GroupRun, ImagesFromWorkersThatDoNotOwnTheRankAreIgnored) {
   stranger.from_worker = 3;
   stranger.interval = {1, 2};
   stranger.pixels = kFrame;
-  run.OnPartial(stranger, {}, actions);
+  run.OnPartial(PartialImage(stranger), {}, actions);
   EXPECT_TRUE(actions.empty());
   stranger.from_worker = 2;
-  run.OnPartial(stranger, {}, actions);
+  run.OnPartial(PartialImage(stranger), {}, actions);
   EXPECT_EQ(actions.size(), 1U);
 }
 

@@ -109,12 +109,12 @@ TEST_F(HiddenTilesTest, ABoxThatTheyHideAsAWholeIsNeitherFetchedNorRendered) {
   const auto made = All<StartCombine>(told);
   ASSERT_THAT(made, SizeIs(1));
   EXPECT_EQ(made[0].other, 0U);
-  EXPECT_EQ(made[0].incoming.header, RunImageHeader{}) << "an empty picture";
+  EXPECT_EQ(made[0].incoming->header, RunImageHeader{}) << "an empty picture";
   const Actions done = Combined(made[0]);
   const auto sent = All<SendPartial>(done);
   ASSERT_THAT(sent, SizeIs(1));
   EXPECT_EQ(sent[0].image, made[0].image);
-  EXPECT_EQ(sent[0].to.worker, kPeer);
+  EXPECT_EQ(sent[0].to->worker, kPeer);
   EXPECT_EQ(sent[0].message.interval, (RankInterval{0, 1}));
   ASSERT_THAT(sent[0].message.reports, SizeIs(1));
   EXPECT_EQ(sent[0].message.reports[0].box, assignment.group.placements[0].id);

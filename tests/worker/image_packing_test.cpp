@@ -64,7 +64,7 @@ TEST(PackForLink, ImagesComeOutAsTheyWentIn) {
     const RunImage runs = EncodeRuns(ViewOf(image), color);
     const Bytes raw(runs.payload);
     for (const double link : {0.0, 1e6, 1e8, kInfinite}) {
-      std::optional<PackedRuns> packed;
+      Rare<PackedRuns> packed;
       const Bytes payload = PackForLink(raw, link, packed);
       EXPECT_FALSE(packed.has_value() && link == kInfinite);
       if (!packed) {
@@ -87,7 +87,7 @@ TEST(PackForLink, DamageIsFound) {
   SCOPED_TRACE(random.trace());
   LocalImage image = RandomImage(random, PixelFormat::kRgba, {0, 0, 40, 30});
   const RunImage runs = EncodeRuns(ViewOf(image), ColorCoding::kFixed16);
-  std::optional<PackedRuns> packed;
+  Rare<PackedRuns> packed;
   const Bytes payload = PackForLink(Bytes(runs.payload), 0, packed);
   ASSERT_TRUE(packed.has_value());
   const std::size_t raw = PayloadBytes(runs.header);

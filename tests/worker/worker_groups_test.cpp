@@ -38,7 +38,7 @@ TEST_F(WorkerGroupsTest, SendsItsImageToTheRootAndForgetsIt) {
   const Actions done = Rendered(render);
   const auto sent = All<SendPartial>(done);
   ASSERT_THAT(sent, SizeIs(1));
-  EXPECT_EQ(sent[0].to.worker, kPeer);
+  EXPECT_EQ(sent[0].to->worker, kPeer);
   EXPECT_EQ(sent[0].image, render.image);
   EXPECT_EQ(sent[0].message.interval, (RankInterval{1, 2}));
   EXPECT_EQ(sent[0].message.pixels, (PixelRange{0, 8}));

@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
+#include "common/cli/add_option.h"
 #include "laboratory/experiments/paper/setup.h"
+#include "laboratory/measure/splat_loops.h"
 
 namespace slabstream {
 namespace {
@@ -9,33 +11,26 @@ constexpr int kRepeats = 5, kQuickRepeats = 1;
 
 }  // namespace
 
-Report RunPaper(ExperimentContext& context) {
+void DeclarePaper(CLI::App& app, OwnOptions& options) {
+  AddParsedList(
+      app, "--footprints", options.footprints,
+      [](const std::string& option, const std::string& text) { return ParseInteger(option, text, kMinFootprint, kMaxFootprint); },
+      fmt::format("Diameters of the footprints of figure 8b in pixels, each from {} to {}", kMinFootprint, kMaxFootprint))
+      ->default_str("3,5,9,13,17,25");
+}
+
+void RunPaper(ExperimentContext& context, Results& results) {
   const PaperSetup setup(context);
   std::vector<Trial> trials;
-  for (auto* make : {TransformTrials, FootprintTrials, FrameTrials, ImprovedTrials}) {
+  for (auto* make :
+       {TransformTrials, FootprintTrials, PointsTrials, FrameTrials, OccupancyTrials, ImprovedTrials, ClaimTrials, ValidationTrials}) {
     for (Trial& trial : make(setup)) trials.push_back(std::move(trial));
   }
   context.Run(std::move(trials), kRepeats, kQuickRepeats);
-
-  Report report;
-  report.title = "Data-parallel volume rendering, measured again";
-  report.summary =
-      "Yagel and Machiraju divided volumes into slabs, rendered each on a processor of its own and combined the images. Every table and "
-      "figure of their paper, with the same N and p, on today's processors: measured where this machine can (kernels, each slab rendered "
-      "alone, one and "
-      "two workers), simulated from the measured costs of the slabs elsewhere, and theirs beside it. Times of this machine and of theirs "
-      "are "
-      "thirty years apart; shapes, shares, speed-ups and efficiencies are what to compare.";
-  for (auto* make : {TransformSection, FootprintSection, ConstantsSection, CombiningSection}) {
-    report.sections.push_back(make(setup));
+  for (auto* add : {AddTransform, AddFootprint, AddPoints, AddFrames, AddOccupancy, AddModel, AddConstants, AddImproved, AddClaims,
+                    AddValidation, AddPictures}) {
+    add(setup, results);
   }
-  for (const RendererKind* renderer : {Splatting(), ZBuffer()}) {
-    report.sections.push_back(PipelineSection(setup, renderer));
-  }
-  for (auto* make : {ImprovedSection, ValidationSection, PicturesSection}) {
-    report.sections.push_back(make(setup));
-  }
-  return report;
 }
 
 }  // namespace slabstream

@@ -1,12 +1,8 @@
 #include "laboratory/experiments/paper/setup.h"
 
-#include <algorithm>
 #include <numbers>
 
-#include "common/renderers/registry.h"
 #include "laboratory/bench/bench_machine.h"
-#include "laboratory/experiments/machines.h"
-#include "laboratory/experiments/paper/printed.h"
 
 namespace slabstream {
 namespace {
@@ -40,36 +36,25 @@ FrameCase PaperSetup::Frame(const RendererKind* renderer, int size, int workers)
   frame.view.azimuth_degrees = kAzimuth;
   frame.view.elevation_degrees = kElevation;
   frame.view.zoom = std::numbers::sqrt3;  // at 1 the cube's diagonal fills the picture
+  frame.policy.axis = AxisChoice::kView;
   frame.policy.groups = 1;
   frame.workers = workers;
   return frame;
 }
 
-MachineModel PaperSetup::Machine(const RendererKind* renderer) const {
-  return PaperMachine(context_, Recall(context_, Frame(renderer, table_size(), 1)).RenderSeconds(), double(table_size()) * table_size());
+MeasuredFrame PaperSetup::AsPaper(MeasuredFrame frame, Images images) {
+  frame.finish_seconds = frame.receive_seconds = 0;
+  if (images == Images::kWhole) FillImages(frame);
+  return frame;
 }
 
-std::vector<FrameCase> PaperSetup::Frames() const {
-  std::vector<FrameCase> frames;
-  for (const RendererKind* renderer : {Splatting(), ZBuffer()}) {
-    for (const int size : sizes_) {
-      for (const int p : workers_) frames.push_back(Frame(renderer, size, p));
-    }
+std::vector<MachineModel> PaperSetup::Machines(const RendererKind* renderer) const {
+  std::vector<MachineModel> machines;
+  for (const MeasuredFrame& one : RecallRepeats(context_, Frame(renderer, table_size(), 1))) {
+    machines.push_back(PaperMachine(renderer == Splatting() ? kPaperSplatting : kPaperZBuffer, one.RenderSeconds(),
+                                    double(FrameBounds(one.plan.setup).pixel_count())));
   }
-  return frames;
-}
-
-std::vector<Trial> FrameTrials(const PaperSetup& setup) {
-  std::vector<Trial> trials;
-  const std::vector<int> measured = setup.MeasuredWorkers();
-  for (const FrameCase& frame : setup.Frames()) {
-    trials.push_back(BoxCostTrial(setup.context(), frame));
-    trials.push_back(FinishTrial(setup.context(), frame));
-    if (std::ranges::find(measured, frame.workers) == measured.end()) continue;
-    trials.push_back(ValidationTrial(setup.context(), frame, kValidationTurns));
-  }
-  trials.push_back(HostTrial());
-  return trials;
+  return machines;
 }
 
 }  // namespace slabstream

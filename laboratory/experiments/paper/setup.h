@@ -3,12 +3,15 @@
 
 #include <vector>
 
-#include "common/simulation/machine_model.h"
+#include "laboratory/experiments/figures.h"
 #include "laboratory/experiments/frame_case.h"
+#include "laboratory/measure/paper_model.h"
+#include "laboratory/results/results.h"
 
 namespace slabstream {
 
-inline constexpr int kValidationTurns = 7;
+// Images are sent whole, as in the paper, or without their empty pixels, as in Slabstream.
+enum class Images { kWhole, kWithoutEmpty };
 
 class PaperSetup {
  public:
@@ -22,33 +25,40 @@ class PaperSetup {
   int large_size() const { return sizes_.back(); }              // N of its figures 8b and 8c
   int Scaled(int side) const { return context_.Scaled(side); }
 
-  // Class I with 5 % of its voxels occupied, equal slabs, one group, on N x N pixels at zoom sqrt(3): a pixel a voxel. The whole sphere is
-  // in view however it is turned.
+  // Class I with 5 % of its voxels occupied, on N x N pixels at zoom sqrt(3): a pixel a voxel. The whole sphere is in view however it is
+  // turned. As in the paper, a slab is N/p whole slices, of those that are traversed; one group, combined hierarchically.
   FrameCase Frame(const RendererKind* renderer, int size, int workers) const;
 
-  // PaperMachine for the time of a frame of the tables' N on this machine.
-  MachineModel Machine(const RendererKind* renderer) const;
+  // What the paper counts: neither the picture nor its way to a client.
+  static MeasuredFrame AsPaper(MeasuredFrame frame, Images images);
 
-  // All of (renderer, size, workers).
-  std::vector<FrameCase> Frames() const;
+  // PaperMachine for the time of a frame of the tables' N on this machine, one for each repeat.
+  std::vector<MachineModel> Machines(const RendererKind* renderer) const;
 
  private:
   ExperimentContext& context_;
   std::vector<int> sizes_, workers_;
 };
 
-// Sections: the measurements that they need, and their texts.
+// Sections: the measurements that they need, and what they add to the results.
 std::vector<Trial> TransformTrials(const PaperSetup& setup);
-Section TransformSection(const PaperSetup& setup);
+void AddTransform(const PaperSetup& setup, Results& results);
 std::vector<Trial> FootprintTrials(const PaperSetup& setup);
-Section FootprintSection(const PaperSetup& setup);
+void AddFootprint(const PaperSetup& setup, Results& results);
+std::vector<Trial> PointsTrials(const PaperSetup& setup);
+void AddPoints(const PaperSetup& setup, Results& results);
 std::vector<Trial> FrameTrials(const PaperSetup& setup);
-Section ValidationSection(const PaperSetup& setup);
-Section CombiningSection(const PaperSetup& setup);
-Section ConstantsSection(const PaperSetup& setup);
-Section PipelineSection(const PaperSetup& setup, const RendererKind* renderer);
+void AddFrames(const PaperSetup& setup, Results& results);
+std::vector<Trial> OccupancyTrials(const PaperSetup& setup);
+void AddOccupancy(const PaperSetup& setup, Results& results);
+void AddModel(const PaperSetup& setup, Results& results);
+void AddConstants(const PaperSetup& setup, Results& results);
 std::vector<Trial> ImprovedTrials(const PaperSetup& setup);
-Section ImprovedSection(const PaperSetup& setup);
-Section PicturesSection(const PaperSetup& setup);
+void AddImproved(const PaperSetup& setup, Results& results);
+std::vector<Trial> ClaimTrials(const PaperSetup& setup);
+void AddClaims(const PaperSetup& setup, Results& results);
+std::vector<Trial> ValidationTrials(const PaperSetup& setup);
+void AddValidation(const PaperSetup& setup, Results& results);
+void AddPictures(const PaperSetup& setup, Results& results);
 
 }  // namespace slabstream

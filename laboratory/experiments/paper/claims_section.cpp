@@ -1,0 +1,50 @@
+// What the paper says about images of slabs and of subcubes (section 5.1), in both projections.
+#include "laboratory/experiments/paper/setup.h"
+
+namespace slabstream {
+namespace {
+
+std::vector<FrameCase> Frames(const PaperSetup& setup) {
+  std::vector<FrameCase> frames;
+  for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
+    for (const char* decomposition : {"slab", "beam", "subcube"}) {
+      for (const int p : setup.workers()) {
+        if (p == 1) continue;
+        FrameCase& frame = frames.emplace_back(setup.Frame(Splatting(), setup.table_size(), p));
+        frame.policy.decomposition = decomposition;
+        frame.view.projection = projection;
+      }
+    }
+  }
+  return frames;
+}
+
+}  // namespace
+
+std::vector<Trial> ClaimTrials(const PaperSetup& setup) {
+  std::vector<Trial> trials;
+  for (const FrameCase& frame : Frames(setup)) {
+    trials.push_back(BoxCostTrial(setup.context(), frame));
+    trials.push_back(FinishTrial(setup.context(), frame));
+  }
+  return trials;
+}
+
+void AddClaims(const PaperSetup& setup, Results& results) {
+  for (const FrameCase& frame : Frames(setup)) {
+    const MeasuredFrame measured = Recall(setup.context(), frame);
+    Json of = {{"part", "claims"}};
+    of.update(ColumnsOf(frame));
+    const auto add = [&](const char* variant, const char* metric, double value, Origin origin) {
+      of["variant"] = variant;
+      results.Add(of, metric, value, origin);
+    };
+    double pixels = 0;
+    for (const MeasuredFrame::Cost& box : measured.boxes) pixels += box.covered_pixels;
+    add("pixels of all local images that are not empty", "count", pixels, Origin::kMeasured);
+    const std::vector<MachineModel> machines = setup.Machines(Splatting());
+    add("without empty pixels", "image_bytes", Simulate(measured, machines.front()).frames.front().image_bytes, Origin::kSimulated);
+  }
+}
+
+}  // namespace slabstream

@@ -1,0 +1,42 @@
+// PointZBuffer: Z-buffering of voxel points, as the paper's pipeline has it (Yagel and Machiraju, sections 3.1 and 3.5): the centre of each
+// occupied voxel is transformed and written to the one pixel that it falls on, if it is the nearest so far. Nothing is reconstructed, so
+// magnified surfaces have holes, through which one sees what lies behind, or nothing. For comparison with the renderer, which draws whole
+// faces of voxels.
+//
+// Slices are transformed one at a time by the incremental scheme: each is the one before it plus a row of the matrix (transform_loops.h).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/view/camera.h"
+#include "laboratory/measure/transform_loops.h"
+
+namespace slabstream {
+
+// From voxel indices to pixels and depth. Orthographic cameras only.
+TransformMatrix MatrixOf(const Camera& camera);
+
+class PointZBuffer {
+ public:
+  explicit PointZBuffer(ImageSize size);
+
+  // Draws into an empty image. `occupied`: a byte a voxel, x fastest; all but 0 are.
+  void Draw(const TransformMatrix& matrix, const Index3& size, const std::uint8_t* occupied);
+
+  bool Written(std::size_t pixel) const { return voxel_[pixel] != 0; }
+  // Pixels, compared with the depths of faces, row by row, +infinity where there is none, for voxels of spacing 1.
+  struct Holes {
+    std::size_t covered = 0;  // by a face
+    std::size_t empty = 0;    // of these: not written
+    std::size_t behind = 0;   // of these: the voxel lies more than a voxel's diagonal behind the face, so it is not the face's
+  };
+  Holes HolesIn(const std::vector<float>& faces) const;
+
+ private:
+  ImageSize size_;
+  std::vector<float> depth_;          // by pixel
+  std::vector<std::uint32_t> voxel_;  // by pixel: the index of the nearest voxel, from 1; 0: none. Deferred shading would need it
+};
+
+}  // namespace slabstream

@@ -1,0 +1,51 @@
+// Results: what an experiment found, one value a row (tidy data: Wickham, 2014). A folder gets them twice, as results.jsonl (an object a
+// line, columns that do not apply left out) and results.csv (all columns). docs/reference/results.md defines columns and metrics.
+//
+// One thread at a time.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "common/base/status.h"
+#include "laboratory/measure/statistics.h"
+#include "laboratory/results/origin.h"
+
+namespace slabstream {
+
+using Json = nlohmann::ordered_json;
+
+// Who found the values of a run.
+struct FoundBy {
+  std::string experiment, commit, machine;
+};
+
+class Results {
+ public:
+  explicit Results(FoundBy by) : by_(std::move(by)) {}
+
+  // `of`: an object whose names are in CaseColumns(). `metric`: a name of Metrics(), and the value in its unit. CHECKs both, and that no
+  // value was added before for the same case, metric and origin. A value that is not finite is left out.
+  void Add(const Json& of, std::string_view metric, const Estimate& value, Origin origin);
+  void Add(const Json& of, std::string_view metric, double value, Origin origin) {
+    Add(of, metric, Estimate{value, value, value, 1, 0}, origin);
+  }
+
+  // A table that is not tidy data, such as the spans of a timeline: FOLDER/NAME.csv. `rows`: objects with the same names.
+  void Attach(std::string name, std::vector<Json> rows) { attached_.emplace_back(std::move(name), std::move(rows)); }
+
+  const std::vector<Json>& rows() const { return rows_; }
+  Status Write(const std::string& folder) const;
+
+ private:
+  FoundBy by_;
+  std::vector<Json> rows_;  // as in results.jsonl
+  std::set<std::string> known_;
+  std::vector<std::pair<std::string, std::vector<Json>>> attached_;
+};
+
+}  // namespace slabstream

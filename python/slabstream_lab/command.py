@@ -1,0 +1,37 @@
+"""slabstream-lab: the page of an experiment."""
+from __future__ import annotations
+
+import argparse
+import pathlib
+import sys
+
+from . import page
+from .experiments import PAGES
+from .results import ResultsError, read
+
+
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(
+        prog="slabstream-lab",
+        description="Draw the page of an experiment: FOLDER/report.html and FOLDER/plots, from its results.",
+    )
+    parser.add_argument("folders", metavar="FOLDER", nargs="+", type=pathlib.Path, help="what -o of `slabstream experiment` has named")
+    options = parser.parse_args(arguments)
+    for folder in options.folders:
+        try:
+            run = read(folder)
+            name = run.info["experiment"]
+            if name not in PAGES:
+                raise ResultsError(f"'{folder}' holds experiment '{name}', for which there is no page (there is one for {', '.join(PAGES)})")
+            drawn = PAGES[name](run)
+            path = page.write(drawn, run, folder)
+        except (ResultsError, OSError) as error:
+            print(f"slabstream-lab: {error}", file=sys.stderr)
+            return 1
+        for doubt in page.doubts(run):
+            print(f"Doubt: {doubt}")
+        for section in drawn.sections:
+            if section.answer:
+                print(f"{section.title}: {section.answer}")
+        print(f"wrote {path}")
+    return 0

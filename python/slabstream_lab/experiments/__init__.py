@@ -1,0 +1,11 @@
+"""The pages: one module an experiment, with page(run) -> Page."""
+from . import balance, combining, paper, scaling, streaming, sweep
+
+PAGES = {
+    "paper": paper.page,
+    "balance": balance.page,
+    "combining": combining.page,
+    "streaming": streaming.page,
+    "scaling": scaling.page,
+    "sweep": sweep.page,
+}

@@ -1,0 +1,407 @@
+"""Load balance of sparse volumes: partitions, views that move, a slow worker, and what `auto` takes."""
+from __future__ import annotations
+
+import statistics
+from collections import Counter
+from typing import Any
+
+import pandas
+
+from .. import plots
+from ..page import Page, Section, Table
+from ..ranking import ranking
+from ..results import Run, value_of
+from ..value import Value, number_text, speed_text
+
+LINK, SCHEME = "10gbit", "radix-k"
+SLABS = "slab by voxels, static"  # what other methods are compared with
+
+Subject = tuple[str, str]  # volume and renderer
+
+
+def page(run: Run) -> Page:
+    subjects: list[Subject] = [
+        (volume, renderer)
+        for volume in run.distinct("volume", part="policy")
+        for renderer in run.distinct("renderer", part="policy", volume=volume)
+    ]
+    return Page(
+        "Load balance of sparse volumes",
+        "Where most voxels are empty, boxes of equal size take unequal times, and a frame waits for the slowest worker. How much does that "
+        "cost, and which way to divide a volume avoids it? Static balance keeps its boxes. Dynamic balance changes them between frames, by "
+        "the times that earlier frames took.",
+        [
+            _winners(run, subjects),
+            _efficiency(run, subjects),
+            _automatic(run, subjects),
+            *[_sequence(run, subject) for subject in subjects],
+            _slowed(run, subjects),
+            _prediction(run, subjects),
+            _assignments(run, subjects),
+        ],
+    )
+
+
+def _partition(row: pandas.Series) -> str:
+    return f"{row['decomposition']} by {row['split']}"
+
+
+def _method(row: pandas.Series) -> str:
+    return f"{_partition(row)}, {row['balance']}"
+
+
+def _by(rows: pandas.DataFrame, name: Any) -> dict[str, Value]:
+    return {name(row): value_of(row) for _, row in rows.iterrows()}
+
+
+def _shared(run: Run, part: str, subject: Subject) -> list[int]:
+    """The numbers of workers, above one."""
+    return [p for p in sorted(run.distinct("workers", part=part, volume=subject[0], renderer=subject[1])) if p > 1]
+
+
+def _of(count: int, all_: int, noun: str) -> str:
+    return f"{count} of {all_} {noun}{'' if all_ == 1 else 's'}"
+
+
+def _slug(run: Run, subject: Subject) -> str:
+    """Of the names of plots: the renderer only where there are several."""
+    return "-".join(subject if len(run.distinct("renderer", part="policy")) > 1 else subject[:1]).replace(".", "-")
+
+
+def _middle(run: Run, part: str) -> int:
+    return run.distinct("workers", part=part)[0]
+
+
+def _latencies(run: Run, subject: Subject, p: int) -> dict[str, Value]:
+    """Of the partitions with one group in the view of the partition section."""
+    of = {"part": "policy", "metric": "latency", "volume": subject[0], "renderer": subject[1]}
+    return _by(run.select(workers=p, groups=1, combine=SCHEME, link=LINK, **of), _partition)
+
+
+def _relative(rows: pandas.DataFrame) -> dict[str, Value]:
+    """Time over the time of the reference, from speeds."""
+    return {name: Value.exact(1).over(speed) for name, speed in _by(rows, _method).items()}
+
+
+def _winners(run: Run, subjects: list[Subject]) -> Section:
+    rows, winners, undecided = [], Counter(), 0
+    for volume, renderer in subjects:
+        for p in _shared(run, "sequence", (volume, renderer)):
+            for view in run.distinct("view", part="sequence"):
+                of = {"part": "sequence", "volume": volume, "renderer": renderer, "workers": p, "view": view}
+                latencies = _by(run.select(metric="latency", step=None, **of), _method)
+                speeds = _by(run.select(metric="speed", variant="equal slabs", **of), _method)
+                ranked = ranking(_relative(run.select(metric="speed", variant="equal slabs", **of)))
+                first = ranked.ordered[0]
+                if not ranked.decided:
+                    undecided += 1
+                elif len(ranked.best) == 1:
+                    winners[first] += 1
+                than = speed_text(speeds[first], "equal slabs") if first != SLABS else "equal slabs themselves"
+                rows.append([volume, renderer, p, view, latencies[SLABS], ranked.sentence(), latencies[first], than])
+    ties = len(rows) - winners.total() - undecided
+    answer = f"One method alone is fastest in {_of(winners.total(), len(rows), 'case')}"
+    answer += " (" + ", ".join(f"{name}: {count}" for name, count in winners.most_common()) + ")" if winners else ""
+    answer += f"; several tie in {ties}; the repeats do not decide {undecided}."
+    return Section(
+        "Which method wins where",
+        "Which partition, with static or dynamic balance, shows a moving view soonest?",
+        _moving_method(run) + " Methods are ranked by the mean latency of the steps over that of static slabs of equal voxels, in "
+        "parentheses. The two are compared repeat by repeat, on the same simulated machine.",
+        answer if rows else "",
+        [
+            Table(
+                "Least latency",
+                ["volume", "renderer", "p", "views", "equal slabs", "fastest", "latency of the first", "the first is"],
+                rows,
+            )
+        ],
+    )
+
+
+def _moving_method(run: Run) -> str:
+    steps = int(run.select(part="sequence")["step"].max()) + 1
+    return (
+        f"Each sequence has {steps} steps. The boxes of each step are rendered alone on one thread; frames are simulated one at a time "
+        "on a "
+        f"network of 10 Gbit/s, combined by {SCHEME}, one group. Where boxes change between steps, workers fetch the voxels that they lack "
+        "before they render, and that time counts."
+    )
+
+
+def _efficiency(run: Run, subjects: list[Subject]) -> Section:
+    table = Table(
+        "Efficiency and its factors",
+        "volume,renderer,p,partition,imbalance,efficiency,= balance,x extra work,x combining,voxels of a worker".split(","),
+        [],
+    )
+    blocks: list[Any] = []
+    sentences = []
+    for volume, renderer in subjects:
+        of = {"volume": volume, "renderer": renderer}
+        name = _slug(run, (volume, renderer))
+        whole = run.value("render_time", part="partition", workers=1, **of)
+        alone = run.value("latency", part="policy", workers=1, link=LINK, **of)
+        shared = _shared(run, "partition", (volume, renderer))
+        imbalances: dict[str, dict[int, Value]] = {}
+        efficiencies: dict[str, dict[int, Value]] = {}
+        for p in shared:
+            latencies = _latencies(run, (volume, renderer), p)
+            columns = {
+                metric: _by(run.select(part="partition", metric=metric, workers=p, **of), _partition)
+                for metric in ("imbalance", "render_time", "longest_render_time", "memory")
+            }
+            for partition, latency in latencies.items():
+                total, longest = columns["render_time"][partition], columns["longest_render_time"][partition]
+                efficiency = alone.over(latency).times(1 / p).percent()
+                imbalances.setdefault(partition, {})[p] = columns["imbalance"][partition]
+                efficiencies.setdefault(partition, {})[p] = efficiency
+                table.rows.append(
+                    [
+                        volume,
+                        renderer,
+                        p,
+                        partition,
+                        columns["imbalance"][partition],
+                        efficiency,
+                        total.over(longest).times(1 / p).percent(),
+                        whole.over(total).percent(),
+                        longest.over(latency).over(whole.over(alone)).percent(),
+                        columns["memory"][partition],
+                    ]
+                )
+            if p == shared[-1]:
+                sentences.append(f"{volume} ({renderer}): {ranking(columns['imbalance']).sentence()}")
+        for split in ("voxels", "occupied"):
+            blocks.append(
+                plots.lines(
+                    f"imbalance-{name}-{split}",
+                    f"{volume}, {renderer}: imbalance, boxes of equal {'voxels' if split == 'voxels' else 'occupied voxels'}",
+                    {q: list(by_p.items()) for q, by_p in imbalances.items() if q.endswith(split)},
+                    "workers",
+                    "longest / mean render time",
+                    "1 is perfect. A worker whose box shows nothing counts with no time.",
+                    log_x=True,
+                    log_y=True,
+                    marks=True,
+                )
+            )
+        blocks.append(
+            plots.lines(
+                f"efficiency-{name}",
+                f"{volume}, {renderer}: efficiency, boxes of equal occupied voxels",
+                {q: list(by_p.items()) for q, by_p in efficiencies.items() if q.endswith("occupied") or q == "slab by voxels"},
+                "workers",
+                "efficiency",
+                "Latency of one worker over p times the latency of p workers.",
+                log_x=True,
+                from_zero=True,
+                marks=True,
+            )
+        )
+        for partition, decomposition in (("slab by voxels", "slab"), ("kd-tree by occupied", "kd-tree")):
+            boxes = run.attached(f"boxes-{volume}-{renderer}-{decomposition}")
+            title = f"{volume}, {renderer}: {partition}, p = {_middle(run, 'box')}"
+            caption = "Render time of every box that the cut meets."
+            blocks.append(plots.cuts(f"boxes-{name}-{partition.replace(' ', '-')}", title, boxes, caption))
+    view = run.distinct("view", part="partition")[0]
+    pixels = run.distinct("pixels", part="partition")[0]
+    return Section(
+        "Partitions: imbalance and efficiency",
+        "Which partition gives workers equal work, and what is lost to imbalance, to extra work and to combining?",
+        f"One view (azimuth/elevation {view}), {pixels} x {pixels} pixels, one box a worker. Every box is rendered alone on one thread. "
+        "Imbalance is the longest of the workers' render times over their mean. Efficiency is the latency of one worker, T(1), over p "
+        "times "
+        f"that of p workers, T(p), simulated on a network of 10 Gbit/s and combined by {SCHEME}. Its three factors multiply exactly, "
+        "except "
+        "for rounding: balance is mean over longest render time; extra work is the render time of the whole volume by one worker over the "
+        "sum of the boxes' render times; combining is the rest: the share of the frame in which the slowest worker renders, over the same "
+        "share with one worker. A factor above 100 % is a gain. All are made from medians, so balance may differ in the last digit from "
+        "one "
+        "over imbalance. The voxels of a worker include the halo and are those of the fullest.",
+        f"Least imbalance at p = {shared[-1]}: " + "; ".join(sentences) + "." if sentences else "",
+        blocks + [table],
+    )
+
+
+def _automatic(run: Run, subjects: list[Subject]) -> Section:
+    rows, ratios = [], []
+    for volume, renderer in subjects:
+        for p in _shared(run, "auto", (volume, renderer)):
+            for link in run.distinct("link", part="auto"):
+                of = {"volume": volume, "renderer": renderer, "workers": p, "link": link}
+                chosen = run.select(part="auto", metric="latency", **of).iloc[0]
+                tried = _by(run.select(part="policy", metric="latency", **of), _policy)
+                best = min(tried, key=lambda name: tried[name].value)
+                own = tried[best].value >= chosen["value"]
+                ratio = Value.exact(1).over(run.value("speed", part="auto", variant="best policy", **of))
+                ratios.append(ratio.value)
+                least = value_of(chosen) if own else tried[best]
+                rows.append([volume, renderer, p, link, _policy(chosen), value_of(chosen), "its own" if own else best, least, ratio])
+    answer = ""
+    if rows:
+        median, worst = statistics.median(ratios), max(range(len(ratios)), key=ratios.__getitem__)
+        answer = (
+            f"The latency of auto is {number_text(median, 3)} times that of the best policy in the median of {len(ratios)} cases: "
+            f"{'within' if median <= 1.1 else 'not within'} 10 %. It is {number_text(ratios[worst], 3)} times in the worst case: "
+            f"{rows[worst][0]}, {rows[worst][1]}, p = {rows[worst][2]}, {rows[worst][3]}."
+        )
+    return Section(
+        "How good auto is",
+        "How far is the policy that auto takes from the best one?",
+        "The policy auto chooses before it has seen a frame, by simulating estimated boxes on a machine with standard constants. Its "
+        "choice "
+        "and all policies of the lists are then simulated with measured boxes, as above: all partitions, 1 and 2 groups, cyclic, "
+        f"{', '.join(run.distinct('combine', part='policy'))}. It may also take a policy outside these lists. "
+        "If its own is the best of all, the ratio is 1. The ratio is found repeat by repeat.",
+        answer,
+        [
+            Table(
+                "auto and the best policy",
+                ["volume", "renderer", "p", "link", "auto takes", "auto", "the best", "best", "auto / best"],
+                rows,
+            )
+        ],
+    )
+
+
+def _policy(row: pandas.Series) -> str:
+    groups = int(row["groups"])
+    return f"{_partition(row)}, {groups} group{'' if groups == 1 else 's'}, {row['assignment']}, {row['combine']}"
+
+
+def _sequence(run: Run, subject: Subject) -> Section:
+    volume, renderer = subject
+    of = {"part": "sequence", "volume": volume, "renderer": renderer, "link": LINK}
+    rows, outcomes, blocks = [], Counter(), []
+    workers = _shared(run, "sequence", subject)
+    for view in run.distinct("view", **of):
+        for p in workers:
+            values = {
+                metric: _by(run.select(metric=metric, view=view, workers=p, step=None, **of), _method)
+                for metric in ("latency", "imbalance", "voxel_bytes")
+            }
+            against = _by(run.select(metric="speed", variant="static", view=view, workers=p, **of), _method)
+            for method, latency in values["latency"].items():
+                speed = ""
+                if method in against:
+                    speed = speed_text(against[method], "static")
+                    outcomes[_outcome(against[method])] += 1
+                rows.append([view, p, method, latency, values["imbalance"][method], values["voxel_bytes"][method], speed])
+        if not workers:
+            continue
+        p = workers[len(workers) // 2]
+        for metric, what in (("imbalance", "longest / mean render time"), ("latency", "latency")):
+            steps = run.select(metric=metric, view=view, workers=p, **of)
+            steps = steps[steps["step"].notna()]
+            series = {method: plots.points_of(group, "step") for method, group in steps.groupby(steps.apply(_method, axis=1), sort=False)}
+            name = f"{metric}-{view}-{_slug(run, subject)}"
+            even = metric == "imbalance"
+            title = f"{volume}, {view}, p = {p}: {what}"
+            blocks.append(plots.lines(name, title, series, "step", what, log_y=even, from_zero=not even, marks=True))
+    return Section(
+        f"Moving views: {volume}, {renderer}",
+        "Does dynamic balance keep workers even while the view changes, and what does it move?",
+        _moving_method(run) + " Latency, imbalance and the voxels that workers fetch for a frame are means over the steps; these "
+        "include the "
+        "first steps, in which dynamic balance has nothing to go by yet.",
+        f"Dynamic balance is {_counted(outcomes)}." if outcomes else "",
+        blocks
+        + [
+            Table(
+                f"{volume}: means over a sequence",
+                ["views", "p", "method", "latency", "imbalance", "voxels fetched", "dynamic is"],
+                rows,
+            )
+        ],
+    )
+
+
+def _outcome(speed: Value) -> str:
+    if not speed.ranks:
+        return "open"
+    return "tie" if speed.low <= 1 <= speed.high else "faster" if speed.value > 1 else "slower"
+
+
+def _counted(outcomes: Counter) -> str:
+    counted = f"faster than static in {_of(outcomes['faster'], outcomes.total(), 'case')}, slower in {outcomes['slower']}"
+    counted += f", as fast in {outcomes['tie']}"
+    return counted + (f"; {outcomes['open']} are not ranked" if outcomes["open"] else "")
+
+
+def _slowed(run: Run, subjects: list[Subject]) -> Section:
+    rows, outcomes = [], Counter()
+    for volume, renderer in subjects:
+        of = {"volume": volume, "renderer": renderer, "link": LINK}
+        for p in _shared(run, "slowed", (volume, renderer)):
+            view = run.distinct("view", part="slowed")[0]
+            alike = _by(run.select(part="sequence", metric="latency", view=view, workers=p, step=None, **of), _method)
+            slow = _by(run.select(part="slowed", metric="latency", view=view, workers=p, step=None, **of), _method)
+            against = _by(run.select(part="slowed", metric="speed", variant="static", view=view, workers=p, **of), _method)
+            for method, latency in slow.items():
+                speed = ""
+                if method in against:
+                    speed = speed_text(against[method], "static")
+                    outcomes[_outcome(against[method])] += 1
+                rows.append([volume, renderer, p, view, method, alike[method], latency, latency.over(alike[method]), speed])
+    return Section(
+        "A worker at half speed",
+        "One worker takes twice as long for every box. Does dynamic balance give it less to do?",
+        "As under moving views, but the render times of worker 1 are doubled, before they are learnt as well. Both latencies are means "
+        "over "
+        "the steps of the same views.",
+        f"With a worker at half speed, dynamic balance is {_counted(outcomes)}." if outcomes else "",
+        [Table("Latency", ["volume", "renderer", "p", "views", "method", "all alike", "one slow", "slow / alike", "dynamic is"], rows)],
+    )
+
+
+def _prediction(run: Run, subjects: list[Subject]) -> Section:
+    rows, medians = [], []
+    for volume, renderer in subjects:
+        found = run.select(part="box", volume=volume, renderer=renderer)
+        for partition, boxes in found.groupby(found.apply(_partition, axis=1), sort=False):
+            times = boxes.pivot(index="box", columns="metric", values="value")
+            times = times[times["box_time"] > 0]
+            errors = (times["estimated_box_time"] / times["box_time"] - 1).abs()
+            if errors.empty:
+                continue
+            total = times["estimated_box_time"].sum() / times["box_time"].sum()
+            shares = ((times["estimated_box_time"] / total) / times["box_time"] - 1).abs()
+            medians.append(float(errors.median()))
+            found_errors = (errors.median(), errors.quantile(0.9), shares.median(), shares.quantile(0.9))
+            percent = [Value.exact(float(x) * 100, "%") for x in found_errors]
+            rows.append([volume, renderer, int(boxes["workers"].iloc[0]), partition, len(errors), Value.exact(float(total)), *percent])
+    answer = ""
+    if medians:
+        answer = f"The median error of a partition's boxes is from {min(medians) * 100:.0f} to {max(medians) * 100:.0f} %."
+    columns = ["volume", "renderer", "p", "partition", "boxes", "sum expected / measured"]
+    columns += ["median error", "90 % error", "median error of shares", "90 % error of shares"]
+    return Section(
+        "Expected and measured times of boxes",
+        "How well does the planner know what a box will take, before it has seen a frame?",
+        "The same boxes as under partitions. The error of a box is expected over measured time, less one, without its sign; nine of ten "
+        "boxes have at most the 90 % error. A common factor does not change a partition: the last columns give the errors once the "
+        "expected "
+        "times are scaled to the measured sum.",
+        answer,
+        [Table("Errors", columns, rows)],
+    )
+
+
+def _assignments(run: Run, subjects: list[Subject]) -> Section:
+    rows, sentences = [], []
+    for volume, renderer in subjects:
+        found = run.select(part="assignment", metric="imbalance", volume=volume, renderer=renderer)
+        values = _by(found, lambda row: f"{_partition(row)}, {row['assignment']}")
+        names = run.distinct("assignment", part="assignment")
+        for partition in dict.fromkeys(found.apply(_partition, axis=1)):
+            rows.append([volume, renderer, partition, *[values[f"{partition}, {name}"] for name in names]])
+        sentences.append(f"{volume} ({renderer}): {ranking(values).sentence()}")
+    p, groups = _middle(run, "assignment"), run.distinct("groups", part="assignment")[0]
+    return Section(
+        "Assignments",
+        f"With {groups} boxes a worker, who should own which?",
+        f"p = {p}, {groups} groups. Imbalance as above, from the workers' sums over their boxes.",
+        "Least imbalance: " + "; ".join(sentences) + ".",
+        [Table("Imbalance by assignment", ["volume", "renderer", "partition", *run.distinct("assignment", part="assignment")], rows)],
+    )

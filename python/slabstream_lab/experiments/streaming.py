@@ -1,0 +1,104 @@
+"""Groups of slabs: what streaming costs and what it saves."""
+from __future__ import annotations
+
+from .. import plots
+from ..page import Page, Section, Table
+from ..results import Run
+from ..value import Value, speed_text
+
+
+def page(run: Run) -> Page:
+    return Page(
+        "Streaming: groups of slabs",
+        "A volume is divided into groups of slabs that pass through the workers one after the other: the next group renders while the last "
+        "one is combined. More groups need less memory and show a first preview sooner. What do they cost?",
+        [_section(run, volume) for volume in run.distinct("volume", metric="period")],
+    )
+
+
+def _section(run: Run, volume: str) -> Section:
+    rows = run.select(volume=volume, origin="simulated")
+    workers = sorted(run.distinct("workers", volume=volume, metric="period"))
+    groups = sorted(run.distinct("groups", volume=volume, metric="period"))
+    shared = [p for p in workers if p > 1]
+    pixels = run.distinct("pixels", volume=volume)[0]
+
+    def get(metric: str, p: int, g: int, origin: str = "simulated") -> Value:
+        return run.value(metric, volume=volume, workers=p, groups=g, origin=origin, link="host" if p == 0 else "10gbit")
+
+    def efficiency(p: int, g: int) -> Value:
+        return get("period", 1, 1).over(get("period", p, g)).times(1 / p).percent()
+
+    table = Table(
+        f"{volume}: groups",
+        ["p", "groups", "latency", "first preview", "period", "efficiency", "voxels of a worker", "latency, service"],
+        [
+            [
+                p,
+                g,
+                get("latency", p, g),
+                get("preview", p, g),
+                get("period", p, g),
+                efficiency(p, g),
+                get("memory", p, g, "measured"),
+                run.find("latency", volume=volume, workers=p, groups=g, origin="measured"),
+            ]
+            for p in shared
+            for g in groups
+        ],
+    )
+    p, few, many = shared[-1], groups[0], groups[-1]
+    period = get("period", p, few).over(get("period", p, many))
+    answer = (
+        f"At p = {p}, {many} groups instead of {few} show a first preview after {get('preview', p, many).text()} instead of "
+        f"{get('preview', p, few).text()}, and a worker must hold {get('memory', p, many, 'measured').text()} of voxels instead of "
+        f"{get('memory', p, few, 'measured').text()}. From picture to picture the service is {speed_text(period)}."
+    )
+    name = volume.replace(".", "-")
+    return Section(
+        volume,
+        "How many groups?",
+        f"Equal slabs, {pixels} x {pixels} pixels, combined by the tree. Every slab is rendered alone on one thread. Frames are simulated on "
+        "a switched network of 10 Gbit/s with all that a service does around a frame. Efficiency compares the period with that of one worker "
+        "and one group. A worker must hold the slabs of two groups and their halos. The last column is the service on this machine.",
+        answer,
+        [
+            plots.lines(
+                f"efficiency-{name}",
+                "Efficiency, frames requested ahead",
+                {f"p = {p}": [(g, efficiency(p, g)) for g in groups] for p in shared},
+                "groups",
+                "efficiency",
+                "Halos are rendered again in every group, and every group has its own combining.",
+                from_zero=True,
+                marks=True,
+            ),
+            plots.lines(
+                f"memory-{name}",
+                "Voxels that a worker must hold",
+                {f"p = {p}": [(g, get("memory", p, g, "measured")) for g in groups] for p in shared},
+                "groups",
+                "memory",
+                "Counted from the boxes: two groups with their halos.",
+                from_zero=True,
+                marks=True,
+            ),
+            plots.lines(
+                f"preview-{name}",
+                "Time to the first preview",
+                {f"p = {p}, {what}": [(g, get(metric, p, g)) for g in groups] for p in shared for what, metric in (("preview", "preview"), ("whole frame", "latency"))},
+                "groups",
+                "time",
+                "The nearest group alone, and all of the frame.",
+                from_zero=True,
+                marks=True,
+            ),
+            table,
+            plots.timeline(
+                f"timeline-{name}",
+                "Three frames",
+                run.attached(f"timeline-{volume}"),
+                "Group g + 1 renders while group g is combined, across frames too.",
+            ),
+        ],
+    )

@@ -1,0 +1,163 @@
+"""slabstream_lab on synthetic results with known answers."""
+from __future__ import annotations
+
+import pathlib
+import sys
+import tempfile
+import unittest
+import unittest.mock
+import xml.etree.ElementTree
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "python"), str(pathlib.Path(__file__).resolve().parent)]
+
+import synthetic  # noqa: E402
+from slabstream_lab import page as pages  # noqa: E402
+from slabstream_lab import plots, ranking, read  # noqa: E402
+from slabstream_lab.experiments import PAGES  # noqa: E402
+from slabstream_lab.experiments.scaling import efficiency  # noqa: E402
+from slabstream_lab.results import ResultsError  # noqa: E402
+from slabstream_lab.value import Value, speed_text  # noqa: E402
+
+def value(middle: float, spread: float = 0.01, repeats: int = 3, noise: str = "") -> Value:
+    return Value(middle, middle * (1 - spread), middle * (1 + spread), repeats, "s", "measured", noise)
+
+
+class InAFolder(unittest.TestCase):
+    def setUp(self) -> None:
+        made = tempfile.TemporaryDirectory()
+        self.addCleanup(made.cleanup)
+        self.folder = pathlib.Path(made.name)
+
+
+class Values(unittest.TestCase):
+    def test_digits_follow_the_interval(self) -> None:
+        self.assertEqual(value(0.0123456, 0.2).text(), "12 ms")
+        self.assertEqual(value(0.0123456, 0.002).text(), "12.35 ms")
+        self.assertEqual(value(0.0123456, 0, repeats=1).text(), "12 ms")
+
+    def test_speed_is_told_for_both_outcomes(self) -> None:
+        one, two = value(1.0), value(2.0)
+        self.assertEqual(speed_text(two.over(one), "b"), "2.00 times as fast as b")
+        self.assertEqual(speed_text(one.over(two), "b"), "2.00 times as slow as b")
+        self.assertEqual(speed_text(one.over(value(1.01)), "b"), "as fast as b (a tie)")
+        self.assertEqual(speed_text(two.over(value(1.0, repeats=1)), "b"), "not ranked against b")
+
+
+class Rankings(unittest.TestCase):
+    def test_overlapping_intervals_tie(self) -> None:
+        found = ranking({"a": value(1.0), "b": value(1.015), "c": value(2.0)})
+        self.assertEqual(found.best, ["a", "b"])
+        self.assertTrue(found.sentence().endswith(", a tie"))
+
+    def test_the_quicker_leads_whatever_the_order(self) -> None:
+        self.assertEqual(ranking({"a": value(2.0), "b": value(1.0)}).best, ["b"])
+        self.assertEqual(ranking({"a": value(1.0), "b": value(2.0)}).best, ["a"])
+
+    def test_one_repeat_and_two_modes_rank_nothing(self) -> None:
+        for doubtful in (value(2.0, repeats=1), value(2.0, noise="two modes")):
+            found = ranking({"a": value(1.0), "b": doubtful})
+            self.assertFalse(found.decided)
+            self.assertTrue(found.sentence().startswith("not ranked"))
+
+
+class Reading(InAFolder):
+    def test_questions_without_an_answer_are_errors(self) -> None:
+        run = read(synthetic.streaming(self.folder))
+        with self.assertRaisesRegex(ResultsError, "no column 'cake'"):
+            run.select(cake=1)
+        with self.assertRaisesRegex(ResultsError, "no value of latency"):
+            run.value("latency", workers=77)
+        with self.assertRaisesRegex(ResultsError, "values of latency .* they differ in .*workers"):
+            run.value("latency", origin="simulated")
+        with self.assertRaisesRegex(ResultsError, "2 values of 'workers'|values of 'workers'"):
+            run.only("workers")
+        self.assertIsNone(run.find("latency", workers=77))
+
+    def test_a_folder_without_results_or_of_another_version_is_an_error(self) -> None:
+        with self.assertRaises(ResultsError):
+            read(self.folder)
+        rows = [synthetic.row("latency", 1.0) | {"version": 2}]
+        with self.assertRaisesRegex(ResultsError, "version 2"):
+            read(synthetic.write(self.folder, rows))
+
+
+class Doubts(InAFolder):
+    def test_what_speaks_against_a_run_is_told(self) -> None:
+        conduct = [synthetic.row("other_load", 0.4, part="conduct"), synthetic.row("drift", 1.2, 0.05, part="conduct")]
+        wide = [synthetic.row("latency", 1.0, noise="wide", workers=p) for p in range(5)]
+        found = " ".join(pages.doubts(read(synthetic.write(self.folder, conduct + wide, repeats=1, commit="abc-dirty"))))
+        for told in ("40 % of the machine", "1.14 to 1.26", "5 of 7 values are noisy", "measured once", "changed after their commit"):
+            self.assertIn(told, found)
+
+    def test_a_calm_run_has_none(self) -> None:
+        rows = [synthetic.row("other_load", 0.01, part="conduct"), synthetic.row("drift", 1.0, part="conduct")]
+        self.assertEqual(pages.doubts(read(synthetic.write(self.folder, rows))), [])
+
+
+def undrawn(name: str, caption: str, figure) -> pages.Figure:
+    plots.matplotlib.pyplot.close(figure)
+    return pages.Figure(name, "", caption)
+
+
+@unittest.mock.patch.object(plots, "figure_of", undrawn)
+class Answers(InAFolder):
+    def answers(self, experiment: str, **planted) -> list[str]:
+        run = read(synthetic.MAKERS[experiment](self.folder, **planted))
+        return [section.answer for section in PAGES[experiment](run).sections]
+
+    def test_efficiency(self) -> None:
+        self.assertEqual(efficiency(value(3.0), value(3.0), 1, 1).text(), "100.0 %")
+        self.assertAlmostEqual(efficiency(value(1.0), value(0.25), 4, 1).value, 100)  # strong, ideal
+        self.assertAlmostEqual(efficiency(value(1.0), value(1.0), 4, 1).value, 25)  # strong, no gain
+        self.assertAlmostEqual(efficiency(value(1.0), value(1.0), 8, 8).value, 100)  # weak, ideal
+
+    def test_scaling_is_told_for_both_outcomes(self) -> None:
+        for answer in self.answers("scaling", ideal=True):
+            self.assertIn("at least 50 % up to p = 8: every series", answer)
+            self.assertIn("a tie", answer)
+        for answer in self.answers("scaling", ideal=False):
+            self.assertIn("below 50 % from p = 8 on: every series", answer)
+
+    def test_combining_leaders_ties_and_reversals(self) -> None:
+        workers = self.answers("combining")[1]
+        self.assertIn("p = 8, 100 % active: radix-k (1.00 ms)", workers)
+        workers = self.answers("combining", times={"fan-in": 1e-3, "radix-k": 2e-3})[1]
+        self.assertIn("p = 8, 100 % active: fan-in (1.00 ms)", workers)
+        workers = self.answers("combining", times={"fan-in": 1e-3, "radix-k": 1.005e-3})[1]
+        self.assertIn("p = 8, 100 % active: fan-in (1.00 ms) and radix-k (1.005 ms), a tie", workers)
+
+    def test_combining_tells_page_faults_and_equal_links(self) -> None:
+        operators, *_, links = self.answers("combining")
+        self.assertIn("Fan-in with 20 % active is 5.00 times as fast as fan-in with 100 %.", operators)
+        self.assertIn("No page fault was timed.", operators)
+        self.assertIn("Equal times: 10gbit and fat-tree for every scheme", links)
+        self.assertIn("Page faults fell into timed runs of 12 of 12 cases.", self.answers("combining", faults=3)[0])
+
+    def test_sweep_ranks_a_users_policies_at_the_greatest_p(self) -> None:
+        self.assertIn("Least times at p = 4, 10gbit: latency, a & b (250.0 ms)", self.answers("sweep")[0])
+        self.assertIn("10gbit: latency, c (250.0 ms)", self.answers("sweep", times={"a & b": 2.0, "c": 1.0})[0])
+        self.assertIn("a tie", self.answers("sweep", times={"a & b": 1.0, "c": 1.0})[0])
+
+    def test_one_repeat_ranks_nothing(self) -> None:
+        for experiment in ("combining", "scaling", "sweep"):
+            for answer in self.answers(experiment, repeats=1):
+                self.assertIn("not ranked", answer)
+
+
+class Pages(InAFolder):
+    def test_every_page_is_well_formed(self) -> None:
+        for experiment, make in synthetic.MAKERS.items():
+            with self.subTest(experiment):
+                run = read(make(self.folder / experiment))
+                text = pages.write(PAGES[experiment](run), run, self.folder / experiment).read_text(encoding="utf-8")
+                xml.etree.ElementTree.fromstring(text)
+                self.assertNotRegex(text, r"\bnan\b")
+                plots = list((self.folder / experiment / "plots").glob("*.svg"))
+                self.assertTrue(plots)
+                for plot in plots:
+                    xml.etree.ElementTree.parse(plot)
+
+
+if __name__ == "__main__":
+    unittest.main()

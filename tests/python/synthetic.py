@@ -1,0 +1,100 @@
+"""Folders of results with known answers, as experiments write them."""
+from __future__ import annotations
+
+import itertools
+import json
+import pathlib
+
+UNITS = {"imbalance": "1", "idle_share": "1", "image_bytes": "B", "memory": "B", "count": "1", "other_load": "1", "drift": "1"}
+FIGURES = ("latency", "preview", "period", "imbalance", "idle_share", "image_bytes")
+
+
+def row(metric: str, value: float, spread: float = 0.01, repeats: int = 3, origin: str = "simulated", noise: str = "", **of) -> dict:
+    """`spread`: half the interval's width over the value."""
+    interval = {"low": value * (1 - spread), "high": value * (1 + spread)}
+    found = {"metric": metric, "unit": UNITS.get(metric, "s"), "value": value, **interval, "repeats": repeats, "noise": noise}
+    return {"version": 1, "experiment": "synthetic", **of, **found, "origin": origin, "commit": "abc", "machine": "one core"}
+
+
+def figures(seconds: float, repeats: int = 3, **of) -> list[dict]:
+    """The figures of a frame whose latency is this; its period is half of it."""
+    values = {"latency": seconds, "preview": seconds / 2, "period": seconds / 2, "imbalance": 1.1, "idle_share": 0.2, "image_bytes": 1e6}
+    return [row(metric, values[metric], repeats=repeats, **of) for metric in FIGURES]
+
+
+def write(folder: pathlib.Path, rows: list[dict], experiment: str = "streaming", **info) -> pathlib.Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    machine = {"cpu": "one", "cores": 1, "simd": "none"}
+    run = {"experiment": experiment, "version": "0", "commit": "abc", "command": "slabstream <x> & y", "machine": machine}
+    run |= {"seed": 1, "repeats": 3, "quick": True, "scale": 0.15, "date": "today"} | info
+    (folder / "run.json").write_text(json.dumps(run))
+    (folder / "results.jsonl").write_text("".join(json.dumps(r) + "\n" for r in rows))
+    return folder
+
+
+def streaming(folder: pathlib.Path, repeats: int = 3) -> pathlib.Path:
+    rows = []
+    for p, g in [(1, 1), *itertools.product((2, 8), (1, 2, 4))]:
+        of = {"volume": "class1-20", "workers": p, "groups": g, "pixels": 77}
+        rows += figures(1 / p, repeats, link="10gbit", **of)
+        rows.append(row("memory", 1e6 / g, origin="measured", link="10gbit", **of))
+        if p == 2:
+            rows.append(row("latency", 1.0, origin="measured", link="host", **of))
+    write(folder, rows, "streaming", repeats=repeats)
+    spans = "worker,lane,frame,group,stage,begin,end\n1,renders,1,1,render,0,0.5\n1,combines,1,1,combine,0.5,0.6\n"
+    (folder / "timeline-class1-20.csv").write_text(spans)
+    return folder
+
+
+def combining(folder: pathlib.Path, repeats: int = 3, times: dict[str, float] | None = None, faults: int = 0) -> pathlib.Path:
+    """`times`: seconds of each scheme on 8 full images of one size; they grow with workers, size and active pixels."""
+    times = times or {"fan-in": 2e-3, "chain": 3e-3, "radix-k": 1e-3}
+    rows = []
+    for scheme, seconds in times.items():
+        of = {"combine": scheme}
+
+        def add(part: str, p: int, side: int, share: float, link: str, of: dict = of, seconds: float = seconds) -> None:
+            value = seconds * p / 8 * side / 100 * share
+            rows.append(row("combine_time", value, repeats=repeats, part=part, workers=p, pixels=side, active=share, link=link, **of))
+
+        for p, share in itertools.product((2, 8), (1.0, 0.2)):
+            case = {"part": "operators", "workers": p, "pixels": 100, "active": share, **of}
+            rows.append(row("run_time", seconds * p / 8 * share, repeats=repeats, origin="measured", variant="operators", **case))
+            rows.append(row("count", faults, 0, 1, "measured", variant="page faults", **case))
+            add("over workers", p, 100, share, "10gbit")
+        for side in (50, 100):
+            add("over sizes", 16, side, 1.0, "10gbit")
+        for share in (0.05, 0.2, 1.0):
+            add("over active pixels", 16, 100, share, "10gbit")
+        for p, link in itertools.product((64, 128), ("10gbit", "fat-tree")):
+            add("over links", p, 100, 1.0, link)
+    return write(folder, rows, "combining", repeats=repeats)
+
+
+def scaling(folder: pathlib.Path, repeats: int = 3, ideal: bool = True) -> pathlib.Path:
+    """Ideal speed-up, or none at all."""
+    rows = []
+    for part, renderer, variant, p in itertools.product(("strong", "weak"), ("splat", "zbuffer"), ("slab", "kd-tree"), (1, 8)):
+        n = 20 * (2 if part == "weak" and p == 8 else 1)
+        work = (n / 20) ** 3
+        of = {"part": part, "renderer": renderer, "variant": variant, "workers": p, "volume": f"class1-{n}", "n": n, "pixels": 77}
+        rows += figures(work / (p if ideal else 1), repeats, link="10gbit", **of)
+    return write(folder, rows, "scaling", repeats=repeats)
+
+
+def sweep(folder: pathlib.Path, repeats: int = 3, times: dict[str, float] | None = None) -> pathlib.Path:
+    """`times`: latency of each policy with one worker."""
+    rows = []
+    for (variant, seconds), p, link in itertools.product((times or {"a & b": 1.0, "c": 2.0}).items(), (1, 4), ("10gbit", "1gbit")):
+        policy = {"decomposition": "slab", "split": "voxels", "assignment": "cyclic", "balance": "static", "combine": "fan-in"}
+        of = {"part": "brain, splat, view 1", "volume": "brain", "renderer": "splat", "view": "view 1", "variant": variant, **policy}
+        of |= {"workers": p, "groups": 1, "teams": 1, "pixels": 77}
+        rows += figures(seconds / p, repeats, link=link, **of)
+        if p == 1 and link == "10gbit":
+            rows.append(row("latency", seconds, repeats=repeats, origin="measured", link="host", **of))
+    write(folder, rows, "sweep", repeats=repeats)
+    (folder / "sweep.csv").write_text('title\n"Mine, & <yours>"\n')
+    return folder
+
+
+MAKERS = {"streaming": streaming, "combining": combining, "scaling": scaling, "sweep": sweep}
