@@ -16,7 +16,9 @@ Result<std::shared_ptr<const PlannedFrame>> Planner::Plan(const PlanRequest& req
 std::optional<Result<std::shared_ptr<const PlannedFrame>>> Planner::PlanAtHand(const PlanRequest& request) try {
   constexpr std::size_t kMostBoxes = 4096;  // a plan places each of them
   const std::unique_lock lock(mutex_, std::try_to_lock);
-  if (!lock || LeavesChoice(request.frame.policy)) return std::nullopt;
+  if (!lock || LeavesChoice(request.frame.policy, ServiceMachine(request.workers, surroundings_), request.roster.slots.size())) {
+    return std::nullopt;
+  }
   Result<ResolvedPolicy> policy = ResolvePolicy(request.frame, request.summary->description.geometry);
   if (!policy.ok()) return std::nullopt;
   std::shared_ptr<const Layout> layout =
@@ -29,8 +31,9 @@ std::optional<Result<std::shared_ptr<const PlannedFrame>>> Planner::PlanAtHand(c
 
 Result<std::shared_ptr<const PlannedFrame>> Planner::TryPlan(const PlanRequest& request) {
   PlannedFrame planned{.asked = request};
-  if (LeavesChoice(request.frame.policy)) {
-    Result<ChosenPolicy> chosen = policies_.Find(request, ServiceMachine(request.workers, surroundings_), layouts_);
+  const MachineModel machine = ServiceMachine(request.workers, surroundings_);
+  if (LeavesChoice(request.frame.policy, machine, request.roster.slots.size())) {
+    Result<ChosenPolicy> chosen = policies_.Find(request, machine, layouts_);
     if (!chosen.ok()) return chosen.status();
     planned.policy = std::move(chosen->policy);
     planned.prediction = chosen->prediction;

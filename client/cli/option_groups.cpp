@@ -170,7 +170,8 @@ void AddPolicyOptions(CLI::App& app, Policy& policy) {
   AddNamed(app, "--assignment", policy.assignment, Assignments(), "Which worker owns which box", kLeftToThePlanner);
   AddNamed(app, "--balance", policy.balance, BalanceModes(), "Whether boxes change from frame to frame");
   AddInteger(app, "--groups", policy.groups, 0, kMaxGroups,
-             "Groups of boxes, nearest first, that are rendered one after the other; 0: the service chooses");
+             "Groups of boxes, nearest first, that are rendered one after the other; 0: the service chooses, by memory and, across hosts, "
+             "by time");
   AddInteger(app, "--frame-parallel", policy.teams, 1, kMaxTeams,
              "Frames rendered at the same time, each by its own part of the workers, which needs all voxels in every part");
   AddInteger(app, "--teams", policy.teams, 1, kMaxTeams, "")->group(kHidden);

@@ -40,6 +40,9 @@ std::vector<std::string> SchemesToTry() {
   return schemes;
 }
 
+// Workers of different hosts, which send each other images.
+bool HasLinks(const MachineModel& machine, std::size_t workers) { return workers > std::size_t(machine.workers_a_host); }
+
 class Search {
  public:
   Search(const PolicyQuestion& question, const FrameSetup& setup, const FramePredictor& predictor)
@@ -53,7 +56,8 @@ class Search {
         predictor_(predictor),
         asked_(SettledPolicy(*question.frame, question.summary->description.geometry)),
         open_partition_(asked_.decomposition == kAutomatic),
-        open_owners_(open_partition_ || asked_.assignment == kAutomatic) {
+        open_owners_(open_partition_ || asked_.assignment == kAutomatic),
+        open_groups_(asked_.groups == 0 && HasLinks(*question.machine, question.slots)) {
     if (question.now != nullptr) {
       best_ = *question.now;
       return;
@@ -67,7 +71,7 @@ class Search {
   PolicyChoice Run() {
     TryLayout(best_, open_partition_);
     if (open_partition_) ChoosePartition();
-    if (open_owners_) ChooseOwners();
+    if (open_owners_ || open_groups_) ChooseGroupsAndOwners();
     if (asked_.combine == kAutomatic) ChooseScheme();
     return {best_, stands_in_ ? std::nullopt : prediction_, predicted_};
   }
@@ -100,7 +104,7 @@ class Search {
     }
   }
 
-  void ChooseOwners() {
+  void ChooseGroupsAndOwners() {
     const ResolvedPolicy start = best_;
     const int fewest = FewestGroupsOf(start);
     for (const int factor : kGroupFactors) {
@@ -110,6 +114,7 @@ class Search {
         if (asked_.assignment == kAutomatic) policy.assignment = &entry;
         policy.groups = std::min(factor * fewest, kMaxGroups);
         TryLayout(policy, false);
+        if (asked_.assignment != kAutomatic) break;
       }
     }
   }
@@ -164,7 +169,7 @@ class Search {
   LayoutMaker layouts_;
   const FramePredictor& predictor_;
   const Policy asked_;  // but for the view
-  const bool open_partition_, open_owners_;
+  const bool open_partition_, open_owners_, open_groups_;
   ResolvedPolicy best_;
   std::optional<FramePrediction> prediction_;  // of best_; prepared_ is its layout
   FramePredictor::Prepared prepared_;
@@ -175,6 +180,10 @@ class Search {
 };
 
 }  // namespace
+
+bool LeavesChoice(const Policy& policy, const MachineModel& machine, std::size_t workers) {
+  return LeavesChoice(policy) || (policy.groups == 0 && HasLinks(machine, workers));
+}
 
 Policy FixedPolicy(Policy policy) {
   const Policy defaults;

@@ -12,6 +12,7 @@
 // Memory comes first: no candidate has fewer groups than its slabs need (FewestGroups).
 #pragma once
 
+#include <cstddef>
 #include <optional>
 
 #include "common/planning/frame_plan.h"
@@ -41,6 +42,11 @@ struct PolicyChoice {
 };
 
 inline constexpr double kLeastGain = 0.02;
+
+// Whether ChoosePolicy has something to choose for this machine and number of workers: an open name; or the number of groups, if it is open
+// and workers of different hosts send each other images, so that the next group can render meanwhile. On one host a group costs more than
+// it hides (docs/tuning.md).
+bool LeavesChoice(const Policy& policy, const MachineModel& machine, std::size_t workers);
 
 // The policy of a frame if nothing is chosen: open names are as in Policy{}.
 Policy FixedPolicy(Policy policy);

@@ -223,12 +223,12 @@ FramePlan PlanOf(ExperimentContext& context, const FrameCase& frame, std::shared
 }
 
 FrameCase WithChosenPolicy(ExperimentContext& context, FrameCase frame, const LinkModel& link) {
-  if (!LeavesChoice(frame.policy)) return frame;
+  const MachineModel machine = ServiceMachine(std::vector<HostedWorker>(std::size_t(frame.workers)), {.link = link});
+  if (!LeavesChoice(frame.policy, machine, std::size_t(frame.workers))) return frame;
   FrameCase fixed = frame;
   fixed.policy = FixedPolicy(frame.policy);
   const LayoutKnowledge knowledge = KnowLayout(context, fixed);
   const FrameRequest request = RequestOf(frame);
-  const MachineModel machine = ServiceMachine(std::vector<HostedWorker>(std::size_t(frame.workers)), {.link = link});
   const PolicyChoice choice = OrThrow(ChoosePolicy({.frame = &request,
                                                     .summary = knowledge.volume.summary.get(),
                                                     .known = {.occupied = knowledge.occupied.get()},

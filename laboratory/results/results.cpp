@@ -31,7 +31,7 @@ std::string Field(const Json& value) {
 template <class Names>
 std::string Csv(const Names& names, const std::vector<Json>& rows) {
   std::string csv;
-  for (const auto& name : names) csv += (csv.empty() ? "" : ",") + std::string(name);
+  for (const auto& name : names) csv += fmt::format("{}{}", csv.empty() ? "" : ",", name);
   csv += '\n';
   for (const Json& row : rows) {
     std::string line;

@@ -153,6 +153,42 @@ TEST(ChoosePolicy, NoPartitionWithAFewSchemesAndGroupsIsMuchBetter) {
   }
 }
 
+// Across hosts a group may be combined while the next one renders; on one host there is little to hide.
+TEST(ChoosePolicy, TakesMoreGroupsWhereLinksMakeThemPay) {
+  const Index3 size = {256, 256, 256};
+  const Index3 bricks = FullSummary(size).brick_counts;
+  const VolumeSummary ball = SummaryWith(size, [&](const Index3& b) {
+    const Vec3 place = (ToVec3(b) + Vec3{0.5, 0.5, 0.5}) / ToVec3(bricks) - Vec3{0.5, 0.5, 0.5};
+    return Length(place) < 0.5;
+  });
+  Question question{.summary = ball, .slots = 8};
+  question.request.size = {512, 512};
+  TransferFunction fog;
+  fog.colors = {{0, {1, 1, 1}}};
+  fog.opacities = {{100, 0}, {200, 0.02}};
+  question.request.transfer.choice = fog;
+  question.request.view.azimuth_degrees = 30;
+  question.request.view.elevation_degrees = 5;  // slabs lie one above the other: thinner ones make smaller images
+  question.machine = ServiceMachine(std::vector<HostedWorker>(question.slots), {.link = ParseLink("link", "1gbit").value()});
+  Policy open;  // but for the groups, which are 0, nothing
+  EXPECT_FALSE(LeavesChoice(open));
+  EXPECT_TRUE(LeavesChoice(open, question.machine, question.slots));
+  const PolicyChoice slow = question.Choose(open);
+  EXPECT_GT(slow.policy.groups, 1);
+  Policy one = open;
+  one.groups = 1;
+  EXPECT_FALSE(LeavesChoice(one, question.machine, question.slots));
+  const PolicyChoice alone = question.Choose(one);
+  EXPECT_EQ(alone.policy.groups, 1);
+  ASSERT_TRUE(slow.prediction && alone.prediction);
+  EXPECT_LT(slow.prediction->latency_seconds, (1 - kLeastGain) * alone.prediction->latency_seconds);
+
+  const std::vector<HostedWorker> here(question.slots, {.memory_scope = 7, .lends_memory = true, .threads = 1});
+  question.machine = ServiceMachine(here, {.memory_scope = 7, .cores = 8});
+  EXPECT_FALSE(LeavesChoice(open, question.machine, question.slots));
+  EXPECT_EQ(question.Choose(open).policy.groups, 1);
+}
+
 TEST(ChoosePolicy, KeepsWhatHoldsUnlessEnoughIsGained) {
   Question question{.summary = SummaryWith({192, 192, 192}, [](const Index3& b) { return b.z < 3 && b.x < 6; }), .slots = 8};
   question.request.policy = Automatic();
