@@ -92,11 +92,13 @@ def lines(
         plot.set_xscale("log", base=2 if marks else 10)
     if log_y:
         plot.set_yscale("log")
+        if sizes and min(sizes) > 0 and max(sizes) < 10 * min(sizes):  # a decade has one named tick, or none
+            plot.yaxis.set_minor_formatter(matplotlib.ticker.FormatStrFormatter("%g"))
     if from_zero:
         plot.set_ylim(bottom=0)
     if marks:
         plot.set_xticks(sorted({point[0] for points in data.values() for point in points}))
-        plot.minorticks_off()
+        plot.xaxis.set_minor_locator(matplotlib.ticker.NullLocator())
         plot.xaxis.set_major_formatter(matplotlib.ticker.FormatStrFormatter("%g"))
     _legend(plot, len(data))
     return figure_of(name, caption, figure)
@@ -174,7 +176,7 @@ def timeline(name: str, title: str, spans: pandas.DataFrame, caption: str = "", 
 
 def cuts(name: str, title: str, boxes: pandas.DataFrame, caption: str = "") -> Figure:
     """The render time of boxes on three cuts through the middle of the volume, from a table of boxes (docs/reference/results.md)."""
-    figure, plots = matplotlib.pyplot.subplots(1, 3, figsize=(8.4, 3.2))
+    figure, plots = matplotlib.pyplot.subplots(1, 3, figsize=(8.4, 3.2), layout="constrained")
     figure.suptitle(title, fontsize=11)
     most = boxes["seconds"].max() * 1e3
     colours = matplotlib.colormaps["viridis"]

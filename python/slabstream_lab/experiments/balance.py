@@ -373,7 +373,8 @@ def _prediction(run: Run, subjects: list[Subject]) -> Section:
             rows.append([volume, renderer, int(boxes["workers"].iloc[0]), partition, len(errors), Value.exact(float(total)), *percent])
     answer = ""
     if medians:
-        answer = f"The median error of a partition's boxes is from {min(medians) * 100:.0f} to {max(medians) * 100:.0f} %."
+        least, most = f"{min(medians) * 100:.0f}", f"{max(medians) * 100:.0f}"
+        answer = f"The median error of a partition's boxes is {least if least == most else f'from {least} to {most}'} %."
     columns = ["volume", "renderer", "p", "partition", "boxes", "sum expected / measured"]
     columns += ["median error", "90 % error", "median error of shares", "90 % error of shares"]
     return Section(
