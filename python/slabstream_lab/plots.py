@@ -30,7 +30,7 @@ def figure_of(name: str, caption: str, figure: matplotlib.figure.Figure) -> Figu
         figure.savefig(text, format="svg", bbox_inches="tight", metadata={"Date": None, "Creator": None})
     matplotlib.pyplot.close(figure)
     svg = text.getvalue()
-    svg = svg[svg.index("<svg") :]
+    svg = re.sub(r"<!--.*?-->\s*", "", svg[svg.index("<svg") :], flags=re.DOTALL)
     # Several figures on one page must not share ids.
     svg = re.sub(r'\bid="', f'id="{name}-', svg)
     svg = re.sub(r'(xlink:href="|href="|url\()#', rf"\1#{name}-", svg)
