@@ -22,8 +22,9 @@ class EventQueue {
 
   double now() const { return now_; }
   void TellAt(double when, std::uint32_t number) { events_.push(Plan(when, false, number)); }
-  // The same for events of a stream, which are mostly told in order of time, so that only the first of them needs a place in the heap.
-  // Whoever is told the number of one calls NextOf before anything else happens. Streams are few: 0, 1, ...
+  // The same for an event of a stream. Events of one stream mostly come in the order of their times, so only the first needs a place in the
+  // heap. `on_number` must call NextOf with the stream of the event that it is told, before it plans or runs another one. A stream's number
+  // is an index: they count from 0.
   void TellAt(double when, std::uint32_t number, std::uint32_t stream) {
     if (stream >= streams_.size()) streams_.resize(stream + 1);
     Stream& of = streams_[stream];

@@ -156,8 +156,6 @@ Json CaseOf(std::string_view part, const FrameCase& frame, std::string_view link
   return of;
 }
 
-Estimate Exact(double value) { return {value, value, value, 1, 0}; }
-
 // What boxes alone tell.
 void AddBoxFigures(Results& results, const Json& of, const std::vector<MeasuredFrame>& repeats) {
   std::vector<double> imbalance, sum, longest;
@@ -170,7 +168,7 @@ void AddBoxFigures(Results& results, const Json& of, const std::vector<MeasuredF
   results.Add(of, "imbalance", MedianOf(std::move(imbalance)), Origin::kMeasured);
   results.Add(of, "render_time", MedianOf(std::move(sum)), Origin::kMeasured);
   results.Add(of, "longest_render_time", MedianOf(std::move(longest)), Origin::kMeasured);
-  results.Add(of, "memory", Exact(repeats.front().MostVoxelBytes()), Origin::kMeasured);
+  results.Add(of, "memory", repeats.front().MostVoxelBytes(), Origin::kMeasured);
 }
 
 // Latencies of one frame, by link and repeat.
@@ -246,7 +244,7 @@ void AddBoxes(ExperimentContext& context, const Balance& balance, const BenchCas
       std::vector<double> seconds;
       for (const MeasuredFrame& repeat : repeats) seconds.push_back(repeat.boxes[placement.id].seconds);
       results.Add(of, "box_time", MedianOf(std::move(seconds)), Origin::kMeasured);
-      results.Add(of, "estimated_box_time", Exact(estimator.Of(placement.box).seconds), Origin::kSimulated);
+      results.Add(of, "estimated_box_time", estimator.Of(placement.box).seconds, Origin::kSimulated);
     }
     AttachBoxes(results, fmt::format("boxes-{}-{}-{}", volume.dataset, volume.renderer->name(), named.policy.decomposition),
                 Recall(context, frame));

@@ -52,4 +52,8 @@ std::vector<MeasuredFrame> RecallBalanced(ExperimentContext& context, const Fram
   return frames;
 }
 
+std::vector<MeasuredFrame> RecallCosts(ExperimentContext& context, const FrameCase& frame) {
+  return IsDynamic(frame) ? RecallBalanced(context, frame) : RecallRepeats(context, frame);
+}
+
 }  // namespace slabstream

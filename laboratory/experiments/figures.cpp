@@ -18,12 +18,14 @@ FrameFigures FindFigures(const MeasuredFrame& frame, const MachineModel& machine
           .image_bytes = first.image_bytes};
 }
 
-std::vector<FrameFigures> RecallFigures(ExperimentContext& context, const FrameCase& frame, const LinkModel& link, int teams) {
-  const std::vector<MachineModel> machines = Clusters(context, link);
-  const std::vector<MeasuredFrame> frames = IsDynamic(frame) ? RecallBalanced(context, frame) : RecallRepeats(context, frame);
+std::vector<FrameFigures> FindFigures(const std::vector<MeasuredFrame>& frames, const std::vector<MachineModel>& machines, int teams) {
   std::vector<FrameFigures> repeats;
   for (std::size_t i = 0; i < std::min(frames.size(), machines.size()); ++i) repeats.push_back(FindFigures(frames[i], machines[i], teams));
   return repeats;
+}
+
+std::vector<FrameFigures> RecallFigures(ExperimentContext& context, const FrameCase& frame, const LinkModel& link, int teams) {
+  return FindFigures(RecallCosts(context, frame), Clusters(context, link), teams);
 }
 
 void AddFigures(Results& results, const Json& of, const std::vector<FrameFigures>& repeats) {

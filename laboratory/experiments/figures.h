@@ -20,8 +20,10 @@ struct FrameFigures {
 // `teams` of the size of the frame's take frames in turn.
 FrameFigures FindFigures(const MeasuredFrame& frame, const MachineModel& machine, int teams = 1);
 
-// The same for every repeat of a frame whose CostTrial and FinishTrial were run: repeat i of the boxes on repeat i of the machine
-// (Clusters).
+// The same for every repeat: repeat i of the frame on repeat i of the machine, as far as both go.
+std::vector<FrameFigures> FindFigures(const std::vector<MeasuredFrame>& frames, const std::vector<MachineModel>& machines, int teams = 1);
+
+// The same of a frame whose CostTrial and FinishTrial were run, on machines joined by `link` (Clusters).
 std::vector<FrameFigures> RecallFigures(ExperimentContext& context, const FrameCase& frame, const LinkModel& link, int teams = 1);
 
 // Adds each figure as a metric: latency, preview, period, imbalance, idle_share, image_bytes.

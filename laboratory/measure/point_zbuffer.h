@@ -25,12 +25,13 @@ class PointZBuffer {
   void Draw(const TransformMatrix& matrix, const Index3& size, const std::uint8_t* occupied);
 
   bool Written(std::size_t pixel) const { return voxel_[pixel] != 0; }
-  // Pixels, compared with the depths of faces, row by row, +infinity where there is none, for voxels of spacing 1.
+  // Numbers of pixels.
   struct Holes {
     std::size_t covered = 0;  // by a face
     std::size_t empty = 0;    // of these: not written
     std::size_t behind = 0;   // of these: the voxel lies more than a voxel's diagonal behind the face, so it is not the face's
   };
+  // `faces`: the depth of the face that each pixel shows, row by row; +infinity where it shows none. Voxels have spacing 1.
   Holes HolesIn(const std::vector<float>& faces) const;
 
  private:

@@ -84,8 +84,10 @@ def doubts(run: Run) -> list[str]:
     noisy = run.results["noise"].fillna("").ne("").sum()
     if noisy > 0.1 * len(run.results):
         found.append(f"{noisy} of {len(run.results)} values are noisy: their intervals are wide, or their repeats fall into two heaps.")
-    if run.info["repeats"] < 3:
-        found.append(f"Everything was measured {'once' if run.info['repeats'] == 1 else 'twice'}: nothing can be ranked.")
+    if run.info["repeats"] == 1:
+        found.append("Everything was measured once: nothing is ranked.")
+    elif run.info["repeats"] == 2:
+        found.append("Everything was measured twice: an interval goes from one value to the other.")
     if str(run.info["commit"]).endswith("-dirty"):
         found.append("The sources of the program were changed after their commit.")
     return found

@@ -13,6 +13,7 @@ import matplotlib.ticker  # noqa: E402
 import pandas  # noqa: E402
 
 from .page import Figure  # noqa: E402
+from .results import value_of  # noqa: E402
 from .value import Value, scale_of  # noqa: E402
 
 # Okabe and Ito, 2008: told apart by colour-blind readers.
@@ -200,8 +201,6 @@ def cuts(name: str, title: str, boxes: pandas.DataFrame, caption: str = "") -> F
 
 def points_of(rows: pandas.DataFrame, x: str) -> list[tuple[float, Value]]:
     """(x, value) of rows of one metric."""
-    from .results import value_of
-
     return [(row[x], value_of(row)) for _, row in rows.iterrows()]
 
 

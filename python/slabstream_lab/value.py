@@ -95,14 +95,22 @@ def number_text(number: float, digits: int) -> str:
     return f"{round(number, decimals):.{max(decimals, 0)}f}"
 
 
+def outcome(ratio: Value) -> str:
+    """What a speed, time of a reference over time of a case, says of the case: "faster", "slower", "tie", or "open" if it is not ranked."""
+    if not ratio.ranks:
+        return "open"
+    return "tie" if ratio.low <= 1 <= ratio.high else "faster" if ratio.value > 1 else "slower"
+
+
 def speed_text(ratio: Value, of: str = "") -> str:
     """How a case compares with `of`, from time of `of` over time of the case: "2.1 times as fast", "as fast", or that it is open."""
     than = f" as {of}" if of else ""
-    if not ratio.ranks:
+    found = outcome(ratio)
+    if found == "open":
         return f"not ranked against {of or 'it'}"
-    if ratio.low <= 1 <= ratio.high:
+    if found == "tie":
         return f"as fast{than} (a tie)"
-    if ratio.value > 1:
+    if found == "faster":
         return f"{ratio.text()} times as fast{than}"
     inverse = Value(1 / ratio.value, 1 / ratio.high, 1 / ratio.low, ratio.repeats, "1", ratio.origin, ratio.noise)
     return f"{inverse.text()} times as slow{than}"

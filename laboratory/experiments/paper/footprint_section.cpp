@@ -9,10 +9,8 @@ namespace slabstream {
 namespace {
 
 constexpr int kWidths[] = {3, 5, 9, 13, 17, 25};  // k, unless the user names others
-constexpr int kPaperWidth = 5, kRuns = 3, kFigureWorkers = 10;
+constexpr int kPaperWidth = 5, kRuns = 3;
 constexpr double kSliceOccupancies[] = {0.05, 0.1, 0.2, 0.5, 1};
-// Class II reaches 52 % of the cube at most.
-constexpr double kOccupancies[] = {0.05, 0.1, 0.2, 0.3, 0.4, 0.5};
 
 struct Loop {
   const char* name;
@@ -56,15 +54,6 @@ std::vector<FrameCase> WorkerFrames(const PaperSetup& setup) {
   return frames;
 }
 
-std::vector<FrameCase> OccupancyFrames(const PaperSetup& setup) {
-  std::vector<FrameCase> frames;
-  for (const double occupancy : kOccupancies) {
-    FrameCase& frame = frames.emplace_back(setup.Frame(Splatting(), setup.large_size(), kFigureWorkers));
-    frame.volume = SphereCase({SphereClass::kFilled, setup.large_size(), occupancy}, kTranslucentSphere);
-  }
-  return frames;
-}
-
 // Of the slab that takes longest. The paper's splatting stage turns voxels into pixels of sheets; ours also finds where these pixels are.
 Estimate SlowestSplat(const PaperSetup& setup, const FrameCase& frame) {
   std::vector<double> slowest;
@@ -82,24 +71,19 @@ Estimate SlowestSplat(const PaperSetup& setup, const FrameCase& frame) {
 std::vector<Trial> FootprintTrials(const PaperSetup& setup) {
   std::vector<Trial> trials;
   for (const SliceCase& slice : SlicesOf(setup)) trials.push_back(Measure(slice));
-  for (const auto& frames : {WorkerFrames(setup), OccupancyFrames(setup)}) {
-    for (const FrameCase& frame : frames) {
-      trials.push_back(BoxCostTrial(setup.context(), frame));
-      trials.push_back(FinishTrial(setup.context(), frame));
-    }
+  for (const FrameCase& frame : WorkerFrames(setup)) {
+    trials.push_back(BoxCostTrial(setup.context(), frame));
+    trials.push_back(FinishTrial(setup.context(), frame));
   }
   return trials;
 }
 
 void AddFootprint(const PaperSetup& setup, Results& results) {
-  for (const auto& [part, frames] :
-       {std::pair{"splat over workers", WorkerFrames(setup)}, {"splat over occupancy", OccupancyFrames(setup)}}) {
-    for (const FrameCase& frame : frames) {
-      Json of = {{"part", part}};
-      of.update(ColumnsOf(frame));
-      of["stage"] = "transform and splat";
-      results.Add(of, "run_time", SlowestSplat(setup, frame), Origin::kMeasured);
-    }
+  for (const FrameCase& frame : WorkerFrames(setup)) {
+    Json of = {{"part", "splat over workers"}};
+    of.update(ColumnsOf(frame));
+    of["stage"] = "transform and splat";
+    results.Add(of, "run_time", SlowestSplat(setup, frame), Origin::kMeasured);
   }
   for (const SliceCase& slice : SlicesOf(setup)) {
     for (const Loop& loop : kLoops) {

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <set>
+#include <utility>
 
 #include "common/planning/policy_names.h"
 #include "laboratory/experiments/attachments.h"
@@ -58,18 +59,15 @@ class Beyond {
 
   // Latency and period of `workers` in teams of frame.workers.
   void Add(const FrameCase& frame, int workers, Images images) const {
-    const std::vector<MeasuredFrame> frames =
-        IsDynamic(frame) ? RecallBalanced(setup_.context(), frame) : RecallRepeats(setup_.context(), frame);
-    std::vector<FrameFigures> repeats;
-    for (std::size_t i = 0; i < std::min(frames.size(), machines_.size()); ++i) {
-      MeasuredFrame counted = paper_ ? PaperSetup::AsPaper(frames[i], images) : frames[i];
-      counted.plan.combine = frame.policy.combine;
-      repeats.push_back(FindFigures(counted, machines_[i], workers / frame.workers));
+    const int teams = workers / frame.workers;
+    std::vector<MeasuredFrame> repeats = RecallCosts(setup_.context(), frame);
+    for (MeasuredFrame& repeat : repeats) {
+      if (paper_) repeat = PaperSetup::AsPaper(std::move(repeat), images);
     }
     Json of = {{"part", "beyond"}, {"variant", images == Images::kWhole ? "whole images" : "without empty pixels"}};
     of.update(ColumnsOf(frame));
-    of.update(Json{{"workers", workers}, {"teams", workers / frame.workers}, {"link", paper_ ? "paper" : kLink}});
-    AddFigures(results_, of, repeats);
+    of.update(Json{{"workers", workers}, {"teams", teams}, {"link", paper_ ? "paper" : kLink}});
+    AddFigures(results_, of, FindFigures(repeats, machines_, teams));
   }
 
  private:

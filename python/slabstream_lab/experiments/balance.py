@@ -11,7 +11,7 @@ from .. import plots
 from ..page import Page, Section, Table
 from ..ranking import ranking
 from ..results import Run, value_of
-from ..value import Value, number_text, speed_text
+from ..value import Value, number_text, outcome, speed_text
 
 LINK, SCHEME = "10gbit", "radix-k"
 SLABS = "slab by voxels, static"  # what other methods are compared with
@@ -68,7 +68,7 @@ def _slug(run: Run, subject: Subject) -> str:
     return "-".join(subject if len(run.distinct("renderer", part="policy")) > 1 else subject[:1]).replace(".", "-")
 
 
-def _middle(run: Run, part: str) -> int:
+def _workers_of(run: Run, part: str) -> int:
     return run.distinct("workers", part=part)[0]
 
 
@@ -123,8 +123,7 @@ def _moving_method(run: Run) -> str:
     steps = int(run.select(part="sequence")["step"].max()) + 1
     return (
         f"Each sequence has {steps} steps. The boxes of each step are rendered alone on one thread; frames are simulated one at a time "
-        "on a "
-        f"network of 10 Gbit/s, combined by {SCHEME}, one group. Where boxes change between steps, workers fetch the voxels that they lack "
+        f"on a network of 10 Gbit/s, combined by {SCHEME}, one group. Where boxes change between steps, workers fetch the voxels that they lack "
         "before they render, and that time counts."
     )
 
@@ -201,7 +200,7 @@ def _efficiency(run: Run, subjects: list[Subject]) -> Section:
         )
         for partition, decomposition in (("slab by voxels", "slab"), ("kd-tree by occupied", "kd-tree")):
             boxes = run.attached(f"boxes-{volume}-{renderer}-{decomposition}")
-            title = f"{volume}, {renderer}: {partition}, p = {_middle(run, 'box')}"
+            title = f"{volume}, {renderer}: {partition}, p = {_workers_of(run, 'box')}"
             caption = "Render time of every box that the cut meets."
             blocks.append(plots.cuts(f"boxes-{name}-{partition.replace(' ', '-')}", title, boxes, caption))
     view = run.distinct("view", part="partition")[0]
@@ -211,14 +210,11 @@ def _efficiency(run: Run, subjects: list[Subject]) -> Section:
         "Which partition gives workers equal work, and what is lost to imbalance, to extra work and to combining?",
         f"One view (azimuth/elevation {view}), {pixels} x {pixels} pixels, one box a worker. Every box is rendered alone on one thread. "
         "Imbalance is the longest of the workers' render times over their mean. Efficiency is the latency of one worker, T(1), over p "
-        "times "
-        f"that of p workers, T(p), simulated on a network of 10 Gbit/s and combined by {SCHEME}. Its three factors multiply exactly, "
-        "except "
-        "for rounding: balance is mean over longest render time; extra work is the render time of the whole volume by one worker over the "
+        f"times that of p workers, T(p), simulated on a network of 10 Gbit/s and combined by {SCHEME}. Its three factors multiply exactly, "
+        "except for rounding: balance is mean over longest render time; extra work is the render time of the whole volume by one worker over the "
         "sum of the boxes' render times; combining is the rest: the share of the frame in which the slowest worker renders, over the same "
         "share with one worker. A factor above 100 % is a gain. All are made from medians, so balance may differ in the last digit from "
-        "one "
-        "over imbalance. The voxels of a worker include the halo and are those of the fullest.",
+        "one over imbalance. The voxels of a worker include the halo and are those of the fullest.",
         f"Least imbalance at p = {shared[-1]}: " + "; ".join(sentences) + "." if sentences else "",
         blocks + [table],
     )
@@ -250,8 +246,7 @@ def _automatic(run: Run, subjects: list[Subject]) -> Section:
         "How good auto is",
         "How far is the policy that auto takes from the best one?",
         "The policy auto chooses before it has seen a frame, by simulating estimated boxes on a machine with standard constants. Its "
-        "choice "
-        "and all policies of the lists are then simulated with measured boxes, as above: all partitions, 1 and 2 groups, cyclic, "
+        "choice and all policies of the lists are then simulated with measured boxes, as above: all partitions, 1 and 2 groups, cyclic, "
         f"{', '.join(run.distinct('combine', part='policy'))}. It may also take a policy outside these lists. "
         "If its own is the best of all, the ratio is 1. The ratio is found repeat by repeat.",
         answer,
@@ -286,7 +281,7 @@ def _sequence(run: Run, subject: Subject) -> Section:
                 speed = ""
                 if method in against:
                     speed = speed_text(against[method], "static")
-                    outcomes[_outcome(against[method])] += 1
+                    outcomes[outcome(against[method])] += 1
                 rows.append([view, p, method, latency, values["imbalance"][method], values["voxel_bytes"][method], speed])
         if not workers:
             continue
@@ -303,8 +298,7 @@ def _sequence(run: Run, subject: Subject) -> Section:
         f"Moving views: {volume}, {renderer}",
         "Does dynamic balance keep workers even while the view changes, and what does it move?",
         _moving_method(run) + " Latency, imbalance and the voxels that workers fetch for a frame are means over the steps; these "
-        "include the "
-        "first steps, in which dynamic balance has nothing to go by yet.",
+        "include the first steps, in which dynamic balance has nothing to go by yet.",
         f"Dynamic balance is {_counted(outcomes)}." if outcomes else "",
         blocks
         + [
@@ -315,12 +309,6 @@ def _sequence(run: Run, subject: Subject) -> Section:
             )
         ],
     )
-
-
-def _outcome(speed: Value) -> str:
-    if not speed.ranks:
-        return "open"
-    return "tie" if speed.low <= 1 <= speed.high else "faster" if speed.value > 1 else "slower"
 
 
 def _counted(outcomes: Counter) -> str:
@@ -342,14 +330,13 @@ def _slowed(run: Run, subjects: list[Subject]) -> Section:
                 speed = ""
                 if method in against:
                     speed = speed_text(against[method], "static")
-                    outcomes[_outcome(against[method])] += 1
+                    outcomes[outcome(against[method])] += 1
                 rows.append([volume, renderer, p, view, method, alike[method], latency, latency.over(alike[method]), speed])
     return Section(
         "A worker at half speed",
         "One worker takes twice as long for every box. Does dynamic balance give it less to do?",
         "As under moving views, but the render times of worker 1 are doubled, before they are learnt as well. Both latencies are means "
-        "over "
-        "the steps of the same views.",
+        "over the steps of the same views.",
         f"With a worker at half speed, dynamic balance is {_counted(outcomes)}." if outcomes else "",
         [Table("Latency", ["volume", "renderer", "p", "views", "method", "all alike", "one slow", "slow / alike", "dynamic is"], rows)],
     )
@@ -382,8 +369,7 @@ def _prediction(run: Run, subjects: list[Subject]) -> Section:
         "How well does the planner know what a box will take, before it has seen a frame?",
         "The same boxes as under partitions. The error of a box is expected over measured time, less one, without its sign; nine of ten "
         "boxes have at most the 90 % error. A common factor does not change a partition: the last columns give the errors once the "
-        "expected "
-        "times are scaled to the measured sum.",
+        "expected times are scaled to the measured sum.",
         answer,
         [Table("Errors", columns, rows)],
     )
@@ -398,7 +384,7 @@ def _assignments(run: Run, subjects: list[Subject]) -> Section:
         for partition in dict.fromkeys(found.apply(_partition, axis=1)):
             rows.append([volume, renderer, partition, *[values[f"{partition}, {name}"] for name in names]])
         sentences.append(f"{volume} ({renderer}): {ranking(values).sentence()}")
-    p, groups = _middle(run, "assignment"), run.distinct("groups", part="assignment")[0]
+    p, groups = _workers_of(run, "assignment"), run.distinct("groups", part="assignment")[0]
     return Section(
         "Assignments",
         f"With {groups} boxes a worker, who should own which?",

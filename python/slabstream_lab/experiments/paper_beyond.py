@@ -7,7 +7,7 @@ from .. import plots
 from ..page import Section, Table
 from ..ranking import Ranking, ranking
 from ..results import Run, value_of
-from ..value import Value, speed_text
+from ..value import Value, outcome, speed_text
 from .paper_frames import TITLES, Frames, rounded, size_text
 
 
@@ -157,8 +157,8 @@ def _claims(run: Run, frames: Frames) -> Section:
     rows = []
 
     speed_ups = {q: frames.speed_up("zbuffer", least, q) for q in shared}
-    below = [q for q, v in speed_ups.items() if v.ranks and v.high < 1]
-    unclear = [q for q, v in speed_ups.items() if not v.ranks or v.low <= 1 <= v.high]
+    below = [q for q, v in speed_ups.items() if outcome(v) == "slower"]
+    unclear = [q for q, v in speed_ups.items() if outcome(v) in ("open", "tie")]
     text = f"below 1 at p = {', '.join(map(str, below))}" if below else "at no p below 1"
     if unclear:
         text += f"; not decided at p = {', '.join(map(str, unclear))}"

@@ -2,12 +2,13 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from typing import Iterable, Mapping, Sequence
 
 from .. import plots
 from ..page import Photo, Section, Table
 from ..results import Run
-from ..value import Value, number_text, speed_text
+from ..value import Value, number_text, outcome, speed_text
 
 Points = Sequence[tuple[float, Value]]
 
@@ -37,19 +38,19 @@ def power_text(points: Points, x: str) -> str:
 
 def compared_text(ratios: Mapping[str, Value], of: str) -> str:
     """How a method compares with another one over several cases, from time of the other over its own."""
-    ranked = [ratio for ratio in ratios.values() if ratio.ranks]
-    if not ranked:
+    counts = Counter(outcome(ratio) for ratio in ratios.values())
+    if counts["open"] == len(ratios):
         return f"not ranked against {of}"
-    faster, slower = (sorted(r.value for r in ranked if apart(r)) for apart in (lambda r: r.low > 1, lambda r: r.high < 1))
+    faster, slower = (sorted(r.value for r in ratios.values() if outcome(r) == which) for which in ("faster", "slower"))
     parts = []
     for found, word in ((faster, "fast"), ([1 / value for value in reversed(slower)], "slow")):
         if found:
             ends = list(dict.fromkeys(number_text(value, 2) for value in (found[0], found[-1])))
             parts.append(f"{' to '.join(ends)} times as {word} as {of} in {len(found)} of {len(ratios)} cases")
-    if ties := len(ranked) - len(faster) - len(slower):
-        parts.append(f"as fast{'' if parts else f' as {of}'} (a tie) in {ties} of {len(ratios)}{'' if parts else ' cases'}")
-    if unranked := len(ratios) - len(ranked):
-        parts.append(f"not ranked in {unranked} of {len(ratios)}")
+    if counts["tie"]:
+        parts.append(f"as fast{'' if parts else f' as {of}'} (a tie) in {counts['tie']} of {len(ratios)}{'' if parts else ' cases'}")
+    if counts["open"]:
+        parts.append(f"not ranked in {counts['open']} of {len(ratios)}")
     return ", ".join(parts)
 
 
@@ -198,11 +199,8 @@ def _error_text(run: Run, sizes: list[int]) -> str:
 
 
 def _splatting(run: Run) -> Section:
-    over_workers, over_occupancy, slices = (
-        {"part": part, "metric": "run_time"} for part in ("splat over workers", "splat over occupancy", "slice over k")
-    )
+    over_workers, slices = ({"part": part, "metric": "run_time"} for part in ("splat over workers", "slice over k"))
     sizes, workers = sorted(run.distinct("n", **over_workers)), sorted(run.distinct("workers", **over_workers))
-    n, p = run.distinct("n", **over_occupancy)[0], run.distinct("workers", **over_occupancy)[0]
     side = run.distinct("n", **slices)[0]
     widths = sorted(run.distinct("k", **slices))
     loops = run.distinct("variant", **slices)
@@ -214,8 +212,6 @@ def _splatting(run: Run) -> Section:
         return run.value("run_time", part="slice over occupancy", variant=loop, occupancy=c)
 
     shares = sorted(run.distinct("occupancy", part="slice over occupancy"))
-    occupancies = sorted(run.distinct("occupancy", **over_occupancy))
-    spheres = [(c, run.value("run_time", part="splat over occupancy", occupancy=c)) for c in occupancies]
     texts = []
     # Below this width the other work of a voxel weighs on the plain loop.
     wide = [k for k in widths if k >= 9] if sum(k >= 9 for k in widths) >= 2 else widths
@@ -232,26 +228,16 @@ def _splatting(run: Run) -> Section:
     ]
     sparse = speed_text(sparse_time("plain, no vectors", shares[0]).over(sparse_time("phases", shares[0])), "the plain loop")
     compared.append(f"With {shares[0] * 100:g} % of the voxels occupied and k = 5, phases, which splat empty voxels too, are {sparse}.")
-    (first, few), (last, many) = spheres[0], spheres[-1]
-    ratio = many.over(few)
-    span = f"From {first * 100:g} % to {last * 100:g} % occupied voxels of class II, {last / first:.0f} times as many,"
-    if not ratio.ranks:
-        change = f"takes {few.text()} and {many.text()} (not ranked)"
-    elif ratio.low <= 1 <= ratio.high:
-        change = "takes as long (a tie)"
-    else:
-        change = f"takes {ratio.text()} times as long"
-    compared.append(f"{span} the slowest slab {change} (the paper: linear).")
     return Section(
-        "Splatting: figure 8",
-        "How does splatting grow with the workers, with the width of the footprint and with occupancy, and what do the phases gain that "
+        "Splatting: figures 8a and 8b",
+        "How does splatting grow with the workers and with the width of the footprint, and what do the phases gain that "
         "the paper proposes in section 5.1?",
         "a: class-I spheres in equal slabs; the slab that takes longest, rendered alone on one thread (places of voxels and splatting). "
         f"b: a filled slice of {side} x {side} voxels at a pixel a voxel, splatted and composited in three ways that make the same pixels. "
         "Plain: each voxel adds k x k weighted pixels, compiled without vectors, as the paper's. Phases: for each of the k x k offsets in "
         "turn, all voxels add to the pixel at that offset, in vectors (5 x 5 pixels: the voxel's own and the paper's 24 phases). Kernels: "
         "those of the renderer, which filter along one axis and then along the other, in vectors. "
-        "c: class-II spheres of growing occupancy, through the renderer, whose view sets k; and a slice of randomly placed voxels, k = 5.",
+        "The last table has the same of a slice of randomly placed voxels, k = 5.",
         " ".join(growths + compared),
         [
             plots.lines(
@@ -286,16 +272,6 @@ def _splatting(run: Run) -> Section:
                     + [slice_time(of, k).over(slice_time(loop, k)) for loop, of, _ in pairs]
                     for k in widths
                 ],
-            ),
-            plots.lines(
-                "figure-8c-occupancy",
-                f"Figure 8c: splatting against occupancy, N = {n}, p = {p}",
-                {"class II": [(c * 100, time) for c, time in spheres]},
-                "occupied voxels C (%)",
-                "time",
-                "One sphere in p slabs, and the slowest of them. The paper gave every processor C N³ / p voxels and went up to C = 1; a "
-                "sphere in a cube ends at 52 %.",
-                from_zero=True,
             ),
             Table(
                 f"A slice of randomly placed voxels, {side} x {side}, k = 5",
