@@ -34,6 +34,7 @@ class JsonValue {
   bool Has(const char* field) const { return json_->is_object() && json_->contains(field); }
   JsonValue At(const char* field) const;  // the field must be present
 
+  bool Is(std::string_view text) const { return *json_ == text; }
   std::string Text() const;
   double Number(const NumberRange& range) const;
   int Integer(int min, int max) const;

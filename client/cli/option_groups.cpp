@@ -169,9 +169,16 @@ void AddPolicyOptions(CLI::App& app, Policy& policy) {
   AddNamed(app, "--split", policy.load_metric, LoadMetrics(), "")->group(kHidden);
   AddNamed(app, "--assignment", policy.assignment, Assignments(), "Which worker owns which box", kLeftToThePlanner);
   AddNamed(app, "--balance", policy.balance, BalanceModes(), "Whether boxes change from frame to frame");
-  AddInteger(app, "--groups", policy.groups, 0, kMaxGroups,
-             "Groups of boxes, nearest first, that are rendered one after the other; 0: the service chooses, by memory and, across hosts, "
-             "by time");
+  AddParsed(
+      app, "--groups", policy.groups,
+      [](const std::string& option, const std::string& text) -> Result<int> {
+        if (text == kAutomatic) return 0;
+        return ParseInteger(option, text, 0, kMaxGroups);
+      },
+      "Groups of boxes, nearest first, that are rendered one after the other; auto, or 0: the service chooses, by memory and, across "
+      "hosts, by time")
+      ->type_name("N|auto")
+      ->default_str(std::string(kAutomatic));
   AddInteger(app, "--frame-parallel", policy.teams, 1, kMaxTeams,
              "Frames rendered at the same time, each by its own part of the workers, which needs all voxels in every part");
   AddInteger(app, "--teams", policy.teams, 1, kMaxTeams, "")->group(kHidden);

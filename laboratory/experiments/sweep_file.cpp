@@ -189,7 +189,7 @@ SweepPolicy ReadPolicy(const JsonValue& value) {
                  [&](const JsonValue& v) {
                    policy.pixel_error = v.Number({0, kMaxPixelError});
                  }},
-                {"groups", [&](const JsonValue& v) { policy.groups = v.Integer(0, kMaxGroups); }},
+                {"groups", [&](const JsonValue& v) { policy.groups = v.Is(kAutomatic) ? 0 : v.Integer(0, kMaxGroups); }},
                 {"teams", [&](const JsonValue& v) { policy.teams = v.Integer(1, kMaxTeams); }},
                 {"combine", [&](const JsonValue& v) {
                    policy.combine = v.Text();

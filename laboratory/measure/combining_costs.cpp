@@ -22,13 +22,16 @@ constexpr int kRepeats = 15;
 constexpr std::size_t kCacheBytes = std::size_t{64} << 20;  // more than any cache
 
 // Fills `bounds`; every row holds `filled` of its pixels, in runs of 32.
-LocalImage MakePicture(const PixelBounds& bounds, double filled) {
+LocalImage MakePicture(PixelFormat format, const PixelBounds& bounds, double filled) {
   constexpr std::int32_t kRun = 32;
-  LocalImage image = MakeLocalImage(PixelFormat::kRgba, bounds);
+  LocalImage image = MakeLocalImage(format, bounds);
   const auto period = std::int32_t(kRun / filled);
   for (std::int32_t y = 0; y < bounds.height(); ++y) {
     for (std::int32_t x = 0; x < bounds.width(); ++x) {
-      if ((x + y) % period < kRun) std::fill_n(&image.rgba[4 * std::size_t(y * bounds.width() + x)], 4, 0.4F);
+      if ((x + y) % period >= kRun) continue;
+      const auto pixel = std::size_t(y * bounds.width() + x);
+      std::fill_n(&image.rgba[4 * pixel], 4, 0.4F);
+      if (HasDepth(format)) image.depth[pixel] = float(x);
     }
   }
   return image;
@@ -53,18 +56,21 @@ double MedianSeconds(Prepare&& prepare, Work&& work) {
 
 }  // namespace
 
-CombiningCosts MeasureCombining(Transfer transfer) {
+CombiningCosts MeasureCombining(Transfer transfer, PixelFormat format) {
   constexpr double kFilled = double(kBounds.width()) * kBounds.height();
   const PixelRange all = {0, std::uint64_t(kSide) * kSide};
   LocalImage full, half, target, other;
   const auto make_pictures = [&] {
-    full = MakePicture(kFrame, 1);
-    half = MakePicture(kFrame, 0.5);
+    full = MakePicture(format, kFrame, 1);
+    half = MakePicture(format, kFrame, 0.5);
   };
-  const auto make_images = [&] { target = other = MakePicture(kBounds, 1); };
+  const auto make_images = [&] { target = other = MakePicture(format, kBounds, 1); };
   CombiningCosts costs;
   costs.local_pixel = MedianSeconds(make_images, [&] { Combine(target, ViewOf(other), Side::kBack, kFrame); }) / kFilled;
-  costs.hidden_pixel = MedianSeconds(make_pictures, [&] { CHECK(FindHiddenTiles(full, kSide, kSide, 1e-3).empty()); }) / kPixels;
+  costs.hidden_pixel = 0;
+  if (format == PixelFormat::kRgba) {
+    costs.hidden_pixel = MedianSeconds(make_pictures, [&] { CHECK(FindHiddenTiles(full, kSide, kSide, 1e-3).empty()); }) / kPixels;
+  }
   if (transfer == Transfer::kLent) {
     // The sender only finds and describes where rows begin and end.
     costs.lent = true;

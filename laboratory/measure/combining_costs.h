@@ -1,6 +1,7 @@
 // The time that a worker's combining thread takes per pixel, measured by running its operators in this process.
 #pragma once
 
+#include "common/image/pixel_format.h"
 #include "common/simulation/machine_model.h"
 
 namespace slabstream {
@@ -13,7 +14,7 @@ enum class Transfer {
 
 // Processor time, medians of several runs on pictures that are full and half empty. As in frames, the pixels are not in this core's caches
 // (incoming ones were written by another core, and rendering has run on this one since), and an image becomes as large as the frame when
-// the first other one is combined into it.
-CombiningCosts MeasureCombining(Transfer transfer);
+// the first other one is combined into it. The costs of finding hidden tiles are those of colour images; others have none.
+CombiningCosts MeasureCombining(Transfer transfer, PixelFormat format = PixelFormat::kRgba);
 
 }  // namespace slabstream

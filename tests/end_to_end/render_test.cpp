@@ -90,6 +90,7 @@ TEST_F(RenderTest, ZBufferFindsTheBallsSurfaceAtItsDepth) {
 TEST_F(RenderTest, WorkersGroupsAxesAndSchemesDoNotChangeThePicture) {
   const std::vector<std::vector<std::string>> policies = {{"--local=2", "--groups", "2"},
                                                           {"--local=3", "--groups", "3", "--axis", "x"},
+                                                          {"--local=2", "--groups", "auto"},
                                                           {"--local=5", "--axis", "y", "--combine", "centralized"}};
   for (const std::string renderer : {"splat", "zbuffer"}) {
     const PictureFile one = Render("one.exr", {"--local=1", "--renderer", renderer, "--azimuth", "33", "--elevation", "21"});

@@ -50,9 +50,10 @@ TEST(SweepFile, ReadsWhatItSays) {
 
 TEST(SweepFile, LeavesNamesOpen) {
   const Result<Sweep> sweep = ParseSweep("s.json", R"({"volumes": [{"sphere": {}}], "workers": [2],
-    "policies": [{"decomposition": "auto", "split": "auto", "assignment": "auto", "combine": "auto"}]})");
+    "policies": [{"decomposition": "auto", "split": "auto", "assignment": "auto", "groups": "auto", "combine": "auto"}]})");
   ASSERT_TRUE(sweep.ok()) << sweep.status().message();
-  EXPECT_EQ(sweep->policies[0].name, "auto by auto, auto, static, 1 groups, auto");
+  EXPECT_EQ(sweep->policies[0].name, "auto by auto, auto, static, auto groups, auto");
+  EXPECT_EQ(sweep->policies[0].policy.groups, 0);
 }
 
 TEST(SweepFile, HasDefaults) {

@@ -1,9 +1,14 @@
 """slabstream_lab on synthetic results with known answers."""
 from __future__ import annotations
 
+import contextlib
+import io
+import itertools
 import pathlib
+import re
 import sys
 import tempfile
+import textwrap
 import unittest
 import unittest.mock
 import xml.etree.ElementTree
@@ -157,6 +162,26 @@ class Pages(InAFolder):
                 self.assertTrue(plots)
                 for plot in plots:
                     xml.etree.ElementTree.parse(plot)
+
+
+class Documents(InAFolder):
+    def test_the_examples_of_results_md_run(self) -> None:
+        """In one folder, one after the other, on a run that has the cases that they name."""
+        document = (ROOT / "docs/reference/results.md").read_text(encoding="utf-8")
+        section = document[document.index("## Reading them") :]
+        blocks = re.findall(r"(?:^    .*\n|^\n)+", section, re.MULTILINE)
+        examples = [textwrap.dedent(block).strip() for block in blocks if "import" in block]
+        self.assertEqual(len(examples), 2)
+        rows = []
+        for p, g in itertools.product((2, 4, 16), (1, 2, 4)):
+            rows += synthetic.figures(g / p, volume="class1-300", workers=p, groups=g, link="10gbit")
+        synthetic.write(self.folder / "streaming", rows)
+        printed, names = io.StringIO(), {}
+        with contextlib.chdir(self.folder), contextlib.redirect_stdout(printed):
+            for example in examples:
+                exec(compile(example, "results.md", "exec"), names)
+        self.assertIn("1 groups", printed.getvalue())
+        xml.etree.ElementTree.parse(self.folder / "mine.svg")
 
 
 if __name__ == "__main__":

@@ -1,9 +1,13 @@
-// Our own model of the stages (laboratory/measure/cost_model.h), fitted to every slab of every N and p, and the cost of combining a pixel.
+// Our own model of the stages (laboratory/measure/cost_model.h), fitted to every slab of every N and p; the cost of combining a pixel, and
+// a clock cycle.
+#include <tbb/task_arena.h>
+
 #include <cmath>
 
-#include "laboratory/experiments/machines.h"
 #include "laboratory/experiments/paper/setup.h"
+#include "laboratory/measure/combining_costs.h"
 #include "laboratory/measure/cost_fit.h"
+#include "laboratory/measure/thread_time.h"
 
 namespace slabstream {
 namespace {
@@ -23,16 +27,45 @@ std::vector<CostSample> SlabsOf(const PaperSetup& setup, const RendererKind* ren
   return samples;
 }
 
+// To find a pixel of a partial image, copy it into a message and combine it with another one.
+Trial CombiningTrial(const RendererKind* renderer) {
+  const auto run = [renderer]() -> Json {
+    tbb::task_arena one_thread(1);
+    const CombiningCosts costs = one_thread.execute([renderer] { return MeasureCombining(Transfer::kMessage, renderer->format()); });
+    return {{"seconds", costs.scan_pixel + costs.encode_pixel + costs.combine_pixel}};
+  };
+  return {{{"what", "combining pixel"}, {"renderer", renderer->name()}}, run, 5};
+}
+
+// A clock cycle: additions of whole numbers, each of the last sum to itself, take one cycle each on today's processors.
+double CycleSeconds() {
+  constexpr int kRuns = 7, kAdditions = 1 << 20;
+  return MedianSecondsOf(kRuns,
+                         [] {
+                           std::uint64_t sum = 1;
+                           for (int i = 0; i < kAdditions; ++i) {
+                             asm volatile("" : "+r"(sum));  // keeps additions apart
+                             sum += sum;
+                           }
+                           asm volatile("" : : "r"(sum));
+                         }) /
+         kAdditions;
+}
+
+Trial CycleTrial() {
+  return {{{"what", "clock cycle"}}, []() -> Json { return {{"seconds", CycleSeconds()}}; }, 0.1};
+}
+
 }  // namespace
 
+std::vector<Trial> ConstantsTrials(const PaperSetup&) { return {CombiningTrial(Splatting()), CombiningTrial(ZBuffer()), CycleTrial()}; }
+
 void AddConstants(const PaperSetup& setup, Results& results) {
-  std::vector<double> pixels;  // of a colour image, written, read and composited by our operators
-  for (const MachineModel& machine : Clusters(setup.context(), Link("10gbit"))) {
-    pixels.push_back(machine.combining.scan_pixel + machine.combining.encode_pixel + machine.combining.combine_pixel);
-  }
-  results.Add({{"part", "combining-pixel"}, {"renderer", Splatting()->name()}, {"stage", "combine"}}, "constant",
-              MedianOf(std::move(pixels)), Origin::kMeasured);
+  const auto seconds = [&](const Trial& trial) { return EstimateOf(setup.context().log(), trial.key, "seconds"); };
+  results.Add({{"part", "clock-cycle"}}, "constant", seconds(CycleTrial()), Origin::kMeasured);
   for (const RendererKind* renderer : {Splatting(), ZBuffer()}) {
+    results.Add({{"part", "combining-pixel"}, {"renderer", renderer->name()}, {"stage", "combine"}}, "constant",
+                seconds(CombiningTrial(renderer)), Origin::kMeasured);
     const std::vector<CostSample> slabs = SlabsOf(setup, renderer);
     for (const StageModel& stage : CostModelOf(renderer->name())) {
       const Result<StageFit> fit = FitStage(stage, slabs);

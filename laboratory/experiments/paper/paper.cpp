@@ -22,8 +22,8 @@ void DeclarePaper(CLI::App& app, OwnOptions& options) {
 void RunPaper(ExperimentContext& context, Results& results) {
   const PaperSetup setup(context);
   std::vector<Trial> trials;
-  for (auto* make :
-       {TransformTrials, FootprintTrials, PointsTrials, FrameTrials, OccupancyTrials, ImprovedTrials, ClaimTrials, ValidationTrials}) {
+  for (auto* make : {TransformTrials, FootprintTrials, PointsTrials, FrameTrials, OccupancyTrials, ConstantsTrials, ImprovedTrials,
+                     ClaimTrials, ValidationTrials}) {
     for (Trial& trial : make(setup)) trials.push_back(std::move(trial));
   }
   context.Run(std::move(trials), kRepeats, kQuickRepeats);

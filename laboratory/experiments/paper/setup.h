@@ -52,6 +52,7 @@ void AddFrames(const PaperSetup& setup, Results& results);
 std::vector<Trial> OccupancyTrials(const PaperSetup& setup);
 void AddOccupancy(const PaperSetup& setup, Results& results);
 void AddModel(const PaperSetup& setup, Results& results);
+std::vector<Trial> ConstantsTrials(const PaperSetup& setup);
 void AddConstants(const PaperSetup& setup, Results& results);
 std::vector<Trial> ImprovedTrials(const PaperSetup& setup);
 void AddImproved(const PaperSetup& setup, Results& results);

@@ -193,6 +193,17 @@ def _claims(run: Run, frames: Frames) -> Section:
             [f"Subcubes make smaller images than slabs ({name})", f"p = {p}: {verdict}",
              f"pixels {ratio:.2f} times those of slabs, bytes sent by fan-in {values['image_bytes']:.2f} times"]  # fmt: skip
         )
+    for view in run.distinct("view", part="claims"):
+        one = run.value("count", part="claims", view=view, workers=1)
+        slab, beam, cube = (
+            run.value("count", part="claims", view=view, workers=p, decomposition=d).value / one.value for d in ("slab", "beam", "subcube")
+        )
+        name = "perspective" if "fov" in view else "orthographic"
+        verdict = "less" if cube < slab else "more" if cube > slab else "as much"
+        rows.append(
+            [f"Images of subcubes overlap less than those of slabs ({name})", f"p = {p}: {verdict}",
+             f"pixels of all images over those of one: slabs {slab:.2f}, beams {beam:.2f}, subcubes {cube:.2f}"]  # fmt: skip
+        )
     if {"perspective", "orthographic"} <= set(pictures):
         inner, outer = (pictures[name]["count"] for name in ("perspective", "orthographic"))
         text = "as much, within 1 %," if abs(inner / outer - 1) < 0.01 else "more" if inner < outer else "less"

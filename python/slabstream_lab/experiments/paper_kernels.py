@@ -109,6 +109,13 @@ def _transform(run: Run) -> Section:
             f"At p = {p} the time of the phases in vectors {growth}; the paper's two printed times at p = 15 grow as N to the power of "
             f"{number_text(math.log(cubic[1][1].value / cubic[0][1].value) / math.log(2), 2)} (N = 150 to 300)."
         )
+    cycle = run.value("constant", part="clock-cycle")
+    voxels = {n: n * n * math.ceil(n / workers[0]) for n in (sizes[0], sizes[-1])}
+    cycles = [f"{get('phases', n, workers[0]).times(1 / count).over(cycle).text()} at N = {n}" for n, count in voxels.items()]
+    texts.append(
+        f"c_t of Eq. 12, the time of the phases in vectors a voxel, is in clock cycles of {cycle.text()} {' and '.join(cycles)} "
+        f"(p = {workers[0]}); the paper says that it tends to one cycle."
+    )
     texts.append(_error_text(run, sizes))
     series = {f"N = {n}": [(p, get("phases", n, p)) for p in workers] for n in sizes}
     series[f"N = {printed_n}, paper"] = [(p, phases) for p, (_, phases) in paper.items() if phases]
