@@ -69,7 +69,8 @@ class Search {
   }
 
   PolicyChoice Run() {
-    TryLayout(best_, open_partition_);
+    const ResolvedPolicy first = best_;  // best_ changes meanwhile
+    TryLayout(first, open_partition_);
     if (open_partition_) ChoosePartition();
     if (open_owners_ || open_groups_) ChooseGroupsAndOwners();
     if (asked_.combine == kAutomatic) ChooseScheme();
@@ -129,7 +130,7 @@ class Search {
   }
 
   // Layouts that have been tried under another name are not tried again. `schemes`: under all kPartitionSchemes, if the scheme is open.
-  void TryLayout(ResolvedPolicy policy, bool schemes) {
+  void TryLayout(const ResolvedPolicy& policy, bool schemes) {
     Layout layout = layouts_.Make(policy);
     if (std::ranges::find(tried_, layout) != tried_.end()) return;
     tried_.push_back(layout);

@@ -242,6 +242,7 @@ void AddBoxes(ExperimentContext& context, const Balance& balance, const BenchCas
       Json of = CaseOf("box", frame);
       of["box"] = placement.id;
       std::vector<double> seconds;
+      seconds.reserve(repeats.size());
       for (const MeasuredFrame& repeat : repeats) seconds.push_back(repeat.boxes[placement.id].seconds);
       results.Add(of, "box_time", MedianOf(std::move(seconds)), Origin::kMeasured);
       results.Add(of, "estimated_box_time", estimator.Of(placement.box).seconds, Origin::kSimulated);

@@ -38,6 +38,7 @@ void AddFigures(Results& results, const Json& of, const std::vector<FrameFigures
                                {"idle_share", &FrameFigures::idle_share},   {"image_bytes", &FrameFigures::image_bytes}};
   for (const Field& field : kFields) {
     std::vector<double> values;
+    values.reserve(repeats.size());
     for (const FrameFigures& repeat : repeats) values.push_back(repeat.*field.figure);
     results.Add(of, field.metric, MedianOf(std::move(values)), Origin::kSimulated);
   }
