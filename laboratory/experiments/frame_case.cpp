@@ -383,7 +383,7 @@ double SteadySeconds(const MeasuredFrame& frame, const MachineModel& machine, in
   const int window = WindowFor(workers, std::uint32_t(teams), FrameBytes(frame.plan.setup)).frames;
   // Whole rounds of the teams, since teams may end together. The middle half is evaluated.
   const int frames = 4 * teams * std::max((window + teams - 1) / teams, 4);
-  const Timeline timeline = Simulate(frame, machine, frames, window + 2, false, teams);
+  const Timeline timeline = Simulate(frame, machine, frames, std::min(window + 2, int(kMaxOpenRequests)), false, teams);
   std::vector<double> received;
   for (const SimulatedFrame& simulated : timeline.frames) received.push_back(simulated.received);
   std::sort(received.begin(), received.end());

@@ -98,7 +98,7 @@ def _section(run: Run, part: str, renderer: str) -> Section:
         f"{'Spheres from ' + volumes[0] + ' to ' + volumes[-1] if weak else 'Sphere ' + volumes[0]}, {pixels} x {pixels} pixels. Boxes are "
         f"rendered alone, each on one thread. Frames are simulated on a network ({link}) with all that a service does around a frame: "
         "latency of a frame that is alone, and the time from picture to picture with as many frames requested ahead as keep all workers "
-        "busy. Efficiency is what a worker gets done in that time, over what one worker alone gets done, of the same series, by the same time"
+        "busy, at most the 256 that one client may have open. Efficiency is what a worker gets done in that time, over what one worker alone gets done, of the same series, by the same time"
         + (
             "; as sides are whole numbers of voxels, a worker has not always as many, which efficiency takes into account."
             if weak
