@@ -14,7 +14,7 @@ import pandas  # noqa: E402
 
 from .page import Figure  # noqa: E402
 from .results import value_of  # noqa: E402
-from .value import Value, scale_of  # noqa: E402
+from .value import Value, number_text, scale_of  # noqa: E402
 
 # Okabe and Ito, 2008: told apart by colour-blind readers.
 COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#8c6bb1", "#7f7f7f", "#b3a200"]
@@ -97,6 +97,12 @@ def lines(
             plot.yaxis.set_minor_formatter(matplotlib.ticker.FormatStrFormatter("%g"))
     if from_zero:
         plot.set_ylim(bottom=0)
+    # One repeat that was disturbed may reach many times as far as all values: then the values keep the plot.
+    largest, reach = max(sizes, default=0), max((abs(v.high) for points in data.values() for _, v in points), default=0)
+    if reach > 2 * largest > 0:
+        plot.set_ylim(top=1.5 * largest / factor)
+        longest = f"{number_text(reach / factor, 2)} {unit}".strip()
+        caption = f"{caption} Whiskers end at the edge; the longest reaches {longest}.".strip()
     if marks:
         plot.set_xticks(sorted({point[0] for points in data.values() for point in points}))
         plot.xaxis.set_minor_locator(matplotlib.ticker.NullLocator())

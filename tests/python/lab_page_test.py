@@ -150,6 +150,14 @@ class Answers(InAFolder):
                 self.assertIn("not ranked", answer)
 
 
+class Plots(unittest.TestCase):
+    def test_one_disturbed_repeat_does_not_squash_the_values(self) -> None:
+        disturbed = Value(1.0, 0.9, 40.0, 3, "s", "measured", "")
+        figure = plots.lines("a", "A", {"one": [(1, value(1.0)), (2, disturbed)]}, "p", "time", "Of boxes.")
+        self.assertEqual(figure.caption, "Of boxes. Whiskers end at the edge; the longest reaches 40 s.")
+        self.assertEqual(plots.lines("a", "A", {"one": [(1, value(1.0))]}, "p", "time", "Of boxes.").caption, "Of boxes.")
+
+
 class Pages(InAFolder):
     def test_every_page_is_well_formed(self) -> None:
         for experiment, make in synthetic.MAKERS.items():
