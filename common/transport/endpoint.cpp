@@ -4,6 +4,7 @@
 #include <sys/un.h>
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cstdint>
 #include <optional>
@@ -40,22 +41,48 @@ std::optional<std::string> LoopbackHost(std::string_view host) {
   return std::nullopt;
 }
 
-Result<Endpoint> ParseTcp(std::string_view text, std::string_view rest, bool allow_wildcard) {
+// An IPv4 or IPv6 address of one host, as it is written in endpoints.
+bool IsAddress(std::string_view host) {
+  in_addr four{};
+  if (inet_pton(AF_INET, std::string(host).c_str(), &four) == 1) return four.s_addr != htonl(INADDR_ANY);
+  if (!host.starts_with('[') || !host.ends_with(']')) return false;
+  in6_addr six{};
+  const std::string inner(host.substr(1, host.size() - 2));
+  return inet_pton(AF_INET6, inner.c_str(), &six) == 1 && !IN6_IS_ADDR_UNSPECIFIED(&six) && !IN6_IS_ADDR_V4MAPPED(&six) &&
+         !IN6_IS_ADDR_LOOPBACK(&six);
+}
+
+// A host name (RFC 1123) that cannot be mistaken for an address.
+bool IsName(std::string_view host) {
+  constexpr std::size_t kMaxName = 253, kMaxLabel = 63;
+  if (host.empty() || host.size() > kMaxName) return false;
+  std::string_view label;
+  for (std::size_t begin = 0; begin <= host.size(); begin += label.size() + 1) {
+    label = host.substr(begin, host.find('.', begin) - begin);
+    if (label.empty() || label.size() > kMaxLabel || label.front() == '-' || label.back() == '-') return false;
+    const bool plain = std::ranges::all_of(label, [](unsigned char c) { return c < 0x80 && (std::isalnum(c) != 0 || c == '-'); });
+    if (!plain) return false;
+  }
+  return std::ranges::any_of(label, [](unsigned char c) { return std::isalpha(c) != 0; });  // the last one
+}
+
+Result<Endpoint> ParseTcp(std::string_view text, std::string_view rest, bool to_bind) {
   const std::size_t colon = rest.rfind(':');
   if (colon == std::string_view::npos) return Refused(text, "no port, expected tcp://HOST:PORT");
   const std::string_view host = rest.substr(0, colon), port = rest.substr(colon + 1);
   Endpoint endpoint;
   if (std::optional<std::string> loopback = LoopbackHost(host)) {
     endpoint.host = *std::move(loopback);
+  } else if (IsAddress(host) || (!to_bind && IsName(host))) {
+    endpoint.host = host;
   } else {
-    return Refused(text, "host \"" + std::string(host.substr(0, 128)) +
-                             "\" is not loopback (127.0.0.0/8, [::1] or localhost): without keys the service stays on this machine");
+    return Refused(text, "host \"" + std::string(host.substr(0, 128)) + "\" is not " +
+                             (to_bind ? "the address of one host" : "the address or the name of one host"));
   }
-  if (allow_wildcard && port == "*") return endpoint;
+  if (to_bind && (port == "*" || port == "0")) return endpoint;
   const auto [end, error] = std::from_chars(port.data(), port.data() + port.size(), endpoint.port);
   if (error != std::errc() || end != port.data() + port.size() || endpoint.port < 1 || endpoint.port > kMaxPort) {
-    return Refused(text,
-                   "port \"" + std::string(port.substr(0, 128)) + "\" is not a number of [1, 65535]" + (allow_wildcard ? " or *" : ""));
+    return Refused(text, "port \"" + std::string(port.substr(0, 128)) + "\" is not a number of [1, 65535]" + (to_bind ? " or *" : ""));
   }
   return endpoint;
 }
@@ -72,6 +99,8 @@ Result<Endpoint> ParseIpc(std::string_view text, std::string_view path) {
 
 }  // namespace
 
+bool Endpoint::remote() const { return scheme == Scheme::kTcp && !LoopbackHost(host); }
+
 std::string Endpoint::ToString() const {
   switch (scheme) {
     case Scheme::kTcp: return "tcp://" + host + ":" + (port == 0 ? "*" : std::to_string(port));
@@ -81,10 +110,10 @@ std::string Endpoint::ToString() const {
   return "inproc://" + path;
 }
 
-Result<Endpoint> ParseEndpoint(std::string_view text, bool allow_wildcard) {
+Result<Endpoint> ParseEndpoint(std::string_view text, bool to_bind) {
   if (text.size() > kMaxTextBytes) return Refused(text, std::to_string(text.size()) + " bytes, at most " + std::to_string(kMaxTextBytes));
   if (!Printable(text)) return Refused(text, "spaces and control characters are not allowed, expected " + std::string(kShapes));
-  if (text.starts_with("tcp://")) return ParseTcp(text, text.substr(6), allow_wildcard);
+  if (text.starts_with("tcp://")) return ParseTcp(text, text.substr(6), to_bind);
   if (text.starts_with("ipc://")) return ParseIpc(text, text.substr(6));
   if (text.starts_with("inproc://")) {
     if (text.size() == 9) return Refused(text, "no name, expected inproc://NAME");

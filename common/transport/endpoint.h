@@ -1,7 +1,7 @@
 // Endpoints as users type them: tcp://HOST:PORT, ipc://PATH, inproc://NAME.
 //
-// Until the service has keys it stays on this machine: tcp hosts must be loopback (127.0.0.0/8, [::1] or localhost); everything else is
-// refused.
+// Hosts are addresses, or names where a connection is made. What is not loopback (127.0.0.0/8, [::1] or localhost) leaves this machine, and
+// sockets then need keys.
 #pragma once
 
 #include <string>
@@ -15,16 +15,17 @@ enum class Scheme { kTcp, kIpc, kInproc };
 
 struct Endpoint {
   Scheme scheme = Scheme::kTcp;
-  std::string host;  // tcp: "127.0.0.1"
+  std::string host;  // tcp: "127.0.0.1", "[::1]", "node7"
   int port = 0;      // tcp: [1, 65535]; 0 stands for "*", any free port (binding only)
   std::string path;  // ipc: absolute path, at most 107 bytes; inproc: name
 
+  bool remote() const;           // tcp beyond this machine's loopback
   std::string ToString() const;  // as ZeroMQ takes it
 };
 
-// InvalidArgument naming the text and what is expected. At most 512 printable bytes without spaces. `allow_wildcard`: "*" as port is fine
-// (binding).
-Result<Endpoint> ParseEndpoint(std::string_view text, bool allow_wildcard);
+// InvalidArgument naming the text and what is expected. At most 512 printable bytes without spaces. `to_bind`: "*" or 0 as port is fine,
+// and the host is an address.
+Result<Endpoint> ParseEndpoint(std::string_view text, bool to_bind);
 
 // Where the coordinator listens for workers if only the client endpoint is given: the next tcp port (any for any; the one before for
 // 65535), or the path with ".workers".

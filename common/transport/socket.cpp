@@ -7,7 +7,10 @@
 #include <zmq.hpp>
 
 #include "common/base/check.h"
+#include "common/transport/authenticator.h"
+#include "common/transport/connection_table.h"
 #include "common/transport/connection_tuner.h"
+#include "common/transport/context_impl.h"
 #include "common/transport/endpoint.h"
 #include "common/transport/ipc_listener.h"
 
@@ -17,22 +20,19 @@
 
 namespace slabstream {
 
-struct Context::Impl {
-  zmq::context_t context{1};  // one I/O thread moves 4 to 6 GB/s, more than a machine's workers make
-};
-
-Context::Context() : impl_(std::make_unique<Impl>()) {
-  constexpr int kMaxSockets = 65535;  // the usual 1023 would limit the embedded workers: each has a socket to every other
-  impl_->context.set(zmq::ctxopt::max_sockets, kMaxSockets);
-}
-
-Context::~Context() = default;
-
 struct Socket::Impl {
-  Impl(zmq::context_t& context, zmq::socket_type type) : socket(context, type), router(type == zmq::socket_type::router) {}
+  Impl(Context& the_context, zmq::socket_type type, SocketOptions the_options)
+      : context(the_context),
+        options(std::move(the_options)),
+        socket(the_context.impl().context, type),
+        router(type == zmq::socket_type::router) {}
 
+  Context& context;
+  const SocketOptions options;
   zmq::socket_t socket;
-  bool router;
+  const bool router;
+  bool encrypted = false;                  // some of its connections
+  ConnectionTable connections;             // of users
   std::unique_ptr<ConnectionTuner> tuner;  // of the tcp connections made here
   std::vector<std::string> names;          // inproc endpoints bound here
   std::vector<IpcListener> listeners;      // ipc files bound here
@@ -57,10 +57,12 @@ Status Failed(const std::string& endpoint, const zmq::error_t& error) {
 
 Result<std::unique_ptr<Socket::Impl>> MakeSocket(Context& context, zmq::socket_type type, const SocketOptions& options) {
   try {
-    auto impl = std::make_unique<Socket::Impl>(context.impl().context, type);
+    auto impl = std::make_unique<Socket::Impl>(context, type, options);
     impl->socket.set(zmq::sockopt::sndhwm, options.send_high_water_mark);
     impl->socket.set(zmq::sockopt::rcvhwm, options.receive_high_water_mark);
     impl->socket.set(zmq::sockopt::linger, static_cast<int>(std::chrono::ceil<std::chrono::milliseconds>(options.linger).count()));
+    impl->socket.set(zmq::sockopt::handshake_ivl,
+                     static_cast<int>(std::chrono::ceil<std::chrono::milliseconds>(options.handshake).count()));
     impl->socket.set(zmq::sockopt::maxmsgsize, options.max_message_bytes);
     if (impl->router) {
       impl->socket.set(zmq::sockopt::router_mandatory, true);
@@ -74,6 +76,24 @@ Result<std::unique_ptr<Socket::Impl>> MakeSocket(Context& context, zmq::socket_t
 
 // [::1] needs it; with it on always, ZeroMQ would report IPv4 endpoints in their mapped form.
 void AllowAddressFamily(zmq::socket_t& socket, const Endpoint& endpoint) { socket.set(zmq::sockopt::ipv6, endpoint.host.starts_with('[')); }
+
+Status KeysMissing(const Endpoint& endpoint) {
+  return Status::InvalidArgument("endpoint \"" + endpoint.ToString() + "\": host \"" + endpoint.host +
+                                 "\" is not loopback (127.0.0.0/8, [::1] or localhost): without keys the service stays on this machine");
+}
+
+// Connections of this endpoint are encrypted.
+void UseServerKeys(Context& context, zmq::socket_t& socket, const ServerKeys& keys) {
+  context.authenticator();  // without it everybody would be admitted
+  socket.set(zmq::sockopt::curve_server, true);
+  socket.set(zmq::sockopt::curve_secretkey, keys.secret_key);
+  socket.set(zmq::sockopt::zap_domain, keys.plane);
+}
+void UseClientKeys(zmq::socket_t& socket, const ClientKeys& keys) {
+  socket.set(zmq::sockopt::curve_serverkey, keys.server_key);
+  socket.set(zmq::sockopt::curve_publickey, keys.own.public_key);
+  socket.set(zmq::sockopt::curve_secretkey, keys.own.secret_key);
+}
 
 // Hands a listening descriptor to the socket, which owns it from then on.
 void BindDescriptor(zmq::socket_t& socket, const std::string& endpoint, IpcListener& listener) {
@@ -171,6 +191,12 @@ Result<std::string> Socket::Bind(const std::string& text) {
   try {
     switch (endpoint->scheme) {
       case Scheme::kTcp: {
+        if (const auto& keys = impl_->options.server_keys) {
+          UseServerKeys(impl_->context, socket, *keys);
+          impl_->encrypted = true;
+        } else if (endpoint->remote()) {
+          return KeysMissing(*endpoint);
+        }
         AllowAddressFamily(socket, *endpoint);
         socket.bind(name);
         return socket.get(zmq::sockopt::last_endpoint);
@@ -197,7 +223,10 @@ Result<std::string> Socket::Bind(const std::string& text) {
 Status Socket::Connect(const std::string& text) {
   const Result<Endpoint> endpoint = ParseEndpoint(text, false);
   if (!endpoint.ok()) return endpoint.status();
+  const auto& keys = impl_->options.client_keys;
+  if (endpoint->remote() && !keys) return KeysMissing(*endpoint);
   try {
+    if (endpoint->scheme == Scheme::kTcp && keys) UseClientKeys(impl_->socket, *keys);
     AllowAddressFamily(impl_->socket, *endpoint);
     if (endpoint->scheme == Scheme::kTcp && impl_->tuner == nullptr) impl_->tuner = std::make_unique<ConnectionTuner>(impl_->socket);
     impl_->socket.connect(endpoint->ToString());
@@ -223,6 +252,8 @@ Status Socket::Send(const std::string& identity, std::vector<std::byte> header, 
   }
 }
 
+void Socket::EndConnections(const std::string& user) { impl_->connections.End(user); }
+
 std::optional<Incoming> Socket::TryReceive() {
   zmq::message_t part;
   while (ReceivePart(impl_->socket, part)) {
@@ -237,6 +268,7 @@ std::optional<Incoming> Socket::TryReceive() {
     std::size_t surplus = 0;
     while (more && ReceivePart(impl_->socket, part)) {
       more = part.more();
+      if (impl_->encrypted && incoming.parts.empty()) incoming.user = impl_->connections.Heard(incoming.identity, part);
       if (incoming.parts.size() < 2) {
         incoming.parts.push_back(Adopt(std::move(part)));
       } else {

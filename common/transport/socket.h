@@ -1,6 +1,6 @@
 // ROUTER and DEALER sockets that move frames of bytes. cppzmq and its exceptions stay inside socket.cpp.
 //
-//   1. One Context a process (inproc endpoints meet within one context).
+//   1. One Context a process.
 //   2. Socket::Router / Socket::Dealer, then Bind or Connect.
 //   3. A loop: Wait(sockets, wakeup, timeout), then TryReceive until empty, then Send.
 // A socket belongs to the thread that uses it; it may be made in one thread and handed to another before its first use. Context and Wakeup
@@ -23,24 +23,14 @@
 #include "common/base/bytes.h"
 #include "common/base/status.h"
 #include "common/base/time.h"
+#include "common/transport/context.h"
+#include "common/transport/keys.h"
 
 namespace slabstream {
 
-class Context {
- public:
-  Context();
-  ~Context();  // all sockets must be gone
-  Context(const Context&) = delete;
-  Context& operator=(const Context&) = delete;
-  struct Impl;
-  Impl& impl() const { return *impl_; }
-
- private:
-  std::unique_ptr<Impl> impl_;
-};
-
 struct Incoming {
   std::string identity;      // routers: who sent it
+  std::string user;          // routers: the sender's public key, as the Authenticator admitted it; empty: the connection is not encrypted
   std::vector<Bytes> parts;  // 1 or 2: header, payload; the bytes are the message's own memory, not a copy
 };
 
@@ -49,6 +39,10 @@ struct SocketOptions {
   int receive_high_water_mark = 4096;
   Duration linger = std::chrono::milliseconds(500);        // how long unsent messages outlive the socket
   std::int64_t max_message_bytes = std::int64_t{2} << 30;  // a larger frame closes the connection
+  Duration handshake = std::chrono::seconds(5);            // how long a connection may take to become one
+  // With keys, tcp connections are encrypted; without, endpoints that leave this machine are refused. ipc and inproc are never encrypted.
+  std::optional<ServerKeys> server_keys;  // to bind
+  std::optional<ClientKeys> client_keys;  // to connect
 };
 
 class Socket {
@@ -59,15 +53,19 @@ class Socket {
   Socket& operator=(Socket&&) noexcept;
   ~Socket();
 
-  // The endpoint with the port that was chosen. Unavailable (in use, no permission) names the endpoint; InvalidArgument: as ParseEndpoint.
+  // The endpoint with the port that was chosen. Unavailable (in use, no permission) names the endpoint; InvalidArgument: as ParseEndpoint,
+  // or keys are missing.
   // An ipc socket file that a dead process left is replaced. Closing frees inproc names and ipc files at once, a tcp port a moment later.
   Result<std::string> Bind(const std::string& endpoint);
-  // Ok does not mean that anybody listens there. InvalidArgument: as ParseEndpoint.
+  // Ok does not mean that anybody listens there. InvalidArgument: as ParseEndpoint, or keys are missing.
   Status Connect(const std::string& endpoint);
 
   // Sends header and, if not empty, payload as one message, without copying the payload. `identity` is ignored by dealers.
   // Unavailable: nobody with this identity (router); ResourceExhausted: the high-water mark is reached.
   Status Send(const std::string& identity, std::vector<std::byte> header, const Bytes& payload = {});
+
+  // Ends the connections from which messages of this user have come. They are made again, unless the Authenticator refuses them.
+  void EndConnections(const std::string& user);
 
   // The next whole message, if there is one. Messages with no part or more than two parts are dropped.
   std::optional<Incoming> TryReceive();

@@ -307,12 +307,14 @@ TEST(Socket, ConnectionsWithinTheHostAreNotPaced) {
   EXPECT_THAT(CongestionControlsTo(ParseEndpoint(*bound, false)->port), testing::ElementsAre("reno"));
 }
 
-TEST(Socket, RefusesWhatIsNotLoopback) {
+TEST(Socket, RefusesWhatIsNotLoopbackWithoutKeys) {
   Context context;
   Result<Socket> socket = Socket::Router(context);
   ASSERT_TRUE(socket.ok());
-  EXPECT_EQ(socket->Bind("tcp://0.0.0.0:*").status().code(), StatusCode::kInvalidArgument);
-  EXPECT_EQ(socket->Connect("tcp://8.8.8.8:7420").code(), StatusCode::kInvalidArgument);
+  for (const Status& status : {socket->Bind("tcp://192.168.1.2:*").status(), socket->Connect("tcp://8.8.8.8:7420")}) {
+    EXPECT_EQ(status.code(), StatusCode::kInvalidArgument);
+    EXPECT_THAT(status.message(), HasSubstr("is not loopback (127.0.0.0/8, [::1] or localhost): without keys the service stays on this"));
+  }
   EXPECT_EQ(socket->Connect("tcp://127.0.0.1:*").code(), StatusCode::kInvalidArgument);
 }
 

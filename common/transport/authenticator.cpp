@@ -1,0 +1,150 @@
+#include "common/transport/authenticator.h"
+
+#include <algorithm>
+#include <array>
+#include <deque>
+#include <mutex>
+#include <vector>
+#include <zmq.hpp>
+
+#include "common/base/check.h"
+#include "common/base/log.h"
+#include "common/transport/context_impl.h"
+#include "common/transport/socket.h"
+
+namespace slabstream {
+namespace {
+
+constexpr char kEndpoint[] = "inproc://zeromq.zap.01";
+constexpr char kVersion[] = "1.0";
+constexpr std::size_t kKeyBytes = 32;
+constexpr std::size_t kMostWaiting = 1024;  // handshakes; more are refused at once
+constexpr std::chrono::hours kLongWait{1};
+
+struct Request {
+  std::vector<zmq::message_t> route;  // to where the answer goes, with the empty frame behind it
+  std::string id, plane, public_key;
+  Time asked;
+};
+
+std::string KeyText(const zmq::message_t& key) {
+  std::array<char, 41> text{};
+  if (key.size() != kKeyBytes || zmq_z85_encode(text.data(), static_cast<const std::uint8_t*>(key.data()), kKeyBytes) == nullptr) return "";
+  return text.data();
+}
+
+}  // namespace
+
+struct Authenticator::Impl {
+  explicit Impl(zmq::context_t& context) : socket(context, zmq::socket_type::router) {
+    socket.set(zmq::sockopt::linger, 0);
+    socket.bind(kEndpoint);
+  }
+
+  struct Plane {
+    std::set<std::string> admitted;
+    Duration patience{};
+  };
+  enum class Verdict { kAdmit, kWait, kNotYet, kRefuse };
+
+  Verdict Judge(const Request& request) {
+    const std::lock_guard lock(mutex);
+    const auto plane = planes.find(request.plane);
+    if (plane == planes.end() || request.public_key.empty()) return Verdict::kRefuse;
+    if (plane->second.admitted.contains(request.public_key)) return Verdict::kAdmit;
+    if (plane->second.patience == Duration::zero()) return Verdict::kRefuse;
+    return MonotonicNow() - request.asked < plane->second.patience && waiting.size() < kMostWaiting ? Verdict::kWait : Verdict::kNotYet;
+  }
+
+  void Answer(Request& request, Verdict verdict) {
+    for (zmq::message_t& part : request.route) socket.send(part, zmq::send_flags::sndmore);
+    const bool admit = verdict == Verdict::kAdmit;
+    const std::string code = admit ? "200" : verdict == Verdict::kNotYet ? "300" : "400";
+    // The key becomes the name of the connection's user.
+    const std::array<std::string, 6> parts = {kVersion, request.id, code, admit ? "OK" : "unknown key", request.public_key, ""};
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      socket.send(zmq::buffer(parts[i]), i + 1 < parts.size() ? zmq::send_flags::sndmore : zmq::send_flags::none);
+    }
+    if (verdict == Verdict::kRefuse) LogInfo("refused a connection to the " + request.plane + " plane: unknown key");
+  }
+
+  // False: nothing is there.
+  bool Receive() {
+    std::vector<zmq::message_t> parts;
+    do {
+      zmq::message_t& part = parts.emplace_back();
+      if (!socket.recv(part, zmq::recv_flags::dontwait)) return false;
+    } while (parts.back().more());
+    // Route, empty; version, request, domain, address, identity, mechanism, credentials.
+    const auto empty = std::ranges::find_if(parts, [](const zmq::message_t& part) { return part.size() == 0; });
+    const auto rest = std::size_t(parts.end() - empty);
+    if (rest != 8 || empty[1].to_string_view() != kVersion) return true;
+    Request request{.route = {}, .id = empty[2].to_string(), .plane = empty[3].to_string(), .public_key = {}, .asked = MonotonicNow()};
+    if (empty[6].to_string_view() == "CURVE") request.public_key = KeyText(empty[7]);
+    request.route.assign(std::make_move_iterator(parts.begin()), std::make_move_iterator(empty + 1));
+    waiting.push_back(std::move(request));
+    return true;
+  }
+
+  void Run(const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      std::array<zmq::pollitem_t, 2> items = {{{socket.handle(), 0, ZMQ_POLLIN, 0}, {nullptr, wakeup.file_descriptor(), ZMQ_POLLIN, 0}}};
+      const bool some_wait = !waiting.empty();
+      try {
+        zmq::poll(items.data(), items.size(), some_wait ? std::chrono::milliseconds(50) : std::chrono::milliseconds(kLongWait));
+        wakeup.Drain();
+        while (Receive()) {
+        }
+        for (std::deque<Request> asked = std::exchange(waiting, {}); !asked.empty(); asked.pop_front()) {
+          const Verdict verdict = Judge(asked.front());
+          if (verdict == Verdict::kWait) {
+            waiting.push_back(std::move(asked.front()));
+          } else {
+            Answer(asked.front(), verdict);
+          }
+        }
+      } catch (const zmq::error_t& error) {
+        if (error.num() != EINTR) LogError(std::string("authentication: ") + error.what());
+      }
+    }
+  }
+
+  zmq::socket_t socket;
+  Wakeup wakeup;
+  std::deque<Request> waiting;  // the thread's
+  std::mutex mutex;
+  std::map<std::string, Plane> planes;  // guarded by mutex
+  std::jthread thread;                  // last member
+};
+
+Authenticator::Authenticator(Context& context) : impl_(std::make_unique<Impl>(context.impl().context)) {
+  impl_->thread = std::jthread([impl = impl_.get()](const std::stop_token& stop) { impl->Run(stop); });
+}
+
+Authenticator::~Authenticator() {
+  impl_->thread.request_stop();
+  impl_->wakeup.Notify();
+}
+
+void Authenticator::AdmitOnly(const std::string& plane, std::set<std::string> public_keys) {
+  {
+    const std::lock_guard lock(impl_->mutex);
+    impl_->planes[plane].admitted = std::move(public_keys);
+  }
+  impl_->wakeup.Notify();
+}
+
+void Authenticator::Admit(const std::string& plane, const std::string& public_key) {
+  {
+    const std::lock_guard lock(impl_->mutex);
+    if (!impl_->planes[plane].admitted.insert(public_key).second) return;
+  }
+  impl_->wakeup.Notify();
+}
+
+void Authenticator::SetPatience(const std::string& plane, Duration patience) {
+  const std::lock_guard lock(impl_->mutex);
+  impl_->planes[plane].patience = patience;
+}
+
+}  // namespace slabstream

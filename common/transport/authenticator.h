@@ -1,0 +1,37 @@
+// Authenticator: decides who may connect to the encrypted sockets of its Context (ZAP, RFC 27). It has a thread of its own, which ends
+// with it. Its functions may be called from any thread.
+//
+// Without it ZeroMQ would admit every key, so a Context makes one before its first encrypted socket.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <thread>
+
+#include "common/base/time.h"
+
+namespace slabstream {
+
+class Context;
+
+class Authenticator {
+ public:
+  explicit Authenticator(Context& context);  // CHECKs that the context has no other one
+  ~Authenticator();
+
+  // From now on these public keys, and no others, may connect to `plane`. Connections that are there stay: Socket::EndConnections.
+  void AdmitOnly(const std::string& plane, std::set<std::string> public_keys);
+  void Admit(const std::string& plane, const std::string& public_key);
+
+  // Whoever has an unknown key is refused at once, and its socket does not try again. On a plane with patience it waits this long for being
+  // admitted, and then tries again: for planes that learn keys from messages, which a peer may have heard earlier.
+  void SetPatience(const std::string& plane, Duration patience);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace slabstream
