@@ -44,7 +44,7 @@ OutputFile::~OutputFile() {
   if (!temporary_.empty()) ::unlink(temporary_.c_str());
 }
 
-Result<OutputFile> OutputFile::Create(const std::string& path) {
+Result<OutputFile> OutputFile::Create(const std::string& path, unsigned mode) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   const bool direct = fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
@@ -52,7 +52,7 @@ Result<OutputFile> OutputFile::Create(const std::string& path) {
   if (target.empty()) target = path;
   std::string temporary = direct ? "" : TemporaryNameFor(target);
   const char* name = direct ? path.c_str() : temporary.c_str();
-  const int descriptor = ::open(name, O_WRONLY | O_CLOEXEC | (direct ? 0 : O_CREAT | O_TRUNC), 0666);
+  const int descriptor = ::open(name, O_WRONLY | O_CLOEXEC | (direct ? 0 : O_CREAT | O_TRUNC), mode);
   if (descriptor < 0) return CannotWrite(path, std::strerror(errno));
   return OutputFile(path, std::move(target), std::move(temporary), descriptor);
 }
@@ -97,11 +97,27 @@ Status OutputFile::Finish() {
   return Status::Ok();
 }
 
-Status WriteTextFile(const std::string& path, const std::string& text) {
-  Result<OutputFile> file = OutputFile::Create(path);
+namespace {
+
+Status Write(Result<OutputFile> file, const std::string& text) {
   if (!file.ok()) return file.status();
   file->Append(text);
   return file->Finish();
+}
+
+}  // namespace
+
+Status WriteTextFile(const std::string& path, const std::string& text) { return Write(OutputFile::Create(path), text); }
+
+Status WritePrivateTextFile(const std::string& path, const std::string& text) { return Write(OutputFile::Create(path, 0600), text); }
+
+Result<std::string> ReadPrivateTextFile(const std::string& path, std::size_t max_bytes) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  constexpr auto kOthers = fs::perms::group_all | fs::perms::others_all;
+  if (fs::exists(status) && (status.permissions() & kOthers) != fs::perms::none)
+    return Status::InvalidArgument(fmt::format("others can use '{}', which holds a secret (chmod 600)", path));
+  return ReadTextFile(path, max_bytes);
 }
 
 Result<std::string> ReadTextFile(const std::string& path, std::size_t max_bytes) {

@@ -19,7 +19,8 @@ namespace slabstream {
 // Close and Finish return it. One thread at a time.
 class OutputFile {
  public:
-  static Result<OutputFile> Create(const std::string& path);
+  // `mode`: who may use the file, less the process's umask.
+  static Result<OutputFile> Create(const std::string& path, unsigned mode = 0666);
   OutputFile(OutputFile&& other) noexcept;
   OutputFile& operator=(OutputFile&&) = delete;
   ~OutputFile();  // removes the temporary file unless Finish has succeeded
@@ -49,8 +50,14 @@ class OutputFile {
 // Unavailable, naming the path, if it cannot be written.
 Status WriteTextFile(const std::string& path, const std::string& text);
 
+// The same for a secret: the file is readable by its owner alone.
+Status WritePrivateTextFile(const std::string& path, const std::string& text);
+
 // NotFound: no such file. ResourceExhausted: longer than `max_bytes`. Messages name the path.
 Result<std::string> ReadTextFile(const std::string& path, std::size_t max_bytes);
+
+// The same for a secret. InvalidArgument: others can read the file.
+Result<std::string> ReadPrivateTextFile(const std::string& path, std::size_t max_bytes);
 
 // Checks, before long work begins, that a file can be created as `path`; leaves nothing behind. Else InvalidArgument or NotFound with the
 // reason; the message begins with `option`.

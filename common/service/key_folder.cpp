@@ -1,0 +1,137 @@
+#include "common/service/key_folder.h"
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <ctime>
+#include <nlohmann/json.hpp>
+
+#include "common/base/files.h"
+#include "common/wire/any_message.h"
+
+namespace slabstream {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kMaxFileBytes = std::size_t{1} << 20;
+
+std::string Now() {
+  const std::time_t now = std::time(nullptr);
+  std::tm utc{};
+  ::gmtime_r(&now, &utc);
+  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}Z", utc.tm_year + 1900, utc.tm_mon + 1, utc.tm_mday, utc.tm_hour, utc.tm_min,
+                     utc.tm_sec);
+}
+
+}  // namespace
+
+Result<KeyFolder> KeyFolder::Open(const std::string& path) {
+  if (::mkdir(path.c_str(), 0700) != 0 && errno != EEXIST)
+    return Status::Unavailable(fmt::format("cannot make the folder of keys '{}': {}", path, std::strerror(errno)));
+  struct stat info {};
+  if (::stat(path.c_str(), &info) != 0 || !S_ISDIR(info.st_mode) || info.st_uid != ::getuid() || (info.st_mode & 077) != 0)
+    return Status::Unavailable(fmt::format("the folder of keys '{}' must be a folder of this user alone (chmod 700)", path));
+  KeyFolder folder(path);
+  const Status read = folder.Read();
+  if (read.code() == StatusCode::kNotFound) {
+    folder.server_ = MakeKeyPair();
+    if (Status saved = folder.Save(); !saved.ok()) return saved;
+  } else if (!read.ok()) {
+    return read;
+  }
+  return folder;
+}
+
+Status KeyFolder::Read() {
+  const std::string path = path_ + "/keys.json";
+  const Result<std::string> text = ReadPrivateTextFile(path, kMaxFileBytes);
+  if (!text.ok()) return text.status();
+  try {
+    const Json json = Json::parse(*text);
+    server_.secret_key = json.at("server_secret_key");
+    const std::optional<std::string> public_key = PublicKeyOf(server_.secret_key);
+    if (!public_key) return Status::InvalidArgument(fmt::format("'{}': server_secret_key is no key", path));
+    server_.public_key = *public_key;
+    for (const Json& entry : json.at("admitted")) {
+      const std::optional<Role> role = FindRole(entry.at("role").get<std::string>());
+      AdmittedKey key{entry.at("public_key"), role.value_or(Role::kClient), entry.at("made")};
+      if (!role || !IsKey(key.public_key))
+        return Status::InvalidArgument(fmt::format("'{}': an admitted key has no role or is none", path));
+      admitted_.push_back(std::move(key));
+    }
+  } catch (const Json::exception&) {
+    return Status::InvalidArgument(fmt::format("'{}' is damaged; without it the service makes new keys", path));
+  }
+  return Status::Ok();
+}
+
+Status KeyFolder::Save() const {
+  Json json = {{"server_secret_key", server_.secret_key}, {"admitted", Json::array()}};
+  for (const AdmittedKey& key : admitted_)
+    json["admitted"].push_back({{"public_key", key.public_key}, {"role", NameOf(key.role)}, {"made", key.made}});
+  return WritePrivateTextFile(path_ + "/keys.json", json.dump(2) + "\n");
+}
+
+std::string KeyFolder::FileOf(Role role) const { return fmt::format("{}/{}.json", path_, NameOf(role)); }
+
+std::set<std::string> KeyFolder::KeysOf(const std::set<Role>& roles) const {
+  std::set<std::string> keys;
+  for (const AdmittedKey& key : admitted_) {
+    if (roles.contains(key.role)) keys.insert(key.public_key);
+  }
+  return keys;
+}
+
+const AdmittedKey* KeyFolder::Find(const std::string& public_key) const {
+  const auto found = std::ranges::find(admitted_, public_key, &AdmittedKey::public_key);
+  return found == admitted_.end() ? nullptr : &*found;
+}
+
+Status KeyFolder::WriteFile(Role role, const KeyPair& own, const std::string& made) const {
+  return WriteServiceFile(FileOf(role), {.role = role,
+                                         .endpoint = role == Role::kWorker ? service_.worker_endpoint : service_.client_endpoint,
+                                         .server_key = server_.public_key,
+                                         .own = own,
+                                         .epoch = service_.epoch,
+                                         .wire_version = kWireVersion,
+                                         .made = made});
+}
+
+Status KeyFolder::Publish(const Service& service) {
+  service_ = service;
+  for (const Role role : kRoles) {
+    const Result<ServiceFile> file = ReadServiceFile(FileOf(role));
+    const AdmittedKey* const known = file.ok() ? Find(file->own.public_key) : nullptr;
+    if (known != nullptr && known->role == role) {
+      if (Status written = WriteFile(role, file->own, known->made); !written.ok()) return written;
+    } else if (const Result<AdmittedKey> made = Rotate(role); !made.ok()) {
+      return made.status();
+    }
+  }
+  return Status::Ok();
+}
+
+Result<AdmittedKey> KeyFolder::Rotate(Role role) {
+  const KeyPair pair = MakeKeyPair();
+  AdmittedKey key{pair.public_key, role, Now()};
+  admitted_.push_back(key);
+  Status done = Save();
+  if (done.ok()) done = WriteFile(role, pair, key.made);
+  if (done.ok()) return key;
+  admitted_.pop_back();
+  return done;
+}
+
+Status KeyFolder::Revoke(const std::string& public_key) {
+  if (std::erase_if(admitted_, [&](const AdmittedKey& key) { return key.public_key == public_key; }) == 0)
+    return Status::NotFound(fmt::format("no key '{}' is admitted; `slabstream keys list` names those that are", public_key));
+  return Save();
+}
+
+}  // namespace slabstream

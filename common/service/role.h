@@ -1,0 +1,21 @@
+// Roles: what whoever holds a key may do.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+namespace slabstream {
+
+enum class Role : std::uint8_t {
+  kClient,  // ask for pictures and for the service's status
+  kWorker,  // take voxels and render
+  kAdmin,   // what clients may, end the service, and change its keys
+};
+inline constexpr std::array<Role, 3> kRoles = {Role::kClient, Role::kWorker, Role::kAdmin};
+
+std::string_view NameOf(Role role);
+std::optional<Role> FindRole(std::string_view name);
+
+}  // namespace slabstream
