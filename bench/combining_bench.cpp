@@ -136,7 +136,9 @@ class PreparedPicture : public Renderer {
   Context context;
   WorkerOptions options;
   options.coordinator_endpoint = "ipc://" + directory + "/control";
-  options.images_endpoint = config.link == "tcp" ? "tcp://127.0.0.1:*" : "ipc://" + directory + "/images-" + std::to_string(rank);
+  const bool tcp = config.link == "tcp" || config.link == "curve";
+  options.images_endpoint = tcp ? "tcp://127.0.0.1:*" : "ipc://" + directory + "/images-" + std::to_string(rank);
+  if (config.link == "curve") options.keys = ClientKeys{MakeKeyPair().public_key, MakeKeyPair()};  // the coordinator's is not used over ipc
   options.share_memory = config.link == "shared";
   options.compression = config.compression;
   options.make_renderer = [&](const RendererKind&) { return std::make_unique<PreparedPicture>(config, rank, shared); };
@@ -188,7 +190,7 @@ class Coordinator {
     for (Rank rank = 0; rank < config_.ranks; ++rank) {
       const std::int32_t z = 8 * std::int32_t(rank) + 64;
       assignment.group.placements.push_back({rank, {{0, 0, z}, {16, 16, z + 8}}, rank + 1});
-      assignment.peers.push_back({rank + 1, workers_[rank].endpoint, workers_[rank].memory_scope});
+      assignment.peers.push_back({rank + 1, workers_[rank].endpoint, workers_[rank].memory_scope, workers_[rank].key});
     }
     assignment.group.schedule = {scheme, config_.ranks, 0};
     assignment.group.color = config_.color;
@@ -226,6 +228,7 @@ class Coordinator {
   struct Worker {
     std::string identity, endpoint;
     std::uint64_t memory_scope = 0;
+    std::string key;  // of its images plane
   };
 
   // Processor time of all workers, without making the pictures.
@@ -248,7 +251,7 @@ class Coordinator {
       const AnyMessage message = Decode(incoming->parts[0].span()).value();
       if (const auto* hello = std::get_if<Register>(&message)) {
         if (std::ranges::find(workers_, incoming->identity, &Worker::identity) != workers_.end()) continue;
-        workers_.push_back({incoming->identity, hello->images_endpoint, hello->memory_scope});
+        workers_.push_back({incoming->identity, hello->images_endpoint, hello->memory_scope, hello->images_key});
         Send(incoming->identity, Welcome{kEpoch, hello->incarnation, WorkerId(workers_.size()), slabs_endpoint_, 1000, 60000});
       } else if (const auto* done = std::get_if<GroupDone>(&message)) {
         reported_ns_ = NowNs();
@@ -423,7 +426,7 @@ int main(int argc, char** argv) {
   AddList(app, "--size", options.sizes, CLI::Range(8, 8192), "Pixels a side, multiples of 8");
   AddList(app, "--schemes", options.schemes, scheme, "Combining schemes, separated by semicolons", ';');
   AddList(app, "--images", options.images, CLI::IsMember({"full", "sparse"}), "What the pictures fill");
-  AddList(app, "--links", options.links, CLI::IsMember({"shared", "ipc", "tcp"}), "How images travel");
+  AddList(app, "--links", options.links, CLI::IsMember({"shared", "ipc", "tcp", "curve"}), "How images travel; curve: tcp, encrypted");
   app.add_option("--color", options.color, "Coding of colours that are sent: float32, half or fixed16")
       ->transform(
           CLI::CheckedTransformer(std::map<std::string, ColorCoding>{

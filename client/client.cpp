@@ -49,6 +49,17 @@ Result<Picture> DecodePicture(FrameReply& reply, const Bytes& payload, ImageSize
   return picture;
 }
 
+constexpr std::uint64_t kTellBytes = std::uint64_t{16} << 20;
+
+// Of an answer to a question or an order.
+std::optional<std::uint64_t> NonceOfAnswer(const AnyMessage& message) {
+  if (const auto* status = std::get_if<StatusReply>(&message)) return status->nonce;
+  if (const auto* end = std::get_if<ShutDownReply>(&message)) return end->nonce;
+  if (const auto* keys = std::get_if<KeysReply>(&message)) return keys->nonce;
+  if (const auto* refused = std::get_if<OrderRefused>(&message)) return refused->nonce;
+  return std::nullopt;
+}
+
 }  // namespace
 
 struct Client::Impl {
@@ -64,6 +75,7 @@ struct Client::Impl {
   bool Pump(Time limit);
 
   Status NoAnswer(Duration timeout) const {
+    if (socket.refused()) return Status::Unavailable("the service at " + endpoint + " refuses the key: it was revoked or is another's");
     return Status::Unavailable("no service answers at " + endpoint + " within " +
                                std::to_string(std::chrono::duration_cast<std::chrono::milliseconds>(timeout).count()) + " ms");
   }
@@ -79,6 +91,9 @@ struct Client::Impl {
     return true;
   }
 
+  // Sends a question or an order, and waits for its answer: one of the type Answer, or a refusal.
+  template <class Answer, class Question>
+  Result<Answer> Ask(Question question_message, Duration timeout);
   void SendPing(Time now);
   bool Receive();  // true: something came
   void Handle(AnyMessage& message, const Bytes& payload);
@@ -93,11 +108,12 @@ struct Client::Impl {
   Wakeup wakeup;
   RequestId last_request = 0;
   std::uint64_t last_nonce = 0;
+  std::uint64_t received_bytes = 0, told_bytes = 0;  // of payloads; those that the last ping told
   std::map<RequestId, OpenRequest> open;
   std::map<std::uint64_t, std::vector<RequestId>> pinged;  // requests of each unanswered ping, by nonce
   std::deque<ClientEvent> events;
-  std::optional<StatusReply> status_reply;
-  std::optional<ShutDownReply> shut_down_reply;
+  std::optional<AnyMessage> answer;  // to the one question or order that waits for it
+  std::uint64_t question = 0;        // its nonce
   Time next_ping;
   std::optional<Time> unanswered_since;  // time of the first ping since the last message
 };
@@ -109,7 +125,8 @@ void Client::Impl::Submit(const SubmitFrame& message) {
 }
 
 void Client::Impl::SendPing(Time now) {
-  ClientPing ping{.nonce = ++last_nonce, .open = {}};
+  ClientPing ping{.nonce = ++last_nonce, .open = {}, .received_bytes = received_bytes};
+  told_bytes = received_bytes;
   for (const auto& [request, unused] : open) {
     if (ping.open.size() < kMaxOpenRequests) ping.open.push_back(request);
   }
@@ -153,7 +170,9 @@ bool Client::Impl::Receive() {
       continue;
     }
     unanswered_since.reset();
+    received_bytes += payload.size();
     Handle(*message, payload);
+    if (received_bytes - told_bytes >= kTellBytes) SendPing(MonotonicNow());  // else the service takes it for one that does not read
   }
   return received;
 }
@@ -167,13 +186,22 @@ void Client::Impl::Handle(AnyMessage& message, const Bytes& payload) {
     End(failed->request, failed->status);
   } else if (const auto* pong = std::get_if<ClientPong>(&message)) {
     Handle(*pong);
-  } else if (const auto* status = std::get_if<StatusReply>(&message)) {
-    status_reply = *status;
-  } else if (const auto* shut_down = std::get_if<ShutDownReply>(&message)) {
-    shut_down_reply = *shut_down;
+  } else if (const std::optional<std::uint64_t> nonce = NonceOfAnswer(message)) {
+    if (*nonce == question) answer = std::move(message);  // else it comes too late
   } else {
     LogWarning("client plane: dropped " + std::string(NameOf(message)) + ", which services do not send to clients");
   }
+}
+
+template <class Answer, class Question>
+Result<Answer> Client::Impl::Ask(Question question_message, Duration timeout) {
+  answer.reset();
+  question_message.nonce = question = ++last_nonce;
+  (void)Send(question_message);
+  if (!PumpUntil(timeout, [this] { return answer.has_value(); })) return NoAnswer(timeout);
+  if (const auto* refused = std::get_if<OrderRefused>(&*answer)) return refused->status;
+  if (auto* found = std::get_if<Answer>(&*answer)) return std::move(*found);
+  return Status::Internal("the service answered " + std::string(NameOf(*answer)));
 }
 
 void Client::Impl::Handle(FrameReply& reply, const Bytes& payload) {
@@ -225,11 +253,11 @@ void Client::Impl::FailAll(const std::string& reason) {
   unanswered_since.reset();
 }
 
-Result<Client> Client::Connect(Context& context, const std::string& endpoint, Duration timeout, ClientTiming timing) {
-  Result<Socket> socket = Socket::Dealer(context);
+Result<Client> Client::Connect(Context& context, const ServiceAddress& service, Duration timeout, ClientTiming timing) {
+  Result<Socket> socket = Socket::Dealer(context, {.client_keys = service.keys});
   if (!socket.ok()) return socket.status();
-  if (Status connected = socket->Connect(endpoint); !connected.ok()) return connected;
-  Client client(std::make_unique<Impl>(endpoint, std::move(*socket), timing));
+  if (Status connected = socket->Connect(service.endpoint); !connected.ok()) return connected;
+  Client client(std::make_unique<Impl>(service.endpoint, std::move(*socket), timing));
   client.impl_->SendPing(MonotonicNow());
   if (!client.impl_->PumpUntil(timeout, [&] { return client.impl_->pinged.empty(); })) {
     return client.impl_->NoAnswer(timeout);
@@ -297,24 +325,14 @@ Result<Picture> Client::Render(const FrameRequest& request, Duration deadline) {
   return std::move(*end);
 }
 
-Result<StatusReply> Client::QueryStatus(Duration timeout) {
-  impl_->status_reply.reset();
-  const StatusQuery query{.nonce = ++impl_->last_nonce};
-  (void)impl_->Send(query);
-  if (!impl_->PumpUntil(timeout, [&] { return impl_->status_reply && impl_->status_reply->nonce == query.nonce; })) {
-    return impl_->NoAnswer(timeout);
-  }
-  return std::move(*impl_->status_reply);
-}
+Result<StatusReply> Client::QueryStatus(Duration timeout) { return impl_->Ask<StatusReply>(StatusQuery{}, timeout); }
 
-Status Client::ShutDownService(Duration timeout) {
-  impl_->shut_down_reply.reset();
-  const ShutDown order{.nonce = ++impl_->last_nonce};
-  (void)impl_->Send(order);
-  if (!impl_->PumpUntil(timeout, [&] { return impl_->shut_down_reply && impl_->shut_down_reply->nonce == order.nonce; })) {
-    return impl_->NoAnswer(timeout);
-  }
-  return Status::Ok();
+Status Client::ShutDownService(Duration timeout) { return impl_->Ask<ShutDownReply>(ShutDown{}, timeout).status(); }
+
+Result<std::vector<AdmittedKey>> Client::OrderKeys(KeysOrder order, Duration timeout) {
+  Result<KeysReply> reply = impl_->Ask<KeysReply>(std::move(order), timeout);
+  if (!reply.ok()) return reply.status();
+  return std::move(reply->keys);
 }
 
 Wakeup& Client::wakeup() { return impl_->wakeup; }

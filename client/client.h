@@ -9,7 +9,9 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <variant>
+#include <vector>
 
 #include "common/base/status.h"
 #include "common/image/local_image.h"
@@ -33,6 +35,16 @@ struct ClientEvent {
   std::variant<FrameProgress, Picture, Status> what;  // Status: the request failed
 };
 
+// Where a service is.
+struct ServiceAddress {
+  // NOLINTNEXTLINE(google-explicit-constructor): an endpoint is an address
+  ServiceAddress(std::string at, std::optional<ClientKeys> with = std::nullopt) : endpoint(std::move(at)), keys(std::move(with)) {}
+  ServiceAddress(const char* at) : endpoint(at) {}  // NOLINT(google-explicit-constructor)
+
+  std::string endpoint;
+  std::optional<ClientKeys> keys;  // of role client or admin; none: the service has no keys
+};
+
 struct ClientTiming {
   Duration ping = std::chrono::seconds(1);     // between pings while requests are open
   Duration silence = std::chrono::seconds(5);  // without an answer to a ping, the service counts as gone
@@ -40,7 +52,8 @@ struct ClientTiming {
 
 class Client {
  public:
-  static Result<Client> Connect(Context& context, const std::string& endpoint, Duration timeout = std::chrono::seconds(4),
+  // Unavailable also if the service refuses the key.
+  static Result<Client> Connect(Context& context, const ServiceAddress& service, Duration timeout = std::chrono::seconds(4),
                                 ClientTiming timing = {});
   Client(Client&&) noexcept;
   Client& operator=(Client&&) noexcept;
@@ -59,7 +72,11 @@ class Client {
   Result<Picture> Render(const FrameRequest& request, Duration deadline = std::chrono::minutes(10));
 
   Result<StatusReply> QueryStatus(Duration timeout = std::chrono::seconds(5));
+  // InvalidArgument: the service has keys, and this client's is not an admin's.
   Status ShutDownService(Duration timeout = std::chrono::seconds(5));
+  // For admins; `order.nonce` is filled in. The keys that are admitted then. InvalidArgument, NotFound: the service refuses, with its
+  // reason.
+  Result<std::vector<AdmittedKey>> OrderKeys(KeysOrder order, Duration timeout = std::chrono::seconds(5));
 
   Wakeup& wakeup();  // Notify ends a Next early, from any thread or a signal handler
 

@@ -32,6 +32,23 @@ Time ClientTable::NextWake() const {
   return wake;
 }
 
+void ClientTable::Sent(PeerToken token, std::size_t bytes) {
+  if (const auto client = clients_.find(token); client != clients_.end()) client->second.sent_bytes += bytes;
+}
+
+void ClientTable::Read(PeerToken token, std::uint64_t bytes) {
+  const auto found = clients_.find(token);
+  if (found == clients_.end()) return;
+  Client& client = found->second;
+  if (!client.read_before) client.read_before = bytes - std::min(bytes, client.sent_bytes);
+  client.read_bytes = std::min(client.sent_bytes, bytes - std::min(bytes, *client.read_before));
+}
+
+bool ClientTable::IsBehind(PeerToken token) const {
+  const auto client = clients_.find(token);
+  return client != clients_.end() && client->second.sent_bytes - client->second.read_bytes >= kMaxUnreadBytes;
+}
+
 void ClientTable::Keep(PeerToken token, Answer answer) {
   Client& client = clients_.at(token);
   client.answer_bytes += answer.payload.size();

@@ -1,10 +1,13 @@
 // ClientTable: the clients that have asked for frames, when each was last heard, and the last answers sent to each. Answers are kept within
-// limits, so that a client that repeats a request (its connection broke, say) gets the kept answer and the work is not repeated.
+// limits, so that a client that repeats a request (its connection broke, say) gets the kept answer and the work is not repeated. And how
+// much of what was sent to each it has not read yet.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "common/base/bytes.h"
@@ -14,6 +17,8 @@
 
 namespace slabstream {
 
+// Payloads that were sent to a client and that it has not read: from this on none of its frames begins, and it gets no previews.
+inline constexpr std::uint64_t kMaxUnreadBytes = std::uint64_t{128} << 20;
 inline constexpr std::size_t kMaxKeptAnswers = 64;  // of one client
 // Payloads of one client's kept answers. Few: answers are hardly ever asked for again, and a kept picture holds a buffer that the next
 // picture could use while it is still in a cache.
@@ -40,6 +45,11 @@ class ClientTable {
   std::size_t size() const { return clients_.size(); }
   Time NextWake() const;  // the next silence
 
+  void Sent(PeerToken client, std::size_t bytes);
+  // What it says to have read since its connection began.
+  void Read(PeerToken client, std::uint64_t bytes);
+  bool IsBehind(PeerToken client) const;  // kMaxUnreadBytes or more are unread
+
   // Keeps the answer, dropping the oldest ones beyond the limits (this one too if it is too large). The client must be known.
   void Keep(PeerToken client, Answer answer);
   Answer* FindAnswer(PeerToken client, RequestId request);  // null: none kept
@@ -49,6 +59,8 @@ class ClientTable {
     Time last_heard;
     std::deque<Answer> answers;  // oldest first
     std::size_t answer_bytes = 0;
+    std::uint64_t sent_bytes = 0, read_bytes = 0;
+    std::optional<std::uint64_t> read_before;  // what it said first: bytes of an earlier connection
   };
   Duration timeout_;
   std::map<PeerToken, Client> clients_;

@@ -149,7 +149,10 @@ void FrameMachine::State::FailFrame(const RunningFrame& frame, const Status& sta
 void FrameMachine::State::Expire() {
   for (const WorkerId worker : roster.Silent(now)) LoseWorker(worker);
   roster.GiveUpVacancies(now);
-  for (const PeerToken client : clients.Silent(now)) FreeClient(client);
+  for (const PeerToken client : clients.Silent(now)) {
+    if (clients.IsBehind(client)) actions.emplace_back(DropClient{client});
+    FreeClient(client);
+  }
 
   const auto out_of_time = [&](const OpenRequest& request) { return now >= request.deadline(); };
   const auto without_workers = [&](const OpenRequest& request) {
@@ -167,6 +170,7 @@ void FrameMachine::State::Expire() {
     const DatasetTable::Entry& dataset = *datasets.Find(request.submit.frame.dataset);
     const bool counting = request.volume && occupancy.Counting(*request.volume);
     FailRequest(request, late(request, dataset.state != DatasetState::kReady ? "its dataset was still being loaded"
+                                       : clients.IsBehind(request.client)    ? "this client did not read its earlier pictures"
                                        : counting                            ? "the occupied voxels of its dataset were still being counted"
                                        : request.plan != 0 && !HasPlan(request) ? "it was still being planned"
                                                                                 : "it was still queued"));
@@ -217,7 +221,8 @@ void FrameMachine::State::Advance() {
 
 // Starts the first frame in turn that is planned for the present workers. False: there is none.
 bool FrameMachine::State::StartNextFrame() {
-  std::optional<OpenRequest> request = queue.TakeNext([&](const OpenRequest& open) { return HasPlan(open); });
+  std::optional<OpenRequest> request =
+      queue.TakeNext([&](const OpenRequest& open) { return HasPlan(open) && !clients.IsBehind(open.client); });
   if (!request) return false;
   const RunningFrame& running = frames.Add(RunningFrame(frames.next_id(), *std::move(request), limits, now));
   SendClient(running.request().client, running.Progress());
@@ -232,6 +237,7 @@ void FrameMachine::State::HandOut(RunningFrame& frame) {
     const Register& description = roster.Find(peer.worker)->description;
     peer.images_endpoint = description.images_endpoint;
     peer.memory_scope = description.memory_scope;
+    peer.images_key = description.images_key;
   }
   for (const WorkerId worker : out.workers) SendWorker(worker, out.assignment);
 }

@@ -128,7 +128,12 @@ struct DropPlan {
   PlanId plan = 0;
 };
 struct StopService {};  // everything was sent; end
-using CoordinatorAction = std::variant<ToWorker, ToClient, LoadDataset, CountDataset, PlanRequest, DropPlan, FrameMeasured, StopService>;
+// End the connection of a client that reads nothing and says nothing: what waits for it must not stay in memory.
+struct DropClient {
+  PeerToken client = 0;
+};
+using CoordinatorAction =
+    std::variant<ToWorker, ToClient, DropClient, LoadDataset, CountDataset, PlanRequest, DropPlan, FrameMeasured, StopService>;
 
 class FrameMachine {
  public:

@@ -66,6 +66,7 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const CancelFrame& m
 }
 
 void FrameMachine::State::OnClientMessage(PeerToken client, const ClientPing& message) {
+  clients.Read(client, message.received_bytes);
   ClientPong pong{.epoch = config.epoch, .nonce = message.nonce};
   for (const RequestId request : message.open) {
     Answer* answer = clients.FindAnswer(client, request);

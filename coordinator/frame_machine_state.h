@@ -87,7 +87,7 @@ struct FrameMachine::State {
   // Drops what no worker sends here.
   template <AnyOf<Welcome, Ping, GroupAssignment, Retire, Stop, ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused,
                   ImageReceived, SubmitFrame, FrameProgress, FrameReply, FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery,
-                  StatusReply, ShutDown, ShutDownReply>
+                  StatusReply, ShutDown, ShutDownReply, KeysOrder, KeysReply, OrderRefused>
                 Message>
   void OnWorkerMessage(const FromWorker&, const Message&) {}
 
@@ -100,7 +100,7 @@ struct FrameMachine::State {
   // Drops what no client sends.
   template <AnyOf<Register, Welcome, Heartbeat, Ping, GroupAssignment, GroupDone, FrameImage, WorkerTrouble, Leave, Retire, Stop,
                   ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused, ImageReceived, FrameProgress, FrameReply, FrameFailed,
-                  ClientPong, StatusReply, ShutDownReply>
+                  ClientPong, StatusReply, ShutDownReply, KeysOrder, KeysReply, OrderRefused>
                 Message>
   void OnClientMessage(PeerToken, const Message&) {}
 
@@ -139,6 +139,7 @@ struct FrameMachine::State {
     if (const Member* member = roster.Find(worker)) actions.emplace_back(ToWorker{.to = member->peer, .message = std::move(message)});
   }
   void SendClient(PeerToken client, AnyMessage message, Bytes payload = {}) {
+    clients.Sent(client, payload.size());
     actions.emplace_back(ToClient{.to = client, .message = std::move(message), .payload = std::move(payload)});
   }
 };

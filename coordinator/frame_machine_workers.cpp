@@ -50,6 +50,7 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const FrameIm
                    .group_count = message.group_count,
                    .runs = message.runs};
   if (use == RunningFrame::Use::kPreview) {
+    if (clients.IsBehind(request.client)) return;
     SendClient(request.client, std::move(reply), event.payload);
     return;
   }

@@ -1,5 +1,6 @@
 #include "coordinator/service.h"
 
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -14,12 +15,14 @@
 
 #include "common/base/background_tasks.h"
 #include "common/base/guarded.h"
+#include "common/base/limited_log.h"
 #include "common/base/log.h"
 #include "common/base/shared_arena.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/transport/endpoint.h"
 #include "common/transport/mailbox.h"
 #include "coordinator/peer_table.h"
+#include "coordinator/service_keys.h"
 #include "coordinator/slab_server.h"
 
 namespace slabstream {
@@ -41,6 +44,13 @@ std::string SlabsEndpointFor(Endpoint client) {
   client.port = 0;
   client.path += ".slabs";
   return client.ToString();
+}
+
+// Workers that connect to `worker_endpoint` name the files of their images planes after it.
+Endpoint ImagesSocketsOf(const std::string& worker_endpoint) {
+  Endpoint endpoint = ParseEndpoint(worker_endpoint, false).value();
+  endpoint.path += kImagesSuffix;
+  return endpoint;
 }
 
 // Whether at least half of the volume's bricks hold one value each.
@@ -78,8 +88,10 @@ Result<std::shared_ptr<const OccupancyGrid>> Count(const CountFunction& count, c
 }  // namespace
 
 struct CoordinatorService::Impl {
-  Impl(CoordinatorOptions service_options, Socket client_socket, Socket control_socket, std::unique_ptr<SlabServer> slab_server)
-      : catalogue(std::move(service_options.catalogue)),
+  Impl(CoordinatorOptions service_options, std::optional<ServiceKeys> service_keys, Socket client_socket, Socket control_socket,
+       std::unique_ptr<SlabServer> slab_server)
+      : keys(std::move(service_keys)),
+        catalogue(std::move(service_options.catalogue)),
         machine(std::move(service_options.machine)),
         clients(std::move(client_socket)),
         control(std::move(control_socket)),
@@ -93,11 +105,17 @@ struct CoordinatorService::Impl {
   void HandleEvent(CoordinatorEvent event);  // and what follows from it
   void ReceiveFromClients();
   void ReceiveFromWorkers();
+  // What the sender may do; nullopt: its key was revoked. Without keys only this machine can connect, and may do everything.
+  std::optional<Role> RoleOf(const Incoming& incoming) const { return incoming.user.empty() ? Role::kAdmin : keys->RoleOf(incoming); }
+  bool CarryOut(const Incoming& incoming, const AnyMessage& message, Role role);
   void Send(Socket& socket, PeerTable& peers, PeerToken to, const AnyMessage& message, const Bytes& payload, const CoordinatorEvent& gone);
 
   // One for each kind of action.
   void Perform(ToWorker& action) { Send(control, worker_peers, action.to, action.message, {}, WorkerGone{action.to}); }
   void Perform(ToClient& action) { Send(clients, client_peers, action.to, action.message, action.payload, ClientGone{action.to}); }
+  void Perform(DropClient& action) {
+    if (const std::string* identity = client_peers.IdentityOf(action.client)) clients.EndConnection(*identity);
+  }
   void Perform(LoadDataset& action);
   void Perform(CountDataset& action);
   void Perform(PlanRequest& action);
@@ -106,6 +124,8 @@ struct CoordinatorService::Impl {
   void Perform(StopService&) { stop_now = true; }
 
   std::string client_endpoint, worker_endpoint;
+  Endpoint images_sockets;  // how the files of workers' images planes begin, if they are files
+  std::optional<ServiceKeys> keys;
   const Catalogue catalogue;
   FrameMachine machine;
   Socket clients, control;
@@ -117,6 +137,7 @@ struct CoordinatorService::Impl {
   std::atomic<bool> stop_requested = false;
   std::atomic<bool> stopped = false;
   bool stop_now = false;  // the machine said so
+  LimitedLog complaints;  // about messages
   Time next_forget;
   const PlanFunction make_plan;
   const CountFunction count_occupied;
@@ -127,6 +148,7 @@ struct CoordinatorService::Impl {
 };
 
 void CoordinatorService::Impl::Run() {
+  RemoveDeadSockets(images_sockets);  // of workers of an earlier coordinator
   const Status ended = Guarded("coordinator", [&] { Loop(); });
   if (!ended.ok()) {
     LogError("the coordinator stops: " + ended.message());
@@ -135,6 +157,7 @@ void CoordinatorService::Impl::Run() {
       return Status::Ok();
     });
   }
+  RemoveDeadSockets(images_sockets);
   stopped = true;
   stopped.notify_all();
 }
@@ -143,6 +166,7 @@ void CoordinatorService::Impl::Loop() {
   const std::array<Socket*, 2> sockets = {&clients, &control};
   Time stop_deadline = Time::max();
   HandleEvent(CoordinatorTick{});
+  next_forget = MonotonicNow() + kForgetInterval;
   while (!stop_now && MonotonicNow() < stop_deadline) {
     Wait(sockets, &inbox->wakeup(), std::clamp(machine.NextWake() - MonotonicNow(), Duration::zero(), kLongestWait));
     for (News& news : inbox->TakeAll()) {
@@ -160,6 +184,7 @@ void CoordinatorService::Impl::Loop() {
     if (now >= next_forget) {
       client_peers.ForgetSilentSince(now - kForgetAfter);
       worker_peers.ForgetSilentSince(now - kForgetAfter);
+      RemoveDeadSockets(images_sockets);
       next_forget = now + kForgetInterval;
     }
   }
@@ -194,10 +219,11 @@ void CoordinatorService::Impl::ReceiveFromWorkers() {
   for (int i = 0; i < kReceiveBatch; ++i) {
     std::optional<Incoming> incoming = control.TryReceive();
     if (!incoming) return;
+    if (!RoleOf(*incoming)) continue;
     Bytes payload = incoming->parts.size() > 1 ? std::move(incoming->parts[1]) : Bytes();
     Result<AnyMessage> message = Guarded("decoding", [&] { return DecodeOn(Plane::kControl, incoming->parts[0].span(), payload.size()); });
     if (!message.ok()) {
-      LogWarning("control plane: dropped a message: " + message.status().message());
+      complaints.Warning("control plane: dropped a message: " + message.status().message());
       continue;
     }
     HandleEvent(FromWorker{worker_peers.Heard(incoming->identity, MonotonicNow()), std::move(*message), std::move(payload)});
@@ -208,17 +234,46 @@ void CoordinatorService::Impl::ReceiveFromClients() {
   for (int i = 0; i < kReceiveBatch; ++i) {
     const std::optional<Incoming> incoming = clients.TryReceive();
     if (!incoming) return;
+    const std::optional<Role> role = RoleOf(*incoming);
+    if (!role) continue;
     Result<AnyMessage> message = Guarded("decoding", [&] { return Decode(incoming->parts[0].span()); });
     if (!message.ok()) {
-      LogWarning("client plane: refused a message: " + message.status().message());
+      complaints.Warning("client plane: refused a message: " + message.status().message());
       // A refused request whose id can be read gets an answer, so that nobody waits for it in vain.
       if (const std::optional<AnyMessage> refusal = RefusalOf(incoming->parts[0].span(), message.status())) {
         (void)clients.Send(incoming->identity, Encode(*refusal));
       }
       continue;
     }
+    if (CarryOut(*incoming, *message, *role)) continue;
     HandleEvent(FromClient{client_peers.Heard(incoming->identity, MonotonicNow()), std::move(*message)});
   }
+}
+
+// True: the message was an order about keys, or one that its sender may not give.
+bool CoordinatorService::Impl::CarryOut(const Incoming& incoming, const AnyMessage& message, Role role) {
+  const auto reply = [&](const AnyMessage& answer) { (void)clients.Send(incoming.identity, Encode(answer)); };
+  const auto refuse = [&](std::uint64_t nonce, std::string why) { reply(OrderRefused{nonce, Status::InvalidArgument(std::move(why))}); };
+  if (const auto* end = std::get_if<ShutDown>(&message); end != nullptr && role != Role::kAdmin) {
+    refuse(end->nonce, fmt::format("ending the service needs the service file of role admin, not {}", NameOf(role)));
+    return true;
+  }
+  const auto* order = std::get_if<KeysOrder>(&message);
+  if (order == nullptr) return false;
+  if (!keys) {
+    refuse(order->nonce, "the service has no keys: it stays on its machine");
+  } else if (role != Role::kAdmin) {
+    refuse(order->nonce, fmt::format("orders about keys need the service file of role admin, not {}", NameOf(role)));
+  } else {
+    const ServiceKeys::Done done = keys->CarryOut(*order);
+    reply(done.answer);
+    if (done.revoked) {
+      clients.EndConnections(*done.revoked);
+      control.EndConnections(*done.revoked);
+      slabs->EndConnections(*done.revoked);
+    }
+  }
+  return true;
 }
 
 // A task that cannot be started fails like one that was started.
@@ -283,29 +338,48 @@ Result<std::unique_ptr<CoordinatorService>> CoordinatorService::Start(Context& c
     if (const Result<Endpoint> parsed = ParseEndpoint(endpoint, true); !parsed.ok()) return parsed.status();
   }
 
-  SocketOptions client_options;
-  client_options.max_message_bytes = kMaxRequestBytes;
-  Result<Socket> clients = Socket::Router(context, client_options);
+  options.machine.epoch = RandomEpoch();
+  std::optional<ServiceKeys> keys;
+  if (!options.keys_folder.empty()) {
+    Result<ServiceKeys> opened = ServiceKeys::Open(context, options.keys_folder, options.machine.epoch);
+    if (!opened.ok()) return opened.status();
+    keys = *std::move(opened);
+  }
+  const auto options_of = [&](Plane plane) {
+    SocketOptions of;
+    if (keys) of.server_keys = keys->For(plane);
+    if (plane == Plane::kClient) {
+      of.max_message_bytes = kMaxRequestBytes;
+      of.ends_connections = true;
+    }
+    return of;
+  };
+  Result<Socket> clients = Socket::Router(context, options_of(Plane::kClient));
   if (!clients.ok()) return clients.status();
-  Result<Socket> control = Socket::Router(context);
+  Result<Socket> control = Socket::Router(context, options_of(Plane::kControl));
   if (!control.ok()) return control.status();
   Result<std::string> client_endpoint = clients->Bind(options.client_endpoint);
   if (!client_endpoint.ok()) return client_endpoint.status();
   Result<std::string> worker_endpoint = control->Bind(options.worker_endpoint);
   if (!worker_endpoint.ok()) return worker_endpoint.status();
-  options.machine.epoch = RandomEpoch();
-  Result<std::unique_ptr<SlabServer>> slabs = SlabServer::Start(context, options.slabs_endpoint, options.machine.epoch, options.codec);
+  Result<std::unique_ptr<SlabServer>> slabs =
+      SlabServer::Start(context, {options.slabs_endpoint, options_of(Plane::kSlabs)}, options.machine.epoch, options.codec);
   if (!slabs.ok()) return slabs.status();
+  if (keys) {
+    if (Status published = keys->Publish(*client_endpoint, *worker_endpoint); !published.ok()) return published;
+  }
 
   options.machine.pid = static_cast<std::uint32_t>(::getpid());
   options.machine.slabs_endpoint = (*slabs)->endpoint();
   options.surroundings.memory_scope = SharedMemoryScope();
+  options.surroundings.encrypted = keys.has_value();
   options.surroundings.cores = std::int32_t(std::max(std::thread::hardware_concurrency(), 1U));
   options.machine.datasets.clear();
   for (const auto& [name, loader] : options.catalogue) options.machine.datasets.push_back(name);
-  auto impl = std::make_unique<Impl>(std::move(options), std::move(*clients), std::move(*control), std::move(*slabs));
+  auto impl = std::make_unique<Impl>(std::move(options), std::move(keys), std::move(*clients), std::move(*control), std::move(*slabs));
   impl->client_endpoint = std::move(*client_endpoint);
   impl->worker_endpoint = std::move(*worker_endpoint);
+  impl->images_sockets = ImagesSocketsOf(impl->worker_endpoint);
   impl->thread = std::jthread([raw = impl.get()] { raw->Run(); });
   return std::unique_ptr<CoordinatorService>(new CoordinatorService(std::move(impl)));
 }

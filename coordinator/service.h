@@ -27,6 +27,7 @@ struct CoordinatorOptions {
   std::string client_endpoint;       // bound; a wildcard port is read back
   std::string worker_endpoint;       // bound; empty: WorkerEndpointFor(client_endpoint)
   std::string slabs_endpoint;        // bound; empty: any port, ".slabs" beside an ipc path or inproc name
+  std::string keys_folder;           // whose keys encrypt tcp connections (KeyFolder); empty: none, the service stays on this machine
   Catalogue catalogue;               // name -> how to load it
   Codec codec = Codec::kRaw;         // of voxels on their way to workers; zstd pays if the link is slower than packing
   CoordinatorConfig machine;         // epoch, pid, slabs_endpoint and datasets are filled in by Start

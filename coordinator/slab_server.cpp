@@ -24,10 +24,12 @@ std::string Text(const Box& box) {
 
 }  // namespace
 
-Result<std::unique_ptr<SlabServer>> SlabServer::Start(Context& context, const std::string& endpoint, Epoch epoch, Codec codec) {
-  Result<Socket> socket = Socket::Router(context);
+Result<std::unique_ptr<SlabServer>> SlabServer::Start(Context& context, const Place& place, Epoch epoch, Codec codec) {
+  SocketOptions options = place.socket;
+  options.send_high_water_mark = kMaxQueuedChunks;
+  Result<Socket> socket = Socket::Router(context, options);
   if (!socket.ok()) return socket.status();
-  Result<std::string> bound = socket->Bind(endpoint);
+  Result<std::string> bound = socket->Bind(place.endpoint);
   if (!bound.ok()) return bound.status();
   return std::unique_ptr<SlabServer>(new SlabServer(std::move(*socket), std::move(*bound), epoch, codec));
 }
@@ -56,6 +58,19 @@ SlabServer::Samples SlabServer::Find(DatasetId dataset) {
   return found == samples_.end() ? Samples{} : found->second;
 }
 
+void SlabServer::EndConnections(const std::string& user) {
+  {
+    const std::lock_guard lock(mutex_);
+    unwanted_.push_back(user);
+  }
+  wakeup_.Notify();
+}
+
+std::vector<std::string> SlabServer::TakeUnwanted() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(unwanted_, {});
+}
+
 Bytes SlabServer::Cut(const Samples& samples, const Box& part, std::uint64_t begin, std::uint64_t end) {
   if (samples.volume != nullptr) return BoxSamples(samples.volume, part, begin, end);
   ChunkBuffers::Buffer buffer = buffers_.Take();
@@ -81,11 +96,12 @@ void SlabServer::Run(const std::stop_token& stop) {
   const std::array<Socket*, 1> sockets = {&socket_};
   while (!stop.stop_requested()) {
     Wait(sockets, &wakeup_, std::chrono::minutes(1));
+    for (const std::string& user : TakeUnwanted()) socket_.EndConnections(user);
     while (!stop.stop_requested()) {
       const std::optional<Incoming> incoming = socket_.TryReceive();
       if (!incoming) break;
       const Status answered = Guarded("slabs plane", [&] { Answer(*incoming); });
-      if (!answered.ok()) LogWarning(answered.message());  // the worker asks again when its request times out
+      if (!answered.ok()) complaints_.Warning(answered.message());  // the worker asks again when its request times out
     }
   }
 }
@@ -94,7 +110,7 @@ void SlabServer::Answer(const Incoming& incoming) {
   const Result<AnyMessage> decoded = Decode(incoming.parts[0].span());
   const auto* request = decoded.ok() ? std::get_if<ChunkRequest>(&*decoded) : nullptr;
   if (request == nullptr) {
-    LogWarning("slabs plane: dropped " + (decoded.ok() ? std::string(NameOf(*decoded)) : decoded.status().message()));
+    complaints_.Warning("slabs plane: dropped " + (decoded.ok() ? std::string(NameOf(*decoded)) : decoded.status().message()));
     return;
   }
   const Status served = Guarded("chunk request", [&] {
@@ -109,7 +125,7 @@ void SlabServer::Answer(const Incoming& incoming) {
     return Status::Ok();
   });
   if (served.ok()) return;
-  LogWarning(served.message());
+  complaints_.Warning(served.message());
   const ChunkRefused refused{epoch_, request->dataset, request->box, request->chunk, served};
   (void)socket_.Send(incoming.identity, Encode(refused));  // a worker that has gone needs no refusal
 }

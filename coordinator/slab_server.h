@@ -2,7 +2,8 @@
 // volumes.
 //
 // It keeps no state about workers: each request is the credit for one answer of at most kChunkBytes. A request that cannot be met is
-// refused with a reason. Chunks go out packed, except over inproc: they are raw there, and those of a whole volume refer to its own memory.
+// refused with a reason. One that comes while kMaxQueuedChunks answers wait for its sender to read them is dropped. Chunks go out packed,
+// except over inproc: they are raw there, and those of a whole volume refer to its own memory.
 #pragma once
 
 #include <map>
@@ -10,8 +11,10 @@
 #include <mutex>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "common/base/check.h"
+#include "common/base/limited_log.h"
 #include "common/base/status.h"
 #include "common/transport/socket.h"
 #include "common/volume/bricks.h"
@@ -19,6 +22,8 @@
 #include "coordinator/chunk_buffers.h"
 
 namespace slabstream {
+
+inline constexpr int kMaxQueuedChunks = 64;  // several times what a worker's credit allows
 
 class SlabServer {
  public:
@@ -37,7 +42,11 @@ class SlabServer {
     VoxelBricks view() const { return volume != nullptr ? VoxelBricks(volume->block) : VoxelBricks(*bricks); }
   };
 
-  static Result<std::unique_ptr<SlabServer>> Start(Context& context, const std::string& endpoint, Epoch epoch, Codec codec = Codec::kRaw);
+  struct Place {
+    std::string endpoint;  // bound
+    SocketOptions socket = {};
+  };
+  static Result<std::unique_ptr<SlabServer>> Start(Context& context, const Place& place, Epoch epoch, Codec codec = Codec::kRaw);
   ~SlabServer();  // stops and joins
 
   const std::string& endpoint() const { return endpoint_; }
@@ -45,10 +54,13 @@ class SlabServer {
   // From any thread; once for each id. They are served until the server ends.
   void Publish(DatasetId dataset, Samples samples);
   Samples Find(DatasetId dataset);  // from any thread; neither: not published
+  // From any thread: as Socket::EndConnections, soon.
+  void EndConnections(const std::string& user);
 
  private:
   SlabServer(Socket socket, std::string endpoint, Epoch epoch, Codec codec);
   void Run(const std::stop_token& stop);
+  std::vector<std::string> TakeUnwanted();
   void Answer(const Incoming& incoming);
   Bytes Cut(const Samples& samples, const Box& part, std::uint64_t begin, std::uint64_t end);  // as BoxSamples
   static Status Check(const ChunkRequest& request, Epoch epoch, const Samples& samples);       // why it cannot be met, or ok
@@ -58,7 +70,9 @@ class SlabServer {
   const Codec codec_;
   std::mutex mutex_;
   std::map<DatasetId, Samples> samples_;  // guarded by mutex_
+  std::vector<std::string> unwanted_;     // users whose connections are to end; guarded by mutex_
   ChunkBuffers buffers_;                  // the thread's
+  LimitedLog complaints_;                 // the thread's
   Wakeup wakeup_;
   Socket socket_;        // the thread's
   std::jthread thread_;  // last member

@@ -1,7 +1,9 @@
 // slabstream-worker: one worker process. It waits for its coordinator without a time limit and ends on Stop, SIGINT or SIGTERM.
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <cstdlib>
 #include <string>
 
 #include "common/base/stop_signals.h"
@@ -9,6 +11,7 @@
 #include "common/cli/add_option.h"
 #include "common/cli/program.h"
 #include "common/kernels/simd_target.h"
+#include "common/service/service_file.h"
 #include "common/transport/socket.h"
 #include "worker/service.h"
 
@@ -29,14 +32,18 @@ int Run(int argc, char** argv) {
   constexpr int kMaxCacheMib = 1 << 24;  // 16 TiB
   WorkerOptions options;
   int cache_mib = 0;
-  std::string compress = "auto";
+  std::string compress = "auto", service;
   bool frames_only = false;
 
   CLI::App app("Slabstream worker: renders slabs and combines images for a coordinator.", "slabstream-worker");
   SetUp(app, std::string(Version()));
-  app.add_option("--coordinator", options.coordinator_endpoint, "The coordinator's endpoint for workers, such as tcp://127.0.0.1:7421")
-      ->required()
-      ->type_name("ENDPOINT");
+  CLI::Option* coordinator =
+      app.add_option("--coordinator", options.coordinator_endpoint, "The coordinator's endpoint for workers, such as tcp://127.0.0.1:7421")
+          ->type_name("ENDPOINT");
+  app.add_option("--service", service, "The service file worker.json of a service with keys, which names the coordinator")
+      ->type_name("FILE")
+      ->default_str("$SLABSTREAM_SERVICE, if there is no --coordinator")
+      ->excludes(coordinator);
   app.add_option("--listen", options.images_endpoint, "Where other workers send partial images")
       ->type_name("ENDPOINT")
       ->default_str("any port beside the coordinator");
@@ -49,6 +56,18 @@ int Run(int argc, char** argv) {
       ->default_str(compress);
   app.add_flag("--no-shared-memory", frames_only, "Send images to workers of this host in frames as well");
   return RunService(app, argc, argv, "worker " + std::to_string(::getpid()), [&] {
+    if (options.coordinator_endpoint.empty()) {
+      const char* const variable = std::getenv("SLABSTREAM_SERVICE");
+      if (service.empty() && variable != nullptr) service = variable;
+      if (service.empty()) return Status::InvalidArgument("--coordinator or --service is missing: where the service is");
+      const Result<ServiceFile> file = ReadServiceFile(service);
+      if (!file.ok()) return file.status();
+      if (file->role != Role::kWorker)
+        return Status::InvalidArgument(
+            fmt::format("--service '{}' is of role {}, a worker needs worker.json", service, NameOf(file->role)));
+      options.coordinator_endpoint = file->endpoint;
+      options.keys = file->keys();
+    }
     options.compression = *ParseCompression(compress);
     options.share_memory = !frames_only;
     if (cache_mib != 0) options.machine.cache_bytes = std::uint64_t(cache_mib) << 20;

@@ -1,23 +1,23 @@
 #include "worker/peer_sockets.h"
 
-#include <utility>
-
 namespace slabstream {
 
-Status PeerSockets::Send(const std::string& endpoint, std::vector<std::byte> header, const Bytes& payload, Time now) {
-  auto peer = peers_.find(endpoint);
-  if (peer == peers_.end()) {
-    Result<Socket> socket = Socket::Dealer(context_);
+Status PeerSockets::Send(const Peer& to, std::vector<std::byte> header, const Bytes& payload, Time now) {
+  auto connection = connections_.find(to.images_endpoint);
+  if (connection == connections_.end()) {
+    SocketOptions options;
+    if (own_ && !to.images_key.empty()) options.client_keys = ClientKeys{to.images_key, *own_};
+    Result<Socket> socket = Socket::Dealer(context_, options);
     if (!socket.ok()) return socket.status();
-    if (Status status = socket->Connect(endpoint); !status.ok()) return status;
-    peer = peers_.emplace(endpoint, Peer{std::move(*socket), now}).first;
+    if (Status status = socket->Connect(to.images_endpoint); !status.ok()) return status;
+    connection = connections_.emplace(to.images_endpoint, Connection{std::move(*socket), now}).first;
   }
-  peer->second.last_used = now;
-  return peer->second.socket.Send({}, std::move(header), payload);
+  connection->second.last_used = now;
+  return connection->second.socket.Send({}, std::move(header), payload);
 }
 
 void PeerSockets::CloseIdle(Time now) {
-  std::erase_if(peers_, [now](const auto& peer) { return now - peer.second.last_used > kPeerIdle; });
+  std::erase_if(connections_, [now](const auto& connection) { return now - connection.second.last_used > kPeerIdle; });
 }
 
 }  // namespace slabstream

@@ -7,13 +7,16 @@
 #include <chrono>
 #include <cstddef>
 #include <map>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/base/bytes.h"
 #include "common/base/status.h"
 #include "common/base/time.h"
 #include "common/transport/socket.h"
+#include "common/wire/control_messages.h"
 
 namespace slabstream {
 
@@ -21,20 +24,22 @@ inline constexpr Duration kPeerIdle = std::chrono::seconds(10);
 
 class PeerSockets {
  public:
-  explicit PeerSockets(Context& context) : context_(context) {}
+  // `own`: this worker's keys, for peers whose images planes are encrypted.
+  PeerSockets(Context& context, std::optional<KeyPair> own) : context_(context), own_(std::move(own)) {}
 
   // Connects if need be. Errors: the endpoint cannot be connected to, or too much is queued for it.
-  Status Send(const std::string& endpoint, std::vector<std::byte> header, const Bytes& payload, Time now);
+  Status Send(const Peer& to, std::vector<std::byte> header, const Bytes& payload, Time now);
 
   void CloseIdle(Time now);
 
  private:
-  struct Peer {
+  struct Connection {
     Socket socket;
     Time last_used;
   };
   Context& context_;
-  std::map<std::string, Peer> peers_;  // by endpoint
+  const std::optional<KeyPair> own_;
+  std::map<std::string, Connection> connections_;  // by endpoint
 };
 
 }  // namespace slabstream

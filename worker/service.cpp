@@ -17,9 +17,11 @@
 #include <vector>
 
 #include "common/base/guarded.h"
+#include "common/base/limited_log.h"
 #include "common/base/log.h"
 #include "common/base/pooled_vector.h"
 #include "common/base/shared_arena.h"
+#include "common/transport/authenticator.h"
 #include "common/transport/endpoint.h"
 #include "common/transport/mailbox.h"
 #include "worker/executor.h"
@@ -39,11 +41,24 @@ Incarnation RandomIncarnation() {
   return incarnation == 0 ? 1 : incarnation;
 }
 
-// The default endpoint for partial images: on the coordinator's host and by its scheme.
-std::string ImagesEndpointFor(Endpoint coordinator, Incarnation incarnation) {
+// The default endpoint for partial images: by the coordinator's scheme, where packets for it leave this host.
+Result<std::string> ImagesEndpointFor(Endpoint coordinator, Incarnation incarnation) {
+  if (coordinator.remote()) {
+    Result<std::string> host = LocalHostTowards(coordinator);
+    if (!host.ok()) return host;
+    coordinator.host = *std::move(host);
+  }
   coordinator.port = 0;
-  coordinator.path += ".images-" + std::to_string(incarnation);
+  coordinator.path += kImagesSuffix + std::to_string(incarnation);
   return coordinator.ToString();
+}
+
+// The worker that sent a message of the images plane.
+WorkerId SenderOf(const AnyMessage& message) {
+  if (const auto* partial = std::get_if<PartialImage>(&message)) return partial->from_worker;
+  if (const auto* refused = std::get_if<ImageRefused>(&message)) return refused->from_worker;
+  const auto* received = std::get_if<ImageReceived>(&message);
+  return received == nullptr ? 0 : received->from_worker;
 }
 
 std::string HostName() {
@@ -52,22 +67,34 @@ std::string HostName() {
   return name.data();
 }
 
+// Of the images plane: this worker's own, as it registered them.
+struct ImagesKeys {
+  KeyPair own;
+  std::string plane;
+};
+
+constexpr Duration kPeerPatience = std::chrono::seconds(3);  // less than a handshake may take
+
 }  // namespace
 
 struct WorkerService::Impl {
-  Impl(Context& service_context, WorkerOptions worker_options, Socket control_socket, Socket images_socket)
+  Impl(Context& service_context, WorkerOptions worker_options, std::optional<ImagesKeys> images_keys, Socket control_socket,
+       Socket images_socket)
       : context(service_context),
         options(std::move(worker_options)),
+        keys(std::move(images_keys)),
         machine(options.machine),
         control(std::move(control_socket)),
         images(std::move(images_socket)),
-        peers(service_context),
+        peers(service_context, keys ? std::optional(keys->own) : std::nullopt),
         executor(std::in_place, outbox, options.compression == Compression::kOn ? Codec::kZstd : Codec::kRaw, int(options.machine.threads),
                  options.make_renderer, options.task_hook) {}
 
   void Run();
   void Loop();
   void Receive(Socket& socket, Plane plane);
+  // False: the key of the connection is not that of the worker whom the message names.
+  bool ComesFromItsSender(const Incoming& incoming, const AnyMessage& message) const;
   void HandleEvent(WorkerEvent event);
   void HandleOutput(ExecutorOutput& output);
   void SetRegistered();
@@ -95,20 +122,22 @@ struct WorkerService::Impl {
 
   Context& context;
   const WorkerOptions options;
+  const std::optional<ImagesKeys> keys;
   WorkerMachine machine;
   Socket control, images;
   std::optional<Socket> slabs;  // once the coordinator has named its endpoint
   std::string slabs_endpoint;
   PeerSockets peers;
   Epoch epoch = 0;
-  LinkRates links;                            // while compression is automatic
-  std::map<WorkerId, std::string> endpoints;  // image planes of the epoch's other workers
-  std::set<WorkerId> takes_frames_only;       // workers that cannot map memory though they have the same scope
-  std::vector<PartialImage> to_refuse;        // from workers whose endpoint is not known yet
-  std::atomic<bool> registered = false;       // at least once, or stopped
+  LinkRates links;                       // while compression is automatic
+  std::map<WorkerId, Peer> others;       // of the epoch
+  std::set<WorkerId> takes_frames_only;  // workers that cannot map memory though they have the same scope
+  std::vector<PartialImage> to_refuse;   // from workers whose endpoint is not known yet
+  std::atomic<bool> registered = false;  // at least once, or stopped
   std::atomic<bool> stop_requested = false;
   std::atomic<bool> stopped = false;
   bool stop_now = false;           // set by the machine
+  LimitedLog complaints;           // about messages
   Mailbox<ExecutorOutput> outbox;  // its wakeup also signals stop_requested
   std::optional<Executor> executor;
   std::jthread thread;  // owns the sockets and the machine; last member: ends first
@@ -160,7 +189,11 @@ void WorkerService::Impl::Receive(Socket& socket, Plane plane) {
     Bytes payload = incoming->parts.size() > 1 ? std::move(incoming->parts[1]) : Bytes();
     Result<AnyMessage> message = Guarded("decoding", [&] { return DecodeOn(plane, incoming->parts[0].span(), payload.size()); });
     if (!message.ok()) {
-      LogWarning(std::string(NameOf(plane)) + " plane: dropped a message: " + message.status().message());
+      complaints.Warning(std::string(NameOf(plane)) + " plane: dropped a message: " + message.status().message());
+      continue;
+    }
+    if (!ComesFromItsSender(*incoming, *message)) {
+      complaints.Warning(std::string(NameOf(plane)) + " plane: dropped a message of another worker than it says");
       continue;
     }
     Remember(*message);
@@ -169,13 +202,20 @@ void WorkerService::Impl::Receive(Socket& socket, Plane plane) {
   }
 }
 
+bool WorkerService::Impl::ComesFromItsSender(const Incoming& incoming, const AnyMessage& message) const {
+  if (incoming.user.empty()) return true;
+  const auto sender = others.find(SenderOf(message));
+  return sender == others.end() || sender->second.images_key == incoming.user;
+}
+
 // Handles memory shared between workers, and the links between them: the machine knows nothing of either.
 void WorkerService::Impl::Remember(const AnyMessage& message) {
   if (const auto* welcome = std::get_if<Welcome>(&message)) {
     if (std::exchange(epoch, welcome->epoch) == welcome->epoch) return;
     executor->Forget([](const GroupKey&) { return true; });
     takes_frames_only.clear();
-    endpoints.clear();
+    others.clear();
+    if (keys) context.authenticator().AdmitOnly(keys->plane, {});
     links.ForgetAll();
   } else if (const auto* ping = std::get_if<Ping>(&message); ping != nullptr && ping->epoch == epoch) {
     executor->Forget([&](const GroupKey& key) {
@@ -187,7 +227,10 @@ void WorkerService::Impl::Remember(const AnyMessage& message) {
       const bool read = key.frame == now.frame && (key.attempt < now.attempt || key.group < assignment->groups_done);
       return read || key.frame < assignment->finished_before;
     });
-    for (const Peer& peer : assignment->peers) endpoints[peer.worker] = peer.images_endpoint;
+    for (const Peer& peer : assignment->peers) {
+      others[peer.worker] = peer;
+      if (keys && !peer.images_key.empty()) context.authenticator().Admit(keys->plane, peer.images_key);
+    }
     for (const PartialImage& refused : std::exchange(to_refuse, {})) Refuse(refused);
   } else if (const auto* received = std::get_if<ImageReceived>(&message); received != nullptr && received->epoch == epoch) {
     links.Received(received->from_worker, received->number, MonotonicNow());
@@ -200,11 +243,11 @@ void WorkerService::Impl::Acknowledge(const AnyMessage& message, std::size_t pay
   Answer(partial->from_worker, ImageReceived{epoch, machine.worker(), partial->acknowledge});  // without it, the sender asks again
 }
 
-// False: the sender's endpoint is not known yet.
+// False: the sender is not known yet.
 bool WorkerService::Impl::Answer(WorkerId sender, const AnyMessage& message) {
-  const auto endpoint = endpoints.find(sender);
-  if (endpoint == endpoints.end()) return false;
-  const Status sent = peers.Send(endpoint->second, Encode(message), {}, MonotonicNow());
+  const auto peer = others.find(sender);
+  if (peer == others.end()) return false;
+  const Status sent = peers.Send(peer->second, Encode(message), {}, MonotonicNow());
   if (!sent.ok()) LogWarning("worker " + std::to_string(sender) + " is not reached: " + sent.message());
   return true;
 }
@@ -260,7 +303,7 @@ void WorkerService::Impl::HandleOutput(ExecutorOutput& output) {
     Status sent;
     const Status tried = Guarded("send", [&] {
       if (options.task_hook) options.task_hook("send");
-      sent = peers.Send(partial.to.images_endpoint, std::move(partial.header), partial.payload, MonotonicNow());
+      sent = peers.Send(partial.to, std::move(partial.header), partial.payload, MonotonicNow());
     });
     if (!tried.ok()) return HandleEvent(SendFailed{partial.key, tried});  // no fault of the peer's
     if (sent.ok()) return;
@@ -287,7 +330,7 @@ void WorkerService::Impl::Perform(SendChunkRequest& action) {
 void WorkerService::Impl::Perform(ConnectSlabs& action) {
   if (slabs && action.endpoint == slabs_endpoint) return;  // the socket reconnects by itself
   slabs.reset();
-  Result<Socket> socket = Socket::Dealer(context);
+  Result<Socket> socket = Socket::Dealer(context, {.client_keys = options.keys});
   const Status connected = socket.ok() ? socket->Connect(action.endpoint) : socket.status();
   if (!connected.ok()) {
     LogError("slabs plane: " + connected.message());  // chunk requests time out and are reported
@@ -323,14 +366,26 @@ Result<std::unique_ptr<WorkerService>> WorkerService::Start(Context& context, Wo
                                    "]");
   }
   config.incarnation = RandomIncarnation();
-  if (options.images_endpoint.empty()) options.images_endpoint = ImagesEndpointFor(*coordinator, config.incarnation);
+  if (options.images_endpoint.empty()) {
+    Result<std::string> endpoint = ImagesEndpointFor(*coordinator, config.incarnation);
+    if (!endpoint.ok()) return endpoint.status();
+    options.images_endpoint = *std::move(endpoint);
+  }
   if (const Result<Endpoint> parsed = ParseEndpoint(options.images_endpoint, true); !parsed.ok()) return parsed.status();
 
-  Result<Socket> images = Socket::Router(context);
+  std::optional<ImagesKeys> keys;
+  SocketOptions images_options;
+  if (options.keys) {
+    keys = ImagesKeys{MakeKeyPair(), "images-" + std::to_string(config.incarnation)};
+    images_options.server_keys = ServerKeys{keys->own.secret_key, keys->plane};
+    config.images_key = keys->own.public_key;
+    context.authenticator().SetPatience(keys->plane, kPeerPatience);
+  }
+  Result<Socket> images = Socket::Router(context, images_options);
   if (!images.ok()) return images.status();
   Result<std::string> images_endpoint = images->Bind(options.images_endpoint);
   if (!images_endpoint.ok()) return images_endpoint.status();
-  Result<Socket> control = Socket::Dealer(context);
+  Result<Socket> control = Socket::Dealer(context, {.client_keys = options.keys});
   if (!control.ok()) return control.status();
   if (Status connected = control->Connect(options.coordinator_endpoint); !connected.ok()) return connected;
 
@@ -345,7 +400,7 @@ Result<std::unique_ptr<WorkerService>> WorkerService::Start(Context& context, Wo
     }
   }
   config.lends_memory = options.share_memory;
-  auto impl = std::make_unique<Impl>(context, std::move(options), std::move(*control), std::move(*images));
+  auto impl = std::make_unique<Impl>(context, std::move(options), std::move(keys), std::move(*control), std::move(*images));
   impl->thread = std::jthread([raw = impl.get()] { raw->Run(); });
   return std::unique_ptr<WorkerService>(new WorkerService(std::move(impl)));
 }

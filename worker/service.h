@@ -6,6 +6,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "common/base/status.h"
@@ -19,12 +20,13 @@ namespace slabstream {
 
 struct WorkerOptions {
   std::string coordinator_endpoint;  // its worker endpoint
-  std::string images_endpoint;       // bound; empty: any port of the coordinator's scheme (tcp), a path of its own (ipc), a name (inproc)
+  std::string images_endpoint;       // bound; empty: any port on the way to the coordinator (tcp), a path of its own (ipc), a name (inproc)
   Compression compression = Compression::kAuto;
   bool share_memory = true;  // lend images to workers of this host
   RendererFactory make_renderer = MakeRenderer;
-  TaskHook task_hook;  // of the executor, and for "send"
-  // Start fills in incarnation, pid, host, images_endpoint, memory_scope, lends_memory. threads: [1, kMaxThreads].
+  TaskHook task_hook;                             // of the executor, and for "send"
+  std::optional<ClientKeys> keys = std::nullopt;  // of role worker; none: the service has no keys
+  // Start fills in incarnation, pid, host, images_endpoint, images_key, memory_scope, lends_memory. threads: [1, kMaxThreads].
   WorkerConfig machine;
 };
 

@@ -51,10 +51,10 @@ struct WorkerMachine::State {
   void On(const ChunkRefused& refused, const Bytes&);
   void On(PartialImage&& partial, const Bytes& payload);
   // Drops what a worker sends, what its service handles (ImageRefused, ImageReceived), and the messages of the client plane.
-  template <
-      AnyOf<Register, Heartbeat, GroupDone, FrameImage, WorkerTrouble, Leave, ChunkRequest, ImageRefused, ImageReceived, SubmitFrame,
-            FrameProgress, FrameReply, FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery, StatusReply, ShutDown, ShutDownReply>
-          Message>
+  template <AnyOf<Register, Heartbeat, GroupDone, FrameImage, WorkerTrouble, Leave, ChunkRequest, ImageRefused, ImageReceived, SubmitFrame,
+                  FrameProgress, FrameReply, FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery, StatusReply, ShutDown,
+                  ShutDownReply, KeysOrder, KeysReply, OrderRefused>
+                Message>
   void On(const Message&, const Bytes&) {}
 
   // ---- registration
@@ -164,7 +164,7 @@ void WorkerMachine::State::KeepTime() {
   if (worker != 0 && now >= last_heard + timeout) Unregister();
   if (worker == 0 && now >= next_register) {
     actions.push_back(SendControl{Register{incarnation, config.pid, config.host, config.images_endpoint, config.threads, config.cache_bytes,
-                                           config.memory_scope, config.lends_memory}});
+                                           config.memory_scope, config.lends_memory, config.images_key}});
     next_register = now + config.register_interval;
   }
   if (worker != 0 && now >= next_heartbeat) {

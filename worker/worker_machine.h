@@ -62,6 +62,7 @@ struct WorkerConfig {
   std::uint32_t pid = 0;
   std::string host;
   std::string images_endpoint;
+  std::string images_key;                                // as in Register
   std::uint64_t memory_scope = 0;                        // as in Register
   bool lends_memory = false;                             // as in Register
   std::uint32_t threads = 1;                             // render threads, reported to the coordinator

@@ -8,6 +8,7 @@
 #include "client/cli/cores.h"
 #include "client/cli/option_groups.h"
 #include "common/simulation/link_model.h"
+#include "coordinator/tuning/service_machine.h"
 
 namespace slabstream {
 namespace {
@@ -82,7 +83,8 @@ void DeclareUp(const CommandLine& line) {
   AddThreads(*sub, options->threads, "Render threads of each worker");
   AddRepeated(*sub, "--data", options->data, "A volume to serve, as NAME=FILE, or a directory of volumes that are named after their files")
       ->type_name("NAME=FILE");
-  AddParsed(*sub, "--listen", options->listen, EndpointText(true), "Where clients reach the service; tcp://127.0.0.1:* takes any free port")
+  AddParsed(*sub, "--listen", options->listen, EndpointText(true),
+            "Where clients reach the service: an address of this machine; port * is any free one. Addresses that are not loopback get keys")
       ->type_name("ENDPOINT")
       ->default_str(options->listen);
   AddOptionalValue(
@@ -91,11 +93,15 @@ void DeclareUp(const CommandLine& line) {
       "images between workers, and pictures for clients behind a slow tunnel. off: never")
       ->type_name("[=MODE]")
       ->default_str("auto");
-  // Workers of other hosts cannot join yet.
   AddParsed(
       *sub, "--link", options->link,
-      [](const std::string& option, const std::string& text) { return TextIf(ParseLink(option, text).status(), text); }, "")
-      ->group(kHidden);
+      [](const std::string& option, const std::string& text) { return TextIf(ParseLink(option, text).status(), text); },
+      "Between workers of different hosts, as NAME or NAME:MICROSECONDS,GBIT, for policies that are 'auto'" + Explained(LinkPresets()))
+      ->type_name("LINK")
+      ->default_str(kDefaultLink);
+  sub->add_option("--keys", options->keys, "Encrypt connections with the keys of this folder, which is made if need be")
+      ->type_name("FOLDER")
+      ->default_str("a folder beside the logs if --listen leaves this machine, else none");
   sub->add_flag("--detach", options->detach, "Return when the service is ready; `slabstream down` ends it");
   RunWith(*sub, line.run, options, RunUp);
 }
@@ -103,23 +109,44 @@ void DeclareUp(const CommandLine& line) {
 void DeclareDown(const CommandLine& line) {
   CLI::App* sub = line.app.add_subcommand("down", "End a service that `up` started");
   auto options = std::make_shared<DownOptions>();
-  AddEndpoint(*sub, options->endpoint);
+  AddService(*sub, options->service);
   RunWith(*sub, line.run, options, RunDown);
 }
 
 void DeclareStatus(const CommandLine& line) {
   CLI::App* sub = line.app.add_subcommand("status", "Show a service's workers, datasets and frames");
   auto options = std::make_shared<StatusOptions>();
-  AddEndpoint(*sub, options->endpoint);
+  AddService(*sub, options->service);
   sub->add_flag("--json", options->json, "Print JSON");
   RunWith(*sub, line.run, options, RunStatus);
+}
+
+void DeclareKeys(const CommandLine& line) {
+  CLI::App* sub = line.app.add_subcommand("keys", "List, change and revoke the keys that a service admits; for admins");
+  sub->require_subcommand(1);
+  const auto declare = [&](const char* name, const char* purpose, KeysAction action) {
+    CLI::App* order = sub->add_subcommand(name, purpose);
+    auto options = std::make_shared<KeysOptions>();
+    options->order.action = action;
+    AddService(*order, options->service);
+    RunWith(*order, line.run, options, RunKeys);
+    return std::pair(order, options);
+  };
+  declare("list", "List the public keys, their roles and when they were made", KeysAction::kList);
+  const auto [rotate, rotate_options] =
+      declare("rotate", "Put a new key into the service file of a role; the old ones hold until they are revoked", KeysAction::kRotate);
+  AddChoice<Role, 3>(*rotate, "ROLE", rotate_options->order.role, {"client", "worker", "admin"}, kRoles, "client, worker or admin")
+      ->required();
+  const auto [revoke, revoke_options] = declare("revoke", "Admit a key no longer and end its connections", KeysAction::kRevoke);
+  revoke->add_option("KEY", revoke_options->order.key, "The id of a key, or the public key itself, as `slabstream keys list` shows them")
+      ->required();
 }
 
 }  // namespace
 
 std::span<const DeclareCommand> ClientCommands() {
-  static constexpr DeclareCommand kCommands[] = {DeclareRender, DeclareTurntable, DeclareInfo,  DeclareSphere,
-                                                 DeclareUp,     DeclareDown,      DeclareStatus};
+  static constexpr DeclareCommand kCommands[] = {DeclareRender, DeclareTurntable, DeclareInfo,   DeclareSphere,
+                                                 DeclareUp,     DeclareDown,      DeclareStatus, DeclareKeys};
   return kCommands;
 }
 

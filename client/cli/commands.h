@@ -19,5 +19,6 @@ Status RunSphere(const SphereOptions& options);
 Status RunUp(const UpOptions& options);
 Status RunDown(const DownOptions& options);
 Status RunStatus(const StatusOptions& options);
+Status RunKeys(const KeysOptions& options);
 
 }  // namespace slabstream

@@ -37,18 +37,6 @@ CLI::Option* AddNamed(CLI::App& app, const std::string& name, std::string& targe
   return AddParsed(app, name, target, OneOf(std::move(names)), text + Explained(entries))->type_name("NAME")->default_str(target);
 }
 
-// An option that takes one of `names`; each stands for one of `values`.
-template <class T, std::size_t count>
-CLI::Option* AddChoice(CLI::App& app, const std::string& name, T& target, const std::array<std::string_view, count>& names,
-                       const std::array<T, count>& values, const std::string& help) {
-  const auto parse = [names, values](const std::string& option, const std::string& text) -> Result<T> {
-    const Result<std::size_t> index = ParseChoice(option, text, names);
-    if (!index.ok()) return index.status();
-    return values[*index];
-  };
-  return AddParsed(app, name, target, parse, help)->type_name("NAME");
-}
-
 // --renderer, and an option for each parameter of any renderer. Whether the chosen renderer has it is checked with the request.
 void AddRendererOptions(CLI::App& app, FrameRequest& request) {
   std::string help = "How voxels become a picture";
@@ -101,7 +89,7 @@ void AddConnectionOptions(CLI::App& app, ConnectionOptions& connection) {
                                                     every_core))
                            ->type_name("[N]");
   AddThreads(app, connection.local_threads, "Render threads of each worker of --local")->needs(local);
-  AddEndpoint(app, connection.endpoint);
+  AddService(app, connection.service);
 }
 
 void AddViewOptions(CLI::App& app, ViewParameters& view, ImageSize& size) {
@@ -201,10 +189,15 @@ ParseText EndpointText(bool allow_wildcard) {
   };
 }
 
-CLI::Option* AddEndpoint(CLI::App& app, std::string& endpoint) {
-  return AddParsed(app, "--endpoint", endpoint, EndpointText(false), "Where the service listens")
-      ->type_name("ENDPOINT")
-      ->default_str("$SLABSTREAM_ENDPOINT, or the service that `up` started last");
+CLI::Option* AddService(CLI::App& app, ServiceChoice& service) {
+  CLI::Option* endpoint = AddParsed(app, "--endpoint", service.endpoint, EndpointText(false), "Where the service listens")
+                              ->type_name("ENDPOINT")
+                              ->default_str("$SLABSTREAM_ENDPOINT, or the service that `up` started last");
+  app.add_option("--service", service.file, "The service file of a service with keys: where it listens, and the key to it")
+      ->type_name("FILE")
+      ->default_str("$SLABSTREAM_SERVICE, if there is no --endpoint")
+      ->excludes(endpoint);
+  return endpoint;
 }
 
 void AddTransferOptions(CLI::App& app, TransferChoice& transfer) {

@@ -12,7 +12,8 @@ namespace slabstream {
 
 // For AddParsed: an endpoint, as ParseEndpoint takes it.
 ParseText EndpointText(bool allow_wildcard);
-CLI::Option* AddEndpoint(CLI::App& app, std::string& endpoint);
+// --endpoint and --service; returns the former.
+CLI::Option* AddService(CLI::App& app, ServiceChoice& service);
 
 // Headings of the help text. Options under kHidden are not shown: old spellings that still work, and options that cannot be used yet.
 inline constexpr char kOutputGroup[] = "Output", kHidden[] = "";

@@ -8,6 +8,7 @@
 #include "client/image_io/image_writer.h"
 #include "common/frame/frame_request.h"
 #include "common/volume/sphere.h"
+#include "common/wire/client_messages.h"
 
 namespace slabstream {
 
@@ -15,11 +16,16 @@ class RendererKind;
 
 inline constexpr int kMaxLocalWorkers = 256;  // of EmbeddedOptions
 
+// Which service: see ResolveService (service_state.h).
+struct ServiceChoice {
+  std::string endpoint, file;  // at most one; none: the usual one
+};
+
 // Where the frames are rendered.
 struct ConnectionOptions {
   int local_workers = 0;  // 0: render at the service; else in this process, by this many workers
   int local_threads = 0;  // of each local worker; 0: LocalThreads
-  std::string endpoint;   // empty: see DefaultEndpoint (service_state.h)
+  ServiceChoice service;
 };
 
 // What `render` and `turntable` share.
@@ -67,18 +73,24 @@ struct UpOptions {
   int threads = 0;                // of each worker; 0: CoreShare
   std::vector<std::string> data;  // NAME=PATH or DIR, as slabstream-coordinator takes them
   std::string listen;             // endpoint for clients; a wildcard port is fine
+  std::string keys;               // folder of keys; empty: one beside the logs if `listen` leaves this machine, else none
   std::string compress = "auto";  // compression of images on their way: auto, on or off, as slabstream-worker takes it
   std::string link;               // as ParseLink takes it; empty: the coordinator's default
   bool detach = false;
 };
 
 struct DownOptions {
-  std::string endpoint;  // empty: as in ConnectionOptions
+  ServiceChoice service;
 };
 
 struct StatusOptions {
-  std::string endpoint;
+  ServiceChoice service;
   bool json = false;
+};
+
+struct KeysOptions {
+  ServiceChoice service;
+  KeysOrder order;
 };
 
 }  // namespace slabstream

@@ -7,14 +7,19 @@
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
+#include <chrono>
+#include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "common/base/files.h"
+#include "common/base/time.h"
+#include "common/service/service_file.h"
 #include "common/transport/endpoint.h"
 
 namespace slabstream {
@@ -35,7 +40,8 @@ std::optional<ServiceState> Load(const std::string& path) {
   if (!text.ok()) return std::nullopt;
   const nlohmann::json json = nlohmann::json::parse(*text, nullptr, false);
   try {
-    return ServiceState{json.at("endpoint"), json.at("started_unix"), json.at("coordinator"), json.at("workers"), json.at("log_directory")};
+    return ServiceState{json.at("endpoint"), json.at("started_unix"),  json.at("coordinator"),
+                        json.at("workers"),  json.at("log_directory"), json.value("keys_folder", "")};
   } catch (const nlohmann::json::exception&) {
     return std::nullopt;
   }
@@ -68,49 +74,106 @@ Result<std::string> StateDirectory() {
 Status SaveState(const ServiceState& state) {
   const Result<std::string> directory = StateDirectory();
   if (!directory.ok()) return directory.status();
-  const nlohmann::json json = {{"endpoint", state.endpoint},
-                               {"started_unix", state.started_unix},
-                               {"coordinator", state.coordinator},
-                               {"workers", state.workers},
-                               {"log_directory", state.log_directory}};
+  const nlohmann::json json = {{"endpoint", state.endpoint}, {"started_unix", state.started_unix},   {"coordinator", state.coordinator},
+                               {"workers", state.workers},   {"log_directory", state.log_directory}, {"keys_folder", state.keys_folder}};
   return WriteTextFile(FileFor(*directory, state.endpoint), json.dump(2) + "\n");
+}
+
+void ForgetState(const ServiceState& state) {
+  const Result<std::string> directory = StateDirectory();
+  if (!directory.ok()) return;
+  std::error_code ignored;
+  std::filesystem::remove(FileFor(*directory, state.endpoint), ignored);
 }
 
 void RemoveState(const ServiceState& state) {
   const Result<std::string> directory = StateDirectory();
   if (!directory.ok()) return;
+  ForgetState(state);
   std::error_code ignored;
-  std::filesystem::remove(FileFor(*directory, state.endpoint), ignored);
   if (std::filesystem::path(state.log_directory).parent_path() == *directory) std::filesystem::remove_all(state.log_directory, ignored);
 }
 
-std::optional<ServiceState> FindState(const std::string& endpoint) {
+namespace {
+
+// The newest one at `endpoint`, or anywhere if that is empty.
+std::optional<ServiceState> Newest(const std::string& endpoint, bool runs) {
   const Result<std::string> directory = StateDirectory();
   if (!directory.ok()) return std::nullopt;
   std::optional<ServiceState> newest;
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(*directory, error)) {
     if (entry.path().extension() != ".json") continue;
-    const std::optional<ServiceState> state = Load(entry.path());
-    if (!state || !IsRunning(state->coordinator, kCoordinatorProgram)) {
-      if (state) RemoveState(*state);
-      std::filesystem::remove(entry.path(), error);
-      continue;
-    }
+    std::optional<ServiceState> state = Load(entry.path());
+    if (!state || IsRunning(state->coordinator, kCoordinatorProgram) != runs) continue;
     if (!endpoint.empty() && state->endpoint != endpoint) continue;
-    if (!newest || state->started_unix > newest->started_unix) newest = state;
+    if (!newest || state->started_unix > newest->started_unix) newest = std::move(state);
   }
   return newest;
 }
 
-Result<std::string> DefaultEndpoint() {
-  if (const char* text = std::getenv("SLABSTREAM_ENDPOINT"); text != nullptr && text[0] != '\0') {
-    const Result<Endpoint> endpoint = ParseEndpoint(text, false);
-    if (!endpoint.ok()) return Status::InvalidArgument("$SLABSTREAM_ENDPOINT " + endpoint.status().message());
-    return std::string(text);
+using Process = std::pair<pid_t, std::string>;  // pid, program
+
+// Whether all of them ended in time.
+bool WaitForEnd(const std::vector<Process>& processes, Duration patience) {
+  const auto runs = [](const Process& process) { return IsRunning(process.first, process.second); };
+  for (const Time deadline = MonotonicNow() + patience; std::any_of(processes.begin(), processes.end(), runs);) {
+    if (MonotonicNow() >= deadline) return false;
+    ::usleep(20000);
   }
-  const std::optional<ServiceState> state = FindState("");
-  return state ? state->endpoint : std::string(kDefaultEndpoint);
+  return true;
+}
+
+}  // namespace
+
+std::optional<ServiceState> FindState(const std::string& endpoint) { return Newest(endpoint, true); }
+std::optional<ServiceState> FindRemains(const std::string& endpoint) { return Newest(endpoint, false); }
+
+void EndProcesses(const ServiceState& state, Duration patience) {
+  std::vector<Process> processes;
+  for (const pid_t worker : state.workers) processes.emplace_back(worker, kWorkerProgram);
+  processes.emplace_back(state.coordinator, kCoordinatorProgram);
+  for (const int signal : {SIGTERM, SIGKILL}) {
+    if (WaitForEnd(processes, std::exchange(patience, kEndPatience))) return;
+    for (const auto& [pid, program] : processes) {
+      if (IsRunning(pid, program)) ::kill(pid, signal);
+    }
+  }
+  WaitForEnd(processes, kEndPatience);
+}
+
+namespace {
+
+const char* Variable(const char* name) {
+  const char* text = std::getenv(name);
+  return text != nullptr && text[0] != '\0' ? text : nullptr;
+}
+
+Result<ServiceAddress> AddressIn(const std::string& path) {
+  const Result<ServiceFile> file = ReadServiceFile(path);
+  if (!file.ok()) return file.status();
+  if (file->role == Role::kWorker)
+    return Status::InvalidArgument(fmt::format("service file '{}' is of role worker, but client or admin is needed here", path));
+  return ServiceAddress(file->endpoint, file->keys());
+}
+
+}  // namespace
+
+Result<ServiceAddress> ResolveService(const ServiceChoice& choice) {
+  if (!choice.file.empty()) return AddressIn(choice.file);
+  std::string endpoint = choice.endpoint;
+  if (endpoint.empty()) {
+    if (const char* file = Variable("SLABSTREAM_SERVICE")) return AddressIn(file);
+    if (const char* text = Variable("SLABSTREAM_ENDPOINT")) {
+      const Result<Endpoint> parsed = ParseEndpoint(text, false);
+      if (!parsed.ok()) return Status::InvalidArgument("$SLABSTREAM_ENDPOINT " + parsed.status().message());
+      endpoint = text;
+    }
+  }
+  const std::optional<ServiceState> state = FindState(endpoint);
+  if (state && !state->keys_folder.empty()) return AddressIn(state->keys_folder + "/admin.json");
+  if (!endpoint.empty()) return ServiceAddress(endpoint);
+  return ServiceAddress(state ? state->endpoint : std::string(kDefaultEndpoint));
 }
 
 bool IsRunning(pid_t pid, const std::string& program) {

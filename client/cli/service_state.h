@@ -5,12 +5,16 @@
 
 #include <sys/types.h>
 
+#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "client/cli/options.h"
+#include "client/client.h"
 #include "common/base/status.h"
+#include "common/base/time.h"
 
 namespace slabstream {
 
@@ -22,6 +26,7 @@ struct ServiceState {
   pid_t coordinator = 0;
   std::vector<pid_t> workers;
   std::string log_directory;  // a subdirectory of StateDirectory()
+  std::string keys_folder;    // empty: it has no keys
   friend bool operator==(const ServiceState&, const ServiceState&) = default;
 };
 
@@ -29,14 +34,22 @@ struct ServiceState {
 Result<std::string> StateDirectory();
 
 Status SaveState(const ServiceState& state);
+void ForgetState(const ServiceState& state);  // keeps its logs
 void RemoveState(const ServiceState& state);  // and its logs
 
-// The state of the service at `endpoint`, or of the last one started if `endpoint` is empty. Only services with a running coordinator
-// count; files of others are removed. nullopt: there is none.
+// The state of the service at `endpoint`, or of the last one started if `endpoint` is empty. nullopt: none whose coordinator runs.
 std::optional<ServiceState> FindState(const std::string& endpoint);
+// The same of a service whose coordinator has ended without its doing, so that its workers may still run.
+std::optional<ServiceState> FindRemains(const std::string& endpoint);
+// Ends the processes of the service that still run: SIGTERM, unless they end by themselves within `patience`, and SIGKILL some seconds
+// later.
+inline constexpr Duration kEndPatience = std::chrono::seconds(5);
+void EndProcesses(const ServiceState& state, Duration patience);
 
-// $SLABSTREAM_ENDPOINT, else that of the last service started, else kDefaultEndpoint. InvalidArgument: the variable holds no endpoint.
-Result<std::string> DefaultEndpoint();
+// The address of the service that the user means: what is chosen; else by $SLABSTREAM_SERVICE, a service file; else by
+// $SLABSTREAM_ENDPOINT; else the last service started; else kDefaultEndpoint. A service that `up` started here with keys is reached as its
+// admin. Errors: of ReadServiceFile; InvalidArgument: a variable holds no endpoint, or the file is a worker's.
+Result<ServiceAddress> ResolveService(const ServiceChoice& choice);
 
 // Whether `pid` runs (a zombie does not) and is one of ours: its /proc/PID/stat names `program` (the kernel keeps 15 characters).
 bool IsRunning(pid_t pid, const std::string& program);

@@ -31,7 +31,7 @@ Result<Session> Session::Open(const ConnectionOptions& connection, const std::st
     if (source.size() > kMaxNameBytes) {
       return Status::InvalidArgument(fmt::format("SOURCE has {} bytes, a dataset's name has at most {}", source.size(), kMaxNameBytes));
     }
-    Result<Session> session = OpenService(connection.endpoint);
+    Result<Session> session = OpenService(connection.service);
     if (session.ok()) session->dataset_ = source;
     return session;
   }
@@ -56,12 +56,16 @@ Result<Session> Session::OpenLocal(const ConnectionOptions& connection, std::fun
   return session;
 }
 
-Result<Session> Session::OpenService(const std::string& endpoint) {
-  Result<std::string> where = endpoint.empty() ? DefaultEndpoint() : Result<std::string>(endpoint);
-  if (!where.ok()) return where.status();
+Result<Session> Session::OpenService(const ServiceChoice& choice) {
+  const Result<ServiceAddress> service = ResolveService(choice);
+  if (!service.ok()) return service.status();
+  return OpenService(*service);
+}
+
+Result<Session> Session::OpenService(const ServiceAddress& service) {
   Session session;
   session.context_ = std::make_unique<Context>();
-  Result<Client> client = Client::Connect(*session.context_, *where);
+  Result<Client> client = Client::Connect(*session.context_, service);
   if (!client.ok()) {
     const std::string hint =
         client.status().code() == StatusCode::kUnavailable ? " (`slabstream up` starts a service, --local needs none)" : "";

@@ -21,8 +21,9 @@ class Session {
   static Result<Session> Open(const ConnectionOptions& connection, const std::string& source);
   // In this process, by connection.local_workers > 0. `load` supplies the volume when the first frame needs it, on a thread of its own.
   static Result<Session> OpenLocal(const ConnectionOptions& connection, std::function<Result<std::shared_ptr<const Volume>>()> load);
-  // The service alone, for `status`. `endpoint` as in ConnectionOptions.
-  static Result<Session> OpenService(const std::string& endpoint);
+  // The service alone, for `status`.
+  static Result<Session> OpenService(const ServiceChoice& choice);
+  static Result<Session> OpenService(const ServiceAddress& service);
   Session(Session&&) noexcept;
   Session& operator=(Session&&) = delete;
   ~Session();

@@ -82,7 +82,7 @@ std::string StatusJson(const StatusReply& reply) {
 }  // namespace
 
 Status RunStatus(const StatusOptions& options) {
-  Result<Session> session = Session::OpenService(options.endpoint);
+  Result<Session> session = Session::OpenService(options.service);
   if (!session.ok()) return session.status();
   const Result<StatusReply> reply = session->client().QueryStatus();
   if (!reply.ok()) return reply.status();

@@ -2,6 +2,9 @@
 #include <fmt/format.h>
 
 #include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
@@ -16,6 +19,8 @@
 #include "client/cli/service_state.h"
 #include "client/cli/session.h"
 #include "common/base/stop_signals.h"
+#include "common/keys/role.h"
+#include "common/transport/endpoint.h"
 
 namespace slabstream {
 namespace {
@@ -54,8 +59,9 @@ std::string ValueIn(const std::string& line, const std::string& key) {
 
 class LocalService {
  public:
-  LocalService(const UpOptions& options, std::string log_directory) : options_(options) {
+  LocalService(const UpOptions& options, std::string log_directory, std::string keys_folder) : options_(options) {
     state_.log_directory = std::move(log_directory);
+    state_.keys_folder = std::move(keys_folder);
     state_.started_unix = std::time(nullptr);
   }
 
@@ -63,7 +69,7 @@ class LocalService {
   Status Start(const BlockedSignals& signals) {
     if (Status status = StartCoordinator(); !status.ok()) return status;
     if (Status status = StartWorkers(); !status.ok()) return status;
-    Result<Session> session = Session::OpenService(state_.endpoint);
+    Result<Session> session = OpenSession();
     if (!session.ok()) return session.status();
     for (const Time deadline = MonotonicNow() + kStartTimeout;;) {
       const Result<StatusReply> reply = session->client().QueryStatus();
@@ -98,22 +104,29 @@ class LocalService {
     return Status::Ok();
   }
 
-  // Asks the coordinator to end all processes, ends those that remain, and forgets the service.
-  void Stop() {
+  // Asks the coordinator to end all processes, ends those that remain, and forgets the service, except its logs if they are to be kept.
+  void Stop(bool keep_logs) {
     if (!children_.empty() && !children_.front().Ended() && !state_.endpoint.empty()) {
-      if (Result<Session> session = Session::OpenService(state_.endpoint); session.ok() && session->client().ShutDownService().ok()) {
+      if (Result<Session> session = OpenSession(); session.ok() && session->client().ShutDownService().ok()) {
         for (const Time deadline = MonotonicNow() + kPatience; !AllEnded() && MonotonicNow() < deadline;) {
           ::usleep(20000);
         }
       }
     }
     for (std::size_t i = children_.size(); i-- > 0;) children_[i].Terminate(kPatience);  // workers first
-    RemoveState(state_);
+    keep_logs ? ForgetState(state_) : RemoveState(state_);
   }
 
   const ServiceState& state() const { return state_; }
 
  private:
+  std::string ServiceFileOf(Role role) const { return fmt::format("{}/{}.json", state_.keys_folder, NameOf(role)); }
+
+  Result<Session> OpenSession() const {
+    return Session::OpenService(state_.keys_folder.empty() ? ServiceChoice{.endpoint = state_.endpoint, .file = {}}
+                                                           : ServiceChoice{.endpoint = {}, .file = ServiceFileOf(Role::kAdmin)});
+  }
+
   std::string LogOf(std::size_t child) const {
     return fmt::format("{}/{}.log", state_.log_directory, child == 0 ? std::string("coordinator") : fmt::format("worker-{}", child));
   }
@@ -141,6 +154,7 @@ class LocalService {
     std::vector<std::string> arguments = {"--listen", options_.listen};
     for (const std::string& data : options_.data) arguments.insert(arguments.end(), {"--data", data});
     if (!options_.link.empty()) arguments.insert(arguments.end(), {"--link", options_.link});
+    if (!state_.keys_folder.empty()) arguments.insert(arguments.end(), {"--keys", state_.keys_folder});
     Result<Child*> child = StartChild(kCoordinatorProgram, std::move(arguments));
     if (!child.ok()) return child.status();
     state_.coordinator = (*child)->pid();
@@ -157,8 +171,12 @@ class LocalService {
 
   Status StartWorkers() {
     const int threads = options_.threads > 0 ? options_.threads : CoreShare(options_.workers);
-    const std::vector<std::string> arguments = {"--coordinator", worker_endpoint_, "--threads", std::to_string(threads),
-                                                "--compress=" + options_.compress};
+    std::vector<std::string> arguments = {"--threads", std::to_string(threads), "--compress=" + options_.compress};
+    if (state_.keys_folder.empty()) {
+      arguments.insert(arguments.end(), {"--coordinator", worker_endpoint_});
+    } else {
+      arguments.insert(arguments.end(), {"--service", ServiceFileOf(Role::kWorker)});
+    }
     for (int i = 0; i < options_.workers; ++i) {
       const Result<Child*> child = StartChild(kWorkerProgram, arguments);
       if (!child.ok()) return child.status();
@@ -179,19 +197,43 @@ class LocalService {
   std::vector<Child> children_;  // the coordinator, then the workers
 };
 
+// Ends what a coordinator that crashed there has left.
 Status CheckNotRunning(const std::string& listen) {
+  if (const auto remains = FindRemains(listen)) {
+    EndProcesses(*remains, Duration::zero());
+    ForgetState(*remains);
+  }
   const std::optional<ServiceState> running = FindState(listen);
   if (!running || running->endpoint != listen) return Status::Ok();
   return Status::Unavailable(
       fmt::format("a service runs at {} already (pid {}); `slabstream down` ends it", running->endpoint, running->coordinator));
 }
 
+// The folder of keys of a service that leaves this machine: what the user named, else one for this address, so that its service files stay
+// the same from start to start. Empty: it stays on this machine and has no keys.
+Result<std::string> KeysFolder(const UpOptions& options, const std::string& state_directory) {
+  if (!options.keys.empty()) return options.keys;
+  const Result<Endpoint> listen = ParseEndpoint(options.listen, true);
+  if (!listen.ok()) return listen.status();
+  if (!listen->remote()) return std::string();
+  std::string name = fmt::format("{}-{}", listen->host, listen->port);
+  std::ranges::replace_if(
+      name, [](unsigned char c) { return std::isalnum(c) == 0 && c != '.' && c != '-'; }, '_');
+  return fmt::format("{}/keys-{}", state_directory, name);
+}
+
 void PrintReady(const UpOptions& options, const ServiceState& state) {
-  const bool default_endpoint = state.endpoint == kDefaultEndpoint;
+  const bool default_endpoint = state.endpoint == kDefaultEndpoint || !state.keys_folder.empty();
   const std::string endpoint = default_endpoint ? "" : fmt::format(" --endpoint {}", state.endpoint);
   std::cout << fmt::format("slabstream is up at {} (coordinator pid {}, {} workers); logs are in {}\n", state.endpoint, state.coordinator,
                            state.workers.size(), state.log_directory);
   std::cout << fmt::format("  slabstream render NAME -o picture.png{0}\n  slabstream status{0}\n", endpoint);
+  if (!state.keys_folder.empty()) {
+    std::cout << fmt::format(
+        "Service files for other hosts are in {}: client.json, worker.json, admin.json. Whoever has one has its role.\n"
+        "  slabstream render NAME -o picture.png --service client.json\n  slabstream-worker --service worker.json\n",
+        state.keys_folder);
+  }
   if (options.detach) {
     std::cout << fmt::format("  slabstream down{}\n", endpoint);
   } else {
@@ -211,16 +253,21 @@ Status RunUp(const UpOptions& options) {
   std::filesystem::create_directory(log_directory, error);
   if (error) return Status::Unavailable(fmt::format("cannot make the directory '{}': {}", log_directory, error.message()));
 
+  const Result<std::string> keys_folder = KeysFolder(options, *directory);
+  if (!keys_folder.ok()) return keys_folder.status();
+  const bool new_keys = !keys_folder->empty() && !std::filesystem::exists(*keys_folder, error);
+
   const BlockedSignals signals;
-  LocalService service(options, log_directory);
+  LocalService service(options, log_directory, *keys_folder);
   if (Status status = service.Start(signals); !status.ok()) {
-    service.Stop();
+    service.Stop(status.code() == StatusCode::kDeadlineExceeded);  // which names the logs
+    if (new_keys) std::filesystem::remove_all(*keys_folder, error);
     return status;
   }
   PrintReady(options, service.state());
   if (options.detach) return Status::Ok();
   Status status = service.Watch(signals);
-  service.Stop();
+  service.Stop(!status.ok());
   return status;
 }
 

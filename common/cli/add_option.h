@@ -4,6 +4,8 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -68,6 +70,18 @@ ParseText OneOf(std::vector<std::string_view> names);
 // For other parsers that keep the text: the text if `checked` is ok.
 inline Result<std::string> TextIf(const Status& checked, const std::string& text) {
   return checked.ok() ? Result<std::string>(text) : Result<std::string>(checked);
+}
+
+// An option that takes one of `names`; each stands for one of `values`.
+template <class T, std::size_t count>
+CLI::Option* AddChoice(CLI::App& app, const std::string& name, T& target, const std::array<std::string_view, count>& names,
+                       const std::array<T, count>& values, const std::string& help) {
+  const auto parse = [names, values](const std::string& option, const std::string& text) -> Result<T> {
+    const Result<std::size_t> index = ParseChoice(option, text, names);
+    if (!index.ok()) return index.status();
+    return values[*index];
+  };
+  return AddParsed(app, name, target, parse, help)->type_name("NAME");
 }
 
 CLI::Option* AddNumber(CLI::App& app, const std::string& names, double& target, NumberRange range, const std::string& help);

@@ -5,6 +5,7 @@
 #include <exception>
 #include <iostream>
 #include <memory>
+#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "common/base/background_tasks.h"
 #include "common/base/large_buffers.h"
 #include "common/base/log.h"
+#include "common/base/open_files.h"
 #include "common/cli/add_option.h"
 #include "common/cli/help_formatter.h"
 
@@ -71,6 +73,11 @@ int RunService(CLI::App& app, int argc, const char* const* argv, const std::stri
       ->default_str(log_level);
   return ParseAndRun(app, argc, argv, [&] {
     InitLog(log_name, LogLevelNames().at(log_level));
+    constexpr std::uint64_t kLeastFiles = 128;  // with fewer it would wait for ever for some of its own sockets
+    if (const std::uint64_t files = AllowOpenFiles(); files < kLeastFiles) {
+      return Status::ResourceExhausted("this process may open " + std::to_string(files) + " files and sockets, but needs at least " +
+                                       std::to_string(kLeastFiles) + " (ulimit -n)");
+    }
     return serve();
   });
 }

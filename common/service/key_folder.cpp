@@ -128,10 +128,17 @@ Result<AdmittedKey> KeyFolder::Rotate(Role role) {
   return done;
 }
 
-Status KeyFolder::Revoke(const std::string& public_key) {
-  if (std::erase_if(admitted_, [&](const AdmittedKey& key) { return key.public_key == public_key; }) == 0)
-    return Status::NotFound(fmt::format("no key '{}' is admitted; `slabstream keys list` names those that are", public_key));
-  return Save();
+Result<std::string> KeyFolder::Revoke(const std::string& key) {
+  const auto is_it = [&](const AdmittedKey& admitted) { return admitted.public_key == key || IdOfKey(admitted.public_key) == key; };
+  const auto found = std::ranges::find_if(admitted_, is_it);
+  if (found == admitted_.end())
+    return Status::NotFound(fmt::format("no key '{}' is admitted; `slabstream keys list` names those that are", key));
+  std::string public_key = found->public_key;
+  if (std::ranges::count_if(admitted_, is_it) > 1)
+    return Status::InvalidArgument(fmt::format("'{}' is the id of several keys: name one of them in full", key));
+  admitted_.erase(found);
+  if (Status saved = Save(); !saved.ok()) return saved;
+  return public_key;
 }
 
 }  // namespace slabstream

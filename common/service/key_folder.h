@@ -9,18 +9,12 @@
 #include <vector>
 
 #include "common/base/status.h"
-#include "common/service/role.h"
+#include "common/keys/admitted_key.h"
+#include "common/keys/role.h"
 #include "common/service/service_file.h"
 #include "common/transport/keys.h"
 
 namespace slabstream {
-
-struct AdmittedKey {
-  std::string public_key;
-  Role role = Role::kClient;
-  std::string made;  // UTC
-  friend bool operator==(const AdmittedKey&, const AdmittedKey&) = default;
-};
 
 class KeyFolder {
  public:
@@ -42,8 +36,8 @@ class KeyFolder {
 
   // A new pair for the role's file. The keys of the role until now stay admitted until they are revoked.
   Result<AdmittedKey> Rotate(Role role);
-  // NotFound: no such key.
-  Status Revoke(const std::string& public_key);
+  // `key`: a public one, or its IdOfKey. The public key. NotFound: no such key; InvalidArgument: two keys have this id.
+  Result<std::string> Revoke(const std::string& key);
 
  private:
   explicit KeyFolder(std::string path) : path_(std::move(path)) {}

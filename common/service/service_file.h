@@ -6,7 +6,7 @@
 #include <string>
 
 #include "common/base/status.h"
-#include "common/service/role.h"
+#include "common/keys/role.h"
 #include "common/transport/keys.h"
 
 namespace slabstream {

@@ -8,7 +8,7 @@
 #include <zmq.hpp>
 
 #include "common/base/check.h"
-#include "common/base/log.h"
+#include "common/base/limited_log.h"
 #include "common/transport/context_impl.h"
 #include "common/transport/socket.h"
 
@@ -65,7 +65,7 @@ struct Authenticator::Impl {
     for (std::size_t i = 0; i < parts.size(); ++i) {
       socket.send(zmq::buffer(parts[i]), i + 1 < parts.size() ? zmq::send_flags::sndmore : zmq::send_flags::none);
     }
-    if (verdict == Verdict::kRefuse) LogInfo("refused a connection to the " + request.plane + " plane: unknown key");
+    if (verdict == Verdict::kRefuse) complaints.Warning("refused a connection to the " + request.plane + " plane: unknown key");
   }
 
   // False: nothing is there.
@@ -111,7 +111,8 @@ struct Authenticator::Impl {
 
   zmq::socket_t socket;
   Wakeup wakeup;
-  std::deque<Request> waiting;  // the thread's
+  std::deque<Request> waiting;  // the thread's, as is complaints
+  LimitedLog complaints;
   std::mutex mutex;
   std::map<std::string, Plane> planes;  // guarded by mutex
   std::jthread thread;                  // last member

@@ -1,9 +1,8 @@
-// ConnectionTable: the users of a router's encrypted connections, and how to end these. ZeroMQ has no call for that, so the table knows the
+// ConnectionTable: the users of a router's connections, and how to end these. ZeroMQ has no call for that, so the table knows the
 // descriptors. Private to this folder.
 #pragma once
 
-#include <sys/socket.h>
-
+#include <cstdint>
 #include <string>
 #include <unordered_map>
 #include <zmq.hpp>
@@ -15,17 +14,19 @@ class ConnectionTable {
   // The user that the connection `identity`, of which this message part has come, was admitted as; empty: it is not encrypted.
   std::string Heard(const std::string& identity, zmq::message_t& part);
 
-  // Shuts down the user's connections that are still there, which ZeroMQ then closes.
+  // Shut down the user's connections, or the one of this identity, if they are still there; ZeroMQ then closes them.
   void End(const std::string& user);
+  void EndOne(const std::string& identity);
 
  private:
   struct Connection {
     std::string user;
     int descriptor = -1;
-    sockaddr_storage peer{};  // a descriptor that was closed may be another connection's now: then its peer differs
+    std::uint64_t cookie = 0;  // the kernel's name for the socket: a descriptor that was closed may be another one's now
+    void ShutDown() const;
+    bool open() const { return cookie != 0 && CookieOf(descriptor) == cookie; }
   };
-  static sockaddr_storage PeerOf(int descriptor);  // zeros: none
-  void ForgetClosed();
+  static std::uint64_t CookieOf(int descriptor);  // 0: no socket
 
   std::unordered_map<std::string, Connection> connections_;  // by identity, which ZeroMQ never uses again
   std::size_t next_sweep_ = 64;                              // connections

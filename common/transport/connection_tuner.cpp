@@ -40,7 +40,9 @@ bool StaysOnThisHost(int descriptor) {
 
 }  // namespace
 
-ConnectionTuner::ConnectionTuner(zmq::socket_t& socket) { init(socket, UniqueName(), ZMQ_EVENT_CONNECTED); }
+ConnectionTuner::ConnectionTuner(zmq::socket_t& socket) {
+  init(socket, UniqueName(), ZMQ_EVENT_CONNECTED | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH);
+}
 
 void ConnectionTuner::TuneNew() {
   try {

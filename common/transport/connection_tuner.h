@@ -1,4 +1,4 @@
-// ConnectionTuner: sets options of a socket's connections for which ZeroMQ has none. Private to this folder.
+// ConnectionTuner: sets options of a socket's connections for which ZeroMQ has none, and hears if one was refused. Private to this folder.
 //
 // A connection that stays on this host gets reno as its congestion control, which every process may choose. If the system's choice paces
 // packets, as BBR does, an image costs twice the processor time on the loopback, which has no queue to keep short. All other connections
@@ -18,8 +18,14 @@ class ConnectionTuner : private zmq::monitor_t {
   // Tunes connections made since the last call. Call it now and then: until then ZeroMQ remembers them.
   void TuneNew();
 
+  // Somebody listens who does not admit the socket's key.
+  bool refused() const { return refused_; }
+
  private:
   void on_event_connected(const zmq_event_t& event, const char* endpoint) override;
+  void on_event_handshake_failed_auth(const zmq_event_t&, const char*) override { refused_ = true; }
+
+  bool refused_ = false;
 };
 
 }  // namespace slabstream

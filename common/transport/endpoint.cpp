@@ -1,14 +1,25 @@
 #include "common/transport/endpoint.h"
 
 #include <arpa/inet.h>
+#include <netdb.h>
+#include <sys/socket.h>
 #include <sys/un.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
+#include <cerrno>
 #include <charconv>
 #include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <memory>
 #include <optional>
+#include <system_error>
 #include <utility>
+
+#include "common/transport/ipc_listener.h"
 
 namespace slabstream {
 namespace {
@@ -120,6 +131,45 @@ Result<Endpoint> ParseEndpoint(std::string_view text, bool to_bind) {
     return Endpoint{Scheme::kInproc, {}, 0, std::string(text.substr(9))};
   }
   return Refused(text, "expected " + std::string(kShapes));
+}
+
+void RemoveDeadSockets(const Endpoint& prefix) {
+  if (prefix.scheme != Scheme::kIpc) return;
+  const std::filesystem::path begin(prefix.path);
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(begin.parent_path(), error)) {
+    const bool ours = entry.path().filename().string().starts_with(begin.filename().string());
+    if (ours && entry.is_socket(error) && entry.path().string().size() <= kMaxIpcPathBytes)
+      (void)IpcListener::RemoveStale(entry.path());  // somebody listens: it stays
+  }
+}
+
+Result<std::string> LocalHostTowards(const Endpoint& endpoint) {
+  const auto unavailable = [&](const std::string& why) { return Status::Unavailable("endpoint \"" + endpoint.ToString() + "\": " + why); };
+  const bool bracketed = endpoint.host.starts_with('[');
+  const std::string host = bracketed ? endpoint.host.substr(1, endpoint.host.size() - 2) : endpoint.host;
+  const addrinfo wanted = {.ai_flags = AI_NUMERICSERV, .ai_family = bracketed ? AF_INET6 : AF_INET, .ai_socktype = SOCK_DGRAM};
+  addrinfo* found = nullptr;
+  if (const int error = ::getaddrinfo(host.c_str(), std::to_string(endpoint.port).c_str(), &wanted, &found); error != 0)
+    return unavailable(::gai_strerror(error));
+  const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> addresses(found, ::freeaddrinfo);
+  // Connecting a datagram socket only chooses the way.
+  const int descriptor = ::socket(found->ai_family, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  sockaddr_storage own{};
+  socklen_t bytes = sizeof(own);
+  std::array<char, INET6_ADDRSTRLEN> text{};
+  const bool known = descriptor >= 0 && ::connect(descriptor, found->ai_addr, found->ai_addrlen) == 0 &&
+                     ::getsockname(descriptor, reinterpret_cast<sockaddr*>(&own), &bytes) == 0 &&
+                     ::getnameinfo(reinterpret_cast<sockaddr*>(&own), bytes, text.data(), text.size(), nullptr, 0, NI_NUMERICHOST) == 0;
+  const int error = errno;
+  if (descriptor >= 0) ::close(descriptor);
+  if (!known) return unavailable(std::strerror(error));
+  std::string address(text.data());
+  if (bracketed) {
+    address.insert(0, 1, '[');
+    address += ']';
+  }
+  return address;
 }
 
 Endpoint WorkerEndpointFor(const Endpoint& client_endpoint) {

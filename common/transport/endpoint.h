@@ -27,6 +27,17 @@ struct Endpoint {
 // and the host is an address.
 Result<Endpoint> ParseEndpoint(std::string_view text, bool to_bind);
 
+// The address of this machine from which packets to a tcp endpoint leave, as the host of an endpoint; sends nothing. Unavailable: the name
+// is not known, or no network leads there.
+Result<std::string> LocalHostTowards(const Endpoint& endpoint);
+
+// Removes the socket files whose paths begin like this ipc endpoint's, if nobody listens there any more: processes that were killed leave
+// theirs. Does nothing for other endpoints.
+void RemoveDeadSockets(const Endpoint& prefix);
+
+// A worker's own endpoint for images begins with the coordinator's path and this, unless it is told otherwise.
+inline constexpr char kImagesSuffix[] = ".images-";
+
 // Where the coordinator listens for workers if only the client endpoint is given: the next tcp port (any for any; the one before for
 // 65535), or the path with ".workers".
 Endpoint WorkerEndpointFor(const Endpoint& client_endpoint);

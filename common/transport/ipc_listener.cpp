@@ -34,8 +34,10 @@ bool Bind(int descriptor, const sockaddr_un& address) {
   return ::bind(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0;
 }
 
-// Removes a socket file left over from a process that has ended.
-Status RemoveStale(const std::string& path, const sockaddr_un& address) {
+}  // namespace
+
+Status IpcListener::RemoveStale(const std::string& path) {
+  const sockaddr_un address = AddressOf(path);
   struct stat file {};
   if (::lstat(path.c_str(), &file) != 0) return errno == ENOENT ? Status::Ok() : SystemError(path, errno);
   if (!S_ISSOCK(file.st_mode)) return Unavailable(path, "a file that is not a socket is there");
@@ -49,8 +51,6 @@ Status RemoveStale(const std::string& path, const sockaddr_un& address) {
   return Status::Ok();
 }
 
-}  // namespace
-
 Result<IpcListener> IpcListener::Listen(const std::string& path) {
   const sockaddr_un address = AddressOf(path);
   const int descriptor = ::socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
@@ -58,7 +58,7 @@ Result<IpcListener> IpcListener::Listen(const std::string& path) {
   IpcListener listener(path, descriptor);
   if (!Bind(descriptor, address)) {
     if (errno != EADDRINUSE) return SystemError(path, errno);
-    if (Status status = RemoveStale(path, address); !status.ok()) return status;
+    if (Status status = RemoveStale(path); !status.ok()) return status;
     if (!Bind(descriptor, address)) return SystemError(path, errno);
   }
   struct stat file {};

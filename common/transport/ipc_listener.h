@@ -15,6 +15,9 @@ namespace slabstream {
 
 class IpcListener {
  public:
+  // Removes a socket file left over from a process that has ended. Unavailable: somebody listens there, or it is not a socket.
+  static Status RemoveStale(const std::string& path);
+
   // Unavailable naming the path: somebody listens there, it is not a socket, no permission, no such directory.
   static Result<IpcListener> Listen(const std::string& path);
 

@@ -32,4 +32,17 @@ std::optional<std::string> PublicKeyOf(const std::string& secret_key) {
   return public_key.data();
 }
 
+std::string IdOfKey(const std::string& public_key) {
+  std::array<std::uint8_t, kKeyBytes> bytes{};
+  if (!IsKey(public_key)) return "";
+  zmq_z85_decode(bytes.data(), public_key.c_str());
+  constexpr char kDigits[] = "0123456789abcdef";
+  std::string id;
+  for (std::size_t i = 0; i < 4; ++i) {
+    id += kDigits[bytes[i] / 16];
+    id += kDigits[bytes[i] % 16];
+  }
+  return id;
+}
+
 }  // namespace slabstream

@@ -20,6 +20,9 @@ bool IsKey(std::string_view text);
 // The public key that belongs to a secret one; nullopt: `secret_key` is no key.
 std::optional<std::string> PublicKeyOf(const std::string& secret_key);
 
+// A short name of a key for people and shells: 8 hexadecimal digits.
+std::string IdOfKey(const std::string& public_key);
+
 // What a bound socket needs to take encrypted connections. Who may connect says the context's Authenticator, plane by plane.
 struct ServerKeys {
   std::string secret_key;

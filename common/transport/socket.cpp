@@ -31,7 +31,8 @@ struct Socket::Impl {
   const SocketOptions options;
   zmq::socket_t socket;
   const bool router;
-  bool encrypted = false;                  // some of its connections
+  bool encrypted = false;  // all of its connections
+  bool knows_connections = options.ends_connections;
   ConnectionTable connections;             // of users
   std::unique_ptr<ConnectionTuner> tuner;  // of the tcp connections made here
   std::vector<std::string> names;          // inproc endpoints bound here
@@ -52,6 +53,7 @@ struct Socket::Impl {
 namespace {
 
 Status Failed(const std::string& endpoint, const zmq::error_t& error) {
+  if (error.num() == EADDRNOTAVAIL) return Status::InvalidArgument("endpoint \"" + endpoint + "\": this machine has no such address");
   return Status::Unavailable("endpoint \"" + endpoint + "\": " + (error.num() == EADDRINUSE ? "already in use" : error.what()));
 }
 
@@ -79,7 +81,8 @@ void AllowAddressFamily(zmq::socket_t& socket, const Endpoint& endpoint) { socke
 
 Status KeysMissing(const Endpoint& endpoint) {
   return Status::InvalidArgument("endpoint \"" + endpoint.ToString() + "\": host \"" + endpoint.host +
-                                 "\" is not loopback (127.0.0.0/8, [::1] or localhost): without keys the service stays on this machine");
+                                 "\" is not loopback (127.0.0.0/8, [::1] or localhost): without keys the service stays on this machine (a "
+                                 "service file, --service, has those of one that does not)");
 }
 
 // Connections of this endpoint are encrypted.
@@ -193,7 +196,7 @@ Result<std::string> Socket::Bind(const std::string& text) {
       case Scheme::kTcp: {
         if (const auto& keys = impl_->options.server_keys) {
           UseServerKeys(impl_->context, socket, *keys);
-          impl_->encrypted = true;
+          impl_->encrypted = impl_->knows_connections = true;
         } else if (endpoint->remote()) {
           return KeysMissing(*endpoint);
         }
@@ -252,7 +255,14 @@ Status Socket::Send(const std::string& identity, std::vector<std::byte> header, 
   }
 }
 
+bool Socket::refused() const {
+  if (impl_->tuner == nullptr) return false;
+  impl_->tuner->TuneNew();
+  return impl_->tuner->refused();
+}
+
 void Socket::EndConnections(const std::string& user) { impl_->connections.End(user); }
+void Socket::EndConnection(const std::string& identity) { impl_->connections.EndOne(identity); }
 
 std::optional<Incoming> Socket::TryReceive() {
   zmq::message_t part;
@@ -268,13 +278,14 @@ std::optional<Incoming> Socket::TryReceive() {
     std::size_t surplus = 0;
     while (more && ReceivePart(impl_->socket, part)) {
       more = part.more();
-      if (impl_->encrypted && incoming.parts.empty()) incoming.user = impl_->connections.Heard(incoming.identity, part);
+      if (impl_->knows_connections && incoming.parts.empty()) incoming.user = impl_->connections.Heard(incoming.identity, part);
       if (incoming.parts.size() < 2) {
         incoming.parts.push_back(Adopt(std::move(part)));
       } else {
         ++surplus;
       }
     }
+    if (impl_->encrypted && incoming.user.empty()) continue;  // the Authenticator has not admitted it
     if (!incoming.parts.empty() && surplus == 0) return incoming;
   }
   if (impl_->tuner != nullptr) impl_->tuner->TuneNew();

@@ -39,6 +39,7 @@ struct SocketOptions {
   int receive_high_water_mark = 4096;
   Duration linger = std::chrono::milliseconds(500);        // how long unsent messages outlive the socket
   std::int64_t max_message_bytes = std::int64_t{2} << 30;  // a larger frame closes the connection
+  bool ends_connections = false;                           // routers: EndConnection works
   Duration handshake = std::chrono::seconds(5);            // how long a connection may take to become one
   // With keys, tcp connections are encrypted; without, endpoints that leave this machine are refused. ipc and inproc are never encrypted.
   std::optional<ServerKeys> server_keys;  // to bind
@@ -54,7 +55,7 @@ class Socket {
   ~Socket();
 
   // The endpoint with the port that was chosen. Unavailable (in use, no permission) names the endpoint; InvalidArgument: as ParseEndpoint,
-  // or keys are missing.
+  // or keys are missing, or the address is not this machine's.
   // An ipc socket file that a dead process left is replaced. Closing frees inproc names and ipc files at once, a tcp port a moment later.
   Result<std::string> Bind(const std::string& endpoint);
   // Ok does not mean that anybody listens there. InvalidArgument: as ParseEndpoint, or keys are missing.
@@ -64,8 +65,13 @@ class Socket {
   // Unavailable: nobody with this identity (router); ResourceExhausted: the high-water mark is reached.
   Status Send(const std::string& identity, std::vector<std::byte> header, const Bytes& payload = {});
 
-  // Ends the connections from which messages of this user have come. They are made again, unless the Authenticator refuses them.
+  // Dealers: whether the other end has refused this socket's key; it does not try again.
+  bool refused() const;
+
+  // Ends the connections from which messages of this user have come, or of this identity; what is queued for them is gone. The other end
+  // makes them again, unless the Authenticator refuses it.
   void EndConnections(const std::string& user);
+  void EndConnection(const std::string& identity);
 
   // The next whole message, if there is one. Messages with no part or more than two parts are dropped.
   std::optional<Incoming> TryReceive();

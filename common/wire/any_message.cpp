@@ -58,7 +58,10 @@ constexpr auto kMembers = std::tuple{Member{Envelope::kRegisterWorker, &Envelope
                                      Member{Envelope::kStatusQuery, &Envelope::status_query, &Envelope::mutable_status_query},
                                      Member{Envelope::kStatusReply, &Envelope::status_reply, &Envelope::mutable_status_reply},
                                      Member{Envelope::kShutDown, &Envelope::shut_down, &Envelope::mutable_shut_down},
-                                     Member{Envelope::kShutDownReply, &Envelope::shut_down_reply, &Envelope::mutable_shut_down_reply}};
+                                     Member{Envelope::kShutDownReply, &Envelope::shut_down_reply, &Envelope::mutable_shut_down_reply},
+                                     Member{Envelope::kKeysOrder, &Envelope::keys_order, &Envelope::mutable_keys_order},
+                                     Member{Envelope::kKeysReply, &Envelope::keys_reply, &Envelope::mutable_keys_reply},
+                                     Member{Envelope::kOrderRefused, &Envelope::order_refused, &Envelope::mutable_order_refused}};
 
 constexpr std::size_t kMemberCount = std::variant_size_v<AnyMessage>;
 static_assert(std::tuple_size_v<decltype(kMembers)> == kMemberCount, "kMembers lists AnyMessage");

@@ -24,10 +24,10 @@ inline constexpr std::uint32_t kWireVersion = 1;
 inline constexpr std::size_t kMaxHeaderBytes = std::size_t{64} << 20;
 
 // In the order of planes: control, slabs, images, client.
-using AnyMessage =
-    std::variant<Register, Welcome, Heartbeat, Ping, GroupAssignment, GroupDone, FrameImage, WorkerTrouble, Leave, Retire, Stop,
-                 ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused, ImageReceived, SubmitFrame, FrameProgress, FrameReply,
-                 FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery, StatusReply, ShutDown, ShutDownReply>;
+using AnyMessage = std::variant<Register, Welcome, Heartbeat, Ping, GroupAssignment, GroupDone, FrameImage, WorkerTrouble, Leave, Retire,
+                                Stop, ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused, ImageReceived, SubmitFrame,
+                                FrameProgress, FrameReply, FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery, StatusReply,
+                                ShutDown, ShutDownReply, KeysOrder, KeysReply, OrderRefused>;
 
 // The sockets that messages travel on: between coordinator and workers, between workers, and between clients and coordinator. Each message
 // belongs to one: to that of the header that declares it.

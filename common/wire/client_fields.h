@@ -83,6 +83,7 @@ void Fields(auto& io, Is<ClientPing> auto& m) {
   using P = v1::ClientPing;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
   io.Numbers("open", m.open, &P::open, &P::mutable_open, kMaxOpenRequests);
+  io.Any(m.received_bytes, &P::received_bytes, &P::set_received_bytes);
 }
 
 void Fields(auto& io, Is<ClientPong> auto& m) {
@@ -137,5 +138,32 @@ void Fields(auto& io, Is<StatusReply> auto& m) {
 void Fields(auto& io, Is<ShutDown> auto& m) { io.Any(m.nonce, &v1::ShutDown::nonce, &v1::ShutDown::set_nonce); }
 
 void Fields(auto& io, Is<ShutDownReply> auto& m) { io.Any(m.nonce, &v1::ShutDownReply::nonce, &v1::ShutDownReply::set_nonce); }
+
+void Fields(auto& io, Is<KeysOrder> auto& m) {
+  using P = v1::KeysOrder;
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  io.OneOf("action", m.action, &P::action, &P::set_action, KeysAction::kList, KeysAction::kRevoke);
+  io.OneOf("role", m.role, &P::role, &P::set_role, Role::kClient, Role::kAdmin);
+  io.Bytes("key", m.key, &P::key, &P::mutable_key, 0, kMaxKeyBytes);
+}
+
+void Fields(auto& io, Is<AdmittedKey> auto& m) {
+  using P = v1::AdmittedKey;
+  io.Bytes("key", m.public_key, &P::key, &P::mutable_key, kKeyTextBytes, kKeyTextBytes);
+  io.OneOf("role", m.role, &P::role, &P::set_role, Role::kClient, Role::kAdmin);
+  io.Text("made", m.made, &P::made, &P::mutable_made, 0, kMaxKeyBytes);
+}
+
+void Fields(auto& io, Is<KeysReply> auto& m) {
+  using P = v1::KeysReply;
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  io.Messages("keys", m.keys, &P::keys, &P::mutable_keys, kMaxListed);
+}
+
+void Fields(auto& io, Is<OrderRefused> auto& m) {
+  using P = v1::OrderRefused;
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  io.Message("status", m.status, &P::status, &P::mutable_status);
+}
 
 }  // namespace slabstream

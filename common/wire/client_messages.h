@@ -10,6 +10,8 @@
 //               <--------------------------  ClientPong             which of them are still known
 //   StatusQuery -------------------------->  StatusReply
 //   ShutDown    -------------------------->  ShutDownReply          the service and its workers end
+//   KeysOrder   -------------------------->  KeysReply
+//   Either of the last two may be answered by OrderRefused: over encrypted connections they need an admin's key.
 #pragma once
 
 #include <cstdint>
@@ -18,6 +20,7 @@
 #include <vector>
 
 #include "common/frame/frame_request.h"
+#include "common/keys/admitted_key.h"
 #include "common/stats/prediction.h"
 #include "common/wire/control_messages.h"
 #include "common/wire/ids.h"
@@ -81,7 +84,8 @@ struct CancelFrame {
 
 struct ClientPing {
   std::uint64_t nonce = 0;
-  std::vector<RequestId> open;  // at most kMaxOpenRequests
+  std::vector<RequestId> open;       // at most kMaxOpenRequests
+  std::uint64_t received_bytes = 0;  // payloads of all replies that the client has read
   friend bool operator==(const ClientPing&, const ClientPing&) = default;
 };
 
@@ -140,6 +144,28 @@ struct ShutDown {
 struct ShutDownReply {
   std::uint64_t nonce = 0;
   friend bool operator==(const ShutDownReply&, const ShutDownReply&) = default;
+};
+
+enum class KeysAction : std::uint8_t { kList = 1, kRotate = 2, kRevoke = 3 };
+
+struct KeysOrder {
+  std::uint64_t nonce = 0;
+  KeysAction action = KeysAction::kList;
+  Role role = Role::kClient;  // kRotate: whose file gets a new key
+  std::string key;            // kRevoke: a public one
+  friend bool operator==(const KeysOrder&, const KeysOrder&) = default;
+};
+
+struct KeysReply {
+  std::uint64_t nonce = 0;
+  std::vector<AdmittedKey> keys;  // after the order
+  friend bool operator==(const KeysReply&, const KeysReply&) = default;
+};
+
+struct OrderRefused {
+  std::uint64_t nonce = 0;
+  Status status = Status::Internal("");  // never ok
+  friend bool operator==(const OrderRefused&, const OrderRefused&) = default;
 };
 
 }  // namespace slabstream

@@ -21,6 +21,7 @@ void Fields(auto& io, Is<Register> auto& m) {
   io.Any(m.memory_bytes, &P::memory_bytes, &P::set_memory_bytes);
   io.Any(m.memory_scope, &P::memory_scope, &P::set_memory_scope);
   io.Any(m.lends_memory, &P::lends_memory, &P::set_lends_memory);
+  io.Bytes("images_key", m.images_key, &P::images_key, &P::mutable_images_key, 0, kKeyTextBytes);
 }
 
 void Fields(auto& io, Is<Welcome> auto& m) {
@@ -55,6 +56,7 @@ void Fields(auto& io, Is<Peer> auto& m) {
   io.Range("worker", m.worker, &P::worker, &P::set_worker, 1, kMaxWorkerId);
   io.Bytes("images_endpoint", m.images_endpoint, &P::images_endpoint, &P::mutable_images_endpoint, 1, kMaxEndpointBytes);
   io.Any(m.memory_scope, &P::memory_scope, &P::set_memory_scope);
+  io.Bytes("images_key", m.images_key, &P::images_key, &P::mutable_images_key, 0, kKeyTextBytes);
 }
 
 // `m` names every worker of the group and the display worker, nobody twice.

@@ -41,6 +41,7 @@ struct Register {
   std::uint64_t memory_bytes = 0;  // budget for cached slabs; 0: none stated
   std::uint64_t memory_scope = 0;  // workers of the same scope can read each other's memory (SharedMemoryScope); 0: it takes frames only
   bool lends_memory = false;       // it lends its own images to workers of its scope; else it sends them in frames
+  std::string images_key = {};     // public key of its image plane; empty: that plane is not encrypted
   friend bool operator==(const Register&, const Register&) = default;
 };
 
@@ -76,6 +77,7 @@ struct Peer {
   WorkerId worker = 0;
   std::string images_endpoint;
   std::uint64_t memory_scope = 0;  // as it registered
+  std::string images_key = {};     // as it registered
   friend bool operator==(const Peer&, const Peer&) = default;
 };
 

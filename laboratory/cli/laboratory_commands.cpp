@@ -36,7 +36,7 @@ void DeclareBench(const CommandLine& line) {
   AddInteger(*sub, "--turns", options->turns, 1, kMaxTurns, "Turns of each projection");
   CLI::Option* workers = AddInteger(*sub, "--workers", options->connection.local_workers, 1, kMaxLocalWorkers, "Workers in this process");
   AddThreads(*sub, options->connection.local_threads, "Render threads of each worker");
-  CLI::Option* endpoint = AddEndpoint(*sub, options->connection.endpoint)->excludes(workers);
+  CLI::Option* endpoint = AddService(*sub, options->connection.service)->excludes(workers);
   endpoint->description("Measure the service there instead of one in this process; CASE is then a dataset, as NAME or NAME:TRANSFER");
   endpoint->default_str("");
   AddParsed(
@@ -55,7 +55,7 @@ void DeclareBench(const CommandLine& line) {
       ->type_name("DIR")
       ->excludes(endpoint);
   sub->callback([options, &run = line.run] {
-    if (!options->connection.endpoint.empty()) options->connection.local_workers = 0;
+    if (const auto& [at, file] = options->connection.service; !at.empty() || !file.empty()) options->connection.local_workers = 0;
     run = [options] { return RunBench(*options); };
   });
 }

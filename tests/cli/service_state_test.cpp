@@ -1,5 +1,4 @@
 #include "client/cli/service_state.h"
-#include "tests/support/temporary_directory.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,6 +9,9 @@
 #include <filesystem>
 #include <fstream>
 
+#include "common/service/service_file.h"
+#include "tests/support/temporary_directory.h"
+
 namespace slabstream {
 namespace {
 
@@ -18,10 +20,12 @@ class ServiceStateTest : public testing::Test {
   ServiceStateTest() {
     ::setenv("XDG_RUNTIME_DIR", directory_.c_str(), 1);
     ::unsetenv("SLABSTREAM_ENDPOINT");
+    ::unsetenv("SLABSTREAM_SERVICE");
   }
   ~ServiceStateTest() override {
     ::unsetenv("XDG_RUNTIME_DIR");
     ::unsetenv("SLABSTREAM_ENDPOINT");
+    ::unsetenv("SLABSTREAM_SERVICE");
   }
 
   TemporaryDirectory temporary_;
@@ -65,12 +69,15 @@ TEST_F(ServiceStateTest, ALinkInItsPlaceIsRefused) {
   EXPECT_EQ(StateDirectory().status().code(), StatusCode::kUnavailable);
 }
 
-TEST_F(ServiceStateTest, AServiceWhoseCoordinatorIsGoneIsForgotten) {
-  ServiceState state{"tcp://127.0.0.1:5000", 100, ::getpid(), {1, 2}, ""};  // this process runs, but is no coordinator
+TEST_F(ServiceStateTest, AServiceWhoseCoordinatorIsGoneLeavesRemains) {
+  const ServiceState state{"tcp://127.0.0.1:5000", 100, ::getpid(), {1, 2}, "", ""};  // this process runs, but is no coordinator
   ASSERT_EQ(SaveState(state), Status::Ok());
   EXPECT_EQ(FindState(""), std::nullopt);
-  EXPECT_TRUE(std::filesystem::is_empty(*StateDirectory()));
-  EXPECT_EQ(*DefaultEndpoint(), kDefaultEndpoint);
+  EXPECT_EQ(ResolveService({})->endpoint, kDefaultEndpoint);
+  for (const char* endpoint : {"", "tcp://127.0.0.1:5000"}) EXPECT_EQ(FindRemains(endpoint), state);
+  EXPECT_EQ(FindRemains("tcp://127.0.0.1:5001"), std::nullopt);
+  ForgetState(state);
+  EXPECT_EQ(FindRemains(""), std::nullopt);
 }
 
 TEST_F(ServiceStateTest, DamagedFilesAreNoServices) {
@@ -82,10 +89,26 @@ TEST_F(ServiceStateTest, DamagedFilesAreNoServices) {
 
 TEST_F(ServiceStateTest, TheEnvironmentNamesTheEndpoint) {
   ::setenv("SLABSTREAM_ENDPOINT", "tcp://127.0.0.1:5001", 1);
-  EXPECT_EQ(*DefaultEndpoint(), "tcp://127.0.0.1:5001");
+  EXPECT_EQ(ResolveService({})->endpoint, "tcp://127.0.0.1:5001");
   ::setenv("SLABSTREAM_ENDPOINT", "nonsense", 1);
-  EXPECT_EQ(DefaultEndpoint().status().code(), StatusCode::kInvalidArgument);
-  EXPECT_THAT(DefaultEndpoint().status().message(), testing::HasSubstr("$SLABSTREAM_ENDPOINT"));
+  EXPECT_EQ(ResolveService({}).status().code(), StatusCode::kInvalidArgument);
+  EXPECT_THAT(ResolveService({}).status().message(), testing::HasSubstr("$SLABSTREAM_ENDPOINT"));
+}
+
+TEST_F(ServiceStateTest, AServiceFileComesBeforeTheEndpoint) {
+  const std::string path = directory_ + "/client.json";
+  const ServiceFile file = {Role::kClient, "tcp://10.0.0.1:7420", MakeKeyPair().public_key, MakeKeyPair(), 1, 1, ""};
+  ASSERT_TRUE(WriteServiceFile(path, file).ok());
+  ::setenv("SLABSTREAM_ENDPOINT", "tcp://127.0.0.1:5001", 1);
+  EXPECT_EQ(ResolveService({.endpoint = "", .file = path})->endpoint, file.endpoint);
+  EXPECT_EQ(ResolveService({.endpoint = "", .file = path})->keys->own, file.own);
+  ::setenv("SLABSTREAM_SERVICE", path.c_str(), 1);
+  EXPECT_EQ(ResolveService({})->endpoint, file.endpoint);
+  EXPECT_EQ(ResolveService({.endpoint = "tcp://127.0.0.1:5002", .file = ""})->endpoint, "tcp://127.0.0.1:5002");
+  ServiceFile worker = file;
+  worker.role = Role::kWorker;
+  ASSERT_TRUE(WriteServiceFile(path, worker).ok());
+  EXPECT_THAT(ResolveService({}).status().message(), testing::HasSubstr("is of role worker"));
 }
 
 TEST_F(ServiceStateTest, RunningMeansAliveAndOfThatName) {

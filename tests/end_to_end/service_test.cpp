@@ -1,6 +1,7 @@
 // `up`, `status`, `render`, `down`: a service of real processes, on endpoints that no other test can meet.
 #include <gmock/gmock.h>
 #include <signal.h>
+#include <sys/resource.h>
 
 #include <filesystem>
 #include <fstream>
@@ -66,6 +67,52 @@ TEST_F(ServiceTest, NeitherThreadsNorPackingChangeThePicture) {
   MustRun({"render", "ball", "-o", "service.exr", "--size", "64"});
   MustRun({"render", ball_, "--local=1", "--threads", "1", "-o", "local.exr", "--size", "64"});
   EXPECT_EQ(LargestDifference(ReadPicture(Path("service.exr")), ReadPicture(Path("local.exr"))), 0);
+}
+
+TEST_F(ServiceTest, DownEndsTheWorkersOfACoordinatorThatWasKilledAndKeepsTheLogs) {
+  Up(endpoint_);
+  const std::vector<pid_t> pids = Pids();
+  ASSERT_EQ(::kill(pids.front(), SIGKILL), 0);
+  const ProgramResult render = Slabstream({"render", "ball", "-o", "a.png", "--endpoint", endpoint_});
+  EXPECT_EQ(render.exit_status, 1);
+  for (std::size_t i = 1; i < pids.size(); ++i) EXPECT_TRUE(Runs(pids[i]));
+  const std::string down = MustRun({"down"}).out;
+  EXPECT_THAT(down, AllOf(HasSubstr("had ended; its 2 workers are down now"), HasSubstr("logs are in ")));
+  for (const pid_t pid : pids) EXPECT_FALSE(Runs(pid));
+  const std::size_t begin = down.find("logs are in ") + 12;
+  EXPECT_TRUE(std::filesystem::exists(down.substr(begin, down.find('\n') - begin) + "/coordinator.log"));
+  EXPECT_EQ(Slabstream({"down"}).exit_status, 1);
+}
+
+TEST_F(ServiceTest, TooFewFilesAreToldBeforeItIsReady) {
+  rlimit few{}, before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
+  few = {24, before.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &few), 0);
+  Up(endpoint_);  // more are allowed, so it takes more
+  MustRun({"down"});
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &before), 0);
+  const std::string shell = "ulimit -n 24 && exec \"$0\" \"$@\"";
+  std::vector<std::string> command = Command({"up", "--detach", "--workers", "1", "--listen", endpoint_});
+  command.insert(command.begin(), {"/bin/sh", "-c", shell});
+  const ProgramResult up = RunningProgram(command, directory_).Wait();
+  EXPECT_EQ(up.exit_status, 1);
+  EXPECT_THAT(up.err, HasSubstr("this process may open 24 files and sockets, but needs at least 128 (ulimit -n)"));
+}
+
+TEST_F(ServiceTest, SocketFilesOfKilledWorkersAreRemoved) {
+  Up(endpoint_);
+  for (const pid_t pid : Pids()) ::kill(pid, SIGKILL);
+  const auto sockets = [&] {
+    int count = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(directory_)) count += entry.is_socket();
+    return count;
+  };
+  EXPECT_GT(sockets(), 3) << "those of the coordinator, and one of each worker";
+  MustRun({"down"});
+  Up(endpoint_);
+  MustRun({"down"});
+  EXPECT_EQ(sockets(), 0);
 }
 
 TEST_F(ServiceTest, AFullDiskEndsATurntableAndKeepsTheOlderPictures) {

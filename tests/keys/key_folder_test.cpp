@@ -68,7 +68,10 @@ TEST_F(KeyFolderTest, RotationMakesANewKeyAndRevocationEndsTheOldOne) {
   EXPECT_EQ(ReadServiceFile(FileOf(Role::kClient))->own.public_key, made->public_key);
   EXPECT_EQ(folder->KeysOf({Role::kClient}), (std::set<std::string>{old_key, made->public_key}));
   ASSERT_TRUE(folder->Revoke(old_key).ok());
-  EXPECT_EQ(folder->Revoke(old_key).code(), StatusCode::kNotFound);
+  EXPECT_EQ(folder->Revoke(old_key).status().code(), StatusCode::kNotFound);
+  ASSERT_TRUE(folder->Rotate(Role::kClient).ok());
+  EXPECT_EQ(folder->Revoke(IdOfKey(ReadServiceFile(FileOf(Role::kClient))->own.public_key)).value(),
+            ReadServiceFile(FileOf(Role::kClient))->own.public_key);
   EXPECT_EQ(KeyFolder::Open(path())->KeysOf({Role::kClient}), std::set<std::string>{made->public_key});
   EXPECT_EQ(KeyFolder::Open(path())->admitted().size(), 3U);
 }

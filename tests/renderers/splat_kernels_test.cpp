@@ -17,8 +17,8 @@ namespace slabstream {
 namespace {
 
 // Of every number of taps that the kernels know by name, and of some that they do not.
-constexpr double kSigmas[] = {0.6, 0.8, 1.0, 1.1, 2.0};
-constexpr std::int32_t kTaps[] = {4, 5, 6, 7, 12};
+constexpr double kSigmas[] = {0.3, 0.6, 0.8, 1.0, 1.1, 2.0};
+constexpr std::int32_t kTaps[] = {2, 4, 5, 6, 7, 12};
 
 AlignedVector<float> Noise(std::size_t count, std::mt19937& random) {
   std::uniform_real_distribution<float> uniform(0, 1);

@@ -114,7 +114,7 @@ class SlabServerTest : public testing::Test {
   SlabServerTest()
       : random_(1),
         volume_(RandomVolume({300, 70, 60}, ScalarType::kUint8, random_)),  // two chunks
-        server_(SlabServer::Start(context_, "inproc://slab-server-test", kEpoch).value()),
+        server_(SlabServer::Start(context_, {"inproc://slab-server-test"}, kEpoch).value()),
         worker_(Socket::Dealer(context_).value()) {
     server_->Publish(5, {.volume = volume_});
     CHECK(worker_.Connect(server_->endpoint()).ok());
@@ -170,6 +170,34 @@ TEST_F(SlabServerTest, RequestsThatCannotBeMetAreRefusedWithTheReason) {
                 "not inside the volume");
   ExpectRefused({.epoch = kEpoch, .worker = 1, .dataset = 5, .box = box, .chunk = 2}, StatusCode::kInvalidArgument,
                 "chunk 2 is not below 2");
+}
+
+std::size_t ResidentBytes() {
+  std::ifstream file("/proc/self/statm");
+  std::size_t total = 0, resident = 0;
+  file >> total >> resident;
+  return resident * std::size_t(::sysconf(_SC_PAGESIZE));
+}
+
+TEST_F(SlabServerTest, AConnectionThatAsksAndNeverReadsCostsLittleMemory) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "the address sanitizer keeps memory that was freed";
+#endif
+  constexpr int kRequests = 2000;
+  const auto server = SlabServer::Start(context_, {"tcp://127.0.0.1:*"}, kEpoch).value();
+  server->Publish(5, {.volume = volume_});
+  Socket greedy = Socket::Dealer(context_, {.send_high_water_mark = kRequests, .receive_high_water_mark = 1}).value();
+  worker_ = Socket::Dealer(context_).value();
+  ASSERT_TRUE(greedy.Connect(server->endpoint()).ok() && worker_.Connect(server->endpoint()).ok());
+  const Box part = {{0, 0, 0}, {299, 70, 60}};  // is copied out of the volume
+  (void)Ask({.epoch = kEpoch, .worker = 1, .dataset = 5, .box = {{0, 0, 0}, {1, 1, 1}}, .chunk = 0});
+  const std::size_t before = ResidentBytes();
+  for (int i = 0; i < kRequests; ++i)
+    ASSERT_TRUE(greedy.Send({}, Encode(ChunkRequest{.epoch = kEpoch, .worker = 2, .dataset = 5, .box = part, .chunk = 0})).ok());
+  // Connections are served in turn: with as many small requests of another one all have been served.
+  for (int i = 0; i < kRequests + 100; ++i)
+    (void)Ask({.epoch = kEpoch, .worker = 1, .dataset = 5, .box = {{0, 0, 0}, {1, 1, 1}}, .chunk = 0});
+  EXPECT_LT(ResidentBytes() - std::min(before, ResidentBytes()), std::size_t{3} * kMaxQueuedChunks * kChunkBytes);
 }
 
 class CatalogueTest : public testing::Test {

@@ -230,5 +230,48 @@ TEST_F(FailuresTest, AServiceThatLoadsEndsAtOnce) {
   slow->go_on.count_down();
 }
 
+// ---------------------------------------------------------------- clients
+
+TEST_F(FailuresTest, AClientThatNeverReadsWaitsAndTheOthersGoOn) {
+  coordinator_options.machine.client_timeout = seconds(600);
+  StartOne();
+  Socket deaf = Socket::Dealer(context_).value();
+  ASSERT_TRUE(deaf.Connect(coordinator_->client_endpoint()).ok());
+  SubmitFrame submit;
+  submit.frame = TestRequest(Splatting(), 0, 1);
+  submit.frame.size = {1024, 1024};
+  submit.frame.view.zoom = 6;  // the ball fills the picture
+  constexpr int kAsked = 40;
+  for (int i = 1; i <= kAsked; ++i) {
+    submit.request = RequestId(i);
+    ASSERT_TRUE(deaf.Send({}, Encode(submit)).ok());
+  }
+  std::uint64_t done = 0;
+  const Time limit = MonotonicNow() + seconds(120);
+  while (MonotonicNow() < limit) {
+    const StatusReply status = client_->QueryStatus().value();
+    done = status.frames_done;
+    if (status.running == 0 && status.queued > 0 && done > 0) break;
+  }
+  EXPECT_LT(done, std::uint64_t{kAsked} / 2) << "of pictures of 16 MB";
+  for (int i = 0; i < 3; ++i) EXPECT_TRUE(Render().ok());
+  EXPECT_EQ(client_->QueryStatus()->frames_done, done + 3);
+
+  // It reads at last, says so, and gets the rest.
+  std::uint64_t received = 0;
+  int pictures = 0;
+  while (pictures < kAsked && MonotonicNow() < limit) {
+    const std::array<Socket*, 1> sockets = {&deaf};
+    Wait(sockets, nullptr, std::chrono::milliseconds(100));
+    while (const std::optional<Incoming> incoming = deaf.TryReceive()) {
+      if (incoming->parts.size() < 2) continue;
+      received += incoming->parts[1].size();
+      ++pictures;
+      (void)deaf.Send({}, Encode(ClientPing{.nonce = 1, .open = {}, .received_bytes = received}));
+    }
+  }
+  EXPECT_EQ(pictures, kAsked);
+}
+
 }  // namespace
 }  // namespace slabstream

@@ -33,6 +33,8 @@ TEST(Keys, PairsBelongTogetherAndDiffer) {
   EXPECT_TRUE(IsKey(one.secret_key));
   EXPECT_EQ(PublicKeyOf(one.secret_key), one.public_key);
   EXPECT_NE(one.secret_key, other.secret_key);
+  EXPECT_THAT(IdOfKey(one.public_key), testing::MatchesRegex("[0-9a-f]{8}"));
+  EXPECT_NE(IdOfKey(one.public_key), IdOfKey(other.public_key));
   for (const std::string& text : {std::string(), std::string(39, 'a'), std::string(41, 'a'), std::string(39, 'a') + '"'}) {
     EXPECT_FALSE(IsKey(text)) << text;
     EXPECT_FALSE(PublicKeyOf(text)) << text;
@@ -118,11 +120,13 @@ TEST_F(EncryptedTest, NobodyIsAdmittedToAPlaneThatNamesNobody) {
   ASSERT_TRUE(early.Send({}, BytesOf("too early")).ok());
   EXPECT_FALSE(Receive(milliseconds(300)));
   context_.authenticator().Admit(kPlane, friend_.public_key);
+  EXPECT_TRUE(early.refused());
   Socket again = ConnectedAs(friend_);
   ASSERT_TRUE(again.Send({}, BytesOf("hello")).ok());
   const std::optional<Incoming> incoming = Receive();
   ASSERT_TRUE(incoming);
   EXPECT_EQ(TextOf(*incoming), "hello");
+  EXPECT_FALSE(again.refused());
 }
 
 TEST_F(EncryptedTest, APatientPlaneAdmitsWhoeverBecomesKnown) {

@@ -170,6 +170,7 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       {"known", kMaxOpenRequests},
       {"workers", kMaxListed},
       {"datasets", kMaxListed},
+      {"keys", kMaxListed},
       {"x_row", 4},
       {"y_row", 4},
       {"w_row", 4},

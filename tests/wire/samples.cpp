@@ -5,6 +5,8 @@
 #include <string>
 #include <utility>
 
+#include "common/wire/limits.h"
+
 namespace slabstream {
 namespace {
 
@@ -103,7 +105,7 @@ std::vector<Message> SamplesOf() = delete;
 template <>
 std::vector<Register> SamplesOf() {
   return {{1, 2, "host", "tcp://127.0.0.1:1", 1, 0},
-          {kMax64, kMax32, kLongName, kLongEndpoint, kMaxThreads, kMax64, kMax64, true},
+          {kMax64, kMax32, kLongName, kLongEndpoint, kMaxThreads, kMax64, kMax64, true, std::string(kKeyTextBytes, 'k')},
           {0, 0, kUmlaut, kOddEndpoint}};
 }
 
@@ -263,7 +265,7 @@ std::vector<CancelFrame> SamplesOf() {
 
 template <>
 std::vector<ClientPing> SamplesOf() {
-  return {{}, {kMax64, {0, kMax64}}};
+  return {{}, {kMax64, {0, kMax64}, kMax64}};
 }
 
 template <>
@@ -295,6 +297,27 @@ std::vector<ShutDown> SamplesOf() {
 template <>
 std::vector<ShutDownReply> SamplesOf() {
   return {{}, {kMax64}};
+}
+
+template <>
+std::vector<KeysOrder> SamplesOf() {
+  return {{},
+          {kMax64, KeysAction::kRotate, Role::kAdmin, ""},
+          {1, KeysAction::kRevoke, Role::kClient, std::string(kKeyTextBytes, 'a')},
+          {1, KeysAction::kRevoke, Role::kClient, ""}};
+}
+
+template <>
+std::vector<KeysReply> SamplesOf() {
+  return {
+      {},
+      {kMax64,
+       {{std::string(kKeyTextBytes, 'a'), Role::kWorker, "2026-11-21T10:00:00Z"}, {std::string(kKeyTextBytes, 'b'), Role::kAdmin, ""}}}};
+}
+
+template <>
+std::vector<OrderRefused> SamplesOf() {
+  return {{}, {kMax64, Status::InvalidArgument("ending the service needs an admin's key")}};
 }
 
 template <std::size_t... I>

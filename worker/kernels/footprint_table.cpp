@@ -19,7 +19,7 @@ FootprintTable MakeFootprintTable(double sigma, double cut) {
   table.radius = cut * sigma;
   table.taps = std::int32_t(std::ceil(2 * table.radius));
   table.weights.resize(std::size_t(kPhases) * std::size_t(table.taps));
-  table.padded_taps = (table.taps + 1) / 2 * 2;
+  table.padded_taps = std::max((table.taps + 1) / 2 * 2, kLeastPaddedTaps);
   table.channel_weights.resize(4 * std::size_t(kPhases) * std::size_t(table.padded_taps));
   // A tap's distances over the phases are evenly spaced, so its Gaussian is a product of two geometric sequences: exp((d - h)^2) =
   // exp(d^2) exp(-2 h d + h^2).

@@ -18,13 +18,15 @@
 namespace slabstream {
 
 inline constexpr int kPhaseBits = 7, kPhases = 1 << kPhaseBits;
+inline constexpr std::int32_t kLeastPaddedTaps = 4;  // of four channels: 16 floats, the widest vector
 
 struct FootprintTable {
   double radius = 0;             // voxels
   std::int32_t taps = 0;         // ceil(2 radius)
   AlignedVector<float> weights;  // [phase][taps]
 
-  // The same for pixels of four channels: every weight four times. The number of taps is even, so that two voxels are one vector.
+  // The same for pixels of four channels: every weight four times. The number of taps is even and fills the widest vector: weights beyond
+  // `taps` are 0.
   std::int32_t padded_taps = 0;
   AlignedVector<float> channel_weights;  // [phase][padded_taps][4]
 };

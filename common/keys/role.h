@@ -9,9 +9,9 @@
 namespace slabstream {
 
 enum class Role : std::uint8_t {
-  kClient,  // ask for pictures and for the service's status
-  kWorker,  // take voxels and render
-  kAdmin,   // what clients may, end the service, and change its keys
+  kClient = 1,  // ask for pictures and for the service's status
+  kWorker = 2,  // take voxels and render
+  kAdmin = 3,   // what clients may, end the service, and change its keys
 };
 inline constexpr std::array<Role, 3> kRoles = {Role::kClient, Role::kWorker, Role::kAdmin};
 

@@ -1,4 +1,4 @@
-#include "common/service/role.h"
+#include "common/keys/role.h"
 
 namespace slabstream {
 

@@ -1,0 +1,153 @@
+// A service with keys: coordinator, workers and clients over encrypted tcp connections. Pictures are as ever; whoever has no key, another
+// role's or a revoked one, is refused.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/client.h"
+#include "common/service/service_file.h"
+#include "coordinator/service.h"
+#include "tests/service/pictures.h"
+#include "tests/support/renderers.h"
+#include "tests/support/temporary_directory.h"
+#include "worker/service.h"
+
+namespace slabstream {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using testing::HasSubstr;
+
+class KeysOfServiceTest : public testing::Test {
+ protected:
+  void SetUp() override { StartCoordinator(); }
+  ~KeysOfServiceTest() override {
+    workers_.clear();
+    coordinator_.reset();
+  }
+
+  void StartCoordinator() {
+    CoordinatorOptions options;
+    options.client_endpoint = options.worker_endpoint = options.slabs_endpoint = "tcp://127.0.0.1:*";
+    options.keys_folder = folder();
+    options.catalogue["ball"] = [volume = volume_]() -> Result<std::shared_ptr<const Volume>> { return volume; };
+    Result<std::unique_ptr<CoordinatorService>> started = CoordinatorService::Start(coordinator_context_, std::move(options));
+    ASSERT_TRUE(started.ok()) << started.status().message();
+    coordinator_ = *std::move(started);
+  }
+  // Workers of one process lend each other their images; here they must send them.
+  void StartWorkers(int count) {
+    const ServiceFile file = FileOf(Role::kWorker);
+    for (int i = 0; i < count; ++i) {
+      WorkerOptions options;
+      options.coordinator_endpoint = file.endpoint;
+      options.keys = file.keys();
+      options.share_memory = false;
+      workers_.push_back(WorkerService::Start(worker_contexts_[std::size_t(i)], std::move(options)).value());
+    }
+    for (const auto& worker : workers_) worker->WaitUntilRegistered();
+  }
+
+  std::string folder() const { return directory_ / "keys"; }
+  ServiceFile FileOf(Role role) const { return ReadServiceFile(folder() + "/" + std::string(NameOf(role)) + ".json").value(); }
+  Result<Client> ConnectWith(const ServiceFile& file, Duration timeout = seconds(30)) {
+    return Client::Connect(client_context_, {coordinator_->client_endpoint(), file.keys()}, timeout);
+  }
+  Client ConnectAs(Role role) { return ConnectWith(FileOf(role)).value(); }
+
+  TemporaryDirectory directory_{"/tmp"};
+  const std::shared_ptr<const Volume> volume_ = TestSphere(48);
+  Context coordinator_context_, client_context_;
+  std::array<Context, 3> worker_contexts_;
+  std::unique_ptr<CoordinatorService> coordinator_;
+  std::vector<std::unique_ptr<WorkerService>> workers_;
+};
+
+TEST_F(KeysOfServiceTest, PicturesAreThoseOfOneRenderer) {
+  StartWorkers(3);
+  Client client = ConnectAs(Role::kClient);
+  for (const RendererKind* renderer : {Splatting(), ZBuffer()}) {
+    for (const char* combine : {"fan-in", "radix-k", "direct-send"}) {
+      FrameRequest request = TestRequest(renderer, 30);
+      request.policy.combine = combine;
+      const Result<Picture> picture = client.Render(request);
+      ASSERT_TRUE(picture.ok()) << picture.status().message();
+      EXPECT_LE(LargestDifference(picture->image, RenderDirectly(request, *volume_), request.size), AllowedDifference(request));
+      EXPECT_EQ(picture->statistics.attempts, 1U);
+    }
+  }
+}
+
+TEST_F(KeysOfServiceTest, WhoeverHasNoKeyOfTheRoleIsRefused) {
+  // Without keys, nobody answers; with those of a stranger or of a worker, the service says so.
+  EXPECT_FALSE(Client::Connect(client_context_, coordinator_->client_endpoint(), milliseconds(500)).ok());
+  ServiceFile stranger = FileOf(Role::kClient);
+  stranger.own = MakeKeyPair();
+  for (const ServiceFile& file : {stranger, FileOf(Role::kWorker)}) {
+    const Status status = ConnectWith(file, seconds(2)).status();
+    EXPECT_EQ(status.code(), StatusCode::kUnavailable);
+    EXPECT_THAT(status.message(), HasSubstr("refuses the key"));
+  }
+  ServiceFile deceived = FileOf(Role::kClient);
+  deceived.server_key = MakeKeyPair().public_key;
+  EXPECT_FALSE(ConnectWith(deceived, milliseconds(500)).ok());
+  EXPECT_TRUE(ConnectWith(FileOf(Role::kClient)).ok());
+}
+
+TEST_F(KeysOfServiceTest, OnlyAdminsEndTheServiceAndChangeKeys) {
+  Client client = ConnectAs(Role::kClient);
+  EXPECT_THAT(client.ShutDownService().message(), HasSubstr("needs the service file of role admin, not client"));
+  EXPECT_THAT(client.OrderKeys({}).status().message(), HasSubstr("need the service file of role admin, not client"));
+  EXPECT_TRUE(client.QueryStatus().ok());
+  Client admin = ConnectAs(Role::kAdmin);
+  const Result<std::vector<AdmittedKey>> keys = admin.OrderKeys({});
+  ASSERT_TRUE(keys.ok()) << keys.status().message();
+  EXPECT_EQ(keys->size(), 3U);
+  EXPECT_EQ(admin.OrderKeys({.action = KeysAction::kRevoke, .key = "nobody's"}).status().code(), StatusCode::kNotFound);
+  EXPECT_TRUE(admin.ShutDownService().ok());
+  coordinator_->WaitUntilStopped();
+}
+
+TEST_F(KeysOfServiceTest, ARevokedKeyIsRefusedAndItsConnectionsEnd) {
+  StartWorkers(1);
+  const ServiceFile old_file = FileOf(Role::kClient);
+  Client old_client = ConnectWith(old_file).value(), admin = ConnectAs(Role::kAdmin);
+  ASSERT_TRUE(old_client.Render(TestRequest(Splatting(), 0)).ok());
+  ASSERT_TRUE(admin.OrderKeys({.action = KeysAction::kRotate, .role = Role::kClient}).ok());
+  EXPECT_TRUE(old_client.Render(TestRequest(Splatting(), 10)).ok()) << "the old key holds until it is revoked";
+  const Result<std::vector<AdmittedKey>> keys = admin.OrderKeys({.action = KeysAction::kRevoke, .key = old_file.own.public_key});
+  ASSERT_TRUE(keys.ok());
+  EXPECT_EQ(keys->size(), 3U);
+  EXPECT_FALSE(old_client.QueryStatus(seconds(2)).ok());
+  EXPECT_THAT(ConnectWith(old_file, seconds(2)).status().message(), HasSubstr("refuses the key"));
+  Client new_client = ConnectAs(Role::kClient);
+  EXPECT_TRUE(new_client.Render(TestRequest(Splatting(), 20)).ok());
+}
+
+TEST_F(KeysOfServiceTest, AWorkerWhoseKeyIsRevokedIsLostAndDoesNotComeBack) {
+  StartWorkers(2);
+  Client admin = ConnectAs(Role::kAdmin);
+  ASSERT_TRUE(admin.Render(TestRequest(Splatting(), 0)).ok());
+  ASSERT_TRUE(admin.OrderKeys({.action = KeysAction::kRevoke, .key = FileOf(Role::kWorker).own.public_key}).ok());
+  const Time limit = MonotonicNow() + seconds(60);
+  while (!admin.QueryStatus()->workers.empty() && MonotonicNow() < limit) {
+  }
+  EXPECT_TRUE(admin.QueryStatus()->workers.empty());
+}
+
+TEST_F(KeysOfServiceTest, KeysOutliveTheCoordinator) {
+  const ServiceFile before = FileOf(Role::kClient);
+  coordinator_.reset();
+  StartCoordinator();
+  EXPECT_EQ(FileOf(Role::kClient).own, before.own);
+  EXPECT_NE(FileOf(Role::kClient).epoch, before.epoch);
+  EXPECT_TRUE(ConnectWith(before).ok());
+}
+
+}  // namespace
+}  // namespace slabstream
