@@ -127,8 +127,8 @@ void FillImages(MeasuredFrame& frame);
 Timeline Simulate(const MeasuredFrame& frame, const MachineModel& machine, int frames = 1, int in_flight = 1, bool keep_spans = false,
                   int teams = 1);
 
-// Time from picture to picture, with enough frames requested ahead to keep the service busy: a few more than it has under way, or as many as
-// one client may have open (kMaxOpenRequests).
+// Time from picture to picture, with enough frames requested ahead to keep the service busy: a few more than it has under way, or as many
+// as one client may have open (kMaxOpenRequests).
 double SteadySeconds(const MeasuredFrame& frame, const MachineModel& machine, int teams = 1);
 
 }  // namespace slabstream
