@@ -135,7 +135,8 @@ void DeclareKeys(const CommandLine& line) {
   declare("list", "List the public keys, their roles and when they were made", KeysAction::kList);
   const auto [rotate, rotate_options] =
       declare("rotate", "Put a new key into the service file of a role; the old ones hold until they are revoked", KeysAction::kRotate);
-  AddChoice<Role, 3>(*rotate, "ROLE", rotate_options->order.role, {"client", "worker", "admin"}, kRoles, "client, worker or admin")
+  AddChoice<Role, kRoles.size()>(*rotate, "ROLE", rotate_options->order.role, {NameOf(kRoles[0]), NameOf(kRoles[1]), NameOf(kRoles[2])},
+                                 kRoles, "client, worker or admin")
       ->required();
   const auto [revoke, revoke_options] = declare("revoke", "Admit a key no longer and end its connections", KeysAction::kRevoke);
   revoke->add_option("KEY", revoke_options->order.key, "The id of a key, or the public key itself, as `slabstream keys list` shows them")

@@ -23,11 +23,13 @@ Status EndRemains(const ServiceState& remains) {
 }  // namespace
 
 Status RunDown(const DownOptions& options) {
-  // Without a choice the last service that runs is meant, else the last one that does not any more.
-  if (options.service.file.empty() && !FindState(options.service.endpoint)) {
-    if (const auto remains = FindRemains(options.service.endpoint)) return EndRemains(*remains);
+  const Result<ServiceChoice> named = NamedService(options.service);
+  if (!named.ok()) return named.status();
+  // If none is named, the last service that runs is meant. If none runs, it is the last one whose coordinator has crashed.
+  if (named->file.empty() && !FindState(named->endpoint)) {
+    if (const auto remains = FindRemains(named->endpoint)) return EndRemains(*remains);
   }
-  const Result<ServiceAddress> service = ResolveService(options.service);
+  const Result<ServiceAddress> service = ResolveService(*named);
   if (!service.ok()) return service.status();
   const std::optional<ServiceState> state = FindState(service->endpoint);
   Status asked;

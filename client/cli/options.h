@@ -19,6 +19,7 @@ inline constexpr int kMaxLocalWorkers = 256;  // of EmbeddedOptions
 // Which service: see ResolveService (service_state.h).
 struct ServiceChoice {
   std::string endpoint, file;  // at most one; none: the usual one
+  const std::string& text() const { return file.empty() ? endpoint : file; }
 };
 
 // Where the frames are rendered.

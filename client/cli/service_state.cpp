@@ -28,10 +28,7 @@ namespace {
 constexpr std::size_t kMaxStateBytes = std::size_t{1} << 20;
 
 std::string FileFor(const std::string& directory, const std::string& endpoint) {
-  std::string name = endpoint;
-  std::replace_if(
-      name.begin(), name.end(), [](unsigned char c) { return !std::isalnum(c) && c != '.' && c != '-'; }, '_');
-  return directory + "/" + name + ".json";
+  return fmt::format("{}/{}.json", directory, FileNameOf(endpoint));
 }
 
 // nullopt: damaged.
@@ -54,6 +51,12 @@ bool IsOwnDirectory(const char* path) {
 }
 
 }  // namespace
+
+std::string FileNameOf(std::string text) {
+  std::ranges::replace_if(
+      text, [](unsigned char c) { return std::isalnum(c) == 0 && c != '.' && c != '-'; }, '_');
+  return text;
+}
 
 Result<std::string> StateDirectory() {
   const char* runtime = std::getenv("XDG_RUNTIME_DIR");
@@ -159,20 +162,23 @@ Result<ServiceAddress> AddressIn(const std::string& path) {
 
 }  // namespace
 
+Result<ServiceChoice> NamedService(const ServiceChoice& choice) {
+  if (!choice.file.empty() || !choice.endpoint.empty()) return choice;
+  if (const char* file = Variable("SLABSTREAM_SERVICE")) return ServiceChoice{.endpoint = {}, .file = file};
+  const char* endpoint = Variable("SLABSTREAM_ENDPOINT");
+  if (endpoint == nullptr) return ServiceChoice();
+  const Result<Endpoint> parsed = ParseEndpoint(endpoint, false);
+  if (!parsed.ok()) return Status::InvalidArgument("$SLABSTREAM_ENDPOINT " + parsed.status().message());
+  return ServiceChoice{.endpoint = endpoint, .file = {}};
+}
+
 Result<ServiceAddress> ResolveService(const ServiceChoice& choice) {
-  if (!choice.file.empty()) return AddressIn(choice.file);
-  std::string endpoint = choice.endpoint;
-  if (endpoint.empty()) {
-    if (const char* file = Variable("SLABSTREAM_SERVICE")) return AddressIn(file);
-    if (const char* text = Variable("SLABSTREAM_ENDPOINT")) {
-      const Result<Endpoint> parsed = ParseEndpoint(text, false);
-      if (!parsed.ok()) return Status::InvalidArgument("$SLABSTREAM_ENDPOINT " + parsed.status().message());
-      endpoint = text;
-    }
-  }
-  const std::optional<ServiceState> state = FindState(endpoint);
+  const Result<ServiceChoice> named = NamedService(choice);
+  if (!named.ok()) return named.status();
+  if (!named->file.empty()) return AddressIn(named->file);
+  const std::optional<ServiceState> state = FindState(named->endpoint);
   if (state && !state->keys_folder.empty()) return AddressIn(state->keys_folder + "/admin.json");
-  if (!endpoint.empty()) return ServiceAddress(endpoint);
+  if (!named->endpoint.empty()) return ServiceAddress(named->endpoint);
   return ServiceAddress(state ? state->endpoint : std::string(kDefaultEndpoint));
 }
 

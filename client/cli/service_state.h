@@ -46,9 +46,14 @@ std::optional<ServiceState> FindRemains(const std::string& endpoint);
 inline constexpr Duration kEndPatience = std::chrono::seconds(5);
 void EndProcesses(const ServiceState& state, Duration patience);
 
-// The address of the service that the user means: what is chosen; else by $SLABSTREAM_SERVICE, a service file; else by
-// $SLABSTREAM_ENDPOINT; else the last service started; else kDefaultEndpoint. A service that `up` started here with keys is reached as its
-// admin. Errors: of ReadServiceFile; InvalidArgument: a variable holds no endpoint, or the file is a worker's.
+// `text` as a part of a file's name: letters, digits, '.' and '-' stay, anything else becomes '_'.
+std::string FileNameOf(std::string text);
+
+// The service that the user names: `choice`; else $SLABSTREAM_SERVICE, a service file; else $SLABSTREAM_ENDPOINT; else neither file nor
+// endpoint. InvalidArgument: that variable holds no endpoint.
+Result<ServiceChoice> NamedService(const ServiceChoice& choice);
+// Its address; if none is named, that of the last service started; else kDefaultEndpoint. A service that `up` started here with keys is
+// reached as its admin. Errors: of NamedService and ReadServiceFile; InvalidArgument: the file is a worker's.
 Result<ServiceAddress> ResolveService(const ServiceChoice& choice);
 
 // Whether `pid` runs (a zombie does not) and is one of ours: its /proc/PID/stat names `program` (the kernel keeps 15 characters).

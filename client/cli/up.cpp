@@ -3,8 +3,6 @@
 
 #include <unistd.h>
 
-#include <algorithm>
-#include <cctype>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
@@ -197,8 +195,8 @@ class LocalService {
   std::vector<Child> children_;  // the coordinator, then the workers
 };
 
-// Ends what a coordinator that crashed there has left.
-Status CheckNotRunning(const std::string& listen) {
+// Ends what a coordinator that crashed there has left. Unavailable: a service runs there.
+Status MakeRoomAt(const std::string& listen) {
   if (const auto remains = FindRemains(listen)) {
     EndProcesses(*remains, Duration::zero());
     ForgetState(*remains);
@@ -216,10 +214,7 @@ Result<std::string> KeysFolder(const UpOptions& options, const std::string& stat
   const Result<Endpoint> listen = ParseEndpoint(options.listen, true);
   if (!listen.ok()) return listen.status();
   if (!listen->remote()) return std::string();
-  std::string name = fmt::format("{}-{}", listen->host, listen->port);
-  std::ranges::replace_if(
-      name, [](unsigned char c) { return std::isalnum(c) == 0 && c != '.' && c != '-'; }, '_');
-  return fmt::format("{}/keys-{}", state_directory, name);
+  return fmt::format("{}/keys-{}", state_directory, FileNameOf(fmt::format("{}-{}", listen->host, listen->port)));
 }
 
 void PrintReady(const UpOptions& options, const ServiceState& state) {
@@ -247,7 +242,7 @@ void PrintReady(const UpOptions& options, const ServiceState& state) {
 Status RunUp(const UpOptions& options) {
   const Result<std::string> directory = StateDirectory();
   if (!directory.ok()) return directory.status();
-  if (Status status = CheckNotRunning(options.listen); !status.ok()) return status;
+  if (Status status = MakeRoomAt(options.listen); !status.ok()) return status;
   const std::string log_directory = fmt::format("{}/service-{}", *directory, ::getpid());
   std::error_code error;
   std::filesystem::create_directory(log_directory, error);

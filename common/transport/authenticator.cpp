@@ -3,11 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <deque>
+#include <iterator>
+#include <map>
 #include <mutex>
+#include <thread>
+#include <utility>
 #include <vector>
 #include <zmq.hpp>
 
-#include "common/base/check.h"
+#include "common/base/guarded.h"
 #include "common/base/limited_log.h"
 #include "common/transport/context_impl.h"
 #include "common/transport/socket.h"
@@ -18,8 +22,8 @@ namespace {
 constexpr char kEndpoint[] = "inproc://zeromq.zap.01";
 constexpr char kVersion[] = "1.0";
 constexpr std::size_t kKeyBytes = 32;
-constexpr std::size_t kMostWaiting = 1024;  // handshakes; more are refused at once
-constexpr std::chrono::hours kLongWait{1};
+constexpr std::size_t kMostWaiting = 1024;  // handshakes; more must try again
+constexpr std::chrono::milliseconds kBetweenLooks{50}, kUntilAsked{-1};
 
 struct Request {
   std::vector<zmq::message_t> route;  // to where the answer goes, with the empty frame behind it
@@ -86,26 +90,27 @@ struct Authenticator::Impl {
     return true;
   }
 
+  // Waits for requests, for news about keys, or for the end of somebody's patience, and answers whoever can be answered.
+  void Serve() {
+    std::array<zmq::pollitem_t, 2> items = {{{socket.handle(), 0, ZMQ_POLLIN, 0}, {nullptr, wakeup.file_descriptor(), ZMQ_POLLIN, 0}}};
+    zmq::poll(items.data(), items.size(), waiting.empty() ? kUntilAsked : kBetweenLooks);
+    wakeup.Drain();
+    while (Receive()) {
+    }
+    for (std::deque<Request> asked = std::exchange(waiting, {}); !asked.empty(); asked.pop_front()) {
+      const Verdict verdict = Judge(asked.front());
+      if (verdict == Verdict::kWait) {
+        waiting.push_back(std::move(asked.front()));
+      } else {
+        Answer(asked.front(), verdict);
+      }
+    }
+  }
+
   void Run(const std::stop_token& stop) {
     while (!stop.stop_requested()) {
-      std::array<zmq::pollitem_t, 2> items = {{{socket.handle(), 0, ZMQ_POLLIN, 0}, {nullptr, wakeup.file_descriptor(), ZMQ_POLLIN, 0}}};
-      const bool some_wait = !waiting.empty();
-      try {
-        zmq::poll(items.data(), items.size(), some_wait ? std::chrono::milliseconds(50) : std::chrono::milliseconds(kLongWait));
-        wakeup.Drain();
-        while (Receive()) {
-        }
-        for (std::deque<Request> asked = std::exchange(waiting, {}); !asked.empty(); asked.pop_front()) {
-          const Verdict verdict = Judge(asked.front());
-          if (verdict == Verdict::kWait) {
-            waiting.push_back(std::move(asked.front()));
-          } else {
-            Answer(asked.front(), verdict);
-          }
-        }
-      } catch (const zmq::error_t& error) {
-        if (error.num() != EINTR) LogError(std::string("authentication: ") + error.what());
-      }
+      const Status served = Guarded("authentication", [this] { Serve(); });  // whoever got no answer tries again
+      if (!served.ok()) complaints.Warning(served.message());
     }
   }
 

@@ -4,11 +4,9 @@
 // Without it ZeroMQ would admit every key, so a Context makes one before its first encrypted socket.
 #pragma once
 
-#include <map>
 #include <memory>
 #include <set>
 #include <string>
-#include <thread>
 
 #include "common/base/time.h"
 
@@ -18,7 +16,7 @@ class Context;
 
 class Authenticator {
  public:
-  explicit Authenticator(Context& context);  // CHECKs that the context has no other one
+  explicit Authenticator(Context& context);  // one a context: Context::authenticator()
   ~Authenticator();
 
   // From now on these public keys, and no others, may connect to `plane`. Connections that are there stay: Socket::EndConnections.

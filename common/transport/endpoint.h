@@ -27,7 +27,7 @@ struct Endpoint {
 // and the host is an address.
 Result<Endpoint> ParseEndpoint(std::string_view text, bool to_bind);
 
-// The address of this machine from which packets to a tcp endpoint leave, as the host of an endpoint; sends nothing. Unavailable: the name
+// This machine's own address, as an endpoint spells it, on the network that leads to a tcp endpoint. Nothing is sent. Unavailable: the name
 // is not known, or no network leads there.
 Result<std::string> LocalHostTowards(const Endpoint& endpoint);
 

@@ -82,7 +82,7 @@ std::string BenchHeader(const BenchRun& run, std::size_t name_width) {
   const BenchOptions& o = run.options;
   const std::string where = o.connection.local_workers > 0 ? fmt::format("workers in this process: {}, threads of each: {}",
                                                                          o.connection.local_workers, LocalThreads(o.connection))
-                                                           : o.connection.service.endpoint + o.connection.service.file;
+                                                           : o.connection.service.text();
   return fmt::format("machine: {} cores, {}, {}\n", run.machine.cores, run.machine.cpu, run.machine.simd) +
          fmt::format("run:     {0}x{0} pixels, {1} turns of {2} views of each projection, {3}; times in ms, memory in MiB\n", o.size,
                      o.turns, o.frames, where) +
@@ -111,8 +111,7 @@ std::string BenchJson(const BenchRun& run, const std::vector<BenchResult>& resul
                {"size", o.size},
                {"frames", o.frames},
                {"turns", o.turns},
-               {"endpoint", o.connection.service.endpoint +
-                                o.connection.service.file},  // empty: in this process, with the numbers of workers and threads below
+               {"endpoint", o.connection.service.text()},  // empty: in this process, with the numbers of workers and threads below
                {"workers", o.connection.local_workers},
                {"threads", o.connection.local_workers > 0 ? LocalThreads(o.connection) : 0},
                {"cases", Json::array()}};

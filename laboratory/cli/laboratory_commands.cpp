@@ -55,7 +55,7 @@ void DeclareBench(const CommandLine& line) {
       ->type_name("DIR")
       ->excludes(endpoint);
   sub->callback([options, &run = line.run] {
-    if (const auto& [at, file] = options->connection.service; !at.empty() || !file.empty()) options->connection.local_workers = 0;
+    if (!options->connection.service.text().empty()) options->connection.local_workers = 0;
     run = [options] { return RunBench(*options); };
   });
 }

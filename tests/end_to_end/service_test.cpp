@@ -75,6 +75,9 @@ TEST_F(ServiceTest, DownEndsTheWorkersOfACoordinatorThatWasKilledAndKeepsTheLogs
   ASSERT_EQ(::kill(pids.front(), SIGKILL), 0);
   const ProgramResult render = Slabstream({"render", "ball", "-o", "a.png", "--endpoint", endpoint_});
   EXPECT_EQ(render.exit_status, 1);
+  ::setenv("SLABSTREAM_ENDPOINT", "ipc:///nobody/here", 1);  // another service is meant
+  EXPECT_EQ(Slabstream({"down"}).exit_status, 1);
+  ::unsetenv("SLABSTREAM_ENDPOINT");
   for (std::size_t i = 1; i < pids.size(); ++i) EXPECT_TRUE(Runs(pids[i]));
   const std::string down = MustRun({"down"}).out;
   EXPECT_THAT(down, AllOf(HasSubstr("had ended; its 2 workers are down now"), HasSubstr("logs are in ")));

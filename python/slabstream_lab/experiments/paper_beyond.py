@@ -151,6 +151,10 @@ def _beyond(run: Run, frames: Frames) -> Section:
 # ---------------------------------------------------------------- claims
 
 
+def _projection(view: str) -> str:
+    return "perspective" if "fov" in view else "orthographic"
+
+
 def _claims(run: Run, frames: Frames) -> Section:
     n, least, shared = frames.table_n, frames.sizes[0], [p for p in frames.workers if p > 1]
     p = shared[-1]
@@ -185,7 +189,7 @@ def _claims(run: Run, frames: Frames) -> Section:
         for metric in ("count", "image_bytes"):
             slab, cube = (run.value(metric, part="claims", view=view, workers=p, decomposition=d) for d in ("slab", "subcube"))
             values[metric] = cube.value / slab.value
-        pictures["perspective" if "fov" in view else "orthographic"] = values
+        pictures[_projection(view)] = values
     for name, values in pictures.items():
         ratio = values["count"]
         verdict = "smaller" if ratio < 1 else "larger" if ratio > 1 else "as large"
@@ -198,7 +202,7 @@ def _claims(run: Run, frames: Frames) -> Section:
         slab, beam, cube = (
             run.value("count", part="claims", view=view, workers=p, decomposition=d).value / one.value for d in ("slab", "beam", "subcube")
         )
-        name = "perspective" if "fov" in view else "orthographic"
+        name = _projection(view)
         verdict = "less" if cube < slab else "more" if cube > slab else "as much"
         rows.append(
             [f"Images of subcubes overlap less than those of slabs ({name})", f"p = {p}: {verdict}",
