@@ -4,13 +4,11 @@
 
 #include <algorithm>
 
+#include "common/transport/socket_cookie.h"
+
 namespace slabstream {
 
-std::uint64_t ConnectionTable::CookieOf(int descriptor) {
-  std::uint64_t cookie = 0;
-  socklen_t bytes = sizeof(cookie);
-  return ::getsockopt(descriptor, SOL_SOCKET, SO_COOKIE, &cookie, &bytes) == 0 ? cookie : 0;
-}
+bool ConnectionTable::Connection::open() const { return cookie != 0 && SocketCookie(descriptor) == cookie; }
 
 void ConnectionTable::Connection::ShutDown() const {
   if (open()) (void)::shutdown(descriptor, SHUT_RDWR);
@@ -24,7 +22,7 @@ std::string ConnectionTable::Heard(const std::string& identity, zmq::message_t& 
   }
   const char* const user = zmq_msg_gets(part.handle(), "User-Id");  // null over connections without CURVE
   const int descriptor = zmq_msg_get(part.handle(), ZMQ_SRCFD);     // -1 over inproc
-  return connections_.insert_or_assign(identity, Connection{user == nullptr ? "" : user, descriptor, CookieOf(descriptor)})
+  return connections_.insert_or_assign(identity, Connection{user == nullptr ? "" : user, descriptor, SocketCookie(descriptor)})
       .first->second.user;
 }
 

@@ -22,11 +22,10 @@ class ConnectionTable {
   struct Connection {
     std::string user;
     int descriptor = -1;
-    std::uint64_t cookie = 0;  // the kernel's name for the socket: a descriptor that was closed may be another one's now
+    std::uint64_t cookie = 0;  // SocketCookie; 0: no socket
+    bool open() const;
     void ShutDown() const;
-    bool open() const { return cookie != 0 && CookieOf(descriptor) == cookie; }
   };
-  static std::uint64_t CookieOf(int descriptor);  // 0: no socket
 
   std::unordered_map<std::string, Connection> connections_;  // by identity, which ZeroMQ never uses again
   std::size_t next_sweep_ = 64;                              // connections

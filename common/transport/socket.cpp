@@ -8,6 +8,7 @@
 
 #include "common/base/check.h"
 #include "common/transport/authenticator.h"
+#include "common/transport/connection_limit.h"
 #include "common/transport/connection_table.h"
 #include "common/transport/connection_tuner.h"
 #include "common/transport/context_impl.h"
@@ -35,6 +36,7 @@ struct Socket::Impl {
   bool knows_connections = options.ends_connections;
   ConnectionTable connections;             // of users
   std::unique_ptr<ConnectionTuner> tuner;  // of the tcp connections made here
+  std::unique_ptr<ConnectionLimit> limit;  // of the connections accepted here
   std::vector<std::string> names;          // inproc endpoints bound here
   std::vector<IpcListener> listeners;      // ipc files bound here
 
@@ -69,6 +71,7 @@ Result<std::unique_ptr<Socket::Impl>> MakeSocket(Context& context, zmq::socket_t
     if (impl->router) {
       impl->socket.set(zmq::sockopt::router_mandatory, true);
       impl->socket.set(zmq::sockopt::router_handover, false);  // nobody takes over another's identity
+      impl->limit = std::make_unique<ConnectionLimit>(impl->socket, options.max_connections);
     }
     return impl;
   } catch (const zmq::error_t& error) {
@@ -289,6 +292,7 @@ std::optional<Incoming> Socket::TryReceive() {
     if (!incoming.parts.empty() && surplus == 0) return incoming;
   }
   if (impl_->tuner != nullptr) impl_->tuner->TuneNew();
+  if (impl_->limit != nullptr) impl_->limit->Enforce();
   return std::nullopt;
 }
 

@@ -12,6 +12,7 @@
 
 #include <array>
 #include <atomic>
+#include <cerrno>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -254,6 +255,65 @@ TEST(Socket, FrameBeyondTheLimitClosesTheConnection) {
   const std::optional<Incoming> before = Receive(*router);
   ASSERT_TRUE(before);
   EXPECT_TRUE(Until(StatusCode::kUnavailable, *router, [&] { return router->Send(before->identity, BytesOf("there?")); }));
+}
+
+// A connection to 127.0.0.1:`port` that says nothing.
+class SilentConnection {
+ public:
+  explicit SilentConnection(std::uint16_t port) : descriptor_(::socket(AF_INET, SOCK_STREAM, 0)) {
+    sockaddr_in address = {};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(port);
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    EXPECT_EQ(::connect(descriptor_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), 0);
+  }
+  ~SilentConnection() { ::close(descriptor_); }
+  SilentConnection(const SilentConnection&) = delete;
+  SilentConnection& operator=(const SilentConnection&) = delete;
+
+  // The other end has closed it; what that said before is passed over.
+  bool closed() const {
+    std::array<char, 256> said{};
+    ssize_t count = 0;
+    do {
+      count = ::recv(descriptor_, said.data(), said.size(), MSG_DONTWAIT);
+    } while (count > 0);
+    return count == 0 || errno == ECONNRESET;
+  }
+
+ private:
+  const int descriptor_;
+};
+
+TEST(Socket, ConnectionsBeyondTheLimitAreClosedAndLeaveTheOthersAlone) {
+  Context context;
+  Result<Socket> router = Socket::Router(context, {.max_connections = 2, .handshake = std::chrono::hours(1)});
+  ASSERT_TRUE(router.ok());
+  const Result<std::string> bound = router->Bind("tcp://127.0.0.1:*");
+  ASSERT_TRUE(bound.ok());
+  Result<Socket> dealer = Socket::Dealer(context);
+  ASSERT_TRUE(dealer.ok() && dealer->Connect(*bound).ok());
+  ASSERT_TRUE(dealer->Send({}, BytesOf("first")).ok());
+  ASSERT_TRUE(Receive(*router));
+
+  const std::uint16_t port = ParseEndpoint(*bound, false)->port;
+  auto second = std::make_unique<SilentConnection>(port);
+  const auto is_closed = [&](const SilentConnection& connection) {
+    return Until(StatusCode::kOk, *router, [&] {
+      (void)router->TryReceive();
+      return connection.closed() ? Status::Ok() : Status::Unavailable("open");
+    });
+  };
+  for (int i = 0; i < 3; ++i) EXPECT_TRUE(is_closed(SilentConnection(port)));
+  EXPECT_FALSE(second->closed());
+  ASSERT_TRUE(dealer->Send({}, BytesOf("still there")).ok());
+  EXPECT_TRUE(Receive(*router));
+
+  second.reset();  // its place is free when ZeroMQ has noticed, and ZeroMQ's dealers try again until then
+  Result<Socket> other = Socket::Dealer(context);
+  ASSERT_TRUE(other.ok() && other->Connect(*bound).ok());
+  ASSERT_TRUE(other->Send({}, BytesOf("next")).ok());
+  EXPECT_TRUE(Receive(*router));
 }
 
 TEST(Socket, MessagesOfMoreThanTwoPartsAreDropped) {

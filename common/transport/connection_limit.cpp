@@ -1,0 +1,51 @@
+#include "common/transport/connection_limit.h"
+
+#include <sys/resource.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <atomic>
+#include <string>
+
+#include "common/transport/socket_cookie.h"
+
+namespace slabstream {
+namespace {
+
+std::size_t FileShare() {
+  rlimit limit{};
+  return ::getrlimit(RLIMIT_NOFILE, &limit) == 0 ? limit.rlim_cur / 4 : SIZE_MAX;
+}
+
+std::string UniqueName() {
+  static std::atomic<std::uint64_t> last = 0;
+  return "inproc://connection-limit-" + std::to_string(++last);
+}
+
+}  // namespace
+
+ConnectionLimit::ConnectionLimit(zmq::socket_t& socket, std::size_t most) : most_(std::min(most, FileShare())) {
+  init(socket, UniqueName(), ZMQ_EVENT_ACCEPTED);
+}
+
+void ConnectionLimit::Enforce() {
+  try {
+    while (check_event()) {
+    }
+  } catch (const zmq::error_t&) {  // a signal: the next call goes on
+  }
+}
+
+void ConnectionLimit::on_event_accepted(const zmq_event_t& event, const char*) {
+  const int descriptor = event.value;
+  if (accepted_.size() >= most_) std::erase_if(accepted_, [](const auto& entry) { return SocketCookie(entry.first) != entry.second; });
+  const std::uint64_t cookie = SocketCookie(descriptor);
+  if (cookie == 0) return;  // it is closed already
+  if (accepted_.size() < most_ || accepted_.contains(descriptor)) {
+    accepted_[descriptor] = cookie;
+  } else {
+    (void)::shutdown(descriptor, SHUT_RDWR);  // ZeroMQ then closes it
+  }
+}
+
+}  // namespace slabstream
