@@ -5,15 +5,38 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/printable.h"
+
 namespace slabstream {
+namespace {
+
+// Appends the value's text until `text` is longer than `most`: a file nests values as deep as it likes, and this recursion must end before.
+void AppendText(const Json& json, std::size_t most, std::string& text) {
+  if (!json.is_structured()) {
+    text += json.dump(-1, ' ', false, Json::error_handler_t::replace);
+    return;
+  }
+  text += json.is_object() ? '{' : '[';
+  const std::size_t begin = text.size();
+  for (const auto& [name, value] : json.items()) {
+    if (text.size() > most) return;
+    if (text.size() > begin) text += ',';
+    if (json.is_object()) text += Json(name).dump(-1, ' ', false, Json::error_handler_t::replace) + ':';
+    AppendText(value, most, text);
+  }
+  text += json.is_object() ? '}' : ']';
+}
+
+}  // namespace
 
 void JsonValue::Complain(const std::string& what) const {
-  if (!*mistake_) *mistake_ = place_.empty() ? what : fmt::format("{}: {}", place_, what);
+  if (!*mistake_) *mistake_ = Printable(place_.empty() ? what : fmt::format("{}: {}", place_, what));
 }
 
 std::string JsonValue::Shown() const {
   constexpr std::size_t kMost = 60;
-  const std::string text = json_->dump(-1, ' ', false, Json::error_handler_t::replace);
+  std::string text;
+  AppendText(*json_, kMost, text);
   return text.size() <= kMost ? text : text.substr(0, kMost) + "...";
 }
 

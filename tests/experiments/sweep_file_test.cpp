@@ -123,6 +123,22 @@ TEST(SweepFile, TellsWhatIsWrongInOneLineThatNamesFieldValueAndLimit) {
   for (const char* text : {"", "[]", "3", "{}", "null"}) EXPECT_FALSE(ParseSweep("s.json", text).ok()) << text;
 }
 
+TEST(SweepFile, AnErrorIsOneLineHoweverTheFileIsMade) {
+  // Values that nest as deep as the file is long: writing them out for the message must not use up the stack.
+  const std::string deep = std::string(kMaxSweepBytes / 2, '[') + std::string(kMaxSweepBytes / 2, ']');
+  for (const auto& [what, with] : std::vector<std::pair<std::string, std::string>>{{"[300, 200]", deep},
+                                                                                   {"{\"combine\": \"fan-in\"}", deep},
+                                                                                   {"\"workers\"", "\"wor\\nkers\""},
+                                                                                   {"\"workers\"", "\"" + std::string(100'000, 'w') + "\""},
+                                                                                   {"\"tree:4,strips=8\"", "\"tree:\\n\""},
+                                                                                   {"\"close\"", "\"a\\nb\"}, {\"name\": \"a\\nb\""}}) {
+    const Status status = ParseSweep("s.json", Replaced(kGood, what, with)).status();
+    EXPECT_EQ(status.code(), StatusCode::kInvalidArgument) << with.substr(0, 40);
+    EXPECT_EQ(status.message().find('\n'), std::string::npos) << status.message();
+    EXPECT_LE(status.message().size(), 1024U);
+  }
+}
+
 TEST(SweepFile, ALongListIsRefused) {
   std::string workers = "1";
   for (int i = 0; i < 3000; ++i) workers += ", 2";
