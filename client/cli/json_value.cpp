@@ -10,24 +10,38 @@
 namespace slabstream {
 namespace {
 
-// Appends the value's text until `text` is longer than `most`: a file nests values as deep as it likes, and this recursion must end before.
-void AppendText(const Json& json, std::size_t most, std::string& text) {
-  if (!json.is_structured()) {
-    text += json.dump(-1, ' ', false, Json::error_handler_t::replace);
-    return;
+// Brackets and braces outside of texts. Of what is no JSON it may be any number.
+int DepthOf(std::string_view text) {
+  int depth = 0, deepest = 0;
+  bool in_text = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (in_text && c == '\\') {
+      ++i;
+    } else if (c == '"') {
+      in_text = !in_text;
+    } else if (!in_text && (c == '[' || c == '{')) {
+      deepest = std::max(deepest, ++depth);
+    } else if (!in_text && (c == ']' || c == '}')) {
+      --depth;
+    }
   }
-  text += json.is_object() ? '{' : '[';
-  const std::size_t begin = text.size();
-  for (const auto& [name, value] : json.items()) {
-    if (text.size() > most) return;
-    if (text.size() > begin) text += ',';
-    if (json.is_object()) text += Json(name).dump(-1, ' ', false, Json::error_handler_t::replace) + ':';
-    AppendText(value, most, text);
-  }
-  text += json.is_object() ? '}' : ']';
+  return deepest;
 }
 
 }  // namespace
+
+// Copying a value and writing it out call themselves for each level, so the levels are limited before anything is made of the text.
+Result<Json> ParseJson(std::string_view text) {
+  if (const int depth = DepthOf(text); depth > kMaxJsonDepth)
+    return Status::InvalidArgument(fmt::format("values nest {} deep, at most {} are allowed", depth, kMaxJsonDepth));
+  try {
+    return Json::parse(text);
+  } catch (const Json::exception& error) {
+    const std::string what = error.what();
+    return Printable(Status::InvalidArgument("not JSON: " + what.substr(what.find("] ") + 2)));
+  }
+}
 
 void JsonValue::Complain(const std::string& what) const {
   if (!*mistake_) *mistake_ = Printable(place_.empty() ? what : fmt::format("{}: {}", place_, what));
@@ -35,8 +49,7 @@ void JsonValue::Complain(const std::string& what) const {
 
 std::string JsonValue::Shown() const {
   constexpr std::size_t kMost = 60;
-  std::string text;
-  AppendText(*json_, kMost, text);
+  const std::string text = json_->dump(-1, ' ', false, Json::error_handler_t::replace);
   return text.size() <= kMost ? text : text.substr(0, kMost) + "...";
 }
 

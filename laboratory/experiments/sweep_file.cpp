@@ -245,14 +245,10 @@ std::string Describe(const Policy& policy) {
 }
 
 Result<Sweep> ParseSweep(const std::string& path, std::string_view text) {
+  const Result<Json> parsed = ParseJson(text);
+  if (!parsed.ok()) return Status::InvalidArgument(fmt::format("FILE '{}': {}", path, parsed.status().message()));
+  const Json& json = *parsed;
   std::optional<std::string> mistake;
-  Json json;
-  try {
-    json = Json::parse(text);
-  } catch (const Json::parse_error& error) {
-    const std::string what = error.what();
-    return Printable(Status::InvalidArgument(fmt::format("FILE '{}' is not JSON: {}", path, what.substr(what.find("] ") + 2))));
-  }
   Sweep sweep;
   const JsonValue file(json, "", mistake);
   file.Fields(
