@@ -18,7 +18,7 @@ namespace {
 constexpr char kEndpoint[] = "tcp://127.0.0.1:7420";
 
 const TemporaryDirectory& Folder() {
-  static const TemporaryDirectory folder;
+  static const TemporaryDirectory folder(PlaceOfFuzzFiles());
   return folder;
 }
 
@@ -84,7 +84,7 @@ bool DecodeServiceFile(std::span<const std::byte> bytes) {
 }
 
 std::vector<FuzzBytes> ServiceFileSeeds() {
-  const TemporaryDirectory parent;
+  const TemporaryDirectory parent(PlaceOfFuzzFiles());
   const std::string folder = parent / "keys";
   KeyFolder keys = KeyFolder::Open(folder).value();
   CHECK(keys.Publish({kEndpoint, "tcp://[::1]:7421", 12345}).ok());

@@ -1,8 +1,6 @@
 // Volume files of every format, read from a file, since that is what the readers take.
 //
 // input: u8 format (kEndings), the file
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 
@@ -16,13 +14,8 @@ namespace {
 
 constexpr std::array<const char*, 7> kEndings = {"nii", "nii.gz", "nrrd", "nhdr", "mha", "mhd", "tif"};
 
-std::filesystem::path MemoryFolder() {
-  const std::filesystem::path memory = "/dev/shm";
-  return ::access(memory.c_str(), W_OK) == 0 ? memory : std::filesystem::temp_directory_path();
-}
-
 struct Files {
-  TemporaryDirectory directory{MemoryFolder()};
+  TemporaryDirectory directory{PlaceOfFuzzFiles()};
   std::string Path(const std::string& ending) const { return directory / ("volume." + ending); }
 };
 const Files& SharedFiles() {

@@ -8,6 +8,7 @@
 #include <concepts>
 #include <cstddef>
 #include <cstring>
+#include <filesystem>
 #include <span>
 #include <string>
 #include <string_view>
@@ -77,6 +78,9 @@ class FuzzSeed {
   FuzzBytes bytes_;
 };
 inline FuzzBytes SeedOf(std::string_view text) { return FuzzSeed().Put(text).bytes(); }
+
+// Where targets make the files that their decoders read: in memory, if this machine has a place for that.
+std::filesystem::path PlaceOfFuzzFiles();
 
 // CHECKs that a refusal is what a user can be shown: one line of bounded length.
 void CheckRefusal(const Status& status);

@@ -1,5 +1,7 @@
 #include "tests/fuzz/fuzz_target.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 
 #include "tests/fuzz/decoders.h"
@@ -31,6 +33,11 @@ const FuzzTarget* FindFuzzTarget(std::string_view name) {
 FuzzSeed& FuzzSeed::Put(std::span<const std::byte> bytes) {
   bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
   return *this;
+}
+
+std::filesystem::path PlaceOfFuzzFiles() {
+  const std::filesystem::path memory = "/dev/shm";
+  return ::access(memory.c_str(), W_OK) == 0 ? memory : std::filesystem::temp_directory_path();
 }
 
 void CheckRefusal(const Status& status) {
