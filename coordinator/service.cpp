@@ -236,7 +236,8 @@ void CoordinatorService::Impl::ReceiveFromClients() {
     if (!incoming) return;
     const std::optional<Role> role = RoleOf(*incoming);
     if (!role) continue;
-    Result<AnyMessage> message = Guarded("decoding", [&] { return Decode(incoming->parts[0].span()); });
+    const std::size_t payload_bytes = incoming->parts.size() > 1 ? incoming->parts[1].size() : 0;
+    Result<AnyMessage> message = Guarded("decoding", [&] { return DecodeOn(Plane::kClient, incoming->parts[0].span(), payload_bytes); });
     if (!message.ok()) {
       complaints.Warning("client plane: refused a message: " + message.status().message());
       // A refused request whose id can be read gets an answer, so that nobody waits for it in vain.

@@ -14,7 +14,7 @@ Status EarlyImages::Keep(PartialImage message, Bytes payload) {
     });
     if (known) return Status::Ok();
   }
-  const std::uint64_t bytes = bytes_ + Cost(payload);
+  const std::uint64_t bytes = bytes_ + Cost(message, payload);
   if (bytes > limit_bytes_) {
     return Status::ResourceExhausted(
         fmt::format("partial images that came before their assignment take {} bytes, at most {} are kept", bytes, limit_bytes_));
@@ -28,7 +28,7 @@ Status EarlyImages::Keep(PartialImage message, Bytes payload) {
 std::vector<std::pair<PartialImage, Bytes>> EarlyImages::Take(const GroupKey& key) {
   auto group = groups_.extract(key);
   if (group.empty()) return {};
-  for (const auto& image : group.mapped()) bytes_ -= Cost(image.second);
+  for (const auto& image : group.mapped()) bytes_ -= Cost(image.first, image.second);
   return std::move(group.mapped());
 }
 

@@ -24,7 +24,7 @@ class EarlyImages {
     for (auto& [key, images] : groups_) {
       std::erase_if(images, [&](const auto& image) {
         const bool forgotten = over(image.first);
-        if (forgotten) bytes_ -= Cost(image.second);
+        if (forgotten) bytes_ -= Cost(image.first, image.second);
         return forgotten;
       });
     }
@@ -32,7 +32,9 @@ class EarlyImages {
   }
 
  private:
-  static std::uint64_t Cost(const Bytes& payload) { return sizeof(PartialImage) + payload.size(); }
+  static std::uint64_t Cost(const PartialImage& message, const Bytes& payload) {
+    return sizeof(PartialImage) + sizeof(RankReport) * message.reports.size() + payload.size();
+  }
 
   std::uint64_t limit_bytes_;
   std::uint64_t bytes_ = 0;

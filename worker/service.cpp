@@ -125,6 +125,7 @@ struct WorkerService::Impl {
   const std::optional<ImagesKeys> keys;
   WorkerMachine machine;
   Socket control, images;
+  std::string images_endpoint;
   std::optional<Socket> slabs;  // once the coordinator has named its endpoint
   std::string slabs_endpoint;
   PeerSockets peers;
@@ -391,7 +392,7 @@ Result<std::unique_ptr<WorkerService>> WorkerService::Start(Context& context, Wo
 
   config.pid = static_cast<std::uint32_t>(::getpid());
   config.host = HostName();
-  config.images_endpoint = std::move(*images_endpoint);
+  config.images_endpoint = *images_endpoint;
   config.memory_scope = SharedMemoryScope();
   if (options.share_memory) {
     if (const Status shared = ShareBlocks(); !shared.ok()) {
@@ -401,12 +402,15 @@ Result<std::unique_ptr<WorkerService>> WorkerService::Start(Context& context, Wo
   }
   config.lends_memory = options.share_memory;
   auto impl = std::make_unique<Impl>(context, std::move(options), std::move(keys), std::move(*control), std::move(*images));
+  impl->images_endpoint = std::move(*images_endpoint);
   impl->thread = std::jthread([raw = impl.get()] { raw->Run(); });
   return std::unique_ptr<WorkerService>(new WorkerService(std::move(impl)));
 }
 
 WorkerService::WorkerService(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 WorkerService::~WorkerService() { RequestStop(); }
+
+const std::string& WorkerService::images_endpoint() const { return impl_->images_endpoint; }
 
 void WorkerService::RequestStop() {
   impl_->stop_requested = true;

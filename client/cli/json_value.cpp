@@ -5,10 +5,46 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/printable.h"
+
 namespace slabstream {
+namespace {
+
+// Brackets and braces outside of texts. Of what is no JSON it may be any number.
+int DepthOf(std::string_view text) {
+  int depth = 0, deepest = 0;
+  bool in_text = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (in_text && c == '\\') {
+      ++i;
+    } else if (c == '"') {
+      in_text = !in_text;
+    } else if (!in_text && (c == '[' || c == '{')) {
+      deepest = std::max(deepest, ++depth);
+    } else if (!in_text && (c == ']' || c == '}')) {
+      --depth;
+    }
+  }
+  return deepest;
+}
+
+}  // namespace
+
+// Copying a value and writing it out call themselves for each level, so the levels are limited before anything is made of the text.
+Result<Json> ParseJson(std::string_view text) {
+  if (const int depth = DepthOf(text); depth > kMaxJsonDepth)
+    return Status::InvalidArgument(fmt::format("values nest {} deep, at most {} are allowed", depth, kMaxJsonDepth));
+  try {
+    return Json::parse(text);
+  } catch (const Json::exception& error) {
+    const std::string what = error.what();
+    return Printable(Status::InvalidArgument("not JSON: " + what.substr(what.find("] ") + 2)));
+  }
+}
 
 void JsonValue::Complain(const std::string& what) const {
-  if (!*mistake_) *mistake_ = place_.empty() ? what : fmt::format("{}: {}", place_, what);
+  if (!*mistake_) *mistake_ = Printable(place_.empty() ? what : fmt::format("{}: {}", place_, what));
 }
 
 std::string JsonValue::Shown() const {

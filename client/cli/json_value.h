@@ -16,6 +16,11 @@ namespace slabstream {
 
 using Json = nlohmann::ordered_json;
 
+inline constexpr int kMaxJsonDepth = 64;
+
+// The value of a file that a user names. InvalidArgument, one line: not JSON, or values that nest deeper than kMaxJsonDepth.
+Result<Json> ParseJson(std::string_view text);
+
 // One value. Errors are stored in `mistake`, which all values of a file share. The first mistake stays, and values read after it do not
 // matter.
 class JsonValue {

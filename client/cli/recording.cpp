@@ -146,10 +146,10 @@ Json RecordingJson(std::span<const RecordedFrame> frames) {
 }
 
 Result<std::vector<RecordedFrame>> ParseRecording(std::string_view text) {
-  const Json json = Json::parse(text, nullptr, false);
-  if (json.is_discarded()) return Status::InvalidArgument("the trace is no JSON");
-  const auto recording = json.is_object() ? json.find(kRecordingKey) : json.end();
-  if (recording == json.end()) {
+  const Result<Json> json = ParseJson(text);
+  if (!json.ok()) return Status::InvalidArgument("the trace: " + json.status().message());
+  const auto recording = json->is_object() ? json->find(kRecordingKey) : json->end();
+  if (recording == json->end()) {
     return Status::InvalidArgument("the trace holds no \"slabstream\": record it with --trace of render or turntable");
   }
   std::optional<std::string> mistake;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "common/base/printable.h"
 #include "common/classification/transfer_function.h"
 
 namespace slabstream {
@@ -62,7 +63,7 @@ Result<TransferFunction> ReadPreset(const Json& preset) {
 }  // namespace
 
 Result<TransferFunction> ParseParaViewColorMap(std::string_view json, std::string_view name) {
-  const auto failed = [&](const std::string& why) { return Status::InvalidArgument(std::string(name) + ": " + why); };
+  const auto failed = [&](const std::string& why) { return Printable(Status::InvalidArgument(std::string(name) + ": " + why)); };
   Json document;
   try {
     document = Json::parse(json);

@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 #include <sys/stat.h>
 
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "common/base/files.h"
+#include "common/base/printable.h"
 #include "common/transport/endpoint.h"
 
 namespace slabstream {
@@ -26,10 +28,12 @@ class Reader {
     Complain(field, "is missing or no text");
     return "";
   }
-  std::uint64_t Number(const char* field) {
+  template <class T>
+  T Number(const char* field) {
     const auto found = json_.find(field);
-    if (found != json_.end() && found->is_number_unsigned()) return found->get<std::uint64_t>();
-    Complain(field, "is missing or no whole number");
+    constexpr T kMost = std::numeric_limits<T>::max();
+    if (found != json_.end() && found->is_number_unsigned() && found->get<std::uint64_t>() <= kMost) return found->get<T>();
+    Complain(field, fmt::format("is missing or no whole number in [0, {}]", kMost));
     return 0;
   }
   std::string Key(const char* field) {
@@ -38,7 +42,7 @@ class Reader {
     return key;
   }
   void Complain(const char* field, const std::string& what) {
-    if (status_.ok()) status_ = Status::InvalidArgument(fmt::format("service file '{}': {} {}", path_, field, what));
+    if (status_.ok()) status_ = Printable(Status::InvalidArgument(fmt::format("service file '{}': {} {}", path_, field, what)));
   }
   const Status& status() const { return status_; }
 
@@ -73,8 +77,8 @@ Result<ServiceFile> ReadServiceFile(const std::string& path) {
   file.server_key = reader.Key("server_key");
   file.own = {reader.Key("public_key"), reader.Key("secret_key")};
   if (PublicKeyOf(file.own.secret_key) != file.own.public_key) reader.Complain("secret_key", "does not belong to public_key");
-  file.epoch = reader.Number("epoch");
-  file.wire_version = std::uint32_t(reader.Number("wire_version"));
+  file.epoch = reader.Number<std::uint64_t>("epoch");
+  file.wire_version = reader.Number<std::uint32_t>("wire_version");
   file.made = reader.Text("made");
   if (!reader.status().ok()) return reader.status();
   return file;

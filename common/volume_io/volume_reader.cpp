@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "common/base/log.h"
+#include "common/base/printable.h"
 #include "common/volume_io/raw_volume.h"
 #include "common/volume_io/text_header.h"
 
@@ -70,14 +71,6 @@ Result<LoadedVolume> Finish(RawVolume raw, const Format& format, const std::stri
   volume->block = {description.geometry.bounds(), kept.type, std::move(kept.bytes)};
   loaded.volume = std::move(volume);
   return loaded;
-}
-
-// Messages quote files, which may hold anything; a user gets one printable line.
-Status Printable(const Status& status) {
-  std::string message = status.message();
-  std::replace_if(
-      message.begin(), message.end(), [](unsigned char c) { return c < ' ' || c == 0x7f; }, '?');
-  return {status.code(), message};
 }
 
 }  // namespace

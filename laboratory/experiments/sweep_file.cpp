@@ -16,6 +16,7 @@
 #include "client/cli/values.h"
 #include "client/cli/volume_argument.h"
 #include "common/base/files.h"
+#include "common/base/printable.h"
 #include "common/cli/parse.h"
 #include "common/combining/schemes.h"
 #include "common/decomposition/decomposition.h"
@@ -244,15 +245,10 @@ std::string Describe(const Policy& policy) {
 }
 
 Result<Sweep> ParseSweep(const std::string& path, std::string_view text) {
+  const Result<Json> parsed = ParseJson(text);
+  if (!parsed.ok()) return Status::InvalidArgument(fmt::format("FILE '{}': {}", path, parsed.status().message()));
+  const Json& json = *parsed;
   std::optional<std::string> mistake;
-  Json json;
-  try {
-    json = Json::parse(text);
-  } catch (const Json::parse_error& error) {
-    std::string what = error.what();
-    std::ranges::replace(what, '\n', ' ');
-    return Status::InvalidArgument(fmt::format("FILE '{}' is not JSON: {}", path, what.substr(what.find("] ") + 2)));
-  }
   Sweep sweep;
   const JsonValue file(json, "", mistake);
   file.Fields(
@@ -291,7 +287,7 @@ Result<Sweep> ParseSweep(const std::string& path, std::string_view text) {
   const std::size_t cases = sweep.volumes.size() * sweep.renderers.size() * sweep.views.size() * sweep.policies.size() *
                             sweep.workers.size() * sweep.links.size();
   if (!mistake && cases > kMaxSweepCases) mistake = fmt::format("{} cases are too many: at most {}", cases, kMaxSweepCases);
-  if (mistake) return Status::InvalidArgument(fmt::format("FILE '{}': {}", path, *mistake));
+  if (mistake) return Printable(Status::InvalidArgument(fmt::format("FILE '{}': {}", path, *mistake)));
   return sweep;
 }
 

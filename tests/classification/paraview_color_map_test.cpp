@@ -10,6 +10,16 @@
 namespace slabstream {
 namespace {
 
+TEST(ParaViewColorMap, AnErrorIsOneLineHoweverTheFileIsMade) {
+  for (const std::string& json :
+       {std::string("{\"RGBPoints\": \n nonsense"), "[\"" + std::string(100'000, 'x'), std::string(1'000'000, '[')}) {
+    const Status status = ParseParaViewColorMap(json, "map.json").status();
+    EXPECT_EQ(status.code(), StatusCode::kInvalidArgument);
+    EXPECT_EQ(status.message().find('\n'), std::string::npos) << status.message();
+    EXPECT_LE(status.message().size(), 1024U);
+  }
+}
+
 using testing::HasSubstr;
 
 // As ParaView 5.11 exports a preset, with the fields that do not matter here.

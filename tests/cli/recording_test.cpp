@@ -109,5 +109,20 @@ TEST(Recording, WhatIsWrongIsNamed) {
     EXPECT_FALSE(ParseRecording(text).ok()) << text;
 }
 
+TEST(Recording, AnErrorIsOneLineHoweverTheFileIsMade) {
+  const auto error_of = [](const std::string& frames) {
+    return ParseRecording("{\"slabstream\": {\"version\": 1, \"frames\": " + frames + "}}").status().message();
+  };
+  // Values that nest as deep as the file is long: neither reading them nor writing them out may use up the stack.
+  constexpr std::size_t kDepth = 1'000'000;
+  const std::string deep = error_of("[" + std::string(kDepth, '[') + std::string(kDepth, ']') + "]");
+  EXPECT_THAT(deep, HasSubstr("values nest 1000003 deep, at most 64 are allowed"));
+  const std::string text = error_of("[\"" + std::string(100, '[') + "\\\"[\"]");
+  EXPECT_THAT(text, HasSubstr("frames[0]: \"[[[")) << "brackets in a text are none";
+  const std::string broken = error_of(R"([{"renderer": "splat", "grid": [4, 4], "workers": 1, "display": 1, "combine": "a\nb"}])");
+  EXPECT_THAT(broken, HasSubstr("combine: 'a?b' is not one of"));
+  EXPECT_EQ(broken.find('\n'), std::string::npos);
+}
+
 }  // namespace
 }  // namespace slabstream

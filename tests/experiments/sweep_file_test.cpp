@@ -111,7 +111,8 @@ TEST(SweepFile, TellsWhatIsWrongInOneLineThatNamesFieldValueAndLimit) {
       {"{\"sphere\": {\"class\": 2, \"size\": 40, \"occupancy\": 0.3}, \"opacity\": 0.2}", "{}", "must have either 'sphere' or 'file'"},
       {"[300, 200]", "[300]", "size: [300] must be [width, height]"},
       {"[300, 200]", "0", "size: 0 must be a whole number in [1, "},
-      {"\"title\"", "title", "is not JSON: "},
+      {"\"title\"", "title", "not JSON: "},
+      {"300", "1e999", "not JSON: number overflow parsing '1e999'"},
   };
   for (const Case& c : cases) {
     const Status status = ParseSweep("s.json", Replaced(kGood, c.what, c.with)).status();
@@ -121,6 +122,22 @@ TEST(SweepFile, TellsWhatIsWrongInOneLineThatNamesFieldValueAndLimit) {
     EXPECT_EQ(status.message().find('\n'), std::string::npos) << status.message();
   }
   for (const char* text : {"", "[]", "3", "{}", "null"}) EXPECT_FALSE(ParseSweep("s.json", text).ok()) << text;
+}
+
+TEST(SweepFile, AnErrorIsOneLineHoweverTheFileIsMade) {
+  // Values that nest as deep as the file is long: neither reading them nor writing them out may use up the stack.
+  const std::string deep = std::string(kMaxSweepBytes / 2, '[') + std::string(kMaxSweepBytes / 2, ']');
+  for (const auto& [what, with] : std::vector<std::pair<std::string, std::string>>{{"[300, 200]", deep},
+                                                                                   {"{\"combine\": \"fan-in\"}", deep},
+                                                                                   {"\"workers\"", "\"wor\\nkers\""},
+                                                                                   {"\"workers\"", "\"" + std::string(100'000, 'w') + "\""},
+                                                                                   {"\"tree:4,strips=8\"", "\"tree:\\n\""},
+                                                                                   {"\"close\"", "\"a\\nb\"}, {\"name\": \"a\\nb\""}}) {
+    const Status status = ParseSweep("s.json", Replaced(kGood, what, with)).status();
+    EXPECT_EQ(status.code(), StatusCode::kInvalidArgument) << with.substr(0, 40);
+    EXPECT_EQ(status.message().find('\n'), std::string::npos) << status.message();
+    EXPECT_LE(status.message().size(), 1024U);
+  }
 }
 
 TEST(SweepFile, ALongListIsRefused) {

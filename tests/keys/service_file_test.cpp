@@ -52,7 +52,8 @@ TEST_F(ServiceFileTest, MistakesAreNamedAndSecretsAreNot) {
       {"\"server_key\"", "\"server\"", "server_key is missing or no text"},
       {file_.own.public_key, "abc", "public_key is no key"},
       {file_.own.public_key, file_.server_key, "secret_key does not belong to public_key"},
-      {"\"epoch\": 7", "\"epoch\": -7", "epoch is missing or no whole number"},
+      {"\"epoch\": 7", "\"epoch\": -7", "epoch is missing or no whole number in [0, 18446744073709551615]"},
+      {"\"wire_version\": 1", "\"wire_version\": 4294967297", "wire_version is missing or no whole number in [0, 4294967295]"},
       {"{", "[", "is not one JSON object"},
   };
   for (const auto& [what, with, says] : cases) {

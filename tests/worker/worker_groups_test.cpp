@@ -90,6 +90,17 @@ TEST_F(WorkerGroupsTest, EarlyImagesAreBounded) {
   EXPECT_THAT(Tell(FromPeer({2, 1, 0}), payload), IsEmpty());
 }
 
+TEST_F(WorkerGroupsTest, ReportsOfEarlyImagesCount) {
+  WorkerConfig config = Config();
+  config.early_image_bytes = 10000;
+  Start(config);
+  PartialImage partial = FromPeer({1, 1, 0});
+  partial.reports.resize(10000 / sizeof(RankReport) + 1);
+  const auto trouble = Sent<WorkerTrouble>(Tell(partial));
+  ASSERT_THAT(trouble, SizeIs(1));
+  EXPECT_EQ(trouble[0].status.code(), StatusCode::kResourceExhausted);
+}
+
 TEST_F(WorkerGroupsTest, ANewAttemptReplacesTheOlderOne) {
   const auto old = All<StartRender>(Feed(Tell(Assignment(1, {kSelf, kPeer})))).at(0);
   const Actions replaced = Tell(Assignment(1, {kSelf, kSelf}, 0, 1, 2));

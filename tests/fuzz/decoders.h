@@ -1,0 +1,41 @@
+// The targets' functions (fuzz_target.h), one file for each pair.
+#pragma once
+
+#include "tests/fuzz/fuzz_target.h"
+
+namespace slabstream {
+
+bool DecodeMessage(std::span<const std::byte> input);
+std::vector<FuzzBytes> MessageSeeds();
+
+bool DecodePayload(std::span<const std::byte> input);
+std::vector<FuzzBytes> PayloadSeeds();
+
+bool DecodeRunImage(std::span<const std::byte> input);
+std::vector<FuzzBytes> RunImageSeeds();
+
+bool DecodeSchedule(std::span<const std::byte> input);
+std::vector<FuzzBytes> ScheduleSeeds();
+
+bool DecodePolicy(std::span<const std::byte> input);
+std::vector<FuzzBytes> PolicySeeds();
+
+bool DecodeTransferFunction(std::span<const std::byte> input);
+std::vector<FuzzBytes> TransferFunctionSeeds();
+
+bool DecodeVolumeFile(std::span<const std::byte> input);
+std::vector<FuzzBytes> VolumeFileSeeds();
+
+bool DecodeServiceFile(std::span<const std::byte> input);
+std::vector<FuzzBytes> ServiceFileSeeds();
+
+bool DecodeRecording(std::span<const std::byte> input);
+std::vector<FuzzBytes> RecordingSeeds();
+
+bool DecodeSweep(std::span<const std::byte> input);
+std::vector<FuzzBytes> SweepSeeds();
+
+bool DecodeValue(std::span<const std::byte> input);
+std::vector<FuzzBytes> ValueSeeds();
+
+}  // namespace slabstream
