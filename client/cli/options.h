@@ -18,7 +18,7 @@ inline constexpr int kMaxLocalWorkers = 256;  // of EmbeddedOptions
 
 // Which service: see ResolveService (service_state.h).
 struct ServiceChoice {
-  std::string endpoint, file;  // at most one; none: the usual one
+  std::string endpoint, file;  // both: the file's keys, and this endpoint instead of its own; none: the usual service
 };
 
 // Where the frames are rendered.

@@ -160,7 +160,11 @@ Result<ServiceAddress> AddressIn(const std::string& path) {
 }  // namespace
 
 Result<ServiceAddress> ResolveService(const ServiceChoice& choice) {
-  if (!choice.file.empty()) return AddressIn(choice.file);
+  if (!choice.file.empty()) {
+    Result<ServiceAddress> address = AddressIn(choice.file);
+    if (address.ok() && !choice.endpoint.empty()) address->endpoint = choice.endpoint;
+    return address;
+  }
   std::string endpoint = choice.endpoint;
   if (endpoint.empty()) {
     if (const char* file = Variable("SLABSTREAM_SERVICE")) return AddressIn(file);

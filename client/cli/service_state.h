@@ -46,7 +46,8 @@ std::optional<ServiceState> FindRemains(const std::string& endpoint);
 inline constexpr Duration kEndPatience = std::chrono::seconds(5);
 void EndProcesses(const ServiceState& state, Duration patience);
 
-// The address of the service that the user means: what is chosen; else by $SLABSTREAM_SERVICE, a service file; else by
+// The address of the service that the user means: what is chosen (an endpoint beside a service file: another way to the same service, such
+// as the near end of a tunnel); else by $SLABSTREAM_SERVICE, a service file; else by
 // $SLABSTREAM_ENDPOINT; else the last service started; else kDefaultEndpoint. A service that `up` started here with keys is reached as its
 // admin. Errors: of ReadServiceFile; InvalidArgument: a variable holds no endpoint, or the file is a worker's.
 Result<ServiceAddress> ResolveService(const ServiceChoice& choice);
