@@ -44,7 +44,9 @@ run_workers() {
       "$programs/slabstream-worker" --service "$folder/worker.json" --threads "$threads" < /dev/null &
     step=$!
     while kill -0 "$step" 2> /dev/null && ! is_over "$file"; do sleep 1; done
-    if kill "$step" 2> /dev/null; then
+    if kill -0 "$step" 2> /dev/null; then
+      # The workers of this element, not this script. $SLURM_JOB_ID would not do: the last element's is that of the array.
+      scancel --quiet --signal=TERM "${SLURM_ARRAY_JOB_ID}_$SLURM_ARRAY_TASK_ID"
       wait "$step"
     else
       wait "$step" || return # a worker failed

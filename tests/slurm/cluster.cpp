@@ -111,7 +111,8 @@ ProgramResult SlurmCluster::Run(const std::vector<std::string>& command) const {
 
 int SlurmCluster::CountPrograms(const std::string& name) const {
   std::set<std::string> nodes;  // network namespaces: those of the daemons
-  for (const auto& daemon : daemons_) nodes.insert(NetworkOf("/proc/" + std::to_string(daemon->pid())));
+  for (const auto& daemon : daemons_)
+    if (daemon != nullptr) nodes.insert(NetworkOf("/proc/" + std::to_string(daemon->pid())));
   int count = 0;
   for (const auto& process : std::filesystem::directory_iterator("/proc")) {
     std::ifstream file(process.path() / "comm");

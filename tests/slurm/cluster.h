@@ -31,6 +31,9 @@ class SlurmCluster {
   // The same for a program that must exit with 0: its stdout without the last newline.
   std::string Output(const std::vector<std::string>& command) const;
 
+  // A host that falls over: everything on it ends at once. It does not come back.
+  void LoseNode(int node) { daemons_[std::size_t(1 + node)].reset(); }
+
   // Running processes on the nodes whose name (the kernel keeps 15 characters) begins like this.
   int CountPrograms(const std::string& name) const;
 
@@ -42,7 +45,7 @@ class SlurmCluster {
 
   std::string directory_;
   Hosts hosts_;
-  std::vector<std::unique_ptr<RunningProgram>> daemons_;  // end before the hosts
+  std::vector<std::unique_ptr<RunningProgram>> daemons_;  // by host; null: lost. They end before the hosts
 };
 
 // Calls `condition` until it holds; false after kProgramTimeout.
