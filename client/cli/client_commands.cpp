@@ -143,11 +143,34 @@ void DeclareKeys(const CommandLine& line) {
       ->required();
 }
 
+void DeclareSlurm(const CommandLine& line) {
+  CLI::App* sub = line.app.add_subcommand("slurm", "Print a job script for Slurm: a service on the nodes of a cluster");
+  auto options = std::make_shared<SlurmOptions>();
+  AddInteger(*sub, "--nodes", options->nodes, 1, kMaxJobNodes, "Nodes with workers; the coordinator runs on one of them");
+  AddInteger(*sub, "--workers-per-node", options->workers_per_node, 1, kMaxWorkersPerNode, "Worker processes on each node");
+  AddInteger(*sub, "--threads", options->threads, 1, int(kMaxThreads),
+             "Render threads of each worker, for nodes that are shared with other jobs")
+      ->default_str("nodes are the job's alone, and their cores are divided by the workers");
+  AddParsed(*sub, "--time", options->time, ParseTimeLimit, "Time limit of the job, as Slurm takes it: 90 (minutes), 1:30:00, 2-12:00:00")
+      ->type_name("TIME")
+      ->default_str("the partition's");
+  AddInteger(*sub, "--notice", options->notice_seconds, 1, kMaxNoticeSeconds, "Seconds before the time limit at which workers leave");
+  AddRepeated(*sub, "--data", options->data, "A volume to serve, as NAME=FILE, or a directory of volumes that are named after their files")
+      ->required()
+      ->type_name("NAME=FILE");
+  sub->add_option("--folder", options->folder, "The folder, shared by all nodes, in which each job makes one for its service files")
+      ->type_name("FOLDER")
+      ->default_str("the one from which the job is submitted");
+  AddRepeated(*sub, "--sbatch", options->directives, "A further option for sbatch, without its dashes, such as partition=long")
+      ->type_name("OPTION");
+  RunWith(*sub, line.run, options, RunSlurm);
+}
+
 }  // namespace
 
 std::span<const DeclareCommand> ClientCommands() {
-  static constexpr DeclareCommand kCommands[] = {DeclareRender, DeclareTurntable, DeclareInfo,   DeclareSphere,
-                                                 DeclareUp,     DeclareDown,      DeclareStatus, DeclareKeys};
+  static constexpr DeclareCommand kCommands[] = {DeclareRender, DeclareTurntable, DeclareInfo, DeclareSphere, DeclareUp,
+                                                 DeclareDown,   DeclareStatus,    DeclareKeys, DeclareSlurm};
   return kCommands;
 }
 

@@ -20,5 +20,6 @@ Status RunUp(const UpOptions& options);
 Status RunDown(const DownOptions& options);
 Status RunStatus(const StatusOptions& options);
 Status RunKeys(const KeysOptions& options);
+Status RunSlurm(const SlurmOptions& options);
 
 }  // namespace slabstream

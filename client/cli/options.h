@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "client/cli/slurm_values.h"
 #include "client/cli/values.h"
 #include "client/image_io/image_writer.h"
 #include "common/frame/frame_request.h"
@@ -18,7 +19,7 @@ inline constexpr int kMaxLocalWorkers = 256;  // of EmbeddedOptions
 
 // Which service: see ResolveService (service_state.h).
 struct ServiceChoice {
-  std::string endpoint, file;  // at most one; none: the usual one
+  std::string endpoint, file;  // both: the file's keys, and this endpoint instead of its own; none: the usual service
   const std::string& text() const { return file.empty() ? endpoint : file; }
 };
 
@@ -92,6 +93,17 @@ struct StatusOptions {
 struct KeysOptions {
   ServiceChoice service;
   KeysOrder order;
+};
+
+struct SlurmOptions {
+  int nodes = 1;                        // [1, kMaxJobNodes]
+  int workers_per_node = 1;             // [1, kMaxWorkersPerNode]
+  int threads = 0;                      // of each worker; 0: the cores of a node divided by its workers
+  TimeLimit time;                       // of the job
+  int notice_seconds = 60;              // [1, kMaxNoticeSeconds]
+  std::vector<std::string> data;        // NAME=PATH or DIR, as slabstream-coordinator takes them
+  std::string folder;                   // that all nodes share; empty: the one from which the job is submitted
+  std::vector<std::string> directives;  // as ParseDirective takes them
 };
 
 }  // namespace slabstream

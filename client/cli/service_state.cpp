@@ -175,7 +175,11 @@ Result<ServiceChoice> NamedService(const ServiceChoice& choice) {
 Result<ServiceAddress> ResolveService(const ServiceChoice& choice) {
   const Result<ServiceChoice> named = NamedService(choice);
   if (!named.ok()) return named.status();
-  if (!named->file.empty()) return AddressIn(named->file);
+  if (!named->file.empty()) {
+    Result<ServiceAddress> address = AddressIn(named->file);
+    if (address.ok() && !named->endpoint.empty()) address->endpoint = named->endpoint;
+    return address;
+  }
   const std::optional<ServiceState> state = FindState(named->endpoint);
   if (state && !state->keys_folder.empty()) return AddressIn(state->keys_folder + "/admin.json");
   if (!named->endpoint.empty()) return ServiceAddress(named->endpoint);

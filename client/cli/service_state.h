@@ -52,8 +52,9 @@ std::string FileNameOf(std::string text);
 // The service that the user names: `choice`; else $SLABSTREAM_SERVICE, a service file; else $SLABSTREAM_ENDPOINT; else neither file nor
 // endpoint. InvalidArgument: that variable holds no endpoint.
 Result<ServiceChoice> NamedService(const ServiceChoice& choice);
-// Its address; if none is named, that of the last service started; else kDefaultEndpoint. A service that `up` started here with keys is
-// reached as its admin. Errors: of NamedService and ReadServiceFile; InvalidArgument: the file is a worker's.
+// Its address (an endpoint beside a service file is another way to the same service, such as the near end of a tunnel); if none is named,
+// that of the last service started; else kDefaultEndpoint. A service that `up` started here with keys is reached as its admin. Errors: of
+// NamedService and ReadServiceFile; InvalidArgument: the file is a worker's.
 Result<ServiceAddress> ResolveService(const ServiceChoice& choice);
 
 // Whether `pid` runs (a zombie does not) and is one of ours: its /proc/PID/stat names `program` (the kernel keeps 15 characters).

@@ -105,6 +105,9 @@ TEST_F(ServiceStateTest, AServiceFileComesBeforeTheEndpoint) {
   ::setenv("SLABSTREAM_SERVICE", path.c_str(), 1);
   EXPECT_EQ(ResolveService({})->endpoint, file.endpoint);
   EXPECT_EQ(ResolveService({.endpoint = "tcp://127.0.0.1:5002", .file = ""})->endpoint, "tcp://127.0.0.1:5002");
+  const Result<ServiceAddress> tunnel = ResolveService({.endpoint = "tcp://127.0.0.1:5002", .file = path});
+  EXPECT_EQ(tunnel->endpoint, "tcp://127.0.0.1:5002") << "the near end of a tunnel";
+  EXPECT_EQ(tunnel->keys->own, file.own);
   ServiceFile worker = file;
   worker.role = Role::kWorker;
   ASSERT_TRUE(WriteServiceFile(path, worker).ok());

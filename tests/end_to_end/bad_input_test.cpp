@@ -142,6 +142,29 @@ TEST_F(BadInputTest, OptionsOfRender) {
   ExpectRefused({"render", "ball.nrrd", "--local=1", "-o", "no/such/x.png"}, "no/such");
 }
 
+TEST_F(BadInputTest, OptionsOfSlurm) {
+  MakeSphere("ball.nrrd", 2, 16);
+  const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
+      {{"--nodes", "0"}, "--nodes 0"},
+      {{"--nodes", "1001"}, "--nodes 1001"},
+      {{"--workers-per-node", "257"}, "--workers-per-node 257"},
+      {{"--threads", "-1"}, "--threads -1"},
+      {{"--time", "1h"}, "--time '1h'"},
+      {{"--notice", "0"}, "--notice 0"},
+      {{"--time", "5:00", "--notice", "300"}, "--notice 300 is not below the 300 seconds of --time 5:00"},
+      {{"--data", "missing=no.nrrd"}, "no.nrrd"},
+      {{"--data", "a/b=ball.nrrd"}, "a/b"},
+      {{"--folder", "ball.nrrd"}, "--folder 'ball.nrrd'"},
+      {{"--sbatch", "array=0-9"}, "--sbatch 'array=0-9'"},
+  };
+  for (const auto& [more, needle] : cases) {
+    std::vector<std::string> arguments = {"slurm", "--data", "ball=ball.nrrd"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    ExpectRefused(arguments, needle);
+  }
+  ExpectRefused({"slurm"}, "--data");
+}
+
 TEST_F(BadInputTest, VolumeFiles) {
   MakeSphere("ball.nrrd", 2, 16);
   const std::string whole = ReadFile("ball.nrrd");

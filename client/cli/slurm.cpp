@@ -1,0 +1,71 @@
+// `slurm`: prints a job script.
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <iostream>
+
+#include "client/cli/commands.h"
+#include "client/cli/job_script.h"
+#include "client/cli/process.h"
+#include "client/cli/service_state.h"
+#include "coordinator/catalogue.h"
+
+namespace slabstream {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Jobs may start in another folder.
+std::string Absolute(const std::string& path) { return fs::absolute(path).lexically_normal().string(); }
+
+// NAME=PATH or DIR.
+std::string WithAbsolutePath(const std::string& data) {
+  const std::size_t path = data.find('=') + 1;  // 0 without a name
+  return data.substr(0, path) + Absolute(data.substr(path));
+}
+
+Result<std::string> FolderOfPrograms() {
+  std::string folder;
+  for (const char* const name : {kWorkerProgram, kCoordinatorProgram}) {
+    const Result<std::string> program = ProgramBeside(name);
+    if (!program.ok()) return program.status();
+    folder = fs::path(*program).parent_path().string();
+  }
+  return folder;
+}
+
+}  // namespace
+
+Status RunSlurm(const SlurmOptions& options) {
+  JobScript script{.nodes = options.nodes,
+                   .workers_per_node = options.workers_per_node,
+                   .threads = options.threads,
+                   .time = options.time.text,
+                   .notice_seconds = options.notice_seconds};
+  if (!options.time.text.empty() && options.notice_seconds >= options.time.seconds) {
+    return Status::InvalidArgument(fmt::format("--notice {} is not below the {} seconds of --time {}", options.notice_seconds,
+                                               options.time.seconds, options.time.text));
+  }
+  for (const std::string& line : options.directives) {
+    const Result<std::string> directive = ParseDirective("--sbatch", line);
+    if (!directive.ok()) return directive.status();
+    script.directives.push_back(*directive);
+  }
+
+  const Result<Catalogue> catalogue = MakeCatalogue(options.data);  // mistakes show here, not when the job starts
+  if (!catalogue.ok()) return catalogue.status();
+  script.dataset = catalogue->begin()->first;
+  for (const std::string& data : options.data) script.data.push_back(WithAbsolutePath(data));
+  if (!options.folder.empty()) {
+    std::error_code error;
+    if (!fs::is_directory(options.folder, error)) return Status::NotFound(fmt::format("--folder '{}' is no folder", options.folder));
+    script.folder = Absolute(options.folder);
+  }
+  const Result<std::string> programs = FolderOfPrograms();
+  if (!programs.ok()) return programs.status();
+  script.programs = *programs;
+  std::cout << TextOf(script) << std::flush;
+  return Status::Ok();
+}
+
+}  // namespace slabstream

@@ -1,0 +1,143 @@
+// The job script of `slabstream slurm`: what bash, shellcheck and Slurm make of it.
+#include "client/cli/job_script.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstdio>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "client/cli/slurm_values.h"
+#include "tests/support/temporary_directory.h"
+
+namespace slabstream {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+// Texts that a careless script would split, expand or end early.
+const std::vector<std::string> kOddTexts = {"plain",  "",      "two words", "it's",    "\"quoted\"", "$HOME", "`id`",     "a\\b",
+                                            "*.nrrd", "a;b",   "~",         "-o",      "#no",        "a\nb",  "\xc3\xa4", "!x",
+                                            "'",      "''' '", "(x)",       "a>b<c|d", "{a,b}",      "[ab]",  " ",        "\t"};
+
+// What a command prints; fails the test unless it exits with 0.
+std::string OutputOf(const std::string& command) {
+  std::string out;
+  FILE* const pipe = ::popen(command.c_str(), "r");
+  for (std::array<char, 4096> part{}; const std::size_t bytes = std::fread(part.data(), 1, part.size(), pipe);)
+    out.append(part.data(), bytes);
+  EXPECT_EQ(::pclose(pipe), 0) << command << ": " << out;
+  return out;
+}
+
+bool IsInstalled(const std::string& program) { return std::system(("command -v " + program + " > /dev/null").c_str()) == 0; }
+
+class JobScriptTest : public testing::Test {
+ protected:
+  // The path of a file that holds the text.
+  std::string Written(const std::string& text) const {
+    const std::string path = directory_ / "job.sh";
+    std::ofstream(path, std::ios::binary) << text;
+    return path;
+  }
+
+  TemporaryDirectory directory_;
+};
+
+JobScript SomeScript() {
+  return {.data = {"head=/data/head.nrrd"}, .dataset = "head", .programs = "/opt/slabstream/bin", .folder = "/shared/jobs"};
+}
+
+TEST_F(JobScriptTest, BashReadsEveryPathAsItIs) {
+  JobScript script = SomeScript();
+  std::string expected;
+  for (const std::string& text : kOddTexts) script.data.push_back("x=/" + text);
+  for (const std::string& data : script.data) expected += "--data\n" + data + "\n";
+  script.programs = "/pro grams' of $HOME";
+  script.folder = "/a shared `folder`";
+  expected += script.programs + "\n" + script.folder + "/slabstream-17\n";
+  // The values alone, printed a line each.
+  std::string text = TextOf(script);
+  const std::size_t body = text.find("\nservice_file()");
+  ASSERT_NE(body, std::string::npos);
+  text.resize(body);
+  const std::string path = Written(text + "\nprintf '%s\\n' \"${data[@]}\" \"$programs\" \"$folder\"\n");
+  EXPECT_EQ(OutputOf("SLURM_ARRAY_JOB_ID=17 SLURM_CPUS_ON_NODE=4 bash " + path), expected);
+}
+
+TEST_F(JobScriptTest, ShellWordsComeBack) {
+  for (const std::string& text : kOddTexts)
+    EXPECT_EQ(OutputOf("bash " + Written("printf '%s.' " + ShellWord(text))), text + ".") << ShellWord(text);
+}
+
+TEST_F(JobScriptTest, ShellcheckFindsNothing) {
+  if (!IsInstalled("shellcheck")) GTEST_SKIP() << "needs shellcheck";
+  JobScript script = SomeScript();
+  for (const std::string& text : kOddTexts) script.data.push_back("x=/" + text);
+  for (const int threads : {0, 3}) {
+    for (const char* folder : {"", "/a shared 'folder'"}) {
+      script.threads = threads;
+      script.folder = folder;
+      // SC2016: a $ in single quotes stands for itself, as it should.
+      EXPECT_EQ(OutputOf("shellcheck --shell=bash --exclude=SC2016 " + Written(TextOf(script))), "");
+    }
+  }
+}
+
+TEST_F(JobScriptTest, SlurmSeesTheOptions) {
+  JobScript script = SomeScript();
+  script.nodes = 4;
+  script.workers_per_node = 2;
+  script.time = "1:30:00";
+  script.notice_seconds = 90;
+  script.directives = {"--partition=long"};
+  const std::string whole_nodes = TextOf(script);
+  for (const char* line :
+       {"--array=0-3", "--nodes=1", "--ntasks=2", "--time=1:30:00", "--signal=TERM@90", "--requeue", "--exclusive", "--partition=long"})
+    EXPECT_THAT(whole_nodes, HasSubstr(std::string("\n#SBATCH ") + line + "\n"));
+  EXPECT_LT(whole_nodes.rfind("#SBATCH"), whole_nodes.find("set -u")) << "Slurm stops reading at the first command";
+  EXPECT_GT(whole_nodes.find("--partition=long"), whole_nodes.find("--requeue")) << "of two options Slurm takes the later";
+  script.threads = 3;
+  EXPECT_THAT(TextOf(script), HasSubstr("\n#SBATCH --cpus-per-task=3\n"));
+  EXPECT_THAT(TextOf(script), Not(HasSubstr("--exclusive")));
+}
+
+TEST(SlurmValues, Times) {
+  const std::vector<std::pair<std::string, int>> good = {{"1", 60},        {"90", 5400},         {"1:00", 60},          {"90:30", 5430},
+                                                         {"0:01:00", 60},  {"48:00:00", 172800}, {"1:30:00", 5400},     {"1-0", 86400},
+                                                         {"2-12", 216000}, {"2-12:30", 217800},  {"2-12:30:15", 217815}};
+  for (const auto& [text, seconds] : good) {
+    const Result<TimeLimit> time = ParseTimeLimit("--time", text);
+    ASSERT_TRUE(time.ok()) << time.status().message();
+    EXPECT_EQ(time->seconds, seconds) << text;
+    EXPECT_EQ(time->text, text);
+  }
+  for (const char* text :
+       {"",        "x",       "-1",      "+1", " 1", "1 ",   "1h",     "1.5",      "1:",    ":1",        "1:60",
+        "1:60:00", "1:00:60", "1:2:3:4", "1-", "-",  "1-24", "1-1:60", "1-1:1:60", "1-1-1", "1-1:1:1:1", "99999999999999999999",
+        "0",       "0:59",    "366-0",   "1\n"}) {
+    const Status status = ParseTimeLimit("--time", text).status();
+    EXPECT_EQ(status.code(), StatusCode::kInvalidArgument) << text;
+    EXPECT_THAT(status.message(), HasSubstr("--time"));
+  }
+}
+
+TEST(SlurmValues, Directives) {
+  EXPECT_EQ(*ParseDirective("--sbatch", "partition=long"), "--partition=long");
+  EXPECT_EQ(*ParseDirective("--sbatch", "--account=a b"), "--account=a b");
+  EXPECT_EQ(*ParseDirective("--sbatch", "exclusive"), "--exclusive");
+  for (const char* text :
+       {"", "--", "-p", "=x", "par tition=x", "array=0-3", "--array", "nodes=2", "ntasks=3", "mail-user=a\nrm x", "a=\x7f"}) {
+    const Status status = ParseDirective("--sbatch", text).status();
+    EXPECT_EQ(status.code(), StatusCode::kInvalidArgument) << text;
+    EXPECT_THAT(status.message(), HasSubstr("--sbatch '"));
+    EXPECT_THAT(status.message(), Not(HasSubstr("\n")));
+  }
+}
+
+}  // namespace
+}  // namespace slabstream
