@@ -1,4 +1,7 @@
 // The file of `experiment sweep`: the parameters to vary, as JSON. docs/experiments.md has an example.
+//
+// A sweep runs on this machine or at a running service. The service has workers, links and volumes of its own: a volume is then a dataset
+// of its catalogue (a sphere is the dataset of its name: class2-512), and the file names neither workers nor links.
 #pragma once
 
 #include <string>
@@ -35,7 +38,9 @@ struct SweepLink {
   LinkModel link;
 };
 
-// Every combination of these is a case.
+enum class SweepPlace : bool { kHere, kAtService };
+
+// Every combination of these is a case. At a service `workers` and `links` are empty.
 struct Sweep {
   std::string title;
   std::vector<BenchCase> volumes;
@@ -51,8 +56,15 @@ struct Sweep {
 std::string Describe(const Policy& policy);
 
 // InvalidArgument in one line naming `path`, the field by its place ("policies[1].combine"), the value and what is allowed.
-Result<Sweep> ParseSweep(const std::string& path, std::string_view text);
+Result<Sweep> ParseSweep(const std::string& path, std::string_view text, SweepPlace place = SweepPlace::kHere);
 // The same of a file; also fails if it cannot be read.
-Result<Sweep> ReadSweep(const std::string& path);
+Result<Sweep> ReadSweep(const std::string& path, SweepPlace place = SweepPlace::kHere);
+
+// A combination of volume, renderer, view and policy.
+struct SweepFrame {
+  FrameCase frame;  // of one worker
+  Json names;       // what the file calls them, as columns of results: part, volume, view, variant
+};
+std::vector<SweepFrame> FramesOf(const Sweep& sweep);
 
 }  // namespace slabstream

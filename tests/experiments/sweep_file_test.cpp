@@ -123,6 +123,36 @@ TEST(SweepFile, TellsWhatIsWrongInOneLineThatNamesFieldValueAndLimit) {
   for (const char* text : {"", "[]", "3", "{}", "null"}) EXPECT_FALSE(ParseSweep("s.json", text).ok()) << text;
 }
 
+TEST(SweepFile, AtAServiceVolumesAreDatasets) {
+  const char* text = R"({"volumes": [{"dataset": "head", "transfer": "ct-bone"}, {"sphere": {"class": 2, "size": 512, "occupancy": 0.4}}],
+    "policies": [{}]})";
+  const Result<Sweep> sweep = ParseSweep("s.json", text, SweepPlace::kAtService);
+  ASSERT_TRUE(sweep.ok()) << sweep.status().message();
+  EXPECT_EQ(sweep->volumes[0].dataset, "head");
+  EXPECT_EQ(sweep->volumes[0].name, "head-ct-bone");
+  EXPECT_EQ(sweep->volumes[1].dataset, "class2-512");
+  EXPECT_THAT(sweep->workers, testing::IsEmpty());
+  EXPECT_THAT(sweep->links, testing::IsEmpty());
+
+  const auto refused = [](const std::string& file, SweepPlace place) { return ParseSweep("s.json", file, place).status().message(); };
+  EXPECT_THAT(refused(R"({"volumes": [{"file": "head.nrrd"}], "policies": [{}]})", SweepPlace::kAtService),
+              HasSubstr("volumes[0]: {\"file\":\"head.nrrd\"} must have either 'sphere' or 'dataset': the service has volumes of its own"));
+  for (const char* own : {"workers", "links"}) {
+    EXPECT_THAT(refused(Replaced(text, "{", std::string("{\"") + own + "\": [1], "), SweepPlace::kAtService),
+                HasSubstr(std::string("'") + own + "': a running service has its own"));
+  }
+  EXPECT_THAT(refused(text, SweepPlace::kHere), HasSubstr("must have either 'sphere' or 'file'"));
+}
+
+TEST(SweepFile, FramesAreEveryCombination) {
+  const Sweep sweep = ParseSweep("s.json", kGood).value();
+  const std::vector<SweepFrame> frames = FramesOf(sweep);
+  ASSERT_EQ(frames.size(), 8U);
+  EXPECT_EQ(frames[7].frame.volume.renderer, FindRenderer("raycast"));
+  EXPECT_EQ(frames[7].frame.policy, sweep.policies[1].policy);
+  EXPECT_EQ(frames[7].names["part"], "class2-40-0.3, fine, close");
+}
+
 TEST(SweepFile, ALongListIsRefused) {
   std::string workers = "1";
   for (int i = 0; i < 3000; ++i) workers += ", 2";
