@@ -24,7 +24,7 @@ def page(run: Run) -> Page:
 def _service_page(run: Run) -> Page:
     roster = run.attached("roster")
     table = Table("Roster", list(roster.columns), [list(row) for row in roster.itertuples(index=False)])
-    sections = [_service_section(run, part) for part in run.distinct("part", metric="period")]
+    sections = [_service_section(run, part, f"sweep-{i + 1}") for i, part in enumerate(run.distinct("part", metric="period"))]
     sections.append(Section("Roster", "Who rendered?", "The workers of the service when the run began.", blocks=[table]))
     return Page(
         str(run.attached("sweep")["title"].iloc[0]),
@@ -34,7 +34,7 @@ def _service_page(run: Run) -> Page:
     )
 
 
-def _service_section(run: Run, part: str) -> Section:
+def _service_section(run: Run, part: str, name: str) -> Section:
     policies = run.distinct("variant", part=part)
 
     def times(metric: str) -> str:
@@ -47,6 +47,12 @@ def _service_section(run: Run, part: str) -> Section:
         "Latency: one frame in flight. Period: from picture to picture, with more frames requested ahead than the service has under way.",
         f"Least times: latency, {times('latency')}; from picture to picture, {times('period')}.",
         [
+            plots.bars(
+                name,
+                part,
+                {policy: {metric: run.value(metric, part=part, variant=policy) for metric in ("latency", "period")} for policy in policies},
+                "time",
+            ),
             Table(
                 part,
                 ["policy", "asked for", "latency", "period", "rendering, all", "rendering, longest", "imbalance", "idle", "image bytes"],
