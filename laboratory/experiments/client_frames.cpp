@@ -13,6 +13,7 @@ namespace {
 
 constexpr int kWarmUpFrames = 2;
 constexpr int kLearningFrames = 8;  // with dynamic balance
+constexpr int kLeastMeasured = 8;   // frames from picture to picture
 constexpr Duration kPatience = std::chrono::seconds(1);
 
 double Milliseconds(std::int64_t ns) { return double(ns) * 1e-6; }
@@ -54,7 +55,7 @@ Json MeasureLatency(Client& client, const FrameRequest& request, int warm_up, in
 }
 
 double MeasurePeriod(Client& client, const FrameRequest& request, int in_flight) {
-  const int frames = 4 * in_flight;
+  const int measured = std::max(in_flight, kLeastMeasured), frames = measured + 2 * in_flight;
   int submitted = 0;
   for (; submitted < in_flight; ++submitted) client.Submit(request);
   std::vector<Time> received;
@@ -67,8 +68,8 @@ double MeasurePeriod(Client& client, const FrameRequest& request, int in_flight)
     received.push_back(MonotonicNow());
     if (submitted < frames) client.Submit(request), ++submitted;
   }
-  const Duration middle = received[std::size_t(3 * in_flight) - 1] - received[std::size_t(in_flight) - 1];
-  return Milliseconds(middle.count()) / (2 * in_flight);
+  const Duration middle = received[std::size_t(in_flight + measured) - 1] - received[std::size_t(in_flight) - 1];
+  return Milliseconds(middle.count()) / measured;
 }
 
 }  // namespace slabstream

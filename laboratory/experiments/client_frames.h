@@ -14,8 +14,8 @@ int WarmUpFrames(const Policy& policy);
 // "workers", the least number that a frame had. Throws Failure with the frame's.
 Json MeasureLatency(Client& client, const FrameRequest& request, int warm_up, int frames);
 
-// Milliseconds from picture to picture, with `in_flight` frames requested ahead: over the middle half of four times as many frames, when
-// neither the first frames wait for the pipeline nor the last ones leave workers idle. Throws Failure with a frame's.
+// Milliseconds from picture to picture, with `in_flight` frames requested ahead: over some frames in the middle, when the pipeline is full
+// and the last frames do not yet leave workers idle. Throws Failure with a frame's.
 double MeasurePeriod(Client& client, const FrameRequest& request, int in_flight);
 
 }  // namespace slabstream
