@@ -62,7 +62,7 @@ void RunSweepHere(ExperimentContext& context, const Sweep& sweep, Results& resul
   context.Run(std::move(trials), kRepeats, kQuickRepeats);
 
   for (const SweepCase& c : cases) {
-    AddFigures(results, c.columns, RecallFigures(context, c.team, c.link, c.teams));
+    AddFigures(results, c.columns, RecallFigures(context, c.team, c.link, c.teams, sweep.host));
     if (!c.served) continue;
     Json here = c.columns;
     here["link"] = "host";

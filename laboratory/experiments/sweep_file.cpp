@@ -28,7 +28,7 @@
 namespace slabstream {
 namespace {
 
-constexpr int kMaxSphere = 1024;
+constexpr int kMaxSphere = 1024, kMaxHostCores = 1024;
 
 template <class Entries>
 std::vector<std::string_view> NamesIn(const Entries& entries) {
@@ -278,7 +278,7 @@ Result<Sweep> ParseSweep(const std::string& path, std::string_view text, SweepPl
   }
   Sweep sweep;
   const JsonValue file(json, "", mistake);
-  for (const char* own : {"workers", "links"}) {
+  for (const char* own : {"workers", "links", "hosts"}) {
     if (place == SweepPlace::kAtService && file.Has(own))
       mistake = fmt::format("'{}': a running service has its own, so leave them out", own);
   }
@@ -291,6 +291,12 @@ Result<Sweep> ParseSweep(const std::string& path, std::string_view text, SweepPl
        {"policies", [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.policies.push_back(ReadPolicy(e)); }); }},
        {"workers",
         [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.workers.push_back(e.Integer(1, kMaxSweepWorkers)); }); }},
+       {"hosts",
+        [&](const JsonValue& v) {
+          constexpr std::array<std::string_view, 2> kTraffic = {"plain", "encrypted"};
+          v.Fields({{"cores", [&](const JsonValue& c) { sweep.host.cores = c.Integer(1, kMaxHostCores); }},
+                    {"traffic", [&](const JsonValue& t) { sweep.host.encrypted = t.OneOf(kTraffic) == 1; }}});
+        }},
        {"links", [&](const JsonValue& v) {
           v.Each([&](const JsonValue& e) {
             const std::string name = e.Text();

@@ -1,7 +1,7 @@
 // The file of `experiment sweep`: the parameters to vary, as JSON. docs/experiments.md has an example.
 //
 // A sweep runs on this machine or at a running service. The service has workers, links and volumes of its own: a volume is then a dataset
-// of its catalogue (a sphere is the dataset of its name: class2-512), and the file names neither workers nor links.
+// of its catalogue (a sphere is the dataset of its name: class2-512), and the file names neither workers, links nor hosts.
 #pragma once
 
 #include <string>
@@ -13,6 +13,7 @@
 #include "common/simulation/link_model.h"
 #include "laboratory/bench/bench_cases.h"
 #include "laboratory/experiments/frame_case.h"
+#include "laboratory/experiments/machines.h"
 
 namespace slabstream {
 
@@ -40,7 +41,7 @@ struct SweepLink {
 
 enum class SweepPlace : bool { kHere, kAtService };
 
-// Every combination of these is a case. At a service `workers` and `links` are empty.
+// Every combination of these is a case. At a service `workers` and `links` are empty, and `host` has its defaults.
 struct Sweep {
   std::string title;
   std::vector<BenchCase> volumes;
@@ -49,6 +50,7 @@ struct Sweep {
   std::vector<SweepPolicy> policies;
   std::vector<int> workers;
   std::vector<SweepLink> links;
+  HostModel host;  // that is simulated
   ImageSize size{512, 512};
 };
 
