@@ -158,6 +158,18 @@ class Cluster:
         for host in self.hosts:
             host.limit(share, bytes_per_second)
 
+    def busy_seconds(self) -> float:
+        """Processor time of the processes that run on the hosts, since they began."""
+        ticks = 0
+        for host in self.hosts:
+            for pid in host.quota.processes():
+                try:
+                    fields = pathlib.Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+                except OSError:  # it has ended
+                    continue
+                ticks += int(fields[11]) + int(fields[12])  # in user mode, in the kernel
+        return ticks / os.sysconf("SC_CLK_TCK")
+
     def close(self) -> None:
         """Ends all processes of the hosts and removes the hosts."""
         for host in self.hosts:
@@ -170,3 +182,21 @@ class Cluster:
 
     def __exit__(self, *_) -> None:
         self.close()
+
+
+class OtherLoad:
+    """The share of this machine that others than the cluster take, from now on: the hosts then do not get theirs."""
+
+    def __init__(self, cluster: Cluster):
+        self._cluster = cluster
+        self._began = self._now()
+
+    def share(self) -> float:
+        total, busy, own = (now - began for now, began in zip(self._now(), self._began))
+        return max(0.0, busy - own) / total if total > 0 else 0.0
+
+    def _now(self) -> tuple[float, float, float]:
+        ticks = [int(text) for text in pathlib.Path("/proc/stat").read_text(encoding="utf-8").split("\n", 1)[0].split()[1:9]]
+        idle = ticks[3] + ticks[4]  # and waiting for a disk
+        second = os.sysconf("SC_CLK_TCK")
+        return sum(ticks) / second, (sum(ticks) - idle) / second, self._cluster.busy_seconds()
