@@ -216,24 +216,33 @@ auto FrameSimulation::CostOf(const Job&, const StartCombine& action) -> Cost {
   const bool all = action.pixels.begin >= action.pixels.end;
   const PixelRange pixels = all ? PixelRange{0, std::uint64_t(action.frame.pixel_count())} : action.pixels;
   const CombiningCosts& costs = machine_.combining;
-  return {{(action.other == 0 ? costs.combine_pixel : costs.local_pixel) * GroupOf(action.key).coverage.Of(action.ranks, pixels).filled}};
+  const UnionCoverage::Amount amount = GroupOf(action.key).coverage.Of(action.ranks, pixels);
+  if (action.other != 0) return {{costs.local_pixel * amount.filled}};
+  return {{costs.combine_pixel * amount.filled + costs.cipher_byte * MessageBytes(action.key, amount)}};
 }
 
 auto FrameSimulation::CostOf(const Job&, const FindHidden& action) const -> Cost {
   return {{machine_.combining.hidden_pixel * double(FrameBounds(*action.setup).pixel_count())}};
 }
 
+double FrameSimulation::MessageBytes(const GroupKey& key, const UnionCoverage::Amount& amount) const {
+  const CombiningCosts& costs = machine_.combining;
+  const FramePlan& of = plan(FrameOf(key));
+  const ColorCoding color =
+      of.setup.format == PixelFormat::kRgba ? of.groups[key.group].color : ColorCoding::kFloat32;  // others: never coded
+  const double color_share = double(BytesPerChannel(color)) / double(BytesPerChannel(ColorCoding::kFloat32));
+  const double pixel_bytes = HasDepth(of.setup.format) ? costs.depth_bytes : costs.rgba_bytes * color_share;
+  return amount.filled * pixel_bytes + amount.runs * costs.run_bytes;
+}
+
 auto FrameSimulation::CostOf(Job& job, const SendPartial& action) -> Cost {
   const CombiningCosts& costs = machine_.combining;
-  const PixelFormat format = plan(FrameOf(action.message.key)).setup.format;
-  const ColorCoding color = format == PixelFormat::kRgba ? action.color : ColorCoding::kFloat32;  // others are never coded
-  const double color_share = double(BytesPerChannel(color)) / double(BytesPerChannel(ColorCoding::kFloat32));
   const UnionCoverage::Amount amount = GroupOf(action.message.key).coverage.Of(action.message.interval, action.message.pixels);
   job.pixels = amount.filled;
-  job.bytes = amount.filled * (HasDepth(format) ? costs.depth_bytes : costs.rgba_bytes * color_share) + amount.runs * costs.run_bytes;
+  job.bytes = MessageBytes(action.message.key, amount);
   // The thread that owns the sockets announces a lent image itself if that is quicker, as in workers.
-  return {
-      {costs.scan_pixel * amount.scanned + costs.encode_pixel * amount.filled, 1, costs.lent && service_.Idle(job.node, Lane::kCombine)}};
+  return {{costs.scan_pixel * amount.scanned + costs.encode_pixel * amount.filled + costs.cipher_byte * job.bytes, 1,
+           costs.lent && service_.Idle(job.node, Lane::kCombine)}};
 }
 
 auto FrameSimulation::CostOf(const Job&, const SendFrame& action) const -> Cost {

@@ -69,6 +69,7 @@ class FrameSimulation : private Conditions {
   Cost CostOf(const Job&, const FindHidden& action) const;
   Cost CostOf(Job& job, const SendPartial& action);
   Cost CostOf(const Job&, const SendFrame& action) const;
+  double MessageBytes(const GroupKey& key, const UnionCoverage::Amount& amount) const;
   double Slowness(std::uint32_t frame, Node node) const;
   void BeginGroup(const GroupAssignment& assignment);
   // When the last byte arrives of a message that leaves at `sent`. Fills in the message's times.

@@ -20,11 +20,10 @@ Status Validate(const LinkModel& link) {
 }
 
 Status Validate(const CombiningCosts& costs) {
-  const std::pair<const char*, double> seconds[] = {{"combining.scan_pixel", costs.scan_pixel},
-                                                    {"combining.encode_pixel", costs.encode_pixel},
-                                                    {"combining.combine_pixel", costs.combine_pixel},
-                                                    {"combining.local_pixel", costs.local_pixel},
-                                                    {"combining.hidden_pixel", costs.hidden_pixel}};
+  const std::pair<const char*, double> seconds[] = {
+      {"combining.scan_pixel", costs.scan_pixel},       {"combining.encode_pixel", costs.encode_pixel},
+      {"combining.combine_pixel", costs.combine_pixel}, {"combining.local_pixel", costs.local_pixel},
+      {"combining.hidden_pixel", costs.hidden_pixel},   {"combining.cipher_byte", costs.cipher_byte}};
   for (const auto& [field, value] : seconds) {
     if (Status s = InRange(field, value, 0, kMaxSeconds); !s.ok()) return s;
   }

@@ -18,6 +18,7 @@ struct CombiningCosts {
   double combine_pixel = calibration::combining::kCombine;  // from a message, checked, onto what is there
   double local_pixel = calibration::combining::kLocal;      // of one image of this worker onto another one
   double hidden_pixel = calibration::combining::kHidden;    // of the frame: searched for opaque tiles (FindHiddenTiles)
+  double cipher_byte = 0;                                   // of a message: encrypted, and again decrypted; 0: connections without keys
   std::int32_t run_bytes = 12;                              // a run in a message
   std::int32_t rgba_bytes = 16;                             // a pixel in a message: splatting, colours as floats
   std::int32_t depth_bytes = 24;                            // a pixel in a message: Z-buffer

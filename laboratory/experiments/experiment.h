@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "client/cli/options.h"
 #include "common/base/status.h"
 #include "common/frame/frame_request.h"
 #include "laboratory/experiments/trials.h"
@@ -29,6 +30,8 @@ struct OwnOptions {
   std::vector<std::string> views;         // sequences of views
   std::vector<int> footprints;            // diameters of footprints, pixels
   std::vector<TransferChoice> transfers;  // two: the transfer function changes from one to the other in the middle of a sequence
+  ServiceChoice service;                  // a running service whose frames are measured, instead of this machine
+  bool at_service() const { return !service.endpoint.empty() || !service.file.empty(); }
 };
 
 struct ExperimentOptions {
@@ -96,5 +99,6 @@ void RunStreaming(ExperimentContext& context, Results& results);
 void RunScaling(ExperimentContext& context, Results& results);
 void RunSweep(ExperimentContext& context, Results& results);
 void CheckSweepFile(const ExperimentOptions& options);
+void DeclareSweep(CLI::App& app, OwnOptions& options);
 
 }  // namespace slabstream

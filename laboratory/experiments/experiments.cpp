@@ -10,7 +10,7 @@ const std::vector<Experiment>& Experiments() {
       {"combining", "combining schemes over picture sizes, active pixels, workers and links", RunCombining},
       {"streaming", "groups against efficiency, memory of a worker and the time to the first preview", RunStreaming},
       {"scaling", "strong and weak scaling of both pipelines", RunScaling},
-      {"sweep", "your own: volumes, views, policies and workers named by a FILE.json (docs/experiments.md)", RunSweep, nullptr,
+      {"sweep", "your own: volumes, views, policies and workers named by a FILE.json (docs/experiments.md)", RunSweep, DeclareSweep,
        CheckSweepFile, true},
   };
   return experiments;

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "laboratory/experiments/balanced_case.h"
-#include "laboratory/experiments/machines.h"
 
 namespace slabstream {
 
@@ -24,8 +23,9 @@ std::vector<FrameFigures> FindFigures(const std::vector<MeasuredFrame>& frames, 
   return repeats;
 }
 
-std::vector<FrameFigures> RecallFigures(ExperimentContext& context, const FrameCase& frame, const LinkModel& link, int teams) {
-  return FindFigures(RecallCosts(context, frame), Clusters(context, link), teams);
+std::vector<FrameFigures> RecallFigures(ExperimentContext& context, const FrameCase& frame, const LinkModel& link, int teams,
+                                        const HostModel& host) {
+  return FindFigures(RecallCosts(context, frame), Clusters(context, link, host), teams);
 }
 
 void AddFigures(Results& results, const Json& of, const std::vector<FrameFigures>& repeats) {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "laboratory/experiments/frame_case.h"
+#include "laboratory/experiments/machines.h"
 #include "laboratory/results/results.h"
 
 namespace slabstream {
@@ -24,7 +25,8 @@ FrameFigures FindFigures(const MeasuredFrame& frame, const MachineModel& machine
 std::vector<FrameFigures> FindFigures(const std::vector<MeasuredFrame>& frames, const std::vector<MachineModel>& machines, int teams = 1);
 
 // The same of a frame whose CostTrial and FinishTrial were run, on machines joined by `link` (Clusters).
-std::vector<FrameFigures> RecallFigures(ExperimentContext& context, const FrameCase& frame, const LinkModel& link, int teams = 1);
+std::vector<FrameFigures> RecallFigures(ExperimentContext& context, const FrameCase& frame, const LinkModel& link, int teams = 1,
+                                        const HostModel& host = {});
 
 // Adds each figure as a metric: latency, preview, period, imbalance, idle_share, image_bytes.
 void AddFigures(Results& results, const Json& of, const std::vector<FrameFigures>& repeats);

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <utility>
 
-#include "client/cli/frame_summary.h"
 #include "client/cli/session.h"
 #include "common/base/check.h"
 #include "common/planning/frame_window.h"
@@ -17,6 +16,7 @@
 #include "common/renderers/registry.h"
 #include "coordinator/tuning/choose_policy.h"
 #include "coordinator/tuning/service_machine.h"
+#include "laboratory/experiments/client_frames.h"
 #include "laboratory/experiments/frame_keys.h"
 #include "laboratory/measure/box_costs.h"
 #include "laboratory/measure/frame_costs.h"
@@ -26,8 +26,7 @@ namespace slabstream {
 namespace {
 
 constexpr int kRenderings = 2;  // rounds of box costs
-constexpr int kWarmUpFrames = 2, kFinishes = 3;
-constexpr int kLearningFrames = 8;  // to warm up with dynamic balance
+constexpr int kFinishes = 3;
 constexpr DatasetId kPlannedDataset = 1;
 
 // Counts of non-empty pixels, tile by tile, in the smallest rectangle of tiles that holds all: [x, y, width, height, count, ...].
@@ -146,37 +145,13 @@ Json MeasureFinish(ExperimentContext& context, const FrameCase& frame) {
   return Json{{"finish_seconds", cost.finish_seconds}, {"receive_seconds", cost.receive_seconds}};
 }
 
-int WarmUpFrames(const Policy& policy) { return policy.balance == kDynamicBalance ? kLearningFrames : kWarmUpFrames; }
-
 Json MeasureService(ExperimentContext& context, const FrameCase& frame, int frames) {
   const VolumeInUse volume = context.volumes().Get(frame.volume);
   Session session = OrThrow(Session::OpenLocal({.local_workers = frame.workers, .local_threads = 1},
                                                [held = volume.volume]() -> Result<std::shared_ptr<const Volume>> { return held; }));
   FrameRequest request = RequestOf(frame);
   request.dataset = session.dataset();
-  std::vector<double> latencies, imbalances, idle_shares, image_bytes;
-  std::array<std::vector<double>, kStageCount> stages;
-  const int warm_up = WarmUpFrames(frame.policy);
-  for (int i = 0; i < warm_up + frames; ++i) {
-    const Picture picture = OrThrow(session.client().Render(request));
-    if (i < warm_up) continue;
-    const FrameSummary summary = Summarize(picture.statistics);
-    latencies.push_back(double(picture.latency.count()) * 1e-6);
-    imbalances.push_back(summary.imbalance);
-    idle_shares.push_back(summary.idle_share);
-    image_bytes.push_back(double(summary.image_bytes));
-    for (std::size_t stage = 0; stage < stages.size(); ++stage) stages[stage].push_back(double(summary.stage_ns[stage]) * 1e-6);
-  }
-  Json stage_medians = Json::object();
-  for (std::size_t stage = 0; stage < stages.size(); ++stage) {
-    stage_medians[std::string(ToString(Stage(stage)))] = MedianOf(std::move(stages[stage])).median;
-  }
-  return Json{{"latency_ms", MedianOf(latencies).median},
-              {"all_latency_ms", latencies},
-              {"stages_ms", stage_medians},
-              {"imbalance", MedianOf(std::move(imbalances)).median},
-              {"idle_share", MedianOf(std::move(idle_shares)).median},
-              {"image_bytes", MedianOf(std::move(image_bytes)).median}};
+  return MeasureLatency(session.client(), request, WarmUpFrames(frame.policy), frames);
 }
 
 // Relative to other frames: rendering grows with voxels and halos of boxes, and with pixels.

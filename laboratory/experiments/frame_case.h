@@ -57,8 +57,8 @@ Json BoxCostKey(ExperimentContext& context, const FrameCase& frame);
 Trial FinishTrial(ExperimentContext& context, const FrameCase& frame);
 Json FinishKey(ExperimentContext& context, const FrameCase& frame);
 
-// Frames of the embedded service with frame.workers workers of one thread each, one frame in flight, after two warm-up frames. Numbers:
-// "latency_ms" (the median of `frames`), "stages_ms" by name, "imbalance", "idle_share", "image_bytes".
+// Frames of the embedded service with frame.workers workers of one thread each, one frame in flight, after WarmUpFrames. Numbers: those of
+// MeasureLatency.
 Trial ServiceTrial(ExperimentContext& context, const FrameCase& frame, int frames);
 Json ServiceKey(ExperimentContext& context, const FrameCase& frame, int frames);
 

@@ -49,28 +49,29 @@ LinkModel Link(std::string_view preset) { return ParseLink("link", preset).value
 
 namespace {
 
-MachineModel JoinedBy(MachineModel machine, const LinkModel& link) {
+MachineModel JoinedBy(MachineModel machine, const LinkModel& link, const HostModel& host) {
   machine.message_seconds = MachineModel().message_seconds;  // over sockets; threads of one process need none
   machine.link = link;
   machine.workers_a_host = 1;
-  machine.cores_a_host = kCoresAHost;
+  machine.cores_a_host = host.cores;
+  if (host.encrypted) machine.combining.cipher_byte = calibration::service::kCipherByte;
   return machine;
 }
 
 }  // namespace
 
-MachineModel Cluster(const ExperimentContext& context, const LinkModel& link) {
+MachineModel Cluster(const ExperimentContext& context, const LinkModel& link, const HostModel& host) {
   MachineModel machine;
   for (const Found& number : kNumbers) number.of(machine) = EstimateOf(context.log(), HostKey(), number.name).median;
-  return JoinedBy(machine, link);
+  return JoinedBy(machine, link, host);
 }
 
-std::vector<MachineModel> Clusters(const ExperimentContext& context, const LinkModel& link) {
+std::vector<MachineModel> Clusters(const ExperimentContext& context, const LinkModel& link, const HostModel& host) {
   std::vector<MachineModel> machines;
   for (const Json* numbers : context.log().All(HostKey())) {
     MachineModel& machine = machines.emplace_back();
     for (const Found& number : kNumbers) number.of(machine) = numbers->at(number.name).get<double>();
-    machine = JoinedBy(machine, link);
+    machine = JoinedBy(machine, link, host);
   }
   return machines;
 }

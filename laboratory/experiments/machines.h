@@ -12,12 +12,15 @@ namespace slabstream {
 // Measures this machine's constants for the simulation (laboratory/measure/calibrate.h), except those for pixels that travel between hosts.
 Trial HostTrial();
 
-// A host for each worker, of kCoresAHost cores of this machine's speed, joined by `link`: one core renders, one does everything else.
-// HostTrial must have been run.
-inline constexpr int kCoresAHost = 2;
-MachineModel Cluster(const ExperimentContext& context, const LinkModel& link);
+// A host for each worker, with cores of this machine's speed.
+struct HostModel {
+  int cores = 2;           // if there are two, one renders and one does everything else
+  bool encrypted = false;  // what hosts send each other, which costs processor time
+};
+// Such hosts, joined by `link`. HostTrial must have been run.
+MachineModel Cluster(const ExperimentContext& context, const LinkModel& link, const HostModel& host = {});
 // The same for every repeat of HostTrial.
-std::vector<MachineModel> Clusters(const ExperimentContext& context, const LinkModel& link);
+std::vector<MachineModel> Clusters(const ExperimentContext& context, const LinkModel& link, const HostModel& host = {});
 LinkModel Link(std::string_view preset);  // of LinkPresets()
 
 }  // namespace slabstream

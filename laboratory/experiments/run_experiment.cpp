@@ -16,6 +16,7 @@
 #include "common/transport/socket.h"
 #include "laboratory/bench/bench_machine.h"
 #include "laboratory/experiments/request_json.h"
+#include "laboratory/experiments/service_sweep.h"
 #include "laboratory/experiments/sweep_file.h"
 #include "laboratory/measure/other_load.h"
 
@@ -31,11 +32,17 @@ Json Parameters(const ExperimentOptions& options, VolumeCache& volumes) {
   if (!options.sweep_file.empty()) {
     parameters["sweep"] = Json::parse(OrThrow(ReadTextFile(options.sweep_file, kMaxSweepBytes)), nullptr, false);
   }
-  const auto& [cases, workers, renderers, views, footprints, transfers] = options.own;
+  const auto& [cases, workers, renderers, views, footprints, transfers, service] = options.own;
   parameters["own"] = {{"cases", cases}, {"workers", workers},       {"renderers", Json::array()},
                        {"views", views}, {"footprints", footprints}, {"transfers", Json::array()}};
   for (const RendererKind* renderer : renderers) parameters["own"]["renderers"].push_back(renderer->name());
   for (const TransferChoice& transfer : transfers) parameters["own"]["transfers"].push_back(TransferJson(transfer));
+  if (options.own.at_service()) {
+    const Sweep sweep = OrThrow(ReadSweep(options.sweep_file, SweepPlace::kAtService));
+    parameters["service"] = DescribeService(service, sweep);
+    for (const BenchCase& volume : sweep.volumes) parameters["contents"].push_back(TransferJson(volume.transfer));
+    return parameters;
+  }
   // Texts that name files do not say what is in them.
   std::vector<BenchCase> named = options.sweep_file.empty() ? RealVolumes(options.volumes) : OrThrow(ReadSweep(options.sweep_file)).volumes;
   std::ranges::move(NamedVolumes("VOLUME", cases), std::back_inserter(named));

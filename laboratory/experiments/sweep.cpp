@@ -1,11 +1,12 @@
-#include <fmt/format.h>
-
+#include <CLI/CLI.hpp>
 #include <algorithm>
 
+#include "client/cli/option_groups.h"
 #include "laboratory/experiments/balanced_case.h"
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/figures.h"
 #include "laboratory/experiments/machines.h"
+#include "laboratory/experiments/service_sweep.h"
 #include "laboratory/experiments/sweep_file.h"
 
 namespace slabstream {
@@ -25,49 +26,32 @@ struct SweepCase {
 
 std::vector<SweepCase> CasesOf(ExperimentContext& context, const Sweep& sweep) {
   std::vector<SweepCase> cases;
-  const auto add = [&](const BenchCase& volume, const SweepRenderer& renderer, const SweepView& view, const SweepPolicy& policy,
-                       int workers, const SweepLink& link) {
-    SweepCase& c = cases.emplace_back();
-    c.link = link.link;
-    c.teams = std::min(policy.policy.teams, workers);
-    c.team = {volume, sweep.size, view.view, policy.policy, workers / c.teams, renderer.look};
-    c.team.volume.renderer = renderer.kind;
-    c.team.policy.teams = 1;
-    c.team = WithChosenPolicy(context, std::move(c.team), link.link);
-    c.frame = c.team;
-    c.frame.workers = workers;
-    c.frame.policy.teams = policy.policy.teams;
-    // The service has no link to vary: it follows the choice for the first one.
-    c.served = workers <= kMeasuredWorkers && link.name == sweep.links.front().name;
-    c.columns = ColumnsOf(c.frame);
-    c.columns.update(Json{{"part", fmt::format("{}, {}, {}", volume.name, renderer.name, view.name)},
-                          {"volume", volume.name},
-                          {"view", view.name},
-                          {"teams", c.teams},
-                          {"variant", policy.name},
-                          {"link", link.name}});
-    if (c.team.policy.groups == 0) c.columns["groups"] = PlanOf(context, c.team).groups.size();
-  };
-  for (const BenchCase& volume : sweep.volumes) {
-    for (const SweepRenderer& renderer : sweep.renderers) {
-      for (const SweepView& view : sweep.views) {
-        for (const SweepPolicy& policy : sweep.policies) {
-          for (const int p : sweep.workers) {
-            for (const SweepLink& link : sweep.links) add(volume, renderer, view, policy, p, link);
-          }
-        }
+  for (const SweepFrame& asked : FramesOf(sweep)) {
+    for (const int p : sweep.workers) {
+      for (const SweepLink& link : sweep.links) {
+        SweepCase& c = cases.emplace_back();
+        c.link = link.link;
+        c.teams = std::min(asked.frame.policy.teams, p);
+        c.team = asked.frame;
+        c.team.workers = p / c.teams;
+        c.team.policy.teams = 1;
+        c.team = WithChosenPolicy(context, std::move(c.team), link.link);
+        c.frame = c.team;
+        c.frame.workers = p;
+        c.frame.policy.teams = asked.frame.policy.teams;
+        // The service has no link to vary: it follows the choice for the first one.
+        c.served = p <= kMeasuredWorkers && link.name == sweep.links.front().name;
+        c.columns = ColumnsOf(c.frame);
+        c.columns.update(asked.names);
+        c.columns.update(Json{{"teams", c.teams}, {"link", link.name}});
+        if (c.team.policy.groups == 0) c.columns["groups"] = PlanOf(context, c.team).groups.size();
       }
     }
   }
   return cases;
 }
 
-}  // namespace
-
-void CheckSweepFile(const ExperimentOptions& options) { (void)OrThrow(ReadSweep(options.sweep_file)); }
-
-void RunSweep(ExperimentContext& context, Results& results) {
-  const Sweep sweep = OrThrow(ReadSweep(context.options().sweep_file));
+void RunSweepHere(ExperimentContext& context, const Sweep& sweep, Results& results) {
   const std::vector<SweepCase> cases = CasesOf(context, sweep);
   std::vector<Trial> trials = {HostTrial()};
   for (const SweepCase& c : cases) {
@@ -78,13 +62,30 @@ void RunSweep(ExperimentContext& context, Results& results) {
   context.Run(std::move(trials), kRepeats, kQuickRepeats);
 
   for (const SweepCase& c : cases) {
-    AddFigures(results, c.columns, RecallFigures(context, c.team, c.link, c.teams));
+    AddFigures(results, c.columns, RecallFigures(context, c.team, c.link, c.teams, sweep.host));
     if (!c.served) continue;
     Json here = c.columns;
     here["link"] = "host";
     results.Add(here, "latency", EstimateOf(context.log(), ServiceKey(context, c.frame, kServiceFrames), "latency_ms").Times(1e-3),
                 Origin::kMeasured);
   }
+}
+
+SweepPlace PlaceOf(const ExperimentOptions& options) { return options.own.at_service() ? SweepPlace::kAtService : SweepPlace::kHere; }
+
+}  // namespace
+
+void DeclareSweep(CLI::App& app, OwnOptions& options) {
+  AddService(app, options.service)
+      ->description("Measure the frames of the service there, with its workers and datasets, and simulate nothing")
+      ->default_str("none: the workers are simulated from what is measured on this machine");
+}
+
+void CheckSweepFile(const ExperimentOptions& options) { (void)OrThrow(ReadSweep(options.sweep_file, PlaceOf(options))); }
+
+void RunSweep(ExperimentContext& context, Results& results) {
+  const Sweep sweep = OrThrow(ReadSweep(context.options().sweep_file, PlaceOf(context.options())));
+  context.options().own.at_service() ? RunServiceSweep(context, sweep, results) : RunSweepHere(context, sweep, results);
   results.Attach("sweep", {{{"title", sweep.title}}});
 }
 

@@ -29,7 +29,7 @@
 namespace slabstream {
 namespace {
 
-constexpr int kMaxSphere = 1024;
+constexpr int kMaxSphere = 1024, kMaxHostCores = 1024;
 
 template <class Entries>
 std::vector<std::string_view> NamesIn(const Entries& entries) {
@@ -47,12 +47,15 @@ std::string ReadName(const JsonValue& value, const Entries& entries) {
   return std::string(names[value.OneOf(names)]);
 }
 
-BenchCase ReadVolume(const JsonValue& value) {
-  if (value.Has("sphere") == value.Has("file")) {
-    value.Complain(fmt::format("{} must have either 'sphere' or 'file'", value.Shown()));
+BenchCase ReadVolume(const JsonValue& value, SweepPlace place) {
+  // What names a volume that is no sphere.
+  const char* const source = place == SweepPlace::kHere ? "file" : "dataset";
+  if (value.Has("sphere") == value.Has(source)) {
+    value.Complain(fmt::format("{} must have either 'sphere' or '{}'{}", value.Shown(), source,
+                               place == SweepPlace::kHere ? "" : ": the service has volumes of its own"));
     return {};
   }
-  if (value.Has("opacity") && (value.Has("file") || value.Has("transfer"))) {
+  if (value.Has("opacity") && (value.Has(source) || value.Has("transfer"))) {
     value.Complain("'opacity' is that of a sphere without 'transfer'");
     return {};
   }
@@ -73,9 +76,9 @@ BenchCase ReadVolume(const JsonValue& value) {
                  [&](const JsonValue& v) {
                    opacity = v.Number({0, 1, true});
                  }},
-                {"file",
+                {source,
                  [&](const JsonValue& v) {
-                   if (Result<BenchCase> parsed = ParseBenchCase(v.Text(), false); parsed.ok()) {
+                   if (Result<BenchCase> parsed = ParseBenchCase(v.Text(), place == SweepPlace::kAtService); parsed.ok()) {
                      volume = *std::move(parsed);
                    } else {
                      v.Complain(parsed.status().message());
@@ -244,22 +247,52 @@ std::string Describe(const Policy& policy) {
   return text;
 }
 
-Result<Sweep> ParseSweep(const std::string& path, std::string_view text) {
+std::vector<SweepFrame> FramesOf(const Sweep& sweep) {
+  std::vector<SweepFrame> frames;
+  for (const BenchCase& volume : sweep.volumes) {
+    for (const SweepRenderer& renderer : sweep.renderers) {
+      for (const SweepView& view : sweep.views) {
+        for (const SweepPolicy& policy : sweep.policies) {
+          SweepFrame& made = frames.emplace_back();
+          made.frame = {volume, sweep.size, view.view, policy.policy, 1, renderer.look};
+          made.frame.volume.renderer = renderer.kind;
+          made.names = {{"part", fmt::format("{}, {}, {}", volume.name, renderer.name, view.name)},
+                        {"volume", volume.name},
+                        {"view", view.name},
+                        {"variant", policy.name}};
+        }
+      }
+    }
+  }
+  return frames;
+}
+
+Result<Sweep> ParseSweep(const std::string& path, std::string_view text, SweepPlace place) {
   const Result<Json> parsed = ParseJson(text);
   if (!parsed.ok()) return Status::InvalidArgument(fmt::format("FILE '{}': {}", path, parsed.status().message()));
   const Json& json = *parsed;
   std::optional<std::string> mistake;
   Sweep sweep;
   const JsonValue file(json, "", mistake);
+  for (const char* own : {"workers", "links", "hosts"}) {
+    if (place == SweepPlace::kAtService && file.Has(own))
+      mistake = fmt::format("'{}': a running service has its own, so leave them out", own);
+  }
   file.Fields(
       {{"title", [&](const JsonValue& v) { sweep.title = v.Text(); }},
        {"size", [&](const JsonValue& v) { ReadSize(v, sweep.size); }},
-       {"volumes", [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.volumes.push_back(ReadVolume(e)); }); }},
+       {"volumes", [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.volumes.push_back(ReadVolume(e, place)); }); }},
        {"renderers", [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.renderers.push_back(ReadRenderer(e)); }); }},
        {"views", [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.views.push_back(ReadView(e, sweep.views.size())); }); }},
        {"policies", [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.policies.push_back(ReadPolicy(e)); }); }},
        {"workers",
         [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.workers.push_back(e.Integer(1, kMaxSweepWorkers)); }); }},
+       {"hosts",
+        [&](const JsonValue& v) {
+          constexpr std::array<std::string_view, 2> kTraffic = {"plain", "encrypted"};
+          v.Fields({{"cores", [&](const JsonValue& c) { sweep.host.cores = c.Integer(1, kMaxHostCores); }},
+                    {"traffic", [&](const JsonValue& t) { sweep.host.encrypted = t.OneOf(kTraffic) == 1; }}});
+        }},
        {"links", [&](const JsonValue& v) {
           v.Each([&](const JsonValue& e) {
             const std::string name = e.Text();
@@ -272,29 +305,30 @@ Result<Sweep> ParseSweep(const std::string& path, std::string_view text) {
           });
         }}});
   for (const char* needed : {"volumes", "policies", "workers"}) {
-    if (!mistake && !json.contains(needed)) mistake = fmt::format("'{}' is missing", needed);
+    const bool from_service = place == SweepPlace::kAtService && needed == std::string_view("workers");
+    if (!mistake && !from_service && !json.contains(needed)) mistake = fmt::format("'{}' is missing", needed);
   }
   if (sweep.title.empty()) sweep.title = "Sweep";
   if (sweep.renderers.empty()) sweep.renderers = {{.name = std::string(kDefaultRenderer)}};
   if (sweep.views.empty()) sweep.views = {{"view 1", BenchView(Projection::kOrthographic, 1, 12)}};
-  if (sweep.links.empty()) sweep.links = {{"10gbit", *ParseLink("link", "10gbit")}};
+  if (sweep.links.empty() && place == SweepPlace::kHere) sweep.links = {{"10gbit", *ParseLink("link", "10gbit")}};
   CheckNamesDiffer(sweep.volumes, "volumes", mistake);
   CheckNamesDiffer(sweep.renderers, "renderers", mistake);
   CheckNamesDiffer(sweep.views, "views", mistake);
   CheckNamesDiffer(sweep.policies, "policies", mistake);
   CheckNamesDiffer(sweep.links, "links", mistake);
   CheckTeamsAreEqual(sweep, mistake);
-  const std::size_t cases = sweep.volumes.size() * sweep.renderers.size() * sweep.views.size() * sweep.policies.size() *
-                            sweep.workers.size() * sweep.links.size();
+  const std::size_t machines = place == SweepPlace::kHere ? sweep.workers.size() * sweep.links.size() : 1;
+  const std::size_t cases = sweep.volumes.size() * sweep.renderers.size() * sweep.views.size() * sweep.policies.size() * machines;
   if (!mistake && cases > kMaxSweepCases) mistake = fmt::format("{} cases are too many: at most {}", cases, kMaxSweepCases);
   if (mistake) return Printable(Status::InvalidArgument(fmt::format("FILE '{}': {}", path, *mistake)));
   return sweep;
 }
 
-Result<Sweep> ReadSweep(const std::string& path) {
+Result<Sweep> ReadSweep(const std::string& path, SweepPlace place) {
   const Result<std::string> text = ReadTextFile(path, kMaxSweepBytes);
   if (!text.ok()) return Status(text.status().code(), "FILE " + text.status().message());
-  return ParseSweep(path, *text);
+  return ParseSweep(path, *text, place);
 }
 
 }  // namespace slabstream

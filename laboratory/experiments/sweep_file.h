@@ -1,4 +1,7 @@
 // The file of `experiment sweep`: the parameters to vary, as JSON. docs/experiments.md has an example.
+//
+// A sweep runs on this machine or at a running service. The service has workers, links and volumes of its own: a volume is then a dataset
+// of its catalogue (a sphere is the dataset of its name: class2-512), and the file names neither workers, links nor hosts.
 #pragma once
 
 #include <string>
@@ -10,6 +13,7 @@
 #include "common/simulation/link_model.h"
 #include "laboratory/bench/bench_cases.h"
 #include "laboratory/experiments/frame_case.h"
+#include "laboratory/experiments/machines.h"
 
 namespace slabstream {
 
@@ -35,7 +39,9 @@ struct SweepLink {
   LinkModel link;
 };
 
-// Every combination of these is a case.
+enum class SweepPlace : bool { kHere, kAtService };
+
+// Every combination of these is a case. At a service `workers` and `links` are empty, and `host` has its defaults.
 struct Sweep {
   std::string title;
   std::vector<BenchCase> volumes;
@@ -44,6 +50,7 @@ struct Sweep {
   std::vector<SweepPolicy> policies;
   std::vector<int> workers;
   std::vector<SweepLink> links;
+  HostModel host;  // that is simulated
   ImageSize size{512, 512};
 };
 
@@ -51,8 +58,15 @@ struct Sweep {
 std::string Describe(const Policy& policy);
 
 // InvalidArgument in one line naming `path`, the field by its place ("policies[1].combine"), the value and what is allowed.
-Result<Sweep> ParseSweep(const std::string& path, std::string_view text);
+Result<Sweep> ParseSweep(const std::string& path, std::string_view text, SweepPlace place = SweepPlace::kHere);
 // The same of a file; also fails if it cannot be read.
-Result<Sweep> ReadSweep(const std::string& path);
+Result<Sweep> ReadSweep(const std::string& path, SweepPlace place = SweepPlace::kHere);
+
+// A combination of volume, renderer, view and policy.
+struct SweepFrame {
+  FrameCase frame;  // of one worker
+  Json names;       // what the file calls them, as columns of results: part, volume, view, variant
+};
+std::vector<SweepFrame> FramesOf(const Sweep& sweep);
 
 }  // namespace slabstream

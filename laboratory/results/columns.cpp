@@ -21,6 +21,7 @@ std::span<const Column> CaseColumns() {
       {"groups", "groups of a frame"},
       {"teams", "teams of workers that take frames in turn, as for --frame-parallel"},
       {"link", "what joins the workers: a name of docs/simulation.md, NAME:MICROSECONDS,GBIT, or paper: the machine of the paper"},
+      {"share", "of a core and of the link that a host of a time-dilated cluster has, in (0, 1]; times are multiplied by it"},
       {"variant", "what else distinguishes the case, in words"},
       {"stage", "stage of a frame: transform, splat, combine; or a phase of what `variant` names"},
       {"active", "share of an image's pixels that are not empty, in [0, 1]"},

@@ -79,6 +79,46 @@ TEST_F(ExperimentTest, SweepOfAUsersOwn) {
   EXPECT_FALSE(std::filesystem::exists(Path("bad"))) << "nothing is made before the file is right";
 }
 
+TEST_F(ExperimentTest, SweepAtARunningService) {
+  MakeSphere("ball.nrrd", 2, 24);
+  const std::string out = MustRun({"up", "--workers", "2", "--threads", "1", "--listen", "tcp://127.0.0.1:*", "--data",
+                                   "ball=" + Path("ball.nrrd"), "--detach"})
+                              .out;
+  const std::string endpoint = out.substr(out.find("tcp://"), out.find(" (") - out.find("tcp://"));
+  std::ofstream(Path("sweep.json"))
+      << R"({"volumes": [{"dataset": "ball", "transfer": "opaque"}], "size": 48, "renderers": ["splat", "mip"],
+    "policies": [{}, {"decomposition": "kd-tree", "balance": "dynamic"}]})";
+  MustRun({"experiment", "sweep", "sweep.json", "-o", "out", "--quick", "--endpoint", endpoint});
+  ExpectResults("out", "sweep");
+  ExpectPage("out");
+  int periods = 0;
+  for (const json& row : RowsOf("out")) {
+    if (row.value("part", "") == "conduct") continue;
+    EXPECT_EQ(row["origin"], "measured");
+    EXPECT_EQ(row["workers"], 2);
+    if (row["metric"] != "period") continue;
+    ++periods;
+    EXPECT_GT(row["value"].get<double>(), 0);
+  }
+  EXPECT_EQ(periods, 4);
+  const std::string roster = ReadFile("out/roster.csv");
+  EXPECT_THAT(roster, testing::StartsWith("worker,host,threads\n1,"));
+  EXPECT_EQ(std::ranges::count(roster, '\n'), 3);
+  EXPECT_THAT(json::parse(ReadFile("out/experiment.json"))["parameters"]["service"]["roster"], testing::SizeIs(2));
+
+  std::ofstream(Path("other.json")) << R"({"volumes": [{"dataset": "cake"}], "policies": [{}]})";
+  std::ofstream(Path("here.json")) << R"({"volumes": [{"file": "ball.nrrd"}], "policies": [{}]})";
+  const std::pair<std::string, std::string> wrong[] = {{"other.json", "the service has no dataset 'cake'"},
+                                                       {"here.json", "must have either 'sphere' or 'dataset'"}};
+  for (const auto& [file, says] : wrong) {
+    const ProgramResult result = Slabstream({"experiment", "sweep", file, "-o", "x", "--endpoint", endpoint});
+    EXPECT_EQ(result.exit_status, 2);
+    EXPECT_THAT(result.err, HasSubstr(says));
+    EXPECT_EQ(result.err_lines().size(), 1U) << result.err;
+    EXPECT_FALSE(std::filesystem::exists(Path("x")));
+  }
+}
+
 TEST_F(ExperimentTest, ContinuesWhereCtrlCStoppedIt) {
   const std::vector<std::string> arguments = {"experiment", "streaming", "-o", "out", "--quick", "--scale", "0.15", "--repeats", "20"};
   {

@@ -18,7 +18,8 @@ constexpr const char* kGood = R"({
   "views": [{"azimuth": 30}, {"name": "close", "projection": "perspective", "zoom": 2}],
   "policies": [{"combine": "fan-in"}, {"name": "even", "decomposition": "kd-tree", "split": "occupied", "assignment": "greedy", "groups": 2, "combine": "tree:4,strips=8", "balance": "dynamic", "pixel_error": 0.001, "axis": "x", "teams": 2}],
   "workers": [1, 16],
-  "links": ["10gbit", "1gbit:30,1"]
+  "links": ["10gbit", "1gbit:30,1"],
+  "hosts": {"cores": 1, "traffic": "encrypted"}
 })";
 
 TEST(SweepFile, ReadsWhatItSays) {
@@ -45,6 +46,8 @@ TEST(SweepFile, ReadsWhatItSays) {
   EXPECT_EQ(sweep->policies[1].policy.balance, "dynamic");
   EXPECT_EQ(sweep->policies[1].policy.pixel_error, 0.001);
   EXPECT_EQ(sweep->workers, (std::vector{1, 16}));
+  EXPECT_EQ(sweep->host.cores, 1);
+  EXPECT_TRUE(sweep->host.encrypted);
   EXPECT_DOUBLE_EQ(sweep->links[1].link.latency_seconds, 30e-6);
 }
 
@@ -109,6 +112,8 @@ TEST(SweepFile, TellsWhatIsWrongInOneLineThatNamesFieldValueAndLimit) {
       {"{\"sphere\": {\"class\": 2, \"size\": 40, \"occupancy\": 0.3}, \"opacity\": 0.2}", "{\"file\": \"/no/such.nrrd\"}",
        "volumes[0].file: "},
       {"{\"sphere\": {\"class\": 2, \"size\": 40, \"occupancy\": 0.3}, \"opacity\": 0.2}", "{}", "must have either 'sphere' or 'file'"},
+      {"\"cores\": 1", "\"cores\": 0", "hosts.cores: 0 must be a whole number in [1, 1024]"},
+      {"\"encrypted\"", "\"secret\"", "hosts.traffic: \"secret\" must be one of plain, encrypted"},
       {"[300, 200]", "[300]", "size: [300] must be [width, height]"},
       {"[300, 200]", "0", "size: 0 must be a whole number in [1, "},
       {"\"title\"", "title", "not JSON: "},
@@ -138,6 +143,36 @@ TEST(SweepFile, AnErrorIsOneLineHoweverTheFileIsMade) {
     EXPECT_EQ(status.message().find('\n'), std::string::npos) << status.message();
     EXPECT_LE(status.message().size(), 1024U);
   }
+}
+
+TEST(SweepFile, AtAServiceVolumesAreDatasets) {
+  const char* text = R"({"volumes": [{"dataset": "head", "transfer": "ct-bone"}, {"sphere": {"class": 2, "size": 512, "occupancy": 0.4}}],
+    "policies": [{}]})";
+  const Result<Sweep> sweep = ParseSweep("s.json", text, SweepPlace::kAtService);
+  ASSERT_TRUE(sweep.ok()) << sweep.status().message();
+  EXPECT_EQ(sweep->volumes[0].dataset, "head");
+  EXPECT_EQ(sweep->volumes[0].name, "head-ct-bone");
+  EXPECT_EQ(sweep->volumes[1].dataset, "class2-512");
+  EXPECT_THAT(sweep->workers, testing::IsEmpty());
+  EXPECT_THAT(sweep->links, testing::IsEmpty());
+
+  const auto refused = [](const std::string& file, SweepPlace place) { return ParseSweep("s.json", file, place).status().message(); };
+  EXPECT_THAT(refused(R"({"volumes": [{"file": "head.nrrd"}], "policies": [{}]})", SweepPlace::kAtService),
+              HasSubstr("volumes[0]: {\"file\":\"head.nrrd\"} must have either 'sphere' or 'dataset': the service has volumes of its own"));
+  for (const char* own : {"workers", "links", "hosts"}) {
+    EXPECT_THAT(refused(Replaced(text, "{", std::string("{\"") + own + "\": [1], "), SweepPlace::kAtService),
+                HasSubstr(std::string("'") + own + "': a running service has its own"));
+  }
+  EXPECT_THAT(refused(text, SweepPlace::kHere), HasSubstr("must have either 'sphere' or 'file'"));
+}
+
+TEST(SweepFile, FramesAreEveryCombination) {
+  const Sweep sweep = ParseSweep("s.json", kGood).value();
+  const std::vector<SweepFrame> frames = FramesOf(sweep);
+  ASSERT_EQ(frames.size(), 8U);
+  EXPECT_EQ(frames[7].frame.volume.renderer, FindRenderer("raycast"));
+  EXPECT_EQ(frames[7].frame.policy, sweep.policies[1].policy);
+  EXPECT_EQ(frames[7].names["part"], "class2-40-0.3, fine, close");
 }
 
 TEST(SweepFile, ALongListIsRefused) {

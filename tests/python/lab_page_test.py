@@ -144,6 +144,18 @@ class Answers(InAFolder):
         self.assertIn("10gbit: latency, c (250.0 ms)", self.answers("sweep", times={"a & b": 2.0, "c": 1.0})[0])
         self.assertIn("a tie", self.answers("sweep", times={"a & b": 1.0, "c": 1.0})[0])
 
+    def test_cluster_tells_aims_dilation_and_the_errors_of_the_simulation(self) -> None:
+        aims, dilation, simulation, scaling = self.answers("cluster")
+        self.assertEqual(aims, "2 of 2 aims are reached.")
+        self.assertEqual(dilation, "Times differ by at most 0 %.")
+        self.assertEqual(simulation, "4 of 4 simulated times are within 15 % of the measured ones.")
+        self.assertEqual(scaling, "Efficiency: kd-tree: 100 % at p = 16.")
+        aims, dilation, simulation, scaling = self.answers("cluster", ideal=False, error=0.3, drift=0.2)
+        self.assertEqual(aims, "0 of 2 aims are reached.")
+        self.assertEqual(dilation, "Times differ by at most 20 %.")
+        self.assertEqual(simulation, "0 of 4 simulated times are within 15 % of the measured ones.")
+        self.assertEqual(scaling, "Efficiency: kd-tree: 6.25 % at p = 16.")
+
     def test_one_repeat_ranks_nothing(self) -> None:
         for experiment in ("combining", "scaling", "sweep"):
             for answer in self.answers(experiment, repeats=1):

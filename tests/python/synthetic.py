@@ -97,4 +97,18 @@ def sweep(folder: pathlib.Path, repeats: int = 3, times: dict[str, float] | None
     return folder
 
 
-MAKERS = {"streaming": streaming, "combining": combining, "scaling": scaling, "sweep": sweep}
+def cluster(folder: pathlib.Path, repeats: int = 3, ideal: bool = True, error: float = 0.0, drift: float = 0.0) -> pathlib.Path:
+    """`error`: of simulated times; `drift`: of times at half the share."""
+    rows = []
+    for p, (share, off) in itertools.product((1, 8, 16), ((0.5, 0.0), (0.25, drift))):
+        of = {"part": "class2-512, splat, view 1", "volume": "class2-512", "renderer": "splat", "variant": "kd-tree", "link": "10gbit:0,10"}
+        of |= {"workers": p, "pixels": 77}
+        seconds = 1 / (p if ideal else 1)
+        metrics = figures(seconds * (1 + off), repeats, **of) + [row("longest_render_time", seconds, repeats=repeats, **of)]
+        rows += [r | {"origin": "measured", "share": share} for r in metrics]
+        if share == 0.5:
+            rows += [r | {"origin": "simulated"} for r in figures(seconds * (1 + error), repeats, **of)]
+    return write(folder, rows, "cluster", repeats=repeats)
+
+
+MAKERS = {"streaming": streaming, "combining": combining, "scaling": scaling, "sweep": sweep, "cluster": cluster}

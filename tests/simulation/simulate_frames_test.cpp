@@ -112,6 +112,26 @@ TEST(SimulateFrames, AChainTakesOneHopForEachWorker) {
   }
 }
 
+// Each message is encrypted by its sender and decrypted by its receiver, whatever the colours take.
+TEST(SimulateFrames, EncryptionTakesProcessorTimeAtBothEndsOfEveryMessage) {
+  constexpr double kByte = 1e-6;
+  for (const RendererKind* renderer : Renderers()) {
+    for (const ColorCoding color : {ColorCoding::kFloat32, ColorCoding::kHalf}) {
+      MadeFrame frame(4, 1, kSide, 1, 10, "chain:strips=1", renderer);
+      frame.plan().groups[0].color = color;
+      MachineModel machine = WithoutDelays();
+      machine.cores_a_host = 1;
+      const SimulatedFrame plain = Simulate({frame.input()}, machine).frames[0];
+      machine.combining.cipher_byte = kByte;
+      const SimulatedFrame encrypted = Simulate({frame.input()}, machine).frames[0];
+      EXPECT_EQ(encrypted.image_bytes, plain.image_bytes);
+      const double expected = plain.latency() + 2 * kByte * plain.image_bytes;  // all of a chain's messages follow each other
+      EXPECT_GT(expected, plain.latency() + 0.01);
+      EXPECT_NEAR(encrypted.latency(), expected, expected * kRelative) << renderer->name();
+    }
+  }
+}
+
 // Yagel and Machiraju, Eq. 18: one round for each doubling of the workers, if messages do not get in each other's way.
 TEST(SimulateFrames, ATreeTakesLogarithmicallyManyRounds) {
   for (std::uint32_t rounds = 0; rounds <= 6; ++rounds) {

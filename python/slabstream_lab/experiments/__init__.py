@@ -1,9 +1,10 @@
 """The pages: one module an experiment, with page(run) -> Page."""
-from . import balance, combining, paper, scaling, streaming, sweep
+from . import balance, cluster, combining, paper, scaling, streaming, sweep
 
 PAGES = {
     "paper": paper.page,
     "balance": balance.page,
+    "cluster": cluster.page,
     "combining": combining.page,
     "streaming": streaming.page,
     "scaling": scaling.page,

@@ -11,11 +11,63 @@ VARIED = {"volume": "volumes", "view": "views", "variant": "policies", "workers"
 
 
 def page(run: Run) -> Page:
+    if run.select(metric="period", origin="simulated").empty:
+        return _service_page(run)
     counts = [f"{name}: {len(run.distinct(column, origin='simulated'))}" for column, name in VARIED.items()]
     return Page(
         str(run.attached("sweep")["title"].iloc[0]),
         f"Every combination of the values that a file lists ({', '.join(counts)}). A section for each volume, renderer and view.",
         [_section(run, part, f"sweep-{i + 1}") for i, part in enumerate(run.distinct("part", origin="simulated"))],
+    )
+
+
+def _service_page(run: Run) -> Page:
+    roster = run.attached("roster")
+    table = Table("Roster", list(roster.columns), [list(row) for row in roster.itertuples(index=False)])
+    sections = [_service_section(run, part, f"sweep-{i + 1}") for i, part in enumerate(run.distinct("part", metric="period"))]
+    sections.append(Section("Roster", "Who rendered?", "The workers of the service when the run began.", blocks=[table]))
+    return Page(
+        str(run.attached("sweep")["title"].iloc[0]),
+        f"Measured at a running service of {len(roster)} workers on {roster['host'].nunique()} hosts, as its client saw it. A section for each "
+        "volume, renderer and view.",
+        sections,
+    )
+
+
+def _service_section(run: Run, part: str, name: str) -> Section:
+    policies = run.distinct("variant", part=part)
+
+    def times(metric: str) -> str:
+        return ranking({policy: run.value(metric, part=part, variant=policy) for policy in policies}).sentence()
+
+    metrics = ("latency", "period", "render_time", "longest_render_time", "imbalance")
+    return Section(
+        part,
+        "Which policy is quickest at this service?",
+        "Latency: one frame in flight. Period: from picture to picture, with more frames requested ahead than the service has under way.",
+        f"Least times: latency, {times('latency')}; from picture to picture, {times('period')}.",
+        [
+            plots.bars(
+                name,
+                part,
+                {policy: {metric: run.value(metric, part=part, variant=policy) for metric in ("latency", "period")} for policy in policies},
+                "time",
+            ),
+            Table(
+                part,
+                ["policy", "asked for", "latency", "period", "rendering, all", "rendering, longest", "imbalance", "idle", "image bytes"],
+                [
+                    [
+                        row.variant,
+                        _policy(row),
+                        *(run.value(metric, part=part, variant=row.variant) for metric in metrics),
+                        run.value("idle_share", part=part, variant=row.variant).percent(),
+                        run.value("image_bytes", part=part, variant=row.variant),
+                    ]
+                    for row in run.select(metric="latency", part=part).itertuples(index=False)
+                ],
+            )
+        ],
     )
 
 

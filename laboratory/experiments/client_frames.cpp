@@ -1,0 +1,75 @@
+#include "laboratory/experiments/client_frames.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "client/cli/frame_summary.h"
+#include "common/planning/policy_names.h"
+#include "laboratory/experiments/failure.h"
+#include "laboratory/measure/statistics.h"
+
+namespace slabstream {
+namespace {
+
+constexpr int kWarmUpFrames = 2;
+constexpr int kLearningFrames = 8;  // with dynamic balance
+constexpr int kLeastMeasured = 8;   // frames from picture to picture
+constexpr Duration kPatience = std::chrono::seconds(1);
+
+double Milliseconds(std::int64_t ns) { return double(ns) * 1e-6; }
+
+}  // namespace
+
+int WarmUpFrames(const Policy& policy) { return policy.balance == kDynamicBalance ? kLearningFrames : kWarmUpFrames; }
+
+Json MeasureLatency(Client& client, const FrameRequest& request, int warm_up, int frames) {
+  std::vector<double> latencies, renders, longest, imbalances, idle_shares, image_bytes;
+  std::array<std::vector<double>, kStageCount> stages;
+  std::uint32_t workers = ~0U;
+  for (int i = 0; i < warm_up + frames; ++i) {
+    const Picture picture = OrThrow(client.Render(request));
+    if (i < warm_up) continue;
+    const FrameSummary summary = Summarize(picture.statistics);
+    latencies.push_back(Milliseconds(picture.latency.count()));
+    renders.push_back(Milliseconds(summary.stage_ns[std::size_t(Stage::kRender)]));
+    longest.push_back(Milliseconds(summary.render_ns));
+    imbalances.push_back(summary.imbalance);
+    idle_shares.push_back(summary.idle_share);
+    image_bytes.push_back(double(summary.image_bytes));
+    for (std::size_t stage = 0; stage < stages.size(); ++stage) stages[stage].push_back(Milliseconds(summary.stage_ns[stage]));
+    workers = std::min(workers, picture.statistics.workers);
+  }
+  Json stage_medians = Json::object();
+  for (std::size_t stage = 0; stage < stages.size(); ++stage) {
+    stage_medians[std::string(ToString(Stage(stage)))] = MedianOf(std::move(stages[stage])).median;
+  }
+  return Json{{"latency_ms", MedianOf(latencies).median},
+              {"all_latency_ms", latencies},
+              {"stages_ms", stage_medians},
+              {"render_ms", MedianOf(std::move(renders)).median},
+              {"longest_render_ms", MedianOf(std::move(longest)).median},
+              {"imbalance", MedianOf(std::move(imbalances)).median},
+              {"idle_share", MedianOf(std::move(idle_shares)).median},
+              {"image_bytes", MedianOf(std::move(image_bytes)).median},
+              {"workers", workers}};
+}
+
+double MeasurePeriod(Client& client, const FrameRequest& request, int in_flight) {
+  const int measured = std::max(in_flight, kLeastMeasured), frames = measured + 2 * in_flight;
+  int submitted = 0;
+  for (; submitted < in_flight; ++submitted) client.Submit(request);
+  std::vector<Time> received;
+  while (int(received.size()) < frames) {
+    const std::optional<ClientEvent> event = client.Next(kPatience);
+    if (!event) continue;
+    if (const auto* failed = std::get_if<Status>(&event->what)) throw Failure(*failed);
+    const auto* picture = std::get_if<Picture>(&event->what);
+    if (picture == nullptr || !picture->final) continue;
+    received.push_back(MonotonicNow());
+    if (submitted < frames) client.Submit(request), ++submitted;
+  }
+  const Duration middle = received[std::size_t(in_flight + measured) - 1] - received[std::size_t(in_flight) - 1];
+  return Milliseconds(middle.count()) / measured;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,136 @@
+"""bench/cluster and bench/dilated_cluster.py: their arithmetic, and, as root, that hosts come and go."""
+from __future__ import annotations
+
+import contextlib
+import importlib.machinery
+import importlib.util
+import io
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+import unittest.mock
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "bench"))
+
+import dilated_cluster  # noqa: E402
+
+
+def load_program():
+    loader = importlib.machinery.SourceFileLoader("cluster", str(ROOT / "bench" / "cluster"))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("cluster", loader))
+    loader.exec_module(module)
+    return module
+
+
+cluster = load_program()
+
+
+def options(*arguments: str):
+    with unittest.mock.patch.object(sys, "argv", ["cluster", "-o", "out", *arguments]):
+        return cluster.parse_arguments()
+
+
+class Dilation(unittest.TestCase):
+    def test_times_are_multiplied_by_the_share_and_nothing_else_is(self) -> None:
+        row = {"metric": "latency", "unit": "s", "value": 10.0, "low": 8.0, "high": 12.0, "workers": 16}
+        found = cluster.dilated(row, 0.1, 10)
+        self.assertAlmostEqual(found["value"], 1.0)
+        self.assertAlmostEqual(found["low"], 0.8)
+        self.assertAlmostEqual(found["high"], 1.2)
+        self.assertEqual((found["workers"], found["share"], found["link"]), (16, 0.1, "10gbit:0,10"))
+        self.assertEqual(cluster.dilated(row | {"unit": "B"}, 0.1, 10)["value"], 10.0)
+
+    def test_all_workers_together_use_one_and_a_half_cores(self) -> None:
+        for workers in (2, 4, 16, 37):
+            self.assertAlmostEqual(cluster.share_of(options(), workers)[0] * workers, 1.5)
+        self.assertEqual(cluster.share_of(options(), 1), [1.0])
+        self.assertEqual(cluster.share_of(options("--workers", "2", "--share", "0.5,0.25"), 2), [0.5, 0.25])
+
+
+class Options(unittest.TestCase):
+    def test_what_is_named_replaces_what_a_preset_says(self) -> None:
+        aims = options("--aims", "--workers", "2")
+        self.assertEqual((aims.workers, aims.links, aims.spheres, aims.renderer), ([2], [10.0], ["class2"], ["splat", "raycast"]))
+        self.assertEqual(len(options().policy), 6)
+
+    def test_what_is_wrong_is_told_in_a_line(self) -> None:
+        cases = {
+            ("--workers", "0"): "0 must be above 0",
+            ("--renderer", "crayon"): "'crayon' must be one of",
+            ("--workers", "8", "--share", "0.5"): "8 workers would use 4 cores",
+            ("--spheres", "none"): "needs a --volume",
+            ("--volume", "none.nrrd:auto"): "is not FILE:TRANSFER of a file",
+        }
+        for arguments, says in cases.items():
+            told = io.StringIO()
+            with contextlib.redirect_stderr(told), self.assertRaises(SystemExit):
+                options(*arguments)
+            self.assertIn(says, told.getvalue().splitlines()[-1])
+
+    def test_the_same_volumes_are_measured_and_simulated(self) -> None:
+        with tempfile.NamedTemporaryFile(suffix=".nrrd") as file:
+            matrix = cluster.Matrix(options("--quick", "--volume", f"{file.name}:ct-bone"))
+            dataset = pathlib.Path(file.name).stem
+            self.assertEqual(matrix.served["volumes"][1], {"dataset": dataset, "transfer": "ct-bone"})
+            self.assertEqual(matrix.here["volumes"][1]["transfer"], "ct-bone")
+            self.assertEqual(matrix.served["volumes"][0], matrix.here["volumes"][0])
+            self.assertEqual(list(matrix.data), ["class2-128", dataset])
+            self.assertNotIn("workers", matrix.served)
+            self.assertEqual(matrix.here["hosts"], {"cores": 1, "traffic": "encrypted"})
+
+
+class Quotas(unittest.TestCase):
+    def limits(self, version: int, share: float | None) -> dict[str, str]:
+        with tempfile.TemporaryDirectory() as folder:
+            quota = dilated_cluster.Quota.__new__(dilated_cluster.Quota)
+            quota.version, quota.folder = version, pathlib.Path(folder)
+            quota.limit(share)
+            return {path.name: path.read_text() for path in quota.folder.iterdir()}
+
+    def test_a_share_is_a_quota_of_five_milliseconds_or_more(self) -> None:
+        self.assertEqual(self.limits(2, 0.4), {"cpu.max": "2000 5000"})
+        self.assertEqual(self.limits(2, 0.1), {"cpu.max": "1000 10000"})
+        self.assertEqual(self.limits(2, 1), {"cpu.max": "5000 5000"})
+        self.assertEqual(self.limits(2, None), {"cpu.max": "max 5000"})
+        self.assertEqual(self.limits(1, 0.1), {"cpu.cfs_period_us": "10000", "cpu.cfs_quota_us": "1000"})
+        self.assertEqual(self.limits(1, None)["cpu.cfs_quota_us"], "-1")
+
+
+class Hosts(unittest.TestCase):
+    def test_hosts_are_apart_and_leave_nothing_behind(self) -> None:
+        try:
+            made = dilated_cluster.Cluster(2)
+        except dilated_cluster.ClusterError as error:
+            self.skipTest(str(error))
+        with made:
+            made.limit(0.5, 1e8)
+            first = made.hosts[0]
+            folder, name = first.quota.folder, first.name
+
+            def told(host, command: str) -> str:
+                return host.start(["sh", "-c", command], stdout=subprocess.PIPE, text=True).communicate()[0].strip()
+
+            self.assertEqual([told(host, "hostname") for host in made.hosts], ["node0", "node1"])
+            sleepers = [
+                host.start(["sh", "-c", "readlink /proc/self/ns/pid; exec sleep 1000"], stdout=subprocess.PIPE, text=True)
+                for host in made.hosts
+            ]
+            scopes = [sleeper.stdout.readline().strip() for sleeper in sleepers]
+            self.assertEqual(len({*scopes, os.readlink("/proc/self/ns/pid")}), 3)
+            self.assertIn(first.address, told(first, "ip -o -4 addr show eth0"))
+            rate = subprocess.run(["tc", "-n", name, "qdisc", "show", "dev", "eth0"], capture_output=True, text=True, check=True).stdout
+            self.assertIn("tbf", rate)
+            self.assertIn("rate 800Mbit", rate)
+        for sleeper in sleepers:
+            self.assertIsNotNone(sleeper.wait(timeout=60))
+            sleeper.stdout.close()
+        self.assertFalse(folder.exists())
+        self.assertNotIn(name, subprocess.run(["ip", "netns"], capture_output=True, text=True, check=True).stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()
