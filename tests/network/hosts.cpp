@@ -120,7 +120,11 @@ Status Hosts::LimitRate(int host, int mbit) const {
   return sends.ok() ? Order(bridge(), "tc qdisc add dev " + PortOf(host) + limit) : sends;
 }
 
-Status Hosts::ResetConnections(int host, int peer) const { return Order(NameOf(host), "ss -K dst " + AddressOf(peer)); }
+Status Hosts::ResetConnections(int host, const std::vector<int>& peers) const {
+  std::string filter;
+  for (const int peer : peers) filter.append(filter.empty() ? "dst " : " or dst ").append(AddressOf(peer));
+  return Order(NameOf(host), "ss -K " + filter);
+}
 
 Status Hosts::ChangeAddress(int host) {
   std::string& address = addresses_[std::size_t(host)];

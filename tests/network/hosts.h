@@ -26,15 +26,15 @@ class Hosts {
   void Run(int host, const std::function<void()>& function) const;
 
   // ---- what happens to networks. Status: what the kernel cannot do (Unavailable).
-  Status SetLink(int host, bool up) const;            // the cable to the bridge
-  Status Unplug(int host) const;                      // for ever, with the network card
-  Status DropFrom(int host) const;                    // nothing that the host sends arrives
-  Status DropTo(int host) const;                      // nothing arrives at the host
-  Status DropBetween(int sender, int host) const;     // nothing that this IPv4 host sends arrives at that one
-  Status StopDropping(int host) const;                // ends the three
-  Status LimitRate(int host, int mbit) const;         // in each direction
-  Status ResetConnections(int host, int peer) const;  // all tcp connections that the host has with that one
-  Status ChangeAddress(int host);                     // to one that no host has had
+  Status SetLink(int host, bool up) const;                                 // the cable to the bridge
+  Status Unplug(int host) const;                                           // for ever, with the network card
+  Status DropFrom(int host) const;                                         // nothing that the host sends arrives
+  Status DropTo(int host) const;                                           // nothing arrives at the host
+  Status DropBetween(int sender, int host) const;                          // nothing that this IPv4 host sends arrives at that one
+  Status StopDropping(int host) const;                                     // ends the three
+  Status LimitRate(int host, int mbit) const;                              // in each direction
+  Status ResetConnections(int host, const std::vector<int>& peers) const;  // all tcp connections that the host has with those
+  Status ChangeAddress(int host);                                          // to one that no host has had
 
   // Everything that passes the bridge from its construction on, in one piece.
   class Capture {
