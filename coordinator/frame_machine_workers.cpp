@@ -19,7 +19,10 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const Registe
 void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const Heartbeat& message) {
   const LiveRoster::News news = message.epoch == config.epoch ? roster.Hear(message, event.from, now) : LiveRoster::News{};
   if (news.known) {
-    for (RunningFrame& frame : frames) frame.OnHeartbeat(message.worker, news.progressed, now);
+    for (RunningFrame& frame : frames) {
+      if (news.moved) frame.OnReconnection(message.worker, now);
+      frame.OnHeartbeat(message.worker, news.progressed, now);
+    }
     SendWorker(message.worker, MakePing());
   } else if (!news.stale) {
     actions.emplace_back(ToWorker{.to = event.from, .message = Retire{.epoch = config.epoch}});

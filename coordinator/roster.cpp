@@ -46,13 +46,14 @@ LiveRoster::News LiveRoster::Hear(const Heartbeat& message, PeerToken from, Time
   if (member == members_.end()) return {};
   if (member->id != message.worker) return {.stale = true};
   // Counters never fall within one life, so an old heartbeat that arrives late is no progress.
+  const bool moved = member->peer != from;
   const bool progressed = message.fetched_bytes > member->fetched_bytes || message.rendered_ranks > member->rendered_ranks;
   member->peer = from;
   member->last_heard = now;
   member->cached_bytes = message.cached_bytes;
   member->fetched_bytes = std::max(member->fetched_bytes, message.fetched_bytes);
   member->rendered_ranks = std::max(member->rendered_ranks, message.rendered_ranks);
-  return {.known = true, .progressed = progressed};
+  return {.known = true, .moved = moved, .progressed = progressed};
 }
 
 void LiveRoster::Touch(WorkerId worker, Time now) {

@@ -39,6 +39,7 @@ class LiveRoster {
   struct News {
     bool known = false;
     bool stale = false;       // not known, but its incarnation is a member under another id: an old message, no reason to retire anybody
+    bool moved = false;       // it speaks on another connection than before: what was under way on that one may be lost
     bool progressed = false;  // it has received voxels or rendered ranks since its last heartbeat
   };
   News Hear(const Heartbeat& message, PeerToken from, Time now);

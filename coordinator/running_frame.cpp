@@ -172,6 +172,10 @@ void RunningFrame::OnLoss(WorkerId worker, Time now) {
   attempt_due_ = now;
 }
 
+void RunningFrame::OnReconnection(WorkerId worker, Time now) {
+  if (HasPart(worker) && !attempt_due_) attempt_due_ = now;
+}
+
 Status RunningFrame::OnTrouble(const WorkerTrouble& message, Time now) {
   const bool no_picture = message.worker == plan_.display && groups_done_ == group_count();
   if (message.key.attempt != attempt() || (message.key.group < groups_done_ && !no_picture)) return Status::Ok();
@@ -197,15 +201,23 @@ Status RunningFrame::OnTrouble(const WorkerTrouble& message, Time now) {
 Status RunningFrame::Expire(Time now) {
   if (attempt_due_) return Status::Ok();
   if (suspicion_ && now >= suspicion_->until) {
-    return CountStall(
-        Status::Unavailable(WorkerName(suspicion_->accuser) + " cannot reach " + WorkerName(suspicion_->accused) + ", which is alive"),
-        Duration::zero(), now);
+    inability_ =
+        Status::Unavailable(WorkerName(suspicion_->accuser) + " cannot reach " + WorkerName(suspicion_->accused) + ", which is alive");
+    unable_.insert(CulpritOf(*suspicion_));
+    return CountStall(inability_, Duration::zero(), now);
   }
   if (waiting() && now >= last_progress_ + limits_.stall_timeout) {
     const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(limits_.stall_timeout).count();
     return CountStall(Status::Unavailable("no progress for " + std::to_string(seconds) + " s"), Duration::zero(), now);
   }
   return Status::Ok();
+}
+
+// Whoever had a part in more complaints; among equals the one that has not accumulated the frame, then the accused.
+WorkerId RunningFrame::CulpritOf(const Suspicion& suspicion) {
+  const int of_accused = ++complaints_[suspicion.accused], of_accuser = ++complaints_[suspicion.accuser];
+  if (of_accused != of_accuser) return of_accused > of_accuser ? suspicion.accused : suspicion.accuser;
+  return suspicion.accused == plan_.display ? suspicion.accuser : suspicion.accused;
 }
 
 Status RunningFrame::CountStall(const Status& reason, Duration pause, Time now) {

@@ -4,13 +4,14 @@
 // An attempt hands out the groups [first group, group count) of one plan. Events that end it before the frame's end, and where the next one
 // begins:
 //   a worker with a part in it is lost                     the first unfinished group, now
+//   a worker with a part in it has another connection      the first unfinished group, now: messages may be lost
 //   no progress for stall_timeout                          the first unfinished group, now; counted
 //   a worker could not do its part                         the first unfinished group, after a pause that grows; counted
 //   the same, but another worker may be able to            the first unfinished group, now, without that worker; counted
-//   a worker cannot reach another that is alive            the first unfinished group, once that is proved; counted
+//   a worker cannot reach another that is alive            the first unfinished group, once that is proved, without one of the two; counted
 //   any of these, if the display worker was lost or had the trouble     group 0: what it accumulated is gone or in doubt
 // The frame fails after max_stalls counted events in a row, with no group finished for the first time between them. So every frame ends, as
-// long as workers are not lost for ever.
+// long as workers and connections are not lost for ever.
 //
 // A group is done when the display worker has accumulated it. It does so in order: group g done means 0 ... g done. That holds for the
 // display worker's lifetime, not for an attempt, and a picture is right whoever makes it, so messages of older attempts count if their
@@ -22,6 +23,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <set>
 #include <vector>
@@ -83,6 +85,7 @@ class RunningFrame {
 
   // ---- what goes wrong. A Status that is not ok: the frame has failed.
   void OnLoss(WorkerId worker, Time now);  // it is no longer in the roster
+  void OnReconnection(WorkerId worker, Time now);
   // Ignores trouble of another attempt or of a group that is done. message.unreachable, if any, must be in the roster. Trouble of the
   // display worker when all groups are done: it cannot make the picture.
   Status OnTrouble(const WorkerTrouble& message, Time now);
@@ -104,6 +107,7 @@ class RunningFrame {
   void KeepHidden(const GroupDone& message);
   bool waiting() const;  // for groups that are out, or for the finished picture
   Status CountStall(const Status& reason, Duration pause, Time now);
+  WorkerId CulpritOf(const Suspicion& suspicion);
 
   FrameId id_;
   OpenRequest request_;
@@ -124,8 +128,9 @@ class RunningFrame {
   std::optional<Time> attempt_due_;
   bool display_in_doubt_ = false;  // the next attempt begins with group 0
   std::optional<Suspicion> suspicion_;
-  std::set<WorkerId> unable_;  // workers that cannot do their part of this frame
-  Status inability_;           // reason of the last one of them
+  std::map<WorkerId, int> complaints_;  // proved suspicions that each worker had a part in
+  std::set<WorkerId> unable_;           // workers that cannot do their part of this frame
+  Status inability_;                    // reason of the last one of them
   int stalls_ = 0;
   Time last_progress_;
   std::set<WorkerId> moved_on_;                   // workers that have rendered all that is handed out of this frame

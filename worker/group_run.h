@@ -40,6 +40,7 @@ class GroupRun {
   // An inconsistent assignment is a failure. `names` must outlive the run.
   GroupRun(GroupAssignment assignment, WorkerId self, ImageNames& names);
 
+  const std::vector<Peer>& peers() const { return *peers_; }  // by ascending worker
   bool HasPeer(WorkerId worker) const { return FindPeer(worker) != nullptr; }
   const GroupKey& key() const { return assignment_.key; }
   const std::vector<Rank>& ranks() const { return runner_.order().ranks(); }  // of this worker; none if the assignment is inconsistent

@@ -13,7 +13,16 @@ Status PeerSockets::Send(const Peer& to, std::vector<std::byte> header, const By
     connection = connections_.emplace(to.images_endpoint, Connection{std::move(*socket), now}).first;
   }
   connection->second.last_used = now;
+  connection->second.worker = to.worker;
   return connection->second.socket.Send({}, std::move(header), payload);
+}
+
+std::vector<WorkerId> PeerSockets::TakeBroken() {
+  std::vector<WorkerId> broken;
+  for (auto& [endpoint, connection] : connections_) {
+    if (connection.socket.TakeBroken()) broken.push_back(connection.worker);
+  }
+  return broken;
 }
 
 void PeerSockets::CloseIdle(Time now) {

@@ -1,7 +1,7 @@
 // PeerSockets: the sending ends of the images plane, one DEALER for each worker that was sent to lately.
 //
-// A DEALER queues silently while its peer is down. The coordinator detects dead peers and orders nothing more for them. A socket and its
-// queue are closed after kPeerIdle without use.
+// A DEALER queues silently while its peer is down. The coordinator detects dead peers and orders nothing more for them; TakeBroken names
+// those that may be alive and yet have not got what was sent. A socket and its queue are closed after kPeerIdle without use.
 #pragma once
 
 #include <chrono>
@@ -30,12 +30,16 @@ class PeerSockets {
   // Connects if need be. Errors: the endpoint cannot be connected to, or too much is queued for it.
   Status Send(const Peer& to, std::vector<std::byte> header, const Bytes& payload, Time now);
 
+  // Workers that messages to may have been lost since the last call: a connection broke, or could not be made.
+  std::vector<WorkerId> TakeBroken();
+
   void CloseIdle(Time now);
 
  private:
   struct Connection {
     Socket socket;
     Time last_used;
+    WorkerId worker = 0;  // that was sent to last
   };
   Context& context_;
   const std::optional<KeyPair> own_;

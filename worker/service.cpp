@@ -25,32 +25,22 @@
 #include "common/transport/endpoint.h"
 #include "common/transport/mailbox.h"
 #include "worker/executor.h"
+#include "worker/images_endpoint.h"
 #include "worker/peer_sockets.h"
 
 namespace slabstream {
 namespace {
 
-constexpr Duration kLongestWait = std::chrono::seconds(1);  // between checks for idle connections
-constexpr Duration kStopGrace = std::chrono::seconds(5);    // for the machine to leave in an orderly way
-constexpr std::size_t kMostRefused = 4096;                  // images that wait for an endpoint
-constexpr int kReceiveBatch = 64;                           // messages of one socket before the other sockets' turn
+constexpr Duration kLongestWait = std::chrono::seconds(1);       // between checks for idle connections
+constexpr Duration kLookRound = std::chrono::milliseconds(100);  // between looks at what became of connections
+constexpr Duration kStopGrace = std::chrono::seconds(5);         // for the machine to leave in an orderly way
+constexpr std::size_t kMostRefused = 4096;                       // images that wait for an endpoint
+constexpr int kReceiveBatch = 64;                                // messages of one socket before the other sockets' turn
 
 Incarnation RandomIncarnation() {
   std::random_device device;
   const Incarnation incarnation = (Incarnation{device()} << 32) | device();
   return incarnation == 0 ? 1 : incarnation;
-}
-
-// The default endpoint for partial images: by the coordinator's scheme, where packets for it leave this host.
-Result<std::string> ImagesEndpointFor(Endpoint coordinator, Incarnation incarnation) {
-  if (coordinator.remote()) {
-    Result<std::string> host = LocalHostTowards(coordinator);
-    if (!host.ok()) return host;
-    coordinator.host = *std::move(host);
-  }
-  coordinator.port = 0;
-  coordinator.path += kImagesSuffix + std::to_string(incarnation);
-  return coordinator.ToString();
 }
 
 // The worker that sent a message of the images plane.
@@ -79,13 +69,14 @@ constexpr Duration kPeerPatience = std::chrono::seconds(3);  // less than a hand
 
 struct WorkerService::Impl {
   Impl(Context& service_context, WorkerOptions worker_options, std::optional<ImagesKeys> images_keys, Socket control_socket,
-       Socket images_socket)
+       Socket images_socket, ImagesEndpoint endpoint_of_images)
       : context(service_context),
         options(std::move(worker_options)),
         keys(std::move(images_keys)),
         machine(options.machine),
         control(std::move(control_socket)),
         images(std::move(images_socket)),
+        images_endpoint(std::move(endpoint_of_images)),
         peers(service_context, keys ? std::optional(keys->own) : std::nullopt),
         executor(std::in_place, outbox, options.compression == Compression::kOn ? Codec::kZstd : Codec::kRaw, int(options.machine.threads),
                  options.make_renderer, options.task_hook) {}
@@ -98,6 +89,7 @@ struct WorkerService::Impl {
   void HandleEvent(WorkerEvent event);
   void HandleOutput(ExecutorOutput& output);
   void SetRegistered();
+  void LookAtConnections();
   void Remember(const AnyMessage& message);
   bool OpenShared(const AnyMessage& message);
   void Refuse(const PartialImage& partial);
@@ -125,7 +117,8 @@ struct WorkerService::Impl {
   const std::optional<ImagesKeys> keys;
   WorkerMachine machine;
   Socket control, images;
-  std::string images_endpoint;
+  ImagesEndpoint images_endpoint;
+  const std::string first_images_endpoint = images_endpoint.text();
   std::optional<Socket> slabs;  // once the coordinator has named its endpoint
   std::string slabs_endpoint;
   PeerSockets peers;
@@ -161,6 +154,7 @@ void WorkerService::Impl::Run() {
 
 void WorkerService::Impl::Loop() {
   Time stop_deadline = Time::max();
+  Time next_look = Time::min();
   HandleEvent(Tick{});
   while (!stop_now && MonotonicNow() < stop_deadline) {
     std::vector<Socket*> sockets = {&control, &images};
@@ -173,6 +167,10 @@ void WorkerService::Impl::Loop() {
     if (slabs) Receive(*slabs, Plane::kSlabs);
     const Time now = MonotonicNow();
     if (machine.NextWake() <= now) HandleEvent(Tick{});
+    if (now >= next_look) {
+      LookAtConnections();
+      next_look = now + kLookRound;
+    }
     if (stop_requested && stop_deadline == Time::max()) {
       stop_deadline = now + kStopGrace;
       HandleEvent(StopRequested{});
@@ -180,6 +178,11 @@ void WorkerService::Impl::Loop() {
     peers.CloseIdle(now);
     executor->peer_memory().CloseIdle(now);
   }
+}
+
+void WorkerService::Impl::LookAtConnections() {
+  for (const WorkerId peer : peers.TakeBroken()) HandleEvent(PeerUnreachable{peer});
+  if (auto endpoint = images_endpoint.Follow(images, control.local_host())) HandleEvent(Moved{*std::move(endpoint)});
 }
 
 // Only what belongs to the plane is heard: everybody may send to the images plane, the coordinator alone to the others.
@@ -367,12 +370,6 @@ Result<std::unique_ptr<WorkerService>> WorkerService::Start(Context& context, Wo
                                    "]");
   }
   config.incarnation = RandomIncarnation();
-  if (options.images_endpoint.empty()) {
-    Result<std::string> endpoint = ImagesEndpointFor(*coordinator, config.incarnation);
-    if (!endpoint.ok()) return endpoint.status();
-    options.images_endpoint = *std::move(endpoint);
-  }
-  if (const Result<Endpoint> parsed = ParseEndpoint(options.images_endpoint, true); !parsed.ok()) return parsed.status();
 
   std::optional<ImagesKeys> keys;
   SocketOptions images_options;
@@ -384,7 +381,7 @@ Result<std::unique_ptr<WorkerService>> WorkerService::Start(Context& context, Wo
   }
   Result<Socket> images = Socket::Router(context, images_options);
   if (!images.ok()) return images.status();
-  Result<std::string> images_endpoint = images->Bind(options.images_endpoint);
+  Result<ImagesEndpoint> images_endpoint = ImagesEndpoint::Bind(*images, options.images_endpoint, *coordinator, config.incarnation);
   if (!images_endpoint.ok()) return images_endpoint.status();
   Result<Socket> control = Socket::Dealer(context, {.client_keys = options.keys});
   if (!control.ok()) return control.status();
@@ -392,7 +389,7 @@ Result<std::unique_ptr<WorkerService>> WorkerService::Start(Context& context, Wo
 
   config.pid = static_cast<std::uint32_t>(::getpid());
   config.host = HostName();
-  config.images_endpoint = *images_endpoint;
+  config.images_endpoint = images_endpoint->text();
   config.memory_scope = SharedMemoryScope();
   if (options.share_memory) {
     if (const Status shared = ShareBlocks(); !shared.ok()) {
@@ -401,8 +398,8 @@ Result<std::unique_ptr<WorkerService>> WorkerService::Start(Context& context, Wo
     }
   }
   config.lends_memory = options.share_memory;
-  auto impl = std::make_unique<Impl>(context, std::move(options), std::move(keys), std::move(*control), std::move(*images));
-  impl->images_endpoint = std::move(*images_endpoint);
+  auto impl = std::make_unique<Impl>(context, std::move(options), std::move(keys), std::move(*control), std::move(*images),
+                                     std::move(*images_endpoint));
   impl->thread = std::jthread([raw = impl.get()] { raw->Run(); });
   return std::unique_ptr<WorkerService>(new WorkerService(std::move(impl)));
 }
@@ -410,7 +407,7 @@ Result<std::unique_ptr<WorkerService>> WorkerService::Start(Context& context, Wo
 WorkerService::WorkerService(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 WorkerService::~WorkerService() { RequestStop(); }
 
-const std::string& WorkerService::images_endpoint() const { return impl_->images_endpoint; }
+const std::string& WorkerService::images_endpoint() const { return impl_->first_images_endpoint; }
 
 void WorkerService::RequestStop() {
   impl_->stop_requested = true;

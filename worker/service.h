@@ -35,7 +35,7 @@ class WorkerService {
   static Result<std::unique_ptr<WorkerService>> Start(Context& context, WorkerOptions options);
   ~WorkerService();  // stops and joins
 
-  const std::string& images_endpoint() const;  // where other workers send images, with the port that was chosen
+  const std::string& images_endpoint() const;  // where other workers send images at first, with the port that was chosen
 
   // Returns once the coordinator has registered this worker for the first time, or the service has stopped.
   void WaitUntilRegistered();

@@ -26,6 +26,7 @@ struct WorkerMachine::State {
   struct Frame {
     std::uint32_t attempt = 0;
     std::map<std::uint32_t, std::optional<GroupRun>> groups;
+    std::map<WorkerId, std::uint32_t> met;        // workers of groups that are over here, and the last such group
     std::optional<FrameAccumulator> accumulator;  // display worker
   };
 
@@ -39,6 +40,7 @@ struct WorkerMachine::State {
   void On(const HiddenFound& found);
   void On(const SendFailed& failed);
   void On(const PeerUnreachable& peer);
+  void On(const Moved& moved);
   void On(const StopRequested&);
   void On(const Tick&) {}
 
@@ -79,7 +81,7 @@ struct WorkerMachine::State {
   void FailGroup(const GroupKey& key, const Status& status);
   void ReportSlabFailures();
 
-  const WorkerConfig config;
+  WorkerConfig config;
   Incarnation incarnation;  // of the current registration
   Epoch slabs_epoch = 0;    // epoch of the cached volumes
   Duration heartbeat{}, timeout{};
@@ -134,6 +136,12 @@ void WorkerMachine::State::On(const Retire&, const Bytes&) {
 
 void WorkerMachine::State::On(const Stop& stop, const Bytes&) {
   if (worker == 0 || stop.epoch == epoch) End();
+}
+
+// Others know this worker by its endpoint, so it is another one from now on.
+void WorkerMachine::State::On(const Moved& moved) {
+  config.images_endpoint = moved.images_endpoint;
+  if (worker != 0) Unregister();
 }
 
 void WorkerMachine::State::On(const StopRequested&) {
@@ -240,6 +248,7 @@ void WorkerMachine::State::On(GroupAssignment&& assignment, const Bytes&) {
 void WorkerMachine::State::BeginAttempt(FrameId id, Frame& frame, const GroupAssignment& assignment) {
   EndRuns(frame);
   frame.groups.clear();
+  frame.met.clear();
   frame.attempt = assignment.key.attempt;
   early.Forget([&](const PartialImage& image) { return image.key.frame == id && image.key.attempt < frame.attempt; });
   if (!frame.accumulator) return;
@@ -298,10 +307,13 @@ void WorkerMachine::State::On(const SendFailed& failed) {
 
 void WorkerMachine::State::On(const PeerUnreachable& peer) {
   for (const auto& [id, frame] : frames) {
+    std::optional<std::uint32_t> last;  // the last group that may lack an image
+    if (const auto met = frame.met.find(peer.worker); met != frame.met.end()) last = met->second;
     for (const auto& [group, run] : frame.groups) {
-      if (run && run->HasPeer(peer.worker)) {
-        Trouble(run->key(), Status::Unavailable(fmt::format("worker {} cannot be reached", peer.worker)), peer.worker);
-      }
+      if (run && run->HasPeer(peer.worker)) last = std::max(last.value_or(0), group);
+    }
+    if (last) {
+      Trouble({id, frame.attempt, *last}, Status::Unavailable(fmt::format("worker {} cannot be reached", peer.worker)), peer.worker);
     }
   }
 }
@@ -330,7 +342,12 @@ void WorkerMachine::State::EndRun(GroupKey key) {
   brief = false;
   latest_run = nullptr;
   renders.DropGroup(key, actions);
-  std::optional<GroupRun>& run = frames.at(key.frame).groups.at(key.group);
+  Frame& frame = frames.at(key.frame);
+  std::optional<GroupRun>& run = frame.groups.at(key.group);
+  for (const Peer& peer : run->peers()) {
+    std::uint32_t& last = frame.met[peer.worker];
+    last = std::max(last, key.group);
+  }
   run->Drop(actions);
   run.reset();
 }

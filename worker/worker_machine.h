@@ -117,13 +117,18 @@ struct SendFailed {
   GroupKey key;
   Status status;
 };
+// Images cannot be sent to this worker, or the connection broke, so that those that were sent may be lost.
 struct PeerUnreachable {
   WorkerId worker = 0;
 };
+// This host has another address: images come to this endpoint now.
+struct Moved {
+  std::string images_endpoint;
+};
 struct StopRequested {};  // SIGTERM: leave in an orderly way
 struct Tick {};
-using WorkerEvent =
-    std::variant<MessageReceived, ChunkStored, RenderDone, CombineDone, HiddenFound, SendFailed, PeerUnreachable, StopRequested, Tick>;
+using WorkerEvent = std::variant<MessageReceived, ChunkStored, RenderDone, CombineDone, HiddenFound, SendFailed, PeerUnreachable, Moved,
+                                 StopRequested, Tick>;
 
 // ---- actions
 struct SendControl {

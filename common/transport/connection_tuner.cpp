@@ -12,6 +12,8 @@
 #include <string>
 #include <utility>
 
+#include "common/transport/endpoint.h"
+
 namespace slabstream {
 namespace {
 
@@ -41,7 +43,7 @@ bool StaysOnThisHost(int descriptor) {
 }  // namespace
 
 ConnectionTuner::ConnectionTuner(zmq::socket_t& socket) {
-  init(socket, UniqueName(), ZMQ_EVENT_CONNECTED | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH);
+  init(socket, UniqueName(), ZMQ_EVENT_CONNECTED | ZMQ_EVENT_DISCONNECTED | ZMQ_EVENT_CLOSED | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH);
 }
 
 void ConnectionTuner::TuneNew() {
@@ -55,6 +57,7 @@ void ConnectionTuner::TuneNew() {
 // The connection may be gone and its descriptor reused: then the new connection is one of this host too, or stays unchanged.
 void ConnectionTuner::on_event_connected(const zmq_event_t& event, const char*) {
   const int descriptor = event.value;
+  if (std::string host = LocalHostOf(descriptor); !host.empty()) local_host_ = std::move(host);
   if (!StaysOnThisHost(descriptor)) return;
   std::array<char, kMostNameBytes> system{};
   socklen_t bytes = system.size();

@@ -155,21 +155,23 @@ Result<std::string> LocalHostTowards(const Endpoint& endpoint) {
   const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> addresses(found, ::freeaddrinfo);
   // Connecting a datagram socket only chooses the way.
   const int descriptor = ::socket(found->ai_family, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  const bool connected = descriptor >= 0 && ::connect(descriptor, found->ai_addr, found->ai_addrlen) == 0;
+  const int error = errno;
+  std::string address = connected ? LocalHostOf(descriptor) : "";
+  if (descriptor >= 0) ::close(descriptor);
+  if (address.empty()) return unavailable(std::strerror(error));
+  return address;
+}
+
+std::string LocalHostOf(int descriptor) {
   sockaddr_storage own{};
   socklen_t bytes = sizeof(own);
   std::array<char, INET6_ADDRSTRLEN> text{};
-  const bool known = descriptor >= 0 && ::connect(descriptor, found->ai_addr, found->ai_addrlen) == 0 &&
-                     ::getsockname(descriptor, reinterpret_cast<sockaddr*>(&own), &bytes) == 0 &&
-                     ::getnameinfo(reinterpret_cast<sockaddr*>(&own), bytes, text.data(), text.size(), nullptr, 0, NI_NUMERICHOST) == 0;
-  const int error = errno;
-  if (descriptor >= 0) ::close(descriptor);
-  if (!known) return unavailable(std::strerror(error));
-  std::string address(text.data());
-  if (bracketed) {
-    address.insert(0, 1, '[');
-    address += ']';
+  if (::getsockname(descriptor, reinterpret_cast<sockaddr*>(&own), &bytes) != 0 ||
+      ::getnameinfo(reinterpret_cast<sockaddr*>(&own), bytes, text.data(), text.size(), nullptr, 0, NI_NUMERICHOST) != 0) {
+    return "";
   }
-  return address;
+  return own.ss_family == AF_INET6 ? "[" + std::string(text.data()) + "]" : text.data();
 }
 
 Endpoint WorkerEndpointFor(const Endpoint& client_endpoint) {

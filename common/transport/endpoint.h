@@ -31,6 +31,9 @@ Result<Endpoint> ParseEndpoint(std::string_view text, bool to_bind);
 // is not known, or no network leads there.
 Result<std::string> LocalHostTowards(const Endpoint& endpoint);
 
+// This machine's end of a connected tcp socket, as the host of an endpoint; empty: it is not connected.
+std::string LocalHostOf(int descriptor);
+
 // Removes the socket files whose paths begin like this ipc endpoint's, if nobody listens there any more: processes that were killed leave
 // theirs. Does nothing for other endpoints.
 void RemoveDeadSockets(const Endpoint& prefix);

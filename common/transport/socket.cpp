@@ -59,6 +59,23 @@ Status Failed(const std::string& endpoint, const zmq::error_t& error) {
   return Status::Unavailable("endpoint \"" + endpoint + "\": " + (error.num() == EADDRINUSE ? "already in use" : error.what()));
 }
 
+// How long a tcp connection may go without an acknowledgement before it ends: less than any time-out of the service above it, so that
+// messages pass again, over another connection, before somebody is taken for dead.
+constexpr std::chrono::milliseconds kCutOff{3000};
+constexpr std::chrono::seconds kIdle{2}, kProbeInterval{1};  // of a connection that is silent; then of the probes
+constexpr std::chrono::milliseconds kConnect{2000};          // for one attempt to connect
+
+// Without these the kernel alone decides, and it waits twice as long before each time that it sends a packet again: after a link was down
+// for 10 s, nothing passed for up to 6 s more; a connection whose host has another address now hung for ever. The kernel rather than
+// heartbeats of ZeroMQ judges, since those wait behind a message that takes long on a slow link, while every part of it is acknowledged.
+void NoticeCutConnections(zmq::socket_t& socket) {
+  socket.set(zmq::sockopt::tcp_maxrt, int(kCutOff.count()));
+  socket.set(zmq::sockopt::tcp_keepalive, 1);
+  socket.set(zmq::sockopt::tcp_keepalive_idle, int(kIdle.count()));
+  socket.set(zmq::sockopt::tcp_keepalive_intvl, int(kProbeInterval.count()));
+  socket.set(zmq::sockopt::connect_timeout, int(kConnect.count()));
+}
+
 Result<std::unique_ptr<Socket::Impl>> MakeSocket(Context& context, zmq::socket_type type, const SocketOptions& options) {
   try {
     auto impl = std::make_unique<Socket::Impl>(context, type, options);
@@ -68,6 +85,7 @@ Result<std::unique_ptr<Socket::Impl>> MakeSocket(Context& context, zmq::socket_t
     impl->socket.set(zmq::sockopt::handshake_ivl,
                      static_cast<int>(std::chrono::ceil<std::chrono::milliseconds>(options.handshake).count()));
     impl->socket.set(zmq::sockopt::maxmsgsize, options.max_message_bytes);
+    NoticeCutConnections(impl->socket);
     if (impl->router) {
       impl->socket.set(zmq::sockopt::router_mandatory, true);
       impl->socket.set(zmq::sockopt::router_handover, false);  // nobody takes over another's identity
@@ -226,6 +244,13 @@ Result<std::string> Socket::Bind(const std::string& text) {
   return Status::Internal("endpoint \"" + name + "\": unknown scheme");
 }
 
+void Socket::Unbind(const std::string& endpoint) {
+  try {
+    impl_->socket.unbind(endpoint);
+  } catch (const zmq::error_t&) {  // nothing is bound there
+  }
+}
+
 Status Socket::Connect(const std::string& text) {
   const Result<Endpoint> endpoint = ParseEndpoint(text, false);
   if (!endpoint.ok()) return endpoint.status();
@@ -262,6 +287,18 @@ bool Socket::refused() const {
   if (impl_->tuner == nullptr) return false;
   impl_->tuner->TuneNew();
   return impl_->tuner->refused();
+}
+
+bool Socket::TakeBroken() {
+  if (impl_->tuner == nullptr) return false;
+  impl_->tuner->TuneNew();
+  return impl_->tuner->TakeBroken();
+}
+
+std::string Socket::local_host() const {
+  if (impl_->tuner == nullptr) return "";
+  impl_->tuner->TuneNew();
+  return impl_->tuner->local_host();
 }
 
 void Socket::EndConnections(const std::string& user) { impl_->connections.End(user); }

@@ -11,6 +11,8 @@
 // again while it is broken, up to the high-water mark: tcp and ipc reconnect by themselves (every 100 ms), and the queue then reaches
 // whoever listens there now. So receivers check epochs, and a dealer whose peer is known to be dead is closed, which drops the queue after
 // the linger time. inproc does not reconnect: after its peer has closed, sending ends in ResourceExhausted.
+//
+// A tcp connection ends if its other end acknowledges nothing for 3 s, whether it has vanished, is cut off, or has another address.
 #pragma once
 
 #include <cstdint>
@@ -59,6 +61,8 @@ class Socket {
   // or keys are missing, or the address is not this machine's.
   // An ipc socket file that a dead process left is replaced. Closing frees inproc names and ipc files at once, a tcp port a moment later.
   Result<std::string> Bind(const std::string& endpoint);
+  // Ends what Bind began at this tcp endpoint, as it was returned. Connections stay.
+  void Unbind(const std::string& endpoint);
   // Ok does not mean that anybody listens there. InvalidArgument: as ParseEndpoint, or keys are missing.
   Status Connect(const std::string& endpoint);
 
@@ -68,6 +72,11 @@ class Socket {
 
   // Dealers: whether the other end has refused this socket's key; it does not try again.
   bool refused() const;
+
+  // Dealers over tcp: whether a connection broke, or could not be made, since the last call. What was sent may be lost.
+  bool TakeBroken();
+  // Dealers over tcp: this machine's address on the latest connection, as the host of an endpoint; empty: there was none.
+  std::string local_host() const;
 
   // Ends the connections from which messages of this user have come, or of this identity; what is queued for them is gone. The other end
   // makes them again, unless the Authenticator refuses it.

@@ -429,10 +429,46 @@ TEST_F(UnreachablePeer, ThatIsSilentIsPlannedAroundWithinTheTimeout) {
   EXPECT_EQ(WorkersOf(again.back()), std::set<WorkerId>{accuser.id});
 }
 
-TEST_F(UnreachablePeer, ThatLivesMakesItAStall) {
-  const auto again = HandedOut(script.Pass(milliseconds(1000)));
+TEST_F(UnreachablePeer, ThatLivesIsLeftOutOfTheFrame) {
+  const Actions actions = script.Pass(milliseconds(1000));
+  const auto again = HandedOut(actions);
   ASSERT_EQ(again.at(0).key, (GroupKey{1, 2, 0}));
-  EXPECT_EQ(WorkersOf(again[0]), (std::set<WorkerId>{1, 2}));
+  EXPECT_EQ(again[0].display, groups[0].display) << "it keeps what it accumulated";
+  EXPECT_EQ(WorkersOf(again[0]), (std::set<WorkerId>{accuser.id}));
+  EXPECT_EQ(ToClients<FrameReply>(script.AnswerAll(actions)).size(), 1U);
+  EXPECT_EQ(WorkersOf(HandedOut(script.Submit(kClient, Frame(2))).at(0)).size(), 2U) << "the next frame tries again";
+}
+
+// It complains of one worker after another: then it is the one that is cut off.
+TEST(CoordinatorFrames, WorkerThatReachesNobodyIsLeftOutOfTheFrame) {
+  CoordinatorScript script;
+  for (int token = 11; token <= 14; ++token) script.Join(PeerToken(token), std::uint32_t(token));
+  GroupAssignment group = HandedOut(script.Submit(kClient, Frame(1))).at(0);
+  const WorkerId accuser = group.display % 4 + 1;
+  for (int complaints = 1; complaints <= 2; ++complaints) {
+    std::set<WorkerId> others = WorkersOf(group);
+    others.erase(accuser);
+    others.erase(group.display);
+    script.Worker({}, WorkerTrouble{77, accuser, group.key, *others.begin(), Status::Unavailable("does not answer")});
+    group = HandedOut(script.Pass(milliseconds(1000))).at(0);
+    EXPECT_EQ(WorkersOf(group).contains(accuser), complaints == 1);
+  }
+  EXPECT_EQ(WorkersOf(group).size(), 2U);
+}
+
+TEST(CoordinatorFrames, WhatAWorkerHadOnAnEarlierConnectionIsHandedOutAgainAtOnce) {
+  CoordinatorScript script;
+  FakeWorker worker = script.Join(11, 1);
+  script.Join(12, 2);
+  const auto groups = HandedOut(script.Submit(kClient, Frame(1, 3)));
+  script.Done(groups.at(0));
+  EXPECT_TRUE(HandedOut(script.Beat(worker)).empty());
+  worker.token = 21;
+  const auto again = HandedOut(script.Beat(worker));
+  ASSERT_FALSE(again.empty());
+  EXPECT_EQ(again[0].key, (GroupKey{1, 2, 1})) << "the first group that is not done";
+  EXPECT_EQ(WorkersOf(again[0]).size(), 2U);
+  EXPECT_TRUE(HandedOut(script.Beat(worker)).empty()) << "once";
 }
 
 TEST(CoordinatorFrames, FrameOutlivesAllItsWorkersIfOthersComeInTime) {

@@ -35,7 +35,7 @@ class KeysOnHostsTest : public EndToEndTest {
 
   void StartService() {
     const std::string ball = MakeSphere("ball.nrrd", 2, 48);
-    coordinator_ = Start(kCoordinator, {SLABSTREAM_COORDINATOR_PROGRAM, "--listen", "tcp://" + Hosts::AddressOf(kCoordinator) + ":*",
+    coordinator_ = Start(kCoordinator, {SLABSTREAM_COORDINATOR_PROGRAM, "--listen", "tcp://" + hosts_->AddressOf(kCoordinator) + ":*",
                                         "--keys", Path("keys"), "--data", kDataset + ("=" + ball)});
     ASSERT_TRUE(coordinator_->WaitForOutput("slabstream-coordinator ready"));
     for (int i = 0; i < kWorkers; ++i)
@@ -68,7 +68,7 @@ TEST_F(KeysOnHostsTest, ThePictureIsThatOfOneProcessAndNothingPassesInTheClear) 
 
 TEST_F(KeysOnHostsTest, KeysAreNeededAndRevokedOnesEnd) {
   StartService();
-  const std::string endpoint = "tcp://" + Hosts::AddressOf(kCoordinator) + ":7420";
+  const std::string endpoint = "tcp://" + hosts_->AddressOf(kCoordinator) + ":7420";
   const ProgramResult without = AsClient({"status", "--endpoint", endpoint});
   EXPECT_EQ(without.exit_status, 2);
   EXPECT_THAT(without.err, HasSubstr("without keys the service stays on this machine"));

@@ -13,10 +13,12 @@
 #include <array>
 #include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
@@ -365,6 +367,51 @@ TEST(Socket, ConnectionsWithinTheHostAreNotPaced) {
   ASSERT_TRUE(Receive(*router));
   ASSERT_TRUE(dealer->Send({}, BytesOf("finds it there")).ok());
   EXPECT_THAT(CongestionControlsTo(ParseEndpoint(*bound, false)->port), testing::ElementsAre("reno"));
+}
+
+// False: not within a time that is far above what is needed.
+bool BreaksSoon(Socket& dealer) {
+  const Time limit = MonotonicNow() + std::chrono::seconds(30);
+  const std::array<Socket*, 1> sockets = {&dealer};
+  while (MonotonicNow() < limit) {
+    if (dealer.TakeBroken()) return true;
+    Wait(sockets, nullptr, std::chrono::milliseconds(10));
+  }
+  return false;
+}
+
+TEST(Socket, DealersTellWhereTheyConnectFromAndThatConnectionsBroke) {
+  for (const std::string host : {"127.0.0.1", "[::1]"}) {
+    Context context;
+    std::optional<Socket> router = Socket::Router(context).value();
+    const Result<std::string> bound = router->Bind("tcp://" + host + ":*");
+    if (!bound.ok()) continue;  // no IPv6
+    Socket dealer = Socket::Dealer(context).value();
+    EXPECT_EQ(dealer.local_host(), "");
+    ASSERT_TRUE(dealer.Connect(*bound).ok());
+    ASSERT_TRUE(dealer.Send({}, BytesOf("makes the connection")).ok());
+    ASSERT_TRUE(Receive(*router));
+    EXPECT_EQ(dealer.local_host(), host);
+    EXPECT_FALSE(dealer.TakeBroken());
+    router.reset();
+    EXPECT_TRUE(BreaksSoon(dealer));
+    EXPECT_TRUE(BreaksSoon(dealer)) << "and it cannot be made again";
+  }
+}
+
+TEST(Socket, AnUnboundEndpointIsFreeAndConnectionsStay) {
+  Context context;
+  Socket router = Socket::Router(context).value(), other = Socket::Router(context).value();
+  const std::string first = router.Bind("tcp://127.0.0.1:*").value();
+  Socket dealer = Socket::Dealer(context).value();
+  ASSERT_TRUE(dealer.Connect(first).ok());
+  ASSERT_TRUE(dealer.Send({}, BytesOf("before")).ok());
+  ASSERT_TRUE(Receive(router));
+  router.Unbind(first);
+  const Time limit = MonotonicNow() + std::chrono::seconds(30);  // ZeroMQ closes it a moment later
+  while (!other.Bind(first).ok()) ASSERT_LT(MonotonicNow(), limit);
+  ASSERT_TRUE(dealer.Send({}, BytesOf("after")).ok());
+  EXPECT_TRUE(Receive(router));
 }
 
 TEST(Socket, RefusesWhatIsNotLoopbackWithoutKeys) {

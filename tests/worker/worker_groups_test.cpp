@@ -176,5 +176,20 @@ TEST_F(WorkerGroupsTest, AnUnreachablePeerIsReportedForItsGroups) {
   EXPECT_THAT(Sent<WorkerTrouble>(Tell(PeerUnreachable{99})), IsEmpty());
 }
 
+// An image that was sent may be lost with its connection: that concerns groups that are over here, while the frame is not.
+TEST_F(WorkerGroupsTest, AnUnreachablePeerIsReportedForTheLastGroupWithIt) {
+  for (const std::uint32_t group : {0, 1}) {
+    GroupAssignment assignment = Assignment(1, {kPeer, kSelf}, group, 3);
+    assignment.display = kPeer;
+    EXPECT_THAT(All<SendPartial>(Rendered(All<StartRender>(Feed(Tell(assignment))).at(0))), SizeIs(1));
+  }
+  const auto trouble = Sent<WorkerTrouble>(Tell(PeerUnreachable{kPeer}));
+  ASSERT_THAT(trouble, SizeIs(1));
+  EXPECT_EQ(trouble[0].unreachable, kPeer);
+  EXPECT_EQ(trouble[0].key, (GroupKey{1, 1, 1}));
+  Tell(Ping{kEpoch, 2, {}});
+  EXPECT_THAT(Sent<WorkerTrouble>(Tell(PeerUnreachable{kPeer})), IsEmpty()) << "the frame is finished";
+}
+
 }  // namespace
 }  // namespace slabstream

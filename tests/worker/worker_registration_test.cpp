@@ -68,6 +68,14 @@ TEST_F(WorkerRegistrationTest, RetireMakesItRegisterAgain) {
   EXPECT_THAT(Tell(Retire{kEpoch + 1}), IsEmpty());
 }
 
+TEST_F(WorkerRegistrationTest, RegistersAgainWhereItsImagesComeNow) {
+  const auto registers = Sent<Register>(Tell(Moved{"inproc://elsewhere"}));
+  EXPECT_FALSE(machine->registered());
+  ASSERT_THAT(registers, SizeIs(1));
+  EXPECT_EQ(registers[0].images_endpoint, "inproc://elsewhere");
+  EXPECT_EQ(registers[0].incarnation, 1001U);
+}
+
 TEST_F(WorkerRegistrationTest, LeavesInOrderAndObeysStop) {
   const Actions leaving = Tell(StopRequested{});
   EXPECT_THAT(Sent<Leave>(leaving), SizeIs(1));
