@@ -25,7 +25,6 @@ int WarmUpFrames(const Policy& policy) { return policy.balance == kDynamicBalanc
 Json MeasureLatency(Client& client, const FrameRequest& request, int warm_up, int frames) {
   std::vector<double> latencies, renders, longest, imbalances, idle_shares, image_bytes;
   std::array<std::vector<double>, kStageCount> stages;
-  std::uint32_t workers = ~0U;
   for (int i = 0; i < warm_up + frames; ++i) {
     const Picture picture = OrThrow(client.Render(request));
     if (i < warm_up) continue;
@@ -37,7 +36,6 @@ Json MeasureLatency(Client& client, const FrameRequest& request, int warm_up, in
     idle_shares.push_back(summary.idle_share);
     image_bytes.push_back(double(summary.image_bytes));
     for (std::size_t stage = 0; stage < stages.size(); ++stage) stages[stage].push_back(Milliseconds(summary.stage_ns[stage]));
-    workers = std::min(workers, picture.statistics.workers);
   }
   Json stage_medians = Json::object();
   for (std::size_t stage = 0; stage < stages.size(); ++stage) {
@@ -50,8 +48,7 @@ Json MeasureLatency(Client& client, const FrameRequest& request, int warm_up, in
               {"longest_render_ms", MedianOf(std::move(longest)).median},
               {"imbalance", MedianOf(std::move(imbalances)).median},
               {"idle_share", MedianOf(std::move(idle_shares)).median},
-              {"image_bytes", MedianOf(std::move(image_bytes)).median},
-              {"workers", workers}};
+              {"image_bytes", MedianOf(std::move(image_bytes)).median}};
 }
 
 double MeasurePeriod(Client& client, const FrameRequest& request, int in_flight) {

@@ -30,18 +30,21 @@ int FramesInFlight(int workers, const FrameCase& frame) {
   return WindowFor(std::size_t(workers), teams, std::int64_t(frame.size.width) * frame.size.height * kPixelBytes).frames + kAhead;
 }
 
-Trial FramesTrial(Client& client, const Json& roster, const FrameCase& frame) {
-  const int in_flight = FramesInFlight(int(roster.size()), frame);
+// `begin`: the service when the run began.
+Trial FramesTrial(Client& client, const StatusReply& begin, const FrameCase& frame) {
+  const int in_flight = FramesInFlight(int(begin.workers.size()), frame);
   const Json key = {{"what", "frames of a service"}, {"in flight", in_flight}, {"request", RequestJson(RequestOf(frame))}};
-  const auto run = [&client, workers = roster.size(), frame, in_flight]() -> Json {
+  const auto run = [&client, begin, frame, in_flight]() -> Json {
     const FrameRequest request = RequestOf(frame);
     // The connections between workers are made while frames are in flight, before the latency of a single one is measured.
     (void)MeasureLatency(client, request, WarmUpFrames(frame.policy), 1);
     const double period_ms = MeasurePeriod(client, request, in_flight);
     Json numbers = MeasureLatency(client, request, 1, kLatencyFrames);
-    if (numbers.at("workers") != workers) {
-      throw Failure(Status::Unavailable(
-          fmt::format("a frame had {} workers of {}: the roster of the service has changed", numbers.at("workers").dump(), workers)));
+    const StatusReply now = OrThrow(client.QueryStatus());
+    if (now.workers_lost != begin.workers_lost || RosterOf(now) != RosterOf(begin)) {
+      throw Failure(
+          Status::Unavailable(fmt::format("the roster of the service has changed: {} workers of {} are there, {} were lost meanwhile",
+                                          now.workers.size(), begin.workers.size(), now.workers_lost - begin.workers_lost)));
     }
     numbers["period_ms"] = period_ms;
     return numbers;
@@ -68,11 +71,12 @@ Json DescribeService(const ServiceChoice& service, const Sweep& sweep) {
 
 void RunServiceSweep(ExperimentContext& context, const Sweep& sweep, Results& results) {
   Session session = OrThrow(Session::OpenService(context.options().own.service));
-  const Json roster = RosterOf(OrThrow(session.client().QueryStatus()));
+  const StatusReply begin = OrThrow(session.client().QueryStatus());
+  const Json roster = RosterOf(begin);
   const std::vector<SweepFrame> frames = FramesOf(sweep);
   std::vector<Trial> trials;
   trials.reserve(frames.size());
-  for (const SweepFrame& asked : frames) trials.push_back(FramesTrial(session.client(), roster, asked.frame));
+  for (const SweepFrame& asked : frames) trials.push_back(FramesTrial(session.client(), begin, asked.frame));
   context.Run(trials, kRepeats, kQuickRepeats);
 
   constexpr struct {
