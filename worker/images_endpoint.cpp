@@ -30,7 +30,7 @@ std::optional<std::string> ImagesEndpoint::Follow(Socket& images, const std::str
     return std::nullopt;
   }
   LogInfo("this host has another address: images come to " + *bound);
-  images.Unbind(std::exchange(text_, *std::move(bound)));
+  text_ = *std::move(bound);
   return text_;
 }
 

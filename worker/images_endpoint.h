@@ -21,7 +21,7 @@ class ImagesEndpoint {
   const std::string& text() const { return text_; }
 
   // `local_host`: the address from which the coordinator was reached last; empty: not known. If it is another one than before, images come
-  // there from now on. Then returns the endpoint.
+  // there from now on, beside the endpoints before. Then returns the endpoint.
   std::optional<std::string> Follow(Socket& images, const std::string& local_host);
 
  private:

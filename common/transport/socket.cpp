@@ -244,13 +244,6 @@ Result<std::string> Socket::Bind(const std::string& text) {
   return Status::Internal("endpoint \"" + name + "\": unknown scheme");
 }
 
-void Socket::Unbind(const std::string& endpoint) {
-  try {
-    impl_->socket.unbind(endpoint);
-  } catch (const zmq::error_t&) {  // nothing is bound there
-  }
-}
-
 Status Socket::Connect(const std::string& text) {
   const Result<Endpoint> endpoint = ParseEndpoint(text, false);
   if (!endpoint.ok()) return endpoint.status();

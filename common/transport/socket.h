@@ -61,8 +61,6 @@ class Socket {
   // or keys are missing, or the address is not this machine's.
   // An ipc socket file that a dead process left is replaced. Closing frees inproc names and ipc files at once, a tcp port a moment later.
   Result<std::string> Bind(const std::string& endpoint);
-  // Ends what Bind began at this tcp endpoint, as it was returned. Connections stay.
-  void Unbind(const std::string& endpoint);
   // Ok does not mean that anybody listens there. InvalidArgument: as ParseEndpoint, or keys are missing.
   Status Connect(const std::string& endpoint);
 
