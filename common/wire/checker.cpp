@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "common/base/printable.h"
+
 namespace slabstream {
 namespace {
 
@@ -20,7 +22,7 @@ void Checker::Fail(std::string_view field, std::string_view what) {
   if (!ok()) return;
   std::string message = path_;
   if (!field.empty()) message.append(".").append(field);
-  status_ = Status::InvalidArgument(message.append(": ").append(what));
+  status_ = Printable(Status::InvalidArgument(message.append(": ").append(what)));
 }
 
 void Checker::Adopt(const Status& status) {

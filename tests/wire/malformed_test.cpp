@@ -139,6 +139,14 @@ TEST(Malformed, NoEnumMayHaveAnUnknownValue) {
   }
 }
 
+TEST(Malformed, ARefusalIsOneLineWhateverItQuotes) {
+  SubmitFrame message{.request = 1};
+  message.frame.dataset = "brain";
+  message.frame.renderer = "a\nb";
+  const std::string error = Decode(Encode(message)).status().message();
+  EXPECT_THAT(error, StartsWith("SubmitFrame.frame: renderer is 'a?b'"));
+}
+
 TEST(Malformed, EveryTextIsBounded) {
   AlterEachField(
       [&](const Place& place) {
