@@ -17,6 +17,9 @@
 //              frame that it had a part in is re-planned over the others (attempt + 1) from its first unfinished group, or from the
 //              first group if the display worker is lost. Slots that stay vacant for vacancy_grace are given up; the next frame is then
 //              partitioned anew. A worker that cannot do its part of a frame (WorkerTrouble) is left out of that frame.
+//   leaving    A worker that says that it is leaving loses its slot at once and gets no new frame. It finishes the groups that it has; the
+//              rest of a frame is handed over to the workers that stay, if there are any. Without a part in any frame it gets Stop. What
+//              the last worker has left behind in this way waits for another one until its deadline.
 //   stalls     A frame without progress for stall_timeout is handed out again (attempt + 1); after max_stalls in a row it fails. If there
 //              is no worker for worker_wait, everything that waits fails and says so. Every request has a deadline.
 //   end        ShutDown ends the service: workers Stop. CoordinatorStopRequested ends the coordinator alone: workers Retire and wait for

@@ -116,6 +116,9 @@ struct FrameMachine::State {
   // ---- frames and workers
   void Expire();
   void Advance();
+  void BeginAttempts();
+  void DismissWorkers();
+  Time EndOfWait(const OpenRequest& request) const;
   Status FindVolume(OpenRequest& request) const;
   bool WaitsForCount(const OpenRequest& request) { return request.needs_occupancy && !occupancy.Find(*request.volume); }
   void CountAhead();
@@ -129,7 +132,7 @@ struct FrameMachine::State {
   void EndFrame(FrameId id);
   void FailFrame(const RunningFrame& frame, const Status& status);
   void LoseWorker(WorkerId worker);
-  void RemoveWorker(WorkerId worker);
+  void RemoveWorker(WorkerId worker, LiveRoster::Notice notice);
   void StopAll(const AnyMessage& goodbye, const std::string& reason);
   Ping MakePing() const { return {.epoch = config.epoch, .finished_before = frames.finished_before(), .cancelled = frames.cancelled()}; }
   Time NextWake();

@@ -75,16 +75,16 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker&, const WorkerTrouble
 }
 
 void FrameMachine::State::OnWorkerMessage(const FromWorker&, const Leave& message) {
-  if (message.epoch == config.epoch) RemoveWorker(message.worker);
+  if (message.epoch == config.epoch) RemoveWorker(message.worker, LiveRoster::Notice::kGiven);
 }
 
 void FrameMachine::State::LoseWorker(WorkerId worker) {
   ++workers_lost;
-  RemoveWorker(worker);
+  RemoveWorker(worker, LiveRoster::Notice::kNone);
 }
 
-void FrameMachine::State::RemoveWorker(WorkerId worker) {
-  roster.Remove(worker, now);
+void FrameMachine::State::RemoveWorker(WorkerId worker, LiveRoster::Notice notice) {
+  roster.Remove(worker, now, notice);
   for (RunningFrame& frame : frames) frame.OnLoss(worker, now);
 }
 

@@ -52,6 +52,10 @@ LiveRoster::News LiveRoster::Hear(const Heartbeat& message, PeerToken from, Time
   member->cached_bytes = message.cached_bytes;
   member->fetched_bytes = std::max(member->fetched_bytes, message.fetched_bytes);
   member->rendered_ranks = std::max(member->rendered_ranks, message.rendered_ranks);
+  if (message.leaving && !member->leaving) {
+    member->leaving = true;
+    Vacate(member->id, now);
+  }
   return {.known = true, .progressed = progressed};
 }
 
@@ -61,13 +65,19 @@ void LiveRoster::Touch(WorkerId worker, Time now) {
   }
 }
 
-void LiveRoster::Remove(WorkerId worker, Time now) {
-  if (std::erase_if(members_, [worker](const Member& m) { return m.id == worker; }) == 0) return;
+void LiveRoster::Vacate(WorkerId worker, Time now) {
+  const auto slot = std::ranges::find(slots_, worker, &Slot::worker);
+  if (slot == slots_.end()) return;
+  *slot = {.worker = 0, .vacant_since = now};
   ++version_;
-  for (Slot& slot : slots_) {
-    if (slot.worker == worker) slot = {.worker = 0, .vacant_since = now};
-  }
-  if (members_.empty()) empty_since_ = now;
+}
+
+void LiveRoster::Remove(WorkerId worker, Time now, Notice notice) {
+  if (std::erase_if(members_, [worker](const Member& m) { return m.id == worker; }) == 0) return;
+  Vacate(worker, now);
+  if (!members_.empty()) return;
+  empty_since_ = now;
+  last_gave_notice_ = notice == Notice::kGiven;
 }
 
 void LiveRoster::GiveUpVacancies(Time now) {
@@ -92,6 +102,12 @@ std::vector<WorkerId> LiveRoster::Silent(Time now) const {
   return IdsOf(members_, [&](const Member& member) { return now >= member.last_heard + timeout_; });
 }
 
+std::vector<WorkerId> LiveRoster::Leaving() const {
+  return IdsOf(members_, [](const Member& member) { return member.leaving; });
+}
+
+std::size_t LiveRoster::staying() const { return std::size_t(std::ranges::count(members_, false, &Member::leaving)); }
+
 std::uint32_t LiveRoster::SlotOf(WorkerId worker) const {
   const auto slot = std::ranges::find(slots_, worker, &Slot::worker);
   CHECK(worker != 0 && slot != slots_.end()) << "worker " << worker << " has no slot";
@@ -105,17 +121,21 @@ Roster LiveRoster::slots() const {
 }
 
 Roster LiveRoster::Refill(const Roster& planned) const {
-  Roster refilled = planned;
+  Roster refilled{.slots = planned.slots, .leaving = Leaving()};
+  const auto stays = [&](WorkerId worker) {
+    const Member* member = Find(worker);
+    return member != nullptr && !member->leaving;
+  };
   const auto used = [&](WorkerId worker) { return std::ranges::find(refilled.slots, worker) != refilled.slots.end(); };
   for (WorkerId& worker : refilled.slots) {
-    if (Find(worker) == nullptr) worker = 0;
+    if (!stays(worker)) worker = 0;
   }
   for (std::size_t i = 0; i < std::min(slots_.size(), refilled.slots.size()); ++i) {
     if (refilled.slots[i] == 0 && !used(slots_[i].worker)) refilled.slots[i] = slots_[i].worker;
   }
   for (const Member& member : members_) {
     const auto vacant = std::ranges::find(refilled.slots, WorkerId{0});
-    if (vacant != refilled.slots.end() && !used(member.id)) *vacant = member.id;
+    if (vacant != refilled.slots.end() && !member.leaving && !used(member.id)) *vacant = member.id;
   }
   return refilled;
 }

@@ -3,6 +3,7 @@
 // A worker is an incarnation (one registration of one process: what it held before is gone). It keeps its id while it stays, on whatever
 // connection it speaks; a new incarnation is a new worker. Slots outlive workers: the slot of a lost worker stays vacant for a grace
 // period, so that a replacement takes over its boxes and nobody else's voxels move; then it is given up, and the slots after it move down.
+// A worker that is leaving has no slot any more, but is a member until it is removed.
 #pragma once
 
 #include <cstdint>
@@ -24,6 +25,7 @@ struct Member {
   Time last_heard;
   std::uint64_t cached_bytes = 0, fetched_bytes = 0;
   std::uint32_t rendered_ranks = 0;
+  bool leaving = false;
 };
 
 class LiveRoster {
@@ -44,22 +46,26 @@ class LiveRoster {
   News Hear(const Heartbeat& message, PeerToken from, Time now);
   void Touch(WorkerId worker, Time now);  // any other message of a member; unknown ids are ignored
 
-  void Remove(WorkerId worker, Time now);  // its slot becomes vacant
-  void GiveUpVacancies(Time now);          // drops slots that have been vacant for the grace period
-  void Postpone(Duration duration);        // all silences begin later, since the listener itself was asleep
+  enum class Notice { kGiven, kNone };
+  void Remove(WorkerId worker, Time now, Notice notice = Notice::kNone);  // its slot becomes vacant
+  void GiveUpVacancies(Time now);                                         // drops slots that have been vacant for the grace period
+  void Postpone(Duration duration);                                       // all silences begin later, since the listener itself was asleep
 
   const Member* Find(WorkerId worker) const;  // null: not a member
   std::vector<WorkerId> At(PeerToken peer) const;
   std::vector<WorkerId> Silent(Time now) const;  // not heard for the timeout
   const std::vector<Member>& members() const { return members_; }
+  std::vector<WorkerId> Leaving() const;
+  std::size_t staying() const;  // members that are not leaving
   bool empty() const { return members_.empty(); }
-  Time empty_since() const { return empty_since_; }  // Time::min(): there never was a worker
-  std::uint32_t SlotOf(WorkerId worker) const;       // of a member
+  Time empty_since() const { return empty_since_; }            // Time::min(): there never was a worker
+  bool last_gave_notice() const { return last_gave_notice_; }  // the one since whose removal it is empty
+  std::uint32_t SlotOf(WorkerId worker) const;                 // of a member that stays
 
   Roster slots() const;                               // 0 where a slot is vacant
   std::uint64_t version() const { return version_; }  // changes whenever slots() does
-  // Fills the slots of an earlier plan: workers that are still here keep theirs; the others' go to workers without a slot in it, the
-  // present owner of the same slot first. The rest are vacant.
+  // Fills the slots of an earlier plan: workers that stay keep theirs; the others' go to workers without a slot in it, the present owner
+  // of the same slot first. The rest are vacant. Names the workers that are leaving, too.
   Roster Refill(const Roster& planned) const;
 
   Time NextWake() const;  // the next silence or end of a grace period; Time::max(): none
@@ -69,12 +75,15 @@ class LiveRoster {
     WorkerId worker = 0;
     Time vacant_since;
   };
+  void Vacate(WorkerId worker, Time now);
+
   Duration timeout_, vacancy_grace_;
   std::vector<Member> members_;  // by ascending id
   std::vector<Slot> slots_;
   WorkerId last_id_ = 0;
   std::uint64_t version_ = 0;
   Time empty_since_ = Time::min();
+  bool last_gave_notice_ = false;
 };
 
 }  // namespace slabstream

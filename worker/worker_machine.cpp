@@ -39,6 +39,7 @@ struct WorkerMachine::State {
   void On(const HiddenFound& found);
   void On(const SendFailed& failed);
   void On(const PeerUnreachable& peer);
+  void On(const LeaveRequested&);
   void On(const StopRequested&);
   void On(const Tick&) {}
 
@@ -86,6 +87,7 @@ struct WorkerMachine::State {
   Time next_heartbeat;
   Time next_register = Time::min();
   std::uint32_t rendered_ranks = 0;
+  std::optional<Time> leave_by;  // it is leaving
   bool ended = false;
   ImageNames names;
   SlabFetcher slabs;
@@ -136,6 +138,12 @@ void WorkerMachine::State::On(const Stop& stop, const Bytes&) {
   if (worker == 0 || stop.epoch == epoch) End();
 }
 
+void WorkerMachine::State::On(const LeaveRequested&) {
+  if (leave_by) return;
+  leave_by = now + config.drain;
+  next_heartbeat = now;
+}
+
 void WorkerMachine::State::On(const StopRequested&) {
   if (worker != 0) actions.push_back(SendControl{Leave{epoch, worker}});
   End();
@@ -157,18 +165,21 @@ void WorkerMachine::State::End() {
   if (ended) return;
   Unregister();
   ended = true;
-  actions.push_back(StopProcess{});
+  actions.push_back(StopProcess{rendered_ranks});
 }
 
 void WorkerMachine::State::KeepTime() {
   if (worker != 0 && now >= last_heard + timeout) Unregister();
+  // Without its coordinator it has nothing to do, and will get nothing.
+  if (leave_by && (worker == 0 || now >= *leave_by)) return On(StopRequested{});
   if (worker == 0 && now >= next_register) {
     actions.push_back(SendControl{Register{incarnation, config.pid, config.host, config.images_endpoint, config.threads, config.cache_bytes,
                                            config.memory_scope, config.lends_memory, config.images_key}});
     next_register = now + config.register_interval;
   }
   if (worker != 0 && now >= next_heartbeat) {
-    actions.push_back(SendControl{Heartbeat{epoch, incarnation, worker, slabs.cached_bytes(), slabs.fetched_bytes(), rendered_ranks}});
+    actions.push_back(SendControl{
+        Heartbeat{epoch, incarnation, worker, slabs.cached_bytes(), slabs.fetched_bytes(), rendered_ranks, leave_by.has_value()}});
     next_heartbeat = now + heartbeat;
   }
 }
@@ -411,7 +422,7 @@ void WorkerMachine::State::Tend() {
 Time WorkerMachine::State::NextWake() const {
   if (ended) return Time::max();
   if (worker == 0) return next_register;
-  return std::min({next_heartbeat, last_heard + timeout, slabs.NextExpiry()});
+  return std::min({next_heartbeat, last_heard + timeout, slabs.NextExpiry(), leave_by.value_or(Time::max())});
 }
 
 Time WorkerMachine::NextWake() const { return state_->wake; }

@@ -42,6 +42,7 @@ void Fields(auto& io, Is<Heartbeat> auto& m) {
   io.Any(m.cached_bytes, &P::cached_bytes, &P::set_cached_bytes);
   io.Any(m.fetched_bytes, &P::fetched_bytes, &P::set_fetched_bytes);
   io.Any(m.rendered_ranks, &P::rendered_ranks, &P::set_rendered_ranks);
+  io.Any(m.leaving, &P::leaving, &P::set_leaving);
 }
 
 void Fields(auto& io, Is<Ping> auto& m) {

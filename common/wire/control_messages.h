@@ -9,7 +9,7 @@
 //   GroupDone ------------------------>            display worker only; opens the window for the next group
 //   FrameImage + payload ------------->            display worker only; a preview or the finished frame
 //   WorkerTrouble -------------------->            something failed for this group
-//   Leave     ------------------------>            a worker leaves in an orderly way
+//   Leave     ------------------------>            a worker ends now, whatever it had to do
 //             <------------------------  Retire    you are not (or no longer) known: register again
 //             <------------------------  Stop      end the process
 #pragma once
@@ -62,6 +62,7 @@ struct Heartbeat {
   std::uint64_t cached_bytes = 0;    // voxels and what was made from them
   std::uint64_t fetched_bytes = 0;   // voxels received since the process began
   std::uint32_t rendered_ranks = 0;  // since the process began: progress, even while a long group runs
+  bool leaving = false;              // it wants no new work, and Stop once nothing needs it any more; from then on in every heartbeat
   friend bool operator==(const Heartbeat&, const Heartbeat&) = default;
 };
 

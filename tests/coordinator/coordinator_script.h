@@ -119,6 +119,7 @@ struct FakeWorker {
   Incarnation incarnation = 0;
   WorkerId id = 0;
   std::uint32_t rendered_ranks = 0;
+  bool leaving = false;
 };
 
 class CoordinatorScript {
@@ -178,9 +179,16 @@ class CoordinatorScript {
     return worker;
   }
   Actions Beat(const FakeWorker& worker) {
-    return Worker(
-        worker,
-        Heartbeat{.epoch = config.epoch, .incarnation = worker.incarnation, .worker = worker.id, .rendered_ranks = worker.rendered_ranks});
+    return Worker(worker, Heartbeat{.epoch = config.epoch,
+                                    .incarnation = worker.incarnation,
+                                    .worker = worker.id,
+                                    .rendered_ranks = worker.rendered_ranks,
+                                    .leaving = worker.leaving});
+  }
+  // From now on it says that it is leaving.
+  Actions Leave(WorkerId id) {
+    WorkerOf(id).leaving = true;
+    return Beat(WorkerOf(id));
   }
   FakeWorker& WorkerOf(WorkerId id) {
     return *std::find_if(workers.begin(), workers.end(), [id](const FakeWorker& w) { return w.id == id; });

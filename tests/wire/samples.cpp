@@ -116,7 +116,7 @@ std::vector<Welcome> SamplesOf() {
 
 template <>
 std::vector<Heartbeat> SamplesOf() {
-  return {{}, {kMax64, kMax64, kMax32, kMax64, kMax64, kMax32}};
+  return {{}, {kMax64, kMax64, kMax32, kMax64, kMax64, kMax32, true}};
 }
 
 template <>
@@ -281,7 +281,7 @@ std::vector<StatusQuery> SamplesOf() {
 template <>
 std::vector<StatusReply> SamplesOf() {
   StatusReply full{kMax64, kMax64, kMax32, kMax64, kMax32, kMax32, kMax32, kMax64, kMax64, kMax64, {}, {}};
-  full.workers = {{1, 2, "", 1, 0, 0, 0, 0, 0}, {kMax32, kMax32, kLongName, kMaxThreads, kMax32, kMax64, kMax64, kMax32, kMax32}};
+  full.workers = {{1, 2, "", 1, 0, 0, 0, 0, 0}, {kMax32, kMax32, kLongName, kMaxThreads, kMax32, kMax64, kMax64, kMax32, kMax32, true}};
   full.datasets = {{"a", DatasetState::kUnloaded, {}, {}, ""},
                    {kLongName, DatasetState::kLoading, {}, {}, ""},
                    {kUmlaut, DatasetState::kReady, Description(), {-3, 4}, ""},
