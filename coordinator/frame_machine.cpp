@@ -20,7 +20,7 @@ constexpr std::size_t kPlansAhead = 1;
 }  // namespace
 
 void FrameMachine::State::On(const DatasetLoaded& event) {
-  if (!datasets.Loaded(event.name, event.dataset, event.summary)) return;
+  if (!datasets.Loaded(event.name, event.load, event.dataset, event.summary)) return;
   const auto waits = [&](const OpenRequest& request) { return request.submit.frame.dataset == event.name && !request.volume; };
   queue.ForEach([&](OpenRequest& request) {
     if (waits(request) && FindVolume(request).ok()) SendQueued(request);
@@ -139,7 +139,7 @@ void FrameMachine::State::AfterGroupDone(const RunningFrame& frame) {
 void FrameMachine::State::EndFrame(FrameId id) {
   const std::vector<WorkerId> workers = frames.Find(id)->Participants();
   frames.Remove(id);
-  for (const WorkerId worker : workers) SendWorker(worker, MakePing());  // so that they drop it now
+  for (const WorkerId worker : workers) SendWorker(worker, MakePing(worker));  // so that they drop it now
 }
 
 void FrameMachine::State::FailFrame(const RunningFrame& frame, const Status& status) {
@@ -170,7 +170,7 @@ void FrameMachine::State::Expire() {
     const bool counting = request.volume && occupancy.Counting(*request.volume);
     FailRequest(request, late(request, dataset.state != DatasetState::kReady ? "its dataset was still being loaded"
                                        : clients.IsBehind(request.client)    ? "this client did not read its earlier pictures"
-                                       : roster.empty()                      ? "the last worker had left"
+                                       : roster.empty()                      ? "there was no worker"
                                        : counting                            ? "the occupied voxels of its dataset were still being counted"
                                        : request.plan != 0 && !HasPlan(request) ? "it was still being planned"
                                                                                 : "it was still queued"));
@@ -190,7 +190,7 @@ void FrameMachine::State::Expire() {
   }
 
   if (!roster.empty() && now >= next_ping) {
-    for (const Member& member : roster.members()) SendWorker(member.id, MakePing());
+    for (const Member& member : roster.members()) SendWorker(member.id, MakePing(member.id));
     next_ping = now + config.heartbeat;
   }
 }
@@ -211,7 +211,7 @@ void FrameMachine::State::Advance() {
       break;
     }
   }
-  if (staying > 0) {
+  if (staying > 0 && !roster.AwaitsReturn()) {
     CountAhead();
     PlanAhead();
   }

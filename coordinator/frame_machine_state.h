@@ -30,7 +30,7 @@ inline std::uint32_t Milliseconds(Duration duration) {
 struct FrameMachine::State {
   explicit State(CoordinatorConfig c)
       : config(std::move(c)),
-        roster(config.worker_timeout, config.vacancy_grace),
+        roster(config.worker_timeout, config.vacancy_grace, config.return_wait),
         datasets(config.datasets),
         clients(config.client_timeout),
         limits{.stall_timeout = config.stall_timeout,
@@ -134,7 +134,10 @@ struct FrameMachine::State {
   void LoseWorker(WorkerId worker);
   void RemoveWorker(WorkerId worker, LiveRoster::Notice notice);
   void StopAll(const AnyMessage& goodbye, const std::string& reason);
-  Ping MakePing() const { return {.epoch = config.epoch, .finished_before = frames.finished_before(), .cancelled = frames.cancelled()}; }
+  Ping MakePing(WorkerId to) const {
+    return {
+        .epoch = config.epoch, .finished_before = frames.finished_before(), .cancelled = frames.cancelled(), .place = roster.PlaceOf(to)};
+  }
   Time NextWake();
 
   // ---- actions

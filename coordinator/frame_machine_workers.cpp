@@ -20,7 +20,7 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const Heartbe
   const LiveRoster::News news = message.epoch == config.epoch ? roster.Hear(message, event.from, now) : LiveRoster::News{};
   if (news.known) {
     for (RunningFrame& frame : frames) frame.OnHeartbeat(message.worker, news.progressed, now);
-    SendWorker(message.worker, MakePing());
+    SendWorker(message.worker, MakePing(message.worker));
   } else if (!news.stale) {
     actions.emplace_back(ToWorker{.to = event.from, .message = Retire{.epoch = config.epoch}});
   }
@@ -67,8 +67,8 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker&, const WorkerTrouble
   RunningFrame* frame = frames.Find(message.key.frame);
   if (frame == nullptr) return;
   if (message.unreachable != 0) {
-    if (roster.Find(message.unreachable) == nullptr) return;  // known to be lost: the frame has been planned anew already
-    SendWorker(message.unreachable, MakePing());              // if it cannot be sent, the complaint is right
+    if (roster.Find(message.unreachable) == nullptr) return;         // known to be lost: the frame has been planned anew already
+    SendWorker(message.unreachable, MakePing(message.unreachable));  // if it cannot be sent, the complaint is right
   }
   const Status status = frame->OnTrouble(message, now);
   if (!status.ok()) FailFrame(*frame, status);

@@ -14,6 +14,8 @@ std::vector<WorkerId> IdsOf(const std::vector<Member>& members, Predicate&& want
   return ids;
 }
 
+constexpr std::uint32_t kMostRestored = 4096;  // slots that are kept for workers of an earlier coordinator
+
 Incarnation IncarnationOf(const Member& member) { return member.description.incarnation; }
 
 }  // namespace
@@ -34,11 +36,28 @@ WorkerId LiveRoster::Admit(const Register& message, PeerToken from, Time now) {
     return known->id;
   }
   members_.push_back({.id = ++last_id_, .peer = from, .description = message, .last_heard = now});
-  auto slot = std::ranges::find(slots_, WorkerId{0}, &Slot::worker);
-  if (slot == slots_.end()) slot = slots_.insert(slot, Slot{});
-  slot->worker = last_id_;
+  SlotFor(message, now).worker = last_id_;
   ++version_;
   return last_id_;
+}
+
+// Its former one, else the first vacant one, else one more.
+LiveRoster::Slot& LiveRoster::SlotFor(const Register& message, Time now) {
+  const std::uint32_t slots = std::min(message.place.slots, kMostRestored);
+  if (!first_admitted_) {
+    first_admitted_ = now;
+    if (slots > 1) awaits_until_ = now + return_wait_;
+  }
+  // Later, a slot that is missing was given up.
+  if (now < *first_admitted_ + vacancy_grace_ && slots_.size() < slots) slots_.resize(slots, Slot{.worker = 0, .vacant_since = now});
+  const std::uint32_t former = message.place.slot;
+  if (former < std::min<std::size_t>(slots, slots_.size()) && slots_[former].worker == 0) return slots_[former];
+  const auto vacant = std::ranges::find(slots_, WorkerId{0}, &Slot::worker);
+  return vacant == slots_.end() ? slots_.emplace_back() : *vacant;
+}
+
+bool LiveRoster::AwaitsReturn() const {
+  return awaits_until_ && std::ranges::any_of(slots_, [](const Slot& slot) { return slot.worker == 0; });
 }
 
 LiveRoster::News LiveRoster::Hear(const Heartbeat& message, PeerToken from, Time now) {
@@ -81,6 +100,7 @@ void LiveRoster::Remove(WorkerId worker, Time now, Notice notice) {
 }
 
 void LiveRoster::GiveUpVacancies(Time now) {
+  if (awaits_until_ && now >= *awaits_until_) awaits_until_.reset();
   const auto expired = [&](const Slot& slot) { return slot.worker == 0 && now >= slot.vacant_since + vacancy_grace_; };
   if (std::erase_if(slots_, expired) > 0) ++version_;
 }
@@ -108,10 +128,10 @@ std::vector<WorkerId> LiveRoster::Leaving() const {
 
 std::size_t LiveRoster::staying() const { return std::size_t(std::ranges::count(members_, false, &Member::leaving)); }
 
-std::uint32_t LiveRoster::SlotOf(WorkerId worker) const {
+SlotPlace LiveRoster::PlaceOf(WorkerId worker) const {
   const auto slot = std::ranges::find(slots_, worker, &Slot::worker);
-  CHECK(worker != 0 && slot != slots_.end()) << "worker " << worker << " has no slot";
-  return std::uint32_t(slot - slots_.begin());
+  if (worker == 0 || slot == slots_.end()) return {};
+  return {.slot = std::uint32_t(slot - slots_.begin()), .slots = std::uint32_t(slots_.size())};
 }
 
 Roster LiveRoster::slots() const {
@@ -141,7 +161,7 @@ Roster LiveRoster::Refill(const Roster& planned) const {
 }
 
 Time LiveRoster::NextWake() const {
-  Time wake = Time::max();
+  Time wake = awaits_until_.value_or(Time::max());
   for (const Member& member : members_) wake = std::min(wake, member.last_heard + timeout_);
   for (const Slot& slot : slots_) {
     if (slot.worker == 0) wake = std::min(wake, slot.vacant_since + vacancy_grace_);

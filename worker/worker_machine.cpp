@@ -82,7 +82,7 @@ struct WorkerMachine::State {
 
   const WorkerConfig config;
   Incarnation incarnation;  // of the current registration
-  Epoch slabs_epoch = 0;    // epoch of the cached volumes
+  SlotPlace place;          // that a coordinator gave it last
   Duration heartbeat{}, timeout{};
   Time next_heartbeat;
   Time next_register = Time::min();
@@ -125,8 +125,6 @@ void WorkerMachine::State::On(const Welcome& welcome, const Bytes&) {
   last_heard = now;
   next_heartbeat = now;
   early.Forget([&](const PartialImage& image) { return image.epoch != epoch; });
-  if (slabs_epoch != epoch) slabs.RetireAll();
-  slabs_epoch = epoch;
   actions.push_back(ConnectSlabs{welcome.slabs_endpoint});
 }
 
@@ -174,7 +172,7 @@ void WorkerMachine::State::KeepTime() {
   if (leave_by && (worker == 0 || now >= *leave_by)) return On(StopRequested{});
   if (worker == 0 && now >= next_register) {
     actions.push_back(SendControl{Register{incarnation, config.pid, config.host, config.images_endpoint, config.threads, config.cache_bytes,
-                                           config.memory_scope, config.lends_memory, config.images_key}});
+                                           config.memory_scope, config.lends_memory, config.images_key, place}});
     next_register = now + config.register_interval;
   }
   if (worker != 0 && now >= next_heartbeat) {
@@ -188,6 +186,7 @@ void WorkerMachine::State::KeepTime() {
 
 void WorkerMachine::State::On(const Ping& ping, const Bytes&) {
   if (!Heard(ping.epoch)) return;
+  place = ping.place;
   for (const FrameId frame : ping.cancelled) {
     if (frame < finished_before) continue;
     cancelled.insert(frame);

@@ -2,8 +2,9 @@
 // pixel and no voxel: images have handles, payloads are opaque Bytes. The service (worker/service.h) and the simulator of the tests run it.
 //
 // States:  unregistered --Welcome--> registered --silence, Retire--> unregistered
-// Unregistering drops everything but cached slabs; a change of epoch drops those too. Dropped work cannot be continued, so the worker
-// registers again under the next incarnation number: to the coordinator it is a new worker.
+// Unregistering drops everything but cached slabs. Dropped work cannot be continued, so the worker registers again under the next
+// incarnation number: to the coordinator it is a new worker. It says which slot it had, so that it gets the boxes again whose voxels it
+// holds, also from another coordinator: the names of datasets outlive coordinators.
 //
 // Leaving (LeaveRequested): it says so in each heartbeat and goes on with what it has, until the coordinator stops it, or until `drain` is
 // over, or until it is not registered any more.

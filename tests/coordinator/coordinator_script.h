@@ -209,7 +209,7 @@ class CoordinatorScript {
     Actions actions = Client(client, submit);
     for (std::size_t i = loads_before; i < loads.size(); ++i) {
       const LoadDataset load = loads[i];
-      Append(actions, Step(DatasetLoaded{load.name, load.dataset, BlockSummary()}));
+      Append(actions, Step(DatasetLoaded{load.name, load.load, load.load, BlockSummary()}));
     }
     return actions;
   }

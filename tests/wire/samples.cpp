@@ -51,7 +51,7 @@ GroupAssignment Assignment(Rank ranks, const ViewParameters& view, const Rendere
   message.previews = true;
   message.display = kMax32;
   FrameSetup& setup = message.setup;
-  setup.dataset = kMax32;
+  setup.dataset = kMax64;
   setup.description = Description();
   setup.range = {-1, 1e30F};
   SetRenderer(*renderer, setup);
@@ -121,7 +121,7 @@ std::vector<Heartbeat> SamplesOf() {
 
 template <>
 std::vector<Ping> SamplesOf() {
-  return {{}, {kMax64, kMax64, {0, 1, kMax64}}};
+  return {{}, {kMax64, kMax64, {0, 1, kMax64}, {kMax32, kMax32}}};
 }
 
 template <>
@@ -174,7 +174,7 @@ std::vector<Chunk> SamplesOf() {
 
 template <>
 std::vector<ChunkRefused> SamplesOf() {
-  return {{1, 2, kOneVoxel, 0, Status::NotFound("no dataset 2")}, {kMax64, kMax32, kWholeBox, 5, Status::Cancelled(kLongText)}};
+  return {{1, 2, kOneVoxel, 0, Status::NotFound("no dataset 2")}, {kMax64, kMax64, kWholeBox, 5, Status::Cancelled(kLongText)}};
 }
 
 template <>

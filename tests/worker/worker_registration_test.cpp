@@ -68,6 +68,13 @@ TEST_F(WorkerRegistrationTest, RetireMakesItRegisterAgain) {
   EXPECT_THAT(Tell(Retire{kEpoch + 1}), IsEmpty());
 }
 
+TEST_F(WorkerRegistrationTest, SaysWhichSlotItHad) {
+  Tell(Ping{kEpoch, 0, {}, {.slot = 2, .slots = 5}});
+  const auto registers = Sent<Register>(Tell(Retire{kEpoch + 1}));
+  ASSERT_THAT(registers, SizeIs(1));
+  EXPECT_EQ(registers[0].place, (SlotPlace{.slot = 2, .slots = 5}));
+}
+
 TEST_F(WorkerRegistrationTest, LeavesInOrderAndObeysStop) {
   const Actions leaving = Tell(StopRequested{});
   EXPECT_THAT(Sent<Leave>(leaving), SizeIs(1));
