@@ -66,7 +66,8 @@ class MultiProcessTest : public testing::Test {
   void StartLoggingWorker(const std::vector<std::string>& options = {}) {
     const std::string log = LogOf(workers_.size());
     std::vector<std::string> command = {
-        "/bin/sh", "-c", "exec \"$0\" \"$@\" 2>'" + log + "'", SLABSTREAM_WORKER_PROGRAM, "--coordinator", worker_endpoint_};
+        "/bin/sh",     "-c",  "exec \"$0\" \"$@\" 2>'" + log + "'", SLABSTREAM_WORKER_PROGRAM, "--coordinator", worker_endpoint_,
+        "--log-level", "info"};
     command.insert(command.end(), options.begin(), options.end());
     workers_.emplace_back(command);
   }
