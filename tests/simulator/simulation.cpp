@@ -77,6 +77,8 @@ void Simulation::TellWorkerToLeave() {
   const std::vector<Node> staying = Staying();
   if (staying.empty()) return;
   const Node leaver = staying[random_.Integer<std::size_t>(0, staying.size() - 1)];
+  // Until it knows its id it cannot say that it leaves: it is lost.
+  if (faults_.gentle() && !service_.worker(leaver).registered()) return;
   leaving_.insert(leaver);
   ++tally_.workers_left;
   if (staying.size() == 1) workerless_ = true;
