@@ -23,9 +23,10 @@ constexpr std::int64_t kMaxDeadlineMs = 86'400'000;
 // A request that has not ended.
 struct OpenRequest {
   SubmitFrame message;
-  Time submitted;
+  Time submitted, deadline;
   int unknown_pongs = 0;  // in a row
   int resubmits = 0;
+  bool cancelled = false;  // by the caller; the service has not answered yet
 };
 
 // The checked picture of a reply: whoever answers at the endpoint may send anything.
@@ -99,6 +100,7 @@ struct Client::Impl {
   void Handle(AnyMessage& message, const Bytes& payload);
   void Handle(FrameReply& reply, const Bytes& payload);
   void Handle(const ClientPong& pong);
+  void SubmitAgain(OpenRequest& lost);
   void End(RequestId request, Status status);  // with a failure
   void FailAll(const std::string& reason);
 
@@ -232,14 +234,25 @@ void Client::Impl::Handle(const ClientPong& pong) {
       state.unknown_pongs = 0;
     } else if (++state.unknown_pongs >= kUnknownPongs) {
       state.unknown_pongs = 0;
-      if (state.resubmits++ < kMaxResubmits) {
-        const SubmitFrame again = state.message;  // a copy: a failed submit ends the request
-        Submit(again);
-      } else {
-        End(request,
-            Status::Unavailable("the service at " + endpoint + " lost the request " + std::to_string(kMaxResubmits + 1) + " times"));
-      }
+      SubmitAgain(state);
     }
+  }
+}
+
+// The service has lost the request: it was started anew. The deadline is still that of the first time.
+void Client::Impl::SubmitAgain(OpenRequest& lost) {
+  const RequestId request = lost.message.request;
+  const std::int64_t left_ms = std::chrono::duration_cast<std::chrono::milliseconds>(lost.deadline - MonotonicNow()).count();
+  if (lost.cancelled) {
+    End(request, Status::Cancelled("the client cancelled the frame"));
+  } else if (left_ms < 1) {
+    End(request, Status::DeadlineExceeded("the service at " + endpoint + " lost the request, and its time is over"));
+  } else if (lost.resubmits++ < kMaxResubmits) {
+    SubmitFrame again = lost.message;  // a copy: a failed submit ends the request
+    again.deadline_ms = std::uint32_t(left_ms);
+    Submit(again);
+  } else {
+    End(request, Status::Unavailable("the service at " + endpoint + " lost the request " + std::to_string(kMaxResubmits + 1) + " times"));
   }
 }
 
@@ -278,7 +291,9 @@ RequestId Client::Submit(const FrameRequest& request, Duration deadline) {
   const RequestId id = ++impl_->last_request;
   const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(deadline).count();
   SubmitFrame message{.request = id, .deadline_ms = std::uint32_t(std::clamp<std::int64_t>(ms, 1, kMaxDeadlineMs)), .frame = request};
-  impl_->open.emplace(id, OpenRequest{.message = message, .submitted = MonotonicNow()});
+  const Time now = MonotonicNow();
+  const Time limit = now + std::chrono::milliseconds(message.deadline_ms);
+  impl_->open.emplace(id, OpenRequest{.message = message, .submitted = now, .deadline = limit});
   if (Status status = Validate(request); !status.ok()) {
     impl_->End(id, std::move(status));  // the service would drop a request that it cannot decode
   } else if (impl_->open.size() > kMaxOpenRequests) {
@@ -290,7 +305,10 @@ RequestId Client::Submit(const FrameRequest& request, Duration deadline) {
 }
 
 void Client::Cancel(RequestId request) {
-  if (impl_->open.contains(request)) (void)impl_->Send(CancelFrame{request});
+  const auto found = impl_->open.find(request);
+  if (found == impl_->open.end()) return;
+  found->second.cancelled = true;
+  (void)impl_->Send(CancelFrame{request});
 }
 
 std::optional<ClientEvent> Client::Next(Duration timeout) {

@@ -64,8 +64,8 @@ class Client {
   void Cancel(RequestId request);
 
   // The next event of any open request; nullopt after the timeout, or earlier if wakeup() was notified or a signal was handled. If the
-  // service stops answering, every open request gets an Unavailable event. A request that the service has lost is submitted again, a few
-  // times.
+  // service stops answering, every open request gets an Unavailable event. A request that the service has lost, because it was started
+  // anew, is submitted again, a few times and within its deadline, unless it was cancelled.
   std::optional<ClientEvent> Next(Duration timeout);
 
   // Submits and waits for the end.

@@ -31,25 +31,25 @@ Status DatasetTable::NoSuchDataset(const std::string& name) const {
   return Status::NotFound(fmt::format("no dataset \"{}\": the catalogue has {}{}", name, fmt::join(names, ", "), more));
 }
 
-DatasetId DatasetTable::BeginLoad(const std::string& name) {
+LoadId DatasetTable::BeginLoad(const std::string& name) {
   Entry& entry = entries_.at(name);
   CHECK(entry.state == DatasetState::kUnloaded || entry.state == DatasetState::kFailed) << name;
-  entry = {.state = DatasetState::kLoading, .id = ++last_id_};
-  return entry.id;
+  entry = {.state = DatasetState::kLoading, .load = ++last_load_};
+  return entry.load;
 }
 
-bool DatasetTable::Loaded(const std::string& name, DatasetId id, std::shared_ptr<const VolumeSummary> summary) {
+bool DatasetTable::Loaded(const std::string& name, LoadId load, DatasetId id, std::shared_ptr<const VolumeSummary> summary) {
   const auto found = entries_.find(name);
-  if (found == entries_.end() || found->second.state != DatasetState::kLoading || found->second.id != id) return false;
+  if (found == entries_.end() || found->second.state != DatasetState::kLoading || found->second.load != load) return false;
   CHECK(summary != nullptr) << name;
-  found->second = {.state = DatasetState::kReady, .id = id, .summary = std::move(summary)};
+  found->second = {.state = DatasetState::kReady, .load = load, .id = id, .summary = std::move(summary)};
   return true;
 }
 
 bool DatasetTable::Failed(const std::string& name, const Status& status) {
   const auto found = entries_.find(name);
   if (found == entries_.end() || found->second.state != DatasetState::kLoading) return false;
-  found->second = {.state = DatasetState::kFailed, .id = found->second.id, .error = status.message()};
+  found->second = {.state = DatasetState::kFailed, .load = found->second.load, .error = status.message()};
   return true;
 }
 

@@ -1,5 +1,5 @@
 // DatasetTable: the catalogue's names and how far each has been loaded. A dataset is loaded at its first use; a failed load is tried again
-// at the next request. Every load has its own id, so that results of an earlier load are recognised.
+// at the next request. Every load has a number, so that results of an earlier load are recognised.
 #pragma once
 
 #include <cstdint>
@@ -14,11 +14,14 @@
 
 namespace slabstream {
 
+using LoadId = std::uint32_t;
+
 class DatasetTable {
  public:
   struct Entry {
     DatasetState state = DatasetState::kUnloaded;
-    DatasetId id = 0;                              // of the last load begun; 0: none
+    LoadId load = 0;                               // the last one begun; 0: none
+    DatasetId id = 0;                              // kReady only
     std::shared_ptr<const VolumeSummary> summary;  // kReady only
     std::string error;                             // kFailed only
   };
@@ -27,10 +30,10 @@ class DatasetTable {
 
   const Entry* Find(const std::string& name) const;     // null: not in the catalogue
   Status NoSuchDataset(const std::string& name) const;  // NotFound, naming what there is
-  DatasetId BeginLoad(const std::string& name);         // of an unloaded or failed one; its new id
+  LoadId BeginLoad(const std::string& name);            // of an unloaded or failed one
 
-  // The end of the load `id`. False: another load was begun since, or none; nothing changes.
-  bool Loaded(const std::string& name, DatasetId id, std::shared_ptr<const VolumeSummary> summary);
+  // The end of a load. False: another one was begun since, or none; nothing changes.
+  bool Loaded(const std::string& name, LoadId load, DatasetId id, std::shared_ptr<const VolumeSummary> summary);
   // The end of the load that is under way. False: none is.
   bool Failed(const std::string& name, const Status& status);
 
@@ -38,7 +41,7 @@ class DatasetTable {
 
  private:
   std::map<std::string, Entry> entries_;
-  DatasetId last_id_ = 0;
+  LoadId last_load_ = 0;
 };
 
 }  // namespace slabstream

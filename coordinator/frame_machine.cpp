@@ -20,7 +20,7 @@ constexpr std::size_t kPlansAhead = 1;
 }  // namespace
 
 void FrameMachine::State::On(const DatasetLoaded& event) {
-  if (!datasets.Loaded(event.name, event.dataset, event.summary)) return;
+  if (!datasets.Loaded(event.name, event.load, event.dataset, event.summary)) return;
   const auto waits = [&](const OpenRequest& request) { return request.submit.frame.dataset == event.name && !request.volume; };
   queue.ForEach([&](OpenRequest& request) {
     if (waits(request) && FindVolume(request).ok()) SendQueued(request);
@@ -83,7 +83,7 @@ void FrameMachine::State::CountAhead() {
 // Plans as many of the next requests in turn as can start soon.
 void FrameMachine::State::PlanAhead() {
   std::size_t ahead = 0;
-  const std::size_t most = frames.Room(roster.members().size()) + kPlansAhead;
+  const std::size_t most = frames.Room(roster.staying()) + kPlansAhead;
   queue.VisitInTurn([&](OpenRequest& request) {
     if (!request.volume) return true;
     const bool under_way = request.plan != 0 && request.planned_for == roster.version();
@@ -110,6 +110,7 @@ PlanRequest FrameMachine::State::MakePlanRequest(const OpenRequest& request) {
                   .roster = std::move(team.roster),
                   .turn = team.turn};
   for (const Member& member : roster.members()) {
+    if (member.leaving) continue;
     const Register& worker = member.description;
     ask.workers.push_back({worker.memory_scope, worker.lends_memory, worker.threads, worker.pid});
   }
@@ -138,7 +139,7 @@ void FrameMachine::State::AfterGroupDone(const RunningFrame& frame) {
 void FrameMachine::State::EndFrame(FrameId id) {
   const std::vector<WorkerId> workers = frames.Find(id)->Participants();
   frames.Remove(id);
-  for (const WorkerId worker : workers) SendWorker(worker, MakePing());  // so that they drop it now
+  for (const WorkerId worker : workers) SendWorker(worker, MakePing(worker));  // so that they drop it now
 }
 
 void FrameMachine::State::FailFrame(const RunningFrame& frame, const Status& status) {
@@ -155,9 +156,7 @@ void FrameMachine::State::Expire() {
   }
 
   const auto out_of_time = [&](const OpenRequest& request) { return now >= request.deadline(); };
-  const auto without_workers = [&](const OpenRequest& request) {
-    return roster.empty() && now >= std::max(request.arrived, roster.empty_since()) + config.worker_wait;
-  };
+  const auto without_workers = [&](const OpenRequest& request) { return now >= EndOfWait(request); };
   const auto late = [&](const OpenRequest& request, const std::string& state) {
     return Status::DeadlineExceeded("the frame was not finished within its " + std::to_string(request.submit.deadline_ms) +
                                     " ms: " + state);
@@ -171,6 +170,7 @@ void FrameMachine::State::Expire() {
     const bool counting = request.volume && occupancy.Counting(*request.volume);
     FailRequest(request, late(request, dataset.state != DatasetState::kReady ? "its dataset was still being loaded"
                                        : clients.IsBehind(request.client)    ? "this client did not read its earlier pictures"
+                                       : roster.empty()                      ? "there was no worker"
                                        : counting                            ? "the occupied voxels of its dataset were still being counted"
                                        : request.plan != 0 && !HasPlan(request) ? "it was still being planned"
                                                                                 : "it was still queued"));
@@ -190,13 +190,35 @@ void FrameMachine::State::Expire() {
   }
 
   if (!roster.empty() && now >= next_ping) {
-    for (const Member& member : roster.members()) SendWorker(member.id, MakePing());
+    for (const Member& member : roster.members()) SendWorker(member.id, MakePing(member.id));
     next_ping = now + config.heartbeat;
   }
 }
 
+// Workers that are leaving finish what they have. If nobody else is there, that includes the frames that run; the others wait.
 void FrameMachine::State::Advance() {
   if (roster.empty()) return;
+  const std::size_t staying = roster.staying();
+  if (staying < roster.members().size()) {
+    for (RunningFrame& frame : frames) frame.HandOver(roster.Refill(frame.roster()));
+  }
+  if (staying > 0) BeginAttempts();
+  while (true) {
+    const FramesInFlight::Choice next = frames.Next(staying);
+    if (next.step == FramesInFlight::Step::kHandOut) {
+      HandOut(*next.frame);
+    } else if (next.step == FramesInFlight::Step::kWait || !StartNextFrame()) {
+      break;
+    }
+  }
+  if (staying > 0 && !roster.AwaitsReturn()) {
+    CountAhead();
+    PlanAhead();
+  }
+  DismissWorkers();
+}
+
+void FrameMachine::State::BeginAttempts() {
   for (auto it = frames.begin(); it != frames.end();) {
     RunningFrame& frame = *it++;  // FailFrame removes it
     if (!frame.AttemptDue(now)) continue;
@@ -207,16 +229,15 @@ void FrameMachine::State::Advance() {
       SendClient(frame.request().client, frame.Progress());
     }
   }
-  while (true) {
-    const FramesInFlight::Choice next = frames.Next(roster.members().size());
-    if (next.step == FramesInFlight::Step::kHandOut) {
-      HandOut(*next.frame);
-    } else if (next.step == FramesInFlight::Step::kWait || !StartNextFrame()) {
-      break;
-    }
+}
+
+// Ends the workers that are leaving and have no part in any frame.
+void FrameMachine::State::DismissWorkers() {
+  for (const WorkerId worker : roster.Leaving()) {
+    if (std::ranges::any_of(frames, [worker](const RunningFrame& frame) { return frame.HasPart(worker); })) continue;
+    SendWorker(worker, Stop{.epoch = config.epoch});
+    RemoveWorker(worker, LiveRoster::Notice::kGiven);
   }
-  CountAhead();
-  PlanAhead();
 }
 
 // Starts the first frame in turn that is planned for the present workers. False: there is none.
@@ -251,16 +272,25 @@ void FrameMachine::State::StopAll(const AnyMessage& goodbye, const std::string& 
   stopped = true;
 }
 
+// When a request fails for want of a worker; Time::max(): not now. If the last worker gave notice, others are expected, and what it left
+// behind waits for them.
+Time FrameMachine::State::EndOfWait(const OpenRequest& request) const {
+  const bool left_behind = roster.last_gave_notice() && request.arrived <= roster.empty_since();
+  if (!roster.empty() || left_behind) return Time::max();
+  return std::max(request.arrived, roster.empty_since()) + config.worker_wait;
+}
+
 Time FrameMachine::State::NextWake() {
   Time next = std::min(roster.NextWake(), clients.NextWake());
   const auto consider = [&](const OpenRequest& request) {
     next = std::min(next, request.deadline());
-    if (roster.empty()) next = std::min(next, std::max(request.arrived, roster.empty_since()) + config.worker_wait);
+    next = std::min(next, EndOfWait(request));
   };
   queue.ForEach(consider);
   for (const RunningFrame& frame : frames) {
     consider(frame.request());
-    if (!roster.empty()) next = std::min(next, frame.NextWake());  // without workers no attempt can begin
+    const bool waits_for_workers = roster.staying() == 0 && frame.between_attempts();
+    if (!waits_for_workers) next = std::min(next, frame.NextWake());
   }
   return roster.empty() ? next : std::min(next, next_ping);
 }

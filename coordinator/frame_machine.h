@@ -17,6 +17,10 @@
 //              frame that it had a part in is re-planned over the others (attempt + 1) from its first unfinished group, or from the
 //              first group if the display worker is lost. Slots that stay vacant for vacancy_grace are given up; the next frame is then
 //              partitioned anew. A worker that cannot do its part of a frame (WorkerTrouble) is left out of that frame.
+//              Workers of an earlier coordinator say which slots they had: they get them again, and plans wait for them a while.
+//   leaving    A worker that says that it is leaving loses its slot at once and gets no new frame. It finishes the groups that it has; the
+//              rest of a frame is handed over to the workers that stay, if there are any. Without a part in any frame it gets Stop. What
+//              the last worker has left behind in this way waits for another one until its deadline.
 //   stalls     A frame without progress for stall_timeout is handed out again (attempt + 1); after max_stalls in a row it fails. If there
 //              is no worker for worker_wait, everything that waits fails and says so. Every request has a deadline.
 //   end        ShutDown ends the service: workers Stop. CoordinatorStopRequested ends the coordinator alone: workers Retire and wait for
@@ -37,6 +41,7 @@
 #include "common/base/bytes.h"
 #include "common/base/time.h"
 #include "common/wire/any_message.h"
+#include "coordinator/datasets.h"
 #include "coordinator/occupancy_table.h"
 #include "coordinator/peer_token.h"
 #include "coordinator/plan_request.h"
@@ -53,6 +58,7 @@ struct CoordinatorConfig {
   Duration client_timeout = std::chrono::seconds(10);
   Duration worker_wait = std::chrono::seconds(10);  // for the first worker
   Duration vacancy_grace = std::chrono::seconds(30);
+  Duration return_wait = std::chrono::seconds(5);  // for the workers of an earlier coordinator, once one of them is there
   Duration stall_timeout = std::chrono::seconds(60);
   int max_stalls = 5;
   std::size_t max_queued = 1024;  // frames of all clients
@@ -77,7 +83,8 @@ struct ClientGone {
 };
 struct DatasetLoaded {
   std::string name;
-  DatasetId dataset = 0;
+  LoadId load = 0;
+  DatasetId dataset = 0;  // not 0
   std::shared_ptr<const VolumeSummary> summary;
 };
 struct DatasetFailed {
@@ -115,7 +122,7 @@ struct ToClient {
 // -> DatasetLoaded or DatasetFailed
 struct LoadDataset {
   std::string name;
-  DatasetId dataset = 0;
+  LoadId load = 0;
 };
 // -> OccupiedCounted: counts the voxels of the volume that its renderer draws (DrawnTable, CountOccupied). The dataset was loaded.
 struct CountDataset {

@@ -25,8 +25,8 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const SubmitFrame& m
   request.needs_occupancy = NeedsOccupancy(message.frame.policy);
   const DatasetState state = datasets.Find(message.frame.dataset)->state;
   if (state == DatasetState::kUnloaded || state == DatasetState::kFailed) {
-    const DatasetId id = datasets.BeginLoad(message.frame.dataset);
-    actions.emplace_back(LoadDataset{.name = message.frame.dataset, .dataset = id});
+    const LoadId load = datasets.BeginLoad(message.frame.dataset);
+    actions.emplace_back(LoadDataset{.name = message.frame.dataset, .load = load});
   }
   if (state == DatasetState::kReady) {
     if (const Status found = FindVolume(request); !found.ok()) return FailRequest(request, found);
@@ -95,11 +95,12 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const StatusQuery& m
                              .pid = member.description.pid,
                              .host = member.description.host,
                              .threads = member.description.threads,
-                             .slot = roster.SlotOf(member.id),
+                             .slot = roster.PlaceOf(member.id).slot,
                              .cached_bytes = member.cached_bytes,
                              .fetched_bytes = member.fetched_bytes,
                              .rendered_ranks = member.rendered_ranks,
-                             .silent_ms = Milliseconds(std::max(now - member.last_heard, Duration::zero()))});
+                             .silent_ms = Milliseconds(std::max(now - member.last_heard, Duration::zero())),
+                             .leaving = member.leaving});
   }
   SendClient(client, std::move(reply));
 }
@@ -114,7 +115,7 @@ void FrameMachine::State::SendQueued(const OpenRequest& request) {
   SendClient(request.client, FrameProgress{.request = request.submit.request,
                                            .phase = loading ? FramePhase::kLoading : FramePhase::kQueued,
                                            .queue_position = queue.PositionOf(request.client, request.submit.request),
-                                           .workers = std::uint32_t(roster.members().size())});
+                                           .workers = std::uint32_t(roster.staying())});
 }
 
 void FrameMachine::State::SendAnswer(PeerToken client, Answer& answer) {

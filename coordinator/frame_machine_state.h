@@ -30,7 +30,7 @@ inline std::uint32_t Milliseconds(Duration duration) {
 struct FrameMachine::State {
   explicit State(CoordinatorConfig c)
       : config(std::move(c)),
-        roster(config.worker_timeout, config.vacancy_grace),
+        roster(config.worker_timeout, config.vacancy_grace, config.return_wait),
         datasets(config.datasets),
         clients(config.client_timeout),
         limits{.stall_timeout = config.stall_timeout,
@@ -116,6 +116,9 @@ struct FrameMachine::State {
   // ---- frames and workers
   void Expire();
   void Advance();
+  void BeginAttempts();
+  void DismissWorkers();
+  Time EndOfWait(const OpenRequest& request) const;
   Status FindVolume(OpenRequest& request) const;
   bool WaitsForCount(const OpenRequest& request) { return request.needs_occupancy && !occupancy.Find(*request.volume); }
   void CountAhead();
@@ -129,9 +132,12 @@ struct FrameMachine::State {
   void EndFrame(FrameId id);
   void FailFrame(const RunningFrame& frame, const Status& status);
   void LoseWorker(WorkerId worker);
-  void RemoveWorker(WorkerId worker);
+  void RemoveWorker(WorkerId worker, LiveRoster::Notice notice);
   void StopAll(const AnyMessage& goodbye, const std::string& reason);
-  Ping MakePing() const { return {.epoch = config.epoch, .finished_before = frames.finished_before(), .cancelled = frames.cancelled()}; }
+  Ping MakePing(WorkerId to) const {
+    return {
+        .epoch = config.epoch, .finished_before = frames.finished_before(), .cancelled = frames.cancelled(), .place = roster.PlaceOf(to)};
+  }
   Time NextWake();
 
   // ---- actions

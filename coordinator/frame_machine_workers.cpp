@@ -23,7 +23,7 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const Heartbe
       if (news.moved) frame.OnReconnection(message.worker, now);
       frame.OnHeartbeat(message.worker, news.progressed, now);
     }
-    SendWorker(message.worker, MakePing());
+    SendWorker(message.worker, MakePing(message.worker));
   } else if (!news.stale) {
     actions.emplace_back(ToWorker{.to = event.from, .message = Retire{.epoch = config.epoch}});
   }
@@ -70,24 +70,24 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker&, const WorkerTrouble
   RunningFrame* frame = frames.Find(message.key.frame);
   if (frame == nullptr) return;
   if (message.unreachable != 0) {
-    if (roster.Find(message.unreachable) == nullptr) return;  // known to be lost: the frame has been planned anew already
-    SendWorker(message.unreachable, MakePing());              // if it cannot be sent, the complaint is right
+    if (roster.Find(message.unreachable) == nullptr) return;         // known to be lost: the frame has been planned anew already
+    SendWorker(message.unreachable, MakePing(message.unreachable));  // if it cannot be sent, the complaint is right
   }
   const Status status = frame->OnTrouble(message, now);
   if (!status.ok()) FailFrame(*frame, status);
 }
 
 void FrameMachine::State::OnWorkerMessage(const FromWorker&, const Leave& message) {
-  if (message.epoch == config.epoch) RemoveWorker(message.worker);
+  if (message.epoch == config.epoch) RemoveWorker(message.worker, LiveRoster::Notice::kGiven);
 }
 
 void FrameMachine::State::LoseWorker(WorkerId worker) {
   ++workers_lost;
-  RemoveWorker(worker);
+  RemoveWorker(worker, LiveRoster::Notice::kNone);
 }
 
-void FrameMachine::State::RemoveWorker(WorkerId worker) {
-  roster.Remove(worker, now);
+void FrameMachine::State::RemoveWorker(WorkerId worker, LiveRoster::Notice notice) {
+  roster.Remove(worker, now, notice);
   for (RunningFrame& frame : frames) frame.OnLoss(worker, now);
 }
 

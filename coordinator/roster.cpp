@@ -14,6 +14,8 @@ std::vector<WorkerId> IdsOf(const std::vector<Member>& members, Predicate&& want
   return ids;
 }
 
+constexpr std::uint32_t kMostRestored = 4096;  // slots that are kept for workers of an earlier coordinator
+
 Incarnation IncarnationOf(const Member& member) { return member.description.incarnation; }
 
 }  // namespace
@@ -34,11 +36,28 @@ WorkerId LiveRoster::Admit(const Register& message, PeerToken from, Time now) {
     return known->id;
   }
   members_.push_back({.id = ++last_id_, .peer = from, .description = message, .last_heard = now});
-  auto slot = std::ranges::find(slots_, WorkerId{0}, &Slot::worker);
-  if (slot == slots_.end()) slot = slots_.insert(slot, Slot{});
-  slot->worker = last_id_;
+  SlotFor(message, now).worker = last_id_;
   ++version_;
   return last_id_;
+}
+
+// Its former one, else the first vacant one, else one more.
+LiveRoster::Slot& LiveRoster::SlotFor(const Register& message, Time now) {
+  const std::uint32_t slots = std::min(message.place.slots, kMostRestored);
+  if (!first_admitted_) {
+    first_admitted_ = now;
+    if (slots > 1) awaits_until_ = now + return_wait_;
+  }
+  // Later, a slot that is missing was given up.
+  if (now < *first_admitted_ + vacancy_grace_ && slots_.size() < slots) slots_.resize(slots, Slot{.worker = 0, .vacant_since = now});
+  const std::uint32_t former = message.place.slot;
+  if (former < std::min<std::size_t>(slots, slots_.size()) && slots_[former].worker == 0) return slots_[former];
+  const auto vacant = std::ranges::find(slots_, WorkerId{0}, &Slot::worker);
+  return vacant == slots_.end() ? slots_.emplace_back() : *vacant;
+}
+
+bool LiveRoster::AwaitsReturn() const {
+  return awaits_until_ && std::ranges::any_of(slots_, [](const Slot& slot) { return slot.worker == 0; });
 }
 
 LiveRoster::News LiveRoster::Hear(const Heartbeat& message, PeerToken from, Time now) {
@@ -53,6 +72,10 @@ LiveRoster::News LiveRoster::Hear(const Heartbeat& message, PeerToken from, Time
   member->cached_bytes = message.cached_bytes;
   member->fetched_bytes = std::max(member->fetched_bytes, message.fetched_bytes);
   member->rendered_ranks = std::max(member->rendered_ranks, message.rendered_ranks);
+  if (message.leaving && !member->leaving) {
+    member->leaving = true;
+    Vacate(member->id, now);
+  }
   return {.known = true, .moved = moved, .progressed = progressed};
 }
 
@@ -62,16 +85,23 @@ void LiveRoster::Touch(WorkerId worker, Time now) {
   }
 }
 
-void LiveRoster::Remove(WorkerId worker, Time now) {
-  if (std::erase_if(members_, [worker](const Member& m) { return m.id == worker; }) == 0) return;
+void LiveRoster::Vacate(WorkerId worker, Time now) {
+  const auto slot = std::ranges::find(slots_, worker, &Slot::worker);
+  if (slot == slots_.end()) return;
+  *slot = {.worker = 0, .vacant_since = now};
   ++version_;
-  for (Slot& slot : slots_) {
-    if (slot.worker == worker) slot = {.worker = 0, .vacant_since = now};
-  }
-  if (members_.empty()) empty_since_ = now;
+}
+
+void LiveRoster::Remove(WorkerId worker, Time now, Notice notice) {
+  if (std::erase_if(members_, [worker](const Member& m) { return m.id == worker; }) == 0) return;
+  Vacate(worker, now);
+  if (!members_.empty()) return;
+  empty_since_ = now;
+  last_gave_notice_ = notice == Notice::kGiven;
 }
 
 void LiveRoster::GiveUpVacancies(Time now) {
+  if (awaits_until_ && now >= *awaits_until_) awaits_until_.reset();
   const auto expired = [&](const Slot& slot) { return slot.worker == 0 && now >= slot.vacant_since + vacancy_grace_; };
   if (std::erase_if(slots_, expired) > 0) ++version_;
 }
@@ -93,10 +123,16 @@ std::vector<WorkerId> LiveRoster::Silent(Time now) const {
   return IdsOf(members_, [&](const Member& member) { return now >= member.last_heard + timeout_; });
 }
 
-std::uint32_t LiveRoster::SlotOf(WorkerId worker) const {
+std::vector<WorkerId> LiveRoster::Leaving() const {
+  return IdsOf(members_, [](const Member& member) { return member.leaving; });
+}
+
+std::size_t LiveRoster::staying() const { return std::size_t(std::ranges::count(members_, false, &Member::leaving)); }
+
+SlotPlace LiveRoster::PlaceOf(WorkerId worker) const {
   const auto slot = std::ranges::find(slots_, worker, &Slot::worker);
-  CHECK(worker != 0 && slot != slots_.end()) << "worker " << worker << " has no slot";
-  return std::uint32_t(slot - slots_.begin());
+  if (worker == 0 || slot == slots_.end()) return {};
+  return {.slot = std::uint32_t(slot - slots_.begin()), .slots = std::uint32_t(slots_.size())};
 }
 
 Roster LiveRoster::slots() const {
@@ -106,23 +142,27 @@ Roster LiveRoster::slots() const {
 }
 
 Roster LiveRoster::Refill(const Roster& planned) const {
-  Roster refilled = planned;
+  Roster refilled{.slots = planned.slots, .leaving = Leaving()};
+  const auto stays = [&](WorkerId worker) {
+    const Member* member = Find(worker);
+    return member != nullptr && !member->leaving;
+  };
   const auto used = [&](WorkerId worker) { return std::ranges::find(refilled.slots, worker) != refilled.slots.end(); };
   for (WorkerId& worker : refilled.slots) {
-    if (Find(worker) == nullptr) worker = 0;
+    if (!stays(worker)) worker = 0;
   }
   for (std::size_t i = 0; i < std::min(slots_.size(), refilled.slots.size()); ++i) {
     if (refilled.slots[i] == 0 && !used(slots_[i].worker)) refilled.slots[i] = slots_[i].worker;
   }
   for (const Member& member : members_) {
     const auto vacant = std::ranges::find(refilled.slots, WorkerId{0});
-    if (vacant != refilled.slots.end() && !used(member.id)) *vacant = member.id;
+    if (vacant != refilled.slots.end() && !member.leaving && !used(member.id)) *vacant = member.id;
   }
   return refilled;
 }
 
 Time LiveRoster::NextWake() const {
-  Time wake = Time::max();
+  Time wake = awaits_until_.value_or(Time::max());
   for (const Member& member : members_) wake = std::min(wake, member.last_heard + timeout_);
   for (const Slot& slot : slots_) {
     if (slot.worker == 0) wake = std::min(wake, slot.vacant_since + vacancy_grace_);

@@ -3,6 +3,9 @@
 // A worker is an incarnation (one registration of one process: what it held before is gone). It keeps its id while it stays, on whatever
 // connection it speaks; a new incarnation is a new worker. Slots outlive workers: the slot of a lost worker stays vacant for a grace
 // period, so that a replacement takes over its boxes and nobody else's voxels move; then it is given up, and the slots after it move down.
+// A worker that had a slot before, of an earlier coordinator too, gets the same one if it is vacant. So the first worker of an earlier
+// coordinator brings the number of slots with it, and for return_wait the others are awaited.
+// A worker that is leaving has no slot any more, but is a member until it is removed.
 #pragma once
 
 #include <cstdint>
@@ -24,11 +27,13 @@ struct Member {
   Time last_heard;
   std::uint64_t cached_bytes = 0, fetched_bytes = 0;
   std::uint32_t rendered_ranks = 0;
+  bool leaving = false;
 };
 
 class LiveRoster {
  public:
-  LiveRoster(Duration worker_timeout, Duration vacancy_grace) : timeout_(worker_timeout), vacancy_grace_(vacancy_grace) {}
+  LiveRoster(Duration worker_timeout, Duration vacancy_grace, Duration return_wait)
+      : timeout_(worker_timeout), vacancy_grace_(vacancy_grace), return_wait_(return_wait) {}
 
   // Members that this Register proves dead: same connection or same image endpoint, other incarnation. Remove them before Admit, so that
   // the new worker gets their slot.
@@ -45,22 +50,30 @@ class LiveRoster {
   News Hear(const Heartbeat& message, PeerToken from, Time now);
   void Touch(WorkerId worker, Time now);  // any other message of a member; unknown ids are ignored
 
-  void Remove(WorkerId worker, Time now);  // its slot becomes vacant
-  void GiveUpVacancies(Time now);          // drops slots that have been vacant for the grace period
-  void Postpone(Duration duration);        // all silences begin later, since the listener itself was asleep
+  enum class Notice { kGiven, kNone };
+  void Remove(WorkerId worker, Time now, Notice notice = Notice::kNone);  // its slot becomes vacant
+  // Drops slots that have been vacant for the grace period, and waits no longer than return_wait.
+  void GiveUpVacancies(Time now);
+  void Postpone(Duration duration);  // all silences begin later, since the listener itself was asleep
 
   const Member* Find(WorkerId worker) const;  // null: not a member
   std::vector<WorkerId> At(PeerToken peer) const;
   std::vector<WorkerId> Silent(Time now) const;  // not heard for the timeout
   const std::vector<Member>& members() const { return members_; }
+  std::vector<WorkerId> Leaving() const;
+  std::size_t staying() const;  // members that are not leaving
   bool empty() const { return members_.empty(); }
-  Time empty_since() const { return empty_since_; }  // Time::min(): there never was a worker
-  std::uint32_t SlotOf(WorkerId worker) const;       // of a member
+  Time empty_since() const { return empty_since_; }            // Time::min(): there never was a worker
+  bool last_gave_notice() const { return last_gave_notice_; }  // the one since whose removal it is empty
+  SlotPlace PlaceOf(WorkerId worker) const;                    // of a member
 
   Roster slots() const;                               // 0 where a slot is vacant
   std::uint64_t version() const { return version_; }  // changes whenever slots() does
-  // Fills the slots of an earlier plan: workers that are still here keep theirs; the others' go to workers without a slot in it, the
-  // present owner of the same slot first. The rest are vacant.
+  // Workers of an earlier coordinator are expected: a frame that began now would move voxels that they hold.
+  bool AwaitsReturn() const;
+
+  // Fills the slots of an earlier plan: workers that stay keep theirs; the others' go to workers without a slot in it, the present owner
+  // of the same slot first. The rest are vacant. Names the workers that are leaving, too.
   Roster Refill(const Roster& planned) const;
 
   Time NextWake() const;  // the next silence or end of a grace period; Time::max(): none
@@ -70,12 +83,18 @@ class LiveRoster {
     WorkerId worker = 0;
     Time vacant_since;
   };
-  Duration timeout_, vacancy_grace_;
+  void Vacate(WorkerId worker, Time now);
+  Slot& SlotFor(const Register& message, Time now);
+
+  Duration timeout_, vacancy_grace_, return_wait_;
   std::vector<Member> members_;  // by ascending id
   std::vector<Slot> slots_;
   WorkerId last_id_ = 0;
   std::uint64_t version_ = 0;
   Time empty_since_ = Time::min();
+  bool last_gave_notice_ = false;
+  std::optional<Time> first_admitted_;
+  std::optional<Time> awaits_until_;
 };
 
 }  // namespace slabstream

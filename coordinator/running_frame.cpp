@@ -64,7 +64,19 @@ std::vector<WorkerId> RunningFrame::Participants() const {
   return workers;
 }
 
-bool RunningFrame::CanHandOut() const { return !attempt_due_ && next_group_ < group_count(); }
+bool RunningFrame::CanHandOut() const { return !attempt_due_ && !handing_over_ && next_group_ < group_count(); }
+
+bool RunningFrame::IsNextOf(WorkerId worker) const {
+  if (next_group_ == 0 && worker == plan_.display) return true;
+  return std::any_of(plan_.groups.begin() + next_group_, plan_.groups.end(), [worker](const GroupPlan& group) {
+    return std::ranges::find(group.placements, worker, &Placement::worker) != group.placements.end();
+  });
+}
+
+void RunningFrame::HandOver(const Roster& roster) {
+  handing_over_ = std::ranges::any_of(roster.slots, [this](WorkerId worker) { return CanRender(worker); }) &&
+                  std::ranges::any_of(roster.leaving, [this](WorkerId worker) { return IsNextOf(worker); });
+}
 
 RunningFrame::HandOut RunningFrame::NextGroup(Time now) {
   CHECK(CanHandOut()) << "frame " << id_;
@@ -89,8 +101,10 @@ RunningFrame::HandOut RunningFrame::NextGroup(Time now) {
 Status RunningFrame::BeginAttempt(const Roster& roster, Time now) {
   Roster able = roster;
   for (WorkerId& worker : able.slots) {
-    if (unable_.contains(worker)) worker = 0;
+    if (!CanRender(worker)) worker = 0;
   }
+  // A display worker that is leaving stays one only for what it has accumulated.
+  if (groups_done_ == 0 || display_in_doubt_) able.leaving.clear();
   Result<FramePlan> plan = Replan(plan_, able);
   if (!plan.ok()) return unable_.empty() ? plan.status() : inability_;
   const bool keeps_accumulated = plan->display == plan_.display && !display_in_doubt_;
@@ -107,6 +121,7 @@ Status RunningFrame::BeginAttempt(const Roster& roster, Time now) {
   first_group_ = next_group_ = std::min(groups_done_, group_count() - 1);
   groups_done_ = first_group_;
   attempt_due_.reset();
+  handing_over_ = false;
   display_in_doubt_ = false;
   suspicion_.reset();
   last_progress_ = now;

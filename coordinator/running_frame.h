@@ -10,6 +10,8 @@
 //   the same, but another worker may be able to            the first unfinished group, now, without that worker; counted
 //   a worker cannot reach another that is alive            the first unfinished group, once that is proved, without one of the two; counted
 //   any of these, if the display worker was lost or had the trouble     group 0: what it accumulated is gone or in doubt
+// A worker that leaves with notice ends no attempt: the groups that are out are finished. Then the next attempt gives the others to workers
+// that stay, if there are any (HandOver). The display worker remains what it is, once it has accumulated a group.
 // The frame fails after max_stalls counted events in a row, with no group finished for the first time between them. So every frame ends, as
 // long as workers and connections are not lost for ever.
 //
@@ -63,14 +65,19 @@ class RunningFrame {
   std::vector<WorkerId> Participants() const;  // workers with a placement anywhere in the plan, and the display worker
 
   // ---- handing out
-  bool CanHandOut() const;  // a group is left, and no new attempt is due
+  bool CanHandOut() const;  // a group is left, and no new attempt is due or wanted
   struct HandOut {
     GroupAssignment assignment;  // epoch, finished_before and the endpoints of the peers are left to the caller
     std::vector<WorkerId> workers;
   };
   HandOut NextGroup(Time now);  // needs CanHandOut()
 
-  bool AttemptDue(Time now) const { return attempt_due_ && now >= *attempt_due_; }
+  // `roster`: as for BeginAttempt. If groups are still to be handed out to workers that are leaving, and another one can have them, a new
+  // attempt begins as soon as nothing is out. Call it again whenever the roster has changed.
+  void HandOver(const Roster& roster);
+
+  bool AttemptDue(Time now) const { return attempt_due_ ? now >= *attempt_due_ : handing_over_ && unfinished_groups() == 0; }
+  bool between_attempts() const { return attempt_due_.has_value(); }
   // Begins the next attempt over `roster` (same number of slots), without workers that could not do their part. If nobody is left, nothing
   // changes; the Status is the last such worker's reason, or Unavailable if there is none.
   Status BeginAttempt(const Roster& roster, Time now);
@@ -105,7 +112,9 @@ class RunningFrame {
   bool Accept(std::uint32_t attempt, WorkerId sender) const;
   bool Finish(std::uint32_t groups, Time now);
   void KeepHidden(const GroupDone& message);
-  bool waiting() const;  // for groups that are out, or for the finished picture
+  bool CanRender(WorkerId worker) const { return worker != 0 && !unable_.contains(worker); }
+  bool IsNextOf(WorkerId worker) const;  // it has a part in what is not handed out yet
+  bool waiting() const;                  // for groups that are out, or for the finished picture
   Status CountStall(const Status& reason, Duration pause, Time now);
   WorkerId CulpritOf(const Suspicion& suspicion);
 
@@ -126,6 +135,7 @@ class RunningFrame {
   OcclusionMask hidden_;                  // by the groups [0, hidden_by_), as the present display worker accumulated them
   std::uint32_t hidden_by_ = 0;
   std::optional<Time> attempt_due_;
+  bool handing_over_ = false;
   bool display_in_doubt_ = false;  // the next attempt begins with group 0
   std::optional<Suspicion> suspicion_;
   std::map<WorkerId, int> complaints_;  // proved suspicions that each worker had a part in

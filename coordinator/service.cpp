@@ -21,6 +21,7 @@
 #include "common/renderers/renderer_kind.h"
 #include "common/transport/endpoint.h"
 #include "common/transport/mailbox.h"
+#include "coordinator/dataset_id.h"
 #include "coordinator/peer_table.h"
 #include "coordinator/service_keys.h"
 #include "coordinator/slab_server.h"
@@ -76,7 +77,8 @@ Result<News> Load(const VolumeLoader& loader, const LoadDataset& action) {
   } else {
     samples.volume = *volume;
   }
-  return News{DatasetLoaded{action.name, action.dataset, std::move(summary)}, action.dataset, std::move(samples)};
+  const DatasetId id = IdOf(action.name, **volume);
+  return News{DatasetLoaded{action.name, action.load, id, std::move(summary)}, id, std::move(samples)};
 }
 
 Result<std::shared_ptr<const OccupancyGrid>> Count(const CountFunction& count, const SlabServer::Samples& samples,

@@ -63,7 +63,7 @@ class SlabServer {
   std::vector<std::string> TakeUnwanted();
   void Answer(const Incoming& incoming);
   Bytes Cut(const Samples& samples, const Box& part, std::uint64_t begin, std::uint64_t end);  // as BoxSamples
-  static Status Check(const ChunkRequest& request, Epoch epoch, const Samples& samples);       // why it cannot be met, or ok
+  static Status Check(const ChunkRequest& request, const Samples& samples);                    // why it cannot be met, or ok
 
   const std::string endpoint_;
   const Epoch epoch_;

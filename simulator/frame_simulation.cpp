@@ -155,7 +155,7 @@ void FrameSimulation::OnPicture(std::uint32_t frame) {
 // ---------------------------------------------------------------- the coordinator
 
 void FrameSimulation::Perform(const LoadDataset& action) {
-  service_.TellCoordinator(service_.now(), DatasetLoaded{action.name, action.dataset, std::make_shared<const VolumeSummary>()});
+  service_.TellCoordinator(service_.now(), DatasetLoaded{action.name, action.load, action.load, std::make_shared<const VolumeSummary>()});
 }
 
 void FrameSimulation::Perform(const PlanRequest& action) {

@@ -1,4 +1,5 @@
-// slabstream-worker: one worker process. It waits for its coordinator without a time limit and ends on Stop, SIGINT or SIGTERM.
+// slabstream-worker: one worker process. It waits for its coordinator without a time limit. It ends on Stop, and on SIGINT or SIGTERM after
+// it has finished what it had begun.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -24,7 +25,7 @@ Status Serve(WorkerOptions options) {
   Context context;
   auto service = WorkerService::Start(context, std::move(options));
   if (!service.ok()) return service.status();
-  WaitUntilStopped(**service);
+  WaitUntilStopped<WorkerService, &WorkerService::RequestLeave>(**service);
   return Status::Ok();
 }
 
@@ -34,6 +35,7 @@ int Run(int argc, char** argv) {
   int cache_mib = 0;
   std::string compress = "auto", service;
   bool frames_only = false;
+  constexpr Duration kLongestDrain = std::chrono::hours(24);
 
   CLI::App app("Slabstream worker: renders slabs and combines images for a coordinator.", "slabstream-worker");
   SetUp(app, std::string(Version()));
@@ -54,6 +56,14 @@ int Run(int argc, char** argv) {
                    "all images, and the pictures for clients. off: none")
       ->type_name("[=MODE]")
       ->default_str(compress);
+  AddParsed(
+      app, "--drain", options.machine.drain,
+      [](const std::string& option, const std::string& text) { return ParseDuration(option, text, kLongestDrain); },
+      "On SIGTERM or SIGINT: how long it may finish what it has begun, while it gets no new work. It ends as soon as nothing needs it. 0s, "
+      "or "
+      "a second signal: at once")
+      ->type_name("TIME")
+      ->default_str("30s");
   app.add_flag("--no-shared-memory", frames_only, "Send images to workers of this host in frames as well");
   return RunService(app, argc, argv, "worker " + std::to_string(::getpid()), [&] {
     if (options.coordinator_endpoint.empty()) {

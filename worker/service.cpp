@@ -105,7 +105,7 @@ struct WorkerService::Impl {
   void Perform(SendChunkRequest& action);
   void Perform(ConnectSlabs& action);
   void Perform(SendPartial& action);
-  void Perform(StopProcess&) { stop_now = true; }
+  void Perform(StopProcess& action);
   template <class Action>
   void Perform(Action& action) {
     executor->Perform(std::move(action));
@@ -128,7 +128,7 @@ struct WorkerService::Impl {
   std::set<WorkerId> takes_frames_only;  // workers that cannot map memory though they have the same scope
   std::vector<PartialImage> to_refuse;   // from workers whose endpoint is not known yet
   std::atomic<bool> registered = false;  // at least once, or stopped
-  std::atomic<bool> stop_requested = false;
+  std::atomic<bool> leave_requested = false, stop_requested = false;
   std::atomic<bool> stopped = false;
   bool stop_now = false;           // set by the machine
   LimitedLog complaints;           // about messages
@@ -155,6 +155,7 @@ void WorkerService::Impl::Run() {
 void WorkerService::Impl::Loop() {
   Time stop_deadline = Time::max();
   Time next_look = Time::min();
+  bool leaving = false;
   HandleEvent(Tick{});
   while (!stop_now && MonotonicNow() < stop_deadline) {
     std::vector<Socket*> sockets = {&control, &images};
@@ -170,6 +171,10 @@ void WorkerService::Impl::Loop() {
     if (now >= next_look) {
       LookAtConnections();
       next_look = now + kLookRound;
+    }
+    if (leave_requested && !leaving) {
+      leaving = true;
+      HandleEvent(LeaveRequested{});
     }
     if (stop_requested && stop_deadline == Time::max()) {
       stop_deadline = now + kStopGrace;
@@ -327,6 +332,11 @@ void WorkerService::Impl::Perform(SendControl& action) {
   Send(control, std::move(action).Take());
 }
 
+void WorkerService::Impl::Perform(StopProcess& action) {
+  LogInfo("ends after rendering " + std::to_string(action.rendered_ranks) + " boxes");
+  stop_now = true;
+}
+
 void WorkerService::Impl::Perform(SendChunkRequest& action) {
   if (slabs) Send(*slabs, action.request);
 }
@@ -408,6 +418,11 @@ WorkerService::WorkerService(std::unique_ptr<Impl> impl) : impl_(std::move(impl)
 WorkerService::~WorkerService() { RequestStop(); }
 
 const std::string& WorkerService::images_endpoint() const { return impl_->first_images_endpoint; }
+
+void WorkerService::RequestLeave() {
+  if (impl_->leave_requested.exchange(true)) impl_->stop_requested = true;
+  impl_->outbox.wakeup().Notify();
+}
 
 void WorkerService::RequestStop() {
   impl_->stop_requested = true;

@@ -40,7 +40,9 @@ class WorkerService {
   // Returns once the coordinator has registered this worker for the first time, or the service has stopped.
   void WaitUntilRegistered();
 
-  void RequestStop();
+  // From any thread or a signal handler; return at once.
+  void RequestLeave();  // ends when nothing needs it any more, after the machine's `drain` at the latest. The second time: like RequestStop
+  void RequestStop();   // ends now
   void WaitUntilStopped();
   bool stopped() const;
 

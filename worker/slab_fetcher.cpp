@@ -225,10 +225,6 @@ void SlabFetcher::ForgetRequests() {
   });
 }
 
-void SlabFetcher::RetireAll() {
-  for (auto& [generation, slab] : slabs_) slab.retired = true;
-}
-
 void SlabFetcher::Trim(WorkerActions& actions) {
   for (auto next = slabs_.begin(); next != slabs_.end();) {
     const auto entry = next++;

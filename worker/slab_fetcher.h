@@ -58,7 +58,6 @@ class SlabFetcher {
   std::vector<Failure> TakeFailures() { return std::exchange(failures_, {}); }
 
   void ForgetRequests();  // the coordinator is gone: requested chunks will not come
-  void RetireAll();       // another coordinator: no slab may be used again
   void Trim(WorkerActions& actions);
 
   std::uint64_t cached_bytes() const { return cached_bytes_; }

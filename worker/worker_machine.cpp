@@ -41,6 +41,7 @@ struct WorkerMachine::State {
   void On(const SendFailed& failed);
   void On(const PeerUnreachable& peer);
   void On(const Moved& moved);
+  void On(const LeaveRequested&);
   void On(const StopRequested&);
   void On(const Tick&) {}
 
@@ -83,11 +84,12 @@ struct WorkerMachine::State {
 
   WorkerConfig config;
   Incarnation incarnation;  // of the current registration
-  Epoch slabs_epoch = 0;    // epoch of the cached volumes
+  SlotPlace place;          // that a coordinator gave it last
   Duration heartbeat{}, timeout{};
   Time next_heartbeat;
   Time next_register = Time::min();
   std::uint32_t rendered_ranks = 0;
+  std::optional<Time> leave_by;  // it is leaving
   bool ended = false;
   ImageNames names;
   SlabFetcher slabs;
@@ -125,8 +127,6 @@ void WorkerMachine::State::On(const Welcome& welcome, const Bytes&) {
   last_heard = now;
   next_heartbeat = now;
   early.Forget([&](const PartialImage& image) { return image.epoch != epoch; });
-  if (slabs_epoch != epoch) slabs.RetireAll();
-  slabs_epoch = epoch;
   actions.push_back(ConnectSlabs{welcome.slabs_endpoint});
 }
 
@@ -142,6 +142,12 @@ void WorkerMachine::State::On(const Stop& stop, const Bytes&) {
 void WorkerMachine::State::On(const Moved& moved) {
   config.images_endpoint = moved.images_endpoint;
   if (worker != 0) Unregister();
+}
+
+void WorkerMachine::State::On(const LeaveRequested&) {
+  if (leave_by) return;
+  leave_by = now + config.drain;
+  next_heartbeat = now;
 }
 
 void WorkerMachine::State::On(const StopRequested&) {
@@ -165,18 +171,21 @@ void WorkerMachine::State::End() {
   if (ended) return;
   Unregister();
   ended = true;
-  actions.push_back(StopProcess{});
+  actions.push_back(StopProcess{rendered_ranks});
 }
 
 void WorkerMachine::State::KeepTime() {
   if (worker != 0 && now >= last_heard + timeout) Unregister();
+  // Without its coordinator it has nothing to do, and will get nothing.
+  if (leave_by && (worker == 0 || now >= *leave_by)) return On(StopRequested{});
   if (worker == 0 && now >= next_register) {
     actions.push_back(SendControl{Register{incarnation, config.pid, config.host, config.images_endpoint, config.threads, config.cache_bytes,
-                                           config.memory_scope, config.lends_memory, config.images_key}});
+                                           config.memory_scope, config.lends_memory, config.images_key, place}});
     next_register = now + config.register_interval;
   }
   if (worker != 0 && now >= next_heartbeat) {
-    actions.push_back(SendControl{Heartbeat{epoch, incarnation, worker, slabs.cached_bytes(), slabs.fetched_bytes(), rendered_ranks}});
+    actions.push_back(SendControl{
+        Heartbeat{epoch, incarnation, worker, slabs.cached_bytes(), slabs.fetched_bytes(), rendered_ranks, leave_by.has_value()}});
     next_heartbeat = now + heartbeat;
   }
 }
@@ -185,6 +194,7 @@ void WorkerMachine::State::KeepTime() {
 
 void WorkerMachine::State::On(const Ping& ping, const Bytes&) {
   if (!Heard(ping.epoch)) return;
+  place = ping.place;
   for (const FrameId frame : ping.cancelled) {
     if (frame < finished_before) continue;
     cancelled.insert(frame);
@@ -428,7 +438,7 @@ void WorkerMachine::State::Tend() {
 Time WorkerMachine::State::NextWake() const {
   if (ended) return Time::max();
   if (worker == 0) return next_register;
-  return std::min({next_heartbeat, last_heard + timeout, slabs.NextExpiry()});
+  return std::min({next_heartbeat, last_heard + timeout, slabs.NextExpiry(), leave_by.value_or(Time::max())});
 }
 
 Time WorkerMachine::NextWake() const { return state_->wake; }

@@ -2,8 +2,12 @@
 // pixel and no voxel: images have handles, payloads are opaque Bytes. The service (worker/service.h) and the simulator of the tests run it.
 //
 // States:  unregistered --Welcome--> registered --silence, Retire--> unregistered
-// Unregistering drops everything but cached slabs; a change of epoch drops those too. Dropped work cannot be continued, so the worker
-// registers again under the next incarnation number: to the coordinator it is a new worker.
+// Unregistering drops everything but cached slabs. Dropped work cannot be continued, so the worker registers again under the next
+// incarnation number: to the coordinator it is a new worker. It says which slot it had, so that it gets the boxes again whose voxels it
+// holds, also from another coordinator: the names of datasets outlive coordinators.
+//
+// Leaving (LeaveRequested): it says so in each heartbeat and goes on with what it has, until the coordinator stops it, or until `drain` is
+// over, or until it is not registered any more.
 //
 // A group on this worker:
 //   GroupAssignment   fetch the voxels of its boxes that no cached slab holds (chunk requests within the byte credit); a box that is
@@ -71,6 +75,7 @@ struct WorkerConfig {
   Duration register_interval = std::chrono::seconds(1);
   Duration chunk_timeout = std::chrono::seconds(3);          // then a chunk is asked for again
   int chunk_attempts = 10;                                   // then WorkerTrouble
+  Duration drain = std::chrono::seconds(30);                 // from LeaveRequested to the end; 0: at once
   std::uint64_t early_image_bytes = std::uint64_t{1} << 30;  // payloads of PartialImages kept before their assignment; then WorkerTrouble
 };
 
@@ -125,10 +130,11 @@ struct PeerUnreachable {
 struct Moved {
   std::string images_endpoint;
 };
-struct StopRequested {};  // SIGTERM: leave in an orderly way
+struct LeaveRequested {};  // SIGTERM: take no new work, end when the old is done
+struct StopRequested {};   // end now
 struct Tick {};
 using WorkerEvent = std::variant<MessageReceived, ChunkStored, RenderDone, CombineDone, HiddenFound, SendFailed, PeerUnreachable, Moved,
-                                 StopRequested, Tick>;
+                                 LeaveRequested, StopRequested, Tick>;
 
 // ---- actions
 struct SendControl {
@@ -217,7 +223,9 @@ struct SendFrame {
 struct ReleaseImage {
   ImageHandle image = 0;
 };
-struct StopProcess {};
+struct StopProcess {
+  std::uint32_t rendered_ranks = 0;  // since the process began: for the log
+};
 using WorkerAction = std::variant<SendControl, SendChunkRequest, ConnectSlabs, OpenSlab, StoreChunk, DropSlab, StartRender, CancelRender,
                                   StartCombine, FindHidden, SendPartial, SendFrame, ReleaseImage, StopProcess>;
 using WorkerActions = std::vector<WorkerAction>;

@@ -101,11 +101,10 @@ std::optional<ChildEnd> Child::Ended() {
 }
 
 void Child::Terminate(Duration patience) {
-  for (const int signal : {SIGTERM, SIGKILL}) {
+  for (const auto& [signal, wait] : EndSteps(patience)) {
     if (Ended()) return;
     ::kill(pid_, signal);  // not reaped yet, so the pid is still its own
-    for (const Time deadline = MonotonicNow() + patience; !Ended() && MonotonicNow() < deadline;)
-      std::this_thread::sleep_for(kPollInterval);
+    for (const Time deadline = MonotonicNow() + wait; !Ended() && MonotonicNow() < deadline;) std::this_thread::sleep_for(kPollInterval);
   }
 }
 

@@ -3,6 +3,9 @@
 
 #include <sys/types.h>
 
+#include <array>
+#include <chrono>
+#include <csignal>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,6 +14,16 @@
 #include "common/base/time.h"
 
 namespace slabstream {
+
+// How a process is made to end: signals in turn, and how long to wait after each. The second SIGTERM is for a worker that would rather
+// finish its work first.
+struct EndStep {
+  int signal = SIGTERM;
+  Duration wait{};
+};
+constexpr std::array<EndStep, 3> EndSteps(Duration patience) {
+  return {{{SIGTERM, std::chrono::milliseconds(200)}, {SIGTERM, patience}, {SIGKILL, patience}}};
+}
 
 // Path of a program that lies beside this one. NotFound if it does not.
 Result<std::string> ProgramBeside(const std::string& name);
@@ -43,7 +56,7 @@ class Child {
   // How it ended, if it has; reaps it. Later calls return the same.
   std::optional<ChildEnd> Ended();
 
-  // Sends SIGTERM, then SIGKILL after `patience`, and reaps it.
+  // Takes the EndSteps, and reaps it.
   void Terminate(Duration patience);
 
  private:

@@ -17,6 +17,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "client/cli/process.h"
 #include "common/base/files.h"
 #include "common/base/time.h"
 #include "common/service/service_file.h"
@@ -136,13 +137,13 @@ void EndProcesses(const ServiceState& state, Duration patience) {
   std::vector<Process> processes;
   for (const pid_t worker : state.workers) processes.emplace_back(worker, kWorkerProgram);
   processes.emplace_back(state.coordinator, kCoordinatorProgram);
-  for (const int signal : {SIGTERM, SIGKILL}) {
-    if (WaitForEnd(processes, std::exchange(patience, kEndPatience))) return;
+  if (WaitForEnd(processes, patience)) return;
+  for (const auto& [signal, wait] : EndSteps(kEndPatience)) {
     for (const auto& [pid, program] : processes) {
       if (IsRunning(pid, program)) ::kill(pid, signal);
     }
+    if (WaitForEnd(processes, wait)) return;
   }
-  WaitForEnd(processes, kEndPatience);
 }
 
 namespace {

@@ -26,8 +26,9 @@ std::string StatusText(const StatusReply& reply) {
                       reply.queued);
   text += fmt::format("workers      {} ({} lost so far)\n", reply.workers.size(), reply.workers_lost);
   for (const WorkerStatus& worker : reply.workers) {
-    text += fmt::format("  {:<4} pid {} on {}, {} threads, slot {}, {:.1f} MiB cached, {:.1f} MiB fetched, {} ranks rendered\n",
-                        worker.worker, worker.pid, worker.host, worker.threads, worker.slot, double(worker.cached_bytes) / (1 << 20),
+    const std::string place = worker.leaving ? "leaving" : fmt::format("slot {}", worker.slot);
+    text += fmt::format("  {:<4} pid {} on {}, {} threads, {}, {:.1f} MiB cached, {:.1f} MiB fetched, {} ranks rendered\n", worker.worker,
+                        worker.pid, worker.host, worker.threads, place, double(worker.cached_bytes) / (1 << 20),
                         double(worker.fetched_bytes) / (1 << 20), worker.rendered_ranks);
   }
   text += fmt::format("datasets     {}\n", reply.datasets.size());
@@ -50,6 +51,7 @@ std::string StatusJson(const StatusReply& reply) {
                        {"host", worker.host},
                        {"threads", worker.threads},
                        {"slot", worker.slot},
+                       {"leaving", worker.leaving},
                        {"cached_bytes", worker.cached_bytes},
                        {"fetched_bytes", worker.fetched_bytes},
                        {"rendered_ranks", worker.rendered_ranks},

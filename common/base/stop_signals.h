@@ -26,13 +26,13 @@ inline void BlockStopSignals() {
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
 }
 
-// Service has RequestStop(), which may be called by a signal handler, and WaitUntilStopped().
-template <class Service>
+// `kRequest` is called by the signal handler, once for each signal. Service has WaitUntilStopped().
+template <class Service, void (Service::*kRequest)() = &Service::RequestStop>
 void WaitUntilStopped(Service& service) {
   static std::atomic<Service*> target;
   target = &service;
   struct sigaction action = {};
-  action.sa_handler = [](int) { target.load()->RequestStop(); };
+  action.sa_handler = [](int) { (target.load()->*kRequest)(); };
   const sigset_t signals = StopSignals();
   for (const int number : {SIGINT, SIGTERM}) sigaction(number, &action, nullptr);
   pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);

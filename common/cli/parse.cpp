@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 
 #include "common/base/parse_number.h"
@@ -39,6 +42,27 @@ Result<int> ParseInteger(std::string_view option, std::string_view text, int min
     return Status::InvalidArgument(fmt::format("{} {} is out of range [{}, {}]", option, text, min, max));
   }
   return int(*value);
+}
+
+Result<Duration> ParseDuration(std::string_view option, std::string_view text, Duration max) {
+  using std::chrono::milliseconds;
+  struct Unit {
+    std::string_view name;
+    Duration length;
+  };
+  constexpr std::array<Unit, 4> kUnits = {
+      {{"ms", milliseconds(1)}, {"s", std::chrono::seconds(1)}, {"m", std::chrono::minutes(1)}, {"h", std::chrono::hours(1)}}};
+  const std::size_t digits = std::min(text.find_first_not_of("0123456789"), text.size());
+  const std::optional<std::int64_t> count = ParseNumber<std::int64_t>(text.substr(0, digits));
+  const auto unit = std::ranges::find(kUnits, text.substr(digits), &Unit::name);
+  if (!count || unit == kUnits.end()) {
+    return Status::InvalidArgument(fmt::format("{} '{}' is not a time such as 500ms, 30s, 2m or 1h", option, text));
+  }
+  if (*count > max / unit->length) {
+    return Status::InvalidArgument(
+        fmt::format("{} {} is out of range [0, {} s]", option, text, std::chrono::duration_cast<std::chrono::seconds>(max).count()));
+  }
+  return *count * unit->length;
 }
 
 Result<std::size_t> ParseChoice(std::string_view option, std::string_view text, std::span<const std::string_view> choices) {

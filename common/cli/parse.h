@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "common/base/status.h"
+#include "common/base/time.h"
 
 namespace slabstream {
 
@@ -18,6 +19,9 @@ struct NumberRange {
 
 Result<double> ParseNumber(std::string_view option, std::string_view text, const NumberRange& range);
 Result<int> ParseInteger(std::string_view option, std::string_view text, int min, int max);
+
+// A time such as 500ms, 30s, 2m or 1h, at most `max`.
+Result<Duration> ParseDuration(std::string_view option, std::string_view text, Duration max);
 
 // The index of the text in `choices`.
 Result<std::size_t> ParseChoice(std::string_view option, std::string_view text, std::span<const std::string_view> choices);

@@ -17,7 +17,7 @@ namespace slabstream {
 
 class RendererKind;  // common/renderers/renderer_kind.h
 
-using DatasetId = std::uint32_t;  // one loaded volume within one coordinator's life. 0: none
+using DatasetId = std::uint64_t;  // a volume under a name: the same in every coordinator's life, another one for other voxels. 0: none
 
 struct FrameSetup {
   DatasetId dataset = 0;

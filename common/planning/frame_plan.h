@@ -65,6 +65,7 @@ std::vector<Placement> PlacementsOf(const FramePlan& plan);
 // these keep their own boxes, so that only the lost voxels travel again. No worker holds two slots.
 struct Roster {
   std::vector<WorkerId> slots;
+  std::vector<WorkerId> leaving = {};  // hold no slot and render nothing new, but may remain a frame's display worker
   friend bool operator==(const Roster&, const Roster&) = default;
 };
 

@@ -12,7 +12,8 @@ namespace slabstream {
 namespace {
 
 bool Contains(const Roster& roster, WorkerId worker) {
-  return worker != 0 && std::find(roster.slots.begin(), roster.slots.end(), worker) != roster.slots.end();
+  const auto among = [worker](const std::vector<WorkerId>& workers) { return std::ranges::find(workers, worker) != workers.end(); };
+  return worker != 0 && (among(roster.slots) || among(roster.leaving));
 }
 
 std::vector<WorkerId> Present(const Roster& roster) {

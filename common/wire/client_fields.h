@@ -106,6 +106,7 @@ void Fields(auto& io, Is<WorkerStatus> auto& m) {
   io.Any(m.fetched_bytes, &P::fetched_bytes, &P::set_fetched_bytes);
   io.Any(m.rendered_ranks, &P::rendered_ranks, &P::set_rendered_ranks);
   io.Any(m.silent_ms, &P::silent_ms, &P::set_silent_ms);
+  io.Any(m.leaving, &P::leaving, &P::set_leaving);
 }
 
 void Fields(auto& io, Is<DatasetStatus> auto& m) {

@@ -106,10 +106,11 @@ struct WorkerStatus {
   std::uint32_t pid = 0;
   std::string host;
   std::uint32_t threads = 1;
-  std::uint32_t slot = 0;
+  std::uint32_t slot = 0;  // 0 if it is leaving
   std::uint64_t cached_bytes = 0, fetched_bytes = 0;
   std::uint32_t rendered_ranks = 0;
   std::uint32_t silent_ms = 0;  // since it was last heard
+  bool leaving = false;         // it gets no new work
   friend bool operator==(const WorkerStatus&, const WorkerStatus&) = default;
 };
 

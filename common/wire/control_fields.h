@@ -11,6 +11,13 @@
 
 namespace slabstream {
 
+// The fields `slot` and `slots` of a message P.
+template <class P>
+void PlaceFields(auto& io, Is<SlotPlace> auto& m) {
+  io.Any(m.slot, &P::slot, &P::set_slot);
+  io.Any(m.slots, &P::slots, &P::set_slots);
+}
+
 void Fields(auto& io, Is<Register> auto& m) {
   using P = v1::Register;
   io.Any(m.incarnation, &P::incarnation, &P::set_incarnation);
@@ -22,6 +29,7 @@ void Fields(auto& io, Is<Register> auto& m) {
   io.Any(m.memory_scope, &P::memory_scope, &P::set_memory_scope);
   io.Any(m.lends_memory, &P::lends_memory, &P::set_lends_memory);
   io.Bytes("images_key", m.images_key, &P::images_key, &P::mutable_images_key, 0, kKeyTextBytes);
+  PlaceFields<P>(io, m.place);
 }
 
 void Fields(auto& io, Is<Welcome> auto& m) {
@@ -42,6 +50,7 @@ void Fields(auto& io, Is<Heartbeat> auto& m) {
   io.Any(m.cached_bytes, &P::cached_bytes, &P::set_cached_bytes);
   io.Any(m.fetched_bytes, &P::fetched_bytes, &P::set_fetched_bytes);
   io.Any(m.rendered_ranks, &P::rendered_ranks, &P::set_rendered_ranks);
+  io.Any(m.leaving, &P::leaving, &P::set_leaving);
 }
 
 void Fields(auto& io, Is<Ping> auto& m) {
@@ -49,6 +58,7 @@ void Fields(auto& io, Is<Ping> auto& m) {
   io.Any(m.epoch, &P::epoch, &P::set_epoch);
   io.Any(m.finished_before, &P::finished_before, &P::set_finished_before);
   io.Numbers("cancelled", m.cancelled, &P::cancelled, &P::mutable_cancelled, kMaxCancelled);
+  PlaceFields<P>(io, m.place);
 }
 
 void Fields(auto& io, Is<Peer> auto& m) {

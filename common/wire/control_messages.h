@@ -9,7 +9,7 @@
 //   GroupDone ------------------------>            display worker only; opens the window for the next group
 //   FrameImage + payload ------------->            display worker only; a preview or the finished frame
 //   WorkerTrouble -------------------->            something failed for this group
-//   Leave     ------------------------>            a worker leaves in an orderly way
+//   Leave     ------------------------>            a worker ends now, whatever it had to do
 //             <------------------------  Retire    you are not (or no longer) known: register again
 //             <------------------------  Stop      end the process
 #pragma once
@@ -32,6 +32,13 @@ inline constexpr std::size_t kMaxTextBytes = 4096;
 inline constexpr std::uint32_t kMaxThreads = 1024;  // of one worker
 inline constexpr std::int32_t kMaxOcclusionTiles = OcclusionTiles(kMaxGridSide);
 
+// The slot that a worker owns, among how many.
+struct SlotPlace {
+  std::uint32_t slot = 0;
+  std::uint32_t slots = 0;  // 0: it owns none
+  friend bool operator==(const SlotPlace&, const SlotPlace&) = default;
+};
+
 struct Register {
   Incarnation incarnation = 0;
   std::uint32_t pid = 0;
@@ -42,6 +49,7 @@ struct Register {
   std::uint64_t memory_scope = 0;  // workers of the same scope can read each other's memory (SharedMemoryScope); 0: it takes frames only
   bool lends_memory = false;       // it lends its own images to workers of its scope; else it sends them in frames
   std::string images_key = {};     // public key of its image plane; empty: that plane is not encrypted
+  SlotPlace place = {};            // that it had last: it holds the voxels of that slot's boxes
   friend bool operator==(const Register&, const Register&) = default;
 };
 
@@ -62,6 +70,7 @@ struct Heartbeat {
   std::uint64_t cached_bytes = 0;    // voxels and what was made from them
   std::uint64_t fetched_bytes = 0;   // voxels received since the process began
   std::uint32_t rendered_ranks = 0;  // since the process began: progress, even while a long group runs
+  bool leaving = false;              // it wants no new work, and Stop once nothing needs it any more; from then on in every heartbeat
   friend bool operator==(const Heartbeat&, const Heartbeat&) = default;
 };
 
@@ -69,6 +78,7 @@ struct Ping {
   Epoch epoch = 0;
   FrameId finished_before = 0;     // all frames with a smaller id are over: forget them
   std::vector<FrameId> cancelled;  // also over, though their id is not smaller; at most kMaxCancelled
+  SlotPlace place = {};            // of the receiver
   friend bool operator==(const Ping&, const Ping&) = default;
 };
 inline constexpr std::size_t kMaxCancelled = 1024;

@@ -34,6 +34,21 @@ TEST(Values, IntegersKeepToTheirRange) {
   }
 }
 
+TEST(Values, TimesHaveAUnitAndALimit) {
+  using namespace std::chrono_literals;
+  const Duration most = 24h;
+  const std::vector<std::pair<std::string, Duration>> times = {{"0s", 0s}, {"500ms", 500ms}, {"30s", 30s}, {"2m", 2min}, {"24h", 24h}};
+  for (const auto& [text, expected] : times) EXPECT_EQ(*ParseDuration("--drain", text, most), expected) << text;
+  for (const char* text : {"", "30", "s", "-1s", "1.5s", "30 s", "30sec", "99999999999999999999s"}) {
+    const Result<Duration> value = ParseDuration("--drain", text, most);
+    ASSERT_FALSE(value.ok()) << text;
+    EXPECT_THAT(value.status().message(), AllOf(HasSubstr("--drain"), HasSubstr("is not a time"))) << text;
+  }
+  for (const char* text : {"25h", "86401s", "9223372036854775807h"}) {
+    EXPECT_THAT(ParseDuration("--drain", text, most).status().message(), AllOf(HasSubstr("--drain"), HasSubstr("86400 s"))) << text;
+  }
+}
+
 TEST(Values, SizesAreSquaresOrPairs) {
   EXPECT_EQ(*ParseImageSize("--size", "640x480"), (ImageSize{640, 480}));
   EXPECT_EQ(*ParseImageSize("--size", "512"), (ImageSize{512, 512}));

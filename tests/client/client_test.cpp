@@ -181,6 +181,41 @@ TEST_F(ClientTest, RequestThatTheServiceAlwaysForgetsFails) {
   EXPECT_EQ(submits, 4);  // once, and three times again
 }
 
+TEST_F(ClientTest, RequestThatWasCancelledIsNotSubmittedToTheNextCoordinator) {
+  std::atomic<int> submits = 0;
+  FakeService service(context_, "inproc://client-test", [&](const AnyMessage& message) -> std::vector<Answer> {
+    if (std::holds_alternative<SubmitFrame>(message)) ++submits;
+    const auto* ping = std::get_if<ClientPing>(&message);
+    if (ping == nullptr) return {};
+    return {{ClientPong{.epoch = 1, .nonce = ping->nonce}, {}}};
+  });
+  Client client = Client::Connect(context_, service.endpoint(), seconds(5), quick_).value();
+  const RequestId id = client.Submit(SmallRequest());
+  client.Cancel(id);  // which the first coordinator took with it
+  const std::optional<ClientEvent> event = client.Next(seconds(30));
+  ASSERT_TRUE(event && std::holds_alternative<Status>(event->what));
+  EXPECT_EQ(std::get<Status>(event->what).code(), StatusCode::kCancelled);
+  EXPECT_EQ(submits, 1);
+}
+
+// Its deadline is a promise: it does not begin anew.
+TEST_F(ClientTest, RequestThatWasLostKeepsItsDeadline) {
+  std::vector<std::uint32_t> deadlines;  // written by the service's thread, read when that has ended
+  {
+    FakeService service(context_, "inproc://client-test", [&](const AnyMessage& message) -> std::vector<Answer> {
+      if (const auto* submit = std::get_if<SubmitFrame>(&message)) deadlines.push_back(submit->deadline_ms);
+      const auto* ping = std::get_if<ClientPing>(&message);
+      if (ping == nullptr) return {};
+      return {{ClientPong{.epoch = 1, .nonce = ping->nonce}, {}}};
+    });
+    Client client = Client::Connect(context_, service.endpoint(), seconds(5), quick_).value();
+    EXPECT_EQ(client.Render(SmallRequest(), seconds(600)).status().code(), StatusCode::kUnavailable);
+    EXPECT_EQ(client.Render(SmallRequest(), milliseconds(1)).status().code(), StatusCode::kDeadlineExceeded);
+  }
+  ASSERT_EQ(deadlines.size(), 5U);
+  for (std::size_t i = 1; i < 4; ++i) EXPECT_LT(deadlines[i], deadlines[i - 1]) << i;
+}
+
 TEST_F(ClientTest, BadRequestFailsBeforeItIsSent) {
   FakeService service(context_, "inproc://client-test", [&](const AnyMessage& message) -> std::vector<Answer> {
     EXPECT_FALSE(std::holds_alternative<SubmitFrame>(message));

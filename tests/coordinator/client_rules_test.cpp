@@ -41,7 +41,7 @@ TEST(CoordinatorClients, ProgressTellsPhasesAndPositions) {
   const Actions loading = script.Client(kOther, Frame(1, 1, "other"));
   ASSERT_EQ(ToClients<FrameProgress>(loading).size(), 1U);
   EXPECT_EQ(ToClients<FrameProgress>(loading)[0].message.phase, FramePhase::kLoading);
-  const auto loaded = ToClients<FrameProgress>(script.Step(DatasetLoaded{"other", script.loads.back().dataset, BlockSummary()}));
+  const auto loaded = ToClients<FrameProgress>(script.Step(DatasetLoaded{"other", script.loads.back().load, 1, BlockSummary()}));
   ASSERT_EQ(loaded.size(), 1U);
   EXPECT_EQ(loaded[0].to, kOther);
   EXPECT_EQ(loaded[0].message.phase, FramePhase::kQueued);
@@ -227,9 +227,9 @@ TEST(CoordinatorClients, DatasetIsLoadedOnceAndAFailedLoadIsTriedAgain) {
 
   script.Client(kClient, Frame(3));
   ASSERT_EQ(script.loads.size(), 2U);
-  EXPECT_NE(script.loads[1].dataset, script.loads[0].dataset);
-  EXPECT_TRUE(HandedOut(script.Step(DatasetLoaded{"block", script.loads[0].dataset, BlockSummary()})).empty()) << "of the first load";
-  EXPECT_EQ(HandedOut(script.Step(DatasetLoaded{"block", script.loads[1].dataset, BlockSummary()})).size(), 1U);
+  EXPECT_NE(script.loads[1].load, script.loads[0].load);
+  EXPECT_TRUE(HandedOut(script.Step(DatasetLoaded{"block", script.loads[0].load, 1, BlockSummary()})).empty()) << "of the first load";
+  EXPECT_EQ(HandedOut(script.Step(DatasetLoaded{"block", script.loads[1].load, 1, BlockSummary()})).size(), 1U);
   script.Client(kClient, Frame(4));
   EXPECT_EQ(script.loads.size(), 2U);
 }

@@ -119,6 +119,7 @@ struct FakeWorker {
   Incarnation incarnation = 0;
   WorkerId id = 0;
   std::uint32_t rendered_ranks = 0;
+  bool leaving = false;
 };
 
 class CoordinatorScript {
@@ -178,9 +179,16 @@ class CoordinatorScript {
     return worker;
   }
   Actions Beat(const FakeWorker& worker) {
-    return Worker(
-        worker,
-        Heartbeat{.epoch = config.epoch, .incarnation = worker.incarnation, .worker = worker.id, .rendered_ranks = worker.rendered_ranks});
+    return Worker(worker, Heartbeat{.epoch = config.epoch,
+                                    .incarnation = worker.incarnation,
+                                    .worker = worker.id,
+                                    .rendered_ranks = worker.rendered_ranks,
+                                    .leaving = worker.leaving});
+  }
+  // From now on it says that it is leaving.
+  Actions Leave(WorkerId id) {
+    WorkerOf(id).leaving = true;
+    return Beat(WorkerOf(id));
   }
   FakeWorker& WorkerOf(WorkerId id) {
     return *std::find_if(workers.begin(), workers.end(), [id](const FakeWorker& w) { return w.id == id; });
@@ -201,7 +209,7 @@ class CoordinatorScript {
     Actions actions = Client(client, submit);
     for (std::size_t i = loads_before; i < loads.size(); ++i) {
       const LoadDataset load = loads[i];
-      Append(actions, Step(DatasetLoaded{load.name, load.dataset, BlockSummary()}));
+      Append(actions, Step(DatasetLoaded{load.name, load.load, load.load, BlockSummary()}));
     }
     return actions;
   }

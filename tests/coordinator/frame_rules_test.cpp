@@ -25,7 +25,7 @@ TEST(CoordinatorFrames, FrameRunsGroupByGroupToItsPicture) {
   EXPECT_EQ(groups[0].group_count, 3U);
   EXPECT_EQ(groups[0].first_group, 0U);
   EXPECT_EQ(WorkersOf(groups[0]), (std::set<WorkerId>{a.id, b.id}));
-  EXPECT_EQ(groups[0].setup.dataset, script.loads.at(0).dataset);
+  EXPECT_EQ(groups[0].setup.dataset, script.loads.at(0).load);
   std::set<std::string> endpoints;
   for (const Peer& peer : groups[0].peers) endpoints.insert(peer.images_endpoint);
   EXPECT_EQ(endpoints, (std::set<std::string>{"inproc://images1", "inproc://images2"}));

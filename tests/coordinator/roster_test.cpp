@@ -18,7 +18,7 @@ Register Incarnated(Incarnation incarnation) {
 }
 
 LiveRoster ThreeWorkers() {
-  LiveRoster roster(seconds(6), seconds(30));
+  LiveRoster roster(seconds(6), seconds(30), seconds(2));
   for (Incarnation i = 1; i <= 3; ++i) EXPECT_EQ(roster.Admit(Incarnated(i), 10 + i, kStart), WorkerId(i));
   return roster;
 }
@@ -29,6 +29,50 @@ TEST(LiveRoster, ReplacementTakesTheVacantSlotAndNobodyElseMoves) {
   EXPECT_EQ(roster.slots().slots, (std::vector<WorkerId>{1, 0, 3}));
   EXPECT_EQ(roster.Admit(Incarnated(9), 19, kStart), WorkerId{4}) << "ids are never given twice";
   EXPECT_EQ(roster.slots().slots, (std::vector<WorkerId>{1, 4, 3}));
+}
+
+Register Returning(Incarnation incarnation, SlotPlace place) {
+  Register message = Incarnated(incarnation);
+  message.place = place;
+  return message;
+}
+
+TEST(LiveRoster, WorkersOfAnEarlierCoordinatorGetTheirSlotsAgain) {
+  LiveRoster roster(seconds(6), seconds(30), seconds(2));
+  roster.Admit(Returning(9, {.slot = 2, .slots = 3}), 19, kStart);
+  EXPECT_EQ(roster.slots().slots, (std::vector<WorkerId>{0, 0, 1}));
+  EXPECT_TRUE(roster.AwaitsReturn());
+  roster.Admit(Returning(8, {.slot = 1, .slots = 3}), 18, kStart);
+  EXPECT_EQ(roster.slots().slots, (std::vector<WorkerId>{0, 2, 1}));
+  EXPECT_TRUE(roster.AwaitsReturn());
+  roster.Admit(Returning(7, {.slot = 1, .slots = 2}), 17, kStart);
+  EXPECT_EQ(roster.slots().slots, (std::vector<WorkerId>{3, 2, 1})) << "its slot is taken";
+  EXPECT_FALSE(roster.AwaitsReturn()) << "nobody is missing";
+  EXPECT_EQ(roster.PlaceOf(2), (SlotPlace{.slot = 1, .slots = 3}));
+  EXPECT_EQ(roster.Admit(Incarnated(6), 16, kStart), WorkerId{4});
+  EXPECT_EQ(roster.slots().slots.size(), 4U);
+}
+
+TEST(LiveRoster, WorkersThatDoNotReturnAreAwaitedForAWhile) {
+  LiveRoster roster(seconds(6), seconds(30), seconds(2));
+  roster.Admit(Returning(9, {.slot = 1, .slots = 2}), 19, kStart);
+  EXPECT_EQ(roster.NextWake(), kStart + seconds(2));
+  roster.GiveUpVacancies(kStart + seconds(2) - Duration(1));
+  EXPECT_TRUE(roster.AwaitsReturn());
+  roster.GiveUpVacancies(kStart + seconds(2));
+  EXPECT_FALSE(roster.AwaitsReturn());
+  EXPECT_EQ(roster.slots().slots, (std::vector<WorkerId>{0, 1})) << "its boxes are lent";
+  EXPECT_EQ(roster.NextWake(), kStart + seconds(6));
+}
+
+TEST(LiveRoster, ARunningServiceMakesNoSlotsForWhoComesBackLate) {
+  LiveRoster roster = ThreeWorkers();
+  EXPECT_FALSE(roster.AwaitsReturn()) << "nobody had a slot before";
+  roster.Admit(Returning(9, {.slot = 7, .slots = 9}), 19, kStart + seconds(30));
+  EXPECT_EQ(roster.slots().slots, (std::vector<WorkerId>{1, 2, 3, 4}));
+  LiveRoster hostile(seconds(6), seconds(30), seconds(2));
+  hostile.Admit(Returning(9, {.slot = 4000000000, .slots = 4294967295}), 19, kStart);
+  EXPECT_LE(hostile.slots().slots.size(), 4096U);
 }
 
 TEST(LiveRoster, VacantSlotsAreGivenUpAfterTheGracePeriod) {
@@ -73,7 +117,7 @@ TEST(LiveRoster, RefillMovesNobodyAndLeavesNobodyOut) {
   Random random(3);
   SCOPED_TRACE(random.trace());
   for (int round = 0; round < 300; ++round) {
-    LiveRoster roster(seconds(6), seconds(30));
+    LiveRoster roster(seconds(6), seconds(30), seconds(2));
     Incarnation incarnation = 0;
     const auto churn = [&](int events) {
       for (int i = 0; i < events; ++i) {

@@ -23,23 +23,27 @@ struct Faults {
   double silent_kill = 0;   // share of kills that no socket tells of
   double restart = 0;       // share of killed workers that are replaced
   int workers_joining = 0;  // while frames run
+  int workers_leaving = 0;  // with notice
   int coordinator_restarts = 0;
   double cancel = 0;  // share of requests
   double vanish = 0;  // share of clients
 
   bool none() const { return !reorder && lose + duplicate + delay == 0 && failures() == 0; }
+  // True if no box of a frame may be rendered twice: at most, workers leave with notice.
+  bool gentle() const { return !reorder && lose + duplicate + delay == 0 && failures() == workers_leaving; }
   // True if every frame must be finished, as long as there is a worker.
   bool harmless() const {
     return lose <= kRareLoss && delay + fail_render + damage_chunk + fail_combine + fail_load + coordinator_restarts == 0;
   }
   // Beside messages.
   double failures() const {
-    return fail_render + damage_chunk + fail_combine + fail_load + worker_kills + workers_joining + coordinator_restarts + cancel + vanish;
+    return fail_render + damage_chunk + fail_combine + fail_load + worker_kills + workers_joining + workers_leaving + coordinator_restarts +
+           cancel + vanish;
   }
 };
 
-// A quarter of the worlds is free of faults; in a quarter only workers come and go (which must cost no frame) and messages overtake each
-// other; the others have any mixture.
+// A quarter of the worlds is free of faults; in some, workers leave with notice and nothing else happens; in nearly a quarter only workers
+// come and go (which must cost no frame) and messages overtake each other; the others have any mixture.
 inline Faults RandomFaults(Random& random) {
   Faults faults;
   const double kind = random.Real(0, 1);
@@ -48,12 +52,18 @@ inline Faults RandomFaults(Random& random) {
     const double list[] = {double(values)...};
     return list[random.Integer<std::size_t>(0, sizeof...(values) - 1)];
   };
+  if (kind < 0.3) {
+    faults.workers_leaving = random.Integer(1, 6);
+    faults.restart = one_of(0, 0.5, 1);
+    return faults;
+  }
   faults.duplicate = one_of(0, 0.02, 0.2);
   faults.reorder = random.Chance(0.5);
   faults.worker_kills = int(one_of(0, 1, 2, 5));
   faults.silent_kill = one_of(0, 0.5, 1);
   faults.restart = one_of(0, 0.5, 1);
   faults.workers_joining = int(one_of(0, 0, 1, 3));
+  faults.workers_leaving = int(one_of(0, 0, 1, 3));
   faults.cancel = one_of(0, 0, 0.2);
   faults.vanish = one_of(0, 0, 0.3);
   faults.lose = one_of(0, kRareLoss);

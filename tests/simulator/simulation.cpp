@@ -61,7 +61,28 @@ void Simulation::KillWorker() {
   service_.KillWorker(victim);
   ++tally_.workers_killed;
   if (!random_.Chance(faults_.silent_kill)) told_dead_.insert(victim);
-  if (alive.size() == 1) workerless_ = true;
+  if (Staying().empty()) workerless_ = true;
+  if (random_.Chance(faults_.restart)) AddWorker(milliseconds(random_.Integer(1, 4000)));
+}
+
+std::vector<Node> Simulation::Staying() const {
+  std::vector<Node> staying;
+  for (Node node = 0; node < workers_.size(); ++node) {
+    if (service_.alive(node) && !leaving_.contains(node)) staying.push_back(node);
+  }
+  return staying;
+}
+
+void Simulation::TellWorkerToLeave() {
+  const std::vector<Node> staying = Staying();
+  if (staying.empty()) return;
+  const Node leaver = staying[random_.Integer<std::size_t>(0, staying.size() - 1)];
+  // Until it knows its id it cannot say that it leaves: it is lost.
+  if (faults_.gentle() && !service_.worker(leaver).registered()) return;
+  leaving_.insert(leaver);
+  ++tally_.workers_left;
+  if (staying.size() == 1) workerless_ = true;
+  service_.StepWorker(leaver, LeaveRequested{});
   if (random_.Chance(faults_.restart)) AddWorker(milliseconds(random_.Integer(1, 4000)));
 }
 
@@ -93,6 +114,7 @@ void Simulation::PlanTroubles(Duration span) {
     service_.queue().After(Duration(random_.Integer<std::int64_t>(0, span.count())), std::move(what));
   };
   for (int i = 0; i < faults_.worker_kills; ++i) somewhere([this] { KillWorker(); });
+  for (int i = 0; i < faults_.workers_leaving; ++i) somewhere([this] { TellWorkerToLeave(); });
   for (int i = 0; i < faults_.workers_joining; ++i) somewhere([this] { AddWorker({}); });
   for (int i = 0; i < faults_.coordinator_restarts; ++i) somewhere([this] { RestartCoordinator(); });
   for (const auto& client : clients_) {
@@ -159,6 +181,7 @@ void Simulation::CheckOutcome() {
       if (ended.status.ok()) {
         ++tally_.pictures;
         if (ended.statistics.attempts > 1) ++tally_.retried;
+        if (faults_.gentle() && ended.statistics.attempts > 1) ++tally_.handed_over;
         if (faults_.none()) {
           EXPECT_EQ(ended.statistics.attempts, 1U);
         }
@@ -216,8 +239,16 @@ void Simulation::Perform(ToClient& action) {
   }
 }
 
+WorkerEvent Simulation::Answer(Job& job) {
+  const auto* render = std::get_if<StartRender>(&job.action);
+  if (render != nullptr && faults_.gentle()) {
+    EXPECT_TRUE(rendered_.emplace(render->key.frame, render->placement.id).second) << "a box is rendered twice";
+  }
+  return workers_[job.node].Answer(job);
+}
+
 void Simulation::Perform(const LoadDataset& action) {
-  CoordinatorEvent loaded = DatasetLoaded{action.name, action.dataset, world_.summary};
+  CoordinatorEvent loaded = DatasetLoaded{action.name, action.load, 1, world_.summary};
   if (random_.Chance(faults_.fail_load)) loaded = DatasetFailed{action.name, Status::NotFound("the file of the volume is gone")};
   service_.TellCoordinator(service_.now() + random_.Real(0.001, 0.3), loaded);
 }
@@ -275,7 +306,7 @@ void Simulation::Perform(Node node, SendChunkRequest& action) {
   const Arrivals asked = network_.Send({int(node), kSlabServerEnd}, service_.now());
   for (int i = 0; i < asked.count; ++i) {
     service_.queue().At(asked.times[i], [this, node, request] {
-      if (!service_.coordinator_runs()) return;
+      if (!service_.coordinator_runs() || request.epoch != epoch_) return;
       const AnyMessage answer = OnTheWay(AnswerOf(request));
       const Arrivals answered = network_.Send({kSlabServerEnd, int(node)}, service_.now());
       for (int j = 0; j < answered.count; ++j) {
@@ -285,10 +316,7 @@ void Simulation::Perform(Node node, SendChunkRequest& action) {
   }
 }
 
-AnyMessage Simulation::AnswerOf(const ChunkRequest& request) const {
-  if (request.epoch != epoch_) {
-    return ChunkRefused{epoch_, request.dataset, request.box, request.chunk, Status::NotFound("another coordinator's epoch")};
-  }
+AnyMessage Simulation::AnswerOf(const ChunkRequest& request) {
   Chunk chunk;
   chunk.epoch = request.epoch;
   chunk.dataset = request.dataset;

@@ -8,6 +8,7 @@
 //   no image is left, read after its release or released twice; no slab is rendered from before it is complete; credits are kept
 //   no more groups are unfinished at a time than the window allows, nor of one frame with masks
 //   where only workers come and go and few messages are lost, but a worker is always there: every frame is finished
+//   where workers only leave with notice, and have the time for it: no box of a frame is rendered twice
 //   without faults: no frame fails, none needs a second attempt, and voxels that a worker has had do not travel again
 #pragma once
 
@@ -16,6 +17,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "coordinator/planner.h"
@@ -41,6 +43,8 @@ class Simulation : private Conditions {
   // ---- the world
   void AddWorker(Duration after);
   void KillWorker();
+  void TellWorkerToLeave();
+  std::vector<Node> Staying() const;  // alive and not told to leave
   void StartCoordinator();
   void RestartCoordinator();
   void PlanTroubles(Duration span);
@@ -51,12 +55,12 @@ class Simulation : private Conditions {
   PeerToken TokenOfClient(std::size_t client) const;
   AnyMessage OnTheWay(const AnyMessage& message) const;
   void FromClientNode(std::size_t client, const AnyMessage& message);
-  AnyMessage AnswerOf(const ChunkRequest& request) const;
+  static AnyMessage AnswerOf(const ChunkRequest& request);
 
   // ---- Conditions
   using Conditions::Perform;
   std::optional<WorkCost> Begin(Job& job) override { return workers_[job.node].Begin(job); }
-  WorkerEvent Answer(Job& job) override { return workers_[job.node].Answer(job); }
+  WorkerEvent Answer(Job& job) override;
   bool CancelsInTime() override { return random_.Chance(0.7); }
   void Perform(Node node, SendChunkRequest& action) override;
   void Perform(Node node, const OpenSlab& action) override { workers_[node].Perform(action); }
@@ -88,7 +92,9 @@ class Simulation : private Conditions {
   Epoch epoch_ = 0;                  // of the coordinator
   std::deque<ModelWorker> workers_;  // by node
   std::vector<std::unique_ptr<ModelClient>> clients_;
-  std::set<Node> told_dead_;  // workers whose death the sockets notice
+  std::set<Node> told_dead_;                      // workers whose death the sockets notice
+  std::set<Node> leaving_;                        // workers that were told to leave
+  std::set<std::pair<FrameId, BoxId>> rendered_;  // in gentle worlds
   std::size_t requests_planned_ = 0, requests_made_ = 0;
   const CoordinatorEvent* cause_ = nullptr;  // what the coordinator deals with
   std::optional<StatusReply> status_;

@@ -35,7 +35,8 @@ TEST(Simulator, EveryFrameEndsRightOrWithItsError) {
             << tally.coordinator_restarts << " coordinator restarts; " << tally.masks << " groups with hidden tiles ("
             << tally.masks_of_retries << " of them after the first attempt), " << tally.hidden_pixels << " pixels without hidden boxes, "
             << tally.hidden_boxes << " boxes not rendered; " << tally.counts << " counts of occupied voxels, " << tally.moved_boxes
-            << " boxes moved by balance\n";
+            << " boxes moved by balance; " << tally.workers_left << " workers left, " << tally.handed_over
+            << " frames handed over without loss\n";
   if (tally.worlds < 1000) return;
   // The worlds must be such that something is tested, and the service such that faults rarely cost a frame.
   EXPECT_GT(tally.pictures, tally.requests * 8 / 10);
@@ -50,6 +51,8 @@ TEST(Simulator, EveryFrameEndsRightOrWithItsError) {
   EXPECT_GT(tally.hidden_boxes, tally.worlds);
   EXPECT_GT(tally.counts, tally.worlds / 4);
   EXPECT_GT(tally.moved_boxes, tally.worlds / 20);
+  EXPECT_GT(tally.workers_left, tally.worlds / 4);
+  EXPECT_GT(tally.handed_over, tally.worlds / 100);
 }
 
 }  // namespace

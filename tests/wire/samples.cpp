@@ -51,7 +51,7 @@ GroupAssignment Assignment(Rank ranks, const ViewParameters& view, const Rendere
   message.previews = true;
   message.display = kMax32;
   FrameSetup& setup = message.setup;
-  setup.dataset = kMax32;
+  setup.dataset = kMax64;
   setup.description = Description();
   setup.range = {-1, 1e30F};
   SetRenderer(*renderer, setup);
@@ -116,12 +116,12 @@ std::vector<Welcome> SamplesOf() {
 
 template <>
 std::vector<Heartbeat> SamplesOf() {
-  return {{}, {kMax64, kMax64, kMax32, kMax64, kMax64, kMax32}};
+  return {{}, {kMax64, kMax64, kMax32, kMax64, kMax64, kMax32, true}};
 }
 
 template <>
 std::vector<Ping> SamplesOf() {
-  return {{}, {kMax64, kMax64, {0, 1, kMax64}}};
+  return {{}, {kMax64, kMax64, {0, 1, kMax64}, {kMax32, kMax32}}};
 }
 
 template <>
@@ -174,7 +174,7 @@ std::vector<Chunk> SamplesOf() {
 
 template <>
 std::vector<ChunkRefused> SamplesOf() {
-  return {{1, 2, kOneVoxel, 0, Status::NotFound("no dataset 2")}, {kMax64, kMax32, kWholeBox, 5, Status::Cancelled(kLongText)}};
+  return {{1, 2, kOneVoxel, 0, Status::NotFound("no dataset 2")}, {kMax64, kMax64, kWholeBox, 5, Status::Cancelled(kLongText)}};
 }
 
 template <>
@@ -281,7 +281,7 @@ std::vector<StatusQuery> SamplesOf() {
 template <>
 std::vector<StatusReply> SamplesOf() {
   StatusReply full{kMax64, kMax64, kMax32, kMax64, kMax32, kMax32, kMax32, kMax64, kMax64, kMax64, {}, {}};
-  full.workers = {{1, 2, "", 1, 0, 0, 0, 0, 0}, {kMax32, kMax32, kLongName, kMaxThreads, kMax32, kMax64, kMax64, kMax32, kMax32}};
+  full.workers = {{1, 2, "", 1, 0, 0, 0, 0, 0}, {kMax32, kMax32, kLongName, kMaxThreads, kMax32, kMax64, kMax64, kMax32, kMax32, true}};
   full.datasets = {{"a", DatasetState::kUnloaded, {}, {}, ""},
                    {kLongName, DatasetState::kLoading, {}, {}, ""},
                    {kUmlaut, DatasetState::kReady, Description(), {-3, 4}, ""},

@@ -76,6 +76,13 @@ TEST_F(WorkerRegistrationTest, RegistersAgainWhereItsImagesComeNow) {
   EXPECT_EQ(registers[0].incarnation, 1001U);
 }
 
+TEST_F(WorkerRegistrationTest, SaysWhichSlotItHad) {
+  Tell(Ping{kEpoch, 0, {}, {.slot = 2, .slots = 5}});
+  const auto registers = Sent<Register>(Tell(Retire{kEpoch + 1}));
+  ASSERT_THAT(registers, SizeIs(1));
+  EXPECT_EQ(registers[0].place, (SlotPlace{.slot = 2, .slots = 5}));
+}
+
 TEST_F(WorkerRegistrationTest, LeavesInOrderAndObeysStop) {
   const Actions leaving = Tell(StopRequested{});
   EXPECT_THAT(Sent<Leave>(leaving), SizeIs(1));
@@ -86,6 +93,53 @@ TEST_F(WorkerRegistrationTest, LeavesInOrderAndObeysStop) {
   Start(Config());
   EXPECT_THAT(All<StopProcess>(Tell(Stop{kEpoch + 1})), IsEmpty()) << "another coordinator's";
   EXPECT_THAT(All<StopProcess>(Tell(Stop{kEpoch})), SizeIs(1));
+}
+
+TEST_F(WorkerRegistrationTest, LeavingSaysSoAndGoesOnUntilItIsStopped) {
+  const auto render = All<StartRender>(Feed(Tell(Assignment(1, {kSelf})))).at(0);
+  const auto beats = Sent<Heartbeat>(Tell(LeaveRequested{}));
+  ASSERT_THAT(beats, SizeIs(1)) << "at once";
+  EXPECT_TRUE(beats[0].leaving);
+  EXPECT_THAT(Sent<GroupDone>(Rendered(render)), SizeIs(1)) << "it finishes what it has";
+  const auto later = Sent<Heartbeat>(After(milliseconds(500)));
+  ASSERT_THAT(later, SizeIs(1));
+  EXPECT_TRUE(later[0].leaving) << "the first one may be lost";
+  EXPECT_THAT(All<StopProcess>(Tell(LeaveRequested{})), IsEmpty());
+  const auto ends = All<StopProcess>(Tell(Stop{kEpoch}));
+  ASSERT_THAT(ends, SizeIs(1));
+  EXPECT_EQ(ends[0].rendered_ranks, 1U);
+}
+
+TEST_F(WorkerRegistrationTest, LeavingEndsWhenItsTimeIsOver) {
+  WorkerConfig config = Config();
+  config.drain = milliseconds(1200);
+  Start(config);
+  Feed(Tell(Assignment(1, {kSelf})));
+  Tell(LeaveRequested{});
+  EXPECT_THAT(All<StopProcess>(After(milliseconds(1199))), IsEmpty());
+  const Actions over = After(milliseconds(1));
+  EXPECT_THAT(Sent<Leave>(over), SizeIs(1)) << "the coordinator need not wait for its silence";
+  EXPECT_THAT(All<StopProcess>(over), SizeIs(1));
+
+  config.drain = {};
+  Start(config);
+  EXPECT_THAT(All<StopProcess>(Tell(LeaveRequested{})), SizeIs(1)) << "no time at all";
+}
+
+TEST_F(WorkerRegistrationTest, LeavingEndsWithoutACoordinator) {
+  Tell(LeaveRequested{});
+  const Actions retired = Tell(Retire{kEpoch + 1});
+  EXPECT_THAT(All<StopProcess>(retired), SizeIs(1)) << "a new coordinator has no part of any frame for it";
+  EXPECT_THAT(Sent<Register>(retired), IsEmpty());
+
+  Start(Config());
+  Tell(LeaveRequested{});
+  EXPECT_THAT(All<StopProcess>(After(milliseconds(5999))), IsEmpty());
+  EXPECT_THAT(All<StopProcess>(After(milliseconds(1))), SizeIs(1)) << "silence";
+
+  Start(Config(), false);
+  Tell(Tick{});
+  EXPECT_THAT(All<StopProcess>(Tell(LeaveRequested{})), SizeIs(1)) << "never registered";
 }
 
 TEST_F(WorkerRegistrationTest, LosingTheCoordinatorReleasesEverything) {

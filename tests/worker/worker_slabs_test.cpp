@@ -164,13 +164,22 @@ TEST_F(WorkerSlabsTest, CountsTheBytesThatTheLastFrameOfASlabReported) {
   EXPECT_EQ(cached_after(3 * kVoxels, Status::Internal("render")), 3 * kVoxels) << "derived before the frame failed";
 }
 
-TEST_F(WorkerSlabsTest, AnotherCoordinatorMeansOtherVoxels) {
+TEST_F(WorkerSlabsTest, VoxelsStayWhenTheCoordinatorStartsAnew) {
   const auto first = All<StartRender>(Feed(Tell(Assignment(1, {kSelf})))).at(0);
   Rendered(first);
-  Tell(Retire{kEpoch});
-  EXPECT_THAT(All<DropSlab>(Tell(WelcomeTo(1001))), IsEmpty()) << "the same coordinator: voxels stay";
-  Tell(Retire{kEpoch});
-  EXPECT_THAT(All<DropSlab>(Tell(WelcomeTo(1002, kEpoch + 1))), ElementsAre(testing::Field(&DropSlab::slab, first.slab)));
+  for (const Epoch epoch : {kEpoch, kEpoch + 1}) {
+    Tell(Retire{epoch});
+    EXPECT_THAT(All<DropSlab>(Tell(WelcomeTo(1001 + epoch - kEpoch, epoch))), IsEmpty());
+  }
+  GroupAssignment again = Assignment(1, {kSelf});
+  again.epoch = kEpoch + 1;
+  const Actions actions = Tell(again);
+  EXPECT_THAT(All<SendChunkRequest>(actions), IsEmpty());
+  EXPECT_EQ(All<StartRender>(actions).at(0).slab, first.slab);
+
+  again.key.frame = 2;
+  ++again.setup.dataset;
+  EXPECT_THAT(All<SendChunkRequest>(Tell(again)), testing::Not(IsEmpty())) << "another volume";
 }
 
 }  // namespace
