@@ -76,7 +76,8 @@ Result<News> Load(const VolumeLoader& loader, const LoadDataset& action) {
   } else {
     samples.volume = *volume;
   }
-  return News{DatasetLoaded{action.name, action.dataset, std::move(summary)}, action.dataset, std::move(samples)};
+  const std::uint64_t bytes = samples.bytes();
+  return News{DatasetLoaded{action.name, action.dataset, std::move(summary), bytes}, action.dataset, std::move(samples)};
 }
 
 Result<std::shared_ptr<const OccupancyGrid>> Count(const CountFunction& count, const SlabServer::Samples& samples,
@@ -117,6 +118,7 @@ struct CoordinatorService::Impl {
     if (const std::string* identity = client_peers.IdentityOf(action.client)) clients.EndConnection(*identity);
   }
   void Perform(LoadDataset& action);
+  void Perform(UnloadDataset& action) { slabs->Withdraw(action.dataset); }
   void Perform(CountDataset& action);
   void Perform(PlanRequest& action);
   void Perform(DropPlan& action);
