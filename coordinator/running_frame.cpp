@@ -170,8 +170,8 @@ void RunningFrame::OnOvertaken(const std::vector<WorkerId>& workers) { moved_on_
 Status RunningFrame::OnLoss(WorkerId worker, std::optional<Time> last_heard, Time now) {
   if (suspicion_ && suspicion_->accused == worker) suspicion_.reset();
   if (!HasPart(worker)) return Status::Ok();
-  // A worker that was silent when the attempt began had died before: of something else, perhaps with those that the attempt replaces.
-  const bool died_of_it = last_heard && *last_heard + 2 * limits_.proof_of_life >= attempt_begin_;
+  // A worker that was not heard since the attempt began may have died before, together with those whose boxes it got.
+  const bool died_of_it = last_heard && *last_heard > attempt_begin_;
   const Status status = died_of_it ? NoteDeath(worker) : Status::Ok();
   if (worker == plan_.display) display_in_doubt_ = true;
   attempt_due_ = now;

@@ -64,9 +64,7 @@ TEST(CoordinatorHiddenTiles, AMaskOutlivesAttemptsButNotItsDisplayWorker) {
 
   const auto renderer =
       std::find_if(script.workers.begin(), script.workers.end(), [&](const FakeWorker& worker) { return worker.id != first[0].display; });
-  const FakeWorker leaving = *renderer;
-  const auto second = HandedOut(script.Worker(leaving, Leave{.epoch = 77, .worker = leaving.id}));
-  script.Mute(leaving);
+  const auto second = HandedOut(script.Kill(*renderer));
   ASSERT_THAT(Keys(second), ElementsAre(GroupKey{1, 2, 1}, GroupKey{1, 2, 2}));
   EXPECT_EQ(second[0].hidden, mask);
   EXPECT_EQ(second[1].hidden, mask);

@@ -101,9 +101,11 @@ TEST_F(MemoryRules, AFrameThatLosesTheWorkerOfABoxTwiceFailsAndTheOthersGoOn) {
   script.Join(12, 2);
   script.Join(13, 3);
   ASSERT_THAT(HandedOut(script.Submit(kClient, Frame(1))), SizeIs(1));
+  script.Pass(seconds(1));
   const std::vector<GroupAssignment> again = HandedOut(script.Kill(first));
   ASSERT_THAT(again, SizeIs(1));
-  // The first worker had box 0. Whoever got it dies too.
+  // The first worker had box 0. Whoever got it dies too, a while later.
+  script.Pass(seconds(1));
   const WorkerId heir = std::ranges::find(again[0].group.placements, BoxId{0}, &Placement::id)->worker;
   const Actions actions = script.Kill(script.WorkerOf(heir));
   const auto failed = ToClients<FrameFailed>(actions);
