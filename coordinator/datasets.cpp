@@ -34,15 +34,23 @@ Status DatasetTable::NoSuchDataset(const std::string& name) const {
 LoadId DatasetTable::BeginLoad(const std::string& name) {
   Entry& entry = entries_.at(name);
   CHECK(entry.state == DatasetState::kUnloaded || entry.state == DatasetState::kFailed) << name;
-  entry = {.state = DatasetState::kLoading, .load = ++last_load_};
+  entry = {.state = DatasetState::kLoading, .load = ++last_load_, .last_use = entry.last_use};
   return entry.load;
 }
 
-bool DatasetTable::Loaded(const std::string& name, LoadId load, DatasetId id, std::shared_ptr<const VolumeSummary> summary) {
+void DatasetTable::Use(const std::string& name) { entries_.at(name).last_use = ++uses_; }
+
+bool DatasetTable::Loaded(const std::string& name, LoadId load, DatasetId id, std::shared_ptr<const VolumeSummary> summary,
+                          std::uint64_t bytes) {
   const auto found = entries_.find(name);
   if (found == entries_.end() || found->second.state != DatasetState::kLoading || found->second.load != load) return false;
   CHECK(summary != nullptr) << name;
-  found->second = {.state = DatasetState::kReady, .load = load, .id = id, .summary = std::move(summary)};
+  found->second = {.state = DatasetState::kReady,
+                   .load = load,
+                   .id = id,
+                   .summary = std::move(summary),
+                   .bytes = bytes,
+                   .last_use = found->second.last_use};
   return true;
 }
 
@@ -53,6 +61,24 @@ bool DatasetTable::Failed(const std::string& name, const Status& status) {
   return true;
 }
 
+std::uint64_t DatasetTable::bytes() const {
+  std::uint64_t total = 0;
+  for (const auto& [name, entry] : entries_) total += entry.bytes;
+  return total;
+}
+
+std::optional<DatasetId> DatasetTable::UnloadOne(const std::function<bool(DatasetId)>& in_use) {
+  Entry* oldest = nullptr;
+  for (auto& [name, entry] : entries_) {
+    const bool may_go = entry.state == DatasetState::kReady && !in_use(entry.id);
+    if (may_go && (oldest == nullptr || entry.last_use < oldest->last_use)) oldest = &entry;
+  }
+  if (oldest == nullptr) return std::nullopt;
+  const DatasetId id = oldest->id;
+  *oldest = {.last_use = oldest->last_use};
+  return id;
+}
+
 std::vector<DatasetStatus> DatasetTable::Report() const {
   std::vector<DatasetStatus> report;
   for (const auto& [name, entry] : entries_) {
@@ -60,6 +86,7 @@ std::vector<DatasetStatus> DatasetTable::Report() const {
     if (entry.summary) {
       status.description = entry.summary->description;
       status.range = entry.summary->range;
+      status.memory_bytes = entry.bytes;
     }
     report.push_back(std::move(status));
   }

@@ -1,5 +1,7 @@
 #include "coordinator/frame_machine.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <memory>
@@ -7,7 +9,9 @@
 #include <utility>
 
 #include "common/planning/team.h"
+#include "common/planning/worker_memory.h"
 #include "common/renderers/registry.h"
+#include "common/volume/memory_budget.h"
 #include "coordinator/frame_machine_state.h"
 
 namespace slabstream {
@@ -17,19 +21,53 @@ constexpr std::size_t kCountAhead = 4;
 static_assert(kCountAhead <= OccupancyTable::kMaxKept);
 // Frames planned beyond the window's room: when a frame ends and makes room for another, that one's plan should be ready.
 constexpr std::size_t kPlansAhead = 1;
+
+// What datasets may take of a coordinator's memory: the rest is for a volume that is being read and for pictures on their way. 0: no limit.
+std::uint64_t DatasetShare(std::uint64_t memory_bytes) { return memory_bytes / 4 * 3; }
 }  // namespace
 
 void FrameMachine::State::On(const DatasetLoaded& event) {
-  if (!datasets.Loaded(event.name, event.load, event.dataset, event.summary)) return;
+  if (!datasets.Loaded(event.name, event.load, event.dataset, event.summary, event.bytes)) return;
   const auto waits = [&](const OpenRequest& request) { return request.submit.frame.dataset == event.name && !request.volume; };
   queue.ForEach([&](OpenRequest& request) {
     if (waits(request) && FindVolume(request).ok()) SendQueued(request);
   });
   for (OpenRequest& request : queue.Extract(waits)) FailRequest(request, FindVolume(request));
+
+  const std::uint64_t share = DatasetShare(config.memory_bytes);
+  while (share != 0 && datasets.bytes() > share && UnloadOne()) {
+  }
+  if (share == 0 || datasets.bytes() <= share) return;
+  // All that are loaded are in use. What came last goes, with its requests.
+  const Status full = Status::ResourceExhausted(
+      fmt::format("dataset \"{}\" needs {}, limit {} ({} are in use by other datasets); the "
+                  "coordinator's --memory sets the limit",
+                  event.name, MemoryText(event.bytes), MemoryText(share), MemoryText(datasets.bytes() - event.bytes)));
+  const auto needs = [&](const OpenRequest& request) { return request.submit.frame.dataset == event.name; };
+  for (const OpenRequest& request : queue.Extract(needs)) FailRequest(request, full);
+  UnloadOne();
+}
+
+bool FrameMachine::State::InUse(DatasetId dataset) {
+  bool used = std::ranges::any_of(frames, [&](const RunningFrame& frame) { return frame.plan().setup.dataset == dataset; });
+  queue.ForEach([&](const OpenRequest& request) { used = used || (request.volume && request.volume->dataset() == dataset); });
+  return used;
+}
+
+bool FrameMachine::State::UnloadOne() {
+  const std::optional<DatasetId> unloaded = datasets.UnloadOne([this](DatasetId dataset) { return InUse(dataset); });
+  if (!unloaded) return false;
+  occupancy.Forget(*unloaded);
+  actions.emplace_back(UnloadDataset{*unloaded});
+  return true;
 }
 
 void FrameMachine::State::On(const DatasetFailed& event) {
   if (!datasets.Failed(event.name, event.status)) return;
+  if (event.status.code() == StatusCode::kResourceExhausted && UnloadOne()) {  // there may be room now
+    actions.emplace_back(LoadDataset{.name = event.name, .load = datasets.BeginLoad(event.name)});
+    return;
+  }
   const auto waiting = queue.Extract([&](const OpenRequest& request) { return request.submit.frame.dataset == event.name; });
   for (const OpenRequest& request : waiting) FailRequest(request, event.status);
 }
@@ -46,14 +84,24 @@ void FrameMachine::State::On(const OccupiedCounted& event) {
 // A request that has ended is not in the queue any more.
 void FrameMachine::State::On(const Planned& event) {
   planning.erase(event.plan);
-  if (event.frame.ok()) {
+  const Result<int> fit =
+      event.frame.ok() ? FramesThatFitWorkers((*event.frame)->plan, *(*event.frame)->asked.summary) : Result<int>(event.frame.status());
+  if (fit.ok()) {
     queue.ForEach([&](OpenRequest& request) {
-      if (request.plan == event.plan) request.planned = *event.frame;
+      if (request.plan != event.plan) return;
+      request.planned = *event.frame;
+      request.fit = *fit;
     });
   } else {
     const auto is_it = [&](const OpenRequest& request) { return request.plan == event.plan && request.planned_for == roster.version(); };
-    for (const OpenRequest& request : queue.Extract(is_it)) FailRequest(request, event.frame.status());
+    for (const OpenRequest& request : queue.Extract(is_it)) FailRequest(request, fit.status());
   }
+}
+
+Result<int> FrameMachine::State::FramesThatFitWorkers(const FramePlan& plan, const VolumeSummary& summary) const {
+  std::vector<WorkerLimit> workers;
+  for (const Member& member : roster.members()) workers.push_back({member.id, member.description.memory_bytes});
+  return FramesThatFit(plan, summary, workers);
 }
 
 // Sets request.volume; its dataset is loaded. NotFound: no such preset.
@@ -222,7 +270,13 @@ void FrameMachine::State::BeginAttempts() {
   for (auto it = frames.begin(); it != frames.end();) {
     RunningFrame& frame = *it++;  // FailFrame removes it
     if (!frame.AttemptDue(now)) continue;
-    const Status status = frame.BeginAttempt(roster.Refill(frame.roster()), now);
+    Status status = frame.BeginAttempt(roster.Refill(frame.roster()), now);
+    if (status.ok()) {
+      // The boxes of those that were lost may be too much for the others.
+      const Result<int> fit = FramesThatFitWorkers(frame.plan(), *frame.request().planned->asked.summary);
+      if (fit.ok()) frame.SetFit(*fit);
+      status = fit.status();
+    }
     if (!status.ok()) {
       FailFrame(frame, status);
     } else {
@@ -236,14 +290,22 @@ void FrameMachine::State::DismissWorkers() {
   for (const WorkerId worker : roster.Leaving()) {
     if (std::ranges::any_of(frames, [worker](const RunningFrame& frame) { return frame.HasPart(worker); })) continue;
     SendWorker(worker, Stop{.epoch = config.epoch});
-    RemoveWorker(worker, LiveRoster::Notice::kGiven);
+    RemoveWorker(worker, std::nullopt);
   }
 }
 
-// Starts the first frame in turn that is planned for the present workers. False: there is none.
+// Starts the first frame in turn that is planned for the present workers. False: there is none, or the workers' memory has no room for it
+// yet. None overtakes it then, so that it gets the room.
 bool FrameMachine::State::StartNextFrame() {
-  std::optional<OpenRequest> request =
-      queue.TakeNext([&](const OpenRequest& open) { return HasPlan(open) && !clients.IsBehind(open.client); });
+  const auto ready = [&](const OpenRequest& open) { return HasPlan(open) && !clients.IsBehind(open.client); };
+  bool room = true;
+  queue.VisitInTurn([&](const OpenRequest& open) {
+    if (!ready(open)) return true;
+    room = frames.HasRoomFor(open);
+    return false;
+  });
+  if (!room) return false;
+  std::optional<OpenRequest> request = queue.TakeNext(ready);
   if (!request) return false;
   const RunningFrame& running = frames.Add(RunningFrame(frames.next_id(), *std::move(request), limits, now));
   SendClient(running.request().client, running.Progress());

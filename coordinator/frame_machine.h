@@ -4,7 +4,11 @@
 //   clients    Requests are queued; the clients are served in turn, one frame each. The machine reports progress. A request ends when its
 //              client cancels it or falls silent. The last answers of a client are kept, so that it costs nothing to submit a request
 //              again.
-//   datasets   A dataset is loaded when it is first used. Requests wait for it; a failed load fails them.
+//   datasets   A dataset is loaded when it is first used. Requests wait for it; a failed load fails them. Datasets that no request needs
+//              are unloaded, the least recently used one first, if they take more than their share of memory_bytes, or if another one
+//              cannot be loaded for want of memory.
+//   memory     A frame that does not fit the memory of its workers fails before they are given any of it (FramesThatFit). Frames that
+//              fit one by one run one by one.
 //   occupancy  Where a policy needs it, occupied voxels are counted once for each dataset, transfer function and renderer. Requests wait
 //              for the count; a failed count fails them.
 //   plans      The next requests in turn are planned ahead (PlanRequest), as many as the window has room for and kPlansAhead more, so
@@ -16,7 +20,8 @@
 //   workers    Register gives an id and a slot (a vacant one first). Silence, an unreachable peer or Leave takes the worker out. Every
 //              frame that it had a part in is re-planned over the others (attempt + 1) from its first unfinished group, or from the
 //              first group if the display worker is lost. Slots that stay vacant for vacancy_grace are given up; the next frame is then
-//              partitioned anew. A worker that cannot do its part of a frame (WorkerTrouble) is left out of that frame.
+//              partitioned anew. A worker that cannot do its part of a frame (WorkerTrouble) is left out of that frame. A frame that
+//              twice loses the worker of the same box fails: what it asks for may be what ends them.
 //              Workers of an earlier coordinator say which slots they had: they get them again, and plans wait for them a while.
 //   leaving    A worker that says that it is leaving loses its slot at once and gets no new frame. It finishes the groups that it has; the
 //              rest of a frame is handed over to the workers that stay, if there are any. Without a part in any frame it gets Stop. What
@@ -53,6 +58,7 @@ struct CoordinatorConfig {
   std::uint32_t pid = 0;
   std::string slabs_endpoint;
   std::vector<std::string> datasets;                    // names of the catalogue
+  std::uint64_t memory_bytes = 0;                       // limit of the coordinator's memory; 0: none
   Duration heartbeat = std::chrono::milliseconds(500);  // also the interval of Ping
   Duration worker_timeout = std::chrono::seconds(6);
   Duration client_timeout = std::chrono::seconds(10);
@@ -86,6 +92,7 @@ struct DatasetLoaded {
   LoadId load = 0;
   DatasetId dataset = 0;  // not 0
   std::shared_ptr<const VolumeSummary> summary;
+  std::uint64_t bytes = 0;  // memory of its voxels
 };
 struct DatasetFailed {
   std::string name;
@@ -124,6 +131,10 @@ struct LoadDataset {
   std::string name;
   LoadId load = 0;
 };
+// Its voxels are not needed any more.
+struct UnloadDataset {
+  DatasetId dataset = 0;
+};
 // -> OccupiedCounted: counts the voxels of the volume that its renderer draws (DrawnTable, CountOccupied). The dataset was loaded.
 struct CountDataset {
   CountId count = 0;
@@ -139,8 +150,8 @@ struct StopService {};  // everything was sent; end
 struct DropClient {
   PeerToken client = 0;
 };
-using CoordinatorAction =
-    std::variant<ToWorker, ToClient, DropClient, LoadDataset, CountDataset, PlanRequest, DropPlan, FrameMeasured, StopService>;
+using CoordinatorAction = std::variant<ToWorker, ToClient, DropClient, LoadDataset, UnloadDataset, CountDataset, PlanRequest, DropPlan,
+                                       FrameMeasured, StopService>;
 
 class FrameMachine {
  public:

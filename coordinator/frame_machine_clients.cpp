@@ -23,6 +23,7 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const SubmitFrame& m
   const Status admissible = Admissible(client, message);
   if (!admissible.ok()) return FailRequest(request, admissible);
   request.needs_occupancy = NeedsOccupancy(message.frame.policy);
+  datasets.Use(message.frame.dataset);
   const DatasetState state = datasets.Find(message.frame.dataset)->state;
   if (state == DatasetState::kUnloaded || state == DatasetState::kFailed) {
     const LoadId load = datasets.BeginLoad(message.frame.dataset);
@@ -89,7 +90,8 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const StatusQuery& m
                     .frames_done = frames_done,
                     .frames_failed = frames_failed,
                     .workers_lost = workers_lost,
-                    .datasets = datasets.Report()};
+                    .datasets = datasets.Report(),
+                    .memory_bytes = config.memory_bytes};
   for (const Member& member : roster.members()) {
     reply.workers.push_back({.worker = member.id,
                              .pid = member.description.pid,
@@ -100,7 +102,8 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const StatusQuery& m
                              .fetched_bytes = member.fetched_bytes,
                              .rendered_ranks = member.rendered_ranks,
                              .silent_ms = Milliseconds(std::max(now - member.last_heard, Duration::zero())),
-                             .leaving = member.leaving});
+                             .leaving = member.leaving,
+                             .memory_bytes = member.description.memory_bytes});
   }
   SendClient(client, std::move(reply));
 }

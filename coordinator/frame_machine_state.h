@@ -120,6 +120,9 @@ struct FrameMachine::State {
   void DismissWorkers();
   Time EndOfWait(const OpenRequest& request) const;
   Status FindVolume(OpenRequest& request) const;
+  bool InUse(DatasetId dataset);
+  bool UnloadOne();  // false: all are in use
+  Result<int> FramesThatFitWorkers(const FramePlan& plan, const VolumeSummary& summary) const;
   bool WaitsForCount(const OpenRequest& request) { return request.needs_occupancy && !occupancy.Find(*request.volume); }
   void CountAhead();
   void PlanAhead();
@@ -132,7 +135,7 @@ struct FrameMachine::State {
   void EndFrame(FrameId id);
   void FailFrame(const RunningFrame& frame, const Status& status);
   void LoseWorker(WorkerId worker);
-  void RemoveWorker(WorkerId worker, LiveRoster::Notice notice);
+  void RemoveWorker(WorkerId worker, std::optional<Time> last_heard);
   void StopAll(const AnyMessage& goodbye, const std::string& reason);
   Ping MakePing(WorkerId to) const {
     return {

@@ -78,17 +78,22 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker&, const WorkerTrouble
 }
 
 void FrameMachine::State::OnWorkerMessage(const FromWorker&, const Leave& message) {
-  if (message.epoch == config.epoch) RemoveWorker(message.worker, LiveRoster::Notice::kGiven);
+  if (message.epoch == config.epoch) RemoveWorker(message.worker, std::nullopt);
 }
 
 void FrameMachine::State::LoseWorker(WorkerId worker) {
   ++workers_lost;
-  RemoveWorker(worker, LiveRoster::Notice::kNone);
+  const Member* member = roster.Find(worker);
+  RemoveWorker(worker, member == nullptr ? std::nullopt : std::optional(member->last_heard));
 }
 
-void FrameMachine::State::RemoveWorker(WorkerId worker, LiveRoster::Notice notice) {
-  roster.Remove(worker, now, notice);
-  for (RunningFrame& frame : frames) frame.OnLoss(worker, now);
+// Without `last_heard` it has left in order.
+void FrameMachine::State::RemoveWorker(WorkerId worker, std::optional<Time> last_heard) {
+  roster.Remove(worker, now, last_heard ? LiveRoster::Notice::kNone : LiveRoster::Notice::kGiven);
+  for (auto it = frames.begin(); it != frames.end();) {
+    RunningFrame& frame = *it++;  // FailFrame removes it
+    if (const Status status = frame.OnLoss(worker, last_heard, now); !status.ok()) FailFrame(frame, status);
+  }
 }
 
 }  // namespace slabstream

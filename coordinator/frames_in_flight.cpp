@@ -34,11 +34,19 @@ RunningFrame* FramesInFlight::FindRequest(PeerToken client, RequestId request) {
 FrameWindow FramesInFlight::Window(std::size_t workers) const {
   std::int64_t frame_bytes = 0;
   std::uint32_t teams = 1;
+  int fit = kMostInWindow;
   for (const RunningFrame& frame : frames_) {
     frame_bytes = std::max(frame_bytes, FrameBytes(frame.plan().setup));
     teams = std::max(teams, frame.plan().turn.teams);
+    fit = std::min(fit, frame.fit());
   }
-  return WindowFor(workers, teams, frame_bytes);
+  return WindowFor(workers, teams, frame_bytes, fit);
+}
+
+// Frames of other sizes count as if they took as much as this one, or as the largest that runs: a mixture takes less.
+bool FramesInFlight::HasRoomFor(const OpenRequest& request) const {
+  const auto teams = std::size_t(request.planned->plan.turn.teams);
+  return frames_.empty() || frames_.size() < std::size_t(request.fit) * teams;
 }
 
 std::size_t FramesInFlight::Room(std::size_t workers) const {

@@ -1,4 +1,6 @@
 // slabstream-coordinator: the service's front. It ends on SIGINT, SIGTERM or a client's order, and tells its workers to end.
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <string>
@@ -9,6 +11,7 @@
 #include "common/cli/add_option.h"
 #include "common/cli/program.h"
 #include "common/transport/socket.h"
+#include "common/volume/memory_budget.h"
 #include "coordinator/catalogue.h"
 #include "coordinator/service.h"
 
@@ -52,6 +55,11 @@ int Run(int argc, char** argv) {
   AddRepeated(app, "--data", data, "A volume to serve, as NAME=FILE, or a directory of volumes that are named after their files")
       ->type_name("NAME=FILE");
   app.add_flag("--compress", compress, "Pack voxels for workers with zstd: pays on links slower than about 300 MB/s, not within a machine");
+  options.machine.memory_bytes = DefaultMemory().coordinator;
+  AddParsed(app, "--memory", options.machine.memory_bytes, ParseMemoryLimit,
+            "Limit of its memory. Datasets that nobody needs are unloaded, least recently used first")
+      ->type_name("SIZE")
+      ->default_str(fmt::format("a quarter of this machine's memory: {}", MemoryText(options.machine.memory_bytes)));
   options.surroundings.link = *ParseLink("--link", kDefaultLink);
   AddParsed(
       app, "--link", options.surroundings.link, ParseLink,
@@ -62,6 +70,7 @@ int Run(int argc, char** argv) {
     auto catalogue = MakeCatalogue(data);
     if (!catalogue.ok()) return catalogue.status();
     options.catalogue = std::move(*catalogue);
+    LimitMemory(options.machine.memory_bytes);
     if (compress) options.codec = Codec::kZstd;
     return Serve(std::move(options));
   });

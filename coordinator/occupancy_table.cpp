@@ -25,6 +25,10 @@ CountId OccupancyTable::Begin(const ClassifiedVolume& volume) {
   return last_count_;
 }
 
+void OccupancyTable::Forget(DatasetId dataset) {
+  entries_.remove_if([dataset](const Entry& entry) { return entry.volume.dataset() == dataset; });
+}
+
 std::list<OccupancyTable::Entry>::iterator OccupancyTable::UnderWay(CountId count) {
   return std::ranges::find_if(entries_, [count](const Entry& entry) { return entry.grid == nullptr && entry.count == count; });
 }

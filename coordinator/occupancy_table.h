@@ -28,6 +28,8 @@ class OccupancyTable {
   // Likewise; returns the volume whose count failed. It may be begun anew.
   std::optional<ClassifiedVolume> Failed(CountId count);
 
+  void Forget(DatasetId dataset);  // all grids of it, and counts under way
+
  private:
   struct Entry {
     ClassifiedVolume volume;

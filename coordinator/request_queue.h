@@ -26,6 +26,7 @@ struct OpenRequest {
   PlanId plan = 0;                              // the requested plan; 0: none
   std::uint64_t planned_for = 0;                // LiveRoster::version() when it was
   std::shared_ptr<const PlannedFrame> planned;  // null: not yet
+  int fit = 1;                                  // such frames fit the workers' memory at a time (FramesThatFit), >= 1; once planned
 
   Time deadline() const { return arrived + std::chrono::milliseconds(submit.deadline_ms); }
   bool Is(PeerToken of_client, RequestId id) const { return client == of_client && submit.request == id; }

@@ -31,6 +31,7 @@ RunningFrame::RunningFrame(FrameId id, OpenRequest request, const FrameLimits& l
       roster_(request_.planned->asked.roster),
       limits_(limits),
       begin_(now),
+      attempt_begin_(now),
       displays_{plan_.display},
       last_progress_(now),
       reports_(plan_.groups.size()) {
@@ -124,7 +125,7 @@ Status RunningFrame::BeginAttempt(const Roster& roster, Time now) {
   handing_over_ = false;
   display_in_doubt_ = false;
   suspicion_.reset();
-  last_progress_ = now;
+  last_progress_ = attempt_begin_ = now;
   return Status::Ok();
 }
 
@@ -139,6 +140,7 @@ bool RunningFrame::Finish(std::uint32_t groups, Time now) {
   if (groups_done_ > furthest_done_) {
     furthest_done_ = groups_done_;
     stalls_ = 0;
+    deadly_boxes_.clear();
   }
   last_progress_ = now;
   return true;
@@ -180,11 +182,30 @@ void RunningFrame::OnHeartbeat(WorkerId worker, bool progressed, Time now) {
 
 void RunningFrame::OnOvertaken(const std::vector<WorkerId>& workers) { moved_on_.insert(workers.begin(), workers.end()); }
 
-void RunningFrame::OnLoss(WorkerId worker, Time now) {
+Status RunningFrame::OnLoss(WorkerId worker, std::optional<Time> last_heard, Time now) {
   if (suspicion_ && suspicion_->accused == worker) suspicion_.reset();
-  if (!HasPart(worker)) return;
+  if (!HasPart(worker)) return Status::Ok();
+  // A worker that was not heard since the attempt began may have died before, together with those whose boxes it got.
+  const bool died_of_it = last_heard && *last_heard > attempt_begin_;
+  const Status status = died_of_it ? NoteDeath(worker) : Status::Ok();
   if (worker == plan_.display) display_in_doubt_ = true;
   attempt_due_ = now;
+  return status;
+}
+
+// In one attempt each box is in the hands of one worker, so deaths at the same time are never the same way.
+Status RunningFrame::NoteDeath(WorkerId worker) {
+  const auto same_way = [&](const std::string& what) {
+    return Status::Unavailable(fmt::format("{} was lost with {} of the frame, as another worker before it: the frame may be what ends them",
+                                           WorkerName(worker), what));
+  };
+  if (worker == plan_.display && groups_done_ == group_count() && std::exchange(deadly_picture_, true)) return same_way("the picture");
+  for (std::uint32_t group = groups_done_; group < next_group_; ++group) {
+    for (const Placement& placement : plan_.groups[group].placements) {
+      if (placement.worker == worker && !deadly_boxes_.insert(placement.id).second) return same_way(fmt::format("box {}", placement.id));
+    }
+  }
+  return Status::Ok();
 }
 
 void RunningFrame::OnReconnection(WorkerId worker, Time now) {

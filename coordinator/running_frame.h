@@ -3,7 +3,8 @@
 //
 // An attempt hands out the groups [first group, group count) of one plan. Events that end it before the frame's end, and where the next one
 // begins:
-//   a worker with a part in it is lost                     the first unfinished group, now
+//   a worker with a part in it is lost                     the first unfinished group, now; but the second time that a worker dies with
+//                                                          the same box, or with the picture, in its hands, the frame fails
 //   a worker with a part in it has another connection      the first unfinished group, now: messages may be lost
 //   no progress for stall_timeout                          the first unfinished group, now; counted
 //   a worker could not do its part                         the first unfinished group, after a pause that grows; counted
@@ -55,6 +56,8 @@ class RunningFrame {
   const OpenRequest& request() const { return request_; }
   const FramePlan& plan() const { return plan_; }
   const Roster& roster() const { return roster_; }
+  int fit() const { return request_.fit; }  // FramesThatFit, of the present plan
+  void SetFit(int fit) { request_.fit = fit; }
   std::uint32_t attempt() const { return std::uint32_t(displays_.size()); }  // from 1
   WorkerId display() const { return plan_.display; }
   std::uint32_t group_count() const { return std::uint32_t(plan_.groups.size()); }
@@ -91,7 +94,8 @@ class RunningFrame {
   void OnOvertaken(const std::vector<WorkerId>& workers);
 
   // ---- what goes wrong. A Status that is not ok: the frame has failed.
-  void OnLoss(WorkerId worker, Time now);  // it is no longer in the roster
+  // `worker` is no longer in the roster. Without `last_heard` it has left in order; else it has died, as far as anybody knows.
+  Status OnLoss(WorkerId worker, std::optional<Time> last_heard, Time now);
   void OnReconnection(WorkerId worker, Time now);
   // Ignores trouble of another attempt or of a group that is done. message.unreachable, if any, must be in the roster. Trouble of the
   // display worker when all groups are done: it cannot make the picture.
@@ -114,7 +118,8 @@ class RunningFrame {
   void KeepHidden(const GroupDone& message);
   bool CanRender(WorkerId worker) const { return worker != 0 && !unable_.contains(worker); }
   bool IsNextOf(WorkerId worker) const;  // it has a part in what is not handed out yet
-  bool waiting() const;                  // for groups that are out, or for the finished picture
+  Status NoteDeath(WorkerId worker);
+  bool waiting() const;  // for groups that are out, or for the finished picture
   Status CountStall(const Status& reason, Duration pause, Time now);
   WorkerId CulpritOf(const Suspicion& suspicion);
 
@@ -123,7 +128,7 @@ class RunningFrame {
   FramePlan plan_;
   Roster roster_;
   FrameLimits limits_;
-  Time begin_;
+  Time begin_, attempt_begin_;
 
   std::vector<WorkerId> displays_;        // by attempt - 1
   std::uint32_t accumulating_since_ = 1;  // the attempt that the present display worker began with nothing
@@ -141,6 +146,8 @@ class RunningFrame {
   std::map<WorkerId, int> complaints_;  // proved suspicions that each worker had a part in
   std::set<WorkerId> unable_;           // workers that cannot do their part of this frame
   Status inability_;                    // reason of the last one of them
+  std::set<BoxId> deadly_boxes_;        // boxes in the hands of workers that died since a group was finished for the first time
+  bool deadly_picture_ = false;         // likewise: the picture
   int stalls_ = 0;
   Time last_progress_;
   std::set<WorkerId> moved_on_;                   // workers that have rendered all that is handed out of this frame

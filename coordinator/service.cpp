@@ -78,7 +78,8 @@ Result<News> Load(const VolumeLoader& loader, const LoadDataset& action) {
     samples.volume = *volume;
   }
   const DatasetId id = IdOf(action.name, **volume);
-  return News{DatasetLoaded{action.name, action.load, id, std::move(summary)}, id, std::move(samples)};
+  const std::uint64_t bytes = samples.bytes();
+  return News{DatasetLoaded{action.name, action.load, id, std::move(summary), bytes}, id, std::move(samples)};
 }
 
 Result<std::shared_ptr<const OccupancyGrid>> Count(const CountFunction& count, const SlabServer::Samples& samples,
@@ -119,6 +120,7 @@ struct CoordinatorService::Impl {
     if (const std::string* identity = client_peers.IdentityOf(action.client)) clients.EndConnection(*identity);
   }
   void Perform(LoadDataset& action);
+  void Perform(UnloadDataset& action) { slabs->Withdraw(action.dataset); }
   void Perform(CountDataset& action);
   void Perform(PlanRequest& action);
   void Perform(DropPlan& action);

@@ -52,6 +52,15 @@ void SlabServer::Publish(DatasetId dataset, Samples samples) {
   samples_.insert_or_assign(dataset, std::move(samples));
 }
 
+void SlabServer::Withdraw(DatasetId dataset) {
+  Samples unused;  // freed without the lock
+  const std::lock_guard lock(mutex_);
+  const auto found = samples_.find(dataset);
+  if (found == samples_.end()) return;
+  unused = std::move(found->second);
+  samples_.erase(found);
+}
+
 SlabServer::Samples SlabServer::Find(DatasetId dataset) {
   const std::lock_guard lock(mutex_);
   const auto found = samples_.find(dataset);

@@ -38,6 +38,7 @@ class SlabServer {
       CHECK(any());
       return volume != nullptr ? volume->block.box : bricks->grid().box;
     }
+    std::uint64_t bytes() const { return volume != nullptr ? volume->block.bytes.size() : bricks->bytes(); }
     ScalarType type() const { return volume != nullptr ? volume->block.type : bricks->type(); }
     VoxelBricks view() const { return volume != nullptr ? VoxelBricks(volume->block) : VoxelBricks(*bricks); }
   };
@@ -51,9 +52,10 @@ class SlabServer {
 
   const std::string& endpoint() const { return endpoint_; }
 
-  // From any thread; once for each id. They are served until the server ends.
+  // From any thread; once for each id. They are served until they are withdrawn.
   void Publish(DatasetId dataset, Samples samples);
-  Samples Find(DatasetId dataset);  // from any thread; neither: not published
+  void Withdraw(DatasetId dataset);  // from any thread; requests for it are refused from now on
+  Samples Find(DatasetId dataset);   // from any thread; neither: not published
   // From any thread: as Socket::EndConnections, soon.
   void EndConnections(const std::string& user);
 

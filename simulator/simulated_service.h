@@ -78,7 +78,7 @@ class SimulatedService {
   void CountSpin(Time next_wake) { spins_ = next_wake <= time() ? spins_ + 1 : 0; }
 
   void Perform(ToWorker& action);
-  void Perform(AnyOf<DropPlan, DropClient> auto&) {}
+  void Perform(AnyOf<DropPlan, DropClient, UnloadDataset> auto&) {}
   void Perform(StopService&) { StopCoordinator(); }
   void Perform(auto& action) { conditions_.Perform(action); }
 

@@ -14,6 +14,7 @@
 #include "common/kernels/simd_target.h"
 #include "common/service/service_file.h"
 #include "common/transport/socket.h"
+#include "common/volume/memory_budget.h"
 #include "worker/service.h"
 
 namespace slabstream {
@@ -50,7 +51,12 @@ int Run(int argc, char** argv) {
       ->type_name("ENDPOINT")
       ->default_str("any port beside the coordinator");
   AddInteger(app, "--threads", options.machine.threads, 1, int(kMaxThreads), "Render threads");
-  AddInteger(app, "--cache-mib", cache_mib, 1, kMaxCacheMib, "MiB of voxels kept between frames")->default_str("no limit");
+  options.machine.memory_bytes = DefaultMemory().worker;
+  AddParsed(app, "--memory", options.machine.memory_bytes, ParseMemoryLimit,
+            "Limit of its memory: voxels and images. It gets no frame that needs more")
+      ->type_name("SIZE")
+      ->default_str(fmt::format("half of this machine's memory: {}", MemoryText(options.machine.memory_bytes)));
+  AddInteger(app, "--cache-mib", cache_mib, 1, kMaxCacheMib, "MiB of voxels kept between frames")->default_str("what --memory leaves");
   AddOptionalValue(app, "--compress", compress, "on", OneOf({"auto", "on", "off"}),
                    "Pack images with zstd. auto: for workers behind links that are slower than zstd. on, which --compress alone means: "
                    "all images, and the pictures for clients. off: none")

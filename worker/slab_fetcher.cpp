@@ -56,7 +56,7 @@ SlabFetcher::Generation SlabFetcher::Acquire(DatasetId dataset, const Box& box, 
 OpenSlab SlabFetcher::PlanSlab(Slab& slab) {
   std::vector<Slab*> sources;
   std::vector<Box> at_hand;
-  const bool room = cached_bytes() <= config_.cache_bytes;  // if not, everything that can be dropped must be
+  const bool room = cached_bytes() <= most_cached();  // if not, everything that can be dropped must be
   for (auto& [generation, other] : slabs_) {
     if (!room || &other == &slab || other.retired || !other.is_complete()) continue;
     if (other.key.dataset != slab.key.dataset || other.key.type != slab.key.type) continue;
@@ -76,6 +76,7 @@ OpenSlab SlabFetcher::PlanSlab(Slab& slab) {
   }
   std::ranges::reverse(slab.missing);
   slab.chunk_count = slab.missing.size();
+  slab.begun = slab.is_complete();
   return open;
 }
 
@@ -106,8 +107,12 @@ void SlabFetcher::SetBytes(Generation slab, std::uint64_t bytes) {
 }
 
 void SlabFetcher::RequestChunks(std::span<const Generation> slabs, Epoch epoch, WorkerId worker, Time now, WorkerActions& actions) {
+  std::uint64_t begun_bytes = BegunBytes();
   for (const Generation generation : slabs) {
     Slab& slab = slabs_.at(generation);
+    if (!slab.begun && generation != slabs.front() && begun_bytes + slab.bytes > room_) return;
+    if (!slab.begun) begun_bytes += slab.bytes;
+    slab.begun = true;
     while (!slab.retired && !slab.missing.empty()) {
       const ChunkPlace chunk = slab.missing.back();
       const std::uint32_t bytes = BytesOfChunk(chunk.box, slab.key.type, chunk.chunk);
@@ -120,6 +125,12 @@ void SlabFetcher::RequestChunks(std::span<const Generation> slabs, Epoch epoch, 
       actions.push_back(SendChunkRequest{{epoch, worker, slab.key.dataset, chunk.box, chunk.chunk}});
     }
   }
+}
+
+std::uint64_t SlabFetcher::BegunBytes() const {
+  std::uint64_t bytes = 0;
+  for (const auto& [generation, slab] : slabs_) bytes += slab.begun ? slab.bytes : 0;
+  return bytes;
 }
 
 void SlabFetcher::OnChunk(const Chunk& chunk, Bytes payload, WorkerActions& actions) {
@@ -230,7 +241,7 @@ void SlabFetcher::Trim(WorkerActions& actions) {
     const auto entry = next++;
     if (entry->second.pins == 0 && entry->second.retired) Drop(entry->first, actions);
   }
-  while (cached_bytes() > config_.cache_bytes) {
+  while (cached_bytes() > most_cached()) {
     const Slab* oldest = nullptr;
     for (const auto& [generation, slab] : slabs_) {
       if (slab.pins == 0 && (oldest == nullptr || slab.last_use < oldest->last_use)) oldest = &slab;

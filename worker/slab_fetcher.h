@@ -7,10 +7,13 @@
 //      chunk_timeout, or arrives damaged, is asked for again, chunk_attempts times; then the slab is given up (TakeFailures).
 //   3. complete(slab): it can be rendered from. Release when that is done; the slab stays cached.
 // Trim drops unpinned slabs: those that a complete one covers (the same box with a smaller halo), then the least recently used above
-// cache_bytes.
+// cache_bytes or the room (SetRoom). Slabs that are waited for begin to take memory one after the other, as far as there is room; the one
+// that is needed next always does.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <span>
 #include <utility>
@@ -36,6 +39,8 @@ class SlabFetcher {
 
   explicit SlabFetcher(const WorkerConfig& config) : config_(config) {}
 
+  void SetRoom(std::uint64_t bytes) { room_ = bytes; }  // for all slabs, those in use too; without a call there is no limit
+
   Generation Acquire(DatasetId dataset, const Box& box, ScalarType type, WorkerActions& actions);
   void Release(Generation slab);  // once for each Acquire
   // Of acquired slabs.
@@ -46,7 +51,8 @@ class SlabFetcher {
   // The slab's memory, with what was derived from its voxels; it may fall. Counts as at least the samples.
   void SetBytes(Generation slab, std::uint64_t bytes);
 
-  // Requests missing chunks of these slabs within the credit (one chunk is always allowed).
+  // Requests missing chunks of these slabs, which are in the order in which they are needed, within the credit (one chunk is always
+  // allowed) and the room.
   void RequestChunks(std::span<const Generation> slabs, Epoch epoch, WorkerId worker, Time now, WorkerActions& actions);
   void OnChunk(const Chunk& chunk, Bytes payload, WorkerActions& actions);
   void OnRefused(const ChunkRefused& refused);
@@ -82,6 +88,7 @@ class SlabFetcher {
     std::map<ChunkPlace, int> failures;
     FetchReport report;
     bool requested = false;  // since the last report
+    bool begun = false;      // some of it was requested or copied: it takes memory
 
     bool is_complete() const { return stored == chunk_count; }
   };
@@ -95,6 +102,8 @@ class SlabFetcher {
   Slab* Find(Generation slab);  // null: dropped
   Slab* FindRequested(DatasetId dataset, const ChunkPlace& chunk);
   OpenSlab PlanSlab(Slab& slab);
+  std::uint64_t BegunBytes() const;
+  std::uint64_t most_cached() const { return std::min(config_.cache_bytes, room_); }
   void Unpin(std::span<const Generation> sources);
   void Retry(Generation slab, const ChunkPlace& chunk, const Status& why);
   void GiveUp(Slab& slab, Status status);
@@ -105,6 +114,7 @@ class SlabFetcher {
   std::map<Generation, Slab> slabs_;
   std::map<ChunkName, InFlight> in_flight_;  // outlives its slab: the credit is used until the chunk is stored or expires
   std::uint64_t in_flight_bytes_ = 0;
+  std::uint64_t room_ = std::numeric_limits<std::uint64_t>::max();
   std::uint64_t cached_bytes_ = 0;  // of slabs_
   Generation last_generation_ = 0;
   std::uint64_t use_counter_ = 0;

@@ -10,6 +10,8 @@
 
 #include "common/base/any_of.h"
 #include "common/planning/frame_occlusion.h"
+#include "common/planning/worker_memory.h"
+#include "common/volume/memory_budget.h"
 #include "worker/early_images.h"
 #include "worker/frame_accumulator.h"
 #include "worker/group_run.h"
@@ -20,7 +22,12 @@ namespace slabstream {
 
 struct WorkerMachine::State {
   explicit State(WorkerConfig c)
-      : config(std::move(c)), incarnation(config.incarnation), slabs(config), renders(slabs, names), early(config.early_image_bytes) {}
+      : config(std::move(c)), incarnation(config.incarnation), slabs(config), renders(slabs, names), early(EarlyImageBytes(config)) {}
+
+  // They are images of groups, which have room.
+  static std::uint64_t EarlyImageBytes(const WorkerConfig& config) {
+    return config.memory_bytes == 0 ? config.early_image_bytes : std::min(config.early_image_bytes, config.memory_bytes / 2);
+  }
 
   // One frame, at the latest known attempt. A group without a run is over here: done, failed, or not needed.
   struct Frame {
@@ -28,6 +35,8 @@ struct WorkerMachine::State {
     std::map<std::uint32_t, std::optional<GroupRun>> groups;
     std::map<WorkerId, std::uint32_t> met;        // workers of groups that are over here, and the last such group
     std::optional<FrameAccumulator> accumulator;  // display worker
+    // Memory of images, if this worker's memory is limited: of its largest group, and of its picture.
+    std::uint64_t group_bytes = 0, picture_bytes = 0;
   };
 
   // ---- input from the coordinator and the executor. `actions` and `now` are those of the running Step.
@@ -78,6 +87,7 @@ struct WorkerMachine::State {
   void CheckAccumulator(FrameId id, Frame& frame);
   void Trouble(const GroupKey& key, Status status, WorkerId unreachable = 0);
   void Tend();  // what is due, and what voxels and renderings need
+  std::uint64_t RoomForVoxels() const;
   Time NextWake() const;
   void FailGroup(const GroupKey& key, const Status& status);
   void ReportSlabFailures();
@@ -179,8 +189,8 @@ void WorkerMachine::State::KeepTime() {
   // Without its coordinator it has nothing to do, and will get nothing.
   if (leave_by && (worker == 0 || now >= *leave_by)) return On(StopRequested{});
   if (worker == 0 && now >= next_register) {
-    actions.push_back(SendControl{Register{incarnation, config.pid, config.host, config.images_endpoint, config.threads, config.cache_bytes,
-                                           config.memory_scope, config.lends_memory, config.images_key, place}});
+    actions.push_back(SendControl{Register{incarnation, config.pid, config.host, config.images_endpoint, config.threads,
+                                           config.memory_bytes, config.memory_scope, config.lends_memory, config.images_key, place}});
     next_register = now + config.register_interval;
   }
   if (worker != 0 && now >= next_heartbeat) {
@@ -228,6 +238,10 @@ void WorkerMachine::State::On(GroupAssignment&& assignment, const Bytes&) {
   if (key.attempt > frame.attempt) BeginAttempt(key.frame, frame, assignment);
   const auto [entry, added] = frame.groups.try_emplace(key.group);
   if (!added) return;
+  if (config.memory_bytes != 0) {
+    frame.group_bytes = std::max(frame.group_bytes, GroupImageBytes(assignment.setup, assignment.group.placements));
+    frame.picture_bytes = PictureBytes(assignment.setup);
+  }
 
   if (assignment.display == worker) {
     if (!frame.accumulator) frame.accumulator.emplace(assignment, worker, names);
@@ -425,6 +439,7 @@ WorkerActions WorkerMachine::Step(WorkerEvent&& event, Time now, WorkerActions m
 
 void WorkerMachine::State::Tend() {
   slabs.ExpireRequests(now);
+  if (config.memory_bytes != 0) slabs.SetRoom(RoomForVoxels());
   ReportSlabFailures();
   if (!ended) KeepTime();
   if (worker != 0) {
@@ -433,6 +448,16 @@ void WorkerMachine::State::Tend() {
   }
   slabs.Trim(actions);
   wake = NextWake();
+}
+
+// What the images of the present frames leave of memory_bytes.
+std::uint64_t WorkerMachine::State::RoomForVoxels() const {
+  std::uint64_t taken = kIdleMemoryBytes;
+  for (const auto& [id, frame] : frames) {
+    const auto runs = std::ranges::count_if(frame.groups, [](const auto& group) { return group.second.has_value(); });
+    taken += frame.group_bytes * std::uint64_t(runs) + (frame.accumulator ? frame.picture_bytes : 0);
+  }
+  return config.memory_bytes - std::min(config.memory_bytes, taken);
 }
 
 Time WorkerMachine::State::NextWake() const {

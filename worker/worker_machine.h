@@ -70,7 +70,9 @@ struct WorkerConfig {
   std::uint64_t memory_scope = 0;                        // as in Register
   bool lends_memory = false;                             // as in Register
   std::uint32_t threads = 1;                             // render threads, reported to the coordinator
-  std::uint64_t cache_bytes = std::uint64_t{1} << 40;    // slabs not needed by a current group are dropped, oldest first, above this
+  std::uint64_t memory_bytes = 0;                        // limit of the process (common/planning/worker_memory.h); 0: none. As in Register
+  std::uint64_t cache_bytes = std::uint64_t{1} << 40;    // slabs not needed by a current group are dropped, oldest first, above this, and
+                                                         // above what images leave of memory_bytes
   std::uint64_t credit_bytes = std::uint64_t{16} << 20;  // chunk bytes requested and not yet stored
   Duration register_interval = std::chrono::seconds(1);
   Duration chunk_timeout = std::chrono::seconds(3);          // then a chunk is asked for again

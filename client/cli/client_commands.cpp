@@ -8,6 +8,7 @@
 #include "client/cli/cores.h"
 #include "client/cli/option_groups.h"
 #include "common/simulation/link_model.h"
+#include "common/volume/memory_budget.h"
 #include "coordinator/tuning/service_machine.h"
 
 namespace slabstream {
@@ -102,6 +103,11 @@ void DeclareUp(const CommandLine& line) {
   sub->add_option("--keys", options->keys, "Encrypt connections with the keys of this folder, which is made if need be")
       ->type_name("FOLDER")
       ->default_str("a folder beside the logs if --listen leaves this machine, else none");
+  options->memory = DefaultServiceMemory();
+  AddParsed(*sub, "--memory", options->memory, ParseMemoryLimit,
+            "Limit of the memory of all processes: a third is the coordinator's, the rest is shared by the workers")
+      ->type_name("SIZE")
+      ->default_str(fmt::format("three quarters of this machine's memory: {}", MemoryText(options->memory)));
   sub->add_flag("--detach", options->detach, "Return when the service is ready; `slabstream down` ends it");
   RunWith(*sub, line.run, options, RunUp);
 }

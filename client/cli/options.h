@@ -1,6 +1,7 @@
 // The options of each subcommand: plain values, filled by client_commands.cpp, valid when a command sees them.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -78,6 +79,7 @@ struct UpOptions {
   std::string keys;               // folder of keys; empty: one beside the logs if `listen` leaves this machine, else none
   std::string compress = "auto";  // compression of images on their way: auto, on or off, as slabstream-worker takes it
   std::string link;               // as ParseLink takes it; empty: the coordinator's default
+  std::uint64_t memory = 0;       // bytes, of all processes together
   bool detach = false;
 };
 

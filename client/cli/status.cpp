@@ -6,6 +6,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/session.h"
+#include "common/volume/memory_budget.h"
 
 namespace slabstream {
 namespace {
@@ -21,21 +22,25 @@ std::string_view NameOf(DatasetState state) {
 }
 
 std::string StatusText(const StatusReply& reply) {
-  std::string text = fmt::format("coordinator  pid {}, up {:.1f} s, {} clients\n", reply.pid, double(reply.uptime_ms) / 1e3, reply.clients);
+  const auto limit = [](std::uint64_t bytes) { return bytes == 0 ? std::string("no memory limit") : "memory limit " + MemoryText(bytes); };
+  std::string text = fmt::format("coordinator  pid {}, up {:.1f} s, {} clients, {}\n", reply.pid, double(reply.uptime_ms) / 1e3,
+                                 reply.clients, limit(reply.memory_bytes));
   text += fmt::format("frames       {} done, {} failed, {} running, {} queued\n", reply.frames_done, reply.frames_failed, reply.running,
                       reply.queued);
   text += fmt::format("workers      {} ({} lost so far)\n", reply.workers.size(), reply.workers_lost);
   for (const WorkerStatus& worker : reply.workers) {
     const std::string place = worker.leaving ? "leaving" : fmt::format("slot {}", worker.slot);
-    text += fmt::format("  {:<4} pid {} on {}, {} threads, {}, {:.1f} MiB cached, {:.1f} MiB fetched, {} ranks rendered\n", worker.worker,
-                        worker.pid, worker.host, worker.threads, place, double(worker.cached_bytes) / (1 << 20),
-                        double(worker.fetched_bytes) / (1 << 20), worker.rendered_ranks);
+    text += fmt::format("  {:<4} pid {} on {}, {} threads, {}, {:.1f} MiB cached, {:.1f} MiB fetched, {} ranks rendered, {}\n",
+                        worker.worker, worker.pid, worker.host, worker.threads, place, double(worker.cached_bytes) / (1 << 20),
+                        double(worker.fetched_bytes) / (1 << 20), worker.rendered_ranks, limit(worker.memory_bytes));
   }
   text += fmt::format("datasets     {}\n", reply.datasets.size());
   for (const DatasetStatus& dataset : reply.datasets) {
     text += fmt::format("  {} {}", dataset.name, NameOf(dataset.state));
     const Index3& size = dataset.description.geometry.size;
-    if (dataset.state == DatasetState::kReady) text += fmt::format(" {} x {} x {}", size.x, size.y, size.z);
+    if (dataset.state == DatasetState::kReady) {
+      text += fmt::format(" {} x {} x {}, {}", size.x, size.y, size.z, MemoryText(dataset.memory_bytes));
+    }
     if (dataset.state == DatasetState::kFailed) text += fmt::format(": {}", dataset.error);
     text += '\n';
   }
@@ -55,7 +60,8 @@ std::string StatusJson(const StatusReply& reply) {
                        {"cached_bytes", worker.cached_bytes},
                        {"fetched_bytes", worker.fetched_bytes},
                        {"rendered_ranks", worker.rendered_ranks},
-                       {"silent_ms", worker.silent_ms}});
+                       {"silent_ms", worker.silent_ms},
+                       {"memory_bytes", worker.memory_bytes}});
   }
   for (const DatasetStatus& dataset : reply.datasets) {
     Json entry = {{"name", dataset.name}, {"state", NameOf(dataset.state)}};
@@ -63,6 +69,7 @@ std::string StatusJson(const StatusReply& reply) {
       const VolumeGeometry& geometry = dataset.description.geometry;
       entry["size"] = {geometry.size.x, geometry.size.y, geometry.size.z};
       entry["spacing"] = {geometry.spacing.x, geometry.spacing.y, geometry.spacing.z};
+      entry["memory_bytes"] = dataset.memory_bytes;
       entry["range"] = {{"min", dataset.range.min}, {"max", dataset.range.max}};
     }
     if (dataset.state == DatasetState::kFailed) entry["error"] = dataset.error;
@@ -76,6 +83,7 @@ std::string StatusJson(const StatusReply& reply) {
                      {"frames_done", reply.frames_done},
                      {"frames_failed", reply.frames_failed},
                      {"workers_lost", reply.workers_lost},
+                     {"memory_bytes", reply.memory_bytes},
                      {"workers", std::move(workers)},
                      {"datasets", std::move(datasets)}};
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";

@@ -1,24 +1,33 @@
-// `up`: one coordinator and N workers as processes of this machine. In the foreground they end with this process; with --detach they stay.
+// `up`: one coordinator and N workers as processes of this machine. In the foreground they end with this process. With --detach a process
+// stays that watches them. Workers that end unexpectedly are started again.
 #include <fmt/format.h>
 
+#include <fcntl.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
+#include <cstring>
 #include <ctime>
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <optional>
 
 #include "client/cli/commands.h"
 #include "client/cli/cores.h"
 #include "client/cli/process.h"
+#include "client/cli/restart_pause.h"
 #include "client/cli/service_state.h"
 #include "client/cli/session.h"
 #include "common/base/stop_signals.h"
+#include "common/cli/program.h"
 #include "common/keys/role.h"
 #include "common/transport/endpoint.h"
+#include "common/volume/memory_budget.h"
 
 namespace slabstream {
 namespace {
@@ -55,9 +64,13 @@ std::string ValueIn(const std::string& line, const std::string& key) {
   return line.substr(begin, line.find(' ', begin) - begin);
 }
 
+// As --memory takes it.
+std::string MemoryArgument(std::uint64_t bytes) { return fmt::format("{}MiB", bytes >> 20); }
+
 class LocalService {
  public:
-  LocalService(const UpOptions& options, std::string log_directory, std::string keys_folder) : options_(options) {
+  LocalService(const UpOptions& options, const MemoryShares& memory, std::string log_directory, std::string keys_folder)
+      : options_(options), memory_(memory) {
     state_.log_directory = std::move(log_directory);
     state_.keys_folder = std::move(keys_folder);
     state_.started_unix = std::time(nullptr);
@@ -74,7 +87,7 @@ class LocalService {
       if (!reply.ok()) return reply.status();
       if (int(reply->workers.size()) >= options_.workers) return SaveState(state_);
       for (std::size_t i = 0; i < children_.size(); ++i) {
-        if (const auto end = children_[i].Ended()) return StartFailure(i, *end);
+        if (const auto end = children_[i].process->Ended()) return StartFailure(i, *end);
       }
       if (signals.Wait(milliseconds(50))) return Status::Cancelled("interrupted");
       if (MonotonicNow() > deadline) {
@@ -84,40 +97,42 @@ class LocalService {
     }
   }
 
-  // Until a signal comes (Ok) or the coordinator ends. Reports workers that end meanwhile on stderr.
+  // Until a signal comes (Ok) or the coordinator ends. Starts workers again that end unexpectedly, and says so on stderr. One that exits
+  // with status 0 was told to end. No worker is started once the coordinator has ended, so whoever ends the service waits for none.
   Status Watch(const BlockedSignals& signals) {
-    std::vector<bool> told(children_.size());
     while (!signals.Wait(milliseconds(200))) {
-      if (const auto end = children_.front().Ended()) {
+      if (const auto end = children_.front().process->Ended()) {
         if (end->exit_status == 0) return Status::Ok();  // `slabstream down`, from another terminal
         return Status::Unavailable(fmt::format("the coordinator {}; its last words: {}", end->description, LastLogLine(LogOf(0))));
       }
-      for (std::size_t i = 1; i < children_.size(); ++i) {
-        const auto end = children_[i].Ended();
-        if (!end || told[i]) continue;
-        told[i] = true;
-        if (end->exit_status != 0) std::cerr << fmt::format("worker {} (pid {}) {}", i, children_[i].pid(), end->description) << std::endl;
-      }
+      for (std::size_t i = 1; i < children_.size(); ++i) KeepAlive(i);
     }
     return Status::Ok();
   }
 
   // Asks the coordinator to end all processes, ends those that remain, and forgets the service, except its logs if they are to be kept.
   void Stop(bool keep_logs) {
-    if (!children_.empty() && !children_.front().Ended() && !state_.endpoint.empty()) {
+    if (!children_.empty() && !children_.front().process->Ended() && !state_.endpoint.empty()) {
       if (Result<Session> session = OpenSession(); session.ok() && session->client().ShutDownService().ok()) {
         for (const Time deadline = MonotonicNow() + kPatience; !AllEnded() && MonotonicNow() < deadline;) {
           ::usleep(20000);
         }
       }
     }
-    for (std::size_t i = children_.size(); i-- > 0;) children_[i].Terminate(kPatience);  // workers first
+    for (std::size_t i = children_.size(); i-- > 0;) children_[i].process->Terminate(kPatience);  // workers first
     keep_logs ? ForgetState(state_) : RemoveState(state_);
   }
 
   const ServiceState& state() const { return state_; }
 
  private:
+  struct Watched {
+    std::optional<Child> process;  // never none
+    Time started;
+    RestartPause pause;
+    std::optional<Time> restart;  // it has ended, and is started again then
+  };
+
   std::string ServiceFileOf(Role role) const { return fmt::format("{}/{}.json", state_.keys_folder, NameOf(role)); }
 
   Result<Session> OpenSession() const {
@@ -138,28 +153,51 @@ class LocalService {
                   fmt::format("{} {}: {}", program, end.description, line.empty() ? "it says nothing" : line));
   }
 
-  Result<Child*> StartChild(const char* program, std::vector<std::string> arguments) {
+  // The coordinator if it is the first, else a worker; again if it was started before.
+  Status StartChild(std::size_t number, const char* program, std::vector<std::string> arguments) {
     const Result<std::string> path = ProgramBeside(program);
     if (!path.ok()) return path.status();
     arguments.insert(arguments.begin(), *path);
-    Result<Child> child = Child::Start({std::move(arguments), LogOf(children_.size()), options_.detach});
+    Result<Child> child = Child::Start({std::move(arguments), LogOf(number), options_.detach});
     if (!child.ok()) return child.status();
-    children_.push_back(*std::move(child));
-    return &children_.back();
+    if (number == children_.size()) children_.emplace_back();
+    children_[number].process.emplace(*std::move(child));
+    children_[number].started = MonotonicNow();
+    return Status::Ok();
+  }
+
+  void KeepAlive(std::size_t number) {
+    Watched& worker = children_[number];
+    const auto end = worker.process->Ended();
+    if (!end || end->exit_status == 0) return;
+    const Time now = MonotonicNow();
+    if (!worker.restart) {
+      const Duration pause = worker.pause.AfterEnd(worker.started, now);
+      worker.restart = now + pause;
+      std::cerr << fmt::format("worker {} (pid {}) {}; it is started again in {} s", number, worker.process->pid(), end->description,
+                               std::chrono::duration_cast<seconds>(pause).count())
+                << std::endl;
+    } else if (now >= *worker.restart) {
+      worker.restart.reset();
+      worker.started = now;  // also if it fails: then it is tried again after the next pause
+      Status started = StartWorker(number);
+      if (started.ok()) started = SaveState(state_);
+      if (!started.ok()) std::cerr << fmt::format("worker {} cannot be started: {}", number, started.message()) << std::endl;
+    }
   }
 
   Status StartCoordinator() {
-    std::vector<std::string> arguments = {"--listen", options_.listen};
+    std::vector<std::string> arguments = {"--listen", options_.listen, "--memory", MemoryArgument(memory_.coordinator)};
     for (const std::string& data : options_.data) arguments.insert(arguments.end(), {"--data", data});
     if (!options_.link.empty()) arguments.insert(arguments.end(), {"--link", options_.link});
     if (!state_.keys_folder.empty()) arguments.insert(arguments.end(), {"--keys", state_.keys_folder});
-    Result<Child*> child = StartChild(kCoordinatorProgram, std::move(arguments));
-    if (!child.ok()) return child.status();
-    state_.coordinator = (*child)->pid();
-    const Result<std::string> line = (*child)->ReadLine(kStartTimeout);
+    if (Status started = StartChild(0, kCoordinatorProgram, std::move(arguments)); !started.ok()) return started;
+    Child& child = *children_.front().process;
+    state_.coordinator = child.pid();
+    const Result<std::string> line = child.ReadLine(kStartTimeout);
     if (!line.ok()) {
-      (*child)->Terminate(kPatience);  // it closed its output: ended, or about to
-      return StartFailure(0, *(*child)->Ended());
+      child.Terminate(kPatience);  // it closed its output: ended, or about to
+      return StartFailure(0, *child.Ended());
     }
     state_.endpoint = ValueIn(*line, "client");
     worker_endpoint_ = ValueIn(*line, "workers");
@@ -168,31 +206,38 @@ class LocalService {
   }
 
   Status StartWorkers() {
+    for (int i = 1; i <= options_.workers; ++i) {
+      if (Status started = StartWorker(std::size_t(i)); !started.ok()) return started;
+    }
+    return Status::Ok();
+  }
+
+  Status StartWorker(std::size_t number) {
     const int threads = options_.threads > 0 ? options_.threads : CoreShare(options_.workers);
-    std::vector<std::string> arguments = {"--threads", std::to_string(threads), "--compress=" + options_.compress};
+    std::vector<std::string> arguments = {"--threads", std::to_string(threads), "--compress=" + options_.compress, "--memory",
+                                          MemoryArgument(memory_.worker)};
     if (state_.keys_folder.empty()) {
       arguments.insert(arguments.end(), {"--coordinator", worker_endpoint_});
     } else {
       arguments.insert(arguments.end(), {"--service", ServiceFileOf(Role::kWorker)});
     }
-    for (int i = 0; i < options_.workers; ++i) {
-      const Result<Child*> child = StartChild(kWorkerProgram, arguments);
-      if (!child.ok()) return child.status();
-      state_.workers.push_back((*child)->pid());
-    }
+    if (Status started = StartChild(number, kWorkerProgram, std::move(arguments)); !started.ok()) return started;
+    state_.workers.resize(std::max(state_.workers.size(), number));
+    state_.workers[number - 1] = children_[number].process->pid();
     return Status::Ok();
   }
 
   bool AllEnded() {
     bool all = true;
-    for (Child& child : children_) all = child.Ended().has_value() && all;
+    for (Watched& child : children_) all = child.process->Ended().has_value() && all;
     return all;
   }
 
   const UpOptions& options_;
+  const MemoryShares memory_;
   ServiceState state_;
   std::string worker_endpoint_;
-  std::vector<Child> children_;  // the coordinator, then the workers
+  std::vector<Watched> children_;  // the coordinator, then the workers
 };
 
 // Ends what a coordinator that crashed there has left. Unavailable: a service runs there.
@@ -237,9 +282,40 @@ void PrintReady(const UpOptions& options, const ServiceState& state) {
   std::cout << std::flush;
 }
 
-}  // namespace
+// Goes on in a process of its own, in a session of its own: nothing that happens to the terminal ends it. This process waits until it is
+// told that the service is ready, or that process ends; then it ends itself, with the same status. What is returned closes to tell it.
+Result<int> Detach() {
+  int ready[2] = {-1, -1};
+  if (::pipe2(ready, O_CLOEXEC) != 0) return Status::Unavailable(fmt::format("cannot make a pipe: {}", std::strerror(errno)));
+  const pid_t child = ::fork();
+  if (child < 0) return Status::Unavailable(fmt::format("cannot start a process: {}", std::strerror(errno)));
+  if (child == 0) {
+    ::close(ready[0]);
+    (void)::setsid();
+    return ready[1];
+  }
+  ::close(ready[1]);
+  char byte = 0;
+  if (::read(ready[0], &byte, 1) == 1) ::_exit(0);
+  int how = 0;
+  while (::waitpid(child, &how, 0) < 0 && errno == EINTR) {
+  }
+  ::_exit(WIFEXITED(how) ? WEXITSTATUS(how) : 1);
+}
 
-Status RunUp(const UpOptions& options) {
+// From now on this process writes to a log and nowhere else, and its parent ends.
+Status LeaveTerminal(const std::string& log_path, int ready) {
+  const int in = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+  const int log = ::open(log_path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
+  const bool done = in >= 0 && log >= 0 && ::dup2(in, STDIN_FILENO) >= 0 && ::dup2(log, STDOUT_FILENO) >= 0 &&
+                    ::dup2(log, STDERR_FILENO) >= 0 && ::write(ready, "", 1) == 1;
+  const int error = errno;
+  for (const int descriptor : {in, log, ready}) ::close(descriptor);
+  return done ? Status::Ok() : Status::Unavailable(fmt::format("cannot write '{}': {}", log_path, std::strerror(error)));
+}
+
+// `ready`: of Detach, if it was called.
+Status Serve(const UpOptions& options, const MemoryShares& memory, std::optional<int> ready) {
   const Result<std::string> directory = StateDirectory();
   if (!directory.ok()) return directory.status();
   if (Status status = MakeRoomAt(options.listen); !status.ok()) return status;
@@ -253,17 +329,35 @@ Status RunUp(const UpOptions& options) {
   const bool new_keys = !keys_folder->empty() && !std::filesystem::exists(*keys_folder, error);
 
   const BlockedSignals signals;
-  LocalService service(options, log_directory, *keys_folder);
+  LocalService service(options, memory, log_directory, *keys_folder);
   if (Status status = service.Start(signals); !status.ok()) {
     service.Stop(status.code() == StatusCode::kDeadlineExceeded);  // which names the logs
     if (new_keys) std::filesystem::remove_all(*keys_folder, error);
     return status;
   }
   PrintReady(options, service.state());
-  if (options.detach) return Status::Ok();
+  if (ready) {
+    if (Status left = LeaveTerminal(log_directory + "/up.log", *ready); !left.ok()) {
+      service.Stop(true);
+      return left;
+    }
+  }
   Status status = service.Watch(signals);
-  service.Stop(!status.ok());
+  // The workers of a detached service outlive a coordinator that crashed, until `down` has told of it.
+  if (status.ok() || !options.detach) service.Stop(!status.ok());
   return status;
+}
+
+}  // namespace
+
+Status RunUp(const UpOptions& options) {
+  const Result<MemoryShares> memory = ShareMemory(options.memory, options.workers);
+  if (!memory.ok()) return memory.status();
+  if (!options.detach) return Serve(options, *memory, std::nullopt);
+  const Result<int> ready = Detach();
+  if (!ready.ok()) return ready.status();
+  // Threads that libraries began before did not come along, so the way out is not through destructors that would wait for them.
+  std::_Exit(Finish("slabstream", Serve(options, *memory, *ready)));
 }
 
 }  // namespace slabstream

@@ -7,7 +7,7 @@
 //   below  by 2, which one or two workers need to render while they combine;
 //   above  by kMostInWindow, so that a frame asked for late does not wait behind many;
 //   and by memory: a worker holds an image, which may be as large as the frame, for every unfinished group: at most kWindowBytes in
-//          all, but always room for 2.
+//          all, but always room for 2, and never more frames than fit the limit that workers have stated (FramesThatFit).
 // Each team (common/planning/team.h) has its own window.
 //
 // A frame that uses occlusion masks has at most kMaskedGroups unfinished groups: the earlier a group is handed out, the less is known to be
@@ -28,7 +28,7 @@ struct FrameWindow {
 };
 
 // `workers` in all, in `teams` >= 1 teams; `frame_bytes` of the largest frame under way (FrameBytes), 0 if there is none. Both members lie
-// in [kLeastInWindow, kMostInWindow] for each team.
-FrameWindow WindowFor(std::size_t workers, std::uint32_t teams, std::int64_t frame_bytes);
+// in [kLeastInWindow, kMostInWindow] for each team, or are `fit` >= 1 if that is less.
+FrameWindow WindowFor(std::size_t workers, std::uint32_t teams, std::int64_t frame_bytes, int fit = kMostInWindow);
 
 }  // namespace slabstream

@@ -107,6 +107,7 @@ void Fields(auto& io, Is<WorkerStatus> auto& m) {
   io.Any(m.rendered_ranks, &P::rendered_ranks, &P::set_rendered_ranks);
   io.Any(m.silent_ms, &P::silent_ms, &P::set_silent_ms);
   io.Any(m.leaving, &P::leaving, &P::set_leaving);
+  io.Any(m.memory_bytes, &P::memory_bytes, &P::set_memory_bytes);
 }
 
 void Fields(auto& io, Is<DatasetStatus> auto& m) {
@@ -116,6 +117,7 @@ void Fields(auto& io, Is<DatasetStatus> auto& m) {
   if (m.state == DatasetState::kReady) {
     io.Message("description", m.description, &P::description, &P::mutable_description);
     io.Message("range", m.range, &P::range, &P::mutable_range);
+    io.Any(m.memory_bytes, &P::memory_bytes, &P::set_memory_bytes);
   }
   if (m.state == DatasetState::kFailed) io.Text("error", m.error, &P::error, &P::mutable_error, 0, kMaxTextBytes);
 }
@@ -134,6 +136,7 @@ void Fields(auto& io, Is<StatusReply> auto& m) {
   io.Any(m.workers_lost, &P::workers_lost, &P::set_workers_lost);
   io.Messages("workers", m.workers, &P::workers, &P::mutable_workers, kMaxListed);
   io.Messages("datasets", m.datasets, &P::datasets, &P::mutable_datasets, kMaxListed);
+  io.Any(m.memory_bytes, &P::memory_bytes, &P::set_memory_bytes);
 }
 
 void Fields(auto& io, Is<ShutDown> auto& m) { io.Any(m.nonce, &v1::ShutDown::nonce, &v1::ShutDown::set_nonce); }

@@ -109,8 +109,9 @@ struct WorkerStatus {
   std::uint32_t slot = 0;  // 0 if it is leaving
   std::uint64_t cached_bytes = 0, fetched_bytes = 0;
   std::uint32_t rendered_ranks = 0;
-  std::uint32_t silent_ms = 0;  // since it was last heard
-  bool leaving = false;         // it gets no new work
+  std::uint32_t silent_ms = 0;     // since it was last heard
+  bool leaving = false;            // it gets no new work
+  std::uint64_t memory_bytes = 0;  // limit of its memory; 0: none stated
   friend bool operator==(const WorkerStatus&, const WorkerStatus&) = default;
 };
 
@@ -119,9 +120,10 @@ enum class DatasetState : std::uint8_t { kUnloaded = 1, kLoading = 2, kReady = 3
 struct DatasetStatus {
   std::string name;
   DatasetState state = DatasetState::kUnloaded;
-  VolumeDescription description;  // kReady only
-  ValueRange range;               // kReady only
-  std::string error;              // kFailed only
+  VolumeDescription description;   // kReady only
+  ValueRange range;                // kReady only
+  std::string error;               // kFailed only
+  std::uint64_t memory_bytes = 0;  // kReady only: what its voxels take of the coordinator's memory
   friend bool operator==(const DatasetStatus&, const DatasetStatus&) = default;
 };
 
@@ -134,6 +136,7 @@ struct StatusReply {
   std::uint64_t frames_done = 0, frames_failed = 0, workers_lost = 0;
   std::vector<WorkerStatus> workers;
   std::vector<DatasetStatus> datasets;
+  std::uint64_t memory_bytes = 0;  // limit of the coordinator's memory; 0: none stated
   friend bool operator==(const StatusReply&, const StatusReply&) = default;
 };
 

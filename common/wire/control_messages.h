@@ -45,7 +45,7 @@ struct Register {
   std::string host;                // at most kMaxNameBytes
   std::string images_endpoint;     // where other workers reach this one's image plane
   std::uint32_t threads = 1;       // render threads, [1, kMaxThreads]
-  std::uint64_t memory_bytes = 0;  // budget for cached slabs; 0: none stated
+  std::uint64_t memory_bytes = 0;  // limit of its memory: it gets no frame that needs more; 0: none stated
   std::uint64_t memory_scope = 0;  // workers of the same scope can read each other's memory (SharedMemoryScope); 0: it takes frames only
   bool lends_memory = false;       // it lends its own images to workers of its scope; else it sends them in frames
   std::string images_key = {};     // public key of its image plane; empty: that plane is not encrypted

@@ -3,6 +3,8 @@
 #include <signal.h>
 #include <sys/resource.h>
 
+#include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -183,6 +185,37 @@ TEST_F(ServiceTest, ASecondUpOnTheSameEndpointSaysSo) {
   ASSERT_EQ(second.err_lines().size(), 1U) << second.err;
   EXPECT_THAT(second.err, HasSubstr("a service runs at " + endpoint_ + " already"));
   EXPECT_EQ(Pids(), before);
+}
+
+TEST_F(ServiceTest, AWorkerThatIsKilledIsStartedAgainAndDownEndsItToo) {
+  Up(endpoint_);
+  const std::vector<pid_t> before = Pids();
+  ASSERT_EQ(::kill(before.back(), SIGKILL), 0);
+  std::vector<pid_t> after;
+  for (const auto limit = std::chrono::steady_clock::now() + std::chrono::minutes(1); std::chrono::steady_clock::now() < limit;) {
+    after = Pids();
+    if (after.size() == 3 && std::ranges::find(after, before.back()) == after.end()) break;
+  }
+  ASSERT_EQ(after.size(), 3U);
+  EXPECT_EQ(std::ranges::find(after, before.back()), after.end());
+  MustRun({"render", "ball", "-o", "a.png", "--size", "32"});
+  MustRun({"down"});
+  for (const pid_t pid : after) EXPECT_FALSE(Runs(pid)) << pid;
+}
+
+TEST_F(ServiceTest, LimitsOfMemoryAreSharedOutAndShown) {
+  MustRun({"up", "--detach", "--workers", "2", "--memory", "3GiB", "--listen", endpoint_, "--data", "ball=" + ball_});
+  const json status = json::parse(MustRun({"status", "--json"}).out);
+  EXPECT_EQ(status["memory_bytes"], 1 << 30);
+  for (const json& worker : status["workers"]) EXPECT_EQ(worker["memory_bytes"], 1 << 30);
+  EXPECT_THAT(MustRun({"status"}).out, HasSubstr("memory limit 1024 MiB"));
+  const ProgramResult too_large = Slabstream({"render", "ball", "-o", "a.png", "--size", "8192", "--renderer", "raycast"});
+  EXPECT_EQ(too_large.exit_status, 1);
+  EXPECT_THAT(too_large.err, AllOf(HasSubstr("size 8192x8192 needs"), HasSubstr("limit 1024 MiB")));
+  MustRun({"down"});
+  const ProgramResult too_little = Slabstream({"up", "--detach", "--workers", "2", "--memory", "512MiB", "--listen", endpoint_});
+  EXPECT_EQ(too_little.exit_status, 2);
+  EXPECT_THAT(too_little.err, HasSubstr("memory 512 MiB is too little for a coordinator and 2 workers, which need 768 MiB"));
 }
 
 TEST_F(ServiceTest, InTheForegroundCtrlCEndsEverything) {

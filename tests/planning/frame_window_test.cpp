@@ -11,6 +11,13 @@ TEST(FrameWindow, OneAndTwoWorkersHaveTwoGroupsUnderWay) {
   for (const std::size_t workers : {0, 1, 2}) EXPECT_EQ(WindowFor(workers, 1, 0), (FrameWindow{2, 2}));
 }
 
+TEST(FrameWindow, HoldsNoMoreThanFitsTheWorkersMemory) {
+  EXPECT_EQ(WindowFor(8, 1, 0, 1), (FrameWindow{1, 1}));
+  EXPECT_EQ(WindowFor(8, 2, 0, 1), (FrameWindow{2, 2}));
+  EXPECT_EQ(WindowFor(8, 1, 0, 5), (FrameWindow{5, 5}));
+  EXPECT_EQ(WindowFor(8, 1, 0, 1000), WindowFor(8, 1, 0));
+}
+
 TEST(FrameWindow, GrowsWithWorkersAndShrinksWithFrames) {
   const std::int64_t bytes[] = {
       0, 1, 1 << 20, 1 << 24, kWindowBytes / 5, kWindowBytes, 8 * kWindowBytes, std::numeric_limits<std::int64_t>::max()};

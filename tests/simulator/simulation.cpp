@@ -188,7 +188,9 @@ void Simulation::CheckOutcome() {
         continue;
       }
       ++tally_.errors;
-      const bool excused = !faults_.harmless() || workerless_ || client->cancelled().count(request) > 0;
+      // Two workers that die by chance may have had the same box of a frame.
+      const bool died_alike = faults_.worker_kills >= 2 && ended.status.message().find("as another worker before it") != std::string::npos;
+      const bool excused = !faults_.harmless() || workerless_ || died_alike || client->cancelled().count(request) > 0;
       EXPECT_TRUE(excused) << "a frame failed although there was a worker all the time: " << ended.status.message();
       EXPECT_FALSE(ended.status.message().empty());
       const StatusCode code = ended.status.code();

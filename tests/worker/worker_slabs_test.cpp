@@ -2,6 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "common/planning/worker_memory.h"
+#include "common/renderers/registry.h"
+#include "common/renderers/renderer_kind.h"
+#include "common/volume/memory_budget.h"
 #include "tests/worker/worker_machine_fixture.h"
 
 namespace slabstream {
@@ -10,9 +14,13 @@ namespace {
 using std::chrono::seconds;
 using testing::ElementsAre;
 using testing::IsEmpty;
+using testing::Not;
 using testing::SizeIs;
 
-class WorkerSlabsTest : public WorkerMachineTest {};
+class WorkerSlabsTest : public WorkerMachineTest {
+ public:
+  static GroupAssignment Assigned(FrameId frame, std::uint32_t group) { return Assignment(frame, {kSelf}, group, 2); }
+};
 
 TEST_F(WorkerSlabsTest, AsksForChunksWithinItsCredit) {
   WorkerConfig config = Config();
@@ -147,6 +155,56 @@ TEST_F(WorkerSlabsTest, DropsTheOldestUnusedSlabAboveItsBudget) {
     Rendered(render);
   }
   EXPECT_THAT(All<DropSlab>(Tell(Assignment(1, {kSelf}, 2, 3))), ElementsAre(testing::Field(&DropSlab::slab, oldest)));
+}
+
+// The first of two groups of a frame of `size`, or the second. Ray casting.
+GroupAssignment Sized(FrameId frame, std::uint32_t group, ImageSize size) {
+  GroupAssignment a = WorkerSlabsTest::Assigned(frame, group);
+  SetRenderer(*FindRenderer("raycast"), a.setup);
+  a.setup.sheets = {};
+  a.setup.camera = MakeCamera({}, size, a.setup.description.geometry);
+  return a;
+}
+
+std::uint64_t ImageBytesOf(const GroupAssignment& a) { return GroupImageBytes(a.setup, a.group.placements) + PictureBytes(a.setup); }
+
+TEST_F(WorkerSlabsTest, SlabsTakeMemoryOneAfterTheOtherIfThereIsNoRoomForAll) {
+  WorkerConfig config = Config();
+  config.memory_bytes = kIdleMemoryBytes + 2 * ImageBytesOf(Sized(1, 0, {16, 16})) + 128 * 128 * 100;
+  Start(config);
+  const auto asked = All<SendChunkRequest>(Tell(Sized(1, 0, {16, 16})));
+  ASSERT_THAT(asked, SizeIs(Not(0)));
+  EXPECT_THAT(All<SendChunkRequest>(Tell(Sized(1, 1, {16, 16}))), IsEmpty()) << "the second group waits";
+  std::vector<StartRender> renders;
+  for (const SendChunkRequest& request : asked) {
+    for (const StoreChunk& store : All<StoreChunk>(Tell(Answer(request.request)))) {
+      const auto started = All<StartRender>(Tell(ChunkStored{store.slab, store.chunk.box, store.chunk.chunk, {}}));
+      renders.insert(renders.end(), started.begin(), started.end());
+    }
+  }
+  ASSERT_THAT(renders, SizeIs(1));
+  const Actions after = Rendered(renders[0]);
+  EXPECT_THAT(All<DropSlab>(after), ElementsAre(testing::Field(&DropSlab::slab, renders[0].slab)));
+  EXPECT_THAT(All<StartRender>(Feed(after)), SizeIs(1));
+}
+
+// A worker stays under its limit: what images of frames need, cached voxels give up.
+TEST_F(WorkerSlabsTest, ImagesOfFramesTakeRoomFromCachedVoxels) {
+  constexpr std::uint64_t kSlab = 128 * 128 * 80;
+  const GroupAssignment large = Sized(2, 0, {512, 512});
+  const std::uint64_t images = ImageBytesOf(large);
+  ASSERT_GT(images, 2 * kSlab);
+  WorkerConfig config = Config();
+  config.memory_bytes = kIdleMemoryBytes + images + kSlab;
+  Start(config);
+  std::vector<SlabKey> cached;
+  for (std::uint32_t group = 0; group < 2; ++group) {
+    const auto render = All<StartRender>(Feed(Tell(Sized(1, group, {16, 16})))).at(0);
+    cached.push_back(render.slab);
+    EXPECT_THAT(All<DropSlab>(Rendered(render)), IsEmpty());
+  }
+  EXPECT_THAT(All<DropSlab>(Tell(large)), ElementsAre(testing::Field(&DropSlab::slab, cached[1])))
+      << "the one that the frame does not need";
 }
 
 // What renderers derive from voxels grows and shrinks with the frames.

@@ -1,0 +1,112 @@
+#include "common/planning/worker_memory.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <string>
+
+#include "common/image/pixel_bounds.h"
+#include "common/planning/frame_window.h"
+#include "common/renderers/renderer_kind.h"
+#include "common/volume/bricks.h"
+#include "common/volume/memory_budget.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::uint64_t kDerivedPerVoxel = 2;  // the voxels, and what renderers make from them
+
+std::uint64_t ImageBytes(const PixelBounds& bounds, const FrameSetup& setup) {
+  return std::uint64_t(bounds.pixel_count()) * BytesPerPixel(setup.format);
+}
+
+// By worker with a part in the plan: the voxels of the group that needs most of them, if `bytes_of` tells what a slab takes.
+template <class BytesOf>
+std::map<WorkerId, std::uint64_t> MostVoxels(const FramePlan& plan, BytesOf&& bytes_of) {
+  std::map<WorkerId, std::uint64_t> most = {{plan.display, 0}};
+  for (const GroupPlan& group : plan.groups) {
+    std::map<WorkerId, std::uint64_t> bytes;
+    for (const Placement& placement : group.placements) bytes[placement.worker] += bytes_of(SlabBox(placement.box, plan.setup));
+    for (const auto& [worker, of_group] : bytes) most[worker] = std::max(most[worker], of_group);
+  }
+  return most;
+}
+
+std::string SizeText(const FrameSetup& setup) {
+  const PixelBounds frame = FrameBounds(setup);
+  const Camera& camera = setup.camera;
+  const std::string size = fmt::format("size {}x{}", camera.width / camera.supersample, camera.height / camera.supersample);
+  return setup.renderer->FrameIsPicture(setup) ? size : fmt::format("{} (rendered as {}x{})", size, frame.width(), frame.height());
+}
+
+}  // namespace
+
+std::uint64_t GroupImageBytes(const FrameSetup& setup, std::span<const Placement> placements) {
+  std::uint64_t bytes = 0;
+  PixelBounds all;
+  for (const Placement& placement : placements) {
+    const PixelBounds reach = ReachOf(placement.box, setup);
+    bytes = std::min(bytes + ImageBytes(reach, setup), kMostMemoryBytes);  // thousands of the largest images are more than 64 bits count
+    all = Union(all, reach);
+  }
+  return bytes + ImageBytes(all, setup);
+}
+
+std::uint64_t PictureBytes(const FrameSetup& setup) {
+  const Camera& camera = setup.camera;
+  const PixelBounds picture{0, 0, camera.width / camera.supersample, camera.height / camera.supersample};
+  const std::uint64_t copies = setup.renderer->FrameIsPicture(setup) ? 1 : 2;
+  return std::uint64_t(FrameBytes(setup)) + copies * ImageBytes(picture, setup);
+}
+
+std::uint64_t VoxelBytes(const Box& slab, const VolumeSummary& summary) {
+  if (slab.empty()) return 0;
+  std::uint64_t voxels = 0;
+  const BrickGrid grid(slab);
+  for (std::int32_t z = 0; z < grid.counts.z; ++z) {
+    for (std::int32_t y = 0; y < grid.counts.y; ++y) {
+      for (std::int32_t x = 0; x < grid.counts.x; ++x) {
+        const Index3 brick = grid.first + Index3{x, y, z};
+        const ValueRange& range = summary.bricks[NumberIn(summary.brick_counts, brick)];
+        if (range.min != range.max) voxels += std::uint64_t(grid.BoxOf(brick).voxel_count());
+      }
+    }
+  }
+  return kDerivedPerVoxel * voxels * BytesPerSample(summary.description.type);
+}
+
+Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, std::span<const WorkerLimit> workers) {
+  std::uint64_t group_bytes = 0;
+  for (const GroupPlan& group : plan.groups) group_bytes = std::max(group_bytes, GroupImageBytes(plan.setup, group.placements));
+  // Every worker of a plan may be the next frame's display worker.
+  const std::uint64_t images = std::max<std::uint64_t>(group_bytes + PictureBytes(plan.setup), 1);
+
+  constexpr std::uint64_t kEnough = kMostInWindow;  // more are never under way at a time
+  std::map<WorkerId, std::uint64_t> voxels = MostVoxels(plan, [&](const Box& slab) {
+    return kDerivedPerVoxel * std::uint64_t(slab.voxel_count()) * BytesPerSample(summary.description.type);
+  });
+  const auto needs = [&](WorkerId worker) { return kIdleMemoryBytes + voxels.at(worker) + images; };
+  const auto has_part = [&](const WorkerLimit& limit) { return limit.bytes != 0 && voxels.contains(limit.worker); };
+  const bool all_fit = std::ranges::all_of(
+      workers, [&](const WorkerLimit& limit) { return !has_part(limit) || needs(limit.worker) + (kEnough - 1) * images <= limit.bytes; });
+  if (all_fit) return int(kEnough);
+  // Only now it matters how much of the volume is empty, which takes longer to find out.
+  voxels = MostVoxels(plan, [&](const Box& slab) { return VoxelBytes(slab, summary); });
+
+  std::uint64_t fit = kEnough;
+  for (const WorkerLimit& limit : workers) {
+    if (!has_part(limit)) continue;
+    const std::uint64_t needed = needs(limit.worker);
+    if (needed > limit.bytes) {
+      const std::string what = images > voxels.at(limit.worker) ? SizeText(plan.setup) : "the dataset";
+      return Status::ResourceExhausted(fmt::format("{} needs {} of worker {}, limit {} (voxels {}, images {}); --memory sets the limit",
+                                                   what, MemoryText(needed), limit.worker, MemoryText(limit.bytes),
+                                                   MemoryText(voxels.at(limit.worker)), MemoryText(images)));
+    }
+    fit = std::min(fit, 1 + (limit.bytes - needed) / images);
+  }
+  return int(fit);
+}
+
+}  // namespace slabstream

@@ -1,0 +1,41 @@
+// What a frame takes of the memory of one worker. Admission (coordinator), the window and the worker's own cache follow this one rule, so a
+// worker stays under its limit (Register.memory_bytes):
+//
+//   limit >= kIdleMemoryBytes + voxels + images
+//
+// An unfinished group takes (GroupImageBytes)
+//   the images of all of its ranks        what a root may hold at a time: its own, and those that wait to be combined
+//   one image of the union of their reach an image that is decoded, encoded or on its way to another worker
+// and a display worker takes, for each frame (PictureBytes)
+//   an image of the whole frame           accumulated
+//   the picture, twice                    resampled or averaged if it is not the frame itself; then encoded, until it is sent
+// Images count with all pixels that their boxes can reach (ReachOf). Runs and lent images take less. A group needs the voxels of its
+// worker's boxes, with their halo, and about as much again for what renderers derive from them (VoxelBytes). Bricks of one value take
+// nothing. A worker caches more voxels than a group needs as long as images leave room.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "common/base/status.h"
+#include "common/planning/frame_plan.h"
+
+namespace slabstream {
+
+// Bytes, of the formula above. `placements`: of a group.
+std::uint64_t GroupImageBytes(const FrameSetup& setup, std::span<const Placement> placements);
+std::uint64_t PictureBytes(const FrameSetup& setup);
+std::uint64_t VoxelBytes(const Box& slab, const VolumeSummary& summary);
+
+// A worker that has a part in a frame, and its limit in bytes; 0: it has stated none.
+struct WorkerLimit {
+  WorkerId worker = 0;
+  std::uint64_t bytes = 0;
+};
+
+// How many frames such as this one fit the memory of all `workers` at a time, in [1, kMostInWindow]: each with one unfinished group, and
+// all of one volume. ResourceExhausted: not even one fits; names what is too large, what it needs, and the limit. Workers that have no part
+// in the plan do not count. The worker with the least room decides, since a plan gives all of them a part of each frame.
+Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, std::span<const WorkerLimit> workers);
+
+}  // namespace slabstream

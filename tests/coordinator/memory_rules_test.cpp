@@ -1,0 +1,236 @@
+// What the coordinator does about memory: frames that do not fit, frames that fit one by one, datasets that nobody needs; and frames that
+// end their workers.
+#include "common/planning/worker_memory.h"
+#include "common/volume/memory_budget.h"
+#include "tests/coordinator/coordinator_script.h"
+
+namespace slabstream {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+constexpr PeerToken kClient = 21, kOther = 22;
+constexpr std::uint64_t kMebi = 1 << 20;
+
+class MemoryRules : public testing::Test {
+ protected:
+  FakeWorker JoinWith(CoordinatorScript& script, PeerToken token, std::uint64_t memory_bytes) {
+    FakeWorker worker{.token = token, .incarnation = token};
+    Register message = CoordinatorScript::RegisterOf(worker);
+    message.memory_bytes = memory_bytes;
+    worker.id = ToWorkers<Welcome>(script.Worker(worker, message)).at(0).message.worker;
+    script.workers.push_back(worker);
+    return worker;
+  }
+  static SubmitFrame Sized(RequestId request, int side, const std::string& dataset = "block") {
+    SubmitFrame submit = Frame(request, 1, dataset);
+    submit.frame.size = {side, side};
+    return submit;
+  }
+  // The images of a frame of this size.
+  static std::uint64_t ImagesOf(int side, int workers = 1, const std::shared_ptr<const VolumeSummary>& summary = BlockSummary()) {
+    CoordinatorScript script;
+    for (int i = 1; i <= workers; ++i) script.Join(PeerToken(i), Incarnation(i));
+    script.Client(kClient, Sized(1, side));
+    const std::vector<GroupAssignment> groups = HandedOut(script.Step(DatasetLoaded{"block", script.loads.back().dataset, summary}));
+    return GroupImageBytes(groups.at(0).setup, groups[0].group.placements) + PictureBytes(groups[0].setup);
+  }
+  static std::uint64_t RoomFor(std::uint64_t images) { return kIdleMemoryBytes + 2 * 32 * 32 * 48 + images; }
+};
+
+TEST_F(MemoryRules, AFrameThatDoesNotFitAWorkerFailsBeforeAnyIsGivenAPartOfIt) {
+  CoordinatorScript script;
+  JoinWith(script, 11, 0);
+  JoinWith(script, 12, 256 * kMebi);
+  const Actions actions = script.Submit(kClient, Sized(1, 8192));
+  EXPECT_THAT(HandedOut(actions), IsEmpty());
+  const auto failed = ToClients<FrameFailed>(actions);
+  ASSERT_THAT(failed, SizeIs(1));
+  EXPECT_EQ(failed[0].message.status.code(), StatusCode::kResourceExhausted);
+  EXPECT_THAT(failed[0].message.status.message(), HasSubstr("size 8192x8192"));
+  EXPECT_THAT(failed[0].message.status.message(), HasSubstr("of worker 2, limit 256 MiB"));
+  // What fits is rendered.
+  EXPECT_THAT(ToClients<FrameReply>(script.AnswerAll(script.Submit(kClient, Sized(2, 64)))), SizeIs(1));
+  EXPECT_EQ(script.QueryStatus().workers[1].memory_bytes, 256 * kMebi);
+}
+
+TEST_F(MemoryRules, FramesThatFitOneByOneRunOneByOneAndNoneOvertakes) {
+  CoordinatorScript script;
+  JoinWith(script, 11, RoomFor(ImagesOf(1024)));
+  const std::vector<GroupAssignment> first = HandedOut(script.Submit(kClient, Sized(1, 1024)));
+  ASSERT_THAT(first, SizeIs(1));
+  EXPECT_THAT(HandedOut(script.Submit(kClient, Sized(2, 1024))), IsEmpty());
+  EXPECT_THAT(HandedOut(script.Submit(kOther, Sized(1, 64))), IsEmpty());
+  const std::vector<GroupAssignment> second = HandedOut(script.Answer(first[0]));
+  ASSERT_THAT(second, SizeIs(1)) << "of those that wait, the one in turn, alone or with what fits beside it";
+  EXPECT_EQ(script.QueryStatus().running, 1U);
+  EXPECT_THAT(HandedOut(script.Answer(second[0])), SizeIs(1));
+}
+
+TEST_F(MemoryRules, WithoutALimitTheWindowIsAsWideAsEver) {
+  CoordinatorScript script;
+  script.Join(11, 1);
+  EXPECT_THAT(HandedOut(script.Submit(kClient, Sized(1, 1024))), SizeIs(1));
+  EXPECT_THAT(HandedOut(script.Submit(kClient, Sized(2, 1024))), SizeIs(1));
+}
+
+TEST_F(MemoryRules, WhatTheLossOfAWorkerMakesTooLargeFails) {
+  CoordinatorScript script;
+  auto summary = std::make_shared<VolumeSummary>(*BlockSummary());
+  summary->description.geometry.size = {32, 32, 4800};
+  summary->brick_counts = {2, 2, 300};
+  summary->bricks.assign(1200, {0, 255});
+  constexpr std::uint64_t kVoxels = 2 * 32 * 32 * 4800;
+  const FakeWorker lost = JoinWith(script, 11, 0);
+  JoinWith(script, 12, kIdleMemoryBytes + ImagesOf(64, 2, summary) + kVoxels * 7 / 10);  // half of the voxels fit, all do not
+  script.Client(kClient, Sized(1, 64));
+  ASSERT_THAT(HandedOut(script.Step(DatasetLoaded{"block", script.loads.back().dataset, summary})), SizeIs(1));
+  const auto failed = ToClients<FrameFailed>(script.Kill(lost));
+  ASSERT_THAT(failed, SizeIs(1));
+  EXPECT_EQ(failed[0].message.status.code(), StatusCode::kResourceExhausted);
+}
+
+// ---------------------------------------------------------------- frames that end workers
+
+TEST_F(MemoryRules, AFrameThatLosesTheWorkerOfABoxTwiceFailsAndTheOthersGoOn) {
+  CoordinatorScript script;
+  const FakeWorker first = script.Join(11, 1);
+  script.Join(12, 2);
+  script.Join(13, 3);
+  ASSERT_THAT(HandedOut(script.Submit(kClient, Frame(1))), SizeIs(1));
+  script.Pass(seconds(1));
+  const std::vector<GroupAssignment> again = HandedOut(script.Kill(first));
+  ASSERT_THAT(again, SizeIs(1));
+  // The first worker had box 0. Whoever got it dies too, a while later.
+  script.Pass(seconds(1));
+  const WorkerId heir = std::ranges::find(again[0].group.placements, BoxId{0}, &Placement::id)->worker;
+  const Actions actions = script.Kill(script.WorkerOf(heir));
+  const auto failed = ToClients<FrameFailed>(actions);
+  ASSERT_THAT(failed, SizeIs(1));
+  EXPECT_EQ(failed[0].message.status.code(), StatusCode::kUnavailable);
+  EXPECT_THAT(failed[0].message.status.message(), HasSubstr("box 0 of the frame, as another worker before it"));
+  EXPECT_THAT(HandedOut(actions), IsEmpty());
+  EXPECT_THAT(ToClients<FrameReply>(script.AnswerAll(script.Submit(kClient, Frame(2)))), SizeIs(1));
+}
+
+// A host ends with two of its workers: one is found to be silent a moment before the other, and the other gets its boxes meanwhile.
+TEST_F(MemoryRules, WorkersThatDieTogetherFailNoFrame) {
+  CoordinatorScript script;
+  const FakeWorker first = script.Join(11, 1), second = script.Join(12, 2);
+  ASSERT_THAT(HandedOut(script.Submit(kClient, Frame(1))), SizeIs(1));
+  script.Mute(first);
+  script.Pass(milliseconds(300));
+  script.Beat(second);
+  script.Mute(second);
+  Actions actions = script.Pass(milliseconds(5800));
+  ASSERT_THAT(HandedOut(actions), SizeIs(1)) << "the second one has all boxes now";
+  actions = script.Pass(seconds(1));
+  EXPECT_EQ(script.QueryStatus().workers_lost, 2U);
+  EXPECT_THAT(ToClients<FrameFailed>(actions), IsEmpty());
+  script.Join(13, 3, &actions);
+  EXPECT_THAT(ToClients<FrameReply>(script.AnswerAll(actions)), SizeIs(1));
+}
+
+TEST_F(MemoryRules, WorkersThatLeaveFailNoFrame) {
+  CoordinatorScript script;
+  std::vector<FakeWorker> all;
+  for (PeerToken token = 11; token < 14; ++token) all.push_back(script.Join(token, token));
+  ASSERT_THAT(HandedOut(script.Submit(kClient, Frame(1))), SizeIs(1));
+  // One that leaves, and one more that gets its boxes and leaves.
+  Actions actions = script.Worker(all[0], Leave{.epoch = 77, .worker = all[0].id});
+  script.Mute(all[0]);
+  const std::vector<GroupAssignment> again = HandedOut(actions);
+  ASSERT_THAT(again, SizeIs(1));
+  const auto heir = std::ranges::find(again[0].group.placements, BoxId{0}, &Placement::id)->worker;
+  const FakeWorker second = script.WorkerOf(heir);
+  actions = script.Worker(second, Leave{.epoch = 77, .worker = second.id});
+  script.Mute(second);
+  EXPECT_THAT(ToClients<FrameFailed>(actions), IsEmpty());
+  EXPECT_THAT(ToClients<FrameReply>(script.AnswerAll(actions)), SizeIs(1));
+}
+
+// ---------------------------------------------------------------- datasets
+
+class DatasetRules : public MemoryRules {
+ protected:
+  static CoordinatorConfig Config() {
+    CoordinatorConfig config = TestConfig();
+    config.datasets = {"a", "b", "c"};
+    config.memory_bytes = 400 * kMebi;  // 300 for datasets
+    return config;
+  }
+  // Answers the load that was begun last.
+  Actions Loaded(std::uint64_t bytes) {
+    const LoadDataset& load = script.loads.back();
+    return script.Step(DatasetLoaded{load.name, load.dataset, BlockSummary(), bytes});
+  }
+  // A frame of a dataset of 100 MiB, done.
+  Actions Visit(RequestId request, const std::string& dataset) {
+    const std::size_t before = script.loads.size();
+    Actions actions = script.Client(kClient, Frame(request, 1, dataset));
+    if (script.loads.size() > before) CoordinatorScript::Append(actions, Loaded(120 * kMebi));
+    return script.AnswerAll(actions);
+  }
+  DatasetState StateOf(int index) { return script.QueryStatus().datasets[std::size_t(index)].state; }
+
+  CoordinatorScript script{Config()};
+};
+
+TEST_F(DatasetRules, TheLeastRecentlyUsedIsUnloadedAndLoadedAgainWhenAskedFor) {
+  script.Join(11, 1);
+  Visit(1, "a");
+  Visit(2, "b");
+  Visit(3, "a");
+  const DatasetId b = script.loads.back().dataset;
+  EXPECT_EQ(script.QueryStatus().datasets[0].memory_bytes, 120 * kMebi);
+  const Actions third = Visit(4, "c");
+  const std::vector<UnloadDataset> unloaded = Of<UnloadDataset>(third);
+  ASSERT_THAT(unloaded, SizeIs(1));
+  EXPECT_EQ(unloaded[0].dataset, b);
+  EXPECT_THAT(ToClients<FrameReply>(third), SizeIs(1));
+  EXPECT_EQ(StateOf(0), DatasetState::kReady);
+  EXPECT_EQ(StateOf(1), DatasetState::kUnloaded);
+  const std::size_t loads = script.loads.size();
+  EXPECT_THAT(ToClients<FrameReply>(Visit(5, "b")), SizeIs(1));
+  EXPECT_EQ(script.loads.size(), loads + 1);
+  EXPECT_NE(script.loads.back().dataset, b);
+  EXPECT_EQ(StateOf(0), DatasetState::kUnloaded);
+}
+
+TEST_F(DatasetRules, WhatFramesNeedStaysAndWhatComesOnTopIsRefused) {
+  script.Join(11, 1);
+  script.Client(kClient, Frame(1, 1, "a"));
+  const std::vector<GroupAssignment> running = HandedOut(Loaded(200 * kMebi));
+  ASSERT_THAT(running, SizeIs(1));
+  script.Client(kClient, Frame(2, 1, "b"));
+  const Actions actions = Loaded(150 * kMebi);
+  const auto failed = ToClients<FrameFailed>(actions);
+  ASSERT_THAT(failed, SizeIs(1));
+  EXPECT_EQ(failed[0].message.request, 2U);
+  EXPECT_THAT(failed[0].message.status.message(), HasSubstr("dataset \"b\" needs 150 MiB, limit 300 MiB (200 MiB are in use"));
+  ASSERT_THAT(Of<UnloadDataset>(actions), SizeIs(1));
+  EXPECT_EQ(Of<UnloadDataset>(actions)[0].dataset, script.loads.back().dataset);
+  EXPECT_THAT(ToClients<FrameReply>(script.AnswerAll(script.Answer(running[0]))), SizeIs(1));
+}
+
+TEST_F(DatasetRules, ALoadWithoutMemoryIsTriedAgainWhenOthersAreUnloaded) {
+  script.Join(11, 1);
+  Visit(1, "a");
+  script.Client(kClient, Frame(2, 1, "b"));
+  const Status no_memory = Status::ResourceExhausted("b.nrrd needs 300 MiB");
+  const std::size_t loads = script.loads.size();
+  Actions actions = script.Step(DatasetFailed{"b", no_memory});
+  EXPECT_THAT(Of<UnloadDataset>(actions), SizeIs(1));
+  EXPECT_THAT(ToClients<FrameFailed>(actions), IsEmpty());
+  ASSERT_EQ(script.loads.size(), loads + 1);
+  // Now there is nothing more to unload.
+  actions = script.Step(DatasetFailed{"b", no_memory});
+  EXPECT_THAT(ToClients<FrameFailed>(actions), SizeIs(1));
+  EXPECT_EQ(script.loads.size(), loads + 1);
+}
+
+}  // namespace
+}  // namespace slabstream
