@@ -28,7 +28,7 @@ WorkerEvent ModelWorker::Answer(Job& job) {
 }
 
 void ModelWorker::OnRequest(const ChunkRequest& request) {
-  const std::uint32_t bytes = BytesOfChunk(request.box, ScalarType::kUint8, request.chunk);
+  const std::uint32_t bytes = BytesOfChunk(request.box, kVoxelType, request.chunk);
   requested_[{request.dataset, request.box, request.chunk}] = {bytes, service_.time()};
 }
 

@@ -15,6 +15,8 @@
 
 namespace slabstream {
 
+inline constexpr ScalarType kVoxelType = ScalarType::kFloat32;  // of the only volume
+
 struct WorkerSpeed {
   double render = 0, combine = 0, store = 0, finish = 0;  // seconds
 };

@@ -294,7 +294,7 @@ AnyMessage Simulation::AnswerOf(const ChunkRequest& request) const {
   chunk.dataset = request.dataset;
   chunk.box = request.box;
   chunk.chunk = request.chunk;
-  chunk.raw_bytes = BytesOfChunk(request.box, ScalarType::kUint8, request.chunk);
+  chunk.raw_bytes = BytesOfChunk(request.box, kVoxelType, request.chunk);
   chunk.encoded_bytes = chunk.raw_bytes;
   return chunk;
 }
