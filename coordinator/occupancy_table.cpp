@@ -25,6 +25,10 @@ CountId OccupancyTable::Begin(const ClassifiedVolume& volume) {
   return last_count_;
 }
 
+std::size_t OccupancyTable::counting() const {
+  return std::size_t(std::ranges::count_if(entries_, [](const Entry& entry) { return entry.grid == nullptr; }));
+}
+
 std::list<OccupancyTable::Entry>::iterator OccupancyTable::UnderWay(CountId count) {
   return std::ranges::find_if(entries_, [count](const Entry& entry) { return entry.grid == nullptr && entry.count == count; });
 }

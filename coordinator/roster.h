@@ -6,8 +6,10 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/base/time.h"
@@ -33,27 +35,31 @@ class LiveRoster {
   // Members that this Register proves dead: same connection or same image endpoint, other incarnation. Remove them before Admit, so that
   // the new worker gets their slot.
   std::vector<WorkerId> ReplacedBy(const Register& message, PeerToken from) const;
-  // Adds a worker, or finds the one that it is already: Registers repeat until the Welcome arrives.
+  // Adds a worker, or finds the one that it is already: Registers repeat until the Welcome arrives. They are no sign of life: a worker that
+  // hears nothing from here could repeat them for ever.
   WorkerId Admit(const Register& message, PeerToken from, Time now);
 
   struct News {
     bool known = false;
     bool stale = false;       // not known, but its incarnation is a member under another id: an old message, no reason to retire anybody
     bool progressed = false;  // it has received voxels or rendered ranks since its last heartbeat
+    bool moved = false;       // it spoke on another connection before
   };
   News Hear(const Heartbeat& message, PeerToken from, Time now);
   void Touch(WorkerId worker, Time now);  // any other message of a member; unknown ids are ignored
 
   void Remove(WorkerId worker, Time now);  // its slot becomes vacant
   void GiveUpVacancies(Time now);          // drops slots that have been vacant for the grace period
-  void Postpone(Duration duration);        // all silences begin later, since the listener itself was asleep
+  // The listener itself was asleep until now: silences and vacancies begin later by as much, the wait for a first worker begins anew.
+  void Postpone(Duration duration, Time now);
 
-  const Member* Find(WorkerId worker) const;  // null: not a member
+  const Member* Find(WorkerId worker) const;               // null: not a member
+  std::optional<PeerToken> PeerOf(WorkerId worker) const;  // the connection of a member, or of one of the last that were removed
   std::vector<WorkerId> At(PeerToken peer) const;
   std::vector<WorkerId> Silent(Time now) const;  // not heard for the timeout
   const std::vector<Member>& members() const { return members_; }
   bool empty() const { return members_.empty(); }
-  Time empty_since() const { return empty_since_; }  // Time::min(): there never was a worker
+  Time empty_since() const { return empty_since_; }  // from then on one may come; Time::min(): there never was a worker
   std::uint32_t SlotOf(WorkerId worker) const;       // of a member
 
   Roster slots() const;                               // 0 where a slot is vacant
@@ -65,6 +71,7 @@ class LiveRoster {
   Time NextWake() const;  // the next silence or end of a grace period; Time::max(): none
 
  private:
+  static constexpr std::size_t kMaxRemoved = 64;
   struct Slot {
     WorkerId worker = 0;
     Time vacant_since;
@@ -72,6 +79,7 @@ class LiveRoster {
   Duration timeout_, vacancy_grace_;
   std::vector<Member> members_;  // by ascending id
   std::vector<Slot> slots_;
+  std::deque<std::pair<WorkerId, PeerToken>> removed_;  // the last kMaxRemoved
   WorkerId last_id_ = 0;
   std::uint64_t version_ = 0;
   Time empty_since_ = Time::min();

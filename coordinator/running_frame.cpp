@@ -56,6 +56,17 @@ std::vector<WorkerId> RunningFrame::Renderers(std::uint32_t group) const {
   return workers;
 }
 
+std::vector<WorkerId> RunningFrame::HaveRendered(std::uint32_t group) const {
+  std::set<WorkerId> reported, rendered;
+  for (const RankReport& report : reports_[group]) {
+    reported.insert(report.worker);
+    if (report.stage_ns[std::size_t(Stage::kRender)] > 0) rendered.insert(report.worker);
+  }
+  std::vector<WorkerId> workers = Renderers(group);
+  std::erase_if(workers, [&](WorkerId worker) { return reported.contains(worker) && !rendered.contains(worker); });
+  return workers;
+}
+
 std::vector<WorkerId> RunningFrame::Participants() const {
   std::vector<WorkerId> workers = {plan_.display};
   for (std::uint32_t group = 0; group < group_count(); ++group) {
@@ -172,7 +183,13 @@ void RunningFrame::OnLoss(WorkerId worker, Time now) {
   attempt_due_ = now;
 }
 
+// Whatever was under way on the old connection: who has it answers at once, who has not gets it now.
+void RunningFrame::OnReconnect(WorkerId worker, Time now) {
+  if (HasPart(worker) && !attempt_due_) attempt_due_ = now;
+}
+
 Status RunningFrame::OnTrouble(const WorkerTrouble& message, Time now) {
+  if (!HasPart(message.worker)) return Status::Ok();
   const bool no_picture = message.worker == plan_.display && groups_done_ == group_count();
   if (message.key.attempt != attempt() || (message.key.group < groups_done_ && !no_picture)) return Status::Ok();
   const Status reason(message.status.code(), WorkerName(message.worker) + ": " + message.status.message());
@@ -206,6 +223,13 @@ Status RunningFrame::Expire(Time now) {
     return CountStall(Status::Unavailable("no progress for " + std::to_string(seconds) + " s"), Duration::zero(), now);
   }
   return Status::Ok();
+}
+
+void RunningFrame::Postpone(Duration duration) {
+  last_progress_ += duration;
+  if (!suspicion_) return;
+  suspicion_->proof_after += duration;
+  suspicion_->until += duration;
 }
 
 Status RunningFrame::CountStall(const Status& reason, Duration pause, Time now) {

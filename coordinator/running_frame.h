@@ -7,6 +7,7 @@
 //   no progress for stall_timeout                          the first unfinished group, now; counted
 //   a worker could not do its part                         the first unfinished group, after a pause that grows; counted
 //   the same, but another worker may be able to            the first unfinished group, now, without that worker; counted
+//   a worker with a part in it has connected anew          the first unfinished group, now
 //   a worker cannot reach another that is alive            the first unfinished group, once that is proved; counted
 //   any of these, if the display worker was lost or had the trouble     group 0: what it accumulated is gone or in doubt
 // The frame fails after max_stalls counted events in a row, with no group finished for the first time between them. So every frame ends, as
@@ -58,6 +59,8 @@ class RunningFrame {
   std::uint32_t unfinished_groups() const;  // handed out and not done; 0 while a new attempt is due
   bool HasPart(WorkerId worker) const;      // in groups that are not done yet
   std::vector<WorkerId> Renderers(std::uint32_t group) const;
+  // Those of them that rendered a box of the group, as far as is known: hidden boxes are left out, before older work is done.
+  std::vector<WorkerId> HaveRendered(std::uint32_t group) const;
   std::vector<WorkerId> Participants() const;  // workers with a placement anywhere in the plan, and the display worker
 
   // ---- handing out
@@ -82,11 +85,13 @@ class RunningFrame {
   void OnOvertaken(const std::vector<WorkerId>& workers);
 
   // ---- what goes wrong. A Status that is not ok: the frame has failed.
-  void OnLoss(WorkerId worker, Time now);  // it is no longer in the roster
-  // Ignores trouble of another attempt or of a group that is done. message.unreachable, if any, must be in the roster. Trouble of the
-  // display worker when all groups are done: it cannot make the picture.
+  void OnLoss(WorkerId worker, Time now);       // it is no longer in the roster
+  void OnReconnect(WorkerId worker, Time now);  // messages from it or to it may be lost
+  // Ignores trouble of another attempt, of a group that is done, or of a worker without a part in the frame. message.unreachable, if any,
+  // must be in the roster. Trouble of the display worker when all groups are done: it cannot make the picture.
   Status OnTrouble(const WorkerTrouble& message, Time now);
-  Status Expire(Time now);  // stalls, suspicions
+  Status Expire(Time now);           // stalls, suspicions
+  void Postpone(Duration duration);  // both end later, since the listener itself was asleep
 
   Time NextWake() const;  // of Expire and AttemptDue; Time::max(): none
 
