@@ -189,7 +189,6 @@ void RunningFrame::OnReconnect(WorkerId worker, Time now) {
 }
 
 Status RunningFrame::OnTrouble(const WorkerTrouble& message, Time now) {
-  if (!HasPart(message.worker)) return Status::Ok();
   const bool no_picture = message.worker == plan_.display && groups_done_ == group_count();
   if (message.key.attempt != attempt() || (message.key.group < groups_done_ && !no_picture)) return Status::Ok();
   const Status reason(message.status.code(), WorkerName(message.worker) + ": " + message.status.message());

@@ -87,8 +87,8 @@ class RunningFrame {
   // ---- what goes wrong. A Status that is not ok: the frame has failed.
   void OnLoss(WorkerId worker, Time now);       // it is no longer in the roster
   void OnReconnect(WorkerId worker, Time now);  // messages from it or to it may be lost
-  // Ignores trouble of another attempt, of a group that is done, or of a worker without a part in the frame. message.unreachable, if any,
-  // must be in the roster. Trouble of the display worker when all groups are done: it cannot make the picture.
+  // Ignores trouble of another attempt or of a group that is done. message.unreachable, if any, must be in the roster. Trouble of the
+  // display worker when all groups are done: it cannot make the picture.
   Status OnTrouble(const WorkerTrouble& message, Time now);
   Status Expire(Time now);           // stalls, suspicions
   void Postpone(Duration duration);  // both end later, since the listener itself was asleep

@@ -59,17 +59,6 @@ TEST(CoordinatorPeers, FrameOfAWorkerThatConnectsAnewIsHandedOutAgain) {
   EXPECT_THAT(ToClients<FrameReply>(script.Step(FromWorker{12, PictureOf(again.at(0)), {}})), SizeIs(1));
 }
 
-TEST(CoordinatorPeers, TroubleOfAWorkerWithoutAPartInTheFrameIsNoTrouble) {
-  CoordinatorScript script;
-  script.Join(11, 1);
-  const auto groups = HandedOut(script.Submit(kClient, Frame(1, 1)));
-  const FakeWorker idle = script.Join(12, 2);
-  for (int i = 0; i < script.config.max_stalls + 1; ++i) {
-    script.Worker(idle, WorkerTrouble{77, idle.id, groups.at(0).key, 0, Status::Unavailable("no"), false});
-  }
-  EXPECT_THAT(ToClients<FrameReply>(script.Image(groups[0], 1)), SizeIs(1));
-}
-
 // It hears nothing of the coordinator, which hears it: it registers again and again and does nothing else.
 TEST(CoordinatorPeers, WorkerThatDoesNotHearItsWelcomeIsLost) {
   CoordinatorScript script;
