@@ -179,7 +179,7 @@ void FrameMachine::State::DropPlans() {
 
 void FrameMachine::State::AfterGroupDone(const RunningFrame& frame) {
   for (RunningFrame& older : frames) {
-    if (older.id() < frame.id()) older.OnOvertaken(frame.Renderers(frame.groups_done() - 1));
+    if (older.id() < frame.id()) older.OnOvertaken(frame.HaveRendered(frame.groups_done() - 1));
   }
   SendClient(frame.request().client, frame.Progress());
 }
@@ -370,8 +370,9 @@ std::vector<CoordinatorAction> FrameMachine::Step(const CoordinatorEvent& event,
   if (!state.started) state.started = now;
   if (now > state.wake) {
     // The executor was held up (a stopped process, a busy machine): unread messages are no silence of the others.
-    state.roster.Postpone(now - state.wake);
+    state.roster.Postpone(now - state.wake, now);
     state.clients.Postpone(now - state.wake);
+    for (RunningFrame& frame : state.frames) frame.Postpone(now - state.wake);
   }
   std::visit([&state](const auto& e) { state.On(e); }, event);
   if (!state.stopped) {
@@ -384,5 +385,18 @@ std::vector<CoordinatorAction> FrameMachine::Step(const CoordinatorEvent& event,
 }
 
 Time FrameMachine::NextWake() const { return state_->wake; }
+
+CoordinatorSizes FrameMachine::sizes() const {
+  const State& state = *state_;
+  return {.clients = state.clients.size(),
+          .queued = state.queue.size(),
+          .running = state.frames.size(),
+          .over = state.frames.cancelled().size(),
+          .planning = state.planning.size(),
+          .counting = state.occupancy.counting(),
+          .grids = state.occupancy.grids(),
+          .workers = state.roster.members().size(),
+          .slots = state.roster.slots().slots.size()};
+}
 
 }  // namespace slabstream

@@ -153,6 +153,15 @@ struct DropClient {
 using CoordinatorAction = std::variant<ToWorker, ToClient, DropClient, LoadDataset, UnloadDataset, CountDataset, PlanRequest, DropPlan,
                                        FrameMeasured, StopService>;
 
+// Entries in the machine's tables. At rest, with nothing asked for and every client gone, they are 0 but for the workers, their slots and
+// the grids of earlier counts (at most OccupancyTable::kMaxKept).
+struct CoordinatorSizes {
+  std::size_t clients = 0, queued = 0, running = 0;
+  std::size_t over = 0;  // frames that workers must still be told of
+  std::size_t planning = 0, counting = 0, grids = 0;
+  std::size_t workers = 0, slots = 0;
+};
+
 class FrameMachine {
  public:
   explicit FrameMachine(CoordinatorConfig config);
@@ -161,6 +170,7 @@ class FrameMachine {
 
   std::vector<CoordinatorAction> Step(const CoordinatorEvent& event, Time now);
   Time NextWake() const;
+  CoordinatorSizes sizes() const;
 
  private:
   struct State;

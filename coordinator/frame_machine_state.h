@@ -84,6 +84,10 @@ struct FrameMachine::State {
   void OnWorkerMessage(const FromWorker& event, const FrameImage& message);
   void OnWorkerMessage(const FromWorker& event, const WorkerTrouble& message);
   void OnWorkerMessage(const FromWorker& event, const Leave& message);
+  // What a worker says counts on its own connection, which its heartbeats tell: nobody speaks for another one.
+  bool IsFrom(const FromWorker& event, Epoch epoch, WorkerId worker) const {
+    return epoch == config.epoch && roster.PeerOf(worker) == event.from;
+  }
   // Drops what no worker sends here.
   template <AnyOf<Welcome, Ping, GroupAssignment, Retire, Stop, ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused,
                   ImageReceived, SubmitFrame, FrameProgress, FrameReply, FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery,

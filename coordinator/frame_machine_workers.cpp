@@ -29,15 +29,15 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const Heartbe
   }
 }
 
-void FrameMachine::State::OnWorkerMessage(const FromWorker&, const GroupDone& message) {
-  if (message.epoch != config.epoch) return;
+void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const GroupDone& message) {
+  if (!IsFrom(event, message.epoch, message.worker)) return;
   roster.Touch(message.worker, now);
   RunningFrame* frame = frames.Find(message.key.frame);
   if (frame != nullptr && frame->OnGroupDone(message, now)) AfterGroupDone(*frame);
 }
 
 void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const FrameImage& message) {
-  if (message.epoch != config.epoch) return;
+  if (!IsFrom(event, message.epoch, message.worker)) return;
   roster.Touch(message.worker, now);
   RunningFrame* frame = frames.Find(message.frame);
   if (frame == nullptr) return;
@@ -64,8 +64,8 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const FrameIm
   EndFrame(message.frame);
 }
 
-void FrameMachine::State::OnWorkerMessage(const FromWorker&, const WorkerTrouble& message) {
-  if (message.epoch != config.epoch || roster.Find(message.worker) == nullptr) return;
+void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const WorkerTrouble& message) {
+  if (!IsFrom(event, message.epoch, message.worker) || roster.Find(message.worker) == nullptr) return;
   roster.Touch(message.worker, now);
   RunningFrame* frame = frames.Find(message.key.frame);
   if (frame == nullptr) return;
@@ -77,8 +77,8 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker&, const WorkerTrouble
   if (!status.ok()) FailFrame(*frame, status);
 }
 
-void FrameMachine::State::OnWorkerMessage(const FromWorker&, const Leave& message) {
-  if (message.epoch == config.epoch) RemoveWorker(message.worker, std::nullopt);
+void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const Leave& message) {
+  if (IsFrom(event, message.epoch, message.worker)) RemoveWorker(message.worker, std::nullopt);
 }
 
 void FrameMachine::State::LoseWorker(WorkerId worker) {

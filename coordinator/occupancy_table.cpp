@@ -29,6 +29,10 @@ void OccupancyTable::Forget(DatasetId dataset) {
   entries_.remove_if([dataset](const Entry& entry) { return entry.volume.dataset() == dataset; });
 }
 
+std::size_t OccupancyTable::counting() const {
+  return std::size_t(std::ranges::count_if(entries_, [](const Entry& entry) { return entry.grid == nullptr; }));
+}
+
 std::list<OccupancyTable::Entry>::iterator OccupancyTable::UnderWay(CountId count) {
   return std::ranges::find_if(entries_, [count](const Entry& entry) { return entry.grid == nullptr && entry.count == count; });
 }

@@ -22,6 +22,8 @@ class OccupancyTable {
   std::shared_ptr<const OccupancyGrid> Find(const ClassifiedVolume& volume);
   bool Counting(const ClassifiedVolume& volume) const;
   CountId Begin(const ClassifiedVolume& volume);  // neither found nor counting
+  std::size_t counting() const;                   // counts under way
+  std::size_t grids() const { return entries_.size() - counting(); }
 
   // The end of a count. If there is none with this id under way, nothing changes.
   void Counted(CountId count, std::shared_ptr<const OccupancyGrid> grid);

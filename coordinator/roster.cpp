@@ -1,6 +1,7 @@
 #include "coordinator/roster.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace slabstream {
 namespace {
@@ -32,7 +33,6 @@ WorkerId LiveRoster::Admit(const Register& message, PeerToken from, Time now) {
   if (known != members_.end()) {
     known->peer = from;
     known->description = message;
-    known->last_heard = now;
     return known->id;
   }
   members_.push_back({.id = ++last_id_, .peer = from, .description = message, .last_heard = now});
@@ -65,9 +65,8 @@ LiveRoster::News LiveRoster::Hear(const Heartbeat& message, PeerToken from, Time
   if (member == members_.end()) return {};
   if (member->id != message.worker) return {.stale = true};
   // Counters never fall within one life, so an old heartbeat that arrives late is no progress.
-  const bool moved = member->peer != from;
   const bool progressed = message.fetched_bytes > member->fetched_bytes || message.rendered_ranks > member->rendered_ranks;
-  member->peer = from;
+  const bool moved = std::exchange(member->peer, from) != from;
   member->last_heard = now;
   member->cached_bytes = message.cached_bytes;
   member->fetched_bytes = std::max(member->fetched_bytes, message.fetched_bytes);
@@ -93,7 +92,11 @@ void LiveRoster::Vacate(WorkerId worker, Time now) {
 }
 
 void LiveRoster::Remove(WorkerId worker, Time now, Notice notice) {
-  if (std::erase_if(members_, [worker](const Member& m) { return m.id == worker; }) == 0) return;
+  const auto member = std::ranges::find(members_, worker, &Member::id);
+  if (member == members_.end()) return;
+  removed_.emplace_back(worker, member->peer);
+  if (removed_.size() > kMaxRemoved) removed_.pop_front();
+  members_.erase(member);
   Vacate(worker, now);
   if (!members_.empty()) return;
   empty_since_ = now;
@@ -106,13 +109,24 @@ void LiveRoster::GiveUpVacancies(Time now) {
   if (std::erase_if(slots_, expired) > 0) ++version_;
 }
 
-void LiveRoster::Postpone(Duration duration) {
+void LiveRoster::Postpone(Duration duration, Time now) {
   for (Member& member : members_) member.last_heard += duration;
+  for (Slot& slot : slots_) {
+    if (slot.worker == 0) slot.vacant_since += duration;
+  }
+  if (members_.empty()) empty_since_ = now;
+  if (awaits_until_) *awaits_until_ += duration;
 }
 
 const Member* LiveRoster::Find(WorkerId worker) const {
   const auto member = std::ranges::find(members_, worker, &Member::id);
   return member == members_.end() ? nullptr : &*member;
+}
+
+std::optional<PeerToken> LiveRoster::PeerOf(WorkerId worker) const {
+  if (const Member* member = Find(worker)) return member->peer;
+  const auto removed = std::ranges::find(removed_, worker, &std::pair<WorkerId, PeerToken>::first);
+  return removed == removed_.end() ? std::nullopt : std::optional(removed->second);
 }
 
 std::vector<WorkerId> LiveRoster::At(PeerToken peer) const {

@@ -9,8 +9,10 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/base/time.h"
@@ -38,7 +40,8 @@ class LiveRoster {
   // Members that this Register proves dead: same connection or same image endpoint, other incarnation. Remove them before Admit, so that
   // the new worker gets their slot.
   std::vector<WorkerId> ReplacedBy(const Register& message, PeerToken from) const;
-  // Adds a worker, or finds the one that it is already: Registers repeat until the Welcome arrives.
+  // Adds a worker, or finds the one that it is already: Registers repeat until the Welcome arrives. They are no sign of life: a worker that
+  // hears nothing from here could repeat them for ever.
   WorkerId Admit(const Register& message, PeerToken from, Time now);
 
   struct News {
@@ -54,16 +57,18 @@ class LiveRoster {
   void Remove(WorkerId worker, Time now, Notice notice = Notice::kNone);  // its slot becomes vacant
   // Drops slots that have been vacant for the grace period, and waits no longer than return_wait.
   void GiveUpVacancies(Time now);
-  void Postpone(Duration duration);  // all silences begin later, since the listener itself was asleep
+  // The listener itself was asleep until now: silences and vacancies begin later by as much, the wait for a first worker begins anew.
+  void Postpone(Duration duration, Time now);
 
-  const Member* Find(WorkerId worker) const;  // null: not a member
+  const Member* Find(WorkerId worker) const;               // null: not a member
+  std::optional<PeerToken> PeerOf(WorkerId worker) const;  // the connection of a member, or of one of the last that were removed
   std::vector<WorkerId> At(PeerToken peer) const;
   std::vector<WorkerId> Silent(Time now) const;  // not heard for the timeout
   const std::vector<Member>& members() const { return members_; }
   std::vector<WorkerId> Leaving() const;
   std::size_t staying() const;  // members that are not leaving
   bool empty() const { return members_.empty(); }
-  Time empty_since() const { return empty_since_; }            // Time::min(): there never was a worker
+  Time empty_since() const { return empty_since_; }            // from then on one may come; Time::min(): there never was a worker
   bool last_gave_notice() const { return last_gave_notice_; }  // the one since whose removal it is empty
   SlotPlace PlaceOf(WorkerId worker) const;                    // of a member
 
@@ -79,6 +84,7 @@ class LiveRoster {
   Time NextWake() const;  // the next silence or end of a grace period; Time::max(): none
 
  private:
+  static constexpr std::size_t kMaxRemoved = 64;
   struct Slot {
     WorkerId worker = 0;
     Time vacant_since;
@@ -89,6 +95,7 @@ class LiveRoster {
   Duration timeout_, vacancy_grace_, return_wait_;
   std::vector<Member> members_;  // by ascending id
   std::vector<Slot> slots_;
+  std::deque<std::pair<WorkerId, PeerToken>> removed_;  // the last kMaxRemoved
   WorkerId last_id_ = 0;
   std::uint64_t version_ = 0;
   Time empty_since_ = Time::min();

@@ -57,6 +57,17 @@ std::vector<WorkerId> RunningFrame::Renderers(std::uint32_t group) const {
   return workers;
 }
 
+std::vector<WorkerId> RunningFrame::HaveRendered(std::uint32_t group) const {
+  std::set<WorkerId> reported, rendered;
+  for (const RankReport& report : reports_[group]) {
+    reported.insert(report.worker);
+    if (report.stage_ns[std::size_t(Stage::kRender)] > 0) rendered.insert(report.worker);
+  }
+  std::vector<WorkerId> workers = Renderers(group);
+  std::erase_if(workers, [&](WorkerId worker) { return reported.contains(worker) && !rendered.contains(worker); });
+  return workers;
+}
+
 std::vector<WorkerId> RunningFrame::Participants() const {
   std::vector<WorkerId> workers = {plan_.display};
   for (std::uint32_t group = 0; group < group_count(); ++group) {
@@ -208,6 +219,7 @@ Status RunningFrame::NoteDeath(WorkerId worker) {
   return Status::Ok();
 }
 
+// Whatever was under way on the old connection: who has it answers at once, who has not gets it now.
 void RunningFrame::OnReconnection(WorkerId worker, Time now) {
   if (HasPart(worker) && !attempt_due_) attempt_due_ = now;
 }
@@ -254,6 +266,13 @@ WorkerId RunningFrame::CulpritOf(const Suspicion& suspicion) {
   const int of_accused = ++complaints_[suspicion.accused], of_accuser = ++complaints_[suspicion.accuser];
   if (of_accused != of_accuser) return of_accused > of_accuser ? suspicion.accused : suspicion.accuser;
   return suspicion.accused == plan_.display ? suspicion.accuser : suspicion.accused;
+}
+
+void RunningFrame::Postpone(Duration duration) {
+  last_progress_ += duration;
+  if (!suspicion_) return;
+  suspicion_->proof_after += duration;
+  suspicion_->until += duration;
 }
 
 Status RunningFrame::CountStall(const Status& reason, Duration pause, Time now) {

@@ -65,6 +65,8 @@ class RunningFrame {
   std::uint32_t unfinished_groups() const;  // handed out and not done; 0 while a new attempt is due
   bool HasPart(WorkerId worker) const;      // in groups that are not done yet
   std::vector<WorkerId> Renderers(std::uint32_t group) const;
+  // Those of them that rendered a box of the group, as far as is known: hidden boxes are left out, before older work is done.
+  std::vector<WorkerId> HaveRendered(std::uint32_t group) const;
   std::vector<WorkerId> Participants() const;  // workers with a placement anywhere in the plan, and the display worker
 
   // ---- handing out
@@ -96,11 +98,12 @@ class RunningFrame {
   // ---- what goes wrong. A Status that is not ok: the frame has failed.
   // `worker` is no longer in the roster. Without `last_heard` it has left in order; else it has died, as far as anybody knows.
   Status OnLoss(WorkerId worker, std::optional<Time> last_heard, Time now);
-  void OnReconnection(WorkerId worker, Time now);
+  void OnReconnection(WorkerId worker, Time now);  // messages from it or to it may be lost
   // Ignores trouble of another attempt or of a group that is done. message.unreachable, if any, must be in the roster. Trouble of the
   // display worker when all groups are done: it cannot make the picture.
   Status OnTrouble(const WorkerTrouble& message, Time now);
-  Status Expire(Time now);  // stalls, suspicions
+  Status Expire(Time now);           // stalls, suspicions
+  void Postpone(Duration duration);  // both end later, since the listener itself was asleep
 
   Time NextWake() const;  // of Expire and AttemptDue; Time::max(): none
 

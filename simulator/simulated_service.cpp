@@ -52,7 +52,22 @@ void SimulatedService::StartCoordinator(CoordinatorConfig config) {
   coordinator_runs_ = true;
   ++generation_;
   coordinator_alarm_ = kNever;
+  coordinator_held_ = 0;
   StepCoordinator(CoordinatorTick{});
+}
+
+void SimulatedService::JumpCoordinator(Duration by) {
+  coordinator_ahead_ += by;
+  if (coordinator_runs_) SetCoordinatorAlarm();
+}
+
+Time SimulatedService::CoordinatorWake() const {
+  const Time wake = coordinator_->NextWake();
+  return wake == Time::max() ? wake : wake - coordinator_ahead_;
+}
+
+void SimulatedService::SetCoordinatorAlarm() {
+  SetAlarm(coordinator_alarm_, CoordinatorWake(), [this, generation = generation_] { WakeCoordinator(generation); });
 }
 
 std::optional<Node> SimulatedService::NodeOf(PeerToken token) const {
@@ -67,23 +82,24 @@ void SimulatedService::TellCoordinator(double when, CoordinatorEvent event) {
 
 void SimulatedService::StepCoordinator(const CoordinatorEvent& event) {
   if (!coordinator_runs_) return;
+  if (now() < coordinator_held_) return TellCoordinator(coordinator_held_, event);
   const bool message = std::holds_alternative<FromWorker>(event) || std::holds_alternative<FromClient>(event);
   coordinator_free_ = std::max(coordinator_free_, now()) + (message ? machine_.message_seconds : 0);
   conditions_.BeforeStep(event);
-  for (CoordinatorAction& action : coordinator_->Step(event, time())) {
+  for (CoordinatorAction& action : coordinator_->Step(event, coordinator_time())) {
     std::visit([this](auto& a) { Perform(a); }, action);
   }
   threads_.Active(Threads::kCoordinator, coordinator_free_);
-  if (coordinator_runs_) SetAlarm(coordinator_alarm_, coordinator_->NextWake(), [this, g = generation_] { WakeCoordinator(g); });
+  if (coordinator_runs_) SetCoordinatorAlarm();
 }
 
 void SimulatedService::WakeCoordinator(std::uint64_t generation) {
   if (generation != generation_ || !coordinator_runs_ || now() != coordinator_alarm_) return;
   coordinator_alarm_ = kNever;
-  const bool due = coordinator_->NextWake() <= time();
-  if (!due) return SetAlarm(coordinator_alarm_, coordinator_->NextWake(), [this, generation] { WakeCoordinator(generation); });
+  if (CoordinatorWake() > time()) return SetCoordinatorAlarm();
+  const bool held = now() < coordinator_held_;
   StepCoordinator(CoordinatorTick{});
-  CountSpin(coordinator_->NextWake());
+  if (!held) CountSpin(CoordinatorWake() <= time());
 }
 
 void SimulatedService::Perform(ToWorker& action) {
@@ -116,6 +132,7 @@ Node SimulatedService::AddWorker(WorkerConfig config) {
 void SimulatedService::StepWorker(Node node, WorkerEvent&& event) {
   Worker& worker = workers_[node];
   if (!worker.alive) return;
+  if (now() < worker.held) return queue_.At(worker.held, [this, node, event]() mutable { StepWorker(node, std::move(event)); });
   WorkerActions actions = worker.machine.Step(std::move(event), time(), std::move(actions_));
   for (WorkerAction& action : actions) {
     std::visit([&](auto& a) { Perform(node, a); }, action);
@@ -131,8 +148,9 @@ void SimulatedService::WakeWorker(Node node) {
   worker.alarm = kNever;
   const bool due = worker.machine.NextWake() <= time();
   if (!due) return SetAlarm(worker.alarm, worker.machine.NextWake(), [this, node] { WakeWorker(node); });
+  const bool held = now() < worker.held;
   StepWorker(node, Tick{});
-  CountSpin(worker.machine.NextWake());
+  if (!held) CountSpin(worker.machine.NextWake() <= time());
 }
 
 void SimulatedService::Perform(Node node, CancelRender& action) {
@@ -183,6 +201,7 @@ void SimulatedService::OnWorked(const LaneTask& task) {
 void SimulatedService::Finish(std::uint32_t place) {
   Job& job = JobAt(place);
   const Node node = job.node;
+  if (workers_[node].alive && now() < workers_[node].held) return queue_.TellAt(workers_[node].held, 2 * place);
   if (workers_[node].alive && std::holds_alternative<SendPartial>(job.action)) return SendToPeer(place);
   unused_jobs_.push_back(place);
   if (!workers_[node].alive) return;

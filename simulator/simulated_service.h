@@ -39,6 +39,7 @@ class SimulatedService {
   void StartCoordinator(CoordinatorConfig config);  // in place of the last one, whose connections are gone
   void StopCoordinator() { coordinator_runs_ = false; }
   bool coordinator_runs() const { return coordinator_runs_; }
+  const FrameMachine& coordinator() const { return *coordinator_; }
   double coordinator_free() const { return coordinator_free_; }  // its thread has done what it has heard of
   // At `when`, if it is still the same coordinator.
   void TellCoordinator(double when, CoordinatorEvent event);
@@ -54,6 +55,13 @@ class SimulatedService {
   const WorkerMachine& worker(Node node) const { return workers_[node].machine; }
   void StepWorker(Node node, WorkerEvent&& event);
   bool Idle(Node node, Lane lane) const { return lanes_.Idle(node, lane); }
+  // The process stands still until `until`: what happens to it meanwhile happens then, in order.
+  void HoldCoordinator(double until) { coordinator_held_ = std::max(coordinator_held_, until); }
+  void HoldWorker(Node node, double until) { workers_[node].held = std::max(workers_[node].held, until); }
+  bool Held(Node node) const { return now() < workers_[node].held; }
+  // The coordinator's clock jumps forward, and stays that much ahead.
+  void JumpCoordinator(Duration by);
+
   // How often in a row a machine asked to be woken at once, the coordinator's included.
   int spins() const { return spins_; }
 
@@ -65,6 +73,7 @@ class SimulatedService {
     WorkerMachine machine;
     bool alive = true;
     double alarm = kNever;                   // planned
+    double held = 0;                         // until then it stands still
     std::optional<std::uint32_t> rendering;  // a job
   };
 
@@ -73,9 +82,12 @@ class SimulatedService {
   void SetAlarm(double& alarm, Time wake, auto&& ring);
   // Events of jobs, by number: 2 * place, or more by one if its message arrives rather than its thread is done.
   void OnNumber(std::uint32_t number) { number % 2 == 0 ? Finish(number / 2) : Deliver(number / 2); }
+  Time coordinator_time() const { return time() + coordinator_ahead_; }
+  Time CoordinatorWake() const;  // as others see time
+  void SetCoordinatorAlarm();
   void WakeCoordinator(std::uint64_t generation);
   void WakeWorker(Node node);
-  void CountSpin(Time next_wake) { spins_ = next_wake <= time() ? spins_ + 1 : 0; }
+  void CountSpin(bool due) { spins_ = due ? spins_ + 1 : 0; }
 
   void Perform(ToWorker& action);
   void Perform(AnyOf<DropPlan, DropClient, UnloadDataset> auto&) {}
@@ -110,6 +122,8 @@ class SimulatedService {
   bool coordinator_runs_ = false;
   std::uint64_t generation_ = 0;  // of the coordinator
   double coordinator_free_ = 0, coordinator_alarm_ = kNever;
+  double coordinator_held_ = 0;              // until then it stands still
+  Duration coordinator_ahead_{};             // its clock's
   std::deque<Worker> workers_;               // by node
   WorkerActions actions_;                    // memory for those of a step
   static constexpr std::size_t kChunk = 64;  // jobs: the table of chunks stays small, and no job ever moves

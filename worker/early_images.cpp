@@ -6,9 +6,9 @@
 
 namespace slabstream {
 
-Status EarlyImages::Keep(PartialImage message, Bytes payload) {
+Status EarlyImages::Keep(PartialImage message, Bytes payload, Time now) {
   if (const auto group = groups_.find(message.key); group != groups_.end()) {
-    const bool known = std::ranges::any_of(group->second, [&](const auto& image) {
+    const bool known = std::ranges::any_of(group->second.images, [&](const auto& image) {
       return image.first.epoch == message.epoch && image.first.step == message.step && image.first.pixels == message.pixels &&
              image.first.from_worker == message.from_worker;
     });
@@ -21,15 +21,25 @@ Status EarlyImages::Keep(PartialImage message, Bytes payload) {
   }
   bytes_ = bytes;
   const GroupKey key = message.key;
-  groups_[key].emplace_back(std::move(message), std::move(payload));
+  Group& group = groups_[key];
+  group.images.emplace_back(std::move(message), std::move(payload));
+  group.last_came = now;
   return Status::Ok();
 }
 
 std::vector<std::pair<PartialImage, Bytes>> EarlyImages::Take(const GroupKey& key) {
   auto group = groups_.extract(key);
   if (group.empty()) return {};
-  for (const auto& image : group.mapped()) bytes_ -= Cost(image.first, image.second);
-  return std::move(group.mapped());
+  for (const auto& image : group.mapped().images) bytes_ -= Cost(image.first, image.second);
+  return std::move(group.mapped().images);
+}
+
+void EarlyImages::ForgetSince(Time limit) {
+  std::erase_if(groups_, [&](const auto& group) {
+    if (group.second.last_came >= limit) return false;
+    for (const auto& image : group.second.images) bytes_ -= Cost(image.first, image.second);
+    return true;
+  });
 }
 
 }  // namespace slabstream

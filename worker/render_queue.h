@@ -29,6 +29,7 @@ class RenderQueue {
 
   std::vector<SlabFetcher::Generation> SlabsInOrder() const;  // of waiting jobs
   std::set<GroupKey> GroupsOn(SlabFetcher::Generation slab) const;
+  std::size_t size() const { return waiting_.size() + (running_ ? 1 : 0); }
 
  private:
   struct Job {

@@ -68,6 +68,8 @@ class SlabFetcher {
 
   std::uint64_t cached_bytes() const { return cached_bytes_; }
   std::uint64_t fetched_bytes() const { return fetched_bytes_; }
+  std::size_t size() const { return slabs_.size(); }
+  std::size_t chunk_requests() const { return in_flight_.size(); }
 
  private:
   struct ChunkPlace {  // a chunk of a box inside the slab

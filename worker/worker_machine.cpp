@@ -286,7 +286,7 @@ void WorkerMachine::State::BeginAttempt(FrameId id, Frame& frame, const GroupAss
 
 void WorkerMachine::State::On(PartialImage&& partial, const Bytes& payload) {
   // Once the coordinator has admitted this worker, others send it images, and these may overtake the Welcome.
-  if (worker == 0) return (void)early.Keep(std::move(partial), payload);
+  if (worker == 0) return (void)early.Keep(std::move(partial), payload, now);
   if (partial.epoch != epoch) return;
   if (GroupRun* run = FindRun(partial.key)) {
     run->OnPartial(std::move(partial), payload, actions);
@@ -299,7 +299,7 @@ void WorkerMachine::State::On(PartialImage&& partial, const Bytes& payload) {
     if (partial.key.attempt == frame->second.attempt && frame->second.groups.contains(partial.key.group)) return;  // over
   }
   const GroupKey key = partial.key;
-  if (const Status kept = early.Keep(std::move(partial), payload); !kept.ok()) Trouble(key, kept);
+  if (const Status kept = early.Keep(std::move(partial), payload, now); !kept.ok()) Trouble(key, kept);
 }
 
 void WorkerMachine::State::On(const RenderDone& done) {
@@ -440,6 +440,7 @@ WorkerActions WorkerMachine::Step(WorkerEvent&& event, Time now, WorkerActions m
 void WorkerMachine::State::Tend() {
   slabs.ExpireRequests(now);
   if (config.memory_bytes != 0) slabs.SetRoom(RoomForVoxels());
+  early.ForgetSince(now - config.early_image_patience);
   ReportSlabFailures();
   if (!ended) KeepTime();
   if (worker != 0) {
@@ -470,5 +471,14 @@ Time WorkerMachine::NextWake() const { return state_->wake; }
 
 bool WorkerMachine::registered() const { return state_->worker != 0; }
 WorkerId WorkerMachine::worker() const { return state_->worker; }
+WorkerSizes WorkerMachine::sizes() const {
+  const State& state = *state_;
+  return {.frames = state.frames.size(),
+          .cancelled = state.cancelled.size(),
+          .early_images = state.early.size(),
+          .renders = state.renders.size(),
+          .chunk_requests = state.slabs.chunk_requests(),
+          .slabs = state.slabs.size()};
+}
 
 }  // namespace slabstream

@@ -17,8 +17,8 @@
 //                     it is in, a receive waits for its PartialImage; ranks of this same worker combine without a message
 //   root is complete  the group image goes to the display worker. It accumulates groups front to back (early ones wait), reports GroupDone
 //                     (with the tiles hidden by then), sends a preview if wanted, and after the last group the frame
-// PartialImages that arrive before their assignment or before the Welcome are kept, within a byte limit; those of finished frames and older
-// attempts are dropped. A second copy of any message changes nothing.
+// PartialImages that arrive before their assignment or before the Welcome are kept, within a byte limit and for some time; those of
+// finished frames and older attempts are dropped. A second copy of any message changes nothing.
 //
 // The executor must: run StartRender, StartCombine, FindHidden and StoreChunk on other threads and answer each with exactly one event; run
 // StartCombine, FindHidden, SendPartial and SendFrame in the order given; call Step(Tick) no later than NextWake(). If it calls late, the
@@ -79,6 +79,7 @@ struct WorkerConfig {
   int chunk_attempts = 10;                                   // then WorkerTrouble
   Duration drain = std::chrono::seconds(30);                 // from LeaveRequested to the end; 0: at once
   std::uint64_t early_image_bytes = std::uint64_t{1} << 30;  // payloads of PartialImages kept before their assignment; then WorkerTrouble
+  Duration early_image_patience = std::chrono::seconds(10);  // so long they are kept, at least
 };
 
 // The pixels of a PartialImage: runs, or another process' memory.
@@ -232,6 +233,15 @@ using WorkerAction = std::variant<SendControl, SendChunkRequest, ConnectSlabs, O
                                   StartCombine, FindHidden, SendPartial, SendFrame, ReleaseImage, StopProcess>;
 using WorkerActions = std::vector<WorkerAction>;
 
+// Entries in the machine's tables. At rest, all but those of cached slabs are 0.
+struct WorkerSizes {
+  std::size_t frames = 0, cancelled = 0;
+  std::size_t early_images = 0;  // groups that images have come for too early
+  std::size_t renders = 0;       // waiting, or running
+  std::size_t chunk_requests = 0;
+  std::size_t slabs = 0;
+};
+
 class WorkerMachine {
  public:
   explicit WorkerMachine(WorkerConfig config);
@@ -244,6 +254,7 @@ class WorkerMachine {
 
   bool registered() const;
   WorkerId worker() const;  // 0 while unregistered
+  WorkerSizes sizes() const;
 
  private:
   struct State;

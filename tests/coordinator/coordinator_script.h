@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <map>
 #include <set>
 #include <string>
 #include <utility>
@@ -129,9 +130,10 @@ class CoordinatorScript {
   const CoordinatorConfig config;
   FrameMachine machine;
   Time now{seconds(1000)};
-  std::vector<FakeWorker> workers;  // those that send heartbeats while time passes
-  std::vector<PeerToken> clients;   // those that send pings
-  std::vector<LoadDataset> loads;   // all that were asked for
+  std::vector<FakeWorker> workers;       // those that send heartbeats while time passes
+  std::map<WorkerId, PeerToken> tokens;  // of all that have joined
+  std::vector<PeerToken> clients;        // those that send pings
+  std::vector<LoadDataset> loads;        // all that were asked for
   std::vector<CountDataset> counts;
   Planner planner;
   bool plans_at_once = true;       // else plans wait in `plans` for Plan()
@@ -174,6 +176,7 @@ class CoordinatorScript {
     const auto welcomes = ToWorkers<Welcome>(actions);
     EXPECT_EQ(welcomes.size(), 1U);
     if (!welcomes.empty()) worker.id = welcomes[0].message.worker;
+    tokens[worker.id] = token;
     workers.push_back(worker);
     if (out != nullptr) *out = actions;
     return worker;
@@ -227,7 +230,7 @@ class CoordinatorScript {
                      .attempt = group.key.attempt,
                      .groups_done = groups_done,
                      .group_count = group.group_count};
-    return Step(FromWorker{.from = 0, .message = image, .payload = std::move(payload)});
+    return Step(FromWorker{.from = tokens.at(group.display), .message = image, .payload = std::move(payload)});
   }
   // The display worker reports the group and, after the last one, hands the frame over.
   Actions Answer(const GroupAssignment& group) {

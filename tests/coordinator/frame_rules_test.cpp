@@ -167,7 +167,8 @@ TEST(CoordinatorFrames, LossOfTheDisplayWorkerBeginsAgain) {
   EXPECT_EQ(again[0].first_group, 0U);
   EXPECT_NE(again[0].display, groups[0].display);
   // What the lost display worker said before it went is about a picture that is gone.
-  EXPECT_TRUE(script.Step(FromWorker{0, GroupDone{77, groups[1].display, groups[1].key, {}}, {}}).empty());
+  EXPECT_TRUE(
+      script.Step(FromWorker{script.tokens.at(groups[1].display), GroupDone{77, groups[1].display, groups[1].key, {}}, {}}).empty());
 }
 
 TEST(CoordinatorFrames, LossOfAWorkerThatHasDoneItsPartCostsNothing) {
@@ -197,7 +198,8 @@ TEST(CoordinatorFrames, NewsOfOlderAttemptsCountsIfItsSenderProvesIt) {
   EXPECT_TRUE(script.Worker(other, GroupDone{77, again[0].display, {1, 9, 0}, {}}).empty()) << "an attempt that never was";
   // Accumulated is accumulated: the third group goes out.
   EXPECT_THAT(Keys(HandedOut(script.Done(groups[0]))), ElementsAre(GroupKey{1, 2, 2}));
-  EXPECT_TRUE(ToClients<FrameReply>(script.Step(FromWorker{0, FrameImage{77, other.id, 1, 1, 3, 3, {}, {}}, {}})).empty());
+  EXPECT_TRUE(
+      ToClients<FrameReply>(script.Step(FromWorker{script.tokens.at(other.id), FrameImage{77, other.id, 1, 1, 3, 3, {}, {}}, {}})).empty());
   EXPECT_EQ(ToClients<FrameReply>(script.Image(groups[0], 3)).size(), 1U) << "a whole picture is one, whatever was tried since";
 }
 
@@ -300,7 +302,8 @@ TEST(CoordinatorFrames, TroubleIsTriedAgainWithPausesAndThenReported) {
   script.Join(12, 2);
   auto groups = HandedOut(script.Submit(kClient, Frame(1, 2)));
   const auto trouble = [&](const GroupAssignment& group, WorkerId worker) {
-    return script.Worker({}, WorkerTrouble{77, worker, group.key, 0, Status::ResourceExhausted("slab of 9 GB, budget 1 GB")});
+    return script.Worker(script.WorkerOf(worker),
+                         WorkerTrouble{77, worker, group.key, 0, Status::ResourceExhausted("slab of 9 GB, budget 1 GB")});
   };
   const WorkerId display = groups.at(0).display;
   const WorkerId other = display == 1 ? 2 : 1;
@@ -330,8 +333,9 @@ TEST(CoordinatorFrames, TroubleOfTheDisplayWorkerBeginsAgain) {
   script.Join(11, 1);
   const auto groups = HandedOut(script.Submit(kClient, Frame(1, 3)));
   script.Done(groups[0]);
-  const auto again = HandedOut(
-      script.Worker({}, WorkerTrouble{77, groups[0].display, groups[1].key, 0, Status::DataLoss("0 groups accumulated, expected 1")}));
+  const auto again =
+      HandedOut(script.Worker(script.WorkerOf(groups[0].display), WorkerTrouble{77, groups[0].display, groups[1].key, 0,
+                                                                                Status::DataLoss("0 groups accumulated, expected 1")}));
   ASSERT_THAT(Keys(again), ElementsAre(GroupKey{1, 2, 0}, GroupKey{1, 2, 1}));
   EXPECT_EQ(again[0].first_group, 0U);
   EXPECT_TRUE(script.Done(groups[1]).empty()) << "said before the trouble";
@@ -350,7 +354,7 @@ TEST(CoordinatorFrames, WorkerThatIsUnableIsLeftOutAtOnceAndOnlyOfThisFrame) {
   const auto groups = HandedOut(script.Submit(kClient, Frame(1, 3)));
   script.Done(groups.at(0));
   const WorkerId unable = groups[0].display % 3 + 1;
-  const Actions actions = script.Worker({}, Unable(groups[1], unable));
+  const Actions actions = script.Worker(script.WorkerOf(unable), Unable(groups[1], unable));
   const auto again = HandedOut(actions);
   ASSERT_EQ(again.at(0).key, (GroupKey{1, 2, 1}));
   EXPECT_FALSE(WorkersOf(again[0]).contains(unable));
@@ -366,11 +370,11 @@ TEST(CoordinatorFrames, FrameThatNoWorkerIsAbleToRenderFailsAtOnceWithTheReason)
     Actions actions = script.Submit(kClient, Frame(1, 2));
     for (int i = 1; i < workers; ++i) {
       const GroupAssignment group = HandedOut(actions).at(0);
-      actions = script.Worker({}, Unable(group, *WorkersOf(group).begin()));
+      actions = script.Worker(script.WorkerOf(*WorkersOf(group).begin()), Unable(group, *WorkersOf(group).begin()));
       EXPECT_TRUE(ToClients<FrameFailed>(actions).empty());
     }
     const GroupAssignment last = HandedOut(actions).at(0);
-    const auto failed = ToClients<FrameFailed>(script.Worker({}, Unable(last, last.display)));
+    const auto failed = ToClients<FrameFailed>(script.Worker(script.WorkerOf(last.display), Unable(last, last.display)));
     ASSERT_EQ(failed.size(), 1U) << workers << " workers";
     EXPECT_EQ(failed[0].message.status.code(), StatusCode::kResourceExhausted);
     EXPECT_EQ(failed[0].message.status.message(), "worker " + std::to_string(last.display) + ": render: not enough memory");
@@ -385,7 +389,7 @@ TEST(CoordinatorFrames, PictureThatTheDisplayWorkerCannotMakeIsMadeByAnother) {
   const auto groups = HandedOut(script.Submit(kClient, Frame(1, 2)));
   script.Done(groups.at(0));
   script.Done(groups.at(1));
-  const Actions actions = script.Worker({}, Unable(groups[1], groups[1].display));
+  const Actions actions = script.Worker(script.WorkerOf(groups[1].display), Unable(groups[1], groups[1].display));
   const auto again = HandedOut(actions);
   ASSERT_EQ(again.at(0).key, (GroupKey{1, 2, 0})) << "what it accumulated is its own";
   EXPECT_NE(again[0].display, groups[0].display);

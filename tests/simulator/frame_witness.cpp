@@ -61,6 +61,7 @@ void FrameWitness::OnGroupDone(const GroupDone& done) {
 void FrameWitness::OnAssignment(const GroupAssignment& assignment, std::size_t workers, int teams) {
   SeenFrame& frame = frames_[assignment.key.frame];
   if (assignment.key.attempt > frame.attempt) {
+    if (frame.attempt > 0) tally_.Add(Count::kAttempts);
     frame.attempt = assignment.key.attempt;
     frame.handed_out.clear();
   }
@@ -74,11 +75,11 @@ void FrameWitness::OnAssignment(const GroupAssignment& assignment, std::size_t w
     boxes.push_back(placement.id);
     frame.boxes[placement.id] = placement.box;
     Box& last = last_boxes_.try_emplace(placement.id, placement.box).first->second;
-    if (faults_.none() && last != placement.box) ++tally_.moved_boxes;
+    if (faultless_ && last != placement.box) tally_.Add(Count::kMovedBoxes);
     last = placement.box;
     if (HidesBox(assignment.hidden, placement.box, assignment.setup)) {
       frame.left_out.insert(placement.id);
-      ++tally_.hidden_boxes;
+      tally_.Add(Count::kHiddenBoxes);
       continue;
     }
     const std::pair<WorkerId, Box> slab{placement.worker, SlabBox(placement.box, assignment.setup)};
@@ -94,15 +95,15 @@ void FrameWitness::OnAssignment(const GroupAssignment& assignment, std::size_t w
   // While frames wait for their next attempt, the groups of the last one, which may have had the window to itself, are still out but no
   // longer counted.
   const FrameWindow window = WindowFor(workers, std::uint32_t(teams), FrameBytes(assignment.setup));
-  EXPECT_LE(unfinished, std::size_t(faults_.none() ? window.groups : window.groups * window.frames));
-  if (faults_.none() && UsesOcclusion(assignment.setup)) {
+  EXPECT_LE(unfinished, std::size_t(faultless_ ? window.groups : window.groups * window.frames));
+  if (faultless_ && UsesOcclusion(assignment.setup)) {
     EXPECT_LE(frame.unfinished(), std::size_t(kMaskedGroups));
   }
 }
 
 void FrameWitness::CheckHidden(const GroupAssignment& assignment, const SeenFrame& frame) {
-  ++tally_.masks;
-  if (assignment.key.attempt > 1) ++tally_.masks_of_retries;
+  tally_.Add(Count::kMasks);
+  if (assignment.key.attempt > 1) tally_.Add(Count::kMasksOfRetries);
   const Status fits = CheckFits(assignment.hidden, assignment.setup);
   EXPECT_TRUE(fits.ok()) << fits.message();
   const auto done = frame.done.find(assignment.display);
@@ -140,10 +141,10 @@ void FrameWitness::OnPicture(const FrameImage& image, const Bytes& payload, cons
     EXPECT_TRUE(UsesOcclusion(frame->second.setup) && LacksHiddenBoxesOnly(seen, expected, frame->second.left_out, x, y))
         << "frame " << image.frame << ", pixel " << i << " shows " << testing::PrintToString(seen) << ", not "
         << testing::PrintToString(expected);
-    ++tally_.hidden_pixels;
+    tally_.Add(Count::kHiddenPixels);
   }
   if (reply.groups_done < reply.group_count) {
-    ++tally_.previews;
+    tally_.Add(Count::kPreviews);
     return;
   }
   for (std::size_t far = 1; far < expected.size(); ++far) {
@@ -153,12 +154,12 @@ void FrameWitness::OnPicture(const FrameImage& image, const Bytes& payload, cons
     }
   }
   frame->second.over = true;
-  if (!faults_.none()) return;
+  if (!faultless_) return;
   if (frame->second.all_cached) {
     std::uint64_t moved = 0;
     for (const RankReport& report : reply.statistics.reports) moved += report.voxel_bytes;
     EXPECT_EQ(moved, 0U) << "voxels that were there moved again";
-    ++tally_.cached_frames;
+    tally_.Add(Count::kCachedFrames);
   }
   fetched_.insert(frame->second.slabs.begin(), frame->second.slabs.end());
 }

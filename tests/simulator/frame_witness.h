@@ -10,14 +10,14 @@
 
 #include "common/base/bytes.h"
 #include "common/wire/any_message.h"
-#include "tests/simulator/faults.h"
 #include "tests/simulator/tally.h"
 
 namespace slabstream {
 
 class FrameWitness {
  public:
-  FrameWitness(const Faults& faults, Tally& tally) : faults_(faults), tally_(tally) {}
+  // Without faults more must hold.
+  FrameWitness(bool faultless, Tally& tally) : faultless_(faultless), tally_(tally) {}
 
   void OnRestart();  // of the coordinator: it knows of no frame
   void OnAssignment(const GroupAssignment& assignment, std::size_t workers, int teams);
@@ -48,7 +48,7 @@ class FrameWitness {
 
   void CheckHidden(const GroupAssignment& assignment, const SeenFrame& frame);
 
-  const Faults& faults_;
+  const bool faultless_;
   Tally& tally_;
   std::map<FrameId, SeenFrame> frames_;         // of this epoch
   std::map<BoxId, Box> last_boxes_;             // as they were handed out last

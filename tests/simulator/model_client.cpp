@@ -15,6 +15,7 @@ constexpr int kSubmissions = 4;
 void ModelClient::Submit(SubmitFrame submit) {
   if (vanished_) return;
   if (open_.empty()) last_pong_ = service_.time();
+  ++submitted_;
   open_[submit.request] = {submit, 0, 1};
   send_(std::move(submit));
   if (!pinging_) Ping();
@@ -73,7 +74,7 @@ void ModelClient::Deliver(const AnyMessage& message) {
 
 void ModelClient::End(RequestId request, Ended how) {
   if (open_.erase(request) == 0) return;
-  ended_.emplace(request, std::move(how));
+  EXPECT_TRUE(ended_.emplace(request, std::move(how)).second) << "request " << request << " ends twice";
 }
 
 }  // namespace slabstream

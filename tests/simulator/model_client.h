@@ -31,7 +31,7 @@ class ModelClient {
 
   bool idle() const { return vanished_ || open_.empty(); }
   bool vanished() const { return vanished_; }
-  std::size_t open() const { return open_.size(); }
+  std::size_t submitted() const { return submitted_; }
   const std::map<RequestId, Ended>& ended() const { return ended_; }
   const std::set<RequestId>& cancelled() const { return cancelled_; }
 
@@ -47,6 +47,7 @@ class ModelClient {
 
   SimulatedService& service_;
   Send send_;
+  std::size_t submitted_ = 0;
   std::map<RequestId, Open> open_;
   std::map<RequestId, Ended> ended_;
   std::set<RequestId> cancelled_;

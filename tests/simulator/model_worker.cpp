@@ -7,16 +7,35 @@
 #include "tests/simulator/model_occlusion.h"
 
 namespace slabstream {
+namespace {
+
+constexpr double kLongestRender = 10, kLongestOther = 0.5;  // seconds
+constexpr std::uint64_t kLargePixels = 4;
+
+}  // namespace
 
 WorkCost ModelWorker::Begin(Job& job) {
-  return {std::visit([&](const auto& action) { return Begin(job, action); }, job.action)};
+  const double seconds = std::visit([&](const auto& action) { return Begin(job, action); }, job.action);
+  return {Slowed(seconds, std::holds_alternative<StartRender>(job.action) ? kLongestRender : kLongestOther)};
+}
+
+// Within limits: what was begun slowly ends slowly, also after the world has healed.
+double ModelWorker::Slowed(double seconds, double longest) {
+  return slowness_ == 1 ? seconds : std::max(seconds, std::min(seconds * slowness_, longest));
+}
+
+bool ModelWorker::LacksMemory(std::uint64_t pixels) {
+  const bool lacks = !has_memory_ && pixels >= kLargePixels;
+  if (lacks) tally_.Add(Count::kLargeFramesRefused);
+  return lacks;
 }
 
 WorkerEvent ModelWorker::Answer(Job& job) {
   return std::visit(Overloaded{[&](const StartRender& action) -> WorkerEvent { return Rendered(action, job.cancelled); },
                                [&](const StoreChunk& action) -> WorkerEvent { return Stored(action); },
                                [&](const StartCombine& action) -> WorkerEvent {
-                                 const bool fails = random_.Chance(faults_.fail_combine);
+                                 const bool fails =
+                                     random_.Chance(faults_.fail_combine) || LacksMemory(std::uint64_t(action.frame.pixel_count()));
                                  const Status status = fails ? Status::ResourceExhausted("no memory to combine") : Status::Ok();
                                  return CombineDone{action.key, action.image, status, {Stage::kCombine, 0, 1}};
                                },
@@ -28,7 +47,7 @@ WorkerEvent ModelWorker::Answer(Job& job) {
 }
 
 void ModelWorker::OnRequest(const ChunkRequest& request) {
-  const std::uint32_t bytes = BytesOfChunk(request.box, ScalarType::kUint8, request.chunk);
+  const std::uint32_t bytes = BytesOfChunk(request.box, kVoxelType, request.chunk);
   requested_[{request.dataset, request.box, request.chunk}] = {bytes, service_.time()};
 }
 
@@ -97,6 +116,7 @@ double ModelWorker::Begin(Job&, const StartRender& action) {
   EXPECT_TRUE(action.slab.box.Contains(SlabBox(action.placement.box, *action.setup))) << "a slab without the voxels of its box";
   EXPECT_EQ(action.slab.dataset, action.setup->dataset);
   rendering_ = action.slab;
+  if (slowness_ != 1) tally_.Add(Count::kSlowRenders);
   render_seconds_ = speed_.render * random_.Real(0.5, 2);
   return render_seconds_;
 }
@@ -106,7 +126,7 @@ RenderDone ModelWorker::Rendered(const StartRender& render, bool cancelled) {
   Status status;
   if (cancelled) {
     status = Status::Cancelled("render");
-  } else if (random_.Chance(faults_.fail_render)) {
+  } else if (random_.Chance(faults_.fail_render) || LacksMemory(std::uint64_t(FrameBounds(*render.setup).pixel_count()))) {
     status = Status::ResourceExhausted("no memory to render");
   }
   if (status.ok()) {

@@ -10,10 +10,13 @@
 
 #include "simulator/simulated_service.h"
 #include "tests/simulator/faults.h"
+#include "tests/simulator/tally.h"
 #include "tests/support/symbolic_images.h"
 #include "worker/worker_machine.h"
 
 namespace slabstream {
+
+inline constexpr ScalarType kVoxelType = ScalarType::kFloat32;  // of the only volume
 
 struct WorkerSpeed {
   double render = 0, combine = 0, store = 0, finish = 0;  // seconds
@@ -21,9 +24,14 @@ struct WorkerSpeed {
 
 class ModelWorker {
  public:
+  // `faults` may change: what they say at the time counts.
   ModelWorker(Node node, WorkerConfig config, const WorkerSpeed& speed, const Faults& faults, Random& random,
-              const SimulatedService& service)
-      : node_(node), config_(std::move(config)), speed_(speed), faults_(faults), random_(random), service_(service) {}
+              const SimulatedService& service, Tally& tally)
+      : node_(node), config_(std::move(config)), speed_(speed), faults_(faults), random_(random), service_(service), tally_(tally) {}
+
+  void SlowDown(double slowness) { slowness_ = slowness; }
+  void TakeMemory() { has_memory_ = false; }  // for large frames
+  void Heal() { slowness_ = 1, has_memory_ = true; }
 
   // As in Conditions.
   WorkCost Begin(Job& job);
@@ -37,6 +45,7 @@ class ModelWorker {
 
   bool stopped() const { return stopped_; }
   std::size_t images() const { return images_.size(); }
+  std::size_t slabs() const { return slabs_.size(); }
 
  private:
   struct Outstanding {
@@ -56,6 +65,8 @@ class ModelWorker {
   double Begin(Job& job, const FindHidden& action);
   double Begin(Job& job, const SendPartial& action);
   double Begin(Job& job, const SendFrame& action);
+  double Slowed(double seconds, double longest);
+  bool LacksMemory(std::uint64_t pixels);
   RenderDone Rendered(const StartRender& render, bool cancelled);
   ChunkStored Stored(const StoreChunk& store);
   bool Complete(const SlabKey& key) const;
@@ -66,7 +77,10 @@ class ModelWorker {
   const Faults& faults_;
   Random& random_;
   const SimulatedService& service_;
+  Tally& tally_;
   bool stopped_ = false;
+  double slowness_ = 1;
+  bool has_memory_ = true;
 
   SymbolicImages images_;
   std::optional<SlabKey> rendering_;

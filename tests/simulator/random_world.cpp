@@ -17,7 +17,8 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr Index3 kVolumeSize{256, 256, 128};  // 8 MiB: a slab has 1 to 8 chunks
+// 8 MiB: a slab has 1 to 8 chunks. Voxels of four bytes, since plans cost time by voxel.
+constexpr Index3 kVolumeSize{256, 64, 128};
 
 // Values up to 50 show nothing.
 TransferFunction StepTransfer() {
@@ -31,6 +32,7 @@ TransferFunction StepTransfer() {
 void MakeVolume(Random& random, World& world) {
   auto summary = std::make_shared<VolumeSummary>();
   summary->description.geometry.size = kVolumeSize;
+  summary->description.type = kVoxelType;
   summary->range = {0, 255};
   summary->brick_counts = {kVolumeSize.x / kBrick, kVolumeSize.y / kBrick, kVolumeSize.z / kBrick};
   const double empty = random.Chance(0.05) ? 1 : random.Real(0, 0.8);

@@ -15,11 +15,9 @@ using std::chrono::seconds;
 constexpr std::uint32_t kDeadlineMs = 60000;
 constexpr Duration kBound = milliseconds(kDeadlineMs) + seconds(30);  // until every request has ended, from the last one on
 constexpr Duration kTroubled = seconds(5);                            // requests are made and things break in this time
-constexpr Duration kSettle = seconds(14);                             // long enough for every time-out of the machines below
-
-// Ends of links, and names of connections: workers 0, 1, ...; clients from kClientEnds on.
-constexpr int kClientEnds = 1 << 20;
-constexpr int kCoordinatorEnd = -1, kSlabServerEnd = -2;
+constexpr Duration kSettleSlowly = seconds(90);                       // and for what was begun slowly
+constexpr RequestId kRequestAfterHealing = 1000;
+constexpr Duration kSettle = seconds(14);  // long enough for every time-out of the machines below
 
 // What the other end would decode.
 AnyMessage OverTheWire(const AnyMessage& message) {
@@ -34,56 +32,40 @@ Simulation::Simulation(std::uint64_t seed, Tally& tally)
     : random_(seed),
       tally_(tally),
       faults_(RandomFaults(random_)),
-      network_(random_, faults_, std::chrono::microseconds(random_.Integer(50, 5000))),
+      current_(faults_),
+      network_(random_, faults_, std::chrono::microseconds(random_.Integer(50, 5000)), tally),
       encode_messages_(random_.Chance(0.02)),
       world_(RandomWorld(random_, faults_)),
-      witness_(faults_, tally),
-      service_(machine_, *this) {}
+      witness_(faults_.none(), tally),
+      service_(machine_, *this),
+      words_(random_) {}
 
 // ---------------------------------------------------------------- the world
 
+Node Simulation::AddNode() {
+  WorkerConfig config = world_.worker_config;
+  config.incarnation = random_.Integer<Incarnation>(1, std::uint64_t{1} << 62);
+  workers_.emplace_back(Node(workers_.size()), config, world_.speed, current_, random_, service_, tally_);
+  return service_.AddWorker(std::move(config));
+}
+
 void Simulation::AddWorker(Duration after) {
   service_.queue().After(after, [this] {
-    WorkerConfig config = world_.worker_config;
-    config.incarnation = random_.Integer<Incarnation>(1, std::uint64_t{1} << 62);
-    workers_.emplace_back(Node(workers_.size()), config, world_.speed, faults_, random_, service_);
-    service_.AddWorker(std::move(config));
+    const Node node = AddNode();
+    if (random_.Chance(current_.slow)) {
+      tally_.Add(Count::kSlowWorkers);
+      workers_[node].SlowDown(current_.slowness);
+    }
+    if (random_.Chance(current_.without_memory)) {
+      tally_.Add(Count::kWorkersWithoutMemory);
+      workers_[node].TakeMemory();
+    }
   });
 }
 
-void Simulation::KillWorker() {
-  std::vector<Node> alive;
-  for (Node node = 0; node < workers_.size(); ++node) {
-    if (service_.alive(node)) alive.push_back(node);
-  }
-  if (alive.empty()) return;
-  const Node victim = alive[random_.Integer<std::size_t>(0, alive.size() - 1)];
-  service_.KillWorker(victim);
-  ++tally_.workers_killed;
-  if (!random_.Chance(faults_.silent_kill)) told_dead_.insert(victim);
-  if (Staying().empty()) workerless_ = true;
-  if (random_.Chance(faults_.restart)) AddWorker(milliseconds(random_.Integer(1, 4000)));
-}
-
-std::vector<Node> Simulation::Staying() const {
-  std::vector<Node> staying;
-  for (Node node = 0; node < workers_.size(); ++node) {
-    if (service_.alive(node) && !leaving_.contains(node)) staying.push_back(node);
-  }
-  return staying;
-}
-
-void Simulation::TellWorkerToLeave() {
-  const std::vector<Node> staying = Staying();
-  if (staying.empty()) return;
-  const Node leaver = staying[random_.Integer<std::size_t>(0, staying.size() - 1)];
-  // Until it knows its id it cannot say that it leaves: it is lost.
-  if (faults_.gentle() && !service_.worker(leaver).registered()) return;
-  leaving_.insert(leaver);
-  ++tally_.workers_left;
-  if (staying.size() == 1) workerless_ = true;
-  service_.StepWorker(leaver, LeaveRequested{});
-  if (random_.Chance(faults_.restart)) AddWorker(milliseconds(random_.Integer(1, 4000)));
+void Simulation::AddClient() {
+  clients_.push_back(
+      std::make_unique<ModelClient>(service_, [this, i = clients_.size()](const AnyMessage& message) { FromClientNode(i, message); }));
 }
 
 void Simulation::StartCoordinator() {
@@ -101,25 +83,9 @@ void Simulation::StartCoordinator() {
   service_.StartCoordinator(std::move(config));
 }
 
-void Simulation::RestartCoordinator() {
-  if (!service_.coordinator_runs()) return;
-  service_.StopCoordinator();
-  ++tally_.coordinator_restarts;
-  service_.queue().After(milliseconds(random_.Integer(1, 6000)), [this] { StartCoordinator(); });
-}
-
-// Everything that happens beside messages, somewhere in `span` from now on.
-void Simulation::PlanTroubles(Duration span) {
-  const auto somewhere = [&](std::function<void()> what) {
-    service_.queue().After(Duration(random_.Integer<std::int64_t>(0, span.count())), std::move(what));
-  };
-  for (int i = 0; i < faults_.worker_kills; ++i) somewhere([this] { KillWorker(); });
-  for (int i = 0; i < faults_.workers_leaving; ++i) somewhere([this] { TellWorkerToLeave(); });
-  for (int i = 0; i < faults_.workers_joining; ++i) somewhere([this] { AddWorker({}); });
-  for (int i = 0; i < faults_.coordinator_restarts; ++i) somewhere([this] { RestartCoordinator(); });
-  for (const auto& client : clients_) {
-    if (random_.Chance(faults_.vanish)) somewhere([c = client.get()] { c->Vanish(); });
-  }
+void Simulation::Submit(ModelClient& client, RequestId request) {
+  ++requests_made_;
+  client.Submit(RandomRequest(random_, world_.policy, request, kDeadlineMs));
 }
 
 bool Simulation::Idle() const {
@@ -137,15 +103,12 @@ void Simulation::RunUntil(Duration from_now, bool until_idle) {
 }
 
 void Simulation::Run() {
-  ++tally_.worlds;
+  tally_.Add(Count::kWorlds);
   StartCoordinator();
   const int workers = random_.Integer(1, 8);
   for (int i = 0; i < workers; ++i) AddWorker(faults_.none() ? Duration{} : Duration(milliseconds(random_.Integer(0, 500))));
   const int clients = random_.Integer(1, 3);
-  for (int i = 0; i < clients; ++i) {
-    clients_.push_back(
-        std::make_unique<ModelClient>(service_, [this, i](const AnyMessage& message) { FromClientNode(std::size_t(i), message); }));
-  }
+  for (int i = 0; i < clients; ++i) AddClient();
   // Without faults nobody asks before all workers are there: slots, and so slabs, then stay as they are.
   const Duration first = faults_.none() ? Duration(milliseconds(500)) : Duration{};
   for (const auto& client : clients_) {
@@ -154,8 +117,7 @@ void Simulation::Run() {
       ++requests_planned_;
       const Duration when = first + Duration(random_.Integer<std::int64_t>(0, Duration(kTroubled).count() / 2));
       service_.queue().After(when, [this, c = client.get(), r] {
-        ++requests_made_;
-        c->Submit(RandomRequest(random_, world_.policy, RequestId(r), kDeadlineMs));
+        Submit(*c, RequestId(r));
         if (random_.Chance(faults_.cancel)) {
           service_.queue().After(milliseconds(random_.Integer(0, 1000)), [c, r] { c->Cancel(RequestId(r)); });
         }
@@ -163,55 +125,84 @@ void Simulation::Run() {
     }
   }
   PlanTroubles(kTroubled);
-  tally_.requests += requests_planned_;
 
   RunUntil(kTroubled + kBound, true);
+  tally_.Add(Count::kRequests, requests_planned_);
   CheckOutcome();
-  network_.CalmDown();
-  RunUntil(kTroubled + kSettle, false);
+  Heal();
+  RunUntil(faults_.slow > 0 ? kSettleSlowly : kTroubled + kSettle, false);
+  CheckRecovery();
+  RunUntil(kSettle, false);
   CheckRest();
+  tally_.virtual_seconds += service_.now();
 }
 
 // ---------------------------------------------------------------- what must hold
 
 void Simulation::CheckOutcome() {
   EXPECT_TRUE(Idle()) << "a request has not ended in time";
+  const bool only_stops = faults_.none() || (faults_.only_stops_time() && faults_.worker_pauses == 0 && faults_.coordinator_pauses == 0);
   for (const auto& client : clients_) {
+    if (!client->vanished()) {
+      EXPECT_EQ(client->ended().size(), client->submitted());
+    }
     for (const auto& [request, ended] : client->ended()) {
-      if (ended.status.ok()) {
-        ++tally_.pictures;
-        if (ended.statistics.attempts > 1) ++tally_.retried;
-        if (faults_.gentle() && ended.statistics.attempts > 1) ++tally_.handed_over;
-        if (faults_.none()) {
+      const StatusCode code = ended.status.code();
+      if (code == StatusCode::kOk) {
+        tally_.Add(Count::kPictures);
+        if (ended.statistics.attempts > 1) tally_.Add(Count::kRetriedPictures);
+        if (faults_.gentle() && ended.statistics.attempts > 1) tally_.Add(Count::kHandedOver);
+        if (only_stops) {
           EXPECT_EQ(ended.statistics.attempts, 1U);
         }
         continue;
       }
-      ++tally_.errors;
-      // Two workers that die by chance may have had the same box of a frame.
-      const bool died_alike = faults_.worker_kills >= 2 && ended.status.message().find("as another worker before it") != std::string::npos;
-      const bool excused = !faults_.harmless() || workerless_ || died_alike || client->cancelled().count(request) > 0;
+      tally_.Add(ended.given_up                           ? Count::kGivenUp
+                 : code == StatusCode::kCancelled         ? Count::kCancelled
+                 : code == StatusCode::kDeadlineExceeded  ? Count::kErrorsOfDeadline
+                 : code == StatusCode::kResourceExhausted ? Count::kErrorsOfMemory
+                 : code == StatusCode::kUnavailable       ? Count::kErrorsOfWorkers
+                                                          : Count::kErrors);
+      const bool out_of_time = code == StatusCode::kDeadlineExceeded && faults_.clock_jumps > 0;
+      const bool stood_still = ended.given_up && faults_.coordinator_pauses + faults_.suspensions > 0;
+      const bool excused = !faults_.harmless() || workerless_ || out_of_time || stood_still || client->cancelled().count(request) > 0;
       EXPECT_TRUE(excused) << "a frame failed although there was a worker all the time: " << ended.status.message();
       EXPECT_FALSE(ended.status.message().empty());
-      const StatusCode code = ended.status.code();
-      EXPECT_TRUE(code != StatusCode::kInternal && code != StatusCode::kInvalidArgument && code != StatusCode::kOk)
-          << ended.status.message();
+      EXPECT_TRUE(code != StatusCode::kInternal && code != StatusCode::kInvalidArgument) << ended.status.message();
       if (code == StatusCode::kCancelled) {
-        ++tally_.cancelled;
         EXPECT_EQ(client->cancelled().count(request), 1U) << "cancelled, but not by the client";
       }
     }
   }
 }
 
+// Whatever happened before: the clients that are left, and a new one, get their pictures at once.
+void Simulation::CheckRecovery() {
+  if (Staying().empty()) {
+    AddWorker({});
+    RunUntil(seconds(1), false);
+  }
+  AddClient();
+  for (const auto& client : clients_) {
+    if (client->vanished()) continue;
+    ++requests_planned_;
+    tally_.Add(Count::kRequestsAfterHealing);
+    Submit(*client, kRequestAfterHealing);
+  }
+  RunUntil(kBound, true);
+  for (const auto& client : clients_) {
+    if (client->vanished()) continue;
+    const auto ended = client->ended().find(kRequestAfterHealing);
+    ASSERT_TRUE(ended != client->ended().end()) << "no picture after the world has healed";
+    EXPECT_TRUE(ended->second.status.ok()) << "after the world has healed: " << ended->second.status.message();
+    EXPECT_EQ(ended->second.statistics.attempts, ended->second.status.ok() ? 1U : 0U);
+  }
+}
+
 // After a while without work and faults, nothing is left of any frame; then the service goes down.
 void Simulation::CheckRest() {
   ASSERT_TRUE(service_.coordinator_runs());
-  for (Node node = 0; node < workers_.size(); ++node) {
-    if (!service_.alive(node) || workers_[node].stopped()) continue;
-    EXPECT_EQ(workers_[node].images(), 0U) << node;
-    EXPECT_TRUE(service_.worker(node).registered()) << node;
-  }
+  CheckTables();
   const PeerToken monitor = TokenOfClient(clients_.size());
   service_.StepCoordinator(FromClient{monitor, StatusQuery{1}});
   ASSERT_TRUE(status_.has_value());
@@ -223,6 +214,33 @@ void Simulation::CheckRest() {
   for (Node node = 0; node < workers_.size(); ++node) EXPECT_TRUE(!service_.alive(node) || workers_[node].stopped()) << node;
 }
 
+void Simulation::CheckTables() {
+  std::size_t registered = 0;
+  for (Node node = 0; node < workers_.size(); ++node) {
+    if (!service_.alive(node) || workers_[node].stopped()) continue;
+    ++registered;
+    EXPECT_EQ(workers_[node].images(), 0U) << node;
+    EXPECT_TRUE(service_.worker(node).registered()) << node;
+    const WorkerSizes sizes = service_.worker(node).sizes();
+    EXPECT_EQ(sizes.frames, 0U) << node;
+    EXPECT_EQ(sizes.cancelled, 0U) << node;
+    EXPECT_EQ(sizes.early_images, 0U) << node;
+    EXPECT_EQ(sizes.renders, 0U) << node;
+    EXPECT_EQ(sizes.chunk_requests, 0U) << node;
+    EXPECT_EQ(sizes.slabs, workers_[node].slabs()) << node;
+  }
+  const CoordinatorSizes sizes = service_.coordinator().sizes();
+  EXPECT_EQ(sizes.clients, 0U);
+  EXPECT_EQ(sizes.queued, 0U);
+  EXPECT_EQ(sizes.running, 0U);
+  EXPECT_EQ(sizes.over, 0U);
+  EXPECT_EQ(sizes.planning, 0U);
+  EXPECT_EQ(sizes.counting, 0U);
+  EXPECT_LE(sizes.grids, OccupancyTable::kMaxKept);
+  EXPECT_EQ(sizes.workers, registered);
+  EXPECT_EQ(sizes.slots, registered);
+}
+
 // ---------------------------------------------------------------- the coordinator
 
 void Simulation::Perform(ToClient& action) {
@@ -232,6 +250,7 @@ void Simulation::Perform(ToClient& action) {
     if (image != nullptr) witness_.OnPicture(*image, action.payload, *reply);
   }
   if (const auto* status = std::get_if<StatusReply>(&action.message)) status_ = *status;
+  words_.Overhear(action.message, action.payload);
   for (std::size_t client = 0; client < clients_.size(); ++client) {
     if (action.to != TokenOfClient(client)) continue;
     const Arrivals arrivals = network_.Send({kCoordinatorEnd, kClientEnds + int(client)}, service_.now());
@@ -251,14 +270,14 @@ WorkerEvent Simulation::Answer(Job& job) {
 
 void Simulation::Perform(const LoadDataset& action) {
   CoordinatorEvent loaded = DatasetLoaded{action.name, action.load, 1, world_.summary};
-  if (random_.Chance(faults_.fail_load)) loaded = DatasetFailed{action.name, Status::NotFound("the file of the volume is gone")};
+  if (random_.Chance(current_.fail_load)) loaded = DatasetFailed{action.name, Status::NotFound("the file of the volume is gone")};
   service_.TellCoordinator(service_.now() + random_.Real(0.001, 0.3), loaded);
 }
 
 void Simulation::Perform(const CountDataset& action) {
-  ++tally_.counts;
+  tally_.Add(Count::kCountsOfVoxels);
   OccupiedCounted counted{action.count, world_.occupied};
-  if (random_.Chance(faults_.fail_load)) counted.grid = Status::ResourceExhausted("not enough memory to count");
+  if (random_.Chance(current_.fail_load)) counted.grid = Status::ResourceExhausted("not enough memory to count");
   // Once, or twice, and with news of a count that nobody asked for.
   const int times = faults_.none() ? 1 : random_.Integer(1, 2);
   for (int i = 0; i < times; ++i) {
@@ -271,7 +290,7 @@ void Simulation::Perform(const CountDataset& action) {
 // Plans come late, and not always in the order in which they were asked for.
 void Simulation::Perform(const PlanRequest& action) {
   Planned planned{action.plan, planner_->Plan(action)};
-  if (random_.Chance(faults_.fail_load / 5)) planned.frame = Status::ResourceExhausted("not enough memory to plan");
+  if (random_.Chance(current_.fail_load / 5)) planned.frame = Status::ResourceExhausted("not enough memory to plan");
   service_.TellCoordinator(service_.now() + random_.Real(0, faults_.none() ? 200e-6 : 0.1), std::move(planned));
 }
 
@@ -284,13 +303,23 @@ Arrivals Simulation::ToWorker(Node to, AnyMessage& message, double sent) {
     witness_.OnAssignment(*assignment, workers_.size(), world_.policy.teams);
   }
   if (const auto* ping = std::get_if<Ping>(&message)) witness_.OnPing(*ping);
+  if (std::holds_alternative<Retire>(message)) tally_.Add(Count::kRetired);
+  words_.Overhear(message, {});
+  if (const auto peer = hostile_peers_.find(to); peer != hostile_peers_.end()) return HearAsHostile(peer->second, message);
   if (told_dead_.contains(to)) return {.nobody = true};
   message = OnTheWay(message);
   return network_.Send({kCoordinatorEnd, int(to)}, sent);
 }
 
 Arrivals Simulation::ToCoordinator(Node from, AnyMessage& message) {
+  if (IsHostile(from) && !hostile_peers_.at(from).worker) return {};
   if (const auto* done = std::get_if<GroupDone>(&message); done != nullptr && done->epoch == epoch_) witness_.OnGroupDone(*done);
+  if (const auto* trouble = std::get_if<WorkerTrouble>(&message)) {
+    tally_.Add(Count::kTroubles);
+    if (trouble->elsewhere) tally_.Add(Count::kTroublesElsewhere);
+    if (trouble->unreachable != 0) tally_.Add(Count::kComplaints);
+  }
+  words_.Overhear(message, {});
   message = OnTheWay(message);
   return network_.Send({int(from), kCoordinatorEnd}, service_.now());
 }
@@ -298,6 +327,7 @@ Arrivals Simulation::ToCoordinator(Node from, AnyMessage& message) {
 Arrivals Simulation::ToPeer(Node to, Job& sends) {
   if (told_dead_.contains(to) && random_.Chance(0.3)) return {.nobody = true};
   PartialImage& image = std::get<SendPartial>(sends.action).message;
+  words_.Overhear(image, sends.payload ? *sends.payload : Bytes());
   image = std::get<PartialImage>(OnTheWay(image));
   return network_.Send({int(sends.node), int(to)}, service_.now());
 }
@@ -324,7 +354,7 @@ AnyMessage Simulation::AnswerOf(const ChunkRequest& request) {
   chunk.dataset = request.dataset;
   chunk.box = request.box;
   chunk.chunk = request.chunk;
-  chunk.raw_bytes = BytesOfChunk(request.box, ScalarType::kUint8, request.chunk);
+  chunk.raw_bytes = BytesOfChunk(request.box, kVoxelType, request.chunk);
   chunk.encoded_bytes = chunk.raw_bytes;
   return chunk;
 }

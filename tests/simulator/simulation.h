@@ -7,13 +7,19 @@
 //   a mask of hidden tiles tells only of tiles that the groups in front hide, as the display worker at hand has accumulated them
 //   no image is left, read after its release or released twice; no slab is rendered from before it is complete; credits are kept
 //   no more groups are unfinished at a time than the window allows, nor of one frame with masks
-//   where only workers come and go and few messages are lost, but a worker is always there: every frame is finished
+//   where only workers come and go, processes and clocks stop, strangers talk, and few messages are lost: every frame is finished, as long
+//   as a worker is there all the time
+//   where everybody stops at once, or the coordinator's clock jumps, and nothing else: no frame needs a second attempt
 //   where workers only leave with notice, and have the time for it: no box of a frame is rendered twice
 //   without faults: no frame fails, none needs a second attempt, and voxels that a worker has had do not travel again
+//   after the world has healed: every client gets a picture, at the first attempt; then the tables of all machines are as at rest
+//
+// simulation.cpp runs the world and checks it, troubles.cpp breaks it.
 #pragma once
 
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -25,6 +31,7 @@
 #include "simulator/simulated_service.h"
 #include "tests/simulator/faults.h"
 #include "tests/simulator/frame_witness.h"
+#include "tests/simulator/hostile_words.h"
 #include "tests/simulator/model_client.h"
 #include "tests/simulator/model_worker.h"
 #include "tests/simulator/network.h"
@@ -34,24 +41,55 @@
 
 namespace slabstream {
 
+// Ends of links, and names of connections: workers 0, 1, ...; clients from kClientEnds on.
+inline constexpr int kClientEnds = 1 << 20, kHostileClientEnds = kClientEnds + (1 << 10);
+inline constexpr int kCoordinatorEnd = -1, kSlabServerEnd = -2;
+
 class Simulation : private Conditions {
  public:
   Simulation(std::uint64_t seed, Tally& tally);
   void Run();
 
  private:
+  struct HostilePeer {
+    HostileWords::Speaker self;
+    bool worker = false;  // it registers; else it is a stranger
+  };
+
   // ---- the world
   void AddWorker(Duration after);
-  void KillWorker();
-  void TellWorkerToLeave();
-  std::vector<Node> Staying() const;  // alive and not told to leave
+  Node AddNode();
+  void AddClient();
   void StartCoordinator();
-  void RestartCoordinator();
-  void PlanTroubles(Duration span);
+  void Submit(ModelClient& client, RequestId request);
   bool Idle() const;
+
+  // ---- what breaks
+  void PlanTroubles(Duration span);
+  std::vector<Node> Running() const;  // workers that are alive and do not stand still
+  std::vector<Node> Staying() const;  // those that were not told to leave
+  void TellWorkerToLeave();
+  void KillWorker(Node victim);
+  void KillSomeWorker();
+  void Preempt();
+  void RestartCoordinator();
+  void PauseWorker(double seconds);
+  void Suspend(double seconds);
+  void Cut();
+  void AddHostilePeer(bool worker, Duration span);
+  Arrivals HearAsHostile(HostilePeer& peer, const AnyMessage& message);
+  void Speak(HostilePeer& peer);
+  void SpeakAsClient(std::size_t hostile);
+  void BeatOf(HostilePeer& peer);
+  bool IsHostile(Node node) const { return hostile_peers_.contains(node); }
+  void Heal();
+
+  // ---- what must hold
   void RunUntil(Duration from_now, bool until_idle);
   void CheckOutcome();
+  void CheckRecovery();
   void CheckRest();
+  void CheckTables();
   PeerToken TokenOfClient(std::size_t client) const;
   AnyMessage OnTheWay(const AnyMessage& message) const;
   void FromClientNode(std::size_t client, const AnyMessage& message);
@@ -80,10 +118,11 @@ class Simulation : private Conditions {
 
   Random random_;
   Tally& tally_;
-  Faults faults_;
+  const Faults faults_;
+  Faults current_;  // none once the world has healed
   FaultyNetwork network_;
   const bool encode_messages_;  // in a few worlds messages are encoded and decoded on their way
-  bool workerless_ = false;     // for a moment no worker was alive
+  bool workerless_ = false;     // for a moment no worker was running
   const World world_;
   FrameWitness witness_;
   const MachineModel machine_ = WithoutDelays();  // what takes how long is up to the world
@@ -95,6 +134,8 @@ class Simulation : private Conditions {
   std::set<Node> told_dead_;                      // workers whose death the sockets notice
   std::set<Node> leaving_;                        // workers that were told to leave
   std::set<std::pair<FrameId, BoxId>> rendered_;  // in gentle worlds
+  std::map<Node, HostilePeer> hostile_peers_;
+  HostileWords words_;
   std::size_t requests_planned_ = 0, requests_made_ = 0;
   const CoordinatorEvent* cause_ = nullptr;  // what the coordinator deals with
   std::optional<StatusReply> status_;

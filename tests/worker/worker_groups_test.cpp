@@ -101,6 +101,22 @@ TEST_F(WorkerGroupsTest, ReportsOfEarlyImagesCount) {
   EXPECT_EQ(trouble[0].status.code(), StatusCode::kResourceExhausted);
 }
 
+// A frame of the far future would hold them for ever.
+TEST_F(WorkerGroupsTest, EarlyImagesAreForgottenInTime) {
+  WorkerConfig config = Config();
+  config.early_image_bytes = 10000;
+  config.early_image_patience = std::chrono::seconds(2);
+  Start(config);
+  const Bytes payload(std::vector<std::byte>(6000));
+  EXPECT_THAT(Tell(FromPeer({std::uint64_t{1} << 63U, 1, 0}), payload), IsEmpty());
+  EXPECT_EQ(machine->sizes().early_images, 1U);
+  EXPECT_THAT(Sent<WorkerTrouble>(Tell(FromPeer({1, 1, 0}), payload)), SizeIs(1)) << "no room beside it";
+  now += config.early_image_patience + Duration(1);
+  Tell(Ping{kEpoch, 0, {}});
+  EXPECT_EQ(machine->sizes().early_images, 0U);
+  EXPECT_THAT(Tell(FromPeer({1, 1, 0}), payload), IsEmpty());
+}
+
 TEST_F(WorkerGroupsTest, ANewAttemptReplacesTheOlderOne) {
   const auto old = All<StartRender>(Feed(Tell(Assignment(1, {kSelf, kPeer})))).at(0);
   const Actions replaced = Tell(Assignment(1, {kSelf, kSelf}, 0, 1, 2));

@@ -1,0 +1,56 @@
+// HostileWords: what peers say that were let in and keep to no protocol. All of it can be decoded: messages of other peers said again, by
+// others and elsewhere; unknown ids; the ids of others; numbers at the ends of their range. Three things they do not do. Only a worker's
+// own connection knows its incarnation. Nobody says false things of images that are its own to make, since nothing protects from that
+// (docs/security.md). And nobody ends the service, which is a client's right.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "common/base/bytes.h"
+#include "common/wire/any_message.h"
+#include "tests/support/random.h"
+
+namespace slabstream {
+
+class HostileWords {
+ public:
+  explicit HostileWords(Random& random) : random_(random) {}
+
+  struct Speaker {
+    Epoch epoch = 0;  // of the coordinator
+    WorkerId worker = 0;
+    Incarnation incarnation = 0;  // 0: it is no worker
+    std::uint32_t node = 0;
+  };
+  struct Words {
+    AnyMessage message;
+    Bytes payload;
+  };
+
+  // From now on it may be said again.
+  void Overhear(const AnyMessage& message, const Bytes& payload);
+
+  AnyMessage OfClient(const Policy& policy);
+  Words OfWorker(const Speaker& self, std::uint32_t nodes);  // to the coordinator, `nodes`: workers that there ever were
+  Words ToWorker(const Speaker& self);                       // on the images plane
+
+ private:
+  std::uint64_t Number();
+  std::uint32_t Number32() { return std::uint32_t(Number()); }
+  Epoch EpochLike(Epoch epoch) { return random_.Chance(0.8) ? epoch : Number(); }
+  GroupKey Key() { return {Number(), Number32(), Number32()}; }
+  Status Reason();
+  std::optional<Words> Again(Plane plane);
+  AnyMessage MakeOfClient(const Policy& policy);
+  AnyMessage MakeOfWorker(const Speaker& self, std::uint32_t nodes);
+  AnyMessage MakeToWorker(const Speaker& self);
+
+  Random& random_;
+  std::vector<Words> overheard_;
+  std::size_t next_place_ = 0;
+};
+
+}  // namespace slabstream
