@@ -377,7 +377,7 @@ Result<std::unique_ptr<WorkerService>> WorkerService::Start(Context& context, Wo
   SocketOptions images_options;
   if (options.keys) {
     keys = ImagesKeys{MakeKeyPair(), "images-" + std::to_string(config.incarnation)};
-    images_options.server_keys = ServerKeys{keys->own.secret_key, keys->plane};
+    images_options.server_keys = ServerKeys{.secret_key = keys->own.secret_key, .plane = keys->plane, .sealed = true};
     config.images_key = keys->own.public_key;
     context.authenticator().SetPatience(keys->plane, kPeerPatience);
   }

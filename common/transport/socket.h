@@ -11,6 +11,9 @@
 // again while it is broken, up to the high-water mark: tcp and ipc reconnect by themselves (every 100 ms), and the queue then reaches
 // whoever listens there now. So receivers check epochs, and a dealer whose peer is known to be dead is closed, which drops the queue after
 // the linger time. inproc does not reconnect: after its peer has closed, sending ends in ResourceExhausted.
+//
+// Sealed connections (keys.h) carry the same messages, in one direction. Sending one seals it, at some 3 GB/s, before Send returns.
+// Messages of which any frame is altered, lost, repeated or made by another one never arrive.
 #pragma once
 
 #include <cstdint>
