@@ -131,7 +131,9 @@ struct FrameMachine::State {
   void LoseWorker(WorkerId worker);
   void RemoveWorker(WorkerId worker);
   void StopAll(const AnyMessage& goodbye, const std::string& reason);
-  Ping MakePing() const { return {.epoch = config.epoch, .finished_before = frames.finished_before(), .cancelled = frames.cancelled()}; }
+  Ping MakePing() const {
+    return {.epoch = config.epoch, .finished_before = frames.finished_before(), .cancelled = frames.cancelled(), .gone = roster.Gone(now)};
+  }
   Time NextWake();
 
   // ---- actions

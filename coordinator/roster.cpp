@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "common/wire/limits.h"
+
 namespace slabstream {
 namespace {
 
@@ -68,6 +70,17 @@ void LiveRoster::Remove(WorkerId worker, Time now) {
     if (slot.worker == worker) slot = {.worker = 0, .vacant_since = now};
   }
   if (members_.empty()) empty_since_ = now;
+  std::erase_if(removed_, [&](const Removed& removed) { return IsLate(removed, now); });
+  if (removed_.size() == kMaxPeers) removed_.erase(removed_.begin());
+  removed_.push_back({worker, now});
+}
+
+std::vector<WorkerId> LiveRoster::Gone(Time now) const {
+  std::vector<WorkerId> gone;
+  for (const Removed& removed : removed_) {
+    if (!IsLate(removed, now)) gone.push_back(removed.worker);
+  }
+  return gone;
 }
 
 void LiveRoster::GiveUpVacancies(Time now) {

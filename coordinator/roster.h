@@ -51,6 +51,8 @@ class LiveRoster {
   const Member* Find(WorkerId worker) const;  // null: not a member
   std::vector<WorkerId> At(PeerToken peer) const;
   std::vector<WorkerId> Silent(Time now) const;  // not heard for the timeout
+  // Removed within the last two timeouts, at most kMaxPeers of them: whoever has not heard of it by then registers anew.
+  std::vector<WorkerId> Gone(Time now) const;
   const std::vector<Member>& members() const { return members_; }
   bool empty() const { return members_.empty(); }
   Time empty_since() const { return empty_since_; }  // Time::min(): there never was a worker
@@ -71,7 +73,14 @@ class LiveRoster {
   };
   Duration timeout_, vacancy_grace_;
   std::vector<Member> members_;  // by ascending id
+  struct Removed {
+    WorkerId worker = 0;
+    Time at;
+  };
+  bool IsLate(const Removed& removed, Time now) const { return now >= removed.at + 2 * timeout_; }
+
   std::vector<Slot> slots_;
+  std::vector<Removed> removed_;  // lately
   WorkerId last_id_ = 0;
   std::uint64_t version_ = 0;
   Time empty_since_ = Time::min();

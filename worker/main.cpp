@@ -1,4 +1,5 @@
-// slabstream-worker: one worker process. It waits for its coordinator without a time limit and ends on Stop, SIGINT or SIGTERM.
+// slabstream-worker: one worker process. It waits for its coordinator without a time limit and ends on Stop, SIGINT or SIGTERM, and if its
+// key is refused.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -25,7 +26,7 @@ Status Serve(WorkerOptions options) {
   auto service = WorkerService::Start(context, std::move(options));
   if (!service.ok()) return service.status();
   WaitUntilStopped(**service);
-  return Status::Ok();
+  return (*service)->ended();
 }
 
 int Run(int argc, char** argv) {

@@ -25,6 +25,7 @@
 #include "common/transport/endpoint.h"
 #include "common/transport/mailbox.h"
 #include "worker/executor.h"
+#include "worker/known_peers.h"
 #include "worker/peer_sockets.h"
 
 namespace slabstream {
@@ -87,11 +88,12 @@ struct WorkerService::Impl {
         control(std::move(control_socket)),
         images(std::move(images_socket)),
         peers(service_context, keys ? std::optional(keys->own) : std::nullopt),
+        others(keys ? &service_context.authenticator() : nullptr, keys ? keys->plane : ""),
         executor(std::in_place, outbox, options.compression == Compression::kOn ? Codec::kZstd : Codec::kRaw, int(options.machine.threads),
                  options.make_renderer, options.task_hook) {}
 
   void Run();
-  void Loop();
+  Status Loop();  // not ok: why the worker leaves though nobody told it to
   void Receive(Socket& socket, Plane plane);
   // False: the key of the connection is not that of the worker whom the message names.
   bool ComesFromItsSender(const Incoming& incoming, const AnyMessage& message) const;
@@ -130,12 +132,13 @@ struct WorkerService::Impl {
   PeerSockets peers;
   Epoch epoch = 0;
   LinkRates links;                       // while compression is automatic
-  std::map<WorkerId, Peer> others;       // of the epoch
+  KnownPeers others;                     // of this registration
   std::set<WorkerId> takes_frames_only;  // workers that cannot map memory though they have the same scope
   std::vector<PartialImage> to_refuse;   // from workers whose endpoint is not known yet
   std::atomic<bool> registered = false;  // at least once, or stopped
   std::atomic<bool> stop_requested = false;
   std::atomic<bool> stopped = false;
+  Status ended;                    // set before `stopped`
   bool stop_now = false;           // set by the machine
   LimitedLog complaints;           // about messages
   Mailbox<ExecutorOutput> outbox;  // its wakeup also signals stop_requested
@@ -144,7 +147,7 @@ struct WorkerService::Impl {
 };
 
 void WorkerService::Impl::Run() {
-  const Status ended = Guarded("worker", [&] { Loop(); });
+  ended = Guarded("worker", [&] { return Loop(); });
   if (!ended.ok()) {
     LogError("the worker leaves: " + ended.message());
     (void)Guarded("worker", [&] {
@@ -158,7 +161,7 @@ void WorkerService::Impl::Run() {
   stopped.notify_all();
 }
 
-void WorkerService::Impl::Loop() {
+Status WorkerService::Impl::Loop() {
   Time stop_deadline = Time::max();
   HandleEvent(Tick{});
   while (!stop_now && MonotonicNow() < stop_deadline) {
@@ -178,7 +181,11 @@ void WorkerService::Impl::Loop() {
     }
     peers.CloseIdle(now);
     executor->peer_memory().CloseIdle(now);
+    if (control.refused()) {
+      return Status::Unavailable("the coordinator at " + options.coordinator_endpoint + " refuses the key: it was revoked or is another's");
+    }
   }
+  return Status::Ok();
 }
 
 // Only what belongs to the plane is heard: everybody may send to the images plane, the coordinator alone to the others.
@@ -204,33 +211,30 @@ void WorkerService::Impl::Receive(Socket& socket, Plane plane) {
 
 bool WorkerService::Impl::ComesFromItsSender(const Incoming& incoming, const AnyMessage& message) const {
   if (incoming.user.empty()) return true;
-  const auto sender = others.find(SenderOf(message));
-  return sender == others.end() || sender->second.images_key == incoming.user;
+  const Peer* const sender = others.Find(SenderOf(message));
+  return sender == nullptr || sender->images_key == incoming.user;
 }
 
 // Handles memory shared between workers, and the links between them: the machine knows nothing of either.
 void WorkerService::Impl::Remember(const AnyMessage& message) {
   if (const auto* welcome = std::get_if<Welcome>(&message)) {
+    if (welcome->epoch != epoch || welcome->worker != machine.worker()) others.ForgetAll();
     if (std::exchange(epoch, welcome->epoch) == welcome->epoch) return;
     executor->Forget([](const GroupKey&) { return true; });
     takes_frames_only.clear();
-    others.clear();
-    if (keys) context.authenticator().AdmitOnly(keys->plane, {});
     links.ForgetAll();
   } else if (const auto* ping = std::get_if<Ping>(&message); ping != nullptr && ping->epoch == epoch) {
     executor->Forget([&](const GroupKey& key) {
       return key.frame < ping->finished_before || std::ranges::find(ping->cancelled, key.frame) != ping->cancelled.end();
     });
+    others.Gone(ping->gone, images);
   } else if (const auto* assignment = std::get_if<GroupAssignment>(&message); assignment != nullptr && assignment->epoch == epoch) {
     const GroupKey& now = assignment->key;
     executor->Forget([&](const GroupKey& key) {
       const bool read = key.frame == now.frame && (key.attempt < now.attempt || key.group < assignment->groups_done);
       return read || key.frame < assignment->finished_before;
     });
-    for (const Peer& peer : assignment->peers) {
-      others[peer.worker] = peer;
-      if (keys && !peer.images_key.empty()) context.authenticator().Admit(keys->plane, peer.images_key);
-    }
+    for (const Peer& peer : assignment->peers) others.Name(peer);
     for (const PartialImage& refused : std::exchange(to_refuse, {})) Refuse(refused);
   } else if (const auto* received = std::get_if<ImageReceived>(&message); received != nullptr && received->epoch == epoch) {
     links.Received(received->from_worker, received->number, MonotonicNow());
@@ -245,9 +249,9 @@ void WorkerService::Impl::Acknowledge(const AnyMessage& message, std::size_t pay
 
 // False: the sender is not known yet.
 bool WorkerService::Impl::Answer(WorkerId sender, const AnyMessage& message) {
-  const auto peer = others.find(sender);
-  if (peer == others.end()) return false;
-  const Status sent = peers.Send(peer->second, Encode(message), {}, MonotonicNow());
+  const Peer* const peer = others.Find(sender);
+  if (peer == nullptr) return false;
+  const Status sent = peers.Send(*peer, Encode(message), {}, MonotonicNow());
   if (!sent.ok()) LogWarning("worker " + std::to_string(sender) + " is not reached: " + sent.message());
   return true;
 }
@@ -416,5 +420,6 @@ void WorkerService::RequestStop() {
 void WorkerService::WaitUntilRegistered() { impl_->registered.wait(false); }
 void WorkerService::WaitUntilStopped() { impl_->stopped.wait(false); }
 bool WorkerService::stopped() const { return impl_->stopped; }
+Status WorkerService::ended() const { return impl_->stopped ? impl_->ended : Status::Ok(); }
 
 }  // namespace slabstream
