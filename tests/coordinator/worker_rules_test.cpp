@@ -4,6 +4,9 @@
 namespace slabstream {
 namespace {
 
+using testing::ElementsAre;
+using testing::IsEmpty;
+
 TEST(CoordinatorWorkers, RepeatedRegisterGetsTheSameWelcome) {
   CoordinatorScript script;
   const FakeWorker worker = script.Join(11, 1);
