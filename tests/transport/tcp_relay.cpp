@@ -13,7 +13,9 @@
 namespace slabstream {
 namespace {
 
-constexpr int kGlanceMs = 20;  // between looks at the order to stop
+constexpr int kGlanceMs = 20;        // between looks at the order to stop
+constexpr int kAnswerGlances = 5;    // that an answer may take
+constexpr int kCloseGlances = 1000;  // until the test fails
 
 sockaddr_in Loopback(int port) {
   sockaddr_in address = {};
@@ -64,8 +66,14 @@ TcpRelay::~TcpRelay() {
 std::string TcpRelay::endpoint() const { return "tcp://127.0.0.1:" + std::to_string(listening_port_); }
 
 std::string TcpRelay::Recorded() const {
+  std::string all;
+  for (const std::string& piece : Pieces()) all += piece;
+  return all;
+}
+
+std::vector<std::string> TcpRelay::Pieces() const {
   const std::lock_guard lock(mutex_);
-  return recorded_;
+  return pieces_;
 }
 
 int TcpRelay::connections() const {
@@ -78,13 +86,20 @@ void TcpRelay::AlterAfter(std::size_t bytes) {
   alter_after_ = bytes + 1;
 }
 
-void TcpRelay::Replay(const std::string& bytes) const {
+bool TcpRelay::Replay(const std::vector<std::string>& pieces) const {
   const int socket = ConnectTo(port_);
-  SendAll(socket, bytes.data(), bytes.size());
   std::array<char, 4096> taken{};
-  while (::recv(socket, taken.data(), taken.size(), 0) > 0) {
+  bool closed = false;
+  const auto take = [&](int glances) {
+    for (int i = 0; i < glances && !closed; ++i) closed = Readable(socket) && ::recv(socket, taken.data(), taken.size(), 0) <= 0;
+  };
+  for (const std::string& piece : pieces) {
+    SendAll(socket, piece.data(), piece.size());
+    take(kAnswerGlances);
   }
+  take(kCloseGlances);
   ::close(socket);
+  return closed;
 }
 
 void TcpRelay::Run(const std::stop_token& stop) {
@@ -117,7 +132,7 @@ void TcpRelay::Pass(int from, int to, const std::stop_token& stop) {
     if (count <= 0) return;
     {
       const std::lock_guard lock(mutex_);
-      recorded_.append(bytes.data(), std::size_t(count));
+      pieces_.emplace_back(bytes.data(), std::size_t(count));
       if (alter_after_ > std::size_t(count)) {
         alter_after_ -= std::size_t(count);
       } else if (alter_after_ > 0) {

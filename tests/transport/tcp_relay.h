@@ -6,6 +6,7 @@
 #include <mutex>
 #include <string>
 #include <thread>
+#include <vector>
 
 namespace slabstream {
 
@@ -25,8 +26,11 @@ class TcpRelay {
   // Alters the next byte that comes once `bytes` more have passed.
   void AlterAfter(std::size_t bytes);
 
-  // Sends these bytes to the port in a connection of its own, takes what comes, and returns when the other end closes.
-  void Replay(const std::string& bytes) const;
+  // The same in pieces. Between two of them the other end had a moment to answer, as a handshake needs.
+  std::vector<std::string> Pieces() const;
+
+  // Sends these pieces to the port in a connection of its own and takes what comes. False: the other end does not close it.
+  bool Replay(const std::vector<std::string>& pieces) const;
 
  private:
   void Run(const std::stop_token& stop);
@@ -35,7 +39,7 @@ class TcpRelay {
   const int port_;
   int listener_ = -1, listening_port_ = 0;
   mutable std::mutex mutex_;
-  std::string recorded_;  // guarded by mutex_, as are the next two
+  std::vector<std::string> pieces_;  // guarded by mutex_, as are the next two
   int connections_ = 0;
   std::size_t alter_after_ = 0;  // 0: nothing is altered
   std::jthread thread_;          // last member
