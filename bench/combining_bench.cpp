@@ -136,9 +136,10 @@ class PreparedPicture : public Renderer {
   Context context;
   WorkerOptions options;
   options.coordinator_endpoint = "ipc://" + directory + "/control";
-  const bool tcp = config.link == "tcp" || config.link == "curve";
+  const bool tcp = config.link == "tcp" || config.link == "sealed";
   options.images_endpoint = tcp ? "tcp://127.0.0.1:*" : "ipc://" + directory + "/images-" + std::to_string(rank);
-  if (config.link == "curve") options.keys = ClientKeys{MakeKeyPair().public_key, MakeKeyPair()};  // the coordinator's is not used over ipc
+  if (config.link == "sealed")
+    options.keys = ClientKeys{MakeKeyPair().public_key, MakeKeyPair()};  // the coordinator's is not used over ipc
   options.share_memory = config.link == "shared";
   options.compression = config.compression;
   options.make_renderer = [&](const RendererKind&) { return std::make_unique<PreparedPicture>(config, rank, shared); };
@@ -426,7 +427,7 @@ int main(int argc, char** argv) {
   AddList(app, "--size", options.sizes, CLI::Range(8, 8192), "Pixels a side, multiples of 8");
   AddList(app, "--schemes", options.schemes, scheme, "Combining schemes, separated by semicolons", ';');
   AddList(app, "--images", options.images, CLI::IsMember({"full", "sparse"}), "What the pictures fill");
-  AddList(app, "--links", options.links, CLI::IsMember({"shared", "ipc", "tcp", "curve"}), "How images travel; curve: tcp, encrypted");
+  AddList(app, "--links", options.links, CLI::IsMember({"shared", "ipc", "tcp", "sealed"}), "How images travel; sealed: tcp, encrypted");
   app.add_option("--color", options.color, "Coding of colours that are sent: float32, half or fixed16")
       ->transform(
           CLI::CheckedTransformer(std::map<std::string, ColorCoding>{

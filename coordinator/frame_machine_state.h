@@ -142,8 +142,11 @@ struct FrameMachine::State {
   void RemoveWorker(WorkerId worker, std::optional<Time> last_heard);
   void StopAll(const AnyMessage& goodbye, const std::string& reason);
   Ping MakePing(WorkerId to) const {
-    return {
-        .epoch = config.epoch, .finished_before = frames.finished_before(), .cancelled = frames.cancelled(), .place = roster.PlaceOf(to)};
+    return {.epoch = config.epoch,
+            .finished_before = frames.finished_before(),
+            .cancelled = frames.cancelled(),
+            .place = roster.PlaceOf(to),
+            .gone = roster.Gone(now)};
   }
   Time NextWake();
 

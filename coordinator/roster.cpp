@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/wire/limits.h"
+
 namespace slabstream {
 namespace {
 
@@ -94,13 +96,21 @@ void LiveRoster::Vacate(WorkerId worker, Time now) {
 void LiveRoster::Remove(WorkerId worker, Time now, Notice notice) {
   const auto member = std::ranges::find(members_, worker, &Member::id);
   if (member == members_.end()) return;
-  removed_.emplace_back(worker, member->peer);
-  if (removed_.size() > kMaxRemoved) removed_.pop_front();
+  removed_.push_back({worker, member->peer, now});
+  while (removed_.size() > kMaxPeers || (removed_.size() > kMaxRemoved && IsLate(removed_.front(), now))) removed_.pop_front();
   members_.erase(member);
   Vacate(worker, now);
   if (!members_.empty()) return;
   empty_since_ = now;
   last_gave_notice_ = notice == Notice::kGiven;
+}
+
+std::vector<WorkerId> LiveRoster::Gone(Time now) const {
+  std::vector<WorkerId> gone;
+  for (const Removed& removed : removed_) {
+    if (!IsLate(removed, now)) gone.push_back(removed.worker);
+  }
+  return gone;
 }
 
 void LiveRoster::GiveUpVacancies(Time now) {
@@ -125,8 +135,8 @@ const Member* LiveRoster::Find(WorkerId worker) const {
 
 std::optional<PeerToken> LiveRoster::PeerOf(WorkerId worker) const {
   if (const Member* member = Find(worker)) return member->peer;
-  const auto removed = std::ranges::find(removed_, worker, &std::pair<WorkerId, PeerToken>::first);
-  return removed == removed_.end() ? std::nullopt : std::optional(removed->second);
+  const auto removed = std::ranges::find(removed_, worker, &Removed::worker);
+  return removed == removed_.end() ? std::nullopt : std::optional(removed->peer);
 }
 
 std::vector<WorkerId> LiveRoster::At(PeerToken peer) const {

@@ -64,6 +64,8 @@ class LiveRoster {
   std::optional<PeerToken> PeerOf(WorkerId worker) const;  // the connection of a member, or of one of the last that were removed
   std::vector<WorkerId> At(PeerToken peer) const;
   std::vector<WorkerId> Silent(Time now) const;  // not heard for the timeout
+  // Removed within the last two timeouts, at most kMaxPeers of them: whoever has not heard of it by then registers anew.
+  std::vector<WorkerId> Gone(Time now) const;
   const std::vector<Member>& members() const { return members_; }
   std::vector<WorkerId> Leaving() const;
   std::size_t staying() const;  // members that are not leaving
@@ -89,13 +91,20 @@ class LiveRoster {
     WorkerId worker = 0;
     Time vacant_since;
   };
+  struct Removed {
+    WorkerId worker = 0;
+    PeerToken peer = 0;
+    Time at;
+  };
   void Vacate(WorkerId worker, Time now);
   Slot& SlotFor(const Register& message, Time now);
 
   Duration timeout_, vacancy_grace_, return_wait_;
   std::vector<Member> members_;  // by ascending id
+  bool IsLate(const Removed& removed, Time now) const { return now >= removed.at + 2 * timeout_; }
+
   std::vector<Slot> slots_;
-  std::deque<std::pair<WorkerId, PeerToken>> removed_;  // the last kMaxRemoved
+  std::deque<Removed> removed_;  // lately, and at least the last kMaxRemoved
   WorkerId last_id_ = 0;
   std::uint64_t version_ = 0;
   Time empty_since_ = Time::min();

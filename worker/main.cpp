@@ -1,5 +1,5 @@
-// slabstream-worker: one worker process. It waits for its coordinator without a time limit. It ends on Stop, and on SIGINT or SIGTERM after
-// it has finished what it had begun.
+// slabstream-worker: one worker process. It waits for its coordinator without a time limit. It ends on Stop, if its key is refused, and on
+// SIGINT or SIGTERM after it has finished what it had begun.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -27,7 +27,7 @@ Status Serve(WorkerOptions options) {
   auto service = WorkerService::Start(context, std::move(options));
   if (!service.ok()) return service.status();
   WaitUntilStopped<WorkerService, &WorkerService::RequestLeave>(**service);
-  return Status::Ok();
+  return (*service)->ended();
 }
 
 int Run(int argc, char** argv) {

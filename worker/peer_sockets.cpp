@@ -6,7 +6,7 @@ Status PeerSockets::Send(const Peer& to, std::vector<std::byte> header, const By
   auto connection = connections_.find(to.images_endpoint);
   if (connection == connections_.end()) {
     SocketOptions options;
-    if (own_ && !to.images_key.empty()) options.client_keys = ClientKeys{to.images_key, *own_};
+    if (own_ && !to.images_key.empty()) options.client_keys = ClientKeys{.server_key = to.images_key, .own = *own_, .sealed = true};
     Result<Socket> socket = Socket::Dealer(context_, options);
     if (!socket.ok()) return socket.status();
     if (Status status = socket->Connect(to.images_endpoint); !status.ok()) return status;

@@ -26,6 +26,7 @@
 #include "common/transport/mailbox.h"
 #include "worker/executor.h"
 #include "worker/images_endpoint.h"
+#include "worker/known_peers.h"
 #include "worker/peer_sockets.h"
 
 namespace slabstream {
@@ -78,11 +79,12 @@ struct WorkerService::Impl {
         images(std::move(images_socket)),
         images_endpoint(std::move(endpoint_of_images)),
         peers(service_context, keys ? std::optional(keys->own) : std::nullopt),
+        others(keys ? &service_context.authenticator() : nullptr, keys ? keys->plane : ""),
         executor(std::in_place, outbox, options.compression == Compression::kOn ? Codec::kZstd : Codec::kRaw, int(options.machine.threads),
                  options.make_renderer, options.task_hook) {}
 
   void Run();
-  void Loop();
+  Status Loop();  // not ok: why the worker leaves though nobody told it to
   void Receive(Socket& socket, Plane plane);
   // False: the key of the connection is not that of the worker whom the message names.
   bool ComesFromItsSender(const Incoming& incoming, const AnyMessage& message) const;
@@ -124,12 +126,13 @@ struct WorkerService::Impl {
   PeerSockets peers;
   Epoch epoch = 0;
   LinkRates links;                       // while compression is automatic
-  std::map<WorkerId, Peer> others;       // of the epoch
+  KnownPeers others;                     // of this registration
   std::set<WorkerId> takes_frames_only;  // workers that cannot map memory though they have the same scope
   std::vector<PartialImage> to_refuse;   // from workers whose endpoint is not known yet
   std::atomic<bool> registered = false;  // at least once, or stopped
   std::atomic<bool> leave_requested = false, stop_requested = false;
   std::atomic<bool> stopped = false;
+  Status ended;                    // set before `stopped`
   bool stop_now = false;           // set by the machine
   LimitedLog complaints;           // about messages
   Mailbox<ExecutorOutput> outbox;  // its wakeup also signals stop_requested
@@ -138,7 +141,7 @@ struct WorkerService::Impl {
 };
 
 void WorkerService::Impl::Run() {
-  const Status ended = Guarded("worker", [&] { Loop(); });
+  ended = Guarded("worker", [&] { return Loop(); });
   if (!ended.ok()) {
     LogError("the worker leaves: " + ended.message());
     (void)Guarded("worker", [&] {
@@ -152,7 +155,7 @@ void WorkerService::Impl::Run() {
   stopped.notify_all();
 }
 
-void WorkerService::Impl::Loop() {
+Status WorkerService::Impl::Loop() {
   Time stop_deadline = Time::max();
   Time next_look = Time::min();
   bool leaving = false;
@@ -182,7 +185,11 @@ void WorkerService::Impl::Loop() {
     }
     peers.CloseIdle(now);
     executor->peer_memory().CloseIdle(now);
+    if (control.refused()) {
+      return Status::Unavailable("the coordinator at " + options.coordinator_endpoint + " refuses the key: it was revoked or is another's");
+    }
   }
+  return Status::Ok();
 }
 
 void WorkerService::Impl::LookAtConnections() {
@@ -213,33 +220,30 @@ void WorkerService::Impl::Receive(Socket& socket, Plane plane) {
 
 bool WorkerService::Impl::ComesFromItsSender(const Incoming& incoming, const AnyMessage& message) const {
   if (incoming.user.empty()) return true;
-  const auto sender = others.find(SenderOf(message));
-  return sender == others.end() || sender->second.images_key == incoming.user;
+  const Peer* const sender = others.Find(SenderOf(message));
+  return sender == nullptr || sender->images_key == incoming.user;
 }
 
 // Handles memory shared between workers, and the links between them: the machine knows nothing of either.
 void WorkerService::Impl::Remember(const AnyMessage& message) {
   if (const auto* welcome = std::get_if<Welcome>(&message)) {
+    if (welcome->epoch != epoch || welcome->worker != machine.worker()) others.ForgetAll();
     if (std::exchange(epoch, welcome->epoch) == welcome->epoch) return;
     executor->Forget([](const GroupKey&) { return true; });
     takes_frames_only.clear();
-    others.clear();
-    if (keys) context.authenticator().AdmitOnly(keys->plane, {});
     links.ForgetAll();
   } else if (const auto* ping = std::get_if<Ping>(&message); ping != nullptr && ping->epoch == epoch) {
     executor->Forget([&](const GroupKey& key) {
       return key.frame < ping->finished_before || std::ranges::find(ping->cancelled, key.frame) != ping->cancelled.end();
     });
+    others.Gone(ping->gone, images);
   } else if (const auto* assignment = std::get_if<GroupAssignment>(&message); assignment != nullptr && assignment->epoch == epoch) {
     const GroupKey& now = assignment->key;
     executor->Forget([&](const GroupKey& key) {
       const bool read = key.frame == now.frame && (key.attempt < now.attempt || key.group < assignment->groups_done);
       return read || key.frame < assignment->finished_before;
     });
-    for (const Peer& peer : assignment->peers) {
-      others[peer.worker] = peer;
-      if (keys && !peer.images_key.empty()) context.authenticator().Admit(keys->plane, peer.images_key);
-    }
+    for (const Peer& peer : assignment->peers) others.Name(peer);
     for (const PartialImage& refused : std::exchange(to_refuse, {})) Refuse(refused);
   } else if (const auto* received = std::get_if<ImageReceived>(&message); received != nullptr && received->epoch == epoch) {
     links.Received(received->from_worker, received->number, MonotonicNow());
@@ -254,9 +258,9 @@ void WorkerService::Impl::Acknowledge(const AnyMessage& message, std::size_t pay
 
 // False: the sender is not known yet.
 bool WorkerService::Impl::Answer(WorkerId sender, const AnyMessage& message) {
-  const auto peer = others.find(sender);
-  if (peer == others.end()) return false;
-  const Status sent = peers.Send(peer->second, Encode(message), {}, MonotonicNow());
+  const Peer* const peer = others.Find(sender);
+  if (peer == nullptr) return false;
+  const Status sent = peers.Send(*peer, Encode(message), {}, MonotonicNow());
   if (!sent.ok()) LogWarning("worker " + std::to_string(sender) + " is not reached: " + sent.message());
   return true;
 }
@@ -385,7 +389,7 @@ Result<std::unique_ptr<WorkerService>> WorkerService::Start(Context& context, Wo
   SocketOptions images_options;
   if (options.keys) {
     keys = ImagesKeys{MakeKeyPair(), "images-" + std::to_string(config.incarnation)};
-    images_options.server_keys = ServerKeys{keys->own.secret_key, keys->plane};
+    images_options.server_keys = ServerKeys{.secret_key = keys->own.secret_key, .plane = keys->plane, .sealed = true};
     config.images_key = keys->own.public_key;
     context.authenticator().SetPatience(keys->plane, kPeerPatience);
   }
@@ -432,5 +436,6 @@ void WorkerService::RequestStop() {
 void WorkerService::WaitUntilRegistered() { impl_->registered.wait(false); }
 void WorkerService::WaitUntilStopped() { impl_->stopped.wait(false); }
 bool WorkerService::stopped() const { return impl_->stopped; }
+Status WorkerService::ended() const { return impl_->stopped ? impl_->ended : Status::Ok(); }
 
 }  // namespace slabstream

@@ -1,8 +1,8 @@
 // WorkerService: runs a WorkerMachine over ZeroMQ.
 //
 // One thread owns all sockets and runs the machine; those of the Executor compute. So heartbeats are on time whatever is computed. If a
-// task throws, its group fails, and the coordinator is told at once. If the thread that runs the machine throws, the worker leaves and logs
-// why.
+// task throws, its group fails, and the coordinator is told at once. If the thread that runs the machine throws, or the coordinator refuses
+// the worker's key, the worker leaves and logs why.
 #pragma once
 
 #include <memory>
@@ -45,6 +45,7 @@ class WorkerService {
   void RequestStop();   // ends now
   void WaitUntilStopped();
   bool stopped() const;
+  Status ended() const;  // not ok: why it stopped though nobody told it to
 
  private:
   struct Impl;

@@ -14,6 +14,7 @@
 #include "common/base/guarded.h"
 #include "common/base/limited_log.h"
 #include "common/transport/context_impl.h"
+#include "common/transport/sealed_sessions.h"
 #include "common/transport/socket.h"
 
 namespace slabstream {
@@ -28,6 +29,7 @@ constexpr std::chrono::milliseconds kBetweenLooks{50}, kUntilAsked{-1};
 struct Request {
   std::vector<zmq::message_t> route;  // to where the answer goes, with the empty frame behind it
   std::string id, plane, public_key;
+  std::optional<Session> session;  // of a sealed connection
   Time asked;
 };
 
@@ -48,6 +50,7 @@ struct Authenticator::Impl {
   struct Plane {
     std::set<std::string> admitted;
     Duration patience{};
+    std::shared_ptr<SealedSessions> sessions;  // null: CURVE
   };
   enum class Verdict { kAdmit, kWait, kNotYet, kRefuse };
 
@@ -55,7 +58,10 @@ struct Authenticator::Impl {
     const std::lock_guard lock(mutex);
     const auto plane = planes.find(request.plane);
     if (plane == planes.end() || request.public_key.empty()) return Verdict::kRefuse;
-    if (plane->second.admitted.contains(request.public_key)) return Verdict::kAdmit;
+    if (plane->second.admitted.contains(request.public_key)) {
+      const bool enters = !request.session || plane->second.sessions->Enter(request.public_key, *request.session);
+      return enters ? Verdict::kAdmit : Verdict::kRefuse;
+    }
     if (plane->second.patience == Duration::zero()) return Verdict::kRefuse;
     return MonotonicNow() - request.asked < plane->second.patience && waiting.size() < kMostWaiting ? Verdict::kWait : Verdict::kNotYet;
   }
@@ -72,6 +78,17 @@ struct Authenticator::Impl {
     if (verdict == Verdict::kRefuse) complaints.Warning("refused a connection to the " + request.plane + " plane: unknown key");
   }
 
+  // Names the sender and the session if the ticket is the sender's.
+  void ReadTicket(const std::string& public_key, std::string_view ticket, Request& request) {
+    std::shared_ptr<SealedSessions> sessions;
+    {
+      const std::lock_guard lock(mutex);
+      if (const auto plane = planes.find(request.plane); plane != planes.end()) sessions = plane->second.sessions;
+    }
+    if (sessions != nullptr) request.session = sessions->Read(ticket, public_key);
+    if (request.session) request.public_key = public_key;
+  }
+
   // False: nothing is there.
   bool Receive() {
     std::vector<zmq::message_t> parts;
@@ -82,9 +99,10 @@ struct Authenticator::Impl {
     // Route, empty; version, request, domain, address, identity, mechanism, credentials.
     const auto empty = std::ranges::find_if(parts, [](const zmq::message_t& part) { return part.size() == 0; });
     const auto rest = std::size_t(parts.end() - empty);
-    if (rest != 8 || empty[1].to_string_view() != kVersion) return true;
-    Request request{.route = {}, .id = empty[2].to_string(), .plane = empty[3].to_string(), .public_key = {}, .asked = MonotonicNow()};
-    if (empty[6].to_string_view() == "CURVE") request.public_key = KeyText(empty[7]);
+    if (rest < 8 || empty[1].to_string_view() != kVersion) return true;
+    Request request{.id = empty[2].to_string(), .plane = empty[3].to_string(), .asked = MonotonicNow()};
+    if (rest == 8 && empty[6].to_string_view() == "CURVE") request.public_key = KeyText(empty[7]);
+    if (rest == 9 && empty[6].to_string_view() == "PLAIN") ReadTicket(empty[7].to_string(), empty[8].to_string_view(), request);
     request.route.assign(std::make_move_iterator(parts.begin()), std::make_move_iterator(empty + 1));
     waiting.push_back(std::move(request));
     return true;
@@ -146,6 +164,11 @@ void Authenticator::Admit(const std::string& plane, const std::string& public_ke
     if (!impl_->planes[plane].admitted.insert(public_key).second) return;
   }
   impl_->wakeup.Notify();
+}
+
+void Authenticator::SetSealed(const std::string& plane, std::shared_ptr<SealedSessions> sessions) {
+  const std::lock_guard lock(impl_->mutex);
+  impl_->planes[plane].sessions = std::move(sessions);
 }
 
 void Authenticator::SetPatience(const std::string& plane, Duration patience) {

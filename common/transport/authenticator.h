@@ -13,6 +13,7 @@
 namespace slabstream {
 
 class Context;
+class SealedSessions;
 
 class Authenticator {
  public:
@@ -26,6 +27,9 @@ class Authenticator {
   // Whoever has an unknown key is refused at once, and its socket does not try again. On a plane with patience it waits this long for being
   // admitted, and then tries again: for planes that learn keys from messages, which a peer may have heard earlier.
   void SetPatience(const std::string& plane, Duration patience);
+
+  // From now on whoever connects to this plane brings a ticket of a sealed session, and who is admitted enters it there.
+  void SetSealed(const std::string& plane, std::shared_ptr<SealedSessions> sessions);
 
  private:
   struct Impl;

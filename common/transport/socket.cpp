@@ -7,6 +7,7 @@
 #include <zmq.hpp>
 
 #include "common/base/check.h"
+#include "common/base/limited_log.h"
 #include "common/transport/authenticator.h"
 #include "common/transport/connection_limit.h"
 #include "common/transport/connection_table.h"
@@ -14,10 +15,9 @@
 #include "common/transport/context_impl.h"
 #include "common/transport/endpoint.h"
 #include "common/transport/ipc_listener.h"
-
-#ifdef __SANITIZE_THREAD__
-#include <sanitizer/tsan_interface.h>
-#endif
+#include "common/transport/message_parts.h"
+#include "common/transport/sealed_sessions.h"
+#include "common/transport/sealing.h"
 
 namespace slabstream {
 
@@ -34,11 +34,14 @@ struct Socket::Impl {
   const bool router;
   bool encrypted = false;  // all of its connections
   bool knows_connections = options.ends_connections;
-  ConnectionTable connections;             // of users
-  std::unique_ptr<ConnectionTuner> tuner;  // of the tcp connections made here
-  std::unique_ptr<ConnectionLimit> limit;  // of the connections accepted here
-  std::vector<std::string> names;          // inproc endpoints bound here
-  std::vector<IpcListener> listeners;      // ipc files bound here
+  ConnectionTable connections;               // of users
+  std::unique_ptr<ConnectionTuner> tuner;    // of the tcp connections made here
+  std::unique_ptr<ConnectionLimit> limit;    // of the connections accepted here
+  std::shared_ptr<SealedSessions> sessions;  // if it listens for sealed connections
+  std::optional<Sealer> sealer;              // if it has a sealed connection
+  LimitedLog complaints;                     // about forged frames
+  std::vector<std::string> names;            // inproc endpoints bound here
+  std::vector<IpcListener> listeners;        // ipc files bound here
 
   // Names and files are free again when the socket is gone; ZeroMQ alone would free them some time later.
   ~Impl() {
@@ -53,6 +56,10 @@ struct Socket::Impl {
 };
 
 namespace {
+
+constexpr int kSealedReceiveMark = 64;  // frames of a connection that wait to be opened: 16 MiB, also of one that nobody should have made
+constexpr std::int64_t kHandshakeBytes = 512;  // more than any part of a PLAIN handshake has
+constexpr int kSealedBatch = 256;              // frames opened in one call: 64 MiB
 
 Status Failed(const std::string& endpoint, const zmq::error_t& error) {
   if (error.num() == EADDRNOTAVAIL) return Status::InvalidArgument("endpoint \"" + endpoint + "\": this machine has no such address");
@@ -119,6 +126,34 @@ void UseClientKeys(zmq::socket_t& socket, const ClientKeys& keys) {
   socket.set(zmq::sockopt::curve_secretkey, keys.own.secret_key);
 }
 
+// Sealed connections are ZeroMQ's PLAIN ones: the public key is the user's name, the ticket is the password.
+Status UseSealedServerKeys(Socket::Impl& impl, const ServerKeys& keys) {
+  const std::optional<std::string> public_key = PublicKeyOf(keys.secret_key);
+  if (!public_key) return Status::InvalidArgument("the secret key of the plane " + keys.plane + " is no key");
+  impl.sessions = std::make_shared<SealedSessions>(KeyPair{*public_key, keys.secret_key},
+                                                   std::uint64_t(std::max<std::int64_t>(impl.options.max_message_bytes, 0)));
+  impl.context.authenticator().SetSealed(keys.plane, impl.sessions);
+  impl.socket.set(zmq::sockopt::plain_server, true);
+  impl.socket.set(zmq::sockopt::zap_domain, keys.plane);
+  impl.socket.set(zmq::sockopt::maxmsgsize, std::int64_t{kSealedFrameBytes});
+  impl.socket.set(zmq::sockopt::rcvhwm, kSealedReceiveMark);
+  return Status::Ok();
+}
+Status UseSealedClientKeys(Socket::Impl& impl, const ClientKeys& keys) {
+  CHECK(!impl.sealer) << "a sealed socket connects once";
+  const std::optional<Session> session = Session::Make(keys.own, keys.server_key);
+  if (!session) return Status::InvalidArgument("the key of whoever listens, or the own one, is no key");
+  impl.sealer.emplace(*session);
+  impl.socket.set(zmq::sockopt::plain_username, keys.own.public_key);
+  impl.socket.set(zmq::sockopt::plain_password, session->ticket);
+  // One message of any size goes through an empty queue.
+  const auto largest = std::uint64_t(std::max<std::int64_t>(impl.options.max_message_bytes, 0));
+  impl.socket.set(zmq::sockopt::sndhwm, impl.options.send_high_water_mark + int(SealedFrames(largest)));
+  // Nothing is expected from the other end, which need not be who it should.
+  impl.socket.set(zmq::sockopt::maxmsgsize, kHandshakeBytes);
+  return Status::Ok();
+}
+
 // Hands a listening descriptor to the socket, which owns it from then on.
 void BindDescriptor(zmq::socket_t& socket, const std::string& endpoint, IpcListener& listener) {
   constexpr int kNone = -1;
@@ -128,64 +163,56 @@ void BindDescriptor(zmq::socket_t& socket, const std::string& endpoint, IpcListe
   socket.set(zmq::sockopt::use_fd, kNone);
 }
 
-// What a thread did before it sent a message happens before what another does after receiving or freeing it. ThreadSanitizer does not see
-// that inside ZeroMQ, which is not instrumented, so these calls tell it.
-void BeforeHandOver([[maybe_unused]] const void* data) {
-#ifdef __SANITIZE_THREAD__
-  __tsan_release(const_cast<void*>(data));
-#endif
-}
-void AfterHandOver([[maybe_unused]] const void* data) {
-#ifdef __SANITIZE_THREAD__
-  __tsan_acquire(const_cast<void*>(data));
-#endif
-}
-
-void LetGo(void* data, void* owner) {
-  AfterHandOver(data);
-  delete static_cast<Bytes*>(owner);
-}
-
-// A message that shares the bytes and releases them when ZeroMQ has sent it, on any thread.
-zmq::message_t Share(Bytes bytes) {
-  if (bytes.empty()) return {};
-  auto owner = std::make_unique<Bytes>(std::move(bytes));
-  const std::span<const std::byte> data = owner->span();
-  zmq::message_t message(const_cast<std::byte*>(data.data()), data.size(), LetGo, owner.get());
-  BeforeHandOver(data.data());
-  (void)owner.release();  // the message owns it now
-  return message;
-}
-
-// The memory of a received message as Bytes.
-Bytes Adopt(zmq::message_t message) {
-  auto owner = std::make_shared<zmq::message_t>(std::move(message));
-  const std::span<const std::byte> data(static_cast<const std::byte*>(owner->data()), owner->size());
-  AfterHandOver(data.data());
-  return Bytes(std::move(owner), data);
-}
-
-// 0, or the error number.
-int SendPart(zmq::socket_t& socket, zmq::message_t message, bool more) {
-  const zmq::send_flags flags = more ? zmq::send_flags::dontwait | zmq::send_flags::sndmore : zmq::send_flags::dontwait;
-  while (true) {
-    try {
-      return socket.send(message, flags) ? 0 : EAGAIN;
-    } catch (const zmq::error_t& error) {
-      if (error.num() != EINTR) return error.num();
-    }
+Status StatusOfSending(int error) {
+  switch (error) {
+    case 0: return Status::Ok();
+    case EAGAIN: return Status::ResourceExhausted("send: the high-water mark is reached or nobody is connected");
+    case EHOSTUNREACH: return Status::Unavailable("send: the peer is not connected");
+    default: return Status::Unavailable(std::string("send: ") + zmq_strerror(error));
   }
 }
 
-// False: nothing is there.
-bool ReceivePart(zmq::socket_t& socket, zmq::message_t& message) {
-  while (true) {
-    try {
-      return socket.recv(message, zmq::recv_flags::dontwait).has_value();
-    } catch (const zmq::error_t& error) {
-      if (error.num() != EINTR) return false;
-    }
+// Each frame is a ZeroMQ message of its own, so that it is under way while the next one is sealed. If the queue is full before the last
+// one, the receiver drops what it has got.
+Status SendSealed(Socket::Impl& impl, std::span<const std::byte> header, const Bytes& payload) {
+  if (header.size() > kMaxSealedHeaderBytes) {
+    return Status::InvalidArgument("send: a header of " + std::to_string(header.size()) +
+                                   " bytes; over a sealed connection it has at most " + std::to_string(kMaxSealedHeaderBytes));
   }
+  impl.sealer->Begin(header, payload.span());
+  int error = 0;
+  while (error == 0) {
+    PooledVector<std::byte> frame = impl.sealer->Next();
+    if (frame.empty()) break;
+    error = SendPart(impl.socket, Share(Bytes(std::move(frame))), false);
+  }
+  return StatusOfSending(error);
+}
+
+// A whole message, if the frames that are there make one.
+std::optional<Incoming> TryReceiveSealed(Socket::Impl& impl) {
+  zmq::message_t part;
+  for (int i = 0; i < kSealedBatch && ReceivePart(impl.socket, part); ++i) {
+    Incoming incoming{.identity = part.to_string()};
+    std::vector<Bytes> frames;
+    for (bool more = part.more(); more && ReceivePart(impl.socket, part);) {
+      more = part.more();
+      if (frames.empty()) incoming.user = impl.connections.Heard(incoming.identity, part);
+      frames.push_back(Adopt(std::move(part)));
+    }
+    const std::shared_ptr<Unsealer> unsealer = impl.sessions->Of(incoming.user);
+    if (unsealer != nullptr && frames.size() == 1) {
+      auto opened = unsealer->Open(frames[0].span());
+      if (std::holds_alternative<Unsealer::More>(opened)) continue;
+      if (auto* message = std::get_if<Unsealer::Message>(&opened)) {
+        incoming.parts = std::move(*message);
+        return incoming;
+      }
+    }
+    impl.complaints.Warning("ended a sealed connection of the key " + IdOfKey(incoming.user) + ": its holder did not make what it brought");
+    impl.connections.EndOne(incoming.identity);
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -216,7 +243,11 @@ Result<std::string> Socket::Bind(const std::string& text) {
     switch (endpoint->scheme) {
       case Scheme::kTcp: {
         if (const auto& keys = impl_->options.server_keys) {
-          UseServerKeys(impl_->context, socket, *keys);
+          if (!keys->sealed) {
+            UseServerKeys(impl_->context, socket, *keys);
+          } else if (Status status = UseSealedServerKeys(*impl_, *keys); !status.ok()) {
+            return status;
+          }
           impl_->encrypted = impl_->knows_connections = true;
         } else if (endpoint->remote()) {
           return KeysMissing(*endpoint);
@@ -250,7 +281,11 @@ Status Socket::Connect(const std::string& text) {
   const auto& keys = impl_->options.client_keys;
   if (endpoint->remote() && !keys) return KeysMissing(*endpoint);
   try {
-    if (endpoint->scheme == Scheme::kTcp && keys) UseClientKeys(impl_->socket, *keys);
+    if (endpoint->scheme == Scheme::kTcp && keys && keys->sealed) {
+      if (Status status = UseSealedClientKeys(*impl_, *keys); !status.ok()) return status;
+    } else if (endpoint->scheme == Scheme::kTcp && keys) {
+      UseClientKeys(impl_->socket, *keys);
+    }
     AllowAddressFamily(impl_->socket, *endpoint);
     if (endpoint->scheme == Scheme::kTcp && impl_->tuner == nullptr) impl_->tuner = std::make_unique<ConnectionTuner>(impl_->socket);
     impl_->socket.connect(endpoint->ToString());
@@ -263,17 +298,14 @@ Status Socket::Connect(const std::string& text) {
 Status Socket::Send(const std::string& identity, std::vector<std::byte> header, const Bytes& payload) {
   zmq::socket_t& socket = impl_->socket;
   if (impl_->tuner != nullptr) impl_->tuner->TuneNew();
+  if (impl_->sessions != nullptr) return Status::InvalidArgument("send: sealed connections go one way, to this socket");
+  if (impl_->sealer) return SendSealed(*impl_, header, payload);
   // Make all parts before sending the first one: running out of memory between them would leave half a message.
   zmq::message_t to(identity.data(), identity.size()), head = Share(Bytes(std::move(header))), body = Share(payload);
   int error = impl_->router ? SendPart(socket, std::move(to), true) : 0;
   if (error == 0) error = SendPart(socket, std::move(head), !payload.empty());
   if (error == 0 && !payload.empty()) error = SendPart(socket, std::move(body), false);
-  switch (error) {
-    case 0: return Status::Ok();
-    case EAGAIN: return Status::ResourceExhausted("send: the high-water mark is reached or nobody is connected");
-    case EHOSTUNREACH: return Status::Unavailable("send: the peer is not connected");
-    default: return Status::Unavailable(std::string("send: ") + zmq_strerror(error));
-  }
+  return StatusOfSending(error);
 }
 
 bool Socket::refused() const {
@@ -294,10 +326,16 @@ std::string Socket::local_host() const {
   return impl_->tuner->local_host();
 }
 
-void Socket::EndConnections(const std::string& user) { impl_->connections.End(user); }
+void Socket::EndConnections(const std::string& user) {
+  impl_->connections.End(user);
+  const std::shared_ptr<Unsealer> unsealer = impl_->sessions == nullptr ? nullptr : impl_->sessions->Of(user);
+  if (unsealer != nullptr) unsealer->DropPartial();
+}
 void Socket::EndConnection(const std::string& identity) { impl_->connections.EndOne(identity); }
 
 std::optional<Incoming> Socket::TryReceive() {
+  if (impl_->sessions != nullptr) return TryReceiveSealed(*impl_);
+  if (impl_->sealer) return std::nullopt;  // nothing is expected, and nothing that comes is authenticated
   zmq::message_t part;
   while (ReceivePart(impl_->socket, part)) {
     Incoming incoming;

@@ -13,6 +13,8 @@
 // the linger time. inproc does not reconnect: after its peer has closed, sending ends in ResourceExhausted.
 //
 // A tcp connection ends if its other end acknowledges nothing for 3 s, whether it has vanished, is cut off, or has another address.
+// Sealed connections (keys.h) carry the same messages, in one direction. Sending one seals it, at some 3 GB/s, before Send returns.
+// Messages of which any frame is altered, lost, repeated or made by another one never arrive.
 #pragma once
 
 #include <cstdint>

@@ -59,6 +59,7 @@ void Fields(auto& io, Is<Ping> auto& m) {
   io.Any(m.finished_before, &P::finished_before, &P::set_finished_before);
   io.Numbers("cancelled", m.cancelled, &P::cancelled, &P::mutable_cancelled, kMaxCancelled);
   PlaceFields<P>(io, m.place);
+  io.Numbers("gone", m.gone, &P::gone, &P::mutable_gone, kMaxPeers);
 }
 
 void Fields(auto& io, Is<Peer> auto& m) {

@@ -76,9 +76,10 @@ struct Heartbeat {
 
 struct Ping {
   Epoch epoch = 0;
-  FrameId finished_before = 0;     // all frames with a smaller id are over: forget them
-  std::vector<FrameId> cancelled;  // also over, though their id is not smaller; at most kMaxCancelled
-  SlotPlace place = {};            // of the receiver
+  FrameId finished_before = 0;      // all frames with a smaller id are over: forget them
+  std::vector<FrameId> cancelled;   // also over, though their id is not smaller; at most kMaxCancelled
+  SlotPlace place = {};             // of the receiver
+  std::vector<WorkerId> gone = {};  // workers that left or were lost lately; at most kMaxPeers
   friend bool operator==(const Ping&, const Ping&) = default;
 };
 inline constexpr std::size_t kMaxCancelled = 1024;

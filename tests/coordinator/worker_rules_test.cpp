@@ -4,6 +4,9 @@
 namespace slabstream {
 namespace {
 
+using testing::ElementsAre;
+using testing::IsEmpty;
+
 TEST(CoordinatorWorkers, RepeatedRegisterGetsTheSameWelcome) {
   CoordinatorScript script;
   const FakeWorker worker = script.Join(11, 1);
@@ -72,6 +75,25 @@ TEST(CoordinatorWorkers, SilenceOfTheTimeoutAndNotLessTakesAWorkerOut) {
   ASSERT_EQ(status.workers.size(), 1U);
   EXPECT_EQ(status.workers[0].worker, 2U);
   EXPECT_EQ(status.workers_lost, 1U);
+}
+
+TEST(CoordinatorWorkers, PingsTellForTwoTimeoutsWhoHasGone) {
+  CoordinatorScript script;
+  const FakeWorker stays = script.Join(11, 1), silent = script.Join(12, 2), leaves = script.Join(13, 3);
+  const auto gone = [&] { return ToWorkers<Ping>(script.Beat(stays)).at(0).message.gone; };
+  EXPECT_THAT(gone(), IsEmpty());
+  script.Worker(leaves, Leave{.epoch = 77, .worker = leaves.id});
+  script.Mute(leaves);
+  script.Mute(silent);
+  EXPECT_THAT(gone(), ElementsAre(leaves.id));
+  script.Pass(milliseconds(6000));
+  EXPECT_THAT(gone(), ElementsAre(leaves.id, silent.id));
+  script.Pass(milliseconds(5999));
+  EXPECT_THAT(gone(), ElementsAre(leaves.id, silent.id));
+  script.Pass(milliseconds(1));
+  EXPECT_THAT(gone(), ElementsAre(silent.id));
+  script.Pass(milliseconds(6000));
+  EXPECT_THAT(gone(), IsEmpty());
 }
 
 TEST(CoordinatorWorkers, CoordinatorThatWasHeldUpItselfTakesNobodyForDead) {

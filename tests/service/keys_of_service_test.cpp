@@ -129,7 +129,7 @@ TEST_F(KeysOfServiceTest, ARevokedKeyIsRefusedAndItsConnectionsEnd) {
   EXPECT_TRUE(new_client.Render(TestRequest(Splatting(), 20)).ok());
 }
 
-TEST_F(KeysOfServiceTest, AWorkerWhoseKeyIsRevokedIsLostAndDoesNotComeBack) {
+TEST_F(KeysOfServiceTest, AWorkerWhoseKeyIsRevokedIsLostAndEnds) {
   StartWorkers(2);
   Client admin = ConnectAs(Role::kAdmin);
   ASSERT_TRUE(admin.Render(TestRequest(Splatting(), 0)).ok());
@@ -138,6 +138,17 @@ TEST_F(KeysOfServiceTest, AWorkerWhoseKeyIsRevokedIsLostAndDoesNotComeBack) {
   while (!admin.QueryStatus()->workers.empty() && MonotonicNow() < limit) {
   }
   EXPECT_TRUE(admin.QueryStatus()->workers.empty());
+  for (const auto& worker : workers_) {
+    worker->WaitUntilStopped();
+    EXPECT_THAT(worker->ended().message(), HasSubstr("refuses the key: it was revoked"));
+  }
+}
+
+TEST_F(KeysOfServiceTest, AWorkerThatIsToldToEndHasNothingToSay) {
+  StartWorkers(1);
+  workers_[0]->RequestStop();
+  workers_[0]->WaitUntilStopped();
+  EXPECT_TRUE(workers_[0]->ended().ok()) << workers_[0]->ended().message();
 }
 
 TEST_F(KeysOfServiceTest, KeysOutliveTheCoordinator) {

@@ -61,9 +61,9 @@ struct Faults {
   }
 };
 
-// Some worlds are free of faults. In some, workers leave with notice and nothing else happens. In others there is only one kind of what must
-// cost no frame: workers that come and go and messages that overtake each other; processes and clocks that stop and go on; peers that keep to no protocol. The others have any
-// mixture.
+// Some worlds are free of faults. In some, workers leave with notice and nothing else happens. In others there is only one kind of what
+// must cost no frame: workers that come and go and messages that overtake each other; processes and clocks that stop and go on; peers that
+// keep to no protocol. The others have any mixture.
 inline Faults RandomFaults(Random& random) {
   Faults faults;
   const double kind = random.Real(0, 1);

@@ -167,6 +167,7 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
   // By the field's name: how many items are allowed. A new repeated field needs its line.
   const std::map<std::string, std::size_t> limits = {
       {"cancelled", kMaxCancelled},
+      {"gone", kMaxPeers},
       {"colors", kMaxTransferPoints},
       {"opacities", kMaxTransferPoints},
       {"lights", kMaxLights},
@@ -205,6 +206,7 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
             case FieldDescriptor::CPPTYPE_MESSAGE: reflection.AddMessage(place.message, place.field); break;
             case FieldDescriptor::CPPTYPE_DOUBLE: reflection.AddDouble(place.message, place.field, 1); break;
             case FieldDescriptor::CPPTYPE_INT64: reflection.AddInt64(place.message, place.field, 1); break;
+            case FieldDescriptor::CPPTYPE_UINT32: reflection.AddUInt32(place.message, place.field, 1); break;
             default: reflection.AddUInt64(place.message, place.field, 1);
           }
         }

@@ -121,7 +121,7 @@ std::vector<Heartbeat> SamplesOf() {
 
 template <>
 std::vector<Ping> SamplesOf() {
-  return {{}, {kMax64, kMax64, {0, 1, kMax64}, {kMax32, kMax32}}};
+  return {{}, {kMax64, kMax64, {0, 1, kMax64}, {kMax32, kMax32}, {1, kMax32}}};
 }
 
 template <>
