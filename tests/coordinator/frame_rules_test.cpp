@@ -453,7 +453,7 @@ TEST(CoordinatorFrames, WorkerThatReachesNobodyIsLeftOutOfTheFrame) {
     std::set<WorkerId> others = WorkersOf(group);
     others.erase(accuser);
     others.erase(group.display);
-    script.Worker({}, WorkerTrouble{77, accuser, group.key, *others.begin(), Status::Unavailable("does not answer")});
+    script.Worker(script.WorkerOf(accuser), WorkerTrouble{77, accuser, group.key, *others.begin(), Status::Unavailable("does not answer")});
     group = HandedOut(script.Pass(milliseconds(1000))).at(0);
     EXPECT_EQ(WorkersOf(group).contains(accuser), complaints == 1);
   }

@@ -14,6 +14,7 @@ using testing::SizeIs;
 
 constexpr PeerToken kClient = 21, kOther = 22;
 constexpr std::uint64_t kMebi = 1 << 20;
+constexpr DatasetId kBlock = 1;
 
 class MemoryRules : public testing::Test {
  protected:
@@ -22,6 +23,7 @@ class MemoryRules : public testing::Test {
     Register message = CoordinatorScript::RegisterOf(worker);
     message.memory_bytes = memory_bytes;
     worker.id = ToWorkers<Welcome>(script.Worker(worker, message)).at(0).message.worker;
+    script.tokens[worker.id] = token;
     script.workers.push_back(worker);
     return worker;
   }
@@ -35,7 +37,7 @@ class MemoryRules : public testing::Test {
     CoordinatorScript script;
     for (int i = 1; i <= workers; ++i) script.Join(PeerToken(i), Incarnation(i));
     script.Client(kClient, Sized(1, side));
-    const std::vector<GroupAssignment> groups = HandedOut(script.Step(DatasetLoaded{"block", script.loads.back().dataset, summary}));
+    const std::vector<GroupAssignment> groups = HandedOut(script.Step(DatasetLoaded{"block", script.loads.back().load, kBlock, summary}));
     return GroupImageBytes(groups.at(0).setup, groups[0].group.placements) + PictureBytes(groups[0].setup);
   }
   static std::uint64_t RoomFor(std::uint64_t images) { return kIdleMemoryBytes + 2 * 32 * 32 * 48 + images; }
@@ -87,7 +89,7 @@ TEST_F(MemoryRules, WhatTheLossOfAWorkerMakesTooLargeFails) {
   const FakeWorker lost = JoinWith(script, 11, 0);
   JoinWith(script, 12, kIdleMemoryBytes + ImagesOf(64, 2, summary) + kVoxels * 7 / 10);  // half of the voxels fit, all do not
   script.Client(kClient, Sized(1, 64));
-  ASSERT_THAT(HandedOut(script.Step(DatasetLoaded{"block", script.loads.back().dataset, summary})), SizeIs(1));
+  ASSERT_THAT(HandedOut(script.Step(DatasetLoaded{"block", script.loads.back().load, kBlock, summary})), SizeIs(1));
   const auto failed = ToClients<FrameFailed>(script.Kill(lost));
   ASSERT_THAT(failed, SizeIs(1));
   EXPECT_EQ(failed[0].message.status.code(), StatusCode::kResourceExhausted);
@@ -162,10 +164,11 @@ class DatasetRules : public MemoryRules {
     config.memory_bytes = 400 * kMebi;  // 300 for datasets
     return config;
   }
+  static DatasetId IdOf(const std::string& name) { return DatasetId(name[0]); }  // the same at each load
   // Answers the load that was begun last.
   Actions Loaded(std::uint64_t bytes) {
     const LoadDataset& load = script.loads.back();
-    return script.Step(DatasetLoaded{load.name, load.dataset, BlockSummary(), bytes});
+    return script.Step(DatasetLoaded{load.name, load.load, IdOf(load.name), BlockSummary(), bytes});
   }
   // A frame of a dataset of 100 MiB, done.
   Actions Visit(RequestId request, const std::string& dataset) {
@@ -184,19 +187,17 @@ TEST_F(DatasetRules, TheLeastRecentlyUsedIsUnloadedAndLoadedAgainWhenAskedFor) {
   Visit(1, "a");
   Visit(2, "b");
   Visit(3, "a");
-  const DatasetId b = script.loads.back().dataset;
   EXPECT_EQ(script.QueryStatus().datasets[0].memory_bytes, 120 * kMebi);
   const Actions third = Visit(4, "c");
   const std::vector<UnloadDataset> unloaded = Of<UnloadDataset>(third);
   ASSERT_THAT(unloaded, SizeIs(1));
-  EXPECT_EQ(unloaded[0].dataset, b);
+  EXPECT_EQ(unloaded[0].dataset, IdOf("b"));
   EXPECT_THAT(ToClients<FrameReply>(third), SizeIs(1));
   EXPECT_EQ(StateOf(0), DatasetState::kReady);
   EXPECT_EQ(StateOf(1), DatasetState::kUnloaded);
   const std::size_t loads = script.loads.size();
   EXPECT_THAT(ToClients<FrameReply>(Visit(5, "b")), SizeIs(1));
   EXPECT_EQ(script.loads.size(), loads + 1);
-  EXPECT_NE(script.loads.back().dataset, b);
   EXPECT_EQ(StateOf(0), DatasetState::kUnloaded);
 }
 
@@ -212,7 +213,7 @@ TEST_F(DatasetRules, WhatFramesNeedStaysAndWhatComesOnTopIsRefused) {
   EXPECT_EQ(failed[0].message.request, 2U);
   EXPECT_THAT(failed[0].message.status.message(), HasSubstr("dataset \"b\" needs 150 MiB, limit 300 MiB (200 MiB are in use"));
   ASSERT_THAT(Of<UnloadDataset>(actions), SizeIs(1));
-  EXPECT_EQ(Of<UnloadDataset>(actions)[0].dataset, script.loads.back().dataset);
+  EXPECT_EQ(Of<UnloadDataset>(actions)[0].dataset, IdOf("b"));
   EXPECT_THAT(ToClients<FrameReply>(script.AnswerAll(script.Answer(running[0]))), SizeIs(1));
 }
 
