@@ -196,7 +196,7 @@ void FrameMachine::State::FailFrame(const RunningFrame& frame, const Status& sta
 }
 
 void FrameMachine::State::Expire() {
-  for (const WorkerId worker : roster.Silent(now)) LoseWorker(worker);
+  for (const WorkerId worker : roster.Silent(now)) LoseWorker(worker, LiveRoster::Loss::kSilent);
   roster.GiveUpVacancies(now);
   for (const PeerToken client : clients.Silent(now)) {
     if (clients.IsBehind(client)) actions.emplace_back(DropClient{client});
@@ -290,7 +290,7 @@ void FrameMachine::State::DismissWorkers() {
   for (const WorkerId worker : roster.Leaving()) {
     if (std::ranges::any_of(frames, [worker](const RunningFrame& frame) { return frame.HasPart(worker); })) continue;
     SendWorker(worker, Stop{.epoch = config.epoch});
-    RemoveWorker(worker, std::nullopt);
+    RemoveWorker(worker, LiveRoster::Loss::kLeft);
   }
 }
 

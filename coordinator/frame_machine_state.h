@@ -67,7 +67,7 @@ struct FrameMachine::State {
     std::visit([&](const auto& message) { OnClientMessage(event.from, message); }, event.message);
   }
   void On(const WorkerGone& event) {
-    for (const WorkerId worker : roster.At(event.who)) LoseWorker(worker);
+    for (const WorkerId worker : roster.At(event.who)) LoseWorker(worker, LiveRoster::Loss::kGone);
   }
   void On(const ClientGone& event) { FreeClient(event.who); }
   void On(const DatasetLoaded& event);
@@ -138,8 +138,8 @@ struct FrameMachine::State {
   void AfterGroupDone(const RunningFrame& frame);
   void EndFrame(FrameId id);
   void FailFrame(const RunningFrame& frame, const Status& status);
-  void LoseWorker(WorkerId worker);
-  void RemoveWorker(WorkerId worker, std::optional<Time> last_heard);
+  void LoseWorker(WorkerId worker, LiveRoster::Loss loss);
+  void RemoveWorker(WorkerId worker, LiveRoster::Loss loss);
   void StopAll(const AnyMessage& goodbye, const std::string& reason);
   Ping MakePing(WorkerId to) const {
     return {.epoch = config.epoch,

@@ -5,7 +5,7 @@
 namespace slabstream {
 
 void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const Register& message) {
-  for (const WorkerId dead : roster.ReplacedBy(message, event.from)) LoseWorker(dead);
+  for (const WorkerId dead : roster.ReplacedBy(message, event.from)) LoseWorker(dead, LiveRoster::Loss::kSilent);
   if (roster.empty()) next_ping = now + config.heartbeat;
   const WorkerId worker = roster.Admit(message, event.from, now);
   SendWorker(worker, Welcome{.epoch = config.epoch,
@@ -78,21 +78,22 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const WorkerT
 }
 
 void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const Leave& message) {
-  if (IsFrom(event, message.epoch, message.worker)) RemoveWorker(message.worker, std::nullopt);
+  if (IsFrom(event, message.epoch, message.worker)) RemoveWorker(message.worker, LiveRoster::Loss::kLeft);
 }
 
-void FrameMachine::State::LoseWorker(WorkerId worker) {
+void FrameMachine::State::LoseWorker(WorkerId worker, LiveRoster::Loss loss) {
   ++workers_lost;
-  const Member* member = roster.Find(worker);
-  RemoveWorker(worker, member == nullptr ? std::nullopt : std::optional(member->last_heard));
+  RemoveWorker(worker, loss);
 }
 
-// Without `last_heard` it has left in order.
-void FrameMachine::State::RemoveWorker(WorkerId worker, std::optional<Time> last_heard) {
-  roster.Remove(worker, now, last_heard ? LiveRoster::Notice::kNone : LiveRoster::Notice::kGiven);
+void FrameMachine::State::RemoveWorker(WorkerId worker, LiveRoster::Loss loss) {
+  const Member* member = roster.Find(worker);
+  if (member == nullptr) return;
+  const std::optional<Time> last_word = loss == LiveRoster::Loss::kGone ? std::optional(member->last_heard) : std::nullopt;
+  roster.Remove(worker, now, loss);
   for (auto it = frames.begin(); it != frames.end();) {
     RunningFrame& frame = *it++;  // FailFrame removes it
-    if (const Status status = frame.OnLoss(worker, last_heard, now); !status.ok()) FailFrame(frame, status);
+    if (const Status status = frame.OnLoss(worker, last_word, now); !status.ok()) FailFrame(frame, status);
   }
 }
 

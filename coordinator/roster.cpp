@@ -93,7 +93,7 @@ void LiveRoster::Vacate(WorkerId worker, Time now) {
   ++version_;
 }
 
-void LiveRoster::Remove(WorkerId worker, Time now, Notice notice) {
+void LiveRoster::Remove(WorkerId worker, Time now, Loss loss) {
   const auto member = std::ranges::find(members_, worker, &Member::id);
   if (member == members_.end()) return;
   removed_.push_back({worker, member->peer, now});
@@ -102,7 +102,7 @@ void LiveRoster::Remove(WorkerId worker, Time now, Notice notice) {
   Vacate(worker, now);
   if (!members_.empty()) return;
   empty_since_ = now;
-  last_gave_notice_ = notice == Notice::kGiven;
+  last_gave_notice_ = loss == Loss::kLeft;
 }
 
 std::vector<WorkerId> LiveRoster::Gone(Time now) const {

@@ -53,8 +53,8 @@ class LiveRoster {
   News Hear(const Heartbeat& message, PeerToken from, Time now);
   void Touch(WorkerId worker, Time now);  // any other message of a member; unknown ids are ignored
 
-  enum class Notice { kGiven, kNone };
-  void Remove(WorkerId worker, Time now, Notice notice = Notice::kNone);  // its slot becomes vacant
+  enum class Loss { kLeft, kSilent, kGone };  // it said so; it is heard no more; its connection ended, as when a process dies
+  void Remove(WorkerId worker, Time now, Loss loss = Loss::kSilent);  // its slot becomes vacant
   // Drops slots that have been vacant for the grace period, and waits no longer than return_wait.
   void GiveUpVacancies(Time now);
   // The listener itself was asleep until now: silences and vacancies begin later by as much, the wait for a first worker begins anew.

@@ -193,11 +193,11 @@ void RunningFrame::OnHeartbeat(WorkerId worker, bool progressed, Time now) {
 
 void RunningFrame::OnOvertaken(const std::vector<WorkerId>& workers) { moved_on_.insert(workers.begin(), workers.end()); }
 
-Status RunningFrame::OnLoss(WorkerId worker, std::optional<Time> last_heard, Time now) {
+Status RunningFrame::OnLoss(WorkerId worker, std::optional<Time> last_word, Time now) {
   if (suspicion_ && suspicion_->accused == worker) suspicion_.reset();
   if (!HasPart(worker)) return Status::Ok();
   // A worker that was not heard since the attempt began may have died before, together with those whose boxes it got.
-  const bool died_of_it = last_heard && *last_heard > attempt_begin_;
+  const bool died_of_it = last_word && *last_word > attempt_begin_;
   const Status status = died_of_it ? NoteDeath(worker) : Status::Ok();
   if (worker == plan_.display) display_in_doubt_ = true;
   attempt_due_ = now;

@@ -96,8 +96,8 @@ class RunningFrame {
   void OnOvertaken(const std::vector<WorkerId>& workers);
 
   // ---- what goes wrong. A Status that is not ok: the frame has failed.
-  // `worker` is no longer in the roster. Without `last_heard` it has left in order; else it has died, as far as anybody knows.
-  Status OnLoss(WorkerId worker, std::optional<Time> last_heard, Time now);
+  // `worker` is no longer in the roster. `last_word`: it has died, and when it was heard last. Without it, it left or fell silent.
+  Status OnLoss(WorkerId worker, std::optional<Time> last_word, Time now);
   void OnReconnection(WorkerId worker, Time now);  // messages from it or to it may be lost
   // Ignores trouble of another attempt or of a group that is done. message.unreachable, if any, must be in the roster. Trouble of the
   // display worker when all groups are done: it cannot make the picture.
