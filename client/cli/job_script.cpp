@@ -14,7 +14,7 @@ constexpr std::string_view kPreamble = R"(#!/bin/bash
 # go.
 )";
 
-// What follows the values. It uses: programs, folder, data, dataset, workers, threads, patience.
+// What follows the values. It uses: programs, folder, data, dataset, workers, threads, drain, patience.
 constexpr std::string_view kBody = R"(
 service_file() { cat "$folder/worker.json" 2> /dev/null; }
 
@@ -41,7 +41,8 @@ run_workers() {
     [[ ! -e "$folder/ended" ]] || return 0
     file=$(service_file)
     srun --ntasks="$workers" --cpus-per-task="$threads" --kill-on-bad-exit=0 --wait=0 \
-      "$programs/slabstream-worker" --service "$folder/worker.json" --threads "$threads" < /dev/null &
+      "$programs/slabstream-worker" --service "$folder/worker.json" --threads "$threads" --drain "$drain" \
+        < /dev/null &
     step=$!
     while kill -0 "$step" 2> /dev/null && ! is_over "$file"; do sleep 1; done
     if kill -0 "$step" 2> /dev/null; then
@@ -147,6 +148,8 @@ std::string TextOf(const JobScript& script) {
   for (const std::string& data : script.data) text += fmt::format("{}--data {}", text.ends_with('(') ? "" : " ", ShellWord(data));
   text += fmt::format(")\ndataset={}\nworkers={}\n", ShellWord(script.dataset), script.workers_per_node);
   text += fmt::format("threads={}\n", script.threads > 0 ? std::to_string(script.threads) : "$((SLURM_CPUS_ON_NODE / workers))");
+  text += fmt::format("drain={}s # that workers have to finish what they have, after a notice\n",
+                      script.notice_seconds - script.notice_seconds / 4);
   text += "patience=600 # seconds without a coordinator after which workers end\n";
   return text + std::string(kBody);
 }

@@ -99,6 +99,7 @@ TEST_F(JobScriptTest, SlurmSeesTheOptions) {
   for (const char* line :
        {"--array=0-3", "--nodes=1", "--ntasks=2", "--time=1:30:00", "--signal=TERM@90", "--requeue", "--exclusive", "--partition=long"})
     EXPECT_THAT(whole_nodes, HasSubstr(std::string("\n#SBATCH ") + line + "\n"));
+  EXPECT_THAT(whole_nodes, HasSubstr("\ndrain=68s ")) << "shorter than the notice";
   EXPECT_LT(whole_nodes.rfind("#SBATCH"), whole_nodes.find("set -u")) << "Slurm stops reading at the first command";
   EXPECT_GT(whole_nodes.find("--partition=long"), whole_nodes.find("--requeue")) << "of two options Slurm takes the later";
   script.threads = 3;

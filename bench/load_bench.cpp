@@ -1,0 +1,189 @@
+// A service under load: many well-behaved clients at once, for a while alone and then beside one that asks for pictures and never reads
+// them and one that asks for very large pictures. What must hold: no process takes more memory than its --memory, and the well-behaved
+// clients together keep at least half of their speed. The exit status says whether it did.
+//
+// A well-behaved client asks for the next picture when it has the last one. All clients are threads of this process.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <fstream>
+#include <functional>
+#include <thread>
+
+#include "bench/program.h"
+#include "client/cli/process.h"
+#include "client/client.h"
+#include "common/base/check.h"
+#include "common/volume/memory_budget.h"
+#include "common/volume_io/volume_reader.h"
+#include "common/wire/any_message.h"
+#include "tests/support/temporary_directory.h"
+
+namespace slabstream {
+namespace {
+
+constexpr Duration kPatience = std::chrono::seconds(30);
+constexpr Duration kAnswerWait = std::chrono::milliseconds(200);
+constexpr Duration kReportInterval = std::chrono::seconds(10);
+
+struct Options {
+  int clients = 200, seconds = 600, workers = 2, threads = 1, volume = 64, size = 128, large = 8192;
+  int memory_mebi = 1024;  // of each process
+};
+
+FrameRequest RequestOf(int size, int frame) {
+  FrameRequest request;
+  request.dataset = "sphere";
+  request.size = {size, size};
+  request.view.azimuth_degrees = frame * 7 % 360;
+  return request;
+}
+
+struct Counts {
+  std::atomic<std::uint64_t> pictures = 0, failures = 0;
+};
+
+// Asks for one picture after another.
+void AskAndRead(Client& client, int size, Counts& counts, const std::stop_token& stop) {
+  for (int frame = 0; !stop.stop_requested(); ++frame) {
+    const RequestId request = client.Submit(RequestOf(size, frame));
+    for (bool over = false; !over && !stop.stop_requested();) {
+      const std::optional<ClientEvent> event = client.Next(kAnswerWait);
+      if (!event || event->request != request) continue;
+      const auto* picture = std::get_if<Picture>(&event->what);
+      const bool failed = std::holds_alternative<Status>(event->what);
+      over = failed || (picture != nullptr && picture->final);
+      if (over) ++(failed ? counts.failures : counts.pictures);
+    }
+  }
+}
+
+// Asks for more and more, and reads nothing, but says that it is alive.
+void AskAndNeverRead(Context& context, const std::string& endpoint, int size, const std::stop_token& stop) {
+  Socket socket = Socket::Dealer(context, {.receive_high_water_mark = 1}).value();
+  CHECK(socket.Connect(endpoint).ok());
+  for (RequestId request = 1; !stop.stop_requested(); ++request) {
+    (void)socket.Send({}, Encode(SubmitFrame{.request = request, .deadline_ms = 600'000, .frame = RequestOf(size, int(request % 360))}));
+    (void)socket.Send({}, Encode(ClientPing{.nonce = request}));
+    ::usleep(50'000);
+  }
+}
+
+// Bytes of resident memory that the process had at most.
+std::uint64_t PeakMemory(pid_t pid) {
+  std::ifstream file(fmt::format("/proc/{}/status", pid));
+  for (std::string word; file >> word;) {
+    std::uint64_t kibi = 0;
+    if (word == "VmHWM:" && file >> kibi) return kibi << 10;
+  }
+  return 0;
+}
+
+class Load {
+ public:
+  explicit Load(const Options& options) : options_(options) {}
+
+  // Call before this process has threads.
+  Status Run() {
+    const TemporaryDirectory temporary;
+    const std::string directory = temporary.path();
+    const Volume sphere = MakeSphere({.sphere_class = SphereClass::kHollow, .size = options_.volume}).value();
+    CHECK(WriteVolume(sphere, directory + "/sphere.mha").ok());
+    const std::string memory = fmt::format("{}MiB", options_.memory_mebi);
+    const auto start = [&](std::vector<std::string> command) {
+      command[0] = ProgramBeside(command[0]).value();
+      return Child::Start({.command = std::move(command), .log_path = directory + "/log"}).value();
+    };
+    Child coordinator = start(
+        {"slabstream-coordinator", "--listen", "tcp://127.0.0.1:*", "--memory", memory, "--data", "sphere=" + directory + "/sphere.mha"});
+    const std::string line = coordinator.ReadLine(kPatience).value();
+    const auto value = [&line](const std::string& key) {
+      const std::size_t begin = line.find(key + "=") + key.size() + 1;
+      return line.substr(begin, line.find(' ', begin) - begin);
+    };
+    std::vector<Child> workers;
+    for (int i = 0; i < options_.workers; ++i) {
+      workers.push_back(start(
+          {"slabstream-worker", "--coordinator", value("workers"), "--threads", std::to_string(options_.threads), "--memory", memory}));
+    }
+    processes_ = {{"coordinator", coordinator.pid()}};
+    for (const Child& worker : workers) processes_.emplace_back(fmt::format("worker {}", processes_.size()), worker.pid());
+    const Status status = Measure(value("client"));
+    for (Child& worker : workers) worker.Terminate(kPatience);
+    coordinator.Terminate(kPatience);
+    return status;
+  }
+
+ private:
+  Status Measure(const std::string& endpoint) {
+    Context context;
+    std::vector<Client> clients;
+    for (int i = 0; i < options_.clients; ++i) clients.push_back(Client::Connect(context, endpoint).value());
+    while (clients[0].QueryStatus().value().workers.size() < std::size_t(options_.workers)) ::usleep(10000);
+    fmt::print("sphere {0}^3, {1} clients of {2}x{2} pixels, {3} workers of {4} threads, {5} MiB for each process\n", options_.volume,
+               options_.clients - 2, options_.size, options_.workers, options_.threads, options_.memory_mebi);
+
+    Counts good, large;
+    std::vector<std::jthread> threads;
+    for (std::size_t i = 2; i < clients.size(); ++i) {
+      threads.emplace_back([&, i](const std::stop_token& stop) { AskAndRead(clients[i], options_.size, good, stop); });
+    }
+    (void)RateOf(good, options_.seconds / 20, "all begin");
+    const double alone = RateOf(good, options_.seconds / 4, "well-behaved clients alone");
+    threads.emplace_back([&](const std::stop_token& stop) { AskAndNeverRead(context, endpoint, 1024, stop); });
+    threads.emplace_back([&](const std::stop_token& stop) { AskAndRead(clients[1], options_.large, large, stop); });
+    const double beside = RateOf(good, options_.seconds - options_.seconds / 4 - options_.seconds / 20, "beside the two others");
+    for (std::jthread& thread : threads) thread.request_stop();
+    threads.clear();
+
+    fmt::print("{0}x{0}: {1} pictures, {2} refused or failed; well-behaved clients: {3} pictures, {4} failures\n", options_.large,
+               large.pictures, large.failures, good.pictures, good.failures);
+    const std::uint64_t limit = std::uint64_t(options_.memory_mebi) << 20;
+    Status status;
+    for (const auto& [name, pid] : processes_) {
+      const std::uint64_t peak = PeakMemory(pid);
+      fmt::print("{:12} {:>10} at most, limit {}\n", name, MemoryText(peak), MemoryText(limit));
+      if (peak == 0 || peak > limit) status = Status::ResourceExhausted(fmt::format("{} took {}", name, MemoryText(peak)));
+    }
+    fmt::print("speed kept: {:.2f}\n", beside / alone);
+    if (beside < alone / 2) status = Status::Unavailable("well-behaved clients kept less than half of their speed");
+    if (good.failures > 0) status = Status::Unavailable("frames of well-behaved clients failed");
+    return status;
+  }
+
+  // Pictures a second, over so many seconds.
+  static double RateOf(const Counts& counts, int seconds, const std::string& what) {
+    const std::uint64_t before = counts.pictures;
+    const Time begin = MonotonicNow(), end = begin + std::chrono::seconds(std::max(seconds, 1));
+    const auto rate = [&] { return double(counts.pictures - before) / std::chrono::duration<double>(MonotonicNow() - begin).count(); };
+    while (MonotonicNow() < end) {
+      std::this_thread::sleep_for(std::min<Duration>(end - MonotonicNow(), kReportInterval));
+      fmt::print("{}: {:.1f} pictures a second\n", what, rate());
+      std::fflush(stdout);
+    }
+    return rate();
+  }
+
+  const Options options_;
+  std::vector<std::pair<std::string, pid_t>> processes_;
+};
+
+}  // namespace
+}  // namespace slabstream
+
+int main(int argc, char** argv) {
+  using namespace slabstream;  // NOLINT(google-build-using-namespace): the program's own
+  Options options;
+  CLI::App app("A service under the load of many clients, one of which never reads", "load_bench");
+  AddInteger(app, "--clients", options.clients, 3, 1000, "Clients, with the one that never reads and the one that asks for large pictures");
+  AddInteger(app, "--seconds", options.seconds, 20, 86400, "Duration; a quarter of it without those two");
+  AddInteger(app, "--workers", options.workers, 1, 64, "Workers");
+  AddInteger(app, "--threads", options.threads, 1, 64, "Render threads of each worker");
+  AddInteger(app, "--volume", options.volume, 2, 1024, "Voxels a side of the sphere");
+  AddInteger(app, "--size", options.size, 1, 8192, "Pixels a side of most pictures");
+  AddInteger(app, "--large", options.large, 1, 16384, "Pixels a side of the large pictures");
+  AddInteger(app, "--memory", options.memory_mebi, 256, 1 << 20, "MiB for the coordinator, and for each worker");
+  return RunProgram(app, argc, argv, [&options] { return Load(options).Run(); });
+}
