@@ -124,7 +124,7 @@ void LiveRoster::Postpone(Duration duration, Time now) {
   for (Slot& slot : slots_) {
     if (slot.worker == 0) slot.vacant_since += duration;
   }
-  if (members_.empty()) empty_since_ = now;
+  if (members_.empty() && duration > kMoment) empty_since_ = now;
   if (awaits_until_) *awaits_until_ += duration;
 }
 

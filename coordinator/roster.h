@@ -57,7 +57,8 @@ class LiveRoster {
   void Remove(WorkerId worker, Time now, Loss loss = Loss::kSilent);  // its slot becomes vacant
   // Drops slots that have been vacant for the grace period, and waits no longer than return_wait.
   void GiveUpVacancies(Time now);
-  // The listener itself was asleep until now: silences and vacancies begin later by as much, the wait for a first worker begins anew.
+  // The listener itself was asleep until now: silences and vacancies begin later by as much. After more than a moment the wait for a first
+  // worker begins anew.
   void Postpone(Duration duration, Time now);
 
   const Member* Find(WorkerId worker) const;               // null: not a member
@@ -87,6 +88,7 @@ class LiveRoster {
 
  private:
   static constexpr std::size_t kMaxRemoved = 64;
+  static constexpr Duration kMoment = std::chrono::seconds(1);  // workers that are not registered speak as often
   struct Slot {
     WorkerId worker = 0;
     Time vacant_since;

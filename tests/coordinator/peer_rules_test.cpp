@@ -111,6 +111,20 @@ TEST(CoordinatorPeers, TimeInWhichTheCoordinatorStoodStillCountsForNothing) {
   EXPECT_EQ(script.machine.sizes().slots, 2U) << "the vacant slot is still kept";
 }
 
+TEST(CoordinatorPeers, WaitForTheFirstWorkerEndsThoughEveryWakeUpIsALittleLate) {
+  CoordinatorScript script;
+  Actions actions = script.Submit(kClient, Frame(1));
+  const Time end = script.now + seconds(12);
+  while (script.now < end) {
+    script.now = std::min(script.machine.NextWake(), end) + milliseconds(2);
+    CoordinatorScript::Append(actions, script.Client(kClient, ClientPing{}));
+    CoordinatorScript::Append(actions, script.Step(CoordinatorTick{}));
+  }
+  const auto failed = ToClients<FrameFailed>(actions);
+  ASSERT_EQ(failed.size(), 1U);
+  EXPECT_EQ(failed[0].message.status.code(), StatusCode::kUnavailable);
+}
+
 TEST(CoordinatorPeers, WaitForTheFirstWorkerBeginsAnewWhenTheCoordinatorStoodStill) {
   CoordinatorConfig config = TestConfig();
   config.client_timeout = seconds(1000);

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/time.h"
 #include "tests/end_to_end/picture_file.h"
 #include "tests/slurm/cluster.h"
 
@@ -87,10 +88,13 @@ class SlurmTest : public EndToEndTest {
       const std::string job = cluster_->Output({"scontrol", "show", "job", Element(element)});
       return job.find("Restarts=1") != std::string::npos && job.find("JobState=RUNNING") != std::string::npos;
     };
+    Time next_update = MonotonicNow();
     ASSERT_TRUE(Eventually([&] {
       if (runs_again()) return true;
-      // Refused while it ends, and forgotten if it comes too early.
-      if (Ask(element, "%T") == "PENDING") cluster_->Run({"scontrol", "update", "JobId=" + Element(element), "StartTime=now"});
+      // Refused while it ends, and forgotten if it comes too early. Without a pause it would be updated before the scheduler looks at it.
+      if (MonotonicNow() < next_update || Ask(element, "%T") != "PENDING") return false;
+      cluster_->Run({"scontrol", "update", "JobId=" + Element(element), "StartTime=now"});
+      next_update = MonotonicNow() + std::chrono::seconds(5);
       return false;
     })) << Ask(element, "%T %r");
   }
