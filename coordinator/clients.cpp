@@ -53,7 +53,8 @@ void ClientTable::Keep(PeerToken token, Answer answer) {
   Client& client = clients_.at(token);
   client.answer_bytes += answer.payload.size();
   client.answers.push_back(std::move(answer));
-  while (client.answers.size() > kMaxKeptAnswers || client.answer_bytes > kMaxKeptAnswerBytes) {
+  const std::size_t most_bytes = std::min(kMaxKeptAnswerBytes, kKeptAnswerBytesOfAll / clients_.size());
+  while (client.answers.size() > kMaxKeptAnswers || client.answer_bytes > most_bytes) {
     client.answer_bytes -= client.answers.front().payload.size();
     client.answers.pop_front();
   }

@@ -23,6 +23,7 @@ inline constexpr std::size_t kMaxKeptAnswers = 64;  // of one client
 // Payloads of one client's kept answers. Few: answers are hardly ever asked for again, and a kept picture holds a buffer that the next
 // picture could use while it is still in a cache.
 inline constexpr std::size_t kMaxKeptAnswerBytes = std::size_t{8} << 20;
+inline constexpr std::size_t kKeptAnswerBytesOfAll = std::size_t{64} << 20;  // many clients share them: each has an equal part
 
 // What ended a request: its final FrameReply, or FrameFailed.
 struct Answer {
