@@ -354,7 +354,10 @@ Time FrameMachine::State::NextWake() {
     const bool waits_for_workers = roster.staying() == 0 && frame.between_attempts();
     if (!waits_for_workers) next = std::min(next, frame.NextWake());
   }
-  return roster.empty() ? next : std::min(next, next_ping);
+  if (!roster.empty()) return std::min(next, next_ping);
+  // Often enough that a coordinator that was held up notices how long.
+  const bool anything_waits = queue.size() + frames.size() > 0;
+  return anything_waits ? std::min(next, now + config.heartbeat) : next;
 }
 
 FrameMachine::FrameMachine(CoordinatorConfig config) : state_(std::make_unique<State>(std::move(config))) {

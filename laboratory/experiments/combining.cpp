@@ -11,6 +11,7 @@
 #include "common/base/check.h"
 #include "common/combining/schemes.h"
 #include "common/kernels/combine.h"
+#include "common/renderers/registry.h"
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/machines.h"
 #include "laboratory/experiments/policies.h"
@@ -127,6 +128,7 @@ double CombiningSeconds(const Combining& c, std::uint64_t seed, const MachineMod
   VolumeSummary summary;
   summary.description.geometry.size = {8, 8, c.ranks};
   plan.setup.description = summary.description;
+  SetRenderer(*FindRenderer(kDefaultRenderer), plan.setup);
   plan.setup.sheets.width = plan.setup.sheets.height = c.side;
   plan.slots = std::uint32_t(c.ranks);
   plan.display = 1;

@@ -120,7 +120,7 @@ TEST_F(ExperimentTest, SweepAtARunningService) {
 }
 
 TEST_F(ExperimentTest, ContinuesWhereCtrlCStoppedIt) {
-  const std::vector<std::string> arguments = {"experiment", "streaming", "-o", "out", "--quick", "--scale", "0.15", "--repeats", "20"};
+  const std::vector<std::string> arguments = {"experiment", "streaming", "-o", "out", "--quick", "--scale", "0.15", "--repeats", "4"};
   {
     RunningProgram program(Command(arguments), directory_);
     ASSERT_TRUE(program.WaitForOutput("kinds of trials"));
@@ -130,9 +130,9 @@ TEST_F(ExperimentTest, ContinuesWhereCtrlCStoppedIt) {
     EXPECT_THAT(result.err, HasSubstr("the same command continues"));
   }
   const std::string before = ReadFile("out/trials.jsonl");
-  const ProgramResult other = Slabstream({"experiment", "streaming", "-o", "out", "--quick", "--scale", "0.15", "--repeats", "21"});
+  const ProgramResult other = Slabstream({"experiment", "streaming", "-o", "out", "--quick", "--scale", "0.15", "--repeats", "5"});
   EXPECT_EQ(other.exit_status, 2);
-  EXPECT_THAT(other.err, HasSubstr("holds a run with repeats 20, not 21"));
+  EXPECT_THAT(other.err, HasSubstr("holds a run with repeats 4, not 5"));
   MustRun(arguments);
   EXPECT_EQ(ReadFile("out/trials.jsonl").substr(0, before.size()), before);
   ExpectResults("out", "streaming");

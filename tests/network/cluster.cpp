@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <thread>
@@ -132,8 +133,11 @@ void ClusterTest::ExpectUndisturbed(const std::vector<Result<Picture>>& pictures
 }
 
 std::uint32_t ClusterTest::RenderThrough(const std::function<void()>& disturb) {
-  std::jthread other([this] { ExpectUndisturbed(Render(*other_client_, Frames(), {})); });
-  const std::vector<Result<Picture>> pictures = Render(*client_, Frames(), disturb);
+  std::vector<Result<Picture>> of_other;
+  std::jthread other([&] { of_other = Render(*other_client_, Frames(), {}); });
+  std::vector<Result<Picture>> pictures = Render(*client_, Frames(), disturb);
+  other.join();
+  std::ranges::move(of_other, std::back_inserter(pictures));
   ExpectUndisturbed(pictures);
   std::uint32_t attempts = 0;
   for (const Result<Picture>& picture : pictures) {

@@ -37,7 +37,7 @@ class ClusterTest : public EndToEndTest {
   // The same picture, made in three ways that each take other voxels to the workers, in several groups.
   static std::vector<FrameRequest> Frames();
   // Both clients ask for Frames(). Once the first group of the first client's is done, `disturb` is called. Every frame must end as the
-  // undisturbed picture, bit for bit. How many attempts the first client's frames took, at most.
+  // undisturbed picture, bit for bit. Returns the most attempts that a frame took.
   std::uint32_t RenderThrough(const std::function<void()>& disturb);
   // There are `workers` workers, which are heard, and frames are as ever.
   void ExpectHealthy(int workers);
