@@ -106,6 +106,15 @@ TEST(CoordinatorWorkers, CoordinatorThatWasHeldUpItselfTakesNobodyForDead) {
   EXPECT_EQ(script.QueryStatus().clients, 1U);
 }
 
+TEST(CoordinatorWorkers, CoordinatorThatWasHeldUpItselfHearsTheFirstWorkerOut) {
+  CoordinatorScript script;
+  script.Submit(21, Frame(1));
+  script.now += script.config.worker_wait + milliseconds(300);
+  EXPECT_TRUE(ToClients<FrameFailed>(script.Step(CoordinatorTick{})).empty());
+  EXPECT_TRUE(ToClients<FrameFailed>(script.Pass(script.config.worker_wait - Duration(1))).empty());
+  EXPECT_EQ(ToClients<FrameFailed>(script.Pass(Duration(1))).size(), 1U);
+}
+
 TEST(CoordinatorWorkers, LossOfAConnectionThatAWorkerHasLeftIsNoLossOfTheWorker) {
   CoordinatorScript script;
   FakeWorker worker = script.Join(11, 1);
