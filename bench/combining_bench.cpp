@@ -249,7 +249,7 @@ class Coordinator {
       for (const Worker& worker : workers_) Send(worker.identity, Ping{kEpoch, frame_, {}});
     }
     while (const auto incoming = control_.TryReceive()) {
-      const AnyMessage message = Decode(incoming->parts[0].span()).value();
+      const AnyMessage message = Decode(incoming->header()).value();
       if (const auto* hello = std::get_if<Register>(&message)) {
         if (std::ranges::find(workers_, incoming->identity, &Worker::identity) != workers_.end()) continue;
         workers_.push_back({incoming->identity, hello->images_endpoint, hello->memory_scope, hello->images_key});
@@ -262,7 +262,7 @@ class Coordinator {
       }
     }
     while (const auto incoming = slabs_.TryReceive()) {
-      const AnyMessage message = Decode(incoming->parts[0].span()).value();
+      const AnyMessage message = Decode(incoming->header()).value();
       const auto& request = std::get<ChunkRequest>(message);
       const auto bytes = std::size_t(request.box.voxel_count()) * BytesPerSample(setup_.description.type);
       Chunk chunk = {.epoch = kEpoch, .dataset = kDataset, .box = request.box, .chunk = request.chunk};

@@ -6,16 +6,14 @@
 // A line a transport: medians and 95th percentiles of the frames after a warm-up. "Before render" is the part of this latency before the
 // first worker begins.
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <map>
 
 #include "bench/program.h"
-#include "client/cli/process.h"
+#include "bench/service_processes.h"
 #include "client/cli/session.h"
 #include "common/base/check.h"
-#include "common/volume_io/volume_reader.h"
 #include "laboratory/measure/statistics.h"
 #include "tests/support/temporary_directory.h"
 
@@ -23,7 +21,6 @@ namespace slabstream {
 namespace {
 
 constexpr int kWarmUpFrames = 20;
-constexpr Duration kPatience = std::chrono::seconds(10);
 
 struct Options {
   int volume = 64, size = 512, frames = 200, workers = 2, threads = 1;
@@ -87,33 +84,13 @@ void PrintRow(const std::string& name, const Measured& measured) {
   std::fflush(stdout);
 }
 
-// Coordinator and workers as processes, as `slabstream up` starts them. Call before this process has threads.
+// Call before this process has threads.
 Measured MeasureProcesses(const Options& options, const std::string& listen, const std::string& directory) {
-  const auto start = [&](std::vector<std::string> command) {
-    command[0] = ProgramBeside(command[0]).value();
-    return Child::Start({.command = std::move(command), .log_path = directory + "/log"}).value();
-  };
-  Child coordinator = start({"slabstream-coordinator", "--listen", listen, "--data", "sphere=" + directory + "/sphere.mha"});
-  const std::string line = coordinator.ReadLine(kPatience).value();
-  const auto value = [&line](const std::string& key) {
-    const std::size_t begin = line.find(key + "=") + key.size() + 1;
-    return line.substr(begin, line.find(' ', begin) - begin);
-  };
-  std::vector<Child> workers;
-  for (int i = 0; i < options.workers; ++i) {
-    workers.push_back(start({"slabstream-worker", "--coordinator", value("workers"), "--threads", std::to_string(options.threads)}));
-  }
-  Measured measured;
-  {
-    Context context;
-    Client client = Client::Connect(context, value("client")).value();
-    while (client.QueryStatus().value().workers.size() < std::size_t(options.workers)) ::usleep(10000);
-    measured = Measure(client, "sphere", options);
-    CHECK(client.ShutDownService().ok());
-  }
-  for (Child& worker : workers) worker.Terminate(kPatience);
-  coordinator.Terminate(kPatience);
-  return measured;
+  const ServiceProcesses service(
+      {.directory = directory, .listen = listen, .volume = options.volume, .workers = options.workers, .threads = options.threads});
+  Context context;
+  Client client = service.Connect(context);
+  return Measure(client, "sphere", options);
 }
 
 Measured MeasureEmbedded(const Options& options, const std::shared_ptr<const Volume>& volume, int workers, int threads) {
@@ -126,7 +103,6 @@ Status Run(const Options& options) {
   const TemporaryDirectory temporary;
   const std::string directory = temporary.path();
   const auto sphere = std::make_shared<const Volume>(MakeSphere({.sphere_class = SphereClass::kHollow, .size = options.volume}).value());
-  CHECK(WriteVolume(*sphere, directory + "/sphere.mha").ok());
   fmt::print("sphere {0}^3, {1}x{1}, zoom {2}, {3}, {4} workers of {5} threads, {6} frames\n", options.volume, options.size, options.zoom,
              options.renderer->name(), options.workers, options.threads, options.frames);
   PrintHead();

@@ -1,8 +1,8 @@
-// A service under load: many well-behaved clients at once, for a while alone and then beside one that asks for pictures and never reads
-// them and one that asks for very large pictures. What must hold: no process takes more memory than its --memory, and the well-behaved
-// clients together keep at least half of their speed. The exit status says whether it did.
-//
-// A well-behaved client asks for the next picture when it has the last one. All clients are threads of this process.
+// Many clients at once. Most of them ask for the next picture when they have the last one. At first they are alone; then one client that
+// asks and never reads joins them, and one that asks for very large pictures. The program checks two things:
+//   memory  no process takes more than its --memory
+//   speed   the others together keep at least half of their pictures a second
+// It exits with 0 if both hold. All clients are threads of this process.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -13,18 +13,16 @@
 #include <thread>
 
 #include "bench/program.h"
-#include "client/cli/process.h"
+#include "bench/service_processes.h"
 #include "client/client.h"
 #include "common/base/check.h"
 #include "common/volume/memory_budget.h"
-#include "common/volume_io/volume_reader.h"
 #include "common/wire/any_message.h"
 #include "tests/support/temporary_directory.h"
 
 namespace slabstream {
 namespace {
 
-constexpr Duration kPatience = std::chrono::seconds(30);
 constexpr Duration kAnswerWait = std::chrono::milliseconds(200);
 constexpr Duration kReportInterval = std::chrono::seconds(10);
 
@@ -88,40 +86,20 @@ class Load {
   // Call before this process has threads.
   Status Run() {
     const TemporaryDirectory temporary;
-    const std::string directory = temporary.path();
-    const Volume sphere = MakeSphere({.sphere_class = SphereClass::kHollow, .size = options_.volume}).value();
-    CHECK(WriteVolume(sphere, directory + "/sphere.mha").ok());
     const std::string memory = fmt::format("{}MiB", options_.memory_mebi);
-    const auto start = [&](std::vector<std::string> command) {
-      command[0] = ProgramBeside(command[0]).value();
-      return Child::Start({.command = std::move(command), .log_path = directory + "/log"}).value();
-    };
-    Child coordinator = start(
-        {"slabstream-coordinator", "--listen", "tcp://127.0.0.1:*", "--memory", memory, "--data", "sphere=" + directory + "/sphere.mha"});
-    const std::string line = coordinator.ReadLine(kPatience).value();
-    const auto value = [&line](const std::string& key) {
-      const std::size_t begin = line.find(key + "=") + key.size() + 1;
-      return line.substr(begin, line.find(' ', begin) - begin);
-    };
-    std::vector<Child> workers;
-    for (int i = 0; i < options_.workers; ++i) {
-      workers.push_back(start(
-          {"slabstream-worker", "--coordinator", value("workers"), "--threads", std::to_string(options_.threads), "--memory", memory}));
-    }
-    processes_ = {{"coordinator", coordinator.pid()}};
-    for (const Child& worker : workers) processes_.emplace_back(fmt::format("worker {}", processes_.size()), worker.pid());
-    const Status status = Measure(value("client"));
-    for (Child& worker : workers) worker.Terminate(kPatience);
-    coordinator.Terminate(kPatience);
-    return status;
+    const ServiceProcesses service({.directory = temporary.path(),
+                                    .volume = options_.volume,
+                                    .workers = options_.workers,
+                                    .threads = options_.threads,
+                                    .arguments_of_each = {"--memory", memory}});
+    return Measure(service);
   }
 
  private:
-  Status Measure(const std::string& endpoint) {
+  Status Measure(const ServiceProcesses& service) {
     Context context;
     std::vector<Client> clients;
-    for (int i = 0; i < options_.clients; ++i) clients.push_back(Client::Connect(context, endpoint).value());
-    while (clients[0].QueryStatus().value().workers.size() < std::size_t(options_.workers)) ::usleep(10000);
+    for (int i = 0; i < options_.clients; ++i) clients.push_back(service.Connect(context));
     fmt::print("sphere {0}^3, {1} clients of {2}x{2} pixels, {3} workers of {4} threads, {5} MiB for each process\n", options_.volume,
                options_.clients - 2, options_.size, options_.workers, options_.threads, options_.memory_mebi);
 
@@ -132,7 +110,7 @@ class Load {
     }
     (void)RateOf(good, options_.seconds / 20, "all begin");
     const double alone = RateOf(good, options_.seconds / 4, "well-behaved clients alone");
-    threads.emplace_back([&](const std::stop_token& stop) { AskAndNeverRead(context, endpoint, 1024, stop); });
+    threads.emplace_back([&](const std::stop_token& stop) { AskAndNeverRead(context, service.endpoint(), 1024, stop); });
     threads.emplace_back([&](const std::stop_token& stop) { AskAndRead(clients[1], options_.large, large, stop); });
     const double beside = RateOf(good, options_.seconds - options_.seconds / 4 - options_.seconds / 20, "beside the two others");
     for (std::jthread& thread : threads) thread.request_stop();
@@ -142,7 +120,7 @@ class Load {
                large.pictures, large.failures, good.pictures, good.failures);
     const std::uint64_t limit = std::uint64_t(options_.memory_mebi) << 20;
     Status status;
-    for (const auto& [name, pid] : processes_) {
+    for (const auto& [name, pid] : service.pids()) {
       const std::uint64_t peak = PeakMemory(pid);
       fmt::print("{:12} {:>10} at most, limit {}\n", name, MemoryText(peak), MemoryText(limit));
       if (peak == 0 || peak > limit) status = Status::ResourceExhausted(fmt::format("{} took {}", name, MemoryText(peak)));
@@ -167,7 +145,6 @@ class Load {
   }
 
   const Options options_;
-  std::vector<std::pair<std::string, pid_t>> processes_;
 };
 
 }  // namespace

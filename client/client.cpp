@@ -92,7 +92,7 @@ struct Client::Impl {
     return true;
   }
 
-  // Sends a question or an order, and waits for its answer: one of the type Answer, or a refusal.
+  // Sends a message and waits for its answer, of the type Answer. Errors: the service refused it, or did not answer in time.
   template <class Answer, class Question>
   Result<Answer> Ask(Question question_message, Duration timeout);
   void SendPing(Time now);
@@ -163,8 +163,8 @@ bool Client::Impl::Receive() {
   bool received = false;
   while (const std::optional<Incoming> incoming = socket.TryReceive()) {
     received = true;
-    Result<AnyMessage> message = Decode(incoming->parts[0].span());
-    const Bytes payload = incoming->parts.size() > 1 ? incoming->parts[1] : Bytes();
+    Result<AnyMessage> message = Decode(incoming->header());
+    const Bytes payload = incoming->payload();
     if (!message.ok() || payload.size() != ExpectedPayloadBytes(*message)) {
       LogWarning("client plane: dropped a message: " +
                  (message.ok() ? std::string(NameOf(*message)) + " with a payload of " + std::to_string(payload.size()) + " bytes"

@@ -17,6 +17,9 @@ target_include_directories(slabstream_options INTERFACE ${CMAKE_SOURCE_DIR})
 target_compile_options(slabstream_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual)
 # Designated initialisers name what differs from the defaults and leave out the rest on purpose.
 target_compile_options(slabstream_options INTERFACE -Wno-missing-field-initializers)
+if(SLABSTREAM_UNITY)
+  target_compile_options(slabstream_options INTERFACE -Wno-subobject-linkage) # every file looks included there
+endif()
 # Kernels keep vectors in arrays and structs, which those of SVE, whose size no compiler knows, cannot be kept in: NEON on all of Arm.
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
   target_compile_definitions(slabstream_options INTERFACE "HWY_DISABLED_TARGETS=(HWY_SVE|HWY_SVE2|HWY_SVE_256|HWY_SVE2_128)")
@@ -58,15 +61,24 @@ function(slabstream_program name)
   endif()
 endfunction()
 
-# slabstream_test(NAME SOURCES file... LINKS target... [TIMEOUT seconds] [LABELS label...]): a GoogleTest program in build/tests, one ctest.
+# slabstream_test(NAME SOURCES file... LINKS target... [TIMEOUT seconds] [LABELS label...] [COST seconds] [WAITS]): a GoogleTest program in
+# build/tests, one ctest. COST: long ones begin first. WAITS: it leaves the processors to others most of the time.
 function(slabstream_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LINKS;LABELS" ${ARGN})
+  cmake_parse_arguments(ARG "WAITS" "TIMEOUT;COST" "SOURCES;LINKS;LABELS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
   slabstream_program(${name} SOURCES ${ARG_SOURCES} LINKS ${ARG_LINKS} slabstream_test_main FOLDER tests)
   add_test(NAME ${name} COMMAND ${name})
-  set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}")
+  # Of the five jobs of the test presets: two tests that compute and one that waits run at a time on two cores.
+  set(processors 2)
+  if(ARG_WAITS)
+    set(processors 1)
+  endif()
+  if(NOT ARG_COST)
+    set(ARG_COST 0)
+  endif()
+  set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT} COST ${ARG_COST} PROCESSORS ${processors} LABELS "${ARG_LABELS}")
 endfunction()
 
 # slabstream_benchmark(NAME SOURCES file... LINKS target...): a Google Benchmark program in build/bench.

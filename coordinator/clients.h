@@ -17,11 +17,12 @@
 
 namespace slabstream {
 
-// Payloads that were sent to a client and that it has not read: from this on none of its frames begins, and it gets no previews.
+// Bytes of payloads that were sent to a client and that it has not read. A client with so many or more gets no previews, and none of its
+// frames begins.
 inline constexpr std::uint64_t kMaxUnreadBytes = std::uint64_t{128} << 20;
 inline constexpr std::size_t kMaxKeptAnswers = 64;  // of one client
-// Payloads of one client's kept answers. Few: answers are hardly ever asked for again, and a kept picture holds a buffer that the next
-// picture could use while it is still in a cache.
+// Bytes of the payloads of one client's kept answers. Few, since answers are hardly ever asked for again, and since a picture that is kept
+// holds a buffer that the next picture could use while it is still in a cache.
 inline constexpr std::size_t kMaxKeptAnswerBytes = std::size_t{8} << 20;
 inline constexpr std::size_t kKeptAnswerBytesOfAll = std::size_t{64} << 20;  // many clients share them: each has an equal part
 

@@ -298,16 +298,9 @@ void FrameMachine::State::DismissWorkers() {
 // yet. None overtakes it then, so that it gets the room.
 bool FrameMachine::State::StartNextFrame() {
   const auto ready = [&](const OpenRequest& open) { return HasPlan(open) && !clients.IsBehind(open.client); };
-  bool room = true;
-  queue.VisitInTurn([&](const OpenRequest& open) {
-    if (!ready(open)) return true;
-    room = frames.HasRoomFor(open);
-    return false;
-  });
-  if (!room) return false;
-  std::optional<OpenRequest> request = queue.TakeNext(ready);
-  if (!request) return false;
-  const RunningFrame& running = frames.Add(RunningFrame(frames.next_id(), *std::move(request), limits, now));
+  const OpenRequest* const next = queue.FindNext(ready);
+  if (next == nullptr || !frames.HasRoomFor(*next)) return false;
+  const RunningFrame& running = frames.Add(RunningFrame(frames.next_id(), *queue.TakeNext(ready), limits, now));
   SendClient(running.request().client, running.Progress());
   return true;
 }

@@ -11,6 +11,14 @@ void RequestQueue::Push(OpenRequest request) {
   queue->requests.push_back(std::move(request));
 }
 
+const OpenRequest* RequestQueue::FindNext(const Predicate& ready) const {
+  for (const ClientQueue& queue : turn_) {
+    const auto found = std::ranges::find_if(queue.requests, ready);
+    if (found != queue.requests.end()) return &*found;
+  }
+  return nullptr;
+}
+
 std::optional<OpenRequest> RequestQueue::TakeNext(const Predicate& ready) {
   for (auto queue = turn_.begin(); queue != turn_.end(); ++queue) {
     const auto found = std::ranges::find_if(queue->requests, ready);

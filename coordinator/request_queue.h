@@ -37,7 +37,9 @@ class RequestQueue {
   using Predicate = std::function<bool(const OpenRequest&)>;
 
   void Push(OpenRequest request);
-  // The first request that is `ready` of the first client in turn that has one; that client then goes to the end of the turn.
+  // The first request that is `ready` of the first client in turn that has one; null: none is.
+  const OpenRequest* FindNext(const Predicate& ready) const;
+  // Takes it out; its client then goes to the end of the turn.
   std::optional<OpenRequest> TakeNext(const Predicate& ready);
   std::vector<OpenRequest> Extract(const Predicate& wanted);  // takes all of them out, wherever they stand
 

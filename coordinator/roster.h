@@ -98,13 +98,13 @@ class LiveRoster {
     PeerToken peer = 0;
     Time at;
   };
+  // Whoever has not heard of it by now registers anew.
+  bool IsLate(const Removed& removed, Time now) const { return now >= removed.at + 2 * timeout_; }
   void Vacate(WorkerId worker, Time now);
   Slot& SlotFor(const Register& message, Time now);
 
   Duration timeout_, vacancy_grace_, return_wait_;
   std::vector<Member> members_;  // by ascending id
-  bool IsLate(const Removed& removed, Time now) const { return now >= removed.at + 2 * timeout_; }
-
   std::vector<Slot> slots_;
   std::deque<Removed> removed_;  // lately, and at least the last kMaxRemoved
   WorkerId last_id_ = 0;

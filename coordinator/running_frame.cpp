@@ -44,10 +44,11 @@ std::uint32_t RunningFrame::unfinished_groups() const {
 
 bool RunningFrame::waiting() const { return !attempt_due_ && (next_group_ > groups_done_ || groups_done_ == group_count()); }
 
-bool RunningFrame::HasPart(WorkerId worker) const {
-  if (worker == plan_.display) return true;
-  return std::any_of(plan_.groups.begin() + groups_done_, plan_.groups.end(), [worker](const GroupPlan& group) {
-    return std::ranges::find(group.placements, worker, &Placement::worker) != group.placements.end();
+bool RunningFrame::HasPart(WorkerId worker) const { return worker == plan_.display || RendersFrom(groups_done_, worker); }
+
+bool RunningFrame::RendersFrom(std::uint32_t group, WorkerId worker) const {
+  return std::any_of(plan_.groups.begin() + group, plan_.groups.end(), [worker](const GroupPlan& of_frame) {
+    return std::ranges::find(of_frame.placements, worker, &Placement::worker) != of_frame.placements.end();
   });
 }
 
@@ -79,10 +80,7 @@ std::vector<WorkerId> RunningFrame::Participants() const {
 bool RunningFrame::CanHandOut() const { return !attempt_due_ && !handing_over_ && next_group_ < group_count(); }
 
 bool RunningFrame::IsNextOf(WorkerId worker) const {
-  if (next_group_ == 0 && worker == plan_.display) return true;
-  return std::any_of(plan_.groups.begin() + next_group_, plan_.groups.end(), [worker](const GroupPlan& group) {
-    return std::ranges::find(group.placements, worker, &Placement::worker) != group.placements.end();
-  });
+  return (next_group_ == 0 && worker == plan_.display) || RendersFrom(next_group_, worker);
 }
 
 void RunningFrame::HandOver(const Roster& roster) {
@@ -219,7 +217,7 @@ Status RunningFrame::NoteDeath(WorkerId worker) {
   return Status::Ok();
 }
 
-// Whatever was under way on the old connection: who has it answers at once, who has not gets it now.
+// Messages on the old connection may be lost, so another attempt sends all of them again. A worker that has done its part answers at once.
 void RunningFrame::OnReconnection(WorkerId worker, Time now) {
   if (HasPart(worker) && !attempt_due_) attempt_due_ = now;
 }

@@ -120,7 +120,8 @@ class RunningFrame {
   bool Finish(std::uint32_t groups, Time now);
   void KeepHidden(const GroupDone& message);
   bool CanRender(WorkerId worker) const { return worker != 0 && !unable_.contains(worker); }
-  bool IsNextOf(WorkerId worker) const;  // it has a part in what is not handed out yet
+  bool RendersFrom(std::uint32_t group, WorkerId worker) const;  // a box of that group or of a later one
+  bool IsNextOf(WorkerId worker) const;                          // it has a part in what is not handed out yet
   Status NoteDeath(WorkerId worker);
   bool waiting() const;  // for groups that are out, or for the finished picture
   Status CountStall(const Status& reason, Duration pause, Time now);

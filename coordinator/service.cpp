@@ -224,8 +224,8 @@ void CoordinatorService::Impl::ReceiveFromWorkers() {
     std::optional<Incoming> incoming = control.TryReceive();
     if (!incoming) return;
     if (!RoleOf(*incoming)) continue;
-    Bytes payload = incoming->parts.size() > 1 ? std::move(incoming->parts[1]) : Bytes();
-    Result<AnyMessage> message = Guarded("decoding", [&] { return DecodeOn(Plane::kControl, incoming->parts[0].span(), payload.size()); });
+    Bytes payload = incoming->payload();
+    Result<AnyMessage> message = Guarded("decoding", [&] { return DecodeOn(Plane::kControl, incoming->header(), payload.size()); });
     if (!message.ok()) {
       complaints.Warning("control plane: dropped a message: " + message.status().message());
       continue;
@@ -240,12 +240,12 @@ void CoordinatorService::Impl::ReceiveFromClients() {
     if (!incoming) return;
     const std::optional<Role> role = RoleOf(*incoming);
     if (!role) continue;
-    const std::size_t payload_bytes = incoming->parts.size() > 1 ? incoming->parts[1].size() : 0;
-    Result<AnyMessage> message = Guarded("decoding", [&] { return DecodeOn(Plane::kClient, incoming->parts[0].span(), payload_bytes); });
+    Result<AnyMessage> message =
+        Guarded("decoding", [&] { return DecodeOn(Plane::kClient, incoming->header(), incoming->payload().size()); });
     if (!message.ok()) {
       complaints.Warning("client plane: refused a message: " + message.status().message());
       // A refused request whose id can be read gets an answer, so that nobody waits for it in vain.
-      if (const std::optional<AnyMessage> refusal = RefusalOf(incoming->parts[0].span(), message.status())) {
+      if (const std::optional<AnyMessage> refusal = RefusalOf(incoming->header(), message.status())) {
         (void)clients.Send(incoming->identity, Encode(*refusal));
       }
       continue;

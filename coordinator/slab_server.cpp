@@ -115,8 +115,7 @@ void SlabServer::Run(const std::stop_token& stop) {
 }
 
 void SlabServer::Answer(const Incoming& incoming) {
-  const std::size_t payload_bytes = incoming.parts.size() > 1 ? incoming.parts[1].size() : 0;
-  const Result<AnyMessage> decoded = DecodeOn(Plane::kSlabs, incoming.parts[0].span(), payload_bytes);
+  const Result<AnyMessage> decoded = DecodeOn(Plane::kSlabs, incoming.header(), incoming.payload().size());
   const auto* request = decoded.ok() ? std::get_if<ChunkRequest>(&*decoded) : nullptr;
   if (request == nullptr) {
     complaints_.Warning("slabs plane: dropped " + (decoded.ok() ? std::string(NameOf(*decoded)) : decoded.status().message()));

@@ -6,6 +6,8 @@
 namespace slabstream {
 
 void KnownPeers::Name(const Peer& peer) {
+  const auto known = peers_.find(peer.worker);
+  if (known != peers_.end() && known->second == peer) return;
   peers_[peer.worker] = peer;
   if (authenticator_ != nullptr && !peer.images_key.empty()) authenticator_->Admit(plane_, peer.images_key);
 }

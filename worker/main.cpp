@@ -66,8 +66,7 @@ int Run(int argc, char** argv) {
       app, "--drain", options.machine.drain,
       [](const std::string& option, const std::string& text) { return ParseDuration(option, text, kLongestDrain); },
       "On SIGTERM or SIGINT: how long it may finish what it has begun, while it gets no new work. It ends as soon as nothing needs it. 0s, "
-      "or "
-      "a second signal: at once")
+      "or a second signal: at once")
       ->type_name("TIME")
       ->default_str("30s");
   app.add_flag("--no-shared-memory", frames_only, "Send images to workers of this host in frames as well");

@@ -202,8 +202,8 @@ void WorkerService::Impl::Receive(Socket& socket, Plane plane) {
   for (int i = 0; i < kReceiveBatch; ++i) {
     std::optional<Incoming> incoming = socket.TryReceive();
     if (!incoming) return;
-    Bytes payload = incoming->parts.size() > 1 ? std::move(incoming->parts[1]) : Bytes();
-    Result<AnyMessage> message = Guarded("decoding", [&] { return DecodeOn(plane, incoming->parts[0].span(), payload.size()); });
+    Bytes payload = incoming->payload();
+    Result<AnyMessage> message = Guarded("decoding", [&] { return DecodeOn(plane, incoming->header(), payload.size()); });
     if (!message.ok()) {
       complaints.Warning(std::string(NameOf(plane)) + " plane: dropped a message: " + message.status().message());
       continue;

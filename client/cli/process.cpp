@@ -108,6 +108,13 @@ void Child::Terminate(Duration patience) {
   }
 }
 
+std::string ValueIn(const std::string& line, const std::string& key) {
+  const std::size_t at = line.find(" " + key + "=");
+  if (at == std::string::npos) return "";
+  const std::size_t begin = at + key.size() + 2;
+  return line.substr(begin, line.find(' ', begin) - begin);
+}
+
 std::string LastLogLine(const std::string& log_path) {
   std::ifstream log(log_path);
   std::string line, last;

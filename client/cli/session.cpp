@@ -14,7 +14,7 @@ namespace {
 
 constexpr const char* kLocalDataset = "volume";
 
-Result<std::shared_ptr<const Volume>> Load(const std::string& path) {
+Result<std::shared_ptr<const Volume>> LoadInput(const std::string& path) {
   Result<LoadedVolume> loaded = ReadInputVolume(path);
   if (!loaded.ok()) return loaded.status();
   return std::move(loaded->volume);
@@ -36,7 +36,7 @@ Result<Session> Session::Open(const ConnectionOptions& connection, const std::st
     return session;
   }
   if (Status status = CheckVolumePath(source); !status.ok()) return status;
-  return OpenLocal(connection, [source] { return Load(source); });
+  return OpenLocal(connection, [source] { return LoadInput(source); });
 }
 
 Result<Session> Session::OpenLocal(const ConnectionOptions& connection, std::function<Result<std::shared_ptr<const Volume>>()> load) {

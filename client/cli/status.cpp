@@ -11,6 +11,8 @@
 namespace slabstream {
 namespace {
 
+using Json = nlohmann::ordered_json;
+
 std::string_view NameOf(DatasetState state) {
   switch (state) {
     case DatasetState::kUnloaded: return "unloaded";
@@ -48,7 +50,6 @@ std::string StatusText(const StatusReply& reply) {
 }
 
 std::string StatusJson(const StatusReply& reply) {
-  using Json = nlohmann::ordered_json;
   Json workers = Json::array(), datasets = Json::array();
   for (const WorkerStatus& worker : reply.workers) {
     workers.push_back({{"worker", worker.worker},

@@ -57,13 +57,6 @@ class BlockedSignals {
 };
 
 // The value of "key=value" in the coordinator's ready line; empty if it is not there.
-std::string ValueIn(const std::string& line, const std::string& key) {
-  const std::size_t at = line.find(" " + key + "=");
-  if (at == std::string::npos) return "";
-  const std::size_t begin = at + key.size() + 2;
-  return line.substr(begin, line.find(' ', begin) - begin);
-}
-
 // As --memory takes it.
 std::string MemoryArgument(std::uint64_t bytes) { return fmt::format("{}MiB", bytes >> 20); }
 

@@ -20,12 +20,12 @@ class Authenticator {
   explicit Authenticator(Context& context);  // one a context: Context::authenticator()
   ~Authenticator();
 
-  // From now on these public keys, and no others, may connect to `plane`. Connections that are there stay: Socket::EndConnections.
+  // Replaces the public keys that may connect to `plane`. Connections that are there stay (Socket::EndConnections ends them).
   void AdmitOnly(const std::string& plane, std::set<std::string> public_keys);
   void Admit(const std::string& plane, const std::string& public_key);
 
-  // Whoever has an unknown key is refused at once, and its socket does not try again. On a plane with patience it waits this long for being
-  // admitted, and then tries again: for planes that learn keys from messages, which a peer may have heard earlier.
+  // An unknown key is refused at once, and its socket does not try again. On a plane with patience it waits this long to be admitted, and
+  // tries again after that. This is for planes that learn keys from messages, which the key's holder may have heard earlier.
   void SetPatience(const std::string& plane, Duration patience);
 
   // From now on whoever connects to this plane brings a ticket of a sealed session, and who is admitted enters it there.

@@ -4,8 +4,6 @@
 #include <sys/socket.h>
 
 #include <algorithm>
-#include <atomic>
-#include <string>
 
 #include "common/transport/socket_cookie.h"
 
@@ -17,24 +15,10 @@ std::size_t FileShare() {
   return ::getrlimit(RLIMIT_NOFILE, &limit) == 0 ? limit.rlim_cur / 4 : SIZE_MAX;
 }
 
-std::string UniqueName() {
-  static std::atomic<std::uint64_t> last = 0;
-  return "inproc://connection-limit-" + std::to_string(++last);
-}
-
 }  // namespace
 
-ConnectionLimit::ConnectionLimit(zmq::socket_t& socket, std::size_t most) : most_(std::min(most, FileShare())) {
-  init(socket, UniqueName(), ZMQ_EVENT_ACCEPTED);
-}
-
-void ConnectionLimit::Enforce() {
-  try {
-    while (check_event()) {
-    }
-  } catch (const zmq::error_t&) {  // a signal: the next call goes on
-  }
-}
+ConnectionLimit::ConnectionLimit(zmq::socket_t& socket, std::size_t most)
+    : ConnectionMonitor(socket, ZMQ_EVENT_ACCEPTED), most_(std::min(most, FileShare())) {}
 
 void ConnectionLimit::on_event_accepted(const zmq_event_t& event, const char*) {
   const int descriptor = event.value;
@@ -44,7 +28,7 @@ void ConnectionLimit::on_event_accepted(const zmq_event_t& event, const char*) {
   if (accepted_.size() < most_ || accepted_.contains(descriptor)) {
     accepted_[descriptor] = cookie;
   } else {
-    (void)::shutdown(descriptor, SHUT_RDWR);  // ZeroMQ then closes it
+    (void)::shutdown(descriptor, SHUT_RDWR);  // ZeroMQ, whose descriptor it is, then closes it
   }
 }
 

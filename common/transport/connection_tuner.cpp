@@ -5,9 +5,7 @@
 #include <sys/socket.h>
 
 #include <array>
-#include <atomic>
 #include <cstddef>
-#include <cstdint>
 #include <cstring>
 #include <string>
 #include <utility>
@@ -19,11 +17,6 @@ namespace {
 
 constexpr const char* kReno = "reno";
 constexpr std::size_t kMostNameBytes = 16;  // of a congestion control, TCP_CA_NAME_MAX of the kernel
-
-std::string UniqueName() {
-  static std::atomic<std::uint64_t> last = 0;
-  return "inproc://connection-tuner-" + std::to_string(++last);
-}
 
 // Both ends have the same address.
 bool StaysOnThisHost(int descriptor) {
@@ -42,17 +35,8 @@ bool StaysOnThisHost(int descriptor) {
 
 }  // namespace
 
-ConnectionTuner::ConnectionTuner(zmq::socket_t& socket) {
-  init(socket, UniqueName(), ZMQ_EVENT_CONNECTED | ZMQ_EVENT_DISCONNECTED | ZMQ_EVENT_CLOSED | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH);
-}
-
-void ConnectionTuner::TuneNew() {
-  try {
-    while (check_event()) {
-    }
-  } catch (const zmq::error_t&) {  // a signal: the next call goes on
-  }
-}
+ConnectionTuner::ConnectionTuner(zmq::socket_t& socket)
+    : ConnectionMonitor(socket, ZMQ_EVENT_CONNECTED | ZMQ_EVENT_DISCONNECTED | ZMQ_EVENT_CLOSED | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH) {}
 
 // The connection may be gone and its descriptor reused: then the new connection is one of this host too, or stays unchanged.
 void ConnectionTuner::on_event_connected(const zmq_event_t& event, const char*) {

@@ -10,16 +10,15 @@
 #include <utility>
 #include <zmq.hpp>
 
+#include "common/transport/connection_monitor.h"
+
 namespace slabstream {
 
 // For the socket's thread only; ends before the socket.
-class ConnectionTuner : private zmq::monitor_t {
+class ConnectionTuner : public ConnectionMonitor {
  public:
   // Before the socket connects. Throws zmq::error_t.
   explicit ConnectionTuner(zmq::socket_t& socket);
-
-  // Tunes connections made since the last call. Call it now and then: until then ZeroMQ remembers them.
-  void TuneNew();
 
   // Somebody listens who does not admit the socket's key.
   bool refused() const { return refused_; }

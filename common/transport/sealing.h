@@ -28,8 +28,16 @@ struct evp_cipher_ctx_st;
 
 namespace slabstream {
 
-// Frame: number of the message (8 bytes, little endian), number of the frame in it (4 bytes; together the nonce), ciphertext, tag.
-// All frames of a message but the last one are of kSealedFrameBytes. Plaintext: sizes of header (4 bytes) and payload (8), then both.
+// A frame has four parts. All numbers are little endian.
+//   8 bytes   number of the message in its session, from 1
+//   4 bytes   number of the frame in its message, from 0; both numbers together are the nonce
+//   ...       ciphertext
+//   16 bytes  tag
+// The plaintext of a message's frames, one after the other, is:
+//   4 bytes   size of the header
+//   8 bytes   size of the payload
+//   ...       header, payload
+// All frames of a message but the last one have kSealedFrameBytes.
 inline constexpr std::size_t kSealedFrameBytes = std::size_t{1} << 18;  // those under way stay in a cache
 inline constexpr std::size_t kSealedPlaceBytes = 12, kSealedTagBytes = 16, kSealedSizesBytes = 12;
 inline constexpr std::size_t kSealedPartBytes = kSealedFrameBytes - kSealedPlaceBytes - kSealedTagBytes;  // of the plaintext

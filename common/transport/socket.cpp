@@ -189,6 +189,33 @@ Status SendSealed(Socket::Impl& impl, std::span<const std::byte> header, const B
   return StatusOfSending(error);
 }
 
+std::optional<Incoming> TryReceivePlain(Socket::Impl& impl) {
+  zmq::message_t part;
+  while (ReceivePart(impl.socket, part)) {
+    Incoming incoming;
+    bool more = part.more();
+    if (impl.router) {
+      incoming.identity = part.to_string();
+    } else {
+      incoming.parts.push_back(Adopt(std::move(part)));
+    }
+    // The parts of a message arrive together, so none of them needs a wait.
+    std::size_t surplus = 0;
+    while (more && ReceivePart(impl.socket, part)) {
+      more = part.more();
+      if (impl.knows_connections && incoming.parts.empty()) incoming.user = impl.connections.Heard(incoming.identity, part);
+      if (incoming.parts.size() < 2) {
+        incoming.parts.push_back(Adopt(std::move(part)));
+      } else {
+        ++surplus;
+      }
+    }
+    if (impl.encrypted && incoming.user.empty()) continue;  // the Authenticator has not admitted it
+    if (!incoming.parts.empty() && surplus == 0) return incoming;
+  }
+  return std::nullopt;
+}
+
 // A whole message, if the frames that are there make one.
 std::optional<Incoming> TryReceiveSealed(Socket::Impl& impl) {
   zmq::message_t part;
@@ -297,7 +324,7 @@ Status Socket::Connect(const std::string& text) {
 
 Status Socket::Send(const std::string& identity, std::vector<std::byte> header, const Bytes& payload) {
   zmq::socket_t& socket = impl_->socket;
-  if (impl_->tuner != nullptr) impl_->tuner->TuneNew();
+  if (impl_->tuner != nullptr) impl_->tuner->HandleEvents();
   if (impl_->sessions != nullptr) return Status::InvalidArgument("send: sealed connections go one way, to this socket");
   if (impl_->sealer) return SendSealed(*impl_, header, payload);
   // Make all parts before sending the first one: running out of memory between them would leave half a message.
@@ -310,19 +337,19 @@ Status Socket::Send(const std::string& identity, std::vector<std::byte> header, 
 
 bool Socket::refused() const {
   if (impl_->tuner == nullptr) return false;
-  impl_->tuner->TuneNew();
+  impl_->tuner->HandleEvents();
   return impl_->tuner->refused();
 }
 
 bool Socket::TakeBroken() {
   if (impl_->tuner == nullptr) return false;
-  impl_->tuner->TuneNew();
+  impl_->tuner->HandleEvents();
   return impl_->tuner->TakeBroken();
 }
 
 std::string Socket::local_host() const {
   if (impl_->tuner == nullptr) return "";
-  impl_->tuner->TuneNew();
+  impl_->tuner->HandleEvents();
   return impl_->tuner->local_host();
 }
 
@@ -334,33 +361,15 @@ void Socket::EndConnections(const std::string& user) {
 void Socket::EndConnection(const std::string& identity) { impl_->connections.EndOne(identity); }
 
 std::optional<Incoming> Socket::TryReceive() {
-  if (impl_->sessions != nullptr) return TryReceiveSealed(*impl_);
-  if (impl_->sealer) return std::nullopt;  // nothing is expected, and nothing that comes is authenticated
-  zmq::message_t part;
-  while (ReceivePart(impl_->socket, part)) {
-    Incoming incoming;
-    bool more = part.more();
-    if (impl_->router) {
-      incoming.identity = part.to_string();
-    } else {
-      incoming.parts.push_back(Adopt(std::move(part)));
-    }
-    // The parts of a message arrive together, so none of them needs a wait.
-    std::size_t surplus = 0;
-    while (more && ReceivePart(impl_->socket, part)) {
-      more = part.more();
-      if (impl_->knows_connections && incoming.parts.empty()) incoming.user = impl_->connections.Heard(incoming.identity, part);
-      if (incoming.parts.size() < 2) {
-        incoming.parts.push_back(Adopt(std::move(part)));
-      } else {
-        ++surplus;
-      }
-    }
-    if (impl_->encrypted && incoming.user.empty()) continue;  // the Authenticator has not admitted it
-    if (!incoming.parts.empty() && surplus == 0) return incoming;
+  std::optional<Incoming> incoming;
+  if (impl_->sessions != nullptr) {
+    incoming = TryReceiveSealed(*impl_);
+  } else if (!impl_->sealer) {  // whose socket expects nothing, and nothing that comes is authenticated
+    incoming = TryReceivePlain(*impl_);
   }
-  if (impl_->tuner != nullptr) impl_->tuner->TuneNew();
-  if (impl_->limit != nullptr) impl_->limit->Enforce();
+  if (incoming) return incoming;
+  if (impl_->tuner != nullptr) impl_->tuner->HandleEvents();
+  if (impl_->limit != nullptr) impl_->limit->HandleEvents();
   return std::nullopt;
 }
 

@@ -36,6 +36,9 @@ struct Incoming {
   std::string identity;      // routers: who sent it
   std::string user;          // routers: the sender's public key, as the Authenticator admitted it; empty: the connection is not encrypted
   std::vector<Bytes> parts;  // 1 or 2: header, payload; the bytes are the message's own memory, not a copy
+
+  std::span<const std::byte> header() const { return parts.front().span(); }
+  Bytes payload() const { return parts.size() > 1 ? parts[1] : Bytes(); }
 };
 
 struct SocketOptions {

@@ -20,12 +20,6 @@ void LendImages(MachineModel& machine) {
                        .lent = true};
 }
 
-// Encrypting and sending overlap, so the slower of the two counts.
-LinkModel Encrypted(LinkModel link) {
-  link.bytes_per_second = std::min(link.bytes_per_second, calibration::service::kEncryptedRate);
-  return link;
-}
-
 }  // namespace
 
 LinkModel DefaultLink() { return ParseLink("link", kDefaultLink).value(); }
@@ -40,12 +34,12 @@ MachineModel ServiceMachine(std::span<const HostedWorker> workers, const Service
   machine.threads = std::int32_t(std::max<std::uint32_t>(least_threads, 1));
   const bool one_host = std::ranges::all_of(
       workers, [&](const HostedWorker& worker) { return worker.memory_scope != 0 && worker.memory_scope == workers.front().memory_scope; });
+  if (surroundings.encrypted) machine.combining.cipher_byte = calibration::service::kCipherByte;
   if (!one_host) {
-    machine.link = surroundings.encrypted ? Encrypted(surroundings.link) : surroundings.link;
+    machine.link = surroundings.link;
     return machine;
   }
   machine.link = {Contention::kNone, 0, calibration::service::kLoopbackRate};
-  if (surroundings.encrypted) machine.link = Encrypted(machine.link);
   if (std::ranges::all_of(workers, &HostedWorker::lends_memory)) LendImages(machine);
   machine.plan_seconds = machine.message_seconds = machine.client_seconds = 0;  // in the wake-ups, which are measured as a whole
   const bool coordinators_host = !workers.empty() && workers.front().memory_scope == surroundings.memory_scope;

@@ -23,7 +23,7 @@
 namespace slabstream {
 namespace {
 
-constexpr int kRepeats = 3, kQuickRepeats = 1, kMostWorkers = 4096;
+constexpr int kMostWorkers = 4096;
 constexpr int kBoxesAWorker = 4;                                         // to compare assignments: with one box each they have no choice
 constexpr std::array<std::string_view, 2> kLinks = {"10gbit", "1gbit"};  // the first one wherever there is one link
 constexpr std::string_view kCombine = "radix-k";                         // wherever partitions alone are compared
@@ -360,7 +360,7 @@ void CheckBalance(const ExperimentOptions& options) {
 
 void RunBalance(ExperimentContext& context, Results& results) {
   const Balance balance = BalanceOf(context);
-  context.Run(TrialsOf(context, balance), kRepeats, kQuickRepeats);
+  context.Run(TrialsOf(context, balance), {.full = 3, .quick = 1});
   for (const BenchCase& volume : balance.volumes) {
     AddPolicies(context, balance, volume, results);
     AddBoxes(context, balance, volume, results);

@@ -20,10 +20,8 @@
 namespace slabstream {
 namespace {
 
-constexpr int kRepeats = 7, kQuickRepeats = 2;
 constexpr int kTurns = 3;          // of a trial, after one to warm up
 constexpr int kMeasuredMost = 16;  // ranks whose images are kept in memory at a time
-constexpr std::string_view kLink = "10gbit";
 constexpr double kSparse = 0.2;
 // More than one switch of the fat tree has ports, so that its uplinks matter.
 constexpr std::array<int, 2> kRanksOverLinks = {64, 128};
@@ -186,7 +184,7 @@ void RunCombining(ExperimentContext& context, Results& results) {
   const std::uint64_t seed = context.options().seed;
   std::vector<Trial> trials = {HostTrial()};
   for (const Combining& c : cases.measured) trials.push_back(OperatorsTrial(c, seed));
-  context.Run(std::move(trials), kRepeats, kQuickRepeats);
+  context.Run(std::move(trials), {.full = 7, .quick = 2});
 
   for (const Combining& c : cases.measured) {
     Json of = ColumnsOf(c);

@@ -61,9 +61,11 @@ class ExperimentContext {
   int Scaled(int side) const;  // a sphere's side or a picture's, at least kLeastScaledSide
   VolumeCache& volumes() { return volumes_; }
 
-  // Runs the trials that the log does not hold yet, each once (Distinct). `repeats`, or `quick_repeats` of a quick run, applies if the user
-  // gave no number.
-  void Run(std::vector<Trial> trials, int repeats, int quick_repeats);
+  // Runs the trials that the log does not hold yet, each once (Distinct). `repeats` applies if the user gave no number.
+  struct Repeats {
+    int full = 1, quick = 1;  // quick: of a quick run
+  };
+  void Run(std::vector<Trial> trials, const Repeats& repeats);
   const TrialLog& log() const { return log_; }
   int repeats() const { return repeats_; }  // of the last Run
   bool interrupted() const { return interrupted_ && interrupted_(); }

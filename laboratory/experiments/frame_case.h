@@ -59,6 +59,7 @@ Json FinishKey(ExperimentContext& context, const FrameCase& frame);
 
 // Frames of the embedded service with frame.workers workers of one thread each, one frame in flight, after WarmUpFrames. Numbers: those of
 // MeasureLatency.
+inline constexpr int kServiceFrames = 5;
 Trial ServiceTrial(ExperimentContext& context, const FrameCase& frame, int frames);
 Json ServiceKey(ExperimentContext& context, const FrameCase& frame, int frames);
 

@@ -22,5 +22,7 @@ MachineModel Cluster(const ExperimentContext& context, const LinkModel& link, co
 // The same for every repeat of HostTrial.
 std::vector<MachineModel> Clusters(const ExperimentContext& context, const LinkModel& link, const HostModel& host = {});
 LinkModel Link(std::string_view preset);  // of LinkPresets()
+// The preset of experiments that do not compare links.
+inline constexpr std::string_view kLink = "10gbit";
 
 }  // namespace slabstream

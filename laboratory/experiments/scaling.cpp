@@ -15,8 +15,6 @@
 namespace slabstream {
 namespace {
 
-constexpr int kRepeats = 3, kQuickRepeats = 1;
-constexpr std::string_view kLink = "10gbit";
 constexpr int kTeam = 2;                 // workers that share a frame, in series with teams
 constexpr int kMostDynamicWorkers = 64;  // measuring more boxes frame after frame takes long
 
@@ -96,7 +94,7 @@ void RunScaling(ExperimentContext& context, Results& results) {
       }
     }
   }
-  context.Run(std::move(trials), kRepeats, kQuickRepeats);
+  context.Run(std::move(trials), {.full = 3, .quick = 1});
 
   for (const auto& [part, all] : parts) {
     for (const Series& series : all) {

@@ -12,7 +12,7 @@
 namespace slabstream {
 namespace {
 
-constexpr int kRepeats = 3, kQuickRepeats = 1, kLatencyFrames = 5;
+constexpr int kLatencyFrames = 5;
 constexpr int kAhead = 2;  // frames requested beyond those that the coordinator has under way
 constexpr std::int64_t kPixelBytes = 16;
 
@@ -77,7 +77,7 @@ void RunServiceSweep(ExperimentContext& context, const Sweep& sweep, Results& re
   std::vector<Trial> trials;
   trials.reserve(frames.size());
   for (const SweepFrame& asked : frames) trials.push_back(FramesTrial(session.client(), begin, asked.frame));
-  context.Run(trials, kRepeats, kQuickRepeats);
+  context.Run(trials, {.full = 3, .quick = 1});
 
   constexpr struct {
     const char *metric, *number;

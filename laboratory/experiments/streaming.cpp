@@ -9,9 +9,6 @@
 namespace slabstream {
 namespace {
 
-constexpr int kRepeats = 5, kQuickRepeats = 1, kServiceFrames = 5;
-constexpr std::string_view kLink = "10gbit";
-
 struct Streams {
   std::vector<BenchCase> volumes;
   std::vector<int> groups, workers;
@@ -65,7 +62,7 @@ void RunStreaming(ExperimentContext& context, Results& results) {
       trials.push_back(ServiceTrial(context, streams.Frame(volume, 2, groups), kServiceFrames));
     }
   }
-  context.Run(std::move(trials), kRepeats, kQuickRepeats);
+  context.Run(std::move(trials), {.full = 5, .quick = 1});
 
   const auto add = [&](const FrameCase& frame) {
     Json of = ColumnsOf(frame);

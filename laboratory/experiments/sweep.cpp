@@ -12,7 +12,7 @@
 namespace slabstream {
 namespace {
 
-constexpr int kRepeats = 3, kQuickRepeats = 1, kServiceFrames = 5, kMeasuredWorkers = 2;
+constexpr int kMeasuredWorkers = 2;
 
 // One value of everything that a sweep varies.
 struct SweepCase {
@@ -59,7 +59,7 @@ void RunSweepHere(ExperimentContext& context, const Sweep& sweep, Results& resul
     trials.push_back(FinishTrial(context, c.team));
     if (c.served) trials.push_back(ServiceTrial(context, c.frame, kServiceFrames));
   }
-  context.Run(std::move(trials), kRepeats, kQuickRepeats);
+  context.Run(std::move(trials), {.full = 3, .quick = 1});
 
   for (const SweepCase& c : cases) {
     AddFigures(results, c.columns, RecallFigures(context, c.team, c.link, c.teams, sweep.host));

@@ -49,7 +49,7 @@ class FakeService {
     while (!stop.stop_requested()) {
       Wait(sockets, &wakeup_, seconds(60));
       while (const std::optional<Incoming> incoming = socket_.TryReceive()) {
-        const Result<AnyMessage> message = Decode(incoming->parts[0].span());
+        const Result<AnyMessage> message = Decode(incoming->header());
         ASSERT_TRUE(message.ok()) << message.status().message();
         for (const Answer& answer : handler_(*message)) (void)socket_.Send(incoming->identity, Encode(answer.message), answer.payload);
       }
@@ -168,14 +168,19 @@ TEST_F(ClientTest, RequestThatTheServiceForgotIsSubmittedAgain) {
   EXPECT_EQ(submits, 3);
 }
 
-TEST_F(ClientTest, RequestThatTheServiceAlwaysForgetsFails) {
-  std::atomic<int> submits = 0;
-  FakeService service(context_, "inproc://client-test", [&](const AnyMessage& message) -> std::vector<Answer> {
+// A service that says in every pong that it has no request.
+auto ForgetsAndCounts(std::atomic<int>& submits) {
+  return [&submits](const AnyMessage& message) -> std::vector<Answer> {
     if (std::holds_alternative<SubmitFrame>(message)) ++submits;
     const auto* ping = std::get_if<ClientPing>(&message);
     if (ping == nullptr) return {};
     return {{ClientPong{.epoch = 1, .nonce = ping->nonce}, {}}};
-  });
+  };
+}
+
+TEST_F(ClientTest, RequestThatTheServiceAlwaysForgetsFails) {
+  std::atomic<int> submits = 0;
+  FakeService service(context_, "inproc://client-test", ForgetsAndCounts(submits));
   Client client = Client::Connect(context_, service.endpoint(), seconds(5), quick_).value();
   EXPECT_EQ(client.Render(SmallRequest()).status().code(), StatusCode::kUnavailable);
   EXPECT_EQ(submits, 4);  // once, and three times again
@@ -183,12 +188,7 @@ TEST_F(ClientTest, RequestThatTheServiceAlwaysForgetsFails) {
 
 TEST_F(ClientTest, RequestThatWasCancelledIsNotSubmittedToTheNextCoordinator) {
   std::atomic<int> submits = 0;
-  FakeService service(context_, "inproc://client-test", [&](const AnyMessage& message) -> std::vector<Answer> {
-    if (std::holds_alternative<SubmitFrame>(message)) ++submits;
-    const auto* ping = std::get_if<ClientPing>(&message);
-    if (ping == nullptr) return {};
-    return {{ClientPong{.epoch = 1, .nonce = ping->nonce}, {}}};
-  });
+  FakeService service(context_, "inproc://client-test", ForgetsAndCounts(submits));
   Client client = Client::Connect(context_, service.endpoint(), seconds(5), quick_).value();
   const RequestId id = client.Submit(SmallRequest());
   client.Cancel(id);  // which the first coordinator took with it

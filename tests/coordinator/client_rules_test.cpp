@@ -8,8 +8,6 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-constexpr PeerToken kClient = 21, kOther = 22;
-
 // A service whose one worker is busy with a first frame of another client, so that everything else queues.
 struct BusyScript : CoordinatorScript {
   BusyScript() {

@@ -23,6 +23,8 @@ using Actions = std::vector<CoordinatorAction>;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
+inline constexpr PeerToken kClient = 21, kOther = 22;  // connections of two clients
+
 inline CoordinatorConfig TestConfig() {
   CoordinatorConfig config;
   config.epoch = 77;

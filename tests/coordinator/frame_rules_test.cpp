@@ -10,8 +10,6 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-constexpr PeerToken kClient = 21;
-
 TEST(CoordinatorFrames, FrameRunsGroupByGroupToItsPicture) {
   CoordinatorScript script;
   const FakeWorker a = script.Join(11, 1), b = script.Join(12, 2);

@@ -8,8 +8,6 @@ namespace {
 
 using testing::ElementsAre;
 
-constexpr PeerToken kClient = 21;
-
 // A mask of the frame with the first `hidden` tiles hidden.
 OcclusionMask Mask(const GroupAssignment& group, std::size_t hidden) {
   const PixelBounds frame = FrameBounds(group.setup);

@@ -6,7 +6,7 @@
 namespace slabstream {
 namespace {
 
-constexpr PeerToken kClient = 500;
+constexpr PeerToken kFarClient = 500;
 
 SubmitFrame KdFrame(RequestId request, const std::string& balance = "static") {
   SubmitFrame submit = Frame(request);
@@ -49,12 +49,12 @@ std::vector<RankReport> Reports(const GroupAssignment& group, double ratio) {
 TEST(CoordinatorLayouts, CountsOnceADatasetAndTransferFunction) {
   CoordinatorScript script;
   script.Join(11, 1);
-  EXPECT_TRUE(HandedOut(script.Submit(kClient, KdFrame(1))).empty());
+  EXPECT_TRUE(HandedOut(script.Submit(kFarClient, KdFrame(1))).empty());
   ASSERT_EQ(script.counts.size(), 1U);
-  EXPECT_TRUE(HandedOut(script.Submit(kClient, KdFrame(2))).empty());
+  EXPECT_TRUE(HandedOut(script.Submit(kFarClient, KdFrame(2))).empty());
   EXPECT_EQ(script.counts.size(), 1U) << "the same voxels are counted twice";
   // A frame that needs no count does not wait.
-  EXPECT_EQ(HandedOut(script.Submit(kClient, Frame(3))).size(), 1U);
+  EXPECT_EQ(HandedOut(script.Submit(kFarClient, Frame(3))).size(), 1U);
 
   const Actions counted = script.Step(OccupiedCounted{script.counts[0].count, FullGrid()});
   EXPECT_FALSE(HandedOut(counted).empty());
@@ -63,15 +63,15 @@ TEST(CoordinatorLayouts, CountsOnceADatasetAndTransferFunction) {
 
   SubmitFrame other = KdFrame(4);
   other.frame.transfer.choice = TransferFunction{.colors = {{0, {1, 1, 1}}}, .opacities = {{0, 0.25}}};
-  script.Submit(kClient, other);
+  script.Submit(kFarClient, other);
   EXPECT_EQ(script.counts.size(), 2U);
 }
 
 TEST(CoordinatorLayouts, AFailedCountFailsWhatWaitsForItAndIsTriedAgain) {
   CoordinatorScript script;
   script.Join(11, 1);
-  script.Submit(kClient, KdFrame(1));
-  script.Submit(kClient, KdFrame(2));
+  script.Submit(kFarClient, KdFrame(1));
+  script.Submit(kFarClient, KdFrame(2));
   ASSERT_EQ(script.counts.size(), 1U);
   const OccupiedCounted failure{script.counts[0].count, Status::ResourceExhausted("not enough memory")};
   const auto failed = ToClients<FrameFailed>(script.Step(failure));
@@ -80,7 +80,7 @@ TEST(CoordinatorLayouts, AFailedCountFailsWhatWaitsForItAndIsTriedAgain) {
   EXPECT_TRUE(ToClients<FrameFailed>(script.Step(failure)).empty());
   EXPECT_EQ(script.QueryStatus().queued, 0U);
 
-  script.Submit(kClient, KdFrame(3));
+  script.Submit(kFarClient, KdFrame(3));
   ASSERT_EQ(script.counts.size(), 2U);
   EXPECT_TRUE(ToClients<FrameFailed>(script.Step(failure)).empty());  // of the first count
   EXPECT_FALSE(HandedOut(script.Step(OccupiedCounted{script.counts[1].count, FullGrid()})).empty());
@@ -91,7 +91,7 @@ TEST(CoordinatorLayouts, ACountThatNeverEndsMeetsTheDeadline) {
   script.Join(11, 1);
   SubmitFrame submit = KdFrame(1);
   submit.deadline_ms = 3000;
-  script.Submit(kClient, submit);
+  script.Submit(kFarClient, submit);
   const auto failed = ToClients<FrameFailed>(script.Pass(seconds(4)));
   ASSERT_EQ(failed.size(), 1U);
   EXPECT_EQ(failed[0].message.status.code(), StatusCode::kDeadlineExceeded);
@@ -108,7 +108,7 @@ TEST(CoordinatorLayouts, WhatEachRendererDrawsIsCountedOnce) {
     submit.frame.renderer = renderer->name();
     submit.frame.transfer.choice = TransferFunction{.colors = {{0, {1, 1, 1}}}, .opacities = {{0, 0.1}, {255, 1}}};
     const std::size_t counted = script.counts.size();
-    Actions actions = script.Submit(kClient, submit);
+    Actions actions = script.Submit(kFarClient, submit);
     if (script.counts.size() > counted) {
       const CountDataset& count = script.counts.back();
       tables.push_back(count.volume.renderer()->DrawnTable(count.volume.transfer(), *count.summary));
@@ -128,7 +128,7 @@ TEST(CoordinatorLayouts, ManyTransferFunctionsAreCountedInTurnAndAllServed) {
   for (int i = 1; i <= requests; ++i) {
     SubmitFrame submit = KdFrame(RequestId(i));
     submit.frame.transfer.choice = TransferFunction{.colors = {{0, {1, 1, 1}}}, .opacities = {{0, i / 100.0}}};
-    ASSERT_TRUE(ToClients<FrameFailed>(script.Submit(kClient, submit)).empty());
+    ASSERT_TRUE(ToClients<FrameFailed>(script.Submit(kFarClient, submit)).empty());
   }
   int replies = 0;
   for (std::size_t i = 0; i < script.counts.size(); ++i) {
@@ -146,7 +146,7 @@ class BalanceScript : public CoordinatorScript {
   // The boxes of a frame that takes its time as Reports says.
   std::vector<Box> Play(const SubmitFrame& submit, double ratio) {
     const std::size_t counted = counts.size();
-    Actions actions = Submit(kClient, submit);
+    Actions actions = Submit(kFarClient, submit);
     if (counts.size() > counted) Append(actions, Step(OccupiedCounted{counts.back().count, FullGrid()}));
     for (const GroupAssignment& group : HandedOut(actions)) {
       Append(actions, Done(group, Reports(group, ratio)));
@@ -199,7 +199,7 @@ class ChoiceScript : public BalanceScript {
  public:
   FrameStatistics StatisticsOf(const SubmitFrame& submit, double ratio) {
     const std::size_t counted = counts.size();
-    Actions actions = Submit(kClient, submit);
+    Actions actions = Submit(kFarClient, submit);
     if (counts.size() > counted) Append(actions, Step(OccupiedCounted{counts.back().count, FullGrid()}));
     std::vector<GroupAssignment> groups = HandedOut(actions);
     for (std::size_t i = 0; i < groups.size(); ++i) {
@@ -261,7 +261,7 @@ TEST(CoordinatorPolicies, AnUnknownNameFailsBesideAnOpenOne) {
   ChoiceScript script;
   SubmitFrame submit = OpenFrame(1);
   submit.frame.policy.combine = "teleport";
-  const auto failed = ToClients<FrameFailed>(script.Submit(kClient, submit));
+  const auto failed = ToClients<FrameFailed>(script.Submit(kFarClient, submit));
   ASSERT_EQ(failed.size(), 1U);
   EXPECT_EQ(failed[0].message.status.code(), StatusCode::kInvalidArgument);
   EXPECT_THAT(failed[0].message.status.message(), testing::AllOf(testing::HasSubstr("teleport"), testing::HasSubstr("fan-in")));

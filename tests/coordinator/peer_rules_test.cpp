@@ -8,7 +8,7 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-constexpr PeerToken kClient = 21, kStranger = 66;
+constexpr PeerToken kStranger = 66;
 
 FrameImage PictureOf(const GroupAssignment& group) {
   return {.epoch = 77,

@@ -7,8 +7,6 @@ namespace {
 using testing::HasSubstr;
 using testing::SizeIs;
 
-constexpr PeerToken kClient = 21, kOther = 22;
-
 // Plans wait until the test makes them.
 struct SlowPlanner : CoordinatorScript {
   SlowPlanner() {

@@ -36,7 +36,7 @@ class RecordedPeer {
         Wait(sockets, nullptr, std::chrono::seconds(1));
         continue;
       }
-      const std::span<const std::byte> header = incoming->parts[0].span();
+      const std::span<const std::byte> header = incoming->header();
       headers_.emplace_back(header.begin(), header.end());
       const AnyMessage message = Decode(header).value();
       if (const auto* wanted = std::get_if<Message>(&message)) return *wanted;

@@ -16,7 +16,7 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr char kDataset[] = "a-name-that-nobody-else-has";
+constexpr char kSecretName[] = "a-name-that-nobody-else-has";
 constexpr int kCoordinator = 0, kClient = 1, kFirstWorker = 2, kWorkers = 3;
 
 class KeysOnHostsTest : public EndToEndTest {
@@ -36,7 +36,7 @@ class KeysOnHostsTest : public EndToEndTest {
   void StartService() {
     const std::string ball = MakeSphere("ball.nrrd", 2, 48);
     coordinator_ = Start(kCoordinator, {SLABSTREAM_COORDINATOR_PROGRAM, "--listen", "tcp://" + hosts_->AddressOf(kCoordinator) + ":*",
-                                        "--keys", Path("keys"), "--data", kDataset + ("=" + ball)});
+                                        "--keys", Path("keys"), "--data", kSecretName + ("=" + ball)});
     ASSERT_TRUE(coordinator_->WaitForOutput("slabstream-coordinator ready"));
     for (int i = 0; i < kWorkers; ++i)
       workers_.push_back(Start(kFirstWorker + i, {SLABSTREAM_WORKER_PROGRAM, "--no-shared-memory", "--service", Path("keys/worker.json")}));
@@ -50,7 +50,8 @@ class KeysOnHostsTest : public EndToEndTest {
 TEST_F(KeysOnHostsTest, ThePictureIsThatOfOneProcessAndNothingPassesInTheClear) {
   StartService();
   Hosts::Capture capture(*hosts_);
-  const std::vector<std::string> render = {"render", kDataset, "-o", "service.exr", "--size", "96", "--service", Path("keys/client.json")};
+  const std::vector<std::string> render = {"render", kSecretName, "-o",        "service.exr",
+                                           "--size", "96",        "--service", Path("keys/client.json")};
   ProgramResult rendered;
   do {  // the first request may come before all workers
     rendered = AsClient(render);
@@ -63,7 +64,7 @@ TEST_F(KeysOnHostsTest, ThePictureIsThatOfOneProcessAndNothingPassesInTheClear) 
   const std::string passed = capture.TakeAll();
   EXPECT_GT(passed.size(), 100000U) << "the voxels and the images";
   EXPECT_NE(passed.find("CURVE"), std::string::npos) << "nothing was captured";
-  EXPECT_EQ(passed.find(kDataset), std::string::npos) << "a request passed in the clear";
+  EXPECT_EQ(passed.find(kSecretName), std::string::npos) << "a request passed in the clear";
 }
 
 TEST_F(KeysOnHostsTest, KeysAreNeededAndRevokedOnesEnd) {

@@ -14,7 +14,6 @@ namespace {
 
 using namespace slabstream::testing;  // NOLINT(google-build-using-namespace): test support
 
-constexpr Projection kProjections[] = {Projection::kOrthographic, Projection::kPerspective};
 constexpr float kColour = 0.5F;
 
 FrameSetup SetupFor(Projection projection, unsigned seed) {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "tests/renderers/render_support.h"
+#include "tests/support/random_volume.h"
 #include "worker/kernels/normal_code.h"
 #include "worker/renderers/splat/splat_cache.h"
 
@@ -18,8 +19,6 @@ namespace slabstream {
 namespace {
 
 using namespace slabstream::testing;  // NOLINT(google-build-using-namespace): test support
-
-constexpr ScalarType kTypes[] = {ScalarType::kUint8, ScalarType::kUint16, ScalarType::kFloat32};
 
 // Voxel by voxel, from the definition: sums in the order that brick_normals.h states, in floats.
 class PlainLook {

@@ -11,7 +11,6 @@ namespace {
 
 using namespace slabstream::testing;  // NOLINT(google-build-using-namespace): test support
 
-constexpr Projection kProjections[] = {Projection::kOrthographic, Projection::kPerspective};
 constexpr float kBlendTolerance = 2e-5F;
 
 void ExpectSamePicture(const LocalImage& one, const LocalImage& many, const FrameSetup& setup) {

@@ -16,8 +16,6 @@ namespace {
 
 using namespace slabstream::testing;  // NOLINT(google-build-using-namespace): test support
 
-constexpr Projection kProjections[] = {Projection::kOrthographic, Projection::kPerspective};
-
 FrameSetup RaycastSetup(const Volume& volume, SetupOptions options, double samples_per_voxel = 1) {
   options.renderer = FindRenderer("raycast");
   FrameSetup setup = MakeSetup(volume, options);

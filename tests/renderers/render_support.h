@@ -14,6 +14,8 @@
 
 namespace slabstream::testing {
 
+inline constexpr Projection kProjections[] = {Projection::kOrthographic, Projection::kPerspective};
+
 // A volume of `type` whose voxel (x, y, z) stores value(x, y, z).
 Volume MakeVolume(const VolumeGeometry& geometry, ScalarType type, const std::function<double(const Index3&)>& value);
 

@@ -12,8 +12,6 @@ namespace {
 
 using namespace slabstream::testing;  // NOLINT(google-build-using-namespace): test support
 
-constexpr Projection kProjections[] = {Projection::kOrthographic, Projection::kPerspective};
-
 FrameSetup SetupOf(const VolumeGeometry& geometry, const ViewParameters& view) {
   FrameSetup setup;
   setup.description.geometry = geometry;

@@ -14,8 +14,6 @@ namespace {
 
 using namespace slabstream::testing;  // NOLINT(google-build-using-namespace): test support
 
-constexpr Projection kProjections[] = {Projection::kOrthographic, Projection::kPerspective};
-
 // Tables of footprints, opacities and normal codes are what the pipeline has and the definition has not.
 constexpr float kTableError = 0.012F;
 

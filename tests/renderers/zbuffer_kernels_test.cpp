@@ -20,8 +20,6 @@ namespace {
 
 using namespace slabstream::testing;  // NOLINT(google-build-using-namespace): test support
 
-constexpr Projection kProjections[] = {Projection::kOrthographic, Projection::kPerspective};
-
 struct Keys {
   explicit Keys(const PixelBounds& pixels)
       : stride(std::size_t(pixels.width() + kKeyPadding)), keys(stride * std::size_t(pixels.height()), kEmptyKey), bounds(pixels) {}

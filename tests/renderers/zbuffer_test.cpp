@@ -12,8 +12,6 @@ namespace {
 
 using namespace slabstream::testing;  // NOLINT(google-build-using-namespace): test support
 
-constexpr Projection kProjections[] = {Projection::kOrthographic, Projection::kPerspective};
-
 float DepthOf(const LocalImage& image, int x, int y) {
   const PixelBounds& b = image.bounds;
   if (x < b.x_begin || x >= b.x_end || y < b.y_begin || y >= b.y_end) return std::numeric_limits<float>::infinity();

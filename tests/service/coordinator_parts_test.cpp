@@ -146,8 +146,8 @@ class SlabServerTest : public testing::Test {
     const std::array<Socket*, 1> sockets = {&worker_};
     std::optional<Incoming> incoming;
     while (!(incoming = worker_.TryReceive())) Wait(sockets, nullptr, std::chrono::seconds(10));
-    if (payload != nullptr && incoming->parts.size() > 1) *payload = incoming->parts[1];
-    return Decode(incoming->parts[0].span()).value();
+    if (payload != nullptr) *payload = incoming->payload();
+    return Decode(incoming->header()).value();
   }
   void ExpectRefused(const ChunkRequest& request, StatusCode code, const char* reason) {
     const AnyMessage answer = Ask(request);

@@ -93,7 +93,7 @@ class HostilePeers : public testing::TestWithParam<bool> {
     CHECK(worker.Send({}, Encode(hello)).ok());
     const std::array<Socket*, 1> sockets = {&worker};
     Wait(sockets, nullptr, seconds(30));
-    const auto welcome = std::get<Welcome>(Decode(worker.TryReceive().value().parts[0].span()).value());
+    const auto welcome = std::get<Welcome>(Decode(worker.TryReceive().value().header()).value());
     CHECK(worker.Send({}, Encode(Leave{welcome.epoch, welcome.worker})).ok());
     return welcome;
   }

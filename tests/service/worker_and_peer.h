@@ -69,10 +69,10 @@ class WorkerAndPeer : public testing::Test {
       Wait(sockets, nullptr, std::chrono::seconds(1));
       for (Socket* socket : sockets) {
         while (auto incoming = socket->TryReceive()) {
-          const AnyMessage message = Decode(incoming->parts[0].span()).value();
+          const AnyMessage message = Decode(incoming->header()).value();
           if (socket == &control_) identity_ = incoming->identity;
           if (const auto* request = std::get_if<ChunkRequest>(&message)) Serve(incoming->identity, *request);
-          payload_ = incoming->parts.size() > 1 ? incoming->parts[1] : Bytes();
+          payload_ = incoming->payload();
           if ((std::holds_alternative<Messages>(message) || ...)) return message;
         }
       }

@@ -33,11 +33,11 @@ void TellOnAbort(std::uint64_t seed) {
   std::signal(SIGABRT, [](int) { (void)!write(STDERR_FILENO, last_words.data(), std::strlen(last_words.data())); });
 }
 
-void Print(const Tally& tally, double seconds) {
+void Print(const Tally& tally, double processor_seconds) {
   for (std::size_t i = 0; i < kCountRules.size(); ++i) std::cout << "  " << tally[Count(i)] << " " << kCountRules[i].what << "\n";
   const double hours = tally.virtual_seconds / 3600;
-  std::cout << tally[Count::kWorlds] << " worlds, " << hours << " virtual hours in " << seconds
-            << " s of processor time: " << hours / seconds << " virtual hours a second\n";
+  std::cout << tally[Count::kWorlds] << " worlds, " << hours << " virtual hours in " << processor_seconds
+            << " s of processor time: " << hours / processor_seconds << " virtual hours a second\n";
 }
 
 TEST(Simulator, EveryFrameEndsRightOrWithItsError) {

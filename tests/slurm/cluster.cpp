@@ -63,6 +63,7 @@ void SlurmCluster::WriteConfiguration(int nodes) const {
   std::ofstream file(directory_ + "/slurm.conf");
   file << "ClusterName=test\nSlurmctldHost=localhost(" << hosts_.AddressOf(kLogin) << ")\n"
        << "SlurmUser=root\nSlurmdUser=root\nAuthType=auth/none\nCredType=cred/none\n"
+       << "AuthInfo=cred_expire=5\n"  // and so a requeued job waits 6 s; 121 s without this line
        << "PluginDir=" << kPlugins << "\n"
        << "StateSaveLocation=" << directory_ << "/state\nSlurmdSpoolDir=" << directory_ << "/spool/%n\n"
        << "SlurmctldPidFile=" << directory_ << "/slurmctld.pid\nSlurmdPidFile=" << directory_ << "/slurmd.%n.pid\n"

@@ -8,6 +8,8 @@
 
 namespace slabstream {
 
+inline constexpr ScalarType kTypes[] = {ScalarType::kUint8, ScalarType::kUint16, ScalarType::kFloat32};
+
 // A volume whose sample at voxel v is value(v), converted to the type.
 template <class Value>
 Volume MakeTestVolume(const Index3& size, ScalarType type, const Value& value) {

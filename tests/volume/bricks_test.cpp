@@ -17,8 +17,6 @@
 namespace slabstream {
 namespace {
 
-constexpr ScalarType kTypes[] = {ScalarType::kUint8, ScalarType::kUint16, ScalarType::kFloat32};
-
 // About half of the bricks hold one value, 0 or another one; the others anything.
 Volume PatchyVolume(Random& random, const Index3& size, ScalarType type) {
   Volume volume = RandomVolume(random, size, type);

@@ -14,7 +14,6 @@ namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr ScalarType kTypes[] = {ScalarType::kUint8, ScalarType::kUint16, ScalarType::kFloat32};
 
 // The definition, voxel by voxel.
 VolumeSummary SummarizeByDefinition(const Volume& volume) {

@@ -11,6 +11,7 @@
 #include "common/wire/limits.h"
 #include "slabstream/v1/envelope.pb.h"
 #include "tests/wire/decode_any_input.h"
+#include "tests/wire/error_of.h"
 #include "tests/wire/samples.h"
 
 namespace slabstream {
@@ -19,8 +20,6 @@ namespace {
 using testing::HasSubstr;
 
 std::span<const std::byte> BytesOf(const std::string& text) { return {reinterpret_cast<const std::byte*>(text.data()), text.size()}; }
-
-std::string ErrorOf(const v1::Envelope& envelope) { return Decode(BytesOf(envelope.SerializeAsString())).status().message(); }
 
 TEST(AnyMessage, EverySampleSurvivesTheWire) {
   std::set<std::size_t> members;

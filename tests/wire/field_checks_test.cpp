@@ -11,6 +11,7 @@
 #include "common/wire/any_message.h"
 #include "common/wire/limits.h"
 #include "slabstream/v1/envelope.pb.h"
+#include "tests/wire/error_of.h"
 #include "tests/wire/samples.h"
 
 namespace slabstream {
@@ -22,11 +23,6 @@ v1::Envelope EnvelopeOf(std::size_t sample = 0) {
   const std::vector<std::byte> header = Encode(Samples<Message>()[sample]);
   EXPECT_TRUE(envelope.ParseFromArray(header.data(), int(header.size())));
   return envelope;
-}
-
-std::string ErrorOf(const v1::Envelope& envelope) {
-  const std::string bytes = envelope.SerializeAsString();
-  return Decode({reinterpret_cast<const std::byte*>(bytes.data()), bytes.size()}).status().message();
 }
 
 struct Case {

@@ -15,6 +15,7 @@
 #include "slabstream/v1/envelope.pb.h"
 #include "tests/support/random.h"
 #include "tests/wire/decode_any_input.h"
+#include "tests/wire/error_of.h"
 #include "tests/wire/samples.h"
 
 namespace slabstream {
@@ -24,11 +25,6 @@ using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 using google::protobuf::Reflection;
 using testing::StartsWith;
-
-std::string ErrorOf(const v1::Envelope& envelope) {
-  const std::string bytes = envelope.SerializeAsString();
-  return Decode({reinterpret_cast<const std::byte*>(bytes.data()), bytes.size()}).status().message();
-}
 
 v1::Envelope EnvelopeOf(const AnyMessage& message) {
   v1::Envelope envelope;

@@ -116,10 +116,10 @@ TEST(LinkRates, LostAnswersAreAskedForAgain) {
 TEST(LinkRates, AReceiverThatSleptIsNoSlowLink) {
   LinkRates rates;
   Time now{};
-  for (const int milliseconds : {1, 300, 250, 400}) {
+  for (const int took : {1, 300, 250, 400}) {
     const std::uint64_t number = rates.Ask(kPeer, now);
     rates.Sent(kPeer, number, 1'000'000, now);
-    rates.Received(kPeer, number, now + std::chrono::milliseconds(milliseconds));
+    rates.Received(kPeer, number, now + std::chrono::milliseconds(took));
     now += std::chrono::seconds(2);
   }
   EXPECT_NEAR(rates.Of(kPeer), 1e9, 1);

@@ -4,7 +4,7 @@
 namespace slabstream {
 namespace {
 
-std::vector<FrameCase> Frames(const PaperSetup& setup) {
+std::vector<FrameCase> ClaimedFrames(const PaperSetup& setup) {
   std::vector<FrameCase> frames;
   for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
     for (const char* decomposition : {"slab", "beam", "subcube"}) {
@@ -23,7 +23,7 @@ std::vector<FrameCase> Frames(const PaperSetup& setup) {
 
 std::vector<Trial> ClaimTrials(const PaperSetup& setup) {
   std::vector<Trial> trials;
-  for (const FrameCase& frame : Frames(setup)) {
+  for (const FrameCase& frame : ClaimedFrames(setup)) {
     trials.push_back(BoxCostTrial(setup.context(), frame));
     trials.push_back(FinishTrial(setup.context(), frame));
   }
@@ -32,7 +32,7 @@ std::vector<Trial> ClaimTrials(const PaperSetup& setup) {
 
 void AddClaims(const PaperSetup& setup, Results& results) {
   const MachineModel machine = setup.Machines(Splatting()).front();  // any: what is sent does not depend on it
-  for (const FrameCase& frame : Frames(setup)) {
+  for (const FrameCase& frame : ClaimedFrames(setup)) {
     const MeasuredFrame measured = Recall(setup.context(), frame);
     Json of = {{"part", "claims"}};
     of.update(ColumnsOf(frame));

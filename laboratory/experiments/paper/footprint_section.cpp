@@ -9,7 +9,7 @@ namespace slabstream {
 namespace {
 
 constexpr int kWidths[] = {3, 5, 9, 13, 17, 25};  // k, unless the user names others
-constexpr int kPaperWidth = 5, kRuns = 3;
+constexpr int kPaperWidth = 5;
 constexpr double kSliceOccupancies[] = {0.05, 0.1, 0.2, 0.5, 1};
 
 struct Loop {
@@ -30,7 +30,7 @@ Trial Measure(const SliceCase& of) {
   const auto run = [of]() -> Json {
     DenseSlice slice(of.side, SigmaOf(of.k), of.occupancy);
     Json numbers;
-    for (const Loop& loop : kLoops) numbers[loop.name] = MedianSecondsOf(kRuns, [&] { (slice.*loop.splat)(); });
+    for (const Loop& loop : kLoops) numbers[loop.name] = MedianSecondsOf(kRunsOfALoop, [&] { (slice.*loop.splat)(); });
     return numbers;
   };
   return {of.Key(), run, 0.05 + double(of.side) * of.side * of.k * of.k * 2e-8};

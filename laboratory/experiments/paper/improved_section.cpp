@@ -15,7 +15,6 @@ namespace slabstream {
 namespace {
 
 constexpr std::array<int, 4> kTeamSizes = {1, 2, 5, 10};  // in addition to all workers
-constexpr const char* kLink = "10gbit";
 
 std::vector<int> Workers(const PaperSetup& setup) {
   std::vector<int> workers = setup.workers();

@@ -5,11 +5,7 @@
 #include "laboratory/measure/splat_loops.h"
 
 namespace slabstream {
-namespace {
-
-constexpr int kRepeats = 5, kQuickRepeats = 1;
-
-}  // namespace
+namespace {}  // namespace
 
 void DeclarePaper(CLI::App& app, OwnOptions& options) {
   AddParsedList(
@@ -26,7 +22,7 @@ void RunPaper(ExperimentContext& context, Results& results) {
                      ClaimTrials, ValidationTrials}) {
     for (Trial& trial : make(setup)) trials.push_back(std::move(trial));
   }
-  context.Run(std::move(trials), kRepeats, kQuickRepeats);
+  context.Run(std::move(trials), {.full = 5, .quick = 1});
   for (auto* add : {AddTransform, AddFootprint, AddPoints, AddFrames, AddOccupancy, AddModel, AddConstants, AddImproved, AddClaims,
                     AddValidation, AddPictures}) {
     add(setup, results);

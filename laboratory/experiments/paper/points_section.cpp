@@ -12,7 +12,6 @@ namespace slabstream {
 namespace {
 
 constexpr double kMagnified[] = {1, 1.5, 2};  // pixels a voxel
-constexpr int kRuns = 3;
 
 struct PointsCase {
   FrameCase frame;  // by faces, one worker
@@ -40,7 +39,7 @@ PointZBuffer Draw(const PointsCase& of, const Volume& volume, double* seconds = 
   // Every voxel of a sphere that is not 0 is opaque.
   const auto draw = [&] { points.Draw(matrix, volume.description.geometry.size, volume.block.samples<std::uint8_t>()); };
   draw();
-  if (seconds != nullptr) *seconds = MedianSecondsOf(kRuns, draw);
+  if (seconds != nullptr) *seconds = MedianSecondsOf(kRunsOfALoop, draw);
   return points;
 }
 

@@ -10,6 +10,8 @@
 
 namespace slabstream {
 
+inline constexpr int kRunsOfALoop = 3;  // of which the median is taken
+
 // Images are sent whole, as in the paper, or without their empty pixels, as in Slabstream.
 enum class Images { kWhole, kWithoutEmpty };
 

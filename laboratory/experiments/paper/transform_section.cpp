@@ -10,7 +10,6 @@ namespace {
 
 // No step is a power of two, so sums are rounded.
 constexpr TransformMatrix kMatrix = {{{0.7F, -0.4F, 0.2F, 80.0F}, {0.1F, 0.6F, -0.7F, 150.0F}, {0.5F, 0.4F, 0.8F, 10.0F}}};
-constexpr int kRuns = 3;
 // Passes of fewer operations are run again and again for one time, since the clock is coarse.
 constexpr double kTimedOperations = 2e5;
 
@@ -24,7 +23,7 @@ Json Key(int size, int workers, const TransformMethod& method) {
 double SecondsOfPass(const TransformPass& pass, const Index3& slab, TransformedPoints& points) {
   const Operations operations = pass.operations(slab);
   const int times = int(kTimedOperations / std::max(operations.additions + operations.products, 1.0)) + 1;
-  return MedianSecondsOf(kRuns,
+  return MedianSecondsOf(kRunsOfALoop,
                          [&] {
                            for (int i = 0; i < times; ++i) pass.run(kMatrix, slab, points);
                          }) /
@@ -36,7 +35,7 @@ Trial Measure(int size, int workers, const TransformMethod& method) {
     const Index3 slab = SlabOf(size, workers);
     TransformedPoints points(slab);
     method.Run(kMatrix, slab, points);  // allocates the memory
-    Json numbers = {{"seconds", MedianSecondsOf(kRuns, [&] { method.Run(kMatrix, slab, points); })}};
+    Json numbers = {{"seconds", MedianSecondsOf(kRunsOfALoop, [&] { method.Run(kMatrix, slab, points); })}};
     for (const TransformPass& pass : method.passes) numbers[std::string(pass.name)] = SecondsOfPass(pass, slab, points);
     return numbers;
   };

@@ -1,0 +1,55 @@
+#include "bench/service_processes.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "common/base/check.h"
+#include "common/volume/sphere.h"
+#include "common/volume_io/volume_reader.h"
+
+namespace slabstream {
+namespace {
+
+constexpr Duration kPatience = std::chrono::seconds(30);
+
+Child StartProgram(const ServiceProcessesOptions& options, const std::string& name, const std::vector<std::string>& arguments) {
+  std::vector<std::string> command = {ProgramBeside(name).value()};
+  for (const auto* list : {&arguments, &options.arguments_of_each}) command.insert(command.end(), list->begin(), list->end());
+  return Child::Start({.command = std::move(command), .log_path = options.directory + "/log"}).value();
+}
+
+Child StartCoordinator(const ServiceProcessesOptions& options) {
+  const std::string file = options.directory + "/sphere.mha";
+  CHECK(WriteVolume(MakeSphere({.sphere_class = SphereClass::kHollow, .size = options.volume}).value(), file).ok());
+  return StartProgram(options, "slabstream-coordinator", {"--listen", options.listen, "--data", "sphere=" + file});
+}
+
+}  // namespace
+
+ServiceProcesses::ServiceProcesses(const ServiceProcessesOptions& options) : coordinator_(StartCoordinator(options)) {
+  const std::string line = coordinator_.ReadLine(kPatience).value();
+  endpoint_ = ValueIn(line, "client");
+  for (int i = 0; i < options.workers; ++i) {
+    workers_.push_back(StartProgram(options, "slabstream-worker",
+                                    {"--coordinator", ValueIn(line, "workers"), "--threads", std::to_string(options.threads)}));
+  }
+}
+
+ServiceProcesses::~ServiceProcesses() {
+  for (Child& worker : workers_) worker.Terminate(kPatience);
+  coordinator_.Terminate(kPatience);
+}
+
+Client ServiceProcesses::Connect(Context& context) const {
+  Client client = Client::Connect(context, endpoint_).value();
+  while (client.QueryStatus().value().workers.size() < workers_.size()) ::usleep(10000);
+  return client;
+}
+
+std::vector<std::pair<std::string, pid_t>> ServiceProcesses::pids() const {
+  std::vector<std::pair<std::string, pid_t>> pids = {{"coordinator", coordinator_.pid()}};
+  for (const Child& worker : workers_) pids.emplace_back(fmt::format("worker {}", pids.size()), worker.pid());
+  return pids;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,41 @@
+// A coordinator and workers as processes, as `slabstream up` starts them, with a hollow sphere as the dataset "sphere".
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "client/cli/process.h"
+#include "client/client.h"
+
+namespace slabstream {
+
+struct ServiceProcessesOptions {
+  std::string directory;                       // for the volume, the log and ipc files
+  std::string listen = "tcp://127.0.0.1:*";    // of the coordinator
+  int volume = 64;                             // voxels a side of the sphere
+  int workers = 2, threads = 1;                // threads: of each worker
+  std::vector<std::string> arguments_of_each;  // further ones, of the coordinator and of each worker
+};
+
+// Ends the processes when it ends. What goes wrong is fatal.
+class ServiceProcesses {
+ public:
+  // Call before this process has threads.
+  explicit ServiceProcesses(const ServiceProcessesOptions& options);
+  ~ServiceProcesses();
+  ServiceProcesses(const ServiceProcesses&) = delete;
+  ServiceProcesses& operator=(const ServiceProcesses&) = delete;
+
+  // Connects once all workers have registered.
+  Client Connect(Context& context) const;
+  const std::string& endpoint() const { return endpoint_; }  // of clients
+  std::vector<std::pair<std::string, pid_t>> pids() const;   // by name: "coordinator", "worker 1"
+
+ private:
+  Child coordinator_;
+  std::string endpoint_;
+  std::vector<Child> workers_;
+};
+
+}  // namespace slabstream
