@@ -77,9 +77,9 @@ inline constexpr double kAwake = 25e-6, kAsleep = 60e-6, kDoze = 500e-6;   // Wa
 inline constexpr double kSerialShare = 0.02;                               // of rendering and making a picture
 inline constexpr double kMemorySlowdown = 0.03;                            // share of a host's speed, by each busy thread
 inline constexpr double kPlan = 200e-6, kMessage = 5e-6, kClient = 50e-6;  // of the coordinator
-inline constexpr double kCipherByte = 0.4e-9;  // of processor time at each end: 16 MiB over a sealed connection in 14 ms (combining_bench)
-inline constexpr double kLoopbackRate = 6e9;   // bytes a second between processes of a host: 16 MiB in 2.7 ms (combining_bench)
-inline constexpr double kVoxelRate = 5e8;      // bytes a second of voxels that reach a new owner and are prepared: an order of magnitude
+inline constexpr double kCipherByte = 0.19e-9;  // of processor time at each end: 16 MiB sealed and opened in 6.2 ms (combining_bench)
+inline constexpr double kLoopbackRate = 6e9;    // bytes a second between processes of a host: 16 MiB in 2.7 ms (combining_bench)
+inline constexpr double kVoxelRate = 5e8;       // bytes a second of voxels that reach a new owner and are prepared: an order of magnitude
 }  // namespace service
 
 }  // namespace slabstream::calibration

@@ -16,9 +16,9 @@
 namespace slabstream {
 namespace {
 
-constexpr std::size_t kKeyBytes = 32, kProofBytes = 32, kNameBytes = 8 + 16;
+constexpr std::size_t kKeyBytes = 32, kProofBytes = 32, kFrameKeyBytes = 16, kNameBytes = 8 + 16;
 constexpr std::size_t kTicketBytes = kNameBytes + kProofBytes, kTicketTextBytes = kTicketBytes / 4 * 5;  // Z85
-constexpr std::string_view kPurpose = "slabstream sealed connection 1";
+constexpr std::string_view kPurpose = "slabstream sealed connection 2";
 
 using RawKey = std::array<std::uint8_t, kKeyBytes>;
 using Pkey = std::unique_ptr<EVP_PKEY, decltype(&EVP_PKEY_free)>;
@@ -64,19 +64,28 @@ struct Secrets {
   std::array<std::uint8_t, kProofBytes> proof;
 };
 
-// The direction is part of it: what B sends to A has other secrets than what A sends to B.
-Secrets Derive(const RawKey& shared, const std::array<std::uint8_t, kNameBytes>& name, const RawKey& from, const RawKey& to) {
-  std::array<std::uint8_t, sizeof(Secrets::key) + kProofBytes> out{};
+// HKDF-SHA256 (RFC 5869).
+void Expand(std::span<const std::uint8_t> secret, std::span<const std::uint8_t> salt, std::span<const std::uint8_t> purpose,
+            std::span<std::uint8_t> out) {
   std::size_t bytes = out.size();
   const PkeyContext context(EVP_PKEY_CTX_new_id(EVP_PKEY_HKDF, nullptr), EVP_PKEY_CTX_free);
   CHECK_EQ(EVP_PKEY_derive_init(context.get()), 1);
   CHECK_EQ(EVP_PKEY_CTX_set_hkdf_md(context.get(), EVP_sha256()), 1);
-  CHECK_EQ(EVP_PKEY_CTX_set1_hkdf_key(context.get(), shared.data(), int(shared.size())), 1);
-  CHECK_EQ(EVP_PKEY_CTX_set1_hkdf_salt(context.get(), name.data(), int(name.size())), 1);
-  CHECK_EQ(EVP_PKEY_CTX_add1_hkdf_info(context.get(), reinterpret_cast<const std::uint8_t*>(kPurpose.data()), int(kPurpose.size())), 1);
-  CHECK_EQ(EVP_PKEY_CTX_add1_hkdf_info(context.get(), from.data(), int(from.size())), 1);
-  CHECK_EQ(EVP_PKEY_CTX_add1_hkdf_info(context.get(), to.data(), int(to.size())), 1);
+  CHECK_EQ(EVP_PKEY_CTX_set1_hkdf_key(context.get(), secret.data(), int(secret.size())), 1);
+  CHECK_EQ(EVP_PKEY_CTX_set1_hkdf_salt(context.get(), salt.data(), int(salt.size())), 1);
+  std::vector<std::uint8_t> info(kPurpose.begin(), kPurpose.end());
+  info.insert(info.end(), purpose.begin(), purpose.end());
+  CHECK_EQ(EVP_PKEY_CTX_add1_hkdf_info(context.get(), info.data(), int(info.size())), 1);
   CHECK_EQ(EVP_PKEY_derive(context.get(), out.data(), &bytes), 1);
+}
+
+// The direction is part of it: what B sends to A has other secrets than what A sends to B.
+Secrets Derive(const RawKey& shared, const std::array<std::uint8_t, kNameBytes>& name, const RawKey& from, const RawKey& to) {
+  std::array<std::uint8_t, 2 * kKeyBytes> direction{};
+  std::ranges::copy(from, direction.begin());
+  std::ranges::copy(to, direction.begin() + kKeyBytes);
+  std::array<std::uint8_t, sizeof(Secrets::key) + kProofBytes> out{};
+  Expand(shared, name, direction, out);
   Secrets secrets{};
   std::copy_n(out.begin(), secrets.key.size(), secrets.key.begin());
   std::copy_n(out.begin() + secrets.key.size(), kProofBytes, secrets.proof.begin());
@@ -132,17 +141,20 @@ std::optional<Session> Session::Read(std::string_view text, const std::string& f
 // One direction of one session.
 class FrameCipher {
  public:
-  FrameCipher(const Session& session, bool seals) : seals_(seals) {
-    CHECK(context_ != nullptr);
-    CHECK_EQ(EVP_CipherInit_ex(context_.get(), EVP_aes_256_gcm(), nullptr, session.key.data(), nullptr, seals ? 1 : 0), 1);
+  FrameCipher(const Session& session, bool seals) : secret_(session.key), seals_(seals) { CHECK(context_ != nullptr); }
+
+  // Of the next frame. Its `to` has room for as many bytes as will pass.
+  void Begin(std::uint64_t message, const std::byte* place, std::byte* to) {
+    if (!key_number_ || *key_number_ != message / kMessagesOfAKey) UseKey(message / kMessagesOfAKey);
+    CHECK_EQ(EVP_CipherInit_ex(context_.get(), nullptr, nullptr, nullptr, Raw(place), -1), 1);
+    to_ = to;
   }
 
-  void Begin(const std::uint8_t* place) { CHECK_EQ(EVP_CipherInit_ex(context_.get(), nullptr, nullptr, nullptr, place, -1), 1); }
-
   // At most kSealedPartBytes at a time.
-  void Pass(std::span<const std::byte> from, std::byte* to) {
-    int bytes = 0;
-    CHECK_EQ(EVP_CipherUpdate(context_.get(), Raw(to), &bytes, Raw(from.data()), int(from.size())), 1);
+  void Pass(std::span<const std::byte> from) {
+    int bytes = 0;  // fewer than those of `from`, if they end within a block
+    CHECK_EQ(EVP_CipherUpdate(context_.get(), Raw(to_), &bytes, Raw(from.data()), int(from.size())), 1);
+    to_ += bytes;
   }
 
   void WriteTag(std::byte* tag) {
@@ -155,16 +167,29 @@ class FrameCipher {
   }
 
  private:
+  // RFC 7253, 5.1: a key should seal no more than 2^48 bytes. So many messages of 2 GiB have half of that.
+  static constexpr std::uint64_t kMessagesOfAKey = std::uint64_t{1} << 16;
+
+  void UseKey(std::uint64_t number) {
+    std::array<std::uint8_t, kFrameKeyBytes> key{};
+    std::array<std::uint8_t, sizeof(number)> salt{};
+    StoreLittle(number, salt.data());
+    Expand(secret_, salt, {}, key);
+    CHECK_EQ(EVP_CipherInit_ex(context_.get(), EVP_aes_128_ocb(), nullptr, key.data(), nullptr, seals_ ? 1 : 0), 1);
+    key_number_ = number;
+  }
   bool Finish() {
-    std::array<std::uint8_t, 16> none{};
     int bytes = 0;
-    return EVP_CipherFinal_ex(context_.get(), none.data(), &bytes) == 1;
+    return EVP_CipherFinal_ex(context_.get(), Raw(to_), &bytes) == 1;
   }
   struct Free {
     void operator()(EVP_CIPHER_CTX* context) const { EVP_CIPHER_CTX_free(context); }
   };
-  const std::unique_ptr<EVP_CIPHER_CTX, Free> context_{EVP_CIPHER_CTX_new()};
+  const Session::Secret secret_;
   const bool seals_;
+  const std::unique_ptr<EVP_CIPHER_CTX, Free> context_{EVP_CIPHER_CTX_new()};
+  std::optional<std::uint64_t> key_number_;
+  std::byte* to_ = nullptr;
 };
 
 Sealer::Sealer(const Session& session) : cipher_(std::make_unique<FrameCipher>(session, true)) {}
@@ -189,13 +214,12 @@ PooledVector<std::byte> Sealer::Next() {
   sealed.resize(kSealedPlaceBytes + front_.size() + part.size() + kSealedTagBytes);
   StoreLittle(message_, Raw(sealed.data()));
   StoreLittle(frame_++, Raw(sealed.data()) + 8);
-  std::byte* to = sealed.data() + kSealedPlaceBytes;
-  cipher_->Begin(Raw(sealed.data()));
+  std::byte* const to = sealed.data() + kSealedPlaceBytes;
+  cipher_->Begin(message_, sealed.data(), to);
   for (const std::span<const std::byte> piece : {std::span<const std::byte>(front_), part}) {
-    if (!piece.empty()) cipher_->Pass(piece, to);
-    to += piece.size();
+    if (!piece.empty()) cipher_->Pass(piece);
   }
-  cipher_->WriteTag(to);
+  cipher_->WriteTag(to + front_.size() + part.size());
   front_.clear();
   left_ = left_.subspan(part.size());
   done_ = left_.empty();
@@ -218,8 +242,8 @@ std::variant<Unsealer::Forged, Unsealer::More, Unsealer::Message> Unsealer::Open
       partial_ && place == partial_->next && sealed.size() == std::min(partial_->payload.size() - partial_->filled, kSealedPartBytes);
   scratch_.resize(kSealedPartBytes);
   std::byte* const to = fits ? partial_->payload.data() + partial_->filled : scratch_.data();
-  cipher_->Begin(Raw(frame.data()));
-  if (!sealed.empty()) cipher_->Pass(sealed, to);
+  cipher_->Begin(place.message, frame.data(), to);
+  if (!sealed.empty()) cipher_->Pass(sealed);
   if (!cipher_->TagFits(sealed.data() + sealed.size())) return Forged{};
   last_ = place;
 

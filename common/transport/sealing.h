@@ -1,6 +1,6 @@
 // Sealed connections: how images travel between hosts. CURVE's cipher moves 0.5 GB/s through a thread; this one moves several. A message is
-// cut into frames, each sealed by AES-256-GCM, so that frames are sealed, sent and opened at the same time. Messages go one way only: from
-// whoever connects to whoever listens. Private to this folder.
+// cut into frames, each sealed by AES-128-OCB (RFC 7253), so that frames are sealed, sent and opened at the same time. Messages go one way
+// only: from whoever connects to whoever listens. Private to this folder.
 //
 //   1. Both have Curve25519 keys, and each knows the other's public one. Whoever connects makes a Session: a name for it, and from the two
 //      keys and the name the session's secrets (X25519, then HKDF-SHA256). Its Ticket, the name and a proof, goes with the handshake.
@@ -53,7 +53,7 @@ struct SessionName {
 };
 
 struct Session {
-  using Secret = std::array<std::uint8_t, 32>;
+  using Secret = std::array<std::uint8_t, 32>;  // keys of frames are derived from it
   SessionName name;
   Secret key{};
   std::string ticket;  // 70 printable characters

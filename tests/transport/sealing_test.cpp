@@ -136,6 +136,12 @@ TEST_F(SealingTest, FramesCountOnce) {
   for (const Frame& frame : frames) EXPECT_TRUE(IsForged(unsealer_, frame));
 }
 
+// The cipher's key changes every 65536 messages.
+TEST_F(SealingTest, LongSessionsGoOn) {
+  for (int i = 0; i < 65600; ++i) ASSERT_TRUE(OpenAll(unsealer_, Seal(sealer_, {}, {}))) << i;
+  EXPECT_TRUE(Arrives(ThreeFrames()));
+}
+
 TEST_F(SealingTest, MessagesWhoseFramesAreLostOrReorderedNeverArriveAndTheNextOneDoes) {
   for (const std::vector<std::size_t>& order : {std::vector<std::size_t>{1, 2}, {0, 2}, {0, 1}, {2}}) {  // lost
     const Frames frames = ThreeFrames();
