@@ -50,7 +50,7 @@ Result<Picture> DecodePicture(FrameReply& reply, const Bytes& payload, ImageSize
   return picture;
 }
 
-constexpr std::uint64_t kTellBytes = std::uint64_t{16} << 20;
+constexpr std::uint64_t kTellBytes = std::uint64_t{1} << 20;
 
 // Of an answer to a question or an order.
 std::optional<std::uint64_t> NonceOfAnswer(const AnyMessage& message) {

@@ -12,7 +12,13 @@ void ClientTable::Touch(PeerToken client, Time now) {
   if (found != clients_.end()) found->second.last_heard = now;
 }
 
-bool ClientTable::Forget(PeerToken client) { return clients_.erase(client) > 0; }
+bool ClientTable::Forget(PeerToken token) {
+  const auto client = clients_.find(token);
+  if (client == clients_.end()) return false;
+  unread_of_all_ -= client->second.unread();
+  clients_.erase(client);
+  return true;
+}
 
 void ClientTable::Postpone(Duration duration) {
   for (auto& [token, client] : clients_) client.last_heard += duration;
@@ -33,20 +39,28 @@ Time ClientTable::NextWake() const {
 }
 
 void ClientTable::Sent(PeerToken token, std::size_t bytes) {
-  if (const auto client = clients_.find(token); client != clients_.end()) client->second.sent_bytes += bytes;
+  const auto client = clients_.find(token);
+  if (client == clients_.end()) return;
+  client->second.sent_bytes += bytes;
+  unread_of_all_ += bytes;
 }
 
 void ClientTable::Read(PeerToken token, std::uint64_t bytes) {
   const auto found = clients_.find(token);
   if (found == clients_.end()) return;
   Client& client = found->second;
+  unread_of_all_ -= client.unread();
   if (!client.read_before) client.read_before = bytes - std::min(bytes, client.sent_bytes);
   client.read_bytes = std::min(client.sent_bytes, bytes - std::min(bytes, *client.read_before));
+  unread_of_all_ += client.unread();
 }
 
 bool ClientTable::IsBehind(PeerToken token) const {
   const auto client = clients_.find(token);
-  return client != clients_.end() && client->second.sent_bytes - client->second.read_bytes >= kMaxUnreadBytes;
+  if (client == clients_.end()) return false;
+  const std::uint64_t unread = client->second.unread();
+  return unread >= kMaxUnreadBytes ||
+         (unread_of_all_ >= most_unread_ && unread >= std::max(most_unread_ / clients_.size(), kLeastUnreadPart));
 }
 
 void ClientTable::Keep(PeerToken token, Answer answer) {

@@ -21,9 +21,6 @@ constexpr std::size_t kCountAhead = 4;
 static_assert(kCountAhead <= OccupancyTable::kMaxKept);
 // Frames planned beyond the window's room: when a frame ends and makes room for another, that one's plan should be ready.
 constexpr std::size_t kPlansAhead = 1;
-
-// What datasets may take of a coordinator's memory: the rest is for a volume that is being read and for pictures on their way. 0: no limit.
-std::uint64_t DatasetShare(std::uint64_t memory_bytes) { return memory_bytes / 4 * 3; }
 }  // namespace
 
 void FrameMachine::State::On(const DatasetLoaded& event) {
@@ -35,9 +32,9 @@ void FrameMachine::State::On(const DatasetLoaded& event) {
   for (OpenRequest& request : queue.Extract(waits)) FailRequest(request, FindVolume(request));
 
   const std::uint64_t share = DatasetShare(config.memory_bytes);
-  while (share != 0 && datasets.bytes() > share && UnloadOne()) {
+  while (datasets.bytes() > share && UnloadOne()) {
   }
-  if (share == 0 || datasets.bytes() <= share) return;
+  if (datasets.bytes() <= share) return;
   // All that are loaded are in use. What came last goes, with its requests.
   const Status full = Status::ResourceExhausted(
       fmt::format("dataset \"{}\" needs {}, limit {} ({} are in use by other datasets); the "

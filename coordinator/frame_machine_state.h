@@ -27,12 +27,17 @@ inline std::uint32_t Milliseconds(Duration duration) {
   return std::uint32_t(std::chrono::duration_cast<std::chrono::milliseconds>(duration).count());
 }
 
+// What datasets, and pictures that clients have not read, may take of a coordinator's memory; the rest is for a volume that is being read
+// and for pictures on their way. `memory_bytes` 0: no limit.
+inline std::uint64_t DatasetShare(std::uint64_t memory_bytes) { return memory_bytes == 0 ? UINT64_MAX : memory_bytes / 4 * 3; }
+inline std::uint64_t UnreadShare(std::uint64_t memory_bytes) { return memory_bytes == 0 ? UINT64_MAX : memory_bytes / 16; }
+
 struct FrameMachine::State {
   explicit State(CoordinatorConfig c)
       : config(std::move(c)),
         roster(config.worker_timeout, config.vacancy_grace, config.return_wait),
         datasets(config.datasets),
-        clients(config.client_timeout),
+        clients(config.client_timeout, UnreadShare(config.memory_bytes)),
         limits{.stall_timeout = config.stall_timeout,
                .max_stalls = config.max_stalls,
                .pause = config.heartbeat,
