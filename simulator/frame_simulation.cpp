@@ -138,7 +138,11 @@ void FrameSimulation::Perform(ToClient& action) {
   if (reply == nullptr) return;  // news of progress travels for free
   const auto frame = std::uint32_t(reply->request - 1);
   timeline_.frames[frame].done = now();
-  const double arrival = service_.threads().Begin(Threads::kClient, service_.coordinator_free() + machine_.client_seconds);
+  // The coordinator decrypts and encrypts; the client decrypts.
+  const double bytes = inputs_[frame].picture_bytes, cipher = bytes * machine_.picture.cipher_byte;
+  coordinator_passed_ = std::max(coordinator_passed_, service_.coordinator_free()) + 2 * cipher;
+  client_passed_ = std::max(client_passed_, coordinator_passed_ + bytes * machine_.picture.link_byte) + cipher;
+  const double arrival = service_.threads().Begin(Threads::kClient, client_passed_ + machine_.client_seconds);
   service_.queue().At(arrival + inputs_[frame].receive_seconds, [this, frame] { OnPicture(frame); });
 }
 
@@ -246,8 +250,9 @@ auto FrameSimulation::CostOf(Job& job, const SendPartial& action) -> Cost {
 }
 
 auto FrameSimulation::CostOf(const Job&, const SendFrame& action) const -> Cost {
-  const double seconds = inputs_[frame_of_.at(action.message.frame)].finish_seconds;
-  return {{seconds, std::max(machine_.threads, machine_.picture_threads)}};
+  const FrameInput& input = inputs_[frame_of_.at(action.message.frame)];
+  const double cipher = input.picture_bytes * machine_.picture.cipher_byte;
+  return {{input.finish_seconds + cipher, std::max(machine_.threads, machine_.picture_threads)}};
 }
 
 void FrameSimulation::OnWorked(const Job& job, const LaneTask& task) {
@@ -288,7 +293,11 @@ Arrivals FrameSimulation::ToWorker(Node, AnyMessage& message, double sent) {
 
 Arrivals FrameSimulation::ToCoordinator(Node, AnyMessage& message) {
   if (const auto* trouble = std::get_if<WorkerTrouble>(&message)) CHECK(false) << trouble->status.message();
-  return Arrivals::At(service_.now() + machine_.link.latency_seconds);
+  double arrival = service_.now() + machine_.link.latency_seconds;
+  if (const auto* picture = std::get_if<FrameImage>(&message)) {
+    arrival += inputs_[frame_of_.at(picture->frame)].picture_bytes * machine_.picture.link_byte;
+  }
+  return Arrivals::At(arrival);
 }
 
 Arrivals FrameSimulation::ToPeer(Node to, Job& sends) {

@@ -35,6 +35,7 @@ struct FrameInput {
   std::vector<RenderCost> boxes;    // by BoxId; at least those of all placements
   double finish_seconds = 0;        // the picture from the accumulated frame, encoded
   double receive_seconds = 0;       // the client checks and decodes it
+  double picture_bytes = 0;         // encoded
 };
 
 struct SimulationOptions {

@@ -44,6 +44,8 @@ Status Validate(const MachineModel& machine) {
   if (Status s = Validate(machine.link); !s.ok()) return s;
   if (Status s = Validate(machine.combining); !s.ok()) return s;
   if (Status s = Validate(machine.wake_ups); !s.ok()) return s;
+  if (Status s = InRange("picture.link_byte", machine.picture.link_byte, 0, kMaxSeconds); !s.ok()) return s;
+  if (Status s = InRange("picture.cipher_byte", machine.picture.cipher_byte, 0, kMaxSeconds); !s.ok()) return s;
   for (const double speed : machine.speeds) {
     if (Status s = InRange("speeds", speed, 1e-6, 1e6); !s.ok()) return s;
   }

@@ -37,6 +37,14 @@ struct WakeUps {
   friend bool operator==(const WakeUps&, const WakeUps&) = default;
 };
 
+// A picture's way from the display worker over the coordinator to the client. Each process decrypts it, encrypts it, or does both as a
+// whole, one picture after the other, beside its other threads; then its last byte takes `link_byte` for each. 0: it takes no time.
+struct PictureWay {
+  double link_byte = 0;    // of each of the two connections
+  double cipher_byte = 0;  // to encrypt or decrypt it
+  friend bool operator==(const PictureWay&, const PictureWay&) = default;
+};
+
 // Some workers render slower in some frames, for no reason that a plan could know. Which ones depends on the seed alone.
 struct Stragglers {
   double probability = 0;  // of a worker, in each frame; [0, 1]
@@ -49,6 +57,7 @@ struct MachineModel {
   // Between workers. A message between a worker and the coordinator takes only its latency and waits for no other. Wake-ups come on top.
   LinkModel link;
   CombiningCosts combining;
+  PictureWay picture;
   WakeUps wake_ups;
   std::vector<double> speeds;  // of the workers, relative, > 0; worker i has speeds[i % size()]. Empty: all 1
   Stragglers stragglers;

@@ -142,7 +142,7 @@ Json MeasureFinish(ExperimentContext& context, const FrameCase& frame) {
   const VolumeInUse volume = context.volumes().Get(frame.volume);
   const FramePlan plan = PlanOf(context, frame);
   const PictureCost cost = MeasurePictureCost(*volume.volume, plan.setup, kFinishes);
-  return Json{{"finish_seconds", cost.finish_seconds}, {"receive_seconds", cost.receive_seconds}};
+  return Json{{"finish_seconds", cost.finish_seconds}, {"receive_seconds", cost.receive_seconds}, {"picture_bytes", cost.bytes}};
 }
 
 Json MeasureService(ExperimentContext& context, const FrameCase& frame, int frames) {
@@ -260,7 +260,7 @@ Trial ValidationTrial(ExperimentContext& context, const FrameCase& frame, int tu
 }
 
 FrameInput MeasuredFrame::Input() const {
-  FrameInput input{&plan, {}, finish_seconds, receive_seconds};
+  FrameInput input{&plan, {}, finish_seconds, receive_seconds, picture_bytes};
   for (const Cost& box : boxes)
     input.boxes.push_back({box.seconds, box.coverage.share.empty() ? nullptr : &box.coverage, box.fetched_bytes});
   return input;
@@ -307,10 +307,8 @@ std::vector<MeasuredFrame> RecallRepeats(ExperimentContext& context, const Frame
 
 MeasuredFrame WithBoxCosts(ExperimentContext& context, const FrameCase& frame, FramePlan plan, const std::vector<const Json*>& repeats) {
   CHECK(!repeats.empty()) << BoxCostKey(context, frame).dump();
-  MeasuredFrame measured{std::move(plan),
-                         {},
-                         EstimateOf(context.log(), FinishKey(context, frame), "finish_seconds").median,
-                         EstimateOf(context.log(), FinishKey(context, frame), "receive_seconds").median};
+  const auto of_picture = [&](const char* number) { return EstimateOf(context.log(), FinishKey(context, frame), number).median; };
+  MeasuredFrame measured{std::move(plan), {}, of_picture("finish_seconds"), of_picture("receive_seconds"), of_picture("picture_bytes")};
   measured.boxes.resize(measured.plan.layout->partition.boxes().size());
 
   const std::vector<double> ids = MediansOf(repeats, "ids"), seconds = MediansOf(repeats, "seconds"),

@@ -53,7 +53,7 @@ Trial BoxCostTrial(ExperimentContext& context, const FrameCase& frame);
 Json BoxCostKey(ExperimentContext& context, const FrameCase& frame);
 
 // Times on one thread: "finish_seconds" to make the picture from the accumulated frame and encode it, "receive_seconds" for the client to
-// decode it.
+// decode it. And "picture_bytes", encoded.
 Trial FinishTrial(ExperimentContext& context, const FrameCase& frame);
 Json FinishKey(ExperimentContext& context, const FrameCase& frame);
 
@@ -102,7 +102,7 @@ struct MeasuredFrame {
     CoverageMap coverage;
   };
   std::vector<Cost> boxes;  // by BoxId; those without a placement cost nothing
-  double finish_seconds = 0, receive_seconds = 0;
+  double finish_seconds = 0, receive_seconds = 0, picture_bytes = 0;
 
   FrameInput Input() const;                   // for SimulateFrames, valid as long as this lives
   std::vector<double> WorkerSeconds() const;  // render time of each worker, including workers without a box

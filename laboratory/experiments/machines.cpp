@@ -54,7 +54,10 @@ MachineModel JoinedBy(MachineModel machine, const LinkModel& link, const HostMod
   machine.link = link;
   machine.workers_a_host = 1;
   machine.cores_a_host = host.cores;
-  if (host.encrypted) machine.combining.cipher_byte = calibration::service::kCipherByte;
+  if (host.encrypted) {
+    machine.combining.cipher_byte = calibration::service::kCipherByte;
+    machine.picture = {.link_byte = 1 / link.bytes_per_second, .cipher_byte = calibration::service::kCurveByte};
+  }
   return machine;
 }
 

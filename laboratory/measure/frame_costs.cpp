@@ -80,6 +80,7 @@ PictureCost PictureMeter::Measure(const FrameSetup& setup) {
     Keep(Finish(frame, setup));
     cost.finish_elapsed = double((MonotonicNow() - begin).count()) * 1e-9;
   });
+  cost.bytes = double(kept_.back().payload.size());
   cost.receive_seconds = SecondsOnAnotherThread(1, [&] { Receive(kept_.back()); });
   return cost;
 }
@@ -89,12 +90,15 @@ PictureCost MeasurePictureCost(const Volume& volume, const FrameSetup& setup, in
   PictureMeter meter(volume);
   meter.KeepAnswers(setup);
   std::vector<double> finish_seconds, receive_seconds;
+  PictureCost cost;
   for (int i = 0; i < repeats; ++i) {
-    const PictureCost cost = meter.Measure(setup);
+    cost = meter.Measure(setup);
     finish_seconds.push_back(cost.finish_seconds);
     receive_seconds.push_back(cost.receive_seconds);
   }
-  return {.finish_seconds = MedianOf(std::move(finish_seconds)).median, .receive_seconds = MedianOf(std::move(receive_seconds)).median};
+  return {.finish_seconds = MedianOf(std::move(finish_seconds)).median,
+          .receive_seconds = MedianOf(std::move(receive_seconds)).median,
+          .bytes = cost.bytes};
 }
 
 FrameCosts MeasureFrameCosts(const Volume& volume, const FramePlan& plan, int repeats) {
@@ -120,7 +124,11 @@ CostSample SampleOf(const BoxCost& box, const Camera& camera) {
 }
 
 FrameInput FrameCosts::Input(const FramePlan& plan) const {
-  FrameInput input{.plan = &plan, .boxes = {}, .finish_seconds = picture.finish_seconds, .receive_seconds = picture.receive_seconds};
+  FrameInput input{.plan = &plan,
+                   .boxes = {},
+                   .finish_seconds = picture.finish_seconds,
+                   .receive_seconds = picture.receive_seconds,
+                   .picture_bytes = picture.bytes};
   for (const BoxCost& box : boxes) input.boxes.push_back({box.seconds, box.coverage.share.empty() ? nullptr : &box.coverage, 0});
   return input;
 }

@@ -18,6 +18,7 @@ struct PictureCost {
   double finish_seconds = 0;   // resampling or resolving, encoding, digest: the display worker's part
   double receive_seconds = 0;  // digest, check, decoding: the client's part
   double finish_elapsed = 0;   // elapsed time of the same, by all threads of the meter
+  double bytes = 0;            // encoded
 };
 
 // Makes and decodes pictures of one volume under the conditions of the service. Each step runs on a thread of its own, so its input lies in

@@ -10,7 +10,7 @@
 namespace slabstream {
 namespace {
 
-constexpr std::uint64_t kMebi = 1 << 20;
+constexpr std::uint64_t kUnit = 1 << 20;  // bytes
 
 TEST(ClientTable, WhoeverReadsNothingIsBehind) {
   ClientTable clients(std::chrono::seconds(10));
@@ -26,12 +26,12 @@ TEST(ClientTable, WhoeverReadsNothingIsBehind) {
 }
 
 TEST(ClientTable, WhatManyLeaveUnreadCountsTogether) {
-  constexpr std::uint64_t kMost = 100 * kMebi;
+  constexpr std::uint64_t kMost = 100 * kUnit;
   ClientTable clients(std::chrono::seconds(10), kMost);
   for (PeerToken client = 1; client <= 10; ++client) clients.Meet(client, {});
-  for (PeerToken client = 1; client <= 4; ++client) clients.Sent(client, 24 * kMebi);
+  for (PeerToken client = 1; client <= 4; ++client) clients.Sent(client, 24 * kUnit);
   for (PeerToken client = 1; client <= 10; ++client) EXPECT_FALSE(clients.IsBehind(client)) << "all together are within the limit";
-  clients.Sent(5, 4 * kMebi);
+  clients.Sent(5, 4 * kUnit);
   for (PeerToken client = 1; client <= 4; ++client) EXPECT_TRUE(clients.IsBehind(client));
   for (PeerToken client = 5; client <= 10; ++client) EXPECT_FALSE(clients.IsBehind(client)) << "others took its part";
   clients.Forget(1);
@@ -42,7 +42,7 @@ TEST(ClientTable, WhatManyLeaveUnreadCountsTogether) {
 TEST(ClientTable, UnreadBytesStayWithinTheLimit) {
   Random random(5);
   SCOPED_TRACE(random.trace());
-  constexpr std::uint64_t kMost = 50 * kMebi, kPicture = 3 * kMebi;
+  constexpr std::uint64_t kMost = 50 * kUnit, kPicture = 3 * kUnit;
   ClientTable clients(std::chrono::seconds(10), kMost);
   std::map<PeerToken, std::uint64_t> sent, read;
   for (int step = 0; step < 5000; ++step) {

@@ -132,6 +132,24 @@ TEST(SimulateFrames, EncryptionTakesProcessorTimeAtBothEndsOfEveryMessage) {
   }
 }
 
+// Four times it is encrypted or decrypted, by three processes, and it takes two connections. The coordinator does half of the work.
+TEST(SimulateFrames, PicturesTravelOverTheCoordinatorToTheClient) {
+  constexpr double kBytes = 1000, kLinkByte = 1e-3, kCipherByte = 2e-3;
+  MadeFrame frame(2, 1, kSide, 1, 1, "fan-in");
+  MachineModel machine = WithoutDelays();
+  const double plain = Simulate({frame.input()}, machine).frames[0].latency();
+  frame.picture_bytes = kBytes;
+  EXPECT_NEAR(Simulate({frame.input()}, machine).frames[0].latency(), plain, plain * kRelative) << "by default it takes no time";
+  machine.picture = {.link_byte = kLinkByte, .cipher_byte = kCipherByte};
+  const double expected = plain + kBytes * (2 * kLinkByte + 4 * kCipherByte);
+  EXPECT_NEAR(Simulate({frame.input()}, machine).frames[0].latency(), expected, expected * kRelative);
+
+  const std::vector<FrameInput> many(20, frame.input());
+  const Timeline timeline = SimulateFrames(many, machine, {.in_flight = 10, .keep_spans = false}).value();
+  const double period = (timeline.frames[19].received - timeline.frames[9].received) / 10;
+  EXPECT_NEAR(period, kBytes * 2 * kCipherByte, kRelative * period) << "the coordinator is busy all the time";
+}
+
 // Yagel and Machiraju, Eq. 18: one round for each doubling of the workers, if messages do not get in each other's way.
 TEST(SimulateFrames, ATreeTakesLogarithmicallyManyRounds) {
   for (std::uint32_t rounds = 0; rounds <= 6; ++rounds) {

@@ -34,10 +34,10 @@ class MadeFrame {
   }
   MadeFrame(const MadeFrame&) = delete;
 
-  FrameInput input() const { return {&plan_, costs_, finish_seconds}; }
+  FrameInput input() const { return {&plan_, costs_, finish_seconds, 0, picture_bytes}; }
   FramePlan& plan() { return plan_; }
   std::vector<RenderCost>& costs() { return costs_; }
-  double finish_seconds = 0;
+  double finish_seconds = 0, picture_bytes = 0;
 
  private:
   CoverageMap coverage_;
