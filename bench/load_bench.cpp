@@ -1,8 +1,6 @@
-// Many clients at once. Most of them ask for the next picture when they have the last one. At first they are alone; then one client that
-// asks and never reads joins them, and one that asks for very large pictures. The program checks two things:
-//   memory  no process takes more than its --memory
-//   speed   the others together keep at least half of their pictures a second
-// It exits with 0 if both hold. All clients are threads of this process.
+// Loads a service with many clients, threads of this process. Well-behaved clients ask for a picture, read it, and ask for the next one.
+// After a while two others join them: one asks for pictures and never reads them, one asks for very large pictures. The program exits with
+// 0 if each process stays within its --memory, and if the well-behaved clients together keep at least half of their pictures a second.
 #include <fmt/format.h>
 #include <unistd.h>
 

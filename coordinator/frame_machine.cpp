@@ -297,7 +297,7 @@ bool FrameMachine::State::StartNextFrame() {
   const auto ready = [&](const OpenRequest& open) { return HasPlan(open) && !clients.IsBehind(open.client); };
   const OpenRequest* const next = queue.FindNext(ready);
   if (next == nullptr || !frames.HasRoomFor(*next)) return false;
-  const RunningFrame& running = frames.Add(RunningFrame(frames.next_id(), *queue.TakeNext(ready), limits, now));
+  const RunningFrame& running = frames.Add(RunningFrame(frames.next_id(), queue.Take(*next), limits, now));
   SendClient(running.request().client, running.Progress());
   return true;
 }

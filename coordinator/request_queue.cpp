@@ -19,20 +19,17 @@ const OpenRequest* RequestQueue::FindNext(const Predicate& ready) const {
   return nullptr;
 }
 
-std::optional<OpenRequest> RequestQueue::TakeNext(const Predicate& ready) {
-  for (auto queue = turn_.begin(); queue != turn_.end(); ++queue) {
-    const auto found = std::ranges::find_if(queue->requests, ready);
-    if (found == queue->requests.end()) continue;
-    OpenRequest request = std::move(*found);
-    queue->requests.erase(found);
-    if (queue->requests.empty()) {
-      turn_.erase(queue);
-    } else {
-      turn_.splice(turn_.end(), turn_, queue);
-    }
-    return request;
+OpenRequest RequestQueue::Take(const OpenRequest& next) {
+  const auto queue = std::ranges::find(turn_, next.client, &ClientQueue::client);
+  const auto found = std::ranges::find_if(queue->requests, [&](const OpenRequest& request) { return &request == &next; });
+  OpenRequest request = std::move(*found);
+  queue->requests.erase(found);
+  if (queue->requests.empty()) {
+    turn_.erase(queue);
+  } else {
+    turn_.splice(turn_.end(), turn_, queue);
   }
-  return std::nullopt;
+  return request;
 }
 
 std::vector<OpenRequest> RequestQueue::Extract(const Predicate& wanted) {

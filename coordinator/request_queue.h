@@ -39,8 +39,8 @@ class RequestQueue {
   void Push(OpenRequest request);
   // The first request that is `ready` of the first client in turn that has one; null: none is.
   const OpenRequest* FindNext(const Predicate& ready) const;
-  // Takes it out; its client then goes to the end of the turn.
-  std::optional<OpenRequest> TakeNext(const Predicate& ready);
+  // Takes out what FindNext has found; its client then goes to the end of the turn.
+  OpenRequest Take(const OpenRequest& next);
   std::vector<OpenRequest> Extract(const Predicate& wanted);  // takes all of them out, wherever they stand
 
   void ForEach(const std::function<void(OpenRequest&)>& visit);  // in turn of clients, then in order of arrival

@@ -88,7 +88,7 @@ class FrameSimulation : private Conditions {
   std::map<FrameId, std::uint32_t> frame_of_;
   std::map<std::uint32_t, Frame> frames_;  // that are under way
   double render_seconds_ = 0;
-  double coordinator_passed_ = 0, client_passed_ = 0;  // they have decrypted and encrypted all pictures so far
+  double coordinator_passed_ = 0, client_passed_ = 0;  // they are done with the pictures so far
   Timeline timeline_;
 };
 

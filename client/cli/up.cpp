@@ -56,7 +56,6 @@ class BlockedSignals {
   sigset_t before_;
 };
 
-// The value of "key=value" in the coordinator's ready line; empty if it is not there.
 // As --memory takes it.
 std::string MemoryArgument(std::uint64_t bytes) { return fmt::format("{}MiB", bytes >> 20); }
 

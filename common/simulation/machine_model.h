@@ -37,10 +37,11 @@ struct WakeUps {
   friend bool operator==(const WakeUps&, const WakeUps&) = default;
 };
 
-// A picture's way from the display worker over the coordinator to the client. Each process decrypts it, encrypts it, or does both as a
-// whole, one picture after the other, beside its other threads; then its last byte takes `link_byte` for each. 0: it takes no time.
+// A picture's way: the display worker encrypts it after making it; the coordinator decrypts and encrypts it, and the client decrypts it,
+// one picture after the other and beside their other threads. Each does so with the whole picture. 0: no time, as between the paper's
+// hosts.
 struct PictureWay {
-  double link_byte = 0;    // of each of the two connections
+  double link_byte = 0;    // to travel over one of its two connections
   double cipher_byte = 0;  // to encrypt or decrypt it
   friend bool operator==(const PictureWay&, const PictureWay&) = default;
 };
@@ -54,7 +55,7 @@ struct Stragglers {
 };
 
 struct MachineModel {
-  // Between workers. A message between a worker and the coordinator takes only its latency and waits for no other. Wake-ups come on top.
+  // Between workers. A message between a worker and the coordinator takes only its latency (a picture: its way, too). Wake-ups come on top.
   LinkModel link;
   CombiningCosts combining;
   PictureWay picture;

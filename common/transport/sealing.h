@@ -1,4 +1,4 @@
-// Sealed connections: how images travel between hosts. CURVE's cipher moves 0.5 GB/s through a thread; this one moves several. A message is
+// Sealed connections: how images travel between hosts. CURVE's cipher moves 1 GB/s through a thread; this one moves several. A message is
 // cut into frames, each sealed by AES-128-OCB (RFC 7253), so that frames are sealed, sent and opened at the same time. Messages go one way
 // only: from whoever connects to whoever listens. Private to this folder.
 //

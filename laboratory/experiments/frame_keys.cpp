@@ -64,7 +64,7 @@ KeyedFrame ForBoxCosts(ExperimentContext& context, const FrameCase& frame) {
 }
 
 KeyedFrame ForFinish(ExperimentContext& context, const FrameCase& frame) {
-  KeyedFrame keyed = WholeCase(context, "picture", frame);
+  KeyedFrame keyed = WholeCase(context, "encoded picture", frame);
   keyed.frame.policy = {.groups = 1};
   keyed.frame.workers = 1;
   keyed.key.erase("policy");

@@ -203,6 +203,7 @@ TEST(CoordinatorClients, DeadlineEndsQueuedAndRunningFrames) {
 TEST(CoordinatorClients, WithoutWorkersARequestWaitsAndThenFails) {
   CoordinatorScript script;
   script.Submit(kClient, Frame(1));
+  EXPECT_EQ(script.machine.NextWake(), script.now + script.config.heartbeat);
   EXPECT_TRUE(ToClients<FrameFailed>(script.Pass(seconds(10) - Duration(1))).empty());
   const auto failed = ToClients<FrameFailed>(script.Pass(Duration(1)));
   ASSERT_EQ(failed.size(), 1U);

@@ -6,7 +6,7 @@
 namespace slabstream {
 namespace {
 
-constexpr PeerToken kFarClient = 500;
+constexpr PeerToken kFarClient = 500;  // beyond the tokens of many workers
 
 SubmitFrame KdFrame(RequestId request, const std::string& balance = "static") {
   SubmitFrame submit = Frame(request);

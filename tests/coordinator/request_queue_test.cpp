@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <optional>
 #include <set>
 #include <utility>
 #include <vector>
@@ -21,13 +22,18 @@ OpenRequest Request(PeerToken client, RequestId id, const std::string& dataset =
 
 bool Any(const OpenRequest&) { return true; }
 
+std::optional<OpenRequest> TakeNext(RequestQueue& queue, const RequestQueue::Predicate& ready) {
+  const OpenRequest* const next = queue.FindNext(ready);
+  return next == nullptr ? std::nullopt : std::optional(queue.Take(*next));
+}
+
 TEST(RequestQueue, ClientsAreServedInTurn) {
   RequestQueue queue;
   for (RequestId id = 1; id <= 3; ++id) queue.Push(Request(1, id));
   queue.Push(Request(2, 1));
   queue.Push(Request(2, 2));
   std::vector<std::pair<PeerToken, RequestId>> served;
-  while (auto next = queue.TakeNext(Any)) served.emplace_back(next->client, next->submit.request);
+  while (auto next = TakeNext(queue, Any)) served.emplace_back(next->client, next->submit.request);
   EXPECT_EQ(served, (std::vector<std::pair<PeerToken, RequestId>>{{1, 1}, {2, 1}, {1, 2}, {2, 2}, {1, 3}}));
 }
 
@@ -37,10 +43,10 @@ TEST(RequestQueue, RequestsThatAreNotReadyLetOthersPass) {
   queue.Push(Request(1, 2));
   queue.Push(Request(2, 1, "loading"));
   const auto ready = [](const OpenRequest& request) { return request.submit.frame.dataset != "loading"; };
-  const auto next = queue.TakeNext(ready);
+  const auto next = TakeNext(queue, ready);
   ASSERT_TRUE(next);
   EXPECT_TRUE(next->Is(1, 2));
-  EXPECT_FALSE(queue.TakeNext(ready));
+  EXPECT_FALSE(TakeNext(queue, ready));
   EXPECT_EQ(queue.size(), 2U);
 }
 
@@ -53,12 +59,12 @@ TEST(RequestQueue, PositionsAreTheOrderOfService) {
     const int count = random.Integer(1, 30);
     for (int i = 0; i < count; ++i) {
       queue.Push(Request(random.Integer<PeerToken>(1, 5), ++id));
-      if (random.Chance(0.2)) queue.TakeNext(Any);  // turns the order of the clients
+      if (random.Chance(0.2)) TakeNext(queue, Any);  // turns the order of the clients
     }
     std::map<std::pair<PeerToken, RequestId>, std::uint32_t> promised;
     queue.ForEach([&](const OpenRequest& r) { promised[{r.client, r.submit.request}] = queue.PositionOf(r.client, r.submit.request); });
     ASSERT_EQ(promised.size(), queue.size());
-    for (std::uint32_t position = 0; const auto next = queue.TakeNext(Any); ++position) {
+    for (std::uint32_t position = 0; const auto next = TakeNext(queue, Any); ++position) {
       EXPECT_EQ((promised[{next->client, next->submit.request}]), position);
     }
   }
@@ -74,7 +80,7 @@ TEST(RequestQueue, VisitsInTheOrderInWhichRequestsAreServed) {
     visited.push_back(request.submit.request);
     return visited.size() < 30;
   });
-  while (served.size() < 30) served.push_back(queue.TakeNext(Any)->submit.request);
+  while (served.size() < 30) served.push_back(TakeNext(queue, Any)->submit.request);
   EXPECT_EQ(visited, served);
 }
 

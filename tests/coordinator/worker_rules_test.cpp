@@ -108,7 +108,7 @@ TEST(CoordinatorWorkers, CoordinatorThatWasHeldUpItselfTakesNobodyForDead) {
 
 TEST(CoordinatorWorkers, CoordinatorThatWasHeldUpItselfHearsTheFirstWorkerOut) {
   CoordinatorScript script;
-  script.Submit(21, Frame(1));
+  script.Submit(kClient, Frame(1));
   script.now += script.config.worker_wait + milliseconds(300);
   EXPECT_TRUE(ToClients<FrameFailed>(script.Step(CoordinatorTick{})).empty());
   EXPECT_TRUE(ToClients<FrameFailed>(script.Pass(script.config.worker_wait - Duration(1))).empty());

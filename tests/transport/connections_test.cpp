@@ -1,4 +1,4 @@
-// What becomes of tcp connections: which are closed, how they are tuned, what their sockets tell of them.
+// Connections over tcp: when sockets close them, how they are tuned, and what sockets tell of them.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>

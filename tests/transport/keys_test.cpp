@@ -91,6 +91,9 @@ TEST_P(ConnectionsWithKeys, APatientPlaneAdmitsWhoeverBecomesKnown) {
     Socket early = Connected(endpoint_, {.handshake = 2 * patience, .client_keys = KeysOf(late)});
     ASSERT_TRUE(early.Send({}, BytesOf("hello")).ok());
     EXPECT_FALSE(Receive(milliseconds(300)));
+    context_.authenticator().Admit(kPlane, friend_.public_key);
+    Socket known = ConnectedAs(friend_);
+    ExpectHeard(known, "I am known");
     context_.authenticator().Admit(kPlane, late.public_key);
     const std::optional<Incoming> incoming = Receive();
     ASSERT_TRUE(incoming);
@@ -101,16 +104,33 @@ TEST_P(ConnectionsWithKeys, APatientPlaneAdmitsWhoeverBecomesKnown) {
 TEST_P(ConnectionsWithKeys, ThoseOfAKeyThatIsRevokedEnd) {
   context_.authenticator().AdmitOnly(kPlane, {friend_.public_key, stranger_.public_key});
   Socket stays = ConnectedAs(friend_), goes = ConnectedAs(stranger_);
-  ExpectHeard(stays, "hello");
-  ExpectHeard(goes, "hello");
+  ASSERT_TRUE(goes.Send({}, BytesOf("hello")).ok());
+  const std::optional<Incoming> last = Receive();
+  ASSERT_TRUE(last);
+  ASSERT_TRUE(stays.Send({}, BytesOf("hello")).ok());
+  const std::optional<Incoming> other = Receive();
+  ASSERT_TRUE(other);
   context_.authenticator().AdmitOnly(kPlane, {friend_.public_key});
   router_->EndConnections(stranger_.public_key);
+  if (!sealed_) {
+    const auto sends_to_last = [&] {
+      (void)router_->TryReceive();
+      return router_->Send(last->identity, BytesOf("are you there?"));
+    };
+    EXPECT_TRUE(SendsUntil(StatusCode::kUnavailable, *router_, sends_to_last));
+    EXPECT_TRUE(router_->Send(other->identity, BytesOf("you stay")).ok());
+  }
   EXPECT_TRUE(Until(*router_, [&] {
     (void)goes.Send({}, BytesOf("and again"));
     EXPECT_FALSE(router_->TryReceive());
     return goes.refused();
   })) << "it was not connected anew";
-  for (int i = 0; i < 3; ++i) ExpectHeard(stays, "hello");
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE(stays.Send({}, BytesOf("hello")).ok());
+    const std::optional<Incoming> incoming = Receive();
+    ASSERT_TRUE(incoming);
+    EXPECT_EQ(incoming->user, friend_.public_key);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(CurveAndSealed, ConnectionsWithKeys, testing::Bool());

@@ -47,8 +47,10 @@ TEST(ServiceMachine, EncryptionCostsWhateverIsSentAndNoLentImages) {
     for (const std::uint64_t scope : {7, 8}) {
       workers[1].memory_scope = scope;
       ServiceSurroundings surroundings = Surroundings(ParseLink("link", "10gbit").value());
-      EXPECT_EQ(ServiceMachine(workers, surroundings).combining.cipher_byte, 0);
+      const MachineModel plain = ServiceMachine(workers, surroundings);
+      EXPECT_EQ(plain.combining.cipher_byte, 0);
       surroundings.encrypted = true;
+      EXPECT_EQ(ServiceMachine(workers, surroundings).link, plain.link);
       const bool lent = lends && scope == 7;
       EXPECT_EQ(ServiceMachine(workers, surroundings).combining.cipher_byte, lent ? 0 : calibration::service::kCipherByte)
           << lends << scope;

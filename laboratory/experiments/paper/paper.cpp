@@ -5,7 +5,6 @@
 #include "laboratory/measure/splat_loops.h"
 
 namespace slabstream {
-namespace {}  // namespace
 
 void DeclarePaper(CLI::App& app, OwnOptions& options) {
   AddParsedList(
