@@ -182,7 +182,12 @@ void FrameMachine::State::AfterGroupDone(const RunningFrame& frame) {
 }
 
 void FrameMachine::State::EndFrame(FrameId id) {
-  const std::vector<WorkerId> workers = frames.Find(id)->Participants();
+  const RunningFrame& frame = *frames.Find(id);
+  const std::vector<WorkerId> workers = frame.Participants();
+  // Frames overlap, so one costs the time since the frame before it ended. Waiting for workers costs nothing.
+  const Duration cost = frame.between_attempts() ? Duration::zero() : now - std::max(frame.attempt_begin(), last_end);
+  queue.Settle(frame.request(), cost);
+  last_end = now;
   frames.Remove(id);
   for (const WorkerId worker : workers) SendWorker(worker, MakePing(worker));  // so that they drop it now
 }

@@ -138,7 +138,7 @@ void FrameMachine::State::FailRequest(const OpenRequest& request, const Status& 
 
 void FrameMachine::State::FreeClient(PeerToken client) {
   if (!clients.Forget(client)) return;
-  queue.Extract([client](const OpenRequest& request) { return request.client == client; });
+  queue.Forget(client);
   std::vector<FrameId> orphans;
   for (const RunningFrame& frame : frames) {
     if (frame.request().client == client) orphans.push_back(frame.id());

@@ -58,6 +58,7 @@ struct FrameMachine::State {
   Time now;                     // of this Step
   Time wake = Time::max();      // promised at the end of the last Step
   std::optional<Time> started;  // the first Step
+  Time last_end;                // of a frame
   Time next_ping;               // while there are workers
   bool stopped = false;
   std::uint64_t frames_done = 0, frames_failed = 0, workers_lost = 0;

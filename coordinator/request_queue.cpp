@@ -6,77 +6,103 @@
 namespace slabstream {
 
 void RequestQueue::Push(OpenRequest request) {
-  auto queue = std::ranges::find(turn_, request.client, &ClientQueue::client);
-  if (queue == turn_.end()) queue = turn_.insert(queue, ClientQueue{.client = request.client});
-  queue->requests.push_back(std::move(request));
+  ClientQueue& queue = clients_[request.client];
+  if (queue.requests.empty()) queue.turn = {std::max(queue.turn.used, used_by_last_), ++turns_};
+  queue.requests.push_back(std::move(request));
 }
 
 const OpenRequest* RequestQueue::FindNext(const Predicate& ready) const {
-  for (const ClientQueue& queue : turn_) {
+  const OpenRequest* next = nullptr;
+  Turn first;
+  for (const auto& [client, queue] : clients_) {
+    const Turn turn = AtLeastLast(queue.turn);
+    if (next != nullptr && first < turn) continue;
     const auto found = std::ranges::find_if(queue.requests, ready);
-    if (found != queue.requests.end()) return &*found;
+    if (found == queue.requests.end()) continue;
+    next = &*found;
+    first = turn;
   }
-  return nullptr;
+  return next;
 }
 
 OpenRequest RequestQueue::Take(const OpenRequest& next) {
-  const auto queue = std::ranges::find(turn_, next.client, &ClientQueue::client);
-  const auto found = std::ranges::find_if(queue->requests, [&](const OpenRequest& request) { return &request == &next; });
+  ClientQueue& queue = clients_.at(next.client);
+  const auto found = std::ranges::find_if(queue.requests, [&](const OpenRequest& request) { return &request == &next; });
   OpenRequest request = std::move(*found);
-  queue->requests.erase(found);
-  if (queue->requests.empty()) {
-    turn_.erase(queue);
-  } else {
-    turn_.splice(turn_.end(), turn_, queue);
-  }
+  queue.requests.erase(found);
+  used_by_last_ = AtLeastLast(queue.turn).used;
+  request.charged = queue.expected;
+  queue.turn = {used_by_last_ + request.charged, ++turns_};
   return request;
+}
+
+void RequestQueue::Settle(const OpenRequest& taken, Duration cost) {
+  const auto client = clients_.find(taken.client);
+  if (client == clients_.end()) return;
+  client->second.turn.used += cost - taken.charged;
+  client->second.expected = cost;
 }
 
 std::vector<OpenRequest> RequestQueue::Extract(const Predicate& wanted) {
   std::vector<OpenRequest> extracted;
-  for (ClientQueue& queue : turn_) {
+  for (auto& [client, queue] : clients_) {
     std::erase_if(queue.requests, [&](OpenRequest& request) {
       if (!wanted(request)) return false;
       extracted.push_back(request);
       return true;
     });
   }
-  turn_.remove_if([](const ClientQueue& queue) { return queue.requests.empty(); });
   return extracted;
 }
 
+void RequestQueue::Forget(PeerToken client) { clients_.erase(client); }
+
 void RequestQueue::ForEach(const std::function<void(OpenRequest&)>& visit) {
-  for (ClientQueue& queue : turn_) {
+  for (auto& [client, queue] : clients_) {
     for (OpenRequest& request : queue.requests) visit(request);
   }
 }
 
 void RequestQueue::VisitInTurn(const std::function<bool(OpenRequest&)>& visit) {
-  bool more = true;
-  for (std::size_t round = 0; more; ++round) {
-    more = false;
-    for (ClientQueue& queue : turn_) {
-      if (round >= queue.requests.size()) continue;
-      more = true;
-      if (!visit(queue.requests[round])) return;
+  struct Waiting {
+    Turn turn;
+    ClientQueue* queue = nullptr;
+    std::size_t visited = 0;
+  };
+  const auto later = [](const Waiting& a, const Waiting& b) { return a.turn > b.turn; };
+  std::vector<Waiting> heap;  // the first is next
+  for (auto& [client, queue] : clients_) {
+    if (!queue.requests.empty()) heap.push_back({AtLeastLast(queue.turn), &queue});
+  }
+  std::ranges::make_heap(heap, later);
+  for (std::uint64_t turns = turns_; !heap.empty();) {
+    std::ranges::pop_heap(heap, later);
+    Waiting& next = heap.back();
+    if (!visit(next.queue->requests[next.visited])) return;
+    if (++next.visited == next.queue->requests.size()) {
+      heap.pop_back();
+    } else {
+      next.turn = {next.turn.used + next.queue->expected, ++turns};
+      std::ranges::push_heap(heap, later);
     }
   }
 }
 
 bool RequestQueue::Contains(PeerToken client, RequestId request) const {
-  const auto queue = std::ranges::find(turn_, client, &ClientQueue::client);
-  return queue != turn_.end() && std::ranges::any_of(queue->requests, [&](const OpenRequest& r) { return r.Is(client, request); });
+  const auto queue = clients_.find(client);
+  return queue != clients_.end() &&
+         std::ranges::any_of(queue->second.requests, [&](const OpenRequest& r) { return r.Is(client, request); });
 }
 
 std::size_t RequestQueue::size() const {
   std::size_t count = 0;
-  for (const ClientQueue& queue : turn_) count += queue.requests.size();
+  for (const auto& [client, queue] : clients_) count += queue.requests.size();
   return count;
 }
 
 std::size_t RequestQueue::CountOf(PeerToken client) const {
-  const auto queue = std::ranges::find(turn_, client, &ClientQueue::client);
-  return queue == turn_.end() ? 0 : queue->requests.size();
+  const auto queue = clients_.find(client);
+  return queue == clients_.end() ? 0 : queue->second.requests.size();
 }
 
 std::uint32_t RequestQueue::PositionOf(PeerToken client, RequestId request) {

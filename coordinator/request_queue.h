@@ -1,11 +1,16 @@
-// RequestQueue: requested frames that do not run yet. Each client has a queue of its own; clients are served in turn, one frame each, so
-// that a turntable of a thousand frames delays another client's picture by one frame and not by a thousand.
+// RequestQueue: requested frames that do not run yet, a queue for each client. Clients share the service's time equally: the next frame is
+// of the client that has used least of it. So neither a turntable of a thousand frames nor one huge picture after another delays other
+// clients for long. (Start-time fair queueing: P. Goyal, H. M. Vin, H. Cheng, 1996.)
+//
+// What a frame costs is known only when it ends (Settle). Until then it counts as much as the client's frame before it.
 #pragma once
 
+#include <algorithm>
+#include <compare>
 #include <cstdint>
 #include <deque>
 #include <functional>
-#include <list>
+#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -28,6 +33,8 @@ struct OpenRequest {
   std::shared_ptr<const PlannedFrame> planned;  // null: not yet
   int fit = 1;                                  // such frames fit the workers' memory at a time (FramesThatFit), >= 1; once planned
 
+  Duration charged{};  // for it, until it is settled; once taken
+
   Time deadline() const { return arrived + std::chrono::milliseconds(submit.deadline_ms); }
   bool Is(PeerToken of_client, RequestId id) const { return client == of_client && submit.request == id; }
 };
@@ -39,25 +46,39 @@ class RequestQueue {
   void Push(OpenRequest request);
   // The first request that is `ready` of the first client in turn that has one; null: none is.
   const OpenRequest* FindNext(const Predicate& ready) const;
-  // Takes out what FindNext has found; its client then goes to the end of the turn.
-  OpenRequest Take(const OpenRequest& next);
+  OpenRequest Take(const OpenRequest& next);  // takes out what FindNext has found
+  // The frame of a request that was taken has ended. `cost`: the time that the service spent on it.
+  void Settle(const OpenRequest& taken, Duration cost);
   std::vector<OpenRequest> Extract(const Predicate& wanted);  // takes all of them out, wherever they stand
+  void Forget(PeerToken client);                              // its requests, and what it has used
 
-  void ForEach(const std::function<void(OpenRequest&)>& visit);  // in turn of clients, then in order of arrival
-  // In the order in which they are served if all are ready, until `visit` returns false.
+  void ForEach(const std::function<void(OpenRequest&)>& visit);  // client by client, then in order of arrival
+  // In the order in which they are served if all are ready and cost what is expected of them, until `visit` returns false.
   void VisitInTurn(const std::function<bool(OpenRequest&)>& visit);
   bool Contains(PeerToken client, RequestId request) const;
   std::size_t size() const;
   std::size_t CountOf(PeerToken client) const;
-  // Frames that are served before this one if all are ready. All of them, if it is not there.
+  // Frames that VisitInTurn visits before this one. All of them, if it is not there.
   std::uint32_t PositionOf(PeerToken client, RequestId request);
 
  private:
-  struct ClientQueue {
-    PeerToken client = 0;
-    std::deque<OpenRequest> requests;  // never empty
+  // When it is a client's turn: the smallest one is next.
+  struct Turn {
+    Duration used{};              // of the service's time
+    std::uint64_t last_turn = 0;  // counts Push to an empty queue and Take
+    friend auto operator<=>(const Turn&, const Turn&) = default;
   };
-  std::list<ClientQueue> turn_;  // the front is served next; client by client
+  struct ClientQueue {
+    std::deque<OpenRequest> requests;
+    Turn turn;
+    Duration expected{};  // cost of its next frame
+  };
+  // A client that had nothing to ask for has not saved up its time: it continues with what the client served last had used.
+  Turn AtLeastLast(Turn turn) const { return {std::max(turn.used, used_by_last_), turn.last_turn}; }
+
+  std::map<PeerToken, ClientQueue> clients_;
+  Duration used_by_last_{};  // when its turn came
+  std::uint64_t turns_ = 0;
 };
 
 }  // namespace slabstream

@@ -58,6 +58,7 @@ class RunningFrame {
   const Roster& roster() const { return roster_; }
   int fit() const { return request_.fit; }  // FramesThatFit, of the present plan
   void SetFit(int fit) { request_.fit = fit; }
+  Time attempt_begin() const { return attempt_begin_; }
   std::uint32_t attempt() const { return std::uint32_t(displays_.size()); }  // from 1
   WorkerId display() const { return plan_.display; }
   std::uint32_t group_count() const { return std::uint32_t(plan_.groups.size()); }

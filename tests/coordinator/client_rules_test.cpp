@@ -29,6 +29,37 @@ TEST(CoordinatorClients, ClientsAreServedInTurn) {
   EXPECT_EQ(served, expected);
 }
 
+TEST(CoordinatorClients, WhoAsksForHugeFramesWaitsUntilOthersHadAsMuchTime) {
+  CoordinatorScript script;
+  script.Join(11, 1);
+  constexpr int kHuge = 128;
+  std::vector<GroupAssignment> groups;
+  std::vector<PeerToken> served;
+  const auto note = [&](const Actions& actions) {
+    for (const auto& reply : ToClients<FrameReply>(actions)) served.push_back(reply.to);
+    for (GroupAssignment& group : HandedOut(actions)) groups.push_back(std::move(group));
+  };
+  for (RequestId id = 1; id <= 4; ++id) {
+    SubmitFrame huge = Frame(id);
+    huge.frame.size = {kHuge, kHuge};
+    note(script.Submit(kClient, huge));
+  }
+  for (RequestId id = 1; id <= 50; ++id) note(script.Submit(kOther, Frame(id)));
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    const GroupAssignment group = groups[i];
+    note(script.Pass(group.setup.camera.width == kHuge ? seconds(10) : seconds(1)));
+    note(script.Answer(group));
+  }
+  std::vector<std::ptrdiff_t> huge_at;
+  for (auto it = served.begin(); (it = std::find(it, served.end(), kClient)) != served.end(); ++it) huge_at.push_back(it - served.begin());
+  // Three frames of 10 s began or were planned before the other client asked. The first one ran alone; when the third one began, both had
+  // waited. Then it is the other's turn for 20 s.
+  ASSERT_EQ(huge_at.size(), 4U);
+  EXPECT_EQ(huge_at[2], 2);
+  EXPECT_GE(huge_at[3], 3 + 18);
+  EXPECT_LE(huge_at[3], 3 + 22);
+}
+
 TEST(CoordinatorClients, ProgressTellsPhasesAndPositions) {
   BusyScript script;
   script.Submit(kClient, Frame(1));

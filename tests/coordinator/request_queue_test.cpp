@@ -2,8 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <chrono>
+#include <deque>
 #include <map>
 #include <optional>
+#include <ranges>
 #include <set>
 #include <utility>
 #include <vector>
@@ -37,6 +41,74 @@ TEST(RequestQueue, ClientsAreServedInTurn) {
   EXPECT_EQ(served, (std::vector<std::pair<PeerToken, RequestId>>{{1, 1}, {2, 1}, {1, 2}, {2, 2}, {1, 3}}));
 }
 
+TEST(RequestQueue, ClientsThatAlwaysAskGetEqualTime) {
+  Random random(3);
+  SCOPED_TRACE(random.trace());
+  constexpr Duration kLongest = std::chrono::milliseconds(1000);
+  for (int round = 0; round < 20; ++round) {
+    RequestQueue queue;
+    const int clients = random.Integer(2, 6), in_flight = random.Integer(1, 3);
+    std::map<PeerToken, Duration> usual, used;
+    for (PeerToken client = 1; client <= PeerToken(clients); ++client) {
+      usual[client] = kLongest / random.Integer(1, 200);
+      for (RequestId id = 1; id <= 4; ++id) queue.Push(Request(client, id));  // more than can run
+    }
+    std::deque<OpenRequest> running;
+    for (RequestId id = 10; id < 2000; ++id) {
+      while (running.size() < std::size_t(in_flight)) running.push_back(*TakeNext(queue, Any));
+      const OpenRequest ended = std::move(running.front());
+      running.pop_front();
+      const Duration cost = usual[ended.client] * random.Integer(50, 100) / 100;
+      queue.Settle(ended, cost);
+      used[ended.client] += cost;
+      queue.Push(Request(ended.client, id));
+    }
+    const auto [least, most] = std::ranges::minmax(used | std::views::values);
+    EXPECT_LE(most - least, 2 * in_flight * kLongest) << clients << " clients, " << in_flight << " frames at a time";
+  }
+}
+
+TEST(RequestQueue, WhoDidNotAskHasNotSavedUpTime) {
+  RequestQueue queue;
+  queue.Push(Request(2, 1));
+  queue.Settle(*TakeNext(queue, Any), std::chrono::seconds(1));
+  for (RequestId id = 1; id <= 100; ++id) {
+    queue.Push(Request(1, id));
+    queue.Settle(*TakeNext(queue, Any), std::chrono::seconds(1));
+  }
+  for (RequestId id = 101; id <= 104; ++id) {
+    queue.Push(Request(1, id));
+    queue.Push(Request(2, id));
+  }
+  std::multiset<PeerToken> served;
+  for (int i = 0; i < 4; ++i) {
+    const auto next = TakeNext(queue, Any);
+    served.insert(next->client);
+    queue.Settle(*next, std::chrono::seconds(1));
+  }
+  EXPECT_EQ(served, (std::multiset<PeerToken>{1, 1, 2, 2}));
+}
+
+TEST(RequestQueue, WhoHadToWaitForItsDatasetDoesNotHoldUpTheOthers) {
+  RequestQueue queue;
+  for (RequestId id = 1; id <= 10; ++id) queue.Push(Request(1, id, "loading"));
+  bool loaded = false;
+  const auto ready = [&](const OpenRequest& request) { return loaded || request.submit.frame.dataset != "loading"; };
+  for (RequestId id = 1; id <= 100; ++id) {
+    queue.Push(Request(2, id));
+    queue.Settle(*TakeNext(queue, ready), std::chrono::seconds(1));
+  }
+  loaded = true;
+  for (RequestId id = 101; id <= 104; ++id) queue.Push(Request(2, id));
+  std::multiset<PeerToken> served;
+  for (int i = 0; i < 4; ++i) {
+    const auto next = TakeNext(queue, ready);
+    served.insert(next->client);
+    queue.Settle(*next, std::chrono::seconds(1));
+  }
+  EXPECT_EQ(served, (std::multiset<PeerToken>{1, 1, 2, 2}));
+}
+
 TEST(RequestQueue, RequestsThatAreNotReadyLetOthersPass) {
   RequestQueue queue;
   queue.Push(Request(1, 1, "loading"));
@@ -59,7 +131,9 @@ TEST(RequestQueue, PositionsAreTheOrderOfService) {
     const int count = random.Integer(1, 30);
     for (int i = 0; i < count; ++i) {
       queue.Push(Request(random.Integer<PeerToken>(1, 5), ++id));
-      if (random.Chance(0.2)) TakeNext(queue, Any);  // turns the order of the clients
+      if (!random.Chance(0.2)) continue;
+      const auto taken = TakeNext(queue, Any);  // what it cost changes the order of the clients
+      if (taken && random.Chance(0.7)) queue.Settle(*taken, std::chrono::milliseconds(random.Integer(0, 100)));
     }
     std::map<std::pair<PeerToken, RequestId>, std::uint32_t> promised;
     queue.ForEach([&](const OpenRequest& r) { promised[{r.client, r.submit.request}] = queue.PositionOf(r.client, r.submit.request); });
@@ -96,6 +170,8 @@ TEST(RequestQueue, ExtractTakesOutWhatIsWantedAndNothingElse) {
   EXPECT_TRUE(queue.Contains(1, 2));
   EXPECT_FALSE(queue.Contains(1, 1));
   EXPECT_FALSE(queue.Contains(2, 2));
+  queue.Forget(1);
+  EXPECT_EQ(queue.size(), 0U);
 }
 
 }  // namespace
