@@ -48,6 +48,7 @@ class Dilation(unittest.TestCase):
         for workers in (2, 4, 16, 37):
             self.assertAlmostEqual(cluster.share_of(options(), workers)[0] * workers, 1.5)
         self.assertEqual(cluster.share_of(options(), 1), [1.0])
+        self.assertEqual(cluster.share_of(options("--crowd", "6"), 1), [0.25])
         self.assertEqual(cluster.share_of(options("--workers", "2", "--share", "0.5,0.25"), 2), [0.5, 0.25])
 
 
@@ -61,7 +62,9 @@ class Options(unittest.TestCase):
         cases = {
             ("--workers", "0"): "0 must be above 0",
             ("--renderer", "crayon"): "'crayon' must be one of",
-            ("--workers", "8", "--share", "0.5"): "8 workers would use 4 cores",
+            ("--workers", "8", "--share", "0.5"): "8 hosts would use 4 cores",
+            ("--workers", "1", "--crowd", "16", "--share", "0.5"): "16 hosts would use 8 cores",
+            ("--crowd", "65"): "must be from 0 to 64",
             ("--spheres", "none"): "needs a --volume",
             ("--volume", "none.nrrd:auto"): "is not FILE:TRANSFER of a file",
         }
