@@ -11,10 +11,12 @@ namespace slabstream {
 
 DatasetId IdOf(const std::string& name, const Volume& volume) {
   const auto& [geometry, type, mapping] = volume.description;
-  const auto& [size, spacing] = geometry;
-  const std::string text =
-      fmt::format("{} {} {} {} {} {} {} {} {} {} {:x} {}", size.x, size.y, size.z, spacing.x, spacing.y, spacing.z, int(type),
-                  mapping.scale, mapping.offset, volume.block.bytes.size(), Digest(volume.block.bytes), name);
+  const auto& [size, spacing, orientation] = geometry;
+  const auto numbers = [](const Vec3& v) { return fmt::format("{} {} {}", v.x, v.y, v.z); };
+  const std::string place = fmt::format("{} {} {} {} {}", int(orientation.world), numbers(orientation.origin), numbers(orientation.axes[0]),
+                                        numbers(orientation.axes[1]), numbers(orientation.axes[2]));
+  const std::string text = fmt::format("{} {} {} {} {} {} {} {} {} {:x} {}", size.x, size.y, size.z, numbers(spacing), place, int(type),
+                                       mapping.scale, mapping.offset, volume.block.bytes.size(), Digest(volume.block.bytes), name);
   return std::max<DatasetId>(Digest(std::as_bytes(std::span(text))), 1);
 }
 

@@ -1,9 +1,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <numeric>
 #include <string_view>
 
@@ -47,17 +49,70 @@ std::string HistogramText(const VolumeSummary& summary) {
   return text;
 }
 
+// "right to left" for a step that mostly goes to the patient's left; "-x" in a scene.
+std::string DirectionName(World world, const Vec3& step) {
+  Axis main = Axis::kX;
+  for (const Axis axis : {Axis::kY, Axis::kZ}) {
+    if (std::abs(step[axis]) > std::abs(step[main])) main = axis;
+  }
+  const bool up = step[main] > 0;
+  if (world != World::kPatient) return fmt::format("{}{}", up ? '+' : '-', Letter(main));
+  constexpr std::array<std::array<const char*, 2>, 3> kEnds = {{{"left", "right"}, {"posterior", "anterior"}, {"inferior", "superior"}}};
+  const auto& [low, high] = kEnds[std::size_t(Number(main))];
+  return fmt::format("{} to {}", up ? low : high, up ? high : low);
+}
+
+// Degrees by which the axes are turned against those of the world.
+double ObliqueDegrees(const Orientation& orientation) {
+  const double trace = orientation.axes[0].x + orientation.axes[1].y + orientation.axes[2].z;
+  return std::acos(std::clamp((trace - 1) / 2, -1.0, 1.0)) * (180 / std::numbers::pi);
+}
+
+constexpr const char* kStoredAxes[] = {"stored_x", "stored_y", "stored_z"};
+
+std::string WorldName(World world) {
+  switch (world) {
+    case World::kVoxels: return "voxels";
+    case World::kScene: return "scene";
+    case World::kPatient: break;
+  }
+  return "patient";
+}
+
+std::string OrientationText(const VolumeFileInfo& info) {
+  const VolumeGeometry& geometry = info.description.geometry;
+  const Orientation& orientation = geometry.orientation;
+  const Vec3 extent = ToVec3(geometry.size) * geometry.spacing;
+  std::string text = fmt::format("extent       {:.6g} x {:.6g} x {:.6g}{}\n", extent.x, extent.y, extent.z,
+                                 orientation.world == World::kPatient ? " mm" : "");
+  if (orientation.world == World::kVoxels) return text + "orientation  not known: x, y and z are those of the voxels\n";
+  text +=
+      fmt::format("orientation  {}\n", orientation.world == World::kPatient ? "of a patient: x to the right, y to anterior, z to superior"
+                                                                            : "axes of the file's own");
+  text += fmt::format("origin       {:.6g} {:.6g} {:.6g}\n", orientation.origin.x, orientation.origin.y, orientation.origin.z);
+  for (std::size_t i = 0; i < 3; ++i) {
+    text += fmt::format("  the file's voxel {} runs {}\n", Letter(kAxes[i]), DirectionName(orientation.world, info.steps[i]));
+  }
+  const double degrees = ObliqueDegrees(orientation);
+  text += degrees < 0.05 ? "oblique      no\n" : fmt::format("oblique      by {:.1f} degrees\n", degrees);
+  if (info.straightened) {
+    text += fmt::format(
+        "slanted      the file has {} x {} x {} voxels whose axes are not at right angles (a tilted gantry?); they are straightened\n",
+        info.stored_size.x, info.stored_size.y, info.stored_size.z);
+  }
+  return text;
+}
+
 std::string InfoText(const VolumeFileInfo& info, const VolumeSummary& summary, const std::string& transfer, double occupancy) {
   const VolumeDescription& d = info.description;
-  const auto vector = [](const Vec3& v) { return fmt::format("{:.6g} {:.6g} {:.6g}", v.x, v.y, v.z); };
+  const Vec3& spacing = d.geometry.spacing;
   std::string text = fmt::format("format       {}\n", info.format);
   text += fmt::format("size         {} x {} x {} voxels ({:.1f} MiB)\n", d.geometry.size.x, d.geometry.size.y, d.geometry.size.z,
                       double(d.voxel_bytes()) / (1 << 20));
   text += fmt::format("samples      {}, {} in the file; value = {:g} * sample + {:g}\n", NameOf(d.type), info.file_type, d.mapping.scale,
                       d.mapping.offset);
-  text += fmt::format("spacing      {}\norigin       {}\n", vector(d.geometry.spacing), vector(info.origin));
-  text += fmt::format("directions   x ({})  y ({})  z ({})\n", vector(info.directions[0]), vector(info.directions[1]),
-                      vector(info.directions[2]));
+  text += fmt::format("spacing      {:.6g} {:.6g} {:.6g}\n", spacing.x, spacing.y, spacing.z);
+  text += OrientationText(info);
   text += fmt::format("values       {:g} ... {:g}\n", summary.range.min, summary.range.max);
   if (summary.non_finite > 0) text += fmt::format("not finite   {} voxels (never visible)\n", summary.non_finite);
   text += fmt::format("occupancy    {:.4g} under transfer function '{}'\n", occupancy, transfer);
@@ -66,7 +121,16 @@ std::string InfoText(const VolumeFileInfo& info, const VolumeSummary& summary, c
 
 std::string InfoJson(const VolumeFileInfo& info, const VolumeSummary& summary, const std::string& transfer, double occupancy) {
   const VolumeDescription& d = info.description;
+  const Orientation& orientation = d.geometry.orientation;
   const auto vector = [](const Vec3& v) { return nlohmann::ordered_json{v.x, v.y, v.z}; };
+  nlohmann::ordered_json world = {{"world", WorldName(orientation.world)},
+                                  {"origin", vector(orientation.origin)},
+                                  {"axes", {vector(orientation.axes[0]), vector(orientation.axes[1]), vector(orientation.axes[2])}},
+                                  {"oblique_degrees", ObliqueDegrees(orientation)}};
+  if (orientation.world != World::kVoxels) {
+    for (std::size_t i = 0; i < 3; ++i) world[kStoredAxes[i]] = DirectionName(orientation.world, info.steps[i]);
+  }
+  world["straightened"] = info.straightened;
   const nlohmann::ordered_json json = {{"format", info.format},
                                        {"size", {d.geometry.size.x, d.geometry.size.y, d.geometry.size.z}},
                                        {"type", NameOf(d.type)},
@@ -74,8 +138,7 @@ std::string InfoJson(const VolumeFileInfo& info, const VolumeSummary& summary, c
                                        {"voxel_bytes", d.voxel_bytes()},
                                        {"mapping", {{"scale", d.mapping.scale}, {"offset", d.mapping.offset}}},
                                        {"spacing", vector(d.geometry.spacing)},
-                                       {"origin", vector(info.origin)},
-                                       {"directions", {vector(info.directions[0]), vector(info.directions[1]), vector(info.directions[2])}},
+                                       {"orientation", world},
                                        {"range", {{"min", summary.range.min}, {"max", summary.range.max}}},
                                        {"non_finite", summary.non_finite},
                                        {"transfer", transfer},

@@ -104,6 +104,12 @@ int JsonValue::Integer(int min, int max) const {
   return inside ? json_->get<int>() : min;
 }
 
+bool JsonValue::Boolean() const {
+  if (json_->is_boolean()) return json_->get<bool>();
+  Complain(Shown() + " must be true or false");
+  return false;
+}
+
 std::size_t JsonValue::OneOf(std::span<const std::string_view> names) const {
   const std::string text = Text();
   const auto found = std::ranges::find(names, text);

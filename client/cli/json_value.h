@@ -43,6 +43,7 @@ class JsonValue {
   std::string Text() const;
   double Number(const NumberRange& range) const;
   int Integer(int min, int max) const;
+  bool Boolean() const;
   std::size_t OneOf(std::span<const std::string_view> names) const;  // its index
 
  private:

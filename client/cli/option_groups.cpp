@@ -2,19 +2,25 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <vector>
 
+#include "client/cli/camera_json.h"
 #include "client/cli/cores.h"
+#include "client/cli/values.h"
 #include "client/cli/volume_argument.h"
+#include "common/base/files.h"
 #include "common/combining/schemes.h"
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
 #include "common/planning/policy_names.h"
 #include "common/renderers/registry.h"
 #include "common/transport/endpoint.h"
+#include "common/view/named_view.h"
 #include "common/wire/control_messages.h"
 
 namespace slabstream {
@@ -92,6 +98,37 @@ void AddConnectionOptions(CLI::App& app, ConnectionOptions& connection) {
   AddService(app, connection.service);
 }
 
+Result<ViewParameters> ParseCameraFile(const std::string& option, const std::string& path) {
+  constexpr std::size_t kMostBytes = std::size_t{1} << 16;
+  const Result<std::string> text = ReadTextFile(path, kMostBytes);
+  if (!text.ok()) return Status(text.status().code(), fmt::format("{} {}", option, text.status().message()));
+  Result<ViewParameters> view = ParseCamera(*text);
+  if (!view.ok()) return Status::InvalidArgument(fmt::format("{} {}: {}", option, path, view.status().message()));
+  return view;
+}
+
+CLI::Option* AddPoint(CLI::App& app, const std::string& name, std::optional<Vec3>& point, const std::string& help) {
+  return AddParsed(
+             app, name, point, [](const std::string& option, const std::string& text) { return ParsePoint(option, text); }, help)
+      ->type_name("X,Y,Z");
+}
+
+CLI::Option* AddNamedView(CLI::App& app, ViewParameters& view) {
+  std::vector<std::string_view> names;
+  for (const NamedView& named : kNamedViews) names.push_back(named.name);
+  const auto store = [&view, is_name = OneOf(names)](const CLI::results_t& texts) {
+    const Result<std::string> name = is_name("--view", texts.back());
+    if (!name.ok()) throw CLI::ValidationError(name.status().message());
+    const NamedView& named = *std::ranges::find(kNamedViews, *name, &NamedView::name);
+    view.azimuth_degrees = named.azimuth_degrees;
+    view.elevation_degrees = named.elevation_degrees;
+    view.of_patient = named.of_patient;
+    return true;
+  };
+  return app.add_option("--view", CLI::callback_t(store), "Look at a side, instead of --azimuth and --elevation" + Explained(kNamedViews))
+      ->type_name("NAME");
+}
+
 void AddViewOptions(CLI::App& app, ViewParameters& view, ImageSize& size) {
   app.option_defaults()->group("View");
   const NumberRange angle{-kMaxAngleDegrees, kMaxAngleDegrees};
@@ -103,13 +140,28 @@ void AddViewOptions(CLI::App& app, ViewParameters& view, ImageSize& size) {
   AddChoice<Projection, 2>(app, "--projection", view.projection, {"orthographic", "perspective"},
                            {Projection::kOrthographic, Projection::kPerspective}, "Orthographic or perspective projection")
       ->default_str("orthographic");
+  CLI::Option* const named = AddNamedView(app, view);
   AddNumber(app, "--azimuth", view.azimuth_degrees, angle,
-            "Degrees that the eye turns about +z; at 0 it looks along +y, at 90 it is on the +x side");
-  AddNumber(app, "--elevation", view.elevation_degrees, angle, "Degrees that the eye is lifted towards +z");
+            "Degrees that the eye turns about +z; at 0 it looks along +y, at 90 it is on the +x side")
+      ->excludes(named);
+  AddNumber(app, "--elevation", view.elevation_degrees, angle, "Degrees that the eye is lifted towards +z")->excludes(named);
+  AddPoint(app, "--look-at", view.look_at, "Point of the world that the picture's centre shows (default: the volume's centre)");
+  CLI::Option* const eye = AddPoint(app, "--eye", view.eye, "Point of the world that one looks from, instead of a direction by angles");
+  for (const char* angles : {"--view", "--azimuth", "--elevation"}) eye->excludes(app.get_option(angles));
+  AddPoint(app, "--up", view.up, "Direction that is upwards in the picture, with --eye (default: 0,0,1)")->needs(eye);
+  AddNumber(app, "--distance", view.distance, {0, kMaxWorldCoordinate},
+            "Distance of the eye from the point that it looks at, for --projection perspective (default: as far as needed to see all)")
+      ->excludes(eye);
   AddNumber(app, "--roll", view.roll_degrees, angle, "Degrees that the picture is turned clockwise");
   AddNumber(app, "--zoom", view.zoom, {kMinZoom, kMaxZoom}, "Magnification; at 1 the volume's bounding sphere fills the shorter side");
   AddNumber(app, "--fov", view.fov_degrees, {kMinFovDegrees, kMaxFovDegrees},
             "Field of view in degrees, for --projection perspective; the eye's distance follows");
+  CLI::Option* const camera = AddParsed(app, "--camera", view, ParseCameraFile, "Take the view from a file that --save-camera wrote");
+  camera->type_name("FILE");
+  for (const char* option :
+       {"--projection", "--view", "--azimuth", "--elevation", "--look-at", "--eye", "--up", "--distance", "--roll", "--zoom", "--fov"}) {
+    camera->excludes(app.get_option(option));
+  }
 }
 
 void AddLookOptions(CLI::App& app, FrameRequest& request, PictureFormat& format) {
@@ -132,7 +184,7 @@ void AddLookOptions(CLI::App& app, FrameRequest& request, PictureFormat& format)
                    if (int(texts.size()) <= kMaxLights) return true;
                    throw CLI::ValidationError(fmt::format("--light is given {} times, at most {} are possible", texts.size(), kMaxLights));
                  }),
-                 "Direction towards a light, in volume axes; may be repeated (default: a light at the eye)")
+                 "Direction towards a light, along the world's axes; may be repeated (default: a light at the eye)")
       ->type_name("X,Y,Z")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
@@ -235,6 +287,7 @@ void AddFrameOptions(CLI::App& app, FrameOptions& options) {
   AddPolicyOptions(app, options.request.policy);
   ResolveSource(app, source, options.source, options.request.transfer, [&options] { return options.connection.local_workers > 0; });
   app.option_defaults()->group(kOutputGroup);
+  app.add_option("--save-camera", options.camera_path, "Write the view, for --camera")->type_name("FILE");
   app.add_option("--stats", options.stats_path, "Write plan, bytes and stage times as JSON")->type_name("FILE");
   app.add_option("--trace", options.trace_path, "Write what each worker did and when, for Perfetto or chrome://tracing")->type_name("FILE");
   app.add_flag("--progress", options.progress, "Show progress on stderr");

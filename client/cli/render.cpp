@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iostream>
 
+#include "client/cli/camera_json.h"
 #include "client/cli/commands.h"
 #include "client/cli/frame_loop.h"
 #include "client/cli/session.h"
@@ -24,6 +25,9 @@ Status CheckPaths(const FrameOptions& options, const std::string& output) {
   if (!options.stats_path.empty()) {
     if (Status status = CheckCanWrite("--stats", options.stats_path); !status.ok()) return status;
   }
+  if (!options.camera_path.empty()) {
+    if (Status status = CheckCanWrite("--save-camera", options.camera_path); !status.ok()) return status;
+  }
   return options.trace_path.empty() ? Status::Ok() : CheckCanWrite("--trace", options.trace_path);
 }
 
@@ -42,6 +46,10 @@ Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std
   loop.progress = options.progress;
   Result<std::vector<FrameRecord>> frames = RenderFrames(session->client(), jobs, loop);
   if (!frames.ok()) return frames;
+  if (!options.camera_path.empty()) {
+    const std::string text = ViewJson(options.request.view).dump(1) + "\n";
+    if (Status status = WriteTextFile(options.camera_path, text); !status.ok()) return status;
+  }
   if (!options.stats_path.empty()) {
     if (Status status = WriteTextFile(options.stats_path, StatsJson(options, *frames)); !status.ok()) return status;
   }
@@ -64,6 +72,9 @@ Status RunRender(const RenderOptions& options) {
 }
 
 Status RunTurntable(const TurntableOptions& options) {
+  if (options.frame.request.view.eye) {
+    return Status::InvalidArgument("--eye stands still; a turntable turns by --azimuth, about --look-at");
+  }
   const Time start = MonotonicNow();
   std::vector<FrameJob> jobs;
   for (int i = 0; i < options.frames; ++i) {

@@ -34,16 +34,21 @@ Result<ImageSize> ParseImageSize(std::string_view option, std::string_view text)
   return ImageSize{*width, *height};
 }
 
-Result<Vec3> ParseDirection(std::string_view option, std::string_view text) {
+Result<Vec3> ParsePoint(std::string_view option, std::string_view text) {
   const std::vector<std::string_view> parts = Split(text, ',');
   if (parts.size() != 3) return Status::InvalidArgument(fmt::format("{} '{}' is not X,Y,Z", option, text));
-  Vec3 direction;
+  Vec3 point;
   for (int i = 0; i < 3; ++i) {
-    const Result<double> value = ParseNumber(option, parts[std::size_t(i)], {-1e9, 1e9});
+    const Result<double> value = ParseNumber(option, parts[std::size_t(i)], {-kMaxWorldCoordinate, kMaxWorldCoordinate});
     if (!value.ok()) return value.status();
-    direction[i] = *value;
+    point[i] = *value;
   }
-  if (direction == Vec3{}) return Status::InvalidArgument(fmt::format("{} {} has no direction", option, text));
+  return point;
+}
+
+Result<Vec3> ParseDirection(std::string_view option, std::string_view text) {
+  Result<Vec3> direction = ParsePoint(option, text);
+  if (direction.ok() && *direction == Vec3{}) return Status::InvalidArgument(fmt::format("{} {} has no direction", option, text));
   return direction;
 }
 

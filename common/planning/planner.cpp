@@ -10,6 +10,12 @@ namespace slabstream {
 Result<FrameSetup> MakeFrameSetup(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary) {
   Result<TransferFunction> transfer = ResolveTransfer(request.transfer, summary);
   if (!transfer.ok()) return transfer.status();
+  if (request.view.of_patient && summary.description.geometry.orientation.world != World::kPatient) {
+    return Status::InvalidArgument(
+        "view: the volume has no patient's orientation, so it has no anterior, posterior, superior or inferior side; front, back, left, "
+        "right, top and bottom are possible");
+  }
+  if (Status status = CheckView(request.view, summary.description.geometry); !status.ok()) return status;
   FrameSetup setup;
   setup.dataset = dataset;
   setup.description = summary.description;
@@ -19,6 +25,7 @@ Result<FrameSetup> MakeFrameSetup(const FrameRequest& request, DatasetId dataset
   if (Status status = setup.renderer->SetView(request.view, request.size, setup); !status.ok()) return status;
   setup.transfer = *std::move(transfer);
   setup.shading = request.shading;
+  for (Vec3& light : setup.shading.lights) light = summary.description.geometry.orientation.FromWorld(light);
   setup.termination = request.termination;
   return setup;
 }

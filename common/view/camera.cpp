@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string>
 
 #include "common/view/range_status.h"
 
@@ -28,20 +29,68 @@ SinCos SinCosDegrees(double degrees) {
   }
 }
 
-// Orthonormal: right, up and the view direction, in physical space. Azimuth and elevation turn a sphere's tangent frame, which exists at
+// Orthonormal: right, up and the view direction. Azimuth and elevation turn a sphere's tangent frame, which exists at
 // the poles too, so that elevation +-90 needs no special case.
 struct Frame {
   Vec3 right, up, forward;
 };
 
-Frame ViewFrame(const ViewParameters& view) {
+// From an eye that is given.
+Frame LookingFrame(const ViewParameters& view, const Vec3& target) {
+  constexpr double kParallel = 1e-6;
+  const Vec3 forward = Normalized(target - *view.eye);
+  Vec3 right = Cross(forward, view.up ? Normalized(*view.up) : Vec3{0, 0, 1});
+  if (Length(right) < kParallel) right = Cross(forward, {0, 1, 0});
+  right = Normalized(right);
+  return {right, Cross(right, forward), forward};
+}
+
+Frame FrameByAngles(const ViewParameters& view) {
   const auto [sin_azimuth, cos_azimuth] = SinCosDegrees(view.azimuth_degrees);
   const auto [sin_elevation, cos_elevation] = SinCosDegrees(view.elevation_degrees);
-  const auto [sin_roll, cos_roll] = SinCosDegrees(view.roll_degrees);
   const Vec3 right = {cos_azimuth, sin_azimuth, 0};
   const Vec3 up = {-sin_elevation * sin_azimuth, sin_elevation * cos_azimuth, cos_elevation};
   const Vec3 forward = {-cos_elevation * sin_azimuth, cos_elevation * cos_azimuth, -sin_elevation};
-  return {cos_roll * right + sin_roll * up, cos_roll * up - sin_roll * right, forward};
+  return {right, up, forward};
+}
+
+// What a view is of a volume, in physical space.
+struct Look {
+  Frame frame;
+  Vec3 target;          // of the picture's centre
+  double distance = 0;  // from the target to the eye (perspective), or to the eye plane
+};
+
+Look LookOf(const ViewParameters& view, const VolumeGeometry& geometry) {
+  const Orientation& orientation = geometry.orientation;
+  const Vec3 centre = orientation.origin + orientation.ToWorld(0.5 * (ToVec3(geometry.size) - Vec3{1, 1, 1}) * geometry.spacing);
+  const Vec3 target = view.look_at.value_or(centre);
+  const double radius = 0.5 * Length(ToVec3(geometry.size) * geometry.spacing);
+  auto [right, up, forward] = view.eye ? LookingFrame(view, target) : FrameByAngles(view);
+  const auto [sin_roll, cos_roll] = SinCosDegrees(view.roll_degrees);
+  const Frame rolled = {cos_roll * right + sin_roll * up, cos_roll * up - sin_roll * right, forward};
+
+  Look look;
+  look.frame = {orientation.FromWorld(rolled.right), orientation.FromWorld(rolled.up), orientation.FromWorld(rolled.forward)};
+  if (view.look_at) look.target = orientation.FromWorld(target - centre);
+  if (view.projection != Projection::kPerspective) {
+    look.distance = 2 * radius + Dot(look.frame.forward, look.target);  // the eye plane stands 2 R before the volume's centre
+  } else if (view.eye) {
+    look.distance = Length(target - *view.eye);
+  } else {
+    look.distance = view.distance > 0 ? view.distance : radius / std::sin(view.fov_degrees * (std::numbers::pi / 360));
+  }
+  return look;
+}
+
+Status CheckPoint(const std::string& field, const std::optional<Vec3>& point) {
+  for (const Axis axis : kAxes) {
+    if (!point) continue;
+    if (Status s = InRange(fmt::format("{}.{}", field, Letter(axis)), (*point)[axis], -kMaxWorldCoordinate, kMaxWorldCoordinate); !s.ok()) {
+      return s;
+    }
+  }
+  return Status::Ok();
 }
 
 // The data axis nearest to `direction`. The tolerance keeps rounding noise from choosing between axes that tie (azimuth 45).
@@ -75,7 +124,44 @@ Status Validate(const ViewParameters& view) {
   if (Status s = InRange("view.elevation", view.elevation_degrees, -kMaxAngleDegrees, kMaxAngleDegrees); !s.ok()) return s;
   if (Status s = InRange("view.roll", view.roll_degrees, -kMaxAngleDegrees, kMaxAngleDegrees); !s.ok()) return s;
   if (Status s = InRange("view.zoom", view.zoom, kMinZoom, kMaxZoom); !s.ok()) return s;
-  return InRange("view.fov", view.fov_degrees, kMinFovDegrees, kMaxFovDegrees);
+  if (Status s = InRange("view.fov", view.fov_degrees, kMinFovDegrees, kMaxFovDegrees); !s.ok()) return s;
+  if (Status s = CheckPoint("view.look_at", view.look_at); !s.ok()) return s;
+  if (Status s = CheckPoint("view.eye", view.eye); !s.ok()) return s;
+  if (Status s = CheckPoint("view.up", view.up); !s.ok()) return s;
+  if (Status s = InRange("view.distance", view.distance, 0, kMaxWorldCoordinate); !s.ok()) return s;
+  if (view.up && !view.eye) return Status::InvalidArgument("view.up needs view.eye; without an eye, view.roll turns the picture");
+  if (view.up && !(Length(*view.up) > 0)) return Status::InvalidArgument("view.up is 0,0,0, but must be a direction");
+  if (view.distance > 0 && view.eye) return Status::InvalidArgument("view.distance and view.eye cannot both be given");
+  if (view.distance > 0 && view.projection != Projection::kPerspective) {
+    return Status::InvalidArgument("view.distance needs a perspective projection; view.zoom magnifies orthographic pictures");
+  }
+  return Status::Ok();
+}
+
+Status CheckView(const ViewParameters& view, const VolumeGeometry& geometry) {
+  constexpr double kParallel = 1e-6;
+  const Look look = LookOf(view, geometry);
+  const Vec3& forward = look.frame.forward;
+  if (view.eye && !(look.distance > 0) && view.projection == Projection::kPerspective) {
+    return Status::InvalidArgument("view.eye is at the point that it looks at");
+  }
+  if (!std::isfinite(Length(forward))) return Status::InvalidArgument("view.eye is at the point that it looks at");
+  const Vec3 up = view.up ? geometry.orientation.FromWorld(Normalized(*view.up)) : Vec3{};
+  if (view.up && Length(Cross(up, forward)) < kParallel) return Status::InvalidArgument("view.up points along the direction of view");
+  if (view.projection != Projection::kPerspective) return Status::Ok();
+
+  // Every corner lies before the eye, and the eye before the first slice.
+  const Vec3 half = 0.5 * (ToVec3(geometry.size) * geometry.spacing);
+  const double corners = std::abs(forward.x) * half.x + std::abs(forward.y) * half.y + std::abs(forward.z) * half.z;
+  const Axis c = NearestAxis(forward);
+  const double before = std::max(corners + Dot(forward, look.target), half[c] / std::abs(forward[c]) + look.target[c] / forward[c]);
+  constexpr double kMargin = 1.001;
+  const double least = kMargin * std::max(before, 0.0);
+  if (look.distance >= least) return Status::Ok();
+  return Status::InvalidArgument(
+      fmt::format("view.{} is {:.6g} from the point that it looks at, but must be at least {:.6g} in this direction, so that "
+                  "the whole volume lies before it; view.zoom magnifies the picture",
+                  view.eye ? "eye" : "distance: the eye", look.distance, least));
 }
 
 Status Validate(const ImageSize& size) {
@@ -88,18 +174,17 @@ Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeomet
   const bool perspective = view.projection == Projection::kPerspective;
   const Vec3 spacing = geometry.spacing;
   const Vec3 extent = ToVec3(geometry.size) * spacing;
-  const Vec3 centre = 0.5 * (ToVec3(geometry.size) - Vec3{1, 1, 1});
   const double radius = 0.5 * Length(extent);
-  const Frame frame = ViewFrame(view);
+  const auto& [frame, target, distance] = LookOf(view, geometry);
+  const Vec3 centre = 0.5 * (ToVec3(geometry.size) - Vec3{1, 1, 1}) + target / spacing;  // data space, of the picture
 
-  // From the volume's centre to the eye plane, and pixels a physical unit at unit depth (perspective) or everywhere (orthographic).
+  // Pixels a physical unit at unit depth (perspective) or everywhere (orthographic).
   const double half_fov = view.fov_degrees * (std::numbers::pi / 360);
-  const double distance = perspective ? radius / std::sin(half_fov) : 2 * radius;
   const double half_side = 0.5 * std::min(size.width, size.height);
   double scale = view.zoom * half_side / (perspective ? std::tan(half_fov) : radius);
 
-  // Supersampling by the farthest point of the bounding sphere, so that it does not change while the view turns.
-  const double pixel_width = (perspective ? distance + radius : 1.0) / scale;
+  // Supersampling by the farthest point that the bounding sphere can have, so that it does not change while the view turns.
+  const double pixel_width = (perspective ? distance + Length(target) + radius : 1.0) / scale;
   const double voxel_width = std::min({spacing.x, spacing.y, spacing.z});
   int supersample = 1;
   while (supersampled && supersample < kMaxSupersample && pixel_width > kMaxVoxelsPerPixel * voxel_width * supersample) supersample *= 2;

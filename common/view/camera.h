@@ -1,10 +1,14 @@
 // From what a user asks for (ViewParameters) to how the renderers project (Camera).
 //
-// Physical space: data-space voxel coordinates times spacing, the origin moved to the volume's centre. Bounding sphere: centre 0, radius R
-// = half the diagonal of size * spacing. At zoom 1 the sphere touches the shorter side of the picture. Azimuth 0, elevation 0 looks along
-// +y, +x to the right, +z up; azimuth turns the eye about +z, counter-clockwise seen from +z; elevation lifts it towards +z; roll turns the
-// picture clockwise (the camera counter-clockwise). Perspective: the eye stands at R / sin(fov / 2), so that the sphere fits the cone of
-// `fov` exactly at zoom 1; zoom magnifies the picture and leaves the eye where it is.
+// Physical space: data-space voxel coordinates times spacing, the origin moved to the volume's centre; its axes are those of the voxels.
+// Bounding sphere: centre 0, radius R = half the diagonal of size * spacing. At zoom 1 the sphere touches the shorter side of the picture.
+// Angles are about the axes of the volume's world (common/volume/orientation.h). Azimuth 0, elevation 0 looks along +y, +x to the right, +z
+// up; azimuth turns the eye about +z, counter-clockwise seen from +z; elevation lifts it towards +z; roll turns the picture clockwise (the
+// camera counter-clockwise). An eye that is given replaces these angles by its direction.
+//
+// The picture's centre shows the target: `look_at`, or the volume's centre. Perspective: the eye stands at `distance` from the target, or
+// else at R / sin(fov / 2), so that the sphere fits the cone of `fov` exactly at zoom 1; zoom magnifies the picture and leaves the eye
+// where it is. The whole volume must lie before the eye (CheckView).
 //
 // Image space: x to the right and y downwards in pixels, origin at the upper left corner, so pixel (column, row) has its centre at
 // (column + 0.5, row + 0.5). Depth: distance from the eye plane along the view direction in physical units; for an orthographic camera the
@@ -17,6 +21,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "common/base/status.h"
 #include "common/volume/volume.h"
@@ -28,6 +33,7 @@ enum class Projection : std::uint8_t { kOrthographic = 1, kPerspective = 2 };
 inline constexpr double kMaxVoxelsPerPixel = 2;
 inline constexpr double kMinZoom = 1e-3, kMaxZoom = 1e4;
 inline constexpr double kMinFovDegrees = 1, kMaxFovDegrees = 60;
+inline constexpr double kMaxWorldCoordinate = 1e9;                      // of points and distances, either sign
 inline constexpr double kMaxAngleDegrees = 1e6;                         // of azimuth, elevation and roll, either sign
 inline constexpr int kMaxImageSide = 16384;                             // pixels
 inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1} << 26;  // 8192 x 8192: about 2.5 GB of working memory a worker
@@ -43,11 +49,18 @@ struct ViewParameters {
   double azimuth_degrees = 0, elevation_degrees = 0, roll_degrees = 0;
   double zoom = 1;
   double fov_degrees = 30;  // perspective only
+  // Points of the world; none: the volume's centre, and where the angles say.
+  std::optional<Vec3> look_at, eye;
+  std::optional<Vec3> up;   // a direction that is upwards in the picture; only with an eye; none: +z, or +y if one looks along z
+  double distance = 0;      // from the target to the eye, in the world's unit; perspective without `eye` only; 0: see above
+  bool of_patient = false;  // the angles are meant for a patient: volumes without such an orientation are refused
   friend bool operator==(const ViewParameters&, const ViewParameters&) = default;
 };
 
 // InvalidArgument naming field, value and limits; NaN is never valid.
 Status Validate(const ViewParameters& view);
+// InvalidArgument naming field, value and limits: a valid view that cannot be had of this volume.
+Status CheckView(const ViewParameters& view, const VolumeGeometry& geometry);
 Status Validate(const ImageSize& size);
 
 // Everything about one view of one volume, in double precision. p is a data-space point.
@@ -81,7 +94,7 @@ struct Camera {
   friend bool operator==(const Camera&, const Camera&) = default;
 };
 
-// `view` and `size` valid. Not `supersampled`: supersample is 1.
+// `view` and `size` valid, and CheckView is ok. Not `supersampled`: supersample is 1.
 Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry, bool supersampled = false);
 inline Camera MakeSupersampledCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry) {
   return MakeCamera(view, size, geometry, true);

@@ -19,7 +19,8 @@ enum class ShadingModel : std::uint8_t {
 
 struct Shading {
   ShadingModel model = ShadingModel::kPhong;
-  std::vector<Vec3> lights;  // directions towards the lights in volume axes (physical), not zero; empty: a headlight
+  std::vector<Vec3> lights;  // directions towards the lights, not zero; of a request in the world, of a FrameSetup along the voxels' axes;
+                             // empty: a headlight
   // Ambient and diffuse add up to 1: a surface that faces a single light has exactly the colour of its transfer function.
   float ambient = 0.2F, diffuse = 0.8F, specular = 0.2F;  // [0, 1]
   float shininess = 20;                                   // [1, 1000]

@@ -1,4 +1,4 @@
-// What a volume is: geometry (dimensions, spacing), how stored samples map to data values, and the voxels of a box.
+// What a volume is: geometry (dimensions, spacing, orientation), how stored samples map to data values, and the voxels of a box.
 //
 // Order: x fastest, then y, then z. A voxel's centre has integer data-space coordinates; the volume fills
 // [-0.5, size - 0.5) along each axis. Spacing is the distance of neighbouring centres, in the unit of the file (mm for scans).
@@ -12,6 +12,7 @@
 
 #include "common/base/aligned_buffer.h"
 #include "common/volume/box.h"
+#include "common/volume/orientation.h"
 
 namespace slabstream {
 
@@ -26,6 +27,7 @@ constexpr std::size_t BytesPerSample(ScalarType type) { return type == ScalarTyp
 struct VolumeGeometry {
   Index3 size;               // voxels, each in [1, kMaxVolumeSide]
   Vec3 spacing = {1, 1, 1};  // > 0, finite
+  Orientation orientation = {};
 
   Box bounds() const { return {{0, 0, 0}, size}; }
   friend bool operator==(const VolumeGeometry&, const VolumeGeometry&) = default;

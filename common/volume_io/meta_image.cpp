@@ -43,9 +43,18 @@ Result<RawHeader> ReadHeader(const TextHeader& text) {
   for (const auto* numbers : {&spacing, &origin, &directions}) {
     if (!numbers->ok()) return numbers->status();
   }
-  RawHeader header{.size = *size, .spacing = Triple(*spacing), .origin = Triple(*origin), .type = *type};
-  if (directions->empty()) return header;
-  for (std::size_t i = 0; i < 3; ++i) header.directions[i] = Triple(*directions, i * count);
+  RawHeader header{.size = *size, .steps = StepsOf(Triple(*spacing)), .type = *type};
+  std::array<Vec3, 3> axes = StepsOf({1, 1, 1});
+  for (std::size_t i = 0; i < 3 && !directions->empty(); ++i) axes[i] = Triple(*directions, i * count);
+  // Only files about a patient name the directions of the axes; their space is left, posterior, superior. Others have no orientation
+  // unless their matrix turns something.
+  const bool patient = text.Find("AnatomicalOrientation").value_or("???").find('?') == std::string::npos;
+  if (!patient && axes == StepsOf({1, 1, 1})) return header;
+  header.world = patient ? World::kPatient : World::kScene;
+  header.matrix = "TransformMatrix";
+  const Vec3 signs = patient ? kRasFromLps : Vec3{1, 1, 1};
+  for (std::size_t i = 0; i < 3; ++i) header.steps[i] = (*spacing)[i] * (signs * axes[i]);
+  header.origin = signs * Triple(*origin);
   return header;
 }
 

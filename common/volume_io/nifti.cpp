@@ -61,28 +61,31 @@ std::optional<SampleType> ToSampleType(int data_type) {
   return found == kNames.end() ? std::nullopt : SampleTypeNamed(found->second);
 }
 
-// Origin and directions. Like ITK, takes the affine matrix if it leads to the scanner's axes, else the quaternion. Without either they stay
-// those of the index axes.
+// Steps and origin in the patient's space, which is that of NIfTI. Like ITK, takes the affine matrix if it leads to the scanner's axes,
+// else the quaternion. Without either, only the spacing is known.
 void ReadOrientation(const NiftiHeader& fields, double millimetres, RawHeader& header) {
   constexpr int kScanner = 1;  // NIFTI_XFORM_SCANNER_ANAT
-  Vec3 columns[3], origin;
+  const Vec3 spacing = millimetres * Vec3{fields.pixdim(1), fields.pixdim(2), fields.pixdim(3)};
+  header.steps = StepsOf(spacing);
   if (fields.sform_code() == kScanner || (fields.sform_code() > 0 && fields.qform_code() <= 0)) {
-    for (int i = 0; i < 3; ++i) columns[i] = {fields.srow(0, i), fields.srow(1, i), fields.srow(2, i)};
-    origin = {fields.srow(0, 3), fields.srow(1, 3), fields.srow(2, 3)};
+    header.world = World::kPatient;
+    header.matrix = "sform";
+    for (int i = 0; i < 3; ++i) header.steps[std::size_t(i)] = millimetres * Vec3{fields.srow(0, i), fields.srow(1, i), fields.srow(2, i)};
+    header.origin = millimetres * Vec3{fields.srow(0, 3), fields.srow(1, 3), fields.srow(2, 3)};
   } else if (fields.qform_code() > 0) {
-    const double b = fields.quatern(0), c = fields.quatern(1), d = fields.quatern(2);
-    const double a = std::sqrt(std::max(0.0, 1 - (b * b + c * c + d * d)));
-    columns[0] = {a * a + b * b - c * c - d * d, 2 * (b * c + a * d), 2 * (b * d - a * c)};
-    columns[1] = {2 * (b * c - a * d), a * a + c * c - b * b - d * d, 2 * (c * d + a * b)};
-    columns[2] = (fields.pixdim(0) < 0 ? -1.0 : 1.0) * Vec3{2 * (b * d + a * c), 2 * (c * d - a * b), a * a + d * d - b * b - c * c};
-    origin = {fields.qoffset(0), fields.qoffset(1), fields.qoffset(2)};
-  } else {
-    return;
-  }
-  constexpr Vec3 kLpsFromRas = {-1, -1, 1};
-  header.origin = millimetres * (kLpsFromRas * origin);
-  for (std::size_t i = 0; i < 3; ++i) {
-    if (const Vec3 direction = kLpsFromRas * columns[i]; Length(direction) > 0) header.directions[i] = Normalized(direction);
+    header.world = World::kPatient;
+    header.matrix = "qform";
+    double b = fields.quatern(0), c = fields.quatern(1), d = fields.quatern(2);
+    const double square = b * b + c * c + d * d;  // rounded, it may be above 1
+    const double a = std::sqrt(std::max(0.0, 1 - square)), scale = square > 1 ? 1 / std::sqrt(square) : 1;
+    b *= scale;
+    c *= scale;
+    d *= scale;
+    header.steps[0] = spacing.x * Vec3{a * a + b * b - c * c - d * d, 2 * (b * c + a * d), 2 * (b * d - a * c)};
+    header.steps[1] = spacing.y * Vec3{2 * (b * c - a * d), a * a + c * c - b * b - d * d, 2 * (c * d + a * b)};
+    header.steps[2] =
+        (fields.pixdim(0) < 0 ? -spacing.z : spacing.z) * Vec3{2 * (b * d + a * c), 2 * (c * d - a * b), a * a + d * d - b * b - c * c};
+    header.origin = millimetres * Vec3{fields.qoffset(0), fields.qoffset(1), fields.qoffset(2)};
   }
 }
 
@@ -103,7 +106,6 @@ Result<RawHeader> ReadHeader(const NiftiHeader& fields, const std::string& path)
   RawHeader header{.size = *size, .type = *type};
   constexpr int kMetres = 1, kMicrometres = 3;  // NIFTI_UNITS_...
   const double millimetres = fields.space_unit() == kMetres ? 1000 : fields.space_unit() == kMicrometres ? 0.001 : 1;
-  header.spacing = millimetres * Vec3{fields.pixdim(1), fields.pixdim(2), fields.pixdim(3)};
   ReadOrientation(fields, millimetres, header);
   // A slope of 0 means that there is none.
   if (fields.slope() != 0 && std::isfinite(fields.slope()) && std::isfinite(fields.intercept())) {

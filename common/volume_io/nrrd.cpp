@@ -30,11 +30,20 @@ std::optional<SampleType> ToSampleType(const std::string& name) {
   return std::nullopt;
 }
 
-// From this space to left, posterior, superior; spaces without a patient stay unchanged.
-Vec3 LpsFrom(const std::string& space) {
-  if (space == "right-anterior-superior" || space == "ras") return {-1, -1, 1};
-  if (space == "left-anterior-superior" || space == "las") return {1, -1, 1};
-  return {1, 1, 1};
+// What a space is, and the signs that turn its axes into those of World. A left-handed space is mirrored, so that objects are not.
+struct Space {
+  World world = World::kVoxels;
+  Vec3 signs = {1, 1, 1};
+};
+
+// `name`: in lower case, of the definition's list (with time or without); empty: the file names none.
+Space SpaceNamed(std::string name) {
+  if (const std::size_t time = name.find("-time"); time != std::string::npos) name.resize(time);
+  if (name == "right-anterior-superior" || name.starts_with("ras")) return {World::kPatient, {1, 1, 1}};
+  if (name == "left-anterior-superior" || name.starts_with("las")) return {World::kPatient, {-1, 1, 1}};
+  if (name == "left-posterior-superior" || name.starts_with("lps")) return {World::kPatient, {-1, -1, 1}};
+  if (name == "3d-left-handed") return {World::kScene, {-1, 1, 1}};
+  return {World::kScene, {1, 1, 1}};
 }
 
 Result<RawHeader> ReadHeader(const TextHeader& text) {
@@ -55,13 +64,16 @@ Result<RawHeader> ReadHeader(const TextHeader& text) {
     if (!numbers->ok()) return numbers->status();
   }
 
-  const Vec3 lps = LpsFrom(ToLower(text.Find("space").value_or("")));
-  RawHeader header{.size = *size, .spacing = Triple(*spacings), .origin = lps * Triple(*origin), .type = *type};
-  for (std::size_t i = 0; i < directions->size() / 3; ++i) {
-    const Vec3 step = lps * Triple(*directions, 3 * i);
-    header.spacing[int(i)] = Length(step);
-    if (Length(step) > 0) header.directions[i] = Normalized(step);
+  RawHeader header{.size = *size, .steps = StepsOf(Triple(*spacings)), .type = *type};
+  const std::string name = ToLower(text.Find("space").value_or(""));
+  if (directions->empty() && name.empty()) return header;
+  const Space space = SpaceNamed(name);
+  header.world = space.world;
+  header.matrix = directions->empty() ? "spacings" : "space directions";
+  for (std::size_t i = 0; i < 3; ++i) {
+    header.steps[i] = space.signs * (directions->empty() ? header.steps[i] : Triple(*directions, 3 * i));
   }
+  header.origin = space.signs * Triple(*origin);
   return header;
 }
 

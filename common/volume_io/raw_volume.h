@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/base/aligned_buffer.h"
@@ -16,9 +17,12 @@ namespace slabstream {
 
 struct RawHeader {
   Index3 size;
-  Vec3 spacing = {1, 1, 1};  // as in the file: may be negative, zero or NaN
-  Vec3 origin;
-  std::array<Vec3, 3> directions = {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};
+  World world = World::kVoxels;
+  // From a voxel to the next one along its x, y and z, in that world; kVoxels: the spacing along each axis. As in the file: may be zero or
+  // NaN.
+  std::array<Vec3, 3> steps = {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};
+  Vec3 origin;                // of the centre of the first voxel
+  std::string_view matrix{};  // the file's name for the steps, for messages; lives as long as the program
   SampleType type = SampleType::kUint8;
   ValueMapping rescale;  // from the file's samples to data values
 
@@ -29,6 +33,12 @@ struct RawVolume {
   RawHeader header;
   AlignedVector<std::byte> bytes;  // this machine's byte order
 };
+
+// Steps along the axes themselves.
+inline std::array<Vec3, 3> StepsOf(const Vec3& spacing) { return {Vec3{spacing.x, 0, 0}, Vec3{0, spacing.y, 0}, Vec3{0, 0, spacing.z}}; }
+
+// From left, posterior, superior to right, anterior, superior, and back.
+inline constexpr Vec3 kRasFromLps = {-1, -1, 1};
 
 // A volume's size from what a file says of its dimensions; those of 1 behind the third are left out. InvalidArgument naming `path`: there
 // are not three, or one is no whole number in [1, kMaxVolumeSide].

@@ -110,7 +110,7 @@ Result<RawHeader> TiffFile::ReadPageHeader() const {
 
   RawHeader header{.size = *size, .type = *type};
   const auto x_resolution = Field<float>(TIFFTAG_XRESOLUTION, 0), y_resolution = Field<float>(TIFFTAG_YRESOLUTION, 0);
-  if (x_resolution > 0 && y_resolution > 0) header.spacing.y = double(x_resolution) / double(y_resolution);
+  if (x_resolution > 0 && y_resolution > 0) header.steps[1].y = double(x_resolution) / double(y_resolution);
   return header;
 }
 

@@ -5,12 +5,15 @@
 #include <cmath>
 #include <filesystem>
 #include <new>
+#include <span>
 #include <string_view>
 
 #include "common/base/log.h"
 #include "common/base/printable.h"
+#include "common/volume/memory_budget.h"
 #include "common/volume_io/raw_volume.h"
 #include "common/volume_io/text_header.h"
+#include "common/volume_io/world_placement.h"
 
 namespace slabstream {
 namespace {
@@ -40,27 +43,36 @@ const Format* FindFormat(const std::string& path) {
   return found == kFormats.end() ? nullptr : &*found;
 }
 
-// Renderers need a distance. The sign only tells how the axis runs in the scanner; for zero or NaN, 1 is the best guess.
-double UsableSpacing(double spacing, const std::string& path) {
-  const double distance = std::abs(spacing);
-  if (distance > 0 && std::isfinite(distance)) return distance;
-  LogWarning(path + ": a spacing of " + std::to_string(spacing) + " is taken as 1");
-  return 1;
+// The stored sample of the lowest data value that there is: what lies outside a volume.
+double LowestSample(const VoxelBlock& block, const ValueMapping& mapping) {
+  return VisitScalarType(block.type, [&]<class T>(const T*) {
+    double least = 0, greatest = 0;
+    bool any = false;
+    for (const T sample : std::span(block.samples<T>(), std::size_t(block.box.voxel_count()))) {
+      if (!std::isfinite(double(sample))) continue;
+      least = any ? std::min(least, double(sample)) : double(sample);
+      greatest = any ? std::max(greatest, double(sample)) : double(sample);
+      any = true;
+    }
+    return mapping.scale < 0 ? greatest : least;
+  });
 }
 
 Result<LoadedVolume> Finish(RawVolume raw, const Format& format, const std::string& path) {
   KeptSamples kept = Keep(raw.header.type, std::move(raw.bytes));
   if (!kept.exact) LogWarning(path + ": values of type " + std::string(ToString(raw.header.type)) + " are rounded to " + "float32");
 
+  const Result<WorldPlacement> placed = PlaceInWorld(raw.header, path);
+  if (!placed.ok()) return placed.status();
   LoadedVolume loaded;
   VolumeFileInfo& info = loaded.info;
   info.file_type = ToString(raw.header.type);
   info.format = format.name;
-  info.origin = raw.header.origin;
-  info.directions = raw.header.directions;
+  info.stored_size = raw.header.size;
+  info.steps = raw.header.steps;
+  info.straightened = placed->slant.has_value();
   VolumeDescription& description = info.description;
-  description.geometry.size = raw.header.size;
-  for (const Axis axis : kAxes) description.geometry.spacing[axis] = UsableSpacing(raw.header.spacing[axis], path);
+  description.geometry = placed->geometry;
   description.type = kept.type;
   // value = scale * (stored + shift) + offset
   const auto [scale, offset] = raw.header.rescale;
@@ -68,7 +80,16 @@ Result<LoadedVolume> Finish(RawVolume raw, const Format& format, const std::stri
 
   auto volume = std::make_shared<Volume>();
   volume->description = description;
-  volume->block = {description.geometry.bounds(), kept.type, std::move(kept.bytes)};
+  volume->block = {{{0, 0, 0}, raw.header.size}, kept.type, std::move(kept.bytes)};
+  if (placed->turn != AxisTurn{}) {
+    if (Status status = CheckFitsMemory(std::int64_t(volume->block.bytes.size()), path); !status.ok()) return status;
+    volume->block = TurnVoxels(volume->block, placed->turn);
+  }
+  if (placed->slant) {
+    if (Status status = CheckFitsMemory(description.voxel_bytes(), path); !status.ok()) return status;
+    volume->block =
+        StraightenVoxels(volume->block, *placed->slant, description.geometry.size, LowestSample(volume->block, description.mapping));
+  }
   loaded.volume = std::move(volume);
   return loaded;
 }

@@ -8,9 +8,12 @@
 // else float32. If float32 cannot hold a value exactly, the reader logs a warning. A rescale slope and intercept (NIfTI scl_slope,
 // scl_inter) goes into ValueMapping.
 //
-// Axes: x, y, z are the file's own index axes, first index fastest; direction cosines are read for `info` and do not turn the picture.
-// Spacing is its absolute value; 0 and NaN become 1, with a warning. TIFF states no distance of slices: spacing is 1 along x and z, and
-// along y the ratio of the two resolutions.
+// Axes: if the file has an orientation (NIfTI sform or qform, NRRD space, MetaImage TransformMatrix), the voxels are turned to the nearest
+// axes of its world, so that x runs to the patient's right (or along the world's x), y to anterior, z to superior, however they are stored.
+// Slanted slices (a tilted gantry) are straightened. A matrix that is not finite or has no inverse is an error. Without an orientation x,
+// y, z are the file's own index axes, first index fastest; spacing is its absolute value, where 0 and NaN become 1, with a warning. TIFF
+// states no distance of slices: spacing is 1 along x and z, and along y the ratio of the two resolutions. Turning and straightening take
+// memory for the kept bytes once more.
 //
 // All functions may be called from any thread.
 #pragma once
@@ -28,8 +31,10 @@ struct VolumeFileInfo {
   VolumeDescription description;
   std::string file_type;  // sample type in the file, such as "int16"
   std::string format;     // "NIfTI", "NRRD", "MetaImage", "TIFF"
-  Vec3 origin;
-  std::array<Vec3, 3> directions;  // of the x, y and z axes (physical: x to the left, y to posterior, z to superior)
+  // As stored, before they were turned: voxels along each axis, and from a voxel to the next one along it, in the world.
+  Index3 stored_size;
+  std::array<Vec3, 3> steps;
+  bool straightened = false;  // the stored axes are not at right angles
 };
 
 struct LoadedVolume {

@@ -52,22 +52,41 @@ FileSamples ToFileSamples(const Volume& volume) {
   return VisitScalarType(type, [&]<class T>(const T*) { return FileSamples{"float", "MET_FLOAT", DataValues<T, float>(volume)}; });
 }
 
+std::string Numbers(const Vec3& v, const char* separator) { return fmt::format("{}{}{}{}{}", v.x, separator, v.y, separator, v.z); }
+
+// The header's lines about the spacing and, if it is known, the orientation.
+std::string NrrdSpace(const VolumeGeometry& geometry) {
+  const Orientation& orientation = geometry.orientation;
+  if (orientation.world == World::kVoxels) return fmt::format("spacings: {}\n", Numbers(geometry.spacing, " "));
+  const auto step = [&](int i) { return Numbers(geometry.spacing[i] * orientation.axes[std::size_t(i)], ","); };
+  return fmt::format("space: {}\nspace directions: ({}) ({}) ({})\nspace origin: ({})\n",
+                     orientation.world == World::kPatient ? "right-anterior-superior" : "3D-right-handed", step(0), step(1), step(2),
+                     Numbers(orientation.origin, ","));
+}
+
 std::string NrrdHeader(const VolumeGeometry& geometry, const char* type) {
-  const auto& [size, spacing] = geometry;
-  return fmt::format(
-      "NRRD0004\ntype: {}\ndimension: 3\nspace: left-posterior-superior\nsizes: {} {} {}\n"
-      "space directions: ({},0,0) (0,{},0) (0,0,{})\nkinds: domain domain domain\nendian: little\n"
-      "encoding: gzip\nspace origin: (0,0,0)\n\n",
-      type, size[0], size[1], size[2], spacing[0], spacing[1], spacing[2]);
+  return fmt::format("NRRD0004\ntype: {}\ndimension: 3\n{}sizes: {} {} {}\nkinds: domain domain domain\nendian: little\nencoding: gzip\n\n",
+                     type, NrrdSpace(geometry), geometry.size.x, geometry.size.y, geometry.size.z);
+}
+
+// A patient's space is left, posterior, superior in MetaImage. Its letters say where each axis begins: left, posterior, inferior, since
+// axes lie near those of World.
+std::string MetaSpace(const VolumeGeometry& geometry) {
+  const Orientation& orientation = geometry.orientation;
+  if (orientation.world == World::kVoxels) return "";
+  const bool patient = orientation.world == World::kPatient;
+  const Vec3 signs = patient ? kRasFromLps : Vec3{1, 1, 1};
+  const auto axis = [&](std::size_t i) { return Numbers(signs * orientation.axes[i], " "); };
+  return fmt::format("TransformMatrix = {} {} {}\nOffset = {}\n{}", axis(0), axis(1), axis(2), Numbers(signs * orientation.origin, " "),
+                     patient ? "AnatomicalOrientation = LPI\n" : "");
 }
 
 std::string MetaHeader(const VolumeGeometry& geometry, const char* type, const std::string& data_file) {
-  const auto& [size, spacing] = geometry;
+  const Index3& size = geometry.size;
   return fmt::format(
       "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = False\n"
-      "TransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = 0 0 0\nElementSpacing = {} {} {}\nDimSize = {} {} {}\nElementType = {}\n"
-      "ElementDataFile = {}\n",
-      spacing[0], spacing[1], spacing[2], size[0], size[1], size[2], type, data_file);
+      "{}ElementSpacing = {}\nDimSize = {} {} {}\nElementType = {}\nElementDataFile = {}\n",
+      MetaSpace(geometry), Numbers(geometry.spacing, " "), size.x, size.y, size.z, type, data_file);
 }
 
 // Appends the bytes as one gzip member.

@@ -31,6 +31,11 @@ void Fields(auto& io, Is<ViewParameters> auto& m) {
   io.Finite("roll_degrees", m.roll_degrees, &P::roll_degrees, &P::set_roll_degrees);
   io.Finite("zoom", m.zoom, &P::zoom, &P::set_zoom);
   io.Finite("fov_degrees", m.fov_degrees, &P::fov_degrees, &P::set_fov_degrees);
+  io.Optional("look_at", m.look_at, &P::has_look_at, &P::look_at, &P::mutable_look_at);
+  io.Optional("eye", m.eye, &P::has_eye, &P::eye, &P::mutable_eye);
+  io.Optional("up", m.up, &P::has_up, &P::up, &P::mutable_up);
+  io.Finite("distance", m.distance, &P::distance, &P::set_distance);
+  io.Any(m.of_patient, &P::of_patient, &P::set_of_patient);
 }
 
 void Fields(auto& io, Is<ColorPoint> auto& m) {

@@ -86,10 +86,27 @@ void Fields(auto& io, Is<ValueRange> auto& m) {
   io.Check([&](Checker& check) { check.That(m.min <= m.max, "", "min is above max"); });
 }
 
+void Fields(auto& io, Is<Orientation> auto& m) {
+  using P = v1::Orientation;
+  io.OneOf("world", m.world, &P::world, &P::set_world, World::kVoxels, World::kPatient);
+  io.Message("origin", m.origin, &P::origin, &P::mutable_origin);
+  io.Message("x_axis", m.axes[0], &P::x_axis, &P::mutable_x_axis);
+  io.Message("y_axis", m.axes[1], &P::y_axis, &P::mutable_y_axis);
+  io.Message("z_axis", m.axes[2], &P::z_axis, &P::mutable_z_axis);
+  io.Check([&](Checker& check) {
+    constexpr double kTolerance = 1e-6;
+    const auto far = [](const Vec3& a, const Vec3& b) { return !(Length(a - b) <= kTolerance); };
+    const bool straight =
+        !far(m.FromWorld(m.axes[0]), {1, 0, 0}) && !far(m.FromWorld(m.axes[1]), {0, 1, 0}) && !far(Cross(m.axes[0], m.axes[1]), m.axes[2]);
+    check.That(straight, "x_axis", "not of three right-handed unit vectors at right angles");
+  });
+}
+
 void Fields(auto& io, Is<VolumeDescription> auto& m) {
   using P = v1::VolumeDescription;
   io.Message("size", m.geometry.size, &P::size, &P::mutable_size);
   io.Message("spacing", m.geometry.spacing, &P::spacing, &P::mutable_spacing);
+  io.Message("orientation", m.geometry.orientation, &P::orientation, &P::mutable_orientation);
   io.OneOf("type", m.type, &P::type, &P::set_type, ScalarType::kUint8, ScalarType::kFloat32);
   io.Finite("scale", m.mapping.scale, &P::scale, &P::set_scale);
   io.Finite("offset", m.mapping.offset, &P::offset, &P::set_offset);

@@ -6,6 +6,7 @@
 #include <span>
 #include <variant>
 
+#include "client/cli/camera_json.h"
 #include "common/wire/digest.h"
 
 namespace slabstream {
@@ -29,16 +30,6 @@ Json FunctionJson(const TransferFunction& function) {
 Json SizeJson(const ImageSize& size) {
   const auto& [width, height] = size;
   return Json::array({width, height});
-}
-
-Json ViewJson(const ViewParameters& view) {
-  const auto& [projection, azimuth, elevation, roll, zoom, fov] = view;
-  return {{"projection", projection == Projection::kPerspective ? "perspective" : "orthographic"},
-          {"azimuth", azimuth},
-          {"elevation", elevation},
-          {"roll", roll},
-          {"zoom", zoom},
-          {"fov", fov}};
 }
 
 // The shortest decimal that means this float: 0.2, not 0.20000000298023224.

@@ -12,6 +12,7 @@
 #include <set>
 #include <utility>
 
+#include "client/cli/camera_json.h"
 #include "client/cli/json_value.h"
 #include "client/cli/values.h"
 #include "client/cli/volume_argument.h"
@@ -158,23 +159,10 @@ SweepRenderer ReadRenderer(const JsonValue& value) {
 
 SweepView ReadView(const JsonValue& value, std::size_t index) {
   SweepView read{fmt::format("view {}", index + 1), {}};
-  const NumberRange angle{-kMaxAngleDegrees, kMaxAngleDegrees};
-  constexpr std::array<std::string_view, 2> kProjections = {"orthographic", "perspective"};
-  ViewParameters& view = read.view;
-  value.Fields(
-      {{"name", [&](const JsonValue& v) { read.name = v.Text(); }},
-       {"projection",
-        [&](const JsonValue& v) { view.projection = v.OneOf(kProjections) == 0 ? Projection::kOrthographic : Projection::kPerspective; }},
-       {"azimuth", [&](const JsonValue& v) { view.azimuth_degrees = v.Number(angle); }},
-       {"elevation", [&](const JsonValue& v) { view.elevation_degrees = v.Number(angle); }},
-       {"roll", [&](const JsonValue& v) { view.roll_degrees = v.Number(angle); }},
-       {"zoom",
-        [&](const JsonValue& v) {
-          view.zoom = v.Number({kMinZoom, kMaxZoom});
-        }},
-       {"fov", [&](const JsonValue& v) {
-          view.fov_degrees = v.Number({kMinFovDegrees, kMaxFovDegrees});
-        }}});
+  auto fields = ViewFields(read.view);
+  fields.insert(fields.begin(), {"name", [&](const JsonValue& v) { read.name = v.Text(); }});
+  value.Fields(fields);
+  if (const Status status = Validate(read.view); !status.ok()) value.Complain(status.message());
   return read;
 }
 

@@ -26,12 +26,14 @@ std::string CanonicalPath(const std::string& path) {
 
 Json FileJson(const std::string& path, const Volume& volume) {
   const auto& [geometry, type, mapping] = volume.description;
-  const auto& [size, spacing] = geometry;
+  const auto& [size, spacing, orientation] = geometry;
   const auto& [scale, offset] = mapping;
+  const auto numbers = [](const Vec3& v) { return Json::array({v.x, v.y, v.z}); };
   const AlignedVector<std::byte>& bytes = volume.block.bytes;
   return {{"file", path},
           {"voxels", Json::array({size.x, size.y, size.z})},
-          {"spacing", Json::array({spacing.x, spacing.y, spacing.z})},
+          {"spacing", numbers(spacing)},
+          {"axes", Json::array({numbers(orientation.axes[0]), numbers(orientation.axes[1]), numbers(orientation.axes[2])})},
           {"bytes", bytes.size()},
           {"type", int(type)},
           {"mapping", Json::array({scale, offset})},

@@ -88,6 +88,32 @@ TEST_P(Partitions, BoxesOfAnyKindMakeOnePicture) {
   }
 }
 
+TEST_P(Partitions, LookingBesideTheCentreMakesOnePicture) {
+  const unsigned seed = 14;
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const Volume volume = MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed);
+  for (Projection projection : kProjections) {
+    int seen = 0;
+    for (int view = 0; seen < 6; ++view) {
+      SetupOptions options;
+      options.renderer = GetParam();
+      options.view = RandomView(projection, random);
+      options.view.look_at = {20 + 15 * uniform(random), 15 + 12 * uniform(random), 21 + 15 * uniform(random)};
+      if (view % 2 == 1) {
+        options.view.eye = {20 + 90 * uniform(random), 15 + 90 * uniform(random), 21 + 90 * uniform(random)};
+      } else if (projection == Projection::kPerspective) {
+        options.view.distance = 60 + 40 * uniform(random);
+      }
+      if (!CheckView(options.view, volume.description.geometry).ok()) continue;
+      ++seen;
+      const FrameSetup setup = MakeSetup(volume, options);
+      SCOPED_TRACE(::testing::Message() << "seed " << seed << " view " << view);
+      ExpectSamePicture(RenderWhole(volume, setup), RenderByBoxes(volume, setup, CutAtRandom(volume.block.box, 11, random)), setup);
+    }
+  }
+}
+
 // Axis-parallel views put rays, faces and planes on top of each other.
 TEST_P(Partitions, AxisParallelViewsHaveNoSeams) {
   const Volume volume = MakeBlobs({{32, 32, 32}, {1, 1, 1}}, ScalarType::kUint8, 5);

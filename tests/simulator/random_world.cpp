@@ -29,7 +29,7 @@ TransferFunction StepTransfer() {
 }
 
 // Whole layers of bricks across x are empty, so that some slabs show nothing.
-void MakeVolume(Random& random, World& world) {
+void MakeVolume(Random& random, SimulatedWorld& world) {
   auto summary = std::make_shared<VolumeSummary>();
   summary->description.geometry.size = kVolumeSize;
   summary->description.type = kVoxelType;
@@ -48,8 +48,8 @@ void MakeVolume(Random& random, World& world) {
 
 }  // namespace
 
-World RandomWorld(Random& random, const Faults& faults) {
-  World world;
+SimulatedWorld RandomWorld(Random& random, const Faults& faults) {
+  SimulatedWorld world;
   MakeVolume(random, world);
   world.speed.render = random.Chance(0.1) ? 0.3 : random.Real(0.001, 0.04);
   world.speed.combine = random.Real(10e-6, 5e-3);

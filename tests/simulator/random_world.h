@@ -15,7 +15,7 @@
 
 namespace slabstream {
 
-struct World {
+struct SimulatedWorld {
   std::shared_ptr<const VolumeSummary> summary;
   std::shared_ptr<const OccupancyGrid> occupied;
   WorkerConfig worker_config;
@@ -23,7 +23,7 @@ struct World {
   Policy policy;
 };
 
-World RandomWorld(Random& random, const Faults& faults);
+SimulatedWorld RandomWorld(Random& random, const Faults& faults);
 
 // Of the world's volume, "volume".
 SubmitFrame RandomRequest(Random& random, const Policy& policy, RequestId id, std::uint32_t deadline_ms);

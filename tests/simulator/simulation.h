@@ -123,7 +123,7 @@ class Simulation : private Conditions {
   FaultyNetwork network_;
   const bool encode_messages_;  // in a few worlds messages are encoded and decoded on their way
   bool workerless_ = false;     // for a moment no worker was running
-  const World world_;
+  const SimulatedWorld world_;
   FrameWitness witness_;
   const MachineModel machine_ = WithoutDelays();  // what takes how long is up to the world
   SimulatedService service_;

@@ -247,5 +247,129 @@ TEST(Camera, ValidateNamesTheFieldAndTheLimits) {
   EXPECT_EQ(Validate(ImageSize{16384, 4097}).code(), StatusCode::kInvalidArgument);
 }
 
+// An oblique volume is seen as the same voxels would be that are turned in the world.
+TEST(Camera, SeesAnObliqueVolumeWhereItLies) {
+  Random random(31);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 100; ++i) {
+    const double a = random.Real(-1, 1), b = random.Real(-1, 1);
+    VolumeGeometry oblique = kGeometry;
+    oblique.orientation.axes[0] = {std::cos(a), std::sin(a), 0};
+    oblique.orientation.axes[1] = {-std::sin(a) * std::cos(b), std::cos(a) * std::cos(b), std::sin(b)};
+    oblique.orientation.axes[2] = Cross(oblique.orientation.axes[0], oblique.orientation.axes[1]);
+    const ViewParameters view = RandomView(random);
+    const Camera camera = MakeCamera(view, {200, 150}, oblique), straight = MakeCamera(view, {200, 150}, kGeometry);
+    const Vec3 voxel = {random.Real(0, 39), random.Real(0, 30), random.Real(0, 16)};
+    const Vec3 in_world = oblique.orientation.ToWorld(Physical(voxel, oblique));
+    const Camera::ImagePoint seen = camera.Project(voxel), expected = straight.Project(DataFromPhysical(in_world, kGeometry));
+    EXPECT_NEAR(seen.x, expected.x, 1e-7 * view.zoom);
+    EXPECT_NEAR(seen.y, expected.y, 1e-7 * view.zoom);
+    EXPECT_NEAR(seen.depth, expected.depth, 1e-9);
+  }
+}
+
+VolumeGeometry RandomPlace(Random& random) {
+  VolumeGeometry geometry = kGeometry;
+  const double a = random.Real(-1, 1);
+  geometry.orientation = {World::kPatient,
+                          {random.Real(-100, 100), random.Real(-100, 100), random.Real(-100, 100)},
+                          {Vec3{std::cos(a), std::sin(a), 0}, Vec3{-std::sin(a), std::cos(a), 0}, Vec3{0, 0, 1}}};
+  return geometry;
+}
+
+Vec3 WorldOf(const Vec3& voxel, const VolumeGeometry& geometry) {
+  return geometry.orientation.origin + geometry.orientation.ToWorld(geometry.spacing * voxel);
+}
+
+Vec3 RandomVoxel(Random& random) { return {random.Real(0, 39), random.Real(0, 30), random.Real(0, 16)}; }
+
+TEST(Camera, ShowsItsTargetInTheMiddleOfThePicture) {
+  Random random(32);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 200; ++i) {
+    const VolumeGeometry geometry = RandomPlace(random);
+    const Vec3 voxel = RandomVoxel(random);
+    ViewParameters view = RandomView(random);
+    view.look_at = WorldOf(voxel, geometry);
+    if (view.projection == Projection::kPerspective && random.Chance(0.5)) view.distance = random.Real(1, 500);
+    const Camera camera = MakeCamera(view, {200, 150}, geometry);
+    const Camera::ImagePoint seen = camera.Project(voxel);
+    EXPECT_NEAR(seen.x, 100, 1e-6);
+    EXPECT_NEAR(seen.y, 75, 1e-6);
+    if (view.distance > 0) EXPECT_NEAR(seen.depth, view.distance, 1e-9);
+  }
+}
+
+TEST(Camera, StandsWhereItsEyeIs) {
+  Random random(33);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 200; ++i) {
+    const VolumeGeometry geometry = RandomPlace(random);
+    ViewParameters view = RandomView(random);
+    view.projection = Projection::kPerspective;
+    view.roll_degrees = 0;
+    view.look_at = WorldOf(RandomVoxel(random), geometry);
+    view.eye = *view.look_at + Vec3{random.Real(-300, 300), random.Real(-300, 300), random.Real(-300, 300)};
+    view.up = Vec3{random.Real(-1, 1), random.Real(-1, 1), random.Real(-1, 1)};
+    const Camera camera = MakeCamera(view, {200, 150}, geometry);
+    ExpectNear(WorldOf(camera.eye, geometry), *view.eye, 1e-8);
+    ExpectNear(geometry.orientation.ToWorld(camera.view_direction), Normalized(*view.look_at - *view.eye), 1e-12);
+    const Vec3 up = geometry.orientation.ToWorld(camera.up);
+    EXPECT_GT(Dot(up, *view.up), 0);
+    // `up` lies in the plane of the view direction and the wanted direction.
+    EXPECT_NEAR(Dot(geometry.orientation.ToWorld(camera.right), *view.up), 0, 1e-9);
+  }
+}
+
+TEST(Camera, ThatIsAllowedSeesTheWholeVolumeBeforeIt) {
+  Random random(34);
+  SCOPED_TRACE(random.trace());
+  int allowed = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const VolumeGeometry geometry = RandomPlace(random);
+    ViewParameters view = RandomView(random);
+    if (random.Chance(0.7)) view.look_at = WorldOf(1.5 * RandomVoxel(random), geometry);
+    if (random.Chance(0.5)) {
+      view.eye = WorldOf(3 * RandomVoxel(random) - Vec3{40, 30, 16}, geometry);
+    } else if (view.projection == Projection::kPerspective) {
+      view.distance = random.Chance(0.5) ? random.Real(1, 100) : 0;
+    }
+    ASSERT_TRUE(Validate(view).ok()) << Validate(view).message();
+    if (!CheckView(view, geometry).ok()) continue;
+    ++allowed;
+    const Camera camera = MakeCamera(view, {200, 150}, geometry);
+    for (int corner = 0; corner < 8; ++corner) {
+      const Vec3 p = {corner & 1 ? 39.5 : -0.5, corner & 2 ? 30.5 : -0.5, corner & 4 ? 16.5 : -0.5};
+      EXPECT_GT(camera.Project(p).depth, 0);
+    }
+    if (camera.projection != Projection::kPerspective) continue;
+    const double eye = camera.eye[camera.traversal_axis];
+    EXPECT_TRUE(camera.ascending ? eye < -0.5 : eye > geometry.size[camera.traversal_axis] - 0.5);
+  }
+  EXPECT_GT(allowed, 300);
+}
+
+TEST(Camera, SaysWhichViewsCannotBeHad) {
+  const auto refusal = [](const ViewParameters& view) {
+    Status status = Validate(view);
+    if (status.ok()) status = CheckView(view, kGeometry);
+    EXPECT_EQ(status.code(), StatusCode::kInvalidArgument);
+    return status.message();
+  };
+  EXPECT_EQ(refusal({.up = Vec3{0, 0, 1}}), "view.up needs view.eye; without an eye, view.roll turns the picture");
+  EXPECT_EQ(refusal({.distance = 3}), "view.distance needs a perspective projection; view.zoom magnifies orthographic pictures");
+  EXPECT_EQ(refusal({.projection = Projection::kPerspective, .eye = Vec3{9, 9, 9}, .distance = 3}),
+            "view.distance and view.eye cannot both be given");
+  EXPECT_EQ(refusal({.look_at = Vec3{1, 2, 3}, .eye = Vec3{1, 2, 3}}), "view.eye is at the point that it looks at");
+  EXPECT_EQ(refusal({.look_at = Vec3{0, 0, 0}, .eye = Vec3{0, 0, 90}, .up = Vec3{0, 0, -2}}), "view.up points along the direction of view");
+  EXPECT_EQ(refusal({.look_at = Vec3{1, std::numeric_limits<double>::quiet_NaN(), 3}}),
+            "view.look_at.y is nan, but must lie in [-1000000000, 1000000000]");
+  // The volume is 15.5 deep along y, so its middle must be more than 7.75 away.
+  EXPECT_EQ(
+      refusal({.projection = Projection::kPerspective, .distance = 7}),
+      "view.distance: the eye is 7 from the point that it looks at, but must be at least 7.75775 in this direction, so that the whole "
+      "volume lies before it; view.zoom magnifies the picture");
+}
+
 }  // namespace
 }  // namespace slabstream

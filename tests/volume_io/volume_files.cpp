@@ -97,17 +97,15 @@ FileBytes NiftiHeader(const FileSpec& spec) {
   for (std::size_t i = 0; i < 7; ++i) put(42 + 2 * i, dimensions[i]);
   put(70, kTypes[int(spec.type)]);
   put(72, std::int16_t(8 * BytesPerSample(spec.type)));
-  put(76, 1.0F);
+  put(76, spec.qfac);
   for (std::size_t i = 0; i < 7; ++i) put(80 + 4 * i, i < 3 ? float(spec.spacing[int(i)]) : 1.0F);
   put(108, 352.0F);
   put(112, spec.slope);
   put(116, spec.intercept);
   put(252, spec.qform);
   put(254, spec.sform);
-  // The quaternion of a quarter turn about z, from (1, 2, 3); the matrix swaps y and z, from (4, 5, 6).
-  constexpr float kQuaternion[] = {0, 0, 0.70710678F, 1, 2, 3}, kMatrix[] = {2, 0, 0, 4, 0, 0, 2, 5, 0, 2, 0, 6};
-  for (std::size_t i = 0; i < 6; ++i) put(256 + 4 * i, kQuaternion[i]);
-  for (std::size_t i = 0; i < 12; ++i) put(280 + 4 * i, kMatrix[i]);
+  for (std::size_t i = 0; i < spec.quaternion.size(); ++i) put(256 + 4 * i, spec.quaternion[i]);
+  for (std::size_t i = 0; i < spec.matrix.size(); ++i) put(280 + 4 * i, spec.matrix[i]);
   bytes.replace(344, 4, std::string("n+1\0", 4));
   return bytes;
 }

@@ -1,6 +1,7 @@
 // Volume files written byte by byte from the formats' definitions, so that the readers are not tested against a library's idea of them.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -27,8 +28,12 @@ struct FileSpec {
   SampleType type = SampleType::kUint8;
   bool big_endian = false;
   Vec3 spacing = {1, 1, 1};
-  float slope = 1, intercept = 0;        // NIfTI only
-  std::int16_t qform = 0, sform = 0;     // NIfTI only: codes
+  float slope = 1, intercept = 0;     // NIfTI only
+  std::int16_t qform = 0, sform = 0;  // NIfTI only: codes
+  // NIfTI only: a quarter turn about z, from (1, 2, 3); the matrix swaps y and z, from (4, 5, 6).
+  std::array<float, 6> quaternion = {0, 0, 0.70710678F, 1, 2, 3};
+  float qfac = 1;
+  std::array<float, 12> matrix = {2, 0, 0, 4, 0, 0, 2, 5, 0, 2, 0, 6};
   std::vector<std::int16_t> dimensions;  // NIfTI only: dim[1] ... instead of `size`
 };
 

@@ -14,7 +14,8 @@ ViewRays MakeViewRays(const Camera& camera, const VolumeGeometry& geometry, doub
   const Vec3 spacing = geometry.spacing;
   const double step = std::min({spacing.x, spacing.y, spacing.z}) / samples_per_voxel;
   const double radius = 0.5 * Length(ToVec3(geometry.size) * spacing);
-  const double centre_depth = camera.Project(0.5 * (ToVec3(geometry.size) - Vec3{1, 1, 1})).depth;
+  const Vec3 middle = 0.5 * (ToVec3(geometry.size) - Vec3{1, 1, 1});
+  const double centre_depth = camera.Project(middle).depth;
   const double first = std::max(std::floor((centre_depth - radius) / step), 0.0);
 
   ViewRays rays;
@@ -35,7 +36,9 @@ ViewRays MakeViewRays(const Camera& camera, const VolumeGeometry& geometry, doub
   rays.pixel_squared = float(Dot(right * spacing, right * spacing));
   rays.start_distance = float(first * step);
   rays.step = float(step);
-  rays.sample_count = std::int32_t(std::ceil((centre_depth + radius) / step) - first) + 1;
+  // Under perspective samples lie at distances from the eye, which are larger than depths.
+  const double farthest = std::max(centre_depth, rays.perspective ? Length((middle - camera.eye) * spacing) : 0) + radius;
+  rays.sample_count = std::int32_t(std::ceil(farthest / step) - first) + 1;
   rays.volume_end = ToFloat3(ToVec3(geometry.size) - Vec3{0.5, 0.5, 0.5});
   return rays;
 }

@@ -1,0 +1,32 @@
+// Where a volume lies in world space: world = origin + sum over axes of axes[i] * spacing[i] * voxel[i].
+//
+// Readers turn what they read to the nearest axes of its world (common/volume_io/world_placement.h). So x, y and z of voxels always run
+// roughly along x, y and z of the world, in whatever order and direction a file stores them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "common/math/vec.h"
+
+namespace slabstream {
+
+enum class World : std::uint8_t {
+  kVoxels = 1,   // no orientation is known: x, y and z are those of the voxels, in the unit of the spacing
+  kScene = 2,    // axes of the file's own, right-handed
+  kPatient = 3,  // x to the patient's right, y to anterior, z to superior (RAS); mm
+};
+
+struct Orientation {
+  World world = World::kVoxels;
+  Vec3 origin;                                                               // of the centre of voxel 0, 0, 0; finite
+  std::array<Vec3, 3> axes = {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};  // unit, at right angles, right-handed
+
+  // A direction of the world as seen from the voxels' axes, and back. Lengths stay.
+  Vec3 FromWorld(const Vec3& direction) const { return {Dot(axes[0], direction), Dot(axes[1], direction), Dot(axes[2], direction)}; }
+  Vec3 ToWorld(const Vec3& direction) const { return direction.x * axes[0] + direction.y * axes[1] + direction.z * axes[2]; }
+
+  friend bool operator==(const Orientation&, const Orientation&) = default;
+};
+
+}  // namespace slabstream

@@ -1,0 +1,128 @@
+// Where things are in a picture: one object, stored in any of the 48 orders of axes, gives one picture, with left on the side where a
+// viewer expects it.
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "tests/end_to_end/picture_file.h"
+#include "tests/end_to_end/program.h"
+#include "tests/volume_io/stored_object.h"
+
+namespace slabstream {
+namespace {
+
+using testing::HasSubstr;
+
+// A body with a bright block at its right, anterior, superior corner.
+Object Body() {
+  Object body{.size = {24, 20, 16}, .steps = {Vec3{2, 0, 0}, Vec3{0, 1.5, 0}, Vec3{0, 0, 3}}, .origin = {}, .value = {}};
+  body.value = [](const Index3& at) -> std::uint8_t {
+    if (at.x >= 18 && at.y >= 15 && at.z >= 11) return 250;
+    return at.x > 2 && at.x < 20 && at.y > 4 && at.y < 17 && at.z > 1 && at.z < 13 ? std::uint8_t(60 + 3 * at.x + at.z) : 0;
+  };
+  return body;
+}
+
+class OrientationTest : public EndToEndTest {
+ protected:
+  std::string Store(const Storage& storage) const {
+    WriteFile(Path("body.nrrd"), NrrdFile(StoredAs(Body(), storage), "left-posterior-superior", {-1, -1, 1}));
+    return Path("body.nrrd");
+  }
+  PictureFile Render(const std::string& volume, std::vector<std::string> more) const {
+    std::vector<std::string> arguments = {"render", volume, "-o", Path("picture.png"), "--size", "64", "--local=2"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    MustRun(arguments);
+    return ReadPicture(Path("picture.png"));
+  }
+};
+
+TEST_F(OrientationTest, OneObjectInAnyStorageGivesOnePicture) {
+  for (const std::vector<std::string>& look :
+       {std::vector<std::string>{"--renderer", "zbuffer"}, {"--renderer", "mip"}, {"--renderer", "raycast", "--light", "1,2,3"}}) {
+    std::vector<std::string> options = {"--azimuth", "200", "--elevation", "25"};
+    options.insert(options.end(), look.begin(), look.end());
+    const std::vector<Storage> storages = AllStorages();
+    const PictureFile first = Render(Store(storages.front()), options);
+    EXPECT_GT(*std::ranges::max_element(first.samples), 0.5);
+    for (const Storage& storage : storages) {
+      EXPECT_EQ(LargestDifference(Render(Store(storage), options), first), 0) << look[1] << ", " << Text(storage);
+    }
+  }
+}
+
+TEST_F(OrientationTest, NamedViewsShowTheCornerWhereItIs) {
+  struct Case {
+    const char* view;
+    int x, y;  // side of the picture where the patient's right, anterior, superior corner appears: -1 left or top, 1 right or bottom
+  };
+  const std::string volume = Store(AllStorages()[29]);
+  for (const auto& [view, side_x, side_y] : {Case{"anterior", -1, -1},
+                                             {"posterior", 1, -1},
+                                             {"right", 1, -1},
+                                             {"left", -1, -1},
+                                             {"superior", 1, -1},
+                                             {"inferior", -1, -1},
+                                             {"front", 1, -1},
+                                             {"back", -1, -1}}) {
+    const PictureFile picture = Render(volume, {"--renderer", "mip", "--transfer", "gray-ramp", "--view", view});
+    double weight = 0, x_sum = 0, y_sum = 0;
+    for (int y = 0; y < picture.height; ++y) {
+      for (int x = 0; x < picture.width; ++x) {
+        if (picture.At(x, y, 3) < 0.9) continue;  // the block, by its opacity
+        weight += 1;
+        x_sum += x + 0.5 - picture.width / 2.0;
+        y_sum += y + 0.5 - picture.height / 2.0;
+      }
+    }
+    ASSERT_GT(weight, 0) << view;
+    EXPECT_GT(side_x * x_sum / weight, 3) << view;
+    EXPECT_GT(side_y * y_sum / weight, 3) << view;
+  }
+}
+
+TEST_F(OrientationTest, InfoTellsHowVoxelsAreStored) {
+  // Stored x is the patient's z, backwards; y is x; z is y, backwards.
+  const std::string info = MustRun({"info", Store({.from = {2, 0, 1}, .flipped = {true, false, true}})}).out;
+  EXPECT_THAT(info, HasSubstr("size         24 x 20 x 16 voxels"));
+  EXPECT_THAT(info, HasSubstr("extent       48 x 30 x 48 mm"));
+  EXPECT_THAT(info, HasSubstr("the file's voxel x runs superior to inferior"));
+  EXPECT_THAT(info, HasSubstr("the file's voxel y runs left to right"));
+  EXPECT_THAT(info, HasSubstr("the file's voxel z runs anterior to posterior"));
+  EXPECT_THAT(info, HasSubstr("oblique      no"));
+}
+
+TEST_F(OrientationTest, AnatomicalViewsNeedAPatient) {
+  const std::string sphere = MakeSphere("sphere.nrrd", 2, 16);
+  const ProgramResult refused = Slabstream({"render", sphere, "--local", "-o", Path("p.png"), "--view", "anterior"});
+  EXPECT_EQ(refused.exit_status, 2);
+  EXPECT_THAT(refused.err, HasSubstr("no patient's orientation"));
+  EXPECT_THAT(refused.err, HasSubstr("front, back, left, right, top and bottom"));
+  MustRun({"render", sphere, "--local", "-o", Path("p.png"), "--view", "top"});
+  const ProgramResult both = Slabstream({"render", sphere, "--local", "-o", Path("p.png"), "--view", "top", "--azimuth", "3"});
+  EXPECT_EQ(both.exit_status, 2);
+  EXPECT_THAT(both.err, HasSubstr("--azimuth"));
+}
+
+TEST_F(OrientationTest, ACameraIsSavedAndReadBack) {
+  const std::string volume = Store(AllStorages()[5]);
+  const std::vector<std::string> view = {"--projection", "perspective", "--look-at", "30,20,30", "--eye", "-90,140,60", "--up", "0,0.2,1"};
+  std::vector<std::string> saving = view;
+  saving.insert(saving.end(), {"--save-camera", Path("camera.json")});
+  const PictureFile picture = Render(volume, saving);
+  EXPECT_EQ(LargestDifference(Render(volume, {"--camera", Path("camera.json")}), picture), 0);
+  const ProgramResult both = Slabstream({"render", volume, "--local", "-o", Path("p.png"), "--camera", Path("camera.json"), "--zoom", "2"});
+  EXPECT_EQ(both.exit_status, 2);
+  const ProgramResult inside =
+      Slabstream({"render", volume, "--local", "-o", Path("p.png"), "--projection", "perspective", "--eye", "24,16,25"});
+  EXPECT_EQ(inside.exit_status, 2);
+  EXPECT_THAT(inside.err, HasSubstr("view.eye"));
+  const ProgramResult turning = Slabstream({"turntable", volume, "--local", "-o", Path("p%d.png"), "--frames", "2", "--eye", "240,16,25"});
+  EXPECT_EQ(turning.exit_status, 2);
+  EXPECT_THAT(turning.err, HasSubstr("--eye stands still"));
+}
+
+}  // namespace
+}  // namespace slabstream
