@@ -150,7 +150,7 @@ void AddViewOptions(CLI::App& app, ViewParameters& view, ImageSize& size) {
   for (const char* angles : {"--view", "--azimuth", "--elevation"}) eye->excludes(app.get_option(angles));
   AddPoint(app, "--up", view.up, "Direction that is upwards in the picture, with --eye (default: 0,0,1)")->needs(eye);
   AddNumber(app, "--distance", view.distance, {0, kMaxWorldCoordinate},
-            "Distance of the eye from the point that it looks at, for --projection perspective (default: as far as needed to see all)")
+            "Distance of the eye from the point that it looks at, for --projection perspective; 0: as far as needed to see all")
       ->excludes(eye);
   AddNumber(app, "--roll", view.roll_degrees, angle, "Degrees that the picture is turned clockwise");
   AddNumber(app, "--zoom", view.zoom, {kMinZoom, kMaxZoom}, "Magnification; at 1 the volume's bounding sphere fills the shorter side");
