@@ -21,7 +21,7 @@ Vec3 ReadPoint(const JsonValue& value) {
 
 // The structured binding names every field: if there is one more, it does not compile.
 Json ViewJson(const ViewParameters& view) {
-  const auto& [projection, azimuth, elevation, roll, zoom, fov, look_at, eye, up, distance, of_patient] = view;
+  const auto& [projection, azimuth, elevation, roll, zoom, fov, look_at, eye, up, distance, fit, of_patient] = view;
   Json json = {{"projection", projection == Projection::kPerspective ? "perspective" : "orthographic"},
                {"azimuth", azimuth},
                {"elevation", elevation},
@@ -32,6 +32,7 @@ Json ViewJson(const ViewParameters& view) {
   if (eye) json["eye"] = PointJson(*eye);
   if (up) json["up"] = PointJson(*up);
   if (distance > 0) json["distance"] = distance;
+  if (fit) json["fit"] = true;
   if (of_patient) json["of_patient"] = true;
   return json;
 }
@@ -54,6 +55,7 @@ std::vector<std::pair<std::string, JsonValue::Read>> ViewFields(ViewParameters& 
           {"eye", point(view.eye)},
           {"up", point(view.up)},
           {"distance", number(view.distance, {0, kMaxWorldCoordinate})},
+          {"fit", [&view](const JsonValue& v) { view.fit = v.Boolean(); }},
           {"of_patient", [&view](const JsonValue& v) { view.of_patient = v.Boolean(); }}};
 }
 

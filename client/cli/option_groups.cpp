@@ -146,6 +146,8 @@ void AddViewOptions(CLI::App& app, ViewParameters& view, ImageSize& size) {
       ->excludes(named);
   AddNumber(app, "--elevation", view.elevation_degrees, angle, "Degrees that the eye is lifted towards +z")->excludes(named);
   AddPoint(app, "--look-at", view.look_at, "Point of the world that the picture's centre shows (default: the volume's centre)");
+  app.add_flag("--fit", view.fit, "Frame what the transfer function shows, instead of the whole volume")
+      ->excludes(app.get_option("--look-at"));
   CLI::Option* const eye = AddPoint(app, "--eye", view.eye, "Point of the world that one looks from, instead of a direction by angles");
   for (const char* angles : {"--view", "--azimuth", "--elevation"}) eye->excludes(app.get_option(angles));
   AddPoint(app, "--up", view.up, "Direction that is upwards in the picture, with --eye (default: 0,0,1)")->needs(eye);
@@ -158,8 +160,8 @@ void AddViewOptions(CLI::App& app, ViewParameters& view, ImageSize& size) {
             "Field of view in degrees, for --projection perspective; the eye's distance follows");
   CLI::Option* const camera = AddParsed(app, "--camera", view, ParseCameraFile, "Take the view from a file that --save-camera wrote");
   camera->type_name("FILE");
-  for (const char* option :
-       {"--projection", "--view", "--azimuth", "--elevation", "--look-at", "--eye", "--up", "--distance", "--roll", "--zoom", "--fov"}) {
+  for (const char* option : {"--projection", "--view", "--azimuth", "--elevation", "--look-at", "--fit", "--eye", "--up", "--distance",
+                             "--roll", "--zoom", "--fov"}) {
     camera->excludes(app.get_option(option));
   }
 }

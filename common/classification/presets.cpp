@@ -156,14 +156,18 @@ TransferFunction MriBrain(const VolumeSummary& summary) {
           {{clear, 0}, {solid, opacity}, {std::max(solid, at(0.98)), std::min(1.4 * opacity, 0.95)}}};
 }
 
-// Skin as a veil; brighter tissue shines through it.
+// For T1: the brain lies between the fluids, which are dark, and the fat of the scalp, which is brightest. Both ends are almost clear, so
+// the brain shows through the skin.
 TransferFunction MriHead(const VolumeSummary& summary) {
   const MaterialBins tissue = Material(summary);
   const double begin = BinBorder(summary.range, tissue.first);
   const auto at = [&](double q) { return Quantile(summary, tissue, q); };
-  return {
-      {{begin, {0.55F, 0.38F, 0.32F}}, {at(0.3), {0.80F, 0.58F, 0.48F}}, {at(0.7), {0.93F, 0.80F, 0.68F}}, {at(0.99), {1, 0.96F, 0.88F}}},
-      {{std::lerp(begin, at(0.3), 0.3), 0}, {at(0.3), 0.06}, {at(0.7), 0.25}, {at(0.99), 0.8}}};
+  return {{{begin, {0.50F, 0.30F, 0.25F}},
+           {at(0.4), {0.72F, 0.48F, 0.40F}},
+           {at(0.7), {0.93F, 0.76F, 0.65F}},
+           {at(0.9), {1, 0.93F, 0.84F}},
+           {at(0.99), {1, 0.90F, 0.70F}}},
+          {{at(0.2), 0}, {at(0.4), 0.015}, {at(0.6), 0.05}, {at(0.85), 0.12}, {at(0.95), 0.06}, {at(0.99), 0.03}}};
 }
 
 // Vessels are the brightest few per cent, or all of the material where everything else was masked out.

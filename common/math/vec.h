@@ -51,6 +51,10 @@ constexpr std::size_t CountIn(const Index3& size) { return std::size_t(size.x) *
 constexpr std::size_t NumberIn(const Index3& size, const Index3& at) {
   return (std::size_t(at.z) * std::size_t(size.y) + std::size_t(at.y)) * std::size_t(size.x) + std::size_t(at.x);
 }
+constexpr Index3 PlaceIn(const Index3& size, std::size_t number) {
+  const auto x = std::size_t(size.x), y = std::size_t(size.y);
+  return {std::int32_t(number % x), std::int32_t(number / x % y), std::int32_t(number / (x * y))};
+}
 // How many cubes of `side` along each axis cover `size`.
 constexpr Index3 CubesOver(const Index3& size, std::int32_t side) { return (size + Uniform(side - 1)) / side; }
 

@@ -29,6 +29,27 @@ bool BrickVisibility::AnyVisible(const Box& box) const {
   return false;
 }
 
+std::optional<BrickVisibility::Ball> BrickVisibility::VisibleBall() const {
+  const VolumeGeometry& geometry = summary_.description.geometry;
+  std::vector<Box> visible;
+  Box hull;
+  for (std::size_t i = 0; i < summary_.bricks.size(); ++i) {
+    if (!Visible(summary_.bricks[i], 0)) continue;
+    const Index3 brick = PlaceIn(summary_.brick_counts, i);
+    visible.push_back(Intersection({kBrick * brick, kBrick * (brick + Uniform(1))}, geometry.bounds()));
+    hull = Hull(hull, visible.back());
+  }
+  if (visible.empty()) return std::nullopt;
+  const auto middle = [](const Box& box) { return 0.5 * (ToVec3(box.begin + box.end) - Vec3{1, 1, 1}); };
+  Ball ball{.centre = middle(hull)};
+  for (const Box& box : visible) {
+    const Vec3 from = middle(box) - ball.centre, half = 0.5 * ToVec3(box.size());
+    const Vec3 farthest = {std::abs(from.x) + half.x, std::abs(from.y) + half.y, std::abs(from.z) + half.z};
+    ball.radius = std::max(ball.radius, Length(farthest * geometry.spacing));
+  }
+  return ball;
+}
+
 OccupancyGrid BrickVisibility::VisibleCells() const {
   static_assert(kBrick % kOccupancyCell == 0, "a cell lies in one brick");
   OccupancyGrid grid{summary_.description.geometry.size, {}};
@@ -45,13 +66,13 @@ OccupancyGrid BrickVisibility::VisibleCells() const {
   return grid;
 }
 
-bool BrickVisibility::Visible(const ValueRange& brick) const {
+bool BrickVisibility::Visible(const ValueRange& brick, int slack) const {
   if (brick.min > brick.max) return false;
-  // The range was rounded to float; one more bin on both sides makes up for the way back to stored samples.
+  // The range was rounded to float; a slack of one bin on both sides makes up for the way back to stored samples.
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   const int a = table_.BinOf(StoredFromData(double(std::nextafter(brick.min, -kInfinity))));
   const int b = table_.BinOf(StoredFromData(double(std::nextafter(brick.max, kInfinity))));
-  const int low = std::max(std::min(a, b) - 1, 0), high = std::min(std::max(a, b) + 1, table_.size() - 1);
+  const int low = std::max(std::min(a, b) - slack, 0), high = std::min(std::max(a, b) + slack, table_.size() - 1);
   return next_visible_[std::size_t(low)] <= high;
 }
 

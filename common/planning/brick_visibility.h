@@ -3,6 +3,7 @@
 // Rounding is conservative: a box that is called empty holds no voxel whose bin has an opacity above zero in the renderer's DrawnTable.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "common/classification/classification_table.h"
@@ -19,11 +20,18 @@ class BrickVisibility {
   // True if a brick that touches `box` (not empty, inside the volume) can be visible.
   bool AnyVisible(const Box& box) const;
 
+  // A ball round all bricks that are visible, but for rounding: for framing, where nothing depends on a voxel. None: no brick is.
+  struct Ball {
+    Vec3 centre;        // data space
+    double radius = 0;  // physical, > 0
+  };
+  std::optional<Ball> VisibleBall() const;
+
   // Counts all voxels of bricks that can be visible as occupied: a substitute for an exact count.
   OccupancyGrid VisibleCells() const;
 
  private:
-  bool Visible(const ValueRange& brick) const;
+  bool Visible(const ValueRange& brick, int slack = 1) const;  // bins
   double StoredFromData(double value) const;
 
   const VolumeSummary& summary_;

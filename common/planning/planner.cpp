@@ -2,6 +2,7 @@
 #include <string>
 #include <utility>
 
+#include "common/planning/brick_visibility.h"
 #include "common/planning/frame_plan.h"
 #include "common/planning/placement.h"
 #include "common/renderers/registry.h"
@@ -15,14 +16,19 @@ Result<FrameSetup> MakeFrameSetup(const FrameRequest& request, DatasetId dataset
         "view: the volume has no patient's orientation, so it has no anterior, posterior, superior or inferior side; front, back, left, "
         "right, top and bottom are possible");
   }
-  if (Status status = CheckView(request.view, summary.description.geometry); !status.ok()) return status;
   FrameSetup setup;
   setup.dataset = dataset;
   setup.description = summary.description;
   setup.range = summary.range;
   SetRenderer(*FindRenderer(request.renderer), setup);
   SetParameters(ParseParameters(*setup.renderer, request.parameters).value(), setup);
-  if (Status status = setup.renderer->SetView(request.view, request.size, setup); !status.ok()) return status;
+  ViewParameters view = request.view;
+  if (view.fit) {
+    const auto ball = BrickVisibility(summary, setup.renderer->DrawnTable(*transfer, summary)).VisibleBall();
+    if (ball) view = FitView(view, summary.description.geometry, ball->centre, ball->radius);
+  }
+  if (Status status = CheckView(view, summary.description.geometry); !status.ok()) return status;
+  if (Status status = setup.renderer->SetView(view, request.size, setup); !status.ok()) return status;
   setup.transfer = *std::move(transfer);
   setup.shading = request.shading;
   for (Vec3& light : setup.shading.lights) light = summary.description.geometry.orientation.FromWorld(light);

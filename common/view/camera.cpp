@@ -129,6 +129,7 @@ Status Validate(const ViewParameters& view) {
   if (Status s = CheckPoint("view.eye", view.eye); !s.ok()) return s;
   if (Status s = CheckPoint("view.up", view.up); !s.ok()) return s;
   if (Status s = InRange("view.distance", view.distance, 0, kMaxWorldCoordinate); !s.ok()) return s;
+  if (view.fit && view.look_at) return Status::InvalidArgument("view.fit and view.look_at cannot both be given");
   if (view.up && !view.eye) return Status::InvalidArgument("view.up needs view.eye; without an eye, view.roll turns the picture");
   if (view.up && !(Length(*view.up) > 0)) return Status::InvalidArgument("view.up is 0,0,0, but must be a direction");
   if (view.distance > 0 && view.eye) return Status::InvalidArgument("view.distance and view.eye cannot both be given");
@@ -136,6 +137,20 @@ Status Validate(const ViewParameters& view) {
     return Status::InvalidArgument("view.distance needs a perspective projection; view.zoom magnifies orthographic pictures");
   }
   return Status::Ok();
+}
+
+ViewParameters FitView(const ViewParameters& view, const VolumeGeometry& geometry, const Vec3& centre, double radius) {
+  ViewParameters fitted = view;
+  fitted.fit = false;
+  fitted.look_at = geometry.orientation.origin + geometry.orientation.ToWorld(geometry.spacing * centre);
+  if (view.projection == Projection::kPerspective) {
+    const double sine = radius / LookOf(fitted, geometry).distance;  // of the angle at which the eye sees the ball's radius
+    if (sine < 1) fitted.zoom *= std::tan(view.fov_degrees * (std::numbers::pi / 360)) * std::sqrt(1 - sine * sine) / sine;
+  } else {
+    fitted.zoom *= 0.5 * Length(ToVec3(geometry.size) * geometry.spacing) / radius;
+  }
+  fitted.zoom = std::min(fitted.zoom, kMaxZoom);
+  return fitted;
 }
 
 Status CheckView(const ViewParameters& view, const VolumeGeometry& geometry) {

@@ -53,6 +53,7 @@ struct ViewParameters {
   std::optional<Vec3> look_at, eye;
   std::optional<Vec3> up;   // a direction that is upwards in the picture; only with an eye; none: +z, or +y if one looks along z
   double distance = 0;      // from the target to the eye, in the world's unit; perspective without `eye` only; 0: see above
+  bool fit = false;         // the picture frames what the transfer function shows, not the whole volume (FitView); not with look_at
   bool of_patient = false;  // the angles are meant for a patient: volumes without such an orientation are refused
   friend bool operator==(const ViewParameters&, const ViewParameters&) = default;
 };
@@ -93,6 +94,10 @@ struct Camera {
 
   friend bool operator==(const Camera&, const Camera&) = default;
 };
+
+// The view in the same direction whose target is `centre` (data space), and in which a ball of `radius` > 0 (physical) round it touches the
+// shorter side of the picture at zoom 1. The eye's distance stays. Not `fit` any more.
+ViewParameters FitView(const ViewParameters& view, const VolumeGeometry& geometry, const Vec3& centre, double radius);
 
 // `view` and `size` valid, and CheckView is ok. Not `supersampled`: supersample is 1.
 Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry, bool supersampled = false);

@@ -35,6 +35,7 @@ void Fields(auto& io, Is<ViewParameters> auto& m) {
   io.Optional("eye", m.eye, &P::has_eye, &P::eye, &P::mutable_eye);
   io.Optional("up", m.up, &P::has_up, &P::up, &P::mutable_up);
   io.Finite("distance", m.distance, &P::distance, &P::set_distance);
+  io.Any(m.fit, &P::fit, &P::set_fit);
   io.Any(m.of_patient, &P::of_patient, &P::set_of_patient);
 }
 

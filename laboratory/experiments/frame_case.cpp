@@ -79,7 +79,7 @@ FrameRequest RequestOf(const FrameCase& frame) {
 namespace {
 
 std::string AnglesOf(const ViewParameters& view) {
-  const auto& [projection, azimuth, elevation, roll, zoom, fov, look_at, eye, up, distance, of_patient] = view;
+  const auto& [projection, azimuth, elevation, roll, zoom, fov, look_at, eye, up, distance, fit, of_patient] = view;
   const auto point = [](const char* what, const std::optional<Vec3>& p) {
     return p ? fmt::format(" {} {:.4g},{:.4g},{:.4g}", what, p->x, p->y, p->z) : std::string();
   };
@@ -88,7 +88,7 @@ std::string AnglesOf(const ViewParameters& view) {
   if (zoom != 1) name += fmt::format(" zoom {:.4g}", zoom);
   if (projection == Projection::kPerspective) name += fmt::format(" fov {:.4g}", fov);
   if (distance > 0) name += fmt::format(" distance {:.4g}", distance);
-  return name + point("at", look_at) + point("from", eye) + point("up", up) + (of_patient ? " of a patient" : "");
+  return name + point("at", look_at) + point("from", eye) + point("up", up) + (fit ? " fit" : "") + (of_patient ? " of a patient" : "");
 }
 
 }  // namespace

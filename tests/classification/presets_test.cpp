@@ -71,7 +71,7 @@ TEST(Presets, ForAHeadShowTissueAndLeaveAirOut) {
     const double scale = type == ScalarType::kFloat32 ? 0.01 : 1;
     const VolumeSummary summary = Summarize(NoisyHead(random, type, scale));
     const double ball = 4.0 / 3 * 3.14159 * 18 * 18 * 18 / (48 * 48 * 48);
-    for (const char* name : {"auto", "mri-brain", "mri-head"}) {
+    for (const char* name : {"auto", "mri-brain"}) {
       const TransferFunction transfer = MakePreset(name, summary).value();
       EXPECT_EQ(OpacityAt(transfer, 5 * scale), 0) << name << ": air";
       EXPECT_GT(OpacityAt(transfer, 90 * scale), 0.01) << name << ": tissue";
@@ -82,6 +82,22 @@ TEST(Presets, ForAHeadShowTissueAndLeaveAirOut) {
     EXPECT_GT(std::pow(1 - tissue, 2), 0.02) << "soft: not solid within two voxels";
     EXPECT_LT(std::pow(1 - tissue, 10), 0.02) << "solid within ten";
   }
+}
+
+TEST(Presets, ForAWholeHeadShowTheBrainThroughTheSkin) {
+  Random random(10);
+  SCOPED_TRACE(random.trace());
+  constexpr double kFat = 190, kBrain = 95, kFluid = 40, kAir = 4;
+  const Volume head = MakeTestVolume({128, 128, 128}, ScalarType::kUint8, [&](const Index3& v) {
+    const double r = Length(ToVec3(v) - Vec3{63.5, 63.5, 63.5});
+    return (r > 60 ? kAir : r > 58 ? kFat : r > 54 ? kFluid : kBrain) + random.Real(-3, 3) * (r > 60 ? 1 : 4);
+  });
+  const TransferFunction transfer = MakePreset("mri-head", Summarize(head)).value();
+  EXPECT_EQ(OpacityAt(transfer, kAir), 0);
+  EXPECT_GT(OpacityAt(transfer, kFat), 0) << "a veil";
+  EXPECT_GT(std::pow(1 - OpacityAt(transfer, kFat), 5), 0.6) << "the scalp, of five voxels, lets most of the light through";
+  EXPECT_GT(std::pow(1 - OpacityAt(transfer, kFluid), 5), 0.9);
+  EXPECT_LT(std::pow(1 - OpacityAt(transfer, kBrain), 20), 0.5) << "the brain hides what is behind it";
 }
 
 TEST(AutoPreset, ShowsWhatLiesBelowTheBackgroundToo) {

@@ -17,7 +17,7 @@ TEST(CameraJson, IsReadBackAsItWas) {
        .fov_degrees = 17},
       {.projection = Projection::kPerspective, .look_at = Vec3{1, 2.25, -3}, .distance = 400},
       {.look_at = Vec3{1e-9, 0, 0}, .eye = Vec3{100, 0, 0}, .up = Vec3{0, 1, 1}},
-      {.azimuth_degrees = 180, .of_patient = true},
+      {.azimuth_degrees = 180, .fit = true, .of_patient = true},
   };
   for (const ViewParameters& view : views) {
     const Result<ViewParameters> read = ParseCamera(ViewJson(view).dump());

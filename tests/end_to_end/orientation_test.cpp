@@ -124,5 +124,31 @@ TEST_F(OrientationTest, ACameraIsSavedAndReadBack) {
   EXPECT_THAT(turning.err, HasSubstr("--eye stands still"));
 }
 
+// A small object in a corner of a large volume.
+TEST_F(OrientationTest, FitFramesWhatIsVisible) {
+  Object corner = Body();
+  corner.size = {96, 96, 96};
+  corner.value = [](const Index3& at) -> std::uint8_t { return at.x < 20 && at.y >= 70 && at.y < 90 && at.z < 20 ? 200 : 0; };
+  WriteFile(Path("corner.nrrd"), NrrdFile(StoredAs(corner, AllStorages().front())));
+  const auto covered = [&](std::vector<std::string> options) {
+    const PictureFile picture = Render(Path("corner.nrrd"), std::move(options));
+    int pixels = 0;
+    for (int y = 0; y < picture.height; ++y) {
+      for (int x = 0; x < picture.width; ++x) pixels += picture.At(x, y, 3) > 0.5F ? 1 : 0;
+    }
+    return pixels;
+  };
+  for (const char* renderer : {"zbuffer", "raycast", "splat"}) {
+    for (const char* projection : {"orthographic", "perspective"}) {
+      const std::vector<std::string> plain = {"--renderer", renderer, "--projection", projection,
+                                              "--azimuth",  "30",     "--transfer",   "opaque"};
+      std::vector<std::string> fitted = plain;
+      fitted.emplace_back("--fit");
+      EXPECT_LT(covered(plain), 64 * 64 / 20) << renderer << " " << projection;
+      EXPECT_GT(covered(fitted), 64 * 64 / 6) << renderer << " " << projection;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace slabstream

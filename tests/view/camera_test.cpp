@@ -349,6 +349,36 @@ TEST(Camera, ThatIsAllowedSeesTheWholeVolumeBeforeIt) {
   EXPECT_GT(allowed, 300);
 }
 
+// The outline of a ball that the view was fitted to touches the shorter side of the picture.
+TEST(Camera, FitsABall) {
+  Random random(35);
+  SCOPED_TRACE(random.trace());
+  int seen = 0;
+  for (int i = 0; i < 300; ++i) {
+    const VolumeGeometry geometry = RandomPlace(random);
+    const Vec3 centre = RandomVoxel(random);
+    const double radius = random.Real(2, 8);
+    ViewParameters view = RandomView(random);
+    view.zoom = 1;
+    view.fit = true;
+    const ViewParameters fitted = FitView(view, geometry, centre, radius);
+    EXPECT_FALSE(fitted.fit);
+    if (!CheckView(fitted, geometry).ok()) continue;
+    ++seen;
+    const Camera camera = MakeCamera(fitted, {200, 150}, geometry);
+    double farthest = 0;
+    for (int k = 0; k < 20000; ++k) {
+      const double z = random.Real(-1, 1), angle = random.Real(0, 7), r = std::sqrt(1 - z * z);
+      const Vec3 on = centre + radius * Vec3{r * std::cos(angle), r * std::sin(angle), z} / geometry.spacing;
+      const Camera::ImagePoint at = camera.Project(on);
+      farthest = std::max(farthest, std::hypot(at.x - 100, at.y - 75));
+    }
+    EXPECT_NEAR(farthest, 75, 0.2);
+    if (seen == 40) break;
+  }
+  EXPECT_EQ(seen, 40);
+}
+
 TEST(Camera, SaysWhichViewsCannotBeHad) {
   const auto refusal = [](const ViewParameters& view) {
     Status status = Validate(view);
@@ -364,6 +394,7 @@ TEST(Camera, SaysWhichViewsCannotBeHad) {
   EXPECT_EQ(refusal({.look_at = Vec3{0, 0, 0}, .eye = Vec3{0, 0, 90}, .up = Vec3{0, 0, -2}}), "view.up points along the direction of view");
   EXPECT_EQ(refusal({.look_at = Vec3{1, std::numeric_limits<double>::quiet_NaN(), 3}}),
             "view.look_at.y is nan, but must lie in [-1000000000, 1000000000]");
+  EXPECT_EQ(refusal({.look_at = Vec3{1, 2, 3}, .fit = true}), "view.fit and view.look_at cannot both be given");
   // The volume is 15.5 deep along y, so its middle must be more than 7.75 away.
   EXPECT_EQ(
       refusal({.projection = Projection::kPerspective, .distance = 7}),
