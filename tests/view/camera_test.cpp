@@ -296,7 +296,9 @@ TEST(Camera, ShowsItsTargetInTheMiddleOfThePicture) {
     const Camera::ImagePoint seen = camera.Project(voxel);
     EXPECT_NEAR(seen.x, 100, 1e-6);
     EXPECT_NEAR(seen.y, 75, 1e-6);
-    if (view.distance > 0) EXPECT_NEAR(seen.depth, view.distance, 1e-9);
+    if (view.distance > 0) {
+      EXPECT_NEAR(seen.depth, view.distance, 1e-9);
+    }
   }
 }
 

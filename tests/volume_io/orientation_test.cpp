@@ -196,8 +196,12 @@ TEST(Orientation, OfSlantedSlicesIsStraightened) {
             within = within && voxel[i] > -1e-6 && voxel[i] < object.size[i] - 1 + 1e-6;
             beyond = beyond || voxel[i] < -1 - 1e-6 || voxel[i] > object.size[i] + 1e-6;
           }
-          if (within) EXPECT_NEAR(found, value(world), 1e-2) << Text(voxel);
-          if (beyond) EXPECT_EQ(found, float(outside)) << Text(voxel);
+          if (within) {
+            EXPECT_NEAR(found, value(world), 1e-2) << Text(voxel);
+          }
+          if (beyond) {
+            EXPECT_EQ(found, float(outside)) << Text(voxel);
+          }
           inside += within ? 1 : 0;
         }
       }
