@@ -1,6 +1,7 @@
-// Loads a service with many clients, threads of this process. Well-behaved clients ask for a picture, read it, and ask for the next one.
-// After a while two others join them: one asks for pictures and never reads them, one asks for very large pictures. The program exits with
-// 0 if each process stays within its --memory, and if the well-behaved clients together keep at least half of their pictures a second.
+// Puts a service under the load of many clients, which are threads of this process. Well-behaved clients ask for a picture, read it, and
+// ask for the next one. After a while two others join them: one asks for pictures and never reads them, one asks for very large pictures.
+// The program exits with 0 if each process stays within its --memory, and if the well-behaved clients together keep at least half of their
+// pictures a second.
 #include <fmt/format.h>
 #include <unistd.h>
 

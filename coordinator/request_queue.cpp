@@ -7,7 +7,7 @@ namespace slabstream {
 
 void RequestQueue::Push(OpenRequest request) {
   ClientQueue& queue = clients_[request.client];
-  if (queue.requests.empty()) queue.turn = {std::max(queue.turn.used, used_by_last_), ++turns_};
+  if (queue.requests.empty()) queue.turn = AtLeastLast({queue.turn.used, ++turns_});
   queue.requests.push_back(std::move(request));
 }
 

@@ -11,27 +11,23 @@ namespace slabstream {
 Result<FrameSetup> MakeFrameSetup(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary) {
   Result<TransferFunction> transfer = ResolveTransfer(request.transfer, summary);
   if (!transfer.ok()) return transfer.status();
-  if (request.view.of_patient && summary.description.geometry.orientation.world != World::kPatient) {
-    return Status::InvalidArgument(
-        "view: the volume has no patient's orientation, so it has no anterior, posterior, superior or inferior side; front, back, left, "
-        "right, top and bottom are possible");
-  }
   FrameSetup setup;
   setup.dataset = dataset;
   setup.description = summary.description;
   setup.range = summary.range;
   SetRenderer(*FindRenderer(request.renderer), setup);
   SetParameters(ParseParameters(*setup.renderer, request.parameters).value(), setup);
+  const VolumeGeometry& geometry = summary.description.geometry;
   ViewParameters view = request.view;
   if (view.fit) {
     const auto ball = BrickVisibility(summary, setup.renderer->DrawnTable(*transfer, summary)).VisibleBall();
-    if (ball) view = FitView(view, summary.description.geometry, ball->centre, ball->radius);
+    if (ball) view = FitView(view, geometry, ball->centre, ball->radius);
   }
-  if (Status status = CheckView(view, summary.description.geometry); !status.ok()) return status;
+  if (Status status = CheckView(view, geometry); !status.ok()) return status;
   if (Status status = setup.renderer->SetView(view, request.size, setup); !status.ok()) return status;
   setup.transfer = *std::move(transfer);
   setup.shading = request.shading;
-  for (Vec3& light : setup.shading.lights) light = summary.description.geometry.orientation.FromWorld(light);
+  for (Vec3& light : setup.shading.lights) light = geometry.orientation.FromWorld(light);
   setup.termination = request.termination;
   return setup;
 }

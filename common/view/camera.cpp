@@ -29,15 +29,25 @@ SinCos SinCosDegrees(double degrees) {
   }
 }
 
-// Orthonormal: right, up and the view direction. Azimuth and elevation turn a sphere's tangent frame, which exists at
-// the poles too, so that elevation +-90 needs no special case.
+constexpr double kParallel = 1e-6;  // the length of the cross product of two unit vectors that are
+
+Vec3 CentreOf(const VolumeGeometry& geometry) { return 0.5 * (ToVec3(geometry.size) - Vec3{1, 1, 1}); }  // data space
+Vec3 ExtentOf(const VolumeGeometry& geometry) { return ToVec3(geometry.size) * geometry.spacing; }
+double RadiusOf(const VolumeGeometry& geometry) { return 0.5 * Length(ExtentOf(geometry)); }  // of the bounding sphere
+double HalfFov(const ViewParameters& view) { return view.fov_degrees * (std::numbers::pi / 360); }
+
+Vec3 WorldOf(const Vec3& voxel, const VolumeGeometry& geometry) {
+  return geometry.orientation.origin + geometry.orientation.ToWorld(geometry.spacing * voxel);
+}
+
+// Orthonormal: right, up and the view direction. Azimuth and elevation turn a sphere's tangent frame, which exists at the poles too, so
+// that elevation +-90 needs no special case.
 struct Frame {
   Vec3 right, up, forward;
 };
 
 // From an eye that is given.
 Frame LookingFrame(const ViewParameters& view, const Vec3& target) {
-  constexpr double kParallel = 1e-6;
   const Vec3 forward = Normalized(target - *view.eye);
   Vec3 right = Cross(forward, view.up ? Normalized(*view.up) : Vec3{0, 0, 1});
   if (Length(right) < kParallel) right = Cross(forward, {0, 1, 0});
@@ -63,9 +73,9 @@ struct Look {
 
 Look LookOf(const ViewParameters& view, const VolumeGeometry& geometry) {
   const Orientation& orientation = geometry.orientation;
-  const Vec3 centre = orientation.origin + orientation.ToWorld(0.5 * (ToVec3(geometry.size) - Vec3{1, 1, 1}) * geometry.spacing);
+  const Vec3 centre = WorldOf(CentreOf(geometry), geometry);
   const Vec3 target = view.look_at.value_or(centre);
-  const double radius = 0.5 * Length(ToVec3(geometry.size) * geometry.spacing);
+  const double radius = RadiusOf(geometry);
   auto [right, up, forward] = view.eye ? LookingFrame(view, target) : FrameByAngles(view);
   const auto [sin_roll, cos_roll] = SinCosDegrees(view.roll_degrees);
   const Frame rolled = {cos_roll * right + sin_roll * up, cos_roll * up - sin_roll * right, forward};
@@ -78,7 +88,7 @@ Look LookOf(const ViewParameters& view, const VolumeGeometry& geometry) {
   } else if (view.eye) {
     look.distance = Length(target - *view.eye);
   } else {
-    look.distance = view.distance > 0 ? view.distance : radius / std::sin(view.fov_degrees * (std::numbers::pi / 360));
+    look.distance = view.distance > 0 ? view.distance : radius / std::sin(HalfFov(view));
   }
   return look;
 }
@@ -142,31 +152,32 @@ Status Validate(const ViewParameters& view) {
 ViewParameters FitView(const ViewParameters& view, const VolumeGeometry& geometry, const Vec3& centre, double radius) {
   ViewParameters fitted = view;
   fitted.fit = false;
-  fitted.look_at = geometry.orientation.origin + geometry.orientation.ToWorld(geometry.spacing * centre);
+  fitted.look_at = WorldOf(centre, geometry);
   if (view.projection == Projection::kPerspective) {
     const double sine = radius / LookOf(fitted, geometry).distance;  // of the angle at which the eye sees the ball's radius
-    if (sine < 1) fitted.zoom *= std::tan(view.fov_degrees * (std::numbers::pi / 360)) * std::sqrt(1 - sine * sine) / sine;
+    if (sine < 1) fitted.zoom *= std::tan(HalfFov(view)) * std::sqrt(1 - sine * sine) / sine;
   } else {
-    fitted.zoom *= 0.5 * Length(ToVec3(geometry.size) * geometry.spacing) / radius;
+    fitted.zoom *= RadiusOf(geometry) / radius;
   }
   fitted.zoom = std::min(fitted.zoom, kMaxZoom);
   return fitted;
 }
 
 Status CheckView(const ViewParameters& view, const VolumeGeometry& geometry) {
-  constexpr double kParallel = 1e-6;
+  if (view.of_patient && geometry.orientation.world != World::kPatient) {
+    return Status::InvalidArgument(
+        "view: the volume has no patient's orientation, so it has no anterior, posterior, superior or inferior side; front, back, left, "
+        "right, top and bottom are possible");
+  }
   const Look look = LookOf(view, geometry);
   const Vec3& forward = look.frame.forward;
-  if (view.eye && !(look.distance > 0) && view.projection == Projection::kPerspective) {
-    return Status::InvalidArgument("view.eye is at the point that it looks at");
-  }
   if (!std::isfinite(Length(forward))) return Status::InvalidArgument("view.eye is at the point that it looks at");
   const Vec3 up = view.up ? geometry.orientation.FromWorld(Normalized(*view.up)) : Vec3{};
   if (view.up && Length(Cross(up, forward)) < kParallel) return Status::InvalidArgument("view.up points along the direction of view");
   if (view.projection != Projection::kPerspective) return Status::Ok();
 
   // Every corner lies before the eye, and the eye before the first slice.
-  const Vec3 half = 0.5 * (ToVec3(geometry.size) * geometry.spacing);
+  const Vec3 half = 0.5 * ExtentOf(geometry);
   const double corners = std::abs(forward.x) * half.x + std::abs(forward.y) * half.y + std::abs(forward.z) * half.z;
   const Axis c = NearestAxis(forward);
   const double before = std::max(corners + Dot(forward, look.target), half[c] / std::abs(forward[c]) + look.target[c] / forward[c]);
@@ -188,13 +199,12 @@ Status Validate(const ImageSize& size) {
 Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry, bool supersampled) {
   const bool perspective = view.projection == Projection::kPerspective;
   const Vec3 spacing = geometry.spacing;
-  const Vec3 extent = ToVec3(geometry.size) * spacing;
-  const double radius = 0.5 * Length(extent);
+  const double radius = RadiusOf(geometry);
   const auto& [frame, target, distance] = LookOf(view, geometry);
-  const Vec3 centre = 0.5 * (ToVec3(geometry.size) - Vec3{1, 1, 1}) + target / spacing;  // data space, of the picture
+  const Vec3 centre = CentreOf(geometry) + target / spacing;  // data space, of the picture
 
   // Pixels a physical unit at unit depth (perspective) or everywhere (orthographic).
-  const double half_fov = view.fov_degrees * (std::numbers::pi / 360);
+  const double half_fov = HalfFov(view);
   const double half_side = 0.5 * std::min(size.width, size.height);
   double scale = view.zoom * half_side / (perspective ? std::tan(half_fov) : radius);
 

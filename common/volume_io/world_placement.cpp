@@ -172,7 +172,7 @@ Result<WorldPlacement> PlaceInWorld(const RawHeader& header, const std::string& 
   const Vec3 x = Normalized(steps[0]);
   const Vec3 y = Normalized(steps[1] - Dot(steps[1], x) * x);
   orientation.axes = {x, y, Cross(x, y)};
-  const std::array<Vec3, 3> straight = {orientation.FromWorld(steps[0]), orientation.FromWorld(steps[1]), orientation.FromWorld(steps[2])};
+  const Steps straight = {orientation.FromWorld(steps[0]), orientation.FromWorld(steps[1]), orientation.FromWorld(steps[2])};
   const double xy = straight[1].x / Length(steps[1]), xz = straight[2].x / Length(steps[2]), yz = straight[2].y / Length(steps[2]);
   if (std::max({std::abs(xy), std::abs(xz), std::abs(yz)}) < kStraight) {
     geometry.spacing = {Length(steps[0]), Length(steps[1]), Length(steps[2])};

@@ -31,6 +31,20 @@ std::optional<OpenRequest> TakeNext(RequestQueue& queue, const RequestQueue::Pre
   return next == nullptr ? std::nullopt : std::optional(queue.Take(*next));
 }
 
+// Takes the next request, whose frame costs a second, and returns its client.
+PeerToken Serve(RequestQueue& queue, const RequestQueue::Predicate& ready) {
+  const OpenRequest served = TakeNext(queue, ready).value();
+  queue.Settle(served, std::chrono::seconds(1));
+  return served.client;
+}
+
+// The clients of the next four.
+std::multiset<PeerToken> ServeFour(RequestQueue& queue, const RequestQueue::Predicate& ready) {
+  std::multiset<PeerToken> served;
+  while (served.size() < 4) served.insert(Serve(queue, ready));
+  return served;
+}
+
 TEST(RequestQueue, ClientsAreServedInTurn) {
   RequestQueue queue;
   for (RequestId id = 1; id <= 3; ++id) queue.Push(Request(1, id));
@@ -71,22 +85,16 @@ TEST(RequestQueue, ClientsThatAlwaysAskGetEqualTime) {
 TEST(RequestQueue, WhoDidNotAskHasNotSavedUpTime) {
   RequestQueue queue;
   queue.Push(Request(2, 1));
-  queue.Settle(*TakeNext(queue, Any), std::chrono::seconds(1));
+  Serve(queue, Any);
   for (RequestId id = 1; id <= 100; ++id) {
     queue.Push(Request(1, id));
-    queue.Settle(*TakeNext(queue, Any), std::chrono::seconds(1));
+    Serve(queue, Any);
   }
   for (RequestId id = 101; id <= 104; ++id) {
     queue.Push(Request(1, id));
     queue.Push(Request(2, id));
   }
-  std::multiset<PeerToken> served;
-  for (int i = 0; i < 4; ++i) {
-    const auto next = TakeNext(queue, Any);
-    served.insert(next->client);
-    queue.Settle(*next, std::chrono::seconds(1));
-  }
-  EXPECT_EQ(served, (std::multiset<PeerToken>{1, 1, 2, 2}));
+  EXPECT_EQ(ServeFour(queue, Any), (std::multiset<PeerToken>{1, 1, 2, 2}));
 }
 
 TEST(RequestQueue, WhoHadToWaitForItsDatasetDoesNotHoldUpTheOthers) {
@@ -96,17 +104,11 @@ TEST(RequestQueue, WhoHadToWaitForItsDatasetDoesNotHoldUpTheOthers) {
   const auto ready = [&](const OpenRequest& request) { return loaded || request.submit.frame.dataset != "loading"; };
   for (RequestId id = 1; id <= 100; ++id) {
     queue.Push(Request(2, id));
-    queue.Settle(*TakeNext(queue, ready), std::chrono::seconds(1));
+    Serve(queue, ready);
   }
   loaded = true;
   for (RequestId id = 101; id <= 104; ++id) queue.Push(Request(2, id));
-  std::multiset<PeerToken> served;
-  for (int i = 0; i < 4; ++i) {
-    const auto next = TakeNext(queue, ready);
-    served.insert(next->client);
-    queue.Settle(*next, std::chrono::seconds(1));
-  }
-  EXPECT_EQ(served, (std::multiset<PeerToken>{1, 1, 2, 2}));
+  EXPECT_EQ(ServeFour(queue, ready), (std::multiset<PeerToken>{1, 1, 2, 2}));
 }
 
 TEST(RequestQueue, RequestsThatAreNotReadyLetOthersPass) {

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 
+#include "tests/support/expect_near.h"
 #include "tests/support/random.h"
 
 namespace slabstream {
@@ -30,12 +31,6 @@ ViewParameters RandomView(Random& random) {
   view.zoom = std::exp(random.Real(-2, 2));
   view.fov_degrees = random.Real(kMinFovDegrees, kMaxFovDegrees);
   return view;
-}
-
-void ExpectNear(const Vec3& a, const Vec3& b, double tolerance) {
-  EXPECT_NEAR(a.x, b.x, tolerance);
-  EXPECT_NEAR(a.y, b.y, tolerance);
-  EXPECT_NEAR(a.z, b.z, tolerance);
 }
 
 TEST(Camera, LooksAsTheConventionSays) {

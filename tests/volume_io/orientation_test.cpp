@@ -13,6 +13,7 @@
 #include <optional>
 
 #include "common/volume_io/volume_reader.h"
+#include "tests/support/expect_near.h"
 #include "tests/support/random.h"
 #include "tests/support/random_volume.h"
 #include "tests/volume_io/stored_object.h"
@@ -56,10 +57,6 @@ Steps Rotated(Random& random, double most_degrees, const Steps& steps) {
     return std::cos(angle) * v + std::sin(angle) * Cross(axis, v) + (1 - std::cos(angle)) * Dot(axis, v) * axis;
   };
   return {turn(steps[0]), turn(steps[1]), turn(steps[2])};
-}
-
-void ExpectNear(const Vec3& a, const Vec3& b, double tolerance) {
-  for (int i = 0; i < 3; ++i) EXPECT_NEAR(a[i], b[i], tolerance) << Text(a) << " and " << Text(b);
 }
 
 TEST(Orientation, OfAnyOfThe48StoragesIsTheSameInEveryFormat) {
