@@ -73,7 +73,9 @@ void FrameMachine::State::On(const OccupiedCounted& event) {
   if (event.grid.ok()) {
     occupancy.Counted(event.count, *event.grid);
   } else if (const std::optional<ClassifiedVolume> failed = occupancy.Failed(event.count)) {
-    const auto waits = [&](const OpenRequest& request) { return request.volume == failed && request.needs_occupancy; };
+    const auto waits = [&](const OpenRequest& request) {
+      return request.volume && request.volume->Whole() == *failed && request.needs_occupancy;
+    };
     for (const OpenRequest& request : queue.Extract(waits)) FailRequest(request, event.grid.status());
   }
 }
@@ -107,7 +109,9 @@ Status FrameMachine::State::FindVolume(OpenRequest& request) const {
   const DatasetTable::Entry& dataset = *datasets.Find(frame.dataset);
   Result<TransferFunction> transfer = ResolveTransfer(frame.transfer, *dataset.summary);
   if (!transfer.ok()) return transfer.status();
-  request.volume.emplace(dataset.id, *std::move(transfer), FindRenderer(frame.renderer));
+  const VolumeGeometry& geometry = dataset.summary->description.geometry;
+  if (Status status = CheckClipping(frame.clipping, geometry); !status.ok()) return status;
+  request.volume.emplace(dataset.id, *std::move(transfer), FindRenderer(frame.renderer), MakeClipRegion(frame.clipping, geometry));
   return Status::Ok();
 }
 
@@ -116,7 +120,7 @@ void FrameMachine::State::CountAhead() {
   std::size_t ahead = 0;
   queue.VisitInTurn([&](const OpenRequest& request) {
     if (!request.volume || request.plan != 0 || !request.needs_occupancy) return true;
-    const ClassifiedVolume& volume = *request.volume;
+    const ClassifiedVolume volume = request.volume->Whole();
     if (!occupancy.Counting(volume) && occupancy.Find(volume) == nullptr) {
       const auto& summary = datasets.Find(request.submit.frame.dataset)->summary;
       actions.emplace_back(CountDataset{.count = occupancy.Begin(volume), .volume = volume, .summary = summary});
@@ -151,7 +155,7 @@ PlanRequest FrameMachine::State::MakePlanRequest(const OpenRequest& request) {
                   .frame = frame,
                   .volume = *request.volume,
                   .summary = datasets.Find(frame.dataset)->summary,
-                  .occupied = request.needs_occupancy ? occupancy.Find(*request.volume) : nullptr,
+                  .occupied = request.needs_occupancy ? occupancy.Find(request.volume->Whole()) : nullptr,
                   .roster = std::move(team.roster),
                   .turn = team.turn};
   for (const Member& member : roster.members()) {
@@ -217,7 +221,7 @@ void FrameMachine::State::Expire() {
 
   for (const OpenRequest& request : queue.Extract(out_of_time)) {
     const DatasetTable::Entry& dataset = *datasets.Find(request.submit.frame.dataset);
-    const bool counting = request.volume && occupancy.Counting(*request.volume);
+    const bool counting = request.volume && occupancy.Counting(request.volume->Whole());
     FailRequest(request, late(request, dataset.state != DatasetState::kReady ? "its dataset was still being loaded"
                                        : clients.IsBehind(request.client)    ? "this client did not read its earlier pictures"
                                        : roster.empty()                      ? "there was no worker"

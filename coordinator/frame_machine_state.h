@@ -133,7 +133,7 @@ struct FrameMachine::State {
   bool InUse(DatasetId dataset);
   bool UnloadOne();  // false: all are in use
   Result<int> FramesThatFitWorkers(const FramePlan& plan, const VolumeSummary& summary) const;
-  bool WaitsForCount(const OpenRequest& request) { return request.needs_occupancy && !occupancy.Find(*request.volume); }
+  bool WaitsForCount(const OpenRequest& request) { return request.needs_occupancy && !occupancy.Find(request.volume->Whole()); }
   void CountAhead();
   void PlanAhead();
   void DropPlans();

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/planning/balance.h"
+#include "common/planning/clipped_cells.h"
 #include "coordinator/learning_table.h"
 
 namespace slabstream {
@@ -47,7 +48,9 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
   if (request.occupied != nullptr) {
     learnt = FindLearnt(key.volume);
     if (learnt == nullptr) {
-      learnt = &learnt_.emplace_front(Learnt{key.volume, MeasuredCost(*request.occupied)});
+      OccupancyGrid drawn = *request.occupied;
+      EmptyClippedCells(key.volume.clip(), drawn);
+      learnt = &learnt_.emplace_front(Learnt{key.volume, MeasuredCost(drawn)});
       KeepFirst(learnt_, kMaxLearnt);
     }
   }
@@ -56,6 +59,7 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
                      .transfer = &request.volume->transfer(),
                      .policy = &policy,
                      .renderer = request.volume->renderer(),
+                     .clip = &request.volume->clip(),
                      .slots = request.slots,
                      .known = {.occupied = request.occupied.get()}};
   std::optional<WorkField> cost;

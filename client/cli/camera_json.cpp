@@ -37,6 +37,23 @@ Json ViewJson(const ViewParameters& view) {
   return json;
 }
 
+Json ClippingJson(const Clipping& clipping) {
+  const auto& [box, slab, planes, mode] = clipping;
+  Json json = {{"mode", int(mode)}};
+  if (box) {
+    const auto& [low, high, unit] = *box;
+    json["box"] = {{"low", PointJson(low)}, {"high", PointJson(high)}, {"unit", int(unit)}};
+  }
+  if (slab) {
+    const auto& [normal, through, index, thickness] = *slab;
+    json["slab"] = {{"normal", PointJson(normal)}, {"thickness", thickness}};
+    if (through) json["slab"]["through"] = PointJson(*through);
+    if (index) json["slab"]["index"] = *index;
+  }
+  for (const auto& [normal, offset] : planes) json["planes"].push_back({{"normal", PointJson(normal)}, {"offset", offset}});
+  return json;
+}
+
 std::vector<std::pair<std::string, JsonValue::Read>> ViewFields(ViewParameters& view) {
   static constexpr std::array<std::string_view, 2> kProjections = {"orthographic", "perspective"};
   const NumberRange angle{-kMaxAngleDegrees, kMaxAngleDegrees};

@@ -8,6 +8,7 @@
 
 #include "client/cli/json_value.h"
 #include "common/view/camera.h"
+#include "common/view/clip.h"
 
 namespace slabstream {
 
@@ -15,6 +16,9 @@ namespace slabstream {
 Json ViewJson(const ViewParameters& view);
 // For JsonValue::Fields: those of `view`, which must live as long. Each is in its range; Validate judges them together.
 std::vector<std::pair<std::string, JsonValue::Read>> ViewFields(ViewParameters& view);
+
+// Whole, as above.
+Json ClippingJson(const Clipping& clipping);
 
 // The view of a file's text. InvalidArgument, one line that names the field, the value and what is expected.
 Result<ViewParameters> ParseCamera(const std::string& text);

@@ -46,6 +46,14 @@ void DeclareTurntable(const CommandLine& line) {
   RunWith(*sub, line.run, options, RunTurntable);
 }
 
+void DeclareSlice(const CommandLine& line) {
+  CLI::App* sub = line.app.add_subcommand("slice", "Render planes through a volume, or slabs of it");
+  auto options = std::make_shared<SliceOptions>();
+  sub->add_option("-o,--output", options->output, "The picture: .png or .exr")->required()->type_name("FILE")->group(kOutputGroup);
+  AddSliceOptions(*sub, *options);
+  RunWith(*sub, line.run, options, RunSlice);
+}
+
 void DeclareInfo(const CommandLine& line) {
   CLI::App* sub = line.app.add_subcommand("info", "Describe a volume file: size, samples, values, histogram, occupancy");
   auto options = std::make_shared<InfoOptions>();
@@ -175,8 +183,8 @@ void DeclareSlurm(const CommandLine& line) {
 }  // namespace
 
 std::span<const DeclareCommand> ClientCommands() {
-  static constexpr DeclareCommand kCommands[] = {DeclareRender, DeclareTurntable, DeclareInfo, DeclareSphere, DeclareUp,
-                                                 DeclareDown,   DeclareStatus,    DeclareKeys, DeclareSlurm};
+  static constexpr DeclareCommand kCommands[] = {DeclareRender, DeclareTurntable, DeclareSlice,  DeclareInfo, DeclareSphere,
+                                                 DeclareUp,     DeclareDown,      DeclareStatus, DeclareKeys, DeclareSlurm};
   return kCommands;
 }
 

@@ -14,6 +14,7 @@ std::span<const DeclareCommand> ClientCommands();
 
 Status RunRender(const RenderOptions& options);
 Status RunTurntable(const TurntableOptions& options);
+Status RunSlice(const SliceOptions& options);
 Status RunInfo(const InfoOptions& options);
 Status RunSphere(const SphereOptions& options);
 Status RunUp(const UpOptions& options);

@@ -43,6 +43,16 @@ CLI::Option* AddNamed(CLI::App& app, const std::string& name, std::string& targe
   return AddParsed(app, name, target, OneOf(std::move(names)), text + Explained(entries))->type_name("NAME")->default_str(target);
 }
 
+// An option for a renderer's parameter.
+void AddParameter(CLI::App& app, const RendererParameter& parameter, const std::string& help, FrameRequest& request) {
+  const bool choice = !parameter.choices.empty();
+  app.add_option_function<std::string>(
+         "--" + std::string(parameter.name),
+         [&request, key = std::string(parameter.name)](const std::string& text) { request.parameters[key] = text; }, help)
+      ->type_name(choice ? "NAME" : "NUMBER")
+      ->default_str(choice ? std::string(parameter.choices[std::size_t(parameter.standard)]) : fmt::format("{:g}", parameter.standard));
+}
+
 // --renderer, and an option for each parameter of any renderer. Whether the chosen renderer has it is checked with the request.
 void AddRendererOptions(CLI::App& app, FrameRequest& request) {
   std::string help = "How voxels become a picture";
@@ -60,14 +70,7 @@ void AddRendererOptions(CLI::App& app, FrameRequest& request) {
       ->default_str(std::string(kDefaultRenderer));
   for (const auto& [name, entry] : parameters) {
     const auto& [parameter, renderers] = entry;
-    const bool choice = !parameter->choices.empty();
-    const std::string standard =
-        choice ? std::string(parameter->choices[std::size_t(parameter->standard)]) : fmt::format("{:g}", parameter->standard);
-    app.add_option_function<std::string>(
-           "--" + std::string(name), [&request, key = std::string(name)](const std::string& text) { request.parameters[key] = text; },
-           fmt::format("{}; for --renderer {}", parameter->purpose, renderers))
-        ->type_name(choice ? "NAME" : "NUMBER")
-        ->default_str(standard);
+    AddParameter(app, *parameter, fmt::format("{}; for --renderer {}", parameter->purpose, renderers), request);
   }
 }
 
@@ -113,6 +116,13 @@ CLI::Option* AddPoint(CLI::App& app, const std::string& name, std::optional<Vec3
       ->type_name("X,Y,Z");
 }
 
+void AddSize(CLI::App& app, ImageSize& size, const std::string& help) {
+  AddParsed(
+      app, "--size", size, [](const std::string& option, const std::string& text) { return ParseImageSize(option, text); }, help)
+      ->type_name("SIZE")
+      ->default_str("512");
+}
+
 CLI::Option* AddNamedView(CLI::App& app, ViewParameters& view) {
   std::vector<std::string_view> names;
   for (const NamedView& named : kNamedViews) names.push_back(named.name);
@@ -132,11 +142,7 @@ CLI::Option* AddNamedView(CLI::App& app, ViewParameters& view) {
 void AddViewOptions(CLI::App& app, ViewParameters& view, ImageSize& size) {
   app.option_defaults()->group("View");
   const NumberRange angle{-kMaxAngleDegrees, kMaxAngleDegrees};
-  AddParsed(
-      app, "--size", size, [](const std::string& option, const std::string& text) { return ParseImageSize(option, text); },
-      "Pixels: WIDTHxHEIGHT, or one number for a square")
-      ->type_name("SIZE")
-      ->default_str("512");
+  AddSize(app, size, "Pixels: WIDTHxHEIGHT, or one number for a square");
   AddChoice<Projection, 2>(app, "--projection", view.projection, {"orthographic", "perspective"},
                            {Projection::kOrthographic, Projection::kPerspective}, "Orthographic or perspective projection")
       ->default_str("orthographic");
@@ -166,6 +172,41 @@ void AddViewOptions(CLI::App& app, ViewParameters& view, ImageSize& size) {
   }
 }
 
+void AddClipOptions(CLI::App& app, Clipping& clipping) {
+  app.option_defaults()->group("Clipping");
+  AddParsed(
+      app, "--clip-box", clipping.box, [](const std::string& option, const std::string& text) { return ParseClipBox(option, text); },
+      "Draw only what lies in this box of the world; with v behind it, of voxel numbers, with % of the volume's sides; a bound that is "
+      "left out does not clip, as in :,:,:50%")
+      ->type_name("X0:X1,Y0:Y1,Z0:Z1");
+  app.add_option(
+         "--clip-plane", CLI::callback_t([&clipping](const CLI::results_t& texts) {
+           clipping.planes.clear();
+           for (const std::string& text : texts) {
+             const Result<ClipPlane> plane = ParseClipPlane("--clip-plane", text);
+             if (!plane.ok()) throw CLI::ValidationError(plane.status().message());
+             clipping.planes.push_back(*plane);
+           }
+           if (texts.size() <= kMaxClipPlanes) return true;
+           throw CLI::ValidationError(fmt::format("--clip-plane is given {} times, at most {} are possible", texts.size(), kMaxClipPlanes));
+         }),
+         "Draw only the points of the world with NX x + NY y + NZ z + D >= 0; may be repeated")
+      ->type_name("NX,NY,NZ,D")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  AddChoice<ClipMode, 2>(app, "--clip-mode", clipping.mode, {"keep", "cut-away"}, {ClipMode::kKeep, ClipMode::kCutAway},
+                         "keep: draw what the box and all planes leave; cut-away: draw everything else")
+      ->default_str("keep");
+}
+
+void AddPictureFormat(CLI::App& app, PictureFormat& format) {
+  AddParsed(
+      app, "--background", format.background, [](const std::string& option, const std::string& text) { return ParseColor(option, text); },
+      "Colour behind the picture, and its opacity (default 1), each from 0 to 1 (default: transparent)")
+      ->type_name("R,G,B[,A]");
+  AddChoice<int, 2>(app, "--depth", format.png_bits, {"8", "16"}, {8, 16}, "Bits of each channel of a PNG: 8 or 16")->default_str("8");
+}
+
 void AddLookOptions(CLI::App& app, FrameRequest& request, PictureFormat& format) {
   app.option_defaults()->group("Look");
   AddRendererOptions(app, request);
@@ -190,13 +231,9 @@ void AddLookOptions(CLI::App& app, FrameRequest& request, PictureFormat& format)
       ->type_name("X,Y,Z")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  AddParsed(
-      app, "--background", format.background, [](const std::string& option, const std::string& text) { return ParseColor(option, text); },
-      "Colour behind the picture, and its opacity (default 1), each from 0 to 1 (default: transparent)")
-      ->type_name("R,G,B[,A]");
   AddNumber(app, "--termination", request.termination, {0, kMaxTermination},
             "Skip what lies behind material whose remaining transmittance is below this; 0: skip nothing");
-  AddChoice<int, 2>(app, "--depth", format.png_bits, {"8", "16"}, {8, 16}, "Bits of each channel of a PNG: 8 or 16")->default_str("8");
+  AddPictureFormat(app, format);
 }
 
 void AddPolicyOptions(CLI::App& app, Policy& policy) {
@@ -277,6 +314,59 @@ void ResolveSource(CLI::App& app, const CLI::Option* source, std::string& volume
   });
 }
 
+void AddSliceOptions(CLI::App& app, SliceOptions& options) {
+  FrameRequest& request = options.request;
+  request.renderer = "mip";
+  request.transfer.choice = "window";
+  app.option_defaults()->group("Options");
+  CLI::Option* source =
+      app.add_option("SOURCE", options.source, "A dataset's name at the service, or with --local a volume file")->required();
+  AddConnectionOptions(app, options.connection);
+
+  app.option_defaults()->group("Plane");
+  std::vector<std::string_view> names;
+  for (const SliceChoice& choice : kSliceChoices) names.push_back(choice.name);
+  const auto parse = [is_name = OneOf(names)](const std::string& option, const std::string& text) -> Result<std::span<const SlicePlane>> {
+    const Result<std::string> name = is_name(option, text);
+    if (!name.ok()) return name.status();
+    return std::ranges::find(kSliceChoices, *name, &SliceChoice::name)->planes;
+  };
+  AddParsed(app, "--plane", options.planes, parse, "Which plane" + Explained(kSliceChoices))
+      ->type_name("NAME")
+      ->default_str(std::string(kSliceChoices.back().name));
+  CLI::Option* const at = AddPoint(app, "--at", options.at, "Point of the world that the planes go through (default: the volume's centre)");
+  AddParsed(
+      app, "--index", options.index,
+      [](const std::string& option, const std::string& text) { return ParseInteger(option, text, 0, kMaxVolumeSide - 1); },
+      "Number of the slice, counted from 0, instead of a point")
+      ->type_name("K")
+      ->excludes(at);
+  AddNumber(app, "--thickness", options.thickness, {0, kMaxWorldCoordinate},
+            "Show the largest values of a slab so thick, in the unit of the world (mm of a patient); 0: the values in the plane");
+  AddSize(app, request.size, "Pixels of each plane: WIDTHxHEIGHT, or one number for a square");
+
+  app.option_defaults()->group("Look");
+  const auto value = [](const std::string& option, const std::string& text) { return ParseNumber(option, text, {-1e30, 1e30}); };
+  CLI::Option* const window = AddParsed(
+                                  app, "--window", options.window,
+                                  [](const std::string& option, const std::string& text) {
+                                    return ParseNumber(option, text, {0, 1e30, true});
+                                  },
+                                  "Width of the range of values from black to white")
+                                  ->type_name("VALUE");
+  AddParsed(app, "--level", options.level, value, "Middle of that range")
+      ->type_name("VALUE")
+      ->default_str("half of --window")
+      ->needs(window);
+  AddTransferOptions(app, request.transfer);
+  app.get_option("--transfer")->excludes(window)->default_str("window");
+  for (const RendererParameter& parameter : RequireRenderer(request.renderer).value()->parameters()) {
+    AddParameter(app, parameter, std::string(parameter.purpose), request);
+  }
+  AddPictureFormat(app, options.format);
+  ResolveSource(app, source, options.source, request.transfer, [&options] { return options.connection.local_workers > 0; });
+}
+
 void AddFrameOptions(CLI::App& app, FrameOptions& options) {
   app.option_defaults()->group("Options");
   CLI::Option* source = app.add_option("SOURCE", options.source,
@@ -285,6 +375,7 @@ void AddFrameOptions(CLI::App& app, FrameOptions& options) {
                             ->required();
   AddConnectionOptions(app, options.connection);
   AddViewOptions(app, options.request.view, options.request.size);
+  AddClipOptions(app, options.request.clipping);
   AddLookOptions(app, options.request, options.format);
   AddPolicyOptions(app, options.request.policy);
   ResolveSource(app, source, options.source, options.request.transfer, [&options] { return options.connection.local_workers > 0; });

@@ -27,6 +27,9 @@ void AddTransferOptions(CLI::App& app, TransferChoice& transfer);
 // After the parse, splits a `source` of the form VOLUME:TRANSFER into its parts (volume_argument.h). Calls `is_file` only then.
 void ResolveSource(CLI::App& app, const CLI::Option* source, std::string& volume, TransferChoice& transfer, std::function<bool()> is_file);
 
+// All options of `slice` but its output.
+void AddSliceOptions(CLI::App& app, SliceOptions& options);
+
 // All options that `render` and `turntable` share: SOURCE, connection, view, look, policy, and the files written beside pictures.
 void AddFrameOptions(CLI::App& app, FrameOptions& options);
 

@@ -2,9 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "client/cli/slice_planes.h"
 #include "client/cli/slurm_values.h"
 #include "client/cli/values.h"
 #include "client/image_io/image_writer.h"
@@ -56,6 +59,18 @@ struct TurntableOptions {
   int frames = 36;    // [1, kMaxTurntableFrames], evenly over `turns` full turns that begin at the request's azimuth
   int turns = 1;      // [1, kMaxTurns]
   int in_flight = 2;  // [1, kMaxInFlight] frames requested and not yet complete
+};
+
+struct SliceOptions {
+  ConnectionOptions connection;
+  std::string source, output;
+  std::span<const SlicePlane> planes = kSliceChoices.back().planes;
+  std::optional<Vec3> at;               // a point of the world
+  std::optional<std::int32_t> index;    // of the slice; of one plane only. Neither: the volume's centre
+  double thickness = 0;                 // unit of the world; 0: a plane
+  std::optional<double> window, level;  // data values; none: `request.transfer`
+  FrameRequest request;                 // renderer, its parameters, size of each plane, transfer function
+  PictureFormat format;
 };
 
 struct InfoOptions {

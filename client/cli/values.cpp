@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "common/cli/parse.h"
@@ -50,6 +51,45 @@ Result<Vec3> ParseDirection(std::string_view option, std::string_view text) {
   Result<Vec3> direction = ParsePoint(option, text);
   if (direction.ok() && *direction == Vec3{}) return Status::InvalidArgument(fmt::format("{} {} has no direction", option, text));
   return direction;
+}
+
+Result<ClipBox> ParseClipBox(std::string_view option, std::string_view text) {
+  ClipBox box;
+  std::string_view bounds = text;
+  if (text.ends_with('%')) box.unit = ClipUnit::kPercent;
+  if (text.ends_with('v')) box.unit = ClipUnit::kVoxels;
+  if (box.unit != ClipUnit::kWorld) bounds.remove_suffix(1);
+  const auto refuse = [&] { return Status::InvalidArgument(fmt::format("{} '{}' is not X0:X1,Y0:Y1,Z0:Z1", option, text)); };
+  const std::vector<std::string_view> axes = Split(bounds, ',');
+  if (axes.size() != kAxes.size()) return refuse();
+  for (const Axis axis : kAxes) {
+    const std::vector<std::string_view> ends = Split(axes[std::size_t(Number(axis))], ':');
+    if (ends.size() != 2) return refuse();
+    for (const bool high : {false, true}) {
+      double& bound = high ? box.high[axis] : box.low[axis];
+      bound = high ? kMaxWorldCoordinate : -kMaxWorldCoordinate;
+      if (ends[high ? 1 : 0].empty()) continue;
+      const Result<double> value = ParseNumber(option, ends[high ? 1 : 0], {-kMaxWorldCoordinate, kMaxWorldCoordinate});
+      if (!value.ok()) return value.status();
+      bound = *value;
+    }
+    if (box.low[axis] < box.high[axis]) continue;
+    return Status::InvalidArgument(
+        fmt::format("{} '{}': {} runs from {:g} to {:g}, but must rise", option, text, Letter(axis), box.low[axis], box.high[axis]));
+  }
+  return box;
+}
+
+Result<ClipPlane> ParseClipPlane(std::string_view option, std::string_view text) {
+  const std::size_t last = text.rfind(',');
+  if (last == std::string_view::npos || std::ranges::count(text, ',') != 3) {
+    return Status::InvalidArgument(fmt::format("{} '{}' is not NX,NY,NZ,D", option, text));
+  }
+  const Result<Vec3> normal = ParseDirection(option, text.substr(0, last));
+  if (!normal.ok()) return normal.status();
+  const Result<double> offset = ParseNumber(option, text.substr(last + 1), {-kMaxWorldCoordinate, kMaxWorldCoordinate});
+  if (!offset.ok()) return offset.status();
+  return ClipPlane{*normal, *offset};
 }
 
 Result<StraightColor> ParseColor(std::string_view option, std::string_view text) {

@@ -8,6 +8,7 @@
 #include "common/base/status.h"
 #include "common/math/vec.h"
 #include "common/view/camera.h"
+#include "common/view/clip.h"
 
 namespace slabstream {
 
@@ -18,6 +19,11 @@ Result<ImageSize> ParseImageSize(std::string_view option, std::string_view text)
 Result<Vec3> ParsePoint(std::string_view option, std::string_view text);
 // The same, and not all zero.
 Result<Vec3> ParseDirection(std::string_view option, std::string_view text);
+
+// "X0:X1,Y0:Y1,Z0:Z1", with "v" behind it in voxels, with "%" in percent of the volume's sides. A bound may be left out: it does not clip.
+Result<ClipBox> ParseClipBox(std::string_view option, std::string_view text);
+// "NX,NY,NZ,D".
+Result<ClipPlane> ParseClipPlane(std::string_view option, std::string_view text);
 
 // "R,G,B" (opaque) or "R,G,B,A", each in [0, 1].
 Result<StraightColor> ParseColor(std::string_view option, std::string_view text);

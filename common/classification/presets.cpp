@@ -156,6 +156,15 @@ TransferFunction MriBrain(const VolumeSummary& summary) {
           {{clear, 0}, {solid, opacity}, {std::max(solid, at(0.98)), std::min(1.4 * opacity, 0.95)}}};
 }
 
+// For slices: all is opaque, and few values are black or white only.
+TransferFunction Window(const VolumeSummary& summary) {
+  constexpr double kBelowWhite = 0.995;  // share of the material
+  const MaterialBins material = Material(summary);
+  const double black = BinBorder(summary.range, material.first), white = Quantile(summary, material, kBelowWhite);
+  if (!(black < white)) return {{{double(summary.range.max), {1, 1, 1}}}, {{double(summary.range.max), 1}}};
+  return {{{black, {0, 0, 0}}, {white, {1, 1, 1}}}, {{black, 1}}};
+}
+
 // For T1: the brain lies between the fluids, which are dark, and the fat of the scalp, which is brightest. Both ends are almost clear, so
 // the brain shows through the skin.
 TransferFunction MriHead(const VolumeSummary& summary) {
@@ -202,6 +211,7 @@ const std::vector<TransferPreset>& TransferPresets() {
   static const std::vector<TransferPreset> presets = {
       {"auto", "from the histogram: whatever differs from the background", Automatic},
       {"gray-ramp", "black to white and clear to opaque over the value range", GrayRamp},
+      {"window", "black to white and opaque, from the background to the brightest material: slices", Window},
       {"opaque", "everything above the lowest value, solid: masks, voxelised objects", Opaque},
       {"ct-bone", "CT: bones", CtBone},
       {"ct-soft-tissue", "CT: bones in a veil of muscle", CtSoftTissue},

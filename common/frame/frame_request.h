@@ -11,6 +11,7 @@
 #include "common/base/status.h"
 #include "common/classification/transfer_function.h"
 #include "common/view/camera.h"
+#include "common/view/clip.h"
 #include "common/view/shading.h"
 
 namespace slabstream {
@@ -57,6 +58,7 @@ struct FrameRequest {
   ParameterTexts parameters;               // of the renderer
   ImageSize size;
   ViewParameters view;
+  Clipping clipping;  // empty: the whole volume is drawn
   TransferChoice transfer;
   Shading shading;
   double termination = kDefaultTermination;  // [0, kMaxTermination]: transmittance below which what lies behind is skipped; 0: never

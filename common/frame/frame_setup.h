@@ -28,6 +28,7 @@ struct FrameSetup {
   PixelFormat format = PixelFormat::kRgba;  // of local images: renderer->FormatOf(parameters), so that combining need not know renderers
   Camera camera;                            // of the picture, perhaps supersampled
   SheetGrid sheets;                         // the frame grid of renderers that work along slices; empty: the camera's grid
+  ClipRegion clip;                          // empty: all is drawn
   TransferFunction transfer;
   Shading shading;
   double termination = kDefaultTermination;

@@ -29,19 +29,21 @@ bool BrickVisibility::AnyVisible(const Box& box) const {
   return false;
 }
 
-std::optional<BrickVisibility::Ball> BrickVisibility::VisibleBall() const {
+std::optional<BrickVisibility::Ball> BrickVisibility::VisibleBall(const ClipRegion& clip) const {
   const VolumeGeometry& geometry = summary_.description.geometry;
   std::vector<Box> visible;
   Box hull;
   for (std::size_t i = 0; i < summary_.bricks.size(); ++i) {
     if (!Visible(summary_.bricks[i], 0)) continue;
     const Index3 brick = PlaceIn(summary_.brick_counts, i);
-    visible.push_back(Intersection({kBrick * brick, kBrick * (brick + Uniform(1))}, geometry.bounds()));
+    const Box box = Intersection({kBrick * brick, kBrick * (brick + Uniform(1))}, geometry.bounds());
+    if (!clip.MayKeep(box)) continue;
+    visible.push_back(box);
     hull = Hull(hull, visible.back());
   }
   if (visible.empty()) return std::nullopt;
   const auto middle = [](const Box& box) { return 0.5 * (ToVec3(box.begin + box.end) - Vec3{1, 1, 1}); };
-  Ball ball{.centre = middle(hull)};
+  Ball ball{.centre = middle(hull), .half_extent = 0.5 * (ToVec3(hull.size()) * geometry.spacing)};
   for (const Box& box : visible) {
     const Vec3 from = middle(box) - ball.centre, half = 0.5 * ToVec3(box.size());
     const Vec3 farthest = {std::abs(from.x) + half.x, std::abs(from.y) + half.y, std::abs(from.z) + half.z};

@@ -1,5 +1,6 @@
-// ClassifiedVolume: a loaded volume under one transfer function, as one renderer draws it. Occupied voxels, layouts, chosen policies and
-// learnt costs belong to one of these, so it is their key. Copies share the transfer function.
+// ClassifiedVolume: a loaded volume under one transfer function, as one renderer draws it, perhaps clipped. Layouts, chosen policies and
+// learnt costs belong to one of these, so it is their key; occupied voxels are counted of the whole volume. Copies share the transfer
+// function.
 #pragma once
 
 #include <memory>
@@ -11,21 +12,33 @@ namespace slabstream {
 
 class ClassifiedVolume {
  public:
-  ClassifiedVolume(DatasetId dataset, TransferFunction transfer, const RendererKind* renderer)
-      : dataset_(dataset), transfer_(std::make_shared<const TransferFunction>(std::move(transfer))), renderer_(renderer) {}
+  ClassifiedVolume(DatasetId dataset, TransferFunction transfer, const RendererKind* renderer, ClipRegion clip = {})
+      : dataset_(dataset),
+        transfer_(std::make_shared<const TransferFunction>(std::move(transfer))),
+        renderer_(renderer),
+        clip_(std::move(clip)) {}
 
   DatasetId dataset() const { return dataset_; }
   const TransferFunction& transfer() const { return *transfer_; }
   const RendererKind* renderer() const { return renderer_; }
+  const ClipRegion& clip() const { return clip_; }
+
+  ClassifiedVolume Whole() const {
+    ClassifiedVolume whole = *this;
+    whole.clip_ = {};
+    return whole;
+  }
 
   friend bool operator==(const ClassifiedVolume& a, const ClassifiedVolume& b) {
-    return a.dataset_ == b.dataset_ && a.renderer_ == b.renderer_ && (a.transfer_ == b.transfer_ || *a.transfer_ == *b.transfer_);
+    return a.dataset_ == b.dataset_ && a.renderer_ == b.renderer_ && a.clip_ == b.clip_ &&
+           (a.transfer_ == b.transfer_ || *a.transfer_ == *b.transfer_);
   }
 
  private:
   DatasetId dataset_;
   std::shared_ptr<const TransferFunction> transfer_;
   const RendererKind* renderer_;
+  ClipRegion clip_;
 };
 
 }  // namespace slabstream

@@ -7,6 +7,7 @@
 
 #include "common/base/check.h"
 #include "common/planning/brick_visibility.h"
+#include "common/planning/clipped_cells.h"
 #include "common/planning/cost_estimator.h"
 #include "common/planning/measured_cost.h"
 #include "common/renderers/renderer_kind.h"
@@ -36,6 +37,7 @@ class WorkFields {
   explicit WorkFields(const LayoutRequest& request)
       : request_(request),
         visibility_(*request.summary, request.renderer->DrawnTable(*request.transfer, *request.summary)),
+        clip_(request.clip != nullptr ? *request.clip : ClipRegion{}),
         voxels_(WorkField::Uniform(request.summary->description.geometry.size)) {}
 
   const WorkField& Of(LoadMetric metric) {
@@ -46,13 +48,17 @@ class WorkFields {
   }
 
   const OccupancyGrid& Grid() {
-    if (request_.known.occupied != nullptr) return *request_.known.occupied;
-    if (!visible_) visible_.emplace(visibility_.VisibleCells());
-    return *visible_;
+    if (request_.known.occupied != nullptr && clip_.empty()) return *request_.known.occupied;
+    if (!drawn_) {
+      drawn_.emplace(request_.known.occupied != nullptr ? *request_.known.occupied : visibility_.VisibleCells());
+      EmptyClippedCells(clip_, *drawn_);
+    }
+    return *drawn_;
   }
 
   // Whether any sample that `box` owns may show something.
   bool Shows(const Box& box) {
+    if (!clip_.MayKeep(box)) return false;
     const Box with_halo = Grown(box, request_.renderer->reach(), request_.summary->description.geometry.bounds());
     if (request_.known.occupied == nullptr) return visibility_.AnyVisible(with_halo);
     return !Of(LoadMetric::kOccupied).Hull(with_halo).empty();
@@ -61,8 +67,9 @@ class WorkFields {
  private:
   const LayoutRequest& request_;
   const BrickVisibility visibility_;
+  const ClipRegion clip_;
   const WorkField voxels_;
-  std::optional<OccupancyGrid> visible_;
+  std::optional<OccupancyGrid> drawn_;
   std::optional<WorkField> occupied_;
 };
 

@@ -11,6 +11,7 @@
 #include "common/decomposition/partition.h"
 #include "common/decomposition/work_field.h"
 #include "common/planning/resolved_policy.h"
+#include "common/view/clip.h"
 #include "common/volume/summary.h"
 
 namespace slabstream {
@@ -27,8 +28,9 @@ struct Layout {
 
 // What is known about the work in a volume under one transfer function. Null: not known.
 struct WorkKnowledge {
-  const OccupancyGrid* occupied = nullptr;  // drawn voxels (RendererKind::DrawnTable); null: the summary's bricks tell what may be drawn
-  const WorkField* cost = nullptr;          // seconds, learnt from frames; null: occupied voxels stand for it
+  const OccupancyGrid* occupied =
+      nullptr;  // drawn voxels (RendererKind::DrawnTable) of the whole volume; null: the summary's bricks tell what may be drawn
+  const WorkField* cost = nullptr;  // seconds, learnt from frames; null: occupied voxels stand for it
 };
 
 // Most memory for the voxels of one slab, as far as the size of slices allows.
@@ -39,7 +41,8 @@ struct LayoutRequest {
   const TransferFunction* transfer = nullptr;
   const ResolvedPolicy* policy = nullptr;
   const RendererKind* renderer = nullptr;
-  std::uint32_t slots = 1;  // >= 1
+  const ClipRegion* clip = nullptr;  // null: nothing is clipped
+  std::uint32_t slots = 1;           // >= 1
   std::int64_t slab_bytes_target = kSlabBytesTarget;
   WorkKnowledge known;
   const Partition* resized = nullptr;  // partition to resize, of a layout by the same policy (DecompositionRequest); null: cut anew

@@ -8,6 +8,20 @@
 #include "common/renderers/registry.h"
 
 namespace slabstream {
+namespace {
+
+// A slab is flat: if it faces the view, its picture is framed by its sides, not by a ball round them.
+double RadiusOfSlab(const BrickVisibility::Ball& ball, const FrameRequest& request, const VolumeGeometry& geometry) {
+  const Camera camera = MakeCamera(request.view, request.size, geometry);
+  const auto reach = [&](const Vec3& v) {
+    return std::abs(v.x) * ball.half_extent.x + std::abs(v.y) * ball.half_extent.y + std::abs(v.z) * ball.half_extent.z;
+  };
+  const double shorter = std::min(camera.width, camera.height);
+  return std::min(ball.radius, std::max(reach(camera.right) * shorter / camera.width, reach(camera.up) * shorter / camera.height));
+}
+
+}  // namespace
+
 Result<FrameSetup> MakeFrameSetup(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary) {
   Result<TransferFunction> transfer = ResolveTransfer(request.transfer, summary);
   if (!transfer.ok()) return transfer.status();
@@ -18,10 +32,12 @@ Result<FrameSetup> MakeFrameSetup(const FrameRequest& request, DatasetId dataset
   SetRenderer(*FindRenderer(request.renderer), setup);
   SetParameters(ParseParameters(*setup.renderer, request.parameters).value(), setup);
   const VolumeGeometry& geometry = summary.description.geometry;
+  if (Status status = CheckClipping(request.clipping, geometry); !status.ok()) return status;
+  setup.clip = MakeClipRegion(request.clipping, geometry);
   ViewParameters view = request.view;
   if (view.fit) {
-    const auto ball = BrickVisibility(summary, setup.renderer->DrawnTable(*transfer, summary)).VisibleBall();
-    if (ball) view = FitView(view, geometry, ball->centre, ball->radius);
+    const auto ball = BrickVisibility(summary, setup.renderer->DrawnTable(*transfer, summary)).VisibleBall(setup.clip);
+    if (ball) view = FitView(view, geometry, ball->centre, request.clipping.slab ? RadiusOfSlab(*ball, request, geometry) : ball->radius);
   }
   if (Status status = CheckView(view, geometry); !status.ok()) return status;
   if (Status status = setup.renderer->SetView(view, request.size, setup); !status.ok()) return status;
@@ -70,10 +86,13 @@ Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, cons
   if (layout == nullptr) {
     const Result<TransferFunction> transfer = ResolveTransfer(request.transfer, summary);
     if (!transfer.ok()) return transfer.status();
+    if (Status status = CheckClipping(request.clipping, summary.description.geometry); !status.ok()) return status;
+    const ClipRegion clip = MakeClipRegion(request.clipping, summary.description.geometry);
     layout = std::make_shared<const Layout>(MakeLayout({.summary = &summary,
                                                         .transfer = &*transfer,
                                                         .policy = &*policy,
                                                         .renderer = FindRenderer(request.renderer),
+                                                        .clip = &clip,
                                                         .slots = std::max<std::uint32_t>(std::uint32_t(roster.slots.size()), 1),
                                                         .slab_bytes_target = slab_bytes_target}));
   }

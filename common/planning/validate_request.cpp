@@ -50,6 +50,7 @@ Status Validate(const FrameRequest& request) {
   }
   if (Status s = Validate(request.size); !s.ok()) return s;
   if (Status s = Validate(request.view); !s.ok()) return s;
+  if (Status s = Validate(request.clipping); !s.ok()) return s;
   if (Status s = Validate(request.transfer); !s.ok()) return s;
   if (Status s = Validate(request.shading); !s.ok()) return s;
   if (Status s = InRange("termination", request.termination, 0, kMaxTermination); !s.ok()) return s;

@@ -66,7 +66,19 @@ void Fields(auto& io, Is<SheetGrid> auto& m) {
       [&](Checker& check) { check.That(m.width % kGridColumnStep == 0, "width", "not a multiple of " + std::to_string(kGridColumnStep)); });
 }
 
-void Fields(auto& io, Is<FrameSetup> auto& m) {  // all but the renderer, its parameters and the sheets
+void Fields(auto& io, Is<HalfSpace> auto& m) {
+  using P = v1::HalfSpace;
+  io.Message("normal", m.normal, &P::normal, &P::mutable_normal);
+  io.Finite("offset", m.offset, &P::offset, &P::set_offset);
+}
+
+void Fields(auto& io, Is<ClipRegion> auto& m) {
+  using P = v1::ClipRegion;
+  io.Messages("sides", m.sides, &P::sides, &P::mutable_sides, kMaxClipSides);
+  io.OneOf("mode", m.mode, &P::mode, &P::set_mode, ClipMode::kKeep, ClipMode::kCutAway);
+}
+
+void Fields(auto& io, Is<FrameSetup> auto& m) {  // all but the renderer, its parameters, the sheets and the clip region
   using P = v1::FrameSetup;
   io.Range("dataset", m.dataset, &P::dataset, &P::set_dataset, 1, std::numeric_limits<DatasetId>::max());
   io.Message("description", m.description, &P::description, &P::mutable_description);
@@ -83,6 +95,7 @@ inline void Write(const FrameSetup& in, v1::FrameSetup& out) {
   out.set_renderer(std::string(in.renderer->name()));
   out.mutable_parameters()->Add(in.parameters.begin(), in.parameters.end());
   if (!in.sheets.empty()) Write(in.sheets, *out.mutable_sheets());
+  if (!in.clip.empty()) Write(in.clip, *out.mutable_clip());
 }
 
 inline void ReadRenderer(const v1::FrameSetup& in, FrameSetup& out, Checker& check) {
@@ -112,6 +125,16 @@ inline void CheckSheets(const FrameSetup& setup, Checker& check) {
   }
 }
 
+inline void CheckClip(const FrameSetup& setup, Checker& check) {
+  constexpr double kTolerance = 1e-6;
+  const auto scope = check.In("clip");
+  for (std::size_t i = 0; i < setup.clip.sides.size(); ++i) {
+    const auto side = check.In("sides", i);
+    const Vec3& normal = setup.clip.sides[i].normal;
+    check.That(std::abs(Length(normal / setup.description.geometry.spacing) - 1) <= kTolerance, "normal", "not of unit length");
+  }
+}
+
 inline void Read(const v1::FrameSetup& in, FrameSetup& out, Checker& check) {
   ReadRenderer(in, out, check);  // sets the halo, too
   ReadFields(in, out, check);
@@ -124,6 +147,13 @@ inline void Read(const v1::FrameSetup& in, FrameSetup& out, Checker& check) {
       Read(in.sheets(), out.sheets, check);
     }
     CheckSheets(out, check);
+  }
+  if (in.has_clip()) {
+    {
+      const auto scope = check.In("clip");
+      Read(in.clip(), out.clip, check);
+    }
+    if (check.ok()) CheckClip(out, check);
   }
   if (check.ok()) check.Adopt(Validate(out.transfer));
   if (check.ok()) check.Adopt(Validate(out.shading));

@@ -12,6 +12,8 @@
 namespace slabstream {
 
 static_assert(v1::Projection_MAX == static_cast<int>(Projection::kPerspective));
+static_assert(v1::ClipUnit_MAX == static_cast<int>(ClipUnit::kPercent));
+static_assert(v1::ClipMode_MAX == static_cast<int>(ClipMode::kCutAway));
 static_assert(v1::AxisChoice_MAX == static_cast<int>(AxisChoice::kView) + 1);
 
 // Validate checks most ranges of these values, once for the whole FrameRequest. Checked here: what a struct cannot hold, what must be known
@@ -37,6 +39,44 @@ void Fields(auto& io, Is<ViewParameters> auto& m) {
   io.Finite("distance", m.distance, &P::distance, &P::set_distance);
   io.Any(m.fit, &P::fit, &P::set_fit);
   io.Any(m.of_patient, &P::of_patient, &P::set_of_patient);
+}
+
+void Fields(auto& io, Is<ClipBox> auto& m) {
+  using P = v1::ClipBox;
+  io.Message("low", m.low, &P::low, &P::mutable_low);
+  io.Message("high", m.high, &P::high, &P::mutable_high);
+  io.OneOf("unit", m.unit, &P::unit, &P::set_unit, ClipUnit::kWorld, ClipUnit::kPercent);
+}
+
+void Fields(auto& io, Is<ClipPlane> auto& m) {
+  using P = v1::ClipPlane;
+  io.Message("normal", m.normal, &P::normal, &P::mutable_normal);
+  io.Finite("offset", m.offset, &P::offset, &P::set_offset);
+}
+
+void Fields(auto& io, Is<ClipSlab> auto& m) {  // all but the index
+  using P = v1::ClipSlab;
+  io.Message("normal", m.normal, &P::normal, &P::mutable_normal);
+  io.Optional("through", m.through, &P::has_through, &P::through, &P::mutable_through);
+  io.Finite("thickness", m.thickness, &P::thickness, &P::set_thickness);
+}
+
+inline void Write(const ClipSlab& in, v1::ClipSlab& out) {
+  WriteFields(in, out);
+  if (in.index) out.set_slice(std::uint32_t(*in.index) + 1);
+}
+inline void Read(const v1::ClipSlab& in, ClipSlab& out, Checker& check) {
+  ReadFields(in, out, check);
+  const auto slice = std::int32_t(check.Range("slice", in.slice(), 0, kMaxVolumeSide));
+  if (slice > 0) out.index = slice - 1;
+}
+
+void Fields(auto& io, Is<Clipping> auto& m) {
+  using P = v1::Clipping;
+  io.Optional("box", m.box, &P::has_box, &P::box, &P::mutable_box);
+  io.Messages("clip_planes", m.planes, &P::clip_planes, &P::mutable_clip_planes, kMaxClipPlanes);
+  io.OneOf("mode", m.mode, &P::mode, &P::set_mode, ClipMode::kKeep, ClipMode::kCutAway);
+  io.Optional("slab", m.slab, &P::has_slab, &P::slab, &P::mutable_slab);
 }
 
 void Fields(auto& io, Is<ColorPoint> auto& m) {
@@ -106,7 +146,7 @@ void Fields(auto& io, Is<Policy> auto& m) {
   io.Range("teams", m.teams, &P::teams, &P::set_teams, 0, kMaxTeams);
 }
 
-void Fields(auto& io, Is<FrameRequest> auto& m) {  // all but the parameters
+void Fields(auto& io, Is<FrameRequest> auto& m) {  // all but clipping and parameters
   using P = v1::FrameRequest;
   io.Text("dataset", m.dataset, &P::dataset, &P::mutable_dataset, 1, kMaxNameBytes);
   io.Text("renderer", m.renderer, &P::renderer, &P::mutable_renderer, 0, kMaxNameBytes);
@@ -121,6 +161,7 @@ void Fields(auto& io, Is<FrameRequest> auto& m) {  // all but the parameters
 
 inline void Write(const FrameRequest& in, v1::FrameRequest& out) {
   WriteFields(in, out);
+  if (!in.clipping.empty()) Write(in.clipping, *out.mutable_clipping());
   for (const auto& [name, text] : in.parameters) {
     v1::Parameter& parameter = *out.add_parameters();
     parameter.set_name(WireText(name, kMaxNameBytes));
@@ -131,6 +172,10 @@ inline void Read(const v1::FrameRequest& in, FrameRequest& out, Checker& check) 
   ReadFields(in, out, check);
   if (out.renderer.empty()) out.renderer = kDefaultRenderer;
   out.policy.teams = std::max(out.policy.teams, 1);  // 0: left out
+  if (in.has_clipping()) {
+    const auto scope = check.In("clipping");
+    Read(in.clipping(), out.clipping, check);
+  }
   const int parameters = check.Count("parameters", in.parameters_size(), kMaxParameters);
   for (int i = 0; i < parameters; ++i) {
     const auto scope = check.In("parameters", std::size_t(i));

@@ -13,6 +13,7 @@
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
 #include "common/planning/brick_visibility.h"
+#include "common/planning/clipped_cells.h"
 #include "common/planning/policy_names.h"
 #include "common/renderers/renderer_kind.h"
 #include "coordinator/tuning/frame_predictor.h"
@@ -50,6 +51,7 @@ class Search {
         layouts_({.summary = question.summary,
                   .transfer = &setup.transfer,
                   .renderer = setup.renderer,
+                  .clip = &setup.clip,
                   .slots = question.slots,
                   .slab_bytes_target = question.slab_bytes_target,
                   .known = question.known}),
@@ -199,10 +201,14 @@ Result<PolicyChoice> ChoosePolicy(const PolicyQuestion& question) {
   CHECK(CheckNames(question.frame->policy).ok());
   const Result<FrameSetup> setup = MakeFrameSetup(*question.frame, kAnyDataset, *question.summary);
   if (!setup.ok()) return setup.status();
-  std::optional<OccupancyGrid> visible;
-  if (question.known.occupied == nullptr)
-    visible = BrickVisibility(*question.summary, setup->renderer->DrawnTable(setup->transfer, *question.summary)).VisibleCells();
-  const FramePredictor predictor(*setup, *question.summary, visible ? *visible : *question.known.occupied, question.known.cost,
+  std::optional<OccupancyGrid> drawn;
+  if (question.known.occupied == nullptr) {
+    drawn = BrickVisibility(*question.summary, setup->renderer->DrawnTable(setup->transfer, *question.summary)).VisibleCells();
+  } else if (!setup->clip.empty()) {
+    drawn = *question.known.occupied;
+  }
+  if (drawn) EmptyClippedCells(setup->clip, *drawn);
+  const FramePredictor predictor(*setup, *question.summary, drawn ? *drawn : *question.known.occupied, question.known.cost,
                                  *question.machine, question.slots, question.render_scale);
   return Search(question, *setup, predictor).Run();
 }

@@ -79,7 +79,7 @@ Json TransferJson(const TransferChoice& transfer) {
 }
 
 Json RequestJson(const FrameRequest& request) {
-  const auto& [dataset, renderer, parameters, size, view, transfer, shading, termination, policy, previews] = request;
+  const auto& [dataset, renderer, parameters, size, view, clipping, transfer, shading, termination, policy, previews] = request;
   Json texts = Json::object();
   for (const auto& [name, text] : parameters) texts[name] = text;
   return {{"dataset", dataset},
@@ -87,6 +87,7 @@ Json RequestJson(const FrameRequest& request) {
           {"parameters", texts},
           {"size", SizeJson(size)},
           {"view", ViewJson(view)},
+          {"clipping", ClippingJson(clipping)},
           {"transfer", TransferJson(transfer)},
           {"shading", ShadingJson(shading)},
           {"termination", termination},

@@ -11,6 +11,24 @@ namespace {
 using testing::AllOf;
 using testing::HasSubstr;
 
+TEST(ParseClipBox, TakesBoundsInThreeUnits) {
+  const ClipBox world = *ParseClipBox("--clip-box", "-1.5:2,:,0:");
+  EXPECT_EQ(world, (ClipBox{{-1.5, -1e9, 0}, {2, 1e9, 1e9}, ClipUnit::kWorld}));
+  EXPECT_EQ(*ParseClipBox("--clip-box", "0:10,5:6,0:1v"), (ClipBox{{0, 5, 0}, {10, 6, 1}, ClipUnit::kVoxels}));
+  EXPECT_EQ(*ParseClipBox("--clip-box", ":50,:,:%"), (ClipBox{{-1e9, -1e9, -1e9}, {50, 1e9, 1e9}, ClipUnit::kPercent}));
+  for (const char* text : {"", ":", ":,:", "0:1,0:1,0:1,0:1", "0:1,0:1,1:0", "0:1,0:1,1:1", "0-1,0:1,0:1", "0:1:2,:,:", "a:1,:,:", ":,:,:x",
+                           "nan:1,:,:", "0:2e9,:,:"}) {
+    EXPECT_EQ(ParseClipBox("--clip-box", text).status().code(), StatusCode::kInvalidArgument) << text;
+  }
+}
+
+TEST(ParseClipPlane, TakesANormalAndAnOffset) {
+  EXPECT_EQ(*ParseClipPlane("--clip-plane", "1,-2,0.5,-7"), (ClipPlane{{1, -2, 0.5}, -7}));
+  for (const char* text : {"", "1,2,3", "0,0,0,1", "1,2,3,4,5", "1,2,x,4", "1,0,0,nan", "1,0,0,inf"}) {
+    EXPECT_EQ(ParseClipPlane("--clip-plane", text).status().code(), StatusCode::kInvalidArgument) << text;
+  }
+}
+
 TEST(Values, NumbersKeepToTheirRange) {
   const NumberRange zoom{0.001, 10000};
   EXPECT_EQ(*ParseNumber("--zoom", "2.5e1", zoom), 25);

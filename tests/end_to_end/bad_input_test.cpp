@@ -74,6 +74,30 @@ TEST_F(BadInputTest, CommandLines) {
   for (const auto& [arguments, needle] : cases) ExpectRefused(arguments, needle);
 }
 
+TEST_F(BadInputTest, OptionsOfSlice) {
+  MakeSphere("ball.nrrd", 2, 16);
+  const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
+      {{"--plane", "oblique"}, "--plane 'oblique' is not one of axial, coronal"},
+      {{"--plane", "axial"}, "no patient's orientation"},
+      {{"--index", "3"}, "--index 3 is the number of a slice of one --plane"},
+      {{"--plane", "z", "--index", "16"}, "clip.slab.index is 16, but the volume has slices 0 to 15 along z"},
+      {{"--plane", "z", "--index", "-1"}, "--index -1"},
+      {{"--plane", "z", "--index", "1", "--at", "1,2,3"}, "--at"},
+      {{"--at", "1,2"}, "--at '1,2'"},
+      {{"--thickness", "-1"}, "--thickness -1"},
+      {{"--window", "0"}, "--window 0"},
+      {{"--level", "5"}, "--window"},
+      {{"--window", "5", "--transfer", "opaque"}, "--transfer"},
+      {{"--interpolation", "cubic"}, "linear, nearest"},
+      {{"--size", "9000"}, "size"},
+  };
+  for (const auto& [options, needle] : cases) {
+    std::vector<std::string> arguments = {"slice", Path("ball.nrrd"), "--local=1", "-o", Path("x.png")};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    ExpectRefused(arguments, needle);
+  }
+}
+
 TEST_F(BadInputTest, OptionsOfRender) {
   MakeSphere("ball.nrrd", 2, 16);
   Write("empty.json", "");
@@ -114,6 +138,12 @@ TEST_F(BadInputTest, OptionsOfRender) {
       {{"--light", "1,2"}, "--light '1,2'"},
       {nine_lights, "at most 8"},
       {{"--background", "1,1,2"}, "--background 2"},
+      {{"--clip-box", "0:1,0:1"}, "--clip-box '0:1,0:1' is not X0:X1,Y0:Y1,Z0:Z1"},
+      {{"--clip-box", "0:1,3:2,:"}, "y runs from 3 to 2, but must rise"},
+      {{"--clip-box", "0:x,:,:"}, "--clip-box 'x'"},
+      {{"--clip-plane", "1,0,0"}, "--clip-plane '1,0,0' is not NX,NY,NZ,D"},
+      {{"--clip-plane", "0,0,0,1"}, "has no direction"},
+      {{"--clip-mode", "away"}, "keep, cut-away"},
       {{"--termination", "0.6"}, "--termination 0.6"},
       {{"--decomposition", "cheese"}, "--decomposition 'cheese' is not one of auto, slab"},
       {{"--split", "hairs"}, "--split 'hairs'"},

@@ -83,6 +83,53 @@ TEST_F(OrientationTest, NamedViewsShowTheCornerWhereItIs) {
   }
 }
 
+// Clip boxes, planes and slices are in the world, so storage does not matter.
+TEST_F(OrientationTest, CutsAreWhereTheyAreInAnyStorage) {
+  const std::vector<std::string> options = {"--renderer",   "zbuffer",     "--azimuth",  "200",     "--elevation", "25",
+                                            "--clip-plane", "-1,0,0.5,10", "--clip-box", ":,:20,:", "--clip-mode", "cut-away"};
+  const std::vector<Storage> storages = AllStorages();
+  const PictureFile first = Render(Store(storages.front()), options);
+  EXPECT_GT(LargestDifference(first, Render(Store(storages.front()), {"--renderer", "zbuffer", "--azimuth", "200", "--elevation", "25"})),
+            0.1);
+  for (std::size_t i = 0; i < storages.size(); i += 5) {
+    EXPECT_EQ(LargestDifference(Render(Store(storages[i]), options), first), 0) << Text(storages[i]);
+  }
+}
+
+TEST_F(OrientationTest, SlicesShowVoxelsWhereRadiologistsExpectThem) {
+  const std::string volume = Store(AllStorages()[29]);
+  struct Case {
+    const char* plane;
+    Index3 voxel;  // in the middle of the slice
+    int x, y;      // side of the picture where the bright corner appears
+  };
+  for (const auto& [plane, voxel, side_x, side_y] :
+       {Case{"axial", {21, 17, 13}, -1, -1}, {"coronal", {21, 17, 13}, -1, -1}, {"sagittal", {21, 17, 13}, -1, -1}}) {
+    const std::string at = std::to_string(2 * voxel.x) + "," + std::to_string(1.5 * voxel.y) + "," + std::to_string(3 * voxel.z);
+    MustRun({"slice", volume, "--local=2", "-o", Path("slice.png"), "--size", "96", "--plane", plane, "--at", at, "--window", "255",
+             "--interpolation", "nearest"});
+    const PictureFile slice = ReadPicture(Path("slice.png"));
+    double bright = 0, x_sum = 0, y_sum = 0;
+    for (int y = 0; y < slice.height; ++y) {
+      for (int x = 0; x < slice.width; ++x) {
+        if (std::abs(slice.At(x, y, 0) - 250 / 255.0F) > 0.006F) continue;
+        bright += 1;
+        x_sum += x + 0.5 - slice.width / 2.0;
+        y_sum += y + 0.5 - slice.height / 2.0;
+      }
+    }
+    ASSERT_GT(bright, 50) << plane;
+    EXPECT_GT(side_x * x_sum / bright, 5) << plane;
+    EXPECT_GT(side_y * y_sum / bright, 5) << plane;
+  }
+  // The same slice by its number.
+  MustRun({"slice", volume, "--local=2", "-o", Path("index.png"), "--size", "96", "--plane", "sagittal", "--index", "21", "--window", "255",
+           "--interpolation", "nearest"});
+  EXPECT_EQ(LargestDifference(ReadPicture(Path("index.png")), ReadPicture(Path("slice.png"))), 0);
+  MustRun({"slice", volume, "--local=2", "-o", Path("three.png"), "--size", "48x32", "--plane", "anatomical", "--thickness", "8"});
+  EXPECT_EQ(ReadPicture(Path("three.png")).width, 3 * 48);
+}
+
 TEST_F(OrientationTest, InfoTellsHowVoxelsAreStored) {
   // Stored x is the patient's z, backwards; y is x; z is y, backwards.
   const std::string info = MustRun({"info", Store({.from = {2, 0, 1}, .flipped = {true, false, true}})}).out;

@@ -129,6 +129,42 @@ TEST_F(Keys, EveryFieldOfARequestIsInItsJson) {
       {"height", [](R& r) { ++r.size.height; }},
       {"termination", [](R& r) { r.termination = 0; }},
       {"previews", [](R& r) { r.previews = true; }},
+      {"clip mode", [](R& r) { r.clipping.mode = ClipMode::kCutAway; }},
+      {"clip box",
+       [](R& r) {
+         r.clipping.box = ClipBox{{0, 0, 0}, {1, 1, 1}};
+       }},
+      {"clip box's unit",
+       [](R& r) {
+         r.clipping.box = ClipBox{{0, 0, 0}, {1, 1, 1}, ClipUnit::kVoxels};
+       }},
+      {"clip box's bounds",
+       [](R& r) {
+         r.clipping.box = ClipBox{{0, 0, 0}, {1, 2, 1}};
+       }},
+      {"clip plane",
+       [](R& r) {
+         r.clipping.planes = {{{1, 0, 0}, 2}};
+       }},
+      {"clip plane's offset",
+       [](R& r) {
+         r.clipping.planes = {{{1, 0, 0}, 3}};
+       }},
+      {"two clip planes",
+       [](R& r) {
+         r.clipping.planes = {{{1, 0, 0}, 2}, {{1, 0, 0}, 3}};
+       }},
+      {"slab", [](R& r) { r.clipping.slab.emplace(); }},
+      {"slab's normal",
+       [](R& r) {
+         r.clipping.slab = ClipSlab{.normal = {1, 0, 0}};
+       }},
+      {"slab's point",
+       [](R& r) {
+         r.clipping.slab = ClipSlab{.through = Vec3{1, 2, 3}};
+       }},
+      {"slab's index", [](R& r) { r.clipping.slab = ClipSlab{.index = 3}; }},
+      {"slab's thickness", [](R& r) { r.clipping.slab = ClipSlab{.thickness = 3}; }},
   };
   Add<R, ViewParameters>(
       changes, ChangesOfView(), [](R & r) -> auto& { return r.view; });

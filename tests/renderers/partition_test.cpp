@@ -114,6 +114,25 @@ TEST_P(Partitions, LookingBesideTheCentreMakesOnePicture) {
   }
 }
 
+TEST_P(Partitions, ClippedVolumesMakeOnePicture) {
+  const unsigned seed = 15;
+  std::mt19937 random(seed);
+  const Volume volume = MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed);
+  for (Projection projection : kProjections) {
+    for (int view = 0; view < 8; ++view) {
+      SetupOptions options;
+      options.renderer = GetParam();
+      options.view = RandomView(projection, random);
+      options.clipping = RandomClipping(volume.description.geometry, random);
+      options.clipping.mode = view % 2 == 0 ? ClipMode::kKeep : ClipMode::kCutAway;
+      options.transfer = Ramp(0.6);
+      const FrameSetup setup = MakeSetup(volume, options);
+      SCOPED_TRACE(::testing::Message() << "seed " << seed << " view " << view);
+      ExpectSamePicture(RenderWhole(volume, setup), RenderByBoxes(volume, setup, CutAtRandom(volume.block.box, 11, random)), setup);
+    }
+  }
+}
+
 // Axis-parallel views put rays, faces and planes on top of each other.
 TEST_P(Partitions, AxisParallelViewsHaveNoSeams) {
   const Volume volume = MakeBlobs({{32, 32, 32}, {1, 1, 1}}, ScalarType::kUint8, 5);
@@ -140,6 +159,7 @@ TEST_P(Partitions, EveryInstructionSetMakesOnePicture) {
     SetupOptions options;
     options.renderer = GetParam();
     options.view = RandomView(projection, random);
+    if (projection == Projection::kPerspective) options.clipping = RandomClipping(volume.description.geometry, random);
     const FrameSetup setup = MakeSetup(volume, options);
     const LocalImage best = RenderWhole(volume, setup);
     for (auto target : hwy::SupportedAndGeneratedTargets()) {

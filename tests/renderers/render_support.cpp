@@ -64,6 +64,7 @@ FrameSetup MakeSetup(const Volume& volume, const SetupOptions& options) {
   setup.range = Summarize(volume).range;
   SetRenderer(*options.renderer, setup);
   SetView(options.view, options.size, setup);
+  setup.clip = MakeClipRegion(options.clipping, volume.description.geometry);
   setup.transfer = options.transfer;
   setup.shading = options.shading;
   setup.termination = options.termination;
@@ -80,6 +81,21 @@ ViewParameters RandomView(Projection projection, std::mt19937& random) {
   view.zoom = 0.5 + uniform(random);
   view.fov_degrees = 10 + 50 * uniform(random);
   return view;
+}
+
+Clipping RandomClipping(const VolumeGeometry& geometry, std::mt19937& random) {
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const Vec3 extent = ToVec3(geometry.size) * geometry.spacing;
+  Clipping clipping;
+  for (int planes = 1 + int(random() % 3); planes > 0; --planes) {
+    const Vec3 normal = {uniform(random), uniform(random), uniform(random)};
+    const Vec3 through = extent * Vec3{0.5 + 0.3 * uniform(random), 0.5 + 0.3 * uniform(random), 0.5 + 0.3 * uniform(random)};
+    clipping.planes.push_back({normal, -Dot(normal, through)});
+  }
+  if (random() % 2 == 0) {
+    clipping.box = ClipBox{{20 + 15 * uniform(random), -1e9, 10}, {80 + 15 * uniform(random), 70, 1e9}, ClipUnit::kPercent};
+  }
+  return clipping;
 }
 
 std::unique_ptr<SlabData> CutSlab(const Volume& volume, const Box& box) { return std::make_unique<SlabData>(CutBlock(volume.block, box)); }

@@ -33,6 +33,7 @@ TransferFunction Uniform(double opacity, Rgb color);
 struct SetupOptions {
   const RendererKind* renderer = Splatting();
   ViewParameters view;
+  Clipping clipping;
   ImageSize size{64, 64};
   TransferFunction transfer = Ramp(0.2);
   Shading shading;
@@ -41,6 +42,8 @@ struct SetupOptions {
 FrameSetup MakeSetup(const Volume& volume, const SetupOptions& options);
 
 ViewParameters RandomView(Projection projection, std::mt19937& random);
+// Planes through the volume, and a box in one in two; the mode is left to the caller.
+Clipping RandomClipping(const VolumeGeometry& geometry, std::mt19937& random);
 
 // The voxels of `box`, which lies in the volume.
 std::unique_ptr<SlabData> CutSlab(const Volume& volume, const Box& box);

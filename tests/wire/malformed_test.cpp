@@ -183,6 +183,8 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       {"from_picture", 9},
       {"stage_ns", kStageCount},
       {"planes", 3},
+      {"clip_planes", kMaxClipPlanes},
+      {"sides", kMaxClipSides},
       {"parameters", kMaxParameters},
   };
   std::map<std::string, bool> seen;

@@ -79,6 +79,15 @@ OcclusionMask Mask(std::int32_t tiles_x, std::int32_t tiles_y) {
   return mask;
 }
 
+GroupAssignment Clipped() {
+  GroupAssignment message = Assignment(2, {}, ZBuffer());
+  for (std::size_t i = 0; i < kMaxClipSides; ++i) {
+    message.setup.clip.sides.push_back({i % 2 == 0 ? Vec3{0.5, 0, 0} : Vec3{0, 0, -2.25}, -1e300});
+  }
+  message.setup.clip.mode = ClipMode::kCutAway;
+  return message;
+}
+
 GroupAssignment BehindOthers() {
   GroupAssignment message = Assignment(2, {}, Splatting());
   message.setup.termination = 0.5;
@@ -127,7 +136,8 @@ std::vector<Ping> SamplesOf() {
 template <>
 std::vector<GroupAssignment> SamplesOf() {
   const ViewParameters oblique{Projection::kPerspective, 1e6, -33, 12.5, 0.01, 60};
-  return {Assignment(3, {}, Splatting()), Assignment(0, oblique, ZBuffer()), Assignment(16, oblique, Splatting()), BehindOthers()};
+  return {Assignment(3, {}, Splatting()), Assignment(0, oblique, ZBuffer()), Assignment(16, oblique, Splatting()), BehindOthers(),
+          Clipped()};
 }
 
 template <>
@@ -226,12 +236,18 @@ std::vector<SubmitFrame> SamplesOf() {
   full.parameters = {{"projection-mode", "minimum"}};
   full.size = {kMaxImageSide, 1};
   full.view = {Projection::kPerspective, kMaxAngleDegrees, -kMaxAngleDegrees, -0.0, kMinZoom, kMinFovDegrees};
+  full.clipping = {.box = ClipBox{{-kMaxWorldCoordinate, -1, 0}, {-1e8, 0, 1e-3}, ClipUnit::kPercent},
+                   .slab = ClipSlab{.normal = {-1, 1e-3, 0}, .through = {}, .index = kMaxVolumeSide - 1, .thickness = kMaxWorldCoordinate},
+                   .planes = std::vector<ClipPlane>(kMaxClipPlanes, {{0, -1, 1e9}, -1e18}),
+                   .mode = ClipMode::kCutAway};
   full.transfer = {Curve(), 1e-6};
   full.shading = ManyLights();
   full.termination = 0.5;
   full.policy = {kUmlaut, kLongName, AxisChoice::kX, kMaxGroups, kUmlaut, kLongName, kLongName, kMaxPixelError, kMaxTeams};
   full.previews = true;
-  return {{0, 1, Request()}, {kMax64, 86400000, full}};
+  FrameRequest sliced = Request();
+  sliced.clipping.slab = ClipSlab{.through = Vec3{1, -2, 3e8}};
+  return {{0, 1, Request()}, {kMax64, 86400000, full}, {1, 2, sliced}};
 }
 
 template <>

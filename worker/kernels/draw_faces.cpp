@@ -124,16 +124,22 @@ HWY_INLINE V DepthWhere(M hit, V depth) {
   return hn::IfThenElse(hit, depth, hn::Set(hn::DFromV<V>(), std::numeric_limits<float>::infinity()));
 }
 
-// Takes the face's keys where they are less: nowhere at infinite depths.
-template <class Tags, class V>
-HWY_INLINE void Merge(V depth, std::uint32_t face, std::uint64_t* HWY_RESTRICT keys) {
+// Takes the face's keys where they are less: nowhere at infinite depths. `keys` points into the band's.
+template <class Tags, bool kClipped, class V>
+HWY_INLINE void Merge(V depth, std::uint32_t face, std::uint64_t* HWY_RESTRICT keys, const KeyBand& band) {
   const typename Tags::Key dk;
+  if constexpr (kClipped) {
+    const typename Tags::Depth df;
+    const std::ptrdiff_t at = keys - band.keys;
+    const auto inside = hn::And(hn::Ge(depth, hn::LoadU(df, band.limits.from + at)), hn::Le(depth, hn::LoadU(df, band.limits.to + at)));
+    depth = DepthWhere(band.limits.inside ? inside : hn::Not(inside), depth);
+  }
   const auto key = hn::Or(hn::ShiftLeft<32>(hn::PromoteTo(dk, hn::BitCast(typename Tags::Bits(), depth))), hn::Set(dk, face));
   hn::StoreU(hn::Min(key, hn::LoadU(dk, keys)), dk, keys);
 }
 
 // Any face of a batch.
-template <bool kPerspective>
+template <bool kPerspective, bool kClipped>
 HWY_INLINE void DrawFace(const FaceProjection& faces, const FaceBatch& batch, std::size_t n, std::uint32_t face, const KeyBand& band) {
   using Tags = RowTags<8>;
   const Tags::Depth df;
@@ -154,11 +160,11 @@ HWY_INLINE void DrawFace(const FaceProjection& faces, const FaceBatch& batch, st
         const auto u = hn::Add(u0, at(u_left, batch.u_y[n])), v = hn::Add(v0, at(v_left, batch.v_y[n]));
         const auto divisor = hn::Add(hn::Set(df, batch.divisor[n]), at(depth_left, batch.slope_y[n]));
         const auto hit = hn::Lt(hn::Max(hn::Abs(u), hn::Abs(v)), hn::Mul(reach, divisor));
-        Merge<Tags>(DepthWhere(hit, hn::Div(depth0, divisor)), face, keys);
+        Merge<Tags, kClipped>(DepthWhere(hit, hn::Div(depth0, divisor)), face, keys, band);
       } else {
         const auto u = hn::Add(u0, at(u_left, faces.u_y)), v = hn::Add(v0, at(v_left, faces.v_y));
         const auto hit = hn::Lt(hn::Max(hn::Abs(u), hn::Abs(v)), reach);
-        Merge<Tags>(DepthWhere(hit, hn::Add(depth0, at(depth_left, faces.depth_y))), face, keys);
+        Merge<Tags, kClipped>(DepthWhere(hit, hn::Add(depth0, at(depth_left, faces.depth_y))), face, keys, band);
       }
     }
   }
@@ -194,7 +200,7 @@ HWY_INLINE bool Fits(const FaceBatch& batch, std::size_t n) {
   return batch.columns[n] <= kStampSide && batch.right[n] == 0 && batch.below[n] + batch.rows[n] <= kStampSide;
 }
 
-template <bool kPerspective>
+template <bool kPerspective, bool kClipped>
 HWY_INLINE void DrawStamp(const Stamp& stamp, const FaceBatch& batch, std::size_t n, std::uint32_t face, const KeyBand& band) {
   const FloatTag df;
   const auto u0 = hn::Set(df, batch.u[n]), v0 = hn::Set(df, batch.v[n]), depth0 = hn::Set(df, batch.depth[n]);
@@ -222,12 +228,12 @@ HWY_INLINE void DrawStamp(const Stamp& stamp, const FaceBatch& batch, std::size_
   std::uint64_t* keys = band.keys + batch.key[n];
   for (std::int32_t row = batch.below[n]; row < row_end; ++row, keys += band.stride) {
     for (std::int32_t column = 0; column < kStampSide; column += std::int32_t(hn::Lanes(row_tag))) {
-      Merge<Tags>(hn::Load(row_tag, depths + kStampSide * row + column), face, keys + column);
+      Merge<Tags, kClipped>(hn::Load(row_tag, depths + kStampSide * row + column), face, keys + column, band);
     }
   }
 }
 
-template <bool kPerspective>
+template <bool kPerspective, bool kClipped>
 std::size_t Draw(const FaceProjection& faces, const FaceSite* sites, const FaceNormals* normals, std::uint32_t first, std::uint32_t count,
                  const KeyBand& band) {
   const auto lanes = std::uint32_t(hn::Lanes(FloatTag()));
@@ -244,9 +250,9 @@ std::size_t Draw(const FaceProjection& faces, const FaceSite* sites, const FaceN
       const auto lane = std::size_t(std::countr_zero(visible));
       const auto face = n + std::uint32_t(lane);
       if (Fits(batch, lane)) {
-        DrawStamp<kPerspective>(stamp, batch, lane, face, band);
+        DrawStamp<kPerspective, kClipped>(stamp, batch, lane, face, band);
       } else {
-        DrawFace<kPerspective>(faces, batch, lane, face, band);
+        DrawFace<kPerspective, kClipped>(faces, batch, lane, face, band);
       }
     }
   }
@@ -255,8 +261,13 @@ std::size_t Draw(const FaceProjection& faces, const FaceSite* sites, const FaceN
 
 std::size_t DrawAny(Projection projection, const FaceProjection& faces, const FaceSite* sites, const FaceNormals* normals,
                     std::uint32_t first, std::uint32_t count, const KeyBand& band) {
-  return projection == Projection::kPerspective ? Draw<true>(faces, sites, normals, first, count, band)
-                                                : Draw<false>(faces, sites, normals, first, count, band);
+  const bool clipped = band.limits.from != nullptr;
+  if (projection == Projection::kPerspective) {
+    return clipped ? Draw<true, true>(faces, sites, normals, first, count, band)
+                   : Draw<true, false>(faces, sites, normals, first, count, band);
+  }
+  return clipped ? Draw<false, true>(faces, sites, normals, first, count, band)
+                 : Draw<false, false>(faces, sites, normals, first, count, band);
 }
 
 bool AllNearerThan(const KeyBand& band, const PixelBounds& bounds, float depth) {

@@ -2,6 +2,7 @@
 //
 // A key holds a pixel's depth (float bits, 32 ... 63) and the number of the visible face (0 ... 31). The least key is the nearest face; at
 // equal depth, the face with the lower number. So the order of faces does not matter. An empty pixel has infinite depth and any number.
+// Depths that clipping cuts out of a pixel's ray are not drawn (DepthLimits).
 //
 // A pixel centre's offset (dx, dy) from the projected centre of a face decides whether it is hit, in the plane of the face:
 //   orthographic: du = u_x dx + u_y dy, dv alike; hit: max(|du|, |dv|) < kFaceReach; depth = that of the centre + depth_x dx + depth_y dy
@@ -24,11 +25,19 @@ inline constexpr std::uint64_t kEmptyKey = 0x7F800000FFFFFFFF;
 inline constexpr std::size_t kSitesReadAhead = 16;
 inline constexpr int kKeyPadding = 16;  // keys after each row that kernels may change; they are never read
 
+// Depths that clipping cuts out of the rays of a band's pixels, placed as the keys are: those in [from, to], or all others.
+struct DepthLimits {
+  const float* from = nullptr;  // null: nothing is clipped
+  const float* to = nullptr;
+  bool inside = false;  // depths in [from, to] are drawn, and no others; else the others
+};
+
 // Keys of the pixels of `bounds`: pixel (x, y) at (y - bounds.y_begin) * stride + x - bounds.x_begin; stride >= width + kKeyPadding.
 struct KeyBand {
   std::uint64_t* keys = nullptr;
   std::size_t stride = 0;
   PixelBounds bounds;
+  DepthLimits limits;
 };
 
 // Faces of one side of a brick on the screen. The face of the brick's voxel (0, 0, 0) has its centre at x - 0.5 = column + x_phase, that of

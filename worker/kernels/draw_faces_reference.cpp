@@ -47,7 +47,12 @@ std::size_t DrawFacesReference(Projection projection, const FaceProjection& face
         const float hit = perspective ? depth / divisor
                                       : (depth + ((left - x) * faces.depth_x + (top - y) * faces.depth_y)) +
                                             (right * faces.depth_x + below * faces.depth_y);
-        std::uint64_t& key = band.keys[std::size_t(row - band.bounds.y_begin) * band.stride + std::size_t(column - band.bounds.x_begin)];
+        const std::size_t pixel = std::size_t(row - band.bounds.y_begin) * band.stride + std::size_t(column - band.bounds.x_begin);
+        if (band.limits.from != nullptr) {
+          const bool inside = hit >= band.limits.from[pixel] && hit <= band.limits.to[pixel];
+          if (inside != band.limits.inside) continue;
+        }
+        std::uint64_t& key = band.keys[pixel];
         key = std::min(key, std::uint64_t{std::bit_cast<std::uint32_t>(hit)} << 32 | face);
       }
     }

@@ -141,6 +141,57 @@ HWY_INLINE SampleInterval SamplesInside(const RayPacket& packet, const Float3& l
   return {hn::Add(first, lead), hn::IfThenElse(packet.valid, hn::Add(first, held), hn::Zero(df))};
 }
 
+// As PartsOf, for each ray.
+struct PacketPart {
+  Floats begin, end, enter, leave, face[3], face_end;
+
+  SampleInterval Of(const SampleInterval& samples) const { return {hn::Max(samples.begin, begin), hn::Min(samples.end, end)}; }
+};
+HWY_INLINE void PartsOf(const RayClip& clip, const RayPacket& packet, PacketPart (&parts)[2]) {
+  const FloatTag df;
+  struct Cut {
+    Floats at, normal[3], face_end;
+  };
+  const auto far = Set(kRayEnd), minus_far = Set(-kRayEnd), zero = hn::Zero(df);
+  Cut enter = {minus_far, {zero, zero, zero}, minus_far}, leave = {far, {zero, zero, zero}, minus_far};
+  auto outside = hn::Lt(far, zero);  // never
+  for (const RayClip::Side& side : clip.sides) {
+    const auto dot = [&](const Floats(&v)[3]) HWY_ATTR {
+      return hn::Add(hn::Add(hn::Mul(Set(side.normal[0]), v[0]), hn::Mul(Set(side.normal[1]), v[1])), hn::Mul(Set(side.normal[2]), v[2]));
+    };
+    const auto first = hn::Add(dot(packet.first), Set(side.offset)), move = dot(packet.move);
+    const auto crosses = hn::Ge(hn::Abs(move), Set(kLeastCrossing)), inwards = hn::Gt(move, zero);
+    const auto divisor = hn::IfThenElse(crosses, move, Set(1));
+    const auto at = hn::Div(hn::Neg(first), divisor);
+    const auto face_end = hn::Add(at, hn::Div(Set(clip.face_depth), hn::Abs(divisor)));
+    outside = hn::Or(outside, hn::AndNot(crosses, hn::Lt(first, zero)));
+    const auto take = [&](Cut& cut, Mask better) HWY_ATTR {
+      cut.at = hn::IfThenElse(better, at, cut.at);
+      cut.face_end = hn::IfThenElse(better, face_end, cut.face_end);
+      for (std::size_t i = 0; i < 3; ++i) cut.normal[i] = hn::IfThenElse(better, Set(side.normal[i]), cut.normal[i]);
+    };
+    take(enter, hn::And(hn::And(crosses, inwards), hn::Gt(at, enter.at)));
+    take(leave, hn::And(hn::AndNot(inwards, crosses), hn::Lt(at, leave.at)));
+  }
+  const auto any = hn::AndNot(outside, hn::Le(enter.at, leave.at));
+  const auto from = hn::Ceil(enter.at), to = hn::Add(hn::Floor(leave.at), Set(1));
+  const auto part = [&](PacketPart& out, Mask present, Floats begin, Floats end, Floats enters, Floats leaves, const Cut* cut) HWY_ATTR {
+    out = {begin, hn::IfThenElse(present, end, minus_far), enters, leaves, {zero, zero, zero}, minus_far};
+    if (cut == nullptr) return;
+    for (std::size_t i = 0; i < 3; ++i) out.face[i] = cut->normal[i];
+    out.face_end = cut->face_end;
+  };
+  if (clip.cut_away) {
+    const auto all = hn::Ge(far, zero);
+    part(parts[0], all, minus_far, hn::IfThenElse(any, from, far), minus_far, hn::IfThenElse(any, enter.at, far), nullptr);
+    part(parts[1], any, to, far, leave.at, far, &leave);
+  } else {
+    part(parts[0], any, from, to, enter.at, leave.at, &enter);
+    parts[1] = parts[0];
+    parts[1].end = minus_far;
+  }
+}
+
 // The samples that the box owns and that may matter.
 HWY_INLINE SampleInterval OwnedSamples(const RayPacket& packet, const RayBox& box) {
   return SamplesInside(packet, box.low, box.high, box.reach.begin, box.reach.end);

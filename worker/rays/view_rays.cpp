@@ -2,21 +2,41 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace slabstream {
 namespace {
 
 Float3 ToFloat3(const Vec3& v) { return {float(v.x), float(v.y), float(v.z)}; }
 
+// Least spacings. Material that is not quite opaque shows what lies a few samples behind a cut, too.
+constexpr double kFaceDepth = 2.5;
+
+// The depth in the middle of a slab that faces the view; its surfaces are two sides of the region. None: there is no slab.
+std::optional<double> MiddleOfSlab(const Camera& camera, const ClipRegion& clip) {
+  if (camera.projection != Projection::kOrthographic || clip.mode != ClipMode::kKeep) return std::nullopt;
+  constexpr double kFacing = 1 - 1e-9;
+  double enter = -1e300, leave = 1e300;
+  for (const HalfSpace& side : clip.sides) {
+    const double facing = Dot(side.normal / camera.spacing, camera.view_direction);
+    const double depth = -side.Distance(camera.eye) / facing;
+    if (facing > kFacing) enter = std::max(enter, depth);
+    if (facing < -kFacing) leave = std::min(leave, depth);
+  }
+  if (enter == -1e300 || leave == 1e300 || enter > leave) return std::nullopt;
+  return 0.5 * (enter + leave);
+}
+
 }  // namespace
 
-ViewRays MakeViewRays(const Camera& camera, const VolumeGeometry& geometry, double samples_per_voxel) {
+ViewRays MakeViewRays(const Camera& camera, const VolumeGeometry& geometry, double samples_per_voxel, const ClipRegion& clip) {
   const Vec3 spacing = geometry.spacing;
   const double step = std::min({spacing.x, spacing.y, spacing.z}) / samples_per_voxel;
   const double radius = 0.5 * Length(ToVec3(geometry.size) * spacing);
   const Vec3 middle = 0.5 * (ToVec3(geometry.size) - Vec3{1, 1, 1});
   const double centre_depth = camera.Project(middle).depth;
-  const double first = std::max(std::floor((centre_depth - radius) / step), 0.0);
+  double first = std::max(std::floor((centre_depth - radius) / step), 0.0);
+  if (const auto middle_depth = MiddleOfSlab(camera, clip)) first += *middle_depth / step - std::ceil(*middle_depth / step);
 
   ViewRays rays;
   rays.perspective = camera.projection == Projection::kPerspective;
@@ -40,6 +60,9 @@ ViewRays MakeViewRays(const Camera& camera, const VolumeGeometry& geometry, doub
   const double farthest = std::max(centre_depth, rays.perspective ? Length((middle - camera.eye) * spacing) : 0) + radius;
   rays.sample_count = std::int32_t(std::ceil(farthest / step) - first) + 1;
   rays.volume_end = ToFloat3(ToVec3(geometry.size) - Vec3{0.5, 0.5, 0.5});
+  for (const HalfSpace& side : clip.sides) rays.clip.sides.push_back({ToFloat3(side.normal), float(side.offset)});
+  rays.clip.cut_away = clip.mode == ClipMode::kCutAway;
+  rays.clip.face_depth = float(kFaceDepth * std::min({spacing.x, spacing.y, spacing.z}));
   return rays;
 }
 
@@ -63,6 +86,50 @@ Float3 SamplePosition(const PixelRay& ray, std::int32_t k) {
   Float3 position{};
   for (std::size_t i = 0; i < 3; ++i) position[i] = ray.first[i] + float(k) * ray.move[i];
   return position;
+}
+
+std::array<RayPart, 2> PartsOf(const RayClip& clip, const PixelRay& ray) {
+  struct Cut {
+    float at;
+    const RayClip::Side* side = nullptr;
+    float face_samples = 0;
+  };
+  Cut enter{-kRayEnd}, leave{kRayEnd};
+  for (const RayClip::Side& side : clip.sides) {
+    const auto dot = [&](const Float3& v) { return side.normal[0] * v[0] + side.normal[1] * v[1] + side.normal[2] * v[2]; };
+    const float first = dot(ray.first) + side.offset, move = dot(ray.move);
+    const float at = -first / move, samples = clip.face_depth / std::abs(move);
+    if (!(std::abs(move) >= kLeastCrossing)) {
+      if (first < 0) leave.at = -2 * kRayEnd;  // the ray runs outside
+    } else if (move > 0) {
+      if (at > enter.at) enter = {at, &side, samples};
+    } else if (at < leave.at) {
+      leave = {at, &side, samples};
+    }
+  }
+  const auto face = [](RayPart& part, const Cut& cut) {
+    if (cut.side == nullptr) return;
+    part.face = cut.side->normal;
+    part.face_end = cut.at + cut.face_samples;
+  };
+  const bool any = enter.at <= leave.at;
+  std::array<RayPart, 2> parts;
+  if (!clip.cut_away) {
+    if (any) {
+      parts[0] = {std::ceil(enter.at), std::floor(leave.at) + 1, enter.at, leave.at};
+      face(parts[0], enter);
+    } else {
+      parts[0].end = -kRayEnd;
+    }
+    parts[1].end = -kRayEnd;
+  } else if (any) {
+    parts[0] = {-kRayEnd, std::ceil(enter.at), -kRayEnd, enter.at};
+    parts[1] = {std::floor(leave.at) + 1, kRayEnd, leave.at, kRayEnd};
+    face(parts[1], leave);
+  } else {
+    parts[1].end = -kRayEnd;
+  }
+  return parts;
 }
 
 RayReach ReachOfBox(const ViewRays& rays, const Camera& camera, const Vec3& low, const Vec3& high) {

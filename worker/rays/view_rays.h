@@ -2,21 +2,40 @@
 //
 // Each pixel has one ray, through its centre. Sample k lies k steps behind the ray's first sample, in equal physical distances (`step`).
 // The first sample is a whole number of steps away from the eye (perspective) or the eye plane (orthographic). All rays start at the same
-// distance, in front of the volume's bounding sphere. So samples depend only on the view and the volume's geometry, never on a box: boxes
+// distance, in front of the volume's bounding sphere. (If clipping leaves a slab that faces an orthographic view, samples lie evenly about
+// its middle instead, so that a thin one is a slice.) So samples depend only on the view and the volume's geometry, never on a box: boxes
 // that ask for the same sample compute the same position, bit for bit (SamplePosition and, lane by lane, ray_packet-inl.h).
+//
+// Clipping leaves one part of a ray, or two if the region is cut away. Its ends depend on ray and region alone, so that boxes agree on
+// them.
 //
 // Positions are single precision with separately rounded operations. Their error is below 2^-22 times the side of the volume in voxels.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <vector>
 
 #include "common/image/local_image.h"
 #include "common/view/camera.h"
+#include "common/view/clip.h"
 
 namespace slabstream {
 
 using Float3 = std::array<float, 3>;
+
+// ClipRegion in single precision.
+struct RayClip {
+  struct Side {
+    Float3 normal{};
+    float offset = 0;
+  };
+  std::vector<Side> sides;
+  bool cut_away = false;
+  float face_depth = 0;  // physical: samples so near behind a cut are lit as parts of a flat face
+
+  bool empty() const { return sides.empty(); }
+};
 
 struct ViewRays {
   bool perspective = false;
@@ -29,10 +48,11 @@ struct ViewRays {
   float step = 0;                 // physical
   std::int32_t sample_count = 0;  // k < sample_count holds for every sample within the volume
   Float3 volume_end{};            // the volume fills the positions p with -0.5 <= p < volume_end on every axis
+  RayClip clip;
 };
 
 // `samples_per_voxel`: samples along a ray per least voxel spacing of the volume, > 0.
-ViewRays MakeViewRays(const Camera& camera, const VolumeGeometry& geometry, double samples_per_voxel);
+ViewRays MakeViewRays(const Camera& camera, const VolumeGeometry& geometry, double samples_per_voxel, const ClipRegion& clip = {});
 
 // The ray of a pixel: sample k is at first + k * move in data space, by component.
 struct PixelRay {
@@ -40,6 +60,18 @@ struct PixelRay {
 };
 PixelRay RayOf(const ViewRays& rays, std::int32_t x, std::int32_t y);
 Float3 SamplePosition(const PixelRay& ray, std::int32_t k);
+
+// A part of a ray that clipping leaves, in numbers of samples.
+inline constexpr float kLeastCrossing = 1e-6F;  // physical distance a sample: a ray that moves less runs along a side
+inline constexpr float kRayEnd = 1e9F;          // beyond every sample, either sign
+struct RayPart {
+  float begin = -kRayEnd, end = kRayEnd;    // samples [begin, end)
+  float enter = -kRayEnd, leave = kRayEnd;  // where the ray is cut, between samples
+  Float3 face{};                            // data space: a normal of the face at `enter`, of any length
+  float face_end = -kRayEnd;                // samples before this one lie within face_depth of it
+};
+// The parts of a ray, nearest first. The second one may be empty: begin >= end.
+std::array<RayPart, 2> PartsOf(const RayClip& clip, const PixelRay& ray);
 
 // Samples [begin, end) and pixels that a data-space box may touch, with some slack. The pixels lie within the camera's image.
 struct RayReach {

@@ -79,7 +79,11 @@ class MipKind : public RendererKind {
                                      {.name = "projection-mode",
                                       .purpose = "Value of a pixel: the largest, the least or the mean sample along its ray",
                                       .standard = double(ProjectionMode::kMaximum),
-                                      .choices = {"maximum", "minimum", "mean"}}}}) {}
+                                      .choices = {"maximum", "minimum", "mean"}},
+                                     {.name = "interpolation",
+                                      .purpose = "Values between voxels: trilinear, or those of the nearest voxel",
+                                      .standard = 0,
+                                      .choices = {"linear", "nearest"}}}}) {}
 
   PixelFormat FormatOf(const std::vector<double>& parameters) const override {
     return ProjectionMode(int(parameters[1])) == ProjectionMode::kMean ? PixelFormat::kSum : PixelFormat::kMaximum;

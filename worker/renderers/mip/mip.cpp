@@ -48,6 +48,7 @@ class MipRenderer : public Renderer {
     const bool largest = (mode == ProjectionMode::kMaximum) == (mapping.scale >= 0);
     work.sign = largest ? 1.0F : -1.0F;
     work.complement = mode == ProjectionMode::kMinimum;
+    work.nearest = TakesNearestVoxel(setup);
     // value = (data value - range.min) / (range.max - range.min)
     const double range = double(setup.range.max) - double(setup.range.min);
     if (mapping.scale != 0 && range > 0) {
@@ -61,7 +62,7 @@ class MipRenderer : public Renderer {
         mode == ProjectionMode::kMean ? nullptr : &slab.CacheOf<BoundsCache>().Of(pieces, work.sign);
     clock.Charge(Stage::kPrepare);
 
-    const ViewRays rays = MakeViewRays(setup.camera, setup.description.geometry, SamplesPerVoxel(setup));
+    const ViewRays rays = MakeViewRays(setup.camera, setup.description.geometry, SamplesPerVoxel(setup), setup.clip);
     work.rays = &rays;
     LocalImage image = MakeLocalImage(setup.format, {});
     for (std::size_t number = 0; number < pieces.size(); ++number) {

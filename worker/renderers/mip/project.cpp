@@ -20,7 +20,11 @@ struct Samples {
   Mask valid;
 };
 template <class T>
-HWY_INLINE Samples SamplesAt(const RayBox& box, const SamplePlace& place, Mask owned) {
+HWY_INLINE Samples SamplesAt(const ProjectWork& work, SamplePlace place, Mask owned) {
+  const RayBox& box = *work.box;
+  if (work.nearest) {
+    for (Floats& fraction : place.fraction) fraction = hn::IfThenElseZero(hn::Ge(fraction, Set(0.5F)), Set(1));
+  }
   const Neighbours<T> n = LoadNeighbours<T>(box, place, owned);
   const auto value = Interpolate(n, place);
   Floats least = n.inner[0][0].a, largest = n.inner[0][0].a;
@@ -83,7 +87,7 @@ HWY_INLINE bool Advance(const ProjectWork& work, const RayPacket& packet, const 
   }
   // If one ray takes its sample, all that are alive do: then its address need not wait for the bounds.
   if (!hn::AllFalse(df, sampled)) {
-    const Samples samples = SamplesAt<T>(box, place, alive);
+    const Samples samples = SamplesAt<T>(work, place, alive);
     const auto candidate = hn::Mul(samples.values, Set(work.sign));
     const auto larger = hn::And(samples.valid, hn::Gt(candidate, found.best));
     found.best = hn::IfThenElse(larger, candidate, found.best);
@@ -99,14 +103,23 @@ struct Hint {
   Floats ahead, behind;
 };
 
-// Returns whether any of a packet's rays has a sample in the box; `pixels` then holds them all. The nearer the hint is to the extremes of
-// its rays, the more is leapt over. It becomes their mean place, for the next packet.
-template <class T>
-HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet, Hint& hint, float* HWY_RESTRICT pixels) {
-  const FloatTag df;
+// The samples that the box owns, as far as clipping leaves them.
+struct OwnedParts {
+  SampleInterval parts[2];
+  int count = 1;
+};
+HWY_INLINE OwnedParts OwnedPartsOf(const ProjectWork& work, const RayPacket& packet) {
   const SampleInterval owned = OwnedSamples(packet, *work.box);
+  if (work.rays->clip.empty()) return {{owned, owned}};
+  PacketPart parts[2];
+  PartsOf(work.rays->clip, packet, parts);
+  return {{parts[0].Of(owned), parts[1].Of(owned)}, work.rays->clip.cut_away ? 2 : 1};
+}
+
+template <class T>
+HWY_INLINE void SearchSamples(const ProjectWork& work, const RayPacket& packet, const SampleInterval& owned, const Hint& hint,
+                              Findings& found) {
   const auto one = Set(1);
-  Findings found = {Set(std::numeric_limits<float>::lowest()), owned.begin, hn::Lt(one, hn::Zero(df))};
   RayPacket reversed = packet;
   for (Floats& move : reversed.move) move = hn::Neg(move);
   Search forwards = {hn::Max(hint.ahead, owned.begin), one, LeapScalesOf(packet), 1};
@@ -116,6 +129,17 @@ HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet
     ahead = ahead && Advance<T>(work, packet, owned, forwards, found);
     behind = behind && Advance<T>(work, packet, owned, backwards, found);
   }
+}
+
+// Returns whether any of a packet's rays has a sample in the box; `pixels` then holds them all. The nearer the hint is to the extremes of
+// its rays, the more is leapt over. It becomes their mean place, for the next packet.
+template <class T>
+HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet, Hint& hint, float* HWY_RESTRICT pixels) {
+  const FloatTag df;
+  const OwnedParts owned = OwnedPartsOf(work, packet);
+  const auto one = Set(1);
+  Findings found = {Set(std::numeric_limits<float>::lowest()), owned.parts[0].begin, hn::Lt(one, hn::Zero(df))};
+  for (int i = 0; i < owned.count; ++i) SearchSamples<T>(work, packet, owned.parts[i], hint, found);
   // One hint for all: rays that stay together read the same memory.
   const auto mean = hn::Floor(hn::Mul(hn::SumOfLanes(df, found.at), Set(1.0F / float(kLanes))));
   hint = {mean, hn::Sub(mean, one)};
@@ -132,22 +156,26 @@ HWY_INLINE bool SumOfPacket(const ProjectWork& work, const RayPacket& packet, fl
   const FloatTag df;
   const IntTag di;
   const RayBox& box = *work.box;
-  const SampleInterval owned = OwnedSamples(packet, box);
-  const auto begin = hn::MinOfLanes(df, hn::IfThenElse(hn::Lt(owned.begin, owned.end), owned.begin, owned.end));
-  const float end = hn::GetLane(hn::MaxOfLanes(df, owned.end));
+  const OwnedParts parts = OwnedPartsOf(work, packet);
   Ints high = hn::Zero(di), middle = high, low = high, count = high;
   const auto byte = SetInt(0xFF), one = SetInt(1);
-  for (float k = hn::GetLane(begin); k < end; k += 1) {
-    const auto sample = Set(k);
-    const auto active = hn::And(hn::Ge(sample, owned.begin), hn::Lt(sample, owned.end));
-    const Samples samples = SamplesAt<T>(box, PlaceSample(packet, box, sample), active);
-    const auto valid = hn::RebindMask(di, samples.valid);
-    const auto value = hn::ConvertTo(di, hn::Mul(ValueOf(work, samples.values), Set(0x1p24F)));
-    const auto fixed = hn::IfThenElseZero(valid, hn::Min(value, SetInt(0xFFFFFF)));
-    high = hn::Add(high, hn::ShiftRight<16>(fixed));
-    middle = hn::Add(middle, hn::And(hn::ShiftRight<8>(fixed), byte));
-    low = hn::Add(low, hn::And(fixed, byte));
-    count = hn::Add(count, hn::IfThenElseZero(valid, one));
+  for (int i = 0; i < parts.count; ++i) {
+    const SampleInterval& owned = parts.parts[i];
+    const auto some = hn::Lt(owned.begin, owned.end);
+    const float begin = hn::GetLane(hn::MinOfLanes(df, hn::IfThenElse(some, owned.begin, Set(kRayEnd))));
+    const float end = hn::GetLane(hn::MaxOfLanes(df, hn::IfThenElse(some, owned.end, Set(-kRayEnd))));
+    for (float k = begin; k < end; k += 1) {
+      const auto sample = Set(k);
+      const auto active = hn::And(hn::Ge(sample, owned.begin), hn::Lt(sample, owned.end));
+      const Samples samples = SamplesAt<T>(work, PlaceSample(packet, box, sample), active);
+      const auto valid = hn::RebindMask(di, samples.valid);
+      const auto value = hn::ConvertTo(di, hn::Mul(ValueOf(work, samples.values), Set(0x1p24F)));
+      const auto fixed = hn::IfThenElseZero(valid, hn::Min(value, SetInt(0xFFFFFF)));
+      high = hn::Add(high, hn::ShiftRight<16>(fixed));
+      middle = hn::Add(middle, hn::And(hn::ShiftRight<8>(fixed), byte));
+      low = hn::Add(low, hn::And(fixed, byte));
+      count = hn::Add(count, hn::IfThenElseZero(valid, one));
+    }
   }
   if (hn::AllTrue(di, hn::Eq(count, hn::Zero(di)))) return false;
   hn::StoreInterleaved4(hn::ConvertTo(df, high), hn::ConvertTo(df, middle), hn::ConvertTo(df, low), hn::ConvertTo(df, count), df, pixels);

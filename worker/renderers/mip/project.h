@@ -37,6 +37,7 @@ struct ProjectWork {
   // Of a sample: value = clamp((sample - low) * scale, 0, 1).
   float low = 0, scale = 1;
   bool complement = false;  // store 1 - value, which is largest for the least value
+  bool nearest = false;     // samples are those of the nearest voxel, not interpolated
 };
 
 // Four floats a pixel of `tile`; `pixels` points to the first pixel's. Pixels without a sample may stay unwritten: they must be 0 before.

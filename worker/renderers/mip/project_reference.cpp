@@ -12,12 +12,13 @@ namespace {
 float Lerp(float t, float a, float b) { return a + t * (b - a); }
 
 template <class T>
-float SampleAt(const RayBox& box, const Float3& p) {
+float SampleAt(const RayBox& box, const Float3& p, bool nearest) {
   const Float3 floor = {std::floor(p[0]), std::floor(p[1]), std::floor(p[2])};
   const std::int64_t first = std::int64_t{box.slice} * (std::int32_t(floor[2]) - box.origin.z + 1) +
                              std::int64_t{box.row} * (std::int32_t(floor[1]) - box.origin.y + 1) +
                              (std::int32_t(floor[0]) - box.origin.x + 1);
-  const float u = p[0] - floor[0], v = p[1] - floor[1], w = p[2] - floor[2];
+  const auto fraction = [&](std::size_t i) { return nearest ? float(p[i] - floor[i] >= 0.5F) : p[i] - floor[i]; };
+  const float u = fraction(0), v = fraction(1), w = fraction(2);
   float least = std::numeric_limits<float>::max(), largest = std::numeric_limits<float>::lowest();
   const auto row = [&](std::int64_t dy, std::int64_t dz) {
     const T* const voxels = reinterpret_cast<const T*>(box.samples) + first + dy * box.row + dz * box.slice;
@@ -39,12 +40,13 @@ std::array<float, 4> Pixel(const ProjectWork& work, std::int32_t x, std::int32_t
   bool found = false;
   float best = 0;
   std::array<float, 4> sums{};
+  const std::array<RayPart, 2> parts = PartsOf(work.rays->clip, ray);
   for (std::int32_t k = 0; k < work.rays->sample_count; ++k) {
     const Float3 p = SamplePosition(ray, k);
-    bool owned = true;
+    bool owned = std::ranges::any_of(parts, [k](const RayPart& part) { return float(k) >= part.begin && float(k) < part.end; });
     for (std::size_t i = 0; i < 3; ++i) owned = owned && p[i] >= box.low[i] && p[i] < box.high[i];
     if (!owned) continue;
-    const float sample = SampleAt<T>(box, p);
+    const float sample = SampleAt<T>(box, p, work.nearest);
     if (!std::isfinite(sample)) continue;
     best = found ? std::max(best, work.sign * sample) : work.sign * sample;
     found = true;

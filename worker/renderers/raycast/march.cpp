@@ -70,9 +70,10 @@ struct EndSamples {
   Floats first, last;                // k
   Floats first_excess, last_excess;  // steps, [-0.5, 0.5]
 };
-HWY_INLINE EndSamples EndSamplesOf(const ViewRays& view, const RayPacket& packet, const LeapScales& scales) {
+// `part`: what clipping leaves of the rays, null: all.
+HWY_INLINE EndSamples EndSamplesOf(const ViewRays& view, const RayPacket& packet, const LeapScales& scales, const PacketPart* part) {
   const Float3 low = {-0.5F, -0.5F, -0.5F}, &high = view.volume_end;
-  const SampleInterval inside = SamplesInside(packet, low, high, 0, view.sample_count);
+  SampleInterval inside = SamplesInside(packet, low, high, 0, view.sample_count);
   auto enter = Set(-1e9F), leave = Set(1e9F);  // in samples
   for (std::size_t i = 0; i < 3; ++i) {
     const auto a = hn::Mul(hn::Sub(Set(low[i]), packet.first[i]), scales.inverse[i]);
@@ -80,34 +81,44 @@ HWY_INLINE EndSamples EndSamplesOf(const ViewRays& view, const RayPacket& packet
     enter = hn::Max(enter, hn::Min(a, b));
     leave = hn::Min(leave, hn::Max(a, b));
   }
+  if (part != nullptr) {
+    inside = part->Of(inside);
+    enter = hn::Max(enter, part->enter);
+    leave = hn::Min(leave, part->leave);
+  }
   const auto half = Set(0.5F);
   const auto limited = [&](Floats excess) HWY_ATTR { return hn::Min(hn::Max(excess, hn::Neg(half)), half); };
   const auto last = hn::Sub(inside.end, Set(1));
   return {inside.begin, last, limited(hn::Sub(hn::Sub(inside.begin, enter), half)), limited(hn::Sub(hn::Sub(leave, last), half))};
 }
 
-// The rays of one packet.
-template <class T>
-HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& packet, float* HWY_RESTRICT rgba) {
+// What the rays of a packet have gathered, front to back.
+struct Sums {
+  Floats red, green, blue, alpha;
+};
+
+// Samples `owned` of the rays. kClipped: they lie in `part`; otherwise it is null. Returns how many samples were shaded.
+template <class T, bool kClipped>
+HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const RayPacket& packet, const LeapScales& leaps, const SampleInterval& owned,
+                                      const PacketPart* part, Sums& sums) {
   const FloatTag df;
   const IntTag di;
   const RayBox& box = *work.box;
   const RayLook& look = *work.look;
-  const SampleInterval owned = OwnedSamples(packet, box);
-  const LeapScales leaps = LeapScalesOf(packet);
   const auto zero = hn::Zero(df), one = Set(1);
   // A ray ends when it transmits less.
   const auto opaque = Set(1 - work.termination);
   const float* const entries = look.entries.data();
 
-  const bool at_border = box.at_border;
+  const bool has_ends = kClipped || box.at_border;
   EndSamples ends{zero, zero, zero, zero};
-  if (at_border) ends = EndSamplesOf(*work.rays, packet, leaps);
+  if (has_ends) ends = EndSamplesOf(*work.rays, packet, leaps, part);
 
-  Floats red = zero, green = zero, blue = zero, alpha = zero;
+  Floats red = sums.red, green = sums.green, blue = sums.blue, alpha = sums.alpha;
   // Each ray advances separately: its next sample is k.
   auto k = owned.begin;
   auto alive = hn::Lt(k, owned.end);
+  if constexpr (kClipped) alive = hn::And(alive, hn::Lt(alpha, opaque));
   bool in_matter = false;  // most of the last samples were visible
   std::uint64_t shaded = 0;
   while (!hn::AllFalse(df, alive)) {
@@ -140,7 +151,7 @@ HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& pac
     if (count == 0) continue;
     shaded += count;
 
-    if (at_border) {
+    if (has_ends) {
       const auto is_first = hn::Eq(this_k, ends.first), is_last = hn::Eq(this_k, ends.last);
       if (!hn::AllFalse(df, hn::And(visible, hn::Or(is_first, is_last)))) {
         const auto steps_of_first = hn::Add(one, hn::IfThenElseZero(is_first, ends.first_excess));
@@ -149,7 +160,15 @@ HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& pac
       }
     }
     Light light = {one, zero};
-    if (look.phong) light = LightOf(look, GradientAt(neighbours, place));
+    if (look.phong) {
+      Gradient gradient = GradientAt(neighbours, place);
+      if constexpr (kClipped) {
+        const auto on_face = hn::Lt(this_k, part->face_end);
+        gradient = {hn::IfThenElse(on_face, part->face[0], gradient.x), hn::IfThenElse(on_face, part->face[1], gradient.y),
+                    hn::IfThenElse(on_face, part->face[2], gradient.z)};
+      }
+      light = LightOf(look, gradient);
+    }
     const auto weight = hn::IfThenElseZero(visible, hn::Mul(hn::Sub(one, alpha), opacity));
     const auto add = [&](Floats& sum, const float* colors) HWY_ATTR {
       const auto color = hn::MulAdd(hn::GatherIndex(df, colors, entry), light.diffuse, light.specular);
@@ -161,7 +180,26 @@ HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& pac
     alpha = hn::Add(alpha, weight);
     alive = hn::And(alive, hn::Lt(alpha, opaque));
   }
-  if (shaded != 0) hn::StoreInterleaved4(red, green, blue, alpha, df, rgba);
+  sums = {red, green, blue, alpha};
+  return shaded;
+}
+
+// The rays of one packet.
+template <class T>
+HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& packet, float* HWY_RESTRICT rgba) {
+  const auto zero = hn::Zero(FloatTag());
+  const SampleInterval owned = OwnedSamples(packet, *work.box);
+  const LeapScales leaps = LeapScalesOf(packet);
+  Sums sums = {zero, zero, zero, zero};
+  std::uint64_t shaded = 0;
+  if (work.rays->clip.empty()) {
+    shaded = MarchSamples<T, false>(work, packet, leaps, owned, nullptr, sums);
+  } else {
+    PacketPart parts[2];
+    PartsOf(work.rays->clip, packet, parts);
+    for (const PacketPart& part : parts) shaded += MarchSamples<T, true>(work, packet, leaps, part.Of(owned), &part, sums);
+  }
+  if (shaded != 0) hn::StoreInterleaved4(sums.red, sums.green, sums.blue, sums.alpha, FloatTag(), rgba);
   return shaded;
 }
 

@@ -17,11 +17,20 @@ class ReferenceMarch {
   std::array<float, 4> Pixel(std::int32_t x, std::int32_t y) const {
     const PixelRay ray = RayOf(*work_.rays, x, y);
     std::array<float, 4> sum{};
+    for (const RayPart& part : PartsOf(work_.rays->clip, ray)) AddPart(ray, part, sum);
+    return sum;
+  }
+
+ private:
+  void AddPart(const PixelRay& ray, const RayPart& part, std::array<float, 4>& sum) const {
     const Float3 volume_begin = {-0.5F, -0.5F, -0.5F}, &volume_end = work_.rays->volume_end;
+    const auto in_part = [&](std::int32_t k) {
+      return Inside(SamplePosition(ray, k), volume_begin, volume_end) && float(k) >= part.begin && float(k) < part.end;
+    };
     for (std::int32_t k = 0; k < work_.rays->sample_count; ++k) {
       const Float3 p = SamplePosition(ray, k);
-      if (!Inside(p, box_.low, box_.high)) continue;
-      double enter = -1e9, leave = 1e9;
+      if (!Inside(p, box_.low, box_.high) || !in_part(k)) continue;
+      double enter = part.enter, leave = part.leave;
       for (std::size_t i = 0; i < 3; ++i) {
         const double move = double(ray.move[i]), to_begin = double(volume_begin[i] - ray.first[i]),
                      to_end = double(volume_end[i] - ray.first[i]);
@@ -29,15 +38,12 @@ class ReferenceMarch {
         enter = std::max(enter, std::min(to_begin / move, to_end / move));
         leave = std::min(leave, std::max(to_begin / move, to_end / move));
       }
-      const bool first = !Inside(SamplePosition(ray, k - 1), volume_begin, volume_end),
-                 last = !Inside(SamplePosition(ray, k + 1), volume_begin, volume_end);
+      const bool first = !in_part(k - 1), last = !in_part(k + 1);
       const double before = first ? std::clamp(k - enter, 0.0, 1.0) : 0.5, behind = last ? std::clamp(leave - k, 0.0, 1.0) : 0.5;
-      Add(p, before + behind, sum);
+      Add(p, before + behind, float(k) < part.face_end ? &part.face : nullptr, sum);
     }
-    return sum;
   }
 
- private:
   static bool Inside(const Float3& p, const Float3& low, const Float3& high) {
     bool inside = true;
     for (std::size_t i = 0; i < 3; ++i) inside = inside && p[i] >= low[i] && p[i] < high[i];
@@ -57,24 +63,25 @@ class ReferenceMarch {
     return Lerp(w, Lerp(v, row(0, 0), row(1, 0)), Lerp(v, row(0, 1), row(1, 1)));
   }
 
-  // `steps`: the length that the sample stands for.
-  void Add(const Float3& p, double steps, std::array<float, 4>& sum) const {
+  // `steps`: the length that the sample stands for. `face`: the normal of the cut face that it lies on, or null.
+  void Add(const Float3& p, double steps, const Float3* face, std::array<float, 4>& sum) const {
     const float sample = Interpolated(p, {});
     if (!std::isfinite(sample)) return;
     const auto entry = std::size_t(std::clamp((sample - look_.origin) * look_.scale + look_.rounding, 0.0F, look_.last));
     const float* const rgba = &look_.entries[4 * entry];
     if (rgba[3] == 0) return;
     double diffuse = 1, specular = 0;
-    if (look_.phong) Shade(p, diffuse, specular);
+    if (look_.phong) Shade(p, face, diffuse, specular);
     const double weight = (1 - double(sum[3])) * (1 - std::pow(1 - double(rgba[3]), steps));
     for (std::size_t c = 0; c < 3; ++c) sum[c] += float(weight * std::clamp(double(rgba[c]) * diffuse + specular, 0.0, 1.0));
     sum[3] += float(weight);
   }
 
-  void Shade(const Float3& p, double& diffuse, double& specular) const {
-    const double gradient[3] = {double(Interpolated(p, {1, 0, 0})) - double(Interpolated(p, {-1, 0, 0})),
-                                double(Interpolated(p, {0, 1, 0})) - double(Interpolated(p, {0, -1, 0})),
-                                double(Interpolated(p, {0, 0, 1})) - double(Interpolated(p, {0, 0, -1}))};
+  void Shade(const Float3& p, const Float3* face, double& diffuse, double& specular) const {
+    double gradient[3] = {double(Interpolated(p, {1, 0, 0})) - double(Interpolated(p, {-1, 0, 0})),
+                          double(Interpolated(p, {0, 1, 0})) - double(Interpolated(p, {0, -1, 0})),
+                          double(Interpolated(p, {0, 0, 1})) - double(Interpolated(p, {0, 0, -1}))};
+    if (face != nullptr) std::copy(face->begin(), face->end(), gradient);
     const auto dot = [&](const Float3& v) { return gradient[0] * double(v[0]) + gradient[1] * double(v[1]) + gradient[2] * double(v[2]); };
     double square = 0;
     for (std::size_t i = 0; i < 3; ++i) square += std::pow(gradient[i] * double(look_.inverse_spacing[i]), 2);

@@ -88,7 +88,7 @@ class RaycastRenderer : public Renderer {
     const std::vector<Visibility>& visible = slab.CacheOf<VisibilityCache>().Of(pieces, look);
     clock.Charge(Stage::kPrepare);
 
-    const ViewRays rays = MakeViewRays(setup.camera, setup.description.geometry, samples_per_voxel);
+    const ViewRays rays = MakeViewRays(setup.camera, setup.description.geometry, samples_per_voxel, setup.clip);
     LocalImage image = MakeLocalImage(setup.format, {});
     std::atomic<std::uint64_t> shaded = 0;
     for (const std::size_t number : NearestFirst(pieces, setup.camera)) {

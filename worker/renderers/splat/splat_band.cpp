@@ -6,6 +6,7 @@
 #include <span>
 
 #include "common/image/local_image.h"
+#include "worker/kernels/normal_code.h"
 
 namespace slabstream {
 namespace {
@@ -61,14 +62,55 @@ bool SplatBand::finished() const {
 void SplatBand::AddSlice(std::int32_t k) {
   slice_ = k;
   slopes_ = pass_.opacity.SlopesIn(k);
-  const SliceSamples& slice = pass_.Slice(k);
+  const bool clipped = !pass_.clip.empty();
+  const SliceSamples clipped_slice = clipped ? ClipSlice(pass_.Slice(k)) : SliceSamples{};
+  const SliceSamples& slice = clipped ? clipped_slice : pass_.Slice(k);
   if (!PlaceBeams(slice)) return;
   FindNeeded(slice);
   clock_.Charge(Stage::kTransform);
   if (octets_.empty()) return;
+  if (clipped) LightCuts();
   ShadeAndFilter(slice);
   CompositeRows(slice);
   clock_.Charge(Stage::kComposite);
+}
+
+// Finds what clipping leaves of the band's rows. The result's rectangle holds it.
+SliceSamples SplatBand::ClipSlice(const SliceSamples& slice) {
+  SliceSamples clipped = slice;
+  clipped.owned = {};
+  left_.resize(std::size_t(y_end_ - y_begin_));
+  const PixelBounds owned = Intersection(slice.owned, {slice.owned.x_begin, y_begin_, slice.owned.x_end, y_end_});
+  for (std::int32_t row = owned.y_begin; row < owned.y_end; ++row) {
+    std::array<ColumnInterval, 2>& left = left_[std::size_t(row - y_begin_)];
+    left = pass_.clip.ColumnsLeft(slice_, row);
+    for (ColumnInterval& columns : left) {
+      columns = {std::max(columns.begin, owned.x_begin), std::min(columns.end, owned.x_end)};
+      if (!columns.empty()) clipped.owned = Union(clipped.owned, {columns.begin, row, columns.end, row + 1});
+    }
+  }
+  return clipped;
+}
+
+// Gives voxels near a cut its normal.
+void SplatBand::LightCuts() {
+  cut_.clear();
+  cut_.reserve(octets_.size());  // octets refer to the records
+  for (std::size_t i = 0; i < octets_.size(); ++i) {
+    OctetWork& octet = octets_[i];
+    std::array<std::uint16_t, std::size_t{kOctet}> normals;
+    normals.fill(kNormalCodes);
+    if (!pass_.clip.LightCuts(slice_, octet_places_[i].v, octet_places_[i].u, kOctet, normals.data())) continue;
+    auto& records = cut_.emplace_back();
+    std::size_t record = 0;
+    for (std::size_t voxel = 0; voxel < normals.size(); ++voxel) {
+      if ((octet.occupied >> voxel & 1) == 0) continue;
+      records[record] = octet.records[record];
+      if (normals[voxel] != kNormalCodes) records[record].normal = normals[voxel];
+      ++record;
+    }
+    octet.records = records.data();
+  }
 }
 
 // Finds the rows and beams of the slice that meet, and makes room for them. False if there are none.
@@ -100,6 +142,7 @@ bool SplatBand::PlaceBeams(const SliceSamples& slice) {
 void SplatBand::FindNeeded(const SliceSamples& slice) {
   const std::int32_t next_slice = pass_.setup.camera.ascending ? slice_ + 1 : slice_ - 1;
   octets_.clear();
+  octet_places_.clear();
   octets_before_.clear();
   std::ranges::fill(owned_, 0);
   Insert(owned_.data(), (slice.owned.x_begin - pass_.bounds.x_begin) / kSegment,
@@ -151,6 +194,7 @@ void SplatBand::FindOctets(std::int32_t beam) {
       Insert(filled, reached[octet]);
       octets_.push_back(
           {records, shaded + 4 * std::ptrdiff_t{octet * kOctet}, occupied, slopes_.AlongU((pass_.first_octet + octet) * kOctet), across});
+      if (!pass_.clip.empty()) octet_places_.push_back({(pass_.first_octet + octet) * kOctet, beam});
       drawn += kOctetCount[occupied];
     }
   }
@@ -217,14 +261,61 @@ void SplatBand::CompositeRows(const SliceSamples& slice) {
       any |= is_filled;
     }
     if (!any) continue;
-    CompositeRow({.taps = taps,
-                  .weights = &slice.along_v->weights[Lattice::Phase(at) * std::size_t(taps)],
-                  .beams = row_beams_.data(),
-                  .filled = row_filled_.data(),
-                  .accumulated = &image_.rgba[4 * std::size_t(row - pass_.bounds.y_begin) * std::size_t(pass_.bounds.width())],
-                  .open = Open(row),
-                  .words = words_,
-                  .opaque_alpha = opaque_alpha_});
+    const RowWork work = {.taps = taps,
+                          .weights = &slice.along_v->weights[Lattice::Phase(at) * std::size_t(taps)],
+                          .beams = row_beams_.data(),
+                          .filled = row_filled_.data(),
+                          .accumulated = &image_.rgba[4 * std::size_t(row - pass_.bounds.y_begin) * std::size_t(pass_.bounds.width())],
+                          .open = Open(row),
+                          .words = words_,
+                          .opaque_alpha = opaque_alpha_};
+    if (pass_.clip.empty()) {
+      CompositeRow(work);
+    } else {
+      CompositeClipped(work, row);
+    }
+  }
+}
+
+// Composites the samples that clipping leaves of a row: whole segments at once, then those that a cut divides. The latter stay open.
+void SplatBand::CompositeClipped(RowWork work, std::int32_t row) {
+  const std::array<ColumnInterval, 2>& left = left_[std::size_t(row - y_begin_)];
+  SegmentWord* const open = work.open;
+  open_whole_.assign(std::size_t(words_), 0);
+  open_part_.assign(std::size_t(words_), 0);
+  for (const ColumnInterval& columns : left) {
+    if (columns.empty()) continue;
+    const std::int32_t begin = columns.begin - pass_.bounds.x_begin, end = columns.end - pass_.bounds.x_begin;
+    Insert(open_part_.data(), begin / kSegment, (end + kSegment - 1) / kSegment);
+    if ((begin + kSegment - 1) / kSegment < end / kSegment) {
+      Insert(open_whole_.data(), (begin + kSegment - 1) / kSegment, end / kSegment);
+    }
+  }
+  for (std::size_t word = 0; word < open_whole_.size(); ++word) {
+    open_whole_[word] &= open[word];
+    open_part_[word] &= open[word] & ~open_whole_[word];
+    open[word] &= ~open_whole_[word];
+  }
+  work.open = open_whole_.data();
+  CompositeRow(work);
+  for (std::size_t word = 0; word < open_whole_.size(); ++word) open[word] |= open_whole_[word];
+
+  work.open = open_whole_.data();
+  for (std::int32_t word = 0; word < words_; ++word) {
+    for (SegmentWord rest = open_part_[std::size_t(word)]; rest != 0; rest &= rest - 1) {
+      std::ranges::fill(open_whole_, 0);
+      open_whole_[std::size_t(word)] = rest & ~(rest - 1);
+      const std::int32_t first = FirstSegment(rest, word) * kSegment;
+      float* const pixels = work.accumulated + 4 * std::ptrdiff_t{first};
+      std::array<float, 4 * std::size_t{kSegment}> before;
+      std::copy_n(pixels, before.size(), before.begin());
+      CompositeRow(work);
+      for (std::int32_t i = 0; i < kSegment; ++i) {
+        const std::int32_t column = first + i + pass_.bounds.x_begin;
+        const auto holds = [column](const ColumnInterval& columns) { return column >= columns.begin && column < columns.end; };
+        if (std::ranges::none_of(left, holds)) std::copy_n(&before[4 * std::size_t(i)], 4, pixels + 4 * i);
+      }
+    }
   }
 }
 

@@ -6,6 +6,7 @@
 // (segment_set.h).
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -15,6 +16,11 @@
 #include "worker/renderers/stage_clock.h"
 
 namespace slabstream {
+
+// In a slice.
+struct VoxelPlace {
+  std::int32_t u = 0, v = 0;
+};
 
 class SplatBand {
  public:
@@ -33,6 +39,9 @@ class SplatBand {
     std::int32_t begin = 0, end = 0;
   };
 
+  SliceSamples ClipSlice(const SliceSamples& slice);
+  void LightCuts();
+  void CompositeClipped(RowWork work, std::int32_t row);
   bool PlaceBeams(const SliceSamples& slice);
   void FindNeeded(const SliceSamples& slice);
   void FindOctets(std::int32_t beam);
@@ -60,6 +69,9 @@ class SplatBand {
 
   // Of the current slice.
   std::int32_t slice_ = 0;
+  std::vector<std::array<ColumnInterval, 2>> left_;                // by row, of a clipped volume: columns of the slice
+  std::vector<std::array<VoxelRecord, std::size_t{kOctet}>> cut_;  // records of octets near a cut
+  std::vector<SegmentWord> open_whole_, open_part_;                // [word]: scratch of CompositeClipped
   SheetOpacity::Slopes slopes_;
   Rows rows_;                                     // that the slice can touch
   std::int32_t first_beam_ = 0, beam_count_ = 0;  // beams whose footprints reach these rows
@@ -69,6 +81,7 @@ class SplatBand {
   std::vector<SegmentWord> filled_;               // [beam][word]: needed segments that the beam's voxels reach
   std::vector<std::uint8_t> any_filled_;          // [beam]: 1 if any segment is filled
   std::vector<OctetWork> octets_;                 // beam by beam
+  std::vector<VoxelPlace> octet_places_;          // of a clipped volume: the first voxel of each octet
   std::vector<std::size_t> octets_before_;        // [beam], and one more: where the beam's octets begin
   std::int32_t margin_ = 0, shaded_voxels_ = 0;   // voxels beside the occupied ones; voxels in a row of shaded_
   AlignedVector<float> shaded_;                   // [kShadedBeams][voxel][4]: zero except for the current octets

@@ -6,7 +6,12 @@ namespace slabstream {
 
 SplatPass::SplatPass(const OccupiedCells& occupied_cells, const ClassificationTable& table, const FrameSetup& frame_setup, const Box& box,
                      const OcclusionMask& hidden_tiles)
-    : cells(occupied_cells), setup(frame_setup), hidden(hidden_tiles), opacity(frame_setup), tables(opacity.Tables(table)) {
+    : cells(occupied_cells),
+      setup(frame_setup),
+      hidden(hidden_tiles),
+      clip(frame_setup),
+      opacity(frame_setup),
+      tables(opacity.Tables(table)) {
   const auto [c, u, v] = cells.axes;
   const Box& occupied = cells.occupied;
   for (std::int32_t k = occupied.begin[c]; k < occupied.end[c]; ++k) {

@@ -9,6 +9,7 @@
 #include "worker/kernels/segment_set.h"
 #include "worker/renderers/splat/occupied_cells.h"
 #include "worker/renderers/splat/sheet_opacity.h"
+#include "worker/renderers/splat/slice_clip.h"
 #include "worker/renderers/splat/slice_samples.h"
 
 namespace slabstream {
@@ -26,6 +27,7 @@ struct SplatPass {
   const OccupiedCells& cells;
   const FrameSetup& setup;
   const OcclusionMask& hidden;
+  SliceClip clip;
   SheetOpacity opacity;
   ShadeTables tables;
   Footprints footprints;

@@ -14,6 +14,8 @@ class SurfaceCache : public SlabCache {
  public:
   // Faces of the opaque voxels of `box`, which lies in the slab. Valid until the next call.
   const Surface& Of(SlabData& slab, const FrameSetup& setup, const Box& box);
+  // Of the voxels that were opaque at the last call.
+  const BinSelection& opaque_bins() const { return opaque_bins_; }
 
   std::size_t bytes() const override;
 

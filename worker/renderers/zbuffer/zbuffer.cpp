@@ -6,6 +6,7 @@
 //   1. place the bricks of the surface on the screen and sort them, nearest first
 //   2. cut the image into bands of rows, one task each: no other task touches a band's pixels
 //   3. each band draws its bricks (draw_faces.h), except those behind what is already drawn, then shades its pixels (shade_faces.h)
+//      and, if the volume is clipped, draws the cuts through opaque voxels (cut_faces.h)
 #include <hwy/cache_control.h>
 #include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
@@ -14,12 +15,14 @@
 
 #include <algorithm>
 #include <numeric>
+#include <optional>
 
 #include "worker/kernels/draw_faces.h"
 #include "worker/kernels/shade_faces.h"
 #include "worker/renderers/renderer.h"
 #include "worker/renderers/stage_clock.h"
 #include "worker/renderers/zbuffer/brick_projection.h"
+#include "worker/renderers/zbuffer/cut_faces.h"
 #include "worker/renderers/zbuffer/surface.h"
 #include "worker/renderers/zbuffer/surface_cache.h"
 
@@ -33,13 +36,16 @@ struct Scene {
   PixelBounds bounds;
 };
 
-Scene PlaceBricks(const Surface& surface, const BrickProjection& projection) {
+// `reach`: pixels that may show something beside the bricks.
+Scene PlaceBricks(const Surface& surface, const BrickProjection& projection, const ClipRegion& clip, const PixelBounds& reach) {
   constexpr std::size_t kGrain = 256;
   Scene scene;
   const std::size_t count = surface.bricks.size();
   scene.views.resize(count);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kGrain), [&](const tbb::blocked_range<std::size_t>& range) {
-    for (std::size_t i = range.begin(); i < range.end(); ++i) scene.views[i] = projection.View(surface.bricks[i]);
+    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+      if (clip.MayKeep(surface.bricks[i].voxels)) scene.views[i] = projection.View(surface.bricks[i]);
+    }
   });
   float least = std::numeric_limits<float>::infinity(), greatest = 0;
   for (const ProjectedBrick& view : scene.views) {
@@ -48,6 +54,7 @@ Scene PlaceBricks(const Surface& surface, const BrickProjection& projection) {
     least = std::min(least, view.nearest);
     greatest = std::max(greatest, view.nearest);
   }
+  scene.bounds = Union(scene.bounds, reach);
   // A counting sort by depth. The order affects only how many bricks turn out to be hidden.
   constexpr std::size_t kClasses = 256;
   const float scale = greatest > least ? float(kClasses - 1) / (greatest - least) : 0.0F;
@@ -127,11 +134,14 @@ class ZBufferRenderer : public Renderer {
                             const std::atomic<bool>& cancelled, RankReport& report) override {
     StageClock clock(report);
     const ClassificationTable& table = slab.Classification(setup);
-    const Surface& surface = slab.CacheOf<SurfaceCache>().Of(slab, setup, box);
+    auto& cache = slab.CacheOf<SurfaceCache>();
+    const Surface& surface = cache.Of(slab, setup, box);
+    std::optional<CutFaces> cuts;
+    if (!setup.clip.empty()) cuts.emplace(slab, setup, box, cache.opaque_bins());
     clock.Charge(Stage::kPrepare);
 
     const BrickProjection projection(setup.camera, setup.description.geometry.size);
-    const Scene scene = PlaceBricks(surface, projection);
+    const Scene scene = PlaceBricks(surface, projection, setup.clip, cuts ? ReachOf(box, setup) : PixelBounds{});
     LocalImage image = MakeUnwrittenImage(PixelFormat::kDepth, scene.bounds);
     const std::vector<std::int32_t> begins = CutIntoBands(surface, scene, kBandsPerThread * tbb::this_task_arena::max_concurrency());
     FaceShading shading = MakeFaceShading(setup.camera, setup.shading, setup.description.geometry.size);
@@ -153,12 +163,25 @@ class ZBufferRenderer : public Renderer {
       AlignedVector<std::uint64_t>& keys = keys_.local();
       keys.resize(std::max(keys.size(), band.stride * std::size_t(band.bounds.height())));
       band.keys = keys.data();
+      AlignedVector<float> from, to;
+      if (cuts) {
+        from.resize(keys.size());
+        to.resize(keys.size());
+        for (std::int32_t y = band.bounds.y_begin; y < band.bounds.y_end; ++y) {
+          const std::size_t row = std::size_t(y - band.bounds.y_begin) * band.stride;
+          cuts->Limits(band.bounds.x_begin, y, std::size_t(band.bounds.width()), &from[row], &to[row]);
+        }
+        band.limits = {from.data(), to.data(), cuts->inside()};
+      }
       drawn += DrawBand(surface, scene, projection, setup.camera.projection, cancelled, band);
       const Time middle = MonotonicNow();
       for (std::int32_t y = band.bounds.y_begin; y < band.bounds.y_end && !cancelled.load(std::memory_order_relaxed); ++y) {
         const auto width = std::size_t(band.bounds.width()), pixel = std::size_t(y - scene.bounds.y_begin) * width;
         ShadeFaceRow(shading, band.keys + std::size_t(y - band.bounds.y_begin) * band.stride, band.bounds.x_begin, y, width,
                      &image.rgba[4 * pixel], &image.depth[pixel], &image.voxel[pixel]);
+        if (cuts) {
+          cuts->Draw(band.bounds.x_begin, y, width, &image.rgba[4 * pixel], &image.depth[pixel], &image.voxel[pixel]);
+        }
       }
       draw_ns += (middle - begin).count();
       shade_ns += (MonotonicNow() - middle).count();

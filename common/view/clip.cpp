@@ -1,0 +1,168 @@
+#include "common/view/clip.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "common/view/camera.h"
+#include "common/view/range_status.h"
+
+namespace slabstream {
+namespace {
+
+// The least and the greatest distance of the points of a closed data-space box.
+struct DistanceRange {
+  double least, greatest;
+};
+DistanceRange DistancesOf(const HalfSpace& side, const Box& box) {
+  const Vec3 centre = 0.5 * (ToVec3(box.begin + box.end) - Vec3{1, 1, 1}), half = 0.5 * ToVec3(box.size());
+  const double middle = side.Distance(centre);
+  const double reach = std::abs(side.normal.x) * half.x + std::abs(side.normal.y) * half.y + std::abs(side.normal.z) * half.z;
+  return {middle - reach, middle + reach};
+}
+
+// Of data space, from a plane of the world.
+HalfSpace FromWorld(const ClipPlane& plane, const VolumeGeometry& geometry) {
+  const double length = Length(plane.normal);
+  const Vec3 normal = (1 / length) * plane.normal;
+  return {geometry.orientation.FromWorld(normal) * geometry.spacing, Dot(normal, geometry.orientation.origin) + plane.offset / length};
+}
+
+Vec3 Unit(Axis axis) {
+  Vec3 unit;
+  unit[axis] = 1;
+  return unit;
+}
+
+void AddBox(const ClipBox& box, const VolumeGeometry& geometry, std::vector<HalfSpace>& sides) {
+  for (const Axis axis : kAxes) {
+    for (const double sign : {1.0, -1.0}) {
+      const double bound = sign > 0 ? box.low[axis] : box.high[axis];
+      if (bound == -sign * kMaxWorldCoordinate) continue;
+      const Vec3 normal = sign * Unit(axis);
+      if (box.unit == ClipUnit::kWorld) {
+        sides.push_back(FromWorld({normal, -sign * bound}, geometry));
+        continue;
+      }
+      // Voxel i fills [i - 0.5, i + 0.5).
+      const double position = (box.unit == ClipUnit::kPercent ? bound / 100 * geometry.size[axis] : bound) - 0.5;
+      sides.push_back({geometry.spacing[axis] * normal, -sign * geometry.spacing[axis] * position});
+    }
+  }
+}
+
+// The axis of the voxels that is nearest to the slab's normal.
+Axis AxisAcross(const ClipSlab& slab, const VolumeGeometry& geometry) {
+  const Vec3 normal = geometry.orientation.FromWorld(slab.normal);
+  return *std::ranges::max_element(kAxes, {}, [&](Axis axis) { return std::abs(normal[axis]); });
+}
+
+// Of a slice, in least spacings: positions of samples are rounded by far less.
+constexpr double kSliceThickness = 1.0 / 64;
+
+void AddSlab(const ClipSlab& slab, const VolumeGeometry& geometry, std::vector<HalfSpace>& sides) {
+  const Vec3& spacing = geometry.spacing;
+  const Vec3 normal = Normalized(slab.normal);
+  Vec3 centre = 0.5 * (ToVec3(geometry.size) - Vec3{1, 1, 1});
+  if (slab.index) centre[AxisAcross(slab, geometry)] = *slab.index;
+  const Vec3 through = slab.through.value_or(geometry.orientation.origin + geometry.orientation.ToWorld(spacing * centre));
+  const double half = 0.5 * std::max(slab.thickness, kSliceThickness * std::min({spacing.x, spacing.y, spacing.z}));
+  for (const double sign : {1.0, -1.0}) sides.push_back(FromWorld({sign * normal, half - sign * Dot(normal, through)}, geometry));
+}
+
+Status CheckNormal(const std::string& field, const Vec3& normal) {
+  for (const Axis axis : kAxes) {
+    const std::string component = fmt::format("{}.{}", field, Letter(axis));
+    if (Status s = InRange(component, normal[axis], -kMaxWorldCoordinate, kMaxWorldCoordinate); !s.ok()) return s;
+  }
+  constexpr double kLeastLength = 1e-9;
+  if (Length(normal) >= kLeastLength) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("{} is ({}, {}, {}), but must not be zero", field, normal.x, normal.y, normal.z));
+}
+
+}  // namespace
+
+Status Validate(const Clipping& clipping) {
+  if (clipping.mode != ClipMode::kKeep && clipping.mode != ClipMode::kCutAway) {
+    return Status::InvalidArgument(fmt::format("clip.mode is {}, but must be 1 (keep) or 2 (cut-away)", int(clipping.mode)));
+  }
+  if (clipping.box) {
+    const ClipBox& box = *clipping.box;
+    if (box.unit < ClipUnit::kWorld || box.unit > ClipUnit::kPercent) {
+      return Status::InvalidArgument(fmt::format("clip.box.unit is {}, but must be 1 (world), 2 (voxels) or 3 (percent)", int(box.unit)));
+    }
+    for (const Axis axis : kAxes) {
+      const double low = box.low[axis], high = box.high[axis];
+      for (const double bound : {low, high}) {
+        const std::string field = fmt::format("clip.box.{}", Letter(axis));
+        if (Status s = InRange(field, bound, -kMaxWorldCoordinate, kMaxWorldCoordinate); !s.ok()) return s;
+      }
+      if (!(low < high)) {
+        return Status::InvalidArgument(fmt::format("clip.box.{} is {}:{}, but must rise", Letter(axis), low, high));
+      }
+    }
+  }
+  if (clipping.slab) {
+    if (Status s = CheckNormal("clip.slab.normal", clipping.slab->normal); !s.ok()) return s;
+    if (Status s = InRange("clip.slab.thickness", clipping.slab->thickness, 0, kMaxWorldCoordinate); !s.ok()) return s;
+    if (clipping.slab->through && clipping.slab->index) {
+      return Status::InvalidArgument("clip.slab has both a point and an index, but one is enough");
+    }
+    if (Status s = InRange("clip.slab.index", clipping.slab->index.value_or(0), 0, kMaxVolumeSide - 1); !s.ok()) return s;
+    for (const Axis axis : kAxes) {
+      if (!clipping.slab->through) break;
+      const std::string field = fmt::format("clip.slab.through.{}", Letter(axis));
+      if (Status s = InRange(field, (*clipping.slab->through)[axis], -kMaxWorldCoordinate, kMaxWorldCoordinate); !s.ok()) return s;
+    }
+  }
+  if (clipping.planes.size() > kMaxClipPlanes) {
+    return Status::InvalidArgument(fmt::format("clip.planes: {} are too many; the limit is {}", clipping.planes.size(), kMaxClipPlanes));
+  }
+  for (std::size_t i = 0; i < clipping.planes.size(); ++i) {
+    const ClipPlane& plane = clipping.planes[i];
+    const std::string field = fmt::format("clip.planes[{}]", i);
+    if (Status s = CheckNormal(field + ".normal", plane.normal); !s.ok()) return s;
+    const double most = kMaxWorldCoordinate * kMaxWorldCoordinate;
+    if (Status s = InRange(field + ".offset", plane.offset, -most, most); !s.ok()) return s;
+  }
+  return Status::Ok();
+}
+
+Status CheckClipping(const Clipping& clipping, const VolumeGeometry& geometry) {
+  if (!clipping.slab || !clipping.slab->index) return Status::Ok();
+  const Axis axis = AxisAcross(*clipping.slab, geometry);
+  if (*clipping.slab->index < geometry.size[axis]) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("clip.slab.index is {}, but the volume has slices 0 to {} along {}", *clipping.slab->index,
+                                             geometry.size[axis] - 1, Letter(axis)));
+}
+
+bool ClipRegion::Keeps(const Vec3& p) const {
+  if (empty()) return true;
+  const bool inside = std::ranges::all_of(sides, [&](const HalfSpace& side) { return side.Distance(p) >= 0; });
+  return inside == (mode == ClipMode::kKeep);
+}
+
+bool ClipRegion::MayKeep(const Box& box) const {
+  if (empty()) return true;
+  // Renderers place samples in single precision.
+  const auto slack = [](const HalfSpace& side) { return 0x1p-10 * Length(side.normal); };
+  if (mode == ClipMode::kKeep) {
+    return std::ranges::all_of(sides, [&](const HalfSpace& side) { return DistancesOf(side, box).greatest >= -slack(side); });
+  }
+  return std::ranges::any_of(sides, [&](const HalfSpace& side) { return DistancesOf(side, box).least <= slack(side); });
+}
+
+ClipRegion MakeClipRegion(const Clipping& clipping, const VolumeGeometry& geometry) {
+  ClipRegion region{{}, clipping.mode};
+  if (clipping.box) AddBox(*clipping.box, geometry, region.sides);
+  if (clipping.slab) AddSlab(*clipping.slab, geometry, region.sides);
+  for (const ClipPlane& plane : clipping.planes) region.sides.push_back(FromWorld(plane, geometry));
+  if (region.mode == ClipMode::kKeep) {
+    std::erase_if(region.sides, [&](const HalfSpace& side) { return DistancesOf(side, geometry.bounds()).least >= 0; });
+  }
+  return region;
+}
+
+}  // namespace slabstream

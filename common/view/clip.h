@@ -1,0 +1,99 @@
+// Clipping: which part of a volume is drawn. A client gives a box, a slab and planes (Clipping); renderers see half-spaces of data space
+// (ClipRegion). Whether a sample is drawn depends on its position alone, never on the box of a partition that owns it.
+//
+// The region is what lies in the box, in the slab and on the kept side of every plane: a convex polyhedron. It is kept, or cut away.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "common/base/status.h"
+#include "common/volume/volume.h"
+
+namespace slabstream {
+
+inline constexpr std::size_t kMaxClipPlanes = 16;
+
+enum class ClipMode : std::uint8_t {
+  kKeep = 1,     // draw what lies in the region
+  kCutAway = 2,  // draw everything else
+};
+
+// What the bounds of a clip box count.
+enum class ClipUnit : std::uint8_t {
+  kWorld = 1,    // along the axes of the world (common/volume/orientation.h)
+  kVoxels = 2,   // indices: voxels low <= v < high, along the axes of the voxels
+  kPercent = 3,  // of the volume's sides, along the axes of the voxels; 0 and 100 are its borders
+};
+
+// low < high along each axis; each in [-kMaxWorldCoordinate, kMaxWorldCoordinate]. A bound there does not clip.
+struct ClipBox {
+  Vec3 low, high;
+  ClipUnit unit = ClipUnit::kWorld;
+  friend bool operator==(const ClipBox&, const ClipBox&) = default;
+};
+
+// Keeps the points p of the world with Dot(normal, p) + offset >= 0 (as glClipPlane of OpenGL 1.0 does). The normal's length does not
+// matter, but it is not zero.
+struct ClipPlane {
+  Vec3 normal;
+  double offset = 0;
+  friend bool operator==(const ClipPlane&, const ClipPlane&) = default;
+};
+
+// What lies within thickness / 2 of the plane through `through` that is perpendicular to `normal`. Thickness 0: a slice, that is, a slab so
+// thin that values hardly change in it.
+struct ClipSlab {
+  Vec3 normal = {0, 0, 1};      // of the world, not zero
+  std::optional<Vec3> through;  // a point of the world; none: the volume's centre
+  // Instead of `through`: the slice with this index along the axis of the voxels that is nearest to the normal, in its middle.
+  std::optional<std::int32_t> index;  // [0, kMaxVolumeSide)
+  double thickness = 0;               // unit of the world, [0, kMaxWorldCoordinate]
+  friend bool operator==(const ClipSlab&, const ClipSlab&) = default;
+};
+
+struct Clipping {
+  std::optional<ClipBox> box;
+  std::optional<ClipSlab> slab;
+  std::vector<ClipPlane> planes;  // at most kMaxClipPlanes
+  ClipMode mode = ClipMode::kKeep;
+
+  bool empty() const { return !box && !slab && planes.empty(); }
+  friend bool operator==(const Clipping&, const Clipping&) = default;
+};
+
+// InvalidArgument naming field, value and limits.
+Status Validate(const Clipping& clipping);
+// InvalidArgument: a valid clipping that cannot be had of this volume.
+Status CheckClipping(const Clipping& clipping, const VolumeGeometry& geometry);
+
+// The points p of data space with Distance(p) >= 0. Distance is in the unit of the spacing: |normal / spacing| is 1.
+struct HalfSpace {
+  Vec3 normal;
+  double offset = 0;
+
+  double Distance(const Vec3& p) const { return Dot(normal, p) + offset; }
+  friend bool operator==(const HalfSpace&, const HalfSpace&) = default;
+};
+
+inline constexpr std::size_t kMaxClipSides = kMaxClipPlanes + 6 + 2;  // planes, box and slab
+
+struct ClipRegion {
+  std::vector<HalfSpace> sides;  // at most kMaxClipSides; none: nothing is clipped, whatever the mode
+  ClipMode mode = ClipMode::kKeep;
+
+  bool empty() const { return sides.empty(); }
+  // Whether a sample at p is drawn.
+  bool Keeps(const Vec3& p) const;
+  // Whether any sample in the voxels of `box` (not empty) may be drawn. False is certain.
+  bool MayKeep(const Box& box) const;
+  friend bool operator==(const ClipRegion&, const ClipRegion&) = default;
+};
+
+// `clipping` valid, and CheckClipping is ok. Sides that the whole volume lies within are left out, so that a box around everything costs
+// nothing.
+ClipRegion MakeClipRegion(const Clipping& clipping, const VolumeGeometry& geometry);
+
+}  // namespace slabstream
