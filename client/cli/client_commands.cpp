@@ -64,6 +64,25 @@ void DeclareInfo(const CommandLine& line) {
   RunWith(*sub, line.run, options, RunInfo);
 }
 
+void DeclareTransfer(const CommandLine& line) {
+  CLI::App* sub = line.app.add_subcommand("transfer", "Print a preset transfer function as JSON that --transfer takes");
+  auto options = std::make_shared<TransferOptions>();
+  std::vector<std::string_view> names;
+  for (const TransferPreset& preset : TransferPresets()) names.push_back(preset.name);
+  AddParsed(
+      *sub, "PRESET", options->transfer.choice,
+      [is_name = OneOf(names)](const std::string& option, const std::string& text) -> Result<std::variant<std::string, TransferFunction>> {
+        const Result<std::string> name = is_name(option, text);
+        if (!name.ok()) return name.status();
+        return *name;
+      },
+      "Which" + Explained(TransferPresets()))
+      ->required();
+  sub->add_option("SOURCE", options->path, "The volume file that it is made for: presets depend on the values of the volume")->required();
+  AddScalarRange(*sub, options->transfer);
+  RunWith(*sub, line.run, options, RunTransfer);
+}
+
 void DeclareSphere(const CommandLine& line) {
   CLI::App* sub = line.app.add_subcommand("sphere", "Make one of the two test volumes of Yagel and Machiraju");
   auto options = std::make_shared<SphereOptions>();
@@ -183,8 +202,9 @@ void DeclareSlurm(const CommandLine& line) {
 }  // namespace
 
 std::span<const DeclareCommand> ClientCommands() {
-  static constexpr DeclareCommand kCommands[] = {DeclareRender, DeclareTurntable, DeclareSlice,  DeclareInfo, DeclareSphere,
-                                                 DeclareUp,     DeclareDown,      DeclareStatus, DeclareKeys, DeclareSlurm};
+  static constexpr DeclareCommand kCommands[] = {DeclareRender,   DeclareTurntable, DeclareSlice, DeclareInfo,
+                                                 DeclareTransfer, DeclareSphere,    DeclareUp,    DeclareDown,
+                                                 DeclareStatus,   DeclareKeys,      DeclareSlurm};
   return kCommands;
 }
 

@@ -16,6 +16,7 @@ Status RunRender(const RenderOptions& options);
 Status RunTurntable(const TurntableOptions& options);
 Status RunSlice(const SliceOptions& options);
 Status RunInfo(const InfoOptions& options);
+Status RunTransfer(const TransferOptions& options);
 Status RunSphere(const SphereOptions& options);
 Status RunUp(const UpOptions& options);
 Status RunDown(const DownOptions& options);

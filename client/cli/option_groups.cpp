@@ -202,8 +202,8 @@ void AddClipOptions(CLI::App& app, Clipping& clipping) {
 void AddPictureFormat(CLI::App& app, PictureFormat& format) {
   AddParsed(
       app, "--background", format.background, [](const std::string& option, const std::string& text) { return ParseColor(option, text); },
-      "Colour behind the picture, and its opacity (default 1), each from 0 to 1 (default: transparent)")
-      ->type_name("R,G,B[,A]");
+      "Colour behind the picture: R,G,B or R,G,B,A from 0 to 1, #rrggbb, #rrggbbaa, or a name such as white (default: transparent)")
+      ->type_name("COLOUR");
   AddChoice<int, 2>(app, "--depth", format.png_bits, {"8", "16"}, {8, 16}, "Bits of each channel of a PNG: 8 or 16")->default_str("8");
 }
 
@@ -291,11 +291,20 @@ CLI::Option* AddService(CLI::App& app, ServiceChoice& service) {
   return endpoint;
 }
 
+void AddScalarRange(CLI::App& app, TransferChoice& transfer) {
+  AddParsed(
+      app, "--scalar-range", transfer.scalar_range,
+      [](const std::string& option, const std::string& text) { return ParseScalarRange(option, text); },
+      "Stretch the transfer function over these data values (default: those of the function itself)")
+      ->type_name("LOW:HIGH");
+}
+
 void AddTransferOptions(CLI::App& app, TransferChoice& transfer) {
   AddParsed(app, "--transfer", transfer.choice, ParseTransfer,
             "Transfer function: a ParaView colour map (a .json file) or one of these presets" + Explained(TransferPresets()))
       ->type_name("TRANSFER")
       ->default_str("auto");
+  AddScalarRange(app, transfer);
   AddNumber(app, "--opacity-distance", transfer.opacity_distance, {0, kMaxOpacityDistance, true},
             "Length of material, in voxels, that has the opacity which the transfer function says");
 }

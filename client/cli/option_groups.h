@@ -21,7 +21,10 @@ inline constexpr char kOutputGroup[] = "Output", kHidden[] = "";
 // --threads, [1, kMaxThreads]; 0 stays if it is not given.
 CLI::Option* AddThreads(CLI::App& app, int& threads, const std::string& help);
 
-// --transfer and --opacity-distance.
+// --scalar-range.
+void AddScalarRange(CLI::App& app, TransferChoice& transfer);
+
+// --transfer, --scalar-range and --opacity-distance.
 void AddTransferOptions(CLI::App& app, TransferChoice& transfer);
 
 // After the parse, splits a `source` of the form VOLUME:TRANSFER into its parts (volume_argument.h). Calls `is_file` only then.

@@ -79,6 +79,11 @@ struct InfoOptions {
   bool json = false;
 };
 
+struct TransferOptions {
+  TransferChoice transfer;  // a preset
+  std::string path;         // the volume that it is made for
+};
+
 struct SphereOptions {
   SphereRequest request;
   std::string output;

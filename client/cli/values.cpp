@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <charconv>
+#include <optional>
 #include <vector>
 
 #include "common/cli/parse.h"
@@ -18,6 +21,42 @@ std::vector<std::string_view> Split(std::string_view text, char separator) {
     if (end == std::string_view::npos) return parts;
     begin = end + 1;
   }
+}
+
+struct NamedColor {
+  std::string_view name, code;
+};
+constexpr std::array<NamedColor, 18> kNamedColors = {{
+    {"black", "#000000"},
+    {"silver", "#c0c0c0"},
+    {"gray", "#808080"},
+    {"grey", "#808080"},
+    {"white", "#ffffff"},
+    {"maroon", "#800000"},
+    {"red", "#ff0000"},
+    {"purple", "#800080"},
+    {"fuchsia", "#ff00ff"},
+    {"green", "#008000"},
+    {"lime", "#00ff00"},
+    {"olive", "#808000"},
+    {"yellow", "#ffff00"},
+    {"orange", "#ffa500"},
+    {"navy", "#000080"},
+    {"blue", "#0000ff"},
+    {"teal", "#008080"},
+    {"aqua", "#00ffff"},
+}};
+
+std::optional<StraightColor> FromHexadecimal(std::string_view digits) {
+  if (digits.size() != 6 && digits.size() != 8) return std::nullopt;
+  float channels[4] = {0, 0, 0, 1};
+  for (std::size_t i = 0; i < digits.size(); i += 2) {
+    unsigned value = 0;
+    const auto [end, error] = std::from_chars(digits.data() + i, digits.data() + i + 2, value, 16);
+    if (error != std::errc() || end != digits.data() + i + 2) return std::nullopt;
+    channels[i / 2] = float(value) / 255;
+  }
+  return StraightColor{channels[0], channels[1], channels[2], channels[3]};
 }
 
 }  // namespace
@@ -51,6 +90,17 @@ Result<Vec3> ParseDirection(std::string_view option, std::string_view text) {
   Result<Vec3> direction = ParsePoint(option, text);
   if (direction.ok() && *direction == Vec3{}) return Status::InvalidArgument(fmt::format("{} {} has no direction", option, text));
   return direction;
+}
+
+Result<ScalarRange> ParseScalarRange(std::string_view option, std::string_view text) {
+  const std::vector<std::string_view> ends = Split(text, ':');
+  if (ends.size() != 2) return Status::InvalidArgument(fmt::format("{} '{}' is not LOW:HIGH", option, text));
+  const Result<double> low = ParseNumber(option, ends[0], {-kMaxScalar, kMaxScalar});
+  if (!low.ok()) return low.status();
+  const Result<double> high = ParseNumber(option, ends[1], {-kMaxScalar, kMaxScalar});
+  if (!high.ok()) return high.status();
+  if (*low < *high) return ScalarRange{*low, *high};
+  return Status::InvalidArgument(fmt::format("{} '{}' must rise", option, text));
 }
 
 Result<ClipBox> ParseClipBox(std::string_view option, std::string_view text) {
@@ -93,9 +143,15 @@ Result<ClipPlane> ParseClipPlane(std::string_view option, std::string_view text)
 }
 
 Result<StraightColor> ParseColor(std::string_view option, std::string_view text) {
+  const auto named = std::ranges::find(kNamedColors, text, &NamedColor::name);
+  const std::string_view code = named != kNamedColors.end() ? named->code : text;
+  if (code.starts_with('#')) {
+    if (const std::optional<StraightColor> color = FromHexadecimal(code.substr(1))) return *color;
+    return Status::InvalidArgument(fmt::format("{} '{}' is neither #rrggbb nor #rrggbbaa", option, text));
+  }
   const std::vector<std::string_view> parts = Split(text, ',');
   if (parts.size() != 3 && parts.size() != 4) {
-    return Status::InvalidArgument(fmt::format("{} '{}' is neither R,G,B nor R,G,B,A", option, text));
+    return Status::InvalidArgument(fmt::format("{} '{}' is neither R,G,B[,A] nor #rrggbb nor the name of a colour", option, text));
   }
   float channels[4] = {0, 0, 0, 1};
   for (std::size_t i = 0; i < parts.size(); ++i) {

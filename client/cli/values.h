@@ -6,6 +6,7 @@
 
 #include "client/image_io/image_writer.h"
 #include "common/base/status.h"
+#include "common/frame/frame_request.h"
 #include "common/math/vec.h"
 #include "common/view/camera.h"
 #include "common/view/clip.h"
@@ -20,12 +21,16 @@ Result<Vec3> ParsePoint(std::string_view option, std::string_view text);
 // The same, and not all zero.
 Result<Vec3> ParseDirection(std::string_view option, std::string_view text);
 
+// "LOW:HIGH", which rise, in [-kMaxScalar, kMaxScalar].
+Result<ScalarRange> ParseScalarRange(std::string_view option, std::string_view text);
+
 // "X0:X1,Y0:Y1,Z0:Z1", with "v" behind it in voxels, with "%" in percent of the volume's sides. A bound may be left out: it does not clip.
 Result<ClipBox> ParseClipBox(std::string_view option, std::string_view text);
 // "NX,NY,NZ,D".
 Result<ClipPlane> ParseClipPlane(std::string_view option, std::string_view text);
 
-// "R,G,B" (opaque) or "R,G,B,A", each in [0, 1].
+// "R,G,B" (opaque) or "R,G,B,A", each in [0, 1]; "#rrggbb" or "#rrggbbaa"; or one of the names of CSS 2.1, such as "white". Codes and names
+// become codes of an 8-bit PNG as they are, without a transfer curve.
 Result<StraightColor> ParseColor(std::string_view option, std::string_view text);
 
 // A file name with exactly one integer conversion, such as "frame_%04d.png"; "%%" stands for a percent sign.

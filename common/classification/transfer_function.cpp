@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace slabstream {
 namespace {
@@ -82,6 +83,24 @@ double TransferFunction::Opacity(double value) const {
   const OpacityPoint& a = opacities[end - 1];
   const OpacityPoint& b = opacities[end];
   return Interpolate(a, b, Fraction(value, a.value, b.value));
+}
+
+TransferFunction Stretched(TransferFunction transfer, const ScalarRange& range) {
+  double least = std::numeric_limits<double>::infinity(), greatest = -least;
+  const auto each = [&](auto&& visit) {
+    for (ColorPoint& point : transfer.colors) visit(point.value);
+    for (OpacityPoint& point : transfer.opacities) visit(point.value);
+  };
+  each([&](double value) {
+    least = std::min(least, value);
+    greatest = std::max(greatest, value);
+  });
+  each([&](double& value) {
+    // Halves, so that the widest range there is does not overflow.
+    const double share = greatest > least ? (0.5 * value - 0.5 * least) / (0.5 * greatest - 0.5 * least) : 0;
+    value = std::clamp(std::lerp(range.min, range.max, share), range.min, range.max);
+  });
+  return transfer;
 }
 
 Status Validate(const TransferFunction& transfer) {

@@ -49,6 +49,14 @@ struct TransferFunction {
   friend bool operator==(const TransferFunction&, const TransferFunction&) = default;
 };
 
+struct ScalarRange {
+  double min = 0, max = 1;  // data values
+  friend bool operator==(const ScalarRange&, const ScalarRange&) = default;
+};
+// The same curves, moved and stretched so that their points lie between range.min (the least one) and range.max (the greatest). min < max,
+// both finite. A function whose points all have one value puts them at range.min.
+TransferFunction Stretched(TransferFunction transfer, const ScalarRange& range);
+
 // InvalidArgument naming the point, the value and the limit, unless everything stated above holds.
 Status Validate(const TransferFunction& transfer);
 

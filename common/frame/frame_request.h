@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -20,6 +21,7 @@ inline constexpr int kMaxGroups = 1024, kMaxTeams = 1024;
 inline constexpr double kDefaultTermination = 1.0 / 1024, kMaxTermination = 0.5;
 inline constexpr double kMaxPixelError = 0.1;
 inline constexpr std::size_t kMaxNameBytes = 256;
+inline constexpr double kMaxScalar = 1e300;  // of a scalar range, either sign
 
 // kAuto: z, or the longest axis of slabs (SlabAxis), so that turning the view never moves voxels. kView: the axis along which the slices of
 // the frame are traversed, so that no slice is divided. Each of the three axes then has its own layout; workers fetch its voxels when a
@@ -44,6 +46,9 @@ struct Policy {
 struct TransferChoice {
   std::variant<std::string, TransferFunction> choice = std::string("auto");
   double opacity_distance = 1;  // voxel lengths; replaces that of a preset or function
+  // Data values onto which the curves are stretched, so that their first point is at `min` and their last one at `max`: in
+  // [-kMaxScalar, kMaxScalar], min < max. None: they stay.
+  std::optional<ScalarRange> scalar_range = {};
   friend bool operator==(const TransferChoice&, const TransferChoice&) = default;
 };
 

@@ -52,7 +52,9 @@ Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const Vol
   Result<TransferFunction> transfer = std::holds_alternative<std::string>(choice.choice)
                                           ? MakePreset(std::get<std::string>(choice.choice), summary)
                                           : Result<TransferFunction>(std::get<TransferFunction>(choice.choice));
-  if (transfer.ok()) transfer->opacity_distance = choice.opacity_distance;
+  if (!transfer.ok()) return transfer;
+  transfer->opacity_distance = choice.opacity_distance;
+  if (choice.scalar_range) return Stretched(*std::move(transfer), *choice.scalar_range);
   return transfer;
 }
 

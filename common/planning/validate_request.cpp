@@ -19,6 +19,13 @@ Status Validate(const TransferChoice& transfer) {
   } else if (Status s = Validate(std::get<TransferFunction>(transfer.choice)); !s.ok()) {
     return s;
   }
+  if (const auto& range = transfer.scalar_range) {
+    if (Status s = InRange("transfer.scalar_range.min", range->min, -kMaxScalar, kMaxScalar); !s.ok()) return s;
+    if (Status s = InRange("transfer.scalar_range.max", range->max, -kMaxScalar, kMaxScalar); !s.ok()) return s;
+    if (!(range->min < range->max)) {
+      return Status::InvalidArgument(fmt::format("transfer.scalar_range is {:g} to {:g}, but must rise", range->min, range->max));
+    }
+  }
   if (transfer.opacity_distance > 0 && transfer.opacity_distance <= kMaxOpacityDistance) return Status::Ok();
   return Status::InvalidArgument(fmt::format("transfer.opacity_distance is {}, but must lie in (0, {}] voxel lengths",
                                              transfer.opacity_distance, kMaxOpacityDistance));

@@ -102,6 +102,12 @@ void Fields(auto& io, Is<TransferFunction> auto& m) {
   io.Finite("opacity_distance", m.opacity_distance, &P::opacity_distance, &P::set_opacity_distance);
 }
 
+void Fields(auto& io, Is<ScalarRange> auto& m) {
+  using P = v1::ScalarRange;
+  io.Finite("min", m.min, &P::min, &P::set_min);
+  io.Finite("max", m.max, &P::max, &P::set_max);
+}
+
 inline void Write(const TransferChoice& in, v1::TransferChoice& out) {
   if (const auto* preset = std::get_if<std::string>(&in.choice)) {
     out.set_preset(WireText(*preset, kMaxNameBytes));
@@ -109,6 +115,7 @@ inline void Write(const TransferChoice& in, v1::TransferChoice& out) {
     Write(std::get<TransferFunction>(in.choice), *out.mutable_function());
   }
   out.set_opacity_distance(in.opacity_distance);
+  if (in.scalar_range) Write(*in.scalar_range, *out.mutable_scalar_range());
 }
 inline void Read(const v1::TransferChoice& in, TransferChoice& out, Checker& check) {
   switch (in.choice_case()) {
@@ -121,6 +128,10 @@ inline void Read(const v1::TransferChoice& in, TransferChoice& out, Checker& che
     case v1::TransferChoice::CHOICE_NOT_SET: check.Fail("choice", "not set, expected preset or function"); break;
   }
   out.opacity_distance = check.Finite("opacity_distance", in.opacity_distance());
+  if (in.has_scalar_range()) {
+    const auto scope = check.In("scalar_range");
+    Read(in.scalar_range(), out.scalar_range.emplace(), check);
+  }
 }
 
 void Fields(auto& io, Is<Shading> auto& m) {

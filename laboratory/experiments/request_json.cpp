@@ -66,7 +66,7 @@ std::string_view NameOf(AxisChoice axis) {
 std::string DigestText(std::string_view bytes) { return fmt::format("{:016x}", Digest(std::as_bytes(std::span(bytes)))); }
 
 Json TransferJson(const TransferChoice& transfer) {
-  const auto& [choice, opacity_distance] = transfer;
+  const auto& [choice, opacity_distance, scalar_range] = transfer;
   const auto* preset = std::get_if<std::string>(&choice);
   Json json = Json::object();
   if (preset != nullptr) {
@@ -75,6 +75,7 @@ Json TransferJson(const TransferChoice& transfer) {
     json["function"] = DigestText(FunctionJson(std::get<TransferFunction>(choice)).dump());
   }
   json["opacity_distance"] = opacity_distance;
+  if (scalar_range) json["scalar_range"] = Json::array({scalar_range->min, scalar_range->max});
   return json;
 }
 

@@ -77,6 +77,23 @@ TEST(TransferFunction, ReachesAcrossTheWholeRangeOfDoubles) {
   EXPECT_EQ(transfer.Color(0), (Rgb{0.5F, 0, 0.5F}));
 }
 
+// A value of the new range looks like the value at the same share of the old one.
+TEST(Stretched, KeepsTheCurves) {
+  const TransferFunction curve{{{-2, {0, 0, 0}}, {3, {1, 0, 0}}, {6, {1, 1, 1}}}, {{-1, 0}, {3, 0.5, 0.3, 0.2}, {3, 0.75}, {5, 1}}};
+  const TransferFunction wide = Stretched(curve, {1000, 9000});
+  EXPECT_TRUE(Validate(wide).ok());
+  for (int i = 0; i <= 64; ++i) {
+    const double share = i / 64.0, from = -2 + 8 * share, to = 1000 + 8000 * share;
+    EXPECT_NEAR(wide.Opacity(to), curve.Opacity(from), 1e-9) << share;
+    EXPECT_NEAR(wide.Color(to).g, curve.Color(from).g, 1e-6) << share;
+  }
+  const TransferFunction widest = Stretched({{{-1e308, {}}, {1e308, {}}}, {{0, 1}}}, {-1e300, 1e300});
+  EXPECT_EQ(widest.colors.front().value, -1e300);
+  EXPECT_EQ(widest.colors.back().value, 1e300);
+  EXPECT_EQ(widest.opacities.front().value, 0);
+  EXPECT_EQ(Stretched({{{7, {}}}, {{7, 1}}}, {1, 2}).colors.front().value, 1);
+}
+
 TEST(Validate, NamesEveryFieldThatIsWrong) {
   const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
   const TransferFunction good = {{{0, kRed}, {1, kBlue}}, {{0, 0, 0.5, 0}, {1, 1, 0.5, 1}}};

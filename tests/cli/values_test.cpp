@@ -11,6 +11,13 @@ namespace {
 using testing::AllOf;
 using testing::HasSubstr;
 
+TEST(ParseScalarRange, TakesTwoValuesThatRise) {
+  EXPECT_EQ(*ParseScalarRange("--scalar-range", "-1000:2.5e3"), (ScalarRange{-1000, 2500}));
+  for (const char* text : {"", "1", ":", "1:", "2:1", "1:1", "1:2:3", "nan:1", "0:inf", "a:b"}) {
+    EXPECT_EQ(ParseScalarRange("--scalar-range", text).status().code(), StatusCode::kInvalidArgument) << text;
+  }
+}
+
 TEST(ParseClipBox, TakesBoundsInThreeUnits) {
   const ClipBox world = *ParseClipBox("--clip-box", "-1.5:2,:,0:");
   EXPECT_EQ(world, (ClipBox{{-1.5, -1e9, 0}, {2, 1e9, 1e9}, ClipUnit::kWorld}));
@@ -79,10 +86,14 @@ TEST(Values, DirectionsAndColors) {
   EXPECT_EQ(*ParseDirection("--light", "1,-2,0.5"), (Vec3{1, -2, 0.5}));
   EXPECT_EQ(*ParseColor("--background", "0,0.5,1"), (StraightColor{0, 0.5F, 1, 1}));
   EXPECT_EQ(*ParseColor("--background", "0,0,0,0.25"), (StraightColor{0, 0, 0, 0.25F}));
+  EXPECT_EQ(*ParseColor("--background", "#ff3300"), (StraightColor{1, 0.2F, 0, 1}));
+  EXPECT_EQ(*ParseColor("--background", "#FF330033"), (StraightColor{1, 0.2F, 0, 0.2F}));
+  EXPECT_EQ(*ParseColor("--background", "white"), (StraightColor{1, 1, 1, 1}));
   for (const char* text : {"", "1,2", "0,0,0", "1,2,3,4", "1,,2", "nan,0,0", "inf,0,0"}) {
     EXPECT_EQ(ParseDirection("--light", text).status().code(), StatusCode::kInvalidArgument) << text;
   }
-  for (const char* text : {"", "1,1", "1,1,1.5", "-0.1,0,0", "0,0,0,0,0", "red"}) {
+  for (const char* text :
+       {"", "1,1", "1,1,1.5", "-0.1,0,0", "0,0,0,0,0", "rouge", "White", "#fff", "#12345g", "#1234567", "#+12345", "#"}) {
     EXPECT_EQ(ParseColor("--background", text).status().code(), StatusCode::kInvalidArgument) << text;
   }
 }

@@ -34,6 +34,14 @@ TransferFunction& FunctionOf(TransferChoice& transfer) { return std::get<Transfe
 
 Changes<TransferChoice> ChangesOfTransfer() {
   return {
+      {"scalar range",
+       [](auto& t) {
+         t.scalar_range = ScalarRange{1, 2};
+       }},
+      {"greatest scalar",
+       [](auto& t) {
+         t.scalar_range = ScalarRange{1, 3};
+       }},
       {"color value", [](auto& t) { FunctionOf(t).colors[1].value += 1; }},
       {"red", [](auto& t) { FunctionOf(t).colors[1].color.r += 0.01F; }},
       {"green", [](auto& t) { FunctionOf(t).colors[1].color.g += 0.01F; }},

@@ -240,7 +240,7 @@ std::vector<SubmitFrame> SamplesOf() {
                    .slab = ClipSlab{.normal = {-1, 1e-3, 0}, .through = {}, .index = kMaxVolumeSide - 1, .thickness = kMaxWorldCoordinate},
                    .planes = std::vector<ClipPlane>(kMaxClipPlanes, {{0, -1, 1e9}, -1e18}),
                    .mode = ClipMode::kCutAway};
-  full.transfer = {Curve(), 1e-6};
+  full.transfer = {Curve(), 1e-6, ScalarRange{-1e300, 1e-300}};
   full.shading = ManyLights();
   full.termination = 0.5;
   full.policy = {kUmlaut, kLongName, AxisChoice::kX, kMaxGroups, kUmlaut, kLongName, kLongName, kMaxPixelError, kMaxTeams};
