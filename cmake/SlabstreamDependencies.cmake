@@ -17,6 +17,14 @@ find_package(ZLIB REQUIRED)
 pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
 # OpenImageIO's own CMake configuration wants its command-line tools and an OpenCV include directory; its pkg-config file does not.
 pkg_check_modules(OIIO REQUIRED IMPORTED_TARGET OpenImageIO)
+# So does that of GDCM, which has no pkg-config file.
+find_path(GDCM_INCLUDE_DIR gdcmImageCodec.h PATH_SUFFIXES gdcm-3.0 REQUIRED)
+add_library(slabstream_gdcm INTERFACE)
+target_include_directories(slabstream_gdcm SYSTEM INTERFACE ${GDCM_INCLUDE_DIR})
+foreach(part MSFF DSED DICT Common)
+  find_library(GDCM_${part} gdcm${part} REQUIRED)
+  target_link_libraries(slabstream_gdcm INTERFACE ${GDCM_${part}})
+endforeach()
 
 if(SLABSTREAM_TESTS)
   find_package(GTest CONFIG REQUIRED)

@@ -11,6 +11,7 @@
 #include "common/base/status.h"
 #include "common/volume/volume.h"
 #include "common/volume_io/payload.h"
+#include "common/volume_io/read_options.h"
 #include "common/volume_io/sample_type.h"
 
 namespace slabstream {
@@ -52,6 +53,7 @@ Result<RawVolume> ReadNifti(const std::string& path);
 Result<RawVolume> ReadNrrd(const std::string& path);
 Result<RawVolume> ReadMetaImage(const std::string& path);
 Result<RawVolume> ReadTiff(const std::string& path);  // a multi-page file, or a directory of slices
+Result<RawVolume> ReadDicom(const std::string& path, const ReadOptions& options);
 
 // The TIFF files of a directory in natural order ("s2.tif" before "s10.tif"); empty if there are none or it is no directory.
 std::vector<std::string> TiffFilesIn(const std::string& directory);

@@ -11,6 +11,7 @@
 #include "common/base/log.h"
 #include "common/base/printable.h"
 #include "common/volume/memory_budget.h"
+#include "common/volume_io/dicom_series.h"
 #include "common/volume_io/raw_volume.h"
 #include "common/volume_io/text_header.h"
 #include "common/volume_io/world_placement.h"
@@ -36,6 +37,7 @@ constexpr std::array<Format, 8> kFormats = {{
     {".tiff", "TIFF", ReadTiff},
 }};
 constexpr const Format& kTiff = kFormats.back();
+constexpr Format kDicom = {"", "DICOM", nullptr};
 
 const Format* FindFormat(const std::string& path) {
   const std::string lower = ToLower(path);
@@ -96,18 +98,19 @@ Result<LoadedVolume> Finish(RawVolume raw, const Format& format, const std::stri
 
 }  // namespace
 
-Result<LoadedVolume> ReadVolume(const std::string& path) {
+Result<LoadedVolume> ReadVolume(const std::string& path, const ReadOptions& options) {
   std::error_code error;
   const auto kind = std::filesystem::status(path, error).type();
   if (kind == std::filesystem::file_type::not_found) return Status::NotFound(path + ": no such file");
   const bool directory = kind == std::filesystem::file_type::directory;
   if (!directory && kind != std::filesystem::file_type::regular) return Status::InvalidArgument(path + ": not a file that can be read");
-  const Format* format = directory ? &kTiff : FindFormat(path);
+  const Format* format = directory ? TiffFilesIn(path).empty() && HoldsDicom(path) ? &kDicom : &kTiff : FindFormat(path);
+  if (format == nullptr && BeginsLikeDicom(path)) format = &kDicom;
   if (format == nullptr) {
     return Status::InvalidArgument(path + ": not a volume: the name must end in .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, .tif or .tiff");
   }
   try {
-    Result<RawVolume> raw = format->read(path);
+    Result<RawVolume> raw = format == &kDicom ? ReadDicom(path, options) : format->read(path);
     if (!raw.ok()) return Printable(raw.status());
     return Finish(std::move(*raw), *format, path);
   } catch (const std::bad_alloc&) {
@@ -117,8 +120,8 @@ Result<LoadedVolume> ReadVolume(const std::string& path) {
 
 bool LooksLikeVolume(const std::string& path) {
   std::error_code error;
-  if (std::filesystem::is_directory(path, error)) return !TiffFilesIn(path).empty();
-  return FindFormat(path) != nullptr;
+  if (std::filesystem::is_directory(path, error)) return !TiffFilesIn(path).empty() || HoldsDicom(path);
+  return FindFormat(path) != nullptr || BeginsLikeDicom(path);
 }
 
 }  // namespace slabstream

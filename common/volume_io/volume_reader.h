@@ -24,6 +24,7 @@
 
 #include "common/base/status.h"
 #include "common/volume/volume.h"
+#include "common/volume_io/read_options.h"
 
 namespace slabstream {
 
@@ -44,7 +45,7 @@ struct LoadedVolume {
 
 // NotFound (no such file), InvalidArgument (not a volume, more than three dimensions, several components, a side above kMaxVolumeSide),
 // DataLoss (truncated), ResourceExhausted (does not fit the memory). Messages name the path.
-Result<LoadedVolume> ReadVolume(const std::string& path);
+Result<LoadedVolume> ReadVolume(const std::string& path, const ReadOptions& options = {});
 
 // Whether ReadVolume would try this path, by its ending or, for directories, by the TIFF files in it.
 bool LooksLikeVolume(const std::string& path);

@@ -17,10 +17,6 @@ constexpr double kLeastVolume = 1e-3;  // of the box that three unit steps span
 
 using Steps = std::array<Vec3, 3>;
 
-bool IsFinite(const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
-
-std::string TextOf(const Vec3& v) { return fmt::format("({:g}, {:g}, {:g})", v.x, v.y, v.z); }
-
 double SpannedVolume(const Steps& steps) { return Dot(Cross(steps[0], steps[1]), steps[2]); }
 
 Steps Turned(const Steps& steps, const AxisTurn& turn) {
@@ -148,6 +144,10 @@ void SampleStraight(const VoxelBlock& from, const Slant& slant, double outside, 
 }
 
 }  // namespace
+
+bool IsFinite(const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+std::string TextOf(const Vec3& v) { return fmt::format("({:g}, {:g}, {:g})", v.x, v.y, v.z); }
 
 Result<WorldPlacement> PlaceInWorld(const RawHeader& header, const std::string& path) {
   WorldPlacement placed;
