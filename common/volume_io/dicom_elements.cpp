@@ -96,6 +96,7 @@ struct ElementHeader {
   std::int64_t value = 0;     // its offset
   bool is_sequence = false;   // its type says so
   bool unknown_type = false;  // UN, or no type stated
+  bool words = false;         // OW
 };
 
 }  // namespace
@@ -125,7 +126,7 @@ class DicomWalk {
         const std::int64_t left = file_.size() - header->value;
         if (header->tag == kPixelData) {
           out.pixels = {header->value, header->length == kUndefined ? left : std::min<std::int64_t>(header->length, left),
-                        header->length == kUndefined};
+                        header->length == kUndefined, header->words};
         }
         return Status::Ok();
       }
@@ -181,6 +182,7 @@ class DicomWalk {
     if (encoding.explicit_types && header.tag >> 16 != kItem >> 16 && HasLongLength(type)) {
       header.is_sequence = type == "SQ";
       header.unknown_type = type == "UN";
+      header.words = type == "OW";
       bytes = end - at < kLong ? nullptr : file_.At(at, kLong);
       if (bytes == nullptr) return Damaged(at, fmt::format("an element begins there, and {} bytes are left", end - at));
       header.value = at + kLong;

@@ -35,6 +35,9 @@ Status CheckFormat(const DicomImage& image) {
   if (high < stored - 1 || high >= allocated) {
     return wrong(fmt::format("HighBit is {}, must be in [BitsStored - 1, BitsAllocated - 1] = [{}, {}]", high, stored - 1, allocated - 1));
   }
+  if (image.transfer_syntax == kExplicitBigEndian && image.pixels.words != (allocated > 8)) {
+    return wrong(fmt::format("pixels of {} bits in big endian must {}be in words of 16 bits", allocated, allocated > 8 ? "" : "not "));
+  }
   if (!IsUncompressed(image) && !CanDecompress(image.transfer_syntax)) {
     return wrong(fmt::format("transfer syntax {} is not supported; uncompressed pixels, {} are", image.transfer_syntax, kCompressions));
   }
@@ -183,7 +186,7 @@ Status ReadFrames(std::span<const DicomFrameNumber> frames, const DicomSamples& 
     } else {
       const Payload payload{.file = image->path, .offset = image->pixels.offset + std::int64_t(frame) * image->frame_bytes()};
       if (Status status = ReadPayload(payload, pixels); !status.ok()) return status;
-      if (image->transfer_syntax == kExplicitBigEndian) SwapByteOrder(image->format.type(), pixels);
+      if (image->transfer_syntax == kExplicitBigEndian && image->pixels.words) SwapByteOrder(SampleType::kUint16, pixels);
     }
     ToSamples(pixels, *image, image->frames[frame].rescale, as_values, next);
     next += image->frame_pixels() * std::int64_t(BytesPerSample(samples.type));

@@ -142,7 +142,7 @@ class SortedSlices {
     bool whole = true;
     for (std::size_t i = 0; i < gaps.size(); ++i) {
       const double steps = std::round(gaps[i] / usual);
-      whole = whole && std::abs(gaps[i] / usual - steps) <= 2 * kMostOffPlace && steps >= 1;
+      whole = whole && std::abs(gaps[i] / usual - steps) <= kMostOffPlace && steps >= 1;
       if (steps < 2) continue;
       missing += std::size_t(std::min(steps, double(kMaxVolumeSide))) - 1;
       first = std::min(first, i);
@@ -184,7 +184,7 @@ Result<DicomStack> ArrangeSlices(std::span<const DicomSlice> slices) {
   stack.steps = {(*any.frame->spacing)[0] * row, (*any.frame->spacing)[1] * column,
                  (sorted.position(slices.size() - 1) - sorted.position(0)) / double(slices.size() - 1)};
   if (Status status = sorted.CheckEven(stack.steps, normal); !status.ok()) return status;
-  stack.origin = kRasFromLps * sorted.position(0);
+  stack.origin = kRasFromLps * sorted.position(0) + Vec3{};  // 0 instead of -0
   for (Vec3& step : stack.steps) step = kRasFromLps * step;
   return stack;
 }

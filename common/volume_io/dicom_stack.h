@@ -17,8 +17,8 @@
 
 namespace slabstream {
 
-// How far a slice may lie off its place in an even stack, in voxels along each axis.
-inline constexpr double kMostOffPlace = 0.1;
+// How far a slice may lie off its place in an even stack, in voxels along each axis: scanners round positions to a tenth of a millimetre.
+inline constexpr double kMostOffPlace = 0.2;
 // How far directions of slices may differ, by component; and spacings, as a share.
 inline constexpr double kMostTurned = 1e-3;
 // Slices nearer to each other than this share of the mean distance are at the same position.

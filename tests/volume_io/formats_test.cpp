@@ -43,16 +43,6 @@ std::vector<double> ValuesFor(SampleType type) {
   return ends(-0.25, 0x1p100);
 }
 
-std::vector<double> DataValues(const Volume& volume) {
-  std::vector<double> values;
-  VisitScalarType(volume.description.type, [&]<class T>(const T*) {
-    for (std::int64_t i = 0; i < volume.block.box.voxel_count(); ++i) {
-      values.push_back(volume.description.mapping.FromStored(double(volume.block.samples<T>()[i])));
-    }
-  });
-  return values;
-}
-
 // Reads, and checks what must hold for every volume.
 LoadedVolume Read(const std::string& path) {
   Result<LoadedVolume> loaded = ReadVolume(path);

@@ -174,4 +174,14 @@ void WriteTiff(const std::string& path, const FileSpec& spec, const FileBytes& s
   TIFFClose(tiff);
 }
 
+std::vector<double> DataValues(const Volume& volume) {
+  std::vector<double> values;
+  VisitScalarType(volume.description.type, [&]<class T>(const T*) {
+    for (std::int64_t i = 0; i < volume.block.box.voxel_count(); ++i) {
+      values.push_back(volume.description.mapping.FromStored(double(volume.block.samples<T>()[i])));
+    }
+  });
+  return values;
+}
+
 }  // namespace slabstream

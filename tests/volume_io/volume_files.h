@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/math/vec.h"
+#include "common/volume/volume.h"
 #include "common/volume_io/sample_type.h"
 #include "tests/support/temporary_directory.h"
 
@@ -49,5 +50,8 @@ struct TiffOptions {
   float y_resolution = 0;  // 0: no resolution, else that of x is 100
 };
 void WriteTiff(const std::string& path, const FileSpec& spec, const FileBytes& samples, const TiffOptions& options = {});
+
+// The values of all voxels.
+std::vector<double> DataValues(const Volume& volume);
 
 }  // namespace slabstream
