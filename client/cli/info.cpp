@@ -111,6 +111,7 @@ std::string InfoText(const VolumeFileInfo& info, const VolumeSummary& summary, c
                       double(d.voxel_bytes()) / (1 << 20));
   text += fmt::format("samples      {}, {} in the file; value = {:g} * sample + {:g}\n", NameOf(d.type), info.file_type, d.mapping.scale,
                       d.mapping.offset);
+  if (info.labels) text += "labels       yes: values are numbers of structures, not measurements\n";
   text += fmt::format("spacing      {:.6g} {:.6g} {:.6g}\n", spacing.x, spacing.y, spacing.z);
   text += OrientationText(info);
   text += fmt::format("values       {:g} ... {:g}\n", summary.range.min, summary.range.max);
@@ -135,6 +136,7 @@ std::string InfoJson(const VolumeFileInfo& info, const VolumeSummary& summary, c
                                        {"size", {d.geometry.size.x, d.geometry.size.y, d.geometry.size.z}},
                                        {"type", NameOf(d.type)},
                                        {"file_type", info.file_type},
+                                       {"labels", info.labels},
                                        {"voxel_bytes", d.voxel_bytes()},
                                        {"mapping", {{"scale", d.mapping.scale}, {"offset", d.mapping.offset}}},
                                        {"spacing", vector(d.geometry.spacing)},
@@ -150,7 +152,7 @@ std::string InfoJson(const VolumeFileInfo& info, const VolumeSummary& summary, c
 }  // namespace
 
 Status RunInfo(const InfoOptions& options) {
-  if (Status status = CheckVolumePath(options.path); !status.ok()) return status;
+  if (Status status = CheckInputVolume(options.path); !status.ok()) return status;
   const Result<LoadedVolume> loaded = ReadInputVolume(options.path);
   if (!loaded.ok()) return loaded.status();
   const VolumeSummary summary = Summarize(*loaded->volume);

@@ -8,10 +8,15 @@
 
 namespace slabstream {
 
-// NotFound: no such file. InvalidArgument: not a volume by its name (names the known endings). Reads nothing.
-Status CheckVolumePath(const std::string& path);
+// `source`: a path, with options for reading it or without (read_options.h).
+
+// NotFound: no such file. InvalidArgument: not a volume by its name (names the known endings), or an option that it does not take. Reads no
+// samples.
+Status CheckInputVolume(const std::string& source);
+Status CheckInputVolume(const VolumeSource& source);
 
 // ReadVolume, but a damaged file (DataLoss) becomes InvalidArgument: here the input is wrong, not a service.
-Result<LoadedVolume> ReadInputVolume(const std::string& path);
+Result<LoadedVolume> ReadInputVolume(const std::string& source);
+Result<LoadedVolume> ReadInputVolume(const VolumeSource& source);
 
 }  // namespace slabstream
