@@ -15,6 +15,7 @@ std::span<const DeclareCommand> ClientCommands();
 Status RunRender(const RenderOptions& options);
 Status RunTurntable(const TurntableOptions& options);
 Status RunInfo(const InfoOptions& options);
+Status RunConvert(const ConvertOptions& options);
 Status RunSphere(const SphereOptions& options);
 Status RunUp(const UpOptions& options);
 Status RunDown(const DownOptions& options);

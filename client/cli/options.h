@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,7 @@
 #include "client/image_io/image_writer.h"
 #include "common/frame/frame_request.h"
 #include "common/volume/sphere.h"
+#include "common/volume_io/sample_type.h"
 #include "common/wire/client_messages.h"
 
 namespace slabstream {
@@ -62,6 +64,13 @@ struct InfoOptions {
   std::string path;
   TransferChoice transfer;
   bool json = false;
+};
+
+struct ConvertOptions {
+  std::string source;  // a path, with options for reading it or without
+  std::string output;
+  std::optional<SampleType> type;  // of the samples in `output`
+  bool progress = false;
 };
 
 struct SphereOptions {

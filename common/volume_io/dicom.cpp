@@ -2,10 +2,12 @@
 // definition of attributes is PS3.3, C.7.6.
 #include <fmt/format.h>
 
-#include "common/volume/memory_budget.h"
+#include <filesystem>
+
 #include "common/volume_io/dicom_frames.h"
 #include "common/volume_io/dicom_series.h"
-#include "common/volume_io/raw_volume.h"
+#include "common/volume_io/formats.h"
+#include "common/volume_io/slice_stack.h"
 
 namespace slabstream {
 namespace {
@@ -20,9 +22,13 @@ std::vector<DicomFrameNumber> StackedFrames(const DicomSeries& series) {
   return stacked;
 }
 
-}  // namespace
+// A folder that also has files of other formats is not one of DICOM, although there may be some below it.
+bool Recognises(const std::string& path, const ReadOptions&) {
+  std::error_code error;
+  return std::filesystem::is_directory(path, error) ? !HasVolumeFiles(path) && HoldsDicom(path) : BeginsLikeDicom(path);
+}
 
-Result<RawVolume> ReadDicom(const std::string& path, const ReadOptions& options) {
+Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
   const Result<std::vector<DicomSeries>> all = ListDicomSeries(path);
   if (!all.ok()) return all.status();
   const Result<const DicomSeries*> chosen = ChooseSeries(*all, options.series, path);
@@ -33,18 +39,29 @@ Result<RawVolume> ReadDicom(const std::string& path, const ReadOptions& options)
   }
   const std::vector<DicomFrameNumber> frames = StackedFrames(series);
   const DicomSamples samples = SamplesOf(frames);
-  RawVolume raw{.header = {.size = series.stack.size,
-                           .world = World::kPatient,
-                           .steps = series.stack.steps,
-                           .origin = series.stack.origin,
-                           .matrix = "ImageOrientationPatient",
-                           .type = samples.type,
-                           .rescale = samples.rescale},
-                .bytes = {}};
-  if (Status status = CheckFitsMemory(raw.header.sample_bytes(), path); !status.ok()) return status;
-  raw.bytes.resize(std::size_t(raw.header.sample_bytes()));
-  if (Status status = ReadFrames(frames, samples, raw.bytes); !status.ok()) return status;
+  const RawHeader header{.size = series.stack.size,
+                         .world = World::kPatient,
+                         .steps = series.stack.steps,
+                         .origin = series.stack.origin,
+                         .matrix = "ImageOrientationPatient",
+                         .type = samples.type,
+                         .rescale = samples.rescale};
+  Result<RawVolume> raw = TakeMemory(path, header, options);
+  if (!raw.ok()) return raw;
+  if (Status status = ReadFrames(frames, samples, raw->bytes); !status.ok()) return status;
   return raw;
+}
+
+}  // namespace
+
+VolumeFormat Dicom() {
+  return {
+      .name = "DICOM", .endings = {}, .also = "DICOM, a folder or a file", .recognises = Recognises, .options = {"series"}, .read = Read};
+}
+
+bool IsDicom(const std::string& path) {
+  const VolumeFormat* const format = FindFormat(path, {});
+  return format != nullptr && format->read == Read;
 }
 
 }  // namespace slabstream

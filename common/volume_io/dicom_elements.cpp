@@ -4,14 +4,13 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
-#include <cstring>
 #include <fstream>
 #include <limits>
 #include <string_view>
 
 #include "common/base/parse_number.h"
+#include "common/volume_io/binary_header.h"
 
 namespace slabstream {
 namespace {
@@ -46,14 +45,6 @@ std::string_view WithoutBlanks(std::string_view text) {
   constexpr std::string_view kBlanks{" \t\r\n\0", 5};
   const std::size_t begin = text.find_first_not_of(kBlanks);
   return begin == std::string_view::npos ? std::string_view() : text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
-}
-
-template <class T>
-T FromBytes(const std::byte* bytes, bool big_endian) {
-  std::array<std::byte, sizeof(T)> raw{};
-  std::memcpy(raw.data(), bytes, sizeof(T));
-  if (big_endian) std::reverse(raw.begin(), raw.end());
-  return std::bit_cast<T>(raw);
 }
 
 // A file of which a stretch is in memory.
@@ -170,13 +161,13 @@ class DicomWalk {
     constexpr std::int64_t kShort = 8, kLong = 12;  // bytes
     const std::byte* bytes = end - at < kShort ? nullptr : file_.At(at, kShort);
     if (bytes == nullptr) return Damaged(at, fmt::format("an element begins there, and {} bytes are left", end - at));
-    const bool big = encoding.big_endian;
+    const BinaryHeader fields({bytes, std::size_t{kShort}}, encoding.big_endian);
     ElementHeader header;
-    header.tag = DicomTag{FromBytes<std::uint16_t>(bytes, big)} << 16 | FromBytes<std::uint16_t>(bytes + 2, big);
+    header.tag = DicomTag{fields.At<std::uint16_t>(0)} << 16 | fields.At<std::uint16_t>(2);
     header.value = at + kShort;
     const std::string_view type(reinterpret_cast<const char*>(bytes) + 4, 2);
     if (encoding.explicit_types && header.tag >> 16 != kItem >> 16 && HasShortLength(type)) {
-      header.length = FromBytes<std::uint16_t>(bytes + 6, big);
+      header.length = fields.At<std::uint16_t>(6);
       return header;
     }
     if (encoding.explicit_types && header.tag >> 16 != kItem >> 16 && HasLongLength(type)) {
@@ -186,12 +177,12 @@ class DicomWalk {
       bytes = end - at < kLong ? nullptr : file_.At(at, kLong);
       if (bytes == nullptr) return Damaged(at, fmt::format("an element begins there, and {} bytes are left", end - at));
       header.value = at + kLong;
-      header.length = FromBytes<std::uint32_t>(bytes + 8, big);
+      header.length = BinaryHeader({bytes, std::size_t{kLong}}, encoding.big_endian).At<std::uint32_t>(8);
       return header;
     }
     // Items have no type, and some writers leave types out within private sequences.
     header.unknown_type = true;
-    header.length = FromBytes<std::uint32_t>(bytes + 4, big);
+    header.length = fields.At<std::uint32_t>(4);
     return header;
   }
 
@@ -312,7 +303,7 @@ template <class T>
 std::optional<T> DicomElements::Binary(DicomTag tag) const {
   const Element* const element = Find(tag);
   if (element == nullptr || element->value.size() < sizeof(T)) return std::nullopt;
-  return FromBytes<T>(reinterpret_cast<const std::byte*>(element->value.data()), big_endian_);
+  return BinaryHeader(std::as_bytes(std::span(element->value)), big_endian_).At<T>(0);
 }
 
 std::optional<std::uint16_t> DicomElements::Short(DicomTag tag) const { return Binary<std::uint16_t>(tag); }

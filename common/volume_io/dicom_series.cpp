@@ -177,7 +177,7 @@ Result<const DicomSeries*> ChooseSeries(const std::vector<DicomSeries>& all, con
   if (!series.empty() && found.empty()) {
     std::vector<const DicomSeries*> listed;
     for (const DicomSeries& each : all) listed.push_back(&each);
-    return Status::NotFound(fmt::format("{}: no series '{}' in it, there are {}", path, series, DescribedAll(listed)));
+    return Status::NotFound(fmt::format("{}: no series '{}' in it, but these: {}", path, series, DescribedAll(listed)));
   }
   if (!series.empty()) {
     return Status::InvalidArgument(fmt::format("{}: {} series have the number {}; choose one by its UID: --series {} or {}", path,

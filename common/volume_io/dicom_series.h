@@ -28,6 +28,9 @@ struct DicomSeries {
   std::size_t frame_count() const;
 };
 
+// Whether a volume of this path would be read as DICOM (formats.h).
+bool IsDicom(const std::string& path);
+
 // Whether there is any DICOM file in it. Errors count as no.
 bool HoldsDicom(const std::string& directory);
 

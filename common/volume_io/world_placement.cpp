@@ -153,8 +153,14 @@ Result<WorldPlacement> PlaceInWorld(const RawHeader& header, const std::string& 
   WorldPlacement placed;
   VolumeGeometry& geometry = placed.geometry;
   if (header.world == World::kVoxels) {
-    geometry.size = header.size;
-    for (const Axis axis : kAxes) geometry.spacing[axis] = UsableSpacing(header.steps[std::size_t(Number(axis))][axis], path);
+    // Axes may be stored in another order, but not backwards: the sign of a spacing only tells how the scanner moved.
+    const bool in_order = header.steps[0].y == 0 && header.steps[0].z == 0;
+    if (!in_order) placed.turn = NearestTurn(header.steps);
+    for (int i = 0; i < 3; ++i) {
+      const int stored = placed.turn.from[std::size_t(i)];
+      geometry.size[i] = header.size[stored];
+      geometry.spacing[i] = UsableSpacing(header.steps[std::size_t(stored)][i], path);
+    }
     return placed;
   }
   if (Status status = CheckSteps(header, path); !status.ok()) return status;

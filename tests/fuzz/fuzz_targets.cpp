@@ -16,7 +16,7 @@ const std::vector<FuzzTarget>& FuzzTargets() {
       {"schedules", "combining schemes and their schedules", DecodeSchedule, ScheduleSeeds},
       {"policies", "policies and parameters of renderers", DecodePolicy, PolicySeeds},
       {"transfer-functions", "ParaView's colour maps", DecodeTransferFunction, TransferFunctionSeeds},
-      {"volume-files", "NIfTI, NRRD, MetaImage and TIFF", DecodeVolumeFile, VolumeFileSeeds},
+      {"volume-files", "volume files of every format", DecodeVolumeFile, VolumeFileSeeds},
       {"service-files", "service files, folders of keys and records of services", DecodeServiceFile, ServiceFileSeeds},
       {"recordings", "traces with a recording", DecodeRecording, RecordingSeeds},
       {"sweeps", "files of experiment sweep", DecodeSweep, SweepSeeds},

@@ -151,6 +151,7 @@ void WriteTiff(const std::string& path, const FileSpec& spec, const FileBytes& s
     TIFFSetField(tiff, TIFFTAG_SAMPLEFORMAT, is_float ? SAMPLEFORMAT_IEEEFP : is_signed ? SAMPLEFORMAT_INT : SAMPLEFORMAT_UINT);
     TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
     TIFFSetField(tiff, TIFFTAG_COMPRESSION, options.compression);
+    if (z == 0 && !options.description.empty()) TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, options.description.c_str());
     if (options.y_resolution > 0) {
       TIFFSetField(tiff, TIFFTAG_XRESOLUTION, 100.0);
       TIFFSetField(tiff, TIFFTAG_YRESOLUTION, double(options.y_resolution));

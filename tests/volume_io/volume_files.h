@@ -45,9 +45,10 @@ FileBytes MetaHeader(const FileSpec& spec, const std::string& data_file, std::in
 
 // One TIFF page a slice, through libtiff, which takes samples in this machine's byte order.
 struct TiffOptions {
-  int compression = 1;     // a number of tiff.h
-  int tile = 0;            // pixels a side; 0: strips
-  float y_resolution = 0;  // 0: no resolution, else that of x is 100
+  int compression = 1;           // a number of tiff.h
+  int tile = 0;                  // pixels a side; 0: strips
+  float y_resolution = 0;        // 0: no resolution, else that of x is 100
+  std::string description = {};  // of the first page
 };
 void WriteTiff(const std::string& path, const FileSpec& spec, const FileBytes& samples, const TiffOptions& options = {});
 
