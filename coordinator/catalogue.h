@@ -2,7 +2,8 @@
 //
 // What --data takes, any number of times:
 //   NAME=PATH   one volume: a file, or a directory of slices; with options for reading it behind a question mark (read_options.h)
-//   DIR         every volume file in DIR by its stem ("head.nii.gz" is "head"); a DIR of slices is one volume named as the directory
+//   DIR         every volume file in DIR by its stem ("head.nii.gz" is "head"); a DIR of slices is one volume named as the directory;
+//               if DIR holds nothing but directories, each that holds a volume
 #pragma once
 
 #include <functional>

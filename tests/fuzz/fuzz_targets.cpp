@@ -17,6 +17,7 @@ const std::vector<FuzzTarget>& FuzzTargets() {
       {"policies", "policies and parameters of renderers", DecodePolicy, PolicySeeds},
       {"transfer-functions", "ParaView's colour maps", DecodeTransferFunction, TransferFunctionSeeds},
       {"volume-files", "volume files of every format", DecodeVolumeFile, VolumeFileSeeds},
+      {"dicom-files", "DICOM files, but for their pixels", DecodeDicomFile, DicomFileSeeds},
       {"service-files", "service files, folders of keys and records of services", DecodeServiceFile, ServiceFileSeeds},
       {"recordings", "traces with a recording", DecodeRecording, RecordingSeeds},
       {"sweeps", "files of experiment sweep", DecodeSweep, SweepSeeds},
