@@ -25,29 +25,39 @@ std::string Stem(const fs::path& path) {
   return name.stem().string();
 }
 
-VolumeLoader LoaderOf(const std::string& path) {
-  return [path]() -> Result<std::shared_ptr<const Volume>> {
-    Result<LoadedVolume> loaded = ReadVolume(path);
+VolumeLoader LoaderOf(const VolumeSource& source) {
+  return [source]() -> Result<std::shared_ptr<const Volume>> {
+    Result<LoadedVolume> loaded = ReadVolume(source.path, source.options);
     if (!loaded.ok()) return loaded.status();
     return loaded->volume;
   };
 }
 
-Status Add(Catalogue& catalogue, const std::string& name, const fs::path& path, const std::string& argument) {
+Status Add(Catalogue& catalogue, const std::string& name, const VolumeSource& source, const std::string& argument) {
   if (name.empty() || name.size() > kMaxNameBytes || !std::ranges::all_of(name, AllowedInName)) {
     return Status::InvalidArgument(
         fmt::format("--data {}: dataset name \"{}\" must have 1 to {} letters, digits, '.', '_' or '-'", argument, name, kMaxNameBytes));
   }
-  if (!catalogue.emplace(name, LoaderOf(path.string())).second) {
+  if (!catalogue.emplace(name, LoaderOf(source)).second) {
     return Status::InvalidArgument("--data " + argument + ": there is already a dataset named \"" + name + "\"");
   }
   return Status::Ok();
 }
 
+bool HasFiles(const fs::path& directory) {
+  std::error_code error;
+  const fs::directory_iterator entries(directory, error);
+  return !error && std::any_of(begin(entries), end(entries), [](const fs::directory_entry& entry) {
+    std::error_code unreadable;
+    return entry.is_regular_file(unreadable);
+  });
+}
+
 Status AddDirectory(Catalogue& catalogue, const fs::path& directory, const std::string& argument) {
-  if (LooksLikeVolume(directory.string())) {
+  // A directory of nothing but directories holds a volume in each, as a directory of DICOM studies does.
+  if (HasFiles(directory) && LooksLikeVolume(directory.string())) {
     const fs::path whole = fs::absolute(directory).lexically_normal();
-    return Add(catalogue, (whole.has_filename() ? whole : whole.parent_path()).filename().string(), directory, argument);
+    return Add(catalogue, (whole.has_filename() ? whole : whole.parent_path()).filename().string(), {directory.string(), {}}, argument);
   }
   std::vector<fs::path> found;
   std::error_code error;
@@ -58,7 +68,7 @@ Status AddDirectory(Catalogue& catalogue, const fs::path& directory, const std::
   if (found.empty()) return Status::InvalidArgument("--data " + argument + ": no volume file in this directory");
   std::ranges::sort(found);
   for (const fs::path& path : found) {
-    if (Status status = Add(catalogue, Stem(path), path, argument); !status.ok()) return status;
+    if (Status status = Add(catalogue, Stem(path), {path.string(), {}}, argument); !status.ok()) return status;
   }
   return Status::Ok();
 }
@@ -67,9 +77,10 @@ Status AddArgument(Catalogue& catalogue, const std::string& argument) {
   std::error_code error;
   const std::size_t equals = argument.find('=');
   if (equals != std::string::npos) {
-    const std::string path = argument.substr(equals + 1);
-    if (!fs::exists(path, error)) return Status::NotFound("--data " + argument + ": \"" + path + "\" does not exist");
-    return Add(catalogue, argument.substr(0, equals), path, argument);
+    const Result<VolumeSource> source = ParseVolumeSource(argument.substr(equals + 1));
+    if (!source.ok()) return Status(source.status().code(), "--data " + source.status().message());
+    if (!fs::exists(source->path, error)) return Status::NotFound("--data " + argument + ": \"" + source->path + "\" does not exist");
+    return Add(catalogue, argument.substr(0, equals), *source, argument);
   }
   if (!fs::exists(argument, error)) return Status::NotFound("--data " + argument + ": does not exist");
   if (!fs::is_directory(argument, error)) {

@@ -7,8 +7,10 @@
 #include "client/cli/commands.h"
 #include "client/cli/cores.h"
 #include "client/cli/option_groups.h"
+#include "common/base/find_named.h"
 #include "common/simulation/link_model.h"
 #include "common/volume/memory_budget.h"
+#include "common/volume_io/formats.h"
 #include "coordinator/tuning/service_machine.h"
 
 namespace slabstream {
@@ -59,6 +61,7 @@ void DeclareInfo(const CommandLine& line) {
   auto options = std::make_shared<InfoOptions>();
   CLI::Option* source = sub->add_option("SOURCE", options->path, "A volume file, as FILE or FILE:TRANSFER")->required();
   AddTransferOptions(*sub, options->transfer);
+  AddReadOptions(*sub);
   ResolveSource(*sub, source, options->path, options->transfer, [] { return true; });
   sub->add_flag("--json", options->json, "Print JSON");
   RunWith(*sub, line.run, options, RunInfo);
@@ -80,7 +83,31 @@ void DeclareTransfer(const CommandLine& line) {
       ->required();
   sub->add_option("SOURCE", options->path, "The volume file that it is made for: presets depend on the values of the volume")->required();
   AddScalarRange(*sub, options->transfer);
+  AddReadOptions(*sub);
+  sub->parse_complete_callback([sub, options] { options->path = WithReadOptions(*sub, options->path); });
   RunWith(*sub, line.run, options, RunTransfer);
+}
+
+void DeclareConvert(const CommandLine& line) {
+  CLI::App* sub = line.app.add_subcommand("convert", "Write a volume in another format, or with samples of another type");
+  auto options = std::make_shared<ConvertOptions>();
+  sub->add_option("SOURCE", options->source, "A volume file, or a folder of slices")->required();
+  sub->add_option("OUTPUT", options->output, "The file to write: " + WritableEndings())->required();
+  AddParsed(
+      *sub, "--type", options->type,
+      [](const std::string& option, const std::string& text) -> Result<std::optional<SampleType>> {
+        ReadOptions parsed;
+        const Status status = FindNamed(ReadOptionList(), "type")->set(parsed, option, text);
+        return status.ok() ? Result(parsed.type) : status;
+      },
+      "Type of the samples in OUTPUT: " + SampleTypeNames() +
+          "; every value must fit. It is also that of raw samples in SOURCE, unless ?type=... stands there")
+      ->type_name("TYPE")
+      ->default_str("that of SOURCE, or the smallest that holds its values");
+  sub->add_flag("--progress", options->progress, "Show progress on stderr");
+  AddReadOptions(*sub, {"type"});
+  sub->parse_complete_callback([sub, options] { options->source = WithReadOptions(*sub, options->source); });
+  RunWith(*sub, line.run, options, RunConvert);
 }
 
 void DeclareSphere(const CommandLine& line) {
@@ -98,7 +125,7 @@ void DeclareSphere(const CommandLine& line) {
       ->type_name("N");
   AddInteger(*sub, "--size", options->request.size, 2, 4096, "Voxels a side")->required();
   AddNumber(*sub, "--occupancy", options->request.occupancy, {0, 1, true}, "Share of voxels that are not empty");
-  sub->add_option("-o,--output", options->output, "The volume: .nrrd, .mhd or .mha")->required()->type_name("FILE");
+  sub->add_option("-o,--output", options->output, "The volume: " + WritableEndings())->required()->type_name("FILE");
   RunWith(*sub, line.run, options, RunSphere);
 }
 
@@ -202,9 +229,8 @@ void DeclareSlurm(const CommandLine& line) {
 }  // namespace
 
 std::span<const DeclareCommand> ClientCommands() {
-  static constexpr DeclareCommand kCommands[] = {DeclareRender,   DeclareTurntable, DeclareSlice, DeclareInfo,
-                                                 DeclareTransfer, DeclareSphere,    DeclareUp,    DeclareDown,
-                                                 DeclareStatus,   DeclareKeys,      DeclareSlurm};
+  static constexpr DeclareCommand kCommands[] = {DeclareRender,  DeclareTurntable, DeclareSlice, DeclareInfo,   DeclareTransfer, DeclareConvert,
+                                                 DeclareSphere,  DeclareUp,        DeclareDown,  DeclareStatus, DeclareKeys,     DeclareSlurm};
   return kCommands;
 }
 

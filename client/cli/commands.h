@@ -17,6 +17,7 @@ Status RunTurntable(const TurntableOptions& options);
 Status RunSlice(const SliceOptions& options);
 Status RunInfo(const InfoOptions& options);
 Status RunTransfer(const TransferOptions& options);
+Status RunConvert(const ConvertOptions& options);
 Status RunSphere(const SphereOptions& options);
 Status RunUp(const UpOptions& options);
 Status RunDown(const DownOptions& options);

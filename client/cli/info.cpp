@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "client/cli/commands.h"
+#include "client/cli/dicom_listing.h"
 #include "client/cli/input_volume.h"
 #include "common/planning/frame_plan.h"
 #include "common/volume/summary.h"
@@ -111,6 +112,7 @@ std::string InfoText(const VolumeFileInfo& info, const VolumeSummary& summary, c
                       double(d.voxel_bytes()) / (1 << 20));
   text += fmt::format("samples      {}, {} in the file; value = {:g} * sample + {:g}\n", NameOf(d.type), info.file_type, d.mapping.scale,
                       d.mapping.offset);
+  if (info.labels) text += "labels       yes: values are numbers of structures, not measurements\n";
   text += fmt::format("spacing      {:.6g} {:.6g} {:.6g}\n", spacing.x, spacing.y, spacing.z);
   text += OrientationText(info);
   text += fmt::format("values       {:g} ... {:g}\n", summary.range.min, summary.range.max);
@@ -119,7 +121,12 @@ std::string InfoText(const VolumeFileInfo& info, const VolumeSummary& summary, c
   return text + "histogram    lowest value of the row, voxels, bar by the logarithm of their number\n" + HistogramText(summary);
 }
 
-std::string InfoJson(const VolumeFileInfo& info, const VolumeSummary& summary, const std::string& transfer, double occupancy) {
+std::string JsonText(const nlohmann::ordered_json& json) {
+  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+}
+
+std::string InfoJson(const VolumeFileInfo& info, const VolumeSummary& summary, const std::string& transfer, double occupancy,
+                     const std::vector<DicomSeries>& series) {
   const VolumeDescription& d = info.description;
   const Orientation& orientation = d.geometry.orientation;
   const auto vector = [](const Vec3& v) { return nlohmann::ordered_json{v.x, v.y, v.z}; };
@@ -131,26 +138,36 @@ std::string InfoJson(const VolumeFileInfo& info, const VolumeSummary& summary, c
     for (std::size_t i = 0; i < 3; ++i) world[kStoredAxes[i]] = DirectionName(orientation.world, info.steps[i]);
   }
   world["straightened"] = info.straightened;
-  const nlohmann::ordered_json json = {{"format", info.format},
-                                       {"size", {d.geometry.size.x, d.geometry.size.y, d.geometry.size.z}},
-                                       {"type", NameOf(d.type)},
-                                       {"file_type", info.file_type},
-                                       {"voxel_bytes", d.voxel_bytes()},
-                                       {"mapping", {{"scale", d.mapping.scale}, {"offset", d.mapping.offset}}},
-                                       {"spacing", vector(d.geometry.spacing)},
-                                       {"orientation", world},
-                                       {"range", {{"min", summary.range.min}, {"max", summary.range.max}}},
-                                       {"non_finite", summary.non_finite},
-                                       {"transfer", transfer},
-                                       {"occupancy", occupancy},
-                                       {"histogram", summary.histogram}};
-  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  nlohmann::ordered_json json = {{"format", info.format},
+                                 {"size", {d.geometry.size.x, d.geometry.size.y, d.geometry.size.z}},
+                                 {"type", NameOf(d.type)},
+                                 {"file_type", info.file_type},
+                                 {"labels", info.labels},
+                                 {"voxel_bytes", d.voxel_bytes()},
+                                 {"mapping", {{"scale", d.mapping.scale}, {"offset", d.mapping.offset}}},
+                                 {"spacing", vector(d.geometry.spacing)},
+                                 {"orientation", world},
+                                 {"range", {{"min", summary.range.min}, {"max", summary.range.max}}},
+                                 {"non_finite", summary.non_finite},
+                                 {"transfer", transfer},
+                                 {"occupancy", occupancy},
+                                 {"histogram", summary.histogram}};
+  if (!series.empty()) json["series"] = SeriesJson(series);
+  return JsonText(json);
 }
 
 }  // namespace
 
 Status RunInfo(const InfoOptions& options) {
-  if (Status status = CheckVolumePath(options.path); !status.ok()) return status;
+  if (Status status = CheckInputVolume(options.path); !status.ok()) return status;
+  const Result<std::vector<DicomSeries>> series = SeriesAt(options.path);
+  if (!series.ok()) return series.status();
+  if (NeedsChoice(*series, options.path)) {
+    std::cout << (options.json ? JsonText({{"format", "DICOM"}, {"series", SeriesJson(*series)}})
+                               : SeriesText(*series) + "several series are volumes: --series NUMBER or --series UID takes one\n");
+    return Status::Ok();
+  }
+  if (!options.json) std::cout << SeriesText(*series);
   const Result<LoadedVolume> loaded = ReadInputVolume(options.path);
   if (!loaded.ok()) return loaded.status();
   const VolumeSummary summary = Summarize(*loaded->volume);
@@ -160,7 +177,8 @@ Status RunInfo(const InfoOptions& options) {
   const double occupancy = EstimateOccupancy(summary, *transfer);
 
   const std::string name = TransferName(options.transfer);
-  std::cout << (options.json ? InfoJson(loaded->info, summary, name, occupancy) : InfoText(loaded->info, summary, name, occupancy));
+  std::cout << (options.json ? InfoJson(loaded->info, summary, name, occupancy, *series)
+                             : InfoText(loaded->info, summary, name, occupancy));
   return Status::Ok();
 }
 

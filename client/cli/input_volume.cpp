@@ -1,23 +1,29 @@
 #include "client/cli/input_volume.h"
 
-#include <fmt/format.h>
-
-#include <filesystem>
-
 namespace slabstream {
 
-Status CheckVolumePath(const std::string& path) {
-  std::error_code error;
-  if (!std::filesystem::exists(path, error)) return Status::NotFound(fmt::format("SOURCE '{}' does not exist", path));
-  if (LooksLikeVolume(path)) return Status::Ok();
-  return Status::InvalidArgument(
-      fmt::format("SOURCE '{}' is not a volume: .nii, .nii.gz, .nrrd, .nhdr, .mhd, .mha, .tif, or a directory of .tif slices", path));
+Status CheckInputVolume(const std::string& source) {
+  const Result<VolumeSource> parsed = ParseVolumeSource(source);
+  return parsed.ok() ? CheckInputVolume(*parsed) : Status(parsed.status().code(), "SOURCE " + parsed.status().message());
 }
 
-Result<LoadedVolume> ReadInputVolume(const std::string& path) {
-  Result<LoadedVolume> loaded = ReadVolume(path);
-  if (loaded.ok() || loaded.status().code() != StatusCode::kDataLoss) return loaded;
-  return Status::InvalidArgument(loaded.status().message());
+Status CheckInputVolume(const VolumeSource& source) {
+  const Status status = CheckVolume(source.path, source.options);
+  return status.ok() ? status : Status(status.code(), "SOURCE " + status.message());
+}
+
+Status AsInput(const Status& status) { return status.code() == StatusCode::kDataLoss ? Status::InvalidArgument(status.message()) : status; }
+
+Result<LoadedVolume> ReadInputVolume(const std::string& source) {
+  const Result<VolumeSource> parsed = ParseVolumeSource(source);
+  if (!parsed.ok()) return parsed.status();
+  return ReadInputVolume(*parsed);
+}
+
+Result<LoadedVolume> ReadInputVolume(const VolumeSource& source) {
+  Result<LoadedVolume> loaded = ReadVolume(source.path, source.options);
+  if (!loaded.ok()) return AsInput(loaded.status());
+  return loaded;
 }
 
 }  // namespace slabstream

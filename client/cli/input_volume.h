@@ -8,10 +8,18 @@
 
 namespace slabstream {
 
-// NotFound: no such file. InvalidArgument: not a volume by its name (names the known endings). Reads nothing.
-Status CheckVolumePath(const std::string& path);
+// `source`: a path, with options for reading it or without (read_options.h).
 
-// ReadVolume, but a damaged file (DataLoss) becomes InvalidArgument: here the input is wrong, not a service.
-Result<LoadedVolume> ReadInputVolume(const std::string& path);
+// NotFound: no such file. InvalidArgument: not a volume by its name (names the known endings), or an option that it does not take. Reads no
+// samples.
+Status CheckInputVolume(const std::string& source);
+Status CheckInputVolume(const VolumeSource& source);
+
+// A damaged file (DataLoss) becomes InvalidArgument: here the input is wrong, not a service.
+Status AsInput(const Status& status);
+
+// ReadVolume with such failures.
+Result<LoadedVolume> ReadInputVolume(const std::string& source);
+Result<LoadedVolume> ReadInputVolume(const VolumeSource& source);
 
 }  // namespace slabstream

@@ -21,6 +21,7 @@
 #include "common/renderers/registry.h"
 #include "common/transport/endpoint.h"
 #include "common/view/named_view.h"
+#include "common/volume_io/read_options.h"
 #include "common/wire/control_messages.h"
 
 namespace slabstream {
@@ -309,17 +310,46 @@ void AddTransferOptions(CLI::App& app, TransferChoice& transfer) {
             "Length of material, in voxels, that has the opacity which the transfer function says");
 }
 
+void AddReadOptions(CLI::App& app, std::initializer_list<std::string_view> except) {
+  app.option_defaults()->group("Reading a file");
+  for (const ReadOption& option : ReadOptionList()) {
+    if (std::ranges::count(except, option.name) > 0) continue;
+    const auto check = [&option](const CLI::results_t& texts) {
+      ReadOptions scratch;
+      if (Status status = option.set(scratch, fmt::format("--{}", option.name), texts.back()); !status.ok()) {
+        throw CLI::ValidationError(status.message());
+      }
+      return true;
+    };
+    app.add_option(fmt::format("--{}", option.name), CLI::callback_t(check), std::string(option.purpose))
+        ->type_name(std::string(option.value));
+  }
+  app.option_defaults()->group("Options");
+}
+
+std::string WithReadOptions(const CLI::App& app, std::string source) {
+  for (const ReadOption& option : ReadOptionList()) {
+    const CLI::Option* const given = app.get_option_no_throw(fmt::format("--{}", option.name));
+    if (given != nullptr && given->count() > 0) source = WithReadOption(source, option.name, given->results().back());
+  }
+  return source;
+}
+
 void ResolveSource(CLI::App& app, const CLI::Option* source, std::string& volume, TransferChoice& transfer, std::function<bool()> is_file) {
   app.parse_complete_callback([&app, source, &volume, &transfer, is_file = std::move(is_file)] {
     if (source->count() == 0) return;
     Result<VolumeArgument> argument = ParseVolumeArgument("SOURCE", volume, is_file());
     if (!argument.ok()) throw CLI::ValidationError(argument.status().message());
-    if (!argument->transfer) return;
-    if (app.get_option("--transfer")->count() > 0) {
+    if (argument->transfer && app.get_option("--transfer")->count() > 0) {
       throw CLI::ValidationError(fmt::format("SOURCE '{}' names a transfer function, and so does --transfer", volume));
     }
-    volume = std::move(argument->volume);
-    transfer.choice = *std::move(argument->transfer);
+    volume = WithReadOptions(app, argument->volume);
+    if (volume != argument->volume && !is_file()) {
+      throw CLI::ValidationError(
+          fmt::format("'{}' is a dataset at the service: how its file is read is said where it is named, as in --data {}", argument->volume,
+                      WithReadOptions(app, "NAME=FILE")));
+    }
+    if (argument->transfer) transfer.choice = *std::move(argument->transfer);
   });
 }
 
@@ -330,6 +360,7 @@ void AddSliceOptions(CLI::App& app, SliceOptions& options) {
   app.option_defaults()->group("Options");
   CLI::Option* source =
       app.add_option("SOURCE", options.source, "A dataset's name at the service, or with --local a volume file")->required();
+  AddReadOptions(app);
   AddConnectionOptions(app, options.connection);
 
   app.option_defaults()->group("Plane");
@@ -382,6 +413,7 @@ void AddFrameOptions(CLI::App& app, FrameOptions& options) {
                                        "A dataset's name at the service, or with --local a volume file; followed by :TRANSFER it says "
                                        "what --transfer says")
                             ->required();
+  AddReadOptions(app);
   AddConnectionOptions(app, options.connection);
   AddViewOptions(app, options.request.view, options.request.size);
   AddClipOptions(app, options.request.clipping);

@@ -3,7 +3,9 @@
 
 #include <CLI/CLI.hpp>
 #include <functional>
+#include <initializer_list>
 #include <string>
+#include <string_view>
 
 #include "client/cli/options.h"
 #include "common/cli/add_option.h"
@@ -27,7 +29,13 @@ void AddScalarRange(CLI::App& app, TransferChoice& transfer);
 // --transfer, --scalar-range and --opacity-distance.
 void AddTransferOptions(CLI::App& app, TransferChoice& transfer);
 
-// After the parse, splits a `source` of the form VOLUME:TRANSFER into its parts (volume_argument.h). Calls `is_file` only then.
+// An option for each of ReadOptionList() but those of `except`: --time 3 says what ?time=3 behind a source says.
+void AddReadOptions(CLI::App& app, std::initializer_list<std::string_view> except = {});
+// The source with those options that were given to `app`.
+std::string WithReadOptions(const CLI::App& app, std::string source);
+
+// After the parse, splits a `source` of the form VOLUME:TRANSFER into its parts (volume_argument.h) and adds what AddReadOptions took,
+// which must be about a file. Calls `is_file` only then.
 void ResolveSource(CLI::App& app, const CLI::Option* source, std::string& volume, TransferChoice& transfer, std::function<bool()> is_file);
 
 // All options of `slice` but its output.

@@ -13,6 +13,7 @@
 #include "client/image_io/image_writer.h"
 #include "common/frame/frame_request.h"
 #include "common/volume/sphere.h"
+#include "common/volume_io/sample_type.h"
 #include "common/wire/client_messages.h"
 
 namespace slabstream {
@@ -82,6 +83,13 @@ struct InfoOptions {
 struct TransferOptions {
   TransferChoice transfer;  // a preset
   std::string path;         // the volume that it is made for
+};
+
+struct ConvertOptions {
+  std::string source;  // a path, with options for reading it or without
+  std::string output;
+  std::optional<SampleType> type;  // of the samples in `output`
+  bool progress = false;
 };
 
 struct SphereOptions {

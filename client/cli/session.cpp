@@ -35,7 +35,7 @@ Result<Session> Session::Open(const ConnectionOptions& connection, const std::st
     if (session.ok()) session->dataset_ = source;
     return session;
   }
-  if (Status status = CheckVolumePath(source); !status.ok()) return status;
+  if (Status status = CheckInputVolume(source); !status.ok()) return status;
   return OpenLocal(connection, [source] { return LoadInput(source); });
 }
 

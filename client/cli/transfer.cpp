@@ -8,7 +8,7 @@
 namespace slabstream {
 
 Status RunTransfer(const TransferOptions& options) {
-  if (Status status = CheckVolumePath(options.path); !status.ok()) return status;
+  if (Status status = CheckInputVolume(options.path); !status.ok()) return status;
   const Result<LoadedVolume> loaded = ReadInputVolume(options.path);
   if (!loaded.ok()) return loaded.status();
   const Result<TransferFunction> transfer = ResolveTransfer(options.transfer, Summarize(*loaded->volume));

@@ -8,6 +8,7 @@
 
 #include "common/base/files.h"
 #include "common/cli/parse.h"
+#include "common/volume_io/read_options.h"
 
 namespace slabstream {
 namespace {
@@ -37,12 +38,18 @@ Result<std::variant<std::string, TransferFunction>> ParseTransfer(const std::str
 }
 
 Result<VolumeArgument> ParseVolumeArgument(const std::string& argument, const std::string& text, bool is_file) {
+  // Options are checked with the volume.
+  const auto exists = [](const std::string& volume) {
+    const Result<VolumeSource> source = ParseVolumeSource(volume);
+    std::error_code error;
+    return source.ok() && std::filesystem::exists(source->path, error);
+  };
   const VolumeArgument whole{text, "", {}};
   const std::size_t colon = text.rfind(':');
   std::error_code error;
   if (colon == std::string::npos || (is_file && std::filesystem::exists(text, error))) return whole;
   VolumeArgument parts{text.substr(0, colon), text.substr(colon + 1), {}};
-  if (is_file && !std::filesystem::exists(parts.volume, error)) return whole;
+  if (is_file && !exists(parts.volume)) return whole;
   auto transfer = ParseTransfer(fmt::format("{} '{}':", argument, text), parts.transfer_text);
   if (!transfer.ok() && !is_file && !NamesFile(parts.transfer_text)) return whole;
   if (!transfer.ok()) return transfer.status();

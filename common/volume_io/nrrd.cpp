@@ -6,28 +6,40 @@
 #include <utility>
 #include <vector>
 
+#include "common/volume_io/formats.h"
+#include "common/volume_io/output.h"
 #include "common/volume_io/text_header.h"
 
 namespace slabstream {
 namespace {
 
-std::optional<SampleType> ToSampleType(const std::string& name) {
-  static const std::pair<SampleType, std::vector<std::string_view>> kNames[] = {
-      {SampleType::kInt8, {"signed char", "int8", "int8_t"}},
-      {SampleType::kUint8, {"uchar", "unsigned char", "uint8", "uint8_t"}},
-      {SampleType::kInt16, {"short", "short int", "signed short", "signed short int", "int16", "int16_t"}},
-      {SampleType::kUint16, {"ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"}},
-      {SampleType::kInt32, {"int", "signed int", "int32", "int32_t"}},
-      {SampleType::kUint32, {"uint", "unsigned int", "uint32", "uint32_t"}},
-      {SampleType::kInt64, {"longlong", "long long", "long long int", "signed long long", "signed long long int", "int64", "int64_t"}},
-      {SampleType::kUint64, {"ulonglong", "unsigned long long", "unsigned long long int", "uint64", "uint64_t"}},
+// The first name is the one that is written.
+const std::vector<std::pair<SampleType, std::vector<std::string_view>>>& TypeNames() {
+  static const std::vector<std::pair<SampleType, std::vector<std::string_view>>> kNames = {
+      {SampleType::kInt8, {"int8", "signed char", "int8_t"}},
+      {SampleType::kUint8, {"uint8", "uchar", "unsigned char", "uint8_t"}},
+      {SampleType::kInt16, {"int16", "short", "short int", "signed short", "signed short int", "int16_t"}},
+      {SampleType::kUint16, {"uint16", "ushort", "unsigned short", "unsigned short int", "uint16_t"}},
+      {SampleType::kInt32, {"int32", "int", "signed int", "int32_t"}},
+      {SampleType::kUint32, {"uint32", "uint", "unsigned int", "uint32_t"}},
+      {SampleType::kInt64, {"int64", "longlong", "long long", "long long int", "signed long long", "signed long long int", "int64_t"}},
+      {SampleType::kUint64, {"uint64", "ulonglong", "unsigned long long", "unsigned long long int", "uint64_t"}},
       {SampleType::kFloat32, {"float"}},
       {SampleType::kFloat64, {"double"}},
   };
-  for (const auto& [type, names] : kNames) {
+  return kNames;
+}
+
+std::optional<SampleType> ToSampleType(const std::string& name) {
+  for (const auto& [type, names] : TypeNames()) {
     if (std::find(names.begin(), names.end(), ToLower(name)) != names.end()) return type;
   }
   return std::nullopt;
+}
+
+std::string_view NameOf(SampleType wanted) {
+  const auto found = std::ranges::find(TypeNames(), wanted, [](const auto& entry) { return entry.first; });
+  return found->second.front();
 }
 
 // What a space is, and the signs that turn its axes into those of World. A left-handed space is mirrored, so that objects are not.
@@ -46,25 +58,34 @@ Space SpaceNamed(std::string name) {
   return {World::kScene, {1, 1, 1}};
 }
 
-Result<RawHeader> ReadHeader(const TextHeader& text) {
+Result<RawHeader> ReadHeader(const TextHeader& text, const ReadOptions& options) {
   const std::optional<SampleType> type = ToSampleType(*text.Find("type"));
   if (!type) return text.NotAVolume("type '" + *text.Find("type") + "' is not supported");
   const auto sizes = text.Sizes("dimension", "sizes");
   if (!sizes.ok()) return sizes.status();
-  const std::string kinds = ToLower(text.Find("kinds").value_or("domain"));
-  if (!kinds.starts_with("domain") && !kinds.starts_with("space") && !kinds.starts_with("?")) {
-    return text.Refused(fmt::format("has {} components a voxel, must have 1", sizes->front()));
+  RawHeader header{.type = *type};
+  // Components lie along the first axis: as its kind says, or if there is none, where it is as short as a colour.
+  const std::string kinds =
+      ToLower(text.Find("kinds").value_or(sizes->size() == 4 && (sizes->front() == 3 || sizes->front() == 4) ? "color" : "domain"));
+  const bool components = !kinds.starts_with("domain") && !kinds.starts_with("space") && !kinds.starts_with("?");
+  const std::size_t first = components ? 1 : 0;
+  if (components) {
+    if (!(sizes->front() >= 1 && sizes->front() <= kMaxComponents)) {
+      return text.NotAVolume(fmt::format("sizes begin with {} components, must be in [1, {}]", sizes->front(), kMaxComponents));
+    }
+    header.components = int(sizes->front());
   }
-  const Result<Index3> size = ToSize(text.path, *sizes);
-  if (!size.ok()) return size.status();
-  const auto spacings = text.Numbers({"spacings"}, sizes->size(), {1, 1, 1});
+  if (Status status = SetSize(header, text.path, {sizes->begin() + std::ptrdiff_t(first), sizes->end()}, options); !status.ok())
+    return status;
+  header.labels = text.Find("segment0_id").has_value();  // as 3D Slicer writes segmentations
+  const auto spacings = text.Numbers({"spacings"}, sizes->size(), std::vector<double>(sizes->size(), 1));
   const auto origin = text.Numbers({"space origin"}, 3, {0, 0, 0});
   const auto directions = text.Numbers({"space directions"}, 9, {});
   for (const auto* numbers : {&spacings, &origin, &directions}) {
     if (!numbers->ok()) return numbers->status();
   }
 
-  RawHeader header{.size = *size, .steps = StepsOf(Triple(*spacings)), .type = *type};
+  header.steps = StepsOf(Triple(*spacings, first));
   const std::string name = ToLower(text.Find("space").value_or(""));
   if (directions->empty() && name.empty()) return header;
   const Space space = SpaceNamed(name);
@@ -94,16 +115,45 @@ Result<Payload> FindPayload(const TextHeader& text, std::int64_t sample_bytes) {
   return payload;
 }
 
+Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
+  return ReadTextVolume(path,
+                        {.name = "NRRD",
+                         .first_line = "NRRD000",
+                         .separator = ':',
+                         .ignores_case = true,
+                         .required = {"type", "dimension", "sizes", "encoding"},
+                         .read_header = ReadHeader,
+                         .find_payload = FindPayload},
+                        options);
+}
+
+// The header's lines about the spacing and, if it is known, the orientation.
+std::string SpaceLines(const VolumeGeometry& geometry) {
+  const Orientation& orientation = geometry.orientation;
+  if (orientation.world == World::kVoxels) return fmt::format("spacings: {}\n", Numbers(geometry.spacing));
+  const auto step = [&](int i) { return Numbers(geometry.spacing[i] * orientation.axes[std::size_t(i)], ","); };
+  return fmt::format("space: {}\nspace directions: ({}) ({}) ({})\nspace origin: ({})\n",
+                     orientation.world == World::kPatient ? "right-anterior-superior" : "3D-right-handed", step(0), step(1), step(2),
+                     Numbers(orientation.origin, ","));
+}
+
+Status Write(const FileSamples& samples, const std::string& path) {
+  const VolumeGeometry& geometry = samples.geometry();
+  const std::string header =
+      fmt::format("NRRD0004\ntype: {}\ndimension: 3\n{}sizes: {} {} {}\nkinds: domain domain domain\nendian: little\nencoding: gzip\n\n",
+                  NameOf(samples.type()), SpaceLines(geometry), geometry.size.x, geometry.size.y, geometry.size.z);
+  return WriteHeaderAndSamples(path, header, samples, Gzipped::kSamples);
+}
+
 }  // namespace
 
-Result<RawVolume> ReadNrrd(const std::string& path) {
-  return ReadTextVolume(path, {.name = "NRRD",
-                               .first_line = "NRRD000",
-                               .separator = ':',
-                               .ignores_case = true,
-                               .required = {"type", "dimension", "sizes", "encoding"},
-                               .read_header = ReadHeader,
-                               .find_payload = FindPayload});
+VolumeFormat Nrrd() {
+  return {.name = "NRRD",
+          .endings = {".nrrd", ".nhdr"},
+          .options = {"time", "channel"},
+          .read = Read,
+          .written_endings = {".nrrd"},
+          .write = Write};
 }
 
 }  // namespace slabstream

@@ -13,7 +13,6 @@ namespace slabstream {
 namespace {
 
 constexpr std::size_t kBlock = std::size_t{1} << 16;  // bytes
-constexpr std::int64_t kMaxDeflateRatio = 1032;       // zlib's technical notes: 1032:1 at most
 
 Status Truncated(const Payload& payload, std::int64_t expected, std::int64_t found) {
   return Status::DataLoss(
@@ -100,13 +99,18 @@ Status ReadCompressed(const Payload& payload, std::ifstream& file, std::span<std
 
 }  // namespace
 
+bool BeginsLikeGzip(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return file.get() == 0x1f && file.get() == 0x8b;
+}
+
 Status CheckHolds(const Payload& payload, std::int64_t bytes) {
   std::error_code error;
   const auto file_bytes = std::filesystem::file_size(payload.file, error);
   if (error) return Status::NotFound(payload.file.string() + ": " + error.message());
   const std::int64_t data_bytes = std::max<std::int64_t>(0, std::int64_t(file_bytes) - payload.offset);
   if (!payload.compressed) return data_bytes >= bytes ? Status::Ok() : Truncated(payload, bytes, data_bytes);
-  if (data_bytes >= bytes / kMaxDeflateRatio) return Status::Ok();
+  if (data_bytes >= (payload.skip + bytes) / kMaxDeflateRatio) return Status::Ok();
   return Status::DataLoss(fmt::format("{}: truncated: the header speaks of {} bytes of samples, which {} compressed bytes cannot hold",
                                       payload.file.string(), bytes, data_bytes));
 }

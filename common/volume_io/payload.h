@@ -11,6 +11,8 @@
 
 namespace slabstream {
 
+inline constexpr std::int64_t kMaxDeflateRatio = 1032;  // zlib's technical notes: 1032:1 at most
+
 struct Payload {
   std::filesystem::path file;
   std::int64_t offset = 0;  // bytes of the file before the samples (or before the compressed stream)
@@ -18,6 +20,8 @@ struct Payload {
   std::int64_t skip = 0;    // bytes of the decompressed stream before the samples
   bool big_endian = false;
 };
+
+bool BeginsLikeGzip(const std::filesystem::path& file);
 
 // Checks, before memory is taken, that the file is long enough for `bytes` of samples: a compressed one, at the largest ratio that deflate
 // reaches. DataLoss: it is not. NotFound: no such file.

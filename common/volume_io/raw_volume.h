@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -11,27 +12,38 @@
 #include "common/base/status.h"
 #include "common/volume/volume.h"
 #include "common/volume_io/payload.h"
+#include "common/volume_io/read_options.h"
 #include "common/volume_io/sample_type.h"
 
 namespace slabstream {
 
+inline constexpr int kMaxComponents = 1024;  // of a voxel
+
 struct RawHeader {
   Index3 size;
+  // Samples of one voxel, which lie together; above 1 only where options.channel takes one of them.
+  int components = 1;       // in [1, kMaxComponents]
+  std::int64_t number = 0;  // in [0, kMaxVolumes): which of the volumes that lie one after the other in the payload
   World world = World::kVoxels;
-  // From a voxel to the next one along its x, y and z, in that world; kVoxels: the spacing along each axis. As in the file: may be zero or
-  // NaN.
+  // From a voxel to the next one along its x, y and z, in that world. kVoxels: each along one axis, in some order. As in the file: may be
+  // zero or NaN (kVoxels: only in that order).
   std::array<Vec3, 3> steps = {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};
   Vec3 origin;                // of the centre of the first voxel
   std::string_view matrix{};  // the file's name for the steps, for messages; lives as long as the program
   SampleType type = SampleType::kUint8;
   ValueMapping rescale;  // from the file's samples to data values
+  bool labels = false;   // samples are numbers of structures, not measurements
 
-  std::int64_t sample_bytes() const { return VolumeGeometry{size}.bounds().voxel_count() * std::int64_t(BytesPerSample(type)); }
+  // Of all components.
+  std::int64_t sample_bytes() const {
+    return VolumeGeometry{size}.bounds().voxel_count() * std::int64_t(BytesPerSample(type)) * components;
+  }
 };
 
 struct RawVolume {
   RawHeader header;
-  AlignedVector<std::byte> bytes;  // this machine's byte order
+  AlignedVector<std::byte> bytes;      // this machine's byte order
+  std::filesystem::path samples_file;  // if that is another file than the header's
 };
 
 // Steps along the axes themselves.
@@ -40,20 +52,23 @@ inline std::array<Vec3, 3> StepsOf(const Vec3& spacing) { return {Vec3{spacing.x
 // From left, posterior, superior to right, anterior, superior, and back.
 inline constexpr Vec3 kRasFromLps = {-1, -1, 1};
 
-// A volume's size from what a file says of its dimensions; those of 1 behind the third are left out. InvalidArgument naming `path`: there
-// are not three, or one is no whole number in [1, kMaxVolumeSide].
-Result<Index3> ToSize(const std::string& path, std::vector<double> sizes);
+// Sets the size and the number of the volume by what a file says of its dimensions; those of 1 behind the third are left out.
+// InvalidArgument naming `path`: there are fewer than three or more than four, one of three is no whole number in [1, kMaxVolumeSide], or
+// there are several volumes and options.time does not take one.
+Status SetSize(RawHeader& header, const std::string& path, std::vector<double> sizes, const ReadOptions& options);
+// Which of `count` volumes options.time takes. InvalidArgument: none, although there are several, or one that there is not.
+Result<std::int64_t> ChosenVolume(const std::string& path, std::int64_t count, const ReadOptions& options);
+
+// Takes memory for the samples. InvalidArgument: several components, of which options.channel takes none. ResourceExhausted: too large.
+Result<RawVolume> TakeMemory(const std::string& path, const RawHeader& header, const ReadOptions& options);
 
 // Checks that the file and the memory are large enough, then takes memory for the samples and reads them.
-Result<RawVolume> ReadSamples(const std::string& path, const RawHeader& header, const Payload& payload);
+Result<RawVolume> ReadSamples(const std::string& path, const RawHeader& header, const Payload& payload, const ReadOptions& options);
 
-// The formats. Errors as in volume_reader.h.
-Result<RawVolume> ReadNifti(const std::string& path);
-Result<RawVolume> ReadNrrd(const std::string& path);
-Result<RawVolume> ReadMetaImage(const std::string& path);
-Result<RawVolume> ReadTiff(const std::string& path);  // a multi-page file, or a directory of slices
+// Half floats, read as uint16, become float32. ResourceExhausted: they do not fit the memory.
+Result<RawVolume> HalvesAsFloats(const std::string& path, RawVolume halves);
 
-// The TIFF files of a directory in natural order ("s2.tif" before "s10.tif"); empty if there are none or it is no directory.
-std::vector<std::string> TiffFilesIn(const std::string& directory);
+// Of several components the one that options.channel takes, or their luminance, in place.
+void TakeChannel(RawVolume& raw, const ReadOptions& options);
 
 }  // namespace slabstream

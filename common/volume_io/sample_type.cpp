@@ -1,5 +1,7 @@
 #include "common/volume_io/sample_type.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -85,11 +87,23 @@ KeptSamples Narrow(AlignedVector<std::byte> bytes) {
 }  // namespace
 
 std::string_view ToString(SampleType type) { return kNames[std::size_t(type)]; }
+std::string SampleTypeNames() { return fmt::format("{}", fmt::join(kNames, ", ")); }
 std::size_t BytesPerSample(SampleType type) { return kBytes[std::size_t(type)]; }
 
 std::optional<SampleType> SampleTypeNamed(std::string_view name) {
   const auto found = std::ranges::find(kNames, name);
   return found == kNames.end() ? std::nullopt : std::optional(SampleType(found - kNames.begin()));
+}
+
+std::string ValuesOf(SampleType type) {
+  return VisitSampleType(type, []<class T>(const T*) {
+    using Limits = std::numeric_limits<T>;
+    if constexpr (std::is_floating_point_v<T>) {
+      return fmt::format("numbers up to {:.6g}", double(Limits::max()));
+    } else {
+      return fmt::format("whole numbers from {} to {}", Limits::min(), Limits::max());
+    }
+  });
 }
 
 void SwapByteOrder(SampleType type, AlignedVector<std::byte>& bytes) {

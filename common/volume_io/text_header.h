@@ -51,12 +51,12 @@ struct TextFormat {
   bool ignores_case;                  // of keys: they are found by their lower case
   std::string last_key;               // ends the header, like an empty line; "": none does
   std::vector<const char*> required;  // keys of fields that must not be empty
-  Result<RawHeader> (*read_header)(const TextHeader& text);
+  Result<RawHeader> (*read_header)(const TextHeader& text, const ReadOptions& options);
   Result<Payload> (*find_payload)(const TextHeader& text, std::int64_t sample_bytes);
 };
 
 // Skips lines of the header that begin with # and lines without the separator. Errors as in volume_reader.h.
-Result<RawVolume> ReadTextVolume(const std::string& path, const TextFormat& format);
+Result<RawVolume> ReadTextVolume(const std::string& path, const TextFormat& format, const ReadOptions& options);
 
 std::string ToLower(std::string text);
 

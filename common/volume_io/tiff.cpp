@@ -1,7 +1,7 @@
-// TIFF: a multi-page file, or a directory of files, one a slice.
+// TIFF: a multi-page file, or a folder of files, one a slice.
 //
 // TIFF states no distance between slices, and its resolution is meant for print: spacing is 1 along x and z, and along y the ratio of the
-// two resolutions.
+// two resolutions. Files of OME state the size of voxels in their description.
 #include <fmt/format.h>
 #include <tiffio.h>
 
@@ -9,14 +9,14 @@
 #include <cstdarg>
 #include <cstdio>
 #include <cstring>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <utility>
 
 #include "common/volume/memory_budget.h"
-#include "common/volume_io/raw_volume.h"
-#include "common/volume_io/text_header.h"
+#include "common/volume_io/formats.h"
+#include "common/volume_io/ome_header.h"
+#include "common/volume_io/slice_stack.h"
 
 namespace slabstream {
 namespace {
@@ -35,7 +35,7 @@ int KeepFirst(TIFF*, void* complaint, const char*, const char* format, va_list a
 int Ignore(TIFF*, void*, const char*, const char*, va_list) { return 1; }
 
 // An open file at one of its pages. Errors name the file.
-class TiffFile {
+class TiffFile : public SliceFile {
  public:
   explicit TiffFile(std::string path) : path_(std::move(path)) {
     TIFFOpenOptions* options = TIFFOpenOptionsAlloc();
@@ -53,23 +53,31 @@ class TiffFile {
   Status Refused(const std::string& why) const { return Failed(StatusCode::kInvalidArgument, why); }
   Status NotTiff() const { return Refused("not a TIFF volume"); }
 
-  // Counts the pages to the end of the chain; a broken chain is an error.
+  // Counts the pages to the end of the chain, and goes back to the first one; a broken chain is an error.
   Result<std::int64_t> CountPages() {
     std::int64_t pages = 1;
     while (TIFFReadDirectory(tiff_.get()) != 0) {
-      if (++pages > kMaxVolumeSide) break;
+      if (++pages > kMaxVolumes) break;
     }
     if (!complaint_->empty()) return Failed(StatusCode::kDataLoss, "truncated or damaged after page " + std::to_string(pages));
+    page_ = 0;
+    if (TIFFSetDirectory(tiff_.get(), 0) == 0) return Damaged();
     return pages;
   }
-  Status GoToFirstPage() { return TIFFSetDirectory(tiff_.get(), 0) != 0 ? Status::Ok() : Damaged(); }
-  Status GoToNextPage() { return TIFFReadDirectory(tiff_.get()) != 0 ? Status::Ok() : Damaged(); }
+  // Pages are taken in order: `page` is not before the present one.
+  Status GoToPage(std::int64_t page) {
+    for (; page_ < page; ++page_) {
+      if (TIFFReadDirectory(tiff_.get()) == 0) return Damaged();
+    }
+    return Status::Ok();
+  }
 
-  // Size (along z: 1), type and spacing of this page. InvalidArgument unless it has one sample a pixel of a type that is supported.
-  Result<RawHeader> ReadPageHeader() const;
+  // Which of the file's `pages` are the volume's slices, by the first page. Errors of ReadOmeHeader.
+  Result<PageOrder> ReadPageOrder(std::int64_t pages, const ReadOptions& options) const;
 
-  // Reads the samples of this page, with its own `header`, in this machine's byte order. DataLoss: truncated or damaged.
-  Status ReadPage(const RawHeader& header, std::byte* out);
+  // Of this page. InvalidArgument: a palette, planes for each component, or a type that is not supported.
+  Result<RawHeader> ReadHeader() override;
+  Status ReadSamples(const RawHeader& header, std::byte* out) override;
 
  private:
   template <class T>
@@ -80,6 +88,7 @@ class TiffFile {
   Status ReadTiles(const RawHeader& header, std::byte* out);
 
   std::string path_;
+  std::int64_t page_ = 0;
   std::unique_ptr<std::string> complaint_ = std::make_unique<std::string>();  // its address is the handler's
   struct Close {
     void operator()(TIFF* tiff) const { TIFFClose(tiff); }
@@ -87,16 +96,30 @@ class TiffFile {
   std::unique_ptr<TIFF, Close> tiff_;
 };
 
+std::size_t PixelBytes(const RawHeader& header) { return BytesPerSample(header.type) * std::size_t(header.components); }
+
 std::optional<SampleType> ToSampleType(unsigned bits, unsigned format) {
   const bool is_unsigned = format == SAMPLEFORMAT_UINT || format == SAMPLEFORMAT_VOID;
   const char* kind = is_unsigned ? "uint" : format == SAMPLEFORMAT_INT ? "int" : format == SAMPLEFORMAT_IEEEFP ? "float" : "";
   return SampleTypeNamed(kind + std::to_string(bits));
 }
 
-Result<RawHeader> TiffFile::ReadPageHeader() const {
-  const auto samples = Field<std::uint16_t>(TIFFTAG_SAMPLESPERPIXEL, 1);
-  if (samples != 1 || Field<std::uint16_t>(TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK) == PHOTOMETRIC_PALETTE) {
-    return Refused(fmt::format("a colour image ({} samples a pixel or a palette), must have 1 sample", samples));
+Result<PageOrder> TiffFile::ReadPageOrder(std::int64_t pages, const ReadOptions& options) const {
+  const std::string description = Field<const char*>(TIFFTAG_IMAGEDESCRIPTION, "");
+  if (IsOmeHeader(description)) return ReadOmeHeader(path_, description, pages, options);
+  if (options.time) return Refused("time is for files of OME that state several; this one does not");
+  return PageOrder{.count = pages};
+}
+
+Result<RawHeader> TiffFile::ReadHeader() {
+  const auto samples = Field<std::uint16_t>(TIFFTAG_SAMPLESPERPIXEL, 1),
+             photometric = Field<std::uint16_t>(TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
+  const bool grey = photometric == PHOTOMETRIC_MINISBLACK || photometric == PHOTOMETRIC_MINISWHITE;
+  if (samples < 1 || samples > kMaxComponents || (!grey && photometric != PHOTOMETRIC_RGB)) {
+    return Refused(fmt::format("a colour image of {} samples a pixel, kind {}, must be grey or RGB", samples, photometric));
+  }
+  if (samples > 1 && Field<std::uint16_t>(TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG) != PLANARCONFIG_CONTIG) {
+    return Refused("components in planes of their own are not supported");
   }
   const auto bits = Field<std::uint16_t>(TIFFTAG_BITSPERSAMPLE, 1), format = Field<std::uint16_t>(TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_UINT);
   const std::optional<SampleType> type = ToSampleType(bits, format);
@@ -105,18 +128,16 @@ Result<RawHeader> TiffFile::ReadPageHeader() const {
         "samples of {} bits and format {} are not supported, integers of 8 to 64 bits and floats of 32 and 64 bits are", bits, format));
   }
   const auto width = Field<std::uint32_t>(TIFFTAG_IMAGEWIDTH, 0), height = Field<std::uint32_t>(TIFFTAG_IMAGELENGTH, 0);
-  const Result<Index3> size = ToSize(path_, {double(width), double(height), 1});
-  if (!size.ok()) return size.status();
-
-  RawHeader header{.size = *size, .type = *type};
+  RawHeader header{.components = samples, .type = *type};
+  if (Status status = SetSize(header, path_, {double(width), double(height), 1}, {}); !status.ok()) return status;
   const auto x_resolution = Field<float>(TIFFTAG_XRESOLUTION, 0), y_resolution = Field<float>(TIFFTAG_YRESOLUTION, 0);
   if (x_resolution > 0 && y_resolution > 0) header.steps[1].y = double(x_resolution) / double(y_resolution);
   return header;
 }
 
-Status TiffFile::ReadPage(const RawHeader& header, std::byte* out) {
+Status TiffFile::ReadSamples(const RawHeader& header, std::byte* out) {
   if (TIFFIsTiled(tiff_.get()) != 0) return ReadTiles(header, out);
-  const std::size_t row_bytes = std::size_t(header.size.x) * BytesPerSample(header.type);
+  const std::size_t row_bytes = std::size_t(header.size.x) * PixelBytes(header);
   // libtiff writes whole scanlines, and computes their length itself.
   if (std::size_t(TIFFScanlineSize64(tiff_.get())) != row_bytes) return Damaged();
   for (std::int32_t y = 0; y < header.size.y; ++y) {
@@ -127,11 +148,11 @@ Status TiffFile::ReadPage(const RawHeader& header, std::byte* out) {
 
 Status TiffFile::ReadTiles(const RawHeader& header, std::byte* out) {
   const auto tile_width = Field<std::uint32_t>(TIFFTAG_TILEWIDTH, 0), tile_height = Field<std::uint32_t>(TIFFTAG_TILELENGTH, 0);
-  const std::size_t sample_bytes = BytesPerSample(header.type);
+  const std::size_t pixel_bytes = PixelBytes(header);
   const std::uint64_t tile_bytes = TIFFTileSize64(tiff_.get());
   const std::uint32_t side_limit = std::uint32_t{kMaxVolumeSide} + 1;
   if (tile_width == 0 || tile_height == 0 || tile_width > side_limit || tile_height > side_limit ||
-      tile_bytes != std::uint64_t{tile_width} * tile_height * sample_bytes) {
+      tile_bytes != std::uint64_t{tile_width} * tile_height * pixel_bytes) {
     return Damaged();
   }
   if (Status status = CheckFitsMemory(std::int64_t(tile_bytes), path_ + ": one tile"); !status.ok()) return status;
@@ -140,9 +161,9 @@ Status TiffFile::ReadTiles(const RawHeader& header, std::byte* out) {
   for (std::uint32_t y = 0; y < height; y += tile_height) {
     for (std::uint32_t x = 0; x < width; x += tile_width) {
       if (TIFFReadTile(tiff_.get(), tile.data(), x, y, 0, 0) < 0) return Damaged();
-      const std::size_t run_bytes = std::min(tile_width, width - x) * sample_bytes;
+      const std::size_t run_bytes = std::min(tile_width, width - x) * pixel_bytes;
       for (std::uint32_t row = 0; row < std::min(tile_height, height - y); ++row) {
-        std::memcpy(out + ((std::size_t(y) + row) * width + x) * sample_bytes, tile.data() + std::size_t(row) * tile_width * sample_bytes,
+        std::memcpy(out + ((std::size_t(y) + row) * width + x) * pixel_bytes, tile.data() + std::size_t(row) * tile_width * pixel_bytes,
                     run_bytes);
       }
     }
@@ -150,112 +171,56 @@ Status TiffFile::ReadTiles(const RawHeader& header, std::byte* out) {
   return Status::Ok();
 }
 
-// Takes memory for a whole volume of pages like `page`, after checking that files of that many bytes can hold it.
-Result<RawVolume> Allocate(const std::string& path, const RawHeader& page, std::int64_t pages, std::int64_t file_bytes) {
-  const Result<Index3> size = ToSize(path, {double(page.size.x), double(page.size.y), double(pages)});
-  if (!size.ok()) return size.status();
-  RawVolume raw{page, {}};
-  raw.header.size = *size;
-  const std::int64_t needed = raw.header.sample_bytes();
-  // More than LZW (1400), deflate (1032) and LZMA (7000) reach; a file that claims more is damaged.
-  constexpr std::int64_t kMaxRatio = 8192;
-  if (needed / kMaxRatio > file_bytes) {
-    return Status::DataLoss(
-        fmt::format("{}: truncated: the header speaks of {} bytes of samples, the file has {}", path, needed, file_bytes));
-  }
-  if (Status status = CheckFitsMemory(needed, path); !status.ok()) return status;
-  raw.bytes.resize(std::size_t(needed));
-  return raw;
+Result<std::unique_ptr<SliceFile>> OpenSliceFile(const std::string& path) {
+  auto file = std::make_unique<TiffFile>(path);
+  if (!file->is_open()) return file->NotTiff();
+  const Result<std::int64_t> pages = file->CountPages();
+  if (!pages.ok()) return pages.status();
+  if (*pages != 1) return file->Refused(fmt::format("has {} pages, must have 1 in a folder of slices", *pages));
+  return std::unique_ptr<SliceFile>(std::move(file));
 }
 
-std::int64_t FileBytes(const std::string& path) {
-  std::error_code error;
-  const auto bytes = std::filesystem::file_size(path, error);
-  return error ? 0 : std::int64_t(bytes);
-}
-
-// Reads the current page of `file` as slice number `slice` of the volume. `name`: of the page, for messages.
-Status ReadSlice(TiffFile& file, const std::string& name, std::int64_t slice, RawVolume& volume) {
-  const Result<RawHeader> page = file.ReadPageHeader();
-  if (!page.ok()) return page.status();
-  const RawHeader& wanted = volume.header;
-  if (page->size.x != wanted.size.x || page->size.y != wanted.size.y || page->type != wanted.type) {
-    return Status::InvalidArgument(fmt::format("{} is {} x {} {}, must be {} x {} {} like the first one", name, page->size.x, page->size.y,
-                                               ToString(page->type), wanted.size.x, wanted.size.y, ToString(wanted.type)));
-  }
-  return file.ReadPage(*page, volume.bytes.data() + slice * page->sample_bytes());
-}
-
-Result<RawVolume> ReadPages(const std::string& path) {
+Result<RawVolume> ReadPages(const std::string& path, const ReadOptions& options) {
   TiffFile file(path);
   if (!file.is_open()) return file.NotTiff();
-  const Result<RawHeader> first = file.ReadPageHeader();
+  Result<RawHeader> first = file.ReadHeader();
   if (!first.ok()) return first.status();
   const Result<std::int64_t> pages = file.CountPages();
   if (!pages.ok()) return pages.status();
-  if (*pages == 1) return Status::InvalidArgument(path + ": has 2 dimensions, must have 3 (a page for each slice)");
-  Result<RawVolume> raw = Allocate(path, *first, *pages, FileBytes(path));
-  for (std::int64_t page = 0; raw.ok() && page < *pages; ++page) {
-    if (Status status = page == 0 ? file.GoToFirstPage() : file.GoToNextPage(); !status.ok()) return status;
-    if (Status status = ReadSlice(file, fmt::format("{}: page {}", path, page + 1), page, *raw); !status.ok()) return status;
+  const Result<PageOrder> order = file.ReadPageOrder(*pages, options);
+  if (!order.ok()) return order.status();
+  if (order->spacing) first->steps = StepsOf(*order->spacing);
+  if (order->count == 1) return Status::InvalidArgument(path + ": has 2 dimensions, must have 3 (a page for each slice)");
+  ReadOptions rest = options;
+  if (order->of_channel) rest.channel.reset();
+  Result<RawVolume> raw = TakeMemoryForSlices(path, *first, order->count, BytesOfFile(path), rest);
+  for (std::int64_t slice = 0; raw.ok() && slice < order->count; ++slice) {
+    const std::int64_t page = order->first + slice * order->step;
+    if (Status status = file.GoToPage(page); !status.ok()) return status;
+    if (Status status = ReadSlice(file, fmt::format("{}: page {}", path, page + 1), slice, *raw); !status.ok()) return status;
   }
   return raw;
 }
 
-Result<RawVolume> ReadSlices(const std::string& directory, const std::vector<std::string>& paths) {
-  std::int64_t file_bytes = 0;
-  for (const std::string& path : paths) file_bytes += FileBytes(path);
-  std::optional<RawVolume> raw;
-  for (std::size_t slice = 0; slice < paths.size(); ++slice) {
-    TiffFile file(paths[slice]);
-    if (!file.is_open()) return file.NotTiff();
-    if (!raw) {
-      const Result<RawHeader> first = file.ReadPageHeader();
-      if (!first.ok()) return first.status();
-      Result<RawVolume> allocated = Allocate(directory, *first, std::int64_t(paths.size()), file_bytes);
-      if (!allocated.ok()) return allocated;
-      raw = *std::move(allocated);
-    }
-    if (Status status = ReadSlice(file, paths[slice], std::int64_t(slice), *raw); !status.ok()) return status;
-    const Result<std::int64_t> pages = file.CountPages();
-    if (!pages.ok()) return pages.status();
-    if (*pages != 1) return file.Refused(fmt::format("has {} pages, must have 1 in a directory of slices", *pages));
-  }
-  return *std::move(raw);
-}
+std::vector<std::string_view> Endings() { return {".tif", ".tiff"}; }
 
-// A key that sorts numbers inside names by value, s2 before s10: each becomes a 0, the count of its digits, and its digits.
-std::string NaturalKey(const std::string& name) {
-  std::string key;
-  for (std::size_t i = 0; i < name.size();) {
-    const std::size_t number = std::min(name.find_first_of("0123456789", i), name.size());
-    key.append(name, i, number - i);
-    i = std::min(name.find_first_not_of("0123456789", number), name.size());
-    const std::size_t digits = std::min(name.find_first_not_of('0', number), i);
-    if (number < i) key.append({'0', char(i - digits)}).append(name, digits, i - digits);
-  }
-  return key;
+// A folder of slices.
+bool Recognises(const std::string& path, const ReadOptions&) { return !SlicesIn(path, Endings()).empty(); }
+
+Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
+  const std::vector<std::string> slices = SlicesIn(path, Endings());
+  return slices.empty() ? ReadPages(path, options) : ReadSliceStack(path, slices, OpenSliceFile, options);
 }
 
 }  // namespace
 
-std::vector<std::string> TiffFilesIn(const std::string& directory) {
-  std::vector<std::string> paths;
-  std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(directory, error)) {
-    const std::string ending = ToLower(entry.path().extension().string());
-    if ((ending == ".tif" || ending == ".tiff") && entry.is_regular_file(error)) paths.push_back(entry.path().string());
-  }
-  std::ranges::sort(paths, {}, [](const std::string& path) { return std::pair(NaturalKey(path), path); });
-  return paths;
-}
-
-Result<RawVolume> ReadTiff(const std::string& path) {
-  std::error_code error;
-  if (!std::filesystem::is_directory(path, error)) return ReadPages(path);
-  const std::vector<std::string> slices = TiffFilesIn(path);
-  if (slices.empty()) return Status::InvalidArgument(path + ": a directory without TIFF files is not a volume");
-  return ReadSlices(path, slices);
+VolumeFormat Tiff() {
+  return {.name = "TIFF",
+          .endings = Endings(),
+          .also = "a folder of .tif slices",
+          .recognises = Recognises,
+          .options = {"time", "channel", "spacing"},
+          .read = Read};
 }
 
 }  // namespace slabstream

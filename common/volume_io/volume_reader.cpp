@@ -1,47 +1,20 @@
 #include "common/volume_io/volume_reader.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <filesystem>
 #include <new>
 #include <span>
-#include <string_view>
 
 #include "common/base/log.h"
 #include "common/base/printable.h"
 #include "common/volume/memory_budget.h"
+#include "common/volume_io/formats.h"
 #include "common/volume_io/raw_volume.h"
-#include "common/volume_io/text_header.h"
 #include "common/volume_io/world_placement.h"
 
 namespace slabstream {
 namespace {
-
-struct Format {
-  std::string_view ending;
-  std::string_view name;
-  Result<RawVolume> (*read)(const std::string& path);
-};
-
-// The only list. Endings are in lower case.
-constexpr std::array<Format, 8> kFormats = {{
-    {".nii", "NIfTI", ReadNifti},
-    {".nii.gz", "NIfTI", ReadNifti},
-    {".nrrd", "NRRD", ReadNrrd},
-    {".nhdr", "NRRD", ReadNrrd},
-    {".mha", "MetaImage", ReadMetaImage},
-    {".mhd", "MetaImage", ReadMetaImage},
-    {".tif", "TIFF", ReadTiff},
-    {".tiff", "TIFF", ReadTiff},
-}};
-constexpr const Format& kTiff = kFormats.back();
-
-const Format* FindFormat(const std::string& path) {
-  const std::string lower = ToLower(path);
-  const auto found = std::find_if(kFormats.begin(), kFormats.end(), [&](const Format& format) { return lower.ends_with(format.ending); });
-  return found == kFormats.end() ? nullptr : &*found;
-}
 
 // The stored sample of the lowest data value that there is: what lies outside a volume.
 double LowestSample(const VoxelBlock& block, const ValueMapping& mapping) {
@@ -58,7 +31,7 @@ double LowestSample(const VoxelBlock& block, const ValueMapping& mapping) {
   });
 }
 
-Result<LoadedVolume> Finish(RawVolume raw, const Format& format, const std::string& path) {
+Result<LoadedVolume> Finish(RawVolume raw, const VolumeFormat& format, const std::string& path) {
   KeptSamples kept = Keep(raw.header.type, std::move(raw.bytes));
   if (!kept.exact) LogWarning(path + ": values of type " + std::string(ToString(raw.header.type)) + " are rounded to " + "float32");
 
@@ -71,6 +44,8 @@ Result<LoadedVolume> Finish(RawVolume raw, const Format& format, const std::stri
   info.stored_size = raw.header.size;
   info.steps = raw.header.steps;
   info.straightened = placed->slant.has_value();
+  info.labels = raw.header.labels;
+  info.samples_file = std::move(raw.samples_file);
   VolumeDescription& description = info.description;
   description.geometry = placed->geometry;
   description.type = kept.type;
@@ -96,29 +71,31 @@ Result<LoadedVolume> Finish(RawVolume raw, const Format& format, const std::stri
 
 }  // namespace
 
-Result<LoadedVolume> ReadVolume(const std::string& path) {
-  std::error_code error;
-  const auto kind = std::filesystem::status(path, error).type();
-  if (kind == std::filesystem::file_type::not_found) return Status::NotFound(path + ": no such file");
-  const bool directory = kind == std::filesystem::file_type::directory;
-  if (!directory && kind != std::filesystem::file_type::regular) return Status::InvalidArgument(path + ": not a file that can be read");
-  const Format* format = directory ? &kTiff : FindFormat(path);
-  if (format == nullptr) {
-    return Status::InvalidArgument(path + ": not a volume: the name must end in .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, .tif or .tiff");
-  }
+Result<LoadedVolume> ReadVolume(const std::string& path, const ReadOptions& options) {
+  if (Status status = CheckVolume(path, options); !status.ok()) return status;
+  const VolumeFormat& format = *FindFormat(path, options);
   try {
-    Result<RawVolume> raw = format->read(path);
+    Result<RawVolume> raw = format.read(path, options);
     if (!raw.ok()) return Printable(raw.status());
-    return Finish(std::move(*raw), *format, path);
+    TakeChannel(*raw, options);
+    return Finish(std::move(*raw), format, path);
   } catch (const std::bad_alloc&) {
     return Status::ResourceExhausted(path + ": does not fit the memory");
   }
 }
 
-bool LooksLikeVolume(const std::string& path) {
+Status CheckVolume(const std::string& path, const ReadOptions& options) {
   std::error_code error;
-  if (std::filesystem::is_directory(path, error)) return !TiffFilesIn(path).empty();
-  return FindFormat(path) != nullptr;
+  const auto kind = std::filesystem::status(path, error).type();
+  if (kind == std::filesystem::file_type::not_found) return Printable(Status::NotFound(path + ": no such file"));
+  if (kind != std::filesystem::file_type::directory && kind != std::filesystem::file_type::regular) {
+    return Printable(Status::InvalidArgument(path + ": not a file that can be read"));
+  }
+  const VolumeFormat* const format = FindFormat(path, options);
+  if (format == nullptr) return Printable(Status::InvalidArgument(path + ": not a volume: the name " + ReadableText()));
+  return Printable(CheckOptions(*format, path, options));
 }
+
+bool LooksLikeVolume(const std::string& path) { return CheckVolume(path).ok(); }
 
 }  // namespace slabstream

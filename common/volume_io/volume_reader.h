@@ -1,7 +1,6 @@
-// Volume files to volumes: NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd; .nhdr with a detached data file; raw or gzip), MetaImage (.mhd, .mha; raw
-// or zlib), and TIFF (a directory of slices, one file a slice, in natural order of their names; or one multi-page file). Truncated and
-// damaged files are detected before memory is taken for them or while they are read. Reading takes memory for the bytes of the file's
-// samples and, if samples become narrower, for the kept bytes on top.
+// Volume files to volumes, and back; formats.h lists the formats. Truncated and damaged files are detected before memory is taken for them
+// or while they are read. Reading takes memory for the bytes of the file's samples and, if samples become narrower, for the kept bytes on
+// top.
 //
 // Samples are kept as uint8, uint16 or float32, without losing what was in the file: int8 and int16 are shifted into the unsigned type
 // (ValueMapping.offset); uint32, int32, uint64, int64 and float64 become uint16 if all their values are integers that fit after a shift,
@@ -19,22 +18,28 @@
 #pragma once
 
 #include <array>
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "common/base/status.h"
 #include "common/volume/volume.h"
+#include "common/volume_io/file_samples.h"
+#include "common/volume_io/read_options.h"
 
 namespace slabstream {
 
 struct VolumeFileInfo {
   VolumeDescription description;
   std::string file_type;  // sample type in the file, such as "int16"
-  std::string format;     // "NIfTI", "NRRD", "MetaImage", "TIFF"
+  std::string format;     // the name in VolumeFormats(): "NIfTI"
   // As stored, before they were turned: voxels along each axis, and from a voxel to the next one along it, in the world.
   Index3 stored_size;
   std::array<Vec3, 3> steps;
-  bool straightened = false;  // the stored axes are not at right angles
+  bool straightened = false;           // the stored axes are not at right angles
+  bool labels = false;                 // samples are numbers of structures, not measurements
+  std::filesystem::path samples_file;  // if the samples are in a file of their own
 };
 
 struct LoadedVolume {
@@ -42,16 +47,25 @@ struct LoadedVolume {
   std::shared_ptr<const Volume> volume;
 };
 
-// NotFound (no such file), InvalidArgument (not a volume, more than three dimensions, several components, a side above kMaxVolumeSide),
-// DataLoss (truncated), ResourceExhausted (does not fit the memory). Messages name the path.
-Result<LoadedVolume> ReadVolume(const std::string& path);
+// NotFound (no such file), InvalidArgument (not a volume, an option that its format does not take, more than three dimensions, several
+// components, a side above kMaxVolumeSide), DataLoss (truncated), ResourceExhausted (does not fit the memory). Messages name the path.
+Result<LoadedVolume> ReadVolume(const std::string& path, const ReadOptions& options = {});
 
-// Whether ReadVolume would try this path, by its ending or, for directories, by the TIFF files in it.
+// Whether ReadVolume would try this path: the file exists, a format knows it (formats.h), and takes the options. Errors as of ReadVolume.
+Status CheckVolume(const std::string& path, const ReadOptions& options = {});
+// The same without options, as for the files of a folder.
 bool LooksLikeVolume(const std::string& path);
 
-// Writes NRRD (gzip) or MetaImage (raw; .mhd: with a .raw beside it) by the ending. Such files have no value mapping: samples that were
-// read from int8 or int16 become that type again, others with a mapping become float32 data values. An older file is replaced only by a
-// complete one (common/base/files.h). InvalidArgument: another ending. Unavailable: cannot be written; the message says why.
-Status WriteVolume(const Volume& volume, const std::string& path);
+struct WriteOptions {
+  std::optional<SampleType> type;  // of the samples in the file; none: see FileSamples
+  WriteProgress progress;
+};
+
+// Writes the format that the ending names (formats.h; .mhd: with a .raw beside it). Files have no value mapping, but the data values
+// themselves: samples that were read from int8 or int16 become that type again, others of a mapping by whole numbers the smallest integer
+// type that holds them, and the rest float32. An older file is replaced only by a complete one (common/base/files.h). Takes a few MiB of
+// memory. InvalidArgument: another ending, or a data value that does not fit options.type. Unavailable: cannot be written; the message says
+// why.
+Status WriteVolume(const Volume& volume, const std::string& path, const WriteOptions& options = {});
 
 }  // namespace slabstream

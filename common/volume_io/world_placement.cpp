@@ -17,10 +17,6 @@ constexpr double kLeastVolume = 1e-3;  // of the box that three unit steps span
 
 using Steps = std::array<Vec3, 3>;
 
-bool IsFinite(const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
-
-std::string TextOf(const Vec3& v) { return fmt::format("({:g}, {:g}, {:g})", v.x, v.y, v.z); }
-
 double SpannedVolume(const Steps& steps) { return Dot(Cross(steps[0], steps[1]), steps[2]); }
 
 Steps Turned(const Steps& steps, const AxisTurn& turn) {
@@ -149,12 +145,22 @@ void SampleStraight(const VoxelBlock& from, const Slant& slant, double outside, 
 
 }  // namespace
 
+bool IsFinite(const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+std::string TextOf(const Vec3& v) { return fmt::format("({:g}, {:g}, {:g})", v.x, v.y, v.z); }
+
 Result<WorldPlacement> PlaceInWorld(const RawHeader& header, const std::string& path) {
   WorldPlacement placed;
   VolumeGeometry& geometry = placed.geometry;
   if (header.world == World::kVoxels) {
-    geometry.size = header.size;
-    for (const Axis axis : kAxes) geometry.spacing[axis] = UsableSpacing(header.steps[std::size_t(Number(axis))][axis], path);
+    // Axes may be stored in another order, but not backwards: the sign of a spacing only tells how the scanner moved.
+    const bool in_order = header.steps[0].y == 0 && header.steps[0].z == 0;
+    if (!in_order) placed.turn = NearestTurn(header.steps);
+    for (int i = 0; i < 3; ++i) {
+      const int stored = placed.turn.from[std::size_t(i)];
+      geometry.size[i] = header.size[stored];
+      geometry.spacing[i] = UsableSpacing(header.steps[std::size_t(stored)][i], path);
+    }
     return placed;
   }
   if (Status status = CheckSteps(header, path); !status.ok()) return status;

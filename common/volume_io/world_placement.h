@@ -40,6 +40,9 @@ inline constexpr double kStraight = 1e-4;
 // step is zero, the steps lie in a plane, or the straight grid is larger than a volume can be.
 Result<WorldPlacement> PlaceInWorld(const RawHeader& header, const std::string& path);
 
+bool IsFinite(const Vec3& v);
+std::string TextOf(const Vec3& v);  // "(0, 1.5, nan)", for messages
+
 // `block`: the whole volume as stored.
 VoxelBlock TurnVoxels(const VoxelBlock& block, const AxisTurn& turn);
 // `outside`: what voxels of the straight grid hold that the slanted one does not reach, a sample.

@@ -94,16 +94,19 @@ Result<BenchCase> ParseBenchCase(const std::string& text, bool at_service) {
   }
   Result<VolumeArgument> argument = ParseVolumeArgument("CASE", text, !at_service);
   if (!argument.ok()) return argument.status();
-  std::error_code error;
-  if (!at_service && !std::filesystem::exists(argument->volume, error)) {
-    return Status::NotFound(fmt::format("CASE '{}' is neither a file nor a standard case (--list names them)", text));
-  }
-  if (!at_service && !LooksLikeVolume(argument->volume))
-    return Status::InvalidArgument(fmt::format("CASE '{}' is not a volume file", text));
-
   BenchCase bench_case;
   bench_case.volume = argument->volume;
-  bench_case.dataset = at_service ? argument->volume : Stem(argument->volume);
+  bench_case.dataset = argument->volume;
+  if (!at_service) {
+    const Result<VolumeSource> source = ParseVolumeSource(argument->volume);
+    if (!source.ok()) return Status(source.status().code(), "CASE " + source.status().message());
+    const Status known = CheckVolume(source->path, source->options);
+    if (known.code() == StatusCode::kNotFound) {
+      return Status::NotFound(fmt::format("CASE '{}' is neither a file nor a standard case (--list names them)", text));
+    }
+    if (!known.ok()) return Status(known.code(), "CASE " + known.message());
+    bench_case.dataset = Stem(source->path);
+  }
   bench_case.name = bench_case.dataset + "-" + (argument->transfer ? Stem(argument->transfer_text) : "auto");
   if (argument->transfer) bench_case.transfer.choice = *std::move(argument->transfer);
   return bench_case;

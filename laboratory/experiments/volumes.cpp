@@ -8,6 +8,7 @@
 #include "common/classification/count_occupied.h"
 #include "common/planning/frame_plan.h"
 #include "common/renderers/renderer_kind.h"
+#include "common/volume_io/read_options.h"
 
 namespace slabstream {
 
@@ -18,10 +19,12 @@ Json SphereJson(const SphereRequest& sphere) {
   return {{"class", int(sphere_class)}, {"size", size}, {"occupancy", occupancy}};
 }
 
-std::string CanonicalPath(const std::string& path) {
+// `source`: a path, with options for reading it or without.
+std::string CanonicalSource(const std::string& source) {
+  const Result<VolumeSource> parsed = ParseVolumeSource(source);
   std::error_code error;
-  const std::filesystem::path canonical = std::filesystem::canonical(path, error);
-  return error ? path : canonical.string();  // the reader reports the error
+  const std::filesystem::path canonical = parsed.ok() ? std::filesystem::canonical(parsed->path, error) : "";
+  return !parsed.ok() || error ? source : canonical.string() + source.substr(parsed->path.size());  // the reader reports the error
 }
 
 Json FileJson(const std::string& path, const Volume& volume) {
@@ -43,7 +46,7 @@ Json FileJson(const std::string& path, const Volume& volume) {
 // What a case's volume is made or read from: cases of one source have one volume.
 std::string SourceOf(const BenchCase& volume) {
   const auto* path = std::get_if<std::string>(&volume.volume);
-  return path != nullptr ? CanonicalPath(*path) : SphereJson(std::get<SphereRequest>(volume.volume)).dump();
+  return path != nullptr ? CanonicalSource(*path) : SphereJson(std::get<SphereRequest>(volume.volume)).dump();
 }
 
 }  // namespace

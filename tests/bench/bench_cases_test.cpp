@@ -102,7 +102,7 @@ TEST_F(BenchFilesTest, WhatIsWrongIsNamed) {
   const std::pair<std::string, std::string> cases[] = {
       {"class3-256", "CASE 'class3-256' is neither a file nor a standard case"},
       {"", "CASE ''"},
-      {notes, "notes.txt' is not a volume"},
+      {notes, "notes.txt: not a volume"},
       {head + ":bone", "'bone' is not one of auto,"},
       {head + ":", "'' is not one of auto,"},
       {head + ":no/map.json", "'no/map.json' does not exist"},

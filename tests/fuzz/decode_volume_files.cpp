@@ -1,31 +1,69 @@
 // Volume files of every format, read from a file, since that is what the readers take.
 //
-// input: u8 format (kEndings), the file
+// input: u8 kind (Kinds()), u8 options (OptionsNumber), the file
 #include <algorithm>
-#include <array>
 
+#include "common/volume_io/formats.h"
 #include "common/volume_io/volume_reader.h"
 #include "tests/fuzz/decoders.h"
 #include "tests/support/temporary_directory.h"
+#include "tests/volume_io/more_files.h"
 #include "tests/volume_io/volume_files.h"
 
 namespace slabstream {
 namespace {
 
-constexpr std::array<const char*, 7> kEndings = {"nii", "nii.gz", "nrrd", "nhdr", "mha", "mhd", "tif"};
+// The ending of a file, or of the pictures in a folder.
+struct Kind {
+  std::string ending;
+  bool folder = false;
+};
+
+const std::vector<Kind>& Kinds() {
+  static const std::vector<Kind> kinds = [] {
+    std::vector<Kind> all = {{".png", true}, {".jpg", true}};
+    for (const VolumeFormat& format : VolumeFormats()) {
+      for (const std::string_view ending : format.endings) all.push_back({std::string(ending)});
+    }
+    return all;
+  }();
+  return kinds;
+}
+
+ReadOptions OptionsNumber(std::uint8_t number, const Kind& kind) {
+  if (kind.ending == ".raw") return {.dims = Index3{3, 2, 2}, .type = SampleType(number % (int(SampleType::kFloat64) + 1)), .offset = 1};
+  switch (number % 4) {
+    case 1: return {.time = 1};
+    case 2: return {.channel = 0};
+    case 3: return {.channel = kLuminance};
+    default: return {};
+  }
+}
 
 struct Files {
   TemporaryDirectory directory{PlaceOfFuzzFiles()};
-  std::string Path(const std::string& ending) const { return directory / ("volume." + ending); }
+  std::string Path(const std::string& ending) const { return directory / ("volume" + ending); }
 };
 const Files& SharedFiles() {
   static const Files files;
   return files;
 }
 
-FuzzBytes Seed(const char* ending, std::string_view file) {
-  const auto format = std::find_if(kEndings.begin(), kEndings.end(), [&](std::string_view e) { return e == ending; }) - kEndings.begin();
-  return FuzzSeed().Put(std::uint8_t(format)).Put(file).bytes();
+// Where a volume of this file lies: a folder holds it twice.
+std::string Written(const Kind& kind, const FileBytes& file) {
+  const std::string path = SharedFiles().Path(kind.ending);
+  if (!kind.folder) {
+    WriteFile(path, file);
+    return path;
+  }
+  std::filesystem::create_directories(path);
+  for (const char* number : {"1", "2"}) WriteFile(path + "/" + number + kind.ending, file);
+  return path;
+}
+
+FuzzBytes Seed(const std::string& ending, std::string_view file, std::uint8_t options = 0) {
+  const auto kind = std::ranges::find(Kinds(), ending, &Kind::ending) - Kinds().begin();
+  return FuzzSeed().Put(std::uint8_t(kind)).Put(options).Put(file).bytes();
 }
 
 bool SameSamples(const Volume& a, const Volume& b) {
@@ -46,9 +84,9 @@ std::shared_ptr<const Volume> Rewritten(const Volume& volume, const std::string&
 
 bool DecodeVolumeFile(std::span<const std::byte> bytes) {
   FuzzInput input(bytes);
-  const std::string path = SharedFiles().Path(kEndings[input.Take<std::uint8_t>() % kEndings.size()]);
-  WriteFile(path, FileBytes(input.Text()));
-  const Result<LoadedVolume> loaded = ReadVolume(path);
+  const Kind& kind = Kinds()[input.Take<std::uint8_t>() % Kinds().size()];
+  const ReadOptions options = OptionsNumber(input.Take<std::uint8_t>(), kind);
+  const Result<LoadedVolume> loaded = ReadVolume(Written(kind, FileBytes(input.Text())), options);
   if (!loaded.ok()) {
     CheckRefusal(loaded.status());
     return false;
@@ -62,9 +100,9 @@ bool DecodeVolumeFile(std::span<const std::byte> bytes) {
   CHECK_EQ(volume.block.bytes.size(), std::size_t(geometry.bounds().voxel_count()) * BytesPerSample(volume.description.type));
 
   // The first copy has the data values of formats that store others; from there on nothing changes.
-  const auto once = Rewritten(volume, SharedFiles().Path("copy.nrrd"));
+  const auto once = Rewritten(volume, SharedFiles().Path(".copy.nrrd"));
   CHECK(once->description.geometry.size == geometry.size);
-  const auto twice = Rewritten(*once, SharedFiles().Path("copy.nrrd"));
+  const auto twice = Rewritten(*once, SharedFiles().Path(".copy.nrrd"));
   CHECK(SameSamples(*once, *twice));
   for (const Axis axis : kAxes) {  // oblique axes are rounded when they are written
     const double spacing = once->description.geometry.spacing[axis];
@@ -87,25 +125,40 @@ std::vector<FuzzBytes> VolumeFileSeeds() {
     spec.qform = std::int16_t(type % 2);
     spec.sform = std::int16_t(type % 3);
     const FileBytes samples = samples_of(spec), nifti = NiftiHeader(spec) + samples;
-    seeds.push_back(Seed("nii", nifti));
-    seeds.push_back(Seed("nrrd", NrrdHeader(spec, "raw") + samples));
-    seeds.push_back(Seed("mha", MetaHeader(spec, "LOCAL") + samples));
+    seeds.push_back(Seed(".nii", nifti));
+    seeds.push_back(Seed(".nrrd", NrrdHeader(spec, "raw") + samples));
+    seeds.push_back(Seed(".mha", MetaHeader(spec, "LOCAL") + samples));
     if (type % 3 != 0) continue;
-    seeds.push_back(Seed("nii.gz", Gzip(nifti)));
-    seeds.push_back(Seed("nrrd", NrrdHeader(spec, "gzip") + Gzip(samples)));
+    seeds.push_back(Seed(".nii.gz", Gzip(nifti)));
+    seeds.push_back(Seed(".nrrd", NrrdHeader(spec, "gzip") + Gzip(samples)));
     const FileBytes packed = Zlib(samples);
-    seeds.push_back(Seed("mha", MetaHeader(spec, "LOCAL", std::int64_t(packed.size())) + packed));
+    seeds.push_back(Seed(".mha", MetaHeader(spec, "LOCAL", std::int64_t(packed.size())) + packed));
   }
+  for (const SampleFile& file : OneOfEachFormat()) seeds.push_back(Seed(file.file.substr(1), file.bytes));
+  seeds.push_back(Seed(".raw", FileBytes(13, 'x'), std::uint8_t(SampleType::kUint8)));
+  seeds.push_back(Seed(".nii", NiftiHeader({.dimensions = {4, 3, 2, 2}}) + FileBytes(48, 'x'), 1));
+  seeds.push_back(Seed(".npy", NpyHeader("<f2", "(2, 3, 4)", true, 2) + FileBytes(48, 'x')));
+  seeds.push_back(Seed(".vti", VtiFile({}, FileBytes(72, 'x'), {.block = 10, .components = 3}), 3));
   spec.big_endian = false;
-  const std::string path = SharedFiles().Path("seed.tif");
+  const std::string path = SharedFiles().Path(".seed.tif");
   for (const SampleType type : {SampleType::kUint8, SampleType::kInt16, SampleType::kFloat32}) {
     spec.type = type;
     const FileBytes samples = samples_of(spec);
     for (const TiffOptions& options :
          {TiffOptions{}, TiffOptions{.compression = 5}, TiffOptions{.compression = 8, .y_resolution = 50}, TiffOptions{.tile = 16}}) {
       WriteTiff(path, spec, samples, options);
-      seeds.push_back(Seed("tif", ReadFile(path)));
+      seeds.push_back(Seed(".tif", ReadFile(path)));
     }
+  }
+  const std::string ome =
+      "<OME><Image><Pixels SizeZ=\"2\" SizeC=\"1\" SizeT=\"1\" DimensionOrder=\"XYZCT\" PhysicalSizeX=\"2\"/></Image></OME>";
+  WriteTiff(path, {}, FileBytes(24, 'x'), {.description = ome});
+  seeds.push_back(Seed(".tif", ReadFile(path)));
+  for (const int picture : {0, 2, 3}) {
+    WritePng(path, {4, 4, 1}, picture == 0 ? 16 : 8, picture, FileBytes(picture == 0 ? 32 : picture == 2 ? 48 : 16, 1), picture == 2);
+    seeds.push_back(Seed(".png", ReadFile(path), picture == 0 ? 0 : 3));
+    WriteJpeg(path, {8, 8, 1}, picture == 0 ? 1 : 3, FileBytes(192, 100), picture == 3);
+    seeds.push_back(Seed(".jpg", ReadFile(path), picture == 0 ? 0 : 3));
   }
   return seeds;
 }

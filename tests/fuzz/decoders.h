@@ -26,6 +26,9 @@ std::vector<FuzzBytes> TransferFunctionSeeds();
 bool DecodeVolumeFile(std::span<const std::byte> input);
 std::vector<FuzzBytes> VolumeFileSeeds();
 
+bool DecodeDicomFile(std::span<const std::byte> input);
+std::vector<FuzzBytes> DicomFileSeeds();
+
 bool DecodeServiceFile(std::span<const std::byte> input);
 std::vector<FuzzBytes> ServiceFileSeeds();
 

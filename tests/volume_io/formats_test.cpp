@@ -9,6 +9,7 @@
 #include "common/volume_io/volume_reader.h"
 #include "tests/support/full_disk.h"
 #include "tests/support/random_volume.h"
+#include "tests/volume_io/more_files.h"
 #include "tests/volume_io/volume_files.h"
 
 namespace slabstream {
@@ -41,16 +42,6 @@ std::vector<double> ValuesFor(SampleType type) {
     case SampleType::kFloat64: break;
   }
   return ends(-0.25, 0x1p100);
-}
-
-std::vector<double> DataValues(const Volume& volume) {
-  std::vector<double> values;
-  VisitScalarType(volume.description.type, [&]<class T>(const T*) {
-    for (std::int64_t i = 0; i < volume.block.box.voxel_count(); ++i) {
-      values.push_back(volume.description.mapping.FromStored(double(volume.block.samples<T>()[i])));
-    }
-  });
-  return values;
 }
 
 // Reads, and checks what must hold for every volume.
@@ -112,6 +103,14 @@ const Writer kWriters[] = {
        WriteFile(path, MetaHeader(spec, "samples.zraw", std::int64_t(packed.size())));
        WriteFile((std::filesystem::path(path).parent_path() / "samples.zraw").string(), packed);
      }},
+    {"npy", "v.npy", "NumPy",
+     [](const std::string& path, const FileSpec& spec, const FileBytes& samples) { WriteFile(path, NpyHeader(spec) + samples); }},
+    {"vti_raw", "v.vti", "VTK image",
+     [](const std::string& path, const FileSpec& spec, const FileBytes& samples) { WriteFile(path, VtiFile(spec, samples)); }},
+    {"vti_blocks", "v.vti", "VTK image",
+     [](const std::string& path, const FileSpec& spec, const FileBytes& samples) {
+       WriteFile(path, VtiFile(spec, samples, {.format = "binary", .block = 32}));
+     }},
     {"tiff_pages", "v.tif", "TIFF",
      [](const std::string& path, const FileSpec& spec, const FileBytes& samples) { WriteTiff(path, spec, samples); }},
 };
@@ -121,6 +120,7 @@ class EveryFormat : public testing::TestWithParam<Writer> {};
 TEST_P(EveryFormat, GivesBackEveryTypeInBothByteOrders) {
   const Writer& writer = GetParam();
   const bool tiff = std::string(writer.format) == "TIFF";  // its byte order is libtiff's business
+  const bool states_spacing = !tiff && std::string(writer.format) != "NumPy";
   for (const SampleType type : kTypes) {
     for (const bool big_endian : {false, true}) {
       if (tiff && big_endian) continue;
@@ -134,7 +134,7 @@ TEST_P(EveryFormat, GivesBackEveryTypeInBothByteOrders) {
       EXPECT_EQ(loaded.info.format, writer.format);
       EXPECT_EQ(loaded.info.file_type, ToString(type));
       EXPECT_EQ(loaded.info.description.geometry.size, spec.size);
-      EXPECT_EQ(loaded.info.description.geometry.spacing, tiff ? (Vec3{1, 1, 1}) : spec.spacing);
+      EXPECT_EQ(loaded.info.description.geometry.spacing, states_spacing ? spec.spacing : (Vec3{1, 1, 1}));
       std::vector<double> expected = values;
       if (type == SampleType::kFloat32) expected.back() = double(float(expected.back()));
       EXPECT_EQ(DataValues(*loaded.volume), expected);
@@ -338,7 +338,7 @@ TEST(WriteVolume, SaysWhatItCannotWrite) {
   const Volume volume = MakeTestVolume({2, 2, 2}, ScalarType::kUint8, [](const Index3&) { return 1; });
   const Status ending = WriteVolume(volume, directory / "v.png");
   EXPECT_EQ(ending.code(), StatusCode::kInvalidArgument);
-  EXPECT_THAT(ending.message(), testing::AllOf(HasSubstr("v.png"), HasSubstr(".nrrd, .mha or .mhd")));
+  EXPECT_THAT(ending.message(), testing::AllOf(HasSubstr("v.png"), HasSubstr(".nrrd, .mha, .mhd")));
   const Status place = WriteVolume(volume, directory / "nowhere/v.nrrd");
   EXPECT_EQ(place.code(), StatusCode::kUnavailable);
   EXPECT_THAT(place.message(), testing::AllOf(HasSubstr("nowhere/v.nrrd"), HasSubstr("No such file or directory")));

@@ -151,6 +151,7 @@ void WriteTiff(const std::string& path, const FileSpec& spec, const FileBytes& s
     TIFFSetField(tiff, TIFFTAG_SAMPLEFORMAT, is_float ? SAMPLEFORMAT_IEEEFP : is_signed ? SAMPLEFORMAT_INT : SAMPLEFORMAT_UINT);
     TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
     TIFFSetField(tiff, TIFFTAG_COMPRESSION, options.compression);
+    if (z == 0 && !options.description.empty()) TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, options.description.c_str());
     if (options.y_resolution > 0) {
       TIFFSetField(tiff, TIFFTAG_XRESOLUTION, 100.0);
       TIFFSetField(tiff, TIFFTAG_YRESOLUTION, double(options.y_resolution));
@@ -172,6 +173,16 @@ void WriteTiff(const std::string& path, const FileSpec& spec, const FileBytes& s
     CHECK_EQ(TIFFWriteDirectory(tiff), 1);
   }
   TIFFClose(tiff);
+}
+
+std::vector<double> DataValues(const Volume& volume) {
+  std::vector<double> values;
+  VisitScalarType(volume.description.type, [&]<class T>(const T*) {
+    for (std::int64_t i = 0; i < volume.block.box.voxel_count(); ++i) {
+      values.push_back(volume.description.mapping.FromStored(double(volume.block.samples<T>()[i])));
+    }
+  });
+  return values;
 }
 
 }  // namespace slabstream

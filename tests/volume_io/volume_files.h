@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/math/vec.h"
+#include "common/volume/volume.h"
 #include "common/volume_io/sample_type.h"
 #include "tests/support/temporary_directory.h"
 
@@ -44,10 +45,14 @@ FileBytes MetaHeader(const FileSpec& spec, const std::string& data_file, std::in
 
 // One TIFF page a slice, through libtiff, which takes samples in this machine's byte order.
 struct TiffOptions {
-  int compression = 1;     // a number of tiff.h
-  int tile = 0;            // pixels a side; 0: strips
-  float y_resolution = 0;  // 0: no resolution, else that of x is 100
+  int compression = 1;           // a number of tiff.h
+  int tile = 0;                  // pixels a side; 0: strips
+  float y_resolution = 0;        // 0: no resolution, else that of x is 100
+  std::string description = {};  // of the first page
 };
 void WriteTiff(const std::string& path, const FileSpec& spec, const FileBytes& samples, const TiffOptions& options = {});
+
+// The values of all voxels.
+std::vector<double> DataValues(const Volume& volume);
 
 }  // namespace slabstream

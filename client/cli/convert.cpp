@@ -1,0 +1,69 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <iostream>
+
+#include "client/cli/commands.h"
+#include "client/cli/input_volume.h"
+#include "client/cli/progress_bar.h"
+#include "common/base/files.h"
+#include "common/base/log.h"
+#include "common/volume_io/formats.h"
+
+namespace slabstream {
+namespace {
+
+constexpr double kMebibyte = 1 << 20;
+
+// What it reads from stays as it is, even though it has been read when the output takes its place.
+Status CheckKeepsInput(const ConvertOptions& options, const VolumeFormat& format, const std::vector<std::filesystem::path>& inputs) {
+  std::vector<std::filesystem::path> outputs = {options.output};
+  if (format.second_file != nullptr) outputs.push_back(format.second_file(options.output));
+  for (const std::filesystem::path& output : outputs) {
+    for (const std::filesystem::path& input : inputs) {
+      std::error_code error;
+      if (!std::filesystem::equivalent(output, input, error) || error) continue;
+      return Status::InvalidArgument(fmt::format("OUTPUT '{}': would overwrite the input '{}'", options.output, input.string()));
+    }
+  }
+  return Status::Ok();
+}
+
+}  // namespace
+
+Status RunConvert(const ConvertOptions& options) {
+  Result<VolumeSource> source = ParseVolumeSource(options.source);
+  if (!source.ok()) return source.status();
+  // --type is also that of raw samples, unless they have one of their own.
+  const VolumeFormat* const from = FindFormat(source->path, source->options);
+  const bool needs_type = from != nullptr && std::ranges::count(from->required, "type") > 0;
+  if (needs_type && !source->options.type) source->options.type = options.type;
+  if (Status status = CheckInputVolume(*source); !status.ok()) return status;
+  const VolumeFormat* const to = FindWritableFormat(options.output);
+  if (to == nullptr) {
+    return Status::InvalidArgument(fmt::format("OUTPUT '{}' must end in one of {}", options.output, WritableEndings()));
+  }
+  if (Status status = CheckKeepsInput(options, *to, {source->path}); !status.ok()) return status;
+  if (Status status = CheckCanWrite("OUTPUT", options.output); !status.ok()) return status;
+
+  ProgressBar bar(options.progress, 1);
+  bar.Show(0, "reading " + source->path);
+  const Result<LoadedVolume> loaded = ReadInputVolume(*source);
+  if (!loaded.ok()) return loaded.status();
+  const VolumeFileInfo& info = loaded->info;
+  if (Status status = CheckKeepsInput(options, *to, {info.samples_file}); !status.ok()) return status;
+  if (const std::string lost = WhatIsLost(*to, info.description.geometry); !lost.empty()) {
+    LogWarning(fmt::format("{}: {} files do not keep {}", options.output, to->name, lost));
+  }
+  const auto progress = [&](std::int64_t done, std::int64_t all) {
+    bar.Show(double(done) / double(all),
+             fmt::format("writing {}: {} % of {:.0f} MiB", options.output, done * 100 / all, double(all) / kMebibyte));
+  };
+  if (Status status = WriteVolume(*loaded->volume, options.output, {options.type, progress}); !status.ok()) return status;
+  const Index3& size = info.description.geometry.size;
+  std::cout << fmt::format("wrote {}: {}, {} x {} x {} voxels\n", options.output, to->name, size.x, size.y, size.z);
+  return Status::Ok();
+}
+
+}  // namespace slabstream

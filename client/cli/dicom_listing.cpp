@@ -1,0 +1,82 @@
+#include "client/cli/dicom_listing.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "client/cli/input_volume.h"
+#include "common/base/printable.h"
+#include "common/volume_io/read_options.h"
+
+namespace slabstream {
+namespace {
+
+// What a terminal can show, of texts in any encoding.
+std::string Plain(const std::string& text) {
+  std::string plain = Printable(text);
+  std::ranges::replace_if(
+      plain, [](char c) { return static_cast<unsigned char>(c) >= 0x80; }, '?');
+  return plain;
+}
+
+Vec3 SpacingOf(const DicomStack& stack) { return {Length(stack.steps[0]), Length(stack.steps[1]), Length(stack.steps[2])}; }
+
+// Why it is not read, or only if asked for.
+std::string RemarkOn(const DicomSeries& series) {
+  if (!series.trouble.ok()) return series.trouble.message();
+  return series.other;
+}
+
+}  // namespace
+
+Result<std::vector<DicomSeries>> SeriesAt(const std::string& source) {
+  const Result<VolumeSource> parsed = ParseVolumeSource(source);
+  if (!parsed.ok()) return parsed.status();
+  if (!IsDicom(parsed->path)) return std::vector<DicomSeries>();
+  Result<std::vector<DicomSeries>> all = ListDicomSeries(parsed->path);
+  if (!all.ok()) return Printable(AsInput(all.status()));
+  return all;
+}
+
+bool NeedsChoice(const std::vector<DicomSeries>& all, const std::string& source) {
+  const Result<VolumeSource> parsed = ParseVolumeSource(source);
+  return parsed.ok() && parsed->options.series.empty() &&
+         std::ranges::count_if(all, [](const DicomSeries& series) { return series.other.empty(); }) > 1;
+}
+
+std::string SeriesText(const std::vector<DicomSeries>& all) {
+  if (all.empty()) return "";
+  std::string text =
+      fmt::format("{:<8} {:<8} {:<20} {:<26} {}\n", "series", "modality", "pixels and slices", "spacing (mm)", "UID, description");
+  for (const DicomSeries& series : all) {
+    const DicomImage& first = series.images.front();
+    const Vec3 spacing = SpacingOf(series.stack);
+    text += fmt::format("{:<8} {:<8} {:<20} {:<26} {}{}\n", Plain(series.number), Plain(series.modality),
+                        fmt::format("{} x {} x {}", first.columns, first.rows, series.frame_count()),
+                        series.trouble.ok() ? fmt::format("{:.6g} x {:.6g} x {:.6g}", spacing.x, spacing.y, spacing.z) : "-",
+                        Plain(series.uid), series.description.empty() ? "" : fmt::format(", \"{}\"", Plain(series.description)));
+    if (const std::string remark = RemarkOn(series); !remark.empty()) text += fmt::format("{:<8} no volume: {}\n", "", Plain(remark));
+  }
+  return text;
+}
+
+nlohmann::ordered_json SeriesJson(const std::vector<DicomSeries>& all) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const DicomSeries& series : all) {
+    const DicomImage& first = series.images.front();
+    nlohmann::ordered_json each = {{"number", series.number},
+                                   {"uid", series.uid},
+                                   {"modality", series.modality},
+                                   {"description", series.description},
+                                   {"size", {first.columns, first.rows, series.frame_count()}}};
+    if (series.trouble.ok()) {
+      const Vec3 spacing = SpacingOf(series.stack);
+      each["spacing"] = {spacing.x, spacing.y, spacing.z};
+    }
+    if (const std::string remark = RemarkOn(series); !remark.empty()) each["no_volume"] = remark;
+    json.push_back(std::move(each));
+  }
+  return json;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,96 @@
+// The data elements of a DICOM file (PS3.10 section 7, PS3.5 section 7): those that the caller wants, with the sequences that they are in,
+// up to the pixels. The rest is passed over.
+//
+// A length is believed only if what holds the element has that many bytes, sequences nest at most kMaxDicomDepth deep, and values longer
+// than kMaxDicomValue are not kept: so no bytes make it take memory or fail otherwise than by a Status. This is why GDCM does not do it:
+// its parser takes memory by the lengths that a file claims, and as Debian compiles it, it ends the process where a file is damaged.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/base/status.h"
+
+namespace slabstream {
+
+using DicomTag = std::uint32_t;  // group << 16 | element
+
+inline constexpr int kMaxDicomDepth = 16;
+inline constexpr std::size_t kMaxDicomValue = std::size_t{1} << 16;  // bytes of a value
+inline constexpr int kMaxDicomKept = 1 << 22;                        // elements and items of a file that are kept
+
+// Some elements: of a file, or of an item of a sequence.
+class DicomElements {
+ public:
+  struct Element {
+    DicomTag tag = 0;
+    std::string value;                 // as in the file
+    std::vector<DicomElements> items;  // of a sequence
+  };
+
+  // In the functions below the caller knows of which value representation a tag is. What is absent, empty or broken is left out.
+  bool Has(DicomTag tag) const { return Find(tag) != nullptr; }
+  std::string Text(DicomTag tag) const;                // without blanks around it
+  std::vector<std::string> Texts(DicomTag tag) const;  // values between backslashes
+  std::vector<double> Decimals(DicomTag tag) const;    // DS, IS; one that is no number is NaN
+  std::optional<double> Decimal(DicomTag tag) const;   // the first of them
+  std::optional<std::uint16_t> Short(DicomTag tag) const;
+  std::optional<std::uint32_t> Long(DicomTag tag) const;
+  std::optional<double> Double(DicomTag tag) const;
+  const std::vector<DicomElements>& Items(DicomTag tag) const;
+  // The first item of a sequence; an empty one if there is none.
+  const DicomElements& FirstItem(DicomTag tag) const;
+
+ private:
+  friend class DicomWalk;
+  const Element* Find(DicomTag tag) const;
+  template <class T>
+  std::optional<T> Binary(DicomTag tag) const;
+
+  std::vector<Element> elements_;
+  bool big_endian_ = false;
+};
+
+// Where the pixels of a file are.
+struct DicomPixelData {
+  std::int64_t offset = 0;    // of the first byte behind the element's header; 0: the file has no pixels
+  std::int64_t bytes = 0;     // as many as the element claims, or as the file has, if these are fewer
+  bool encapsulated = false;  // in fragments, which are items
+  bool words = false;         // of 16 bits, whose bytes big endian swaps, whatever the bits of a pixel
+};
+
+struct DicomFile {
+  std::string path;
+  std::string media_class;      // MediaStorageSOPClassUID
+  std::string transfer_syntax;  // its UID
+  DicomElements elements;
+  DicomPixelData pixels;
+};
+
+struct WantedElement {
+  DicomTag tag;
+  bool sequence = false;
+};
+
+// Whether a file begins like one of DICOM: with DICM at byte 128. False also if it cannot be read.
+bool BeginsLikeDicom(const std::string& path);
+
+// `wanted` is kept wherever it is met. NotFound: cannot be opened. InvalidArgument: no DICOM file, or its transfer syntax is deflated or
+// not stated. DataLoss: damaged. Messages name the path.
+Result<DicomFile> ReadDicomFile(const std::string& path, std::span<const WantedElement> wanted);
+
+// The transfer syntaxes in which pixels are not compressed, but the deflated one.
+inline constexpr const char* kImplicitLittleEndian = "1.2.840.10008.1.2";
+inline constexpr const char* kExplicitLittleEndian = "1.2.840.10008.1.2.1";
+inline constexpr const char* kExplicitBigEndian = "1.2.840.10008.1.2.2";
+
+// The bytes of the fragments of encapsulated pixels, (offset, bytes) in the file. The first is the offset table. DataLoss: damaged.
+using DicomFragment = std::pair<std::int64_t, std::int64_t>;
+Result<std::vector<DicomFragment>> ListFragments(const std::string& path, const DicomPixelData& pixels);
+
+}  // namespace slabstream
