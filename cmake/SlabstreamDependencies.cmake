@@ -13,6 +13,7 @@ find_package(Eigen3 3.4 CONFIG REQUIRED)
 find_package(hwy CONFIG REQUIRED)
 find_package(TBB CONFIG REQUIRED)
 find_package(TIFF REQUIRED)
+find_package(Freetype REQUIRED)
 find_package(ZLIB REQUIRED)
 pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
 # OpenImageIO's own CMake configuration wants its command-line tools and an OpenCV include directory; its pkg-config file does not.
