@@ -11,6 +11,8 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/input_volume.h"
+#include "client/cli/picture_info.h"
+#include "client/image_io/picture_header.h"
 #include "common/planning/frame_plan.h"
 #include "common/volume/summary.h"
 
@@ -150,6 +152,7 @@ std::string InfoJson(const VolumeFileInfo& info, const VolumeSummary& summary, c
 }  // namespace
 
 Status RunInfo(const InfoOptions& options) {
+  if (IsPicturePath(options.path)) return RunPictureInfo(options);
   if (Status status = CheckVolumePath(options.path); !status.ok()) return status;
   const Result<LoadedVolume> loaded = ReadInputVolume(options.path);
   if (!loaded.ok()) return loaded.status();
