@@ -42,6 +42,7 @@ Result<Picture> DecodePicture(FrameReply& reply, const Bytes& payload, ImageSize
   if (!image.ok()) return Status::DataLoss(image.status().message());
   Picture picture;
   picture.size = reply.size;
+  picture.geometry = reply.geometry;
   picture.image = std::move(*image);
   picture.final = reply.groups_done == reply.group_count;
   picture.groups_done = reply.groups_done;

@@ -23,6 +23,7 @@ namespace slabstream {
 // A picture: premultiplied float RGBA (and depth) on its bounds within `size`; everything outside is empty.
 struct Picture {
   ImageSize size;
+  PictureGeometry geometry;
   LocalImage image;
   bool final = true;
   std::uint32_t groups_done = 1, group_count = 1;

@@ -16,6 +16,7 @@ find_package(TIFF REQUIRED)
 find_package(PNG REQUIRED)
 find_package(JPEG REQUIRED)
 find_package(EXPAT REQUIRED)
+find_package(Freetype REQUIRED)
 find_package(ZLIB REQUIRED)
 pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
 # OpenImageIO's own CMake configuration wants its command-line tools and an OpenCV include directory; its pkg-config file does not.

@@ -51,7 +51,9 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const FrameIm
                    .size = request.submit.frame.size,
                    .groups_done = message.groups_done,
                    .group_count = message.group_count,
-                   .runs = message.runs};
+                   .runs = message.runs,
+                   .statistics = {},
+                   .geometry = GeometryOf(frame->plan().setup.camera, frame->plan().setup.description.geometry)};
   if (use == RunningFrame::Use::kPreview) {
     if (clients.IsBehind(request.client)) return;
     SendClient(request.client, std::move(reply), event.payload);

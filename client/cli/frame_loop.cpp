@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "client/cli/interrupt.h"
+#include "client/cli/picture_record.h"
 #include "client/cli/progress_display.h"
 
 namespace slabstream {
@@ -68,19 +69,25 @@ class FrameLoop {
     }
     auto& picture = std::get<Picture>(event.what);
     // Written at once, so that it cannot come after the final picture in the same file.
-    if (!picture.final) return WritePicture(picture.image, picture.size, jobs_[index].output, options_.format);
+    if (!picture.final) return Write(picture, jobs_[index]);
     open_.erase(found);
     display_.FrameDone(int(index));
     FrameRecord& record = records_[index];
     record = {jobs_[index].output, picture.latency, std::move(picture.statistics)};
     if (!options_.keep_reports) record.statistics.reports = {};
     if (record.output.empty()) return Status::Ok();
-    writes_.push_back(std::async(std::launch::async, [this, picture = std::move(picture), output = record.output] {
-      Status status = WritePicture(picture.image, picture.size, output, options_.format);
+    writes_.push_back(std::async(std::launch::async, [this, picture = std::move(picture), index] {
+      Status status = Write(picture, jobs_[index]);
       client_.wakeup().Notify();
       return status;
     }));
     return Status::Ok();
+  }
+
+  Status Write(const Picture& picture, const FrameJob& job) const {
+    PictureNotes notes{.geometry = picture.geometry, .record = {}};
+    if (!options_.source.empty()) notes.record = RecordText(options_.source, job.request, options_.format, picture.geometry);
+    return WritePicture(picture.image, picture.size, job.output, options_.format, notes);
   }
 
   Status FinishWrite() {

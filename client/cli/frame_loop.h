@@ -25,6 +25,7 @@ struct FrameRecord {
 struct FrameLoopOptions {
   int in_flight = 1;
   PictureFormat format;
+  std::string source;  // SOURCE as it was typed, for the records of pictures; empty: they get none
   bool keep_reports = false;
   bool progress = false;  // on stderr
   std::string label;      // begins each line of progress

@@ -12,6 +12,8 @@
 #include "client/cli/commands.h"
 #include "client/cli/dicom_listing.h"
 #include "client/cli/input_volume.h"
+#include "client/cli/picture_info.h"
+#include "client/image_io/picture_header.h"
 #include "common/planning/frame_plan.h"
 #include "common/volume/summary.h"
 
@@ -159,6 +161,7 @@ std::string InfoJson(const VolumeFileInfo& info, const VolumeSummary& summary, c
 }  // namespace
 
 Status RunInfo(const InfoOptions& options) {
+  if (IsPicturePath(options.path)) return RunPictureInfo(options);
   if (Status status = CheckInputVolume(options.path); !status.ok()) return status;
   const Result<std::vector<DicomSeries>> series = SeriesAt(options.path);
   if (!series.ok()) return series.status();

@@ -237,6 +237,19 @@ void AddLookOptions(CLI::App& app, FrameRequest& request, PictureFormat& format)
   AddPictureFormat(app, format);
 }
 
+void AddAnnotationOptions(CLI::App& app, Annotations& annotations) {
+  app.option_defaults()->group("Annotations (drawn onto the picture)");
+  app.add_flag("--scale-bar", annotations.scale_bar,
+               "A scale bar: mm for patients, else voxels or the unit of the file; under perspective it holds at the depth of the target");
+  app.add_flag("--orientation-marker", annotations.orientation_marker,
+               "The axes of the world; of patients also the sides (R, L, A, P, S, I) at the edges of the picture");
+  AddParsed(
+      app, "--title", annotations.title,
+      [](const std::string& option, const std::string& text) { return TextIf(CheckTitle(option, text), text); },
+      fmt::format("A line of at most {} characters at the top", kMaxTitleCharacters))
+      ->type_name("TEXT");
+}
+
 void AddPolicyOptions(CLI::App& app, Policy& policy) {
   app.option_defaults()->group("Distribution (never changes the picture)");
   AddNamed(app, "--decomposition", policy.decomposition, Decompositions(), "How the volume is divided into boxes", kLeftToThePlanner);
@@ -418,9 +431,12 @@ void AddFrameOptions(CLI::App& app, FrameOptions& options) {
   AddViewOptions(app, options.request.view, options.request.size);
   AddClipOptions(app, options.request.clipping);
   AddLookOptions(app, options.request, options.format);
+  AddAnnotationOptions(app, options.format.annotations);
   AddPolicyOptions(app, options.request.policy);
   ResolveSource(app, source, options.source, options.request.transfer, [&options] { return options.connection.local_workers > 0; });
   app.option_defaults()->group(kOutputGroup);
+  app.add_flag("!--no-record", options.record,
+               "Do not write into pictures how they were made: SOURCE, options and version, which `slabstream info PICTURE` shows");
   app.add_option("--save-camera", options.camera_path, "Write the view, for --camera")->type_name("FILE");
   app.add_option("--stats", options.stats_path, "Write plan, bytes and stage times as JSON")->type_name("FILE");
   app.add_option("--trace", options.trace_path, "Write what each worker did and when, for Perfetto or chrome://tracing")->type_name("FILE");

@@ -41,6 +41,7 @@ struct FrameOptions {
   std::string source;    // a name of the catalogue; a path with local_workers > 0
   FrameRequest request;  // `dataset` is filled in when the connection is open
   PictureFormat format;
+  bool record = true;                               // pictures hold how they were made
   std::string stats_path, trace_path, camera_path;  // files to be written; empty: not wanted
   bool progress = false;
 };

@@ -22,6 +22,7 @@ double Milliseconds(Duration duration) { return std::chrono::duration<double, st
 Status CheckPaths(const FrameOptions& options, const std::string& output) {
   if (Status status = CheckPicturePath(output); !status.ok()) return status;
   if (Status status = CheckCanWrite("--output", output); !status.ok()) return status;
+  if (Status status = CheckCanDraw(options.format.annotations); !status.ok()) return status;
   if (!options.stats_path.empty()) {
     if (Status status = CheckCanWrite("--stats", options.stats_path); !status.ok()) return status;
   }
@@ -42,6 +43,7 @@ Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std
   FrameLoopOptions loop;
   loop.in_flight = in_flight;
   loop.format = options.format;
+  if (options.record) loop.source = options.source;
   loop.keep_reports = !options.stats_path.empty() || !options.trace_path.empty();
   loop.progress = options.progress;
   Result<std::vector<FrameRecord>> frames = RenderFrames(session->client(), jobs, loop);

@@ -15,6 +15,7 @@
 
 #include "common/base/check.h"
 #include "common/base/files.h"
+#include "common/base/version.h"
 
 namespace slabstream {
 namespace {
@@ -55,28 +56,43 @@ void ToStraightCodes(std::span<const float> premultiplied, std::span<Code> codes
   }
 }
 
+// What the rows of a file are made of.
+struct Composition {
+  const LocalImage& image;
+  ImageSize size;
+  const PictureFormat& format;
+  AnnotationLayers annotations;
+
+  // As ComposeRow above, with the annotations.
+  void Compose(int y, std::span<float> rgba, std::span<float> depth) const {
+    ComposeRow(image, y, format.background, rgba, depth);
+    annotations.PutOver(y, rgba);
+  }
+};
+
 // Calls write(y, row) for each row, in the file's own sample layout. Stops at the first failure.
 template <class Write>
-bool WritePngRows(const LocalImage& image, ImageSize size, const PictureFormat& format, Write write) {
-  std::vector<float> rgba(4 * std::size_t(size.width));
-  std::vector<std::uint8_t> codes8(format.png_bits == 8 ? rgba.size() : 0);
-  std::vector<std::uint16_t> codes16(format.png_bits == 16 ? rgba.size() : 0);
-  for (int y = 0; y < size.height; ++y) {
-    ComposeRow(image, y, format.background, rgba, {});
+bool WritePngRows(const Composition& picture, Write write) {
+  const bool deep = picture.format.png_bits == 16;
+  std::vector<float> rgba(4 * std::size_t(picture.size.width));
+  std::vector<std::uint8_t> codes8(deep ? 0 : rgba.size());
+  std::vector<std::uint16_t> codes16(deep ? rgba.size() : 0);
+  for (int y = 0; y < picture.size.height; ++y) {
+    picture.Compose(y, rgba, {});
     ToStraightCodes<std::uint8_t>(rgba, codes8);
     ToStraightCodes<std::uint16_t>(rgba, codes16);
-    if (!(format.png_bits == 8 ? write(y, static_cast<const void*>(codes8.data())) : write(y, codes16.data()))) return false;
+    if (!(deep ? write(y, static_cast<const void*>(codes16.data())) : write(y, codes8.data()))) return false;
   }
   return true;
 }
 
 template <class Write>
-bool WriteExrRows(const LocalImage& image, ImageSize size, const PictureFormat& format, Write write) {
-  const bool with_depth = HasDepth(image.format);
-  const std::size_t width = std::size_t(size.width);
+bool WriteExrRows(const Composition& picture, Write write) {
+  const bool with_depth = HasDepth(picture.image.format);
+  const std::size_t width = std::size_t(picture.size.width);
   std::vector<float> rgba(4 * width), depth(with_depth ? width : 0), rgbaz(with_depth ? 5 * width : 0);
-  for (int y = 0; y < size.height; ++y) {
-    ComposeRow(image, y, format.background, rgba, depth);
+  for (int y = 0; y < picture.size.height; ++y) {
+    picture.Compose(y, rgba, depth);
     for (std::size_t x = 0; x < depth.size(); ++x) {
       std::copy_n(&rgba[4 * x], 4, &rgbaz[5 * x]);
       rgbaz[5 * x + 4] = depth[x];
@@ -84,6 +100,18 @@ bool WriteExrRows(const LocalImage& image, ImageSize size, const PictureFormat& 
     if (!write(y, static_cast<const void*>(with_depth ? rgbaz.data() : rgba.data()))) return false;
   }
   return true;
+}
+
+// PNG: in pixels a metre; OpenImageIO cuts what it calculates off to whole ones, so they are rounded here. EXR: in pixels an inch.
+void StatePixelSize(const PictureGeometry& geometry, bool png, OIIO::ImageSpec& spec) {
+  if (geometry.unit != LengthUnit::kMillimetre || geometry.projection == Projection::kPerspective) return;
+  constexpr double kMillimetresAMetre = 1000, kMillimetresAnInch = 25.4;
+  constexpr double kMost = 1 << 24;  // whole numbers up to this have floats of their own
+  const double density = png ? std::round(kMillimetresAMetre / geometry.pixel_size) : kMillimetresAnInch / geometry.pixel_size;
+  if (!(density >= (png ? 1 : 1 / kMost) && density <= kMost)) return;
+  spec.attribute("ResolutionUnit", png ? "m" : "in");
+  spec.attribute("XResolution", float(density));
+  spec.attribute("YResolution", float(density));
 }
 
 // Passes the encoder's bytes to the file. OutputFile reports failures, because encoders do so unreliably.
@@ -113,10 +141,14 @@ Status CheckPicturePath(const std::string& path) {
   return Status::InvalidArgument(fmt::format("output '{}' must end in .png or .exr", path));
 }
 
-Status WritePicture(const LocalImage& image, ImageSize size, const std::string& path, const PictureFormat& format) {
+Status WritePicture(const LocalImage& image, ImageSize size, const std::string& path, const PictureFormat& format,
+                    const PictureNotes& notes) {
   if (Status status = CheckPicturePath(path); !status.ok()) return status;
   CHECK(format.png_bits == 8 || format.png_bits == 16);
   CHECK((PixelBounds{0, 0, size.width, size.height}.Contains(image.bounds)));
+  Result<AnnotationLayers> annotations = AnnotationLayers::Draw(format.annotations, size, notes.geometry);
+  if (!annotations.ok()) return annotations.status();
+  const Composition picture{image, size, format, *std::move(annotations)};
 
   const bool png = TypeOf(path) == FileType::kPng;
   const OIIO::TypeDesc sample = !png ? OIIO::TypeDesc::FLOAT : format.png_bits == 16 ? OIIO::TypeDesc::UINT16 : OIIO::TypeDesc::UINT8;
@@ -134,6 +166,11 @@ Status WritePicture(const LocalImage& image, ImageSize size, const std::string& 
     spec.attribute("oiio:ColorSpace", "Linear");
     spec.attribute("compression", "zip");
   }
+  StatePixelSize(notes.geometry, png, spec);
+  if (!notes.record.empty()) {
+    spec.attribute("Software", fmt::format("slabstream {}", Version()));
+    spec.attribute(kRecordName, notes.record);
+  }
 
   Result<OutputFile> file = OutputFile::Create(path);
   if (!file.ok()) return file.status();
@@ -149,7 +186,7 @@ Status WritePicture(const LocalImage& image, ImageSize size, const std::string& 
   if (!out) return failure(OIIO::geterror());
   if (!out->open(png ? "picture.png" : "picture.exr", spec)) return failure(out->geterror());
   const auto write = [&](int y, const void* row) { return file->ok() && out->write_scanline(y, 0, sample, row); };
-  const bool written = png ? WritePngRows(image, size, format, write) : WriteExrRows(image, size, format, write);
+  const bool written = png ? WritePngRows(picture, write) : WriteExrRows(picture, write);
   const bool closed = out->close();
   if (!written || !closed) return failure(out->geterror());
   return file->Finish();

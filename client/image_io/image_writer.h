@@ -2,14 +2,17 @@
 //
 // PNG: straight alpha, 8 or 16 bit, row 0 at the top; code = round(max * clamp(straight value, 0, 1)), without a transfer curve.
 // EXR: premultiplied linear float R, G, B, A, and Z (camera depth, +infinity where nothing is seen) for images that have depth.
+// Annotations are drawn over picture and background; depths stay. The file states the size of its pixels (PNG: chunk pHYs; EXR: xDensity)
+// if that is one length all over the picture and its unit is known: for orthographic pictures of patients.
 // The file appears whole or not at all (common/base/files.h).
 #pragma once
 
 #include <string>
 
+#include "client/image_io/annotations.h"
 #include "common/base/status.h"
 #include "common/image/local_image.h"
-#include "common/view/camera.h"
+#include "common/view/picture_geometry.h"
 
 namespace slabstream {
 
@@ -21,13 +24,23 @@ struct StraightColor {
 struct PictureFormat {
   int png_bits = 8;          // 8 or 16; EXR is always float
   StraightColor background;  // put behind the picture; the default leaves it as it is
+  Annotations annotations;   // drawn onto it
 };
+
+// What a file holds beside the pixels.
+struct PictureNotes {
+  PictureGeometry geometry;
+  std::string record;  // ASCII text that says how the picture was made, under the name kRecordName; empty: none
+};
+inline constexpr char kRecordName[] = "slabstream";
 
 // InvalidArgument, naming the path and the known endings, unless `path` ends in .png or .exr (any case).
 Status CheckPicturePath(const std::string& path);
 
 // `image` is premultiplied, its bounds lie within `size`; pixels outside are empty. Both formats are written row by row, so that writing
 // needs no second copy of the picture. InvalidArgument: the path's ending. Unavailable: cannot be written; the message names the path.
-Status WritePicture(const LocalImage& image, ImageSize size, const std::string& path, const PictureFormat& format);
+// NotFound: the font of annotations.
+Status WritePicture(const LocalImage& image, ImageSize size, const std::string& path, const PictureFormat& format,
+                    const PictureNotes& notes = {});
 
 }  // namespace slabstream

@@ -123,6 +123,10 @@ double Apply(const std::array<double, 4>& row, const Vec3& p) { return row[0] * 
 
 Vec3 Linear(const std::array<double, 4>& row) { return {row[0], row[1], row[2]}; }
 
+// Pixels a physical unit at unit depth (perspective) or everywhere (orthographic): x_row holds scale * right (and, under perspective, a
+// multiple of the view direction, to which right is perpendicular).
+double ScaleOf(const Camera& camera) { return Dot(Linear(camera.x_row) / camera.spacing, camera.right); }
+
 }  // namespace
 
 Status Validate(const ViewParameters& view) {
@@ -220,6 +224,7 @@ Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeomet
   camera.width = size.width * supersample;
   camera.height = size.height * supersample;
   camera.supersample = supersample;
+  camera.target_depth = distance;
   camera.spacing = spacing;
   camera.view_direction = frame.forward;
   camera.right = frame.right;
@@ -248,12 +253,15 @@ Camera::ImagePoint Camera::Project(const Vec3& data_point) const {
 }
 
 Camera::Ray Camera::RayAt(double x, double y) const {
-  // x_row holds scale * right (and, under perspective, a multiple of the view direction, to which right is perpendicular).
-  const double scale = Dot(Linear(x_row) / spacing, right);
+  const double scale = ScaleOf(*this);
   const Vec3 offset = ((x - 0.5 * width) / scale * right - (y - 0.5 * height) / scale * up) / spacing;
   const Vec3 forward = view_direction / spacing;
   if (projection == Projection::kPerspective) return {eye, forward + offset};
   return {eye + offset, forward};
+}
+
+double Camera::PixelSizeAt(double depth) const {
+  return (projection == Projection::kPerspective ? depth : 1.0) * supersample / ScaleOf(*this);
 }
 
 }  // namespace slabstream

@@ -76,6 +76,7 @@ struct Camera {
   Vec3 spacing;               // of the volume: physical = spacing * data
   int width = 0, height = 0;  // pixels of the (supersampled) grid
   int supersample = 1;        // power of two
+  double target_depth = 1;    // depth of the target, which the picture's centre shows; perspective: its distance from the eye, > 0
   // The traversal: slices perpendicular to `traversal_axis` (the data axis nearest to the view direction in physical space; ties go to the
   // higher axis), from index 0 up if `ascending`, else from the last one down: nearest slice first.
   Axis traversal_axis = Axis::kY;
@@ -91,6 +92,9 @@ struct Camera {
     Vec3 origin, direction;
   };
   Ray RayAt(double x, double y) const;
+
+  // Physical length of a side of the finished picture's pixels at this depth, which matters under perspective only (> 0).
+  double PixelSizeAt(double depth) const;
 
   friend bool operator==(const Camera&, const Camera&) = default;
 };

@@ -8,6 +8,7 @@ namespace slabstream {
 
 static_assert(v1::FramePhase_MAX == static_cast<int>(FramePhase::kRunning));
 static_assert(v1::DatasetState_MAX == static_cast<int>(DatasetState::kFailed));
+static_assert(v1::LengthUnit_MAX == static_cast<int>(LengthUnit::kMillimetre));
 
 void Fields(auto& io, Is<SubmitFrame> auto& m) {
   using P = v1::SubmitFrame;
@@ -57,6 +58,24 @@ void Fields(auto& io, Is<FrameStatistics> auto& m) {
   io.Optional("predicted", m.predicted, &P::has_predicted, &P::predicted, &P::mutable_predicted);
 }
 
+void Fields(auto& io, Is<PictureGeometry> auto& m) {
+  using P = v1::PictureGeometry;
+  io.OneOf("world", m.world, &P::world, &P::set_world, World::kVoxels, World::kPatient);
+  io.OneOf("unit", m.unit, &P::unit, &P::set_unit, LengthUnit::kVoxel, LengthUnit::kMillimetre);
+  io.OneOf("projection", m.projection, &P::projection, &P::set_projection, Projection::kOrthographic, Projection::kPerspective);
+  io.Message("right", m.right, &P::right, &P::mutable_right);
+  io.Message("up", m.up, &P::up, &P::mutable_up);
+  io.Message("forward", m.forward, &P::forward, &P::mutable_forward);
+  io.Message("target", m.target, &P::target, &P::mutable_target);
+  io.Finite("target_depth", m.target_depth, &P::target_depth, &P::set_target_depth);
+  io.Finite("pixel_size", m.pixel_size, &P::pixel_size, &P::set_pixel_size);
+  io.Check([&](Checker& check) {
+    check.That(AreRightHanded(m.right, m.up, -m.forward), "right", "not of three right-handed unit vectors at right angles");
+    if (m.projection == Projection::kPerspective) check.Positive("target_depth", m.target_depth);
+    check.Positive("pixel_size", m.pixel_size);
+  });
+}
+
 void Fields(auto& io, Is<FrameReply> auto& m) {
   using P = v1::FrameReply;
   io.Any(m.request, &P::request, &P::set_request);
@@ -65,6 +84,7 @@ void Fields(auto& io, Is<FrameReply> auto& m) {
   io.Range("groups_done", m.groups_done, &P::groups_done, &P::set_groups_done, 0, m.group_count);
   io.Message("runs", m.runs, &P::runs, &P::mutable_runs);
   io.Message("statistics", m.statistics, &P::statistics, &P::mutable_statistics);
+  io.Message("geometry", m.geometry, &P::geometry, &P::mutable_geometry);
   io.Check([&](Checker& check) {
     const PixelBounds picture = {0, 0, m.size.width, m.size.height};
     check.That(picture.Contains(m.runs.image.bounds), "runs.image.bounds", "not inside the picture");

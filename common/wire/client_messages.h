@@ -22,6 +22,7 @@
 #include "common/frame/frame_request.h"
 #include "common/keys/admitted_key.h"
 #include "common/stats/prediction.h"
+#include "common/view/picture_geometry.h"
 #include "common/wire/control_messages.h"
 #include "common/wire/ids.h"
 
@@ -68,6 +69,7 @@ struct FrameReply {  // payload: the runs
   std::uint32_t groups_done = 0, group_count = 1;  // equal: final
   EncodedRuns runs;
   FrameStatistics statistics;  // final only
+  PictureGeometry geometry;
   friend bool operator==(const FrameReply&, const FrameReply&) = default;
 };
 

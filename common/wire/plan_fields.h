@@ -32,6 +32,7 @@ void Fields(auto& io, Is<Camera> auto& m) {
   io.Range("height", m.height, &P::height, &P::set_height, 1, most);
   io.OneOf("traversal_axis", m.traversal_axis, &P::traversal_axis, &P::set_traversal_axis, Axis::kX, Axis::kZ);
   io.Any(m.ascending, &P::ascending, &P::set_ascending);
+  io.Finite("target_depth", m.target_depth, &P::target_depth, &P::set_target_depth);
   io.Check([&](Checker& check) {
     constexpr double kTolerance = 1e-6;
     const auto unit = [](const Vec3& v) { return std::abs(Length(v) - 1) <= kTolerance; };

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <string>
 
@@ -45,6 +46,13 @@ inline void CheckPositive(std::string_view field, const Vec3& v, Checker& check)
   check.Positive("x", v.x);
   check.Positive("y", v.y);
   check.Positive("z", v.z);
+}
+
+// Unit vectors at right angles, z = x cross y, but for rounding.
+inline bool AreRightHanded(const Vec3& x, const Vec3& y, const Vec3& z) {
+  constexpr double kTolerance = 1e-6;
+  const auto near = [](double a, double b) { return std::abs(a - b) <= kTolerance; };
+  return near(Length(x), 1) && near(Length(y), 1) && near(Dot(x, y), 0) && Length(Cross(x, y) - z) <= kTolerance;
 }
 
 void Fields(auto& io, Is<Box> auto& m) {
@@ -94,11 +102,7 @@ void Fields(auto& io, Is<Orientation> auto& m) {
   io.Message("y_axis", m.axes[1], &P::y_axis, &P::mutable_y_axis);
   io.Message("z_axis", m.axes[2], &P::z_axis, &P::mutable_z_axis);
   io.Check([&](Checker& check) {
-    constexpr double kTolerance = 1e-6;
-    const auto far = [](const Vec3& a, const Vec3& b) { return !(Length(a - b) <= kTolerance); };
-    const bool straight =
-        !far(m.FromWorld(m.axes[0]), {1, 0, 0}) && !far(m.FromWorld(m.axes[1]), {0, 1, 0}) && !far(Cross(m.axes[0], m.axes[1]), m.axes[2]);
-    check.That(straight, "x_axis", "not of three right-handed unit vectors at right angles");
+    check.That(AreRightHanded(m.axes[0], m.axes[1], m.axes[2]), "x_axis", "not of three right-handed unit vectors at right angles");
   });
 }
 

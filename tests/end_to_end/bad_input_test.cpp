@@ -152,6 +152,11 @@ TEST_F(BadInputTest, OptionsOfRender) {
       {{"--clip-plane", "0,0,0,1"}, "has no direction"},
       {{"--clip-mode", "away"}, "keep, cut-away"},
       {{"--termination", "0.6"}, "--termination 0.6"},
+      {{"--title", "two\nlines"}, "--title has a control character at byte 3"},
+      {{"--title", "\xFF"}, "--title is not UTF-8: byte 0 is 0xFF"},
+      {{"--title", std::string(121, 'x')}, "--title has 121 characters, at most 120 are possible"},
+      {{"--title"}, "--title"},
+      {{"--scale-bar=wide"}, "--scale-bar"},
       {{"--decomposition", "cheese"}, "--decomposition 'cheese' is not one of auto, slab"},
       {{"--split", "hairs"}, "--split 'hairs'"},
       {{"--assignment", "lots"}, "--assignment 'lots'"},
@@ -223,6 +228,27 @@ TEST_F(BadInputTest, VolumeFiles) {
     ExpectRefused({"info", Path(name)}, name);
     ExpectRefused({"bench", Path(name)}, name);
   }
+}
+
+TEST_F(BadInputTest, PicturesOfInfo) {
+  MakeSphere("ball.nrrd", 2, 16);
+  MustRun({"render", "ball.nrrd", "--local=1", "--size", "16", "-o", "good.png"});
+  const std::string whole = ReadFile("good.png");
+  Write("empty.png", "");
+  Write("text.png", "this is no picture\n");
+  Write("short.png", whole.substr(0, 40));
+  Write("bitten.png", whole.substr(0, whole.find("slabstream") + 50));
+  Write("volume.exr", ReadFile("ball.nrrd"));
+  std::string altered = whole;
+  altered[altered.find("\"program\"") + 1] = 'P';  // the checksum does not hold any more
+  Write("altered.png", altered);
+  for (const char* name : {"missing.png", "missing.exr", "empty.png", "text.png", "short.png", "bitten.png", "volume.exr", "altered.png"}) {
+    ExpectRefused({"info", Path(name)}, name);
+    ExpectRefused({"info", Path(name), "--json"}, name);
+  }
+  ExpectRefused({"info", "good.png", "--transfer", "opaque"}, "is a picture");
+  ExpectRefused({"info", "good.png:opaque"}, "is a picture");
+  ExpectRefused({"render", "good.png", "--local=1", "-o", "x.png"}, "good.png");
 }
 
 }  // namespace

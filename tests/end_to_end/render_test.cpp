@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <csignal>
+#include <cstdlib>
+#include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -120,7 +122,7 @@ TEST_F(RenderTest, BackgroundAndSixteenBitsReachTheFile) {
 }
 
 TEST_F(RenderTest, AnOptionHasTheSameMeaningInEachOfItsSpellings) {
-  Render("a.png");
+  Render("a.png", {"--no-record"});  // which names the policy
   const std::string picture = ReadFile("a.png");
   const std::vector<std::vector<std::string>> spellings = {
       {ball_, "--local", "2", "--transfer", "opaque"},
@@ -132,12 +134,69 @@ TEST_F(RenderTest, AnOptionHasTheSameMeaningInEachOfItsSpellings) {
   };
   for (std::vector<std::string> arguments : spellings) {
     arguments.insert(arguments.begin(), "render");
-    const std::vector<std::string> rest = {"-o", "b.png", "--size", std::to_string(kPixels), "--shading", "none"};
+    const std::vector<std::string> rest = {"-o", "b.png", "--size", std::to_string(kPixels), "--shading", "none", "--no-record"};
     arguments.insert(arguments.end(), rest.begin(), rest.end());
     MustRun(arguments);
     EXPECT_EQ(ReadFile("b.png"), picture) << arguments[1] << " " << arguments[2];
   }
   EXPECT_EQ(Slabstream({"render", ball_ + ":opaque", "--transfer", "auto", "--local", "-o", "c.png"}).exit_status, 2);
+}
+
+TEST_F(RenderTest, AnnotationsChangeNoPixelBesideThem) {
+  const std::vector<std::string> annotated = {"--scale-bar", "--orientation-marker", "--title", "B\xC3\xA4ll"};
+  for (const std::string name : {"a.png", "a.exr"}) {
+    const PictureFile plain = Render("plain" + name.substr(1)), with = Render(name, annotated);
+    ASSERT_EQ(plain.samples.size(), with.samples.size());
+    int changed = 0;
+    for (int y = 0; y < kPixels; ++y) {
+      for (int x = 0; x < kPixels; ++x) {
+        bool same = true;
+        for (std::size_t c = 0; c < plain.channels.size(); ++c) same = same && plain.At(x, y, c) == with.At(x, y, c);
+        changed += same ? 0 : 1;
+        const bool free = y > kPixels / 6 && y < kPixels / 2;  // below the title and above the rest
+        EXPECT_TRUE(same || !free) << x << " " << y;
+      }
+    }
+    EXPECT_GT(changed, 200) << name;
+  }
+}
+
+TEST_F(RenderTest, APictureTellsTheCommandLineThatMakesItAgain) {
+  const std::vector<std::string> more = {"--azimuth", "-33.3", "--projection", "perspective", "--scale-bar", "--title", "It's a ball",
+                                         "--depth",   "16",    "--background", "0.1,0.2,0.3", "--renderer",  "zbuffer"};
+  Render("a.png", more);
+  const std::string text = MustRun({"info", "a.png"}).out;
+  for (const char* line : {"format       PNG\n", "size         96 x 96 pixels\n", "samples      uint16: R, G, B, A\n", "source       ",
+                           "view.azimuth_degrees         -33.3\n", "'It'\\''s a ball'"}) {
+    EXPECT_THAT(text, HasSubstr(line));
+  }
+  const json info = json::parse(MustRun({"info", "a.png", "--json"}).out);
+  EXPECT_EQ(info["size"], (std::vector<int>{96, 96}));
+  EXPECT_EQ(info["source"], ball_);
+  EXPECT_EQ(info["geometry"]["unit"], "voxel");
+  MustRun(info["command"].get<std::vector<std::string>>());
+  EXPECT_EQ(ReadFile("again.png"), ReadFile("a.png")) << "down to the last byte";
+
+  // The same as the shell reads it.
+  const std::string command = text.substr(text.find("  slabstream render"), text.rfind('\n') - text.find("  slabstream render"));
+  std::filesystem::remove(Path("again.png"));
+  const std::string program = Command({}).front();
+  const std::string folder = program.substr(0, program.rfind('/'));
+  ASSERT_EQ(std::system(("cd '" + directory_ + "' && PATH='" + folder + "':$PATH && " + command + " > /dev/null").c_str()), 0);
+  EXPECT_EQ(ReadFile("again.png"), ReadFile("a.png"));
+
+  Render("none.png", {"--no-record"});
+  EXPECT_THAT(MustRun({"info", "none.png"}).out, HasSubstr("not known: the file holds no record"));
+  EXPECT_FALSE(json::parse(MustRun({"info", "none.png", "--json"}).out).contains("source"));
+}
+
+TEST_F(RenderTest, AFontThatIsNotThereIsToldBeforeTheWorkBegins) {
+  ::setenv("SLABSTREAM_FONT", "no.ttf", 1);
+  const ProgramResult result = Slabstream({"render", ball_, "--local=1", "--scale-bar", "-o", "x.png"});
+  ::unsetenv("SLABSTREAM_FONT");
+  EXPECT_EQ(result.exit_status, 2);
+  EXPECT_EQ(result.err, "slabstream render: $SLABSTREAM_FONT names 'no.ttf', which is no file\n");
+  EXPECT_THAT(Files(), Not(Contains("x.png")));
 }
 
 TEST_F(RenderTest, APictureWithoutAnythingToSeeIsEmpty) {

@@ -63,6 +63,27 @@ TEST_F(ServiceTest, RendersTheSamePictureAsThisProcessAlone) {
   EXPECT_THAT(MustRun({"status"}).out, AllOf(HasSubstr("workers      2"), HasSubstr("ball ready 32 x 32 x 32")));
 }
 
+// To the last byte, with annotations and record: the service sends what they need, and neither says where a picture was made.
+TEST_F(ServiceTest, PictureFilesDoNotTellWhereTheyWereMade) {
+  MustRun({"up", "--detach", "--workers", "2", "--listen", endpoint_, "--data", "ball.nrrd=" + ball_});
+  const std::vector<std::string> options = {"--size",      "200",         "--renderer", "zbuffer",     "--projection",
+                                            "perspective", "--elevation", "20",         "--scale-bar", "--orientation-marker",
+                                            "--title",     "A ball"};
+  const auto render = [&](const std::string& output, std::vector<std::string> more) {
+    std::vector<std::string> arguments = {"render", "ball.nrrd", "-o", output};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    MustRun(arguments);
+    return ReadFile(output);
+  };
+  for (const std::string ending : {".png", ".exr"}) {
+    const std::string at_service = render("a" + ending, {});
+    EXPECT_EQ(render("b" + ending, {"--local=3", "--threads", "1"}), at_service);
+    EXPECT_EQ(render("c" + ending, {"--endpoint", endpoint_}), at_service);
+    for (const std::string& place : {directory_, endpoint_, std::string("b.png")}) EXPECT_EQ(at_service.find(place), std::string::npos);
+  }
+}
+
 TEST_F(ServiceTest, NeitherThreadsNorPackingChangeThePicture) {
   MustRun({"up", "--detach", "--workers", "1", "--threads", "3", "--compress", "--listen", endpoint_, "--data", "ball=" + ball_});
   EXPECT_EQ(json::parse(MustRun({"status", "--json"}).out)["workers"][0]["threads"], 3);

@@ -38,6 +38,9 @@ std::vector<FuzzBytes> RecordingSeeds();
 bool DecodeSweep(std::span<const std::byte> input);
 std::vector<FuzzBytes> SweepSeeds();
 
+bool DecodePicture(std::span<const std::byte> input);
+std::vector<FuzzBytes> PictureSeeds();
+
 bool DecodeValue(std::span<const std::byte> input);
 std::vector<FuzzBytes> ValueSeeds();
 

@@ -21,6 +21,7 @@ const std::vector<FuzzTarget>& FuzzTargets() {
       {"service-files", "service files, folders of keys and records of services", DecodeServiceFile, ServiceFileSeeds},
       {"recordings", "traces with a recording", DecodeRecording, RecordingSeeds},
       {"sweeps", "files of experiment sweep", DecodeSweep, SweepSeeds},
+      {"pictures", "headers of PNG and EXR, and how their pictures were made", DecodePicture, PictureSeeds},
       {"values", "values of the command line", DecodeValue, ValueSeeds},
   };
   return targets;

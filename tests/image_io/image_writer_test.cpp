@@ -7,10 +7,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <sstream>
 #include <vector>
 
 namespace slabstream {
@@ -113,6 +116,94 @@ TEST_F(ImageWriterTest, ExrOfADepthImageHasInfiniteDepthWhereNothingIsSeen) {
   EXPECT_THAT(file.spec.channelnames, ElementsAre("R", "G", "B", "A", "Z"));
   EXPECT_EQ(file.At(2, 1)[4], 3.5F);
   EXPECT_EQ(file.At(0, 0)[4], std::numeric_limits<float>::infinity());
+}
+
+PictureNotes OfPatient(double pixel_mm) {
+  PictureNotes notes;
+  notes.geometry.world = World::kPatient;
+  notes.geometry.unit = LengthUnit::kMillimetre;
+  notes.geometry.pixel_size = pixel_mm;
+  return notes;
+}
+
+std::string Bytes(const std::string& path) {
+  std::ostringstream bytes;
+  bytes << std::ifstream(path, std::ios::binary).rdbuf();
+  return bytes.str();
+}
+
+TEST_F(ImageWriterTest, PngStatesTheSizeOfAPatientsPixels) {
+  const auto chunk = [&](const PictureNotes& notes) -> std::vector<int> {
+    EXPECT_EQ(WritePicture(TwoPixels(PixelFormat::kRgba), kSize, Path("a.png"), {}, notes), Status::Ok());
+    const std::string bytes = Bytes(Path("a.png"));
+    const std::size_t at = bytes.find("pHYs");
+    if (at == std::string::npos) return {};
+    std::vector<int> values;
+    for (std::size_t i = at - 4; i < at + 13; ++i) values.push_back(static_cast<unsigned char>(bytes[i]));
+    return values;
+  };
+  // Length 9, the name, pixels a metre along x and y, the unit metre.
+  EXPECT_THAT(chunk(OfPatient(0.5)), ElementsAre(0, 0, 0, 9, 'p', 'H', 'Y', 's', 0, 0, 0x07, 0xD0, 0, 0, 0x07, 0xD0, 1));
+  EXPECT_THAT(chunk(OfPatient(1 / 1.9996)), ElementsAre(0, 0, 0, 9, 'p', 'H', 'Y', 's', 0, 0, 0x07, 0xD0, 0, 0, 0x07, 0xD0, 1));  // rounded
+  EXPECT_THAT(chunk(OfPatient(1000)), ElementsAre(0, 0, 0, 9, 'p', 'H', 'Y', 's', 0, 0, 0, 1, 0, 0, 0, 1, 1));
+  PictureNotes perspective = OfPatient(0.5);
+  perspective.geometry.projection = Projection::kPerspective;
+  PictureNotes unknown = OfPatient(0.5);
+  unknown.geometry.unit = LengthUnit::kFile;
+  for (const PictureNotes& none : {PictureNotes{}, perspective, unknown, OfPatient(1e4), OfPatient(1e-9), OfPatient(1e300)}) {
+    EXPECT_TRUE(chunk(none).empty());
+  }
+}
+
+TEST_F(ImageWriterTest, ExrStatesTheSizeOfAPatientsPixels) {
+  ASSERT_EQ(WritePicture(TwoPixels(PixelFormat::kRgba), kSize, Path("a.exr"), {}, OfPatient(0.5)), Status::Ok());
+  const std::string bytes = Bytes(Path("a.exr"));
+  const std::string name("xDensity\0float\0\4\0\0\0", 19);
+  const std::size_t at = bytes.find(name);
+  ASSERT_NE(at, std::string::npos);
+  float density = 0;
+  std::memcpy(&density, &bytes[at + name.size()], sizeof density);
+  EXPECT_NEAR(density, 25.4 / 0.5, 1e-4);  // pixels an inch
+}
+
+TEST_F(ImageWriterTest, TheRecordIsTextThatOthersCanRead) {
+  PictureNotes notes;
+  notes.record = R"({"source": "B\u00fcro \"x\"", "empty": {}})";
+  for (const std::string name : {"a.png", "a.exr"}) {
+    ASSERT_EQ(WritePicture(TwoPixels(PixelFormat::kRgba), kSize, Path(name), {}, notes), Status::Ok());
+    const FileImage file = Read(Path(name));
+    EXPECT_EQ(file.spec.get_string_attribute("slabstream"), notes.record) << name;
+    EXPECT_THAT(std::string(file.spec.get_string_attribute("Software")), testing::StartsWith("slabstream ")) << name;
+    // The same request, the same bytes: no time, no host.
+    const std::string before = Bytes(Path(name));
+    ASSERT_EQ(WritePicture(TwoPixels(PixelFormat::kRgba), kSize, Path(name), {}, notes), Status::Ok());
+    EXPECT_EQ(Bytes(Path(name)), before);
+  }
+}
+
+TEST_F(ImageWriterTest, AnnotationsLieOverPictureAndBackground) {
+  LocalImage image = MakeLocalImage(PixelFormat::kDepth, {0, 0, 200, 200});
+  for (std::size_t i = 0; i < image.rgba.size(); ++i) image.rgba[i] = i % 4 == 3 ? 0.5F : 0.0001F * float(i % 4999);
+  std::fill(image.depth.begin(), image.depth.end(), 7.0F);
+  PictureFormat format{.background = {0.2F, 0.4F, 0.6F, 1}};
+  ASSERT_EQ(WritePicture(image, {200, 200}, Path("plain.exr"), format), Status::Ok());
+  format.annotations.scale_bar = true;
+  ASSERT_EQ(WritePicture(image, {200, 200}, Path("bar.exr"), format, OfPatient(1)), Status::Ok());
+  const FileImage plain = Read(Path("plain.exr")), bar = Read(Path("bar.exr"));
+  int changed = 0;
+  for (int y = 0; y < 200; ++y) {
+    for (int x = 0; x < 200; ++x) {
+      EXPECT_EQ(bar.At(x, y)[4], 7) << "depths stay";
+      if (bar.At(x, y) == plain.At(x, y)) continue;
+      ++changed;
+      EXPECT_TRUE(x > 100 && y > 160) << x << " " << y;
+    }
+  }
+  EXPECT_GT(changed, 200);
+  // 40 mm are wanted; the bar's own rows are white from end to end.
+  int white = 0;
+  for (int x = 0; x < 200; ++x) white += bar.At(x, 193) == std::vector<float>{1, 1, 1, 1, 7} ? 1 : 0;
+  EXPECT_NEAR(white, 50, 2);
 }
 
 TEST_F(ImageWriterTest, AnImageWithoutPixelsIsAnEmptyPicture) {

@@ -285,6 +285,7 @@ TEST(FieldChecks, Clients) {
       {[&](auto& e) { frame(e)->mutable_policy()->clear_combine(); },
        "SubmitFrame.frame.policy.combine: a text of 0 bytes, expected 1 to 256"},
   });
+  const auto geometry = [](auto& e) { return e.mutable_frame_reply()->mutable_geometry(); };
   Check<FrameReply>({
       {[](auto& e) { e.mutable_frame_reply()->clear_size(); }, "FrameReply.size.width: 0 is not in [1, 16384]"},
       {[](auto& e) {
@@ -293,6 +294,21 @@ TEST(FieldChecks, Clients) {
          runs->mutable_image()->mutable_bounds()->set_y_end(1);
        },
        "FrameReply.runs.image.bounds: not inside the picture"},
+      {[&](auto& e) { geometry(e)->clear_world(); }, "FrameReply.geometry.world: not set"},
+      {[&](auto& e) { geometry(e)->set_unit(v1::LengthUnit(4)); }, "FrameReply.geometry.unit: unknown value 4"},
+      {[&](auto& e) { geometry(e)->clear_projection(); }, "FrameReply.geometry.projection: not set"},
+      {[&](auto& e) { geometry(e)->mutable_right()->set_x(1.1); },
+       "FrameReply.geometry.right: not of three right-handed unit vectors at right angles"},
+      {[&](auto& e) { geometry(e)->mutable_forward()->set_y(-1); },
+       "FrameReply.geometry.right: not of three right-handed unit vectors at right angles"},
+      {[&](auto& e) { geometry(e)->set_pixel_size(0); }, "FrameReply.geometry.pixel_size: 0 is not a finite number above 0"},
+      {[&](auto& e) { geometry(e)->set_target_depth(-1); }, ""},
+      {[&](auto& e) {
+         geometry(e)->set_target_depth(-1);
+         geometry(e)->set_projection(v1::PROJECTION_PERSPECTIVE);
+       },
+       "FrameReply.geometry.target_depth: -1 is not a finite number above 0"},
+      {[](auto& e) { e.mutable_frame_reply()->clear_geometry(); }, "FrameReply.geometry.world: not set"},
   });
   Check<FrameProgress>(
       {{[](auto& e) { e.mutable_frame_progress()->set_groups_done(1); }, "FrameProgress.groups_done: 1 is not in [0, 0]"}});

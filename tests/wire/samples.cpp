@@ -261,9 +261,20 @@ std::vector<FrameReply> SamplesOf() {
                                    kUmlaut, kLongName, -kMaxTime, kMaxTime, kMaxTime,   {FullReport()}};
   FrameStatistics predicted = statistics;
   predicted.predicted = FramePrediction{0.25, 0, 1e-9, 1e9, 1.5};
-  return {{1, {1, 1}, 0, 1, NoRuns(), {}},
-          {kMax64, {30, 40}, 1024, 1024, SomeRuns(), statistics},
-          {kMax64, {30, 40}, 1024, 1024, SomeRuns(), predicted}};
+  const PictureGeometry of_patient{World::kPatient,
+                                   LengthUnit::kMillimetre,
+                                   Projection::kPerspective,
+                                   {0, -1, 0},
+                                   {0.6, 0, 0.8},
+                                   {0.8, 0, -0.6},
+                                   {-1e9, 0.5, 1e300},
+                                   1e-300,
+                                   1e300};
+  const PictureGeometry behind_the_eye_plane{
+      World::kScene, LengthUnit::kFile, Projection::kOrthographic, {1, 0, 0}, {0, 1, 0}, {0, 0, -1}, {}, -7.5, 0.25};
+  return {{1, {1, 1}, 0, 1, NoRuns(), {}, {}},
+          {kMax64, {30, 40}, 1024, 1024, SomeRuns(), statistics, of_patient},
+          {kMax64, {30, 40}, 1024, 1024, SomeRuns(), predicted, behind_the_eye_plane}};
 }
 
 template <>

@@ -1,0 +1,124 @@
+#include "client/cli/picture_info.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iostream>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/cli/job_script.h"
+#include "client/cli/picture_record.h"
+#include "client/image_io/picture_header.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::string_view kAgain = "again";  // name of the file that the command line makes
+
+std::string JsonText(const Json& json, int indent) { return json.dump(indent, ' ', false, Json::error_handler_t::replace); }
+
+// The text without characters that a terminal would obey: files may hold anything.
+std::string Harmless(std::string text) {
+  std::ranges::replace_if(
+      text, [](unsigned char c) { return (c < 0x20 && c != '\n') || c == 0x7F; }, '?');
+  return text;
+}
+
+bool IsPlain(std::string_view word) {
+  constexpr std::string_view kPlain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_=+,./:@%";
+  return !word.empty() && word.find_first_not_of(kPlain) == std::string_view::npos;
+}
+
+std::string CommandText(const PictureRecord& record, const std::string& output) {
+  std::string text = "slabstream";
+  for (const std::string& word : RenderArguments(record, output)) text += " " + (IsPlain(word) ? word : ShellWord(word));
+  return text;
+}
+
+// A line for each value: the fields on the way to it with points between them, and the value. Empty values are left out; points of curves
+// are counted.
+void AddLines(const std::string& name, const Json& value, std::string& text) {
+  if (value.is_object()) {
+    for (const auto& [field, inner] : value.items()) AddLines(name.empty() ? field : name + "." + field, inner, text);
+    return;
+  }
+  std::string shown = value.is_string() ? value.get<std::string>() : JsonText(value, -1);
+  if (value.is_array()) {
+    shown.clear();
+    const bool numbers = std::ranges::all_of(value, [](const Json& item) { return item.is_number(); });
+    if (!numbers) shown = fmt::format("{} points", value.size());
+    for (std::size_t i = 0; numbers && i < value.size(); ++i) {
+      if (i > 0) shown += ' ';
+      shown += JsonText(value[i], -1);
+    }
+  }
+  if (!shown.empty()) text += fmt::format("  {:<28} {}\n", name, shown);
+}
+
+std::string HeaderText(const PictureHeader& header) {
+  std::string text = fmt::format("format       {}\n", header.format);
+  text += fmt::format("size         {} x {} pixels\n", header.width, header.height);
+  text += fmt::format("samples      {}: {}\n", header.sample_type, fmt::join(header.channels, ", "));
+  if (header.pixel_mm) text += fmt::format("pixel size   {:.6g} mm\n", *header.pixel_mm);
+  return text;
+}
+
+bool HasOwnTransfer(const PictureRecord& record) { return std::holds_alternative<TransferFunction>(record.request.transfer.choice); }
+
+std::string RecordLines(const PictureRecord& record, const std::string& output) {
+  std::string text = fmt::format("made by      {}\nsource       {}\nrequest\n", record.program, record.source);
+  AddLines("", record.json["request"], text);
+  text += "picture\n";
+  AddLines("", record.json["picture"], text);
+  text += "geometry\n";
+  AddLines("", record.json["geometry"], text);
+  text += "command\n  " + CommandText(record, output) + "\n";
+  if (HasOwnTransfer(record)) text += fmt::format("  {} is what --json prints as color_map\n", kColorMapFile);
+  return text;
+}
+
+Json PictureJson(const PictureHeader& header, const std::optional<PictureRecord>& record, const std::string& output) {
+  Json json = {{"format", header.format},
+               {"size", {header.width, header.height}},
+               {"sample_type", header.sample_type},
+               {"channels", header.channels}};
+  if (header.pixel_mm) json["pixel_mm"] = *header.pixel_mm;
+  if (!record) return json;
+  for (const auto& [field, value] : record->json.items()) json[field] = value;
+  json["command"] = RenderArguments(*record, output);
+  if (HasOwnTransfer(*record)) {
+    json["color_map"] = Json::parse(FormatParaViewColorMap(std::get<TransferFunction>(record->request.transfer.choice), record->source));
+  }
+  return json;
+}
+
+}  // namespace
+
+Status RunPictureInfo(const InfoOptions& options) {
+  if (options.transfer != TransferChoice{}) {
+    return Status::InvalidArgument(fmt::format("SOURCE '{}' is a picture, which no transfer function applies to", options.path));
+  }
+  const Result<PictureHeader> header = ReadPictureHeader(options.path);
+  if (!header.ok()) return Status(header.status().code(), "SOURCE " + header.status().message());
+  std::optional<PictureRecord> record;
+  if (!header->record.empty()) {
+    Result<PictureRecord> parsed = ParseRecord(header->record);
+    if (!parsed.ok()) {
+      return Status::InvalidArgument(
+          fmt::format("SOURCE '{}' says in a way unknown to this version how it was made: {}", options.path, parsed.status().message()));
+    }
+    record = *std::move(parsed);
+  }
+  const std::string output = fmt::format("{}.{}", kAgain, header->format == "PNG" ? "png" : "exr");
+  if (options.json) {
+    std::cout << JsonText(PictureJson(*header, record, output), 2) << "\n";
+    return Status::Ok();
+  }
+  const std::string how = record ? RecordLines(*record, output) : "made by      not known: the file holds no record of Slabstream\n";
+  std::cout << Harmless(HeaderText(*header) + how);
+  return Status::Ok();
+}
+
+}  // namespace slabstream

@@ -1,0 +1,194 @@
+// The command line that `info` prints of a picture asks for the same picture.
+#include "client/cli/picture_record.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <memory>
+
+#include "client/cli/option_groups.h"
+#include "tests/support/random.h"
+#include "tests/support/temporary_directory.h"
+
+namespace slabstream {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+// What `slabstream` makes of the arguments of render.
+FrameOptions Parse(std::vector<std::string> arguments) {
+  FrameOptions options;
+  CLI::App app;
+  std::string output;
+  app.add_option("-o,--output", output)->required();
+  AddFrameOptions(app, options);
+  app.add_flag("--previews", options.request.previews);
+  std::reverse(arguments.begin(), arguments.end());
+  app.parse(arguments);
+  return options;
+}
+
+PictureGeometry SomeGeometry() {
+  PictureGeometry geometry;
+  geometry.world = World::kPatient;
+  geometry.unit = LengthUnit::kMillimetre;
+  geometry.pixel_size = 0.1;
+  return geometry;
+}
+
+PictureRecord RecordOf(const FrameOptions& options) {
+  Result<PictureRecord> record = ParseRecord(RecordText(options.source, options.request, options.format, SomeGeometry()));
+  EXPECT_TRUE(record.ok()) << record.status().message();
+  return *std::move(record);
+}
+
+// The same but for the dataset, which the connection decides.
+void ExpectSame(FrameRequest a, FrameRequest b) {
+  a.dataset = b.dataset = "";
+  EXPECT_EQ(a, b);
+}
+
+std::string Joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : " ") + word;
+  return text;
+}
+
+const std::vector<std::vector<std::string>> kOptions = {
+    {},
+    {"--size", "300x200"},
+    {"--size", "64", "--projection", "perspective", "--fov", "12.5", "--distance", "1e3"},
+    {"--azimuth", "-30.1", "--elevation", "0.1", "--roll", "-0.30000000000000004", "--zoom", "1e-3"},
+    {"--view", "anterior"},
+    {"--view", "superior", "--fit"},
+    {"--view", "back"},
+    {"--look-at", "-1,2.5,1e-7", "--eye", "-100,-200,3"},
+    {"--eye", "1,2,3", "--up", "0,-1,0", "--projection", "perspective"},
+    {"--renderer", "mip", "--projection-mode", "minimum"},
+    {"--renderer", "raycast", "--sampling-rate", "2"},
+    {"--renderer", "zbuffer", "--shading", "depth-gradient"},
+    {"--transfer", "opaque", "--opacity-distance", "0.25"},
+    {"--shading", "none", "--light", "-1,0,0", "--light", "0,1e-3,5"},
+    {"--background", "0.2,0.4,0.6"},
+    {"--background", "0,0,0,0.1", "--depth", "16"},
+    {"--termination", "0"},
+    {"--decomposition", "kd-tree", "--axis", "view", "--balance-by", "cost", "--assignment", "auto", "--balance", "dynamic"},
+    {"--groups", "3", "--frame-parallel", "2", "--combine", "radix-k:2x2", "--pixel-error", "1e-4"},
+    {"--scale-bar", "--orientation-marker", "--title", "It's \"B\xC3\xBCro\" \xE2\x86\x92 $x"},
+    {"--title=-x"},
+    {"--previews"},
+};
+
+TEST(PictureRecordTest, TheCommandLineAsksForTheSamePicture) {
+  Random random(94);
+  SCOPED_TRACE(random.trace());
+  for (const std::string source : {"brain", "scans/head.nii.gz", "-odd"}) {
+    for (const std::vector<std::string>& more : kOptions) {
+      std::vector<std::string> arguments = {"-o", "a.png"};
+      arguments.insert(arguments.end(), more.begin(), more.end());
+      arguments.insert(arguments.end(), {"--", source});
+      const FrameOptions typed = Parse(arguments);
+      const PictureRecord record = RecordOf(typed);
+      EXPECT_EQ(record.source, source);
+      ExpectSame(record.request, typed.request);
+      EXPECT_EQ(record.format.background, typed.format.background);
+      EXPECT_EQ(record.format.png_bits, typed.format.png_bits);
+      EXPECT_EQ(record.format.annotations, typed.format.annotations);
+
+      std::vector<std::string> again = RenderArguments(record, "b.png");
+      SCOPED_TRACE(Joined(again));
+      ASSERT_EQ(again.front(), "render");
+      again.erase(again.begin());
+      const FrameOptions parsed = Parse(again);
+      EXPECT_EQ(parsed.source, source);
+      EXPECT_EQ(parsed.connection.local_workers > 0, source == "scans/head.nii.gz");
+      ExpectSame(parsed.request, typed.request);
+      EXPECT_EQ(parsed.format.background, typed.format.background);
+      EXPECT_EQ(parsed.format.png_bits, typed.format.png_bits);
+      EXPECT_EQ(parsed.format.annotations, typed.format.annotations);
+    }
+  }
+}
+
+TEST(PictureRecordTest, TheCommandLineHoldsWhatDiffersFromTheDefaults) {
+  EXPECT_EQ(Joined(RenderArguments(RecordOf(Parse({"-o", "a.png", "brain"})), "b.png")), "render brain -o b.png");
+  EXPECT_EQ(Joined(RenderArguments(RecordOf(Parse({"-o", "a.png", "./b.nrrd", "--local=3", "--view", "left", "--zoom", "2"})), "b.png")),
+            "render ./b.nrrd --local --azimuth 270 --zoom 2 -o b.png");
+}
+
+TEST(PictureRecordTest, ATransferFunctionOfAFileIsKeptWhole) {
+  const TemporaryDirectory directory;
+  const std::string map = directory / "map.json";
+  std::ofstream(map) << R"([{"RGBPoints": [0, 0.1, 0.2, 0.3, 255, 1, 1, 1], "Points": [0, 0, 0.5, 0, 255, 0.7, 0.25, 1]}])";
+  const FrameOptions typed = Parse({"-o", "a.png", "brain", "--transfer", map});
+  const PictureRecord record = RecordOf(typed);
+  ExpectSame(record.request, typed.request);
+  EXPECT_EQ(Joined(RenderArguments(record, "b.png")), "render brain --transfer color-map.json -o b.png");
+}
+
+TEST(PictureRecordTest, TheTextIsAsciiAndNamesNoPlace) {
+  FrameOptions options = Parse({"-o", "a.png", "B\xC3\xBCro.nrrd", "--local=7", "--threads", "3", "--title", "\xC3\xA4"});
+  const std::string text = RecordText(options.source, options.request, options.format, SomeGeometry());
+  for (const char c : text) ASSERT_TRUE(c >= 0x20 && c < 0x7F) << text;
+  EXPECT_THAT(text, HasSubstr("B\\u00fcro.nrrd"));
+  // The same at a service: neither how many workers nor which dataset is told.
+  options.connection = {};
+  options.connection.service.endpoint = "tcp://127.0.0.1:7420";
+  options.request.dataset = "volume";
+  EXPECT_EQ(RecordText(options.source, options.request, options.format, SomeGeometry()), text);
+  for (const char* place : {"7420", "127.0.0.1", "dataset", "a.png", "threads"}) EXPECT_THAT(text, Not(HasSubstr(place)));
+}
+
+TEST(PictureRecordTest, BadRecordsAreNamed) {
+  const FrameOptions options = Parse({"-o", "a.png", "brain"});
+  const Json good = Json::parse(RecordText("brain", options.request, options.format, SomeGeometry()));
+  EXPECT_TRUE(ParseRecord(good.dump()).ok());
+  const auto with = [&](const char* pointer, const Json& value) {
+    Json bad = good;
+    bad[Json::json_pointer(pointer)] = value;
+    return bad.dump();
+  };
+  const auto without = [&](const char* field) {
+    Json bad = good;
+    bad.erase(field);
+    return bad.dump();
+  };
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"", "not JSON"},
+      {"[]", "must be an object"},
+      {std::string(100000, '['), "nest"},
+      {without("source"), "record.source: is missing"},
+      {without("request"), "record.request: is missing"},
+      {without("picture"), "record.picture: is missing"},
+      {without("geometry"), "record.geometry: is missing"},
+      {with("/more", 1), "'more' is no field"},
+      {with("/source", 1), "record.source"},
+      {with("/geometry", 1), "record.geometry"},
+      {with("/picture/depth", 12), "depth 12"},
+      {with("/picture/background", {1, 2, 3, 4}), "record.picture.background[1]: 2"},
+      {with("/picture/background", {1, 1, 1, 1, 1}), "must be four numbers"},
+      {with("/picture/title", "a\nb"), "control character"},
+      {with("/picture/scale_bar", "yes"), "true or false"},
+      {with("/request", "splat"), "FrameRequest"},
+      {with("/request/zoom", 1), "zoom"},
+      {with("/request/view/zoom", 1e9), "view.zoom"},
+      {with("/request/view/zoom", "big"), "zoom"},
+      {with("/request/renderer", "toaster"), "toaster"},
+      {with("/request/size/width", -1), "width"},
+      {with("/request/view/projection", "FISHEYE"), "projection"},
+      {with("/request/view/projection", 7), "projection"},
+  };
+  for (const auto& [text, message] : cases) {
+    const Result<PictureRecord> record = ParseRecord(text);
+    ASSERT_FALSE(record.ok()) << message;
+    EXPECT_EQ(record.status().code(), StatusCode::kInvalidArgument);
+    EXPECT_THAT(record.status().message(), HasSubstr(message));
+    EXPECT_EQ(record.status().message().find('\n'), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace slabstream
