@@ -79,7 +79,7 @@ void DeclareTransfer(const CommandLine& line) {
       [is_name = OneOf(names)](const std::string& option, const std::string& text) -> Result<std::variant<std::string, TransferFunction>> {
         const Result<std::string> name = is_name(option, text);
         if (!name.ok()) return name.status();
-        return *name;
+        return std::variant<std::string, TransferFunction>(*name);
       },
       "Which" + Explained(TransferPresets()))
       ->required();
