@@ -192,7 +192,7 @@ bool IsFile(const std::string& source) {
 
 std::string RecordText(const std::string& source, const FrameRequest& request, const PictureFormat& format,
                        const PictureGeometry& geometry) {
-  Json made = Json::parse(RequestJson(request));
+  Json made = Json::parse(RequestToJson(request));
   made.erase("dataset");  // the source says it
   const Json json = {{"program", fmt::format("{}{}", kProgram, Version())},
                      {"source", source},
@@ -216,7 +216,7 @@ Result<PictureRecord> ParseRecord(std::string_view text) {
                 {"geometry", [](const JsonValue& v) { (void)v.At("pixel_size"); }}});
   for (const char* field : {"program", "source", "request", "picture", "geometry"}) (void)value.At(field);
   if (mistake) return Status::InvalidArgument(*mistake);
-  Result<FrameRequest> parsed = ParseRequestJson(request, "volume");
+  Result<FrameRequest> parsed = RequestFromJson(request, "volume");
   if (!parsed.ok()) return parsed.status();
   record.request = *std::move(parsed);
   record.json = *std::move(json);

@@ -1,7 +1,7 @@
 // The record of a picture: how it was made, as the text that its file holds (PictureNotes). It is JSON:
 //
 //   {"program": "slabstream 0.2.0", "source": "brain.nii.gz",             SOURCE as it was typed
-//    "request": {...},                                                    RequestJson (common/wire/request_json.h)
+//    "request": {...},                                                    RequestToJson (common/wire/request_json.h)
 //    "picture": {"depth", "background", "title", "scale_bar", "orientation_marker"},
 //    "geometry": {"world", "unit", "projection", "right", "up", "forward", "target", "target_depth", "pixel_size"}}
 //

@@ -8,7 +8,7 @@
 
 namespace slabstream {
 
-std::string RequestJson(const FrameRequest& request) {
+std::string RequestToJson(const FrameRequest& request) {
   v1::FrameRequest message;
   Write(request, message);
   message.clear_dataset();
@@ -20,7 +20,7 @@ std::string RequestJson(const FrameRequest& request) {
   return json;
 }
 
-Result<FrameRequest> ParseRequestJson(const std::string& json, const std::string& dataset) {
+Result<FrameRequest> RequestFromJson(const std::string& json, const std::string& dataset) {
   v1::FrameRequest message;
   if (const auto status = google::protobuf::util::JsonStringToMessage(json, &message); !status.ok()) {
     return Printable(Status::InvalidArgument("FrameRequest: " + std::string(status.message())));

@@ -9,9 +9,9 @@
 
 namespace slabstream {
 
-std::string RequestJson(const FrameRequest& request);
+std::string RequestToJson(const FrameRequest& request);
 
 // The request, with this dataset. InvalidArgument, one line: not JSON of that message, or not a valid request.
-Result<FrameRequest> ParseRequestJson(const std::string& json, const std::string& dataset);
+Result<FrameRequest> RequestFromJson(const std::string& json, const std::string& dataset);
 
 }  // namespace slabstream

@@ -5,6 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
+#include <numbers>
+#include <ostream>
 #include <set>
 
 #include "common/view/named_view.h"
@@ -13,7 +16,7 @@
 namespace slabstream {
 namespace {
 
-constexpr ImageSize kSize{400, 300};
+constexpr ImageSize kShown{400, 300};
 
 // A letter's side, as a direction of the world.
 Vec3 SideOf(char letter) {
@@ -40,7 +43,7 @@ Edges EdgesOf(const PictureGeometry& g) { return {PatientSides(-g.right), Patien
 
 PictureGeometry LookAt(const ViewParameters& view, const Orientation& orientation = {.world = World::kPatient}) {
   const VolumeGeometry volume = {{60, 70, 50}, {1, 1, 2}, orientation};
-  return GeometryOf(MakeCamera(view, kSize, volume), volume);
+  return GeometryOf(MakeCamera(view, kShown, volume), volume);
 }
 
 TEST(PictureLabels, NamedViewsHaveTheSidesThatRadiologistsExpect) {
@@ -91,13 +94,13 @@ TEST(PictureLabels, AStepToASideGoesToTheEdgeThatNamesIt) {
   for (int i = 0; i < 1000; ++i) {
     const VolumeGeometry volume = RandomGeometry(random);
     const ViewParameters view = RandomViewOf(volume, random);
-    const Camera camera = MakeCamera(view, kSize, volume);
+    const Camera camera = MakeCamera(view, kShown, volume);
     const PictureGeometry geometry = GeometryOf(camera, volume);
     const auto shown = [&](const Vec3& step) {  // of the world, from the target; pixels to the right and upwards
       const Vec3 from = volume.orientation.FromWorld(geometry.target - volume.orientation.origin);
       const double small = 1e-3 * geometry.target_depth;
       const auto [x, y, depth] = camera.Project((from + volume.orientation.FromWorld(small * step)) / volume.spacing);
-      return std::pair(x - 0.5 * kSize.width, 0.5 * kSize.height - y);
+      return std::pair(x - 0.5 * kShown.width, 0.5 * kShown.height - y);
     };
     const Edges edges = EdgesOf(geometry);
     std::set<char> named;
@@ -131,7 +134,7 @@ TEST(PictureLabels, AxesComeFarthestFirst) {
   SCOPED_TRACE(random.trace());
   for (int i = 0; i < 200; ++i) {
     const VolumeGeometry volume = RandomGeometry(random, random.Chance(0.5) ? World::kPatient : World::kScene);
-    const Camera camera = MakeCamera(RandomViewOf(volume, random), kSize, volume);
+    const Camera camera = MakeCamera(RandomViewOf(volume, random), kShown, volume);
     const PictureGeometry geometry = GeometryOf(camera, volume);
     const std::array<ShownAxis, 3> axes = ShownAxes(geometry);
     EXPECT_GE(axes[0].depth, axes[1].depth);
