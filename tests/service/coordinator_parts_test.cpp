@@ -247,6 +247,28 @@ TEST_F(CatalogueTest, NamesComeFromArgumentsAndStems) {
   EXPECT_FALSE(catalogue->at("head")().ok()) << "loading a file that is no volume fails when it is tried, not before";
 }
 
+TEST_F(CatalogueTest, OfDirectoriesHasOneNameForEach) {
+  for (const char* name : {"study-1", "study-2"}) {
+    std::filesystem::create_directories(directory_ / name / "DICOM");
+    std::ofstream(directory_ / name / "DICOM/IM1") << std::string(128, '\0') << "DICM";
+  }
+  const auto names = [&](const std::filesystem::path& directory) {
+    std::vector<std::string> found;
+    const Result<Catalogue> catalogue = MakeCatalogue({directory.string()});
+    EXPECT_TRUE(catalogue.ok()) << catalogue.status().message();
+    if (catalogue.ok()) {
+      for (const auto& [name, loader] : *catalogue) found.push_back(name);
+    }
+    return found;
+  };
+  EXPECT_THAT(names(directory_), testing::ElementsAre("study-1", "study-2"));
+  EXPECT_THAT(names(directory_ / "study-1/DICOM"), testing::ElementsAre("DICOM")) << "slices lie in it";
+  Touch("study-1/DICOMDIR");
+  EXPECT_THAT(names(directory_ / "study-1"), testing::ElementsAre("study-1"));
+  Touch("head.nrrd");
+  EXPECT_THAT(names(directory_), testing::ElementsAre("head", "study-1", "study-2")) << "DICOM below it does not make it one of DICOM";
+}
+
 TEST_F(CatalogueTest, BadArgumentsAreNamed) {
   Touch("head.nii.gz");
   Touch("head.nrrd");
