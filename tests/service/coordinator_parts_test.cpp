@@ -297,7 +297,7 @@ TEST_F(CatalogueTest, BadArgumentsAreNamed) {
   ExpectError({"a=" + file + "?offset=3"}, StatusCode::kInvalidArgument, "offset is no option of NRRD");
   ExpectError({"a=" + file + ".missing?time=3"}, StatusCode::kNotFound, "does not exist");
   Touch("samples.raw");
-  ExpectError({"a=" + (directory_ / "samples.raw").string()}, StatusCode::kInvalidArgument, "raw files need dims, type");
+  ExpectError({"a=" + (directory_ / "samples.raw").string()}, StatusCode::kInvalidArgument, "raw files need --dims X,Y,Z --type TYPE");
   ExpectError({file}, StatusCode::kInvalidArgument, "NAME=");
   std::filesystem::create_directory(directory_ / "empty");
   ExpectError({(directory_ / "empty").string()}, StatusCode::kInvalidArgument, "no volume file");
