@@ -80,6 +80,8 @@ Status AddArgument(Catalogue& catalogue, const std::string& argument) {
     const Result<VolumeSource> source = ParseVolumeSource(argument.substr(equals + 1));
     if (!source.ok()) return Status(source.status().code(), "--data " + source.status().message());
     if (!fs::exists(source->path, error)) return Status::NotFound("--data " + argument + ": \"" + source->path + "\" does not exist");
+    if (Status status = CheckVolume(source->path, source->options); !status.ok())
+      return Status(status.code(), "--data " + status.message());
     return Add(catalogue, argument.substr(0, equals), *source, argument);
   }
   if (!fs::exists(argument, error)) return Status::NotFound("--data " + argument + ": does not exist");

@@ -52,7 +52,9 @@ int Run(int argc, char** argv) {
                  "Encrypt tcp connections with the keys of this folder, which is made if it does not exist and gets the service files "
                  "client.json, worker.json and admin.json; needed by addresses that are not loopback")
       ->type_name("FOLDER");
-  AddRepeated(app, "--data", data, "A volume to serve, as NAME=FILE, or a directory of volumes that are named after their files")
+  AddRepeated(app, "--data", data,
+              "A volume to serve, as NAME=FILE, NAME=FILE?time=3 with options of `slabstream info`, or a directory of volumes that are "
+              "named after their files")
       ->type_name("NAME=FILE");
   app.add_flag("--compress", compress, "Pack voxels for workers with zstd: pays on links slower than about 300 MB/s, not within a machine");
   options.machine.memory_bytes = DefaultMemory().coordinator;

@@ -138,7 +138,9 @@ void DeclareUp(const CommandLine& line) {
   options->listen = "tcp://127.0.0.1:7420";
   AddInteger(*sub, "--workers", options->workers, 1, kMaxUpWorkers, "Worker processes")->default_str("one a core");
   AddThreads(*sub, options->threads, "Render threads of each worker");
-  AddRepeated(*sub, "--data", options->data, "A volume to serve, as NAME=FILE, or a directory of volumes that are named after their files")
+  AddRepeated(*sub, "--data", options->data,
+              "A volume to serve, as NAME=FILE, NAME=FILE?time=3 with options of `slabstream info`, or a directory of volumes that are "
+              "named after their files")
       ->type_name("NAME=FILE");
   AddParsed(*sub, "--listen", options->listen, EndpointText(true),
             "Where clients reach the service: an address of this machine; port * is any free one. Addresses that are not loopback get keys")
@@ -217,7 +219,9 @@ void DeclareSlurm(const CommandLine& line) {
       ->type_name("TIME")
       ->default_str("the partition's");
   AddInteger(*sub, "--notice", options->notice_seconds, 1, kMaxNoticeSeconds, "Seconds before the time limit at which workers leave");
-  AddRepeated(*sub, "--data", options->data, "A volume to serve, as NAME=FILE, or a directory of volumes that are named after their files")
+  AddRepeated(*sub, "--data", options->data,
+              "A volume to serve, as NAME=FILE, NAME=FILE?time=3 with options of `slabstream info`, or a directory of volumes that are "
+              "named after their files")
       ->required()
       ->type_name("NAME=FILE");
   sub->add_option("--folder", options->folder, "The folder, shared by all nodes, in which each job makes one for its service files")

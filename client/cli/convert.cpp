@@ -3,18 +3,19 @@
 #include <algorithm>
 #include <filesystem>
 #include <iostream>
+#include <optional>
+#include <vector>
 
 #include "client/cli/commands.h"
 #include "client/cli/input_volume.h"
 #include "client/cli/progress_bar.h"
 #include "common/base/files.h"
 #include "common/base/log.h"
+#include "common/volume/memory_budget.h"
 #include "common/volume_io/formats.h"
 
 namespace slabstream {
 namespace {
-
-constexpr double kMebibyte = 1 << 20;
 
 // What it reads from stays as it is, even though it has been read when the output takes its place.
 Status CheckKeepsInput(const ConvertOptions& options, const VolumeFormat& format, const std::vector<std::filesystem::path>& inputs) {
@@ -28,6 +29,13 @@ Status CheckKeepsInput(const ConvertOptions& options, const VolumeFormat& format
     }
   }
   return Status::Ok();
+}
+
+// The samples stay of the file's type if that holds their values, which a file's rescaling may have changed.
+std::optional<SampleType> TypeToWrite(const ConvertOptions& options, const LoadedVolume& loaded) {
+  if (options.type) return options.type;
+  const std::optional<SampleType> stored = SampleTypeNamed(loaded.info.file_type);
+  return stored && FileSamples::Of(*loaded.volume, stored).ok() ? stored : std::nullopt;
 }
 
 }  // namespace
@@ -57,10 +65,10 @@ Status RunConvert(const ConvertOptions& options) {
     LogWarning(fmt::format("{}: {} files do not keep {}", options.output, to->name, lost));
   }
   const auto progress = [&](std::int64_t done, std::int64_t all) {
-    bar.Show(double(done) / double(all),
-             fmt::format("writing {}: {} % of {:.0f} MiB", options.output, done * 100 / all, double(all) / kMebibyte));
+    const std::string size = MemoryText(std::uint64_t(all));
+    bar.Show(double(done) / double(all), fmt::format("writing {}: {} % of {}", options.output, done * 100 / all, size));
   };
-  if (Status status = WriteVolume(*loaded->volume, options.output, {options.type, progress}); !status.ok()) return status;
+  if (Status status = WriteVolume(*loaded->volume, options.output, {TypeToWrite(options, *loaded), progress}); !status.ok()) return status;
   const Index3& size = info.description.geometry.size;
   std::cout << fmt::format("wrote {}: {}, {} x {} x {} voxels\n", options.output, to->name, size.x, size.y, size.z);
   return Status::Ok();

@@ -324,7 +324,7 @@ void AddTransferOptions(CLI::App& app, TransferChoice& transfer) {
 }
 
 void AddReadOptions(CLI::App& app, std::initializer_list<std::string_view> except) {
-  app.option_defaults()->group("Reading a file");
+  app.option_defaults()->group(kReadingGroup);
   for (const ReadOption& option : ReadOptionList()) {
     if (std::ranges::count(except, option.name) > 0) continue;
     const auto check = [&option](const CLI::results_t& texts) {
@@ -343,7 +343,8 @@ void AddReadOptions(CLI::App& app, std::initializer_list<std::string_view> excep
 std::string WithReadOptions(const CLI::App& app, std::string source) {
   for (const ReadOption& option : ReadOptionList()) {
     const CLI::Option* const given = app.get_option_no_throw(fmt::format("--{}", option.name));
-    if (given != nullptr && given->count() > 0) source = WithReadOption(source, option.name, given->results().back());
+    const bool reads = given != nullptr && given->get_group() == kReadingGroup;  // a command may have an option of the same name
+    if (reads && given->count() > 0) source = WithReadOption(source, option.name, given->results().back());
   }
   return source;
 }

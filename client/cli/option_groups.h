@@ -18,7 +18,7 @@ ParseText EndpointText(bool allow_wildcard);
 CLI::Option* AddService(CLI::App& app, ServiceChoice& service);
 
 // Headings of the help text. Options under kHidden are not shown: old spellings that still work, and options that cannot be used yet.
-inline constexpr char kOutputGroup[] = "Output", kHidden[] = "";
+inline constexpr char kOutputGroup[] = "Output", kReadingGroup[] = "Reading a file", kHidden[] = "";
 
 // --threads, [1, kMaxThreads]; 0 stays if it is not given.
 CLI::Option* AddThreads(CLI::App& app, int& threads, const std::string& help);

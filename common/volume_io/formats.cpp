@@ -95,11 +95,15 @@ Status CheckOptions(const VolumeFormat& format, const std::string& path, const R
     const std::string takes = format.options.empty() ? "takes none" : "takes " + Joined(format.options);
     return Status::InvalidArgument(fmt::format("{}: {} is no option of {}, which {}", path, option.name, format.name, takes));
   }
+  std::string flags, suffix;
   for (const std::string_view name : format.required) {
     const ReadOption& option = *FindNamed(ReadOptionList(), name);
     if (option.given(options)) continue;
-    return Status::InvalidArgument(fmt::format("{}: {} files need {}: --{} {}, or {}?{}=... in --data", path, format.name,
-                                               Joined(format.required), name, option.value, path, name));
+    flags += fmt::format(" --{} {}", name, option.value);
+    suffix += fmt::format("{}{}={}", suffix.empty() ? '?' : ',', name, option.value);
+  }
+  if (!flags.empty()) {
+    return Status::InvalidArgument(fmt::format("{}: {} files need{}, or in --data {}{}", path, format.name, flags, path, suffix));
   }
   return Status::Ok();
 }

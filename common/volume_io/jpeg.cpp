@@ -72,10 +72,10 @@ class JpegFile : public SliceFile {
   // A picture with thousands of scans would take hours.
   static void OnProgress(j_common_ptr jpeg) {
     constexpr int kMostScans = 200;
-    if (reinterpret_cast<j_decompress_ptr>(jpeg)->input_scan_number > kMostScans) {
-      jpeg->err->msg_code = 0;
-      OnError(jpeg);
-    }
+    if (reinterpret_cast<j_decompress_ptr>(jpeg)->input_scan_number <= kMostScans) return;
+    auto& file = *static_cast<JpegFile*>(jpeg->client_data);
+    std::snprintf(file.complaint_.data(), file.complaint_.size(), "more than %d scans", kMostScans);
+    std::longjmp(file.jump_, 1);
   }
 
   bool Begin() {

@@ -109,7 +109,7 @@ const std::vector<ReadOption>& ReadOptionList() {
        [](const ReadOptions& given) { return given.channel.has_value(); }},
       {"spacing", "X,Y,Z", "Distances of voxels, for files that state none: raw, NumPy, pictures", SetSpacing,
        [](const ReadOptions& given) { return given.spacing.has_value(); }},
-      {"dims", "X,Y,Z", "Voxels along each axis of raw samples, x fastest", SetDims,
+      {"dims", "X,Y,Z", "Voxels along each axis of raw samples, the fastest axis first", SetDims,
        [](const ReadOptions& given) { return given.dims.has_value(); }},
       {"type", "TYPE", "Type of raw samples: uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64", SetType,
        [](const ReadOptions& given) { return given.type.has_value(); }},

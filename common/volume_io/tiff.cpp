@@ -209,7 +209,9 @@ bool Recognises(const std::string& path, const ReadOptions&) { return !SlicesIn(
 
 Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
   const std::vector<std::string> slices = SlicesIn(path, Endings());
-  return slices.empty() ? ReadPages(path, options) : ReadSliceStack(path, slices, OpenSliceFile, options);
+  if (slices.empty()) return ReadPages(path, options);
+  if (options.time) return Status::InvalidArgument(path + ": time is for files of OME, not for a folder of slices");
+  return ReadSliceStack(path, slices, OpenSliceFile, options);
 }
 
 }  // namespace

@@ -92,7 +92,7 @@ Status CheckVolume(const std::string& path, const ReadOptions& options) {
     return Printable(Status::InvalidArgument(path + ": not a file that can be read"));
   }
   const VolumeFormat* const format = FindFormat(path, options);
-  if (format == nullptr) return Printable(Status::InvalidArgument(path + ": not a volume: the name " + ReadableText()));
+  if (format == nullptr) return Printable(Status::InvalidArgument(path + ": not a volume, which " + ReadableText()));
   return Printable(CheckOptions(*format, path, options));
 }
 

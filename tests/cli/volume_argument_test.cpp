@@ -40,6 +40,13 @@ TEST_F(VolumeArgumentTest, AFileMayBeFollowedByATransferFunction) {
               testing::AllOf(HasSubstr("SOURCE '" + head + ":bone'"), HasSubstr("'bone' is not one of auto,")));
 }
 
+TEST_F(VolumeArgumentTest, OptionsForReadingStandBeforeTheTransferFunction) {
+  const std::string head = Touch("head.nii");
+  Expect(head + "?time=3", true, head + "?time=3", "");
+  Expect(head + "?time=3:opaque", true, head + "?time=3", "opaque");
+  Expect(head + "?tine=3:opaque", true, head + "?tine=3:opaque", "");
+}
+
 TEST_F(VolumeArgumentTest, ADatasetsNameMayHoldAColon) {
   Expect("head:ct-skin", false, "head", "ct-skin");
   Expect("head:2026", false, "head:2026", "");

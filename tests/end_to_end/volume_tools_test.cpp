@@ -85,7 +85,7 @@ TEST_F(VolumeToolsTest, HelpNamesWhatCanBeChosen) {
 TEST_F(VolumeToolsTest, HelpExplainsEveryOptionInWords) {
   const std::string program = Command({}).front();
   std::vector<std::vector<std::string>> commands = {{program + "-coordinator"}, {program + "-worker"}};
-  for (const char* command : {"render", "turntable", "info", "sphere", "up", "down", "status", "bench", "experiment", "help"}) {
+  for (const char* command : {"render", "turntable", "info", "convert", "sphere", "up", "down", "status", "bench", "experiment", "help"}) {
     commands.push_back({program, command});
   }
   for (std::vector<std::string>& arguments : commands) {

@@ -315,8 +315,8 @@ TEST_F(ReadersTest, RawSamplesAreWhatTheOptionsSay) {
   options.offset = 6;
   EXPECT_EQ(ReadVolume(directory_ / "v.raw", options).status().code(), StatusCode::kDataLoss);
   options.type.reset();
-  EXPECT_THAT(WhyNotPath(directory_ / "v.raw", options), HasSubstr("raw files need dims, type: --type TYPE"));
-  EXPECT_THAT(WhyNotPath(directory_ / "v.raw"), HasSubstr("raw files need dims, type: --dims X,Y,Z"));
+  EXPECT_THAT(WhyNotPath(directory_ / "v.raw", options), HasSubstr("raw files need --type TYPE, or in --data"));
+  EXPECT_THAT(WhyNotPath(directory_ / "v.raw"), HasSubstr("v.raw?dims=X,Y,Z,type=TYPE"));
   EXPECT_FALSE(LooksLikeVolume(directory_ / "v.raw")) << "the samples of a .mhd are no volume of their own";
 }
 
@@ -497,7 +497,9 @@ TEST_F(ReadersTest, PicturesThatAreCutOffOrDamagedFail) {
         bytes[random.Integer<std::size_t>(0, bytes.size() - 1)] ^= char(1 << random.Integer(0, 7));
         WriteFile(second, bytes);
         const Result<LoadedVolume> loaded = ReadVolume(folder);
-        if (!loaded.ok()) EXPECT_THAT(loaded.status().message(), testing::Not(HasSubstr("\n")));
+        if (!loaded.ok()) {
+          EXPECT_THAT(loaded.status().message(), testing::Not(HasSubstr("\n")));
+        }
       }
     }
   }

@@ -1,0 +1,117 @@
+// `convert`, and options for reading on the command line.
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "tests/end_to_end/program.h"
+
+namespace slabstream {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+class ConvertTest : public EndToEndTest {
+ protected:
+  json Info(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "info");
+    arguments.emplace_back("--json");
+    return json::parse(MustRun(arguments).out);
+  }
+  void Write(const std::string& name, const std::string& bytes) { std::ofstream(Path(name), std::ios::binary) << bytes; }
+  // Exit status 2 and one line that says why.
+  void ExpectRefused(const std::vector<std::string>& arguments, const std::string& why) {
+    const ProgramResult result = Slabstream(arguments);
+    EXPECT_EQ(result.exit_status, 2) << result.err;
+    EXPECT_EQ(result.out, "");
+    EXPECT_EQ(result.err_lines().size(), 1U) << result.err;
+    EXPECT_THAT(result.err, HasSubstr(why));
+  }
+};
+
+TEST_F(ConvertTest, WritesEveryFormatAndTellsSo) {
+  MakeSphere("s.nrrd", 1, 20);
+  const json before = Info({"s.nrrd"});
+  std::string from = "s.nrrd";
+  for (const std::string to : {"a.nii", "b.nii.gz", "c.mha", "d.mhd", "e.npy", "f.vti", "g.nrrd"}) {
+    const ProgramResult result = MustRun({"convert", from, to, "--progress"});
+    EXPECT_THAT(result.out, HasSubstr("wrote " + to));
+    EXPECT_THAT(result.err, testing::AllOf(HasSubstr("reading " + from), HasSubstr("writing " + to + ": 100 %")));
+    const json info = Info({to});
+    for (const char* field : {"size", "type", "spacing", "range", "histogram"}) EXPECT_EQ(info[field], before[field]) << to;
+    from = to;
+  }
+}
+
+TEST_F(ConvertTest, RawSamplesAreDescribedByOptionsInEitherForm) {
+  Write("v.raw", "head" + std::string({0, 1, 0, 2, 0, 3, 0, 4, 0, 5, 1, 0}));
+  const std::vector<std::string> options = {"--dims", "3,2,1",    "--type", "uint16",    "--endian",
+                                            "big",    "--offset", "4",      "--spacing", "0.5,1,2"};
+  std::vector<std::string> apart = {"v.raw"};
+  apart.insert(apart.end(), options.begin(), options.end());
+  const json info = Info(apart);
+  EXPECT_EQ(info["size"], (json{3, 2, 1}));
+  EXPECT_EQ(info["spacing"], (json{0.5, 1.0, 2.0}));
+  EXPECT_EQ(info["range"]["max"], 256.0);
+  EXPECT_EQ(Info({"v.raw?dims=3,2,1,type=uint16,endian=big,offset=4,spacing=0.5,1,2"}), info);
+  // --type of convert is that of raw samples too, unless they have their own.
+  std::vector<std::string> convert = {"convert", "v.raw", "a.nrrd"};
+  convert.insert(convert.end(), options.begin(), options.end());
+  MustRun(convert);
+  EXPECT_EQ(Info({"a.nrrd"})["file_type"], "uint16");
+  MustRun({"convert", "v.raw?dims=3,2,1,type=uint16,endian=big,offset=4", "b.nrrd", "--type", "int32"});
+  EXPECT_EQ(Info({"b.nrrd"})["file_type"], "int32");
+  EXPECT_EQ(Info({"b.nrrd"})["range"], info["range"]);
+}
+
+TEST_F(ConvertTest, SamplesStayOfTheirTypeIfThatHoldsTheirValues) {
+  const std::string header = "NRRD0004\ndimension: 3\nsizes: 2 1 1\nencoding: raw\ntype: ";
+  Write("i.nrrd", header + "int32\n\n" + std::string({1, 0, 0, 0, 2, 0, 0, 0}));
+  Write("d.nrrd", header + "double\n\n" + std::string(16, '\0'));
+  for (const auto& [file, type] : {std::pair{"i", "int32"}, {"d", "float64"}}) {
+    MustRun({"convert", file + std::string(".nrrd"), "v.nii"});
+    EXPECT_EQ(Info({"v.nii"})["file_type"], type);
+  }
+}
+
+TEST_F(ConvertTest, WarnsOfWhatIsNotKept) {
+  Write("v.nrrd",
+        "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 1 1\nencoding: raw\nspace: RAS\nspace directions: (0.5,0,0) (0,1,0) (0,0,2)\n\nab");
+  EXPECT_THAT(MustRun({"convert", "v.nrrd", "v.npy"}).err,
+              HasSubstr("v.npy: NumPy files do not keep the spacing 0.5,1,2, nor the origin and the directions of the axes"));
+  EXPECT_EQ(MustRun({"convert", "v.nrrd", "v.mha"}).err, "");
+}
+
+TEST_F(ConvertTest, NeverOverwritesItsInput) {
+  MakeSphere("s.mhd", 1, 20);
+  const std::string header = ReadFile("s.mhd"), samples = ReadFile("s.raw");
+  std::filesystem::create_symlink(Path("s.mhd"), Path("link.mhd"));
+  std::filesystem::create_hard_link(Path("s.raw"), Path("t.raw"));
+  ExpectRefused({"convert", "s.mhd", "s.mhd"}, "OUTPUT 's.mhd': would overwrite the input 's.mhd'");
+  ExpectRefused({"convert", "s.mhd", "link.mhd"}, "would overwrite the input");
+  ExpectRefused({"convert", "s.raw", "s.mhd", "--dims", "20,20,20", "--type", "uint8"}, "would overwrite the input 's.raw'");
+  ExpectRefused({"convert", "s.mhd", "t.mhd"}, "would overwrite the input 's.raw'");
+  EXPECT_EQ(ReadFile("s.mhd"), header);
+  EXPECT_EQ(ReadFile("s.raw"), samples);
+}
+
+TEST_F(ConvertTest, WhatIsWrongIsNamed) {
+  MakeSphere("s.nrrd", 1, 20);
+  ExpectRefused({"convert", "s.nrrd"}, "OUTPUT");
+  ExpectRefused({"convert", "s.nrrd", "s.png"}, "OUTPUT 's.png' must end in one of .nii, .nii.gz, .nrrd");
+  ExpectRefused({"convert", "missing.nrrd", "a.mha"}, "SOURCE missing.nrrd: no such file");
+  ExpectRefused({"convert", "s.nrrd", "no/a.mha"}, "OUTPUT");
+  ExpectRefused({"convert", "s.nrrd", "a.mha", "--type", "int8"}, "does not fit int8, which holds whole numbers from -128 to 127");
+  ExpectRefused({"convert", "s.nrrd", "a.mha", "--type", "int12"}, "--type 'int12' must be one of int8");
+  ExpectRefused({"convert", "s.nrrd", "a.mha", "--dims", "1,2,3"}, "dims is no option of NRRD");
+  ExpectRefused({"convert", "s.nrrd", "a.mha", "--time", "two"}, "--time 'two' must be a whole number");
+  ExpectRefused({"convert", "s.nrrd?time=1", "a.mha", "--time", "1"}, "time is given twice");
+  ExpectRefused({"info", "s.nrrd", "--time", "1"}, "s.nrrd: time is 1, must be in [0, 0]");
+  ExpectRefused({"info", "s.nrrd?tine=1"}, "'tine' is no option for reading a file");
+  ExpectRefused({"render", "s", "-o", "s.png", "--time", "1"}, "'s' is a dataset at the service");
+  EXPECT_THAT(Files(), testing::ElementsAre("s.nrrd"));
+}
+
+}  // namespace
+}  // namespace slabstream
