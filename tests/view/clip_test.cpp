@@ -13,7 +13,7 @@
 namespace slabstream {
 namespace {
 
-VolumeGeometry RandomGeometry(Random& random) {
+VolumeGeometry ObliqueGeometry(Random& random) {
   VolumeGeometry geometry;
   for (const Axis axis : kAxes) {
     geometry.size[axis] = random.Integer(1, 40);
@@ -76,7 +76,7 @@ TEST(Clip, KeepsWhatTheBoxAndAllPlanesLeave) {
   int kept = 0, points = 0;
   for (int i = 0; i < 300; ++i) {
     SCOPED_TRACE(random.trace());
-    const VolumeGeometry geometry = RandomGeometry(random);
+    const VolumeGeometry geometry = ObliqueGeometry(random);
     const Clipping clipping = RandomClipping(random, geometry);
     ASSERT_TRUE(Validate(clipping).ok()) << Validate(clipping).message();
     const ClipRegion region = MakeClipRegion(clipping, geometry);
@@ -97,7 +97,7 @@ TEST(Clip, DropsNoBoxThatHoldsAPointWhichIsKept) {
   int dropped = 0;
   for (int i = 0; i < 1000; ++i) {
     SCOPED_TRACE(random.trace());
-    const VolumeGeometry geometry = RandomGeometry(random);
+    const VolumeGeometry geometry = ObliqueGeometry(random);
     const ClipRegion region = MakeClipRegion(RandomClipping(random, geometry), geometry);
     const Box box = RandomBox(random, geometry.bounds());
     bool any = false;
@@ -115,7 +115,7 @@ TEST(Clip, DropsNoBoxThatHoldsAPointWhichIsKept) {
 
 TEST(Clip, DistancesArePhysical) {
   Random random(23);
-  const VolumeGeometry geometry = RandomGeometry(random);
+  const VolumeGeometry geometry = ObliqueGeometry(random);
   const ClipRegion region = MakeClipRegion({.planes = {{{3, -4, 12}, 0}}, .mode = ClipMode::kCutAway}, geometry);
   ASSERT_EQ(region.sides.size(), 1U);
   EXPECT_NEAR(Length(region.sides[0].normal / geometry.spacing), 1, 1e-12);
