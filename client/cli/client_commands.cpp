@@ -235,8 +235,9 @@ void DeclareSlurm(const CommandLine& line) {
 }  // namespace
 
 std::span<const DeclareCommand> ClientCommands() {
-  static constexpr DeclareCommand kCommands[] = {DeclareRender,  DeclareTurntable, DeclareSlice, DeclareInfo,   DeclareTransfer, DeclareConvert,
-                                                 DeclareSphere,  DeclareUp,        DeclareDown,  DeclareStatus, DeclareKeys,     DeclareSlurm};
+  static constexpr DeclareCommand kCommands[] = {DeclareRender,   DeclareTurntable, DeclareSlice,  DeclareInfo,
+                                                 DeclareTransfer, DeclareConvert,   DeclareSphere, DeclareUp,
+                                                 DeclareDown,     DeclareStatus,    DeclareKeys,   DeclareSlurm};
   return kCommands;
 }
 

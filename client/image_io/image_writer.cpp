@@ -165,6 +165,7 @@ Status WritePicture(const LocalImage& image, ImageSize size, const std::string& 
   } else {
     spec.attribute("oiio:ColorSpace", "Linear");
     spec.attribute("compression", "zip");
+    spec.attribute("DateTime", "");  // else the library puts the time there, and no two files are the same
   }
   StatePixelSize(notes.geometry, png, spec);
   if (!notes.record.empty()) {

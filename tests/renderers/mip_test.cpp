@@ -18,7 +18,7 @@ constexpr ProjectionMode kModes[] = {ProjectionMode::kMaximum, ProjectionMode::k
 FrameSetup ProjectionSetup(const Volume& volume, SetupOptions options, ProjectionMode mode, double samples_per_voxel = 1) {
   options.renderer = FindRenderer("mip");
   FrameSetup setup = MakeSetup(volume, options);
-  SetParameters({samples_per_voxel, double(mode)}, setup);
+  SetParameters({samples_per_voxel, double(mode), 0}, setup);
   return setup;
 }
 
