@@ -77,13 +77,15 @@ Result<Payload> FindPayload(const TextHeader& text, std::int64_t sample_bytes) {
 
 }  // namespace
 
-Result<RawVolume> ReadMetaImage(const std::string& path) {
-  return ReadTextVolume(path, {.name = "MetaImage",
-                               .separator = '=',
-                               .last_key = "ElementDataFile",
-                               .required = {"NDims", "DimSize", "ElementType", "ElementDataFile"},
-                               .read_header = ReadHeader,
-                               .find_payload = FindPayload});
+Result<RawVolume> ReadMetaImage(const std::string& path, const ReadOptions& options) {
+  return ReadTextVolume(path,
+                        {.name = "MetaImage",
+                         .separator = '=',
+                         .last_key = "ElementDataFile",
+                         .required = {"NDims", "DimSize", "ElementType", "ElementDataFile"},
+                         .read_header = ReadHeader,
+                         .find_payload = FindPayload},
+                        options);
 }
 
 }  // namespace slabstream

@@ -121,7 +121,7 @@ bool BeginsLikeGzip(const std::string& path) {
 
 }  // namespace
 
-Result<RawVolume> ReadNifti(const std::string& path) {
+Result<RawVolume> ReadNifti(const std::string& path, const ReadOptions& options) {
   Payload payload{.file = path, .compressed = BeginsLikeGzip(path)};
   std::array<std::byte, kHeaderBytes> bytes{};
   if (Status status = ReadPayload(payload, bytes, Extent::kStart); !status.ok()) return status;
@@ -135,7 +135,7 @@ Result<RawVolume> ReadNifti(const std::string& path) {
   if (!(offset <= 0x1p30F)) return Status::InvalidArgument(fmt::format("{}: vox_offset is {}, must be at most 2^30", path, offset));
   (payload.compressed ? payload.skip : payload.offset) = offset < float{kHeaderBytes} ? kUsualOffset : std::int64_t(offset);
   payload.big_endian = fields.big_endian();
-  return ReadSamples(path, *header, payload);
+  return ReadSamples(path, *header, payload, options);
 }
 
 }  // namespace slabstream

@@ -96,14 +96,16 @@ Result<Payload> FindPayload(const TextHeader& text, std::int64_t sample_bytes) {
 
 }  // namespace
 
-Result<RawVolume> ReadNrrd(const std::string& path) {
-  return ReadTextVolume(path, {.name = "NRRD",
-                               .first_line = "NRRD000",
-                               .separator = ':',
-                               .ignores_case = true,
-                               .required = {"type", "dimension", "sizes", "encoding"},
-                               .read_header = ReadHeader,
-                               .find_payload = FindPayload});
+Result<RawVolume> ReadNrrd(const std::string& path, const ReadOptions& options) {
+  return ReadTextVolume(path,
+                        {.name = "NRRD",
+                         .first_line = "NRRD000",
+                         .separator = ':',
+                         .ignores_case = true,
+                         .required = {"type", "dimension", "sizes", "encoding"},
+                         .read_header = ReadHeader,
+                         .find_payload = FindPayload},
+                        options);
 }
 
 }  // namespace slabstream

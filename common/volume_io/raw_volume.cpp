@@ -24,14 +24,17 @@ Result<Index3> ToSize(const std::string& path, std::vector<double> sizes) {
   return size;
 }
 
-Result<RawVolume> ReadSamples(const std::string& path, const RawHeader& header, const Payload& payload) {
+Result<RawVolume> ReadSamples(const std::string& path, const RawHeader& header, const Payload& payload, const ReadOptions& options) {
   // Samples in a file of their own: the volume's name first.
   const auto failed = [&](const Status& status) {
     return payload.file == path ? status : Status(status.code(), path + ": samples in " + status.message());
   };
   if (Status status = CheckHolds(payload, header.sample_bytes()); !status.ok()) return failed(status);
   if (Status status = CheckFitsMemory(header.sample_bytes(), path); !status.ok()) return status;
-  RawVolume raw{header, AlignedVector<std::byte>(std::size_t(header.sample_bytes()))};
+  RawVolume raw{header, {}};
+  if (payload.file != path) raw.samples_file = payload.file;
+  if (options.headers_only) return raw;
+  raw.bytes.resize(std::size_t(header.sample_bytes()));
   if (Status status = ReadPayload(payload, raw.bytes); !status.ok()) return failed(status);
   static_assert(std::endian::native == std::endian::little, "this machine's samples are little endian");
   if (payload.big_endian) SwapByteOrder(header.type, raw.bytes);

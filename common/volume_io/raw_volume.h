@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -31,7 +32,12 @@ struct RawHeader {
 
 struct RawVolume {
   RawHeader header;
-  AlignedVector<std::byte> bytes;  // this machine's byte order
+  AlignedVector<std::byte> bytes;           // this machine's byte order; none if only headers were read
+  std::filesystem::path samples_file = {};  // if that is another file than the header's
+};
+
+struct ReadOptions {
+  bool headers_only = false;  // check whatever can be checked without the samples, and take no memory for them
 };
 
 // Steps along the axes themselves.
@@ -45,13 +51,13 @@ inline constexpr Vec3 kRasFromLps = {-1, -1, 1};
 Result<Index3> ToSize(const std::string& path, std::vector<double> sizes);
 
 // Checks that the file and the memory are large enough, then takes memory for the samples and reads them.
-Result<RawVolume> ReadSamples(const std::string& path, const RawHeader& header, const Payload& payload);
+Result<RawVolume> ReadSamples(const std::string& path, const RawHeader& header, const Payload& payload, const ReadOptions& options);
 
 // The formats. Errors as in volume_reader.h.
-Result<RawVolume> ReadNifti(const std::string& path);
-Result<RawVolume> ReadNrrd(const std::string& path);
-Result<RawVolume> ReadMetaImage(const std::string& path);
-Result<RawVolume> ReadTiff(const std::string& path);  // a multi-page file, or a directory of slices
+Result<RawVolume> ReadNifti(const std::string& path, const ReadOptions& options);
+Result<RawVolume> ReadNrrd(const std::string& path, const ReadOptions& options);
+Result<RawVolume> ReadMetaImage(const std::string& path, const ReadOptions& options);
+Result<RawVolume> ReadTiff(const std::string& path, const ReadOptions& options);  // a multi-page file, or a directory of slices
 
 // The TIFF files of a directory in natural order ("s2.tif" before "s10.tif"); empty if there are none or it is no directory.
 std::vector<std::string> TiffFilesIn(const std::string& directory);

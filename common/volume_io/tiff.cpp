@@ -151,7 +151,8 @@ Status TiffFile::ReadTiles(const RawHeader& header, std::byte* out) {
 }
 
 // Takes memory for a whole volume of pages like `page`, after checking that files of that many bytes can hold it.
-Result<RawVolume> Allocate(const std::string& path, const RawHeader& page, std::int64_t pages, std::int64_t file_bytes) {
+Result<RawVolume> Allocate(const std::string& path, const RawHeader& page, std::int64_t pages, std::int64_t file_bytes,
+                           const ReadOptions& options) {
   const Result<Index3> size = ToSize(path, {double(page.size.x), double(page.size.y), double(pages)});
   if (!size.ok()) return size.status();
   RawVolume raw{page, {}};
@@ -164,7 +165,7 @@ Result<RawVolume> Allocate(const std::string& path, const RawHeader& page, std::
         fmt::format("{}: truncated: the header speaks of {} bytes of samples, the file has {}", path, needed, file_bytes));
   }
   if (Status status = CheckFitsMemory(needed, path); !status.ok()) return status;
-  raw.bytes.resize(std::size_t(needed));
+  if (!options.headers_only) raw.bytes.resize(std::size_t(needed));
   return raw;
 }
 
@@ -175,7 +176,7 @@ std::int64_t FileBytes(const std::string& path) {
 }
 
 // Reads the current page of `file` as slice number `slice` of the volume. `name`: of the page, for messages.
-Status ReadSlice(TiffFile& file, const std::string& name, std::int64_t slice, RawVolume& volume) {
+Status ReadSlice(TiffFile& file, const std::string& name, std::int64_t slice, RawVolume& volume, const ReadOptions& options) {
   const Result<RawHeader> page = file.ReadPageHeader();
   if (!page.ok()) return page.status();
   const RawHeader& wanted = volume.header;
@@ -183,10 +184,10 @@ Status ReadSlice(TiffFile& file, const std::string& name, std::int64_t slice, Ra
     return Status::InvalidArgument(fmt::format("{} is {} x {} {}, must be {} x {} {} like the first one", name, page->size.x, page->size.y,
                                                ToString(page->type), wanted.size.x, wanted.size.y, ToString(wanted.type)));
   }
-  return file.ReadPage(*page, volume.bytes.data() + slice * page->sample_bytes());
+  return options.headers_only ? Status::Ok() : file.ReadPage(*page, volume.bytes.data() + slice * page->sample_bytes());
 }
 
-Result<RawVolume> ReadPages(const std::string& path) {
+Result<RawVolume> ReadPages(const std::string& path, const ReadOptions& options) {
   TiffFile file(path);
   if (!file.is_open()) return file.NotTiff();
   const Result<RawHeader> first = file.ReadPageHeader();
@@ -194,15 +195,15 @@ Result<RawVolume> ReadPages(const std::string& path) {
   const Result<std::int64_t> pages = file.CountPages();
   if (!pages.ok()) return pages.status();
   if (*pages == 1) return Status::InvalidArgument(path + ": has 2 dimensions, must have 3 (a page for each slice)");
-  Result<RawVolume> raw = Allocate(path, *first, *pages, FileBytes(path));
+  Result<RawVolume> raw = Allocate(path, *first, *pages, FileBytes(path), options);
   for (std::int64_t page = 0; raw.ok() && page < *pages; ++page) {
     if (Status status = page == 0 ? file.GoToFirstPage() : file.GoToNextPage(); !status.ok()) return status;
-    if (Status status = ReadSlice(file, fmt::format("{}: page {}", path, page + 1), page, *raw); !status.ok()) return status;
+    if (Status status = ReadSlice(file, fmt::format("{}: page {}", path, page + 1), page, *raw, options); !status.ok()) return status;
   }
   return raw;
 }
 
-Result<RawVolume> ReadSlices(const std::string& directory, const std::vector<std::string>& paths) {
+Result<RawVolume> ReadSlices(const std::string& directory, const std::vector<std::string>& paths, const ReadOptions& options) {
   std::int64_t file_bytes = 0;
   for (const std::string& path : paths) file_bytes += FileBytes(path);
   std::optional<RawVolume> raw;
@@ -212,11 +213,11 @@ Result<RawVolume> ReadSlices(const std::string& directory, const std::vector<std
     if (!raw) {
       const Result<RawHeader> first = file.ReadPageHeader();
       if (!first.ok()) return first.status();
-      Result<RawVolume> allocated = Allocate(directory, *first, std::int64_t(paths.size()), file_bytes);
+      Result<RawVolume> allocated = Allocate(directory, *first, std::int64_t(paths.size()), file_bytes, options);
       if (!allocated.ok()) return allocated;
       raw = *std::move(allocated);
     }
-    if (Status status = ReadSlice(file, paths[slice], std::int64_t(slice), *raw); !status.ok()) return status;
+    if (Status status = ReadSlice(file, paths[slice], std::int64_t(slice), *raw, options); !status.ok()) return status;
     const Result<std::int64_t> pages = file.CountPages();
     if (!pages.ok()) return pages.status();
     if (*pages != 1) return file.Refused(fmt::format("has {} pages, must have 1 in a directory of slices", *pages));
@@ -250,12 +251,12 @@ std::vector<std::string> TiffFilesIn(const std::string& directory) {
   return paths;
 }
 
-Result<RawVolume> ReadTiff(const std::string& path) {
+Result<RawVolume> ReadTiff(const std::string& path, const ReadOptions& options) {
   std::error_code error;
-  if (!std::filesystem::is_directory(path, error)) return ReadPages(path);
+  if (!std::filesystem::is_directory(path, error)) return ReadPages(path, options);
   const std::vector<std::string> slices = TiffFilesIn(path);
   if (slices.empty()) return Status::InvalidArgument(path + ": a directory without TIFF files is not a volume");
-  return ReadSlices(path, slices);
+  return ReadSlices(path, slices, options);
 }
 
 }  // namespace slabstream

@@ -21,7 +21,7 @@ namespace {
 struct Format {
   std::string_view ending;
   std::string_view name;
-  Result<RawVolume> (*read)(const std::string& path);
+  Result<RawVolume> (*read)(const std::string& path, const ReadOptions& options);
 };
 
 // The only list. Endings are in lower case.
@@ -94,9 +94,12 @@ Result<LoadedVolume> Finish(RawVolume raw, const Format& format, const std::stri
   return loaded;
 }
 
-}  // namespace
+struct ReadFile {
+  RawVolume raw;
+  const Format* format = nullptr;
+};
 
-Result<LoadedVolume> ReadVolume(const std::string& path) {
+Result<ReadFile> ReadRaw(const std::string& path, const ReadOptions& options) {
   std::error_code error;
   const auto kind = std::filesystem::status(path, error).type();
   if (kind == std::filesystem::file_type::not_found) return Status::NotFound(path + ": no such file");
@@ -106,13 +109,40 @@ Result<LoadedVolume> ReadVolume(const std::string& path) {
   if (format == nullptr) {
     return Status::InvalidArgument(path + ": not a volume: the name must end in .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, .tif or .tiff");
   }
+  Result<RawVolume> raw = format->read(path, options);
+  if (!raw.ok()) return Printable(raw.status());
+  return ReadFile{std::move(*raw), format};
+}
+
+// What `read` returns, unless there is not enough memory.
+template <class Read>
+auto WithinMemory(const std::string& path, Read&& read) -> decltype(read()) {
   try {
-    Result<RawVolume> raw = format->read(path);
-    if (!raw.ok()) return Printable(raw.status());
-    return Finish(std::move(*raw), *format, path);
+    return read();
   } catch (const std::bad_alloc&) {
     return Status::ResourceExhausted(path + ": does not fit the memory");
   }
+}
+
+}  // namespace
+
+Result<LoadedVolume> ReadVolume(const std::string& path) {
+  return WithinMemory(path, [&]() -> Result<LoadedVolume> {
+    Result<ReadFile> file = ReadRaw(path, {});
+    if (!file.ok()) return file.status();
+    return Finish(std::move(file->raw), *file->format, path);
+  });
+}
+
+Result<std::vector<std::string>> CheckVolumeHeaders(const std::string& path) {
+  return WithinMemory(path, [&]() -> Result<std::vector<std::string>> {
+    const Result<ReadFile> file = ReadRaw(path, {.headers_only = true});
+    if (!file.ok()) return file.status();
+    if (const auto placed = PlaceInWorld(file->raw.header, path); !placed.ok()) return placed.status();
+    std::vector<std::string> files = {path};
+    if (!file->raw.samples_file.empty()) files.push_back(file->raw.samples_file.string());
+    return files;
+  });
 }
 
 bool LooksLikeVolume(const std::string& path) {

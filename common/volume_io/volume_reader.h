@@ -21,6 +21,7 @@
 #include <array>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "common/base/status.h"
 #include "common/volume/volume.h"
@@ -45,6 +46,10 @@ struct LoadedVolume {
 // NotFound (no such file), InvalidArgument (not a volume, more than three dimensions, several components, a side above kMaxVolumeSide),
 // DataLoss (truncated), ResourceExhausted (does not fit the memory). Messages name the path.
 Result<LoadedVolume> ReadVolume(const std::string& path);
+
+// Reads the headers alone, and checks what can be checked without the samples: sizes, types, the lengths of files, orientation. The files
+// that ReadVolume would read: `path` and, if its header names one, the file of the samples. Errors: as ReadVolume.
+Result<std::vector<std::string>> CheckVolumeHeaders(const std::string& path);
 
 // Whether ReadVolume would try this path, by its ending or, for directories, by the TIFF files in it.
 bool LooksLikeVolume(const std::string& path);

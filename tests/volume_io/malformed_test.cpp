@@ -59,6 +59,7 @@ TEST(Malformed, FilesThatAreCutOffAnywhereFail) {
     for (std::size_t length = 0; length < good.bytes.size(); length += length < 352 && good.bytes.size() - length > 60 ? 7 : 1) {
       WriteFile(path, good.bytes.substr(0, length));
       const Result<LoadedVolume> loaded = ReadVolume(path);
+      EXPECT_TRUE(CheckVolumeHeaders(path).ok() || !loaded.ok()) << "headers refuse what can be read";
       // The end of a TIFF directory and its trailing padding may be missing without harm.
       if (loaded.ok() && std::string(good.file) == "v.tif") continue;
       ASSERT_FALSE(loaded.ok()) << good.file << " cut to " << length << " of " << good.bytes.size();
@@ -86,6 +87,7 @@ TEST(Malformed, AlteredBytesNeverDoHarm) {
       }
       WriteFile(path, bytes);
       const Result<LoadedVolume> loaded = ReadVolume(path);
+      EXPECT_TRUE(CheckVolumeHeaders(path).ok() || !loaded.ok()) << "headers refuse what can be read";
       if (loaded.ok()) {
         EXPECT_EQ(std::int64_t(loaded->volume->block.bytes.size()), loaded->info.description.voxel_bytes());
       } else {
@@ -111,6 +113,28 @@ TEST(Malformed, DamageInsideCompressedSamplesIsFound) {
     WriteFile(path, bytes);
     ExpectFailure(ReadVolume(path).status(), StatusCode::kDataLoss, path, "damaged");
   }
+}
+
+TEST(Headers, AreEnoughToFindMostOfWhatIsWrongAndTheFiles) {
+  const TemporaryDirectory directory;
+  for (const Good& good : GoodFiles()) {
+    const std::string path = directory / good.file;
+    WriteFile(path, good.bytes);
+    const Result<std::vector<std::string>> files = CheckVolumeHeaders(path);
+    ASSERT_TRUE(files.ok()) << files.status().message();
+    EXPECT_THAT(*files, testing::ElementsAre(path));
+  }
+  const std::string header = "NRRD0004\ntype: uint8\ndimension: 3\nencoding: raw\nsizes: 2 3 4\ndata file: samples.raw\n\n";
+  const std::string path = directory / "v.nhdr", samples = directory / "samples.raw";
+  WriteFile(path, header);
+  ExpectFailure(CheckVolumeHeaders(path).status(), StatusCode::kNotFound, path, "samples.raw");
+  WriteFile(samples, Samples(23));
+  ExpectFailure(CheckVolumeHeaders(path).status(), StatusCode::kDataLoss, path, "truncated");
+  WriteFile(samples, Samples(24));
+  EXPECT_THAT(CheckVolumeHeaders(path).value(), testing::ElementsAre(path, samples));
+  WriteFile(path, "a letter");
+  ExpectFailure(CheckVolumeHeaders(path).status(), StatusCode::kInvalidArgument, path, "not a NRRD volume");
+  ExpectFailure(CheckVolumeHeaders(directory / "nothing.nii").status(), StatusCode::kNotFound, directory / "nothing.nii", "no such file");
 }
 
 TEST(Malformed, NamesThatAreNoVolumesFail) {
