@@ -22,10 +22,16 @@ namespace fs = std::filesystem;
 
 bool AllowedInName(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '.' || c == '_' || c == '-'; }
 
+// The beginning of an argument that is too long for a message.
+std::string Shown(const std::string& argument) {
+  constexpr std::size_t kMost = 512;
+  return argument.size() <= kMost ? argument : argument.substr(0, kMost) + "...";
+}
+
 Status CheckName(const std::string& name) {
   if (!name.empty() && name.size() <= kMaxNameBytes && std::ranges::all_of(name, AllowedInName)) return Status::Ok();
-  return Status::InvalidArgument(fmt::format("dataset name \"{}\" must have 1 to {} letters, digits, '.', '_' or '-'",
-                                             name.substr(0, kMaxNameBytes + 1), kMaxNameBytes));
+  return Status::InvalidArgument(
+      fmt::format("dataset name \"{}\" must have 1 to {} letters, digits, '.', '_' or '-'", Shown(name), kMaxNameBytes));
 }
 
 // The file name without its ending; ".nii.gz" is one ending.
@@ -96,7 +102,7 @@ Status AddNamed(FoundData& found, const DataArgument& argument) {
   const Result<VolumeSource> source = ParseVolumeSource(argument.path);
   if (!source.ok()) return source.status();
   std::error_code error;
-  if (!fs::exists(source->path, error)) return Status::NotFound("\"" + source->path + "\" does not exist");
+  if (!fs::exists(source->path, error)) return Status::NotFound("does not exist");
   return found.datasets.emplace(argument.name, DataSource(argument.path, "")).second ? Status::Ok() : Repeated(argument.name);
 }
 
@@ -135,9 +141,7 @@ Result<DataArgument> ParseDataArgument(const std::string& argument) {
   DataArgument parsed;
   if (equals != std::string::npos) parsed.name = argument.substr(0, equals);
   parsed.path = equals == std::string::npos ? argument : argument.substr(equals + 1);
-  const auto wrong = [&](const std::string& why) {
-    return Status::InvalidArgument(argument.substr(0, kMaxNameBytes + kMaxPathBytes) + ": " + why);
-  };
+  const auto wrong = [&](const std::string& why) { return Status::InvalidArgument(Shown(argument) + ": " + why); };
   if (equals != std::string::npos) {
     if (Status name = CheckName(parsed.name); !name.ok()) return wrong(name.message());
   }
@@ -158,7 +162,7 @@ FoundData FindData(const std::vector<std::string>& arguments, const std::string&
   FoundData found;
   std::vector<std::pair<std::string, DataArgument>> folders;
   const auto note = [&](const std::string& argument, const Status& status) {
-    if (!status.ok()) found.errors.emplace_back(status.code(), prefix + argument + ": " + status.message());
+    if (!status.ok()) found.errors.emplace_back(status.code(), prefix + Shown(argument) + ": " + status.message());
   };
   // What is named first: what lies in folders gives way.
   for (const std::string& argument : arguments) {

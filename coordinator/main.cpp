@@ -73,6 +73,7 @@ int Run(int argc, char** argv) {
     if (!found.errors.empty()) return ReportAll(app.get_name(), found.errors);
     options.catalogue = std::move(found.datasets);
     options.folders = {found.folders.begin(), found.folders.end()};
+    options.machine.log_level = LeastLogLevel();
     LimitMemory(options.machine.memory_bytes);
     if (compress) options.codec = Codec::kZstd;
     return Serve(std::move(options));

@@ -99,7 +99,8 @@ Result<FoundData> Find(const std::vector<std::string>& arguments) {
   std::array<char, 256> host{};
   if (::gethostname(host.data(), host.size() - 1) != 0) host = {"this host"};
   const auto here = [&](const Status& status) {
-    return Status(status.code(), fmt::format("{} (paths are those of the coordinator's host, {})", status.message(), host.data()));
+    return Status(status.code(),
+                  Printable(fmt::format("{} (paths are those of the coordinator's host, {})", status.message(), host.data())));
   };
   for (const std::string& argument : arguments) {
     const Result<DataArgument> parsed = ParseDataArgument(argument);
@@ -463,7 +464,6 @@ Result<std::unique_ptr<CoordinatorService>> CoordinatorService::Start(Context& c
   options.surroundings.cores = std::int32_t(std::max(std::thread::hardware_concurrency(), 1U));
   options.machine.datasets = std::move(options.catalogue);
   options.machine.folders = std::move(options.folders);
-  options.machine.log_level = LeastLogLevel();
   auto impl = std::make_unique<Impl>(std::move(options), std::move(keys), std::move(*clients), std::move(*control), std::move(*slabs));
   impl->client_endpoint = std::move(*client_endpoint);
   impl->worker_endpoint = std::move(*worker_endpoint);

@@ -32,7 +32,7 @@ struct CoordinatorOptions {
   Catalogue catalogue;               // datasets
   std::set<std::string> folders;     // that are watched (FoundData)
   Codec codec = Codec::kRaw;         // of voxels on their way to workers; zstd pays if the link is slower than packing
-  CoordinatorConfig machine;         // filled in by Start: epoch, pid, slabs_endpoint, datasets, folders, log_level
+  CoordinatorConfig machine;         // filled in by Start: epoch, pid, slabs_endpoint, datasets, folders
   ServiceSurroundings surroundings;  // except the link, filled in by Start
   PlanFunction make_plan = &Planner::Plan;
   CountFunction count_occupied = CountOccupied;

@@ -62,7 +62,7 @@ TEST_F(BadInputTest, CommandLines) {
       {{"up", "--link", "bus:-1,5"}, "a latency in [0, 1000000] microseconds"},
       {{"status", "--endpoint", "tcp://0.0.0.0:1"}, "--endpoint"},
       {{"down", "--endpoint", "tcp://127.0.0.1:*"}, "--endpoint"},
-      {{"data"}, "list"},
+      {{"data"}, "required"},
       {{"data", "add"}, "DATA"},
       {{"data", "add", "a=x.nrrd"},
        "a=x.nrrd: the path must be absolute, since it is one of the coordinator's host; on this host it would be /"},

@@ -142,13 +142,15 @@ TEST_F(DatasetsTest, OrdersAddRemoveAndReload) {
   ASSERT_TRUE(Order(DataAction::kRemove, {"other"}).ok());
   EXPECT_THAT(Names(), ElementsAre("ball"));
 
+  const std::string text = (directory_ / "notes.txt").string();
+  std::ofstream(text) << "no volume";
   const std::pair<std::string, std::string> refused[] = {
       {"other=" + path + ".missing", "does not exist (paths are those of the coordinator's host, "},
       {"other=other.nrrd", "the path must be absolute"},
       {"a/b=" + path, "dataset name \"a/b\""},
       {"ball=" + path, "there is already a dataset named \"ball\""},
       {path, "is a file; give it a name"},
-      {"text=" __FILE__, "not a volume"},
+      {"text=" + text, "not a volume"},
       {"other=/" + std::string(4096, 'p'), "a path of 4097 bytes, must have 1 to 4096"},
   };
   for (const auto& [item, why] : refused) {
