@@ -58,6 +58,7 @@ std::optional<std::uint64_t> NonceOfAnswer(const AnyMessage& message) {
   if (const auto* status = std::get_if<StatusReply>(&message)) return status->nonce;
   if (const auto* end = std::get_if<ShutDownReply>(&message)) return end->nonce;
   if (const auto* keys = std::get_if<KeysReply>(&message)) return keys->nonce;
+  if (const auto* data = std::get_if<DataReply>(&message)) return data->nonce;
   if (const auto* refused = std::get_if<OrderRefused>(&message)) return refused->nonce;
   return std::nullopt;
 }
@@ -352,6 +353,12 @@ Result<std::vector<AdmittedKey>> Client::OrderKeys(KeysOrder order, Duration tim
   Result<KeysReply> reply = impl_->Ask<KeysReply>(std::move(order), timeout);
   if (!reply.ok()) return reply.status();
   return std::move(reply->keys);
+}
+
+Result<std::vector<DatasetStatus>> Client::OrderData(DataOrder order, Duration timeout) {
+  Result<DataReply> reply = impl_->Ask<DataReply>(std::move(order), timeout);
+  if (!reply.ok()) return reply.status();
+  return std::move(reply->datasets);
 }
 
 Wakeup& Client::wakeup() { return impl_->wakeup; }

@@ -79,6 +79,10 @@ class Client {
   // reason.
   Result<std::vector<AdmittedKey>> OrderKeys(KeysOrder order, Duration timeout = std::chrono::seconds(5));
 
+  // About the datasets of the catalogue; `order.nonce` is filled in. The datasets after it. Errors: as OrderKeys; ResourceExhausted: the
+  // catalogue is full.
+  Result<std::vector<DatasetStatus>> OrderData(DataOrder order, Duration timeout = std::chrono::seconds(30));
+
   Wakeup& wakeup();  // Notify ends a Next early, from any thread or a signal handler
 
  private:

@@ -1,28 +1,60 @@
-// The catalogue: which volumes a coordinator serves, by name, and how to load each. Clients name datasets; no request carries a path.
+// The catalogue of a coordinator: which volumes --data and orders of admins mean, and how they are read. Clients name datasets; no request
+// of theirs carries a path.
 //
 // What --data takes, any number of times:
-//   NAME=PATH   one volume: a file, or a directory of slices; with options for reading it behind a question mark (read_options.h)
-//   DIR         every volume file in DIR by its stem ("head.nii.gz" is "head"); a DIR of slices is one volume named as the directory;
-//               if DIR holds nothing but directories, each that holds a volume
+//   NAME=PATH   one volume: a file, or a folder of slices; with options for reading it behind a question mark (read_options.h)
+//   DIR         a watched folder: every volume file in it by its stem ("head.nii.gz" is "head"), also those that come later, and every
+//               folder in it that is a volume by its name; a folder of slices or of DICOM alone is one volume named as the folder. One
+//               of nothing but folders holds a volume in each. What has a name that begins with a dot is left out
+//
+// Everything here may take as long as the file system does. Any thread.
 #pragma once
 
-#include <functional>
-#include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "common/base/status.h"
-#include "common/volume/volume.h"
+#include "coordinator/data_source.h"
 
 namespace slabstream {
 
-using VolumeLoader = std::function<Result<std::shared_ptr<const Volume>>()>;
-using Catalogue = std::map<std::string, VolumeLoader>;
+inline constexpr std::size_t kMaxPathBytes = 4096;
 
-// Reads directories, opens no volume. InvalidArgument: a name that is empty, too long (kMaxNameBytes) or has other characters than letters,
-// digits and "._-", a repeated name, a DIR without volumes, options that are wrong; NotFound: a path that does not exist. Messages name the
-// argument.
-Result<Catalogue> MakeCatalogue(const std::vector<std::string>& arguments);
+// Help of --data.
+inline constexpr char kDataHelp[] =
+    "A volume to serve, as NAME=FILE or NAME=FILE?OPTION=VALUE,... with the options for reading of `slabstream render`, or a folder of "
+    "volumes, which are named after their files. A folder is watched: files may come, change and go";
+
+struct DataArgument {
+  std::string name;  // empty: `path` is a folder
+  std::string path;  // of a named one: with its options
+};
+// Looks at no file. InvalidArgument: a name that is empty, too long (kMaxNameBytes) or has other characters than letters, digits and
+// "._-"; a path that is empty or longer than kMaxPathBytes. Messages begin with the argument.
+Result<DataArgument> ParseDataArgument(const std::string& argument);
+
+// A folder as it is watched: absolute, without a slash at its end.
+std::string WatchedFolder(const std::string& path);
+
+// Reads folders, opens no volume. Errors, one for each wrong argument, which begins the message, behind the prefix. InvalidArgument: of
+// ParseDataArgument, a repeated name, a file without a name, options that are wrong; NotFound: a path that does not exist. Files of folders
+// whose names are taken are left out.
+FoundData FindData(const std::vector<std::string>& arguments, const std::string& prefix = "--data ");
+
+// What lies in a watched folder. NotFound, Unavailable: it cannot be read.
+Result<FoundData> ListFolder(const std::string& folder);
+
+// Reads the headers of all files. Adds an error for each named one that cannot be read. One in a folder may still be on its way: it gets
+// a complaint and stays.
+void CheckFiles(FoundData& found);
+
+struct LoadedSource {
+  std::shared_ptr<const Volume> volume;
+  std::shared_ptr<const FileStamp> stamp;  // of its files as they were read; null: they never change
+};
+// Reads the voxels. Files that change meanwhile are read a second time, so the voxels are never those of two files. Errors: of ReadVolume;
+// Unavailable: they change again.
+Result<LoadedSource> LoadSource(const DataSource& source);
 
 }  // namespace slabstream

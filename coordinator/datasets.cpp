@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <chrono>
 #include <string>
 #include <utility>
 
@@ -12,8 +14,13 @@ namespace {
 constexpr std::size_t kNamesInMessage = 12;
 }
 
-DatasetTable::DatasetTable(const std::vector<std::string>& names) {
-  for (const std::string& name : names) entries_.try_emplace(name);
+DatasetTable::DatasetTable(Catalogue catalogue, std::set<std::string> watched) : folders(std::move(watched)) {
+  for (auto& [name, source] : catalogue) entries_[name].source = std::move(source);
+}
+
+DatasetTable::Entry* DatasetTable::Find(const std::string& name) {
+  const auto entry = entries_.find(name);
+  return entry == entries_.end() ? nullptr : &entry->second;
 }
 
 const DatasetTable::Entry* DatasetTable::Find(const std::string& name) const {
@@ -21,68 +28,138 @@ const DatasetTable::Entry* DatasetTable::Find(const std::string& name) const {
   return entry == entries_.end() ? nullptr : &entry->second;
 }
 
+DatasetTable::Entry* DatasetTable::FindLoad(const std::string& name, LoadId load) {
+  Entry* const entry = Find(name);
+  return entry != nullptr && entry->state == DatasetState::kReady && entry->load == load ? entry : nullptr;
+}
+
 Status DatasetTable::NoSuchDataset(const std::string& name) const {
-  if (entries_.empty()) return Status::NotFound("no dataset \"" + name + "\": the catalogue is empty");
   std::vector<std::string> names;
   for (const auto& [known, entry] : entries_) {
-    if (names.size() < kNamesInMessage) names.push_back(known);
+    if (entry.awaited == 0 && names.size() < kNamesInMessage) names.push_back(known);
   }
-  const std::string more = entries_.size() > kNamesInMessage ? fmt::format(" and {} more", entries_.size() - kNamesInMessage) : "";
+  if (names.empty()) return Status::NotFound("no dataset \"" + name + "\": the catalogue is empty");
+  const std::string more = size() > names.size() ? fmt::format(" and {} more", size() - names.size()) : "";
   return Status::NotFound(fmt::format("no dataset \"{}\": the catalogue has {}{}", name, fmt::join(names, ", "), more));
 }
 
-LoadId DatasetTable::BeginLoad(const std::string& name) {
+std::size_t DatasetTable::size() const {
+  return std::size_t(std::ranges::count_if(entries_, [](const auto& entry) { return entry.second.awaited == 0; }));
+}
+
+void DatasetTable::ForEach(const std::function<void(const std::string&, Entry&)>& visit) {
+  for (auto& [name, entry] : entries_) visit(name, entry);
+}
+
+void DatasetTable::Add(const std::string& name, DataSource source, Time now) {
+  Entry& entry = entries_[name];
+  CHECK(entry.awaited != 0 || (entry.source.path.empty() && !entry.source.load)) << name;
+  entry = {.source = std::move(source), .since = now};
+}
+
+void DatasetTable::Await(const std::string& name, LookId look) { entries_[name].awaited = look; }
+
+void DatasetTable::Remove(const std::string& name) {
+  const auto entry = entries_.find(name);
+  Retire(entry->second);
+  entries_.erase(entry);
+}
+
+LoadId DatasetTable::BeginLoad(const std::string& name, Time now) {
   Entry& entry = entries_.at(name);
   CHECK(entry.state == DatasetState::kUnloaded || entry.state == DatasetState::kFailed) << name;
-  entry = {.state = DatasetState::kLoading, .load = ++last_load_, .last_use = entry.last_use};
-  return entry.load;
+  entry.state = DatasetState::kLoading;
+  entry.since = now;
+  entry.error.clear();
+  return entry.load = ++last_load_;
 }
 
 void DatasetTable::Use(const std::string& name) { entries_.at(name).last_use = ++uses_; }
 
 bool DatasetTable::Loaded(const std::string& name, LoadId load, DatasetId id, std::shared_ptr<const VolumeSummary> summary,
-                          std::uint64_t bytes) {
-  const auto found = entries_.find(name);
-  if (found == entries_.end() || found->second.state != DatasetState::kLoading || found->second.load != load) return false;
+                          std::uint64_t bytes, std::shared_ptr<const FileStamp> stamp, Time now) {
+  if (!IsLoading(name, load)) return false;
+  Entry* const entry = Find(name);
   CHECK(summary != nullptr) << name;
-  found->second = {.state = DatasetState::kReady,
-                   .load = load,
-                   .id = id,
-                   .summary = std::move(summary),
-                   .bytes = bytes,
-                   .last_use = found->second.last_use};
+  entry->state = DatasetState::kReady;
+  entry->since = now;
+  entry->id = id;
+  entry->summary = std::move(summary);
+  entry->stamp = std::move(stamp);
+  entry->bytes = bytes;
+  retired_.erase(id);  // the same voxels again
   return true;
 }
 
-bool DatasetTable::Failed(const std::string& name, const Status& status) {
-  const auto found = entries_.find(name);
-  if (found == entries_.end() || found->second.state != DatasetState::kLoading) return false;
-  found->second = {.state = DatasetState::kFailed, .load = found->second.load, .error = status.message()};
-  return true;
+bool DatasetTable::IsLoading(const std::string& name, LoadId load) const {
+  const Entry* const entry = Find(name);
+  return entry != nullptr && entry->state == DatasetState::kLoading && entry->load == load;
+}
+
+void DatasetTable::Fail(const std::string& name, const Status& status, Time now) {
+  Reset(name, now);
+  Entry& entry = entries_.at(name);
+  entry.state = DatasetState::kFailed;
+  entry.error = status.message();
+}
+
+void DatasetTable::Reset(const std::string& name, Time now) {
+  Entry& entry = entries_.at(name);
+  Retire(entry);
+  Entry fresh{.source = std::move(entry.source), .since = now, .load = entry.load, .last_use = entry.last_use, .looks = entry.looks};
+  fresh.looks.End();
+  entry = std::move(fresh);
+}
+
+void DatasetTable::Retire(const Entry& entry) {
+  if (entry.state == DatasetState::kReady) retired_[entry.id] = entry.bytes;
 }
 
 std::uint64_t DatasetTable::bytes() const {
   std::uint64_t total = 0;
   for (const auto& [name, entry] : entries_) total += entry.bytes;
+  for (const auto& [id, bytes] : retired_) total += bytes;
   return total;
 }
 
-std::optional<DatasetId> DatasetTable::UnloadOne(const std::function<bool(DatasetId)>& in_use) {
-  Entry* oldest = nullptr;
-  for (auto& [name, entry] : entries_) {
+bool DatasetTable::Holds(DatasetId dataset) const {
+  const auto is_it = [dataset](const auto& entry) { return entry.second.state == DatasetState::kReady && entry.second.id == dataset; };
+  return retired_.contains(dataset) || std::ranges::any_of(entries_, is_it);
+}
+
+std::optional<DatasetId> DatasetTable::UnloadOne(const std::function<bool(DatasetId)>& in_use, Time now) {
+  const std::string* oldest = nullptr;
+  std::uint64_t last_use = 0;
+  for (const auto& [name, entry] : entries_) {
     const bool may_go = entry.state == DatasetState::kReady && !in_use(entry.id);
-    if (may_go && (oldest == nullptr || entry.last_use < oldest->last_use)) oldest = &entry;
+    if (!may_go || (oldest != nullptr && entry.last_use >= last_use)) continue;
+    oldest = &name;
+    last_use = entry.last_use;
   }
   if (oldest == nullptr) return std::nullopt;
-  const DatasetId id = oldest->id;
-  *oldest = {.last_use = oldest->last_use};
+  const DatasetId id = entries_.at(*oldest).id;
+  Reset(*oldest, now);
+  retired_.erase(id);
   return id;
 }
 
-std::vector<DatasetStatus> DatasetTable::Report() const {
+std::vector<DatasetId> DatasetTable::TakeRetired(const std::function<bool(DatasetId)>& in_use) {
+  std::vector<DatasetId> unused;
+  std::erase_if(retired_, [&](const auto& retired) {
+    if (in_use(retired.first)) return false;
+    unused.push_back(retired.first);
+    return true;
+  });
+  return unused;
+}
+
+std::vector<DatasetStatus> DatasetTable::Report(Time now) const {
   std::vector<DatasetStatus> report;
   for (const auto& [name, entry] : entries_) {
+    if (entry.awaited != 0) continue;
     DatasetStatus status{.name = name, .state = entry.state, .error = entry.error};
+    const auto since = std::chrono::duration_cast<std::chrono::milliseconds>(now - entry.since);
+    status.since_ms = std::uint64_t(std::max(since, std::chrono::milliseconds(0)).count());
     if (entry.summary) {
       status.description = entry.summary->description;
       status.range = entry.summary->range;

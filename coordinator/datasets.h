@@ -1,6 +1,9 @@
-// DatasetTable: the catalogue's names and how far each has been loaded. A dataset is loaded at its first use; a failed load is tried again
-// at the next request. Every load has a number, so that results of an earlier load are recognised. Loaded datasets that nobody uses may be
-// unloaded, the least recently used one first; they are loaded again when they are asked for.
+// DatasetTable: the catalogue as it is now, and how far each dataset has been loaded. A dataset is loaded at its first use; a failed load
+// is tried again at the next request. Every load has a number, so that results of an earlier load are recognised. Loaded datasets that
+// nobody uses may be unloaded, the least recently used one first; they are loaded again when they are asked for.
+//
+// Names come and go, and files change. Voxels that the table does not have any more, but that frames are still rendered from, are retired:
+// they stay until no frame uses them.
 #pragma once
 
 #include <cstdint>
@@ -8,12 +11,16 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/base/time.h"
 #include "common/planning/frame_plan.h"
 #include "common/wire/client_messages.h"
+#include "coordinator/data_source.h"
+#include "coordinator/look_counter.h"
 
 namespace slabstream {
 
@@ -22,35 +29,63 @@ using LoadId = std::uint32_t;
 class DatasetTable {
  public:
   struct Entry {
+    DataSource source;
     DatasetState state = DatasetState::kUnloaded;
+    Time since;                                    // in this state
     LoadId load = 0;                               // the last one begun; 0: none
     DatasetId id = 0;                              // kReady only
     std::shared_ptr<const VolumeSummary> summary;  // kReady only
+    std::shared_ptr<const FileStamp> stamp;        // kReady only: of its files as they were read; null: they never change
     std::string error;                             // kFailed only
     std::uint64_t bytes = 0;                       // kReady only: memory of its voxels
     std::uint64_t last_use = 0;                    // greater: later
+    LookCounter looks;                             // at its files, while it is ready
+    // Not in the catalogue: somebody asks for it, and this look at the folders will tell whether it is there. 0: it is in the catalogue.
+    LookId awaited = 0;
   };
 
-  explicit DatasetTable(const std::vector<std::string>& names);
+  DatasetTable(Catalogue catalogue, std::set<std::string> folders);
 
-  const Entry* Find(const std::string& name) const;     // null: not in the catalogue
+  Entry* Find(const std::string& name);  // null: neither in the catalogue nor awaited
+  const Entry* Find(const std::string& name) const;
+  // Ready, by this load.
+  Entry* FindLoad(const std::string& name, LoadId load);
   Status NoSuchDataset(const std::string& name) const;  // NotFound, naming what there is
-  LoadId BeginLoad(const std::string& name);            // of an unloaded or failed one
+  std::size_t size() const;                             // in the catalogue
+  void ForEach(const std::function<void(const std::string& name, Entry& entry)>& visit);
+
+  // ---- the catalogue
+  void Add(const std::string& name, DataSource source, Time now);  // no such name is in it; one that is awaited is there now
+  void Await(const std::string& name, LookId look);
+  void Remove(const std::string& name);  // retires its voxels
+  std::set<std::string> folders;         // that are watched
+
+  // ---- voxels
+  LoadId BeginLoad(const std::string& name, Time now);  // of an unloaded or failed one
   void Use(const std::string& name);                    // a request asks for it
-
   // The end of a load. False: another one was begun since, or none; nothing changes.
-  bool Loaded(const std::string& name, LoadId load, DatasetId id, std::shared_ptr<const VolumeSummary> summary, std::uint64_t bytes);
-  // The end of the load that is under way. False: none is.
-  bool Failed(const std::string& name, const Status& status);
+  bool Loaded(const std::string& name, LoadId load, DatasetId id, std::shared_ptr<const VolumeSummary> summary, std::uint64_t bytes,
+              std::shared_ptr<const FileStamp> stamp, Time now);
+  bool IsLoading(const std::string& name, LoadId load) const;
+  // Both retire the voxels that it has. The first one as if it had never been loaded.
+  void Reset(const std::string& name, Time now);
+  void Fail(const std::string& name, const Status& status, Time now);
 
-  std::uint64_t bytes() const;  // of all loaded ones
+  std::uint64_t bytes() const;          // of all voxels, the retired ones too
+  bool Holds(DatasetId dataset) const;  // ready or retired
+  std::size_t retired() const { return retired_.size(); }
   // Unloads the least recently used one of those that are not `in_use`. nullopt: there is none.
-  std::optional<DatasetId> UnloadOne(const std::function<bool(DatasetId)>& in_use);
+  std::optional<DatasetId> UnloadOne(const std::function<bool(DatasetId)>& in_use, Time now);
+  // Takes out those that are retired and not `in_use`. Their voxels may go.
+  std::vector<DatasetId> TakeRetired(const std::function<bool(DatasetId)>& in_use);
 
-  std::vector<DatasetStatus> Report() const;  // by name
+  std::vector<DatasetStatus> Report(Time now) const;  // by name
 
  private:
+  void Retire(const Entry& entry);
+
   std::map<std::string, Entry> entries_;
+  std::map<DatasetId, std::uint64_t> retired_;  // and the memory of each
   LoadId last_load_ = 0;
   std::uint64_t uses_ = 0;
 };

@@ -23,52 +23,6 @@ static_assert(kCountAhead <= OccupancyTable::kMaxKept);
 constexpr std::size_t kPlansAhead = 1;
 }  // namespace
 
-void FrameMachine::State::On(const DatasetLoaded& event) {
-  if (!datasets.Loaded(event.name, event.load, event.dataset, event.summary, event.bytes)) return;
-  const auto waits = [&](const OpenRequest& request) { return request.submit.frame.dataset == event.name && !request.volume; };
-  queue.ForEach([&](OpenRequest& request) {
-    if (waits(request) && FindVolume(request).ok()) SendQueued(request);
-  });
-  for (OpenRequest& request : queue.Extract(waits)) FailRequest(request, FindVolume(request));
-
-  const std::uint64_t share = DatasetShare(config.memory_bytes);
-  while (datasets.bytes() > share && UnloadOne()) {
-  }
-  if (datasets.bytes() <= share) return;
-  // All that are loaded are in use. What came last goes, with its requests.
-  const Status full = Status::ResourceExhausted(
-      fmt::format("dataset \"{}\" needs {}, limit {} ({} are in use by other datasets); the "
-                  "coordinator's --memory sets the limit",
-                  event.name, MemoryText(event.bytes), MemoryText(share), MemoryText(datasets.bytes() - event.bytes)));
-  const auto needs = [&](const OpenRequest& request) { return request.submit.frame.dataset == event.name; };
-  for (const OpenRequest& request : queue.Extract(needs)) FailRequest(request, full);
-  UnloadOne();
-}
-
-bool FrameMachine::State::InUse(DatasetId dataset) {
-  bool used = std::ranges::any_of(frames, [&](const RunningFrame& frame) { return frame.plan().setup.dataset == dataset; });
-  queue.ForEach([&](const OpenRequest& request) { used = used || (request.volume && request.volume->dataset() == dataset); });
-  return used;
-}
-
-bool FrameMachine::State::UnloadOne() {
-  const std::optional<DatasetId> unloaded = datasets.UnloadOne([this](DatasetId dataset) { return InUse(dataset); });
-  if (!unloaded) return false;
-  occupancy.Forget(*unloaded);
-  actions.emplace_back(UnloadDataset{*unloaded});
-  return true;
-}
-
-void FrameMachine::State::On(const DatasetFailed& event) {
-  if (!datasets.Failed(event.name, event.status)) return;
-  if (event.status.code() == StatusCode::kResourceExhausted && UnloadOne()) {  // there may be room now
-    actions.emplace_back(LoadDataset{.name = event.name, .load = datasets.BeginLoad(event.name)});
-    return;
-  }
-  const auto waiting = queue.Extract([&](const OpenRequest& request) { return request.submit.frame.dataset == event.name; });
-  for (const OpenRequest& request : waiting) FailRequest(request, event.status);
-}
-
 void FrameMachine::State::On(const OccupiedCounted& event) {
   if (event.grid.ok()) {
     occupancy.Counted(event.count, *event.grid);
@@ -93,7 +47,16 @@ void FrameMachine::State::On(const Planned& event) {
     });
   } else {
     const auto is_it = [&](const OpenRequest& request) { return request.plan == event.plan && request.planned_for == roster.version(); };
-    for (const OpenRequest& request : queue.Extract(is_it)) FailRequest(request, fit.status());
+    const StatusCode code = fit.status().code();
+    const bool bad = code == StatusCode::kInvalidArgument || code == StatusCode::kNotFound;
+    const bool too_large = event.frame.ok() && code == StatusCode::kResourceExhausted;
+    for (const OpenRequest& request : queue.Extract(is_it)) {
+      if (bad || too_large) {
+        RefuseRequest(request, fit.status(), bad ? &RefusedRequests::bad_request : &RefusedRequests::too_large);
+      } else {
+        FailRequest(request, fit.status());
+      }
+    }
   }
 }
 
@@ -101,18 +64,6 @@ Result<int> FrameMachine::State::FramesThatFitWorkers(const FramePlan& plan, con
   std::vector<WorkerLimit> workers;
   for (const Member& member : roster.members()) workers.push_back({member.id, member.description.memory_bytes});
   return FramesThatFit(plan, summary, workers);
-}
-
-// Sets request.volume; its dataset is loaded. NotFound: no such preset.
-Status FrameMachine::State::FindVolume(OpenRequest& request) const {
-  const FrameRequest& frame = request.submit.frame;
-  const DatasetTable::Entry& dataset = *datasets.Find(frame.dataset);
-  Result<TransferFunction> transfer = ResolveTransfer(frame.transfer, *dataset.summary);
-  if (!transfer.ok()) return transfer.status();
-  const VolumeGeometry& geometry = dataset.summary->description.geometry;
-  if (Status status = CheckClipping(frame.clipping, geometry); !status.ok()) return status;
-  request.volume.emplace(dataset.id, *std::move(transfer), FindRenderer(frame.renderer), MakeClipRegion(frame.clipping, geometry));
-  return Status::Ok();
 }
 
 // Counts for the next requests in turn. Those behind them wait, so that no grid is dropped before it is used.
@@ -185,9 +136,14 @@ void FrameMachine::State::AfterGroupDone(const RunningFrame& frame) {
   SendClient(frame.request().client, frame.Progress());
 }
 
-void FrameMachine::State::EndFrame(FrameId id) {
+void FrameMachine::State::EndFrame(FrameId id, std::string_view result) {
   const RunningFrame& frame = *frames.Find(id);
   const std::vector<WorkerId> workers = frame.Participants();
+  const OpenRequest& request = frame.request();
+  Tell(NoteAbout::kFrames, LogLevel::kInfo, "frame {} of client {}: dataset {}, {}, {}x{}, {:.1f} ms, workers {}, attempts {}: {}", id,
+       request.client, request.submit.frame.dataset, request.submit.frame.renderer, request.submit.frame.size.width,
+       request.submit.frame.size.height, std::chrono::duration<double, std::milli>(now - request.arrived).count(), workers.size(),
+       frame.attempt(), result);
   // Frames overlap, so one costs the time since the frame before it ended. Waiting for workers costs nothing.
   const Duration cost = frame.between_attempts() ? Duration::zero() : now - std::max(frame.attempt_begin(), last_end);
   queue.Settle(frame.request(), cost);
@@ -197,8 +153,8 @@ void FrameMachine::State::EndFrame(FrameId id) {
 }
 
 void FrameMachine::State::FailFrame(const RunningFrame& frame, const Status& status) {
-  FailRequest(frame.request(), status);
-  EndFrame(frame.id());
+  AnswerFailure(frame.request(), status);
+  EndFrame(frame.id(), status.message());
 }
 
 void FrameMachine::State::Expire() {
@@ -223,6 +179,7 @@ void FrameMachine::State::Expire() {
     const DatasetTable::Entry& dataset = *datasets.Find(request.submit.frame.dataset);
     const bool counting = request.volume && occupancy.Counting(request.volume->Whole());
     FailRequest(request, late(request, dataset.state != DatasetState::kReady ? "its dataset was still being loaded"
+                                       : !IsSeen(request)                    ? "its dataset's files were still being looked at"
                                        : clients.IsBehind(request.client)    ? "this client did not read its earlier pictures"
                                        : roster.empty()                      ? "there was no worker"
                                        : counting                            ? "the occupied voxels of its dataset were still being counted"
@@ -243,6 +200,7 @@ void FrameMachine::State::Expire() {
     }
   }
 
+  if (!datasets.folders.empty() && now >= next_round && !folder_looks.UnderWay()) LookAtEverything();
   if (!roster.empty() && now >= next_ping) {
     for (const Member& member : roster.members()) SendWorker(member.id, MakePing(member.id));
     next_ping = now + config.heartbeat;
@@ -303,7 +261,7 @@ void FrameMachine::State::DismissWorkers() {
 // Starts the first frame in turn that is planned for the present workers. False: there is none, or the workers' memory has no room for it
 // yet. None overtakes it then, so that it gets the room.
 bool FrameMachine::State::StartNextFrame() {
-  const auto ready = [&](const OpenRequest& open) { return HasPlan(open) && !clients.IsBehind(open.client); };
+  const auto ready = [&](const OpenRequest& open) { return HasPlan(open) && IsSeen(open) && !clients.IsBehind(open.client); };
   const OpenRequest* const next = queue.FindNext(ready);
   if (next == nullptr || !frames.HasRoomFor(*next)) return false;
   const RunningFrame& running = frames.Add(RunningFrame(frames.next_id(), queue.Take(*next), limits, now));
@@ -327,7 +285,7 @@ void FrameMachine::State::HandOut(RunningFrame& frame) {
 void FrameMachine::State::StopAll(const AnyMessage& goodbye, const std::string& reason) {
   const auto everything = [](const OpenRequest&) { return true; };
   for (const OpenRequest& request : queue.Extract(everything)) FailRequest(request, Status::Unavailable(reason));
-  for (const RunningFrame& frame : frames) FailRequest(frame.request(), Status::Unavailable(reason));
+  for (const RunningFrame& frame : frames) AnswerFailure(frame.request(), Status::Unavailable(reason));
   for (const Member& member : roster.members()) SendWorker(member.id, goodbye);
   actions.emplace_back(StopService{});
   stopped = true;
@@ -343,6 +301,7 @@ Time FrameMachine::State::EndOfWait(const OpenRequest& request) const {
 
 Time FrameMachine::State::NextWake() {
   Time next = std::min(roster.NextWake(), clients.NextWake());
+  if (!datasets.folders.empty() && !folder_looks.UnderWay()) next = std::min(next, next_round);
   const auto consider = [&](const OpenRequest& request) {
     next = std::min(next, request.deadline());
     next = std::min(next, EndOfWait(request));
@@ -369,7 +328,11 @@ std::vector<CoordinatorAction> FrameMachine::Step(const CoordinatorEvent& event,
   State& state = *state_;
   if (state.stopped) return {};
   state.now = now;
-  if (!state.started) state.started = now;
+  if (!state.started) {
+    state.started = now;
+    state.next_round = now + state.config.look_interval;
+    state.datasets.ForEach([now](const std::string&, DatasetTable::Entry& entry) { entry.since = now; });
+  }
   if (now > state.wake) {
     // The executor was held up (a stopped process, a busy machine): unread messages are no silence of the others.
     state.roster.Postpone(now - state.wake, now);
@@ -381,6 +344,7 @@ std::vector<CoordinatorAction> FrameMachine::Step(const CoordinatorEvent& event,
     state.Expire();
     state.Advance();
     state.DropPlans();
+    state.UnloadRetired();
   }
   state.wake = state.stopped ? Time::max() : state.NextWake();
   return std::exchange(state.actions, {});
@@ -389,7 +353,9 @@ std::vector<CoordinatorAction> FrameMachine::Step(const CoordinatorEvent& event,
 Time FrameMachine::NextWake() const { return state_->wake; }
 
 CoordinatorSizes FrameMachine::sizes() const {
-  const State& state = *state_;
+  State& state = *state_;
+  std::size_t awaited = 0;
+  state.datasets.ForEach([&](const std::string&, const DatasetTable::Entry& entry) { awaited += entry.awaited != 0 ? 1 : 0; });
   return {.clients = state.clients.size(),
           .queued = state.queue.size(),
           .running = state.frames.size(),
@@ -398,7 +364,10 @@ CoordinatorSizes FrameMachine::sizes() const {
           .counting = state.occupancy.counting(),
           .grids = state.occupancy.grids(),
           .workers = state.roster.members().size(),
-          .slots = state.roster.slots().slots.size()};
+          .slots = state.roster.slots().slots.size(),
+          .orders = state.orders.size(),
+          .awaited = awaited,
+          .retired = state.datasets.retired()};
 }
 
 }  // namespace slabstream

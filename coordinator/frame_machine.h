@@ -7,6 +7,11 @@
 //   datasets   A dataset is loaded when it is first used. Requests wait for it; a failed load fails them. Datasets that no request needs
 //              are unloaded, the least recently used one first, if they take more than their share of memory_bytes, or if another one
 //              cannot be loaded for want of memory.
+//   files      A frame of a dataset begins only after a look at its files that began after the request came. If they have changed, they
+//              are read anew, and what has not begun waits. Frames that have begun end with the voxels that they began with, which stay
+//              until then. Watched folders are looked through every look_interval, and when somebody asks for a name that is not known;
+//              files that come and go there are datasets that come and go. DataOrders add and remove datasets, too. A look never holds
+//              the machine up: the executor answers it with an event, as it does for loads.
 //   memory     A frame that does not fit the memory of its workers fails before they are given any of it (FramesThatFit). Frames that
 //              fit one by one run one by one.
 //   occupancy  Where a policy needs it, occupied voxels are counted once for each dataset, transfer function and renderer. Requests wait
@@ -32,20 +37,26 @@
 //              another coordinator. Both fail the open requests and end with StopService; a stopped machine does nothing more.
 //
 // What the executor must do: call Step(CoordinatorTick) no later than NextWake(), which is Time::max() if nothing can happen by itself;
-// carry out the actions in order; answer LoadDataset, CountDataset and PlanRequest with one event each, in any order; report WorkerGone
+// carry out the actions in order; answer LoadDataset, LookAtDataset, LookAtFolders, FindDatasets, CountDataset and PlanRequest with one
+// event each, in any order; report WorkerGone
 // or ClientGone when a send finds nobody. If the executor calls late, the machine assumes that the executor itself was held up, and
 // extends everybody's time by as much.
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "common/base/bytes.h"
+#include "common/base/log.h"
 #include "common/base/time.h"
 #include "common/wire/any_message.h"
+#include "common/wire/limits.h"
+#include "coordinator/data_source.h"
 #include "coordinator/datasets.h"
 #include "coordinator/occupancy_table.h"
 #include "coordinator/peer_token.h"
@@ -53,11 +64,14 @@
 
 namespace slabstream {
 
+using OrderId = std::uint64_t;  // of an order about datasets that waits; never given twice
+
 struct CoordinatorConfig {
   Epoch epoch = 0;  // random, not 0
   std::uint32_t pid = 0;
   std::string slabs_endpoint;
-  std::vector<std::string> datasets;                    // names of the catalogue
+  Catalogue datasets;
+  std::set<std::string> folders;                        // that are watched, as WatchedFolder says them
   std::uint64_t memory_bytes = 0;                       // limit of the coordinator's memory; 0: none
   Duration heartbeat = std::chrono::milliseconds(500);  // also the interval of Ping
   Duration worker_timeout = std::chrono::seconds(6);
@@ -67,7 +81,10 @@ struct CoordinatorConfig {
   Duration return_wait = std::chrono::seconds(5);  // for the workers of an earlier coordinator, once one of them is there
   Duration stall_timeout = std::chrono::seconds(60);
   int max_stalls = 5;
-  std::size_t max_queued = 1024;  // frames of all clients
+  std::size_t max_queued = 1024;                     // frames of all clients
+  Duration look_interval = std::chrono::seconds(5);  // between looks at the watched folders
+  std::size_t max_datasets = kMaxListed;             // in the catalogue
+  LogLevel log_level = LogLevel::kOff;               // Notes of lower levels are not made
 };
 
 // ---- events
@@ -79,6 +96,11 @@ struct FromWorker {
 struct FromClient {
   PeerToken from = 0;
   AnyMessage message;
+};
+// A SubmitFrame that could not be decoded, with the answer for its client.
+struct BadRequest {
+  PeerToken from = 0;
+  FrameFailed answer;
 };
 // The socket says that nobody is there.
 struct WorkerGone {
@@ -92,11 +114,28 @@ struct DatasetLoaded {
   LoadId load = 0;
   DatasetId dataset = 0;  // not 0
   std::shared_ptr<const VolumeSummary> summary;
-  std::uint64_t bytes = 0;  // memory of its voxels
+  std::uint64_t bytes = 0;                           // memory of its voxels
+  std::shared_ptr<const FileStamp> stamp = nullptr;  // of its files as they were read; null: they never change
 };
 struct DatasetFailed {
   std::string name;
+  LoadId load = 0;
   Status status;
+};
+// The end of a LookAtDataset.
+struct DatasetSeen {
+  std::string name;
+  LoadId load = 0;
+  Result<bool> changed;
+};
+// The end of a LookAtFolders.
+struct FoldersSeen {
+  std::map<std::string, Result<FoundData>> folders;
+};
+// The end of a FindDatasets.
+struct DatasetsFound {
+  OrderId order = 0;
+  Result<FoundData> found;
 };
 // The end of a count.
 struct OccupiedCounted {
@@ -113,8 +152,8 @@ struct CoordinatorStopRequested {
   std::string reason = "the coordinator is going down";
 };
 struct CoordinatorTick {};
-using CoordinatorEvent = std::variant<FromWorker, FromClient, WorkerGone, ClientGone, DatasetLoaded, DatasetFailed, OccupiedCounted,
-                                      Planned, CoordinatorStopRequested, CoordinatorTick>;
+using CoordinatorEvent = std::variant<FromWorker, FromClient, BadRequest, WorkerGone, ClientGone, DatasetLoaded, DatasetFailed, DatasetSeen,
+                                      FoldersSeen, DatasetsFound, OccupiedCounted, Planned, CoordinatorStopRequested, CoordinatorTick>;
 
 // ---- actions
 struct ToWorker {
@@ -130,10 +169,26 @@ struct ToClient {
 struct LoadDataset {
   std::string name;
   LoadId load = 0;
+  DataSource source;
 };
 // Its voxels are not needed any more.
 struct UnloadDataset {
   DatasetId dataset = 0;
+};
+// -> DatasetSeen: whether the files of a loaded dataset have changed.
+struct LookAtDataset {
+  std::string name;
+  LoadId load = 0;
+  std::shared_ptr<const FileStamp> stamp;
+};
+// -> FoldersSeen: what lies in each of these folders.
+struct LookAtFolders {
+  std::set<std::string> folders;
+};
+// -> DatasetsFound: what these arguments of an order mean, and whether it can be read.
+struct FindDatasets {
+  OrderId order = 0;
+  std::vector<std::string> arguments;
 };
 // -> OccupiedCounted: counts the voxels of the volume that its renderer draws (DrawnTable, CountOccupied). The dataset was loaded.
 struct CountDataset {
@@ -150,8 +205,15 @@ struct StopService {};  // everything was sent; end
 struct DropClient {
   PeerToken client = 0;
 };
-using CoordinatorAction = std::variant<ToWorker, ToClient, DropClient, LoadDataset, UnloadDataset, CountDataset, PlanRequest, DropPlan,
-                                       FrameMeasured, StopService>;
+// A line for the log.
+enum class NoteAbout : std::uint8_t { kWorkers, kDatasets, kFrames };
+struct Note {
+  NoteAbout about = NoteAbout::kWorkers;
+  LogLevel level = LogLevel::kInfo;
+  std::string text;
+};
+using CoordinatorAction = std::variant<ToWorker, ToClient, DropClient, LoadDataset, UnloadDataset, LookAtDataset, LookAtFolders,
+                                       FindDatasets, CountDataset, PlanRequest, DropPlan, FrameMeasured, Note, StopService>;
 
 // Entries in the machine's tables. At rest, with nothing asked for and every client gone, they are 0 but for the workers, their slots and
 // the grids of earlier counts (at most OccupancyTable::kMaxKept).
@@ -160,6 +222,8 @@ struct CoordinatorSizes {
   std::size_t over = 0;  // frames that workers must still be told of
   std::size_t planning = 0, counting = 0, grids = 0;
   std::size_t workers = 0, slots = 0;
+  std::size_t orders = 0, awaited = 0;  // that wait for a look at files; names that do
+  std::size_t retired = 0;              // voxels that only frames under way use
 };
 
 class FrameMachine {

@@ -5,14 +5,12 @@
 
 namespace slabstream {
 
-namespace {
-
-// Fits the wire's limit for texts, whatever a worker or a file name contributed.
-Status Bounded(const Status& status) {
-  return status.message().size() <= kMaxTextBytes ? status : Status(status.code(), status.message().substr(0, kMaxTextBytes));
+void FrameMachine::State::On(const BadRequest& event) {
+  ++refused.bad_request;
+  Tell(NoteAbout::kFrames, LogLevel::kInfo, "request {} of client {} is refused: {}", event.answer.request, event.from,
+       event.answer.status.message());
+  SendClient(event.from, event.answer);
 }
-
-}  // namespace
 
 void FrameMachine::State::OnClientMessage(PeerToken client, const SubmitFrame& message) {
   clients.Meet(client, now);
@@ -20,25 +18,19 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const SubmitFrame& m
   if (Answer* answer = clients.FindAnswer(client, message.request)) return SendAnswer(client, *answer);
 
   OpenRequest request{.client = client, .submit = message, .arrived = now};
-  const Status admissible = Admissible(client, message);
-  if (!admissible.ok()) return FailRequest(request, admissible);
+  const std::string& name = message.frame.dataset;
+  if (datasets.folders.empty() && datasets.Find(name) == nullptr) {
+    return RefuseRequest(request, datasets.NoSuchDataset(name), &RefusedRequests::unknown_dataset);
+  }
+  if (Status names = CheckNames(message.frame.policy); !names.ok()) return RefuseRequest(request, names, &RefusedRequests::bad_request);
+  if (Status quota = WithinQuota(client); !quota.ok()) return RefuseRequest(request, quota, &RefusedRequests::over_quota);
   request.needs_occupancy = NeedsOccupancy(message.frame.policy);
-  datasets.Use(message.frame.dataset);
-  const DatasetState state = datasets.Find(message.frame.dataset)->state;
-  if (state == DatasetState::kUnloaded || state == DatasetState::kFailed) {
-    const LoadId load = datasets.BeginLoad(message.frame.dataset);
-    actions.emplace_back(LoadDataset{.name = message.frame.dataset, .load = load});
-  }
-  if (state == DatasetState::kReady) {
-    if (const Status found = FindVolume(request); !found.ok()) return FailRequest(request, found);
-  }
+  if (Status sought = Seek(request); !sought.ok()) return RefuseRequest(request, sought, &RefusedRequests::bad_request);
   queue.Push(request);
   SendQueued(request);
 }
 
-Status FrameMachine::State::Admissible(PeerToken client, const SubmitFrame& message) const {
-  if (datasets.Find(message.frame.dataset) == nullptr) return datasets.NoSuchDataset(message.frame.dataset);
-  if (Status names = CheckNames(message.frame.policy); !names.ok()) return names;
+Status FrameMachine::State::WithinQuota(PeerToken client) const {
   const auto running = std::ranges::count(frames, client, [](const RunningFrame& frame) { return frame.request().client; });
   if (queue.CountOf(client) + std::size_t(running) >= kMaxOpenRequests) {
     return Status::ResourceExhausted("this client has " + std::to_string(kMaxOpenRequests) +
@@ -90,8 +82,9 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const StatusQuery& m
                     .frames_done = frames_done,
                     .frames_failed = frames_failed,
                     .workers_lost = workers_lost,
-                    .datasets = datasets.Report(),
-                    .memory_bytes = config.memory_bytes};
+                    .datasets = datasets.Report(now),
+                    .memory_bytes = config.memory_bytes,
+                    .refused = refused};
   for (const Member& member : roster.members()) {
     reply.workers.push_back({.worker = member.id,
                              .pid = member.description.pid,
@@ -131,9 +124,23 @@ void FrameMachine::State::EndRequest(PeerToken client, RequestId request, AnyMes
   clients.Keep(client, {.request = request, .message = std::move(message), .payload = std::move(payload), .sent = now});
 }
 
-void FrameMachine::State::FailRequest(const OpenRequest& request, const Status& status) {
+void FrameMachine::State::AnswerFailure(const OpenRequest& request, const Status& status) {
   EndRequest(request.client, request.submit.request, FrameFailed{.request = request.submit.request, .status = Bounded(status)}, {});
   if (status.code() != StatusCode::kCancelled) ++frames_failed;
+}
+
+// Of a request whose frame has not begun.
+void FrameMachine::State::FailRequest(const OpenRequest& request, const Status& status) {
+  AnswerFailure(request, status);
+  Tell(NoteAbout::kFrames, LogLevel::kInfo, "request {} of client {} ends without a frame: dataset {}: {}", request.submit.request,
+       request.client, request.submit.frame.dataset, status.message());
+}
+
+void FrameMachine::State::RefuseRequest(const OpenRequest& request, const Status& status, Refusal reason) {
+  ++(refused.*reason);
+  EndRequest(request.client, request.submit.request, FrameFailed{.request = request.submit.request, .status = Bounded(status)}, {});
+  Tell(NoteAbout::kFrames, LogLevel::kInfo, "request {} of client {} is refused: {}", request.submit.request, request.client,
+       status.message());
 }
 
 void FrameMachine::State::FreeClient(PeerToken client) {
@@ -143,7 +150,7 @@ void FrameMachine::State::FreeClient(PeerToken client) {
   for (const RunningFrame& frame : frames) {
     if (frame.request().client == client) orphans.push_back(frame.id());
   }
-  for (const FrameId id : orphans) EndFrame(id);
+  for (const FrameId id : orphans) EndFrame(id, "its client has gone");
 }
 
 }  // namespace slabstream

@@ -1,14 +1,19 @@
 // FrameMachine::State: what the machine knows, and its handlers. Not for executors: only the sources frame_machine*.cpp include it.
 //
 // Every Step: take the event in (On), let time take effect (Expire), then start whatever can start (Advance). Handlers append to `actions`.
-//   frame_machine.cpp           datasets, frames, time, and the Step itself
+//   frame_machine.cpp           frames, time, and the Step itself
+//   frame_machine_data.cpp      datasets: the catalogue, files, voxels
 //   frame_machine_workers.cpp   messages of workers
 //   frame_machine_clients.cpp   messages of clients and the ends of their requests
 #pragma once
 
+#include <fmt/format.h>
+
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -23,6 +28,11 @@
 
 namespace slabstream {
 
+// Fits the wire's limit for texts, whatever a worker or a file name contributed.
+inline Status Bounded(const Status& status) {
+  return status.message().size() <= kMaxTextBytes ? status : Status(status.code(), status.message().substr(0, kMaxTextBytes));
+}
+
 inline std::uint32_t Milliseconds(Duration duration) {
   return std::uint32_t(std::chrono::duration_cast<std::chrono::milliseconds>(duration).count());
 }
@@ -36,7 +46,7 @@ struct FrameMachine::State {
   explicit State(CoordinatorConfig c)
       : config(std::move(c)),
         roster(config.worker_timeout, config.vacancy_grace, config.return_wait),
-        datasets(config.datasets),
+        datasets(config.datasets, config.folders),
         clients(config.client_timeout, UnreadShare(config.memory_bytes)),
         limits{.stall_timeout = config.stall_timeout,
                .max_stalls = config.max_stalls,
@@ -62,6 +72,22 @@ struct FrameMachine::State {
   Time next_ping;               // while there are workers
   bool stopped = false;
   std::uint64_t frames_done = 0, frames_failed = 0, workers_lost = 0;
+  RefusedRequests refused;
+
+  // An order that waits for a look at files. kList: for that at the folders and those at datasets.
+  struct OpenOrder {
+    PeerToken client = 0;
+    DataOrder order;
+    LookId folders = 0;
+    std::map<std::string, LookId> datasets = {};
+  };
+  std::map<OrderId, OpenOrder> orders;  // at most one of each client
+  OrderId last_order = 0;
+  LookCounter folder_looks;
+  Time next_round;                            // when the folders are looked through, if there are any
+  std::set<std::string> complaints;           // about what lies in the folders
+  std::map<std::string, std::string> hidden;  // names that were removed though their files are still there, and the folder of each
+
   std::vector<CoordinatorAction> actions;  // of this Step
 
   // ---- events
@@ -75,9 +101,16 @@ struct FrameMachine::State {
   void On(const WorkerGone& event) {
     for (const WorkerId worker : roster.At(event.who)) LoseWorker(worker, LiveRoster::Loss::kGone);
   }
-  void On(const ClientGone& event) { FreeClient(event.who); }
+  void On(const BadRequest& event);
+  void On(const ClientGone& event) {
+    std::erase_if(orders, [&](const auto& order) { return order.second.client == event.who; });
+    FreeClient(event.who);
+  }
   void On(const DatasetLoaded& event);
   void On(const DatasetFailed& event);
+  void On(const DatasetSeen& event);
+  void On(const FoldersSeen& event);
+  void On(const DatasetsFound& event);
   void On(const OccupiedCounted& event);
   void On(const Planned& event);
   void On(const CoordinatorStopRequested& event) { StopAll(Retire{.epoch = config.epoch}, event.reason); }
@@ -97,7 +130,7 @@ struct FrameMachine::State {
   // Drops what no worker sends here.
   template <AnyOf<Welcome, Ping, GroupAssignment, Retire, Stop, ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused,
                   ImageReceived, SubmitFrame, FrameProgress, FrameReply, FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery,
-                  StatusReply, ShutDown, ShutDownReply, KeysOrder, KeysReply, OrderRefused>
+                  StatusReply, ShutDown, ShutDownReply, KeysOrder, KeysReply, OrderRefused, DataOrder, DataReply>
                 Message>
   void OnWorkerMessage(const FromWorker&, const Message&) {}
 
@@ -107,21 +140,50 @@ struct FrameMachine::State {
   void OnClientMessage(PeerToken client, const ClientPing& message);
   void OnClientMessage(PeerToken client, const StatusQuery& message);
   void OnClientMessage(PeerToken client, const ShutDown& message);
+  void OnClientMessage(PeerToken client, const DataOrder& message);
   // Drops what no client sends.
   template <AnyOf<Register, Welcome, Heartbeat, Ping, GroupAssignment, GroupDone, FrameImage, WorkerTrouble, Leave, Retire, Stop,
                   ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused, ImageReceived, FrameProgress, FrameReply, FrameFailed,
-                  ClientPong, StatusReply, ShutDownReply, KeysOrder, KeysReply, OrderRefused>
+                  ClientPong, StatusReply, ShutDownReply, KeysOrder, KeysReply, OrderRefused, DataReply>
                 Message>
   void OnClientMessage(PeerToken, const Message&) {}
 
   // ---- requests
   bool IsOpen(PeerToken client, RequestId request) { return queue.Contains(client, request) || frames.FindRequest(client, request); }
-  Status Admissible(PeerToken client, const SubmitFrame& message) const;
+  Status WithinQuota(PeerToken client) const;
   void SendQueued(const OpenRequest& request);
   void EndRequest(PeerToken client, RequestId request, AnyMessage message, Bytes payload);
+  using Refusal = std::uint64_t RefusedRequests::*;
+  void RefuseRequest(const OpenRequest& request, const Status& status, Refusal reason);
   void FailRequest(const OpenRequest& request, const Status& status);
+  void AnswerFailure(const OpenRequest& request, const Status& status);
   void SendAnswer(PeerToken client, Answer& answer);
   void FreeClient(PeerToken client);
+
+  // ---- datasets
+  Status FindVolume(OpenRequest& request) const;
+  Status Seek(OpenRequest& request);
+  bool IsSeen(const OpenRequest& request) const {
+    return request.look == 0 || datasets.Find(request.submit.frame.dataset)->looks.IsOver(request.look);
+  }
+  bool InUse(DatasetId dataset);
+  bool UnloadOne();  // false: all are in use
+  void UnloadRetired();
+  void LoadData(const std::string& name);
+  void LookAt(const std::string& name);
+  void LookThroughFolders();
+  void LookAtEverything();
+  void FailData(const std::string& name, const Status& status);
+  void RenewData(const std::string& name);
+  void AddData(const std::string& name, const DataSource& source);
+  void RemoveData(const std::string& name, const std::string& why);
+  void StopWatching(const std::string& folder);
+  void MergeFolder(const std::string& folder, const Catalogue& found, const std::string& gone);
+  Status Remove(const std::vector<std::string>& items);
+  Status Reload(const std::vector<std::string>& items);
+  Status AddFound(const FoundData& found);
+  void AnswerOrder(PeerToken client, const DataOrder& order, const Status& status);
+  void AnswerLists();
 
   // ---- frames and workers
   void Expire();
@@ -129,9 +191,6 @@ struct FrameMachine::State {
   void BeginAttempts();
   void DismissWorkers();
   Time EndOfWait(const OpenRequest& request) const;
-  Status FindVolume(OpenRequest& request) const;
-  bool InUse(DatasetId dataset);
-  bool UnloadOne();  // false: all are in use
   Result<int> FramesThatFitWorkers(const FramePlan& plan, const VolumeSummary& summary) const;
   bool WaitsForCount(const OpenRequest& request) { return request.needs_occupancy && !occupancy.Find(request.volume->Whole()); }
   void CountAhead();
@@ -142,7 +201,7 @@ struct FrameMachine::State {
   bool StartNextFrame();
   void HandOut(RunningFrame& frame);
   void AfterGroupDone(const RunningFrame& frame);
-  void EndFrame(FrameId id);
+  void EndFrame(FrameId id, std::string_view result);
   void FailFrame(const RunningFrame& frame, const Status& status);
   void LoseWorker(WorkerId worker, LiveRoster::Loss loss);
   void RemoveWorker(WorkerId worker, LiveRoster::Loss loss);
@@ -157,6 +216,11 @@ struct FrameMachine::State {
   Time NextWake();
 
   // ---- actions
+  template <class... Values>
+  void Tell(NoteAbout about, LogLevel level, fmt::format_string<Values...> format, Values&&... values) {
+    if (level < config.log_level) return;
+    actions.emplace_back(Note{about, level, fmt::format(format, std::forward<Values>(values)...)});
+  }
   void SendWorker(WorkerId worker, AnyMessage message) {
     if (const Member* member = roster.Find(worker)) actions.emplace_back(ToWorker{.to = member->peer, .message = std::move(message)});
   }

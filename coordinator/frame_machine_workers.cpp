@@ -7,7 +7,12 @@ namespace slabstream {
 void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const Register& message) {
   for (const WorkerId dead : roster.ReplacedBy(message, event.from)) LoseWorker(dead, LiveRoster::Loss::kSilent);
   if (roster.empty()) next_ping = now + config.heartbeat;
+  const std::size_t members_before = roster.members().size();
   const WorkerId worker = roster.Admit(message, event.from, now);
+  if (roster.members().size() > members_before) {  // else it has not heard of its Welcome
+    Tell(NoteAbout::kWorkers, LogLevel::kInfo, "worker {} is here: pid {} on {}, {} threads, slot {}", worker, message.pid, message.host,
+         message.threads, roster.PlaceOf(worker).slot);
+  }
   SendWorker(worker, Welcome{.epoch = config.epoch,
                              .incarnation = message.incarnation,
                              .worker = worker,
@@ -17,8 +22,13 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const Registe
 }
 
 void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const Heartbeat& message) {
+  const Member* const member = roster.Find(message.worker);
+  const bool was_leaving = member == nullptr || member->leaving;
   const LiveRoster::News news = message.epoch == config.epoch ? roster.Hear(message, event.from, now) : LiveRoster::News{};
   if (news.known) {
+    if (message.leaving && !was_leaving) {
+      Tell(NoteAbout::kWorkers, LogLevel::kInfo, "worker {} is leaving: it finishes what it has", message.worker);
+    }
     for (RunningFrame& frame : frames) {
       if (news.moved) frame.OnReconnection(message.worker, now);
       frame.OnHeartbeat(message.worker, news.progressed, now);
@@ -63,7 +73,7 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const FrameIm
   if (request.planned->teaches()) actions.emplace_back(FrameMeasured{request.planned, reply.statistics.reports});
   EndRequest(request.client, request.submit.request, std::move(reply), event.payload);
   ++frames_done;
-  EndFrame(message.frame);
+  EndFrame(message.frame, "done");
 }
 
 void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const WorkerTrouble& message) {
@@ -91,6 +101,16 @@ void FrameMachine::State::LoseWorker(WorkerId worker, LiveRoster::Loss loss) {
 void FrameMachine::State::RemoveWorker(WorkerId worker, LiveRoster::Loss loss) {
   const Member* member = roster.Find(worker);
   if (member == nullptr) return;
+  const double silent = std::chrono::duration<double>(now - member->last_heard).count();
+  switch (loss) {
+    case LiveRoster::Loss::kLeft: Tell(NoteAbout::kWorkers, LogLevel::kInfo, "worker {} has left", worker); break;
+    case LiveRoster::Loss::kSilent:
+      Tell(NoteAbout::kWorkers, LogLevel::kWarning, "worker {} is lost: not heard for {:.1f} s", worker, silent);
+      break;
+    case LiveRoster::Loss::kGone:
+      Tell(NoteAbout::kWorkers, LogLevel::kWarning, "worker {} is lost: its connection has ended", worker);
+      break;
+  }
   const std::optional<Time> last_word = loss == LiveRoster::Loss::kGone ? std::optional(member->last_heard) : std::nullopt;
   roster.Remove(worker, now, loss);
   for (auto it = frames.begin(); it != frames.end();) {

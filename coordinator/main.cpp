@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/log.h"
 #include "common/base/stop_signals.h"
 #include "common/base/version.h"
 #include "common/cli/add_option.h"
@@ -52,10 +53,7 @@ int Run(int argc, char** argv) {
                  "Encrypt tcp connections with the keys of this folder, which is made if it does not exist and gets the service files "
                  "client.json, worker.json and admin.json; needed by addresses that are not loopback")
       ->type_name("FOLDER");
-  AddRepeated(app, "--data", data,
-              "A volume to serve, as NAME=FILE, NAME=FILE?time=3 with options of `slabstream info`, or a directory of volumes that are "
-              "named after their files")
-      ->type_name("NAME=FILE");
+  AddRepeated(app, "--data", data, kDataHelp)->type_name("NAME=FILE");
   app.add_flag("--compress", compress, "Pack voxels for workers with zstd: pays on links slower than about 300 MB/s, not within a machine");
   options.machine.memory_bytes = DefaultMemory().coordinator;
   AddParsed(app, "--memory", options.machine.memory_bytes, ParseMemoryLimit,
@@ -69,9 +67,13 @@ int Run(int argc, char** argv) {
       ->type_name("LINK")
       ->default_str(kDefaultLink);
   return RunService(app, argc, argv, "coordinator", [&]() -> Status {
-    auto catalogue = MakeCatalogue(data);
-    if (!catalogue.ok()) return catalogue.status();
-    options.catalogue = std::move(*catalogue);
+    FoundData found = FindData(data);
+    CheckFiles(found);
+    for (const std::string& line : found.complaints) LogWarning(line);
+    if (!found.errors.empty()) return ReportAll(app.get_name(), found.errors);
+    options.catalogue = std::move(found.datasets);
+    options.folders = {found.folders.begin(), found.folders.end()};
+    options.machine.log_level = LeastLogLevel();
     LimitMemory(options.machine.memory_bytes);
     if (compress) options.codec = Codec::kZstd;
     return Serve(std::move(options));

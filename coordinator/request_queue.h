@@ -17,6 +17,7 @@
 
 #include "common/base/time.h"
 #include "common/wire/client_messages.h"
+#include "coordinator/look_counter.h"
 #include "coordinator/peer_token.h"
 #include "coordinator/plan_request.h"
 
@@ -28,6 +29,7 @@ struct OpenRequest {
   Time arrived;
   bool needs_occupancy = false;                 // of its policy (NeedsOccupancy)
   std::optional<ClassifiedVolume> volume;       // none: its dataset is not loaded yet
+  LookId look = 0;                              // at its dataset's files, which must be over before the frame begins; 0: none
   PlanId plan = 0;                              // the requested plan; 0: none
   std::uint64_t planned_for = 0;                // LiveRoster::version() when it was
   std::shared_ptr<const PlannedFrame> planned;  // null: not yet

@@ -17,6 +17,7 @@
 #include "common/base/guarded.h"
 #include "common/base/limited_log.h"
 #include "common/base/log.h"
+#include "common/base/printable.h"
 #include "common/base/shared_arena.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/transport/endpoint.h"
@@ -33,7 +34,9 @@ constexpr Duration kForgetAfter = std::chrono::minutes(10);  // silent connectio
 constexpr Duration kForgetInterval = std::chrono::minutes(1);
 constexpr Duration kLongestWait = std::chrono::seconds(1);
 constexpr Duration kStopGrace = std::chrono::seconds(5);  // for the machine to end in order
-constexpr int kReceiveBatch = 64;                         // messages of one socket before the other one has its turn
+constexpr std::int64_t kNotesAtOnce = 100;                // lines of the log that peers can provoke
+constexpr Duration kEachNote = std::chrono::milliseconds(200);
+constexpr int kReceiveBatch = 64;  // messages of one socket before the other one has its turn
 
 Epoch RandomEpoch() {
   std::random_device device;
@@ -67,19 +70,48 @@ struct News {
   SlabServer::Samples samples = {};
 };
 
-Result<News> Load(const VolumeLoader& loader, const LoadDataset& action) {
-  const Result<std::shared_ptr<const Volume>> volume = loader();
-  if (!volume.ok()) return volume.status();
-  auto summary = std::make_shared<const VolumeSummary>(Summarize(**volume));
+Result<News> Load(const LoadDataset& action) {
+  const Result<LoadedSource> loaded = LoadSource(action.source);
+  if (!loaded.ok()) return loaded.status();
+  const std::shared_ptr<const Volume>& volume = loaded->volume;
+  auto summary = std::make_shared<const VolumeSummary>(Summarize(*volume));
   SlabServer::Samples samples;
   if (MostBricksAreEqual(*summary)) {
-    samples.bricks = std::make_shared<const BrickedVoxels>((*volume)->block);
+    samples.bricks = std::make_shared<const BrickedVoxels>(volume->block);
   } else {
-    samples.volume = *volume;
+    samples.volume = volume;
   }
-  const DatasetId id = IdOf(action.name, **volume);
+  const DatasetId id = IdOf(action.name, *volume);
   const std::uint64_t bytes = samples.bytes();
-  return News{DatasetLoaded{action.name, action.load, id, std::move(summary), bytes}, id, std::move(samples)};
+  return News{DatasetLoaded{action.name, action.load, id, std::move(summary), bytes, loaded->stamp}, id, std::move(samples)};
+}
+
+FoldersSeen LookThrough(const LookAtFolders& action) {
+  FoldersSeen seen;
+  for (const std::string& folder : action.folders) {
+    seen.folders.emplace(folder, Guarded(folder.c_str(), [&] { return ListFolder(folder); }));
+  }
+  return seen;
+}
+
+// What an order wants to add. Its paths are those of this host, whatever the current folder of this process is.
+Result<FoundData> Find(const std::vector<std::string>& arguments) {
+  std::array<char, 256> host{};
+  if (::gethostname(host.data(), host.size() - 1) != 0) host = {"this host"};
+  const auto here = [&](const Status& status) {
+    return Status(status.code(),
+                  Printable(fmt::format("{} (paths are those of the coordinator's host, {})", status.message(), host.data())));
+  };
+  for (const std::string& argument : arguments) {
+    const Result<DataArgument> parsed = ParseDataArgument(argument);
+    if (!parsed.ok()) return parsed.status();
+    if (!parsed->path.starts_with('/')) return here(Status::InvalidArgument(argument + ": the path must be absolute"));
+  }
+  FoundData found = FindData(arguments, "");
+  CheckFiles(found);
+  for (const std::string& line : found.complaints) LogWarning(line);
+  if (!found.errors.empty()) return here(found.errors.front());
+  return found;
 }
 
 Result<std::shared_ptr<const OccupancyGrid>> Count(const CountFunction& count, const SlabServer::Samples& samples,
@@ -94,7 +126,6 @@ struct CoordinatorService::Impl {
   Impl(CoordinatorOptions service_options, std::optional<ServiceKeys> service_keys, Socket client_socket, Socket control_socket,
        std::unique_ptr<SlabServer> slab_server)
       : keys(std::move(service_keys)),
-        catalogue(std::move(service_options.catalogue)),
         machine(std::move(service_options.machine)),
         clients(std::move(client_socket)),
         control(std::move(control_socket)),
@@ -121,16 +152,22 @@ struct CoordinatorService::Impl {
   }
   void Perform(LoadDataset& action);
   void Perform(UnloadDataset& action) { slabs->Withdraw(action.dataset); }
+  void Perform(LookAtDataset& action);
+  void Perform(LookAtFolders& action);
+  void Perform(FindDatasets& action);
+  void Perform(Note& action) { notes[std::size_t(action.about)].Write(action.level, Printable(std::move(action.text))); }
   void Perform(CountDataset& action);
   void Perform(PlanRequest& action);
   void Perform(DropPlan& action);
   void Perform(FrameMeasured& action);
   void Perform(StopService&) { stop_now = true; }
+  // Has a task made on a thread of `tasks`; `make` returns an event. If the task fails, or cannot be started, `failed(why)` makes the
+  // event.
+  void MakeElsewhere(BackgroundTasks& tasks, const char* what, auto make, auto failed);
 
   std::string client_endpoint, worker_endpoint;
   Endpoint images_sockets;  // how the files of workers' images planes begin, if they are files
   std::optional<ServiceKeys> keys;
-  const Catalogue catalogue;
   FrameMachine machine;
   Socket clients, control;
   PeerTable client_peers, worker_peers;
@@ -142,12 +179,15 @@ struct CoordinatorService::Impl {
   std::atomic<bool> stopped = false;
   bool stop_now = false;  // the machine said so
   LimitedLog complaints;  // about messages
+  // By NoteAbout: each has its own limit, so that no client's frames keep a worker's loss out of the log.
+  std::array<LimitedLog, 3> notes = {LimitedLog(kNotesAtOnce, kEachNote), LimitedLog(kNotesAtOnce, kEachNote),
+                                     LimitedLog(kNotesAtOnce, kEachNote)};
   Time next_forget;
   const PlanFunction make_plan;
   const CountFunction count_occupied;
   const std::shared_ptr<Planner> planner;                      // the planning thread's, but for plans at hand
   std::map<PlanId, std::shared_ptr<std::atomic<bool>>> plans;  // under way: whether they are dropped
-  BackgroundTasks loads{kLoadsAtOnce}, counts{1}, planning{1};
+  BackgroundTasks loads{kLoadsAtOnce}, looks{kLooksAtOnce}, counts{1}, planning{1};
   std::jthread thread;  // owns the sockets and the machine; last member: ends first
 };
 
@@ -245,8 +285,8 @@ void CoordinatorService::Impl::ReceiveFromClients() {
     if (!message.ok()) {
       complaints.Warning("client plane: refused a message: " + message.status().message());
       // A refused request whose id can be read gets an answer, so that nobody waits for it in vain.
-      if (const std::optional<AnyMessage> refusal = RefusalOf(incoming->header(), message.status())) {
-        (void)clients.Send(incoming->identity, Encode(*refusal));
+      if (std::optional<FrameFailed> refusal = RefusalOf(incoming->header(), message.status())) {
+        HandleEvent(BadRequest{client_peers.Heard(incoming->identity, MonotonicNow()), *std::move(refusal)});
       }
       continue;
     }
@@ -255,12 +295,16 @@ void CoordinatorService::Impl::ReceiveFromClients() {
   }
 }
 
-// True: the message was an order about keys, or one that its sender may not give.
+// True: the message was an order about keys, or one that its sender may not give. Datasets may be listed by every client.
 bool CoordinatorService::Impl::CarryOut(const Incoming& incoming, const AnyMessage& message, Role role) {
   const auto reply = [&](const AnyMessage& answer) { (void)clients.Send(incoming.identity, Encode(answer)); };
   const auto refuse = [&](std::uint64_t nonce, std::string why) { reply(OrderRefused{nonce, Status::InvalidArgument(std::move(why))}); };
   if (const auto* end = std::get_if<ShutDown>(&message); end != nullptr && role != Role::kAdmin) {
     refuse(end->nonce, fmt::format("ending the service needs the service file of role admin, not {}", NameOf(role)));
+    return true;
+  }
+  if (const auto* data = std::get_if<DataOrder>(&message); data != nullptr && data->action != DataAction::kList && role != Role::kAdmin) {
+    refuse(data->nonce, fmt::format("adding, removing and reloading datasets needs the service file of role admin, not {}", NameOf(role)));
     return true;
   }
   const auto* order = std::get_if<KeysOrder>(&message);
@@ -281,15 +325,54 @@ bool CoordinatorService::Impl::CarryOut(const Incoming& incoming, const AnyMessa
   return true;
 }
 
-// A task that cannot be started fails like one that was started.
-void CoordinatorService::Impl::Perform(LoadDataset& action) {
-  const auto load = [loader = catalogue.at(action.name), action] {
-    const std::string barrier = "dataset \"" + action.name + "\" could not be loaded";
-    Result<News> loaded = Guarded(barrier.c_str(), [&] { return Load(loader, action); });
-    return loaded.ok() ? *std::move(loaded) : News{DatasetFailed{action.name, loaded.status()}};
+void CoordinatorService::Impl::MakeElsewhere(BackgroundTasks& tasks, const char* what, auto make, auto failed) {
+  const std::string barrier = what;
+  const auto task = [inbox = inbox, barrier, make, failed] {
+    Result<News> news = Guarded(barrier.c_str(), [&]() -> Result<News> { return make(); });
+    inbox->Post(news.ok() ? *std::move(news) : News{failed(news.status())});
   };
-  const Status begun = Guarded("loading", [&] { loads.Post([inbox = inbox, load] { inbox->Post(load()); }); });
-  if (!begun.ok()) following.push_back(DatasetFailed{action.name, begun});
+  const Status begun = Guarded(what, [&] { tasks.Post(task); });
+  if (!begun.ok()) following.push_back(failed(begun));
+}
+
+void CoordinatorService::Impl::Perform(LoadDataset& action) {
+  const std::string barrier = "dataset \"" + action.name + "\" could not be loaded";
+  MakeElsewhere(
+      loads, barrier.c_str(), [action] { return Load(action); },
+      [name = action.name, load = action.load](const Status& why) {
+        return DatasetFailed{name, load, why};
+      });
+}
+
+void CoordinatorService::Impl::Perform(LookAtDataset& action) {
+  MakeElsewhere(
+      looks, "a look at the files of a dataset",
+      [action] {
+        return News{DatasetSeen{action.name, action.load, HaveChanged(*action.stamp)}};
+      },
+      [name = action.name, load = action.load](const Status& why) {
+        return DatasetSeen{name, load, why};
+      });
+}
+
+void CoordinatorService::Impl::Perform(LookAtFolders& action) {
+  MakeElsewhere(
+      looks, "a look at the watched folders", [action] { return News{LookThrough(action)}; },
+      [](const Status& why) {
+        LogWarning(why.message());
+        return FoldersSeen{};
+      });
+}
+
+void CoordinatorService::Impl::Perform(FindDatasets& action) {
+  MakeElsewhere(
+      looks, "a look at files",
+      [action] {
+        return News{DatasetsFound{action.order, Find(action.arguments)}};
+      },
+      [order = action.order](const Status& why) {
+        return DatasetsFound{order, why};
+      });
 }
 
 void CoordinatorService::Impl::Perform(CountDataset& action) {
@@ -379,8 +462,8 @@ Result<std::unique_ptr<CoordinatorService>> CoordinatorService::Start(Context& c
   options.surroundings.memory_scope = SharedMemoryScope();
   options.surroundings.encrypted = keys.has_value();
   options.surroundings.cores = std::int32_t(std::max(std::thread::hardware_concurrency(), 1U));
-  options.machine.datasets.clear();
-  for (const auto& [name, loader] : options.catalogue) options.machine.datasets.push_back(name);
+  options.machine.datasets = std::move(options.catalogue);
+  options.machine.folders = std::move(options.folders);
   auto impl = std::make_unique<Impl>(std::move(options), std::move(keys), std::move(*clients), std::move(*control), std::move(*slabs));
   impl->client_endpoint = std::move(*client_endpoint);
   impl->worker_endpoint = std::move(*worker_endpoint);

@@ -1,13 +1,14 @@
 // CoordinatorService: runs a FrameMachine over ZeroMQ. Binds the client, control and slabs planes, loads datasets, serves voxels.
 //
 // Threads: one owns the client and control sockets and runs the machine; one owns the slabs socket, cuts and packs chunks; one plans; one
-// counts occupied voxels; each dataset that is being loaded has one, kLoadsAtOnce at a time. None of them waits for another one. An
-// exception in one fails only what it was doing: a frame, a load, a count, a chunk. If the machine's own thread throws, open requests fail
-// with the reason and the service stops.
+// counts occupied voxels; each dataset that is being loaded has one, kLoadsAtOnce at a time; up to kLooksAtOnce look at files. None of them
+// waits for another one. An exception in one fails only what it was doing: a frame, a load, a count, a chunk. If the machine's own thread
+// throws, open requests fail with the reason and the service stops.
 #pragma once
 
 #include <functional>
 #include <memory>
+#include <set>
 #include <string>
 
 #include "common/base/status.h"
@@ -28,15 +29,17 @@ struct CoordinatorOptions {
   std::string worker_endpoint;       // bound; empty: WorkerEndpointFor(client_endpoint)
   std::string slabs_endpoint;        // bound; empty: any port, ".slabs" beside an ipc path or inproc name
   std::string keys_folder;           // whose keys encrypt tcp connections (KeyFolder); empty: none, the service stays on this machine
-  Catalogue catalogue;               // name -> how to load it
+  Catalogue catalogue;               // datasets
+  std::set<std::string> folders;     // that are watched (FoundData)
   Codec codec = Codec::kRaw;         // of voxels on their way to workers; zstd pays if the link is slower than packing
-  CoordinatorConfig machine;         // epoch, pid, slabs_endpoint and datasets are filled in by Start
+  CoordinatorConfig machine;         // filled in by Start: epoch, pid, slabs_endpoint, datasets, folders
   ServiceSurroundings surroundings;  // except the link, filled in by Start
   PlanFunction make_plan = &Planner::Plan;
   CountFunction count_occupied = CountOccupied;
 };
 
 inline constexpr std::size_t kLoadsAtOnce = 4;
+inline constexpr std::size_t kLooksAtOnce = 4;  // so one file system that does not answer leaves the others alone
 
 class CoordinatorService {
  public:

@@ -63,6 +63,11 @@ class Conditions {
   virtual void BeforeStep(const CoordinatorEvent&) {}
   virtual void Perform(ToClient& action) = 0;
   virtual void Perform(const LoadDataset& action) = 0;
+  // Of datasets whose files may change, and of watched folders. Without them there is nothing to look at.
+  virtual void Perform(const UnloadDataset&) {}
+  virtual void Perform(const LookAtDataset&) {}
+  virtual void Perform(const LookAtFolders&) {}
+  virtual void Perform(const FindDatasets&) {}
   virtual void Perform(const CountDataset& action) = 0;
   virtual void Perform(const PlanRequest& action) = 0;
   virtual void Perform(const FrameMeasured&) {}

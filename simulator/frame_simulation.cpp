@@ -32,7 +32,7 @@ std::vector<WorkerId> WorkersOf(std::span<const FrameInput> frames) {
 CoordinatorConfig MakeCoordinatorConfig() {
   CoordinatorConfig config;
   config.epoch = kEpoch;
-  config.datasets = {kDataset};
+  config.datasets[kDataset] = {};
   config.heartbeat = config.worker_timeout = config.client_timeout = config.worker_wait = kNever;
   config.vacancy_grace = config.stall_timeout = kNever;
   return config;

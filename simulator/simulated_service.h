@@ -90,7 +90,7 @@ class SimulatedService {
   void CountSpin(bool due) { spins_ = due ? spins_ + 1 : 0; }
 
   void Perform(ToWorker& action);
-  void Perform(AnyOf<DropPlan, DropClient, UnloadDataset> auto&) {}
+  void Perform(AnyOf<DropPlan, DropClient, Note> auto&) {}
   void Perform(StopService&) { StopCoordinator(); }
   void Perform(auto& action) { conditions_.Perform(action); }
 

@@ -177,6 +177,7 @@ Status WorkerService::Impl::Loop() {
     }
     if (leave_requested && !leaving) {
       leaving = true;
+      LogInfo("is leaving: finishes what it has");
       HandleEvent(LeaveRequested{});
     }
     if (stop_requested && stop_deadline == Time::max()) {
@@ -227,7 +228,10 @@ bool WorkerService::Impl::ComesFromItsSender(const Incoming& incoming, const Any
 // Handles memory shared between workers, and the links between them: the machine knows nothing of either.
 void WorkerService::Impl::Remember(const AnyMessage& message) {
   if (const auto* welcome = std::get_if<Welcome>(&message)) {
-    if (welcome->epoch != epoch || welcome->worker != machine.worker()) others.ForgetAll();
+    if (welcome->epoch != epoch || welcome->worker != machine.worker()) {
+      LogInfo("registered as worker " + std::to_string(welcome->worker) + " at " + options.coordinator_endpoint);
+      others.ForgetAll();
+    }
     if (std::exchange(epoch, welcome->epoch) == welcome->epoch) return;
     executor->Forget([](const GroupKey&) { return true; });
     takes_frames_only.clear();
@@ -291,9 +295,11 @@ void WorkerService::Impl::Refuse(const PartialImage& partial) {
 }
 
 void WorkerService::Impl::HandleEvent(WorkerEvent event) {
+  const bool was_registered = machine.registered();
   for (WorkerAction& action : machine.Step(std::move(event), MonotonicNow())) {
     std::visit([this](auto& each) { Perform(each); }, action);
   }
+  if (was_registered && !machine.registered() && !stop_now) LogWarning("has lost its coordinator, and registers again");
   if (machine.registered()) SetRegistered();
 }
 

@@ -8,9 +8,11 @@
 #include "client/cli/cores.h"
 #include "client/cli/option_groups.h"
 #include "common/base/find_named.h"
+#include "common/cli/program.h"
 #include "common/simulation/link_model.h"
 #include "common/volume/memory_budget.h"
 #include "common/volume_io/formats.h"
+#include "coordinator/catalogue.h"
 #include "coordinator/tuning/service_machine.h"
 
 namespace slabstream {
@@ -138,10 +140,7 @@ void DeclareUp(const CommandLine& line) {
   options->listen = "tcp://127.0.0.1:7420";
   AddInteger(*sub, "--workers", options->workers, 1, kMaxUpWorkers, "Worker processes")->default_str("one a core");
   AddThreads(*sub, options->threads, "Render threads of each worker");
-  AddRepeated(*sub, "--data", options->data,
-              "A volume to serve, as NAME=FILE, NAME=FILE?time=3 with options of `slabstream info`, or a directory of volumes that are "
-              "named after their files")
-      ->type_name("NAME=FILE");
+  AddRepeated(*sub, "--data", options->data, kDataHelp)->type_name("NAME=FILE");
   AddParsed(*sub, "--listen", options->listen, EndpointText(true),
             "Where clients reach the service: an address of this machine; port * is any free one. Addresses that are not loopback get keys")
       ->type_name("ENDPOINT")
@@ -167,7 +166,13 @@ void DeclareUp(const CommandLine& line) {
       ->type_name("SIZE")
       ->default_str(fmt::format("three quarters of this machine's memory: {}", MemoryText(options->memory)));
   sub->add_flag("--detach", options->detach, "Return when the service is ready; `slabstream down` ends it");
-  RunWith(*sub, line.run, options, RunUp);
+  AddLogLevel(*sub, line.log_level)->default_str("info of the processes that it starts, warning of its own");
+  sub->callback([&run = line.run, options, &log_level = line.log_level] {
+    run = [options, &log_level] {
+      options->log_level = log_level;
+      return RunUp(*options);
+    };
+  });
 }
 
 void DeclareDown(const CommandLine& line) {
@@ -207,6 +212,49 @@ void DeclareKeys(const CommandLine& line) {
       ->required();
 }
 
+void DeclareData(const CommandLine& line) {
+  CLI::App* sub = line.app.add_subcommand(
+      "data", "List the datasets of a running service; add, remove and reload them, as its admin where it has keys");
+  sub->require_subcommand(1);
+  const auto declare = [&](const char* name, const char* purpose, DataAction action) {
+    CLI::App* order = sub->add_subcommand(name, purpose);
+    auto options = std::make_shared<DataOptions>();
+    options->order.action = action;
+    AddService(*order, options->service);
+    order->add_flag("--json", options->json, "Print JSON");
+    RunWith(*order, line.run, options, RunData);
+    return std::pair(order, options);
+  };
+  declare("list", "Show each dataset: how far it is loaded, its size, its samples, and what is wrong with it", DataAction::kList);
+  const auto [add, add_options] = declare(
+      "add", "Add volumes, or folders to watch, by paths of the coordinator's host, for as long as the coordinator runs", DataAction::kAdd);
+  add->add_option("DATA", add_options->order.items, "As --data of `slabstream up` takes it, NAME=FILE or a folder, with an absolute path")
+      ->required();
+  const auto [remove, remove_options] =
+      declare("remove", "Remove datasets from the catalogue, or stop watching folders. Files stay. Frames that have begun are finished",
+              DataAction::kRemove);
+  remove->add_option("NAME", remove_options->order.items, "Names of datasets, or the absolute paths of watched folders")->required();
+  const auto [reload, reload_options] = declare(
+      "reload", "Read the files anew at the next frame, even if they look the same. Frames that have begun are finished as they began",
+      DataAction::kReload);
+  reload->add_option("NAME", reload_options->order.items, "Names of datasets")->required();
+}
+
+void DeclareLogs(const CommandLine& line) {
+  CLI::App* sub = line.app.add_subcommand("logs", "Print the logs of a service that `up` started on this machine, in order of time");
+  auto options = std::make_shared<LogsOptions>();
+  AddService(*sub, options->service);
+  sub->add_flag("--follow", options->follow, "Go on with new lines until the service ends, or Ctrl-C");
+  constexpr Duration kLongest = std::chrono::hours(24 * 365);
+  AddParsed(
+      *sub, "--since", options->since,
+      [kLongest](const std::string& option, const std::string& text) { return ParseDuration(option, text, kLongest); },
+      "Begin so long ago, such as 30s, 10m or 2h")
+      ->type_name("TIME")
+      ->default_str("the beginning");
+  RunWith(*sub, line.run, options, RunLogs);
+}
+
 void DeclareSlurm(const CommandLine& line) {
   CLI::App* sub = line.app.add_subcommand("slurm", "Print a job script for Slurm: a service on the nodes of a cluster");
   auto options = std::make_shared<SlurmOptions>();
@@ -219,11 +267,7 @@ void DeclareSlurm(const CommandLine& line) {
       ->type_name("TIME")
       ->default_str("the partition's");
   AddInteger(*sub, "--notice", options->notice_seconds, 1, kMaxNoticeSeconds, "Seconds before the time limit at which workers leave");
-  AddRepeated(*sub, "--data", options->data,
-              "A volume to serve, as NAME=FILE, NAME=FILE?time=3 with options of `slabstream info`, or a directory of volumes that are "
-              "named after their files")
-      ->required()
-      ->type_name("NAME=FILE");
+  AddRepeated(*sub, "--data", options->data, kDataHelp)->required()->type_name("NAME=FILE");
   sub->add_option("--folder", options->folder, "The folder, shared by all nodes, in which each job makes one for its service files")
       ->type_name("FOLDER")
       ->default_str("the one from which the job is submitted");
@@ -235,9 +279,9 @@ void DeclareSlurm(const CommandLine& line) {
 }  // namespace
 
 std::span<const DeclareCommand> ClientCommands() {
-  static constexpr DeclareCommand kCommands[] = {DeclareRender,   DeclareTurntable, DeclareSlice,  DeclareInfo,
-                                                 DeclareTransfer, DeclareConvert,   DeclareSphere, DeclareUp,
-                                                 DeclareDown,     DeclareStatus,    DeclareKeys,   DeclareSlurm};
+  static constexpr DeclareCommand kCommands[] = {DeclareRender,  DeclareTurntable, DeclareSlice, DeclareInfo, DeclareTransfer,
+                                                 DeclareConvert, DeclareSphere,    DeclareUp,    DeclareDown, DeclareStatus,
+                                                 DeclareKeys,    DeclareData,      DeclareLogs,  DeclareSlurm};
   return kCommands;
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "client/cli/commands.h"
+#include "client/cli/option_groups.h"
 #include "common/base/log.h"
 #include "common/base/version.h"
 #include "common/cli/program.h"
@@ -23,6 +24,12 @@ std::string CommandNames(const CLI::App& app) {
   std::string names;
   for (const CLI::App* sub : app.get_subcommands(nullptr)) names += (names.empty() ? "" : ", ") + sub->get_name();
   return names;
+}
+
+// Also behind the name of the command, where its help does not mention it.
+void AllowLogLevel(CLI::App& command, std::string& level) {
+  if (command.get_option_no_throw("--log-level") == nullptr) AddLogLevel(command, level)->group(kHidden);
+  for (CLI::App* sub : command.get_subcommands(nullptr)) AllowLogLevel(*sub, level);
 }
 
 // `help COMMAND`, the same as COMMAND --help.
@@ -71,11 +78,16 @@ int RunCommandLine(int argc, const char* const* argv, std::span<const DeclareCom
   app.require_subcommand(0, 1);  // so that words after a command are never taken for another command
   std::function<Status()> run;
   const std::string typed = fmt::format("{}", fmt::join(argv, argv + argc, " "));
-  const CommandLine line{app, run, typed};
+  std::string log_level;
+  AddLogLevel(app, log_level)->default_str("warning");
+  const CommandLine line{app, run, typed, log_level};
   for (const DeclareCommand declare : ClientCommands()) declare(line);
   for (const DeclareCommand declare : more) declare(line);
   DeclareHelp(line);
-  for (CLI::App* sub : app.get_subcommands(nullptr)) sub->group("Commands");
+  for (CLI::App* sub : app.get_subcommands(nullptr)) {
+    sub->group("Commands");
+    AllowLogLevel(*sub, log_level);
+  }
 
   const auto name = [&app] {
     const auto used = app.get_subcommands();
@@ -90,7 +102,7 @@ int RunCommandLine(int argc, const char* const* argv, std::span<const DeclareCom
   }
   if (!run) return Finish("slabstream", Status::InvalidArgument("a command is needed: " + CommandNames(app)));
 
-  InitLog(name(), LogLevel::kWarning);
+  InitLog(name(), log_level.empty() ? LogLevel::kWarning : LogLevelNames().at(log_level));
   Status status = LimitSimdTargetByEnvironment();
   if (status.ok()) status = run();
   return Finish(name(), status);

@@ -18,6 +18,7 @@ struct CommandLine {
   CLI::App& app;                 // gets a subcommand with its options
   std::function<Status()>& run;  // set by the subcommand's callback; called after the parse
   const std::string& typed;      // the whole command line
+  std::string& log_level;        // --log-level, after the parse; empty: not given
 };
 
 // Declares one command. The values of its options must live as long as its callbacks, which may own them.

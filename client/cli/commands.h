@@ -23,6 +23,8 @@ Status RunUp(const UpOptions& options);
 Status RunDown(const DownOptions& options);
 Status RunStatus(const StatusOptions& options);
 Status RunKeys(const KeysOptions& options);
+Status RunData(const DataOptions& options);
+Status RunLogs(const LogsOptions& options);
 Status RunSlurm(const SlurmOptions& options);
 
 }  // namespace slabstream

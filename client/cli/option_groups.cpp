@@ -191,7 +191,7 @@ void AddClipOptions(CLI::App& app, Clipping& clipping) {
            if (texts.size() <= kMaxClipPlanes) return true;
            throw CLI::ValidationError(fmt::format("--clip-plane is given {} times, at most {} are possible", texts.size(), kMaxClipPlanes));
          }),
-         "Draw only the points of the world with NX x + NY y + NZ z + D >= 0; may be repeated")
+         "Draw only the points X,Y,Z of the world with NX*X + NY*Y + NZ*Z + D >= 0; may be repeated")
       ->type_name("NX,NY,NZ,D")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
@@ -247,7 +247,7 @@ void AddAnnotationOptions(CLI::App& app, Annotations& annotations) {
       app, "--title", annotations.title,
       [](const std::string& option, const std::string& text) { return TextIf(CheckTitle(option, text), text); },
       fmt::format("A line of at most {} characters at the top", kMaxTitleCharacters))
-      ->type_name("TEXT");
+      ->type_name("TITLE");
 }
 
 void AddPolicyOptions(CLI::App& app, Policy& policy) {

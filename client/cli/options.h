@@ -11,6 +11,7 @@
 #include "client/cli/slurm_values.h"
 #include "client/cli/values.h"
 #include "client/image_io/image_writer.h"
+#include "common/base/time.h"
 #include "common/frame/frame_request.h"
 #include "common/volume/sphere.h"
 #include "common/volume_io/sample_type.h"
@@ -110,6 +111,7 @@ struct UpOptions {
   std::string link;               // as ParseLink takes it; empty: the coordinator's default
   std::uint64_t memory = 0;       // bytes, of all processes together
   bool detach = false;
+  std::string log_level;  // of the processes that it starts; empty: info
 };
 
 struct DownOptions {
@@ -124,6 +126,18 @@ struct StatusOptions {
 struct KeysOptions {
   ServiceChoice service;
   KeysOrder order;
+};
+
+struct DataOptions {
+  ServiceChoice service;
+  DataOrder order;
+  bool json = false;
+};
+
+struct LogsOptions {
+  ServiceChoice service;
+  bool follow = false;
+  Duration since{};  // how long ago the first line may have been written; 0: any time
 };
 
 struct SlurmOptions {

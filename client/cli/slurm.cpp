@@ -8,6 +8,7 @@
 #include "client/cli/job_script.h"
 #include "client/cli/process.h"
 #include "client/cli/service_state.h"
+#include "common/cli/program.h"
 #include "coordinator/catalogue.h"
 
 namespace slabstream {
@@ -52,9 +53,11 @@ Status RunSlurm(const SlurmOptions& options) {
     script.directives.push_back(*directive);
   }
 
-  const Result<Catalogue> catalogue = MakeCatalogue(options.data);  // mistakes show here, not when the job starts
-  if (!catalogue.ok()) return catalogue.status();
-  script.dataset = catalogue->begin()->first;
+  FoundData found = FindData(options.data);  // mistakes show here, not when the job starts
+  CheckFiles(found);
+  if (!found.errors.empty()) return ReportAll("slabstream slurm", found.errors);
+  if (found.datasets.empty()) return Status::InvalidArgument("--data " + options.data.front() + ": no volume file in this folder");
+  script.dataset = found.datasets.begin()->first;
   for (const std::string& data : options.data) script.data.push_back(WithAbsolutePath(data));
   if (!options.folder.empty()) {
     std::error_code error;

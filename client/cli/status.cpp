@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "client/cli/commands.h"
+#include "client/cli/dataset_text.h"
 #include "client/cli/session.h"
 #include "common/volume/memory_budget.h"
 
@@ -13,22 +14,15 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string_view NameOf(DatasetState state) {
-  switch (state) {
-    case DatasetState::kUnloaded: return "unloaded";
-    case DatasetState::kLoading: return "loading";
-    case DatasetState::kReady: return "ready";
-    case DatasetState::kFailed: break;
-  }
-  return "failed";
-}
-
 std::string StatusText(const StatusReply& reply) {
   const auto limit = [](std::uint64_t bytes) { return bytes == 0 ? std::string("no memory limit") : "memory limit " + MemoryText(bytes); };
   std::string text = fmt::format("coordinator  pid {}, up {:.1f} s, {} clients, {}\n", reply.pid, double(reply.uptime_ms) / 1e3,
                                  reply.clients, limit(reply.memory_bytes));
   text += fmt::format("frames       {} done, {} failed, {} running, {} queued\n", reply.frames_done, reply.frames_failed, reply.running,
                       reply.queued);
+  const auto& [bad, unknown, large, quota] = reply.refused;
+  text += fmt::format("requests     {} refused ({} bad, {} of unknown datasets, {} too large, {} over quota)\n",
+                      bad + unknown + large + quota, bad, unknown, large, quota);
   text += fmt::format("workers      {} ({} lost so far)\n", reply.workers.size(), reply.workers_lost);
   for (const WorkerStatus& worker : reply.workers) {
     const std::string place = worker.leaving ? "leaving" : fmt::format("slot {}", worker.slot);
@@ -64,18 +58,7 @@ std::string StatusJson(const StatusReply& reply) {
                        {"silent_ms", worker.silent_ms},
                        {"memory_bytes", worker.memory_bytes}});
   }
-  for (const DatasetStatus& dataset : reply.datasets) {
-    Json entry = {{"name", dataset.name}, {"state", NameOf(dataset.state)}};
-    if (dataset.state == DatasetState::kReady) {
-      const VolumeGeometry& geometry = dataset.description.geometry;
-      entry["size"] = {geometry.size.x, geometry.size.y, geometry.size.z};
-      entry["spacing"] = {geometry.spacing.x, geometry.spacing.y, geometry.spacing.z};
-      entry["memory_bytes"] = dataset.memory_bytes;
-      entry["range"] = {{"min", dataset.range.min}, {"max", dataset.range.max}};
-    }
-    if (dataset.state == DatasetState::kFailed) entry["error"] = dataset.error;
-    datasets.push_back(std::move(entry));
-  }
+  for (const DatasetStatus& dataset : reply.datasets) datasets.push_back(DatasetJson(dataset));
   const Json json = {{"pid", reply.pid},
                      {"uptime_ms", reply.uptime_ms},
                      {"clients", reply.clients},
@@ -83,6 +66,11 @@ std::string StatusJson(const StatusReply& reply) {
                      {"running", reply.running},
                      {"frames_done", reply.frames_done},
                      {"frames_failed", reply.frames_failed},
+                     {"requests_refused",
+                      {{"bad_request", reply.refused.bad_request},
+                       {"unknown_dataset", reply.refused.unknown_dataset},
+                       {"too_large", reply.refused.too_large},
+                       {"over_quota", reply.refused.over_quota}}},
                      {"workers_lost", reply.workers_lost},
                      {"memory_bytes", reply.memory_bytes},
                      {"workers", std::move(workers)},

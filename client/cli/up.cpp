@@ -23,11 +23,14 @@
 #include "client/cli/restart_pause.h"
 #include "client/cli/service_state.h"
 #include "client/cli/session.h"
+#include "common/base/log.h"
+#include "common/base/printable.h"
 #include "common/base/stop_signals.h"
 #include "common/cli/program.h"
 #include "common/keys/role.h"
 #include "common/transport/endpoint.h"
 #include "common/volume/memory_budget.h"
+#include "coordinator/catalogue.h"
 
 namespace slabstream {
 namespace {
@@ -166,20 +169,20 @@ class LocalService {
     if (!worker.restart) {
       const Duration pause = worker.pause.AfterEnd(worker.started, now);
       worker.restart = now + pause;
-      std::cerr << fmt::format("worker {} (pid {}) {}; it is started again in {} s", number, worker.process->pid(), end->description,
-                               std::chrono::duration_cast<seconds>(pause).count())
-                << std::endl;
+      LogWarning(fmt::format("worker {} (pid {}) {}; it is started again in {} s", number, worker.process->pid(), end->description,
+                             std::chrono::duration_cast<seconds>(pause).count()));
     } else if (now >= *worker.restart) {
       worker.restart.reset();
       worker.started = now;  // also if it fails: then it is tried again after the next pause
       Status started = StartWorker(number);
       if (started.ok()) started = SaveState(state_);
-      if (!started.ok()) std::cerr << fmt::format("worker {} cannot be started: {}", number, started.message()) << std::endl;
+      if (!started.ok()) LogError(fmt::format("worker {} cannot be started: {}", number, started.message()));
     }
   }
 
   Status StartCoordinator() {
-    std::vector<std::string> arguments = {"--listen", options_.listen, "--memory", MemoryArgument(memory_.coordinator)};
+    std::vector<std::string> arguments = {"--listen",    options_.listen,     "--memory", MemoryArgument(memory_.coordinator),
+                                          "--log-level", LogLevelOfChildren()};
     for (const std::string& data : options_.data) arguments.insert(arguments.end(), {"--data", data});
     if (!options_.link.empty()) arguments.insert(arguments.end(), {"--link", options_.link});
     if (!state_.keys_folder.empty()) arguments.insert(arguments.end(), {"--keys", state_.keys_folder});
@@ -206,8 +209,9 @@ class LocalService {
 
   Status StartWorker(std::size_t number) {
     const int threads = options_.threads > 0 ? options_.threads : CoreShare(options_.workers);
-    std::vector<std::string> arguments = {"--threads", std::to_string(threads), "--compress=" + options_.compress, "--memory",
-                                          MemoryArgument(memory_.worker)};
+    std::vector<std::string> arguments = {"--threads",         std::to_string(threads),        "--compress=" + options_.compress,
+                                          "--memory",          MemoryArgument(memory_.worker), "--log-level",
+                                          LogLevelOfChildren()};
     if (state_.keys_folder.empty()) {
       arguments.insert(arguments.end(), {"--coordinator", worker_endpoint_});
     } else {
@@ -218,6 +222,8 @@ class LocalService {
     state_.workers[number - 1] = children_[number].process->pid();
     return Status::Ok();
   }
+
+  std::string LogLevelOfChildren() const { return options_.log_level.empty() ? "info" : options_.log_level; }
 
   bool AllEnded() {
     bool all = true;
@@ -340,11 +346,20 @@ Status Serve(const UpOptions& options, const MemoryShares& memory, std::optional
   return status;
 }
 
+// Finds out before anything is started which files cannot be read, and says so: a line each.
+Status CheckData(const std::vector<std::string>& data) {
+  FoundData found = FindData(data);
+  CheckFiles(found);
+  for (const std::string& line : found.complaints) std::cerr << "slabstream up: warning: " << Printable(line) << std::endl;
+  return ReportAll("slabstream up", found.errors);
+}
+
 }  // namespace
 
 Status RunUp(const UpOptions& options) {
   const Result<MemoryShares> memory = ShareMemory(options.memory, options.workers);
   if (!memory.ok()) return memory.status();
+  if (Status readable = CheckData(options.data); !readable.ok()) return readable;
   if (!options.detach) return Serve(options, *memory, std::nullopt);
   const Result<int> ready = Detach();
   if (!ready.ok()) return ready.status();

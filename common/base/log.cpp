@@ -3,6 +3,7 @@
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include <atomic>
 #include <string>
 
 namespace slabstream {
@@ -13,6 +14,8 @@ spdlog::level::level_enum ToSpdlog(LogLevel level) {
   constexpr level_enum kLevels[] = {debug, info, warn, err, off};  // in the order of LogLevel
   return kLevels[int(level)];
 }
+
+std::atomic<LogLevel> least_level = LogLevel::kWarning;
 
 // Until InitLog, only warnings and errors are written, so that a library user sees no chatter.
 spdlog::logger& Logger() {
@@ -36,9 +39,12 @@ const std::map<std::string, LogLevel>& LogLevelNames() {
 }
 
 void InitLog(std::string_view process, LogLevel level) {
-  Logger().set_pattern("%H:%M:%S.%e %L [" + std::string(process) + "] %v");
+  Logger().set_pattern("%Y-%m-%d %H:%M:%S.%e %L [" + std::string(process) + "] %v");
   Logger().set_level(ToSpdlog(level));
+  least_level = level;
 }
+
+LogLevel LeastLogLevel() { return least_level; }
 
 void Log(LogLevel level, std::string_view message) { Logger().log(ToSpdlog(level), spdlog::string_view_t(message.data(), message.size())); }
 

@@ -47,6 +47,11 @@ int Finish(const std::string& who, const Status& status) {
   }
 }
 
+Status ReportAll(const std::string& who, const std::vector<Status>& failures) {
+  for (std::size_t i = 0; i + 1 < failures.size(); ++i) (void)Finish(who, failures[i]);
+  return failures.empty() ? Status::Ok() : failures.back();
+}
+
 void SetUp(CLI::App& app, const std::string& version) {
   app.formatter(std::make_shared<HelpFormatter>());
   app.set_help_flag("-h,--help", "Print this text");
@@ -64,13 +69,16 @@ int ParseAndRun(CLI::App& app, int argc, const char* const* argv, const std::fun
   return Finish(app.get_name(), run());
 }
 
+CLI::Option* AddLogLevel(CLI::App& app, std::string& level) {
+  std::vector<std::string_view> levels;
+  for (const auto& [name, unused] : LogLevelNames()) levels.push_back(name);
+  return AddParsed(app, "--log-level", level, OneOf(std::move(levels)), "What is logged to stderr: debug, info, warning, error or off")
+      ->type_name("NAME");
+}
+
 int RunService(CLI::App& app, int argc, const char* const* argv, const std::string& log_name, const std::function<Status()>& serve) {
   std::string log_level = "warning";
-  std::vector<std::string_view> levels;
-  for (const auto& [name, level] : LogLevelNames()) levels.push_back(name);
-  AddParsed(app, "--log-level", log_level, OneOf(std::move(levels)), "What is logged to stderr: debug, info, warning, error or off")
-      ->type_name("NAME")
-      ->default_str(log_level);
+  AddLogLevel(app, log_level)->default_str(log_level);
   return ParseAndRun(app, argc, argv, [&] {
     InitLog(log_name, LogLevelNames().at(log_level));
     constexpr std::uint64_t kLeastFiles = 128;  // with fewer it would wait for ever for some of its own sockets

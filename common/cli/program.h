@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "common/base/status.h"
 
@@ -16,11 +17,17 @@ int RunMain(const std::string& name, const std::function<int()>& program);
 // 2: bad arguments or input. 130: stopped by Ctrl-C.
 int Finish(const std::string& who, const Status& status);
 
+// Writes all of them but the last one as Finish does, and returns that one. Ok if there is none.
+Status ReportAll(const std::string& who, const std::vector<Status>& failures);
+
 // The style of help texts, --help and --version.
 void SetUp(CLI::App& app, const std::string& version);
 
 // Parses, and runs `run`. Returns the exit status.
 int ParseAndRun(CLI::App& app, int argc, const char* const* argv, const std::function<Status()>& run);
+
+// --log-level; the text stays as it is if the option is not given.
+CLI::Option* AddLogLevel(CLI::App& app, std::string& level);
 
 // A program that is one service: adds --log-level, parses, begins to log as `log_name`, and runs `serve`. Returns the exit status.
 int RunService(CLI::App& app, int argc, const char* const* argv, const std::string& log_name, const std::function<Status()>& serve);

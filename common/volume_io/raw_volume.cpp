@@ -79,7 +79,7 @@ Result<std::int64_t> ChosenVolume(const std::string& path, std::int64_t count, c
 Result<RawVolume> TakeMemory(const std::string& path, const RawHeader& header, const ReadOptions& options) {
   if (Status status = CheckChannel(path, header.components, options); !status.ok()) return status;
   if (Status status = CheckFitsMemory(header.sample_bytes(), path); !status.ok()) return status;
-  return RawVolume{header, AlignedVector<std::byte>(std::size_t(header.sample_bytes())), {}};
+  return RawVolume{header, AlignedVector<std::byte>(options.headers_only ? 0 : std::size_t(header.sample_bytes())), {}};
 }
 
 Result<RawVolume> ReadSamples(const std::string& path, const RawHeader& header, const Payload& payload, const ReadOptions& options) {
@@ -94,10 +94,11 @@ Result<RawVolume> ReadSamples(const std::string& path, const RawHeader& header, 
   if (Status status = CheckHolds(chosen, header.sample_bytes()); !status.ok()) return failed(status);
   Result<RawVolume> raw = TakeMemory(path, header, options);
   if (!raw.ok()) return raw;
+  if (payload.file != path) raw->samples_file = payload.file;
+  if (options.headers_only) return raw;
   if (Status status = ReadPayload(chosen, raw->bytes); !status.ok()) return failed(status);
   static_assert(std::endian::native == std::endian::little, "this machine's samples are little endian");
   if (payload.big_endian) SwapByteOrder(header.type, raw->bytes);
-  if (payload.file != path) raw->samples_file = payload.file;
   return raw;
 }
 
@@ -105,7 +106,7 @@ Result<RawVolume> HalvesAsFloats(const std::string& path, RawVolume halves) {
   RawVolume floats{halves.header, {}, std::move(halves.samples_file)};
   floats.header.type = SampleType::kFloat32;
   if (Status status = CheckFitsMemory(floats.header.sample_bytes(), path); !status.ok()) return status;
-  floats.bytes.resize(std::size_t(floats.header.sample_bytes()));
+  floats.bytes.resize(2 * halves.bytes.size());
   const std::span in(reinterpret_cast<const std::uint16_t*>(halves.bytes.data()), halves.bytes.size() / sizeof(std::uint16_t));
   std::ranges::transform(in, reinterpret_cast<float*>(floats.bytes.data()), FromHalf);
   return floats;

@@ -42,8 +42,8 @@ struct RawHeader {
 
 struct RawVolume {
   RawHeader header;
-  AlignedVector<std::byte> bytes;      // this machine's byte order
-  std::filesystem::path samples_file;  // if that is another file than the header's
+  AlignedVector<std::byte> bytes;      // this machine's byte order; none if only headers were read
+  std::filesystem::path samples_file;  // or the folder of several; if that is not the header's file
 };
 
 // Steps along the axes themselves.
@@ -59,10 +59,11 @@ Status SetSize(RawHeader& header, const std::string& path, std::vector<double> s
 // Which of `count` volumes options.time takes. InvalidArgument: none, although there are several, or one that there is not.
 Result<std::int64_t> ChosenVolume(const std::string& path, std::int64_t count, const ReadOptions& options);
 
-// Takes memory for the samples. InvalidArgument: several components, of which options.channel takes none. ResourceExhausted: too large.
+// Takes memory for the samples, unless only headers are read. InvalidArgument: several components, of which options.channel takes none.
+// ResourceExhausted: too large.
 Result<RawVolume> TakeMemory(const std::string& path, const RawHeader& header, const ReadOptions& options);
 
-// Checks that the file and the memory are large enough, then takes memory for the samples and reads them.
+// Checks that the file and the memory are large enough, then takes memory for the samples and reads them, unless only headers are read.
 Result<RawVolume> ReadSamples(const std::string& path, const RawHeader& header, const Payload& payload, const ReadOptions& options);
 
 // Half floats, read as uint16, become float32. ResourceExhausted: they do not fit the memory.

@@ -33,6 +33,8 @@ struct ReadOptions {
   std::optional<SampleType> type;
   std::optional<bool> big_endian;
   std::optional<std::int64_t> offset;  // bytes of the file before the samples, >= 0
+  // What users cannot say.
+  bool headers_only = false;  // check whatever can be checked without the samples, and take no memory for them
 };
 
 struct ReadOption {

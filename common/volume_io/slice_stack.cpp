@@ -77,7 +77,7 @@ Result<RawVolume> TakeMemoryForSlices(const std::string& path, RawHeader slice, 
   return TakeMemory(path, slice, options);
 }
 
-Status ReadSlice(SliceFile& slice, const std::string& name, std::int64_t number, RawVolume& volume) {
+Status ReadSlice(SliceFile& slice, const std::string& name, std::int64_t number, RawVolume& volume, const ReadOptions& options) {
   const Result<RawHeader> header = slice.ReadHeader();
   if (!header.ok()) return header.status();
   const RawHeader& wanted = volume.header;
@@ -88,7 +88,7 @@ Status ReadSlice(SliceFile& slice, const std::string& name, std::int64_t number,
   if (kind(*header) != kind(wanted)) {
     return Status::InvalidArgument(fmt::format("{} is {}, must be {} like the first one", name, kind(*header), kind(wanted)));
   }
-  return slice.ReadSamples(*header, volume.bytes.data() + number * header->sample_bytes());
+  return options.headers_only ? Status::Ok() : slice.ReadSamples(*header, volume.bytes.data() + number * header->sample_bytes());
 }
 
 Result<RawVolume> ReadSliceStack(const std::string& folder, const std::vector<std::string>& paths, OpenSlice open,
@@ -106,7 +106,7 @@ Result<RawVolume> ReadSliceStack(const std::string& folder, const std::vector<st
       if (!taken.ok()) return taken;
       raw = *std::move(taken);
     }
-    if (Status status = ReadSlice(**slice, paths[number], std::int64_t(number), *raw); !status.ok()) return status;
+    if (Status status = ReadSlice(**slice, paths[number], std::int64_t(number), *raw, options); !status.ok()) return status;
   }
   return *std::move(raw);
 }

@@ -33,14 +33,14 @@ class SliceFile {
   virtual Status ReadSamples(const RawHeader& header, std::byte* out) = 0;
 };
 
-// Takes memory for a volume of `count` slices like `slice`, after checking that files of `file_bytes` can hold it. Spacing: options.spacing
-// if it is given, else that of the slice.
+// Takes memory for a volume of `count` slices like `slice`, as TakeMemory does, after checking that files of `file_bytes` can hold it.
+// Spacing: options.spacing if it is given, else that of the slice.
 Result<RawVolume> TakeMemoryForSlices(const std::string& path, RawHeader slice, std::int64_t count, std::int64_t file_bytes,
                                       const ReadOptions& options);
 
-// Reads a slice as number `number` of the volume. `name`: of the slice, for messages. InvalidArgument: it differs from the first one in
-// size, type or components.
-Status ReadSlice(SliceFile& slice, const std::string& name, std::int64_t number, RawVolume& volume);
+// Reads a slice, or only its header, as number `number` of the volume. `name`: of the slice, for messages. InvalidArgument: it differs from
+// the first one in size, type or components.
+Status ReadSlice(SliceFile& slice, const std::string& name, std::int64_t number, RawVolume& volume, const ReadOptions& options);
 
 // A folder of slices; `open` opens one.
 using OpenSlice = Result<std::unique_ptr<SliceFile>> (*)(const std::string& path);

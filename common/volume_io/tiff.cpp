@@ -197,7 +197,7 @@ Result<RawVolume> ReadPages(const std::string& path, const ReadOptions& options)
   for (std::int64_t slice = 0; raw.ok() && slice < order->count; ++slice) {
     const std::int64_t page = order->first + slice * order->step;
     if (Status status = file.GoToPage(page); !status.ok()) return status;
-    if (Status status = ReadSlice(file, fmt::format("{}: page {}", path, page + 1), slice, *raw); !status.ok()) return status;
+    if (Status status = ReadSlice(file, fmt::format("{}: page {}", path, page + 1), slice, *raw, options); !status.ok()) return status;
   }
   return raw;
 }

@@ -69,19 +69,51 @@ Result<LoadedVolume> Finish(RawVolume raw, const VolumeFormat& format, const std
   return loaded;
 }
 
-}  // namespace
+struct ReadFile {
+  RawVolume raw;
+  const VolumeFormat* format = nullptr;
+};
 
-Result<LoadedVolume> ReadVolume(const std::string& path, const ReadOptions& options) {
+Result<ReadFile> ReadRaw(const std::string& path, const ReadOptions& options) {
   if (Status status = CheckVolume(path, options); !status.ok()) return status;
-  const VolumeFormat& format = *FindFormat(path, options);
+  const VolumeFormat* const format = FindFormat(path, options);
+  Result<RawVolume> raw = format->read(path, options);
+  if (!raw.ok()) return Printable(raw.status());
+  return ReadFile{std::move(*raw), format};
+}
+
+// What `read` returns, unless there is not enough memory.
+template <class Read>
+auto WithinMemory(const std::string& path, Read&& read) -> decltype(read()) {
   try {
-    Result<RawVolume> raw = format.read(path, options);
-    if (!raw.ok()) return Printable(raw.status());
-    TakeChannel(*raw, options);
-    return Finish(std::move(*raw), format, path);
+    return read();
   } catch (const std::bad_alloc&) {
     return Status::ResourceExhausted(path + ": does not fit the memory");
   }
+}
+
+}  // namespace
+
+Result<LoadedVolume> ReadVolume(const std::string& path, const ReadOptions& options) {
+  return WithinMemory(path, [&]() -> Result<LoadedVolume> {
+    Result<ReadFile> file = ReadRaw(path, options);
+    if (!file.ok()) return file.status();
+    TakeChannel(file->raw, options);
+    return Finish(std::move(file->raw), *file->format, path);
+  });
+}
+
+Result<std::vector<std::string>> CheckVolumeHeaders(const std::string& path, const ReadOptions& options) {
+  return WithinMemory(path, [&]() -> Result<std::vector<std::string>> {
+    ReadOptions of_headers = options;
+    of_headers.headers_only = true;
+    const Result<ReadFile> file = ReadRaw(path, of_headers);
+    if (!file.ok()) return file.status();
+    if (const auto placed = PlaceInWorld(file->raw.header, path); !placed.ok()) return placed.status();
+    std::vector<std::string> files = {path};
+    if (!file->raw.samples_file.empty()) files.push_back(file->raw.samples_file.string());
+    return files;
+  });
 }
 
 Status CheckVolume(const std::string& path, const ReadOptions& options) {

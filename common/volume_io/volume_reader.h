@@ -51,6 +51,10 @@ struct LoadedVolume {
 // components, a side above kMaxVolumeSide), DataLoss (truncated), ResourceExhausted (does not fit the memory). Messages name the path.
 Result<LoadedVolume> ReadVolume(const std::string& path, const ReadOptions& options = {});
 
+// Reads the headers alone, and checks what can be checked without the samples: sizes, types, the lengths of files, orientation. The files
+// that ReadVolume would read: `path`, a file or a folder, and if its header names one, the file of the samples. Errors: as ReadVolume.
+Result<std::vector<std::string>> CheckVolumeHeaders(const std::string& path, const ReadOptions& options = {});
+
 // Whether ReadVolume would try this path: the file exists, a format knows it (formats.h), and takes the options. Errors as of ReadVolume.
 Status CheckVolume(const std::string& path, const ReadOptions& options = {});
 // The same without options, as for the files of a folder.

@@ -292,7 +292,7 @@ Result<RawVolume> Reader::ReadArray(const DataArray& array) {
                                std::max<std::int64_t>(end - begin, 0), samples, least));
   }
   Result<RawVolume> raw = TakeMemory(path_, header_, options_);
-  if (!raw.ok()) return raw;
+  if (!raw.ok() || options_.headers_only) return raw;
   Status status;
   if (text) {
     TextCursor cursor(path_, begin, end);

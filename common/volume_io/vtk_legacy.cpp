@@ -243,7 +243,7 @@ Result<RawVolume> Parser::Read() {
   const std::int64_t least_bytes = 2 * header_.sample_bytes() / std::int64_t(BytesPerSample(header_.type)) - 1;
   if (Status status = CheckHolds({.file = path_, .offset = array->offset}, least_bytes); !status.ok()) return status;
   Result<RawVolume> raw = TakeMemory(path_, header_, options_);
-  if (!raw.ok()) return raw;
+  if (!raw.ok() || options_.headers_only) return raw;
   cursor_.GoTo(array->offset);
   if (Status status = ReadTextSamples(cursor_, header_.type, raw->bytes); !status.ok()) {
     return Status(status.code(), path_ + ": " + status.message());

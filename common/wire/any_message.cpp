@@ -61,7 +61,9 @@ constexpr auto kMembers = std::tuple{Member{Envelope::kRegisterWorker, &Envelope
                                      Member{Envelope::kShutDownReply, &Envelope::shut_down_reply, &Envelope::mutable_shut_down_reply},
                                      Member{Envelope::kKeysOrder, &Envelope::keys_order, &Envelope::mutable_keys_order},
                                      Member{Envelope::kKeysReply, &Envelope::keys_reply, &Envelope::mutable_keys_reply},
-                                     Member{Envelope::kOrderRefused, &Envelope::order_refused, &Envelope::mutable_order_refused}};
+                                     Member{Envelope::kOrderRefused, &Envelope::order_refused, &Envelope::mutable_order_refused},
+                                     Member{Envelope::kDataOrder, &Envelope::data_order, &Envelope::mutable_data_order},
+                                     Member{Envelope::kDataReply, &Envelope::data_reply, &Envelope::mutable_data_reply}};
 
 constexpr std::size_t kMemberCount = std::variant_size_v<AnyMessage>;
 static_assert(std::tuple_size_v<decltype(kMembers)> == kMemberCount, "kMembers lists AnyMessage");

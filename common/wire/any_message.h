@@ -27,7 +27,7 @@ inline constexpr std::size_t kMaxHeaderBytes = std::size_t{64} << 20;
 using AnyMessage = std::variant<Register, Welcome, Heartbeat, Ping, GroupAssignment, GroupDone, FrameImage, WorkerTrouble, Leave, Retire,
                                 Stop, ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused, ImageReceived, SubmitFrame,
                                 FrameProgress, FrameReply, FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery, StatusReply,
-                                ShutDown, ShutDownReply, KeysOrder, KeysReply, OrderRefused>;
+                                ShutDown, ShutDownReply, KeysOrder, KeysReply, OrderRefused, DataOrder, DataReply>;
 
 // The sockets that messages travel on: between coordinator and workers, between workers, and between clients and coordinator. Each message
 // belongs to one: to that of the header that declares it.

@@ -9,6 +9,7 @@ namespace slabstream {
 static_assert(v1::FramePhase_MAX == static_cast<int>(FramePhase::kRunning));
 static_assert(v1::DatasetState_MAX == static_cast<int>(DatasetState::kFailed));
 static_assert(v1::LengthUnit_MAX == static_cast<int>(LengthUnit::kMillimetre));
+static_assert(v1::DataAction_MAX == static_cast<int>(DataAction::kReload));
 
 void Fields(auto& io, Is<SubmitFrame> auto& m) {
   using P = v1::SubmitFrame;
@@ -140,6 +141,15 @@ void Fields(auto& io, Is<DatasetStatus> auto& m) {
     io.Any(m.memory_bytes, &P::memory_bytes, &P::set_memory_bytes);
   }
   if (m.state == DatasetState::kFailed) io.Text("error", m.error, &P::error, &P::mutable_error, 0, kMaxTextBytes);
+  io.Any(m.since_ms, &P::since_ms, &P::set_since_ms);
+}
+
+void Fields(auto& io, Is<RefusedRequests> auto& m) {
+  using P = v1::RefusedRequests;
+  io.Any(m.bad_request, &P::bad_request, &P::set_bad_request);
+  io.Any(m.unknown_dataset, &P::unknown_dataset, &P::set_unknown_dataset);
+  io.Any(m.too_large, &P::too_large, &P::set_too_large);
+  io.Any(m.over_quota, &P::over_quota, &P::set_over_quota);
 }
 
 void Fields(auto& io, Is<StatusReply> auto& m) {
@@ -157,6 +167,7 @@ void Fields(auto& io, Is<StatusReply> auto& m) {
   io.Messages("workers", m.workers, &P::workers, &P::mutable_workers, kMaxListed);
   io.Messages("datasets", m.datasets, &P::datasets, &P::mutable_datasets, kMaxListed);
   io.Any(m.memory_bytes, &P::memory_bytes, &P::set_memory_bytes);
+  io.Message("refused", m.refused, &P::refused, &P::mutable_refused);
 }
 
 void Fields(auto& io, Is<ShutDown> auto& m) { io.Any(m.nonce, &v1::ShutDown::nonce, &v1::ShutDown::set_nonce); }
@@ -188,6 +199,19 @@ void Fields(auto& io, Is<OrderRefused> auto& m) {
   using P = v1::OrderRefused;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
   io.Message("status", m.status, &P::status, &P::mutable_status);
+}
+
+void Fields(auto& io, Is<DataOrder> auto& m) {
+  using P = v1::DataOrder;
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  io.OneOf("action", m.action, &P::action, &P::set_action, DataAction::kList, DataAction::kReload);
+  io.ByteStrings("items", m.items, &P::items, &P::mutable_items, kMaxDataItems, kMaxDataItemBytes);
+}
+
+void Fields(auto& io, Is<DataReply> auto& m) {
+  using P = v1::DataReply;
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  io.Messages("datasets", m.datasets, &P::datasets, &P::mutable_datasets, kMaxListed);
 }
 
 }  // namespace slabstream

@@ -11,7 +11,8 @@
 //   StatusQuery -------------------------->  StatusReply
 //   ShutDown    -------------------------->  ShutDownReply          the service and its workers end
 //   KeysOrder   -------------------------->  KeysReply
-//   Either of the last two may be answered by OrderRefused: over encrypted connections they need an admin's key.
+//   DataOrder   -------------------------->  DataReply
+//   Any of the last three may be answered by OrderRefused: over encrypted connections they need an admin's key, but for lists of datasets.
 #pragma once
 
 #include <cstdint>
@@ -126,7 +127,17 @@ struct DatasetStatus {
   ValueRange range;                // kReady only
   std::string error;               // kFailed only
   std::uint64_t memory_bytes = 0;  // kReady only: what its voxels take of the coordinator's memory
+  std::uint64_t since_ms = 0;      // how long it has been in this state
   friend bool operator==(const DatasetStatus&, const DatasetStatus&) = default;
+};
+
+// Requests that were refused before any worker had a part in them. They do not count as failed frames.
+struct RefusedRequests {
+  std::uint64_t bad_request = 0;      // a field, a name or a combination that is not allowed
+  std::uint64_t unknown_dataset = 0;  // the catalogue has no such dataset
+  std::uint64_t too_large = 0;        // more than the memory of a worker or of the coordinator
+  std::uint64_t over_quota = 0;       // too many open requests of the client, or of all clients
+  friend bool operator==(const RefusedRequests&, const RefusedRequests&) = default;
 };
 
 struct StatusReply {
@@ -139,6 +150,7 @@ struct StatusReply {
   std::vector<WorkerStatus> workers;
   std::vector<DatasetStatus> datasets;
   std::uint64_t memory_bytes = 0;  // limit of the coordinator's memory; 0: none stated
+  RefusedRequests refused;
   friend bool operator==(const StatusReply&, const StatusReply&) = default;
 };
 
@@ -172,6 +184,26 @@ struct OrderRefused {
   std::uint64_t nonce = 0;
   Status status = Status::Internal("");  // never ok
   friend bool operator==(const OrderRefused&, const OrderRefused&) = default;
+};
+
+enum class DataAction : std::uint8_t { kList = 1, kAdd = 2, kRemove = 3, kReload = 4 };
+
+inline constexpr std::size_t kMaxDataItems = 128;       // of one order
+inline constexpr std::size_t kMaxDataItemBytes = 5120;  // a name, a path and what may stand between and behind them
+
+struct DataOrder {
+  std::uint64_t nonce = 0;
+  DataAction action = DataAction::kList;
+  // kAdd: as --data takes them, with absolute paths of the coordinator's host. kRemove: names of datasets, or watched folders. kReload:
+  // names of datasets. kList: none.
+  std::vector<std::string> items;  // at most kMaxDataItems, each of 1 ... kMaxDataItemBytes
+  friend bool operator==(const DataOrder&, const DataOrder&) = default;
+};
+
+struct DataReply {
+  std::uint64_t nonce = 0;
+  std::vector<DatasetStatus> datasets;  // after the order
+  friend bool operator==(const DataReply&, const DataReply&) = default;
 };
 
 }  // namespace slabstream

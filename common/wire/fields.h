@@ -77,6 +77,10 @@ class Writer {
              std::size_t) {
     *(out_.*edit)() = value;
   }
+  void ByteStrings(std::string_view, const std::vector<std::string>& items, const RepeatedMessage<std::string>& (P::*)() const,
+                   RepeatedMessage<std::string>* (P::*edit)(), std::size_t, std::size_t) {
+    (out_.*edit)()->Add(items.begin(), items.end());
+  }
   template <class T>
   void Numbers(std::string_view, const std::vector<T>& values, const Repeated<T>& (P::*)() const, Repeated<T>* (P::*edit)(), std::size_t) {
     (out_.*edit)()->Add(values.begin(), values.end());
@@ -141,6 +145,16 @@ class Reader {
   void Bytes(std::string_view field, std::string& value, const std::string& (P::*get)() const, std::string* (P::*)(), std::size_t min_bytes,
              std::size_t max_bytes) {
     value = check_.Text(field, (in_.*get)(), min_bytes, max_bytes);
+  }
+  // At most `max` of them, each of 1 to max_bytes bytes.
+  void ByteStrings(std::string_view field, std::vector<std::string>& items, const RepeatedMessage<std::string>& (P::*get)() const,
+                   RepeatedMessage<std::string>* (P::*)(), std::size_t max, std::size_t max_bytes) {
+    const RepeatedMessage<std::string>& in = (in_.*get)();
+    items.resize(static_cast<std::size_t>(check_.Count(field, in.size(), max)));
+    for (std::size_t i = 0; i < items.size(); ++i) {
+      const auto scope = check_.In(field, i);
+      items[i] = check_.Text("", in[static_cast<int>(i)], 1, max_bytes);
+    }
   }
   // At most `max` values.
   template <class T>

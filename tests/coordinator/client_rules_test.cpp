@@ -249,7 +249,8 @@ TEST(CoordinatorClients, DatasetIsLoadedOnceAndAFailedLoadIsTriedAgain) {
   script.Client(kClient, Frame(1));
   script.Client(kClient, Frame(2));
   ASSERT_EQ(script.loads.size(), 1U);
-  const auto failed = ToClients<FrameFailed>(script.Step(DatasetFailed{"block", Status::DataLoss("block.nrrd: truncated")}));
+  const auto failed =
+      ToClients<FrameFailed>(script.Step(DatasetFailed{"block", script.loads.back().load, Status::DataLoss("block.nrrd: truncated")}));
   ASSERT_EQ(failed.size(), 2U);
   EXPECT_EQ(failed[0].message.status, Status::DataLoss("block.nrrd: truncated"));
   EXPECT_EQ(script.QueryStatus().datasets[0].error, "block.nrrd: truncated");

@@ -30,7 +30,7 @@ inline CoordinatorConfig TestConfig() {
   config.epoch = 77;
   config.pid = 4321;
   config.slabs_endpoint = "inproc://slabs";
-  config.datasets = {"block", "other"};
+  config.datasets = {{"block", {}}, {"other", {}}};
   return config;
 }
 

@@ -159,7 +159,7 @@ class DatasetRules : public MemoryRules {
  protected:
   static CoordinatorConfig Config() {
     CoordinatorConfig config = TestConfig();
-    config.datasets = {"a", "b", "c"};
+    config.datasets = {{"a", {}}, {"b", {}}, {"c", {}}};
     config.memory_bytes = 400 * kMebi;  // 300 for datasets
     return config;
   }
@@ -222,12 +222,12 @@ TEST_F(DatasetRules, ALoadWithoutMemoryIsTriedAgainWhenOthersAreUnloaded) {
   script.Client(kClient, Frame(2, 1, "b"));
   const Status no_memory = Status::ResourceExhausted("b.nrrd needs 300 MiB");
   const std::size_t loads = script.loads.size();
-  Actions actions = script.Step(DatasetFailed{"b", no_memory});
+  Actions actions = script.Step(DatasetFailed{"b", script.loads.back().load, no_memory});
   EXPECT_THAT(Of<UnloadDataset>(actions), SizeIs(1));
   EXPECT_THAT(ToClients<FrameFailed>(actions), IsEmpty());
   ASSERT_EQ(script.loads.size(), loads + 1);
   // Now there is nothing more to unload.
-  actions = script.Step(DatasetFailed{"b", no_memory});
+  actions = script.Step(DatasetFailed{"b", script.loads.back().load, no_memory});
   EXPECT_THAT(ToClients<FrameFailed>(actions), SizeIs(1));
   EXPECT_EQ(script.loads.size(), loads + 1);
 }

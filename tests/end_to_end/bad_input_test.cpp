@@ -28,6 +28,9 @@ class BadInputTest : public EndToEndTest {
 };
 
 TEST_F(BadInputTest, CommandLines) {
+  std::vector<std::string> many(131, "a");
+  many[0] = "data";
+  many[1] = "remove";
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
       {{}, "render, turntable"},
       {{"rendr"}, "rendr"},
@@ -59,6 +62,26 @@ TEST_F(BadInputTest, CommandLines) {
       {{"up", "--link", "bus:-1,5"}, "a latency in [0, 1000000] microseconds"},
       {{"status", "--endpoint", "tcp://0.0.0.0:1"}, "--endpoint"},
       {{"down", "--endpoint", "tcp://127.0.0.1:*"}, "--endpoint"},
+      {{"data"}, "required"},
+      {{"data", "add"}, "DATA"},
+      {{"data", "add", "a=x.nrrd"},
+       "a=x.nrrd: the path must be absolute, since it is one of the coordinator's host; on this host it would be /"},
+      {{"data", "add", "x"}, "x: the path must be absolute"},
+      {{"data", "add", "a="}, "a path of 0 bytes, must have 1 to 4096"},
+      {{"data", "add", "a=/" + std::string(4096, 'p')}, "a path of 4097 bytes, must have 1 to 4096"},
+      {{"data", "add", "a/b=/x.nrrd"}, "dataset name \"a/b\" must have 1 to 256 letters"},
+      {{"data", "add", std::string(257, 'n') + "=/x.nrrd"}, "must have 1 to 256"},
+      {{"data", "remove"}, "NAME"},
+      {{"data", "remove", ""}, "NAME has 0 bytes, must have 1 to 5120"},
+      {{"data", "reload", std::string(5121, 'n')}, "NAME has 5121 bytes, must have 1 to 5120"},
+      {{"data", "list", "all"}, "all"},
+      {{"data", "list", "--endpoint", "nowhere"}, "--endpoint"},
+      {many, "129 datasets at a time, at most 128 can be named"},
+      {{"logs", "--since", "yesterday"}, "--since 'yesterday'"},
+      {{"logs", "--endpoint", "nowhere"}, "--endpoint"},
+      {{"up", "--log-level", "loud"}, "--log-level 'loud'"},
+      {{"status", "--log-level", "loud"}, "--log-level 'loud'"},
+      {{"--log-level", "loud", "status"}, "--log-level 'loud'"},
       {{"sphere", "--class", "3", "--size", "8", "-o", "s.nrrd"}, "--class 3"},
       {{"sphere", "--class", "1", "--size", "1", "-o", "s.nrrd"}, "--size 1"},
       {{"sphere", "--class", "2", "--size", "8", "--occupancy", "0.9", "-o", "s.nrrd"}, "occupancy"},

@@ -276,6 +276,95 @@ TEST_F(ServiceTest, UpThatCannotStartSaysWhyAndLeavesNothingBehind) {
   }
 }
 
+TEST_F(ServiceTest, UpTellsOfEachFileThatCannotBeReadBeforeItStartsAnything) {
+  std::ofstream(Path("text.nrrd")) << "no volume";
+  const ProgramResult named = Slabstream({"up", "--detach", "--listen", endpoint_, "--data", "a=" + Path("text.nrrd"), "--data",
+                                          "ball=" + ball_, "--data", "b=" + Path("missing.nrrd")});
+  EXPECT_EQ(named.exit_status, 2);
+  EXPECT_THAT(named.err_lines(),
+              testing::UnorderedElementsAre(AllOf(HasSubstr("slabstream up: "), HasSubstr("text.nrrd: not a NRRD volume")),
+                                            AllOf(HasSubstr("slabstream up: "), HasSubstr("missing.nrrd"), HasSubstr("does not exist"))));
+  EXPECT_FALSE(std::filesystem::exists(Path("slabstream")));
+
+  std::filesystem::create_directory(Path("inbox"));
+  std::filesystem::rename(Path("text.nrrd"), Path("inbox/text.nrrd"));
+  const ProgramResult watched = MustRun({"up", "--detach", "--workers", "1", "--listen", endpoint_, "--data", Path("inbox")});
+  EXPECT_THAT(watched.err_lines(),
+              testing::ElementsAre(AllOf(HasSubstr("slabstream up: warning: "), HasSubstr("text.nrrd: not a NRRD volume"))));
+  const ProgramResult render = Slabstream({"render", "text", "-o", "a.png"});
+  EXPECT_EQ(render.exit_status, 2);
+  EXPECT_THAT(render.err, HasSubstr("text.nrrd: not a NRRD volume"));
+}
+
+TEST_F(ServiceTest, DataAddsListsReloadsAndRemoves) {
+  Up(endpoint_);
+  std::filesystem::create_directory(Path("inbox"));
+  const std::string other = MakeSphere("other.nrrd", 2, 24);
+  EXPECT_THAT(MustRun({"data", "add", "other=" + other, Path("inbox")}).out, AllOf(HasSubstr("ball"), HasSubstr("other")));
+  std::filesystem::copy_file(other, Path("inbox/dropped.nrrd"));
+  MustRun({"render", "dropped", "-o", "a.png", "--size", "32"});
+  const json list = json::parse(MustRun({"data", "list", "--json"}).out);
+  ASSERT_EQ(list.size(), 3U);
+  EXPECT_EQ(list[1]["name"], "dropped");
+  EXPECT_EQ(list[1]["state"], "ready");
+  EXPECT_EQ(list[1]["size"], (json{24, 24, 24}));
+  EXPECT_EQ(list[1]["type"], "uint8");
+  EXPECT_EQ(list[1]["spacing"], (json{1, 1, 1}));
+  EXPECT_GT(list[1]["memory_bytes"], 0);
+  EXPECT_EQ(list[2]["state"], "unloaded");
+  EXPECT_THAT(MustRun({"data", "list"}).out, testing::ContainsRegex("dropped +ready +[0-9]+ s +24 x 24 x 24 +uint8 +1 x 1 x 1 +"));
+  MustRun({"data", "reload", "dropped", "ball"});
+  EXPECT_EQ(json::parse(MustRun({"data", "list", "--json"}).out)[1]["state"], "unloaded");
+  EXPECT_EQ(json::parse(MustRun({"data", "remove", "other", Path("inbox"), "--json"}).out).size(), 1U);
+  EXPECT_EQ(Slabstream({"render", "dropped", "-o", "a.png"}).exit_status, 2);
+
+  const ProgramResult unknown = Slabstream({"data", "remove", "ball", "nonesuch"});
+  EXPECT_EQ(unknown.exit_status, 2);
+  EXPECT_THAT(unknown.err_lines(), testing::ElementsAre("slabstream data: no dataset \"nonesuch\": the catalogue has ball"));
+}
+
+TEST_F(ServiceTest, LogsTellWhatHappenedInOrder) {
+  MakeSphere("other.nrrd", 2, 16);
+  Up(endpoint_);
+  MustRun({"render", "ball", "-o", "a.png", "--size", "64"});
+  EXPECT_EQ(Slabstream({"render", "nonesuch", "-o", "a.png"}).exit_status, 2);
+  const std::string all = MustRun({"logs"}).out;
+  std::size_t at = 0;
+  for (const char* const line : {"] worker ", "is here: pid", "dataset \"ball\" is loaded: 32 x 32 x 32 voxels", "frame 1 of client",
+                                 ": dataset ball, splat, 64x64, ", "attempts 1: done", "is refused: no dataset \"nonesuch\""}) {
+    at = all.find(line, at);
+    ASSERT_NE(at, std::string::npos) << line << " is missing or out of order in\n" << all;
+  }
+  EXPECT_THAT(all, AllOf(HasSubstr("[coordinator] "), HasSubstr("registered as worker 1"), HasSubstr("registered as worker 2")));
+  EXPECT_EQ(MustRun({"logs", "--since", "1h"}).out, MustRun({"logs"}).out);
+  // Lines of what comes, and what is there already.
+  RunningProgram follow(Command({"logs", "--follow"}), directory_);
+  ASSERT_TRUE(follow.WaitForOutput("frame 1 of client"));
+  MustRun({"render", "ball", "-o", "a.png", "--size", "48"});
+  ASSERT_TRUE(follow.WaitForOutput("splat, 48x48, "));
+  MustRun({"down"});
+  EXPECT_EQ(follow.Wait().exit_status, 0);
+  const ProgramResult none = Slabstream({"logs"});
+  EXPECT_EQ(none.exit_status, 1);
+  EXPECT_THAT(none.err_lines(),
+              testing::ElementsAre(HasSubstr("slabstream logs: no service that `slabstream up` of this user started on this host")));
+}
+
+TEST_F(ServiceTest, TheLogLevelIsThatOfAllProcesses) {
+  MustRun({"up", "--detach", "--workers", "1", "--listen", endpoint_, "--data", "ball=" + ball_, "--log-level", "warning"});
+  MustRun({"render", "ball", "-o", "a.png", "--size", "32", "--log-level", "debug"});
+  EXPECT_EQ(MustRun({"logs"}).out, "");
+}
+
+TEST_F(ServiceTest, StatusTellsOfRefusedRequests) {
+  Up(endpoint_);
+  EXPECT_EQ(Slabstream({"render", "nonesuch", "-o", "a.png"}).exit_status, 2);
+  const json status = json::parse(MustRun({"status", "--json"}).out);
+  EXPECT_EQ(status["frames_failed"], 0);
+  EXPECT_EQ(status["requests_refused"], (json{{"bad_request", 0}, {"unknown_dataset", 1}, {"too_large", 0}, {"over_quota", 0}}));
+  EXPECT_THAT(MustRun({"status"}).out, HasSubstr("requests     1 refused (0 bad, 1 of unknown datasets, 0 too large, 0 over quota)"));
+}
+
 TEST_F(ServiceTest, AnUnknownDatasetIsBadInputAndTheOthersAreNamed) {
   Up(endpoint_);
   const ProgramResult result = Slabstream({"render", "brain", "-o", "a.png"});

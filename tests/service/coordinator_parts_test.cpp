@@ -3,12 +3,17 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <atomic>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "common/transport/socket.h"
+#include "common/volume/sphere.h"
+#include "common/volume_io/volume_reader.h"
 #include "common/wire/payload.h"
 #include "coordinator/box_samples.h"
 #include "coordinator/catalogue.h"
@@ -225,11 +230,23 @@ TEST_F(SlabServerTest, AConnectionThatAsksAndNeverReadsCostsLittleMemory) {
 class CatalogueTest : public testing::Test {
  protected:
   void Touch(const std::string& name) { std::ofstream(directory_ / name) << "x"; }
+  std::string Write(const std::string& name, int size) {
+    const Volume volume = MakeSphere({.sphere_class = SphereClass::kFilled, .size = size, .occupancy = 0.3}).value();
+    EXPECT_TRUE(WriteVolume(volume, (directory_ / name).string()).ok());
+    return (directory_ / name).string();
+  }
+  static std::vector<std::string> NamesOf(const FoundData& found) {
+    std::vector<std::string> names;
+    for (const auto& [name, source] : found.datasets) names.push_back(name);
+    return names;
+  }
   void ExpectError(const std::vector<std::string>& arguments, StatusCode code, const std::string& reason) {
-    const Result<Catalogue> catalogue = MakeCatalogue(arguments);
-    EXPECT_EQ(catalogue.status().code(), code) << catalogue.status().message();
-    EXPECT_THAT(catalogue.status().message(), HasSubstr(reason));
-    EXPECT_THAT(catalogue.status().message(), testing::Not(HasSubstr("\n")));
+    const FoundData found = FindData(arguments);
+    ASSERT_EQ(found.errors.size(), 1U) << reason;
+    EXPECT_EQ(found.errors[0].code(), code) << found.errors[0].message();
+    EXPECT_THAT(found.errors[0].message(), HasSubstr(reason));
+    EXPECT_THAT(found.errors[0].message(), testing::StartsWith("--data "));
+    EXPECT_THAT(found.errors[0].message(), testing::Not(HasSubstr("\n")));
   }
   TemporaryDirectory temporary_;
   const std::filesystem::path directory_ = temporary_.path();
@@ -239,12 +256,15 @@ TEST_F(CatalogueTest, NamesComeFromArgumentsAndStems) {
   Touch("head.nii.gz");
   Touch("foot.nrrd");
   Touch("notes.txt");
-  const Result<Catalogue> catalogue = MakeCatalogue({directory_.string(), "other=" + (directory_ / "foot.nrrd").string()});
-  ASSERT_TRUE(catalogue.ok()) << catalogue.status().message();
-  std::vector<std::string> names;
-  for (const auto& [name, loader] : *catalogue) names.push_back(name);
-  EXPECT_THAT(names, testing::ElementsAre("foot", "head", "other"));
-  EXPECT_FALSE(catalogue->at("head")().ok()) << "loading a file that is no volume fails when it is tried, not before";
+  Touch(".hidden.nrrd");
+  const FoundData found = FindData({directory_.string() + "/", "other=" + (directory_ / "foot.nrrd").string()});
+  EXPECT_THAT(found.errors, testing::IsEmpty());
+  EXPECT_THAT(found.complaints, testing::IsEmpty());
+  EXPECT_THAT(NamesOf(found), testing::ElementsAre("foot", "head", "other"));
+  EXPECT_THAT(found.folders, testing::ElementsAre(directory_.string()));
+  EXPECT_EQ(found.datasets.at("head").folder, directory_.string());
+  EXPECT_EQ(found.datasets.at("other").folder, "");
+  EXPECT_FALSE(LoadSource(found.datasets.at("head")).ok()) << "loading a file that is no volume fails when it is tried, not before";
 }
 
 TEST_F(CatalogueTest, OfDirectoriesHasOneNameForEach) {
@@ -283,14 +303,14 @@ TEST_F(CatalogueTest, OptionsForReadingStandBehindThePath) {
 }
 
 TEST_F(CatalogueTest, BadArgumentsAreNamed) {
-  Touch("head.nii.gz");
   Touch("head.nrrd");
   const std::string file = (directory_ / "head.nrrd").string();
-  ExpectError({directory_.string()}, StatusCode::kInvalidArgument, "already a dataset named \"head\"");
   ExpectError({"a=" + file, "a=" + file}, StatusCode::kInvalidArgument, "already a dataset named \"a\"");
   ExpectError({"=" + file}, StatusCode::kInvalidArgument, "dataset name \"\"");
   ExpectError({"a/b=" + file}, StatusCode::kInvalidArgument, "dataset name \"a/b\"");
   ExpectError({std::string(257, 'a') + "=" + file}, StatusCode::kInvalidArgument, "1 to 256");
+  ExpectError({"a="}, StatusCode::kInvalidArgument, "a path of 0 bytes, must have 1 to 4096");
+  ExpectError({"a=/" + std::string(4096, 'p')}, StatusCode::kInvalidArgument, "a path of 4097 bytes");
   ExpectError({"a=" + file + ".missing"}, StatusCode::kNotFound, "does not exist");
   ExpectError({"missing"}, StatusCode::kNotFound, "does not exist");
   ExpectError({"a=" + file + "?tine=3"}, StatusCode::kInvalidArgument, "'tine' is no option for reading a file");
@@ -299,8 +319,132 @@ TEST_F(CatalogueTest, BadArgumentsAreNamed) {
   Touch("samples.raw");
   ExpectError({"a=" + (directory_ / "samples.raw").string()}, StatusCode::kInvalidArgument, "raw files need --dims X,Y,Z --type TYPE");
   ExpectError({file}, StatusCode::kInvalidArgument, "NAME=");
+  ExpectError({directory_.string(), directory_.string() + "/."}, StatusCode::kInvalidArgument, "the folder is given before it");
+  EXPECT_EQ(FindData({"a=" + file + ".missing", "missing", "b=" + file}).errors.size(), 2U) << "each mistake is told";
+}
+
+TEST_F(CatalogueTest, InAFolderWhatCannotBeNamedIsLeftOutAndToldOf) {
+  Touch("head.nii.gz");
+  Touch("head.nrrd");
+  Touch("a b.nrrd");
+  const FoundData found = FindData({"foot=" + (directory_ / "head.nrrd").string(), directory_.string()});
+  EXPECT_THAT(found.errors, testing::IsEmpty());
+  EXPECT_THAT(NamesOf(found), testing::ElementsAre("foot", "head"));
+  EXPECT_THAT(found.complaints,
+              testing::ElementsAre(testing::AllOf(HasSubstr("a b.nrrd: left out"), HasSubstr("must have 1 to 256")),
+                                   testing::AllOf(HasSubstr("head.nrrd: left out"), HasSubstr("already a dataset named \"head\""))));
   std::filesystem::create_directory(directory_ / "empty");
-  ExpectError({(directory_ / "empty").string()}, StatusCode::kInvalidArgument, "no volume file");
+  const FoundData empty = FindData({(directory_ / "empty").string()});
+  EXPECT_THAT(empty.errors, testing::IsEmpty()) << "files may come";
+  EXPECT_THAT(empty.complaints, testing::ElementsAre(HasSubstr("no volume file in this folder yet")));
+}
+
+TEST_F(CatalogueTest, AFolderOfSlicesIsOneVolumeUntilOtherVolumesLieInIt) {
+  Touch("1.tif");
+  Touch("2.TIFF");
+  const std::string name = directory_.filename().string();
+  EXPECT_THAT(NamesOf(ListFolder(directory_.string()).value()), testing::ElementsAre(name));
+  Touch("head.nrrd");
+  EXPECT_THAT(NamesOf(ListFolder(directory_.string()).value()), testing::ElementsAre("1", "2", "head"));
+  std::filesystem::remove_all(directory_);
+  EXPECT_EQ(ListFolder(directory_.string()).status().code(), StatusCode::kNotFound);
+}
+
+TEST_F(CatalogueTest, AFolderOfNothingButFoldersHoldsAVolumeInEach) {
+  for (const char* study : {"1.2.3", "1.2.4"}) {
+    std::filesystem::create_directories(directory_ / study / "series");
+    std::ofstream(directory_ / study / "series" / "image") << std::string(128, '\0') << "DICM";
+  }
+  std::filesystem::create_directory(directory_ / "empty");
+  Touch(".hidden");
+  EXPECT_THAT(NamesOf(ListFolder(directory_.string()).value()), testing::ElementsAre("1.2.3", "1.2.4"));
+  const std::string study = (directory_ / "1.2.3").string();
+  EXPECT_THAT(NamesOf(ListFolder(study).value()), testing::ElementsAre("series"));
+  EXPECT_THAT(NamesOf(ListFolder(study + "/series").value()), testing::ElementsAre("series")) << "images are one volume";
+}
+
+TEST_F(CatalogueTest, ANamedVolumeIsCheckedAndReadWithItsOptions) {
+  const std::string file = (directory_ / "times.raw").string();
+  std::ofstream(file) << std::string(8, 'a') << std::string(8, 'b');
+  FoundData found = FindData({"b=" + file + "?dims=2,2,2,type=uint8,offset=8", "none=" + file, "long=" + file + "?dims=9,9,9,type=uint8"});
+  ASSERT_THAT(found.errors, testing::IsEmpty());
+  CheckFiles(found);
+  ASSERT_EQ(found.errors.size(), 2U);
+  EXPECT_THAT(found.errors[0].message(), testing::AllOf(testing::StartsWith("dataset \"long\": "), HasSubstr("truncated")));
+  EXPECT_THAT(found.errors[1].message(), testing::AllOf(testing::StartsWith("dataset \"none\": "), HasSubstr("--dims")));
+  const Result<LoadedSource> loaded = LoadSource(found.datasets.at("b"));
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  EXPECT_THAT(loaded->volume->block.bytes, testing::AllOf(testing::SizeIs(8), testing::Each(std::byte{'b'})));
+  ExpectError({"a=" + file + "?dims=2,2"}, StatusCode::kInvalidArgument, "dims");
+  ExpectError({"a=" + file + "?depth=2"}, StatusCode::kInvalidArgument, "'depth' is no option");
+  ExpectError({"a=" + file + ".missing?time=2"}, StatusCode::kNotFound, "does not exist");
+}
+
+TEST_F(CatalogueTest, FilesThatCannotBeReadAreToldByTheirHeaders) {
+  const std::string whole = Write("whole.nrrd", 8);
+  Touch("notes.txt");
+  std::filesystem::create_directory(directory_ / "inbox");
+  std::ofstream(directory_ / "inbox" / "short.nrrd") << "NRRD0004\ntype: uint8\ndimension: 3\nencoding: raw\nsizes: 9 9 9\n\nabc";
+  FoundData found = FindData({"whole=" + whole, "text=" + (directory_ / "notes.txt").string(), (directory_ / "inbox").string()});
+  ASSERT_THAT(found.errors, testing::IsEmpty());
+  CheckFiles(found);
+  ASSERT_EQ(found.errors.size(), 1U);
+  EXPECT_THAT(found.errors[0].message(), testing::StartsWith("dataset \"text\": "));
+  EXPECT_THAT(found.complaints, testing::ElementsAre(HasSubstr("short.nrrd: truncated")));
+  EXPECT_EQ(found.datasets.size(), 3U) << "a file of a folder may still be on its way";
+}
+
+TEST_F(CatalogueTest, ALoadedFileHasAStampThatTellsOfEveryChange) {
+  const std::string file = Write("ball.nrrd", 8);
+  const DataSource source(file, "");
+  const Result<LoadedSource> loaded = LoadSource(source);
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  ASSERT_NE(loaded->stamp, nullptr);
+  EXPECT_FALSE(HaveChanged(*loaded->stamp).value());
+  Write("ball.nrrd", 9);  // in its place
+  EXPECT_TRUE(HaveChanged(*loaded->stamp).value());
+  EXPECT_EQ(LoadSource(source)->volume->description.geometry.size, (Index3{9, 9, 9}));
+  std::filesystem::remove(file);
+  EXPECT_EQ(HaveChanged(*loaded->stamp).status().code(), StatusCode::kNotFound);
+}
+
+// Readers see the old bytes, the new ones, or an error that says why: never both.
+TEST_F(CatalogueTest, AFileThatIsWrittenAgainAndAgainIsReadAsAWholeOrNotAtAll) {
+  constexpr int kSide = 64;
+  const std::string file = (directory_ / "grey.nrrd").string();
+  const std::string header = "NRRD0004\ntype: uint8\ndimension: 3\nencoding: raw\nsizes: 64 64 64\n\n";
+  const auto write = [&](char value) {
+    std::ofstream out(file, std::ios::binary | std::ios::in | std::ios::out);  // over the old bytes
+    if (!out) out.open(file, std::ios::binary);
+    out << header;
+    for (int slice = 0; slice < kSide; ++slice) out << std::string(kSide * kSide, value) << std::flush;
+  };
+  write(0);
+  std::atomic<bool> done = false;
+  std::jthread writer([&] {
+    for (char value = 1; !done; value = char(value % 100 + 1)) write(value);
+  });
+  const auto expect_whole = [](const LoadedSource& loaded) {
+    const auto& bytes = loaded.volume->block.bytes;
+    EXPECT_TRUE(std::ranges::all_of(bytes, [&](std::byte byte) { return byte == bytes[0]; })) << "bytes of two files";
+  };
+  int told = 0;
+  for (int i = 0; i < 20; ++i) {
+    const Result<LoadedSource> loaded = LoadSource(DataSource(file, ""));
+    if (loaded.ok()) {
+      expect_whole(*loaded);
+      continue;
+    }
+    EXPECT_EQ(loaded.status().code(), StatusCode::kUnavailable);
+    EXPECT_THAT(loaded.status().message(), HasSubstr("is being written"));
+    ++told;
+  }
+  EXPECT_GT(told, 0) << "the writer was never met at work";
+  done = true;
+  writer.join();
+  const Result<LoadedSource> loaded = LoadSource(DataSource(file, ""));
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  expect_whole(*loaded);
 }
 
 }  // namespace

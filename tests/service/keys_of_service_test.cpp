@@ -10,6 +10,7 @@
 
 #include "client/client.h"
 #include "common/service/service_file.h"
+#include "common/volume_io/volume_reader.h"
 #include "coordinator/service.h"
 #include "tests/service/pictures.h"
 #include "tests/support/renderers.h"
@@ -111,6 +112,31 @@ TEST_F(KeysOfServiceTest, OnlyAdminsEndTheServiceAndChangeKeys) {
   EXPECT_EQ(admin.OrderKeys({.action = KeysAction::kRevoke, .key = "nobody's"}).status().code(), StatusCode::kNotFound);
   EXPECT_TRUE(admin.ShutDownService().ok());
   coordinator_->WaitUntilStopped();
+}
+
+TEST_F(KeysOfServiceTest, EveryClientListsDatasetsAndOnlyAdminsChangeThem) {
+  Client client = ConnectAs(Role::kClient), admin = ConnectAs(Role::kAdmin);
+  for (Client* either : {&client, &admin}) {
+    const Result<std::vector<DatasetStatus>> list = either->OrderData({});
+    ASSERT_TRUE(list.ok()) << list.status().message();
+    EXPECT_EQ(list->size(), 1U);
+  }
+  const std::string file = directory_ / "more.nrrd";
+  ASSERT_TRUE(WriteVolume(*volume_, file).ok());
+  const DataOrder orders[] = {{.action = DataAction::kAdd, .items = {"more=" + file}},
+                              {.action = DataAction::kAdd, .items = {directory_.path()}},
+                              {.action = DataAction::kReload, .items = {"ball"}},
+                              {.action = DataAction::kRemove, .items = {"ball"}}};
+  for (const DataOrder& order : orders) {
+    const Status refused = client.OrderData(order).status();
+    EXPECT_EQ(refused.code(), StatusCode::kInvalidArgument);
+    EXPECT_THAT(refused.message(), HasSubstr("needs the service file of role admin, not client"));
+    EXPECT_EQ(client.OrderData({})->size(), 1U) << "nothing has changed";
+  }
+  EXPECT_EQ(admin.OrderData(orders[0])->size(), 2U);
+  EXPECT_EQ(admin.OrderData(orders[2])->size(), 2U);
+  EXPECT_EQ(admin.OrderData(orders[3])->size(), 1U);
+  EXPECT_EQ(client.OrderData({})->front().name, "more");
 }
 
 TEST_F(KeysOfServiceTest, ARevokedKeyIsRefusedAndItsConnectionsEnd) {

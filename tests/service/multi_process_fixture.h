@@ -49,9 +49,19 @@ class MultiProcessTest : public testing::Test {
     coordinator_.reset();
   }
 
-  void StartCoordinator(const std::string& listen = "tcp://127.0.0.1:*", const std::string& worker_listen = "tcp://127.0.0.1:*") {
-    coordinator_.emplace(std::vector<std::string>{SLABSTREAM_COORDINATOR_PROGRAM, "--listen", listen, "--worker-listen", worker_listen,
-                                                  "--data", "ball=" + (directory_ / "ball.nrrd").string(), "--log-level", "error"});
+  void StartCoordinator(const std::string& listen = "tcp://127.0.0.1:*", const std::string& worker_listen = "tcp://127.0.0.1:*",
+                        const std::vector<std::string>& more = {}) {
+    std::vector<std::string> command = {SLABSTREAM_COORDINATOR_PROGRAM,
+                                        "--listen",
+                                        listen,
+                                        "--worker-listen",
+                                        worker_listen,
+                                        "--data",
+                                        "ball=" + (directory_ / "ball.nrrd").string(),
+                                        "--log-level",
+                                        "error"};
+    command.insert(command.end(), more.begin(), more.end());
+    coordinator_.emplace(command);
     const std::string ready = coordinator_->ReadLine();
     ASSERT_THAT(ready, HasSubstr("slabstream-coordinator ready"));
     client_endpoint_ = FieldOf(ready, "client");

@@ -38,6 +38,9 @@ struct Faults {
   int clock_jumps = 0;  // of the coordinator's clock, forward
   double cancel = 0;    // share of requests
   double vanish = 0;    // share of clients
+  // ---- files
+  int file_changes = 0;  // of the volume's
+  int data_orders = 0;   // of a client that is an admin
   // ---- hostile peers (hostile_peer.h)
   int hostile_clients = 0;
   int strangers = 0;        // have a connection for workers, and are none
@@ -57,7 +60,8 @@ struct Faults {
   // Beside messages.
   double failures() const {
     return fail_render + damage_chunk + fail_combine + fail_load + slow + without_memory + worker_kills + preemptions + workers_joining +
-           workers_leaving + coordinator_restarts + stops() + cancel + vanish + hostile_clients + strangers + hostile_workers;
+           workers_leaving + coordinator_restarts + stops() + cancel + vanish + file_changes + data_orders + hostile_clients + strangers +
+           hostile_workers;
   }
 };
 
@@ -89,6 +93,8 @@ inline Faults RandomFaults(Random& random) {
     faults.workers_leaving = int(one_of(0, 0, 1, 3));
     faults.cancel = one_of(0, 0, 0.2);
     faults.vanish = one_of(0, 0, 0.3);
+    faults.file_changes = int(one_of(0, 0, 1, 4));
+    faults.data_orders = int(one_of(0, 0, 4));
     faults.lose = one_of(0, kRareLoss);
   }
   if ((kind >= 0.35 && kind < 0.48) || mixture) {

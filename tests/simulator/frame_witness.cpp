@@ -66,6 +66,9 @@ void FrameWitness::OnAssignment(const GroupAssignment& assignment, std::size_t w
     frame.handed_out.clear();
   }
   ASSERT_EQ(assignment.setup.camera.supersample, 1);
+  if (!frame.handed_out.empty() || !frame.groups.empty()) {
+    EXPECT_EQ(assignment.setup.dataset, frame.setup.dataset) << "a frame of two sets of voxels";
+  }
   frame.group_count = assignment.group_count;
   frame.setup = assignment.setup;
   frame.handed_out.insert(assignment.key.group);

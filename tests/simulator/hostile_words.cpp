@@ -64,7 +64,7 @@ AnyMessage HostileWords::OfClient(const Policy& policy) {
 }
 
 AnyMessage HostileWords::MakeOfClient(const Policy& policy) {
-  switch (random_.Integer(0, 6)) {
+  switch (random_.Integer(0, 7)) {
     case 0:
     case 1: {
       SubmitFrame submit = RandomRequest(random_, policy, Number(), random_.Chance(0.5) ? Number32() : random_.Integer(1U, 86400000U));
@@ -83,6 +83,7 @@ AnyMessage HostileWords::MakeOfClient(const Policy& policy) {
       return ping;
     }
     case 5: return StatusQuery{Number()};
+    case 6: return DataOrder{.nonce = Number()};  // its connection lets only lists through
     default: return KeysOrder{.nonce = Number(), .key = std::string(40, 'k')};
   }
 }

@@ -71,13 +71,15 @@ void Simulation::AddClient() {
 void Simulation::StartCoordinator() {
   CoordinatorConfig config;
   config.epoch = random_.Integer<Epoch>(1, std::uint64_t{1} << 62);
-  config.datasets = {"volume"};
+  config.datasets = {{"volume", DataSource("/data/volume", "")}};
+  config.folders = {"/data"};
   config.slabs_endpoint = "slabs";
   config.worker_timeout = seconds(3);
   config.worker_wait = seconds(5);
   config.vacancy_grace = milliseconds(random_.Integer(500, 8000));
   config.stall_timeout = seconds(4);
   epoch_ = config.epoch;
+  published_.clear();
   planner_.emplace();
   witness_.OnRestart();
   service_.StartCoordinator(std::move(config));
@@ -241,6 +243,9 @@ void Simulation::CheckTables() {
   EXPECT_EQ(sizes.planning, 0U);
   EXPECT_EQ(sizes.counting, 0U);
   EXPECT_LE(sizes.grids, OccupancyTable::kMaxKept);
+  EXPECT_EQ(sizes.orders, 0U);
+  EXPECT_EQ(sizes.awaited, 0U);
+  EXPECT_EQ(sizes.retired, 0U);
   EXPECT_EQ(sizes.workers, registered);
   EXPECT_EQ(sizes.slots, registered);
 }
@@ -273,9 +278,45 @@ WorkerEvent Simulation::Answer(Job& job) {
 }
 
 void Simulation::Perform(const LoadDataset& action) {
-  CoordinatorEvent loaded = DatasetLoaded{action.name, action.load, 1, world_.summary};
-  if (random_.Chance(current_.fail_load)) loaded = DatasetFailed{action.name, Status::NotFound("the file of the volume is gone")};
-  service_.TellCoordinator(service_.now() + random_.Real(0.001, 0.3), loaded);
+  const double when = service_.now() + random_.Real(0.001, 0.3);
+  if (random_.Chance(current_.fail_load)) {
+    return service_.TellCoordinator(when, DatasetFailed{action.name, action.load, Status::NotFound("the file of the volume is gone")});
+  }
+  if (voxels_ > 1) tally_.Add(Count::kReadAnew);
+  const auto stamp = std::make_shared<const FileStamp>(FileStamp{{action.source.path}, voxels_});
+  // Voxels are published before the machine hears of them.
+  service_.queue().At(when, [this, epoch = epoch_, voxels = voxels_] {
+    if (epoch == epoch_) published_.insert(voxels);
+  });
+  service_.TellCoordinator(when, DatasetLoaded{action.name, action.load, voxels_, world_.summary, 0, stamp});
+}
+
+void Simulation::Perform(const LookAtDataset& action) {
+  DatasetSeen seen{action.name, action.load, action.stamp->digest != voxels_};
+  if (random_.Chance(current_.fail_load / 5)) seen.changed = Status::NotFound("the file of the volume is gone");
+  service_.TellCoordinator(service_.now() + random_.Real(0, faults_.none() ? 200e-6 : 0.1), seen);
+}
+
+// A file of another name comes and goes.
+void Simulation::Perform(const LookAtFolders& action) {
+  FoldersSeen seen;
+  for (const std::string& folder : action.folders) {
+    FoundData found;
+    if (random_.Chance(0.5)) found.datasets["other"] = DataSource(folder + "/other", folder);
+    const bool fails = random_.Chance(current_.fail_load);
+    seen.folders.emplace(folder, fails ? Result<FoundData>(Status::Unavailable("cannot read the folder")) : Result<FoundData>(found));
+  }
+  service_.TellCoordinator(service_.now() + random_.Real(0, 0.1), seen);
+}
+
+void Simulation::Perform(const FindDatasets& action) {
+  DatasetsFound answer{action.order, Status::NotFound("no such file")};
+  if (random_.Chance(0.7)) {
+    FoundData found;
+    for (const std::string& name : action.arguments) found.datasets[name] = DataSource("/data/" + name, "");
+    answer.found = std::move(found);
+  }
+  service_.TellCoordinator(service_.now() + random_.Real(0, 0.1), answer);
 }
 
 void Simulation::Perform(const CountDataset& action) {
@@ -305,6 +346,8 @@ AnyMessage Simulation::OnTheWay(const AnyMessage& message) const { return encode
 Arrivals Simulation::ToWorker(Node to, AnyMessage& message, double sent) {
   if (const auto* assignment = std::get_if<GroupAssignment>(&message)) {
     witness_.OnAssignment(*assignment, workers_.size(), world_.policy.teams);
+    EXPECT_TRUE(published_.contains(assignment->setup.dataset)) << "a group of voxels that are not there any more";
+    if (assignment->setup.dataset != voxels_) tally_.Add(Count::kFramesOfRetiredVoxels);
   }
   if (const auto* ping = std::get_if<Ping>(&message)) witness_.OnPing(*ping);
   if (std::holds_alternative<Retire>(message)) tally_.Add(Count::kRetired);
@@ -353,6 +396,9 @@ void Simulation::Perform(Node node, SendChunkRequest& action) {
 }
 
 AnyMessage Simulation::AnswerOf(const ChunkRequest& request) {
+  if (!published_.contains(request.dataset)) {
+    return ChunkRefused{request.epoch, request.dataset, request.box, request.chunk, Status::NotFound("no such dataset")};
+  }
   Chunk chunk;
   chunk.epoch = request.epoch;
   chunk.dataset = request.dataset;

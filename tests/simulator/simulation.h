@@ -5,6 +5,7 @@
 //   a picture (or preview) holds exactly the boxes of its plan (of its first groups), each once, in visibility order; behind an opaque one
 //   some may be left out, but only where the frame's termination allows it
 //   a mask of hidden tiles tells only of tiles that the groups in front hide, as the display worker at hand has accumulated them
+//   all groups of a frame are of the same voxels, in every attempt, and those stay until its end, whatever becomes of the file
 //   no image is left, read after its release or released twice; no slab is rendered from before it is complete; credits are kept
 //   no more groups are unfinished at a time than the window allows, nor of one frame with masks
 //   where only workers come and go, processes and clocks stop, strangers talk, and few messages are lost: every frame is finished, as long
@@ -82,6 +83,8 @@ class Simulation : private Conditions {
   void SpeakAsClient(std::size_t hostile);
   void BeatOf(HostilePeer& peer);
   bool IsHostile(Node node) const { return hostile_peers_.contains(node); }
+  void ChangeFile();
+  void OrderData();
   void Heal();
 
   // ---- what must hold
@@ -93,7 +96,7 @@ class Simulation : private Conditions {
   PeerToken TokenOfClient(std::size_t client) const;
   AnyMessage OnTheWay(const AnyMessage& message) const;
   void FromClientNode(std::size_t client, const AnyMessage& message);
-  static AnyMessage AnswerOf(const ChunkRequest& request);
+  AnyMessage AnswerOf(const ChunkRequest& request);
 
   // ---- Conditions
   using Conditions::Perform;
@@ -112,6 +115,10 @@ class Simulation : private Conditions {
   void BeforeStep(const CoordinatorEvent& event) override { cause_ = &event; }
   void Perform(ToClient& action) override;
   void Perform(const LoadDataset& action) override;
+  void Perform(const UnloadDataset& action) override { published_.erase(action.dataset); }
+  void Perform(const LookAtDataset& action) override;
+  void Perform(const LookAtFolders& action) override;
+  void Perform(const FindDatasets& action) override;
   void Perform(const CountDataset& action) override;
   void Perform(const PlanRequest& action) override;
   void Perform(const FrameMeasured& action) override { planner_->Learn(action); }
@@ -139,6 +146,8 @@ class Simulation : private Conditions {
   std::size_t requests_planned_ = 0, requests_made_ = 0;
   const CoordinatorEvent* cause_ = nullptr;  // what the coordinator deals with
   std::optional<StatusReply> status_;
+  DatasetId voxels_ = 1;           // that the volume's file holds now
+  std::set<DatasetId> published_;  // by the slab server
 };
 
 }  // namespace slabstream

@@ -41,6 +41,8 @@ enum class Count : std::size_t {
   kClockJumps,
   kCoordinatorRestarts,
   kVanishedClients,
+  kFileChanges,
+  kDataOrders,
   kHostileClients,
   kHostileClientMessages,
   kStrangers,
@@ -63,6 +65,8 @@ enum class Count : std::size_t {
   kHiddenBoxes,
   kCountsOfVoxels,
   kMovedBoxes,
+  kReadAnew,
+  kFramesOfRetiredVoxels,
   kEnd
 };
 
@@ -103,6 +107,8 @@ inline constexpr std::array<CountRule, std::size_t(Count::kEnd)> kCountRules{{
     {"jumps of the coordinator's clock", 50},
     {"coordinator restarts", 50},
     {"vanished clients", 50},
+    {"changes of the volume's file", 250},
+    {"orders about datasets", 250},
     {"hostile clients", 50},
     {"messages of hostile clients", 1000},
     {"hostile strangers to workers' connections", 50},
@@ -124,6 +130,8 @@ inline constexpr std::array<CountRule, std::size_t(Count::kEnd)> kCountRules{{
     {"boxes not rendered", 1000},
     {"counts of occupied voxels", 250},
     {"boxes moved by balance", 50},
+    {"loads after a change", 100},
+    {"groups of frames whose file has changed since", 20},
 }};
 
 class Tally {

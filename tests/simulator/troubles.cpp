@@ -45,6 +45,8 @@ void Simulation::PlanTroubles(Duration span) {
     tally_.Add(Count::kVanishedClients);
     somewhere([c = client.get()] { c->Vanish(); });
   }
+  for (int i = 0; i < faults_.file_changes; ++i) somewhere([this] { ChangeFile(); });
+  for (int i = 0; i < faults_.data_orders; ++i) somewhere([this] { OrderData(); });
   for (int i = 0; i < faults_.hostile_clients; ++i) {
     tally_.Add(Count::kHostileClients);
     for (int w = 0; w < kHostileWords; ++w) somewhere([this, i] { SpeakAsClient(std::size_t(i)); });
@@ -133,6 +135,23 @@ void Simulation::Suspend(double seconds) {
   tally_.Add(Count::kSuspensions);
   service_.HoldCoordinator(service_.now() + seconds);
   for (const Node node : Running()) service_.HoldWorker(node, service_.now() + seconds);
+}
+
+// ---------------------------------------------------------------- files
+
+void Simulation::ChangeFile() {
+  ++voxels_;
+  tally_.Add(Count::kFileChanges);
+}
+
+// Nothing that would leave a client without its dataset: "volume" is read anew, but stays.
+void Simulation::OrderData() {
+  DataOrder order{.nonce = 1, .action = DataAction(random_.Integer(1, 4))};
+  if (order.action == DataAction::kAdd) order.items = {"more"};
+  if (order.action == DataAction::kRemove) order.items = {random_.Chance(0.5) ? "more" : random_.Chance(0.5) ? "other" : "nothing"};
+  if (order.action == DataAction::kReload) order.items = {"volume"};
+  tally_.Add(Count::kDataOrders);
+  service_.StepCoordinator(FromClient{TokenOfClient(clients_.size() + 1), order});
 }
 
 // ---------------------------------------------------------------- the network

@@ -271,6 +271,8 @@ TEST(Dicom, IsFoundByItsBytesInAllSubFolders) {
   ASSERT_TRUE(LooksLikeVolume(directory.path()));
   EXPECT_EQ(DataValues(*ReadDicomVolume(directory.path()).volume), values);
   EXPECT_EQ(DataValues(*ReadDicomVolume(directory / "DICOMDIR").volume), values) << "stands for its folder";
+  EXPECT_THAT(CheckVolumeHeaders(directory / "DICOMDIR").value(), testing::ElementsAre(directory / "DICOMDIR", directory.path()));
+  EXPECT_THAT(CheckVolumeHeaders(directory.path()).value(), testing::ElementsAre(directory.path()));
   EXPECT_TRUE(LooksLikeVolume(directory / "DISK1/IM2"));
   EXPECT_FALSE(LooksLikeVolume(directory / "README.TXT"));
 }

@@ -56,6 +56,7 @@ TEST(Malformed, FilesThatAreCutOffAnywhereFail) {
     for (std::size_t length = 0; length < good.bytes.size() - (ends_in_number ? 6 : 0); ++length) {
       WriteFile(path, good.bytes.substr(0, length));
       const Result<LoadedVolume> loaded = ReadVolume(path);
+      EXPECT_TRUE(CheckVolumeHeaders(path).ok() || !loaded.ok()) << good.file << ": headers refuse what can be read";
       if (loaded.ok()) {
         // The end of a TIFF directory, and what stands behind the samples of VTK, may be missing without harm.
         EXPECT_THAT(good.file, testing::AnyOf("v.tif", "v.vtk", "v.vti")) << "cut to " << length << " of " << good.bytes.size();
@@ -86,6 +87,7 @@ TEST(Malformed, AlteredBytesNeverDoHarm) {
       }
       WriteFile(path, bytes);
       const Result<LoadedVolume> loaded = ReadVolume(path);
+      EXPECT_TRUE(CheckVolumeHeaders(path).ok() || !loaded.ok()) << "headers refuse what can be read";
       if (loaded.ok()) {
         EXPECT_EQ(std::int64_t(loaded->volume->block.bytes.size()), loaded->info.description.voxel_bytes());
       } else {
@@ -111,6 +113,49 @@ TEST(Malformed, DamageInsideCompressedSamplesIsFound) {
     WriteFile(path, bytes);
     ExpectFailure(ReadVolume(path).status(), StatusCode::kDataLoss, path, "damaged");
   }
+}
+
+TEST(Headers, AreEnoughToFindMostOfWhatIsWrongAndTheFiles) {
+  const TemporaryDirectory directory;
+  for (const SampleFile& good : GoodFiles()) {
+    const std::string path = directory / good.file;
+    WriteFile(path, good.bytes);
+    const Result<std::vector<std::string>> files = CheckVolumeHeaders(path);
+    ASSERT_TRUE(files.ok()) << files.status().message();
+    EXPECT_THAT(*files, testing::ElementsAre(path));
+  }
+  const std::string header = "NRRD0004\ntype: uint8\ndimension: 3\nencoding: raw\nsizes: 2 3 4\ndata file: samples.raw\n\n";
+  const std::string path = directory / "v.nhdr", samples = directory / "samples.raw";
+  WriteFile(path, header);
+  ExpectFailure(CheckVolumeHeaders(path).status(), StatusCode::kNotFound, path, "samples.raw");
+  WriteFile(samples, Samples(23));
+  ExpectFailure(CheckVolumeHeaders(path).status(), StatusCode::kDataLoss, path, "truncated");
+  WriteFile(samples, Samples(24));
+  EXPECT_THAT(CheckVolumeHeaders(path).value(), testing::ElementsAre(path, samples));
+  WriteFile(path, "a letter");
+  ExpectFailure(CheckVolumeHeaders(path).status(), StatusCode::kInvalidArgument, path, "not a NRRD volume");
+  ExpectFailure(CheckVolumeHeaders(directory / "nothing.nii").status(), StatusCode::kNotFound, directory / "nothing.nii", "no such file");
+}
+
+TEST(Headers, OfAStackAreThoseOfAllItsSlices) {
+  const TemporaryDirectory directory;
+  const Index3 size = {3, 4, 1};
+  WritePng(directory / "1.png", size, 8, 0, Samples(12));
+  WritePng(directory / "2.png", size, 8, 0, Samples(12));
+  EXPECT_THAT(CheckVolumeHeaders(directory.path()).value(), testing::ElementsAre(directory.path()));
+  WritePng(directory / "3.png", size, 16, 0, Samples(24));
+  ExpectFailure(CheckVolumeHeaders(directory.path()).status(), StatusCode::kInvalidArgument, directory / "3.png", "like the first one");
+}
+
+TEST(Headers, AreJudgedByTheOptionsForReading) {
+  const TemporaryDirectory directory;
+  const std::string path = directory / "v.raw";
+  WriteFile(path, Samples(24));
+  ReadOptions options{.dims = Index3{2, 3, 4}, .type = SampleType::kUint8};
+  EXPECT_TRUE(CheckVolumeHeaders(path, options).ok());
+  options.offset = 1;
+  ExpectFailure(CheckVolumeHeaders(path, options).status(), StatusCode::kDataLoss, path, "truncated");
+  ExpectFailure(CheckVolumeHeaders(path).status(), StatusCode::kInvalidArgument, path, "need dims");
 }
 
 TEST(Malformed, NamesThatAreNoVolumesFail) {

@@ -314,6 +314,17 @@ TEST(FieldChecks, Clients) {
       {{[](auto& e) { e.mutable_frame_progress()->set_groups_done(1); }, "FrameProgress.groups_done: 1 is not in [0, 0]"}});
   Check<FrameFailed>({{[](auto& e) { e.mutable_frame_failed()->mutable_status()->set_code(v1::StatusCode(9)); },
                        "FrameFailed.status.code: unknown value 9"}});
+  const auto order = [](v1::Envelope& e) { return e.mutable_data_order(); };
+  Check<DataOrder>({
+      {[&](auto& e) { order(e)->set_action(v1::DataAction(0)); }, "DataOrder.action: not set"},
+      {[&](auto& e) { order(e)->set_action(v1::DataAction(5)); }, "DataOrder.action: unknown value 5"},
+      {[&](auto& e) { order(e)->add_items(""); }, "DataOrder.items[0]: a text of 0 bytes, expected 1 to 5120"},
+      {[&](auto& e) { order(e)->add_items(std::string(5121, '/')); }, "DataOrder.items[0]: a text of 5121 bytes, expected 1 to 5120"},
+      {[&](auto& e) {
+         for (int i = 0; i < 129; ++i) order(e)->add_items("a");
+       },
+       "DataOrder.items: 129 items, at most 128"},
+  });
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <google/protobuf/message.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 #include <limits>
 #include <map>
@@ -144,18 +145,22 @@ TEST(Malformed, ARefusalIsOneLineWhateverItQuotes) {
 }
 
 TEST(Malformed, EveryTextIsBounded) {
+  constexpr std::size_t kTooLong = std::max(kMaxTextBytes, kMaxDataItemBytes) + 1;
   AlterEachField(
       [&](const Place& place) {
-        if (place.field->cpp_type() != FieldDescriptor::CPPTYPE_STRING) return false;
+        if (place.field->cpp_type() != FieldDescriptor::CPPTYPE_STRING || !IsItem(place)) return false;
+        const Reflection& reflection = *place.message->GetReflection();
+        if (place.index >= 0) {
+          reflection.SetRepeatedString(place.message, place.field, place.index, std::string(kTooLong, 'x'));
+          return true;
+        }
         // A dataset that has not failed has no error: there the field does not count, however long.
-        if (place.path.find(".error") != std::string::npos &&
-            place.message->GetReflection()->GetString(*place.message, place.field).empty())
-          return false;
-        place.message->GetReflection()->SetString(place.message, place.field, std::string(kMaxTextBytes + 1, 'x'));
+        if (place.path.find(".error") != std::string::npos && reflection.GetString(*place.message, place.field).empty()) return false;
+        reflection.SetString(place.message, place.field, std::string(kTooLong, 'x'));
         return true;
       },
       [](const Place& place, const std::string& error) {
-        EXPECT_THAT(error, StartsWith(place.path + ": a text of 4097 bytes, expected "));
+        EXPECT_THAT(error, StartsWith(place.path + ": a text of " + std::to_string(kTooLong) + " bytes, expected "));
       });
 }
 
@@ -176,6 +181,7 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       {"workers", kMaxListed},
       {"datasets", kMaxListed},
       {"keys", kMaxListed},
+      {"items", kMaxDataItems},
       {"x_row", 4},
       {"y_row", 4},
       {"w_row", 4},
@@ -204,6 +210,7 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
             case FieldDescriptor::CPPTYPE_MESSAGE: reflection.AddMessage(place.message, place.field); break;
             case FieldDescriptor::CPPTYPE_DOUBLE: reflection.AddDouble(place.message, place.field, 1); break;
             case FieldDescriptor::CPPTYPE_INT64: reflection.AddInt64(place.message, place.field, 1); break;
+            case FieldDescriptor::CPPTYPE_STRING: reflection.AddString(place.message, place.field, "a"); break;
             case FieldDescriptor::CPPTYPE_UINT32: reflection.AddUInt32(place.message, place.field, 1); break;
             default: reflection.AddUInt64(place.message, place.field, 1);
           }
@@ -213,7 +220,7 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       [&](const Place& place, const std::string& error) {
         EXPECT_THAT(error, StartsWith(place.path + ": " + std::to_string(limits.at(place.field->name()) + 1)));
       });
-  EXPECT_EQ(seen.size(), limits.size() + 4) << "reports are in four messages, parameters in two";
+  EXPECT_EQ(seen.size(), limits.size() + 5) << "reports are in four messages, parameters and datasets in two";
 }
 
 TEST(Malformed, MissingFieldsAreNoCrash) {

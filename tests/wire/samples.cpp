@@ -312,7 +312,8 @@ std::vector<StatusReply> SamplesOf() {
   full.datasets = {{"a", DatasetState::kUnloaded, {}, {}, ""},
                    {kLongName, DatasetState::kLoading, {}, {}, ""},
                    {kUmlaut, DatasetState::kReady, Description(), {-3, 4}, ""},
-                   {"b", DatasetState::kFailed, {}, {}, kLongText}};
+                   {"b", DatasetState::kFailed, {}, {}, kLongText, 0, kMax64}};
+  full.refused = {kMax64, kMax64 - 1, kMax64 - 2, 1};
   return {{}, full};
 }
 
@@ -345,6 +346,19 @@ std::vector<KeysReply> SamplesOf() {
 template <>
 std::vector<OrderRefused> SamplesOf() {
   return {{}, {kMax64, Status::InvalidArgument("ending the service needs an admin's key")}};
+}
+
+template <>
+std::vector<DataOrder> SamplesOf() {
+  return {{},
+          {kMax64, DataAction::kAdd, {"head=/data/head.nrrd", std::string(kMaxDataItemBytes, '/'), "\xff"}},
+          {1, DataAction::kRemove, std::vector<std::string>(kMaxDataItems, "a")},
+          {1, DataAction::kReload, {kUmlaut}}};
+}
+
+template <>
+std::vector<DataReply> SamplesOf() {
+  return {{}, {kMax64, {{kUmlaut, DatasetState::kReady, Description(), {-3, 4}, "", kMax64, kMax64}, {"b", DatasetState::kLoading}}}};
 }
 
 template <std::size_t... I>

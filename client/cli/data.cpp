@@ -1,0 +1,56 @@
+// `data`: the datasets of a running service.
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "client/cli/commands.h"
+#include "client/cli/dataset_text.h"
+#include "client/cli/session.h"
+#include "coordinator/catalogue.h"
+
+namespace slabstream {
+namespace {
+
+Status CheckItem(DataAction action, const std::string& item) {
+  if (action != DataAction::kAdd) {
+    if (item.empty() || item.size() > kMaxDataItemBytes) {
+      return Status::InvalidArgument(fmt::format("NAME has {} bytes, must have 1 to {}", item.size(), kMaxDataItemBytes));
+    }
+    return Status::Ok();
+  }
+  const Result<DataArgument> data = ParseDataArgument(item);
+  if (!data.ok()) return data.status();
+  if (data->path.starts_with('/')) return Status::Ok();
+  std::error_code error;
+  const std::string here = std::filesystem::absolute(data->path, error).lexically_normal().string();
+  return Status::InvalidArgument(
+      fmt::format("{}: the path must be absolute, since it is one of the coordinator's host; on this host it would be {}", item, here));
+}
+
+}  // namespace
+
+Status RunData(const DataOptions& options) {
+  const DataOrder& order = options.order;
+  if (order.items.size() > kMaxDataItems) {
+    return Status::InvalidArgument(fmt::format("{} datasets at a time, at most {} can be named", order.items.size(), kMaxDataItems));
+  }
+  for (const std::string& item : order.items) {
+    if (Status status = CheckItem(order.action, item); !status.ok()) return status;
+  }
+  Result<Session> session = Session::OpenService(options.service);
+  if (!session.ok()) return session.status();
+  const Result<std::vector<DatasetStatus>> datasets = session->client().OrderData(order);
+  if (!datasets.ok()) return datasets.status();
+  if (options.json) {
+    nlohmann::ordered_json list = nlohmann::ordered_json::array();
+    for (const DatasetStatus& dataset : *datasets) list.push_back(DatasetJson(dataset));
+    std::cout << list.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << '\n';
+  } else {
+    std::cout << DatasetTableText(*datasets);
+  }
+  return Status::Ok();
+}
+
+}  // namespace slabstream

@@ -1,0 +1,43 @@
+// Where the voxels of datasets come from. The machine keeps sources and hands them to the executor; it opens nothing itself.
+#pragma once
+
+#include <concepts>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/base/file_stamp.h"
+#include "common/base/status.h"
+#include "common/volume/volume.h"
+
+namespace slabstream {
+
+using VolumeLoader = std::function<Result<std::shared_ptr<const Volume>>()>;
+
+// A path, or a function whose volume never changes.
+struct DataSource {
+  DataSource() = default;
+  DataSource(std::string from_path, std::string of_folder) : path(std::move(from_path)), folder(std::move(of_folder)) {}
+  template <std::convertible_to<VolumeLoader> Loader>
+  DataSource(Loader loader) : load(std::move(loader)) {}  // NOLINT(google-explicit-constructor): a function is a source
+
+  std::string path;    // a file, or a folder of slices; a named one may have options for reading it behind a question mark
+  std::string folder;  // the watched folder that it was found in; empty: it was named
+  VolumeLoader load;   // set: `path` is not used
+};
+
+// By name.
+using Catalogue = std::map<std::string, DataSource>;
+
+// What arguments of --data mean, or what lies in a folder.
+struct FoundData {
+  Catalogue datasets;
+  std::vector<std::string> folders;     // that are to be watched
+  std::vector<Status> errors;           // of arguments and of named files
+  std::vector<std::string> complaints;  // about files in folders, a line each: left out, or not to be read so far
+};
+
+}  // namespace slabstream
