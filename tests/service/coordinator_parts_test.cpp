@@ -267,41 +267,6 @@ TEST_F(CatalogueTest, NamesComeFromArgumentsAndStems) {
   EXPECT_FALSE(LoadSource(found.datasets.at("head")).ok()) << "loading a file that is no volume fails when it is tried, not before";
 }
 
-TEST_F(CatalogueTest, OfDirectoriesHasOneNameForEach) {
-  for (const char* name : {"study-1", "study-2"}) {
-    std::filesystem::create_directories(directory_ / name / "DICOM");
-    std::ofstream(directory_ / name / "DICOM/IM1") << std::string(128, '\0') << "DICM";
-  }
-  const auto names = [&](const std::filesystem::path& directory) {
-    std::vector<std::string> found;
-    const Result<Catalogue> catalogue = MakeCatalogue({directory.string()});
-    EXPECT_TRUE(catalogue.ok()) << catalogue.status().message();
-    if (catalogue.ok()) {
-      for (const auto& [name, loader] : *catalogue) found.push_back(name);
-    }
-    return found;
-  };
-  EXPECT_THAT(names(directory_), testing::ElementsAre("study-1", "study-2"));
-  EXPECT_THAT(names(directory_ / "study-1/DICOM"), testing::ElementsAre("DICOM")) << "slices lie in it";
-  Touch("study-1/DICOMDIR");
-  EXPECT_THAT(names(directory_ / "study-1"), testing::ElementsAre("study-1"));
-  Touch("head.nrrd");
-  EXPECT_THAT(names(directory_), testing::ElementsAre("head", "study-1", "study-2")) << "DICOM below it does not make it one of DICOM";
-}
-
-TEST_F(CatalogueTest, OptionsForReadingStandBehindThePath) {
-  std::ofstream(directory_ / "samples.raw") << "0123456789ab";
-  const std::string options = "?dims=3,2,1,type=uint16,spacing=0.5,1,2";
-  const Result<Catalogue> catalogue = MakeCatalogue({"raw=" + (directory_ / "samples.raw").string() + options});
-  ASSERT_TRUE(catalogue.ok()) << catalogue.status().message();
-  const Result<std::shared_ptr<const Volume>> volume = catalogue->at("raw")();
-  ASSERT_TRUE(volume.ok()) << volume.status().message();
-  EXPECT_EQ((*volume)->description.geometry.size, (Index3{3, 2, 1}));
-  EXPECT_EQ((*volume)->description.geometry.spacing, (Vec3{0.5, 1, 2}));
-  Touch("head.nrrd");
-  EXPECT_EQ(MakeCatalogue({directory_.string()})->size(), 1U) << "raw samples without options are no dataset";
-}
-
 TEST_F(CatalogueTest, BadArgumentsAreNamed) {
   Touch("head.nrrd");
   const std::string file = (directory_ / "head.nrrd").string();
@@ -313,11 +278,6 @@ TEST_F(CatalogueTest, BadArgumentsAreNamed) {
   ExpectError({"a=/" + std::string(4096, 'p')}, StatusCode::kInvalidArgument, "a path of 4097 bytes");
   ExpectError({"a=" + file + ".missing"}, StatusCode::kNotFound, "does not exist");
   ExpectError({"missing"}, StatusCode::kNotFound, "does not exist");
-  ExpectError({"a=" + file + "?tine=3"}, StatusCode::kInvalidArgument, "'tine' is no option for reading a file");
-  ExpectError({"a=" + file + "?offset=3"}, StatusCode::kInvalidArgument, "offset is no option of NRRD");
-  ExpectError({"a=" + file + ".missing?time=3"}, StatusCode::kNotFound, "does not exist");
-  Touch("samples.raw");
-  ExpectError({"a=" + (directory_ / "samples.raw").string()}, StatusCode::kInvalidArgument, "raw files need --dims X,Y,Z --type TYPE");
   ExpectError({file}, StatusCode::kInvalidArgument, "NAME=");
   ExpectError({directory_.string(), directory_.string() + "/."}, StatusCode::kInvalidArgument, "the folder is given before it");
   EXPECT_EQ(FindData({"a=" + file + ".missing", "missing", "b=" + file}).errors.size(), 2U) << "each mistake is told";
