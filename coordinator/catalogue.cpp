@@ -192,7 +192,9 @@ void CheckFiles(FoundData& found) {
     const Status readable = source.load ? Status::Ok() : CheckHeaders(source.path);
     if (readable.ok()) continue;
     if (source.folder.empty()) {
-      found.errors.emplace_back(readable.code(), fmt::format("dataset \"{}\": {}", name, readable.message()));
+      // A damaged file is bad input, as a wrong name is.
+      const StatusCode code = readable.code() == StatusCode::kDataLoss ? StatusCode::kInvalidArgument : readable.code();
+      found.errors.emplace_back(code, fmt::format("dataset \"{}\": {}", name, readable.message()));
     } else {
       found.complaints.push_back(readable.message());
     }
