@@ -299,7 +299,7 @@ void WorkerService::Impl::HandleEvent(WorkerEvent event) {
   for (WorkerAction& action : machine.Step(std::move(event), MonotonicNow())) {
     std::visit([this](auto& each) { Perform(each); }, action);
   }
-  if (was_registered && !machine.registered() && !stop_now) LogWarning("has lost its coordinator, and registers again");
+  if (was_registered && !machine.registered() && !stop_now) LogInfo("has lost its coordinator, and registers again");
   if (machine.registered()) SetRegistered();
 }
 
