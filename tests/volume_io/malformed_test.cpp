@@ -155,7 +155,7 @@ TEST(Headers, AreJudgedByTheOptionsForReading) {
   EXPECT_TRUE(CheckVolumeHeaders(path, options).ok());
   options.offset = 1;
   ExpectFailure(CheckVolumeHeaders(path, options).status(), StatusCode::kDataLoss, path, "truncated");
-  ExpectFailure(CheckVolumeHeaders(path).status(), StatusCode::kInvalidArgument, path, "need dims");
+  ExpectFailure(CheckVolumeHeaders(path).status(), StatusCode::kInvalidArgument, path, "need --dims");
 }
 
 TEST(Malformed, NamesThatAreNoVolumesFail) {
