@@ -19,10 +19,9 @@ struct Samples {
   Floats values;
   Mask valid;
 };
-template <class T>
-HWY_INLINE Samples SamplesAt(const ProjectWork& work, SamplePlace place, Mask owned) {
-  const RayBox& box = *work.box;
-  if (work.nearest) {
+template <class T, bool kNearest>
+HWY_INLINE Samples SamplesAt(const RayBox& box, SamplePlace place, Mask owned) {
+  if constexpr (kNearest) {
     for (Floats& fraction : place.fraction) fraction = hn::IfThenElseZero(hn::Ge(fraction, Set(0.5F)), Set(1));
   }
   const Neighbours<T> n = LoadNeighbours<T>(box, place, owned);
@@ -57,7 +56,7 @@ struct Search {
 };
 
 // Goes on by one sample or leap. Returns false if there is none: all rays have left the box or found its extreme.
-template <class T>
+template <class T, bool kNearest>
 HWY_INLINE bool Advance(const ProjectWork& work, const RayPacket& packet, const SampleInterval& owned, Search& search, Findings& found) {
   const FloatTag df;
   const RayBox& box = *work.box;
@@ -87,7 +86,7 @@ HWY_INLINE bool Advance(const ProjectWork& work, const RayPacket& packet, const 
   }
   // If one ray takes its sample, all that are alive do: then its address need not wait for the bounds.
   if (!hn::AllFalse(df, sampled)) {
-    const Samples samples = SamplesAt<T>(work, place, alive);
+    const Samples samples = SamplesAt<T, kNearest>(box, place, alive);
     const auto candidate = hn::Mul(samples.values, Set(work.sign));
     const auto larger = hn::And(samples.valid, hn::Gt(candidate, found.best));
     found.best = hn::IfThenElse(larger, candidate, found.best);
@@ -103,20 +102,7 @@ struct Hint {
   Floats ahead, behind;
 };
 
-// The samples that the box owns, as far as clipping leaves them.
-struct OwnedParts {
-  SampleInterval parts[2];
-  int count = 1;
-};
-HWY_INLINE OwnedParts OwnedPartsOf(const ProjectWork& work, const RayPacket& packet) {
-  const SampleInterval owned = OwnedSamples(packet, *work.box);
-  if (work.rays->clip.empty()) return {{owned, owned}};
-  PacketPart parts[2];
-  PartsOf(work.rays->clip, packet, parts);
-  return {{parts[0].Of(owned), parts[1].Of(owned)}, work.rays->clip.cut_away ? 2 : 1};
-}
-
-template <class T>
+template <class T, bool kNearest>
 HWY_INLINE void SearchSamples(const ProjectWork& work, const RayPacket& packet, const SampleInterval& owned, const Hint& hint,
                               Findings& found) {
   const auto one = Set(1);
@@ -126,20 +112,26 @@ HWY_INLINE void SearchSamples(const ProjectWork& work, const RayPacket& packet, 
   Search backwards = {hn::Min(hint.behind, hn::Sub(owned.end, one)), Set(-1), LeapScalesOf(reversed)};
   // In turns: while one waits for memory, the other goes on.
   for (bool ahead = true, behind = true; ahead || behind;) {
-    ahead = ahead && Advance<T>(work, packet, owned, forwards, found);
-    behind = behind && Advance<T>(work, packet, owned, backwards, found);
+    ahead = ahead && Advance<T, kNearest>(work, packet, owned, forwards, found);
+    behind = behind && Advance<T, kNearest>(work, packet, owned, backwards, found);
   }
 }
 
 // Returns whether any of a packet's rays has a sample in the box; `pixels` then holds them all. The nearer the hint is to the extremes of
 // its rays, the more is leapt over. It becomes their mean place, for the next packet.
-template <class T>
+template <class T, bool kNearest>
 HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet, Hint& hint, float* HWY_RESTRICT pixels) {
   const FloatTag df;
-  const OwnedParts owned = OwnedPartsOf(work, packet);
+  const SampleInterval owned = OwnedSamples(packet, *work.box);
   const auto one = Set(1);
-  Findings found = {Set(std::numeric_limits<float>::lowest()), owned.parts[0].begin, hn::Lt(one, hn::Zero(df))};
-  for (int i = 0; i < owned.count; ++i) SearchSamples<T>(work, packet, owned.parts[i], hint, found);
+  Findings found = {Set(std::numeric_limits<float>::lowest()), owned.begin, hn::Lt(one, hn::Zero(df))};
+  if (work.rays->clip.empty()) {
+    SearchSamples<T, kNearest>(work, packet, owned, hint, found);
+  } else {
+    PacketPart parts[2];
+    PartsOf(work.rays->clip, packet, parts);
+    for (const PacketPart& part : parts) SearchSamples<T, kNearest>(work, packet, part.Of(owned), hint, found);
+  }
   // One hint for all: rays that stay together read the same memory.
   const auto mean = hn::Floor(hn::Mul(hn::SumOfLanes(df, found.at), Set(1.0F / float(kLanes))));
   hint = {mean, hn::Sub(mean, one)};
@@ -151,23 +143,22 @@ HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet
   return true;
 }
 
-template <class T>
+template <class T, bool kNearest>
 HWY_INLINE bool SumOfPacket(const ProjectWork& work, const RayPacket& packet, float* HWY_RESTRICT pixels) {
   const FloatTag df;
   const IntTag di;
   const RayBox& box = *work.box;
-  const OwnedParts parts = OwnedPartsOf(work, packet);
+  const SampleInterval whole = OwnedSamples(packet, box);
   Ints high = hn::Zero(di), middle = high, low = high, count = high;
   const auto byte = SetInt(0xFF), one = SetInt(1);
-  for (int i = 0; i < parts.count; ++i) {
-    const SampleInterval& owned = parts.parts[i];
+  const auto sum = [&](const SampleInterval& owned) HWY_ATTR {
     const auto some = hn::Lt(owned.begin, owned.end);
     const float begin = hn::GetLane(hn::MinOfLanes(df, hn::IfThenElse(some, owned.begin, Set(kRayEnd))));
     const float end = hn::GetLane(hn::MaxOfLanes(df, hn::IfThenElse(some, owned.end, Set(-kRayEnd))));
     for (float k = begin; k < end; k += 1) {
       const auto sample = Set(k);
       const auto active = hn::And(hn::Ge(sample, owned.begin), hn::Lt(sample, owned.end));
-      const Samples samples = SamplesAt<T>(work, PlaceSample(packet, box, sample), active);
+      const Samples samples = SamplesAt<T, kNearest>(box, PlaceSample(packet, box, sample), active);
       const auto valid = hn::RebindMask(di, samples.valid);
       const auto value = hn::ConvertTo(di, hn::Mul(ValueOf(work, samples.values), Set(0x1p24F)));
       const auto fixed = hn::IfThenElseZero(valid, hn::Min(value, SetInt(0xFFFFFF)));
@@ -176,18 +167,35 @@ HWY_INLINE bool SumOfPacket(const ProjectWork& work, const RayPacket& packet, fl
       low = hn::Add(low, hn::And(fixed, byte));
       count = hn::Add(count, hn::IfThenElseZero(valid, one));
     }
+  };
+  if (work.rays->clip.empty()) {
+    sum(whole);
+  } else {
+    PacketPart parts[2];
+    PartsOf(work.rays->clip, packet, parts);
+    for (const PacketPart& part : parts) sum(part.Of(whole));
   }
   if (hn::AllTrue(di, hn::Eq(count, hn::Zero(di)))) return false;
   hn::StoreInterleaved4(hn::ConvertTo(df, high), hn::ConvertTo(df, middle), hn::ConvertTo(df, low), hn::ConvertTo(df, count), df, pixels);
   return true;
 }
 
-template <class T>
-HWY_INLINE void Project(const ProjectWork& work, const PixelBounds& tile, float* HWY_RESTRICT pixels, std::size_t floats_a_row) {
+template <class T, bool kNearest>
+HWY_INLINE void ProjectPackets(const ProjectWork& work, const PixelBounds& tile, float* HWY_RESTRICT pixels, std::size_t floats_a_row) {
   Hint hint = {hn::Zero(FloatTag()), Set(1e9F)};  // none: the first packet searches from both ends
   ForEachPacket(*work.rays, tile, pixels, floats_a_row, [&](const RayPacket& packet, float* HWY_RESTRICT result) HWY_ATTR {
-    return work.bounds != nullptr ? ExtremeOfPacket<T>(work, packet, hint, result) : SumOfPacket<T>(work, packet, result);
+    return work.bounds != nullptr ? ExtremeOfPacket<T, kNearest>(work, packet, hint, result)
+                                  : SumOfPacket<T, kNearest>(work, packet, result);
   });
+}
+
+template <class T>
+HWY_INLINE void Project(const ProjectWork& work, const PixelBounds& tile, float* HWY_RESTRICT pixels, std::size_t floats_a_row) {
+  if (work.nearest) {
+    ProjectPackets<T, true>(work, tile, pixels, floats_a_row);
+  } else {
+    ProjectPackets<T, false>(work, tile, pixels, floats_a_row);
+  }
 }
 
 void Project8(const ProjectWork& work, const PixelBounds& tile, float* pixels, std::size_t row) {
