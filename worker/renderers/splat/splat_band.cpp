@@ -42,6 +42,7 @@ SplatBand::SplatBand(const SplatPass& pass, std::int32_t y_begin, std::int32_t y
       segments_(pass.bounds.width() / kSegment),
       words_(SegmentWords(segments_)),
       opaque_alpha_(pass.setup.termination > 0 ? float(1 - pass.setup.termination) : 2.0F),
+      clipped_(!pass.clip.empty()),
       open_(std::size_t(y_end - y_begin) * std::size_t(words_)),
       owned_(std::size_t(words_)),
       nothing_(std::size_t(words_)) {
@@ -62,14 +63,13 @@ bool SplatBand::finished() const {
 void SplatBand::AddSlice(std::int32_t k) {
   slice_ = k;
   slopes_ = pass_.opacity.SlopesIn(k);
-  const bool clipped = !pass_.clip.empty();
-  const SliceSamples clipped_slice = clipped ? ClipSlice(pass_.Slice(k)) : SliceSamples{};
-  const SliceSamples& slice = clipped ? clipped_slice : pass_.Slice(k);
+  const SliceSamples clipped = clipped_ ? ClipSlice(pass_.Slice(k)) : SliceSamples{};
+  const SliceSamples& slice = clipped_ ? clipped : pass_.Slice(k);
   if (!PlaceBeams(slice)) return;
   FindNeeded(slice);
   clock_.Charge(Stage::kTransform);
   if (octets_.empty()) return;
-  if (clipped) LightCuts();
+  if (clipped_) LightCuts();
   ShadeAndFilter(slice);
   CompositeRows(slice);
   clock_.Charge(Stage::kComposite);
@@ -194,7 +194,7 @@ void SplatBand::FindOctets(std::int32_t beam) {
       Insert(filled, reached[octet]);
       octets_.push_back(
           {records, shaded + 4 * std::ptrdiff_t{octet * kOctet}, occupied, slopes_.AlongU((pass_.first_octet + octet) * kOctet), across});
-      if (!pass_.clip.empty()) octet_places_.push_back({(pass_.first_octet + octet) * kOctet, beam});
+      if (clipped_) octet_places_.push_back({(pass_.first_octet + octet) * kOctet, beam});
       drawn += kOctetCount[occupied];
     }
   }
@@ -269,10 +269,10 @@ void SplatBand::CompositeRows(const SliceSamples& slice) {
                           .open = Open(row),
                           .words = words_,
                           .opaque_alpha = opaque_alpha_};
-    if (pass_.clip.empty()) {
-      CompositeRow(work);
-    } else {
+    if (clipped_) {
       CompositeClipped(work, row);
+    } else {
+      CompositeRow(work);
     }
   }
 }

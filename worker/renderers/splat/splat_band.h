@@ -65,6 +65,7 @@ class SplatBand {
   StageClock clock_;
   const std::int32_t segments_, words_;  // of a row
   const float opaque_alpha_;
+  const bool clipped_;
   std::vector<SegmentWord> open_;  // [row][word]: not opaque yet
 
   // Of the current slice.
