@@ -41,10 +41,19 @@ std::array<ColumnInterval, 2> SliceClip::ColumnsLeft(std::int32_t k, std::int32_
 }
 
 bool SliceClip::LightCuts(std::int32_t k, std::int32_t v, std::int32_t u, std::int32_t count, std::uint16_t* normals) const {
-  bool any = false;
   Vec3 p;
   p[axes_.c] = k;
   p[axes_.v] = v;
+  // Mostly the whole row is far within all sides, or far beyond one.
+  bool near = false;
+  for (const HalfSpace& side : setup_.clip.sides) {
+    p[axes_.u] = u;
+    const double first = side.Distance(p), last = first + (count - 1) * side.normal[axes_.u];
+    if (std::max(first, last) <= -face_reach_) return false;
+    near = near || std::min(first, last) < face_reach_;
+  }
+  if (!near) return false;
+  bool any = false;
   for (std::int32_t i = 0; i < count; ++i) {
     p[axes_.u] = u + i;
     // The side that the voxel is nearest to, or farthest beyond.
