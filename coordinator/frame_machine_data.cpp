@@ -26,9 +26,9 @@ Status FrameMachine::State::FindVolume(OpenRequest& request) const {
   const DatasetTable::Entry& dataset = *datasets.Find(frame.dataset);
   Result<TransferFunction> transfer = ResolveTransfer(frame.transfer, *dataset.summary);
   if (!transfer.ok()) return transfer.status();
-  const VolumeGeometry& geometry = dataset.summary->description.geometry;
-  if (Status status = CheckClipping(frame.clipping, geometry); !status.ok()) return status;
-  request.volume.emplace(dataset.id, *std::move(transfer), FindRenderer(frame.renderer), MakeClipRegion(frame.clipping, geometry));
+  Result<ClipRegion> clip = MakeClipRegion(frame.clipping, dataset.summary->description.geometry);
+  if (!clip.ok()) return clip.status();
+  request.volume.emplace(dataset.id, *std::move(transfer), FindRenderer(frame.renderer), *std::move(clip));
   return Status::Ok();
 }
 

@@ -40,6 +40,8 @@ constexpr double Dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.
 constexpr Vec3 Cross(const Vec3& a, const Vec3& b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 inline double Length(const Vec3& a) { return std::sqrt(Dot(a, a)); }
 inline Vec3 Normalized(const Vec3& a) { return (1.0 / Length(a)) * a; }
+constexpr double Least(const Vec3& a) { return std::min({a.x, a.y, a.z}); }  // component
+inline Vec3 Absolute(const Vec3& a) { return {std::abs(a.x), std::abs(a.y), std::abs(a.z)}; }
 
 using Index3 = Vector3<std::int32_t>;
 constexpr Index3 Min(const Index3& a, const Index3& b) { return {std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)}; }

@@ -46,7 +46,7 @@ std::optional<BrickVisibility::Ball> BrickVisibility::VisibleBall(const ClipRegi
   Ball ball{.centre = middle(hull), .half_extent = 0.5 * (ToVec3(hull.size()) * geometry.spacing)};
   for (const Box& box : visible) {
     const Vec3 from = middle(box) - ball.centre, half = 0.5 * ToVec3(box.size());
-    const Vec3 farthest = {std::abs(from.x) + half.x, std::abs(from.y) + half.y, std::abs(from.z) + half.z};
+    const Vec3 farthest = Absolute(from) + half;
     ball.radius = std::max(ball.radius, Length(farthest * geometry.spacing));
   }
   return ball;

@@ -13,9 +13,7 @@ namespace {
 // A slab is flat: if it faces the view, its picture is framed by its sides, not by a ball round them.
 double RadiusOfSlab(const BrickVisibility::Ball& ball, const FrameRequest& request, const VolumeGeometry& geometry) {
   const Camera camera = MakeCamera(request.view, request.size, geometry);
-  const auto reach = [&](const Vec3& v) {
-    return std::abs(v.x) * ball.half_extent.x + std::abs(v.y) * ball.half_extent.y + std::abs(v.z) * ball.half_extent.z;
-  };
+  const auto reach = [&](const Vec3& v) { return Dot(Absolute(v), ball.half_extent); };
   const double shorter = std::min(camera.width, camera.height);
   return std::min(ball.radius, std::max(reach(camera.right) * shorter / camera.width, reach(camera.up) * shorter / camera.height));
 }
@@ -32,8 +30,9 @@ Result<FrameSetup> MakeFrameSetup(const FrameRequest& request, DatasetId dataset
   SetRenderer(*FindRenderer(request.renderer), setup);
   SetParameters(ParseParameters(*setup.renderer, request.parameters).value(), setup);
   const VolumeGeometry& geometry = summary.description.geometry;
-  if (Status status = CheckClipping(request.clipping, geometry); !status.ok()) return status;
-  setup.clip = MakeClipRegion(request.clipping, geometry);
+  Result<ClipRegion> clip = MakeClipRegion(request.clipping, geometry);
+  if (!clip.ok()) return clip.status();
+  setup.clip = *std::move(clip);
   ViewParameters view = request.view;
   if (view.fit) {
     const auto ball = BrickVisibility(summary, setup.renderer->DrawnTable(*transfer, summary)).VisibleBall(setup.clip);
@@ -88,13 +87,13 @@ Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, cons
   if (layout == nullptr) {
     const Result<TransferFunction> transfer = ResolveTransfer(request.transfer, summary);
     if (!transfer.ok()) return transfer.status();
-    if (Status status = CheckClipping(request.clipping, summary.description.geometry); !status.ok()) return status;
-    const ClipRegion clip = MakeClipRegion(request.clipping, summary.description.geometry);
+    const Result<ClipRegion> clip = MakeClipRegion(request.clipping, summary.description.geometry);
+    if (!clip.ok()) return clip.status();
     layout = std::make_shared<const Layout>(MakeLayout({.summary = &summary,
                                                         .transfer = &*transfer,
                                                         .policy = &*policy,
                                                         .renderer = FindRenderer(request.renderer),
-                                                        .clip = &clip,
+                                                        .clip = &*clip,
                                                         .slots = std::max<std::uint32_t>(std::uint32_t(roster.slots.size()), 1),
                                                         .slab_bytes_target = slab_bytes_target}));
   }

@@ -19,7 +19,7 @@ double PixelsPerVoxel(const FrameSetup& setup) {
   const VolumeGeometry& geometry = setup.description.geometry;
   const Index3& size = geometry.size;
   const Vec3 middle = {(size.x - 1) / 2.0, (size.y - 1) / 2.0, (size.z - 1) / 2.0};
-  const double least = std::min({geometry.spacing.x, geometry.spacing.y, geometry.spacing.z});
+  const double least = Least(geometry.spacing);
   if (!setup.sheets.empty()) {
     const auto [c, u, v] = AxesOf(setup.camera.traversal_axis);
     const SlicePlacement slice = PlaceSlice(setup.sheets, middle[c]);

@@ -31,14 +31,9 @@ SinCos SinCosDegrees(double degrees) {
 
 constexpr double kParallel = 1e-6;  // the length of the cross product of two unit vectors that are
 
-Vec3 CentreOf(const VolumeGeometry& geometry) { return 0.5 * (ToVec3(geometry.size) - Vec3{1, 1, 1}); }  // data space
 Vec3 ExtentOf(const VolumeGeometry& geometry) { return ToVec3(geometry.size) * geometry.spacing; }
 double RadiusOf(const VolumeGeometry& geometry) { return 0.5 * Length(ExtentOf(geometry)); }  // of the bounding sphere
 double HalfFov(const ViewParameters& view) { return view.fov_degrees * (std::numbers::pi / 360); }
-
-Vec3 WorldOf(const Vec3& voxel, const VolumeGeometry& geometry) {
-  return geometry.orientation.origin + geometry.orientation.ToWorld(geometry.spacing * voxel);
-}
 
 // Orthonormal: right, up and the view direction. Azimuth and elevation turn a sphere's tangent frame, which exists at the poles too, so
 // that elevation +-90 needs no special case.
@@ -73,7 +68,7 @@ struct Look {
 
 Look LookOf(const ViewParameters& view, const VolumeGeometry& geometry) {
   const Orientation& orientation = geometry.orientation;
-  const Vec3 centre = WorldOf(CentreOf(geometry), geometry);
+  const Vec3 centre = geometry.ToWorld(geometry.centre());
   const Vec3 target = view.look_at.value_or(centre);
   const double radius = RadiusOf(geometry);
   auto [right, up, forward] = view.eye ? LookingFrame(view, target) : FrameByAngles(view);
@@ -156,7 +151,7 @@ Status Validate(const ViewParameters& view) {
 ViewParameters FitView(const ViewParameters& view, const VolumeGeometry& geometry, const Vec3& centre, double radius) {
   ViewParameters fitted = view;
   fitted.fit = false;
-  fitted.look_at = WorldOf(centre, geometry);
+  fitted.look_at = geometry.ToWorld(centre);
   if (view.projection == Projection::kPerspective) {
     const double sine = radius / LookOf(fitted, geometry).distance;  // of the angle at which the eye sees the ball's radius
     if (sine < 1) fitted.zoom *= std::tan(HalfFov(view)) * std::sqrt(1 - sine * sine) / sine;
@@ -182,7 +177,7 @@ Status CheckView(const ViewParameters& view, const VolumeGeometry& geometry) {
 
   // Every corner lies before the eye, and the eye before the first slice.
   const Vec3 half = 0.5 * ExtentOf(geometry);
-  const double corners = std::abs(forward.x) * half.x + std::abs(forward.y) * half.y + std::abs(forward.z) * half.z;
+  const double corners = Dot(Absolute(forward), half);
   const Axis c = NearestAxis(forward);
   const double before = std::max(corners + Dot(forward, look.target), half[c] / std::abs(forward[c]) + look.target[c] / forward[c]);
   constexpr double kMargin = 1.001;
@@ -205,7 +200,7 @@ Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeomet
   const Vec3 spacing = geometry.spacing;
   const double radius = RadiusOf(geometry);
   const auto& [frame, target, distance] = LookOf(view, geometry);
-  const Vec3 centre = CentreOf(geometry) + target / spacing;  // data space, of the picture
+  const Vec3 centre = geometry.centre() + target / spacing;  // data space, of the picture
 
   // Pixels a physical unit at unit depth (perspective) or everywhere (orthographic).
   const double half_fov = HalfFov(view);
@@ -214,7 +209,7 @@ Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeomet
 
   // Supersampling by the farthest point that the bounding sphere can have, so that it does not change while the view turns.
   const double pixel_width = (perspective ? distance + Length(target) + radius : 1.0) / scale;
-  const double voxel_width = std::min({spacing.x, spacing.y, spacing.z});
+  const double voxel_width = Least(spacing);
   int supersample = 1;
   while (supersampled && supersample < kMaxSupersample && pixel_width > kMaxVoxelsPerPixel * voxel_width * supersample) supersample *= 2;
   scale *= supersample;

@@ -19,7 +19,7 @@ struct DistanceRange {
 DistanceRange DistancesOf(const HalfSpace& side, const Box& box) {
   const Vec3 centre = 0.5 * (ToVec3(box.begin + box.end) - Vec3{1, 1, 1}), half = 0.5 * ToVec3(box.size());
   const double middle = side.Distance(centre);
-  const double reach = std::abs(side.normal.x) * half.x + std::abs(side.normal.y) * half.y + std::abs(side.normal.z) * half.z;
+  const double reach = Dot(Absolute(side.normal), half);
   return {middle - reach, middle + reach};
 }
 
@@ -62,13 +62,21 @@ Axis AxisAcross(const ClipSlab& slab, const VolumeGeometry& geometry) {
 // Of a slice, in least spacings: positions of samples are rounded by far less.
 constexpr double kSliceThickness = 1.0 / 64;
 
+// InvalidArgument: there is no slice with its index.
+Status CheckIndex(const ClipSlab& slab, const VolumeGeometry& geometry) {
+  const Axis axis = AxisAcross(slab, geometry);
+  const std::int32_t last = geometry.size[axis] - 1;
+  if (slab.index.value_or(0) <= last) return Status::Ok();
+  return Status::InvalidArgument(
+      fmt::format("clip.slab.index is {}, but the volume has slices 0 to {} along {}", *slab.index, last, Letter(axis)));
+}
+
 void AddSlab(const ClipSlab& slab, const VolumeGeometry& geometry, std::vector<HalfSpace>& sides) {
-  const Vec3& spacing = geometry.spacing;
   const Vec3 normal = Normalized(slab.normal);
-  Vec3 centre = 0.5 * (ToVec3(geometry.size) - Vec3{1, 1, 1});
-  if (slab.index) centre[AxisAcross(slab, geometry)] = *slab.index;
-  const Vec3 through = slab.through.value_or(geometry.orientation.origin + geometry.orientation.ToWorld(spacing * centre));
-  const double half = 0.5 * std::max(slab.thickness, kSliceThickness * std::min({spacing.x, spacing.y, spacing.z}));
+  Vec3 middle = geometry.centre();
+  if (slab.index) middle[AxisAcross(slab, geometry)] = *slab.index;
+  const Vec3 through = slab.through.value_or(geometry.ToWorld(middle));
+  const double half = 0.5 * std::max(slab.thickness, kSliceThickness * Least(geometry.spacing));
   for (const double sign : {1.0, -1.0}) sides.push_back(FromWorld({sign * normal, half - sign * Dot(normal, through)}, geometry));
 }
 
@@ -130,14 +138,6 @@ Status Validate(const Clipping& clipping) {
   return Status::Ok();
 }
 
-Status CheckClipping(const Clipping& clipping, const VolumeGeometry& geometry) {
-  if (!clipping.slab || !clipping.slab->index) return Status::Ok();
-  const Axis axis = AxisAcross(*clipping.slab, geometry);
-  if (*clipping.slab->index < geometry.size[axis]) return Status::Ok();
-  return Status::InvalidArgument(fmt::format("clip.slab.index is {}, but the volume has slices 0 to {} along {}", *clipping.slab->index,
-                                             geometry.size[axis] - 1, Letter(axis)));
-}
-
 bool ClipRegion::Keeps(const Vec3& p) const {
   if (empty()) return true;
   const bool inside = std::ranges::all_of(sides, [&](const HalfSpace& side) { return side.Distance(p) >= 0; });
@@ -154,10 +154,13 @@ bool ClipRegion::MayKeep(const Box& box) const {
   return std::ranges::any_of(sides, [&](const HalfSpace& side) { return DistancesOf(side, box).least <= slack(side); });
 }
 
-ClipRegion MakeClipRegion(const Clipping& clipping, const VolumeGeometry& geometry) {
+Result<ClipRegion> MakeClipRegion(const Clipping& clipping, const VolumeGeometry& geometry) {
   ClipRegion region{{}, clipping.mode};
   if (clipping.box) AddBox(*clipping.box, geometry, region.sides);
-  if (clipping.slab) AddSlab(*clipping.slab, geometry, region.sides);
+  if (clipping.slab) {
+    if (Status status = CheckIndex(*clipping.slab, geometry); !status.ok()) return status;
+    AddSlab(*clipping.slab, geometry, region.sides);
+  }
   for (const ClipPlane& plane : clipping.planes) region.sides.push_back(FromWorld(plane, geometry));
   if (region.mode == ClipMode::kKeep) {
     std::erase_if(region.sides, [&](const HalfSpace& side) { return DistancesOf(side, geometry.bounds()).least >= 0; });

@@ -66,8 +66,6 @@ struct Clipping {
 
 // InvalidArgument naming field, value and limits.
 Status Validate(const Clipping& clipping);
-// InvalidArgument: a valid clipping that cannot be had of this volume.
-Status CheckClipping(const Clipping& clipping, const VolumeGeometry& geometry);
 
 // The points p of data space with Distance(p) >= 0. Distance is in the unit of the spacing: |normal / spacing| is 1.
 struct HalfSpace {
@@ -79,6 +77,10 @@ struct HalfSpace {
 };
 
 inline constexpr std::size_t kMaxClipSides = kMaxClipPlanes + 6 + 2;  // planes, box and slab
+
+// Least spacings. Samples so near behind a cut are lit by its plane and not by their gradient: a visible sample lies up to about one behind
+// the cut, gathers most from voxels nearer than 1.5, and is seen through others where the matter is not quite opaque.
+inline constexpr double kFaceDepth = 2.5;
 
 struct ClipRegion {
   std::vector<HalfSpace> sides;  // at most kMaxClipSides; none: nothing is clipped, whatever the mode
@@ -92,8 +94,8 @@ struct ClipRegion {
   friend bool operator==(const ClipRegion&, const ClipRegion&) = default;
 };
 
-// `clipping` valid, and CheckClipping is ok. Sides that the whole volume lies within are left out, so that a box around everything costs
-// nothing.
-ClipRegion MakeClipRegion(const Clipping& clipping, const VolumeGeometry& geometry);
+// `clipping` valid. Sides that the whole volume lies within are left out, so that a box around everything costs nothing.
+// InvalidArgument: the volume has no slice with the slab's index.
+Result<ClipRegion> MakeClipRegion(const Clipping& clipping, const VolumeGeometry& geometry);
 
 }  // namespace slabstream

@@ -40,7 +40,7 @@ struct Extent {
 SheetGrid MakeSheetGrid(const Camera& camera, const VolumeGeometry& geometry) {
   const auto [c, u, v] = AxesOf(camera.traversal_axis);
   const auto column_of = [&](const std::array<double, 4>& row, Axis axis) { return row[std::size_t(Number(axis))]; };
-  const Vec3 centre = 0.5 * (ToVec3(geometry.size) - Vec3{1, 1, 1});
+  const Vec3 centre = geometry.centre();
   const bool perspective = camera.projection == Projection::kPerspective;
 
   // The plane through the volume's centre, k = centre[c], stands for the grid: the point where a ray meets it is the ray's pixel.

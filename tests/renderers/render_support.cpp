@@ -64,7 +64,7 @@ FrameSetup MakeSetup(const Volume& volume, const SetupOptions& options) {
   setup.range = Summarize(volume).range;
   SetRenderer(*options.renderer, setup);
   SetView(options.view, options.size, setup);
-  setup.clip = MakeClipRegion(options.clipping, volume.description.geometry);
+  setup.clip = MakeClipRegion(options.clipping, volume.description.geometry).value();
   setup.transfer = options.transfer;
   setup.shading = options.shading;
   setup.termination = options.termination;

@@ -79,7 +79,7 @@ TEST(Clip, KeepsWhatTheBoxAndAllPlanesLeave) {
     const VolumeGeometry geometry = ObliqueGeometry(random);
     const Clipping clipping = RandomClipping(random, geometry);
     ASSERT_TRUE(Validate(clipping).ok()) << Validate(clipping).message();
-    const ClipRegion region = MakeClipRegion(clipping, geometry);
+    const ClipRegion region = MakeClipRegion(clipping, geometry).value();
     for (int n = 0; n < 50; ++n) {
       Vec3 p;
       for (const Axis axis : kAxes) p[axis] = random.Real(-0.499, geometry.size[axis] - 0.501);
@@ -98,7 +98,7 @@ TEST(Clip, DropsNoBoxThatHoldsAPointWhichIsKept) {
   for (int i = 0; i < 1000; ++i) {
     SCOPED_TRACE(random.trace());
     const VolumeGeometry geometry = ObliqueGeometry(random);
-    const ClipRegion region = MakeClipRegion(RandomClipping(random, geometry), geometry);
+    const ClipRegion region = MakeClipRegion(RandomClipping(random, geometry), geometry).value();
     const Box box = RandomBox(random, geometry.bounds());
     bool any = false;
     for (int n = 0; n < 50; ++n) {
@@ -116,18 +116,18 @@ TEST(Clip, DropsNoBoxThatHoldsAPointWhichIsKept) {
 TEST(Clip, DistancesArePhysical) {
   Random random(23);
   const VolumeGeometry geometry = ObliqueGeometry(random);
-  const ClipRegion region = MakeClipRegion({.planes = {{{3, -4, 12}, 0}}, .mode = ClipMode::kCutAway}, geometry);
+  const ClipRegion region = MakeClipRegion({.planes = {{{3, -4, 12}, 0}}, .mode = ClipMode::kCutAway}, geometry).value();
   ASSERT_EQ(region.sides.size(), 1U);
   EXPECT_NEAR(Length(region.sides[0].normal / geometry.spacing), 1, 1e-12);
 }
 
 TEST(Clip, ABoxAroundTheVolumeLeavesNothingToDo) {
   const VolumeGeometry geometry{{10, 20, 30}, {1, 2, 3}};
-  EXPECT_TRUE(MakeClipRegion({.box = ClipBox{{0, 0, 0}, {100, 100, 100}, ClipUnit::kPercent}}, geometry).empty());
-  EXPECT_TRUE(MakeClipRegion({.box = ClipBox{{0, -1e9, 0}, {10, 1e9, 30}, ClipUnit::kVoxels}}, geometry).empty());
-  EXPECT_EQ(MakeClipRegion({.box = ClipBox{{0, -1e9, 0}, {9, 1e9, 30}, ClipUnit::kVoxels}}, geometry).sides.size(), 1U);
+  EXPECT_TRUE(MakeClipRegion({.box = ClipBox{{0, 0, 0}, {100, 100, 100}, ClipUnit::kPercent}}, geometry).value().empty());
+  EXPECT_TRUE(MakeClipRegion({.box = ClipBox{{0, -1e9, 0}, {10, 1e9, 30}, ClipUnit::kVoxels}}, geometry).value().empty());
+  EXPECT_EQ(MakeClipRegion({.box = ClipBox{{0, -1e9, 0}, {9, 1e9, 30}, ClipUnit::kVoxels}}, geometry).value().sides.size(), 1U);
   const ClipRegion all_gone =
-      MakeClipRegion({.box = ClipBox{{0, 0, 0}, {100, 100, 100}, ClipUnit::kPercent}, .mode = ClipMode::kCutAway}, geometry);
+      MakeClipRegion({.box = ClipBox{{0, 0, 0}, {100, 100, 100}, ClipUnit::kPercent}, .mode = ClipMode::kCutAway}, geometry).value();
   EXPECT_FALSE(all_gone.Keeps({5, 5, 5}));
 }
 

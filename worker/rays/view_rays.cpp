@@ -9,9 +9,6 @@ namespace {
 
 Float3 ToFloat3(const Vec3& v) { return {float(v.x), float(v.y), float(v.z)}; }
 
-// Least spacings. Material that is not quite opaque shows what lies a few samples behind a cut, too.
-constexpr double kFaceDepth = 2.5;
-
 // The depth in the middle of a slab that faces the view; its surfaces are two sides of the region. None: there is no slab.
 std::optional<double> MiddleOfSlab(const Camera& camera, const ClipRegion& clip) {
   if (camera.projection != Projection::kOrthographic || clip.mode != ClipMode::kKeep) return std::nullopt;
@@ -31,9 +28,9 @@ std::optional<double> MiddleOfSlab(const Camera& camera, const ClipRegion& clip)
 
 ViewRays MakeViewRays(const Camera& camera, const VolumeGeometry& geometry, double samples_per_voxel, const ClipRegion& clip) {
   const Vec3 spacing = geometry.spacing;
-  const double step = std::min({spacing.x, spacing.y, spacing.z}) / samples_per_voxel;
+  const double step = Least(spacing) / samples_per_voxel;
   const double radius = 0.5 * Length(ToVec3(geometry.size) * spacing);
-  const Vec3 middle = 0.5 * (ToVec3(geometry.size) - Vec3{1, 1, 1});
+  const Vec3 middle = geometry.centre();
   const double centre_depth = camera.Project(middle).depth;
   double first = std::max(std::floor((centre_depth - radius) / step), 0.0);
   if (const auto middle_depth = MiddleOfSlab(camera, clip)) first += *middle_depth / step - std::ceil(*middle_depth / step);
@@ -62,7 +59,7 @@ ViewRays MakeViewRays(const Camera& camera, const VolumeGeometry& geometry, doub
   rays.volume_end = ToFloat3(ToVec3(geometry.size) - Vec3{0.5, 0.5, 0.5});
   for (const HalfSpace& side : clip.sides) rays.clip.sides.push_back({ToFloat3(side.normal), float(side.offset)});
   rays.clip.cut_away = clip.mode == ClipMode::kCutAway;
-  rays.clip.face_depth = float(kFaceDepth * std::min({spacing.x, spacing.y, spacing.z}));
+  rays.clip.face_depth = float(kFaceDepth * Least(spacing));
   return rays;
 }
 

@@ -77,7 +77,7 @@ class RayDepths {
 }  // namespace
 
 SplatWork::SplatWork(const OccupancyGrid& grid, const Vec3& spacing, double extinction)
-    : grid_(grid), spacing_(spacing), extinction_(extinction), least_spacing_(std::min({spacing.x, spacing.y, spacing.z})) {}
+    : grid_(grid), spacing_(spacing), extinction_(extinction), least_spacing_(Least(spacing)) {}
 
 double SplatWork::PixelsPerVoxel(Axis axis) const { return std::min(spacing_[axis] / least_spacing_, kMostPixels); }
 

@@ -78,7 +78,7 @@ LocalImage ShadeByDepth(const LocalImage& frame, const FrameSetup& setup) {
   const Phong phong(setup.shading, setup.camera.view_direction);
   const auto distance = std::max(std::int32_t{1}, std::int32_t(std::lround(kVoxels * CostViewOf(setup).pixels_per_voxel)));
   const Vec3& spacing = setup.camera.spacing;
-  const double least = std::min({spacing.x, spacing.y, spacing.z});
+  const double least = Least(spacing);
   constexpr std::int32_t kRows = 8;
   tbb::parallel_for(tbb::blocked_range<std::int32_t>(frame.bounds.y_begin, frame.bounds.y_end, kRows), [&](const auto& rows) {
     for (std::int32_t y = rows.begin(); y < rows.end(); ++y) {

@@ -72,7 +72,7 @@ class VisibilityCache : public SlabCache {
 // The share of a voxel's volume that a sample at the volume's centre represents: a pixel's area times a step.
 double VoxelsASample(const ViewRays& rays, const FrameSetup& setup) {
   const VolumeGeometry& geometry = setup.description.geometry;
-  const double depth = rays.perspective ? setup.camera.Project(0.5 * (ToVec3(geometry.size) - Vec3{1, 1, 1})).depth : 1;
+  const double depth = rays.perspective ? setup.camera.Project(geometry.centre()).depth : 1;
   const double voxel = geometry.spacing.x * geometry.spacing.y * geometry.spacing.z;
   return double(rays.pixel_squared) * depth * depth * double(rays.step) / voxel;
 }

@@ -46,7 +46,7 @@ SheetOpacity::Slopes SheetOpacity::SlopesIn(std::int32_t k) const {
 
 ShadeTables SheetOpacity::Tables(const ClassificationTable& table) const {
   const Camera& camera = setup_.camera;
-  const double voxel_length = std::min({camera.spacing.x, camera.spacing.y, camera.spacing.z});
+  const double voxel_length = Least(camera.spacing);
   const double exponent = central_distance_ / (table.opacity_distance * voxel_length);
   ShadeTables tables;
   tables.levels = levels_;

@@ -9,7 +9,7 @@ namespace slabstream {
 
 SliceClip::SliceClip(const FrameSetup& setup) : setup_(setup), axes_(AxesOf(setup.camera.traversal_axis)) {
   const Vec3& spacing = setup.description.geometry.spacing;
-  face_reach_ = kFaceReach * std::min({spacing.x, spacing.y, spacing.z});
+  face_reach_ = kFaceDepth * Least(spacing);
   for (const HalfSpace& side : setup.clip.sides) {
     const Vec3 normal = side.normal / spacing;
     normals_.push_back(EncodeNormal(float(normal.x), float(normal.y), float(normal.z)));

@@ -25,14 +25,11 @@ class SliceClip {
   bool empty() const { return setup_.clip.empty(); }
   // The columns that are left of a row of slice k, in ascending order.
   std::array<ColumnInterval, 2> ColumnsLeft(std::int32_t k, std::int32_t row) const;
-  // Sets the codes (normal_code.h) of the voxels of a row that lie within kFaceReach of a cut, voxel + i for i < count along u, to that of
+  // Sets the codes (normal_code.h) of the voxels of a row that lie within kFaceDepth of a cut, voxel + i for i < count along u, to that of
   // the cut's normal. The others stay. Returns whether any was set.
   bool LightCuts(std::int32_t k, std::int32_t v, std::int32_t u, std::int32_t count, std::uint16_t* normals) const;
 
  private:
-  // Least spacings: a visible sample lies up to about one behind the cut, and gathers most from voxels that are nearer than 1.5.
-  static constexpr double kFaceReach = 2.5;
-
   const FrameSetup& setup_;
   SliceAxes axes_;
   double face_reach_;                   // physical

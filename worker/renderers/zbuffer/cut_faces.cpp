@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <type_traits>
 
 #include "worker/kernels/surface_face.h"
 
@@ -12,18 +11,21 @@ namespace {
 
 constexpr double kSlack = 0x1p-8;  // of the least spacing
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kAlong = 1e-9;        // a ray that comes nearer to a side by less runs along it: physical, a unit of depth
 constexpr std::uint32_t kCutAxis = 3;  // of FaceIndex: not the axis of a face
 
 }  // namespace
 
 CutFaces::CutFaces(SlabData& slab, const FrameSetup& setup, const Box& box, const BinSelection& opaque)
-    : voxels_(slab.voxels()), box_(box), keep_(setup.clip.mode == ClipMode::kKeep), table_(slab.Classification(setup)), opaque_(opaque) {
+    : voxels_(slab.voxels()),
+      box_(box),
+      keep_(setup.clip.mode == ClipMode::kKeep),
+      slack_(kSlack * Least(setup.description.geometry.spacing)),
+      table_(slab.Classification(setup)),
+      opaque_(opaque),
+      bricks_(CubesOver(setup.description.geometry.size, kFaceBrick)) {
   const VolumeGeometry& geometry = setup.description.geometry;
   const Camera& camera = setup.camera;
-  slack_ = kSlack * std::min({geometry.spacing.x, geometry.spacing.y, geometry.spacing.z});
-  bricks_x_ = std::uint32_t(geometry.size.x + kFaceBrick - 1) / kFaceBrick;
-  bricks_y_ = std::uint32_t(geometry.size.y + kFaceBrick - 1) / kFaceBrick;
-
   const Camera::Ray first = camera.RayAt(0, 0), right = camera.RayAt(camera.width, 0), down = camera.RayAt(0, camera.height);
   const auto linear = [&](double at_0, double at_right, double at_bottom) {
     return Linear{at_0, (at_right - at_0) / camera.width, (at_bottom - at_0) / camera.height};
@@ -41,80 +43,68 @@ CutFaces::CutFaces(SlabData& slab, const FrameSetup& setup, const Box& box, cons
                       linear(along(first.direction), along(right.direction), along(down.direction)),
                       lit ? phong.AtNormal(Normalized(side.normal / geometry.spacing)) : PhongFactors{}});
   }
-  VisitScalarType(voxels_.type, [&]<class T>(const T*) {
-    if constexpr (std::is_integral_v<T>) {
-      const BinLookup<T> lookup(table_, opaque_);
-      for (std::size_t sample = 0; sample <= std::numeric_limits<T>::max(); ++sample) bins_.push_back(lookup(T(sample)));
-    }
-  });
 }
 
-CutFaces::Crossing CutFaces::CrossingOf(std::int32_t column, std::int32_t row) const {
-  const double x = column + 0.5, y = row + 0.5;
-  Crossing crossing{0, kInfinity, nullptr, nullptr};
-  for (const Side& side : sides_) {
-    const double start = side.start.At(x, y), rise = side.rise.At(x, y), at = -start / rise;
-    if (std::abs(rise) < 1e-9) {
-      if (start < 0) crossing.to = -1;
-    } else if (rise > 0) {
-      if (at <= crossing.from) continue;
-      crossing.from = at;
-      crossing.in = &side;
-    } else if (at < crossing.to) {
-      crossing.to = at;
-      crossing.out = &side;
-    }
-  }
-  return crossing;
-}
-
+// Side after side, and along a row: such loops are quick.
 void CutFaces::Limits(std::int32_t column, std::int32_t row, std::size_t count, float* from, float* to) const {
   const double inwards = keep_ ? slack_ : -slack_;
-  for (std::size_t n = 0; n < count; ++n) {
-    const Crossing crossing = CrossingOf(column + std::int32_t(n), row);
-    const bool any = crossing.from <= crossing.to;
-    from[n] = float(any && crossing.in != nullptr ? crossing.from + inwards : any ? 0 : kInfinity);
-    to[n] = float(any ? crossing.to - inwards : -1);
+  std::vector<double> enters(count), leaves(count, kInfinity);
+  for (const Side& side : sides_) {
+    const double start = side.start.At(column + 0.5, row + 0.5), rise = side.rise.At(column + 0.5, row + 0.5);
+    for (std::size_t n = 0; n < count; ++n) {
+      const double rises = rise + double(n) * side.rise.by_x, starts = start + double(n) * side.start.by_x;
+      const double at = -starts / rises;
+      const bool along = std::abs(rises) < kAlong;
+      enters[n] = !along && rises > 0 && at > enters[n] ? at : enters[n];
+      leaves[n] = along ? (starts < 0 ? -1 : leaves[n]) : rises < 0 && at < leaves[n] ? at : leaves[n];
+    }
   }
+  for (std::size_t n = 0; n < count; ++n) {
+    const bool any = enters[n] <= leaves[n];
+    from[n] = float(!any ? kInfinity : enters[n] > 0 ? enters[n] + inwards : 0);
+    to[n] = float(any ? leaves[n] - inwards : -1);
+  }
+}
+
+const CutFaces::Side& CutFaces::CutAt(double x, double y, double depth) const {
+  const auto distance = [&](const Side& side) { return std::abs(side.start.At(x, y) + depth * side.rise.At(x, y)); };
+  return *std::ranges::min_element(sides_, {}, distance);
 }
 
 std::uint16_t CutFaces::BinOf(const Index3& voxel) const {
-  const auto at = std::size_t(voxels_.Offset(voxel));
-  switch (voxels_.type) {
-    case ScalarType::kUint8: return bins_[voxels_.samples<std::uint8_t>()[at]];
-    case ScalarType::kUint16: return bins_[voxels_.samples<std::uint16_t>()[at]];
-    case ScalarType::kFloat32: break;
-  }
-  const float sample = voxels_.samples<float>()[at];
-  if (!std::isfinite(sample)) return kNotSelected;
-  const int bin = table_.BinOf(double(sample));
-  return opaque_.selected[std::size_t(bin)] != 0 ? std::uint16_t(bin) : kNotSelected;
+  return VisitScalarType(voxels_.type, [&]<class T>(const T*) {
+    const auto sample = double(voxels_.samples<T>()[voxels_.Offset(voxel)]);
+    if (!std::isfinite(sample)) return kNotSelected;
+    const auto bin = std::uint16_t(table_.BinOf(sample));
+    return opaque_.selected[bin] != 0 ? bin : kNotSelected;
+  });
 }
 
-void CutFaces::Draw(std::int32_t column, std::int32_t row, std::size_t count, float* rgba, float* depth, std::uint32_t* voxel) const {
+void CutFaces::Draw(std::int32_t column, std::int32_t row, std::size_t count, const float* from, const float* to, float* rgba, float* depth,
+                    std::uint32_t* voxel) const {
+  const float* const behind = keep_ ? from : to;  // a cut by slack_
   for (std::size_t n = 0; n < count; ++n) {
-    const Crossing crossing = CrossingOf(column + std::int32_t(n), row);
-    if (crossing.from > crossing.to) continue;
-    const Side* const side = keep_ ? crossing.in : crossing.out;
-    const double at = keep_ ? crossing.from : crossing.to;
-    if (side == nullptr || float(at) > depth[n]) continue;
+    const double at = double(behind[n]) - slack_;
+    if (behind[n] <= 0 || std::isinf(behind[n]) || float(at) > depth[n]) continue;
     // The voxel just behind the cut.
     const double x = column + std::int32_t(n) + 0.5, y = row + 0.5;
     Index3 site;
     for (const Axis axis : kAxes) {
       const auto i = std::size_t(Number(axis));
-      const double p = origin_[i].At(x, y) + (at + slack_) * direction_[i].At(x, y);
+      const double p = origin_[i].At(x, y) + double(behind[n]) * direction_[i].At(x, y);
       site[axis] = std::int32_t(std::floor(std::clamp(p + 0.5, -1.0, double(kMaxVolumeSide))));
     }
     if (!box_.Contains(site)) continue;
     const std::uint16_t bin = BinOf(site);
     if (bin == kNotSelected) continue;
     const Rgb& color = table_.color[bin];
-    const auto lit = [&](float channel) { return std::clamp(channel * side->light.diffuse + side->light.specular, 0.0F, 1.0F); };
+    const PhongFactors& light = CutAt(x, y, at).light;
+    const auto lit = [&](float channel) { return std::clamp(channel * light.diffuse + light.specular, 0.0F, 1.0F); };
     const float pixel[4] = {lit(color.r), lit(color.g), lit(color.b), 1};
     std::copy_n(pixel, 4, rgba + 4 * n);
     depth[n] = float(at);
-    voxel[n] = FaceIndex(std::uint32_t(site.x), std::uint32_t(site.y), std::uint32_t(site.z), kCutAxis, bricks_x_, bricks_y_);
+    voxel[n] = FaceIndex(std::uint32_t(site.x), std::uint32_t(site.y), std::uint32_t(site.z), kCutAxis, std::uint32_t(bricks_.x),
+                         std::uint32_t(bricks_.y));
   }
 }
 

@@ -26,8 +26,10 @@ class CutFaces {
   bool inside() const { return keep_; }
   // The limits of `count` pixels from (column, row) on.
   void Limits(std::int32_t column, std::int32_t row, std::size_t count, float* from, float* to) const;
-  // Puts the cuts through voxels of the box in front of what lies behind them. `depth` and `voxel` are as ShadeFaceRow fills them in.
-  void Draw(std::int32_t column, std::int32_t row, std::size_t count, float* rgba, float* depth, std::uint32_t* voxel) const;
+  // Puts the cuts through voxels of the box in front of what lies behind them. `from` and `to` are the limits; `depth` and `voxel` are as
+  // ShadeFaceRow fills them in.
+  void Draw(std::int32_t column, std::int32_t row, std::size_t count, const float* from, const float* to, float* rgba, float* depth,
+            std::uint32_t* voxel) const;
 
  private:
   // A quantity that is linear in a pixel's x and y.
@@ -40,13 +42,9 @@ class CutFaces {
     Linear start, rise;
     PhongFactors light;
   };
-  // Depths between which a ray runs in the half-spaces; from > to: nowhere. The side that it comes in or goes out by; null: none.
-  struct Crossing {
-    double from, to;
-    const Side *in, *out;
-  };
-  Crossing CrossingOf(std::int32_t column, std::int32_t row) const;
-  std::uint16_t BinOf(const Index3& voxel) const;
+  // The side that the ray of the pixel whose centre is (x, y) crosses at a depth.
+  const Side& CutAt(double x, double y, double depth) const;
+  std::uint16_t BinOf(const Index3& voxel) const;  // of a voxel of the box; kNotSelected if it is not opaque
 
   const VoxelBlock& voxels_;
   const Box box_;
@@ -54,10 +52,9 @@ class CutFaces {
   double slack_;                              // physical
   std::array<Linear, 3> origin_, direction_;  // of a pixel's ray, data space: origin + depth * direction
   std::vector<Side> sides_;
-  std::vector<std::uint16_t> bins_;  // of stored samples of one or two bytes
   const ClassificationTable& table_;
   const BinSelection& opaque_;
-  std::uint32_t bricks_x_, bricks_y_;
+  const Index3 bricks_;
 };
 
 }  // namespace slabstream

@@ -160,13 +160,13 @@ class ZBufferRenderer : public Renderer {
       KeyBand band;
       band.bounds = {scene.bounds.x_begin, begins[i - 1], scene.bounds.x_end, begins[i]};
       band.stride = std::size_t(band.bounds.width() + kKeyPadding);
-      AlignedVector<std::uint64_t>& keys = keys_.local();
-      keys.resize(std::max(keys.size(), band.stride * std::size_t(band.bounds.height())));
+      const std::size_t pixels = band.stride * std::size_t(band.bounds.height());
+      auto& [keys, from, to] = scratch_.local();
+      keys.resize(std::max(keys.size(), pixels));
       band.keys = keys.data();
-      AlignedVector<float> from, to;
       if (cuts) {
-        from.resize(keys.size());
-        to.resize(keys.size());
+        from.resize(std::max(from.size(), pixels));
+        to.resize(from.size());
         for (std::int32_t y = band.bounds.y_begin; y < band.bounds.y_end; ++y) {
           const std::size_t row = std::size_t(y - band.bounds.y_begin) * band.stride;
           cuts->Limits(band.bounds.x_begin, y, std::size_t(band.bounds.width()), &from[row], &to[row]);
@@ -177,10 +177,11 @@ class ZBufferRenderer : public Renderer {
       const Time middle = MonotonicNow();
       for (std::int32_t y = band.bounds.y_begin; y < band.bounds.y_end && !cancelled.load(std::memory_order_relaxed); ++y) {
         const auto width = std::size_t(band.bounds.width()), pixel = std::size_t(y - scene.bounds.y_begin) * width;
-        ShadeFaceRow(shading, band.keys + std::size_t(y - band.bounds.y_begin) * band.stride, band.bounds.x_begin, y, width,
-                     &image.rgba[4 * pixel], &image.depth[pixel], &image.voxel[pixel]);
+        const std::size_t row = std::size_t(y - band.bounds.y_begin) * band.stride;
+        ShadeFaceRow(shading, band.keys + row, band.bounds.x_begin, y, width, &image.rgba[4 * pixel], &image.depth[pixel],
+                     &image.voxel[pixel]);
         if (cuts) {
-          cuts->Draw(band.bounds.x_begin, y, width, &image.rgba[4 * pixel], &image.depth[pixel], &image.voxel[pixel]);
+          cuts->Draw(band.bounds.x_begin, y, width, &from[row], &to[row], &image.rgba[4 * pixel], &image.depth[pixel], &image.voxel[pixel]);
         }
       }
       draw_ns += (middle - begin).count();
@@ -198,7 +199,12 @@ class ZBufferRenderer : public Renderer {
   // More bands balance the load better, but bricks on the border of two bands are drawn by both.
   static constexpr int kBandsPerThread = 4;
 
-  tbb::enumerable_thread_specific<AlignedVector<std::uint64_t>> keys_;  // of a band; kept from frame to frame
+  // Of a band; kept from frame to frame.
+  struct Scratch {
+    AlignedVector<std::uint64_t> keys;
+    AlignedVector<float> from, to;  // CutFaces::Limits
+  };
+  tbb::enumerable_thread_specific<Scratch> scratch_;
 };
 
 }  // namespace
