@@ -28,9 +28,9 @@ struct Layout {
 
 // What is known about the work in a volume under one transfer function. Null: not known.
 struct WorkKnowledge {
-  const OccupancyGrid* occupied =
-      nullptr;  // drawn voxels (RendererKind::DrawnTable) of the whole volume; null: the summary's bricks tell what may be drawn
-  const WorkField* cost = nullptr;  // seconds, learnt from frames; null: occupied voxels stand for it
+  // Drawn voxels (RendererKind::DrawnTable) of the whole volume; null: the summary's bricks tell what may be drawn.
+  const OccupancyGrid* occupied = nullptr;
+  const WorkField* cost = nullptr;  // seconds, learnt from frames; null: drawn voxels stand for it
 };
 
 // Most memory for the voxels of one slab, as far as the size of slices allows.

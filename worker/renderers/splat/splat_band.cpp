@@ -300,11 +300,11 @@ void SplatBand::CompositeClipped(RowWork work, std::int32_t row) {
   CompositeRow(work);
   for (std::size_t word = 0; word < open_whole_.size(); ++word) open[word] |= open_whole_[word];
 
-  work.open = open_whole_.data();
+  open_one_.assign(std::size_t(words_), 0);
+  work.open = open_one_.data();
   for (std::int32_t word = 0; word < words_; ++word) {
     for (SegmentWord rest = open_part_[std::size_t(word)]; rest != 0; rest &= rest - 1) {
-      std::ranges::fill(open_whole_, 0);
-      open_whole_[std::size_t(word)] = rest & ~(rest - 1);
+      open_one_[std::size_t(word)] = rest & ~(rest - 1);
       const std::int32_t first = FirstSegment(rest, word) * kSegment;
       float* const pixels = work.accumulated + 4 * std::ptrdiff_t{first};
       std::array<float, 4 * std::size_t{kSegment}> before;
@@ -316,6 +316,7 @@ void SplatBand::CompositeClipped(RowWork work, std::int32_t row) {
         if (std::ranges::none_of(left, holds)) std::copy_n(&before[4 * std::size_t(i)], 4, pixels + 4 * i);
       }
     }
+    open_one_[std::size_t(word)] = 0;
   }
 }
 

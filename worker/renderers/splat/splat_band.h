@@ -72,7 +72,7 @@ class SplatBand {
   std::int32_t slice_ = 0;
   std::vector<std::array<ColumnInterval, 2>> left_;                // by row, of a clipped volume: columns of the slice
   std::vector<std::array<VoxelRecord, std::size_t{kOctet}>> cut_;  // records of octets near a cut
-  std::vector<SegmentWord> open_whole_, open_part_;                // [word]: scratch of CompositeClipped
+  std::vector<SegmentWord> open_whole_, open_part_, open_one_;     // [word]: scratch of CompositeClipped
   SheetOpacity::Slopes slopes_;
   Rows rows_;                                     // that the slice can touch
   std::int32_t first_beam_ = 0, beam_count_ = 0;  // beams whose footprints reach these rows
