@@ -45,20 +45,30 @@ CutFaces::CutFaces(SlabData& slab, const FrameSetup& setup, const Box& box, cons
   }
 }
 
-// Side after side, and along a row: such loops are quick.
 void CutFaces::Limits(std::int32_t column, std::int32_t row, std::size_t count, float* from, float* to) const {
-  const double inwards = keep_ ? slack_ : -slack_;
+  // Side after side along the row, without branches. All is computed from a pixel's own x and y, so that it is the same in every box.
   std::vector<double> enters(count), leaves(count, kInfinity);
   for (const Side& side : sides_) {
-    const double start = side.start.At(column + 0.5, row + 0.5), rise = side.rise.At(column + 0.5, row + 0.5);
+    const double start = side.start.At(0, row + 0.5), rise = side.rise.At(0, row + 0.5);
+    const auto x = [column](std::size_t n) { return double(column + std::int32_t(n)) + 0.5; };
+    const bool parallel = side.rise.by_x == 0;  // the row's rays
+    if (parallel && std::abs(rise) >= kAlong) {
+      const double first = -start / rise, slope = -side.start.by_x / rise;
+      for (std::size_t n = 0; n < count; ++n) {
+        const double at = first + slope * x(n);
+        enters[n] = rise > 0 && at > enters[n] ? at : enters[n];
+        leaves[n] = rise < 0 && at < leaves[n] ? at : leaves[n];
+      }
+      continue;
+    }
     for (std::size_t n = 0; n < count; ++n) {
-      const double rises = rise + double(n) * side.rise.by_x, starts = start + double(n) * side.start.by_x;
-      const double at = -starts / rises;
+      const double starts = start + side.start.by_x * x(n), rises = rise + side.rise.by_x * x(n), at = -starts / rises;
       const bool along = std::abs(rises) < kAlong;
       enters[n] = !along && rises > 0 && at > enters[n] ? at : enters[n];
       leaves[n] = along ? (starts < 0 ? -1 : leaves[n]) : rises < 0 && at < leaves[n] ? at : leaves[n];
     }
   }
+  const double inwards = keep_ ? slack_ : -slack_;
   for (std::size_t n = 0; n < count; ++n) {
     const bool any = enters[n] <= leaves[n];
     from[n] = float(!any ? kInfinity : enters[n] > 0 ? enters[n] + inwards : 0);
