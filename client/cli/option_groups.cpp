@@ -203,7 +203,8 @@ void AddClipOptions(CLI::App& app, Clipping& clipping) {
 void AddPictureFormat(CLI::App& app, PictureFormat& format) {
   AddParsed(
       app, "--background", format.background, [](const std::string& option, const std::string& text) { return ParseColor(option, text); },
-      "Colour behind the picture: R,G,B or R,G,B,A from 0 to 1, #rrggbb, #rrggbbaa, or a name such as white (default: transparent)")
+      "Colour behind the picture: R,G,B or R,G,B,A from 0 to 1, #rrggbb, #rrggbbaa, or a name such as white (default: transparent, which "
+      "is black in a movie)")
       ->type_name("COLOUR");
   AddChoice<int, 2>(app, "--depth", format.png_bits, {"8", "16"}, {8, 16}, "Bits of each channel of a PNG: 8 or 16")->default_str("8");
 }
@@ -421,13 +422,13 @@ void AddSliceOptions(CLI::App& app, SliceOptions& options) {
   ResolveSource(app, source, options.source, request.transfer, [&options] { return options.connection.local_workers > 0; });
 }
 
-void AddFrameOptions(CLI::App& app, FrameOptions& options) {
+void AddFrameOptions(CLI::App& app, FrameOptions& options, std::initializer_list<std::string_view> except) {
   app.option_defaults()->group("Options");
   CLI::Option* source = app.add_option("SOURCE", options.source,
                                        "A dataset's name at the service, or with --local a volume file; followed by :TRANSFER it says "
                                        "what --transfer says")
                             ->required();
-  AddReadOptions(app);
+  AddReadOptions(app, except);
   AddConnectionOptions(app, options.connection);
   AddViewOptions(app, options.request.view, options.request.size);
   AddClipOptions(app, options.request.clipping);
