@@ -144,9 +144,9 @@ void AddViewOptions(CLI::App& app, ViewParameters& view, ImageSize& size) {
   app.option_defaults()->group("View");
   const NumberRange angle{-kMaxAngleDegrees, kMaxAngleDegrees};
   AddSize(app, size, "Pixels: WIDTHxHEIGHT, or one number for a square");
-  AddChoice<Projection, 2>(app, "--projection", view.projection, {"orthographic", "perspective"},
+  AddChoice<Projection, 2>(app, "--projection", view.projection, {NameOf(Projection::kOrthographic), NameOf(Projection::kPerspective)},
                            {Projection::kOrthographic, Projection::kPerspective}, "Orthographic or perspective projection")
-      ->default_str("orthographic");
+      ->default_str(std::string(NameOf(view.projection)));
   CLI::Option* const named = AddNamedView(app, view);
   AddNumber(app, "--azimuth", view.azimuth_degrees, angle,
             "Degrees that the eye turns about +z; at 0 it looks along +y, at 90 it is on the +x side")
@@ -214,7 +214,7 @@ void AddLookOptions(CLI::App& app, FrameRequest& request, PictureFormat& format)
   AddRendererOptions(app, request);
   AddTransferOptions(app, request.transfer);
   AddChoice<ShadingModel, 3>(
-      app, "--shading", request.shading.model, {"phong", "none", "depth-gradient"},
+      app, "--shading", request.shading.model, kShadingModelNames,
       {ShadingModel::kPhong, ShadingModel::kNone, ShadingModel::kDepthGradient},
       "Lighting; phong: lit surfaces; none: the material's own colours; depth-gradient: lit surfaces, with normals from "
       "the depths of the picture; zbuffer only")
@@ -255,8 +255,7 @@ void AddPolicyOptions(CLI::App& app, Policy& policy) {
   app.option_defaults()->group("Distribution (never changes the picture)");
   AddNamed(app, "--decomposition", policy.decomposition, Decompositions(), "How the volume is divided into boxes", kLeftToThePlanner);
   AddChoice<AxisChoice, 5>(
-      app, "--axis", policy.axis, {"x", "y", "z", "auto", "view"},
-      {AxisChoice::kX, AxisChoice::kY, AxisChoice::kZ, AxisChoice::kAuto, AxisChoice::kView},
+      app, "--axis", policy.axis, kAxisChoiceNames, {AxisChoice::kX, AxisChoice::kY, AxisChoice::kZ, AxisChoice::kAuto, AxisChoice::kView},
       "Axis along which slabs are cut, and other boxes first: x, y, z, auto, or view, the axis nearest to the view direction")
       ->default_str("auto");
   AddNamed(app, "--balance-by", policy.load_metric, LoadMetrics(), "The load metric: what boxes have equal shares of");

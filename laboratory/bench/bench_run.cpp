@@ -50,8 +50,7 @@ Status WritePictures(Client& client, const BenchCase& c, const BenchOptions& opt
   std::vector<FrameJob> jobs;
   for (const Projection projection : kProjections) {
     jobs.push_back(MakeJob(c, options, dataset, projection, 0));
-    const std::string_view name = projection == Projection::kPerspective ? "perspective" : "orthographic";
-    jobs.back().output = fmt::format("{}/{}.{}.png", options.pictures_directory, c.name, name);
+    jobs.back().output = fmt::format("{}/{}.{}.png", options.pictures_directory, c.name, NameOf(projection));
   }
   PictureFormat format;
   format.background = {0, 0, 0, 1};
