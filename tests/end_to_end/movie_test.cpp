@@ -212,7 +212,7 @@ TEST_F(MovieTest, CtrlCEndsAnEncoderThatDoesNotEnd) {
 
 TEST_F(MovieTest, WhatAMovieCannotBeIsRefusedBeforeTheWorkBegins) {
   KeepFrames();
-  const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
+  const std::vector<Refusal> cases = {
       {{"-o", "m.mp4", "--size", "301x300"}, "--size 301x300: width and height of .mp4 must be even, as in 302x300"},
       {{"-o", "m.MP4", "--size", "11"}, "--size 11x11: width and height of .mp4 must be even, as in 12x12"},
       {{"-o", "m.gif", "--fps", "60"}, "--fps 60 is out of range [0.1, 50] for .gif"},
@@ -225,14 +225,7 @@ TEST_F(MovieTest, WhatAMovieCannotBeIsRefusedBeforeTheWorkBegins) {
       {{"-o", "m.mp4", "--eye", "1,2,3"}, "--eye stands still"},
       {{"-o", "m.mp4", "--stats", "no/s.json"}, "--stats 'no/s.json'"},
   };
-  for (const auto& [more, why] : cases) {
-    std::vector<std::string> arguments = {"turntable", ball_, "--local=1", "--frames", "2"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    const ProgramResult result = Slabstream(arguments);
-    EXPECT_EQ(result.exit_status, 2) << why;
-    EXPECT_EQ(result.err_lines().size(), 1U) << result.err;
-    EXPECT_THAT(result.err, HasSubstr(why));
-  }
+  ExpectEachRefused({"turntable", ball_, "--local=1", "--frames", "2"}, cases);
   // What only the frames' own start finds: the encoder was started, and nothing is left of it.
   EXPECT_EQ(Slabstream({"turntable", "no.nrrd", "--local=1", "--frames", "2", "-o", "m.mp4"}).exit_status, 2);
   const std::vector<std::string> files = Files();
@@ -294,7 +287,7 @@ TEST_F(MovieTest, AColourMeansTheSameValueAtAllTimes) {
 
 TEST_F(MovieTest, TimesThatAreNotThereAreRefused) {
   const std::string series = MakeSeries("series.npy", {50, 100, 200});
-  const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
+  const std::vector<Refusal> cases = {
       {{series, "--local=1", "--time", "0:3"}, "series.npy: time is 3, must be in [0, 2]"},
       {{series, "--local=1", "--time", "2:1"}, "--time '2:1' must not fall"},
       {{series, "--local=1", "--time", "0:1:2"}, "--time '0:1:2' is neither T nor FIRST:LAST"},
@@ -307,15 +300,7 @@ TEST_F(MovieTest, TimesThatAreNotThereAreRefused) {
       {{ball_, "--local=1", "--time", "0:2"}, "ball.nrrd: time is 2, must be in [0, 0]"},
       {{ball_, "--local=1"}, "--frames is required"},
   };
-  for (const auto& [more, why] : cases) {
-    std::vector<std::string> arguments = {"turntable", "-o", "p%d.png"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    const ProgramResult result = Slabstream(arguments);
-    EXPECT_EQ(result.exit_status, 2) << why << ": " << result.err;
-    EXPECT_EQ(result.err_lines().size(), 1U) << result.err;
-    EXPECT_THAT(result.err, HasSubstr(why));
-    EXPECT_THAT(Files(), Not(Contains("p0.png")));
-  }
+  ExpectEachRefused({"turntable", "-o", "p%d.png"}, cases);
 }
 
 // ---- the real program
