@@ -95,7 +95,7 @@ Measured MeasureProcesses(const Options& options, const std::string& listen, con
 
 Measured MeasureEmbedded(const Options& options, const std::shared_ptr<const Volume>& volume, int workers, int threads) {
   const auto load = [volume]() -> Result<std::shared_ptr<const Volume>> { return volume; };
-  Session session = Session::OpenLocal({.local_workers = workers, .local_threads = threads}, load).value();
+  Session session = Session::OpenLocal({.local_workers = workers, .local_threads = threads}, {load}).value();
   return Measure(session.client(), session.dataset(), options);
 }
 

@@ -326,12 +326,12 @@ bool CoordinatorService::Impl::CarryOut(const Incoming& incoming, const AnyMessa
 }
 
 void CoordinatorService::Impl::MakeElsewhere(BackgroundTasks& tasks, const char* what, auto make, auto failed) {
-  const std::string barrier = what;
-  const auto task = [inbox = inbox, barrier, make, failed] {
-    Result<News> news = Guarded(barrier.c_str(), [&]() -> Result<News> { return make(); });
-    inbox->Post(news.ok() ? *std::move(news) : News{failed(news.status())});
-  };
-  const Status begun = Guarded(what, [&] { tasks.Post(task); });
+  const Status begun = Guarded(what, [&] {
+    tasks.Post([inbox = inbox, barrier = std::string(what), make = std::move(make), failed] {
+      Result<News> news = Guarded(barrier.c_str(), [&]() -> Result<News> { return make(); });
+      inbox->Post(news.ok() ? *std::move(news) : News{failed(news.status())});
+    });
+  });
   if (!begun.ok()) following.push_back(failed(begun));
 }
 
@@ -376,13 +376,14 @@ void CoordinatorService::Impl::Perform(FindDatasets& action) {
 }
 
 void CoordinatorService::Impl::Perform(CountDataset& action) {
-  const Status begun = Guarded("counting of occupied voxels", [&] {
-    counts.Post([inbox = inbox, count = count_occupied, samples = slabs->Find(action.volume.dataset()), action] {
-      auto grid = Guarded("counting of occupied voxels", [&] { return Count(count, samples, action); });
-      inbox->Post({OccupiedCounted{action.count, std::move(grid)}});
-    });
-  });
-  if (!begun.ok()) following.push_back(OccupiedCounted{action.count, begun});
+  MakeElsewhere(
+      counts, "counting of occupied voxels",
+      [count = count_occupied, samples = slabs->Find(action.volume.dataset()), action] {
+        return News{OccupiedCounted{action.count, Count(count, samples, action)}};
+      },
+      [id = action.count](const Status& why) {
+        return OccupiedCounted{id, why};
+      });
 }
 
 void CoordinatorService::Impl::Perform(PlanRequest& action) {

@@ -7,8 +7,6 @@
 namespace slabstream {
 namespace {
 
-Json PointJson(const Vec3& point) { return Json::array({point.x, point.y, point.z}); }
-
 Vec3 ReadPoint(const JsonValue& value) {
   std::vector<double> numbers;
   value.Each([&](const JsonValue& v) { numbers.push_back(v.Number({-kMaxWorldCoordinate, kMaxWorldCoordinate})); });
@@ -22,15 +20,11 @@ Vec3 ReadPoint(const JsonValue& value) {
 // The structured binding names every field: if there is one more, it does not compile.
 Json ViewJson(const ViewParameters& view) {
   const auto& [projection, azimuth, elevation, roll, zoom, fov, look_at, eye, up, distance, fit, of_patient] = view;
-  Json json = {{"projection", projection == Projection::kPerspective ? "perspective" : "orthographic"},
-               {"azimuth", azimuth},
-               {"elevation", elevation},
-               {"roll", roll},
-               {"zoom", zoom},
-               {"fov", fov}};
-  if (look_at) json["look_at"] = PointJson(*look_at);
-  if (eye) json["eye"] = PointJson(*eye);
-  if (up) json["up"] = PointJson(*up);
+  Json json = {
+      {"projection", NameOf(projection)}, {"azimuth", azimuth}, {"elevation", elevation}, {"roll", roll}, {"zoom", zoom}, {"fov", fov}};
+  if (look_at) json["look_at"] = VectorJson(*look_at);
+  if (eye) json["eye"] = VectorJson(*eye);
+  if (up) json["up"] = VectorJson(*up);
   if (distance > 0) json["distance"] = distance;
   if (fit) json["fit"] = true;
   if (of_patient) json["of_patient"] = true;
@@ -42,20 +36,20 @@ Json ClippingJson(const Clipping& clipping) {
   Json json = {{"mode", int(mode)}};
   if (box) {
     const auto& [low, high, unit] = *box;
-    json["box"] = {{"low", PointJson(low)}, {"high", PointJson(high)}, {"unit", int(unit)}};
+    json["box"] = {{"low", VectorJson(low)}, {"high", VectorJson(high)}, {"unit", int(unit)}};
   }
   if (slab) {
     const auto& [normal, through, index, thickness] = *slab;
-    json["slab"] = {{"normal", PointJson(normal)}, {"thickness", thickness}};
-    if (through) json["slab"]["through"] = PointJson(*through);
+    json["slab"] = {{"normal", VectorJson(normal)}, {"thickness", thickness}};
+    if (through) json["slab"]["through"] = VectorJson(*through);
     if (index) json["slab"]["index"] = *index;
   }
-  for (const auto& [normal, offset] : planes) json["planes"].push_back({{"normal", PointJson(normal)}, {"offset", offset}});
+  for (const auto& [normal, offset] : planes) json["planes"].push_back({{"normal", VectorJson(normal)}, {"offset", offset}});
   return json;
 }
 
 std::vector<std::pair<std::string, JsonValue::Read>> ViewFields(ViewParameters& view) {
-  static constexpr std::array<std::string_view, 2> kProjections = {"orthographic", "perspective"};
+  static constexpr std::array<std::string_view, 2> kProjections = {NameOf(Projection::kOrthographic), NameOf(Projection::kPerspective)};
   const NumberRange angle{-kMaxAngleDegrees, kMaxAngleDegrees};
   const auto number = [](double& target, NumberRange range) { return [&target, range](const JsonValue& v) { target = v.Number(range); }; };
   const auto point = [](std::optional<Vec3>& target) { return [&target](const JsonValue& v) { target = ReadPoint(v); }; };

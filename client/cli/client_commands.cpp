@@ -6,6 +6,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/cores.h"
+#include "client/cli/movie.h"
 #include "client/cli/option_groups.h"
 #include "common/base/find_named.h"
 #include "common/cli/program.h"
@@ -34,19 +35,35 @@ void DeclareRender(const CommandLine& line) {
 }
 
 void DeclareTurntable(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("turntable", "Render a full turn about the volume's z axis, frame after frame");
+  CLI::App* sub =
+      line.app.add_subcommand("turntable", "Render a full turn about the volume's z axis, or volumes over time, as pictures or as a movie");
   auto options = std::make_shared<TurntableOptions>();
   sub->option_defaults()->group(kOutputGroup);
-  AddParsed(
-      *sub, "-o,--output", options->output,
-      [](const std::string& option, const std::string& text) { return FramePattern::Parse(option, text); },
-      "The pictures: a name with a place for the number, such as 'frame_%04d.png'")
+  AddParsed(*sub, "-o,--output", options->output, ParseTurntableOutput,
+            "The pictures: a name with a place for the number, such as 'frame_%04d.png'; or a movie, " + MovieEndings() +
+                ", which the program ffmpeg makes")
       ->required()
-      ->type_name("PATTERN");
-  AddInteger(*sub, "--frames", options->frames, 1, kMaxTurntableFrames, "How many pictures")->required();
-  AddInteger(*sub, "--turns", options->turns, 1, kMaxTurns, "How many full turns the pictures are spread over");
-  AddInteger(*sub, "--in-flight", options->in_flight, 1, kMaxInFlight, "How many pictures are requested at the same time");
-  AddFrameOptions(*sub, options->frame);
+      ->type_name("PATTERN|MOVIE");
+  AddParsed(
+      *sub, "--frames", options->frames,
+      [](const std::string& option, const std::string& text) { return ParseInteger(option, text, 1, kMaxTurntableFrames); },
+      "How many frames, which are spread evenly over turns and times")
+      ->type_name("N")
+      ->default_str("one for each time, if there are several");
+  AddInteger(*sub, "--turns", options->turns, 0, kMaxTurns, "How many full turns; 0: the view stands still");
+  AddParsed(*sub, "--time", options->times, ParseTimeRange,
+            "Which of the volumes of a file that holds several, as over time; counted from 0, FIRST and LAST included")
+      ->type_name("T|FIRST:LAST");
+  AddParsed(
+      *sub, "--fps", options->frames_per_second,
+      [](const std::string& option, const std::string& text) {
+        return ParseNumber(option, text, {kMinFramesPerSecond, kMaxFramesPerSecond});
+      },
+      "Frames per second of a movie")
+      ->type_name("NUMBER")
+      ->default_str(fmt::format("{:g}", MovieOptions().frames_per_second));
+  AddInteger(*sub, "--in-flight", options->in_flight, 1, kMaxInFlight, "How many frames are requested at the same time");
+  AddFrameOptions(*sub, options->frame, {"time"});
   RunWith(*sub, line.run, options, RunTurntable);
 }
 

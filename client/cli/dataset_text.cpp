@@ -10,18 +10,6 @@
 #include "common/volume/memory_budget.h"
 
 namespace slabstream {
-namespace {
-
-std::string_view NameOf(ScalarType type) {
-  switch (type) {
-    case ScalarType::kUint8: return "uint8";
-    case ScalarType::kUint16: return "uint16";
-    case ScalarType::kFloat32: break;
-  }
-  return "float32";
-}
-
-}  // namespace
 
 std::string_view NameOf(DatasetState state) {
   switch (state) {

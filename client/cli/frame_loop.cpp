@@ -4,10 +4,10 @@
 #include <deque>
 #include <future>
 #include <map>
+#include <thread>
 #include <utility>
 
 #include "client/cli/interrupt.h"
-#include "client/cli/picture_record.h"
 #include "client/cli/progress_display.h"
 
 namespace slabstream {
@@ -26,19 +26,17 @@ class FrameLoop {
 
   Status Run() {
     const InterruptGuard interrupt(client_.wakeup());
-    while (next_ < jobs_.size() || !open_.empty()) {
+    while (!Done()) {
       if (interrupt.interrupted()) return Abandon(Status::Cancelled("interrupted"));
       SubmitAhead();
-      // A finished write ends the wait too. The timeout is for a write that finishes just as a message arrives.
+      // A task that ends wakes this up too. The timeout is for one that ends just as a message arrives.
       if (auto event = client_.Next(milliseconds(50))) {
         if (Status status = Handle(*std::move(event)); !status.ok()) return Abandon(std::move(status));
       }
-      while (!writes_.empty() && writes_.front().wait_for(milliseconds(0)) == std::future_status::ready) {
-        if (Status status = FinishWrite(); !status.ok()) return Abandon(std::move(status));
+      while (!tasks_.empty() && tasks_.front().result.wait_for(milliseconds(0)) == std::future_status::ready) {
+        if (Status status = EndTask(); !status.ok()) return Abandon(std::move(status));
       }
-    }
-    while (!writes_.empty()) {
-      if (Status status = FinishWrite(); !status.ok()) return status;
+      PutPictures();
     }
     return Status::Ok();
   }
@@ -46,10 +44,21 @@ class FrameLoop {
   std::vector<FrameRecord> TakeRecords() { return std::move(records_); }
 
  private:
-  // Pictures that wait to be written count too, so that neither frames nor memory run ahead of the disk.
+  // A call of the sink, on a thread of its own.
+  struct Task {
+    std::future<Status> result;
+    std::jthread thread;
+  };
+
+  bool Done() const {
+    const bool rendered = next_ == jobs_.size() && open_.empty();
+    return rendered && tasks_.empty() && (options_.pictures == nullptr || finishing_);
+  }
+
+  // Pictures that wait to be put count too, so that neither frames nor memory run ahead of the sink.
   void SubmitAhead() {
     const std::size_t limit = std::size_t(options_.in_flight);
-    while (next_ < jobs_.size() && open_.size() < limit && writes_.size() < limit) {
+    while (next_ < jobs_.size() && open_.size() < limit && waiting_.size() + tasks_.size() < limit) {
       open_[client_.Submit(jobs_[next_].request)] = next_;
       ++next_;
     }
@@ -68,36 +77,50 @@ class FrameLoop {
       return std::move(*failure);
     }
     auto& picture = std::get<Picture>(event.what);
-    // Written at once, so that it cannot come after the final picture in the same file.
-    if (!picture.final) return Write(picture, jobs_[index]);
+    // A preview is put at once, so that it cannot come after the final picture.
+    if (!picture.final) return options_.pictures == nullptr ? Status::Ok() : options_.pictures->Put(picture, jobs_[index]);
     open_.erase(found);
     display_.FrameDone(int(index));
     FrameRecord& record = records_[index];
     record = {jobs_[index].output, picture.latency, std::move(picture.statistics)};
     if (!options_.keep_reports) record.statistics.reports = {};
-    if (record.output.empty()) return Status::Ok();
-    writes_.push_back(std::async(std::launch::async, [this, picture = std::move(picture), index] {
-      Status status = Write(picture, jobs_[index]);
-      client_.wakeup().Notify();
-      return status;
-    }));
+    if (options_.pictures != nullptr) waiting_.emplace(index, std::move(picture));
     return Status::Ok();
   }
 
-  Status Write(const Picture& picture, const FrameJob& job) const {
-    PictureNotes notes{.geometry = picture.geometry, .record = {}};
-    if (!options_.source.empty()) notes.record = RecordText(options_.source, job.request, options_.format, picture.geometry);
-    return WritePicture(picture.image, picture.size, job.output, options_.format, notes);
+  void PutPictures() {
+    PictureSink* const pictures = options_.pictures;
+    if (pictures == nullptr) return;
+    while (!waiting_.empty() && (!pictures->in_order() || (waiting_.begin()->first == put_ && tasks_.empty()))) {
+      auto first = waiting_.extract(waiting_.begin());
+      ++put_;
+      StartTask(
+          [this, pictures, index = first.key(), picture = std::move(first.mapped())] { return pictures->Put(picture, jobs_[index]); });
+    }
+    if (put_ == jobs_.size() && tasks_.empty() && !std::exchange(finishing_, true)) {
+      StartTask([pictures] { return pictures->Finish(); });
+    }
   }
 
-  Status FinishWrite() {
-    Status status = writes_.front().get();
-    writes_.pop_front();
+  template <class Function>
+  void StartTask(Function function) {
+    std::packaged_task<Status()> task(std::move(function));
+    std::future<Status> result = task.get_future();
+    tasks_.push_back({std::move(result), std::jthread([this, task = std::move(task)]() mutable {
+                        task();
+                        client_.wakeup().Notify();
+                      })});
+  }
+
+  Status EndTask() {
+    Status status = tasks_.front().result.get();
+    tasks_.pop_front();
     return status;
   }
 
   // Lets the service free its workers, and gives the message some time to leave.
   Status Abandon(Status why) {
+    if (options_.pictures != nullptr) options_.pictures->Abandon();
     for (const auto& [request, index] : open_) client_.Cancel(request);
     const Time deadline = MonotonicNow() + std::chrono::seconds(2);
     while (!open_.empty() && MonotonicNow() < deadline) {
@@ -114,7 +137,10 @@ class FrameLoop {
   std::vector<FrameRecord> records_;
   std::size_t next_ = 0;                    // of jobs_: the first that has not been requested yet
   std::map<RequestId, std::size_t> open_;   // to the job's index
-  std::deque<std::future<Status>> writes_;  // oldest first
+  std::map<std::size_t, Picture> waiting_;  // to be put, by the job's index
+  std::size_t put_ = 0;                     // pictures that have been given to the sink
+  bool finishing_ = false;                  // the sink's Finish has been called
+  std::deque<Task> tasks_;                  // oldest first
 };
 
 }  // namespace

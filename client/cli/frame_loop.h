@@ -4,16 +4,12 @@
 #include <string>
 #include <vector>
 
-#include "client/cli/options.h"
+#include "client/cli/frame_job.h"
+#include "client/cli/picture_sink.h"
 #include "client/client.h"
 #include "common/base/status.h"
 
 namespace slabstream {
-
-struct FrameJob {
-  FrameRequest request;
-  std::string output;  // where the picture goes; empty: nowhere
-};
 
 // Figures of a finished frame.
 struct FrameRecord {
@@ -24,15 +20,15 @@ struct FrameRecord {
 
 struct FrameLoopOptions {
   int in_flight = 1;
-  PictureFormat format;
-  std::string source;  // SOURCE as it was typed, for the records of pictures; empty: they get none
+  PictureSink* pictures = nullptr;  // where they go; null: nowhere
   bool keep_reports = false;
   bool progress = false;  // on stderr
   std::string label;      // begins each line of progress
 };
 
-// Renders and writes `jobs`; pictures are encoded while the next frames render. The records are in the order of the jobs. The first failure
-// cancels the open frames and is returned; Ctrl-C does the same with Cancelled.
+// Renders `jobs`; pictures are put while the next frames render. At most in_flight frames are open, and at most as many more wait to be put
+// or are being put: so a slow sink stops requests, and pictures do not pile up. The records are in the order of the jobs. The first
+// failure cancels the open frames and is returned; Ctrl-C does the same with Cancelled.
 Result<std::vector<FrameRecord>> RenderFrames(Client& client, const std::vector<FrameJob>& jobs, const FrameLoopOptions& options);
 
 }  // namespace slabstream

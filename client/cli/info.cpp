@@ -12,6 +12,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/dicom_listing.h"
 #include "client/cli/input_volume.h"
+#include "client/cli/json_value.h"
 #include "client/cli/picture_info.h"
 #include "client/image_io/picture_header.h"
 #include "common/planning/frame_plan.h"
@@ -19,15 +20,6 @@
 
 namespace slabstream {
 namespace {
-
-std::string_view NameOf(ScalarType type) {
-  switch (type) {
-    case ScalarType::kUint8: return "uint8";
-    case ScalarType::kUint16: return "uint16";
-    case ScalarType::kFloat32: break;
-  }
-  return "float32";
-}
 
 std::string TransferName(const TransferChoice& transfer) {
   const auto* preset = std::get_if<std::string>(&transfer.choice);
@@ -72,15 +64,6 @@ double ObliqueDegrees(const Orientation& orientation) {
 }
 
 constexpr const char* kStoredAxes[] = {"stored_x", "stored_y", "stored_z"};
-
-std::string WorldName(World world) {
-  switch (world) {
-    case World::kVoxels: return "voxels";
-    case World::kScene: return "scene";
-    case World::kPatient: break;
-  }
-  return "patient";
-}
 
 std::string OrientationText(const VolumeFileInfo& info) {
   const VolumeGeometry& geometry = info.description.geometry;
@@ -131,11 +114,11 @@ std::string InfoJson(const VolumeFileInfo& info, const VolumeSummary& summary, c
                      const std::vector<DicomSeries>& series) {
   const VolumeDescription& d = info.description;
   const Orientation& orientation = d.geometry.orientation;
-  const auto vector = [](const Vec3& v) { return nlohmann::ordered_json{v.x, v.y, v.z}; };
-  nlohmann::ordered_json world = {{"world", WorldName(orientation.world)},
-                                  {"origin", vector(orientation.origin)},
-                                  {"axes", {vector(orientation.axes[0]), vector(orientation.axes[1]), vector(orientation.axes[2])}},
-                                  {"oblique_degrees", ObliqueDegrees(orientation)}};
+  nlohmann::ordered_json world = {
+      {"world", NameOf(orientation.world)},
+      {"origin", VectorJson(orientation.origin)},
+      {"axes", {VectorJson(orientation.axes[0]), VectorJson(orientation.axes[1]), VectorJson(orientation.axes[2])}},
+      {"oblique_degrees", ObliqueDegrees(orientation)}};
   if (orientation.world != World::kVoxels) {
     for (std::size_t i = 0; i < 3; ++i) world[kStoredAxes[i]] = DirectionName(orientation.world, info.steps[i]);
   }
@@ -147,7 +130,7 @@ std::string InfoJson(const VolumeFileInfo& info, const VolumeSummary& summary, c
                                  {"labels", info.labels},
                                  {"voxel_bytes", d.voxel_bytes()},
                                  {"mapping", {{"scale", d.mapping.scale}, {"offset", d.mapping.offset}}},
-                                 {"spacing", vector(d.geometry.spacing)},
+                                 {"spacing", VectorJson(d.geometry.spacing)},
                                  {"orientation", world},
                                  {"range", {{"min", summary.range.min}, {"max", summary.range.max}}},
                                  {"non_finite", summary.non_finite},

@@ -12,6 +12,13 @@ Status CheckInputVolume(const VolumeSource& source) {
   return status.ok() ? status : Status(status.code(), "SOURCE " + status.message());
 }
 
+Status CheckInputHeaders(const std::string& source) {
+  const Result<VolumeSource> parsed = ParseVolumeSource(source);
+  if (!parsed.ok()) return Status(parsed.status().code(), "SOURCE " + parsed.status().message());
+  if (Status status = CheckInputVolume(*parsed); !status.ok()) return status;
+  return AsInput(CheckVolumeHeaders(parsed->path, parsed->options).status());
+}
+
 Status AsInput(const Status& status) { return status.code() == StatusCode::kDataLoss ? Status::InvalidArgument(status.message()) : status; }
 
 Result<LoadedVolume> ReadInputVolume(const std::string& source) {

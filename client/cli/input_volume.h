@@ -15,6 +15,9 @@ namespace slabstream {
 Status CheckInputVolume(const std::string& source);
 Status CheckInputVolume(const VolumeSource& source);
 
+// Reads the headers as well, and checks all that can be checked without the samples: whether there is such a time, for example.
+Status CheckInputHeaders(const std::string& source);
+
 // A damaged file (DataLoss) becomes InvalidArgument: here the input is wrong, not a service.
 Status AsInput(const Status& status);
 

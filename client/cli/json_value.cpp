@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 #include "common/base/printable.h"
 
@@ -30,6 +31,8 @@ int DepthOf(std::string_view text) {
 }
 
 }  // namespace
+
+double Decimal(float number) { return std::strtod(fmt::format("{}", number).c_str(), nullptr); }
 
 // Copying a value and writing it out call themselves for each level, so the levels are limited before anything is made of the text.
 Result<Json> ParseJson(std::string_view text) {

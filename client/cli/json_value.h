@@ -11,10 +11,15 @@
 #include <vector>
 
 #include "common/cli/parse.h"
+#include "common/math/vec.h"
 
 namespace slabstream {
 
 using Json = nlohmann::ordered_json;
+
+inline Json VectorJson(const Vec3& v) { return Json::array({v.x, v.y, v.z}); }
+// The double with the fewest digits that is this float: 0.2 instead of 0.20000000298023224.
+double Decimal(float number);
 
 inline constexpr int kMaxJsonDepth = 64;
 

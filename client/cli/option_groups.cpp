@@ -144,9 +144,9 @@ void AddViewOptions(CLI::App& app, ViewParameters& view, ImageSize& size) {
   app.option_defaults()->group("View");
   const NumberRange angle{-kMaxAngleDegrees, kMaxAngleDegrees};
   AddSize(app, size, "Pixels: WIDTHxHEIGHT, or one number for a square");
-  AddChoice<Projection, 2>(app, "--projection", view.projection, {"orthographic", "perspective"},
+  AddChoice<Projection, 2>(app, "--projection", view.projection, {NameOf(Projection::kOrthographic), NameOf(Projection::kPerspective)},
                            {Projection::kOrthographic, Projection::kPerspective}, "Orthographic or perspective projection")
-      ->default_str("orthographic");
+      ->default_str(std::string(NameOf(view.projection)));
   CLI::Option* const named = AddNamedView(app, view);
   AddNumber(app, "--azimuth", view.azimuth_degrees, angle,
             "Degrees that the eye turns about +z; at 0 it looks along +y, at 90 it is on the +x side")
@@ -203,7 +203,8 @@ void AddClipOptions(CLI::App& app, Clipping& clipping) {
 void AddPictureFormat(CLI::App& app, PictureFormat& format) {
   AddParsed(
       app, "--background", format.background, [](const std::string& option, const std::string& text) { return ParseColor(option, text); },
-      "Colour behind the picture: R,G,B or R,G,B,A from 0 to 1, #rrggbb, #rrggbbaa, or a name such as white (default: transparent)")
+      "Colour behind the picture: R,G,B or R,G,B,A from 0 to 1, #rrggbb, #rrggbbaa, or a name such as white (default: transparent, which "
+      "is black in a movie)")
       ->type_name("COLOUR");
   AddChoice<int, 2>(app, "--depth", format.png_bits, {"8", "16"}, {8, 16}, "Bits of each channel of a PNG: 8 or 16")->default_str("8");
 }
@@ -213,7 +214,7 @@ void AddLookOptions(CLI::App& app, FrameRequest& request, PictureFormat& format)
   AddRendererOptions(app, request);
   AddTransferOptions(app, request.transfer);
   AddChoice<ShadingModel, 3>(
-      app, "--shading", request.shading.model, {"phong", "none", "depth-gradient"},
+      app, "--shading", request.shading.model, kShadingModelNames,
       {ShadingModel::kPhong, ShadingModel::kNone, ShadingModel::kDepthGradient},
       "Lighting; phong: lit surfaces; none: the material's own colours; depth-gradient: lit surfaces, with normals from "
       "the depths of the picture; zbuffer only")
@@ -254,8 +255,7 @@ void AddPolicyOptions(CLI::App& app, Policy& policy) {
   app.option_defaults()->group("Distribution (never changes the picture)");
   AddNamed(app, "--decomposition", policy.decomposition, Decompositions(), "How the volume is divided into boxes", kLeftToThePlanner);
   AddChoice<AxisChoice, 5>(
-      app, "--axis", policy.axis, {"x", "y", "z", "auto", "view"},
-      {AxisChoice::kX, AxisChoice::kY, AxisChoice::kZ, AxisChoice::kAuto, AxisChoice::kView},
+      app, "--axis", policy.axis, kAxisChoiceNames, {AxisChoice::kX, AxisChoice::kY, AxisChoice::kZ, AxisChoice::kAuto, AxisChoice::kView},
       "Axis along which slabs are cut, and other boxes first: x, y, z, auto, or view, the axis nearest to the view direction")
       ->default_str("auto");
   AddNamed(app, "--balance-by", policy.load_metric, LoadMetrics(), "The load metric: what boxes have equal shares of");
@@ -421,13 +421,13 @@ void AddSliceOptions(CLI::App& app, SliceOptions& options) {
   ResolveSource(app, source, options.source, request.transfer, [&options] { return options.connection.local_workers > 0; });
 }
 
-void AddFrameOptions(CLI::App& app, FrameOptions& options) {
+void AddFrameOptions(CLI::App& app, FrameOptions& options, std::initializer_list<std::string_view> except) {
   app.option_defaults()->group("Options");
   CLI::Option* source = app.add_option("SOURCE", options.source,
                                        "A dataset's name at the service, or with --local a volume file; followed by :TRANSFER it says "
                                        "what --transfer says")
                             ->required();
-  AddReadOptions(app);
+  AddReadOptions(app, except);
   AddConnectionOptions(app, options.connection);
   AddViewOptions(app, options.request.view, options.request.size);
   AddClipOptions(app, options.request.clipping);

@@ -42,6 +42,7 @@ void ResolveSource(CLI::App& app, const CLI::Option* source, std::string& volume
 void AddSliceOptions(CLI::App& app, SliceOptions& options);
 
 // All options that `render` and `turntable` share: SOURCE, connection, view, look, policy, and the files written beside pictures.
-void AddFrameOptions(CLI::App& app, FrameOptions& options);
+// `except`: options for reading that the command has in a form of its own.
+void AddFrameOptions(CLI::App& app, FrameOptions& options, std::initializer_list<std::string_view> except = {});
 
 }  // namespace slabstream

@@ -58,10 +58,12 @@ inline constexpr int kMaxInFlight = 64;
 
 struct TurntableOptions {
   FrameOptions frame;
-  FramePattern output;
-  int frames = 36;    // [1, kMaxTurntableFrames], evenly over `turns` full turns that begin at the request's azimuth
-  int turns = 1;      // [1, kMaxTurns]
-  int in_flight = 2;  // [1, kMaxInFlight] frames requested and not yet complete
+  TurntableOutput output;
+  std::optional<double> frames_per_second;  // of a movie, [kMinFramesPerSecond, kMaxFramesPerSecond]; none: MovieOptions' own
+  std::optional<TimeRange> times;           // of the volumes in SOURCE; none: it is one volume
+  std::optional<int> frames;                // [1, kMaxTurntableFrames], spread evenly over turns and times; none: one for each time
+  int turns = 1;                            // [0, kMaxTurns], which begin at the request's azimuth
+  int in_flight = 2;                        // [1, kMaxInFlight] frames requested and not yet complete
 };
 
 struct SliceOptions {

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdlib>
 #include <optional>
 #include <utility>
 
@@ -19,14 +18,11 @@ namespace {
 
 constexpr std::string_view kProgram = "slabstream ";
 
-Json VectorJson(const Vec3& v) { return Json::array({v.x, v.y, v.z}); }
-
 Json GeometryJson(const PictureGeometry& geometry) {
-  static constexpr std::array<const char*, 3> kWorlds = {"voxels", "scene", "patient"};
   static constexpr std::array<const char*, 3> kUnits = {"voxel", "unknown", "mm"};
-  return {{"world", kWorlds.at(std::size_t(geometry.world) - 1)},
+  return {{"world", NameOf(geometry.world)},
           {"unit", kUnits.at(std::size_t(geometry.unit) - 1)},
-          {"projection", geometry.projection == Projection::kPerspective ? "perspective" : "orthographic"},
+          {"projection", NameOf(geometry.projection)},
           {"right", VectorJson(geometry.right)},
           {"up", VectorJson(geometry.up)},
           {"forward", VectorJson(geometry.forward)},
@@ -34,9 +30,6 @@ Json GeometryJson(const PictureGeometry& geometry) {
           {"target_depth", geometry.target_depth},
           {"pixel_size", geometry.pixel_size}};
 }
-
-// The double with the fewest digits that is this float: 0.2 instead of 0.20000000298023224.
-double Decimal(float number) { return std::strtod(fmt::format("{}", number).c_str(), nullptr); }
 
 Json FormatJson(const PictureFormat& format) {
   const StraightColor& b = format.background;
@@ -79,8 +72,8 @@ class OptionList {
     Add(value);
   }
   // Only if the value is not the usual one.
-  void Name(const std::string& option, const std::string& value, const std::string& usual) {
-    if (value != usual) Add(option, value);
+  void Name(const std::string& option, std::string_view value, std::string_view usual) {
+    if (value != usual) Add(option, std::string(value));
   }
   void Number(const std::string& option, double value, double usual) {
     if (value != usual) Add(option, NumberText(value));
@@ -103,7 +96,7 @@ void AddView(OptionList& out, const ViewParameters& view) {
   const ViewParameters usual;
   const auto& [projection, azimuth, elevation, roll, zoom, fov, look_at, eye, up, distance, fit, of_patient] = view;
   const bool by_name = of_patient && !eye;
-  if (projection == Projection::kPerspective) out.Add("--projection", "perspective");
+  out.Name("--projection", NameOf(projection), NameOf(usual.projection));
   const auto named = std::ranges::find_if(kNamedViews, [&](const NamedView& v) {
     return v.of_patient && v.azimuth_degrees == view.azimuth_degrees && v.elevation_degrees == view.elevation_degrees;
   });
@@ -125,8 +118,7 @@ void AddView(OptionList& out, const ViewParameters& view) {
 
 // No option sets the coefficients of a shading: they are the usual ones.
 void AddShading(OptionList& out, const Shading& shading) {
-  static constexpr std::array<const char*, 3> kModels = {"phong", "none", "depth-gradient"};
-  out.Name("--shading", kModels.at(std::size_t(shading.model)), kModels.at(std::size_t(Shading().model)));
+  out.Name("--shading", NameOf(shading.model), NameOf(Shading().model));
   for (const Vec3& light : shading.lights) out.Add("--light", PointText(light));
 }
 
@@ -156,11 +148,10 @@ void AddClipping(OptionList& out, const Clipping& clipping) {
 }
 
 void AddPolicy(OptionList& out, const Policy& policy) {
-  static constexpr std::array<const char*, 5> kAxisChoices = {"x", "y", "z", "auto", "view"};
   const Policy usual;
   const auto& [decomposition, load_metric, axis, groups, assignment, balance, combine, pixel_error, teams] = policy;
   out.Name("--decomposition", decomposition, usual.decomposition);
-  out.Name("--axis", kAxisChoices.at(std::size_t(axis)), kAxisChoices.at(std::size_t(usual.axis)));
+  out.Name("--axis", NameOf(axis), NameOf(usual.axis));
   out.Name("--balance-by", load_metric, usual.load_metric);
   out.Name("--assignment", assignment, usual.assignment);
   out.Name("--balance", balance, usual.balance);

@@ -10,9 +10,11 @@
 #include <algorithm>
 #include <cerrno>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <thread>
 #include <utility>
 
@@ -50,12 +52,24 @@ Result<std::string> ProgramBeside(const std::string& name) {
   return Status::NotFound(fmt::format("the program '{}' is missing", program.string()));
 }
 
+std::string ProgramInPath(const std::string& name) {
+  const char* const path = std::getenv("PATH");
+  std::istringstream folders(path == nullptr ? "" : path);
+  for (std::string folder; std::getline(folders, folder, ':');) {
+    const std::filesystem::path program = std::filesystem::path(folder) / name;
+    std::error_code error;
+    if (std::filesystem::is_regular_file(program, error) && ::access(program.c_str(), X_OK) == 0) return program.string();
+  }
+  return "";
+}
+
 Result<Child> Child::Start(const ChildOptions& options) {
   std::vector<char*> arguments;  // made before the fork: a child may not allocate
   for (const std::string& argument : options.command) arguments.push_back(const_cast<char*>(argument.c_str()));
   arguments.push_back(nullptr);
 
-  const int in = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+  const int in =
+      options.input >= 0 ? ::fcntl(options.input, F_DUPFD_CLOEXEC, STDERR_FILENO + 1) : ::open("/dev/null", O_RDONLY | O_CLOEXEC);
   const int log = ::open(options.log_path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
   int out[2] = {-1, -1};
   pid_t pid = -1;

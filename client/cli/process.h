@@ -1,4 +1,4 @@
-// Child processes, for `up`: start one, and find out whether it has ended.
+// Child processes, for `up` and for movies: start one, and find out whether it has ended.
 #pragma once
 
 #include <sys/types.h>
@@ -27,10 +27,13 @@ constexpr std::array<EndStep, 3> EndSteps(Duration patience) {
 
 // Path of a program that lies beside this one. NotFound if it does not.
 Result<std::string> ProgramBeside(const std::string& name);
+// Path of a program in one of the folders of $PATH; empty: there is none.
+std::string ProgramInPath(const std::string& name);
 
 struct ChildOptions {
   std::vector<std::string> command;  // program path and arguments
   std::string log_path;              // stderr is appended to it
+  int input = -1;                    // a descriptor that becomes its stdin; -1: /dev/null
   bool outlives_us = false;          // else the kernel sends it SIGTERM when this process ends for any reason
 };
 
@@ -39,8 +42,9 @@ struct ChildEnd {
   std::string description;  // "exited with status 1", "was killed by signal 9"
 };
 
-// A child process in a session of its own, so that Ctrl-C at the terminal reaches only the parent, with stdin from /dev/null and no signal
-// blocked. The caller must have no threads. Move-only; the destructor leaves the child running.
+// A child process in a session of its own, so that Ctrl-C at the terminal reaches only the parent, with no signal blocked. Unless it
+// outlives us, the thread that starts it must be there as long as this process: its end is what the kernel takes for our end. Move-only;
+// the destructor leaves the child running.
 class Child {
  public:
   static Result<Child> Start(const ChildOptions& options);

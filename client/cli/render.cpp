@@ -2,16 +2,26 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <cstdint>
 #include <iostream>
+#include <map>
+#include <memory>
+#include <utility>
+#include <variant>
 
 #include "client/cli/camera_json.h"
 #include "client/cli/commands.h"
 #include "client/cli/frame_loop.h"
+#include "client/cli/input_volume.h"
+#include "client/cli/movie.h"
+#include "client/cli/picture_files.h"
 #include "client/cli/session.h"
 #include "client/cli/stats_json.h"
 #include "client/cli/trace_json.h"
 #include "common/base/files.h"
+#include "common/planning/frame_plan.h"
 #include "common/planning/validate_request.h"
+#include "common/volume_io/read_options.h"
 
 namespace slabstream {
 namespace {
@@ -20,7 +30,6 @@ double Milliseconds(Duration duration) { return std::chrono::duration<double, st
 
 // Before work begins: checks that the directories of all files exist.
 Status CheckPaths(const FrameOptions& options, const std::string& output) {
-  if (Status status = CheckPicturePath(output); !status.ok()) return status;
   if (Status status = CheckCanWrite("--output", output); !status.ok()) return status;
   if (Status status = CheckCanDraw(options.format.annotations); !status.ok()) return status;
   if (!options.stats_path.empty()) {
@@ -32,18 +41,29 @@ Status CheckPaths(const FrameOptions& options, const std::string& output) {
   return options.trace_path.empty() ? Status::Ok() : CheckCanWrite("--trace", options.trace_path);
 }
 
-// The pictures of `jobs`, whose datasets are filled in here, and the files beside them (--stats, --trace).
-Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std::vector<FrameJob> jobs, int in_flight) {
-  if (Status status = CheckPaths(options, jobs.front().output); !status.ok()) return status;
-  Result<Session> session = Session::Open(options.connection, options.source);
+// Connects to the service for the volumes of all jobs, and fills in their datasets.
+Result<Session> OpenSession(const ConnectionOptions& connection, std::vector<FrameJob>& jobs) {
+  std::vector<std::string> sources;
+  std::map<std::string, std::size_t> numbers;
+  for (const FrameJob& job : jobs) {
+    if (numbers.emplace(job.source, sources.size()).second) sources.push_back(job.source);
+  }
+  Result<Session> session = Session::Open(connection, sources);
+  if (!session.ok()) return session;
+  for (FrameJob& job : jobs) job.request.dataset = session->dataset(numbers[job.source]);
+  return session;
+}
+
+// The pictures of `jobs`, and the files beside them (--stats, --trace).
+Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std::vector<FrameJob> jobs, PictureSink& pictures,
+                                                int in_flight) {
+  Result<Session> session = OpenSession(options.connection, jobs);
   if (!session.ok()) return session.status();
-  for (FrameJob& job : jobs) job.request.dataset = session->dataset();
   if (Status status = Validate(jobs.front().request); !status.ok()) return status;
 
   FrameLoopOptions loop;
   loop.in_flight = in_flight;
-  loop.format = options.format;
-  if (options.record) loop.source = options.source;
+  loop.pictures = &pictures;
   loop.keep_reports = !options.stats_path.empty() || !options.trace_path.empty();
   loop.progress = options.progress;
   Result<std::vector<FrameRecord>> frames = RenderFrames(session->client(), jobs, loop);
@@ -61,11 +81,92 @@ Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std
   return frames;
 }
 
+// Where the frames of a turntable go. A movie's encoder is started here.
+Result<std::unique_ptr<PictureSink>> OpenPictures(const TurntableOptions& options, const std::string& first_output) {
+  const std::string& movie_path = options.output.movie;
+  if (movie_path.empty()) {
+    if (options.frames_per_second) {
+      return Status::InvalidArgument(fmt::format("--fps {:g} is for movies ({}), but --output '{}' names pictures",
+                                                 *options.frames_per_second, MovieEndings(), first_output));
+    }
+    if (Status status = CheckPicturePath(first_output); !status.ok()) return status;
+    if (Status status = CheckPaths(options.frame, first_output); !status.ok()) return status;
+    return std::unique_ptr<PictureSink>(std::make_unique<PictureFiles>(options.frame.format, options.frame.record));
+  }
+  MovieOptions movie{.path = movie_path, .size = options.frame.request.size, .format = options.frame.format};
+  if (options.frames_per_second) movie.frames_per_second = *options.frames_per_second;
+  if (Status status = CheckCanEncode(movie); !status.ok()) return status;
+  if (Status status = CheckPaths(options.frame, movie_path); !status.ok()) return status;
+  Result<std::unique_ptr<Movie>> started = Movie::Start(movie);
+  if (!started.ok()) return started.status();
+  return std::unique_ptr<PictureSink>(*std::move(started));
+}
+
+// SOURCE at this time.
+std::string SourceAt(const TurntableOptions& options, int time) {
+  return options.times ? WithReadOption(options.frame.source, "time", std::to_string(time)) : options.frame.source;
+}
+
+// A preset depends on the values of the volume. Over time it is made once, for the first volume, so that a colour means the same value in
+// all frames.
+Result<TransferChoice> TransferOverTime(const TransferChoice& transfer, const std::string& first_source) {
+  TransferChoice settled = transfer;
+  if (!std::holds_alternative<std::string>(transfer.choice)) return settled;
+  const Result<LoadedVolume> first = ReadInputVolume(first_source);
+  if (!first.ok()) return first.status();
+  Result<TransferFunction> function = ResolveTransfer({.choice = transfer.choice}, Summarize(*first->volume));
+  if (!function.ok()) return function.status();
+  settled.choice = *std::move(function);
+  return settled;
+}
+
+// What does not go together.
+Status CheckTurntable(const TurntableOptions& options) {
+  if (options.frame.request.view.eye && options.turns > 0) {
+    return Status::InvalidArgument("--eye stands still; a turntable turns by --azimuth, about --look-at, unless --turns is 0");
+  }
+  if (!options.frames && !options.times) return Status::InvalidArgument("--frames is required");
+  if (options.times && options.frame.connection.local_workers == 0) {
+    return Status::InvalidArgument(
+        "--time needs --local: a dataset of a service is one volume, whose time is said where it is named, as in --data NAME=FILE?time=3");
+  }
+  return Status::Ok();
+}
+
+// Frame i shows the time and the angle that belong to the i-th part of the whole.
+Result<std::vector<FrameJob>> TurntableJobs(const TurntableOptions& options) {
+  const TimeRange times = options.times.value_or(TimeRange{});
+  const int frames = options.frames.value_or(times.count());
+  if (frames > kMaxTurntableFrames) {
+    return Status::InvalidArgument(fmt::format("--time {}:{} has {} times, but at most {} --frames are possible", times.first, times.last,
+                                               frames, kMaxTurntableFrames));
+  }
+  FrameRequest request = options.frame.request;
+  if (times.count() > 1) {
+    if (Status status = CheckInputHeaders(SourceAt(options, times.last)); !status.ok()) return status;
+    Result<TransferChoice> transfer = TransferOverTime(request.transfer, SourceAt(options, times.first));
+    if (!transfer.ok()) return transfer.status();
+    request.transfer = *std::move(transfer);
+  }
+  std::vector<FrameJob> jobs;
+  for (int i = 0; i < frames; ++i) {
+    const int time = times.first + int(std::int64_t{i} * times.count() / frames);
+    const std::string& movie = options.output.movie;
+    FrameJob& job = jobs.emplace_back(FrameJob{request, movie.empty() ? options.output.pictures.Name(i) : movie, SourceAt(options, time)});
+    // Back into one turn, so that a start near the limit of angles stays valid.
+    job.request.view.azimuth_degrees = std::fmod(request.view.azimuth_degrees + 360.0 * options.turns * i / frames, 360.0);
+  }
+  return jobs;
+}
+
 }  // namespace
 
 Status RunRender(const RenderOptions& options) {
   const Time start = MonotonicNow();
-  const auto frames = RenderPictures(options.frame, {{options.frame.request, options.output}}, 1);
+  if (Status status = CheckPicturePath(options.output); !status.ok()) return status;
+  if (Status status = CheckPaths(options.frame, options.output); !status.ok()) return status;
+  PictureFiles files(options.frame.format, options.frame.record);
+  const auto frames = RenderPictures(options.frame, {{options.frame.request, options.output, options.frame.source}}, files, 1);
   if (!frames.ok()) return frames.status();
   const ImageSize size = options.frame.request.size;
   std::cout << fmt::format("rendered {} {}x{} in {:.0f} ms (frame {:.0f} ms)\n", options.output, size.width, size.height,
@@ -74,22 +175,19 @@ Status RunRender(const RenderOptions& options) {
 }
 
 Status RunTurntable(const TurntableOptions& options) {
-  if (options.frame.request.view.eye) {
-    return Status::InvalidArgument("--eye stands still; a turntable turns by --azimuth, about --look-at");
-  }
+  if (Status status = CheckTurntable(options); !status.ok()) return status;
   const Time start = MonotonicNow();
-  std::vector<FrameJob> jobs;
-  for (int i = 0; i < options.frames; ++i) {
-    FrameJob& job = jobs.emplace_back(FrameJob{options.frame.request, options.output.Name(i)});
-    // Back into one turn, so that a start near the limit of angles stays valid.
-    job.request.view.azimuth_degrees = std::fmod(job.request.view.azimuth_degrees + 360.0 * options.turns * i / options.frames, 360.0);
-  }
-  const auto frames = RenderPictures(options.frame, std::move(jobs), options.in_flight);
+  const Result<std::unique_ptr<PictureSink>> pictures = OpenPictures(options, options.output.pictures.Name(0));
+  if (!pictures.ok()) return pictures.status();
+  const Result<std::vector<FrameJob>> jobs = TurntableJobs(options);
+  if (!jobs.ok()) return jobs.status();
+  const auto frames = RenderPictures(options.frame, *jobs, **pictures, options.in_flight);
   if (!frames.ok()) return frames.status();
   const ImageSize size = options.frame.request.size;
-  std::cout << fmt::format("rendered {} frames, {} to {}, {}x{} in {:.0f} ms (first frame {:.0f} ms)\n", frames->size(),
-                           frames->front().output, frames->back().output, size.width, size.height, Milliseconds(MonotonicNow() - start),
-                           Milliseconds(frames->front().latency));
+  const std::string files = options.output.movie.empty() ? fmt::format("{} to {}", frames->front().output, frames->back().output)
+                                                         : fmt::format("into {}", options.output.movie);
+  std::cout << fmt::format("rendered {} frames, {}, {}x{} in {:.0f} ms (first frame {:.0f} ms)\n", frames->size(), files, size.width,
+                           size.height, Milliseconds(MonotonicNow() - start), Milliseconds(frames->front().latency));
   return Status::Ok();
 }
 

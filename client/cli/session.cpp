@@ -26,25 +26,34 @@ Session::Session() = default;
 Session::Session(Session&&) noexcept = default;
 Session::~Session() = default;
 
-Result<Session> Session::Open(const ConnectionOptions& connection, const std::string& source) {
+Result<Session> Session::Open(const ConnectionOptions& connection, std::span<const std::string> sources) {
   if (connection.local_workers == 0) {
-    if (source.size() > kMaxNameBytes) {
+    for (const std::string& source : sources) {
+      if (source.size() <= kMaxNameBytes) continue;
       return Status::InvalidArgument(fmt::format("SOURCE has {} bytes, a dataset's name has at most {}", source.size(), kMaxNameBytes));
     }
     Result<Session> session = OpenService(connection.service);
-    if (session.ok()) session->dataset_ = source;
+    if (session.ok()) session->datasets_.assign(sources.begin(), sources.end());
     return session;
   }
-  if (Status status = CheckInputVolume(source); !status.ok()) return status;
-  return OpenLocal(connection, [source] { return LoadInput(source); });
+  std::vector<LoadVolume> loads;
+  for (const std::string& source : sources) {
+    if (Status status = CheckInputVolume(source); !status.ok()) return status;
+    loads.emplace_back([source] { return LoadInput(source); });
+  }
+  return OpenLocal(connection, std::move(loads));
 }
 
-Result<Session> Session::OpenLocal(const ConnectionOptions& connection, std::function<Result<std::shared_ptr<const Volume>>()> load) {
+Result<Session> Session::OpenLocal(const ConnectionOptions& connection, std::vector<LoadVolume> loads) {
   Session session;
   session.context_ = std::make_unique<Context>();
   EmbeddedOptions options;
   options.workers = connection.local_workers;
-  options.coordinator.catalogue[kLocalDataset] = std::move(load);
+  for (LoadVolume& load : loads) {
+    const std::size_t number = session.datasets_.size();
+    session.datasets_.push_back(number == 0 ? kLocalDataset : fmt::format("{}-{}", kLocalDataset, number));
+    options.coordinator.catalogue[session.datasets_.back()] = std::move(load);
+  }
   options.worker.threads = std::uint32_t(LocalThreads(connection));
   Result<std::unique_ptr<EmbeddedService>> service = EmbeddedService::Start(*session.context_, std::move(options));
   if (!service.ok()) return service.status();
@@ -52,7 +61,6 @@ Result<Session> Session::OpenLocal(const ConnectionOptions& connection, std::fun
   Result<Client> client = Client::Connect(*session.context_, session.service_->endpoint());
   if (!client.ok()) return client.status();
   session.client_ = std::make_unique<Client>(*std::move(client));
-  session.dataset_ = kLocalDataset;
   return session;
 }
 

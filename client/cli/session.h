@@ -3,7 +3,9 @@
 
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "client/cli/options.h"
 #include "client/client.h"
@@ -16,11 +18,14 @@ class EmbeddedService;
 
 class Session {
  public:
-  // At the service `source` is a name of its catalogue. With local workers it is a volume file: Open checks that it exists, and the first
-  // frame reads it. Unavailable within 5 s if nobody answers.
-  static Result<Session> Open(const ConnectionOptions& connection, const std::string& source);
-  // In this process, by connection.local_workers > 0. `load` supplies the volume when the first frame needs it, on a thread of its own.
-  static Result<Session> OpenLocal(const ConnectionOptions& connection, std::function<Result<std::shared_ptr<const Volume>>()> load);
+  // For volumes `sources`, at least one. At the service they are names of its catalogue. With local workers they are volume files: Open
+  // checks that they exist, and the first frame of each reads it. Unavailable within 5 s if nobody answers.
+  static Result<Session> Open(const ConnectionOptions& connection, std::span<const std::string> sources);
+  static Result<Session> Open(const ConnectionOptions& connection, const std::string& source) { return Open(connection, {&source, 1}); }
+  // In this process, by connection.local_workers > 0. Each of `loads` supplies a volume when the first frame needs it, on a thread of its
+  // own.
+  using LoadVolume = std::function<Result<std::shared_ptr<const Volume>>()>;
+  static Result<Session> OpenLocal(const ConnectionOptions& connection, std::vector<LoadVolume> loads);
   // The service alone, for `status`.
   static Result<Session> OpenService(const ServiceChoice& choice);
   static Result<Session> OpenService(const ServiceAddress& service);
@@ -29,7 +34,8 @@ class Session {
   ~Session();
 
   Client& client() { return *client_; }
-  const std::string& dataset() const { return dataset_; }  // the dataset to request
+  // The dataset to request for the source of this number.
+  const std::string& dataset(std::size_t source = 0) const { return datasets_[source]; }
 
  private:
   Session();
@@ -37,7 +43,7 @@ class Session {
   std::unique_ptr<Context> context_;
   std::unique_ptr<EmbeddedService> service_;
   std::unique_ptr<Client> client_;
-  std::string dataset_;
+  std::vector<std::string> datasets_;
 };
 
 }  // namespace slabstream

@@ -8,7 +8,9 @@
 #include <optional>
 #include <vector>
 
+#include "client/cli/movie.h"
 #include "common/cli/parse.h"
+#include "common/volume_io/read_options.h"
 
 namespace slabstream {
 namespace {
@@ -191,6 +193,32 @@ Result<FramePattern> FramePattern::Parse(std::string_view option, std::string_vi
   }
   if (conversions == 0) return refuse("has no place for the frame's number");
   return pattern;
+}
+
+Result<TurntableOutput> ParseTurntableOutput(std::string_view option, std::string_view text) {
+  TurntableOutput output;
+  Result<FramePattern> pattern = FramePattern::Parse(option, text);
+  if (MovieFormatOf(std::string(text)) != nullptr) {
+    if (pattern.ok())
+      return Status::InvalidArgument(fmt::format("{} '{}' has a place for a number, but a movie is one file", option, text));
+    output.movie = text;
+    return output;
+  }
+  if (!pattern.ok())
+    return Status::InvalidArgument(fmt::format("{}, or the ending of a movie: {}", pattern.status().message(), MovieEndings()));
+  output.pictures = *std::move(pattern);
+  return output;
+}
+
+Result<TimeRange> ParseTimeRange(std::string_view option, std::string_view text) {
+  const std::vector<std::string_view> ends = Split(text, ':');
+  if (ends.size() > 2) return Status::InvalidArgument(fmt::format("{} '{}' is neither T nor FIRST:LAST", option, text));
+  const auto parse = [&](std::string_view end) { return ParseInteger(option, end, 0, int(kMaxVolumes) - 1); };
+  const Result<int> first = parse(ends.front()), last = parse(ends.back());
+  if (!first.ok()) return first.status();
+  if (!last.ok()) return last.status();
+  if (*first <= *last) return TimeRange{*first, *last};
+  return Status::InvalidArgument(fmt::format("{} '{}' must not fall", option, text));
 }
 
 std::string FramePattern::Name(int index) const {

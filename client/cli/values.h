@@ -45,4 +45,19 @@ class FramePattern {
   bool zero_ = false;
 };
 
+// Where a turntable goes: a picture for each frame, or a movie of them.
+struct TurntableOutput {
+  FramePattern pictures;
+  std::string movie;  // its path (MovieFormatOf); empty: pictures
+};
+Result<TurntableOutput> ParseTurntableOutput(std::string_view option, std::string_view text);
+
+// Volumes of a file that holds several, both included.
+struct TimeRange {
+  int first = 0, last = 0;  // 0 <= first <= last < kMaxVolumes
+  int count() const { return last - first + 1; }
+};
+// "T" or "FIRST:LAST".
+Result<TimeRange> ParseTimeRange(std::string_view option, std::string_view text);
+
 }  // namespace slabstream

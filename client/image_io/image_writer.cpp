@@ -13,6 +13,7 @@
 #include <span>
 #include <vector>
 
+#include "client/image_io/composed_picture.h"
 #include "common/base/check.h"
 #include "common/base/files.h"
 #include "common/base/version.h"
@@ -28,57 +29,24 @@ FileType TypeOf(const std::string& path) {
   return ending == ".png" ? FileType::kPng : ending == ".exr" ? FileType::kExr : FileType::kOther;
 }
 
-// One row of the whole picture, over the background: width * 4 premultiplied floats, and width depths if `depth` is not empty.
-void ComposeRow(const LocalImage& image, int y, const StraightColor& background, std::span<float> rgba, std::span<float> depth) {
-  const float behind[4] = {background.r * background.a, background.g * background.a, background.b * background.a, background.a};
-  for (std::size_t i = 0; i < rgba.size(); ++i) rgba[i] = behind[i % 4];
-  std::fill(depth.begin(), depth.end(), std::numeric_limits<float>::infinity());
-  const PixelBounds& b = image.bounds;
-  if (b.empty() || y < b.y_begin || y >= b.y_end) return;
-  const std::size_t first = std::size_t(y - b.y_begin) * std::size_t(b.width());
-  const auto left = std::size_t(b.x_begin), width = std::size_t(b.width());
-  for (std::size_t x = 0; x < width; ++x) {
-    const float* front = &image.rgba[4 * (first + x)];
-    float* out = &rgba[4 * (left + x)];
-    for (int c = 0; c < 4; ++c) out[c] = front[c] + (1 - front[3]) * behind[c];
-    if (!depth.empty()) depth[left + x] = image.depth[first + x];
-  }
-}
-
 template <class Code>
 void ToStraightCodes(std::span<const float> premultiplied, std::span<Code> codes) {
-  constexpr float kMax = std::numeric_limits<Code>::max();
-  const auto code = [](float value) { return Code(std::lround(kMax * std::clamp(value, 0.0F, 1.0F))); };
   for (std::size_t i = 0; i < codes.size(); i += 4) {
     const float alpha = premultiplied[i + 3];
-    for (std::size_t c = 0; c < 3; ++c) codes[i + c] = alpha > 0 ? code(premultiplied[i + c] / alpha) : Code(0);
-    codes[i + 3] = code(alpha);
+    for (std::size_t c = 0; c < 3; ++c) codes[i + c] = alpha > 0 ? SampleCode<Code>(premultiplied[i + c] / alpha) : Code(0);
+    codes[i + 3] = SampleCode<Code>(alpha);
   }
 }
-
-// What the rows of a file are made of.
-struct Composition {
-  const LocalImage& image;
-  ImageSize size;
-  const PictureFormat& format;
-  AnnotationLayers annotations;
-
-  // As ComposeRow above, with the annotations.
-  void Compose(int y, std::span<float> rgba, std::span<float> depth) const {
-    ComposeRow(image, y, format.background, rgba, depth);
-    annotations.PutOver(y, rgba);
-  }
-};
 
 // Calls write(y, row) for each row, in the file's own sample layout. Stops at the first failure.
 template <class Write>
-bool WritePngRows(const Composition& picture, Write write) {
-  const bool deep = picture.format.png_bits == 16;
-  std::vector<float> rgba(4 * std::size_t(picture.size.width));
+bool WritePngRows(const ComposedPicture& picture, int bits, Write write) {
+  const bool deep = bits == 16;
+  std::vector<float> rgba(4 * std::size_t(picture.size().width));
   std::vector<std::uint8_t> codes8(deep ? 0 : rgba.size());
   std::vector<std::uint16_t> codes16(deep ? rgba.size() : 0);
-  for (int y = 0; y < picture.size.height; ++y) {
-    picture.Compose(y, rgba, {});
+  for (int y = 0; y < picture.size().height; ++y) {
+    picture.Row(y, rgba, {});
     ToStraightCodes<std::uint8_t>(rgba, codes8);
     ToStraightCodes<std::uint16_t>(rgba, codes16);
     if (!(deep ? write(y, static_cast<const void*>(codes16.data())) : write(y, codes8.data()))) return false;
@@ -87,12 +55,12 @@ bool WritePngRows(const Composition& picture, Write write) {
 }
 
 template <class Write>
-bool WriteExrRows(const Composition& picture, Write write) {
-  const bool with_depth = HasDepth(picture.image.format);
-  const std::size_t width = std::size_t(picture.size.width);
+bool WriteExrRows(const ComposedPicture& picture, Write write) {
+  const bool with_depth = picture.has_depth();
+  const std::size_t width = std::size_t(picture.size().width);
   std::vector<float> rgba(4 * width), depth(with_depth ? width : 0), rgbaz(with_depth ? 5 * width : 0);
-  for (int y = 0; y < picture.size.height; ++y) {
-    picture.Compose(y, rgba, depth);
+  for (int y = 0; y < picture.size().height; ++y) {
+    picture.Row(y, rgba, depth);
     for (std::size_t x = 0; x < depth.size(); ++x) {
       std::copy_n(&rgba[4 * x], 4, &rgbaz[5 * x]);
       rgbaz[5 * x + 4] = depth[x];
@@ -145,14 +113,12 @@ Status WritePicture(const LocalImage& image, ImageSize size, const std::string& 
                     const PictureNotes& notes) {
   if (Status status = CheckPicturePath(path); !status.ok()) return status;
   CHECK(format.png_bits == 8 || format.png_bits == 16);
-  CHECK((PixelBounds{0, 0, size.width, size.height}.Contains(image.bounds)));
-  Result<AnnotationLayers> annotations = AnnotationLayers::Draw(format.annotations, size, notes.geometry);
-  if (!annotations.ok()) return annotations.status();
-  const Composition picture{image, size, format, *std::move(annotations)};
+  const Result<ComposedPicture> picture = ComposedPicture::Make(image, size, format, notes.geometry);
+  if (!picture.ok()) return picture.status();
 
   const bool png = TypeOf(path) == FileType::kPng;
   const OIIO::TypeDesc sample = !png ? OIIO::TypeDesc::FLOAT : format.png_bits == 16 ? OIIO::TypeDesc::UINT16 : OIIO::TypeDesc::UINT8;
-  const bool with_depth = !png && HasDepth(image.format);
+  const bool with_depth = !png && picture->has_depth();
   OIIO::ImageSpec spec(size.width, size.height, with_depth ? 5 : 4, sample);
   spec.channelnames = {"R", "G", "B", "A"};
   if (with_depth) spec.channelnames.push_back("Z");
@@ -187,7 +153,7 @@ Status WritePicture(const LocalImage& image, ImageSize size, const std::string& 
   if (!out) return failure(OIIO::geterror());
   if (!out->open(png ? "picture.png" : "picture.exr", spec)) return failure(out->geterror());
   const auto write = [&](int y, const void* row) { return file->ok() && out->write_scanline(y, 0, sample, row); };
-  const bool written = png ? WritePngRows(picture, write) : WriteExrRows(picture, write);
+  const bool written = png ? WritePngRows(*picture, format.png_bits, write) : WriteExrRows(*picture, write);
   const bool closed = out->close();
   if (!written || !closed) return failure(out->geterror());
   return file->Finish();

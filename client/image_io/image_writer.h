@@ -2,30 +2,19 @@
 //
 // PNG: straight alpha, 8 or 16 bit, row 0 at the top; code = round(max * clamp(straight value, 0, 1)), without a transfer curve.
 // EXR: premultiplied linear float R, G, B, A, and Z (camera depth, +infinity where nothing is seen) for images that have depth.
-// Annotations are drawn over picture and background; depths stay. The file states the size of its pixels (PNG: chunk pHYs; EXR: xDensity)
+// The file states the size of its pixels (PNG: chunk pHYs; EXR: xDensity)
 // if that is one length all over the picture and its unit is known: for orthographic pictures of patients.
 // The file appears whole or not at all (common/base/files.h).
 #pragma once
 
 #include <string>
 
-#include "client/image_io/annotations.h"
+#include "client/image_io/composed_picture.h"
 #include "common/base/status.h"
 #include "common/image/local_image.h"
 #include "common/view/picture_geometry.h"
 
 namespace slabstream {
-
-struct StraightColor {
-  float r = 0, g = 0, b = 0, a = 0;  // each in [0, 1]
-  friend bool operator==(const StraightColor&, const StraightColor&) = default;
-};
-
-struct PictureFormat {
-  int png_bits = 8;          // 8 or 16; EXR is always float
-  StraightColor background;  // put behind the picture; the default leaves it as it is
-  Annotations annotations;   // drawn onto it
-};
 
 // What a file holds beside the pixels.
 struct PictureNotes {

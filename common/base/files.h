@@ -29,6 +29,8 @@ class OutputFile {
   void Append(const std::string& text) { Append(std::as_bytes(std::span(text))); }
   void WriteAt(std::int64_t offset, std::span<const std::byte> bytes);  // later appends go on behind the last byte written by Append
   bool ok() const { return error_ == 0; }
+  // Where the bytes go until Finish: for another program that writes them instead.
+  const std::string& written_path() const { return temporary_.empty() ? path_ : temporary_; }
 
   Status Close();   // nothing can be written afterwards; the target is still untouched
   Status Finish();  // closes if need be, then puts the file in its place

@@ -1,6 +1,8 @@
 // FrameRequest: one picture, as a client asks for it. Policy: how the service should make it; it never changes the picture.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -27,6 +29,8 @@ inline constexpr double kMaxScalar = 1e300;  // of a scalar range, either sign
 // the frame are traversed, so that no slice is divided. Each of the three axes then has its own layout; workers fetch its voxels when a
 // view first needs it.
 enum class AxisChoice : std::uint8_t { kX = 0, kY = 1, kZ = 2, kAuto = 3, kView = 4 };
+inline constexpr std::array<std::string_view, 5> kAxisChoiceNames = {"x", "y", "z", "auto", "view"};  // by AxisChoice
+constexpr std::string_view NameOf(AxisChoice axis) { return kAxisChoiceNames.at(std::size_t(axis)); }
 
 struct Policy {
   std::string decomposition = "slab";  // a name of Decompositions(), or "auto" (kAutomatic), like the other names

@@ -22,6 +22,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <string_view>
 
 #include "common/base/status.h"
 #include "common/volume/volume.h"
@@ -29,6 +30,7 @@
 namespace slabstream {
 
 enum class Projection : std::uint8_t { kOrthographic = 1, kPerspective = 2 };
+constexpr std::string_view NameOf(Projection projection) { return projection == Projection::kPerspective ? "perspective" : "orthographic"; }
 
 inline constexpr double kMaxVoxelsPerPixel = 2;
 inline constexpr double kMinZoom = 1e-3, kMaxZoom = 1e4;

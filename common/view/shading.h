@@ -1,7 +1,10 @@
 // How surfaces are lit: by Phong (1975) with white lights at infinity, or not at all.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <string_view>
 #include <vector>
 
 #include "common/base/status.h"
@@ -16,6 +19,8 @@ enum class ShadingModel : std::uint8_t {
   kNone = 1,           // the colours of the transfer function
   kDepthGradient = 2,  // Phong with normals from the depths of the finished frame; renderers with depths only
 };
+inline constexpr std::array<std::string_view, 3> kShadingModelNames = {"phong", "none", "depth-gradient"};  // by ShadingModel
+constexpr std::string_view NameOf(ShadingModel model) { return kShadingModelNames.at(std::size_t(model)); }
 
 struct Shading {
   ShadingModel model = ShadingModel::kPhong;

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <string_view>
 
 #include "common/math/vec.h"
 
@@ -16,6 +17,7 @@ enum class World : std::uint8_t {
   kScene = 2,    // axes of the file's own, right-handed
   kPatient = 3,  // x to the patient's right, y to anterior, z to superior (RAS); mm
 };
+constexpr std::string_view NameOf(World world) { return world == World::kVoxels ? "voxels" : world == World::kScene ? "scene" : "patient"; }
 
 struct Orientation {
   World world = World::kVoxels;

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/base/aligned_buffer.h"
@@ -23,6 +24,9 @@ inline constexpr std::int32_t kBrick = 16;
 enum class ScalarType : std::uint8_t { kUint8 = 1, kUint16 = 2, kFloat32 = 3 };
 
 constexpr std::size_t BytesPerSample(ScalarType type) { return type == ScalarType::kUint8 ? 1 : type == ScalarType::kUint16 ? 2 : 4; }
+constexpr std::string_view NameOf(ScalarType type) {
+  return type == ScalarType::kUint8 ? "uint8" : type == ScalarType::kUint16 ? "uint16" : "float32";
+}
 
 struct VolumeGeometry {
   Index3 size;               // voxels, each in [1, kMaxVolumeSide]

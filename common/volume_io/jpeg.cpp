@@ -1,4 +1,5 @@
-// A folder of numbered JPEG pictures, one a slice, through libjpeg. JPEG rounds values; files of it are for looking, not for measuring.
+// A folder of numbered JPEG pictures, one a slice, through libjpeg. JPEG rounds values, so such files are for looking at, not for
+// measuring.
 #include <cstdio>
 // jpeglib.h needs the types of stdio.h before it.
 #include <jpeglib.h>
@@ -10,17 +11,16 @@
 #include <utility>
 
 #include "common/volume/memory_budget.h"
-#include "common/volume_io/formats.h"
 #include "common/volume_io/slice_stack.h"
 
 namespace slabstream {
 namespace {
 
-std::vector<std::string_view> Endings() { return {".jpg", ".jpeg"}; }
-
 // libjpeg leaves by longjmp, so no function that calls it behind setjmp has objects with destructors.
 class JpegFile : public SliceFile {
  public:
+  static std::vector<std::string_view> Endings() { return {".jpg", ".jpeg"}; }
+
   explicit JpegFile(std::string path) : path_(std::move(path)), file_(std::fopen(path_.c_str(), "rb")) {
     jpeg_.err = jpeg_std_error(&errors_);
     jpeg_.client_data = this;
@@ -111,27 +111,8 @@ class JpegFile : public SliceFile {
   std::array<char, JMSG_LENGTH_MAX> complaint_{};
 };
 
-Result<std::unique_ptr<SliceFile>> OpenSliceFile(const std::string& path) {
-  auto file = std::make_unique<JpegFile>(path);
-  if (Status status = file->Open(); !status.ok()) return status;
-  return std::unique_ptr<SliceFile>(std::move(file));
-}
-
-bool Recognises(const std::string& path, const ReadOptions&) { return IsStackOfPictures(path, Endings()); }
-
-Result<RawVolume> Read(const std::string& folder, const ReadOptions& options) {
-  return ReadSliceStack(folder, SlicesIn(folder, Endings()), OpenSliceFile, options);
-}
-
 }  // namespace
 
-VolumeFormat Jpeg() {
-  return {.name = "JPEG",
-          .endings = {},
-          .also = "a folder of numbered .jpg pictures",
-          .recognises = Recognises,
-          .options = {"channel", "spacing"},
-          .read = Read};
-}
+VolumeFormat Jpeg() { return StackFormat<JpegFile>("JPEG", "a folder of numbered .jpg pictures"); }
 
 }  // namespace slabstream

@@ -11,17 +11,16 @@
 #include <string>
 #include <utility>
 
-#include "common/volume_io/formats.h"
 #include "common/volume_io/slice_stack.h"
 
 namespace slabstream {
 namespace {
 
-std::vector<std::string_view> Endings() { return {".png"}; }
-
-// libpng leaves by longjmp, so no function that calls it through Try has objects with destructors.
+// libpng leaves by longjmp, so no function that calls it behind setjmp has objects with destructors.
 class PngFile : public SliceFile {
  public:
+  static std::vector<std::string_view> Endings() { return {".png"}; }
+
   explicit PngFile(std::string path) : path_(std::move(path)), file_(std::fopen(path_.c_str(), "rb")) {
     png_ = png_create_read_struct(PNG_LIBPNG_VER_STRING, this, OnError, [](png_structp, png_const_charp) {});
     if (png_ != nullptr) info_ = png_create_info_struct(png_);
@@ -108,27 +107,8 @@ class PngFile : public SliceFile {
   std::array<char, 128> complaint_{};
 };
 
-Result<std::unique_ptr<SliceFile>> OpenSliceFile(const std::string& path) {
-  auto file = std::make_unique<PngFile>(path);
-  if (Status status = file->Open(); !status.ok()) return status;
-  return std::unique_ptr<SliceFile>(std::move(file));
-}
-
-bool Recognises(const std::string& path, const ReadOptions&) { return IsStackOfPictures(path, Endings()); }
-
-Result<RawVolume> Read(const std::string& folder, const ReadOptions& options) {
-  return ReadSliceStack(folder, SlicesIn(folder, Endings()), OpenSliceFile, options);
-}
-
 }  // namespace
 
-VolumeFormat Png() {
-  return {.name = "PNG",
-          .endings = {},
-          .also = "a folder of numbered .png pictures",
-          .recognises = Recognises,
-          .options = {"channel", "spacing"},
-          .read = Read};
-}
+VolumeFormat Png() { return StackFormat<PngFile>("PNG", "a folder of numbered .png pictures"); }
 
 }  // namespace slabstream

@@ -7,7 +7,6 @@
 #include <optional>
 #include <utility>
 
-#include "common/volume_io/formats.h"
 #include "common/volume_io/text_header.h"
 
 namespace slabstream {

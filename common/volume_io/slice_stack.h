@@ -6,9 +6,11 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/volume_io/formats.h"
 #include "common/volume_io/raw_volume.h"
 
 namespace slabstream {
@@ -49,5 +51,23 @@ Result<RawVolume> ReadSliceStack(const std::string& folder, const std::vector<st
 
 // 0 if it cannot be told.
 std::int64_t BytesOfFile(const std::string& path);
+
+// The format of folders of numbered pictures. `File` is a SliceFile that is made from a path. It has a `Status Open()`, called once and
+// before all else, and `Endings()`, those of its files, for SlicesIn.
+template <class File>
+VolumeFormat StackFormat(std::string_view name, std::string_view also) {
+  constexpr OpenSlice kOpen = [](const std::string& path) -> Result<std::unique_ptr<SliceFile>> {
+    auto file = std::make_unique<File>(path);
+    if (Status status = file->Open(); !status.ok()) return status;
+    return std::unique_ptr<SliceFile>(std::move(file));
+  };
+  return {.name = name,
+          .endings = {},
+          .also = also,
+          .recognises = [](const std::string& path, const ReadOptions&) { return IsStackOfPictures(path, File::Endings()); },
+          .options = {"channel", "spacing"},
+          .read = [](const std::string& folder,
+                     const ReadOptions& options) { return ReadSliceStack(folder, SlicesIn(folder, File::Endings()), kOpen, options); }};
+}
 
 }  // namespace slabstream

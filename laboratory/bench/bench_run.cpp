@@ -7,6 +7,7 @@
 #include <span>
 #include <utility>
 
+#include "client/cli/picture_files.h"
 #include "client/cli/session.h"
 
 namespace slabstream {
@@ -21,14 +22,14 @@ Result<Session> OpenSession(const BenchCase& c, const ConnectionOptions& connect
   // A sphere is made beforehand, so that the first frame's time is the service's own. Only the service keeps it.
   Result<std::shared_ptr<const Volume>> sphere = LoadBenchVolume(c);
   if (!sphere.ok()) return sphere.status();
-  return Session::OpenLocal(connection, [c, made = *std::move(sphere)]() mutable -> Result<std::shared_ptr<const Volume>> {
-    if (made == nullptr) return LoadBenchVolume(c);
-    return std::exchange(made, nullptr);
-  });
+  return Session::OpenLocal(connection, {[c, made = *std::move(sphere)]() mutable -> Result<std::shared_ptr<const Volume>> {
+                              if (made == nullptr) return LoadBenchVolume(c);
+                              return std::exchange(made, nullptr);
+                            }});
 }
 
 FrameJob MakeJob(const BenchCase& c, const BenchOptions& options, const std::string& dataset, Projection projection, int index) {
-  FrameJob job{BenchRequest(c, BenchView(projection, index, options.frames), {options.size, options.size}), ""};
+  FrameJob job{BenchRequest(c, BenchView(projection, index, options.frames), {options.size, options.size}), {}, {}};
   job.request.dataset = dataset;
   return job;
 }
@@ -49,11 +50,13 @@ Status WritePictures(Client& client, const BenchCase& c, const BenchOptions& opt
   std::vector<FrameJob> jobs;
   for (const Projection projection : kProjections) {
     jobs.push_back(MakeJob(c, options, dataset, projection, 0));
-    const std::string_view name = projection == Projection::kPerspective ? "perspective" : "orthographic";
-    jobs.back().output = fmt::format("{}/{}.{}.png", options.pictures_directory, c.name, name);
+    jobs.back().output = fmt::format("{}/{}.{}.png", options.pictures_directory, c.name, NameOf(projection));
   }
+  PictureFormat format;
+  format.background = {0, 0, 0, 1};
+  PictureFiles files(format, false);
   FrameLoopOptions loop;
-  loop.format.background = {0, 0, 0, 1};
+  loop.pictures = &files;
   const Result<std::vector<FrameRecord>> frames = RenderFrames(client, jobs, loop);
   return frames.ok() ? Status::Ok() : frames.status();
 }

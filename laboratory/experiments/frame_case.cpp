@@ -152,7 +152,7 @@ Json MeasureFinish(ExperimentContext& context, const FrameCase& frame) {
 Json MeasureService(ExperimentContext& context, const FrameCase& frame, int frames) {
   const VolumeInUse volume = context.volumes().Get(frame.volume);
   Session session = OrThrow(Session::OpenLocal({.local_workers = frame.workers, .local_threads = 1},
-                                               [held = volume.volume]() -> Result<std::shared_ptr<const Volume>> { return held; }));
+                                               {[held = volume.volume]() -> Result<std::shared_ptr<const Volume>> { return held; }}));
   FrameRequest request = RequestOf(frame);
   request.dataset = session.dataset();
   return MeasureLatency(session.client(), request, WarmUpFrames(frame.policy), frames);

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <span>
 #include <variant>
 
@@ -32,13 +31,10 @@ Json SizeJson(const ImageSize& size) {
   return Json::array({width, height});
 }
 
-// The shortest decimal that means this float: 0.2, not 0.20000000298023224.
-double Decimal(float value) { return std::stod(fmt::format("{}", value)); }
-
 Json ShadingJson(const Shading& shading) {
   const auto& [model, lights, ambient, diffuse, specular, shininess] = shading;
   Json directions = Json::array();
-  for (const Vec3& light : lights) directions.push_back(Json::array({light.x, light.y, light.z}));
+  for (const Vec3& light : lights) directions.push_back(VectorJson(light));
   return {{"model", int(model)},         {"lights", directions},          {"ambient", Decimal(ambient)},
           {"diffuse", Decimal(diffuse)}, {"specular", Decimal(specular)}, {"shininess", Decimal(shininess)}};
 }
@@ -57,11 +53,6 @@ Json PolicyJson(const Policy& policy) {
 }
 
 }  // namespace
-
-std::string_view NameOf(AxisChoice axis) {
-  constexpr std::array<std::string_view, 5> kNames = {"x", "y", "z", "auto", "view"};
-  return kNames.at(std::size_t(axis));
-}
 
 std::string DigestText(std::string_view bytes) { return fmt::format("{:016x}", Digest(std::as_bytes(std::span(bytes)))); }
 

@@ -12,7 +12,6 @@ namespace slabstream {
 
 using Json = nlohmann::ordered_json;
 
-std::string_view NameOf(AxisChoice axis);  // as for --axis
 Json RequestJson(const FrameRequest& request);
 // {"preset": "auto", "opacity_distance": 1}, or "function" with the digest of its points, of which there may be thousands.
 Json TransferJson(const TransferChoice& transfer);

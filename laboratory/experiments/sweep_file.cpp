@@ -130,12 +130,11 @@ SweepRenderer ReadRenderer(const JsonValue& value) {
     return read;
   }
   if (value.Has("renderer")) read.kind = kind_of(value.At("renderer"));
-  constexpr std::array<std::string_view, 3> kShadings = {"phong", "none", "depth-gradient"};  // by ShadingModel
   Look& look = read.look;
   std::vector<std::pair<std::string, JsonValue::Read>> fields = {
       {"name", [&](const JsonValue& v) { read.name = v.Text(); }},
       {"renderer", [](const JsonValue&) {}},
-      {"shading", [&](const JsonValue& v) { look.shading.model = ShadingModel(v.OneOf(kShadings)); }},
+      {"shading", [&](const JsonValue& v) { look.shading.model = ShadingModel(v.OneOf(kShadingModelNames)); }},
       {"lights",
        [&](const JsonValue& v) {
          v.Each([&](const JsonValue& light) { look.shading.lights.push_back(ReadLight(light)); }, 0);
@@ -170,12 +169,11 @@ SweepPolicy ReadPolicy(const JsonValue& value) {
   SweepPolicy read;
   Policy& policy = read.policy;
   policy.groups = 1;
-  constexpr std::array<std::string_view, 5> kAxes = {"x", "y", "z", "auto", "view"};
   value.Fields({{"name", [&](const JsonValue& v) { read.name = v.Text(); }},
                 {"decomposition", [&](const JsonValue& v) { policy.decomposition = ReadName(v, Decompositions()); }},
                 {"split", [&](const JsonValue& v) { policy.load_metric = ReadName(v, LoadMetrics()); }},
                 {"assignment", [&](const JsonValue& v) { policy.assignment = ReadName(v, Assignments()); }},
-                {"axis", [&](const JsonValue& v) { policy.axis = AxisChoice(v.OneOf(kAxes)); }},
+                {"axis", [&](const JsonValue& v) { policy.axis = AxisChoice(v.OneOf(kAxisChoiceNames)); }},
                 {"balance", [&](const JsonValue& v) { policy.balance = NamesIn(BalanceModes())[v.OneOf(NamesIn(BalanceModes()))]; }},
                 {"pixel_error",
                  [&](const JsonValue& v) {

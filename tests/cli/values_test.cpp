@@ -127,5 +127,28 @@ TEST(FramePatternTest, RefusesEverythingButOneInteger) {
   }
 }
 
+TEST(Values, ATurntablesOutputIsPicturesOrOneMovie) {
+  EXPECT_EQ(ParseTurntableOutput("-o", "f%02d.png")->pictures.Name(7), "f07.png");
+  EXPECT_EQ(ParseTurntableOutput("-o", "f%02d.png")->movie, "");
+  for (const char* movie : {"a.mp4", "a.b/c.WEBM", "100%.gif", "%s.mp4"}) EXPECT_EQ(ParseTurntableOutput("-o", movie)->movie, movie);
+  EXPECT_THAT(ParseTurntableOutput("-o", "%d.gif").status().message(), HasSubstr("a movie is one file"));
+  for (const char* neither : {"", "mp4", "a.mp4.png", "a.png", ".mp4/x"}) {
+    EXPECT_THAT(ParseTurntableOutput("-o", neither).status().message(), HasSubstr("or the ending of a movie: .mp4, .webm or .gif"))
+        << neither;
+  }
+}
+
+TEST(Values, TimesAreOneOrARangeWithBothEnds) {
+  EXPECT_EQ(ParseTimeRange("--time", "3")->count(), 1);
+  EXPECT_EQ(ParseTimeRange("--time", "3")->last, 3);
+  const TimeRange range = ParseTimeRange("--time", "0:19").value();
+  EXPECT_EQ(range.first, 0);
+  EXPECT_EQ(range.last, 19);
+  EXPECT_EQ(range.count(), 20);
+  for (const char* text : {"", ":", "1:", ":1", "2:1", "-1", "0:1:2", "0-3", "1048576", "0:1048576", "a:b"}) {
+    EXPECT_THAT(ParseTimeRange("--time", text).status().message(), HasSubstr("--time")) << text;
+  }
+}
+
 }  // namespace
 }  // namespace slabstream

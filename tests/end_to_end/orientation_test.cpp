@@ -25,6 +25,28 @@ Object Body() {
   return body;
 }
 
+// Where pixels lie, on average, from the picture's centre to the right and downwards, in pixels.
+struct Spot {
+  int pixels = 0;
+  double x = 0, y = 0;
+};
+// Of those for which belongs(x, y) holds.
+template <class Belongs>
+Spot SpotOf(const PictureFile& picture, Belongs belongs) {
+  Spot spot;
+  for (int y = 0; y < picture.height; ++y) {
+    for (int x = 0; x < picture.width; ++x) {
+      if (!belongs(x, y)) continue;
+      ++spot.pixels;
+      spot.x += x + 0.5 - picture.width / 2.0;
+      spot.y += y + 0.5 - picture.height / 2.0;
+    }
+  }
+  spot.x /= spot.pixels;
+  spot.y /= spot.pixels;
+  return spot;
+}
+
 class OrientationTest : public EndToEndTest {
  protected:
   std::string Store(const Storage& storage) const {
@@ -68,18 +90,10 @@ TEST_F(OrientationTest, NamedViewsShowTheCornerWhereItIs) {
                                              {"front", 1, -1},
                                              {"back", -1, -1}}) {
     const PictureFile picture = Render(volume, {"--renderer", "mip", "--transfer", "gray-ramp", "--view", view});
-    double weight = 0, x_sum = 0, y_sum = 0;
-    for (int y = 0; y < picture.height; ++y) {
-      for (int x = 0; x < picture.width; ++x) {
-        if (picture.At(x, y, 3) < 0.9) continue;  // the block, by its opacity
-        weight += 1;
-        x_sum += x + 0.5 - picture.width / 2.0;
-        y_sum += y + 0.5 - picture.height / 2.0;
-      }
-    }
-    ASSERT_GT(weight, 0) << view;
-    EXPECT_GT(side_x * x_sum / weight, 3) << view;
-    EXPECT_GT(side_y * y_sum / weight, 3) << view;
+    const Spot block = SpotOf(picture, [&](int x, int y) { return picture.At(x, y, 3) >= 0.9; });  // by its opacity
+    ASSERT_GT(block.pixels, 0) << view;
+    EXPECT_GT(side_x * block.x, 3) << view;
+    EXPECT_GT(side_y * block.y, 3) << view;
   }
 }
 
@@ -109,18 +123,10 @@ TEST_F(OrientationTest, SlicesShowVoxelsWhereRadiologistsExpectThem) {
     MustRun({"slice", volume, "--local=2", "-o", Path("slice.png"), "--size", "96", "--plane", plane, "--at", at, "--window", "255",
              "--interpolation", "nearest"});
     const PictureFile slice = ReadPicture(Path("slice.png"));
-    double bright = 0, x_sum = 0, y_sum = 0;
-    for (int y = 0; y < slice.height; ++y) {
-      for (int x = 0; x < slice.width; ++x) {
-        if (std::abs(slice.At(x, y, 0) - 250 / 255.0F) > 0.006F) continue;
-        bright += 1;
-        x_sum += x + 0.5 - slice.width / 2.0;
-        y_sum += y + 0.5 - slice.height / 2.0;
-      }
-    }
-    ASSERT_GT(bright, 50) << plane;
-    EXPECT_GT(side_x * x_sum / bright, 5) << plane;
-    EXPECT_GT(side_y * y_sum / bright, 5) << plane;
+    const Spot block = SpotOf(slice, [&](int x, int y) { return std::abs(slice.At(x, y, 0) - 250 / 255.0F) <= 0.006F; });
+    ASSERT_GT(block.pixels, 50) << plane;
+    EXPECT_GT(side_x * block.x, 5) << plane;
+    EXPECT_GT(side_y * block.y, 5) << plane;
   }
   // The same slice by its number.
   MustRun({"slice", volume, "--local=2", "-o", Path("index.png"), "--size", "96", "--plane", "sagittal", "--index", "21", "--window", "255",
@@ -179,11 +185,7 @@ TEST_F(OrientationTest, FitFramesWhatIsVisible) {
   WriteFile(Path("corner.nrrd"), NrrdFile(StoredAs(corner, AllStorages().front())));
   const auto covered = [&](std::vector<std::string> options) {
     const PictureFile picture = Render(Path("corner.nrrd"), std::move(options));
-    int pixels = 0;
-    for (int y = 0; y < picture.height; ++y) {
-      for (int x = 0; x < picture.width; ++x) pixels += picture.At(x, y, 3) > 0.5F ? 1 : 0;
-    }
-    return pixels;
+    return SpotOf(picture, [&](int x, int y) { return picture.At(x, y, 3) > 0.5F; }).pixels;
   };
   for (const char* renderer : {"zbuffer", "raycast", "splat"}) {
     for (const char* projection : {"orthographic", "perspective"}) {

@@ -123,6 +123,27 @@ ProgramResult EndToEndTest::MustRun(std::vector<std::string> arguments) const {
   return result;
 }
 
+void EndToEndTest::ExpectRefused(const std::vector<std::string>& arguments, const std::string& why) const {
+  std::string shown;
+  for (const std::string& argument : arguments) shown += argument + " ";
+  const std::vector<std::string> files = Files();
+  const ProgramResult result = Slabstream(arguments);
+  EXPECT_EQ(result.exit_status, 2) << shown << "\n" << result.err;
+  EXPECT_EQ(result.err_lines().size(), 1U) << shown << "\n" << result.err;
+  EXPECT_TRUE(result.err.starts_with("slabstream")) << shown << "\n" << result.err;
+  EXPECT_NE(result.err.find(why), std::string::npos) << shown << "\nmust say: " << why << "\nbut says: " << result.err;
+  EXPECT_EQ(result.out, "") << shown;
+  EXPECT_EQ(Files(), files) << shown;
+}
+
+void EndToEndTest::ExpectEachRefused(const std::vector<std::string>& beginning, const std::vector<Refusal>& refusals) const {
+  for (const auto& [more, why] : refusals) {
+    std::vector<std::string> arguments = beginning;
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    ExpectRefused(arguments, why);
+  }
+}
+
 std::string EndToEndTest::MakeSphere(const std::string& name, int sphere_class, int size) const {
   MustRun({"sphere", "--class", std::to_string(sphere_class), "--size", std::to_string(size), "--occupancy",
            sphere_class == 1 ? "0.05" : "0.3", "-o", name});

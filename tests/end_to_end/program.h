@@ -57,6 +57,15 @@ class EndToEndTest : public testing::Test {
   ProgramResult Slabstream(std::vector<std::string> arguments) const;
   // The same, and fails the test unless it exits with 0.
   ProgramResult MustRun(std::vector<std::string> arguments) const;
+  // Fails the test unless slabstream refuses bad input as it must: exit status 2, nothing on stdout, one line on stderr that holds `why`,
+  // and no file that was not there before.
+  void ExpectRefused(const std::vector<std::string>& arguments, const std::string& why) const;
+  // The same for each of several command lines that begin alike.
+  struct Refusal {
+    std::vector<std::string> more;  // arguments
+    std::string why;
+  };
+  void ExpectEachRefused(const std::vector<std::string>& beginning, const std::vector<Refusal>& refusals) const;
   // The sphere as `name` in the directory; returns its path.
   std::string MakeSphere(const std::string& name, int sphere_class, int size) const;
   std::string ReadFile(const std::string& name) const;

@@ -253,5 +253,26 @@ TEST_F(ImageWriterTest, AFullDiskIsToldAndKeepsTheOlderPicture) {
   EXPECT_EQ(FileCount(), 2U);
 }
 
+TEST_F(ImageWriterTest, AFrameOfAMovieLiesOverItsBackgroundAndThatOverBlack) {
+  const LocalImage image = TwoPixels(PixelFormat::kRgba);
+  const auto frame = [&](const StraightColor& background) {
+    return MovieFrame(ComposedPicture::Make(image, {6, 4}, {.background = background}, {}).value());
+  };
+  const auto pixel = [](const std::vector<std::byte>& bytes, std::size_t x, std::size_t y) {
+    const std::size_t at = 3 * (6 * y + x);
+    return std::vector<int>{int(bytes[at]), int(bytes[at + 1]), int(bytes[at + 2])};
+  };
+  const std::vector<std::byte> black = frame({});
+  ASSERT_EQ(black.size(), 6U * 4 * 3);
+  EXPECT_THAT(pixel(black, 0, 0), ElementsAre(0, 0, 0));
+  EXPECT_THAT(pixel(black, 2, 1), ElementsAre(64, 32, 0));
+  EXPECT_THAT(pixel(black, 3, 1), ElementsAre(255, 128, 64));
+  const std::vector<std::byte> coloured = frame({1, 0, 0.5F, 1}), veiled = frame({1, 1, 1, 0.5F});
+  EXPECT_THAT(pixel(coloured, 5, 3), ElementsAre(255, 0, 128));
+  EXPECT_THAT(pixel(coloured, 2, 1), ElementsAre(191, 32, 64));
+  EXPECT_THAT(pixel(coloured, 3, 1), ElementsAre(255, 128, 64));
+  EXPECT_THAT(pixel(veiled, 0, 0), ElementsAre(128, 128, 128));
+}
+
 }  // namespace
 }  // namespace slabstream

@@ -8,6 +8,7 @@
 
 #include "tests/support/expect_near.h"
 #include "tests/support/random.h"
+#include "tests/view/random_view.h"
 
 namespace slabstream {
 namespace {
@@ -21,17 +22,6 @@ double Radius(const VolumeGeometry& geometry) { return 0.5 * Length(ToVec3(geome
 Vec3 Physical(const Vec3& data_point, const VolumeGeometry& geometry) { return geometry.spacing * (data_point - Centre(geometry)); }
 
 Vec3 DataFromPhysical(const Vec3& point, const VolumeGeometry& geometry) { return point / geometry.spacing + Centre(geometry); }
-
-ViewParameters RandomView(Random& random) {
-  ViewParameters view;
-  view.projection = random.Chance(0.5) ? Projection::kOrthographic : Projection::kPerspective;
-  view.azimuth_degrees = random.Real(-400, 400);
-  view.elevation_degrees = random.Real(-90, 90);
-  view.roll_degrees = random.Real(-180, 180);
-  view.zoom = std::exp(random.Real(-2, 2));
-  view.fov_degrees = random.Real(kMinFovDegrees, kMaxFovDegrees);
-  return view;
-}
 
 TEST(Camera, LooksAsTheConventionSays) {
   struct Case {

@@ -9,23 +9,10 @@
 #include "common/view/camera.h"
 #include "tests/support/random.h"
 #include "tests/support/random_box.h"
+#include "tests/view/random_view.h"
 
 namespace slabstream {
 namespace {
-
-VolumeGeometry ObliqueGeometry(Random& random) {
-  VolumeGeometry geometry;
-  for (const Axis axis : kAxes) {
-    geometry.size[axis] = random.Integer(1, 40);
-    geometry.spacing[axis] = random.Real(0.2, 3);
-    geometry.orientation.origin[axis] = random.Real(-100, 100);
-  }
-  geometry.orientation.world = World::kScene;
-  const Vec3 x = Normalized({random.Real(0.5, 1), random.Real(-0.5, 0.5), random.Real(-0.5, 0.5)});
-  const Vec3 z = Normalized(Cross(x, {random.Real(-0.2, 0.2), 1, 0}));
-  geometry.orientation.axes = {x, Cross(z, x), z};
-  return geometry;
-}
 
 Clipping RandomClipping(Random& random, const VolumeGeometry& geometry) {
   Clipping clipping;
@@ -76,7 +63,7 @@ TEST(Clip, KeepsWhatTheBoxAndAllPlanesLeave) {
   int kept = 0, points = 0;
   for (int i = 0; i < 300; ++i) {
     SCOPED_TRACE(random.trace());
-    const VolumeGeometry geometry = ObliqueGeometry(random);
+    const VolumeGeometry geometry = RandomGeometry(random, World::kScene);
     const Clipping clipping = RandomClipping(random, geometry);
     ASSERT_TRUE(Validate(clipping).ok()) << Validate(clipping).message();
     const ClipRegion region = MakeClipRegion(clipping, geometry).value();
@@ -97,7 +84,7 @@ TEST(Clip, DropsNoBoxThatHoldsAPointWhichIsKept) {
   int dropped = 0;
   for (int i = 0; i < 1000; ++i) {
     SCOPED_TRACE(random.trace());
-    const VolumeGeometry geometry = ObliqueGeometry(random);
+    const VolumeGeometry geometry = RandomGeometry(random, World::kScene);
     const ClipRegion region = MakeClipRegion(RandomClipping(random, geometry), geometry).value();
     const Box box = RandomBox(random, geometry.bounds());
     bool any = false;
@@ -115,7 +102,7 @@ TEST(Clip, DropsNoBoxThatHoldsAPointWhichIsKept) {
 
 TEST(Clip, DistancesArePhysical) {
   Random random(23);
-  const VolumeGeometry geometry = ObliqueGeometry(random);
+  const VolumeGeometry geometry = RandomGeometry(random, World::kScene);
   const ClipRegion region = MakeClipRegion({.planes = {{{3, -4, 12}, 0}}, .mode = ClipMode::kCutAway}, geometry).value();
   ASSERT_EQ(region.sides.size(), 1U);
   EXPECT_NEAR(Length(region.sides[0].normal / geometry.spacing), 1, 1e-12);

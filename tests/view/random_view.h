@@ -26,16 +26,22 @@ inline VolumeGeometry RandomGeometry(Random& random, World world = World::kPatie
   return geometry;
 }
 
+// Of the centre of any volume.
+inline ViewParameters RandomView(Random& random) {
+  ViewParameters view;
+  view.projection = random.Chance(0.5) ? Projection::kOrthographic : Projection::kPerspective;
+  view.azimuth_degrees = random.Real(-400, 400);
+  view.elevation_degrees = random.Real(-90, 90);
+  view.roll_degrees = random.Real(-180, 180);
+  view.zoom = std::exp(random.Real(-2, 2));
+  view.fov_degrees = random.Real(kMinFovDegrees, kMaxFovDegrees);
+  return view;
+}
+
 // A view that CheckView takes: of the volume's centre, or of a point nearby.
 inline ViewParameters RandomViewOf(const VolumeGeometry& volume, Random& random) {
   for (;;) {
-    ViewParameters view;
-    view.projection = random.Chance(0.5) ? Projection::kOrthographic : Projection::kPerspective;
-    view.azimuth_degrees = random.Real(-400, 400);
-    view.elevation_degrees = random.Real(-90, 90);
-    view.roll_degrees = random.Real(-180, 180);
-    view.zoom = std::exp(random.Real(-2, 2));
-    view.fov_degrees = random.Real(kMinFovDegrees, kMaxFovDegrees);
+    ViewParameters view = RandomView(random);
     const Vec3 voxel = {random.Real(0, volume.size.x), random.Real(0, volume.size.y), random.Real(0, volume.size.z)};
     if (random.Chance(0.5)) view.look_at = volume.orientation.origin + volume.orientation.ToWorld(volume.spacing * voxel);
     if (CheckView(view, volume).ok()) return view;

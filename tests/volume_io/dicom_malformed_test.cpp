@@ -16,9 +16,9 @@ namespace {
 using testing::AllOf;
 using testing::HasSubstr;
 
-void ExpectRefusal(const Status& status, const std::string& path) {
+void ExpectRefusal(const Status& status, const std::string& path, const std::string& why = "") {
   ASSERT_FALSE(status.ok());
-  EXPECT_THAT(status.message(), AllOf(HasSubstr(path), testing::Not(HasSubstr("\n"))));
+  EXPECT_THAT(status.message(), AllOf(HasSubstr(path), HasSubstr(why), testing::Not(HasSubstr("\n"))));
   EXPECT_THAT(status.code(), testing::AnyOf(StatusCode::kDataLoss, StatusCode::kInvalidArgument, StatusCode::kResourceExhausted))
       << status.message();
 }
@@ -69,8 +69,7 @@ TEST(DicomMalformed, AlteredBytesNeverDoHarm) {
     for (int i = 0; i < 120; ++i) {
       FileBytes bytes = good;
       for (int flips = random.Integer(1, 4); flips > 0; --flips) {
-        const std::size_t at = random.Integer<std::size_t>(132, bytes.size() - 1);
-        bytes[at] = random.Chance(0.3) ? char(random.Integer(0, 255)) : char(bytes[at] ^ (1 << random.Integer(0, 7)));
+        Damage(bytes[random.Integer<std::size_t>(132, bytes.size() - 1)], random);
       }
       WriteFile(directory / "0", bytes);
       const Result<LoadedVolume> loaded = ReadVolume(directory.path());
@@ -131,9 +130,7 @@ TEST(DicomMalformed, LengthsAndDepthsAreNotBelieved) {
     SCOPED_TRACE(each.name);
     const TemporaryDirectory directory;
     WriteFile(directory / "file", each.bytes);
-    const Status status = ReadVolume(directory / "file").status();
-    ExpectRefusal(status, directory / "file");
-    EXPECT_THAT(status.message(), HasSubstr(each.why));
+    ExpectRefusal(ReadVolume(directory / "file").status(), directory / "file", each.why);
   }
 }
 
@@ -176,9 +173,7 @@ TEST(DicomMalformed, ClaimsOfPixelsAreChecked) {
       }
       WriteFile(directory / file, bytes);
     }
-    const Status status = ReadVolume(directory.path()).status();
-    ExpectRefusal(status, directory.path());
-    EXPECT_THAT(status.message(), HasSubstr(each.why));
+    ExpectRefusal(ReadVolume(directory.path()).status(), directory.path(), each.why);
   }
 }
 

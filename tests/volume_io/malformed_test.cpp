@@ -83,7 +83,7 @@ TEST(Malformed, AlteredBytesNeverDoHarm) {
         // Mostly in the header, where it matters.
         const std::size_t at =
             random.Integer<std::size_t>(0, random.Chance(0.8) ? std::min<std::size_t>(bytes.size() - 1, 300) : bytes.size() - 1);
-        bytes[at] = random.Chance(0.3) ? char(random.Integer(0, 255)) : char(bytes[at] ^ (1 << random.Integer(0, 7)));
+        Damage(bytes[at], random);
       }
       WriteFile(path, bytes);
       const Result<LoadedVolume> loaded = ReadVolume(path);

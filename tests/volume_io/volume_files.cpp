@@ -175,6 +175,10 @@ void WriteTiff(const std::string& path, const FileSpec& spec, const FileBytes& s
   TIFFClose(tiff);
 }
 
+void Damage(char& byte, Random& random) {
+  byte = random.Chance(0.3) ? char(random.Integer(0, 255)) : char(byte ^ (1 << random.Integer(0, 7)));
+}
+
 std::vector<double> DataValues(const Volume& volume) {
   std::vector<double> values;
   VisitScalarType(volume.description.type, [&]<class T>(const T*) {

@@ -10,6 +10,7 @@
 #include "common/math/vec.h"
 #include "common/volume/volume.h"
 #include "common/volume_io/sample_type.h"
+#include "tests/support/random.h"
 #include "tests/support/temporary_directory.h"
 
 namespace slabstream {
@@ -51,6 +52,9 @@ struct TiffOptions {
   std::string description = {};  // of the first page
 };
 void WriteTiff(const std::string& path, const FileSpec& spec, const FileBytes& samples, const TiffOptions& options = {});
+
+// Does what may happen to a byte of a file: another value, or one bit of it.
+void Damage(char& byte, Random& random);
 
 // The values of all voxels.
 std::vector<double> DataValues(const Volume& volume);

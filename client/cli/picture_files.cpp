@@ -1,0 +1,13 @@
+#include "client/cli/picture_files.h"
+
+#include "client/cli/picture_record.h"
+
+namespace slabstream {
+
+Status PictureFiles::Put(const Picture& picture, const FrameJob& job) {
+  PictureNotes notes{.geometry = picture.geometry, .record = {}};
+  if (record_) notes.record = RecordText(job.source, job.request, format_, picture.geometry);
+  return WritePicture(picture.image, picture.size, job.output, format_, notes);
+}
+
+}  // namespace slabstream

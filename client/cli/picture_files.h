@@ -1,0 +1,24 @@
+// PictureFiles: each picture becomes the file that its job names.
+#pragma once
+
+#include "client/cli/picture_sink.h"
+#include "client/image_io/image_writer.h"
+
+namespace slabstream {
+
+class PictureFiles : public PictureSink {
+ public:
+  // `record`: the files say how they were made (picture_record.h).
+  PictureFiles(const PictureFormat& format, bool record) : format_(format), record_(record) {}
+
+  bool in_order() const override { return false; }
+  Status Put(const Picture& picture, const FrameJob& job) override;
+  Status Finish() override { return Status::Ok(); }
+  void Abandon() override {}  // files wait for nobody
+
+ private:
+  const PictureFormat format_;
+  const bool record_;
+};
+
+}  // namespace slabstream

@@ -1,0 +1,67 @@
+// The picture that a file shows: what was rendered, over its background and under its annotations. Depths stay as they are.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "client/image_io/annotations.h"
+#include "common/base/status.h"
+#include "common/image/local_image.h"
+#include "common/view/picture_geometry.h"
+
+namespace slabstream {
+
+struct StraightColor {
+  float r = 0, g = 0, b = 0, a = 0;  // each in [0, 1]
+  friend bool operator==(const StraightColor&, const StraightColor&) = default;
+};
+
+struct PictureFormat {
+  int png_bits = 8;          // 8 or 16; EXR is always float, frames of movies have 8
+  StraightColor background;  // put behind the picture; the default leaves it as it is
+  Annotations annotations;   // drawn onto it
+};
+
+// Rows are made one by one, so that no second copy of the picture is needed. Any thread.
+class ComposedPicture {
+ public:
+  // `image` is premultiplied and must outlive this; its bounds lie within `size`, pixels outside are empty. NotFound: the font of
+  // annotations.
+  static Result<ComposedPicture> Make(const LocalImage& image, ImageSize size, const PictureFormat& format,
+                                      const PictureGeometry& geometry);
+
+  ImageSize size() const { return size_; }
+  bool has_depth() const { return HasDepth(image_->format); }
+
+  // Row y of the picture: size().width * 4 premultiplied floats, and as many depths as the row has pixels if `depth` is not empty
+  // (+infinity where nothing is seen).
+  void Row(int y, std::span<float> rgba, std::span<float> depth) const;
+
+ private:
+  ComposedPicture(const LocalImage& image, ImageSize size, const StraightColor& background, AnnotationLayers annotations)
+      : image_(&image), size_(size), background_(background), annotations_(std::move(annotations)) {}
+
+  const LocalImage* image_;
+  ImageSize size_;
+  StraightColor background_;
+  AnnotationLayers annotations_;
+};
+
+// Codes of a sample in [0, 1]: round(max * sample), without a transfer curve. Samples outside are clamped.
+template <class Code>
+Code SampleCode(float sample) {
+  constexpr float kMax = std::numeric_limits<Code>::max();
+  return Code(std::lround(kMax * std::clamp(sample, 0.0F, 1.0F)));
+}
+
+// A frame of a movie: size.width * size.height * 3 bytes, red, green and blue, row 0 first. A movie has no transparency: behind whatever
+// the background lets through lies black.
+std::vector<std::byte> MovieFrame(const ComposedPicture& picture);
+
+}  // namespace slabstream
