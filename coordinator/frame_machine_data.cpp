@@ -20,7 +20,7 @@ std::string InQuotes(const std::string& name) { return '"' + name + '"'; }
 
 // ---------------------------------------------------------------- requests
 
-// Sets request.volume; its dataset is loaded. NotFound: no such preset.
+// Sets request.volume; its dataset is loaded. NotFound: no such preset; InvalidArgument: clipping or layers do not suit the dataset.
 Status FrameMachine::State::FindVolume(OpenRequest& request) const {
   const FrameRequest& frame = request.submit.frame;
   const DatasetTable::Entry& dataset = *datasets.Find(frame.dataset);
@@ -28,7 +28,10 @@ Status FrameMachine::State::FindVolume(OpenRequest& request) const {
   if (!transfer.ok()) return transfer.status();
   const VolumeGeometry& geometry = dataset.summary->description.geometry;
   if (Status status = CheckClipping(frame.clipping, geometry); !status.ok()) return status;
-  request.volume.emplace(dataset.id, *std::move(transfer), FindRenderer(frame.renderer), MakeClipRegion(frame.clipping, geometry));
+  Result<LayerLooks> looks = ResolveLayers(frame, *dataset.summary);
+  if (!looks.ok()) return looks.status();
+  request.volume.emplace(dataset.id, *std::move(transfer), FindRenderer(frame.renderer), MakeClipRegion(frame.clipping, geometry),
+                         *std::move(looks));
   return Status::Ok();
 }
 

@@ -86,7 +86,8 @@ class FrameLoop {
 
   Status Write(const Picture& picture, const FrameJob& job) const {
     PictureNotes notes{.geometry = picture.geometry, .record = {}};
-    if (!options_.source.empty()) notes.record = RecordText(options_.source, job.request, options_.format, picture.geometry);
+    if (!options_.source.empty())
+      notes.record = RecordText(options_.source, job.request, options_.format, picture.geometry, options_.layers);
     return WritePicture(picture.image, picture.size, job.output, options_.format, notes);
   }
 

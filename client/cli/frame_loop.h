@@ -26,6 +26,7 @@ struct FrameLoopOptions {
   int in_flight = 1;
   PictureFormat format;
   std::string source;  // SOURCE as it was typed, for the records of pictures; empty: they get none
+  LayerFiles layers;   // likewise
   bool keep_reports = false;
   bool progress = false;  // on stderr
   std::string label;      // begins each line of progress

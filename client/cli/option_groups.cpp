@@ -11,6 +11,7 @@
 
 #include "client/cli/camera_json.h"
 #include "client/cli/cores.h"
+#include "client/cli/layer_options.h"
 #include "client/cli/values.h"
 #include "client/cli/volume_argument.h"
 #include "common/base/files.h"
@@ -418,6 +419,7 @@ void AddSliceOptions(CLI::App& app, SliceOptions& options) {
     AddParameter(app, parameter, std::string(parameter.purpose), request);
   }
   AddPictureFormat(app, options.format);
+  AddLayerOptions(app, request, options.layers, false);
   ResolveSource(app, source, options.source, request.transfer, [&options] { return options.connection.local_workers > 0; });
 }
 
@@ -432,6 +434,7 @@ void AddFrameOptions(CLI::App& app, FrameOptions& options) {
   AddViewOptions(app, options.request.view, options.request.size);
   AddClipOptions(app, options.request.clipping);
   AddLookOptions(app, options.request, options.format);
+  AddLayerOptions(app, options.request, options.layers);
   AddAnnotationOptions(app, options.format.annotations);
   AddPolicyOptions(app, options.request.policy);
   ResolveSource(app, source, options.source, options.request.transfer, [&options] { return options.connection.local_workers > 0; });

@@ -35,7 +35,7 @@ Status CheckPaths(const FrameOptions& options, const std::string& output) {
 // The pictures of `jobs`, whose datasets are filled in here, and the files beside them (--stats, --trace).
 Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std::vector<FrameJob> jobs, int in_flight) {
   if (Status status = CheckPaths(options, jobs.front().output); !status.ok()) return status;
-  Result<Session> session = Session::Open(options.connection, options.source);
+  Result<Session> session = Session::Open(options.connection, options.source, options.layers);
   if (!session.ok()) return session.status();
   for (FrameJob& job : jobs) job.request.dataset = session->dataset();
   if (Status status = Validate(jobs.front().request); !status.ok()) return status;
@@ -44,6 +44,7 @@ Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std
   loop.in_flight = in_flight;
   loop.format = options.format;
   if (options.record) loop.source = options.source;
+  loop.layers = options.layers;
   loop.keep_reports = !options.stats_path.empty() || !options.trace_path.empty();
   loop.progress = options.progress;
   Result<std::vector<FrameRecord>> frames = RenderFrames(session->client(), jobs, loop);

@@ -14,10 +14,15 @@ namespace {
 
 constexpr const char* kLocalDataset = "volume";
 
-Result<std::shared_ptr<const Volume>> LoadInput(const std::string& path) {
+Result<LayeredVolume> LoadInput(const std::string& path, const LayerFiles& files) {
   Result<LoadedVolume> loaded = ReadInputVolume(path);
   if (!loaded.ok()) return loaded.status();
-  return std::move(loaded->volume);
+  LayeredVolume layered{.volume = std::move(loaded->volume)};
+  if (!files.any()) return layered;
+  Result<Layers> layers = ReadLayers(files, layered.volume->description.geometry);
+  if (!layers.ok()) return AsInput(layers.status());
+  layered.layers = *std::move(layers);
+  return layered;
 }
 
 }  // namespace
@@ -26,8 +31,14 @@ Session::Session() = default;
 Session::Session(Session&&) noexcept = default;
 Session::~Session() = default;
 
-Result<Session> Session::Open(const ConnectionOptions& connection, const std::string& source) {
+Result<Session> Session::Open(const ConnectionOptions& connection, const std::string& source, const LayerFiles& layers) {
   if (connection.local_workers == 0) {
+    if (layers.any()) {
+      return Status::InvalidArgument(
+          fmt::format("--{} needs --local: at a service layers belong to the dataset, as --data "
+                      "NAME=FILE,labels=FILE,overlay=FILE says, and --label-mode or --overlay-transfer shows them",
+                      layers.labels.empty() ? "overlay" : "labels"));
+    }
     if (source.size() > kMaxNameBytes) {
       return Status::InvalidArgument(fmt::format("SOURCE has {} bytes, a dataset's name has at most {}", source.size(), kMaxNameBytes));
     }
@@ -36,15 +47,18 @@ Result<Session> Session::Open(const ConnectionOptions& connection, const std::st
     return session;
   }
   if (Status status = CheckInputVolume(source); !status.ok()) return status;
-  return OpenLocal(connection, [source] { return LoadInput(source); });
+  if (layers.any()) {
+    if (const auto files = CheckLayerHeaders(layers); !files.ok()) return AsInput(files.status());
+  }
+  return OpenLocal(connection, [source, layers] { return LoadInput(source, layers); });
 }
 
-Result<Session> Session::OpenLocal(const ConnectionOptions& connection, std::function<Result<std::shared_ptr<const Volume>>()> load) {
+Result<Session> Session::OpenLocal(const ConnectionOptions& connection, DataSource source) {
   Session session;
   session.context_ = std::make_unique<Context>();
   EmbeddedOptions options;
   options.workers = connection.local_workers;
-  options.coordinator.catalogue[kLocalDataset] = std::move(load);
+  options.coordinator.catalogue[kLocalDataset] = std::move(source);
   options.worker.threads = std::uint32_t(LocalThreads(connection));
   Result<std::unique_ptr<EmbeddedService>> service = EmbeddedService::Start(*session.context_, std::move(options));
   if (!service.ok()) return service.status();

@@ -8,7 +8,8 @@
 #include "client/cli/options.h"
 #include "client/client.h"
 #include "common/base/status.h"
-#include "common/volume/volume.h"
+#include "common/layers/layer_reader.h"
+#include "coordinator/data_source.h"
 
 namespace slabstream {
 
@@ -18,9 +19,11 @@ class Session {
  public:
   // At the service `source` is a name of its catalogue. With local workers it is a volume file: Open checks that it exists, and the first
   // frame reads it. Unavailable within 5 s if nobody answers.
-  static Result<Session> Open(const ConnectionOptions& connection, const std::string& source);
-  // In this process, by connection.local_workers > 0. `load` supplies the volume when the first frame needs it, on a thread of its own.
-  static Result<Session> OpenLocal(const ConnectionOptions& connection, std::function<Result<std::shared_ptr<const Volume>>()> load);
+  // `layers`: files, with local workers only; else InvalidArgument.
+  static Result<Session> Open(const ConnectionOptions& connection, const std::string& source, const LayerFiles& layers = {});
+  // In this process, by connection.local_workers > 0. A function in `source` supplies the volume when the first frame needs it, on a thread
+  // of its own.
+  static Result<Session> OpenLocal(const ConnectionOptions& connection, DataSource source);
   // The service alone, for `status`.
   static Result<Session> OpenService(const ServiceChoice& choice);
   static Result<Session> OpenService(const ServiceAddress& service);

@@ -11,6 +11,7 @@
 
 #include "common/base/status.h"
 #include "common/classification/transfer_function.h"
+#include "common/frame/layer_look.h"
 #include "common/view/camera.h"
 #include "common/view/clip.h"
 #include "common/view/shading.h"
@@ -52,6 +53,13 @@ struct TransferChoice {
   friend bool operator==(const TransferChoice&, const TransferChoice&) = default;
 };
 
+// How the overlay of a dataset is shown.
+struct OverlayChoice {
+  TransferChoice transfer;  // of its values
+  double weight = 1;        // [0, 1]: factor of its density in the mix
+  friend bool operator==(const OverlayChoice&, const OverlayChoice&) = default;
+};
+
 // Values of a renderer's parameters (RendererKind::parameters), by name, as a user types them. Missing ones have their defaults.
 using ParameterTexts = std::map<std::string, std::string, std::less<>>;
 inline constexpr std::size_t kMaxParameters = 32;
@@ -65,6 +73,8 @@ struct FrameRequest {
   ViewParameters view;
   Clipping clipping;  // empty: the whole volume is drawn
   TransferChoice transfer;
+  std::optional<LabelChoice> labels = {};     // none: those of the dataset, if it has any, are not shown
+  std::optional<OverlayChoice> overlay = {};  // likewise
   Shading shading;
   double termination = kDefaultTermination;  // [0, kMaxTermination]: transmittance below which what lies behind is skipped; 0: never
   Policy policy;

@@ -2,6 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cstdint>
+#include <set>
+#include <string>
+
 #include "common/renderers/registry.h"
 #include "common/view/range_status.h"
 
@@ -29,6 +34,41 @@ Status Validate(const TransferChoice& transfer) {
   if (transfer.opacity_distance > 0 && transfer.opacity_distance <= kMaxOpacityDistance) return Status::Ok();
   return Status::InvalidArgument(fmt::format("transfer.opacity_distance is {}, but must lie in (0, {}] voxel lengths",
                                              transfer.opacity_distance, kMaxOpacityDistance));
+}
+
+Status Validate(const LabelChoice& labels) {
+  if (Status s = InRange("labels.mode", int(labels.mode), int(LabelMode::kTint), int(LabelMode::kSurface)); !s.ok()) return s;
+  if (Status s = InRange("labels.tint", labels.tint, 0, 1); !s.ok()) return s;
+  if (labels.opacities.size() > kMaxLabels) {
+    return Status::InvalidArgument(
+        fmt::format("labels.opacities has {} labels, at most {} are possible", labels.opacities.size(), kMaxLabels));
+  }
+  std::set<std::uint32_t> named;
+  for (const auto& [value, opacity] : labels.opacities) {
+    if (Status s = InRange("labels.opacities.value", int(std::min(value, kMaxLabelValue + 1)), 1, int(kMaxLabelValue)); !s.ok()) return s;
+    if (Status s = InRange("labels.opacities.opacity", opacity, 0, 1); !s.ok()) return s;
+    if (!named.insert(value).second) return Status::InvalidArgument(fmt::format("labels.opacities names label {} twice", value));
+  }
+  if (labels.shown.size() > kMaxLabelRanges) {
+    return Status::InvalidArgument(
+        fmt::format("labels.shown has {} ranges, at most {} are possible", labels.shown.size(), kMaxLabelRanges));
+  }
+  for (const auto& [first, last] : labels.shown) {
+    if (first >= 1 && first <= last && last <= kMaxLabelValue) continue;
+    return Status::InvalidArgument(
+        fmt::format("labels.shown has the range {} to {}, but must rise in [1, {}]", first, last, kMaxLabelValue));
+  }
+  return Status::Ok();
+}
+
+// Of one of both layers.
+Status CheckShowsLayers(const RendererKind& renderer, std::string_view layer) {
+  if (renderer.shows_layers()) return Status::Ok();
+  std::string others;
+  for (const RendererKind* kind : Renderers()) {
+    if (kind->shows_layers()) others += (others.empty() ? "" : ", ") + std::string(kind->name());
+  }
+  return Status::InvalidArgument(fmt::format("renderer '{}' does not show {}, but these do: {}", renderer.name(), layer, others));
 }
 
 Status Validate(const Policy& policy) {
@@ -59,6 +99,15 @@ Status Validate(const FrameRequest& request) {
   if (Status s = Validate(request.view); !s.ok()) return s;
   if (Status s = Validate(request.clipping); !s.ok()) return s;
   if (Status s = Validate(request.transfer); !s.ok()) return s;
+  if (request.labels) {
+    if (Status s = CheckShowsLayers(**renderer, "labels"); !s.ok()) return s;
+    if (Status s = Validate(*request.labels); !s.ok()) return s;
+  }
+  if (request.overlay) {
+    if (Status s = CheckShowsLayers(**renderer, "overlays"); !s.ok()) return s;
+    if (Status s = Validate(request.overlay->transfer); !s.ok()) return Status(s.code(), "overlay." + s.message());
+    if (Status s = InRange("overlay.weight", request.overlay->weight, 0, 1); !s.ok()) return s;
+  }
   if (Status s = Validate(request.shading); !s.ok()) return s;
   if (Status s = InRange("termination", request.termination, 0, kMaxTermination); !s.ok()) return s;
   return Validate(request.policy);

@@ -68,6 +68,7 @@ class RendererKind {
     PixelFormat format = PixelFormat::kRgba;  // of local images with default parameters; says how they combine (common/kernels/combine.h)
     std::int32_t reach = kHalo;               // voxels outside a box that its samples depend on, [0, kHalo]
     bool along_slices = false;                // the frame is an image along the slices (SheetGrid), else the camera's
+    bool shows_layers = false;                // labels and overlays, too
     double footprint = 1;                     // pixels that a voxel fills, for each pixel of its cross-section
     std::vector<Stage> stages;                // stages that the pixel half charges time to, in order
     std::vector<RendererParameter> parameters;
@@ -84,6 +85,7 @@ class RendererKind {
   PixelFormat format() const { return facts_.format; }
   std::int32_t reach() const { return facts_.reach; }
   bool along_slices() const { return facts_.along_slices; }
+  bool shows_layers() const { return facts_.shows_layers; }
   double footprint() const { return facts_.footprint; }
   const std::vector<Stage>& stages() const { return facts_.stages; }
   const std::vector<RendererParameter>& parameters() const { return facts_.parameters; }

@@ -14,6 +14,7 @@ namespace slabstream {
 static_assert(v1::Projection_MAX == static_cast<int>(Projection::kPerspective));
 static_assert(v1::ClipUnit_MAX == static_cast<int>(ClipUnit::kPercent));
 static_assert(v1::ClipMode_MAX == static_cast<int>(ClipMode::kCutAway));
+static_assert(v1::LabelMode_MAX == static_cast<int>(LabelMode::kSurface));
 static_assert(v1::AxisChoice_MAX == static_cast<int>(AxisChoice::kView) + 1);
 
 // Validate checks most ranges of these values, once for the whole FrameRequest. Checked here: what a struct cannot hold, what must be known
@@ -134,6 +135,32 @@ inline void Read(const v1::TransferChoice& in, TransferChoice& out, Checker& che
   }
 }
 
+void Fields(auto& io, Is<LabelRange> auto& m) {
+  using P = v1::LabelRange;
+  io.Any(m.first, &P::first, &P::set_first);
+  io.Any(m.last, &P::last, &P::set_last);
+}
+
+void Fields(auto& io, Is<LabelOpacity> auto& m) {
+  using P = v1::LabelOpacity;
+  io.Any(m.value, &P::value, &P::set_value);
+  io.Finite("opacity", m.opacity, &P::opacity, &P::set_opacity);
+}
+
+void Fields(auto& io, Is<LabelChoice> auto& m) {
+  using P = v1::LabelChoice;
+  io.OneOf("mode", m.mode, &P::mode, &P::set_mode, LabelMode::kTint, LabelMode::kSurface);
+  io.Finite("tint", m.tint, &P::tint, &P::set_tint);
+  io.Messages("opacities", m.opacities, &P::opacities, &P::mutable_opacities, kMaxLabels);
+  io.Messages("shown", m.shown, &P::shown, &P::mutable_shown, kMaxLabelRanges);
+}
+
+void Fields(auto& io, Is<OverlayChoice> auto& m) {
+  using P = v1::OverlayChoice;
+  io.Message("transfer", m.transfer, &P::transfer, &P::mutable_transfer);
+  io.Finite("weight", m.weight, &P::weight, &P::set_weight);
+}
+
 void Fields(auto& io, Is<Shading> auto& m) {
   using P = v1::Shading;
   io.OneOf("model", m.model, &P::model, &P::set_model, ShadingModel::kPhong, ShadingModel::kDepthGradient);
@@ -164,6 +191,8 @@ void Fields(auto& io, Is<FrameRequest> auto& m) {  // all but clipping and param
   io.Message("size", m.size, &P::size, &P::mutable_size);
   io.Message("view", m.view, &P::view, &P::mutable_view);
   io.Message("transfer", m.transfer, &P::transfer, &P::mutable_transfer);
+  io.Optional("labels", m.labels, &P::has_labels, &P::labels, &P::mutable_labels);
+  io.Optional("overlay", m.overlay, &P::has_overlay, &P::overlay, &P::mutable_overlay);
   io.Message("shading", m.shading, &P::shading, &P::mutable_shading);
   io.Finite("termination", m.termination, &P::termination, &P::set_termination);
   io.Message("policy", m.policy, &P::policy, &P::mutable_policy);

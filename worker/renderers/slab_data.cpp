@@ -11,6 +11,14 @@ const VoxelBlock& SlabData::voxels() const {
   return block_;
 }
 
+ScalarType SlabData::widest_type() const {
+  ScalarType widest = bricks().type();
+  for (const auto* layer : {&layers_.labels, &layers_.overlay}) {
+    if (*layer && BytesPerSample((*layer)->type()) > BytesPerSample(widest)) widest = (*layer)->type();
+  }
+  return widest;
+}
+
 const BrickRanges& SlabData::ranges() {
   if (!ranges_) ranges_.emplace(bricks());
   return *ranges_;
@@ -28,6 +36,7 @@ const ClassificationTable& SlabData::Classification(const FrameSetup& setup) {
 
 std::size_t SlabData::bytes() const {
   std::size_t total = block_.bytes.capacity() + (bricks_ ? bricks_->bytes() : 0) + (ranges_ ? ranges_->bytes() : 0);
+  for (const auto* layer : {&layers_.labels, &layers_.overlay}) total += *layer ? (*layer)->bytes() : 0;
   total += table_.opacity.capacity() * sizeof(float) + table_.color.capacity() * sizeof(Rgb);
   for (const auto& [type, cache] : caches_) total += cache->bytes();
   return total;

@@ -64,6 +64,7 @@ class RaycastKind : public RendererKind {
                       .purpose = "trilinear samples along each pixel's ray, for sharp surfaces inside translucent material",
                       .format = PixelFormat::kRgba,
                       .reach = kHalo,  // 2 would do; like the other renderers, so that all use the same cached voxels
+                      .shows_layers = true,
                       .footprint = 1,
                       .stages = {Stage::kSample},
                       .parameters = {SamplingRate()}}) {}

@@ -9,6 +9,7 @@
 
 #include "worker/kernels/power-inl.h"
 #include "worker/rays/ray_packet-inl.h"
+#include "worker/renderers/raycast/layer_samples-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace slabstream::HWY_NAMESPACE {
@@ -97,10 +98,14 @@ struct Sums {
   Floats red, green, blue, alpha;
 };
 
-// Samples `owned` of the rays. kClipped: they lie in `part`; otherwise it is null. Returns how many samples were shaded.
-template <class T, bool kClipped>
+// What samples can be beside those of a volume alone. Each is compiled apart, so that none pays for what it does not use.
+enum class Samples { kPlain, kClipped, kLayered };
+
+// Samples `owned` of the rays. They lie in `part`; kPlain: it is null. Returns how many samples were shaded.
+template <class T, Samples kSamples>
 HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const RayPacket& packet, const LeapScales& leaps, const SampleInterval& owned,
                                       const PacketPart* part, Sums& sums) {
+  constexpr bool kClipped = kSamples != Samples::kPlain, kLayered = kSamples == Samples::kLayered;
   const FloatTag df;
   const IntTag di;
   const RayBox& box = *work.box;
@@ -145,7 +150,13 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const RayPacket& pa
         hn::Min(hn::Max(hn::Add(hn::Mul(hn::Sub(value, Set(look.origin)), Set(look.scale)), Set(look.rounding)), zero), Set(look.last));
     const auto entry = hn::ShiftLeft<2>(hn::ConvertTo(di, hn::IfThenElseZero(finite, number)));
     auto opacity = hn::GatherIndex(df, entries + 3, entry);
-    const auto visible = hn::And(hn::And(sampled, finite), hn::Gt(opacity, zero));
+    auto visible = hn::And(hn::And(sampled, finite), hn::Gt(opacity, zero));
+    [[maybe_unused]] LayeredSample layered;
+    if constexpr (kLayered) {
+      layered = WithLayers(*work.layers, box, place, neighbours, hn::IfThenElseZero(finite, opacity));
+      opacity = layered.opacity;
+      visible = hn::And(sampled, hn::Gt(opacity, zero));
+    }
     const std::size_t count = hn::CountTrue(df, visible);
     in_matter = count > kLanes / 2;
     if (count == 0) continue;
@@ -160,19 +171,50 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const RayPacket& pa
       }
     }
     Light light = {one, zero};
+    [[maybe_unused]] Light overlay_light = {one, zero};
     if (look.phong) {
       Gradient gradient = GradientAt(neighbours, place);
-      if constexpr (kClipped) {
-        const auto on_face = hn::Lt(this_k, part->face_end);
-        gradient = {hn::IfThenElse(on_face, part->face[0], gradient.x), hn::IfThenElse(on_face, part->face[1], gradient.y),
-                    hn::IfThenElse(on_face, part->face[2], gradient.z)};
+      const auto lit = [&](Gradient g) HWY_ATTR {
+        if constexpr (kClipped) {
+          const auto on_face = hn::Lt(this_k, part->face_end);
+          g = {hn::IfThenElse(on_face, part->face[0], g.x), hn::IfThenElse(on_face, part->face[1], g.y),
+               hn::IfThenElse(on_face, part->face[2], g.z)};
+        }
+        return LightOf(look, g);
+      };
+      if constexpr (kLayered) {
+        const auto matter = hn::And(visible, layered.matter);
+        if (!hn::AllFalse(df, matter)) {
+          const IndicatorGradient g = IndicatorGradientAt(*work.layers, box, place, neighbours.at, layered.label);
+          gradient = {hn::IfThenElse(matter, g.x, gradient.x), hn::IfThenElse(matter, g.y, gradient.y),
+                      hn::IfThenElse(matter, g.z, gradient.z)};
+        }
+        if (!hn::AllFalse(df, hn::And(visible, hn::Gt(layered.overlay_share, zero)))) {
+          overlay_light = lit(GradientAt(layered.overlay, place));
+        }
       }
-      light = LightOf(look, gradient);
+      light = lit(gradient);
     }
     const auto weight = hn::IfThenElseZero(visible, hn::Mul(hn::Sub(one, alpha), opacity));
     const auto add = [&](Floats& sum, const float* colors) HWY_ATTR {
-      const auto color = hn::MulAdd(hn::GatherIndex(df, colors, entry), light.diffuse, light.specular);
-      sum = hn::MulAdd(weight, hn::Min(hn::Max(color, zero), one), sum);
+      const auto shown = [&](Floats material, const Light& by)
+                             HWY_ATTR { return hn::Min(hn::Max(hn::MulAdd(material, by.diffuse, by.specular), zero), one); };
+      const auto material = hn::GatherIndex(df, colors, entry);
+      if constexpr (kLayered) {
+        const auto channel = colors - entries;
+        auto color = material;
+        if (work.layers->labels != nullptr) {
+          color = Lerp(layered.tint, material, hn::GatherIndex(df, work.layers->labels->entries.data() + channel, layered.label_entry));
+        }
+        color = shown(color, light);
+        if (work.layers->overlay != nullptr) {
+          const auto over = hn::GatherIndex(df, work.layers->overlay->entries.data() + channel, layered.overlay_entry);
+          color = Lerp(layered.overlay_share, color, shown(over, overlay_light));
+        }
+        sum = hn::MulAdd(weight, color, sum);
+      } else {
+        sum = hn::MulAdd(weight, shown(material, light), sum);
+      }
     };
     add(red, entries);
     add(green, entries + 1);
@@ -192,12 +234,15 @@ HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& pac
   const LeapScales leaps = LeapScalesOf(packet);
   Sums sums = {zero, zero, zero, zero};
   std::uint64_t shaded = 0;
-  if (work.rays->clip.empty()) {
-    shaded = MarchSamples<T, false>(work, packet, leaps, owned, nullptr, sums);
+  if (work.rays->clip.empty() && work.layers == nullptr) {
+    shaded = MarchSamples<T, Samples::kPlain>(work, packet, leaps, owned, nullptr, sums);
   } else {
     PacketPart parts[2];
     PartsOf(work.rays->clip, packet, parts);
-    for (const PacketPart& part : parts) shaded += MarchSamples<T, true>(work, packet, leaps, part.Of(owned), &part, sums);
+    for (const PacketPart& part : parts) {
+      shaded += work.layers == nullptr ? MarchSamples<T, Samples::kClipped>(work, packet, leaps, part.Of(owned), &part, sums)
+                                       : MarchSamples<T, Samples::kLayered>(work, packet, leaps, part.Of(owned), &part, sums);
+    }
   }
   if (shaded != 0) hn::StoreInterleaved4(sums.red, sums.green, sums.blue, sums.alpha, FloatTag(), rgba);
   return shaded;

@@ -5,12 +5,15 @@
 //   classified  after interpolation, by RayLook::entries; a sample that is not finite is empty
 //   gradient    central differences of stored samples over two voxels, interpolated like the samples; that of the interpolated volume
 //   shaded      as Phong::AtNormal and WithoutGradient define it
+//   layers      the label of the nearest voxel, and the overlay interpolated and classified like the volume (RayLayers); mixed with the
+//               volume's sample as docs/rendering.md says
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 
 #include "worker/rays/ray_box.h"
+#include "worker/renderers/raycast/ray_layers.h"
 #include "worker/renderers/raycast/ray_look.h"
 
 namespace slabstream {
@@ -21,6 +24,7 @@ struct MarchWork {
   const RayLook* look = nullptr;
   const std::uint8_t* empty_distance = nullptr;  // EmptyDistances of the box's cells
   float termination = 0;                         // a ray ends where it transmits less; 0: never
+  const RayLayers* layers = nullptr;             // null: none is shown
 };
 
 // Premultiplied RGBA of the samples that the box owns on the rays of the pixels of `tile`; `rgba` points to the first pixel. Pixels without
