@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "common/base/range_status.h"
 #include "common/renderers/registry.h"
-#include "common/view/range_status.h"
 
 namespace slabstream {
 namespace {
@@ -26,9 +26,21 @@ Status Validate(const TransferChoice& transfer) {
       return Status::InvalidArgument(fmt::format("transfer.scalar_range is {:g} to {:g}, but must rise", range->min, range->max));
     }
   }
+  if (Status s = Validate(transfer.isosurfaces); !s.ok()) return s;
+  if (Status s = Validate(transfer.gradient_opacities); !s.ok()) return s;
   if (transfer.opacity_distance > 0 && transfer.opacity_distance <= kMaxOpacityDistance) return Status::Ok();
   return Status::InvalidArgument(fmt::format("transfer.opacity_distance is {}, but must lie in (0, {}] voxel lengths",
                                              transfer.opacity_distance, kMaxOpacityDistance));
+}
+
+// Refuses `option` unless the renderer has it, which is named by `has`.
+Status RequireAbility(std::string_view option, const RendererKind& renderer, bool (RendererKind::*has)() const) {
+  if ((renderer.*has)()) return Status::Ok();
+  std::string names;
+  for (const RendererKind* kind : Renderers()) {
+    if ((kind->*has)()) names.append(names.empty() ? "" : ", ").append(kind->name());
+  }
+  return Status::InvalidArgument(fmt::format("renderer is '{}', but {} needs one of: {}", renderer.name(), option, names));
 }
 
 Status Validate(const Policy& policy) {
@@ -54,6 +66,12 @@ Status Validate(const FrameRequest& request) {
   if (request.shading.model == ShadingModel::kDepthGradient && (*renderer)->FormatOf(*parameters) != PixelFormat::kDepth) {
     return Status::InvalidArgument("shading 'depth-gradient' needs a renderer with depths, such as zbuffer, not '" + request.renderer +
                                    "'");
+  }
+  if (!request.transfer.isosurfaces.empty()) {
+    if (Status s = RequireAbility("isovalue", **renderer, &RendererKind::isosurfaces); !s.ok()) return s;
+  }
+  if (!request.transfer.gradient_opacities.empty()) {
+    if (Status s = RequireAbility("gradient-opacity", **renderer, &RendererKind::gradient_opacity); !s.ok()) return s;
   }
   if (Status s = Validate(request.size); !s.ok()) return s;
   if (Status s = Validate(request.view); !s.ok()) return s;

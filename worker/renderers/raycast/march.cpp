@@ -9,6 +9,7 @@
 
 #include "worker/kernels/power-inl.h"
 #include "worker/rays/ray_packet-inl.h"
+#include "worker/renderers/raycast/surface_walk-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace slabstream::HWY_NAMESPACE {
@@ -95,12 +96,71 @@ HWY_INLINE EndSamples EndSamplesOf(const ViewRays& view, const RayPacket& packet
 // What the rays of a packet have gathered, front to back.
 struct Sums {
   Floats red, green, blue, alpha;
+
+  // Adds what lies next on these rays. `colors`: straight, red, green, blue and something else of each colour; `entry`: times four.
+  HWY_INLINE void Add(Mask rays, Floats opacity, const float* colors, Ints entry, const Light& light) {
+    const FloatTag df;
+    const auto weight = hn::IfThenElseZero(rays, hn::Mul(hn::Sub(Set(1), alpha), opacity));
+    const auto add = [&](Floats& sum, const float* channel) HWY_ATTR {
+      const auto color = hn::MulAdd(hn::GatherIndex(df, channel, entry), light.diffuse, light.specular);
+      sum = hn::MulAdd(weight, hn::Min(hn::Max(color, hn::Zero(df)), Set(1)), sum);
+    };
+    add(red, colors);
+    add(green, colors + 1);
+    add(blue, colors + 2);
+    alpha = hn::Add(alpha, weight);
+  }
 };
 
-// Samples `owned` of the rays. kClipped: they lie in `part`; otherwise it is null. Returns how many samples were shaded.
-template <class T, bool kClipped>
+// The entry of RayLook::entries, times four, by which samples of these values look; 0 where a value is not finite.
+HWY_INLINE Ints EntryOf(const RayLook& look, Floats value, Mask finite) {
+  const FloatTag df;
+  const auto number = hn::Min(
+      hn::Max(hn::Add(hn::Mul(hn::Sub(value, Set(look.origin)), Set(look.scale)), Set(look.rounding)), hn::Zero(df)), Set(look.last));
+  return hn::ShiftLeft<2>(hn::ConvertTo(IntTag(), hn::IfThenElseZero(finite, number)));
+}
+
+// The factor of the opacity of samples with this gradient.
+HWY_INLINE Floats GradientFactor(const RayLook& look, const Gradient& g) {
+  const FloatTag df;
+  const auto square = [&](Floats slope, std::size_t axis) HWY_ATTR {
+    const auto physical = hn::Mul(slope, Set(look.inverse_spacing[axis]));
+    return hn::Mul(physical, physical);
+  };
+  const auto magnitude = hn::Sqrt(hn::Add(hn::Add(square(g.x, 0), square(g.y, 1)), square(g.z, 2)));
+  const auto finite = hn::Le(magnitude, Set(std::numeric_limits<float>::max()));
+  const auto number =
+      hn::Min(hn::MulAdd(hn::IfThenElseZero(finite, magnitude), Set(look.gradient_scale), Set(0.5F)), Set(look.gradient_last));
+  return hn::GatherIndex(df, look.gradient_factors.data(), hn::ConvertTo(IntTag(), number));
+}
+
+// Adds the crossings of rays with isosurfaces up to `before`, in samples. Returns how many.
+template <class T>
+HWY_NOINLINE std::uint64_t AddSurfaces(const MarchWork& work, Mask rays, Floats before, SurfaceWalk<T>& walk, Sums& sums) {
+  const FloatTag df;
+  const RayLook& look = *work.look;
+  const auto opaque = Set(1 - work.termination);
+  const auto due = [&]() HWY_ATTR {
+    return hn::And(rays, hn::And(hn::And(hn::Le(walk.at(), before), hn::Lt(walk.at(), Set(kRayEnd))), hn::Lt(sums.alpha, opaque)));
+  };
+  std::uint64_t count = 0;
+  for (auto crossing = due(); !hn::AllFalse(df, crossing); crossing = due()) {
+    count += hn::CountTrue(df, crossing);
+    Light light = {Set(1), hn::Zero(df)};
+    if (look.phong) light = LightOf(look, GradientAt(LoadNeighbours<T>(*work.box, walk.place(), crossing), walk.place()));
+    const float* const colors = look.surface_looks.data();
+    sums.Add(crossing, hn::GatherIndex(df, colors + 3, walk.look()), colors, walk.look(), light);
+    walk.Next(crossing);
+  }
+  return count;
+}
+
+// Samples `owned` of the rays. kAll: with all that a frame may ask for (cuts, isosurfaces, gradient opacity); the samples lie in `part`.
+// Otherwise only a transfer function, and `part` is null: one switch, so that a plain frame does not pay for any of these. Returns how many
+// samples were shaded.
+template <class T, bool kAll>
 HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const RayPacket& packet, const LeapScales& leaps, const SampleInterval& owned,
-                                      const PacketPart* part, Sums& sums) {
+                                      const PacketPart* part, Sums& gathered) {
   const FloatTag df;
   const IntTag di;
   const RayBox& box = *work.box;
@@ -110,17 +170,24 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const RayPacket& pa
   const auto opaque = Set(1 - work.termination);
   const float* const entries = look.entries.data();
 
-  const bool has_ends = kClipped || box.at_border;
-  EndSamples ends{zero, zero, zero, zero};
-  if (has_ends) ends = EndSamplesOf(*work.rays, packet, leaps, part);
-
-  Floats red = sums.red, green = sums.green, blue = sums.blue, alpha = sums.alpha;
   // Each ray advances separately: its next sample is k.
   auto k = owned.begin;
   auto alive = hn::Lt(k, owned.end);
-  if constexpr (kClipped) alive = hn::And(alive, hn::Lt(alpha, opaque));
-  bool in_matter = false;  // most of the last samples were visible
   std::uint64_t shaded = 0;
+  SurfaceWalk<T> surfaces(work, packet);
+  const bool has_surfaces = kAll && !look.isovalues.empty();
+  if constexpr (kAll) {
+    alive = hn::And(alive, hn::Lt(gathered.alpha, opaque));
+    if (!look.volume_shows) alive = hn::Lt(one, zero);
+    if (has_surfaces) surfaces.Start(*part);
+  }
+  if (!has_surfaces && hn::AllFalse(df, alive)) return 0;
+  const bool has_ends = kAll || box.at_border;
+  EndSamples ends{zero, zero, zero, zero};
+  if (has_ends) ends = EndSamplesOf(*work.rays, packet, leaps, part);
+
+  Sums sums = gathered;
+  bool in_matter = false;  // most of the last samples were visible
   while (!hn::AllFalse(df, alive)) {
     const SamplePlace place = PlaceSample(packet, box, k);
     // Rays in empty space leap ahead; the others go on to their next sample.
@@ -141,46 +208,46 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const RayPacket& pa
     const Neighbours<T> neighbours = LoadNeighbours<T>(box, place, sampled);
     const auto value = Interpolate(neighbours, place);
     const auto finite = hn::Le(hn::Abs(value), Set(std::numeric_limits<float>::max()));
-    const auto number =
-        hn::Min(hn::Max(hn::Add(hn::Mul(hn::Sub(value, Set(look.origin)), Set(look.scale)), Set(look.rounding)), zero), Set(look.last));
-    const auto entry = hn::ShiftLeft<2>(hn::ConvertTo(di, hn::IfThenElseZero(finite, number)));
+    const auto entry = EntryOf(look, value, finite);
     auto opacity = hn::GatherIndex(df, entries + 3, entry);
     const auto visible = hn::And(hn::And(sampled, finite), hn::Gt(opacity, zero));
     const std::size_t count = hn::CountTrue(df, visible);
     in_matter = count > kLanes / 2;
     if (count == 0) continue;
     shaded += count;
+    if constexpr (kAll) {
+      if (has_surfaces) shaded += AddSurfaces<T>(work, visible, this_k, surfaces, sums);
+    }
 
-    if (has_ends) {
+    Gradient gradient = {zero, zero, zero};
+    const bool by_gradient = kAll && !look.gradient_factors.empty();
+    if (look.phong || by_gradient) gradient = GradientAt(neighbours, place);
+    if (by_gradient) opacity = hn::Mul(opacity, GradientFactor(look, gradient));
+    if (has_ends || by_gradient) {
       const auto is_first = hn::Eq(this_k, ends.first), is_last = hn::Eq(this_k, ends.last);
-      if (!hn::AllFalse(df, hn::And(visible, hn::Or(is_first, is_last)))) {
+      if (by_gradient || !hn::AllFalse(df, hn::And(visible, hn::Or(is_first, is_last)))) {
         const auto steps_of_first = hn::Add(one, hn::IfThenElseZero(is_first, ends.first_excess));
-        const auto power = hn::Add(steps_of_first, hn::IfThenElseZero(is_last, ends.last_excess));
+        auto power = hn::Add(steps_of_first, hn::IfThenElseZero(is_last, ends.last_excess));
+        if (by_gradient) power = hn::Mul(power, Set(look.step_exponent));
         opacity = hn::Sub(one, PowerOfFraction(hn::Sub(one, opacity), power));
       }
     }
     Light light = {one, zero};
     if (look.phong) {
-      Gradient gradient = GradientAt(neighbours, place);
-      if constexpr (kClipped) {
+      if constexpr (kAll) {
         const auto on_face = hn::Lt(this_k, part->face_end);
         gradient = {hn::IfThenElse(on_face, part->face[0], gradient.x), hn::IfThenElse(on_face, part->face[1], gradient.y),
                     hn::IfThenElse(on_face, part->face[2], gradient.z)};
       }
       light = LightOf(look, gradient);
     }
-    const auto weight = hn::IfThenElseZero(visible, hn::Mul(hn::Sub(one, alpha), opacity));
-    const auto add = [&](Floats& sum, const float* colors) HWY_ATTR {
-      const auto color = hn::MulAdd(hn::GatherIndex(df, colors, entry), light.diffuse, light.specular);
-      sum = hn::MulAdd(weight, hn::Min(hn::Max(color, zero), one), sum);
-    };
-    add(red, entries);
-    add(green, entries + 1);
-    add(blue, entries + 2);
-    alpha = hn::Add(alpha, weight);
-    alive = hn::And(alive, hn::Lt(alpha, opaque));
+    sums.Add(visible, opacity, entries, entry, light);
+    alive = hn::And(alive, hn::Lt(sums.alpha, opaque));
   }
-  sums = {red, green, blue, alpha};
+  if constexpr (kAll) {
+    if (has_surfaces) shaded += AddSurfaces<T>(work, packet.valid, Set(kRayEnd), surfaces, sums);
+  }
+  gathered = sums;
   return shaded;
 }
 
@@ -192,7 +259,7 @@ HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& pac
   const LeapScales leaps = LeapScalesOf(packet);
   Sums sums = {zero, zero, zero, zero};
   std::uint64_t shaded = 0;
-  if (work.rays->clip.empty()) {
+  if (work.rays->clip.empty() && work.look->isovalues.empty() && work.look->gradient_factors.empty()) {
     shaded = MarchSamples<T, false>(work, packet, leaps, owned, nullptr, sums);
   } else {
     PacketPart parts[2];

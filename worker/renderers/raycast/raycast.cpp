@@ -84,7 +84,8 @@ class RaycastRenderer : public Renderer {
     StageClock clock(report);
     const double samples_per_voxel = setup.parameters.at(0);
     const std::vector<RayPiece>& pieces = slab.CacheOf<RayVolume>().PiecesOf(slab);
-    const RayLook look = MakeRayLook(slab.Classification(setup), setup.description, setup.camera, setup.shading, samples_per_voxel);
+    const RayLook look =
+        MakeRayLook(slab.Classification(setup), setup.transfer, setup.description, setup.camera, setup.shading, samples_per_voxel);
     const std::vector<Visibility>& visible = slab.CacheOf<VisibilityCache>().Of(pieces, look);
     clock.Charge(Stage::kPrepare);
 
