@@ -133,11 +133,21 @@ void AddShading(OptionList& out, const Shading& shading) {
 
 void AddTransfer(OptionList& out, const TransferChoice& transfer) {
   const TransferChoice usual;
-  const auto& [choice, opacity_distance, scalar_range] = transfer;
+  const auto& [choice, opacity_distance, scalar_range, isosurfaces, gradient_opacities] = transfer;
   const auto* preset = std::get_if<std::string>(&choice);
-  out.Name("--transfer", preset != nullptr ? *preset : kColorMapFile, std::get<std::string>(usual.choice));
+  out.Name("--transfer", preset != nullptr ? *preset : kColorMapFile,
+           isosurfaces.empty() ? std::get<std::string>(usual.choice) : std::string(kNoTransfer));
   if (scalar_range) out.Add("--scalar-range", fmt::format("{}:{}", scalar_range->min, scalar_range->max));
   out.Number("--opacity-distance", opacity_distance, usual.opacity_distance);
+  std::string list;
+  for (const auto& [value, color, opacity] : isosurfaces) {
+    const auto& [r, g, b] = color;
+    list += fmt::format("{}{}:{},{},{}:{}", list.empty() ? "" : ",", value, r, g, b, opacity);
+  }
+  if (!list.empty()) out.Add("--isovalue", list);
+  list.clear();
+  for (const auto& [slope, opacity] : gradient_opacities) list += fmt::format("{}{}:{}", list.empty() ? "" : ",", slope, opacity);
+  if (!list.empty()) out.Add("--gradient-opacity", list);
 }
 
 // `render` has no option for a slab: that is for slices.

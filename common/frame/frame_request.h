@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include "common/base/status.h"
 #include "common/classification/transfer_function.h"
@@ -22,7 +23,6 @@ inline constexpr int kMaxGroups = 1024, kMaxTeams = 1024;
 inline constexpr double kDefaultTermination = 1.0 / 1024, kMaxTermination = 0.5;
 inline constexpr double kMaxPixelError = 0.1;
 inline constexpr std::size_t kMaxNameBytes = 256;
-inline constexpr double kMaxScalar = 1e300;  // of a scalar range, either sign
 
 // kAuto: z, or the longest axis of slabs (SlabAxis), so that turning the view never moves voxels. kView: the axis along which the slices of
 // the frame are traversed, so that no slice is divided. Each of the three axes then has its own layout; workers fetch its voxels when a
@@ -43,13 +43,16 @@ struct Policy {
   friend bool operator==(const Policy&, const Policy&) = default;
 };
 
-// A preset's name (resolved by the coordinator, which knows the volume) or the function itself.
+// A preset's name (resolved by the coordinator, which knows the volume) or the function itself. The other fields replace those of a preset
+// or function.
 struct TransferChoice {
   std::variant<std::string, TransferFunction> choice = std::string("auto");
-  double opacity_distance = 1;  // voxel lengths; replaces that of a preset or function
+  double opacity_distance = 1;  // voxel lengths
   // Data values onto which the curves are stretched, so that their first point is at `min` and their last one at `max`: in
   // [-kMaxScalar, kMaxScalar], min < max. None: they stay.
   std::optional<ScalarRange> scalar_range = {};
+  std::vector<Isosurface> isosurfaces = {};                   // of renderers that draw them (RendererKind::isosurfaces)
+  std::vector<GradientOpacityPoint> gradient_opacities = {};  // of renderers that use them (RendererKind::gradient_opacity)
   friend bool operator==(const TransferChoice&, const TransferChoice&) = default;
 };
 

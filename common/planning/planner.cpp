@@ -61,6 +61,8 @@ Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const Vol
                                           : Result<TransferFunction>(std::get<TransferFunction>(choice.choice));
   if (!transfer.ok()) return transfer;
   transfer->opacity_distance = choice.opacity_distance;
+  transfer->isosurfaces = choice.isosurfaces;
+  transfer->gradient_opacities = choice.gradient_opacities;
   if (choice.scalar_range) return Stretched(*std::move(transfer), *choice.scalar_range);
   return transfer;
 }

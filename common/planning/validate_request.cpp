@@ -7,8 +7,8 @@
 #include <set>
 #include <string>
 
+#include "common/base/range_status.h"
 #include "common/renderers/registry.h"
-#include "common/view/range_status.h"
 
 namespace slabstream {
 namespace {
@@ -31,6 +31,8 @@ Status Validate(const TransferChoice& transfer) {
       return Status::InvalidArgument(fmt::format("transfer.scalar_range is {:g} to {:g}, but must rise", range->min, range->max));
     }
   }
+  if (Status s = Validate(transfer.isosurfaces); !s.ok()) return s;
+  if (Status s = Validate(transfer.gradient_opacities); !s.ok()) return s;
   if (transfer.opacity_distance > 0 && transfer.opacity_distance <= kMaxOpacityDistance) return Status::Ok();
   return Status::InvalidArgument(fmt::format("transfer.opacity_distance is {}, but must lie in (0, {}] voxel lengths",
                                              transfer.opacity_distance, kMaxOpacityDistance));
@@ -61,14 +63,23 @@ Status Validate(const LabelChoice& labels) {
   return Status::Ok();
 }
 
-// Of one of both layers.
-Status CheckShowsLayers(const RendererKind& renderer, std::string_view layer) {
-  if (renderer.shows_layers()) return Status::Ok();
-  std::string others;
+// Overlays have no isosurfaces and no opacity by gradient.
+Status CheckCurvesAlone(const TransferChoice& overlay) {
+  const auto* function = std::get_if<TransferFunction>(&overlay.choice);
+  const bool alone = overlay.isosurfaces.empty() && overlay.gradient_opacities.empty() &&
+                     (function == nullptr || (function->isosurfaces.empty() && function->gradient_opacities.empty()));
+  if (alone) return Status::Ok();
+  return Status::InvalidArgument("overlay.transfer has isosurfaces or gradient_opacities, which are of the volume alone");
+}
+
+// Refuses `option` unless the renderer has it, which is named by `has`.
+Status RequireAbility(std::string_view option, const RendererKind& renderer, bool (RendererKind::*has)() const) {
+  if ((renderer.*has)()) return Status::Ok();
+  std::string names;
   for (const RendererKind* kind : Renderers()) {
-    if (kind->shows_layers()) others += (others.empty() ? "" : ", ") + std::string(kind->name());
+    if ((kind->*has)()) names.append(names.empty() ? "" : ", ").append(kind->name());
   }
-  return Status::InvalidArgument(fmt::format("renderer '{}' does not show {}, but these do: {}", renderer.name(), layer, others));
+  return Status::InvalidArgument(fmt::format("renderer is '{}', but {} needs one of: {}", renderer.name(), option, names));
 }
 
 Status Validate(const Policy& policy) {
@@ -95,17 +106,24 @@ Status Validate(const FrameRequest& request) {
     return Status::InvalidArgument("shading 'depth-gradient' needs a renderer with depths, such as zbuffer, not '" + request.renderer +
                                    "'");
   }
+  if (!request.transfer.isosurfaces.empty()) {
+    if (Status s = RequireAbility("isovalue", **renderer, &RendererKind::isosurfaces); !s.ok()) return s;
+  }
+  if (!request.transfer.gradient_opacities.empty()) {
+    if (Status s = RequireAbility("gradient-opacity", **renderer, &RendererKind::gradient_opacity); !s.ok()) return s;
+  }
   if (Status s = Validate(request.size); !s.ok()) return s;
   if (Status s = Validate(request.view); !s.ok()) return s;
   if (Status s = Validate(request.clipping); !s.ok()) return s;
   if (Status s = Validate(request.transfer); !s.ok()) return s;
   if (request.labels) {
-    if (Status s = CheckShowsLayers(**renderer, "labels"); !s.ok()) return s;
+    if (Status s = RequireAbility("labels", **renderer, &RendererKind::shows_layers); !s.ok()) return s;
     if (Status s = Validate(*request.labels); !s.ok()) return s;
   }
   if (request.overlay) {
-    if (Status s = CheckShowsLayers(**renderer, "overlays"); !s.ok()) return s;
+    if (Status s = RequireAbility("overlay", **renderer, &RendererKind::shows_layers); !s.ok()) return s;
     if (Status s = Validate(request.overlay->transfer); !s.ok()) return Status(s.code(), "overlay." + s.message());
+    if (Status s = CheckCurvesAlone(request.overlay->transfer); !s.ok()) return s;
     if (Status s = InRange("overlay.weight", request.overlay->weight, 0, 1); !s.ok()) return s;
   }
   if (Status s = Validate(request.shading); !s.ok()) return s;

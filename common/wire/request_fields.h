@@ -96,11 +96,34 @@ void Fields(auto& io, Is<OpacityPoint> auto& m) {
   io.Finite("sharpness", m.sharpness, &P::sharpness, &P::set_sharpness);
 }
 
+void Fields(auto& io, Is<Isosurface> auto& m) {
+  using P = v1::Isosurface;
+  io.Finite("value", m.value, &P::value, &P::set_value);
+  io.Finite("r", m.color.r, &P::r, &P::set_r);
+  io.Finite("g", m.color.g, &P::g, &P::set_g);
+  io.Finite("b", m.color.b, &P::b, &P::set_b);
+  io.Finite("opacity", m.opacity, &P::opacity, &P::set_opacity);
+}
+
+void Fields(auto& io, Is<GradientOpacityPoint> auto& m) {
+  using P = v1::GradientOpacityPoint;
+  io.Finite("slope", m.slope, &P::slope, &P::set_slope);
+  io.Finite("opacity", m.opacity, &P::opacity, &P::set_opacity);
+}
+
+// The fields that a TransferFunction and a TransferChoice share.
+template <class P>
+void IsosurfaceFields(auto& io, auto& m) {
+  io.Messages("isosurfaces", m.isosurfaces, &P::isosurfaces, &P::mutable_isosurfaces, kMaxIsosurfaces);
+  io.Messages("gradient_opacities", m.gradient_opacities, &P::gradient_opacities, &P::mutable_gradient_opacities, kMaxTransferPoints);
+}
+
 void Fields(auto& io, Is<TransferFunction> auto& m) {
   using P = v1::TransferFunction;
   io.Messages("colors", m.colors, &P::colors, &P::mutable_colors, kMaxTransferPoints);
   io.Messages("opacities", m.opacities, &P::opacities, &P::mutable_opacities, kMaxTransferPoints);
   io.Finite("opacity_distance", m.opacity_distance, &P::opacity_distance, &P::set_opacity_distance);
+  IsosurfaceFields<P>(io, m);
 }
 
 void Fields(auto& io, Is<ScalarRange> auto& m) {
@@ -109,13 +132,19 @@ void Fields(auto& io, Is<ScalarRange> auto& m) {
   io.Finite("max", m.max, &P::max, &P::set_max);
 }
 
+void Fields(auto& io, Is<TransferChoice> auto& m) {  // all but choice and scalar_range
+  using P = v1::TransferChoice;
+  io.Finite("opacity_distance", m.opacity_distance, &P::opacity_distance, &P::set_opacity_distance);
+  IsosurfaceFields<P>(io, m);
+}
+
 inline void Write(const TransferChoice& in, v1::TransferChoice& out) {
+  WriteFields(in, out);
   if (const auto* preset = std::get_if<std::string>(&in.choice)) {
     out.set_preset(WireText(*preset, kMaxNameBytes));
   } else {
     Write(std::get<TransferFunction>(in.choice), *out.mutable_function());
   }
-  out.set_opacity_distance(in.opacity_distance);
   if (in.scalar_range) Write(*in.scalar_range, *out.mutable_scalar_range());
 }
 inline void Read(const v1::TransferChoice& in, TransferChoice& out, Checker& check) {
@@ -128,7 +157,7 @@ inline void Read(const v1::TransferChoice& in, TransferChoice& out, Checker& che
     }
     case v1::TransferChoice::CHOICE_NOT_SET: check.Fail("choice", "not set, expected preset or function"); break;
   }
-  out.opacity_distance = check.Finite("opacity_distance", in.opacity_distance());
+  ReadFields(in, out, check);
   if (in.has_scalar_range()) {
     const auto scope = check.In("scalar_range");
     Read(in.scalar_range(), out.scalar_range.emplace(), check);

@@ -257,6 +257,8 @@ Case RandomCase(unsigned seed, int i) {
   SetupOptions options;
   options.view = RandomView(i % 2 == 0 ? Projection::kOrthographic : Projection::kPerspective, random);
   options.transfer = Ramp(uniform(0.05, 0.9));
+  if (i % 5 == 2) options.transfer.isosurfaces = {{60, {1, 1, 1}, 0.5}, {120, {0, 1, 1}, 0.8}};
+  if (i % 5 == 4) options.transfer.gradient_opacities = {{0, 0.2}, {30, 1}};
   if (i % 4 == 1) options.clipping = RandomClipping(geometry, random);
   if (i % 7 == 3) options.shading.model = ShadingModel::kNone;
   options.size = {45, 38};
@@ -291,7 +293,8 @@ TEST(Layers, AgreeWithTheReference) {
     LayerVolume layer_volume;
     const auto& pieces = ray_volume.PiecesOf(*slab);
     const auto& layer_pieces = layer_volume.PiecesOf(*slab, pieces, c.setup.looks);
-    const RayLook look = MakeRayLook(slab->Classification(c.setup), c.setup.description, c.setup.camera, c.setup.shading, rate);
+    const RayLook look =
+        MakeRayLook(slab->Classification(c.setup), c.setup.transfer, c.setup.description, c.setup.camera, c.setup.shading, rate);
     RayLayers layers;
     std::optional<LabelTables> tables;
     std::optional<RayLook> overlay;
@@ -303,8 +306,8 @@ TEST(Layers, AgreeWithTheReference) {
     if (c.setup.looks.overlay) {
       const VolumeDescription& description = c.volume.layers.overlay->description;
       const OverlayLook& of = *c.setup.looks.overlay;
-      layers.overlay = &overlay.emplace(
-          MakeRayLook(Classify(of.transfer, description, of.range), description, c.setup.camera, c.setup.shading, rate / of.weight));
+      layers.overlay = &overlay.emplace(MakeRayLook(Classify(of.transfer, description, of.range), of.transfer, description, c.setup.camera,
+                                                    c.setup.shading, rate / of.weight));
       layers.overlay_samples = reinterpret_cast<const float*>(layer_pieces[0].overlay.samples.get());
     }
     // Nothing is leapt over.

@@ -88,6 +88,19 @@ GroupAssignment Clipped() {
   return message;
 }
 
+std::vector<Isosurface> ManySurfaces() {
+  std::vector<Isosurface> surfaces;
+  for (int i = 0; i < kMaxIsosurfaces; ++i) surfaces.push_back({-kMaxScalar + i * 1e299, {0, 0.5F, 1}, i % 2 == 0 ? 0.25 : 1});
+  return surfaces;
+}
+
+GroupAssignment WithSurfaces() {
+  GroupAssignment message = Assignment(2, {}, FindRenderer("raycast"));
+  message.setup.transfer.isosurfaces = ManySurfaces();
+  message.setup.transfer.gradient_opacities = {{0, 0}, {0, 1}, {kMaxScalar, 0.5}};
+  return message;
+}
+
 GroupAssignment BehindOthers() {
   GroupAssignment message = Assignment(2, {}, Splatting());
   message.setup.termination = 0.5;
@@ -136,8 +149,12 @@ std::vector<Ping> SamplesOf() {
 template <>
 std::vector<GroupAssignment> SamplesOf() {
   const ViewParameters oblique{Projection::kPerspective, 1e6, -33, 12.5, 0.01, 60};
-  return {Assignment(3, {}, Splatting()), Assignment(0, oblique, ZBuffer()), Assignment(16, oblique, Splatting()), BehindOthers(),
-          Clipped()};
+  return {Assignment(3, {}, Splatting()),
+          Assignment(0, oblique, ZBuffer()),
+          Assignment(16, oblique, Splatting()),
+          BehindOthers(),
+          Clipped(),
+          WithSurfaces()};
 }
 
 template <>
@@ -247,7 +264,11 @@ std::vector<SubmitFrame> SamplesOf() {
   full.previews = true;
   FrameRequest sliced = Request();
   sliced.clipping.slab = ClipSlab{.through = Vec3{1, -2, 3e8}};
-  return {{0, 1, Request()}, {kMax64, 86400000, full}, {1, 2, sliced}};
+  FrameRequest surfaces = Request();
+  surfaces.renderer = "raycast";
+  surfaces.transfer.isosurfaces = ManySurfaces();
+  surfaces.transfer.gradient_opacities = {{1e-3, 0.5}, {7, 0}};
+  return {{0, 1, Request()}, {kMax64, 86400000, full}, {1, 2, sliced}, {1, 2, surfaces}};
 }
 
 template <>

@@ -1,5 +1,7 @@
 #include "worker/renderers/slab_data.h"
 
+#include "common/renderers/renderer_kind.h"
+
 namespace slabstream {
 
 const VoxelBlock& SlabData::voxels() const {
@@ -26,9 +28,9 @@ const BrickRanges& SlabData::ranges() {
 
 const ClassificationTable& SlabData::Classification(const FrameSetup& setup) {
   // A slab's description never changes: it is its dataset's.
-  auto key = std::pair(setup.transfer, setup.range);
+  auto key = std::tuple(setup.renderer, setup.transfer, setup.range);
   if (classified_ != key) {
-    table_ = Classify(setup.transfer, setup.description, setup.range);
+    table_ = setup.renderer->Table(setup.transfer, setup.description, setup.range);
     classified_ = std::move(key);
   }
   return table_;

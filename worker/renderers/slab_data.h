@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <tuple>
 #include <typeindex>
 #include <utility>
 
@@ -46,7 +47,7 @@ class SlabData {
   // The range of samples of each brick.
   const BrickRanges& ranges();
 
-  // The table of this frame's transfer function. Valid until the next call.
+  // The table of this frame's renderer and transfer function (RendererKind::Table). Valid until the next call.
   const ClassificationTable& Classification(const FrameSetup& setup);
 
   // The renderer's cache. The first call creates it.
@@ -67,7 +68,7 @@ class SlabData {
 
   LayerVoxels layers_;
   std::optional<BrickRanges> ranges_;
-  std::optional<std::pair<TransferFunction, ValueRange>> classified_;  // table_ was made from these
+  std::optional<std::tuple<const RendererKind*, TransferFunction, ValueRange>> classified_;  // table_ was made from these
   ClassificationTable table_;
   std::map<std::type_index, std::unique_ptr<SlabCache>> caches_;
 };

@@ -16,6 +16,14 @@
 HWY_BEFORE_NAMESPACE();
 namespace slabstream::HWY_NAMESPACE {
 
+// The entry of RayLook::entries, times four, by which samples of these values look; 0 where a value is not finite.
+HWY_INLINE Ints EntryOf(const RayLook& look, Floats value, Mask finite) {
+  const FloatTag df;
+  const auto number = hn::Min(
+      hn::Max(hn::Add(hn::Mul(hn::Sub(value, Set(look.origin)), Set(look.scale)), Set(look.rounding)), hn::Zero(df)), Set(look.last));
+  return hn::ShiftLeft<2>(hn::ConvertTo(IntTag(), hn::IfThenElseZero(finite, number)));
+}
+
 // Four label numbers along x, from the voxel with index `at` on.
 struct LabelRow {
   Ints numbers[4];
@@ -31,6 +39,12 @@ HWY_INLINE LabelRow LoadLabelRow(const RayLayers& layers, Ints at) {
   const auto offset = hn::Add(at, at), low = SetInt(0xFFFF);
   const auto first = hn::GatherOffset(di, words, offset), second = hn::GatherOffset(di, words + 1, offset);
   return {{hn::And(first, low), hn::And(hn::ShiftRight<16>(first), low), hn::And(second, low), hn::And(hn::ShiftRight<16>(second), low)}};
+}
+
+// Neighbours::at of a sample: the index of the voxel one row, one slice and one voxel along x before its floor.
+HWY_INLINE Ints IndexBefore(const RayBox& box, const SamplePlace& place, Mask owned) {
+  const auto at = hn::Add(hn::Add(hn::Mul(place.voxel[2], SetInt(box.slice)), hn::Mul(place.voxel[1], SetInt(box.row))), place.voxel[0]);
+  return hn::IfThenElseZero(hn::RebindMask(IntTag(), owned), at);
 }
 
 // The label of the voxel nearest to each sample. `at` as in Neighbours.
@@ -158,14 +172,14 @@ HWY_INLINE LayeredSample WithLayers(const RayLayers& layers, const RayBox& box, 
     }
     const auto value = Interpolate(sample.overlay, place);
     const auto finite = hn::Le(hn::Abs(value), Set(std::numeric_limits<float>::max()));
-    const auto number =
-        hn::Min(hn::Max(hn::Add(hn::Mul(hn::Sub(value, Set(look.origin)), Set(look.scale)), Set(look.rounding)), zero), Set(look.last));
-    sample.overlay_entry = hn::ShiftLeft<2>(hn::ConvertTo(di, hn::IfThenElseZero(finite, number)));
+    sample.overlay_entry = EntryOf(look, value, finite);
     const auto over = hn::IfThenElseZero(finite, hn::GatherIndex(df, look.entries.data() + 3, sample.overlay_entry));
     const auto sum = hn::Add(sample.opacity, over);
     const auto any = hn::Gt(sum, zero);
     sample.overlay_share = hn::IfThenElseZero(any, hn::Div(over, hn::IfThenElse(any, sum, one)));
-    sample.opacity = hn::Sub(sum, hn::Mul(sample.opacity, over));
+    // Of opaque material exactly 1; of material without an overlay as it was.
+    const auto together = hn::Sub(one, hn::Mul(hn::Sub(one, sample.opacity), hn::Sub(one, over)));
+    sample.opacity = hn::IfThenElse(hn::Gt(over, zero), together, sample.opacity);
   }
   return sample;
 }

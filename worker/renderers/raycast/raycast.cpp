@@ -95,7 +95,8 @@ ShownLayers LayersOf(SlabData& slab, std::span<const RayPiece> pieces, const Fra
     const VolumeDescription description{.geometry = setup.description.geometry, .type = ScalarType::kFloat32, .mapping = {}};
     const ClassificationTable table = Classify(looks.overlay->transfer, description, looks.overlay->range);
     // Weight w: the opacity of a step is 1 - (1 - a)^w, as of a step w times as long.
-    shown.overlay = MakeRayLook(table, description, setup.camera, setup.shading, steps_per_voxel / looks.overlay->weight);
+    shown.overlay =
+        MakeRayLook(table, looks.overlay->transfer, description, setup.camera, setup.shading, steps_per_voxel / looks.overlay->weight);
   }
   return shown;
 }
@@ -148,7 +149,8 @@ class RaycastRenderer : public Renderer {
     StageClock clock(report);
     const double samples_per_voxel = setup.parameters.at(0);
     const std::vector<RayPiece>& pieces = slab.CacheOf<RayVolume>().PiecesOf(slab);
-    const RayLook look = MakeRayLook(slab.Classification(setup), setup.description, setup.camera, setup.shading, samples_per_voxel);
+    const RayLook look =
+        MakeRayLook(slab.Classification(setup), setup.transfer, setup.description, setup.camera, setup.shading, samples_per_voxel);
     const ShownLayers shown = LayersOf(slab, pieces, setup, samples_per_voxel);
     const std::vector<Visibility>& visible = slab.CacheOf<VisibilityCache>().Of(pieces, look, setup.looks, shown);
     clock.Charge(Stage::kPrepare);
