@@ -251,6 +251,17 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const RayPacket& pa
   return shaded;
 }
 
+// Apart from plain frames, so that these have the registers for themselves.
+template <class T>
+HWY_NOINLINE std::uint64_t MarchParts(const MarchWork& work, const RayPacket& packet, const LeapScales& leaps, const SampleInterval& owned,
+                                      Sums& sums) {
+  PacketPart parts[2];
+  PartsOf(work.rays->clip, packet, parts);
+  std::uint64_t shaded = 0;
+  for (const PacketPart& part : parts) shaded += MarchSamples<T, true>(work, packet, leaps, part.Of(owned), &part, sums);
+  return shaded;
+}
+
 // The rays of one packet.
 template <class T>
 HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& packet, float* HWY_RESTRICT rgba) {
@@ -262,9 +273,7 @@ HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& pac
   if (work.rays->clip.empty() && work.look->isovalues.empty() && work.look->gradient_factors.empty()) {
     shaded = MarchSamples<T, false>(work, packet, leaps, owned, nullptr, sums);
   } else {
-    PacketPart parts[2];
-    PartsOf(work.rays->clip, packet, parts);
-    for (const PacketPart& part : parts) shaded += MarchSamples<T, true>(work, packet, leaps, part.Of(owned), &part, sums);
+    shaded = MarchParts<T>(work, packet, leaps, owned, sums);
   }
   if (shaded != 0) hn::StoreInterleaved4(sums.red, sums.green, sums.blue, sums.alpha, FloatTag(), rgba);
   return shaded;
