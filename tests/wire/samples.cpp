@@ -94,6 +94,14 @@ std::vector<Isosurface> ManySurfaces() {
   return surfaces;
 }
 
+GroupAssignment WithLayers() {
+  GroupAssignment message = Assignment(2, {}, FindRenderer("raycast"));
+  message.setup.layers = {.labels = ScalarType::kUint16, .overlay = ScalarType::kFloat32};
+  message.setup.looks.labels = LabelLook{.mode = LabelMode::kSurface, .tint = 0, .entries = {{{0, 0.5F, 1}, 0.25F, false}, {{1, 1, 1}}}};
+  message.setup.looks.overlay = OverlayLook{.transfer = Curve(), .range = {-2, 3}, .weight = 0.125};
+  return message;
+}
+
 GroupAssignment WithSurfaces() {
   GroupAssignment message = Assignment(2, {}, FindRenderer("raycast"));
   message.setup.transfer.isosurfaces = ManySurfaces();
@@ -154,7 +162,8 @@ std::vector<GroupAssignment> SamplesOf() {
           Assignment(16, oblique, Splatting()),
           BehindOthers(),
           Clipped(),
-          WithSurfaces()};
+          WithSurfaces(),
+          WithLayers()};
 }
 
 template <>
@@ -268,7 +277,12 @@ std::vector<SubmitFrame> SamplesOf() {
   surfaces.renderer = "raycast";
   surfaces.transfer.isosurfaces = ManySurfaces();
   surfaces.transfer.gradient_opacities = {{1e-3, 0.5}, {7, 0}};
-  return {{0, 1, Request()}, {kMax64, 86400000, full}, {1, 2, sliced}, {1, 2, surfaces}};
+  FrameRequest layers = Request();
+  layers.renderer = "raycast";
+  layers.labels = LabelChoice{
+      .mode = LabelMode::kSurface, .tint = 1, .opacities = {{1, 0}, {kMaxLabelValue, 0.25}}, .shown = {{1, kMaxLabelValue}, {7, 7}}};
+  layers.overlay = OverlayChoice{.transfer = {"grayscale", 1, ScalarRange{-1, 2}}, .weight = 0.5};
+  return {{0, 1, Request()}, {kMax64, 86400000, full}, {1, 2, sliced}, {1, 2, surfaces}, {1, 2, layers}};
 }
 
 template <>
@@ -379,7 +393,10 @@ std::vector<DataOrder> SamplesOf() {
 
 template <>
 std::vector<DataReply> SamplesOf() {
-  return {{}, {kMax64, {{kUmlaut, DatasetState::kReady, Description(), {-3, 4}, "", kMax64, kMax64}, {"b", DatasetState::kLoading}}}};
+  return {{},
+          {kMax64,
+           {{kUmlaut, DatasetState::kReady, Description(), {-3, 4}, "", kMax64, kMax64, std::uint32_t(kMaxLabels), true},
+            {"b", DatasetState::kLoading}}}};
 }
 
 template <std::size_t... I>
