@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <chrono>
 #include <filesystem>
@@ -103,7 +104,8 @@ Status AddNamed(FoundData& found, const DataArgument& argument) {
   if (!source.ok()) return source.status();
   std::error_code error;
   if (!fs::exists(source->path, error)) return Status::NotFound("does not exist");
-  return found.datasets.emplace(argument.name, DataSource(argument.path, "")).second ? Status::Ok() : Repeated(argument.name);
+  const bool added = found.datasets.emplace(argument.name, DataSource(argument.path, "", argument.layers)).second;
+  return added ? Status::Ok() : Repeated(argument.name);
 }
 
 Status AddFolder(FoundData& found, const std::string& path) {
@@ -121,9 +123,56 @@ Status AddFolder(FoundData& found, const std::string& path) {
   return Status::Ok();
 }
 
-Status CheckHeaders(const std::string& path) {
-  const Result<VolumeSource> source = ParseVolumeSource(path);
-  return source.ok() ? CheckVolumeHeaders(source->path, source->options).status() : source.status();
+// The files of a source, by its headers.
+Result<std::vector<std::string>> FilesOf(const DataSource& data) {
+  const Result<VolumeSource> source = ParseVolumeSource(data.path);
+  if (!source.ok()) return source.status();
+  Result<std::vector<std::string>> files = CheckVolumeHeaders(source->path, source->options);
+  if (!files.ok() || !data.layers.any()) return files;
+  const Result<std::vector<std::string>> of_layers = CheckLayerHeaders(data.layers);
+  if (!of_layers.ok()) return of_layers.status();
+  files->insert(files->end(), of_layers->begin(), of_layers->end());
+  return files;
+}
+
+Result<LayeredVolume> ReadSource(const DataSource& data) {
+  const Result<VolumeSource> source = ParseVolumeSource(data.path);
+  if (!source.ok()) return source.status();
+  const Result<LoadedVolume> read = ReadVolume(source->path, source->options);
+  if (!read.ok()) return read.status();
+  LayeredVolume loaded{.volume = read->volume};
+  if (!data.layers.any()) return loaded;
+  Result<Layers> layers = ReadLayers(data.layers, read->volume->description.geometry);
+  if (!layers.ok()) return layers.status();
+  loaded.layers = *std::move(layers);
+  return loaded;
+}
+
+// Moves ",labels=..." and ",overlay=..." from the end of a named path to `layers`.
+Status TakeLayers(std::string& path, LayerFiles& layers) {
+  constexpr std::array<std::string_view, 2> kMarks = {",labels=", ",overlay="};
+  std::string labels;
+  const std::array<std::string*, 2> targets = {&labels, &layers.overlay};
+  while (true) {
+    std::size_t at = std::string::npos, which = 0;
+    for (std::size_t i = 0; i < kMarks.size(); ++i) {
+      const std::size_t found = path.rfind(kMarks.at(i));
+      if (found == std::string::npos || (at != std::string::npos && found < at)) continue;
+      at = found;
+      which = i;
+    }
+    if (at == std::string::npos) break;
+    const std::string_view name = kMarks.at(which).substr(1, kMarks.at(which).size() - 2);
+    std::string& target = *targets.at(which);
+    if (!target.empty()) return Status::InvalidArgument(fmt::format("{} are given twice", name));
+    target = path.substr(at + kMarks.at(which).size());
+    if (target.empty() || target.size() > kMaxPathBytes) {
+      return Status::InvalidArgument(fmt::format("{}: a path of {} bytes, must have 1 to {}", name, target.size(), kMaxPathBytes));
+    }
+    path.resize(at);
+  }
+  if (!labels.empty()) SetLabelFiles(labels, layers);
+  return Status::Ok();
 }
 
 // Waits until the files were not changed for longer than a tick of the file system's clock. Then their stamp tells of every change from now
@@ -149,6 +198,9 @@ Result<DataArgument> ParseDataArgument(const std::string& argument) {
     return wrong(fmt::format("a path of {} bytes, must have 1 to {}", parsed.path.size(), kMaxPathBytes));
   }
   if (parsed.path.find('\0') != std::string::npos) return wrong("a path with a zero byte");
+  if (parsed.name.empty()) return parsed;
+  if (Status layers = TakeLayers(parsed.path, parsed.layers); !layers.ok()) return wrong(layers.message());
+  if (parsed.path.empty()) return wrong("layers without a volume");
   return parsed;
 }
 
@@ -189,7 +241,7 @@ Result<FoundData> ListFolder(const std::string& folder) {
 
 void CheckFiles(FoundData& found) {
   for (const auto& [name, source] : found.datasets) {
-    const Status readable = source.load ? Status::Ok() : CheckHeaders(source.path);
+    const Status readable = source.load ? Status::Ok() : FilesOf(source).status();
     if (readable.ok()) continue;
     if (source.folder.empty()) {
       // A damaged file is bad input, as a wrong name is.
@@ -203,26 +255,25 @@ void CheckFiles(FoundData& found) {
 
 Result<LoadedSource> LoadSource(const DataSource& source) {
   if (source.load) {
-    Result<std::shared_ptr<const Volume>> volume = source.load();
-    if (!volume.ok()) return volume.status();
-    return LoadedSource{*std::move(volume), nullptr};
+    Result<LayeredVolume> loaded = source.load();
+    if (!loaded.ok()) return loaded.status();
+    return LoadedSource{std::move(loaded->volume), std::move(loaded->layers), nullptr};
   }
-  const Result<VolumeSource> named = ParseVolumeSource(source.path);
-  if (!named.ok()) return named.status();
   constexpr int kAttempts = 2;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    Result<std::vector<std::string>> files = CheckVolumeHeaders(named->path, named->options);
+    Result<std::vector<std::string>> files = FilesOf(source);
     if (!files.ok()) return files.status();
     const Result<FileStamp> stamp = StampFiles(*std::move(files));
     if (!stamp.ok()) return stamp.status();
     AwaitRest(*stamp);
-    const Result<LoadedVolume> read = ReadVolume(named->path, named->options);
+    Result<LayeredVolume> read = ReadSource(source);
     const Result<bool> changed = HaveChanged(*stamp);
     if (!changed.ok() || *changed) continue;
     if (!read.ok()) return read.status();
-    return LoadedSource{read->volume, std::make_shared<const FileStamp>(*stamp)};
+    return LoadedSource{std::move(read->volume), std::move(read->layers), std::make_shared<const FileStamp>(*stamp)};
   }
-  return Status::Unavailable(named->path + ": the file is being written; it is read again when it is asked for again");
+  return Status::Unavailable(source.path.substr(0, source.path.find('?')) +
+                             ": the file is being written; it is read again when it is asked for again");
 }
 
 }  // namespace slabstream

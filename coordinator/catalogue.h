@@ -3,6 +3,8 @@
 //
 // What --data takes, any number of times:
 //   NAME=PATH   one volume: a file, or a folder of slices; with options for reading it behind a question mark (read_options.h)
+//   NAME=PATH,labels=FILE[:COLOURS],overlay=FILE
+//               the same with layers (common/layers/layer_reader.h); either one may be left out
 //   DIR         a watched folder: every volume file in it by its stem ("head.nii.gz" is "head"), also those that come later, and every
 //               folder in it that is a volume by its name; a folder of slices or of DICOM alone is one volume named as the folder. One
 //               of nothing but folders holds a volume in each. What has a name that begins with a dot is left out
@@ -24,14 +26,17 @@ inline constexpr std::size_t kMaxPathBytes = 4096;
 // Help of --data.
 inline constexpr char kDataHelp[] =
     "A volume to serve, as NAME=FILE or NAME=FILE?OPTION=VALUE,... with the options for reading of `slabstream render`, or a folder of "
-    "volumes, which are named after their files. A folder is watched: files may come, change and go";
+    "volumes, which are named after their files. A folder is watched: files may come, change and go. Layers follow a named volume, as "
+    "NAME=FILE,labels=FILE[:COLOURS],overlay=FILE";
 
 struct DataArgument {
   std::string name;  // empty: `path` is a folder
   std::string path;  // of a named one: with its options
+  LayerFiles layers = {};
 };
 // Looks at no file. InvalidArgument: a name that is empty, too long (kMaxNameBytes) or has other characters than letters, digits and
-// "._-"; a path that is empty or longer than kMaxPathBytes. Messages begin with the argument.
+// "._-"; a path that is empty or longer than kMaxPathBytes, of the volume or of a layer; a layer that is given twice, or one of a folder.
+// Messages begin with the argument.
 Result<DataArgument> ParseDataArgument(const std::string& argument);
 
 // A folder as it is watched: absolute, without a slash at its end.
@@ -51,10 +56,11 @@ void CheckFiles(FoundData& found);
 
 struct LoadedSource {
   std::shared_ptr<const Volume> volume;
+  Layers layers;
   std::shared_ptr<const FileStamp> stamp;  // of its files as they were read; null: they never change
 };
-// Reads the voxels. Files that change meanwhile are read a second time, so the voxels are never those of two files. Errors: of ReadVolume;
-// Unavailable: they change again.
+// Reads the voxels, those of layers too. Files that change meanwhile are read a second time, so the voxels are never those of two files.
+// Errors: of ReadVolume and ReadLayers; Unavailable: they change again.
 Result<LoadedSource> LoadSource(const DataSource& source);
 
 }  // namespace slabstream

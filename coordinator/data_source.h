@@ -11,22 +11,33 @@
 
 #include "common/base/file_stamp.h"
 #include "common/base/status.h"
-#include "common/volume/volume.h"
+#include "common/layers/layer_reader.h"
+#include "common/volume/layers.h"
 
 namespace slabstream {
 
 using VolumeLoader = std::function<Result<std::shared_ptr<const Volume>>()>;
+using DataLoader = std::function<Result<LayeredVolume>()>;
 
-// A path, or a function whose volume never changes.
+// Paths, or a function whose volume never changes.
 struct DataSource {
   DataSource() = default;
-  DataSource(std::string from_path, std::string of_folder) : path(std::move(from_path)), folder(std::move(of_folder)) {}
-  template <std::convertible_to<VolumeLoader> Loader>
+  DataSource(std::string from_path, std::string of_folder, LayerFiles with_layers = {})
+      : path(std::move(from_path)), folder(std::move(of_folder)), layers(std::move(with_layers)) {}
+  template <std::convertible_to<DataLoader> Loader>
   DataSource(Loader loader) : load(std::move(loader)) {}  // NOLINT(google-explicit-constructor): a function is a source
+  template <std::convertible_to<VolumeLoader> Loader>
+  DataSource(Loader loader)  // NOLINT(google-explicit-constructor): so is one whose volume has no layers
+      : load([loader = VolumeLoader(std::move(loader))]() -> Result<LayeredVolume> {
+          Result<std::shared_ptr<const Volume>> volume = loader();
+          if (!volume.ok()) return volume.status();
+          return LayeredVolume{.volume = *std::move(volume)};
+        }) {}
 
   std::string path;    // a file, or a folder of slices; a named one may have options for reading it behind a question mark
   std::string folder;  // the watched folder that it was found in; empty: it was named
-  VolumeLoader load;   // set: `path` is not used
+  LayerFiles layers;   // of a named one
+  DataLoader load;     // set: `path` and `layers` are not used
 };
 
 // By name.

@@ -9,14 +9,23 @@
 
 namespace slabstream {
 
-DatasetId IdOf(const std::string& name, const Volume& volume) {
+DatasetId IdOf(const std::string& name, const Volume& volume, const Layers& layers) {
   const auto& [geometry, type, mapping] = volume.description;
   const auto& [size, spacing, orientation] = geometry;
   const auto numbers = [](const Vec3& v) { return fmt::format("{} {} {}", v.x, v.y, v.z); };
   const std::string place = fmt::format("{} {} {} {} {}", int(orientation.world), numbers(orientation.origin), numbers(orientation.axes[0]),
                                         numbers(orientation.axes[1]), numbers(orientation.axes[2]));
+  std::string of_layers;
+  for (const Volume* layer : {layers.labels.get(), layers.overlay.get()}) {
+    if (layer != nullptr) of_layers += fmt::format(" {} {:x}", int(layer->block.type), Digest(layer->block.bytes));
+    of_layers += ",";
+  }
+  for (const Label& label : layers.table == nullptr ? std::vector<Label>() : layers.table->labels) {
+    of_layers += fmt::format(" {} {} {} {} {}", label.value, label.color[0], label.color[1], label.color[2], label.name);
+  }
   const std::string text = fmt::format("{} {} {} {} {} {} {} {} {} {:x} {}", size.x, size.y, size.z, numbers(spacing), place, int(type),
-                                       mapping.scale, mapping.offset, volume.block.bytes.size(), Digest(volume.block.bytes), name);
+                                       mapping.scale, mapping.offset, volume.block.bytes.size(), Digest(volume.block.bytes), name) +
+                           (layers.types().any() ? of_layers : "");
   return std::max<DatasetId>(Digest(std::as_bytes(std::span(text))), 1);
 }
 

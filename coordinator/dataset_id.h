@@ -1,15 +1,15 @@
 // What names a dataset in messages: the same volume under the same name has the same id in every life of every coordinator, so that workers
-// may keep its voxels when a coordinator starts anew. Other voxels, or another description of them, have another id.
+// may keep its voxels when a coordinator starts anew. Other voxels, another description of them, or other layers have another id.
 #pragma once
 
 #include <string>
 
 #include "common/frame/frame_setup.h"
-#include "common/volume/volume.h"
+#include "common/volume/layers.h"
 
 namespace slabstream {
 
 // Reads every voxel once. Not 0.
-DatasetId IdOf(const std::string& name, const Volume& volume);
+DatasetId IdOf(const std::string& name, const Volume& volume, const Layers& layers = {});
 
 }  // namespace slabstream

@@ -164,6 +164,8 @@ std::vector<DatasetStatus> DatasetTable::Report(Time now) const {
       status.description = entry.summary->description;
       status.range = entry.summary->range;
       status.memory_bytes = entry.bytes;
+      if (entry.summary->label_table != nullptr) status.labels = std::uint32_t(entry.summary->label_table->labels.size());
+      status.overlay = entry.summary->overlay != nullptr;
     }
     report.push_back(std::move(status));
   }

@@ -20,7 +20,7 @@ std::string InQuotes(const std::string& name) { return '"' + name + '"'; }
 
 // ---------------------------------------------------------------- requests
 
-// Sets request.volume; its dataset is loaded. NotFound: no such preset.
+// Sets request.volume; its dataset is loaded. NotFound: no such preset; InvalidArgument: clipping or layers do not suit the dataset.
 Status FrameMachine::State::FindVolume(OpenRequest& request) const {
   const FrameRequest& frame = request.submit.frame;
   const DatasetTable::Entry& dataset = *datasets.Find(frame.dataset);
@@ -28,7 +28,9 @@ Status FrameMachine::State::FindVolume(OpenRequest& request) const {
   if (!transfer.ok()) return transfer.status();
   Result<ClipRegion> clip = MakeClipRegion(frame.clipping, dataset.summary->description.geometry);
   if (!clip.ok()) return clip.status();
-  request.volume.emplace(dataset.id, *std::move(transfer), FindRenderer(frame.renderer), *std::move(clip));
+  Result<LayerLooks> looks = ResolveLayers(frame, *dataset.summary);
+  if (!looks.ok()) return looks.status();
+  request.volume.emplace(dataset.id, *std::move(transfer), FindRenderer(frame.renderer), *std::move(clip), *std::move(looks));
   return Status::Ok();
 }
 

@@ -60,6 +60,7 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
                      .policy = &policy,
                      .renderer = request.volume->renderer(),
                      .clip = &request.volume->clip(),
+                     .looks = &request.volume->looks(),
                      .slots = request.slots,
                      .known = {.occupied = request.occupied.get()}};
   std::optional<WorkField> cost;

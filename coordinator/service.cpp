@@ -19,6 +19,7 @@
 #include "common/base/log.h"
 #include "common/base/printable.h"
 #include "common/base/shared_arena.h"
+#include "common/planning/layer_bricks.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/transport/endpoint.h"
 #include "common/transport/mailbox.h"
@@ -74,14 +75,17 @@ Result<News> Load(const LoadDataset& action) {
   const Result<LoadedSource> loaded = LoadSource(action.source);
   if (!loaded.ok()) return loaded.status();
   const std::shared_ptr<const Volume>& volume = loaded->volume;
-  auto summary = std::make_shared<const VolumeSummary>(Summarize(*volume));
+  const Layers& layers = loaded->layers;
+  auto summary = std::make_shared<const VolumeSummary>(Summarize(LayeredVolume{volume, layers}));
   SlabServer::Samples samples;
   if (MostBricksAreEqual(*summary)) {
     samples.bricks = std::make_shared<const BrickedVoxels>(volume->block);
   } else {
     samples.volume = volume;
   }
-  const DatasetId id = IdOf(action.name, *volume);
+  if (layers.labels != nullptr) samples.labels = std::make_shared<const BrickedVoxels>(layers.labels->block);
+  if (layers.overlay != nullptr) samples.overlay = std::make_shared<const BrickedVoxels>(layers.overlay->block);
+  const DatasetId id = IdOf(action.name, *volume, layers);
   const std::uint64_t bytes = samples.bytes();
   return News{DatasetLoaded{action.name, action.load, id, std::move(summary), bytes, loaded->stamp}, id, std::move(samples)};
 }
@@ -105,7 +109,10 @@ Result<FoundData> Find(const std::vector<std::string>& arguments) {
   for (const std::string& argument : arguments) {
     const Result<DataArgument> parsed = ParseDataArgument(argument);
     if (!parsed.ok()) return parsed.status();
-    if (!parsed->path.starts_with('/')) return here(Status::InvalidArgument(argument + ": the path must be absolute"));
+    for (const std::string& path : {parsed->path, parsed->layers.labels, parsed->layers.label_colors, parsed->layers.overlay}) {
+      if (path.empty() || path.starts_with('/')) continue;
+      return here(Status::InvalidArgument(argument + ": the path must be absolute"));
+    }
   }
   FoundData found = FindData(arguments, "");
   CheckFiles(found);
@@ -116,8 +123,10 @@ Result<FoundData> Find(const std::vector<std::string>& arguments) {
 
 Result<std::shared_ptr<const OccupancyGrid>> Count(const CountFunction& count, const SlabServer::Samples& samples,
                                                    const CountDataset& action) {
-  const ClassificationTable drawn = action.volume.renderer()->DrawnTable(action.volume.transfer(), *action.summary);
-  return std::make_shared<const OccupancyGrid>(count(samples.view(), drawn));
+  const RendererKind& renderer = *action.volume.renderer();
+  OccupancyGrid grid = count(samples.view(), renderer.DrawnTable(action.volume.transfer(), *action.summary));
+  AddLayerBricks(LayerBricks(*action.summary, renderer, action.volume.looks()), *action.summary, grid);
+  return std::make_shared<const OccupancyGrid>(std::move(grid));
 }
 
 }  // namespace

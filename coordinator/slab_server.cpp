@@ -80,11 +80,16 @@ std::vector<std::string> SlabServer::TakeUnwanted() {
   return std::exchange(unwanted_, {});
 }
 
-Bytes SlabServer::Cut(const Samples& samples, const Box& part, std::uint64_t begin, std::uint64_t end) {
-  if (samples.volume != nullptr) return BoxSamples(samples.volume, part, begin, end);
+Bytes SlabServer::Cut(const Samples& samples, const Box& box, const ChunkPart& part) {
+  if (part.layer == Layer::kVolume && samples.volume != nullptr) {
+    return BoxSamples(samples.volume, box, part.begin, part.begin + part.bytes);
+  }
+  const BrickedVoxels& bricks = part.layer == Layer::kVolume   ? *samples.bricks
+                                : part.layer == Layer::kLabels ? *samples.labels
+                                                               : *samples.overlay;
   ChunkBuffers::Buffer buffer = buffers_.Take();
-  const std::span<std::byte> cut(buffer->data(), end - begin);
-  VoxelBricks(*samples.bricks).Read(part, begin, cut);
+  const std::span<std::byte> cut(buffer->data(), part.bytes);
+  VoxelBricks(bricks).Read(box, part.begin, cut);
   return {std::move(buffer), cut};
 }
 
@@ -94,7 +99,7 @@ Status SlabServer::Check(const ChunkRequest& request, const Samples& samples) {
     return Status::InvalidArgument(
         fmt::format("chunk request: box {} is not inside the volume {}", Text(request.box), Text(samples.box())));
   }
-  if (const std::uint32_t count = ChunkCount(request.box, samples.type()); request.chunk >= count) {
+  if (const std::uint32_t count = ChunkCount(request.box, samples.types()); request.chunk >= count) {
     return Status::InvalidArgument(fmt::format("chunk request: chunk {} is not below {}", request.chunk, count));
   }
   return Status::Ok();
@@ -125,10 +130,9 @@ void SlabServer::Answer(const Incoming& incoming) {
   const Status served = Guarded("chunk request", [&] {
     const Samples samples = Find(request->dataset);
     if (Status status = Check(*request, samples); !status.ok()) return status;
-    const std::uint64_t box_bytes = std::uint64_t(request->box.voxel_count()) * BytesPerSample(samples.type());
-    const std::uint64_t begin = std::uint64_t{request->chunk} * kChunkBytes;
+    const ChunkPart part = PartOfChunk(request->box, samples.types(), request->chunk);
     Chunk chunk{.epoch = epoch_, .dataset = request->dataset, .box = request->box, .chunk = request->chunk};
-    const Bytes payload = PackChunk(Cut(samples, request->box, begin, std::min(begin + kChunkBytes, box_bytes)), codec_, chunk);
+    const Bytes payload = PackChunk(Cut(samples, request->box, part), codec_, chunk);
     const Status sent = socket_.Send(incoming.identity, Encode(chunk), payload);
     if (!sent.ok()) LogDebug("slabs plane: " + sent.message());  // it has gone, or asks again when its request times out
     return Status::Ok();

@@ -18,6 +18,7 @@
 #include "common/base/status.h"
 #include "common/transport/socket.h"
 #include "common/volume/bricks.h"
+#include "common/volume/layers.h"
 #include "common/wire/any_message.h"
 #include "coordinator/chunk_buffers.h"
 
@@ -27,10 +28,11 @@ inline constexpr int kMaxQueuedChunks = 64;  // several times what a worker's cr
 
 class SlabServer {
  public:
-  // The voxels of a dataset: a whole volume, or bricks if they take much less memory. One of the two, or neither.
+  // The voxels of a dataset: a whole volume, or bricks if they take much less memory. One of the two, or neither. And those of its layers.
   struct Samples {
     std::shared_ptr<const Volume> volume = nullptr;
     std::shared_ptr<const BrickedVoxels> bricks = nullptr;
+    std::shared_ptr<const BrickedVoxels> labels = nullptr, overlay = nullptr;
 
     bool any() const { return volume != nullptr || bricks != nullptr; }
     // What follows needs any().
@@ -38,8 +40,16 @@ class SlabServer {
       CHECK(any());
       return volume != nullptr ? volume->block.box : bricks->grid().box;
     }
-    std::uint64_t bytes() const { return volume != nullptr ? volume->block.bytes.size() : bricks->bytes(); }
-    ScalarType type() const { return volume != nullptr ? volume->block.type : bricks->type(); }
+    std::uint64_t bytes() const {
+      const std::uint64_t of_layers = (labels == nullptr ? 0 : labels->bytes()) + (overlay == nullptr ? 0 : overlay->bytes());
+      return of_layers + (volume != nullptr ? volume->block.bytes.size() : bricks->bytes());
+    }
+    SampleTypes types() const {
+      SampleTypes types(volume != nullptr ? volume->block.type : bricks->type());
+      if (labels != nullptr) types.layers.labels = labels->type();
+      if (overlay != nullptr) types.layers.overlay = overlay->type();
+      return types;
+    }
     VoxelBricks view() const { return volume != nullptr ? VoxelBricks(volume->block) : VoxelBricks(*bricks); }
   };
 
@@ -64,8 +74,8 @@ class SlabServer {
   void Run(const std::stop_token& stop);
   std::vector<std::string> TakeUnwanted();
   void Answer(const Incoming& incoming);
-  Bytes Cut(const Samples& samples, const Box& part, std::uint64_t begin, std::uint64_t end);  // as BoxSamples
-  static Status Check(const ChunkRequest& request, const Samples& samples);                    // why it cannot be met, or ok
+  Bytes Cut(const Samples& samples, const Box& box, const ChunkPart& part);
+  static Status Check(const ChunkRequest& request, const Samples& samples);  // why it cannot be met, or ok
 
   const std::string endpoint_;
   const Epoch epoch_;

@@ -1,6 +1,7 @@
 #include "worker/executor.h"
 
 #include <algorithm>
+#include <array>
 #include <string>
 #include <utility>
 
@@ -123,35 +124,51 @@ struct Executor::Slab {
   Status Store(const Chunk& chunk, const Bytes& payload) {
     if (chunk.box.empty() || !key.box.Contains(chunk.box) || chunk.dataset != key.dataset) return Status::DataLoss("chunk of another slab");
     if (data != nullptr) return Status::Ok();  // a duplicate after the slab was complete
-    if (chunk.chunk >= ChunkCount(chunk.box, key.type) || chunk.raw_bytes != BytesOfChunk(chunk.box, key.type, chunk.chunk)) {
+    if (chunk.chunk >= ChunkCount(chunk.box, key.types) || chunk.raw_bytes != BytesOfChunk(chunk.box, key.types, chunk.chunk)) {
       return Status::DataLoss("chunk " + std::to_string(chunk.chunk) + " of " + std::to_string(chunk.raw_bytes) +
                               " bytes does not fit a box of " + std::to_string(chunk.box.voxel_count()) + " voxels");
     }
-    if (!voxels) voxels.emplace(key.box, key.type);
+    const ChunkPart part = PartOfChunk(chunk.box, key.types, chunk.chunk);
     unpacked.resize(chunk.raw_bytes);
     if (Status status = UnpackChunk(chunk, payload.span(), unpacked); !status.ok()) return status;
-    voxels->Write(chunk.box, std::uint64_t{chunk.chunk} * kChunkBytes, unpacked);
+    Voxels(part.layer).Write(chunk.box, part.begin, unpacked);
     return Status::Ok();
   }
 
   // The data to render from. The first call, when all chunks are stored, copies voxels that other slabs hold. Render thread only.
   SlabData& Data() {
     if (data != nullptr) return *data;
-    if (!voxels) voxels.emplace(key.box, key.type);
-    for (const Copy& copy : copies) copy.Perform(*voxels);
+    for (const Layer layer : kLayers) {
+      if (!key.types.Of(layer)) continue;
+      BrickedVoxels& to = Voxels(layer);
+      for (const Copy& copy : copies) copy.Perform(layer, to);
+    }
     copies.clear();
-    data = std::make_unique<SlabData>(*std::move(voxels));
-    voxels.reset();
+    data = std::make_unique<SlabData>(*std::move(voxels[0]), LayerVoxels{std::move(voxels[1]), std::move(voxels[2])});
+    voxels = {};
     unpacked = {};
     return *data;
+  }
+
+  // Those that are being stored. The first call makes room for them.
+  BrickedVoxels& Voxels(Layer layer) {
+    std::optional<BrickedVoxels>& stored = voxels.at(std::size_t(layer));
+    if (!stored) stored.emplace(key.box, *key.types.Of(layer));
+    return *stored;
+  }
+
+  VoxelBricks Bricks(Layer layer) {
+    const SlabData& stored = Data();
+    if (layer == Layer::kVolume) return stored.bricks();
+    return *(layer == Layer::kLabels ? stored.layers().labels : stored.layers().overlay);
   }
 
   struct Copy {
     std::shared_ptr<Slab> from;
     Box box;
 
-    void Perform(BrickedVoxels& to) const {
-      const VoxelBricks source = from->Data().bricks();
+    void Perform(Layer layer, BrickedVoxels& to) const {
+      const VoxelBricks source = from->Bricks(layer);
       const Index3 size = box.size();
       std::vector<std::byte> slice(std::size_t(size.x) * std::size_t(size.y) * BytesPerSample(source.type()));
       for (std::int32_t z = 0; z < size.z; ++z) {
@@ -164,8 +181,8 @@ struct Executor::Slab {
 
   const SlabKey key;
   std::vector<Copy> copies;
-  std::optional<BrickedVoxels> voxels;
-  std::vector<std::byte> unpacked;  // a chunk's samples
+  std::array<std::optional<BrickedVoxels>, kLayers.size()> voxels;  // by layer
+  std::vector<std::byte> unpacked;                                  // a chunk's samples
   std::unique_ptr<SlabData> data;
 };
 

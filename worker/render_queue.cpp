@@ -7,7 +7,7 @@ namespace slabstream {
 void RenderQueue::Add(const GroupKey& key, Rank rank, const Placement& placement, const std::shared_ptr<const FrameSetup>& setup,
                       const std::shared_ptr<const OcclusionMask>& hidden, WorkerActions& actions) {
   const Box voxels = SlabBox(placement.box, *setup);
-  waiting_[{key, rank}] = {placement, setup, hidden, slabs_.Acquire(setup->dataset, voxels, setup->description.type, actions)};
+  waiting_[{key, rank}] = {placement, setup, hidden, slabs_.Acquire(setup->dataset, voxels, TypesOf(*setup), actions)};
 }
 
 void RenderQueue::DropGroup(const GroupKey& key, WorkerActions& actions) {

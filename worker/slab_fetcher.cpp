@@ -10,7 +10,7 @@
 namespace slabstream {
 namespace {
 
-std::uint64_t RawBytes(const SlabKey& key) { return std::uint64_t(key.box.voxel_count()) * BytesPerSample(key.type); }
+std::uint64_t RawBytes(const SlabKey& key) { return std::uint64_t(key.box.voxel_count()) * key.types.bytes_per_voxel(); }
 
 }  // namespace
 
@@ -28,16 +28,16 @@ SlabFetcher::Slab* SlabFetcher::FindRequested(DatasetId dataset, const ChunkPlac
   return nullptr;
 }
 
-SlabFetcher::Generation SlabFetcher::Acquire(DatasetId dataset, const Box& box, ScalarType type, WorkerActions& actions) {
+SlabFetcher::Generation SlabFetcher::Acquire(DatasetId dataset, const Box& box, const SampleTypes& types, WorkerActions& actions) {
   Slab* best = nullptr;
   for (auto& [generation, slab] : slabs_) {
-    if (slab.retired || slab.key.dataset != dataset || slab.key.type != type || !slab.key.box.Contains(box)) continue;
+    if (slab.retired || slab.key.dataset != dataset || slab.key.types != types || !slab.key.box.Contains(box)) continue;
     if (best == nullptr || (slab.is_complete() && !best->is_complete())) best = &slab;
   }
   if (best == nullptr) {
     const Generation generation = ++last_generation_;
     best = &slabs_[generation];
-    best->key = {dataset, box, type, generation};
+    best->key = {dataset, box, types, generation};
     best->bytes = RawBytes(best->key);
     cached_bytes_ += best->bytes;
     best->pins = 1;
@@ -59,7 +59,7 @@ OpenSlab SlabFetcher::PlanSlab(Slab& slab) {
   const bool room = cached_bytes() <= most_cached();  // if not, everything that can be dropped must be
   for (auto& [generation, other] : slabs_) {
     if (!room || &other == &slab || other.retired || !other.is_complete()) continue;
-    if (other.key.dataset != slab.key.dataset || other.key.type != slab.key.type) continue;
+    if (other.key.dataset != slab.key.dataset || other.key.types != slab.key.types) continue;
     sources.push_back(&other);
     at_hand.push_back(other.key.box);
   }
@@ -72,7 +72,7 @@ OpenSlab SlabFetcher::PlanSlab(Slab& slab) {
     slab.sources.push_back(source.key.generation);
   }
   for (const Box& box : assembly.missing) {
-    for (std::uint32_t chunk = 0; chunk < ChunkCount(box, slab.key.type); ++chunk) slab.missing.push_back({box, chunk});
+    for (std::uint32_t chunk = 0; chunk < ChunkCount(box, slab.key.types); ++chunk) slab.missing.push_back({box, chunk});
   }
   std::ranges::reverse(slab.missing);
   slab.chunk_count = slab.missing.size();
@@ -115,7 +115,7 @@ void SlabFetcher::RequestChunks(std::span<const Generation> slabs, Epoch epoch, 
     slab.begun = true;
     while (!slab.retired && !slab.missing.empty()) {
       const ChunkPlace chunk = slab.missing.back();
-      const std::uint32_t bytes = BytesOfChunk(chunk.box, slab.key.type, chunk.chunk);
+      const std::uint32_t bytes = BytesOfChunk(chunk.box, slab.key.types, chunk.chunk);
       if (!in_flight_.empty() && in_flight_bytes_ + bytes > config_.credit_bytes) return;
       slab.missing.pop_back();
       in_flight_[{generation, chunk}] = {bytes, now + config_.chunk_timeout, false};
@@ -214,7 +214,7 @@ void SlabFetcher::GiveUp(Slab& slab, Status status) {
 // If one slab covers another, the smaller one is no longer needed once both are complete, or if nobody waits for it.
 void SlabFetcher::RetireCovered(Slab& complete) {
   const auto covers = [](const Slab& a, const Slab& b) {
-    return a.key.dataset == b.key.dataset && a.key.type == b.key.type && a.key.box.Contains(b.key.box);
+    return a.key.dataset == b.key.dataset && a.key.types == b.key.types && a.key.box.Contains(b.key.box);
   };
   for (auto& [generation, other] : slabs_) {
     if (&other == &complete || other.retired) continue;

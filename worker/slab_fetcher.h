@@ -41,7 +41,7 @@ class SlabFetcher {
 
   void SetRoom(std::uint64_t bytes) { room_ = bytes; }  // for all slabs, those in use too; without a call there is no limit
 
-  Generation Acquire(DatasetId dataset, const Box& box, ScalarType type, WorkerActions& actions);
+  Generation Acquire(DatasetId dataset, const Box& box, const SampleTypes& types, WorkerActions& actions);
   void Release(Generation slab);  // once for each Acquire
   // Of acquired slabs.
   bool complete(Generation slab) const { return slabs_.at(slab).is_complete(); }  // all that must be fetched is stored

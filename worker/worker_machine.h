@@ -55,7 +55,7 @@ class ImageNames {
 struct SlabKey {
   DatasetId dataset = 0;
   Box box;
-  ScalarType type = ScalarType::kUint8;
+  SampleTypes types;
   std::uint64_t generation = 0;  // named by the machine, never reused: a slab that is dropped and opened again gets a new one
   friend bool operator==(const SlabKey&, const SlabKey&) = default;
   friend auto operator<=>(const SlabKey&, const SlabKey&) = default;

@@ -6,6 +6,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/cores.h"
+#include "client/cli/layer_options.h"
 #include "client/cli/movie.h"
 #include "client/cli/option_groups.h"
 #include "common/base/find_named.h"
@@ -82,6 +83,7 @@ void DeclareInfo(const CommandLine& line) {
   CLI::Option* source =
       sub->add_option("SOURCE", options->path, "A volume file, as FILE or FILE:TRANSFER, or a picture, .png or .exr")->required();
   AddTransferOptions(*sub, options->transfer);
+  AddLayerFiles(*sub, options->layers);
   AddReadOptions(*sub);
   ResolveSource(*sub, source, options->path, options->transfer, [] { return true; });
   sub->add_flag("--json", options->json, "Print JSON");

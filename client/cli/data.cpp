@@ -22,11 +22,14 @@ Status CheckItem(DataAction action, const std::string& item) {
   }
   const Result<DataArgument> data = ParseDataArgument(item);
   if (!data.ok()) return data.status();
-  if (data->path.starts_with('/')) return Status::Ok();
-  std::error_code error;
-  const std::string here = std::filesystem::absolute(data->path, error).lexically_normal().string();
-  return Status::InvalidArgument(
-      fmt::format("{}: the path must be absolute, since it is one of the coordinator's host; on this host it would be {}", item, here));
+  for (const std::string& path : {data->path, data->layers.labels, data->layers.label_colors, data->layers.overlay}) {
+    if (path.empty() || path.starts_with('/')) continue;
+    std::error_code error;
+    const std::string here = std::filesystem::absolute(path, error).lexically_normal().string();
+    return Status::InvalidArgument(
+        fmt::format("{}: the path must be absolute, since it is one of the coordinator's host; on this host it would be {}", item, here));
+  }
+  return Status::Ok();
 }
 
 }  // namespace

@@ -10,6 +10,15 @@
 #include "common/volume/memory_budget.h"
 
 namespace slabstream {
+namespace {
+
+std::string LayersText(const DatasetStatus& dataset) {
+  std::string text = dataset.labels > 0 ? fmt::format("{} label{}", dataset.labels, dataset.labels == 1 ? "" : "s") : "";
+  if (dataset.overlay) text += text.empty() ? "overlay" : ", overlay";
+  return text.empty() ? "-" : text;
+}
+
+}  // namespace
 
 std::string_view NameOf(DatasetState state) {
   switch (state) {
@@ -36,6 +45,7 @@ nlohmann::ordered_json DatasetJson(const DatasetStatus& dataset) {
     entry["type"] = NameOf(dataset.description.type);
     entry["spacing"] = {geometry.spacing.x, geometry.spacing.y, geometry.spacing.z};
     entry["memory_bytes"] = dataset.memory_bytes;
+    entry["layers"] = {{"labels", dataset.labels}, {"overlay", dataset.overlay}};
     entry["range"] = {{"min", dataset.range.min}, {"max", dataset.range.max}};
   }
   if (dataset.state == DatasetState::kFailed) entry["error"] = dataset.error;
@@ -44,17 +54,18 @@ nlohmann::ordered_json DatasetJson(const DatasetStatus& dataset) {
 }
 
 std::string DatasetTableText(const std::vector<DatasetStatus>& datasets) {
-  constexpr std::size_t kColumns = 7;
+  constexpr std::size_t kColumns = 8;
   using Row = std::array<std::string, kColumns>;
-  std::vector<Row> rows = {{"NAME", "STATE", "FOR", "SIZE", "TYPE", "SPACING", "MEMORY"}};
+  std::vector<Row> rows = {{"NAME", "STATE", "FOR", "SIZE", "TYPE", "SPACING", "MEMORY", "LAYERS"}};
   for (const DatasetStatus& dataset : datasets) {
-    Row row = {Printable(dataset.name), std::string(NameOf(dataset.state)), AgeText(dataset.since_ms), "-", "-", "-", "-"};
+    Row row = {Printable(dataset.name), std::string(NameOf(dataset.state)), AgeText(dataset.since_ms), "-", "-", "-", "-", "-"};
     if (dataset.state == DatasetState::kReady) {
       const auto& [size, spacing, unused] = dataset.description.geometry;
       row[3] = fmt::format("{} x {} x {}", size.x, size.y, size.z);
       row[4] = NameOf(dataset.description.type);
       row[5] = fmt::format("{:.4g} x {:.4g} x {:.4g}", spacing.x, spacing.y, spacing.z);
       row[6] = MemoryText(dataset.memory_bytes);
+      row[7] = LayersText(dataset);
     }
     rows.push_back(std::move(row));
   }

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <numeric>
+#include <span>
 #include <string_view>
 
 #include "client/cli/commands.h"
@@ -110,8 +111,59 @@ std::string JsonText(const nlohmann::ordered_json& json) {
   return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
+// Voxels of the volume by number of the label.
+std::vector<std::uint64_t> CountLabels(const Layers& layers) {
+  std::vector<std::uint64_t> counts(layers.table->labels.size() + 1);
+  VisitScalarType(layers.labels->block.type, [&]<class T>(const T*) {
+    const VoxelBlock& block = layers.labels->block;
+    for (const T number : std::span(block.samples<T>(), std::size_t(block.box.voxel_count()))) ++counts[std::size_t(number)];
+  });
+  return counts;
+}
+
+std::string ColorText(const std::array<float, 3>& color) {
+  const auto byte = [](float channel) { return int(std::lround(255 * channel)); };
+  return fmt::format("#{:02x}{:02x}{:02x}", byte(color[0]), byte(color[1]), byte(color[2]));
+}
+
+std::string LayersText(const Layers& layers) {
+  std::string text;
+  if (layers.labels != nullptr) {
+    const std::vector<std::uint64_t> counts = CountLabels(layers);
+    text += fmt::format("label layer  {} labels: value, colour, voxels of this volume, name\n", layers.table->labels.size());
+    for (std::size_t i = 0; i < layers.table->labels.size(); ++i) {
+      const Label& label = layers.table->labels[i];
+      text += fmt::format("  {:>8} {} {:>10} {}\n", label.value, ColorText(label.color), counts[i + 1], label.name);
+    }
+  }
+  if (layers.overlay != nullptr) {
+    const VolumeSummary summary = Summarize(*layers.overlay);
+    text += fmt::format("overlay      values {:g} ... {:g}; {} voxels of this volume have none\n", summary.range.min, summary.range.max,
+                        summary.non_finite);
+  }
+  return text;
+}
+
+nlohmann::ordered_json LayersJson(const Layers& layers) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  if (layers.labels != nullptr) {
+    const std::vector<std::uint64_t> counts = CountLabels(layers);
+    json["labels"] = nlohmann::ordered_json::array();
+    for (std::size_t i = 0; i < layers.table->labels.size(); ++i) {
+      const Label& label = layers.table->labels[i];
+      json["labels"].push_back(
+          {{"value", label.value}, {"name", label.name}, {"color", ColorText(label.color)}, {"voxels", counts[i + 1]}});
+    }
+  }
+  if (layers.overlay != nullptr) {
+    const VolumeSummary summary = Summarize(*layers.overlay);
+    json["overlay"] = {{"range", {{"min", summary.range.min}, {"max", summary.range.max}}}, {"no_value", summary.non_finite}};
+  }
+  return json;
+}
+
 std::string InfoJson(const VolumeFileInfo& info, const VolumeSummary& summary, const std::string& transfer, double occupancy,
-                     const std::vector<DicomSeries>& series) {
+                     const std::vector<DicomSeries>& series, const Layers& layers) {
   const VolumeDescription& d = info.description;
   const Orientation& orientation = d.geometry.orientation;
   nlohmann::ordered_json world = {
@@ -138,6 +190,7 @@ std::string InfoJson(const VolumeFileInfo& info, const VolumeSummary& summary, c
                                  {"occupancy", occupancy},
                                  {"histogram", summary.histogram}};
   if (!series.empty()) json["series"] = SeriesJson(series);
+  if (layers.types().any()) json["layers"] = LayersJson(layers);
   return JsonText(json);
 }
 
@@ -162,9 +215,12 @@ Status RunInfo(const InfoOptions& options) {
   if (!transfer.ok()) return transfer.status();
   const double occupancy = EstimateOccupancy(summary, *transfer);
 
+  const Result<Layers> layers = ReadLayers(options.layers, loaded->info.description.geometry);
+  if (!layers.ok()) return AsInput(layers.status());
+
   const std::string name = TransferName(options.transfer);
-  std::cout << (options.json ? InfoJson(loaded->info, summary, name, occupancy, *series)
-                             : InfoText(loaded->info, summary, name, occupancy));
+  std::cout << (options.json ? InfoJson(loaded->info, summary, name, occupancy, *series, *layers)
+                             : InfoText(loaded->info, summary, name, occupancy) + LayersText(*layers));
   return Status::Ok();
 }
 

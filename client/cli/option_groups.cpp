@@ -11,6 +11,7 @@
 
 #include "client/cli/camera_json.h"
 #include "client/cli/cores.h"
+#include "client/cli/layer_options.h"
 #include "client/cli/values.h"
 #include "client/cli/volume_argument.h"
 #include "common/base/files.h"
@@ -209,10 +210,27 @@ void AddPictureFormat(CLI::App& app, PictureFormat& format) {
   AddChoice<int, 2>(app, "--depth", format.png_bits, {"8", "16"}, {8, 16}, "Bits of each channel of a PNG: 8 or 16")->default_str("8");
 }
 
+void AddSurfaceOptions(CLI::App& app, TransferChoice& transfer) {
+  AddParsed(
+      app, "--isovalue", transfer.isosurfaces,
+      [](const std::string& option, const std::string& text) { return ParseIsosurfaces(option, text); },
+      "Draw the surfaces at these data values, as in 120:red:0.3,300; COLOUR is as for --background, OPACITY is 1 if left out. Without "
+      "--transfer they stand alone, else both are drawn. zbuffer: voxels of at least V are opaque, in the colour of the greatest V that "
+      "they reach; for --renderer raycast and zbuffer")
+      ->type_name("V[:COLOUR[:OPACITY]],...");
+  AddParsed(
+      app, "--gradient-opacity", transfer.gradient_opacities,
+      [](const std::string& option, const std::string& text) { return ParseGradientOpacities(option, text); },
+      "Multiply opacities by a factor O that depends on the gradient's magnitude G, in data values per unit of the world (mm of a "
+      "patient); linear between the points, which ascend; for --renderer raycast")
+      ->type_name("G:O,...");
+}
+
 void AddLookOptions(CLI::App& app, FrameRequest& request, PictureFormat& format) {
   app.option_defaults()->group("Look");
   AddRendererOptions(app, request);
   AddTransferOptions(app, request.transfer);
+  AddSurfaceOptions(app, request.transfer);
   AddChoice<ShadingModel, 3>(
       app, "--shading", request.shading.model, kShadingModelNames,
       {ShadingModel::kPhong, ShadingModel::kNone, ShadingModel::kDepthGradient},
@@ -363,7 +381,11 @@ void ResolveSource(CLI::App& app, const CLI::Option* source, std::string& volume
           fmt::format("'{}' is a dataset at the service: how its file is read is said where it is named, as in --data {}", argument->volume,
                       WithReadOptions(app, "NAME=FILE")));
     }
-    if (argument->transfer) transfer.choice = *std::move(argument->transfer);
+    if (argument->transfer) {
+      transfer.choice = *std::move(argument->transfer);
+    } else if (!transfer.isosurfaces.empty() && app.get_option("--transfer")->count() == 0) {
+      transfer.choice = std::string(kNoTransfer);
+    }
   });
 }
 
@@ -418,6 +440,7 @@ void AddSliceOptions(CLI::App& app, SliceOptions& options) {
     AddParameter(app, parameter, std::string(parameter.purpose), request);
   }
   AddPictureFormat(app, options.format);
+  AddLayerOptions(app, request, options.layers, false);
   ResolveSource(app, source, options.source, request.transfer, [&options] { return options.connection.local_workers > 0; });
 }
 
@@ -432,6 +455,7 @@ void AddFrameOptions(CLI::App& app, FrameOptions& options, std::initializer_list
   AddViewOptions(app, options.request.view, options.request.size);
   AddClipOptions(app, options.request.clipping);
   AddLookOptions(app, options.request, options.format);
+  AddLayerOptions(app, options.request, options.layers);
   AddAnnotationOptions(app, options.format.annotations);
   AddPolicyOptions(app, options.request.policy);
   ResolveSource(app, source, options.source, options.request.transfer, [&options] { return options.connection.local_workers > 0; });

@@ -13,6 +13,7 @@
 #include "client/image_io/image_writer.h"
 #include "common/base/time.h"
 #include "common/frame/frame_request.h"
+#include "common/layers/layer_reader.h"
 #include "common/volume/sphere.h"
 #include "common/volume_io/sample_type.h"
 #include "common/wire/client_messages.h"
@@ -40,6 +41,7 @@ struct ConnectionOptions {
 struct FrameOptions {
   ConnectionOptions connection;
   std::string source;    // a name of the catalogue; a path with local_workers > 0
+  LayerFiles layers;     // with local_workers > 0
   FrameRequest request;  // `dataset` is filled in when the connection is open
   PictureFormat format;
   bool record = true;                               // pictures hold how they were made
@@ -69,6 +71,7 @@ struct TurntableOptions {
 struct SliceOptions {
   ConnectionOptions connection;
   std::string source, output;
+  LayerFiles layers;  // with local_workers > 0
   std::span<const SlicePlane> planes = kSliceChoices.back().planes;
   std::optional<Vec3> at;               // a point of the world
   std::optional<std::int32_t> index;    // of the slice; of one plane only. Neither: the volume's centre
@@ -80,6 +83,7 @@ struct SliceOptions {
 
 struct InfoOptions {
   std::string path;
+  LayerFiles layers;
   TransferChoice transfer;
   bool json = false;
 };

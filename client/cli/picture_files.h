@@ -1,15 +1,19 @@
 // PictureFiles: each picture becomes the file that its job names.
 #pragma once
 
+#include <utility>
+
 #include "client/cli/picture_sink.h"
 #include "client/image_io/image_writer.h"
+#include "common/layers/layer_reader.h"
 
 namespace slabstream {
 
 class PictureFiles : public PictureSink {
  public:
-  // `record`: the files say how they were made (picture_record.h).
-  PictureFiles(const PictureFormat& format, bool record) : format_(format), record_(record) {}
+  // `record`: the files say how they were made (picture_record.h), with these files of layers.
+  PictureFiles(const PictureFormat& format, bool record, LayerFiles layers)
+      : format_(format), record_(record), layers_(std::move(layers)) {}
 
   bool in_order() const override { return false; }
   Status Put(const Picture& picture, const FrameJob& job) override;
@@ -19,6 +23,7 @@ class PictureFiles : public PictureSink {
  private:
   const PictureFormat format_;
   const bool record_;
+  const LayerFiles layers_;
 };
 
 }  // namespace slabstream

@@ -70,6 +70,10 @@ bool HasOwnTransfer(const PictureRecord& record) { return std::holds_alternative
 std::string RecordLines(const PictureRecord& record, const std::string& output) {
   std::string text = fmt::format("made by      {}\nsource       {}\nrequest\n", record.program, record.source);
   AddLines("", record.json["request"], text);
+  if (record.layers.any()) {
+    text += "layers\n";
+    AddLines("", record.json["layers"], text);
+  }
   text += "picture\n";
   AddLines("", record.json["picture"], text);
   text += "geometry\n";
@@ -100,6 +104,7 @@ Status RunPictureInfo(const InfoOptions& options) {
   if (options.transfer != TransferChoice{}) {
     return Status::InvalidArgument(fmt::format("SOURCE '{}' is a picture, which no transfer function applies to", options.path));
   }
+  if (options.layers.any()) return Status::InvalidArgument(fmt::format("SOURCE '{}' is a picture, which has no layers", options.path));
   const Result<PictureHeader> header = ReadPictureHeader(options.path);
   if (!header.ok()) return Status(header.status().code(), "SOURCE " + header.status().message());
   std::optional<PictureRecord> record;

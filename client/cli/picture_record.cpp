@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "client/cli/camera_json.h"
+#include "client/cli/layer_options.h"
 #include "common/base/version.h"
 #include "common/view/named_view.h"
 #include "common/volume_io/volume_reader.h"
@@ -124,11 +125,21 @@ void AddShading(OptionList& out, const Shading& shading) {
 
 void AddTransfer(OptionList& out, const TransferChoice& transfer) {
   const TransferChoice usual;
-  const auto& [choice, opacity_distance, scalar_range] = transfer;
+  const auto& [choice, opacity_distance, scalar_range, isosurfaces, gradient_opacities] = transfer;
   const auto* preset = std::get_if<std::string>(&choice);
-  out.Name("--transfer", preset != nullptr ? *preset : kColorMapFile, std::get<std::string>(usual.choice));
+  out.Name("--transfer", preset != nullptr ? *preset : kColorMapFile,
+           isosurfaces.empty() ? std::get<std::string>(usual.choice) : std::string(kNoTransfer));
   if (scalar_range) out.Add("--scalar-range", fmt::format("{}:{}", scalar_range->min, scalar_range->max));
   out.Number("--opacity-distance", opacity_distance, usual.opacity_distance);
+  std::string list;
+  for (const auto& [value, color, opacity] : isosurfaces) {
+    const auto& [r, g, b] = color;
+    list += fmt::format("{}{}:{},{},{}:{}", list.empty() ? "" : ",", value, r, g, b, opacity);
+  }
+  if (!list.empty()) out.Add("--isovalue", list);
+  list.clear();
+  for (const auto& [slope, opacity] : gradient_opacities) list += fmt::format("{}{}:{}", list.empty() ? "" : ",", slope, opacity);
+  if (!list.empty()) out.Add("--gradient-opacity", list);
 }
 
 // `render` has no option for a slab: that is for slices.
@@ -174,6 +185,11 @@ void AddFormat(OptionList& out, const PictureFormat& format) {
   out.Flag("--orientation-marker", orientation_marker);
 }
 
+void ReadLayerFiles(const JsonValue& value, LayerFiles& files) {
+  value.Fields({{"labels", [&](const JsonValue& v) { SetLabelFiles(v.Text(), files); }},
+                {"overlay", [&](const JsonValue& v) { files.overlay = v.Text(); }}});
+}
+
 // Names of catalogues have no slashes, and hardly ever the ending of a volume file.
 bool IsFile(const std::string& source) {
   return source.find('/') != std::string::npos || LooksLikeVolume(source.substr(0, source.find('?')));
@@ -181,15 +197,17 @@ bool IsFile(const std::string& source) {
 
 }  // namespace
 
-std::string RecordText(const std::string& source, const FrameRequest& request, const PictureFormat& format,
-                       const PictureGeometry& geometry) {
+std::string RecordText(const std::string& source, const FrameRequest& request, const PictureFormat& format, const PictureGeometry& geometry,
+                       const LayerFiles& layers) {
   Json made = Json::parse(RequestToJson(request));
   made.erase("dataset");  // the source says it
-  const Json json = {{"program", fmt::format("{}{}", kProgram, Version())},
-                     {"source", source},
-                     {"request", std::move(made)},
-                     {"picture", FormatJson(format)},
-                     {"geometry", GeometryJson(geometry)}};
+  Json json = {{"program", fmt::format("{}{}", kProgram, Version())},
+               {"source", source},
+               {"request", std::move(made)},
+               {"picture", FormatJson(format)},
+               {"geometry", GeometryJson(geometry)}};
+  if (!layers.labels.empty()) json["layers"]["labels"] = LabelText(layers);
+  if (!layers.overlay.empty()) json["layers"]["overlay"] = layers.overlay;
   return json.dump(-1, ' ', true, Json::error_handler_t::replace);
 }
 
@@ -202,6 +220,7 @@ Result<PictureRecord> ParseRecord(std::string_view text) {
   const JsonValue value(*json, "record", mistake);
   value.Fields({{"program", [&](const JsonValue& v) { record.program = v.Text(); }},
                 {"source", [&](const JsonValue& v) { record.source = v.Text(); }},
+                {"layers", [&](const JsonValue& v) { ReadLayerFiles(v, record.layers); }},
                 {"request", [&](const JsonValue&) { request = (*json)["request"].dump(); }},
                 {"picture", [&](const JsonValue& v) { ReadFormat(v, record.format); }},
                 {"geometry", [](const JsonValue& v) { (void)v.At("pixel_size"); }}});
@@ -216,7 +235,8 @@ Result<PictureRecord> ParseRecord(std::string_view text) {
 
 std::vector<std::string> RenderArguments(const PictureRecord& record, const std::string& output) {
   const FrameRequest usual;
-  const auto& [dataset, renderer, parameters, size, view, clipping, transfer, shading, termination, policy, previews] = record.request;
+  const auto& [dataset, renderer, parameters, size, view, clipping, transfer, labels, overlay, shading, termination, policy, previews] =
+      record.request;
   OptionList out;
   out.Add("render");
   const bool like_an_option = record.source.starts_with('-');
@@ -228,6 +248,7 @@ std::vector<std::string> RenderArguments(const PictureRecord& record, const std:
   out.Name("--renderer", renderer, usual.renderer);
   for (const auto& [name, text] : parameters) out.Add("--" + name, text);
   AddTransfer(out, transfer);
+  for (const std::string& argument : LayerArguments(record.request, record.layers)) out.Add(argument);
   AddShading(out, shading);
   out.Number("--termination", termination, usual.termination);
   AddPolicy(out, policy);

@@ -1,6 +1,7 @@
 // The record of a picture: how it was made, as the text that its file holds (PictureNotes). It is JSON:
 //
 //   {"program": "slabstream 0.2.0", "source": "brain.nii.gz",             SOURCE as it was typed
+//    "layers": {"labels", "overlay"},                                     likewise, if there are any
 //    "request": {...},                                                    RequestToJson (common/wire/request_json.h)
 //    "picture": {"depth", "background", "title", "scale_bar", "orientation_marker"},
 //    "geometry": {"world", "unit", "projection", "right", "up", "forward", "target", "target_depth", "pixel_size"}}
@@ -16,20 +17,22 @@
 #include "client/image_io/image_writer.h"
 #include "common/base/status.h"
 #include "common/frame/frame_request.h"
+#include "common/layers/layer_reader.h"
 
 namespace slabstream {
 
 struct PictureRecord {
   std::string program;
   std::string source;
+  LayerFiles layers;
   FrameRequest request;  // its dataset does not count
   PictureFormat format;
   Json json;  // of the whole record
 };
 
 // ASCII, one line.
-std::string RecordText(const std::string& source, const FrameRequest& request, const PictureFormat& format,
-                       const PictureGeometry& geometry);
+std::string RecordText(const std::string& source, const FrameRequest& request, const PictureFormat& format, const PictureGeometry& geometry,
+                       const LayerFiles& layers = {});
 // InvalidArgument, one line: what is wrong with the text.
 Result<PictureRecord> ParseRecord(std::string_view text);
 

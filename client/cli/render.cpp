@@ -42,13 +42,13 @@ Status CheckPaths(const FrameOptions& options, const std::string& output) {
 }
 
 // Connects to the service for the volumes of all jobs, and fills in their datasets.
-Result<Session> OpenSession(const ConnectionOptions& connection, std::vector<FrameJob>& jobs) {
+Result<Session> OpenSession(const FrameOptions& options, std::vector<FrameJob>& jobs) {
   std::vector<std::string> sources;
   std::map<std::string, std::size_t> numbers;
   for (const FrameJob& job : jobs) {
     if (numbers.emplace(job.source, sources.size()).second) sources.push_back(job.source);
   }
-  Result<Session> session = Session::Open(connection, sources);
+  Result<Session> session = Session::Open(options.connection, sources, options.layers);
   if (!session.ok()) return session;
   for (FrameJob& job : jobs) job.request.dataset = session->dataset(numbers[job.source]);
   return session;
@@ -57,7 +57,7 @@ Result<Session> OpenSession(const ConnectionOptions& connection, std::vector<Fra
 // The pictures of `jobs`, and the files beside them (--stats, --trace).
 Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std::vector<FrameJob> jobs, PictureSink& pictures,
                                                 int in_flight) {
-  Result<Session> session = OpenSession(options.connection, jobs);
+  Result<Session> session = OpenSession(options, jobs);
   if (!session.ok()) return session.status();
   if (Status status = Validate(jobs.front().request); !status.ok()) return status;
 
@@ -91,7 +91,7 @@ Result<std::unique_ptr<PictureSink>> OpenPictures(const TurntableOptions& option
     }
     if (Status status = CheckPicturePath(first_output); !status.ok()) return status;
     if (Status status = CheckPaths(options.frame, first_output); !status.ok()) return status;
-    return std::unique_ptr<PictureSink>(std::make_unique<PictureFiles>(options.frame.format, options.frame.record));
+    return std::unique_ptr<PictureSink>(std::make_unique<PictureFiles>(options.frame.format, options.frame.record, options.frame.layers));
   }
   MovieOptions movie{.path = movie_path, .size = options.frame.request.size, .format = options.frame.format};
   if (options.frames_per_second) movie.frames_per_second = *options.frames_per_second;
@@ -165,7 +165,7 @@ Status RunRender(const RenderOptions& options) {
   const Time start = MonotonicNow();
   if (Status status = CheckPicturePath(options.output); !status.ok()) return status;
   if (Status status = CheckPaths(options.frame, options.output); !status.ok()) return status;
-  PictureFiles files(options.frame.format, options.frame.record);
+  PictureFiles files(options.frame.format, options.frame.record, options.frame.layers);
   const auto frames = RenderPictures(options.frame, {{options.frame.request, options.output, options.frame.source}}, files, 1);
   if (!frames.ok()) return frames.status();
   const ImageSize size = options.frame.request.size;

@@ -14,10 +14,15 @@ namespace {
 
 constexpr const char* kLocalDataset = "volume";
 
-Result<std::shared_ptr<const Volume>> LoadInput(const std::string& path) {
+Result<LayeredVolume> LoadInput(const std::string& path, const LayerFiles& files) {
   Result<LoadedVolume> loaded = ReadInputVolume(path);
   if (!loaded.ok()) return loaded.status();
-  return std::move(loaded->volume);
+  LayeredVolume layered{.volume = std::move(loaded->volume)};
+  if (!files.any()) return layered;
+  Result<Layers> layers = ReadLayers(files, layered.volume->description.geometry);
+  if (!layers.ok()) return AsInput(layers.status());
+  layered.layers = *std::move(layers);
+  return layered;
 }
 
 }  // namespace
@@ -26,8 +31,14 @@ Session::Session() = default;
 Session::Session(Session&&) noexcept = default;
 Session::~Session() = default;
 
-Result<Session> Session::Open(const ConnectionOptions& connection, std::span<const std::string> sources) {
+Result<Session> Session::Open(const ConnectionOptions& connection, std::span<const std::string> sources, const LayerFiles& layers) {
   if (connection.local_workers == 0) {
+    if (layers.any()) {
+      return Status::InvalidArgument(
+          fmt::format("--{} needs --local: at a service layers belong to the dataset, as --data "
+                      "NAME=FILE,labels=FILE,overlay=FILE says, and --label-mode or --overlay-transfer shows them",
+                      layers.labels.empty() ? "overlay" : "labels"));
+    }
     for (const std::string& source : sources) {
       if (source.size() <= kMaxNameBytes) continue;
       return Status::InvalidArgument(fmt::format("SOURCE has {} bytes, a dataset's name has at most {}", source.size(), kMaxNameBytes));
@@ -36,23 +47,26 @@ Result<Session> Session::Open(const ConnectionOptions& connection, std::span<con
     if (session.ok()) session->datasets_.assign(sources.begin(), sources.end());
     return session;
   }
-  std::vector<LoadVolume> loads;
+  std::vector<DataSource> files;
   for (const std::string& source : sources) {
     if (Status status = CheckInputVolume(source); !status.ok()) return status;
-    loads.emplace_back([source] { return LoadInput(source); });
+    files.emplace_back([source, layers] { return LoadInput(source, layers); });
   }
-  return OpenLocal(connection, std::move(loads));
+  if (layers.any()) {
+    if (const auto headers = CheckLayerHeaders(layers); !headers.ok()) return AsInput(headers.status());
+  }
+  return OpenLocal(connection, std::move(files));
 }
 
-Result<Session> Session::OpenLocal(const ConnectionOptions& connection, std::vector<LoadVolume> loads) {
+Result<Session> Session::OpenLocal(const ConnectionOptions& connection, std::vector<DataSource> sources) {
   Session session;
   session.context_ = std::make_unique<Context>();
   EmbeddedOptions options;
   options.workers = connection.local_workers;
-  for (LoadVolume& load : loads) {
+  for (DataSource& source : sources) {
     const std::size_t number = session.datasets_.size();
     session.datasets_.push_back(number == 0 ? kLocalDataset : fmt::format("{}-{}", kLocalDataset, number));
-    options.coordinator.catalogue[session.datasets_.back()] = std::move(load);
+    options.coordinator.catalogue[session.datasets_.back()] = std::move(source);
   }
   options.worker.threads = std::uint32_t(LocalThreads(connection));
   Result<std::unique_ptr<EmbeddedService>> service = EmbeddedService::Start(*session.context_, std::move(options));

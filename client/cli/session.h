@@ -1,7 +1,6 @@
 // Session: a client connected to a service, or to an embedded one of its own (`--local`).
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -10,7 +9,8 @@
 #include "client/cli/options.h"
 #include "client/client.h"
 #include "common/base/status.h"
-#include "common/volume/volume.h"
+#include "common/layers/layer_reader.h"
+#include "coordinator/data_source.h"
 
 namespace slabstream {
 
@@ -20,12 +20,14 @@ class Session {
  public:
   // For volumes `sources`, at least one. At the service they are names of its catalogue. With local workers they are volume files: Open
   // checks that they exist, and the first frame of each reads it. Unavailable within 5 s if nobody answers.
-  static Result<Session> Open(const ConnectionOptions& connection, std::span<const std::string> sources);
-  static Result<Session> Open(const ConnectionOptions& connection, const std::string& source) { return Open(connection, {&source, 1}); }
-  // In this process, by connection.local_workers > 0. Each of `loads` supplies a volume when the first frame needs it, on a thread of its
-  // own.
-  using LoadVolume = std::function<Result<std::shared_ptr<const Volume>>()>;
-  static Result<Session> OpenLocal(const ConnectionOptions& connection, std::vector<LoadVolume> loads);
+  // `layers`: files that belong to each of them, with local workers only; else InvalidArgument.
+  static Result<Session> Open(const ConnectionOptions& connection, std::span<const std::string> sources, const LayerFiles& layers = {});
+  static Result<Session> Open(const ConnectionOptions& connection, const std::string& source, const LayerFiles& layers = {}) {
+    return Open(connection, {&source, 1}, layers);
+  }
+  // In this process, by connection.local_workers > 0. A function in a source supplies its volume when the first frame needs it, on a thread
+  // of its own.
+  static Result<Session> OpenLocal(const ConnectionOptions& connection, std::vector<DataSource> sources);
   // The service alone, for `status`.
   static Result<Session> OpenService(const ServiceChoice& choice);
   static Result<Session> OpenService(const ServiceAddress& service);

@@ -1,5 +1,5 @@
 // `slice`: a plane through a volume, or a slab of it. It is a maximum intensity projection of what clipping leaves, so that it needs no
-// more voxels than those.
+// more voxels than those. With layers it is a ray casting of a plane, whose rays have one opaque sample each.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -53,16 +53,24 @@ Status RunSlice(const SliceOptions& options) {
   const ImageSize size = options.request.size;
   const ImageSize whole = {size.width * int(options.planes.size()), size.height};
   if (Status status = Validate(whole); !status.ok()) return status;
+  const bool layers = options.request.labels || options.request.overlay;
+  if (layers && options.thickness > 0) {
+    return Status::InvalidArgument(fmt::format("--thickness {} is no plane, and layers are shown in planes only", options.thickness));
+  }
   if (options.index && options.planes.size() > 1) {
     return Status::InvalidArgument(
         fmt::format("--index {} is the number of a slice of one --plane, but there are {}", *options.index, options.planes.size()));
   }
-  Result<Session> session = Session::Open(options.connection, options.source);
+  Result<Session> session = Session::Open(options.connection, options.source, options.layers);
   if (!session.ok()) return session.status();
   std::vector<FrameRequest> requests;
   for (const SlicePlane& plane : options.planes) {
     FrameRequest& request = requests.emplace_back(RequestOf(options, plane));
     request.dataset = session->dataset();
+    if (layers) {
+      request.renderer = "raycast";
+      request.shading.model = ShadingModel::kNone;
+    }
     if (options.window) request.transfer.choice = Window(*options.window, options.level.value_or(*options.window / 2));
     if (Status status = Validate(request); !status.ok()) return status;
   }

@@ -164,6 +164,71 @@ Result<StraightColor> ParseColor(std::string_view option, std::string_view text)
   return StraightColor{channels[0], channels[1], channels[2], channels[3]};
 }
 
+Result<std::vector<Isosurface>> ParseIsosurfaces(std::string_view option, std::string_view text) {
+  // Of surfaces without a colour, by their place in the list: bone, blood, fat, nerve and so on.
+  static constexpr std::array<Rgb, kMaxIsosurfaces> kColors = {{{0.92F, 0.84F, 0.72F},
+                                                                {0.80F, 0.30F, 0.26F},
+                                                                {0.38F, 0.60F, 0.86F},
+                                                                {0.95F, 0.78F, 0.35F},
+                                                                {0.45F, 0.72F, 0.48F},
+                                                                {0.66F, 0.48F, 0.78F},
+                                                                {0.88F, 0.55F, 0.70F},
+                                                                {0.60F, 0.60F, 0.60F}}};
+  std::vector<Isosurface> surfaces;
+  const std::vector<std::string_view> parts = Split(text, ',');
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (surfaces.size() == kColors.size()) {
+      return Status::InvalidArgument(fmt::format("{} '{}' has more than {} values", option, text, kMaxIsosurfaces));
+    }
+    std::string_view item = parts[i];
+    // A colour that begins with a digit goes on behind two more commas.
+    const std::size_t colon = item.find(':');
+    if (const std::string_view color = colon == std::string_view::npos ? "" : item.substr(colon + 1);
+        !color.empty() && std::string_view("0123456789.").find(color[0]) != std::string_view::npos && i + 2 < parts.size()) {
+      item = {item.data(), std::size_t(parts[i + 2].data() + parts[i + 2].size() - item.data())};
+      i += 2;
+    }
+    const std::vector<std::string_view> fields = Split(item, ':');
+    if (fields.size() > 3) return Status::InvalidArgument(fmt::format("{} '{}' is not V[:COLOUR[:OPACITY]]", option, item));
+    const Result<double> value = ParseNumber(option, fields[0], {-kMaxScalar, kMaxScalar});
+    if (!value.ok()) return value.status();
+    Isosurface surface{*value, kColors[surfaces.size()], 1};
+    if (fields.size() > 1) {
+      const Result<StraightColor> color = ParseColor(option, fields[1]);
+      if (!color.ok()) return color.status();
+      surface.color = {color->r, color->g, color->b};
+      surface.opacity = double(color->a);
+    }
+    if (fields.size() > 2) {
+      const Result<double> opacity = ParseNumber(option, fields[2], {0, 1});
+      if (!opacity.ok()) return opacity.status();
+      surface.opacity = *opacity;
+    }
+    surfaces.push_back(surface);
+  }
+  std::ranges::sort(surfaces, {}, &Isosurface::value);
+  const auto twice = std::ranges::adjacent_find(surfaces, {}, &Isosurface::value);
+  if (twice == surfaces.end()) return surfaces;
+  return Status::InvalidArgument(fmt::format("{} '{}' has the value {:g} twice", option, text, twice->value));
+}
+
+Result<std::vector<GradientOpacityPoint>> ParseGradientOpacities(std::string_view option, std::string_view text) {
+  std::vector<GradientOpacityPoint> points;
+  for (const std::string_view item : Split(text, ',')) {
+    const std::vector<std::string_view> fields = Split(item, ':');
+    if (fields.size() != 2) return Status::InvalidArgument(fmt::format("{} '{}' is not GRADIENT:OPACITY", option, item));
+    const Result<double> slope = ParseNumber(option, fields[0], {0, kMaxScalar});
+    if (!slope.ok()) return slope.status();
+    const Result<double> opacity = ParseNumber(option, fields[1], {0, 1});
+    if (!opacity.ok()) return opacity.status();
+    points.push_back({*slope, *opacity});
+  }
+  if (const Status status = Validate(points); !status.ok()) {
+    return Status::InvalidArgument(fmt::format("{} '{}': {}", option, text, status.message()));
+  }
+  return points;
+}
+
 Result<FramePattern> FramePattern::Parse(std::string_view option, std::string_view text) {
   const auto refuse = [&](std::string_view why) {
     return Status::InvalidArgument(fmt::format("{} '{}' {}; it needs one number such as %04d", option, text, why));

@@ -3,6 +3,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "client/image_io/image_writer.h"
 #include "common/base/status.h"
@@ -32,6 +33,14 @@ Result<ClipPlane> ParseClipPlane(std::string_view option, std::string_view text)
 // "R,G,B" (opaque) or "R,G,B,A", each in [0, 1]; "#rrggbb" or "#rrggbbaa"; or one of the names of CSS 2.1, such as "white". Codes and names
 // become codes of an 8-bit PNG as they are, without a transfer curve.
 Result<StraightColor> ParseColor(std::string_view option, std::string_view text);
+
+// "V[:COLOUR[:OPACITY]],...", such as "120:red:0.3,300": 1 to kMaxIsosurfaces different values in any order, here returned in ascending
+// order. COLOUR is as for ParseColor, but R,G,B has three numbers; OPACITY in [0, 1] is that of the colour if it is left out. Surfaces
+// without a colour have one of their own.
+Result<std::vector<Isosurface>> ParseIsosurfaces(std::string_view option, std::string_view text);
+
+// "G:O,G:O,...", with slopes G that ascend in [0, kMaxScalar] and opacities O in [0, 1].
+Result<std::vector<GradientOpacityPoint>> ParseGradientOpacities(std::string_view option, std::string_view text);
 
 // A file name with exactly one integer conversion, such as "frame_%04d.png"; "%%" stands for a percent sign.
 class FramePattern {

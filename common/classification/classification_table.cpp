@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace slabstream {
 namespace {
@@ -53,6 +54,13 @@ ClassificationTable Classify(const TransferFunction& transfer, const VolumeDescr
   }
   table.max_opacity = *std::max_element(table.opacity.begin(), table.opacity.end());
   return table;
+}
+
+float StoredIsovalue(double value, const ValueMapping& mapping) {
+  if (mapping.scale == 0) return std::numeric_limits<float>::infinity();  // every sample has the same value
+  const double stored = (value - mapping.offset) / mapping.scale;
+  constexpr double kMost = std::numeric_limits<float>::max();
+  return std::abs(stored) <= kMost ? float(stored) : float(std::copysign(std::numeric_limits<double>::infinity(), stored));
 }
 
 float MaxOpacity(const ClassificationTable& table, const VolumeDescription& description, ValueRange values) {

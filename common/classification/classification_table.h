@@ -24,11 +24,16 @@ struct ClassificationTable {
   float max_opacity = 0;        // over all bins
 
   int size() const { return int(opacity.size()); }
+  // The data value in the middle of a bin.
+  double ValueOf(int bin, const ValueMapping& mapping) const { return mapping.FromStored(stored_origin + bin / bin_from_stored_scale); }
   int BinOf(double stored) const {
     const double bin = (stored - stored_origin) * bin_from_stored_scale + 0.5;
     return bin <= 0 ? 0 : bin >= size() - 1 ? size() - 1 : int(bin);
   }
 };
+
+// An isovalue among stored samples, in their precision. It may be infinite: then no surface has it.
+float StoredIsovalue(double value, const ValueMapping& mapping);
 
 // `range` is in data values and comes from the volume's summary, so that all workers build the same table.
 ClassificationTable Classify(const TransferFunction& transfer, const VolumeDescription& description, ValueRange range);

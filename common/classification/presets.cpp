@@ -20,6 +20,8 @@ TransferFunction GrayRamp(const VolumeSummary& summary) {
   return {{{min, {0, 0, 0}}, {max, {1, 1, 1}}}, {{min, 0}, {max, 1}}};
 }
 
+TransferFunction None(const VolumeSummary& summary) { return {{{summary.range.min, {0, 0, 0}}}, {{summary.range.min, 0}}}; }
+
 // All but the lowest value is solid: masks, voxelised objects and Z-buffer renderings of them.
 TransferFunction Opaque(const VolumeSummary& summary) {
   const auto [min, max] = summary.range;
@@ -166,17 +168,18 @@ TransferFunction Window(const VolumeSummary& summary) {
 }
 
 // For T1: the brain lies between the fluids, which are dark, and the fat of the scalp, which is brightest. Both ends are almost clear, so
-// the brain shows through the skin.
+// the skin is a veil. Where grey matter shares its voxels with fluid, in the folds, it is dark, so that they stand out.
 TransferFunction MriHead(const VolumeSummary& summary) {
   const MaterialBins tissue = Material(summary);
   const double begin = BinBorder(summary.range, tissue.first);
   const auto at = [&](double q) { return Quantile(summary, tissue, q); };
-  return {{{begin, {0.50F, 0.30F, 0.25F}},
-           {at(0.4), {0.72F, 0.48F, 0.40F}},
-           {at(0.7), {0.93F, 0.76F, 0.65F}},
-           {at(0.9), {1, 0.93F, 0.84F}},
-           {at(0.99), {1, 0.90F, 0.70F}}},
-          {{at(0.2), 0}, {at(0.4), 0.015}, {at(0.6), 0.05}, {at(0.85), 0.12}, {at(0.95), 0.06}, {at(0.99), 0.03}}};
+  return {{{begin, {0.55F, 0.32F, 0.27F}},
+           {at(0.34), {0.50F, 0.22F, 0.17F}},
+           {at(0.47), {0.78F, 0.47F, 0.39F}},
+           {at(0.65), {0.95F, 0.72F, 0.62F}},
+           {at(0.86), {1, 0.93F, 0.86F}},
+           {at(0.975), {0.95F, 0.85F, 0.75F}}},
+          {{at(0.2), 0}, {at(0.36), 0.004}, {at(0.47), 0.05}, {at(0.75), 0.16}, {at(0.92), 0.12}, {at(0.96), 0.012}, {at(0.995), 0.006}}};
 }
 
 // Vessels are the brightest few per cent, or all of the material where everything else was masked out.
@@ -220,6 +223,7 @@ const std::vector<TransferPreset>& TransferPresets() {
       {"mri-head", "MRI: a whole head, the skin as a veil", MriHead},
       {"angiography", "CT or MR angiography: the vessels", Angiography},
       {"simulation", "simulations: glowing gas", Simulation},
+      {kNoTransfer, "nothing is visible, so that isosurfaces (--isovalue) stand alone", None},
   };
   return presets;
 }

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "common/base/range_status.h"
+
 namespace slabstream {
 namespace {
 
@@ -126,7 +128,54 @@ Status Validate(const TransferFunction& transfer) {
     return Status::InvalidArgument(fmt::format("transfer function: opacity distance is {:g} voxel lengths, must be in (0, {:g}]",
                                                transfer.opacity_distance, kMaxOpacityDistance));
   }
+  if (Status status = Validate(transfer.isosurfaces); !status.ok()) return status;
+  return Validate(transfer.gradient_opacities);
+}
+
+Status Validate(const std::vector<Isosurface>& isosurfaces) {
+  if (isosurfaces.size() > std::size_t{kMaxIsosurfaces}) {
+    return Status::InvalidArgument(
+        fmt::format("number of isosurfaces is {}, at most {} are possible", isosurfaces.size(), kMaxIsosurfaces));
+  }
+  for (std::size_t i = 0; i < isosurfaces.size(); ++i) {
+    const auto& [value, color, opacity] = isosurfaces[i];
+    const auto in_range = [&](std::string_view field, double number, double least, double most) {
+      return InRange(fmt::format("{} of isosurface {}", field, i), number, least, most);
+    };
+    if (Status s = in_range("value", value, -kMaxScalar, kMaxScalar); !s.ok()) return s;
+    if (Status s = in_range("red", double(color.r), 0, 1); !s.ok()) return s;
+    if (Status s = in_range("green", double(color.g), 0, 1); !s.ok()) return s;
+    if (Status s = in_range("blue", double(color.b), 0, 1); !s.ok()) return s;
+    if (Status s = in_range("opacity", opacity, 0, 1); !s.ok()) return s;
+    if (i == 0 || isosurfaces[i - 1].value < value) continue;
+    return Status::InvalidArgument(
+        fmt::format("value of isosurface {} is {:g}, must be above that of the one before, {:g}", i, value, isosurfaces[i - 1].value));
+  }
   return Status::Ok();
+}
+
+Status Validate(const std::vector<GradientOpacityPoint>& points) {
+  if (points.size() > std::size_t{kMaxTransferPoints}) {
+    return Status::InvalidArgument(
+        fmt::format("number of gradient opacity points is {}, at most {} are possible", points.size(), kMaxTransferPoints));
+  }
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const auto& [slope, opacity] = points[i];
+    if (Status s = InRange(fmt::format("slope of gradient opacity point {}", i), slope, 0, kMaxScalar); !s.ok()) return s;
+    if (Status s = InRange(fmt::format("opacity of gradient opacity point {}", i), opacity, 0, 1); !s.ok()) return s;
+    if (i == 0 || points[i - 1].slope <= slope) continue;
+    return Status::InvalidArgument(fmt::format("slope of gradient opacity point {} is {:g}, must be at least that of the one before, {:g}",
+                                               i, slope, points[i - 1].slope));
+  }
+  return Status::Ok();
+}
+
+double GradientOpacity(const std::vector<GradientOpacityPoint>& points, double slope) {
+  const auto end = std::ranges::upper_bound(points, slope, {}, &GradientOpacityPoint::slope);
+  if (end == points.begin()) return end->opacity;
+  const GradientOpacityPoint& before = end[-1];
+  if (end == points.end()) return before.opacity;
+  return std::lerp(before.opacity, end->opacity, (slope - before.slope) / (end->slope - before.slope));
 }
 
 double MaxOpacity(const TransferFunction& transfer, double low, double high) {

@@ -2,6 +2,8 @@
 // curve (Points) whose segments have a midpoint and a sharpness (0: linear, 1: a step at the midpoint; between them a Hermite curve,
 // as in vtkPiecewiseFunction). Outside the first and the last point the end value holds; at a step, the last of the points at that value.
 //
+// Beside the curves, isosurfaces may stand at single values, and a second opacity curve may lie over the gradient's magnitude.
+//
 // Opacity is that of `opacity_distance` voxel lengths of material (the smallest spacing), so a value's extinction per voxel length is
 // -ln(1 - opacity) / opacity_distance; renderers correct it for the distance between their samples.
 // Colours are straight (not premultiplied) and taken as linear: an opaque, unshaded voxel shows exactly these values.
@@ -19,6 +21,8 @@ namespace slabstream {
 
 inline constexpr int kMaxTransferPoints = 4096;     // of each curve
 inline constexpr double kMaxOpacityDistance = 1e6;  // voxel lengths
+inline constexpr int kMaxIsosurfaces = 8;
+inline constexpr double kMaxScalar = 1e300;  // of isovalues, slopes and the ends of scalar ranges; either sign
 
 struct Rgb {
   float r = 0, g = 0, b = 0;
@@ -39,10 +43,29 @@ struct OpacityPoint {
   friend bool operator==(const OpacityPoint&, const OpacityPoint&) = default;
 };
 
+// The surface at which the interpolated volume passes `value`: values of at least `value` lie on one side of it.
+struct Isosurface {
+  double value = 0;    // data value, in [-kMaxScalar, kMaxScalar]
+  Rgb color;           // each in [0, 1]
+  double opacity = 1;  // [0, 1], of one passage, whatever the angle
+  friend bool operator==(const Isosurface&, const Isosurface&) = default;
+};
+
+// A point of the curve over the gradient's magnitude. Between two points the curve is linear; outside the end value holds.
+struct GradientOpacityPoint {
+  double slope = 0;    // data values per unit of the world (mm of a patient), in [0, kMaxScalar]; points ascend (equal slopes: a step)
+  double opacity = 1;  // [0, 1]: a factor of the opacity that the value has
+  friend bool operator==(const GradientOpacityPoint&, const GradientOpacityPoint&) = default;
+};
+// points not empty, slope finite.
+double GradientOpacity(const std::vector<GradientOpacityPoint>& points, double slope);
+
 struct TransferFunction {
-  std::vector<ColorPoint> colors;       // 1 ... kMaxTransferPoints
-  std::vector<OpacityPoint> opacities;  // 1 ... kMaxTransferPoints
-  double opacity_distance = 1;          // voxel lengths, (0, kMaxOpacityDistance]
+  std::vector<ColorPoint> colors;                             // 1 ... kMaxTransferPoints
+  std::vector<OpacityPoint> opacities;                        // 1 ... kMaxTransferPoints
+  double opacity_distance = 1;                                // voxel lengths, (0, kMaxOpacityDistance]
+  std::vector<Isosurface> isosurfaces = {};                   // at most kMaxIsosurfaces, their values ascend
+  std::vector<GradientOpacityPoint> gradient_opacities = {};  // at most kMaxTransferPoints; empty: the factor is 1
 
   Rgb Color(double value) const;       // value finite
   double Opacity(double value) const;  // value finite; in [0, 1]
@@ -59,6 +82,8 @@ TransferFunction Stretched(TransferFunction transfer, const ScalarRange& range);
 
 // InvalidArgument naming the point, the value and the limit, unless everything stated above holds.
 Status Validate(const TransferFunction& transfer);
+Status Validate(const std::vector<Isosurface>& isosurfaces);
+Status Validate(const std::vector<GradientOpacityPoint>& points);
 
 // Largest opacity of any value in [low, high] (exact: at curve points and segment ends; the curves are monotone between points; of a step
 // above `low` both sides count). 0 if low > high. To decide whether a brick can be skipped, ask the ClassificationTable, which renderers
@@ -70,10 +95,11 @@ double MaxOpacity(const TransferFunction& transfer, double low, double high);
 // Colours are interpolated in RGB, whatever the map's ColorSpace. Errors: InvalidArgument, beginning with `name`.
 Result<TransferFunction> ParseParaViewColorMap(std::string_view json, std::string_view name);
 
-// The inverse, as a preset called `name`. `transfer` valid; its opacity_distance has no place there.
+// The inverse, as a preset called `name`. `transfer` valid; only its curves over data values have a place there.
 std::string FormatParaViewColorMap(const TransferFunction& transfer, std::string_view name);
 
-// Built-in transfer functions, chosen by name; "auto" is made from the histogram of the volume.
+// Built-in transfer functions, chosen by name; "auto" is made from the histogram of the volume, kNoTransfer shows nothing.
+inline constexpr std::string_view kNoTransfer = "none";
 struct TransferPreset {
   std::string_view name;     // what --transfer takes
   std::string_view purpose;  // one line for --help

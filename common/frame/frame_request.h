@@ -10,9 +10,11 @@
 #include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include "common/base/status.h"
 #include "common/classification/transfer_function.h"
+#include "common/frame/layer_look.h"
 #include "common/view/camera.h"
 #include "common/view/clip.h"
 #include "common/view/shading.h"
@@ -23,7 +25,6 @@ inline constexpr int kMaxGroups = 1024, kMaxTeams = 1024;
 inline constexpr double kDefaultTermination = 1.0 / 1024, kMaxTermination = 0.5;
 inline constexpr double kMaxPixelError = 0.1;
 inline constexpr std::size_t kMaxNameBytes = 256;
-inline constexpr double kMaxScalar = 1e300;  // of a scalar range, either sign
 
 // kAuto: z, or the longest axis of slabs (SlabAxis), so that turning the view never moves voxels. kView: the axis along which the slices of
 // the frame are traversed, so that no slice is divided. Each of the three axes then has its own layout; workers fetch its voxels when a
@@ -46,14 +47,24 @@ struct Policy {
   friend bool operator==(const Policy&, const Policy&) = default;
 };
 
-// A preset's name (resolved by the coordinator, which knows the volume) or the function itself.
+// A preset's name (resolved by the coordinator, which knows the volume) or the function itself. The other fields replace those of a preset
+// or function.
 struct TransferChoice {
   std::variant<std::string, TransferFunction> choice = std::string("auto");
-  double opacity_distance = 1;  // voxel lengths; replaces that of a preset or function
+  double opacity_distance = 1;  // voxel lengths
   // Data values onto which the curves are stretched, so that their first point is at `min` and their last one at `max`: in
   // [-kMaxScalar, kMaxScalar], min < max. None: they stay.
   std::optional<ScalarRange> scalar_range = {};
+  std::vector<Isosurface> isosurfaces = {};                   // of renderers that draw them (RendererKind::isosurfaces)
+  std::vector<GradientOpacityPoint> gradient_opacities = {};  // of renderers that use them (RendererKind::gradient_opacity)
   friend bool operator==(const TransferChoice&, const TransferChoice&) = default;
+};
+
+// How the overlay of a dataset is shown.
+struct OverlayChoice {
+  TransferChoice transfer;  // of its values
+  double weight = 1;        // [0, 1]: factor of its density in the mix
+  friend bool operator==(const OverlayChoice&, const OverlayChoice&) = default;
 };
 
 // Values of a renderer's parameters (RendererKind::parameters), by name, as a user types them. Missing ones have their defaults.
@@ -69,6 +80,8 @@ struct FrameRequest {
   ViewParameters view;
   Clipping clipping;  // empty: the whole volume is drawn
   TransferChoice transfer;
+  std::optional<LabelChoice> labels = {};     // none: those of the dataset, if it has any, are not shown
+  std::optional<OverlayChoice> overlay = {};  // likewise
   Shading shading;
   double termination = kDefaultTermination;  // [0, kMaxTermination]: transmittance below which what lies behind is skipped; 0: never
   Policy policy;

@@ -8,9 +8,11 @@
 
 #include "common/classification/transfer_function.h"
 #include "common/frame/frame_request.h"
+#include "common/frame/layer_look.h"
 #include "common/image/pixel_bounds.h"
 #include "common/image/pixel_format.h"
 #include "common/view/sheet_grid.h"
+#include "common/volume/layers.h"
 #include "common/volume/summary.h"
 
 namespace slabstream {
@@ -22,6 +24,7 @@ using DatasetId = std::uint64_t;  // a volume under a name: the same in every co
 struct FrameSetup {
   DatasetId dataset = 0;
   VolumeDescription description;
+  LayerTypes layers;                        // that the dataset has
   ValueRange range;                         // data values that the classification table is made for
   const RendererKind* renderer = nullptr;   // of Renderers(); lives as long as the program
   std::vector<double> parameters;           // one value for each of renderer->parameters()
@@ -30,11 +33,15 @@ struct FrameSetup {
   SheetGrid sheets;                         // the frame grid of renderers that work along slices; empty: the camera's grid
   ClipRegion clip;                          // empty: all is drawn
   TransferFunction transfer;
+  LayerLooks looks;  // of the layers that are shown, which the dataset has
   Shading shading;
   double termination = kDefaultTermination;
   std::int32_t halo = kHalo;  // voxels that a worker keeps round a box
   friend bool operator==(const FrameSetup&, const FrameSetup&) = default;
 };
+
+// What workers hold of each voxel.
+inline SampleTypes TypesOf(const FrameSetup& setup) { return {setup.description.type, setup.layers}; }
 
 // All pixels that workers render and combine, and that the final picture is made from. Local images, runs and pixel ranges lie in it.
 PixelBounds FrameBounds(const FrameSetup& setup);

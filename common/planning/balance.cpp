@@ -82,7 +82,7 @@ Layout Reassign(const Layout& layout, std::uint32_t slots, std::span<const doubl
 std::optional<Layout> Rebalance(const Layout& now, std::span<const double> seconds, const LayoutRequest& request, int frames_seen) {
   CHECK(request.known.cost != nullptr);
   CHECK_GE(frames_seen, 1);
-  const double voxel_seconds = double(BytesPerSample(request.summary->description.type)) / calibration::service::kVoxelRate;
+  const double voxel_seconds = double(request.summary->types().bytes_per_voxel()) / calibration::service::kVoxelRate;
   const double least_gain = kLeastGain * (1 + 1.0 / frames_seen);
   std::optional<Layout> chosen;
   double most_won = 0;

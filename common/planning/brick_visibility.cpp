@@ -7,8 +7,8 @@
 
 namespace slabstream {
 
-BrickVisibility::BrickVisibility(const VolumeSummary& summary, ClassificationTable drawn)
-    : summary_(summary), table_(std::move(drawn)), next_visible_(table_.opacity.size()) {
+BrickVisibility::BrickVisibility(const VolumeSummary& summary, ClassificationTable drawn, std::vector<std::uint8_t> layers)
+    : summary_(summary), table_(std::move(drawn)), layers_(std::move(layers)), next_visible_(table_.opacity.size()) {
   int next = table_.size();
   for (int bin = table_.size() - 1; bin >= 0; --bin) {
     if (table_.opacity[std::size_t(bin)] > 0) next = bin;
@@ -20,9 +20,9 @@ bool BrickVisibility::AnyVisible(const Box& box) const {
   const auto brick_of = [](std::int32_t voxel) { return voxel / kBrick; };
   for (std::int32_t z = brick_of(box.begin.z); z <= brick_of(box.end.z - 1); ++z) {
     for (std::int32_t y = brick_of(box.begin.y); y <= brick_of(box.end.y - 1); ++y) {
-      const ValueRange* const row = &summary_.bricks[NumberIn(summary_.brick_counts, {0, y, z})];
+      const std::size_t row = NumberIn(summary_.brick_counts, {0, y, z});
       for (std::int32_t x = brick_of(box.begin.x); x <= brick_of(box.end.x - 1); ++x) {
-        if (Visible(row[x])) return true;
+        if (Visible(row + std::size_t(x), 1)) return true;
       }
     }
   }
@@ -34,7 +34,7 @@ std::optional<BrickVisibility::Ball> BrickVisibility::VisibleBall(const ClipRegi
   std::vector<Box> visible;
   Box hull;
   for (std::size_t i = 0; i < summary_.bricks.size(); ++i) {
-    if (!Visible(summary_.bricks[i], 0)) continue;
+    if (!Visible(i, 0)) continue;
     const Index3 brick = PlaceIn(summary_.brick_counts, i);
     const Box box = Intersection({kBrick * brick, kBrick * (brick + Uniform(1))}, geometry.bounds());
     if (!clip.MayKeep(box)) continue;

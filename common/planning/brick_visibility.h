@@ -1,8 +1,10 @@
 // BrickVisibility: whether a renderer may draw any voxel of a box. The value ranges of the summary's bricks tell; no voxels are needed.
 //
-// Rounding is conservative: a box that is called empty holds no voxel whose bin has an opacity above zero in the renderer's DrawnTable.
+// Rounding is conservative: a box that is called empty holds no voxel whose bin has an opacity above zero in the renderer's DrawnTable, and
+// none that layers show.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -15,8 +17,11 @@ namespace slabstream {
 
 class BrickVisibility {
  public:
-  // `summary` must outlive this.
-  BrickVisibility(const VolumeSummary& summary, ClassificationTable drawn);
+  // `summary` must outlive this. `layers`: LayerBricks (layer_bricks.h).
+  BrickVisibility(const VolumeSummary& summary, ClassificationTable drawn, std::vector<std::uint8_t> layers = {});
+
+  // The brick can be visible.
+  bool AnyVisible(std::size_t brick) const { return Visible(brick, 1); }
 
   // True if a brick that touches `box` (not empty, inside the volume) can be visible.
   bool AnyVisible(const Box& box) const;
@@ -34,12 +39,16 @@ class BrickVisibility {
   OccupancyGrid VisibleCells() const;
 
  private:
-  bool Visible(const ValueRange& brick, int slack = 1) const;  // bins
+  bool Visible(std::size_t brick, int slack) const {  // bins
+    return Visible(summary_.bricks[brick], slack) || (!layers_.empty() && layers_[brick] != 0);
+  }
+  bool Visible(const ValueRange& brick, int slack) const;
   double StoredFromData(double value) const;
 
   const VolumeSummary& summary_;
   ClassificationTable table_;
-  std::vector<int> next_visible_;  // by bin: the lowest bin at or above it with an opacity above zero; table_.size(): none
+  std::vector<std::uint8_t> layers_;  // by brick; empty: none
+  std::vector<int> next_visible_;     // by bin: the lowest bin at or above it with an opacity above zero; table_.size(): none
 };
 
 }  // namespace slabstream

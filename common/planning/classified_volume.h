@@ -1,6 +1,6 @@
-// ClassifiedVolume: a loaded volume under one transfer function, as one renderer draws it, perhaps clipped. Layouts, chosen policies and
-// learnt costs belong to one of these, so it is their key; occupied voxels are counted of the whole volume. Copies share the transfer
-// function.
+// ClassifiedVolume: a loaded volume under one transfer function, as one renderer draws it, perhaps with layers, perhaps clipped. Layouts,
+// chosen policies and learnt costs belong to one of these, so it is their key; occupied voxels are counted of the whole volume. Copies
+// share the transfer function and the looks of layers.
 #pragma once
 
 #include <memory>
@@ -12,16 +12,18 @@ namespace slabstream {
 
 class ClassifiedVolume {
  public:
-  ClassifiedVolume(DatasetId dataset, TransferFunction transfer, const RendererKind* renderer, ClipRegion clip = {})
+  ClassifiedVolume(DatasetId dataset, TransferFunction transfer, const RendererKind* renderer, ClipRegion clip = {}, LayerLooks looks = {})
       : dataset_(dataset),
         transfer_(std::make_shared<const TransferFunction>(std::move(transfer))),
         renderer_(renderer),
-        clip_(std::move(clip)) {}
+        clip_(std::move(clip)),
+        looks_(std::make_shared<const LayerLooks>(std::move(looks))) {}
 
   DatasetId dataset() const { return dataset_; }
   const TransferFunction& transfer() const { return *transfer_; }
   const RendererKind* renderer() const { return renderer_; }
   const ClipRegion& clip() const { return clip_; }
+  const LayerLooks& looks() const { return *looks_; }
 
   ClassifiedVolume Whole() const {
     ClassifiedVolume whole = *this;
@@ -31,7 +33,7 @@ class ClassifiedVolume {
 
   friend bool operator==(const ClassifiedVolume& a, const ClassifiedVolume& b) {
     return a.dataset_ == b.dataset_ && a.renderer_ == b.renderer_ && a.clip_ == b.clip_ &&
-           (a.transfer_ == b.transfer_ || *a.transfer_ == *b.transfer_);
+           (a.transfer_ == b.transfer_ || *a.transfer_ == *b.transfer_) && (a.looks_ == b.looks_ || *a.looks_ == *b.looks_);
   }
 
  private:
@@ -39,6 +41,7 @@ class ClassifiedVolume {
   std::shared_ptr<const TransferFunction> transfer_;
   const RendererKind* renderer_;
   ClipRegion clip_;
+  std::shared_ptr<const LayerLooks> looks_;
 };
 
 }  // namespace slabstream

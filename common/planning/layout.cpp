@@ -9,6 +9,7 @@
 #include "common/planning/brick_visibility.h"
 #include "common/planning/clipped_cells.h"
 #include "common/planning/cost_estimator.h"
+#include "common/planning/layer_bricks.h"
 #include "common/planning/measured_cost.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/view/sheet_grid.h"
@@ -31,12 +32,17 @@ int MostGroups(const LayoutRequest& request, const ResolvedPolicy& policy) {
   return int(std::clamp<std::int64_t>(boxes / slots, 1, kMaxGroups));
 }
 
+std::vector<std::uint8_t> BricksOfLayers(const LayoutRequest& request) {
+  if (request.looks == nullptr) return {};
+  return LayerBricks(*request.summary, *request.renderer, *request.looks);
+}
+
 // The fields of work that layouts are made from, each made at its first use.
 class WorkFields {
  public:
   explicit WorkFields(const LayoutRequest& request)
       : request_(request),
-        visibility_(*request.summary, request.renderer->DrawnTable(*request.transfer, *request.summary)),
+        visibility_(*request.summary, request.renderer->DrawnTable(*request.transfer, *request.summary), BricksOfLayers(request)),
         clip_(request.clip != nullptr ? *request.clip : ClipRegion{}),
         voxels_(WorkField::Uniform(request.summary->description.geometry.size)) {}
 
@@ -93,7 +99,7 @@ struct LayoutMaker::State {
   }
 
   bool SlabsFit(const Partition& partition) {
-    const std::int64_t sample_bytes = BytesPerSample(request.summary->description.type);
+    const auto sample_bytes = std::int64_t(request.summary->types().bytes_per_voxel());
     return std::ranges::all_of(partition.boxes(), [&](const Box& box) {
       const std::int64_t bytes = Grown(box, request.renderer->reach(), partition.bounds()).voxel_count() * sample_bytes;
       return bytes <= request.slab_bytes_target || !fields.Shows(box);

@@ -41,8 +41,9 @@ struct LayoutRequest {
   const TransferFunction* transfer = nullptr;
   const ResolvedPolicy* policy = nullptr;
   const RendererKind* renderer = nullptr;
-  const ClipRegion* clip = nullptr;  // null: nothing is clipped
-  std::uint32_t slots = 1;           // >= 1
+  const ClipRegion* clip = nullptr;   // null: nothing is clipped
+  const LayerLooks* looks = nullptr;  // null: no layer is shown
+  std::uint32_t slots = 1;            // >= 1
   std::int64_t slab_bytes_target = kSlabBytesTarget;
   WorkKnowledge known;
   const Partition* resized = nullptr;  // partition to resize, of a layout by the same policy (DecompositionRequest); null: cut anew

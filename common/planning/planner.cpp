@@ -4,6 +4,7 @@
 
 #include "common/planning/brick_visibility.h"
 #include "common/planning/frame_plan.h"
+#include "common/planning/layer_bricks.h"
 #include "common/planning/placement.h"
 #include "common/renderers/registry.h"
 
@@ -26,6 +27,7 @@ Result<FrameSetup> MakeFrameSetup(const FrameRequest& request, DatasetId dataset
   FrameSetup setup;
   setup.dataset = dataset;
   setup.description = summary.description;
+  setup.layers = summary.layers();
   setup.range = summary.range;
   SetRenderer(*FindRenderer(request.renderer), setup);
   SetParameters(ParseParameters(*setup.renderer, request.parameters).value(), setup);
@@ -33,9 +35,14 @@ Result<FrameSetup> MakeFrameSetup(const FrameRequest& request, DatasetId dataset
   Result<ClipRegion> clip = MakeClipRegion(request.clipping, geometry);
   if (!clip.ok()) return clip.status();
   setup.clip = *std::move(clip);
+  Result<LayerLooks> looks = ResolveLayers(request, summary);
+  if (!looks.ok()) return looks.status();
+  setup.looks = *std::move(looks);
   ViewParameters view = request.view;
   if (view.fit) {
-    const auto ball = BrickVisibility(summary, setup.renderer->DrawnTable(*transfer, summary)).VisibleBall(setup.clip);
+    const BrickVisibility visibility(summary, setup.renderer->DrawnTable(*transfer, summary),
+                                     LayerBricks(summary, *setup.renderer, setup.looks));
+    const auto ball = visibility.VisibleBall(setup.clip);
     if (ball) view = FitView(view, geometry, ball->centre, request.clipping.slab ? RadiusOfSlab(*ball, request, geometry) : ball->radius);
   }
   if (Status status = CheckView(view, geometry); !status.ok()) return status;
@@ -53,6 +60,8 @@ Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const Vol
                                           : Result<TransferFunction>(std::get<TransferFunction>(choice.choice));
   if (!transfer.ok()) return transfer;
   transfer->opacity_distance = choice.opacity_distance;
+  transfer->isosurfaces = choice.isosurfaces;
+  transfer->gradient_opacities = choice.gradient_opacities;
   if (choice.scalar_range) return Stretched(*std::move(transfer), *choice.scalar_range);
   return transfer;
 }
@@ -89,11 +98,14 @@ Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, cons
     if (!transfer.ok()) return transfer.status();
     const Result<ClipRegion> clip = MakeClipRegion(request.clipping, summary.description.geometry);
     if (!clip.ok()) return clip.status();
+    const Result<LayerLooks> looks = ResolveLayers(request, summary);
+    if (!looks.ok()) return looks.status();
     layout = std::make_shared<const Layout>(MakeLayout({.summary = &summary,
                                                         .transfer = &*transfer,
                                                         .policy = &*policy,
                                                         .renderer = FindRenderer(request.renderer),
                                                         .clip = &*clip,
+                                                        .looks = &*looks,
                                                         .slots = std::max<std::uint32_t>(std::uint32_t(roster.slots.size()), 1),
                                                         .slab_bytes_target = slab_bytes_target}));
   }

@@ -2,8 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cstdint>
+#include <set>
+#include <string>
+
+#include "common/base/range_status.h"
 #include "common/renderers/registry.h"
-#include "common/view/range_status.h"
 
 namespace slabstream {
 namespace {
@@ -26,9 +31,55 @@ Status Validate(const TransferChoice& transfer) {
       return Status::InvalidArgument(fmt::format("transfer.scalar_range is {:g} to {:g}, but must rise", range->min, range->max));
     }
   }
+  if (Status s = Validate(transfer.isosurfaces); !s.ok()) return s;
+  if (Status s = Validate(transfer.gradient_opacities); !s.ok()) return s;
   if (transfer.opacity_distance > 0 && transfer.opacity_distance <= kMaxOpacityDistance) return Status::Ok();
   return Status::InvalidArgument(fmt::format("transfer.opacity_distance is {}, but must lie in (0, {}] voxel lengths",
                                              transfer.opacity_distance, kMaxOpacityDistance));
+}
+
+Status Validate(const LabelChoice& labels) {
+  if (Status s = InRange("labels.mode", int(labels.mode), int(LabelMode::kTint), int(LabelMode::kSurface)); !s.ok()) return s;
+  if (Status s = InRange("labels.tint", labels.tint, 0, 1); !s.ok()) return s;
+  if (labels.opacities.size() > kMaxLabels) {
+    return Status::InvalidArgument(
+        fmt::format("labels.opacities has {} labels, at most {} are possible", labels.opacities.size(), kMaxLabels));
+  }
+  std::set<std::uint32_t> named;
+  for (const auto& [value, opacity] : labels.opacities) {
+    if (Status s = InRange("labels.opacities.value", int(std::min(value, kMaxLabelValue + 1)), 1, int(kMaxLabelValue)); !s.ok()) return s;
+    if (Status s = InRange("labels.opacities.opacity", opacity, 0, 1); !s.ok()) return s;
+    if (!named.insert(value).second) return Status::InvalidArgument(fmt::format("labels.opacities names label {} twice", value));
+  }
+  if (labels.shown.size() > kMaxLabelRanges) {
+    return Status::InvalidArgument(
+        fmt::format("labels.shown has {} ranges, at most {} are possible", labels.shown.size(), kMaxLabelRanges));
+  }
+  for (const auto& [first, last] : labels.shown) {
+    if (first >= 1 && first <= last && last <= kMaxLabelValue) continue;
+    return Status::InvalidArgument(
+        fmt::format("labels.shown has the range {} to {}, but must rise in [1, {}]", first, last, kMaxLabelValue));
+  }
+  return Status::Ok();
+}
+
+// Overlays have no isosurfaces and no opacity by gradient.
+Status CheckCurvesAlone(const TransferChoice& overlay) {
+  const auto* function = std::get_if<TransferFunction>(&overlay.choice);
+  const bool alone = overlay.isosurfaces.empty() && overlay.gradient_opacities.empty() &&
+                     (function == nullptr || (function->isosurfaces.empty() && function->gradient_opacities.empty()));
+  if (alone) return Status::Ok();
+  return Status::InvalidArgument("overlay.transfer has isosurfaces or gradient_opacities, which are of the volume alone");
+}
+
+// Refuses `option` unless the renderer has it, which is named by `has`.
+Status RequireAbility(std::string_view option, const RendererKind& renderer, bool (RendererKind::*has)() const) {
+  if ((renderer.*has)()) return Status::Ok();
+  std::string names;
+  for (const RendererKind* kind : Renderers()) {
+    if ((kind->*has)()) names.append(names.empty() ? "" : ", ").append(kind->name());
+  }
+  return Status::InvalidArgument(fmt::format("renderer is '{}', but {} needs one of: {}", renderer.name(), option, names));
 }
 
 Status Validate(const Policy& policy) {
@@ -55,10 +106,26 @@ Status Validate(const FrameRequest& request) {
     return Status::InvalidArgument("shading 'depth-gradient' needs a renderer with depths, such as zbuffer, not '" + request.renderer +
                                    "'");
   }
+  if (!request.transfer.isosurfaces.empty()) {
+    if (Status s = RequireAbility("isovalue", **renderer, &RendererKind::isosurfaces); !s.ok()) return s;
+  }
+  if (!request.transfer.gradient_opacities.empty()) {
+    if (Status s = RequireAbility("gradient-opacity", **renderer, &RendererKind::gradient_opacity); !s.ok()) return s;
+  }
   if (Status s = Validate(request.size); !s.ok()) return s;
   if (Status s = Validate(request.view); !s.ok()) return s;
   if (Status s = Validate(request.clipping); !s.ok()) return s;
   if (Status s = Validate(request.transfer); !s.ok()) return s;
+  if (request.labels) {
+    if (Status s = RequireAbility("labels", **renderer, &RendererKind::shows_layers); !s.ok()) return s;
+    if (Status s = Validate(*request.labels); !s.ok()) return s;
+  }
+  if (request.overlay) {
+    if (Status s = RequireAbility("overlay", **renderer, &RendererKind::shows_layers); !s.ok()) return s;
+    if (Status s = Validate(request.overlay->transfer); !s.ok()) return Status(s.code(), "overlay." + s.message());
+    if (Status s = CheckCurvesAlone(request.overlay->transfer); !s.ok()) return s;
+    if (Status s = InRange("overlay.weight", request.overlay->weight, 0, 1); !s.ok()) return s;
+  }
   if (Status s = Validate(request.shading); !s.ok()) return s;
   if (Status s = InRange("termination", request.termination, 0, kMaxTermination); !s.ok()) return s;
   return Validate(request.policy);

@@ -73,7 +73,11 @@ std::uint64_t VoxelBytes(const Box& slab, const VolumeSummary& summary) {
       }
     }
   }
-  return kDerivedPerVoxel * voxels * BytesPerSample(summary.description.type);
+  std::uint64_t bytes = kDerivedPerVoxel * voxels * BytesPerSample(summary.description.type);
+  for (const VolumeSummary* layer : {summary.labels.get(), summary.overlay.get()}) {
+    if (layer != nullptr) bytes += VoxelBytes(slab, *layer);
+  }
+  return bytes;
 }
 
 Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, std::span<const WorkerLimit> workers) {
@@ -83,9 +87,8 @@ Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, s
   const std::uint64_t images = std::max<std::uint64_t>(group_bytes + PictureBytes(plan.setup), 1);
 
   constexpr std::uint64_t kEnough = kMostInWindow;  // more are never under way at a time
-  std::map<WorkerId, std::uint64_t> voxels = MostVoxels(plan, [&](const Box& slab) {
-    return kDerivedPerVoxel * std::uint64_t(slab.voxel_count()) * BytesPerSample(summary.description.type);
-  });
+  std::map<WorkerId, std::uint64_t> voxels = MostVoxels(
+      plan, [&](const Box& slab) { return kDerivedPerVoxel * std::uint64_t(slab.voxel_count()) * summary.types().bytes_per_voxel(); });
   const auto needs = [&](WorkerId worker) { return kIdleMemoryBytes + voxels.at(worker) + images; };
   const auto has_part = [&](const WorkerLimit& limit) { return limit.bytes != 0 && voxels.contains(limit.worker); };
   const bool all_fit = std::ranges::all_of(

@@ -50,8 +50,12 @@ Status RendererKind::SetView(const ViewParameters& view, ImageSize size, FrameSe
   return Status::Ok();
 }
 
+ClassificationTable RendererKind::Table(const TransferFunction& transfer, const VolumeDescription& description, ValueRange range) const {
+  return Classify(transfer, description, range);
+}
+
 ClassificationTable RendererKind::DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const {
-  return Classify(transfer, summary.description, summary.range);
+  return Table(transfer, summary.description, summary.range);
 }
 
 LocalImage RendererKind::Finish(const LocalImage& frame, const FrameSetup& setup) const {

@@ -68,6 +68,9 @@ class RendererKind {
     PixelFormat format = PixelFormat::kRgba;  // of local images with default parameters; says how they combine (common/kernels/combine.h)
     std::int32_t reach = kHalo;               // voxels outside a box that its samples depend on, [0, kHalo]
     bool along_slices = false;                // the frame is an image along the slices (SheetGrid), else the camera's
+    bool shows_layers = false;                // labels and overlays, too
+    bool isosurfaces = false;                 // draws TransferFunction::isosurfaces
+    bool gradient_opacity = false;            // multiplies opacities by TransferFunction::gradient_opacities
     double footprint = 1;                     // pixels that a voxel fills, for each pixel of its cross-section
     std::vector<Stage> stages;                // stages that the pixel half charges time to, in order
     std::vector<RendererParameter> parameters;
@@ -84,6 +87,9 @@ class RendererKind {
   PixelFormat format() const { return facts_.format; }
   std::int32_t reach() const { return facts_.reach; }
   bool along_slices() const { return facts_.along_slices; }
+  bool shows_layers() const { return facts_.shows_layers; }
+  bool isosurfaces() const { return facts_.isosurfaces; }
+  bool gradient_opacity() const { return facts_.gradient_opacity; }
   double footprint() const { return facts_.footprint; }
   const std::vector<Stage>& stages() const { return facts_.stages; }
   const std::vector<RendererParameter>& parameters() const { return facts_.parameters; }
@@ -96,8 +102,12 @@ class RendererKind {
   // the picture's own grid, supersampled where it is minified.
   virtual Status SetView(const ViewParameters& view, ImageSize size, FrameSetup& setup) const;
 
+  // The table by which the pixel half looks up stored samples. The default is Classify.
+  virtual ClassificationTable Table(const TransferFunction& transfer, const VolumeDescription& description, ValueRange range) const;
+
   // The classification table whose opacity is 0 in exactly the bins that the renderer does not draw. Boxes without a drawn voxel within
   // their reach are not rendered. Empty-space skipping uses it, too.
+  // The default is Table.
   virtual ClassificationTable DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const;
 
   virtual std::unique_ptr<AnalyticCost> MakeCost(const CostBasis& basis) const = 0;

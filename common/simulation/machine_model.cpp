@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "common/view/range_status.h"
+#include "common/base/range_status.h"
 
 namespace slabstream {
 namespace {

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <string>
 
-#include "common/view/range_status.h"
+#include "common/base/range_status.h"
 
 namespace slabstream {
 namespace {

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <string>
 
+#include "common/base/range_status.h"
 #include "common/view/camera.h"
-#include "common/view/range_status.h"
 
 namespace slabstream {
 namespace {

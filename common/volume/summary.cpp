@@ -192,4 +192,15 @@ VolumeSummary Summarize(const Volume& volume) {
   return summary;
 }
 
+VolumeSummary Summarize(const LayeredVolume& volume) {
+  VolumeSummary summary = Summarize(*volume.volume);
+  const auto of_layer = [](const std::shared_ptr<const Volume>& layer) {
+    return layer == nullptr ? nullptr : std::make_shared<const VolumeSummary>(Summarize(*layer));
+  };
+  summary.labels = of_layer(volume.layers.labels);
+  summary.overlay = of_layer(volume.layers.overlay);
+  summary.label_table = volume.layers.table;
+  return summary;
+}
+
 }  // namespace slabstream

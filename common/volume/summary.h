@@ -7,8 +7,10 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
+#include "common/volume/layers.h"
 #include "common/volume/volume.h"
 
 namespace slabstream {
@@ -39,6 +41,17 @@ struct VolumeSummary {
   Index3 brick_counts;                                    // bricks along each axis
   std::vector<ValueRange> bricks;                         // x fastest; of finite values; kNoFiniteValue: there is none
   std::int64_t non_finite = 0;                            // voxels that are NaN or infinite: never visible
+  // Of its layers; null: there is no such layer. Values of labels are their numbers.
+  std::shared_ptr<const VolumeSummary> labels = nullptr, overlay = nullptr;
+  std::shared_ptr<const LabelTable> label_table = nullptr;  // if there are labels
+
+  LayerTypes layers() const {
+    LayerTypes types;
+    if (labels != nullptr) types.labels = labels->description.type;
+    if (overlay != nullptr) types.overlay = overlay->description.type;
+    return types;
+  }
+  SampleTypes types() const { return {description.type, layers()}; }
 
   friend bool operator==(const VolumeSummary&, const VolumeSummary&) = default;
 };
@@ -46,5 +59,7 @@ struct VolumeSummary {
 // Reads every voxel once; those of float volumes a second time for the histogram. Parallel; the result is the same for any number of
 // threads.
 VolumeSummary Summarize(const Volume& volume);
+// With the summaries of its layers.
+VolumeSummary Summarize(const LayeredVolume& volume);
 
 }  // namespace slabstream

@@ -139,6 +139,8 @@ void Fields(auto& io, Is<DatasetStatus> auto& m) {
     io.Message("description", m.description, &P::description, &P::mutable_description);
     io.Message("range", m.range, &P::range, &P::mutable_range);
     io.Any(m.memory_bytes, &P::memory_bytes, &P::set_memory_bytes);
+    io.Range("labels", m.labels, &P::labels, &P::set_labels, 0, kMaxLabels);
+    io.Any(m.overlay, &P::overlay, &P::set_overlay);
   }
   if (m.state == DatasetState::kFailed) io.Text("error", m.error, &P::error, &P::mutable_error, 0, kMaxTextBytes);
   io.Any(m.since_ms, &P::since_ms, &P::set_since_ms);

@@ -128,6 +128,8 @@ struct DatasetStatus {
   std::string error;               // kFailed only
   std::uint64_t memory_bytes = 0;  // kReady only: what its voxels take of the coordinator's memory
   std::uint64_t since_ms = 0;      // how long it has been in this state
+  std::uint32_t labels = 0;        // kReady only: different ones of its label volume; 0 if there is none
+  bool overlay = false;            // kReady only: there is one
   friend bool operator==(const DatasetStatus&, const DatasetStatus&) = default;
 };
 

@@ -79,13 +79,47 @@ void Fields(auto& io, Is<ClipRegion> auto& m) {
   io.OneOf("mode", m.mode, &P::mode, &P::set_mode, ClipMode::kKeep, ClipMode::kCutAway);
 }
 
+inline void Write(const LabelLook& in, v1::LabelLook& out) {
+  out.set_mode(static_cast<v1::LabelMode>(static_cast<int>(in.mode)));
+  out.set_tint(in.tint);
+  for (const auto& [color, opacity, shown] : in.entries) {
+    for (const float channel : {color.r, color.g, color.b}) out.add_colors(channel);
+    out.add_opacities(opacity);
+    out.add_shown(shown);
+  }
+}
+inline void Read(const v1::LabelLook& in, LabelLook& out, Checker& check) {
+  out.mode = check.OneOf("mode", in.mode(), LabelMode::kTint, LabelMode::kSurface);
+  out.tint = check.Between("tint", in.tint(), 0, 1);
+  const int count = check.Count("opacities", in.opacities_size(), kMaxLabels);
+  if (in.colors_size() != 3 * count) return check.Fail("colors", "not three for each label");
+  if (in.shown_size() != count) return check.Fail("shown", "not one for each label");
+  const auto between = [&](std::string_view field, float value) { return float(check.Between(field, double(value), 0, 1)); };
+  for (int i = 0; i < count; ++i) {
+    LabelLook::Entry& entry = out.entries.emplace_back();
+    entry.color = {between("colors", in.colors(3 * i)), between("colors", in.colors(3 * i + 1)), between("colors", in.colors(3 * i + 2))};
+    entry.opacity = between("opacities", in.opacities(i));
+    entry.shown = in.shown(i);
+  }
+}
+
+void Fields(auto& io, Is<OverlayLook> auto& m) {
+  using P = v1::OverlayLook;
+  io.Message("transfer", m.transfer, &P::transfer, &P::mutable_transfer);
+  io.Message("range", m.range, &P::range, &P::mutable_range);
+  io.Between("weight", m.weight, &P::weight, &P::set_weight, 0, 1);
+}
+
 void Fields(auto& io, Is<FrameSetup> auto& m) {  // all but the renderer, its parameters, the sheets and the clip region
   using P = v1::FrameSetup;
   io.Range("dataset", m.dataset, &P::dataset, &P::set_dataset, 1, std::numeric_limits<DatasetId>::max());
   io.Message("description", m.description, &P::description, &P::mutable_description);
+  io.Message("layers", m.layers, &P::layers, &P::mutable_layers);
   io.Message("range", m.range, &P::range, &P::mutable_range);
   io.Message("camera", m.camera, &P::camera, &P::mutable_camera);
   io.Message("transfer", m.transfer, &P::transfer, &P::mutable_transfer);
+  io.Optional("labels", m.looks.labels, &P::has_labels, &P::labels, &P::mutable_labels);
+  io.Optional("overlay", m.looks.overlay, &P::has_overlay, &P::overlay, &P::mutable_overlay);
   io.Message("shading", m.shading, &P::shading, &P::mutable_shading);
   io.Between("termination", m.termination, &P::termination, &P::set_termination, 0, kMaxTermination);
   io.Range("halo", m.halo, &P::halo, &P::set_halo, 0, kMaxVolumeSide);
@@ -155,6 +189,14 @@ inline void Read(const v1::FrameSetup& in, FrameSetup& out, Checker& check) {
       Read(in.clip(), out.clip, check);
     }
     if (check.ok()) CheckClip(out, check);
+  }
+  if (out.looks.labels) check.That(out.layers.labels.has_value(), "labels", "of a dataset without labels");
+  if (out.looks.overlay) check.That(out.layers.overlay.has_value(), "overlay", "of a dataset without an overlay");
+  if (out.looks.any()) check.That(out.renderer->shows_layers(), "renderer", "one that shows no layers");
+  if (check.ok() && out.looks.overlay) {
+    const TransferFunction& transfer = out.looks.overlay->transfer;
+    check.That(transfer.isosurfaces.empty() && transfer.gradient_opacities.empty(), "overlay.transfer", "not of curves over values alone");
+    check.Adopt(Validate(transfer));
   }
   if (check.ok()) check.Adopt(Validate(out.transfer));
   if (check.ok()) check.Adopt(Validate(out.shading));

@@ -14,6 +14,7 @@ namespace slabstream {
 static_assert(v1::Projection_MAX == static_cast<int>(Projection::kPerspective));
 static_assert(v1::ClipUnit_MAX == static_cast<int>(ClipUnit::kPercent));
 static_assert(v1::ClipMode_MAX == static_cast<int>(ClipMode::kCutAway));
+static_assert(v1::LabelMode_MAX == static_cast<int>(LabelMode::kSurface));
 static_assert(v1::AxisChoice_MAX == static_cast<int>(AxisChoice::kView) + 1);
 
 // Validate checks most ranges of these values, once for the whole FrameRequest. Checked here: what a struct cannot hold, what must be known
@@ -95,11 +96,34 @@ void Fields(auto& io, Is<OpacityPoint> auto& m) {
   io.Finite("sharpness", m.sharpness, &P::sharpness, &P::set_sharpness);
 }
 
+void Fields(auto& io, Is<Isosurface> auto& m) {
+  using P = v1::Isosurface;
+  io.Finite("value", m.value, &P::value, &P::set_value);
+  io.Finite("r", m.color.r, &P::r, &P::set_r);
+  io.Finite("g", m.color.g, &P::g, &P::set_g);
+  io.Finite("b", m.color.b, &P::b, &P::set_b);
+  io.Finite("opacity", m.opacity, &P::opacity, &P::set_opacity);
+}
+
+void Fields(auto& io, Is<GradientOpacityPoint> auto& m) {
+  using P = v1::GradientOpacityPoint;
+  io.Finite("slope", m.slope, &P::slope, &P::set_slope);
+  io.Finite("opacity", m.opacity, &P::opacity, &P::set_opacity);
+}
+
+// The fields that a TransferFunction and a TransferChoice share.
+template <class P>
+void IsosurfaceFields(auto& io, auto& m) {
+  io.Messages("isosurfaces", m.isosurfaces, &P::isosurfaces, &P::mutable_isosurfaces, kMaxIsosurfaces);
+  io.Messages("gradient_opacities", m.gradient_opacities, &P::gradient_opacities, &P::mutable_gradient_opacities, kMaxTransferPoints);
+}
+
 void Fields(auto& io, Is<TransferFunction> auto& m) {
   using P = v1::TransferFunction;
   io.Messages("colors", m.colors, &P::colors, &P::mutable_colors, kMaxTransferPoints);
   io.Messages("opacities", m.opacities, &P::opacities, &P::mutable_opacities, kMaxTransferPoints);
   io.Finite("opacity_distance", m.opacity_distance, &P::opacity_distance, &P::set_opacity_distance);
+  IsosurfaceFields<P>(io, m);
 }
 
 void Fields(auto& io, Is<ScalarRange> auto& m) {
@@ -108,13 +132,19 @@ void Fields(auto& io, Is<ScalarRange> auto& m) {
   io.Finite("max", m.max, &P::max, &P::set_max);
 }
 
+void Fields(auto& io, Is<TransferChoice> auto& m) {  // all but choice and scalar_range
+  using P = v1::TransferChoice;
+  io.Finite("opacity_distance", m.opacity_distance, &P::opacity_distance, &P::set_opacity_distance);
+  IsosurfaceFields<P>(io, m);
+}
+
 inline void Write(const TransferChoice& in, v1::TransferChoice& out) {
+  WriteFields(in, out);
   if (const auto* preset = std::get_if<std::string>(&in.choice)) {
     out.set_preset(WireText(*preset, kMaxNameBytes));
   } else {
     Write(std::get<TransferFunction>(in.choice), *out.mutable_function());
   }
-  out.set_opacity_distance(in.opacity_distance);
   if (in.scalar_range) Write(*in.scalar_range, *out.mutable_scalar_range());
 }
 inline void Read(const v1::TransferChoice& in, TransferChoice& out, Checker& check) {
@@ -127,11 +157,37 @@ inline void Read(const v1::TransferChoice& in, TransferChoice& out, Checker& che
     }
     case v1::TransferChoice::CHOICE_NOT_SET: check.Fail("choice", "not set, expected preset or function"); break;
   }
-  out.opacity_distance = check.Finite("opacity_distance", in.opacity_distance());
+  ReadFields(in, out, check);
   if (in.has_scalar_range()) {
     const auto scope = check.In("scalar_range");
     Read(in.scalar_range(), out.scalar_range.emplace(), check);
   }
+}
+
+void Fields(auto& io, Is<LabelRange> auto& m) {
+  using P = v1::LabelRange;
+  io.Any(m.first, &P::first, &P::set_first);
+  io.Any(m.last, &P::last, &P::set_last);
+}
+
+void Fields(auto& io, Is<LabelOpacity> auto& m) {
+  using P = v1::LabelOpacity;
+  io.Any(m.value, &P::value, &P::set_value);
+  io.Finite("opacity", m.opacity, &P::opacity, &P::set_opacity);
+}
+
+void Fields(auto& io, Is<LabelChoice> auto& m) {
+  using P = v1::LabelChoice;
+  io.OneOf("mode", m.mode, &P::mode, &P::set_mode, LabelMode::kTint, LabelMode::kSurface);
+  io.Finite("tint", m.tint, &P::tint, &P::set_tint);
+  io.Messages("opacities", m.opacities, &P::opacities, &P::mutable_opacities, kMaxLabels);
+  io.Messages("shown", m.shown, &P::shown, &P::mutable_shown, kMaxLabelRanges);
+}
+
+void Fields(auto& io, Is<OverlayChoice> auto& m) {
+  using P = v1::OverlayChoice;
+  io.Message("transfer", m.transfer, &P::transfer, &P::mutable_transfer);
+  io.Finite("weight", m.weight, &P::weight, &P::set_weight);
 }
 
 void Fields(auto& io, Is<Shading> auto& m) {
@@ -164,6 +220,8 @@ void Fields(auto& io, Is<FrameRequest> auto& m) {  // all but clipping and param
   io.Message("size", m.size, &P::size, &P::mutable_size);
   io.Message("view", m.view, &P::view, &P::mutable_view);
   io.Message("transfer", m.transfer, &P::transfer, &P::mutable_transfer);
+  io.Optional("labels", m.labels, &P::has_labels, &P::labels, &P::mutable_labels);
+  io.Optional("overlay", m.overlay, &P::has_overlay, &P::overlay, &P::mutable_overlay);
   io.Message("shading", m.shading, &P::shading, &P::mutable_shading);
   io.Finite("termination", m.termination, &P::termination, &P::set_termination);
   io.Message("policy", m.policy, &P::policy, &P::mutable_policy);

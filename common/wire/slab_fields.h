@@ -9,8 +9,11 @@
 
 namespace slabstream {
 
-// For the widest sample type, because only the dataset knows the actual one.
-inline std::uint32_t LastChunk(const Box& box) { return std::max(ChunkCount(box, ScalarType::kFloat32), 1U) - 1; }
+// For the widest sample types and all layers, because only the dataset knows the actual ones.
+inline std::uint32_t LastChunk(const Box& box) {
+  const SampleTypes widest(ScalarType::kFloat32, {.labels = ScalarType::kUint16, .overlay = ScalarType::kFloat32});
+  return std::max(ChunkCount(box, widest), 1U) - 1;
+}
 
 void Fields(auto& io, Is<ChunkRequest> auto& m) {
   using P = v1::ChunkRequest;

@@ -1,14 +1,17 @@
 // The slabs plane: voxels, from the coordinator (ROUTER) to workers (DEALER), pulled chunk by chunk.
 //
-// The samples of a box (x fastest) are cut into chunks of kChunkBytes; the last one is shorter. A worker requests chunks one by one and
-// never has more bytes outstanding than its credit. Each request is the credit for its answer, so bytes in flight are bounded at both ends,
+// The samples of a box (x fastest) are cut into chunks of kChunkBytes; the last one is shorter. The samples of the volume come first, then
+// those of each layer of the dataset, in the order of kLayers; each begins with a new chunk. A worker requests chunks one by one and never
+// has more bytes outstanding than its credit. Each request is the credit for its answer, so bytes in flight are bounded at both ends,
 // and a lost message is requested again. The coordinator keeps no state about it.
 #pragma once
 
 #include <algorithm>
 #include <cstdint>
 
+#include "common/base/check.h"
 #include "common/base/status.h"
+#include "common/volume/layers.h"
 #include "common/wire/control_messages.h"
 #include "common/wire/ids.h"
 
@@ -16,14 +19,37 @@ namespace slabstream {
 
 inline constexpr std::uint32_t kChunkBytes = 1U << 20;  // multiple of every sample size
 
-inline std::uint32_t ChunkCount(const Box& box, ScalarType type) {
-  const std::uint64_t bytes = std::uint64_t(box.voxel_count()) * BytesPerSample(type);
-  return std::uint32_t((bytes + kChunkBytes - 1) / kChunkBytes);
+// Where the samples of a chunk belong: bytes [begin, begin + bytes) of the box's samples of one layer.
+struct ChunkPart {
+  Layer layer = Layer::kVolume;
+  std::uint64_t begin = 0;
+  std::uint32_t bytes = 0;
+};
+
+inline std::uint32_t ChunkCount(const Box& box, const SampleTypes& types) {
+  std::uint64_t count = 0;
+  for (const Layer layer : kLayers) {
+    if (const auto type = types.Of(layer)) {
+      count += (std::uint64_t(box.voxel_count()) * BytesPerSample(*type) + kChunkBytes - 1) / kChunkBytes;
+    }
+  }
+  return std::uint32_t(count);
 }
-// Of samples in chunk `chunk`, below ChunkCount.
-inline std::uint32_t BytesOfChunk(const Box& box, ScalarType type, std::uint32_t chunk) {
-  const std::uint64_t total = std::uint64_t(box.voxel_count()) * BytesPerSample(type);
-  return std::uint32_t(std::min<std::uint64_t>(kChunkBytes, total - std::uint64_t{chunk} * kChunkBytes));
+// Of a chunk below ChunkCount.
+inline ChunkPart PartOfChunk(const Box& box, const SampleTypes& types, std::uint32_t chunk) {
+  std::uint64_t before = std::uint64_t{chunk} * kChunkBytes;  // of this layer and those that follow
+  for (const Layer layer : kLayers) {
+    const auto type = types.Of(layer);
+    if (!type) continue;
+    const std::uint64_t total = std::uint64_t(box.voxel_count()) * BytesPerSample(*type);
+    if (before < total) return {layer, before, std::uint32_t(std::min<std::uint64_t>(kChunkBytes, total - before))};
+    before -= (total + kChunkBytes - 1) / kChunkBytes * kChunkBytes;
+  }
+  CHECK(false) << "chunk " << chunk << " of " << ChunkCount(box, types);
+  return {};
+}
+inline std::uint32_t BytesOfChunk(const Box& box, const SampleTypes& types, std::uint32_t chunk) {
+  return PartOfChunk(box, types, chunk).bytes;
 }
 
 struct ChunkRequest {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "common/image/run_image.h"
+#include "common/volume/layers.h"
 #include "common/wire/client_messages.h"
 #include "common/wire/fields.h"
 #include "common/wire/limits.h"
@@ -121,6 +122,21 @@ void Fields(auto& io, Is<VolumeDescription> auto& m) {
     check.Range("y", std::uint32_t(m.geometry.size.y), 1, kMaxVolumeSide);
     check.Range("z", std::uint32_t(m.geometry.size.z), 1, kMaxVolumeSide);
   });
+}
+
+inline void Write(const LayerTypes& in, v1::LayerTypes& out) {
+  const auto type = [](const std::optional<ScalarType>& of) {
+    return of ? static_cast<v1::ScalarType>(static_cast<int>(*of)) : v1::ScalarType{};
+  };
+  out.set_labels(type(in.labels));
+  out.set_overlay(type(in.overlay));
+}
+inline void Read(const v1::LayerTypes& in, LayerTypes& out, Checker& check) {
+  if (in.labels() != 0) out.labels = check.OneOf("labels", in.labels(), ScalarType::kUint8, ScalarType::kUint16);
+  if (in.overlay() != 0) {
+    check.That(in.overlay() == v1::SCALAR_TYPE_FLOAT32, "overlay", "not of type float32");
+    out.overlay = ScalarType::kFloat32;
+  }
 }
 
 // ---- Status, GroupKey

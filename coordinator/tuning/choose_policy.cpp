@@ -14,6 +14,7 @@
 #include "common/planning/assignment.h"
 #include "common/planning/brick_visibility.h"
 #include "common/planning/clipped_cells.h"
+#include "common/planning/layer_bricks.h"
 #include "common/planning/policy_names.h"
 #include "common/renderers/renderer_kind.h"
 #include "coordinator/tuning/frame_predictor.h"
@@ -52,6 +53,7 @@ class Search {
                   .transfer = &setup.transfer,
                   .renderer = setup.renderer,
                   .clip = &setup.clip,
+                  .looks = &setup.looks,
                   .slots = question.slots,
                   .slab_bytes_target = question.slab_bytes_target,
                   .known = question.known}),
@@ -203,7 +205,9 @@ Result<PolicyChoice> ChoosePolicy(const PolicyQuestion& question) {
   if (!setup.ok()) return setup.status();
   std::optional<OccupancyGrid> drawn;
   if (question.known.occupied == nullptr) {
-    drawn = BrickVisibility(*question.summary, setup->renderer->DrawnTable(setup->transfer, *question.summary)).VisibleCells();
+    drawn = BrickVisibility(*question.summary, setup->renderer->DrawnTable(setup->transfer, *question.summary),
+                            LayerBricks(*question.summary, *setup->renderer, setup->looks))
+                .VisibleCells();
   } else if (!setup->clip.empty()) {
     drawn = *question.known.occupied;
   }

@@ -13,8 +13,17 @@ namespace {
 
 // Structured bindings name every field of a type: if there is one more, they do not compile.
 
+// Both only if there are any.
+void AddSurfaces(const std::vector<Isosurface>& isosurfaces, const std::vector<GradientOpacityPoint>& gradient_opacities, Json& json) {
+  for (const auto& [value, color, opacity] : isosurfaces) {
+    const auto& [r, g, b] = color;
+    json["isosurfaces"].push_back(Json::array({value, r, g, b, opacity}));
+  }
+  for (const auto& [slope, opacity] : gradient_opacities) json["gradient_opacities"].push_back(Json::array({slope, opacity}));
+}
+
 Json FunctionJson(const TransferFunction& function) {
-  const auto& [colors, opacities, opacity_distance] = function;
+  const auto& [colors, opacities, opacity_distance, isosurfaces, gradient_opacities] = function;
   Json color_points = Json::array(), opacity_points = Json::array();
   for (const auto& [value, color] : colors) {
     const auto& [r, g, b] = color;
@@ -23,7 +32,9 @@ Json FunctionJson(const TransferFunction& function) {
   for (const auto& [value, opacity, midpoint, sharpness] : opacities) {
     opacity_points.push_back(Json::array({value, opacity, midpoint, sharpness}));
   }
-  return {{"colors", color_points}, {"opacities", opacity_points}, {"opacity_distance", opacity_distance}};
+  Json json = {{"colors", color_points}, {"opacities", opacity_points}, {"opacity_distance", opacity_distance}};
+  AddSurfaces(isosurfaces, gradient_opacities, json);
+  return json;
 }
 
 Json SizeJson(const ImageSize& size) {
@@ -57,7 +68,7 @@ Json PolicyJson(const Policy& policy) {
 std::string DigestText(std::string_view bytes) { return fmt::format("{:016x}", Digest(std::as_bytes(std::span(bytes)))); }
 
 Json TransferJson(const TransferChoice& transfer) {
-  const auto& [choice, opacity_distance, scalar_range] = transfer;
+  const auto& [choice, opacity_distance, scalar_range, isosurfaces, gradient_opacities] = transfer;
   const auto* preset = std::get_if<std::string>(&choice);
   Json json = Json::object();
   if (preset != nullptr) {
@@ -67,6 +78,7 @@ Json TransferJson(const TransferChoice& transfer) {
   }
   json["opacity_distance"] = opacity_distance;
   if (scalar_range) json["scalar_range"] = Json::array({scalar_range->min, scalar_range->max});
+  AddSurfaces(isosurfaces, gradient_opacities, json);
   return json;
 }
 

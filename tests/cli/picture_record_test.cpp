@@ -40,7 +40,7 @@ PictureGeometry SomeGeometry() {
 }
 
 PictureRecord RecordOf(const FrameOptions& options) {
-  Result<PictureRecord> record = ParseRecord(RecordText(options.source, options.request, options.format, SomeGeometry()));
+  Result<PictureRecord> record = ParseRecord(RecordText(options.source, options.request, options.format, SomeGeometry(), options.layers));
   EXPECT_TRUE(record.ok()) << record.status().message();
   return *std::move(record);
 }
@@ -72,7 +72,15 @@ const std::vector<std::vector<std::string>> kOptions = {
     {"--renderer", "zbuffer", "--shading", "depth-gradient"},
     {"--transfer", "opaque", "--opacity-distance", "0.25"},
     {"--scalar-range", "0.1:1e30"},
+    {"--renderer", "raycast", "--isovalue", "300:#804020:0.1,-120.5:1,0.9,0.8,1e30"},
+    {"--renderer", "zbuffer", "--isovalue=-5,7:white", "--transfer", "auto"},
+    {"--renderer", "raycast", "--gradient-opacity", "0:0,0.1:0.30000000000000004,1e9:1", "--transfer", "none"},
     {"--transfer", "gray-ramp", "--scalar-range=-5.5:100"},
+    {"--renderer", "raycast", "--label-mode", "tint"},
+    {"--renderer", "raycast", "--label-mode", "surface", "--label-opacity", "3=0.30000000000000004,7=0", "--labels-shown", "1,5-9"},
+    {"--renderer", "raycast", "--label-tint", "0.1", "--overlay-transfer", "gray-ramp", "--overlay-range=-3:1e-3", "--overlay-weight",
+     "0.5"},
+    {"--renderer", "raycast", "--labels", "atlas.nii", "--overlay", "map.nii"},
     {"--clip-box", ":,:,20:"},
     {"--clip-box=-1.5:0.1,5:6,0:1v", "--clip-mode", "cut-away"},
     {"--clip-box", "0:50,:,:%", "--clip-plane", "0.1,0,-1e-3,-7", "--clip-plane=-1,2,3,4e8"},
@@ -109,6 +117,7 @@ TEST(PictureRecordTest, TheCommandLineAsksForTheSamePicture) {
       again.erase(again.begin());
       const FrameOptions parsed = Parse(again);
       EXPECT_EQ(parsed.source, source);
+      EXPECT_EQ(parsed.layers, typed.layers);
       EXPECT_EQ(parsed.connection.local_workers > 0, source == "scans/head.nii.gz");
       ExpectSame(parsed.request, typed.request);
       EXPECT_EQ(parsed.format.background, typed.format.background);

@@ -18,6 +18,32 @@ TEST(ParseScalarRange, TakesTwoValuesThatRise) {
   }
 }
 
+TEST(ParseIsosurfaces, TakesValuesWithColorsAndOpacities) {
+  const auto parse = [](const char* text) { return ParseIsosurfaces("--isovalue", text); };
+  const std::vector<Isosurface> plain = *parse("120,-3.5e2");
+  ASSERT_EQ(plain.size(), 2U);
+  EXPECT_EQ(plain[0].value, -350) << "they ascend";
+  EXPECT_EQ(plain[1].value, 120);
+  EXPECT_EQ(plain[0].opacity, 1);
+  EXPECT_NE(plain[0].color, plain[1].color);
+  EXPECT_EQ(*parse("1:red"), (std::vector<Isosurface>{{1, {1, 0, 0}, 1}}));
+  EXPECT_EQ(*parse("1:#00ff00:0.25,2:0,0.5,1:.5,3:1,0,0"),
+            (std::vector<Isosurface>{{1, {0, 1, 0}, 0.25}, {2, {0, 0.5F, 1}, 0.5}, {3, {1, 0, 0}, 1}}));
+  EXPECT_EQ(parse("1:#00ff0033")->front().opacity, double(0.2F)) << "a colour's own opacity";
+  for (const char* text : {"", ",", "1,", "x", "nan", "1:", "1:rouge", "1:red:2", "1:red:", "1:red:1:1", "1:0,1", "1:0,1,2",
+                           "1:0,0,0,1,5:", "1,1", "1e301", "1,2,3,4,5,6,7,8,9"}) {
+    EXPECT_EQ(parse(text).status().code(), StatusCode::kInvalidArgument) << text;
+  }
+}
+
+TEST(ParseGradientOpacities, TakesPointsThatAscend) {
+  const auto parse = [](const char* text) { return ParseGradientOpacities("--gradient-opacity", text); };
+  EXPECT_EQ(*parse("0:0,10:0.5,10:1"), (std::vector<GradientOpacityPoint>{{0, 0}, {10, 0.5}, {10, 1}}));
+  for (const char* text : {"", "1", "1:", ":1", "-1:0", "1:2", "1:0.5:1", "2:0,1:0", "nan:1", "inf:1", "1:nan", "1:0,"}) {
+    EXPECT_EQ(parse(text).status().code(), StatusCode::kInvalidArgument) << text;
+  }
+}
+
 TEST(ParseClipBox, TakesBoundsInThreeUnits) {
   const ClipBox world = *ParseClipBox("--clip-box", "-1.5:2,:,0:");
   EXPECT_EQ(world, (ClipBox{{-1.5, -1e9, 0}, {2, 1e9, 1e9}, ClipUnit::kWorld}));

@@ -42,6 +42,34 @@ Changes<TransferChoice> ChangesOfTransfer() {
        [](auto& t) {
          t.scalar_range = ScalarRange{1, 3};
        }},
+      {"isosurface",
+       [](auto& t) {
+         t.isosurfaces = {{1, {0, 0, 0}, 1}};
+       }},
+      {"isovalue",
+       [](auto& t) {
+         t.isosurfaces = {{2, {0, 0, 0}, 1}};
+       }},
+      {"isosurface's color",
+       [](auto& t) {
+         t.isosurfaces = {{1, {0, 0, 1}, 1}};
+       }},
+      {"isosurface's opacity",
+       [](auto& t) {
+         t.isosurfaces = {{1, {0, 0, 0}, 0.5}};
+       }},
+      {"gradient opacity",
+       [](auto& t) {
+         t.gradient_opacities = {{1, 0.5}};
+       }},
+      {"slope",
+       [](auto& t) {
+         t.gradient_opacities = {{2, 0.5}};
+       }},
+      {"factor",
+       [](auto& t) {
+         t.gradient_opacities = {{1, 0.25}};
+       }},
       {"color value", [](auto& t) { FunctionOf(t).colors[1].value += 1; }},
       {"red", [](auto& t) { FunctionOf(t).colors[1].color.r += 0.01F; }},
       {"green", [](auto& t) { FunctionOf(t).colors[1].color.g += 0.01F; }},

@@ -23,6 +23,9 @@ std::vector<FuzzBytes> PolicySeeds();
 bool DecodeTransferFunction(std::span<const std::byte> input);
 std::vector<FuzzBytes> TransferFunctionSeeds();
 
+bool DecodeColorTable(std::span<const std::byte> input);
+std::vector<FuzzBytes> ColorTableSeeds();
+
 bool DecodeVolumeFile(std::span<const std::byte> input);
 std::vector<FuzzBytes> VolumeFileSeeds();
 

@@ -16,6 +16,7 @@ const std::vector<FuzzTarget>& FuzzTargets() {
       {"schedules", "combining schemes and their schedules", DecodeSchedule, ScheduleSeeds},
       {"policies", "policies and parameters of renderers", DecodePolicy, PolicySeeds},
       {"transfer-functions", "ParaView's colour maps", DecodeTransferFunction, TransferFunctionSeeds},
+      {"color-tables", "tables of label colours", DecodeColorTable, ColorTableSeeds},
       {"volume-files", "volume files of every format", DecodeVolumeFile, VolumeFileSeeds},
       {"dicom-files", "DICOM files, but for their pixels", DecodeDicomFile, DicomFileSeeds},
       {"service-files", "service files, folders of keys and records of services", DecodeServiceFile, ServiceFileSeeds},

@@ -133,6 +133,53 @@ TEST_P(Partitions, ClippedVolumesMakeOnePicture) {
   }
 }
 
+// A crossing between two samples, or between two cells, belongs to one box.
+TEST_P(Partitions, IsosurfacesMakeOnePicture) {
+  if (!GetParam()->isosurfaces()) GTEST_SKIP() << "draws none";
+  const unsigned seed = 16;
+  std::mt19937 random(seed);
+  const Volume volume = MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed);
+  for (Projection projection : kProjections) {
+    for (int view = 0; view < 12; ++view) {
+      SetupOptions options;
+      options.renderer = GetParam();
+      options.view = RandomView(projection, random);
+      if (view % 4 == 3) options.view = {.projection = projection, .azimuth_degrees = 45.0 * view};
+      options.transfer = Ramp(view % 3 == 0 ? 0 : 0.6);
+      options.transfer.isosurfaces = {{60, {0.9F, 0.4F, 0.2F}, 0.3}, {120, {0.2F, 0.5F, 0.9F}, view % 2 == 0 ? 1 : 0.5}};
+      if (view % 3 == 2) {
+        options.clipping = RandomClipping(volume.description.geometry, random);
+        options.clipping.mode = view % 2 == 0 ? ClipMode::kKeep : ClipMode::kCutAway;
+      }
+      FrameSetup setup = MakeSetup(volume, options);
+      if (!setup.parameters.empty()) setup.parameters.front() = view % 4 == 0 ? 0.1 : view % 4 == 1 ? 3 : 1;
+      SCOPED_TRACE(::testing::Message() << "seed " << seed << " view " << view);
+      const LocalImage one = RenderWhole(volume, setup);
+      ExpectSamePicture(one, RenderByBoxes(volume, setup, CutAtRandom(volume.block.box, 11, random)), setup);
+      ExpectSamePicture(one, RenderByBoxes(volume, setup, CutIntoSlabs(volume, 13, kAxes[std::size_t(view) % 3])), setup);
+    }
+  }
+}
+
+TEST_P(Partitions, GradientOpacityMakesOnePicture) {
+  if (!GetParam()->gradient_opacity()) GTEST_SKIP() << "has none";
+  const unsigned seed = 17;
+  std::mt19937 random(seed);
+  const Volume volume = MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed);
+  for (Projection projection : kProjections) {
+    for (int view = 0; view < 4; ++view) {
+      SetupOptions options;
+      options.renderer = GetParam();
+      options.view = RandomView(projection, random);
+      options.transfer = Ramp(0.6);
+      options.transfer.gradient_opacities = {{3, 0}, {20, 1}, {60, 0.3}};
+      const FrameSetup setup = MakeSetup(volume, options);
+      SCOPED_TRACE(::testing::Message() << "seed " << seed << " view " << view);
+      ExpectSamePicture(RenderWhole(volume, setup), RenderByBoxes(volume, setup, CutAtRandom(volume.block.box, 11, random)), setup);
+    }
+  }
+}
+
 // Axis-parallel views put rays, faces and planes on top of each other.
 TEST_P(Partitions, AxisParallelViewsHaveNoSeams) {
   const Volume volume = MakeBlobs({{32, 32, 32}, {1, 1, 1}}, ScalarType::kUint8, 5);
@@ -159,7 +206,11 @@ TEST_P(Partitions, EveryInstructionSetMakesOnePicture) {
     SetupOptions options;
     options.renderer = GetParam();
     options.view = RandomView(projection, random);
-    if (projection == Projection::kPerspective) options.clipping = RandomClipping(volume.description.geometry, random);
+    if (projection == Projection::kPerspective) {
+      options.clipping = RandomClipping(volume.description.geometry, random);
+      if (GetParam()->isosurfaces()) options.transfer.isosurfaces = {{60, {0.9F, 0.4F, 0.2F}, 0.3}};
+      if (GetParam()->gradient_opacity()) options.transfer.gradient_opacities = {{3, 0.2}, {20, 1}};
+    }
     const FrameSetup setup = MakeSetup(volume, options);
     const LocalImage best = RenderWhole(volume, setup);
     for (auto target : hwy::SupportedAndGeneratedTargets()) {

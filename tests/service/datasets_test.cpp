@@ -2,9 +2,11 @@
 // picture is that of one file.
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <set>
 
+#include "common/layers/layer_reader.h"
 #include "common/volume_io/volume_reader.h"
 #include "tests/service/multi_process_fixture.h"
 
@@ -68,6 +70,72 @@ TEST_F(DatasetsTest, AReplacedFileIsSeenByTheNextFrame) {
     ExpectShows("ball", *next);
   }
   EXPECT_EQ(client_->QueryStatus()->frames_failed, 0U);
+}
+
+// Labels on the ball, in x-slices of this width.
+TEST_F(DatasetsTest, LayersOfADatasetAreThoseOfTheirFiles) {
+  const auto labels_of = [&](std::int32_t width) {
+    Volume labels{volume_->description, MakeVoxelBlock(volume_->block.box, ScalarType::kUint8)};
+    labels.description.type = ScalarType::kUint8;
+    for (Index3 v; v.z < 64; ++v.z) {
+      for (v.y = 0; v.y < 64; ++v.y) {
+        for (v.x = 0; v.x < 64; ++v.x) labels.block.samples<std::uint8_t>()[labels.block.Offset(v)] = std::uint8_t(1 + v.x / width % 2);
+      }
+    }
+    return labels;
+  };
+  const std::filesystem::path labels = directory_ / "labels.nrrd", table = directory_ / "table.txt";
+  Replace(labels, labels_of(32));
+  std::ofstream(table) << "1 left 255 0 0 0\n2 right 0 255 0 0\n";
+  const std::string source = file_.string() + ",labels=" + labels.string() + ":" + table.string();
+  ASSERT_TRUE(Order(DataAction::kAdd, {"layered=" + source}).ok());
+
+  FrameRequest request = TestRequest(FindRenderer("raycast"), 30, 3);
+  request.dataset = "layered";
+  request.labels = LabelChoice{.mode = LabelMode::kTint, .tint = 1};
+  request.shading.model = ShadingModel::kNone;
+  // What the picture is, by definition: from the same files, in one box.
+  const auto expected = [&] {
+    const Layers layers = ReadLayers({.labels = labels.string(), .label_colors = table.string()}, volume_->description.geometry).value();
+    const FramePlan plan = PlanFrame(request, 1, Summarize(LayeredVolume{volume_, layers}), Roster{{1}}).value();
+    SlabData slab(CutBlock(volume_->block, volume_->block.box), LayerVoxels{BrickedVoxels(layers.labels->block), {}});
+    RankReport report;
+    LocalImage frame =
+        MakeRenderer(*plan.setup.renderer)->Render(slab, volume_->block.box, plan.setup, {}, std::atomic<bool>(false), report).value();
+    return FinishPicture(frame, plan.setup);
+  };
+  const auto expect_shows = [&](const LocalImage& image) {
+    const Result<Picture> picture = client_->Render(request);
+    ASSERT_TRUE(picture.ok()) << picture.status().message();
+    EXPECT_LE(LargestDifference(picture->image, image, request.size), AllowedDifference(request));
+  };
+  const LocalImage first = expected();
+  expect_shows(first);
+  for (const DatasetStatus& dataset : client_->OrderData({}).value()) EXPECT_EQ(dataset.labels, dataset.name == "layered" ? 2U : 0U);
+
+  // Another file, then other colours: the next frame has them.
+  Replace(labels, labels_of(16));
+  const LocalImage second = expected();
+  EXPECT_GT(LargestDifference(first, second, request.size), 0.1);
+  expect_shows(second);
+  std::ofstream(table) << "1 left 0 0 255 0\n2 right 0 255 0 0\n";
+  const LocalImage third = expected();
+  EXPECT_GT(LargestDifference(second, third, request.size), 0.1);
+  expect_shows(third);
+
+  // Layers that there are not are refused in one line.
+  FrameRequest overlay = request;
+  overlay.overlay.emplace();
+  EXPECT_THAT(client_->Render(overlay).status().message(), testing::HasSubstr("dataset \"layered\" has no overlay"));
+  request.dataset = "ball";
+  EXPECT_THAT(client_->Render(request).status().message(), testing::HasSubstr("dataset \"ball\" has no labels"));
+  request.dataset = "layered";
+  request.labels->shown = {{3, 9}};
+  EXPECT_THAT(client_->Render(request).status().message(), testing::HasSubstr("no label from 3 to 9; it has 2 from 1 to 2"));
+  request.renderer = "splat";
+  request.labels->shown.clear();
+  EXPECT_THAT(client_->Render(request).status().message(), testing::HasSubstr("labels needs one of: raycast"));
+  EXPECT_FALSE(Order(DataAction::kAdd, {"wrong=" + file_.string() + ",labels=" + (directory_ / "none.nrrd").string()}).ok());
 }
 
 TEST_F(DatasetsTest, FramesInFlightShowTheOldFileOrTheNewOne) {

@@ -182,7 +182,7 @@ TEST_F(ExecutorTest, FinishedFrameIsResolvedAndPacked) {
 }
 
 TEST_F(ExecutorTest, EveryChunkIsAnsweredAndDamageIsFound) {
-  const SlabKey slab{.dataset = 4, .box = {{0, 0, 0}, {10, 10, 5}}, .type = ScalarType::kUint16};
+  const SlabKey slab{.dataset = 4, .box = {{0, 0, 0}, {10, 10, 5}}, .types = ScalarType::kUint16};
   Chunk chunk{.epoch = 1, .dataset = 4, .box = slab.box, .chunk = 0};
   const Bytes payload = PackChunk(Bytes(std::vector<std::byte>(1000, std::byte{7})), Codec::kZstd, chunk);
   const auto store = [&](const Chunk& header, const Bytes& bytes) {
@@ -214,7 +214,7 @@ TEST_F(ExecutorTest, RenderIsAnsweredAlsoWhenItIsCancelled) {
   FrameRequest request = TestRequest(Splatting(), 20);
   request.size = {1024, 1024};
   const FramePlan plan = PlanFrame(request, 1, Summarize(*volume), Roster{{1}}).value();
-  const SlabKey slab{.dataset = 1, .box = volume->block.box, .type = volume->block.type};
+  const SlabKey slab{.dataset = 1, .box = volume->block.box, .types = volume->block.type};
   executor_.Perform(OpenSlab{slab});
   const Bytes samples(volume, volume->block.bytes);
   ASSERT_LE(samples.size(), kChunkBytes);
@@ -265,7 +265,7 @@ TEST_F(ExecutorTest, WhatIsCopiedFromOtherSlabsIsWhatWouldHaveArrived) {
       return done.report;
     };
     const auto key = [&](const Box& box, std::uint64_t generation) {
-      return SlabKey{.dataset = 1, .box = box, .type = volume->block.type, .generation = generation};
+      return SlabKey{.dataset = 1, .box = box, .types = volume->block.type, .generation = generation};
     };
     const SlabKey direct = key(whole, 1), lower = key({{0, 0, 0}, {96, 96, 50}}, 2), side = key({{20, 0, 0}, {96, 96, 80}}, 3),
                   put_together = key(whole, 4);

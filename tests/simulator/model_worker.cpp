@@ -66,7 +66,7 @@ void ModelWorker::Perform(const OpenSlab& action) {
   EXPECT_TRUE(slabs_.try_emplace(action.slab).second) << "a slab is opened twice";
   for (const OpenSlab::Copy& copy : action.copies) {
     EXPECT_TRUE(Complete(copy.from)) << "a slab is copied from that is not open or not complete";
-    EXPECT_TRUE(copy.from.box.Contains(copy.box) && copy.from.dataset == action.slab.dataset && copy.from.type == action.slab.type);
+    EXPECT_TRUE(copy.from.box.Contains(copy.box) && copy.from.dataset == action.slab.dataset && copy.from.types == action.slab.types);
     slabs_[action.slab].copied.push_back(copy);
   }
 }
@@ -94,7 +94,7 @@ bool ModelWorker::Complete(const SlabKey& key) const {
   if (open == slabs_.end()) return false;
   std::vector<Box> boxes;
   for (const auto& [box, chunks] : open->second.chunks) {
-    if (chunks.size() != ChunkCount(box, key.type)) return false;
+    if (chunks.size() != ChunkCount(box, key.types)) return false;
     boxes.push_back(box);
   }
   for (const OpenSlab::Copy& copy : open->second.copied) boxes.push_back(copy.box);

@@ -190,6 +190,8 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       {"stage_ns", kStageCount},
       {"planes", 3},
       {"clip_planes", kMaxClipPlanes},
+      {"isosurfaces", kMaxIsosurfaces},
+      {"gradient_opacities", kMaxTransferPoints},
       {"sides", kMaxClipSides},
       {"parameters", kMaxParameters},
   };
@@ -220,7 +222,7 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       [&](const Place& place, const std::string& error) {
         EXPECT_THAT(error, StartsWith(place.path + ": " + std::to_string(limits.at(place.field->name()) + 1)));
       });
-  EXPECT_EQ(seen.size(), limits.size() + 5) << "reports are in four messages, parameters and datasets in two";
+  EXPECT_EQ(seen.size(), limits.size() + 7) << "reports are in four messages; parameters, datasets, isosurfaces and gradients in two";
 }
 
 TEST(Malformed, MissingFieldsAreNoCrash) {

@@ -88,6 +88,27 @@ GroupAssignment Clipped() {
   return message;
 }
 
+std::vector<Isosurface> ManySurfaces() {
+  std::vector<Isosurface> surfaces;
+  for (int i = 0; i < kMaxIsosurfaces; ++i) surfaces.push_back({-kMaxScalar + i * 1e299, {0, 0.5F, 1}, i % 2 == 0 ? 0.25 : 1});
+  return surfaces;
+}
+
+GroupAssignment WithLayers() {
+  GroupAssignment message = Assignment(2, {}, FindRenderer("raycast"));
+  message.setup.layers = {.labels = ScalarType::kUint16, .overlay = ScalarType::kFloat32};
+  message.setup.looks.labels = LabelLook{.mode = LabelMode::kSurface, .tint = 0, .entries = {{{0, 0.5F, 1}, 0.25F, false}, {{1, 1, 1}}}};
+  message.setup.looks.overlay = OverlayLook{.transfer = Curve(), .range = {-2, 3}, .weight = 0.125};
+  return message;
+}
+
+GroupAssignment WithSurfaces() {
+  GroupAssignment message = Assignment(2, {}, FindRenderer("raycast"));
+  message.setup.transfer.isosurfaces = ManySurfaces();
+  message.setup.transfer.gradient_opacities = {{0, 0}, {0, 1}, {kMaxScalar, 0.5}};
+  return message;
+}
+
 GroupAssignment BehindOthers() {
   GroupAssignment message = Assignment(2, {}, Splatting());
   message.setup.termination = 0.5;
@@ -136,8 +157,13 @@ std::vector<Ping> SamplesOf() {
 template <>
 std::vector<GroupAssignment> SamplesOf() {
   const ViewParameters oblique{Projection::kPerspective, 1e6, -33, 12.5, 0.01, 60};
-  return {Assignment(3, {}, Splatting()), Assignment(0, oblique, ZBuffer()), Assignment(16, oblique, Splatting()), BehindOthers(),
-          Clipped()};
+  return {Assignment(3, {}, Splatting()),
+          Assignment(0, oblique, ZBuffer()),
+          Assignment(16, oblique, Splatting()),
+          BehindOthers(),
+          Clipped(),
+          WithSurfaces(),
+          WithLayers()};
 }
 
 template <>
@@ -247,7 +273,16 @@ std::vector<SubmitFrame> SamplesOf() {
   full.previews = true;
   FrameRequest sliced = Request();
   sliced.clipping.slab = ClipSlab{.through = Vec3{1, -2, 3e8}};
-  return {{0, 1, Request()}, {kMax64, 86400000, full}, {1, 2, sliced}};
+  FrameRequest surfaces = Request();
+  surfaces.renderer = "raycast";
+  surfaces.transfer.isosurfaces = ManySurfaces();
+  surfaces.transfer.gradient_opacities = {{1e-3, 0.5}, {7, 0}};
+  FrameRequest layers = Request();
+  layers.renderer = "raycast";
+  layers.labels = LabelChoice{
+      .mode = LabelMode::kSurface, .tint = 1, .opacities = {{1, 0}, {kMaxLabelValue, 0.25}}, .shown = {{1, kMaxLabelValue}, {7, 7}}};
+  layers.overlay = OverlayChoice{.transfer = {"grayscale", 1, ScalarRange{-1, 2}}, .weight = 0.5};
+  return {{0, 1, Request()}, {kMax64, 86400000, full}, {1, 2, sliced}, {1, 2, surfaces}, {1, 2, layers}};
 }
 
 template <>
@@ -358,7 +393,10 @@ std::vector<DataOrder> SamplesOf() {
 
 template <>
 std::vector<DataReply> SamplesOf() {
-  return {{}, {kMax64, {{kUmlaut, DatasetState::kReady, Description(), {-3, 4}, "", kMax64, kMax64}, {"b", DatasetState::kLoading}}}};
+  return {{},
+          {kMax64,
+           {{kUmlaut, DatasetState::kReady, Description(), {-3, 4}, "", kMax64, kMax64, std::uint32_t(kMaxLabels), true},
+            {"b", DatasetState::kLoading}}}};
 }
 
 template <std::size_t... I>

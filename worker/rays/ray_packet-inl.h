@@ -176,7 +176,8 @@ HWY_INLINE void PartsOf(const RayClip& clip, const RayPacket& packet, PacketPart
   const auto any = hn::AndNot(outside, hn::Le(enter.at, leave.at));
   const auto from = hn::Ceil(enter.at), to = hn::Add(hn::Floor(leave.at), Set(1));
   const auto part = [&](PacketPart& out, Mask present, Floats begin, Floats end, Floats enters, Floats leaves, const Cut* cut) HWY_ATTR {
-    out = {begin, hn::IfThenElse(present, end, minus_far), enters, leaves, {zero, zero, zero}, minus_far};
+    out = {begin,    hn::IfThenElse(present, end, minus_far), enters, hn::IfThenElse(present, leaves, minus_far), {zero, zero, zero},
+           minus_far};
     if (cut == nullptr) return;
     for (std::size_t i = 0; i < 3; ++i) out.face[i] = cut->normal[i];
     out.face_end = cut->face_end;
@@ -188,7 +189,7 @@ HWY_INLINE void PartsOf(const RayClip& clip, const RayPacket& packet, PacketPart
   } else {
     part(parts[0], any, from, to, enter.at, leave.at, &enter);
     parts[1] = parts[0];
-    parts[1].end = minus_far;
+    parts[1].end = parts[1].leave = minus_far;
   }
 }
 

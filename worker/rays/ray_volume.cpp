@@ -22,7 +22,7 @@ std::vector<Box> CutIntoLayers(const Box& box, ScalarType type, std::size_t most
 const std::vector<RayPiece>& RayVolume::PiecesOf(const SlabData& slab) {
   if (!pieces_.empty()) return pieces_;
   const VoxelBricks bricks = slab.bricks();
-  for (const Box& layer : CutIntoLayers(bricks.box(), bricks.type(), kMostRayBytes)) {
+  for (const Box& layer : CutIntoLayers(bricks.box(), slab.widest_type(), kMostRayBytes)) {
     RayPiece piece;
     piece.voxels = Pad(bricks, layer);
     piece.cells = FindCellRanges(piece.voxels);

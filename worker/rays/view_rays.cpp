@@ -116,15 +116,15 @@ std::array<RayPart, 2> PartsOf(const RayClip& clip, const PixelRay& ray) {
       parts[0] = {std::ceil(enter.at), std::floor(leave.at) + 1, enter.at, leave.at};
       face(parts[0], enter);
     } else {
-      parts[0].end = -kRayEnd;
+      parts[0].end = parts[0].leave = -kRayEnd;
     }
-    parts[1].end = -kRayEnd;
+    parts[1].end = parts[1].leave = -kRayEnd;
   } else if (any) {
     parts[0] = {-kRayEnd, std::ceil(enter.at), -kRayEnd, enter.at};
     parts[1] = {std::floor(leave.at) + 1, kRayEnd, leave.at, kRayEnd};
     face(parts[1], leave);
   } else {
-    parts[1].end = -kRayEnd;
+    parts[1].end = parts[1].leave = -kRayEnd;
   }
   return parts;
 }

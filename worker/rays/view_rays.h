@@ -66,11 +66,11 @@ inline constexpr float kLeastCrossing = 1e-6F;  // physical distance a sample: a
 inline constexpr float kRayEnd = 1e9F;          // beyond every sample, either sign
 struct RayPart {
   float begin = -kRayEnd, end = kRayEnd;    // samples [begin, end)
-  float enter = -kRayEnd, leave = kRayEnd;  // where the ray is cut, between samples
+  float enter = -kRayEnd, leave = kRayEnd;  // where the ray is cut, between samples; enter > leave: nothing is left
   Float3 face{};                            // data space: a normal of the face at `enter`, of any length
   float face_end = -kRayEnd;                // samples before this one lie within face_depth of it
 };
-// The parts of a ray, nearest first. The second one may be empty: begin >= end.
+// The parts of a ray, nearest first. A part may have no samples, begin >= end, and yet a length.
 std::array<RayPart, 2> PartsOf(const RayClip& clip, const PixelRay& ray);
 
 // Samples [begin, end) and pixels that a data-space box may touch, with some slack. The pixels lie within the camera's image.

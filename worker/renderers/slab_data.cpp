@@ -1,5 +1,7 @@
 #include "worker/renderers/slab_data.h"
 
+#include "common/renderers/renderer_kind.h"
+
 namespace slabstream {
 
 const VoxelBlock& SlabData::voxels() const {
@@ -11,6 +13,14 @@ const VoxelBlock& SlabData::voxels() const {
   return block_;
 }
 
+ScalarType SlabData::widest_type() const {
+  ScalarType widest = bricks().type();
+  for (const auto* layer : {&layers_.labels, &layers_.overlay}) {
+    if (*layer && BytesPerSample((*layer)->type()) > BytesPerSample(widest)) widest = (*layer)->type();
+  }
+  return widest;
+}
+
 const BrickRanges& SlabData::ranges() {
   if (!ranges_) ranges_.emplace(bricks());
   return *ranges_;
@@ -18,9 +28,9 @@ const BrickRanges& SlabData::ranges() {
 
 const ClassificationTable& SlabData::Classification(const FrameSetup& setup) {
   // A slab's description never changes: it is its dataset's.
-  auto key = std::pair(setup.transfer, setup.range);
+  auto key = std::tuple(setup.renderer, setup.transfer, setup.range);
   if (classified_ != key) {
-    table_ = Classify(setup.transfer, setup.description, setup.range);
+    table_ = setup.renderer->Table(setup.transfer, setup.description, setup.range);
     classified_ = std::move(key);
   }
   return table_;
@@ -28,6 +38,7 @@ const ClassificationTable& SlabData::Classification(const FrameSetup& setup) {
 
 std::size_t SlabData::bytes() const {
   std::size_t total = block_.bytes.capacity() + (bricks_ ? bricks_->bytes() : 0) + (ranges_ ? ranges_->bytes() : 0);
+  for (const auto* layer : {&layers_.labels, &layers_.overlay}) total += *layer ? (*layer)->bytes() : 0;
   total += table_.opacity.capacity() * sizeof(float) + table_.color.capacity() * sizeof(Rgb);
   for (const auto& [type, cache] : caches_) total += cache->bytes();
   return total;

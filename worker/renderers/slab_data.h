@@ -1,4 +1,4 @@
-// SlabData: the voxels of one slab with its halo, and what renderers derived from them. One thread at a time uses it.
+// SlabData: the voxels of one slab with its halo, those of its layers, and what renderers derived from them. One thread at a time uses it.
 #pragma once
 
 #include <concepts>
@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <tuple>
 #include <typeindex>
 #include <utility>
 
@@ -23,10 +24,15 @@ class SlabCache {
   virtual std::size_t bytes() const = 0;  // memory
 };
 
+// Of the slab's box. nullopt: the dataset has no such layer.
+struct LayerVoxels {
+  std::optional<BrickedVoxels> labels, overlay;
+};
+
 class SlabData {
  public:
-  explicit SlabData(VoxelBlock voxels) : block_(std::move(voxels)) {}
-  explicit SlabData(BrickedVoxels voxels) : bricks_(std::move(voxels)) {}
+  explicit SlabData(VoxelBlock voxels, LayerVoxels layers = {}) : block_(std::move(voxels)), layers_(std::move(layers)) {}
+  explicit SlabData(BrickedVoxels voxels, LayerVoxels layers = {}) : bricks_(std::move(voxels)), layers_(std::move(layers)) {}
   SlabData(const SlabData&) = delete;
   SlabData& operator=(const SlabData&) = delete;
 
@@ -34,10 +40,14 @@ class SlabData {
   const VoxelBlock& voxels() const;
   VoxelBricks bricks() const { return bricks_ ? VoxelBricks(*bricks_) : VoxelBricks(block_); }
 
+  const LayerVoxels& layers() const { return layers_; }
+  // Of volume and layers, the type whose samples take most.
+  ScalarType widest_type() const;
+
   // The range of samples of each brick.
   const BrickRanges& ranges();
 
-  // The table of this frame's transfer function. Valid until the next call.
+  // The table of this frame's renderer and transfer function (RendererKind::Table). Valid until the next call.
   const ClassificationTable& Classification(const FrameSetup& setup);
 
   // The renderer's cache. The first call creates it.
@@ -56,8 +66,9 @@ class SlabData {
   mutable VoxelBlock block_;
   mutable std::optional<BrickedVoxels> bricks_;  // then block_ is empty
 
+  LayerVoxels layers_;
   std::optional<BrickRanges> ranges_;
-  std::optional<std::pair<TransferFunction, ValueRange>> classified_;  // table_ was made from these
+  std::optional<std::tuple<const RendererKind*, TransferFunction, ValueRange>> classified_;  // table_ was made from these
   ClassificationTable table_;
   std::map<std::type_index, std::unique_ptr<SlabCache>> caches_;
 };

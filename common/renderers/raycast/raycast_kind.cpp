@@ -16,11 +16,15 @@ double Extinction(const CostBasis& basis) {
   return -std::log1p(-std::min(double(table.max_opacity), 0.999)) / table.opacity_distance;
 }
 
-// The time of a box is that of the pixels that it covers and of their shaded samples.
+// The time of a box is that of the pixels that it covers and of their shaded samples. Of isosurfaces alone, samples are taken only in cells
+// that a surface passes through: those that are drawn in part.
 class RaycastCost : public AnalyticCost {
  public:
-  explicit RaycastCost(const CostBasis& basis)
-      : drawn_(*basis.drawn), opaque_depth_(kEnd / std::max(Extinction(basis), 1e-9)), sampling_rate_(SamplingRateOf(basis.parameters)) {}
+  explicit RaycastCost(const CostBasis& basis) : drawn_(*basis.drawn), sampling_rate_(SamplingRateOf(basis.parameters)) {
+    const double extinction = Extinction(basis);
+    opaque_depth_ = kEnd / std::max(extinction, 1e-9);
+    surfaces_alone_ = !(extinction > 0);
+  }
 
   double Seconds(const Box& box, const CostView& view) const override {
     // Columns of cells along the view: material behind opaque material is not sampled.
@@ -34,7 +38,12 @@ class RaycastCost : public AnalyticCost {
       for (cell[u] = across_u.begin; cell[u] < across_u.end; ++cell[u]) {
         double depth = 0;  // voxel lengths of material
         for (cell[c] = along.begin; cell[c] < along.end; ++cell[c]) {
-          depth += along.ShareInside(cell[c]) * drawn_.cells[NumberIn(cells, cell)].voxels / kCellArea;
+          const std::uint32_t voxels = drawn_.cells[NumberIn(cells, cell)].voxels;
+          if (!surfaces_alone_) {
+            depth += along.ShareInside(cell[c]) * voxels / kCellArea;
+          } else if (voxels != 0 && voxels != OccupancyCellBox(cell, drawn_.size).voxel_count()) {
+            depth += along.ShareInside(cell[c]) * kOccupancyCell;
+          }
         }
         if (depth <= 0) continue;
         const double area = kCellArea * across_u.ShareInside(cell[u]) * across_v.ShareInside(cell[v]);
@@ -52,8 +61,9 @@ class RaycastCost : public AnalyticCost {
   static constexpr double kEnd = 6.9;  // -ln of the transmittance at which rays end by default, 1/1024
 
   const OccupancyGrid& drawn_;
-  const double opaque_depth_;  // voxel lengths of material after which rays end
   const double sampling_rate_;
+  double opaque_depth_;  // voxel lengths of material after which rays end
+  bool surfaces_alone_;
 };
 
 class RaycastKind : public RendererKind {
@@ -64,15 +74,22 @@ class RaycastKind : public RendererKind {
                       .purpose = "trilinear samples along each pixel's ray, for sharp surfaces inside translucent material",
                       .format = PixelFormat::kRgba,
                       .reach = kHalo,  // 2 would do; like the other renderers, so that all use the same cached voxels
+                      .shows_layers = true,
+                      .isosurfaces = true,
+                      .gradient_opacity = true,
                       .footprint = 1,
                       .stages = {Stage::kSample},
                       .parameters = {SamplingRate()}}) {}
 
   // Interpolation gives all values between those of two voxels, so a sample between two clear voxels may be visible. A voxel counts as
-  // drawn if it is at least the lowest visible value: without such a voxel, nothing in its reach shows.
+  // drawn if it is at least the lowest visible value or isovalue: without such a voxel, nothing in its reach shows.
   ClassificationTable DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const override {
     ClassificationTable table = Classify(transfer, summary.description, summary.range);
-    const auto first = std::ranges::find_if(table.opacity, [](float opacity) { return opacity > 0; });
+    auto first = std::ranges::find_if(table.opacity, [](float opacity) { return opacity > 0; });
+    for (const Isosurface& surface : transfer.isosurfaces) {
+      first = std::min(first, table.opacity.begin() + table.BinOf(double(StoredIsovalue(surface.value, summary.description.mapping))));
+    }
+    if (!transfer.isosurfaces.empty()) table.max_opacity = 1;
     std::for_each(first, table.opacity.end(), [&](float& opacity) { opacity = opacity > 0 ? opacity : table.max_opacity; });
     return table;
   }

@@ -1,8 +1,9 @@
 // The Z-buffer's planning half: the frame is the picture, supersampled where it is minified; only opaque voxels draw.
+#include <algorithm>
+
 #include "common/calibration/calibration.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/renderers/zbuffer/depth_shading.h"
-#include "common/renderers/zbuffer/least_opaque.h"
 #include "common/volume/cells_along.h"
 
 namespace slabstream::zbuffer {
@@ -51,13 +52,24 @@ class ZBufferKind : public RendererKind {
                       .purpose = "the surfaces of opaque voxels; for solid objects",
                       .format = PixelFormat::kDepth,
                       .reach = kHalo,  // 2 would do; as for splatting, so that both use the same cached voxels
+                      .isosurfaces = true,
                       .footprint = 1,
                       .stages = {Stage::kZBuffer, Stage::kShade}}) {}
 
-  ClassificationTable DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const override {
-    ClassificationTable table = Classify(transfer, summary.description, summary.range);
-    const float least = LeastOpaque(table, summary.description, summary.range);
+  // A voxel is opaque if it has half of the largest opacity in the volume's range of values, or at least an isovalue: then it has the
+  // colour of the greatest one that it reaches. All other bins are clear.
+  ClassificationTable Table(const TransferFunction& transfer, const VolumeDescription& description, ValueRange range) const override {
+    ClassificationTable table = Classify(transfer, description, range);
+    const float least = 0.5F * MaxOpacity(table, description, range);
     for (float& opacity : table.opacity) opacity = opacity >= least ? opacity : 0;
+    for (const Isosurface& surface : transfer.isosurfaces) {
+      for (std::size_t bin = 0; bin < table.opacity.size(); ++bin) {
+        if (table.ValueOf(int(bin), description.mapping) < surface.value) continue;
+        table.opacity[bin] = 1;
+        table.color[bin] = surface.color;
+      }
+    }
+    table.max_opacity = *std::ranges::max_element(table.opacity);
     return table;
   }
   std::unique_ptr<AnalyticCost> MakeCost(const CostBasis& basis) const override { return std::make_unique<ZBufferCost>(*basis.drawn); }

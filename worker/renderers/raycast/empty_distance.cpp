@@ -1,6 +1,7 @@
 #include "worker/renderers/raycast/empty_distance.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace slabstream {
 namespace {
@@ -44,12 +45,19 @@ class Sweep {
 
 }  // namespace
 
-std::vector<std::uint8_t> EmptyDistances(const CellRanges& cells, const VisibleSamples& visible) {
+std::vector<std::uint8_t> VisibleCells(const CellRanges& cells, const VisibleSamples& visible) {
   std::vector<std::uint8_t> distance(cells.ranges.size() + kEmptyDistancePadding, 255);
   for (std::size_t i = 0; i < cells.ranges.size(); ++i) {
     if (visible.AnyBetween(cells.ranges[i].min, cells.ranges[i].max)) distance[i] = 0;
   }
-  const Index3& counts = cells.counts;
+  return distance;
+}
+
+std::vector<std::uint8_t> EmptyDistances(const CellRanges& cells, const VisibleSamples& visible) {
+  return EmptyDistances(cells.counts, VisibleCells(cells, visible));
+}
+
+std::vector<std::uint8_t> EmptyDistances(const Index3& counts, std::vector<std::uint8_t> distance) {
   Sweep sweep(counts, distance.data());
   for (std::int32_t z = 0; z < counts.z; ++z) {
     for (std::int32_t y = 0; y < counts.y; ++y) sweep.Visit(y, z, -1);

@@ -14,5 +14,9 @@ inline constexpr std::size_t kEmptyDistancePadding = 3;  // bytes after the last
 
 // [z][y][x] and the padding; at most 255.
 std::vector<std::uint8_t> EmptyDistances(const CellRanges& cells, const VisibleSamples& visible);
+// The same where more is visible: `distance` has the padding, 0 in visible cells and 255 elsewhere.
+std::vector<std::uint8_t> EmptyDistances(const Index3& counts, std::vector<std::uint8_t> distance);
+// What it begins with.
+std::vector<std::uint8_t> VisibleCells(const CellRanges& cells, const VisibleSamples& visible);
 
 }  // namespace slabstream

@@ -9,6 +9,8 @@
 
 #include "worker/kernels/power-inl.h"
 #include "worker/rays/ray_packet-inl.h"
+#include "worker/renderers/raycast/layer_samples-inl.h"
+#include "worker/renderers/raycast/surface_walk-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace slabstream::HWY_NAMESPACE {
@@ -95,12 +97,126 @@ HWY_INLINE EndSamples EndSamplesOf(const ViewRays& view, const RayPacket& packet
 // What the rays of a packet have gathered, front to back.
 struct Sums {
   Floats red, green, blue, alpha;
+
+  // Adds what lies next on these rays. `colors`: straight, red, green, blue and something else of each colour; `entry`: times four.
+  HWY_INLINE void Add(Mask rays, Floats opacity, const float* colors, Ints entry, const Light& light) {
+    const FloatTag df;
+    AddChannels(rays, opacity, [&](std::size_t channel) HWY_ATTR { return Lit(hn::GatherIndex(df, colors + channel, entry), light); });
+  }
+  // `color(channel)`: what the light makes of red, green and blue.
+  template <class Color>
+  HWY_INLINE void AddChannels(Mask rays, Floats opacity, Color&& color) {
+    const auto weight = hn::IfThenElseZero(rays, hn::Mul(hn::Sub(Set(1), alpha), opacity));
+    red = hn::MulAdd(weight, color(0), red);
+    green = hn::MulAdd(weight, color(1), green);
+    blue = hn::MulAdd(weight, color(2), blue);
+    alpha = hn::Add(alpha, weight);
+  }
+  static HWY_INLINE Floats Lit(Floats color, const Light& light) {
+    return hn::Min(hn::Max(hn::MulAdd(color, light.diffuse, light.specular), hn::Zero(FloatTag())), Set(1));
+  }
 };
 
-// Samples `owned` of the rays. kClipped: they lie in `part`; otherwise it is null. Returns how many samples were shaded.
-template <class T, bool kClipped>
+// The factor of the opacity of samples with this gradient.
+HWY_INLINE Floats GradientFactor(const RayLook& look, const Gradient& g) {
+  const FloatTag df;
+  const auto square = [&](Floats slope, std::size_t axis) HWY_ATTR {
+    const auto physical = hn::Mul(slope, Set(look.inverse_spacing[axis]));
+    return hn::Mul(physical, physical);
+  };
+  const auto magnitude = hn::Sqrt(hn::Add(hn::Add(square(g.x, 0), square(g.y, 1)), square(g.z, 2)));
+  const auto finite = hn::Le(magnitude, Set(std::numeric_limits<float>::max()));
+  const auto number =
+      hn::Min(hn::MulAdd(hn::IfThenElseZero(finite, magnitude), Set(look.gradient_scale), Set(0.5F)), Set(look.gradient_last));
+  return hn::GatherIndex(df, look.gradient_factors.data(), hn::ConvertTo(IntTag(), number));
+}
+
+// Adds a crossing with an isosurface as labels have it: tinted, thinned or taken away like a sample there, and not in the place of a label
+// that is matter.
+HWY_INLINE void AddLabelled(const MarchWork& work, Mask rays, const SamplePlace& place, Ints entry, const Light& light, Sums& sums) {
+  const FloatTag df;
+  const LabelTables& tables = *work.layers->labels;
+  const float *const colors = work.look->surface_looks.data(), *const tints = tables.entries.data();
+  const auto label = hn::ShiftLeft<2>(NearestLabel(*work.layers, *work.box, place, IndexBefore(*work.box, place, rays)));
+  const auto changed = hn::GatherIndex(df, tints + 3, label);
+  const auto factor = tables.surface ? hn::IfThenElseZero(hn::Lt(changed, hn::Zero(df)), Set(1)) : changed;
+  const auto tint = hn::IfThenElseZero(hn::RebindMask(df, hn::Gt(label, hn::Zero(IntTag()))), Set(tables.tint));
+  sums.AddChannels(rays, hn::Mul(hn::GatherIndex(df, colors + 3, entry), factor), [&](std::size_t channel) HWY_ATTR {
+    return Sums::Lit(Lerp(tint, hn::GatherIndex(df, colors + channel, entry), hn::GatherIndex(df, tints + channel, label)), light);
+  });
+}
+
+// Adds the crossings of rays with isosurfaces up to `before`, in samples. Returns how many.
+template <class T>
+HWY_NOINLINE std::uint64_t AddSurfaces(const MarchWork& work, Mask rays, Floats before, SurfaceWalk<T>& walk, Sums& sums) {
+  const FloatTag df;
+  const RayLook& look = *work.look;
+  const auto opaque = Set(1 - work.termination);
+  const auto due = [&]() HWY_ATTR {
+    return hn::And(rays, hn::And(hn::And(hn::Le(walk.at(), before), hn::Lt(walk.at(), Set(kRayEnd))), hn::Lt(sums.alpha, opaque)));
+  };
+  std::uint64_t count = 0;
+  for (auto crossing = due(); !hn::AllFalse(df, crossing); crossing = due()) {
+    count += hn::CountTrue(df, crossing);
+    Light light = {Set(1), hn::Zero(df)};
+    if (look.phong) light = LightOf(look, GradientAt(LoadNeighbours<T>(*work.box, walk.place(), crossing), walk.place()));
+    const float* const colors = look.surface_looks.data();
+    if (work.layers != nullptr && work.layers->labels != nullptr) {
+      AddLabelled(work, crossing, walk.place(), walk.look(), light, sums);
+    } else {
+      sums.Add(crossing, hn::GatherIndex(df, colors + 3, walk.look()), colors, walk.look(), light);
+    }
+    walk.Next(crossing);
+  }
+  return count;
+}
+
+// The light on both parts of samples with layers.
+struct LayeredLight {
+  Light volume, overlay;
+};
+// `gradient`: of the volume, or a face's normal if `on_face`.
+HWY_INLINE LayeredLight LightOfLayers(const MarchWork& work, const SamplePlace& place, Ints at, const LayeredSample& sample, Mask visible,
+                                      Gradient gradient, Mask on_face) {
+  const FloatTag df;
+  const auto matter = hn::AndNot(on_face, hn::And(visible, sample.matter));
+  if (!hn::AllFalse(df, matter)) {
+    const IndicatorGradient g = IndicatorGradientAt(*work.layers, *work.box, place, at, sample.label);
+    gradient = {hn::IfThenElse(matter, g.x, gradient.x), hn::IfThenElse(matter, g.y, gradient.y), hn::IfThenElse(matter, g.z, gradient.z)};
+  }
+  const Light volume = LightOf(*work.look, gradient);
+  if (hn::AllFalse(df, hn::And(visible, hn::Gt(sample.overlay_share, hn::Zero(df))))) return {volume, volume};
+  const Gradient over = GradientAt(sample.overlay, place);
+  return {volume, LightOf(*work.look, {hn::IfThenElse(on_face, gradient.x, over.x), hn::IfThenElse(on_face, gradient.y, over.y),
+                                       hn::IfThenElse(on_face, gradient.z, over.z)})};
+}
+
+// Adds samples with layers.
+HWY_INLINE void AddLayered(const MarchWork& work, Mask rays, Floats opacity, Ints entry, const LayeredSample& sample,
+                           const LayeredLight& light, Sums& sums) {
+  const FloatTag df;
+  const RayLayers& layers = *work.layers;
+  sums.AddChannels(rays, opacity, [&](std::size_t channel) HWY_ATTR {
+    auto color = hn::GatherIndex(df, work.look->entries.data() + channel, entry);
+    if (layers.labels != nullptr) {
+      color = Lerp(sample.tint, color, hn::GatherIndex(df, layers.labels->entries.data() + channel, sample.label_entry));
+    }
+    color = Sums::Lit(color, light.volume);
+    if (layers.overlay == nullptr) return color;
+    const auto over = hn::GatherIndex(df, layers.overlay->entries.data() + channel, sample.overlay_entry);
+    return Lerp(sample.overlay_share, color, Sums::Lit(over, light.overlay));
+  });
+}
+
+// What a frame may ask for: only a transfer function; cuts, isosurfaces and gradient opacity, too; and layers on top. Each is compiled by
+// itself, so that a frame does not pay for what it does not use.
+enum class Samples { kPlain, kAll, kLayered };
+
+// Samples `owned` of the rays, which lie in `part`; of kPlain it is null. Returns how many samples were shaded.
+template <class T, Samples kSamples>
 HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const RayPacket& packet, const LeapScales& leaps, const SampleInterval& owned,
-                                      const PacketPart* part, Sums& sums) {
+                                      const PacketPart* part, Sums& gathered) {
+  constexpr bool kAll = kSamples != Samples::kPlain, kLayered = kSamples == Samples::kLayered;
   const FloatTag df;
   const IntTag di;
   const RayBox& box = *work.box;
@@ -110,17 +226,24 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const RayPacket& pa
   const auto opaque = Set(1 - work.termination);
   const float* const entries = look.entries.data();
 
-  const bool has_ends = kClipped || box.at_border;
-  EndSamples ends{zero, zero, zero, zero};
-  if (has_ends) ends = EndSamplesOf(*work.rays, packet, leaps, part);
-
-  Floats red = sums.red, green = sums.green, blue = sums.blue, alpha = sums.alpha;
   // Each ray advances separately: its next sample is k.
   auto k = owned.begin;
   auto alive = hn::Lt(k, owned.end);
-  if constexpr (kClipped) alive = hn::And(alive, hn::Lt(alpha, opaque));
-  bool in_matter = false;  // most of the last samples were visible
   std::uint64_t shaded = 0;
+  SurfaceWalk<T> surfaces(work, packet);
+  const bool has_surfaces = kAll && !look.isovalues.empty();
+  if constexpr (kAll) {
+    alive = hn::And(alive, hn::Lt(gathered.alpha, opaque));
+    if (!kLayered && !look.volume_shows) alive = hn::Lt(one, zero);
+    if (has_surfaces) surfaces.Start(*part);
+  }
+  if (!has_surfaces && hn::AllFalse(df, alive)) return 0;
+  const bool has_ends = kAll || box.at_border;
+  EndSamples ends{zero, zero, zero, zero};
+  if (has_ends) ends = EndSamplesOf(*work.rays, packet, leaps, part);
+
+  Sums sums = gathered;
+  bool in_matter = false;  // most of the last samples were visible
   while (!hn::AllFalse(df, alive)) {
     const SamplePlace place = PlaceSample(packet, box, k);
     // Rays in empty space leap ahead; the others go on to their next sample.
@@ -141,46 +264,79 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const RayPacket& pa
     const Neighbours<T> neighbours = LoadNeighbours<T>(box, place, sampled);
     const auto value = Interpolate(neighbours, place);
     const auto finite = hn::Le(hn::Abs(value), Set(std::numeric_limits<float>::max()));
-    const auto number =
-        hn::Min(hn::Max(hn::Add(hn::Mul(hn::Sub(value, Set(look.origin)), Set(look.scale)), Set(look.rounding)), zero), Set(look.last));
-    const auto entry = hn::ShiftLeft<2>(hn::ConvertTo(di, hn::IfThenElseZero(finite, number)));
+    const auto entry = EntryOf(look, value, finite);
     auto opacity = hn::GatherIndex(df, entries + 3, entry);
-    const auto visible = hn::And(hn::And(sampled, finite), hn::Gt(opacity, zero));
+    auto visible = hn::And(hn::And(sampled, finite), hn::Gt(opacity, zero));
+    Gradient gradient = {zero, zero, zero};
+    const bool by_gradient = kAll && !look.gradient_factors.empty();
+    [[maybe_unused]] LayeredSample layered;
+    if constexpr (kLayered) {
+      if (by_gradient) {
+        gradient = GradientAt(neighbours, place);
+        const auto clear = hn::Sub(one, hn::Mul(opacity, GradientFactor(look, gradient)));
+        opacity = hn::Sub(one, PowerOfFraction(clear, Set(look.step_exponent)));
+      }
+      layered = WithLayers(*work.layers, box, place, neighbours, hn::IfThenElseZero(finite, opacity));
+      opacity = layered.opacity;
+      visible = hn::And(sampled, hn::Gt(opacity, zero));
+    }
     const std::size_t count = hn::CountTrue(df, visible);
     in_matter = count > kLanes / 2;
     if (count == 0) continue;
     shaded += count;
+    if constexpr (kAll) {
+      if (has_surfaces) shaded += AddSurfaces<T>(work, visible, this_k, surfaces, sums);
+    }
 
-    if (has_ends) {
+    const bool of_length = !kLayered && by_gradient;  // the opacity is not that of a step yet
+    if ((look.phong && !(kLayered && by_gradient)) || of_length) gradient = GradientAt(neighbours, place);
+    if (of_length) opacity = hn::Mul(opacity, GradientFactor(look, gradient));
+    if (has_ends || of_length) {
       const auto is_first = hn::Eq(this_k, ends.first), is_last = hn::Eq(this_k, ends.last);
-      if (!hn::AllFalse(df, hn::And(visible, hn::Or(is_first, is_last)))) {
+      if (of_length || !hn::AllFalse(df, hn::And(visible, hn::Or(is_first, is_last)))) {
         const auto steps_of_first = hn::Add(one, hn::IfThenElseZero(is_first, ends.first_excess));
-        const auto power = hn::Add(steps_of_first, hn::IfThenElseZero(is_last, ends.last_excess));
+        auto power = hn::Add(steps_of_first, hn::IfThenElseZero(is_last, ends.last_excess));
+        if (of_length) power = hn::Mul(power, Set(look.step_exponent));
         opacity = hn::Sub(one, PowerOfFraction(hn::Sub(one, opacity), power));
       }
     }
     Light light = {one, zero};
+    [[maybe_unused]] LayeredLight lights = {light, light};
     if (look.phong) {
-      Gradient gradient = GradientAt(neighbours, place);
-      if constexpr (kClipped) {
-        const auto on_face = hn::Lt(this_k, part->face_end);
+      [[maybe_unused]] auto on_face = hn::Lt(one, zero);
+      if constexpr (kAll) {
+        on_face = hn::Lt(this_k, part->face_end);
         gradient = {hn::IfThenElse(on_face, part->face[0], gradient.x), hn::IfThenElse(on_face, part->face[1], gradient.y),
                     hn::IfThenElse(on_face, part->face[2], gradient.z)};
       }
-      light = LightOf(look, gradient);
+      if constexpr (kLayered) {
+        lights = LightOfLayers(work, place, neighbours.at, layered, visible, gradient, on_face);
+      } else {
+        light = LightOf(look, gradient);
+      }
     }
-    const auto weight = hn::IfThenElseZero(visible, hn::Mul(hn::Sub(one, alpha), opacity));
-    const auto add = [&](Floats& sum, const float* colors) HWY_ATTR {
-      const auto color = hn::MulAdd(hn::GatherIndex(df, colors, entry), light.diffuse, light.specular);
-      sum = hn::MulAdd(weight, hn::Min(hn::Max(color, zero), one), sum);
-    };
-    add(red, entries);
-    add(green, entries + 1);
-    add(blue, entries + 2);
-    alpha = hn::Add(alpha, weight);
-    alive = hn::And(alive, hn::Lt(alpha, opaque));
+    if constexpr (kLayered) {
+      AddLayered(work, visible, opacity, entry, layered, lights, sums);
+    } else {
+      sums.Add(visible, opacity, entries, entry, light);
+    }
+    alive = hn::And(alive, hn::Lt(sums.alpha, opaque));
   }
-  sums = {red, green, blue, alpha};
+  if constexpr (kAll) {
+    if (has_surfaces) shaded += AddSurfaces<T>(work, packet.valid, Set(kRayEnd), surfaces, sums);
+  }
+  gathered = sums;
+  return shaded;
+}
+
+// Apart from plain frames, so that these have the registers for themselves.
+template <class T, Samples kSamples>
+HWY_NOINLINE std::uint64_t MarchParts(const MarchWork& work, const RayPacket& packet, const LeapScales& leaps, const SampleInterval& owned,
+                                      Sums& sums) {
+  PacketPart parts[2];
+  PartsOf(work.rays->clip, packet, parts);
+  std::uint64_t shaded = 0;
+  for (const PacketPart& part : parts) shaded += MarchSamples<T, kSamples>(work, packet, leaps, part.Of(owned), &part, sums);
   return shaded;
 }
 
@@ -192,12 +348,12 @@ HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& pac
   const LeapScales leaps = LeapScalesOf(packet);
   Sums sums = {zero, zero, zero, zero};
   std::uint64_t shaded = 0;
-  if (work.rays->clip.empty()) {
-    shaded = MarchSamples<T, false>(work, packet, leaps, owned, nullptr, sums);
+  if (work.layers != nullptr) {
+    shaded = MarchParts<T, Samples::kLayered>(work, packet, leaps, owned, sums);
+  } else if (!work.rays->clip.empty() || !work.look->isovalues.empty() || !work.look->gradient_factors.empty()) {
+    shaded = MarchParts<T, Samples::kAll>(work, packet, leaps, owned, sums);
   } else {
-    PacketPart parts[2];
-    PartsOf(work.rays->clip, packet, parts);
-    for (const PacketPart& part : parts) shaded += MarchSamples<T, true>(work, packet, leaps, part.Of(owned), &part, sums);
+    shaded = MarchSamples<T, Samples::kPlain>(work, packet, leaps, owned, nullptr, sums);
   }
   if (shaded != 0) hn::StoreInterleaved4(sums.red, sums.green, sums.blue, sums.alpha, FloatTag(), rgba);
   return shaded;

@@ -4,13 +4,20 @@
 //   sample      trilinear interpolation of stored samples: along x, then y, then z
 //   classified  after interpolation, by RayLook::entries; a sample that is not finite is empty
 //   gradient    central differences of stored samples over two voxels, interpolated like the samples; that of the interpolated volume
+//   opacity     times the factor that the gradient's magnitude has (RayLook::gradient_factors), if there is such a curve
 //   shaded      as Phong::AtNormal and WithoutGradient define it
+//   layers      the label of the nearest voxel, and the overlay interpolated and classified like the volume (RayLayers); mixed with the
+//               volume's sample as docs/rendering.md says
+//
+// Isosurfaces of the interpolated volume are composited among the samples, each crossing of a ray with its surface's opacity
+// (surface_walk-inl.h). A crossing between two samples comes after the first of them.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 
 #include "worker/rays/ray_box.h"
+#include "worker/renderers/raycast/ray_layers.h"
 #include "worker/renderers/raycast/ray_look.h"
 
 namespace slabstream {
@@ -21,13 +28,15 @@ struct MarchWork {
   const RayLook* look = nullptr;
   const std::uint8_t* empty_distance = nullptr;  // EmptyDistances of the box's cells
   float termination = 0;                         // a ray ends where it transmits less; 0: never
+  const RayLayers* layers = nullptr;             // null: none is shown
 };
 
 // Premultiplied RGBA of the samples that the box owns on the rays of the pixels of `tile`; `rgba` points to the first pixel. Pixels without
 // a visible sample may stay unwritten: they must be 0 before. Returns how many samples were shaded.
 std::uint64_t MarchTile(const MarchWork& work, const PixelBounds& tile, float* rgba, std::size_t floats_a_row);
 
-// The definition: one ray and one sample after the other, without leaps. Within 1e-5 of MarchTile where `termination` is 0.
+// The definition: one ray and one sample after the other, without leaps. Within 1e-5 of MarchTile where `termination` is 0; with
+// isosurfaces within 1e-3, except where a ray merely touches one.
 void MarchTileReference(const MarchWork& work, const PixelBounds& tile, float* rgba, std::size_t floats_a_row);
 
 }  // namespace slabstream

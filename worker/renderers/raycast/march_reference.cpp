@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
+#include <vector>
 
 #include "worker/renderers/raycast/march.h"
 
@@ -27,9 +29,11 @@ class ReferenceMarch {
     const auto in_part = [&](std::int32_t k) {
       return Inside(SamplePosition(ray, k), volume_begin, volume_end) && float(k) >= part.begin && float(k) < part.end;
     };
+    std::deque<Crossing> crossings = CrossingsOf(ray, part);
     for (std::int32_t k = 0; k < work_.rays->sample_count; ++k) {
       const Float3 p = SamplePosition(ray, k);
       if (!Inside(p, box_.low, box_.high) || !in_part(k)) continue;
+      AddCrossings(crossings, k, sum);
       double enter = part.enter, leave = part.leave;
       for (std::size_t i = 0; i < 3; ++i) {
         const double move = double(ray.move[i]), to_begin = double(volume_begin[i] - ray.first[i]),
@@ -42,6 +46,103 @@ class ReferenceMarch {
       const double before = first ? std::clamp(k - enter, 0.0, 1.0) : 0.5, behind = last ? std::clamp(leave - k, 0.0, 1.0) : 0.5;
       Add(p, before + behind, float(k) < part.face_end ? &part.face : nullptr, sum);
     }
+    AddCrossings(crossings, double(kRayEnd), sum);
+  }
+
+  struct Crossing {
+    double at;
+    Float3 position;
+    std::size_t surface;
+  };
+
+  // Crossings of the ray with isosurfaces in the box and in `part`, nearest first.
+  std::deque<Crossing> CrossingsOf(const PixelRay& ray, const RayPart& part) const {
+    double from = std::max(double(part.enter), 0.0), to = double(part.leave);
+    std::vector<double> planes;  // where the ray passes planes of voxel centres
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double first = double(ray.first[i]), move = double(ray.move[i]);
+      if (std::abs(move) < 1e-9) continue;
+      const double a = (double(box_.low[i]) - first) / move, b = (double(box_.high[i]) - first) / move;
+      from = std::max(from, std::min(a, b));
+      to = std::min(to, std::max(a, b));
+      for (double plane = std::floor(double(box_.low[i])); plane <= double(box_.high[i]) + 1; ++plane)
+        planes.push_back((plane - first) / move);
+    }
+    std::deque<Crossing> crossings;
+    if (!(from < to)) return crossings;
+    std::erase_if(planes, [&](double at) { return at <= from || at >= to; });
+    planes.insert(planes.end(), {from, to});
+    std::ranges::sort(planes);
+    for (std::size_t i = 1; i < planes.size(); ++i) AddCrossingsBetween(ray, planes[i - 1], planes[i], crossings);
+    std::ranges::stable_sort(crossings, {}, &Crossing::at);
+    return crossings;
+  }
+
+  // Between `from` and `to` the ray stays in one cell.
+  void AddCrossingsBetween(const PixelRay& ray, double from, double to, std::deque<Crossing>& crossings) const {
+    const auto at = [&](std::size_t i, double t) { return double(ray.first[i]) + t * double(ray.move[i]); };
+    const double middle = (from + to) / 2;
+    Index3 cell;
+    for (std::size_t i = 0; i < 3; ++i) cell[int(i)] = std::int32_t(std::floor(at(i, middle)));
+    double corners[8];
+    for (int n = 0; n < 8; ++n) {
+      corners[n] = double(Voxel(cell.x + (n & 1), cell.y + (n >> 1 & 1), cell.z + (n >> 2)));
+      if (!std::isfinite(corners[n])) return;
+    }
+    const auto value = [&](double t) {
+      double sum = 0;
+      for (int n = 0; n < 8; ++n) {
+        double weight = corners[n];
+        for (std::size_t i = 0; i < 3; ++i) {
+          const double fraction = std::clamp(at(i, t) - cell[int(i)], 0.0, 1.0);
+          weight *= (n >> i & 1) != 0 ? fraction : 1 - fraction;
+        }
+        sum += weight;
+      }
+      return sum;
+    };
+    // Where the cubic polynomial through four values turns: c1 + 2 c2 x + 3 c3 x^2 = 0, x from 0 to 3.
+    const double step = (to - from) / 3, f[4] = {value(from), value(from + step), value(to - step), value(to)};
+    const double d1 = f[1] - f[0], d2 = f[2] - 2 * f[1] + f[0], d3 = f[3] - 3 * f[2] + 3 * f[1] - f[0];
+    const double c1 = d1 - d2 / 2 + d3 / 3, c2 = (d2 - d3) / 2, c3 = d3 / 6;
+    std::vector<double> ends = {from, to};
+    for (const double sign : {-1.0, 1.0}) {
+      const double q = -(c2 + std::copysign(std::sqrt(c2 * c2 - 3 * c3 * c1), c2)), x = sign < 0 ? q / (3 * c3) : c1 / q;
+      if (x > 0 && x < 3) ends.push_back(from + x * step);
+    }
+    std::ranges::sort(ends);
+    for (std::size_t surface = 0; surface < look_.isovalues.size(); ++surface) {
+      const auto isovalue = double(look_.isovalues[surface]);
+      for (std::size_t i = 1; i < ends.size(); ++i) {
+        double low = ends[i - 1], high = ends[i];
+        const bool above = value(low) >= isovalue;
+        if (above == (value(high) >= isovalue)) continue;
+        for (int n = 0; n < 50; ++n) ((value((low + high) / 2) >= isovalue) == above ? low : high) = (low + high) / 2;
+        Crossing crossing{high, {}, surface};
+        for (std::size_t c = 0; c < 3; ++c) {
+          const auto begin = float(cell[int(c)]);  // single precision must not move the crossing into another cell
+          crossing.position[c] = std::clamp(float(at(c, high)), begin, std::nextafter(begin + 1, begin));
+        }
+        crossings.push_back(crossing);
+      }
+    }
+  }
+
+  // Those up to `before`.
+  void AddCrossings(std::deque<Crossing>& crossings, double before, std::array<float, 4>& sum) const {
+    for (; !crossings.empty() && crossings.front().at <= before; crossings.pop_front()) {
+      const Crossing& crossing = crossings.front();
+      const float* const rgba = &look_.surface_looks[4 * crossing.surface];
+      Part surface = {.opacity = double(rgba[3]), .color = {double(rgba[0]), double(rgba[1]), double(rgba[2])}};
+      if (ShowsLabels()) {
+        const std::int32_t label = LabelAt(crossing.position);
+        const float* const entry = &work_.layers->labels->entries[4 * std::size_t(label)];
+        surface.opacity *= !work_.layers->labels->surface ? double(entry[3]) : entry[3] < 0 ? 1 : 0;
+        if (label != 0) Tint(entry, surface);
+      }
+      Light(GradientAt(samples(), crossing.position), surface);
+      Blend(surface.color, surface.opacity, sum);
+    }
   }
 
   static bool Inside(const Float3& p, const Float3& low, const Float3& high) {
@@ -49,39 +150,158 @@ class ReferenceMarch {
     for (std::size_t i = 0; i < 3; ++i) inside = inside && p[i] >= low[i] && p[i] < high[i];
     return inside;
   }
-  float Voxel(std::int32_t x, std::int32_t y, std::int32_t z) const {
-    const std::int64_t index =
-        std::int64_t{box_.slice} * (z - box_.origin.z + 1) + std::int64_t{box_.row} * (y - box_.origin.y + 1) + (x - box_.origin.x + 1);
-    return float(reinterpret_cast<const T*>(box_.samples)[index]);
+  const T* samples() const { return reinterpret_cast<const T*>(box_.samples); }
+  std::int64_t IndexOf(std::int32_t x, std::int32_t y, std::int32_t z) const {
+    return std::int64_t{box_.slice} * (z - box_.origin.z + 1) + std::int64_t{box_.row} * (y - box_.origin.y + 1) + (x - box_.origin.x + 1);
   }
-  float Interpolated(const Float3& p, const Index3& shift) const {
+  float Voxel(std::int32_t x, std::int32_t y, std::int32_t z) const { return float(samples()[IndexOf(x, y, z)]); }
+
+  // `of`: samples of the volume or of its overlay.
+  template <class S>
+  float Interpolated(const S* of, const Float3& p, const Index3& shift) const {
     const std::int32_t x = std::int32_t(std::floor(p[0])), y = std::int32_t(std::floor(p[1])), z = std::int32_t(std::floor(p[2]));
     const float u = p[0] - std::floor(p[0]), v = p[1] - std::floor(p[1]), w = p[2] - std::floor(p[2]);
     const auto row = [&](int dy, int dz) {
-      return Lerp(u, Voxel(x + shift.x, y + dy + shift.y, z + dz + shift.z), Voxel(x + 1 + shift.x, y + dy + shift.y, z + dz + shift.z));
+      const std::int64_t at = IndexOf(x + shift.x, y + dy + shift.y, z + dz + shift.z);
+      return Lerp(u, float(of[at]), float(of[at + 1]));
     };
     return Lerp(w, Lerp(v, row(0, 0), row(1, 0)), Lerp(v, row(0, 1), row(1, 1)));
   }
 
+  // What the volume or its overlay has of a sample.
+  struct Part {
+    double opacity = 0;  // of a step
+    std::array<double, 3> color{};
+  };
+
+  // Null: the sample is not finite.
+  static const float* EntryAt(const RayLook& look, float sample) {
+    if (!std::isfinite(sample)) return nullptr;
+    return &look.entries[4 * std::size_t(std::clamp((sample - look.origin) * look.scale + look.rounding, 0.0F, look.last))];
+  }
+  static Part PartOf(const float* entry) {
+    if (entry == nullptr) return {};
+    return {.opacity = double(entry[3]), .color = {double(entry[0]), double(entry[1]), double(entry[2])}};
+  }
+
   // `steps`: the length that the sample stands for. `face`: the normal of the cut face that it lies on, or null.
   void Add(const Float3& p, double steps, const Float3* face, std::array<float, 4>& sum) const {
-    const float sample = Interpolated(p, {});
-    if (!std::isfinite(sample)) return;
-    const auto entry = std::size_t(std::clamp((sample - look_.origin) * look_.scale + look_.rounding, 0.0F, look_.last));
-    const float* const rgba = &look_.entries[4 * entry];
-    if (rgba[3] == 0) return;
-    double diffuse = 1, specular = 0;
-    if (look_.phong) Shade(p, face, diffuse, specular);
-    const double weight = (1 - double(sum[3])) * (1 - std::pow(1 - double(rgba[3]), steps));
-    for (std::size_t c = 0; c < 3; ++c) sum[c] += float(weight * std::clamp(double(rgba[c]) * diffuse + specular, 0.0, 1.0));
+    Part volume = PartOf(EntryAt(look_, Interpolated(samples(), p, {}))), overlay;
+    Float3 gradient = GradientAt(samples(), p);
+    if (!look_.gradient_factors.empty()) {
+      volume.opacity = 1 - std::pow(1 - volume.opacity * GradientFactor(gradient), double(look_.step_exponent));
+    }
+    if (ShowsLabels()) AddLabel(p, volume, gradient);
+    if (work_.layers != nullptr && work_.layers->overlay != nullptr) {
+      const float* const samples_of = work_.layers->overlay_samples;
+      overlay = PartOf(EntryAt(*work_.layers->overlay, Interpolated(samples_of, p, {})));
+      Light(face != nullptr ? *face : GradientAt(samples_of, p), overlay);
+    }
+    const double opacity = 1 - (1 - volume.opacity) * (1 - overlay.opacity);
+    if (!(opacity > 0)) return;
+    Light(face != nullptr ? *face : gradient, volume);
+    const double share = overlay.opacity / (volume.opacity + overlay.opacity);
+    std::array<double, 3> color{};
+    for (std::size_t c = 0; c < 3; ++c) color.at(c) = (1 - share) * volume.color.at(c) + share * overlay.color.at(c);
+    Blend(color, 1 - std::pow(1 - opacity, steps), sum);
+  }
+
+  // What lies behind `sum`.
+  static void Blend(const std::array<double, 3>& color, double opacity, std::array<float, 4>& sum) {
+    const double weight = (1 - double(sum[3])) * opacity;
+    for (std::size_t c = 0; c < 3; ++c) sum.at(c) += float(weight * color.at(c));
     sum[3] += float(weight);
   }
 
-  void Shade(const Float3& p, const Float3* face, double& diffuse, double& specular) const {
-    double gradient[3] = {double(Interpolated(p, {1, 0, 0})) - double(Interpolated(p, {-1, 0, 0})),
-                          double(Interpolated(p, {0, 1, 0})) - double(Interpolated(p, {0, -1, 0})),
-                          double(Interpolated(p, {0, 0, 1})) - double(Interpolated(p, {0, 0, -1}))};
-    if (face != nullptr) std::copy(face->begin(), face->end(), gradient);
+  bool ShowsLabels() const { return work_.layers != nullptr && work_.layers->labels != nullptr; }
+  std::int32_t LabelOf(std::int32_t x, std::int32_t y, std::int32_t z) const {
+    const std::int64_t index = IndexOf(x, y, z);
+    return work_.layers->label_type == ScalarType::kUint8 ? reinterpret_cast<const std::uint8_t*>(work_.layers->label_samples)[index]
+                                                          : reinterpret_cast<const std::uint16_t*>(work_.layers->label_samples)[index];
+  }
+  // Of the nearest voxel.
+  std::int32_t LabelAt(const Float3& p) const {
+    const auto nearest = [&](std::size_t i) {
+      const float floor = std::floor(p.at(i));
+      return std::int32_t(floor) + (p.at(i) - floor >= 0.5F ? 1 : 0);
+    };
+    return LabelOf(nearest(0), nearest(1), nearest(2));
+  }
+
+  void Tint(const float* entry, Part& volume) const {
+    for (std::size_t c = 0; c < 3; ++c) volume.color.at(c) += double(work_.layers->labels->tint) * (double(entry[c]) - volume.color.at(c));
+  }
+
+  void AddLabel(const Float3& p, Part& volume, Float3& gradient) const {
+    const LabelTables& tables = *work_.layers->labels;
+    const std::int32_t label = LabelAt(p);
+    const float* const entry = &tables.entries[4 * std::size_t(label)];
+    if (tables.surface) {
+      if (entry[3] < 0) return;
+      volume = PartOf(entry);
+      gradient = IndicatorGradient(p, label);
+      return;
+    }
+    if (label == 0) return;
+    const double steps = double(tables.steps_a_length), of_length = 1 - std::pow(1 - volume.opacity, steps);
+    if (entry[3] < 1) volume.opacity = 1 - std::pow(1 - double(entry[3]) * of_length, 1 / steps);
+    Tint(entry, volume);
+  }
+
+  // The cubic B-spline and its derivative at the distance `v` from its middle.
+  static double Spline(double v) {
+    const double d = std::abs(v);
+    return d < 1 ? 2.0 / 3 - d * d + d * d * d / 2 : d < 2 ? (2 - d) * (2 - d) * (2 - d) / 6 : 0;
+  }
+  static double SplineSlope(double v) {
+    const double d = std::abs(v), slope = d < 1 ? d * (1.5 * d - 2) : d < 2 ? -(2 - d) * (2 - d) / 2 : 0;
+    return v < 0 ? -slope : slope;
+  }
+
+  Float3 IndicatorGradient(const Float3& p, std::int32_t label) const {
+    const std::array<std::int32_t, 3> first = {std::int32_t(std::floor(p[0])) - 1, std::int32_t(std::floor(p[1])) - 1,
+                                               std::int32_t(std::floor(p[2])) - 1};
+    std::array<double, 3> gradient{};
+    for (std::int32_t z = first[2]; z < first[2] + 4; ++z) {
+      for (std::int32_t y = first[1]; y < first[1] + 4; ++y) {
+        for (std::int32_t x = first[0]; x < first[0] + 4; ++x) {
+          if (LabelOf(x, y, z) != label) continue;
+          const double dx = double(p[0]) - x, dy = double(p[1]) - y, dz = double(p[2]) - z;
+          gradient[0] += SplineSlope(dx) * Spline(dy) * Spline(dz);
+          gradient[1] += Spline(dx) * SplineSlope(dy) * Spline(dz);
+          gradient[2] += Spline(dx) * Spline(dy) * SplineSlope(dz);
+        }
+      }
+    }
+    const double square = gradient[0] * gradient[0] + gradient[1] * gradient[1] + gradient[2] * gradient[2];
+    return square > 1e-4 ? Float3{float(gradient[0]), float(gradient[1]), float(gradient[2])} : Float3{};
+  }
+
+  // Lights the colour of a part.
+  void Light(const Float3& gradient, Part& part) const {
+    double diffuse = 1, specular = 0;
+    if (look_.phong) Shade(gradient, diffuse, specular);
+    for (double& channel : part.color) channel = std::clamp(channel * diffuse + specular, 0.0, 1.0);
+  }
+
+  // Differences over two voxels.
+  template <class S>
+  Float3 GradientAt(const S* of, const Float3& p) const {
+    return {Interpolated(of, p, {1, 0, 0}) - Interpolated(of, p, {-1, 0, 0}),
+            Interpolated(of, p, {0, 1, 0}) - Interpolated(of, p, {0, -1, 0}),
+            Interpolated(of, p, {0, 0, 1}) - Interpolated(of, p, {0, 0, -1})};
+  }
+
+  double GradientFactor(const Float3& gradient) const {
+    double square = 0;
+    for (std::size_t i = 0; i < 3; ++i) square += std::pow(double(gradient[i]) * double(look_.inverse_spacing[i]), 2);
+    const double magnitude = std::isfinite(square) ? std::sqrt(square) : 0;
+    return double(
+        look_.gradient_factors[std::size_t(std::min(magnitude * double(look_.gradient_scale) + 0.5, double(look_.gradient_last)))]);
+  }
+
+  void Shade(const Float3& normal, double& diffuse, double& specular) const {
+    const double gradient[3] = {double(normal[0]), double(normal[1]), double(normal[2])};
     const auto dot = [&](const Float3& v) { return gradient[0] * double(v[0]) + gradient[1] * double(v[1]) + gradient[2] * double(v[2]); };
     double square = 0;
     for (std::size_t i = 0; i < 3; ++i) square += std::pow(gradient[i] * double(look_.inverse_spacing[i]), 2);

@@ -18,6 +18,17 @@ struct RayLook {
   float origin = 0, scale = 1, rounding = 0.5F, last = 0;
   AlignedVector<float> entries;
 
+  // Isosurfaces that show. Four floats each in `surface_looks`: straight colour and opacity.
+  std::vector<float> isovalues;  // stored samples
+  AlignedVector<float> surface_looks;
+
+  // The factor of an opacity, by the gradient's magnitude m: entry min(m * gradient_scale + 0.5, gradient_last). Empty: none is needed.
+  // Otherwise `entries` hold the opacity a of the transfer function's distance instead: a step's is 1 - (1 - a * factor)^step_exponent.
+  AlignedVector<float> gradient_factors;
+  float gradient_scale = 0, gradient_last = 0, step_exponent = 1;
+
+  bool volume_shows = false;  // an entry's opacity is above 0
+
   // Phong's model for the gradient g of samples in data space. With n = g / spacing: N.L = Dot(g, light) / |g * inverse_spacing|.
   struct Light {
     Float3 direction;  // towards the light, by component divided by the spacing
@@ -35,10 +46,11 @@ struct RayLook {
 // If each stored integer has a bin of its own, colour and opacity between two bins are interpolated linearly, at as many places as fit into
 // kMaxBins entries. A table with several values in a bin is used as it is. Either way a value between two samples is visible only if a bin
 // between theirs is visible, so a brick that is empty by the ClassificationTable is empty here.
-RayLook MakeRayLook(const ClassificationTable& table, const VolumeDescription& description, const Camera& camera, const Shading& shading,
-                    double steps_per_voxel);
+// `table`: of `transfer`.
+RayLook MakeRayLook(const ClassificationTable& table, const TransferFunction& transfer, const VolumeDescription& description,
+                    const Camera& camera, const Shading& shading, double steps_per_voxel);
 
-// True if a sample between two stored ones may have an opacity above 0.
+// True if a sample between two stored ones may have an opacity above 0 or lie on an isosurface.
 class VisibleSamples {
  public:
   explicit VisibleSamples(const RayLook& look);
@@ -48,6 +60,7 @@ class VisibleSamples {
  private:
   float origin_, scale_, rounding_, last_;
   std::vector<std::int32_t> visible_before_;  // entries before this one
+  std::vector<float> isovalues_;
 };
 
 }  // namespace slabstream

@@ -2,16 +2,18 @@
 // computes.
 //
 //   1. once a slab: pad its voxels (RayVolume) and find the range of each small cell
-//   2. once a transfer function: for each cell, find the distance to the nearest visible one (EmptyDistances)
+//   2. once a transfer function, and look of layers: for each cell, find the distance to the nearest visible one (EmptyDistances)
 //   3. once a frame: tiles of pixels are separate tasks; a tile's rays march through the box (March)
 #include <cmath>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "common/kernels/combine.h"
 #include "worker/rays/ray_volume.h"
 #include "worker/rays/render_tiles.h"
 #include "worker/renderers/raycast/empty_distance.h"
+#include "worker/renderers/raycast/layer_volume.h"
 #include "worker/renderers/raycast/march.h"
 #include "worker/renderers/renderer.h"
 #include "worker/renderers/stage_clock.h"
@@ -25,8 +27,22 @@ struct Visibility {
   SampledRegion region;  // positions in visible cells; empty if low.x > high.x
 };
 
-Visibility VisibilityOf(const RayPiece& piece, const VisibleSamples& visible) {
-  Visibility result{EmptyDistances(piece.cells, visible), {{1, 0, 0}, {0, 0, 0}}};
+// What layers make visible beside the volume.
+struct VisibleLayers {
+  std::optional<MatterLabels> labels;
+  std::optional<VisibleSamples> overlay;
+};
+
+Visibility VisibilityOf(const RayPiece& piece, const VisibleSamples& visible, const LayerPiece* layers, const VisibleLayers& of_layers) {
+  std::vector<std::uint8_t> cells_shown = VisibleCells(piece.cells, visible);
+  const auto add = [&](const CellRanges& of, const auto& shown) {
+    for (std::size_t i = 0; i < of.ranges.size(); ++i) {
+      if (shown.AnyBetween(of.ranges[i].min, of.ranges[i].max)) cells_shown[i] = 0;
+    }
+  };
+  if (of_layers.labels) add(layers->label_cells, *of_layers.labels);
+  if (of_layers.overlay) add(layers->overlay_cells, *of_layers.overlay);
+  Visibility result{EmptyDistances(piece.cells.counts, std::move(cells_shown)), {{1, 0, 0}, {0, 0, 0}}};
   const Index3& counts = piece.cells.counts;
   Box cells;
   std::size_t number = 0;
@@ -44,16 +60,64 @@ Visibility VisibilityOf(const RayPiece& piece, const VisibleSamples& visible) {
   return result;
 }
 
-// The visible parts of a slab, kept until the transfer function makes other samples visible.
+// The layers that a frame shows of a slab.
+struct ShownLayers {
+  const std::vector<LayerPiece>* pieces = nullptr;  // null: none
+  std::optional<LabelTables> labels;
+  std::optional<RayLook> overlay;
+
+  // Of a piece. nullopt: none is shown.
+  std::optional<RayLayers> Of(std::size_t number) const {
+    if (pieces == nullptr) return std::nullopt;
+    const LayerPiece& piece = (*pieces)[number];
+    RayLayers layers;
+    if (labels) {
+      layers.labels = &*labels;
+      layers.label_type = piece.labels.type;
+      layers.label_samples = piece.labels.samples.get();
+    }
+    if (overlay) {
+      layers.overlay = &*overlay;
+      layers.overlay_samples = reinterpret_cast<const float*>(piece.overlay.samples.get());
+    }
+    return layers;
+  }
+};
+
+ShownLayers LayersOf(SlabData& slab, std::span<const RayPiece> pieces, const FrameSetup& setup, double steps_per_voxel) {
+  ShownLayers shown;
+  LayerLooks looks = setup.looks;
+  if (looks.overlay && looks.overlay->weight <= 0) looks.overlay.reset();
+  if (!looks.any()) return shown;
+  shown.pieces = &slab.CacheOf<LayerVolume>().PiecesOf(slab, pieces, looks);
+  if (looks.labels) shown.labels = MakeLabelTables(*looks.labels, steps_per_voxel, setup.transfer.opacity_distance);
+  if (looks.overlay) {
+    const VolumeDescription description{.geometry = setup.description.geometry, .type = ScalarType::kFloat32, .mapping = {}};
+    const ClassificationTable table = Classify(looks.overlay->transfer, description, looks.overlay->range);
+    // Weight w: the opacity of a step is 1 - (1 - a)^w, as of a step w times as long.
+    shown.overlay =
+        MakeRayLook(table, looks.overlay->transfer, description, setup.camera, setup.shading, steps_per_voxel / looks.overlay->weight);
+  }
+  return shown;
+}
+
+// The visible parts of a slab, kept until the transfer function makes other samples visible, or layers are shown in another way.
 class VisibilityCache : public SlabCache {
  public:
   // By piece.
-  const std::vector<Visibility>& Of(const std::vector<RayPiece>& pieces, const RayLook& look) {
+  const std::vector<Visibility>& Of(const std::vector<RayPiece>& pieces, const RayLook& look, const LayerLooks& looks,
+                                    const ShownLayers& shown) {
     VisibleSamples visible(look);
-    if (pieces_.empty() || visible_ != visible) {
+    if (pieces_.empty() || visible_ != visible || looks_ != looks) {
       visible_ = std::move(visible);
+      looks_ = looks;
+      VisibleLayers of_layers;
+      if (shown.labels && looks.labels->mode == LabelMode::kSurface) of_layers.labels.emplace(*looks.labels);
+      if (shown.overlay) of_layers.overlay.emplace(*shown.overlay);
       pieces_.clear();
-      for (const RayPiece& piece : pieces) pieces_.push_back(VisibilityOf(piece, *visible_));
+      for (std::size_t i = 0; i < pieces.size(); ++i) {
+        pieces_.push_back(VisibilityOf(pieces[i], *visible_, shown.pieces == nullptr ? nullptr : &(*shown.pieces)[i], of_layers));
+      }
     }
     return pieces_;
   }
@@ -66,6 +130,7 @@ class VisibilityCache : public SlabCache {
 
  private:
   std::optional<VisibleSamples> visible_;
+  LayerLooks looks_;
   std::vector<Visibility> pieces_;
 };
 
@@ -84,8 +149,10 @@ class RaycastRenderer : public Renderer {
     StageClock clock(report);
     const double samples_per_voxel = setup.parameters.at(0);
     const std::vector<RayPiece>& pieces = slab.CacheOf<RayVolume>().PiecesOf(slab);
-    const RayLook look = MakeRayLook(slab.Classification(setup), setup.description, setup.camera, setup.shading, samples_per_voxel);
-    const std::vector<Visibility>& visible = slab.CacheOf<VisibilityCache>().Of(pieces, look);
+    const RayLook look =
+        MakeRayLook(slab.Classification(setup), setup.transfer, setup.description, setup.camera, setup.shading, samples_per_voxel);
+    const ShownLayers shown = LayersOf(slab, pieces, setup, samples_per_voxel);
+    const std::vector<Visibility>& visible = slab.CacheOf<VisibilityCache>().Of(pieces, look, setup.looks, shown);
     clock.Charge(Stage::kPrepare);
 
     const ViewRays rays = MakeViewRays(setup.camera, setup.description.geometry, samples_per_voxel, setup.clip);
@@ -96,7 +163,13 @@ class RaycastRenderer : public Renderer {
       const Box part = Intersection(box, piece.voxels.box);
       if (part.empty()) continue;
       const RayBox ray_box = MakeRayBox(piece.voxels, piece.cells.counts, part, visible[number].region, rays, setup.camera);
-      const MarchWork work = {&rays, &ray_box, &look, visible[number].distances.data(), float(setup.termination)};
+      const std::optional<RayLayers> layers = shown.Of(number);
+      const MarchWork work = {.rays = &rays,
+                              .box = &ray_box,
+                              .look = &look,
+                              .empty_distance = visible[number].distances.data(),
+                              .termination = float(setup.termination),
+                              .layers = layers ? &*layers : nullptr};
       LocalImage layer = MakeLocalImage(setup.format, ray_box.reach.pixels);
       RenderTiles(layer, hidden, cancelled, report, [&](const PixelBounds& tile, float* rgba, std::size_t floats_a_row) {
         shaded += MarchTile(work, tile, rgba, floats_a_row);

@@ -3,13 +3,11 @@
 #include <utility>
 #include <vector>
 
-#include "common/renderers/zbuffer/least_opaque.h"
-
 namespace slabstream {
 
 const Surface& SurfaceCache::Of(SlabData& slab, const FrameSetup& setup, const Box& box) {
   const ClassificationTable& table = slab.Classification(setup);
-  if (BinSelection bins = SelectBins(table, zbuffer::LeastOpaque(table, setup.description, setup.range)); bins != opaque_bins_) {
+  if (BinSelection bins = SelectBins(table, 0); bins != opaque_bins_) {
     surfaces_.Clear();
     opaque_bins_ = std::move(bins);
   }

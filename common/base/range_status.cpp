@@ -1,4 +1,4 @@
-#include "common/view/range_status.h"
+#include "common/base/range_status.h"
 
 #include <fmt/format.h>
 

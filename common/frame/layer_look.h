@@ -1,0 +1,75 @@
+// How a frame shows the layers of its dataset (common/volume/layers.h): labels as a client asks for them (LabelChoice), and what workers
+// are told of either layer (LayerLooks). docs/rendering.md defines what they mean for a picture.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "common/classification/transfer_function.h"
+#include "common/volume/summary.h"
+
+namespace slabstream {
+
+// kTint: labels colour the material that the transfer function shows. kSurface: a label is material of its own, in place of the volume's.
+enum class LabelMode : std::uint8_t { kTint = 1, kSurface = 2 };
+
+inline constexpr double kDefaultTint = 0.6;
+inline constexpr std::size_t kMaxLabelRanges = 1024;
+
+// Values of labels, both ends included: 1 <= first <= last <= kMaxLabelValue.
+struct LabelRange {
+  std::uint32_t first = 1, last = 1;
+  friend bool operator==(const LabelRange&, const LabelRange&) = default;
+};
+struct LabelOpacity {
+  std::uint32_t value = 1;  // [1, kMaxLabelValue]
+  double opacity = 1;       // [0, 1]; kTint: a factor of the material's opacity; kSurface: of a voxel length of the label
+  friend bool operator==(const LabelOpacity&, const LabelOpacity&) = default;
+};
+
+struct LabelChoice {
+  LabelMode mode = LabelMode::kTint;
+  double tint = kDefaultTint;           // [0, 1]: share of the label's colour; kTint only
+  std::vector<LabelOpacity> opacities;  // of labels that are not named: 1; no label twice; at most kMaxLabels
+  std::vector<LabelRange> shown;        // empty: all; at most kMaxLabelRanges
+  friend bool operator==(const LabelChoice&, const LabelChoice&) = default;
+};
+
+// ---- resolved
+
+struct LabelLook {
+  struct Entry {
+    Rgb color;
+    float opacity = 1;  // as LabelOpacity
+    bool shown = true;  // kTint: else its material is not drawn; kSurface: else the volume's material is drawn as it is
+    friend bool operator==(const Entry&, const Entry&) = default;
+  };
+  LabelMode mode = LabelMode::kTint;
+  double tint = kDefaultTint;
+  std::vector<Entry> entries;  // of label number i: entries[i - 1]
+  friend bool operator==(const LabelLook&, const LabelLook&) = default;
+
+  // The label is material, whatever the transfer function says.
+  bool IsMatter(std::size_t number) const {
+    return mode == LabelMode::kSurface && number != 0 && entries[number - 1].shown && entries[number - 1].opacity > 0;
+  }
+};
+
+struct OverlayLook {
+  TransferFunction transfer;
+  ValueRange range;   // data values that the classification table is made for
+  double weight = 1;  // [0, 1]
+  friend bool operator==(const OverlayLook&, const OverlayLook&) = default;
+};
+
+// Nothing: the frame does not show that layer.
+struct LayerLooks {
+  std::optional<LabelLook> labels = {};
+  std::optional<OverlayLook> overlay = {};
+
+  bool any() const { return labels || overlay; }
+  friend bool operator==(const LayerLooks&, const LayerLooks&) = default;
+};
+
+}  // namespace slabstream

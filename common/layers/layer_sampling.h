@@ -1,0 +1,27 @@
+// Layers on the grid of their volume: a volume that lies elsewhere in the same world, on whatever grid, is sampled at the voxels of
+// another.
+//
+//   position   of a voxel of the grid in the data space of the layer, through world space (common/volume/orientation.h). Less than 1e-6
+//              voxel lengths from a voxel's centre it is that centre, so that a layer on the same grid keeps its samples to the last bit
+//   inside     the layer fills [-0.5, size - 0.5) of its data space
+//
+// Parallel. Memory is that of the result; whoever calls has checked that it fits.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+
+#include "common/volume/volume.h"
+
+namespace slabstream {
+
+// Samples of the voxels nearest to those of `grid`: number_of(sample) as `type`, kUint8 or kUint16; 0 outside. Of two voxels equally near,
+// the one with the higher index.
+VoxelBlock NearestOn(const VolumeGeometry& grid, const Volume& layer, ScalarType type,
+                     const std::function<std::uint32_t(double)>& number_of);
+
+// Data values as float32, by trilinear interpolation; between the outermost voxels' centres and the layer's border the outermost value. NaN
+// outside, and where a voxel with a part in the value has none that is finite.
+VoxelBlock InterpolatedOn(const VolumeGeometry& grid, const Volume& layer);
+
+}  // namespace slabstream

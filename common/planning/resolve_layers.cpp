@@ -1,0 +1,65 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "common/planning/frame_plan.h"
+
+namespace slabstream {
+namespace {
+
+Status Missing(const FrameRequest& request, std::string_view layer, std::string_view option) {
+  return Status::InvalidArgument(fmt::format("dataset \"{}\" has no {}: it cannot be shown with {}", request.dataset, layer, option));
+}
+
+std::string Span(const LabelTable& table) {
+  if (table.labels.empty()) return "it has none";
+  return fmt::format("it has {} from {} to {}", table.labels.size(), table.labels.front().value, table.labels.back().value);
+}
+
+Result<LabelLook> ResolveLabels(const LabelChoice& choice, const LabelTable& table) {
+  LabelLook look{.mode = choice.mode, .tint = choice.tint};
+  for (const Label& label : table.labels) {
+    look.entries.push_back({.color = {label.color[0], label.color[1], label.color[2]}, .opacity = 1, .shown = choice.shown.empty()});
+  }
+  const auto first_from = [&](std::uint32_t value) {
+    return std::size_t(std::ranges::lower_bound(table.labels, value, {}, &Label::value) - table.labels.begin());
+  };
+  for (const LabelRange& range : choice.shown) {
+    const std::size_t begin = first_from(range.first), end = first_from(range.last + 1);
+    if (begin == end) {
+      return Status::InvalidArgument(fmt::format("labels.shown: no label from {} to {}; {}", range.first, range.last, Span(table)));
+    }
+    for (std::size_t i = begin; i < end; ++i) look.entries[i].shown = true;
+  }
+  for (const auto& [value, opacity] : choice.opacities) {
+    const std::size_t i = first_from(value);
+    if (i == table.labels.size() || table.labels[i].value != value) {
+      return Status::InvalidArgument(fmt::format("labels.opacities: no label {}; {}", value, Span(table)));
+    }
+    look.entries[i].opacity = float(opacity);
+  }
+  return look;
+}
+
+}  // namespace
+
+Result<LayerLooks> ResolveLayers(const FrameRequest& request, const VolumeSummary& summary) {
+  LayerLooks looks;
+  if (request.labels) {
+    if (summary.labels == nullptr) return Missing(request, "labels", "--label-mode, --label-tint, --label-opacity or --labels-shown");
+    Result<LabelLook> labels = ResolveLabels(*request.labels, *summary.label_table);
+    if (!labels.ok()) return labels.status();
+    looks.labels = *std::move(labels);
+  }
+  if (request.overlay) {
+    if (summary.overlay == nullptr) return Missing(request, "overlay", "--overlay-transfer, --overlay-range or --overlay-weight");
+    Result<TransferFunction> transfer = ResolveTransfer(request.overlay->transfer, *summary.overlay);
+    if (!transfer.ok()) return transfer.status();
+    looks.overlay = OverlayLook{.transfer = *std::move(transfer), .range = summary.overlay->range, .weight = request.overlay->weight};
+  }
+  return looks;
+}
+
+}  // namespace slabstream

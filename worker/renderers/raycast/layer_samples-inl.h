@@ -1,0 +1,190 @@
+// Samples of layers along rays, and how they change the sample of the volume. Included once for each instruction set, hence the unusual
+// include guard.
+#include <limits>
+
+#include "worker/kernels/power-inl.h"
+#include "worker/rays/ray_packet-inl.h"
+#include "worker/renderers/raycast/ray_layers.h"
+
+#if defined(SLABSTREAM_WORKER_RENDERERS_RAYCAST_LAYER_SAMPLES_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SLABSTREAM_WORKER_RENDERERS_RAYCAST_LAYER_SAMPLES_INL_H_
+#undef SLABSTREAM_WORKER_RENDERERS_RAYCAST_LAYER_SAMPLES_INL_H_
+#else
+#define SLABSTREAM_WORKER_RENDERERS_RAYCAST_LAYER_SAMPLES_INL_H_
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace slabstream::HWY_NAMESPACE {
+
+// The entry of RayLook::entries, times four, by which samples of these values look; 0 where a value is not finite.
+HWY_INLINE Ints EntryOf(const RayLook& look, Floats value, Mask finite) {
+  const FloatTag df;
+  const auto number = hn::Min(
+      hn::Max(hn::Add(hn::Mul(hn::Sub(value, Set(look.origin)), Set(look.scale)), Set(look.rounding)), hn::Zero(df)), Set(look.last));
+  return hn::ShiftLeft<2>(hn::ConvertTo(IntTag(), hn::IfThenElseZero(finite, number)));
+}
+
+// Four label numbers along x, from the voxel with index `at` on.
+struct LabelRow {
+  Ints numbers[4];
+};
+HWY_INLINE LabelRow LoadLabelRow(const RayLayers& layers, Ints at) {
+  const IntTag di;
+  if (layers.label_type == ScalarType::kUint8) {
+    const auto word = hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(layers.label_samples), at), byte = SetInt(0xFF);
+    return {{hn::And(word, byte), hn::And(hn::ShiftRight<8>(word), byte), hn::And(hn::ShiftRight<16>(word), byte),
+             hn::And(hn::ShiftRight<24>(word), byte)}};
+  }
+  const auto* const words = reinterpret_cast<const std::int32_t*>(layers.label_samples);
+  const auto offset = hn::Add(at, at), low = SetInt(0xFFFF);
+  const auto first = hn::GatherOffset(di, words, offset), second = hn::GatherOffset(di, words + 1, offset);
+  return {{hn::And(first, low), hn::And(hn::ShiftRight<16>(first), low), hn::And(second, low), hn::And(hn::ShiftRight<16>(second), low)}};
+}
+
+// Neighbours::at of a sample: the index of the voxel one row, one slice and one voxel along x before its floor.
+HWY_INLINE Ints IndexBefore(const RayBox& box, const SamplePlace& place, Mask owned) {
+  const auto at = hn::Add(hn::Add(hn::Mul(place.voxel[2], SetInt(box.slice)), hn::Mul(place.voxel[1], SetInt(box.row))), place.voxel[0]);
+  return hn::IfThenElseZero(hn::RebindMask(IntTag(), owned), at);
+}
+
+// The label of the voxel nearest to each sample. `at` as in Neighbours.
+HWY_INLINE Ints NearestLabel(const RayLayers& layers, const RayBox& box, const SamplePlace& place, Ints at) {
+  const IntTag di;
+  const auto half = Set(0.5F);
+  const auto upper = [&](std::size_t i) HWY_ATTR { return hn::RebindMask(di, hn::Ge(place.fraction[i], half)); };
+  const auto one_or_two = [&](std::size_t i, std::int32_t stride)
+                              HWY_ATTR { return hn::IfThenElse(upper(i), SetInt(2 * stride), SetInt(stride)); };
+  const auto row = hn::Add(hn::Add(at, one_or_two(1, box.row)), one_or_two(2, box.slice));
+  const LabelRow found = LoadLabelRow(layers, row);
+  const auto number = hn::IfThenElse(upper(0), found.numbers[2], found.numbers[1]);
+  return hn::Min(number, SetInt(std::int32_t(layers.labels->last)));  // other numbers are a peer's mistake
+}
+
+// The gradient of the indicator of each sample's label (1 in its voxels, 0 elsewhere), smoothed by the cubic B-spline (Unser 1999) over the
+// 4 x 4 x 4 voxels around. 0 where there is hardly any: inside the label.
+struct IndicatorGradient {
+  Floats x, y, z;
+};
+HWY_INLINE IndicatorGradient IndicatorGradientAt(const RayLayers& layers, const RayBox& box, const SamplePlace& place, Ints at,
+                                                 Ints label) {
+  const FloatTag df;
+  const auto zero = hn::Zero(df), one = Set(1);
+  struct Spline {
+    Floats value[4], slope[4];
+  };
+  Spline along[3];
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto t = place.fraction[i], u = hn::Sub(one, t), sixth = Set(1.0F / 6), half = Set(0.5F);
+    const auto cubic = [&](Floats v) HWY_ATTR { return hn::Mul(sixth, hn::Mul(v, hn::Mul(v, v))); };
+    // The middle two weights are 2/3 - v^2 + v^3 / 2 at the distance v.
+    const auto middle = [&](Floats v) HWY_ATTR { return hn::Add(Set(2.0F / 3), hn::Mul(hn::Mul(v, v), hn::Sub(hn::Mul(half, v), one))); };
+    const auto middle_slope = [&](Floats v) HWY_ATTR { return hn::Mul(v, hn::Sub(hn::Mul(Set(1.5F), v), Set(2))); };
+    Spline& s = along[i];
+    s.value[0] = cubic(u);
+    s.value[1] = middle(t);
+    s.value[2] = middle(u);
+    s.value[3] = cubic(t);
+    s.slope[0] = hn::Neg(hn::Mul(half, hn::Mul(u, u)));
+    s.slope[1] = middle_slope(t);
+    s.slope[2] = hn::Neg(middle_slope(u));
+    s.slope[3] = hn::Mul(half, hn::Mul(t, t));
+  }
+  IndicatorGradient g = {zero, zero, zero};
+  auto slice = at;
+  for (int z = 0; z < 4; ++z, slice = hn::Add(slice, SetInt(box.slice))) {
+    auto row = slice;
+    for (int y = 0; y < 4; ++y, row = hn::Add(row, SetInt(box.row))) {
+      const LabelRow labels = LoadLabelRow(layers, row);
+      auto value = zero, slope = zero;
+      for (int x = 0; x < 4; ++x) {
+        const auto same = hn::RebindMask(df, hn::Eq(labels.numbers[x], label));
+        value = hn::Add(value, hn::IfThenElseZero(same, along[0].value[x]));
+        slope = hn::Add(slope, hn::IfThenElseZero(same, along[0].slope[x]));
+      }
+      const auto value_z = hn::Mul(value, along[2].value[z]);
+      g.x = hn::Add(g.x, hn::Mul(hn::Mul(slope, along[1].value[y]), along[2].value[z]));
+      g.y = hn::Add(g.y, hn::Mul(value_z, along[1].slope[y]));
+      g.z = hn::Add(g.z, hn::Mul(hn::Mul(value, along[1].value[y]), along[2].slope[z]));
+    }
+  }
+  const auto square = hn::Add(hn::Add(hn::Mul(g.x, g.x), hn::Mul(g.y, g.y)), hn::Mul(g.z, g.z));
+  const auto any = hn::Gt(square, Set(1e-4F));
+  return {hn::IfThenElseZero(any, g.x), hn::IfThenElseZero(any, g.y), hn::IfThenElseZero(any, g.z)};
+}
+
+// Samples after the layers have had their say. Lanes that are not `sampled` mean nothing.
+struct LayeredSample {
+  Floats opacity;  // of volume and overlay together
+  // Of the volume's part: its colour is (1 - tint) times its own and tint times `label_entry`'s. A label that is matter has a tint of 1.
+  Floats tint;
+  Ints label;        // number
+  Ints label_entry;  // index into LabelTables::entries
+  Mask matter;       // the label is the material
+  // Of the overlay's part.
+  Floats overlay_share;  // of the colour, [0, 1]
+  Ints overlay_entry;
+  Neighbours<float> overlay;  // only if the overlay is shown
+};
+
+// `opacity`: of the volume's sample, 0 where it has none. `neighbours`: of the volume.
+template <class T>
+HWY_INLINE LayeredSample WithLayers(const RayLayers& layers, const RayBox& box, const SamplePlace& place, const Neighbours<T>& neighbours,
+                                    Floats opacity) {
+  const FloatTag df;
+  const IntTag di;
+  const auto zero = hn::Zero(df), one = Set(1);
+  LayeredSample sample;
+  sample.opacity = opacity;
+  sample.tint = zero;
+  sample.label = sample.label_entry = sample.overlay_entry = hn::Zero(di);
+  sample.matter = hn::Lt(one, zero);
+  sample.overlay_share = zero;
+  if (layers.labels != nullptr) {
+    const LabelTables& tables = *layers.labels;
+    sample.label = NearestLabel(layers, box, place, neighbours.at);
+    sample.label_entry = hn::ShiftLeft<2>(sample.label);
+    const auto changed = hn::GatherIndex(df, tables.entries.data() + 3, sample.label_entry);
+    if (tables.surface) {
+      sample.matter = hn::Ge(changed, zero);
+      sample.opacity = hn::IfThenElse(sample.matter, changed, opacity);
+      sample.tint = hn::IfThenElseZero(sample.matter, one);
+    } else {
+      const auto labelled = hn::RebindMask(df, hn::Gt(sample.label, hn::Zero(di)));
+      sample.tint = hn::IfThenElseZero(labelled, Set(tables.tint));
+      sample.opacity = hn::IfThenElseZero(hn::Gt(changed, zero), opacity);
+      const auto thinned = hn::And(hn::Lt(changed, one), hn::Gt(sample.opacity, zero));
+      if (!hn::AllFalse(df, thinned)) {
+        const auto steps = Set(tables.steps_a_length);
+        const auto of_length = hn::Sub(one, PowerOfFraction(hn::Sub(one, opacity), steps));
+        const auto of_step = hn::Sub(one, PowerOfFraction(hn::Sub(one, hn::Mul(changed, of_length)), hn::Div(one, steps)));
+        sample.opacity = hn::IfThenElse(thinned, of_step, sample.opacity);
+      }
+    }
+  }
+  if (layers.overlay != nullptr) {
+    const RayLook& look = *layers.overlay;
+    sample.overlay.samples = layers.overlay_samples;
+    sample.overlay.row = neighbours.row;
+    sample.overlay.slice = neighbours.slice;
+    sample.overlay.at = neighbours.at;
+    for (int z = 0; z < 2; ++z) {
+      for (int y = 0; y < 2; ++y) sample.overlay.inner[z][y] = LoadInner(layers.overlay_samples, sample.overlay.RowAt(y + 1, z + 1));
+    }
+    const auto value = Interpolate(sample.overlay, place);
+    const auto finite = hn::Le(hn::Abs(value), Set(std::numeric_limits<float>::max()));
+    sample.overlay_entry = EntryOf(look, value, finite);
+    const auto over = hn::IfThenElseZero(finite, hn::GatherIndex(df, look.entries.data() + 3, sample.overlay_entry));
+    const auto sum = hn::Add(sample.opacity, over);
+    const auto any = hn::Gt(sum, zero);
+    sample.overlay_share = hn::IfThenElseZero(any, hn::Div(over, hn::IfThenElse(any, sum, one)));
+    // Of opaque material exactly 1; of material without an overlay as it was.
+    const auto together = hn::Sub(one, hn::Mul(hn::Sub(one, sample.opacity), hn::Sub(one, over)));
+    sample.opacity = hn::IfThenElse(hn::Gt(over, zero), together, sample.opacity);
+  }
+  return sample;
+}
+
+}  // namespace slabstream::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

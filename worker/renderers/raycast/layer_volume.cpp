@@ -1,0 +1,45 @@
+#include "worker/renderers/raycast/layer_volume.h"
+
+#include <algorithm>
+
+#include "common/base/check.h"
+
+namespace slabstream {
+
+const std::vector<LayerPiece>& LayerVolume::PiecesOf(const SlabData& slab, std::span<const RayPiece> pieces, const LayerLooks& looks) {
+  pieces_.resize(pieces.size());
+  const auto make = [&](const std::optional<BrickedVoxels>& voxels, PaddedVoxels LayerPiece::*padded, CellRanges LayerPiece::*cells) {
+    CHECK(voxels.has_value()) << "a layer is shown that the slab does not have";
+    for (std::size_t i = 0; i < pieces.size(); ++i) {
+      LayerPiece& piece = pieces_[i];
+      if ((piece.*padded).samples != nullptr) continue;
+      piece.*padded = Pad(*voxels, pieces[i].voxels.box);
+      piece.*cells = FindCellRanges(piece.*padded);
+    }
+  };
+  if (looks.labels) make(slab.layers().labels, &LayerPiece::labels, &LayerPiece::label_cells);
+  if (looks.overlay) make(slab.layers().overlay, &LayerPiece::overlay, &LayerPiece::overlay_cells);
+  return pieces_;
+}
+
+std::size_t LayerVolume::bytes() const {
+  std::size_t total = 0;
+  for (const LayerPiece& piece : pieces_) {
+    total += piece.labels.bytes() + piece.overlay.bytes() + piece.label_cells.bytes() + piece.overlay_cells.bytes();
+  }
+  return total;
+}
+
+MatterLabels::MatterLabels(const LabelLook& look) : matter_before_(1) {
+  for (std::size_t number = 0; number <= look.entries.size(); ++number) {
+    matter_before_.push_back(matter_before_.back() + (look.IsMatter(number) ? 1 : 0));
+  }
+}
+
+bool MatterLabels::AnyBetween(float low, float high) const {
+  if (!(low <= high)) return false;
+  const auto number = [&](float stored) { return std::min(std::size_t(stored), matter_before_.size() - 2); };
+  return matter_before_[number(high) + 1] > matter_before_[number(low)];
+}
+
+}  // namespace slabstream

@@ -1,0 +1,296 @@
+// SurfaceWalk: where the rays of a packet cross isosurfaces in a box, one crossing after the other along each ray. Included once for each
+// instruction set, hence the unusual include guard.
+//
+// Between eight neighbouring voxel centres (here a cell) the trilinear interpolant along a ray is a cubic polynomial (Parker et al. 1998).
+// Its extrema divide the ray's way through the cell into stretches where it is monotonic. A stretch holds one crossing if its ends lie on
+// either side of the isovalue, and bisection finds it (Marmitt et al. 2004). So no crossing is missed, however close two of them are.
+//
+// A crossing depends on its ray and on its cell's voxels alone, and belongs to the box that owns its position: boxes agree on crossings.
+// Two cells agree on the value at the face between them, bit for bit, so that a surface has no holes there.
+//
+// Positions are within 2^-20 times the side of the volume in voxels, or 1e-4 voxel if that is more.
+#include <hwy/highway.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "worker/rays/ray_packet-inl.h"
+#include "worker/renderers/raycast/march.h"
+
+#if defined(SLABSTREAM_WORKER_RENDERERS_RAYCAST_SURFACE_WALK_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SLABSTREAM_WORKER_RENDERERS_RAYCAST_SURFACE_WALK_INL_H_
+#undef SLABSTREAM_WORKER_RENDERERS_RAYCAST_SURFACE_WALK_INL_H_
+#else
+#define SLABSTREAM_WORKER_RENDERERS_RAYCAST_SURFACE_WALK_INL_H_
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace slabstream {
+namespace HWY_NAMESPACE {
+
+// f(x) along a ray, x from 0 where it enters a cell to 3 where it leaves.
+struct Cubic {
+  Floats c0, c1, c2, c3;
+
+  HWY_INLINE Floats At(Floats x) const { return hn::Add(hn::Mul(hn::Add(hn::Mul(hn::Add(hn::Mul(c3, x), c2), x), c1), x), c0); }
+};
+
+// The one through the values at x = 0, 1, 2 and 3 (Newton's forward differences).
+HWY_INLINE Cubic CubicThrough(const Floats (&f)[4]) {
+  const auto first = hn::Sub(f[1], f[0]);
+  const auto second = hn::Add(hn::Sub(f[2], hn::Add(f[1], f[1])), f[0]);
+  const auto third = hn::Sub(hn::Sub(f[3], f[0]), hn::Mul(Set(3), hn::Sub(f[2], f[1])));
+  const auto half = Set(0.5F);
+  return {f[0], hn::Add(hn::Sub(first, hn::Mul(second, half)), hn::Mul(third, Set(1.0F / 3))), hn::Mul(hn::Sub(second, third), half),
+          hn::Mul(third, Set(1.0F / 6))};
+}
+
+// Ascending points of [0, 3] between which the polynomial is monotonic; 0 or 3 if there are fewer than two.
+struct Extrema {
+  Floats first, second;
+};
+HWY_INLINE Extrema ExtremaOf(const Cubic& f) {
+  // Roots of 3 c3 x^2 + 2 c2 x + c1, without cancellation.
+  const auto zero = hn::Zero(FloatTag());
+  const auto square = hn::Sub(hn::Mul(f.c2, f.c2), hn::Mul(Set(3), hn::Mul(f.c3, f.c1)));
+  const auto root = hn::Sqrt(hn::Max(square, zero));
+  const auto q = hn::Neg(hn::Add(f.c2, hn::CopySign(root, f.c2)));
+  const auto limited = [&](Floats numerator, Floats divisor) HWY_ATTR {
+    const auto x = hn::Div(numerator, hn::IfThenElse(hn::Eq(divisor, zero), Set(1), divisor));
+    return hn::IfThenElseZero(hn::And(hn::Gt(square, zero), hn::Ne(divisor, zero)), hn::Min(hn::Max(x, zero), Set(3)));
+  };
+  const auto a = limited(q, hn::Mul(Set(3), f.c3)), b = limited(f.c1, q);
+  return {hn::Min(a, b), hn::Max(a, b)};
+}
+
+template <class T>
+class SurfaceWalk {
+ public:
+  HWY_INLINE SurfaceWalk(const MarchWork& work, const RayPacket& packet) : work_(work), box_(*work.box), packet_(packet) {}
+
+  // Finds each ray's first crossing in `part`.
+  HWY_NOINLINE void Start(const PacketPart& part) {
+    const FloatTag df;
+    const auto zero = hn::Zero(df), far = Set(kRayEnd);
+    from_ = hn::Max(part.enter, zero);
+    to_ = part.leave;
+    constexpr float kMargin = 1.0F / 64;  // voxels, and samples: covers the rounding of positions
+    auto enter = hn::Sub(from_, Set(kMargin)), leave = to_;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto low = Set(box_.low[i]), high = Set(box_.high[i]), margin = Set(kMargin);
+      const auto first = packet_.first[i], move = packet_.move[i];
+      still_[i] = hn::Lt(hn::Abs(move), Set(1e-9F));
+      inverse_[i] = hn::Div(Set(1), hn::IfThenElse(still_[i], Set(1), move));
+      const auto a = PlaneAt(i, hn::Sub(low, margin)), b = PlaneAt(i, hn::Add(high, margin));
+      const auto beside = hn::Or(hn::Lt(first, low), hn::Ge(first, high));
+      enter = hn::Max(enter, hn::IfThenElse(still_[i], hn::IfThenElse(beside, far, hn::Neg(far)), hn::Min(a, b)));
+      leave = hn::Min(leave, hn::IfThenElse(still_[i], far, hn::Max(a, b)));
+      lowest_[i] = Set(std::floor(box_.low[i]));
+      highest_[i] = Set(std::ceil(box_.high[i]) - 1);
+    }
+    walking_ = hn::And(packet_.valid, hn::Le(enter, leave));
+    enter = hn::IfThenElseZero(walking_, enter);
+    for (std::size_t i = 0; i < 3; ++i) {
+      cell_[i] = hn::Min(hn::Max(hn::Floor(PositionOf(packet_, i, enter)), lowest_[i]), highest_[i]);
+    }
+    last_ = hn::Neg(far);
+    surface_ = zero;
+    at_ = far;
+    for (std::size_t i = 0; i < 3; ++i) {
+      place_.fraction[i] = place_.position[i] = zero;
+      place_.voxel[i] = hn::Zero(IntTag());
+    }
+    Next(packet_.valid);
+  }
+
+  // Finds the next crossing of these rays.
+  void Next(Mask rays) {
+    const FloatTag df;
+    const IntTag di;
+    at_ = hn::IfThenElse(rays, Set(kRayEnd), at_);
+    auto searching = hn::And(rays, walking_);
+    while (!hn::AllFalse(df, searching)) {
+      SamplePlace place;
+      for (std::size_t i = 0; i < 3; ++i) {
+        place.voxel[i] = hn::Sub(hn::ConvertTo(di, cell_[i]), SetInt(box_.origin[int(i)]));
+        place.fraction[i] = place.position[i] = hn::Zero(df);
+      }
+      const auto group = CellOf<kCellShift>(place, box_.cells, searching);
+      const auto distance = hn::And(hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(work_.empty_distance), group), SetInt(0xFF));
+      const auto empty = hn::RebindMask(df, hn::Gt(distance, hn::Zero(di)));
+      const auto busy = hn::AndNot(empty, searching);
+      if (!hn::AllFalse(df, busy)) searching = hn::AndNot(FindIn(place, busy), searching);
+      walking_ = hn::Or(hn::AndNot(searching, walking_), Move(place, searching, empty, hn::ConvertTo(df, distance)));
+      searching = hn::And(searching, walking_);
+    }
+  }
+
+  // The crossing that was found, in samples; kRayEnd: there is none.
+  Floats at() const { return at_; }
+  const SamplePlace& place() const { return place_; }
+  // Times four: of RayLook::surface_looks.
+  Ints look() const { return hn::ShiftLeft<2>(hn::ConvertTo(IntTag(), surface_)); }
+
+ private:
+  // Crossings of these rays in their cells behind the last ones. Returns which rays have one.
+  HWY_NOINLINE Mask FindIn(const SamplePlace& cell, Mask rays) {
+    const FloatTag df;
+    const auto zero = hn::Zero(df), one = Set(1);
+    const Neighbours<T> voxels = LoadNeighbours<T>(box_, cell, rays);
+    auto least = voxels.inner[0][0].a, greatest = least, magnitude = zero;
+    for (const auto& slice : voxels.inner) {
+      for (const InnerPair& row : slice) {
+        least = hn::Min(least, hn::Min(row.a, row.b));
+        greatest = hn::Max(greatest, hn::Max(row.a, row.b));
+        magnitude = hn::Add(magnitude, hn::Add(hn::Abs(row.a), hn::Abs(row.b)));
+      }
+    }
+    rays = hn::And(rays, hn::Le(magnitude, Set(std::numeric_limits<float>::max())));  // all are finite
+    const std::vector<float>& isovalues = work_.look->isovalues;
+    const auto holds = [&](std::size_t surface) HWY_ATTR {
+      const auto value = Set(isovalues[surface]);
+      return hn::And(rays, hn::And(hn::Lt(least, value), hn::Le(value, greatest)));
+    };
+    auto any = hn::Lt(one, zero);
+    for (std::size_t surface = 0; surface < isovalues.size(); ++surface) any = hn::Or(any, holds(surface));
+    if (hn::AllFalse(df, any)) return any;
+
+    // Where the rays enter and leave the cell: exactly on a face of it.
+    Floats in[3], out[3];
+    auto enter = Set(-kRayEnd), leave = Set(kRayEnd);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto a = PlaneAt(i, cell_[i]), b = PlaneAt(i, hn::Add(cell_[i], one));
+      in[i] = hn::IfThenElse(still_[i], Set(-kRayEnd), hn::Min(a, b));
+      out[i] = hn::IfThenElse(still_[i], Set(kRayEnd), hn::Max(a, b));
+      enter = hn::Max(enter, in[i]);
+      leave = hn::Min(leave, out[i]);
+    }
+    rays = hn::And(rays, hn::Le(enter, leave));
+    Floats begin[3], end[3], change[3];  // fractions
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto fraction = [&](Floats at) HWY_ATTR { return hn::Min(hn::Max(hn::Sub(PositionOf(packet_, i, at), cell_[i]), zero), one); };
+      const auto backward = hn::Lt(packet_.move[i], zero);
+      const auto near_face = hn::IfThenElseZero(backward, one), far_face = hn::Sub(one, near_face);
+      begin[i] = hn::IfThenElse(hn::Eq(in[i], enter), near_face, fraction(enter));
+      end[i] = hn::IfThenElse(hn::Eq(out[i], leave), far_face, fraction(leave));
+      change[i] = hn::Sub(end[i], begin[i]);
+    }
+    const auto fraction_at = [&](std::size_t i, Floats x)
+                                 HWY_ATTR { return hn::Add(begin[i], hn::Mul(hn::Mul(x, Set(1.0F / 3)), change[i])); };
+    // Exact at both ends of t, unlike Lerp.
+    const auto mix = [&](Floats t, Floats a, Floats b) HWY_ATTR { return hn::Add(hn::Mul(hn::Sub(one, t), a), hn::Mul(t, b)); };
+    const auto value_at = [&](Floats u, Floats v, Floats w) HWY_ATTR {
+      const auto row = [&](const InnerPair& pair) HWY_ATTR { return mix(u, pair.a, pair.b); };
+      return mix(w, mix(v, row(voxels.inner[0][0]), row(voxels.inner[0][1])), mix(v, row(voxels.inner[1][0]), row(voxels.inner[1][1])));
+    };
+    const auto value_of = [&](float x)
+                              HWY_ATTR { return value_at(fraction_at(0, Set(x)), fraction_at(1, Set(x)), fraction_at(2, Set(x))); };
+    const Floats values[4] = {value_at(begin[0], begin[1], begin[2]), value_of(1), value_of(2), value_at(end[0], end[1], end[2])};
+    const Cubic cubic = CubicThrough(values);
+    const Extrema extrema = ExtremaOf(cubic);
+    const Floats ends[4] = {zero, extrema.first, extrema.second, Set(3)};
+
+    auto nearest = Set(kRayEnd), nearest_x = zero, nearest_surface = zero;
+    for (std::size_t surface = 0; surface < isovalues.size(); ++surface) {
+      const auto crossed = hn::And(rays, holds(surface));
+      if (hn::AllFalse(df, crossed)) continue;
+      const auto value = Set(isovalues[surface]);
+      Cubic above = cubic;
+      above.c0 = hn::Sub(cubic.c0, value);
+      const auto enters_above = hn::Ge(values[0], value), leaves_above = hn::Ge(values[3], value);
+      const auto is_above = [&](Floats x) HWY_ATTR {
+        const auto at_end = hn::Ge(x, ends[3]);
+        return hn::Or(hn::And(at_end, leaves_above), hn::AndNot(at_end, hn::Ge(above.At(x), zero)));
+      };
+      const Mask sides[4] = {enters_above, is_above(ends[1]), is_above(ends[2]), leaves_above};
+      for (std::size_t stretch = 0; stretch < 3; ++stretch) {
+        const auto changes = hn::And(crossed, hn::Xor(sides[stretch], sides[stretch + 1]));
+        if (hn::AllFalse(df, changes)) continue;
+        auto low = ends[stretch], high = ends[stretch + 1];
+        constexpr int kHalvings = 16;  // of at most 1.8 voxels
+        for (int i = 0; i < kHalvings; ++i) {
+          const auto middle = hn::Mul(Set(0.5F), hn::Add(low, high));
+          const auto behind = hn::Xor(hn::Ge(above.At(middle), zero), sides[stretch]);
+          high = hn::IfThenElse(behind, middle, high);
+          low = hn::IfThenElse(behind, low, middle);
+        }
+        const auto at = hn::Add(enter, hn::Mul(hn::Mul(high, Set(1.0F / 3)), hn::Sub(leave, enter)));
+        auto counts = hn::And(hn::And(hn::Ge(at, from_), hn::Le(at, to_)), hn::And(changes, hn::Lt(at, nearest)));
+        const auto number = Set(float(surface));
+        counts = hn::And(counts, hn::Or(hn::Gt(at, last_), hn::And(hn::Eq(at, last_), hn::Gt(number, surface_))));
+        for (std::size_t i = 0; i < 3; ++i) {
+          const auto position = hn::Add(cell_[i], fraction_at(i, high));
+          counts = hn::And(counts, hn::And(hn::Ge(position, Set(box_.low[i])), hn::Lt(position, Set(box_.high[i]))));
+        }
+        nearest = hn::IfThenElse(counts, at, nearest);
+        nearest_x = hn::IfThenElse(counts, high, nearest_x);
+        nearest_surface = hn::IfThenElse(counts, number, nearest_surface);
+      }
+    }
+    const auto found = hn::And(rays, hn::Lt(nearest, Set(kRayEnd)));
+    at_ = hn::IfThenElse(found, nearest, at_);
+    last_ = hn::IfThenElse(found, nearest, last_);
+    surface_ = hn::IfThenElse(found, nearest_surface, surface_);
+    for (std::size_t i = 0; i < 3; ++i) {
+      place_.fraction[i] = hn::IfThenElse(found, fraction_at(i, nearest_x), place_.fraction[i]);
+      place_.voxel[i] = hn::IfThenElse(hn::RebindMask(IntTag(), found), cell.voxel[i], place_.voxel[i]);
+    }
+    return found;
+  }
+
+  // Moves rays into the next cell, or to the border of the empty cells around them. Returns which of them are still in the box.
+  HWY_INLINE Mask Move(const SamplePlace& place, Mask rays, Mask empty, Floats distance) {
+    const FloatTag df;
+    const auto zero = hn::Zero(df), one = Set(1);
+    // The planes through which the rays leave.
+    Floats plane[3], plane_at[3];
+    auto leave = Set(kRayEnd);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto backward = hn::Lt(packet_.move[i], zero);
+      const auto group = hn::ConvertTo(df, hn::ShiftRight<kCellShift>(place.voxel[i]));
+      const auto ahead = hn::Add(group, hn::IfThenElse(backward, hn::Sub(one, distance), distance));
+      const auto of_groups = hn::Add(hn::Mul(ahead, Set(float(kCellSide))), Set(float(box_.origin[int(i)])));
+      const auto of_cell = hn::IfThenElse(backward, cell_[i], hn::Add(cell_[i], one));
+      plane[i] = hn::IfThenElse(empty, of_groups, of_cell);
+      plane_at[i] = hn::IfThenElse(still_[i], Set(kRayEnd), PlaneAt(i, plane[i]));
+      leave = hn::Min(leave, plane_at[i]);
+    }
+    auto inside = hn::And(rays, hn::Le(leave, to_));
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto backward = hn::Lt(packet_.move[i], zero);
+      const auto last = hn::IfThenElse(backward, plane[i], hn::Sub(plane[i], one));  // cell before the plane
+      const auto behind = hn::IfThenElse(backward, hn::Sub(plane[i], one), plane[i]);
+      // A leap along the other axes: never back, and not beyond the plane.
+      const auto beside = hn::Floor(PositionOf(packet_, i, leave));
+      const auto limited = hn::IfThenElse(backward, hn::Min(hn::Max(beside, last), cell_[i]), hn::Max(hn::Min(beside, last), cell_[i]));
+      const auto next = hn::IfThenElse(hn::Eq(plane_at[i], leave), behind, hn::IfThenElse(empty, limited, cell_[i]));
+      cell_[i] = hn::IfThenElse(rays, next, cell_[i]);
+      inside = hn::And(inside, hn::And(hn::Ge(cell_[i], lowest_[i]), hn::Le(cell_[i], highest_[i])));
+    }
+    last_ = hn::IfThenElse(rays, Set(-kRayEnd), last_);
+    return inside;
+  }
+
+  // Where the rays pass a plane of voxel centres, in samples.
+  HWY_INLINE Floats PlaneAt(std::size_t axis, Floats plane) const { return hn::Mul(hn::Sub(plane, packet_.first[axis]), inverse_[axis]); }
+
+  const MarchWork& work_;
+  const RayBox& box_;
+  const RayPacket& packet_;
+  Floats from_, to_;               // samples
+  Mask still_[3];                  // rays that do not move along an axis
+  Floats inverse_[3];              // 1 / move
+  Floats lowest_[3], highest_[3];  // cells of the box
+  Mask walking_;                   // rays that are still in the box
+  Floats cell_[3];                 // floors of the positions in it
+  Floats last_, surface_;          // the last crossing found in this cell, and the surface of the last crossing
+  Floats at_;
+  SamplePlace place_;
+};
+
+}  // namespace HWY_NAMESPACE
+}  // namespace slabstream
+HWY_AFTER_NAMESPACE();
+
+#endif
