@@ -63,6 +63,15 @@ Json PolicyJson(const Policy& policy) {
           {"teams", teams}};
 }
 
+Json LabelsJson(const LabelChoice& labels) {
+  const auto& [mode, tint, opacities, shown] = labels;
+  Json json = {
+      {"mode", mode == LabelMode::kTint ? "tint" : "surface"}, {"tint", tint}, {"opacities", Json::array()}, {"shown", Json::array()}};
+  for (const auto& [value, opacity] : opacities) json["opacities"].push_back(Json::array({value, opacity}));
+  for (const auto& [first, last] : shown) json["shown"].push_back(Json::array({first, last}));
+  return json;
+}
+
 }  // namespace
 
 std::string DigestText(std::string_view bytes) { return fmt::format("{:016x}", Digest(std::as_bytes(std::span(bytes)))); }
@@ -83,20 +92,25 @@ Json TransferJson(const TransferChoice& transfer) {
 }
 
 Json RequestJson(const FrameRequest& request) {
-  const auto& [dataset, renderer, parameters, size, view, clipping, transfer, shading, termination, policy, previews] = request;
+  const auto& [dataset, renderer, parameters, size, view, clipping, transfer, labels, overlay, shading, termination, policy, previews] =
+      request;
   Json texts = Json::object();
   for (const auto& [name, text] : parameters) texts[name] = text;
-  return {{"dataset", dataset},
-          {"renderer", renderer},
-          {"parameters", texts},
-          {"size", SizeJson(size)},
-          {"view", ViewJson(view)},
-          {"clipping", ClippingJson(clipping)},
-          {"transfer", TransferJson(transfer)},
-          {"shading", ShadingJson(shading)},
-          {"termination", termination},
-          {"previews", previews},
-          {"policy", PolicyJson(policy)}};
+  Json json = {{"dataset", dataset},
+               {"renderer", renderer},
+               {"parameters", texts},
+               {"size", SizeJson(size)},
+               {"view", ViewJson(view)},
+               {"clipping", ClippingJson(clipping)},
+               {"transfer", TransferJson(transfer)},
+               {"shading", ShadingJson(shading)},
+               {"termination", termination},
+               {"previews", previews},
+               {"policy", PolicyJson(policy)}};
+  // Only if they are shown: keys of other trials stay what they were.
+  if (labels) json["labels"] = LabelsJson(*labels);
+  if (overlay) json["overlay"] = {{"transfer", TransferJson(overlay->transfer)}, {"weight", overlay->weight}};
+  return json;
 }
 
 }  // namespace slabstream

@@ -188,6 +188,37 @@ TEST_F(SlabServerTest, ChunksPutTogetherAreTheBox) {
   }
 }
 
+// The chunks of a dataset with layers are those of its volume, then those of each layer.
+TEST_F(SlabServerTest, ChunksOfLayersFollowThoseOfTheVolume) {
+  const Box box = volume_->block.box;
+  VoxelBlock labels = MakeVoxelBlock(box, ScalarType::kUint16), overlay = MakeVoxelBlock(box, ScalarType::kFloat32);
+  for (std::int64_t i = 0; i < box.voxel_count(); ++i) {
+    labels.samples<std::uint16_t>()[i] = std::uint16_t(random_.Real(0, 3000));
+    overlay.samples<float>()[i] = float(random_.Real(-1, 1));
+  }
+  server_->Publish(7, {.volume = volume_,
+                       .labels = std::make_shared<const BrickedVoxels>(labels),
+                       .overlay = std::make_shared<const BrickedVoxels>(overlay)});
+  const SampleTypes types(volume_->block.type, {.labels = ScalarType::kUint16, .overlay = ScalarType::kFloat32});
+  const std::array<const VoxelBlock*, 3> expected = {&volume_->block, &labels, &overlay};
+  std::array<std::vector<std::byte>, 3> samples;
+  for (std::uint32_t i = 0; i < ChunkCount(box, types); ++i) {
+    const ChunkPart part = PartOfChunk(box, types, i);
+    std::vector<std::byte>& of_layer = samples.at(std::size_t(part.layer));
+    ASSERT_EQ(part.begin, of_layer.size()) << "chunk " << i << " does not follow the one before";
+    of_layer.resize(of_layer.size() + part.bytes);
+    Bytes payload;
+    const AnyMessage answer = Ask({.epoch = kEpoch, .worker = 1, .dataset = 7, .box = box, .chunk = i}, &payload);
+    const auto* chunk = std::get_if<Chunk>(&answer);
+    ASSERT_NE(chunk, nullptr) << NameOf(answer);
+    ASSERT_TRUE(UnpackChunk(*chunk, payload.span(), std::span(of_layer).subspan(part.begin)).ok());
+  }
+  for (std::size_t layer = 0; layer < 3; ++layer) {
+    ASSERT_EQ(samples.at(layer).size(), expected.at(layer)->bytes.size());
+    EXPECT_EQ(std::memcmp(samples.at(layer).data(), expected.at(layer)->bytes.data(), samples.at(layer).size()), 0) << "layer " << layer;
+  }
+}
+
 TEST_F(SlabServerTest, RequestsThatCannotBeMetAreRefusedWithTheReason) {
   const Box box = volume_->block.box;
   ExpectRefused({.epoch = kEpoch, .worker = 1, .dataset = 6, .box = box, .chunk = 0}, StatusCode::kNotFound, "dataset 6");
@@ -352,6 +383,29 @@ TEST_F(CatalogueTest, FilesThatCannotBeReadAreToldByTheirHeaders) {
   EXPECT_THAT(found.errors[0].message(), testing::StartsWith("dataset \"text\": "));
   EXPECT_THAT(found.complaints, testing::ElementsAre(HasSubstr("short.nrrd: truncated")));
   EXPECT_EQ(found.datasets.size(), 3U) << "a file of a folder may still be on its way";
+}
+
+TEST_F(CatalogueTest, LayersFollowANamedVolume) {
+  const std::string volume = Write("ball.nrrd", 8), layer = Write("layer.nrrd", 5);
+  const DataArgument both = ParseDataArgument("a=" + volume + "?time=0,labels=" + layer + "?time=1:colours.txt,overlay=" + layer).value();
+  EXPECT_EQ(both.path, volume + "?time=0");
+  EXPECT_EQ(both.layers.labels + "|" + both.layers.label_colors, layer + "?time=1|colours.txt");
+  EXPECT_EQ(both.layers.overlay, layer);
+  EXPECT_EQ(ParseDataArgument("a=" + volume + ",overlay=x,labels=y").value().layers, (LayerFiles{.labels = "y", .overlay = "x"}));
+  for (const std::string& wrong :
+       std::vector<std::string>{"a=v,labels=", "a=v,labels=x,labels=y", "a=,labels=x", "a=v,overlay=" + std::string(5000, 'x')}) {
+    EXPECT_EQ(ParseDataArgument(wrong).status().code(), StatusCode::kInvalidArgument) << wrong.substr(0, 40);
+  }
+  // Other layers, other ids; a layer that is replaced is noticed.
+  const DataSource source(volume, "", {.overlay = layer});
+  const Result<LoadedSource> loaded = LoadSource(source);
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  ASSERT_NE(loaded->layers.overlay, nullptr);
+  EXPECT_NE(IdOf("a", *loaded->volume, loaded->layers), IdOf("a", *loaded->volume));
+  EXPECT_FALSE(HaveChanged(*loaded->stamp).value());
+  Write("layer.nrrd", 6);
+  EXPECT_TRUE(HaveChanged(*loaded->stamp).value());
+  EXPECT_NE(IdOf("a", *loaded->volume, LoadSource(source)->layers), IdOf("a", *loaded->volume, loaded->layers));
 }
 
 TEST_F(CatalogueTest, ALoadedFileHasAStampThatTellsOfEveryChange) {
