@@ -26,7 +26,7 @@ Status CheckItem(DataAction action, const std::string& item) {
   std::error_code error;
   const std::string here = std::filesystem::absolute(data->path, error).lexically_normal().string();
   return Status::InvalidArgument(
-      fmt::format("{}: the path must be absolute, since it is one of the coordinator's host; on this host it would be {}", item, here));
+      fmt::format("{}: the path must be absolute, since it is a path on the coordinator's host; on this host it would be {}", item, here));
 }
 
 }  // namespace

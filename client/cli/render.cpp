@@ -123,12 +123,14 @@ Result<TransferChoice> TransferOverTime(const TransferChoice& transfer, const st
 // What does not go together.
 Status CheckTurntable(const TurntableOptions& options) {
   if (options.frame.request.view.eye && options.turns > 0) {
-    return Status::InvalidArgument("--eye stands still; a turntable turns by --azimuth, about --look-at, unless --turns is 0");
+    return Status::InvalidArgument(
+        "--eye stands still, but a turntable turns by --azimuth, about --look-at; --turns 0 keeps the view still");
   }
   if (!options.frames && !options.times) return Status::InvalidArgument("--frames is required");
   if (options.times && options.frame.connection.local_workers == 0) {
     return Status::InvalidArgument(
-        "--time needs --local: a dataset of a service is one volume, whose time is said where it is named, as in --data NAME=FILE?time=3");
+        "--time needs --local: a dataset of a service is one volume; its time stands where the service names it, as in --data "
+        "NAME=FILE?time=3");
   }
   return Status::Ok();
 }
