@@ -6,8 +6,8 @@
 //   NAME=PATH,labels=FILE[:COLOURS],overlay=FILE
 //               the same with layers (common/layers/layer_reader.h); either one may be left out
 //   DIR         a watched folder: every volume file in it by its stem ("head.nii.gz" is "head"), also those that come later, and every
-//               folder in it that is a volume by its name; a folder of slices or of DICOM alone is one volume named as the folder. One
-//               of nothing but folders holds a volume in each. What has a name that begins with a dot is left out
+//               folder in it that is a volume by its name; a watched folder of nothing but slices, or DICOM, is one volume and has its
+//               name; in one of nothing but folders each may be a volume. What has a name that begins with a dot is left out
 //
 // Everything here may take as long as the file system does. Any thread.
 #pragma once

@@ -53,7 +53,7 @@ void DeclareTurntable(const CommandLine& line) {
       ->default_str("one for each time, if there are several");
   AddInteger(*sub, "--turns", options->turns, 0, kMaxTurns, "How many full turns; 0: the view stands still");
   AddParsed(*sub, "--time", options->times, ParseTimeRange,
-            "Which of the volumes of a file that holds several, as over time; counted from 0, FIRST and LAST included")
+            "Which of the volumes in a file of several, such as a time series; counted from 0, FIRST and LAST included")
       ->type_name("T|FIRST:LAST");
   AddParsed(
       *sub, "--fps", options->frames_per_second,
@@ -268,7 +268,7 @@ void DeclareLogs(const CommandLine& line) {
   AddParsed(
       *sub, "--since", options->since,
       [kLongest](const std::string& option, const std::string& text) { return ParseDuration(option, text, kLongest); },
-      "Begin so long ago, such as 30s, 10m or 2h")
+      "Leave out older lines: 30s, 10m or 2h")
       ->type_name("TIME")
       ->default_str("the beginning");
   RunWith(*sub, line.run, options, RunLogs);

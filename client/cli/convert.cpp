@@ -17,7 +17,7 @@
 namespace slabstream {
 namespace {
 
-// What it reads from stays as it is, even though it has been read when the output takes its place.
+// The output never takes the place of the input, although the input has been read by then.
 Status CheckKeepsInput(const ConvertOptions& options, const VolumeFormat& format, const std::vector<std::filesystem::path>& inputs) {
   std::vector<std::filesystem::path> outputs = {options.output};
   if (format.second_file != nullptr) outputs.push_back(format.second_file(options.output));
@@ -31,7 +31,7 @@ Status CheckKeepsInput(const ConvertOptions& options, const VolumeFormat& format
   return Status::Ok();
 }
 
-// The samples stay of the file's type if that holds their values, which a file's rescaling may have changed.
+// Samples keep the type that they have in the file, if it holds their values after the file's rescaling.
 std::optional<SampleType> TypeToWrite(const ConvertOptions& options, const LoadedVolume& loaded) {
   if (options.type) return options.type;
   const std::optional<SampleType> stored = SampleTypeNamed(loaded.info.file_type);

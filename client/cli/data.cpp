@@ -26,8 +26,8 @@ Status CheckItem(DataAction action, const std::string& item) {
     if (path.empty() || path.starts_with('/')) continue;
     std::error_code error;
     const std::string here = std::filesystem::absolute(path, error).lexically_normal().string();
-    return Status::InvalidArgument(
-        fmt::format("{}: the path must be absolute, since it is one of the coordinator's host; on this host it would be {}", item, here));
+    return Status::InvalidArgument(fmt::format(
+        "{}: the path must be absolute, since it is a path on the coordinator's host; on this host it would be {}", item, here));
   }
   return Status::Ok();
 }

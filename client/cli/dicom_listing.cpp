@@ -21,7 +21,7 @@ std::string Plain(const std::string& text) {
 
 Vec3 SpacingOf(const DicomStack& stack) { return {Length(stack.steps[0]), Length(stack.steps[1]), Length(stack.steps[2])}; }
 
-// Why it is not read, or only if asked for.
+// Why it is not read, or is read only if --series asks for it.
 std::string RemarkOn(const DicomSeries& series) {
   if (!series.trouble.ok()) return series.trouble.message();
   return series.other;

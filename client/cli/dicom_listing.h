@@ -9,7 +9,7 @@
 
 namespace slabstream {
 
-// The series of the volume that a source names (read_options.h), if it is DICOM; else none. Errors as of ListDicomSeries, of bad input.
+// The series that a source names (read_options.h), if it is DICOM; else none. Errors of ListDicomSeries, as bad input (AsInput).
 Result<std::vector<DicomSeries>> SeriesAt(const std::string& source);
 
 // Whether several of them are volumes, and the source does not say which is meant.

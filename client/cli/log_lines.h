@@ -21,7 +21,7 @@ class LogFile {
 
 // What a log line begins with (common/base/log.h): "2026-11-22 10:00:00.123". Texts compare like times. Empty: it has no time.
 std::string TimeOfLogLine(const std::string& line);
-// The same of now less `seconds_ago`.
+// The same, for the time `seconds_ago` before now.
 std::string LogTime(double seconds_ago);
 
 // The lines of all files in the order of their times, those of one file as they were. A line without a time goes with the one before it.

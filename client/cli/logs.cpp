@@ -84,7 +84,7 @@ Status RunLogs(const LogsOptions& options) {
   do {
     runs = options.follow && IsRunning(service->coordinator, kCoordinatorProgram) && !guard.interrupted();
     logs.Print(since);
-    since.clear();  // what comes now is new
+    since.clear();  // all later lines are new
     if (runs) Wait({}, &wakeup, kLogPollInterval);
   } while (runs);  // what was written before the end is printed
   return Status::Ok();

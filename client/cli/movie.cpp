@@ -87,14 +87,11 @@ Status CheckCanEncode(const MovieOptions& options) {
 
 std::vector<std::string> EncoderArguments(const MovieOptions& options, const std::string& output) {
   const MovieFormat& format = *MovieFormatOf(options.path);
-  std::vector<std::string> arguments = {"-hide_banner", "-nostats", "-loglevel", "error", "-xerror"};  // each error counts
   const std::string size = fmt::format("{}x{}", options.size.width, options.size.height);
   const std::string rate = fmt::format("{}", options.frames_per_second);
-  for (const std::string& argument :
-       {std::string("-f"), std::string("rawvideo"), std::string("-pixel_format"), std::string("rgb24"), std::string("-video_size"), size,
-        std::string("-framerate"), rate, std::string("-i"), std::string("pipe:0")}) {
-    arguments.push_back(argument);
-  }
+  std::vector<std::string> arguments = {"-hide_banner", "-nostats", "-loglevel", "error", "-xerror"};  // each error counts
+  arguments.insert(arguments.end(), {"-f", "rawvideo", "-pixel_format", "rgb24", "-video_size", size});
+  arguments.insert(arguments.end(), {"-framerate", rate, "-i", "pipe:0"});
   arguments.insert(arguments.end(), format.encoding.begin(), format.encoding.end());
   // No dates and versions in the file: the same frames make the same bytes.
   arguments.insert(arguments.end(), {"-map_metadata", "-1", "-fflags", "+bitexact", "-flags:v", "+bitexact"});

@@ -178,7 +178,8 @@ void AddClipOptions(CLI::App& app, Clipping& clipping) {
   app.option_defaults()->group("Clipping");
   AddParsed(
       app, "--clip-box", clipping.box, [](const std::string& option, const std::string& text) { return ParseClipBox(option, text); },
-      "Draw only what lies in this box of the world; with v behind it, of voxel numbers, with % of the volume's sides; a bound that is "
+      "Draw only what lies in this box of the world; a v at the end makes the bounds voxel numbers, a % shares of the sides; a bound that "
+      "is "
       "left out does not clip, as in :,:,:50%")
       ->type_name("X0:X1,Y0:Y1,Z0:Z1");
   app.add_option(
@@ -378,8 +379,8 @@ void ResolveSource(CLI::App& app, const CLI::Option* source, std::string& volume
     volume = WithReadOptions(app, argument->volume);
     if (volume != argument->volume && !is_file()) {
       throw CLI::ValidationError(
-          fmt::format("'{}' is a dataset at the service: how its file is read is said where it is named, as in --data {}", argument->volume,
-                      WithReadOptions(app, "NAME=FILE")));
+          fmt::format("'{}' is a dataset at the service; options for reading its file stand where the service names it, as in --data {}",
+                      argument->volume, WithReadOptions(app, "NAME=FILE")));
     }
     if (argument->transfer) {
       transfer.choice = *std::move(argument->transfer);
@@ -418,7 +419,7 @@ void AddSliceOptions(CLI::App& app, SliceOptions& options) {
       ->type_name("K")
       ->excludes(at);
   AddNumber(app, "--thickness", options.thickness, {0, kMaxWorldCoordinate},
-            "Show the largest values of a slab so thick, in the unit of the world (mm of a patient); 0: the values in the plane");
+            "Show the largest values of a slab of this thickness, in the unit of the world (mm of a patient); 0: the values in the plane");
   AddSize(app, request.size, "Pixels of each plane: WIDTHxHEIGHT, or one number for a square");
 
   app.option_defaults()->group("Look");
@@ -430,7 +431,7 @@ void AddSliceOptions(CLI::App& app, SliceOptions& options) {
                                   },
                                   "Width of the range of values from black to white")
                                   ->type_name("VALUE");
-  AddParsed(app, "--level", options.level, value, "Middle of that range")
+  AddParsed(app, "--level", options.level, value, "Middle of the range of values from black to white")
       ->type_name("VALUE")
       ->default_str("half of --window")
       ->needs(window);

@@ -19,7 +19,7 @@ constexpr std::string_view kAgain = "again";  // name of the file that the comma
 
 std::string JsonText(const Json& json, int indent) { return json.dump(indent, ' ', false, Json::error_handler_t::replace); }
 
-// The text without characters that a terminal would obey: files may hold anything.
+// The text without control characters, which a terminal would obey: files may hold anything.
 std::string Harmless(std::string text) {
   std::ranges::replace_if(
       text, [](unsigned char c) { return (c < 0x20 && c != '\n') || c == 0x7F; }, '?');
@@ -102,7 +102,7 @@ Json PictureJson(const PictureHeader& header, const std::optional<PictureRecord>
 
 Status RunPictureInfo(const InfoOptions& options) {
   if (options.transfer != TransferChoice{}) {
-    return Status::InvalidArgument(fmt::format("SOURCE '{}' is a picture, which no transfer function applies to", options.path));
+    return Status::InvalidArgument(fmt::format("SOURCE '{}' is a picture; transfer functions are for volumes", options.path));
   }
   if (options.layers.any()) return Status::InvalidArgument(fmt::format("SOURCE '{}' is a picture, which has no layers", options.path));
   const Result<PictureHeader> header = ReadPictureHeader(options.path);
@@ -112,7 +112,7 @@ Status RunPictureInfo(const InfoOptions& options) {
     Result<PictureRecord> parsed = ParseRecord(header->record);
     if (!parsed.ok()) {
       return Status::InvalidArgument(
-          fmt::format("SOURCE '{}' says in a way unknown to this version how it was made: {}", options.path, parsed.status().message()));
+          fmt::format("SOURCE '{}' has a record that this version cannot read: {}", options.path, parsed.status().message()));
     }
     record = *std::move(parsed);
   }

@@ -36,7 +36,7 @@ std::string RecordText(const std::string& source, const FrameRequest& request, c
 // InvalidArgument, one line: what is wrong with the text.
 Result<PictureRecord> ParseRecord(std::string_view text);
 
-// What stands for the file of a transfer function that is in no file any more.
+// The file that a command line names for a transfer function of the record, whose own file may be gone.
 inline constexpr char kColorMapFile[] = "color-map.json";
 
 // The command line that makes the picture again as `output`: "render", SOURCE, and each option whose value is not its default. --local if

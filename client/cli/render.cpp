@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <iostream>
 #include <map>
 #include <memory>
@@ -54,16 +55,20 @@ Result<Session> OpenSession(const FrameOptions& options, std::vector<FrameJob>& 
   return session;
 }
 
-// The pictures of `jobs`, and the files beside them (--stats, --trace).
-Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std::vector<FrameJob> jobs, PictureSink& pictures,
+// The pictures of `jobs`, and the files beside them (--stats, --trace). `open_pictures` is called when all that may take long before the
+// first frame is done: Ctrl-C before that ends the process at once, and must find nothing to clean up.
+using OpenSink = std::function<Result<std::unique_ptr<PictureSink>>()>;
+Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std::vector<FrameJob> jobs, const OpenSink& open_pictures,
                                                 int in_flight) {
   Result<Session> session = OpenSession(options, jobs);
   if (!session.ok()) return session.status();
   if (Status status = Validate(jobs.front().request); !status.ok()) return status;
+  const Result<std::unique_ptr<PictureSink>> pictures = open_pictures();
+  if (!pictures.ok()) return pictures.status();
 
   FrameLoopOptions loop;
   loop.in_flight = in_flight;
-  loop.pictures = &pictures;
+  loop.pictures = pictures->get();
   loop.keep_reports = !options.stats_path.empty() || !options.trace_path.empty();
   loop.progress = options.progress;
   Result<std::vector<FrameRecord>> frames = RenderFrames(session->client(), jobs, loop);
@@ -81,25 +86,22 @@ Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std
   return frames;
 }
 
-// Where the frames of a turntable go. A movie's encoder is started here.
-Result<std::unique_ptr<PictureSink>> OpenPictures(const TurntableOptions& options, const std::string& first_output) {
-  const std::string& movie_path = options.output.movie;
-  if (movie_path.empty()) {
-    if (options.frames_per_second) {
-      return Status::InvalidArgument(fmt::format("--fps {:g} is for movies ({}), but --output '{}' names pictures",
-                                                 *options.frames_per_second, MovieEndings(), first_output));
-    }
-    if (Status status = CheckPicturePath(first_output); !status.ok()) return status;
-    if (Status status = CheckPaths(options.frame, first_output); !status.ok()) return status;
-    return std::unique_ptr<PictureSink>(std::make_unique<PictureFiles>(options.frame.format, options.frame.record, options.frame.layers));
-  }
-  MovieOptions movie{.path = movie_path, .size = options.frame.request.size, .format = options.frame.format};
+std::unique_ptr<PictureSink> FilesOf(const FrameOptions& options) {
+  return std::make_unique<PictureFiles>(options.format, options.record, options.layers);
+}
+
+MovieOptions MovieOf(const TurntableOptions& options) {
+  MovieOptions movie{.path = options.output.movie, .size = options.frame.request.size, .format = options.frame.format};
   if (options.frames_per_second) movie.frames_per_second = *options.frames_per_second;
-  if (Status status = CheckCanEncode(movie); !status.ok()) return status;
-  if (Status status = CheckPaths(options.frame, movie_path); !status.ok()) return status;
-  Result<std::unique_ptr<Movie>> started = Movie::Start(movie);
-  if (!started.ok()) return started.status();
-  return std::unique_ptr<PictureSink>(*std::move(started));
+  return movie;
+}
+
+// Where the frames of a turntable go.
+Result<std::unique_ptr<PictureSink>> OpenPictures(const TurntableOptions& options) {
+  if (options.output.movie.empty()) return FilesOf(options.frame);
+  Result<std::unique_ptr<Movie>> movie = Movie::Start(MovieOf(options));
+  if (!movie.ok()) return movie.status();
+  return std::unique_ptr<PictureSink>(*std::move(movie));
 }
 
 // SOURCE at this time.
@@ -120,17 +122,33 @@ Result<TransferChoice> TransferOverTime(const TransferChoice& transfer, const st
   return settled;
 }
 
-// What does not go together.
+// Where frame `index` goes.
+std::string FileOf(const TurntableOptions& options, int index) {
+  return options.output.movie.empty() ? options.output.pictures.Name(index) : options.output.movie;
+}
+
+// What is wrong with the options as a whole, before work begins.
 Status CheckTurntable(const TurntableOptions& options) {
   if (options.frame.request.view.eye && options.turns > 0) {
-    return Status::InvalidArgument("--eye stands still; a turntable turns by --azimuth, about --look-at, unless --turns is 0");
+    return Status::InvalidArgument(
+        "--eye stands still, but a turntable turns by --azimuth, about --look-at; --turns 0 keeps the view still");
   }
   if (!options.frames && !options.times) return Status::InvalidArgument("--frames is required");
   if (options.times && options.frame.connection.local_workers == 0) {
     return Status::InvalidArgument(
-        "--time needs --local: a dataset of a service is one volume, whose time is said where it is named, as in --data NAME=FILE?time=3");
+        "--time needs --local: a dataset of a service is one volume; its time stands where the service names it, as in --data "
+        "NAME=FILE?time=3");
   }
-  return Status::Ok();
+  const std::string first_output = FileOf(options, 0);
+  if (!options.output.movie.empty()) {
+    if (Status status = CheckCanEncode(MovieOf(options)); !status.ok()) return status;
+  } else if (options.frames_per_second) {
+    return Status::InvalidArgument(fmt::format("--fps {:g} is for movies ({}), but --output '{}' names pictures",
+                                               *options.frames_per_second, MovieEndings(), first_output));
+  } else if (Status status = CheckPicturePath(first_output); !status.ok()) {
+    return status;
+  }
+  return CheckPaths(options.frame, first_output);
 }
 
 // Frame i shows the time and the angle that belong to the i-th part of the whole.
@@ -151,8 +169,7 @@ Result<std::vector<FrameJob>> TurntableJobs(const TurntableOptions& options) {
   std::vector<FrameJob> jobs;
   for (int i = 0; i < frames; ++i) {
     const int time = times.first + int(std::int64_t{i} * times.count() / frames);
-    const std::string& movie = options.output.movie;
-    FrameJob& job = jobs.emplace_back(FrameJob{request, movie.empty() ? options.output.pictures.Name(i) : movie, SourceAt(options, time)});
+    FrameJob& job = jobs.emplace_back(FrameJob{request, FileOf(options, i), SourceAt(options, time)});
     // Back into one turn, so that a start near the limit of angles stays valid.
     job.request.view.azimuth_degrees = std::fmod(request.view.azimuth_degrees + 360.0 * options.turns * i / frames, 360.0);
   }
@@ -165,8 +182,8 @@ Status RunRender(const RenderOptions& options) {
   const Time start = MonotonicNow();
   if (Status status = CheckPicturePath(options.output); !status.ok()) return status;
   if (Status status = CheckPaths(options.frame, options.output); !status.ok()) return status;
-  PictureFiles files(options.frame.format, options.frame.record, options.frame.layers);
-  const auto frames = RenderPictures(options.frame, {{options.frame.request, options.output, options.frame.source}}, files, 1);
+  const auto open_pictures = [&] { return FilesOf(options.frame); };
+  const auto frames = RenderPictures(options.frame, {{options.frame.request, options.output, options.frame.source}}, open_pictures, 1);
   if (!frames.ok()) return frames.status();
   const ImageSize size = options.frame.request.size;
   std::cout << fmt::format("rendered {} {}x{} in {:.0f} ms (frame {:.0f} ms)\n", options.output, size.width, size.height,
@@ -177,11 +194,10 @@ Status RunRender(const RenderOptions& options) {
 Status RunTurntable(const TurntableOptions& options) {
   if (Status status = CheckTurntable(options); !status.ok()) return status;
   const Time start = MonotonicNow();
-  const Result<std::unique_ptr<PictureSink>> pictures = OpenPictures(options, options.output.pictures.Name(0));
-  if (!pictures.ok()) return pictures.status();
   const Result<std::vector<FrameJob>> jobs = TurntableJobs(options);
   if (!jobs.ok()) return jobs.status();
-  const auto frames = RenderPictures(options.frame, *jobs, **pictures, options.in_flight);
+  const auto open_pictures = [&] { return OpenPictures(options); };
+  const auto frames = RenderPictures(options.frame, *jobs, open_pictures, options.in_flight);
   if (!frames.ok()) return frames.status();
   const ImageSize size = options.frame.request.size;
   const std::string files = options.output.movie.empty() ? fmt::format("{} to {}", frames->front().output, frames->back().output)

@@ -283,7 +283,7 @@ Result<TimeRange> ParseTimeRange(std::string_view option, std::string_view text)
   if (!first.ok()) return first.status();
   if (!last.ok()) return last.status();
   if (*first <= *last) return TimeRange{*first, *last};
-  return Status::InvalidArgument(fmt::format("{} '{}' must not fall", option, text));
+  return Status::InvalidArgument(fmt::format("{} '{}': FIRST must not be above LAST", option, text));
 }
 
 std::string FramePattern::Name(int index) const {

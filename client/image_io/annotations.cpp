@@ -86,7 +86,7 @@ class Artist {
     const double half = 0.5 * kCapital * scale_.letters, x = 0.5 * size_.width, y = 0.5 * size_.height + half;
     const std::pair<Vec3, InkPoint> sides[] = {{geometry_.up, {x, top_ + 2 * half}},
                                                {-geometry_.up, {x, double(size_.height - scale_.margin)}},
-                                               {-geometry_.right, {0, y}},  // texts keep to the picture
+                                               {-geometry_.right, {0, y}},  // PutText keeps texts inside the picture
                                                {geometry_.right, {double(size_.width), y}}};
     for (const auto& [direction, place] : sides) {
       if (Status status = PutText(PatientSides(direction), place); !status.ok()) return status;

@@ -164,7 +164,7 @@ Ink Grown(const Ink& ink, double radius) {
     for (int x = b.x_begin; x < b.x_end; ++x, ++i) {
       const float coverage = ink.coverage[i];
       if (coverage == 0) continue;
-      // From inside of a shape nothing is reached that its edge does not reach.
+      // What is near a point inside of a shape is inside of it, or near its edge.
       const bool at_edge = x == b.x_begin || x == b.x_end - 1 || y == b.y_begin || y == b.y_end - 1;
       const float* here = &ink.coverage[i];
       if (!at_edge && here[-1] == 1 && here[1] == 1 && here[-row] == 1 && here[row] == 1) {

@@ -128,7 +128,7 @@ Status ReadExrChannels(HeaderBytes list, PictureHeader& header) {
   static constexpr std::array<std::string_view, 3> kTypes = {"uint32", "half", "float"};
   for (std::string_view name = list.Text(); !name.empty(); name = list.Text()) {
     const std::uint32_t type = list.LittleEndian();
-    list.Take(12);  // how it is compressed, and every how many pixels it is stored
+    list.Take(12);  // compression and sampling
     if (!list.ok() || type >= kTypes.size()) return Damaged("its list of channels");
     const std::string_view known = kTypes.at(type);
     header.sample_type = header.channels.empty() || header.sample_type == known ? known : "mixed";

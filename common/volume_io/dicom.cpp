@@ -22,7 +22,7 @@ std::vector<DicomFrameNumber> StackedFrames(const DicomSeries& series) {
   return stacked;
 }
 
-// A folder that also has files of other formats is not one of DICOM, although there may be some below it.
+// A folder that holds files of other formats is not taken for DICOM, even if DICOM files lie in it or below it.
 bool Recognises(const std::string& path, const ReadOptions&) {
   std::error_code error;
   return std::filesystem::is_directory(path, error) ? !HasVolumeFiles(path) && HoldsDicom(path) : BeginsLikeDicom(path);

@@ -141,7 +141,7 @@ std::string Widened(std::string_view samples, std::size_t from_bytes, std::size_
   return wide;
 }
 
-// The pixels of a frame; empty: damaged. GDCM is told what the stream says of itself, since it believes the one and checks not the other.
+// The pixels of a frame; empty: damaged. GDCM trusts the header that it gets, so the header repeats what the stream says of itself.
 std::string Decompressed(const CompressedFrame& frame, const std::string& bytes) {
   const Codec codec_kind = FindCompression(frame.transfer_syntax)->codec;
   const std::optional<Stream> stream = ReadStreamHeader(codec_kind, bytes, frame);
@@ -195,7 +195,7 @@ bool WriteAll(int pipe, std::string_view bytes) {
   return true;
 }
 
-// Lets go of all that this process has from its parent, but memory and `pipe`, which becomes descriptor 3.
+// Closes all that this process has inherited from its parent but `pipe`, which becomes descriptor 3.
 bool Seclude(int pipe, std::int64_t frame_bytes) {
   constexpr int kPipe = 3;
   (void)::prctl(PR_SET_PDEATHSIG, SIGKILL);

@@ -57,7 +57,7 @@ class FileWindow {
   bool is_open() const { return size_ >= 0; }
   std::int64_t size() const { return size_; }
 
-  // `bytes` of the file; null: it has not as many. Valid until the next call.
+  // `bytes` of the file; null: the file ends before them. Valid until the next call.
   const std::byte* At(std::int64_t offset, std::int64_t bytes) {
     if (offset < 0 || bytes > size_ - offset) return nullptr;
     if (offset < begin_ || offset + bytes > begin_ + std::int64_t(window_.size())) {

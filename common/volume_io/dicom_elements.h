@@ -2,7 +2,7 @@
 // up to the pixels. The rest is passed over.
 //
 // A length is believed only if what holds the element has that many bytes, sequences nest at most kMaxDicomDepth deep, and values longer
-// than kMaxDicomValue are not kept: so no bytes make it take memory or fail otherwise than by a Status. This is why GDCM does not do it:
+// than kMaxDicomValue are not kept: so damaged bytes lead to a Status and never to much memory. This is why GDCM does not do it:
 // its parser takes memory by the lengths that a file claims, and as Debian compiles it, it ends the process where a file is damaged.
 #pragma once
 
@@ -33,7 +33,7 @@ class DicomElements {
     std::vector<DicomElements> items;  // of a sequence
   };
 
-  // In the functions below the caller knows of which value representation a tag is. What is absent, empty or broken is left out.
+  // The caller of these functions knows the value representation of a tag. Absent, empty and broken values are left out.
   bool Has(DicomTag tag) const { return Find(tag) != nullptr; }
   std::string Text(DicomTag tag) const;                // without blanks around it
   std::vector<std::string> Texts(DicomTag tag) const;  // values between backslashes
@@ -80,11 +80,11 @@ struct WantedElement {
 // Whether a file begins like one of DICOM: with DICM at byte 128. False also if it cannot be read.
 bool BeginsLikeDicom(const std::string& path);
 
-// `wanted` is kept wherever it is met. NotFound: cannot be opened. InvalidArgument: no DICOM file, or its transfer syntax is deflated or
-// not stated. DataLoss: damaged. Messages name the path.
+// Keeps the elements `wanted`, wherever they are. NotFound: cannot be opened. InvalidArgument: no DICOM file, or its transfer syntax is
+// deflated or not stated. DataLoss: damaged. Messages name the path.
 Result<DicomFile> ReadDicomFile(const std::string& path, std::span<const WantedElement> wanted);
 
-// The transfer syntaxes in which pixels are not compressed, but the deflated one.
+// The transfer syntaxes whose pixels are not compressed, except the deflated one.
 inline constexpr const char* kImplicitLittleEndian = "1.2.840.10008.1.2";
 inline constexpr const char* kExplicitLittleEndian = "1.2.840.10008.1.2.1";
 inline constexpr const char* kExplicitBigEndian = "1.2.840.10008.1.2.2";

@@ -39,7 +39,8 @@ Status CheckFormat(const DicomImage& image) {
     return wrong(fmt::format("pixels of {} bits in big endian must {}be in words of 16 bits", allocated, allocated > 8 ? "" : "not "));
   }
   if (!IsUncompressed(image) && !CanDecompress(image.transfer_syntax)) {
-    return wrong(fmt::format("transfer syntax {} is not supported; uncompressed pixels, {} are", image.transfer_syntax, kCompressions));
+    return wrong(
+        fmt::format("transfer syntax {} is not supported; supported: uncompressed pixels, {}", image.transfer_syntax, kCompressions));
   }
   return Status::Ok();
 }

@@ -11,11 +11,11 @@
 
 namespace slabstream {
 
-// Pixels of a compressed frame: only the compressed bytes could tell whether more are true.
+// Pixels of a compressed frame, at most: whether it has more could only be told by decompressing it.
 inline constexpr std::int64_t kMaxCompressedPixels = std::int64_t{1} << 26;
 
 // Whether the frames of the image can be read: InvalidArgument: colours, a format of pixels, a transfer syntax or a rescaling that is not
-// supported; DataLoss: the file has not as many pixels as it claims. Messages name the file.
+// supported; DataLoss: the file has fewer pixels than it claims. Messages name the file.
 Status CheckFrames(const DicomImage& image);
 
 struct DicomFrameNumber {

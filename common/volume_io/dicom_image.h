@@ -54,7 +54,7 @@ struct DicomImage {
   DicomPixelData pixels;
   std::vector<DicomFrame> frames;  // one or more
   bool media_directory = false;    // DICOMDIR: it has no image, its folder is meant
-  Status damage;                   // of the pixels: not ok if the file has not as many as it claims
+  Status damage;                   // of the pixels: not ok if the file has fewer than it claims
 
   std::int64_t frame_pixels() const { return std::int64_t{columns} * rows; }
   std::int64_t frame_bytes() const { return frame_pixels() * (format.bits_allocated / 8); }

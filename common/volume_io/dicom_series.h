@@ -1,7 +1,7 @@
 // The series of a DICOM folder or file: which there are, which of them could be volumes, and why the others are not.
 //
-// A folder is searched with all its sub-folders, as exports have them; a DICOMDIR stands for its folder. What a file is shows in its bytes
-// (DICM at byte 128), not in its name. Images belong together by their SeriesInstanceUID.
+// A folder is searched with all its sub-folders, as exports have them; a DICOMDIR stands for its folder. Files are recognised by their
+// bytes (DICM at byte 128), not by their names. Images belong together by their SeriesInstanceUID.
 #pragma once
 
 #include <span>

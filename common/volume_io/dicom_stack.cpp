@@ -122,7 +122,7 @@ class SortedSlices {
       for (std::size_t axis = 0; axis < 2; ++axis) {
         const double voxels = Dot(aside, steps[axis]) / Dot(steps[axis], steps[axis]);
         if (std::abs(voxels) > kMostOffPlace) {
-          return Refused(fmt::format("{} lies {:.2g} pixels aside of its place in an even stack, limit {}; dcm2niix may convert the series",
+          return Refused(fmt::format("{} lies {:.2g} pixels beside its place in an even stack, limit {}; dcm2niix may convert the series",
                                      (*this)[i].name, std::abs(voxels), kMostOffPlace));
         }
       }

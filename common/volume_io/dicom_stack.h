@@ -1,7 +1,7 @@
 // From slices in any order to a stack: sorted by their positions along the normal of their plane, and checked to lie evenly. Pure.
 //
-// Neither file names nor InstanceNumber count. The step from slice to slice need not be along the normal: with a tilted gantry it is not,
-// and such stacks are straightened later (world_placement.h).
+// Names of files and InstanceNumber do not matter. The step from slice to slice need not be along the normal: with a tilted gantry it is
+// not, and such stacks are straightened later (world_placement.h).
 #pragma once
 
 #include <array>

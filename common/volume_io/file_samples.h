@@ -16,7 +16,7 @@
 
 namespace slabstream {
 
-// Told after each block how many of all bytes of samples are written.
+// Called after each block with the bytes of samples that are written, and all there are.
 using WriteProgress = std::function<void(std::int64_t done, std::int64_t all)>;
 
 class FileSamples {

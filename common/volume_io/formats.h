@@ -25,7 +25,7 @@ struct VolumeFormat {
   std::string_view name;                  // "NIfTI"
   std::vector<std::string_view> endings;  // of files, in lower case: ".nii"
   std::string_view also = {};             // what else is read, for error texts: "a folder of .tif slices"
-  // Whether this is such a thing: a folder, or a file by its first bytes. Asked if no format claims the ending. Null: only endings count.
+  // Whether this is of the format: a folder, or a file by its first bytes. Asked if no format claims the ending. Null: only endings count.
   bool (*recognises)(const std::string& path, const ReadOptions& options) = nullptr;
   std::vector<std::string_view> options = {};   // names of the options (ReadOptionList) that it takes
   std::vector<std::string_view> required = {};  // those of them without which it cannot be read

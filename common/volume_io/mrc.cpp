@@ -91,7 +91,7 @@ Result<RawHeader> HeaderOf(const BinaryHeader& fields, SampleType type, const st
     header.steps[std::size_t(i)] = steps[std::size_t(axes[i] - 1)];
     header.origin = header.origin + double(starts[i]) * header.steps[std::size_t(i)];
   }
-  // Of the two ways to say where a volume lies, the later one.
+  // A file may say where its volume lies in a second way, which counts if it is there.
   if (const Vec3 origin = Floats(fields, 50); origin != Vec3{}) header.origin = origin;
   return header;
 }
@@ -109,7 +109,7 @@ Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
   const std::optional<Mode> mode = ModeOf(fields);
   if (!mode) {
     return Status::InvalidArgument(
-        fmt::format("{}: MRC mode {} is not supported, 0, 1, 2, 6 and 12 are (integers of 8 and 16 bits, floats)", path,
+        fmt::format("{}: MRC mode {} is not supported; supported: 0, 1, 2, 6 and 12 (integers of 8 and 16 bits, floats)", path,
                     fields.At<std::int32_t>(Word(4))));
   }
   const Result<RawHeader> header = HeaderOf(fields, mode->type, path, options);

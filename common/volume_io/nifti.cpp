@@ -109,7 +109,7 @@ Result<RawHeader> ReadHeader(const NiftiHeader& fields, const std::string& path,
   const auto wrong = [&](const std::string& why) { return Status::InvalidArgument(path + ": " + why); };
   const std::optional<SampleType> type = ToSampleType(fields.data_type());
   if (!type) {
-    return wrong(fmt::format("NIfTI data type {} is not supported, integers of 8 to 64 bits, floats of 32 and 64 bits and colours are",
+    return wrong(fmt::format("NIfTI data type {} is not supported; supported: integers of 8 to 64 bits, floats of 32 and 64 bits, colours",
                              fields.data_type()));
   }
   const int dimensions = fields.dim(0);

@@ -94,7 +94,7 @@ Result<NpyHeader> ReadText(const std::string& path) {
   if (!std::ranges::equal(std::as_bytes(std::span(kMagic)), std::span(start).first(kMagic.size())))
     return wrong("it does not begin with \\x93NUMPY");
   const std::size_t version = byte(6);
-  if (version < 1 || version > 3) return wrong(fmt::format("version {} is not supported, 1 to 3 are", version));
+  if (version < 1 || version > 3) return wrong(fmt::format("version {} is not supported; supported: 1 to 3", version));
   const std::size_t length_bytes = version == 1 ? 2 : 4;
   std::size_t length = 0;
   for (std::size_t i = length_bytes; i-- > 0;) length = length << 8 | byte(kFirst + i);
@@ -112,7 +112,8 @@ Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
   const auto descr = ValueOf(text->text, "descr", '\'', '\'');
   const std::optional<Dtype> dtype = descr ? ParseDtype(*descr) : std::nullopt;
   if (!dtype)
-    return wrong(fmt::format("dtype '{}' is not supported, integers, floats and truth values are", descr.value_or("of several fields")));
+    return wrong(
+        fmt::format("dtype '{}' is not supported; supported: integers, floats and truth values", descr.value_or("of several fields")));
   const bool fortran = text->text.find("'fortran_order': True") != std::string::npos;
   if (!fortran && text->text.find("'fortran_order': False") == std::string::npos) return wrong("fortran_order is neither True nor False");
   const auto shape_text = ValueOf(text->text, "shape", '(', ')');

@@ -103,7 +103,8 @@ Result<Payload> FindPayload(const TextHeader& text, std::int64_t sample_bytes) {
   if (!payload.ok()) return payload;
   const std::string encoding = ToLower(*text.Find("encoding"));
   payload->compressed = encoding == "gzip" || encoding == "gz";
-  if (!payload->compressed && encoding != "raw") return text.Refused("encoding '" + encoding + "' is not supported, raw and gzip are");
+  if (!payload->compressed && encoding != "raw")
+    return text.Refused("encoding '" + encoding + "' is not supported; supported: raw and gzip");
   payload->big_endian = ToLower(text.Find("endian").value_or("little")) == "big";
 
   if (text.Find({"line skip", "lineskip"}).value_or("0") != "0") return text.Refused("line skip is not supported");

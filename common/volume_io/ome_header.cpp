@@ -55,7 +55,7 @@ std::optional<double> Micrometres(const std::string& unit) {
   return found == std::end(kUnits) ? std::nullopt : std::optional(found->second);
 }
 
-// Nothing unless all three sizes are stated; that of z may be missing, as of a single slice.
+// None unless the sizes are stated; that of z may be missing, as for a single slice.
 std::optional<Vec3> SpacingOf(const XmlTag& pixels) {
   Vec3 spacing;
   for (const Axis axis : kAxes) {

@@ -1,4 +1,4 @@
-// Raw samples without a header: what they are is said by options.
+// Raw samples without a header: options say what they are.
 #include <fmt/format.h>
 
 #include "common/base/log.h"
@@ -17,7 +17,7 @@ Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
   std::error_code error;
   const auto file_bytes = std::int64_t(std::filesystem::file_size(path, error));
   Result<RawVolume> raw = ReadSamples(path, header, payload, options);
-  // A wrong guess reads something, too.
+  // Wrong options read something as well, so say what does not add up.
   if (const std::int64_t used = payload.offset + header.sample_bytes(); raw.ok() && !error && file_bytes != used) {
     LogWarning(fmt::format("{}: has {} bytes, of which its dims, type and offset use {}", path, file_bytes, used));
   }

@@ -103,7 +103,7 @@ std::size_t OptionEnd(const std::string& source, std::size_t begin) {
 
 const std::vector<ReadOption>& ReadOptionList() {
   static const std::vector<ReadOption> options = {
-      {"time", "T", "Which of the volumes of a file that holds several, as over time; counted from 0", SetTime,
+      {"time", "T", "Which of the volumes in a file of several, such as a time series; counted from 0", SetTime,
        [](const ReadOptions& given) { return given.time.has_value(); }},
       {"channel", "N|luminance", "Which of a voxel's components, counted from 0; or the luminance of red, green and blue", SetChannel,
        [](const ReadOptions& given) { return given.channel.has_value(); }},

@@ -1,7 +1,7 @@
 // TIFF: a multi-page file, or a folder of files, one a slice.
 //
 // TIFF states no distance between slices, and its resolution is meant for print: spacing is 1 along x and z, and along y the ratio of the
-// two resolutions. Files of OME state the size of voxels in their description.
+// two resolutions. OME-TIFF states the size of voxels in its description.
 #include <fmt/format.h>
 #include <tiffio.h>
 
@@ -107,7 +107,7 @@ std::optional<SampleType> ToSampleType(unsigned bits, unsigned format) {
 Result<PageOrder> TiffFile::ReadPageOrder(std::int64_t pages, const ReadOptions& options) const {
   const std::string description = Field<const char*>(TIFFTAG_IMAGEDESCRIPTION, "");
   if (IsOmeHeader(description)) return ReadOmeHeader(path_, description, pages, options);
-  if (options.time) return Refused("time is for files of OME that state several; this one does not");
+  if (options.time) return Refused("time is for OME-TIFF files that state several times; this one does not");
   return PageOrder{.count = pages};
 }
 
@@ -210,7 +210,7 @@ bool Recognises(const std::string& path, const ReadOptions&) { return !SlicesIn(
 Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
   const std::vector<std::string> slices = SlicesIn(path, Endings());
   if (slices.empty()) return ReadPages(path, options);
-  if (options.time) return Status::InvalidArgument(path + ": time is for files of OME, not for a folder of slices");
+  if (options.time) return Status::InvalidArgument(path + ": time is for OME-TIFF files, not for a folder of slices");
   return ReadSliceStack(path, slices, OpenSliceFile, options);
 }
 

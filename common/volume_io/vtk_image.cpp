@@ -264,7 +264,7 @@ Result<RawVolume> Reader::ReadArray(const DataArray& array) {
   const std::string compressor = file_.file.Attribute("compressor");
   const bool text = format == "ascii", appended = format == "appended", compressed = !text && !compressor.empty();
   if (compressed && compressor != "vtkZLibDataCompressor") {
-    return Wrong(fmt::format("compressor {} is not supported, vtkZLibDataCompressor is", compressor));
+    return Wrong(fmt::format("compressor {} is not supported; supported: vtkZLibDataCompressor", compressor));
   }
   if (!text && !appended && format != "binary")
     return Wrong(fmt::format("array {}: format '{}', must be ascii, binary or appended", name, format));

@@ -200,7 +200,7 @@ Status Parser::OnKeyword(const std::string& keyword) {
     }
     return Status::Ok();
   }
-  return Wrong(fmt::format("VTK attribute {} is not supported, SCALARS and FIELD are", keyword));
+  return Wrong(fmt::format("VTK attribute {} is not supported; supported: SCALARS and FIELD", keyword));
 }
 
 Status Parser::ReadKeywords() {

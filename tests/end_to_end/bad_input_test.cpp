@@ -49,7 +49,7 @@ TEST_F(BadInputTest, CommandLines) {
       {{"data"}, "required"},
       {{"data", "add"}, "DATA"},
       {{"data", "add", "a=x.nrrd"},
-       "a=x.nrrd: the path must be absolute, since it is one of the coordinator's host; on this host it would be /"},
+       "a=x.nrrd: the path must be absolute, since it is a path on the coordinator's host; on this host it would be /"},
       {{"data", "add", "x"}, "x: the path must be absolute"},
       {{"data", "add", "a="}, "a path of 0 bytes, must have 1 to 4096"},
       {{"data", "add", "a=/" + std::string(4096, 'p')}, "a path of 4097 bytes, must have 1 to 4096"},

@@ -289,7 +289,7 @@ TEST_F(MovieTest, TimesThatAreNotThereAreRefused) {
   const std::string series = MakeSeries("series.npy", {50, 100, 200});
   const std::vector<Refusal> cases = {
       {{series, "--local=1", "--time", "0:3"}, "series.npy: time is 3, must be in [0, 2]"},
-      {{series, "--local=1", "--time", "2:1"}, "--time '2:1' must not fall"},
+      {{series, "--local=1", "--time", "2:1"}, "--time '2:1': FIRST must not be above LAST"},
       {{series, "--local=1", "--time", "0:1:2"}, "--time '0:1:2' is neither T nor FIRST:LAST"},
       {{series, "--local=1", "--time", "0:x"}, "--time 'x'"},
       {{series, "--local=1", "--time", ":2"}, "--time ''"},

@@ -115,7 +115,7 @@ TEST(DicomSeries, ThatIsNoStackIsRefusedByName) {
        {"varies from 1.4 to 2.6 mm", "0.2 of a voxel", "dcm2niix"}},
       {"aside",
        {SliceAt(0), SliceAt(2), SliceAt(4, {{kTagPosition, "0.4\\0\\4"}}), SliceAt(6)},
-       {"/s2 lies 0.4 pixels aside", "limit 0.2"}},
+       {"/s2 lies 0.4 pixels beside its place", "limit 0.2"}},
       {"twice", {SliceAt(0), SliceAt(2), SliceAt(2), SliceAt(4)}, {"4 images at 3 positions", "2 of them at (0, 0, 2)", "dcm2niix"}},
       {"echoes",
        {SliceAt(0, echo_1), SliceAt(2, echo_1), SliceAt(0, echo_2), SliceAt(2, echo_2)},

@@ -568,7 +568,7 @@ TEST_F(OmeTest, DescriptionsThatDoNotFitAreRefused) {
   EXPECT_THAT(WhyNotPath(Write(Ome("SizeZ=\"2\" SizeC=\"1\" SizeT=\"1\" DimensionOrder=\"XYZZZ\""), 2)),
               HasSubstr("DimensionOrder is 'XYZZZ'"));
   EXPECT_THAT(WhyNotPath(Write("<OME><Image>", 2)), HasSubstr("its OME description"));
-  EXPECT_THAT(WhyNotPath(Write("by a scanner", 2), {.time = 0}), HasSubstr("time is for files of OME"));
+  EXPECT_THAT(WhyNotPath(Write("by a scanner", 2), {.time = 0}), HasSubstr("time is for OME-TIFF files that state several"));
 }
 
 }  // namespace
