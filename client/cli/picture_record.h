@@ -37,7 +37,7 @@ std::string RecordText(const std::string& source, const FrameRequest& request, c
 Result<PictureRecord> ParseRecord(std::string_view text);
 
 // What stands for the file of a transfer function that is in no file any more.
-inline constexpr char kColorMapFile[] = "color-map.json";
+inline constexpr char kColorMapFile[] = "color-map.json", kOverlayMapFile[] = "overlay-map.json";
 
 // The command line that makes the picture again as `output`: "render", SOURCE, and each option whose value is not its default. --local if
 // SOURCE is the name of a file.
