@@ -186,7 +186,7 @@ std::vector<std::string> LayerArguments(const FrameRequest& request, const Layer
   if (request.overlay) {
     const auto& [transfer, weight] = *request.overlay;
     const auto* preset = std::get_if<std::string>(&transfer.choice);
-    add("--overlay-transfer", preset != nullptr ? *preset : kColorMapFile);
+    add("--overlay-transfer", preset != nullptr ? *preset : kOverlayMapFile);
     if (transfer.scalar_range) {
       arguments.push_back(fmt::format("--overlay-range={}:{}", transfer.scalar_range->min, transfer.scalar_range->max));
     }

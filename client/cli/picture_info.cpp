@@ -65,7 +65,11 @@ std::string HeaderText(const PictureHeader& header) {
   return text;
 }
 
-bool HasOwnTransfer(const PictureRecord& record) { return std::holds_alternative<TransferFunction>(record.request.transfer.choice); }
+// Null: a preset.
+const TransferFunction* OwnTransfer(const TransferChoice& transfer) { return std::get_if<TransferFunction>(&transfer.choice); }
+const TransferFunction* OverlayTransfer(const PictureRecord& record) {
+  return record.request.overlay ? OwnTransfer(record.request.overlay->transfer) : nullptr;
+}
 
 std::string RecordLines(const PictureRecord& record, const std::string& output) {
   std::string text = fmt::format("made by      {}\nsource       {}\nrequest\n", record.program, record.source);
@@ -79,7 +83,8 @@ std::string RecordLines(const PictureRecord& record, const std::string& output) 
   text += "geometry\n";
   AddLines("", record.json["geometry"], text);
   text += "command\n  " + CommandText(record, output) + "\n";
-  if (HasOwnTransfer(record)) text += fmt::format("  {} is what --json prints as color_map\n", kColorMapFile);
+  if (OwnTransfer(record.request.transfer) != nullptr) text += fmt::format("  {} is what --json prints as color_map\n", kColorMapFile);
+  if (OverlayTransfer(record) != nullptr) text += fmt::format("  {} is what --json prints as overlay_map\n", kOverlayMapFile);
   return text;
 }
 
@@ -92,9 +97,9 @@ Json PictureJson(const PictureHeader& header, const std::optional<PictureRecord>
   if (!record) return json;
   for (const auto& [field, value] : record->json.items()) json[field] = value;
   json["command"] = RenderArguments(*record, output);
-  if (HasOwnTransfer(*record)) {
-    json["color_map"] = Json::parse(FormatParaViewColorMap(std::get<TransferFunction>(record->request.transfer.choice), record->source));
-  }
+  const auto map = [&](const TransferFunction& transfer) { return Json::parse(FormatParaViewColorMap(transfer, record->source)); };
+  if (const auto* own = OwnTransfer(record->request.transfer)) json["color_map"] = map(*own);
+  if (const auto* overlay = OverlayTransfer(*record)) json["overlay_map"] = map(*overlay);
   return json;
 }
 

@@ -36,8 +36,8 @@ std::string RecordText(const std::string& source, const FrameRequest& request, c
 // InvalidArgument, one line: what is wrong with the text.
 Result<PictureRecord> ParseRecord(std::string_view text);
 
-// The file that a command line names for a transfer function of the record, whose own file may be gone.
-inline constexpr char kColorMapFile[] = "color-map.json";
+// The files that a command line names for transfer functions of the record, whose own files may be gone.
+inline constexpr char kColorMapFile[] = "color-map.json", kOverlayMapFile[] = "overlay-map.json";
 
 // The command line that makes the picture again as `output`: "render", SOURCE, and each option whose value is not its default. --local if
 // SOURCE is the name of a file.

@@ -94,11 +94,15 @@ inline void Read(const v1::LabelLook& in, LabelLook& out, Checker& check) {
   const int count = check.Count("opacities", in.opacities_size(), kMaxLabels);
   if (in.colors_size() != 3 * count) return check.Fail("colors", "not three for each label");
   if (in.shown_size() != count) return check.Fail("shown", "not one for each label");
-  const auto between = [&](std::string_view field, float value) { return float(check.Between(field, double(value), 0, 1)); };
+  const auto share = [&](std::string_view field, const Repeated<float>& values, int i) {
+    const auto scope = check.In(field, std::size_t(i));
+    return float(check.Between("", double(values[i]), 0, 1));
+  };
   for (int i = 0; i < count; ++i) {
     LabelLook::Entry& entry = out.entries.emplace_back();
-    entry.color = {between("colors", in.colors(3 * i)), between("colors", in.colors(3 * i + 1)), between("colors", in.colors(3 * i + 2))};
-    entry.opacity = between("opacities", in.opacities(i));
+    const auto channel = [&](int c) { return share("colors", in.colors(), 3 * i + c); };
+    entry.color = {channel(0), channel(1), channel(2)};
+    entry.opacity = share("opacities", in.opacities(), i);
     entry.shown = in.shown(i);
   }
 }

@@ -125,18 +125,13 @@ void Fields(auto& io, Is<VolumeDescription> auto& m) {
 }
 
 inline void Write(const LayerTypes& in, v1::LayerTypes& out) {
-  const auto type = [](const std::optional<ScalarType>& of) {
-    return of ? static_cast<v1::ScalarType>(static_cast<int>(*of)) : v1::ScalarType{};
-  };
-  out.set_labels(type(in.labels));
-  out.set_overlay(type(in.overlay));
+  if (in.labels) out.set_label_bytes(std::uint32_t(BytesPerSample(*in.labels)));
+  out.set_overlay(in.overlay.has_value());
 }
 inline void Read(const v1::LayerTypes& in, LayerTypes& out, Checker& check) {
-  if (in.labels() != 0) out.labels = check.OneOf("labels", in.labels(), ScalarType::kUint8, ScalarType::kUint16);
-  if (in.overlay() != 0) {
-    check.That(in.overlay() == v1::SCALAR_TYPE_FLOAT32, "overlay", "not of type float32");
-    out.overlay = ScalarType::kFloat32;
-  }
+  const std::uint32_t label_bytes = check.Range("label_bytes", in.label_bytes(), 0, 2);
+  if (label_bytes > 0) out.labels = label_bytes == 1 ? ScalarType::kUint8 : ScalarType::kUint16;
+  if (in.overlay()) out.overlay = ScalarType::kFloat32;
 }
 
 // ---- Status, GroupKey

@@ -176,7 +176,8 @@ TEST(FieldChecks, Chunks) {
       {[](auto& e) { e.mutable_chunk_request()->clear_box(); }, "ChunkRequest.box: an empty box"},
       {[](auto& e) { e.mutable_chunk_request()->mutable_box()->mutable_end()->set_x(65536); },
        "ChunkRequest.box.end.x: 65536 is not in [0, 65535]"},
-      {[](auto& e) { e.mutable_chunk_request()->set_chunk(1); }, "ChunkRequest.chunk: 1 is not in [0, 0]"},
+      {[](auto& e) { e.mutable_chunk_request()->set_chunk(3); },
+       "ChunkRequest.chunk: 3 is not in [0, 2]"},  // a voxel has at most three samples
   });
   Check<Chunk>({
       {[](auto& e) { e.mutable_chunk()->set_raw_bytes(0); }, "Chunk.raw_bytes: 0 is not in [1, 1048576]"},

@@ -113,7 +113,8 @@ TEST(Malformed, NoNumberMayBeNanOrInfinite) {
             return true;
           }
           if (place.field->cpp_type() == FieldDescriptor::CPPTYPE_FLOAT) {
-            reflection.SetFloat(place.message, place.field, float(bad));
+            place.index < 0 ? reflection.SetFloat(place.message, place.field, float(bad))
+                            : reflection.SetRepeatedFloat(place.message, place.field, place.index, float(bad));
             return true;
           }
           return false;
