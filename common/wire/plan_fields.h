@@ -79,32 +79,24 @@ void Fields(auto& io, Is<ClipRegion> auto& m) {
   io.OneOf("mode", m.mode, &P::mode, &P::set_mode, ClipMode::kKeep, ClipMode::kCutAway);
 }
 
-inline void Write(const LabelLook& in, v1::LabelLook& out) {
-  out.set_mode(static_cast<v1::LabelMode>(static_cast<int>(in.mode)));
-  out.set_tint(in.tint);
-  for (const auto& [color, opacity, shown] : in.entries) {
-    for (const float channel : {color.r, color.g, color.b}) out.add_colors(channel);
-    out.add_opacities(opacity);
-    out.add_shown(shown);
-  }
+void Fields(auto& io, Is<LabelLook::Entry> auto& m) {
+  using P = v1::LabelEntry;
+  io.Finite("r", m.color.r, &P::r, &P::set_r);
+  io.Finite("g", m.color.g, &P::g, &P::set_g);
+  io.Finite("b", m.color.b, &P::b, &P::set_b);
+  io.Finite("opacity", m.opacity, &P::opacity, &P::set_opacity);
+  io.Any(m.shown, &P::shown, &P::set_shown);
+  io.Check([&](Checker& check) {
+    const auto& [r, g, b] = m.color;
+    for (const float share : {r, g, b, m.opacity}) check.That(share >= 0 && share <= 1, "", "a colour or an opacity that is not in [0, 1]");
+  });
 }
-inline void Read(const v1::LabelLook& in, LabelLook& out, Checker& check) {
-  out.mode = check.OneOf("mode", in.mode(), LabelMode::kTint, LabelMode::kSurface);
-  out.tint = check.Between("tint", in.tint(), 0, 1);
-  const int count = check.Count("opacities", in.opacities_size(), kMaxLabels);
-  if (in.colors_size() != 3 * count) return check.Fail("colors", "not three for each label");
-  if (in.shown_size() != count) return check.Fail("shown", "not one for each label");
-  const auto share = [&](std::string_view field, const Repeated<float>& values, int i) {
-    const auto scope = check.In(field, std::size_t(i));
-    return float(check.Between("", double(values[i]), 0, 1));
-  };
-  for (int i = 0; i < count; ++i) {
-    LabelLook::Entry& entry = out.entries.emplace_back();
-    const auto channel = [&](int c) { return share("colors", in.colors(), 3 * i + c); };
-    entry.color = {channel(0), channel(1), channel(2)};
-    entry.opacity = share("opacities", in.opacities(), i);
-    entry.shown = in.shown(i);
-  }
+
+void Fields(auto& io, Is<LabelLook> auto& m) {
+  using P = v1::LabelLook;
+  io.OneOf("mode", m.mode, &P::mode, &P::set_mode, LabelMode::kTint, LabelMode::kSurface);
+  io.Between("tint", m.tint, &P::tint, &P::set_tint, 0, 1);
+  io.Messages("entries", m.entries, &P::entries, &P::mutable_entries, kMaxLabels);
 }
 
 void Fields(auto& io, Is<OverlayLook> auto& m) {
@@ -196,7 +188,7 @@ inline void Read(const v1::FrameSetup& in, FrameSetup& out, Checker& check) {
   }
   if (out.looks.labels) check.That(out.layers.labels.has_value(), "labels", "of a dataset without labels");
   if (out.looks.overlay) check.That(out.layers.overlay.has_value(), "overlay", "of a dataset without an overlay");
-  if (out.looks.any()) check.That(out.renderer->shows_layers(), "renderer", "one that shows no layers");
+  if (check.ok() && out.looks.any()) check.That(out.renderer->shows_layers(), "renderer", "one that shows no layers");
   if (check.ok() && out.looks.overlay) {
     const TransferFunction& transfer = out.looks.overlay->transfer;
     check.That(transfer.isosurfaces.empty() && transfer.gradient_opacities.empty(), "overlay.transfer", "not of curves over values alone");

@@ -113,8 +113,7 @@ TEST(Malformed, NoNumberMayBeNanOrInfinite) {
             return true;
           }
           if (place.field->cpp_type() == FieldDescriptor::CPPTYPE_FLOAT) {
-            place.index < 0 ? reflection.SetFloat(place.message, place.field, float(bad))
-                            : reflection.SetRepeatedFloat(place.message, place.field, place.index, float(bad));
+            reflection.SetFloat(place.message, place.field, float(bad));
             return true;
           }
           return false;
@@ -194,6 +193,8 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       {"isosurfaces", kMaxIsosurfaces},
       {"gradient_opacities", kMaxTransferPoints},
       {"sides", kMaxClipSides},
+      {"shown", kMaxLabelRanges},
+      {"entries", kMaxLabels},
       {"parameters", kMaxParameters},
   };
   std::map<std::string, bool> seen;
@@ -223,7 +224,8 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       [&](const Place& place, const std::string& error) {
         EXPECT_THAT(error, StartsWith(place.path + ": " + std::to_string(limits.at(place.field->name()) + 1)));
       });
-  EXPECT_EQ(seen.size(), limits.size() + 7) << "reports are in four messages; parameters, datasets, isosurfaces and gradients in two";
+  EXPECT_EQ(seen.size(), limits.size() + 8)
+      << "reports are in four messages; parameters, datasets, isosurfaces, gradients and opacities in two";
 }
 
 TEST(Malformed, MissingFieldsAreNoCrash) {
