@@ -328,7 +328,8 @@ void AddScalarRange(CLI::App& app, TransferChoice& transfer) {
   AddParsed(
       app, "--scalar-range", transfer.scalar_range,
       [](const std::string& option, const std::string& text) { return ParseScalarRange(option, text); },
-      "Stretch the transfer function over these data values (default: those of the function itself)")
+      "Stretch the transfer function over these data values, or with % over these percentiles of the values above the background, as in "
+      "2%:98% (default: those of the function itself)")
       ->type_name("LOW:HIGH");
 }
 

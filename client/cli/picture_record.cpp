@@ -129,7 +129,11 @@ void AddTransfer(OptionList& out, const TransferChoice& transfer) {
   const auto* preset = std::get_if<std::string>(&choice);
   out.Name("--transfer", preset != nullptr ? *preset : kColorMapFile,
            isosurfaces.empty() ? std::get<std::string>(usual.choice) : std::string(kNoTransfer));
-  if (scalar_range) out.Add("--scalar-range", fmt::format("{}:{}", scalar_range->min, scalar_range->max));
+  if (scalar_range) {
+    const auto& [min, max, percentiles] = *scalar_range;
+    const std::string_view unit = percentiles ? "%" : "";
+    out.Add("--scalar-range", fmt::format("{}{}:{}{}", min, unit, max, unit));
+  }
   out.Number("--opacity-distance", opacity_distance, usual.opacity_distance);
   std::string list;
   for (const auto& [value, color, opacity] : isosurfaces) {

@@ -95,13 +95,21 @@ Result<Vec3> ParseDirection(std::string_view option, std::string_view text) {
 }
 
 Result<ScalarRange> ParseScalarRange(std::string_view option, std::string_view text) {
-  const std::vector<std::string_view> ends = Split(text, ':');
-  if (ends.size() != 2) return Status::InvalidArgument(fmt::format("{} '{}' is not LOW:HIGH", option, text));
-  const Result<double> low = ParseNumber(option, ends[0], {-kMaxScalar, kMaxScalar});
-  if (!low.ok()) return low.status();
-  const Result<double> high = ParseNumber(option, ends[1], {-kMaxScalar, kMaxScalar});
-  if (!high.ok()) return high.status();
-  if (*low < *high) return ScalarRange{*low, *high};
+  std::vector<std::string_view> ends = Split(text, ':');
+  const auto is_percentile = [](std::string_view end) { return end.ends_with('%'); };
+  if (ends.size() != 2 || is_percentile(ends[0]) != is_percentile(ends[1])) {
+    return Status::InvalidArgument(fmt::format("{} '{}' is neither LOW:HIGH nor LOW%:HIGH%", option, text));
+  }
+  ScalarRange range;
+  range.percentiles = is_percentile(ends[0]);
+  const NumberRange limits = range.percentiles ? NumberRange{0, 100} : NumberRange{-kMaxScalar, kMaxScalar};
+  for (std::string_view& end : ends) {
+    if (range.percentiles) end.remove_suffix(1);
+    const Result<double> value = ParseNumber(option, end, limits);
+    if (!value.ok()) return value.status();
+    (&end == &ends[0] ? range.min : range.max) = *value;
+  }
+  if (range.min < range.max) return range;
   return Status::InvalidArgument(fmt::format("{} '{}' must rise", option, text));
 }
 

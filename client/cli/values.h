@@ -22,7 +22,7 @@ Result<Vec3> ParsePoint(std::string_view option, std::string_view text);
 // The same, and not all zero.
 Result<Vec3> ParseDirection(std::string_view option, std::string_view text);
 
-// "LOW:HIGH", which rise, in [-kMaxScalar, kMaxScalar].
+// "LOW:HIGH", which rise, in [-kMaxScalar, kMaxScalar]; or "LOW%:HIGH%", percentiles.
 Result<ScalarRange> ParseScalarRange(std::string_view option, std::string_view text);
 
 // "X0:X1,Y0:Y1,Z0:Z1", with "v" behind it in voxels, with "%" in percent of the volume's sides. A bound may be left out: it does not clip.

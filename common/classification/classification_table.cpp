@@ -60,7 +60,8 @@ float StoredIsovalue(double value, const ValueMapping& mapping) {
   if (mapping.scale == 0) return std::numeric_limits<float>::infinity();  // every sample has the same value
   const double stored = (value - mapping.offset) / mapping.scale;
   constexpr double kMost = std::numeric_limits<float>::max();
-  return std::abs(stored) <= kMost ? float(stored) : float(std::copysign(std::numeric_limits<double>::infinity(), stored));
+  if (!(std::abs(stored) <= kMost)) return float(std::copysign(std::numeric_limits<double>::infinity(), stored));
+  return float(stored - std::abs(stored) * 0x1p-20);
 }
 
 float MaxOpacity(const ClassificationTable& table, const VolumeDescription& description, ValueRange values) {

@@ -32,7 +32,8 @@ struct ClassificationTable {
   }
 };
 
-// An isovalue among stored samples, in their precision. It may be infinite: then no surface has it.
+// An isovalue among stored samples, in their precision. It is less by 2^-20 of itself: where all voxels have the value, rounding must not
+// move interpolated samples below it. It may be infinite: then no surface has it.
 float StoredIsovalue(double value, const ValueMapping& mapping);
 
 // `range` is in data values and comes from the volume's summary, so that all workers build the same table.

@@ -228,6 +228,12 @@ const std::vector<TransferPreset>& TransferPresets() {
   return presets;
 }
 
+ScalarRange InDataValues(const ScalarRange& range, const VolumeSummary& summary) {
+  if (!range.percentiles) return range;
+  const MaterialBins material = Material(summary);
+  return {Quantile(summary, material, range.min / 100), Quantile(summary, material, range.max / 100)};
+}
+
 Result<TransferFunction> MakePreset(std::string_view name, const VolumeSummary& summary) {
   if (const TransferPreset* preset = FindNamed(TransferPresets(), name)) return preset->make(summary);
   return Status::NotFound(fmt::format("no transfer function is named '{}', there are {}", name, NamesOf(TransferPresets())));

@@ -73,11 +73,14 @@ struct TransferFunction {
 };
 
 struct ScalarRange {
-  double min = 0, max = 1;  // data values
+  double min = 0, max = 1;   // data values, or
+  bool percentiles = false;  // percentiles, [0, 100], of a volume's values above its background (FindForeground)
   friend bool operator==(const ScalarRange&, const ScalarRange&) = default;
 };
-// The same curves, moved and stretched so that their points lie between range.min (the least one) and range.max (the greatest). min < max,
-// both finite. A function whose points all have one value puts them at range.min.
+// The range in data values.
+ScalarRange InDataValues(const ScalarRange& range, const VolumeSummary& summary);
+// The same curves, moved and stretched so that their points lie between range.min (the least one) and range.max (the greatest): data
+// values, finite, min <= max. A function whose points all have one value puts them at range.min.
 TransferFunction Stretched(TransferFunction transfer, const ScalarRange& range);
 
 // InvalidArgument naming the point, the value and the limit, unless everything stated above holds.

@@ -62,7 +62,7 @@ Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const Vol
   transfer->opacity_distance = choice.opacity_distance;
   transfer->isosurfaces = choice.isosurfaces;
   transfer->gradient_opacities = choice.gradient_opacities;
-  if (choice.scalar_range) return Stretched(*std::move(transfer), *choice.scalar_range);
+  if (choice.scalar_range) return Stretched(*std::move(transfer), InDataValues(*choice.scalar_range, summary));
   return transfer;
 }
 

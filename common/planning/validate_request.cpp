@@ -25,8 +25,9 @@ Status Validate(const TransferChoice& transfer) {
     return s;
   }
   if (const auto& range = transfer.scalar_range) {
-    if (Status s = InRange("transfer.scalar_range.min", range->min, -kMaxScalar, kMaxScalar); !s.ok()) return s;
-    if (Status s = InRange("transfer.scalar_range.max", range->max, -kMaxScalar, kMaxScalar); !s.ok()) return s;
+    const double least = range->percentiles ? 0 : -kMaxScalar, most = range->percentiles ? 100 : kMaxScalar;
+    if (Status s = InRange("transfer.scalar_range.min", range->min, least, most); !s.ok()) return s;
+    if (Status s = InRange("transfer.scalar_range.max", range->max, least, most); !s.ok()) return s;
     if (!(range->min < range->max)) {
       return Status::InvalidArgument(fmt::format("transfer.scalar_range is {:g} to {:g}, but must rise", range->min, range->max));
     }

@@ -130,6 +130,7 @@ void Fields(auto& io, Is<ScalarRange> auto& m) {
   using P = v1::ScalarRange;
   io.Finite("min", m.min, &P::min, &P::set_min);
   io.Finite("max", m.max, &P::max, &P::set_max);
+  io.Any(m.percentiles, &P::percentiles, &P::set_percentiles);
 }
 
 void Fields(auto& io, Is<TransferChoice> auto& m) {  // all but choice and scalar_range

@@ -86,7 +86,10 @@ Json TransferJson(const TransferChoice& transfer) {
     json["function"] = DigestText(FunctionJson(std::get<TransferFunction>(choice)).dump());
   }
   json["opacity_distance"] = opacity_distance;
-  if (scalar_range) json["scalar_range"] = Json::array({scalar_range->min, scalar_range->max});
+  if (scalar_range) {
+    const auto& [min, max, percentiles] = *scalar_range;
+    json[percentiles ? "scalar_percentiles" : "scalar_range"] = Json::array({min, max});
+  }
   AddSurfaces(isosurfaces, gradient_opacities, json);
   return json;
 }

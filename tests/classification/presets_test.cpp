@@ -100,6 +100,21 @@ TEST(Presets, ForAWholeHeadShowTheBrainThroughTheSkin) {
   EXPECT_LT(std::pow(1 - OpacityAt(transfer, kBrain), 20), 0.5) << "the brain hides what is behind it";
 }
 
+TEST(InDataValues, TakesPercentilesOfTheMaterial) {
+  Random random(11);
+  SCOPED_TRACE(random.trace());
+  const VolumeSummary summary = Summarize(NoisyHead(random, ScalarType::kUint8));  // air 5, tissue 90, a small core of 200
+  const auto range = [&](double low, double high) { return InDataValues({low, high, true}, summary); };
+  EXPECT_NEAR(range(5, 95).min, 90, 6) << "air does not count";
+  EXPECT_NEAR(range(5, 90).max, 90, 6);
+  EXPECT_NEAR(range(5, 99.5).max, 200, 6);
+  EXPECT_LT(range(0, 100).min, range(50, 100).min);
+  EXPECT_EQ(InDataValues({3, 7}, summary), (ScalarRange{3, 7})) << "data values stay";
+  const TransferFunction ramp = Stretched(MakePreset("gray-ramp", summary).value(), range(5, 90));
+  EXPECT_GT(OpacityAt(ramp, 97), 0.99);
+  EXPECT_LT(OpacityAt(ramp, 60), 0.01);
+}
+
 TEST(AutoPreset, ShowsWhatLiesBelowTheBackgroundToo) {
   // Swirls of both signs in still air, and a block of low values in a high background.
   const Volume swirls = MakeTestVolume({32, 32, 32}, ScalarType::kFloat32,

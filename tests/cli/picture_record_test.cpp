@@ -72,6 +72,7 @@ const std::vector<std::vector<std::string>> kOptions = {
     {"--renderer", "zbuffer", "--shading", "depth-gradient"},
     {"--transfer", "opaque", "--opacity-distance", "0.25"},
     {"--scalar-range", "0.1:1e30"},
+    {"--scalar-range", "0.30000000000000004%:98%"},
     {"--renderer", "raycast", "--isovalue", "300:#804020:0.1,-120.5:1,0.9,0.8,1e30"},
     {"--renderer", "zbuffer", "--isovalue=-5,7:white", "--transfer", "auto"},
     {"--renderer", "raycast", "--gradient-opacity", "0:0,0.1:0.30000000000000004,1e9:1", "--transfer", "none"},

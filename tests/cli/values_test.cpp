@@ -13,7 +13,9 @@ using testing::HasSubstr;
 
 TEST(ParseScalarRange, TakesTwoValuesThatRise) {
   EXPECT_EQ(*ParseScalarRange("--scalar-range", "-1000:2.5e3"), (ScalarRange{-1000, 2500}));
-  for (const char* text : {"", "1", ":", "1:", "2:1", "1:1", "1:2:3", "nan:1", "0:inf", "a:b"}) {
+  EXPECT_EQ(*ParseScalarRange("--scalar-range", "0%:99.5%"), (ScalarRange{0, 99.5, true}));
+  for (const char* text : {"", "1", ":", "1:", "2:1", "1:1", "1:2:3", "nan:1", "0:inf", "a:b", "%:%", "1%:2", "1:2%", "2%:1%", "-1%:5%",
+                           "1%:101%", "1%%:5%"}) {
     EXPECT_EQ(ParseScalarRange("--scalar-range", text).status().code(), StatusCode::kInvalidArgument) << text;
   }
 }

@@ -38,6 +38,10 @@ Changes<TransferChoice> ChangesOfTransfer() {
        [](auto& t) {
          t.scalar_range = ScalarRange{1, 2};
        }},
+      {"percentiles",
+       [](auto& t) {
+         t.scalar_range = ScalarRange{1, 2, true};
+       }},
       {"greatest scalar",
        [](auto& t) {
          t.scalar_range = ScalarRange{1, 3};

@@ -237,6 +237,35 @@ TEST(DrawnTable, HoldsWhatTheRendererDraws) {
   }
 }
 
+// Isosurfaces pass only where there is a voxel of at least the isovalue.
+TEST(DrawnTable, HoldsTheVoxelsAboveAnIsovalue) {
+  const VolumeSummary summary = FullSummary({16, 16, 16});
+  TransferFunction transfer{{{0, {1, 1, 1}}}, {{0, 0}}};
+  transfer.isosurfaces = {{99.6, {1, 0, 0}, 0.1}, {200, {0, 1, 0}, 1}};
+  for (const RendererKind* renderer : {ZBuffer(), FindRenderer("raycast")}) {
+    const ClassificationTable drawn = renderer->DrawnTable(transfer, summary);
+    for (int bin = 0; bin < drawn.size(); ++bin) EXPECT_EQ(drawn.opacity[std::size_t(bin)] > 0, bin >= 100) << renderer->name() << bin;
+  }
+  const ClassificationTable zbuffer = ZBuffer()->Table(transfer, summary.description, summary.range);
+  EXPECT_EQ(zbuffer.color[199], (Rgb{1, 0, 0}));
+  EXPECT_EQ(zbuffer.color[200], (Rgb{0, 1, 0}));
+}
+
+TEST(AnalyticCost, OfSurfacesAloneIsThatOfTheCellsTheyPassThrough) {
+  const VolumeSummary summary = FullSummary({16, 16, 16});
+  TransferFunction transfer{{{0, {1, 1, 1}}}, {{0, 0}}};
+  transfer.isosurfaces = {{100, {1, 0, 0}, 1}};
+  OccupancyGrid grid = EmptyGrid({16, 16, 16});
+  for (std::size_t i = 0; i < 4; ++i) grid.cells[i] = FullCell({{0, 0, 0}, {8, 8, 8}});  // z < 8
+  const auto raycast = FindRenderer("raycast")->MakeCost({&grid, &summary, &transfer});
+  const Box lower{{0, 0, 0}, {16, 16, 8}}, upper{{0, 0, 8}, {16, 16, 16}};
+  const double full = Of(*raycast, lower)[0];
+  EXPECT_GT(full, 0) << "rays leap through it, and boxes are cut before voxels are counted";
+  EXPECT_EQ(Of(*raycast, upper)[0], 0);
+  for (std::size_t i = 0; i < 4; ++i) grid.cells[i].voxels -= 1;
+  EXPECT_GT(Of(*raycast, lower)[0], full);
+}
+
 // By what is predicted of the layout's boxes, each with a slot of its own: a frame on average over views, and how uneven the worse view is.
 struct Predicted {
   double frame = 0, imbalance = 0;

@@ -250,6 +250,37 @@ TEST(Isosurfaces, DoNotDependOnTheSamplingRate) {
   }
 }
 
+// The surface of a solid is found where interpolation reaches its value, in spite of rounding.
+TEST(Isosurfaces, AtTheValueOfASolidHaveNoHoles) {
+  std::mt19937 random(kSeed);
+  const Volume volume = MakeVolume({{40, 40, 40}, {1, 1, 1}}, ScalarType::kUint8, [](const Index3& v) {
+    return Length(ToVec3(v) - Vec3{19.5, 19.5, 19.5}) < 15 ? 213 : 0;
+  });
+  for (const Projection projection : kProjections) {
+    for (int view = 0; view < 4; ++view) {
+      SetupOptions options = RaycastOptions(projection, random);
+      if (view == 3) options.view = {.projection = projection};
+      options.transfer = Surfaces({{213, kRed, 0.3}});
+      const FrameSetup setup = MakeSetup(volume, options);
+      const LocalImage image = Raycast(volume, options);
+      int seen = 0;
+      for (int y = 0; y < setup.camera.height; ++y) {
+        for (int x = 0; x < setup.camera.width; ++x) {
+          const PixelLine line(setup, x, y);
+          const Vec3 along = Normalized(line.ray.direction), to_centre = Vec3{19.5, 19.5, 19.5} - line.ray.origin;
+          if (Length(to_centre - Dot(to_centre, along) * along) > 12) continue;
+          ++seen;
+          // What goes in comes out; the solid has steps, so a ray may go in twice.
+          const double crossings = std::log1p(-double(PixelOf(image, x, y)[3])) / std::log1p(-0.3), pairs = std::round(crossings / 2);
+          ASSERT_NEAR(crossings, 2 * pairs, 1e-3) << "seed " << kSeed << " view " << view << " pixel " << x << ' ' << y;
+          ASSERT_GE(pairs, 1) << "seed " << kSeed << " view " << view << " pixel " << x << ' ' << y;
+        }
+      }
+      EXPECT_GT(seen, 200);
+    }
+  }
+}
+
 // What lies behind an opaque surface is not sampled.
 TEST(Isosurfaces, OpaqueOnesEndRays) {
   std::mt19937 random(kSeed);

@@ -17,9 +17,9 @@ using namespace slabstream::testing;  // NOLINT(google-build-using-namespace): t
 enum class Mode { kMaximum, kMinimum, kMean };
 
 struct Scene {
-  Scene(const Volume& volume, const Box& box, const Camera& view, double rate, Mode mode)
+  Scene(const Volume& volume, const Box& box, const Camera& view, double rate, Mode mode, const ClipRegion& clip = {})
       : camera(view),
-        rays(MakeViewRays(camera, volume.description.geometry, rate)),
+        rays(MakeViewRays(camera, volume.description.geometry, rate, clip)),
         padded(Pad(VoxelBricks(volume.block), Grown(box, 3, volume.block.box))),
         cells(FindCellRanges(padded)),
         ray_box(MakeRayBox(padded, cells.counts, box, WholeBox(box), rays, camera)),
@@ -61,8 +61,12 @@ TEST(ProjectTile, IsTheReferenceBitForBit) {
     view.zoom *= i % 5 == 0 ? 4 : 1;
     const Camera camera = MakeCamera(view, {45, 38}, volume.description.geometry);
     const Box box = i % 4 == 0 ? volume.block.box : RandomBox(random, volume.block.box);
+    // One in two is clipped.
+    Clipping clipping = i / 3 % 2 == 0 ? Clipping{} : RandomClipping(volume.description.geometry, views);
+    clipping.mode = i / 6 % 2 == 0 ? ClipMode::kKeep : ClipMode::kCutAway;
+    const ClipRegion clip = MakeClipRegion(clipping, volume.description.geometry);
     for (const Mode mode : {Mode::kMaximum, Mode::kMinimum, Mode::kMean}) {
-      const Scene scene(volume, box, camera, i % 4 == 1 ? 2.5 : 1, mode);
+      const Scene scene(volume, box, camera, i % 4 == 1 ? 2.5 : 1, mode, clip);
       const LocalImage expected = scene.Projected(true);
       ForEachTarget([&] { EXPECT_TRUE(scene.Projected().rgba == expected.rgba) << "case " << i << " mode " << int(mode); });
     }

@@ -89,6 +89,38 @@ TEST_P(PoliciesTest, NeverChangeThePicture) {
   }
 }
 
+// Boxes with a surface are rendered, whatever says where boxes are.
+TEST_P(PoliciesTest, NeverChangeIsosurfaces) {
+  const std::shared_ptr<const Volume> volume = SparseVolume();
+  EmbeddedOptions options;
+  options.workers = GetParam();
+  options.worker.threads = 1;
+  options.coordinator.catalogue["ball"] = [volume]() -> Result<std::shared_ptr<const Volume>> { return volume; };
+  Context context;
+  const auto service = EmbeddedService::Start(context, options);
+  ASSERT_TRUE(service.ok()) << service.status().message();
+  Client client = Client::Connect(context, (*service)->endpoint()).value();
+  for (const RendererKind* renderer : Renderers()) {
+    if (!renderer->isosurfaces()) continue;
+    FrameRequest request = TestRequest(renderer, 120, 1);
+    request.transfer.choice = std::string(kNoTransfer);
+    request.transfer.isosurfaces = {{100, {1, 0.5F, 0.2F}, 0.5}};
+    const LocalImage expected = RenderDirectly(request, *volume);
+    ASSERT_GT(HighestAlpha(expected), 0.4F);
+    for (const std::string_view decomposition : WithAutomatic(Decompositions())) {
+      for (const auto& metric : LoadMetrics()) {
+        request.policy.decomposition = decomposition;
+        request.policy.load_metric = metric.name;
+        SCOPED_TRACE(testing::Message() << GetParam() << " workers, renderer " << renderer->name() << ", " << decomposition << ", "
+                                        << metric.name);
+        const Result<Picture> picture = client.Render(request, std::chrono::seconds(60));
+        ASSERT_TRUE(picture.ok()) << picture.status().message();
+        EXPECT_LE(LargestDifference(picture->image, expected, request.size), AllowedDifference(request));
+      }
+    }
+  }
+}
+
 // Over a scheme that sends a rank's pixels at once and one that sends them in parts: the same pixels, in more runs.
 TEST(PoliciesStatistics, CountTheBytesOfEveryMessage) {
   const std::shared_ptr<const Volume> volume = SparseVolume();

@@ -275,6 +275,7 @@ std::vector<SubmitFrame> SamplesOf() {
   sliced.clipping.slab = ClipSlab{.through = Vec3{1, -2, 3e8}};
   FrameRequest surfaces = Request();
   surfaces.renderer = "raycast";
+  surfaces.transfer.scalar_range = ScalarRange{0, 100, true};
   surfaces.transfer.isosurfaces = ManySurfaces();
   surfaces.transfer.gradient_opacities = {{1e-3, 0.5}, {7, 0}};
   FrameRequest layers = Request();

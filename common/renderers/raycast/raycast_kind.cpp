@@ -16,14 +16,14 @@ double Extinction(const CostBasis& basis) {
   return -std::log1p(-std::min(double(table.max_opacity), 0.999)) / table.opacity_distance;
 }
 
-// The time of a box is that of the pixels that it covers and of their shaded samples. Of isosurfaces alone, samples are taken only in cells
-// that a surface passes through: those that are drawn in part.
+// The time of a box is that of the pixels that it covers and of their shaded samples. Of isosurfaces alone, voxels are read where a surface
+// passes through: in cells that are drawn in part. Rays leap through the others.
 class RaycastCost : public AnalyticCost {
  public:
   explicit RaycastCost(const CostBasis& basis) : drawn_(*basis.drawn), sampling_rate_(SamplingRateOf(basis.parameters)) {
     const double extinction = Extinction(basis);
     opaque_depth_ = kEnd / std::max(extinction, 1e-9);
-    surfaces_alone_ = !(extinction > 0);
+    surfaces_alone_ = !(extinction > 0) && !basis.transfer->isosurfaces.empty();
   }
 
   double Seconds(const Box& box, const CostView& view) const override {
@@ -41,8 +41,9 @@ class RaycastCost : public AnalyticCost {
           const std::uint32_t voxels = drawn_.cells[NumberIn(cells, cell)].voxels;
           if (!surfaces_alone_) {
             depth += along.ShareInside(cell[c]) * voxels / kCellArea;
-          } else if (voxels != 0 && voxels != OccupancyCellBox(cell, drawn_.size).voxel_count()) {
-            depth += along.ShareInside(cell[c]) * kOccupancyCell;
+          } else if (voxels != 0) {
+            const bool full = voxels == OccupancyCellBox(cell, drawn_.size).voxel_count();
+            depth += along.ShareInside(cell[c]) * (full ? 1 : kOccupancyCell);
           }
         }
         if (depth <= 0) continue;
