@@ -64,7 +64,7 @@ TEST(ProjectTile, IsTheReferenceBitForBit) {
     // One in two is clipped.
     Clipping clipping = i / 3 % 2 == 0 ? Clipping{} : RandomClipping(volume.description.geometry, views);
     clipping.mode = i / 6 % 2 == 0 ? ClipMode::kKeep : ClipMode::kCutAway;
-    const ClipRegion clip = MakeClipRegion(clipping, volume.description.geometry);
+    const ClipRegion clip = MakeClipRegion(clipping, volume.description.geometry).value();
     for (const Mode mode : {Mode::kMaximum, Mode::kMinimum, Mode::kMean}) {
       const Scene scene(volume, box, camera, i % 4 == 1 ? 2.5 : 1, mode, clip);
       const LocalImage expected = scene.Projected(true);

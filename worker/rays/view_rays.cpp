@@ -58,7 +58,7 @@ ViewRays MakeViewRays(const Camera& camera, const VolumeGeometry& geometry, doub
   rays.sample_count = std::int32_t(std::ceil(farthest / step) - first) + 1;
   rays.volume_end = ToFloat3(ToVec3(geometry.size) - Vec3{0.5, 0.5, 0.5});
   for (const HalfSpace& side : clip.sides) rays.clip.sides.push_back({ToFloat3(side.normal), float(side.offset)});
-  rays.clip.cut_away = clip.mode == ClipMode::kCutAway;
+  rays.clip.cut_away = clip.mode == ClipMode::kCutAway && !clip.empty();  // without sides nothing is clipped
   rays.clip.face_depth = float(kFaceDepth * Least(spacing));
   return rays;
 }
