@@ -34,7 +34,7 @@ struct VolumeGeometry {
   Orientation orientation = {};
 
   Box bounds() const { return {{0, 0, 0}, size}; }
-  Vec3 centre() const { return 0.5 * (ToVec3(size) - Vec3{1, 1, 1}); }  // data space
+  Vec3 centre() const { return 0.5 * (ToVec3(size) - Vec3{1, 1, 1}); }                                 // data space
   Vec3 ToWorld(const Vec3& p) const { return orientation.origin + orientation.ToWorld(spacing * p); }  // of a point of data space
   friend bool operator==(const VolumeGeometry&, const VolumeGeometry&) = default;
 };
