@@ -2,6 +2,8 @@
 // renderer, for any number of workers, in both projections, with boxes that change from frame to frame; and whatever the service chooses.
 #include <gtest/gtest.h>
 
+#include <memory>
+#include <optional>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -33,25 +35,33 @@ std::vector<std::string_view> WithAutomatic(const Entries& entries) {
   return names;
 }
 
-class PoliciesTest : public testing::TestWithParam<int> {};
+// A service of GetParam() workers.
+class PoliciesTest : public testing::TestWithParam<int> {
+ protected:
+  void SetUp() override {
+    EmbeddedOptions options;
+    options.workers = GetParam();
+    options.worker.threads = 1;
+    options.coordinator.catalogue["ball"] = [volume = volume_]() -> Result<std::shared_ptr<const Volume>> { return volume; };
+    auto service = EmbeddedService::Start(context_, options);
+    ASSERT_TRUE(service.ok()) << service.status().message();
+    service_ = *std::move(service);
+    client_.emplace(Client::Connect(context_, service_->endpoint()).value());
+  }
+
+  const std::shared_ptr<const Volume> volume_ = SparseVolume();
+  Context context_;
+  std::unique_ptr<EmbeddedService> service_;
+  std::optional<Client> client_;
+};
 
 TEST_P(PoliciesTest, NeverChangeThePicture) {
-  const std::shared_ptr<const Volume> volume = SparseVolume();
-  EmbeddedOptions options;
-  options.workers = GetParam();
-  options.worker.threads = 1;
-  options.coordinator.catalogue["ball"] = [volume]() -> Result<std::shared_ptr<const Volume>> { return volume; };
-  Context context;
-  const auto service = EmbeddedService::Start(context, options);
-  ASSERT_TRUE(service.ok()) << service.status().message();
-  Client client = Client::Connect(context, (*service)->endpoint()).value();
-
   std::size_t frame = 0;
   for (const RendererKind* renderer : Renderers()) {
     for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
       FrameRequest request = TestRequest(renderer, 120, 1);
       request.view.projection = projection;
-      const LocalImage expected = RenderDirectly(request, *volume);
+      const LocalImage expected = RenderDirectly(request, *volume_);
       ASSERT_GT(HighestAlpha(expected), ExpectedAlpha(request));
       for (const std::string_view decomposition : WithAutomatic(Decompositions())) {
         for (const std::string_view assignment : WithAutomatic(Assignments())) {
@@ -68,7 +78,7 @@ TEST_P(PoliciesTest, NeverChangeThePicture) {
                                           << ", " << request.policy.groups << " groups, " << request.policy.decomposition << ", "
                                           << request.policy.load_metric << ", " << request.policy.assignment << ", "
                                           << request.policy.balance << ", " << request.policy.combine);
-          const Result<Picture> picture = client.Render(request, std::chrono::seconds(60));
+          const Result<Picture> picture = client_->Render(request, std::chrono::seconds(60));
           ASSERT_TRUE(picture.ok()) << picture.status().message();
           EXPECT_LE(LargestDifference(picture->image, expected, request.size), AllowedDifference(request));
           const FrameStatistics& done = picture->statistics;
@@ -91,21 +101,12 @@ TEST_P(PoliciesTest, NeverChangeThePicture) {
 
 // Boxes with a surface are rendered, whatever says where boxes are.
 TEST_P(PoliciesTest, NeverChangeIsosurfaces) {
-  const std::shared_ptr<const Volume> volume = SparseVolume();
-  EmbeddedOptions options;
-  options.workers = GetParam();
-  options.worker.threads = 1;
-  options.coordinator.catalogue["ball"] = [volume]() -> Result<std::shared_ptr<const Volume>> { return volume; };
-  Context context;
-  const auto service = EmbeddedService::Start(context, options);
-  ASSERT_TRUE(service.ok()) << service.status().message();
-  Client client = Client::Connect(context, (*service)->endpoint()).value();
   for (const RendererKind* renderer : Renderers()) {
     if (!renderer->isosurfaces()) continue;
     FrameRequest request = TestRequest(renderer, 120, 1);
     request.transfer.choice = std::string(kNoTransfer);
     request.transfer.isosurfaces = {{100, {1, 0.5F, 0.2F}, 0.5}};
-    const LocalImage expected = RenderDirectly(request, *volume);
+    const LocalImage expected = RenderDirectly(request, *volume_);
     ASSERT_GT(HighestAlpha(expected), 0.4F);
     for (const std::string_view decomposition : WithAutomatic(Decompositions())) {
       for (const auto& metric : LoadMetrics()) {
@@ -113,7 +114,7 @@ TEST_P(PoliciesTest, NeverChangeIsosurfaces) {
         request.policy.load_metric = metric.name;
         SCOPED_TRACE(testing::Message() << GetParam() << " workers, renderer " << renderer->name() << ", " << decomposition << ", "
                                         << metric.name);
-        const Result<Picture> picture = client.Render(request, std::chrono::seconds(60));
+        const Result<Picture> picture = client_->Render(request, std::chrono::seconds(60));
         ASSERT_TRUE(picture.ok()) << picture.status().message();
         EXPECT_LE(LargestDifference(picture->image, expected, request.size), AllowedDifference(request));
       }
