@@ -153,7 +153,7 @@ class LocalService {
     const Result<std::string> path = ProgramBeside(program);
     if (!path.ok()) return path.status();
     arguments.insert(arguments.begin(), *path);
-    Result<Child> child = Child::Start({std::move(arguments), LogOf(number), options_.detach});
+    Result<Child> child = Child::Start({.command = std::move(arguments), .log_path = LogOf(number), .outlives_us = options_.detach});
     if (!child.ok()) return child.status();
     if (number == children_.size()) children_.emplace_back();
     children_[number].process.emplace(*std::move(child));
