@@ -147,7 +147,7 @@ void AddLayerOptions(CLI::App& app, FrameRequest& request, LayerFiles& files, bo
           })
       ->type_name("TRANSFER")
       ->default_str("auto");
-  AddText(app, "--overlay-range", "Stretch the overlay's transfer function over these data values",
+  AddText(app, "--overlay-range", "Stretch the overlay's transfer function, as --scalar-range",
           [&request](const std::string& option, const std::string& text) {
             const Result<ScalarRange> range = ParseScalarRange(option, text);
             if (range.ok()) Shown(request.overlay).transfer.scalar_range = *range;
@@ -187,9 +187,7 @@ std::vector<std::string> LayerArguments(const FrameRequest& request, const Layer
     const auto& [transfer, weight] = *request.overlay;
     const auto* preset = std::get_if<std::string>(&transfer.choice);
     add("--overlay-transfer", preset != nullptr ? *preset : kOverlayMapFile);
-    if (transfer.scalar_range) {
-      arguments.push_back(fmt::format("--overlay-range={}:{}", transfer.scalar_range->min, transfer.scalar_range->max));
-    }
+    if (transfer.scalar_range) arguments.push_back("--overlay-range=" + ScalarRangeText(*transfer.scalar_range));
     if (weight != 1) add("--overlay-weight", fmt::format("{}", weight));
   }
   return arguments;

@@ -9,6 +9,7 @@
 
 #include "client/cli/camera_json.h"
 #include "client/cli/layer_options.h"
+#include "client/cli/values.h"
 #include "common/base/version.h"
 #include "common/view/named_view.h"
 #include "common/volume_io/volume_reader.h"
@@ -129,11 +130,7 @@ void AddTransfer(OptionList& out, const TransferChoice& transfer) {
   const auto* preset = std::get_if<std::string>(&choice);
   out.Name("--transfer", preset != nullptr ? *preset : kColorMapFile,
            isosurfaces.empty() ? std::get<std::string>(usual.choice) : std::string(kNoTransfer));
-  if (scalar_range) {
-    const auto& [min, max, percentiles] = *scalar_range;
-    const std::string_view unit = percentiles ? "%" : "";
-    out.Add("--scalar-range", fmt::format("{}{}:{}{}", min, unit, max, unit));
-  }
+  if (scalar_range) out.Add("--scalar-range", ScalarRangeText(*scalar_range));
   out.Number("--opacity-distance", opacity_distance, usual.opacity_distance);
   std::string list;
   for (const auto& [value, color, opacity] : isosurfaces) {

@@ -113,6 +113,12 @@ Result<ScalarRange> ParseScalarRange(std::string_view option, std::string_view t
   return Status::InvalidArgument(fmt::format("{} '{}' must rise", option, text));
 }
 
+std::string ScalarRangeText(const ScalarRange& range) {
+  const auto& [min, max, percentiles] = range;
+  const std::string_view unit = percentiles ? "%" : "";
+  return fmt::format("{}{}:{}{}", min, unit, max, unit);
+}
+
 Result<ClipBox> ParseClipBox(std::string_view option, std::string_view text) {
   ClipBox box;
   std::string_view bounds = text;

@@ -24,6 +24,8 @@ Result<Vec3> ParseDirection(std::string_view option, std::string_view text);
 
 // "LOW:HIGH", which rise, in [-kMaxScalar, kMaxScalar]; or "LOW%:HIGH%", percentiles.
 Result<ScalarRange> ParseScalarRange(std::string_view option, std::string_view text);
+// The other way round.
+std::string ScalarRangeText(const ScalarRange& range);
 
 // "X0:X1,Y0:Y1,Z0:Z1", with "v" behind it in voxels, with "%" in percent of the volume's sides. A bound may be left out: it does not clip.
 Result<ClipBox> ParseClipBox(std::string_view option, std::string_view text);

@@ -82,6 +82,7 @@ const std::vector<std::vector<std::string>> kOptions = {
     {"--renderer", "raycast", "--label-tint", "0.1", "--overlay-transfer", "gray-ramp", "--overlay-range=-3:1e-3", "--overlay-weight",
      "0.5"},
     {"--renderer", "raycast", "--labels", "atlas.nii", "--overlay", "map.nii"},
+    {"--renderer", "raycast", "--overlay-range", "2%:98.5%"},
     {"--clip-box", ":,:,20:"},
     {"--clip-box=-1.5:0.1,5:6,0:1v", "--clip-mode", "cut-away"},
     {"--clip-box", "0:50,:,:%", "--clip-plane", "0.1,0,-1e-3,-7", "--clip-plane=-1,2,3,4e8"},
