@@ -100,8 +100,14 @@ std::vector<FrameRequest> ClusterTest::Frames() {
 std::vector<Result<Picture>> ClusterTest::Render(Client& client, const std::vector<FrameRequest>& requests,
                                                  const std::function<void()>& in_the_middle) {
   std::map<RequestId, std::size_t> open;
-  std::vector<Result<Picture>> pictures(requests.size(), Status::Internal("no end"));
-  for (std::size_t i = 0; i < requests.size(); ++i) open[client.Submit(requests[i], kFrameDeadline)] = i;
+  std::vector<Result<Picture>> pictures;
+  const auto submit = [&] {
+    for (const FrameRequest& request : requests) {
+      open[client.Submit(request, kFrameDeadline)] = pictures.size();
+      pictures.push_back(Status::Internal("no end"));
+    }
+  };
+  submit();
   bool called = !in_the_middle;
   while (!open.empty()) {
     std::optional<ClientEvent> event = client.Next(milliseconds(100));
@@ -110,6 +116,7 @@ std::vector<Result<Picture>> ClusterTest::Render(Client& client, const std::vect
       if (!called && progress->groups_done > 0) {
         called = true;
         in_the_middle();
+        submit();  // all of the first ones may be over by now
       }
       continue;
     }

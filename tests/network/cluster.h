@@ -36,8 +36,9 @@ class ClusterTest : public EndToEndTest {
 
   // The same picture, made in three ways that each take other voxels to the workers, in several groups.
   static std::vector<FrameRequest> Frames();
-  // Both clients ask for Frames(). Once the first group of the first client's is done, `disturb` is called. Every frame must end as the
-  // undisturbed picture, bit for bit. Returns the most attempts that a frame took.
+  // Both clients ask for Frames(). Once the first group of the first client's is done, `disturb` is called; then the first client asks for
+  // Frames() again, so that some begin on the disturbed network. Every frame must end as the undisturbed picture, bit for bit. Returns the
+  // most attempts that a frame took.
   std::uint32_t RenderThrough(const std::function<void()>& disturb);
   // There are `workers` workers, which are heard, and frames are as ever.
   void ExpectHealthy(int workers);
