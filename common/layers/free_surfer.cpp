@@ -17,11 +17,7 @@ Result<ColorTable> Read(std::string_view file) {
   ColorTable table;
   for (TableLines lines(file); lines.Next();) {
     if (lines.words().size() < kWords) return lines.Wrong("must be VALUE NAME RED GREEN BLUE TRANSPARENCY");
-    const Result<std::uint32_t> value = lines.Value(0);
-    if (!value.ok()) return value.status();
-    const Result<LabelColor> color = lines.Color(2, 255);
-    if (!color.ok()) return color.status();
-    if (Status added = lines.Add(table, *value, {*color, std::string(lines.words()[1])}); !added.ok()) return added;
+    if (Status added = lines.AddLabel(table, 2, 255, std::string(lines.words()[1])); !added.ok()) return added;
   }
   return table;
 }

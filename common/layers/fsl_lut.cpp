@@ -1,4 +1,4 @@
-// The .lut of FSLeyes: a line for each label, with its value, red, green and blue in [0, 1], and its name, which may be left out.
+// The .lut of FSLeyes: a line for each label, with its value, red, green and blue in [0, 1], and its name. The name may be left out.
 #include "common/layers/table_lines.h"
 
 namespace slabstream::fsl_lut {
@@ -19,11 +19,7 @@ Result<ColorTable> Read(std::string_view file) {
   ColorTable table;
   for (TableLines lines(file); lines.Next();) {
     if (lines.words().size() < kNumbers) return lines.Wrong("must be VALUE RED GREEN BLUE NAME");
-    const Result<std::uint32_t> value = lines.Value(0);
-    if (!value.ok()) return value.status();
-    const Result<LabelColor> color = lines.Color(1, 1);
-    if (!color.ok()) return color.status();
-    if (Status added = lines.Add(table, *value, {*color, lines.From(kNumbers)}); !added.ok()) return added;
+    if (Status added = lines.AddLabel(table, 1, 1, lines.From(kNumbers)); !added.ok()) return added;
   }
   return table;
 }

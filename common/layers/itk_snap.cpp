@@ -20,11 +20,7 @@ Result<ColorTable> Read(std::string_view file) {
   ColorTable table;
   for (TableLines lines(file); lines.Next();) {
     if (lines.words().size() <= kNumbers) return lines.Wrong("must be VALUE RED GREEN BLUE OPACITY VISIBLE MESH \"NAME\"");
-    const Result<std::uint32_t> value = lines.Value(0);
-    if (!value.ok()) return value.status();
-    const Result<LabelColor> color = lines.Color(1, 255);
-    if (!color.ok()) return color.status();
-    if (Status added = lines.Add(table, *value, {*color, lines.From(kNumbers)}); !added.ok()) return added;
+    if (Status added = lines.AddLabel(table, 1, 255, lines.From(kNumbers)); !added.ok()) return added;
   }
   return table;
 }

@@ -188,7 +188,7 @@ Status AddLabels(const LayerFiles& files, const VolumeGeometry& grid, Layers& la
   const Result<LoadedVolume> read = ReadVolume(source->path, source->options);
   if (!read.ok()) return read.status();
   if (read->info.straightened) {
-    return Status::InvalidArgument(source->path + ": its axes are not at right angles; values between labels are none");
+    return Status::InvalidArgument(source->path + ": its axes are not at right angles, and labels cannot be interpolated");
   }
   Result<Layers> made = LabelLayer(*read->volume, *colors, grid, source->path);
   if (!made.ok()) return made.status();

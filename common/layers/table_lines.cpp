@@ -63,8 +63,14 @@ Result<LabelColor> TableLines::Color(std::size_t first, float greatest) const {
   return color;
 }
 
-Status TableLines::Add(ColorTable& table, std::uint32_t value, ColorTable::Entry entry) const {
-  if (!table.entries.emplace(value, std::move(entry)).second) return Wrong(fmt::format("label {} is given before", value));
+Status TableLines::AddLabel(ColorTable& table, std::size_t color_word, float greatest, std::string name) const {
+  const Result<std::uint32_t> value = Value(0);
+  if (!value.ok()) return value.status();
+  const Result<LabelColor> color = Color(color_word, greatest);
+  if (!color.ok()) return color.status();
+  if (!table.entries.emplace(*value, ColorTable::Entry{*color, std::move(name)}).second) {
+    return Wrong(fmt::format("label {} is given before", *value));
+  }
   if (table.entries.size() > kMaxColorTableEntries) return Wrong(fmt::format("more than {} labels", kMaxColorTableEntries));
   return Status::Ok();
 }

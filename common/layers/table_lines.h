@@ -29,8 +29,9 @@ class TableLines {
   Result<std::uint32_t> Value(std::size_t word) const;
   // Of words `first` to `first` + 2, each in [0, greatest].
   Result<LabelColor> Color(std::size_t first, float greatest) const;
-  // InvalidArgument: there is one of this value already, or there are too many.
-  Status Add(ColorTable& table, std::uint32_t value, ColorTable::Entry entry) const;
+  // Adds the line's label: its value is the first word, its colour the three from `color_word` on, each in [0, greatest]. InvalidArgument:
+  // of Value or Color, or there is one of this value already, or there are too many.
+  Status AddLabel(ColorTable& table, std::size_t color_word, float greatest, std::string name) const;
 
  private:
   std::string_view rest_, line_;
