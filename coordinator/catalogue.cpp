@@ -185,6 +185,13 @@ void AwaitRest(const FileStamp& stamp) {
 
 }  // namespace
 
+const std::string* DataArgument::RelativePath() const {
+  for (const std::string* file : {&path, &layers.labels, &layers.label_colors, &layers.overlay}) {
+    if (!file->empty() && !file->starts_with('/')) return file;
+  }
+  return nullptr;
+}
+
 Result<DataArgument> ParseDataArgument(const std::string& argument) {
   const std::size_t equals = argument.find('=');
   DataArgument parsed;

@@ -33,6 +33,9 @@ struct DataArgument {
   std::string name;  // empty: `path` is a folder
   std::string path;  // of a named one: with its options
   LayerFiles layers = {};
+
+  // The first path that is not absolute, of the volume or of a layer. Null: all are.
+  const std::string* RelativePath() const;
 };
 // Looks at no file. InvalidArgument: a name that is empty, too long (kMaxNameBytes) or has other characters than letters, digits and
 // "._-"; a path that is empty or longer than kMaxPathBytes, of the volume or of a layer; a layer that is given twice, or one of a folder.

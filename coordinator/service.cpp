@@ -109,10 +109,7 @@ Result<FoundData> Find(const std::vector<std::string>& arguments) {
   for (const std::string& argument : arguments) {
     const Result<DataArgument> parsed = ParseDataArgument(argument);
     if (!parsed.ok()) return parsed.status();
-    for (const std::string& path : {parsed->path, parsed->layers.labels, parsed->layers.label_colors, parsed->layers.overlay}) {
-      if (path.empty() || path.starts_with('/')) continue;
-      return here(Status::InvalidArgument(argument + ": the path must be absolute"));
-    }
+    if (parsed->RelativePath() != nullptr) return here(Status::InvalidArgument(argument + ": the path must be absolute"));
   }
   FoundData found = FindData(arguments, "");
   CheckFiles(found);

@@ -22,10 +22,9 @@ Status CheckItem(DataAction action, const std::string& item) {
   }
   const Result<DataArgument> data = ParseDataArgument(item);
   if (!data.ok()) return data.status();
-  for (const std::string& path : {data->path, data->layers.labels, data->layers.label_colors, data->layers.overlay}) {
-    if (path.empty() || path.starts_with('/')) continue;
+  if (const std::string* path = data->RelativePath(); path != nullptr) {
     std::error_code error;
-    const std::string here = std::filesystem::absolute(path, error).lexically_normal().string();
+    const std::string here = std::filesystem::absolute(*path, error).lexically_normal().string();
     return Status::InvalidArgument(fmt::format(
         "{}: the path must be absolute, since it is a path on the coordinator's host; on this host it would be {}", item, here));
   }
