@@ -24,13 +24,10 @@ std::string InQuotes(const std::string& name) { return '"' + name + '"'; }
 Status FrameMachine::State::FindVolume(OpenRequest& request) const {
   const FrameRequest& frame = request.submit.frame;
   const DatasetTable::Entry& dataset = *datasets.Find(frame.dataset);
-  Result<TransferFunction> transfer = ResolveTransfer(frame.transfer, *dataset.summary);
-  if (!transfer.ok()) return transfer.status();
-  Result<ClipRegion> clip = MakeClipRegion(frame.clipping, dataset.summary->description.geometry);
-  if (!clip.ok()) return clip.status();
-  Result<LayerLooks> looks = ResolveLayers(frame, *dataset.summary);
-  if (!looks.ok()) return looks.status();
-  request.volume.emplace(dataset.id, *std::move(transfer), FindRenderer(frame.renderer), *std::move(clip), *std::move(looks));
+  Result<VolumeLook> look = ResolveLook(frame, *dataset.summary);
+  if (!look.ok()) return look.status();
+  request.volume.emplace(dataset.id, std::move(look->transfer), FindRenderer(frame.renderer), std::move(look->clip),
+                         std::move(look->layers));
   return Status::Ok();
 }
 

@@ -87,9 +87,14 @@ Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, cons
 // The function that a request names or holds, for this volume. NotFound: no such preset.
 Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const VolumeSummary& summary);
 
-// How the request shows the layers of this dataset. InvalidArgument: it shows one that the dataset does not have, or names a label that
-// there is not; NotFound: no such preset.
-Result<LayerLooks> ResolveLayers(const FrameRequest& request, const VolumeSummary& summary);
+// How a request shows a dataset, whatever its view.
+struct VolumeLook {
+  TransferFunction transfer;
+  ClipRegion clip;
+  LayerLooks layers;
+};
+// InvalidArgument: the volume has no slice with the slab's index, or no such layer, or there is no such label; NotFound: no such preset.
+Result<VolumeLook> ResolveLook(const FrameRequest& request, const VolumeSummary& summary);
 
 // Plans the same frame for another roster with the same number of slots. Setup, layout and groups stay; workers of placements, schedules
 // and display change. The display worker stays if it is still in the roster: it holds the accumulated image. Unavailable: no worker.

@@ -3,26 +3,22 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "common/frame/matter_labels.h"
 #include "common/planning/brick_visibility.h"
 
 namespace slabstream {
 namespace {
 
 void AddLabels(const VolumeSummary& labels, const LabelLook& look, std::vector<std::uint8_t>& bricks) {
-  std::vector<std::size_t> matter_before = {0};  // labels below a number that are material
-  for (std::size_t number = 0; number <= look.entries.size(); ++number) {
-    matter_before.push_back(matter_before.back() + (look.IsMatter(number) ? 1 : 0));
-  }
-  if (matter_before.back() == 0) return;
+  const MatterLabels matter(look);
+  if (!matter.any()) return;
   bricks.resize(labels.bricks.size());
   for (std::size_t i = 0; i < bricks.size(); ++i) {
-    const auto low = std::size_t(labels.bricks[i].min), high = std::size_t(labels.bricks[i].max);
-    if (matter_before[high + 1] > matter_before[low]) bricks[i] = 1;
+    if (matter.AnyBetween(labels.bricks[i].min, labels.bricks[i].max)) bricks[i] = 1;
   }
 }
 
 void AddOverlay(const VolumeSummary& overlay, const RendererKind& renderer, const OverlayLook& look, std::vector<std::uint8_t>& bricks) {
-  if (look.weight <= 0) return;
   const BrickVisibility visibility(overlay, renderer.DrawnTable(look.transfer, overlay));
   bricks.resize(overlay.bricks.size());
   for (std::size_t i = 0; i < bricks.size(); ++i) {

@@ -22,8 +22,8 @@ double RadiusOfSlab(const BrickVisibility::Ball& ball, const FrameRequest& reque
 }  // namespace
 
 Result<FrameSetup> MakeFrameSetup(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary) {
-  Result<TransferFunction> transfer = ResolveTransfer(request.transfer, summary);
-  if (!transfer.ok()) return transfer.status();
+  Result<VolumeLook> look = ResolveLook(request, summary);
+  if (!look.ok()) return look.status();
   FrameSetup setup;
   setup.dataset = dataset;
   setup.description = summary.description;
@@ -32,38 +32,22 @@ Result<FrameSetup> MakeFrameSetup(const FrameRequest& request, DatasetId dataset
   SetRenderer(*FindRenderer(request.renderer), setup);
   SetParameters(ParseParameters(*setup.renderer, request.parameters).value(), setup);
   const VolumeGeometry& geometry = summary.description.geometry;
-  Result<ClipRegion> clip = MakeClipRegion(request.clipping, geometry);
-  if (!clip.ok()) return clip.status();
-  setup.clip = *std::move(clip);
-  Result<LayerLooks> looks = ResolveLayers(request, summary);
-  if (!looks.ok()) return looks.status();
-  setup.looks = *std::move(looks);
+  setup.transfer = std::move(look->transfer);
+  setup.clip = std::move(look->clip);
+  setup.looks = std::move(look->layers);
   ViewParameters view = request.view;
   if (view.fit) {
-    const BrickVisibility visibility(summary, setup.renderer->DrawnTable(*transfer, summary),
+    const BrickVisibility visibility(summary, setup.renderer->DrawnTable(setup.transfer, summary),
                                      LayerBricks(summary, *setup.renderer, setup.looks));
     const auto ball = visibility.VisibleBall(setup.clip);
     if (ball) view = FitView(view, geometry, ball->centre, request.clipping.slab ? RadiusOfSlab(*ball, request, geometry) : ball->radius);
   }
   if (Status status = CheckView(view, geometry); !status.ok()) return status;
   if (Status status = setup.renderer->SetView(view, request.size, setup); !status.ok()) return status;
-  setup.transfer = *std::move(transfer);
   setup.shading = request.shading;
   for (Vec3& light : setup.shading.lights) light = geometry.orientation.FromWorld(light);
   setup.termination = request.termination;
   return setup;
-}
-
-Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const VolumeSummary& summary) {
-  Result<TransferFunction> transfer = std::holds_alternative<std::string>(choice.choice)
-                                          ? MakePreset(std::get<std::string>(choice.choice), summary)
-                                          : Result<TransferFunction>(std::get<TransferFunction>(choice.choice));
-  if (!transfer.ok()) return transfer;
-  transfer->opacity_distance = choice.opacity_distance;
-  transfer->isosurfaces = choice.isosurfaces;
-  transfer->gradient_opacities = choice.gradient_opacities;
-  if (choice.scalar_range) return Stretched(*std::move(transfer), InDataValues(*choice.scalar_range, summary));
-  return transfer;
 }
 
 std::vector<Placement> PlacementsOf(const FramePlan& plan) {
@@ -94,18 +78,14 @@ Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, cons
   const Result<ResolvedPolicy> policy = ResolvePolicy(request, summary.description.geometry);
   if (!policy.ok()) return policy.status();
   if (layout == nullptr) {
-    const Result<TransferFunction> transfer = ResolveTransfer(request.transfer, summary);
-    if (!transfer.ok()) return transfer.status();
-    const Result<ClipRegion> clip = MakeClipRegion(request.clipping, summary.description.geometry);
-    if (!clip.ok()) return clip.status();
-    const Result<LayerLooks> looks = ResolveLayers(request, summary);
-    if (!looks.ok()) return looks.status();
+    const Result<VolumeLook> look = ResolveLook(request, summary);
+    if (!look.ok()) return look.status();
     layout = std::make_shared<const Layout>(MakeLayout({.summary = &summary,
-                                                        .transfer = &*transfer,
+                                                        .transfer = &look->transfer,
                                                         .policy = &*policy,
                                                         .renderer = FindRenderer(request.renderer),
-                                                        .clip = &*clip,
-                                                        .looks = &*looks,
+                                                        .clip = &look->clip,
+                                                        .looks = &look->layers,
                                                         .slots = std::max<std::uint32_t>(std::uint32_t(roster.slots.size()), 1),
                                                         .slab_bytes_target = slab_bytes_target}));
   }

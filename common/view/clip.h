@@ -94,7 +94,7 @@ struct ClipRegion {
   friend bool operator==(const ClipRegion&, const ClipRegion&) = default;
 };
 
-// `clipping` valid. Sides that the whole volume lies within are left out, so that a box around everything costs nothing.
+// `clipping` valid. Sides that do not cut the volume are left out, so that a box around everything costs nothing.
 // InvalidArgument: the volume has no slice with the slab's index.
 Result<ClipRegion> MakeClipRegion(const Clipping& clipping, const VolumeGeometry& geometry);
 

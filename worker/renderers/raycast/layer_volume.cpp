@@ -1,7 +1,5 @@
 #include "worker/renderers/raycast/layer_volume.h"
 
-#include <algorithm>
-
 #include "common/base/check.h"
 
 namespace slabstream {
@@ -28,18 +26,6 @@ std::size_t LayerVolume::bytes() const {
     total += piece.labels.bytes() + piece.overlay.bytes() + piece.label_cells.bytes() + piece.overlay_cells.bytes();
   }
   return total;
-}
-
-MatterLabels::MatterLabels(const LabelLook& look) : matter_before_(1) {
-  for (std::size_t number = 0; number <= look.entries.size(); ++number) {
-    matter_before_.push_back(matter_before_.back() + (look.IsMatter(number) ? 1 : 0));
-  }
-}
-
-bool MatterLabels::AnyBetween(float low, float high) const {
-  if (!(low <= high)) return false;
-  const auto number = [&](float stored) { return std::min(std::size_t(stored), matter_before_.size() - 2); };
-  return matter_before_[number(high) + 1] > matter_before_[number(low)];
 }
 
 }  // namespace slabstream

@@ -28,14 +28,4 @@ class LayerVolume : public SlabCache {
   std::vector<LayerPiece> pieces_;
 };
 
-// Whether labels of a cell are material, whatever the transfer function says.
-class MatterLabels {
- public:
-  explicit MatterLabels(const LabelLook& look);
-  bool AnyBetween(float low, float high) const;  // numbers; false if low > high
-
- private:
-  std::vector<std::int32_t> matter_before_;  // labels below this number
-};
-
 }  // namespace slabstream

@@ -9,6 +9,7 @@
 #include <span>
 #include <utility>
 
+#include "common/frame/matter_labels.h"
 #include "common/kernels/combine.h"
 #include "worker/rays/ray_volume.h"
 #include "worker/rays/render_tiles.h"
@@ -27,21 +28,24 @@ struct Visibility {
   SampledRegion region;  // positions in visible cells; empty if low.x > high.x
 };
 
-// What layers make visible beside the volume.
-struct VisibleLayers {
-  std::optional<MatterLabels> labels;
-  std::optional<VisibleSamples> overlay;
+// What is visible of a slab: samples of the volume, and what layers add.
+struct VisibleValues {
+  VisibleSamples volume;
+  std::optional<MatterLabels> labels = {};
+  std::optional<VisibleSamples> overlay = {};
+  friend bool operator==(const VisibleValues&, const VisibleValues&) = default;
 };
 
-Visibility VisibilityOf(const RayPiece& piece, const VisibleSamples& visible, const LayerPiece* layers, const VisibleLayers& of_layers) {
-  std::vector<std::uint8_t> cells_shown = VisibleCells(piece.cells, visible);
+// `layers`: of the piece; null if none is shown.
+Visibility VisibilityOf(const RayPiece& piece, const VisibleValues& visible, const LayerPiece* layers) {
+  std::vector<std::uint8_t> cells_shown = VisibleCells(piece.cells, visible.volume);
   const auto add = [&](const CellRanges& of, const auto& shown) {
     for (std::size_t i = 0; i < of.ranges.size(); ++i) {
       if (shown.AnyBetween(of.ranges[i].min, of.ranges[i].max)) cells_shown[i] = 0;
     }
   };
-  if (of_layers.labels) add(layers->label_cells, *of_layers.labels);
-  if (of_layers.overlay) add(layers->overlay_cells, *of_layers.overlay);
+  if (visible.labels) add(layers->label_cells, *visible.labels);
+  if (visible.overlay) add(layers->overlay_cells, *visible.overlay);
   Visibility result{EmptyDistances(piece.cells.counts, std::move(cells_shown)), {{1, 0, 0}, {0, 0, 0}}};
   const Index3& counts = piece.cells.counts;
   Box cells;
@@ -86,8 +90,7 @@ struct ShownLayers {
 
 ShownLayers LayersOf(SlabData& slab, std::span<const RayPiece> pieces, const FrameSetup& setup, double steps_per_voxel) {
   ShownLayers shown;
-  LayerLooks looks = setup.looks;
-  if (looks.overlay && looks.overlay->weight <= 0) looks.overlay.reset();
+  const LayerLooks& looks = setup.looks;
   if (!looks.any()) return shown;
   shown.pieces = &slab.CacheOf<LayerVolume>().PiecesOf(slab, pieces, looks);
   if (looks.labels) shown.labels = MakeLabelTables(*looks.labels, steps_per_voxel, setup.transfer.opacity_distance);
@@ -101,22 +104,20 @@ ShownLayers LayersOf(SlabData& slab, std::span<const RayPiece> pieces, const Fra
   return shown;
 }
 
-// The visible parts of a slab, kept until the transfer function makes other samples visible, or layers are shown in another way.
+// The visible parts of a slab, kept until other values are visible.
 class VisibilityCache : public SlabCache {
  public:
   // By piece.
   const std::vector<Visibility>& Of(const std::vector<RayPiece>& pieces, const RayLook& look, const LayerLooks& looks,
                                     const ShownLayers& shown) {
-    VisibleSamples visible(look);
-    if (pieces_.empty() || visible_ != visible || looks_ != looks) {
+    VisibleValues visible{.volume = VisibleSamples(look)};
+    if (looks.labels && looks.labels->mode == LabelMode::kSurface) visible.labels.emplace(*looks.labels);
+    if (shown.overlay) visible.overlay.emplace(*shown.overlay);
+    if (pieces_.empty() || visible_ != visible) {
       visible_ = std::move(visible);
-      looks_ = looks;
-      VisibleLayers of_layers;
-      if (shown.labels && looks.labels->mode == LabelMode::kSurface) of_layers.labels.emplace(*looks.labels);
-      if (shown.overlay) of_layers.overlay.emplace(*shown.overlay);
       pieces_.clear();
       for (std::size_t i = 0; i < pieces.size(); ++i) {
-        pieces_.push_back(VisibilityOf(pieces[i], *visible_, shown.pieces == nullptr ? nullptr : &(*shown.pieces)[i], of_layers));
+        pieces_.push_back(VisibilityOf(pieces[i], *visible_, shown.pieces == nullptr ? nullptr : &(*shown.pieces)[i]));
       }
     }
     return pieces_;
@@ -129,8 +130,7 @@ class VisibilityCache : public SlabCache {
   }
 
  private:
-  std::optional<VisibleSamples> visible_;
-  LayerLooks looks_;
+  std::optional<VisibleValues> visible_;
   std::vector<Visibility> pieces_;
 };
 

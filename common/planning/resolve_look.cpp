@@ -43,8 +43,7 @@ Result<LabelLook> ResolveLabels(const LabelChoice& choice, const LabelTable& tab
   return look;
 }
 
-}  // namespace
-
+// An overlay without weight is not shown.
 Result<LayerLooks> ResolveLayers(const FrameRequest& request, const VolumeSummary& summary) {
   LayerLooks looks;
   if (request.labels) {
@@ -57,9 +56,35 @@ Result<LayerLooks> ResolveLayers(const FrameRequest& request, const VolumeSummar
     if (summary.overlay == nullptr) return Missing(request, "overlay", "--overlay-transfer, --overlay-range or --overlay-weight");
     Result<TransferFunction> transfer = ResolveTransfer(request.overlay->transfer, *summary.overlay);
     if (!transfer.ok()) return transfer.status();
-    looks.overlay = OverlayLook{.transfer = *std::move(transfer), .range = summary.overlay->range, .weight = request.overlay->weight};
+    if (request.overlay->weight > 0) {
+      looks.overlay = OverlayLook{.transfer = *std::move(transfer), .range = summary.overlay->range, .weight = request.overlay->weight};
+    }
   }
   return looks;
+}
+
+}  // namespace
+
+Result<VolumeLook> ResolveLook(const FrameRequest& request, const VolumeSummary& summary) {
+  Result<TransferFunction> transfer = ResolveTransfer(request.transfer, summary);
+  if (!transfer.ok()) return transfer.status();
+  Result<ClipRegion> clip = MakeClipRegion(request.clipping, summary.description.geometry);
+  if (!clip.ok()) return clip.status();
+  Result<LayerLooks> layers = ResolveLayers(request, summary);
+  if (!layers.ok()) return layers.status();
+  return VolumeLook{*std::move(transfer), *std::move(clip), *std::move(layers)};
+}
+
+Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const VolumeSummary& summary) {
+  Result<TransferFunction> transfer = std::holds_alternative<std::string>(choice.choice)
+                                          ? MakePreset(std::get<std::string>(choice.choice), summary)
+                                          : Result<TransferFunction>(std::get<TransferFunction>(choice.choice));
+  if (!transfer.ok()) return transfer;
+  transfer->opacity_distance = choice.opacity_distance;
+  transfer->isosurfaces = choice.isosurfaces;
+  transfer->gradient_opacities = choice.gradient_opacities;
+  if (choice.scalar_range) return Stretched(*std::move(transfer), InDataValues(*choice.scalar_range, summary));
+  return transfer;
 }
 
 }  // namespace slabstream
