@@ -55,8 +55,8 @@ Result<Session> OpenSession(const FrameOptions& options, std::vector<FrameJob>& 
   return session;
 }
 
-// The pictures of `jobs`, and the files beside them (--stats, --trace). `open_pictures` is called when all that may take long before the
-// first frame is done: Ctrl-C before that ends the process at once, and must find nothing to clean up.
+// The pictures of `jobs`, and the files beside them (--stats, --trace). `open_pictures` is called just before the first frame: until then
+// Ctrl-C ends the process at once, so there must be nothing to clean up.
 using OpenSink = std::function<Result<std::unique_ptr<PictureSink>>()>;
 Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std::vector<FrameJob> jobs, const OpenSink& open_pictures,
                                                 int in_flight) {

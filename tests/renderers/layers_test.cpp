@@ -1,4 +1,4 @@
-// Labels and overlays in the ray caster: analytic truth, the kernel against its definition, and independence of boxes.
+// Labels and overlays in the ray caster: formulas, the kernel against its reference, and that boxes do not matter.
 #include <gtest/gtest.h>
 
 #include <cmath>

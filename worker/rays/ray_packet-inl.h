@@ -325,18 +325,29 @@ struct Neighbours {
   }
 };
 
+// Neighbours::at of samples; 0 where not `owned`.
+HWY_INLINE Ints IndexBefore(const RayBox& box, const SamplePlace& place, Mask owned) {
+  const auto at = hn::Add(hn::Add(hn::Mul(place.voxel[2], SetInt(box.slice)), hn::Mul(place.voxel[1], SetInt(box.row))), place.voxel[0]);
+  return hn::IfThenElseZero(hn::RebindMask(IntTag(), owned), at);
+}
+
+// `samples`: of the volume, or of a layer that is padded like it.
 template <class T>
-HWY_INLINE Neighbours<T> LoadNeighbours(const RayBox& box, const SamplePlace& place, Mask owned) {
+HWY_INLINE Neighbours<T> NeighboursAt(const RayBox& box, const T* samples, Ints at) {
   Neighbours<T> n;
-  n.samples = reinterpret_cast<const T*>(box.samples);
+  n.samples = samples;
   n.row = SetInt(box.row);
   n.slice = SetInt(box.slice);
-  const auto at = hn::Add(hn::Add(hn::Mul(place.voxel[2], n.slice), hn::Mul(place.voxel[1], n.row)), place.voxel[0]);
-  n.at = hn::IfThenElseZero(hn::RebindMask(IntTag(), owned), at);
+  n.at = at;
   for (int z = 0; z < 2; ++z) {
     for (int y = 0; y < 2; ++y) n.inner[z][y] = LoadInner(n.samples, n.RowAt(y + 1, z + 1));
   }
   return n;
+}
+
+template <class T>
+HWY_INLINE Neighbours<T> LoadNeighbours(const RayBox& box, const SamplePlace& place, Mask owned) {
+  return NeighboursAt(box, reinterpret_cast<const T*>(box.samples), IndexBefore(box, place, owned));
 }
 
 // Along x of the four rows, then along y, then along z.

@@ -3,8 +3,8 @@
 #include <limits>
 
 #include "worker/kernels/power-inl.h"
-#include "worker/rays/ray_packet-inl.h"
 #include "worker/renderers/raycast/ray_layers.h"
+#include "worker/renderers/raycast/sample_look-inl.h"
 
 #if defined(SLABSTREAM_WORKER_RENDERERS_RAYCAST_LAYER_SAMPLES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SLABSTREAM_WORKER_RENDERERS_RAYCAST_LAYER_SAMPLES_INL_H_
@@ -15,14 +15,6 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace slabstream::HWY_NAMESPACE {
-
-// The entry of RayLook::entries, times four, by which samples of these values look; 0 where a value is not finite.
-HWY_INLINE Ints EntryOf(const RayLook& look, Floats value, Mask finite) {
-  const FloatTag df;
-  const auto number = hn::Min(
-      hn::Max(hn::Add(hn::Mul(hn::Sub(value, Set(look.origin)), Set(look.scale)), Set(look.rounding)), hn::Zero(df)), Set(look.last));
-  return hn::ShiftLeft<2>(hn::ConvertTo(IntTag(), hn::IfThenElseZero(finite, number)));
-}
 
 // Four label numbers along x, from the voxel with index `at` on.
 struct LabelRow {
@@ -41,12 +33,6 @@ HWY_INLINE LabelRow LoadLabelRow(const RayLayers& layers, Ints at) {
   return {{hn::And(first, low), hn::And(hn::ShiftRight<16>(first), low), hn::And(second, low), hn::And(hn::ShiftRight<16>(second), low)}};
 }
 
-// Neighbours::at of a sample: the index of the voxel one row, one slice and one voxel along x before its floor.
-HWY_INLINE Ints IndexBefore(const RayBox& box, const SamplePlace& place, Mask owned) {
-  const auto at = hn::Add(hn::Add(hn::Mul(place.voxel[2], SetInt(box.slice)), hn::Mul(place.voxel[1], SetInt(box.row))), place.voxel[0]);
-  return hn::IfThenElseZero(hn::RebindMask(IntTag(), owned), at);
-}
-
 // The label of the voxel nearest to each sample. `at` as in Neighbours.
 HWY_INLINE Ints NearestLabel(const RayLayers& layers, const RayBox& box, const SamplePlace& place, Ints at) {
   const IntTag di;
@@ -62,11 +48,7 @@ HWY_INLINE Ints NearestLabel(const RayLayers& layers, const RayBox& box, const S
 
 // The gradient of the indicator of each sample's label (1 in its voxels, 0 elsewhere), smoothed by the cubic B-spline (Unser 1999) over the
 // 4 x 4 x 4 voxels around. 0 where there is hardly any: inside the label.
-struct IndicatorGradient {
-  Floats x, y, z;
-};
-HWY_INLINE IndicatorGradient IndicatorGradientAt(const RayLayers& layers, const RayBox& box, const SamplePlace& place, Ints at,
-                                                 Ints label) {
+HWY_INLINE Gradient IndicatorGradientAt(const RayLayers& layers, const RayBox& box, const SamplePlace& place, Ints at, Ints label) {
   const FloatTag df;
   const auto zero = hn::Zero(df), one = Set(1);
   struct Spline {
@@ -89,7 +71,7 @@ HWY_INLINE IndicatorGradient IndicatorGradientAt(const RayLayers& layers, const 
     s.slope[2] = hn::Neg(middle_slope(u));
     s.slope[3] = hn::Mul(half, hn::Mul(t, t));
   }
-  IndicatorGradient g = {zero, zero, zero};
+  Gradient g = {zero, zero, zero};
   auto slice = at;
   for (int z = 0; z < 4; ++z, slice = hn::Add(slice, SetInt(box.slice))) {
     auto row = slice;
@@ -126,10 +108,8 @@ struct LayeredSample {
   Neighbours<float> overlay;  // only if the overlay is shown
 };
 
-// `opacity`: of the volume's sample, 0 where it has none. `neighbours`: of the volume.
-template <class T>
-HWY_INLINE LayeredSample WithLayers(const RayLayers& layers, const RayBox& box, const SamplePlace& place, const Neighbours<T>& neighbours,
-                                    Floats opacity) {
+// `at` as in Neighbours. `opacity`: of the volume's sample, 0 where it has none.
+HWY_INLINE LayeredSample WithLayers(const RayLayers& layers, const RayBox& box, const SamplePlace& place, Ints at, Floats opacity) {
   const FloatTag df;
   const IntTag di;
   const auto zero = hn::Zero(df), one = Set(1);
@@ -141,7 +121,7 @@ HWY_INLINE LayeredSample WithLayers(const RayLayers& layers, const RayBox& box, 
   sample.overlay_share = zero;
   if (layers.labels != nullptr) {
     const LabelTables& tables = *layers.labels;
-    sample.label = NearestLabel(layers, box, place, neighbours.at);
+    sample.label = NearestLabel(layers, box, place, at);
     sample.label_entry = hn::ShiftLeft<2>(sample.label);
     const auto changed = hn::GatherIndex(df, tables.entries.data() + 3, sample.label_entry);
     if (tables.surface) {
@@ -163,13 +143,7 @@ HWY_INLINE LayeredSample WithLayers(const RayLayers& layers, const RayBox& box, 
   }
   if (layers.overlay != nullptr) {
     const RayLook& look = *layers.overlay;
-    sample.overlay.samples = layers.overlay_samples;
-    sample.overlay.row = neighbours.row;
-    sample.overlay.slice = neighbours.slice;
-    sample.overlay.at = neighbours.at;
-    for (int z = 0; z < 2; ++z) {
-      for (int y = 0; y < 2; ++y) sample.overlay.inner[z][y] = LoadInner(layers.overlay_samples, sample.overlay.RowAt(y + 1, z + 1));
-    }
+    sample.overlay = NeighboursAt(box, layers.overlay_samples, at);
     const auto value = Interpolate(sample.overlay, place);
     const auto finite = hn::Le(hn::Abs(value), Set(std::numeric_limits<float>::max()));
     sample.overlay_entry = EntryOf(look, value, finite);

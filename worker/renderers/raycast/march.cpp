@@ -7,64 +7,12 @@
 
 #include <limits>
 
-#include "worker/kernels/power-inl.h"
-#include "worker/rays/ray_packet-inl.h"
 #include "worker/renderers/raycast/layer_samples-inl.h"
+#include "worker/renderers/raycast/sample_look-inl.h"
 #include "worker/renderers/raycast/surface_walk-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace slabstream::HWY_NAMESPACE {
-
-// Central differences, times two, of stored samples around a position, interpolated.
-struct Gradient {
-  Floats x, y, z;
-};
-
-template <class T>
-HWY_INLINE Gradient GradientAt(const Neighbours<T>& n, const SamplePlace& place) {
-  const auto u = place.fraction[0], v = place.fraction[1], w = place.fraction[2];
-  // Row y, z of 0 ... 3, interpolated along x.
-  const auto inner = [&](int y, int z) HWY_ATTR { return Lerp(u, n.inner[z - 1][y - 1].a, n.inner[z - 1][y - 1].b); };
-  const auto outer = [&](int y, int z) HWY_ATTR {
-    const InnerPair pair = LoadInner(n.samples, n.RowAt(y, z));
-    return Lerp(u, pair.a, pair.b);
-  };
-  const auto slope = [&](int y, int z) HWY_ATTR {
-    const OuterSlopes slopes = LoadSlopes(n.samples, n.RowAt(y, z), n.inner[z - 1][y - 1]);
-    return Lerp(u, slopes.at_a, slopes.at_b);
-  };
-  const auto r11 = inner(1, 1), r21 = inner(2, 1), r12 = inner(1, 2), r22 = inner(2, 2);
-  const auto along_y = [&](Floats first, Floats a, Floats b, Floats last) HWY_ATTR { return Lerp(v, hn::Sub(b, first), hn::Sub(last, a)); };
-  const auto along_z = [&](Floats first, Floats a, Floats b, Floats last) HWY_ATTR { return Lerp(w, hn::Sub(b, first), hn::Sub(last, a)); };
-  return {Lerp(w, Lerp(v, slope(1, 1), slope(2, 1)), Lerp(v, slope(1, 2), slope(2, 2))),
-          Lerp(w, along_y(outer(0, 1), r11, r21, outer(3, 1)), along_y(outer(0, 2), r12, r22, outer(3, 2))),
-          Lerp(v, along_z(outer(1, 0), r11, r12, outer(1, 3)), along_z(outer(2, 0), r21, r22, outer(2, 3)))};
-}
-
-struct Light {
-  Floats diffuse, specular;
-};
-
-HWY_INLINE Light LightOf(const RayLook& look, const Gradient& g) {
-  const FloatTag df;
-  const auto dot = [&](const Float3& v)
-                       HWY_ATTR { return hn::Add(hn::Add(hn::Mul(g.x, Set(v[0])), hn::Mul(g.y, Set(v[1]))), hn::Mul(g.z, Set(v[2]))); };
-  const auto nx = hn::Mul(g.x, Set(look.inverse_spacing[0])), ny = hn::Mul(g.y, Set(look.inverse_spacing[1])),
-             nz = hn::Mul(g.z, Set(look.inverse_spacing[2]));
-  const auto square = hn::Add(hn::Add(hn::Mul(nx, nx), hn::Mul(ny, ny)), hn::Mul(nz, nz));
-  const auto has_gradient = hn::And(hn::Gt(square, hn::Zero(df)), hn::Le(square, Set(std::numeric_limits<float>::max())));
-  const auto per_length = hn::Div(Set(1), hn::Sqrt(hn::IfThenElse(has_gradient, square, Set(1))));
-  const auto n_v = hn::Mul(dot(look.viewer), per_length);
-  auto lit = hn::Zero(df), shine = hn::Zero(df);
-  for (const RayLook::Light& light : look.lights) {
-    const auto n_l = hn::Mul(dot(light.direction), per_length);
-    lit = hn::Add(lit, hn::Abs(n_l));
-    const auto r_v = hn::Sub(hn::Mul(hn::Add(n_l, n_l), n_v), Set(light.to_viewer));
-    shine = hn::Add(shine, PowerOfFraction(hn::Min(hn::Max(r_v, hn::Zero(df)), Set(1)), Set(look.shininess)));
-  }
-  return {hn::IfThenElse(has_gradient, hn::MulAdd(lit, Set(look.diffuse), Set(look.ambient)), Set(look.diffuse_without_gradient)),
-          hn::IfThenElseZero(has_gradient, hn::Mul(shine, Set(look.specular)))};
-}
 
 // A sample stands for half a step of its ray on each side. For the first and the last sample in the volume that part reaches to the point
 // where the ray enters or leaves the volume, between 0 and 1 step away.
@@ -117,20 +65,6 @@ struct Sums {
   }
 };
 
-// The factor of the opacity of samples with this gradient.
-HWY_INLINE Floats GradientFactor(const RayLook& look, const Gradient& g) {
-  const FloatTag df;
-  const auto square = [&](Floats slope, std::size_t axis) HWY_ATTR {
-    const auto physical = hn::Mul(slope, Set(look.inverse_spacing[axis]));
-    return hn::Mul(physical, physical);
-  };
-  const auto magnitude = hn::Sqrt(hn::Add(hn::Add(square(g.x, 0), square(g.y, 1)), square(g.z, 2)));
-  const auto finite = hn::Le(magnitude, Set(std::numeric_limits<float>::max()));
-  const auto number =
-      hn::Min(hn::MulAdd(hn::IfThenElseZero(finite, magnitude), Set(look.gradient_scale), Set(0.5F)), Set(look.gradient_last));
-  return hn::GatherIndex(df, look.gradient_factors.data(), hn::ConvertTo(IntTag(), number));
-}
-
 // Adds a crossing with an isosurface as labels have it: tinted, thinned or taken away like a sample there, and not in the place of a label
 // that is matter.
 HWY_INLINE void AddLabelled(const MarchWork& work, Mask rays, const SamplePlace& place, Ints entry, const Light& light, Sums& sums) {
@@ -181,14 +115,11 @@ HWY_INLINE LayeredLight LightOfLayers(const MarchWork& work, const SamplePlace& 
   const FloatTag df;
   const auto matter = hn::AndNot(on_face, hn::And(visible, sample.matter));
   if (!hn::AllFalse(df, matter)) {
-    const IndicatorGradient g = IndicatorGradientAt(*work.layers, *work.box, place, at, sample.label);
-    gradient = {hn::IfThenElse(matter, g.x, gradient.x), hn::IfThenElse(matter, g.y, gradient.y), hn::IfThenElse(matter, g.z, gradient.z)};
+    gradient = Choose(matter, IndicatorGradientAt(*work.layers, *work.box, place, at, sample.label), gradient);
   }
   const Light volume = LightOf(*work.look, gradient);
   if (hn::AllFalse(df, hn::And(visible, hn::Gt(sample.overlay_share, hn::Zero(df))))) return {volume, volume};
-  const Gradient over = GradientAt(sample.overlay, place);
-  return {volume, LightOf(*work.look, {hn::IfThenElse(on_face, gradient.x, over.x), hn::IfThenElse(on_face, gradient.y, over.y),
-                                       hn::IfThenElse(on_face, gradient.z, over.z)})};
+  return {volume, LightOf(*work.look, Choose(on_face, gradient, GradientAt(sample.overlay, place)))};
 }
 
 // Adds samples with layers.
@@ -269,14 +200,14 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const RayPacket& pa
     auto visible = hn::And(hn::And(sampled, finite), hn::Gt(opacity, zero));
     Gradient gradient = {zero, zero, zero};
     const bool by_gradient = kAll && !look.gradient_factors.empty();
+    if (by_gradient && !hn::AllFalse(df, visible)) {
+      gradient = GradientAt(neighbours, place);
+      opacity = OpacityByGradient(look, opacity, gradient);
+      visible = hn::And(visible, hn::Gt(opacity, zero));
+    }
     [[maybe_unused]] LayeredSample layered;
     if constexpr (kLayered) {
-      if (by_gradient) {
-        gradient = GradientAt(neighbours, place);
-        const auto clear = hn::Sub(one, hn::Mul(opacity, GradientFactor(look, gradient)));
-        opacity = hn::Sub(one, PowerOfFraction(clear, Set(look.step_exponent)));
-      }
-      layered = WithLayers(*work.layers, box, place, neighbours, hn::IfThenElseZero(finite, opacity));
+      layered = WithLayers(*work.layers, box, place, neighbours.at, hn::IfThenElseZero(finite, opacity));
       opacity = layered.opacity;
       visible = hn::And(sampled, hn::Gt(opacity, zero));
     }
@@ -288,26 +219,22 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const RayPacket& pa
       if (has_surfaces) shaded += AddSurfaces<T>(work, visible, this_k, surfaces, sums);
     }
 
-    const bool of_length = !kLayered && by_gradient;  // the opacity is not that of a step yet
-    if ((look.phong && !(kLayered && by_gradient)) || of_length) gradient = GradientAt(neighbours, place);
-    if (of_length) opacity = hn::Mul(opacity, GradientFactor(look, gradient));
-    if (has_ends || of_length) {
+    if (has_ends) {
       const auto is_first = hn::Eq(this_k, ends.first), is_last = hn::Eq(this_k, ends.last);
-      if (of_length || !hn::AllFalse(df, hn::And(visible, hn::Or(is_first, is_last)))) {
+      if (!hn::AllFalse(df, hn::And(visible, hn::Or(is_first, is_last)))) {
         const auto steps_of_first = hn::Add(one, hn::IfThenElseZero(is_first, ends.first_excess));
-        auto power = hn::Add(steps_of_first, hn::IfThenElseZero(is_last, ends.last_excess));
-        if (of_length) power = hn::Mul(power, Set(look.step_exponent));
+        const auto power = hn::Add(steps_of_first, hn::IfThenElseZero(is_last, ends.last_excess));
         opacity = hn::Sub(one, PowerOfFraction(hn::Sub(one, opacity), power));
       }
     }
     Light light = {one, zero};
     [[maybe_unused]] LayeredLight lights = {light, light};
     if (look.phong) {
+      if (!by_gradient) gradient = GradientAt(neighbours, place);
       [[maybe_unused]] auto on_face = hn::Lt(one, zero);
       if constexpr (kAll) {
         on_face = hn::Lt(this_k, part->face_end);
-        gradient = {hn::IfThenElse(on_face, part->face[0], gradient.x), hn::IfThenElse(on_face, part->face[1], gradient.y),
-                    hn::IfThenElse(on_face, part->face[2], gradient.z)};
+        gradient = Choose(on_face, {part->face[0], part->face[1], part->face[2]}, gradient);
       }
       if constexpr (kLayered) {
         lights = LightOfLayers(work, place, neighbours.at, layered, visible, gradient, on_face);

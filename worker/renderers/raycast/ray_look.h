@@ -22,8 +22,8 @@ struct RayLook {
   std::vector<float> isovalues;  // stored samples
   AlignedVector<float> surface_looks;
 
-  // The factor of an opacity, by the gradient's magnitude m: entry min(m * gradient_scale + 0.5, gradient_last). Empty: none is needed.
-  // Otherwise `entries` hold the opacity a of the transfer function's distance instead: a step's is 1 - (1 - a * factor)^step_exponent.
+  // Opacity by gradient: a factor for each magnitude m, entry min(m * gradient_scale + 0.5, gradient_last). Empty: there is none. With
+  // factors, the opacity a in `entries` is that of the transfer function's distance, and a step's is 1 - (1 - a * factor)^step_exponent.
   AlignedVector<float> gradient_factors;
   float gradient_scale = 0, gradient_last = 0, step_exponent = 1;
 

@@ -1,0 +1,101 @@
+// How samples look by a RayLook: their entry, gradient, opacity and light. Included once for each instruction set, hence the unusual
+// include guard.
+#include <limits>
+
+#include "worker/kernels/power-inl.h"
+#include "worker/rays/ray_packet-inl.h"
+#include "worker/renderers/raycast/ray_look.h"
+
+#if defined(SLABSTREAM_WORKER_RENDERERS_RAYCAST_SAMPLE_LOOK_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SLABSTREAM_WORKER_RENDERERS_RAYCAST_SAMPLE_LOOK_INL_H_
+#undef SLABSTREAM_WORKER_RENDERERS_RAYCAST_SAMPLE_LOOK_INL_H_
+#else
+#define SLABSTREAM_WORKER_RENDERERS_RAYCAST_SAMPLE_LOOK_INL_H_
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace slabstream::HWY_NAMESPACE {
+
+// The entry of RayLook::entries, times four, by which samples of these values look; 0 where a value is not finite.
+HWY_INLINE Ints EntryOf(const RayLook& look, Floats value, Mask finite) {
+  const FloatTag df;
+  const auto number = hn::Min(
+      hn::Max(hn::Add(hn::Mul(hn::Sub(value, Set(look.origin)), Set(look.scale)), Set(look.rounding)), hn::Zero(df)), Set(look.last));
+  return hn::ShiftLeft<2>(hn::ConvertTo(IntTag(), hn::IfThenElseZero(finite, number)));
+}
+
+// Central differences, times two, of stored samples around a position, interpolated.
+struct Gradient {
+  Floats x, y, z;
+};
+
+template <class T>
+HWY_INLINE Gradient GradientAt(const Neighbours<T>& n, const SamplePlace& place) {
+  const auto u = place.fraction[0], v = place.fraction[1], w = place.fraction[2];
+  // Row y, z of 0 ... 3, interpolated along x.
+  const auto inner = [&](int y, int z) HWY_ATTR { return Lerp(u, n.inner[z - 1][y - 1].a, n.inner[z - 1][y - 1].b); };
+  const auto outer = [&](int y, int z) HWY_ATTR {
+    const InnerPair pair = LoadInner(n.samples, n.RowAt(y, z));
+    return Lerp(u, pair.a, pair.b);
+  };
+  const auto slope = [&](int y, int z) HWY_ATTR {
+    const OuterSlopes slopes = LoadSlopes(n.samples, n.RowAt(y, z), n.inner[z - 1][y - 1]);
+    return Lerp(u, slopes.at_a, slopes.at_b);
+  };
+  const auto r11 = inner(1, 1), r21 = inner(2, 1), r12 = inner(1, 2), r22 = inner(2, 2);
+  const auto along_y = [&](Floats first, Floats a, Floats b, Floats last) HWY_ATTR { return Lerp(v, hn::Sub(b, first), hn::Sub(last, a)); };
+  const auto along_z = [&](Floats first, Floats a, Floats b, Floats last) HWY_ATTR { return Lerp(w, hn::Sub(b, first), hn::Sub(last, a)); };
+  return {Lerp(w, Lerp(v, slope(1, 1), slope(2, 1)), Lerp(v, slope(1, 2), slope(2, 2))),
+          Lerp(w, along_y(outer(0, 1), r11, r21, outer(3, 1)), along_y(outer(0, 2), r12, r22, outer(3, 2))),
+          Lerp(v, along_z(outer(1, 0), r11, r12, outer(1, 3)), along_z(outer(2, 0), r21, r22, outer(2, 3)))};
+}
+
+// `a` where the mask is set, otherwise `b`.
+HWY_INLINE Gradient Choose(Mask mask, const Gradient& a, const Gradient& b) {
+  return {hn::IfThenElse(mask, a.x, b.x), hn::IfThenElse(mask, a.y, b.y), hn::IfThenElse(mask, a.z, b.z)};
+}
+
+// The opacity of a step, of samples with this gradient. `opacity`: as in RayLook::entries if there are gradient factors.
+HWY_INLINE Floats OpacityByGradient(const RayLook& look, Floats opacity, const Gradient& g) {
+  const FloatTag df;
+  const auto square = [&](Floats slope, std::size_t axis) HWY_ATTR {
+    const auto physical = hn::Mul(slope, Set(look.inverse_spacing[axis]));
+    return hn::Mul(physical, physical);
+  };
+  const auto magnitude = hn::Sqrt(hn::Add(hn::Add(square(g.x, 0), square(g.y, 1)), square(g.z, 2)));
+  const auto finite = hn::Le(magnitude, Set(std::numeric_limits<float>::max()));
+  const auto number =
+      hn::Min(hn::MulAdd(hn::IfThenElseZero(finite, magnitude), Set(look.gradient_scale), Set(0.5F)), Set(look.gradient_last));
+  const auto factor = hn::GatherIndex(df, look.gradient_factors.data(), hn::ConvertTo(IntTag(), number));
+  return hn::Sub(Set(1), PowerOfFraction(hn::Sub(Set(1), hn::Mul(opacity, factor)), Set(look.step_exponent)));
+}
+
+struct Light {
+  Floats diffuse, specular;
+};
+
+HWY_INLINE Light LightOf(const RayLook& look, const Gradient& g) {
+  const FloatTag df;
+  const auto dot = [&](const Float3& v)
+                       HWY_ATTR { return hn::Add(hn::Add(hn::Mul(g.x, Set(v[0])), hn::Mul(g.y, Set(v[1]))), hn::Mul(g.z, Set(v[2]))); };
+  const auto nx = hn::Mul(g.x, Set(look.inverse_spacing[0])), ny = hn::Mul(g.y, Set(look.inverse_spacing[1])),
+             nz = hn::Mul(g.z, Set(look.inverse_spacing[2]));
+  const auto square = hn::Add(hn::Add(hn::Mul(nx, nx), hn::Mul(ny, ny)), hn::Mul(nz, nz));
+  const auto has_gradient = hn::And(hn::Gt(square, hn::Zero(df)), hn::Le(square, Set(std::numeric_limits<float>::max())));
+  const auto per_length = hn::Div(Set(1), hn::Sqrt(hn::IfThenElse(has_gradient, square, Set(1))));
+  const auto n_v = hn::Mul(dot(look.viewer), per_length);
+  auto lit = hn::Zero(df), shine = hn::Zero(df);
+  for (const RayLook::Light& light : look.lights) {
+    const auto n_l = hn::Mul(dot(light.direction), per_length);
+    lit = hn::Add(lit, hn::Abs(n_l));
+    const auto r_v = hn::Sub(hn::Mul(hn::Add(n_l, n_l), n_v), Set(light.to_viewer));
+    shine = hn::Add(shine, PowerOfFraction(hn::Min(hn::Max(r_v, hn::Zero(df)), Set(1)), Set(look.shininess)));
+  }
+  return {hn::IfThenElse(has_gradient, hn::MulAdd(lit, Set(look.diffuse), Set(look.ambient)), Set(look.diffuse_without_gradient)),
+          hn::IfThenElseZero(has_gradient, hn::Mul(shine, Set(look.specular)))};
+}
+
+}  // namespace slabstream::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif
