@@ -69,6 +69,8 @@ function(slabstream_test name)
     set(ARG_TIMEOUT 300)
   endif()
   slabstream_program(${name} SOURCES ${ARG_SOURCES} LINKS ${ARG_LINKS} slabstream_test_main FOLDER tests)
+  # Tests are more than half of a build from scratch, and with less optimisation they compile in three quarters of the time.
+  target_compile_options(${name} PRIVATE $<$<CONFIG:Release,RelWithDebInfo>:-O1>)
   add_test(NAME ${name} COMMAND ${name})
   # Of the five jobs of the test presets: two tests that compute and one that waits run at a time on two cores.
   set(processors 2)
