@@ -32,8 +32,8 @@ LinearInImage MakeLinear(const Camera& camera, double at_0, double at_right, dou
 
 ClipRays::ClipRays(const ClipRegion& region, const Camera& camera, const Box& box)
     : perspective_(camera.projection == Projection::kPerspective),
-      start_(perspective_ ? -std::numeric_limits<double>::infinity() : 0),
-      end_(perspective_ ? -1 / double(kNever) : double(kNever)),
+      start_(perspective_ ? -double(kNeverMet) : 0),
+      end_(perspective_ ? -1 / double(kNeverMet) : double(kNeverMet)),
       sides_(SidesOf(region.sides, camera)) {
   FindOutline({0, 0, camera.width, camera.height}, SidesOf(HalfSpacesOf(box), camera));
 }
@@ -110,8 +110,8 @@ void ClipRays::FindOutline(const PixelBounds& frame, const Sides& of_box) {
   for (const Side& side : sides_.entered) enter = std::max(enter, least(side.g));
   for (const Side& side : sides_.left) leave = std::min(leave, least(side.g));
   const auto rounded_down = [&](double g) { return float(std::max(0.0, DepthAt(std::max(g, start_)) * (1 - 1e-6))); };
-  least_enter_ = rounded_down(enter);
-  least_leave_ = rounded_down(leave);
+  if (!sides_.entered.empty()) least_enter_ = rounded_down(enter);
+  if (!sides_.left.empty()) least_leave_ = rounded_down(leave);
 }
 
 ClipRays::Columns ClipRays::ColumnsOf(std::int32_t row, const PixelBounds& within) const {
@@ -134,32 +134,12 @@ ClipRays::Columns ClipRays::ColumnsOf(std::int32_t row, const PixelBounds& withi
   return {std::max(pixel(least - kAround), within.x_begin), std::min(pixel(greatest + kAround) + 1, within.x_end)};
 }
 
-void ClipRays::Depths(std::int32_t column, std::int32_t row, std::size_t count, float* enter, float* leave) const {
-  constexpr std::size_t kPixels = 64;  // at a time
-  const double y = row + 0.5;
-  for (std::size_t first = 0; first < count; first += kPixels) {
-    const std::size_t pixels = std::min(kPixels, count - first);
-    std::array<double, kPixels> x, entered, left;
-    for (std::size_t n = 0; n < kPixels; ++n) x[n] = double(column + std::int32_t(first + n)) + 0.5;
-    entered.fill(start_);
-    left.fill(end_);
-    for (const Side& side : sides_.entered) {
-      const double g0 = side.g.at_0 + y * side.g.by_y, by_x = side.g.by_x;
-      for (std::size_t n = 0; n < kPixels; ++n) entered[n] = std::max(entered[n], g0 + x[n] * by_x);
-    }
-    for (const Side& side : sides_.left) {
-      const double g0 = side.g.at_0 + y * side.g.by_y, by_x = side.g.by_x;
-      for (std::size_t n = 0; n < kPixels; ++n) left[n] = std::min(left[n], g0 + x[n] * by_x);
-    }
-    for (const LinearInImage& g : sides_.never) {
-      for (std::size_t n = 0; n < kPixels; ++n) left[n] = g.At(x[n], y) < 0 ? start_ : left[n];
-    }
-    for (std::size_t n = 0; n < pixels; ++n) {
-      const bool meets = entered[n] < left[n];
-      enter[first + n] = !meets ? kNever : entered[n] > start_ ? float(DepthAt(entered[n])) : 0;
-      leave[first + n] = meets ? float(DepthAt(left[n])) : -1;
-    }
-  }
+RegionRow ClipRays::Row(std::int32_t row) const {
+  RegionRow result{.perspective = perspective_, .start = start_, .end = end_};
+  for (const Side& side : sides_.entered) result.entered.push_back(side.g.InRow(row));
+  for (const Side& side : sides_.left) result.left.push_back(side.g.InRow(row));
+  for (const LinearInImage& g : sides_.never) result.never.push_back(g.InRow(row));
+  return result;
 }
 
 std::size_t ClipRays::SideEntered(std::int32_t column, std::int32_t row) const {

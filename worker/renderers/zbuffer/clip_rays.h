@@ -1,7 +1,7 @@
 // ClipRays: where the rays of a frame's pixels enter and leave a clip region, which is convex.
 //
 // A ray is in the region between the farthest of the sides that it enters and the nearest of those that it leaves. Both follow from
-// functions g that are linear in a pixel's x and y, so that a whole row takes a few operations a pixel:
+// functions g that are linear in a pixel's x and y, so that a row takes a few operations a pixel (worker/kernels/clip_rows.h):
 //
 //   orthographic   g = depth       the side's distance from a ray's origin is linear, its rise along all rays the same
 //   perspective    g = -1 / depth  the other way round; g grows with the depth, too
@@ -21,6 +21,7 @@
 #include "common/image/pixel_bounds.h"
 #include "common/view/camera.h"
 #include "common/view/clip.h"
+#include "worker/kernels/clip_rows.h"
 
 namespace slabstream {
 
@@ -28,6 +29,7 @@ namespace slabstream {
 struct LinearInImage {
   double at_0 = 0, by_x = 0, by_y = 0;
   double At(double x, double y) const { return (at_0 + y * by_y) + x * by_x; }
+  LinearInRow InRow(std::int32_t row) const { return {at_0 + (row + 0.5) * by_y, by_x}; }
 };
 // From its values at (0, 0), (width, 0) and (0, height) of the camera.
 LinearInImage MakeLinear(const Camera& camera, double at_0, double at_right, double at_bottom);
@@ -45,12 +47,10 @@ class ClipRays {
   };
   Columns ColumnsOf(std::int32_t row, const PixelBounds& within) const;
 
-  // The depths at which the rays of pixels (column ... column + count - 1, row) are in the region: [enter, leave]. `enter` is 0 where the
-  // ray starts inside; rays that do not meet the region have kNever and -1.
-  static constexpr float kNever = 1e30F;
-  void Depths(std::int32_t column, std::int32_t row, std::size_t count, float* enter, float* leave) const;
+  // For RegionDepths.
+  RegionRow Row(std::int32_t row) const;
 
-  // No ray enters the region (leaves it) at a depth below this.
+  // No ray that meets both enters the region, or leaves it, at a depth below this. kNeverMet: none does.
   float least_enter() const { return least_enter_; }
   float least_leave() const { return least_leave_; }
   // The side, by number in the region, where the ray of a pixel that meets the region enters it, other than from its start, or leaves it.
@@ -72,14 +72,14 @@ class ClipRays {
   double DepthAt(double g) const { return perspective_ ? -1 / g : g; }
 
   const bool perspective_;
-  double start_, end_;  // g of depths 0 and kNever
+  const double start_, end_;  // g of depths 0 and kNeverMet
   Sides sides_;
   struct Point {
     double x, y;
   };
   std::vector<Point> outline_;  // corners in order
   PixelBounds bounds_;
-  float least_enter_ = kNever, least_leave_ = kNever;
+  float least_enter_ = kNeverMet, least_leave_ = kNeverMet;
 };
 
 }  // namespace slabstream

@@ -1,5 +1,7 @@
 #include "worker/renderers/zbuffer/cut_faces.h"
 
+#include <hwy/cache_control.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -14,6 +16,7 @@ namespace {
 constexpr double kSlack = 0x1p-8;
 constexpr double kMargin = 0.5;
 
+constexpr std::int32_t kPixels = 256;  // of a row, at a time
 constexpr std::uint32_t kCutAxis = 3;  // of FaceIndex: not the axis of a face
 
 std::size_t PlaceIn(const KeyBand& band, std::int32_t x, std::int32_t y) {
@@ -51,25 +54,29 @@ CutFaces::CutFaces(SlabData& slab, const FrameSetup& setup, const Box& box, cons
 bool CutFaces::IsWhole(const Box& part) const { return region_.KeepsAll(part, margin_); }
 
 void CutFaces::Limits(const PixelBounds& pixels, const KeyBand& band, float* from, float* to) const {
-  const float inwards = float(keep_ ? slack_ : -slack_);
+  const auto inwards = float(keep_ ? slack_ : -slack_);
+  std::array<float, kPixels + kRowPadding> enter, leave;
   for (std::int32_t y = pixels.y_begin; y < pixels.y_end; ++y) {
     const std::size_t first = PlaceIn(band, pixels.x_begin, y), end = first + std::size_t(pixels.width());
-    std::fill(from + first, from + end, ClipRays::kNever);
+    std::fill(from + first, from + end, kNeverMet);
     std::fill(to + first, to + end, -1.0F);
-    const auto [begin_column, end_column] = rays_.ColumnsOf(y, pixels);
-    if (begin_column >= end_column) continue;
-    const std::size_t met = PlaceIn(band, begin_column, y), count = std::size_t(end_column - begin_column);
-    rays_.Depths(begin_column, y, count, from + met, to + met);
-    for (std::size_t n = met; n < met + count; ++n) {
-      from[n] = from[n] > 0 ? from[n] + inwards : 0;
-      to[n] -= inwards;
+    const RegionRow row = rays_.Row(y);
+    const ClipRays::Columns columns = rays_.ColumnsOf(y, pixels);
+    for (std::int32_t column = columns.begin; column < columns.end; column += kPixels) {
+      const auto count = std::size_t(std::min(kPixels, columns.end - column));
+      RegionDepths(row, column, count, enter.data(), leave.data());
+      const std::size_t at = PlaceIn(band, column, y);
+      for (std::size_t n = 0; n < count; ++n) {
+        from[at + n] = enter[n] > 0 ? enter[n] + inwards : 0;
+        to[at + n] = leave[n] - inwards;
+      }
     }
   }
 }
 
 void CutFaces::Draw(const KeyBand& band, std::vector<CutPixel>& cuts) const {
   const PixelBounds pixels = Intersection(bounds(), band.bounds);
-  if (pixels.empty() || least_depth_ >= ClipRays::kNever) return;
+  if (pixels.empty() || least_depth_ >= kNeverMet) return;
   for (std::int32_t y = pixels.y_begin; y < pixels.y_end; ++y) {
     const ClipRays::Columns columns = rays_.ColumnsOf(y, pixels);
     if (columns.begin < columns.end && !AllNearer(band, {columns.begin, y, columns.end, y + 1}, least_depth_)) {
@@ -78,44 +85,47 @@ void CutFaces::Draw(const KeyBand& band, std::vector<CutPixel>& cuts) const {
   }
 }
 
-void CutFaces::DrawRow(const KeyBand& band, std::int32_t row, ClipRays::Columns columns, std::vector<CutPixel>& cuts) const {
-  constexpr std::int32_t kPixels = 256;  // at a time
-  const double y = row + 0.5;
-  std::array<double, 3> origin{}, direction{};
+void CutFaces::DrawRow(const KeyBand& band, std::int32_t y, ClipRays::Columns columns, std::vector<CutPixel>& cuts) const {
+  const RegionRow region = rays_.Row(y);
+  RayRow rays;
   for (std::size_t i = 0; i < 3; ++i) {
-    origin[i] = origin_[i].At(0, y) + 1.5;  // conversion to an integer rounds towards 0
-    direction[i] = direction_[i].At(0, y);
+    rays.origin[i] = origin_[i].InRow(y);
+    rays.direction[i] = direction_[i].InRow(y);
   }
+  std::array<float, kPixels + kRowPadding> enter, leave;
+  std::array<std::array<std::int32_t, kPixels + kRowPadding>, 3> voxels;
+  // Voxels along a cut lie far apart in memory: all of them are fetched before the first one is read.
+  std::array<std::int32_t, kPixels> candidates;
   VisitScalarType(voxels_.type, [&]<class T>(const T*) {
     const T* const samples = voxels_.samples<T>();
     for (std::int32_t begin = columns.begin; begin < columns.end; begin += kPixels) {
-      std::array<float, kPixels> enter, leave;
-      const std::int32_t end = std::min(begin + kPixels, columns.end);
-      rays_.Depths(begin, row, std::size_t(end - begin), enter.data(), leave.data());
+      const std::int32_t pixels = std::min(kPixels, columns.end - begin);
+      RegionDepths(region, begin, std::size_t(pixels), enter.data(), leave.data());
       const float* const depths = keep_ ? enter.data() : leave.data();
-      std::uint64_t* const keys = band.keys + PlaceIn(band, begin, row);
-      for (std::int32_t n = 0; n < end - begin; ++n) {
-        const float depth = depths[n];
-        if (!(depth > 0 && depth < ClipRays::kNever)) continue;
-        const std::uint64_t key = std::uint64_t{std::bit_cast<std::uint32_t>(depth)} << 32 | (kFirstCut + cuts.size());
-        if (key >= keys[n]) continue;
-        // The voxel just behind the cut.
-        const double x = begin + n + 0.5, behind = double(depth) + slack_;
-        const auto along = [&](std::size_t i) {
-          const double p = (origin[i] + x * origin_[i].by_x) + behind * (direction[i] + x * direction_[i].by_x);
-          return std::int32_t(std::clamp(p, 0.0, double(kMaxVolumeSide) + 1)) - 1;
-        };
-        const Index3 voxel = {along(0), along(1), along(2)};
-        if (!box_.Contains(voxel)) continue;
+      VoxelsAt(rays, begin, std::size_t(pixels), depths, slack_, voxels[0].data(), voxels[1].data(), voxels[2].data());
+      std::uint64_t* const keys = band.keys + PlaceIn(band, begin, y);
+      const auto voxel_at = [&](std::size_t n) { return Index3{voxels[0][n], voxels[1][n], voxels[2][n]}; };
+      std::size_t count = 0;
+      for (std::int32_t n = 0; n < pixels; ++n) {
+        const float depth = depths[std::size_t(n)];
+        const Index3 voxel = voxel_at(std::size_t(n));
+        if (!(depth > 0 && depth < kNeverMet) || std::bit_cast<std::uint32_t>(depth) > keys[n] >> 32 || !box_.Contains(voxel)) continue;
+        hwy::Prefetch(samples + voxels_.Offset(voxel));
+        candidates[count++] = n;
+      }
+      for (std::size_t i = 0; i < count; ++i) {
+        const std::int32_t n = candidates[i], x = begin + n;
+        const Index3 voxel = voxel_at(std::size_t(n));
         const auto sample = double(samples[voxels_.Offset(voxel)]);
         if (!std::isfinite(sample)) continue;
         const auto bin = std::uint16_t(table_.BinOf(sample));
         if (opaque_.selected[bin] == 0) continue;
-        const std::size_t side = keep_ ? rays_.SideEntered(begin + n, row) : rays_.SideLeft(begin + n, row);
+        const float depth = depths[std::size_t(n)];
         const std::uint32_t index = FaceIndex(std::uint32_t(voxel.x), std::uint32_t(voxel.y), std::uint32_t(voxel.z), kCutAxis,
                                               std::uint32_t(bricks_.x), std::uint32_t(bricks_.y));
-        keys[n] = key;
-        cuts.push_back({begin + n, row, depth, index, bin, std::uint16_t(side)});
+        const std::size_t side = keep_ ? rays_.SideEntered(x, y) : rays_.SideLeft(x, y);
+        keys[n] = std::uint64_t{std::bit_cast<std::uint32_t>(depth)} << 32 | (kFirstCut + cuts.size());
+        cuts.push_back({x, y, depth, index, bin, std::uint16_t(side)});
       }
     }
   });

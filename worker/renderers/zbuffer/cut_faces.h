@@ -57,7 +57,7 @@ class CutFaces {
   void Shade(const std::vector<CutPixel>& cuts, LocalImage& image) const;
 
  private:
-  void DrawRow(const KeyBand& band, std::int32_t row, ClipRays::Columns columns, std::vector<CutPixel>& cuts) const;
+  void DrawRow(const KeyBand& band, std::int32_t y, ClipRays::Columns columns, std::vector<CutPixel>& cuts) const;
 
   const ClipRegion& region_;
   const ClipRays rays_;
@@ -66,7 +66,7 @@ class CutFaces {
   const bool keep_;
   const double slack_;                               // physical
   const double margin_;                              // likewise: what is so far from every side needs no limits
-  const float least_depth_;                          // of a cut; ClipRays::kNever: there is none
+  const float least_depth_;                          // of a cut; kNeverMet: there is none
   std::array<LinearInImage, 3> origin_, direction_;  // of a pixel's ray, data space: origin + depth * direction
   std::vector<PhongFactors> light_;                  // by side
   const ClassificationTable& table_;
