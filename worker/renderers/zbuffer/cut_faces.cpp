@@ -25,7 +25,7 @@ std::size_t PlaceIn(const KeyBand& band, std::int32_t x, std::int32_t y) {
 
 }  // namespace
 
-CutFaces::CutFaces(SlabData& slab, const FrameSetup& setup, const Box& box, const BinSelection& opaque)
+CutFaces::CutFaces(SlabData& slab, const FrameSetup& setup, const Box& box, const BinSelection& opaque, const ShownLabels* labels)
     : region_(setup.clip),
       rays_(setup.clip, setup.camera, box),
       voxels_(slab.voxels()),
@@ -36,6 +36,7 @@ CutFaces::CutFaces(SlabData& slab, const FrameSetup& setup, const Box& box, cons
       least_depth_(keep_ ? rays_.least_enter() : rays_.least_leave()),
       table_(slab.Classification(setup)),
       opaque_(opaque),
+      labels_(labels),
       bricks_(CubesOver(setup.description.geometry.size, kFaceBrick)) {
   const Camera& camera = setup.camera;
   const Camera::Ray first = camera.RayAt(0, 0), right = camera.RayAt(camera.width, 0), down = camera.RayAt(0, camera.height);
@@ -117,15 +118,21 @@ void CutFaces::DrawRow(const KeyBand& band, std::int32_t y, ClipRays::Columns co
         const std::int32_t n = candidates[i], x = begin + n;
         const Index3 voxel = voxel_at(std::size_t(n));
         const auto sample = double(samples[voxels_.Offset(voxel)]);
-        if (!std::isfinite(sample)) continue;
-        const auto bin = std::uint16_t(table_.BinOf(sample));
-        if (opaque_.selected[bin] == 0) continue;
+        const std::uint16_t label = labels_ != nullptr ? labels_->NumberOf(voxel) : 0;
+        const LabelUse use = labels_ != nullptr ? labels_->uses[label] : LabelUse::kAsVolume;
+        if (use == LabelUse::kClear) continue;
+        std::uint16_t bin = 0;
+        if (use == LabelUse::kAsVolume) {
+          if (!std::isfinite(sample)) continue;
+          bin = std::uint16_t(table_.BinOf(sample));
+          if (opaque_.selected[bin] == 0) continue;
+        }
         const float depth = depths[std::size_t(n)];
         const std::uint32_t index = FaceIndex(std::uint32_t(voxel.x), std::uint32_t(voxel.y), std::uint32_t(voxel.z), kCutAxis,
                                               std::uint32_t(bricks_.x), std::uint32_t(bricks_.y));
         const std::size_t side = keep_ ? rays_.SideEntered(x, y) : rays_.SideLeft(x, y);
         keys[n] = std::uint64_t{std::bit_cast<std::uint32_t>(depth)} << 32 | (kFirstCut + cuts.size());
-        cuts.push_back({x, y, depth, index, bin, std::uint16_t(side)});
+        cuts.push_back({x, y, depth, index, bin, label, std::uint16_t(side)});
       }
     }
   });
@@ -142,15 +149,18 @@ void CutFaces::TakeSeen(const KeyBand& band, std::vector<CutPixel>& cuts) {
   cuts.resize(seen);
 }
 
-void CutFaces::Shade(const std::vector<CutPixel>& cuts, LocalImage& image) const {
+void CutFaces::Shade(const std::vector<CutPixel>& cuts, const FaceShading& shading, LocalImage& image) const {
   for (const CutPixel& cut : cuts) {
     const std::size_t pixel =
         std::size_t(cut.y - image.bounds.y_begin) * std::size_t(image.bounds.width()) + std::size_t(cut.x - image.bounds.x_begin);
-    const Rgb& color = table_.color[cut.bin];
+    const float* const of_bin = shading.colors + 4 * std::size_t{cut.bin};
+    const float* const of_label = shading.labels != nullptr ? shading.label_colors + 4 * std::size_t{cut.label} : nullptr;
     const PhongFactors& light = light_[cut.side];
-    const auto lit = [&](float channel) { return std::clamp(channel * light.diffuse + light.specular, 0.0F, 1.0F); };
-    const std::array<float, 4> rgba = {lit(color.r), lit(color.g), lit(color.b), 1};
-    std::ranges::copy(rgba, &image.rgba[4 * pixel]);
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float color = of_label != nullptr ? of_bin[c] * (1 - of_label[3]) + of_label[c] : of_bin[c];
+      image.rgba[4 * pixel + c] = std::clamp(color * light.diffuse + light.specular, 0.0F, 1.0F);
+    }
+    image.rgba[4 * pixel + 3] = 1;
     image.depth[pixel] = cut.depth;
     image.voxel[pixel] = cut.voxel;
   }

@@ -15,9 +15,11 @@
 #include "common/image/local_image.h"
 #include "common/view/phong.h"
 #include "worker/kernels/draw_faces.h"
+#include "worker/kernels/shade_faces.h"
 #include "worker/renderers/bin_lookup.h"
 #include "worker/renderers/slab_data.h"
 #include "worker/renderers/zbuffer/clip_rays.h"
+#include "worker/renderers/zbuffer/shown_labels.h"
 
 namespace slabstream {
 
@@ -26,14 +28,15 @@ struct CutPixel {
   std::int32_t x = 0, y = 0;
   float depth = 0;
   std::uint32_t voxel = 0;  // FaceIndex
-  std::uint16_t bin = 0;
+  std::uint16_t bin = 0, label = 0;
   std::uint16_t side = 0;  // of the clip region
 };
 
 class CutFaces {
  public:
-  // `opaque`: the bins of opaque voxels, by the slab's table. All must outlive this. The setup's clip region is not empty.
-  CutFaces(SlabData& slab, const FrameSetup& setup, const Box& box, const BinSelection& opaque);
+  // `opaque`: the bins of opaque voxels, by the slab's table. `labels`: null if they are not shown. All must outlive this. The setup's clip
+  // region is not empty.
+  CutFaces(SlabData& slab, const FrameSetup& setup, const Box& box, const BinSelection& opaque, const ShownLabels* labels);
 
   // Pixels outside see nothing of the box that lies in the clip region.
   const PixelBounds& bounds() const { return rays_.bounds(); }
@@ -53,8 +56,8 @@ class CutFaces {
   void Draw(const KeyBand& band, std::vector<CutPixel>& cuts) const;
   // Takes the cuts out of the band again, and leaves those in `cuts` that are seen.
   static void TakeSeen(const KeyBand& band, std::vector<CutPixel>& cuts);
-  // Fills in pixels of `image` (kDepth), after the others.
-  void Shade(const std::vector<CutPixel>& cuts, LocalImage& image) const;
+  // Fills in pixels of `image` (kDepth), after the others. Of `shading`: the colours.
+  void Shade(const std::vector<CutPixel>& cuts, const FaceShading& shading, LocalImage& image) const;
 
  private:
   void DrawRow(const KeyBand& band, std::int32_t y, ClipRays::Columns columns, std::vector<CutPixel>& cuts) const;
@@ -71,6 +74,7 @@ class CutFaces {
   std::vector<PhongFactors> light_;                  // by side
   const ClassificationTable& table_;
   const BinSelection& opaque_;
+  const ShownLabels* const labels_;
   const Index3 bricks_;
 };
 

@@ -173,7 +173,7 @@ class ZBufferRenderer : public Renderer {
     auto& cache = slab.CacheOf<SurfaceCache>();
     const Surface& surface = cache.Of(slab, setup, box);
     std::optional<CutFaces> cuts;
-    if (!setup.clip.empty()) cuts.emplace(slab, setup, box, cache.opaque_bins());
+    if (!setup.clip.empty()) cuts.emplace(slab, setup, box, cache.opaque_bins(), cache.labels());
     clock.Charge(Stage::kPrepare);
 
     const BrickProjection projection(setup.camera, setup.description.geometry.size);
@@ -188,6 +188,12 @@ class ZBufferRenderer : public Renderer {
     colors.reserve(4 * table.color.size());
     for (const Rgb& color : table.color) colors.insert(colors.end(), {color.r, color.g, color.b, 1});
     shading.colors = colors.data();
+    std::vector<float> label_colors;
+    if (setup.looks.labels) {
+      label_colors = LabelColors(*setup.looks.labels);
+      shading.labels = surface.labels.data();
+      shading.label_colors = label_colors.data();
+    }
     clock.Charge(Stage::kZBuffer);
 
     std::atomic<std::size_t> drawn = 0;
@@ -210,7 +216,7 @@ class ZBufferRenderer : public Renderer {
         ShadeFaceRow(shading, band.keys + row, band.bounds.x_begin, y, width, &image.rgba[4 * pixel], &image.depth[pixel],
                      &image.voxel[pixel]);
       }
-      if (cuts) cuts->Shade(scratch.cuts, image);
+      if (cuts) cuts->Shade(scratch.cuts, shading, image);
       draw_ns += (middle - begin).count();
       shade_ns += (MonotonicNow() - middle).count();
     });
