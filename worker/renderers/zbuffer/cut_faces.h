@@ -34,8 +34,8 @@ struct CutPixel {
 
 class CutFaces {
  public:
-  // `opaque`: the bins of opaque voxels, by the slab's table. `labels`: null if they are not shown. All must outlive this. The setup's clip
-  // region is not empty.
+  // `box`: no other voxels are drawn. `opaque`: the bins of opaque voxels, by the slab's table. `labels`: null if they are not shown. All
+  // must outlive this. The setup's clip region is not empty.
   CutFaces(SlabData& slab, const FrameSetup& setup, const Box& box, const BinSelection& opaque, const ShownLabels* labels);
 
   // Pixels outside see nothing of the box that lies in the clip region.

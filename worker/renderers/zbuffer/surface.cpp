@@ -263,6 +263,7 @@ Surface FindSurface(const VoxelBlock& voxels, const OpaqueVoxels& opaque, const 
   const BrickGrid bricks(inside);
   std::vector<BrickFaces> made(bricks.size());
   std::vector<FoundFaces> parts(bricks.size());
+  std::vector<std::uint8_t> may_be_opaque(bricks.size());
   VisitScalarType(voxels.type, [&]<class T>(const T*) {
     const BinLookup<T> lookup(opaque.table, opaque.bins);
     const auto any_opaque = [&](const Index3& brick) {
@@ -278,6 +279,7 @@ Surface FindSurface(const VoxelBlock& voxels, const OpaqueVoxels& opaque, const 
         if (!any_opaque(brick)) continue;
         const Index3 origin = {brick.x * kFaceBrick, brick.y * kFaceBrick, brick.z * kFaceBrick};
         const std::size_t number = bricks.Number(brick);
+        may_be_opaque[number] = 1;
         if (FindKnown(known, origin, bricks.BoxOf(brick), parts[number])) continue;
         if (surface == nullptr) surface = std::make_unique<BrickSurface<T>>(voxels, lookup, opaque.labels, spacing);
         made[number] = surface->Find(origin, bricks.BoxOf(brick));
@@ -285,7 +287,11 @@ Surface FindSurface(const VoxelBlock& voxels, const OpaqueVoxels& opaque, const 
       }
     });
   });
-  return Join(parts, opaque.labels != nullptr);
+  Surface surface = Join(parts, opaque.labels != nullptr);
+  for (std::size_t i = 0; i < bricks.size(); ++i) {
+    if (may_be_opaque[i] != 0) surface.opaque_hull = Hull(surface.opaque_hull, bricks.BoxOf(bricks.first + PlaceIn(bricks.counts, i)));
+  }
+  return surface;
 }
 
 }  // namespace slabstream

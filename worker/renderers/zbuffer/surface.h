@@ -31,6 +31,8 @@ struct Surface {
   AlignedVector<FaceNormals> normals;  // by face
   std::vector<std::uint16_t> labels;   // by face: the number of its voxel's label, and one more; empty if labels are not shown
 
+  Box opaque_hull;  // outside it no voxel of the box is opaque; whole bricks, so it may be too large
+
   std::size_t bytes() const;
 };
 

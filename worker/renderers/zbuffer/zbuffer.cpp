@@ -173,7 +173,10 @@ class ZBufferRenderer : public Renderer {
     auto& cache = slab.CacheOf<SurfaceCache>();
     const Surface& surface = cache.Of(slab, setup, box);
     std::optional<CutFaces> cuts;
-    if (!setup.clip.empty()) cuts.emplace(slab, setup, box, cache.opaque_bins(), cache.labels());
+    // Cuts lie in opaque voxels; without these there are no faces either.
+    if (!setup.clip.empty() && !surface.opaque_hull.empty()) {
+      cuts.emplace(slab, setup, surface.opaque_hull, cache.opaque_bins(), cache.labels());
+    }
     clock.Charge(Stage::kPrepare);
 
     const BrickProjection projection(setup.camera, setup.description.geometry.size);
