@@ -126,7 +126,8 @@ void AddLayerOptions(CLI::App& app, FrameRequest& request, LayerFiles& files, bo
       ->default_str(fmt::format("{:g}", kDefaultTint));
   if (opacities) {
     AddText(app, "--label-opacity",
-            "Opacities of labels from 0 to 1, others have 1; tint: a factor of the material's; surface: of a voxel length",
+            "Opacities of labels from 0 to 1, others have 1; tint: a factor of the material's; surface: of a voxel length; zbuffer: clear "
+            "below 0.5",
             [&request](const std::string& option, const std::string& text) {
               Shown(request.labels).opacities.clear();
               return ReadOpacities(option, text, *request.labels);

@@ -118,11 +118,11 @@ Status Validate(const FrameRequest& request) {
   if (Status s = Validate(request.clipping); !s.ok()) return s;
   if (Status s = Validate(request.transfer); !s.ok()) return s;
   if (request.labels) {
-    if (Status s = RequireAbility("labels", **renderer, &RendererKind::shows_layers); !s.ok()) return s;
+    if (Status s = RequireAbility("labels", **renderer, &RendererKind::shows_labels); !s.ok()) return s;
     if (Status s = Validate(*request.labels); !s.ok()) return s;
   }
   if (request.overlay) {
-    if (Status s = RequireAbility("overlay", **renderer, &RendererKind::shows_layers); !s.ok()) return s;
+    if (Status s = RequireAbility("overlay", **renderer, &RendererKind::shows_overlays); !s.ok()) return s;
     if (Status s = Validate(request.overlay->transfer); !s.ok()) return Status(s.code(), "overlay." + s.message());
     if (Status s = CheckCurvesAlone(request.overlay->transfer); !s.ok()) return s;
     if (Status s = InRange("overlay.weight", request.overlay->weight, 0, 1); !s.ok()) return s;

@@ -68,11 +68,12 @@ class RendererKind {
     PixelFormat format = PixelFormat::kRgba;  // of local images with default parameters; says how they combine (common/kernels/combine.h)
     std::int32_t reach = kHalo;               // voxels outside a box that its samples depend on, [0, kHalo]
     bool along_slices = false;                // the frame is an image along the slices (SheetGrid), else the camera's
-    bool shows_layers = false;                // labels and overlays, too
-    bool isosurfaces = false;                 // draws TransferFunction::isosurfaces
-    bool gradient_opacity = false;            // multiplies opacities by TransferFunction::gradient_opacities
-    double footprint = 1;                     // pixels that a voxel fills, for each pixel of its cross-section
-    std::vector<Stage> stages;                // stages that the pixel half charges time to, in order
+    bool shows_labels = false;
+    bool shows_overlays = false;
+    bool isosurfaces = false;       // draws TransferFunction::isosurfaces
+    bool gradient_opacity = false;  // multiplies opacities by TransferFunction::gradient_opacities
+    double footprint = 1;           // pixels that a voxel fills, for each pixel of its cross-section
+    std::vector<Stage> stages;      // stages that the pixel half charges time to, in order
     std::vector<RendererParameter> parameters;
   };
 
@@ -87,7 +88,8 @@ class RendererKind {
   PixelFormat format() const { return facts_.format; }
   std::int32_t reach() const { return facts_.reach; }
   bool along_slices() const { return facts_.along_slices; }
-  bool shows_layers() const { return facts_.shows_layers; }
+  bool shows_labels() const { return facts_.shows_labels; }
+  bool shows_overlays() const { return facts_.shows_overlays; }
   bool isosurfaces() const { return facts_.isosurfaces; }
   bool gradient_opacity() const { return facts_.gradient_opacity; }
   double footprint() const { return facts_.footprint; }

@@ -154,6 +154,14 @@ bool ClipRegion::MayKeep(const Box& box) const {
   return std::ranges::any_of(sides, [&](const HalfSpace& side) { return DistancesOf(side, box).least <= slack(side); });
 }
 
+bool ClipRegion::KeepsAll(const Box& box, double margin) const {
+  if (empty()) return true;
+  if (mode == ClipMode::kKeep) {
+    return std::ranges::all_of(sides, [&](const HalfSpace& side) { return DistancesOf(side, box).least >= margin; });
+  }
+  return std::ranges::any_of(sides, [&](const HalfSpace& side) { return DistancesOf(side, box).greatest <= -margin; });
+}
+
 Result<ClipRegion> MakeClipRegion(const Clipping& clipping, const VolumeGeometry& geometry) {
   ClipRegion region{{}, clipping.mode};
   if (clipping.box) AddBox(*clipping.box, geometry, region.sides);

@@ -91,6 +91,9 @@ struct ClipRegion {
   bool Keeps(const Vec3& p) const;
   // Whether any sample in the voxels of `box` (not empty) may be drawn. False is certain.
   bool MayKeep(const Box& box) const;
+  // Whether every point of the voxels of `box` (not empty) is drawn, and all round them that are nearer than `margin`, in the unit of the
+  // spacing. True is certain.
+  bool KeepsAll(const Box& box, double margin) const;
   friend bool operator==(const ClipRegion&, const ClipRegion&) = default;
 };
 

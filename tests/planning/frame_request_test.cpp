@@ -43,6 +43,12 @@ TEST(ValidateFrameRequest, NamesFieldValueAndLimit) {
       {[](auto& r) { r.transfer.opacity_distance = 0; }, "transfer.opacity_distance is 0, but must lie in (0, 1000000] voxel lengths"},
       {[](auto& r) { r.transfer.opacity_distance = kNan; }, "transfer.opacity_distance is nan"},
       {[](auto& r) { r.shading.ambient = 7; }, "shading.ambient is 7"},
+      {[](auto& r) { r.labels.emplace(); }, "renderer is 'splat', but labels needs one of: zbuffer, raycast"},
+      {[](auto& r) {
+         r.renderer = "zbuffer";
+         r.overlay.emplace();
+       },
+       "renderer is 'zbuffer', but overlay needs one of: raycast"},
       {[](auto& r) { r.termination = 0.6; }, "termination is 0.6, but must lie in [0, 0.5]"},
       {[](auto& r) { r.termination = kNan; }, "termination is nan"},
       {[](auto& r) { r.policy.decomposition = ""; }, "policy.decomposition has 0 bytes"},

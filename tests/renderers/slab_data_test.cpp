@@ -114,7 +114,8 @@ TEST(Surface, IsTheOpenFacesOfOpaqueVoxels) {
     v[side / 2] += side % 2 == 0 ? -1 : 1;
     return v;
   };
-  const Surface surface = FindSurface(slab->voxels(), slab->ranges(), table, SelectBins(table, threshold), {1, 1, 1}, box);
+  const BinSelection bins = SelectBins(table, threshold);
+  const Surface surface = FindSurface(slab->voxels(), {table, bins, slab->ranges()}, {1, 1, 1}, box);
   std::size_t expected = 0;
   for (Index3 v = box.begin; v.z < box.end.z; ++v.z) {
     for (v.y = box.begin.y; v.y < box.end.y; ++v.y) {

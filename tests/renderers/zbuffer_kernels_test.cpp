@@ -146,6 +146,8 @@ struct RandomFaces {
       normals.push_back(corners);
     }
     for (int i = 0; i < 4 * 16; ++i) colors.push_back(uniform(random));
+    for (int face = 0; face < 200; ++face) labels.push_back(std::uint16_t(random() % 8));
+    for (int i = 0; i < 4 * 8; ++i) label_colors.push_back(uniform(random) / 2);
     for (int i = 0; i < 100; ++i) {
       const float depth = random() % 3 == 0 ? std::numeric_limits<float>::infinity() : 60 + 60 * uniform(random);
       keys.push_back(std::uint64_t{std::bit_cast<std::uint32_t>(depth)} << 32 | (std::isinf(depth) ? 0xFFFFFFFF : random() % 200));
@@ -157,11 +159,17 @@ struct RandomFaces {
     out.sites = sites.data();
     out.normals = normals.data();
     out.colors = colors.data();
+    if (with_labels) {
+      out.labels = labels.data();
+      out.label_colors = label_colors.data();
+    }
     return out;
   }
   std::vector<FaceSite> sites;
   std::vector<FaceNormals> normals;
-  std::vector<float> colors;
+  std::vector<float> colors, label_colors;
+  std::vector<std::uint16_t> labels;
+  bool with_labels = false;
   std::vector<std::uint64_t> keys;
 };
 
@@ -173,7 +181,8 @@ TEST(ShadeFaces, IsTheSameBitsOnEveryInstructionSet) {
   for (Projection projection : kProjections) {
     for (unsigned seed = 70; seed < 80; ++seed) {
       SCOPED_TRACE(seed);
-      const RandomFaces faces(seed);
+      RandomFaces faces(seed);
+      faces.with_labels = seed % 2 == 1;
       std::mt19937 random(seed);
       const FaceShading shading = faces.Shading(MakeCamera(RandomView(projection, random), {100, 80}, kGeometry), shadings[seed % 4]);
       for (std::size_t count : {1, 3, 4, 5, 15, 16, 17, 33, 64, 100}) {

@@ -134,7 +134,7 @@ TEST_F(DatasetsTest, LayersOfADatasetAreThoseOfTheirFiles) {
   EXPECT_THAT(client_->Render(request).status().message(), testing::HasSubstr("no label from 3 to 9; it has 2 from 1 to 2"));
   request.renderer = "splat";
   request.labels->shown.clear();
-  EXPECT_THAT(client_->Render(request).status().message(), testing::HasSubstr("labels needs one of: raycast"));
+  EXPECT_THAT(client_->Render(request).status().message(), testing::HasSubstr("labels needs one of: zbuffer, raycast"));
   EXPECT_FALSE(Order(DataAction::kAdd, {"wrong=" + file_.string() + ",labels=" + (directory_ / "none.nrrd").string()}).ok());
 }
 

@@ -100,6 +100,30 @@ TEST(Clip, DropsNoBoxThatHoldsAPointWhichIsKept) {
   EXPECT_GT(dropped, 50);
 }
 
+TEST(Clip, KeepsAllOfABoxOnlyIfItKeepsEveryPointRoundIt) {
+  Random random(24);
+  int whole = 0;
+  for (int i = 0; i < 1000; ++i) {
+    SCOPED_TRACE(random.trace());
+    const VolumeGeometry geometry = RandomGeometry(random, World::kScene);
+    const ClipRegion region = MakeClipRegion(RandomClipping(random, geometry), geometry).value();
+    const Box box = RandomBox(random, geometry.bounds());
+    const double margin = 0.5 * Least(geometry.spacing);
+    if (!region.KeepsAll(box, margin)) continue;
+    if (!region.empty()) ++whole;
+    EXPECT_TRUE(region.MayKeep(box));
+    for (int n = 0; n < 50; ++n) {
+      // A unit of data space is at least the least spacing, so a step of less than half a voxel along one axis stays within the margin.
+      Vec3 p;
+      for (const Axis axis : kAxes) p[axis] = random.Real(box.begin[axis] - 0.5, box.end[axis] - 0.5);
+      const int axis = n % 3;
+      p[axis] += random.Real(-0.99, 0.99) * margin / geometry.spacing[axis];
+      EXPECT_TRUE(region.Keeps(p));
+    }
+  }
+  EXPECT_GT(whole, 50);
+}
+
 TEST(Clip, DistancesArePhysical) {
   Random random(23);
   const VolumeGeometry geometry = RandomGeometry(random, World::kScene);

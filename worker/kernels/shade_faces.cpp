@@ -69,13 +69,20 @@ HWY_INLINE bool AllEmpty(const std::uint64_t* HWY_RESTRICT keys) {
 }
 
 // For pixels that are not all empty; empty ones get any face.
+template <bool kLabels>
 HWY_INLINE void Stage(const FaceShading& shading, const std::uint64_t* HWY_RESTRICT keys, Staged& staged) {
   for (std::size_t i = 0; i < kLanes; ++i) {
     const std::size_t face = IsEmpty(keys[i]) ? 0 : std::uint32_t(keys[i]);
     staged.sites[i] = shading.sites[face];
     staged.normals[i] = shading.normals[face];
     const std::size_t bin = shading.sites[face].bin_and_side & ((1U << kBinBits) - 1);
-    std::copy_n(shading.colors + 4 * bin, 4, &staged.colors[4 * i]);
+    if constexpr (kLabels) {
+      const float* of_bin = shading.colors + 4 * bin;
+      const float* of_label = shading.label_colors + 4 * std::size_t{shading.labels[face]};
+      for (std::size_t c = 0; c < 4; ++c) staged.colors[4 * i + c] = of_bin[c] * (1 - of_label[3]) + of_label[c];
+    } else {
+      std::copy_n(shading.colors + 4 * bin, 4, &staged.colors[4 * i]);
+    }
   }
 }
 
@@ -173,8 +180,9 @@ HWY_INLINE void ShadePixels(const FaceShading& shading, const std::uint64_t* HWY
   hn::StoreInterleaved4(channel(red), channel(green), channel(blue), hn::IfThenElseZero(seen, Set(1)), df, rgba);
 }
 
-void ShadeRow(const FaceShading& shading, const std::uint64_t* keys, std::int32_t column, std::int32_t row, std::size_t count, float* rgba,
-              float* depth, std::uint32_t* voxel) {
+template <bool kLabels>
+HWY_INLINE void ShadeRowOf(const FaceShading& shading, const std::uint64_t* keys, std::int32_t column, std::int32_t row, std::size_t count,
+                           float* rgba, float* depth, std::uint32_t* voxel) {
   // The last pixels go through a buffer: keys after the row are meaningless, and nothing may be written there.
   const std::size_t whole = count / kLanes * kLanes;
   alignas(64) std::array<std::uint64_t, kLanes> last_keys;
@@ -185,7 +193,7 @@ void ShadeRow(const FaceShading& shading, const std::uint64_t* keys, std::int32_
   constexpr std::size_t kAhead = 3 * kLanes;  // pixels
   std::array<Staged, 2> staged;
   const auto stage = [&](std::size_t n) {
-    if (!AllEmpty(keys_at(n))) Stage(shading, keys_at(n), staged[n / kLanes % 2]);
+    if (!AllEmpty(keys_at(n))) Stage<kLabels>(shading, keys_at(n), staged[n / kLanes % 2]);
   };
   stage(0);
   for (std::size_t n = 0; n < whole; n += kLanes) {
@@ -202,6 +210,15 @@ void ShadeRow(const FaceShading& shading, const std::uint64_t* keys, std::int32_
   std::copy_n(last_rgba.begin(), 4 * (count - whole), rgba + 4 * whole);
   std::copy_n(last_depth.begin(), count - whole, depth + whole);
   std::copy_n(last_voxel.begin(), count - whole, voxel + whole);
+}
+
+void ShadeRow(const FaceShading& shading, const std::uint64_t* keys, std::int32_t column, std::int32_t row, std::size_t count, float* rgba,
+              float* depth, std::uint32_t* voxel) {
+  if (shading.labels != nullptr) {
+    ShadeRowOf<true>(shading, keys, column, row, count, rgba, depth, voxel);
+  } else {
+    ShadeRowOf<false>(shading, keys, column, row, count, rgba, depth, voxel);
+  }
 }
 
 }  // namespace slabstream::HWY_NAMESPACE

@@ -113,8 +113,15 @@ void ShadeFaceRowReference(const FaceShading& shading, const std::uint64_t* keys
         specular = shading.specular * shine;
       }
     }
-    const float* color = shading.colors + 4 * std::size_t(site.bin_and_side & ((1U << kBinBits) - 1));
-    for (std::size_t c = 0; c < 3; ++c) rgba[4 * n + c] = std::clamp(color[c] * diffuse + specular, 0.0F, 1.0F);
+    const float* of_bin = shading.colors + 4 * std::size_t(site.bin_and_side & ((1U << kBinBits) - 1));
+    for (std::size_t c = 0; c < 3; ++c) {
+      float color = of_bin[c];
+      if (shading.labels != nullptr) {
+        const float* of_label = shading.label_colors + 4 * std::size_t{shading.labels[std::uint32_t(keys[n])]};
+        color = color * (1 - of_label[3]) + of_label[c];
+      }
+      rgba[4 * n + c] = std::clamp(color * diffuse + specular, 0.0F, 1.0F);
+    }
     rgba[4 * n + 3] = 1;
   }
 }

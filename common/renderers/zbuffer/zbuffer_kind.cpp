@@ -52,6 +52,7 @@ class ZBufferKind : public RendererKind {
                       .purpose = "the surfaces of opaque voxels; for solid objects",
                       .format = PixelFormat::kDepth,
                       .reach = kHalo,  // 2 would do; as for splatting, so that both use the same cached voxels
+                      .shows_labels = true,
                       .isosurfaces = true,
                       .footprint = 1,
                       .stages = {Stage::kZBuffer, Stage::kShade}}) {}

@@ -1,6 +1,9 @@
 #include "worker/renderers/zbuffer/cut_faces.h"
 
+#include <hwy/cache_control.h>
+
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -9,112 +12,157 @@
 namespace slabstream {
 namespace {
 
-constexpr double kSlack = 0x1p-8;  // of the least spacing
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kAlong = 1e-9;        // a ray that comes nearer to a side by less runs along it: physical, a unit of depth
+// Of the least spacing.
+constexpr double kSlack = 0x1p-8;
+constexpr double kMargin = 0.5;
+
+constexpr std::int32_t kPixels = 256;  // of a row, at a time
 constexpr std::uint32_t kCutAxis = 3;  // of FaceIndex: not the axis of a face
+
+std::size_t PlaceIn(const KeyBand& band, std::int32_t x, std::int32_t y) {
+  return std::size_t(y - band.bounds.y_begin) * band.stride + std::size_t(x - band.bounds.x_begin);
+}
 
 }  // namespace
 
-CutFaces::CutFaces(SlabData& slab, const FrameSetup& setup, const Box& box, const BinSelection& opaque)
-    : voxels_(slab.voxels()),
+CutFaces::CutFaces(SlabData& slab, const FrameSetup& setup, const Box& box, const BinSelection& opaque, const ShownLabels* labels)
+    : region_(setup.clip),
+      rays_(setup.clip, setup.camera, box),
+      voxels_(slab.voxels()),
       box_(box),
       keep_(setup.clip.mode == ClipMode::kKeep),
       slack_(kSlack * Least(setup.description.geometry.spacing)),
+      margin_(kMargin * Least(setup.description.geometry.spacing)),
+      least_depth_(keep_ ? rays_.least_enter() : rays_.least_leave()),
       table_(slab.Classification(setup)),
       opaque_(opaque),
+      labels_(labels),
       bricks_(CubesOver(setup.description.geometry.size, kFaceBrick)) {
-  const VolumeGeometry& geometry = setup.description.geometry;
   const Camera& camera = setup.camera;
   const Camera::Ray first = camera.RayAt(0, 0), right = camera.RayAt(camera.width, 0), down = camera.RayAt(0, camera.height);
-  const auto linear = [&](double at_0, double at_right, double at_bottom) {
-    return Linear{at_0, (at_right - at_0) / camera.width, (at_bottom - at_0) / camera.height};
-  };
   for (const Axis axis : kAxes) {
     const auto i = std::size_t(Number(axis));
-    origin_[i] = linear(first.origin[axis], right.origin[axis], down.origin[axis]);
-    direction_[i] = linear(first.direction[axis], right.direction[axis], down.direction[axis]);
+    origin_[i] = MakeLinear(camera, first.origin[axis], right.origin[axis], down.origin[axis]);
+    direction_[i] = MakeLinear(camera, first.direction[axis], right.direction[axis], down.direction[axis]);
   }
   const Phong phong(setup.shading, camera.view_direction);
+  const bool lit = setup.shading.model == ShadingModel::kPhong;
   for (const HalfSpace& side : setup.clip.sides) {
-    const auto along = [&](const Vec3& v) { return Dot(side.normal, v); };
-    const bool lit = setup.shading.model == ShadingModel::kPhong;
-    sides_.push_back({linear(side.Distance(first.origin), side.Distance(right.origin), side.Distance(down.origin)),
-                      linear(along(first.direction), along(right.direction), along(down.direction)),
-                      lit ? phong.AtNormal(Normalized(side.normal / geometry.spacing)) : PhongFactors{}});
+    light_.push_back(lit ? phong.AtNormal(Normalized(side.normal / setup.description.geometry.spacing)) : PhongFactors{});
   }
 }
 
-void CutFaces::Limits(std::int32_t column, std::int32_t row, std::size_t count, float* from, float* to) const {
-  // Side after side along the row, without branches. All is computed from a pixel's own x and y, so that it is the same in every box.
-  std::vector<double> enters(count), leaves(count, kInfinity);
-  for (const Side& side : sides_) {
-    const double start = side.start.At(0, row + 0.5), rise = side.rise.At(0, row + 0.5);
-    const auto x = [column](std::size_t n) { return double(column + std::int32_t(n)) + 0.5; };
-    const bool parallel = side.rise.by_x == 0;  // the row's rays
-    if (parallel && std::abs(rise) >= kAlong) {
-      const double first = -start / rise, slope = -side.start.by_x / rise;
+bool CutFaces::IsWhole(const Box& part) const { return region_.KeepsAll(part, margin_); }
+
+void CutFaces::Limits(const PixelBounds& pixels, const KeyBand& band, float* from, float* to) const {
+  const auto inwards = float(keep_ ? slack_ : -slack_);
+  std::array<float, kPixels + kRowPadding> enter, leave;
+  for (std::int32_t y = pixels.y_begin; y < pixels.y_end; ++y) {
+    const std::size_t first = PlaceIn(band, pixels.x_begin, y), end = first + std::size_t(pixels.width());
+    std::fill(from + first, from + end, kNeverMet);
+    std::fill(to + first, to + end, -1.0F);
+    const RegionRow row = rays_.Row(y);
+    const ClipRays::Columns columns = rays_.ColumnsOf(y, pixels);
+    for (std::int32_t column = columns.begin; column < columns.end; column += kPixels) {
+      const auto count = std::size_t(std::min(kPixels, columns.end - column));
+      RegionDepths(row, column, count, enter.data(), leave.data());
+      const std::size_t at = PlaceIn(band, column, y);
       for (std::size_t n = 0; n < count; ++n) {
-        const double at = first + slope * x(n);
-        enters[n] = rise > 0 && at > enters[n] ? at : enters[n];
-        leaves[n] = rise < 0 && at < leaves[n] ? at : leaves[n];
+        from[at + n] = enter[n] > 0 ? enter[n] + inwards : 0;
+        to[at + n] = leave[n] - inwards;
       }
-      continue;
     }
-    for (std::size_t n = 0; n < count; ++n) {
-      const double starts = start + side.start.by_x * x(n), rises = rise + side.rise.by_x * x(n), at = -starts / rises;
-      const bool along = std::abs(rises) < kAlong;
-      enters[n] = !along && rises > 0 && at > enters[n] ? at : enters[n];
-      leaves[n] = along ? (starts < 0 ? -1 : leaves[n]) : rises < 0 && at < leaves[n] ? at : leaves[n];
-    }
-  }
-  const double inwards = keep_ ? slack_ : -slack_;
-  for (std::size_t n = 0; n < count; ++n) {
-    const bool any = enters[n] <= leaves[n];
-    from[n] = float(!any ? kInfinity : enters[n] > 0 ? enters[n] + inwards : 0);
-    to[n] = float(any ? leaves[n] - inwards : -1);
   }
 }
 
-const CutFaces::Side& CutFaces::CutAt(double x, double y, double depth) const {
-  const auto distance = [&](const Side& side) { return std::abs(side.start.At(x, y) + depth * side.rise.At(x, y)); };
-  return *std::ranges::min_element(sides_, {}, distance);
+void CutFaces::Draw(const KeyBand& band, std::vector<CutPixel>& cuts) const {
+  const PixelBounds pixels = Intersection(bounds(), band.bounds);
+  if (pixels.empty() || least_depth_ >= kNeverMet) return;
+  for (std::int32_t y = pixels.y_begin; y < pixels.y_end; ++y) {
+    const ClipRays::Columns columns = rays_.ColumnsOf(y, pixels);
+    if (columns.begin < columns.end && !AllNearer(band, {columns.begin, y, columns.end, y + 1}, least_depth_)) {
+      DrawRow(band, y, columns, cuts);
+    }
+  }
 }
 
-std::uint16_t CutFaces::BinOf(const Index3& voxel) const {
-  return VisitScalarType(voxels_.type, [&]<class T>(const T*) {
-    const auto sample = double(voxels_.samples<T>()[voxels_.Offset(voxel)]);
-    if (!std::isfinite(sample)) return kNotSelected;
-    const auto bin = std::uint16_t(table_.BinOf(sample));
-    return opaque_.selected[bin] != 0 ? bin : kNotSelected;
+void CutFaces::DrawRow(const KeyBand& band, std::int32_t y, ClipRays::Columns columns, std::vector<CutPixel>& cuts) const {
+  const RegionRow region = rays_.Row(y);
+  RayRow rays;
+  for (std::size_t i = 0; i < 3; ++i) {
+    rays.origin[i] = origin_[i].InRow(y);
+    rays.direction[i] = direction_[i].InRow(y);
+  }
+  std::array<float, kPixels + kRowPadding> enter, leave;
+  std::array<std::array<std::int32_t, kPixels + kRowPadding>, 3> voxels;
+  // Voxels along a cut lie far apart in memory: all of them are fetched before the first one is read.
+  std::array<std::int32_t, kPixels> candidates;
+  VisitScalarType(voxels_.type, [&]<class T>(const T*) {
+    const T* const samples = voxels_.samples<T>();
+    for (std::int32_t begin = columns.begin; begin < columns.end; begin += kPixels) {
+      const std::int32_t pixels = std::min(kPixels, columns.end - begin);
+      RegionDepths(region, begin, std::size_t(pixels), enter.data(), leave.data());
+      const float* const depths = keep_ ? enter.data() : leave.data();
+      VoxelsAt(rays, begin, std::size_t(pixels), depths, slack_, voxels[0].data(), voxels[1].data(), voxels[2].data());
+      std::uint64_t* const keys = band.keys + PlaceIn(band, begin, y);
+      const auto voxel_at = [&](std::size_t n) { return Index3{voxels[0][n], voxels[1][n], voxels[2][n]}; };
+      std::size_t count = 0;
+      for (std::int32_t n = 0; n < pixels; ++n) {
+        const float depth = depths[std::size_t(n)];
+        const Index3 voxel = voxel_at(std::size_t(n));
+        if (!(depth > 0 && depth < kNeverMet) || std::bit_cast<std::uint32_t>(depth) > keys[n] >> 32 || !box_.Contains(voxel)) continue;
+        hwy::Prefetch(samples + voxels_.Offset(voxel));
+        candidates[count++] = n;
+      }
+      for (std::size_t i = 0; i < count; ++i) {
+        const std::int32_t n = candidates[i], x = begin + n;
+        const Index3 voxel = voxel_at(std::size_t(n));
+        const auto sample = double(samples[voxels_.Offset(voxel)]);
+        const std::uint16_t label = labels_ != nullptr ? labels_->NumberOf(voxel) : 0;
+        const LabelUse use = labels_ != nullptr ? labels_->uses[label] : LabelUse::kAsVolume;
+        if (use == LabelUse::kClear) continue;
+        std::uint16_t bin = 0;
+        if (use == LabelUse::kAsVolume) {
+          if (!std::isfinite(sample)) continue;
+          bin = std::uint16_t(table_.BinOf(sample));
+          if (opaque_.selected[bin] == 0) continue;
+        }
+        const float depth = depths[std::size_t(n)];
+        const std::uint32_t index = FaceIndex(std::uint32_t(voxel.x), std::uint32_t(voxel.y), std::uint32_t(voxel.z), kCutAxis,
+                                              std::uint32_t(bricks_.x), std::uint32_t(bricks_.y));
+        const std::size_t side = keep_ ? rays_.SideEntered(x, y) : rays_.SideLeft(x, y);
+        keys[n] = std::uint64_t{std::bit_cast<std::uint32_t>(depth)} << 32 | (kFirstCut + cuts.size());
+        cuts.push_back({x, y, depth, index, bin, label, std::uint16_t(side)});
+      }
+    }
   });
 }
 
-void CutFaces::Draw(std::int32_t column, std::int32_t row, std::size_t count, const float* from, const float* to, float* rgba, float* depth,
-                    std::uint32_t* voxel) const {
-  const float* const behind = keep_ ? from : to;  // a cut by slack_
-  for (std::size_t n = 0; n < count; ++n) {
-    const double at = double(behind[n]) - slack_;
-    if (behind[n] <= 0 || std::isinf(behind[n]) || float(at) > depth[n]) continue;
-    // The voxel just behind the cut.
-    const double x = column + std::int32_t(n) + 0.5, y = row + 0.5;
-    Index3 site;
-    for (const Axis axis : kAxes) {
-      const auto i = std::size_t(Number(axis));
-      const double p = origin_[i].At(x, y) + double(behind[n]) * direction_[i].At(x, y);
-      site[axis] = std::int32_t(std::floor(std::clamp(p + 0.5, -1.0, double(kMaxVolumeSide))));
+void CutFaces::TakeSeen(const KeyBand& band, std::vector<CutPixel>& cuts) {
+  std::size_t seen = 0;
+  for (std::size_t i = 0; i < cuts.size(); ++i) {
+    std::uint64_t& key = band.keys[PlaceIn(band, cuts[i].x, cuts[i].y)];
+    if (std::uint32_t(key) != kFirstCut + i) continue;
+    cuts[seen++] = cuts[i];
+    key = kEmptyKey;
+  }
+  cuts.resize(seen);
+}
+
+void CutFaces::Shade(const std::vector<CutPixel>& cuts, const FaceShading& shading, LocalImage& image) const {
+  for (const CutPixel& cut : cuts) {
+    const std::size_t pixel =
+        std::size_t(cut.y - image.bounds.y_begin) * std::size_t(image.bounds.width()) + std::size_t(cut.x - image.bounds.x_begin);
+    const float* const of_bin = shading.colors + 4 * std::size_t{cut.bin};
+    const float* const of_label = shading.labels != nullptr ? shading.label_colors + 4 * std::size_t{cut.label} : nullptr;
+    const PhongFactors& light = light_[cut.side];
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float color = of_label != nullptr ? of_bin[c] * (1 - of_label[3]) + of_label[c] : of_bin[c];
+      image.rgba[4 * pixel + c] = std::clamp(color * light.diffuse + light.specular, 0.0F, 1.0F);
     }
-    if (!box_.Contains(site)) continue;
-    const std::uint16_t bin = BinOf(site);
-    if (bin == kNotSelected) continue;
-    const Rgb& color = table_.color[bin];
-    const PhongFactors& light = CutAt(x, y, at).light;
-    const auto lit = [&](float channel) { return std::clamp(channel * light.diffuse + light.specular, 0.0F, 1.0F); };
-    const float pixel[4] = {lit(color.r), lit(color.g), lit(color.b), 1};
-    std::copy_n(pixel, 4, rgba + 4 * n);
-    depth[n] = float(at);
-    voxel[n] = FaceIndex(std::uint32_t(site.x), std::uint32_t(site.y), std::uint32_t(site.z), kCutAxis, std::uint32_t(bricks_.x),
-                         std::uint32_t(bricks_.y));
+    image.rgba[4 * pixel + 3] = 1;
+    image.depth[pixel] = cut.depth;
+    image.voxel[pixel] = cut.voxel;
   }
 }
 

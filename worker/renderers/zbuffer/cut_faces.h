@@ -1,8 +1,10 @@
 // CutFaces: clipping in the Z-buffer. A face of the surface is drawn where its depth is not clipped. Where a ray comes out of what is
 // clipped away inside an opaque voxel, the cut through the voxel is seen: a flat face in the plane of the clip region's side.
 //
-// Where a ray is cut depends on the pixel and the region alone, in double precision, so all boxes agree on it. A face in the plane of a cut
-// lies within kSlack of it and is not drawn: the cut stands for it.
+// Cuts go into the keys of a band like faces, so that they hide what lies behind them, and bricks there are not drawn. Before the band is
+// shaded, they are taken out again (TakeSeen) and lit by the plane of their side (Shade).
+//
+// A face in the plane of a cut lies within kSlack of it and is not drawn: the cut stands for it.
 #pragma once
 
 #include <array>
@@ -10,50 +12,69 @@
 #include <vector>
 
 #include "common/frame/frame_setup.h"
+#include "common/image/local_image.h"
 #include "common/view/phong.h"
 #include "worker/kernels/draw_faces.h"
+#include "worker/kernels/shade_faces.h"
 #include "worker/renderers/bin_lookup.h"
 #include "worker/renderers/slab_data.h"
+#include "worker/renderers/zbuffer/clip_rays.h"
+#include "worker/renderers/zbuffer/shown_labels.h"
 
 namespace slabstream {
 
+// One pixel of a cut.
+struct CutPixel {
+  std::int32_t x = 0, y = 0;
+  float depth = 0;
+  std::uint32_t voxel = 0;  // FaceIndex
+  std::uint16_t bin = 0, label = 0;
+  std::uint16_t side = 0;  // of the clip region
+};
+
 class CutFaces {
  public:
-  // `opaque`: the bins of opaque voxels, by the slab's table. All must outlive this. The setup's clip region is not empty.
-  CutFaces(SlabData& slab, const FrameSetup& setup, const Box& box, const BinSelection& opaque);
+  // `box`: no other voxels are drawn. `opaque`: the bins of opaque voxels, by the slab's table. `labels`: null if they are not shown. All
+  // must outlive this. The setup's clip region is not empty.
+  CutFaces(SlabData& slab, const FrameSetup& setup, const Box& box, const BinSelection& opaque, const ShownLabels* labels);
+
+  // Pixels outside see nothing of the box that lies in the clip region.
+  const PixelBounds& bounds() const { return rays_.bounds(); }
+  // True: all faces of the voxels of `part` are drawn; they need no limits.
+  bool IsWhole(const Box& part) const;
 
   // Whether depths from ... to are drawn (DepthLimits::inside).
   bool inside() const { return keep_; }
-  // The limits of `count` pixels from (column, row) on.
-  void Limits(std::int32_t column, std::int32_t row, std::size_t count, float* from, float* to) const;
-  // Puts the cuts through voxels of the box in front of what lies behind them. `from` and `to` are the limits; `depth` and `voxel` are as
-  // ShadeFaceRow fills them in.
-  void Draw(std::int32_t column, std::int32_t row, std::size_t count, const float* from, const float* to, float* rgba, float* depth,
-            std::uint32_t* voxel) const;
+  // Limits of `pixels`, which lie in the band; placed as its keys are.
+  void Limits(const PixelBounds& pixels, const KeyBand& band, float* from, float* to) const;
+
+  // Bricks nearer than this are best drawn before the cuts, others after them.
+  float turn() const { return keep_ ? 0 : least_depth_; }
+  // Puts those cuts through voxels of the box into the band that nothing in it hides yet. Their face numbers are kFirstCut + their place in
+  // `cuts`.
+  static constexpr std::uint32_t kFirstCut = 0x80000000;  // surfaces have fewer faces
+  void Draw(const KeyBand& band, std::vector<CutPixel>& cuts) const;
+  // Takes the cuts out of the band again, and leaves those in `cuts` that are seen.
+  static void TakeSeen(const KeyBand& band, std::vector<CutPixel>& cuts);
+  // Fills in pixels of `image` (kDepth), after the others. Of `shading`: the colours.
+  void Shade(const std::vector<CutPixel>& cuts, const FaceShading& shading, LocalImage& image) const;
 
  private:
-  // A quantity that is linear in a pixel's x and y.
-  struct Linear {
-    double at_0, by_x, by_y;
-    double At(double x, double y) const { return at_0 + x * by_x + y * by_y; }
-  };
-  // Along a pixel's ray, the distance from the side is start + depth * rise.
-  struct Side {
-    Linear start, rise;
-    PhongFactors light;
-  };
-  // The side that the ray of the pixel whose centre is (x, y) crosses at a depth.
-  const Side& CutAt(double x, double y, double depth) const;
-  std::uint16_t BinOf(const Index3& voxel) const;  // of a voxel of the box; kNotSelected if it is not opaque
+  void DrawRow(const KeyBand& band, std::int32_t y, ClipRays::Columns columns, std::vector<CutPixel>& cuts) const;
 
+  const ClipRegion& region_;
+  const ClipRays rays_;
   const VoxelBlock& voxels_;
   const Box box_;
   const bool keep_;
-  double slack_;                              // physical
-  std::array<Linear, 3> origin_, direction_;  // of a pixel's ray, data space: origin + depth * direction
-  std::vector<Side> sides_;
+  const double slack_;                               // physical
+  const double margin_;                              // likewise: what is so far from every side needs no limits
+  const float least_depth_;                          // of a cut; kNeverMet: there is none
+  std::array<LinearInImage, 3> origin_, direction_;  // of a pixel's ray, data space: origin + depth * direction
+  std::vector<PhongFactors> light_;                  // by side
   const ClassificationTable& table_;
   const BinSelection& opaque_;
+  const ShownLabels* const labels_;
   const Index3 bricks_;
 };
 

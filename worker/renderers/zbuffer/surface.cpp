@@ -23,23 +23,55 @@ struct BrickFaces {
   SurfaceBrick brick;
   std::vector<FaceSite> sites;
   std::vector<FaceNormals> normals;
+  std::vector<std::uint16_t> labels;
+};
+
+// The packed normals at the vertices of a brick, made where they are asked for.
+class BrickNormals {
+ public:
+  void Clear() {
+    computed_ = false;
+    normals_.fill(kUnknown);
+  }
+  // `compute` calls VertexNormals::Compute for the brick.
+  template <class Compute>
+  std::uint32_t At(const Index3& vertex, Compute&& compute) {
+    std::uint32_t& normal = normals_[std::size_t((vertex.z * kVertices + vertex.y) * kVertices + vertex.x)];
+    if (normal != kUnknown) return normal;
+    if (!computed_) compute(gradients_);
+    computed_ = true;
+    return normal = PackNormal(gradients_.Gradient(vertex));
+  }
+
+ private:
+  static constexpr int kVertices = kFaceBrick + 1;
+  static constexpr std::uint32_t kUnknown = 0xFFFFFFFF;  // not a valid packed normal: these leave the upper two bits free
+
+  VertexNormals gradients_;
+  bool computed_ = false;
+  std::array<std::uint32_t, std::size_t{kVertices} * kVertices * kVertices> normals_{};
 };
 
 template <class T>
 class BrickSurface {
  public:
-  BrickSurface(const VoxelBlock& voxels, const BinLookup<T>& lookup, const Vec3& spacing)
-      : voxels_(voxels), lookup_(lookup), spacing_(spacing) {}
+  // `labels` may be null.
+  BrickSurface(const VoxelBlock& voxels, const BinLookup<T>& lookup, const ShownLabels* labels, const Vec3& spacing)
+      : voxels_(voxels), lookup_(lookup), labels_(labels), spacing_(spacing) {
+    if (labels != nullptr) label_normals_ = std::make_unique<BrickNormals>();
+  }
 
   // Faces of the voxels of `box`, which lies in the brick at `origin`.
   BrickFaces Find(const Index3& origin, const Box& box) {
     origin_ = origin;
+    around_ = Grown(box, 2, voxels_.box);
     faces_ = {};
     faces_.brick = {origin, {box.end, box.begin}, {}};
     FindOpaque(box);
+    if (labels_ != nullptr) ApplyLabels(box);
     FindOpen(box);
-    if (std::ranges::any_of(open_, [](std::uint32_t row) { return row != 0; })) gradients_.Compute(voxels_, spacing_, origin);
-    normals_.fill(kUnknown);
+    normals_.Clear();
+    if (labels_ != nullptr) label_normals_->Clear();
     // In the order of FaceIndex.
     for (int side = 0; side < kSides; ++side) {
       for (int parities = 0; parities < 8; ++parities) {
@@ -58,9 +90,6 @@ class BrickSurface {
   }
 
  private:
-  static constexpr int kVertices = kFaceBrick + 1;
-  static constexpr std::uint32_t kUnknown = 0xFFFFFFFF;  // not a valid packed normal: these leave the upper two bits free
-
   // Bit x + 1: voxel x of the row is opaque. Rows -1 ... kFaceBrick along y and z.
   std::uint32_t& Row(std::int32_t y, std::int32_t z) { return opaque_[std::size_t((z + 1) * (kFaceBrick + 2) + y + 1)]; }
 
@@ -77,6 +106,36 @@ class BrickSurface {
         Row(y - origin_.y, z - origin_.z) = row;
       }
     }
+  }
+
+  void ApplyLabels(const Box& box) {
+    const Box around = Grown(box, 1, voxels_.box);
+    for (Index3 v = around.begin; v.z < around.end.z; ++v.z) {
+      for (v.y = around.begin.y; v.y < around.end.y; ++v.y) {
+        std::uint32_t& row = Row(v.y - origin_.y, v.z - origin_.z);
+        for (v.x = around.begin.x; v.x < around.end.x; ++v.x) {
+          const std::uint32_t bit = 1U << (v.x - origin_.x + 1);
+          const LabelUse use = labels_->UseOf(v);
+          if (use != LabelUse::kAsVolume) row = use == LabelUse::kOpaque ? row | bit : row & ~bit;
+        }
+      }
+    }
+  }
+
+  // 1 in opaque voxels, 0 in others: of all voxels that normals of the brick's part depend on.
+  VoxelBlock Indicator() const {
+    VoxelBlock indicator = MakeVoxelBlock(around_, ScalarType::kUint8);
+    auto* out = indicator.samples<std::uint8_t>();
+    const T* const samples = voxels_.samples<T>();
+    for (Index3 v = around_.begin; v.z < around_.end.z; ++v.z) {
+      for (v.y = around_.begin.y; v.y < around_.end.y; ++v.y) {
+        for (v.x = around_.begin.x; v.x < around_.end.x; ++v.x) {
+          const LabelUse use = labels_->UseOf(v);
+          *out++ = use == LabelUse::kAsVolume ? lookup_(samples[voxels_.Offset(v)]) != kNotSelected : use == LabelUse::kOpaque;
+        }
+      }
+    }
+    return indicator;
   }
 
   // Bit x: the side of voxel x of the row is open.
@@ -98,8 +157,11 @@ class BrickSurface {
   void AddFace(const Index3& local, int side) {
     const Index3 voxel = {origin_.x + local.x, origin_.y + local.y, origin_.z + local.z};
     const T sample = voxels_.samples<T>()[voxels_.Offset(voxel)];
-    faces_.sites.push_back(
-        {std::uint16_t(voxel.x), std::uint16_t(voxel.y), std::uint16_t(voxel.z), std::uint16_t(lookup_(sample) | side << kBinBits)});
+    const std::uint16_t label = labels_ != nullptr ? labels_->NumberOf(voxel) : 0;
+    const bool of_label = labels_ != nullptr && labels_->uses[label] == LabelUse::kOpaque;
+    const std::uint16_t bin = of_label ? 0 : lookup_(sample);  // colours of labels hide those of bins
+    faces_.sites.push_back({std::uint16_t(voxel.x), std::uint16_t(voxel.y), std::uint16_t(voxel.z), std::uint16_t(bin | side << kBinBits)});
+    if (labels_ != nullptr) faces_.labels.push_back(label);
     const int axis = side / 2, u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
     FaceNormals corners;
     for (int corner = 0; corner < 4; ++corner) {
@@ -107,7 +169,7 @@ class BrickSurface {
       vertex[axis] += side % 2;
       vertex[u] += corner % 2;
       vertex[v] += corner / 2;
-      corners[std::size_t(corner)] = NormalAt(vertex);
+      corners[std::size_t(corner)] = of_label ? LabelNormalAt(vertex) : NormalAt(vertex);
     }
     faces_.normals.push_back(corners);
     Box& bounds = faces_.brick.voxels;
@@ -118,19 +180,23 @@ class BrickSurface {
   }
 
   std::uint32_t NormalAt(const Index3& vertex) {
-    std::uint32_t& normal = normals_[std::size_t((vertex.z * kVertices + vertex.y) * kVertices + vertex.x)];
-    if (normal == kUnknown) normal = PackNormal(gradients_.Gradient(vertex));
-    return normal;
+    return normals_.At(vertex, [&](VertexNormals& gradients) { gradients.Compute(voxels_, spacing_, origin_); });
+  }
+  // Labels have no values that rise: of the border of what is opaque.
+  std::uint32_t LabelNormalAt(const Index3& vertex) {
+    return label_normals_->At(vertex, [&](VertexNormals& gradients) { gradients.Compute(Indicator(), spacing_, origin_); });
   }
 
   const VoxelBlock& voxels_;
   const BinLookup<T>& lookup_;
+  const ShownLabels* const labels_;
   const Vec3 spacing_;
   Index3 origin_;
+  Box around_;  // the brick's part and the voxels that its normals depend on
   BrickFaces faces_;
-  VertexNormals gradients_;
+  BrickNormals normals_;
+  std::unique_ptr<BrickNormals> label_normals_;  // with labels
   std::array<std::uint32_t, std::size_t{kFaceBrick + 2} * (kFaceBrick + 2)> opaque_{};
-  std::array<std::uint32_t, std::size_t{kVertices} * kVertices * kVertices> normals_{};
   std::array<std::uint32_t, std::size_t{kSides} * kFaceBrick * kFaceBrick> open_{};
 };
 
@@ -142,6 +208,7 @@ struct FoundFaces {
   SurfaceBrick brick;  // numbers faces of the arrays
   const FaceSite* sites = nullptr;
   const FaceNormals* normals = nullptr;
+  const std::uint16_t* labels = nullptr;
 };
 
 // The faces of `part` of the brick at `origin`. False: no known box holds just this part of it.
@@ -152,12 +219,12 @@ bool FindKnown(std::span<const KnownSurface> known, const Index3& origin, const 
   const std::vector<SurfaceBrick>& bricks = same->surface->bricks;
   const auto brick = std::ranges::lower_bound(bricks, origin, InOrder, &SurfaceBrick::origin);
   if (brick != bricks.end() && brick->origin == origin) {
-    faces = {*brick, same->surface->sites.data(), same->surface->normals.data()};
+    faces = {*brick, same->surface->sites.data(), same->surface->normals.data(), same->surface->labels.data()};
   }
   return true;
 }
 
-Surface Join(std::span<const FoundFaces> parts) {
+Surface Join(std::span<const FoundFaces> parts, bool labelled) {
   Surface surface;
   std::vector<std::uint32_t> begins(parts.size());
   std::size_t faces = 0;
@@ -171,11 +238,13 @@ Surface Join(std::span<const FoundFaces> parts) {
   CHECK_LT(faces, std::size_t{1} << 29) << "faces of one box: kernels address their normals by 32 bits";
   surface.sites.resize(faces + kSitesReadAhead);
   surface.normals.resize(faces);
+  if (labelled) surface.labels.resize(faces + 1);
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) {
-    const auto& [brick, sites, normals] = parts[i];
+    const auto& [brick, sites, normals, labels] = parts[i];
     if (brick.face_count() == 0) return;
     std::copy_n(sites + brick.side_begin[0], brick.face_count(), surface.sites.data() + begins[i]);
     std::copy_n(normals + brick.side_begin[0], brick.face_count(), surface.normals.data() + begins[i]);
+    if (labelled) std::copy_n(labels + brick.side_begin[0], brick.face_count(), surface.labels.data() + begins[i]);
   });
   return surface;
 }
@@ -183,33 +252,46 @@ Surface Join(std::span<const FoundFaces> parts) {
 }  // namespace
 
 std::size_t Surface::bytes() const {
-  return bricks.capacity() * sizeof(SurfaceBrick) + sites.capacity() * sizeof(FaceSite) + normals.capacity() * sizeof(FaceNormals);
+  return bricks.capacity() * sizeof(SurfaceBrick) + sites.capacity() * sizeof(FaceSite) + normals.capacity() * sizeof(FaceNormals) +
+         labels.capacity() * sizeof(std::uint16_t);
 }
 
-Surface FindSurface(const VoxelBlock& voxels, const BrickRanges& ranges, const ClassificationTable& table, const BinSelection& opaque,
-                    const Vec3& spacing, const Box& box, std::span<const KnownSurface> known) {
+Surface FindSurface(const VoxelBlock& voxels, const OpaqueVoxels& opaque, const Vec3& spacing, const Box& box,
+                    std::span<const KnownSurface> known) {
   const Box inside = Intersection(box, voxels.box);
   if (inside.empty()) return {};
   const BrickGrid bricks(inside);
   std::vector<BrickFaces> made(bricks.size());
   std::vector<FoundFaces> parts(bricks.size());
+  std::vector<std::uint8_t> may_be_opaque(bricks.size());
   VisitScalarType(voxels.type, [&]<class T>(const T*) {
-    const BinLookup<T> lookup(table, opaque);
+    const BinLookup<T> lookup(opaque.table, opaque.bins);
+    const auto any_opaque = [&](const Index3& brick) {
+      const BrickRanges::Range& range = opaque.ranges.Of(brick);
+      if (lookup.AnyBetween(range.min, range.max)) return true;
+      if (opaque.labels == nullptr) return false;
+      const BrickRanges::Range& numbers = opaque.label_ranges->Of(brick);
+      return opaque.labels->AnyOpaqueBetween(numbers.min, numbers.max);
+    };
     ForEachRowOfBricks(bricks, [&](Index3 brick) {
       std::unique_ptr<BrickSurface<T>> surface;  // large: only where something is found anew
       for (; brick.x < bricks.first.x + bricks.counts.x; ++brick.x) {
-        const BrickRanges::Range& range = ranges.Of(brick);
-        if (!lookup.AnyBetween(range.min, range.max)) continue;
+        if (!any_opaque(brick)) continue;
         const Index3 origin = {brick.x * kFaceBrick, brick.y * kFaceBrick, brick.z * kFaceBrick};
         const std::size_t number = bricks.Number(brick);
+        may_be_opaque[number] = 1;
         if (FindKnown(known, origin, bricks.BoxOf(brick), parts[number])) continue;
-        if (surface == nullptr) surface = std::make_unique<BrickSurface<T>>(voxels, lookup, spacing);
+        if (surface == nullptr) surface = std::make_unique<BrickSurface<T>>(voxels, lookup, opaque.labels, spacing);
         made[number] = surface->Find(origin, bricks.BoxOf(brick));
-        parts[number] = {made[number].brick, made[number].sites.data(), made[number].normals.data()};
+        parts[number] = {made[number].brick, made[number].sites.data(), made[number].normals.data(), made[number].labels.data()};
       }
     });
   });
-  return Join(parts);
+  Surface surface = Join(parts, opaque.labels != nullptr);
+  for (std::size_t i = 0; i < bricks.size(); ++i) {
+    if (may_be_opaque[i] != 0) surface.opaque_hull = Hull(surface.opaque_hull, bricks.BoxOf(bricks.first + PlaceIn(bricks.counts, i)));
+  }
+  return surface;
 }
 
 }  // namespace slabstream

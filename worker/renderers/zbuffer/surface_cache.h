@@ -1,8 +1,10 @@
 // SurfaceCache: the surfaces of a slab's boxes. The Z-buffer keeps them between frames until the transfer function makes other voxels
-// opaque.
+// opaque, or labels are shown in another way.
 #pragma once
 
 #include <cstddef>
+
+#include <optional>
 
 #include "worker/renderers/recent_boxes.h"
 #include "worker/renderers/slab_data.h"
@@ -14,13 +16,18 @@ class SurfaceCache : public SlabCache {
  public:
   // Faces of the opaque voxels of `box`, which lies in the slab. Valid until the next call.
   const Surface& Of(SlabData& slab, const FrameSetup& setup, const Box& box);
-  // Of the voxels that were opaque at the last call.
+  // Of the voxels that were opaque at the last call; valid until the next one.
   const BinSelection& opaque_bins() const { return opaque_bins_; }
+  const ShownLabels* labels() const { return labels_ ? &*labels_ : nullptr; }  // null: they are not shown
 
   std::size_t bytes() const override;
 
  private:
+  void ShowLabels(const SlabData& slab, const LayerLooks& looks);
+
   BinSelection opaque_bins_;
+  std::optional<ShownLabels> labels_;
+  std::optional<BrickRanges> label_ranges_;  // once labels were shown
   RecentBoxes<Surface> surfaces_;
 };
 

@@ -5,8 +5,8 @@
 //
 //   1. place the bricks of the surface on the screen and sort them, nearest first
 //   2. cut the image into bands of rows, one task each: no other task touches a band's pixels
-//   3. each band draws its bricks (draw_faces.h), except those behind what is already drawn, then shades its pixels (shade_faces.h)
-//      and, if the volume is clipped, draws the cuts through opaque voxels (cut_faces.h)
+//   3. each band draws its bricks (draw_faces.h), except those behind what is already drawn, and if the volume is clipped, the cuts through
+//      opaque voxels (cut_faces.h); then it shades its pixels (shade_faces.h)
 #include <hwy/cache_control.h>
 #include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
@@ -36,15 +36,22 @@ struct Scene {
   PixelBounds bounds;
 };
 
-// `reach`: pixels that may show something beside the bricks.
-Scene PlaceBricks(const Surface& surface, const BrickProjection& projection, const ClipRegion& clip, const PixelBounds& reach) {
+// `cuts`: null if nothing is clipped.
+Scene PlaceBricks(const Surface& surface, const BrickProjection& projection, const ClipRegion& clip, const CutFaces* cuts) {
   constexpr std::size_t kGrain = 256;
   Scene scene;
   const std::size_t count = surface.bricks.size();
   scene.views.resize(count);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kGrain), [&](const tbb::blocked_range<std::size_t>& range) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      if (clip.MayKeep(surface.bricks[i].voxels)) scene.views[i] = projection.View(surface.bricks[i]);
+      const SurfaceBrick& brick = surface.bricks[i];
+      if (cuts == nullptr) {
+        scene.views[i] = projection.View(brick);
+      } else if (clip.MayKeep(brick.voxels)) {
+        scene.views[i] = projection.View(brick);
+        scene.views[i].clipped = !cuts->IsWhole(brick.voxels);
+        if (cuts->inside()) scene.views[i].pixels = Intersection(scene.views[i].pixels, cuts->bounds());
+      }
     }
   });
   float least = std::numeric_limits<float>::infinity(), greatest = 0;
@@ -54,7 +61,7 @@ Scene PlaceBricks(const Surface& surface, const BrickProjection& projection, con
     least = std::min(least, view.nearest);
     greatest = std::max(greatest, view.nearest);
   }
-  scene.bounds = Union(scene.bounds, reach);
+  if (cuts != nullptr) scene.bounds = Union(scene.bounds, cuts->bounds());
   // A counting sort by depth. The order affects only how many bricks turn out to be hidden.
   constexpr std::size_t kClasses = 256;
   const float scale = greatest > least ? float(kClasses - 1) / (greatest - least) : 0.0F;
@@ -105,26 +112,55 @@ void FetchSites(const Surface& surface, std::uint32_t brick, std::uint32_t sides
   }
 }
 
-std::size_t DrawBand(const Surface& surface, const Scene& scene, const BrickProjection& projection, Projection kind,
-                     const std::atomic<bool>& cancelled, const KeyBand& band) {
-  std::fill_n(band.keys, band.stride * std::size_t(band.bounds.height()), kEmptyKey);
+// Of a band; kept from frame to frame.
+struct Scratch {
+  AlignedVector<std::uint64_t> keys;
+  AlignedVector<float> from, to;  // DepthLimits
+  std::vector<CutPixel> cuts;
+};
+
+// The keys of a band of the scene, and the cuts in it. `cuts` may be null.
+std::size_t DrawBand(const Surface& surface, const Scene& scene, const BrickProjection& projection, Projection kind, const CutFaces* cuts,
+                     const std::atomic<bool>& cancelled, const KeyBand& band, Scratch& scratch) {
+  const std::size_t pixels = band.stride * std::size_t(band.bounds.height());
+  std::fill_n(band.keys, pixels, kEmptyKey);
   std::vector<std::uint32_t> bricks;
+  PixelBounds clipped;  // that clipped bricks may touch
   for (std::uint32_t number : scene.order) {
-    if (!Intersection(scene.views[number].pixels, band.bounds).empty()) bricks.push_back(number);
+    const PixelBounds touched = Intersection(scene.views[number].pixels, band.bounds);
+    if (touched.empty()) continue;
+    bricks.push_back(number);
+    if (scene.views[number].clipped) clipped = Union(clipped, touched);
   }
+  KeyBand limited = band;
+  bool cuts_drawn = cuts == nullptr;
+  const auto draw_cuts = [&] {
+    scratch.cuts.clear();
+    cuts->Draw(band, scratch.cuts);
+    cuts_drawn = true;
+  };
   constexpr std::size_t kAhead = 2;  // bricks
   std::size_t drawn = 0;
   for (std::size_t i = 0; i < bricks.size() && !cancelled.load(std::memory_order_relaxed); ++i) {
     if (i + kAhead < bricks.size()) FetchSites(surface, bricks[i + kAhead], scene.views[bricks[i + kAhead]].sides);
     const ProjectedBrick& view = scene.views[bricks[i]];
+    if (!cuts_drawn && view.nearest >= cuts->turn()) draw_cuts();
     if (AllNearer(band, Intersection(view.pixels, band.bounds), view.nearest)) continue;
+    if (view.clipped && limited.limits.from == nullptr) {
+      scratch.from.resize(std::max(scratch.from.size(), pixels));
+      scratch.to.resize(scratch.from.size());
+      cuts->Limits(clipped, band, scratch.from.data(), scratch.to.data());
+      limited.limits = {scratch.from.data(), scratch.to.data(), cuts->inside()};
+    }
     const SurfaceBrick& brick = surface.bricks[bricks[i]];
     for (int side = 0; side < kSides; ++side) {
       const std::uint32_t first = brick.side_begin[std::size_t(side)], count = brick.side_begin[std::size_t(side) + 1] - first;
       if ((view.sides >> side & 1) == 0 || count == 0) continue;
-      drawn += DrawFaces(kind, projection.Faces(brick, side), surface.sites.data(), surface.normals.data(), first, count, band);
+      drawn += DrawFaces(kind, projection.Faces(brick, side), surface.sites.data(), surface.normals.data(), first, count,
+                         view.clipped ? limited : band);
     }
   }
+  if (!cuts_drawn) draw_cuts();
   return drawn;
 }
 
@@ -137,11 +173,15 @@ class ZBufferRenderer : public Renderer {
     auto& cache = slab.CacheOf<SurfaceCache>();
     const Surface& surface = cache.Of(slab, setup, box);
     std::optional<CutFaces> cuts;
-    if (!setup.clip.empty()) cuts.emplace(slab, setup, box, cache.opaque_bins());
+    // Cuts lie in opaque voxels; without these there are no faces either.
+    if (!setup.clip.empty() && !surface.opaque_hull.empty()) {
+      cuts.emplace(slab, setup, surface.opaque_hull, cache.opaque_bins(), cache.labels());
+    }
     clock.Charge(Stage::kPrepare);
 
     const BrickProjection projection(setup.camera, setup.description.geometry.size);
-    const Scene scene = PlaceBricks(surface, projection, setup.clip, cuts ? ReachOf(box, setup) : PixelBounds{});
+    const CutFaces* const drawn_cuts = cuts ? &*cuts : nullptr;
+    const Scene scene = PlaceBricks(surface, projection, setup.clip, drawn_cuts);
     LocalImage image = MakeUnwrittenImage(PixelFormat::kDepth, scene.bounds);
     const std::vector<std::int32_t> begins = CutIntoBands(surface, scene, kBandsPerThread * tbb::this_task_arena::max_concurrency());
     FaceShading shading = MakeFaceShading(setup.camera, setup.shading, setup.description.geometry.size);
@@ -151,6 +191,12 @@ class ZBufferRenderer : public Renderer {
     colors.reserve(4 * table.color.size());
     for (const Rgb& color : table.color) colors.insert(colors.end(), {color.r, color.g, color.b, 1});
     shading.colors = colors.data();
+    std::vector<float> label_colors;
+    if (setup.looks.labels) {
+      label_colors = LabelColors(*setup.looks.labels);
+      shading.labels = surface.labels.data();
+      shading.label_colors = label_colors.data();
+    }
     clock.Charge(Stage::kZBuffer);
 
     std::atomic<std::size_t> drawn = 0;
@@ -161,29 +207,19 @@ class ZBufferRenderer : public Renderer {
       band.bounds = {scene.bounds.x_begin, begins[i - 1], scene.bounds.x_end, begins[i]};
       band.stride = std::size_t(band.bounds.width() + kKeyPadding);
       const std::size_t pixels = band.stride * std::size_t(band.bounds.height());
-      auto& [keys, from, to] = scratch_.local();
-      keys.resize(std::max(keys.size(), pixels));
-      band.keys = keys.data();
-      if (cuts) {
-        from.resize(std::max(from.size(), pixels));
-        to.resize(from.size());
-        for (std::int32_t y = band.bounds.y_begin; y < band.bounds.y_end; ++y) {
-          const std::size_t row = std::size_t(y - band.bounds.y_begin) * band.stride;
-          cuts->Limits(band.bounds.x_begin, y, std::size_t(band.bounds.width()), &from[row], &to[row]);
-        }
-        band.limits = {from.data(), to.data(), cuts->inside()};
-      }
-      drawn += DrawBand(surface, scene, projection, setup.camera.projection, cancelled, band);
+      Scratch& scratch = scratch_.local();
+      scratch.keys.resize(std::max(scratch.keys.size(), pixels));
+      band.keys = scratch.keys.data();
+      drawn += DrawBand(surface, scene, projection, setup.camera.projection, drawn_cuts, cancelled, band, scratch);
       const Time middle = MonotonicNow();
+      if (cuts) CutFaces::TakeSeen(band, scratch.cuts);
       for (std::int32_t y = band.bounds.y_begin; y < band.bounds.y_end && !cancelled.load(std::memory_order_relaxed); ++y) {
         const auto width = std::size_t(band.bounds.width()), pixel = std::size_t(y - scene.bounds.y_begin) * width;
         const std::size_t row = std::size_t(y - band.bounds.y_begin) * band.stride;
         ShadeFaceRow(shading, band.keys + row, band.bounds.x_begin, y, width, &image.rgba[4 * pixel], &image.depth[pixel],
                      &image.voxel[pixel]);
-        if (cuts) {
-          cuts->Draw(band.bounds.x_begin, y, width, &from[row], &to[row], &image.rgba[4 * pixel], &image.depth[pixel], &image.voxel[pixel]);
-        }
       }
+      if (cuts) cuts->Shade(scratch.cuts, shading, image);
       draw_ns += (middle - begin).count();
       shade_ns += (MonotonicNow() - middle).count();
     });
@@ -199,11 +235,6 @@ class ZBufferRenderer : public Renderer {
   // More bands balance the load better, but bricks on the border of two bands are drawn by both.
   static constexpr int kBandsPerThread = 4;
 
-  // Of a band; kept from frame to frame.
-  struct Scratch {
-    AlignedVector<std::uint64_t> keys;
-    AlignedVector<float> from, to;  // CutFaces::Limits
-  };
   tbb::enumerable_thread_specific<Scratch> scratch_;
 };
 
