@@ -111,7 +111,8 @@ TEST_F(DatasetsTest, LayersOfADatasetAreThoseOfTheirFiles) {
   };
   const LocalImage first = expected();
   expect_shows(first);
-  for (const DatasetStatus& dataset : client_->OrderData({}).value()) EXPECT_EQ(dataset.labels, dataset.name == "layered" ? 2U : 0U);
+  const std::vector<DatasetStatus> datasets = client_->OrderData({}).value();
+  for (const DatasetStatus& dataset : datasets) EXPECT_EQ(dataset.labels, dataset.name == "layered" ? 2U : 0U);
 
   // Another file, then other colours: the next frame has them.
   Replace(labels, labels_of(16));
