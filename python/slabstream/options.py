@@ -205,7 +205,7 @@ def _view(draft: Draft, option: Option, value: Any) -> None:
 
 
 def _camera(draft: Draft, option: Option, value: Any) -> None:
-    """A file that --save-camera wrote, or its contents."""
+    """A file that --save-camera wrote, or its contents: whatever options it stands for, and excludes."""
     if isinstance(value, (str, os.PathLike)):
         try:
             fields = json.loads(pathlib.Path(value).read_bytes())
@@ -220,10 +220,10 @@ def _camera(draft: Draft, option: Option, value: Any) -> None:
     for field, inner in fields.items():
         if field == "of_patient":
             draft.frame.view.of_patient = values.flag(f"{option.name} {field}", inner)
-        elif field in ("view", "camera") or COMMANDS["render"].get(field, option).group != "View" or field == "size":
-            raise InvalidArgument(f"{option.name} has the field {field!r}, which cameras do not have")
-        else:
+        elif field in option.excludes and field != "view":
             _PUT[field](draft, COMMANDS["render"][field], inner)
+        else:
+            raise InvalidArgument(f"{option.name} has the field {field!r}, which cameras do not have")
 
 
 _CLIP_UNITS = {"": schema.CLIP_UNIT_WORLD, "v": schema.CLIP_UNIT_VOXELS, "%": schema.CLIP_UNIT_PERCENT}
@@ -404,14 +404,14 @@ def _put_all(draft: Draft, command: str, given: Mapping[str, Any]) -> None:
         _PUT[name](draft, COMMANDS[command][name], value)
 
 
-def _without_none(options: Mapping[str, Any]) -> dict[str, Any]:
-    """None says that an option is not given."""
-    return {name: value for name, value in options.items() if value is not None}
+def _given(options: Mapping[str, Any]) -> dict[str, Any]:
+    """None says that an option is not given; so does False of a layer."""
+    return {name: value for name, value in options.items() if not (value is None or (value is False and name in ("labels", "overlay")))}
 
 
 def draft_of(dataset: str, options: Mapping[str, Any]) -> Draft:
     """The request of `slabstream render` with these options. InvalidArgument, UnknownOption: the sentence names the option."""
-    given = _without_none(options)
+    given = _given(options)
     _check("render", given)
     draft = Draft()
     frame = draft.frame
@@ -442,7 +442,7 @@ _SEVERAL_PLANES = {"anatomical": ("axial", "coronal", "sagittal"), "zyx": ("z", 
 
 def slice_drafts_of(dataset: str, options: Mapping[str, Any]) -> list[Draft]:
     """The requests of `slabstream slice` with these options, one a plane, from left to right."""
-    given = _without_none(options)
+    given = _given(options)
     _check("slice", given)
     planes = Draft()
     _put_all(planes, "slice", given)
