@@ -27,8 +27,8 @@ _START_SECONDS = 60.0
 _END_SECONDS = 20.0
 _MOST_IPC_PATH_BYTES = 107
 
-# Starts the service, and ends it when this process is gone, however it ended: then nobody holds the other end of the pipe any more.
-_KEEPER = '"$@" </dev/null & service=$!; exec >&- 2>&-; read -r _; kill "$service"; wait "$service"'
+# Starts the service in its folder, and ends both when this process is gone, however it ended: then nobody holds the other end of the pipe.
+_KEEPER = '"$@" </dev/null & service=$!; exec >&- 2>&-; read -r _; kill "$service"; wait "$service"; rm -rf -- "$0"'
 
 
 def find_program() -> str:
@@ -59,7 +59,7 @@ class _LocalService:
         endpoint = f"ipc://{socket}" if len(os.fsencode(socket)) < _MOST_IPC_PATH_BYTES - 30 else "tcp://127.0.0.1:*"
         with (self.folder / "errors").open("wb") as errors:
             self.keeper = subprocess.Popen(
-                ["/bin/sh", "-c", _KEEPER, "sh", program, "up", "--listen", endpoint],
+                ["/bin/sh", "-c", _KEEPER, str(self.folder), program, "up", "--listen", endpoint],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=errors,
@@ -104,8 +104,8 @@ class _LocalService:
         except subprocess.TimeoutExpired:
             self.keeper.kill()
             self.keeper.wait()
+            shutil.rmtree(self.folder, ignore_errors=True)
         self.keeper.stdout.close()
-        shutil.rmtree(self.folder, ignore_errors=True)
 
 
 _lock = threading.RLock()

@@ -100,16 +100,16 @@ def grid_of(spacing: Any = None, origin: Any = None, direction: Any = None, worl
     return Grid((steps[2], steps[1], steps[0]), at, world or "scene")
 
 
-def _even_step(name: str, positions: Any) -> float:
+def _even_step(what: str, positions: Any) -> float:
     """The distance of positions that lie evenly, up or down; of a single one 1."""
     at = numpy.asarray(positions, numpy.float64)
     if at.ndim != 1 or not numpy.isfinite(at).all():
-        raise InvalidArgument(f"the coordinates of '{name}' are not a list of finite numbers")
+        raise InvalidArgument(f"{what} are not a list of finite numbers")
     if len(at) < 2:
         return 1.0
     step = float(at[-1] - at[0]) / (len(at) - 1)
     if step == 0 or numpy.abs(at - (at[0] + step * numpy.arange(len(at)))).max() > _EVEN * abs(step):
-        raise InvalidArgument(f"the coordinates of '{name}' do not lie evenly")
+        raise InvalidArgument(f"{what} do not lie evenly")
     return step
 
 
@@ -120,7 +120,7 @@ def _from_xarray(array: Any) -> Volume:
     if len(array.dims) != 3:
         raise InvalidArgument(f"the DataArray has the axes {', '.join(map(str, array.dims))}, must have 3: z, y, x")
     given = [name in array.coords for name in array.dims]
-    steps = [_even_step(str(name), array.coords[name].values) if has else 1.0 for name, has in zip(array.dims, given)]
+    steps = [_even_step(f"the coordinates of '{name}'", array.coords[name].values) if has else 1.0 for name, has in zip(array.dims, given)]
     if not any(given):
         return Volume(array.data, grid_of())
     dz, dy, dx = steps
@@ -158,7 +158,7 @@ def _from_dicom(slices: Sequence[Any]) -> Volume:
     at = [_to_ras(one.ImagePositionPatient) for one in slices]
     if len(slices) > 1:
         heights = [float(normal @ position) for position in at]
-        _even_step("the slices' positions", heights)
+        _even_step("the positions of the slices", heights)
         step = (at[-1] - at[0]) / (len(at) - 1)
     else:
         step = normal * float(getattr(first, "SliceThickness", None) or 1)
