@@ -35,7 +35,7 @@ void AllowLogLevel(CLI::App& command, std::string& level) {
   for (CLI::App* sub : command.get_subcommands(nullptr)) AllowLogLevel(*sub, level);
 }
 
-// Declares a command whose arguments are the name of a command, `act` does something with that.
+// Declares a command about another one, which its arguments name; `act` gets that.
 CLI::App* DeclareAbout(const CommandLine& line, const std::string& name, const std::string& purpose,
                        const std::function<void(CLI::App& found, const std::string& full_name)>& act) {
   CLI::App* sub = line.app.add_subcommand(name, purpose);

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 import re
 import unittest
 
@@ -12,6 +13,8 @@ from client_support import ROOT, InAFolder, RunningService, volume_arrays, write
 
 import slabstream as ss  # noqa: E402
 from slabstream.volumes import volume_of, write_nrrd  # noqa: E402
+
+KEEP = os.environ.get("SLABSTREAM_KEEP_PICTURES")  # a folder for the tutorial's pictures, to be looked at
 
 
 def blocks_of(document: str) -> list[str]:
@@ -42,6 +45,23 @@ class Documents(InAFolder):
         with ss.connect(endpoint=running.endpoint) as service:
             np.testing.assert_array_equal(service.render("brain", azimuth=45).rgba, whole)
         self.assertGreater(whole.max(), 0.1)
+
+    def test_the_tutorial_runs(self) -> None:
+        running = self.start(f"brain={self.brain()}")
+        self.addCleanup(ss.shutdown)
+        code = "\n".join(blocks_of("python.md"))
+        printed = "tcp://127.0.0.1:7420"
+        self.assertEqual(code.count(printed), 2)
+        names: dict = {}
+        said = io.StringIO()
+        with contextlib.chdir(self.folder), contextlib.redirect_stdout(said):
+            exec(compile(code.replace(printed, running.endpoint), "python.md", "exec"), names)
+        self.assertIn("zoom 0 is out of range [0.001, 10000]", said.getvalue())
+        self.assertEqual(len(list(self.folder.glob("turn_*.png"))), 12)
+        for name in ("image", "front", "above", "planes", "surface", "preview"):
+            self.assertGreater(np.asarray(names[name])[..., :3].max(), 50, name)
+            if KEEP:
+                names[name].save(f"{KEEP}/{name}.png")
 
     def brain(self) -> str:
         write_nrrd(volume_of(volume_arrays()[0], spacing=(2, 1.5, 1.25)), self.folder / "brain.nrrd")
