@@ -83,7 +83,7 @@ class _Loop:
     def call(self, function: Callable[[], None]) -> None:
         """Has the thread run `function`."""
         with self.lock:
-            if self.ends:
+            if self.ends or os.getpid() != self.process:  # a forked child has no thread that would do it
                 raise Unavailable(f"the connection to the service at {self.endpoint} is closed")
             self.calls.put(function)
             self._wake()

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import atexit
+import itertools
 import os
 import pathlib
 import select
@@ -21,11 +22,13 @@ from .frame import Frame
 from .image import Image
 from .options import takes_options_of
 from .service import Service
-from .volumes import volume_of, write_nrrd
+from .volumes import Grid, check_spacing, on_grid, volume_of, write_nrrd
+from .volumes import Volume as VolumeData
 
 _START_SECONDS = 60.0
 _END_SECONDS = 20.0
-_MOST_IPC_PATH_BYTES = 107
+_TAKE_AWAY_SECONDS = 5.0
+_MOST_FOLDER_BYTES = 50  # of temporary files: paths of sockets have at most 107, with names of ours and of workers behind it
 
 # Starts the service in its folder, and ends both when this process is gone, however it ended: then nobody holds the other end of the pipe.
 _KEEPER = '"$@" </dev/null & service=$!; exec >&- 2>&-; read -r _; kill "$service"; wait "$service"; rm -rf -- "$0"'
@@ -53,10 +56,9 @@ class _LocalService:
     def __init__(self) -> None:
         self.process = os.getpid()
         program = find_program()
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="slabstream-"))
-        socket = self.folder / "s"
-        # Workers append to the path, where they listen themselves.
-        endpoint = f"ipc://{socket}" if len(os.fsencode(socket)) < _MOST_IPC_PATH_BYTES - 30 else "tcp://127.0.0.1:*"
+        short = len(os.fsencode(tempfile.gettempdir())) <= _MOST_FOLDER_BYTES
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="slabstream-", dir=None if short else "/tmp"))
+        endpoint = f"ipc://{self.folder}/s"
         with (self.folder / "errors").open("wb") as errors:
             self.keeper = subprocess.Popen(
                 ["/bin/sh", "-c", _KEEPER, str(self.folder), program, "up", "--listen", endpoint],
@@ -145,7 +147,7 @@ class Volume:
     def __init__(self, service: Service, name: str, shows: dict[str, Any], files: list[pathlib.Path]):
         self.service, self.name = service, name
         self._shows = shows  # layers: options that are given unless the caller says otherwise
-        self.close: Callable[[], Any] = weakref.finalize(self, _take_away, service, name, files)
+        self.close: Callable[[], Any] = weakref.finalize(self, _take_away, service, name, files, os.getpid())
 
     @takes_options_of("render")
     def render(self, **options: Any) -> Image:
@@ -177,9 +179,11 @@ class Volume:
         return f"<slabstream.Volume {self.name} at {self.service.endpoint}>"
 
 
-def _take_away(service: Service, name: str, files: list[pathlib.Path]) -> None:
+def _take_away(service: Service, name: str, files: list[pathlib.Path], process: int) -> None:
+    if os.getpid() != process:
+        return  # a forked child's copy
     try:
-        service.remove_data(name)
+        service.remove_data(name, timeout=_TAKE_AWAY_SECONDS)
     except SlabstreamError:
         pass  # it went with its service
     for file in files:
@@ -211,51 +215,50 @@ def load(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any
     volumes on the same grid, or paths. `service`: one on this machine that takes data; None: one of this process' own, which is started if
     need be and ends with it.
     """
-    with _lock:
-        own = None if service is not None else _running()
-        where = service if service is not None else own.service  # type: ignore[union-attr]
-        geometry = {"spacing": spacing, "origin": origin, "direction": direction, "world": world}
-        folder = own.folder if own is not None else pathlib.Path(tempfile.gettempdir())
-        files: list[pathlib.Path] = []
+    own = None if service is not None else _running()
+    where = service if service is not None else own.service  # type: ignore[union-attr]
+    grid: Grid | None = None  # of a volume that is no file: that of its layers too, unless they state their own
+    folder = own.folder if own is not None else pathlib.Path(tempfile.gettempdir())
+    files: list[pathlib.Path] = []
 
-        def placed(what: str, given: Any) -> str:
-            if _is_path(given):
-                return _path_text(given, what)
-            checked = volume_of(given, **geometry)
-            handle, name = tempfile.mkstemp(prefix=".slabstream-", suffix=".nrrd", dir=folder)
-            os.close(handle)
-            files.append(pathlib.Path(name))
-            try:
-                write_nrrd(checked, name)
-            except OSError as error:
-                raise Unavailable(f"cannot write '{name}': {error.strerror}") from None
-            return name
-
+    def written(checked: VolumeData) -> str:
+        handle, name = tempfile.mkstemp(prefix=".slabstream-", suffix=".nrrd", dir=folder)
+        os.close(handle)
+        files.append(pathlib.Path(name))
         try:
-            text = placed("volume", volume)
-            if _is_path(volume):
-                for name in ("origin", "direction", "world"):
-                    if geometry[name] is not None:
-                        raise InvalidArgument(f"{name} is for arrays; files state their own")
-                if spacing is not None:
-                    dz, dy, dx = spacing
-                    text += f"{',' if '?' in text else '?'}spacing={dx},{dy},{dz}"
-            for what, layer in (("labels", labels), ("overlay", overlay)):
-                if layer is not None:
-                    text += f",{what}={placed(what, layer)}"
-            global _count
-            _count += 1
-            name = f"python-{os.getpid()}-{_count}"
-            where.add_data(f"{name}={text}")
-        except BaseException:
-            for file in files:
-                file.unlink(missing_ok=True)
-            raise
-        shows = {what: True for what, layer in (("labels", labels), ("overlay", overlay)) if layer is not None}
-        return Volume(where, name, shows, files)
+            write_nrrd(checked, name)
+        except OSError as error:
+            raise Unavailable(f"cannot write '{name}': {error.strerror}") from None
+        return name
+
+    try:
+        if _is_path(volume):
+            text = _path_text(volume, "volume")
+            for name, value in (("origin", origin), ("direction", direction), ("world", world)):
+                if value is not None:
+                    raise InvalidArgument(f"{name} is for arrays; files state their own")
+            if spacing is not None:
+                dz, dy, dx = check_spacing(spacing)
+                text += f"{',' if '?' in text else '?'}spacing={dx},{dy},{dz}"
+        else:
+            checked = volume_of(volume, spacing, origin, direction, world)
+            grid = checked.grid
+            text = written(checked)
+        for what, layer in (("labels", labels), ("overlay", overlay)):
+            if layer is not None:
+                path = _path_text(layer, what) if _is_path(layer) else written(on_grid(volume_of(layer), grid))
+                text += f",{what}={path}"
+        name = f"python-{os.getpid()}-{next(_numbers)}"
+        where.add_data(f"{name}={text}")
+    except BaseException:
+        for file in files:
+            file.unlink(missing_ok=True)
+        raise
+    shows = {what: True for what, layer in (("labels", labels), ("overlay", overlay)) if layer is not None}
+    return Volume(where, name, shows, files)
 
 
-_count = 0  # of volumes, for their names
+_numbers = itertools.count(1)  # of volumes, for their names
 
 
 @takes_options_of("render")

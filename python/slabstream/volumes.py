@@ -70,7 +70,7 @@ def _reverse(vector: Vector) -> Vector:
     return vector[2], vector[1], vector[0]
 
 
-def _spacing(value: Any) -> Vector:
+def check_spacing(value: Any) -> Vector:
     spacing = _three("spacing", value)
     if min(spacing) <= 0:
         raise InvalidArgument(f"spacing {value!r} must be above 0 along each axis")
@@ -79,7 +79,7 @@ def _spacing(value: Any) -> Vector:
 
 def grid_of(spacing: Any = None, origin: Any = None, direction: Any = None, world: str | None = None) -> Grid:
     """`spacing` and `origin` are z, y, x. Row i of `direction` is where the array's axis i points to, as z, y, x of the world."""
-    dz, dy, dx = (1.0, 1.0, 1.0) if spacing is None else _spacing(spacing)
+    dz, dy, dx = (1.0, 1.0, 1.0) if spacing is None else check_spacing(spacing)
     if world not in (None, "voxels", "scene", "patient"):
         raise InvalidArgument(f"world '{world}' is not one of voxels, scene, patient")
     if world == "voxels" and (origin is not None or direction is not None):
@@ -203,6 +203,11 @@ def volume_of(volume: Any, spacing: Any = None, origin: Any = None, direction: A
         raise InvalidArgument(f"the array has the shape {shape}, each side must be in [1, {_MOST_SIDE}]")
     _file_type(found.samples.dtype)
     return found
+
+
+def on_grid(volume: Volume, grid: Grid | None) -> Volume:
+    """The volume on this grid, if it states none of its own."""
+    return dataclasses.replace(volume, grid=grid) if grid is not None and volume.grid == grid_of() else volume
 
 
 def _file_type(dtype: Any) -> str:

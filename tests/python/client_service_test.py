@@ -353,6 +353,8 @@ class OwnService(InAFolder):
             self.assertEqual(volume.submit(size=8, labels=False, overlay=False).result().size, (8, 8))
             service = volume.service
         self.assertEqual((service.datasets(), list(folder.glob("*.nrrd")) + list(folder.glob(".*.nrrd"))), ([], []))
+        with ss.load(values, spacing=spacing, origin=(5, 6, 7), world="patient", labels=labels) as volume:
+            self.assertEqual(volume.render(size=9, view="left", renderer="raycast").geometry.world, "patient")
         ss.render(values, size=9)
         self.assertEqual(service.status().pid, ss.load(values).service.status().pid)  # it is kept
 
