@@ -37,6 +37,7 @@ class _Waiting:
         self.draft = draft
         self.on_progress, self.on_preview = on_progress, on_preview
         self.end: concurrent.futures.Future[Image] = concurrent.futures.Future()
+        self.end.set_running_or_notify_cancel()  # from now on nobody but the service ends it
         self.changed = threading.Condition()
         self.progress: Progress | None = None
         self.preview: Image | None = None

@@ -52,7 +52,7 @@ def _is_nibabel(volume: Any) -> bool:
 
 
 def _is_dicom(volume: Any) -> bool:
-    return hasattr(volume, "pixel_array") and hasattr(volume, "Rows")
+    return hasattr(volume, "PixelData") and hasattr(volume, "Rows")
 
 
 def _three(name: str, value: Any) -> Vector:
@@ -164,7 +164,10 @@ def _from_dicom(slices: Sequence[Any]) -> Volume:
         step = normal * float(getattr(first, "SliceThickness", None) or 1)
     frames, rounds = [], False
     for one in slices:
-        pixels = numpy.asarray(one.pixel_array)
+        try:
+            pixels = numpy.asarray(one.pixel_array)
+        except Exception as error:  # of whatever decodes it
+            raise InvalidArgument(f"pydicom cannot decode a dataset: {str(error).splitlines()[0]}; give the path of its file instead") from None
         if pixels.ndim != 2:
             raise InvalidArgument("a DICOM dataset has several frames or colours; give the path of its file instead")
         slope, intercept = float(getattr(one, "RescaleSlope", 1)), float(getattr(one, "RescaleIntercept", 0))

@@ -77,6 +77,7 @@ class AtAService(WithAService):
         done, pending = concurrent.futures.wait([frame.future for frame in frames])
         self.assertEqual((len(done), len(pending)), (8, 0))
         self.assertIsNone(frames[0].exception())
+        self.assertFalse(self.service.submit("head", size=30).future.cancel())
 
         async def get() -> ss.Image:
             return await asyncio.wrap_future(self.service.submit("head", size=30).future)

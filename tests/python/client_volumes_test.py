@@ -160,13 +160,28 @@ class Files(InAFolder):
                        capture_output=True)
         np.testing.assert_array_equal(found, np.load(self.folder / "same.npy"))
 
+    def dicom_slice(self, pixels: np.ndarray, **fields):
+        try:
+            from pydicom.dataset import Dataset, FileMetaDataset
+            from pydicom.uid import ExplicitVRLittleEndian
+        except ImportError:
+            return types.SimpleNamespace(Rows=2, PixelData=b"", pixel_array=pixels, **fields)
+        one = Dataset()
+        one.file_meta = FileMetaDataset()
+        one.file_meta.TransferSyntaxUID = ExplicitVRLittleEndian
+        one.Rows, one.Columns = pixels.shape
+        one.BitsAllocated, one.BitsStored, one.HighBit, one.PixelRepresentation, one.SamplesPerPixel = 16, 16, 15, 1, 1
+        one.PhotometricInterpretation, one.PixelData = "MONOCHROME2", pixels.tobytes()
+        for name, value in fields.items():
+            setattr(one, name, value)
+        return one
+
     def test_dicom_slices_keep_their_orientation(self) -> None:
         """Sagittal slices, in disorder; z of the array is from the patient's right to the left."""
         pixels = np.arange(3 * 2 * 4, dtype=np.int16).reshape(3, 2, 4)
         slices = [
-            types.SimpleNamespace(Rows=2, Columns=4, pixel_array=pixels[i], ImageOrientationPatient=[0, 1, 0, 0, 0, -1],
-                                  ImagePositionPatient=[10 - 2 * i, 20, 30], PixelSpacing=["1.5", "0.5"], RescaleSlope="1",
-                                  RescaleIntercept="-1000")
+            self.dicom_slice(pixels[i], ImageOrientationPatient=[0, 1, 0, 0, 0, -1], ImagePositionPatient=[10 - 2 * i, 20, 30],
+                             PixelSpacing=["1.5", "0.5"], RescaleSlope="1", RescaleIntercept="-1000")
             for i in (2, 0, 1)
         ]
         found, about = self.written(slices)
@@ -175,7 +190,7 @@ class Files(InAFolder):
         # To the left is +10 - 2 i of DICOM, whose x is to the left: to the right -10 ... -6. Columns go to posterior, rows down.
         np.testing.assert_allclose(self.world_of(about), [[-10, -20 - 3 * 0.5, 30 - 1.5], [-6, -20, 30]], atol=1e-9)
         with self.assertRaisesRegex(ss.InvalidArgument, "a DICOM dataset lacks PixelSpacing"):
-            volume_of([types.SimpleNamespace(Rows=1, pixel_array=pixels[0], ImageOrientationPatient=[], ImagePositionPatient=[])])
+            volume_of([types.SimpleNamespace(Rows=1, PixelData=b"", pixel_array=pixels[0], ImageOrientationPatient=[], ImagePositionPatient=[])])
         slices[0].ImagePositionPatient = [3, 20, 30]
         with self.assertRaisesRegex(ss.InvalidArgument, "the positions of the slices do not lie evenly"):
             volume_of(slices)
