@@ -25,7 +25,8 @@ from .errors import (
 )
 from .frame import Frame, Progress
 from .image import Geometry, Image, Statistics
-from .local import Volume, load, render, shutdown
+from .loading import Volume, load, render
+from .local import shutdown
 from .service import Service, connect
 from .status import Dataset, Status, Worker
 from .transfer import TransferFunction

@@ -10,9 +10,9 @@ from typing import Any, Callable, Iterator
 
 from . import schema
 from .connection import Connection
+from .drafts import Draft
 from .errors import DataLoss, DeadlineExceeded, SlabstreamError
 from .image import Image, compose, geometry_of, statistics_of
-from .options import Draft
 from .runs import read_runs
 
 _PHASES = {schema.FRAME_PHASE_QUEUED: "queued", schema.FRAME_PHASE_LOADING: "loading", schema.FRAME_PHASE_RUNNING: "running"}

@@ -11,10 +11,11 @@ from typing import Any, Callable, Iterator
 from . import schema
 from .address import find_service
 from .connection import ANSWER_SECONDS, CONNECT_SECONDS, Connection
+from .drafts import Draft, draft_of, slice_drafts_of
 from .errors import InvalidArgument
 from .frame import Frame, Progress
 from .image import Image, side_by_side
-from .options import Draft, draft_of, slice_drafts_of, takes_options_of
+from .options import takes_options_of
 from .status import Dataset, Status, dataset_of, status_of
 from .values import integer
 

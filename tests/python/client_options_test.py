@@ -17,8 +17,9 @@ import client_support
 from client_support import ROOT, WithAService
 
 import slabstream as ss  # noqa: E402
-from slabstream import options, schema  # noqa: E402
-from slabstream.options import COMMANDS, draft_of, slice_drafts_of  # noqa: E402
+from slabstream import drafts  # noqa: E402
+from slabstream.drafts import draft_of, slice_drafts_of  # noqa: E402
+from slabstream.options import COMMANDS  # noqa: E402
 
 
 def load_update():
@@ -43,7 +44,7 @@ RENDER_CASES: list[tuple[dict, list[str]]] = [
     ({"size": (40, 30)}, ["--size", "40x30"]),
     ({"size": 32}, ["--size", "32"]),
     ({"projection": "perspective"}, ["--projection", "perspective"]),
-    *(({"view": view}, ["--view", view]) for view in options.NAMED_VIEWS),
+    *(({"view": view}, ["--view", view]) for view in drafts.NAMED_VIEWS),
     ({"azimuth": 30, "elevation": -20.5}, ["--azimuth", "30", "--elevation", "-20.5"]),
     ({"azimuth": "1e2"}, ["--azimuth", "1e2"]),
     ({"look_at": (25, 10, 0)}, ["--look-at", "25,10,0"]),
@@ -177,7 +178,7 @@ class Drift(unittest.TestCase):
 
     def test_every_option_has_its_place_in_a_request(self) -> None:
         names = {name for command in COMMANDS.values() for name in command}
-        self.assertEqual(set(options._PUT), names)
+        self.assertEqual(set(drafts._PUT), names)
 
     def test_signatures_and_help_show_them(self) -> None:
         signature = inspect.signature(ss.Service.render)
