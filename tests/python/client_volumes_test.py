@@ -49,14 +49,21 @@ class Files(InAFolder):
             self.assertEqual(done.returncode, 0, done.stderr)
         return np.load(out), json.loads(done.stdout)
 
+    def samples_in_file(self, array, file_type: str) -> np.ndarray:
+        write_nrrd(volume_of(array), self.folder / "a.nrrd")
+        content = (self.folder / "a.nrrd").read_bytes()
+        return np.frombuffer(content[content.index(b"\n\n") + 2 :], file_type).reshape(array.shape)
+
     def test_types_are_kept_or_converted_exactly(self) -> None:
         values = np.arange(2 * 3 * 4).reshape(2, 3, 4)
-        for dtype in ("bool", "uint8", "int8", "uint16", ">i2", "int32", "uint32", "int64", "uint64", "float16", ">f4", "float64"):
+        for dtype, file_type in (("bool", "u1"), ("uint8", "u1"), ("int8", "i1"), ("uint16", "<u2"), (">i2", "<i2"), ("int32", "<f4"),
+                                 ("uint32", "<f4"), ("int64", "<f4"), ("uint64", "<f4"), ("float16", "<f4"), (">f4", "<f4"), ("float64", "<f4")):
             array = values.astype(dtype)
-            np.testing.assert_array_equal(self.written(array)[0], array.astype(np.float32), dtype)
-        np.testing.assert_array_equal(self.written((values - 12).astype(np.int16))[0], values - 12)
-        np.testing.assert_array_equal(self.written(np.asfortranarray(values.astype(np.uint8)))[0], values)
-        np.testing.assert_array_equal(self.written(values.astype(np.uint8)[::-1, :, ::2])[0], values[::-1, :, ::2])
+            np.testing.assert_array_equal(self.samples_in_file(array, file_type), array, dtype)
+        for array in (np.asfortranarray(values.astype(np.uint8)), values.astype(np.uint8)[::-1, :, ::2]):
+            np.testing.assert_array_equal(self.samples_in_file(array, "u1"), array)
+        np.testing.assert_array_equal(self.written((values - 12).astype(">i2"))[0], values - 12)
+        np.testing.assert_array_equal(self.written(values * 1000.5)[0], values * 1000.5)
 
     def test_other_arrays_are_refused_by_name(self) -> None:
         for array, sentence in (
@@ -120,11 +127,8 @@ class Files(InAFolder):
                               (None, [(0, 3), (3, 6), (6, 7)])):
             with self.subTest(chunks=chunks):
                 lazy = Chunks(array, chunks)
-                write_nrrd(volume_of(lazy), self.folder / "a.nrrd")
+                np.testing.assert_array_equal(self.samples_in_file(lazy, "<f4"), array)
                 self.assertEqual(lazy.asked, asked)
-                content = (self.folder / "a.nrrd").read_bytes()
-                found = np.frombuffer(content[content.index(b"\n\n") + 2 :], "<f4").reshape(array.shape)
-                np.testing.assert_array_equal(found, array)
 
     def test_xarray_coordinates_give_spacing_and_place(self) -> None:
         xarray = need("xarray")
