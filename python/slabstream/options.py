@@ -10,6 +10,7 @@ import inspect
 import json
 import math
 import pathlib
+import re
 import textwrap
 from typing import Any, Callable, Iterable, TypeVar
 
@@ -62,6 +63,25 @@ def _load() -> dict[str, dict[str, Option]]:
 COMMANDS = _load()
 
 
+# What layers are here, where the command line names files.
+_LAYER_HELP = {"labels": "Shows the dataset's labels as usual", "overlay": "Shows the dataset's overlay as usual"}
+
+
+def _in_keywords(text: str, command: str) -> str:
+    """Options of this command as one writes them here."""
+
+    def keyword(found: re.Match[str]) -> str:
+        name = _keyword(found[1])
+        return name if name in COMMANDS[command] else found[0]
+
+    return re.sub(r"--([a-z]+(?:-[a-z]+)*)", keyword, text)
+
+
+def _limits_of(option: Option) -> list[str]:
+    limits = [] if option.default is None else [f"default: {option.default}"]
+    return limits if math.inf == option.most else [*limits, f"{'above' if option.above else 'from'} {option.least:g} to {option.most:g}"]
+
+
 def _help_of(command: str, names: Iterable[str]) -> str:
     lines, group = [], ""
     for name in names:
@@ -69,9 +89,10 @@ def _help_of(command: str, names: Iterable[str]) -> str:
         if option.group != group:
             group = option.group
             lines += ["", f"{group.partition(' (')[0]}:"]
-        about = option.help + (f" (default: {option.default})" if option.default is not None else "")
-        head, *rest = about.split("\n")
-        lines.append(f"  {name}: {option.type or 'bool'}")
+        head, *rest = _in_keywords(_LAYER_HELP.get(name, option.help), command).split("\n")
+        limits = _limits_of(option)
+        head += f" ({'; '.join(limits)})" if limits else ""
+        lines.append(f"  {name}: {option.type if option.type and name not in _LAYER_HELP else 'bool'}")
         for part, indent in [(head, "      "), *((line.strip(), "        ") for line in rest)]:
             lines += textwrap.wrap(part, 100, initial_indent=indent, subsequent_indent=indent)
     return "\n".join(lines)

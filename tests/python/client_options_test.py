@@ -176,6 +176,9 @@ class Drift(unittest.TestCase):
         self.assertEqual(signature.parameters["zoom"].default, "1")
         self.assertIn("Degrees that the eye turns", ss.render.__doc__)
         self.assertIn("plane: NAME", ss.Volume.slice.__doc__)
+        words = " ".join(ss.render.__doc__.split())
+        self.assertIn("Look at a side, instead of azimuth and elevation", words)
+        self.assertIn("(default: 1; from 0.001 to 10000)", words)
 
 
 class Requests(unittest.TestCase):
