@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "client/cli/commands.h"
+#include "client/cli/option_description.h"
 #include "client/cli/option_groups.h"
 #include "common/base/log.h"
 #include "common/base/version.h"
@@ -22,7 +23,9 @@ namespace {
 
 std::string CommandNames(const CLI::App& app) {
   std::string names;
-  for (const CLI::App* sub : app.get_subcommands(nullptr)) names += (names.empty() ? "" : ", ") + sub->get_name();
+  for (const CLI::App* sub : app.get_subcommands(nullptr)) {
+    if (sub->get_group() != kHidden) names += (names.empty() ? "" : ", ") + sub->get_name();
+  }
   return names;
 }
 
@@ -32,25 +35,40 @@ void AllowLogLevel(CLI::App& command, std::string& level) {
   for (CLI::App* sub : command.get_subcommands(nullptr)) AllowLogLevel(*sub, level);
 }
 
-// `help COMMAND`, the same as COMMAND --help.
-void DeclareHelp(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("help", "Explain a command and its options");
+// Declares a command about another one, which its arguments name; `act` gets that.
+CLI::App* DeclareAbout(const CommandLine& line, const std::string& name, const std::string& purpose,
+                       const std::function<void(CLI::App& found, const std::string& full_name)>& act) {
+  CLI::App* sub = line.app.add_subcommand(name, purpose);
   auto names = std::make_shared<std::vector<std::string>>();
-  sub->add_option("COMMAND", *names, "Which one, such as: help render, help experiment replay");
-  sub->callback([&app = line.app, &run = line.run, names] {
-    run = [&app, names] {
-      const CLI::App* found = &app;
+  sub->add_option("COMMAND", *names, fmt::format("Which one, such as: {0} render, {0} experiment replay", name));
+  sub->callback([&app = line.app, &run = line.run, names, act] {
+    run = [&app, names, act] {
+      CLI::App* found = &app;
       std::string full_name = app.get_name();
-      for (const std::string& name : *names) {
-        const auto named = found->get_subcommands([&](const CLI::App* command) { return command->get_name() == name; });
-        if (named.empty()) return Status::InvalidArgument(fmt::format("there is no command '{}', but {}", name, CommandNames(*found)));
+      for (const std::string& part : *names) {
+        const auto named = found->get_subcommands([&](const CLI::App* command) { return command->get_name() == part; });
+        if (named.empty()) return Status::InvalidArgument(fmt::format("there is no command '{}', but {}", part, CommandNames(*found)));
         found = named.front();
-        full_name += " " + name;
+        full_name += " " + part;
       }
-      std::cout << found->get_formatter()->make_help(found, full_name, CLI::AppFormatMode::Normal);
+      act(*found, full_name);
       return Status::Ok();
     };
   });
+  return sub;
+}
+
+// `help COMMAND`, the same as COMMAND --help.
+void DeclareHelp(const CommandLine& line) {
+  DeclareAbout(line, "help", "Explain a command and its options", [](CLI::App& found, const std::string& full_name) {
+    std::cout << found.get_formatter()->make_help(&found, full_name, CLI::AppFormatMode::Normal);
+  });
+}
+
+// `options COMMAND`, for programs.
+CLI::App* DeclareOptions(const CommandLine& line) {
+  return DeclareAbout(line, "options", "Print the options of a command as JSON",
+                      [](CLI::App& found, const std::string&) { std::cout << DescribeOptions(found); });
 }
 
 // A number after --local is its value, as with --local=4; anything else is not, so that a SOURCE after a bare --local stays the source.
@@ -84,8 +102,9 @@ int RunCommandLine(int argc, const char* const* argv, std::span<const DeclareCom
   for (const DeclareCommand declare : ClientCommands()) declare(line);
   for (const DeclareCommand declare : more) declare(line);
   DeclareHelp(line);
+  const CLI::App* const options = DeclareOptions(line);
   for (CLI::App* sub : app.get_subcommands(nullptr)) {
-    sub->group("Commands");
+    sub->group(sub == options ? kHidden : "Commands");
     AllowLogLevel(*sub, log_level);
   }
 

@@ -18,6 +18,7 @@ namespace slabstream {
 namespace {
 
 constexpr int kGreatestLabel = int(kMaxLabelValue);
+constexpr NumberRange kShare = {0, 1};
 const std::vector<std::string_view> kModes = {"tint", "surface"};
 
 // The parts of a list with commas.
@@ -106,22 +107,25 @@ void AddLayerOptions(CLI::App& app, FrameRequest& request, LayerFiles& files, bo
   app.option_defaults()->group("Layers (any option shows the dataset's labels or its overlay)");
   AddFiles(
       app, files, [&request] { Shown(request.labels); }, [&request] { Shown(request.overlay); });
-  AddText(app, "--label-mode",
-          "tint: labels colour what the transfer function shows, and a label that is not shown takes its material away; surface: labels "
-          "are material of their own",
-          [&request](const std::string& option, const std::string& text) {
-            const Result<std::size_t> mode = ParseChoice(option, text, kModes);
-            if (mode.ok()) Shown(request.labels).mode = *mode == 0 ? LabelMode::kTint : LabelMode::kSurface;
-            return mode.status();
-          })
+  NoteChoices(
+      AddText(app, "--label-mode",
+              "tint: labels colour what the transfer function shows, and a label that is not shown takes its material away; surface: "
+              "labels are material of their own",
+              [&request](const std::string& option, const std::string& text) {
+                const Result<std::size_t> mode = ParseChoice(option, text, kModes);
+                if (mode.ok()) Shown(request.labels).mode = *mode == 0 ? LabelMode::kTint : LabelMode::kSurface;
+                return mode.status();
+              }),
+      kModes)
       ->type_name("tint|surface")
       ->default_str("tint");
-  AddText(app, "--label-tint", "Share of a label's colour in that of the material, for --label-mode tint",
-          [&request](const std::string& option, const std::string& text) {
-            const Result<double> tint = ParseNumber(option, text, {0, 1});
-            if (tint.ok()) Shown(request.labels).tint = *tint;
-            return tint.status();
-          })
+  NoteRange(AddText(app, "--label-tint", "Share of a label's colour in that of the material, for --label-mode tint",
+                    [&request](const std::string& option, const std::string& text) {
+                      const Result<double> tint = ParseNumber(option, text, kShare);
+                      if (tint.ok()) Shown(request.labels).tint = *tint;
+                      return tint.status();
+                    }),
+            kShare)
       ->type_name("NUMBER")
       ->default_str(fmt::format("{:g}", kDefaultTint));
   if (opacities) {
@@ -155,12 +159,13 @@ void AddLayerOptions(CLI::App& app, FrameRequest& request, LayerFiles& files, bo
             return range.status();
           })
       ->type_name("LOW:HIGH");
-  AddText(app, "--overlay-weight", "Factor of the overlay's density in the mix, from 0 to 1",
-          [&request](const std::string& option, const std::string& text) {
-            const Result<double> weight = ParseNumber(option, text, {0, 1});
-            if (weight.ok()) Shown(request.overlay).weight = *weight;
-            return weight.status();
-          })
+  NoteRange(AddText(app, "--overlay-weight", "Factor of the overlay's density in the mix, from 0 to 1",
+                    [&request](const std::string& option, const std::string& text) {
+                      const Result<double> weight = ParseNumber(option, text, kShare);
+                      if (weight.ok()) Shown(request.overlay).weight = *weight;
+                      return weight.status();
+                    }),
+            kShare)
       ->type_name("NUMBER")
       ->default_str("1");
 }

@@ -42,15 +42,16 @@ CLI::Option* AddNamed(CLI::App& app, const std::string& name, std::string& targe
     text += fmt::format("\n  {}: {}", kAutomatic, automatic);
   }
   for (const auto& entry : entries) names.push_back(entry.name);
-  return AddParsed(app, name, target, OneOf(std::move(names)), text + Explained(entries))->type_name("NAME")->default_str(target);
+  return AddName(app, name, target, names, text + Explained(entries))->default_str(target);
 }
 
 // An option for a renderer's parameter.
 void AddParameter(CLI::App& app, const RendererParameter& parameter, const std::string& help, FrameRequest& request) {
   const bool choice = !parameter.choices.empty();
-  app.add_option_function<std::string>(
-         "--" + std::string(parameter.name),
-         [&request, key = std::string(parameter.name)](const std::string& text) { request.parameters[key] = text; }, help)
+  CLI::Option* const option = app.add_option_function<std::string>(
+      "--" + std::string(parameter.name),
+      [&request, key = std::string(parameter.name)](const std::string& text) { request.parameters[key] = text; }, help);
+  (choice ? NoteChoices(option, parameter.choices) : NoteRange(option, {parameter.least, parameter.most}))
       ->type_name(choice ? "NAME" : "NUMBER")
       ->default_str(choice ? std::string(parameter.choices[std::size_t(parameter.standard)]) : fmt::format("{:g}", parameter.standard));
 }
@@ -67,9 +68,7 @@ void AddRendererOptions(CLI::App& app, FrameRequest& request) {
       renderers += (renderers.empty() ? "" : " and ") + std::string(kind->name());
     }
   }
-  AddParsed(app, "--renderer", request.renderer, OneOf(RendererNames()), help)
-      ->type_name("NAME")
-      ->default_str(std::string(kDefaultRenderer));
+  AddName(app, "--renderer", request.renderer, RendererNames(), help)->default_str(std::string(kDefaultRenderer));
   for (const auto& [name, entry] : parameters) {
     const auto& [parameter, renderers] = entry;
     AddParameter(app, *parameter, fmt::format("{}; for --renderer {}", parameter->purpose, renderers), request);
@@ -137,8 +136,10 @@ CLI::Option* AddNamedView(CLI::App& app, ViewParameters& view) {
     view.of_patient = named.of_patient;
     return true;
   };
-  return app.add_option("--view", CLI::callback_t(store), "Look at a side, instead of --azimuth and --elevation" + Explained(kNamedViews))
-      ->type_name("NAME");
+  return NoteChoices(
+      app.add_option("--view", CLI::callback_t(store), "Look at a side, instead of --azimuth and --elevation" + Explained(kNamedViews))
+          ->type_name("NAME"),
+      names);
 }
 
 void AddViewOptions(CLI::App& app, ViewParameters& view, ImageSize& size) {
@@ -409,7 +410,7 @@ void AddSliceOptions(CLI::App& app, SliceOptions& options) {
     if (!name.ok()) return name.status();
     return std::ranges::find(kSliceChoices, *name, &SliceChoice::name)->planes;
   };
-  AddParsed(app, "--plane", options.planes, parse, "Which plane" + Explained(kSliceChoices))
+  NoteChoices(AddParsed(app, "--plane", options.planes, parse, "Which plane" + Explained(kSliceChoices)), names)
       ->type_name("NAME")
       ->default_str(std::string(kSliceChoices.back().name));
   CLI::Option* const at = AddPoint(app, "--at", options.at, "Point of the world that the planes go through (default: the volume's centre)");

@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -16,6 +17,15 @@
 #include "common/cli/parse.h"
 
 namespace slabstream {
+
+// What an option takes, for `slabstream options`, which describes options to other programs. The option's own parser does the checking.
+struct OptionDomain {
+  std::vector<std::string> choices;  // empty: not a choice
+  std::optional<NumberRange> range;
+};
+CLI::Option* NoteChoices(CLI::Option* option, const std::vector<std::string_view>& names);
+CLI::Option* NoteRange(CLI::Option* option, const NumberRange& range);
+OptionDomain DomainOf(CLI::Option& option);
 
 // An option `names` ("-o,--output") whose text `parse` turns into a value: parse(option, text) -> Result<T>.
 template <class T, class Parse>
@@ -67,6 +77,10 @@ CLI::Option* AddOptionalValue(CLI::App& app, const std::string& name, T& target,
 using ParseText = std::function<Result<std::string>(const std::string& option, const std::string& text)>;
 ParseText OneOf(std::vector<std::string_view> names);
 
+// An option that takes one of `names` and keeps the text.
+CLI::Option* AddName(CLI::App& app, const std::string& name, std::string& target, const std::vector<std::string_view>& names,
+                     const std::string& help);
+
 // For other parsers that keep the text: the text if `checked` is ok.
 inline Result<std::string> TextIf(const Status& checked, const std::string& text) {
   return checked.ok() ? Result<std::string>(text) : Result<std::string>(checked);
@@ -81,7 +95,7 @@ CLI::Option* AddChoice(CLI::App& app, const std::string& name, T& target, const 
     if (!index.ok()) return index.status();
     return values[*index];
   };
-  return AddParsed(app, name, target, parse, help)->type_name("NAME");
+  return NoteChoices(AddParsed(app, name, target, parse, help)->type_name("NAME"), {names.begin(), names.end()});
 }
 
 CLI::Option* AddNumber(CLI::App& app, const std::string& names, double& target, NumberRange range, const std::string& help);
@@ -89,7 +103,8 @@ CLI::Option* AddNumber(CLI::App& app, const std::string& names, double& target, 
 template <class T>
 CLI::Option* AddInteger(CLI::App& app, const std::string& names, T& target, int min, int max, const std::string& help) {
   const auto parse = [min, max](const std::string& option, const std::string& text) { return ParseInteger(option, text, min, max); };
-  return AddParsed(app, names, target, parse, help)->type_name("N")->default_str(std::to_string(target));
+  CLI::Option* option = AddParsed(app, names, target, parse, help)->type_name("N")->default_str(std::to_string(target));
+  return NoteRange(option, {double(min), double(max)});
 }
 
 // The lines of a help text that explain the entries of a list, each with a name and a purpose.

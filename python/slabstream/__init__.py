@@ -1,0 +1,62 @@
+"""Slabstream from Python: pictures of volumes, by a service on CPUs.
+
+    import slabstream as ss
+
+    ss.render(array, spacing=(dz, dy, dx), transfer="ct-bone").save("a.png")   # starts a service of its own
+    with ss.connect(service="client.json") as s:
+        image = s.render("head", azimuth=30)
+        numpy.asarray(image)                                                   # height, width, RGBA
+
+Arrays are z, y, x. Options are those of the command line, with underscores; docs/python.md is a tutorial.
+"""
+from __future__ import annotations
+
+from .errors import (
+    Cancelled,
+    DataLoss,
+    DeadlineExceeded,
+    Internal,
+    InvalidArgument,
+    NotFound,
+    ResourceExhausted,
+    SlabstreamError,
+    Unavailable,
+    UnknownOption,
+)
+from .frame import Frame, Progress
+from .image import Geometry, Image, Statistics
+from .loading import Volume, load, render
+from .local import shutdown
+from .service import Service, connect
+from .status import Dataset, Status, Worker
+from .transfer import TransferFunction
+
+__version__ = "0.2.0"
+
+__all__ = [
+    "Cancelled",
+    "DataLoss",
+    "Dataset",
+    "DeadlineExceeded",
+    "Frame",
+    "Geometry",
+    "Image",
+    "Internal",
+    "InvalidArgument",
+    "NotFound",
+    "Progress",
+    "ResourceExhausted",
+    "Service",
+    "SlabstreamError",
+    "Statistics",
+    "Status",
+    "TransferFunction",
+    "Unavailable",
+    "UnknownOption",
+    "Volume",
+    "Worker",
+    "connect",
+    "load",
+    "render",
+    "shutdown",
+]

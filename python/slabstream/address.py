@@ -1,0 +1,175 @@
+"""Where a service is, and the keys to it: endpoints, service files (docs/security.md), and the service that one means by naming none."""
+from __future__ import annotations
+
+import dataclasses
+import ipaddress
+import json
+import os
+import pathlib
+from typing import Any
+
+from .errors import InvalidArgument, NotFound
+
+USUAL_ENDPOINT = "tcp://127.0.0.1:7420"
+_SHAPES = "tcp://HOST:PORT or ipc:///PATH"
+_MOST_ENDPOINT_BYTES = 512
+_MOST_IPC_PATH_BYTES = 107
+_MOST_FILE_BYTES = 1 << 16
+_KEY_CHARACTERS = 40  # Z85
+
+
+@dataclasses.dataclass(frozen=True)
+class Keys:
+    """CURVE keys as text of 40 characters (Z85). `secret` is not shown."""
+
+    server: str
+    public: str
+    secret: str = dataclasses.field(repr=False)
+
+
+@dataclasses.dataclass(frozen=True)
+class Address:
+    endpoint: str
+    keys: Keys | None = None
+
+
+def is_loopback(host: str) -> bool:
+    if host in ("localhost", "[::1]"):
+        return True
+    try:
+        return ipaddress.IPv4Address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def check_endpoint(text: str, with_keys: bool) -> None:
+    """InvalidArgument unless one can connect there. Without keys a service stays on its machine."""
+
+    def refuse(why: str) -> InvalidArgument:
+        return InvalidArgument(f'endpoint "{text[:128]}": {why}')
+
+    if len(text.encode()) > _MOST_ENDPOINT_BYTES:
+        raise refuse(f"{len(text.encode())} bytes, at most {_MOST_ENDPOINT_BYTES}")
+    if not text.isprintable() or " " in text:
+        raise InvalidArgument(f"endpoint {text[:128]!r}: spaces and control characters are not allowed, expected {_SHAPES}")
+    if text.startswith("ipc://"):
+        path = text[6:]
+        if len(path) < 2 or path[0] != "/" or path[-1] == "/":
+            raise refuse("expected an absolute path of a socket file, ipc:///PATH")
+        if len(os.fsencode(path)) > _MOST_IPC_PATH_BYTES:
+            raise refuse(f"a path of {len(os.fsencode(path))} bytes, at most {_MOST_IPC_PATH_BYTES} fit a socket address")
+        return
+    if not text.startswith("tcp://"):
+        raise refuse(f"expected {_SHAPES}")
+    host, colon, port = text[6:].rpartition(":")
+    if not colon or not host:
+        raise refuse("no port, expected tcp://HOST:PORT")
+    if not (port.isascii() and port.isdigit() and 1 <= int(port) <= 65535):
+        raise refuse(f'port "{port}" is not a number of [1, 65535]')
+    if not with_keys and not is_loopback(host):
+        raise refuse(
+            f'host "{host}" is not loopback (127.0.0.0/8, [::1] or localhost): without keys the service stays on this machine '
+            "(a service file has those of one that does not)"
+        )
+
+
+def read_service_file(path: str | os.PathLike[str]) -> Address:
+    """The address in a file of role client or admin. Messages contain no secret."""
+    file = pathlib.Path(path)
+    try:
+        mode = file.stat().st_mode
+    except OSError:
+        raise NotFound(f"'{file}' does not exist") from None
+    if mode & 0o077:
+        raise InvalidArgument(f"others can use '{file}', which holds a secret (chmod 600)")
+    try:
+        with file.open("rb") as stream:
+            fields: Any = json.loads(stream.read(_MOST_FILE_BYTES))
+    except OSError as error:
+        raise InvalidArgument(f"'{file}' cannot be read: {error.strerror}") from None
+    except ValueError:
+        fields = None
+    if not isinstance(fields, dict):
+        raise InvalidArgument(f"'{file}' is no service file: it is not one JSON object")
+
+    def text(name: str) -> str:
+        value = fields.get(name)
+        if not isinstance(value, str):
+            raise InvalidArgument(f"service file '{file}': {name} is missing or no text")
+        return value
+
+    def key(name: str) -> str:
+        value = text(name)
+        if len(value) != _KEY_CHARACTERS or not value.isascii():
+            raise InvalidArgument(f"service file '{file}': {name} is no key")
+        return value
+
+    role = text("role")
+    if role == "worker":
+        raise InvalidArgument(f"service file '{file}' is of role worker, but client or admin is needed here")
+    if role not in ("client", "admin"):
+        raise InvalidArgument(f"service file '{file}': role is not client, worker or admin")
+    return Address(text("endpoint"), Keys(key("server_key"), key("public_key"), key("secret_key")))
+
+
+def _state_folder() -> pathlib.Path:
+    """Where `slabstream up` records what it started (client/cli/service_state.h)."""
+    runtime = os.environ.get("XDG_RUNTIME_DIR", "")
+    try:
+        own = runtime.startswith("/") and os.stat(runtime).st_uid == os.getuid()
+    except OSError:
+        own = False
+    return pathlib.Path(runtime, "slabstream") if own else pathlib.Path(f"/tmp/slabstream-{os.getuid()}")
+
+
+def _runs(pid: int) -> bool:
+    try:
+        text = pathlib.Path(f"/proc/{pid}/stat").read_text(errors="replace")
+    except OSError:
+        return False
+    name, _, rest = text.partition("(")[2].rpartition(")")
+    return name == "slabstream-coordinator"[:15] and rest[1:2] not in ("Z", "X")
+
+
+def _started_here(endpoint: str | None) -> dict[str, Any] | None:
+    """The newest service that `slabstream up` started here and that runs, at this endpoint or at any."""
+    folder = _state_folder()
+    try:
+        if folder.lstat().st_uid != os.getuid():
+            return None
+        files = sorted(folder.glob("*.json"))
+    except OSError:
+        return None
+    newest: dict[str, Any] | None = None
+    for file in files:
+        try:
+            state = json.loads(file.read_text())
+            found = _runs(int(state["coordinator"])) and (endpoint is None or state["endpoint"] == endpoint)
+            if found and (newest is None or state["started_unix"] > newest["started_unix"]):
+                newest = state
+        except (OSError, ValueError, KeyError, TypeError):
+            continue  # damaged
+    return newest
+
+
+def find_service(service: str | os.PathLike[str] | None = None, endpoint: str | None = None) -> Address:
+    """The service that is meant: the named one; else $SLABSTREAM_SERVICE; else $SLABSTREAM_ENDPOINT; else the one that `slabstream up`
+    started here last; else the usual endpoint. An endpoint beside a service file is another way to the same service, such as the near end
+    of a tunnel."""
+    if service is None and endpoint is None:
+        service = os.environ.get("SLABSTREAM_SERVICE") or None
+        endpoint = None if service else os.environ.get("SLABSTREAM_ENDPOINT") or None
+    if service is not None:
+        address = read_service_file(service)
+        if endpoint is not None:
+            address = dataclasses.replace(address, endpoint=endpoint)
+    else:
+        state = _started_here(endpoint)
+        if state is not None and state.get("keys_folder"):
+            address = read_service_file(pathlib.Path(state["keys_folder"], "admin.json"))
+        elif endpoint is not None:
+            address = Address(endpoint)
+        else:
+            address = Address(state["endpoint"] if state else USUAL_ENDPOINT)
+    check_endpoint(address.endpoint, address.keys is not None)
+    return address

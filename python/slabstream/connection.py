@@ -1,0 +1,207 @@
+"""A connection to a service: a thread that owns the socket and runs Requests. Everybody else's calls are handed to it."""
+from __future__ import annotations
+
+import concurrent.futures
+import math
+import os
+import queue
+import threading
+import time
+import weakref
+from typing import Any, Callable
+
+import zmq
+from zmq.utils.monitor import parse_monitor_message
+
+from . import schema
+from .address import Address
+from .errors import InvalidArgument, SlabstreamError, Unavailable
+from .requests import Observer, Requests
+
+CONNECT_SECONDS = 4.0
+ANSWER_SECONDS = 5.0
+
+_MOST_MESSAGES = 4096  # queued, each way
+_MOST_FRAME_BYTES = 2 << 30
+_BATCH = 256  # messages that are read before anything else is done
+
+
+def _open_socket(context: zmq.Context[Any], address: Address) -> zmq.Socket[Any]:
+    """As client/client.cpp has it: reconnects every 100 ms, and notices within 3 s that a tcp connection is cut."""
+    socket: zmq.Socket[Any] = context.socket(zmq.DEALER)
+    for option, value in (
+        (zmq.SNDHWM, _MOST_MESSAGES),
+        (zmq.RCVHWM, _MOST_MESSAGES),
+        (zmq.LINGER, 500),
+        (zmq.HANDSHAKE_IVL, 5000),
+        (zmq.MAXMSGSIZE, _MOST_FRAME_BYTES),
+        (zmq.TCP_MAXRT, 3000),
+        (zmq.TCP_KEEPALIVE, 1),
+        (zmq.TCP_KEEPALIVE_IDLE, 2),
+        (zmq.TCP_KEEPALIVE_INTVL, 1),
+        (zmq.CONNECT_TIMEOUT, 2000),
+    ):
+        socket.setsockopt(option, value)
+    if address.endpoint.startswith("tcp://["):
+        socket.setsockopt(zmq.IPV6, 1)
+    if address.keys is not None and address.endpoint.startswith("tcp://"):
+        if not zmq.has("curve"):
+            raise InvalidArgument("this ZeroMQ was built without CURVE, which services with keys need")
+        socket.curve_serverkey = address.keys.server.encode()
+        socket.curve_publickey = address.keys.public.encode()
+        socket.curve_secretkey = address.keys.secret.encode()
+    return socket
+
+
+def _milliseconds_until(due: float) -> int | None:
+    return None if due == math.inf else math.ceil(1000 * max(due - time.monotonic(), 0.0))
+
+
+class _Loop:
+    """What the thread has. It does not refer to the Connection, so that one which nobody uses any more is closed."""
+
+    def __init__(self, address: Address):
+        self.endpoint = address.endpoint
+        self.context: zmq.Context[Any] = zmq.Context()
+        try:
+            self.socket = _open_socket(self.context, address)
+            self.monitor = self.socket.get_monitor_socket(zmq.EVENT_HANDSHAKE_FAILED_AUTH)
+            self.socket.connect(address.endpoint)
+        except BaseException:
+            self.context.destroy(linger=0)
+            raise
+        self.requests = Requests(address.endpoint, self._send)
+        self.calls: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self.wake_read, self.wake_write = os.pipe()
+        os.set_blocking(self.wake_write, False)
+        self.ends = False
+        self.lock = threading.Lock()  # of `ends` and the pipe's life
+        self.process = os.getpid()
+        self.thread = threading.Thread(target=self._run, name="slabstream", daemon=True)
+        self.thread.start()
+
+    def call(self, function: Callable[[], None]) -> None:
+        """Has the thread run `function`."""
+        with self.lock:
+            if self.ends or os.getpid() != self.process:  # a forked child has no thread that would do it
+                raise Unavailable(f"the connection to the service at {self.endpoint} is closed")
+            self.calls.put(function)
+            self._wake()
+
+    def stop(self) -> None:
+        if os.getpid() != self.process:
+            return  # a forked child has neither the thread nor a say
+        with self.lock:
+            if self.ends:
+                return
+            self.ends = True
+            self._wake()
+        if threading.current_thread() is not self.thread:
+            self.thread.join()
+
+    def _wake(self) -> None:
+        try:
+            os.write(self.wake_write, b"!")
+        except BlockingIOError:
+            pass  # it is full of calls to wake up
+
+    def _send(self, envelope: Any) -> None:
+        try:
+            self.socket.send(envelope.SerializeToString(), zmq.NOBLOCK)
+        except zmq.Again:
+            pass  # as if it was lost: pings notice, and requests are submitted again
+
+    def _run(self) -> None:
+        poller = zmq.Poller()
+        poller.register(self.socket, zmq.POLLIN)
+        poller.register(self.monitor, zmq.POLLIN)
+        poller.register(self.wake_read, zmq.POLLIN)
+        try:
+            while not self.ends:
+                # What has come is read before silence is judged: this thread may have been busy elsewhere for long.
+                busy = self._read()
+                due = self.requests.tick(time.monotonic())
+                for source, _ in poller.poll(0 if busy else _milliseconds_until(due)):
+                    if isinstance(source, int):
+                        os.read(self.wake_read, 4096)
+                    elif source is self.monitor:
+                        self._hear_monitor()
+                self._run_calls()
+        finally:
+            with self.lock:
+                self.ends = True
+            self._run_calls()  # nobody waits for ever
+            self.requests.close()
+            self.socket.disable_monitor()
+            self.context.destroy(linger=500)
+            with self.lock:
+                os.close(self.wake_read)
+                os.close(self.wake_write)
+
+    def _run_calls(self) -> None:
+        while True:
+            try:
+                function = self.calls.get_nowait()
+            except queue.Empty:
+                return
+            function()
+
+    def _read(self) -> bool:
+        """Whether there may be more."""
+        for _ in range(_BATCH):
+            try:
+                parts = self.socket.recv_multipart(zmq.NOBLOCK, copy=False)
+            except zmq.Again:
+                return False
+            self.requests.receive([part.buffer for part in parts], time.monotonic())
+        return True
+
+    def _hear_monitor(self) -> None:
+        event = parse_monitor_message(self.monitor.recv_multipart())
+        if event["event"] == zmq.EVENT_HANDSHAKE_FAILED_AUTH:  # ZeroMQ does not try again
+            self.requests.fail_all(f"the service at {self.endpoint} refuses the key: it was revoked or is another's", for_good=True)
+
+
+class Connection:
+    """Any thread. Unavailable: nobody answers within `timeout` seconds, or the service refuses the key."""
+
+    def __init__(self, address: Address, timeout: float = CONNECT_SECONDS):
+        self.endpoint = address.endpoint
+        try:
+            self._loop = _Loop(address)
+        except zmq.ZMQError as error:
+            raise Unavailable(f'endpoint "{address.endpoint}": {error.strerror}') from None
+        self.close = weakref.finalize(self, self._loop.stop)
+        from . import schema  # what is asked is a ping
+
+        try:
+            self.ask("client_ping", schema.ClientPing(), timeout)
+        except SlabstreamError:
+            self.close()
+            raise
+
+    def submit(self, frame: Any, deadline_seconds: float, observer: Observer) -> concurrent.futures.Future[int]:
+        """The request's number, when it has been sent."""
+        number: concurrent.futures.Future[int] = concurrent.futures.Future()
+        requests = self._loop.requests
+        self._loop.call(lambda: number.set_result(requests.submit(frame, deadline_seconds, observer, time.monotonic())))
+        return number
+
+    def cancel(self, number: concurrent.futures.Future[int]) -> None:
+        """`number`: of submit()."""
+        requests = self._loop.requests
+        self._loop.call(lambda: requests.cancel(number.result()))  # calls keep their order: it is known by then
+
+    def ask(self, kind: str, message: Any, timeout: float = ANSWER_SECONDS) -> Any:
+        """The answer to a question or an order, or the service's refusal as an exception."""
+        answer: concurrent.futures.Future[Any] = concurrent.futures.Future()
+        nonces: list[int] = []
+        requests = self._loop.requests
+        self._loop.call(lambda: nonces.append(requests.ask(kind, message, answer)))
+        try:
+            return answer.result(timeout)
+        except concurrent.futures.TimeoutError:
+            if answer.done():
+                raise  # the service's own
+            self._loop.call(lambda: requests.forget(nonces[0]))
+            raise Unavailable(f"no service answers at {self.endpoint} within {round(1000 * timeout)} ms") from None

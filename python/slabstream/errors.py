@@ -1,0 +1,65 @@
+"""What goes wrong, as exceptions that carry the service's own sentence.
+
+All are SlabstreamError. The class says what kind of failure it is (StatusCode of proto/slabstream/v1/types.proto); each is also the exception
+of Python's own that fits, so that `except ValueError` or `except TimeoutError` work as usual.
+"""
+from __future__ import annotations
+
+import concurrent.futures
+
+
+class SlabstreamError(Exception):
+    """Any failure of this package. Its text is one line."""
+
+
+class InvalidArgument(SlabstreamError, ValueError):
+    """A value, name or combination that is not allowed. The text names it, and the limit."""
+
+
+class UnknownOption(InvalidArgument, TypeError):
+    """A keyword that is no option."""
+
+
+class NotFound(SlabstreamError, LookupError):
+    """No such dataset, file or program."""
+
+
+class Unavailable(SlabstreamError, ConnectionError):
+    """The service does not answer, refuses the key, or has gone."""
+
+
+class ResourceExhausted(SlabstreamError):
+    """More memory, or more open requests, than the service has or allows."""
+
+
+class DataLoss(SlabstreamError):
+    """A damaged file or message."""
+
+
+class Cancelled(SlabstreamError, concurrent.futures.CancelledError):
+    """The frame was cancelled."""
+
+
+class DeadlineExceeded(SlabstreamError, TimeoutError):
+    """The frame was not finished within its deadline, or result() waited long enough."""
+
+
+class Internal(SlabstreamError):
+    """A mistake of the service's or of this package's."""
+
+
+_BY_CODE: dict[int, type[SlabstreamError]] = {
+    1: InvalidArgument,
+    2: NotFound,
+    3: Unavailable,
+    4: ResourceExhausted,
+    5: DataLoss,
+    6: Cancelled,
+    7: DeadlineExceeded,
+    8: Internal,
+}
+
+
+def error_of(code: int, message: str) -> SlabstreamError:
+    """The exception for a Status of the wire."""
+    return _BY_CODE.get(code, Internal)(message)

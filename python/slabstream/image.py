@@ -1,0 +1,205 @@
+"""Image: a finished picture, or a preview of one."""
+from __future__ import annotations
+
+import dataclasses
+import os
+import pathlib
+import tempfile
+from typing import Any
+
+import numpy
+import numpy.typing
+
+from . import png, schema
+from .errors import InvalidArgument, Unavailable
+from .runs import Floats, Rectangle
+
+Vector = tuple[float, float, float]
+
+_STAGES = ("fetch", "prepare", "transform", "shade", "splat", "composite", "zbuffer", "combine", "encode", "resolve", "render", "sample")
+
+
+@dataclasses.dataclass(frozen=True)
+class PictureFormat:
+    """How pixels become a picture, by whoever shows it."""
+
+    background: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)  # straight, each in [0, 1]
+    png_bits: int = 8  # 8 or 16
+
+
+@dataclasses.dataclass(frozen=True)
+class Geometry:
+    """How a picture shows the world of its volume. Vectors are x, y, z of the world, as on the command line."""
+
+    world: str          # "voxels", "scene" or "patient" (x to the patient's right, y to anterior, z to superior)
+    unit: str           # of lengths: "voxel", "file" (that of its spacing, which is not known) or "millimetre"
+    perspective: bool
+    right: Vector       # to the right in the picture; the three are unit vectors at right angles
+    up: Vector          # upwards in the picture
+    forward: Vector     # away from the viewer
+    target: Vector      # the point that the picture's centre shows
+    target_depth: float
+    pixel_size: float   # side of a pixel at the target's depth; in orthographic pictures at any depth
+
+
+@dataclasses.dataclass(frozen=True)
+class Statistics:
+    """What a frame cost, and how the service made it."""
+
+    workers: int
+    groups: int
+    attempts: int                # above 1: workers were lost
+    decomposition: str
+    axis: str
+    combine: str
+    load_metric: str
+    assignment: str
+    balance: str
+    queued_seconds: float        # from the request's arrival to the plan
+    frame_seconds: float         # from the plan to the last byte at the coordinator
+    latency_seconds: float       # from submit() to the last byte here
+    worker_seconds: dict[str, float]  # worker time by stage, summed over all of them
+    message: Any = dataclasses.field(repr=False)  # FrameStatistics of the wire, with the reports of all ranks
+
+
+def geometry_of(message: Any) -> Geometry:
+    def vector(v: Any) -> Vector:
+        return (v.x, v.y, v.z)
+
+    return Geometry(
+        world={schema.WORLD_SCENE: "scene", schema.WORLD_PATIENT: "patient"}.get(message.world, "voxels"),
+        unit={schema.LENGTH_UNIT_FILE: "file", schema.LENGTH_UNIT_MILLIMETRE: "millimetre"}.get(message.unit, "voxel"),
+        perspective=message.projection == schema.PROJECTION_PERSPECTIVE,
+        right=vector(message.right),
+        up=vector(message.up),
+        forward=vector(message.forward),
+        target=vector(message.target),
+        target_depth=message.target_depth,
+        pixel_size=message.pixel_size,
+    )
+
+
+def statistics_of(message: Any, latency_seconds: float) -> Statistics:
+    stages = dict.fromkeys(_STAGES, 0.0)
+    for report in message.reports:
+        for name, nanoseconds in zip(_STAGES, report.stage_ns):
+            stages[name] += nanoseconds * 1e-9
+    return Statistics(
+        workers=message.workers,
+        groups=message.groups,
+        attempts=message.attempts,
+        decomposition=message.decomposition,
+        axis=message.axis,
+        combine=message.combine,
+        load_metric=message.load_metric,
+        assignment=message.assignment,
+        balance=message.balance,
+        queued_seconds=message.queued_ns * 1e-9,
+        frame_seconds=(message.end_ns - message.begin_ns) * 1e-9,
+        latency_seconds=latency_seconds,
+        worker_seconds=stages,
+        message=message,
+    )
+
+
+def _codes(rgba: Floats, bits: int) -> numpy.typing.NDArray[Any]:
+    """Straight alpha: round(max * clamp(straight value, 0, 1)), halves away from zero, without a transfer curve; as the command line's PNG.
+    The arithmetic is that of client/image_io: floats, until the rounding."""
+    alpha = rgba[..., 3:]
+    straight = numpy.zeros_like(rgba)
+    numpy.divide(rgba[..., :3], alpha, out=straight[..., :3], where=alpha > 0)
+    straight[..., 3:] = alpha
+    scaled = numpy.float32(2**bits - 1) * numpy.clip(straight, numpy.float32(0), numpy.float32(1))
+    codes: numpy.typing.NDArray[Any] = numpy.floor(scaled.astype(numpy.float64) + 0.5).astype(f"uint{bits}")
+    return codes
+
+
+class Image:
+    """A picture. Row 0 is the top.
+
+    numpy.asarray(image) is height, width, 4: uint8 with straight alpha, the same codes as in the command line's PNG. `rgba` has what the
+    service sent, over the background.
+    """
+
+    def __init__(self, rgba: Floats, depth: Floats | None = None, *, format: PictureFormat = PictureFormat(),
+                 geometry: Geometry | None = None, statistics: Statistics | None = None, preview: bool = False):
+        self.rgba = rgba                #: float32, height, width, 4: premultiplied, linear
+        self.depth = depth              #: float32, height, width: camera depth, +infinity where nothing is seen; None: has none
+        self.format = format
+        self.geometry = geometry        #: how it shows the world; None for pictures put together of several
+        self.statistics = statistics    #: None for previews, and pictures put together of several
+        self.preview = preview          #: some groups are still missing
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels, as Pillow has it."""
+        return self.rgba.shape[1], self.rgba.shape[0]
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """That of numpy.asarray(image)."""
+        return self.rgba.shape[0], self.rgba.shape[1], 4
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> numpy.typing.NDArray[Any]:
+        codes = _codes(self.rgba, 8)
+        return codes if dtype is None else codes.astype(dtype)
+
+    def png(self, bits: int | None = None) -> bytes:
+        """The picture as a PNG file with 8 or 16 bits a channel; None: as the option `depth` said."""
+        if bits not in (None, 8, 16):
+            raise InvalidArgument(f"bits is {bits}, must be 8 or 16")
+        return png.encode(_codes(self.rgba, bits or self.format.png_bits), {"Software": "slabstream"})
+
+    def save(self, path: str | os.PathLike[str], bits: int | None = None) -> None:
+        """Writes a PNG file, whole or not at all."""
+        file = pathlib.Path(path)
+        if file.suffix.lower() != ".png":
+            raise InvalidArgument(f"'{file}' must end in .png; numpy.asarray(image) and image.rgba hold the pixels for other formats")
+        content = self.png(bits)
+        try:
+            with tempfile.NamedTemporaryFile(dir=file.parent, prefix=f".{file.name}.", delete=False) as temporary:
+                try:
+                    temporary.write(content)
+                    temporary.flush()
+                    mask = os.umask(0)
+                    os.umask(mask)
+                    os.chmod(temporary.name, 0o666 & ~mask)
+                    os.replace(temporary.name, file)
+                except BaseException:
+                    os.unlink(temporary.name)
+                    raise
+        except OSError as error:
+            raise Unavailable(f"cannot write '{file}': {error.strerror}") from None
+
+    def _repr_png_(self) -> bytes:
+        """For notebooks."""
+        return self.png(8)
+
+    def __repr__(self) -> str:
+        width, height = self.size
+        return f"<slabstream.Image {width}x{height}{' with depth' if self.depth is not None else ''}{', a preview' if self.preview else ''}>"
+
+
+def compose(part: Rectangle, width: int, height: int, format: PictureFormat) -> tuple[Floats, Floats | None]:
+    """The whole picture over its background; and its depths, if it has any."""
+    red, green, blue, alpha = (numpy.float32(channel) for channel in format.background)
+    behind = numpy.array([red * alpha, green * alpha, blue * alpha, alpha], numpy.float32)
+    rgba = numpy.broadcast_to(behind, (height, width, 4)).copy()
+    h, w = part.rgba.shape[:2]
+    there = (slice(part.y, part.y + h), slice(part.x, part.x + w))
+    if alpha > 0:
+        rgba[there] = part.rgba + (numpy.float32(1) - part.rgba[..., 3:]) * behind
+    else:
+        rgba[there] = part.rgba
+    depth: Floats | None = None
+    if part.depth is not None:
+        depth = numpy.full((height, width), numpy.inf, numpy.float32)
+        depth[there] = part.depth
+    return rgba, depth
+
+
+def side_by_side(images: list[Image]) -> Image:
+    """Pictures of one height, from left to right."""
+    if len(images) == 1:
+        return images[0]
+    return Image(numpy.concatenate([image.rgba for image in images], axis=1), format=images[0].format)

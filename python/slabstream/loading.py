@@ -1,0 +1,160 @@
+"""Arrays and files as volumes of a service on this machine: load() and render()."""
+from __future__ import annotations
+
+import itertools
+import os
+import pathlib
+import tempfile
+import types
+import weakref
+from typing import Any, Callable, Iterator
+
+from .errors import InvalidArgument, NotFound, SlabstreamError, Unavailable
+from .frame import Frame
+from .image import Image
+from .local import lock, running
+from .options import takes_options_of
+from .service import Service
+from .volumes import Grid, check_spacing, on_grid, volume_of, write_nrrd
+from .volumes import Volume as VolumeData
+
+_TAKE_AWAY_SECONDS = 5.0
+
+
+class Volume:
+    """A volume at a service, made by load(). A context manager: leaving it takes the volume away again."""
+
+    def __init__(self, service: Service, name: str, shows: dict[str, Any], files: list[pathlib.Path]):
+        self.service, self.name = service, name
+        self._shows = shows  # layers: options that are given unless the caller says otherwise
+        self.close: Callable[[], Any] = weakref.finalize(self, _take_away, service, name, files, os.getpid())
+
+    @takes_options_of("render")
+    def render(self, **options: Any) -> Image:
+        """A picture of the volume."""
+        return self.service.render(self.name, **self._shows | options)
+
+    @takes_options_of("render")
+    def submit(self, **options: Any) -> Frame:
+        """As Service.submit."""
+        return self.service.submit(self.name, **self._shows | options)
+
+    @takes_options_of("render")
+    def turntable(self, frames: int, **options: Any) -> Iterator[Image]:
+        """As Service.turntable."""
+        return self.service.turntable(self.name, frames, **self._shows | options)
+
+    @takes_options_of("slice")
+    def slice(self, **options: Any) -> Image:
+        """As Service.slice."""
+        return self.service.slice(self.name, **self._shows | options)
+
+    def __enter__(self) -> Volume:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: types.TracebackType | None) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<slabstream.Volume {self.name} at {self.service.endpoint}>"
+
+
+def _take_away(service: Service, name: str, files: list[pathlib.Path], process: int) -> None:
+    if os.getpid() != process:
+        return  # a forked child's copy
+    try:
+        service.remove_data(name, timeout=_TAKE_AWAY_SECONDS)
+    except SlabstreamError:
+        pass  # it went with its service
+    for file in files:
+        file.unlink(missing_ok=True)
+
+
+def _is_path(volume: Any) -> bool:
+    return isinstance(volume, (str, os.PathLike))
+
+
+def _path_text(path: Any, what: str) -> str:
+    """Absolute; options for reading may stand behind a question mark."""
+    text = str(os.fspath(path))
+    file = text if os.path.exists(text) else text.partition("?")[0]
+    if what == "labels" and not os.path.exists(file):
+        file = file.rpartition(":")[0] or file  # FILE:COLOURS
+    if not os.path.exists(file):
+        raise NotFound(f"{what} '{file}' does not exist")
+    return os.path.abspath(file) + text[len(file):]
+
+
+def load(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any = None, world: str | None = None, labels: Any = None,
+         overlay: Any = None, service: Service | None = None) -> Volume:
+    """Brings a volume to a service on this machine, for any number of pictures.
+
+    `volume` is a path of any format that slabstream reads, or an array of z, y, x: numpy, dask, zarr, h5py, xarray.DataArray, an image of
+    nibabel, a list of pydicom datasets. `spacing` and `origin` are z, y, x too; row i of `direction` is where the array's axis i points to,
+    as z, y, x of the world; `world` is "scene" or "patient" (x to the right, y to anterior, z to superior; mm). `labels` and `overlay` are
+    volumes on the same grid, or paths. `service`: one on this machine that takes data; None: one of this process' own, which is started if
+    need be and ends with it.
+    """
+    own = None if service is not None else running()
+    where = service if service is not None else own.service  # type: ignore[union-attr]
+    grid: Grid | None = None  # of a volume that is no file: that of its layers too, unless they state their own
+    folder = own.folder if own is not None else pathlib.Path(tempfile.gettempdir())
+    files: list[pathlib.Path] = []
+
+    def written(checked: VolumeData) -> str:
+        handle, name = tempfile.mkstemp(prefix=".slabstream-", suffix=".nrrd", dir=folder)
+        os.close(handle)
+        files.append(pathlib.Path(name))
+        try:
+            write_nrrd(checked, name)
+        except OSError as error:
+            raise Unavailable(f"cannot write '{name}': {error.strerror}") from None
+        return name
+
+    try:
+        if _is_path(volume):
+            text = _path_text(volume, "volume")
+            for name, value in (("origin", origin), ("direction", direction), ("world", world)):
+                if value is not None:
+                    raise InvalidArgument(f"{name} is for arrays; files state their own")
+            if spacing is not None:
+                dz, dy, dx = check_spacing(spacing)
+                text += f"{',' if '?' in text else '?'}spacing={dx},{dy},{dz}"
+        else:
+            checked = volume_of(volume, spacing, origin, direction, world)
+            grid = checked.grid
+            text = written(checked)
+        for what, layer in (("labels", labels), ("overlay", overlay)):
+            if layer is not None:
+                path = _path_text(layer, what) if _is_path(layer) else written(on_grid(volume_of(layer), grid))
+                text += f",{what}={path}"
+        name = f"python-{os.getpid()}-{next(_numbers)}"
+        where.add_data(f"{name}={text}")
+    except BaseException:
+        for file in files:
+            file.unlink(missing_ok=True)
+        raise
+    shows = {what: True for what, layer in (("labels", labels), ("overlay", overlay)) if layer is not None}
+    return Volume(where, name, shows, files)
+
+
+_numbers = itertools.count(1)  # of volumes, for their names
+
+
+@takes_options_of("render")
+def render(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any = None, world: str | None = None, labels: Any = None,
+           overlay: Any = None, service: Service | None = None, **options: Any) -> Image:
+    """A picture of an array or a file: load() and render() in one. For several pictures of one array, load() it once. Files stay loaded, and
+    are read again when they change."""
+    given: dict[str, Any] = {"spacing": spacing, "origin": origin, "direction": direction, "world": world, "labels": labels,
+                             "overlay": overlay, "service": service}
+    if service is None and all(layer is None or _is_path(layer) for layer in (volume, labels, overlay)):
+        with lock:
+            kept = running().kept
+            key = repr((os.getcwd(), volume, given))
+            if key not in kept:
+                kept[key] = load(volume, **given)
+            loaded: Volume = kept[key]
+        return loaded.render(**options)
+    with load(volume, **given) as loaded:
+        return loaded.render(**options)

@@ -1,0 +1,118 @@
+"""The options of pictures: those of `slabstream render` and `slice`, by the same names with underscores.
+
+options.json is what `slabstream options COMMAND` prints (python/update-options writes it, a test compares). Names, defaults, limits, choices,
+help texts and signatures are made from it. drafts.py says what an option changes in a request.
+"""
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import json
+import math
+import pathlib
+import re
+import textwrap
+from typing import Any, Callable, Iterable, TypeVar
+
+
+@dataclasses.dataclass(frozen=True)
+class Option:
+    """As slabstream describes it (client/cli/option_description.h)."""
+
+    name: str               # as a keyword
+    text_name: str          # as on the command line, without dashes
+    group: str
+    help: str
+    type: str | None        # None: a flag
+    default: str | None
+    choices: tuple[str, ...]
+    least: float
+    most: float
+    above: bool             # values must exceed `least`
+    excludes: tuple[str, ...]
+    needs: tuple[str, ...]
+
+
+def _keyword(name: str) -> str:
+    return name.replace("-", "_")
+
+
+def _option(entry: dict[str, Any]) -> Option:
+    return Option(
+        name=_keyword(entry["name"]),
+        text_name=entry["name"],
+        group=entry["group"],
+        help=entry["help"],
+        type=entry.get("type"),
+        default=entry.get("default"),
+        choices=tuple(entry.get("choices", ())),
+        least=entry.get("above", entry.get("min", -math.inf)),
+        most=entry.get("max", math.inf),
+        above="above" in entry,
+        excludes=tuple(map(_keyword, entry.get("excludes", ()))),
+        needs=tuple(map(_keyword, entry.get("needs", ()))),
+    )
+
+
+def _load() -> dict[str, dict[str, Option]]:
+    commands = json.loads(pathlib.Path(__file__).with_name("options.json").read_text(encoding="utf-8"))
+    return {command: {option.name: option for option in map(_option, entries)} for command, entries in commands.items()}
+
+
+#: By command and keyword.
+COMMANDS = _load()
+
+
+# What layers are here, where the command line names files.
+_LAYER_HELP = {"labels": "Shows the dataset's labels as usual", "overlay": "Shows the dataset's overlay as usual"}
+
+
+def _in_keywords(text: str, command: str) -> str:
+    """Options of this command as one writes them here."""
+
+    def keyword(found: re.Match[str]) -> str:
+        name = _keyword(found[1])
+        return name if name in COMMANDS[command] else found[0]
+
+    return re.sub(r"--([a-z]+(?:-[a-z]+)*)", keyword, text)
+
+
+def _limits_of(option: Option) -> list[str]:
+    limits = [] if option.default is None else [f"default: {option.default}"]
+    return limits if math.inf == option.most else [*limits, f"{'above' if option.above else 'from'} {option.least:g} to {option.most:g}"]
+
+
+def _help_of(command: str, names: Iterable[str]) -> str:
+    lines, group = [], ""
+    for name in names:
+        option = COMMANDS[command][name]
+        if option.group != group:
+            group = option.group
+            lines += ["", f"{group.partition(' (')[0]}:"]
+        head, *rest = _in_keywords(_LAYER_HELP.get(name, option.help), command).split("\n")
+        limits = _limits_of(option)
+        head += f" ({'; '.join(limits)})" if limits else ""
+        lines.append(f"  {name}: {option.type if option.type and name not in _LAYER_HELP else 'bool'}")
+        for part, indent in [(head, "      "), *((line.strip(), "        ") for line in rest)]:
+            lines += textwrap.wrap(part, 100, initial_indent=indent, subsequent_indent=indent)
+    return "\n".join(lines)
+
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def takes_options_of(command: str) -> Callable[[Function], Function]:
+    """Gives a function whose last parameter is **options the signature and the help text of its options, for help() and completion."""
+
+    def describe(function: Function) -> Function:
+        signature = inspect.signature(function)
+        own = [p for p in signature.parameters.values() if p.kind is not inspect.Parameter.VAR_KEYWORD]
+        named = {p.name for p in own}
+        options = [option for option in COMMANDS[command].values() if option.name not in named]
+        more = [inspect.Parameter(o.name, inspect.Parameter.KEYWORD_ONLY, default=False if o.type is None else o.default) for o in options]
+        function.__signature__ = signature.replace(parameters=own + more)  # type: ignore[attr-defined]
+        about = inspect.cleandoc(function.__doc__ or "")
+        function.__doc__ = f"{about}\n\nOptions, as of `slabstream {command}`:\n{_help_of(command, (o.name for o in options))}\n"
+        return function
+
+    return describe

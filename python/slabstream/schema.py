@@ -1,0 +1,46 @@
+"""The messages of proto/slabstream/v1, as classes: schema.Envelope(version=1), schema.FRAME_PHASE_QUEUED.
+
+They are made from schema.bin, a FileDescriptorSet that protoc wrote and a test compares with proto/. So the package needs no protoc to be
+installed, and takes any version of protobuf from 3.20 on.
+"""
+from __future__ import annotations
+
+import pathlib
+from typing import Any
+
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+
+PACKAGE = "slabstream.v1"
+WIRE_VERSION = 1
+
+
+def _load() -> dict[str, Any]:
+    """Messages and values of enums, by name. The pool is our own: other modules may have the same schema in the common one."""
+    pool = descriptor_pool.DescriptorPool()
+    files = descriptor_pb2.FileDescriptorSet.FromString(pathlib.Path(__file__).with_name("schema.bin").read_bytes())
+    for file in files.file:
+        pool.AddSerializedFile(file.SerializeToString())
+    if hasattr(message_factory, "GetMessageClass"):
+        class_of = message_factory.GetMessageClass
+    else:  # before protobuf 4.22
+        class_of = message_factory.MessageFactory(pool).GetPrototype
+    found: dict[str, Any] = {}
+    for file in files.file:
+        for message in file.message_type:
+            found[message.name] = class_of(pool.FindMessageTypeByName(f"{PACKAGE}.{message.name}"))
+        for enum in file.enum_type:
+            found.update((value.name, value.number) for value in enum.value)
+    return found
+
+
+_NAMES = _load()
+
+
+def __getattr__(name: str) -> Any:
+    if name in _NAMES:
+        return _NAMES[name]
+    raise AttributeError(f"the schema has no {name}")
+
+
+def __dir__() -> list[str]:
+    return sorted(_NAMES)

@@ -1,0 +1,172 @@
+"""Service: a connected service. All of it may be used by several threads at once."""
+from __future__ import annotations
+
+import collections
+import copy
+import math
+import os
+import types
+from typing import Any, Callable, Iterator
+
+from . import schema
+from .address import find_service
+from .connection import ANSWER_SECONDS, CONNECT_SECONDS, Connection
+from .drafts import Draft, draft_of, slice_drafts_of
+from .errors import InvalidArgument
+from .frame import Frame, Progress
+from .image import Image, side_by_side
+from .options import takes_options_of
+from .status import Dataset, Status, dataset_of, status_of
+from .values import integer
+
+DEADLINE_SECONDS = 600.0
+_ORDER_SECONDS = 30.0
+_MOST_ITEMS = 128
+_MOST_FRAMES, _MOST_TURNS, _MOST_IN_FLIGHT = 100000, 1000, 64
+
+
+def turntable_drafts(draft: Draft, frames: int, turns: int) -> Iterator[Draft]:
+    """Frame i is turned by i / frames of all turns, from the azimuth of `draft` on."""
+    start = draft.frame.view.azimuth_degrees
+    for i in range(frames):
+        turned = copy.copy(draft)
+        turned.frame = schema.FrameRequest()
+        turned.frame.CopyFrom(draft.frame)
+        # Back into one turn, so that a start near the limit of angles stays valid.
+        turned.frame.view.azimuth_degrees = math.fmod(start + 360.0 * turns * i / frames, 360.0)
+        yield turned
+
+
+class Service:
+    """Made by connect(). A context manager: leaving it closes the connection, which cancels what is open."""
+
+    def __init__(self, connection: Connection):
+        self._connection = connection
+
+    @property
+    def endpoint(self) -> str:
+        return self._connection.endpoint
+
+    @takes_options_of("render")
+    def render(self, dataset: str, *, deadline: float = DEADLINE_SECONDS, **options: Any) -> Image:
+        """A picture of a dataset, by its name in the service's catalogue. Waits for it, at most `deadline` seconds.
+
+        Raises InvalidArgument, NotFound, Unavailable, ResourceExhausted or DeadlineExceeded with the service's sentence.
+        """
+        return self._wait_for(self.submit(dataset, deadline=deadline, **options))
+
+    @takes_options_of("render")
+    def submit(self, dataset: str, *, deadline: float = DEADLINE_SECONDS, previews: bool = False,
+               on_progress: Callable[[Progress], None] | None = None, on_preview: Callable[[Image], None] | None = None,
+               **options: Any) -> Frame:
+        """Asks for a picture and returns at once.
+
+        `previews`, or an `on_preview`: a picture after each group of boxes, nearest first (see `groups`). Callbacks run on the connection's
+        thread: they must be quick and not wait for anything of the service. `deadline` is in seconds, up to a day.
+        """
+        draft = draft_of(dataset, options)
+        draft.frame.previews = previews or on_preview is not None
+        return Frame(self._connection, draft, deadline, on_progress, on_preview)
+
+    @takes_options_of("render")
+    def turntable(self, dataset: str, frames: int, *, turns: int = 1, in_flight: int = 2, deadline: float = DEADLINE_SECONDS,
+                  **options: Any) -> Iterator[Image]:
+        """Pictures of full turns about the volume's z axis, one by one, in order. `in_flight` of them are asked for before they are needed,
+        so that the service never waits. Frames that are open when the iterator is closed are cancelled."""
+        frames = integer("frames", frames, 1, _MOST_FRAMES)
+        turns = integer("turns", turns, 0, _MOST_TURNS)
+        in_flight = integer("in_flight", in_flight, 1, _MOST_IN_FLIGHT)
+        draft = draft_of(dataset, options)
+        if draft.frame.view.HasField("eye") and turns > 0:
+            raise InvalidArgument(
+                "eye stands still, but a turntable turns by azimuth, about look_at; turns=0 keeps the view still"
+            )
+        return self._pipelined(turntable_drafts(draft, frames, turns), in_flight, deadline)
+
+    @takes_options_of("slice")
+    def slice(self, dataset: str, *, deadline: float = DEADLINE_SECONDS, **options: Any) -> Image:
+        """Planes through a volume, or slabs of it; several are put side by side."""
+        return side_by_side(list(self._pipelined(iter(slice_drafts_of(dataset, options)), 3, deadline)))
+
+    def status(self, timeout: float = ANSWER_SECONDS) -> Status:
+        """Workers, datasets and counts of frames."""
+        return status_of(self._connection.ask("status_query", schema.StatusQuery(), timeout), self.endpoint)
+
+    def datasets(self, timeout: float = _ORDER_SECONDS) -> list[Dataset]:
+        """The service's catalogue."""
+        return self._order(schema.DATA_ACTION_LIST, [], timeout)
+
+    def add_data(self, *items: str, timeout: float = _ORDER_SECONDS, **named: str | os.PathLike[str]) -> list[Dataset]:
+        """Adds volumes or folders, for as long as the coordinator runs: add_data(head="/data/head.nii.gz"), or texts as `slabstream data add`
+        takes them ("head=/data/head.nii.gz,labels=/data/atlas.nii.gz"). Paths are absolute, on the coordinator's host. Needs the role admin
+        where the service has keys. Returns the catalogue."""
+        texts = [*items, *(f"{name}={os.fspath(path)}" for name, path in named.items())]
+        for text in texts:
+            name, equals, path = text.partition("=")
+            if not (path if equals else name).startswith("/"):
+                raise InvalidArgument(f"{text}: the path must be absolute, since it is a path on the coordinator's host")
+        return self._order(schema.DATA_ACTION_ADD, texts, timeout)
+
+    def remove_data(self, *names: str, timeout: float = _ORDER_SECONDS) -> list[Dataset]:
+        """Removes datasets, or watched folders, from the catalogue. Files stay."""
+        return self._order(schema.DATA_ACTION_REMOVE, names, timeout)
+
+    def reload_data(self, *names: str, timeout: float = _ORDER_SECONDS) -> list[Dataset]:
+        """Has the next frame read the files anew, even if they look the same."""
+        return self._order(schema.DATA_ACTION_RELOAD, names, timeout)
+
+    def close(self) -> None:
+        self._connection.close()
+
+    def __enter__(self) -> Service:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: types.TracebackType | None) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<slabstream.Service at {self.endpoint}>"
+
+    def _order(self, action: int, items: Any, timeout: float) -> list[Dataset]:
+        if len(items) > _MOST_ITEMS:
+            raise InvalidArgument(f"{len(items)} datasets at a time, at most {_MOST_ITEMS} can be named")
+        order = schema.DataOrder(action=action, items=[os.fsencode(item) for item in items])
+        return [dataset_of(dataset) for dataset in self._connection.ask("data_order", order, timeout).datasets]
+
+    @staticmethod
+    def _wait_for(frame: Frame) -> Image:
+        try:
+            return frame.result()
+        except KeyboardInterrupt:
+            frame.cancel()
+            raise
+
+    def _pipelined(self, drafts: Iterator[Draft], in_flight: int, deadline: float) -> Iterator[Image]:
+        open_frames: collections.deque[Frame] = collections.deque()
+        try:
+            for draft in drafts:
+                open_frames.append(Frame(self._connection, draft, deadline, None, None))
+                if len(open_frames) == in_flight:
+                    image = open_frames[0].result()
+                    open_frames.popleft()
+                    yield image
+            while open_frames:
+                image = open_frames[0].result()
+                open_frames.popleft()
+                yield image
+        finally:
+            for frame in open_frames:
+                frame.cancel()
+
+
+def connect(service: str | os.PathLike[str] | None = None, *, endpoint: str | None = None, timeout: float = CONNECT_SECONDS) -> Service:
+    """Connects to a service that runs.
+
+    `service` is the service file of one with keys (docs/security.md), `endpoint` where another one listens, such as
+    "tcp://127.0.0.1:7420"; with both, the endpoint is another way to the same service. With neither: $SLABSTREAM_SERVICE,
+    $SLABSTREAM_ENDPOINT, or the service that `slabstream up` started here last.
+
+    Raises Unavailable if nobody answers within `timeout` seconds or the service refuses the key; InvalidArgument, NotFound: the file or the
+    endpoint is wrong.
+    """
+    return Service(Connection(find_service(service, endpoint), timeout))

@@ -1,0 +1,249 @@
+"""Values of options: what Python users write, or the command line's text, turned into numbers.
+
+Each function takes the option's name, for messages, and a value. Messages are those of the command line, without dashes:
+"zoom 0 is out of range [0.001, 10000]". Points and directions are x, y, z of the world.
+"""
+from __future__ import annotations
+
+import math
+import operator
+from typing import Any, Iterable, Sequence
+
+import numpy
+
+from .errors import InvalidArgument
+
+Vector = tuple[float, float, float]
+Color = tuple[float, float, float, float]  # straight, each in [0, 1], with the precision of a float32
+
+MOST_COORDINATE = 1e9  # of the world; a bound of a clip box that is left out
+MOST_SCALAR = 1e300
+MOST_SIDE = 16384      # pixels
+MOST_LABEL = 1 << 24
+MOST_ISOSURFACES = 8
+
+_COLORS = {
+    "black": "#000000", "silver": "#c0c0c0", "gray": "#808080", "grey": "#808080", "white": "#ffffff", "maroon": "#800000",
+    "red": "#ff0000", "purple": "#800080", "fuchsia": "#ff00ff", "green": "#008000", "lime": "#00ff00", "olive": "#808000",
+    "yellow": "#ffff00", "orange": "#ffa500", "navy": "#000080", "blue": "#0000ff", "teal": "#008080", "aqua": "#00ffff",
+}
+# Of isosurfaces without a colour, by their place in the list: bone, blood, fat, nerve and so on.
+_ISOSURFACE_COLORS: list[Vector] = [
+    (0.92, 0.84, 0.72), (0.80, 0.30, 0.26), (0.38, 0.60, 0.86), (0.95, 0.78, 0.35),
+    (0.45, 0.72, 0.48), (0.66, 0.48, 0.78), (0.88, 0.55, 0.70), (0.60, 0.60, 0.60),
+]
+
+
+def text_of(number: float) -> str:
+    """As short as it reads back the same: 10000, 0.001."""
+    return str(int(number)) if number == int(number) and abs(number) < 1e16 else repr(float(number))
+
+
+def number(name: str, value: object, least: float, most: float, above: bool = False) -> float:
+    """In [least, most], or in (least, most] if `above`."""
+    try:
+        found = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        found = math.nan
+    if math.isnan(found) or isinstance(value, bool):
+        raise InvalidArgument(f"{name} {value!r} is not a number")
+    if not least <= found <= most or (above and found == least):
+        raise InvalidArgument(f"{name} {value} is out of range {'(' if above else '['}{text_of(least)}, {text_of(most)}]")
+    return found
+
+
+def integer(name: str, value: object, least: int, most: int) -> int:
+    try:
+        found = int(value) if isinstance(value, str) else operator.index(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        found = None
+    if found is None or isinstance(value, bool):
+        raise InvalidArgument(f"{name} {value!r} is not a whole number in [{least}, {most}]")
+    if not least <= found <= most:
+        raise InvalidArgument(f"{name} {value} is out of range [{least}, {most}]")
+    return found
+
+
+def flag(name: str, value: object) -> bool:
+    if isinstance(value, (bool, numpy.bool_)):
+        return bool(value)
+    raise InvalidArgument(f"{name} {value!r} is neither True nor False")
+
+
+def choice(name: str, value: object, choices: Sequence[str]) -> int:
+    """Its index."""
+    if str(value) in choices:
+        return choices.index(str(value))
+    raise InvalidArgument(f"{name} '{value}' is not one of {', '.join(choices)}")
+
+
+def _parts(name: str, value: object, count: int, shape: str) -> list[Any]:
+    found = value.split(",") if isinstance(value, str) else list(value) if isinstance(value, Iterable) else []
+    if len(found) != count:
+        raise InvalidArgument(f"{name} {value!r} is not {shape}")
+    return found
+
+
+def point(name: str, value: object) -> Vector:
+    x, y, z = (number(name, part, -MOST_COORDINATE, MOST_COORDINATE) for part in _parts(name, value, 3, "X,Y,Z"))
+    return x, y, z
+
+
+def direction(name: str, value: object) -> Vector:
+    found = point(name, value)
+    if found == (0, 0, 0):
+        raise InvalidArgument(f"{name} {value} has no direction")
+    return found
+
+
+def size(name: str, value: object) -> tuple[int, int]:
+    """Width and height: (640, 480), "640x480", or one number for a square."""
+    if isinstance(value, str):
+        sides: list[Any] = value.split("x")
+    else:
+        sides = list(value) if isinstance(value, Iterable) else [value]
+    if len(sides) not in (1, 2):
+        raise InvalidArgument(f"{name} {value!r} is neither WIDTHxHEIGHT nor one number")
+    return integer(name, sides[0], 1, MOST_SIDE), integer(name, sides[-1], 1, MOST_SIDE)
+
+
+def scalar_range(name: str, value: object) -> tuple[float, float, bool]:
+    """Low, high, and whether they are percentiles: (0, 255), "0:255", "2%:98%"."""
+    if isinstance(value, str):
+        ends: list[Any] = value.split(":")
+        percentiles = all(end.endswith("%") for end in ends)
+        if len(ends) != 2 or any(end.endswith("%") for end in ends) != percentiles:
+            raise InvalidArgument(f"{name} '{value}' is neither LOW:HIGH nor LOW%:HIGH%")
+        ends = [end.rstrip("%") for end in ends]
+    else:
+        ends, percentiles = _parts(name, value, 2, "LOW:HIGH"), False
+    least, most = (0.0, 100.0) if percentiles else (-MOST_SCALAR, MOST_SCALAR)
+    low, high = (number(name, end, least, most) for end in ends)
+    if low >= high:
+        raise InvalidArgument(f"{name} {value!r} must rise")
+    return low, high, percentiles
+
+
+def clip_box(name: str, value: object) -> tuple[Vector, Vector, str]:
+    """Low, high and the unit, "" for that of the world, "v" for voxels or "%" of the sides: ((x0, x1), (y0, y1), (z0, z1)), with None for
+    a bound that does not clip, and the unit as a fourth value if it is another; or "X0:X1,Y0:Y1,Z0:Z1%"."""
+    unit = ""
+    if isinstance(value, str):
+        text = value
+        if text[-1:] in ("v", "%"):
+            text, unit = text[:-1], text[-1]
+        axes: list[Any] = [[end or None for end in axis.split(":")] for axis in text.split(",")]
+    else:
+        axes = list(value) if isinstance(value, Iterable) else []
+        if len(axes) == 4 and axes[3] in ("", "v", "%"):
+            unit = axes.pop()
+    if len(axes) != 3 or not all(isinstance(axis, Iterable) and len(list(axis)) == 2 for axis in axes):
+        raise InvalidArgument(f"{name} {value!r} is not X0:X1,Y0:Y1,Z0:Z1")
+    low, high = [], []
+    for letter, axis in zip("xyz", axes):
+        begin, end = axis
+        low.append(-MOST_COORDINATE if begin is None else number(name, begin, -MOST_COORDINATE, MOST_COORDINATE))
+        high.append(MOST_COORDINATE if end is None else number(name, end, -MOST_COORDINATE, MOST_COORDINATE))
+        if low[-1] >= high[-1]:
+            raise InvalidArgument(f"{name} {value!r}: {letter} runs from {low[-1]:g} to {high[-1]:g}, but must rise")
+    return (low[0], low[1], low[2]), (high[0], high[1], high[2]), unit
+
+
+def clip_plane(name: str, value: object) -> tuple[Vector, float]:
+    """Normal and offset: (nx, ny, nz, d), or "NX,NY,NZ,D"."""
+    parts = _parts(name, value, 4, "NX,NY,NZ,D")
+    return direction(name, parts[:3]), number(name, parts[3], -MOST_COORDINATE, MOST_COORDINATE)
+
+
+def color(name: str, value: object) -> Color:
+    """(r, g, b) or (r, g, b, a) from 0 to 1, "R,G,B", "#rrggbb", "#rrggbbaa", or a name such as "white"."""
+    text = _COLORS.get(value, value) if isinstance(value, str) else value
+    if isinstance(text, str) and text.startswith("#"):
+        try:
+            codes = bytes.fromhex(text[1:]) if text.isascii() and " " not in text else b""
+        except ValueError:
+            codes = b""
+        if len(codes) not in (3, 4):
+            raise InvalidArgument(f"{name} '{value}' is neither #rrggbb nor #rrggbbaa")
+        channels = [float(numpy.float32(code) / numpy.float32(255)) for code in codes]
+    else:
+        parts: list[Any] = text.split(",") if isinstance(text, str) else list(text) if isinstance(text, Iterable) else []
+        if len(parts) not in (3, 4):
+            raise InvalidArgument(f"{name} {value!r} is neither R,G,B[,A] nor #rrggbb nor the name of a colour")
+        channels = [float(numpy.float32(number(name, part, 0, 1))) for part in parts]
+    red, green, blue, alpha = [*channels, 1.0][:4]
+    return red, green, blue, alpha
+
+
+def _surface_texts(text: str) -> list[tuple[Any, ...]]:
+    """120:red:0.3,300:0.1,0.2,0.3 as its surfaces: a colour that begins with a digit goes on behind two more commas."""
+    parts, found = text.split(","), []
+    while parts:
+        item = parts.pop(0)
+        colour = item.partition(":")[2]
+        if colour[:1] in set("0123456789.") and colour and len(parts) >= 2:
+            item += "," + parts.pop(0) + "," + parts.pop(0)
+        found.append(tuple(item.split(":")))
+    return found
+
+
+def isosurfaces(name: str, value: object) -> list[tuple[float, Vector, float]]:
+    """Value, colour and opacity of each, ascending: 120, (120, "red"), (120, "red", 0.3), a list of such, or "120:red:0.3,300"."""
+    if isinstance(value, str):
+        items = _surface_texts(value)
+    else:
+        listed = list(value) if isinstance(value, (list, numpy.ndarray)) else [value]
+        items = [tuple(item) if isinstance(item, tuple) else (item,) for item in listed]
+    if len(items) > MOST_ISOSURFACES:
+        raise InvalidArgument(f"{name} {value!r} has more than {MOST_ISOSURFACES} values")
+    found: list[tuple[float, Vector, float]] = []
+    for item, usual in zip(items, _ISOSURFACE_COLORS):
+        if not 1 <= len(item) <= 3:
+            raise InvalidArgument(f"{name} {item!r} is not V[:COLOUR[:OPACITY]]")
+        red, green, blue, opacity = color(name, item[1]) if len(item) > 1 else (*usual, 1.0)
+        if len(item) > 2:
+            opacity = number(name, item[2], 0, 1)
+        found.append((number(name, item[0], -MOST_SCALAR, MOST_SCALAR), (red, green, blue), opacity))
+    found.sort(key=lambda surface: surface[0])
+    for one, next_one in zip(found, found[1:]):
+        if one[0] == next_one[0]:
+            raise InvalidArgument(f"{name} {value!r} has the value {one[0]:g} twice")
+    return found
+
+
+def gradient_opacities(name: str, value: object) -> list[tuple[float, float]]:
+    """Gradient and opacity of each point: [(0, 0), (40, 1)], or "0:0,40:1"."""
+    items = [item.split(":") for item in value.split(",")] if isinstance(value, str) else list(value) if isinstance(value, Iterable) else []
+    found = []
+    for item in items:
+        if not isinstance(item, Sequence) or len(item) != 2:
+            raise InvalidArgument(f"{name} {item!r} is not GRADIENT:OPACITY")
+        found.append((number(name, item[0], 0, MOST_SCALAR), number(name, item[1], 0, 1)))
+    return found
+
+
+def label_opacities(name: str, value: object) -> list[tuple[int, float]]:
+    """Label and opacity of each: {3: 0.5, 7: 0}, or "3=0.5,7=0"."""
+    if isinstance(value, str):
+        pairs: list[Any] = [item.partition("=")[::2] for item in value.split(",")]
+    elif isinstance(value, dict):
+        pairs = list(value.items())
+    else:
+        raise InvalidArgument(f"{name} {value!r} is not LABEL=OPACITY,...")
+    return [(integer(name, label, 1, MOST_LABEL), number(name, opacity, 0, 1)) for label, opacity in pairs]
+
+
+def label_ranges(name: str, value: object) -> list[tuple[int, int]]:
+    """First and last of each, both included: [1, (5, 9)], 3, or "1,5-9"."""
+    if isinstance(value, str):
+        items: list[Any] = [item.split("-") if "-" in item else item for item in value.split(",")]
+    else:
+        items = list(value) if isinstance(value, Iterable) else [value]
+    found = []
+    for item in items:
+        ends = [item] if isinstance(item, str) or not isinstance(item, Iterable) else list(item)
+        if len(ends) not in (1, 2):
+            raise InvalidArgument(f"{name} {item!r} is not LABEL[-LABEL]")
+        first = integer(name, ends[0], 1, MOST_LABEL)
+        found.append((first, integer(name, ends[-1], first, MOST_LABEL)))
+    return found

@@ -1,0 +1,280 @@
+"""Options: Python's are the command line's, and make the same pictures."""
+from __future__ import annotations
+
+import importlib.machinery
+import importlib.util
+import inspect
+import io
+import json
+import os
+import shutil
+import sys
+import unittest
+
+import numpy as np
+
+import client_support
+from client_support import ROOT, WithAService
+
+import slabstream as ss  # noqa: E402
+from slabstream import drafts  # noqa: E402
+from slabstream.drafts import draft_of, slice_drafts_of  # noqa: E402
+from slabstream.options import COMMANDS  # noqa: E402
+
+
+def load_update():
+    loader = importlib.machinery.SourceFileLoader("update_options", str(ROOT / "python" / "update-options"))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("update_options", loader))
+    sys.dont_write_bytecode = True
+    loader.exec_module(module)
+    return module
+
+
+update = load_update()
+
+# A colour map as ParaView writes it, and the same as Python's own.
+COLOR_MAP = [{"Name": "mine", "RGBPoints": [0, 0, 0, 0.5, 100, 1, 0.5, 0, 255, 1, 1, 1], "Points": [30, 0, 0.5, 0, 200, 0.4, 0.3, 0.5]}]
+FUNCTION = ss.TransferFunction(colors=[(0, (0, 0, 0.5)), (100, (1, 0.5, 0)), (255, (1, 1, 1))], opacities=[(30, 0), (200, 0.4, 0.3, 0.5)])
+CAMERA = {"projection": "perspective", "azimuth": 20.0, "elevation": 10.0, "roll": 5.0, "zoom": 1.2, "fov": 25.0}
+
+# Python's options, and the command line's. Every option of options.json, every view and every renderer is here; several of them share a
+# picture where they do not hide each other, since the command line takes a third of a second to start.
+RAYCAST = ["--renderer", "raycast"]
+Z = ["--renderer", "zbuffer"]
+RENDER_CASES: list[tuple[dict, list[str]]] = [
+    ({}, []),
+    ({"size": (40, 30), "azimuth": 30, "elevation": -20.5}, ["--size", "40x30", "--azimuth", "30", "--elevation", "-20.5"]),
+    ({"size": 32, "azimuth": "1e2", "roll": 15, "zoom": 1.7}, ["--size", "32", "--azimuth", "1e2", "--roll", "15", "--zoom", "1.7"]),
+    ({"look_at": (25, 10, 0), "projection": "perspective", "fov": 50},
+     ["--look-at", "25,10,0", "--projection", "perspective", "--fov", "50"]),
+    ({"projection": "perspective", "distance": 80}, ["--projection", "perspective", "--distance", "80"]),
+    ({"eye": np.array([100, -60, 30]), "up": (0, 1, 1)}, ["--eye", "100,-60,30", "--up", "0,1,1"]),
+    ({"camera": CAMERA}, ["--camera", "camera.json"]),
+    ({"view": "anterior", "fit": True}, ["--view", "anterior", "--fit"]),
+    ({"view": "posterior", "clip_box": ((25, None), (None, 18.5), (-5, 12))}, ["--view", "posterior", "--clip-box", "25:,:18.5,-5:12"]),
+    ({"view": "superior", "clip_box": ((None, None), (None, None), (None, 50), "%")},
+     ["--view", "superior", "--clip-box", ":,:,:50%"]),
+    ({"view": "inferior", "clip_box": "3:20,:,4:9v"}, ["--view", "inferior", "--clip-box", "3:20,:,4:9v"]),
+    ({"view": "left", "clip_plane": (1, 0.5, 0, -40)}, ["--view", "left", "--clip-plane", "1,0.5,0,-40"]),
+    ({"view": "right", "clip_plane": [(1, 0.5, 0, -40), "0,0,1,0"]},
+     ["--view", "right", "--clip-plane", "1,0.5,0,-40", "--clip-plane", "0,0,1,0"]),
+    ({"view": "front", "clip_plane": (1, 0, 0, -35), "clip_mode": "cut-away"},
+     ["--view", "front", "--clip-plane", "1,0,0,-35", "--clip-mode", "cut-away"]),
+    ({"view": "back", "shading": "none", "background": "teal"}, ["--view", "back", "--shading", "none", "--background", "teal"]),
+    ({"view": "top", "light": (1, 1, 2), "termination": 0.25}, ["--view", "top", "--light", "1,1,2", "--termination", "0.25"]),
+    ({"view": "bottom", "light": [(1, 1, 2), (-1, 0, 0)], "background": (0.1, 0.7, 0.3, 0.4)},
+     ["--view", "bottom", "--light", "1,1,2", "--light", "-1,0,0", "--background", "0.1,0.7,0.3,0.4"]),
+    ({"renderer": "splat", "background": "#1020fe80", "depth": 16}, ["--renderer", "splat", "--background", "#1020fe80", "--depth", "16"]),
+    ({"renderer": "zbuffer", "shading": "depth-gradient"}, [*Z, "--shading", "depth-gradient"]),
+    ({"renderer": "zbuffer", "isovalue": 90, "transfer": "auto"}, [*Z, "--isovalue", "90", "--transfer", "auto"]),
+    ({"renderer": "mip", "interpolation": "nearest", "projection_mode": "mean", "sampling_rate": 2},
+     ["--renderer", "mip", "--interpolation", "nearest", "--projection-mode", "mean", "--sampling-rate", "2"]),
+    ({"transfer": COLOR_MAP, "opacity_distance": 3.5}, ["--transfer", "map.json", "--opacity-distance", "3.5"]),
+    ({"transfer": FUNCTION}, ["--transfer", "map.json"]),
+    ({"transfer": "gray-ramp", "scalar_range": (20, 150)}, ["--transfer", "gray-ramp", "--scalar-range", "20:150"]),
+    ({"transfer": "gray-ramp", "scalar_range": "2%:98%"}, ["--transfer", "gray-ramp", "--scalar-range", "2%:98%"]),
+    ({"renderer": "raycast", "isovalue": [40, (150, "olive", 0.5)]}, [*RAYCAST, "--isovalue", "40,150:olive:0.5"]),
+    ({"renderer": "raycast", "isovalue": [(150, (0.1, 0.2, 0.9)), (40, "#ff000060")]},
+     [*RAYCAST, "--isovalue", "150:0.1,0.2,0.9,40:#ff000060"]),
+    ({"renderer": "raycast", "isovalue": "40:0.5,0.5,0.5:0.2,150"}, [*RAYCAST, "--isovalue", "40:0.5,0.5,0.5:0.2,150"]),
+    ({"renderer": "raycast", "gradient_opacity": [(0, 0.1), (20, 1)]}, [*RAYCAST, "--gradient-opacity", "0:0.1,20:1"]),
+    ({"renderer": "raycast", "labels": True}, [*RAYCAST, "--label-mode", "tint"]),
+    ({"renderer": "raycast", "label_mode": "surface", "label_opacity": {1: 0.2, 3: 0}},
+     [*RAYCAST, "--label-mode", "surface", "--label-opacity", "1=0.2,3=0"]),
+    ({"renderer": "raycast", "label_tint": 1, "labels_shown": [1, (3, 5)]}, [*RAYCAST, "--label-tint", "1", "--labels-shown", "1,3-5"]),
+    ({"renderer": "raycast", "overlay": True}, [*RAYCAST, "--overlay-weight", "1"]),
+    ({"renderer": "raycast", "overlay_transfer": "opaque", "overlay_range": (0.2, 0.9), "overlay_weight": 0.5},
+     [*RAYCAST, "--overlay-transfer", "opaque", "--overlay-range", "0.2:0.9", "--overlay-weight", "0.5"]),
+    ({"decomposition": "kd-tree", "axis": "x", "balance_by": "voxels"}, ["--decomposition", "kd-tree", "--axis", "x", "--balance-by", "voxels"]),
+    ({"assignment": "greedy", "groups": 3}, ["--assignment", "greedy", "--groups", "3"]),
+    ({"balance": "static", "frame_parallel": 2}, ["--balance", "static", "--frame-parallel", "2"]),
+    ({"combine": "chain:strips=2", "pixel_error": 1e-7}, ["--combine", "chain:strips=2", "--pixel-error", "1e-7"]),  # too little for 16 bits
+]
+SLICE_CASES: list[tuple[dict, list[str]]] = [
+    ({"plane": "anatomical"}, ["--plane", "anatomical"]),
+    ({"plane": "zyx", "background": "red", "depth": 16}, ["--plane", "zyx", "--background", "red", "--depth", "16"]),
+    ({"plane": "axial", "at": (30, 10, 2), "size": (50, 40)}, ["--plane", "axial", "--at", "30,10,2", "--size", "50x40"]),
+    ({"plane": "coronal", "index": 9, "interpolation": "nearest"}, ["--plane", "coronal", "--index", "9", "--interpolation", "nearest"]),
+    ({"plane": "sagittal", "window": 150}, ["--plane", "sagittal", "--window", "150"]),
+    ({"plane": "y", "window": 150, "level": 60}, ["--plane", "y", "--window", "150", "--level", "60"]),
+    ({"plane": "x", "transfer": "gray-ramp", "scalar_range": (0, 99), "opacity_distance": 2},
+     ["--plane", "x", "--transfer", "gray-ramp", "--scalar-range", "0:99", "--opacity-distance", "2"]),
+    ({"plane": "z", "projection_mode": "mean", "sampling_rate": 2, "thickness": 8},
+     ["--plane", "z", "--projection-mode", "mean", "--sampling-rate", "2", "--thickness", "8"]),
+    ({"plane": "axial", "labels": True}, ["--plane", "axial", "--label-mode", "tint"]),
+    ({"plane": "axial", "label_mode": "surface", "labels_shown": 2}, ["--plane", "axial", "--label-mode", "surface", "--labels-shown", "2"]),
+    ({"plane": "axial", "label_tint": 0.3, "overlay": True}, ["--plane", "axial", "--label-tint", "0.3", "--overlay-transfer", "auto"]),
+    ({"plane": "axial", "overlay_transfer": "gray-ramp", "overlay_range": "0:0.5", "overlay_weight": "0.7"},
+     ["--plane", "axial", "--overlay-transfer", "gray-ramp", "--overlay-range", "0:0.5", "--overlay-weight", "0.7"]),
+]
+
+
+class Pixels(WithAService):
+    @classmethod
+    def setUpClass(cls) -> None:
+        super().setUpClass()
+        (cls.folder / "map.json").write_text(json.dumps(COLOR_MAP))
+        (cls.folder / "camera.json").write_text(json.dumps(CAMERA))
+        cls.service = ss.connect(endpoint=cls.running.endpoint)
+        cls.addClassCleanup(cls.service.close)
+
+    def compare(self, command: str, cases: list) -> None:
+        for python, arguments in cases:
+            with self.subTest(command=command, python=python):
+                if "size" not in python:
+                    python, arguments = {**python, "size": 48}, [*arguments, "--size", "48"]
+                image = getattr(self.service, "render" if command == "render" else "slice")("head", **python)
+                expected = self.running.picture(command, *arguments)
+                found = client_support.read_png(image.png())
+                self.assertEqual(found.dtype, expected.dtype)
+                np.testing.assert_array_equal(found, expected)
+                if found.dtype == np.uint8:
+                    np.testing.assert_array_equal(np.asarray(image), expected)
+                self.assertGreater(expected[..., 3].max(), 0)
+
+    def test_render_makes_the_command_lines_pixels(self) -> None:
+        self.compare("render", RENDER_CASES)
+
+    def test_slice_makes_the_command_lines_pixels(self) -> None:
+        self.compare("slice", SLICE_CASES)
+
+    def test_every_option_is_compared(self) -> None:
+        for command, cases in (("render", RENDER_CASES), ("slice", SLICE_CASES)):
+            compared = {name for python, _ in cases for name in python}
+            self.assertEqual(set(COMMANDS[command]) - compared, set())
+            for name in ("view", "renderer", "plane"):
+                if name in COMMANDS[command]:
+                    self.assertEqual({python.get(name) for python, _ in cases} - {None}, set(COMMANDS[command][name].choices))
+
+    def test_presets_are_the_services(self) -> None:
+        with self.assertRaisesRegex(ss.NotFound, "no transfer function is named 'crayon', there are auto, gray-ramp"):
+            self.service.render("head", transfer="crayon")
+
+
+class Drift(unittest.TestCase):
+    def test_options_are_those_that_the_program_prints(self) -> None:
+        self.assertEqual(update.OPTIONS.read_text(), update.options_text(client_support.PROGRAM), "run python/update-options")
+
+    def test_the_schema_is_that_of_proto(self) -> None:
+        from google.protobuf import descriptor_pb2
+
+        protoc = os.environ.get("SLABSTREAM_PROTOC") or shutil.which("protoc")
+        if protoc is None:
+            self.skipTest("install protobuf-compiler")
+        kept, made = (
+            descriptor_pb2.FileDescriptorSet.FromString(content) for content in (update.SCHEMA.read_bytes(), update.schema_bytes(protoc))
+        )
+        self.assertEqual({file.name: file for file in kept.file}, {file.name: file for file in made.file}, "run python/update-options")
+
+    def test_every_option_has_its_place_in_a_request(self) -> None:
+        names = {name for command in COMMANDS.values() for name in command}
+        self.assertEqual(set(drafts._PUT), names)
+
+    def test_signatures_and_help_show_them(self) -> None:
+        signature = inspect.signature(ss.Service.render)
+        self.assertLessEqual(set(COMMANDS["render"]), set(signature.parameters))
+        self.assertEqual(signature.parameters["zoom"].default, "1")
+        self.assertIn("Degrees that the eye turns", ss.render.__doc__)
+        self.assertIn("plane: NAME", ss.Volume.slice.__doc__)
+        words = " ".join(ss.render.__doc__.split())
+        self.assertIn("Look at a side, instead of azimuth and elevation", words)
+        self.assertIn("(default: 1; from 0.001 to 10000)", words)
+
+
+class Requests(unittest.TestCase):
+    def test_values_are_pythons_or_the_command_lines(self) -> None:
+        for python, text in (
+            ({"size": (64, 32)}, {"size": "64x32"}),
+            ({"look_at": [1, 2, 3.5]}, {"look_at": "1,2,3.5"}),
+            ({"clip_box": ((1, 2), (None, 3), (0, None), "v")}, {"clip_box": "1:2,:3,0:v"}),
+            ({"isovalue": [300, (120, "red", 0.3)]}, {"isovalue": "300,120:red:0.3"}),
+            ({"label_opacity": {3: 0.5, 7: 0}}, {"label_opacity": "3=0.5,7=0"}),
+            ({"labels_shown": [1, range(5, 7)]}, {"labels_shown": "1,5-6"}),
+            ({"groups": 4, "zoom": np.float32(0.5)}, {"groups": "4", "zoom": "0.5"}),
+            ({"light": np.eye(3)}, {"light": ["1,0,0", "0,1,0", "0,0,1"]}),
+        ):
+            self.assertEqual(draft_of("a", python), draft_of("a", text))
+
+    def test_none_is_not_given(self) -> None:
+        self.assertEqual(draft_of("a", {"zoom": None, "labels": None, "eye": None}), draft_of("a", {}))
+        self.assertEqual(draft_of("a", {"labels": False, "overlay": False}), draft_of("a", {}))
+
+    def test_a_picture_of_isosurfaces_shows_nothing_else_unless_asked(self) -> None:
+        self.assertEqual(draft_of("a", {"isovalue": 3}).frame.transfer.preset, "none")
+        self.assertEqual(draft_of("a", {"isovalue": 3, "transfer": "auto"}).frame.transfer.preset, "auto")
+
+    def test_mistakes_name_the_option_the_value_and_the_limit(self) -> None:
+        for given, sentence in (
+            ({"zoom": 0}, "zoom 0 is out of range [0.001, 10000]"),
+            ({"zoom": "wide"}, "zoom 'wide' is not a number"),
+            ({"zoom": float("nan")}, "zoom nan is not a number"),
+            ({"zoom": True}, "zoom True is not a number"),
+            ({"opacity_distance": 0}, "opacity_distance 0 is out of range (0, 1000000]"),
+            ({"frame_parallel": 0}, "frame_parallel 0 is out of range [1, 1024]"),
+            ({"frame_parallel": 1.5}, "frame_parallel 1.5 is not a whole number in [1, 1024]"),
+            ({"groups": 2000}, "groups 2000 is out of range [0, 1024]"),
+            ({"sampling_rate": 100}, "sampling_rate 100 is out of range [0.1, 16]"),
+            ({"label_tint": 2}, "label_tint 2 is out of range [0, 1]"),
+            ({"size": 0}, "size 0 is out of range [1, 16384]"),
+            ({"size": (1, 2, 3)}, "size (1, 2, 3) is neither WIDTHxHEIGHT nor one number"),
+            ({"shading": "toon"}, "shading 'toon' is not one of phong, none, depth-gradient"),
+            ({"renderer": "crayon"}, "renderer 'crayon' is not one of splat, zbuffer, raycast, mip"),
+            ({"fit": "yes"}, "fit 'yes' is neither True nor False"),
+            ({"look_at": (1, 2)}, "look_at (1, 2) is not X,Y,Z"),
+            ({"light": (0, 0, 0)}, "light [0, 0, 0] has no direction"),
+            ({"scalar_range": (5, 5)}, "scalar_range (5, 5) must rise"),
+            ({"scalar_range": "5:7%"}, "scalar_range '5:7%' is neither LOW:HIGH nor LOW%:HIGH%"),
+            ({"clip_box": ((3, 1), (0, 1), (0, 1))}, "clip_box ((3, 1), (0, 1), (0, 1)): x runs from 3 to 1, but must rise"),
+            ({"background": "blurple"}, "background 'blurple' is neither R,G,B[,A] nor #rrggbb nor the name of a colour"),
+            ({"background": "#12345"}, "background '#12345' is neither #rrggbb nor #rrggbbaa"),
+            ({"isovalue": [3, 3]}, "isovalue [3, 3] has the value 3 twice"),
+            ({"transfer": "none.json"}, "transfer 'none.json' does not exist"),
+            ({"transfer": {"Points": []}}, "transfer: not a colour map: RGBPoints is missing"),
+            ({"camera": {"lens": 1}}, "camera has the field 'lens', which cameras do not have"),
+            ({"view": "left", "azimuth": 3}, "view excludes azimuth"),
+            ({"up": (0, 0, 1)}, "up requires eye"),
+            ({"labels": "atlas.nii"}, "labels 'atlas.nii' must be True"),
+            ({"azimut": 3}, "there is no option 'azimut'; is 'azimuth' meant?"),
+            ({"output": "a.png"}, "there is no option 'output'"),
+        ):
+            with self.subTest(given=given), self.assertRaises(ss.SlabstreamError) as caught:
+                draft_of("a", given)
+            self.assertTrue(str(caught.exception).startswith(sentence), f"{caught.exception} is not {sentence}")
+            self.assertNotIn("\n", str(caught.exception))
+        self.assertRaises(ValueError, draft_of, "a", {"zoom": 0})
+        self.assertRaises(TypeError, draft_of, "a", {"azimut": 0})
+        self.assertRaises(ss.InvalidArgument, draft_of, "", {})
+
+    def test_mistakes_of_slices(self) -> None:
+        for given, sentence in (
+            ({"index": 3}, "index 3 is the number of a slice of one plane, but there are 3"),
+            ({"plane": "x", "index": 3, "at": (0, 0, 0)}, "index excludes at"),
+            ({"level": 3}, "level requires window"),
+            ({"thickness": 3, "labels": True}, "thickness 3 is no plane"),
+            ({"azimuth": 3}, "there is no option 'azimuth'"),
+        ):
+            with self.subTest(given=given), self.assertRaises(ss.InvalidArgument) as caught:
+                slice_drafts_of("a", given)
+            self.assertTrue(str(caught.exception).startswith(sentence), str(caught.exception))
+
+
+class Pictures(unittest.TestCase):
+    def test_png_files_are_read_back_the_same(self) -> None:
+        rgba = np.zeros((3, 5, 4), np.float32)
+        rgba[1] = (0.5, 0.25, 0, 0.5)
+        rgba[2] = (2, 0, 0.7, 1)
+        image = ss.Image(rgba)
+        np.testing.assert_array_equal(np.asarray(image)[1:, 0], [[255, 128, 0, 128], [255, 0, 179, 255]])
+        for bits in (8, 16):
+            np.testing.assert_array_equal(client_support.read_png(image.png(bits))[..., 3] > 0, rgba[..., 3] > 0)
+        np.testing.assert_array_equal(client_support.read_png(image._repr_png_()), np.asarray(image))
+        try:
+            import PIL.Image
+        except ImportError:
+            return
+        np.testing.assert_array_equal(np.asarray(PIL.Image.open(io.BytesIO(image.png()))), np.asarray(image))
+        self.assertEqual(PIL.Image.fromarray(np.asarray(image)).size, image.size)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,429 @@
+"""The Python client at real services: pictures, what ends them, keys, a coordinator that is started anew, and a service of its own."""
+from __future__ import annotations
+
+import asyncio
+import concurrent.futures
+import inspect
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import unittest
+import unittest.mock
+
+import numpy as np
+
+from client_support import PROGRAM, PROGRAMS, InAFolder, RunningService, WithAService, volume_arrays, write_volumes
+
+import slabstream as ss  # noqa: E402
+
+HEAVY = dict(renderer="raycast", sampling_rate=16, size=2000, opacity_distance=1000, termination=0)
+
+
+class AtAService(WithAService):
+    def setUp(self) -> None:
+        self.service = ss.connect(endpoint=self.running.endpoint)
+        self.addCleanup(self.service.close)
+
+    def test_pictures_know_their_size_place_and_cost(self) -> None:
+        image = self.service.render("head", size=(60, 40), azimuth=90)
+        self.assertEqual((image.size, image.shape, np.asarray(image).shape), ((60, 40), (40, 60, 4), (40, 60, 4)))
+        self.assertEqual(np.asarray(image).dtype, np.uint8)
+        self.assertEqual((image.rgba.dtype, image.rgba.shape), (np.float32, (40, 60, 4)))
+        self.assertIsNone(image.depth)
+        self.assertEqual((image.geometry.world, image.geometry.unit), ("patient", "millimetre"))
+        np.testing.assert_allclose(image.geometry.right, (0, 1, 0), atol=1e-12)
+        self.assertEqual((image.statistics.workers, image.statistics.attempts, image.statistics.decomposition), (2, 1, "slab"))
+        self.assertGreater(image.statistics.worker_seconds["splat"], 0)
+        self.assertGreaterEqual(image.statistics.latency_seconds, image.statistics.frame_seconds)
+
+    def test_the_zbuffer_has_depths(self) -> None:
+        image = self.service.render("head", renderer="zbuffer", size=50)
+        seen = image.rgba[..., 3] > 0
+        self.assertTrue(np.isfinite(image.depth[seen]).all())
+        self.assertTrue(np.isposinf(image.depth[~seen]).all())
+        self.assertTrue(seen.any() and not seen.all())
+
+    def test_pictures_are_saved_whole(self) -> None:
+        image = self.service.render("head", size=20)
+        image.save(self.folder / "a.PNG")
+        self.assertEqual((self.folder / "a.PNG").read_bytes(), image.png())
+        with self.assertRaisesRegex(ss.InvalidArgument, "must end in .png"):
+            image.save("a.gif")
+        with self.assertRaisesRegex(ss.Unavailable, "cannot write '.*none/a.png': No such file"):
+            image.save(self.folder / "none" / "a.png")
+
+    def test_previews_and_progress_come_before_the_picture(self) -> None:
+        told, previews = [], []
+        frame = self.service.submit("head", groups=4, size=100, on_progress=told.append, on_preview=previews.append)
+        picture = frame.result()
+        self.assertFalse(picture.preview)
+        self.assertTrue(all(preview.preview and preview.size == (100, 100) for preview in previews))
+        self.assertEqual(told[-1].group_count, 4)
+        self.assertEqual(told[-1], frame.progress)
+        shown = list(self.service.submit("head", groups=4, size=100, previews=True).previews())
+        self.assertFalse(shown[-1].preview)
+        np.testing.assert_array_equal(np.asarray(shown[-1]), np.asarray(picture))
+
+    def test_a_callback_that_fails_harms_nothing(self) -> None:
+        with self.assertLogs("slabstream", "ERROR"):
+            self.assertEqual(self.service.submit("head", size=9, on_progress=lambda _: 1 / 0).result().size, (9, 9))
+
+    def test_frames_are_futures(self) -> None:
+        frames = [self.service.submit("head", size=30, azimuth=angle) for angle in range(0, 360, 45)]
+        done, pending = concurrent.futures.wait([frame.future for frame in frames])
+        self.assertEqual((len(done), len(pending)), (8, 0))
+        self.assertIsNone(frames[0].exception())
+        self.assertFalse(self.service.submit("head", size=30).future.cancel())
+
+        async def get() -> ss.Image:
+            return await asyncio.wrap_future(self.service.submit("head", size=30).future)
+
+        np.testing.assert_array_equal(np.asarray(asyncio.run(get())), np.asarray(frames[0].result()))
+        told: list = []
+        frames[0].add_done_callback(told.append)
+        self.assertEqual(told, [frames[0]])
+
+    def test_threads_share_a_service(self) -> None:
+        with concurrent.futures.ThreadPoolExecutor(8) as pool:
+            images = list(pool.map(lambda i: self.service.render("head", size=20 + i), range(40)))
+        self.assertEqual([image.size[0] for image in images], list(range(20, 60)))
+
+    def test_cancelled_frames_say_so(self) -> None:
+        frame = self.service.submit("head", **HEAVY)
+        with self.assertRaisesRegex(ss.DeadlineExceeded, "the frame is not finished after 0 s"):
+            frame.result(timeout=0)
+        frame.cancel()
+        self.assertRaises(ss.Cancelled, frame.result)
+        frame.cancel()  # again: nothing
+        self.assertTrue(frame.done())
+        with self.assertRaises(concurrent.futures.CancelledError):
+            frame.result()
+
+    def test_a_deadline_ends_a_frame(self) -> None:
+        with self.assertRaises(TimeoutError):
+            self.service.render("head", deadline=0.001, **HEAVY)
+
+    def test_turntables_come_in_order_and_turn(self) -> None:
+        images = list(self.service.turntable("head", 4, size=30, azimuth=10, in_flight=3))
+        for image, azimuth in zip(images, (10, 100, 190, 280)):
+            np.testing.assert_array_equal(np.asarray(image), np.asarray(self.service.render("head", size=30, azimuth=azimuth)))
+        still = list(self.service.turntable("head", 2, turns=0, size=30, eye=(100, 0, 0)))
+        np.testing.assert_array_equal(np.asarray(still[0]), np.asarray(still[1]))
+        for given, sentence in (({"frames": 0}, "frames 0 is out of range"), ({"frames": 2, "eye": (1, 2, 3)}, "eye stands still"),
+                                ({"frames": 2, "in_flight": 65}, "in_flight 65 is out of range"), ({"frames": 2, "zoom": 0}, "zoom 0 is out")):
+            with self.subTest(given=given), self.assertRaisesRegex(ss.InvalidArgument, sentence):
+                self.service.turntable("head", **given)
+
+    def test_a_turntable_that_is_left_cancels_the_rest(self) -> None:
+        turntable = self.service.turntable("head", 1000, in_flight=8, size=10)
+        next(turntable)
+        turntable.close()
+        self.service.render("head", size=10)
+        self.assertLess(self.service.status().frames_done, 900)
+
+    def test_the_services_sentence_is_the_exceptions(self) -> None:
+        for options, kind, sentence in (
+            ({"dataset": "foot"}, ss.NotFound, "foot"),
+            ({"dataset": "head", "shading": "depth-gradient"}, ss.InvalidArgument, "shading 'depth-gradient' needs a renderer with depths"),
+            ({"dataset": "head", "isovalue": 4}, ss.InvalidArgument, "renderer is 'splat', but isovalue needs one of: zbuffer, raycast"),
+            ({"dataset": "head", "fit": True, "renderer": "mip", "sampling_rate": 1, "combine": "knit"}, ss.InvalidArgument, "knit"),
+        ):
+            with self.subTest(options=options), self.assertRaises(kind) as caught:
+                self.service.render(**options)
+            self.assertIn(sentence, str(caught.exception))
+            self.assertNotIn("\n", str(caught.exception))
+
+    def test_status_tells_of_workers_and_datasets(self) -> None:
+        self.service.render("head", size=9)
+        status = self.service.status()
+        self.assertEqual((status.pid, len(status.workers), status.endpoint), (self.running.coordinator, 2, self.running.endpoint))
+        head = {dataset.name: dataset for dataset in self.service.datasets()}["head"]
+        self.assertEqual((head.state, head.shape, head.spacing, head.dtype), ("ready", (20, 24, 28), (2, 1.5, 1.25), "uint8"))
+        self.assertEqual((head.labels, head.overlay), (3, True))
+
+    def test_data_comes_and_goes(self) -> None:
+        names = {dataset.name for dataset in self.service.add_data(copy=self.folder / "head.nrrd")}
+        self.assertEqual(names, {"head", "copy"})
+        np.testing.assert_array_equal(np.asarray(self.service.render("copy", size=30)), np.asarray(self.service.render("head", size=30)))
+        self.service.reload_data("copy")
+        self.assertEqual([dataset.name for dataset in self.service.remove_data("copy")], ["head"])
+        with self.assertRaisesRegex(ss.InvalidArgument, "the path must be absolute"):
+            self.service.add_data(copy="head.nrrd")
+        with self.assertRaisesRegex(ss.NotFound, "none.nrrd"):
+            self.service.add_data(copy="/none.nrrd")
+        with self.assertRaises(ss.NotFound):
+            self.service.remove_data("copy")
+
+    def test_a_closed_service_says_so(self) -> None:
+        frame = self.service.submit("head", **HEAVY)
+        self.service.close()
+        self.assertRaises(ss.Cancelled, frame.result)
+        with self.assertRaisesRegex(ss.Unavailable, "is closed"):
+            self.service.render("head")
+        self.service.close()
+
+    def test_a_service_that_nobody_uses_closes_itself(self) -> None:
+        clients = self.service.status().clients
+        for _ in range(3):
+            ss.connect(endpoint=self.running.endpoint)
+        self.assertEqual(self.service.status().clients, clients)
+
+    def test_the_service_that_up_started_is_found(self) -> None:
+        with unittest.mock.patch.dict(os.environ, {"XDG_RUNTIME_DIR": str(self.folder)}):
+            os.environ.pop("SLABSTREAM_ENDPOINT", None)
+            with ss.connect() as service:
+                self.assertEqual(service.endpoint, self.running.endpoint)
+        with unittest.mock.patch.dict(os.environ, {"SLABSTREAM_ENDPOINT": self.running.endpoint}), ss.connect() as service:
+            self.assertEqual(service.endpoint, self.running.endpoint)
+
+    def test_arrays_go_to_a_service_that_is_given(self) -> None:
+        values = volume_arrays()[0]
+        with ss.load(values, spacing=(2, 1.5, 1.25), service=self.service) as volume:
+            self.assertEqual(volume.render(size=20).size, (20, 20))
+            self.assertEqual(len(self.service.datasets()), 2)
+        self.assertEqual(len(self.service.datasets()), 1)
+
+
+class Addresses(InAFolder):
+    def test_nobody_answers(self) -> None:
+        with self.assertRaisesRegex(ss.Unavailable, "no service answers at ipc:///.*/none within 200 ms"):
+            ss.connect(endpoint=f"ipc://{self.folder}/none", timeout=0.2)
+
+    def test_endpoints_that_are_wrong(self) -> None:
+        for endpoint, sentence in (
+            ("http://localhost", "expected tcp://HOST:PORT or ipc:///PATH"),
+            ("tcp://localhost", "no port"),
+            ("tcp://127.0.0.1:0", 'port "0" is not a number of [1, 65535]'),
+            ("tcp://10.1.2.3:7420", 'host "10.1.2.3" is not loopback'),
+            ("ipc://relative", "expected an absolute path"),
+            ("ipc:///" + "a" * 120, "at most 107 fit a socket address"),
+            ("tcp://local host:3", "spaces and control characters are not allowed"),
+        ):
+            with self.subTest(endpoint=endpoint), self.assertRaises(ss.InvalidArgument) as caught:
+                ss.connect(endpoint=endpoint)
+            self.assertIn(sentence, str(caught.exception))
+
+
+class Keys(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory(prefix="slabstream-test-")))
+        cls.keys = cls.folder / "keys"
+        cls.running = RunningService(cls.folder, "--data", write_volumes(cls.folder), "--keys", str(cls.keys), listen="tcp://127.0.0.1:*")
+        cls.addClassCleanup(cls.running.end)
+
+    def copy(self, name: str = "client.json", **fields: str) -> pathlib.Path:
+        """A service file with other fields."""
+        import json
+
+        path = self.folder / "copy.json"
+        path.write_text(json.dumps(json.loads((self.keys / name).read_text()) | fields))
+        path.chmod(0o600)
+        return path
+
+    def test_clients_render_and_admins_order(self) -> None:
+        with ss.connect(self.keys / "client.json") as client, ss.connect(service=str(self.keys / "admin.json")) as admin:
+            self.assertEqual(client.render("head", size=20).size, (20, 20))
+            self.assertEqual([dataset.name for dataset in client.datasets()], ["head"])
+            with self.assertRaisesRegex(ss.InvalidArgument, "admin"):
+                client.add_data(more=self.folder / "head.nrrd")
+            self.assertEqual(len(admin.add_data(more=self.folder / "head.nrrd")), 2)
+            admin.remove_data("more")
+
+    def test_a_key_that_is_not_admitted_is_refused_within_the_time(self) -> None:
+        import zmq
+
+        public, secret = (key.decode() for key in zmq.curve_keypair())
+        with self.assertRaisesRegex(ss.Unavailable, "refuses the key: it was revoked or is another's"):
+            ss.connect(self.copy(public_key=public, secret_key=secret))
+
+    def test_a_service_without_the_secret_is_not_believed(self) -> None:
+        import zmq
+
+        with self.assertRaisesRegex(ss.Unavailable, "no service answers at tcp://127.0.0.1:.* within 500 ms"):
+            ss.connect(self.copy(server_key=zmq.curve_keypair()[0].decode()), timeout=0.5)
+
+    def test_without_keys_nobody_answers(self) -> None:
+        with self.assertRaisesRegex(ss.Unavailable, "no service answers"), \
+                unittest.mock.patch.dict(os.environ, {"XDG_RUNTIME_DIR": "/nowhere"}):
+            ss.connect(endpoint=self.running.endpoint, timeout=0.5)
+
+    def test_files_that_are_wrong(self) -> None:
+        for path, kind, sentence in (
+            (self.keys / "worker.json", ss.InvalidArgument, "is of role worker, but client or admin is needed here"),
+            (self.keys / "none.json", ss.NotFound, "does not exist"),
+            (self.copy(server_key="short"), ss.InvalidArgument, "server_key is no key"),
+        ):
+            with self.subTest(path=path), self.assertRaises(kind) as caught:
+                ss.connect(path)
+            self.assertIn(sentence, str(caught.exception))
+        path = self.copy()
+        path.chmod(0o644)
+        with self.assertRaisesRegex(ss.InvalidArgument, "others can use '.*copy.json', which holds a secret"):
+            ss.connect(path)
+
+    def test_a_revoked_key_ends_the_connection(self) -> None:
+        rotated = self.running.run("keys", "rotate", "client", "--service", str(self.keys / "admin.json"))
+        self.assertEqual(rotated.returncode, 0, rotated.stderr)
+        import json
+
+        key = json.loads((self.keys / "client.json").read_text())["public_key"]
+        with ss.connect(self.keys / "client.json") as client:
+            client.render("head", size=9)
+            revoked = self.running.run("keys", "revoke", key, "--service", str(self.keys / "admin.json"))
+            self.assertEqual(revoked.returncode, 0, revoked.stderr)
+            with self.assertRaises(ss.Unavailable):
+                client.render("head", size=9)
+        self.running.run("keys", "rotate", "client", "--service", str(self.keys / "admin.json"))
+
+
+class Endings(InAFolder):
+    def start(self, program: str, *arguments: str) -> subprocess.Popen:
+        with (self.folder / f"{program}.log").open("ab") as log:
+            process = subprocess.Popen([str(PROGRAMS / program), *arguments], stdout=subprocess.PIPE, stderr=log)
+        self.addCleanup(process.stdout.close)
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)
+        return process
+
+    def coordinator(self) -> subprocess.Popen:
+        process = self.start("slabstream-coordinator", "--listen", f"ipc://{self.folder}/s", "--data", self.data)
+        process.stdout.readline()  # it listens
+        return process
+
+    def test_a_request_outlives_its_coordinator(self) -> None:
+        """Nobody renders at first, so the frame waits. Then the coordinator is killed, and the next one knows nothing of the frame."""
+        self.data = write_volumes(self.folder)
+        first = self.coordinator()
+        with ss.connect(endpoint=f"ipc://{self.folder}/s") as service:
+            frame = service.submit("head", size=25)
+            service.status()  # the frame has arrived before
+            first.kill()
+            first.wait()
+            self.coordinator()
+            self.start("slabstream-worker", "--coordinator", f"ipc://{self.folder}/s.workers", "--threads", "1")
+            self.assertEqual(frame.result(timeout=60).size, (25, 25))
+
+    def test_a_service_that_has_gone_is_noticed(self) -> None:
+        self.data = write_volumes(self.folder)
+        coordinator = self.coordinator()
+        with ss.connect(endpoint=f"ipc://{self.folder}/s") as service:
+            frame = service.submit("head")
+            service.status()
+            coordinator.kill()
+            with self.assertRaisesRegex(ss.Unavailable, "has not answered for 5... ms"):
+                frame.result(timeout=60)
+            with self.assertRaisesRegex(ss.Unavailable, "no service answers at .* within 100 ms"):
+                service.status(timeout=0.1)
+
+    def test_a_service_that_ends_says_so(self) -> None:
+        self.data = write_volumes(self.folder)
+        coordinator = self.coordinator()
+        with ss.connect(endpoint=f"ipc://{self.folder}/s") as service:
+            frame = service.submit("head")
+            service.status()
+            coordinator.send_signal(signal.SIGTERM)
+            self.assertRaises(ss.Unavailable, frame.result, timeout=60)
+
+
+class OwnService(InAFolder):
+    """ss.render and ss.load: the service that they start."""
+
+    @classmethod
+    def tearDownClass(cls) -> None:
+        ss.shutdown()
+
+    def test_an_array_in_a_picture_out(self) -> None:
+        values, labels, overlay = volume_arrays()
+        spacing = (2, 1.5, 1.25)
+        plain = ss.render(values, spacing=spacing, size=40)
+        self.assertEqual(plain.geometry.world, "voxels")
+        with ss.load(values, spacing=spacing, labels=labels, overlay=overlay) as volume:
+            folder = pathlib.Path(volume.service.endpoint[6:]).parent
+            self.assertEqual(folder.stat().st_mode & 0o777, 0o700)
+            np.testing.assert_array_equal(np.asarray(volume.render(size=40, labels=False, overlay=False)), np.asarray(plain))
+            shown = volume.render(size=40, renderer="raycast")
+            hidden = volume.render(size=40, renderer="raycast", labels=False, overlay=False)
+            self.assertGreater(np.abs(shown.rgba - hidden.rgba).max(), 0.1)
+            self.assertEqual([image.size for image in volume.turntable(2, size=12, labels=None, overlay=None)], [(12, 12)] * 2)
+            self.assertEqual(volume.slice(plane="zyx", size=10).size, (30, 10))
+            self.assertEqual(volume.submit(size=8, labels=False, overlay=False).result().size, (8, 8))
+            service = volume.service
+        self.assertEqual((service.datasets(), list(folder.glob("*.nrrd")) + list(folder.glob(".*.nrrd"))), ([], []))
+        with ss.load(values, spacing=spacing, origin=(5, 6, 7), world="patient", labels=labels) as volume:
+            self.assertEqual(volume.render(size=9, view="left", renderer="raycast").geometry.world, "patient")
+        ss.render(values, size=9)
+        self.assertEqual(service.status().pid, ss.load(values).service.status().pid)  # it is kept
+
+    def test_files_stay_loaded_and_are_read_again_when_they_change(self) -> None:
+        from slabstream.volumes import volume_of, write_nrrd
+
+        values, path = volume_arrays()[0], self.folder / "head.nrrd"
+        write_nrrd(volume_of(values), path)
+        before = np.asarray(ss.render(path, size=30))
+        with ss.load(path) as volume:
+            known = len(volume.service.datasets())
+        ss.render(str(path), size=30)
+        write_nrrd(volume_of(values[::-1]), self.folder / "new.nrrd")
+        os.replace(self.folder / "new.nrrd", path)
+        self.assertGreater(np.abs(np.asarray(ss.render(path, size=30)).astype(int) - before).max(), 10)
+        with ss.load(path) as volume:
+            self.assertLessEqual(len(volume.service.datasets()), known + 1)
+
+    def test_options_for_reading_stand_behind_a_path(self) -> None:
+        values = volume_arrays()[0]
+        (self.folder / "a.raw").write_bytes(values.tobytes())
+        found = ss.render(f"{self.folder}/a.raw?dims=28,24,20,type=uint8", spacing=(2, 1.5, 1.25), size=30)
+        np.testing.assert_array_equal(np.asarray(found), np.asarray(ss.render(values, spacing=(2, 1.5, 1.25), size=30)))
+
+    def test_what_is_wrong_is_told(self) -> None:
+        with self.assertRaisesRegex(ss.NotFound, "volume '.*none.nrrd' does not exist"):
+            ss.render(self.folder / "none.nrrd")
+        with self.assertRaisesRegex(ss.InvalidArgument, "zoom 0 is out of range"):
+            ss.render(volume_arrays()[0], zoom=0)
+        with self.assertRaisesRegex(ss.InvalidArgument, "origin is for arrays"):
+            (self.folder / "a.nrrd").write_bytes(b"")
+            ss.render(self.folder / "a.nrrd", origin=(0, 0, 0))
+
+    def test_a_service_that_was_killed_is_started_again(self) -> None:
+        values = volume_arrays()[0]
+        with ss.load(values) as volume:
+            pid = volume.service.status().pid
+        os.kill(pid, signal.SIGKILL)
+        self.assertEqual(ss.render(values, size=10).size, (10, 10))
+
+    def test_it_needs_the_programs(self) -> None:
+        ss.shutdown()
+        with unittest.mock.patch.dict(os.environ, {"SLABSTREAM_PROGRAMS": str(self.folder)}):
+            with self.assertRaisesRegex(ss.NotFound, r"\$SLABSTREAM_PROGRAMS is '.*', which has no program slabstream"):
+                ss.render(volume_arrays()[0])
+        shutil.copy(PROGRAM, self.folder / "slabstream")  # without the other two
+        with unittest.mock.patch.dict(os.environ, {"SLABSTREAM_PROGRAMS": str(self.folder)}):
+            with self.assertRaisesRegex(ss.Unavailable, "slabstream-coordinator' is missing"):
+                ss.render(volume_arrays()[0])
+
+    def test_it_ends_with_the_interpreter_however_that_ends(self) -> None:
+        script = """
+            import os, sys, slabstream, numpy
+            volume = slabstream.load(numpy.eye(9, dtype="u1")[:, :, None].repeat(5, 2))
+            print(slabstream.local._local.keeper.pid, volume.service.status().pid, volume.service.endpoint[6:], flush=True)
+            {end}
+        """
+        for end in ("pass", "os._exit(3)", "os.kill(os.getpid(), 9)"):
+            with self.subTest(end=end):
+                run = subprocess.run([sys.executable, "-c", inspect.cleandoc(script.format(end=end))], capture_output=True, text=True,
+                                     env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)})
+                self.assertEqual(run.stderr, "")
+                *processes, socket = run.stdout.split()
+                for process in processes:
+                    gone = subprocess.run(["tail", f"--pid={process}", "-f", "/dev/null"], timeout=60)  # until it has ended
+                    self.assertEqual(gone.returncode, 0)
+                self.assertFalse(pathlib.Path(socket).parent.exists())
+
+
+if __name__ == "__main__":
+    unittest.main()

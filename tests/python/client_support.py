@@ -1,0 +1,130 @@
+"""For the tests of the Python client: a service of two workers, a volume with layers, and pictures of the command line."""
+from __future__ import annotations
+
+import contextlib
+import os
+import pathlib
+import select
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+import zlib
+
+import numpy as np
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "python"))
+
+PROGRAMS = pathlib.Path(os.environ.get("SLABSTREAM_PROGRAMS", ROOT / "build" / "bin"))
+os.environ["SLABSTREAM_PROGRAMS"] = str(PROGRAMS)
+PROGRAM = str(PROGRAMS / "slabstream")
+
+from slabstream import volumes  # noqa: E402
+
+START_SECONDS = 60
+
+
+def volume_arrays() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A head that has no symmetry, its labels 1 to 3 and a map of values; z, y, x."""
+    z, y, x = np.meshgrid(np.linspace(-1, 1, 20), np.linspace(-1, 1, 24), np.linspace(-1, 1, 28), indexing="ij")
+    radius = np.sqrt(x**2 + (1.2 * y) ** 2 + z**2)
+    bump = np.exp(-8 * ((x - 0.6) ** 2 + (y + 0.4) ** 2 + (z - 0.3) ** 2))
+    values = np.clip(220 * (1 - radius) + 150 * bump, 0, 255).astype(np.uint8)
+    labels = np.where(values > 20, 1 + (x > 0) + (z > 0), 0).astype(np.uint8)
+    return values, labels, np.where(values > 20, bump, np.nan).astype(np.float32)
+
+
+def write_volumes(folder: pathlib.Path) -> str:
+    """Argument of --data: a patient's volume with layers, named head."""
+    grid = dict(spacing=(2, 1.5, 1.25), origin=(-10, 5, 20), direction=((1, 0, 0), (0, 1, 0), (0, 0, 1)), world="patient")
+    for name, array in zip(("head", "labels", "overlay"), volume_arrays()):
+        volumes.write_nrrd(volumes.volume_of(array, **grid), folder / f"{name}.nrrd")
+    return f"head={folder}/head.nrrd,labels={folder}/labels.nrrd,overlay={folder}/overlay.nrrd"
+
+
+class RunningService:
+    """`slabstream up` with two workers in a folder of its own; ended by end()."""
+
+    def __init__(self, folder: pathlib.Path, *arguments: str, listen: str | None = None):
+        self.folder = folder
+        self.environment = {name: value for name, value in os.environ.items() if not name.startswith("SLABSTREAM_")}
+        self.environment["XDG_RUNTIME_DIR"] = str(folder)
+        with (folder / "up.errors").open("wb") as errors:
+            self.process = subprocess.Popen(
+                [PROGRAM, "up", "--workers", "2", "--listen", listen or f"ipc://{folder}/s", *arguments],
+                stdout=subprocess.PIPE, stderr=errors, stdin=subprocess.DEVNULL, env=self.environment,
+            )
+        said = b""
+        while b"Ctrl-C" not in said:
+            ready = select.select([self.process.stdout], [], [], START_SECONDS)[0]
+            part = os.read(self.process.stdout.fileno(), 4096) if ready else b""
+            if not part:
+                raise RuntimeError(f"slabstream up: {(folder / 'up.errors').read_text()}")
+            said += part
+        words = said.decode().split()
+        self.endpoint = words[4]
+        self.coordinator = int(words[words.index("(coordinator") + 2].rstrip(","))
+
+    def end(self) -> None:
+        self.process.terminate()
+        self.process.wait(timeout=START_SECONDS)
+        self.process.stdout.close()
+
+    def run(self, *arguments: str) -> subprocess.CompletedProcess:
+        return subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, env=self.environment, cwd=self.folder, timeout=300)
+
+    def picture(self, command: str, *arguments: str) -> np.ndarray:
+        """The command line's PNG."""
+        done = self.run(command, "head", "-o", "picture.png", "--endpoint", self.endpoint, *arguments)
+        if done.returncode != 0:
+            raise RuntimeError(done.stderr)
+        return read_png((self.folder / "picture.png").read_bytes())
+
+
+class InAFolder(unittest.TestCase):
+    def setUp(self) -> None:
+        made = tempfile.TemporaryDirectory(prefix="slabstream-test-")
+        self.addCleanup(made.cleanup)
+        self.folder = pathlib.Path(made.name)
+
+
+class WithAService(unittest.TestCase):
+    """One service for all tests of a class."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        stack = contextlib.ExitStack()
+        cls.addClassCleanup(stack.close)
+        cls.folder = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="slabstream-test-")))
+        cls.running = RunningService(cls.folder, "--data", write_volumes(cls.folder))
+        stack.callback(cls.running.end)
+
+
+def read_png(content: bytes) -> np.ndarray:
+    """Height, width, 4, of uint8 or uint16: any PNG with RGBA, without interlacing."""
+    at, packed = 8, b""
+    while at < len(content):
+        length, kind = struct.unpack_from(">I4s", content, at)
+        chunk = content[at + 8 : at + 8 + length]
+        if zlib.crc32(kind + chunk) != struct.unpack_from(">I", content, at + 8 + length)[0]:
+            raise ValueError(f"chunk {kind!r} is damaged")
+        if kind == b"IHDR":
+            width, height, bits, color, *rest = struct.unpack(">IIBBBBB", chunk)
+            assert color == 6 and rest == [0, 0, 0]
+        elif kind == b"IDAT":
+            packed += chunk
+        at += 12 + length
+    step = bits // 2  # bytes of a pixel
+    rows = np.frombuffer(zlib.decompress(packed), np.uint8).reshape(height, 1 + step * width)
+    found = np.zeros((height + 1, step * (width + 1)), np.int64)  # a row above and a pixel to the left, of zeros
+    for y, (kind, *row) in enumerate(rows.tolist(), 1):
+        line, above = found[y], found[y - 1]
+        for x, byte in enumerate(row, step):
+            left, up, corner = int(line[x - step]), int(above[x]), int(above[x - step])
+            guess = left + up - corner
+            paeth = min((left, up, corner), key=lambda v: abs(guess - v))
+            line[x] = (byte + (0, left, up, (left + up) // 2, paeth)[kind]) & 255
+    codes = found[1:, step:].astype(np.uint8).reshape(height, width, step)
+    return codes if bits == 8 else np.ascontiguousarray(codes).view(">u2").astype(np.uint16)
