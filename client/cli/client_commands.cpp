@@ -6,9 +6,9 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/cores.h"
-#include "client/cli/layer_options.h"
 #include "client/cli/movie.h"
 #include "client/cli/option_groups.h"
+#include "client/request/layer_options.h"
 #include "common/base/find_named.h"
 #include "common/cli/program.h"
 #include "common/simulation/link_model.h"

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "client/cli/slice_planes.h"
 #include "client/cli/slurm_values.h"
-#include "client/cli/values.h"
+#include "client/cli/turntable_values.h"
 #include "client/image_io/image_writer.h"
+#include "client/request/slice_request.h"
 #include "common/base/time.h"
 #include "common/frame/frame_request.h"
 #include "common/layers/layer_reader.h"
@@ -71,14 +71,8 @@ struct TurntableOptions {
 struct SliceOptions {
   ConnectionOptions connection;
   std::string source, output;
-  LayerFiles layers;  // with local_workers > 0
-  std::span<const SlicePlane> planes = kSliceChoices.back().planes;
-  std::optional<Vec3> at;               // a point of the world
-  std::optional<std::int32_t> index;    // of the slice; of one plane only. Neither: the volume's centre
-  double thickness = 0;                 // unit of the world; 0: a plane
-  std::optional<double> window, level;  // data values; none: `request.transfer`
-  FrameRequest request;                 // renderer, its parameters, size of each plane, transfer function
-  PictureFormat format;
+  LayerFiles layers;   // with local_workers > 0
+  SliceRequest slice;  // `frame.dataset` is filled in when the connection is open
 };
 
 struct InfoOptions {

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "client/cli/job_script.h"
-#include "client/cli/picture_record.h"
 #include "client/image_io/picture_header.h"
+#include "client/request/picture_record.h"
 
 namespace slabstream {
 namespace {

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "client/cli/json_value.h"
+#include "client/request/json_value.h"
 #include "common/view/camera.h"
 #include "common/view/clip.h"
 

@@ -1,4 +1,4 @@
-#include "client/cli/volume_argument.h"
+#include "client/request/volume_argument.h"
 
 #include <fmt/format.h>
 
@@ -15,26 +15,41 @@ namespace {
 
 constexpr std::size_t kMaxTransferFileBytes = std::size_t{16} << 20;
 
+using TransferText = std::variant<std::string, TransferFunction>;
+
+bool IsJson(const std::string& text) { return text.starts_with('{') || text.starts_with('['); }
+
+Result<TransferText> ColorMap(const std::string& option, const std::string& json, const std::string& name) {
+  Result<TransferFunction> transfer = ParseParaViewColorMap(json, name);
+  if (!transfer.ok()) return Status(transfer.status().code(), fmt::format("{} {}", option, transfer.status().message()));
+  return TransferText(*std::move(transfer));
+}
+
 bool NamesFile(const std::string& transfer) {
+  if (IsJson(transfer)) return false;
   return std::filesystem::path(transfer).extension() == ".json" || transfer.find('/') != std::string::npos;
 }
 
 }  // namespace
 
-Result<std::variant<std::string, TransferFunction>> ParseTransfer(const std::string& option, const std::string& text) {
-  using Choice = std::variant<std::string, TransferFunction>;
-  if (NamesFile(text)) {
-    const Result<std::string> json = ReadTextFile(text, kMaxTransferFileBytes);
-    if (!json.ok()) return Status(json.status().code(), fmt::format("{} {}", option, json.status().message()));
-    Result<TransferFunction> transfer = ParseParaViewColorMap(*json, text);
-    if (!transfer.ok()) return Status(transfer.status().code(), fmt::format("{} {}", option, transfer.status().message()));
-    return Choice(*std::move(transfer));
-  }
+Result<std::variant<std::string, TransferFunction>> ParseTransferText(const std::string& option, const std::string& text) {
+  if (IsJson(text)) return ColorMap(option, text, "the colour map");
   std::vector<std::string_view> names;
   for (const TransferPreset& preset : TransferPresets()) names.push_back(preset.name);
   const Result<std::size_t> index = ParseChoice(option, text, names);
-  if (!index.ok()) return Status::InvalidArgument(index.status().message() + ", nor a .json file");
-  return Choice(text);
+  if (!index.ok()) return Status::InvalidArgument(index.status().message() + ", nor JSON of a colour map");
+  return TransferText(text);
+}
+
+Result<std::variant<std::string, TransferFunction>> ParseTransfer(const std::string& option, const std::string& text) {
+  if (NamesFile(text)) {
+    const Result<std::string> json = ReadTextFile(text, kMaxTransferFileBytes);
+    if (!json.ok()) return Status(json.status().code(), fmt::format("{} {}", option, json.status().message()));
+    return ColorMap(option, *json, text);
+  }
+  Result<TransferText> transfer = ParseTransferText(option, text);
+  if (!transfer.ok() && !IsJson(text)) return Status::InvalidArgument(transfer.status().message() + ", nor a .json file");
+  return transfer;
 }
 
 Result<VolumeArgument> ParseVolumeArgument(const std::string& argument, const std::string& text, bool is_file) {

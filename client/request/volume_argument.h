@@ -11,7 +11,9 @@
 
 namespace slabstream {
 
-// A value of --transfer: a ParaView colour map if the text names a file, else the name of a preset. `option` begins messages.
+// A value of --transfer: the name of a preset, or a ParaView colour map, as its JSON. `option` begins messages.
+Result<std::variant<std::string, TransferFunction>> ParseTransferText(const std::string& option, const std::string& text);
+// The same; and the colour map may also be the file that the text names.
 Result<std::variant<std::string, TransferFunction>> ParseTransfer(const std::string& option, const std::string& text);
 
 struct VolumeArgument {

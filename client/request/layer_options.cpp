@@ -1,4 +1,4 @@
-#include "client/cli/layer_options.h"
+#include "client/request/layer_options.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -8,9 +8,9 @@
 #include <utility>
 #include <variant>
 
-#include "client/cli/picture_record.h"
-#include "client/cli/values.h"
-#include "client/cli/volume_argument.h"
+#include "client/request/picture_record.h"
+#include "client/request/values.h"
+#include "client/request/volume_argument.h"
 #include "common/cli/add_option.h"
 #include "common/cli/parse.h"
 
@@ -102,10 +102,12 @@ void AddLayerFiles(CLI::App& app, LayerFiles& files) {
       app, files, [] {}, [] {});
 }
 
-void AddLayerOptions(CLI::App& app, FrameRequest& request, LayerFiles& files, bool opacities) {
+void AddLayerOptions(CLI::App& app, FrameRequest& request, LayerFiles* files, bool opacities) {
   app.option_defaults()->group("Layers (any option shows the dataset's labels or its overlay)");
-  AddFiles(
-      app, files, [&request] { Shown(request.labels); }, [&request] { Shown(request.overlay); });
+  if (files != nullptr) {
+    AddFiles(
+        app, *files, [&request] { Shown(request.labels); }, [&request] { Shown(request.overlay); });
+  }
   AddText(app, "--label-mode",
           "tint: labels colour what the transfer function shows, and a label that is not shown takes its material away; surface: labels "
           "are material of their own",
@@ -140,8 +142,8 @@ void AddLayerOptions(CLI::App& app, FrameRequest& request, LayerFiles& files, bo
           })
       ->type_name("LABEL[-LABEL],...");
   AddText(app, "--overlay-transfer", "Transfer function of the overlay, as --transfer",
-          [&request](const std::string& option, const std::string& text) {
-            auto transfer = ParseTransfer(option, text);
+          [&request, files](const std::string& option, const std::string& text) {
+            auto transfer = files != nullptr ? ParseTransfer(option, text) : ParseTransferText(option, text);
             if (transfer.ok()) Shown(request.overlay).transfer.choice = *std::move(transfer);
             return transfer.status();
           })

@@ -1,4 +1,4 @@
-#include "client/cli/json_value.h"
+#include "client/request/json_value.h"
 
 #include <fmt/format.h>
 

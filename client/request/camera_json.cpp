@@ -1,4 +1,4 @@
-#include "client/cli/camera_json.h"
+#include "client/request/camera_json.h"
 
 #include <array>
 #include <optional>

@@ -13,8 +13,8 @@
 #include <string_view>
 #include <vector>
 
-#include "client/cli/json_value.h"
 #include "client/image_io/image_writer.h"
+#include "client/request/json_value.h"
 #include "common/base/status.h"
 #include "common/frame/frame_request.h"
 #include "common/layers/layer_reader.h"

@@ -1,4 +1,4 @@
-#include "client/cli/picture_record.h"
+#include "client/request/picture_record.h"
 
 #include <fmt/format.h>
 
@@ -7,9 +7,9 @@
 #include <optional>
 #include <utility>
 
-#include "client/cli/camera_json.h"
-#include "client/cli/layer_options.h"
-#include "client/cli/values.h"
+#include "client/request/camera_json.h"
+#include "client/request/layer_options.h"
+#include "client/request/values.h"
 #include "common/base/version.h"
 #include "common/view/named_view.h"
 #include "common/volume_io/volume_reader.h"

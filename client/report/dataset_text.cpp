@@ -1,4 +1,4 @@
-#include "client/cli/dataset_text.h"
+#include "client/report/dataset_text.h"
 
 #include <fmt/format.h>
 

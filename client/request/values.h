@@ -44,31 +44,4 @@ Result<std::vector<Isosurface>> ParseIsosurfaces(std::string_view option, std::s
 // "G:O,G:O,...", with slopes G that ascend in [0, kMaxScalar] and opacities O in [0, 1].
 Result<std::vector<GradientOpacityPoint>> ParseGradientOpacities(std::string_view option, std::string_view text);
 
-// A file name with exactly one integer conversion, such as "frame_%04d.png"; "%%" stands for a percent sign.
-class FramePattern {
- public:
-  static Result<FramePattern> Parse(std::string_view option, std::string_view text);
-  std::string Name(int index) const;  // index >= 0
-
- private:
-  std::string before_, after_;
-  int width_ = 0;  // digits, filled with zeros if zero_ or else with blanks
-  bool zero_ = false;
-};
-
-// Where a turntable goes: a picture for each frame, or a movie of them.
-struct TurntableOutput {
-  FramePattern pictures;
-  std::string movie;  // its path (MovieFormatOf); empty: pictures
-};
-Result<TurntableOutput> ParseTurntableOutput(std::string_view option, std::string_view text);
-
-// Volumes of a file that holds several, both included.
-struct TimeRange {
-  int first = 0, last = 0;  // 0 <= first <= last < kMaxVolumes
-  int count() const { return last - first + 1; }
-};
-// "T" or "FIRST:LAST".
-Result<TimeRange> ParseTimeRange(std::string_view option, std::string_view text);
-
 }  // namespace slabstream

@@ -10,9 +10,9 @@
 
 namespace slabstream {
 
-// --labels and --overlay, which name files and show them, and --label-... and --overlay-... , each of which shows a layer, too. Opacities
-// of labels are left out of `slice`.
-void AddLayerOptions(CLI::App& app, FrameRequest& request, LayerFiles& files, bool opacities = true);
+// --labels and --overlay, which name files and show them, and --label-... and --overlay-... , each of which shows a layer, too. `files`
+// null: no option names a file (picture_options.h). Opacities of labels are left out of `slice`.
+void AddLayerOptions(CLI::App& app, FrameRequest& request, LayerFiles* files, bool opacities = true);
 // --labels and --overlay alone.
 void AddLayerFiles(CLI::App& app, LayerFiles& files);
 
