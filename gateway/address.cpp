@@ -116,7 +116,8 @@ std::optional<std::string> OriginRules::Refusal(std::string_view host, std::opti
 
 Result<std::string> MakeToken() {
   std::array<unsigned char, 22> random{};  // 6 bits of each: 132 bits
-  if (::getrandom(random.data(), random.size(), 0) != ssize_t(random.size())) return Status::Unavailable("the system gives no random bytes");
+  if (::getrandom(random.data(), random.size(), 0) != ssize_t(random.size()))
+    return Status::Unavailable("the system gives no random bytes");
   std::string token;
   for (const unsigned char byte : random) token += kTokenLetters[byte % kTokenLetters.size()];
   return token;
@@ -124,7 +125,8 @@ Result<std::string> MakeToken() {
 
 Status CheckToken(std::string_view token) {
   constexpr std::size_t kLeast = 16, kMost = 128;
-  if (token.size() >= kLeast && token.size() <= kMost && token.find_first_not_of(kTokenLetters) == std::string_view::npos) return Status::Ok();
+  if (token.size() >= kLeast && token.size() <= kMost && token.find_first_not_of(kTokenLetters) == std::string_view::npos)
+    return Status::Ok();
   return Status::InvalidArgument(
       fmt::format("the token has {} characters; it needs {} to {} letters, digits, - and _", token.size(), kLeast, kMost));
 }

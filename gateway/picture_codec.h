@@ -17,6 +17,7 @@ std::vector<std::byte> EncodeJpeg(const ComposedPicture& picture, const PixelBou
 
 // PNG of those pixels: the same codes as WritePicture stores, 8 bits a channel, straight alpha, packed for speed. nullopt: `given_up`
 // became true meanwhile.
-std::optional<std::vector<std::byte>> EncodePng(const ComposedPicture& picture, const PixelBounds& bounds, const std::atomic<bool>& given_up);
+std::optional<std::vector<std::byte>> EncodePng(const ComposedPicture& picture, const PixelBounds& bounds,
+                                                const std::atomic<bool>& given_up);
 
 }  // namespace slabstream

@@ -23,8 +23,8 @@ class ServiceLink {
  public:
   using Ticket = std::uint64_t;
   struct Handlers {
-    std::function<void(const FrameProgress&)> progress;             // may be empty
-    std::function<void(Result<std::vector<Picture>>)> done;         // once, unless the ticket was cancelled before
+    std::function<void(const FrameProgress&)> progress;      // may be empty
+    std::function<void(Result<std::vector<Picture>>)> done;  // once, unless the ticket was cancelled before
   };
 
   // `context` and what the handlers use must outlive it.
@@ -33,8 +33,8 @@ class ServiceLink {
   ServiceLink(const ServiceLink&) = delete;
   ServiceLink& operator=(const ServiceLink&) = delete;
 
-  // Any thread. Renders `frames`, at least one, all at once; the first failure is that of all. The handlers are called on the link's thread.
-  // Unavailable: the service does not answer.
+  // Any thread. Renders `frames`, at least one, all at once; the first failure is that of all. The handlers are called on the link's
+  // thread. Unavailable: the service does not answer.
   Ticket Render(std::vector<FrameRequest> frames, Duration deadline, Handlers handlers);
   // Any thread. The handlers may still be called if they are about to be.
   void Cancel(Ticket ticket);

@@ -1,7 +1,7 @@
 #include "gateway/target.h"
 
-#include <charconv>
 #include <fmt/format.h>
+#include <charconv>
 
 #include <optional>
 #include <utility>

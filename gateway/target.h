@@ -10,8 +10,8 @@
 namespace slabstream {
 
 struct Target {
-  std::string path;       // as it stands: the gateway's own paths need no escapes
-  PictureFields fields;   // decoded; in their order
+  std::string path;      // as it stands: the gateway's own paths need no escapes
+  PictureFields fields;  // decoded; in their order
 };
 
 // InvalidArgument: no path, a '%' that is no escape, or more than kMaxPictureFields fields.

@@ -74,6 +74,12 @@ ViewMachine::Actions ViewMachine::OnEncoded(Time now) {
   return Next(now);
 }
 
+ViewMachine::Actions ViewMachine::OnEncodeFailed(Time now) {
+  out_ = Out::kEmpty;
+  if (rendered_) final_seq_ = std::max(final_seq_, rendered_->seq);
+  return Next(now);
+}
+
 ViewMachine::Actions ViewMachine::OnAck(std::uint64_t frame, Time now) {
   if (sent_ != frame) return {};
   sent_.reset();

@@ -50,6 +50,7 @@ class ViewMachine {
   Actions OnUnavailable(Time now);  // the service is gone: the view waits for OnServiceBack
   Actions OnServiceBack(Time now);
   Actions OnEncoded(Time now);
+  Actions OnEncodeFailed(Time now);  // there is no picture to send; the view is done with
   Actions OnAck(std::uint64_t frame, Time now);
   Actions OnTime(Time now);  // at wake_time()
 

@@ -8,7 +8,6 @@
 
 #include "client/cli/cores.h"
 #include "client/request/volume_argument.h"
-#include "common/transport/endpoint.h"
 #include "common/volume_io/read_options.h"
 #include "common/wire/control_messages.h"
 
@@ -32,25 +31,6 @@ void AddConnectionOptions(CLI::App& app, ConnectionOptions& connection) {
 
 CLI::Option* AddThreads(CLI::App& app, int& threads, const std::string& help) {
   return AddInteger(app, "--threads", threads, 1, int(kMaxThreads), help)->default_str("the cores divided by the workers");
-}
-
-ParseText EndpointText(bool allow_wildcard) {
-  return [allow_wildcard](const std::string& option, const std::string& text) -> Result<std::string> {
-    const Result<Endpoint> endpoint = ParseEndpoint(text, allow_wildcard);
-    if (!endpoint.ok()) return Status::InvalidArgument(fmt::format("{} {}", option, endpoint.status().message()));
-    return text;
-  };
-}
-
-CLI::Option* AddService(CLI::App& app, ServiceChoice& service) {
-  CLI::Option* endpoint = AddParsed(app, "--endpoint", service.endpoint, EndpointText(false),
-                                    "Where the service listens; with --service, where it is reached instead, as through a tunnel")
-                              ->type_name("ENDPOINT")
-                              ->default_str("$SLABSTREAM_ENDPOINT, or the service that `up` started last");
-  app.add_option("--service", service.file, "The service file of a service with keys: where it listens, and the key to it")
-      ->type_name("FILE")
-      ->default_str("$SLABSTREAM_SERVICE, if there is no --endpoint");
-  return endpoint;
 }
 
 void AddReadOptions(CLI::App& app, std::initializer_list<std::string_view> except) {

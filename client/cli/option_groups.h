@@ -9,14 +9,10 @@
 
 #include "client/cli/options.h"
 #include "client/request/picture_options.h"
+#include "client/service/service_choice.h"
 #include "common/cli/add_option.h"
 
 namespace slabstream {
-
-// For AddParsed: an endpoint, as ParseEndpoint takes it.
-ParseText EndpointText(bool allow_wildcard);
-// --endpoint and --service; returns the former.
-CLI::Option* AddService(CLI::App& app, ServiceChoice& service);
 
 // Headings of the help text.
 inline constexpr char kOutputGroup[] = "Output", kReadingGroup[] = "Reading a file";

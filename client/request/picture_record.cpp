@@ -9,6 +9,7 @@
 
 #include "client/request/camera_json.h"
 #include "client/request/layer_options.h"
+#include "client/request/shell_word.h"
 #include "client/request/values.h"
 #include "common/base/version.h"
 #include "common/view/named_view.h"
@@ -19,19 +20,6 @@ namespace slabstream {
 namespace {
 
 constexpr std::string_view kProgram = "slabstream ";
-
-Json GeometryJson(const PictureGeometry& geometry) {
-  static constexpr std::array<const char*, 3> kUnits = {"voxel", "unknown", "mm"};
-  return {{"world", NameOf(geometry.world)},
-          {"unit", kUnits.at(std::size_t(geometry.unit) - 1)},
-          {"projection", NameOf(geometry.projection)},
-          {"right", VectorJson(geometry.right)},
-          {"up", VectorJson(geometry.up)},
-          {"forward", VectorJson(geometry.forward)},
-          {"target", VectorJson(geometry.target)},
-          {"target_depth", geometry.target_depth},
-          {"pixel_size", geometry.pixel_size}};
-}
 
 Json FormatJson(const PictureFormat& format) {
   const StraightColor& b = format.background;
@@ -196,7 +184,25 @@ bool IsFile(const std::string& source) {
   return source.find('/') != std::string::npos || LooksLikeVolume(source.substr(0, source.find('?')));
 }
 
+bool IsPlain(std::string_view word) {
+  constexpr std::string_view kPlain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_=+,./:@%";
+  return !word.empty() && word.find_first_not_of(kPlain) == std::string_view::npos;
+}
+
 }  // namespace
+
+Json GeometryJson(const PictureGeometry& geometry) {
+  static constexpr std::array<const char*, 3> kUnits = {"voxel", "unknown", "mm"};
+  return {{"world", NameOf(geometry.world)},
+          {"unit", kUnits.at(std::size_t(geometry.unit) - 1)},
+          {"projection", NameOf(geometry.projection)},
+          {"right", VectorJson(geometry.right)},
+          {"up", VectorJson(geometry.up)},
+          {"forward", VectorJson(geometry.forward)},
+          {"target", VectorJson(geometry.target)},
+          {"target_depth", geometry.target_depth},
+          {"pixel_size", geometry.pixel_size}};
+}
 
 std::string RecordText(const std::string& source, const FrameRequest& request, const PictureFormat& format, const PictureGeometry& geometry,
                        const LayerFiles& layers) {
@@ -259,6 +265,12 @@ std::vector<std::string> RenderArguments(const PictureRecord& record, const std:
   arguments.insert(arguments.end(), {"-o", output});
   if (like_an_option) arguments.insert(arguments.end(), {"--", record.source});
   return arguments;
+}
+
+std::string CommandText(const PictureRecord& record, const std::string& output) {
+  std::string text = "slabstream";
+  for (const std::string& word : RenderArguments(record, output)) text += " " + (IsPlain(word) ? word : ShellWord(word));
+  return text;
 }
 
 }  // namespace slabstream

@@ -30,6 +30,9 @@ struct PictureRecord {
   Json json;  // of the whole record
 };
 
+// The record's "geometry".
+Json GeometryJson(const PictureGeometry& geometry);
+
 // ASCII, one line.
 std::string RecordText(const std::string& source, const FrameRequest& request, const PictureFormat& format, const PictureGeometry& geometry,
                        const LayerFiles& layers = {});
@@ -42,5 +45,7 @@ inline constexpr char kColorMapFile[] = "color-map.json", kOverlayMapFile[] = "o
 // The command line that makes the picture again as `output`: "render", SOURCE, and each option whose value is not its default. --local if
 // SOURCE is the name of a file.
 std::vector<std::string> RenderArguments(const PictureRecord& record, const std::string& output);
+// The same as a line for a shell: "slabstream render ...".
+std::string CommandText(const PictureRecord& record, const std::string& output);
 
 }  // namespace slabstream

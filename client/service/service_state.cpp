@@ -1,4 +1,4 @@
-#include "client/cli/service_state.h"
+#include "client/service/service_state.h"
 
 #include <fmt/format.h>
 #include <sys/stat.h>
@@ -17,7 +17,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "client/cli/process.h"
+#include "client/service/process.h"
 #include "common/base/files.h"
 #include "common/base/time.h"
 #include "common/service/service_file.h"

@@ -1,4 +1,4 @@
-#include "client/cli/process.h"
+#include "client/service/process.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "client/cli/options.h"
 #include "client/client.h"
+#include "client/service/service_choice.h"
 #include "common/base/status.h"
 #include "common/base/time.h"
 
