@@ -11,7 +11,7 @@
 #include <map>
 
 #include "bench/program.h"
-#include "client/cli/frame_summary.h"
+#include "client/report/frame_summary.h"
 #include "common/combining/schemes.h"
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"

@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "client/cli/process.h"
 #include "client/client.h"
+#include "client/service/process.h"
 
 namespace slabstream {
 

@@ -6,9 +6,9 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/cores.h"
-#include "client/cli/layer_options.h"
 #include "client/cli/movie.h"
 #include "client/cli/option_groups.h"
+#include "client/request/layer_options.h"
 #include "common/base/find_named.h"
 #include "common/cli/program.h"
 #include "common/simulation/link_model.h"
@@ -194,6 +194,19 @@ void DeclareUp(const CommandLine& line) {
   });
 }
 
+void DeclareView(const CommandLine& line) {
+  CLI::App* sub = line.app.add_subcommand("view", "Look at a volume in the browser: starts what is missing, and ends it at Ctrl-C");
+  auto options = std::make_shared<ViewOptions>();
+  sub->add_option("SOURCE", options->source, "A volume file, which gets a service of its own, or a dataset's name at the service")
+      ->required();
+  AddService(*sub, options->service);
+  sub->add_option("--listen", options->listen, "Where the gateway is reached; port 0 is any free one")
+      ->type_name("HOST:PORT")
+      ->default_str(options->listen);
+  sub->add_flag("!--no-browser", options->browser, "Only print the address");
+  RunWith(*sub, line.run, options, RunView);
+}
+
 void DeclareDown(const CommandLine& line) {
   CLI::App* sub = line.app.add_subcommand("down", "End a service that `up` started");
   auto options = std::make_shared<DownOptions>();
@@ -299,8 +312,8 @@ void DeclareSlurm(const CommandLine& line) {
 
 std::span<const DeclareCommand> ClientCommands() {
   static constexpr DeclareCommand kCommands[] = {DeclareRender,  DeclareTurntable, DeclareSlice, DeclareInfo, DeclareTransfer,
-                                                 DeclareConvert, DeclareSphere,    DeclareUp,    DeclareDown, DeclareStatus,
-                                                 DeclareKeys,    DeclareData,      DeclareLogs,  DeclareSlurm};
+                                                 DeclareConvert, DeclareSphere,    DeclareUp,    DeclareView, DeclareDown,
+                                                 DeclareStatus,  DeclareKeys,      DeclareData,  DeclareLogs, DeclareSlurm};
   return kCommands;
 }
 

@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "client/cli/commands.h"
-#include "client/cli/dataset_text.h"
 #include "client/cli/session.h"
+#include "client/report/dataset_text.h"
 #include "coordinator/catalogue.h"
 
 namespace slabstream {

@@ -5,8 +5,8 @@
 #include <iostream>
 
 #include "client/cli/commands.h"
-#include "client/cli/service_state.h"
 #include "client/cli/session.h"
+#include "client/service/service_state.h"
 
 namespace slabstream {
 namespace {

@@ -13,9 +13,9 @@
 #include "client/cli/commands.h"
 #include "client/cli/dicom_listing.h"
 #include "client/cli/input_volume.h"
-#include "client/cli/json_value.h"
 #include "client/cli/picture_info.h"
 #include "client/image_io/picture_header.h"
+#include "client/request/json_value.h"
 #include "common/planning/frame_plan.h"
 #include "common/volume/summary.h"
 

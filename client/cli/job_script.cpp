@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "client/request/shell_word.h"
+
 namespace slabstream {
 namespace {
 
@@ -114,12 +116,6 @@ exit "$status"
 )";
 
 }  // namespace
-
-std::string ShellWord(std::string_view text) {
-  std::string word = "'";
-  for (const char c : text) c == '\'' ? word += "'\\''" : word += c;
-  return word + "'";
-}
 
 std::string TextOf(const JobScript& script) {
   std::string text(kPreamble);

@@ -24,7 +24,4 @@ struct JobScript {
 // Paths may hold any bytes but zero.
 std::string TextOf(const JobScript& script);
 
-// The text as one word of bash, in quotes.
-std::string ShellWord(std::string_view text);
-
 }  // namespace slabstream

@@ -13,7 +13,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/log_lines.h"
-#include "client/cli/service_state.h"
+#include "client/service/service_state.h"
 #include "common/base/printable.h"
 #include "common/transport/socket.h"
 

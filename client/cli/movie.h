@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "client/cli/picture_sink.h"
-#include "client/cli/process.h"
 #include "client/image_io/composed_picture.h"
+#include "client/service/process.h"
 #include "common/base/files.h"
 #include "common/base/status.h"
 

@@ -8,26 +8,17 @@
 #include <string_view>
 
 #include "client/cli/options.h"
+#include "client/request/picture_options.h"
+#include "client/service/service_choice.h"
 #include "common/cli/add_option.h"
 
 namespace slabstream {
 
-// For AddParsed: an endpoint, as ParseEndpoint takes it.
-ParseText EndpointText(bool allow_wildcard);
-// --endpoint and --service; returns the former.
-CLI::Option* AddService(CLI::App& app, ServiceChoice& service);
-
-// Headings of the help text. Options under kHidden are not shown: old spellings that still work, and options that cannot be used yet.
-inline constexpr char kOutputGroup[] = "Output", kReadingGroup[] = "Reading a file", kHidden[] = "";
+// Headings of the help text.
+inline constexpr char kOutputGroup[] = "Output", kReadingGroup[] = "Reading a file";
 
 // --threads, [1, kMaxThreads]; 0 stays if it is not given.
 CLI::Option* AddThreads(CLI::App& app, int& threads, const std::string& help);
-
-// --scalar-range.
-void AddScalarRange(CLI::App& app, TransferChoice& transfer);
-
-// --transfer, --scalar-range and --opacity-distance.
-void AddTransferOptions(CLI::App& app, TransferChoice& transfer);
 
 // An option for each of ReadOptionList() but those of `except`: --time 3 says what ?time=3 behind a source says.
 void AddReadOptions(CLI::App& app, std::initializer_list<std::string_view> except = {});

@@ -7,10 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "client/cli/slice_planes.h"
 #include "client/cli/slurm_values.h"
-#include "client/cli/values.h"
+#include "client/cli/turntable_values.h"
 #include "client/image_io/image_writer.h"
+#include "client/request/slice_request.h"
+#include "client/service/service_choice.h"
 #include "common/base/time.h"
 #include "common/frame/frame_request.h"
 #include "common/layers/layer_reader.h"
@@ -23,12 +24,6 @@ namespace slabstream {
 class RendererKind;
 
 inline constexpr int kMaxLocalWorkers = 256;  // of EmbeddedOptions
-
-// Which service: see ResolveService (service_state.h).
-struct ServiceChoice {
-  std::string endpoint, file;  // both: the file's keys, and this endpoint instead of its own; none: the usual service
-  const std::string& text() const { return file.empty() ? endpoint : file; }
-};
 
 // Where the frames are rendered.
 struct ConnectionOptions {
@@ -71,14 +66,8 @@ struct TurntableOptions {
 struct SliceOptions {
   ConnectionOptions connection;
   std::string source, output;
-  LayerFiles layers;  // with local_workers > 0
-  std::span<const SlicePlane> planes = kSliceChoices.back().planes;
-  std::optional<Vec3> at;               // a point of the world
-  std::optional<std::int32_t> index;    // of the slice; of one plane only. Neither: the volume's centre
-  double thickness = 0;                 // unit of the world; 0: a plane
-  std::optional<double> window, level;  // data values; none: `request.transfer`
-  FrameRequest request;                 // renderer, its parameters, size of each plane, transfer function
-  PictureFormat format;
+  LayerFiles layers;   // with local_workers > 0
+  SliceRequest slice;  // `frame.dataset` is filled in when the connection is open
 };
 
 struct InfoOptions {
@@ -118,6 +107,13 @@ struct UpOptions {
   std::uint64_t memory = 0;       // bytes, of all processes together
   bool detach = false;
   std::string log_level;  // of the processes that it starts; empty: info
+};
+
+struct ViewOptions {
+  ServiceChoice service;
+  std::string source;                  // a volume file, or a dataset's name at the service
+  std::string listen = "127.0.0.1:0";  // as slabstream-gateway takes it
+  bool browser = true;                 // open it, if there is a display
 };
 
 struct DownOptions {

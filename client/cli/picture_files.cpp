@@ -1,6 +1,6 @@
 #include "client/cli/picture_files.h"
 
-#include "client/cli/picture_record.h"
+#include "client/request/picture_record.h"
 
 namespace slabstream {
 

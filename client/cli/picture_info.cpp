@@ -8,9 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "client/cli/job_script.h"
-#include "client/cli/picture_record.h"
 #include "client/image_io/picture_header.h"
+#include "client/request/picture_record.h"
 
 namespace slabstream {
 namespace {
@@ -23,17 +22,6 @@ std::string JsonText(const Json& json, int indent) { return json.dump(indent, ' 
 std::string Harmless(std::string text) {
   std::ranges::replace_if(
       text, [](unsigned char c) { return (c < 0x20 && c != '\n') || c == 0x7F; }, '?');
-  return text;
-}
-
-bool IsPlain(std::string_view word) {
-  constexpr std::string_view kPlain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_=+,./:@%";
-  return !word.empty() && word.find_first_not_of(kPlain) == std::string_view::npos;
-}
-
-std::string CommandText(const PictureRecord& record, const std::string& output) {
-  std::string text = "slabstream";
-  for (const std::string& word : RenderArguments(record, output)) text += " " + (IsPlain(word) ? word : ShellWord(word));
   return text;
 }
 

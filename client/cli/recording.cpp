@@ -8,7 +8,7 @@
 #include <optional>
 #include <utility>
 
-#include "client/cli/json_value.h"
+#include "client/request/json_value.h"
 #include "common/combining/schemes.h"
 #include "common/renderers/registry.h"
 #include "common/view/sheet_grid.h"

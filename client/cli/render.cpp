@@ -10,7 +10,6 @@
 #include <utility>
 #include <variant>
 
-#include "client/cli/camera_json.h"
 #include "client/cli/commands.h"
 #include "client/cli/frame_loop.h"
 #include "client/cli/input_volume.h"
@@ -19,6 +18,7 @@
 #include "client/cli/session.h"
 #include "client/cli/stats_json.h"
 #include "client/cli/trace_json.h"
+#include "client/request/camera_json.h"
 #include "common/base/files.h"
 #include "common/planning/frame_plan.h"
 #include "common/planning/validate_request.h"

@@ -6,8 +6,8 @@
 
 #include "client/cli/cores.h"
 #include "client/cli/input_volume.h"
-#include "client/cli/service_state.h"
 #include "client/embedded/embedded_service.h"
+#include "client/service/service_state.h"
 
 namespace slabstream {
 namespace {

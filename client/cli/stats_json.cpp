@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "client/cli/frame_summary.h"
+#include "client/report/frame_summary.h"
 
 namespace slabstream {
 namespace {

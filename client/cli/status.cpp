@@ -1,91 +1,20 @@
-#include <fmt/format.h>
+#include "client/report/status_text.h"
 
 #include <iostream>
 #include <nlohmann/json.hpp>
-#include <string_view>
 
 #include "client/cli/commands.h"
-#include "client/cli/dataset_text.h"
 #include "client/cli/session.h"
-#include "common/volume/memory_budget.h"
 
 namespace slabstream {
-namespace {
-
-using Json = nlohmann::ordered_json;
-
-std::string StatusText(const StatusReply& reply) {
-  const auto limit = [](std::uint64_t bytes) { return bytes == 0 ? std::string("no memory limit") : "memory limit " + MemoryText(bytes); };
-  std::string text = fmt::format("coordinator  pid {}, up {:.1f} s, {} clients, {}\n", reply.pid, double(reply.uptime_ms) / 1e3,
-                                 reply.clients, limit(reply.memory_bytes));
-  text += fmt::format("frames       {} done, {} failed, {} running, {} queued\n", reply.frames_done, reply.frames_failed, reply.running,
-                      reply.queued);
-  const auto& [bad, unknown, large, quota] = reply.refused;
-  text += fmt::format("requests     {} refused ({} bad, {} of unknown datasets, {} too large, {} over quota)\n",
-                      bad + unknown + large + quota, bad, unknown, large, quota);
-  text += fmt::format("workers      {} ({} lost so far)\n", reply.workers.size(), reply.workers_lost);
-  for (const WorkerStatus& worker : reply.workers) {
-    const std::string place = worker.leaving ? "leaving" : fmt::format("slot {}", worker.slot);
-    text += fmt::format("  {:<4} pid {} on {}, {} threads, {}, {:.1f} MiB cached, {:.1f} MiB fetched, {} ranks rendered, {}\n",
-                        worker.worker, worker.pid, worker.host, worker.threads, place, double(worker.cached_bytes) / (1 << 20),
-                        double(worker.fetched_bytes) / (1 << 20), worker.rendered_ranks, limit(worker.memory_bytes));
-  }
-  text += fmt::format("datasets     {}\n", reply.datasets.size());
-  for (const DatasetStatus& dataset : reply.datasets) {
-    text += fmt::format("  {} {}", dataset.name, NameOf(dataset.state));
-    const Index3& size = dataset.description.geometry.size;
-    if (dataset.state == DatasetState::kReady) {
-      text += fmt::format(" {} x {} x {}, {}", size.x, size.y, size.z, MemoryText(dataset.memory_bytes));
-    }
-    if (dataset.state == DatasetState::kFailed) text += fmt::format(": {}", dataset.error);
-    text += '\n';
-  }
-  return text;
-}
-
-std::string StatusJson(const StatusReply& reply) {
-  Json workers = Json::array(), datasets = Json::array();
-  for (const WorkerStatus& worker : reply.workers) {
-    workers.push_back({{"worker", worker.worker},
-                       {"pid", worker.pid},
-                       {"host", worker.host},
-                       {"threads", worker.threads},
-                       {"slot", worker.slot},
-                       {"leaving", worker.leaving},
-                       {"cached_bytes", worker.cached_bytes},
-                       {"fetched_bytes", worker.fetched_bytes},
-                       {"rendered_ranks", worker.rendered_ranks},
-                       {"silent_ms", worker.silent_ms},
-                       {"memory_bytes", worker.memory_bytes}});
-  }
-  for (const DatasetStatus& dataset : reply.datasets) datasets.push_back(DatasetJson(dataset));
-  const Json json = {{"pid", reply.pid},
-                     {"uptime_ms", reply.uptime_ms},
-                     {"clients", reply.clients},
-                     {"queued", reply.queued},
-                     {"running", reply.running},
-                     {"frames_done", reply.frames_done},
-                     {"frames_failed", reply.frames_failed},
-                     {"requests_refused",
-                      {{"bad_request", reply.refused.bad_request},
-                       {"unknown_dataset", reply.refused.unknown_dataset},
-                       {"too_large", reply.refused.too_large},
-                       {"over_quota", reply.refused.over_quota}}},
-                     {"workers_lost", reply.workers_lost},
-                     {"memory_bytes", reply.memory_bytes},
-                     {"workers", std::move(workers)},
-                     {"datasets", std::move(datasets)}};
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
-}
-
-}  // namespace
 
 Status RunStatus(const StatusOptions& options) {
   Result<Session> session = Session::OpenService(options.service);
   if (!session.ok()) return session.status();
   const Result<StatusReply> reply = session->client().QueryStatus();
   if (!reply.ok()) return reply.status();
-  std::cout << (options.json ? StatusJson(*reply) : StatusText(*reply));
+  std::cout << (options.json ? StatusJson(*reply).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n"
+                             : StatusText(*reply));
   return Status::Ok();
 }
 

@@ -19,10 +19,10 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/cores.h"
-#include "client/cli/process.h"
 #include "client/cli/restart_pause.h"
-#include "client/cli/service_state.h"
 #include "client/cli/session.h"
+#include "client/service/process.h"
+#include "client/service/service_state.h"
 #include "common/base/log.h"
 #include "common/base/printable.h"
 #include "common/base/stop_signals.h"

@@ -7,9 +7,12 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <cstddef>
+#include <cstring>
 #include <filesystem>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -82,10 +85,11 @@ void StatePixelSize(const PictureGeometry& geometry, bool png, OIIO::ImageSpec& 
   spec.attribute("YResolution", float(density));
 }
 
-// Passes the encoder's bytes to the file. OutputFile reports failures, because encoders do so unreliably.
-class FileSink : public OIIO::Filesystem::IOProxy {
+// Takes an encoder's bytes, which may come in any order.
+class Sink : public OIIO::Filesystem::IOProxy {
  public:
-  explicit FileSink(OutputFile& file) : IOProxy("", Write), file_(file) {}
+  Sink() : IOProxy("", Write) {}
+  virtual bool ok() const = 0;
 
   const char* proxytype() const override { return "slabstream"; }
   std::size_t write(const void* bytes, std::size_t size) override {
@@ -93,6 +97,13 @@ class FileSink : public OIIO::Filesystem::IOProxy {
     m_pos += std::int64_t(written);
     return written;
   }
+};
+
+// Into a file. OutputFile reports failures, because encoders do so unreliably.
+class FileSink : public Sink {
+ public:
+  explicit FileSink(OutputFile& file) : file_(file) {}
+  bool ok() const override { return file_.ok(); }
   std::size_t pwrite(const void* bytes, std::size_t size, std::int64_t offset) override {
     file_.WriteAt(offset, {static_cast<const std::byte*>(bytes), size});
     return file_.ok() ? size : 0;
@@ -102,24 +113,26 @@ class FileSink : public OIIO::Filesystem::IOProxy {
   OutputFile& file_;
 };
 
-}  // namespace
+class MemorySink : public Sink {
+ public:
+  bool ok() const override { return true; }
+  std::size_t pwrite(const void* bytes, std::size_t size, std::int64_t offset) override {
+    const std::size_t end = std::size_t(offset) + size;
+    if (bytes_.size() < end) bytes_.resize(end);
+    std::memcpy(&bytes_[std::size_t(offset)], bytes, size);
+    return size;
+  }
+  std::vector<std::byte> Take() { return std::move(bytes_); }
 
-Status CheckPicturePath(const std::string& path) {
-  if (TypeOf(path) != FileType::kOther) return Status::Ok();
-  return Status::InvalidArgument(fmt::format("output '{}' must end in .png or .exr", path));
-}
+ private:
+  std::vector<std::byte> bytes_;
+};
 
-Status WritePicture(const LocalImage& image, ImageSize size, const std::string& path, const PictureFormat& format,
-                    const PictureNotes& notes) {
-  if (Status status = CheckPicturePath(path); !status.ok()) return status;
+OIIO::ImageSpec SpecOf(const ComposedPicture& picture, const PictureFormat& format, const PictureNotes& notes, bool png) {
   CHECK(format.png_bits == 8 || format.png_bits == 16);
-  const Result<ComposedPicture> picture = ComposedPicture::Make(image, size, format, notes.geometry);
-  if (!picture.ok()) return picture.status();
-
-  const bool png = TypeOf(path) == FileType::kPng;
   const OIIO::TypeDesc sample = !png ? OIIO::TypeDesc::FLOAT : format.png_bits == 16 ? OIIO::TypeDesc::UINT16 : OIIO::TypeDesc::UINT8;
-  const bool with_depth = !png && picture->has_depth();
-  OIIO::ImageSpec spec(size.width, size.height, with_depth ? 5 : 4, sample);
+  const bool with_depth = !png && picture.has_depth();
+  OIIO::ImageSpec spec(picture.size().width, picture.size().height, with_depth ? 5 : 4, sample);
   spec.channelnames = {"R", "G", "B", "A"};
   if (with_depth) spec.channelnames.push_back("Z");
   spec.alpha_channel = 3;
@@ -138,25 +151,59 @@ Status WritePicture(const LocalImage& image, ImageSize size, const std::string& 
     spec.attribute("Software", fmt::format("slabstream {}", Version()));
     spec.attribute(kRecordName, notes.record);
   }
+  return spec;
+}
 
-  Result<OutputFile> file = OutputFile::Create(path);
-  if (!file.ok()) return file.status();
-  FileSink sink(*file);
+// nullopt: done; else the encoder's reason.
+std::optional<std::string> Encode(const ComposedPicture& picture, const PictureFormat& format, const PictureNotes& notes, bool png,
+                                  Sink& sink) {
+  OIIO::ImageSpec spec = SpecOf(picture, format, notes, png);
   OIIO::Filesystem::IOProxy* proxy = &sink;
   spec.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
   const std::unique_ptr<OIIO::ImageOutput> out = OIIO::ImageOutput::create(png ? "png" : "openexr");
-  const auto failure = [&](const std::string& reason) {
-    if (Status status = file->Close(); !status.ok()) return status;  // reports a full disk rather than the encoder's message about it
-    const std::string line = reason.substr(0, reason.find('\n'));
-    return Status::Unavailable(fmt::format("cannot write '{}': {}", path, line.empty() ? "unknown reason" : line));
-  };
-  if (!out) return failure(OIIO::geterror());
-  if (!out->open(png ? "picture.png" : "picture.exr", spec)) return failure(out->geterror());
-  const auto write = [&](int y, const void* row) { return file->ok() && out->write_scanline(y, 0, sample, row); };
-  const bool written = png ? WritePngRows(*picture, format.png_bits, write) : WriteExrRows(*picture, write);
+  if (!out) return OIIO::geterror();
+  if (!out->open(png ? "picture.png" : "picture.exr", spec)) return out->geterror();
+  const auto write = [&](int y, const void* row) { return sink.ok() && out->write_scanline(y, 0, spec.format, row); };
+  const bool written = png ? WritePngRows(picture, format.png_bits, write) : WriteExrRows(picture, write);
   const bool closed = out->close();
-  if (!written || !closed) return failure(out->geterror());
-  return file->Finish();
+  if (!written || !closed) return out->geterror();
+  return std::nullopt;
+}
+
+std::string FirstLine(const std::string& reason) {
+  const std::string line = reason.substr(0, reason.find('\n'));
+  return line.empty() ? "unknown reason" : line;
+}
+
+}  // namespace
+
+Status CheckPicturePath(const std::string& path) {
+  if (TypeOf(path) != FileType::kOther) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("output '{}' must end in .png or .exr", path));
+}
+
+Status WritePicture(const LocalImage& image, ImageSize size, const std::string& path, const PictureFormat& format,
+                    const PictureNotes& notes) {
+  if (Status status = CheckPicturePath(path); !status.ok()) return status;
+  const Result<ComposedPicture> picture = ComposedPicture::Make(image, size, format, notes.geometry);
+  if (!picture.ok()) return picture.status();
+  Result<OutputFile> file = OutputFile::Create(path);
+  if (!file.ok()) return file.status();
+  FileSink sink(*file);
+  const std::optional<std::string> failure = Encode(*picture, format, notes, TypeOf(path) == FileType::kPng, sink);
+  if (!failure) return file->Finish();
+  if (Status status = file->Close(); !status.ok()) return status;  // reports a full disk rather than the encoder's message about it
+  return Status::Unavailable(fmt::format("cannot write '{}': {}", path, FirstLine(*failure)));
+}
+
+Result<std::vector<std::byte>> PngFile(const LocalImage& image, ImageSize size, const PictureFormat& format, const PictureNotes& notes) {
+  const Result<ComposedPicture> picture = ComposedPicture::Make(image, size, format, notes.geometry);
+  if (!picture.ok()) return picture.status();
+  MemorySink sink;
+  if (const auto failure = Encode(*picture, format, notes, true, sink)) {
+    return Status::Internal(fmt::format("cannot encode a PNG: {}", FirstLine(*failure)));
+  }
+  return sink.Take();
 }
 
 }  // namespace slabstream

@@ -7,7 +7,9 @@
 // The file appears whole or not at all (common/base/files.h).
 #pragma once
 
+#include <cstddef>
 #include <string>
+#include <vector>
 
 #include "client/image_io/composed_picture.h"
 #include "common/base/status.h"
@@ -31,5 +33,9 @@ Status CheckPicturePath(const std::string& path);
 // NotFound: the font of annotations.
 Status WritePicture(const LocalImage& image, ImageSize size, const std::string& path, const PictureFormat& format,
                     const PictureNotes& notes = {});
+
+// The bytes of the .png file that WritePicture would write. NotFound: the font of annotations.
+Result<std::vector<std::byte>> PngFile(const LocalImage& image, ImageSize size, const PictureFormat& format,
+                                       const PictureNotes& notes = {});
 
 }  // namespace slabstream

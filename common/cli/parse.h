@@ -5,11 +5,15 @@
 #include <cstddef>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "common/base/status.h"
 #include "common/base/time.h"
 
 namespace slabstream {
+
+// The parts between separators, at least one; each may be empty.
+std::vector<std::string_view> Split(std::string_view text, char separator);
 
 // A closed range, or open below.
 struct NumberRange {

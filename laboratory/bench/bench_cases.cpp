@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "client/cli/input_volume.h"
-#include "client/cli/volume_argument.h"
+#include "client/request/volume_argument.h"
 
 namespace slabstream {
 namespace {

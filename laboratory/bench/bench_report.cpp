@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/cli/cores.h"
-#include "client/cli/frame_summary.h"
+#include "client/report/frame_summary.h"
 #include "common/base/check.h"
 #include "common/base/version.h"
 #include "laboratory/measure/statistics.h"

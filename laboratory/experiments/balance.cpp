@@ -5,7 +5,7 @@
 #include <numeric>
 #include <string_view>
 
-#include "client/cli/volume_argument.h"
+#include "client/request/volume_argument.h"
 #include "common/cli/add_option.h"
 #include "common/planning/assignment.h"
 #include "common/planning/balance.h"

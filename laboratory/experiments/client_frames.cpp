@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "client/cli/frame_summary.h"
+#include "client/report/frame_summary.h"
 #include "common/planning/policy_names.h"
 #include "laboratory/experiments/failure.h"
 #include "laboratory/measure/statistics.h"

@@ -5,7 +5,7 @@
 #include <span>
 #include <variant>
 
-#include "client/cli/camera_json.h"
+#include "client/request/camera_json.h"
 #include "common/wire/digest.h"
 
 namespace slabstream {

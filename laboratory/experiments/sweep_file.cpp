@@ -12,10 +12,10 @@
 #include <set>
 #include <utility>
 
-#include "client/cli/camera_json.h"
-#include "client/cli/json_value.h"
-#include "client/cli/values.h"
-#include "client/cli/volume_argument.h"
+#include "client/request/camera_json.h"
+#include "client/request/json_value.h"
+#include "client/request/values.h"
+#include "client/request/volume_argument.h"
 #include "common/base/files.h"
 #include "common/base/printable.h"
 #include "common/cli/parse.h"

@@ -1,4 +1,4 @@
-#include "client/cli/camera_json.h"
+#include "client/request/camera_json.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

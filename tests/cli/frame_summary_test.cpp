@@ -1,4 +1,4 @@
-#include "client/cli/frame_summary.h"
+#include "client/report/frame_summary.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,6 @@
 // The job script of `slabstream slurm`: what bash, shellcheck and Slurm make of it.
 #include "client/cli/job_script.h"
+#include "client/request/shell_word.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

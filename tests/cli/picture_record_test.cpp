@@ -1,5 +1,5 @@
 // The command line that `info` prints of a picture asks for the same picture.
-#include "client/cli/picture_record.h"
+#include "client/request/picture_record.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "client/cli/service_state.h"
+#include "client/service/service_state.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,5 @@
-#include "client/cli/values.h"
+#include "client/request/values.h"
+#include "client/cli/turntable_values.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

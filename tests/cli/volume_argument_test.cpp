@@ -1,4 +1,4 @@
-#include "client/cli/volume_argument.h"
+#include "client/request/volume_argument.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

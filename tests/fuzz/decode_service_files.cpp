@@ -6,7 +6,7 @@
 #include <array>
 #include <cstdlib>
 
-#include "client/cli/service_state.h"
+#include "client/service/service_state.h"
 #include "common/base/files.h"
 #include "common/service/key_folder.h"
 #include "tests/fuzz/decoders.h"

@@ -1,8 +1,9 @@
 // Values of the command line: every parser takes every text.
 #include <fmt/format.h>
 
-#include "client/cli/values.h"
-#include "client/cli/volume_argument.h"
+#include "client/cli/turntable_values.h"
+#include "client/request/values.h"
+#include "client/request/volume_argument.h"
 #include "common/cli/parse.h"
 #include "common/simulation/link_model.h"
 #include "common/transport/endpoint.h"

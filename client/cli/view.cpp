@@ -1,0 +1,155 @@
+// `view`: a volume in the browser. Starts what is missing, a service for a file and the gateway, and ends what it started.
+#include <fmt/format.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "client/cli/commands.h"
+#include "client/cli/input_volume.h"
+#include "client/cli/session.h"
+#include "client/service/process.h"
+#include "client/service/service_state.h"
+#include "common/base/stop_signals.h"
+#include "common/volume_io/volume_reader.h"
+
+namespace slabstream {
+namespace {
+
+using std::chrono::seconds;
+
+constexpr const char* kGatewayProgram = "slabstream-gateway";
+constexpr Duration kStartTimeout = seconds(60);
+constexpr Duration kPatience = seconds(15);  // for a service to end its processes
+
+// A name of a catalogue for a file: letters, digits, '-', '_' and '.', without its ending.
+std::string DatasetName(const std::filesystem::path& path) {
+  std::string name = path.filename().string();
+  if (name.empty()) name = path.parent_path().filename().string();
+  name = FileNameOf(name.substr(0, name.find('.', 1)));
+  return name.empty() || name == "_" ? "volume" : name;
+}
+
+bool NamesFile(const std::string& source) {
+  std::error_code error;
+  const Result<VolumeSource> parsed = ParseVolumeSource(source);
+  return parsed.ok() && std::filesystem::exists(parsed->path, error);
+}
+
+// NAME=PATH as --data takes it, with an absolute path.
+std::string DataArgument(const std::string& source) {
+  const std::size_t options = source.find('?');
+  const std::filesystem::path path = std::filesystem::absolute(source.substr(0, options));
+  return fmt::format("{}={}{}", DatasetName(path), path.string(), options == std::string::npos ? "" : source.substr(options));
+}
+
+// A child that ends with this process or with this object.
+class Helper {
+ public:
+  static Result<Helper> Start(std::vector<std::string> command) {
+    Result<Child> child = Child::Start({.command = std::move(command), .log_path = "/dev/stderr"});
+    if (!child.ok()) return child.status();
+    return Helper(*std::move(child));
+  }
+  Helper(Helper&&) = default;
+  Helper& operator=(Helper&&) = delete;
+  ~Helper() {
+    if (child_ != nullptr) child_->Terminate(kPatience);
+  }
+  Child& child() { return *child_; }
+
+ private:
+  explicit Helper(Child child) : child_(std::make_unique<Child>(std::move(child))) {}
+  std::unique_ptr<Child> child_;
+};
+
+// This program, to be started again.
+Result<std::string> OwnPath() {
+  std::error_code error;
+  const std::filesystem::path path = std::filesystem::read_symlink("/proc/self/exe", error);
+  if (error) return Status::Unavailable("cannot find this program: " + error.message());
+  return path.string();
+}
+
+// The endpoint in "slabstream is up at ENDPOINT (...)".
+Result<std::string> EndpointOf(Helper& up) {
+  const Result<std::string> line = up.child().ReadLine(kStartTimeout);
+  if (!line.ok()) return Status(line.status().code(), "the service did not start; its reason stands above");
+  constexpr std::string_view kBefore = " up at ";
+  const std::size_t begin = line->find(kBefore);
+  if (begin == std::string::npos) return Status::Internal(fmt::format("`slabstream up` said '{}' instead of its endpoint", *line));
+  const std::size_t from = begin + kBefore.size();
+  return line->substr(from, line->find(' ', from) - from);
+}
+
+void OpenBrowser(const std::string& url) {
+  const char *x11 = std::getenv("DISPLAY"), *wayland = std::getenv("WAYLAND_DISPLAY");
+  const std::string opener = ProgramInPath("xdg-open");
+  if ((x11 == nullptr && wayland == nullptr) || opener.empty()) return;
+  (void)Child::Start({.command = {opener, url}, .log_path = "/dev/null", .outlives_us = true});
+}
+
+// Until Ctrl-C (Ok), or one of the children ends.
+Status Watch(Helper& gateway, std::optional<Helper>& service) {
+  const sigset_t signals = StopSignals();
+  while (true) {
+    const timespec pause{0, 200'000'000};
+    if (::sigtimedwait(&signals, nullptr, &pause) > 0) return Status::Ok();
+    if (const auto end = gateway.child().Ended()) return Status::Unavailable("the gateway " + end->description);
+    if (!service) continue;
+    if (const auto end = service->child().Ended()) return Status::Unavailable("the service " + end->description);
+  }
+}
+
+// The dataset that the service has for the file. With keys it takes an admin's.
+Status AddToService(const ServiceChoice& choice, const std::string& source) {
+  Result<Session> session = Session::OpenService(choice);
+  if (!session.ok()) return session.status();
+  return session->client().OrderData({.action = DataAction::kAdd, .items = {DataArgument(source)}}).status();
+}
+
+}  // namespace
+
+Status RunView(const ViewOptions& options) {
+  const bool file = NamesFile(options.source);
+  if (!file && LooksLikeVolume(options.source.substr(0, options.source.find('?')))) return CheckInputVolume(options.source);
+  const Result<ServiceChoice> named = NamedService(options.service);
+  if (!named.ok()) return named.status();
+  const Result<std::string> self = OwnPath(), program = ProgramBeside(kGatewayProgram);
+  if (!self.ok()) return self.status();
+  if (!program.ok()) return program.status();
+  BlockStopSignals();
+  std::optional<Helper> service;
+  ServiceChoice choice = *named;
+  if (file && choice.text().empty()) {
+    if (Status status = CheckInputVolume(options.source); !status.ok()) return status;
+    Result<Helper> up = Helper::Start({*self, "up", "--listen", "tcp://127.0.0.1:*", "--data", DataArgument(options.source)});
+    if (!up.ok()) return up.status();
+    service.emplace(*std::move(up));
+    Result<std::string> endpoint = EndpointOf(*service);
+    if (!endpoint.ok()) return endpoint.status();
+    choice.endpoint = *std::move(endpoint);
+  } else if (file) {
+    if (Status status = AddToService(choice, options.source); !status.ok()) return status;
+  }
+  std::vector<std::string> command = {*program, "--listen", options.listen};
+  if (!choice.endpoint.empty()) command.insert(command.end(), {"--endpoint", choice.endpoint});
+  if (!choice.file.empty()) command.insert(command.end(), {"--service", choice.file});
+  Result<Helper> gateway = Helper::Start(std::move(command));
+  if (!gateway.ok()) return gateway.status();
+  const Result<std::string> line = gateway->child().ReadLine(kStartTimeout);
+  if (!line.ok()) return Status(line.status().code(), "the gateway did not start; its reason stands above");
+  const std::string dataset =
+      file ? DatasetName(std::filesystem::absolute(options.source.substr(0, options.source.find('?')))) : options.source;
+  const std::string url = fmt::format("{}&dataset={}", line->substr(line->find(' ') + 1), dataset);
+  std::cout << fmt::format("{} is at {}\nCtrl-C ends it.\n", dataset, url) << std::flush;
+  if (options.browser) OpenBrowser(url);
+  return Watch(*gateway, service);
+}
+
+}  // namespace slabstream

@@ -1,0 +1,85 @@
+#include "client/report/dataset_text.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <nlohmann/json.hpp>
+
+#include "common/base/printable.h"
+#include "common/volume/memory_budget.h"
+
+namespace slabstream {
+namespace {
+
+std::string LayersText(const DatasetStatus& dataset) {
+  std::string text = dataset.labels > 0 ? fmt::format("{} label{}", dataset.labels, dataset.labels == 1 ? "" : "s") : "";
+  if (dataset.overlay) text += text.empty() ? "overlay" : ", overlay";
+  return text.empty() ? "-" : text;
+}
+
+}  // namespace
+
+std::string_view NameOf(DatasetState state) {
+  switch (state) {
+    case DatasetState::kUnloaded: return "unloaded";
+    case DatasetState::kLoading: return "loading";
+    case DatasetState::kReady: return "ready";
+    case DatasetState::kFailed: break;
+  }
+  return "failed";
+}
+
+std::string AgeText(std::uint64_t milliseconds) {
+  const double seconds = double(milliseconds) / 1000, hours = seconds / 3600;
+  if (seconds < 120) return fmt::format("{:.0f} s", seconds);
+  if (hours < 2) return fmt::format("{:.0f} min", seconds / 60);
+  return hours < 48 ? fmt::format("{:.1f} h", hours) : fmt::format("{:.1f} d", hours / 24);
+}
+
+nlohmann::ordered_json DatasetJson(const DatasetStatus& dataset) {
+  nlohmann::ordered_json entry = {{"name", dataset.name}, {"state", NameOf(dataset.state)}};
+  if (dataset.state == DatasetState::kReady) {
+    const VolumeGeometry& geometry = dataset.description.geometry;
+    entry["size"] = {geometry.size.x, geometry.size.y, geometry.size.z};
+    entry["type"] = NameOf(dataset.description.type);
+    entry["spacing"] = {geometry.spacing.x, geometry.spacing.y, geometry.spacing.z};
+    entry["memory_bytes"] = dataset.memory_bytes;
+    entry["layers"] = {{"labels", dataset.labels}, {"overlay", dataset.overlay}};
+    entry["range"] = {{"min", dataset.range.min}, {"max", dataset.range.max}};
+  }
+  if (dataset.state == DatasetState::kFailed) entry["error"] = dataset.error;
+  entry["since_ms"] = dataset.since_ms;
+  return entry;
+}
+
+std::string DatasetTableText(const std::vector<DatasetStatus>& datasets) {
+  constexpr std::size_t kColumns = 8;
+  using Row = std::array<std::string, kColumns>;
+  std::vector<Row> rows = {{"NAME", "STATE", "FOR", "SIZE", "TYPE", "SPACING", "MEMORY", "LAYERS"}};
+  for (const DatasetStatus& dataset : datasets) {
+    Row row = {Printable(dataset.name), std::string(NameOf(dataset.state)), AgeText(dataset.since_ms), "-", "-", "-", "-", "-"};
+    if (dataset.state == DatasetState::kReady) {
+      const auto& [size, spacing, unused] = dataset.description.geometry;
+      row[3] = fmt::format("{} x {} x {}", size.x, size.y, size.z);
+      row[4] = NameOf(dataset.description.type);
+      row[5] = fmt::format("{:.4g} x {:.4g} x {:.4g}", spacing.x, spacing.y, spacing.z);
+      row[6] = MemoryText(dataset.memory_bytes);
+      row[7] = LayersText(dataset);
+    }
+    rows.push_back(std::move(row));
+  }
+  std::array<std::size_t, kColumns> widths{};
+  for (const Row& row : rows) {
+    for (std::size_t i = 0; i < kColumns; ++i) widths[i] = std::max(widths[i], row[i].size());
+  }
+  std::string text;
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    for (std::size_t i = 0; i + 1 < kColumns; ++i) text += fmt::format("{:<{}}  ", rows[r][i], widths[i]);
+    text += rows[r].back() + '\n';
+    if (r > 0 && datasets[r - 1].state == DatasetState::kFailed) text += "    " + Printable(datasets[r - 1].error) + '\n';
+  }
+  return text;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,124 @@
+#include "client/request/json_value.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "common/base/printable.h"
+
+namespace slabstream {
+namespace {
+
+// Brackets and braces outside of texts. Of what is no JSON it may be any number.
+int DepthOf(std::string_view text) {
+  int depth = 0, deepest = 0;
+  bool in_text = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (in_text && c == '\\') {
+      ++i;
+    } else if (c == '"') {
+      in_text = !in_text;
+    } else if (!in_text && (c == '[' || c == '{')) {
+      deepest = std::max(deepest, ++depth);
+    } else if (!in_text && (c == ']' || c == '}')) {
+      --depth;
+    }
+  }
+  return deepest;
+}
+
+}  // namespace
+
+double Decimal(float number) { return std::strtod(fmt::format("{}", number).c_str(), nullptr); }
+
+// Copying a value and writing it out call themselves for each level, so the levels are limited before anything is made of the text.
+Result<Json> ParseJson(std::string_view text) {
+  if (const int depth = DepthOf(text); depth > kMaxJsonDepth)
+    return Status::InvalidArgument(fmt::format("values nest {} deep, at most {} are allowed", depth, kMaxJsonDepth));
+  try {
+    return Json::parse(text);
+  } catch (const Json::exception& error) {
+    const std::string what = error.what();
+    return Printable(Status::InvalidArgument("not JSON: " + what.substr(what.find("] ") + 2)));
+  }
+}
+
+void JsonValue::Complain(const std::string& what) const {
+  if (!*mistake_) *mistake_ = Printable(place_.empty() ? what : fmt::format("{}: {}", place_, what));
+}
+
+std::string JsonValue::Shown() const {
+  constexpr std::size_t kMost = 60;
+  const std::string text = json_->dump(-1, ' ', false, Json::error_handler_t::replace);
+  return text.size() <= kMost ? text : text.substr(0, kMost) + "...";
+}
+
+void JsonValue::Fields(const std::vector<std::pair<std::string, Read>>& fields) const {
+  if (!json_->is_object()) return Complain(fmt::format("{} must be an object", Shown()));
+  for (const auto& [name, value] : json_->items()) {
+    const auto found = std::ranges::find(fields, name, &std::pair<std::string, Read>::first);
+    if (found != fields.end()) {
+      found->second(JsonValue(value, place_.empty() ? name : place_ + "." + name, *mistake_));
+      continue;
+    }
+    std::string known;
+    for (const auto& field : fields) known += (known.empty() ? "" : ", ") + field.first;
+    Complain(fmt::format("'{}' is no field; there are {}", name, known));
+  }
+}
+
+void JsonValue::Each(const Read& read, std::size_t least) const {
+  if (!json_->is_array() || json_->size() < least) {
+    return Complain(fmt::format("{} must be a list{}", Shown(),
+                                least == 0   ? ""
+                                : least == 1 ? " of at least one"
+                                             : fmt::format(" of {}", least)));
+  }
+  for (std::size_t i = 0; i < json_->size(); ++i) read(JsonValue((*json_)[i], fmt::format("{}[{}]", place_, i), *mistake_));
+}
+
+JsonValue JsonValue::At(const char* field) const {
+  static const Json kMissing;
+  JsonValue found(Has(field) ? (*json_)[field] : kMissing, place_ + "." + field, *mistake_);
+  if (!json_->is_object()) Complain(fmt::format("{} must be an object", Shown()));
+  if (!Has(field)) found.Complain("is missing");
+  return found;
+}
+
+std::string JsonValue::Text() const {
+  if (json_->is_string()) return json_->get<std::string>();
+  Complain(fmt::format("{} must be a text", Shown()));
+  return "";
+}
+
+double JsonValue::Number(const NumberRange& range) const {
+  const double value = json_->is_number() ? json_->get<double>() : std::nan("");
+  const bool inside = std::isfinite(value) && value <= range.max && (range.min_open ? value > range.min : value >= range.min);
+  if (!inside) Complain(fmt::format("{} must be a number in {}{}, {}]", Shown(), range.min_open ? "(" : "[", range.min, range.max));
+  return inside ? value : range.max;
+}
+
+int JsonValue::Integer(int min, int max) const {
+  const bool inside = json_->is_number_integer() && json_->get<double>() >= min && json_->get<double>() <= max;
+  if (!inside) Complain(fmt::format("{} must be a whole number in [{}, {}]", Shown(), min, max));
+  return inside ? json_->get<int>() : min;
+}
+
+bool JsonValue::Boolean() const {
+  if (json_->is_boolean()) return json_->get<bool>();
+  Complain(Shown() + " must be true or false");
+  return false;
+}
+
+std::size_t JsonValue::OneOf(std::span<const std::string_view> names) const {
+  const std::string text = Text();
+  const auto found = std::ranges::find(names, text);
+  if (found != names.end()) return std::size_t(found - names.begin());
+  Complain(fmt::format("{} must be one of {}", Shown(), fmt::join(names, ", ")));
+  return 0;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,51 @@
+// Pictures as named texts, such as the parameters of an address have: {"azimuth", "30"} says what --azimuth 30 says on the command line.
+// The options, their checks and their errors are those of the command line (picture_options.h), but for those that name files of this
+// host; and the field "dataset" names the dataset. Any thread.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "client/image_io/composed_picture.h"
+#include "client/request/json_value.h"
+#include "client/request/slice_request.h"
+#include "common/base/status.h"
+#include "common/frame/frame_request.h"
+
+namespace slabstream {
+
+struct PictureField {
+  std::string name;  // of an option, without dashes
+  std::string text;  // a flag: "true", "false", or empty for "true"
+};
+using PictureFields = std::vector<PictureField>;
+
+inline constexpr std::size_t kMaxPictureFields = 256;
+
+// Of a JSON object: texts, numbers, booleans; lists of them for fields that are repeated; objects for colour maps. Null: left out.
+// InvalidArgument: another kind of value.
+Result<PictureFields> FieldsOfJson(const Json& object);
+
+struct RenderRequest {
+  FrameRequest frame;
+  PictureFormat format;
+};
+
+// InvalidArgument: one line that names the field, the value and the limit.
+Result<RenderRequest> ParseRenderFields(const PictureFields& fields);
+Result<SliceRequest> ParseSliceFields(const PictureFields& fields);
+
+// What there is, for descriptions of an interface.
+struct FieldDescription {
+  std::string name;
+  std::string group;     // heading of the help text
+  std::string purpose;   // its first line; the others explain the choices
+  std::string value;     // such as "NUMBER"; empty: a flag
+  std::string standard;  // default; empty: none
+  bool repeated = false;
+};
+std::vector<FieldDescription> RenderFields();
+std::vector<FieldDescription> SliceFields();
+
+}  // namespace slabstream

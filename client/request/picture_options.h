@@ -1,0 +1,33 @@
+// Options that say what a picture shows: those of `render` and `slice`, on the command line and in requests of the gateway.
+//
+// `files`: where options put the names of files that they take. Null: no option names a file, because the texts come from another host.
+// Then --camera, --labels and --overlay are missing, and colour maps are taken as their JSON.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "client/image_io/composed_picture.h"
+#include "client/request/slice_request.h"
+#include "common/frame/frame_request.h"
+#include "common/layers/layer_reader.h"
+
+namespace slabstream {
+
+// Options under this heading are not shown in help texts: old spellings that still work, and options that cannot be used yet.
+inline constexpr char kHidden[] = "";
+
+// View, clipping, look, layers, annotations and policy.
+void AddRenderPictureOptions(CLI::App& app, FrameRequest& request, PictureFormat& format, LayerFiles* files);
+
+// Plane, look and layers.
+void AddSlicePictureOptions(CLI::App& app, SliceRequest& slice, LayerFiles* files);
+
+// --scalar-range.
+void AddScalarRange(CLI::App& app, TransferChoice& transfer);
+// --transfer, --scalar-range and --opacity-distance.
+void AddTransferOptions(CLI::App& app, TransferChoice& transfer, bool files = true);
+
+// After the parse: isosurfaces without --transfer are all that is shown.
+void LetSurfacesStandAlone(const CLI::App& app, TransferChoice& transfer);
+
+}  // namespace slabstream

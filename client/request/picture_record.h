@@ -1,0 +1,51 @@
+// The record of a picture: how it was made, as the text that its file holds (PictureNotes). It is JSON:
+//
+//   {"program": "slabstream 0.2.0", "source": "brain.nii.gz",             SOURCE as it was typed
+//    "layers": {"labels", "overlay"},                                     likewise, if there are any
+//    "request": {...},                                                    RequestToJson (common/wire/request_json.h)
+//    "picture": {"depth", "background", "title", "scale_bar", "orientation_marker"},
+//    "geometry": {"world", "unit", "projection", "right", "up", "forward", "target", "target_depth", "pixel_size"}}
+//
+// It names no host, no time and no place of the service, so the same picture has the same record wherever and whenever it is made.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "client/image_io/image_writer.h"
+#include "client/request/json_value.h"
+#include "common/base/status.h"
+#include "common/frame/frame_request.h"
+#include "common/layers/layer_reader.h"
+
+namespace slabstream {
+
+struct PictureRecord {
+  std::string program;
+  std::string source;
+  LayerFiles layers;
+  FrameRequest request;  // its dataset does not count
+  PictureFormat format;
+  Json json;  // of the whole record
+};
+
+// The record's "geometry".
+Json GeometryJson(const PictureGeometry& geometry);
+
+// ASCII, one line.
+std::string RecordText(const std::string& source, const FrameRequest& request, const PictureFormat& format, const PictureGeometry& geometry,
+                       const LayerFiles& layers = {});
+// InvalidArgument, one line: what is wrong with the text.
+Result<PictureRecord> ParseRecord(std::string_view text);
+
+// The files that a command line names for transfer functions of the record, whose own files may be gone.
+inline constexpr char kColorMapFile[] = "color-map.json", kOverlayMapFile[] = "overlay-map.json";
+
+// The command line that makes the picture again as `output`: "render", SOURCE, and each option whose value is not its default. --local if
+// SOURCE is the name of a file.
+std::vector<std::string> RenderArguments(const PictureRecord& record, const std::string& output);
+// The same as a line for a shell: "slabstream render ...".
+std::string CommandText(const PictureRecord& record, const std::string& output);
+
+}  // namespace slabstream

@@ -1,0 +1,67 @@
+#include "client/request/slice_request.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/planning/validate_request.h"
+#include "common/view/named_view.h"
+
+namespace slabstream {
+namespace {
+
+FrameRequest FrameOf(const SliceRequest& slice, const SlicePlane& plane) {
+  FrameRequest frame = slice.frame;
+  const NamedView& view = *std::ranges::find(kNamedViews, plane.view, &NamedView::name);
+  frame.view.azimuth_degrees = view.azimuth_degrees;
+  frame.view.elevation_degrees = view.elevation_degrees;
+  frame.view.of_patient = plane.of_patient;
+  frame.view.fit = true;
+  frame.clipping.slab = ClipSlab{.normal = plane.normal, .through = slice.at, .index = slice.index, .thickness = slice.thickness};
+  return frame;
+}
+
+// Values from level - window / 2 to level + window / 2 are black to white; all are opaque.
+TransferFunction Window(double window, double level) {
+  return {.colors = {{level - window / 2, {0, 0, 0}}, {level + window / 2, {1, 1, 1}}}, .opacities = {{level, 1}}};
+}
+
+}  // namespace
+
+Result<std::vector<FrameRequest>> FramesOf(const SliceRequest& slice) {
+  if (Status status = Validate(slice.size()); !status.ok()) return status;
+  const bool layers = slice.frame.labels || slice.frame.overlay;
+  if (layers && slice.thickness > 0) {
+    return Status::InvalidArgument(fmt::format("--thickness {} is no plane, and layers are shown in planes only", slice.thickness));
+  }
+  if (slice.index && slice.planes.size() > 1) {
+    return Status::InvalidArgument(
+        fmt::format("--index {} is the number of a slice of one --plane, but there are {}", *slice.index, slice.planes.size()));
+  }
+  std::vector<FrameRequest> frames;
+  for (const SlicePlane& plane : slice.planes) {
+    FrameRequest& frame = frames.emplace_back(FrameOf(slice, plane));
+    if (layers) {
+      frame.renderer = "raycast";
+      frame.shading.model = ShadingModel::kNone;
+    }
+    if (slice.window) frame.transfer.choice = Window(*slice.window, slice.level.value_or(*slice.window / 2));
+    if (Status status = Validate(frame); !status.ok()) return status;
+  }
+  return frames;
+}
+
+LocalImage SideBySide(std::span<const LocalImage> images, ImageSize size) {
+  LocalImage all = MakeLocalImage(PixelFormat::kRgba, {0, 0, size.width * std::int32_t(images.size()), size.height});
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const LocalImage& image = images[i];
+    const auto width = std::size_t(image.bounds.width());
+    for (std::int32_t y = image.bounds.y_begin; y < image.bounds.y_end; ++y) {
+      const auto to = std::size_t(y) * std::size_t(all.bounds.width()) + i * std::size_t(size.width) + std::size_t(image.bounds.x_begin);
+      std::copy_n(&image.rgba[4 * std::size_t(y - image.bounds.y_begin) * width], 4 * width, &all.rgba[4 * to]);
+    }
+  }
+  return all;
+}
+
+}  // namespace slabstream

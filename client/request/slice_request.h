@@ -1,0 +1,42 @@
+// SliceRequest: planes through a volume, or slabs of it, side by side in one picture, as `slice` makes it. A plane is a maximum intensity
+// projection of what clipping leaves, so that it needs no more voxels than those. With layers it is a ray casting of a plane, whose rays
+// have one opaque sample each.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "client/image_io/composed_picture.h"
+#include "client/request/slice_planes.h"
+#include "common/base/status.h"
+#include "common/frame/frame_request.h"
+#include "common/image/local_image.h"
+
+namespace slabstream {
+
+struct SliceRequest {
+  SliceRequest() {
+    frame.renderer = "mip";
+    frame.transfer.choice = "window";
+  }
+
+  std::span<const SlicePlane> planes = kSliceChoices.back().planes;
+  std::optional<Vec3> at;               // a point of the world
+  std::optional<std::int32_t> index;    // of the slice; of one plane only. Neither: the volume's centre
+  double thickness = 0;                 // unit of the world; 0: a plane
+  std::optional<double> window, level;  // data values; none: `frame.transfer`
+  FrameRequest frame;                   // dataset, renderer, its parameters, size of each plane, transfer function, layers
+  PictureFormat format;
+
+  ImageSize size() const { return {frame.size.width * int(planes.size()), frame.size.height}; }  // of the whole picture
+};
+
+// A frame for each plane, from left to right, all of them valid. InvalidArgument.
+Result<std::vector<FrameRequest>> FramesOf(const SliceRequest& slice);
+
+// Puts the pictures of those frames beside each other, from left to right.
+LocalImage SideBySide(std::span<const LocalImage> images, ImageSize size);
+
+}  // namespace slabstream

@@ -1,0 +1,234 @@
+#include "client/request/values.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <optional>
+#include <vector>
+
+#include "common/cli/parse.h"
+
+namespace slabstream {
+namespace {
+
+struct NamedColor {
+  std::string_view name, code;
+};
+constexpr std::array<NamedColor, 18> kNamedColors = {{
+    {"black", "#000000"},
+    {"silver", "#c0c0c0"},
+    {"gray", "#808080"},
+    {"grey", "#808080"},
+    {"white", "#ffffff"},
+    {"maroon", "#800000"},
+    {"red", "#ff0000"},
+    {"purple", "#800080"},
+    {"fuchsia", "#ff00ff"},
+    {"green", "#008000"},
+    {"lime", "#00ff00"},
+    {"olive", "#808000"},
+    {"yellow", "#ffff00"},
+    {"orange", "#ffa500"},
+    {"navy", "#000080"},
+    {"blue", "#0000ff"},
+    {"teal", "#008080"},
+    {"aqua", "#00ffff"},
+}};
+
+std::optional<StraightColor> FromHexadecimal(std::string_view digits) {
+  if (digits.size() != 6 && digits.size() != 8) return std::nullopt;
+  float channels[4] = {0, 0, 0, 1};
+  for (std::size_t i = 0; i < digits.size(); i += 2) {
+    unsigned value = 0;
+    const auto [end, error] = std::from_chars(digits.data() + i, digits.data() + i + 2, value, 16);
+    if (error != std::errc() || end != digits.data() + i + 2) return std::nullopt;
+    channels[i / 2] = float(value) / 255;
+  }
+  return StraightColor{channels[0], channels[1], channels[2], channels[3]};
+}
+
+}  // namespace
+
+Result<ImageSize> ParseImageSize(std::string_view option, std::string_view text) {
+  const std::vector<std::string_view> sides = Split(text, 'x');
+  if (sides.size() > 2) return Status::InvalidArgument(fmt::format("{} '{}' is neither WIDTHxHEIGHT nor one number", option, text));
+  const Result<int> width = ParseInteger(option, sides.front(), 1, kMaxImageSide);
+  if (!width.ok()) return width.status();
+  const Result<int> height = ParseInteger(option, sides.back(), 1, kMaxImageSide);
+  if (!height.ok()) return height.status();
+  if (const std::int64_t pixels = std::int64_t{*width} * *height; pixels > kMaxImagePixels) {
+    return Status::InvalidArgument(fmt::format("{} '{}' has {} pixels, at most {} are rendered", option, text, pixels, kMaxImagePixels));
+  }
+  return ImageSize{*width, *height};
+}
+
+Result<Vec3> ParsePoint(std::string_view option, std::string_view text) {
+  const std::vector<std::string_view> parts = Split(text, ',');
+  if (parts.size() != 3) return Status::InvalidArgument(fmt::format("{} '{}' is not X,Y,Z", option, text));
+  Vec3 point;
+  for (int i = 0; i < 3; ++i) {
+    const Result<double> value = ParseNumber(option, parts[std::size_t(i)], {-kMaxWorldCoordinate, kMaxWorldCoordinate});
+    if (!value.ok()) return value.status();
+    point[i] = *value;
+  }
+  return point;
+}
+
+Result<Vec3> ParseDirection(std::string_view option, std::string_view text) {
+  Result<Vec3> direction = ParsePoint(option, text);
+  if (direction.ok() && *direction == Vec3{}) return Status::InvalidArgument(fmt::format("{} {} has no direction", option, text));
+  return direction;
+}
+
+Result<ScalarRange> ParseScalarRange(std::string_view option, std::string_view text) {
+  std::vector<std::string_view> ends = Split(text, ':');
+  const auto is_percentile = [](std::string_view end) { return end.ends_with('%'); };
+  if (ends.size() != 2 || is_percentile(ends[0]) != is_percentile(ends[1])) {
+    return Status::InvalidArgument(fmt::format("{} '{}' is neither LOW:HIGH nor LOW%:HIGH%", option, text));
+  }
+  ScalarRange range;
+  range.percentiles = is_percentile(ends[0]);
+  const NumberRange limits = range.percentiles ? NumberRange{0, 100} : NumberRange{-kMaxScalar, kMaxScalar};
+  for (std::string_view& end : ends) {
+    if (range.percentiles) end.remove_suffix(1);
+    const Result<double> value = ParseNumber(option, end, limits);
+    if (!value.ok()) return value.status();
+    (&end == &ends[0] ? range.min : range.max) = *value;
+  }
+  if (range.min < range.max) return range;
+  return Status::InvalidArgument(fmt::format("{} '{}' must rise", option, text));
+}
+
+std::string ScalarRangeText(const ScalarRange& range) {
+  const auto& [min, max, percentiles] = range;
+  const std::string_view unit = percentiles ? "%" : "";
+  return fmt::format("{}{}:{}{}", min, unit, max, unit);
+}
+
+Result<ClipBox> ParseClipBox(std::string_view option, std::string_view text) {
+  ClipBox box;
+  std::string_view bounds = text;
+  if (text.ends_with('%')) box.unit = ClipUnit::kPercent;
+  if (text.ends_with('v')) box.unit = ClipUnit::kVoxels;
+  if (box.unit != ClipUnit::kWorld) bounds.remove_suffix(1);
+  const auto refuse = [&] { return Status::InvalidArgument(fmt::format("{} '{}' is not X0:X1,Y0:Y1,Z0:Z1", option, text)); };
+  const std::vector<std::string_view> axes = Split(bounds, ',');
+  if (axes.size() != kAxes.size()) return refuse();
+  for (const Axis axis : kAxes) {
+    const std::vector<std::string_view> ends = Split(axes[std::size_t(Number(axis))], ':');
+    if (ends.size() != 2) return refuse();
+    for (const bool high : {false, true}) {
+      double& bound = high ? box.high[axis] : box.low[axis];
+      bound = high ? kMaxWorldCoordinate : -kMaxWorldCoordinate;
+      if (ends[high ? 1 : 0].empty()) continue;
+      const Result<double> value = ParseNumber(option, ends[high ? 1 : 0], {-kMaxWorldCoordinate, kMaxWorldCoordinate});
+      if (!value.ok()) return value.status();
+      bound = *value;
+    }
+    if (box.low[axis] < box.high[axis]) continue;
+    return Status::InvalidArgument(
+        fmt::format("{} '{}': {} runs from {:g} to {:g}, but must rise", option, text, Letter(axis), box.low[axis], box.high[axis]));
+  }
+  return box;
+}
+
+Result<ClipPlane> ParseClipPlane(std::string_view option, std::string_view text) {
+  const std::size_t last = text.rfind(',');
+  if (last == std::string_view::npos || std::ranges::count(text, ',') != 3) {
+    return Status::InvalidArgument(fmt::format("{} '{}' is not NX,NY,NZ,D", option, text));
+  }
+  const Result<Vec3> normal = ParseDirection(option, text.substr(0, last));
+  if (!normal.ok()) return normal.status();
+  const Result<double> offset = ParseNumber(option, text.substr(last + 1), {-kMaxWorldCoordinate, kMaxWorldCoordinate});
+  if (!offset.ok()) return offset.status();
+  return ClipPlane{*normal, *offset};
+}
+
+Result<StraightColor> ParseColor(std::string_view option, std::string_view text) {
+  const auto named = std::ranges::find(kNamedColors, text, &NamedColor::name);
+  const std::string_view code = named != kNamedColors.end() ? named->code : text;
+  if (code.starts_with('#')) {
+    if (const std::optional<StraightColor> color = FromHexadecimal(code.substr(1))) return *color;
+    return Status::InvalidArgument(fmt::format("{} '{}' is neither #rrggbb nor #rrggbbaa", option, text));
+  }
+  const std::vector<std::string_view> parts = Split(text, ',');
+  if (parts.size() != 3 && parts.size() != 4) {
+    return Status::InvalidArgument(fmt::format("{} '{}' is neither R,G,B[,A] nor #rrggbb nor the name of a colour", option, text));
+  }
+  float channels[4] = {0, 0, 0, 1};
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const Result<double> value = ParseNumber(option, parts[i], {0, 1});
+    if (!value.ok()) return value.status();
+    channels[i] = float(*value);
+  }
+  return StraightColor{channels[0], channels[1], channels[2], channels[3]};
+}
+
+Result<std::vector<Isosurface>> ParseIsosurfaces(std::string_view option, std::string_view text) {
+  // Of surfaces without a colour, by their place in the list: bone, blood, fat, nerve and so on.
+  static constexpr std::array<Rgb, kMaxIsosurfaces> kColors = {{{0.92F, 0.84F, 0.72F},
+                                                                {0.80F, 0.30F, 0.26F},
+                                                                {0.38F, 0.60F, 0.86F},
+                                                                {0.95F, 0.78F, 0.35F},
+                                                                {0.45F, 0.72F, 0.48F},
+                                                                {0.66F, 0.48F, 0.78F},
+                                                                {0.88F, 0.55F, 0.70F},
+                                                                {0.60F, 0.60F, 0.60F}}};
+  std::vector<Isosurface> surfaces;
+  const std::vector<std::string_view> parts = Split(text, ',');
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (surfaces.size() == kColors.size()) {
+      return Status::InvalidArgument(fmt::format("{} '{}' has more than {} values", option, text, kMaxIsosurfaces));
+    }
+    std::string_view item = parts[i];
+    // A colour that begins with a digit goes on behind two more commas.
+    const std::size_t colon = item.find(':');
+    if (const std::string_view color = colon == std::string_view::npos ? "" : item.substr(colon + 1);
+        !color.empty() && std::string_view("0123456789.").find(color[0]) != std::string_view::npos && i + 2 < parts.size()) {
+      item = {item.data(), std::size_t(parts[i + 2].data() + parts[i + 2].size() - item.data())};
+      i += 2;
+    }
+    const std::vector<std::string_view> fields = Split(item, ':');
+    if (fields.size() > 3) return Status::InvalidArgument(fmt::format("{} '{}' is not V[:COLOUR[:OPACITY]]", option, item));
+    const Result<double> value = ParseNumber(option, fields[0], {-kMaxScalar, kMaxScalar});
+    if (!value.ok()) return value.status();
+    Isosurface surface{*value, kColors[surfaces.size()], 1};
+    if (fields.size() > 1) {
+      const Result<StraightColor> color = ParseColor(option, fields[1]);
+      if (!color.ok()) return color.status();
+      surface.color = {color->r, color->g, color->b};
+      surface.opacity = double(color->a);
+    }
+    if (fields.size() > 2) {
+      const Result<double> opacity = ParseNumber(option, fields[2], {0, 1});
+      if (!opacity.ok()) return opacity.status();
+      surface.opacity = *opacity;
+    }
+    surfaces.push_back(surface);
+  }
+  std::ranges::sort(surfaces, {}, &Isosurface::value);
+  const auto twice = std::ranges::adjacent_find(surfaces, {}, &Isosurface::value);
+  if (twice == surfaces.end()) return surfaces;
+  return Status::InvalidArgument(fmt::format("{} '{}' has the value {:g} twice", option, text, twice->value));
+}
+
+Result<std::vector<GradientOpacityPoint>> ParseGradientOpacities(std::string_view option, std::string_view text) {
+  std::vector<GradientOpacityPoint> points;
+  for (const std::string_view item : Split(text, ',')) {
+    const std::vector<std::string_view> fields = Split(item, ':');
+    if (fields.size() != 2) return Status::InvalidArgument(fmt::format("{} '{}' is not GRADIENT:OPACITY", option, item));
+    const Result<double> slope = ParseNumber(option, fields[0], {0, kMaxScalar});
+    if (!slope.ok()) return slope.status();
+    const Result<double> opacity = ParseNumber(option, fields[1], {0, 1});
+    if (!opacity.ok()) return opacity.status();
+    points.push_back({*slope, *opacity});
+  }
+  if (const Status status = Validate(points); !status.ok()) {
+    return Status::InvalidArgument(fmt::format("{} '{}': {}", option, text, status.message()));
+  }
+  return points;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,47 @@
+// Parses texts of the command line into values of pictures and frames. Pure. Errors as in common/cli/parse.h.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "client/image_io/image_writer.h"
+#include "common/base/status.h"
+#include "common/frame/frame_request.h"
+#include "common/math/vec.h"
+#include "common/view/camera.h"
+#include "common/view/clip.h"
+
+namespace slabstream {
+
+// "640x480" or "512" (a square), each side in [1, kMaxImageSide], at most kMaxImagePixels in all.
+Result<ImageSize> ParseImageSize(std::string_view option, std::string_view text);
+
+// "X,Y,Z", each in [-kMaxWorldCoordinate, kMaxWorldCoordinate].
+Result<Vec3> ParsePoint(std::string_view option, std::string_view text);
+// The same, and not all zero.
+Result<Vec3> ParseDirection(std::string_view option, std::string_view text);
+
+// "LOW:HIGH", which rise, in [-kMaxScalar, kMaxScalar]; or "LOW%:HIGH%", percentiles.
+Result<ScalarRange> ParseScalarRange(std::string_view option, std::string_view text);
+// The other way round.
+std::string ScalarRangeText(const ScalarRange& range);
+
+// "X0:X1,Y0:Y1,Z0:Z1", with "v" behind it in voxels, with "%" in percent of the volume's sides. A bound may be left out: it does not clip.
+Result<ClipBox> ParseClipBox(std::string_view option, std::string_view text);
+// "NX,NY,NZ,D".
+Result<ClipPlane> ParseClipPlane(std::string_view option, std::string_view text);
+
+// "R,G,B" (opaque) or "R,G,B,A", each in [0, 1]; "#rrggbb" or "#rrggbbaa"; or one of the names of CSS 2.1, such as "white". Codes and names
+// become codes of an 8-bit PNG as they are, without a transfer curve.
+Result<StraightColor> ParseColor(std::string_view option, std::string_view text);
+
+// "V[:COLOUR[:OPACITY]],...", such as "120:red:0.3,300": 1 to kMaxIsosurfaces different values in any order, here returned in ascending
+// order. COLOUR is as for ParseColor, but R,G,B has three numbers; OPACITY in [0, 1] is that of the colour if it is left out. Surfaces
+// without a colour have one of their own.
+Result<std::vector<Isosurface>> ParseIsosurfaces(std::string_view option, std::string_view text);
+
+// "G:O,G:O,...", with slopes G that ascend in [0, kMaxScalar] and opacities O in [0, 1].
+Result<std::vector<GradientOpacityPoint>> ParseGradientOpacities(std::string_view option, std::string_view text);
+
+}  // namespace slabstream

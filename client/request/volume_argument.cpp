@@ -1,0 +1,75 @@
+#include "client/request/volume_argument.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <string_view>
+#include <vector>
+
+#include "common/base/files.h"
+#include "common/cli/parse.h"
+#include "common/volume_io/read_options.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::size_t kMaxTransferFileBytes = std::size_t{16} << 20;
+
+using TransferText = std::variant<std::string, TransferFunction>;
+
+bool IsJson(const std::string& text) { return text.starts_with('{') || text.starts_with('['); }
+
+Result<TransferText> ColorMap(const std::string& option, const std::string& json, const std::string& name) {
+  Result<TransferFunction> transfer = ParseParaViewColorMap(json, name);
+  if (!transfer.ok()) return Status(transfer.status().code(), fmt::format("{} {}", option, transfer.status().message()));
+  return TransferText(*std::move(transfer));
+}
+
+bool NamesFile(const std::string& transfer) {
+  if (IsJson(transfer)) return false;
+  return std::filesystem::path(transfer).extension() == ".json" || transfer.find('/') != std::string::npos;
+}
+
+}  // namespace
+
+Result<std::variant<std::string, TransferFunction>> ParseTransferText(const std::string& option, const std::string& text) {
+  if (IsJson(text)) return ColorMap(option, text, "the colour map");
+  std::vector<std::string_view> names;
+  for (const TransferPreset& preset : TransferPresets()) names.push_back(preset.name);
+  const Result<std::size_t> index = ParseChoice(option, text, names);
+  if (!index.ok()) return Status::InvalidArgument(index.status().message() + ", nor JSON of a colour map");
+  return TransferText(text);
+}
+
+Result<std::variant<std::string, TransferFunction>> ParseTransfer(const std::string& option, const std::string& text) {
+  if (NamesFile(text)) {
+    const Result<std::string> json = ReadTextFile(text, kMaxTransferFileBytes);
+    if (!json.ok()) return Status(json.status().code(), fmt::format("{} {}", option, json.status().message()));
+    return ColorMap(option, *json, text);
+  }
+  Result<TransferText> transfer = ParseTransferText(option, text);
+  if (!transfer.ok() && !IsJson(text)) return Status::InvalidArgument(transfer.status().message() + ", nor a .json file");
+  return transfer;
+}
+
+Result<VolumeArgument> ParseVolumeArgument(const std::string& argument, const std::string& text, bool is_file) {
+  // Options are checked with the volume.
+  const auto exists = [](const std::string& volume) {
+    const Result<VolumeSource> source = ParseVolumeSource(volume);
+    std::error_code error;
+    return source.ok() && std::filesystem::exists(source->path, error);
+  };
+  const VolumeArgument whole{text, "", {}};
+  const std::size_t colon = text.rfind(':');
+  std::error_code error;
+  if (colon == std::string::npos || (is_file && std::filesystem::exists(text, error))) return whole;
+  VolumeArgument parts{text.substr(0, colon), text.substr(colon + 1), {}};
+  if (is_file && !exists(parts.volume)) return whole;
+  auto transfer = ParseTransfer(fmt::format("{} '{}':", argument, text), parts.transfer_text);
+  if (!transfer.ok() && !is_file && !NamesFile(parts.transfer_text)) return whole;
+  if (!transfer.ok()) return transfer.status();
+  parts.transfer = *std::move(transfer);
+  return parts;
+}
+
+}  // namespace slabstream

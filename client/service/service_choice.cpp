@@ -1,0 +1,28 @@
+#include "client/service/service_choice.h"
+
+#include <fmt/format.h>
+
+#include "common/transport/endpoint.h"
+
+namespace slabstream {
+
+ParseText EndpointText(bool allow_wildcard) {
+  return [allow_wildcard](const std::string& option, const std::string& text) -> Result<std::string> {
+    const Result<Endpoint> endpoint = ParseEndpoint(text, allow_wildcard);
+    if (!endpoint.ok()) return Status::InvalidArgument(fmt::format("{} {}", option, endpoint.status().message()));
+    return text;
+  };
+}
+
+CLI::Option* AddService(CLI::App& app, ServiceChoice& service) {
+  CLI::Option* endpoint = AddParsed(app, "--endpoint", service.endpoint, EndpointText(false),
+                                    "Where the service listens; with --service, where it is reached instead, as through a tunnel")
+                              ->type_name("ENDPOINT")
+                              ->default_str("$SLABSTREAM_ENDPOINT, or the service that `up` started last");
+  app.add_option("--service", service.file, "The service file of a service with keys: where it listens, and the key to it")
+      ->type_name("FILE")
+      ->default_str("$SLABSTREAM_SERVICE, if there is no --endpoint");
+  return endpoint;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,200 @@
+#include "client/service/service_state.h"
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "client/service/process.h"
+#include "common/base/files.h"
+#include "common/base/time.h"
+#include "common/service/service_file.h"
+#include "common/transport/endpoint.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::size_t kMaxStateBytes = std::size_t{1} << 20;
+
+std::string FileFor(const std::string& directory, const std::string& endpoint) {
+  return fmt::format("{}/{}.json", directory, FileNameOf(endpoint));
+}
+
+// nullopt: damaged.
+std::optional<ServiceState> Load(const std::string& path) {
+  const Result<std::string> text = ReadTextFile(path, kMaxStateBytes);
+  if (!text.ok()) return std::nullopt;
+  const nlohmann::json json = nlohmann::json::parse(*text, nullptr, false);
+  try {
+    return ServiceState{json.at("endpoint"), json.at("started_unix"),  json.at("coordinator"),
+                        json.at("workers"),  json.at("log_directory"), json.value("keys_folder", "")};
+  } catch (const nlohmann::json::exception&) {
+    return std::nullopt;
+  }
+}
+
+// The folder named by XDG_RUNTIME_DIR may be missing (no login session) or belong to another user (sudo and su pass the variable on).
+bool IsOwnDirectory(const char* path) {
+  struct stat info {};
+  return path != nullptr && path[0] == '/' && ::stat(path, &info) == 0 && S_ISDIR(info.st_mode) && info.st_uid == ::getuid();
+}
+
+}  // namespace
+
+std::string FileNameOf(std::string text) {
+  std::ranges::replace_if(
+      text, [](unsigned char c) { return std::isalnum(c) == 0 && c != '.' && c != '-'; }, '_');
+  return text;
+}
+
+Result<std::string> StateDirectory() {
+  const char* runtime = std::getenv("XDG_RUNTIME_DIR");
+  const std::string path = IsOwnDirectory(runtime) ? fmt::format("{}/slabstream", runtime) : fmt::format("/tmp/slabstream-{}", ::getuid());
+  if (::mkdir(path.c_str(), 0700) != 0 && errno != EEXIST) {
+    return Status::Unavailable(
+        fmt::format("cannot make the directory '{}': {}; $XDG_RUNTIME_DIR chooses another place", path, std::strerror(errno)));
+  }
+  struct stat info {};
+  // lstat: a link that somebody else left in /tmp is not ours, wherever it points.
+  if (::lstat(path.c_str(), &info) != 0 || !S_ISDIR(info.st_mode) || info.st_uid != ::getuid() || (info.st_mode & 077) != 0) {
+    return Status::Unavailable(
+        fmt::format("'{}' must be a directory of this user alone (mode 0700); $XDG_RUNTIME_DIR chooses another place", path));
+  }
+  return path;
+}
+
+Status SaveState(const ServiceState& state) {
+  const Result<std::string> directory = StateDirectory();
+  if (!directory.ok()) return directory.status();
+  const nlohmann::json json = {{"endpoint", state.endpoint}, {"started_unix", state.started_unix},   {"coordinator", state.coordinator},
+                               {"workers", state.workers},   {"log_directory", state.log_directory}, {"keys_folder", state.keys_folder}};
+  return WriteTextFile(FileFor(*directory, state.endpoint), json.dump(2) + "\n");
+}
+
+void ForgetState(const ServiceState& state) {
+  const Result<std::string> directory = StateDirectory();
+  if (!directory.ok()) return;
+  std::error_code ignored;
+  std::filesystem::remove(FileFor(*directory, state.endpoint), ignored);
+}
+
+void RemoveState(const ServiceState& state) {
+  const Result<std::string> directory = StateDirectory();
+  if (!directory.ok()) return;
+  ForgetState(state);
+  std::error_code ignored;
+  if (std::filesystem::path(state.log_directory).parent_path() == *directory) std::filesystem::remove_all(state.log_directory, ignored);
+}
+
+namespace {
+
+// The newest one at `endpoint`, or anywhere if that is empty.
+std::optional<ServiceState> Newest(const std::string& endpoint, bool runs) {
+  const Result<std::string> directory = StateDirectory();
+  if (!directory.ok()) return std::nullopt;
+  std::optional<ServiceState> newest;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(*directory, error)) {
+    if (entry.path().extension() != ".json") continue;
+    std::optional<ServiceState> state = Load(entry.path());
+    if (!state || IsRunning(state->coordinator, kCoordinatorProgram) != runs) continue;
+    if (!endpoint.empty() && state->endpoint != endpoint) continue;
+    if (!newest || state->started_unix > newest->started_unix) newest = std::move(state);
+  }
+  return newest;
+}
+
+using Process = std::pair<pid_t, std::string>;  // pid, program
+
+// Whether all of them ended in time.
+bool WaitForEnd(const std::vector<Process>& processes, Duration patience) {
+  const auto runs = [](const Process& process) { return IsRunning(process.first, process.second); };
+  for (const Time deadline = MonotonicNow() + patience; std::any_of(processes.begin(), processes.end(), runs);) {
+    if (MonotonicNow() >= deadline) return false;
+    ::usleep(20000);
+  }
+  return true;
+}
+
+}  // namespace
+
+std::optional<ServiceState> FindState(const std::string& endpoint) { return Newest(endpoint, true); }
+std::optional<ServiceState> FindRemains(const std::string& endpoint) { return Newest(endpoint, false); }
+
+void EndProcesses(const ServiceState& state, Duration patience) {
+  std::vector<Process> processes;
+  for (const pid_t worker : state.workers) processes.emplace_back(worker, kWorkerProgram);
+  processes.emplace_back(state.coordinator, kCoordinatorProgram);
+  if (WaitForEnd(processes, patience)) return;
+  for (const auto& [signal, wait] : EndSteps(kEndPatience)) {
+    for (const auto& [pid, program] : processes) {
+      if (IsRunning(pid, program)) ::kill(pid, signal);
+    }
+    if (WaitForEnd(processes, wait)) return;
+  }
+}
+
+namespace {
+
+const char* Variable(const char* name) {
+  const char* text = std::getenv(name);
+  return text != nullptr && text[0] != '\0' ? text : nullptr;
+}
+
+Result<ServiceAddress> AddressIn(const std::string& path) {
+  const Result<ServiceFile> file = ReadServiceFile(path);
+  if (!file.ok()) return file.status();
+  if (file->role == Role::kWorker)
+    return Status::InvalidArgument(fmt::format("service file '{}' is of role worker, but client or admin is needed here", path));
+  return ServiceAddress(file->endpoint, file->keys());
+}
+
+}  // namespace
+
+Result<ServiceChoice> NamedService(const ServiceChoice& choice) {
+  if (!choice.file.empty() || !choice.endpoint.empty()) return choice;
+  if (const char* file = Variable("SLABSTREAM_SERVICE")) return ServiceChoice{.endpoint = {}, .file = file};
+  const char* endpoint = Variable("SLABSTREAM_ENDPOINT");
+  if (endpoint == nullptr) return ServiceChoice();
+  const Result<Endpoint> parsed = ParseEndpoint(endpoint, false);
+  if (!parsed.ok()) return Status::InvalidArgument("$SLABSTREAM_ENDPOINT " + parsed.status().message());
+  return ServiceChoice{.endpoint = endpoint, .file = {}};
+}
+
+Result<ServiceAddress> ResolveService(const ServiceChoice& choice) {
+  const Result<ServiceChoice> named = NamedService(choice);
+  if (!named.ok()) return named.status();
+  if (!named->file.empty()) {
+    Result<ServiceAddress> address = AddressIn(named->file);
+    if (address.ok() && !named->endpoint.empty()) address->endpoint = named->endpoint;
+    return address;
+  }
+  const std::optional<ServiceState> state = FindState(named->endpoint);
+  if (state && !state->keys_folder.empty()) return AddressIn(state->keys_folder + "/admin.json");
+  if (!named->endpoint.empty()) return ServiceAddress(named->endpoint);
+  return ServiceAddress(state ? state->endpoint : std::string(kDefaultEndpoint));
+}
+
+bool IsRunning(pid_t pid, const std::string& program) {
+  if (pid <= 0) return false;
+  std::ifstream file(fmt::format("/proc/{}/stat", pid));  // "PID (NAME) STATE ...", and the name may hold anything
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const std::size_t open = text.find('('), close = text.rfind(')');
+  if (open == std::string::npos || close == std::string::npos || close + 2 >= text.size()) return false;
+  const char state = text[close + 2];
+  return text.substr(open + 1, close - open - 1) == program.substr(0, 15) && state != 'Z' && state != 'X';
+}
+
+}  // namespace slabstream

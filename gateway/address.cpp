@@ -1,0 +1,140 @@
+#include "gateway/address.h"
+
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <sys/random.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <utility>
+
+#include "common/base/parse_number.h"
+#include "common/base/printable.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::string_view kTokenLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
+
+std::string Lower(std::string_view text) {
+  std::string lower(text);
+  std::ranges::transform(lower, lower.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  return lower;
+}
+
+bool IsLoopback(const std::string& host) {
+  in_addr v4{};
+  if (::inet_pton(AF_INET, host.c_str(), &v4) == 1) return (ntohl(v4.s_addr) >> 24) == 127;
+  return host == "::1";
+}
+
+struct HostAndPort {
+  std::string host;  // without brackets
+  std::string port;  // empty: none
+};
+
+// nullopt: neither a name nor an address with a port or without.
+std::optional<HostAndPort> Divide(std::string_view text) {
+  HostAndPort parts;
+  if (text.starts_with('[')) {
+    const std::size_t end = text.find(']');
+    if (end == std::string_view::npos) return std::nullopt;
+    parts.host = text.substr(1, end - 1);
+    text.remove_prefix(end + 1);
+    if (text.empty()) return parts;
+    if (text[0] != ':') return std::nullopt;
+    parts.port = text.substr(1);
+    return parts;
+  }
+  const std::size_t colon = text.find(':');
+  parts.host = text.substr(0, colon);
+  if (colon != std::string_view::npos) parts.port = text.substr(colon + 1);
+  if (parts.host.empty() || parts.port.find(':') != std::string::npos) return std::nullopt;
+  return parts;
+}
+
+std::string_view AfterScheme(std::string_view origin) { return origin.substr(origin.find("//") + 2); }
+
+}  // namespace
+
+Result<ListenAddress> ParseListenAddress(std::string_view option, std::string_view text) {
+  const auto refuse = [&] {
+    return Status::InvalidArgument(fmt::format("{} '{}' is not an address such as 127.0.0.1:8080 or [::1]:8080", option, text));
+  };
+  const std::optional<HostAndPort> parts = Divide(text);
+  if (!parts) return refuse();
+  ListenAddress listen;
+  listen.host = parts->host == "localhost" ? "127.0.0.1" : parts->host;
+  in_addr v4{};
+  in6_addr v6{};
+  if (::inet_pton(AF_INET, listen.host.c_str(), &v4) != 1 && ::inet_pton(AF_INET6, listen.host.c_str(), &v6) != 1) return refuse();
+  if (!parts->port.empty() && parts->port != "*") {
+    const std::optional<std::uint16_t> port = ParseNumber<std::uint16_t>(parts->port);
+    if (!port) return refuse();
+    listen.port = *port;
+  }
+  listen.loopback = IsLoopback(listen.host);
+  return listen;
+}
+
+Result<std::string> ParseOrigin(std::string_view option, std::string_view text) {
+  const std::string origin = Lower(text);
+  const bool scheme = origin.starts_with("https://") || origin.starts_with("http://");
+  const std::string_view rest = scheme ? AfterScheme(origin) : "";
+  if (scheme && !rest.empty() && rest.find_first_of("/?#@ ") == std::string_view::npos && Divide(rest)) return origin;
+  return Status::InvalidArgument(fmt::format("{} '{}' is not an origin such as https://viewer.example.org", option, text));
+}
+
+OriginRules::OriginRules(ListenAddress listen, bool tls, std::string proxy_origin)
+    : listen_(std::move(listen)), tls_(tls), proxy_origin_(std::move(proxy_origin)) {
+  if (!proxy_origin_.empty()) proxy_host_ = AfterScheme(proxy_origin_);
+}
+
+bool OriginRules::IsOwnHost(std::string_view host) const {
+  if (!proxy_host_.empty() && host == proxy_host_) return true;
+  const std::optional<HostAndPort> parts = Divide(host);
+  if (!parts) return false;
+  // Any port of this machine's own names: a tunnel's near end has another one. No foreign page has such a name.
+  if (parts->host == "localhost" || IsLoopback(parts->host)) return true;
+  // With TLS, whoever reaches the gateway under a name had its certificate checked for it.
+  return tls_ || parts->host == listen_.host;
+}
+
+std::optional<std::string> OriginRules::Refusal(std::string_view host, std::optional<std::string_view> origin) const {
+  const std::string asked = Lower(host);
+  if (!IsOwnHost(asked)) {
+    return fmt::format("Host '{}' is not a name of this gateway; --behind-proxy names the address of a proxy in front of it",
+                       Printable(asked.substr(0, 128)));
+  }
+  if (!origin) return std::nullopt;
+  const std::string from = Lower(*origin);
+  if (!proxy_origin_.empty() && from == proxy_origin_) return std::nullopt;
+  if (from == fmt::format("{}://{}", tls_ ? "https" : "http", asked)) return std::nullopt;
+  return fmt::format("Origin '{}' is another site", Printable(from.substr(0, 128)));
+}
+
+Result<std::string> MakeToken() {
+  std::array<unsigned char, 22> random{};  // 6 bits of each: 132 bits
+  if (::getrandom(random.data(), random.size(), 0) != ssize_t(random.size()))
+    return Status::Unavailable("the system gives no random bytes");
+  std::string token;
+  for (const unsigned char byte : random) token += kTokenLetters[byte % kTokenLetters.size()];
+  return token;
+}
+
+Status CheckToken(std::string_view token) {
+  constexpr std::size_t kLeast = 16, kMost = 128;
+  if (token.size() >= kLeast && token.size() <= kMost && token.find_first_not_of(kTokenLetters) == std::string_view::npos)
+    return Status::Ok();
+  return Status::InvalidArgument(
+      fmt::format("the token has {} characters; it needs {} to {} letters, digits, - and _", token.size(), kLeast, kMost));
+}
+
+bool SameToken(std::string_view a, std::string_view b) {
+  unsigned difference = a.size() == b.size() ? 0 : 1;
+  for (std::size_t i = 0; i < a.size(); ++i) difference |= unsigned(a[i] ^ (b.empty() ? 'x' : b[i % b.size()]));
+  return difference == 0;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,48 @@
+// Where the gateway listens and under which names it may be asked: the checks of Host and Origin that keep foreign pages out. Pure.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "common/base/status.h"
+
+namespace slabstream {
+
+struct ListenAddress {
+  std::string host = "127.0.0.1";  // a numeric address; IPv6 without brackets
+  std::uint16_t port = 0;          // 0: any free one
+  bool loopback = true;
+};
+
+// "HOST:PORT", "HOST", or "[::1]:8080"; a port of 0 or * is any. InvalidArgument.
+Result<ListenAddress> ParseListenAddress(std::string_view option, std::string_view text);
+
+// "https://viewer.example.org" or with a port; no path. The text in lower case. InvalidArgument.
+Result<std::string> ParseOrigin(std::string_view option, std::string_view text);
+
+// Which requests are the gateway's own.
+class OriginRules {
+ public:
+  // `proxy_origin`: of the proxy in front; empty: there is none.
+  OriginRules(ListenAddress listen, bool tls, std::string proxy_origin);
+
+  // Of the two headers of a request, `origin` if it has one. nullopt: fine; else what is wrong, for a line to the client.
+  std::optional<std::string> Refusal(std::string_view host, std::optional<std::string_view> origin) const;
+
+ private:
+  bool IsOwnHost(std::string_view host) const;
+  ListenAddress listen_;
+  bool tls_;
+  std::string proxy_origin_, proxy_host_;
+};
+
+// Random text of 128 bits, letters, digits, - and _. Unavailable: the system has no randomness.
+Result<std::string> MakeToken();
+// What may stand in --token-file: 16 to 128 letters, digits, - and _. InvalidArgument.
+Status CheckToken(std::string_view token);
+// In time that does not depend on where they differ.
+bool SameToken(std::string_view a, std::string_view b);
+
+}  // namespace slabstream

@@ -1,0 +1,19 @@
+// The files of the page, which are part of the program. The table is made from a folder at build time (embed_assets.cmake).
+#pragma once
+
+#include <span>
+#include <string_view>
+
+namespace slabstream {
+
+struct Asset {
+  std::string_view path;  // "/assets/page.js"
+  std::string_view type;  // "text/javascript; charset=utf-8"
+  std::string_view bytes;
+};
+
+std::span<const Asset> Assets();
+// "/" is "/index.html". Null: there is none.
+const Asset* FindAsset(std::string_view path);
+
+}  // namespace slabstream

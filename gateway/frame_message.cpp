@@ -1,0 +1,122 @@
+#include "gateway/frame_message.h"
+
+#include <array>
+#include <span>
+#include <utility>
+
+#include "client/report/frame_summary.h"
+#include "client/request/picture_record.h"
+#include "client/request/slice_request.h"
+#include "gateway/picture_codec.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::size_t kMaxTimelineEntries = 4096;
+
+double Milliseconds(std::int64_t ns) { return double(ns) / 1e6; }
+
+Json TimelineJson(const FrameStatistics& statistics) {
+  Json entries = Json::array();
+  for (const RankReport& report : statistics.reports) {
+    for (const Span& span : report.spans) {
+      if (entries.size() == kMaxTimelineEntries) return entries;
+      entries.push_back({{"worker", report.worker},
+                         {"group", report.group},
+                         {"stage", ToString(span.stage)},
+                         {"begin_ms", Milliseconds(span.begin_ns - statistics.begin_ns)},
+                         {"end_ms", Milliseconds(span.end_ns - statistics.begin_ns)}});
+    }
+  }
+  return entries;
+}
+
+}  // namespace
+
+Json StatisticsJson(const FrameStatistics& statistics, Duration latency, bool timeline) {
+  const FrameSummary summary = Summarize(statistics);
+  Json stages = Json::object();
+  for (int stage = 0; stage < kStageCount; ++stage) {
+    stages[std::string(ToString(Stage(stage)))] = Milliseconds(summary.stage_ns[std::size_t(stage)]);
+  }
+  Json json = {{"latency_ms", Milliseconds(latency.count())},
+               {"queued_ms", Milliseconds(statistics.queued_ns)},
+               {"attempts", statistics.attempts},
+               {"workers", statistics.workers},
+               {"groups", statistics.groups},
+               {"imbalance", summary.imbalance},
+               {"idle_share", summary.idle_share},
+               {"bytes", {{"voxels", summary.voxel_bytes}, {"images", summary.image_bytes}}},
+               {"stages_ms", std::move(stages)},
+               {"plan",
+                {{"decomposition", statistics.decomposition},
+                 {"axis", statistics.axis},
+                 {"assignment", statistics.assignment},
+                 {"balance", statistics.balance},
+                 {"combine", statistics.combine},
+                 {"split", statistics.load_metric}}}};
+  if (timeline) json["timeline"] = TimelineJson(statistics);
+  return json;
+}
+
+RenderedView JoinPictures(std::vector<Picture> pictures, ImageSize size) {
+  RenderedView view;
+  view.geometry = pictures.front().geometry;
+  view.statistics = std::move(pictures.front().statistics);
+  for (const Picture& picture : pictures) view.latency = std::max(view.latency, picture.latency);
+  view.size = {size.width * int(pictures.size()), size.height};
+  if (pictures.size() == 1) {
+    view.image = std::move(pictures.front().image);
+    return view;
+  }
+  std::vector<LocalImage> images;
+  for (Picture& picture : pictures) images.push_back(std::move(picture.image));
+  view.image = SideBySide(images, size);
+  return view;
+}
+
+Result<EncodedView> EncodeView(const RenderedView& view, bool final, int quality, const std::atomic<bool>& given_up) {
+  const Time begin = MonotonicNow();
+  const Result<ComposedPicture> picture = ComposedPicture::Make(view.image, view.size, view.format, view.geometry);
+  if (!picture.ok()) return picture.status();
+  // Outside of what was rendered is background, unless something was drawn onto the picture.
+  const PixelBounds bounds = view.format.annotations.any() ? PixelBounds{0, 0, view.size.width, view.size.height} : view.image.bounds;
+  EncodedView encoded{.seq = view.seq, .header = {}, .bytes = nullptr, .encoding = {}, .type = final ? "png" : "jpeg"};
+  std::vector<std::byte> bytes;
+  if (!bounds.empty() && final) {
+    std::optional<std::vector<std::byte>> png = EncodePng(*picture, bounds, given_up);
+    if (!png) return Status::Cancelled("a newer view has come");
+    bytes = *std::move(png);
+  } else if (!bounds.empty()) {
+    bytes = EncodeJpeg(*picture, bounds, quality);
+  }
+  const StraightColor& background = view.format.background;
+  Json statistics = StatisticsJson(view.statistics, view.latency, view.timeline);
+  statistics["bytes"]["picture"] = bytes.size();
+  encoded.encoding = MonotonicNow() - begin;
+  statistics["encode_ms"] = Milliseconds(encoded.encoding.count());
+  const auto area = bounds.empty() ? std::array{0, 0, 0, 0} : std::array{bounds.x_begin, bounds.y_begin, bounds.width(), bounds.height()};
+  encoded.header = {{"frame", 0},
+                    {"seq", view.seq},
+                    {"final", final},
+                    {"type", final ? "image/png" : "image/jpeg"},
+                    {"size", {view.size.width, view.size.height}},
+                    {"scale", view.scale},
+                    {"bounds", area},
+                    {"background", {Decimal(background.r), Decimal(background.g), Decimal(background.b), Decimal(background.a)}},
+                    {"geometry", GeometryJson(view.geometry)},
+                    {"statistics", std::move(statistics)}};
+  encoded.bytes = std::make_shared<const std::vector<std::byte>>(std::move(bytes));
+  return encoded;
+}
+
+std::string HeadOf(Json header, std::uint64_t frame, Duration round_trip) {
+  header["frame"] = frame;
+  header["statistics"]["round_trip_ms"] = Milliseconds(round_trip.count());
+  const std::string text = header.dump(-1, ' ', false, Json::error_handler_t::replace);
+  std::string head;
+  for (int byte = 0; byte < 4; ++byte) head += char((text.size() >> (8 * byte)) & 0xFF);
+  return head + text;
+}
+
+}  // namespace slabstream

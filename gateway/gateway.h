@@ -1,0 +1,55 @@
+// Gateway: pictures of a service over HTTP and WebSockets (docs/http.md). Its parts, and their threads:
+//
+//   HttpServer (http.h)   sockets and limits                                         io thread
+//   Gateway               who may ask; routes                                        io thread
+//   ViewSession           one view of one page                                       io thread
+//   ServiceLink           a client of the service: one for all requests over HTTP,   one each
+//                         and one for each session
+//   ServiceMonitor        asks how the service is, once a second                     its own
+//   encoders              compress pictures                                          one a core
+//
+// Threads hand results over by posting them to the io thread, which alone changes the state of the gateway and its sessions.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "client/client.h"
+#include "common/base/status.h"
+#include "gateway/address.h"
+#include "gateway/http.h"
+
+namespace slabstream {
+
+struct GatewayOptions {
+  ListenAddress listen;
+  std::optional<TlsFiles> tls;
+  std::string proxy_origin;  // of --behind-proxy, as ParseOrigin gives it; empty: none
+  std::string token;         // CheckToken
+  HttpLimits limits;
+  int max_sessions = 64;
+  int max_renders = 16;  // pictures over HTTP under way
+};
+
+class Gateway {
+ public:
+  // Serves at once, on a thread of its own, whether the service answers or not. `context` must outlive it. InvalidArgument: options, among
+  // them an address off loopback without TLS or proxy; Unavailable: the address.
+  static Result<std::unique_ptr<Gateway>> Start(Context& context, ServiceAddress service, GatewayOptions options);
+  ~Gateway();
+
+  std::uint16_t port() const;
+  std::string url() const;  // with the token
+
+  void RequestStop();  // any thread, signal handlers too
+  void WaitUntilStopped();
+
+ private:
+  class Impl;
+  explicit Gateway(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace slabstream

@@ -1,0 +1,438 @@
+#include "gateway/http.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ssl/context.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/ssl.hpp>
+#include <boost/beast/websocket.hpp>
+#include <boost/beast/websocket/ssl.hpp>
+#include <deque>
+#include <list>
+#include <set>
+#include <type_traits>
+#include <utility>
+
+#include "common/base/limited_log.h"
+#include "common/base/printable.h"
+#include "common/cli/parse.h"
+
+namespace slabstream {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+namespace websocket = beast::websocket;
+using asio::ip::tcp;
+using Error = beast::error_code;
+using PlainStream = beast::tcp_stream;
+using TlsStream = beast::ssl_stream<beast::tcp_stream>;
+
+// Whatever is open and must be closed when the server stops.
+class Closable {
+ public:
+  virtual ~Closable() = default;
+  virtual void CloseNow() = 0;
+};
+
+// What connections share.
+struct Shared {
+  const HttpLimits limits;
+  HttpApplication& application;
+  std::set<Closable*> open;
+  LimitedLog log;
+};
+
+class Registered : public Closable {
+ public:
+  explicit Registered(std::shared_ptr<Shared> shared) : shared_(std::move(shared)) { shared_->open.insert(this); }
+  ~Registered() override { shared_->open.erase(this); }
+  Registered(const Registered&) = delete;
+  Registered& operator=(const Registered&) = delete;
+
+ protected:
+  std::shared_ptr<Shared> shared_;
+};
+
+std::string_view View(beast::string_view text) { return {text.data(), text.size()}; }
+
+std::vector<std::string> Items(std::string_view list) {
+  std::vector<std::string> items;
+  for (std::string_view item : Split(list, ',')) {
+    while (item.starts_with(' ')) item.remove_prefix(1);
+    while (item.ends_with(' ')) item.remove_suffix(1);
+    if (!item.empty()) items.emplace_back(item);
+  }
+  return items;
+}
+
+HttpRequest RequestOf(const http::request<http::string_body>& message) {
+  HttpRequest request;
+  request.method = View(message.method_string());
+  request.target = View(message.target());
+  request.host = View(message[http::field::host]);
+  request.body = message.body();
+  const auto optional = [&](http::field field) -> std::optional<std::string> {
+    const auto found = message.find(field);
+    return found == message.end() ? std::nullopt : std::optional<std::string>(View(found->value()));
+  };
+  request.origin = optional(http::field::origin);
+  request.authorization = optional(http::field::authorization);
+  request.subprotocols = Items(View(message[http::field::sec_websocket_protocol]));
+  return request;
+}
+
+http::response<http::string_body> ResponseOf(HttpReply reply, unsigned version, bool keep_alive, const Shared& shared) {
+  http::response<http::string_body> response(http::int_to_status(reply.status), version);
+  response.set(http::field::content_type, reply.type);
+  for (const auto& [name, value] : shared.application.CommonHeaders()) response.set(name, value);
+  for (const auto& [name, value] : reply.headers) response.set(name, value);
+  response.body() = std::move(reply.body);
+  response.keep_alive(keep_alive);
+  response.prepare_payload();
+  return response;
+}
+
+// ---- WebSockets
+
+template <class Stream>
+class WebSocketConnection final : public Registered,
+                                  public WebSocketPeer,
+                                  public std::enable_shared_from_this<WebSocketConnection<Stream>> {
+ public:
+  WebSocketConnection(Stream stream, std::shared_ptr<Shared> shared, WebSocketAccepted accepted)
+      : Registered(std::move(shared)), socket_(std::move(stream)), accepted_(std::move(accepted)), timer_(socket_.get_executor()) {}
+
+  void Run(const http::request<http::string_body>& request) {
+    beast::get_lowest_layer(socket_).expires_never();  // the WebSocket has times of its own
+    const HttpLimits& limits = shared_->limits;
+    socket_.set_option(
+        websocket::stream_base::timeout{.handshake_timeout = limits.reading, .idle_timeout = limits.silence, .keep_alive_pings = true});
+    socket_.set_option(websocket::stream_base::decorator([this](websocket::response_type& response) {
+      for (const auto& [name, value] : shared_->application.CommonHeaders()) response.set(name, value);
+      response.set(http::field::sec_websocket_protocol, accepted_.subprotocol);
+    }));
+    socket_.read_message_max(limits.message_bytes);
+    socket_.auto_fragment(false);
+    socket_.write_buffer_bytes(std::size_t{1} << 16);
+    socket_.async_accept(request, [self = this->shared_from_this()](Error error) {
+      if (error) return self->End(error.message());
+      self->open_ = true;
+      self->accepted_.session->OnOpen(*self);
+      self->Read();
+    });
+  }
+
+  void SendText(std::string text) override { Queue({.text = true, .head = std::move(text), .tail = nullptr}); }
+  void SendBinary(std::string head, std::shared_ptr<const std::vector<std::byte>> tail) override {
+    Queue({.text = false, .head = std::move(head), .tail = std::move(tail)});
+  }
+
+  void Close(std::uint16_t code, std::string reason) override {
+    if (std::exchange(closing_, true)) return;
+    why_ = reason;
+    constexpr std::size_t kMaxReasonBytes = 120;
+    websocket::close_reason closing(static_cast<websocket::close_code>(code), reason.substr(0, kMaxReasonBytes));
+    // The other end may be one that does not read: it has only so long.
+    timer_.expires_after(std::chrono::seconds(2));
+    timer_.async_wait([self = this->shared_from_this()](Error error) {
+      if (!error) self->CloseNow();
+    });
+    if (writing_) {
+      close_after_write_ = closing;
+    } else {
+      SendClose(closing);
+    }
+  }
+
+  void CloseNow() override { beast::get_lowest_layer(socket_).close(); }
+
+ private:
+  struct Message {
+    bool text = true;
+    std::string head;
+    std::shared_ptr<const std::vector<std::byte>> tail;
+  };
+
+  void SendClose(const websocket::close_reason& closing) {
+    socket_.async_close(closing, [self = this->shared_from_this()](Error) { self->timer_.cancel(); });
+  }
+
+  void Queue(Message message) {
+    if (closing_ || !open_) return;
+    constexpr std::size_t kMaxQueued = 256;
+    if (queue_.size() >= kMaxQueued) return Drop("it does not read its messages");
+    queue_.push_back(std::move(message));
+    if (!writing_) Write();
+  }
+
+  void Write() {
+    writing_ = true;
+    const Message& message = queue_.front();
+    socket_.text(message.text);
+    timer_.expires_after(shared_->limits.writing);
+    timer_.async_wait([self = this->shared_from_this()](Error error) {
+      if (!error && self->writing_ && !self->closing_) self->Drop("a message did not leave in time");
+    });
+    const std::array<asio::const_buffer, 2> buffers = {
+        asio::buffer(message.head),
+        message.tail == nullptr ? asio::const_buffer() : asio::const_buffer(message.tail->data(), message.tail->size())};
+    socket_.async_write(buffers, [self = this->shared_from_this()](Error error, std::size_t) { self->OnWritten(error); });
+  }
+
+  void OnWritten(const Error& error) {
+    writing_ = false;
+    if (!closing_) timer_.cancel();
+    if (error) return End(error.message());
+    queue_.pop_front();
+    if (close_after_write_) return SendClose(*close_after_write_);
+    if (!closing_ && !queue_.empty()) Write();
+  }
+
+  void Drop(const std::string& why) {
+    shared_->application.CountRefusal("slow reader");
+    shared_->log.Warning(fmt::format("a viewer was dropped: {}", why));
+    closing_ = true;
+    why_ = why;
+    CloseNow();
+  }
+
+  void Read() {
+    socket_.async_read(buffer_, [self = this->shared_from_this()](Error error, std::size_t) { self->OnRead(error); });
+  }
+
+  void OnRead(const Error& error) {
+    if (error) return End(error == websocket::error::closed ? std::string() : error.message());
+    if (!socket_.got_text()) {
+      Close(1003, "messages to the gateway are text");
+    } else if (!closing_) {
+      const auto data = buffer_.cdata();
+      accepted_.session->OnText({static_cast<const char*>(data.data()), data.size()});
+    }
+    buffer_.consume(buffer_.size());
+    Read();
+  }
+
+  void End(const std::string& why) {
+    if (std::exchange(ended_, true)) return;
+    timer_.cancel();
+    closing_ = true;
+    if (open_) accepted_.session->OnClosed(why_.empty() ? why : why_);
+    CloseNow();
+  }
+
+  websocket::stream<Stream> socket_;
+  WebSocketAccepted accepted_;
+  asio::steady_timer timer_;
+  beast::flat_buffer buffer_;
+  std::deque<Message> queue_;  // the first one is being written, if any is
+  std::optional<websocket::close_reason> close_after_write_;
+  std::string why_;
+  bool open_ = false, writing_ = false, closing_ = false, ended_ = false;
+};
+
+// ---- HTTP
+
+template <class Stream>
+class HttpConnection final : public Registered, public std::enable_shared_from_this<HttpConnection<Stream>> {
+ public:
+  HttpConnection(Stream stream, std::shared_ptr<Shared> shared) : Registered(std::move(shared)), stream_(std::move(stream)) {}
+
+  void Run() {
+    if constexpr (std::is_same_v<Stream, TlsStream>) {
+      Lowest().expires_after(shared_->limits.reading);
+      stream_.async_handshake(asio::ssl::stream_base::server, [self = this->shared_from_this()](Error error) {
+        if (!error) self->Read();
+      });
+    } else {
+      Read();
+    }
+  }
+
+  void CloseNow() override { Lowest().close(); }
+
+ private:
+  PlainStream& Lowest() { return beast::get_lowest_layer(stream_); }
+
+  void Read() {
+    parser_.emplace();
+    parser_->header_limit(std::uint32_t(shared_->limits.header_bytes));
+    parser_->body_limit(shared_->limits.body_bytes);
+    Lowest().expires_after(shared_->limits.reading);
+    http::async_read(stream_, buffer_, *parser_, [self = this->shared_from_this()](Error error, std::size_t) { self->OnRead(error); });
+  }
+
+  void OnRead(const Error& error) {
+    if (error == http::error::header_limit || error == http::error::buffer_overflow) return Refuse(431, "header", "the header is too long");
+    if (error == http::error::body_limit) return Refuse(413, "body", "the body is too long");
+    if (error == http::error::end_of_stream || error == beast::error::timeout) return Shutdown();
+    if (error.category() == http::make_error_code(http::error::bad_version).category()) {
+      return Refuse(400, "malformed", "the request is not HTTP/1.1");
+    }
+    if (error) return;
+    Lowest().expires_never();
+    message_ = parser_->release();
+    HttpRequest request = RequestOf(message_);
+    if (websocket::is_upgrade(message_)) return Upgrade(request);
+    shared_->application.Handle(std::move(request), [self = this->shared_from_this()](HttpReply reply) {
+      self->Write(std::move(reply), self->message_.keep_alive());
+    });
+  }
+
+  void Upgrade(const HttpRequest& request) {
+    auto answer = shared_->application.Accept(request);
+    if (auto* reply = std::get_if<HttpReply>(&answer)) return Write(std::move(*reply), false);
+    std::make_shared<WebSocketConnection<Stream>>(std::move(stream_), shared_, std::move(std::get<WebSocketAccepted>(answer)))
+        ->Run(message_);
+  }
+
+  void Refuse(unsigned status, std::string_view what, std::string_view why) {
+    shared_->application.CountRefusal(what);
+    Write({.status = status, .body = fmt::format("{{\"error\":\"{}\"}}", why)}, false);
+  }
+
+  void Write(HttpReply reply, bool keep_alive) {
+    const bool head = message_.method() == http::verb::head;
+    response_.emplace(ResponseOf(std::move(reply), message_.version() == 0 ? 11 : message_.version(), keep_alive, *shared_));
+    Lowest().expires_after(shared_->limits.writing);
+    const auto written = [self = this->shared_from_this()](Error error, std::size_t) {
+      if (error == beast::error::timeout) {
+        self->shared_->application.CountRefusal("slow reader");
+        self->shared_->log.Warning("a connection was dropped: a response did not leave in time");
+      }
+      if (error) return;
+      self->response_->keep_alive() ? self->Read() : self->Shutdown();
+    };
+    if (head) {  // the length of the body, but no body
+      head_.emplace(response_->base());
+      header_.emplace(*head_);
+      return http::async_write_header(stream_, *header_, written);
+    }
+    http::async_write(stream_, *response_, written);
+  }
+
+  void Shutdown() {
+    if constexpr (std::is_same_v<Stream, TlsStream>) {
+      Lowest().expires_after(std::chrono::seconds(2));
+      stream_.async_shutdown([self = this->shared_from_this()](Error) { self->CloseNow(); });
+    } else {
+      Error ignored;
+      Lowest().socket().shutdown(tcp::socket::shutdown_send, ignored);
+      Drain();
+    }
+  }
+
+  // Closing with unread bytes would reset the connection, and the response could be lost with it. So what still comes is thrown away, for
+  // a while.
+  void Drain() {
+    if (drained_ > shared_->limits.body_bytes) return;
+    Lowest().expires_after(std::chrono::seconds(2));
+    stream_.async_read_some(asio::buffer(waste_), [self = this->shared_from_this()](Error error, std::size_t size) {
+      self->drained_ += size;
+      if (!error) self->Drain();
+    });
+  }
+
+  Stream stream_;
+  beast::flat_buffer buffer_;
+  std::optional<http::request_parser<http::string_body>> parser_;
+  http::request<http::string_body> message_;
+  std::optional<http::response<http::string_body>> response_;
+  std::optional<http::response<http::empty_body>> head_;
+  std::optional<http::response_serializer<http::empty_body>> header_;
+  std::array<char, 4096> waste_{};
+  std::size_t drained_ = 0;
+};
+
+// ---- the server
+
+class Server final : public HttpServer {
+ public:
+  Server(asio::io_context& io, std::shared_ptr<Shared> shared) : acceptor_(io), shared_(std::move(shared)) {}
+  ~Server() override { Stop(); }
+
+  Status Listen(const std::string& host, std::uint16_t port, const std::optional<TlsFiles>& tls) {
+    if (tls) {
+      if (Status status = Load(*tls); !status.ok()) return status;
+    }
+    Error error;
+    const asio::ip::address address = asio::ip::make_address(host, error);
+    const tcp::endpoint endpoint(address, port);
+    if (!error) acceptor_.open(endpoint.protocol(), error);
+    if (!error) acceptor_.set_option(asio::socket_base::reuse_address(true), error);
+    if (!error) acceptor_.bind(endpoint, error);
+    if (!error) acceptor_.listen(asio::socket_base::max_listen_connections, error);
+    if (error) return Status::Unavailable(fmt::format("cannot listen at {} port {}: {}", host, port, error.message()));
+    AcceptNext();
+    return Status::Ok();
+  }
+
+  std::uint16_t port() const override {
+    Error error;
+    return acceptor_.local_endpoint(error).port();
+  }
+
+  void Stop() override {
+    Error ignored;
+    acceptor_.close(ignored);
+    for (Closable* connection : std::set<Closable*>(shared_->open)) connection->CloseNow();
+  }
+
+ private:
+  Status Load(const TlsFiles& files) {
+    tls_.emplace(asio::ssl::context::tls_server);
+    Error error;
+    tls_->set_options(asio::ssl::context::default_workarounds | asio::ssl::context::no_tlsv1 | asio::ssl::context::no_tlsv1_1, error);
+    tls_->use_certificate_chain_file(files.certificate, error);
+    if (error) return Status::InvalidArgument(fmt::format("--tls-cert {}: {}", files.certificate, error.message()));
+    tls_->use_private_key_file(files.key, asio::ssl::context::pem, error);
+    if (error) return Status::InvalidArgument(fmt::format("--tls-key {}: {}", files.key, error.message()));
+    return Status::Ok();
+  }
+
+  void AcceptNext() {
+    acceptor_.async_accept([this](Error error, tcp::socket socket) {
+      if (error == asio::error::operation_aborted) return;
+      if (!error) Begin(std::move(socket));
+      AcceptNext();
+    });
+  }
+
+  void Begin(tcp::socket socket) {
+    if (shared_->open.size() >= shared_->limits.connections) {
+      shared_->application.CountRefusal("connections");
+      return shared_->log.Warning(fmt::format("a connection was closed: there are {} already", shared_->open.size()));
+    }
+    Error ignored;
+    socket.set_option(tcp::no_delay(true), ignored);
+    if (tls_) {
+      std::make_shared<HttpConnection<TlsStream>>(TlsStream(PlainStream(std::move(socket)), *tls_), shared_)->Run();
+    } else {
+      std::make_shared<HttpConnection<PlainStream>>(PlainStream(std::move(socket)), shared_)->Run();
+    }
+  }
+
+  std::optional<asio::ssl::context> tls_;
+  tcp::acceptor acceptor_;
+  std::shared_ptr<Shared> shared_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<HttpServer>> HttpServer::Start(boost::asio::io_context& io, const std::string& host, std::uint16_t port,
+                                                      const std::optional<TlsFiles>& tls, const HttpLimits& limits,
+                                                      HttpApplication& application) {
+  auto shared = std::make_shared<Shared>(Shared{.limits = limits, .application = application, .open = {}, .log = LimitedLog()});
+  auto server = std::make_unique<Server>(io, std::move(shared));
+  if (Status status = server->Listen(host, port, tls); !status.ok()) return status;
+  return std::unique_ptr<HttpServer>(std::move(server));
+}
+
+}  // namespace slabstream

@@ -1,0 +1,88 @@
+// slabstream-gateway: pictures of a service over HTTP and WebSockets (docs/http.md). It ends on SIGINT or SIGTERM.
+#include <CLI/CLI.hpp>
+#include <csignal>
+#include <cstdio>
+#include <string>
+
+#include "client/service/service_choice.h"
+#include "client/service/service_state.h"
+#include "common/base/files.h"
+#include "common/base/stop_signals.h"
+#include "common/base/version.h"
+#include "common/cli/add_option.h"
+#include "common/cli/program.h"
+#include "common/transport/context.h"
+#include "gateway/gateway.h"
+
+namespace slabstream {
+namespace {
+
+struct Options {
+  GatewayOptions gateway;
+  ServiceChoice service;
+  TlsFiles tls;
+  std::string token_file;
+};
+
+Result<std::string> TokenOf(const Options& options) {
+  if (options.token_file.empty()) return MakeToken();
+  constexpr std::size_t kMostBytes = 256;
+  Result<std::string> token = ReadTextFile(options.token_file, kMostBytes);
+  if (!token.ok()) return Status(token.status().code(), "--token-file " + token.status().message());
+  while (token->ends_with('\n')) token->pop_back();
+  if (Status status = CheckToken(*token); !status.ok()) {
+    return Status::InvalidArgument("--token-file " + options.token_file + ": " + status.message());
+  }
+  return token;
+}
+
+Status Serve(Options options) {
+  BlockStopSignals();
+  const Result<ServiceAddress> service = ResolveService(options.service);
+  if (!service.ok()) return service.status();
+  Result<std::string> token = TokenOf(options);
+  if (!token.ok()) return token.status();
+  options.gateway.token = *std::move(token);
+  if (!options.tls.certificate.empty()) options.gateway.tls = options.tls;
+  Context context;
+  const Result<std::unique_ptr<Gateway>> gateway = Gateway::Start(context, *service, options.gateway);
+  if (!gateway.ok()) return gateway.status();
+  // Whoever started this process reads the address from this line.
+  (void)std::printf("ready %s\n", (*gateway)->url().c_str());
+  (void)std::fflush(stdout);
+  const sigset_t signals = StopSignals();
+  int signal = 0;
+  (void)::sigwait(&signals, &signal);
+  return Status::Ok();
+}
+
+int Run(int argc, char** argv) {
+  Options options;
+  CLI::App app("Slabstream gateway: pictures of a service for browsers and scripts, over HTTP and WebSockets.", "slabstream-gateway");
+  SetUp(app, std::string(Version()));
+  AddService(app, options.service);
+  AddParsed(app, "--listen", options.gateway.listen, ParseListenAddress,
+            "Where it is reached: an address of this machine; port 0 is any free one. Addresses that are not loopback need TLS or a proxy")
+      ->type_name("HOST:PORT")
+      ->default_str("127.0.0.1:0");
+  CLI::Option* const certificate =
+      app.add_option("--tls-cert", options.tls.certificate, "Speak TLS with this certificate, and those that vouch for it (PEM)")
+          ->type_name("FILE");
+  CLI::Option* const key = app.add_option("--tls-key", options.tls.key, "Its private key (PEM)")->type_name("FILE");
+  certificate->needs(key);
+  key->needs(certificate);
+  AddParsed(app, "--behind-proxy", options.gateway.proxy_origin, ParseOrigin,
+            "A proxy in front of it ends TLS and is reached at this address, such as https://viewer.example.org")
+      ->type_name("ORIGIN");
+  app.add_option("--token-file", options.token_file, "Ask for the token in this file, 16 to 128 letters, digits, - and _")
+      ->type_name("FILE")
+      ->default_str("a new random one at each start");
+  return RunService(app, argc, argv, "gateway", [&] { return Serve(std::move(options)); });
+}
+
+}  // namespace
+}  // namespace slabstream
+
+int main(int argc, char** argv) {
+  return slabstream::RunMain("slabstream-gateway", [&] { return slabstream::Run(argc, argv); });
+}

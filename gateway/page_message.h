@@ -1,0 +1,46 @@
+// What a page says over its WebSocket (docs/http.md): text messages, JSON. Hostile until parsed. Pure.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <variant>
+
+#include "client/request/picture_fields.h"
+#include "common/base/status.h"
+
+namespace slabstream {
+
+inline constexpr std::size_t kMaxPageMessageBytes = std::size_t{1} << 20;
+inline constexpr std::uint64_t kMaxSequence = std::uint64_t{1} << 53;  // whole numbers up to this are exact in JavaScript
+
+enum class PictureKind : std::uint8_t { kRender = 1, kSlice = 2 };
+
+// A view to be shown. Its options are checked when it is rendered, because most views are overtaken before that.
+struct ViewMessage {
+  std::uint64_t seq = 0;  // [1, kMaxSequence]
+  PictureKind kind = PictureKind::kRender;
+  bool timeline = false;
+  PictureFields options;
+};
+
+// A picture is drawn.
+struct AckMessage {
+  std::uint64_t frame = 0;
+};
+
+using PageMessage = std::variant<ViewMessage, AckMessage>;
+
+// InvalidArgument: wrong in form.
+Result<PageMessage> ParsePageMessage(std::string_view text);
+
+// A parsed view, as frames to be rendered, from left to right in the picture.
+struct PictureJob {
+  std::vector<FrameRequest> frames;  // at least one, all of one size
+  ImageSize size;                    // of the whole picture
+  PictureFormat format;
+};
+// InvalidArgument: as ParseRenderFields.
+Result<PictureJob> MakePictureJob(PictureKind kind, const PictureFields& fields);
+
+}  // namespace slabstream

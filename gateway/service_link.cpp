@@ -1,0 +1,138 @@
+#include "gateway/service_link.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace slabstream {
+namespace {
+
+constexpr Duration kConnectTimeout = std::chrono::seconds(1);  // also how long an end may take
+constexpr Duration kConnectPause = std::chrono::milliseconds(500);
+constexpr Duration kIdle = std::chrono::seconds(5);
+
+}  // namespace
+
+ServiceLink::ServiceLink(Context& context, ServiceAddress address) : context_(context), address_(std::move(address)) {
+  thread_ = std::thread([this] { Run(); });
+}
+
+ServiceLink::~ServiceLink() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+    WakeUp();
+  }
+  thread_.join();
+}
+
+// With the mutex held.
+void ServiceLink::WakeUp() {
+  changed_.notify_one();
+  if (client_ != nullptr) client_->wakeup().Notify();
+}
+
+ServiceLink::Ticket ServiceLink::Render(std::vector<FrameRequest> frames, Duration deadline, Handlers handlers) {
+  const std::lock_guard lock(mutex_);
+  const Ticket ticket = ++last_ticket_;
+  tasks_.push_back({ticket, std::move(frames), deadline, std::move(handlers)});
+  WakeUp();
+  return ticket;
+}
+
+void ServiceLink::Cancel(Ticket ticket) {
+  const std::lock_guard lock(mutex_);
+  if (std::erase_if(tasks_, [&](const Task& task) { return task.ticket == ticket; }) > 0) return;
+  cancelled_.push_back(ticket);
+  WakeUp();
+}
+
+void ServiceLink::Run() {
+  while (true) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (stopping_) break;
+    }
+    if (client_ == nullptr) Connect();
+    TakeOrders();
+    if (client_ == nullptr) {
+      std::unique_lock lock(mutex_);
+      changed_.wait_for(lock, kConnectPause, [this] { return stopping_ || !tasks_.empty(); });
+    } else if (std::optional<ClientEvent> event = client_->Next(kIdle)) {
+      Handle(*std::move(event));
+    }
+  }
+  while (!open_.empty()) Forget(open_.begin());
+  const std::lock_guard lock(mutex_);
+  client_.reset();
+}
+
+void ServiceLink::Connect() {
+  Result<Client> client = Client::Connect(context_, address_, kConnectTimeout);
+  reason_ = client.status();
+  if (!client.ok()) return;
+  const std::lock_guard lock(mutex_);
+  client_ = std::make_unique<Client>(*std::move(client));
+}
+
+void ServiceLink::TakeOrders() {
+  std::vector<Task> tasks;
+  std::vector<Ticket> cancelled;
+  {
+    const std::lock_guard lock(mutex_);
+    std::swap(tasks, tasks_);
+    std::swap(cancelled, cancelled_);
+  }
+  for (const Ticket ticket : cancelled) {
+    if (const auto found = open_.find(ticket); found != open_.end()) Forget(found);
+  }
+  for (Task& task : tasks) {
+    client_ == nullptr ? task.handlers.done(Status::Unavailable(reason_.message())) : Begin(std::move(task));
+  }
+}
+
+void ServiceLink::Begin(Task task) {
+  OpenTask& open = open_[task.ticket];
+  open.handlers = std::move(task.handlers);
+  open.left = task.frames.size();
+  open.pictures.resize(task.frames.size());
+  for (const FrameRequest& frame : task.frames) {
+    open.requests.push_back(client_->Submit(frame, task.deadline));
+    requests_[open.requests.back()] = task.ticket;
+  }
+}
+
+void ServiceLink::Handle(ClientEvent event) {
+  const auto request = requests_.find(event.request);
+  if (request == requests_.end()) return;
+  const auto found = open_.find(request->second);
+  OpenTask& task = found->second;
+  if (const auto* progress = std::get_if<FrameProgress>(&event.what)) {
+    if (task.handlers.progress) task.handlers.progress(*progress);
+    return;
+  }
+  if (auto* failure = std::get_if<Status>(&event.what)) {
+    Status status = std::move(*failure);
+    requests_.erase(request);
+    const auto done = std::move(task.handlers.done);
+    Forget(found);
+    return done(std::move(status));
+  }
+  auto& picture = std::get<Picture>(event.what);
+  if (!picture.final) return;
+  requests_.erase(request);
+  const auto place = std::ranges::find(task.requests, event.request) - task.requests.begin();
+  task.pictures[std::size_t(place)] = std::move(picture);
+  if (--task.left > 0) return;
+  OpenTask finished = std::move(task);
+  open_.erase(found);
+  finished.handlers.done(std::move(finished.pictures));
+}
+
+void ServiceLink::Forget(std::map<Ticket, OpenTask>::iterator task) {
+  for (const RequestId id : task->second.requests) {
+    if (requests_.erase(id) > 0) client_->Cancel(id);
+  }
+  open_.erase(task);
+}
+
+}  // namespace slabstream

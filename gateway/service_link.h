@@ -1,0 +1,81 @@
+// ServiceLink: a client of the service on a thread of its own, for those who must not wait. Each link is a client of its own to the
+// service, which shares its workers fairly among clients.
+//
+// It connects by itself, at once and again after the service was gone.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "client/client.h"
+#include "common/base/status.h"
+
+namespace slabstream {
+
+class ServiceLink {
+ public:
+  using Ticket = std::uint64_t;
+  struct Handlers {
+    std::function<void(const FrameProgress&)> progress;      // may be empty
+    std::function<void(Result<std::vector<Picture>>)> done;  // once, unless the ticket was cancelled before
+  };
+
+  // `context` and what the handlers use must outlive it.
+  ServiceLink(Context& context, ServiceAddress address);
+  ~ServiceLink();  // cancels what is open; may take a second while the service does not answer
+  ServiceLink(const ServiceLink&) = delete;
+  ServiceLink& operator=(const ServiceLink&) = delete;
+
+  // Any thread. Renders `frames`, at least one, all at once; the first failure is that of all. The handlers are called on the link's
+  // thread. Unavailable: the service does not answer.
+  Ticket Render(std::vector<FrameRequest> frames, Duration deadline, Handlers handlers);
+  // Any thread. The handlers may still be called if they are about to be.
+  void Cancel(Ticket ticket);
+
+ private:
+  struct Task {
+    Ticket ticket = 0;
+    std::vector<FrameRequest> frames;
+    Duration deadline{};
+    Handlers handlers;
+  };
+  struct OpenTask {
+    Handlers handlers;
+    std::vector<RequestId> requests;  // of each frame
+    std::vector<Picture> pictures;    // of each frame
+    std::size_t left = 0;             // frames that are not finished
+  };
+
+  void Run();
+  void Connect();
+  void TakeOrders();
+  void Begin(Task task);
+  void Handle(ClientEvent event);
+  void Forget(std::map<Ticket, OpenTask>::iterator task);  // cancels its frames
+  void WakeUp();
+
+  Context& context_;
+  const ServiceAddress address_;
+  // Of the link's thread.
+  std::map<Ticket, OpenTask> open_;
+  std::map<RequestId, Ticket> requests_;
+  Status reason_;  // why there is no client
+  // Shared.
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::unique_ptr<Client> client_;  // made and ended by the link's thread; others use its wakeup only, under the mutex
+  std::vector<Task> tasks_;
+  std::vector<Ticket> cancelled_;
+  Ticket last_ticket_ = 0;
+  bool stopping_ = false;
+  std::thread thread_;
+};
+
+}  // namespace slabstream

@@ -1,0 +1,164 @@
+#include "gateway/view_machine.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace slabstream {
+namespace {
+
+using std::chrono::milliseconds;
+
+// Quality of JPEG falls with the round trip: at these and beyond it stays.
+constexpr Duration kQuick = milliseconds(30), kSlow = milliseconds(200);
+constexpr int kBestQuality = 92, kLeastQuality = 50;
+// Pictures become small above the first, and large again below the second, which small ones would else lead to at once.
+constexpr Duration kSmallAbove = milliseconds(100), kLargeBelow = milliseconds(50);
+
+Duration Smoothed(Duration before, Duration sample) { return before == Duration::zero() ? sample : (3 * before + sample) / 4; }
+
+}  // namespace
+
+int ViewMachine::Quality() const {
+  const double share = double((std::clamp(round_trip_, kQuick, kSlow) - kQuick).count()) / double((kSlow - kQuick).count());
+  return kBestQuality - int(share * (kBestQuality - kLeastQuality));
+}
+
+ViewMachine::Actions ViewMachine::OnView(std::uint64_t seq, Time now) {
+  Actions actions;
+  if (seq <= latest_) return actions;
+  latest_ = seq;
+  latest_since_ = now;
+  refused_ = false;
+  // A lossless picture of an older view is given up.
+  if (out_ != Out::kEmpty && outgoing_final_) {
+    if (out_ == Out::kEncoding) actions.push_back({.kind = ViewActionKind::kCancelEncode});
+    out_ = Out::kEmpty;
+  }
+  if (rendering_ && rendering_->for_still) {
+    actions.push_back({.kind = ViewActionKind::kCancelRender});
+    rendering_.reset();
+  }
+  Actions more = Next(now);
+  actions.insert(actions.end(), more.begin(), more.end());
+  return actions;
+}
+
+ViewMachine::Actions ViewMachine::OnRendered(Time now) {
+  if (!rendering_) return {};
+  render_time_ = Smoothed(render_time_, now - rendering_since_);
+  rendered_ = std::exchange(rendering_, std::nullopt);
+  to_be_shown_ = !rendered_->for_still;
+  return Next(now);
+}
+
+ViewMachine::Actions ViewMachine::OnRefused(Time now) {
+  if (!rendering_) return {};
+  if (rendering_->seq == latest_) refused_ = true;
+  rendering_.reset();
+  return Next(now);
+}
+
+ViewMachine::Actions ViewMachine::OnUnavailable(Time now) {
+  rendering_.reset();
+  unavailable_ = true;
+  return Next(now);
+}
+
+ViewMachine::Actions ViewMachine::OnServiceBack(Time now) {
+  if (!std::exchange(unavailable_, false)) return {};
+  return Next(now);
+}
+
+ViewMachine::Actions ViewMachine::OnEncoded(Time now) {
+  if (out_ == Out::kEncoding) out_ = Out::kEncoded;
+  return Next(now);
+}
+
+ViewMachine::Actions ViewMachine::OnEncodeFailed(Time now) {
+  out_ = Out::kEmpty;
+  if (rendered_) final_seq_ = std::max(final_seq_, rendered_->seq);
+  return Next(now);
+}
+
+ViewMachine::Actions ViewMachine::OnAck(std::uint64_t frame, Time now) {
+  if (sent_ != frame) return {};
+  sent_.reset();
+  if (!sent_final_) {  // lossless pictures are larger: they say nothing about the next one that moves
+    round_trip_ = Smoothed(round_trip_, std::max<Duration>(now - sent_at_, Duration(1)));
+    if (round_trip_ > kSmallAbove) small_ = true;
+    if (round_trip_ < kLargeBelow) small_ = false;
+  }
+  return Next(now);
+}
+
+ViewMachine::Actions ViewMachine::OnTime(Time now) { return Next(now); }
+
+ViewMachine::Actions ViewMachine::Next(Time now) {
+  Actions actions;
+  wake_.reset();
+  Send(now, actions);
+  Encode(now, actions);
+  Render(now, actions);
+  return actions;
+}
+
+void ViewMachine::Send(Time now, Actions& actions) {
+  if (out_ != Out::kEncoded || sent_) return;
+  out_ = Out::kEmpty;
+  sent_ = ++frames_;
+  sent_at_ = now;
+  sent_final_ = outgoing_final_;
+  actions.push_back({.kind = ViewActionKind::kSend, .frame = *sent_});
+}
+
+void ViewMachine::Encode(Time now, Actions& actions) {
+  if (out_ == Out::kEncoding || !rendered_) return;
+  if (to_be_shown_) {  // also in place of an older picture that could not be sent yet
+    to_be_shown_ = false;
+    outgoing_final_ = false;
+    out_ = Out::kEncoding;
+    actions.push_back({.kind = ViewActionKind::kEncode, .quality = Quality()});
+    return;
+  }
+  const bool same_in_full = rendered_->seq == latest_ && rendered_->scale == 1;
+  if (out_ != Out::kEmpty || !same_in_full || final_seq_ == latest_) return;
+  if (now < latest_since_ + kStillAfter) return WakeAt(latest_since_ + kStillAfter);
+  final_seq_ = latest_;
+  outgoing_final_ = true;
+  out_ = Out::kEncoding;
+  actions.push_back({.kind = ViewActionKind::kEncode, .final = true});
+}
+
+bool ViewMachine::IsRenderedOrRenders(std::uint64_t seq) const {
+  return (rendered_ && rendered_->seq == seq) || (rendering_ && rendering_->seq == seq);
+}
+
+// A frame that would wait for the page is begun later, and then shows a newer view.
+bool ViewMachine::MayRender(Time now) {
+  if (!sent_) return true;
+  if (out_ != Out::kEmpty) return false;
+  const Time ready = sent_at_ + round_trip_ - render_time_;
+  if (now >= ready) return true;
+  WakeAt(ready);
+  return false;
+}
+
+void ViewMachine::Render(Time now, Actions& actions) {
+  if (latest_ == 0 || refused_ || unavailable_ || rendering_) return;
+  Picture next{.seq = latest_, .scale = small_ ? 0.5 : 1};
+  if (IsRenderedOrRenders(latest_)) {
+    const bool still_needs_it = rendered_->scale != 1 && !to_be_shown_;
+    if (!still_needs_it) return;
+    if (now < latest_since_ + kStillAfter) return WakeAt(latest_since_ + kStillAfter);
+    next = {.seq = latest_, .scale = 1, .for_still = true};
+  } else if (!MayRender(now)) {
+    return;
+  }
+  rendering_ = next;
+  rendering_since_ = now;
+  actions.push_back({.kind = ViewActionKind::kRender, .seq = next.seq, .scale = next.scale});
+}
+
+void ViewMachine::WakeAt(Time time) { wake_ = wake_ ? std::min(*wake_, time) : time; }
+
+}  // namespace slabstream

@@ -1,0 +1,99 @@
+// ViewMachine: decides what happens next for one view that a page changes: when to render, encode, send and give up. Pure: events and the
+// time go in, actions come out. The session (view_session.h) carries them out.
+//
+//   OnView --> [pending] --Render--> [rendering] --OnRendered--> [outgoing] --Encode--> OnEncoded --Send--> [sent] --OnAck--> ...
+//
+// - The latest view wins: there is one pending view, and a new one takes its place.
+// - One view renders, one picture is outgoing, one is sent and not acknowledged. The next view begins to render when it should be finished
+//   no sooner than the page is ready for its picture: so what is shown is as new as can be, and no frame is rendered for nothing.
+// - A frame that renders is finished although newer views have come, else a picture that always moves would never be seen. A lossless
+//   picture is given up for a newer view.
+// - kStillAfter after the last view, the same picture follows, lossless: the one that was rendered, or one in full size if that was small.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "common/base/time.h"
+
+namespace slabstream {
+
+inline constexpr Duration kStillAfter = std::chrono::milliseconds(150);
+
+enum class ViewActionKind : std::uint8_t {
+  kRender,        // view `seq` at `scale`; answer by OnRendered, OnRefused or OnUnavailable
+  kCancelRender,  // the frame that renders; no answer
+  kEncode,        // the picture that was rendered last, `final` or with `quality`; answer by OnEncoded
+  kCancelEncode,  // no answer
+  kSend,          // what was encoded, as number `frame`; answered by the page (OnAck)
+};
+
+struct ViewAction {
+  ViewActionKind kind = ViewActionKind::kRender;
+  std::uint64_t seq = 0;    // kRender
+  double scale = 1;         // kRender: of width and height
+  bool final = false;       // kEncode: lossless
+  int quality = 0;          // kEncode: of JPEG, if not final
+  std::uint64_t frame = 0;  // kSend
+  friend bool operator==(const ViewAction&, const ViewAction&) = default;
+};
+
+class ViewMachine {
+ public:
+  using Actions = std::vector<ViewAction>;
+
+  // `seq` rises from view to view; one that does not is ignored.
+  Actions OnView(std::uint64_t seq, Time now);
+  Actions OnRendered(Time now);
+  Actions OnRefused(Time now);      // the view cannot be rendered: it is done with
+  Actions OnUnavailable(Time now);  // the service is gone: the view waits for OnServiceBack
+  Actions OnServiceBack(Time now);
+  Actions OnEncoded(Time now);
+  Actions OnEncodeFailed(Time now);  // there is no picture to send; the view is done with
+  Actions OnAck(std::uint64_t frame, Time now);
+  Actions OnTime(Time now);  // at wake_time()
+
+  // When OnTime is due; nullopt: nothing waits for a time.
+  std::optional<Time> wake_time() const { return wake_; }
+  Duration round_trip() const { return round_trip_; }
+  // Of a moving picture, by the measured round trip.
+  int Quality() const;
+
+ private:
+  struct Picture {
+    std::uint64_t seq = 0;
+    double scale = 1;
+    bool for_still = false;  // in full size, to be shown lossless only
+  };
+  enum class Out : std::uint8_t { kEmpty, kEncoding, kEncoded };
+
+  Actions Next(Time now);
+  void Send(Time now, Actions& actions);
+  void Encode(Time now, Actions& actions);
+  void Render(Time now, Actions& actions);
+  bool IsRenderedOrRenders(std::uint64_t seq) const;
+  bool MayRender(Time now);
+  void WakeAt(Time time);
+
+  std::uint64_t latest_ = 0;  // the newest view; 0: none yet
+  Time latest_since_{};
+  bool refused_ = false;      // the latest view
+  bool unavailable_ = false;  // the service
+  std::optional<Picture> rendering_;
+  Time rendering_since_{};
+  std::optional<Picture> rendered_;  // the last one that was finished
+  bool to_be_shown_ = false;         // and it was not encoded yet
+  Out out_ = Out::kEmpty;
+  bool outgoing_final_ = false;
+  std::uint64_t final_seq_ = 0;        // the newest view whose lossless picture was begun
+  std::optional<std::uint64_t> sent_;  // the frame that is not acknowledged
+  Time sent_at_{};
+  bool sent_final_ = false;
+  std::uint64_t frames_ = 0;
+  Duration round_trip_{}, render_time_{};  // smoothed; 0: not measured yet
+  bool small_ = false;                     // pictures while moving have half the size
+  std::optional<Time> wake_;
+};
+
+}  // namespace slabstream

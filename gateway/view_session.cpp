@@ -1,0 +1,230 @@
+#include "gateway/view_session.h"
+
+#include <algorithm>
+#include <boost/asio/post.hpp>
+#include <utility>
+
+#include "client/report/status_text.h"
+#include "common/base/version.h"
+
+namespace slabstream {
+namespace {
+
+namespace asio = boost::asio;
+
+constexpr Duration kDeadline = std::chrono::minutes(10);  // volumes may have to be loaded first
+
+std::string TextOf(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+
+std::string_view NameOf(FramePhase phase) {
+  switch (phase) {
+    case FramePhase::kQueued: return "queued";
+    case FramePhase::kLoading: return "loading";
+    case FramePhase::kRunning: break;
+  }
+  return "running";
+}
+
+int Scaled(int pixels, double scale) { return std::max(1, int(double(pixels) * scale + 0.5)); }
+
+}  // namespace
+
+ViewSession::ViewSession(SessionSurroundings surroundings, std::unique_ptr<ServiceLink> link, std::shared_ptr<const ServiceNews> news,
+                         std::function<void(ViewSession&)> closed)
+    : around_(surroundings), link_(std::move(link)), news_(std::move(news)), closed_(std::move(closed)), timer_(surroundings.io) {}
+
+// The end of a link may take a while, which the io thread has not.
+ViewSession::~ViewSession() {
+  asio::post(around_.encoders, [link = std::shared_ptr<ServiceLink>(std::move(link_))] {});
+}
+
+void ViewSession::OnOpen(WebSocketPeer& peer) {
+  peer_ = &peer;
+  around_.metrics.CountSession(1);
+  peer_->SendText(TextOf({{"type", "hello"},
+                          {"version", 1},
+                          {"program", std::string("slabstream ") + std::string(Version())},
+                          {"still_after_ms", std::chrono::duration_cast<std::chrono::milliseconds>(kStillAfter).count()}}));
+  SendStatus();
+}
+
+void ViewSession::OnClosed(const std::string&) {
+  if (std::exchange(peer_, nullptr) == nullptr) return;
+  around_.metrics.CountSession(-1);
+  timer_.cancel();
+  if (rendering_) link_->Cancel(rendering_->ticket);
+  if (given_up_ != nullptr) *given_up_ = true;
+  closed_(*this);
+}
+
+void ViewSession::End() {
+  if (peer_ != nullptr) peer_->Close(1001, "the gateway ends");
+}
+
+void ViewSession::OnText(std::string_view text) {
+  Result<PageMessage> message = ParsePageMessage(text);
+  if (!message.ok()) {
+    around_.metrics.CountRefusal("message");
+    return peer_->Close(1008, message.status().message());
+  }
+  if (auto* view = std::get_if<ViewMessage>(&*message)) return Handle(*std::move(view));
+  const ViewMachine::Actions actions = machine_.OnAck(std::get<AckMessage>(*message).frame, MonotonicNow());
+  if (sent_at_ != Time{}) around_.metrics.CountRoundTrip(MonotonicNow() - std::exchange(sent_at_, Time{}));
+  Do(actions);
+}
+
+void ViewSession::Handle(ViewMessage view) {
+  if (view_ && view.seq <= view_->seq) {
+    return peer_->Close(1008, "seq " + std::to_string(view.seq) + " does not rise: the last one was " + std::to_string(view_->seq));
+  }
+  const std::uint64_t seq = view.seq;
+  view_ = std::move(view);
+  Do(machine_.OnView(seq, MonotonicNow()));
+}
+
+void ViewSession::OnNews(std::shared_ptr<const ServiceNews> news) {
+  news_ = std::move(news);
+  if (peer_ == nullptr) return;
+  SendStatus();
+  if (news_->health != ServiceHealth::kGone) Do(machine_.OnServiceBack(MonotonicNow()));
+}
+
+void ViewSession::SendStatus() {
+  Json json = {{"type", "status"}, {"service", slabstream::NameOf(news_->health)}, {"reason", news_->reason}};
+  const Json status = StatusJson(news_->status);
+  for (const char* field : {"workers", "workers_lost", "queued", "running", "frames_done", "datasets"}) json[field] = status[field];
+  peer_->SendText(TextOf(json));
+}
+
+void ViewSession::SendError(std::uint64_t seq, const Status& status) {
+  if (peer_ == nullptr) return;
+  peer_->SendText(TextOf({{"type", "error"}, {"seq", seq}, {"code", ToString(status.code())}, {"error", status.message()}}));
+}
+
+void ViewSession::Do(const ViewMachine::Actions& actions) {
+  for (const ViewAction& action : actions) {
+    switch (action.kind) {
+      case ViewActionKind::kRender: Render(action.seq, action.scale); break;
+      case ViewActionKind::kCancelRender:
+        if (rendering_) link_->Cancel(rendering_->ticket);
+        rendering_.reset();
+        break;
+      case ViewActionKind::kEncode: Encode(action.final, action.quality); break;
+      case ViewActionKind::kCancelEncode:
+        *given_up_ = true;
+        ++encoding_;
+        break;
+      case ViewActionKind::kSend: Send(action.frame); break;
+    }
+  }
+  SetTimer();
+}
+
+void ViewSession::SetTimer() {
+  if (peer_ == nullptr || !machine_.wake_time()) {
+    timer_.cancel();
+    return;
+  }
+  timer_.expires_at(*machine_.wake_time());
+  timer_.async_wait([weak = weak_from_this()](boost::system::error_code error) {
+    const auto self = weak.lock();
+    if (!error && self != nullptr && self->peer_ != nullptr) self->Do(self->machine_.OnTime(MonotonicNow()));
+  });
+}
+
+void ViewSession::Render(std::uint64_t seq, double scale) {
+  const std::uint64_t order = ++orders_;
+  Result<PictureJob> job = MakePictureJob(view_->kind, view_->options);
+  if (!job.ok()) {
+    SendError(seq, job.status());
+    rendering_ = Rendering{.order = order};
+    // Not now: the machine is still at work.
+    asio::post(around_.io, [self = shared_from_this(), order] {
+      if (!self->rendering_ || self->rendering_->order != order || self->peer_ == nullptr) return;
+      self->rendering_.reset();
+      self->Do(self->machine_.OnRefused(MonotonicNow()));
+    });
+    return;
+  }
+  for (FrameRequest& frame : job->frames) frame.size = {Scaled(frame.size.width, scale), Scaled(frame.size.height, scale)};
+  Rendering rendering{.order = order, .ticket = 0, .view = {}, .size = job->frames.front().size};
+  rendering.view.seq = seq;
+  rendering.view.scale = scale;
+  rendering.view.format = std::move(job->format);
+  rendering.view.timeline = view_->timeline;
+  const auto self = shared_from_this();
+  rendering.ticket = link_->Render(std::move(job->frames), kDeadline,
+                                   {.progress =
+                                        [self, order](const FrameProgress& progress) {
+                                          asio::post(self->around_.io, [self, order, progress] { self->OnProgress(order, progress); });
+                                        },
+                                    .done =
+                                        [self, order](Result<std::vector<Picture>> pictures) {
+                                          asio::post(self->around_.io, [self, order, pictures = std::move(pictures)]() mutable {
+                                            self->OnFrames(order, std::move(pictures));
+                                          });
+                                        }});
+  rendering_ = std::move(rendering);
+}
+
+void ViewSession::OnProgress(std::uint64_t order, const FrameProgress& progress) {
+  if (peer_ == nullptr || !rendering_ || rendering_->order != order) return;
+  peer_->SendText(TextOf({{"type", "progress"},
+                          {"seq", rendering_->view.seq},
+                          {"phase", NameOf(progress.phase)},
+                          {"queue_position", progress.queue_position},
+                          {"groups_done", progress.groups_done},
+                          {"group_count", progress.group_count},
+                          {"attempt", progress.attempt},
+                          {"workers", progress.workers}}));
+}
+
+void ViewSession::OnFrames(std::uint64_t order, Result<std::vector<Picture>> pictures) {
+  if (peer_ == nullptr || !rendering_ || rendering_->order != order) return;
+  Rendering rendering = *std::exchange(rendering_, std::nullopt);
+  if (!pictures.ok()) {
+    if (pictures.status().code() == StatusCode::kUnavailable) return Do(machine_.OnUnavailable(MonotonicNow()));
+    SendError(rendering.view.seq, pictures.status());
+    return Do(machine_.OnRefused(MonotonicNow()));
+  }
+  RenderedView view = JoinPictures(*std::move(pictures), rendering.size);
+  view.seq = rendering.view.seq;
+  view.scale = rendering.view.scale;
+  view.format = std::move(rendering.view.format);
+  view.timeline = rendering.view.timeline;
+  around_.metrics.CountFrame(view.statistics, view.latency);
+  rendered_ = std::make_shared<const RenderedView>(std::move(view));
+  Do(machine_.OnRendered(MonotonicNow()));
+}
+
+void ViewSession::Encode(bool final, int quality) {
+  given_up_ = std::make_shared<std::atomic<bool>>(false);
+  const std::uint64_t number = ++encoding_;
+  asio::post(around_.encoders, [self = shared_from_this(), view = rendered_, final, quality, given_up = given_up_, number]() mutable {
+    Result<EncodedView> encoded = EncodeView(*view, final, quality, *given_up);
+    view.reset();
+    auto& io = self->around_.io;
+    asio::post(io,
+               [self = std::move(self), number, encoded = std::move(encoded)]() mutable { self->OnEncoded(number, std::move(encoded)); });
+  });
+}
+
+void ViewSession::OnEncoded(std::uint64_t number, Result<EncodedView> encoded) {
+  if (peer_ == nullptr || number != encoding_) return;
+  if (!encoded.ok()) {
+    if (encoded.status().code() == StatusCode::kCancelled) return;
+    SendError(rendered_->seq, encoded.status());
+    return Do(machine_.OnEncodeFailed(MonotonicNow()));
+  }
+  around_.metrics.CountPicture(encoded->type, encoded->bytes->size(), encoded->encoding);
+  encoded_ = *std::move(encoded);
+  Do(machine_.OnEncoded(MonotonicNow()));
+}
+
+void ViewSession::Send(std::uint64_t frame) {
+  EncodedView encoded = *std::exchange(encoded_, std::nullopt);
+  sent_at_ = MonotonicNow();
+  peer_->SendBinary(HeadOf(std::move(encoded.header), frame, machine_.round_trip()), std::move(encoded.bytes));
+}
+
+}  // namespace slabstream

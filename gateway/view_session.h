@@ -1,0 +1,82 @@
+// ViewSession: one WebSocket with one view. It carries out what its ViewMachine decides. Of the io thread.
+#pragma once
+
+#include <atomic>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/thread_pool.hpp>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "gateway/frame_message.h"
+#include "gateway/http.h"
+#include "gateway/metrics.h"
+#include "gateway/page_message.h"
+#include "gateway/service_link.h"
+#include "gateway/service_monitor.h"
+#include "gateway/view_machine.h"
+
+namespace slabstream {
+
+// What sessions share; all of it outlives them.
+struct SessionSurroundings {
+  boost::asio::io_context& io;
+  boost::asio::thread_pool& encoders;
+  Metrics& metrics;
+};
+
+class ViewSession final : public WebSocketSession, public std::enable_shared_from_this<ViewSession> {
+ public:
+  // `closed` is called at the end, when the session leaves.
+  ViewSession(SessionSurroundings surroundings, std::unique_ptr<ServiceLink> link, std::shared_ptr<const ServiceNews> news,
+              std::function<void(ViewSession&)> closed);
+  ~ViewSession() override;
+
+  void OnOpen(WebSocketPeer& peer) override;
+  void OnText(std::string_view text) override;
+  void OnClosed(const std::string& reason) override;
+
+  void OnNews(std::shared_ptr<const ServiceNews> news);
+  void End();  // the gateway stops
+
+ private:
+  void Handle(ViewMessage view);
+  void Do(const ViewMachine::Actions& actions);
+  void Render(std::uint64_t seq, double scale);
+  void OnFrames(std::uint64_t order, Result<std::vector<Picture>> pictures);
+  void OnProgress(std::uint64_t order, const FrameProgress& progress);
+  void Encode(bool final, int quality);
+  void OnEncoded(std::uint64_t number, Result<EncodedView> encoded);
+  void Send(std::uint64_t frame);
+  void SendError(std::uint64_t seq, const Status& status);
+  void SendStatus();
+  void SetTimer();
+
+  SessionSurroundings around_;
+  std::unique_ptr<ServiceLink> link_;
+  std::shared_ptr<const ServiceNews> news_;
+  std::function<void(ViewSession&)> closed_;
+  WebSocketPeer* peer_ = nullptr;  // null before OnOpen and after OnClosed
+  ViewMachine machine_;
+  boost::asio::steady_timer timer_;
+
+  std::optional<ViewMessage> view_;  // the latest
+  std::uint64_t orders_ = 0;         // counts orders to render
+  struct Rendering {
+    std::uint64_t order = 0;
+    ServiceLink::Ticket ticket = 0;
+    RenderedView view;  // what is known before the pictures are there
+    ImageSize size;     // of each frame
+  };
+  std::optional<Rendering> rendering_;
+  std::shared_ptr<const RenderedView> rendered_;
+  std::shared_ptr<std::atomic<bool>> given_up_;  // of what is being encoded
+  std::uint64_t encoding_ = 0;                   // number of the encoding whose end is awaited
+  std::optional<EncodedView> encoded_;
+  Time sent_at_{};
+};
+
+}  // namespace slabstream

@@ -1,0 +1,108 @@
+#include "gateway/page_message.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "gateway/address.h"
+#include "gateway/target.h"
+
+namespace slabstream {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(PageMessageTest, ViewsAndAcknowledgements) {
+  const auto view =
+      ParsePageMessage(R"({"type": "view", "seq": 17, "options": {"dataset": "head", "azimuth": 30, "clip-plane": ["1,0,0,5"]}})");
+  ASSERT_TRUE(view.ok()) << view.status().message();
+  const auto& message = std::get<ViewMessage>(*view);
+  EXPECT_EQ(message.seq, 17U);
+  EXPECT_EQ(message.kind, PictureKind::kRender);
+  const auto job = MakePictureJob(message.kind, message.options);
+  ASSERT_TRUE(job.ok()) << job.status().message();
+  EXPECT_EQ(job->frames.front().view.azimuth_degrees, 30);
+  EXPECT_EQ(job->frames.front().clipping.planes.size(), 1U);
+  const auto ack = ParsePageMessage(R"({"frame": 5, "type": "ack"})");
+  ASSERT_TRUE(ack.ok());
+  EXPECT_EQ(std::get<AckMessage>(*ack).frame, 5U);
+}
+
+TEST(PageMessageTest, WrongFormIsRefusedInOneLine) {
+  const std::string deep = std::string(5000, '[');
+  for (const std::string text :
+       {std::string(), std::string("{}"), std::string("[]"), std::string("null"), std::string(R"({"type": "x"})"),
+        std::string(R"({"type": "view"})"), std::string(R"({"type": "view", "seq": 0, "options": {}})"),
+        std::string(R"({"type": "view", "seq": 1, "options": []})"), std::string(R"({"type": "view", "seq": 1, "options": {}, "more": 1})"),
+        std::string(R"({"type": "view", "seq": 1e300, "options": {}})"), std::string(R"({"type": "ack"})"),
+        std::string(R"({"type": "ack", "frame": -1})"), deep}) {
+    const auto message = ParsePageMessage(text);
+    ASSERT_FALSE(message.ok()) << text;
+    EXPECT_EQ(message.status().code(), StatusCode::kInvalidArgument);
+    EXPECT_THAT(message.status().message(), testing::Not(HasSubstr("\n")));
+  }
+  EXPECT_FALSE(ParsePageMessage(std::string(kMaxPageMessageBytes + 1, ' ')).ok());
+}
+
+TEST(TargetTest, FieldsAreDecoded) {
+  const auto target = ParseTarget("/api/v1/render.png?dataset=a%20b&title=1+%2B+1&fit&&light=1,0,0&light=0%2c1,0");
+  ASSERT_TRUE(target.ok());
+  EXPECT_EQ(target->path, "/api/v1/render.png");
+  ASSERT_EQ(target->fields.size(), 5U);
+  EXPECT_EQ(target->fields[0].text, "a b");
+  EXPECT_EQ(target->fields[1].text, "1 + 1");
+  EXPECT_EQ(target->fields[2].name, "fit");
+  EXPECT_EQ(target->fields[4].text, "0,1,0");
+  for (const char* wrong : {"", "x", "/?%", "/?a=%4", "/?a=%zz", "http://host/"}) EXPECT_FALSE(ParseTarget(wrong).ok()) << wrong;
+  std::string many = "/?";
+  for (std::size_t i = 0; i <= kMaxPictureFields; ++i) many += "a=b&";
+  EXPECT_FALSE(ParseTarget(many).ok());
+}
+
+TEST(AddressTest, ListenAddresses) {
+  const auto any = ParseListenAddress("--listen", "127.0.0.1");
+  ASSERT_TRUE(any.ok());
+  EXPECT_EQ(any->port, 0);
+  EXPECT_TRUE(ParseListenAddress("--listen", "[::1]:80")->loopback);
+  EXPECT_FALSE(ParseListenAddress("--listen", "0.0.0.0:80")->loopback);
+  EXPECT_EQ(ParseListenAddress("--listen", "localhost:8080")->host, "127.0.0.1");
+  for (const char* wrong : {"", ":80", "host.example:80", "127.0.0.1:x", "127.0.0.1:65536", "::1", "[::1", "1.2.3:5"}) {
+    EXPECT_FALSE(ParseListenAddress("--listen", wrong).ok()) << wrong;
+  }
+}
+
+TEST(AddressTest, OnlyOwnHostsAndOriginsMayAsk) {
+  const ListenAddress loopback = *ParseListenAddress("--listen", "127.0.0.1:4000");
+  const OriginRules rules(loopback, false, "");
+  EXPECT_EQ(rules.Refusal("127.0.0.1:4000", std::nullopt), std::nullopt);
+  EXPECT_EQ(rules.Refusal("localhost:9999", "http://localhost:9999"), std::nullopt);  // a tunnel's near end
+  EXPECT_EQ(rules.Refusal("[::1]:4000", "http://[::1]:4000"), std::nullopt);
+  EXPECT_NE(rules.Refusal("evil.example:4000", std::nullopt), std::nullopt);  // a name that was made to point here
+  EXPECT_NE(rules.Refusal("", std::nullopt), std::nullopt);
+  EXPECT_NE(rules.Refusal("localhost:4000", "http://evil.example"), std::nullopt);
+  EXPECT_NE(rules.Refusal("localhost:4000", "https://localhost:4000"), std::nullopt);
+  EXPECT_NE(rules.Refusal("localhost:4000", "http://localhost:4001"), std::nullopt);
+  EXPECT_NE(rules.Refusal("localhost:4000", "null"), std::nullopt);
+  const OriginRules proxied(loopback, false, *ParseOrigin("--behind-proxy", "https://Viewer.example.org"));
+  EXPECT_EQ(proxied.Refusal("viewer.example.org", "https://viewer.example.org"), std::nullopt);
+  EXPECT_EQ(proxied.Refusal("localhost:4000", "https://viewer.example.org"), std::nullopt);  // a proxy that changes Host
+  EXPECT_NE(proxied.Refusal("viewer.example.org", "https://other.example.org"), std::nullopt);
+  for (const char* wrong : {"", "viewer", "https://", "https://a/b", "ftp://a", "https://a b"}) {
+    EXPECT_FALSE(ParseOrigin("--behind-proxy", wrong).ok()) << wrong;
+  }
+}
+
+TEST(AddressTest, TokensAreRandomAndCompared) {
+  const std::string a = *MakeToken(), b = *MakeToken();
+  EXPECT_NE(a, b);
+  EXPECT_TRUE(CheckToken(a).ok());
+  EXPECT_FALSE(CheckToken("short").ok());
+  EXPECT_FALSE(CheckToken("with a blank in the middle").ok());
+  EXPECT_TRUE(SameToken(a, a));
+  EXPECT_FALSE(SameToken(a, b));
+  EXPECT_FALSE(SameToken("", a));
+  EXPECT_FALSE(SameToken(a, ""));
+  EXPECT_FALSE(SameToken(a + "x", a));
+}
+
+}  // namespace
+}  // namespace slabstream

@@ -1,0 +1,214 @@
+// What a view does when: with events at stated times, and with a page and a service of any speed.
+#include "gateway/view_machine.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <deque>
+#include <map>
+
+#include "tests/support/random.h"
+
+namespace slabstream {
+namespace {
+
+using std::chrono::milliseconds;
+using testing::ElementsAre;
+using testing::IsEmpty;
+using Kind = ViewActionKind;
+
+MATCHER_P(Is, kind, "") { return arg.kind == kind; }
+
+Time At(int ms) { return Time{} + milliseconds(100000 + ms); }
+
+TEST(ViewMachineTest, AViewIsRenderedEncodedSentAndThenStill) {
+  ViewMachine machine;
+  EXPECT_THAT(machine.OnView(1, At(0)), ElementsAre(ViewAction{.kind = Kind::kRender, .seq = 1}));
+  EXPECT_THAT(machine.OnRendered(At(30)), ElementsAre(ViewAction{.kind = Kind::kEncode, .quality = 92}));
+  EXPECT_THAT(machine.OnEncoded(At(35)), ElementsAre(ViewAction{.kind = Kind::kSend, .frame = 1}));
+  EXPECT_EQ(machine.wake_time(), At(150));
+  EXPECT_THAT(machine.OnAck(1, At(45)), IsEmpty());
+  EXPECT_EQ(machine.round_trip(), milliseconds(10));
+  EXPECT_THAT(machine.OnTime(At(150)),
+              ElementsAre(ViewAction{.kind = Kind::kEncode, .final = true}));  // the same picture: nothing is rendered
+  EXPECT_THAT(machine.OnEncoded(At(200)), ElementsAre(ViewAction{.kind = Kind::kSend, .frame = 2}));
+  EXPECT_THAT(machine.OnAck(2, At(230)), IsEmpty());
+  EXPECT_EQ(machine.wake_time(), std::nullopt);
+}
+
+TEST(ViewMachineTest, TheLatestViewWins) {
+  ViewMachine machine;
+  machine.OnView(1, At(0));
+  for (int seq = 2; seq <= 9; ++seq) EXPECT_THAT(machine.OnView(std::uint64_t(seq), At(seq)), IsEmpty());
+  EXPECT_THAT(machine.OnRendered(At(30)), ElementsAre(Is(Kind::kEncode), ViewAction{.kind = Kind::kRender, .seq = 9}));
+  EXPECT_THAT(machine.OnView(9, At(31)), IsEmpty());  // not newer
+}
+
+TEST(ViewMachineTest, ALosslessPictureIsGivenUpForANewView) {
+  ViewMachine machine;
+  machine.OnView(1, At(0));
+  machine.OnRendered(At(30));
+  machine.OnEncoded(At(31));
+  machine.OnAck(1, At(40));
+  EXPECT_THAT(machine.OnTime(At(150)), ElementsAre(ViewAction{.kind = Kind::kEncode, .final = true}));
+  EXPECT_THAT(machine.OnView(2, At(160)), ElementsAre(Is(Kind::kCancelEncode), ViewAction{.kind = Kind::kRender, .seq = 2}));
+}
+
+TEST(ViewMachineTest, NothingIsSentBeforeTheAcknowledgement) {
+  ViewMachine machine;
+  machine.OnView(1, At(0));
+  machine.OnRendered(At(30));
+  machine.OnEncoded(At(31));
+  EXPECT_THAT(machine.OnView(2, At(40)), ElementsAre(Is(Kind::kRender)));  // no round trip is known yet
+  EXPECT_THAT(machine.OnRendered(At(70)), ElementsAre(Is(Kind::kEncode)));
+  EXPECT_THAT(machine.OnEncoded(At(75)), IsEmpty());
+  EXPECT_THAT(machine.OnView(3, At(80)), IsEmpty());  // it would wait behind the second
+  EXPECT_THAT(machine.OnAck(7, At(85)), IsEmpty());   // of no frame that was sent
+  EXPECT_THAT(machine.OnAck(1, At(90)), ElementsAre(ViewAction{.kind = Kind::kSend, .frame = 2}));
+}
+
+TEST(ViewMachineTest, PicturesAreSmallOnSlowConnectionsUntilTheViewStandsStill) {
+  ViewMachine machine;
+  machine.OnView(1, At(0));
+  machine.OnRendered(At(10));
+  machine.OnEncoded(At(10));
+  machine.OnAck(1, At(410));  // the lossless picture is being encoded meanwhile
+  EXPECT_EQ(machine.Quality(), 50);
+  machine.OnTime(At(410));
+  const auto actions = machine.OnView(2, At(500));
+  ASSERT_FALSE(actions.empty());
+  EXPECT_EQ(actions.back(), (ViewAction{.kind = Kind::kRender, .seq = 2, .scale = 0.5}));
+  EXPECT_THAT(machine.OnRendered(At(510)), ElementsAre(Is(Kind::kEncode)));
+  EXPECT_THAT(machine.OnEncoded(At(511)), ElementsAre(Is(Kind::kSend)));
+  EXPECT_THAT(machine.OnTime(At(650)), ElementsAre(ViewAction{.kind = Kind::kRender, .seq = 2, .scale = 1}));
+  EXPECT_THAT(machine.OnRendered(At(660)), ElementsAre(ViewAction{.kind = Kind::kEncode, .final = true}));
+  EXPECT_THAT(machine.OnEncoded(At(670)), IsEmpty());
+  EXPECT_THAT(machine.OnAck(2, At(900)), ElementsAre(Is(Kind::kSend)));
+}
+
+TEST(ViewMachineTest, AFullFrameForTheStillPictureIsCancelled) {
+  ViewMachine machine;
+  machine.OnView(1, At(0));
+  machine.OnRendered(At(10));
+  machine.OnEncoded(At(10));
+  machine.OnAck(1, At(410));
+  machine.OnView(2, At(500));
+  machine.OnRendered(At(510));
+  machine.OnEncoded(At(511));
+  EXPECT_THAT(machine.OnTime(At(650)), ElementsAre(Is(Kind::kRender)));
+  EXPECT_THAT(machine.OnView(3, At(660)), testing::Contains(Is(Kind::kCancelRender)));
+}
+
+TEST(ViewMachineTest, ARefusedViewIsDoneWith) {
+  ViewMachine machine;
+  machine.OnView(1, At(0));
+  EXPECT_THAT(machine.OnRefused(At(1)), IsEmpty());
+  EXPECT_EQ(machine.wake_time(), std::nullopt);
+  EXPECT_THAT(machine.OnView(2, At(2)), ElementsAre(Is(Kind::kRender)));
+}
+
+TEST(ViewMachineTest, WhenTheServiceIsBackTheViewIsRendered) {
+  ViewMachine machine;
+  machine.OnView(1, At(0));
+  EXPECT_THAT(machine.OnUnavailable(At(10)), IsEmpty());
+  EXPECT_THAT(machine.OnView(2, At(20)), IsEmpty());
+  EXPECT_THAT(machine.OnServiceBack(At(30)), ElementsAre(ViewAction{.kind = Kind::kRender, .seq = 2}));
+  EXPECT_THAT(machine.OnServiceBack(At(31)), IsEmpty());
+}
+
+// A page, a service and encoders that take any time: the rules hold, and the last view ends lossless on the screen.
+TEST(ViewMachineTest, AnySpeedsEndWithTheLastViewLossless) {
+  Random random(71);
+  SCOPED_TRACE(random.trace());
+  for (int run = 0; run < 300; ++run) {
+    ViewMachine machine;
+    const int render = random.Integer(1, 300), encode = random.Integer(1, 60), trip = random.Integer(1, 400), views = random.Integer(1, 60);
+    const int pace = random.Integer(1, 40);
+    struct Event {
+      enum { kView, kRendered, kEncoded, kAck } kind;
+      std::uint64_t number = 0;
+    };
+    std::multimap<Time, Event> events;
+    for (int i = 1; i <= views; ++i) events.emplace(At(i * pace), Event{Event::kView, std::uint64_t(i)});
+    std::uint64_t order = 0, encoding = 0, rendering_seq = 0, rendered_seq = 0, encoding_seq = 0, last_sent_seq = 0;
+    bool renders = false, encodes = false, unacknowledged = false, encoding_final = false, last_final = false;
+    int sent = 0;
+    Time now = At(0);
+    const auto apply = [&](const ViewMachine::Actions& actions) {
+      for (const ViewAction& action : actions) {
+        switch (action.kind) {
+          case Kind::kRender:
+            ASSERT_FALSE(renders);
+            ASSERT_GE(action.seq, rendering_seq);
+            renders = true;
+            rendering_seq = action.seq;
+            events.emplace(now + milliseconds(render), Event{Event::kRendered, ++order});
+            break;
+          case Kind::kCancelRender:
+            ASSERT_TRUE(renders);
+            renders = false;
+            ++order;
+            break;
+          case Kind::kEncode:
+            ASSERT_FALSE(encodes);
+            encodes = true;
+            encoding_seq = rendered_seq;
+            encoding_final = action.final;
+            events.emplace(now + milliseconds(encode), Event{Event::kEncoded, ++encoding});
+            break;
+          case Kind::kCancelEncode:
+            ASSERT_TRUE(encodes && encoding_final);
+            encodes = false;
+            ++encoding;
+            break;
+          case Kind::kSend:
+            ASSERT_FALSE(unacknowledged);
+            ASSERT_GE(encoding_seq, last_sent_seq);
+            unacknowledged = true;
+            ++sent;
+            last_sent_seq = encoding_seq;
+            last_final = encoding_final;
+            events.emplace(now + milliseconds(trip), Event{Event::kAck, action.frame});
+            break;
+        }
+      }
+    };
+    while (true) {
+      const bool timer = machine.wake_time() && (events.empty() || *machine.wake_time() < events.begin()->first);
+      if (timer) {
+        now = std::max(now, *machine.wake_time());
+        apply(machine.OnTime(now));
+        continue;
+      }
+      if (events.empty()) break;
+      const auto [time, event] = *events.begin();
+      events.erase(events.begin());
+      now = time;
+      switch (event.kind) {
+        case Event::kView: apply(machine.OnView(event.number, now)); break;
+        case Event::kRendered:
+          if (event.number != order || !renders) break;
+          renders = false;
+          rendered_seq = rendering_seq;
+          apply(machine.OnRendered(now));
+          break;
+        case Event::kEncoded:
+          if (event.number != encoding || !encodes) break;
+          encodes = false;
+          apply(machine.OnEncoded(now));
+          break;
+        case Event::kAck:
+          unacknowledged = false;
+          apply(machine.OnAck(event.number, now));
+          break;
+      }
+      ASSERT_FALSE(HasFatalFailure());
+    }
+    EXPECT_EQ(last_sent_seq, std::uint64_t(views));
+    EXPECT_TRUE(last_final);
+    EXPECT_LE(sent, views * pace / trip + 4 + views * pace / std::max(1, render)) << "frames for nothing";
+  }
+}
+
+}  // namespace
+}  // namespace slabstream
