@@ -11,6 +11,7 @@ import numpy.typing
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _RGBA = 6   # colour type
 _UP = 2     # filter: each byte minus the one above it
+_LEVEL = 4  # of zlib: a third of the time of 6, and files 4 % longer
 
 
 def _chunk(kind: bytes, content: bytes) -> bytes:
@@ -29,5 +30,5 @@ def encode(codes: numpy.typing.NDArray[Any], text: dict[str, str] | None = None)
     parts = [_SIGNATURE, _chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, _RGBA, 0, 0, 0))]
     for keyword, value in (text or {}).items():
         parts.append(_chunk(b"tEXt", keyword.encode("latin-1") + b"\0" + value.encode("latin-1", "replace")))
-    parts += [_chunk(b"IDAT", zlib.compress(filtered.tobytes(), 6)), _chunk(b"IEND", b"")]
+    parts += [_chunk(b"IDAT", zlib.compress(filtered.tobytes(), _LEVEL)), _chunk(b"IEND", b"")]
     return b"".join(parts)
