@@ -42,6 +42,9 @@ struct EncodedView {
 // Lossless, or as JPEG of `quality`. Cancelled: `given_up` became true. NotFound: the font of annotations.
 Result<EncodedView> EncodeView(const RenderedView& view, bool final, int quality, const std::atomic<bool>& given_up);
 
+// The smallest rectangle that holds all pixels that are not empty; empty if there are none.
+PixelBounds ContentBounds(const LocalImage& image);
+
 // What comes before the encoded rectangle in the message.
 std::string HeadOf(Json header, std::uint64_t frame, Duration round_trip);
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "client/request/json_value.h"
+#include "common/base/printable.h"
 
 namespace slabstream {
 namespace {
@@ -20,18 +21,18 @@ Result<PageMessage> ParsePageMessage(std::string_view text) {
     return Status::InvalidArgument(fmt::format("the message has {} bytes, at most {} are taken", text.size(), kMaxPageMessageBytes));
   }
   const Result<Json> json = ParseJson(text);
-  if (!json.ok()) return json.status();
+  if (!json.ok()) return Printable(json.status());
   std::optional<std::string> mistake;
   const JsonValue value(*json, "message", mistake);
   static constexpr std::array<std::string_view, 2> kTypes = {"view", "ack"}, kKinds = {"render", "slice"};
   const std::size_t type = value.At("type").OneOf(kTypes);
-  if (mistake) return Status::InvalidArgument(*mistake);
+  if (mistake) return Status::InvalidArgument(Printable(*mistake));
   const auto ignore = [](const JsonValue&) {};
   if (type == 1) {
     AckMessage ack;
     value.Fields({{"type", ignore}, {"frame", [&](const JsonValue& v) { ack.frame = Sequence(v); }}});
     (void)value.At("frame");
-    if (mistake) return Status::InvalidArgument(*mistake);
+    if (mistake) return Status::InvalidArgument(Printable(*mistake));
     return PageMessage(ack);
   }
   ViewMessage view;
@@ -42,7 +43,7 @@ Result<PageMessage> ParsePageMessage(std::string_view text) {
                 {"options", ignore}});
   (void)value.At("seq");
   (void)value.At("options");
-  if (mistake) return Status::InvalidArgument(*mistake);
+  if (mistake) return Status::InvalidArgument(Printable(*mistake));
   Result<PictureFields> options = FieldsOfJson((*json)["options"]);
   if (!options.ok()) return options.status();
   view.options = *std::move(options);

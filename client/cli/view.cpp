@@ -1,7 +1,7 @@
 // `view`: a volume in the browser. Starts what is missing, a service for a file and the gateway, and ends what it started.
 #include <fmt/format.h>
 
-#include <cerrno>
+#include <algorithm>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
@@ -16,7 +16,7 @@
 #include "client/service/process.h"
 #include "client/service/service_state.h"
 #include "common/base/stop_signals.h"
-#include "common/volume_io/volume_reader.h"
+#include "common/volume_io/read_options.h"
 
 namespace slabstream {
 namespace {
@@ -24,8 +24,8 @@ namespace {
 using std::chrono::seconds;
 
 constexpr const char* kGatewayProgram = "slabstream-gateway";
-constexpr Duration kStartTimeout = seconds(60);
-constexpr Duration kPatience = seconds(15);  // for a service to end its processes
+constexpr Duration kHelperStartTimeout = seconds(60);
+constexpr Duration kHelperPatience = seconds(15);  // for a service to end its processes
 
 // A name of a catalogue for a file: letters, digits, '-', '_' and '.', without its ending.
 std::string DatasetName(const std::filesystem::path& path) {
@@ -35,14 +35,14 @@ std::string DatasetName(const std::filesystem::path& path) {
   return name.empty() || name == "_" ? "volume" : name;
 }
 
-bool NamesFile(const std::string& source) {
+bool IsVolumeFile(const std::string& source) {
   std::error_code error;
   const Result<VolumeSource> parsed = ParseVolumeSource(source);
   return parsed.ok() && std::filesystem::exists(parsed->path, error);
 }
 
 // NAME=PATH as --data takes it, with an absolute path.
-std::string DataArgument(const std::string& source) {
+std::string CatalogueEntry(const std::string& source) {
   const std::size_t options = source.find('?');
   const std::filesystem::path path = std::filesystem::absolute(source.substr(0, options));
   return fmt::format("{}={}{}", DatasetName(path), path.string(), options == std::string::npos ? "" : source.substr(options));
@@ -59,7 +59,7 @@ class Helper {
   Helper(Helper&&) = default;
   Helper& operator=(Helper&&) = delete;
   ~Helper() {
-    if (child_ != nullptr) child_->Terminate(kPatience);
+    if (child_ != nullptr) child_->Terminate(kHelperPatience);
   }
   Child& child() { return *child_; }
 
@@ -77,8 +77,8 @@ Result<std::string> OwnPath() {
 }
 
 // The endpoint in "slabstream is up at ENDPOINT (...)".
-Result<std::string> EndpointOf(Helper& up) {
-  const Result<std::string> line = up.child().ReadLine(kStartTimeout);
+Result<std::string> EndpointOfUp(Helper& up) {
+  const Result<std::string> line = up.child().ReadLine(kHelperStartTimeout);
   if (!line.ok()) return Status(line.status().code(), "the service did not start; its reason stands above");
   constexpr std::string_view kBefore = " up at ";
   const std::size_t begin = line->find(kBefore);
@@ -95,7 +95,7 @@ void OpenBrowser(const std::string& url) {
 }
 
 // Until Ctrl-C (Ok), or one of the children ends.
-Status Watch(Helper& gateway, std::optional<Helper>& service) {
+Status WatchHelpers(Helper& gateway, std::optional<Helper>& service) {
   const sigset_t signals = StopSignals();
   while (true) {
     const timespec pause{0, 200'000'000};
@@ -110,14 +110,25 @@ Status Watch(Helper& gateway, std::optional<Helper>& service) {
 Status AddToService(const ServiceChoice& choice, const std::string& source) {
   Result<Session> session = Session::OpenService(choice);
   if (!session.ok()) return session.status();
-  return session->client().OrderData({.action = DataAction::kAdd, .items = {DataArgument(source)}}).status();
+  return session->client().OrderData({.action = DataAction::kAdd, .items = {CatalogueEntry(source)}}).status();
+}
+
+// NotFound: the service has no dataset of this name; Unavailable: there is no service.
+Status CheckDataset(const ServiceChoice& choice, const std::string& source) {
+  Result<Session> session = Session::OpenService(choice);
+  if (!session.ok()) {
+    return Status(session.status().code(), fmt::format("SOURCE '{}' is no file, and {}", source, session.status().message()));
+  }
+  const Result<StatusReply> status = session->client().QueryStatus();
+  if (!status.ok()) return status.status();
+  if (std::ranges::find(status->datasets, source, &DatasetStatus::name) != status->datasets.end()) return Status::Ok();
+  return Status::NotFound(fmt::format("SOURCE '{}' is neither a file nor a dataset of the service", source));
 }
 
 }  // namespace
 
 Status RunView(const ViewOptions& options) {
-  const bool file = NamesFile(options.source);
-  if (!file && LooksLikeVolume(options.source.substr(0, options.source.find('?')))) return CheckInputVolume(options.source);
+  const bool file = IsVolumeFile(options.source);
   const Result<ServiceChoice> named = NamedService(options.service);
   if (!named.ok()) return named.status();
   const Result<std::string> self = OwnPath(), program = ProgramBeside(kGatewayProgram);
@@ -128,28 +139,30 @@ Status RunView(const ViewOptions& options) {
   ServiceChoice choice = *named;
   if (file && choice.text().empty()) {
     if (Status status = CheckInputVolume(options.source); !status.ok()) return status;
-    Result<Helper> up = Helper::Start({*self, "up", "--listen", "tcp://127.0.0.1:*", "--data", DataArgument(options.source)});
+    Result<Helper> up = Helper::Start({*self, "up", "--listen", "tcp://127.0.0.1:*", "--data", CatalogueEntry(options.source)});
     if (!up.ok()) return up.status();
     service.emplace(*std::move(up));
-    Result<std::string> endpoint = EndpointOf(*service);
+    Result<std::string> endpoint = EndpointOfUp(*service);
     if (!endpoint.ok()) return endpoint.status();
     choice.endpoint = *std::move(endpoint);
   } else if (file) {
     if (Status status = AddToService(choice, options.source); !status.ok()) return status;
+  } else if (Status status = CheckDataset(choice, options.source); !status.ok()) {
+    return status;
   }
   std::vector<std::string> command = {*program, "--listen", options.listen};
   if (!choice.endpoint.empty()) command.insert(command.end(), {"--endpoint", choice.endpoint});
   if (!choice.file.empty()) command.insert(command.end(), {"--service", choice.file});
   Result<Helper> gateway = Helper::Start(std::move(command));
   if (!gateway.ok()) return gateway.status();
-  const Result<std::string> line = gateway->child().ReadLine(kStartTimeout);
+  const Result<std::string> line = gateway->child().ReadLine(kHelperStartTimeout);
   if (!line.ok()) return Status(line.status().code(), "the gateway did not start; its reason stands above");
   const std::string dataset =
       file ? DatasetName(std::filesystem::absolute(options.source.substr(0, options.source.find('?')))) : options.source;
   const std::string url = fmt::format("{}&dataset={}", line->substr(line->find(' ') + 1), dataset);
   std::cout << fmt::format("{} is at {}\nCtrl-C ends it.\n", dataset, url) << std::flush;
   if (options.browser) OpenBrowser(url);
-  return Watch(*gateway, service);
+  return WatchHelpers(*gateway, service);
 }
 
 }  // namespace slabstream

@@ -15,7 +15,7 @@ Result<ComposedPicture> ComposedPicture::Make(const LocalImage& image, ImageSize
 void ComposedPicture::Row(int y, std::span<float> rgba, std::span<float> depth) const {
   const float alpha = background_.a;
   const float behind[4] = {background_.r * alpha, background_.g * alpha, background_.b * alpha, alpha};
-  for (std::size_t i = 0; i < rgba.size(); ++i) rgba[i] = behind[i % 4];
+  for (std::size_t i = 0; i < rgba.size(); i += 4) std::copy_n(behind, 4, &rgba[i]);
   std::fill(depth.begin(), depth.end(), std::numeric_limits<float>::infinity());
   const PixelBounds& b = image_->bounds;
   if (!b.empty() && y >= b.y_begin && y < b.y_end) {

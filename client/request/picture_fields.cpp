@@ -79,9 +79,7 @@ Status Parse(const PictureFields& fields, OptionsApp& options) {
   try {
     options.app.parse(std::move(arguments));
   } catch (const CLI::Error& error) {
-    std::string message = error.what();
-    std::ranges::replace(message, '\n', ' ');
-    return Status::InvalidArgument(std::move(message));
+    return Status::InvalidArgument(error.what());
   }
   LetSurfacesStandAlone(options.app, options.transfer());
   return Status::Ok();
@@ -140,17 +138,20 @@ Result<PictureFields> FieldsOfJson(const Json& object) {
   return fields;
 }
 
+// Errors repeat texts, which come from anywhere: they are made printable.
 Result<RenderRequest> ParseRenderFields(const PictureFields& fields) {
   RenderOptionsApp options;
-  if (Status status = Parse(fields, options); !status.ok()) return status;
-  if (Status status = Validate(options.request.frame); !status.ok()) return status;
+  Status status = Parse(fields, options);
+  if (status.ok()) status = Validate(options.request.frame);
+  if (!status.ok()) return Printable(status);
   return std::move(options.request);
 }
 
 Result<SliceRequest> ParseSliceFields(const PictureFields& fields) {
   SliceOptionsApp options;
-  if (Status status = Parse(fields, options); !status.ok()) return status;
-  if (const auto frames = FramesOf(options.request); !frames.ok()) return frames.status();
+  Status status = Parse(fields, options);
+  if (status.ok()) status = FramesOf(options.request).status();
+  if (!status.ok()) return Printable(status);
   return std::move(options.request);
 }
 

@@ -2,7 +2,7 @@
 const background = "#101418";
 const canvas = document.getElementById("view"), context = canvas.getContext("2d");
 const say = document.getElementById("say"), dataset = document.getElementById("dataset"), renderer = document.getElementById("renderer");
-const token = new URLSearchParams(location.hash.slice(1)).get("token") ?? "";
+const link = new URLSearchParams(location.hash.slice(1)), token = link.get("token") ?? "";
 const view = { azimuth: 30, elevation: 20, zoom: 1 };
 let socket = null, seq = 0;
 
@@ -35,7 +35,7 @@ async function draw(message) {
 function fillDatasets(list) {
   const names = list.map(d => d.name);
   if (names.join("\n") === [...dataset.options].map(o => o.value).join("\n")) return;
-  const before = dataset.value;
+  const before = dataset.value || link.get("dataset");
   dataset.replaceChildren(...names.map(name => Object.assign(document.createElement("option"), { value: name, textContent: name })));
   if (names.includes(before)) dataset.value = before;
   show();

@@ -44,6 +44,9 @@ std::vector<FuzzBytes> SweepSeeds();
 bool DecodePicture(std::span<const std::byte> input);
 std::vector<FuzzBytes> PictureSeeds();
 
+bool DecodePageMessage(std::span<const std::byte> input);
+std::vector<FuzzBytes> PageMessageSeeds();
+
 bool DecodeValue(std::span<const std::byte> input);
 std::vector<FuzzBytes> ValueSeeds();
 

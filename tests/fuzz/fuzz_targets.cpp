@@ -23,6 +23,7 @@ const std::vector<FuzzTarget>& FuzzTargets() {
       {"recordings", "traces with a recording", DecodeRecording, RecordingSeeds},
       {"sweeps", "files of experiment sweep", DecodeSweep, SweepSeeds},
       {"pictures", "headers of PNG and EXR, and how their pictures were made", DecodePicture, PictureSeeds},
+      {"page-messages", "what pages and scripts send to the gateway", DecodePageMessage, PageMessageSeeds},
       {"values", "values of the command line", DecodeValue, ValueSeeds},
   };
   return targets;

@@ -29,7 +29,7 @@ TEST(PageMessageTest, ViewsAndAcknowledgements) {
 
 TEST(PageMessageTest, WrongFormIsRefusedInOneLine) {
   const std::string deep = std::string(5000, '[');
-  for (const std::string text :
+  for (const std::string& text :
        {std::string(), std::string("{}"), std::string("[]"), std::string("null"), std::string(R"({"type": "x"})"),
         std::string(R"({"type": "view"})"), std::string(R"({"type": "view", "seq": 0, "options": {}})"),
         std::string(R"({"type": "view", "seq": 1, "options": []})"), std::string(R"({"type": "view", "seq": 1, "options": {}, "more": 1})"),

@@ -1,0 +1,82 @@
+// What pages and scripts send to the gateway: messages of a WebSocket, and targets of requests.
+#include <algorithm>
+
+#include "gateway/address.h"
+#include "gateway/page_message.h"
+#include "gateway/target.h"
+#include "tests/fuzz/decoders.h"
+
+namespace slabstream {
+namespace {
+
+// Whether the fields are a picture that could be asked for.
+bool Takes(PictureKind kind, const PictureFields& fields) {
+  const Result<PictureJob> job = MakePictureJob(kind, fields);
+  if (!job.ok()) {
+    CheckRefusal(job.status());
+    return false;
+  }
+  CHECK(!job->frames.empty());
+  for (const FrameRequest& frame : job->frames) {
+    CHECK(!frame.dataset.empty());
+    CHECK(frame.size.width * int(job->frames.size()) == job->size.width && frame.size.height == job->size.height);
+  }
+  return true;
+}
+
+bool DecodeMessageOfPage(std::string_view text) {
+  const Result<PageMessage> message = ParsePageMessage(text);
+  if (!message.ok()) {
+    CheckRefusal(message.status());
+    return false;
+  }
+  const auto* view = std::get_if<ViewMessage>(&*message);
+  return view == nullptr || Takes(view->kind, view->options);
+}
+
+bool DecodeTarget(std::string_view text) {
+  const Result<Target> target = ParseTarget(text);
+  if (!target.ok()) {
+    CheckRefusal(target.status());
+    return false;
+  }
+  CHECK(target->path.starts_with('/'));
+  CHECK_LE(target->fields.size(), kMaxPictureFields);
+  bool taken = Takes(PictureKind::kRender, target->fields);
+  taken = Takes(PictureKind::kSlice, target->fields) || taken;
+  return taken;
+}
+
+// Names of hosts come from the same requests.
+void DecodeHost(std::string_view text) {
+  static const OriginRules rules({}, false, "https://viewer.example.org");
+  const auto refusal = rules.Refusal(text, text);
+  CHECK(refusal.has_value());  // no host is an origin
+  CheckRefusal(Status::InvalidArgument(*refusal));
+}
+
+}  // namespace
+
+bool DecodePageMessage(std::span<const std::byte> bytes) {
+  const std::string_view text = FuzzInput(bytes).Text();
+  DecodeHost(text);
+  return text.starts_with('/') ? DecodeTarget(text) : DecodeMessageOfPage(text);
+}
+
+std::vector<FuzzBytes> PageMessageSeeds() {
+  std::vector<FuzzBytes> seeds;
+  for (
+      const char* text : {
+          R"({"type": "view", "seq": 17, "timeline": true, "options": {"dataset": "head", "azimuth": 30, "clip-plane": ["1,0,0,5"], "fit": true}})",
+          R"({"type": "view", "seq": 1, "picture": "slice", "options": {"dataset": "head", "plane": "zyx", "size": "64x32", "window": 80}})",
+          R"({"type": "view", "seq": 2, "options": {"dataset": "a", "transfer": [{"RGBPoints": [0, 0, 0, 0, 1, 1, 1, 1]}]}})",
+          R"({"type": "ack", "frame": 5})",
+          "/api/v1/render.png?dataset=head&azimuth=-30.5&renderer=raycast&isovalue=300:red:0.5&light=1,0,0&light=0%2C1,0&title=a+b",
+          "/api/v1/slice.png?dataset=head&plane=axial&thickness=5&label-mode=surface",
+      }) {
+    seeds.push_back(SeedOf(text));
+  }
+  return seeds;
+}
+
+}  // namespace slabstream

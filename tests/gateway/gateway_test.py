@@ -1,0 +1,483 @@
+#!/usr/bin/env python3
+"""The gateway as scripts and pages use it: the real programs, over HTTP and a WebSocket.
+
+    gateway_test.py FOLDER_OF_PROGRAMS [unittest arguments]
+"""
+import http.client
+import json
+import os
+import random
+import re
+import shutil
+import signal
+import ssl
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+import urllib.parse
+from pathlib import Path
+
+from page import Closed, Gateway, Page, Refused, png_pixels, whole
+
+PROGRAMS = Path(sys.argv[1]) if len(sys.argv) > 1 else None
+TIMEOUT = 120  # far above what anything needs
+
+
+def process_ended(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] in "ZX"
+    except OSError:
+        return True
+
+
+def wait_until(condition, what):
+    limit = time.monotonic() + TIMEOUT
+    while not condition():
+        if time.monotonic() > limit:
+            raise AssertionError(what)
+        time.sleep(0.02)
+
+
+class Programs:
+    """A folder, and what was started in it."""
+
+    def __init__(self):
+        self.folder = Path(tempfile.mkdtemp(prefix="slabstream-gateway-", dir="/tmp"))
+        self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(self.folder)}
+        for name in ("SLABSTREAM_ENDPOINT", "SLABSTREAM_SERVICE", "DISPLAY", "WAYLAND_DISPLAY"):
+            self.environment.pop(name, None)
+        self.children = []
+
+    def run(self, *arguments, expect=0):
+        result = subprocess.run([str(PROGRAMS / "slabstream"), *map(str, arguments)], cwd=self.folder, env=self.environment,
+                                capture_output=True, text=True, timeout=TIMEOUT)
+        assert result.returncode == expect, f"{arguments}: {result.returncode} {result.stderr}"
+        return result
+
+    def start(self, program, *arguments):
+        child = subprocess.Popen([str(PROGRAMS / program), *map(str, arguments)], cwd=self.folder, env=self.environment,
+                                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.children.append(child)
+        return child
+
+    def end(self, child):
+        if child.poll() is None:
+            child.send_signal(signal.SIGTERM)
+        child.communicate(timeout=TIMEOUT)
+        self.children.remove(child)
+        return child.returncode
+
+    def up(self, *arguments):
+        endpoint = f"ipc://{self.folder}/s"
+        child = self.start("slabstream", "up", "--listen", endpoint, "--workers", "2", "--threads", "1", *arguments)
+        line = child.stdout.readline()
+        assert "is up" in line, line + child.stderr.read()
+        return child, endpoint
+
+    def gateway(self, *arguments, context=None):
+        child = self.start("slabstream-gateway", *arguments)
+        line = child.stdout.readline().split()
+        assert line and line[0] == "ready", child.stderr.read()
+        gateway = Gateway(line[1], context)
+        return child, gateway
+
+    def close(self):
+        for child in reversed(list(self.children)):
+            self.end(child)
+        shutil.rmtree(self.folder)
+
+
+class WithService(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.programs = Programs()
+        cls.addClassCleanup(cls.programs.close)
+        cls.programs.run("sphere", "--class", 1, "--size", 24, "--occupancy", 0.2, "-o", "a.nrrd")
+        cls.programs.run("sphere", "--class", 2, "--size", 20, "--occupancy", 0.3, "-o", "b.nrrd")
+        _, cls.endpoint = cls.programs.up("--data", "a=a.nrrd", "--data", "b=b.nrrd")
+        cls.process, cls.gateway = cls.programs.gateway("--endpoint", cls.endpoint)
+        wait_until(lambda: cls.gateway.request("/readyz")[0] == 200, "ready")
+
+    def page(self, **more):
+        page = Page(self.gateway, **more)
+        self.addCleanup(page.close)
+        return page
+
+    def get(self, path, **fields):
+        return self.gateway.request(path + "?" + urllib.parse.urlencode(fields, doseq=True))
+
+
+class HttpTest(WithService):
+    def test_pictures_are_the_files_of_the_command_line(self):
+        cases = [
+            ("render", {"size": "40x30"}),
+            ("render", {"azimuth": "-30.5", "elevation": 20, "zoom": 1.5, "renderer": "raycast", "sampling-rate": 2}),
+            ("render", {"renderer": "mip", "projection": "perspective", "fov": 40, "background": "#102030"}),
+            ("render", {"renderer": "zbuffer", "isovalue": "1:red:1", "light": ["1,0,0", "0,1,1"], "depth": 16}),
+            ("render", {"renderer": "raycast", "isovalue": "1:blue:0.5", "clip-box": ":,:,0:", "clip-plane": ["1,0,0,5", "0,-1,0,5"]}),
+            ("render", {"transfer": "opaque", "scalar-range": "10%:90%", "decomposition": "kd-tree", "combine": "tree:2"}),
+            ("render", {"eye": "-40,-50,10", "look-at": "1,2,3", "up": "0,1,1", "shading": "none", "termination": 0}),
+            ("slice", {"plane": "zyx"}),
+            ("slice", {"plane": "x", "index": 3, "window": 2, "level": 1, "background": "white"}),
+        ]
+        for kind, options in cases:
+            with self.subTest(kind=kind, **{k.replace("-", "_"): v for k, v in options.items()}):
+                options.setdefault("size", "48")
+                arguments = [f"--{name}={value}" for name, values in options.items() for value in (values if isinstance(values, list) else [values])]
+                self.programs.run(kind, "a", "--endpoint", self.endpoint, "-o", "file.png", *arguments)
+                file = (self.programs.folder / "file.png").read_bytes()
+                status, headers, body = self.get(f"/api/v1/{kind}.png", dataset="a", **options)
+                self.assertEqual(status, 200, body)
+                self.assertEqual(headers["Content-Type"], "image/png")
+                self.assertEqual(body, file)
+                posted = self.gateway.request(f"/api/v1/{kind}.png", method="POST", body=json.dumps({"dataset": "a", **options}))
+                self.assertEqual(posted[2], file)
+
+    def test_a_color_map_may_be_sent(self):
+        color_map = [{"Name": "m", "RGBPoints": [0, 0, 0, 1, 5, 1, 1, 0], "Points": [0, 0, 0.5, 0, 5, 1, 0.5, 0]}]
+        (self.programs.folder / "map.json").write_text(json.dumps(color_map))
+        self.programs.run("render", "a", "--endpoint", self.endpoint, "--size=32", "--transfer=map.json", "-o", "file.png")
+        file = (self.programs.folder / "file.png").read_bytes()
+        body = json.dumps({"dataset": "a", "size": 32, "transfer": color_map})
+        self.assertEqual(self.gateway.request("/api/v1/render.png", method="POST", body=body)[2], file)
+        status, command = self.gateway.json("/api/v1/command", method="POST", body=body)
+        self.assertEqual(status, 200)
+        self.assertIn("--transfer color-map.json", command["command"])
+        self.assertIn("RGBPoints", command["files"]["color-map.json"])
+
+    def test_the_command_makes_the_picture(self):
+        options = {"dataset": "a", "azimuth": 33, "size": "32x24", "title": "it's", "clip-box": "-3:3,:,:"}
+        _, command = self.gateway.json("/api/v1/command?" + urllib.parse.urlencode(options))
+        line = command["command"].replace("slabstream", str(PROGRAMS / "slabstream"), 1) + f" --endpoint {self.endpoint}"
+        subprocess.run(["bash", "-c", line], cwd=self.programs.folder, env=self.programs.environment, check=True, capture_output=True)
+        self.assertEqual((self.programs.folder / "picture.png").read_bytes(), self.get("/api/v1/render.png", **options)[2])
+
+    def test_errors_say_what_the_command_line_says(self):
+        for fields, status, why in [
+            ({"dataset": "a", "azimuth": "x"}, 400, "--azimuth 'x' is not a number"),
+            ({"dataset": "a", "size": "100000"}, 400, "out of range"),
+            ({"dataset": "a", "what": "1"}, 400, "there is no option 'what'"),
+            ({"dataset": "a", "transfer": "/etc/passwd"}, 400, "--transfer"),
+            ({"dataset": "a", "camera": "c.json"}, 400, "no option"),
+            ({"dataset": "a", "view": "top", "azimuth": 1}, 400, "excludes"),
+            ({"size": 32}, 400, "dataset is missing"),
+            ({"dataset": "none"}, 404, "none"),
+        ]:
+            got, body = self.gateway.json("/api/v1/render.png?" + urllib.parse.urlencode(fields))
+            self.assertEqual((got, list(body)), (status, ["error"]), body)
+            self.assertIn(why, body["error"])
+            self.assertNotIn("\n", body["error"])
+        self.assertEqual(self.gateway.request("/nothing")[0], 404)
+        self.assertEqual(self.gateway.request("/api/v1/status", method="DELETE")[0], 405)
+        self.assertEqual(self.gateway.request("/api/v1/datasets", method="POST", body="{}")[0], 405)
+        self.assertEqual(self.gateway.request("/api/v1/render.png", method="POST", body="{")[0], 400)
+        self.assertEqual(self.gateway.request("/api/v1/view")[0], 426)
+
+    def test_what_the_service_has(self):
+        self.get("/api/v1/render.png", dataset="a", size=16)
+        wait_until(lambda: any(d["state"] == "ready" for d in self.gateway.json("/api/v1/datasets")[1]["datasets"]), "a is loaded")
+        datasets = {d["name"]: d for d in self.gateway.json("/api/v1/datasets")[1]["datasets"]}
+        self.assertEqual(set(datasets), {"a", "b"})
+        self.assertEqual(datasets["a"]["size"], [24, 24, 24])
+        status, service = self.gateway.json("/api/v1/status")
+        self.assertEqual((status, len(service["workers"])), (200, 2))
+
+    def test_only_who_has_the_token_may_ask(self):
+        for path in ("/metrics", "/api/v1/datasets", "/api/v1/status", "/api/v1/render.png?dataset=a", "/api/v1/view"):
+            self.assertEqual(self.gateway.request(path, token=False)[0], 401, path)
+            self.assertEqual(self.gateway.request(path, token=False, headers={"Authorization": "Bearer wrong"})[0], 401)
+        for path in ("/", "/page.js", "/livez", "/readyz", "/api/v1/openapi.json"):
+            status, headers, _ = self.gateway.request(path, token=False)
+            self.assertEqual(status, 200, path)
+            self.assertNotIn("unsafe", headers["Content-Security-Policy"])
+            self.assertEqual(headers["X-Content-Type-Options"], "nosniff")
+        path = "/api/v1/datasets?token="
+        self.assertEqual(self.gateway.request(path + self.gateway.token, token=False)[0], 200)
+        self.assertEqual(self.gateway.request(path + self.gateway.token[:-1], token=False)[0], 401)
+
+    def test_the_page_uses_relative_addresses_only(self):
+        for path in ("/", "/page.js", "/page.css"):
+            text = self.gateway.request(path)[2].decode()
+            self.assertIsNone(re.search(r"""(src|href)=["']/|["']/api|https?://""", text), path)
+            self.assertNotRegex(text, r"<script>|\son\w+=|style=")
+
+    def test_foreign_names_and_pages_are_refused(self):
+        own = self.gateway.authority
+        port = own.rsplit(":")[-1]
+        for headers, status in [
+            ({"Host": own}, 200), ({"Host": "localhost:" + port}, 200), ({"Host": "localhost:1"}, 200), ({"Host": "evil.example"}, 403),
+            ({"Host": "127.0.0.1.evil.example"}, 403), ({"Origin": "http://" + own}, 200), ({"Origin": "http://evil.example"}, 403),
+            ({"Origin": "null"}, 403), ({"Origin": "https://" + own}, 403)]:
+            self.assertEqual(self.gateway.request("/livez", headers=headers)[0], status, headers)
+            if status == 200:
+                self.page(headers=headers).close()
+            else:
+                with self.assertRaisesRegex(Refused, "403"):
+                    Page(self.gateway, headers=headers)
+        self.assertIn(b" 403 ", self.gateway.raw(b"GET / HTTP/1.1\r\nConnection: close\r\n\r\n"))  # no Host
+        with self.assertRaisesRegex(Refused, "401"):
+            Page(self.gateway, protocols=["slabstream.view.v1"])
+        with self.assertRaisesRegex(Refused, "400"):
+            Page(self.gateway, protocols=["slabstream.token." + self.gateway.token])
+
+    def test_hostile_requests(self):
+        host = f"Host: {self.gateway.authority}\r\n".encode()
+        for data, status in [
+            (b"GET / HTTP/1.1\r\n" + host + b"X: " + b"x" * 40000 + b"\r\n\r\n", b" 431 "),
+            (b"POST /api/v1/render.png HTTP/1.1\r\n" + host + b"Content-Length: 2000000\r\n\r\n" + b" " * 70000, b" 413 "),
+            (b"\x00\x01\x02\r\n\r\n", b" 400 "),
+            (b"GET /%zz?a=% HTTP/1.1\r\nConnection: close\r\n" + host + b"\r\n", b" 400 "),
+            (b"GET /../../etc/passwd HTTP/1.1\r\nConnection: close\r\n" + host + b"\r\n", b" 404 "),
+            (b"GET / HTTP/1.1\r\n" + host + b"Content-Length: -1\r\n\r\n", b" 400 "),
+        ]:
+            self.assertIn(status, self.gateway.raw(data).split(b"\r\n")[0], data[:60])
+        seed = random.randrange(1 << 30)
+        chance = random.Random(seed)
+        whole_request = b"GET /api/v1/view HTTP/1.1\r\n" + host + b"Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n\r\n"
+        for _ in range(100):
+            altered = bytearray(whole_request)
+            for _ in range(chance.randrange(1, 6)):
+                altered[chance.randrange(len(altered))] = chance.randrange(256)
+            with self.gateway.connect() as connection:
+                connection.sendall(altered)
+        self.assertEqual(self.gateway.request("/livez")[0], 200, f"seed {seed}")
+
+    def test_the_document_fits_the_server(self):
+        document = self.gateway.json("/api/v1/openapi.json")[1]
+        self.assertEqual(document["openapi"], "3.0.3")
+        for path, methods in document["paths"].items():
+            for method, operation in methods.items():
+                status, _, _ = self.gateway.request(path, method=method.upper(), token=False)
+                self.assertEqual(status, 200 if operation.get("security") == [] else 401, (path, method))
+                status, headers, body = self.gateway.request(path, method=method.upper(), body="{}" if method == "post" else None)
+                self.assertIn(str(status), operation["responses"], path)
+                self.assertIn(headers["Content-Type"].split(";")[0], operation["responses"][str(status)]["content"])
+        for kind in ("render", "slice"):
+            operations = document["paths"][f"/api/v1/{kind}.png"]
+            names = [parameter["name"] for parameter in operations["get"]["parameters"]]
+            self.assertEqual(sorted(names), sorted(operations["post"]["requestBody"]["content"]["application/json"]["schema"]["properties"]))
+            for name in names:  # each is known: a wrong value is what is complained about
+                _, body = self.gateway.json(f"/api/v1/{kind}.png?{name}=%01&dataset=none")
+                self.assertNotIn("there is no option", body["error"], name)
+
+    def test_metrics_are_in_prometheus_form(self):
+        self.get("/api/v1/render.png", dataset="a", size=16)
+        status, _, body = self.gateway.request("/metrics")
+        self.assertEqual(status, 200)
+        text = body.decode()
+        families, seen = {}, set()
+        for line in text.rstrip("\n").split("\n"):
+            if line.startswith("# TYPE "):
+                _, _, name, kind = line.split(" ")
+                self.assertNotIn(name, families)
+                families[name] = kind
+            elif not line.startswith("# HELP "):
+                match = re.fullmatch(r'([a-z_]+)(\{(?:[a-z]+="[^"\\\n]*",?)+\})? ([-+0-9.e]+)', line)
+                self.assertIsNotNone(match, line)
+                self.assertNotIn(match[1] + (match[2] or ""), seen)
+                seen.add(match[1] + (match[2] or ""))
+                base = re.sub("_(bucket|sum|count)$", "", match[1])
+                self.assertTrue(match[1] in families or families.get(base) == "histogram", line)
+                float(match[3])
+        counts = [int(n) for n in re.findall(r'gateway_stage_seconds_bucket\{stage="latency",le="[^"]+"\} (\d+)', text)]
+        self.assertEqual(counts, sorted(counts))
+        self.assertGreater(counts[-1], 0)
+        self.assertRegex(text, "slabstream_service_workers 2\n")
+        if shutil.which("promtool"):
+            subprocess.run(["promtool", "check", "metrics"], input=text, text=True, check=True)
+
+
+class ViewTest(WithService):
+    def test_a_still_picture_is_that_of_the_command_line(self):
+        page = self.page()
+        self.assertEqual(page.receive()["type"], "hello")
+        self.assertEqual(page.text("status")["service"], "ready")
+        for options in ({"azimuth": 30, "renderer": "raycast"}, {"clip-box": ":,:,3:", "scale-bar": True}, {"renderer": "mip", "size": "64x40"},
+                        {"clip-box": "500:600,:,:"}):
+            options = {"dataset": "a", "size": 48, **options}
+            header, data, count = page.final(page.view(options))
+            self.assertEqual(count, 2)  # one that moves, and the still one
+            fields = {k: "true" if v is True else v for k, v in options.items()}
+            self.assertEqual(whole(header, data), png_pixels(self.get("/api/v1/render.png", **fields)[2]), options)
+        options = {"dataset": "a", "size": 40, "plane": "zyx", "background": "#204060"}
+        header, data, _ = page.final(page.view(options, picture="slice"))
+        self.assertEqual(whole(header, data, b"\x20\x40\x60\xff"), png_pixels(self.get("/api/v1/slice.png", **options)[2]))
+
+    def test_moving_pictures_are_jpeg_of_what_shows(self):
+        page = self.page()
+        page.view({"dataset": "a", "size": 200, "zoom": 0.5, "renderer": "raycast"}, timeline=True)
+        header, data = page.picture()
+        self.assertEqual((header["type"], header["final"], header["size"]), ("image/jpeg", False, [200, 200]))
+        self.assertEqual(data[:2], b"\xff\xd8")
+        x, y, width, height = header["bounds"]
+        self.assertTrue(0 < x and x + width < 200 and 40 < width < 160 and 0 < y and y + height < 200 and 40 < height < 160, header["bounds"])
+        statistics = header["statistics"]
+        self.assertEqual(statistics["workers"], 2)
+        self.assertTrue({"render"} <= {entry["stage"] for entry in statistics["timeline"]})
+        self.assertEqual({entry["worker"] for entry in statistics["timeline"]}, {w["worker"] for w in page.text("status")["workers"]})
+        self.assertEqual(statistics["bytes"]["picture"], len(data))
+        self.assertAlmostEqual(sum(v * v for v in header["geometry"]["right"]), 1)
+
+    def test_the_latest_view_wins_and_a_slow_page_gets_few(self):
+        page = self.page()
+        page.view({"dataset": "a", "size": 64})
+        first, _ = page.picture()
+        for i in range(300):
+            last = page.view({"dataset": "a", "size": 64, "azimuth": i})
+        # Nothing more comes while the first one is not acknowledged; the status comes each second.
+        pictures = 0
+        for _ in range(40):
+            message = page.receive()
+            pictures += isinstance(message, tuple)
+            if not isinstance(message, tuple) and message["type"] == "status":
+                break
+        self.assertEqual(pictures, 0)
+        page.ack(first["frame"])
+        header, data, count = page.final(last)
+        self.assertLessEqual(count, 4)
+        self.assertEqual(whole(header, data), png_pixels(self.get("/api/v1/render.png", dataset="a", size=64, azimuth=299)[2]))
+
+    def test_a_wrong_view_is_answered_and_the_next_one_is_shown(self):
+        page = self.page()
+        seq = page.view({"dataset": "a", "azimuth": "x"})
+        error = page.text("error")
+        self.assertEqual((error["seq"], error["error"]), (seq, "--azimuth 'x' is not a number"))
+        self.assertEqual(page.view({"dataset": "none"}), page.text("error")["seq"])
+        page.final(page.view({"dataset": "a", "size": 16}))
+
+    def test_wrong_messages_end_the_session_with_a_reason(self):
+        for opcode, payload, code in [(1, b"{", 1008), (1, b"[]", 1008), (1, b'{"type": "view", "seq": 0, "options": {}}', 1008), (2, b"x", 1003),
+                                      (1, b'"' + b"x" * (1 << 20) + b'"', 1009), (1, b"\xff\xfe", 1007), (1, b"[" * 100000, 1008), (3, b"x", 1002)]:
+            page = self.page()
+            page.send_frame(opcode, payload)
+            with self.assertRaises(Closed) as closed:
+                while True:
+                    page.receive()
+            self.assertEqual(closed.exception.code, code, payload[:40])
+            page.close()
+        page = self.page()
+        page.view({"dataset": "a", "size": 16})
+        page.seq = 0
+        page.view({"dataset": "a", "size": 16})
+        with self.assertRaisesRegex(Closed, "does not rise"):
+            while True:
+                page.receive()
+        self.assertEqual(self.gateway.request("/livez")[0], 200)
+
+    def test_sessions_share_the_service(self):
+        pages = [self.page() for _ in range(3)]
+        views = [(page, page.view({"dataset": name, "size": 40, "azimuth": 7 * i})) for i, (page, name) in enumerate(zip(pages, "aba"))]
+        for i, (page, seq) in enumerate(views):
+            header, data, _ = page.final(seq)
+            self.assertEqual(whole(header, data), png_pixels(self.get("/api/v1/render.png", dataset="aba"[i], size=40, azimuth=7 * i)[2]))
+        self.assertIn(b"slabstream_gateway_sessions 3\n", self.gateway.request("/metrics")[2])
+
+
+class ServiceLossTest(unittest.TestCase):
+    def test_a_session_survives_the_service(self):
+        programs = Programs()
+        self.addCleanup(programs.close)
+        programs.run("sphere", "--class", 1, "--size", 16, "--occupancy", 0.2, "-o", "a.nrrd")
+        _, gateway = programs.gateway("--endpoint", f"ipc://{programs.folder}/s")  # before there is a service
+        self.assertEqual(gateway.request("/readyz")[0], 503)
+        self.assertEqual(gateway.request("/api/v1/render.png?dataset=a")[0], 503)
+        page = Page(gateway)
+        self.addCleanup(page.close)
+        self.assertEqual(page.text("status")["service"], "gone")
+        first = page.view({"dataset": "a", "size": 32})
+        service, _ = programs.up("--data", "a=a.nrrd")
+        page.final(first)
+        wait_until(lambda: gateway.request("/readyz")[0] == 200, "ready")
+        programs.end(service)
+        self.assertNotEqual(page.text("status", lambda status: status["service"] == "gone")["reason"], "")
+        second = page.view({"dataset": "a", "size": 32, "azimuth": 40})
+        programs.up("--data", "a=a.nrrd")
+        header, data, _ = page.final(second)
+        self.assertEqual(whole(header, data), png_pixels(gateway.request("/api/v1/render.png?dataset=a&size=32&azimuth=40")[2]))
+
+
+class StartTest(unittest.TestCase):
+    def setUp(self):
+        self.programs = Programs()
+        self.addCleanup(self.programs.close)
+
+    def refused(self, *arguments):
+        child = self.programs.start("slabstream-gateway", *arguments)
+        out, err = child.communicate(timeout=TIMEOUT)
+        self.programs.children.remove(child)
+        self.assertEqual((out, len(err.splitlines())), ("", 1), err)
+        return child.returncode, err
+
+    def test_off_loopback_it_wants_tls_or_a_proxy(self):
+        code, why = self.refused("--listen", "0.0.0.0:0")
+        self.assertEqual(code, 2)
+        self.assertIn("--tls-cert and --tls-key, or --behind-proxy", why)
+        for arguments in (["--listen", "here"], ["--behind-proxy", "x"], ["--tls-cert", "a"], ["--token-file", "none"],
+                          ["--tls-cert", "none", "--tls-key", "none"], ["--endpoint", "x"]):
+            self.assertEqual(self.refused(*arguments)[0], 2, arguments)
+
+    def test_behind_a_proxy(self):
+        (self.programs.folder / "token").write_text("0123456789abcdef\n")
+        _, gateway = self.programs.gateway("--behind-proxy", "https://viewer.example.org:8443", "--token-file", "token", "--listen", "127.0.0.1")
+        self.assertEqual((gateway.authority, gateway.token), ("viewer.example.org:8443", "0123456789abcdef"))
+
+    @unittest.skipUnless(shutil.which("openssl"), "openssl is not installed")
+    def test_tls(self):
+        subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", "key.pem", "-out", "cert.pem", "-days", "2", "-subj",
+                        "/CN=127.0.0.1", "-addext", "subjectAltName=IP:127.0.0.1"], cwd=self.programs.folder, check=True, capture_output=True)
+        self.programs.run("sphere", "--class", 1, "--size", 16, "--occupancy", 0.2, "-o", "a.nrrd")
+        _, endpoint = self.programs.up("--data", "a=a.nrrd")
+        context = ssl.create_default_context(cafile=self.programs.folder / "cert.pem")
+        _, gateway = self.programs.gateway("--tls-cert", "cert.pem", "--tls-key", "key.pem", "--endpoint", endpoint, context=context)
+        self.assertEqual(gateway.scheme, "https")
+        self.assertEqual(gateway.request("/api/v1/render.png?dataset=a&size=16")[0], 200)
+        page = Page(gateway)
+        self.addCleanup(page.close)
+        page.final(page.view({"dataset": "a", "size": 16}))
+        plain = Gateway(f"http://{gateway.authority}/#token={gateway.token}")
+        with self.assertRaises((OSError, http.client.HTTPException)):
+            plain.request("/livez")
+
+    def test_view_starts_what_is_missing_and_ends_it(self):
+        self.programs.run("sphere", "--class", 1, "--size", 16, "--occupancy", 0.2, "-o", "my ball.nrrd")
+        child = self.programs.start("slabstream", "view", "my ball.nrrd", "--no-browser")
+        line = child.stdout.readline()
+        gateway = Gateway(line.split()[-1])
+        self.assertIn("&dataset=my_ball", line)
+        self.assertEqual(gateway.request("/api/v1/render.png?dataset=my_ball&size=16")[0], 200)
+        service = gateway.json("/api/v1/status")[1]
+        child.send_signal(signal.SIGINT)
+        _, err = child.communicate(timeout=TIMEOUT)
+        self.programs.children.remove(child)
+        self.assertEqual((child.returncode, err), (0, ""))
+        for pid in [service["pid"]] + [worker["pid"] for worker in service["workers"]]:
+            wait_until(lambda pid=pid: process_ended(pid), f"process {pid} has ended")
+        with self.assertRaises(OSError):
+            gateway.request("/livez")
+
+    def test_view_at_a_service(self):
+        self.programs.run("sphere", "--class", 1, "--size", 16, "--occupancy", 0.2, "-o", "a.nrrd")
+        self.programs.run("sphere", "--class", 2, "--size", 16, "--occupancy", 0.2, "-o", "b.nrrd")
+        _, endpoint = self.programs.up("--data", "a=a.nrrd")
+        for source, dataset in (("a", "a"), ("b.nrrd", "b")):
+            child = self.programs.start("slabstream", "view", source, "--no-browser", "--endpoint", endpoint)
+            gateway = Gateway(child.stdout.readline().split()[-1])
+            self.assertEqual(gateway.request(f"/api/v1/render.png?dataset={dataset}&size=16")[0], 200)
+            child.send_signal(signal.SIGINT)
+            child.communicate(timeout=TIMEOUT)
+            self.programs.children.remove(child)
+            self.assertEqual(child.returncode, 0)
+        self.programs.run("status", "--endpoint", endpoint)  # still there
+        refused = self.programs.run("view", "none", "--no-browser", "--endpoint", endpoint, expect=2).stderr
+        self.assertEqual(refused, "slabstream view: SOURCE 'none' is neither a file nor a dataset of the service\n")
+
+    def test_view_says_what_is_missing(self):
+        refused = self.programs.run("view", "none.nrrd", "--no-browser", "--endpoint", f"ipc://{self.programs.folder}/none", expect=1)
+        self.assertEqual(len(refused.stderr.splitlines()), 1)
+        self.assertIn("'none.nrrd' is no file, and no service answers", refused.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], *sys.argv[2:]])
