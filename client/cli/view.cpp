@@ -1,7 +1,7 @@
 // `view`: a volume in the browser. Starts what is missing, a service for a file and the gateway, and ends what it started.
 #include <fmt/format.h>
 
-#include <cerrno>
+#include <algorithm>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
@@ -16,7 +16,7 @@
 #include "client/service/process.h"
 #include "client/service/service_state.h"
 #include "common/base/stop_signals.h"
-#include "common/volume_io/volume_reader.h"
+#include "common/volume_io/read_options.h"
 
 namespace slabstream {
 namespace {
@@ -113,11 +113,22 @@ Status AddToService(const ServiceChoice& choice, const std::string& source) {
   return session->client().OrderData({.action = DataAction::kAdd, .items = {CatalogueEntry(source)}}).status();
 }
 
+// NotFound: the service has no dataset of this name; Unavailable: there is no service.
+Status CheckDataset(const ServiceChoice& choice, const std::string& source) {
+  Result<Session> session = Session::OpenService(choice);
+  if (!session.ok()) {
+    return Status(session.status().code(), fmt::format("SOURCE '{}' is no file, and {}", source, session.status().message()));
+  }
+  const Result<StatusReply> status = session->client().QueryStatus();
+  if (!status.ok()) return status.status();
+  if (std::ranges::find(status->datasets, source, &DatasetStatus::name) != status->datasets.end()) return Status::Ok();
+  return Status::NotFound(fmt::format("SOURCE '{}' is neither a file nor a dataset of the service", source));
+}
+
 }  // namespace
 
 Status RunView(const ViewOptions& options) {
   const bool file = IsVolumeFile(options.source);
-  if (!file && LooksLikeVolume(options.source.substr(0, options.source.find('?')))) return CheckInputVolume(options.source);
   const Result<ServiceChoice> named = NamedService(options.service);
   if (!named.ok()) return named.status();
   const Result<std::string> self = OwnPath(), program = ProgramBeside(kGatewayProgram);
@@ -136,6 +147,8 @@ Status RunView(const ViewOptions& options) {
     choice.endpoint = *std::move(endpoint);
   } else if (file) {
     if (Status status = AddToService(choice, options.source); !status.ok()) return status;
+  } else if (Status status = CheckDataset(choice, options.source); !status.ok()) {
+    return status;
   }
   std::vector<std::string> command = {*program, "--listen", options.listen};
   if (!choice.endpoint.empty()) command.insert(command.end(), {"--endpoint", choice.endpoint});

@@ -72,7 +72,7 @@ std::vector<FuzzBytes> PageMessageSeeds() {
           R"({"type": "view", "seq": 2, "options": {"dataset": "a", "transfer": [{"RGBPoints": [0, 0, 0, 0, 1, 1, 1, 1]}]}})",
           R"({"type": "ack", "frame": 5})",
           "/api/v1/render.png?dataset=head&azimuth=-30.5&renderer=raycast&isovalue=300:red:0.5&light=1,0,0&light=0%2C1,0&title=a+b",
-          "/api/v1/slice.png?dataset=head&plane=axial&thickness=5&label-mode=surface",
+          "/api/v1/slice.png?dataset=head&plane=axial&label-mode=surface",
       }) {
     seeds.push_back(SeedOf(text));
   }

@@ -470,7 +470,13 @@ class StartTest(unittest.TestCase):
             self.programs.children.remove(child)
             self.assertEqual(child.returncode, 0)
         self.programs.run("status", "--endpoint", endpoint)  # still there
-        self.assertIn("no such", self.programs.run("view", "none.nrrd", "--no-browser", expect=2).stderr.lower().replace("does not exist", "no such"))
+        refused = self.programs.run("view", "none", "--no-browser", "--endpoint", endpoint, expect=2).stderr
+        self.assertEqual(refused, "slabstream view: SOURCE 'none' is neither a file nor a dataset of the service\n")
+
+    def test_view_says_what_is_missing(self):
+        refused = self.programs.run("view", "none.nrrd", "--no-browser", "--endpoint", f"ipc://{self.programs.folder}/none", expect=1)
+        self.assertEqual(len(refused.stderr.splitlines()), 1)
+        self.assertIn("'none.nrrd' is no file, and no service answers", refused.stderr)
 
 
 if __name__ == "__main__":
