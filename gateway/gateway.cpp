@@ -286,8 +286,7 @@ class Gateway::Impl : public HttpApplication {
     auto timer = std::make_shared<asio::steady_timer>(io_, std::chrono::milliseconds(200));
     timer->async_wait([this, timer](boost::system::error_code) {
       server_->Stop();
-      work_.reset();
-      io_.stop();
+      work_.reset();  // the io thread ends when all connections have
     });
   }
 

@@ -224,7 +224,7 @@ class WebSocketConnection final : public Registered,
     if (std::exchange(ended_, true)) return;
     timer_.cancel();
     closing_ = true;
-    if (open_) accepted_.session->OnClosed(why_.empty() ? why : why_);
+    accepted_.session->OnClosed(why_.empty() ? why : why_);
     CloseNow();
   }
 

@@ -57,7 +57,7 @@ class WebSocketPeer {
   virtual void Close(std::uint16_t code, std::string reason) = 0;  // OnClosed follows
 };
 
-// This end. OnClosed is the last call.
+// This end. OnClosed is the last call, and comes in any case, even if OnOpen never did.
 class WebSocketSession {
  public:
   virtual ~WebSocketSession() = default;

@@ -33,11 +33,6 @@ ViewSession::ViewSession(SessionSurroundings surroundings, std::unique_ptr<Servi
                          std::function<void(ViewSession&)> closed)
     : around_(surroundings), link_(std::move(link)), news_(std::move(news)), closed_(std::move(closed)), timer_(surroundings.io) {}
 
-// The end of a link may take a while, which the io thread has not.
-ViewSession::~ViewSession() {
-  asio::post(around_.encoders, [link = std::shared_ptr<ServiceLink>(std::move(link_))] {});
-}
-
 void ViewSession::OnOpen(WebSocketPeer& peer) {
   peer_ = &peer;
   around_.metrics.CountSession(1);
@@ -49,11 +44,12 @@ void ViewSession::OnOpen(WebSocketPeer& peer) {
 }
 
 void ViewSession::OnClosed(const std::string&) {
-  if (std::exchange(peer_, nullptr) == nullptr) return;
-  around_.metrics.CountSession(-1);
+  if (link_ == nullptr) return;
+  if (std::exchange(peer_, nullptr) != nullptr) around_.metrics.CountSession(-1);
   timer_.cancel();
-  if (rendering_) link_->Cancel(rendering_->ticket);
   if (given_up_ != nullptr) *given_up_ = true;
+  // The end of a link may take a while, which the io thread has not. It cancels what the service still works on.
+  asio::post(around_.encoders, [link = std::shared_ptr<ServiceLink>(std::move(link_))] {});
   closed_(*this);
 }
 

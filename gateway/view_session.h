@@ -33,7 +33,6 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
   // `closed` is called at the end, when the session leaves.
   ViewSession(SessionSurroundings surroundings, std::unique_ptr<ServiceLink> link, std::shared_ptr<const ServiceNews> news,
               std::function<void(ViewSession&)> closed);
-  ~ViewSession() override;
 
   void OnOpen(WebSocketPeer& peer) override;
   void OnText(std::string_view text) override;
@@ -56,7 +55,7 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
   void SetTimer();
 
   SessionSurroundings around_;
-  std::unique_ptr<ServiceLink> link_;
+  std::unique_ptr<ServiceLink> link_;  // null after OnClosed
   std::shared_ptr<const ServiceNews> news_;
   std::function<void(ViewSession&)> closed_;
   WebSocketPeer* peer_ = nullptr;  // null before OnOpen and after OnClosed

@@ -351,11 +351,14 @@ class ViewTest(WithService):
         for opcode, payload, code in [(1, b"{", 1008), (1, b"[]", 1008), (1, b'{"type": "view", "seq": 0, "options": {}}', 1008), (2, b"x", 1003),
                                       (1, b'"' + b"x" * (1 << 20) + b'"', 1009), (1, b"\xff\xfe", 1007), (1, b"[" * 100000, 1008), (3, b"x", 1002)]:
             page = self.page()
-            page.send_frame(opcode, payload)
-            with self.assertRaises(Closed) as closed:
-                while True:
-                    page.receive()
-            self.assertEqual(closed.exception.code, code, payload[:40])
+            try:
+                page.send_frame(opcode, payload)
+                with self.assertRaises(Closed) as closed:
+                    while True:
+                        page.receive()
+                self.assertEqual(closed.exception.code, code, payload[:40])
+            except ConnectionError:
+                self.assertEqual(code, 1009)  # the gateway may hang up before it has read a message that is too long
             page.close()
         page = self.page()
         page.view({"dataset": "a", "size": 16})
@@ -456,6 +459,21 @@ class StartTest(unittest.TestCase):
             wait_until(lambda pid=pid: process_ended(pid), f"process {pid} has ended")
         with self.assertRaises(OSError):
             gateway.request("/livez")
+
+    def test_it_ends_while_pages_are_open(self):
+        self.programs.run("sphere", "--class", 1, "--size", 24, "--occupancy", 0.2, "-o", "a.nrrd")
+        _, endpoint = self.programs.up("--data", "a=a.nrrd")
+        child, gateway = self.programs.gateway("--endpoint", endpoint)
+        wait_until(lambda: gateway.request("/readyz")[0] == 200, "ready")
+        pages = [Page(gateway) for _ in range(3)]
+        for page in pages:
+            self.addCleanup(page.close)
+        pages[0].final(pages[0].view({"dataset": "a", "size": 64}))
+        pages[1].view({"dataset": "a", "size": 1024, "renderer": "raycast"})  # is rendered when the end comes, or just done
+        child.send_signal(signal.SIGTERM)
+        _, err = child.communicate(timeout=TIMEOUT)
+        self.programs.children.remove(child)
+        self.assertEqual((child.returncode, err), (0, ""))
 
     def test_view_at_a_service(self):
         self.programs.run("sphere", "--class", 1, "--size", 16, "--occupancy", 0.2, "-o", "a.nrrd")
