@@ -11,6 +11,7 @@
 #include <thread>
 #include <utility>
 
+#include "common/frame/dataset_name.h"
 #include "common/frame/frame_request.h"
 #include "common/volume_io/formats.h"
 #include "common/volume_io/read_options.h"
@@ -104,8 +105,21 @@ Status AddNamed(FoundData& found, const DataArgument& argument) {
   if (!source.ok()) return source.status();
   std::error_code error;
   if (!fs::exists(source->path, error)) return Status::NotFound("does not exist");
-  const bool added = found.datasets.emplace(argument.name, DataSource(argument.path, "", argument.layers)).second;
-  return added ? Status::Ok() : Repeated(argument.name);
+  const auto add = [&](const std::string& name, const std::string& path) {
+    return found.datasets.emplace(name, DataSource(path, "", argument.layers)).second ? Status::Ok() : Repeated(name);
+  };
+  const TimeRange times = source->options.time.value_or(TimeRange{});
+  if (times.count() == 1) return add(argument.name, argument.path);
+  if (times.count() > kMaxTimes) {
+    return Status::InvalidArgument(fmt::format("time {}:{} names {} volumes, limit {}", times.first, times.last, times.count(), kMaxTimes));
+  }
+  if (const std::size_t length = NameAtTime(argument.name, times.last).size(); length > kMaxNameBytes) {
+    return Status::InvalidArgument(fmt::format("the name with its time has {} bytes, limit {}", length, kMaxNameBytes));
+  }
+  for (int time = times.first; time <= times.last; ++time) {
+    if (Status added = add(NameAtTime(argument.name, time), AtTime(argument.path, time)); !added.ok()) return added;
+  }
+  return Status::Ok();
 }
 
 Status AddFolder(FoundData& found, const std::string& path) {
@@ -247,10 +261,13 @@ Result<FoundData> ListFolder(const std::string& folder) {
 }
 
 void CheckFiles(FoundData& found) {
+  std::string_view refused;  // the name of which a time was refused; one error is enough
   for (const auto& [name, source] : found.datasets) {
+    if (NameWithoutTime(name) == refused) continue;
     const Status readable = source.load ? Status::Ok() : FilesOf(source).status();
     if (readable.ok()) continue;
     if (source.folder.empty()) {
+      refused = NameWithoutTime(name);
       // A damaged file is bad input, as a wrong name is.
       const StatusCode code = readable.code() == StatusCode::kDataLoss ? StatusCode::kInvalidArgument : readable.code();
       found.errors.emplace_back(code, fmt::format("dataset \"{}\": {}", name, readable.message()));

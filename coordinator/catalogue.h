@@ -3,6 +3,8 @@
 //
 // What --data takes, any number of times:
 //   NAME=PATH   one volume: a file, or a folder of slices; with options for reading it behind a question mark (read_options.h)
+//   NAME=PATH?time=FIRST:LAST
+//               a volume for each time of a file that holds several: NAME@FIRST ... NAME@LAST (NameAtTime)
 //   NAME=PATH,labels=FILE[:COLOURS],overlay=FILE
 //               the same with layers (common/layers/layer_reader.h); either one may be left out
 //   DIR         a watched folder: every volume file in it by its stem ("head.nii.gz" is "head"), also those that come later, and every
@@ -22,12 +24,13 @@
 namespace slabstream {
 
 inline constexpr std::size_t kMaxPathBytes = 4096;
+inline constexpr int kMaxTimes = 10'000;  // that one argument names
 
 // Help of --data.
 inline constexpr char kDataHelp[] =
     "A volume to serve, as NAME=FILE or NAME=FILE?OPTION=VALUE,... with the options for reading of `slabstream render`, or a folder of "
     "volumes, which are named after their files. A folder is watched: files may come, change and go. Layers follow a named volume, as "
-    "NAME=FILE,labels=FILE[:COLOURS],overlay=FILE";
+    "NAME=FILE,labels=FILE[:COLOURS],overlay=FILE. NAME=FILE?time=FIRST:LAST names several volumes of one file: NAME@FIRST to NAME@LAST";
 
 struct DataArgument {
   std::string name;  // empty: `path` is a folder

@@ -8,6 +8,8 @@
 #include <string>
 #include <utility>
 
+#include "common/frame/dataset_name.h"
+
 namespace slabstream {
 
 namespace {
@@ -45,6 +47,14 @@ Status DatasetTable::NoSuchDataset(const std::string& name) const {
 
 std::size_t DatasetTable::size() const {
   return std::size_t(std::ranges::count_if(entries_, [](const auto& entry) { return entry.second.awaited == 0; }));
+}
+
+std::vector<std::string> DatasetTable::Named(const std::string& name) const {
+  std::vector<std::string> names;
+  for (const auto& [known, entry] : entries_) {
+    if (entry.awaited == 0 && (known == name || NameWithoutTime(known) == name)) names.push_back(known);
+  }
+  return names;
 }
 
 void DatasetTable::ForEach(const std::function<void(const std::string&, Entry&)>& visit) {

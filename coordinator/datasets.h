@@ -50,8 +50,9 @@ class DatasetTable {
   const Entry* Find(const std::string& name) const;
   // Ready, by this load.
   Entry* FindLoad(const std::string& name, LoadId load);
-  Status NoSuchDataset(const std::string& name) const;  // NotFound, naming what there is
-  std::size_t size() const;                             // in the catalogue
+  Status NoSuchDataset(const std::string& name) const;            // NotFound, naming what there is
+  std::size_t size() const;                                       // in the catalogue
+  std::vector<std::string> Named(const std::string& name) const;  // in the catalogue: this one, or all times of a series (NameAtTime)
   void ForEach(const std::function<void(const std::string& name, Entry& entry)>& visit);
 
   // ---- the catalogue

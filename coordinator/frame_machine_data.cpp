@@ -350,30 +350,35 @@ Status FrameMachine::State::AddFound(const FoundData& found) {
 
 // All of them or none.
 Status FrameMachine::State::Remove(const std::vector<std::string>& items) {
+  std::set<std::string> removed;
   for (const std::string& item : items) {
-    const DatasetTable::Entry* const entry = datasets.Find(item);
-    const bool known = datasets.folders.contains(item) || (entry != nullptr && entry->awaited == 0);
-    if (!known) return item.starts_with('/') ? Status::NotFound(item + " is no watched folder") : datasets.NoSuchDataset(item);
+    if (datasets.folders.contains(item)) continue;
+    const std::vector<std::string> names = datasets.Named(item);
+    if (names.empty()) return item.starts_with('/') ? Status::NotFound(item + " is no watched folder") : datasets.NoSuchDataset(item);
+    removed.insert(names.begin(), names.end());
   }
-  for (const std::string& item : std::set<std::string>(items.begin(), items.end())) {
-    if (datasets.folders.contains(item)) {
-      StopWatching(item);
-    } else if (const DatasetTable::Entry* const entry = datasets.Find(item)) {
-      if (!entry->source.folder.empty()) hidden[item] = entry->source.folder;
-      RemoveData(item, "an admin has removed it");
-    }
+  for (const std::string& item : items) {
+    if (datasets.folders.contains(item)) StopWatching(item);
+  }
+  for (const std::string& name : removed) {
+    const DatasetTable::Entry* const entry = datasets.Find(name);
+    if (entry == nullptr) continue;  // it went with its folder
+    if (!entry->source.folder.empty()) hidden[name] = entry->source.folder;
+    RemoveData(name, "an admin has removed it");
   }
   return Status::Ok();
 }
 
 Status FrameMachine::State::Reload(const std::vector<std::string>& items) {
+  std::set<std::string> renewed;
   for (const std::string& item : items) {
-    const DatasetTable::Entry* const entry = datasets.Find(item);
-    if (entry == nullptr || entry->awaited != 0) return datasets.NoSuchDataset(item);
+    const std::vector<std::string> names = datasets.Named(item);
+    if (names.empty()) return datasets.NoSuchDataset(item);
+    renewed.insert(names.begin(), names.end());
   }
-  for (const std::string& item : items) {
-    Tell(NoteAbout::kDatasets, LogLevel::kInfo, "dataset {} is read anew: an admin wants it", InQuotes(item));
-    RenewData(item);
+  for (const std::string& name : renewed) {
+    Tell(NoteAbout::kDatasets, LogLevel::kInfo, "dataset {} is read anew: an admin wants it", InQuotes(name));
+    RenewData(name);
   }
   return Status::Ok();
 }

@@ -16,6 +16,7 @@
 #include "common/frame/frame_request.h"
 #include "common/layers/layer_reader.h"
 #include "common/volume/sphere.h"
+#include "common/volume_io/read_options.h"
 #include "common/volume_io/sample_type.h"
 #include "common/wire/client_messages.h"
 

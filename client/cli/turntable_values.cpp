@@ -56,17 +56,6 @@ Result<TurntableOutput> ParseTurntableOutput(std::string_view option, std::strin
   return output;
 }
 
-Result<TimeRange> ParseTimeRange(std::string_view option, std::string_view text) {
-  const std::vector<std::string_view> ends = Split(text, ':');
-  if (ends.size() > 2) return Status::InvalidArgument(fmt::format("{} '{}' is neither T nor FIRST:LAST", option, text));
-  const auto parse = [&](std::string_view end) { return ParseInteger(option, end, 0, int(kMaxVolumes) - 1); };
-  const Result<int> first = parse(ends.front()), last = parse(ends.back());
-  if (!first.ok()) return first.status();
-  if (!last.ok()) return last.status();
-  if (*first <= *last) return TimeRange{*first, *last};
-  return Status::InvalidArgument(fmt::format("{} '{}': FIRST must not be above LAST", option, text));
-}
-
 std::string FramePattern::Name(int index) const {
   return before_ + (zero_ ? fmt::format("{:0{}}", index, width_) : fmt::format("{:{}}", index, width_)) + after_;
 }

@@ -1,4 +1,4 @@
-// Parses what only `turntable` takes: where its pictures go, and times. Pure. Errors as in common/cli/parse.h.
+// Parses what only `turntable` takes: where its pictures go. Pure. Errors as in common/cli/parse.h.
 #pragma once
 
 #include <string>
@@ -26,13 +26,5 @@ struct TurntableOutput {
   std::string movie;  // its path (MovieFormatOf); empty: pictures
 };
 Result<TurntableOutput> ParseTurntableOutput(std::string_view option, std::string_view text);
-
-// Volumes of a file that holds several, both included.
-struct TimeRange {
-  int first = 0, last = 0;  // 0 <= first <= last < kMaxVolumes
-  int count() const { return last - first + 1; }
-};
-// "T" or "FIRST:LAST".
-Result<TimeRange> ParseTimeRange(std::string_view option, std::string_view text);
 
 }  // namespace slabstream

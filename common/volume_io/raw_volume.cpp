@@ -67,13 +67,17 @@ Status SetSize(RawHeader& header, const std::string& path, std::vector<double> s
 }
 
 Result<std::int64_t> ChosenVolume(const std::string& path, std::int64_t count, const ReadOptions& options) {
-  if (options.time && *options.time >= count) {
-    return Status::InvalidArgument(fmt::format("{}: time is {}, must be in [0, {}]", path, *options.time, count - 1));
+  if (options.time && options.time->count() > 1) {
+    return Status::InvalidArgument(
+        fmt::format("{}: time is {}:{}, must be one volume here", path, options.time->first, options.time->last));
+  }
+  if (options.time && options.time->first >= count) {
+    return Status::InvalidArgument(fmt::format("{}: time is {}, must be in [0, {}]", path, options.time->first, count - 1));
   }
   if (!options.time && count > 1) {
     return Status::InvalidArgument(fmt::format("{}: holds {} volumes, of which --time takes one: 0 to {}", path, count, count - 1));
   }
-  return std::int64_t{options.time.value_or(0)};
+  return std::int64_t{options.time.value_or(TimeRange{}).first};
 }
 
 Result<RawVolume> TakeMemory(const std::string& path, const RawHeader& header, const ReadOptions& options) {

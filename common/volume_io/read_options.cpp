@@ -22,9 +22,10 @@ Status SetSeries(ReadOptions& options, std::string_view option, std::string_view
 }
 
 Status SetTime(ReadOptions& options, std::string_view option, std::string_view text) {
-  options.time = ParseNumber<int>(text);
-  if (options.time && *options.time >= 0 && *options.time < kMaxVolumes) return Status::Ok();
-  return Wrong(option, text, fmt::format("a whole number in [0, {}]", kMaxVolumes - 1));
+  const Result<TimeRange> range = ParseTimeRange(option, text);
+  if (!range.ok()) return range.status();
+  options.time = *range;
+  return Status::Ok();
 }
 
 Status SetChannel(ReadOptions& options, std::string_view option, std::string_view text) {
@@ -101,6 +102,20 @@ std::size_t OptionEnd(const std::string& source, std::size_t begin) {
 
 }  // namespace
 
+Result<TimeRange> ParseTimeRange(std::string_view option, std::string_view text) {
+  const std::size_t colon = text.find(':');
+  const auto parse = [&](std::string_view end) -> Result<int> {
+    const std::optional<int> time = ParseNumber<int>(end);
+    if (time && *time >= 0 && *time < kMaxVolumes) return *time;
+    return Wrong(option, text, fmt::format("a whole number in [0, {}], or FIRST:LAST", kMaxVolumes - 1));
+  };
+  const Result<int> first = parse(text.substr(0, colon)), last = colon == std::string_view::npos ? first : parse(text.substr(colon + 1));
+  if (!first.ok()) return first.status();
+  if (!last.ok()) return last.status();
+  if (*first <= *last) return TimeRange{*first, *last};
+  return Status::InvalidArgument(fmt::format("{} '{}': FIRST must not be above LAST", option, text));
+}
+
 const std::vector<ReadOption>& ReadOptionList() {
   static const std::vector<ReadOption> options = {
       {"time", "T", "Which of the volumes in a file of several, such as a time series; counted from 0", SetTime,
@@ -123,14 +138,31 @@ const std::vector<ReadOption>& ReadOptionList() {
   return options;
 }
 
-Result<VolumeSource> ParseVolumeSource(const std::string& text) {
-  VolumeSource source{text, {}};
-  std::size_t begin = OptionsBegin(text);
-  if (begin == std::string::npos) return source;
-  source.path = text.substr(0, begin - 1);
+namespace {
+
+struct OptionText {
+  std::string name, value;
+};
+
+// The options behind the question mark, which is at begin - 1.
+std::vector<OptionText> OptionsFrom(const std::string& text, std::size_t begin) {
+  std::vector<OptionText> options;
   while (begin <= text.size()) {
     const std::size_t end = OptionEnd(text, begin), equals = std::min(text.find('=', begin), end);
-    const std::string name = text.substr(begin, equals - begin), value = equals < end ? text.substr(equals + 1, end - equals - 1) : "";
+    options.push_back({text.substr(begin, equals - begin), equals < end ? text.substr(equals + 1, end - equals - 1) : ""});
+    begin = end + 1;
+  }
+  return options;
+}
+
+}  // namespace
+
+Result<VolumeSource> ParseVolumeSource(const std::string& text) {
+  VolumeSource source{text, {}};
+  const std::size_t begin = OptionsBegin(text);
+  if (begin == std::string::npos) return source;
+  source.path = text.substr(0, begin - 1);
+  for (const auto& [name, value] : OptionsFrom(text, begin)) {
     const ReadOption* const option = FindNamed(ReadOptionList(), name);
     if (option == nullptr) {
       return Status::InvalidArgument(
@@ -138,13 +170,22 @@ Result<VolumeSource> ParseVolumeSource(const std::string& text) {
     }
     if (option->given(source.options)) return Status::InvalidArgument(fmt::format("'{}': {} is given twice", text, name));
     if (Status status = option->set(source.options, fmt::format("'{}': {}", text, name), value); !status.ok()) return status;
-    begin = end + 1;
   }
   return source;
 }
 
 std::string WithReadOption(const std::string& source, std::string_view name, std::string_view value) {
   return fmt::format("{}{}{}={}", source, OptionsBegin(source) == std::string::npos ? '?' : ',', name, value);
+}
+
+std::string AtTime(const std::string& source, int time) {
+  const std::size_t begin = OptionsBegin(source);
+  if (begin == std::string::npos) return WithReadOption(source, "time", std::to_string(time));
+  std::string others;
+  for (const auto& [name, value] : OptionsFrom(source, begin)) {
+    if (name != "time") others += fmt::format("{}={},", name, value);
+  }
+  return fmt::format("{}{}time={}", source.substr(0, begin), others, time);
 }
 
 }  // namespace slabstream

@@ -23,11 +23,20 @@ namespace slabstream {
 inline constexpr std::int64_t kMaxVolumes = 1 << 20;  // in one file
 inline constexpr int kLuminance = -1;
 
+// Volumes of a file that holds several, both included.
+struct TimeRange {
+  int first = 0, last = 0;  // 0 <= first <= last < kMaxVolumes
+  int count() const { return last - first + 1; }
+  friend bool operator==(const TimeRange&, const TimeRange&) = default;
+};
+// "T" or "FIRST:LAST". InvalidArgument: the message begins with `option` and names the text.
+Result<TimeRange> ParseTimeRange(std::string_view option, std::string_view text);
+
 struct ReadOptions {
-  std::string series;           // which of the series of a DICOM folder: its number or UID; "": the only one
-  std::optional<int> time;      // which of the volumes of a file that holds several, from 0
-  std::optional<int> channel;   // which of the components of a voxel, from 0; or kLuminance
-  std::optional<Vec3> spacing;  // each > 0, finite
+  std::string series;             // which of the series of a DICOM folder: its number or UID; "": the only one
+  std::optional<TimeRange> time;  // which of the volumes of a file that holds several. Readers take one, a catalogue takes several
+  std::optional<int> channel;     // which of the components of a voxel, from 0; or kLuminance
+  std::optional<Vec3> spacing;    // each > 0, finite
   // Of raw samples.
   std::optional<Index3> dims;  // voxels along x, y and z, each in [1, kMaxVolumeSide]
   std::optional<SampleType> type;
@@ -58,5 +67,7 @@ Result<VolumeSource> ParseVolumeSource(const std::string& text);
 
 // The source with one more option.
 std::string WithReadOption(const std::string& source, std::string_view name, std::string_view value);
+// The source at one time, whatever times it names. `source` is right (ParseVolumeSource).
+std::string AtTime(const std::string& source, int time);
 
 }  // namespace slabstream

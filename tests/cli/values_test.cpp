@@ -167,17 +167,5 @@ TEST(Values, ATurntablesOutputIsPicturesOrOneMovie) {
   }
 }
 
-TEST(Values, TimesAreOneOrARangeWithBothEnds) {
-  EXPECT_EQ(ParseTimeRange("--time", "3")->count(), 1);
-  EXPECT_EQ(ParseTimeRange("--time", "3")->last, 3);
-  const TimeRange range = ParseTimeRange("--time", "0:19").value();
-  EXPECT_EQ(range.first, 0);
-  EXPECT_EQ(range.last, 19);
-  EXPECT_EQ(range.count(), 20);
-  for (const char* text : {"", ":", "1:", ":1", "2:1", "-1", "0:1:2", "0-3", "1048576", "0:1048576", "a:b"}) {
-    EXPECT_THAT(ParseTimeRange("--time", text).status().message(), HasSubstr("--time")) << text;
-  }
-}
-
 }  // namespace
 }  // namespace slabstream

@@ -33,7 +33,7 @@ const std::vector<Kind>& Kinds() {
 ReadOptions OptionsNumber(std::uint8_t number, const Kind& kind) {
   if (kind.ending == ".raw") return {.dims = Index3{3, 2, 2}, .type = SampleType(number % (int(SampleType::kFloat64) + 1)), .offset = 1};
   switch (number % 4) {
-    case 1: return {.time = 1};
+    case 1: return {.time = TimeRange{1, 1}};
     case 2: return {.channel = 0};
     case 3: return {.channel = kLuminance};
     default: return {};

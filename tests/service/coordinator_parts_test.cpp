@@ -371,6 +371,31 @@ TEST_F(CatalogueTest, ANamedVolumeIsCheckedAndReadWithItsOptions) {
   ExpectError({"a=" + file + ".missing?time=2"}, StatusCode::kNotFound, "does not exist");
 }
 
+TEST_F(CatalogueTest, TimesOfAFileAreDatasets) {
+  const std::string file = (directory_ / "times.npy").string();
+  const std::string header = "{'descr': '|u1', 'fortran_order': False, 'shape': (4, 2, 2, 2), }\n";
+  std::ofstream(file) << "\x93NUMPY\x01" << '\0' << char(header.size()) << '\0' << header << "aaaaaaaabbbbbbbbccccccccdddddddd";
+  FoundData found = FindData({"beat=" + file + "?spacing=1,1,2,time=1:3"});
+  ASSERT_THAT(found.errors, testing::IsEmpty());
+  CheckFiles(found);
+  ASSERT_THAT(found.errors, testing::IsEmpty());
+  EXPECT_THAT(NamesOf(found), testing::ElementsAre("beat@1", "beat@2", "beat@3"));
+  const Result<LoadedSource> loaded = LoadSource(found.datasets.at("beat@2"));
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  EXPECT_THAT(loaded->volume->block.bytes, testing::Each(std::byte{'c'}));
+  EXPECT_EQ(loaded->volume->description.geometry.spacing, (Vec3{1, 1, 2}));
+
+  FoundData beyond = FindData({"beat=" + file + "?time=2:9", "one=" + file});
+  CheckFiles(beyond);
+  ASSERT_EQ(beyond.errors.size(), 2U) << "one error for all times";
+  EXPECT_THAT(beyond.errors[0].message(), testing::AllOf(testing::StartsWith("dataset \"beat@4\": "), HasSubstr("must be in [0, 3]")));
+  EXPECT_THAT(beyond.errors[1].message(), HasSubstr("holds 4 volumes"));
+  ExpectError({"beat=" + file + "?time=0:10000"}, StatusCode::kInvalidArgument, "time 0:10000 names 10001 volumes, limit 10000");
+  ExpectError({"beat=" + file + "?time=3:2"}, StatusCode::kInvalidArgument, "FIRST must not be above LAST");
+  ExpectError({"beat@1=" + file}, StatusCode::kInvalidArgument, "dataset name \"beat@1\" must have 1 to 256 letters");
+  ExpectError({std::string(255, 'a') + "=" + file + "?time=0:3"}, StatusCode::kInvalidArgument, "has 257 bytes, limit 256");
+}
+
 TEST_F(CatalogueTest, FilesThatCannotBeReadAreToldByTheirHeaders) {
   const std::string whole = Write("whole.nrrd", 8);
   Touch("notes.txt");

@@ -20,7 +20,7 @@ TEST(VolumeSource, IsAPathWithOptionsBehindIt) {
   EXPECT_EQ(source->options.big_endian, true);
   EXPECT_EQ(source->options.offset, 128);
   EXPECT_FALSE(source->options.time);
-  EXPECT_EQ(ParseVolumeSource("head.nii.gz?time=3")->options.time, 3);
+  EXPECT_EQ(ParseVolumeSource("head.nii.gz?time=3")->options.time, (TimeRange{3, 3}));
   EXPECT_EQ(ParseVolumeSource("head.nii.gz?channel=luminance")->options.channel, kLuminance);
   EXPECT_EQ(ParseVolumeSource("head.nii.gz")->path, "head.nii.gz");
   EXPECT_EQ(ParseVolumeSource("what?")->path, "what?") << "no option stands behind the question mark";
@@ -33,7 +33,7 @@ TEST(VolumeSource, MayBeAFileWithAQuestionMark) {
   EXPECT_EQ(ParseVolumeSource(odd)->path, odd);
   const Result<VolumeSource> with_option = ParseVolumeSource(odd + "?time=2");
   EXPECT_EQ(with_option->path, odd);
-  EXPECT_EQ(with_option->options.time, 2);
+  EXPECT_EQ(with_option->options.time, (TimeRange{2, 2}));
 }
 
 TEST(VolumeSource, SaysWhatIsWrong) {
@@ -61,6 +61,25 @@ TEST(VolumeSource, SaysWhatIsWrong) {
     EXPECT_EQ(source.status().code(), StatusCode::kInvalidArgument);
     EXPECT_THAT(source.status().message(), HasSubstr(why));
   }
+}
+
+TEST(VolumeSource, TimesAreOneOrARangeWithBothEnds) {
+  EXPECT_EQ(ParseTimeRange("--time", "3")->count(), 1);
+  EXPECT_EQ(ParseTimeRange("--time", "3")->last, 3);
+  const TimeRange range = ParseTimeRange("--time", "0:19").value();
+  EXPECT_EQ(range.first, 0);
+  EXPECT_EQ(range.last, 19);
+  EXPECT_EQ(range.count(), 20);
+  for (const char* text : {"", ":", "1:", ":1", "2:1", "-1", "0:1:2", "0-3", "1048576", "0:1048576", "a:b"}) {
+    EXPECT_THAT(ParseTimeRange("--time", text).status().message(), HasSubstr("--time")) << text;
+  }
+}
+
+TEST(VolumeSource, IsNamedAtAnotherTime) {
+  EXPECT_EQ(AtTime("v.nii", 3), "v.nii?time=3");
+  EXPECT_EQ(AtTime("v.nii?time=0:9", 3), "v.nii?time=3");
+  EXPECT_EQ(AtTime("v.npy?spacing=1,1,2,time=0:9", 3), "v.npy?spacing=1,1,2,time=3");
+  EXPECT_EQ(AtTime("v.raw?time=0,dims=2,2,2", 3), "v.raw?dims=2,2,2,time=3");
 }
 
 TEST(VolumeSource, TakesOptionsOneByOne) {

@@ -343,18 +343,19 @@ TEST_F(ReadersTest, OneOfSeveralVolumesIsTaken) {
   for (const auto& [file, bytes, volumes, voxels] : files) {
     SCOPED_TRACE(file);
     for (int time = 0; time < volumes; ++time) {
-      const LoadedVolume loaded = Read(file, bytes, {.time = time});
+      const LoadedVolume loaded = Read(file, bytes, {.time = TimeRange{time, time}});
       EXPECT_EQ(ValuesOf(loaded),
                 std::vector<double>(values.begin() + time * std::ptrdiff_t(voxels), values.begin() + (time + 1) * std::ptrdiff_t(voxels)));
     }
     EXPECT_THAT(WhyNot(file, bytes), HasSubstr(fmt::format("holds {} volumes, of which --time takes one: 0 to {}", volumes, volumes - 1)));
-    EXPECT_THAT(WhyNot(file, bytes, {.time = volumes}), HasSubstr(fmt::format("time is {}, must be in [0, {}]", volumes, volumes - 1)));
+    EXPECT_THAT(WhyNot(file, bytes, {.time = TimeRange{volumes, volumes}}),
+                HasSubstr(fmt::format("time is {}, must be in [0, {}]", volumes, volumes - 1)));
   }
-  EXPECT_EQ(ValuesOf(Read("v.nii", NiftiHeader({}) + FileBytes(24, 'x'), {.time = 0})).size(), 24U);
+  EXPECT_EQ(ValuesOf(Read("v.nii", NiftiHeader({}) + FileBytes(24, 'x'), {.time = TimeRange{0, 0}})).size(), 24U);
   // What is there of the last volume is not enough.
   WriteFile(directory_ / "cut.nii", NiftiHeader({.dimensions = {4, 3, 2, 4}}) + samples.substr(0, 95));
-  EXPECT_EQ(ReadVolume(directory_ / "cut.nii", {.time = 3}).status().code(), StatusCode::kDataLoss);
-  EXPECT_TRUE(ReadVolume(directory_ / "cut.nii", {.time = 2}).ok());
+  EXPECT_EQ(ReadVolume(directory_ / "cut.nii", {.time = TimeRange{3, 3}}).status().code(), StatusCode::kDataLoss);
+  EXPECT_TRUE(ReadVolume(directory_ / "cut.nii", {.time = TimeRange{2, 2}}).ok());
 }
 
 TEST_F(ReadersTest, OneOfSeveralComponentsIsTaken) {
@@ -550,14 +551,15 @@ TEST_F(OmeTest, OneChannelAndTimeIsTaken) {
   const std::string sizes = "SizeZ=\"2\" SizeC=\"3\" SizeT=\"2\" DimensionOrder=",
                     channels = "<Channel Name=\"DAPI\"/><Channel Name=\"GFP\"/>";
   using Values = std::vector<double>;
-  EXPECT_EQ(Slices(Write(Ome(sizes + "\"XYZCT\""), 12), {.time = 1, .channel = 2}), (Values{10, 11}));
-  EXPECT_EQ(Slices(Write(Ome(sizes + "\"XYCZT\""), 12), {.time = 1, .channel = 2}), (Values{8, 11}));
-  EXPECT_EQ(Slices(Write(Ome(sizes + "\"XYTCZ\""), 12), {.time = 1, .channel = 2}), (Values{5, 11}));
-  EXPECT_EQ(Slices(Write(Ome(sizes + "\"XYZTC\""), 12), {.time = 0, .channel = 0}), (Values{0, 1}));
+  EXPECT_EQ(Slices(Write(Ome(sizes + "\"XYZCT\""), 12), {.time = TimeRange{1, 1}, .channel = 2}), (Values{10, 11}));
+  EXPECT_EQ(Slices(Write(Ome(sizes + "\"XYCZT\""), 12), {.time = TimeRange{1, 1}, .channel = 2}), (Values{8, 11}));
+  EXPECT_EQ(Slices(Write(Ome(sizes + "\"XYTCZ\""), 12), {.time = TimeRange{1, 1}, .channel = 2}), (Values{5, 11}));
+  EXPECT_EQ(Slices(Write(Ome(sizes + "\"XYZTC\""), 12), {.time = TimeRange{0, 0}, .channel = 0}), (Values{0, 1}));
   const std::string path = Write(Ome(sizes + "\"XYZCT\"", channels), 12);
   EXPECT_THAT(WhyNotPath(path), HasSubstr("holds 2 volumes, of which --time takes one"));
-  EXPECT_THAT(WhyNotPath(path, {.time = 0}), HasSubstr("has 3 channels, of which --channel takes one: 0 to 2 (0: DAPI, 1: GFP)"));
-  EXPECT_THAT(WhyNotPath(path, {.time = 0, .channel = 3}), HasSubstr("0 to 2"));
+  EXPECT_THAT(WhyNotPath(path, {.time = TimeRange{0, 0}}),
+              HasSubstr("has 3 channels, of which --channel takes one: 0 to 2 (0: DAPI, 1: GFP)"));
+  EXPECT_THAT(WhyNotPath(path, {.time = TimeRange{0, 0}, .channel = 3}), HasSubstr("0 to 2"));
 }
 
 TEST_F(OmeTest, DescriptionsThatDoNotFitAreRefused) {
@@ -568,7 +570,7 @@ TEST_F(OmeTest, DescriptionsThatDoNotFitAreRefused) {
   EXPECT_THAT(WhyNotPath(Write(Ome("SizeZ=\"2\" SizeC=\"1\" SizeT=\"1\" DimensionOrder=\"XYZZZ\""), 2)),
               HasSubstr("DimensionOrder is 'XYZZZ'"));
   EXPECT_THAT(WhyNotPath(Write("<OME><Image>", 2)), HasSubstr("its OME description"));
-  EXPECT_THAT(WhyNotPath(Write("by a scanner", 2), {.time = 0}), HasSubstr("time is for OME-TIFF files that state several"));
+  EXPECT_THAT(WhyNotPath(Write("by a scanner", 2), {.time = TimeRange{0, 0}}), HasSubstr("time is for OME-TIFF files that state several"));
 }
 
 }  // namespace
