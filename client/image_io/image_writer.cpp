@@ -141,6 +141,7 @@ OIIO::ImageSpec SpecOf(const ComposedPicture& picture, const PictureFormat& form
     // Samples are passed in their final form: no division by alpha and no transfer curve on the way.
     spec.attribute("oiio:UnassociatedAlpha", 1);
     spec.attribute("oiio:ColorSpace", "sRGB");
+    spec.attribute("png:compressionLevel", 1);  // the default, 6, takes 1.7 times as long to render 60 pictures of a head, 8 % smaller
   } else {
     spec.attribute("oiio:ColorSpace", "Linear");
     spec.attribute("compression", "zip");
