@@ -5,6 +5,7 @@
 #include <deque>
 #include <iterator>
 #include <map>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -51,6 +52,11 @@ Result<Picture> DecodePicture(FrameReply& reply, const Bytes& payload, ImageSize
   return picture;
 }
 
+// A question that has no answer yet.
+struct OpenQuestion {
+  Time submitted, deadline;
+};
+
 constexpr std::uint64_t kTellBytes = std::uint64_t{1} << 20;
 
 // Of an answer to a question or an order.
@@ -83,13 +89,14 @@ struct Client::Impl {
                                std::to_string(std::chrono::duration_cast<std::chrono::milliseconds>(timeout).count()) + " ms");
   }
 
-  // Pumps until `done()`; false: the time is over.
+  // Pumps until `done()`; false: the time is over. `woken` becomes true once a wakeup has ended a wait.
   template <class Done>
-  bool PumpUntil(Duration timeout, Done&& done) {
+  bool PumpUntil(Duration timeout, Done&& done, bool* woken = nullptr) {
     const Time limit = MonotonicNow() + timeout;
     while (!done()) {
       if (MonotonicNow() >= limit) return false;
-      Pump(limit);
+      const bool by_wakeup = Pump(limit);
+      if (woken != nullptr) *woken = *woken || by_wakeup;
     }
     return true;
   }
@@ -103,6 +110,12 @@ struct Client::Impl {
   void Handle(FrameReply& reply, const Bytes& payload);
   void Handle(const ClientPong& pong);
   void SubmitAgain(OpenRequest& lost);
+  // False: nobody waits for it.
+  bool EndQuestion(std::uint64_t nonce, std::variant<FrameProgress, Picture, QuestionReply, Status> end);
+  void ExpireQuestions(Time now);
+  // Waits for the end of a request that was submitted.
+  template <class Reply>
+  Result<Reply> Await(Client& client, RequestId id);
   void End(RequestId request, Status status);  // with a failure
   void FailAll(const std::string& reason);
 
@@ -110,10 +123,10 @@ struct Client::Impl {
   Socket socket;
   ClientTiming timing;
   Wakeup wakeup;
-  RequestId last_request = 0;
-  std::uint64_t last_nonce = 0;
+  std::uint64_t last_id = 0;                         // of requests and nonces
   std::uint64_t received_bytes = 0, told_bytes = 0;  // of payloads; those that the last ping told
   std::map<RequestId, OpenRequest> open;
+  std::map<std::uint64_t, OpenQuestion> questions;         // by nonce
   std::map<std::uint64_t, std::vector<RequestId>> pinged;  // requests of each unanswered ping, by nonce
   std::deque<ClientEvent> events;
   std::optional<AnyMessage> answer;  // to the one question or order that waits for it
@@ -129,7 +142,7 @@ void Client::Impl::Submit(const SubmitFrame& message) {
 }
 
 void Client::Impl::SendPing(Time now) {
-  ClientPing ping{.nonce = ++last_nonce, .open = {}, .received_bytes = received_bytes};
+  ClientPing ping{.nonce = ++last_id, .open = {}, .received_bytes = received_bytes};
   told_bytes = received_bytes;
   for (const auto& [request, unused] : open) {
     if (ping.open.size() < kMaxOpenRequests) ping.open.push_back(request);
@@ -144,7 +157,8 @@ bool Client::Impl::Pump(Time limit) {
   // Messages that have already come are handled before silence is judged: the caller may have been busy elsewhere for long.
   const bool received = Receive();
   Time now = MonotonicNow();
-  if (!open.empty()) {
+  ExpireQuestions(now);
+  if (!open.empty() || !questions.empty()) {
     if (unanswered_since && now - *unanswered_since >= timing.silence) {
       FailAll("the service at " + endpoint + " has not answered for " +
               std::to_string(std::chrono::duration_cast<std::chrono::milliseconds>(now - *unanswered_since).count()) + " ms");
@@ -153,6 +167,7 @@ bool Client::Impl::Pump(Time limit) {
     if (now >= next_ping) SendPing(now);
     limit = std::min(limit, next_ping);
     if (unanswered_since) limit = std::min(limit, *unanswered_since + timing.silence);
+    for (const auto& [nonce, question_asked] : questions) limit = std::min(limit, question_asked.deadline);
   }
   if (received) return false;  // a message may be what the caller waits for
   const std::array<Socket*, 1> sockets = {&socket};
@@ -190,7 +205,15 @@ void Client::Impl::Handle(AnyMessage& message, const Bytes& payload) {
     End(failed->request, failed->status);
   } else if (const auto* pong = std::get_if<ClientPong>(&message)) {
     Handle(*pong);
+  } else if (auto* summary = std::get_if<SummaryReply>(&message)) {
+    EndQuestion(summary->nonce, QuestionReply(std::move(*summary)));
+  } else if (auto* samples = std::get_if<SampleReply>(&message)) {
+    EndQuestion(samples->nonce, QuestionReply(std::move(*samples)));
+  } else if (auto* picked = std::get_if<PickReply>(&message)) {
+    EndQuestion(picked->nonce, QuestionReply(std::move(*picked)));
   } else if (const std::optional<std::uint64_t> nonce = NonceOfAnswer(message)) {
+    const auto* refused = std::get_if<OrderRefused>(&message);
+    if (refused != nullptr && EndQuestion(*nonce, refused->status)) return;
     if (*nonce == question) answer = std::move(message);  // else it comes too late
   } else {
     LogWarning("client plane: dropped " + std::string(NameOf(message)) + ", which services do not send to clients");
@@ -200,9 +223,12 @@ void Client::Impl::Handle(AnyMessage& message, const Bytes& payload) {
 template <class Answer, class Question>
 Result<Answer> Client::Impl::Ask(Question question_message, Duration timeout) {
   answer.reset();
-  question_message.nonce = question = ++last_nonce;
+  question_message.nonce = question = ++last_id;
   (void)Send(question_message);
-  if (!PumpUntil(timeout, [this] { return answer.has_value(); })) return NoAnswer(timeout);
+  bool woken = false;
+  const auto ends_early = [&] { return answer.has_value() || woken; };
+  if (!PumpUntil(timeout, ends_early, &woken)) return NoAnswer(timeout);
+  if (!answer) return Status::Unavailable("the question to the service was given up");
   if (const auto* refused = std::get_if<OrderRefused>(&*answer)) return refused->status;
   if (auto* found = std::get_if<Answer>(&*answer)) return std::move(*found);
   return Status::Internal("the service answered " + std::string(NameOf(*answer)));
@@ -262,22 +288,46 @@ void Client::Impl::End(RequestId request, Status status) {
   if (open.erase(request) > 0) events.push_back({request, std::move(status)});
 }
 
+bool Client::Impl::EndQuestion(std::uint64_t nonce, std::variant<FrameProgress, Picture, QuestionReply, Status> end) {
+  if (questions.erase(nonce) == 0) return false;
+  events.push_back({nonce, std::move(end)});
+  return true;
+}
+
+void Client::Impl::ExpireQuestions(Time now) {
+  std::vector<std::uint64_t> late;
+  for (const auto& [nonce, asked] : questions) {
+    if (now >= asked.deadline) late.push_back(nonce);
+  }
+  for (const std::uint64_t nonce : late) {
+    const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(now - questions.at(nonce).submitted).count();
+    EndQuestion(nonce, Status::DeadlineExceeded("the service at " + endpoint + " has not answered within " + std::to_string(ms) + " ms"));
+  }
+}
+
 void Client::Impl::FailAll(const std::string& reason) {
+  while (!questions.empty()) EndQuestion(questions.begin()->first, Status::Unavailable(reason));
   while (!open.empty()) End(open.begin()->first, Status::Unavailable(reason));
   pinged.clear();
   unanswered_since.reset();
 }
 
-Result<Client> Client::Connect(Context& context, const ServiceAddress& service, Duration timeout, ClientTiming timing) {
+Result<Client> Client::Connect(Context& context, const ServiceAddress& service, Duration timeout, ClientTiming timing,
+                               const std::function<bool()>& give_up) {
   Result<Socket> socket = Socket::Dealer(context, {.client_keys = service.keys});
   if (!socket.ok()) return socket.status();
   if (Status connected = socket->Connect(service.endpoint); !connected.ok()) return connected;
   Client client(std::make_unique<Impl>(service.endpoint, std::move(*socket), timing));
   client.impl_->SendPing(MonotonicNow());
-  if (!client.impl_->PumpUntil(timeout, [&] { return client.impl_->pinged.empty(); })) {
-    return client.impl_->NoAnswer(timeout);
+  constexpr Duration kEachLook = std::chrono::milliseconds(100);  // at give_up
+  const auto connected_or = [&client](Duration time) {
+    return client.impl_->PumpUntil(time, [&] { return client.impl_->pinged.empty(); });
+  };
+  for (const Time end = MonotonicNow() + timeout;;) {
+    const Duration left = end - MonotonicNow();
+    if (connected_or(give_up ? std::min(left, kEachLook) : left)) return client;
+    if (MonotonicNow() >= end || (give_up && give_up())) return client.impl_->NoAnswer(timeout);
   }
-  return client;
 }
 
 Client::Client(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -290,7 +340,7 @@ Client::~Client() {
 }
 
 RequestId Client::Submit(const FrameRequest& request, Duration deadline) {
-  const RequestId id = ++impl_->last_request;
+  const RequestId id = ++impl_->last_id;
   const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(deadline).count();
   SubmitFrame message{.request = id, .deadline_ms = std::uint32_t(std::clamp<std::int64_t>(ms, 1, kMaxDeadlineMs)), .frame = request};
   const Time now = MonotonicNow();
@@ -306,7 +356,25 @@ RequestId Client::Submit(const FrameRequest& request, Duration deadline) {
   return id;
 }
 
+RequestId Client::Submit(Question question, Duration deadline) {
+  const RequestId id = ++impl_->last_id;
+  std::visit([id](auto& query) { query.nonce = id; }, question);
+  const Time now = MonotonicNow();
+  impl_->questions.emplace(id, OpenQuestion{now, now + deadline});
+  const AnyMessage message = std::visit([](auto& query) -> AnyMessage { return std::move(query); }, question);
+  // What the service would refuse to decode is refused here, by the same rules.
+  if (Result<AnyMessage> checked = Decode(Encode(message)); !checked.ok()) {
+    impl_->EndQuestion(id, checked.status());
+  } else if (impl_->questions.size() > kMaxOpenQuestions) {
+    impl_->EndQuestion(id, Status::ResourceExhausted("at most " + std::to_string(kMaxOpenQuestions) + " questions may be open at once"));
+  } else if (const Status sent = impl_->Send(message); !sent.ok()) {
+    impl_->EndQuestion(id, Status::Unavailable("no service at " + impl_->endpoint + ": " + sent.message()));
+  }
+  return id;
+}
+
 void Client::Cancel(RequestId request) {
+  impl_->questions.erase(request);
   const auto found = impl_->open.find(request);
   if (found == impl_->open.end()) return;
   found->second.cancelled = true;
@@ -326,23 +394,50 @@ std::optional<ClientEvent> Client::Next(Duration timeout) {
   return event;
 }
 
-Result<Picture> Client::Render(const FrameRequest& request, Duration deadline) {
-  const RequestId id = Submit(request, deadline);
+template <class Reply>
+Result<Reply> Client::Impl::Await(Client& client, RequestId id) {
   std::deque<ClientEvent> others;  // of other open requests
-  std::optional<Result<Picture>> end;
+  std::optional<Result<Reply>> end;
   while (!end) {
-    std::optional<ClientEvent> event = Next(impl_->timing.ping);
+    std::optional<ClientEvent> event = client.Next(timing.ping);
     if (!event) continue;
     if (event->request != id) {
       others.push_back(std::move(*event));
-    } else if (auto* picture = std::get_if<Picture>(&event->what)) {
-      if (picture->final) end = std::move(*picture);
     } else if (const auto* failure = std::get_if<Status>(&event->what)) {
       end = *failure;
+    } else if constexpr (std::is_same_v<Reply, Picture>) {
+      auto* picture = std::get_if<Picture>(&event->what);
+      if (picture != nullptr && picture->final) end = std::move(*picture);
+    } else if (auto* reply = std::get_if<QuestionReply>(&event->what)) {
+      auto* wanted = std::get_if<Reply>(reply);
+      end = wanted != nullptr ? Result<Reply>(std::move(*wanted)) : Status::Internal("the service answered another question");
     }
   }
-  impl_->events.insert(impl_->events.begin(), std::make_move_iterator(others.begin()), std::make_move_iterator(others.end()));
+  events.insert(events.begin(), std::make_move_iterator(others.begin()), std::make_move_iterator(others.end()));
   return std::move(*end);
+}
+
+Result<Picture> Client::Render(const FrameRequest& request, Duration deadline) {
+  return impl_->Await<Picture>(*this, Submit(request, deadline));
+}
+
+Result<SummaryReply> Client::Summarize(const std::string& dataset, const TransferChoice& transfer, Duration deadline) {
+  return impl_->Await<SummaryReply>(*this, Submit(SummaryQuery{.dataset = dataset, .transfer = transfer}, deadline));
+}
+
+Result<std::vector<VolumeSample>> Client::SampleAt(const std::string& dataset, std::vector<Vec3> points, Duration deadline) {
+  const std::size_t count = points.size();
+  Result<SampleReply> reply =
+      impl_->Await<SampleReply>(*this, Submit(SampleQuery{.dataset = dataset, .points = std::move(points)}, deadline));
+  if (!reply.ok()) return reply.status();
+  if (reply->samples.size() != count) {
+    return Status::DataLoss("the service answered " + std::to_string(reply->samples.size()) + " of " + std::to_string(count) + " points");
+  }
+  return std::move(reply->samples);
+}
+
+Result<PickReply> Client::Pick(const FrameRequest& frame, double x, double y, Duration deadline) {
+  return impl_->Await<PickReply>(*this, Submit(PickQuery{.frame = frame, .x = x, .y = y}, deadline));
 }
 
 Result<StatusReply> Client::QueryStatus(Duration timeout) { return impl_->Ask<StatusReply>(StatusQuery{}, timeout); }

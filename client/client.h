@@ -6,6 +6,7 @@
 // One thread at a time.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -33,7 +34,7 @@ struct Picture {
 
 struct ClientEvent {
   RequestId request = 0;
-  std::variant<FrameProgress, Picture, Status> what;  // Status: the request failed
+  std::variant<FrameProgress, Picture, QuestionReply, Status> what;  // Status: the request failed
 };
 
 // Where a service is.
@@ -51,18 +52,23 @@ struct ClientTiming {
   Duration silence = std::chrono::seconds(5);  // without an answer to a ping, the service counts as gone
 };
 
+inline constexpr Duration kAnswerTime = std::chrono::minutes(2);  // for an answer to a question: volumes may have to be loaded first
+
 class Client {
  public:
-  // Unavailable also if the service refuses the key.
+  // Unavailable also if the service refuses the key, or soon after `give_up`, which may be empty, returns true.
   static Result<Client> Connect(Context& context, const ServiceAddress& service, Duration timeout = std::chrono::seconds(4),
-                                ClientTiming timing = {});
+                                ClientTiming timing = {}, const std::function<bool()>& give_up = {});
   Client(Client&&) noexcept;
   Client& operator=(Client&&) noexcept;
   ~Client();  // cancels open requests
 
   // A deadline counts from the request's arrival at the service and is limited to what the schema allows.
   RequestId Submit(const FrameRequest& request, Duration deadline = std::chrono::minutes(10));
-  void Cancel(RequestId request);
+  // A question about what a dataset holds; its nonce is filled in. It ends with a QuestionReply or a Status. If its dataset is not loaded,
+  // it is loaded first.
+  RequestId Submit(Question question, Duration deadline = kAnswerTime);
+  void Cancel(RequestId request);  // of a question: nothing is heard of it any more
 
   // The next event of any open request; nullopt after the timeout, or earlier if wakeup() was notified or a signal was handled. If the
   // service stops answering, every open request gets an Unavailable event. A request that the service has lost, because it was started
@@ -72,6 +78,12 @@ class Client {
   // Submits and waits for the end.
   Result<Picture> Render(const FrameRequest& request, Duration deadline = std::chrono::minutes(10));
 
+  // The answers to questions; these submit and wait. InvalidArgument, NotFound, ...: as of frames.
+  Result<SummaryReply> Summarize(const std::string& dataset, const TransferChoice& transfer = {}, Duration deadline = kAnswerTime);
+  Result<std::vector<VolumeSample>> SampleAt(const std::string& dataset, std::vector<Vec3> points, Duration deadline = kAnswerTime);
+  Result<PickReply> Pick(const FrameRequest& frame, double x, double y, Duration deadline = kAnswerTime);
+
+  // A notified wakeup() ends this one early: Unavailable.
   Result<StatusReply> QueryStatus(Duration timeout = std::chrono::seconds(5));
   // InvalidArgument: the service has keys, and this client's is not an admin's.
   Status ShutDownService(Duration timeout = std::chrono::seconds(5));

@@ -286,6 +286,7 @@ void FrameMachine::State::StopAll(const AnyMessage& goodbye, const std::string& 
   const auto everything = [](const OpenRequest&) { return true; };
   for (const OpenRequest& request : queue.Extract(everything)) FailRequest(request, Status::Unavailable(reason));
   for (const RunningFrame& frame : frames) AnswerFailure(frame.request(), Status::Unavailable(reason));
+  for (const auto& [id, open] : questions) RefuseQuestion(open, Status::Unavailable(reason));
   for (const Member& member : roster.members()) SendWorker(member.id, goodbye);
   actions.emplace_back(StopService{});
   stopped = true;
@@ -343,6 +344,7 @@ std::vector<CoordinatorAction> FrameMachine::Step(const CoordinatorEvent& event,
   if (!state.stopped) {
     state.Expire();
     state.Advance();
+    state.AskExecutor();
     state.DropPlans();
     state.UnloadRetired();
   }
@@ -367,7 +369,8 @@ CoordinatorSizes FrameMachine::sizes() const {
           .slots = state.roster.slots().slots.size(),
           .orders = state.orders.size(),
           .awaited = awaited,
-          .retired = state.datasets.retired()};
+          .retired = state.datasets.retired(),
+          .questions = state.questions.size()};
 }
 
 }  // namespace slabstream

@@ -12,6 +12,8 @@
 //              until then. Watched folders are looked through every look_interval, and when somebody asks for a name that is not known;
 //              files that come and go there are datasets that come and go. DataOrders add and remove datasets, too. A look never holds
 //              the machine up: the executor answers it with an event, as it does for loads.
+//   questions  What a dataset holds is asked of the executor once the dataset is loaded and its files were looked at, as for frames. A
+//              question ends with its answer, with OrderRefused, or with its client.
 //   memory     A frame that does not fit the memory of its workers fails before they are given any of it (FramesThatFit). Frames that
 //              fit one by one run one by one.
 //   occupancy  Where a policy needs it, occupied voxels are counted once for each dataset, transfer function and renderer. Requests wait
@@ -37,8 +39,8 @@
 //              another coordinator. Both fail the open requests and end with StopService; a stopped machine does nothing more.
 //
 // What the executor must do: call Step(CoordinatorTick) no later than NextWake(), which is Time::max() if nothing can happen by itself;
-// carry out the actions in order; answer LoadDataset, LookAtDataset, LookAtFolders, FindDatasets, CountDataset and PlanRequest with one
-// event each, in any order; report WorkerGone
+// carry out the actions in order; answer LoadDataset, LookAtDataset, LookAtFolders, FindDatasets, AnswerQuestion, CountDataset and
+// PlanRequest with one event each, in any order; report WorkerGone
 // or ClientGone when a send finds nobody. If the executor calls late, the machine assumes that the executor itself was held up, and
 // extends everybody's time by as much.
 #pragma once
@@ -64,7 +66,8 @@
 
 namespace slabstream {
 
-using OrderId = std::uint64_t;  // of an order about datasets that waits; never given twice
+using OrderId = std::uint64_t;     // of an order about datasets that waits; never given twice
+using QuestionId = std::uint64_t;  // likewise
 
 struct CoordinatorConfig {
   Epoch epoch = 0;  // random, not 0
@@ -97,10 +100,11 @@ struct FromClient {
   PeerToken from = 0;
   AnyMessage message;
 };
-// A SubmitFrame that could not be decoded, with the answer for its client.
+// A SubmitFrame or question that could not be decoded, with the answer for its client (RefusalOf).
 struct BadRequest {
   PeerToken from = 0;
-  FrameFailed answer;
+  AnyMessage answer;
+  Status why;
 };
 // The socket says that nobody is there.
 struct WorkerGone {
@@ -137,6 +141,11 @@ struct DatasetsFound {
   OrderId order = 0;
   Result<FoundData> found;
 };
+// The end of an AnswerQuestion: a reply, or OrderRefused.
+struct QuestionAnswered {
+  QuestionId question = 0;
+  AnyMessage answer;
+};
 // The end of a count.
 struct OccupiedCounted {
   CountId count = 0;
@@ -152,8 +161,9 @@ struct CoordinatorStopRequested {
   std::string reason = "the coordinator is going down";
 };
 struct CoordinatorTick {};
-using CoordinatorEvent = std::variant<FromWorker, FromClient, BadRequest, WorkerGone, ClientGone, DatasetLoaded, DatasetFailed, DatasetSeen,
-                                      FoldersSeen, DatasetsFound, OccupiedCounted, Planned, CoordinatorStopRequested, CoordinatorTick>;
+using CoordinatorEvent =
+    std::variant<FromWorker, FromClient, BadRequest, WorkerGone, ClientGone, DatasetLoaded, DatasetFailed, DatasetSeen, FoldersSeen,
+                 DatasetsFound, QuestionAnswered, OccupiedCounted, Planned, CoordinatorStopRequested, CoordinatorTick>;
 
 // ---- actions
 struct ToWorker {
@@ -190,6 +200,13 @@ struct FindDatasets {
   OrderId order = 0;
   std::vector<std::string> arguments;
 };
+// -> QuestionAnswered. The voxels may be unloaded as soon as the action is performed: the executor holds them until it has answered.
+struct AnswerQuestion {
+  QuestionId id = 0;
+  Question question;
+  DatasetId dataset = 0;
+  std::shared_ptr<const VolumeSummary> summary;
+};
 // -> OccupiedCounted: counts the voxels of the volume that its renderer draws (DrawnTable, CountOccupied). The dataset was loaded.
 struct CountDataset {
   CountId count = 0;
@@ -213,7 +230,7 @@ struct Note {
   std::string text;
 };
 using CoordinatorAction = std::variant<ToWorker, ToClient, DropClient, LoadDataset, UnloadDataset, LookAtDataset, LookAtFolders,
-                                       FindDatasets, CountDataset, PlanRequest, DropPlan, FrameMeasured, Note, StopService>;
+                                       FindDatasets, AnswerQuestion, CountDataset, PlanRequest, DropPlan, FrameMeasured, Note, StopService>;
 
 // Entries in the machine's tables. At rest, with nothing asked for and every client gone, they are 0 but for the workers, their slots and
 // the grids of earlier counts (at most OccupancyTable::kMaxKept).
@@ -224,6 +241,7 @@ struct CoordinatorSizes {
   std::size_t workers = 0, slots = 0;
   std::size_t orders = 0, awaited = 0;  // that wait for a look at files; names that do
   std::size_t retired = 0;              // voxels that only frames under way use
+  std::size_t questions = 0;
 };
 
 class FrameMachine {

@@ -7,8 +7,7 @@ namespace slabstream {
 
 void FrameMachine::State::On(const BadRequest& event) {
   ++refused.bad_request;
-  Tell(NoteAbout::kFrames, LogLevel::kInfo, "request {} of client {} is refused: {}", event.answer.request, event.from,
-       event.answer.status.message());
+  Tell(NoteAbout::kFrames, LogLevel::kInfo, "a request of client {} is refused: {}", event.from, event.why.message());
   SendClient(event.from, event.answer);
 }
 
@@ -144,6 +143,7 @@ void FrameMachine::State::RefuseRequest(const OpenRequest& request, const Status
 }
 
 void FrameMachine::State::FreeClient(PeerToken client) {
+  std::erase_if(questions, [client](const auto& open) { return open.second.client == client; });
   if (!clients.Forget(client)) return;
   queue.Forget(client);
   std::vector<FrameId> orphans;

@@ -31,29 +31,34 @@ Status FrameMachine::State::FindVolume(OpenRequest& request) const {
   return Status::Ok();
 }
 
-// Sees to it that the request gets its dataset as the files are now. Until a look has shown that they have not changed, it is planned for
-// the voxels that are there.
-Status FrameMachine::State::Seek(OpenRequest& request) {
-  const std::string& name = request.submit.frame.dataset;
+// Sees to it that the dataset is loaded as its files are now. The look at them that must be over before; 0: none.
+LookId FrameMachine::State::SeekData(const std::string& name) {
   DatasetTable::Entry* const entry = datasets.Find(name);
   if (entry == nullptr || entry->awaited != 0) {
     datasets.Await(name, folder_looks.Want());
     LookThroughFolders();
-    return Status::Ok();
+    return 0;
   }
   datasets.Use(name);
   switch (entry->state) {
     case DatasetState::kUnloaded:
     case DatasetState::kFailed: LoadData(name); break;
-    case DatasetState::kLoading: request.look = entry->looks.Want(); break;
-    case DatasetState::kReady:
-      if (entry->stamp != nullptr) {
-        request.look = entry->looks.Want();
-        LookAt(name);
-      }
-      return FindVolume(request);
+    case DatasetState::kLoading: return entry->looks.Want();
+    case DatasetState::kReady: {
+      if (entry->stamp == nullptr) break;
+      const LookId look = entry->looks.Want();
+      LookAt(name);
+      return look;
+    }
   }
-  return Status::Ok();
+  return 0;
+}
+
+// Until a look has shown that the files have not changed, the request is planned for the voxels that are there.
+Status FrameMachine::State::Seek(OpenRequest& request) {
+  const std::string& name = request.submit.frame.dataset;
+  request.look = SeekData(name);
+  return datasets.Find(name)->state == DatasetState::kReady ? FindVolume(request) : Status::Ok();
 }
 
 // ---------------------------------------------------------------- voxels
@@ -93,6 +98,7 @@ void FrameMachine::State::On(const DatasetLoaded& event) {
                   event.name, MemoryText(event.bytes), MemoryText(share), MemoryText(datasets.bytes() - event.bytes)));
   const auto needs = [&](const OpenRequest& request) { return request.submit.frame.dataset == event.name; };
   for (const OpenRequest& request : queue.Extract(needs)) RefuseRequest(request, full, &RefusedRequests::too_large);
+  RefuseQuestions(event.name, full);
   UnloadOne();
 }
 
@@ -110,6 +116,7 @@ void FrameMachine::State::FailData(const std::string& name, const Status& status
   const auto waiting = queue.Extract([&](const OpenRequest& request) { return request.submit.frame.dataset == name; });
   for (const OpenRequest& request : waiting)
     full ? RefuseRequest(request, status, &RefusedRequests::too_large) : FailRequest(request, status);
+  RefuseQuestions(name, status);
 }
 
 // What the dataset is read from is not what it was. Frames that have begun go on with the voxels that they began with.
@@ -123,12 +130,16 @@ void FrameMachine::State::RenewData(const std::string& name) {
     request.plan = 0;  // DropPlans drops it
     request.planned = nullptr;
   });
-  if (wanted) LoadData(name);
+  if (wanted || IsAskedAbout(name)) LoadData(name);
 }
 
 bool FrameMachine::State::InUse(DatasetId dataset) {
   bool used = std::ranges::any_of(frames, [&](const RunningFrame& frame) { return frame.plan().setup.dataset == dataset; });
   queue.ForEach([&](const OpenRequest& request) { used = used || (request.volume && request.volume->dataset() == dataset); });
+  for (const auto& [id, open] : questions) {
+    const DatasetTable::Entry* const entry = open.asked ? nullptr : datasets.Find(DatasetOf(open.question));
+    used = used || (entry != nullptr && entry->id == dataset);
+  }
   return used;
 }
 
@@ -253,7 +264,7 @@ void FrameMachine::State::AddData(const std::string& name, const DataSource& sou
   Tell(NoteAbout::kDatasets, LogLevel::kInfo, "dataset {} is in the catalogue: {}", InQuotes(name), source.path);
   bool wanted = false;
   queue.ForEach([&](const OpenRequest& request) { wanted = wanted || request.submit.frame.dataset == name; });
-  if (wanted) LoadData(name);
+  if (wanted || IsAskedAbout(name)) LoadData(name);
 }
 
 void FrameMachine::State::RemoveData(const std::string& name, const std::string& why) {
@@ -262,6 +273,7 @@ void FrameMachine::State::RemoveData(const std::string& name, const std::string&
   datasets.Remove(name);
   const auto waiting = queue.Extract([&](const OpenRequest& request) { return request.submit.frame.dataset == name; });
   for (const OpenRequest& request : waiting) FailRequest(request, removed);
+  RefuseQuestions(name, removed);
 }
 
 void FrameMachine::State::StopWatching(const std::string& folder) {

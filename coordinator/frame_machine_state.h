@@ -5,6 +5,7 @@
 //   frame_machine_data.cpp      datasets: the catalogue, files, voxels
 //   frame_machine_workers.cpp   messages of workers
 //   frame_machine_clients.cpp   messages of clients and the ends of their requests
+//   frame_machine_questions.cpp questions about what datasets hold
 #pragma once
 
 #include <fmt/format.h>
@@ -83,6 +84,15 @@ struct FrameMachine::State {
   };
   std::map<OrderId, OpenOrder> orders;  // at most one of each client
   OrderId last_order = 0;
+  // A question that has no answer yet.
+  struct OpenQuestion {
+    PeerToken client = 0;
+    Question question;
+    LookId look = 0;     // at its dataset's files, which must be over before; 0: none
+    bool asked = false;  // of the executor
+  };
+  std::map<QuestionId, OpenQuestion> questions;  // in order of arrival
+  QuestionId last_question = 0;
   LookCounter folder_looks;
   Time next_round;                            // when the folders are looked through, if there are any
   std::set<std::string> complaints;           // about what lies in the folders
@@ -106,6 +116,7 @@ struct FrameMachine::State {
     std::erase_if(orders, [&](const auto& order) { return order.second.client == event.who; });
     FreeClient(event.who);
   }
+  void On(const QuestionAnswered& event);
   void On(const DatasetLoaded& event);
   void On(const DatasetFailed& event);
   void On(const DatasetSeen& event);
@@ -130,7 +141,8 @@ struct FrameMachine::State {
   // Drops what no worker sends here.
   template <AnyOf<Welcome, Ping, GroupAssignment, Retire, Stop, ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused,
                   ImageReceived, SubmitFrame, FrameProgress, FrameReply, FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery,
-                  StatusReply, ShutDown, ShutDownReply, KeysOrder, KeysReply, OrderRefused, DataOrder, DataReply>
+                  StatusReply, ShutDown, ShutDownReply, KeysOrder, KeysReply, OrderRefused, DataOrder, DataReply, SummaryQuery,
+                  SummaryReply, SampleQuery, SampleReply, PickQuery, PickReply>
                 Message>
   void OnWorkerMessage(const FromWorker&, const Message&) {}
 
@@ -141,11 +153,15 @@ struct FrameMachine::State {
   void OnClientMessage(PeerToken client, const StatusQuery& message);
   void OnClientMessage(PeerToken client, const ShutDown& message);
   void OnClientMessage(PeerToken client, const DataOrder& message);
+  void OnClientMessage(PeerToken client, const SummaryQuery& message) { Ask(client, message); }
+  void OnClientMessage(PeerToken client, const SampleQuery& message) { Ask(client, message); }
+  void OnClientMessage(PeerToken client, const PickQuery& message) { Ask(client, message); }
   // Drops what no client sends.
-  template <AnyOf<Register, Welcome, Heartbeat, Ping, GroupAssignment, GroupDone, FrameImage, WorkerTrouble, Leave, Retire, Stop,
-                  ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused, ImageReceived, FrameProgress, FrameReply, FrameFailed,
-                  ClientPong, StatusReply, ShutDownReply, KeysOrder, KeysReply, OrderRefused, DataReply>
-                Message>
+  template <
+      AnyOf<Register, Welcome, Heartbeat, Ping, GroupAssignment, GroupDone, FrameImage, WorkerTrouble, Leave, Retire, Stop, ChunkRequest,
+            Chunk, ChunkRefused, PartialImage, ImageRefused, ImageReceived, FrameProgress, FrameReply, FrameFailed, ClientPong, StatusReply,
+            ShutDownReply, KeysOrder, KeysReply, OrderRefused, DataReply, SummaryReply, SampleReply, PickReply>
+          Message>
   void OnClientMessage(PeerToken, const Message&) {}
 
   // ---- requests
@@ -160,8 +176,17 @@ struct FrameMachine::State {
   void SendAnswer(PeerToken client, Answer& answer);
   void FreeClient(PeerToken client);
 
+  // ---- questions
+  void Ask(PeerToken client, Question question);
+  void AskExecutor();
+  bool IsAskedAbout(const std::string& dataset) const;  // by a question that the executor has not been asked
+  // Those about the dataset that the executor has not been asked.
+  void RefuseQuestions(const std::string& dataset, const Status& status);
+  void RefuseQuestion(const OpenQuestion& open, const Status& status);
+
   // ---- datasets
   Status FindVolume(OpenRequest& request) const;
+  LookId SeekData(const std::string& name);
   Status Seek(OpenRequest& request);
   bool IsSeen(const OpenRequest& request) const {
     return request.look == 0 || datasets.Find(request.submit.frame.dataset)->looks.IsOver(request.look);

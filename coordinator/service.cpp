@@ -23,6 +23,7 @@
 #include "common/renderers/renderer_kind.h"
 #include "common/transport/endpoint.h"
 #include "common/transport/mailbox.h"
+#include "coordinator/answer_question.h"
 #include "coordinator/dataset_id.h"
 #include "coordinator/peer_table.h"
 #include "coordinator/service_keys.h"
@@ -37,6 +38,7 @@ constexpr Duration kLongestWait = std::chrono::seconds(1);
 constexpr Duration kStopGrace = std::chrono::seconds(5);  // for the machine to end in order
 constexpr std::int64_t kNotesAtOnce = 100;                // lines of the log that peers can provoke
 constexpr Duration kEachNote = std::chrono::milliseconds(200);
+constexpr std::size_t kAnswersAtOnce = 2;
 constexpr int kReceiveBatch = 64;  // messages of one socket before the other one has its turn
 
 Epoch RandomEpoch() {
@@ -161,6 +163,7 @@ struct CoordinatorService::Impl {
   void Perform(LookAtDataset& action);
   void Perform(LookAtFolders& action);
   void Perform(FindDatasets& action);
+  void Perform(AnswerQuestion& action);
   void Perform(Note& action) { notes[std::size_t(action.about)].Write(action.level, Printable(std::move(action.text))); }
   void Perform(CountDataset& action);
   void Perform(PlanRequest& action);
@@ -193,7 +196,7 @@ struct CoordinatorService::Impl {
   const CountFunction count_occupied;
   const std::shared_ptr<Planner> planner;                      // the planning thread's, but for plans at hand
   std::map<PlanId, std::shared_ptr<std::atomic<bool>>> plans;  // under way: whether they are dropped
-  BackgroundTasks loads{kLoadsAtOnce}, looks{kLooksAtOnce}, counts{1}, planning{1};
+  BackgroundTasks loads{kLoadsAtOnce}, looks{kLooksAtOnce}, answers{kAnswersAtOnce}, counts{1}, planning{1};
   std::jthread thread;  // owns the sockets and the machine; last member: ends first
 };
 
@@ -291,8 +294,8 @@ void CoordinatorService::Impl::ReceiveFromClients() {
     if (!message.ok()) {
       complaints.Warning("client plane: refused a message: " + message.status().message());
       // A refused request whose id can be read gets an answer, so that nobody waits for it in vain.
-      if (std::optional<FrameFailed> refusal = RefusalOf(incoming->header(), message.status())) {
-        HandleEvent(BadRequest{client_peers.Heard(incoming->identity, MonotonicNow()), *std::move(refusal)});
+      if (std::optional<AnyMessage> refusal = RefusalOf(incoming->header(), message.status())) {
+        HandleEvent(BadRequest{client_peers.Heard(incoming->identity, MonotonicNow()), *std::move(refusal), message.status()});
       }
       continue;
     }
@@ -379,6 +382,19 @@ void CoordinatorService::Impl::Perform(FindDatasets& action) {
       [order = action.order](const Status& why) {
         return DatasetsFound{order, why};
       });
+}
+
+void CoordinatorService::Impl::Perform(AnswerQuestion& action) {
+  const auto refusal = [id = action.id, nonce = NonceOf(action.question)](const Status& why) {
+    return QuestionAnswered{id, OrderRefused{nonce, why}};
+  };
+  MakeElsewhere(
+      answers, "an answer to a question",
+      [action, refusal, samples = slabs->Find(action.dataset)] {
+        const Result<AnyMessage> answer = AnswerTo(action, samples);
+        return News{answer.ok() ? QuestionAnswered{action.id, *answer} : refusal(answer.status())};
+      },
+      refusal);
 }
 
 void CoordinatorService::Impl::Perform(CountDataset& action) {

@@ -1,9 +1,9 @@
 // CoordinatorService: runs a FrameMachine over ZeroMQ. Binds the client, control and slabs planes, loads datasets, serves voxels.
 //
 // Threads: one owns the client and control sockets and runs the machine; one owns the slabs socket, cuts and packs chunks; one plans; one
-// counts occupied voxels; each dataset that is being loaded has one, kLoadsAtOnce at a time; up to kLooksAtOnce look at files. None of them
-// waits for another one. An exception in one fails only what it was doing: a frame, a load, a count, a chunk. If the machine's own thread
-// throws, open requests fail with the reason and the service stops.
+// counts occupied voxels; two answer questions about voxels; each dataset that is being loaded has one, kLoadsAtOnce at a time; up to
+// kLooksAtOnce look at files. None of them waits for another one. An exception in one fails only what it was doing: a frame, a load, a
+// count, a chunk. If the machine's own thread throws, open requests fail with the reason and the service stops.
 #pragma once
 
 #include <functional>

@@ -1,6 +1,7 @@
 #include "gateway/http.h"
 
 #include <fmt/format.h>
+#include <poll.h>
 
 #include <algorithm>
 #include <array>
@@ -243,7 +244,8 @@ class WebSocketConnection final : public Registered,
 template <class Stream>
 class HttpConnection final : public Registered, public std::enable_shared_from_this<HttpConnection<Stream>> {
  public:
-  HttpConnection(Stream stream, std::shared_ptr<Shared> shared) : Registered(std::move(shared)), stream_(std::move(stream)) {}
+  HttpConnection(Stream stream, std::shared_ptr<Shared> shared)
+      : Registered(std::move(shared)), stream_(std::move(stream)), watch_(stream_.get_executor()) {}
 
   void Run() {
     if constexpr (std::is_same_v<Stream, TlsStream>) {
@@ -281,9 +283,32 @@ class HttpConnection final : public Registered, public std::enable_shared_from_t
     message_ = parser_->release();
     HttpRequest request = RequestOf(message_);
     if (websocket::is_upgrade(message_)) return Upgrade(request);
+    gone_ = request.gone;
     shared_->application.Handle(std::move(request), [self = this->shared_from_this()](HttpReply reply) {
+      self->gone_.reset();
+      self->watch_.cancel();
       self->Write(std::move(reply), self->message_.keep_alive());
     });
+    if (gone_ != nullptr && *gone_) Watch();
+  }
+
+  // Looks now and then whether the other end is still there, while the application works on the reply. A read would tell sooner, but it
+  // would also take what belongs to the next request, or to TLS.
+  void Watch() {
+    watch_.expires_after(kWatchInterval);
+    watch_.async_wait([self = this->shared_from_this()](Error error) {
+      if (error || self->gone_ == nullptr) return;
+      if (self->IsThere()) return self->Watch();
+      const auto gone = std::exchange(self->gone_, nullptr);
+      (*gone)();
+      self->CloseNow();
+    });
+  }
+
+  bool IsThere() {
+    if (!Lowest().socket().is_open()) return false;
+    pollfd state{.fd = Lowest().socket().native_handle(), .events = POLLRDHUP, .revents = 0};
+    return ::poll(&state, 1, 0) <= 0 || (state.revents & (POLLRDHUP | POLLHUP | POLLERR)) == 0;
   }
 
   void Upgrade(const HttpRequest& request) {
@@ -340,7 +365,11 @@ class HttpConnection final : public Registered, public std::enable_shared_from_t
     });
   }
 
+  static constexpr auto kWatchInterval = std::chrono::milliseconds(200);
+
   Stream stream_;
+  asio::steady_timer watch_;
+  std::shared_ptr<std::function<void()>> gone_;  // while the application works on a reply
   beast::flat_buffer buffer_;
   std::optional<http::request_parser<http::string_body>> parser_;
   http::request<http::string_body> message_;

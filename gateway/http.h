@@ -37,6 +37,9 @@ struct HttpRequest {
   std::optional<std::string> origin, authorization;
   std::vector<std::string> subprotocols;  // that a WebSocket offers
   std::string body;
+  // Never null. An application that works on the reply for long may put a function there: it is called, on the io thread, if the
+  // connection closes before the reply.
+  std::shared_ptr<std::function<void()>> gone = std::make_shared<std::function<void()>>();
 };
 
 struct HttpReply {
@@ -74,7 +77,7 @@ struct WebSocketAccepted {
 class HttpApplication {
  public:
   virtual ~HttpApplication() = default;
-  // `reply` is called once, on the io thread.
+  // `reply` is called once, on the io thread, unless `request.gone` was called before.
   virtual void Handle(HttpRequest request, std::function<void(HttpReply)> reply) = 0;
   virtual std::variant<HttpReply, WebSocketAccepted> Accept(const HttpRequest& request) = 0;
   // What goes into every response.

@@ -67,6 +67,12 @@ void Metrics::CountPicture(std::string_view type, std::size_t bytes, Duration en
   Observe(fmt::format("encode-{}", type), encoding.count());
 }
 
+void Metrics::CountAnswer(std::string_view question, Duration latency) {
+  const std::lock_guard lock(mutex_);
+  ++answers_[std::string(question)];
+  Observe("answer", latency.count());
+}
+
 void Metrics::CountRoundTrip(Duration round_trip) {
   const std::lock_guard lock(mutex_);
   Observe("round-trip", round_trip.count());
@@ -93,11 +99,13 @@ std::string Metrics::Text(const ServiceNews& news) const {
   out.Single("gateway_frames_total", "counter", "Frames that the service made for this gateway.", frames_);
   out.Family("gateway_pictures_total", "counter", "Pictures sent, by their type.");
   for (const auto& [type, count] : pictures_) out.Line(count, fmt::format("type=\"{}\"", type));
+  out.Family("gateway_answers_total", "counter", "Questions about volumes that the service answered.");
+  for (const auto& [question, count] : answers_) out.Line(count, fmt::format("question=\"{}\"", question));
   out.Family("gateway_bytes_total", "counter", "Bytes by plane: voxels to workers, images between them, pictures to the web.");
   for (const auto& [plane, bytes] : bytes_) out.Line(bytes, fmt::format("plane=\"{}\"", plane));
   out.Single("gateway_rendered_boxes_total", "counter", "Boxes that workers rendered for this gateway.", voxel_reports_);
   out.Single("gateway_cached_boxes_total", "counter", "Those whose voxels the worker had already.", voxel_hits_);
-  out.Family("gateway_stage_seconds", "histogram", "Times of a frame by stage.");
+  out.Family("gateway_stage_seconds", "histogram", "Times of a frame by stage, and of answers.");
   for (const auto& [stage, histogram] : stages_) {
     for (std::size_t i = 0; i < Histogram::kBounds.size(); ++i) {
       out.Line(histogram.counts[i], fmt::format("stage=\"{}\",le=\"{}\"", stage, Histogram::kBounds[i]), "_bucket");

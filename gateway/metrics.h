@@ -20,6 +20,8 @@ class Metrics {
   void CountFrame(const FrameStatistics& statistics, Duration latency);
   // A picture was encoded: `type` is "jpeg" or "png".
   void CountPicture(std::string_view type, std::size_t bytes, Duration encoding);
+  // The service answered a question ("histogram", "value", "pick", "transfer").
+  void CountAnswer(std::string_view question, Duration latency);
   // From sending a picture to the page's acknowledgement.
   void CountRoundTrip(Duration round_trip);
   // A request over HTTP, by its status.
@@ -44,7 +46,7 @@ class Metrics {
 
   mutable std::mutex mutex_;
   std::map<std::string, Histogram, std::less<>> stages_;  // by stage
-  std::map<std::string, std::uint64_t, std::less<>> pictures_, bytes_, refusals_;
+  std::map<std::string, std::uint64_t, std::less<>> pictures_, bytes_, refusals_, answers_;
   std::map<unsigned, std::uint64_t> responses_;
   std::uint64_t frames_ = 0, voxel_reports_ = 0, voxel_hits_ = 0;
   int sessions_ = 0;

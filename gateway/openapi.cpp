@@ -1,5 +1,7 @@
 #include "gateway/openapi.h"
 
+#include <algorithm>
+#include <initializer_list>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -9,6 +11,8 @@
 
 namespace slabstream {
 namespace {
+
+bool IsRequired(std::string_view name) { return name == "dataset" || name == "x" || name == "y" || name == "at"; }
 
 Json SchemaOf(const FieldDescription& field) {
   Json schema = {{"type", field.value.empty() ? "boolean" : field.value == "NUMBER" ? "number" : "string"}};
@@ -28,7 +32,7 @@ Json Parameters(const std::vector<FieldDescription>& fields) {
   for (const FieldDescription& field : fields) {
     parameters.push_back({{"name", field.name},
                           {"in", "query"},
-                          {"required", field.name == "dataset"},
+                          {"required", IsRequired(field.name)},
                           {"description", DescriptionOf(field)},
                           {"x-group", field.group},
                           {"schema", SchemaOf(field)}});
@@ -56,9 +60,9 @@ Json Responses(const char* type, bool open, const Json& schema, bool takes_optio
   if (!open) responses["401"] = failure("The token is missing or wrong");
   responses["403"] = failure("Host or Origin is foreign");
   if (takes_options) responses["404"] = failure("There is no such dataset");
-  if (takes_options) responses["429"] = failure("Too many pictures are under way");
+  if (takes_options) responses["429"] = failure("Too many pictures or questions are under way");
   responses["503"] = failure("The service does not answer, has no worker, or not enough memory");
-  if (takes_options) responses["504"] = failure("The picture was not ready in time");
+  if (takes_options) responses["504"] = failure("The answer was not ready in time");
   return responses;
 }
 
@@ -66,7 +70,22 @@ struct Operation {
   const char *path, *summary, *type;
   bool open = false;
   std::vector<FieldDescription> fields = {};
+  bool takes_post = false;
 };
+
+// Those of `fields` with these names.
+std::vector<FieldDescription> Named(const std::vector<FieldDescription>& fields, std::initializer_list<std::string_view> names) {
+  std::vector<FieldDescription> named;
+  for (const FieldDescription& field : fields) {
+    if (std::find(names.begin(), names.end(), field.name) != names.end()) named.push_back(field);
+  }
+  return named;
+}
+
+std::vector<FieldDescription> With(std::vector<FieldDescription> fields, const std::vector<FieldDescription>& more) {
+  fields.insert(fields.begin() + 1, more.begin(), more.end());  // behind the dataset
+  return fields;
+}
 
 Json Describe(const Operation& operation) {
   const bool picture = std::string_view(operation.type) == "image/png";
@@ -78,6 +97,7 @@ Json Describe(const Operation& operation) {
   if (!options) return {{"get", std::move(get)}};
   Json post = get;
   get["parameters"] = Parameters(operation.fields);
+  if (!operation.takes_post) return {{"get", std::move(get)}};
   post["requestBody"] = Body(operation.fields);
   return {{"get", std::move(get)}, {"post", std::move(post)}};
 }
@@ -85,6 +105,10 @@ Json Describe(const Operation& operation) {
 }  // namespace
 
 Json OpenApi() {
+  const std::vector<FieldDescription> render = RenderFields(), dataset = Named(render, {"dataset"});
+  const auto field = [](const char* name, const char* purpose, const char* value) {
+    return FieldDescription{.name = name, .group = "Options", .purpose = purpose, .value = value, .standard = ""};
+  };
   const Operation operations[] = {
       {"/livez", "The gateway runs", "text/plain", true},
       {"/readyz", "The service answers and has a worker", "text/plain", true},
@@ -92,9 +116,15 @@ Json OpenApi() {
       {"/api/v1/openapi.json", "This document", "application/json", true},
       {"/api/v1/status", "The service: workers, frames, memory", "application/json"},
       {"/api/v1/datasets", "The datasets of the service", "application/json"},
-      {"/api/v1/render.png", "A picture, as `slabstream render` makes it", "image/png", false, RenderFields()},
-      {"/api/v1/slice.png", "Planes through a volume, as `slabstream slice` makes them", "image/png", false, SliceFields()},
-      {"/api/v1/command", "The command line that makes a picture", "application/json", false, RenderFields()},
+      {"/api/v1/render.png", "A picture, as `slabstream render` makes it", "image/png", false, render, true},
+      {"/api/v1/slice.png", "Planes through a volume, as `slabstream slice` makes them", "image/png", false, SliceFields(), true},
+      {"/api/v1/command", "The command line that makes a picture", "application/json", false, render, true},
+      {"/api/v1/histogram", "The histogram of a dataset, its range and percentiles", "application/json", false, dataset},
+      {"/api/v1/value", "What a dataset holds at a point", "application/json", false, With(dataset, {field("at", kPointHelp, "X,Y,Z")})},
+      {"/api/v1/pick", "The point that a pixel of a picture shows", "application/json", false,
+       With(render, {field("x", kPixelXHelp, "NUMBER"), field("y", kPixelYHelp, "NUMBER")}), true},
+      {"/api/v1/transfer", "The colour map of a preset for a dataset, as `slabstream transfer` prints it", "application/json", false,
+       Named(render, {"dataset", "transfer", "scalar-range"})},
   };
   Json paths = Json::object();
   for (const Operation& operation : operations) paths[operation.path] = Describe(operation);

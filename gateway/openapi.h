@@ -5,6 +5,10 @@
 
 namespace slabstream {
 
+inline constexpr char kPixelXHelp[] = "Pixels from the left side of the whole picture; the first one's centre is at 0.5";
+inline constexpr char kPixelYHelp[] = "Pixels from the upper side of the whole picture";
+inline constexpr char kPointHelp[] = "A point of the world";
+
 Json OpenApi();
 
 }  // namespace slabstream

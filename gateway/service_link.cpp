@@ -6,7 +6,7 @@
 namespace slabstream {
 namespace {
 
-constexpr Duration kConnectTimeout = std::chrono::seconds(1);  // also how long an end may take
+constexpr Duration kConnectTimeout = std::chrono::seconds(1);
 constexpr Duration kConnectPause = std::chrono::milliseconds(500);
 constexpr Duration kIdle = std::chrono::seconds(5);
 
@@ -17,12 +17,14 @@ ServiceLink::ServiceLink(Context& context, ServiceAddress address) : context_(co
 }
 
 ServiceLink::~ServiceLink() {
-  {
-    const std::lock_guard lock(mutex_);
-    stopping_ = true;
-    WakeUp();
-  }
+  RequestStop();
   thread_.join();
+}
+
+void ServiceLink::RequestStop() {
+  const std::lock_guard lock(mutex_);
+  stopping_ = true;
+  WakeUp();
 }
 
 // With the mutex held.
@@ -31,12 +33,20 @@ void ServiceLink::WakeUp() {
   if (client_ != nullptr) client_->wakeup().Notify();
 }
 
-ServiceLink::Ticket ServiceLink::Render(std::vector<FrameRequest> frames, Duration deadline, Handlers handlers) {
+ServiceLink::Ticket ServiceLink::Post(Task task) {
   const std::lock_guard lock(mutex_);
-  const Ticket ticket = ++last_ticket_;
-  tasks_.push_back({ticket, std::move(frames), deadline, std::move(handlers)});
+  const Ticket ticket = task.ticket = ++last_ticket_;
+  tasks_.push_back(std::move(task));
   WakeUp();
   return ticket;
+}
+
+ServiceLink::Ticket ServiceLink::Render(std::vector<FrameRequest> frames, Duration deadline, Handlers handlers) {
+  return Post({.frames = std::move(frames), .deadline = deadline, .handlers = std::move(handlers), .question = {}, .answered = {}});
+}
+
+ServiceLink::Ticket ServiceLink::Ask(Question question, Duration deadline, AnswerHandler done) {
+  return Post({.frames = {}, .deadline = deadline, .handlers = {}, .question = std::move(question), .answered = std::move(done)});
 }
 
 void ServiceLink::Cancel(Ticket ticket) {
@@ -67,7 +77,10 @@ void ServiceLink::Run() {
 }
 
 void ServiceLink::Connect() {
-  Result<Client> client = Client::Connect(context_, address_, kConnectTimeout);
+  Result<Client> client = Client::Connect(context_, address_, kConnectTimeout, {}, [this] {
+    const std::lock_guard lock(mutex_);
+    return stopping_;
+  });
   reason_ = client.status();
   if (!client.ok()) return;
   const std::lock_guard lock(mutex_);
@@ -86,12 +99,24 @@ void ServiceLink::TakeOrders() {
     if (const auto found = open_.find(ticket); found != open_.end()) Forget(found);
   }
   for (Task& task : tasks) {
-    client_ == nullptr ? task.handlers.done(Status::Unavailable(reason_.message())) : Begin(std::move(task));
+    if (client_ != nullptr) {
+      Begin(std::move(task));
+    } else if (task.question) {
+      task.answered(Status::Unavailable(reason_.message()));
+    } else {
+      task.handlers.done(Status::Unavailable(reason_.message()));
+    }
   }
 }
 
 void ServiceLink::Begin(Task task) {
   OpenTask& open = open_[task.ticket];
+  if (task.question) {
+    open.answered = std::move(task.answered);
+    open.requests.push_back(client_->Submit(*std::move(task.question), task.deadline));
+    requests_[open.requests.back()] = task.ticket;
+    return;
+  }
   open.handlers = std::move(task.handlers);
   open.left = task.frames.size();
   open.pictures.resize(task.frames.size());
@@ -106,6 +131,13 @@ void ServiceLink::Handle(ClientEvent event) {
   if (request == requests_.end()) return;
   const auto found = open_.find(request->second);
   OpenTask& task = found->second;
+  if (task.answered) {
+    const AnswerHandler answered = std::move(task.answered);
+    requests_.erase(request);
+    open_.erase(found);
+    auto* failed = std::get_if<Status>(&event.what);
+    return answered(failed != nullptr ? Result<QuestionReply>(std::move(*failed)) : std::get<QuestionReply>(std::move(event.what)));
+  }
   if (const auto* progress = std::get_if<FrameProgress>(&event.what)) {
     if (task.handlers.progress) task.handlers.progress(*progress);
     return;

@@ -10,6 +10,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -22,6 +23,7 @@ namespace slabstream {
 class ServiceLink {
  public:
   using Ticket = std::uint64_t;
+  using AnswerHandler = std::function<void(Result<QuestionReply>)>;
   struct Handlers {
     std::function<void(const FrameProgress&)> progress;      // may be empty
     std::function<void(Result<std::vector<Picture>>)> done;  // once, unless the ticket was cancelled before
@@ -29,15 +31,19 @@ class ServiceLink {
 
   // `context` and what the handlers use must outlive it.
   ServiceLink(Context& context, ServiceAddress address);
-  ~ServiceLink();  // cancels what is open; may take a second while the service does not answer
+  ~ServiceLink();  // cancels what is open
   ServiceLink(const ServiceLink&) = delete;
   ServiceLink& operator=(const ServiceLink&) = delete;
 
   // Any thread. Renders `frames`, at least one, all at once; the first failure is that of all. The handlers are called on the link's
   // thread. Unavailable: the service does not answer.
   Ticket Render(std::vector<FrameRequest> frames, Duration deadline, Handlers handlers);
+  // Any thread. As Render; `done` is called on the link's thread, once, unless the ticket was cancelled before.
+  Ticket Ask(Question question, Duration deadline, AnswerHandler done);
   // Any thread. The handlers may still be called if they are about to be.
   void Cancel(Ticket ticket);
+  // Any thread, returns at once: the link's thread begins to end. Then the destructor hardly waits.
+  void RequestStop();
 
  private:
   struct Task {
@@ -45,14 +51,18 @@ class ServiceLink {
     std::vector<FrameRequest> frames;
     Duration deadline{};
     Handlers handlers;
+    std::optional<Question> question;  // instead of frames
+    AnswerHandler answered;
   };
   struct OpenTask {
     Handlers handlers;
     std::vector<RequestId> requests;  // of each frame
     std::vector<Picture> pictures;    // of each frame
     std::size_t left = 0;             // frames that are not finished
+    AnswerHandler answered;           // of a question, instead of `handlers`
   };
 
+  Ticket Post(Task task);
   void Run();
   void Connect();
   void TakeOrders();

@@ -26,18 +26,26 @@ ServiceMonitor::ServiceMonitor(Context& context, ServiceAddress address, Listene
 }
 
 ServiceMonitor::~ServiceMonitor() {
-  {
-    const std::lock_guard lock(mutex_);
-    stopping_ = true;
-  }
-  stop_.notify_one();
+  RequestStop();
   thread_.join();
+}
+
+void ServiceMonitor::RequestStop() {
+  const std::lock_guard lock(mutex_);
+  stopping_ = true;
+  stop_.notify_one();
+  if (client_ != nullptr) client_->wakeup().Notify();
 }
 
 Result<StatusReply> ServiceMonitor::Ask() {
   if (client_ == nullptr) {
-    Result<Client> client = Client::Connect(context_, address_, kPatience);
+    Result<Client> client = Client::Connect(context_, address_, kPatience, {}, [this] {
+      const std::lock_guard lock(mutex_);
+      return stopping_;
+    });
     if (!client.ok()) return client.status();
+    const std::lock_guard lock(mutex_);
+    if (stopping_) return Status::Cancelled("the gateway ends");
     client_ = std::make_unique<Client>(*std::move(client));
   }
   return client_->QueryStatus(kPatience);
@@ -54,6 +62,10 @@ void ServiceMonitor::Run() {
     } else {
       news.health = ServiceHealth::kGone;
       news.reason = reply.status().message();
+    }
+    {
+      const std::lock_guard lock(mutex_);
+      if (stopping_) return;
     }
     listener_(std::make_shared<const ServiceNews>(news));
     std::unique_lock lock(mutex_);

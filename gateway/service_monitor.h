@@ -30,6 +30,7 @@ class ServiceMonitor {
   // `context` must outlive it. `listener` is called on the monitor's thread after each answer, and when there was none.
   ServiceMonitor(Context& context, ServiceAddress address, Listener listener);
   ~ServiceMonitor();
+  void RequestStop();  // any thread, returns at once: the thread begins to end
   ServiceMonitor(const ServiceMonitor&) = delete;
   ServiceMonitor& operator=(const ServiceMonitor&) = delete;
 
@@ -40,8 +41,8 @@ class ServiceMonitor {
   Context& context_;
   const ServiceAddress address_;
   const Listener listener_;
-  std::unique_ptr<Client> client_;  // of the thread
   std::mutex mutex_;
+  std::unique_ptr<Client> client_;  // of the thread; others use its wakeup only, under the mutex
   std::condition_variable stop_;
   bool stopping_ = false;
   std::thread thread_;

@@ -48,6 +48,7 @@ void ViewSession::OnClosed(const std::string&) {
   if (std::exchange(peer_, nullptr) != nullptr) around_.metrics.CountSession(-1);
   timer_.cancel();
   if (given_up_ != nullptr) *given_up_ = true;
+  link_->RequestStop();
   // The end of a link may take a while, which the io thread has not. It cancels what the service still works on.
   asio::post(around_.encoders, [link = std::shared_ptr<ServiceLink>(std::move(link_))] {});
   closed_(*this);

@@ -68,6 +68,7 @@ class Conditions {
   virtual void Perform(const LookAtDataset&) {}
   virtual void Perform(const LookAtFolders&) {}
   virtual void Perform(const FindDatasets&) {}
+  virtual void Perform(const AnswerQuestion&) {}
   virtual void Perform(const CountDataset& action) = 0;
   virtual void Perform(const PlanRequest& action) = 0;
   virtual void Perform(const FrameMeasured&) {}

@@ -18,6 +18,8 @@ Status ValidateName(std::string_view field, std::string_view name) {
   return Status::InvalidArgument(fmt::format("{} has {} bytes, but must have 1 to {}", field, name.size(), kMaxNameBytes));
 }
 
+}  // namespace
+
 Status Validate(const TransferChoice& transfer) {
   if (const auto* preset = std::get_if<std::string>(&transfer.choice)) {
     if (Status s = ValidateName("transfer.preset", *preset); !s.ok()) return s;
@@ -38,6 +40,8 @@ Status Validate(const TransferChoice& transfer) {
   return Status::InvalidArgument(fmt::format("transfer.opacity_distance is {}, but must lie in (0, {}] voxel lengths",
                                              transfer.opacity_distance, kMaxOpacityDistance));
 }
+
+namespace {
 
 Status Validate(const LabelChoice& labels) {
   if (Status s = InRange("labels.mode", int(labels.mode), int(LabelMode::kTint), int(LabelMode::kSurface)); !s.ok()) return s;

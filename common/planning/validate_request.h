@@ -8,5 +8,6 @@ namespace slabstream {
 
 // InvalidArgument naming field, value and limit. Names of the policy are looked up later (CheckNames).
 Status Validate(const FrameRequest& request);
+Status Validate(const TransferChoice& transfer);
 
 }  // namespace slabstream

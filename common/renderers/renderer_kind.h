@@ -23,6 +23,15 @@ namespace slabstream {
 
 struct LocalImage;
 
+// Which point of a ray its pixel shows (common/probe/pick.h).
+enum class PickRule : std::uint8_t {
+  kHalfOpacity,  // where half of the light is lost
+  kSurface,      // where it meets the first opaque voxel
+  kLargest,      // where the volume has its largest value, or its least one
+  kLeast,
+  kNone,         // no single one
+};
+
 // A number or a choice that a request may set for a renderer, such as sampling-rate. The command line takes it as --NAME.
 struct RendererParameter {
   std::string_view name;                  // lower case with hyphens
@@ -98,6 +107,10 @@ class RendererKind {
 
   // The pixel format of local images, which may depend on the values of parameters().
   virtual PixelFormat FormatOf(const std::vector<double>& /*parameters*/) const { return facts_.format; }
+
+  virtual PickRule PickRuleOf(const std::vector<double>& /*parameters*/) const {
+    return facts_.format == PixelFormat::kDepth ? PickRule::kSurface : PickRule::kHalfOpacity;
+  }
 
   // Fills in the frame that workers render for a picture of `size` under `view`, both valid: camera, and sheets if the renderer works
   // along slices. `setup` has its description. InvalidArgument: the frame would be too large. The default is

@@ -63,7 +63,13 @@ constexpr auto kMembers = std::tuple{Member{Envelope::kRegisterWorker, &Envelope
                                      Member{Envelope::kKeysReply, &Envelope::keys_reply, &Envelope::mutable_keys_reply},
                                      Member{Envelope::kOrderRefused, &Envelope::order_refused, &Envelope::mutable_order_refused},
                                      Member{Envelope::kDataOrder, &Envelope::data_order, &Envelope::mutable_data_order},
-                                     Member{Envelope::kDataReply, &Envelope::data_reply, &Envelope::mutable_data_reply}};
+                                     Member{Envelope::kDataReply, &Envelope::data_reply, &Envelope::mutable_data_reply},
+                                     Member{Envelope::kSummaryQuery, &Envelope::summary_query, &Envelope::mutable_summary_query},
+                                     Member{Envelope::kSummaryReply, &Envelope::summary_reply, &Envelope::mutable_summary_reply},
+                                     Member{Envelope::kSampleQuery, &Envelope::sample_query, &Envelope::mutable_sample_query},
+                                     Member{Envelope::kSampleReply, &Envelope::sample_reply, &Envelope::mutable_sample_reply},
+                                     Member{Envelope::kPickQuery, &Envelope::pick_query, &Envelope::mutable_pick_query},
+                                     Member{Envelope::kPickReply, &Envelope::pick_reply, &Envelope::mutable_pick_reply}};
 
 constexpr std::size_t kMemberCount = std::variant_size_v<AnyMessage>;
 static_assert(std::tuple_size_v<decltype(kMembers)> == kMemberCount, "kMembers lists AnyMessage");
@@ -180,10 +186,16 @@ Result<AnyMessage> DecodeOn(Plane plane, std::span<const std::byte> header, std:
   return message;
 }
 
-std::optional<FrameFailed> RefusalOf(std::span<const std::byte> header, const Status& why) {
+std::optional<AnyMessage> RefusalOf(std::span<const std::byte> header, const Status& why) {
   Envelope envelope;
-  if (!Parse(header, envelope).ok() || !envelope.has_submit_frame()) return std::nullopt;
-  return FrameFailed{.request = envelope.submit_frame().request(), .status = why};
+  if (!Parse(header, envelope).ok()) return std::nullopt;
+  switch (envelope.message_case()) {
+    case Envelope::kSubmitFrame: return FrameFailed{.request = envelope.submit_frame().request(), .status = why};
+    case Envelope::kSummaryQuery: return OrderRefused{.nonce = envelope.summary_query().nonce(), .status = why};
+    case Envelope::kSampleQuery: return OrderRefused{.nonce = envelope.sample_query().nonce(), .status = why};
+    case Envelope::kPickQuery: return OrderRefused{.nonce = envelope.pick_query().nonce(), .status = why};
+    default: return std::nullopt;
+  }
 }
 
 std::string_view NameOf(const AnyMessage& message) {

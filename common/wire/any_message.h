@@ -24,10 +24,11 @@ inline constexpr std::uint32_t kWireVersion = 1;
 inline constexpr std::size_t kMaxHeaderBytes = std::size_t{64} << 20;
 
 // In the order of planes: control, slabs, images, client.
-using AnyMessage = std::variant<Register, Welcome, Heartbeat, Ping, GroupAssignment, GroupDone, FrameImage, WorkerTrouble, Leave, Retire,
-                                Stop, ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused, ImageReceived, SubmitFrame,
-                                FrameProgress, FrameReply, FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery, StatusReply,
-                                ShutDown, ShutDownReply, KeysOrder, KeysReply, OrderRefused, DataOrder, DataReply>;
+using AnyMessage =
+    std::variant<Register, Welcome, Heartbeat, Ping, GroupAssignment, GroupDone, FrameImage, WorkerTrouble, Leave, Retire, Stop,
+                 ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused, ImageReceived, SubmitFrame, FrameProgress, FrameReply,
+                 FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery, StatusReply, ShutDown, ShutDownReply, KeysOrder, KeysReply,
+                 OrderRefused, DataOrder, DataReply, SummaryQuery, SummaryReply, SampleQuery, SampleReply, PickQuery, PickReply>;
 
 // The sockets that messages travel on: between coordinator and workers, between workers, and between clients and coordinator. Each message
 // belongs to one: to that of the header that declares it.
@@ -45,8 +46,9 @@ Result<AnyMessage> Decode(std::span<const std::byte> header);
 // long as the header says.
 Result<AnyMessage> DecodeOn(Plane plane, std::span<const std::byte> header, std::size_t payload_bytes);
 
-// The answer to a SubmitFrame that Decode has refused, so that its client hears why; nullopt for every other header.
-std::optional<FrameFailed> RefusalOf(std::span<const std::byte> header, const Status& why);
+// The answer to a SubmitFrame or a question (SummaryQuery, SampleQuery, PickQuery) that Decode has refused, so that its client hears why:
+// FrameFailed or OrderRefused. nullopt for every other header.
+std::optional<AnyMessage> RefusalOf(std::span<const std::byte> header, const Status& why);
 
 // "GroupAssignment": for logs and messages.
 std::string_view NameOf(const AnyMessage& message);

@@ -216,4 +216,89 @@ void Fields(auto& io, Is<DataReply> auto& m) {
   io.Messages("datasets", m.datasets, &P::datasets, &P::mutable_datasets, kMaxListed);
 }
 
+void Fields(auto& io, Is<SummaryQuery> auto& m) {
+  using P = v1::SummaryQuery;
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  io.Text("dataset", m.dataset, &P::dataset, &P::mutable_dataset, 1, kMaxNameBytes);
+  io.Message("transfer", m.transfer, &P::transfer, &P::mutable_transfer);
+  io.Check([&](Checker& check) {
+    if (check.ok()) check.Adopt(Validate(m.transfer));
+  });
+}
+
+void Fields(auto& io, Is<Percentile> auto& m) {
+  using P = v1::Percentile;
+  io.Between("percent", m.percent, &P::percent, &P::set_percent, 0, 100);
+  io.Finite("value", m.value, &P::value, &P::set_value);
+}
+
+void Fields(auto& io, Is<SummaryReply> auto& m) {
+  using P = v1::SummaryReply;
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  io.Message("description", m.description, &P::description, &P::mutable_description);
+  io.Message("range", m.range, &P::range, &P::mutable_range);
+  io.Numbers("histogram", m.histogram, &P::histogram, &P::mutable_histogram, kHistogramBins);
+  io.Any(m.non_finite, &P::non_finite, &P::set_non_finite);
+  io.Messages("percentiles", m.percentiles, &P::percentiles, &P::mutable_percentiles, kMaxPercentiles);
+  io.Message("transfer", m.transfer, &P::transfer, &P::mutable_transfer);
+  io.Check([&](Checker& check) {
+    check.That(m.histogram.size() == kHistogramBins, "histogram", "not as many bins as expected");
+    if (check.ok()) check.Adopt(Validate(m.transfer));
+  });
+}
+
+void Fields(auto& io, Is<SampleQuery> auto& m) {
+  using P = v1::SampleQuery;
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  io.Text("dataset", m.dataset, &P::dataset, &P::mutable_dataset, 1, kMaxNameBytes);
+  io.Messages("points", m.points, &P::points, &P::mutable_points, kMaxSamplePoints);
+  io.Check([&](Checker& check) { check.That(!m.points.empty(), "points", "none"); });
+}
+
+void Fields(auto& io, Is<LabelAt> auto& m) {
+  using P = v1::LabelAt;
+  io.Range("value", m.value, &P::value, &P::set_value, 0, kMaxLabelValue);
+  io.Text("name", m.name, &P::name, &P::mutable_name, 0, kMaxLabelNameBytes);
+}
+
+void Fields(auto& io, Is<VolumeSample> auto& m) {  // all but value and overlay
+  using P = v1::VolumeSample;
+  io.Message("at", m.at, &P::at, &P::mutable_at);
+  io.Any(m.inside, &P::inside, &P::set_inside);
+  io.Message("voxel", m.voxel, &P::voxel, &P::mutable_voxel);
+  io.Optional("label", m.label, &P::has_label, &P::label, &P::mutable_label);
+}
+
+inline void Write(const VolumeSample& in, v1::VolumeSample& out) {
+  WriteFields(in, out);
+  if (in.value) out.set_value(*in.value);
+  if (in.overlay) out.set_overlay(*in.overlay);
+}
+inline void Read(const v1::VolumeSample& in, VolumeSample& out, Checker& check) {
+  ReadFields(in, out, check);
+  if (in.has_value()) out.value = check.Finite("value", in.value());
+  if (in.has_overlay()) out.overlay = check.Finite("overlay", in.overlay());
+}
+
+void Fields(auto& io, Is<SampleReply> auto& m) {
+  using P = v1::SampleReply;
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  io.Messages("samples", m.samples, &P::samples, &P::mutable_samples, kMaxSamplePoints);
+}
+
+void Fields(auto& io, Is<PickQuery> auto& m) {
+  using P = v1::PickQuery;
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  io.Message("frame", m.frame, &P::frame, &P::mutable_frame);
+  io.Between("x", m.x, &P::x, &P::set_x, 0, m.frame.size.width);
+  io.Between("y", m.y, &P::y, &P::set_y, 0, m.frame.size.height);
+}
+
+void Fields(auto& io, Is<PickReply> auto& m) {
+  using P = v1::PickReply;
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  io.Optional("sample", m.sample, &P::has_sample, &P::sample, &P::mutable_sample);
+  io.Finite("depth", m.depth, &P::depth, &P::set_depth);
+}
+
 }  // namespace slabstream

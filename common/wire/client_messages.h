@@ -13,15 +13,22 @@
 //   KeysOrder   -------------------------->  KeysReply
 //   DataOrder   -------------------------->  DataReply
 //   Any of the last three may be answered by OrderRefused: over encrypted connections they need an admin's key, but for lists of datasets.
+//   SummaryQuery ------------------------>  SummaryReply
+//   SampleQuery ------------------------->  SampleReply
+//   PickQuery --------------------------->  PickReply
+//   These questions wait until their dataset is loaded and its files were looked at, as frames do. Any of them may be answered by
+//   OrderRefused.
 #pragma once
 
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "common/frame/frame_request.h"
 #include "common/keys/admitted_key.h"
+#include "common/probe/volume_sample.h"
 #include "common/stats/prediction.h"
 #include "common/view/picture_geometry.h"
 #include "common/wire/control_messages.h"
@@ -207,5 +214,75 @@ struct DataReply {
   std::vector<DatasetStatus> datasets;  // after the order
   friend bool operator==(const DataReply&, const DataReply&) = default;
 };
+
+// ---- questions about what a dataset holds
+
+inline constexpr std::size_t kMaxOpenQuestions = 64;  // of one client
+inline constexpr std::size_t kMaxSamplePoints = 4096;
+inline constexpr std::size_t kMaxPercentiles = 64;
+
+struct SummaryQuery {
+  std::uint64_t nonce = 0;
+  std::string dataset;      // 1 ... kMaxNameBytes
+  TransferChoice transfer;  // that is resolved for the dataset
+  friend bool operator==(const SummaryQuery&, const SummaryQuery&) = default;
+};
+
+struct Percentile {
+  double percent = 0;  // [0, 100]
+  double value = 0;    // that so many of the finite voxels do not exceed
+  friend bool operator==(const Percentile&, const Percentile&) = default;
+};
+
+struct SummaryReply {
+  std::uint64_t nonce = 0;
+  VolumeDescription description;
+  ValueRange range;                                                                   // as VolumeSummary
+  std::vector<std::uint64_t> histogram = std::vector<std::uint64_t>(kHistogramBins);  // likewise
+  std::uint64_t non_finite = 0;                                                       // voxels
+  std::vector<Percentile> percentiles;                                                // at most kMaxPercentiles
+  TransferFunction transfer;                                                          // of the query, for this dataset
+  friend bool operator==(const SummaryReply&, const SummaryReply&) = default;
+};
+
+struct SampleQuery {
+  std::uint64_t nonce = 0;
+  std::string dataset;       // 1 ... kMaxNameBytes
+  std::vector<Vec3> points;  // of the world; 1 ... kMaxSamplePoints
+  friend bool operator==(const SampleQuery&, const SampleQuery&) = default;
+};
+
+struct SampleReply {
+  std::uint64_t nonce = 0;
+  std::vector<VolumeSample> samples;  // of each point
+  friend bool operator==(const SampleReply&, const SampleReply&) = default;
+};
+
+// The point that a pixel shows (common/probe/pick.h).
+struct PickQuery {
+  std::uint64_t nonce = 0;
+  FrameRequest frame;   // its policy and previews do not matter
+  double x = 0, y = 0;  // pixels from the picture's upper left corner: [0, width], [0, height]; the first pixel's centre is at 0.5
+  friend bool operator==(const PickQuery&, const PickQuery&) = default;
+};
+
+struct PickReply {
+  std::uint64_t nonce = 0;
+  std::optional<VolumeSample> sample;  // none: the pixel shows no point
+  double depth = 0;                    // of it, as depths of the picture's pixels
+  friend bool operator==(const PickReply&, const PickReply&) = default;
+};
+
+using Question = std::variant<SummaryQuery, SampleQuery, PickQuery>;
+using QuestionReply = std::variant<SummaryReply, SampleReply, PickReply>;
+inline const std::string& DatasetOf(const SummaryQuery& query) { return query.dataset; }
+inline const std::string& DatasetOf(const SampleQuery& query) { return query.dataset; }
+inline const std::string& DatasetOf(const PickQuery& query) { return query.frame.dataset; }
+inline const std::string& DatasetOf(const Question& question) {
+  return std::visit([](const auto& query) -> const std::string& { return DatasetOf(query); }, question);
+}
+inline std::uint64_t NonceOf(const Question& question) {
+  return std::visit([](const auto& query) { return query.nonce; }, question);
+}
 
 }  // namespace slabstream

@@ -27,6 +27,7 @@ from .frame import Frame, Progress
 from .image import Geometry, Image, Statistics
 from .loading import Volume, load, render
 from .local import shutdown
+from .probe import Histogram, Sample
 from .service import Service, connect
 from .status import Dataset, Status, Worker
 from .transfer import TransferFunction
@@ -40,12 +41,14 @@ __all__ = [
     "DeadlineExceeded",
     "Frame",
     "Geometry",
+    "Histogram",
     "Image",
     "Internal",
     "InvalidArgument",
     "NotFound",
     "Progress",
     "ResourceExhausted",
+    "Sample",
     "Service",
     "SlabstreamError",
     "Statistics",

@@ -23,7 +23,8 @@ _UNKNOWN_PONGS = 2     # in a row, before a request is submitted again
 _MOST_RESUBMITS = 3    # before it fails
 _TELL_BYTES = 1 << 20  # of payloads, until the next ping tells of them
 
-_ANSWERS = ("client_pong", "status_reply", "shut_down_reply", "keys_reply", "data_reply", "order_refused")
+_ANSWERS = ("client_pong", "status_reply", "shut_down_reply", "keys_reply", "data_reply", "order_refused", "summary_reply",
+            "sample_reply", "pick_reply")
 
 _log = logging.getLogger("slabstream")
 

@@ -16,11 +16,13 @@ from .errors import InvalidArgument
 from .frame import Frame, Progress
 from .image import Image, side_by_side
 from .options import takes_options_of
+from .probe import Histogram, Sample, histogram_of, sample_of
 from .status import Dataset, Status, dataset_of, status_of
-from .values import integer
+from .values import integer, number, point
 
 DEADLINE_SECONDS = 600.0
 _ORDER_SECONDS = 30.0
+_QUESTION_SECONDS = 120.0  # volumes may have to be loaded first
 _MOST_ITEMS = 128
 _MOST_FRAMES, _MOST_TURNS, _MOST_IN_FLIGHT = 100000, 1000, 64
 
@@ -87,6 +89,26 @@ class Service:
     def slice(self, dataset: str, *, deadline: float = DEADLINE_SECONDS, **options: Any) -> Image:
         """Planes through a volume, or slabs of it; several are put side by side."""
         return side_by_side(list(self._pipelined(iter(slice_drafts_of(dataset, options)), 3, deadline)))
+
+    def histogram(self, dataset: str, *, timeout: float = _QUESTION_SECONDS) -> Histogram:
+        """How often which value occurs in a dataset."""
+        transfer = schema.TransferChoice(preset="auto", opacity_distance=1)
+        return histogram_of(self._connection.ask("summary_query", schema.SummaryQuery(dataset=dataset, transfer=transfer), timeout))
+
+    def value(self, dataset: str, at: Any, *, timeout: float = _QUESTION_SECONDS) -> Sample | None:
+        """The voxel that holds a point: x, y, z of the world, as in all options. None: the point lies outside the volume."""
+        x, y, z = point("at", at)
+        query = schema.SampleQuery(dataset=dataset, points=[schema.Vec3(x=x, y=y, z=z)])
+        return sample_of(self._connection.ask("sample_query", query, timeout).samples[0])
+
+    @takes_options_of("render")
+    def pick(self, dataset: str, x: float, y: float, *, timeout: float = _QUESTION_SECONDS, **options: Any) -> Sample | None:
+        """What the picture with these options shows at (x, y): pixels from its upper left corner, with the first pixel's centre at 0.5. None: it
+        shows nothing there. docs/rendering.md says which point of the ray that is."""
+        frame = draft_of(dataset, options).frame
+        query = schema.PickQuery(frame=frame, x=number("x", x, 0, frame.size.width), y=number("y", y, 0, frame.size.height))
+        reply = self._connection.ask("pick_query", query, timeout)
+        return sample_of(reply.sample, reply.depth) if reply.HasField("sample") else None
 
     def status(self, timeout: float = ANSWER_SECONDS) -> Status:
         """Workers, datasets and counts of frames."""

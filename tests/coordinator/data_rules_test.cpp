@@ -398,7 +398,8 @@ TEST_F(DataRules, RefusedRequestsAreCountedByTheirReason) {
   SubmitFrame bad = Frame(2);
   bad.frame.policy.decomposition = "nonesuch";
   script.Client(kClient, bad);
-  script.Step(BadRequest{kOther, FrameFailed{.request = 9, .status = Status::InvalidArgument("SubmitFrame.frame.size.width: 0")}});
+  const Status bad_field = Status::InvalidArgument("SubmitFrame.frame.size.width: 0");
+  script.Step(BadRequest{kOther, FrameFailed{.request = 9, .status = bad_field}, bad_field});
   CoordinatorConfig config = FilesConfig();
   config.max_queued = 1;
   CoordinatorScript busy(config);

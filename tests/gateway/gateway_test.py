@@ -184,6 +184,100 @@ class HttpTest(WithService):
         status, service = self.gateway.json("/api/v1/status")
         self.assertEqual((status, len(service["workers"])), (200, 2))
 
+    def ask(self, question, **fields):
+        status, body = self.gateway.json(f"/api/v1/{question}?" + urllib.parse.urlencode(fields))
+        self.assertEqual(status, 200, body)
+        return body
+
+    def test_the_histogram_counts_every_voxel(self):
+        histogram = self.ask("histogram", dataset="a")
+        self.assertEqual((histogram["dataset"], len(histogram["counts"]), sum(histogram["counts"])), ("a", 256, 24 ** 3))
+        low, high = histogram["range"]
+        self.assertEqual(low, 0)
+        self.assertTrue(128 <= high <= 255)
+        self.assertEqual(histogram["non_finite"], 0)
+        percentiles = histogram["percentiles"]
+        self.assertEqual({"1", "50", "99", "99.9"} - set(percentiles), set())
+        values = [percentiles[key] for key in sorted(percentiles, key=float)]
+        self.assertEqual(values, sorted(values))
+        info = json.loads(self.programs.run("info", "a.nrrd", "--json").stdout)
+        self.assertEqual(histogram["counts"], info["histogram"])
+
+    def test_values_at_points(self):
+        centre = self.ask("value", dataset="b", at="9.5,9.5,9.5")
+        self.assertEqual((centre["inside"], centre["voxel"], centre["at"]), (True, [10, 10, 10], [9.5, 9.5, 9.5]))
+        self.assertGreaterEqual(centre["value"], 128)
+        self.assertNotIn("label", centre)
+        self.assertEqual(self.ask("value", dataset="b", at="0,0,0")["value"], 0)
+        outside = self.ask("value", dataset="b", at="-1,1e9,0")
+        self.assertEqual((outside["inside"], outside["voxel"], outside["value"]), (False, None, None))
+
+    def test_pixels_show_points(self):
+        # The ball's surface, seen along +y: from its geometry by hand.
+        options = {"dataset": "b", "renderer": "zbuffer", "size": 100}
+        hit = self.ask("pick", x=50, y=50, **options)
+        self.assertTrue(hit["hit"] and hit["inside"])
+        self.assertAlmostEqual(hit["at"][0], 9.5, 6)
+        self.assertAlmostEqual(hit["at"][2], 9.5, 6)
+        self.assertLess(hit["at"][1], 5)
+        self.assertGreaterEqual(hit["value"], 128)
+        self.assertEqual(hit["voxel"][1], round(hit["at"][1] + 0.25))
+        posted = self.gateway.json("/api/v1/pick", method="POST", body=json.dumps({"x": 50, "y": 50, **options}))
+        self.assertEqual(posted, (200, hit))
+        self.assertEqual(self.ask("pick", x=0, y=0, **options), {"hit": False})
+        # The other renderers see about the same surface.
+        for renderer in ("raycast", "splat"):
+            other = self.ask("pick", x=50, y=50, transfer="opaque", **(options | {"renderer": renderer}))
+            self.assertAlmostEqual(other["depth"], hit["depth"], delta=1, msg=renderer)
+        # A view from above picks by the same camera as the picture.
+        above = self.ask("pick", x=50, y=50, view="top", **options)
+        self.assertAlmostEqual(above["at"][0], 9.5, 6)
+        self.assertGreater(above["at"][2], 14)
+
+    def test_transfer_is_what_the_command_line_prints(self):
+        for preset in ("auto", "opaque", "gray-ramp"):
+            body = self.get("/api/v1/transfer", dataset="a", transfer=preset)[2].decode()
+            self.assertEqual(body, self.programs.run("transfer", preset, "a.nrrd").stdout)
+        body = self.get("/api/v1/transfer", **{"dataset": "a", "transfer": "opaque", "scalar-range": "10:20"})[2].decode()
+        self.assertEqual(body, self.programs.run("transfer", "opaque", "a.nrrd", "--scalar-range", "10:20").stdout)
+
+    def test_wrong_questions_are_refused_with_a_line(self):
+        for question, fields, status, why in [
+            ("histogram", {}, 400, "dataset is missing"),
+            ("histogram", {"dataset": "none"}, 404, "none"),
+            ("histogram", {"dataset": "a", "size": 3}, 400, "no option 'size'"),
+            ("value", {"dataset": "a"}, 400, "at is missing"),
+            ("value", {"dataset": "a", "at": "1,2"}, 400, "1,2"),
+            ("value", {"dataset": "a", "at": "1,2,nan"}, 400, "nan"),
+            ("value", {"dataset": "x" * 300, "at": "1,2,3"}, 400, "300 bytes"),
+            ("pick", {"dataset": "a", "x": 1}, 400, "y is missing"),
+            ("pick", {"dataset": "a", "x": 33, "y": 1, "size": 32}, 400, "out of range"),
+            ("pick", {"dataset": "a", "x": 3, "y": 1, "zoom": -1}, 400, "zoom"),
+            ("transfer", {"dataset": "a", "transfer": "nothing"}, 400, "nothing"),
+            ("transfer", {"dataset": "a", "azimuth": 3}, 400, "azimuth"),
+        ]:
+            got, body = self.gateway.json(f"/api/v1/{question}?" + urllib.parse.urlencode(fields))
+            self.assertEqual((got, list(body)), (status, ["error"]), (question, fields, body))
+            self.assertIn(why, body["error"])
+            self.assertNotIn("\n", body["error"])
+        self.assertEqual(self.gateway.request("/api/v1/histogram", method="POST", body="{}")[0], 405)
+
+    def test_a_render_that_nobody_waits_for_is_cancelled(self):
+        heavy = {"dataset": "a", "renderer": "raycast", "sampling-rate": 16, "size": 4000, "opacity-distance": 1000, "termination": 0}
+        def status():
+            return json.loads(self.programs.run("status", "--endpoint", self.endpoint, "--json").stdout)
+
+        before = status()["frames_done"]
+        for _ in range(3):
+            with self.gateway.connect() as connection:
+                target = "/api/v1/render.png?" + urllib.parse.urlencode(heavy)
+                connection.sendall(f"GET {target} HTTP/1.1\r\nHost: {self.gateway.authority}\r\nAuthorization: Bearer {self.gateway.token}\r\n\r\n"
+                                   .encode())
+        wait_until(lambda: b'slabstream_gateway_refusals_total{reason="gone"} 3\n' in self.gateway.request("/metrics")[2], "three are gone")
+        wait_until(lambda: status()["running"] + status()["queued"] == 0, "nothing runs")
+        self.assertEqual((status()["frames_done"], status()["frames_failed"]), (before, 0))
+        self.assertEqual(self.get("/api/v1/render.png", dataset="a", size=16)[0], 200)
+
     def test_only_who_has_the_token_may_ask(self):
         for path in ("/metrics", "/api/v1/datasets", "/api/v1/status", "/api/v1/render.png?dataset=a", "/api/v1/view"):
             self.assertEqual(self.gateway.request(path, token=False)[0], 401, path)
@@ -474,6 +568,24 @@ class StartTest(unittest.TestCase):
         _, err = child.communicate(timeout=TIMEOUT)
         self.programs.children.remove(child)
         self.assertEqual((child.returncode, err), (0, ""))
+
+    def test_it_ends_while_the_service_does_not_answer(self):
+        self.programs.run("sphere", "--class", 1, "--size", 16, "--occupancy", 0.2, "-o", "a.nrrd")
+        _, endpoint = self.programs.up("--data", "a=a.nrrd")
+        child, gateway = self.programs.gateway("--endpoint", endpoint)
+        wait_until(lambda: gateway.request("/readyz")[0] == 200, "ready")
+        coordinator = gateway.json("/api/v1/status")[1]["pid"]
+        page = Page(gateway)
+        self.addCleanup(page.close)
+        os.kill(coordinator, signal.SIGSTOP)
+        try:
+            wait_until(lambda: gateway.request("/readyz")[0] == 503, "the service is gone")
+            child.send_signal(signal.SIGTERM)
+            child.communicate(timeout=TIMEOUT)
+        finally:
+            os.kill(coordinator, signal.SIGCONT)
+        self.programs.children.remove(child)
+        self.assertEqual(child.returncode, 0)
 
     def test_view_at_a_service(self):
         self.programs.run("sphere", "--class", 1, "--size", 16, "--occupancy", 0.2, "-o", "a.nrrd")

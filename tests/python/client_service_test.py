@@ -47,6 +47,44 @@ class AtAService(WithAService):
         self.assertTrue(np.isposinf(image.depth[~seen]).all())
         self.assertTrue(seen.any() and not seen.all())
 
+    def test_what_a_dataset_holds(self) -> None:
+        values, labels, overlay = volume_arrays()
+        histogram = self.service.histogram("head")
+        low, high = histogram.value_range
+        self.assertEqual((low, high), (values.min(), values.max()))
+        np.testing.assert_array_equal(histogram.counts, np.histogram(values, bins=256, range=(low, high))[0])
+        self.assertEqual(histogram.edges.shape, (257,))
+        for percent, value in histogram.percentiles.items():
+            below = np.mean(values <= value + (high - low) / 256)
+            self.assertGreaterEqual(below, percent / 100)
+        # The head is a patient's: origin (-10, 5, 20) and spacing (2, 1.5, 1.25) as z, y, x.
+        for index in ((0, 0, 0), (10, 12, 14), (12, 9, 20), (19, 23, 27)):
+            z, y, x = (o + s * i for o, s, i in zip((-10, 5, 20), (2, 1.5, 1.25), index))
+            there = self.service.value("head", at=(x + 0.3, y - 0.3, z))
+            self.assertEqual((there.index, there.value, there.label), (index, values[index], labels[index]))
+            self.assertEqual(there.overlay is None, bool(np.isnan(overlay[index])))
+        self.assertIsNone(self.service.value("head", at="0,0,1e6"))
+        with self.assertRaisesRegex(ss.NotFound, 'no dataset "nothing"'):
+            self.service.histogram("nothing")
+        with self.assertRaisesRegex(ss.InvalidArgument, "at '1,2' is not X,Y,Z"):
+            self.service.value("head", at="1,2")
+
+    def test_a_pixel_shows_the_point_that_its_depth_says(self) -> None:
+        options = dict(renderer="zbuffer", size=(50, 40), azimuth=40, elevation=25, zoom=1.3)
+        image = self.service.render("head", **options)
+        place = image.geometry
+        for x, y in ((25, 20), (20, 16), (31, 22), (1, 1)):
+            seen, depth = self.service.pick("head", x + 0.5, y + 0.5, **options), image.depth[y, x]
+            self.assertEqual(seen is None, not np.isfinite(depth))
+            if seen is None:
+                continue
+            self.assertAlmostEqual(seen.depth, float(depth), 3)
+            right, up = np.array(place.right) * place.pixel_size, np.array(place.up) * place.pixel_size
+            at = np.array(place.target) + (depth - place.target_depth) * np.array(place.forward) + (x - 24.5) * right - (y - 19.5) * up
+            np.testing.assert_allclose(seen.at, at, atol=1e-3)
+        with self.assertRaisesRegex(ss.InvalidArgument, r"x 51 is out of range \[0, 50\]"):
+            self.service.pick("head", 51, 0, **options)
+
     def test_pictures_are_saved_whole(self) -> None:
         image = self.service.render("head", size=20)
         image.save(self.folder / "a.PNG")

@@ -51,13 +51,15 @@ class Documents(InAFolder):
         self.addCleanup(ss.shutdown)
         code = "\n".join(blocks_of("python.md"))
         printed = "tcp://127.0.0.1:7420"
-        self.assertEqual(code.count(printed), 2)
+        self.assertEqual(code.count(printed), 3)
         names: dict = {}
         said = io.StringIO()
         with contextlib.chdir(self.folder), contextlib.redirect_stdout(said):
             exec(compile(code.replace(printed, running.endpoint), "python.md", "exec"), names)
         self.assertIn("zoom 0 is out of range [0.001, 10000]", said.getvalue())
         self.assertEqual(len(list(self.folder.glob("turn_*.png"))), 12)
+        self.assertEqual(names["there"].value, volume_arrays()[0][names["there"].index])
+        self.assertIsNotNone(names["seen"])
         for name in ("image", "front", "above", "planes", "surface", "preview"):
             self.assertGreater(np.asarray(names[name])[..., :3].max(), 50, name)
             if KEEP:

@@ -64,7 +64,7 @@ AnyMessage HostileWords::OfClient(const Policy& policy) {
 }
 
 AnyMessage HostileWords::MakeOfClient(const Policy& policy) {
-  switch (random_.Integer(0, 7)) {
+  switch (random_.Integer(0, 9)) {
     case 0:
     case 1: {
       SubmitFrame submit = RandomRequest(random_, policy, Number(), random_.Chance(0.5) ? Number32() : random_.Integer(1U, 86400000U));
@@ -84,7 +84,10 @@ AnyMessage HostileWords::MakeOfClient(const Policy& policy) {
     }
     case 5: return StatusQuery{Number()};
     case 6: return DataOrder{.nonce = Number()};  // its connection lets only lists through
-    default: return KeysOrder{.nonce = Number(), .key = std::string(40, 'k')};
+    case 7: return KeysOrder{.nonce = Number(), .key = std::string(40, 'k')};
+    case 8:
+      return PickQuery{.nonce = Number(), .frame = RandomRequest(random_, policy, Number(), 1).frame, .x = double(random_.Integer(0, 8))};
+    default: return SampleQuery{.nonce = Number(), .dataset = random_.Chance(0.5) ? "volume" : "nonesuch", .points = {{1, 2, 3}}};
   }
 }
 

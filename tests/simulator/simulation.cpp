@@ -319,6 +319,14 @@ void Simulation::Perform(const FindDatasets& action) {
   service_.TellCoordinator(service_.now() + random_.Real(0, 0.1), answer);
 }
 
+// Whatever was asked: late, and perhaps to nobody who still waits.
+void Simulation::Perform(const AnswerQuestion& action) {
+  const std::uint64_t nonce = NonceOf(action.question);
+  AnyMessage answer = SampleReply{.nonce = nonce};
+  if (random_.Chance(current_.fail_load)) answer = OrderRefused{nonce, Status::ResourceExhausted("not enough memory to answer")};
+  service_.TellCoordinator(service_.now() + random_.Real(0, 0.1), QuestionAnswered{action.id, std::move(answer)});
+}
+
 void Simulation::Perform(const CountDataset& action) {
   tally_.Add(Count::kCountsOfVoxels);
   OccupiedCounted counted{action.count, world_.occupied};

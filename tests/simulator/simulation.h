@@ -119,6 +119,7 @@ class Simulation : private Conditions {
   void Perform(const LookAtDataset& action) override;
   void Perform(const LookAtFolders& action) override;
   void Perform(const FindDatasets& action) override;
+  void Perform(const AnswerQuestion& action) override;
   void Perform(const CountDataset& action) override;
   void Perform(const PlanRequest& action) override;
   void Perform(const FrameMeasured& action) override { planner_->Learn(action); }

@@ -400,6 +400,47 @@ std::vector<DataReply> SamplesOf() {
             {"b", DatasetState::kLoading}}}};
 }
 
+template <>
+std::vector<SummaryQuery> SamplesOf() {
+  return {{.dataset = "a", .transfer = {}}, {kMax64, kLongName, {Curve(), 1e-6, ScalarRange{0, 100, true}}}};
+}
+
+template <>
+std::vector<SummaryReply> SamplesOf() {
+  const TransferFunction flat{.colors = {{0, {1, 1, 1}}}, .opacities = {{0, 0.5}}};
+  return {{.description = Description(), .range = {}, .percentiles = {}, .transfer = flat},
+          {kMax64,
+           Description(),
+           {-1e30F, 1e30F},
+           std::vector<std::uint64_t>(kHistogramBins, kMax64),
+           kMax64,
+           std::vector<Percentile>(kMaxPercentiles, {100, -1e300}),
+           Curve()}};
+}
+
+template <>
+std::vector<SampleQuery> SamplesOf() {
+  return {{.dataset = "a", .points = {{}}}, {kMax64, kLongName, std::vector<Vec3>(kMaxSamplePoints, {1e300, -1, 0})}};
+}
+
+template <>
+std::vector<SampleReply> SamplesOf() {
+  const VolumeSample full{{-1e9, 0, 1}, true, {kMaxVolumeSide, 0, 1}, 1e300, LabelAt{kMaxLabelValue, std::string(kMaxLabelNameBytes, 'n')},
+                          -2.5};
+  return {{}, {kMax64, {full, {.at = {1, 2, 3}}, {.at = {}, .inside = true, .label = LabelAt{}}}}};
+}
+
+template <>
+std::vector<PickQuery> SamplesOf() {
+  FrameRequest request = Request();
+  return {{.frame = request}, {kMax64, request, double(request.size.width), 0.5}};
+}
+
+template <>
+std::vector<PickReply> SamplesOf() {
+  return {{}, {kMax64, VolumeSample{.at = {1, 2, 3}, .inside = true, .voxel = {1, 2, 3}, .value = 4}, -1e300}};
+}
+
 template <std::size_t... I>
 std::vector<AnyMessage> AllSamplesOf(std::index_sequence<I...>) {
   std::vector<AnyMessage> all;

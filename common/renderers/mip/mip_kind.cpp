@@ -89,6 +89,15 @@ class MipKind : public RendererKind {
     return ProjectionMode(int(parameters[1])) == ProjectionMode::kMean ? PixelFormat::kSum : PixelFormat::kMaximum;
   }
 
+  PickRule PickRuleOf(const std::vector<double>& parameters) const override {
+    switch (ProjectionMode(int(parameters[1]))) {
+      case ProjectionMode::kMaximum: return PickRule::kLargest;
+      case ProjectionMode::kMinimum: return PickRule::kLeast;
+      case ProjectionMode::kMean: break;
+    }
+    return PickRule::kNone;
+  }
+
   // Whatever its value, a sample may be the one that a pixel shows.
   ClassificationTable DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const override {
     ClassificationTable table = Classify(transfer, summary.description, summary.range);

@@ -5,8 +5,6 @@
 namespace slabstream {
 namespace {
 
-constexpr float kLeastOpacity = 0.5F;
-
 template <class T>
 std::uint32_t SampleOf(const BrickedVoxels& voxels, const Index3& voxel) {
   const BrickView<T> brick = voxels.View<T>(voxel / kBrick);
@@ -25,20 +23,6 @@ bool ShownLabels::AnyOpaqueBetween(float low, float high) const {
   if (!(low <= high)) return false;
   const auto at = [&](float number) { return uses.begin() + std::ptrdiff_t(std::min(std::size_t(number), uses.size() - 1)); };
   return std::find(at(low), at(high) + 1, LabelUse::kOpaque) != at(high) + 1;
-}
-
-std::vector<LabelUse> UsesOf(const LabelLook& look) {
-  std::vector<LabelUse> uses = {LabelUse::kAsVolume};
-  const bool tint = look.mode == LabelMode::kTint;
-  for (const LabelLook::Entry& entry : look.entries) {
-    const bool clear = entry.opacity < kLeastOpacity;
-    if (tint) {
-      uses.push_back(!entry.shown || clear ? LabelUse::kClear : LabelUse::kAsVolume);
-    } else {
-      uses.push_back(!entry.shown ? LabelUse::kAsVolume : clear ? LabelUse::kClear : LabelUse::kOpaque);
-    }
-  }
-  return uses;
 }
 
 std::vector<float> LabelColors(const LabelLook& look) {

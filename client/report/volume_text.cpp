@@ -1,0 +1,59 @@
+#include "client/report/volume_text.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "common/base/printable.h"
+
+namespace slabstream {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json Vector(const Vec3& v) { return Json::array({v.x, v.y, v.z}); }
+Json OrNull(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+
+}  // namespace
+
+Json HistogramJson(const std::string& dataset, const SummaryReply& summary) {
+  Json percentiles = Json::object();
+  for (const Percentile& each : summary.percentiles) percentiles[fmt::format("{:g}", each.percent)] = each.value;
+  return {{"dataset", dataset},
+          {"range", {summary.range.min, summary.range.max}},
+          {"counts", summary.histogram},
+          {"non_finite", summary.non_finite},
+          {"percentiles", std::move(percentiles)}};
+}
+
+Json SampleJson(const VolumeSample& sample) {
+  Json json = {{"at", Vector(sample.at)}, {"inside", sample.inside}, {"voxel", nullptr}, {"value", nullptr}};
+  if (!sample.inside) return json;
+  json["voxel"] = {sample.voxel.x, sample.voxel.y, sample.voxel.z};
+  json["value"] = OrNull(sample.value);
+  if (sample.label) json["label"] = {{"value", sample.label->value}, {"name", sample.label->name}};
+  if (sample.overlay) json["overlay"] = *sample.overlay;
+  return json;
+}
+
+Json PickJson(const PickReply& picked) {
+  Json json = {{"hit", picked.sample.has_value()}};
+  if (!picked.sample) return json;
+  json["depth"] = picked.depth;
+  json.update(SampleJson(*picked.sample));
+  return json;
+}
+
+std::string SampleText(const VolumeSample& sample) {
+  std::string text = fmt::format("{:g} {:g} {:g}", sample.at.x, sample.at.y, sample.at.z);
+  if (!sample.inside) return text + "  outside the volume";
+  text += fmt::format("  voxel {} {} {}", sample.voxel.x, sample.voxel.y, sample.voxel.z);
+  text += sample.value ? fmt::format("  value {:g}", *sample.value) : "  value not finite";
+  if (sample.label)
+    text += fmt::format("  label {}{}{}", sample.label->value, sample.label->name.empty() ? "" : " ", Printable(sample.label->name));
+  if (sample.overlay) text += fmt::format("  overlay {:g}", *sample.overlay);
+  return text;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,60 @@
+#include "coordinator/answer_question.h"
+
+#include <optional>
+#include <utility>
+
+#include "common/planning/frame_plan.h"
+#include "common/probe/percentiles.h"
+#include "common/probe/pick.h"
+
+namespace slabstream {
+namespace {
+
+struct Dataset {
+  const ProbeVolume& volume;
+  const VolumeSummary& summary;
+  DatasetId id;
+};
+
+Result<AnyMessage> Answer(const SummaryQuery& query, const Dataset& dataset) {
+  const VolumeSummary& summary = dataset.summary;
+  Result<TransferFunction> transfer = ResolveTransfer(query.transfer, summary);
+  if (!transfer.ok()) return transfer.status();
+  SummaryReply reply{.nonce = query.nonce,
+                     .description = summary.description,
+                     .range = summary.range,
+                     .histogram = {summary.histogram.begin(), summary.histogram.end()},
+                     .non_finite = std::uint64_t(summary.non_finite),
+                     .percentiles = {},
+                     .transfer = *std::move(transfer)};
+  for (const double percent : kPercents) reply.percentiles.push_back({percent, PercentileOf(summary, percent)});
+  return AnyMessage(std::move(reply));
+}
+
+Result<AnyMessage> Answer(const SampleQuery& query, const Dataset& dataset) {
+  SampleReply reply{.nonce = query.nonce};
+  for (const Vec3& point : query.points) reply.samples.push_back(SampleAt(dataset.volume, dataset.summary, point));
+  return AnyMessage(std::move(reply));
+}
+
+Result<AnyMessage> Answer(const PickQuery& query, const Dataset& dataset) {
+  const Result<FrameSetup> setup = MakeFrameSetup(query.frame, dataset.id, dataset.summary);
+  if (!setup.ok()) return setup.status();
+  PickReply reply{.nonce = query.nonce};
+  if (const std::optional<Picked> picked = Pick(*setup, dataset.volume, query.x, query.y)) {
+    reply.sample = SampleAt(dataset.volume, dataset.summary, dataset.summary.description.geometry.ToWorld(picked->at));
+    reply.depth = picked->depth;
+  }
+  return AnyMessage(std::move(reply));
+}
+
+}  // namespace
+
+Result<AnyMessage> AnswerTo(const AnswerQuestion& asked, const SlabServer::Samples& samples) {
+  if (!samples.any()) return Status::Unavailable("dataset \"" + DatasetOf(asked.question) + "\" was unloaded meanwhile");
+  const ProbeVolume volume{.voxels = samples.view(), .labels = samples.labels.get(), .overlay = samples.overlay.get()};
+  const Dataset dataset{volume, *asked.summary, asked.dataset};
+  return std::visit([&](const auto& query) { return Answer(query, dataset); }, asked.question);
+}
+
+}  // namespace slabstream

@@ -1,0 +1,14 @@
+// The answers to questions about what a dataset holds. Pure; they may take milliseconds.
+#pragma once
+
+#include <memory>
+
+#include "coordinator/frame_machine.h"
+#include "coordinator/slab_server.h"
+
+namespace slabstream {
+
+// Errors: as of MakeFrameSetup. `samples`: neither, if the dataset has gone meanwhile, which is Unavailable.
+Result<AnyMessage> AnswerTo(const AnswerQuestion& asked, const SlabServer::Samples& samples);
+
+}  // namespace slabstream

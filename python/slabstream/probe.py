@@ -1,0 +1,62 @@
+"""What a dataset holds: its histogram, and the voxels at points."""
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy
+import numpy.typing
+
+Vector = tuple[float, float, float]
+
+
+@dataclasses.dataclass(frozen=True)
+class Histogram:
+    """Of the finite voxels of a dataset, in equal bins."""
+
+    value_range: tuple[float, float]
+    counts: numpy.typing.NDArray[numpy.int64]   # voxels by bin
+    edges: numpy.typing.NDArray[numpy.float64]  # one more than bins, as numpy.histogram gives them
+    percentiles: dict[float, float]             # values that so many percent of the voxels do not exceed, to within a bin
+    non_finite: int                             # voxels that count nowhere
+
+
+@dataclasses.dataclass(frozen=True)
+class Sample:
+    """The voxel that holds a point."""
+
+    at: Vector                     # the point: x, y, z of the world
+    index: tuple[int, int, int]    # of the voxel, as arrays have it: z, y, x
+    value: float | None            # None: it is not finite
+    label: int | None = None       # as in the file; 0: none; None: the dataset has no labels
+    label_name: str = ""
+    overlay: float | None = None   # None: there is none here
+    depth: float | None = None     # of a point that was picked: as depths of the picture's pixels
+
+
+def histogram_of(message: Any) -> Histogram:
+    low, high = message.range.min, message.range.max
+    counts = numpy.array(message.histogram, dtype=numpy.int64)
+    return Histogram(
+        value_range=(low, high),
+        counts=counts,
+        edges=numpy.linspace(low, high, counts.size + 1),
+        percentiles={each.percent: each.value for each in message.percentiles},
+        non_finite=message.non_finite,
+    )
+
+
+def sample_of(message: Any, depth: float | None = None) -> Sample | None:
+    """None: the point lies outside the volume."""
+    if not message.inside:
+        return None
+    labelled = message.HasField("label")
+    return Sample(
+        at=(message.at.x, message.at.y, message.at.z),
+        index=(message.voxel.z, message.voxel.y, message.voxel.x),
+        value=message.value if message.HasField("value") else None,
+        label=message.label.value if labelled else None,
+        label_name=message.label.name if labelled else "",
+        overlay=message.overlay if message.HasField("overlay") else None,
+        depth=depth,
+    )
