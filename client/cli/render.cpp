@@ -20,6 +20,7 @@
 #include "client/cli/trace_json.h"
 #include "client/request/camera_json.h"
 #include "common/base/files.h"
+#include "common/frame/dataset_name.h"
 #include "common/planning/frame_plan.h"
 #include "common/planning/validate_request.h"
 #include "common/volume_io/read_options.h"
@@ -55,6 +56,20 @@ Result<Session> OpenSession(const FrameOptions& options, std::vector<FrameJob>& 
   return session;
 }
 
+// A preset and shares of values depend on the volume. Over time they are those of the first one, so that a colour means the same value in
+// all frames.
+Status SettleTransfer(Client& client, std::vector<FrameJob>& jobs) {
+  if (jobs.front().source == jobs.back().source) return Status::Ok();  // one volume
+  const FrameRequest& first = jobs.front().request;
+  Result<SummaryReply> summary = client.Summarize(first.dataset, first.transfer);
+  if (!summary.ok()) return summary.status();
+  for (FrameJob& job : jobs) {
+    job.request.transfer.choice = summary->transfer;
+    job.request.transfer.scalar_range.reset();
+  }
+  return Status::Ok();
+}
+
 // The pictures of `jobs`, and the files beside them (--stats, --trace). `open_pictures` is called just before the first frame: until then
 // Ctrl-C ends the process at once, so there must be nothing to clean up.
 using OpenSink = std::function<Result<std::unique_ptr<PictureSink>>()>;
@@ -63,6 +78,7 @@ Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std
   Result<Session> session = OpenSession(options, jobs);
   if (!session.ok()) return session.status();
   if (Status status = Validate(jobs.front().request); !status.ok()) return status;
+  if (Status status = SettleTransfer(session->client(), jobs); !status.ok()) return status;
   const Result<std::unique_ptr<PictureSink>> pictures = open_pictures();
   if (!pictures.ok()) return pictures.status();
 
@@ -104,22 +120,11 @@ Result<std::unique_ptr<PictureSink>> OpenPictures(const TurntableOptions& option
   return std::unique_ptr<PictureSink>(*std::move(movie));
 }
 
-// SOURCE at this time.
+// SOURCE at this time: in a file, or at a service, whose catalogue names the times of a file.
 std::string SourceAt(const TurntableOptions& options, int time) {
-  return options.times ? WithReadOption(options.frame.source, "time", std::to_string(time)) : options.frame.source;
-}
-
-// A preset depends on the values of the volume. Over time it is made once, for the first volume, so that a colour means the same value in
-// all frames.
-Result<TransferChoice> TransferOverTime(const TransferChoice& transfer, const std::string& first_source) {
-  TransferChoice settled = transfer;
-  if (!std::holds_alternative<std::string>(transfer.choice)) return settled;
-  const Result<LoadedVolume> first = ReadInputVolume(first_source);
-  if (!first.ok()) return first.status();
-  Result<TransferFunction> function = ResolveTransfer({.choice = transfer.choice}, Summarize(*first->volume));
-  if (!function.ok()) return function.status();
-  settled.choice = *std::move(function);
-  return settled;
+  if (!options.times) return options.frame.source;
+  if (options.frame.connection.local_workers == 0) return NameAtTime(options.frame.source, time);
+  return WithReadOption(options.frame.source, "time", std::to_string(time));
 }
 
 // Where frame `index` goes.
@@ -134,11 +139,6 @@ Status CheckTurntable(const TurntableOptions& options) {
         "--eye stands still, but a turntable turns by --azimuth, about --look-at; --turns 0 keeps the view still");
   }
   if (!options.frames && !options.times) return Status::InvalidArgument("--frames is required");
-  if (options.times && options.frame.connection.local_workers == 0) {
-    return Status::InvalidArgument(
-        "--time needs --local: a dataset of a service is one volume; its time stands where the service names it, as in --data "
-        "NAME=FILE?time=3");
-  }
   const std::string first_output = FileOf(options, 0);
   if (!options.output.movie.empty()) {
     if (Status status = CheckCanEncode(MovieOf(options)); !status.ok()) return status;
@@ -160,11 +160,8 @@ Result<std::vector<FrameJob>> TurntableJobs(const TurntableOptions& options) {
                                                frames, kMaxTurntableFrames));
   }
   FrameRequest request = options.frame.request;
-  if (times.count() > 1) {
+  if (times.count() > 1 && options.frame.connection.local_workers > 0) {
     if (Status status = CheckInputHeaders(SourceAt(options, times.last)); !status.ok()) return status;
-    Result<TransferChoice> transfer = TransferOverTime(request.transfer, SourceAt(options, times.first));
-    if (!transfer.ok()) return transfer.status();
-    request.transfer = *std::move(transfer);
   }
   std::vector<FrameJob> jobs;
   for (int i = 0; i < frames; ++i) {

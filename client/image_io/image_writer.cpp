@@ -1,22 +1,20 @@
 #include "client/image_io/image_writer.h"
 
-#include <OpenImageIO/filesystem.h>
-#include <OpenImageIO/imageio.h>
+#include <dlfcn.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <cstddef>
-#include <cstring>
 #include <filesystem>
 #include <limits>
-#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "client/image_io/composed_picture.h"
+#include "client/picture_encoder/picture_encoder.h"
 #include "common/base/check.h"
 #include "common/base/files.h"
 #include "common/base/version.h"
@@ -42,8 +40,7 @@ void ToStraightCodes(std::span<const float> premultiplied, std::span<Code> codes
 }
 
 // Calls write(y, row) for each row, in the file's own sample layout. Stops at the first failure.
-template <class Write>
-bool WritePngRows(const ComposedPicture& picture, int bits, Write write) {
+bool WritePngRows(const ComposedPicture& picture, int bits, const PictureEncoder::WriteRow& write) {
   const bool deep = bits == 16;
   std::vector<float> rgba(4 * std::size_t(picture.size().width));
   std::vector<std::uint8_t> codes8(deep ? 0 : rgba.size());
@@ -52,13 +49,12 @@ bool WritePngRows(const ComposedPicture& picture, int bits, Write write) {
     picture.Row(y, rgba, {});
     ToStraightCodes<std::uint8_t>(rgba, codes8);
     ToStraightCodes<std::uint16_t>(rgba, codes16);
-    if (!(deep ? write(y, static_cast<const void*>(codes16.data())) : write(y, codes8.data()))) return false;
+    if (!(deep ? write(y, codes16.data()) : write(y, codes8.data()))) return false;
   }
   return true;
 }
 
-template <class Write>
-bool WriteExrRows(const ComposedPicture& picture, Write write) {
+bool WriteExrRows(const ComposedPicture& picture, const PictureEncoder::WriteRow& write) {
   const bool with_depth = picture.has_depth();
   const std::size_t width = std::size_t(picture.size().width);
   std::vector<float> rgba(4 * width), depth(with_depth ? width : 0), rgbaz(with_depth ? 5 * width : 0);
@@ -68,107 +64,52 @@ bool WriteExrRows(const ComposedPicture& picture, Write write) {
       std::copy_n(&rgba[4 * x], 4, &rgbaz[5 * x]);
       rgbaz[5 * x + 4] = depth[x];
     }
-    if (!write(y, static_cast<const void*>(with_depth ? rgbaz.data() : rgba.data()))) return false;
+    if (!write(y, with_depth ? rgbaz.data() : rgba.data())) return false;
   }
   return true;
 }
 
-// PNG: in pixels a metre; OpenImageIO cuts what it calculates off to whole ones, so they are rounded here. EXR: in pixels an inch.
-void StatePixelSize(const PictureGeometry& geometry, bool png, OIIO::ImageSpec& spec) {
-  if (geometry.unit != LengthUnit::kMillimetre || geometry.projection == Projection::kPerspective) return;
+// PNG: in pixels a metre; OpenImageIO cuts what it calculates off to whole ones, so they are rounded here. EXR: in pixels an inch. nullopt:
+// pixels do not all have the same size, or none that is known.
+std::optional<double> PixelDensity(const PictureGeometry& geometry, bool png) {
+  if (geometry.unit != LengthUnit::kMillimetre || geometry.projection == Projection::kPerspective) return std::nullopt;
   constexpr double kMillimetresAMetre = 1000, kMillimetresAnInch = 25.4;
   constexpr double kMost = 1 << 24;  // whole numbers up to this have floats of their own
   const double density = png ? std::round(kMillimetresAMetre / geometry.pixel_size) : kMillimetresAnInch / geometry.pixel_size;
-  if (!(density >= (png ? 1 : 1 / kMost) && density <= kMost)) return;
-  spec.attribute("ResolutionUnit", png ? "m" : "in");
-  spec.attribute("XResolution", float(density));
-  spec.attribute("YResolution", float(density));
+  if (!(density >= (png ? 1 : 1 / kMost) && density <= kMost)) return std::nullopt;
+  return density;
 }
 
-// Takes an encoder's bytes, which may come in any order.
-class Sink : public OIIO::Filesystem::IOProxy {
- public:
-  Sink() : IOProxy("", Write) {}
-  virtual bool ok() const = 0;
-
-  const char* proxytype() const override { return "slabstream"; }
-  std::size_t write(const void* bytes, std::size_t size) override {
-    const std::size_t written = pwrite(bytes, size, m_pos);
-    m_pos += std::int64_t(written);
-    return written;
-  }
-};
-
-// Into a file. OutputFile reports failures, because encoders do so unreliably.
-class FileSink : public Sink {
- public:
-  explicit FileSink(OutputFile& file) : file_(file) {}
-  bool ok() const override { return file_.ok(); }
-  std::size_t pwrite(const void* bytes, std::size_t size, std::int64_t offset) override {
-    file_.WriteAt(offset, {static_cast<const std::byte*>(bytes), size});
-    return file_.ok() ? size : 0;
-  }
-
- private:
-  OutputFile& file_;
-};
-
-class MemorySink : public Sink {
- public:
-  bool ok() const override { return true; }
-  std::size_t pwrite(const void* bytes, std::size_t size, std::int64_t offset) override {
-    const std::size_t end = std::size_t(offset) + size;
-    if (bytes_.size() < end) bytes_.resize(end);
-    std::memcpy(&bytes_[std::size_t(offset)], bytes, size);
-    return size;
-  }
-  std::vector<std::byte> Take() { return std::move(bytes_); }
-
- private:
-  std::vector<std::byte> bytes_;
-};
-
-OIIO::ImageSpec SpecOf(const ComposedPicture& picture, const PictureFormat& format, const PictureNotes& notes, bool png) {
-  CHECK(format.png_bits == 8 || format.png_bits == 16);
-  const OIIO::TypeDesc sample = !png ? OIIO::TypeDesc::FLOAT : format.png_bits == 16 ? OIIO::TypeDesc::UINT16 : OIIO::TypeDesc::UINT8;
-  const bool with_depth = !png && picture.has_depth();
-  OIIO::ImageSpec spec(picture.size().width, picture.size().height, with_depth ? 5 : 4, sample);
-  spec.channelnames = {"R", "G", "B", "A"};
-  if (with_depth) spec.channelnames.push_back("Z");
-  spec.alpha_channel = 3;
-  spec.z_channel = with_depth ? 4 : -1;
-  if (png) {
-    // Samples are passed in their final form: no division by alpha and no transfer curve on the way.
-    spec.attribute("oiio:UnassociatedAlpha", 1);
-    spec.attribute("oiio:ColorSpace", "sRGB");
-    spec.attribute("png:compressionLevel", 1);  // the default, 6, takes 1.7 times as long to render 60 pictures of a head, 8 % smaller
-  } else {
-    spec.attribute("oiio:ColorSpace", "Linear");
-    spec.attribute("compression", "zip");
-    spec.attribute("DateTime", "");  // else the library puts the time there, and no two files are the same
-  }
-  StatePixelSize(notes.geometry, png, spec);
-  if (!notes.record.empty()) {
-    spec.attribute("Software", fmt::format("slabstream {}", Version()));
-    spec.attribute(kRecordName, notes.record);
-  }
-  return spec;
+// Loads the module at the first call. It lies beside the program or where programs are installed (CMAKE_BUILD_RPATH).
+Result<const PictureEncoder*> FindEncoder() {
+  static const Result<const PictureEncoder*> encoder = []() -> Result<const PictureEncoder*> {
+    void* const module = dlopen("libslabstream-pictures.so", RTLD_NOW | RTLD_LOCAL);
+    void* const entry = module == nullptr ? nullptr : dlsym(module, kPictureEncoderEntry);
+    if (entry == nullptr) return Status::Unavailable(fmt::format("pictures cannot be written: {}", dlerror()));
+    return reinterpret_cast<PictureEncoderEntry>(entry)();
+  }();
+  return encoder;
 }
 
 // nullopt: done; else the encoder's reason.
 std::optional<std::string> Encode(const ComposedPicture& picture, const PictureFormat& format, const PictureNotes& notes, bool png,
-                                  Sink& sink) {
-  OIIO::ImageSpec spec = SpecOf(picture, format, notes, png);
-  OIIO::Filesystem::IOProxy* proxy = &sink;
-  spec.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
-  const std::unique_ptr<OIIO::ImageOutput> out = OIIO::ImageOutput::create(png ? "png" : "openexr");
-  if (!out) return OIIO::geterror();
-  if (!out->open(png ? "picture.png" : "picture.exr", spec)) return out->geterror();
-  const auto write = [&](int y, const void* row) { return sink.ok() && out->write_scanline(y, 0, spec.format, row); };
-  const bool written = png ? WritePngRows(picture, format.png_bits, write) : WriteExrRows(picture, write);
-  const bool closed = out->close();
-  if (!written || !closed) return out->geterror();
-  return std::nullopt;
+                                  const PictureEncoder::WriteBytes& write) {
+  CHECK(format.png_bits == 8 || format.png_bits == 16);
+  const Result<const PictureEncoder*> encoder = FindEncoder();
+  if (!encoder.ok()) return encoder.status().message();
+  const EncodedFormat encoded{.png = png,
+                              .width = picture.size().width,
+                              .height = picture.size().height,
+                              .bits = format.png_bits,
+                              .with_depth = !png && picture.has_depth(),
+                              .density = PixelDensity(notes.geometry, png),
+                              .software = fmt::format("slabstream {}", Version()),
+                              .record_name = kRecordName,
+                              .record = notes.record};
+  const auto rows = [&](const PictureEncoder::WriteRow& write_row) {
+    return png ? WritePngRows(picture, format.png_bits, write_row) : WriteExrRows(picture, write_row);
+  };
+  return (*encoder)->Encode(encoded, rows, write);
 }
 
 std::string FirstLine(const std::string& reason) {
@@ -190,8 +131,12 @@ Status WritePicture(const LocalImage& image, ImageSize size, const std::string& 
   if (!picture.ok()) return picture.status();
   Result<OutputFile> file = OutputFile::Create(path);
   if (!file.ok()) return file.status();
-  FileSink sink(*file);
-  const std::optional<std::string> failure = Encode(*picture, format, notes, TypeOf(path) == FileType::kPng, sink);
+  // OutputFile reports failures, because encoders do so unreliably.
+  const auto write = [&](std::int64_t offset, std::span<const std::byte> bytes) {
+    file->WriteAt(offset, bytes);
+    return file->ok();
+  };
+  const std::optional<std::string> failure = Encode(*picture, format, notes, TypeOf(path) == FileType::kPng, write);
   if (!failure) return file->Finish();
   if (Status status = file->Close(); !status.ok()) return status;  // reports a full disk rather than the encoder's message about it
   return Status::Unavailable(fmt::format("cannot write '{}': {}", path, FirstLine(*failure)));
@@ -200,11 +145,16 @@ Status WritePicture(const LocalImage& image, ImageSize size, const std::string& 
 Result<std::vector<std::byte>> PngFile(const LocalImage& image, ImageSize size, const PictureFormat& format, const PictureNotes& notes) {
   const Result<ComposedPicture> picture = ComposedPicture::Make(image, size, format, notes.geometry);
   if (!picture.ok()) return picture.status();
-  MemorySink sink;
-  if (const auto failure = Encode(*picture, format, notes, true, sink)) {
+  std::vector<std::byte> file;
+  const auto write = [&](std::int64_t offset, std::span<const std::byte> bytes) {
+    file.resize(std::max(file.size(), std::size_t(offset) + bytes.size()));
+    std::ranges::copy(bytes, file.begin() + offset);
+    return true;
+  };
+  if (const auto failure = Encode(*picture, format, notes, true, write)) {
     return Status::Internal(fmt::format("cannot encode a PNG: {}", FirstLine(*failure)));
   }
-  return sink.Take();
+  return file;
 }
 
 }  // namespace slabstream

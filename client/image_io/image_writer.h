@@ -1,4 +1,4 @@
-// Writes pictures to files. The only place that uses OpenImageIO.
+// Writes pictures to files, by the encoder of picture_encoder.h.
 //
 // PNG: straight alpha, 8 or 16 bit, row 0 at the top; code = round(max * clamp(straight value, 0, 1)), without a transfer curve.
 // EXR: premultiplied linear float R, G, B, A, and Z (camera depth, +infinity where nothing is seen) for images that have depth.

@@ -285,18 +285,38 @@ TEST_F(MovieTest, AColourMeansTheSameValueAtAllTimes) {
   EXPECT_NEAR(brightest(1), 255 * 50 / 200, 2) << "the preset of the first volume, not one of its own";
 }
 
+TEST_F(MovieTest, AServiceShowsTheTimesOfAFileAsFilesDo) {
+  KeepFrames();
+  const std::string series = MakeSeries("series.npy", {200, 50, 100});
+  MustRun({"up", "--detach", "--workers", "1", "--listen", "ipc://" + Path("s"), "--data", "beat=" + series + "?time=0:2"});
+  const std::vector<std::string> look = {"--turns",    "0",   "--time",     "0:2",    "--size", std::to_string(kPixels),
+                                         "--renderer", "mip", "--transfer", "window", "-o"};
+  const auto movie = [&](std::vector<std::string> arguments, const std::string& file) {
+    arguments.insert(arguments.begin(), "turntable");
+    arguments.insert(arguments.end(), look.begin(), look.end());
+    arguments.push_back(file);
+    MustRun(arguments);
+    return ReadFile(file);
+  };
+  EXPECT_EQ(movie({"beat"}, "service.mp4"), movie({series, "--local=1"}, "local.mp4"));
+  const ProgramResult beyond = Slabstream({"turntable", "beat", "--time", "1:3", "-o", "f%d.png"});
+  EXPECT_EQ(beyond.exit_status, 2) << beyond.err;
+  EXPECT_THAT(beyond.err, HasSubstr("no dataset \"beat@3\": the catalogue has beat@0, beat@1, beat@2"));
+  MustRun({"data", "remove", "beat"});
+  EXPECT_THAT(MustRun({"data", "list"}).out, Not(HasSubstr("beat")));
+}
+
 TEST_F(MovieTest, TimesThatAreNotThereAreRefused) {
   const std::string series = MakeSeries("series.npy", {50, 100, 200});
   const std::vector<Refusal> cases = {
       {{series, "--local=1", "--time", "0:3"}, "series.npy: time is 3, must be in [0, 2]"},
       {{series, "--local=1", "--time", "2:1"}, "--time '2:1': FIRST must not be above LAST"},
-      {{series, "--local=1", "--time", "0:1:2"}, "--time '0:1:2' is neither T nor FIRST:LAST"},
-      {{series, "--local=1", "--time", "0:x"}, "--time 'x'"},
-      {{series, "--local=1", "--time", ":2"}, "--time ''"},
+      {{series, "--local=1", "--time", "0:1:2"}, "--time '0:1:2' must be a whole number in [0, 1048575], or FIRST:LAST"},
+      {{series, "--local=1", "--time", "0:x"}, "--time '0:x'"},
+      {{series, "--local=1", "--time", ":2"}, "--time ':2'"},
       {{series, "--local=1", "--time", "0:100000"}, "--time 0:100000 has 100001 times, but at most 100000 --frames are possible"},
       {{series, "--local=1", "--frames", "3"}, "holds 3 volumes, of which --time takes one: 0 to 2"},
       {{series + "?time=1", "--local=1", "--time", "0:2"}, "time is given twice"},
-      {{"head", "--time", "0:2"}, "--time needs --local: a dataset of a service is one volume"},
       {{ball_, "--local=1", "--time", "0:2"}, "ball.nrrd: time is 2, must be in [0, 0]"},
       {{ball_, "--local=1"}, "--frames is required"},
   };
