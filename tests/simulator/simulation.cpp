@@ -327,6 +327,22 @@ void Simulation::Perform(const AnswerQuestion& action) {
   service_.TellCoordinator(service_.now() + random_.Real(0, 0.1), QuestionAnswered{action.id, std::move(answer)});
 }
 
+void Simulation::Perform(const BeginUpload& action) {
+  UploadBegun begun{action.upload, Status::Ok()};
+  if (random_.Chance(current_.fail_load)) begun.status = Status::ResourceExhausted("not enough memory for a volume");
+  service_.TellCoordinator(service_.now() + random_.Real(0, 0.1), begun);
+}
+
+void Simulation::Perform(const FinishUpload& action) {
+  UploadFinished finished{action.upload, Status::InvalidArgument("a label that there is not")};
+  if (!random_.Chance(current_.fail_load)) {
+    DataSource source("/sent", "");
+    source.held_bytes = 1;
+    finished.source = source;
+  }
+  service_.TellCoordinator(service_.now() + random_.Real(0, 0.1), finished);
+}
+
 void Simulation::Perform(const CountDataset& action) {
   tally_.Add(Count::kCountsOfVoxels);
   OccupiedCounted counted{action.count, world_.occupied};

@@ -120,6 +120,8 @@ class Simulation : private Conditions {
   void Perform(const LookAtFolders& action) override;
   void Perform(const FindDatasets& action) override;
   void Perform(const AnswerQuestion& action) override;
+  void Perform(const BeginUpload& action) override;
+  void Perform(const FinishUpload& action) override;
   void Perform(const CountDataset& action) override;
   void Perform(const PlanRequest& action) override;
   void Perform(const FrameMeasured& action) override { planner_->Learn(action); }
