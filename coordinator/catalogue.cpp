@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <chrono>
 #include <filesystem>
 #include <system_error>
@@ -16,24 +15,17 @@
 #include "common/volume_io/formats.h"
 #include "common/volume_io/read_options.h"
 #include "common/volume_io/volume_reader.h"
+#include "coordinator/dataset_name.h"
 
 namespace slabstream {
 namespace {
 
 namespace fs = std::filesystem;
 
-bool AllowedInName(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '.' || c == '_' || c == '-'; }
-
 // The beginning of an argument that is too long for a message.
 std::string Shown(const std::string& argument) {
   constexpr std::size_t kMost = 512;
   return argument.size() <= kMost ? argument : argument.substr(0, kMost) + "...";
-}
-
-Status CheckName(const std::string& name) {
-  if (!name.empty() && name.size() <= kMaxNameBytes && std::ranges::all_of(name, AllowedInName)) return Status::Ok();
-  return Status::InvalidArgument(
-      fmt::format("dataset name \"{}\" must have 1 to {} letters, digits, '.', '_' or '-'", Shown(name), kMaxNameBytes));
 }
 
 // The file name without its ending; ".nii.gz" is one ending.
@@ -72,7 +64,7 @@ Status Repeated(const std::string& name) { return Status::InvalidArgument("there
 // Adds what is in the folder; what cannot be added is left out.
 void AddContents(FoundData& found, const std::string& folder, const std::vector<fs::path>& files) {
   const auto add = [&](const std::string& name, const std::string& path) {
-    Status added = CheckName(name);
+    Status added = CheckDatasetName(name);
     if (added.ok() && !found.datasets.emplace(name, DataSource(path, folder)).second) added = Repeated(name);
     if (!added.ok()) found.complaints.push_back(path + ": left out: " + added.message());
   };
@@ -213,7 +205,7 @@ Result<DataArgument> ParseDataArgument(const std::string& argument) {
   parsed.path = equals == std::string::npos ? argument : argument.substr(equals + 1);
   const auto wrong = [&](const std::string& why) { return Status::InvalidArgument(Shown(argument) + ": " + why); };
   if (equals != std::string::npos) {
-    if (Status name = CheckName(parsed.name); !name.ok()) return wrong(name.message());
+    if (Status name = CheckDatasetName(parsed.name); !name.ok()) return wrong(name.message());
   }
   if (parsed.path.empty() || parsed.path.size() > kMaxPathBytes) {
     return wrong(fmt::format("a path of {} bytes, must have 1 to {}", parsed.path.size(), kMaxPathBytes));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <concepts>
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
@@ -34,10 +35,11 @@ struct DataSource {
           return LayeredVolume{.volume = *std::move(volume)};
         }) {}
 
-  std::string path;    // a file, or a folder of slices; a named one may have options for reading it behind a question mark
-  std::string folder;  // the watched folder that it was found in; empty: it was named
-  LayerFiles layers;   // of a named one
-  DataLoader load;     // set: `path` and `layers` are not used
+  std::string path;              // a file, or a folder of slices; a named one may have options for reading it behind a question mark
+  std::string folder;            // the watched folder that it was found in; empty: it was named
+  LayerFiles layers;             // of a named one
+  DataLoader load;               // set: `path` and `layers` are not used
+  std::uint64_t held_bytes = 0;  // of memory that it takes itself, whether it is loaded or not: a client has sent it
 };
 
 // By name.

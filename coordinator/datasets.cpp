@@ -122,12 +122,12 @@ void DatasetTable::Reset(const std::string& name, Time now) {
 }
 
 void DatasetTable::Retire(const Entry& entry) {
-  if (entry.state == DatasetState::kReady) retired_[entry.id] = entry.bytes;
+  if (entry.state == DatasetState::kReady) retired_[entry.id] = entry.source.held_bytes + entry.bytes;
 }
 
 std::uint64_t DatasetTable::bytes() const {
   std::uint64_t total = 0;
-  for (const auto& [name, entry] : entries_) total += entry.bytes;
+  for (const auto& [name, entry] : entries_) total += entry.source.held_bytes + entry.bytes;
   for (const auto& [id, bytes] : retired_) total += bytes;
   return total;
 }
@@ -141,7 +141,7 @@ std::optional<DatasetId> DatasetTable::UnloadOne(const std::function<bool(Datase
   const std::string* oldest = nullptr;
   std::uint64_t last_use = 0;
   for (const auto& [name, entry] : entries_) {
-    const bool may_go = entry.state == DatasetState::kReady && !in_use(entry.id);
+    const bool may_go = entry.state == DatasetState::kReady && entry.source.held_bytes == 0 && !in_use(entry.id);
     if (!may_go || (oldest != nullptr && entry.last_use >= last_use)) continue;
     oldest = &name;
     last_use = entry.last_use;
@@ -173,7 +173,7 @@ std::vector<DatasetStatus> DatasetTable::Report(Time now) const {
     if (entry.summary) {
       status.description = entry.summary->description;
       status.range = entry.summary->range;
-      status.memory_bytes = entry.bytes;
+      status.memory_bytes = entry.source.held_bytes + entry.bytes;
       if (entry.summary->label_table != nullptr) status.labels = std::uint32_t(entry.summary->label_table->labels.size());
       status.overlay = entry.summary->overlay != nullptr;
     }

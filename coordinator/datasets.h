@@ -37,7 +37,7 @@ class DatasetTable {
     std::shared_ptr<const VolumeSummary> summary;  // kReady only
     std::shared_ptr<const FileStamp> stamp;        // kReady only: of its files as they were read; null: they never change
     std::string error;                             // kFailed only
-    std::uint64_t bytes = 0;                       // kReady only: memory of its voxels
+    std::uint64_t bytes = 0;                       // kReady only: memory of its voxels beside what the source holds
     std::uint64_t last_use = 0;                    // greater: later
     LookCounter looks;                             // at its files, while it is ready
     // Not in the catalogue: somebody asks for it, and this look at the folders will tell whether it is there. 0: it is in the catalogue.
@@ -75,7 +75,7 @@ class DatasetTable {
   std::uint64_t bytes() const;          // of all voxels, the retired ones too
   bool Holds(DatasetId dataset) const;  // ready or retired
   std::size_t retired() const { return retired_.size(); }
-  // Unloads the least recently used one of those that are not `in_use`. nullopt: there is none.
+  // Unloads the least recently used one of those that are not `in_use`, nor held by their source. nullopt: there is none.
   std::optional<DatasetId> UnloadOne(const std::function<bool(DatasetId)>& in_use, Time now);
   // Takes out those that are retired and not `in_use`. Their voxels may go.
   std::vector<DatasetId> TakeRetired(const std::function<bool(DatasetId)>& in_use);

@@ -370,7 +370,8 @@ CoordinatorSizes FrameMachine::sizes() const {
           .orders = state.orders.size(),
           .awaited = awaited,
           .retired = state.datasets.retired(),
-          .questions = state.questions.size()};
+          .questions = state.questions.size(),
+          .uploads = state.uploads.size()};
 }
 
 }  // namespace slabstream

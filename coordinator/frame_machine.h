@@ -14,6 +14,9 @@
 //              the machine up: the executor answers it with an event, as it does for loads.
 //   questions  What a dataset holds is asked of the executor once the dataset is loaded and its files were looked at, as for frames. A
 //              question ends with its answer, with OrderRefused, or with its client.
+//   uploads    A client may send a dataset (AddVolume): it is admitted if its name is free and the memory suffices, its bytes come in order
+//              within a credit, and the executor stores them. It is a dataset once they are all there. If the client falls silent, gives
+//              it up or sends anything else than the next bytes, nothing stays.
 //   memory     A frame that does not fit the memory of its workers fails before they are given any of it (FramesThatFit). Frames that
 //              fit one by one run one by one.
 //   occupancy  Where a policy needs it, occupied voxels are counted once for each dataset, transfer function and renderer. Requests wait
@@ -39,8 +42,8 @@
 //              another coordinator. Both fail the open requests and end with StopService; a stopped machine does nothing more.
 //
 // What the executor must do: call Step(CoordinatorTick) no later than NextWake(), which is Time::max() if nothing can happen by itself;
-// carry out the actions in order; answer LoadDataset, LookAtDataset, LookAtFolders, FindDatasets, AnswerQuestion, CountDataset and
-// PlanRequest with one event each, in any order; report WorkerGone
+// carry out the actions in order; answer LoadDataset, LookAtDataset, LookAtFolders, FindDatasets, AnswerQuestion, BeginUpload,
+// FinishUpload, CountDataset and PlanRequest with one event each, in any order; report WorkerGone
 // or ClientGone when a send finds nobody. If the executor calls late, the machine assumes that the executor itself was held up, and
 // extends everybody's time by as much.
 #pragma once
@@ -68,6 +71,7 @@ namespace slabstream {
 
 using OrderId = std::uint64_t;     // of an order about datasets that waits; never given twice
 using QuestionId = std::uint64_t;  // likewise
+using UploadId = std::uint64_t;    // likewise, of a dataset that a client sends
 
 struct CoordinatorConfig {
   Epoch epoch = 0;  // random, not 0
@@ -99,6 +103,7 @@ struct FromWorker {
 struct FromClient {
   PeerToken from = 0;
   AnyMessage message;
+  Bytes payload = {};
 };
 // A SubmitFrame or question that could not be decoded, with the answer for its client (RefusalOf).
 struct BadRequest {
@@ -118,7 +123,7 @@ struct DatasetLoaded {
   LoadId load = 0;
   DatasetId dataset = 0;  // not 0
   std::shared_ptr<const VolumeSummary> summary;
-  std::uint64_t bytes = 0;                           // memory of its voxels
+  std::uint64_t bytes = 0;                           // memory of its voxels beside what the source holds
   std::shared_ptr<const FileStamp> stamp = nullptr;  // of its files as they were read; null: they never change
 };
 struct DatasetFailed {
@@ -146,6 +151,16 @@ struct QuestionAnswered {
   QuestionId question = 0;
   AnyMessage answer;
 };
+// The end of a BeginUpload: whether there is room.
+struct UploadBegun {
+  UploadId upload = 0;
+  Status status;
+};
+// The end of a FinishUpload.
+struct UploadFinished {
+  UploadId upload = 0;
+  Result<DataSource> source;
+};
 // The end of a count.
 struct OccupiedCounted {
   CountId count = 0;
@@ -161,9 +176,9 @@ struct CoordinatorStopRequested {
   std::string reason = "the coordinator is going down";
 };
 struct CoordinatorTick {};
-using CoordinatorEvent =
-    std::variant<FromWorker, FromClient, BadRequest, WorkerGone, ClientGone, DatasetLoaded, DatasetFailed, DatasetSeen, FoldersSeen,
-                 DatasetsFound, QuestionAnswered, OccupiedCounted, Planned, CoordinatorStopRequested, CoordinatorTick>;
+using CoordinatorEvent = std::variant<FromWorker, FromClient, BadRequest, WorkerGone, ClientGone, DatasetLoaded, DatasetFailed, DatasetSeen,
+                                      FoldersSeen, DatasetsFound, QuestionAnswered, UploadBegun, UploadFinished, OccupiedCounted, Planned,
+                                      CoordinatorStopRequested, CoordinatorTick>;
 
 // ---- actions
 struct ToWorker {
@@ -207,6 +222,24 @@ struct AnswerQuestion {
   DatasetId dataset = 0;
   std::shared_ptr<const VolumeSummary> summary;
 };
+// -> UploadBegun: room for the bytes of `order`.
+struct BeginUpload {
+  UploadId upload = 0;
+  AddVolume order;
+};
+// The next bytes, of an upload that was begun.
+struct StoreUpload {
+  UploadId upload = 0;
+  std::uint64_t begin = 0;
+  Bytes bytes;
+};
+// -> UploadFinished: all bytes are there.
+struct FinishUpload {
+  UploadId upload = 0;
+};
+struct DropUpload {
+  UploadId upload = 0;
+};
 // -> OccupiedCounted: counts the voxels of the volume that its renderer draws (DrawnTable, CountOccupied). The dataset was loaded.
 struct CountDataset {
   CountId count = 0;
@@ -229,8 +262,9 @@ struct Note {
   LogLevel level = LogLevel::kInfo;
   std::string text;
 };
-using CoordinatorAction = std::variant<ToWorker, ToClient, DropClient, LoadDataset, UnloadDataset, LookAtDataset, LookAtFolders,
-                                       FindDatasets, AnswerQuestion, CountDataset, PlanRequest, DropPlan, FrameMeasured, Note, StopService>;
+using CoordinatorAction =
+    std::variant<ToWorker, ToClient, DropClient, LoadDataset, UnloadDataset, LookAtDataset, LookAtFolders, FindDatasets, AnswerQuestion,
+                 BeginUpload, StoreUpload, FinishUpload, DropUpload, CountDataset, PlanRequest, DropPlan, FrameMeasured, Note, StopService>;
 
 // Entries in the machine's tables. At rest, with nothing asked for and every client gone, they are 0 but for the workers, their slots and
 // the grids of earlier counts (at most OccupancyTable::kMaxKept).
@@ -241,7 +275,7 @@ struct CoordinatorSizes {
   std::size_t workers = 0, slots = 0;
   std::size_t orders = 0, awaited = 0;  // that wait for a look at files; names that do
   std::size_t retired = 0;              // voxels that only frames under way use
-  std::size_t questions = 0;
+  std::size_t questions = 0, uploads = 0;
 };
 
 class FrameMachine {

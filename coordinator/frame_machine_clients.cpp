@@ -8,6 +8,9 @@ namespace slabstream {
 void FrameMachine::State::On(const BadRequest& event) {
   ++refused.bad_request;
   Tell(NoteAbout::kFrames, LogLevel::kInfo, "a request of client {} is refused: {}", event.from, event.why.message());
+  if (const auto* order = std::get_if<OrderRefused>(&event.answer)) {
+    if (const Upload upload = UploadOf(event.from, order->nonce); upload != uploads.end()) return EndUpload(upload, event.why);
+  }
   SendClient(event.from, event.answer);
 }
 
@@ -143,6 +146,14 @@ void FrameMachine::State::RefuseRequest(const OpenRequest& request, const Status
 }
 
 void FrameMachine::State::FreeClient(PeerToken client) {
+  for (auto upload = uploads.begin(); upload != uploads.end();) {
+    const auto next = std::next(upload);
+    if (upload->second.client == client) {
+      actions.emplace_back(DropUpload{upload->first});
+      uploads.erase(upload);
+    }
+    upload = next;
+  }
   std::erase_if(questions, [client](const auto& open) { return open.second.client == client; });
   if (!clients.Forget(client)) return;
   queue.Forget(client);

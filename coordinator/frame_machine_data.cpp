@@ -261,7 +261,8 @@ void FrameMachine::State::MergeFolder(const std::string& folder, const Catalogue
 void FrameMachine::State::AddData(const std::string& name, const DataSource& source) {
   datasets.Add(name, source, now);
   hidden.erase(name);
-  Tell(NoteAbout::kDatasets, LogLevel::kInfo, "dataset {} is in the catalogue: {}", InQuotes(name), source.path);
+  Tell(NoteAbout::kDatasets, LogLevel::kInfo, "dataset {} is in the catalogue: {}", InQuotes(name),
+       source.held_bytes > 0 ? "a client has sent it" : source.path);
   bool wanted = false;
   queue.ForEach([&](const OpenRequest& request) { wanted = wanted || request.submit.frame.dataset == name; });
   if (wanted || IsAskedAbout(name)) LoadData(name);
@@ -348,7 +349,7 @@ Status FrameMachine::State::AddFound(const FoundData& found) {
   for (const std::string& folder : found.folders) {
     if (datasets.folders.contains(folder)) return Status::InvalidArgument(folder + " is watched already");
   }
-  if (datasets.size() + more > config.max_datasets) {
+  if (datasets.size() + uploads.size() + more > config.max_datasets) {
     return Status::ResourceExhausted(
         fmt::format("{} datasets and {} more, the catalogue has at most {}", datasets.size(), more, config.max_datasets));
   }

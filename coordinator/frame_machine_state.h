@@ -6,6 +6,7 @@
 //   frame_machine_workers.cpp   messages of workers
 //   frame_machine_clients.cpp   messages of clients and the ends of their requests
 //   frame_machine_questions.cpp questions about what datasets hold
+//   frame_machine_uploads.cpp   datasets that clients send
 #pragma once
 
 #include <fmt/format.h>
@@ -93,6 +94,14 @@ struct FrameMachine::State {
   };
   std::map<QuestionId, OpenQuestion> questions;  // in order of arrival
   QuestionId last_question = 0;
+  // A dataset on its way from a client.
+  struct OpenUpload {
+    PeerToken client = 0;
+    AddVolume order;
+    std::uint64_t received = 0, allowed = 0;  // bytes
+  };
+  std::map<UploadId, OpenUpload> uploads;  // at most one of each client
+  UploadId last_upload = 0;
   LookCounter folder_looks;
   Time next_round;                            // when the folders are looked through, if there are any
   std::set<std::string> complaints;           // about what lies in the folders
@@ -106,6 +115,7 @@ struct FrameMachine::State {
   }
   void On(const FromClient& event) {
     clients.Touch(event.from, now);
+    if (const auto* part = std::get_if<VolumePart>(&event.message)) return OnVolumePart(event.from, *part, event.payload);
     std::visit([&](const auto& message) { OnClientMessage(event.from, message); }, event.message);
   }
   void On(const WorkerGone& event) {
@@ -117,6 +127,8 @@ struct FrameMachine::State {
     FreeClient(event.who);
   }
   void On(const QuestionAnswered& event);
+  void On(const UploadBegun& event);
+  void On(const UploadFinished& event);
   void On(const DatasetLoaded& event);
   void On(const DatasetFailed& event);
   void On(const DatasetSeen& event);
@@ -142,7 +154,7 @@ struct FrameMachine::State {
   template <AnyOf<Welcome, Ping, GroupAssignment, Retire, Stop, ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused,
                   ImageReceived, SubmitFrame, FrameProgress, FrameReply, FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery,
                   StatusReply, ShutDown, ShutDownReply, KeysOrder, KeysReply, OrderRefused, DataOrder, DataReply, SummaryQuery,
-                  SummaryReply, SampleQuery, SampleReply, PickQuery, PickReply>
+                  SummaryReply, SampleQuery, SampleReply, PickQuery, PickReply, AddVolume, VolumeCredit, VolumePart, DropVolume>
                 Message>
   void OnWorkerMessage(const FromWorker&, const Message&) {}
 
@@ -156,11 +168,15 @@ struct FrameMachine::State {
   void OnClientMessage(PeerToken client, const SummaryQuery& message) { Ask(client, message); }
   void OnClientMessage(PeerToken client, const SampleQuery& message) { Ask(client, message); }
   void OnClientMessage(PeerToken client, const PickQuery& message) { Ask(client, message); }
+  void OnClientMessage(PeerToken client, const AddVolume& message);
+  void OnClientMessage(PeerToken client, const DropVolume& message);
+  void OnClientMessage(PeerToken, const VolumePart&) {}  // see On(FromClient)
+  void OnVolumePart(PeerToken client, const VolumePart& part, const Bytes& payload);
   // Drops what no client sends.
   template <
       AnyOf<Register, Welcome, Heartbeat, Ping, GroupAssignment, GroupDone, FrameImage, WorkerTrouble, Leave, Retire, Stop, ChunkRequest,
             Chunk, ChunkRefused, PartialImage, ImageRefused, ImageReceived, FrameProgress, FrameReply, FrameFailed, ClientPong, StatusReply,
-            ShutDownReply, KeysOrder, KeysReply, OrderRefused, DataReply, SummaryReply, SampleReply, PickReply>
+            ShutDownReply, KeysOrder, KeysReply, OrderRefused, DataReply, SummaryReply, SampleReply, PickReply, VolumeCredit>
           Message>
   void OnClientMessage(PeerToken, const Message&) {}
 
@@ -183,6 +199,14 @@ struct FrameMachine::State {
   // Those about the dataset that the executor has not been asked.
   void RefuseQuestions(const std::string& dataset, const Status& status);
   void RefuseQuestion(const OpenQuestion& open, const Status& status);
+
+  // ---- uploads
+  Status AdmitUpload(const AddVolume& order);
+  std::uint64_t UploadBytes() const;  // of those under way
+  void GrantCredit(OpenUpload& upload);
+  using Upload = std::map<UploadId, OpenUpload>::iterator;
+  Upload UploadOf(PeerToken client, std::uint64_t nonce);
+  void EndUpload(Upload upload, const Status& why);  // without a dataset
 
   // ---- datasets
   Status FindVolume(OpenRequest& request) const;

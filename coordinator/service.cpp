@@ -28,6 +28,7 @@
 #include "coordinator/peer_table.h"
 #include "coordinator/service_keys.h"
 #include "coordinator/slab_server.h"
+#include "coordinator/upload_buffer.h"
 
 namespace slabstream {
 namespace {
@@ -71,6 +72,7 @@ struct News {
   CoordinatorEvent event;
   DatasetId dataset = 0;
   SlabServer::Samples samples = {};
+  std::shared_ptr<UploadBuffer> upload = nullptr;  // of an UploadBegun
 };
 
 Result<News> Load(const LoadDataset& action) {
@@ -80,7 +82,8 @@ Result<News> Load(const LoadDataset& action) {
   const Layers& layers = loaded->layers;
   auto summary = std::make_shared<const VolumeSummary>(Summarize(LayeredVolume{volume, layers}));
   SlabServer::Samples samples;
-  if (MostBricksAreEqual(*summary)) {
+  const bool held = action.source.held_bytes > 0;  // as a whole, in any case
+  if (!held && MostBricksAreEqual(*summary)) {
     samples.bricks = std::make_shared<const BrickedVoxels>(volume->block);
   } else {
     samples.volume = volume;
@@ -88,7 +91,7 @@ Result<News> Load(const LoadDataset& action) {
   if (layers.labels != nullptr) samples.labels = std::make_shared<const BrickedVoxels>(layers.labels->block);
   if (layers.overlay != nullptr) samples.overlay = std::make_shared<const BrickedVoxels>(layers.overlay->block);
   const DatasetId id = IdOf(action.name, *volume, layers);
-  const std::uint64_t bytes = samples.bytes();
+  const std::uint64_t bytes = samples.bytes() - (held ? volume->block.bytes.size() : 0);
   return News{DatasetLoaded{action.name, action.load, id, std::move(summary), bytes, loaded->stamp}, id, std::move(samples)};
 }
 
@@ -164,6 +167,10 @@ struct CoordinatorService::Impl {
   void Perform(LookAtFolders& action);
   void Perform(FindDatasets& action);
   void Perform(AnswerQuestion& action);
+  void Perform(BeginUpload& action);
+  void Perform(StoreUpload& action) { uploads.at(action.upload)->Store(action.begin, action.bytes.span()); }
+  void Perform(FinishUpload& action);
+  void Perform(DropUpload& action) { uploads.erase(action.upload); }
   void Perform(Note& action) { notes[std::size_t(action.about)].Write(action.level, Printable(std::move(action.text))); }
   void Perform(CountDataset& action);
   void Perform(PlanRequest& action);
@@ -195,6 +202,7 @@ struct CoordinatorService::Impl {
   const PlanFunction make_plan;
   const CountFunction count_occupied;
   const std::shared_ptr<Planner> planner;                      // the planning thread's, but for plans at hand
+  std::map<UploadId, std::shared_ptr<UploadBuffer>> uploads;   // begun and neither finished nor dropped; null: memory is being taken
   std::map<PlanId, std::shared_ptr<std::atomic<bool>>> plans;  // under way: whether they are dropped
   BackgroundTasks loads{kLoadsAtOnce}, looks{kLooksAtOnce}, answers{kAnswersAtOnce}, counts{1}, planning{1};
   std::jthread thread;  // owns the sockets and the machine; last member: ends first
@@ -224,6 +232,10 @@ void CoordinatorService::Impl::Loop() {
     Wait(sockets, &inbox->wakeup(), std::clamp(machine.NextWake() - MonotonicNow(), Duration::zero(), kLongestWait));
     for (News& news : inbox->TakeAll()) {
       if (news.samples.any()) slabs->Publish(news.dataset, std::move(news.samples));
+      if (news.upload != nullptr) {
+        const auto begun = std::get_if<UploadBegun>(&news.event);
+        if (const auto open = uploads.find(begun->upload); open != uploads.end()) open->second = std::move(news.upload);
+      }
       HandleEvent(std::move(news.event));
     }
     ReceiveFromWorkers();
@@ -300,7 +312,7 @@ void CoordinatorService::Impl::ReceiveFromClients() {
       continue;
     }
     if (CarryOut(*incoming, *message, *role)) continue;
-    HandleEvent(FromClient{client_peers.Heard(incoming->identity, MonotonicNow()), std::move(*message)});
+    HandleEvent(FromClient{client_peers.Heard(incoming->identity, MonotonicNow()), std::move(*message), incoming->payload()});
   }
 }
 
@@ -314,6 +326,10 @@ bool CoordinatorService::Impl::CarryOut(const Incoming& incoming, const AnyMessa
   }
   if (const auto* data = std::get_if<DataOrder>(&message); data != nullptr && data->action != DataAction::kList && role != Role::kAdmin) {
     refuse(data->nonce, fmt::format("adding, removing and reloading datasets needs the service file of role admin, not {}", NameOf(role)));
+    return true;
+  }
+  if (const auto* add = std::get_if<AddVolume>(&message); add != nullptr && role != Role::kAdmin) {
+    refuse(add->nonce, fmt::format("adding a volume needs the service file of role admin, not {}", NameOf(role)));
     return true;
   }
   const auto* order = std::get_if<KeysOrder>(&message);
@@ -395,6 +411,32 @@ void CoordinatorService::Impl::Perform(AnswerQuestion& action) {
         return News{answer.ok() ? QuestionAnswered{action.id, *answer} : refusal(answer.status())};
       },
       refusal);
+}
+
+void CoordinatorService::Impl::Perform(BeginUpload& action) {
+  const UploadId upload = action.upload;
+  uploads[upload] = nullptr;
+  MakeElsewhere(
+      loads, "taking memory for a volume",
+      [upload, order = std::move(action.order)] {
+        const Result<std::shared_ptr<UploadBuffer>> made = UploadBuffer::Make(order);
+        return News{.event = UploadBegun{upload, made.status()}, .upload = made.ok() ? *made : nullptr};
+      },
+      [upload](const Status& why) {
+        return UploadBegun{upload, why};
+      });
+}
+
+void CoordinatorService::Impl::Perform(FinishUpload& action) {
+  const auto whole = uploads.extract(action.upload);
+  MakeElsewhere(
+      loads, "the end of a volume",
+      [upload = action.upload, buffer = whole.mapped()] {
+        return News{UploadFinished{upload, buffer->Finish()}};
+      },
+      [upload = action.upload](const Status& why) {
+        return UploadFinished{upload, why};
+      });
 }
 
 void CoordinatorService::Impl::Perform(CountDataset& action) {

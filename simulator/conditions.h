@@ -69,6 +69,10 @@ class Conditions {
   virtual void Perform(const LookAtFolders&) {}
   virtual void Perform(const FindDatasets&) {}
   virtual void Perform(const AnswerQuestion&) {}
+  virtual void Perform(const BeginUpload&) {}
+  virtual void Perform(const StoreUpload&) {}
+  virtual void Perform(const FinishUpload&) {}
+  virtual void Perform(const DropUpload&) {}
   virtual void Perform(const CountDataset& action) = 0;
   virtual void Perform(const PlanRequest& action) = 0;
   virtual void Perform(const FrameMeasured&) {}

@@ -66,7 +66,7 @@ struct WorkerMachine::State {
   template <AnyOf<Register, Heartbeat, GroupDone, FrameImage, WorkerTrouble, Leave, ChunkRequest, ImageRefused, ImageReceived, SubmitFrame,
                   FrameProgress, FrameReply, FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery, StatusReply, ShutDown,
                   ShutDownReply, KeysOrder, KeysReply, OrderRefused, DataOrder, DataReply, SummaryQuery, SummaryReply, SampleQuery, SampleReply,
-                  PickQuery, PickReply>
+                  PickQuery, PickReply, AddVolume, VolumeCredit, VolumePart, DropVolume>
                 Message>
   void On(const Message&, const Bytes&) {}
 

@@ -8,6 +8,7 @@
 #include "client/cli/cores.h"
 #include "client/cli/movie.h"
 #include "client/cli/option_groups.h"
+#include "client/cli/value.h"
 #include "client/request/layer_options.h"
 #include "common/base/find_named.h"
 #include "common/cli/program.h"
@@ -88,6 +89,16 @@ void DeclareInfo(const CommandLine& line) {
   ResolveSource(*sub, source, options->path, options->transfer, [] { return true; });
   sub->add_flag("--json", options->json, "Print JSON");
   RunWith(*sub, line.run, options, RunInfo);
+}
+
+void DeclareValue(const CommandLine& line) {
+  CLI::App* sub = line.app.add_subcommand("value", "Print what a dataset or a volume file holds at points: voxel, value, label");
+  auto options = std::make_shared<ValueOptions>();
+  AddSource(*sub, options->source, options->connection);
+  AddRepeated(*sub, "--at", options->points, "A point of the world")->required()->type_name("X,Y,Z");
+  AddLayerFiles(*sub, options->layers);
+  sub->add_flag("--json", options->json, "Print JSON");
+  RunWith(*sub, line.run, options, RunValue);
 }
 
 void DeclareTransfer(const CommandLine& line) {
@@ -311,9 +322,9 @@ void DeclareSlurm(const CommandLine& line) {
 }  // namespace
 
 std::span<const DeclareCommand> ClientCommands() {
-  static constexpr DeclareCommand kCommands[] = {DeclareRender,  DeclareTurntable, DeclareSlice, DeclareInfo, DeclareTransfer,
-                                                 DeclareConvert, DeclareSphere,    DeclareUp,    DeclareView, DeclareDown,
-                                                 DeclareStatus,  DeclareKeys,      DeclareData,  DeclareLogs, DeclareSlurm};
+  static constexpr DeclareCommand kCommands[] = {DeclareRender,  DeclareTurntable, DeclareSlice, DeclareInfo, DeclareValue, DeclareTransfer,
+                                                 DeclareConvert, DeclareSphere,    DeclareUp,    DeclareView, DeclareDown,  DeclareStatus,
+                                                 DeclareKeys,    DeclareData,      DeclareLogs,  DeclareSlurm};
   return kCommands;
 }
 

@@ -81,6 +81,23 @@ void ResolveSource(CLI::App& app, const CLI::Option* source, std::string& volume
   });
 }
 
+void AddSource(CLI::App& app, std::string& source, ConnectionOptions& connection) {
+  app.option_defaults()->group("Options");
+  app.add_option("SOURCE", source, "A dataset's name at the service, or with --local a volume file")->required();
+  AddReadOptions(app);
+  AddConnectionOptions(app, connection);
+  app.option_defaults()->group("Options");
+  app.parse_complete_callback([&app, &source, &connection] {
+    const std::string with_options = WithReadOptions(app, source);
+    if (with_options != source && connection.local_workers == 0) {
+      throw CLI::ValidationError(
+          fmt::format("'{}' is a dataset at the service; options for reading its file stand where the service names it, as in --data {}",
+                      source, WithReadOptions(app, "NAME=FILE")));
+    }
+    source = with_options;
+  });
+}
+
 void AddSliceOptions(CLI::App& app, SliceOptions& options) {
   app.option_defaults()->group("Options");
   CLI::Option* source =

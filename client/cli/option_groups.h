@@ -29,6 +29,9 @@ std::string WithReadOptions(const CLI::App& app, std::string source);
 // which must be about a file. Calls `is_file` only then.
 void ResolveSource(CLI::App& app, const CLI::Option* source, std::string& volume, TransferChoice& transfer, std::function<bool()> is_file);
 
+// SOURCE, a dataset or with --local a file, with the options for reading it, and where it is.
+void AddSource(CLI::App& app, std::string& source, ConnectionOptions& connection);
+
 // All options of `slice` but its output.
 void AddSliceOptions(CLI::App& app, SliceOptions& options);
 

@@ -12,6 +12,7 @@
 #include "common/wire/control_fields.h"
 #include "common/wire/image_fields.h"
 #include "common/wire/slab_fields.h"
+#include "common/wire/volume_fields.h"
 #include "slabstream/v1/envelope.pb.h"
 
 namespace slabstream {
@@ -69,7 +70,11 @@ constexpr auto kMembers = std::tuple{Member{Envelope::kRegisterWorker, &Envelope
                                      Member{Envelope::kSampleQuery, &Envelope::sample_query, &Envelope::mutable_sample_query},
                                      Member{Envelope::kSampleReply, &Envelope::sample_reply, &Envelope::mutable_sample_reply},
                                      Member{Envelope::kPickQuery, &Envelope::pick_query, &Envelope::mutable_pick_query},
-                                     Member{Envelope::kPickReply, &Envelope::pick_reply, &Envelope::mutable_pick_reply}};
+                                     Member{Envelope::kPickReply, &Envelope::pick_reply, &Envelope::mutable_pick_reply},
+                                     Member{Envelope::kAddVolume, &Envelope::add_volume, &Envelope::mutable_add_volume},
+                                     Member{Envelope::kVolumeCredit, &Envelope::volume_credit, &Envelope::mutable_volume_credit},
+                                     Member{Envelope::kVolumePart, &Envelope::volume_part, &Envelope::mutable_volume_part},
+                                     Member{Envelope::kDropVolume, &Envelope::drop_volume, &Envelope::mutable_drop_volume}};
 
 constexpr std::size_t kMemberCount = std::variant_size_v<AnyMessage>;
 static_assert(std::tuple_size_v<decltype(kMembers)> == kMemberCount, "kMembers lists AnyMessage");
@@ -113,6 +118,7 @@ std::size_t PayloadBytesOf(const PartialImage& message) {
   return message.packed ? message.packed->bytes : PayloadBytes(message.image);
 }
 std::size_t PayloadBytesOf(const Chunk& message) { return message.encoded_bytes; }
+std::size_t PayloadBytesOf(const VolumePart& message) { return message.bytes; }
 template <class Message>
 std::size_t PayloadBytesOf(const Message&) {
   return 0;
@@ -194,6 +200,8 @@ std::optional<AnyMessage> RefusalOf(std::span<const std::byte> header, const Sta
     case Envelope::kSummaryQuery: return OrderRefused{.nonce = envelope.summary_query().nonce(), .status = why};
     case Envelope::kSampleQuery: return OrderRefused{.nonce = envelope.sample_query().nonce(), .status = why};
     case Envelope::kPickQuery: return OrderRefused{.nonce = envelope.pick_query().nonce(), .status = why};
+    case Envelope::kAddVolume: return OrderRefused{.nonce = envelope.add_volume().nonce(), .status = why};
+    case Envelope::kVolumePart: return OrderRefused{.nonce = envelope.volume_part().nonce(), .status = why};
     default: return std::nullopt;
   }
 }

@@ -17,6 +17,7 @@
 #include "common/wire/control_messages.h"
 #include "common/wire/image_messages.h"
 #include "common/wire/slab_messages.h"
+#include "common/wire/volume_messages.h"
 
 namespace slabstream {
 
@@ -28,7 +29,8 @@ using AnyMessage =
     std::variant<Register, Welcome, Heartbeat, Ping, GroupAssignment, GroupDone, FrameImage, WorkerTrouble, Leave, Retire, Stop,
                  ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused, ImageReceived, SubmitFrame, FrameProgress, FrameReply,
                  FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery, StatusReply, ShutDown, ShutDownReply, KeysOrder, KeysReply,
-                 OrderRefused, DataOrder, DataReply, SummaryQuery, SummaryReply, SampleQuery, SampleReply, PickQuery, PickReply>;
+                 OrderRefused, DataOrder, DataReply, SummaryQuery, SummaryReply, SampleQuery, SampleReply, PickQuery, PickReply, AddVolume,
+                 VolumeCredit, VolumePart, DropVolume>;
 
 // The sockets that messages travel on: between coordinator and workers, between workers, and between clients and coordinator. Each message
 // belongs to one: to that of the header that declares it.
@@ -46,7 +48,8 @@ Result<AnyMessage> Decode(std::span<const std::byte> header);
 // long as the header says.
 Result<AnyMessage> DecodeOn(Plane plane, std::span<const std::byte> header, std::size_t payload_bytes);
 
-// The answer to a SubmitFrame or a question (SummaryQuery, SampleQuery, PickQuery) that Decode has refused, so that its client hears why:
+// The answer to a SubmitFrame or a question (SummaryQuery, SampleQuery, PickQuery) or part of a volume (AddVolume,
+// VolumePart) that Decode has refused, so that its client hears why:
 // FrameFailed or OrderRefused. nullopt for every other header.
 std::optional<AnyMessage> RefusalOf(std::span<const std::byte> header, const Status& why);
 

@@ -25,12 +25,13 @@ from .errors import (
 )
 from .frame import Frame, Progress
 from .image import Geometry, Image, Statistics
-from .loading import Volume, load, render
+from .loading import Volume, load, render, show
 from .local import shutdown
 from .probe import Histogram, Sample
 from .service import Service, connect
 from .status import Dataset, Status, Worker
 from .transfer import TransferFunction
+from .viewer import Viewer
 
 __version__ = "0.2.0"
 
@@ -56,10 +57,12 @@ __all__ = [
     "TransferFunction",
     "Unavailable",
     "UnknownOption",
+    "Viewer",
     "Volume",
     "Worker",
     "connect",
     "load",
     "render",
+    "show",
     "shutdown",
 ]

@@ -31,6 +31,7 @@ class Keys:
 class Address:
     endpoint: str
     keys: Keys | None = None
+    file: pathlib.Path | None = None  # the service file that has the keys
 
 
 def is_loopback(host: str) -> bool:
@@ -109,7 +110,7 @@ def read_service_file(path: str | os.PathLike[str]) -> Address:
         raise InvalidArgument(f"service file '{file}' is of role worker, but client or admin is needed here")
     if role not in ("client", "admin"):
         raise InvalidArgument(f"service file '{file}': role is not client, worker or admin")
-    return Address(text("endpoint"), Keys(key("server_key"), key("public_key"), key("secret_key")))
+    return Address(text("endpoint"), Keys(key("server_key"), key("public_key"), key("secret_key")), pathlib.Path(file).resolve())
 
 
 def _state_folder() -> pathlib.Path:

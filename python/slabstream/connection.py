@@ -8,7 +8,7 @@ import queue
 import threading
 import time
 import weakref
-from typing import Any, Callable
+from typing import Any, Callable, Iterable
 
 import zmq
 from zmq.utils.monitor import parse_monitor_message
@@ -105,9 +105,10 @@ class _Loop:
         except BlockingIOError:
             pass  # it is full of calls to wake up
 
-    def _send(self, envelope: Any) -> None:
+    def _send(self, envelope: Any, payload: Any = None) -> None:
+        header = envelope.SerializeToString()
         try:
-            self.socket.send(envelope.SerializeToString(), zmq.NOBLOCK)
+            self.socket.send_multipart([header] if payload is None else [header, payload], zmq.NOBLOCK)
         except zmq.Again:
             pass  # as if it was lost: pings notice, and requests are submitted again
 
@@ -166,7 +167,7 @@ class Connection:
     """Any thread. Unavailable: nobody answers within `timeout` seconds, or the service refuses the key."""
 
     def __init__(self, address: Address, timeout: float = CONNECT_SECONDS):
-        self.endpoint = address.endpoint
+        self.address, self.endpoint = address, address.endpoint
         try:
             self._loop = _Loop(address)
         except zmq.ZMQError as error:
@@ -191,6 +192,44 @@ class Connection:
         """`number`: of submit()."""
         requests = self._loop.requests
         self._loop.call(lambda: requests.cancel(number.result()))  # calls keep their order: it is known by then
+
+    def upload(self, order: Any, parts: Iterable[memoryview]) -> Any:
+        """Sends a volume: an AddVolume, then its bytes in parts of at most MOST_PART_BYTES, which are asked for as the service takes them.
+        The DataReply."""
+        answer: concurrent.futures.Future[Any] = concurrent.futures.Future()
+        changed = threading.Condition()
+        allowed, sent = 0, 0
+        nonces: list[int] = []
+        requests = self._loop.requests
+
+        def credited(most: int) -> None:
+            nonlocal allowed
+            with changed:
+                allowed = most
+                changed.notify()
+
+        def ended(_: Any) -> None:
+            with changed:
+                changed.notify()
+
+        def send(begin: int, part: memoryview) -> None:
+            self._loop.call(lambda: requests.send_part(nonces[0], begin, part))
+
+        answer.add_done_callback(ended)
+        self._loop.call(lambda: nonces.append(requests.begin_upload(order, answer, credited, time.monotonic())))
+        try:
+            for part in parts:
+                with changed:
+                    changed.wait_for(lambda: answer.done() or allowed >= sent + part.nbytes)
+                if answer.done():
+                    break
+                send(sent, part)
+                sent += part.nbytes
+            return answer.result()
+        except BaseException:
+            if not answer.done():
+                self._loop.call(lambda: requests.drop_upload(nonces[0]))
+            raise
 
     def ask(self, kind: str, message: Any, timeout: float = ANSWER_SECONDS) -> Any:
         """The answer to a question or an order, or the service's refusal as an exception."""

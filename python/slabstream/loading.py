@@ -15,6 +15,7 @@ from .image import Image
 from .local import lock, running
 from .options import takes_options_of
 from .service import Service
+from .viewer import Viewer
 from .volumes import Grid, check_spacing, on_grid, volume_of, write_nrrd
 from .volumes import Volume as VolumeData
 
@@ -43,6 +44,11 @@ class Volume:
     def turntable(self, frames: int, **options: Any) -> Iterator[Image]:
         """As Service.turntable."""
         return self.service.turntable(self.name, frames, **self._shows | options)
+
+    @takes_options_of("render")
+    def show(self, **options: Any) -> Viewer:
+        """As Service.show."""
+        return self.service.show(self.name, keep=self, **self._shows | options)
 
     @takes_options_of("slice")
     def slice(self, **options: Any) -> Image:
@@ -87,14 +93,20 @@ def _path_text(path: Any, what: str) -> str:
 
 def load(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any = None, world: str | None = None, labels: Any = None,
          overlay: Any = None, service: Service | None = None) -> Volume:
-    """Brings a volume to a service on this machine, for any number of pictures.
+    """Brings a volume to a service, for any number of pictures.
 
     `volume` is a path of any format that slabstream reads, or an array of z, y, x: numpy, dask, zarr, h5py, xarray.DataArray, an image of
     nibabel, a list of pydicom datasets. `spacing` and `origin` are z, y, x too; row i of `direction` is where the array's axis i points to,
     as z, y, x of the world; `world` is "scene" or "patient" (x to the right, y to anterior, z to superior; mm). `labels` and `overlay` are
-    volumes on the same grid, or paths. `service`: one on this machine that takes data; None: one of this process' own, which is started if
-    need be and ends with it.
+    volumes on the same grid, or paths. `service`: one that takes data: arrays are sent to it, wherever it runs; files are read there;
+    None: one of this process' own, which is started if need be and ends with it.
     """
+    given = [layer for layer in (labels, overlay) if layer is not None]
+    shows = {what: True for what, layer in (("labels", labels), ("overlay", overlay)) if layer is not None}
+    name = f"python-{os.getpid()}-{next(_numbers)}"
+    if service is not None and not any(map(_is_path, (volume, *given))):
+        service.add(name, volume, spacing=spacing, origin=origin, direction=direction, world=world, labels=labels, overlay=overlay)
+        return Volume(service, name, shows, [])
     own = None if service is not None else running()
     where = service if service is not None else own.service  # type: ignore[union-attr]
     grid: Grid | None = None  # of a volume that is no file: that of its layers too, unless they state their own
@@ -114,9 +126,9 @@ def load(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any
     try:
         if _is_path(volume):
             text = _path_text(volume, "volume")
-            for name, value in (("origin", origin), ("direction", direction), ("world", world)):
+            for field, value in (("origin", origin), ("direction", direction), ("world", world)):
                 if value is not None:
-                    raise InvalidArgument(f"{name} is for arrays; files state their own")
+                    raise InvalidArgument(f"{field} is for arrays; files state their own")
             if spacing is not None:
                 dz, dy, dx = check_spacing(spacing)
                 text += f"{',' if '?' in text else '?'}spacing={dx},{dy},{dz}"
@@ -128,13 +140,11 @@ def load(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any
             if layer is not None:
                 path = _path_text(layer, what) if _is_path(layer) else written(on_grid(volume_of(layer), grid))
                 text += f",{what}={path}"
-        name = f"python-{os.getpid()}-{next(_numbers)}"
         where.add_data(f"{name}={text}")
     except BaseException:
         for file in files:
             file.unlink(missing_ok=True)
         raise
-    shows = {what: True for what, layer in (("labels", labels), ("overlay", overlay)) if layer is not None}
     return Volume(where, name, shows, files)
 
 
@@ -158,3 +168,11 @@ def render(volume: Any, *, spacing: Any = None, origin: Any = None, direction: A
         return loaded.render(**options)
     with load(volume, **given) as loaded:
         return loaded.render(**options)
+
+
+@takes_options_of("render")
+def show(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any = None, world: str | None = None, labels: Any = None,
+         overlay: Any = None, service: Service | None = None, **options: Any) -> Viewer:
+    """The viewer of an array or a file, for a notebook: load() and show() in one. The volume stays as long as the viewer."""
+    return load(volume, spacing=spacing, origin=origin, direction=direction, world=world, labels=labels, overlay=overlay,
+                service=service).show(**options)

@@ -14,7 +14,8 @@ from typing import Any
 
 from .address import Address
 from .connection import Connection
-from .errors import NotFound, SlabstreamError, Unavailable
+from .errors import SlabstreamError, Unavailable
+from .programs import find_program
 from .service import Service
 
 _START_SECONDS = 60.0
@@ -23,22 +24,6 @@ _MOST_FOLDER_BYTES = 50  # of temporary files: paths of sockets have at most 107
 
 # Starts the service in its folder, and ends both when this process is gone, however it ended: then nobody holds the other end of the pipe.
 _KEEPER = '"$@" </dev/null & service=$!; exec >&- 2>&-; read -r _; kill "$service"; wait "$service"; rm -rf -- "$0"'
-
-
-def find_program() -> str:
-    """`slabstream`, in the folder $SLABSTREAM_PROGRAMS, on the path, or in the build of the sources that this package is part of."""
-    folder = os.environ.get("SLABSTREAM_PROGRAMS")
-    if folder:
-        program = shutil.which("slabstream", path=folder)
-        if program is None:
-            raise NotFound(f"$SLABSTREAM_PROGRAMS is '{folder}', which has no program slabstream")
-        return program
-    built = pathlib.Path(__file__).resolve().parents[2] / "build" / "bin"
-    found = shutil.which("slabstream") or shutil.which("slabstream", path=str(built))
-    if found is None:
-        raise NotFound("there is no program slabstream to start a service with: put it on the path, name its folder in $SLABSTREAM_PROGRAMS, "
-                       "or connect() to a service that runs")
-    return found
 
 
 class LocalService:

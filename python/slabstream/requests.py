@@ -25,6 +25,7 @@ _TELL_BYTES = 1 << 20  # of payloads, until the next ping tells of them
 
 _ANSWERS = ("client_pong", "status_reply", "shut_down_reply", "keys_reply", "data_reply", "order_refused", "summary_reply",
             "sample_reply", "pick_reply")
+MOST_PART_BYTES = 1 << 19  # of a volume that is sent
 
 _log = logging.getLogger("slabstream")
 
@@ -47,13 +48,21 @@ class _Open:
     cancelled: bool = False  # by the caller; the service has not answered yet
 
 
+@dataclasses.dataclass
+class _Upload:
+    answer: concurrent.futures.Future[Any]  # DataReply
+    credited: Callable[[int], None]         # told how many bytes may be sent in all
+    epoch: int | None = None                # of the coordinator, once a pong has told it
+
+
 class Requests:
-    def __init__(self, endpoint: str, send: Callable[[Any], None]):
-        """`send` takes an Envelope."""
+    def __init__(self, endpoint: str, send: Callable[..., None]):
+        """`send` takes an Envelope and, of some, a payload."""
         self._endpoint = endpoint
         self._send = send
         self._open: dict[int, _Open] = {}
         self._questions: dict[int, concurrent.futures.Future[Any]] = {}  # by nonce
+        self._uploads: dict[int, _Upload] = {}  # by nonce
         self._pinged: dict[int, list[int]] = {}  # requests of each unanswered ping, by nonce
         self._last_request = self._last_nonce = 0
         self._received_bytes = self._told_bytes = 0
@@ -72,7 +81,7 @@ class Requests:
         elif len(self._open) >= MOST_OPEN:
             observer.failed(ResourceExhausted(f"at most {MOST_OPEN} requests may be open at once"))
         else:
-            if not self._open:
+            if not self._open and not self._uploads:
                 self._next_ping = now + PING_SECONDS
             self._open[request] = _Open(message, now + seconds, observer)
             self._send_message(submit_frame=message)
@@ -98,6 +107,28 @@ class Requests:
         """Nobody waits for that answer any more."""
         self._questions.pop(nonce, None)
 
+    def begin_upload(self, order: Any, answer: concurrent.futures.Future[Any], credited: Callable[[int], None], now: float) -> int:
+        """Sends an AddVolume. Returns what send_part() and drop_upload() take."""
+        self._last_nonce += 1
+        order.nonce = self._last_nonce
+        if self._gone:
+            answer.set_exception(Unavailable(self._gone))
+        else:
+            if not self._open and not self._uploads:
+                self._next_ping = now + PING_SECONDS
+            self._uploads[self._last_nonce] = _Upload(answer, credited)
+            self._send_message(add_volume=order)
+        return self._last_nonce
+
+    def send_part(self, nonce: int, begin: int, part: memoryview) -> None:
+        if nonce in self._uploads:
+            message = schema.VolumePart(nonce=nonce, begin=begin, bytes=part.nbytes)
+            self._send(schema.Envelope(version=schema.WIRE_VERSION, volume_part=message), part)
+
+    def drop_upload(self, nonce: int) -> None:
+        if self._uploads.pop(nonce, None) is not None:
+            self._send_message(drop_volume=schema.DropVolume(nonce=nonce))
+
     def receive(self, parts: list[Any], now: float) -> None:
         """A message of one or two frames, as bytes or memoryviews."""
         payload = memoryview(parts[1]) if len(parts) > 1 else memoryview(b"")
@@ -120,6 +151,9 @@ class Requests:
             self._replied(message, payload)
         elif kind == "frame_failed":
             self._end(message.request, error_of(message.status.code, message.status.message))
+        elif kind == "volume_credit":
+            if message.nonce in self._uploads:
+                self._uploads[message.nonce].credited(message.allowed)
         elif kind in _ANSWERS:
             self._answered(kind, message, now)
         else:
@@ -129,7 +163,7 @@ class Requests:
 
     def tick(self, now: float) -> float:
         """Pings if it is time, and fails everything if the service is silent. Returns when to call it again."""
-        if not self._open:
+        if not self._open and not self._uploads:
             self._unanswered_since = None
             return math.inf
         if self._unanswered_since is not None and now - self._unanswered_since >= SILENCE_SECONDS:
@@ -150,8 +184,17 @@ class Requests:
             self._questions.clear()
         for request in list(self._open):
             self._end(request, Unavailable(why))
+        self._fail_uploads(why)
         self._pinged.clear()
         self._unanswered_since = None
+
+    def _fail_uploads(self, why: str, unless_epoch: int | None = None) -> None:
+        for nonce, upload in list(self._uploads.items()):
+            if unless_epoch is None or upload.epoch not in (None, unless_epoch):
+                del self._uploads[nonce]
+                upload.answer.set_exception(Unavailable(why))
+            else:
+                upload.epoch = unless_epoch
 
     def close(self) -> None:
         """Cancels what is open."""
@@ -181,7 +224,9 @@ class Requests:
             found.observer.failed(error)
 
     def _answered(self, kind: str, message: Any, now: float) -> None:
-        answer = self._questions.pop(message.nonce, None)
+        upload = self._uploads.pop(message.nonce, None) if kind in ("data_reply", "order_refused") else None
+        answer: concurrent.futures.Future[Any] | None
+        answer = self._questions.pop(message.nonce, None) if upload is None else upload.answer
         if answer is None:
             if kind == "client_pong":
                 self._ponged(message, now)
@@ -204,6 +249,7 @@ class Requests:
         if pong.nonce not in self._pinged:
             return
         asked = self._pinged[pong.nonce]
+        self._fail_uploads(f"the service at {self._endpoint} was started anew, and what was sent of the volume is lost", pong.epoch)
         self._pinged = {nonce: requests for nonce, requests in self._pinged.items() if nonce > pong.nonce}
         known = set(pong.known)
         for request in asked:

@@ -9,7 +9,7 @@ import types
 from typing import Any, Callable, Iterator
 
 from . import schema
-from .address import find_service
+from .address import Address, find_service
 from .connection import ANSWER_SECONDS, CONNECT_SECONDS, Connection
 from .drafts import Draft, draft_of, slice_drafts_of
 from .errors import InvalidArgument
@@ -18,7 +18,10 @@ from .image import Image, side_by_side
 from .options import takes_options_of
 from .probe import Histogram, Sample, histogram_of, sample_of
 from .status import Dataset, Status, dataset_of, status_of
+from .uploads import upload_of
 from .values import integer, number, point
+from .viewer import Viewer
+from .volumes import on_grid, volume_of
 
 DEADLINE_SECONDS = 600.0
 _ORDER_SECONDS = 30.0
@@ -85,6 +88,19 @@ class Service:
             )
         return self._pipelined(turntable_drafts(draft, frames, turns), in_flight, deadline)
 
+    @property
+    def address(self) -> Address:
+        return self._connection.address
+
+    @takes_options_of("render")
+    def show(self, dataset: str, *, width: int | str = "100%", height: int = 640, embed: bool | None = None, keep: Any = None,
+             **options: Any) -> Viewer:
+        """The viewer of a dataset, for a notebook: the value of a cell. It starts a gateway on this machine, which ends with this process. Where
+        the browser does not reach it (JupyterHub), or there is none, a picture with these options is shown; `embed=False` asks for it,
+        `embed=True` for the viewer. `keep` stays as long as the viewer."""
+        draft_of(dataset, options)  # a wrong one is refused here
+        return Viewer(self, dataset, keep, width, height, embed, options)
+
     @takes_options_of("slice")
     def slice(self, dataset: str, *, deadline: float = DEADLINE_SECONDS, **options: Any) -> Image:
         """Planes through a volume, or slabs of it; several are put side by side."""
@@ -128,6 +144,17 @@ class Service:
             if not (path if equals else name).startswith("/"):
                 raise InvalidArgument(f"{text}: the path must be absolute, since it is a path on the coordinator's host")
         return self._order(schema.DATA_ACTION_ADD, texts, timeout)
+
+    def add(self, name: str, volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any = None, world: str | None = None,
+            labels: Any = None, overlay: Any = None) -> Dataset:
+        """Sends an array to the service, wherever it runs, as a dataset that every client sees: add("name", array, spacing=(dz, dy, dx)). It stays
+        until remove_data(), or until the coordinator ends. Arrays as load() takes them, layers on the same grid; dask and zarr arrays are sent
+        chunk by chunk. Needs the role admin where the service has keys."""
+        checked = volume_of(volume, spacing, origin, direction, world)
+        layers = [None if layer is None else on_grid(volume_of(layer), checked.grid) for layer in (labels, overlay)]
+        order, parts = upload_of(name, checked, *layers)
+        reply = self._connection.upload(order, parts)
+        return next(dataset_of(dataset) for dataset in reply.datasets if dataset.name == name)
 
     def remove_data(self, *names: str, timeout: float = _ORDER_SECONDS) -> list[Dataset]:
         """Removes datasets, or watched folders, from the catalogue. Files stay."""

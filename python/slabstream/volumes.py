@@ -204,7 +204,7 @@ def volume_of(volume: Any, spacing: Any = None, origin: Any = None, direction: A
         raise InvalidArgument(f"the array has the shape {shape}, must have 3 axes: z, y, x")
     if not all(1 <= side <= _MOST_SIDE for side in shape):
         raise InvalidArgument(f"the array has the shape {shape}, each side must be in [1, {_MOST_SIDE}]")
-    _file_type(found.samples.dtype)
+    file_type_of(found.samples.dtype)
     return found
 
 
@@ -213,7 +213,7 @@ def on_grid(volume: Volume, grid: Grid | None) -> Volume:
     return dataclasses.replace(volume, grid=grid) if grid is not None and volume.grid == grid_of() else volume
 
 
-def _file_type(dtype: Any) -> str:
+def file_type_of(dtype: Any) -> str:
     """That samples of this type are written as."""
     name = numpy.dtype(dtype).newbyteorder("=").name
     if name == "bool":
@@ -265,10 +265,19 @@ def _converted(slab: Any, file_type: str, rounds: bool) -> Any:
     return converted
 
 
+def slabs_of(volume: Volume, from_the_end: bool = False) -> Iterator[Any]:
+    """Its samples as they are written, slab by slab along z; or from the last one to the first."""
+    file_type = file_type_of(volume.samples.dtype)
+    ends = list(_slab_ends(volume.samples))
+    pairs = list(zip([0, *ends], ends))
+    for begin, end in reversed(pairs) if from_the_end else pairs:
+        yield _converted(numpy.asarray(volume.samples[begin:end]), file_type, volume.rounds)
+
+
 def write_nrrd(volume: Volume, path: str | os.PathLike[str]) -> None:
     """NRRD with raw samples: it keeps type, spacing and orientation, and is written from the front to the back."""
     samples, grid = volume.samples, volume.grid
-    file_type = _file_type(samples.dtype)
+    file_type = file_type_of(samples.dtype)
     depth, height, width = samples.shape
 
     def vector(parts: Vector) -> str:
@@ -284,9 +293,5 @@ def write_nrrd(volume: Volume, path: str | os.PathLike[str]) -> None:
         lines.append("space origin: " + vector(grid.origin))
     with pathlib.Path(path).open("wb") as file:
         file.write(("\n".join(lines) + "\n\n").encode())
-        begin = 0
-        for end in _slab_ends(samples):
-            slab = numpy.asarray(samples[begin:end])
-            converted = numpy.ascontiguousarray(_converted(slab, file_type, volume.rounds))
-            file.write(converted.data if converted.size else b"")
-            begin = end
+        for slab in slabs_of(volume):
+            file.write(numpy.ascontiguousarray(slab).data)

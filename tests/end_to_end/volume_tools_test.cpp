@@ -43,6 +43,24 @@ TEST_F(VolumeToolsTest, InfoTellsWhatSphereMade) {
   }
 }
 
+TEST_F(VolumeToolsTest, ValueTellsWhatLiesAtPoints) {
+  MakeSphere("s.nrrd", 2, 20);
+  const std::vector<std::string> command = {"value", "s.nrrd", "--local=1", "--at", "9.6,9.6,9.6", "--at", "-0.4,0,0", "--at", "99,0,0"};
+  std::vector<std::string> as_json = command;
+  as_json.emplace_back("--json");
+  const json values = json::parse(MustRun(as_json).out);
+  ASSERT_EQ(values.size(), 3U);
+  EXPECT_EQ(values[0]["voxel"], (json{10, 10, 10}));
+  EXPECT_GE(values[0]["value"], 128);
+  EXPECT_EQ(values[1]["value"], 0);
+  EXPECT_EQ(values[2]["inside"], false);
+  EXPECT_TRUE(values[2]["value"].is_null());
+  EXPECT_THAT(MustRun(command).out, HasSubstr("-0.4 0 0  voxel 0 0 0  value 0\n99 0 0  outside the volume\n"));
+  const ProgramResult wrong = Slabstream({"value", "s.nrrd", "--local=1", "--at", "1,2"});
+  EXPECT_EQ(wrong.exit_status, 2);
+  EXPECT_THAT(wrong.err, HasSubstr("--at '1,2'"));
+}
+
 TEST_F(VolumeToolsTest, SpheresAreDeterministicInEveryFormat) {
   MakeSphere("a.nrrd", 1, 33);
   const json reference = Info("a.nrrd");

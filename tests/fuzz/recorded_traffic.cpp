@@ -81,6 +81,18 @@ std::vector<std::vector<std::byte>> RecordedHeaders() {
   client.Await<ClientPong>();
   client.Send(StatusQuery{.nonce = 3});
   client.Await<StatusReply>();
+  client.Send(SummaryQuery{.nonce = 5, .dataset = "ball", .transfer = {}});
+  client.Await<SummaryReply>();
+  client.Send(SampleQuery{.nonce = 6, .dataset = "ball", .points = {{1, 2, 3}}});
+  client.Await<SampleReply>();
+  client.Send(PickQuery{.nonce = 7, .frame = request, .x = 16, .y = 12});
+  client.Await<PickReply>();
+  AddVolume add{.nonce = 8, .name = "sent"};
+  add.description.geometry.size = {2, 2, 2};
+  client.Send(add);
+  client.Await<VolumeCredit>();
+  client.Send(DropVolume{.nonce = 8});
+  client.Await<OrderRefused>();
   client.Send(CancelFrame{.request = 1});
   client.Await<FrameFailed>();
   worker.Send(Leave{welcome.epoch, welcome.worker});

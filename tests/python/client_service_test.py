@@ -269,6 +269,11 @@ class Keys(unittest.TestCase):
             self.assertEqual([dataset.name for dataset in client.datasets()], ["head"])
             with self.assertRaisesRegex(ss.InvalidArgument, "admin"):
                 client.add_data(more=self.folder / "head.nrrd")
+            with self.assertRaisesRegex(ss.InvalidArgument, "adding a volume needs the service file of role admin, not client"):
+                client.add("sent", volume_arrays()[0])
+            admin.add("sent", volume_arrays()[0])
+            self.assertEqual(client.render("sent", size=20).size, (20, 20))
+            admin.remove_data("sent")
             self.assertEqual(len(admin.add_data(more=self.folder / "head.nrrd")), 2)
             admin.remove_data("more")
 

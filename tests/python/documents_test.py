@@ -51,7 +51,7 @@ class Documents(InAFolder):
         self.addCleanup(ss.shutdown)
         code = "\n".join(blocks_of("python.md"))
         printed = "tcp://127.0.0.1:7420"
-        self.assertEqual(code.count(printed), 3)
+        self.assertEqual(code.count(printed), 4)
         names: dict = {}
         said = io.StringIO()
         with contextlib.chdir(self.folder), contextlib.redirect_stdout(said):

@@ -64,7 +64,7 @@ AnyMessage HostileWords::OfClient(const Policy& policy) {
 }
 
 AnyMessage HostileWords::MakeOfClient(const Policy& policy) {
-  switch (random_.Integer(0, 9)) {
+  switch (random_.Integer(0, 12)) {
     case 0:
     case 1: {
       SubmitFrame submit = RandomRequest(random_, policy, Number(), random_.Chance(0.5) ? Number32() : random_.Integer(1U, 86400000U));
@@ -87,6 +87,13 @@ AnyMessage HostileWords::MakeOfClient(const Policy& policy) {
     case 7: return KeysOrder{.nonce = Number(), .key = std::string(40, 'k')};
     case 8:
       return PickQuery{.nonce = Number(), .frame = RandomRequest(random_, policy, Number(), 1).frame, .x = double(random_.Integer(0, 8))};
+    case 9: return VolumePart{.nonce = Number(), .begin = Number(), .bytes = random_.Integer(1U, kMaxVolumePartBytes)};
+    case 10: return DropVolume{Number()};
+    case 11: {
+      AddVolume add{.nonce = Number(), .name = random_.Chance(0.5) ? "sent" : "volume"};
+      add.description.geometry.size = Uniform(random_.Integer(1, kMaxVolumeSide));
+      return add;
+    }
     default: return SampleQuery{.nonce = Number(), .dataset = random_.Chance(0.5) ? "volume" : "nonesuch", .points = {{1, 2, 3}}};
   }
 }

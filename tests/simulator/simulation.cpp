@@ -80,6 +80,7 @@ void Simulation::StartCoordinator() {
   config.stall_timeout = seconds(4);
   epoch_ = config.epoch;
   published_.clear();
+  stored_.clear();
   planner_.emplace();
   witness_.OnRestart();
   service_.StartCoordinator(std::move(config));
@@ -246,6 +247,9 @@ void Simulation::CheckTables() {
   EXPECT_EQ(sizes.orders, 0U);
   EXPECT_EQ(sizes.awaited, 0U);
   EXPECT_EQ(sizes.retired, 0U);
+  EXPECT_EQ(sizes.questions, 0U);
+  EXPECT_EQ(sizes.uploads, 0U);
+  EXPECT_EQ(stored_.size(), 0U) << "memory of a volume whose client has gone";
   EXPECT_EQ(sizes.workers, registered);
   EXPECT_EQ(sizes.slots, registered);
 }
@@ -260,6 +264,9 @@ void Simulation::Perform(ToClient& action) {
   }
   if (const auto* status = std::get_if<StatusReply>(&action.message)) status_ = *status;
   words_.Overhear(action.message, action.payload);
+  if (const auto* credit = std::get_if<VolumeCredit>(&action.message); credit != nullptr && action.to == Admin()) {
+    service_.queue().After(milliseconds(random_.Integer(1, 200)), [this, granted = *credit] { SendParts(granted); });
+  }
   for (std::size_t client = 0; client < clients_.size(); ++client) {
     if (action.to != TokenOfClient(client)) continue;
     const Arrivals arrivals = network_.Send({kCoordinatorEnd, kClientEnds + int(client)}, service_.now());
@@ -325,6 +332,32 @@ void Simulation::Perform(const AnswerQuestion& action) {
   AnyMessage answer = SampleReply{.nonce = nonce};
   if (random_.Chance(current_.fail_load)) answer = OrderRefused{nonce, Status::ResourceExhausted("not enough memory to answer")};
   service_.TellCoordinator(service_.now() + random_.Real(0, 0.1), QuestionAnswered{action.id, std::move(answer)});
+}
+
+void Simulation::Perform(const BeginUpload& action) {
+  EXPECT_TRUE(stored_.emplace(action.upload, Stored{0, action.order.bytes()}).second);
+  UploadBegun begun{action.upload, Status::Ok()};
+  if (random_.Chance(current_.fail_load)) begun.status = Status::ResourceExhausted("not enough memory for a volume");
+  service_.TellCoordinator(service_.now() + random_.Real(0, 0.1), begun);
+}
+
+void Simulation::Perform(const StoreUpload& action) {
+  ASSERT_TRUE(stored_.contains(action.upload));
+  EXPECT_EQ(action.begin, stored_.at(action.upload).bytes) << "bytes are stored in order";
+  stored_.at(action.upload).bytes += action.bytes.size();
+}
+
+void Simulation::Perform(const FinishUpload& action) {
+  const Stored whole = stored_.extract(action.upload).mapped();
+  EXPECT_EQ(whole.bytes, whole.expected) << "a volume is whole when it ends";
+  tally_.Add(Count::kVolumesSent);
+  UploadFinished finished{action.upload, Status::InvalidArgument("a label that there is not")};
+  if (!random_.Chance(current_.fail_load)) {
+    DataSource source("/sent", "");
+    source.held_bytes = 1;
+    finished.source = source;
+  }
+  service_.TellCoordinator(service_.now() + random_.Real(0, 0.1), finished);
 }
 
 void Simulation::Perform(const CountDataset& action) {

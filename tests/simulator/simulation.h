@@ -85,6 +85,9 @@ class Simulation : private Conditions {
   bool IsHostile(Node node) const { return hostile_peers_.contains(node); }
   void ChangeFile();
   void OrderData();
+  void SendVolume();
+  void SendParts(const VolumeCredit& credit);
+  PeerToken Admin() const { return TokenOfClient(clients_.size() + 1); }
   void Heal();
 
   // ---- what must hold
@@ -120,6 +123,10 @@ class Simulation : private Conditions {
   void Perform(const LookAtFolders& action) override;
   void Perform(const FindDatasets& action) override;
   void Perform(const AnswerQuestion& action) override;
+  void Perform(const BeginUpload& action) override;
+  void Perform(const StoreUpload& action) override;
+  void Perform(const DropUpload& action) override { stored_.erase(action.upload); }
+  void Perform(const FinishUpload& action) override;
   void Perform(const CountDataset& action) override;
   void Perform(const PlanRequest& action) override;
   void Perform(const FrameMeasured& action) override { planner_->Learn(action); }
@@ -147,7 +154,15 @@ class Simulation : private Conditions {
   std::size_t requests_planned_ = 0, requests_made_ = 0;
   const CoordinatorEvent* cause_ = nullptr;  // what the coordinator deals with
   std::optional<StatusReply> status_;
-  DatasetId voxels_ = 1;           // that the volume's file holds now
+  DatasetId voxels_ = 1;  // that the volume's file holds now
+  // The volume that the admin sends, and what the executor has stored of volumes.
+  struct Sending {
+    std::uint64_t nonce = 0, sent = 0, bytes = 0;
+  } sending_;
+  struct Stored {
+    std::uint64_t bytes = 0, expected = 0;
+  };
+  std::map<UploadId, Stored> stored_;
   std::set<DatasetId> published_;  // by the slab server
 };
 

@@ -146,12 +146,33 @@ void Simulation::ChangeFile() {
 
 // Nothing that would leave a client without its dataset: "volume" is read anew, but stays.
 void Simulation::OrderData() {
+  if (random_.Chance(0.4)) return SendVolume();
   DataOrder order{.nonce = 1, .action = DataAction(random_.Integer(1, 4))};
   if (order.action == DataAction::kAdd) order.items = {"more"};
-  if (order.action == DataAction::kRemove) order.items = {random_.Chance(0.5) ? "more" : random_.Chance(0.5) ? "other" : "nothing"};
+  if (order.action == DataAction::kRemove)
+    order.items = {random_.Chance(0.5) ? "more" : random_.Chance(0.5) ? "other" : random_.Chance(0.5) ? "sent" : "nothing"};
   if (order.action == DataAction::kReload) order.items = {"volume"};
   tally_.Add(Count::kDataOrders);
-  service_.StepCoordinator(FromClient{TokenOfClient(clients_.size() + 1), order});
+  service_.StepCoordinator(FromClient{Admin(), order});
+}
+
+// Another one may be on its way: it ends that.
+void Simulation::SendVolume() {
+  AddVolume order{.nonce = sending_.nonce + 1, .name = random_.Chance(0.9) ? "sent" : "volume"};
+  order.description.geometry.size = {512, 512, random_.Integer(1, 60)};
+  sending_ = {.nonce = order.nonce, .sent = 0, .bytes = order.bytes()};
+  service_.StepCoordinator(FromClient{Admin(), order});
+}
+
+// As far as the credit goes; sometimes too far, sometimes it stops for good.
+void Simulation::SendParts(const VolumeCredit& credit) {
+  if (credit.nonce != sending_.nonce || random_.Chance(0.05)) return;
+  while (sending_.sent < credit.allowed) {
+    const auto bytes = std::uint32_t(std::min<std::uint64_t>(kMaxVolumePartBytes, credit.allowed - sending_.sent));
+    const VolumePart part{.nonce = sending_.nonce, .begin = random_.Chance(0.01) ? 7 : sending_.sent, .bytes = bytes};
+    sending_.sent += bytes;
+    service_.StepCoordinator(FromClient{Admin(), part, Bytes(std::vector<std::byte>(bytes))});
+  }
 }
 
 // ---------------------------------------------------------------- the network

@@ -420,7 +420,7 @@ std::vector<SummaryReply> SamplesOf() {
 
 template <>
 std::vector<SampleQuery> SamplesOf() {
-  return {{.dataset = "a", .points = {{}}}, {kMax64, kLongName, std::vector<Vec3>(kMaxSamplePoints, {1e300, -1, 0})}};
+  return {{.dataset = "a", .points = {{}}}, {kMax64, kLongName, std::vector<Vec3>(50, {1e300, -1, 0})}};
 }
 
 template <>
@@ -439,6 +439,31 @@ std::vector<PickQuery> SamplesOf() {
 template <>
 std::vector<PickReply> SamplesOf() {
   return {{}, {kMax64, VolumeSample{.at = {1, 2, 3}, .inside = true, .voxel = {1, 2, 3}, .value = 4}, -1e300}};
+}
+
+template <>
+std::vector<AddVolume> SamplesOf() {
+  return {{.name = "a", .description = Description(), .layers = {}, .labels = {}},
+          {kMax64,
+           kLongName,
+           Description(),
+           {ScalarType::kUint16, ScalarType::kFloat32},
+           {{1, "", {}}, {kMaxLabelValue, std::string(kMaxLabelNameBytes, 'n'), std::array<float, 3>{0, 0.5F, 1}}}}};
+}
+
+template <>
+std::vector<VolumeCredit> SamplesOf() {
+  return {{}, {kMax64, kMax64 - 1, kMax64}};
+}
+
+template <>
+std::vector<VolumePart> SamplesOf() {
+  return {{}, {kMax64, kMax64, kMaxVolumePartBytes}};
+}
+
+template <>
+std::vector<DropVolume> SamplesOf() {
+  return {{}, {kMax64}};
 }
 
 template <std::size_t... I>

@@ -1,0 +1,41 @@
+#include "client/cli/value.h"
+
+#include <fmt/format.h>
+
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "client/cli/session.h"
+#include "client/report/volume_text.h"
+#include "client/request/values.h"
+
+namespace slabstream {
+
+Status RunValue(const ValueOptions& options) {
+  if (options.points.size() > kMaxSamplePoints) {
+    return Status::InvalidArgument(fmt::format("--at is given {} times, at most {} are taken", options.points.size(), kMaxSamplePoints));
+  }
+  std::vector<Vec3> points;
+  for (const std::string& text : options.points) {
+    const Result<Vec3> point = ParsePoint("--at", text);
+    if (!point.ok()) return point.status();
+    points.push_back(*point);
+  }
+  Result<Session> session = Session::Open(options.connection, options.source, options.layers);
+  if (!session.ok()) return session.status();
+  const Result<std::vector<VolumeSample>> samples = session->client().SampleAt(session->dataset(), std::move(points));
+  if (!samples.ok()) return samples.status();
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const VolumeSample& sample : *samples) {
+    if (options.json) {
+      json.push_back(SampleJson(sample));
+    } else {
+      std::cout << SampleText(sample) << "\n";
+    }
+  }
+  if (options.json) std::cout << json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << "\n";
+  return Status::Ok();
+}
+
+}  // namespace slabstream

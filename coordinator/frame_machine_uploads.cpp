@@ -1,0 +1,122 @@
+#include <algorithm>
+#include <utility>
+
+#include "common/volume/memory_budget.h"
+#include "coordinator/dataset_name.h"
+#include "coordinator/frame_machine_state.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::size_t kMaxUploads = 4;                           // at a time
+constexpr std::uint64_t kUploadWindow = std::uint64_t{8} << 20;  // bytes that may be under way
+
+}  // namespace
+
+void FrameMachine::State::OnClientMessage(PeerToken client, const AddVolume& message) {
+  clients.Meet(client, now);  // its silence is noticed from now on
+  const auto earlier = std::ranges::find_if(uploads, [client](const auto& each) { return each.second.client == client; });
+  if (earlier != uploads.end()) EndUpload(earlier, Status::Cancelled("the client sends another volume"));
+  if (const Status admitted = AdmitUpload(message); !admitted.ok()) {
+    return SendClient(client, OrderRefused{.nonce = message.nonce, .status = Bounded(admitted)});
+  }
+  uploads.emplace(++last_upload, OpenUpload{.client = client, .order = message});
+  actions.emplace_back(BeginUpload{last_upload, message});
+}
+
+Status FrameMachine::State::AdmitUpload(const AddVolume& order) {
+  if (Status name = CheckDatasetName(order.name); !name.ok()) return name;
+  const DatasetTable::Entry* const entry = datasets.Find(order.name);
+  if (entry != nullptr && entry->awaited == 0) {
+    return Status::InvalidArgument(fmt::format("there is already a dataset named \"{}\"; remove it first", order.name));
+  }
+  if (std::ranges::any_of(uploads, [&](const auto& each) { return each.second.order.name == order.name; })) {
+    return Status::InvalidArgument(fmt::format("a dataset named \"{}\" is on its way from another client", order.name));
+  }
+  if (uploads.size() >= kMaxUploads) {
+    return Status::ResourceExhausted(fmt::format("{} volumes are on their way, which is the limit of the service", uploads.size()));
+  }
+  if (datasets.size() + uploads.size() >= config.max_datasets) {
+    return Status::ResourceExhausted(fmt::format("the catalogue has {} datasets, which is its limit", datasets.size()));
+  }
+  const std::uint64_t share = DatasetShare(config.memory_bytes), bytes = order.bytes();
+  while (datasets.bytes() + UploadBytes() + bytes > share && UnloadOne()) {
+  }
+  if (datasets.bytes() + UploadBytes() + bytes <= share) return Status::Ok();
+  ++refused.too_large;
+  return Status::ResourceExhausted(
+      fmt::format("dataset \"{}\" needs {}, limit {} ({} are in use by other datasets); the coordinator's "
+                  "--memory sets the limit",
+                  order.name, MemoryText(bytes), MemoryText(share), MemoryText(datasets.bytes() + UploadBytes())));
+}
+
+std::uint64_t FrameMachine::State::UploadBytes() const {
+  std::uint64_t total = 0;
+  for (const auto& [id, upload] : uploads) total += upload.order.bytes();
+  return total;
+}
+
+void FrameMachine::State::On(const UploadBegun& event) {
+  const Upload upload = uploads.find(event.upload);
+  if (upload == uploads.end()) return;  // its client has gone
+  if (!event.status.ok()) return EndUpload(upload, event.status);
+  GrantCredit(upload->second);
+}
+
+void FrameMachine::State::GrantCredit(OpenUpload& upload) {
+  upload.allowed = std::min(upload.received + kUploadWindow, upload.order.bytes());
+  SendClient(upload.client, VolumeCredit{.nonce = upload.order.nonce, .received = upload.received, .allowed = upload.allowed});
+}
+
+FrameMachine::State::Upload FrameMachine::State::UploadOf(PeerToken client, std::uint64_t nonce) {
+  return std::ranges::find_if(uploads, [&](const auto& each) { return each.second.client == client && each.second.order.nonce == nonce; });
+}
+
+void FrameMachine::State::OnVolumePart(PeerToken client, const VolumePart& part, const Bytes& payload) {
+  const Upload found = UploadOf(client, part.nonce);
+  if (found == uploads.end()) return;  // it was refused meanwhile
+  OpenUpload& upload = found->second;
+  if (part.begin != upload.received || part.bytes > upload.allowed - upload.received || payload.size() != part.bytes) {
+    return EndUpload(found,
+                     Status::InvalidArgument(fmt::format("VolumePart: {} bytes from {} on, expected those from {} on, at most up to {}",
+                                                         part.bytes, part.begin, upload.received, upload.allowed)));
+  }
+  actions.emplace_back(StoreUpload{found->first, part.begin, payload});
+  upload.received += part.bytes;
+  if (upload.received == upload.order.bytes()) {
+    actions.emplace_back(FinishUpload{found->first});
+  } else if (upload.allowed < upload.order.bytes() && upload.allowed - upload.received <= kUploadWindow / 2) {
+    GrantCredit(upload);
+  }
+}
+
+void FrameMachine::State::On(const UploadFinished& event) {
+  const auto upload = uploads.extract(event.upload);
+  if (upload.empty()) return;
+  const AddVolume& order = upload.mapped().order;
+  Status status = event.source.status();
+  // A file of that name may have come into a watched folder.
+  const DatasetTable::Entry* const entry = datasets.Find(order.name);
+  if (status.ok() && entry != nullptr && entry->awaited == 0) {
+    status = Status::InvalidArgument(fmt::format("there is already a dataset named \"{}\"; remove it first", order.name));
+  }
+  if (!status.ok()) return SendClient(upload.mapped().client, OrderRefused{.nonce = order.nonce, .status = Bounded(status)});
+  AddData(order.name, *event.source);
+  SendClient(upload.mapped().client, DataReply{.nonce = order.nonce, .datasets = datasets.Report(now)});
+}
+
+void FrameMachine::State::OnClientMessage(PeerToken client, const DropVolume& message) {
+  const Upload upload = UploadOf(client, message.nonce);
+  if (upload != uploads.end()) EndUpload(upload, Status::Cancelled("the client gave the volume up"));
+}
+
+void FrameMachine::State::EndUpload(Upload upload, const Status& why) {
+  const OpenUpload& open = upload->second;
+  Tell(NoteAbout::kDatasets, LogLevel::kInfo, "dataset \"{}\" of client {} did not arrive: {}", open.order.name, open.client,
+       why.message());
+  SendClient(open.client, OrderRefused{.nonce = open.order.nonce, .status = Bounded(why)});
+  actions.emplace_back(DropUpload{upload->first});
+  uploads.erase(upload);
+}
+
+}  // namespace slabstream

@@ -1,0 +1,82 @@
+"""docs/notebook.ipynb runs from top to bottom, and show() embeds a viewer that works. Exit status 77: skipped, since nbconvert is missing."""
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import unittest
+import unittest.mock
+import urllib.request
+
+import numpy as np
+
+from client_support import PROGRAMS, ROOT, InAFolder, WithAService, read_png
+
+try:
+    import ipykernel  # noqa: F401
+    import matplotlib  # noqa: F401
+    import nbconvert  # noqa: F401
+except ImportError as missing:
+    print(f"skipped: {missing.name} is not installed (jupyter-nbconvert, python3-ipykernel, python3-matplotlib)")
+    sys.exit(77)
+
+import slabstream as ss  # noqa: E402
+
+
+class Notebook(InAFolder):
+    def test_the_notebook_runs(self) -> None:
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("JUPYTER") and name != "MPLBACKEND"}
+        environment |= {"PYTHONPATH": str(ROOT / "python"), "SLABSTREAM_PROGRAMS": str(PROGRAMS), "HOME": str(self.folder),
+                        "IPYTHONDIR": str(self.folder)}
+        done = subprocess.run(
+            [sys.executable, "-m", "nbconvert", "--to", "notebook", "--execute", "--ExecutePreprocessor.timeout=600", "--output-dir", str(self.folder),
+             "--output", "done.ipynb", str(ROOT / "docs" / "notebook.ipynb")],
+            env=environment, capture_output=True, text=True, timeout=900,
+        )
+        self.assertEqual(done.returncode, 0, done.stderr[-4000:])
+        cells = json.loads((self.folder / "done.ipynb").read_text())["cells"]
+        kinds = [kind for cell in cells for output in cell.get("outputs", []) for kind in output.get("data", {})]
+        self.assertGreaterEqual(kinds.count("image/png"), 3, "the picture and two plots")
+        self.assertIn("text/html", kinds)  # the viewer
+        source = json.loads((ROOT / "docs" / "notebook.ipynb").read_text())
+        self.assertEqual([cell["outputs"] for cell in source["cells"] if cell["cell_type"] == "code" and cell["outputs"]], [], "without outputs")
+
+
+class Shows(WithAService):
+    def setUp(self) -> None:
+        self.service = ss.connect(endpoint=self.running.endpoint)
+        self.addCleanup(self.service.close)
+
+    def test_the_viewer_serves_its_page_and_the_dataset(self) -> None:
+        with unittest.mock.patch.dict(os.environ, {"JUPYTERHUB_SERVICE_PREFIX": ""}):
+            viewer = self.service.show("head", width=500, height=300)
+        bundle = viewer._repr_mimebundle_()
+        self.assertRegex(bundle["text/html"], r'<iframe src="http://127.0.0.1:\d+/#token=[^"&]+&amp;dataset=head" style="width: 500px; height: 300px')
+        origin, token = re.match(r"(http://[^/]+/)#token=([^&]+)", viewer.url).groups()
+        with urllib.request.urlopen(origin) as page:
+            self.assertIn("frame-ancestors 'self' http://localhost:*", page.headers["Content-Security-Policy"])
+        picture = f"{origin}api/v1/render.png?token={token}&dataset=head&size=30"
+        with urllib.request.urlopen(picture) as answer:
+            np.testing.assert_array_equal(read_png(answer.read()), np.asarray(self.service.render("head", size=30)))
+        self.assertEqual(self.service.show("head").url, viewer.url, "one gateway for a service")
+
+    def test_where_the_browser_cannot_reach_it_there_is_a_picture(self) -> None:
+        with unittest.mock.patch.dict(os.environ, {"JUPYTERHUB_SERVICE_PREFIX": "/user/a/"}):
+            viewer = self.service.show("head", size=40, azimuth=30)
+        self.assertIsNone(viewer.url)
+        self.assertEqual(viewer._repr_mimebundle_()["image/png"], self.service.render("head", size=40, azimuth=30).png())
+        with self.assertRaisesRegex(ss.InvalidArgument, "zoom"):
+            self.service.show("head", zoom=0)
+
+    def test_arrays_are_shown_and_stay(self) -> None:
+        viewer = ss.show(np.full((8, 9, 10), 3, np.uint8), service=self.service, embed=False)
+        self.assertEqual(len(self.service.datasets()), 2)
+        self.assertIn("image/png", viewer._repr_mimebundle_())
+        del viewer
+        self.assertEqual(len(self.service.datasets()), 1)
+
+
+if __name__ == "__main__":
+    unittest.main()
