@@ -48,7 +48,7 @@ export function slider(label: string, low: number, high: number, step: number, t
 
 export function numberField(label: string, change: (value: number) => void, step = "any"): Control<number> & { input: HTMLInputElement } {
   const input: HTMLInputElement = h("input", { type: "number", step, "aria-label": label, inputmode: "decimal", onchange: () => { if (Number.isFinite(input.valueAsNumber)) change(rounded(input.valueAsNumber)); } });
-  return { element: input, input, set: value => { if (document.activeElement !== input || input.valueAsNumber !== value) input.value = String(rounded(value)); } };
+  return { element: input, input, set: value => { if (document.activeElement !== input || input.valueAsNumber !== value) input.value = String(rounded(value, 5)); } };
 }
 
 export function textField(label: string, hint: string, pattern: string, change: (value: string) => void): Control<string> {

@@ -19,10 +19,10 @@ export class FunctionSource {
     return range ? [range[0], range[1]] : rangeOf(this.unstretched());
   }
 
-  // Whether current() is what the picture shows, or a ramp in its place.
-  get known(): boolean {
+  // Whether current() is a ramp in the place of a preset, since the gateway does not tell its points.
+  get untold(): boolean {
     const { map, preset } = this.context.store.state;
-    return map !== null || this.presets.get(this.key(preset)) instanceof Object;
+    return map === null && this.presets.get(this.key(preset)) === null;
   }
 
   private unstretched(): ColorMap {

@@ -8,6 +8,9 @@ function isForPictures(target: EventTarget | null): boolean {
 }
 
 export function listenToKeys(groups: readonly KeyGroup[], undo: () => void, redo: () => void): void {
+  // The picture has the focus from the start; its ring shows once keys are used.
+  document.addEventListener("keydown", () => { document.body.dataset["keys"] = "used"; }, true);
+  document.addEventListener("pointerdown", () => { delete document.body.dataset["keys"]; }, true);
   document.addEventListener("keydown", event => {
     const field = event.target instanceof HTMLElement && event.target.matches("input[type=text], input[type=number], textarea");
     if ((event.ctrlKey || event.metaKey) && !field && /^[zy]$/i.test(event.key)) {

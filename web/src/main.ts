@@ -34,7 +34,6 @@ class Page {
   private readonly pointed: Pointed;
   private readonly viewer: Viewer;
   private readonly slices: Slices;
-  private readonly keys: readonly KeyGroup[];
   private volume: Volume | null = null;
   private asking = ""; // the dataset that is being asked about
   private readonly volumeListeners: ((volume: Volume | null) => void)[] = [];
@@ -51,14 +50,13 @@ class Page {
     const editor = new TransferEditor(context, source);
     this.shell.panel.append(section("Transfer function", true, editor.element), renderingSection(context), surfacesSection(context), clipSection(context), labels.element, lightSection(context), this.facts());
     this.viewer = new Viewer(context, source, this.pointed, {
-      drawn: ({ frame: { header } }) => { notices.onFrame(); this.machine.onFrame(header.statistics); this.know(header.geometry.world); },
+      drawn: ({ frame: { header } }) => { notices.onFrame(); this.machine.onFrame(header.statistics); this.know(); },
       status: status => this.onStatus(status), progress: progress => notices.onProgress(progress), error: message => notices.onError(message),
       connection: (state, reason) => { notices.onConnection(state, reason); if (state === "lost") void this.checkToken(); },
     });
     this.shell.panes.append(this.viewer.pane.element);
     this.slices = new Slices(context, this.shell.panes, at => this.pointed.atPoint(at));
-    this.keys = this.keyGroups();
-    listenToKeys(this.keys, () => store.undo(), () => store.redo());
+    listenToKeys(this.keyGroups(), () => store.undo(), () => store.redo());
     store.subscribe((state, before) => {
       if (state.dataset !== before.dataset) this.forgetVolume();
       this.show();
@@ -92,6 +90,7 @@ class Page {
     const { dataset } = this.store.state, first = status.datasets[0];
     if (!dataset && first) this.store.update({ dataset: first.name });
     this.shell.showDatasets(status.datasets, this.store.state.dataset);
+    this.know();
   }
 
   private forgetVolume(): void {
@@ -99,15 +98,16 @@ class Page {
     for (const listener of this.volumeListeners) listener(null);
   }
 
-  // Once a picture of the dataset is there, the gateway can tell of it.
-  private know(world: string): void {
+  // Once a picture of the dataset is there, the gateway can tell of it; what it tells may be a second old, so it is asked again then.
+  private know(): void {
     const { dataset } = this.store.state;
     if (this.volume?.name === dataset || this.asking === dataset || this.viewer.pane.shown?.frame.view.options["dataset"] !== dataset) return;
     this.asking = dataset;
-    Promise.all([this.api.datasets(), centreOf(this.api.token, dataset)]).then(([list, { centre, unit }]) => {
+    Promise.all([this.api.datasets(), centreOf(this.api.token, dataset)]).then(([list, { centre, world, unit }]) => {
       const entry = list.find((each: Dataset) => each.name === dataset);
       if (!entry || this.store.state.dataset !== dataset) return;
       this.volume = volumeOf(entry, centre, world, unit);
+      if (!this.volume) return;
       for (const listener of this.volumeListeners) listener(this.volume);
       this.show();
     }).catch((error: unknown) => this.notices.say(error instanceof Error ? error.message : String(error), "error")).finally(() => { this.asking = ""; });
@@ -160,7 +160,7 @@ class Page {
       dataset: name => store.update({ ...INITIAL, dataset: name, layout: store.state.layout, machine: store.state.machine }),
       view: index => this.view(index), sides: () => this.sides().map(side => side.name), reset: () => this.reset(),
       layout: quad => store.update({ layout: quad ? "quad" : "single" }), machine: () => store.update({ machine: !store.state.machine }),
-      panel: () => this.shell.setPanel(!this.shell.panelOpen), theme: switchTheme, help: () => helpDialog(this.keys),
+      panel: () => this.shell.setPanel(!this.shell.panelOpen), theme: switchTheme, help: () => helpDialog(this.keyGroups()),
       projection: () => store.update({ projection: store.state.projection === "orthographic" ? "perspective" : "orthographic" }),
       copyLink: withToken => this.copyLink(withToken), command: () => void commandDialog(store.state, this.api, ...this.pictureSize(), (message, kind) => this.notices.say(message, kind)),
       screenshot: () => screenshotDialog(store.state, this.api, ...this.pictureSize()),

@@ -24,6 +24,7 @@ export class Pane {
   private readonly session: Session;
   private readonly watcher: ResizeObserver;
   private size: [number, number] = [0, 0]; // pixels of the screen
+  private exact: [number, number] | null = null; // the same as the browser rounds it, where it tells
 
   constructor(name: string, label: string, token: string, private readonly events: PaneEvents) {
     this.canvas.setAttribute("tabindex", "0");
@@ -31,7 +32,12 @@ export class Pane {
     this.canvas.setAttribute("aria-label", label);
     this.element = h("section", { class: `pane pane-${name}`, "data-pane": name, "aria-label": name }, this.canvas, this.drawing);
     this.session = new Session(token, { ...events, frame: frame => this.draw(frame) });
-    this.watcher = new ResizeObserver(entries => this.measure(entries[entries.length - 1] as ResizeObserverEntry));
+    this.watcher = new ResizeObserver(entries => {
+      const exact = entries[entries.length - 1]?.devicePixelContentBoxSize?.[0];
+      this.exact = exact ? [exact.inlineSize, exact.blockSize] : null;
+      this.measure();
+    });
+    addEventListener("resize", this.measure); // also when the window moves to a screen with other pixels
     try { this.watcher.observe(this.element, { box: "device-pixel-content-box" }); } catch { this.watcher.observe(this.element); }
   }
 
@@ -45,17 +51,19 @@ export class Pane {
 
   end(): void {
     this.watcher.disconnect();
+    removeEventListener("resize", this.measure);
     this.session.end();
     this.element.remove();
   }
 
-  private measure(entry: ResizeObserverEntry): void {
-    const exact = entry.devicePixelContentBoxSize?.[0];
-    const width = exact ? exact.inlineSize : Math.round(entry.contentRect.width * devicePixelRatio);
-    const height = exact ? exact.blockSize : Math.round(entry.contentRect.height * devicePixelRatio);
-    this.size = [Math.min(width, MOST_SIDE), Math.min(height, MOST_SIDE)];
+  private readonly measure = (): void => {
+    const sides = [this.element.clientWidth * devicePixelRatio, this.element.clientHeight * devicePixelRatio].map((side, i) => {
+      const exact = this.exact?.[i];
+      return Math.min(exact !== undefined && Math.abs(exact - side) < 2 ? exact : Math.round(side), MOST_SIDE);
+    });
+    this.size = sides as [number, number];
     if (this.isVisible) this.events.resized?.();
-  }
+  };
 
   // The canvas keeps its picture until another is there: resizing a canvas clears it.
   private draw(frame: Frame): void {

@@ -53,7 +53,7 @@ export interface State {
 
 export const INITIAL: State = {
   dataset: "",
-  azimuth: 150, elevation: 15, roll: 0, zoom: 1, lookAt: null, projection: "orthographic",
+  azimuth: 150, elevation: 15, roll: 0, zoom: 1.15, lookAt: null, projection: "orthographic",
   renderer: "splat", samplingRate: 1, projectionMode: "maximum", shading: "phong", lights: [], background: "#0d1014",
   preset: "auto", map: null, range: null, opacityDistance: 1, surfaces: [], surfacesAlone: true,
   clipBox: null, clipPlanes: [], clipMode: "keep",

@@ -98,7 +98,7 @@ export class TransferEditor {
     this.ticks.replaceChildren(...([[scale.domain[0], "start"], [scale.domain[1], "end"]] as const).map(([value, anchor]) =>
       svg("text", { x: scale.x(value), y: stripY + PLOT.strip + 20, "text-anchor": anchor }, shown(value))));
     this.drawPoints(map, scale, stripY);
-    this.note.textContent = this.source.known || !this.context.volume() ? "" : "This gateway does not tell the points of a preset. Editing begins with a ramp.";
+    this.note.textContent = this.source.untold ? "This gateway does not tell the points of a preset. Editing begins with a ramp." : "";
     this.note.hidden = this.note.textContent === "";
     const [low, high] = this.source.range();
     this.low.set(low);
