@@ -413,7 +413,7 @@ class PageTest(unittest.TestCase):
             self.assertTrue(ring, f"no ring: {name}")
             press(Keys.TAB)
         self.assertEqual(reached[0], "Skip to the picture")
-        for name in ("Views", "Help", "Settings", "Undo", "Save as a file"):
+        for name in ("Views", "Help", "Settings", "Save as a file", "Layers"):
             self.assertIn(name, reached)
 
     def test_names_roles_and_contrasts(self):

@@ -28,7 +28,7 @@ export function helpDialog(groups: readonly KeyGroup[]): void {
 }
 
 export function tokenDialog(reason: string, use: (token: string) => void): void {
-  const input = h("input", { type: "text", id: "token", autocomplete: "off", spellcheck: "false", required: true });
+  const input = h("input", { type: "text", id: "token", placeholder: " ", autocomplete: "off", spellcheck: "false", required: true });
   const form = h("form", { method: "dialog", onsubmit: () => use(/token=([^&\s]+)/.exec(input.value)?.[1] ?? input.value.trim()) },
     h("p", {}, reason), h("label", { for: "token" }, "Token, or the whole address that slabstream view printed"), input,
     h("div", { class: "dialog-actions" }, h("button", { type: "submit", class: "button primary" }, "Open")));

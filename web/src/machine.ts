@@ -25,8 +25,8 @@ export class Machine {
 
   constructor(close: () => void) {
     this.element = h("section", { class: "machine", "aria-label": "Machine", hidden: true },
-      h("header", {}, h("h2", {}, "Machine"), this.spark, this.news, h("ul", { class: "legend", "aria-label": "Colours of the timeline" }, ...KINDS.map(([kind, name]) => h("li", { class: kind }, name)), h("li", { class: "idle" }, "Idle")), iconButton("Close the machine panel", "close", close, "M")),
-      this.figures, this.lanes, this.axis);
+      h("header", {}, h("h2", {}, "Machine"), this.spark, h("span", { class: "space" }), h("ul", { class: "legend", "aria-label": "Colours of the timeline" }, ...KINDS.map(([kind, name]) => h("li", { class: kind }, name)), h("li", { class: "idle" }, "Idle")), iconButton("Close the machine panel", "close", close, "M")),
+      this.news, this.figures, this.lanes, this.axis);
   }
 
   setOpen(open: boolean): void {

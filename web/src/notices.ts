@@ -62,7 +62,8 @@ export class Notices {
   private problem(): string {
     if (this.connection === "lost") return `${this.everOpen ? "The gateway does not answer any more." : "The gateway does not answer."}${this.reason ? ` It said: ${this.reason}.` : ""} Trying again.`;
     if (this.connection === "open" && this.service && this.service.service !== "ready") {
-      return `${this.service.service === "gone" ? "The rendering service is gone." : "The service has no worker."} ${this.service.reason ? `${this.service.reason}. ` : ""}The picture stays; it goes on when the service is back.`;
+      const { service, reason } = this.service;
+      return `${service === "gone" ? "The rendering service is gone" : "The service has no worker"}${reason ? `: ${reason}` : ""}. The picture stays; it moves again when the service is back.`;
     }
     return this.error;
   }

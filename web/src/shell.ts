@@ -29,12 +29,12 @@ export class Shell {
         menu(views, "Views", () => [...actions.sides().map((name, i) => menuItem(name, String(i + 1), () => actions.view(i))), h("hr"), menuItem("Reset the view", "R", actions.reset), menuItem("Parallel or perspective", "O", actions.projection)]),
         iconButton("Reset the view", "reset", actions.reset, "R")),
       h("div", { class: "group", role: "group", "aria-label": "Layout" }, ...this.layoutButtons, this.machineButton),
-      h("span", { class: "space" }), status,
+      h("span", { class: "space" }), readout, status,
       h("div", { class: "group", role: "group", "aria-label": "Page" },
         menu(share, "Share", () => [menuItem("Copy link", "C", () => actions.copyLink(false)), menuItem("Copy link with access", "", () => actions.copyLink(true)), menuItem("Command and movie…", "K", actions.command), menuItem("Save picture…", "S", actions.screenshot)]),
         iconButton("Light or dark", "theme", actions.theme), iconButton("Help", "help", actions.help, "?"), this.panelButton));
     this.datasets.element.classList.add("dataset");
-    this.stage.append(h("div", { class: "canvas-area" }, progress, this.panes, banner, messages, readout), machine);
+    this.stage.append(h("div", { class: "canvas-area" }, progress, this.panes, banner, messages), machine);
     document.body.replaceChildren(h("a", { class: "skip", href: "#", onclick: (event: Event) => { event.preventDefault(); this.panes.querySelector("canvas")?.focus(); } }, "Skip to the picture"), header, this.stage, this.panel);
   }
 
