@@ -18,6 +18,7 @@ export class Viewer {
   private readonly handles: ClipHandles;
   private inputAt: number | undefined;
   private frameAsked = 0;
+  private changed = false; // since the last view was sent
 
   constructor(private readonly context: Context, private readonly source: FunctionSource, private readonly pointed: Pointed, events: PaneEvents) {
     this.pane = new Pane("3d", "Volume. Arrow keys turn it, plus and minus zoom, question mark shows all keys.", context.api.token, {
@@ -71,10 +72,16 @@ export class Viewer {
     this.context.say(`Window ${rounded(width, 3)}, level ${rounded(middle, 3)}`);
   }
 
-  // At most one view a frame of the screen; the latest wins.
+  // At once, but at most one view a frame of the screen; the latest wins.
   private later(): void {
-    if (this.frameAsked) return;
-    this.frameAsked = requestAnimationFrame(() => { this.frameAsked = 0; this.send(); });
+    if (this.frameAsked) { this.changed = true; return; }
+    this.send();
+    this.frameAsked = requestAnimationFrame(() => {
+      this.frameAsked = 0;
+      if (!this.changed) return;
+      this.changed = false;
+      this.later();
+    });
   }
 
   private send(): void {
