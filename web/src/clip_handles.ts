@@ -31,6 +31,7 @@ export class ClipHandles {
   readonly element = svg("svg", { class: "tools" });
   private readonly edges = svg("path", { class: "clip-edges" });
   private readonly handles: SVGCircleElement[] = [];
+  private last: readonly [number, number] = [0, 0]; // of the pointer that drags
   private shown: Shown | null = null;
   private box: ClipBox | null = null;
   private volume: Volume | null = null;
@@ -39,8 +40,12 @@ export class ClipHandles {
     this.element.append(this.edges);
     for (const axis of AXES) for (const end of [0, 1] as const) {
       const handle = svg("circle", { r: 7, class: `handle axis-${AXIS_NAMES[axis]}`, tabindex: 0, role: "slider", "aria-label": `Clip ${AXIS_NAMES[axis]} ${end === 0 ? "from" : "to"}` });
-      handle.addEventListener("pointerdown", event => { handle.setPointerCapture(event.pointerId); event.preventDefault(); });
-      handle.addEventListener("pointermove", event => { if (handle.hasPointerCapture(event.pointerId)) this.drag(axis, end, event.movementX, event.movementY); });
+      handle.addEventListener("pointerdown", event => { handle.setPointerCapture(event.pointerId); this.last = [event.clientX, event.clientY]; event.preventDefault(); });
+      handle.addEventListener("pointermove", event => {
+        if (!handle.hasPointerCapture(event.pointerId)) return;
+        this.drag(axis, end, event.clientX - this.last[0], event.clientY - this.last[1]);
+        this.last = [event.clientX, event.clientY];
+      });
       handle.addEventListener("keydown", event => this.press(axis, end, event));
       this.handles.push(handle);
       this.element.append(handle);

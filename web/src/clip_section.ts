@@ -4,7 +4,7 @@ import { axesOf } from "./camera";
 import type { Context } from "./context";
 import { button, iconButton, numberField, row, section, segmented, toggle } from "./controls";
 import { h } from "./dom";
-import type { ClipPlane } from "./state";
+import { type ClipPlane, LOOK } from "./state";
 import { AXES, AXIS_NAMES, dot, rounded } from "./vec";
 import { unitName } from "./volume";
 
@@ -60,7 +60,7 @@ export function clipSection(context: Context): HTMLElement {
     modeRow.hidden = clipBox === null && clipPlanes.length === 0;
     addPlane.disabled = clipPlanes.length >= MOST_PLANES;
   };
-  store.subscribe(update);
+  store.subscribe(update, LOOK);
   context.onVolume(update);
   update();
   return section("Clipping", false, on.element, grid, h("div", { class: "button-row" }, resetBox, unit), planeHead, planes, planeHint, addPlane, modeRow);

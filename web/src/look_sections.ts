@@ -5,7 +5,7 @@ import type { Context } from "./context";
 import { button, choice, colorField, iconButton, numberField, row, section, segmented, slider, textField, toggle } from "./controls";
 import { h, shown } from "./dom";
 import { can } from "./options";
-import type { Surface } from "./state";
+import { LOOK, type Surface } from "./state";
 import { PRESETS } from "./transfer_editor";
 import { add, normalized, rounded, scale, type Vec3 } from "./vec";
 
@@ -32,7 +32,7 @@ export function renderingSection({ store }: Context): HTMLElement {
     sampling.element.hidden = !can("sampling", state.renderer);
     shadingRow.hidden = !can("lit", state.renderer);
   };
-  store.subscribe(update);
+  store.subscribe(update, [...LOOK, "projection"]);
   update();
   return section("Rendering", true, renderer.element, mode.element, sampling.element, shadingRow, row("Projection", projection.element), row("Background", background.element));
 }
@@ -87,7 +87,7 @@ export function surfacesSection(context: Context): HTMLElement {
     hint.hidden = surfaces.length === 0 || can("surfaces", renderer);
     addButton.disabled = surfaces.length >= MOST_SURFACES;
   };
-  store.subscribe(update);
+  store.subscribe(update, LOOK);
   update();
   return section("Isosurfaces", false, head, list.element, hint, alone.element, addButton);
 }
@@ -125,7 +125,7 @@ export function lightSection(context: Context): HTMLElement {
     hint.hidden = lights.length > 0;
     for (const child of adders.children) (child as HTMLButtonElement).disabled = lights.length >= MOST_LIGHTS;
   };
-  store.subscribe(update);
+  store.subscribe(update, LOOK);
   update();
   return section("Light", false, hint, head, list.element, adders);
 }
@@ -168,7 +168,7 @@ export class LabelsSection {
       overlayPreset.element.hidden = weight.element.hidden = !volume?.overlay || !state.overlay;
       this.refresh();
     };
-    store.subscribe(update);
+    store.subscribe(update, LOOK);
     context.onVolume(volume => {
       this.names = [];
       this.list.replaceChildren();

@@ -15,6 +15,7 @@ import { Notices } from "./notices";
 import { Pointed } from "./pointed";
 import { applyTheme, Shell, switchTheme } from "./shell";
 import { Slices } from "./slices";
+import { slicesSection } from "./slices_section";
 import { INITIAL, Store } from "./state";
 import { TransferEditor } from "./transfer_editor";
 import { Viewer } from "./viewer";
@@ -48,7 +49,7 @@ class Page {
     this.pointed = new Pointed(context, label => labels.note(label));
     this.shell = new Shell(this.actions(), notices.status, notices.banner, notices.progress, notices.messages, this.pointed.element, this.machine.element);
     const editor = new TransferEditor(context, source);
-    this.shell.panel.append(section("Transfer function", true, editor.element), renderingSection(context), surfacesSection(context), clipSection(context), labels.element, lightSection(context), this.facts());
+    this.shell.panel.append(section("Transfer function", true, editor.element), slicesSection(context), renderingSection(context), surfacesSection(context), clipSection(context), labels.element, lightSection(context), this.facts());
     this.viewer = new Viewer(context, source, this.pointed, {
       drawn: ({ frame: { header } }) => { notices.onFrame(); this.machine.onFrame(header.statistics); this.know(); },
       status: status => this.onStatus(status), progress: progress => notices.onProgress(progress), error: message => notices.onError(message),

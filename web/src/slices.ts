@@ -82,7 +82,9 @@ export class Slices {
     const place = (event: PointerEvent): void => {
       if (pane.shown) store.update({ crosshair: this.pointAt(pane.shown, event.offsetX, event.offsetY) });
     };
+    let last: readonly [number, number] = [0, 0];
     canvas.addEventListener("pointerdown", event => {
+      last = [event.clientX, event.clientY];
       canvas.focus({ preventScroll: true });
       canvas.setPointerCapture(event.pointerId);
       if (event.button === 0) place(event);
@@ -90,7 +92,8 @@ export class Slices {
     });
     canvas.addEventListener("pointermove", event => {
       if (event.buttons === 1) place(event);
-      else if (event.buttons === 2) this.window(event.movementX / canvas.clientWidth, -event.movementY / canvas.clientHeight);
+      else if (event.buttons === 2) this.window((event.clientX - last[0]) / canvas.clientWidth, (last[1] - event.clientY) / canvas.clientHeight);
+      last = [event.clientX, event.clientY];
       if (pane.shown) this.hover(this.pointAt(pane.shown, event.offsetX, event.offsetY));
     });
     canvas.addEventListener("pointerleave", () => this.hover(null));

@@ -64,7 +64,7 @@ export const INITIAL: State = {
 };
 
 // What undo brings back: the look, not the place from which one looks.
-const UNDONE = ["renderer", "samplingRate", "projectionMode", "shading", "lights", "background", "preset", "map", "range", "opacityDistance",
+export const LOOK = ["renderer", "samplingRate", "projectionMode", "shading", "lights", "background", "preset", "map", "range", "opacityDistance",
   "surfaces", "surfacesAlone", "clipBox", "clipPlanes", "clipMode", "labels", "labelTint", "labelsShown", "labelOpacities", "overlay",
   "overlayPreset", "overlayRange", "overlayWeight", "window", "level"] as const;
 const UNDO_STEPS = 200;
@@ -85,7 +85,10 @@ export class Store {
   get canUndo(): boolean { return this.past.length > 0; }
   get canRedo(): boolean { return this.future.length > 0; }
 
-  subscribe(listener: Listener): void { this.listeners.add(listener); }
+  // With `keys`: only of changes of these. What follows the look need not follow the view, which changes with each move of the hand.
+  subscribe(listener: Listener, keys?: readonly (keyof State)[]): void {
+    this.listeners.add(keys ? (state, before) => { if (keys.some(key => state[key] !== before[key])) listener(state, before); } : listener);
+  }
 
   // `gesture` names what the user does, for undo. Changes of one gesture that follow each other are one step.
   update(patch: Partial<State>, gesture = ""): void {
@@ -106,7 +109,7 @@ export class Store {
     if (!look) return;
     to.push(this.current);
     this.gesture = { name: "", at: -Infinity };
-    this.replace({ ...this.current, ...Object.fromEntries(UNDONE.map(key => [key, look[key]])) });
+    this.replace({ ...this.current, ...Object.fromEntries(LOOK.map(key => [key, look[key]])) });
   }
 
   private replace(next: State): void {

@@ -5,6 +5,7 @@ import { button, choice, colorField, iconButton, numberField, slider } from "./c
 import { copyText, download, h, shown, svg } from "./dom";
 import type { FunctionSource } from "./function_source";
 import { curvePath, gradientStops, histogramPath, PLOT, Scale } from "./plot";
+import { LOOK } from "./state";
 import { type ColorMap, colorAt, hexOf, opacityAt, parseParaView, rangeOf, rgbOf, toParaView } from "./transfer";
 import { clamp, rounded } from "./vec";
 
@@ -67,7 +68,7 @@ export class TransferEditor {
       this.refresh();
       if (volume) context.api.histogram(volume.name).then(histogram => { this.histogram = histogram; this.refresh(); }).catch(() => undefined);
     });
-    context.store.subscribe(() => this.refresh());
+    context.store.subscribe(() => this.refresh(), LOOK);
   }
 
   async open(file: File): Promise<void> {
