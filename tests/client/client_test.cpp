@@ -264,6 +264,7 @@ TEST_F(ClientTest, WakeupEndsNextAlsoWithAMessage) {
   std::atomic<Client*> notified = nullptr;
   FakeService service(context_, "inproc://client-test", [&](const AnyMessage& message) -> std::vector<Answer> {
     if (const auto* ping = std::get_if<ClientPing>(&message)) return {{PongTo(*ping), {}}};
+    if (const auto* cancel = std::get_if<CancelFrame>(&message)) return {{FrameFailed{cancel->request, Status::Cancelled("as asked")}, {}}};
     const auto* submit = std::get_if<SubmitFrame>(&message);
     if (submit == nullptr) return {};
     notified.load()->wakeup().Notify();
@@ -275,6 +276,7 @@ TEST_F(ClientTest, WakeupEndsNextAlsoWithAMessage) {
     const RequestId request = client.Submit(SmallRequest());
     EXPECT_FALSE(client.Next(std::chrono::hours(1)).has_value());
     client.Cancel(request);
+    EXPECT_TRUE(client.Next(std::chrono::hours(1)).has_value());
   }
 }
 

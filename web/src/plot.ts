@@ -15,9 +15,18 @@ export class Scale {
   opacity(y: number): number { return rounded(clamp((PLOT.height - PLOT.bottom - y) / (PLOT.height - PLOT.top - PLOT.bottom), 0, 1), 3); }
 }
 
+// Fewer whole numbers than bins leave bins empty between them, like the teeth of a comb: these get the counts of their left neighbours.
+function withoutGaps({ counts, range: [low, high] }: Histogram): number[] {
+  const longest = Math.ceil(counts.length / Math.max(high - low, 1)) - 1;
+  return counts.map((count, i) => {
+    for (let back = 1; count === 0 && back <= longest && i >= back; back++) count = counts[i - back] as number;
+    return count;
+  });
+}
+
 // Logarithms of the counts, as an area.
 export function histogramPath(histogram: Histogram, scale: Scale): string {
-  const { counts, range: [low, high] } = histogram;
+  const counts = withoutGaps(histogram), [low, high] = histogram.range;
   const most = Math.log1p(counts.reduce((a, b) => Math.max(a, b), 1)), step = (high - low) / counts.length, base = scale.y(0);
   const points = counts.map((count, i) => {
     const y = scale.y((0.96 * Math.log1p(count)) / most).toFixed(1);

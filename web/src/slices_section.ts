@@ -13,6 +13,7 @@ export function slicesSection(context: Context): HTMLElement {
   const range = (): readonly [number, number] => context.volume()?.range ?? [0, 1];
   const window = numberField("Window of the slices", value => { if (value > 0) store.update({ window: value, level: store.state.level ?? (range()[0] + range()[1]) / 2 }, "slice window"); });
   const level = numberField("Level of the slices", value => store.update({ level: value, window: store.state.window ?? Math.max(range()[1] - range()[0], 1e-6) }, "slice level"));
+  window.input.placeholder = level.input.placeholder = "auto";
   const field = (name: string, input: HTMLElement): HTMLElement => h("label", {}, h("span", {}, name), input);
   const element = section("Slices", true, h("div", { class: "fields thirds" }, ...at.map((each, axis) => field(AXIS_NAMES[axis] as string, each.input))),
     h("div", { class: "fields" }, field("Window", window.input), field("Level", level.input), button("Automatic", null, () => store.update({ window: null, level: null }, "automatic"), "quiet")));
