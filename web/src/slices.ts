@@ -15,7 +15,9 @@ interface Slice { pane: Pane; plane: string }
 export class Slices {
   private slices: Slice[] = [];
 
-  constructor(private readonly context: Context, private readonly stage: HTMLElement, private readonly hover: (at: Vec3 | null) => void) {}
+  constructor(private readonly context: Context, private readonly stage: HTMLElement, private readonly hover: (at: Vec3 | null) => void) {
+    context.store.subscribe(() => this.slices.forEach(slice => this.annotate(slice)), ["crosshair", "scaleBar"]);
+  }
 
   // Makes, shows or ends the panes, as the state says.
   update(inputAt?: number): void {
@@ -26,10 +28,7 @@ export class Slices {
       this.end();
       this.slices = planes.map(([plane, name]) => this.make(plane, name));
     }
-    for (const slice of this.slices) {
-      this.show(slice, inputAt);
-      this.annotate(slice);
-    }
+    for (const slice of this.slices) this.show(slice, inputAt);
   }
 
   at(): Vec3 { return this.context.store.state.crosshair ?? this.context.volume()?.centre ?? [0, 0, 0]; }

@@ -27,10 +27,8 @@ export class Viewer {
     this.handles = new ClipHandles(clipBox => this.change({ clipBox }, "handle"));
     this.pane.element.append(this.handles.element);
     context.onVolume(() => { if (this.pane.shown) this.resolveFit(this.pane.shown); this.annotate(); });
-    context.store.subscribe((state, before) => {
-      this.annotate();
-      if (state.dataset !== before.dataset) this.send(); else this.later();
-    });
+    context.store.subscribe(() => this.later());
+    context.store.subscribe(() => this.annotate(), ["marker", "scaleBar", "layout", "crosshair", "clipBox"]); // else with the next picture
     listenToGestures(this.pane.canvas, {
       state: () => context.store.state,
       pixelSize: () => this.pixelSize(),
