@@ -172,8 +172,10 @@ bool Client::Impl::Pump(Time limit) {
   if (received) return false;  // a message may be what the caller waits for
   const std::array<Socket*, 1> sockets = {&socket};
   now = MonotonicNow();
-  Wait(sockets, &wakeup, std::max<Duration>(limit - now, Duration::zero()));
-  return !Receive() && MonotonicNow() < limit;
+  const bool notified = Wait(sockets, &wakeup, std::max<Duration>(limit - now, Duration::zero()));
+  // A message may come together with a notification, which is told all the same: nobody notifies twice. Without both it was a signal.
+  const bool came = Receive();
+  return notified || (!came && MonotonicNow() < limit);
 }
 
 bool Client::Impl::Receive() {

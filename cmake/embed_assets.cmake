@@ -1,4 +1,4 @@
-# Writes OUTPUT, which defines Assets() (gateway/assets.h) with the files of FOLDER: index.html as it is, all others below assets/.
+# Writes OUTPUT, which defines Assets() (gateway/assets.h) with the files of FOLDER: by their paths in it.
 # Run at build time: cmake -DFOLDER=... -DOUTPUT=... -P
 cmake_minimum_required(VERSION 3.25)
 set(types

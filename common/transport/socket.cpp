@@ -373,7 +373,7 @@ std::optional<Incoming> Socket::TryReceive() {
   return std::nullopt;
 }
 
-void Wait(std::span<Socket* const> sockets, Wakeup* wakeup, Duration timeout) {
+bool Wait(std::span<Socket* const> sockets, Wakeup* wakeup, Duration timeout) {
   std::vector<zmq::pollitem_t> items;
   items.reserve(sockets.size() + 1);
   for (Socket* socket : sockets) items.push_back({socket->impl().socket.handle(), 0, ZMQ_POLLIN, 0});
@@ -385,7 +385,7 @@ void Wait(std::span<Socket* const> sockets, Wakeup* wakeup, Duration timeout) {
   } catch (const zmq::error_t& error) {
     CHECK_EQ(error.num(), EINTR);  // a signal: the caller looks round
   }
-  if (wakeup != nullptr) wakeup->Drain();
+  return wakeup != nullptr && wakeup->Drain();
 }
 
 }  // namespace slabstream

@@ -106,13 +106,14 @@ class Wakeup {
   Wakeup& operator=(const Wakeup&) = delete;
   void Notify();
   int file_descriptor() const { return file_descriptor_; }
-  void Drain();
+  bool Drain();  // true: it was notified
 
  private:
   int file_descriptor_ = -1;  // an eventfd
 };
 
 // Returns when a socket may have a message, the wakeup was notified, a signal was handled, or the timeout is over (zero: at once).
-void Wait(std::span<Socket* const> sockets, Wakeup* wakeup, Duration timeout);
+// True: the wakeup was notified, whatever else there is.
+bool Wait(std::span<Socket* const> sockets, Wakeup* wakeup, Duration timeout);
 
 }  // namespace slabstream

@@ -22,9 +22,9 @@ void Wakeup::Notify() {
   if (::write(file_descriptor_, &one, sizeof(one)) < 0) errno = saved;
 }
 
-void Wakeup::Drain() {
+bool Wakeup::Drain() {
   std::uint64_t count = 0;
-  if (::read(file_descriptor_, &count, sizeof(count)) < 0) return;  // EAGAIN: nobody had notified
+  return ::read(file_descriptor_, &count, sizeof(count)) > 0;  // EAGAIN: nobody had notified
 }
 
 }  // namespace slabstream

@@ -259,6 +259,27 @@ TEST_F(ClientTest, WakeupEndsNext) {
   EXPECT_FALSE(client.Next(std::chrono::hours(1)).has_value());
 }
 
+// A message that brings no event must not swallow the notification that comes with it.
+TEST_F(ClientTest, WakeupEndsNextAlsoWithAMessage) {
+  std::atomic<Client*> notified = nullptr;
+  FakeService service(context_, "inproc://client-test", [&](const AnyMessage& message) -> std::vector<Answer> {
+    if (const auto* ping = std::get_if<ClientPing>(&message)) return {{PongTo(*ping), {}}};
+    if (const auto* cancel = std::get_if<CancelFrame>(&message)) return {{FrameFailed{cancel->request, Status::Cancelled("as asked")}, {}}};
+    const auto* submit = std::get_if<SubmitFrame>(&message);
+    if (submit == nullptr) return {};
+    notified.load()->wakeup().Notify();
+    return {{FrameProgress{.request = submit->request + 1000}, {}}};  // of a request that nobody made
+  });
+  Client client = Client::Connect(context_, service.endpoint()).value();
+  notified = &client;
+  for (int round = 0; round < 300; ++round) {
+    const RequestId request = client.Submit(SmallRequest());
+    EXPECT_FALSE(client.Next(std::chrono::hours(1)).has_value());
+    client.Cancel(request);
+    EXPECT_TRUE(client.Next(std::chrono::hours(1)).has_value());
+  }
+}
+
 // Replies whose payload or whose header fields do not fit: the request ends in an error, or in a picture if the damage did no harm; nothing
 // else.
 TEST_F(ClientTest, DamagedRepliesNeverCrash) {

@@ -1,0 +1,552 @@
+#!/usr/bin/env python3
+"""The viewer's page in Chromium: the real programs, real events. Screenshots of the states go to a folder of the build.
+
+    page_test.py FOLDER_OF_PROGRAMS FOLDER_FOR_SCREENSHOTS CHROMIUM CHROMEDRIVER [unittest arguments]
+"""
+import json
+import os
+import signal
+import sys
+import unittest
+import urllib.parse
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "gateway"))
+from gateway_test import Programs, wait_until  # noqa: E402
+from page import png_pixels  # noqa: E402
+
+import browser  # noqa: E402
+from browser import Viewer  # noqa: E402
+from proxy import Proxy  # noqa: E402
+from selenium.webdriver.common.by import By  # noqa: E402
+from selenium.webdriver.common.keys import Keys  # noqa: E402
+
+SHOTS, CHROMIUM, CHROMEDRIVER = Path(sys.argv[2]), sys.argv[3], sys.argv[4]
+
+
+def write_nrrd(path, size, value, space="right-anterior-superior", spacing=2.0):
+    x, y, z = size
+    data = bytes(value(i, j, k) for k in range(z) for j in range(y) for i in range(x))
+    header = (f"NRRD0004\ntype: uint8\ndimension: 3\nspace: {space}\nsizes: {x} {y} {z}\nspace directions: ({spacing},0,0) (0,{spacing},0) (0,0,{spacing})\n"
+              "kinds: domain domain domain\nspace origin: (-20,-24,-16)\nencoding: raw\n\n")
+    path.write_bytes(header.encode() + data)
+
+
+SIZE = (22, 26, 18)
+
+
+def ball(i, j, k):
+    """Brighter to the right, so that no two sides look alike."""
+    r = ((i - 10.5) / 10) ** 2 + ((j - 12.5) / 12) ** 2 + ((k - 8.5) / 8) ** 2
+    return 60 + 8 * i if r < 1 else 0
+
+
+class PageTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.programs = Programs()
+        cls.addClassCleanup(cls.programs.close)
+        write_nrrd(cls.programs.folder / "p.nrrd", SIZE, ball)
+        write_nrrd(cls.programs.folder / "l.nrrd", SIZE, lambda i, j, k: 0 if ball(i, j, k) == 0 else 1 + i // 8)
+        cls.programs.run("sphere", "--class", 1, "--size", 24, "--occupancy", 0.2, "-o", "s.nrrd")
+        cls.data = ("--data", "patient=p.nrrd,labels=l.nrrd", "--data", "sphere=s.nrrd")
+        cls.service, cls.endpoint = cls.programs.up(*cls.data)
+        cls.process, cls.gateway = cls.programs.gateway("--endpoint", cls.endpoint)
+        wait_until(lambda: cls.gateway.request("/readyz")[0] == 200, "ready")
+        cls.driver = browser.start(CHROMIUM, CHROMEDRIVER)
+        cls.addClassCleanup(cls.driver.quit)
+
+    def url(self, port=None, token=True, **fields):
+        parts = ([f"token={self.gateway.token}"] if token else []) + [f"{name.replace('_', '-')}={urllib.parse.quote(str(value), safe=',:;')}" for name, value in {"dataset": "patient", **fields}.items()]
+        return f"http://127.0.0.1:{port or self.gateway.port}/#{'&'.join(parts)}"
+
+    def viewer(self, port=None, width=1000, height=640, pixels=1, mobile=False, theme="dark", token=True, **fields):
+        viewer = Viewer(self.driver, self.url(port, token, **fields), width, height, pixels, mobile, theme)
+        self.addCleanup(viewer.close)
+        return viewer
+
+    def proxy(self, delay=0.0, answers=None):
+        proxy = Proxy(self.gateway.host, self.gateway.port, delay, answers)
+        self.addCleanup(proxy.close)
+        return proxy
+
+    def command_line(self, drawn, kind="render"):
+        """The pixels of the same picture by the command line."""
+        arguments = []
+        for name, values in drawn["options"].items():
+            for value in values if isinstance(values, list) and not (values and isinstance(values[0], dict)) else [values]:
+                if name == "dataset":
+                    continue
+                if isinstance(value, list):
+                    value = json.dumps(value)
+                arguments.append(f"--{name}" if value is True else f"--{name}={value}")
+        self.programs.run(kind, drawn["options"]["dataset"], "--endpoint", self.endpoint, "-o", "cli.png", *arguments)
+        return png_pixels((self.programs.folder / "cli.png").read_bytes())
+
+    def assertSamePixels(self, one, other):
+        self.assertEqual(one[:2], other[:2])
+        different = sum(a != b for a, b in zip(one[2], other[2]))
+        self.assertEqual(different, 0, f"{different} of {len(one[2])} bytes differ")
+
+    # ---- the picture
+
+    def test_the_still_picture_is_that_of_the_command_line(self):
+        viewer = self.viewer(renderer="raycast", clip_box=":,:0,:", light="1,-1,1", azimuth=200)
+        drawn = viewer.settled()
+        self.assertEqual(drawn["header"]["type"], "image/png")
+        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        viewer.save(SHOTS, "picture")
+        canvas = viewer.js("(c => [c.width, c.height, c.clientWidth, c.clientHeight])(document.querySelector('canvas'))")
+        self.assertEqual(canvas[:2], canvas[2:], "a pixel of the picture is one of the screen")
+
+    def test_pictures_have_the_pixels_of_the_screen(self):
+        viewer = self.viewer(width=700, height=500, pixels=2)
+        viewer.final("h.size[0] === Math.round(2 * document.querySelector('canvas').clientWidth) && h.size[1] === Math.round(2 * document.querySelector('canvas').clientHeight)")
+
+    def test_dragging_turns_moves_rolls_and_zooms(self):
+        viewer = self.viewer()
+        before = viewer.settled()["options"]
+        viewer.drag(50, 25, steps=8)
+        turned = viewer.final(f"o.azimuth !== {before['azimuth']}")
+        self.assertAlmostEqual(turned["options"]["azimuth"], before["azimuth"] - 20, places=3)
+        self.assertAlmostEqual(turned["options"]["elevation"], before["elevation"] + 10, places=3)
+        self.assertTrue(viewer.js("window.drawn.some(d => !d.final && d.header.type === 'image/jpeg')"), "it was seen while it moved")
+        self.assertSamePixels(viewer.pixels(), self.command_line(turned))
+
+        viewer.drag(40, -30, keys=["shift"])
+        moved = viewer.final(f"o['look-at'] !== '{turned['options']['look-at']}'")
+        was, now = turned["header"]["geometry"], moved["header"]["geometry"]
+        for i in range(3):  # what was in the middle is 40 pixels to the right and 30 upwards
+            self.assertAlmostEqual(now["target"][i], was["target"][i] - was["pixel_size"] * (40 * was["right"][i] + 30 * was["up"][i]), delta=1e-3)
+
+        viewer.wheel(-200, (100, 60))
+        zoomed = viewer.final(f"o.zoom > {moved['options']['zoom']}")
+        was, now = moved["header"]["geometry"], zoomed["header"]["geometry"]
+        for i in range(3):  # the point below the pointer stays there
+            point = [g["target"][i] + g["pixel_size"] * (100 * g["right"][i] - 60 * g["up"][i]) for g in (was, now)]
+            self.assertAlmostEqual(point[0], point[1], delta=1e-3)
+
+        viewer.drag(0, 60, start=(120, 0), keys=["ctrl"])
+        rolled = viewer.final("o.roll !== 0")
+        self.assertAlmostEqual(rolled["options"]["roll"], 26.565, places=2)
+
+        viewer.keys("r")
+        back = viewer.final(f"o.azimuth === {before['azimuth']} && o.roll === 0 && o['look-at']")
+        self.assertAlmostEqual(back["options"]["zoom"], before["zoom"], places=4)
+
+    def test_the_right_button_changes_window_and_level(self):
+        viewer = self.viewer(scalar_range="50:150")
+        viewer.settled()
+        viewer.drag(100, 0, button="right")
+        low, high = map(float, viewer.final("o['scalar-range'] !== '50:150'")["options"]["scalar-range"].split(":"))
+        self.assertGreater(high - low, 100)
+        self.assertAlmostEqual((low + high) / 2, 100, delta=0.01)
+        viewer.drag(0, -50, button="right")
+        level = sum(map(float, viewer.final(f"o['scalar-range'] !== '{low:g}:{high:g}'")["options"]["scalar-range"].split(":"))) / 2
+        self.assertLess(level, 100)
+        viewer.keys(Keys.CONTROL, "z")
+        viewer.final("o['scalar-range'] === '50:150' || o['scalar-range'].split(':').map(Number).reduce((a, b) => a + b) / 2 === 100")
+
+    def test_fingers_turn_move_zoom_and_roll(self):
+        viewer = self.viewer(width=360, height=640, mobile=True)
+        before = viewer.settled()["options"]
+        viewer.touch(((0, 0), (40, 0)))
+        turned = viewer.final(f"o.azimuth !== {before['azimuth']}")["options"]
+        self.assertAlmostEqual(turned["azimuth"], before["azimuth"] - 16, places=2)
+        self.assertEqual(turned["zoom"], before["zoom"])
+        viewer.touch(((-40, 0), (-80, 0)), ((40, 0), (80, 0)))
+        zoomed = viewer.final(f"o.zoom > {1.5 * before['zoom']}")["options"]
+        self.assertAlmostEqual(zoomed["zoom"], 2 * before["zoom"], delta=0.05 * before["zoom"])
+        self.assertAlmostEqual(zoomed["azimuth"], turned["azimuth"], places=3)
+        viewer.touch(((-60, 0), (0, -60)), ((60, 0), (0, 60)), steps=16)
+        self.assertAlmostEqual(viewer.final("Math.abs(o.roll) > 60")["options"]["roll"], 90, delta=3)
+        viewer.save(SHOTS, "narrow")
+
+    # ---- the link
+
+    def test_a_link_opens_the_same_picture(self):
+        viewer = self.viewer(renderer="raycast")
+        viewer.settled()
+        viewer.drag(33, -21)
+        viewer.drag(30, 0, button="right")
+        viewer.keys("b", "l")
+        drawn = viewer.final("o['clip-box'] !== undefined && h.size[0] < 400")
+        viewer.until("location.hash.includes('layout=quad')")
+        self.assertNotIn(self.gateway.token, viewer.js("location.href"), "the address holds no token")
+        viewer.keys("c")
+        plain = viewer.until("window.copied[0]")
+        self.assertNotIn(self.gateway.token, plain)
+        viewer.find(".share").click()
+        viewer.driver.find_element(By.XPATH, "//button[@role='menuitem'][contains(., 'with access')]").click()
+        link = viewer.until("window.copied[1]")
+        self.assertIn(self.gateway.token, link)
+        shown = viewer.pixels()
+
+        other = Viewer(self.driver, link)
+        self.addCleanup(other.close)
+        same = other.final("o['clip-box'] !== undefined && h.size[0] < 400")
+        self.assertEqual(same["options"], drawn["options"])
+        self.assertSamePixels(other.pixels(), shown)
+        other.driver.refresh()
+        other.final("o['clip-box'] !== undefined")  # the token is kept for this tab
+
+    def test_without_a_token_the_page_asks_for_it(self):
+        viewer = self.viewer(token=False)
+        field = viewer.driver.find_element(By.CSS_SELECTOR, "dialog input")
+        viewer.save(SHOTS, "token")
+        field.send_keys(self.url())
+        viewer.find("dialog .primary").click()
+        viewer.settled()
+        wrong = self.viewer(token=False, zoom=2)
+        wrong.driver.execute_script("sessionStorage.clear()")
+        wrong.driver.get(wrong.js("location.href.replace('#', '#token=wrong&')"))
+        wrong.driver.refresh()
+        wrong.until("document.querySelector('dialog') !== null")
+
+    def test_a_wrong_link_shows_what_is_right_in_it(self):
+        viewer = self.viewer(azimuth="x", renderer="nothing", zoom=-3, clip_box="1", function="||", elevation=40)
+        viewer.until("document.querySelector('.banner:not([hidden])')?.textContent.includes('nothing')")
+        viewer.driver.find_element(By.XPATH, "//option[. = 'Ray casting']").click()
+        drawn = viewer.settled()
+        self.assertEqual((drawn["options"]["elevation"], drawn["options"]["azimuth"]), (40, 150))
+        self.assertFalse(viewer.js("document.querySelector('.banner:not([hidden])') !== null"))
+
+    # ---- the look
+
+    def test_editing_the_function_changes_the_picture(self):
+        asked = []
+        ramp = [{"Name": "auto", "RGBPoints": [0, 0, 0, 0, 250, 1, 0.5, 0.2], "Points": [0, 0, 0.5, 0, 100, 0.2, 0.5, 0, 250, 0.8, 0.5, 0]}]
+        answers = {"/api/v1/transfer": lambda fields, body: asked.append(fields) or ramp,
+                   "/api/v1/histogram": lambda fields, body: {"dataset": "patient", "range": [0, 250], "counts": [2 ** (i % 12) for i in range(256)], "percentiles": {}}}
+        viewer = self.viewer(self.proxy(answers=answers).port, transfer="opaque")
+        drawn = viewer.settled()
+        viewer.until("document.querySelectorAll('.plot .point.opacity').length === 3 && document.querySelector('.histogram').getAttribute('d') !== ''")
+        self.assertEqual(asked[0], {"dataset": "patient", "transfer": "opaque"})
+        before = viewer.pixels()
+        viewer.js("document.querySelectorAll('.plot .point.opacity')[1].focus()")
+        viewer.driver.switch_to.active_element.send_keys(Keys.ARROW_UP * 5, Keys.ARROW_RIGHT)
+        edited = viewer.final("Array.isArray(o.transfer) && Math.abs(o.transfer[0].Points[5] - 0.25) < 1e-6")
+        self.assertGreater(edited["options"]["transfer"][0]["Points"][4], 100)
+        self.assertNotEqual(viewer.pixels(), before)
+        self.assertSamePixels(viewer.pixels(), self.command_line(edited))
+        viewer.save(SHOTS, "function")
+
+        # A click adds a point and a drag moves it; Delete takes it away.
+        x, y = viewer.js("(b => [b.left + b.width * 0.7, b.top + 60])(document.querySelector('.plot').getBoundingClientRect())")
+        for kind, dy in (("mousePressed", 0), ("mouseMoved", 30), ("mouseReleased", 30)):
+            viewer.command("Input.dispatchMouseEvent", type=kind, x=x, y=y + dy, button="left", buttons=1, clickCount=1)
+        viewer.final("o.transfer[0].Points.length === 16")
+        viewer.js("document.querySelector('.plot .point.selected').focus()")
+        viewer.driver.switch_to.active_element.send_keys(Keys.DELETE)
+        viewer.final("o.transfer[0].Points.length === 12")
+        # Undo goes back to the preset, redo forth.
+        for _ in range(6):
+            viewer.keys(Keys.CONTROL, "z")
+        viewer.final("o.transfer === 'opaque'")
+        self.assertSamePixels(viewer.pixels(), before)
+        viewer.keys(Keys.CONTROL, "y")
+        viewer.final("Array.isArray(o.transfer)")
+
+        # What is copied is what --transfer takes.
+        viewer.find("[aria-label='Copy as --transfer takes it']").click()
+        copied = json.loads(viewer.until("window.copied[0]"))
+        (self.programs.folder / "copied.json").write_text(json.dumps(copied))
+        now = viewer.final("Array.isArray(o.transfer)")
+        now["options"]["transfer"] = "copied.json"
+        self.assertSamePixels(viewer.pixels(), self.command_line(now))
+
+    def test_a_colour_map_may_be_dropped(self):
+        viewer = self.viewer()
+        viewer.settled()
+        drop = "(() => { const d = new DataTransfer(); d.items.add(new File([arguments[0]], 'map.json')); document.querySelector('canvas').dispatchEvent(new DragEvent('drop', {bubbles: true, cancelable: true, dataTransfer: d})); return true; })()"
+        viewer.js(drop, json.dumps([{"Name": "mine", "RGBPoints": [0, 0, 0, 1, 200, 1, 1, 0]}]))
+        drawn = viewer.final("Array.isArray(o.transfer) && o.transfer[0].Name === 'mine'")
+        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        for text, why in (("{", "map.json"), ('{"a": 1}', "no RGBPoints"), ('[{"RGBPoints": [2,0,0,0,1,1,1,1]}]', "ascend"), ('[{"RGBPoints": [2,0,0]}]', "groups of four")):
+            viewer.js(drop, text)
+            viewer.until("document.querySelector('.message.error')?.textContent.includes(arguments[0])", why)
+
+    def test_without_newer_addresses_of_the_gateway_editing_begins_with_a_ramp(self):
+        missing = {"/api/v1/" + name: lambda fields, body: None for name in ("transfer", "histogram", "pick", "value")}
+        viewer = self.viewer(self.proxy(answers=missing).port)
+        viewer.settled()
+        if viewer.js("document.querySelector('.editor .hint').hidden"):
+            self.skipTest("this gateway has them")
+        viewer.js("document.querySelectorAll('.plot .point.opacity')[1].focus()")
+        viewer.driver.switch_to.active_element.send_keys(Keys.ARROW_DOWN)
+        viewer.final("Array.isArray(o.transfer)")
+
+    def test_clip_box_handles_fields_and_planes(self):
+        viewer = self.viewer()
+        viewer.settled()
+        viewer.until("document.querySelector('.facts dd') !== null")
+        viewer.keys("b")
+        viewer.final("o['clip-box'] === ':,:,:'")
+        whole = viewer.pixels()
+        viewer.js("document.querySelector('.handle[aria-label=\"Clip x to\"]').focus()")
+        viewer.driver.switch_to.active_element.send_keys(Keys.ARROW_LEFT * 6)
+        drawn = viewer.final("/^:1[0-9.]*,:,:$/.test(o['clip-box'])")
+        self.assertEqual(drawn["options"]["clip-box"], ":11,:,:")  # the side is at 23, a voxel has 2
+        self.assertNotEqual(viewer.pixels(), whole)
+        x, y = viewer.js("(b => [b.left + b.width / 2, b.top + b.height / 2])(document.querySelector('.handle[aria-label=\"Clip z to\"]').getBoundingClientRect())")
+        for kind, dy in (("mousePressed", 0), ("mouseMoved", 40), ("mouseMoved", 80), ("mouseReleased", 80)):
+            viewer.command("Input.dispatchMouseEvent", type=kind, x=x, y=y + dy, button="left", buttons=1, clickCount=1)
+        drawn = viewer.final("/^:11,:,:-?[0-9.]+$/.test(o['clip-box'])")
+        at = viewer.js("(b => [b.left + b.width / 2, b.top + b.height / 2])(document.querySelector('.handle[aria-label=\"Clip z to\"]').getBoundingClientRect())")
+        self.assertAlmostEqual(at[1], y + 80, delta=3, msg="the handle stays below the pointer")
+        viewer.open_section("Clipping")
+        field = viewer.find("input[aria-label='y from']")
+        field.clear()
+        field.send_keys("-4", Keys.ENTER)
+        viewer.final("/^:11,-4:,/.test(o['clip-box'])")
+        viewer.driver.find_element(By.XPATH, "//button[contains(., 'Cut here')]").click()
+        drawn = viewer.final("o['clip-plane'] !== undefined")
+        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        viewer.save(SHOTS, "clip")
+
+    def test_labels_surfaces_lights_and_renderers(self):
+        names = {"/api/v1/labels": lambda fields, body: {"labels": [{"value": 1, "name": "left"}, {"value": 2, "name": "middle", "color": "#40c080"}, {"value": 3, "name": "right"}]}}
+        viewer = self.viewer(self.proxy(answers=names).port)
+        viewer.settled()
+        viewer.until("document.querySelector('.facts dd') !== null")
+        viewer.open_section("Layers")
+        viewer.driver.find_element(By.XPATH, "//input[@value = 'tint']").click()
+        viewer.final("o.renderer === 'raycast' && o['label-mode'] === 'tint'")
+        tinted = viewer.pixels()
+        viewer.find("[data-label='2'] input[type=checkbox]").click()
+        drawn = viewer.final("o['label-opacity'] === '2=0'")
+        self.assertNotEqual(viewer.pixels(), tinted)
+        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        viewer.find("[data-label='3'] .only").click()
+        viewer.final("o['labels-shown'] === '3'")
+        viewer.save(SHOTS, "labels")
+        viewer.open_section("Isosurfaces")
+        viewer.driver.find_element(By.XPATH, "//button[contains(., 'Add a surface')]").click()
+        drawn = viewer.final("o.isovalue !== undefined && o.transfer === undefined")
+        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        viewer.open_section("Light")
+        viewer.driver.find_element(By.XPATH, "//div[@class='button-row']/button[. = 'Left']").click()
+        viewer.final("o.light && o.light.length === 1")
+        for renderer in ("mip", "zbuffer", "splat"):
+            viewer.js("(s => { s.value = arguments[0]; s.dispatchEvent(new Event('change')); return true; })([...document.querySelectorAll('select')].find(s => s.value === 'raycast' || s.value === 'mip' || s.value === 'zbuffer'))", renderer)
+            drawn = viewer.final(f"o.renderer === '{renderer}'")
+            self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+
+    # ---- slices and what lies below the pointer
+
+    def test_slices_share_a_cross_hair(self):
+        viewer = self.viewer(layout="quad")
+        viewer.settled()
+        drawn = [viewer.settled(pane) for pane in ("axial", "coronal", "sagittal")]
+        self.assertEqual(len({d["options"]["at"] for d in drawn}), 1)
+        self.assertSamePixels(viewer.pixels("coronal"), self.command_line(drawn[1], "slice"))
+        before = viewer.pixels("sagittal")
+        viewer.drag(0, 0, start=(40, -20), pane="axial", steps=1)
+        at = viewer.final(f"o.at !== '{drawn[0]['options']['at']}'", "sagittal")["options"]["at"]
+        geometry = drawn[0]["header"]["geometry"]
+        for i, value in enumerate(map(float, at.split(","))):
+            if abs(geometry["forward"][i]) > 0.5:
+                continue  # the slice stays
+            self.assertAlmostEqual(value, geometry["target"][i] + geometry["pixel_size"] * (40 * geometry["right"][i] + 20 * geometry["up"][i]), delta=2 * geometry["pixel_size"])
+        self.assertNotEqual(viewer.pixels("sagittal"), before)
+        viewer.wheel(100, (0, 0), pane="coronal")
+        moved = viewer.final(f"o.at !== '{at}'", "axial")["options"]["at"]
+        changed = [i for i in range(3) if abs(float(moved.split(",")[i]) - float(at.split(",")[i])) > 1e-6]
+        self.assertEqual(changed, [1], "the coronal slice moves along y")
+        viewer.keys(Keys.ARROW_UP, pane="axial")
+        viewer.final(f"o.at !== '{moved}'", "coronal")
+        viewer.drag(40, 0, pane="axial", button="right")
+        viewer.final("o.window > 0", "coronal")
+        viewer.find("input[aria-label='Window of the slices']").send_keys(Keys.CONTROL, "a", Keys.NULL, "50", Keys.ENTER)
+        drawn = viewer.final("o.window === 50", "axial")
+        self.assertSamePixels(viewer.pixels("axial"), self.command_line(drawn, "slice"))
+        viewer.save(SHOTS, "slices")
+        viewer.keys("l")
+        viewer.until("document.querySelectorAll('.pane').length === 1")
+
+    def test_the_pointer_tells_position_value_and_label(self):
+        asked = []
+        answer = {"hit": True, "at": [1.5, -2, 3], "depth": 9, "voxel": [10, 11, 9], "value": 140, "label": {"value": 2, "name": "middle"}}
+        answers = {"/api/v1/pick": lambda fields, body: asked.append(body) or answer,
+                   "/api/v1/value": lambda fields, body: {"at": [float(n) for n in fields["at"].split(",")], "voxel": [1, 2, 3], "inside": True, "value": 99}}
+        viewer = self.viewer(self.proxy(answers=answers).port, layout="quad")
+        viewer.settled()
+        viewer.until("document.querySelectorAll('.pane').length === 4")
+        viewer.hover((10, 5))
+        viewer.until("document.querySelector('.readout').textContent === 'R 1.5  A −2.0  S 3.0 mmvalue 140middle'")
+        self.assertEqual((asked[0]["dataset"], asked[0]["size"]), ("patient", "x".join(map(str, viewer.drawn()["header"]["size"]))))
+        width, height = viewer.drawn()["header"]["size"]
+        self.assertAlmostEqual(asked[-1]["x"], width / 2 + 10, delta=1)
+        self.assertAlmostEqual(asked[-1]["y"], height / 2 + 5, delta=1)
+        viewer.settled("axial")
+        viewer.hover((10, 5), pane="axial")
+        viewer.until("/^R .* mmvalue 99$/.test(document.querySelector('.readout').textContent)")
+        viewer.js("document.querySelector('canvas').dispatchEvent(new MouseEvent('dblclick', {clientX: 100, clientY: 100}))")
+        viewer.final("o.at === '1.5,-2,3'", "axial")
+
+    # ---- the page
+
+    def test_the_keyboard_does_everything(self):
+        viewer = self.viewer()
+        drawn = viewer.settled()["options"]
+        self.assertTrue(viewer.js("document.activeElement === document.querySelector('canvas')"), "keys work at once")
+        press = lambda *keys: viewer.actions().send_keys(*keys).perform()
+        press(Keys.ARROW_RIGHT * 2, Keys.ARROW_UP)
+        viewer.final(f"o.azimuth === {drawn['azimuth']} - 10 && o.elevation === {drawn['elevation']} - 5")
+        press("+", ".", "4")
+        viewer.final(f"o.zoom > {drawn['zoom']} && o.azimuth === 90 && o.elevation === 0 && o.roll === 0")
+        viewer.keys(Keys.SHIFT, Keys.ARROW_LEFT)
+        viewer.final(f"o['look-at'] !== '{drawn['look-at']}'")
+        viewer.keys("o")
+        viewer.final("o.projection === 'perspective'")
+        press("?")
+        viewer.until("document.querySelector('dialog[open]') !== null")
+        viewer.save(SHOTS, "help")
+        press(Keys.ESCAPE)
+        viewer.until("document.querySelector('dialog') === null")
+        press("m")
+        viewer.until("document.querySelector('.machine:not([hidden]) svg.spans rect') !== null")
+        # Tab goes through everything in the order of the page, and everything that is reached shows it.
+        viewer.js("document.querySelector('.skip').focus()")
+        reached = []
+        for _ in range(90):
+            name, ring = viewer.js("(e => [e.className.baseVal === undefined ? e.getAttribute('aria-label') || e.textContent || e.id : 'svg', getComputedStyle(e).outlineStyle !== 'none' || e.matches('canvas, .point, .segmented input, .handle')])(document.activeElement)")
+            if reached and (name == reached[0] or viewer.js("document.activeElement === document.body")):
+                break
+            reached.append(name)
+            self.assertTrue(ring, f"no ring: {name}")
+            press(Keys.TAB)
+        self.assertEqual(reached[0], "Skip to the picture")
+        for name in ("Views", "Help", "Settings", "Save as a file", "Layers"):
+            self.assertIn(name, reached)
+
+    def test_names_roles_and_contrasts(self):
+        script = (HERE / "accessibility.js").read_text()
+        for theme in ("dark", "light"):
+            viewer = self.viewer(theme=theme, layout="quad", machine=1, label_mode="tint", renderer="raycast", clip_box=":,:,:")
+            viewer.settled()
+            viewer.until("document.querySelector('.facts dd') !== null && document.querySelector('svg.spans rect') !== null")
+            viewer.js("document.querySelectorAll('details').forEach(d => { d.open = true; })")
+            self.assertEqual(viewer.driver.execute_script(script), [], theme)
+            viewer.save(SHOTS, f"everything-{theme}")
+            viewer.js("document.querySelectorAll('details').forEach((d, i) => { d.open = i > 2; })")
+            viewer.keys("?")
+            self.assertEqual(viewer.driver.execute_script(script), [], theme)
+            viewer.driver.switch_to.active_element.send_keys(Keys.ESCAPE)
+            viewer.keys("s")
+            self.assertEqual(viewer.driver.execute_script(script), [], theme)
+            viewer.save(SHOTS, f"save-{theme}")
+            viewer.driver.switch_to.active_element.send_keys(Keys.ESCAPE)
+            viewer.keys("k")
+            viewer.until("document.querySelector('pre') !== null")
+            self.assertIn("slabstream render patient", viewer.js("document.querySelector('pre').textContent"))
+            self.assertEqual(viewer.driver.execute_script(script), [], theme)
+            viewer.save(SHOTS, f"command-{theme}")
+
+    def test_it_fits_360_pixels(self):
+        viewer = self.viewer(width=360, height=640, mobile=True, layout="quad", machine=1)
+        viewer.settled()
+        outside = """[...document.querySelectorAll('button, select, input, canvas')].filter(e => e.checkVisibility() && !e.closest('.offscreen, .section') && !e.matches('.offscreen')).filter(e => { const b = e.getBoundingClientRect();
+            return b.left < -1 || b.right > innerWidth + 1; }).map(e => e.outerHTML.slice(0, 80))"""
+        self.assertEqual(viewer.js(outside), [])
+        self.assertEqual(viewer.js("document.documentElement.scrollWidth"), 360)
+        viewer.save(SHOTS, "narrow-machine")
+        viewer.find("[aria-label='Machine panel']").click()
+        viewer.find("[aria-label='Settings']").click()
+        viewer.until("document.querySelector('.panel:not([hidden])') !== null")
+        self.assertEqual(viewer.js("[document.documentElement.scrollWidth, document.querySelector('.panel').scrollWidth <= 360]"), [360, True])
+        viewer.save(SHOTS, "narrow-settings")
+
+    def test_nothing_is_asked_of_other_hosts(self):
+        viewer = self.viewer(layout="quad", machine=1)
+        viewer.settled()
+        viewer.keys("k")
+        viewer.until("document.querySelector('pre') !== null")
+        names = viewer.js("performance.getEntriesByType('resource').concat(performance.getEntriesByType('navigation')).map(e => e.name)")
+        self.assertGreater(len(names), 4)
+        self.assertEqual({urllib.parse.urlsplit(name).netloc for name in names}, {self.gateway.authority})
+        self.assertEqual(viewer.js("window.violations"), [])
+        bad = [entry for entry in viewer.log() if "SEVERE" in entry and "404" not in entry]
+        self.assertEqual(bad, [])
+
+    def test_two_viewers_see_each_their_own_view(self):
+        one, two = self.viewer(azimuth=10), self.viewer(dataset="sphere", azimuth=80)
+        two.settled()
+        one.focus()
+        self.assertEqual(one.settled()["options"]["azimuth"], 10)
+        one.drag(30, 0)
+        one.final("o.azimuth !== 10")
+        two.focus()
+        self.assertEqual(two.drawn()["options"]["azimuth"], 80)
+        two.drag(30, 0)
+        two.final("o.azimuth !== 80")
+
+    def test_memory_stays_after_a_thousand_pictures(self):
+        viewer = self.viewer(width=320, height=240)
+        viewer.settled()
+        turn = """const [count, done] = [arguments[0], arguments[arguments.length - 1]], canvas = document.querySelector('canvas'); let n = 0;
+            const drawn = () => { n += 1; }, turn = () => { if (n >= count) { canvas.removeEventListener('slabstream:drawn', drawn); return done(n); }
+                canvas.dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowRight', bubbles: true})); requestAnimationFrame(turn); };
+            canvas.addEventListener('slabstream:drawn', drawn); turn();"""
+        used = "(() => { for (let i = 0; i < 4; i++) gc(); return performance.memory.usedJSHeapSize; })()"
+        viewer.driver.execute_async_script(turn, 100)
+        before = viewer.js(used)
+        viewer.driver.execute_async_script(turn, 1000)
+        grown = viewer.js(used) - before
+        self.assertLess(grown, 3e6, f"1000 pictures left {grown / 1e6:.1f} MB behind")
+
+    # ---- when something is wrong
+
+    def test_a_slow_network(self):
+        viewer = self.viewer(self.proxy(delay=0.1).port)  # 200 ms there and back
+        viewer.settled()
+        viewer.driver.execute_script("window.drawn.length = 0")
+        for _ in range(12):
+            viewer.drag(20, 3, steps=2)
+        drawn = viewer.final("Math.abs(o.azimuth - 54) < 0.01")
+        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        self.assertGreater(drawn["header"]["statistics"]["round_trip_ms"], 150)
+
+    def test_it_connects_again(self):
+        proxy = self.proxy()
+        viewer = self.viewer(proxy.port)
+        viewer.settled()
+        picture = viewer.pixels()
+        proxy.cut()
+        viewer.driver.execute_script("window.drawn.length = 0")
+        viewer.final("true")  # the same view, from the new connection
+        self.assertSamePixels(viewer.pixels(), picture)
+        viewer.drag(30, 0)
+        viewer.final("o.azimuth < 150")
+
+    def test_a_worker_is_seen_dying_while_the_picture_stays(self):
+        viewer = self.viewer(machine=1)
+        viewer.settled()
+        viewer.until("document.querySelectorAll('.worker[data-state=well]').length === 2")
+        picture = viewer.pixels()
+        workers = self.gateway.json("/api/v1/status")[1]["workers"]
+        os.kill(workers[0]["pid"], signal.SIGKILL)
+        viewer.until("document.querySelector('.worker[data-state=lost]') !== null")
+        self.assertSamePixels(viewer.pixels(), picture)
+        viewer.drag(30, 0)
+        drawn = viewer.final("o.azimuth < 150")
+        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        viewer.save(SHOTS, "worker-lost")
+
+    def test_the_service_ends_and_comes_back(self):
+        viewer = self.viewer()
+        viewer.settled()
+        picture = viewer.pixels()
+        self.programs.end(self.service)
+        viewer.until("/rendering service is gone|no worker/.test(document.querySelector('.banner:not([hidden])')?.textContent ?? '')")
+        self.assertSamePixels(viewer.pixels(), picture)
+        viewer.save(SHOTS, "service-gone")
+        type(self).service, _ = self.programs.up(*self.data)
+        viewer.until("document.querySelector('.banner').hidden")
+        viewer.drag(30, 0)
+        viewer.final("o.azimuth < 150")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], *sys.argv[5:]])

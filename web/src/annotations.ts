@@ -1,0 +1,81 @@
+// What the page draws over a picture, from the picture's geometry: scale bar, axes, a patient's sides, the cross-hair.
+// It lies over the picture, so the pixels below stay those of the service.
+import { project } from "./camera";
+import { shown as text, svg } from "./dom";
+import type { Shown } from "./pane";
+import type { Geometry } from "./session";
+import { AXES, AXIS_NAMES, dot, type Vec3 } from "./vec";
+import { unitName } from "./volume";
+
+// The geometry in pixels of the page.
+export function pageGeometry({ frame: { header }, cssWidth }: Shown): Geometry {
+  return { ...header.geometry, pixel_size: (header.geometry.pixel_size * header.size[0]) / cssWidth };
+}
+
+const AXIS_DIRECTIONS: readonly Vec3[] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+
+// 1, 2 or 5 times a power of ten, as near as possible to a fifth of the width.
+function roundLength(length: number): number {
+  const power = Math.pow(10, Math.floor(Math.log10(length)));
+  return [1, 2, 5, 10].map(n => n * power).reduce((best, n) => (Math.abs(Math.log(n / length)) < Math.abs(Math.log(best / length)) ? n : best));
+}
+
+function scaleBar(geometry: Geometry, width: number, height: number): SVGElement {
+  const length = roundLength((geometry.pixel_size * Math.min(width, 700)) / 5), pixels = length / geometry.pixel_size;
+  const right = width - 16, left = right - pixels, y = height - 18;
+  const note = geometry.projection === "perspective" ? " at the centre" : "";
+  return svg("g", { class: "scale-bar" },
+    svg("path", { d: `M${left} ${y - 4}v8M${left} ${y}H${right}M${right} ${y - 4}v8`, class: "halo" }),
+    svg("path", { d: `M${left} ${y - 4}v8M${left} ${y}H${right}M${right} ${y - 4}v8` }),
+    svg("text", { x: (left + right) / 2, y: y - 8, "text-anchor": "middle" }, `${text(length)} ${unitName(geometry.unit)}${note}`));
+}
+
+function axesMarker(geometry: Geometry, height: number): SVGElement {
+  const radius = 26, x = 16 + radius + 6, y = height - 16 - radius - 6;
+  const names = geometry.world === "patient" ? ["R", "A", "S"] : ["x", "y", "z"];
+  const arrows = AXES.map(axis => {
+    const direction = AXIS_DIRECTIONS[axis] as Vec3;
+    return { axis, dx: dot(direction, geometry.right) * radius, dy: -dot(direction, geometry.up) * radius, depth: dot(direction, geometry.forward) };
+  }).sort((a, b) => b.depth - a.depth);
+  return svg("g", { class: "axes", transform: `translate(${x} ${y})` }, ...arrows.map(({ axis, dx, dy, depth }) => {
+    const long = Math.hypot(dx, dy);
+    const group = svg("g", { class: `axis axis-${AXIS_NAMES[axis]}` });
+    if (long < 4) group.append(svg("circle", { r: depth < 0 ? 3.5 : 2 }));
+    else {
+      const ux = dx / long, uy = dy / long, head = 5;
+      group.append(svg("path", { d: `M0 0L${dx} ${dy}`, class: "halo" }), svg("path", { d: `M0 0L${dx} ${dy}M${dx - ux * head - uy * head * 0.6} ${dy - uy * head + ux * head * 0.6}L${dx} ${dy}L${dx - ux * head + uy * head * 0.6} ${dy - uy * head - ux * head * 0.6}` }));
+      if (long > 10) group.append(svg("text", { x: dx + ux * 8, y: dy + uy * 8, "text-anchor": "middle", "dominant-baseline": "central" }, names[axis] as string));
+    }
+    return group;
+  }));
+}
+
+// As radiologists name the edges: of oblique views the nearest side first, and those within 10 degrees of a right angle left out.
+function sideName(direction: Vec3): string {
+  const sides = ["RL", "AP", "SI"].map((pair, i) => ({ name: pair[(direction[i] as number) > 0 ? 0 : 1] as string, share: Math.abs(direction[i] as number) }));
+  return sides.filter(side => side.share > Math.sin(Math.PI / 18)).sort((a, b) => b.share - a.share).slice(0, 2).map(side => side.name).join("");
+}
+
+function patientSides(geometry: Geometry, width: number, height: number): SVGElement {
+  const { right, up } = geometry, opposite = (v: Vec3): Vec3 => [-v[0], -v[1], -v[2]];
+  const label = (x: number, y: number, anchor: string, direction: Vec3): SVGElement =>
+    svg("text", { x, y, "text-anchor": anchor, "dominant-baseline": "central" }, sideName(direction));
+  return svg("g", { class: "sides" }, label(14, height / 2, "start", opposite(right)), label(width - 14, height / 2, "end", right),
+    label(width / 2, 18, "middle", up), label(width / 2, height - 18, "middle", opposite(up)));
+}
+
+export interface Annotations { marker: boolean; scaleBar: boolean; sides: boolean; crosshair: { at: Vec3; lines: boolean } | null }
+
+export function drawAnnotations(drawing: SVGElement, shown: Shown, which: Annotations): void {
+  const { cssWidth: width, cssHeight: height } = shown, geometry = pageGeometry(shown);
+  const parts: SVGElement[] = [];
+  if (which.crosshair) {
+    const [x, y] = project(geometry, width, height, which.crosshair.at);
+    const gap = 8, reach = which.crosshair.lines ? Math.max(width, height) : 18;
+    parts.push(svg("path", { class: "crosshair", d: `M${x - reach} ${y}H${x - gap}M${x + gap} ${y}H${x + reach}M${x} ${y - reach}V${y - gap}M${x} ${y + gap}V${y + reach}` }));
+  }
+  if (which.sides && geometry.world === "patient") parts.push(patientSides(geometry, width, height));
+  if (which.marker && height > 160) parts.push(axesMarker(geometry, height));
+  if (which.scaleBar && width > 160) parts.push(scaleBar(geometry, width, height));
+  drawing.replaceChildren(...parts);
+}

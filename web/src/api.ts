@@ -1,0 +1,58 @@
+// Requests to the gateway, relative to the page's address, so that it works below any path.
+import type { Options } from "./options";
+import type { Vec3 } from "./vec";
+
+export class ApiError extends Error {
+  constructor(readonly status: number, message: string) { super(message); }
+}
+
+export interface Dataset {
+  name: string; state: "unloaded" | "loading" | "ready" | "failed"; error?: string;
+  size?: [number, number, number]; type?: string; spacing?: [number, number, number]; memory_bytes?: number;
+  layers?: { labels: number; overlay: boolean }; range?: { min: number; max: number };
+}
+export interface Histogram { range: [number, number]; counts: number[]; percentiles: Record<string, number> }
+export interface LabelName { value: number; name: string; color?: string }
+export interface Value { inside?: boolean; hit?: boolean; at?: Vec3; voxel?: [number, number, number]; value?: number; label?: LabelName | null }
+
+export class Api {
+  private readonly missing = new Set<string>();
+
+  constructor(public token: string) {}
+
+  // Whether the gateway has said that it has no such address.
+  lacks(path: string): boolean { return this.missing.has(path); }
+
+  async ask(path: string, fields: Record<string, string> = {}, body?: Options, signal?: AbortSignal): Promise<Response> {
+    const query = new URLSearchParams(fields).toString();
+    const response = await fetch(`api/v1/${path}${query ? `?${query}` : ""}`, {
+      method: body ? "POST" : "GET", headers: { Authorization: `Bearer ${this.token}` }, cache: "no-store", ...(body ? { body: JSON.stringify(body) } : {}), ...(signal ? { signal } : {}),
+    });
+    if (response.ok) return response;
+    const answer = (await response.json().catch(() => null)) as { error?: string } | null;
+    throw new ApiError(response.status, answer?.error ?? `${path}: ${response.status} ${response.statusText}`);
+  }
+
+  datasets = async (): Promise<Dataset[]> => ((await (await this.ask("datasets")).json()) as { datasets: Dataset[] }).datasets;
+  picture = async (options: Options): Promise<Blob> => (await this.ask("render.png", {}, options)).blob();
+  command = async (options: Options): Promise<{ command: string; files: Record<string, string> }> => (await this.ask("command", {}, options)).json();
+
+  // Older gateways lack these: null.
+  histogram = (dataset: string): Promise<Histogram | null> => this.maybe("histogram", { dataset });
+  transfer = (dataset: string, transfer: string): Promise<unknown> => this.maybe("transfer", { dataset, transfer });
+  labels = (dataset: string): Promise<{ labels: LabelName[] } | null> => this.maybe("labels", { dataset });
+  value = (dataset: string, at: Vec3, signal?: AbortSignal): Promise<Value | null> => this.maybe("value", { dataset, at: at.join(",") }, undefined, signal);
+  pick = (options: Options, x: number, y: number, signal?: AbortSignal): Promise<Value | null> => this.maybe("pick", {}, { ...options, x, y }, signal);
+
+  private async maybe<T>(path: string, fields: Record<string, string>, body?: Options, signal?: AbortSignal): Promise<T | null> {
+    if (this.missing.has(path)) return null;
+    try {
+      return (await (await this.ask(path, fields, body, signal)).json()) as T;
+    } catch (error) {
+      if (!(error instanceof ApiError) || (error.status !== 404 && error.status !== 405)) throw error;
+      // A gateway that knows the address says that the dataset is unknown, which the stream of pictures says too.
+      if (error.status === 405 || !/dataset/i.test(error.message)) this.missing.add(path);
+      return null;
+    }
+  }
+}

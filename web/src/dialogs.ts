@@ -1,0 +1,82 @@
+// Windows over the page: help, the picture as a file, the command, the token.
+import type { Api } from "./api";
+import { button, iconButton, toggle } from "./controls";
+import { copyText, download, h } from "./dom";
+import type { KeyGroup } from "./keys";
+import { type Options, renderOptions } from "./options";
+import type { State } from "./state";
+
+function dialog(title: string, ...content: (HTMLElement | null)[]): HTMLDialogElement {
+  const element: HTMLDialogElement = h("dialog", { "aria-label": title, onclose: () => element.remove(), onclick: (event: MouseEvent) => { if (event.target === element) element.close(); } },
+    h("div", { class: "dialog-body" }, h("header", {}, h("h2", {}, title), iconButton("Close", "close", () => element.close(), "Esc")), ...content));
+  document.body.append(element);
+  element.showModal();
+  return element;
+}
+
+const POINTER_HELP: readonly (readonly [string, string])[] = [
+  ["Drag", "Turn"], ["Shift and drag, or middle button", "Move"], ["Wheel", "Zoom about the pointer"], ["Ctrl and drag", "Roll"],
+  ["Right button and drag", "Window and level: sideways widens, upwards brightens"], ["Double click", "Put the cross-hair there"],
+  ["One finger", "Turn"], ["Two fingers", "Move, zoom and roll"], ["Drop a file", "Use it as a colour map (ParaView’s JSON)"],
+];
+
+export function helpDialog(groups: readonly KeyGroup[]): void {
+  const table = (rows: readonly (readonly [string, string])[]): HTMLElement => h("dl", { class: "keys" }, ...rows.map(([key, does]) => h("div", {}, h("dt", {}, h("kbd", {}, key)), h("dd", {}, does))));
+  dialog("Help", h("div", { class: "help" },
+    h("section", {}, h("h3", {}, "Pointer and touch"), h("dl", { class: "keys wide" }, ...POINTER_HELP.map(([key, does]) => h("div", {}, h("dt", {}, key), h("dd", {}, does))))),
+    ...groups.map(group => h("section", {}, h("h3", {}, group.title), table(group.keys.map(key => [key.label, key.does]))))));
+}
+
+export function tokenDialog(reason: string, use: (token: string) => void): void {
+  const input = h("input", { type: "text", id: "token", placeholder: " ", autocomplete: "off", spellcheck: "false", required: true });
+  const form = h("form", { method: "dialog", onsubmit: () => use(/token=([^&\s]+)/.exec(input.value)?.[1] ?? input.value.trim()) },
+    h("p", {}, reason), h("label", { for: "token" }, "Token, or the whole address that slabstream view printed"), input,
+    h("div", { class: "dialog-actions" }, h("button", { type: "submit", class: "button primary" }, "Open")));
+  dialog("This viewer needs a token", form);
+  input.focus();
+}
+
+const SIZES: readonly (readonly [string, number, number])[] = [["Square", 1024, 1024], ["Full HD", 1920, 1080], ["4K", 3840, 2160]];
+
+export function screenshotDialog(state: State, api: Api, width: number, height: number): void {
+  const field = (label: string, value: number): HTMLInputElement => h("input", { type: "number", min: 16, max: 8192, step: 1, required: true, value, "aria-label": label });
+  const w = field("Width in pixels", width), t = field("Height in pixels", height);
+  let transparent = false, annotated = state.scaleBar;
+  const clear = toggle("Transparent background", on => { transparent = on; }), notes = toggle("Scale bar and orientation", on => { annotated = on; });
+  notes.set(annotated);
+  const status = h("p", { role: "status", class: "hint" });
+  const save = h("button", { type: "submit", class: "button primary" }, "Save PNG");
+  const shoot = async (): Promise<void> => {
+    const options: Options = { ...renderOptions(state), size: `${w.value}x${t.value}` };
+    if (transparent) delete options["background"];
+    if (annotated) Object.assign(options, { "scale-bar": true, "orientation-marker": true });
+    save.disabled = true;
+    status.textContent = "Rendering…";
+    try {
+      download(`${state.dataset}-${w.value}x${t.value}.png`, await api.picture(options));
+      status.textContent = "Saved.";
+    } catch (error) {
+      status.textContent = error instanceof Error ? error.message : String(error);
+    }
+    save.disabled = false;
+  };
+  const form = h("form", { onsubmit: (event: Event) => { event.preventDefault(); void shoot(); } },
+    h("p", { class: "hint" }, "The service renders the picture anew, at any size, lossless."),
+    h("div", { class: "size-row" }, w, h("span", { "aria-hidden": "true" }, "×"), t, h("span", {}, "pixels")),
+    h("div", { class: "button-row" }, button("As shown", null, () => { w.value = String(width); t.value = String(height); }, "quiet"), ...SIZES.map(([name, x, y]) => button(name, null, () => { w.value = String(x); t.value = String(y); }, "quiet"))),
+    clear.element, notes.element, status, h("div", { class: "dialog-actions" }, save));
+  dialog("Picture", form);
+}
+
+// The commands that make this picture, and a movie that turns it.
+export async function commandDialog(state: State, api: Api, width: number, height: number, say: (message: string, kind?: "error") => void): Promise<void> {
+  try {
+    const { command, files } = await api.command({ ...renderOptions(state), size: `${width}x${height}` });
+    const movie = command.replace(/^slabstream render/, "slabstream turntable").replace(/ -o \S+$/, " --frames 120 -o turntable.mp4");
+    const line = (title: string, text: string): HTMLElement => h("section", {}, h("h3", {}, title), h("pre", { tabindex: 0 }, text), button("Copy", "copy", () => void copyText(text).then(() => say("Copied.")), "quiet"));
+    dialog("Command", line("This picture", command), line("A movie of one turn (needs ffmpeg)", movie),
+      ...Object.entries(files ?? {}).map(([name, text]) => h("section", {}, h("h3", {}, `The file ${name}`), h("p", { class: "hint" }, "The command reads this colour map."), button(`Save ${name}`, "save", () => download(name, new Blob([text], { type: "application/json" })), "quiet"))));
+  } catch (error) {
+    say(error instanceof Error ? error.message : String(error), "error");
+  }
+}

@@ -1,0 +1,47 @@
+// The transfer function as points: that of the state, or what its preset is for this dataset, which the gateway tells.
+import type { Context } from "./context";
+import { type ColorMap, parseParaView, ramp, rangeOf, stretched } from "./transfer";
+
+export class FunctionSource {
+  private readonly presets = new Map<string, ColorMap | null>(); // null: the gateway does not tell
+  private readonly asked = new Set<string>();
+
+  constructor(private readonly context: Context, private readonly changed: () => void) {}
+
+  // As the service draws it, in data values.
+  current(): ColorMap {
+    const { range } = this.context.store.state, map = this.unstretched();
+    return range ? stretched(map, range) : map;
+  }
+
+  range(): [number, number] {
+    const { range } = this.context.store.state;
+    return range ? [range[0], range[1]] : rangeOf(this.unstretched());
+  }
+
+  // Whether current() is a ramp in the place of a preset, since the gateway does not tell its points.
+  get untold(): boolean {
+    const { map, preset } = this.context.store.state;
+    return map === null && this.presets.get(this.key(preset)) === null;
+  }
+
+  private unstretched(): ColorMap {
+    const { map, preset } = this.context.store.state;
+    if (map) return map;
+    const known = this.presets.get(this.key(preset));
+    if (known === undefined) this.ask(preset);
+    const volume = this.context.volume();
+    return known ?? ramp(...(volume ? ([volume.range[0], Math.max(volume.range[1], volume.range[0] + 1e-6)] as const) : ([0, 1] as const)));
+  }
+
+  private key(preset: string): string { return `${this.context.volume()?.name ?? ""}\n${preset}`; }
+
+  private ask(preset: string): void {
+    const volume = this.context.volume(), key = this.key(preset);
+    if (!volume || this.asked.has(key)) return;
+    this.asked.add(key);
+    this.context.api.transfer(volume.name, preset)
+      .then(json => { this.presets.set(key, json === null ? null : parseParaView(json)); this.changed(); })
+      .catch(() => { this.asked.delete(key); }); // it is asked again with the next change
+  }
+}

@@ -1,0 +1,145 @@
+// The link: the page's whole state behind the address's '#', in the names of the command line where there are such.
+// The token comes in the link that the gateway prints, and stays out of the address and of copied links.
+import { type Bounds, type ClipBox, type ClipPlane, INITIAL, type State, type Surface } from "./state";
+import type { ColorMap } from "./transfer";
+import type { Vec3 } from "./vec";
+
+interface Field<T> { name: string; write: (value: T) => string; read: (text: string) => T | undefined }
+
+const number = (text: string | undefined): number | undefined => (text === undefined || text.trim() === "" || !Number.isFinite(Number(text)) ? undefined : Number(text));
+const numbers = (text: string, count: number): number[] | undefined => {
+  const list = text.split(",").map(number);
+  return list.length === count && list.every(n => n !== undefined) ? (list as number[]) : undefined;
+};
+const list = <T>(text: string, separator: string, read: (item: string) => T | undefined): T[] | undefined => {
+  const items = text.split(separator).map(read);
+  return items.every(item => item !== undefined) ? (items as T[]) : undefined;
+};
+const text = (name: string, allowed: RegExp): Field<string> => ({ name, write: value => value, read: value => (allowed.test(value) ? value : undefined) });
+const oneOf = <T extends string>(name: string, ...values: T[]): Field<T> => ({ name, write: value => value, read: value => values.find(v => v === value) });
+const real = (name: string, low: number, high: number): Field<number> => ({
+  name, write: String, read: value => { const n = number(value); return n !== undefined && n >= low && n <= high ? n : undefined; },
+});
+const flag = (name: string): Field<boolean> => ({ name, write: value => (value ? "1" : "0"), read: value => (value === "1" ? true : value === "0" ? false : undefined) });
+const nullable = <T>(field: Field<T>): Field<T | null> => ({ name: field.name, write: value => (value === null ? "" : field.write(value)), read: field.read });
+const point = (name: string): Field<Vec3> => ({ name, write: value => value.join(","), read: value => numbers(value, 3) as Vec3 | undefined });
+const range = (name: string): Field<readonly [number, number]> => ({
+  name, write: value => value.join(":"),
+  read: value => { const pair = numbers(value.replace(":", ","), 2); return pair && (pair[0] as number) < (pair[1] as number) ? (pair as [number, number]) : undefined; },
+});
+
+const COLOR = /^#[0-9a-f]{6}$/i;
+const surfaces: Field<readonly Surface[]> = {
+  name: "isovalue",
+  write: value => value.map(s => `${s.value}:${s.color}:${s.opacity}`).join(","),
+  read: value => list(value, ",", item => {
+    const [v, color, opacity] = item.split(":"), at = number(v), o = number(opacity);
+    return at !== undefined && color && COLOR.test(color) && o !== undefined ? { value: at, color, opacity: o } : undefined;
+  }),
+};
+export const boxText = (box: ClipBox): string => box.map(([low, high]) => `${low ?? ""}:${high ?? ""}`).join(",");
+const clipBox: Field<ClipBox> = {
+  name: "clip-box", write: boxText,
+  read: value => {
+    const axes = list(value, ",", (item): Bounds | undefined => {
+      const ends = item.split(":");
+      return ends.length === 2 ? [number(ends[0]) ?? null, number(ends[1]) ?? null] : undefined;
+    });
+    return axes?.length === 3 ? (axes as unknown as ClipBox) : undefined;
+  },
+};
+const many = <T extends readonly number[]>(name: string, count: number): Field<readonly T[]> => ({
+  name, write: value => value.map(v => v.join(",")).join(";"), read: value => list(value, ";", item => numbers(item, count) as unknown as T | undefined),
+});
+const map: Field<ColorMap> = {
+  name: "function",
+  write: value => [encodeURIComponent(value.name), value.colors.map(p => [p.x, p.r, p.g, p.b].join(",")).join(";"),
+    value.opacities.map(p => (p.mid === 0.5 && p.sharp === 0 ? [p.x, p.y] : [p.x, p.y, p.mid, p.sharp]).join(",")).join(";")].join("|"),
+  read: value => {
+    const [name, colorText, opacityText] = value.split("|");
+    const colors = list(colorText ?? "", ";", item => { const n = numbers(item, 4); return n && { x: n[0] as number, r: n[1] as number, g: n[2] as number, b: n[3] as number }; });
+    const opacities = list(opacityText ?? "", ";", item => {
+      const n = numbers(item, 4) ?? [...(numbers(item, 2) ?? []), 0.5, 0];
+      return n.length === 4 ? { x: n[0] as number, y: n[1] as number, mid: n[2] as number, sharp: n[3] as number } : undefined;
+    });
+    return colors?.length && opacities?.length ? { name: decodeURIComponent(name ?? ""), colors, opacities } : undefined;
+  },
+};
+const opacities: Field<Readonly<Record<string, number>>> = {
+  name: "label-opacity", write: value => Object.entries(value).map(([label, o]) => `${label}=${o}`).join(","),
+  read: value => {
+    const pairs = list(value, ",", item => { const [label, o] = item.split("="), n = number(o); return label && /^\d+$/.test(label) && n !== undefined ? ([label, n] as const) : undefined; });
+    return pairs && Object.fromEntries(pairs);
+  },
+};
+
+const NAME = /^[a-z][a-z-]{0,40}$/;
+const FIELDS: { [K in keyof State]: Field<State[K]> } = {
+  dataset: text("dataset", /^.{0,256}$/),
+  azimuth: real("azimuth", -36000, 36000), elevation: real("elevation", -36000, 36000), roll: real("roll", -36000, 36000),
+  zoom: real("zoom", 0.01, 1000), lookAt: nullable(point("look-at")), projection: oneOf("projection", "orthographic", "perspective"),
+  renderer: text("renderer", NAME), samplingRate: real("sampling-rate", 0.1, 16), projectionMode: text("projection-mode", NAME),
+  shading: text("shading", NAME), lights: many<Vec3>("light", 3), background: text("background", COLOR),
+  preset: text("transfer", NAME), map: nullable(map), range: nullable(range("scalar-range")), opacityDistance: real("opacity-distance", 1e-6, 1e6),
+  surfaces, surfacesAlone: flag("surfaces-alone"), clipBox: nullable(clipBox), clipPlanes: many<ClipPlane>("clip-plane", 4),
+  clipMode: oneOf("clip-mode", "keep", "cut-away"),
+  labels: oneOf("label-mode", "off", "tint", "surface"), labelTint: real("label-tint", 0, 1), labelsShown: text("labels-shown", /^[\d,-]*$/), labelOpacities: opacities,
+  overlay: flag("overlay"), overlayPreset: text("overlay-transfer", NAME), overlayRange: nullable(range("overlay-range")), overlayWeight: real("overlay-weight", 0, 1),
+  layout: oneOf("layout", "single", "quad"), crosshair: nullable(point("at")), window: nullable(real("window", 0, 1e30)), level: nullable(real("level", -1e30, 1e30)),
+  marker: flag("orientation-marker"), scaleBar: flag("scale-bar"), machine: flag("machine"),
+};
+
+// Spaces and most marks are legible as they are in a fragment.
+const escaped = (value: string): string => encodeURIComponent(value).replace(/%2C/g, ",").replace(/%3A/g, ":").replace(/%3B/g, ";").replace(/%23/g, "%23").replace(/%7C/g, "|");
+
+// Only what differs from the page's first state.
+export function fragmentOf(state: State): string {
+  const parts: string[] = [];
+  const add = <K extends keyof State>(key: K): void => {
+    const value = FIELDS[key].write(state[key]);
+    if (value !== FIELDS[key].write(INITIAL[key])) parts.push(`${FIELDS[key].name}=${escaped(value)}`);
+  };
+  (Object.keys(FIELDS) as (keyof State)[]).forEach(add);
+  return parts.join("&");
+}
+
+// What is wrong or missing has its first value.
+export function stateOf(fragment: string): State {
+  const given = new URLSearchParams(fragment.replace(/\+/g, "%2B"));
+  const state: State = { ...INITIAL };
+  const take = <K extends keyof State>(key: K): void => {
+    const value = given.get(FIELDS[key].name);
+    const read = value === null ? undefined : FIELDS[key].read(value);
+    if (read !== undefined) state[key] = read;
+  };
+  (Object.keys(FIELDS) as (keyof State)[]).forEach(take);
+  return state;
+}
+
+// ---- the token
+
+const KEPT = `slabstream.token ${location.pathname}`; // for one tab, so that it can be loaded again
+
+export function takeToken(): string {
+  const token = new URLSearchParams(location.hash.slice(1)).get("token");
+  try {
+    if (token) sessionStorage.setItem(KEPT, token);
+    return token ?? sessionStorage.getItem(KEPT) ?? "";
+  } catch {
+    return token ?? ""; // a frame without storage: the address keeps the token
+  }
+}
+
+function tokenIsKept(token: string): boolean {
+  try { return sessionStorage.getItem(KEPT) === token; } catch { return false; }
+}
+
+export function linkOf(state: State, token = ""): string {
+  const link = new URL(location.href);
+  link.hash = (token ? `token=${token}&` : "") + fragmentOf(state);
+  return link.href;
+}
+
+export function showInAddress(state: State, token: string): void {
+  history.replaceState(null, "", linkOf(state, tokenIsKept(token) ? "" : token));
+}

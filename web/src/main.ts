@@ -1,0 +1,230 @@
+// The page: makes the parts and connects them.
+import { Api, type Dataset } from "./api";
+import { orbited, panned, rolled, sidesOf, zoomed } from "./camera";
+import { clipSection } from "./clip_section";
+import type { Context } from "./context";
+import { section } from "./controls";
+import { commandDialog, helpDialog, screenshotDialog, tokenDialog } from "./dialogs";
+import { copyText, h } from "./dom";
+import { FunctionSource } from "./function_source";
+import { type KeyGroup, listenToKeys } from "./keys";
+import { linkOf, showInAddress, stateOf, takeToken } from "./link";
+import { LabelsSection, lightSection, renderingSection, surfacesSection } from "./look_sections";
+import { Machine } from "./machine";
+import { Notices } from "./notices";
+import { Pointed } from "./pointed";
+import { applyTheme, Shell, switchTheme } from "./shell";
+import { Slices } from "./slices";
+import { slicesSection } from "./slices_section";
+import { INITIAL, Store } from "./state";
+import { TransferEditor } from "./transfer_editor";
+import { Viewer } from "./viewer";
+import { centreOf, type Volume, volumeOf } from "./volume";
+import type { ServiceStatus } from "./session";
+
+const NARROW_PIXELS = 760;
+const ADDRESS_MS = 200;
+const TURN = { near: 5, far: 45 }, MOVE_PIXELS = { near: 20, far: 100 }, ZOOM_STEP = 1.15, ROLL_STEP = 5;
+
+class Page {
+  private readonly store = new Store(stateOf(location.hash.slice(1)));
+  private readonly api: Api;
+  private readonly notices = new Notices();
+  private readonly shell: Shell;
+  private readonly machine = new Machine(() => this.store.update({ machine: false }));
+  private readonly pointed: Pointed;
+  private readonly viewer: Viewer;
+  private readonly slices: Slices;
+  private volume: Volume | null = null;
+  private asking = ""; // the dataset that is being asked about
+  private readonly volumeListeners: ((volume: Volume | null) => void)[] = [];
+  private addressTimer = 0;
+
+  constructor(token: string) {
+    this.api = new Api(token);
+    const { store, notices, api } = this;
+    const context: Context = { store, api, volume: () => this.volume, onVolume: listener => void this.volumeListeners.push(listener), say: (message, kind) => notices.say(message, kind) };
+    const source: FunctionSource = new FunctionSource(context, () => editor.refresh());
+    const labels = new LabelsSection(context);
+    this.pointed = new Pointed(context, label => labels.note(label));
+    this.shell = new Shell(this.actions(), notices.status, notices.banner, notices.progress, notices.messages, this.pointed.element, this.machine.element);
+    const editor = new TransferEditor(context, source);
+    this.shell.panel.append(section("Transfer function", true, editor.element), slicesSection(context), renderingSection(context), surfacesSection(context), clipSection(context), labels.element, lightSection(context), this.facts());
+    this.viewer = new Viewer(context, source, this.pointed, {
+      drawn: ({ frame: { header } }) => { notices.onFrame(); this.machine.onFrame(header.statistics); this.know(); },
+      status: status => this.onStatus(status), progress: progress => notices.onProgress(progress), error: message => notices.onError(message),
+      connection: (state, reason) => { notices.onConnection(state, reason); if (state === "lost") void this.checkToken(); },
+    });
+    this.shell.panes.append(this.viewer.pane.element);
+    this.slices = new Slices(context, this.shell.panes, at => this.pointed.atPoint(at));
+    listenToKeys(this.keyGroups(), () => store.undo(), () => store.redo());
+    store.subscribe((state, before) => {
+      if (state.dataset !== before.dataset) this.forgetVolume();
+      this.show();
+      clearTimeout(this.addressTimer);
+      this.addressTimer = setTimeout(() => showInAddress(store.state, api.token), ADDRESS_MS);
+    });
+    addEventListener("hashchange", () => {
+      if (location.hash.includes("token=")) return location.reload(); // a link of another start of the gateway, perhaps
+      store.update(stateOf(location.hash.slice(1)));
+    });
+    this.dropsFiles(editor);
+    this.shell.setPanel(innerWidth > NARROW_PIXELS);
+    this.show();
+    showInAddress(store.state, token);
+    this.viewer.pane.canvas.focus({ preventScroll: true });
+  }
+
+  private show(): void {
+    const { state } = this.store;
+    document.title = state.dataset ? `${state.dataset} – Slabstream` : "Slabstream";
+    this.shell.showLayout(state.layout === "quad", state.machine);
+    this.machine.setOpen(state.machine);
+    this.slices.update();
+  }
+
+  // ---- the dataset
+
+  private onStatus(status: ServiceStatus): void {
+    this.notices.onStatus(status);
+    this.machine.onStatus(status);
+    const { dataset } = this.store.state, first = status.datasets[0];
+    if (!dataset && first) this.store.update({ dataset: first.name });
+    this.shell.showDatasets(status.datasets, this.store.state.dataset);
+    this.know();
+  }
+
+  private forgetVolume(): void {
+    this.volume = null;
+    for (const listener of this.volumeListeners) listener(null);
+  }
+
+  // Once a picture of the dataset is there, the gateway can tell of it; what it tells may be a second old, so it is asked again then.
+  private know(): void {
+    const { dataset } = this.store.state;
+    if (this.volume?.name === dataset || this.asking === dataset || this.viewer.pane.shown?.frame.view.options["dataset"] !== dataset) return;
+    this.asking = dataset;
+    Promise.all([this.api.datasets(), centreOf(this.api.token, dataset)]).then(([list, { centre, world, unit }]) => {
+      const entry = list.find((each: Dataset) => each.name === dataset);
+      if (!entry || this.store.state.dataset !== dataset) return;
+      this.volume = volumeOf(entry, centre, world, unit);
+      if (!this.volume) return;
+      for (const listener of this.volumeListeners) listener(this.volume);
+      this.show();
+    }).catch((error: unknown) => this.notices.say(error instanceof Error ? error.message : String(error), "error")).finally(() => { this.asking = ""; });
+  }
+
+  private facts(): HTMLElement {
+    const list = h("dl", { class: "facts" }), element = section("Dataset", false, list);
+    const update = (volume: Volume | null): void => {
+      element.hidden = !volume;
+      if (!volume) return;
+      const fact = (name: string, value: string): HTMLElement => h("div", {}, h("dt", {}, name), h("dd", {}, value));
+      const unit = volume.unit === "mm" ? " mm" : "";
+      list.replaceChildren(fact("Size", `${volume.size.join(" × ")} voxels`), fact("Spacing", `${volume.spacing.map(s => Number(s.toPrecision(4))).join(" × ")}${unit}`), fact("Values", `${volume.type}, ${volume.range.join(" to ")}`),
+        fact("World", volume.world === "patient" ? "a patient’s (R, A, S)" : volume.world === "scene" ? "a scene’s" : "the voxels’"), fact("Memory", `${(volume.memoryBytes / 1e6).toFixed(1)} MB`));
+    };
+    this.volumeListeners.push(update);
+    update(null);
+    return element;
+  }
+
+  // A socket does not say why it was refused; a request does.
+  private async checkToken(): Promise<void> {
+    const answer = await fetch("api/v1/datasets", { headers: { Authorization: `Bearer ${this.api.token}` } }).catch(() => null);
+    if (answer?.status === 401 && !document.querySelector("dialog")) askForToken("The token is not that of this gateway: it is new at each start.");
+  }
+
+  // ---- what can be done
+
+  private sides(): readonly { name: string; azimuth: number; elevation: number }[] { return sidesOf(this.volume?.world ?? this.viewer.pane.shown?.frame.header.geometry.world); }
+
+  private view(index: number): void {
+    const side = this.sides()[index];
+    if (side) this.viewer.move({ azimuth: side.azimuth, elevation: side.elevation, roll: 0 }, performance.now());
+  }
+
+  private reset(): void {
+    const { azimuth, elevation, roll, zoom, lookAt } = INITIAL;
+    this.store.update({ azimuth, elevation, roll, zoom, lookAt });
+  }
+
+  private pictureSize(): [number, number] { return this.viewer.pane.shown?.frame.header.size ?? [1024, 1024]; }
+
+  private copyLink(withToken: boolean): void {
+    void copyText(linkOf(this.store.state, withToken ? this.api.token : "")).then(() => this.notices.say(withToken ? "The link is copied. Whoever has it can use this gateway until it ends." : "The link is copied. It holds no access: others need their own."));
+  }
+
+  private actions(): ConstructorParameters<typeof Shell>[0] {
+    const { store } = this;
+    return {
+      dataset: name => store.update({ ...INITIAL, dataset: name, layout: store.state.layout, machine: store.state.machine }),
+      view: index => this.view(index), sides: () => this.sides().map(side => side.name), reset: () => this.reset(),
+      layout: quad => store.update({ layout: quad ? "quad" : "single" }), machine: () => store.update({ machine: !store.state.machine }),
+      panel: () => this.shell.setPanel(!this.shell.panelOpen), theme: switchTheme, help: () => helpDialog(this.keyGroups()),
+      projection: () => store.update({ projection: store.state.projection === "orthographic" ? "perspective" : "orthographic" }),
+      copyLink: withToken => this.copyLink(withToken), command: () => void commandDialog(store.state, this.api, ...this.pictureSize(), (message, kind) => this.notices.say(message, kind)),
+      screenshot: () => screenshotDialog(store.state, this.api, ...this.pictureSize()),
+    };
+  }
+
+  private keyGroups(): KeyGroup[] {
+    const { store, viewer } = this, actions = this.actions();
+    const turn = (right: number, up: number) => (far: boolean, at: number): void => {
+      const step = far ? TURN.far : TURN.near, pixels = MOVE_PIXELS.near;
+      viewer.move(far ? panned(store.state, right * pixels, -up * pixels, viewer.pixelSize()) : orbited(store.state, right * step, up * step), at);
+    };
+    const zoom = (factor: number) => (_: boolean, at: number): void => viewer.move(zoomed(store.state, factor, 0, 0, viewer.pixelSize()), at);
+    const roll = (degrees: number) => (_: boolean, at: number): void => viewer.move(rolled(store.state, degrees), at);
+    return [
+      { title: "View", keys: [
+        { keys: ["ArrowLeft"], label: "←", does: "Turn left (Shift: move)", run: turn(-1, 0) }, { keys: ["ArrowRight"], label: "→", does: "Turn right (Shift: move)", run: turn(1, 0) },
+        { keys: ["ArrowUp"], label: "↑", does: "Turn up (Shift: move)", run: turn(0, 1) }, { keys: ["ArrowDown"], label: "↓", does: "Turn down (Shift: move)", run: turn(0, -1) },
+        { keys: ["+", "="], label: "+", does: "Zoom in", run: zoom(ZOOM_STEP) }, { keys: ["-", "_"], label: "−", does: "Zoom out", run: zoom(1 / ZOOM_STEP) },
+        { keys: [",", "<"], label: ",", does: "Roll left", run: roll(-ROLL_STEP) }, { keys: [".", ">"], label: ".", does: "Roll right", run: roll(ROLL_STEP) },
+        ...[0, 1, 2, 3, 4, 5].map(i => ({ keys: [String(i + 1)], label: String(i + 1), does: this.sides()[i]?.name ?? "", run: () => this.view(i) })),
+        { keys: ["r"], label: "R", does: "Reset the view", run: actions.reset }, { keys: ["o"], label: "O", does: "Parallel or perspective", run: actions.projection },
+      ] },
+      { title: "Values", keys: [
+        { keys: ["["], label: "[", does: "Narrower window", run: (_, at) => viewer.window(-0.1, 0, at) }, { keys: ["]"], label: "]", does: "Wider window", run: (_, at) => viewer.window(0.1, 0, at) },
+        { keys: ["{"], label: "{", does: "Darker", run: (_, at) => viewer.window(0, -0.04, at) }, { keys: ["}"], label: "}", does: "Brighter", run: (_, at) => viewer.window(0, 0.04, at) },
+      ] },
+      { title: "Page", keys: [
+        { keys: ["l"], label: "L", does: "Slices beside the picture", run: () => actions.layout(store.state.layout === "single") }, { keys: ["m"], label: "M", does: "Machine panel", run: actions.machine },
+        { keys: ["p"], label: "P", does: "Settings", run: actions.panel }, { keys: ["b"], label: "B", does: "Clip box", run: () => store.update({ clipBox: store.state.clipBox ? null : [[null, null], [null, null], [null, null]] }, "box") },
+        { keys: ["a"], label: "A", does: "Axes and scale bar", run: () => store.update({ marker: !store.state.marker, scaleBar: !store.state.marker }) },
+        { keys: ["c"], label: "C", does: "Copy link", run: () => actions.copyLink(false) }, { keys: ["k"], label: "K", does: "Command and movie", run: actions.command },
+        { keys: ["s"], label: "S", does: "Save picture", run: actions.screenshot }, { keys: ["?", "h"], label: "?", does: "This help", run: actions.help },
+        { keys: [], label: "Ctrl+Z", does: "Undo", run: () => undefined }, { keys: [], label: "Ctrl+Y", does: "Redo", run: () => undefined },
+      ] },
+    ];
+  }
+
+  private dropsFiles(editor: TransferEditor): void {
+    document.addEventListener("dragover", event => { event.preventDefault(); document.body.dataset["drop"] = "over"; });
+    document.addEventListener("dragleave", event => { if (!event.relatedTarget) delete document.body.dataset["drop"]; });
+    document.addEventListener("drop", event => {
+      event.preventDefault();
+      delete document.body.dataset["drop"];
+      const file = event.dataTransfer?.files[0];
+      if (file) void editor.open(file);
+    });
+  }
+}
+
+function askForToken(reason: string): void {
+  tokenDialog(reason, token => {
+    const address = new URL(location.href);
+    address.hash = `token=${encodeURIComponent(token)}&${address.hash.slice(1).replace(/(^|&)token=[^&]*/, "")}`;
+    location.replace(address.href);
+    location.reload();
+  });
+}
+
+applyTheme();
+const token = takeToken();
+if (token) new Page(token);
+else {
+  document.body.replaceChildren(h("main", { class: "empty" }, h("h1", {}, "Slabstream")));
+  askForToken("This link holds no access.");
+}

@@ -1,0 +1,67 @@
+// The state as options of the gateway, which are those of the command line.
+import { boxText } from "./link";
+import type { State } from "./state";
+import { toParaView } from "./transfer";
+import type { Vec3 } from "./vec";
+
+export type Options = Record<string, unknown>;
+
+// What which renderer can do; the service refuses the rest.
+const CAN = {
+  surfaces: ["raycast", "zbuffer"], labels: ["raycast", "zbuffer"], overlay: ["raycast"], sampling: ["raycast"], projection: ["mip"], depthShading: ["zbuffer"], lit: ["splat", "raycast", "zbuffer"],
+};
+export const can = (what: keyof typeof CAN, renderer: string): boolean => CAN[what].includes(renderer);
+
+function transferOptions(state: State): Options {
+  const options: Options = { transfer: state.map ? toParaView(state.map) : state.preset };
+  if (state.range) options["scalar-range"] = state.range.join(":");
+  if (state.opacityDistance !== 1) options["opacity-distance"] = state.opacityDistance;
+  return options;
+}
+
+function labelOptions(state: State, opacities: boolean): Options {
+  const options: Options = { "label-mode": state.labels };
+  if (state.labels === "tint") options["label-tint"] = state.labelTint;
+  if (state.labelsShown) options["labels-shown"] = state.labelsShown;
+  const each = Object.entries(state.labelOpacities);
+  if (opacities && each.length > 0) options["label-opacity"] = each.map(([label, opacity]) => `${label}=${opacity}`).join(",");
+  return options;
+}
+
+function overlayOptions(state: State): Options {
+  const options: Options = { "overlay-transfer": state.overlayPreset, "overlay-weight": state.overlayWeight };
+  if (state.overlayRange) options["overlay-range"] = state.overlayRange.join(":");
+  return options;
+}
+
+// Of the picture, without its size.
+export function renderOptions(state: State): Options {
+  const { renderer } = state;
+  const options: Options = {
+    dataset: state.dataset, renderer, background: state.background, projection: state.projection,
+    azimuth: state.azimuth, elevation: state.elevation, roll: state.roll, zoom: state.zoom,
+    shading: state.shading === "depth-gradient" && !can("depthShading", renderer) ? "phong" : state.shading,
+  };
+  if (state.lookAt) options["look-at"] = state.lookAt.join(",");
+  else options["fit"] = true;
+  if (can("sampling", renderer) && state.samplingRate !== 1) options["sampling-rate"] = state.samplingRate;
+  if (can("projection", renderer)) options["projection-mode"] = state.projectionMode;
+  if (state.lights.length > 0 && can("lit", renderer)) options["light"] = state.lights.map(light => light.join(","));
+  const surfaces = can("surfaces", renderer) ? state.surfaces : [];
+  if (surfaces.length > 0) options["isovalue"] = surfaces.map(s => `${s.value}:${s.color}:${s.opacity}`).join(",");
+  if (surfaces.length === 0 || !state.surfacesAlone) Object.assign(options, transferOptions(state));
+  if (state.clipBox) options["clip-box"] = boxText(state.clipBox);
+  if (state.clipPlanes.length > 0) options["clip-plane"] = state.clipPlanes.map(plane => plane.join(","));
+  if (state.clipMode !== "keep" && (state.clipBox || state.clipPlanes.length > 0)) options["clip-mode"] = state.clipMode;
+  if (state.labels !== "off" && can("labels", renderer)) Object.assign(options, labelOptions(state, true));
+  if (state.overlay && can("overlay", renderer)) Object.assign(options, overlayOptions(state));
+  return options;
+}
+
+export function sliceOptions(state: State, plane: string, at: Vec3): Options {
+  const options: Options = { dataset: state.dataset, plane, at: at.join(","), background: state.background };
+  if (state.window !== null && state.level !== null) Object.assign(options, { window: state.window, level: state.level });
+  if (state.labels !== "off") Object.assign(options, labelOptions(state, false));
+  if (state.overlay) Object.assign(options, overlayOptions(state));
+  return options;
+}

@@ -1,0 +1,88 @@
+// A pane: a canvas with the pictures of one session, at the screen's own pixels, and a drawing over it.
+import { h, svg } from "./dom";
+import { type Connection, type Frame, type Progress, type ServiceStatus, Session, type View } from "./session";
+
+export interface Shown { frame: Frame; cssWidth: number; cssHeight: number } // cssWidth: what the picture's width is on the page
+
+export interface PaneEvents {
+  drawn?(shown: Shown): void;
+  resized?(): void;
+  status?(status: ServiceStatus): void;
+  progress?(progress: Progress): void;
+  error?(message: string): void;
+  connection?(state: Connection, reason: string): void;
+}
+
+const LEAST_SIDE = 16, MOST_SIDE = 8192;
+
+export class Pane {
+  readonly canvas = h("canvas", { width: LEAST_SIDE, height: LEAST_SIDE });
+  readonly drawing = svg("svg", { class: "drawing", "aria-hidden": "true" });
+  readonly element: HTMLElement;
+  shown: Shown | null = null;
+  private readonly context = this.canvas.getContext("2d", { alpha: false }) as CanvasRenderingContext2D;
+  private readonly session: Session;
+  private readonly watcher: ResizeObserver;
+  private size: [number, number] = [0, 0]; // pixels of the screen
+  private exact: [number, number] | null = null; // the same as the browser rounds it, where it tells
+
+  constructor(name: string, label: string, token: string, private readonly events: PaneEvents) {
+    this.canvas.setAttribute("tabindex", "0");
+    this.canvas.setAttribute("role", "application");
+    this.canvas.setAttribute("aria-label", label);
+    this.element = h("section", { class: `pane pane-${name}`, "data-pane": name, "aria-label": name }, this.canvas, this.drawing);
+    this.session = new Session(token, { ...events, frame: frame => this.draw(frame) });
+    this.watcher = new ResizeObserver(entries => {
+      const exact = entries[entries.length - 1]?.devicePixelContentBoxSize?.[0];
+      this.exact = exact ? [exact.inlineSize, exact.blockSize] : null;
+      this.measure();
+    });
+    addEventListener("resize", this.measure); // also when the window moves to a screen with other pixels
+    try { this.watcher.observe(this.element, { box: "device-pixel-content-box" }); } catch { this.watcher.observe(this.element); }
+  }
+
+  get pixelRatio(): number { return this.element.clientWidth > 0 ? this.size[0] / this.element.clientWidth : 1; }
+  get isVisible(): boolean { return this.size[0] >= LEAST_SIDE && this.size[1] >= LEAST_SIDE; }
+
+  // The view without its size, which is the pane's.
+  show(view: View, inputAt?: number): void {
+    if (this.isVisible) this.session.show({ ...view, options: { ...view.options, size: this.size.join("x") } }, inputAt);
+  }
+
+  end(): void {
+    this.watcher.disconnect();
+    removeEventListener("resize", this.measure);
+    this.session.end();
+    this.element.remove();
+  }
+
+  private readonly measure = (): void => {
+    const sides = [this.element.clientWidth * devicePixelRatio, this.element.clientHeight * devicePixelRatio].map((side, i) => {
+      const exact = this.exact?.[i];
+      return Math.min(exact !== undefined && Math.abs(exact - side) < 2 ? exact : Math.round(side), MOST_SIDE);
+    });
+    this.size = sides as [number, number];
+    if (this.isVisible) this.events.resized?.();
+  };
+
+  // The canvas keeps its picture until another is there: resizing a canvas clears it.
+  private draw(frame: Frame): void {
+    const { header, picture } = frame;
+    const width = Math.round(header.size[0] / header.scale), height = Math.round(header.size[1] / header.scale);
+    if (this.canvas.width !== width) this.canvas.width = width;
+    if (this.canvas.height !== height) this.canvas.height = height;
+    const [r, g, b] = header.background.map(c => Math.round(c * 255));
+    this.context.fillStyle = `rgb(${r} ${g} ${b})`;
+    this.context.fillRect(0, 0, width, height);
+    const up = 1 / header.scale, [x, y, w, h] = header.bounds;
+    if (picture) this.context.drawImage(picture, x * up, y * up, w * up, h * up);
+    this.shown = { frame, cssWidth: width / this.pixelRatio, cssHeight: height / this.pixelRatio };
+    this.drawing.setAttribute("viewBox", `0 0 ${this.shown.cssWidth} ${this.shown.cssHeight}`);
+    this.events.drawn?.(this.shown);
+    // For whoever embeds or measures the page.
+    this.canvas.dispatchEvent(new CustomEvent("slabstream:drawn", {
+      bubbles: true,
+      detail: { pane: this.element.dataset["pane"], header, seq: header.seq, final: header.final, options: frame.view.options, inputAt: frame.view.inputAt, drawnAt: performance.now() },
+    }));
+  }
+}

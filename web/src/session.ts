@@ -1,0 +1,135 @@
+// One stream of pictures: a WebSocket of docs/http.md with one view that changes. It connects again by itself.
+import type { Options } from "./options";
+import type { Vec3 } from "./vec";
+
+export interface Geometry {
+  right: Vec3; up: Vec3; forward: Vec3; target: Vec3; target_depth: number; pixel_size: number;
+  projection: "orthographic" | "perspective"; world: string; unit: "voxel" | "unknown" | "mm";
+}
+export interface Span { worker: number; group: number; stage: string; begin_ms: number; end_ms: number }
+export interface Statistics {
+  latency_ms: number; queued_ms: number; encode_ms: number; round_trip_ms: number; attempts: number; workers: number; groups: number;
+  imbalance: number; idle_share: number; bytes: { voxels: number; images: number; picture: number };
+  stages_ms: Record<string, number>; plan: Record<string, string>; timeline?: Span[];
+}
+export interface FrameHeader {
+  frame: number; seq: number; final: boolean; type: string; size: [number, number]; scale: number; bounds: [number, number, number, number];
+  background: [number, number, number, number]; geometry: Geometry; statistics: Statistics;
+}
+export interface WorkerStatus {
+  worker: number; host: string; pid: number; threads: number; silent_ms: number; leaving: boolean;
+  memory_bytes: number; cached_bytes: number; fetched_bytes: number; rendered_ranks: number;
+}
+export interface ServiceStatus {
+  service: "ready" | "no-workers" | "gone"; reason: string; workers: WorkerStatus[]; workers_lost: number; queued: number; running: number;
+  frames_done: number; datasets: { name: string; state: string; error?: string }[];
+}
+export interface Progress { seq: number; phase: "queued" | "loading" | "running"; queue_position: number; groups_done: number; group_count: number; attempt: number; workers: number }
+
+export interface View { picture: "render" | "slice"; timeline: boolean; options: Options }
+export interface SentView extends View { seq: number; inputAt: number } // inputAt: of the oldest input that it shows, as performance.now()
+export interface Frame { header: FrameHeader; view: SentView; picture: ImageBitmap | null }
+export type Connection = "connecting" | "open" | "lost";
+
+export interface SessionEvents {
+  // Draws the picture. It is acknowledged when the promise is kept.
+  frame(frame: Frame): void;
+  status?(status: ServiceStatus): void;
+  progress?(progress: Progress): void;
+  error?(message: string): void;
+  connection?(state: Connection, reason: string): void;
+}
+
+const RETRY_MS = [250, 500, 1000, 2000, 4000];
+const KEPT_VIEWS = 256;
+
+export class Session {
+  private socket: WebSocket | null = null;
+  private seq = 0;
+  private attempts = 0;
+  private timer = 0;
+  private ended = false;
+  private wanted: View | null = null;
+  private sent = new Map<number, SentView>();
+  private lastSent = "";
+
+  constructor(private readonly token: string, private readonly events: SessionEvents) {
+    this.connect();
+    addEventListener("online", this.retryNow);
+    document.addEventListener("visibilitychange", this.retryNow);
+  }
+
+  // The latest view wins; one that equals the last one is not sent.
+  show(view: View, inputAt = performance.now()): void {
+    this.wanted = view;
+    if (this.socket?.readyState !== WebSocket.OPEN) return;
+    const text = JSON.stringify(view);
+    if (text === this.lastSent) return;
+    this.lastSent = text;
+    const seq = ++this.seq;
+    this.sent.set(seq, { ...view, seq, inputAt });
+    if (this.sent.size > KEPT_VIEWS) this.sent.delete(this.sent.keys().next().value as number);
+    this.socket.send(JSON.stringify({ type: "view", seq, ...view }));
+  }
+
+  end(): void {
+    this.ended = true;
+    clearTimeout(this.timer);
+    removeEventListener("online", this.retryNow);
+    document.removeEventListener("visibilitychange", this.retryNow);
+    this.socket?.close();
+  }
+
+  private readonly retryNow = (): void => {
+    if (this.ended || document.hidden || this.socket) return;
+    clearTimeout(this.timer);
+    this.connect();
+  };
+
+  private connect(): void {
+    const address = new URL("api/v1/view", location.href);
+    address.protocol = location.protocol === "https:" ? "wss:" : "ws:";
+    address.hash = address.search = "";
+    this.events.connection?.("connecting", "");
+    const socket = new WebSocket(address, ["slabstream.view.v1", `slabstream.token.${this.token}`]);
+    socket.binaryType = "arraybuffer";
+    this.socket = socket;
+    socket.onopen = () => {
+      this.attempts = 0;
+      this.seq = 0;
+      this.sent.clear();
+      this.lastSent = "";
+      this.events.connection?.("open", "");
+      if (this.wanted) this.show(this.wanted);
+    };
+    socket.onmessage = event => (typeof event.data === "string" ? this.onText(event.data) : void this.onPicture(socket, event.data as ArrayBuffer));
+    socket.onclose = event => {
+      if (this.socket !== socket) return;
+      this.socket = null;
+      if (this.ended) return;
+      this.events.connection?.("lost", event.reason);
+      this.timer = setTimeout(() => this.connect(), RETRY_MS[Math.min(this.attempts++, RETRY_MS.length - 1)]);
+    };
+  }
+
+  private onText(text: string): void {
+    const message = JSON.parse(text) as { type: string; seq?: number; error?: string };
+    if (message.type === "status") this.events.status?.(message as unknown as ServiceStatus);
+    else if (message.type === "progress") this.events.progress?.(message as unknown as Progress);
+    else if (message.type === "error" && message.seq === this.seq) this.events.error?.(message.error ?? "");
+  }
+
+  private async onPicture(socket: WebSocket, message: ArrayBuffer): Promise<void> {
+    const n = new DataView(message).getUint32(0, true);
+    const header = JSON.parse(new TextDecoder().decode(new Uint8Array(message, 4, n))) as FrameHeader;
+    const view = this.sent.get(header.seq);
+    const empty = header.bounds[2] === 0;
+    // The pixels as they are: no profile of the screen's colours, which would change them.
+    const picture = empty ? null : await createImageBitmap(new Blob([new Uint8Array(message, 4 + n)], { type: header.type }), { colorSpaceConversion: "none" });
+    if (this.socket !== socket) return picture?.close();
+    for (const seq of this.sent.keys()) if (seq < header.seq) this.sent.delete(seq);
+    if (view) this.events.frame({ header, view, picture });
+    picture?.close();
+    if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify({ type: "ack", frame: header.frame }));
+  }
+}

@@ -1,0 +1,77 @@
+// The frame of the page: the bar above, the stage with the pictures, the panel beside it.
+import { button, choice, iconButton, menu, menuItem } from "./controls";
+import { h } from "./dom";
+
+export interface Actions {
+  dataset(name: string): void; view(index: number): void; sides(): readonly string[]; reset(): void; layout(quad: boolean): void; machine(): void; panel(): void; theme(): void; help(): void;
+  copyLink(withToken: boolean): void; command(): void; screenshot(): void; projection(): void;
+}
+
+export class Shell {
+  readonly stage = h("main", { class: "stage", "aria-label": "Pictures" });
+  readonly panes = h("div", { class: "panes" });
+  readonly panel = h("aside", { class: "panel", "aria-label": "Settings", id: "panel" });
+  private readonly datasets = choice("Dataset", [], name => this.actions.dataset(name));
+  private readonly layoutButtons: HTMLButtonElement[];
+  private readonly machineButton: HTMLButtonElement;
+  private readonly panelButton: HTMLButtonElement;
+  private names = "";
+
+  constructor(private readonly actions: Actions, status: HTMLElement, banner: HTMLElement, progress: HTMLElement, messages: HTMLElement, readout: HTMLElement, machine: HTMLElement) {
+    const views = iconButton("Views", "views", () => undefined);
+    const share = button("Share", "link", () => undefined, "share");
+    this.layoutButtons = [iconButton("One picture", "single", () => actions.layout(false), "L"), iconButton("With slices", "quad", () => actions.layout(true), "L")];
+    this.machineButton = iconButton("Machine panel", "machine", actions.machine, "M");
+    this.panelButton = iconButton("Settings", "panel", actions.panel, "P");
+    this.panelButton.setAttribute("aria-controls", "panel");
+    const header = h("header", { class: "bar" }, h("h1", { class: "brand" }, h("img", { src: "assets/icon.svg", alt: "", width: 20, height: 20 }), h("span", {}, "Slabstream")), this.datasets.element,
+      h("div", { class: "group", role: "group", "aria-label": "View" },
+        menu(views, "Views", () => [...actions.sides().map((name, i) => menuItem(name, String(i + 1), () => actions.view(i))), h("hr"), menuItem("Reset the view", "R", actions.reset), menuItem("Parallel or perspective", "O", actions.projection)]),
+        iconButton("Reset the view", "reset", actions.reset, "R")),
+      h("div", { class: "group", role: "group", "aria-label": "Layout" }, ...this.layoutButtons, this.machineButton),
+      h("span", { class: "space" }), readout, status,
+      h("div", { class: "group", role: "group", "aria-label": "Page" },
+        menu(share, "Share", () => [menuItem("Copy link", "C", () => actions.copyLink(false)), menuItem("Copy link with access", "", () => actions.copyLink(true)), menuItem("Command and movie…", "K", actions.command), menuItem("Save picture…", "S", actions.screenshot)]),
+        iconButton("Light or dark", "theme", actions.theme), iconButton("Help", "help", actions.help, "?"), this.panelButton));
+    this.datasets.element.classList.add("dataset");
+    this.stage.append(h("div", { class: "canvas-area" }, progress, this.panes, banner, messages), machine);
+    document.body.replaceChildren(h("a", { class: "skip", href: "#", onclick: (event: Event) => { event.preventDefault(); this.panes.querySelector("canvas")?.focus(); } }, "Skip to the picture"), header, this.stage, this.panel);
+  }
+
+  showDatasets(list: readonly { name: string; state: string }[], current: string): void {
+    const names = JSON.stringify([list.map(d => d.name), current]);
+    if (names === this.names) return;
+    this.names = names;
+    const known = list.some(d => d.name === current) || current === "" ? list : [{ name: current, state: "" }, ...list];
+    this.datasets.fill(known.map(d => [d.name, d.name] as const));
+    this.datasets.set(current);
+  }
+
+  showLayout(quad: boolean, machine: boolean): void {
+    this.panes.dataset["layout"] = quad ? "quad" : "single";
+    this.layoutButtons.forEach((each, i) => each.setAttribute("aria-pressed", String(quad === (i === 1))));
+    this.machineButton.setAttribute("aria-pressed", String(machine));
+  }
+
+  get panelOpen(): boolean { return !this.panel.hidden; }
+  setPanel(open: boolean): void {
+    this.panel.hidden = !open;
+    this.panelButton.setAttribute("aria-expanded", String(open));
+    document.body.dataset["panel"] = open ? "open" : "closed";
+  }
+}
+
+// ---- light and dark
+
+const KEPT = "slabstream.theme";
+const kept = (): string | null => { try { return localStorage.getItem(KEPT); } catch { return null; } };
+
+export function applyTheme(): void {
+  const theme = kept() ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark");
+  document.documentElement.dataset["theme"] = theme;
+}
+
+export function switchTheme(): void {
+  try { localStorage.setItem(KEPT, document.documentElement.dataset["theme"] === "dark" ? "light" : "dark"); } catch { /* it holds for this visit */ }
+  document.documentElement.dataset["theme"] = document.documentElement.dataset["theme"] === "dark" ? "light" : "dark";
+}

@@ -1,0 +1,120 @@
+// What the page shows: one plain object. All of it is in the link (link.ts), and pictures follow from it alone (options.ts).
+import type { ColorMap } from "./transfer";
+import type { Vec3 } from "./vec";
+
+export interface Surface { value: number; color: string; opacity: number }
+export type Bounds = readonly [number | null, number | null]; // null: not clipped
+export type ClipBox = readonly [Bounds, Bounds, Bounds];
+export type ClipPlane = readonly [number, number, number, number]; // keeps n . p + d >= 0
+
+export interface State {
+  dataset: string;
+  // The view
+  azimuth: number; // degrees
+  elevation: number;
+  roll: number;
+  zoom: number;
+  lookAt: Vec3 | null; // null: the middle of what shows (the service's `fit`)
+  projection: "orthographic" | "perspective";
+  // The look
+  renderer: string;
+  samplingRate: number;
+  projectionMode: string;
+  shading: string;
+  lights: readonly Vec3[]; // none: a light at the eye
+  background: string;
+  preset: string;
+  map: ColorMap | null; // instead of the preset
+  range: readonly [number, number] | null; // the function is stretched over these values
+  opacityDistance: number;
+  surfaces: readonly Surface[];
+  surfacesAlone: boolean;
+  clipBox: ClipBox | null;
+  clipPlanes: readonly ClipPlane[];
+  clipMode: "keep" | "cut-away";
+  labels: "off" | "tint" | "surface";
+  labelTint: number;
+  labelsShown: string; // as 1,5-9; empty: all
+  labelOpacities: Readonly<Record<string, number>>;
+  overlay: boolean;
+  overlayPreset: string;
+  overlayRange: readonly [number, number] | null;
+  overlayWeight: number;
+  // Slices
+  layout: "single" | "quad";
+  crosshair: Vec3 | null; // null: the volume's centre
+  window: number | null;
+  level: number | null;
+  // The page
+  marker: boolean;
+  scaleBar: boolean;
+  machine: boolean;
+}
+
+export const INITIAL: State = {
+  dataset: "",
+  azimuth: 150, elevation: 15, roll: 0, zoom: 1.15, lookAt: null, projection: "orthographic",
+  renderer: "splat", samplingRate: 1, projectionMode: "maximum", shading: "phong", lights: [], background: "#0d1014",
+  preset: "auto", map: null, range: null, opacityDistance: 1, surfaces: [], surfacesAlone: true,
+  clipBox: null, clipPlanes: [], clipMode: "keep",
+  labels: "off", labelTint: 0.5, labelsShown: "", labelOpacities: {},
+  overlay: false, overlayPreset: "auto", overlayRange: null, overlayWeight: 1,
+  layout: "single", crosshair: null, window: null, level: null,
+  marker: true, scaleBar: true, machine: false,
+};
+
+// What undo brings back: the look, not the place from which one looks.
+export const LOOK = ["renderer", "samplingRate", "projectionMode", "shading", "lights", "background", "preset", "map", "range", "opacityDistance",
+  "surfaces", "surfacesAlone", "clipBox", "clipPlanes", "clipMode", "labels", "labelTint", "labelsShown", "labelOpacities", "overlay",
+  "overlayPreset", "overlayRange", "overlayWeight", "window", "level"] as const;
+const UNDO_STEPS = 200;
+const ONE_GESTURE_MS = 700;
+
+export type Listener = (state: State, before: State) => void;
+
+export class Store {
+  private current: State;
+  private readonly listeners = new Set<Listener>();
+  private past: State[] = [];
+  private future: State[] = [];
+  private gesture = { name: "", at: -Infinity };
+
+  constructor(initial: State) { this.current = initial; }
+
+  get state(): State { return this.current; }
+  get canUndo(): boolean { return this.past.length > 0; }
+  get canRedo(): boolean { return this.future.length > 0; }
+
+  // With `keys`: only of changes of these. What follows the look need not follow the view, which changes with each move of the hand.
+  subscribe(listener: Listener, keys?: readonly (keyof State)[]): void {
+    this.listeners.add(keys ? (state, before) => { if (keys.some(key => state[key] !== before[key])) listener(state, before); } : listener);
+  }
+
+  // `gesture` names what the user does, for undo. Changes of one gesture that follow each other are one step.
+  update(patch: Partial<State>, gesture = ""): void {
+    if (gesture !== "") {
+      const now = performance.now();
+      if (gesture !== this.gesture.name || now - this.gesture.at > ONE_GESTURE_MS) this.past = [...this.past.slice(1 - UNDO_STEPS), this.current];
+      this.gesture = { name: gesture, at: now };
+      this.future = [];
+    }
+    this.replace({ ...this.current, ...patch });
+  }
+
+  undo(): void { this.step(this.past, this.future); }
+  redo(): void { this.step(this.future, this.past); }
+
+  private step(from: State[], to: State[]): void {
+    const look = from.pop();
+    if (!look) return;
+    to.push(this.current);
+    this.gesture = { name: "", at: -Infinity };
+    this.replace({ ...this.current, ...Object.fromEntries(LOOK.map(key => [key, look[key]])) });
+  }
+
+  private replace(next: State): void {
+    const before = this.current;
+    this.current = next;
+    for (const listener of this.listeners) listener(next, before);
+  }
+}

@@ -1,0 +1,114 @@
+// The 3-D picture: its view follows the state, gestures move it, the page's drawing lies over it.
+import { drawAnnotations, pageGeometry } from "./annotations";
+import { zoomOf } from "./camera";
+import { ClipHandles } from "./clip_handles";
+import type { Context } from "./context";
+import type { FunctionSource } from "./function_source";
+import { listenToGestures } from "./gestures";
+import { renderOptions } from "./options";
+import { Pane, type PaneEvents, type Shown } from "./pane";
+import type { Pointed } from "./pointed";
+import type { State } from "./state";
+import { rounded, roundedPoint } from "./vec";
+
+const LEAST_WINDOW = 1e-3; // as a share of the data's range
+
+export class Viewer {
+  readonly pane: Pane;
+  private readonly handles: ClipHandles;
+  private inputAt: number | undefined;
+  private frameAsked = 0;
+  private changed = false; // since the last view was sent
+
+  constructor(private readonly context: Context, private readonly source: FunctionSource, private readonly pointed: Pointed, events: PaneEvents) {
+    this.pane = new Pane("3d", "Volume. Arrow keys turn it, plus and minus zoom, question mark shows all keys.", context.api.token, {
+      ...events, drawn: shown => { this.resolveFit(shown); this.annotate(); events.drawn?.(shown); }, resized: () => this.send(),
+    });
+    this.handles = new ClipHandles(clipBox => this.change({ clipBox }, "handle"));
+    this.pane.element.append(this.handles.element);
+    context.onVolume(() => { if (this.pane.shown) this.resolveFit(this.pane.shown); this.annotate(); });
+    context.store.subscribe(() => this.later());
+    context.store.subscribe(() => this.annotate(), ["marker", "scaleBar", "layout", "crosshair", "clipBox"]); // else with the next picture
+    listenToGestures(this.pane.canvas, {
+      state: () => context.store.state,
+      pixelSize: () => this.pixelSize(),
+      move: (patch, at) => this.move(patch, at),
+      window: (widen, raise, at) => this.window(widen, raise, at),
+      hover: (x, y) => pointed.atPixel(this.pane.shown, x, y),
+      leave: () => pointed.clear(),
+      place: (x, y) => void this.place(x, y),
+    });
+  }
+
+  // Side of a pixel of the page in the world, for the zoom of now: the picture may be one behind.
+  pixelSize(): number {
+    const shown = this.pane.shown;
+    if (!shown || !this.context.store.state.lookAt) return 0;
+    const then = Number(shown.frame.view.options["zoom"] ?? 1);
+    return (pageGeometry(shown).pixel_size * then) / this.context.store.state.zoom;
+  }
+
+  move(patch: Partial<State>, inputAt: number): void {
+    this.inputAt ??= inputAt;
+    this.pointed.clear();
+    this.context.store.update(patch);
+  }
+
+  private change(patch: Partial<State>, gesture: string): void {
+    this.inputAt ??= performance.now();
+    this.context.store.update(patch, gesture);
+  }
+
+  // To the right widens the range of values, upwards brightens: the range goes down.
+  window(widen: number, raise: number, inputAt: number): void {
+    const [low, high] = this.source.range(), volume = this.context.volume();
+    if (!volume) return;
+    const least = LEAST_WINDOW * Math.max(volume.range[1] - volume.range[0], 1e-9);
+    const width = Math.max((high - low) * Math.exp(1.5 * widen), least), middle = (low + high) / 2 - raise * (high - low);
+    this.inputAt ??= inputAt;
+    this.context.store.update({ range: [rounded(middle - width / 2, 5), rounded(middle + width / 2, 5)] }, "window");
+    this.context.say(`Window ${rounded(width, 3)}, level ${rounded(middle, 3)}`);
+  }
+
+  // At once, but at most one view a frame of the screen; the latest wins.
+  private later(): void {
+    if (this.frameAsked) { this.changed = true; return; }
+    this.send();
+    this.frameAsked = requestAnimationFrame(() => {
+      this.frameAsked = 0;
+      if (!this.changed) return;
+      this.changed = false;
+      this.later();
+    });
+  }
+
+  private send(): void {
+    const { state } = this.context.store;
+    if (!state.dataset) return;
+    this.pane.show({ picture: "render", timeline: state.machine, options: renderOptions(state) }, this.inputAt);
+    this.inputAt = undefined;
+  }
+
+  // `fit` frames what shows. From the first such picture on the view stays where it is, whatever else changes.
+  private resolveFit({ frame: { header, view } }: Shown): void {
+    const { state } = this.context.store, volume = this.context.volume();
+    if (state.lookAt || !volume || view.options["fit"] !== true || view.options["dataset"] !== state.dataset || volume.name !== state.dataset) return;
+    if (view.options["projection"] !== state.projection) return;
+    const made = Number(view.options["zoom"] ?? 1);
+    this.context.store.update({ lookAt: roundedPoint(header.geometry.target), zoom: rounded((zoomOf(header.geometry, header.size[0], header.size[1], volume.extent) * state.zoom) / made) });
+  }
+
+  private annotate(): void {
+    const { shown } = this.pane, { state } = this.context.store;
+    if (!shown) return;
+    const crosshair = state.layout === "quad" && state.crosshair ? { at: state.crosshair, lines: false } : null;
+    drawAnnotations(this.pane.drawing, shown, { marker: state.marker, scaleBar: state.scaleBar, sides: state.marker, crosshair });
+    this.handles.update(shown, state.clipBox, this.context.volume());
+  }
+
+  private async place(x: number, y: number): Promise<void> {
+    if (!this.pane.shown) return;
+    const value = await this.pointed.pick(this.pane.shown, x, y).catch(() => null);
+    if (value?.at && value.hit !== false) this.context.store.update({ crosshair: roundedPoint(value.at), layout: "quad" });
+  }
+}

@@ -1,0 +1,33 @@
+// What the page knows of the dataset that it shows.
+import type { Dataset } from "./api";
+import { Session } from "./session";
+import { add, scale, type Vec3 } from "./vec";
+
+export interface Volume {
+  name: string; size: Vec3; spacing: Vec3; extent: Vec3; centre: Vec3; low: Vec3; high: Vec3; // extent, low, high: of the world
+  range: readonly [number, number]; type: string; memoryBytes: number; world: string; unit: string; labels: number; overlay: boolean;
+}
+
+export function volumeOf(dataset: Dataset, centre: Vec3, world: string, unit: string): Volume | null {
+  const { size, spacing, range } = dataset;
+  if (!size || !spacing || !range) return null;
+  const extent: Vec3 = [size[0] * spacing[0], size[1] * spacing[1], size[2] * spacing[2]];
+  return {
+    name: dataset.name, size, spacing, extent, centre, low: add(centre, scale(extent, -0.5)), high: add(centre, scale(extent, 0.5)),
+    range: [range.min, range.max], type: dataset.type ?? "", memoryBytes: dataset.memory_bytes ?? 0, world, unit,
+    labels: dataset.layers?.labels ?? 0, overlay: dataset.layers?.overlay ?? false,
+  };
+}
+
+// Where the middle of a volume lies. The picture that tells it is small and not shown.
+export function centreOf(token: string, dataset: string): Promise<{ centre: Vec3; world: string; unit: string }> {
+  return new Promise((resolve, reject) => {
+    const session: Session = new Session(token, {
+      frame: ({ header: { geometry } }) => { session.end(); resolve({ centre: geometry.target, world: geometry.world, unit: geometry.unit }); },
+      error: message => { session.end(); reject(new Error(message)); },
+    });
+    session.show({ picture: "render", timeline: false, options: { dataset, size: "16x16", renderer: "mip" } });
+  });
+}
+
+export const unitName = (unit: string): string => (unit === "mm" ? "mm" : unit === "voxel" ? "voxels" : "units");
