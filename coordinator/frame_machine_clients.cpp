@@ -146,14 +146,7 @@ void FrameMachine::State::RefuseRequest(const OpenRequest& request, const Status
 }
 
 void FrameMachine::State::FreeClient(PeerToken client) {
-  for (auto upload = uploads.begin(); upload != uploads.end();) {
-    const auto next = std::next(upload);
-    if (upload->second.client == client) {
-      actions.emplace_back(DropUpload{upload->first});
-      uploads.erase(upload);
-    }
-    upload = next;
-  }
+  if (const Upload upload = UploadOf(client); upload != uploads.end()) EndUpload(upload, Status::Unavailable("its client has gone"));
   std::erase_if(questions, [client](const auto& open) { return open.second.client == client; });
   if (!clients.Forget(client)) return;
   queue.Forget(client);

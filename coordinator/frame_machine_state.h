@@ -205,8 +205,8 @@ struct FrameMachine::State {
   std::uint64_t UploadBytes() const;  // of those under way
   void GrantCredit(OpenUpload& upload);
   using Upload = std::map<UploadId, OpenUpload>::iterator;
-  Upload UploadOf(PeerToken client, std::uint64_t nonce);
-  void EndUpload(Upload upload, const Status& why);  // without a dataset
+  Upload UploadOf(PeerToken client, std::optional<std::uint64_t> nonce = {});  // end: it has none, or another one
+  void EndUpload(Upload upload, const Status& why);                            // without a dataset
 
   // ---- datasets
   Status FindVolume(OpenRequest& request) const;

@@ -15,8 +15,8 @@ constexpr std::uint64_t kUploadWindow = std::uint64_t{8} << 20;  // bytes that m
 
 void FrameMachine::State::OnClientMessage(PeerToken client, const AddVolume& message) {
   clients.Meet(client, now);  // its silence is noticed from now on
-  const auto earlier = std::ranges::find_if(uploads, [client](const auto& each) { return each.second.client == client; });
-  if (earlier != uploads.end()) EndUpload(earlier, Status::Cancelled("the client sends another volume"));
+  if (const Upload earlier = UploadOf(client); earlier != uploads.end())
+    EndUpload(earlier, Status::Cancelled("the client sends another volume"));
   if (const Status admitted = AdmitUpload(message); !admitted.ok()) {
     return SendClient(client, OrderRefused{.nonce = message.nonce, .status = Bounded(admitted)});
   }
@@ -68,8 +68,9 @@ void FrameMachine::State::GrantCredit(OpenUpload& upload) {
   SendClient(upload.client, VolumeCredit{.nonce = upload.order.nonce, .received = upload.received, .allowed = upload.allowed});
 }
 
-FrameMachine::State::Upload FrameMachine::State::UploadOf(PeerToken client, std::uint64_t nonce) {
-  return std::ranges::find_if(uploads, [&](const auto& each) { return each.second.client == client && each.second.order.nonce == nonce; });
+FrameMachine::State::Upload FrameMachine::State::UploadOf(PeerToken client, std::optional<std::uint64_t> nonce) {
+  return std::ranges::find_if(
+      uploads, [&](const auto& each) { return each.second.client == client && (!nonce || each.second.order.nonce == *nonce); });
 }
 
 void FrameMachine::State::OnVolumePart(PeerToken client, const VolumePart& part, const Bytes& payload) {

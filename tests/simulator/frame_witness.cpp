@@ -96,10 +96,9 @@ void FrameWitness::OnAssignment(const GroupAssignment& assignment, std::size_t w
   std::size_t unfinished = 0;
   for (const auto& [id, other] : frames_) unfinished += other.over ? 0 : other.unfinished();
   // While frames wait for their next attempt, the groups of the last one, which may have had the window to itself, are still out but no
-  // longer counted. That window may have been wider: of more workers.
+  // longer counted.
   const FrameWindow window = WindowFor(workers, std::uint32_t(teams), FrameBytes(assignment.setup));
-  widest_ = std::max(widest_, window.groups);
-  EXPECT_LE(unfinished, std::size_t(faultless_ ? window.groups : widest_ * window.frames));
+  EXPECT_LE(unfinished, std::size_t(faultless_ ? window.groups : window.groups * window.frames));
   if (faultless_ && UsesOcclusion(assignment.setup)) {
     EXPECT_LE(frame.unfinished(), std::size_t(kMaskedGroups));
   }

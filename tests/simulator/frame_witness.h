@@ -50,7 +50,6 @@ class FrameWitness {
 
   const bool faultless_;
   Tally& tally_;
-  int widest_ = 0;                              // window of groups, so far
   std::map<FrameId, SeenFrame> frames_;         // of this epoch
   std::map<BoxId, Box> last_boxes_;             // as they were handed out last
   std::set<std::pair<WorkerId, Box>> fetched_;  // voxels that workers hold for sure
