@@ -13,7 +13,7 @@ export interface Dataset {
 }
 export interface Histogram { range: [number, number]; counts: number[]; percentiles: Record<string, number> }
 export interface LabelName { value: number; name: string; color?: string }
-export interface Value { inside?: boolean; hit?: boolean; at?: Vec3; voxel?: [number, number, number]; value?: number; label?: LabelName | null }
+export interface Value { inside?: boolean; hit?: boolean; at?: Vec3; voxel?: [number, number, number] | null; value?: number | null; label?: LabelName | null }
 
 export class Api {
   private readonly missing = new Set<string>();

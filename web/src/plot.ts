@@ -4,7 +4,7 @@ import { svg } from "./dom";
 import { type ColorMap, colorAt, hexOf, opacityAt } from "./transfer";
 import { clamp, rounded } from "./vec";
 
-export const PLOT = { height: 148, top: 8, bottom: 8, side: 11, strip: 14, stripGap: 12 } as const;
+export const PLOT = { height: 148, top: 11, bottom: 8, side: 11, strip: 14, stripGap: 12 } as const;
 const CURVE_STEPS = 160;
 
 export class Scale {

@@ -57,7 +57,7 @@ export class Pointed {
     if (value.hit === false || !value.at) return this.say("");
     const label = value.label ?? null;
     if (label && label.value > 0) this.onLabel(label);
-    this.say(this.position(value.at), value.value === undefined || value.inside === false ? "" : `value ${shown(value.value)}`, label && label.value > 0 ? label.name || `label ${label.value}` : "");
+    this.say(this.position(value.at), typeof value.value !== "number" || value.inside === false ? "" : `value ${shown(value.value)}`, label && label.value > 0 ? label.name || `label ${label.value}` : "");
   }
 
   private position(at: Vec3): string {
