@@ -386,7 +386,7 @@ AnyMessage Simulation::OnTheWay(const AnyMessage& message) const { return encode
 
 Arrivals Simulation::ToWorker(Node to, AnyMessage& message, double sent) {
   if (const auto* assignment = std::get_if<GroupAssignment>(&message)) {
-    witness_.OnAssignment(*assignment, workers_.size(), world_.policy.teams);
+    witness_.OnAssignment(*assignment, workers_.size(), most_teams_);
     EXPECT_TRUE(published_.contains(assignment->setup.dataset)) << "a group of voxels that are not there any more";
     if (assignment->setup.dataset != voxels_) tally_.Add(Count::kFramesOfRetiredVoxels);
   }

@@ -139,6 +139,7 @@ class Simulation : private Conditions {
   const bool encode_messages_;  // in a few worlds messages are encoded and decoded on their way
   bool workerless_ = false;     // for a moment no worker was running
   const SimulatedWorld world_;
+  int most_teams_ = world_.policy.teams;  // that a client, which may be hostile, has asked for: each has a window of its own
   FrameWitness witness_;
   const MachineModel machine_ = WithoutDelays();  // what takes how long is up to the world
   SimulatedService service_;

@@ -246,7 +246,10 @@ void Simulation::Speak(HostilePeer& peer) {
 
 void Simulation::SpeakAsClient(std::size_t hostile) {
   tally_.Add(Count::kHostileClientMessages);
-  service_.StepCoordinator(FromClient{service_.TokenOf(Node(kHostileClientEnds + int(hostile))), words_.OfClient(world_.policy)});
+  AnyMessage words = words_.OfClient(world_.policy);
+  const auto* const submit = std::get_if<SubmitFrame>(&words);
+  if (submit != nullptr && submit->frame.policy.teams <= kMaxTeams) most_teams_ = std::max(most_teams_, submit->frame.policy.teams);
+  service_.StepCoordinator(FromClient{service_.TokenOf(Node(kHostileClientEnds + int(hostile))), std::move(words)});
 }
 
 }  // namespace slabstream
