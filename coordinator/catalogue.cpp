@@ -15,7 +15,6 @@
 #include "common/volume_io/formats.h"
 #include "common/volume_io/read_options.h"
 #include "common/volume_io/volume_reader.h"
-#include "coordinator/dataset_name.h"
 
 namespace slabstream {
 namespace {

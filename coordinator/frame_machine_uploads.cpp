@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/frame/dataset_name.h"
 #include "common/volume/memory_budget.h"
-#include "coordinator/dataset_name.h"
 #include "coordinator/frame_machine_state.h"
 
 namespace slabstream {

@@ -65,8 +65,8 @@ struct WorkerMachine::State {
   // Drops what a worker sends, what its service handles (ImageRefused, ImageReceived), and the messages of the client plane.
   template <AnyOf<Register, Heartbeat, GroupDone, FrameImage, WorkerTrouble, Leave, ChunkRequest, ImageRefused, ImageReceived, SubmitFrame,
                   FrameProgress, FrameReply, FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery, StatusReply, ShutDown,
-                  ShutDownReply, KeysOrder, KeysReply, OrderRefused, DataOrder, DataReply, SummaryQuery, SummaryReply, SampleQuery, SampleReply,
-                  PickQuery, PickReply, AddVolume, VolumeCredit, VolumePart, DropVolume>
+                  ShutDownReply, KeysOrder, KeysReply, OrderRefused, DataOrder, DataReply, SummaryQuery, SummaryReply, SampleQuery,
+                  SampleReply, PickQuery, PickReply, AddVolume, VolumeCredit, VolumePart, DropVolume>
                 Message>
   void On(const Message&, const Bytes&) {}
 

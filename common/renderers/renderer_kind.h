@@ -29,7 +29,7 @@ enum class PickRule : std::uint8_t {
   kSurface,      // where it meets the first opaque voxel
   kLargest,      // where the volume has its largest value, or its least one
   kLeast,
-  kNone,         // no single one
+  kNone,  // no single one
 };
 
 // A number or a choice that a request may set for a renderer, such as sampling-rate. The command line takes it as --NAME.
