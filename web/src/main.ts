@@ -68,6 +68,8 @@ class Page {
       if (location.hash.includes("token=")) return location.reload(); // a link of another start of the gateway, perhaps
       store.update(stateOf(location.hash.slice(1)));
     });
+    document.addEventListener("pointerdown", () => store.press(), true);
+    for (const end of ["pointerup", "pointercancel"]) document.addEventListener(end, () => store.letGo(), true);
     this.dropsFiles(editor);
     this.shell.setPanel(innerWidth > NARROW_PIXELS);
     this.show();

@@ -78,6 +78,7 @@ export class Store {
   private past: State[] = [];
   private future: State[] = [];
   private gesture = { name: "", at: -Infinity };
+  private held = false; // a button or a finger is down
 
   constructor(initial: State) { this.current = initial; }
 
@@ -90,11 +91,15 @@ export class Store {
     this.listeners.add(keys ? (state, before) => { if (keys.some(key => state[key] !== before[key])) listener(state, before); } : listener);
   }
 
+  // From pressing to letting go is one gesture, however long it takes.
+  press(): void { this.held = true; this.gesture = { name: "", at: -Infinity }; }
+  letGo(): void { this.held = false; }
+
   // `gesture` names what the user does, for undo. Changes of one gesture that follow each other are one step.
   update(patch: Partial<State>, gesture = ""): void {
     if (gesture !== "") {
       const now = performance.now();
-      if (gesture !== this.gesture.name || now - this.gesture.at > ONE_GESTURE_MS) this.past = [...this.past.slice(1 - UNDO_STEPS), this.current];
+      if (gesture !== this.gesture.name || (!this.held && now - this.gesture.at > ONE_GESTURE_MS)) this.past = [...this.past.slice(1 - UNDO_STEPS), this.current];
       this.gesture = { name: gesture, at: now };
       this.future = [];
     }
