@@ -42,7 +42,7 @@ Result<AnyMessage> Answer(const PickQuery& query, const Dataset& dataset) {
   if (!setup.ok()) return setup.status();
   PickReply reply{.nonce = query.nonce};
   if (const std::optional<Picked> picked = Pick(*setup, dataset.volume, query.x, query.y)) {
-    reply.sample = SampleAt(dataset.volume, dataset.summary, dataset.summary.description.geometry.ToWorld(picked->at));
+    reply.sample = SampleAtVoxel(dataset.volume, dataset.summary, dataset.summary.description.geometry.ToWorld(picked->at), picked->voxel);
     reply.depth = picked->depth;
   }
   return AnyMessage(std::move(reply));

@@ -51,9 +51,15 @@ std::vector<Stretch> DrawnStretches(const FrameSetup& setup, const Camera::Ray& 
   return rest;
 }
 
+// Where a ray enters a voxel.
+struct Entry {
+  double depth;
+  Index3 voxel;
+};
+
 // The ray through opaque cells of voxels, [v - 0.5, v + 0.5) (J. Amanatides, A. Woo: A fast voxel traversal algorithm, 1987).
-std::optional<double> FirstOpaqueVoxel(const FrameSetup& setup, const ProbeVolume& volume, const Camera::Ray& ray,
-                                       const std::vector<Stretch>& stretches) {
+std::optional<Entry> FirstOpaqueVoxel(const FrameSetup& setup, const ProbeVolume& volume, const Camera::Ray& ray,
+                                      const std::vector<Stretch>& stretches) {
   const ClassificationTable table = setup.renderer->Table(setup.transfer, setup.description, setup.range);
   const std::vector<LabelUse> uses = setup.looks.labels ? UsesOf(*setup.looks.labels) : std::vector<LabelUse>{LabelUse::kAsVolume};
   const auto is_opaque = [&](const Index3& voxel) {
@@ -67,7 +73,7 @@ std::optional<double> FirstOpaqueVoxel(const FrameSetup& setup, const ProbeVolum
     double depth = stretch.begin;
     Index3 voxel = Max(bounds.begin, Min(VoxelAt(ray.origin + depth * ray.direction), bounds.end - Uniform(1)));
     while (bounds.Contains(voxel) && depth < stretch.end) {
-      if (is_opaque(voxel)) return depth;
+      if (is_opaque(voxel)) return Entry{depth, voxel};
       double next = kInfinity;
       int axis = 0;
       for (int i = 0; i < 3; ++i) {
@@ -225,21 +231,34 @@ std::optional<Picked> Pick(const FrameSetup& setup, const ProbeVolume& volume, d
   const Vec3& spacing = setup.description.geometry.spacing;
   const double least_per_depth = Length(ray.direction * spacing) / Least(spacing), step = kStep / least_per_depth;
 
-  std::optional<double> depth;
+  const auto picked = [&](double depth, double deeper) {
+    const Box bounds = setup.description.geometry.bounds();
+    const Index3 voxel = VoxelAt(ray.origin + (depth + deeper) * ray.direction);
+    return Picked{ray.origin + depth * ray.direction, depth, Max(bounds.begin, Min(voxel, bounds.end - Uniform(1)))};
+  };
+  const auto extreme = [&](double sign) -> std::optional<Picked> {
+    const std::optional<double> depth = Extreme(setup, volume, ray, stretches, step, sign);
+    return depth ? std::optional(picked(*depth, 0)) : std::nullopt;
+  };
   switch (setup.renderer->PickRuleOf(setup.parameters)) {
     case PickRule::kHalfOpacity: {
       const Matter matter(setup, volume);
       HalfLightWalk walk(matter, ray, least_per_depth);
-      for (auto stretch = stretches.begin(); stretch != stretches.end() && !depth; ++stretch) depth = walk.Along(*stretch, step);
-      break;
+      for (const Stretch& stretch : stretches) {
+        if (const std::optional<double> depth = walk.Along(stretch, step)) return picked(*depth, 1 / least_per_depth);
+      }
+      return std::nullopt;
     }
-    case PickRule::kSurface: depth = FirstOpaqueVoxel(setup, volume, ray, stretches); break;
-    case PickRule::kLargest: depth = Extreme(setup, volume, ray, stretches, step, 1); break;
-    case PickRule::kLeast: depth = Extreme(setup, volume, ray, stretches, step, -1); break;
+    case PickRule::kSurface: {
+      const std::optional<Entry> entry = FirstOpaqueVoxel(setup, volume, ray, stretches);
+      if (!entry) return std::nullopt;
+      return Picked{ray.origin + entry->depth * ray.direction, entry->depth, entry->voxel};
+    }
+    case PickRule::kLargest: return extreme(1);
+    case PickRule::kLeast: return extreme(-1);
     case PickRule::kNone: break;
   }
-  if (!depth) return std::nullopt;
-  return Picked{ray.origin + *depth * ray.direction, *depth};
+  return std::nullopt;
 }
 
 }  // namespace slabstream

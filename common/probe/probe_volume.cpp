@@ -53,9 +53,12 @@ Index3 VoxelAt(const Vec3& p) {
 
 VolumeSample SampleAt(const ProbeVolume& volume, const VolumeSummary& summary, const Vec3& at) {
   const VolumeGeometry& geometry = summary.description.geometry;
+  return SampleAtVoxel(volume, summary, at, VoxelAt(geometry.orientation.FromWorld(at - geometry.orientation.origin) / geometry.spacing));
+}
+
+VolumeSample SampleAtVoxel(const ProbeVolume& volume, const VolumeSummary& summary, const Vec3& at, const Index3& voxel) {
   VolumeSample sample{.at = at};
-  const Index3 voxel = VoxelAt(geometry.orientation.FromWorld(at - geometry.orientation.origin) / geometry.spacing);
-  sample.inside = geometry.bounds().Contains(voxel);
+  sample.inside = summary.description.geometry.bounds().Contains(voxel);
   if (!sample.inside) return sample;
   sample.voxel = voxel;
   const auto finite = [](double value) { return std::isfinite(value) ? std::optional<double>(value) : std::nullopt; };

@@ -27,5 +27,7 @@ Index3 VoxelAt(const Vec3& p);
 
 // `at` is a point of the world. `summary` is that of the dataset.
 VolumeSample SampleAt(const ProbeVolume& volume, const VolumeSummary& summary, const Vec3& at);
+// What the voxel, which may lie outside, holds, as the sample at this point.
+VolumeSample SampleAtVoxel(const ProbeVolume& volume, const VolumeSummary& summary, const Vec3& at, const Index3& voxel);
 
 }  // namespace slabstream

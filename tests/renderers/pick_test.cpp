@@ -44,7 +44,7 @@ TEST(Pick, IsosurfaceOfABallIsHitWhereTheRayEntersIt) {
       SetupOptions options{.renderer = FindRenderer("raycast"), .view = RandomView(projection, random)};
       options.transfer = {.colors = {{0, {1, 1, 1}}}, .opacities = {{0, 0}}, .opacity_distance = 1, .isosurfaces = {{0, {1, 1, 1}, 1}}};
       const FrameSetup setup = MakeSetup(ball, options);
-      int hits = 0;
+      int hits = 0, steep = 0, in_ball = 0;
       for (int y = 2; y < 64; y += 5) {
         for (int x = 2; x < 64; x += 5) {
           double reach = 0;
@@ -60,9 +60,13 @@ TEST(Pick, IsosurfaceOfABallIsHitWhereTheRayEntersIt) {
           EXPECT_NEAR(back.x, (x + 0.5) * s, 1e-6);
           EXPECT_NEAR(back.y, (y + 0.5) * s, 1e-6);
           EXPECT_NEAR(back.depth, picked->depth, 1e-9);
+          if (reach > 0.7 * kRadius) continue;
+          ++steep;
+          in_ball += (ProbeVolume{.voxels = VoxelBricks(ball.block)}).StoredAt(picked->voxel) > 0 ? 1 : 0;
         }
       }
       EXPECT_GT(hits, 5);
+      EXPECT_GE(in_ball, 0.9 * steep) << "the voxel is one of the ball, although the point lies between voxels";
     }
   }
 }
@@ -110,6 +114,9 @@ TEST(Pick, IsTheDepthOfTheZBuffer) {
             const auto picked = PickIn(blobs, setup, x + 0.5, y + 0.5);
             const bool both = std::isfinite(depth) == picked.has_value();
             wrong += both && (!picked || std::abs(picked->depth - double(depth)) < 1e-3) ? 0 : 1;
+            if (picked) {
+              EXPECT_GT((ProbeVolume{.voxels = VoxelBricks(blobs.block)}).StoredAt(picked->voxel), 0) << x << ", " << y;
+            }
             seen += picked ? 1 : 0;
           }
         }
