@@ -17,6 +17,10 @@
 #define SLABSTREAM_WORKER_RAYS_RAY_PACKET_INL_H_
 #endif
 
+// Of lambdas that must be part of the loop that calls them: where there are many calls, g++ keeps them apart.
+#undef SLABSTREAM_INLINED
+#define SLABSTREAM_INLINED HWY_ATTR __attribute__((always_inline))
+
 HWY_BEFORE_NAMESPACE();
 namespace slabstream {
 namespace HWY_NAMESPACE {

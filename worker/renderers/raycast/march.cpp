@@ -49,7 +49,11 @@ struct Sums {
   // Adds what lies next on these rays. `colors`: straight, red, green, blue and something else of each colour; `entry`: times four.
   HWY_INLINE void Add(Mask rays, Floats opacity, const float* colors, Ints entry, const Light& light) {
     const FloatTag df;
-    AddChannels(rays, opacity, [&](std::size_t channel) HWY_ATTR { return Lit(hn::GatherIndex(df, colors + channel, entry), light); });
+    const auto weight = hn::IfThenElseZero(rays, hn::Mul(hn::Sub(Set(1), alpha), opacity));
+    red = hn::MulAdd(weight, Lit(hn::GatherIndex(df, colors, entry), light), red);
+    green = hn::MulAdd(weight, Lit(hn::GatherIndex(df, colors + 1, entry), light), green);
+    blue = hn::MulAdd(weight, Lit(hn::GatherIndex(df, colors + 2, entry), light), blue);
+    alpha = hn::Add(alpha, weight);
   }
   // `color(channel)`: what the light makes of red, green and blue.
   template <class Color>
@@ -275,12 +279,14 @@ HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& pac
   const LeapScales leaps = LeapScalesOf(packet);
   Sums sums = {zero, zero, zero, zero};
   std::uint64_t shaded = 0;
-  if (work.layers != nullptr) {
-    shaded = MarchParts<T, Samples::kLayered>(work, packet, leaps, owned, sums);
-  } else if (!work.rays->clip.empty() || !work.look->isovalues.empty() || !work.look->gradient_factors.empty()) {
+  // Plain frames stand first and in line: behind a branch that g++ thinks likelier they take 8 % longer.
+  const bool has_parts = !work.rays->clip.empty() || !work.look->isovalues.empty() || !work.look->gradient_factors.empty();
+  if (HWY_LIKELY(work.layers == nullptr && !has_parts)) {
+    shaded = MarchSamples<T, Samples::kPlain>(work, packet, leaps, owned, nullptr, sums);
+  } else if (work.layers == nullptr) {
     shaded = MarchParts<T, Samples::kAll>(work, packet, leaps, owned, sums);
   } else {
-    shaded = MarchSamples<T, Samples::kPlain>(work, packet, leaps, owned, nullptr, sums);
+    shaded = MarchParts<T, Samples::kLayered>(work, packet, leaps, owned, sums);
   }
   if (shaded != 0) hn::StoreInterleaved4(sums.red, sums.green, sums.blue, sums.alpha, FloatTag(), rgba);
   return shaded;

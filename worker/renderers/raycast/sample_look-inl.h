@@ -33,18 +33,20 @@ template <class T>
 HWY_INLINE Gradient GradientAt(const Neighbours<T>& n, const SamplePlace& place) {
   const auto u = place.fraction[0], v = place.fraction[1], w = place.fraction[2];
   // Row y, z of 0 ... 3, interpolated along x.
-  const auto inner = [&](int y, int z) HWY_ATTR { return Lerp(u, n.inner[z - 1][y - 1].a, n.inner[z - 1][y - 1].b); };
-  const auto outer = [&](int y, int z) HWY_ATTR {
+  const auto inner = [&](int y, int z) SLABSTREAM_INLINED { return Lerp(u, n.inner[z - 1][y - 1].a, n.inner[z - 1][y - 1].b); };
+  const auto outer = [&](int y, int z) SLABSTREAM_INLINED {
     const InnerPair pair = LoadInner(n.samples, n.RowAt(y, z));
     return Lerp(u, pair.a, pair.b);
   };
-  const auto slope = [&](int y, int z) HWY_ATTR {
+  const auto slope = [&](int y, int z) SLABSTREAM_INLINED {
     const OuterSlopes slopes = LoadSlopes(n.samples, n.RowAt(y, z), n.inner[z - 1][y - 1]);
     return Lerp(u, slopes.at_a, slopes.at_b);
   };
   const auto r11 = inner(1, 1), r21 = inner(2, 1), r12 = inner(1, 2), r22 = inner(2, 2);
-  const auto along_y = [&](Floats first, Floats a, Floats b, Floats last) HWY_ATTR { return Lerp(v, hn::Sub(b, first), hn::Sub(last, a)); };
-  const auto along_z = [&](Floats first, Floats a, Floats b, Floats last) HWY_ATTR { return Lerp(w, hn::Sub(b, first), hn::Sub(last, a)); };
+  const auto along_y = [&](Floats first, Floats a, Floats b, Floats last)
+                           SLABSTREAM_INLINED { return Lerp(v, hn::Sub(b, first), hn::Sub(last, a)); };
+  const auto along_z = [&](Floats first, Floats a, Floats b, Floats last)
+                           SLABSTREAM_INLINED { return Lerp(w, hn::Sub(b, first), hn::Sub(last, a)); };
   return {Lerp(w, Lerp(v, slope(1, 1), slope(2, 1)), Lerp(v, slope(1, 2), slope(2, 2))),
           Lerp(w, along_y(outer(0, 1), r11, r21, outer(3, 1)), along_y(outer(0, 2), r12, r22, outer(3, 2))),
           Lerp(v, along_z(outer(1, 0), r11, r12, outer(1, 3)), along_z(outer(2, 0), r21, r22, outer(2, 3)))};
