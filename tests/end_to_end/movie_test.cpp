@@ -1,6 +1,7 @@
 // Movies of `turntable`, and turntables over time. Most tests put a script in place of ffmpeg that keeps what it gets; the last ones take
 // the real program where it is installed.
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <cmath>
@@ -183,11 +184,13 @@ TEST_F(MovieTest, WithoutAnEncoderTheFirstLineSaysWhatToInstall) {
 // The encoder reads nothing, so that a frame is stuck on its way to it: Ctrl-C ends both, and pictures have not piled up meanwhile.
 TEST_F(MovieTest, CtrlCEndsAMovieThatIsStuck) {
   std::ofstream(Path("movie.mp4")) << "older";
-  StandIn("echo $$ > pid.txt; exec tail -f /dev/null");
+  ASSERT_EQ(::mkfifo(Path("pid").c_str(), 0600), 0);  // whoever reads it waits until the encoder runs
+  StandIn("echo $$ > pid; exec tail -f /dev/null");
   RunningProgram program(Command({"turntable", ball_, "--local=2", "-o", "movie.mp4", "--size", "512", "--frames", "100000", "--in-flight",
                                   "2", "--progress"}),
                          directory_);
   ASSERT_TRUE(program.WaitForError("frame 3 of 100000: done"));
+  const pid_t encoder = std::stoi(ReadFile("pid"));
   program.Signal(SIGINT);
   const ProgramResult result = program.Wait();
   EXPECT_EQ(result.exit_status, 130);
@@ -195,9 +198,9 @@ TEST_F(MovieTest, CtrlCEndsAMovieThatIsStuck) {
   EXPECT_EQ(lines.back(), "slabstream turntable: interrupted");
   const auto done = std::ranges::count_if(lines, [](const std::string& line) { return line.ends_with(": done"); });
   EXPECT_LE(done, 2 + 2) << "open frames, and those that wait or are stuck";
-  EXPECT_EQ(Files(), (std::vector<std::string>{"ball.nrrd", "movie.mp4", "pid.txt"}));
+  EXPECT_EQ(Files(), (std::vector<std::string>{"ball.nrrd", "movie.mp4"}));
   EXPECT_EQ(ReadFile("movie.mp4"), "older");
-  EXPECT_NE(::kill(std::stoi(ReadFile("pid.txt")), 0), 0) << "the encoder still runs";
+  EXPECT_NE(::kill(encoder, 0), 0) << "the encoder still runs";
 }
 
 TEST_F(MovieTest, CtrlCEndsAnEncoderThatDoesNotEnd) {
