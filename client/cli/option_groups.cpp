@@ -59,6 +59,21 @@ std::string WithReadOptions(const CLI::App& app, std::string source) {
   return source;
 }
 
+namespace {
+
+// WithReadOptions. Throws what CLI11 takes for an error if there are such options although the source is no file.
+std::string WithReadOptionsOfFile(const CLI::App& app, const std::string& source, bool is_file) {
+  std::string with_options = WithReadOptions(app, source);
+  if (with_options != source && !is_file) {
+    throw CLI::ValidationError(
+        fmt::format("'{}' is a dataset at the service; options for reading its file stand where the service names it, as in --data {}",
+                    source, WithReadOptions(app, "NAME=FILE")));
+  }
+  return with_options;
+}
+
+}  // namespace
+
 void ResolveSource(CLI::App& app, const CLI::Option* source, std::string& volume, TransferChoice& transfer, std::function<bool()> is_file) {
   app.parse_complete_callback([&app, source, &volume, &transfer, is_file = std::move(is_file)] {
     if (source->count() == 0) return;
@@ -67,12 +82,7 @@ void ResolveSource(CLI::App& app, const CLI::Option* source, std::string& volume
     if (argument->transfer && app.get_option("--transfer")->count() > 0) {
       throw CLI::ValidationError(fmt::format("SOURCE '{}' names a transfer function, and so does --transfer", volume));
     }
-    volume = WithReadOptions(app, argument->volume);
-    if (volume != argument->volume && !is_file()) {
-      throw CLI::ValidationError(
-          fmt::format("'{}' is a dataset at the service; options for reading its file stand where the service names it, as in --data {}",
-                      argument->volume, WithReadOptions(app, "NAME=FILE")));
-    }
+    volume = WithReadOptionsOfFile(app, argument->volume, is_file());
     if (argument->transfer) {
       transfer.choice = *std::move(argument->transfer);
     } else {
@@ -87,15 +97,7 @@ void AddSource(CLI::App& app, std::string& source, ConnectionOptions& connection
   AddReadOptions(app);
   AddConnectionOptions(app, connection);
   app.option_defaults()->group("Options");
-  app.parse_complete_callback([&app, &source, &connection] {
-    const std::string with_options = WithReadOptions(app, source);
-    if (with_options != source && connection.local_workers == 0) {
-      throw CLI::ValidationError(
-          fmt::format("'{}' is a dataset at the service; options for reading its file stand where the service names it, as in --data {}",
-                      source, WithReadOptions(app, "NAME=FILE")));
-    }
-    source = with_options;
-  });
+  app.parse_complete_callback([&app, &source, &connection] { source = WithReadOptionsOfFile(app, source, connection.local_workers > 0); });
 }
 
 void AddSliceOptions(CLI::App& app, SliceOptions& options) {

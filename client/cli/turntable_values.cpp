@@ -2,11 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <vector>
-
 #include "client/cli/movie.h"
 #include "common/cli/parse.h"
-#include "common/volume_io/read_options.h"
 
 namespace slabstream {
 

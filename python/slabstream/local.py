@@ -15,15 +15,14 @@ from typing import Any
 from .address import Address
 from .connection import Connection
 from .errors import SlabstreamError, Unavailable
-from .programs import find_program
+from .programs import KEEPER, end_keeper, find_program
 from .service import Service
 
 _START_SECONDS = 60.0
 _END_SECONDS = 20.0
 _MOST_FOLDER_BYTES = 50  # of temporary files: paths of sockets have at most 107, with names of ours and of workers behind it
 
-# Starts the service in its folder, and ends both when this process is gone, however it ended: then nobody holds the other end of the pipe.
-_KEEPER = '"$@" </dev/null & service=$!; exec >&- 2>&-; read -r _; kill "$service"; wait "$service"; rm -rf -- "$0"'
+_KEEPER = KEEPER + '; rm -rf -- "$0"'  # of the service, in its folder
 
 
 class LocalService:
@@ -75,15 +74,8 @@ class LocalService:
             return  # a forked child's copy
         if hasattr(self, "service"):
             self.service.close()
-        assert self.keeper.stdin is not None and self.keeper.stdout is not None
-        self.keeper.stdin.close()
-        try:
-            self.keeper.wait(_END_SECONDS)
-        except subprocess.TimeoutExpired:
-            self.keeper.kill()
-            self.keeper.wait()
+        if not end_keeper(self.keeper, _END_SECONDS):
             shutil.rmtree(self.folder, ignore_errors=True)
-        self.keeper.stdout.close()
 
 
 lock = threading.RLock()

@@ -1,11 +1,30 @@
-"""Where the programs are that this package starts."""
+"""Where the programs are that this package starts, and how they end with it."""
 from __future__ import annotations
 
 import os
 import pathlib
 import shutil
+import subprocess
 
 from .errors import NotFound
+
+# A shell script that starts "$@" and ends it when this process is gone, however it ended: then nobody holds the other end of the pipe.
+KEEPER = '"$@" </dev/null & program=$!; exec >&- 2>&-; read -r _; kill "$program"; wait "$program"'
+
+
+def end_keeper(keeper: subprocess.Popen[bytes], seconds: float) -> bool:
+    """Ends what a KEEPER with pipes for input and output keeps. False: it took longer, so the keeper was killed."""
+    assert keeper.stdin is not None and keeper.stdout is not None
+    keeper.stdin.close()
+    try:
+        keeper.wait(seconds)
+        ended = True
+    except subprocess.TimeoutExpired:
+        keeper.kill()
+        keeper.wait()
+        ended = False
+    keeper.stdout.close()
+    return ended
 
 
 def find_program() -> str:

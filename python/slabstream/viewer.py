@@ -13,14 +13,11 @@ from typing import Any
 
 from .address import Address
 from .errors import SlabstreamError, Unavailable
-from .programs import find_program
+from .programs import KEEPER, end_keeper, find_program
 
 _START_SECONDS = 20.0
 _END_SECONDS = 10.0
 _PICTURE_SIDE = 512  # of the picture in its place
-
-# Starts the gateway, and ends it when this process is gone, however it ended: then nobody holds the other end of the pipe.
-_KEEPER = '"$@" </dev/null & gateway=$!; exec >&- 2>&-; read -r _; kill "$gateway"; wait "$gateway"'
 
 
 class _Gateway:
@@ -33,7 +30,7 @@ class _Gateway:
         arguments = ["--endpoint", address.endpoint] + ([] if address.file is None else ["--service", str(address.file)])
         self.process = os.getpid()
         self.keeper = subprocess.Popen(
-            ["/bin/sh", "-c", _KEEPER, "viewer", str(program), *arguments],
+            ["/bin/sh", "-c", KEEPER, "viewer", str(program), *arguments],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True,
         )
         assert self.keeper.stdout is not None
@@ -50,14 +47,7 @@ class _Gateway:
     def end(self) -> None:
         if self.process != os.getpid():
             return  # a forked child's copy
-        assert self.keeper.stdin is not None and self.keeper.stdout is not None
-        self.keeper.stdin.close()
-        try:
-            self.keeper.wait(_END_SECONDS)
-        except subprocess.TimeoutExpired:
-            self.keeper.kill()
-            self.keeper.wait()
-        self.keeper.stdout.close()
+        end_keeper(self.keeper, _END_SECONDS)
 
 
 _lock = threading.Lock()
