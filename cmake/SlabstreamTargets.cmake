@@ -17,7 +17,7 @@ target_include_directories(slabstream_options INTERFACE ${CMAKE_SOURCE_DIR})
 target_compile_options(slabstream_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual)
 # Designated initialisers name what differs from the defaults and leave out the rest on purpose.
 target_compile_options(slabstream_options INTERFACE -Wno-missing-field-initializers)
-if(SLABSTREAM_UNITY)
+if(SLABSTREAM_UNITY AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   target_compile_options(slabstream_options INTERFACE -Wno-subobject-linkage) # every file looks included there
 endif()
 # Kernels keep vectors in arrays and structs, which those of SVE, whose size no compiler knows, cannot be kept in: NEON on all of Arm.
