@@ -109,7 +109,7 @@ TEST(DrawFaces, NearerKeysStay) {
   }
 }
 
-TEST(AllNearer, LooksAtEveryPixelOfTheBoundsAndNoOther) {
+TEST(AllHidden, LooksAtEveryPixelOfTheBoundsAndNoOther) {
   const std::uint64_t near = std::uint64_t{std::bit_cast<std::uint32_t>(2.0F)} << 32 | 7;
   ForEachTarget([&] {
     for (int width : {1, 3, 8, 21}) {
@@ -118,15 +118,75 @@ TEST(AllNearer, LooksAtEveryPixelOfTheBoundsAndNoOther) {
       for (int y = bounds.y_begin; y < bounds.y_end; ++y) {
         for (int x = bounds.x_begin; x < bounds.x_end; ++x) keys.keys[std::size_t(y - 2) * keys.stride + std::size_t(x - 10)] = near;
       }
-      EXPECT_TRUE(AllNearer(keys.band(), bounds, 2.5F));
-      EXPECT_FALSE(AllNearer(keys.band(), bounds, 2.0F));  // not nearer, as near
+      EXPECT_TRUE(AllHidden(keys.band(), bounds, 2.5F));
+      EXPECT_FALSE(AllHidden(keys.band(), bounds, 2.0F));  // not nearer, as near
       for (int x = bounds.x_begin; x < bounds.x_end; ++x) {
         std::uint64_t& key = keys.keys[std::size_t(6 - 2) * keys.stride + std::size_t(x - 10)];
         key = kEmptyKey;
-        EXPECT_FALSE(AllNearer(keys.band(), bounds, 2.5F));
+        EXPECT_FALSE(AllHidden(keys.band(), bounds, 2.5F));
         key = near;
       }
     }
+  });
+}
+
+TEST(AllHidden, SeesOnlyDepthsThatTheLimitsLetThrough) {
+  constexpr unsigned kSeed = 7;
+  SCOPED_TRACE(kSeed);
+  std::mt19937 random(kSeed);
+  // Whole numbers, so that depths are often equal. A limit that begins behind its end belongs to a ray that misses the region.
+  const auto any = [&] { return float(1 + random() % 6); };
+  for (int round = 0; round < 400; ++round) {
+    Keys keys({10, 2, 50, 9});
+    for (std::uint64_t& key : keys.keys) key = std::uint64_t{std::bit_cast<std::uint32_t>(any())} << 32 | 7;
+    std::vector<float> from(keys.keys.size()), to(keys.keys.size());
+    std::ranges::generate(from, any);
+    std::ranges::generate(to, any);
+    KeyBand band = keys.band();
+    band.limits = {from.data(), to.data(), round % 2 == 0};
+    const int x = 10 + int(random() % 30), y = 2 + int(random() % 7);
+    const PixelBounds bounds = {x, y, x + 1 + int(random() % 3), y + 1};
+    const float nearest = any();
+    bool seen = false;  // a depth from `nearest` on, in steps of a half, that is let through and not hidden
+    for (std::int32_t column = bounds.x_begin; column < bounds.x_end; ++column) {
+      const std::size_t at = std::size_t(y - 2) * band.stride + std::size_t(column - 10);
+      for (float depth = nearest; depth < 9; depth += 0.5F) {
+        const bool inside = depth >= from[at] && depth <= to[at];
+        seen |= inside == band.limits.inside && depth <= std::bit_cast<float>(std::uint32_t(band.keys[at] >> 32));
+      }
+    }
+    // It may take a pixel for seen that is not, never the other way round.
+    ForEachTarget([&] {
+      if (seen) {
+        EXPECT_FALSE(AllHidden(band, bounds, nearest));
+      }
+    });
+    band.limits = {};
+    bool nearer = true;
+    for (std::int32_t column = bounds.x_begin; column < bounds.x_end; ++column) {
+      const std::size_t at = std::size_t(y - 2) * band.stride + std::size_t(column - 10);
+      nearer &= std::bit_cast<float>(std::uint32_t(band.keys[at] >> 32)) < nearest;
+    }
+    EXPECT_EQ(AllHidden(band, bounds, nearest), nearer);
+  }
+}
+
+TEST(AllHidden, ACutHidesWhatLiesBehindIt) {
+  Keys keys({10, 2, 50, 9});
+  const std::vector<float> enter(keys.keys.size(), 3.0F), leave(keys.keys.size(), 8.0F);
+  const PixelBounds bounds = {13, 4, 34, 7};
+  KeyBand band = keys.band();
+  const auto hidden = [&](float cut, bool inside, float nearest) {
+    std::ranges::fill(keys.keys, std::uint64_t{std::bit_cast<std::uint32_t>(cut)} << 32 | 7);
+    band.limits = {enter.data(), leave.data(), inside};
+    return AllHidden(band, bounds, nearest);
+  };
+  ForEachTarget([&] {
+    EXPECT_TRUE(hidden(2.5F, true, 1));    // what lies before the region is not drawn
+    EXPECT_FALSE(hidden(3.5F, true, 1));   // the cut lies behind the beginning of what is drawn
+    EXPECT_TRUE(hidden(7.5F, false, 4));   // what lies in the region is not drawn, and the cut hides what lies behind it
+    EXPECT_FALSE(hidden(7.5F, false, 1));  // something is drawn before the region
+    EXPECT_FALSE(hidden(8.5F, false, 4));
   });
 }
 

@@ -270,7 +270,7 @@ std::size_t DrawAny(Projection projection, const FaceProjection& faces, const Fa
                  : Draw<false, false>(faces, sites, normals, first, count, band);
 }
 
-bool AllNearerThan(const KeyBand& band, const PixelBounds& bounds, float depth) {
+bool NothingSeen(const KeyBand& band, const PixelBounds& bounds, float depth) {
   const hn::ScalableTag<std::int64_t> d;  // depths are positive, so keys are too
   const auto lanes = std::int32_t(hn::Lanes(d));
   const auto limit = hn::Set(d, std::int64_t{std::bit_cast<std::int32_t>(depth)} << 32);
@@ -288,22 +288,47 @@ bool AllNearerThan(const KeyBand& band, const PixelBounds& bounds, float depth) 
   return true;
 }
 
+bool NothingSeenOfClipped(const KeyBand& band, const PixelBounds& bounds, float depth) {
+  const hn::ScalableTag<std::uint64_t> d;
+  const hn::Rebind<float, decltype(d)> df;
+  const hn::Rebind<std::uint32_t, decltype(d)> du;
+  const auto lanes = std::int32_t(hn::Lanes(d));
+  const auto nearest = hn::Set(df, depth);
+  for (std::int32_t y = bounds.y_begin; y < bounds.y_end; ++y) {
+    const std::size_t row = std::size_t(y - band.bounds.y_begin) * band.stride + std::size_t(bounds.x_begin - band.bounds.x_begin);
+    for (std::int32_t x = 0; x < bounds.width(); x += lanes) {
+      const std::size_t at = row + std::size_t(x);
+      const auto drawn = hn::BitCast(df, hn::TruncateTo(du, hn::ShiftRight<32>(hn::LoadU(d, band.keys + at))));
+      const auto from = hn::LoadU(df, band.limits.from + at), to = hn::LoadU(df, band.limits.to + at);
+      // The least depth from `depth` on that the limits let through. Rays without any have from > to.
+      const auto beyond = hn::Max(nearest, band.limits.inside ? from : to);
+      const auto least = band.limits.inside ? beyond : hn::IfThenElse(hn::Lt(nearest, from), nearest, beyond);
+      auto hidden = hn::Lt(drawn, least);
+      if (band.limits.inside) hidden = hn::Or(hidden, hn::Gt(from, to));
+      if (!hn::AllTrue(df, hn::Or(hidden, hn::Not(hn::FirstN(df, std::size_t(bounds.width() - x)))))) return false;
+    }
+  }
+  return true;
+}
+
+bool AllHides(const KeyBand& band, const PixelBounds& bounds, float depth) {
+  return band.limits.from == nullptr ? NothingSeen(band, bounds, depth) : NothingSeenOfClipped(band, bounds, depth);
+}
+
 }  // namespace slabstream::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace slabstream {
 HWY_EXPORT(DrawAny);
-HWY_EXPORT(AllNearerThan);
+HWY_EXPORT(AllHides);
 
 std::size_t DrawFaces(Projection projection, const FaceProjection& faces, const FaceSite* sites, const FaceNormals* normals,
                       std::uint32_t first, std::uint32_t count, const KeyBand& band) {
   return HWY_DYNAMIC_DISPATCH(DrawAny)(projection, faces, sites, normals, first, count, band);
 }
 
-bool AllNearer(const KeyBand& band, const PixelBounds& bounds, float depth) {
-  return HWY_DYNAMIC_DISPATCH(AllNearerThan)(band, bounds, depth);
-}
+bool AllHidden(const KeyBand& band, const PixelBounds& bounds, float depth) { return HWY_DYNAMIC_DISPATCH(AllHides)(band, bounds, depth); }
 
 }  // namespace slabstream
 #endif

@@ -64,7 +64,8 @@ std::size_t DrawFaces(Projection projection, const FaceProjection& faces, const 
 std::size_t DrawFacesReference(Projection projection, const FaceProjection& faces, const FaceSite* sites, std::uint32_t first,
                                std::uint32_t count, const KeyBand& band);
 
-// True if every pixel of `bounds` is nearer than `depth`. `bounds` lie in the band.
-bool AllNearer(const KeyBand& band, const PixelBounds& bounds, float depth);
+// True if DrawFaces changes no pixel of `bounds` with faces at `depth` or behind it: all that the limits let through is hidden. `bounds`
+// lie in the band.
+bool AllHidden(const KeyBand& band, const PixelBounds& bounds, float depth);
 
 }  // namespace slabstream
