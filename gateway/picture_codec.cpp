@@ -10,37 +10,13 @@
 #include <cstring>
 #include <memory>
 #include <new>
-#include <span>
 
 #include <jpeglib.h>
 
+#include "common/kernels/sample_codes.h"
+
 namespace slabstream {
 namespace {
-
-// 255 times the sample, in [0, 255]. In this form compilers vectorise it.
-inline float Scaled(float sample) { return 255.0F * std::min(std::max(sample, 0.0F), 1.0F); }
-// round(255 * clamp(sample, 0, 1)), as SampleCode gives it: in double the sum is exact.
-inline std::uint8_t Code(float sample) { return std::uint8_t(int(double(Scaled(sample)) + 0.5)); }
-// The same but for samples within a rounding error of a half, which no JPEG shows.
-inline std::uint8_t NearCode(float sample) { return std::uint8_t(int(Scaled(sample) + 0.5F)); }
-
-// The pixels of a row between two columns.
-std::span<const float> Part(std::span<const float> row, const PixelBounds& bounds) {
-  return row.subspan(4 * std::size_t(bounds.x_begin), 4 * std::size_t(bounds.width()));
-}
-
-// Premultiplied colours are those over black.
-void ToOpaqueCodes(std::span<const float> premultiplied, std::uint8_t* codes) {
-  for (std::size_t i = 0; i < premultiplied.size(); ++i) codes[i] = NearCode(premultiplied[i]);
-}
-
-void ToStraightCodes(std::span<const float> premultiplied, std::uint8_t* codes) {
-  for (std::size_t i = 0; i < premultiplied.size(); i += 4) {
-    const float alpha = premultiplied[i + 3];
-    for (std::size_t c = 0; c < 3; ++c) codes[i + c] = alpha > 0 ? Code(premultiplied[i + c] / alpha) : std::uint8_t(0);
-    codes[i + 3] = Code(alpha);
-  }
-}
 
 // ---- JPEG
 
@@ -108,9 +84,10 @@ std::vector<std::byte> EncodeJpeg(const ComposedPicture& picture, const PixelBou
   jpeg_start_compress(&info, TRUE);
   std::vector<float> rgba(4 * std::size_t(picture.size().width));
   std::vector<std::uint8_t> codes(4 * std::size_t(bounds.width()));
+  const std::size_t first = 4 * std::size_t(bounds.x_begin);
   for (int y = bounds.y_begin; y < bounds.y_end; ++y) {
     picture.Row(y, rgba, {});
-    ToOpaqueCodes(Part(rgba, bounds), codes.data());
+    SampleCodes(rgba.data() + first, codes.size(), codes.data());
     JSAMPROW row = codes.data();
     jpeg_write_scanlines(&info, &row, 1);
   }
@@ -131,10 +108,11 @@ std::optional<std::vector<std::byte>> EncodePng(const ComposedPicture& picture, 
   png_write_info(writer.png, writer.info);
   std::vector<float> rgba(4 * std::size_t(picture.size().width));
   std::vector<std::uint8_t> codes(4 * std::size_t(bounds.width()));
+  const std::size_t first = 4 * std::size_t(bounds.x_begin);
   for (int y = bounds.y_begin; y < bounds.y_end; ++y) {
     if (given_up.load(std::memory_order_relaxed)) return std::nullopt;
     picture.Row(y, rgba, {});
-    ToStraightCodes(Part(rgba, bounds), codes.data());
+    StraightCodes(rgba.data() + first, std::size_t(bounds.width()), codes.data());
     png_write_row(writer.png, codes.data());
   }
   png_write_end(writer.png, nullptr);

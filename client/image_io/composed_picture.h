@@ -1,11 +1,8 @@
 // The picture that a file shows: what was rendered, over its background and under its annotations. Depths stay as they are.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <utility>
 #include <vector>
@@ -52,13 +49,6 @@ class ComposedPicture {
   StraightColor background_;
   AnnotationLayers annotations_;
 };
-
-// Codes of a sample in [0, 1]: round(max * sample), without a transfer curve. Samples outside are clamped.
-template <class Code>
-Code SampleCode(float sample) {
-  constexpr float kMax = std::numeric_limits<Code>::max();
-  return Code(std::lround(kMax * std::clamp(sample, 0.0F, 1.0F)));
-}
 
 // A frame of a movie: size.width * size.height * 3 bytes, red, green and blue, row 0 first. A movie has no transparency: behind whatever
 // the background lets through lies black.

@@ -18,6 +18,7 @@
 #include "common/base/check.h"
 #include "common/base/files.h"
 #include "common/base/version.h"
+#include "common/kernels/sample_codes.h"
 
 namespace slabstream {
 namespace {
@@ -30,26 +31,16 @@ FileType TypeOf(const std::string& path) {
   return ending == ".png" ? FileType::kPng : ending == ".exr" ? FileType::kExr : FileType::kOther;
 }
 
-template <class Code>
-void ToStraightCodes(std::span<const float> premultiplied, std::span<Code> codes) {
-  for (std::size_t i = 0; i < codes.size(); i += 4) {
-    const float alpha = premultiplied[i + 3];
-    for (std::size_t c = 0; c < 3; ++c) codes[i + c] = alpha > 0 ? SampleCode<Code>(premultiplied[i + c] / alpha) : Code(0);
-    codes[i + 3] = SampleCode<Code>(alpha);
-  }
-}
-
 // Calls write(y, row) for each row, in the file's own sample layout. Stops at the first failure.
-bool WritePngRows(const ComposedPicture& picture, int bits, const PictureEncoder::WriteRow& write) {
-  const bool deep = bits == 16;
-  std::vector<float> rgba(4 * std::size_t(picture.size().width));
-  std::vector<std::uint8_t> codes8(deep ? 0 : rgba.size());
-  std::vector<std::uint16_t> codes16(deep ? rgba.size() : 0);
+template <class Code>
+bool WritePngRows(const ComposedPicture& picture, const PictureEncoder::WriteRow& write) {
+  const auto width = std::size_t(picture.size().width);
+  std::vector<float> rgba(4 * width);
+  std::vector<Code> codes(4 * width);
   for (int y = 0; y < picture.size().height; ++y) {
     picture.Row(y, rgba, {});
-    ToStraightCodes<std::uint8_t>(rgba, codes8);
-    ToStraightCodes<std::uint16_t>(rgba, codes16);
-    if (!(deep ? write(y, codes16.data()) : write(y, codes8.data()))) return false;
+    StraightCodes(rgba.data(), width, codes.data());
+    if (!write(y, codes.data())) return false;
   }
   return true;
 }
@@ -107,7 +98,8 @@ std::optional<std::string> Encode(const ComposedPicture& picture, const PictureF
                               .record_name = kRecordName,
                               .record = notes.record};
   const auto rows = [&](const PictureEncoder::WriteRow& write_row) {
-    return png ? WritePngRows(picture, format.png_bits, write_row) : WriteExrRows(picture, write_row);
+    if (!png) return WriteExrRows(picture, write_row);
+    return format.png_bits == 8 ? WritePngRows<std::uint8_t>(picture, write_row) : WritePngRows<std::uint16_t>(picture, write_row);
   };
   return (*encoder)->Encode(encoded, rows, write);
 }

@@ -1,0 +1,85 @@
+// The codes of samples for every instruction set that the compiler knows; the best one that the CPU has is chosen at the first call.
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "common/kernels/sample_codes.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include <limits>
+
+#include "common/kernels/sample_codes.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace slabstream::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+#if HWY_TARGET == HWY_SCALAR
+
+void Plain8(const float* samples, std::size_t count, std::uint8_t* codes) { SampleCodesReference(samples, count, codes); }
+void Straight8(const float* rgba, std::size_t pixels, std::uint8_t* codes) { StraightCodesReference(rgba, pixels, codes); }
+void Straight16(const float* rgba, std::size_t pixels, std::uint16_t* codes) { StraightCodesReference(rgba, pixels, codes); }
+
+#else
+
+using FloatTag = hn::ScalableTag<float>;
+using Floats = hn::Vec<FloatTag>;
+
+template <class Code>
+HWY_INLINE void StoreCodes(Floats samples, Code* codes) {
+  const FloatTag d;
+  const hn::RebindToSigned<FloatTag> di;
+  const hn::Rebind<Code, FloatTag> dc;
+  const auto clamped = hn::Min(hn::Max(samples, hn::Zero(d)), hn::Set(d, 1.0F));
+  const auto value = hn::Mul(hn::Set(d, float(std::numeric_limits<Code>::max())), clamped);
+  const auto whole = hn::ConvertTo(di, value);  // cut off
+  // The difference is exact, unlike a sum with a half.
+  const auto rounds_up = hn::Ge(hn::Sub(value, hn::ConvertTo(d, whole)), hn::Set(d, 0.5F));
+  hn::StoreU(hn::DemoteTo(dc, hn::Sub(whole, hn::VecFromMask(di, hn::RebindMask(di, rounds_up)))), dc, codes);
+}
+
+void Plain8(const float* samples, std::size_t count, std::uint8_t* codes) {
+  const FloatTag d;
+  std::size_t i = 0;
+  for (; i + hn::Lanes(d) <= count; i += hn::Lanes(d)) StoreCodes(hn::LoadU(d, samples + i), codes + i);
+  SampleCodesReference(samples + i, count - i, codes + i);
+}
+
+template <class Code>
+HWY_INLINE void Straight(const float* rgba, std::size_t pixels, Code* codes) {
+  const FloatTag d;
+  const hn::RebindToUnsigned<FloatTag> du;
+  const auto is_alpha = hn::RebindMask(d, hn::Eq(hn::And(hn::Iota(du, 0), hn::Set(du, 3)), hn::Set(du, 3)));
+  const std::size_t count = 4 * pixels;
+  std::size_t i = 0;
+  for (; i + hn::Lanes(d) <= count; i += hn::Lanes(d)) {
+    const auto color = hn::LoadU(d, rgba + i), alpha = hn::Broadcast<3>(color);  // within each 128-bit block: one pixel
+    const auto straight = hn::Div(color, hn::IfThenElse(is_alpha, hn::Set(d, 1.0F), alpha));
+    StoreCodes(hn::IfThenElseZero(hn::Gt(alpha, hn::Zero(d)), straight), codes + i);
+  }
+  StraightCodesReference(rgba + i, (count - i) / 4, codes + i);
+}
+
+void Straight8(const float* rgba, std::size_t pixels, std::uint8_t* codes) { Straight(rgba, pixels, codes); }
+void Straight16(const float* rgba, std::size_t pixels, std::uint16_t* codes) { Straight(rgba, pixels, codes); }
+
+#endif
+
+}  // namespace slabstream::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace slabstream {
+HWY_EXPORT(Plain8);
+HWY_EXPORT(Straight8);
+HWY_EXPORT(Straight16);
+
+void SampleCodes(const float* samples, std::size_t count, std::uint8_t* codes) { HWY_DYNAMIC_DISPATCH(Plain8)(samples, count, codes); }
+void StraightCodes(const float* premultiplied, std::size_t pixels, std::uint8_t* codes) {
+  HWY_DYNAMIC_DISPATCH(Straight8)(premultiplied, pixels, codes);
+}
+void StraightCodes(const float* premultiplied, std::size_t pixels, std::uint16_t* codes) {
+  HWY_DYNAMIC_DISPATCH(Straight16)(premultiplied, pixels, codes);
+}
+
+}  // namespace slabstream
+#endif

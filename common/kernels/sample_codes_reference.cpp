@@ -1,0 +1,38 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "common/kernels/sample_codes.h"
+
+namespace slabstream {
+namespace {
+
+template <class Code>
+Code CodeOf(float sample) {
+  constexpr float kMax = std::numeric_limits<Code>::max();
+  return Code(std::lround(kMax * std::clamp(sample, 0.0F, 1.0F)));
+}
+
+template <class Code>
+void StraightCodesOf(const float* premultiplied, std::size_t pixels, Code* codes) {
+  for (std::size_t i = 0; i < 4 * pixels; i += 4) {
+    const float alpha = premultiplied[i + 3];
+    for (std::size_t c = 0; c < 3; ++c) codes[i + c] = alpha > 0 ? CodeOf<Code>(premultiplied[i + c] / alpha) : Code(0);
+    codes[i + 3] = CodeOf<Code>(alpha);
+  }
+}
+
+}  // namespace
+
+void SampleCodesReference(const float* samples, std::size_t count, std::uint8_t* codes) {
+  for (std::size_t i = 0; i < count; ++i) codes[i] = CodeOf<std::uint8_t>(samples[i]);
+}
+
+void StraightCodesReference(const float* premultiplied, std::size_t pixels, std::uint8_t* codes) {
+  StraightCodesOf(premultiplied, pixels, codes);
+}
+void StraightCodesReference(const float* premultiplied, std::size_t pixels, std::uint16_t* codes) {
+  StraightCodesOf(premultiplied, pixels, codes);
+}
+
+}  // namespace slabstream

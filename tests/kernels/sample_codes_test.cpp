@@ -1,0 +1,75 @@
+// Codes of samples: known values, and every instruction set against the reference.
+
+#include "common/kernels/sample_codes.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "tests/support/random.h"
+#include "tests/support/simd_targets.h"
+
+namespace slabstream {
+namespace {
+
+// Many samples that lie at a half between two codes or just beside it, some outside [0, 1].
+float AnySample(Random& random) {
+  if (random.Chance(0.1)) return float(random.Integer(-1, 2));
+  if (random.Chance(0.3)) return float(random.Real(-0.1, 1.1));
+  const float half = (float(random.Integer(0, 255)) + 0.5F) / 255.0F;
+  return std::nextafter(half, float(random.Integer(0, 1)));
+}
+
+std::vector<float> AnyPixels(Random& random, std::size_t pixels) {
+  std::vector<float> rgba(4 * pixels);
+  for (float& sample : rgba) sample = AnySample(random);
+  for (std::size_t i = 3; i < rgba.size(); i += 4) {
+    if (random.Chance(0.2)) rgba[i] = 0;
+  }
+  return rgba;
+}
+
+TEST(SampleCodes, AreRoundedAndClamped) {
+  const std::vector<float> samples = {0, 1, 0.5F, 0.25F, -3, 7, 100.4F / 255, 100.6F / 255};
+  std::vector<std::uint8_t> codes(samples.size());
+  SampleCodes(samples.data(), samples.size(), codes.data());
+  EXPECT_EQ(codes, (std::vector<std::uint8_t>{0, 255, 128, 64, 0, 255, 100, 101}));
+}
+
+TEST(SampleCodes, OfColorsAreDividedByAlpha) {
+  const std::vector<float> rgba = {0.25F, 0.5F, 0.125F, 0.5F, 0.3F, 0.2F, 0.1F, 0};
+  std::vector<std::uint8_t> codes(8);
+  std::vector<std::uint16_t> deep(8);
+  StraightCodes(rgba.data(), 2, codes.data());
+  StraightCodes(rgba.data(), 2, deep.data());
+  EXPECT_EQ(codes, (std::vector<std::uint8_t>{128, 255, 64, 128, 0, 0, 0, 0}));
+  EXPECT_EQ(deep, (std::vector<std::uint16_t>{32768, 65535, 16384, 32768, 0, 0, 0, 0}));
+}
+
+TEST(SampleCodes, AreThoseOfTheReferenceOnEveryInstructionSet) {
+  Random random(63);
+  SCOPED_TRACE(random.trace());
+  for (std::size_t pixels = 0; pixels < 40; ++pixels) {
+    const std::vector<float> rgba = AnyPixels(random, pixels);
+    std::vector<std::uint8_t> plain(rgba.size()), straight(rgba.size());
+    std::vector<std::uint16_t> deep(rgba.size());
+    SampleCodesReference(rgba.data(), rgba.size(), plain.data());
+    StraightCodesReference(rgba.data(), pixels, straight.data());
+    StraightCodesReference(rgba.data(), pixels, deep.data());
+    ForEachTarget([&] {
+      std::vector<std::uint8_t> codes(rgba.size());
+      SampleCodes(rgba.data(), rgba.size(), codes.data());
+      EXPECT_EQ(codes, plain);
+      StraightCodes(rgba.data(), pixels, codes.data());
+      EXPECT_EQ(codes, straight);
+      std::vector<std::uint16_t> deep_codes(rgba.size());
+      StraightCodes(rgba.data(), pixels, deep_codes.data());
+      EXPECT_EQ(deep_codes, deep);
+    });
+  }
+}
+
+}  // namespace
+}  // namespace slabstream
