@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "common/base/check.h"
+#include "common/kernels/combine.h"
 #include "common/kernels/sample_codes.h"
 
 namespace slabstream {
@@ -19,27 +20,16 @@ Result<ComposedPicture> ComposedPicture::Make(const LocalImage& image, ImageSize
 void ComposedPicture::Row(int y, std::span<float> rgba, std::span<float> depth) const {
   const float alpha = background_.a;
   const float behind[4] = {background_.r * alpha, background_.g * alpha, background_.b * alpha, alpha};
-  const bool see_through = std::all_of(std::begin(behind), std::end(behind), [](float value) { return value == 0; });
+  for (std::size_t i = 0; i < rgba.size(); i += 4) std::copy_n(behind, 4, &rgba[i]);
   std::fill(depth.begin(), depth.end(), std::numeric_limits<float>::infinity());
   const PixelBounds& b = image_->bounds;
-  const bool in_row = !b.empty() && y >= b.y_begin && y < b.y_end;
-  const auto left = in_row ? std::size_t(b.x_begin) : 0, width = in_row ? std::size_t(b.width()) : 0;
-  const std::size_t first = in_row ? std::size_t(y - b.y_begin) * width : 0;
-  const auto fill = [&](std::size_t begin, std::size_t end) {
-    for (std::size_t x = begin; x < end; ++x) std::copy_n(behind, 4, &rgba[4 * x]);
-  };
-  fill(0, left);
-  if (see_through) {
-    std::copy_n(image_->rgba.data() + 4 * first, 4 * width, rgba.data() + 4 * left);
-  } else {
-    for (std::size_t x = 0; x < width; ++x) {
-      const float* front = &image_->rgba[4 * (first + x)];
-      float* out = &rgba[4 * (left + x)];
-      for (int c = 0; c < 4; ++c) out[c] = front[c] + (1 - front[3]) * behind[c];
-    }
+  if (!b.empty() && y >= b.y_begin && y < b.y_end) {
+    const auto left = std::size_t(b.x_begin), width = std::size_t(b.width());
+    const std::size_t first = std::size_t(y - b.y_begin) * width;
+    float* const out = rgba.data() + 4 * left;
+    OverRow(image_->rgba.data() + 4 * first, out, out, width);
+    if (!depth.empty()) std::copy_n(image_->depth.data() + first, width, depth.data() + left);
   }
-  fill(left + width, rgba.size() / 4);
-  if (!depth.empty()) std::copy_n(image_->depth.data() + first, width, depth.data() + left);
   annotations_.PutOver(y, rgba);
 }
 
