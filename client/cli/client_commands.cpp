@@ -79,7 +79,7 @@ void DeclareSlice(const CommandLine& line) {
 
 void DeclareInfo(const CommandLine& line) {
   CLI::App* sub = line.app.add_subcommand(
-      "info", "Describe a volume file (size, samples, values, histogram, occupancy) or a picture (how it was made)");
+      "info", "Describe a volume file (size, samples, values, histogram, occupancy), an unstructured grid or a picture (how it was made)");
   auto options = std::make_shared<InfoOptions>();
   CLI::Option* source =
       sub->add_option("SOURCE", options->path, "A volume file, as FILE or FILE:TRANSFER, or a picture, .png or .exr")->required();

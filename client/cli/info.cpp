@@ -13,9 +13,11 @@
 #include "client/cli/commands.h"
 #include "client/cli/dicom_listing.h"
 #include "client/cli/input_volume.h"
+#include "client/cli/mesh_info.h"
 #include "client/cli/picture_info.h"
 #include "client/image_io/picture_header.h"
 #include "client/request/json_value.h"
+#include "common/mesh_io/mesh_reader.h"
 #include "common/planning/frame_plan.h"
 #include "common/volume/summary.h"
 
@@ -198,6 +200,7 @@ std::string InfoJson(const VolumeFileInfo& info, const VolumeSummary& summary, c
 
 Status RunInfo(const InfoOptions& options) {
   if (IsPicturePath(options.path)) return RunPictureInfo(options);
+  if (LooksLikeMesh(options.path)) return RunMeshInfo(options);
   if (Status status = CheckInputVolume(options.path); !status.ok()) return status;
   const Result<std::vector<DicomSeries>> series = SeriesAt(options.path);
   if (!series.ok()) return series.status();

@@ -118,9 +118,9 @@ Result<PictureFields> FieldsOfJson(const Json& object) {
   PictureFields fields;
   for (const auto& [name, value] : object.items()) {
     if (value.is_null()) continue;
-    const bool list = value.is_array() && !value.empty() && !value.front().is_object();  // a list of objects is a colour map
-    const auto add = [&](const Json& item) {
-      std::optional<std::string> text = value.is_array() && !list ? item.dump(-1, ' ', true, Json::error_handler_t::replace) : TextOf(item);
+    const bool list = value.is_array() && !value.empty() && !value.front().is_object();              // a list of objects is a colour map
+    const auto add = [&fields, &name = name, whole = value.is_array() && !list](const Json& item) {  // clang 14 does not take [&] here
+      std::optional<std::string> text = whole ? item.dump(-1, ' ', true, Json::error_handler_t::replace) : TextOf(item);
       if (text) fields.push_back({name, *std::move(text)});
       return text.has_value();
     };

@@ -258,5 +258,20 @@ TEST_F(BadInputTest, PicturesOfInfo) {
   ExpectRefused({"render", "good.png", "--local=1", "-o", "x.png"}, "good.png");
 }
 
+TEST_F(BadInputTest, UnstructuredGrids) {
+  const std::string header = "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid><Piece NumberOfPoints=\"4\" NumberOfCells=\"1\">";
+  Write("empty.vtu", "");
+  Write("text.vtu", "this is no grid\n");
+  Write("image.vtu", "<VTKFile type=\"ImageData\"><ImageData/></VTKFile>");
+  Write("bare.vtu", header + "</Piece></UnstructuredGrid></VTKFile>");
+  Write("open.vtu", header);
+  for (const char* name : {"missing.vtu", "empty.vtu", "text.vtu", "image.vtu", "bare.vtu", "open.vtu"}) {
+    ExpectRefused({"info", Path(name)}, name);
+    ExpectRefused({"info", Path(name), "--json"}, name);
+    ExpectRefused({"render", Path(name), "--local=1", "-o", "x.png"}, "an unstructured grid");
+  }
+  ExpectRefused({"info", "bare.vtu", "--transfer", "opaque"}, "is an unstructured grid");
+}
+
 }  // namespace
 }  // namespace slabstream

@@ -32,6 +32,9 @@ std::vector<FuzzBytes> VolumeFileSeeds();
 bool DecodeDicomFile(std::span<const std::byte> input);
 std::vector<FuzzBytes> DicomFileSeeds();
 
+bool DecodeMeshFile(std::span<const std::byte> input);
+std::vector<FuzzBytes> MeshFileSeeds();
+
 bool DecodeServiceFile(std::span<const std::byte> input);
 std::vector<FuzzBytes> ServiceFileSeeds();
 

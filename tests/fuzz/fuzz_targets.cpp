@@ -19,6 +19,7 @@ const std::vector<FuzzTarget>& FuzzTargets() {
       {"color-tables", "tables of label colours", DecodeColorTable, ColorTableSeeds},
       {"volume-files", "volume files of every format", DecodeVolumeFile, VolumeFileSeeds},
       {"dicom-files", "DICOM files, but for their pixels", DecodeDicomFile, DicomFileSeeds},
+      {"mesh-files", "files of unstructured grids", DecodeMeshFile, MeshFileSeeds},
       {"service-files", "service files, folders of keys and records of services", DecodeServiceFile, ServiceFileSeeds},
       {"recordings", "traces with a recording", DecodeRecording, RecordingSeeds},
       {"sweeps", "files of experiment sweep", DecodeSweep, SweepSeeds},

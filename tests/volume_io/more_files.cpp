@@ -33,8 +33,9 @@ FileBytes Word(std::uint64_t number, const FileSpec& spec, const VtiOptions& opt
   return word;
 }
 
-// The samples as they stand in the file: header and blocks, encoded or not.
-FileBytes VtiSamples(const FileSpec& spec, const FileBytes& samples, const VtiOptions& options) {
+}  // namespace
+
+FileBytes VtkXmlSamples(const FileSpec& spec, const FileBytes& samples, const VtiOptions& options) {
   if (options.format == "ascii") return samples;
   const bool base64 = options.format == "binary" || options.encoding == "base64";
   const auto encoded = [&](const FileBytes& bytes) { return base64 ? Base64(bytes) : bytes; };
@@ -50,8 +51,6 @@ FileBytes VtiSamples(const FileSpec& spec, const FileBytes& samples, const VtiOp
                  sizes) +
          encoded(blocks);
 }
-
-}  // namespace
 
 FileBytes Base64(const FileBytes& bytes) {
   constexpr const char* kLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -133,7 +132,7 @@ FileBytes VtiFile(const FileSpec& spec, const FileBytes& samples, const VtiOptio
       options.block > 0 ? " compressor=\"vtkZLibDataCompressor\"" : "", extent, options.origin.x, options.origin.y, options.origin.z,
       spec.spacing.x, spec.spacing.y, spec.spacing.z, options.direction.empty() ? "" : " Direction=\"" + options.direction + "\"", extent,
       options.attributes);
-  const FileBytes stored = VtiSamples(spec, samples, options);
+  const FileBytes stored = VtkXmlSamples(spec, samples, options);
   const bool appended = options.format == "appended";
   for (int i = 0; i < options.arrays; ++i) {
     text += fmt::format("<DataArray type=\"{}\" Name=\"density{}\" NumberOfComponents=\"{}\" format=\"{}\"{}>\n", kTypes[int(spec.type)],

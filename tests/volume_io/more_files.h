@@ -42,7 +42,10 @@ struct VtiOptions {
   int arrays = 1;                                  // the same samples under the names density, density2, ...
   int components = 1;
 };
-// `samples`: of EncodeSamples in the spec's byte order; ascii: as text.
+// Samples as they stand in an XML file of VTK: with header and blocks, encoded or not. `samples`: of EncodeSamples in the spec's byte
+// order; ascii: as text.
+FileBytes VtkXmlSamples(const FileSpec& spec, const FileBytes& samples, const VtiOptions& options);
+// The same samples.
 FileBytes VtiFile(const FileSpec& spec, const FileBytes& samples, const VtiOptions& options = {});
 
 // Samples in this machine's byte order; 8 or 16 bits. `kind`: the PNG colour type, 0 grey, 2 RGB, 3 palette, 4 grey with alpha, 6 RGBA.

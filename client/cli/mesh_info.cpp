@@ -1,0 +1,83 @@
+#include "client/cli/mesh_info.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+#include <limits>
+#include <span>
+
+#include "client/cli/input_volume.h"
+#include "client/request/json_value.h"
+#include "common/mesh_io/mesh_reader.h"
+#include "common/volume/summary.h"
+
+namespace slabstream {
+namespace {
+
+// Of the finite values; {0, 0} if there is none.
+ValueRange RangeOf(std::span<const float> values) {
+  ValueRange range = {std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()};
+  for (const float value : values) {
+    if (!std::isfinite(value)) continue;
+    range = {std::min(range.min, value), std::max(range.max, value)};
+  }
+  return range.min <= range.max ? range : ValueRange{};
+}
+
+std::string MeshText(const LoadedMesh& loaded, const ValueRange& range) {
+  const MeshFileInfo& info = loaded.info;
+  const Bounds3& bounds = loaded.mesh.bounds;
+  const Vec3 extent = bounds.high - bounds.low;
+  std::string text = fmt::format("format       {}\n", info.format);
+  text += fmt::format("points       {}\n", info.points);
+  text += fmt::format("cells        {}, {} tetrahedra when split ({:.1f} MiB)\n", info.cells, loaded.mesh.tetrahedra.size(),
+                      double(loaded.mesh.bytes()) / (1 << 20));
+  for (const MeshFileInfo::CellCount& cells : info.kinds) {
+    text += fmt::format("  {:>10} {}{}\n", cells.count, cells.kind->name, cells.kind->has_volume() ? "" : " (no volume: left out)");
+  }
+  text += fmt::format("low corner   {:.6g} {:.6g} {:.6g}\n", bounds.low.x, bounds.low.y, bounds.low.z);
+  text += fmt::format("extent       {:.6g} x {:.6g} x {:.6g}\n", extent.x, extent.y, extent.z);
+  text += "arrays       name, of what, components, type\n";
+  for (const MeshArray& array : info.arrays) {
+    text += fmt::format("  {} {} {} {}\n", array.name, NameOf(array.at), array.components, ToString(array.type));
+  }
+  return text + fmt::format("values       {:g} ... {:g} in {}\n", range.min, range.max, info.arrays[info.array].name);
+}
+
+Json MeshJson(const LoadedMesh& loaded, const ValueRange& range) {
+  const MeshFileInfo& info = loaded.info;
+  auto kinds = Json::object();
+  for (const MeshFileInfo::CellCount& cells : info.kinds) kinds[std::string(cells.kind->name)] = cells.count;
+  auto arrays = Json::array();
+  for (const MeshArray& array : info.arrays) {
+    arrays.push_back({{"name", array.name}, {"of", NameOf(array.at)}, {"components", array.components}, {"type", ToString(array.type)}});
+  }
+  return {{"format", info.format},
+          {"points", info.points},
+          {"cells", info.cells},
+          {"kinds", kinds},
+          {"tetrahedra", loaded.mesh.tetrahedra.size()},
+          {"bounds", {{"low", VectorJson(loaded.mesh.bounds.low)}, {"high", VectorJson(loaded.mesh.bounds.high)}}},
+          {"arrays", arrays},
+          {"array", info.arrays[info.array].name},
+          {"range", {{"min", range.min}, {"max", range.max}}}};
+}
+
+}  // namespace
+
+Status RunMeshInfo(const InfoOptions& options) {
+  if (options.transfer != TransferChoice{} || options.layers.any()) {
+    return Status::InvalidArgument(
+        fmt::format("SOURCE '{}' is an unstructured grid; transfer functions and layers are for volumes", options.path));
+  }
+  const Result<LoadedMesh> loaded = ReadMesh(options.path);
+  if (!loaded.ok()) return AsInput(loaded.status());
+  const ValueRange range = RangeOf(loaded->mesh.values);
+  std::cout << (options.json ? MeshJson(*loaded, range).dump(2, ' ', false, Json::error_handler_t::replace) + "\n"
+                             : MeshText(*loaded, range));
+  return Status::Ok();
+}
+
+}  // namespace slabstream

@@ -1,0 +1,37 @@
+// A mesh of tetrahedra with one value at each point, between which it is linear, or one in each tetrahedron. What every reader of
+// unstructured grids makes (common/mesh_io), and all that is drawn of them.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "common/base/aligned_buffer.h"
+#include "common/math/vec.h"
+#include "common/mesh/cells.h"
+
+namespace slabstream {
+
+inline constexpr std::int64_t kMaxMeshPoints = std::int64_t{1} << 31, kMaxTetrahedra = std::int64_t{1} << 31;
+
+// To which elements of a grid an array belongs.
+enum class ValuesAt : std::uint8_t { kPoints, kCells };
+constexpr std::string_view NameOf(ValuesAt at) { return at == ValuesAt::kPoints ? "points" : "cells"; }
+
+struct Bounds3 {
+  Vec3 low, high;
+};
+
+struct Mesh {
+  Bounds3 bounds;                        // of the points, in the world
+  AlignedVector<Vector3<float>> points;  // from bounds.low, finite
+  std::vector<Tetrahedron> tetrahedra;   // none has a point twice
+  ValuesAt at = ValuesAt::kPoints;
+  AlignedVector<float> values;  // by point or by tetrahedron; may not be finite: nothing is seen there
+  std::size_t bytes() const {
+    return points.capacity() * sizeof(points[0]) + tetrahedra.capacity() * sizeof(Tetrahedron) + values.capacity() * sizeof(float);
+  }
+};
+
+}  // namespace slabstream

@@ -1,0 +1,52 @@
+// Files of unstructured grids to meshes: VTK's XML files (.vtu), of one piece; ASCII, base64 or appended, uncompressed or in blocks of
+// zlib. Tetrahedra, hexahedra, voxels, wedges and pyramids are read; cells without a volume are counted and left out. Hexahedra, wedges and
+// pyramids are split (common/mesh/cells.h), so that the value is linear in each part, not trilinear in the cell.
+//
+// All functions may be called from any thread.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/base/status.h"
+#include "common/mesh/mesh.h"
+#include "common/volume_io/sample_type.h"
+
+namespace slabstream {
+
+struct MeshArray {
+  std::string name;
+  ValuesAt at = ValuesAt::kPoints;
+  SampleType type = SampleType::kFloat32;
+  int components = 1;
+};
+
+struct MeshFileInfo {
+  std::string format;  // "VTK unstructured grid"
+  std::int64_t points = 0, cells = 0;
+  struct CellCount {
+    const CellKind* kind = nullptr;
+    std::int64_t count = 0;
+  };
+  std::vector<CellCount> kinds;   // that occur, in the order of CellKinds()
+  std::vector<MeshArray> arrays;  // in the file's order
+  std::size_t array = 0;          // the one that is read, of `arrays`
+};
+
+struct LoadedMesh {
+  MeshFileInfo info;
+  Mesh mesh;
+};
+
+struct MeshOptions {
+  std::string array;  // "": the active scalars, else the only array with one component
+};
+
+bool LooksLikeMesh(const std::string& path);  // by its ending
+
+// NotFound (no such file), InvalidArgument (no unstructured grid, no such array, cells of another kind, a point that is not finite),
+// DataLoss (truncated, damaged, cells of points that there are not), ResourceExhausted (does not fit the memory). Messages name the path.
+Result<LoadedMesh> ReadMesh(const std::string& path, const MeshOptions& options = {});
+
+}  // namespace slabstream
