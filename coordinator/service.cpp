@@ -7,28 +7,21 @@
 #include <array>
 #include <atomic>
 #include <deque>
-#include <map>
 #include <random>
 #include <thread>
 #include <utility>
 #include <variant>
 
-#include "common/base/background_tasks.h"
 #include "common/base/guarded.h"
 #include "common/base/limited_log.h"
 #include "common/base/log.h"
 #include "common/base/printable.h"
 #include "common/base/shared_arena.h"
-#include "common/planning/layer_bricks.h"
-#include "common/renderers/renderer_kind.h"
 #include "common/transport/endpoint.h"
-#include "common/transport/mailbox.h"
-#include "coordinator/answer_question.h"
-#include "coordinator/dataset_id.h"
+#include "coordinator/background_actions.h"
 #include "coordinator/peer_table.h"
 #include "coordinator/service_keys.h"
 #include "coordinator/slab_server.h"
-#include "coordinator/upload_buffer.h"
 
 namespace slabstream {
 namespace {
@@ -39,7 +32,6 @@ constexpr Duration kLongestWait = std::chrono::seconds(1);
 constexpr Duration kStopGrace = std::chrono::seconds(5);  // for the machine to end in order
 constexpr std::int64_t kNotesAtOnce = 100;                // lines of the log that peers can provoke
 constexpr Duration kEachNote = std::chrono::milliseconds(200);
-constexpr std::size_t kAnswersAtOnce = 2;
 constexpr int kReceiveBatch = 64;  // messages of one socket before the other one has its turn
 
 Epoch RandomEpoch() {
@@ -61,76 +53,6 @@ Endpoint ImagesSocketsOf(const std::string& worker_endpoint) {
   return endpoint;
 }
 
-// Whether at least half of the volume's bricks hold one value each.
-bool MostBricksAreEqual(const VolumeSummary& summary) {
-  const auto equal = std::ranges::count_if(summary.bricks, [](const ValueRange& range) { return range.min == range.max; });
-  return 2 * std::size_t(equal) >= summary.bricks.size();
-}
-
-// What other threads send to the machine's thread. Voxels are published first, before the machine can send anybody for them.
-struct News {
-  CoordinatorEvent event;
-  DatasetId dataset = 0;
-  SlabServer::Samples samples = {};
-  std::shared_ptr<UploadBuffer> upload = nullptr;  // of an UploadBegun
-};
-
-Result<News> Load(const LoadDataset& action) {
-  const Result<LoadedSource> loaded = LoadSource(action.source);
-  if (!loaded.ok()) return loaded.status();
-  const std::shared_ptr<const Volume>& volume = loaded->volume;
-  const Layers& layers = loaded->layers;
-  auto summary = std::make_shared<const VolumeSummary>(Summarize(LayeredVolume{volume, layers}));
-  SlabServer::Samples samples;
-  const bool held = action.source.held_bytes > 0;  // as a whole, in any case
-  if (!held && MostBricksAreEqual(*summary)) {
-    samples.bricks = std::make_shared<const BrickedVoxels>(volume->block);
-  } else {
-    samples.volume = volume;
-  }
-  if (layers.labels != nullptr) samples.labels = std::make_shared<const BrickedVoxels>(layers.labels->block);
-  if (layers.overlay != nullptr) samples.overlay = std::make_shared<const BrickedVoxels>(layers.overlay->block);
-  const DatasetId id = IdOf(action.name, *volume, layers);
-  const std::uint64_t bytes = samples.bytes() - (held ? volume->block.bytes.size() : 0);
-  return News{DatasetLoaded{action.name, action.load, id, std::move(summary), bytes, loaded->stamp}, id, std::move(samples)};
-}
-
-FoldersSeen LookThrough(const LookAtFolders& action) {
-  FoldersSeen seen;
-  for (const std::string& folder : action.folders) {
-    seen.folders.emplace(folder, Guarded(folder.c_str(), [&] { return ListFolder(folder); }));
-  }
-  return seen;
-}
-
-// What an order wants to add. Its paths are those of this host, whatever the current folder of this process is.
-Result<FoundData> Find(const std::vector<std::string>& arguments) {
-  std::array<char, 256> host{};
-  if (::gethostname(host.data(), host.size() - 1) != 0) host = {"this host"};
-  const auto here = [&](const Status& status) {
-    return Status(status.code(),
-                  Printable(fmt::format("{} (paths are those of the coordinator's host, {})", status.message(), host.data())));
-  };
-  for (const std::string& argument : arguments) {
-    const Result<DataArgument> parsed = ParseDataArgument(argument);
-    if (!parsed.ok()) return parsed.status();
-    if (parsed->RelativePath() != nullptr) return here(Status::InvalidArgument(argument + ": the path must be absolute"));
-  }
-  FoundData found = FindData(arguments, "");
-  CheckFiles(found);
-  for (const std::string& line : found.complaints) LogWarning(line);
-  if (!found.errors.empty()) return here(found.errors.front());
-  return found;
-}
-
-Result<std::shared_ptr<const OccupancyGrid>> Count(const CountFunction& count, const SlabServer::Samples& samples,
-                                                   const CountDataset& action) {
-  const RendererKind& renderer = *action.volume.renderer();
-  OccupancyGrid grid = count(samples.view(), renderer.DrawnTable(action.volume.transfer(), *action.summary));
-  AddLayerBricks(LayerBricks(*action.summary, renderer, action.volume.looks()), *action.summary, grid);
-  return std::make_shared<const OccupancyGrid>(std::move(grid));
-}
-
 }  // namespace
 
 struct CoordinatorService::Impl {
@@ -141,9 +63,7 @@ struct CoordinatorService::Impl {
         clients(std::move(client_socket)),
         control(std::move(control_socket)),
         slabs(std::move(slab_server)),
-        make_plan(std::move(service_options.make_plan)),
-        count_occupied(std::move(service_options.count_occupied)),
-        planner(std::make_shared<Planner>(service_options.surroundings)) {}
+        background(std::move(service_options.make_plan), std::move(service_options.count_occupied), service_options.surroundings, *slabs) {}
 
   void Run();
   void Loop();
@@ -161,25 +81,12 @@ struct CoordinatorService::Impl {
   void Perform(DropClient& action) {
     if (const std::string* identity = client_peers.IdentityOf(action.client)) clients.EndConnection(*identity);
   }
-  void Perform(LoadDataset& action);
-  void Perform(UnloadDataset& action) { slabs->Withdraw(action.dataset); }
-  void Perform(LookAtDataset& action);
-  void Perform(LookAtFolders& action);
-  void Perform(FindDatasets& action);
-  void Perform(AnswerQuestion& action);
-  void Perform(BeginUpload& action);
-  void Perform(StoreUpload& action) { uploads.at(action.upload)->Store(action.begin, action.bytes.span()); }
-  void Perform(FinishUpload& action);
-  void Perform(DropUpload& action) { uploads.erase(action.upload); }
   void Perform(Note& action) { notes[std::size_t(action.about)].Write(action.level, Printable(std::move(action.text))); }
-  void Perform(CountDataset& action);
-  void Perform(PlanRequest& action);
-  void Perform(DropPlan& action);
-  void Perform(FrameMeasured& action);
   void Perform(StopService&) { stop_now = true; }
-  // Has a task made on a thread of `tasks`; `make` returns an event. If the task fails, or cannot be started, `failed(why)` makes the
-  // event.
-  void MakeElsewhere(BackgroundTasks& tasks, const char* what, auto make, auto failed);
+  template <class Action>
+  void Perform(Action& action) {
+    if (BackgroundActions::AtOnce event = background.Perform(action)) following.push_back(*std::move(event));
+  }
 
   std::string client_endpoint, worker_endpoint;
   Endpoint images_sockets;  // how the files of workers' images planes begin, if they are files
@@ -189,8 +96,7 @@ struct CoordinatorService::Impl {
   PeerTable client_peers, worker_peers;
   std::unique_ptr<SlabServer> slabs;
   std::deque<CoordinatorEvent> following;  // what actions led to: heard after all actions of the event at hand
-  // From the other threads; its wakeup also signals stop_requested. Tasks that outlive the service share it.
-  const std::shared_ptr<Mailbox<News>> inbox = std::make_shared<Mailbox<News>>();
+  BackgroundActions background;            // its wakeup also signals stop_requested
   std::atomic<bool> stop_requested = false;
   std::atomic<bool> stopped = false;
   bool stop_now = false;  // the machine said so
@@ -199,12 +105,6 @@ struct CoordinatorService::Impl {
   std::array<LimitedLog, 3> notes = {LimitedLog(kNotesAtOnce, kEachNote), LimitedLog(kNotesAtOnce, kEachNote),
                                      LimitedLog(kNotesAtOnce, kEachNote)};
   Time next_forget;
-  const PlanFunction make_plan;
-  const CountFunction count_occupied;
-  const std::shared_ptr<Planner> planner;                      // the planning thread's, but for plans at hand
-  std::map<UploadId, std::shared_ptr<UploadBuffer>> uploads;   // begun and neither finished nor dropped; null: memory is being taken
-  std::map<PlanId, std::shared_ptr<std::atomic<bool>>> plans;  // under way: whether they are dropped
-  BackgroundTasks loads{kLoadsAtOnce}, looks{kLooksAtOnce}, answers{kAnswersAtOnce}, counts{1}, planning{1};
   std::jthread thread;  // owns the sockets and the machine; last member: ends first
 };
 
@@ -229,15 +129,8 @@ void CoordinatorService::Impl::Loop() {
   HandleEvent(CoordinatorTick{});
   next_forget = MonotonicNow() + kForgetInterval;
   while (!stop_now && MonotonicNow() < stop_deadline) {
-    Wait(sockets, &inbox->wakeup(), std::clamp(machine.NextWake() - MonotonicNow(), Duration::zero(), kLongestWait));
-    for (News& news : inbox->TakeAll()) {
-      if (news.samples.any()) slabs->Publish(news.dataset, std::move(news.samples));
-      if (news.upload != nullptr) {
-        const auto begun = std::get_if<UploadBegun>(&news.event);
-        if (const auto open = uploads.find(begun->upload); open != uploads.end()) open->second = std::move(news.upload);
-      }
-      HandleEvent(std::move(news.event));
-    }
+    Wait(sockets, &background.wakeup(), std::clamp(machine.NextWake() - MonotonicNow(), Duration::zero(), kLongestWait));
+    for (CoordinatorEvent& event : background.TakeEvents()) HandleEvent(std::move(event));
     ReceiveFromWorkers();
     ReceiveFromClients();
     const Time now = MonotonicNow();
@@ -260,7 +153,6 @@ void CoordinatorService::Impl::HandleEvent(CoordinatorEvent event) {
   while (!following.empty()) {
     const CoordinatorEvent next = std::move(following.front());
     following.pop_front();
-    if (const auto* planned = std::get_if<Planned>(&next)) plans.erase(planned->plan);
     for (CoordinatorAction& action : machine.Step(next, MonotonicNow())) {
       std::visit([this](auto& each) { Perform(each); }, action);
     }
@@ -350,138 +242,6 @@ bool CoordinatorService::Impl::CarryOut(const Incoming& incoming, const AnyMessa
   return true;
 }
 
-void CoordinatorService::Impl::MakeElsewhere(BackgroundTasks& tasks, const char* what, auto make, auto failed) {
-  const Status begun = Guarded(what, [&] {
-    tasks.Post([inbox = inbox, barrier = std::string(what), make = std::move(make), failed] {
-      Result<News> news = Guarded(barrier.c_str(), [&]() -> Result<News> { return make(); });
-      inbox->Post(news.ok() ? *std::move(news) : News{failed(news.status())});
-    });
-  });
-  if (!begun.ok()) following.push_back(failed(begun));
-}
-
-void CoordinatorService::Impl::Perform(LoadDataset& action) {
-  const std::string barrier = "dataset \"" + action.name + "\" could not be loaded";
-  MakeElsewhere(
-      loads, barrier.c_str(), [action] { return Load(action); },
-      [name = action.name, load = action.load](const Status& why) {
-        return DatasetFailed{name, load, why};
-      });
-}
-
-void CoordinatorService::Impl::Perform(LookAtDataset& action) {
-  MakeElsewhere(
-      looks, "a look at the files of a dataset",
-      [action] {
-        return News{DatasetSeen{action.name, action.load, HaveChanged(*action.stamp)}};
-      },
-      [name = action.name, load = action.load](const Status& why) {
-        return DatasetSeen{name, load, why};
-      });
-}
-
-void CoordinatorService::Impl::Perform(LookAtFolders& action) {
-  MakeElsewhere(
-      looks, "a look at the watched folders", [action] { return News{LookThrough(action)}; },
-      [](const Status& why) {
-        LogWarning(why.message());
-        return FoldersSeen{};
-      });
-}
-
-void CoordinatorService::Impl::Perform(FindDatasets& action) {
-  MakeElsewhere(
-      looks, "a look at files",
-      [action] {
-        return News{DatasetsFound{action.order, Find(action.arguments)}};
-      },
-      [order = action.order](const Status& why) {
-        return DatasetsFound{order, why};
-      });
-}
-
-void CoordinatorService::Impl::Perform(AnswerQuestion& action) {
-  const auto refusal = [id = action.id, nonce = NonceOf(action.question)](const Status& why) {
-    return QuestionAnswered{id, OrderRefused{nonce, why}};
-  };
-  MakeElsewhere(
-      answers, "an answer to a question",
-      [action, refusal, samples = slabs->Find(action.dataset)] {
-        const Result<AnyMessage> answer = AnswerTo(action, samples);
-        return News{answer.ok() ? QuestionAnswered{action.id, *answer} : refusal(answer.status())};
-      },
-      refusal);
-}
-
-void CoordinatorService::Impl::Perform(BeginUpload& action) {
-  const UploadId upload = action.upload;
-  uploads[upload] = nullptr;
-  MakeElsewhere(
-      loads, "taking memory for a volume",
-      [upload, order = std::move(action.order)] {
-        const Result<std::shared_ptr<UploadBuffer>> made = UploadBuffer::Make(order);
-        return News{.event = UploadBegun{upload, made.status()}, .upload = made.ok() ? *made : nullptr};
-      },
-      [upload](const Status& why) {
-        return UploadBegun{upload, why};
-      });
-}
-
-void CoordinatorService::Impl::Perform(FinishUpload& action) {
-  const auto whole = uploads.extract(action.upload);
-  MakeElsewhere(
-      loads, "the end of a volume",
-      [upload = action.upload, buffer = whole.mapped()] {
-        return News{UploadFinished{upload, buffer->Finish()}};
-      },
-      [upload = action.upload](const Status& why) {
-        return UploadFinished{upload, why};
-      });
-}
-
-void CoordinatorService::Impl::Perform(CountDataset& action) {
-  MakeElsewhere(
-      counts, "counting of occupied voxels",
-      [count = count_occupied, samples = slabs->Find(action.volume.dataset()), action] {
-        return News{OccupiedCounted{action.count, Count(count, samples, action)}};
-      },
-      [id = action.count](const Status& why) {
-        return OccupiedCounted{id, why};
-      });
-}
-
-void CoordinatorService::Impl::Perform(PlanRequest& action) {
-  const PlanId plan = action.plan;
-  if (auto planned = planner->PlanAtHand(action)) {
-    following.push_back(Planned{plan, *std::move(planned)});
-    return;
-  }
-  const Status begun = Guarded("planning", [&] {
-    const auto& dropped = plans[plan] = std::make_shared<std::atomic<bool>>(false);
-    planning.Post([inbox = inbox, planner = planner, make = make_plan, dropped, request = std::move(action)] {
-      if (*dropped) return;
-      inbox->Post({Planned{request.plan, Guarded("planning", [&] { return make(*planner, request); })}});
-    });
-  });
-  if (!begun.ok()) following.push_back(Planned{plan, begun});
-}
-
-void CoordinatorService::Impl::Perform(DropPlan& action) {
-  const auto plan = plans.find(action.plan);
-  if (plan == plans.end()) return;
-  *plan->second = true;
-  plans.erase(plan);
-}
-
-void CoordinatorService::Impl::Perform(FrameMeasured& action) {
-  const auto learn = [planner = planner, measured = std::move(action)] {
-    const Status learnt = Guarded("learning from a frame", [&] { planner->Learn(measured); });
-    if (!learnt.ok()) LogWarning(learnt.message());
-  };
-  const Status begun = Guarded("learning from a frame", [&] { planning.Post(learn); });
-  if (!begun.ok()) LogWarning(begun.message());
-}
-
 Result<std::unique_ptr<CoordinatorService>> CoordinatorService::Start(Context& context, CoordinatorOptions options) {
   const Result<Endpoint> client_wanted = ParseEndpoint(options.client_endpoint, true);
   if (!client_wanted.ok()) return client_wanted.status();
@@ -545,7 +305,7 @@ const std::string& CoordinatorService::worker_endpoint() const { return impl_->w
 
 void CoordinatorService::RequestStop() {
   impl_->stop_requested = true;
-  impl_->inbox->wakeup().Notify();
+  impl_->background.wakeup().Notify();
 }
 
 void CoordinatorService::WaitUntilStopped() { impl_->stopped.wait(false); }

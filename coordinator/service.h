@@ -1,28 +1,21 @@
 // CoordinatorService: runs a FrameMachine over ZeroMQ. Binds the client, control and slabs planes, loads datasets, serves voxels.
 //
-// Threads: one owns the client and control sockets and runs the machine; one owns the slabs socket, cuts and packs chunks; one plans; one
-// counts occupied voxels; two answer questions about voxels; each dataset that is being loaded has one, kLoadsAtOnce at a time; up to
-// kLooksAtOnce look at files. None of them waits for another one. An exception in one fails only what it was doing: a frame, a load, a
-// count, a chunk. If the machine's own thread throws, open requests fail with the reason and the service stops.
+// Threads: one owns the client and control sockets and runs the machine; one owns the slabs socket, cuts and packs chunks; and those of
+// BackgroundActions. If the machine's own thread throws, open requests fail with the reason and the service stops.
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <set>
 #include <string>
 
 #include "common/base/status.h"
-#include "common/classification/count_occupied.h"
 #include "common/transport/socket.h"
+#include "coordinator/background_actions.h"
 #include "coordinator/catalogue.h"
 #include "coordinator/frame_machine.h"
 #include "coordinator/planner.h"
 
 namespace slabstream {
-
-// Called by the planning and the counting thread. Tests replace them by functions that fail or wait.
-using CountFunction = std::function<OccupancyGrid(const VoxelBricks&, const ClassificationTable&)>;
-using PlanFunction = std::function<Result<std::shared_ptr<const PlannedFrame>>(Planner&, const PlanRequest&)>;
 
 struct CoordinatorOptions {
   std::string client_endpoint;       // bound; a wildcard port is read back
@@ -37,9 +30,6 @@ struct CoordinatorOptions {
   PlanFunction make_plan = &Planner::Plan;
   CountFunction count_occupied = CountOccupied;
 };
-
-inline constexpr std::size_t kLoadsAtOnce = 4;
-inline constexpr std::size_t kLooksAtOnce = 4;  // so one file system that does not answer leaves the others alone
 
 class CoordinatorService {
  public:

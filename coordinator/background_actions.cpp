@@ -1,0 +1,261 @@
+#include "coordinator/background_actions.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "common/base/guarded.h"
+#include "common/base/log.h"
+#include "common/base/printable.h"
+#include "common/planning/layer_bricks.h"
+#include "common/renderers/renderer_kind.h"
+#include "coordinator/answer_question.h"
+#include "coordinator/catalogue.h"
+#include "coordinator/dataset_id.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::size_t kAnswersAtOnce = 2;
+
+// Whether at least half of the volume's bricks hold one value each.
+bool MostBricksAreEqual(const VolumeSummary& summary) {
+  const auto equal = std::ranges::count_if(summary.bricks, [](const ValueRange& range) { return range.min == range.max; });
+  return 2 * std::size_t(equal) >= summary.bricks.size();
+}
+
+FoldersSeen LookThrough(const LookAtFolders& action) {
+  FoldersSeen seen;
+  for (const std::string& folder : action.folders) {
+    seen.folders.emplace(folder, Guarded(folder.c_str(), [&] { return ListFolder(folder); }));
+  }
+  return seen;
+}
+
+// What an order wants to add. Its paths are those of this host, whatever the current folder of this process is.
+Result<FoundData> Find(const std::vector<std::string>& arguments) {
+  std::array<char, 256> host{};
+  if (::gethostname(host.data(), host.size() - 1) != 0) host = {"this host"};
+  const auto here = [&](const Status& status) {
+    return Status(status.code(),
+                  Printable(fmt::format("{} (paths are those of the coordinator's host, {})", status.message(), host.data())));
+  };
+  for (const std::string& argument : arguments) {
+    const Result<DataArgument> parsed = ParseDataArgument(argument);
+    if (!parsed.ok()) return parsed.status();
+    if (parsed->RelativePath() != nullptr) return here(Status::InvalidArgument(argument + ": the path must be absolute"));
+  }
+  FoundData found = FindData(arguments, "");
+  CheckFiles(found);
+  for (const std::string& line : found.complaints) LogWarning(line);
+  if (!found.errors.empty()) return here(found.errors.front());
+  return found;
+}
+
+Result<std::shared_ptr<const OccupancyGrid>> Count(const CountFunction& count, const SlabServer::Samples& samples,
+                                                   const CountDataset& action) {
+  const RendererKind& renderer = *action.volume.renderer();
+  OccupancyGrid grid = count(samples.view(), renderer.DrawnTable(action.volume.transfer(), *action.summary));
+  AddLayerBricks(LayerBricks(*action.summary, renderer, action.volume.looks()), *action.summary, grid);
+  return std::make_shared<const OccupancyGrid>(std::move(grid));
+}
+
+}  // namespace
+
+BackgroundActions::BackgroundActions(PlanFunction make_plan, CountFunction count_occupied, const ServiceSurroundings& surroundings,
+                                     SlabServer& slabs)
+    : make_plan_(std::move(make_plan)),
+      count_occupied_(std::move(count_occupied)),
+      planner_(std::make_shared<Planner>(surroundings)),
+      slabs_(slabs),
+      answers_(kAnswersAtOnce) {}
+
+std::vector<CoordinatorEvent> BackgroundActions::TakeEvents() {
+  std::vector<CoordinatorEvent> events;
+  for (News& news : inbox_->TakeAll()) {
+    if (news.samples.any()) slabs_.Publish(news.dataset, std::move(news.samples));
+    if (news.upload != nullptr) {
+      const auto open = uploads_.find(std::get<UploadBegun>(news.event).upload);
+      if (open != uploads_.end()) open->second = std::move(news.upload);
+    }
+    if (const auto* planned = std::get_if<Planned>(&news.event)) plans_.erase(planned->plan);
+    events.push_back(std::move(news.event));
+  }
+  return events;
+}
+
+BackgroundActions::AtOnce BackgroundActions::Post(BackgroundTasks& tasks, const char* what, auto make, auto failed) {
+  const Status begun = Guarded(what, [&] {
+    tasks.Post([inbox = inbox_, barrier = std::string(what), make = std::move(make), failed] {
+      Result<News> news = Guarded(barrier.c_str(), [&]() -> Result<News> { return make(); });
+      inbox->Post(news.ok() ? *std::move(news) : News{failed(news.status())});
+    });
+  });
+  if (begun.ok()) return std::nullopt;
+  return failed(begun);
+}
+
+Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& action) {
+  const Result<LoadedSource> loaded = LoadSource(action.source);
+  if (!loaded.ok()) return loaded.status();
+  const std::shared_ptr<const Volume>& volume = loaded->volume;
+  const Layers& layers = loaded->layers;
+  auto summary = std::make_shared<const VolumeSummary>(Summarize(LayeredVolume{volume, layers}));
+  SlabServer::Samples samples;
+  const bool held = action.source.held_bytes > 0;  // as a whole, in any case
+  if (!held && MostBricksAreEqual(*summary)) {
+    samples.bricks = std::make_shared<const BrickedVoxels>(volume->block);
+  } else {
+    samples.volume = volume;
+  }
+  if (layers.labels != nullptr) samples.labels = std::make_shared<const BrickedVoxels>(layers.labels->block);
+  if (layers.overlay != nullptr) samples.overlay = std::make_shared<const BrickedVoxels>(layers.overlay->block);
+  const DatasetId id = IdOf(action.name, *volume, layers);
+  const std::uint64_t bytes = samples.bytes() - (held ? volume->block.bytes.size() : 0);
+  return News{DatasetLoaded{action.name, action.load, id, std::move(summary), bytes, loaded->stamp}, id, std::move(samples)};
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(LoadDataset& action) {
+  const std::string barrier = "dataset \"" + action.name + "\" could not be loaded";
+  return Post(
+      loads_, barrier.c_str(), [action] { return Load(action); },
+      [name = action.name, load = action.load](const Status& why) {
+        return DatasetFailed{name, load, why};
+      });
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(UnloadDataset& action) {
+  slabs_.Withdraw(action.dataset);
+  return std::nullopt;
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(LookAtDataset& action) {
+  return Post(
+      looks_, "a look at the files of a dataset",
+      [action] {
+        return News{DatasetSeen{action.name, action.load, HaveChanged(*action.stamp)}};
+      },
+      [name = action.name, load = action.load](const Status& why) {
+        return DatasetSeen{name, load, why};
+      });
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(LookAtFolders& action) {
+  return Post(
+      looks_, "a look at the watched folders", [action] { return News{LookThrough(action)}; },
+      [](const Status& why) {
+        LogWarning(why.message());
+        return FoldersSeen{};
+      });
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(FindDatasets& action) {
+  return Post(
+      looks_, "a look at files",
+      [action] {
+        return News{DatasetsFound{action.order, Find(action.arguments)}};
+      },
+      [order = action.order](const Status& why) {
+        return DatasetsFound{order, why};
+      });
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(AnswerQuestion& action) {
+  const auto refusal = [id = action.id, nonce = NonceOf(action.question)](const Status& why) {
+    return QuestionAnswered{id, OrderRefused{nonce, why}};
+  };
+  return Post(
+      answers_, "an answer to a question",
+      [action, refusal, samples = slabs_.Find(action.dataset)] {
+        const Result<AnyMessage> answer = AnswerTo(action, samples);
+        return News{answer.ok() ? QuestionAnswered{action.id, *answer} : refusal(answer.status())};
+      },
+      refusal);
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(BeginUpload& action) {
+  const UploadId upload = action.upload;
+  uploads_[upload] = nullptr;
+  return Post(
+      loads_, "taking memory for a volume",
+      [upload, order = std::move(action.order)] {
+        const Result<std::shared_ptr<UploadBuffer>> made = UploadBuffer::Make(order);
+        return News{.event = UploadBegun{upload, made.status()}, .upload = made.ok() ? *made : nullptr};
+      },
+      [upload](const Status& why) {
+        return UploadBegun{upload, why};
+      });
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(StoreUpload& action) {
+  uploads_.at(action.upload)->Store(action.begin, action.bytes.span());
+  return std::nullopt;
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(FinishUpload& action) {
+  const auto whole = uploads_.extract(action.upload);
+  return Post(
+      loads_, "the end of a volume",
+      [upload = action.upload, buffer = whole.mapped()] {
+        return News{UploadFinished{upload, buffer->Finish()}};
+      },
+      [upload = action.upload](const Status& why) {
+        return UploadFinished{upload, why};
+      });
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(DropUpload& action) {
+  uploads_.erase(action.upload);
+  return std::nullopt;
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(CountDataset& action) {
+  return Post(
+      counts_, "counting of occupied voxels",
+      [count = count_occupied_, samples = slabs_.Find(action.volume.dataset()), action] {
+        return News{OccupiedCounted{action.count, Count(count, samples, action)}};
+      },
+      [id = action.count](const Status& why) {
+        return OccupiedCounted{id, why};
+      });
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(PlanRequest& action) {
+  const PlanId plan = action.plan;
+  if (auto planned = planner_->PlanAtHand(action)) return Planned{plan, *std::move(planned)};
+  const Status begun = Guarded("planning", [&] {
+    const auto& dropped = plans_[plan] = std::make_shared<std::atomic<bool>>(false);
+    planning_.Post([inbox = inbox_, planner = planner_, make = make_plan_, dropped, request = std::move(action)] {
+      if (*dropped) return;
+      inbox->Post({Planned{request.plan, Guarded("planning", [&] { return make(*planner, request); })}});
+    });
+  });
+  if (begun.ok()) return std::nullopt;
+  plans_.erase(plan);
+  return Planned{plan, begun};
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(DropPlan& action) {
+  if (const auto plan = plans_.find(action.plan); plan != plans_.end()) {
+    *plan->second = true;
+    plans_.erase(plan);
+  }
+  return std::nullopt;
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(FrameMeasured& action) {
+  const auto learn = [planner = planner_, measured = std::move(action)] {
+    const Status learnt = Guarded("learning from a frame", [&] { planner->Learn(measured); });
+    if (!learnt.ok()) LogWarning(learnt.message());
+  };
+  const Status begun = Guarded("learning from a frame", [&] { planning_.Post(learn); });
+  if (!begun.ok()) LogWarning(begun.message());
+  return std::nullopt;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,82 @@
+// BackgroundActions: the actions of the coordinator's machine that take long, on threads of their own: up to kLoadsAtOnce load datasets or
+// take memory for uploads, up to kLooksAtOnce look at files, two answer questions about voxels, one counts occupied voxels, one plans. None
+// waits for another. An exception in one fails only what it was doing. What they find comes back as events for the machine.
+//
+// One thread uses an object of this class: the one that runs the machine.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "common/base/background_tasks.h"
+#include "common/classification/count_occupied.h"
+#include "common/transport/mailbox.h"
+#include "coordinator/frame_machine.h"
+#include "coordinator/planner.h"
+#include "coordinator/slab_server.h"
+#include "coordinator/upload_buffer.h"
+
+namespace slabstream {
+
+// Called by the planning and the counting thread. Tests replace them by functions that fail or wait.
+using CountFunction = std::function<OccupancyGrid(const VoxelBricks&, const ClassificationTable&)>;
+using PlanFunction = std::function<Result<std::shared_ptr<const PlannedFrame>>(Planner&, const PlanRequest&)>;
+
+inline constexpr std::size_t kLoadsAtOnce = 4;
+inline constexpr std::size_t kLooksAtOnce = 4;  // so one file system that does not answer leaves the others alone
+
+class BackgroundActions {
+ public:
+  // `slabs` serves the voxels of the datasets that are loaded, and must outlive this.
+  BackgroundActions(PlanFunction make_plan, CountFunction count_occupied, const ServiceSurroundings& surroundings, SlabServer& slabs);
+
+  // Each begins an action. An event: the action is over already, or could not begin.
+  using AtOnce = std::optional<CoordinatorEvent>;
+  AtOnce Perform(LoadDataset& action);
+  AtOnce Perform(UnloadDataset& action);
+  AtOnce Perform(LookAtDataset& action);
+  AtOnce Perform(LookAtFolders& action);
+  AtOnce Perform(FindDatasets& action);
+  AtOnce Perform(AnswerQuestion& action);
+  AtOnce Perform(BeginUpload& action);
+  AtOnce Perform(StoreUpload& action);
+  AtOnce Perform(FinishUpload& action);
+  AtOnce Perform(DropUpload& action);
+  AtOnce Perform(CountDataset& action);
+  AtOnce Perform(PlanRequest& action);
+  AtOnce Perform(DropPlan& action);
+  AtOnce Perform(FrameMeasured& action);
+
+  // What has ended since the last call. Voxels of loaded datasets are served from then on: before the machine can send anybody for them.
+  std::vector<CoordinatorEvent> TakeEvents();
+  // Notified when there is something to take.
+  Wakeup& wakeup() { return inbox_->wakeup(); }
+
+ private:
+  // What a task ends with.
+  struct News {
+    CoordinatorEvent event;
+    DatasetId dataset = 0;
+    SlabServer::Samples samples = {};
+    std::shared_ptr<UploadBuffer> upload = nullptr;  // of an UploadBegun
+  };
+  static Result<News> Load(const LoadDataset& action);
+  // Has `make` make news on a thread of `tasks`; if it fails, `failed(why)` makes the event.
+  AtOnce Post(BackgroundTasks& tasks, const char* what, auto make, auto failed);
+
+  const std::shared_ptr<Mailbox<News>> inbox_ = std::make_shared<Mailbox<News>>();  // tasks that outlive this share it
+  const PlanFunction make_plan_;
+  const CountFunction count_occupied_;
+  const std::shared_ptr<Planner> planner_;  // the planning thread's, but for plans at hand
+  SlabServer& slabs_;
+  std::map<UploadId, std::shared_ptr<UploadBuffer>> uploads_;   // begun and neither finished nor dropped; null: memory is being taken
+  std::map<PlanId, std::shared_ptr<std::atomic<bool>>> plans_;  // under way: whether they are dropped
+  BackgroundTasks loads_{kLoadsAtOnce}, looks_{kLooksAtOnce}, answers_, counts_{1}, planning_{1};
+};
+
+}  // namespace slabstream
