@@ -24,6 +24,7 @@
 #include "common/base/version.h"
 #include "common/planning/validate_request.h"
 #include "gateway/assets.h"
+#include "gateway/content_coding.h"
 #include "gateway/metrics.h"
 #include "gateway/openapi.h"
 #include "gateway/page_message.h"
@@ -174,7 +175,7 @@ class Gateway::Impl : public HttpApplication {
     const auto route = routes_.find(target->path);
     if (route == routes_.end()) {
       if (const Asset* asset = FindAsset(target->path); asset != nullptr && (request.method == "GET" || request.method == "HEAD")) {
-        return counted({.type = std::string(asset->type), .body = std::string(asset->bytes), .headers = {{"Cache-Control", "no-cache"}}});
+        return counted(AssetReply(*asset, request));
       }
       return counted(Failure(404, fmt::format("there is nothing at '{}'", Shown(target->path))));
     }
@@ -266,11 +267,23 @@ class Gateway::Impl : public HttpApplication {
     routes["/api/v1/slice.png"] = {.takes_post = true, .handle = bind(&Impl::SlicePng)};
     routes["/api/v1/command"] = {.takes_post = true, .handle = bind(&Impl::Command)};
     routes["/api/v1/histogram"] = {.handle = bind(&Impl::Histogram)};
+    routes["/api/v1/labels"] = {.handle = bind(&Impl::Labels)};
     routes["/api/v1/value"] = {.handle = bind(&Impl::Value)};
     routes["/api/v1/pick"] = {.takes_post = true, .handle = bind(&Impl::Pick)};
     routes["/api/v1/transfer"] = {.handle = bind(&Impl::Transfer)};
     routes["/api/v1/view"] = {.handle = answer([] { return Failure(426, "this is a WebSocket"); })};
     return routes;
+  }
+
+  static HttpReply AssetReply(const Asset& asset, const HttpRequest& request) {
+    HttpReply reply{.type = std::string(asset.type), .body = {}, .headers = {{"Cache-Control", "no-cache"}, {"Vary", "Accept-Encoding"}}};
+    if (AcceptsGzip(request.accept_encoding)) {
+      reply.body = GzippedBytes(asset);
+      reply.headers.emplace_back("Content-Encoding", "gzip");
+    } else {
+      reply.body = asset.bytes;
+    }
+    return reply;
   }
 
   HttpReply ServiceGone() const { return Failure(503, news_->reason); }
@@ -429,6 +442,15 @@ class Gateway::Impl : public HttpApplication {
       return JsonReply(HistogramJson(name, std::get<SummaryReply>(answer)));
     };
     Ask("histogram", SummaryQuery{.dataset = *dataset, .transfer = {}}, make, std::move(reply), gone);
+  }
+
+  void Labels(const PictureFields& fields, ReplyFunction reply, const Gone& gone) {
+    Result<std::string> dataset = OnlyDataset(fields);
+    if (!dataset.ok()) return reply(Failure(dataset.status()));
+    const auto make = [name = *dataset](const QuestionReply& answer) {
+      return JsonReply(LabelsJson(name, std::get<SummaryReply>(answer)));
+    };
+    Ask("labels", SummaryQuery{.dataset = *dataset, .transfer = {}}, make, std::move(reply), gone);
   }
 
   void Value(PictureFields fields, ReplyFunction reply, const Gone& gone) {

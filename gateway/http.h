@@ -35,6 +35,7 @@ struct HttpRequest {
   std::string method, target;
   std::string host;  // empty: there is none
   std::optional<std::string> origin, authorization;
+  std::string accept_encoding;            // empty: there is none
   std::vector<std::string> subprotocols;  // that a WebSocket offers
   std::string body;
   // Never null. An application that works on the reply for long may put a function there: it is called, on the io thread, if the

@@ -120,6 +120,7 @@ Json OpenApi() {
       {"/api/v1/slice.png", "Planes through a volume, as `slabstream slice` makes them", "image/png", false, SliceFields(), true},
       {"/api/v1/command", "The command line that makes a picture", "application/json", false, render, true},
       {"/api/v1/histogram", "The histogram of a dataset, its range and percentiles", "application/json", false, dataset},
+      {"/api/v1/labels", "The labels of a dataset, with their names and colours", "application/json", false, dataset},
       {"/api/v1/value", "What a dataset holds at a point", "application/json", false, With(dataset, {field("at", kPointHelp, "X,Y,Z")})},
       {"/api/v1/pick", "The point that a pixel of a picture shows", "application/json", false,
        With(render, {field("x", kPixelXHelp, "NUMBER"), field("y", kPixelYHelp, "NUMBER")}), true},

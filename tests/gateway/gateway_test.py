@@ -3,6 +3,7 @@
 
     gateway_test.py FOLDER_OF_PROGRAMS [unittest arguments]
 """
+import gzip
 import http.client
 import json
 import os
@@ -89,6 +90,13 @@ class Programs:
         shutil.rmtree(self.folder)
 
 
+def write_labels(folder):
+    """labels.nrrd, on the grid of a sphere of 20 voxels a side: 3 and 70 in two of its corners; and names.txt, colours for them."""
+    voxels = bytes(3 if max(x, y, z) < 4 else 70 if min(x, y, z) > 15 else 0 for z in range(20) for y in range(20) for x in range(20))
+    (folder / "labels.nrrd").write_bytes(b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 20 20 20\nspacings: 1 1 1\nencoding: raw\n\n" + voxels)
+    (folder / "names.txt").write_text("3 1 0.5 0 Corner \"low\"\n5 1 1 1 Nowhere\n70 0 0 1 Größte Ecke\n", encoding="utf-8")
+
+
 class WithService(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -96,7 +104,8 @@ class WithService(unittest.TestCase):
         cls.addClassCleanup(cls.programs.close)
         cls.programs.run("sphere", "--class", 1, "--size", 24, "--occupancy", 0.2, "-o", "a.nrrd")
         cls.programs.run("sphere", "--class", 2, "--size", 20, "--occupancy", 0.3, "-o", "b.nrrd")
-        _, cls.endpoint = cls.programs.up("--data", "a=a.nrrd", "--data", "b=b.nrrd")
+        write_labels(cls.programs.folder)
+        _, cls.endpoint = cls.programs.up("--data", "a=a.nrrd", "--data", "b=b.nrrd", "--data", "c=b.nrrd,labels=labels.nrrd:names.txt")
         cls.process, cls.gateway = cls.programs.gateway("--endpoint", cls.endpoint)
         wait_until(lambda: cls.gateway.request("/readyz")[0] == 200, "ready")
 
@@ -179,7 +188,7 @@ class HttpTest(WithService):
         self.get("/api/v1/render.png", dataset="a", size=16)
         wait_until(lambda: any(d["state"] == "ready" for d in self.gateway.json("/api/v1/datasets")[1]["datasets"]), "a is loaded")
         datasets = {d["name"]: d for d in self.gateway.json("/api/v1/datasets")[1]["datasets"]}
-        self.assertEqual(set(datasets), {"a", "b"})
+        self.assertEqual(set(datasets), {"a", "b", "c"})
         self.assertEqual(datasets["a"]["size"], [24, 24, 24])
         status, service = self.gateway.json("/api/v1/status")
         self.assertEqual((status, len(service["workers"])), (200, 2))
@@ -202,6 +211,12 @@ class HttpTest(WithService):
         self.assertEqual(values, sorted(values))
         info = json.loads(self.programs.run("info", "a.nrrd", "--json").stdout)
         self.assertEqual(histogram["counts"], info["histogram"])
+
+    def test_labels_have_their_names_and_colours(self):
+        self.assertEqual(self.ask("labels", dataset="c"), {"dataset": "c", "labels": [
+            {"value": 3, "name": "Corner \"low\"", "color": "#ff8000"}, {"value": 70, "name": "Größte Ecke", "color": "#0000ff"}]})
+        self.assertEqual(self.ask("labels", dataset="a"), {"dataset": "a", "labels": []})
+        self.assertEqual(self.ask("value", dataset="c", at="19,19,19")["label"], {"value": 70, "name": "Größte Ecke"})
 
     def test_values_at_points(self):
         centre = self.ask("value", dataset="b", at="9.5,9.5,9.5")
@@ -246,6 +261,8 @@ class HttpTest(WithService):
             ("histogram", {}, 400, "dataset is missing"),
             ("histogram", {"dataset": "none"}, 404, "none"),
             ("histogram", {"dataset": "a", "size": 3}, 400, "no option 'size'"),
+            ("labels", {"dataset": "none"}, 404, "none"),
+            ("labels", {"dataset": "a", "value": 3}, 400, "no option 'value'"),
             ("value", {"dataset": "a"}, 400, "at is missing"),
             ("value", {"dataset": "a", "at": "1,2"}, 400, "1,2"),
             ("value", {"dataset": "a", "at": "1,2,nan"}, 400, "nan"),
@@ -290,6 +307,23 @@ class HttpTest(WithService):
         path = "/api/v1/datasets?token="
         self.assertEqual(self.gateway.request(path + self.gateway.token, token=False)[0], 200)
         self.assertEqual(self.gateway.request(path + self.gateway.token[:-1], token=False)[0], 401)
+
+    def test_the_page_is_compressed_for_those_who_take_that(self):
+        for path in ("/", "/assets/page.js", "/assets/page.css", "/assets/icon.svg"):
+            whole_file = self.gateway.request(path, headers={"Accept-Encoding": "identity"})[2]
+            for accepted, packed in (("gzip", True), ("deflate, gzip;q=1.0, *;q=0.5", True), ("GZIP", True), ("*", True), ("br", False), ("identity", False),
+                                     ("gzip;q=0", False), ("*, gzip ; q=0.000", False), ("", False), ("gzip;q=0.001", True)):
+                for method in ("GET", "HEAD"):
+                    status, headers, body = self.gateway.request(path, method=method, headers={"Accept-Encoding": accepted})
+                    self.assertEqual((status, headers["Vary"], headers["Content-Encoding"]), (200, "Accept-Encoding", "gzip" if packed else None), accepted)
+                    if method == "GET":
+                        self.assertEqual(len(body), int(headers["Content-Length"]))
+                        self.assertEqual(gzip.decompress(body) if packed else body, whole_file)
+                        length = len(body)
+                    else:
+                        self.assertEqual((body, int(headers["Content-Length"])), (b"", length))
+        total = sum(len(self.gateway.request(path, headers={"Accept-Encoding": "gzip"})[2]) for path in ("/", "/assets/page.js", "/assets/page.css"))
+        self.assertLess(total, 150_000)
 
     def test_the_page_uses_relative_addresses_only(self):
         for path in ("/", "/assets/page.js", "/assets/page.css"):

@@ -7,6 +7,7 @@ import { section } from "./controls";
 import { commandDialog, helpDialog, screenshotDialog, tokenDialog } from "./dialogs";
 import { copyText, h } from "./dom";
 import { FunctionSource } from "./function_source";
+import { GradientEditor } from "./gradient_editor";
 import { type KeyGroup, listenToKeys } from "./keys";
 import { linkOf, showInAddress, stateOf, takeToken } from "./link";
 import { LabelsSection, lightSection, renderingSection, surfacesSection } from "./look_sections";
@@ -49,7 +50,7 @@ class Page {
     this.pointed = new Pointed(context, label => labels.note(label));
     this.shell = new Shell(this.actions(), notices.status, notices.banner, notices.progress, notices.messages, this.pointed.element, this.machine.element);
     const editor = new TransferEditor(context, source);
-    this.shell.panel.append(section("Transfer function", true, editor.element), slicesSection(context), renderingSection(context), surfacesSection(context), clipSection(context), labels.element, lightSection(context), this.facts());
+    this.shell.panel.append(section("Transfer function", true, editor.element, new GradientEditor(context).element), slicesSection(context), renderingSection(context), surfacesSection(context), clipSection(context), labels.element, lightSection(context), this.facts());
     this.viewer = new Viewer(context, source, this.pointed, {
       drawn: ({ frame: { header } }) => { notices.onFrame(); this.machine.onFrame(header.statistics); this.know(); },
       status: status => this.onStatus(status), progress: progress => notices.onProgress(progress), error: message => notices.onError(message),
