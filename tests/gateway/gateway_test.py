@@ -506,6 +506,132 @@ class ViewTest(WithService):
         self.assertIn(b"slabstream_gateway_sessions 3\n", self.gateway.request("/metrics")[2])
 
 
+def movie_pixels(picture):
+    """A frame of a movie: a picture's red, green and blue, before black."""
+    width, height, rgba = picture
+    return b"".join(bytes((c * rgba[i + 3] + 127) // 255 for c in rgba[i:i + 3]) for i in range(0, 4 * width * height, 4))
+
+
+class TurntableTest(unittest.TestCase):
+    """Scripts stand in for ffmpeg: what it reads and writes is what matters here."""
+
+    def setUp(self):
+        self.programs = Programs()
+        self.addCleanup(self.programs.close)
+        self.programs.run("sphere", "--class", 1, "--size", 16, "--occupancy", 0.2, "-o", "a.nrrd")
+        self.programs.environment["PATH"] = f"{self.programs.folder}/bin:{os.environ['PATH']}"
+        (self.programs.folder / "bin").mkdir()
+        self.service, self.endpoint = self.programs.up("--data", "a=a.nrrd")
+
+    def gateway(self, script):
+        if script:
+            program = self.programs.folder / "bin" / "ffmpeg"
+            program.write_text("#!/bin/sh\n" + script + "\n")
+            program.chmod(0o755)
+        else:
+            self.programs.environment["PATH"] = str(self.programs.folder / "bin")
+        self.process, gateway = self.programs.gateway("--endpoint", self.endpoint)
+        wait_until(lambda: gateway.request("/readyz")[0] == 200, "ready")
+        return gateway
+
+    def opened(self, gateway, **fields):
+        """A connection that has asked for a movie, and read its first bytes."""
+        connection = gateway.connect()
+        self.addCleanup(connection.close)
+        target = "/api/v1/turntable.mp4?" + urllib.parse.urlencode({"dataset": "a", "size": 64, **fields})
+        connection.sendall(f"GET {target} HTTP/1.1\r\nHost: {gateway.authority}\r\nAuthorization: Bearer {gateway.token}\r\n\r\n".encode())
+        self.assertIn(b" 200 ", connection.recv(13))
+        return connection
+
+    def encoders(self):
+        """Processes that the gateway has started."""
+        found = []
+        for stat in Path("/proc").glob("[0-9]*/stat"):
+            try:
+                state, parent = stat.read_text().rsplit(")", 1)[1].split()[:2]
+            except OSError:
+                continue
+            if int(parent) == self.process.pid and state not in "ZX":
+                found.append(stat.parent.name)
+        return found
+
+    def test_its_frames_are_pictures_all_around(self):
+        gateway = self.gateway('echo "$@" > arguments; exec cat')
+        fields = {"dataset": "a", "size": "24x16", "azimuth": 350, "background": "#204060", "renderer": "mip"}
+        status, headers, body = gateway.request("/api/v1/turntable.mp4?" + urllib.parse.urlencode({**fields, "frames": 5, "turns": 2, "fps": 12.5}))
+        self.assertEqual((status, headers["Content-Type"], headers["Transfer-Encoding"]), (200, "video/mp4", "chunked"))
+        frames = [movie_pixels(png_pixels(gateway.request("/api/v1/render.png?" + urllib.parse.urlencode({**fields, "azimuth": (350 + 144 * i) % 360}))[2]))
+                  for i in range(5)]
+        self.assertEqual(len(body), 5 * 24 * 16 * 3)
+        self.assertEqual(body, b"".join(frames))
+        arguments = (self.programs.folder / "arguments").read_text()
+        for part in (" -video_size 24x16 -framerate 12.5 ", "+frag_every_frame", " pipe:1"):
+            self.assertIn(part, arguments)
+        posted = gateway.request("/api/v1/turntable.mp4", method="POST", body=json.dumps({**fields, "frames": 5, "turns": 2}))
+        self.assertEqual(posted[2], body)
+        # To clients of HTTP/1.0 the end of the connection is the movie's.
+        old = gateway.raw(f"GET /api/v1/turntable.mp4?dataset=a&size=16&frames=2&token={gateway.token} HTTP/1.0\r\nHost: {gateway.authority}\r\n\r\n".encode())
+        self.assertEqual(len(old.split(b"\r\n\r\n", 1)[1]), 2 * 16 * 16 * 3)
+        head = gateway.request("/api/v1/turntable.mp4?dataset=a&size=16&frames=2", method="HEAD")
+        self.assertEqual((head[0], head[2]), (200, b""))
+
+    def test_wrong_ones_are_refused_before_they_begin(self):
+        gateway = self.gateway("exec cat")
+        for fields, status, why in [
+            ({}, 400, "dataset is missing"), ({"dataset": "none"}, 404, "none"), ({"dataset": "a", "frames": 0}, 400, "[1, 1000]"),
+            ({"dataset": "a", "frames": 1001}, 400, "[1, 1000]"), ({"dataset": "a", "turns": -1}, 400, "turns"), ({"dataset": "a", "fps": "nan"}, 400, "fps"),
+            ({"dataset": "a", "size": "33x32"}, 400, "must be even"), ({"dataset": "a", "size": "4096x2048"}, 400, "at most 4194304"),
+            ({"dataset": "a", "eye": "1,2,3"}, 400, "--eye"), ({"dataset": "a", "what": 1}, 400, "no option 'what'")]:
+            got, body = gateway.json("/api/v1/turntable.mp4?" + urllib.parse.urlencode(fields))
+            self.assertEqual((got, list(body)), (status, ["error"]), fields)
+            self.assertIn(why, body["error"])
+        wait_until(lambda: not self.encoders(), "no encoder is left")
+
+    def test_without_ffmpeg_it_says_what_to_install(self):
+        status, body = self.gateway(None).json("/api/v1/turntable.mp4?dataset=a")
+        self.assertEqual(status, 501)
+        self.assertIn("the program ffmpeg, which makes movies, is not in $PATH (Debian package ffmpeg)", body["error"])
+
+    def test_an_encoder_that_fails_cuts_the_movie_off(self):
+        gateway = self.gateway("echo 'no luck' >&2; exit 3")
+        status, body = gateway.json("/api/v1/turntable.mp4?dataset=a&size=64&frames=50")
+        self.assertEqual((status, body["error"]), (503, "ffmpeg exited with status 3: no luck"))
+        self.programs.end(self.process)
+        gateway = self.gateway("head -c 20000; exit 1")
+        with self.assertRaises(http.client.HTTPException):  # no last chunk
+            gateway.request("/api/v1/turntable.mp4?dataset=a&size=64&frames=50")
+        self.assertEqual(gateway.request("/livez")[0], 200)
+
+    def test_closed_connections_end_their_movies(self):
+        gateway = self.gateway("exec cat")
+        def status():
+            return json.loads(self.programs.run("status", "--endpoint", self.endpoint, "--json").stdout)
+
+        first, second = self.opened(gateway, size=256, frames=1000), self.opened(gateway, size=256, frames=1000)
+        refused = gateway.json("/api/v1/turntable.mp4?dataset=a&size=16")
+        self.assertEqual((refused[0], refused[1]["error"]), (429, "2 movies are under way, which is the limit"))
+        # Nobody reads them, so rendering waits: what lies between is a few frames.
+        wait_until(lambda: status()["running"] + status()["queued"] == 0, "nothing runs")
+        done = status()["frames_done"]
+        self.assertLess(done, 200)
+        for connection in (first, second):
+            connection.close()
+        wait_until(lambda: not self.encoders(), "the encoders have ended")
+        wait_until(lambda: gateway.request("/api/v1/turntable.mp4?dataset=a&size=16&frames=2")[0] == 200, "there is room again")
+        # One more runs when the gateway ends.
+        self.opened(gateway, size=256, frames=1000)
+        self.assertEqual(self.programs.end(self.process), 0)
+
+    @unittest.skipUnless(shutil.which("ffmpeg"), "ffmpeg is not installed")
+    def test_ffmpeg_makes_a_movie_of_it(self):
+        os.symlink(shutil.which("ffmpeg"), self.programs.folder / "bin" / "ffmpeg")
+        self.programs.environment["PATH"] = str(self.programs.folder / "bin")
+        self.process, gateway = self.programs.gateway("--endpoint", self.endpoint)
+        status, _, body = gateway.request("/api/v1/turntable.mp4?dataset=a&size=64&frames=30")
+        self.assertEqual(status, 200)
+        self.assertEqual((body[4:8], body.count(b"moof")), (b"ftyp", 30))
+
+
 class ServiceLossTest(unittest.TestCase):
     def test_a_session_survives_the_service(self):
         programs = Programs()

@@ -6,6 +6,7 @@
 import json
 import os
 import re
+import shutil
 import signal
 import sys
 import unittest
@@ -370,6 +371,41 @@ class PageTest(unittest.TestCase):
             viewer.js("(s => { s.value = arguments[0]; s.dispatchEvent(new Event('change')); return true; })([...document.querySelectorAll('select')].find(s => s.value === 'raycast' || s.value === 'mip' || s.value === 'zbuffer'))", renderer)
             drawn = viewer.final(f"o.renderer === '{renderer}'")
             self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+
+    # ---- movies
+
+    @unittest.skipUnless(shutil.which("ffmpeg"), "ffmpeg is not installed")
+    def test_a_movie_is_made_and_can_be_cancelled(self):
+        viewer = self.viewer()
+        viewer.settled()
+        viewer.js("(window.saved = [], URL.createObjectURL = blob => { window.saved.push(blob); return '#'; }, true)")
+        viewer.keys("v")
+        frames = viewer.find("dialog input[aria-label=Frames]")
+        frames.clear()
+        frames.send_keys("1000")
+        viewer.find("dialog .primary").click()
+        viewer.until("/^Frame [0-9]+ of 1000/.test(document.querySelector('dialog [role=status]').textContent)")
+        self.assertGreater(viewer.js("document.querySelector('dialog progress').value"), 0)
+        viewer.save(SHOTS, "movie")
+        viewer.driver.find_element(By.XPATH, "//dialog//button[. = 'Cancel']").click()
+        viewer.until("document.querySelector('dialog [role=status]').textContent === 'Cancelled.'")
+        self.assertEqual(viewer.js("window.saved.length"), 0)
+        frames.clear()
+        frames.send_keys("12")
+        viewer.find("dialog .primary").click()
+        viewer.until("/^Saved: 12 frames, 0.5 s/.test(document.querySelector('dialog [role=status]').textContent)")
+        kind, size = viewer.js("(b => [b.type, b.size])(window.saved[0])")
+        self.assertEqual(kind, "video/mp4")
+        self.assertGreater(size, 1000)
+
+    def test_without_ffmpeg_the_command_is_offered(self):
+        viewer = self.viewer(self.proxy(answers={"/api/v1/turntable.mp4": lambda fields, body: 501}).port)
+        viewer.settled()
+        viewer.keys("v")
+        viewer.find("dialog .primary").click()
+        line = viewer.until("document.querySelector('dialog pre')?.textContent")
+        self.assertRegex(line, r"^slabstream turntable patient .* --frames 120 --fps 25 -o turntable.mp4$")
+        viewer.save(SHOTS, "movie-elsewhere")
 
     # ---- slices and what lies below the pointer
 
