@@ -632,6 +632,47 @@ class TurntableTest(unittest.TestCase):
         self.assertEqual((body[4:8], body.count(b"moof")), (b"ftyp", 30))
 
 
+class SlowReaderTest(WithService):
+    """Those who ask and do not read."""
+
+    def memory(self):
+        """What the gateway has in memory now, in bytes."""
+        lines = dict(line.split(":", 1) for line in Path(f"/proc/{self.process.pid}/status").read_text().splitlines())
+        return 1024 * int(lines["VmRSS"].split()[0])
+
+    def test_they_are_dropped_and_memory_stays(self):
+        # Noise: a lossless picture of some megabytes, which no buffer of a socket takes.
+        side = 48
+        noise = random.Random(5).randbytes(side ** 3)
+        header = f"NRRD0004\ntype: uint8\ndimension: 3\nsizes: {side} {side} {side}\nspacings: 1 1 1\nencoding: raw\n\n".encode()
+        (self.programs.folder / "noise.nrrd").write_bytes(header + noise)
+        self.programs.run("data", "add", f"noise={self.programs.folder}/noise.nrrd", "--endpoint", self.endpoint)
+        view = {"dataset": "noise", "size": 1200, "renderer": "mip", "background": "#000000"}
+        warm = self.page()
+        warm.final(warm.view(view))
+        warm.close()
+        before = self.memory()
+        pages = [self.page(receive_bytes=4096) for _ in range(3)]
+        for turn in range(400):
+            for page in pages:
+                page.view({**view, "azimuth": turn})
+        with self.gateway.connect(receive_bytes=4096) as connection:
+            target = "/api/v1/render.png?" + urllib.parse.urlencode({**view, "size": 2000, "depth": 16})
+            connection.sendall(f"GET {target} HTTP/1.1\r\nHost: {self.gateway.authority}\r\nAuthorization: Bearer {self.gateway.token}\r\n\r\n".encode())
+            most = before
+
+            def dropped():
+                nonlocal most
+                most = max(most, self.memory())
+                metrics = self.gateway.request("/metrics")[2]
+                return b"slabstream_gateway_sessions 0\n" in metrics and b'refusals_total{reason="slow reader"}' in metrics
+
+            wait_until(dropped, "all are dropped")
+        # The largest picture is 64 MB of floats, the others 23: a few are on their way, but not 1200.
+        self.assertLess(most - before, 400 << 20)
+        self.assertEqual(self.get("/api/v1/render.png", dataset="a", size=16)[0], 200)
+
+
 class ServiceLossTest(unittest.TestCase):
     def test_a_session_survives_the_service(self):
         programs = Programs()

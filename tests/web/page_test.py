@@ -69,8 +69,8 @@ class PageTest(unittest.TestCase):
         self.addCleanup(viewer.close)
         return viewer
 
-    def proxy(self, delay=0.0, answers=None):
-        proxy = Proxy(self.gateway.host, self.gateway.port, delay, answers)
+    def proxy(self, delay=0.0, answers=None, prefix=""):
+        proxy = Proxy(self.gateway.host, self.gateway.port, delay, answers, prefix)
         self.addCleanup(proxy.close)
         return proxy
 
@@ -371,6 +371,40 @@ class PageTest(unittest.TestCase):
             viewer.js("(s => { s.value = arguments[0]; s.dispatchEvent(new Event('change')); return true; })([...document.querySelectorAll('select')].find(s => s.value === 'raycast' || s.value === 'mip' || s.value === 'zbuffer'))", renderer)
             drawn = viewer.final(f"o.renderer === '{renderer}'")
             self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+
+    # ---- behind a proxy
+
+    def test_everything_works_below_a_path(self):
+        proxy = self.proxy(prefix="/user/me/proxy/8080")
+        viewer = Viewer(self.driver, self.url(proxy.port).replace("/#", "/user/me/proxy/8080/#"))
+        self.addCleanup(viewer.close)
+        viewer.settled()
+        viewer.drag(40, 10)
+        drawn = viewer.final("o.azimuth !== 150")
+        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        viewer.until("document.querySelector('.facts dd') !== null")
+        viewer.until("document.querySelector('.editor .histogram').getAttribute('d') !== ''")
+        viewer.open_section("Layers")
+        viewer.driver.find_element(By.XPATH, "//input[@value = 'tint']").click()
+        viewer.until("document.querySelectorAll('[data-label]').length === 3")
+        viewer.keys("c")
+        link = viewer.until("window.copied[0]")
+        self.assertTrue(link.startswith(f"http://127.0.0.1:{proxy.port}/user/me/proxy/8080/#"), link)
+        viewer.js("(window.saved = [], URL.createObjectURL = blob => { window.saved.push(blob); return '#'; }, true)")
+        viewer.keys("s")
+        viewer.find("dialog .primary").click()
+        viewer.until("window.saved.length === 1 && window.saved[0].type === 'image/png'")
+        viewer.find("dialog [aria-label=Close]").click()
+        viewer.keys("k")
+        self.assertIn("slabstream render patient", viewer.until("document.querySelector('dialog pre')?.textContent"))
+        viewer.find("dialog [aria-label=Close]").click()
+        viewer.driver.refresh()
+        viewer.settled()  # the token is kept for this tab, at this path
+        proxy.cut()
+        viewer.until("document.querySelector('.banner:not([hidden])') === null && document.querySelector('[data-pane=\"3d\"] canvas') !== null")
+        viewer.drag(40, 10)
+        viewer.final("o.azimuth < 130")
+        self.assertEqual([target for target in proxy.strays if target != "/favicon.ico"], [])
 
     # ---- movies
 
