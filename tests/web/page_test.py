@@ -400,6 +400,9 @@ class PageTest(unittest.TestCase):
         viewer.find("dialog [aria-label=Close]").click()
         viewer.driver.refresh()
         viewer.settled()  # the token is kept for this tab, at this path
+        viewer.until("document.querySelector('.facts dd') !== null && document.querySelectorAll('[data-label]').length === 3")
+        viewer.until("document.querySelector('.editor .histogram').getAttribute('d') !== ''")
+        viewer.until("performance.getEntriesByType('resource').some(entry => entry.name.includes('api/v1/transfer'))")
         proxy.cut()
         viewer.until("document.querySelector('.banner:not([hidden])') === null && document.querySelector('[data-pane=\"3d\"] canvas') !== null")
         viewer.drag(40, 10)
@@ -502,12 +505,12 @@ class PageTest(unittest.TestCase):
         for pane in ("3d", "coronal"):
             viewer.settled(pane)
             viewer.hover((12, -7), pane=pane)
-            text = viewer.until("/value[^]*label/.test(document.querySelector('.readout').innerText) && document.querySelector('.readout').innerText.replaceAll('\u2212', '-')")
-            r, value, label = re.match(r"R (\S+) .* mm\s*value (\S+)\s*label (\d)", text, re.DOTALL).groups()
+            text = viewer.until("/value[^]*(left|middle|right)/.test(document.querySelector('.readout').innerText) && document.querySelector('.readout').innerText.replaceAll('\u2212', '-')")
+            r, value, label = re.match(r"R (\S+) .* mm\s*value (\S+)\s*(\w+)", text, re.DOTALL).groups()
             i = round((float(r) + 20) / 2)  # the volume begins at -20, a voxel has 2 mm
-            self.assertEqual((float(value), int(label)), (60 + 8 * i, 1 + i // 8), text)
+            self.assertEqual((float(value), label), (60 + 8 * i, ("left", "middle", "right")[i // 8]), text)
             viewer.hover((-150, -90), pane=pane)
-            viewer.until("!/label/.test(document.querySelector('.readout').innerText)")
+            viewer.until("!/left|middle|right/.test(document.querySelector('.readout').innerText)")
 
     # ---- the page
 
