@@ -1,9 +1,10 @@
 #!/usr/bin/python3
-"""Draws a scene of `slabstream bench --export` with one of VTK's volume mappers and times it; bench/against_vtk runs it.
+"""Draws a scene of `slabstream bench --export` with one of VTK's volume mappers and times it; bench/against_vtk and bench/viewer run it.
 
 Needs python3-vtk9, python3-numpy and an X display (run it under xvfb-run). One frame is: move the camera, Render(), read the RGBA pixels
 back. Two frames warm up, then both turntables turn after turn, as `slabstream bench` does it. Prints one JSON object: milliseconds of
-each frame in order, of the first one, and the peak of this process's memory.
+each frame in order, of the first one, and the peak of this process's memory. With --jpeg a frame ends with its JPEG file in memory instead,
+as a server sends it. A scene whose views have "azimuths" shows these, in degrees, instead of a full turn.
 """
 import argparse
 import json
@@ -72,7 +73,7 @@ def make_mapper(vtk, kind, threads, sample_distance, renderer):
 class Stage:
     """The window with the volume in it, and the turntable's camera: Slabstream's views (common/view/camera.h), in VTK's terms."""
 
-    def __init__(self, vtk, scene, directory, mapper_kind, threads):
+    def __init__(self, vtk, scene, directory, mapper_kind, threads, jpeg=0):
         image = read_volume(vtk, os.path.join(directory, scene["volume"]))
         dims, spacing = image.GetDimensions(), image.GetSpacing()
         self.views, self.size = scene["views"], scene["size"]
@@ -97,9 +98,20 @@ class Stage:
         self.window.SetDesiredUpdateRate(1e-6)
         self.window.AddRenderer(self.renderer)
         self.pixels = vtk.vtkUnsignedCharArray()
+        self.azimuths = self.views.get("azimuths") or [360 * i / self.views["frames"] for i in range(self.views["frames"])]
+        self.grab, self.encoder = None, None
+        if jpeg:
+            self.grab = vtk.vtkWindowToImageFilter()
+            self.grab.SetInput(self.window)
+            self.grab.ReadFrontBufferOff()
+            self.grab.ShouldRerenderOff()
+            self.encoder = vtk.vtkJPEGWriter()
+            self.encoder.SetInputConnection(self.grab.GetOutputPort())
+            self.encoder.WriteToMemoryOn()
+            self.encoder.SetQuality(jpeg)
 
     def frame_ms(self, projection, index):
-        azimuth = math.radians(360 * index / self.views["frames"])
+        azimuth = math.radians(self.azimuths[index])
         elevation, half_fov = math.radians(self.views["elevation_degrees"]), math.radians(self.views["fov_degrees"]) / 2
         perspective = projection == "perspective"
         distance = self.radius / math.sin(half_fov) if perspective else 2 * self.radius
@@ -115,7 +127,11 @@ class Stage:
         camera.SetViewUp(0, 0, 1)
         self.renderer.ResetCameraClippingRange()
         self.window.Render()
-        self.window.GetRGBACharPixelData(0, 0, self.size - 1, self.size - 1, 1, self.pixels)
+        if self.encoder:
+            self.grab.Modified()
+            self.encoder.Write()
+        else:
+            self.window.GetRGBACharPixelData(0, 0, self.size - 1, self.size - 1, 1, self.pixels)
         return (time.perf_counter() - begin) * 1e3
 
 
@@ -134,6 +150,8 @@ def main():
     p.add_argument("scene", help="a .scene.json")
     p.add_argument("--mapper", choices=["fixedpoint", "gpu"], default="fixedpoint")
     p.add_argument("--threads", type=int, default=2)
+    p.add_argument("--jpeg", type=int, default=0, metavar="QUALITY", help="encode each frame")
+    p.add_argument("--projection", choices=PROJECTIONS, help="only this one")
     p.add_argument("--pictures", metavar="PREFIX", help="write the first view of each projection to PREFIX.PROJECTION.png")
     a = p.parse_args()
     os.environ["LP_NUM_THREADS"] = str(a.threads)  # of Mesa's software rasteriser, which draws for the gpu mapper; read when VTK is loaded
@@ -142,15 +160,16 @@ def main():
 
     with open(a.scene, encoding="utf-8") as stream:
         scene = json.load(stream)
-    stage = Stage(vtk, scene, os.path.dirname(a.scene), a.mapper, a.threads)
-    warm_up = [stage.frame_ms(projection, 0) for projection in PROJECTIONS]
-    times = {projection: [] for projection in PROJECTIONS}
+    stage = Stage(vtk, scene, os.path.dirname(a.scene), a.mapper, a.threads, a.jpeg)
+    projections = [a.projection] if a.projection else PROJECTIONS
+    warm_up = [stage.frame_ms(projection, 0) for projection in projections]
+    times = {projection: [] for projection in projections}
     for _ in range(scene["views"]["turns"]):
-        for projection in PROJECTIONS:
-            times[projection] += [stage.frame_ms(projection, i) for i in range(scene["views"]["frames"])]
+        for projection in projections:
+            times[projection] += [stage.frame_ms(projection, i) for i in range(len(stage.azimuths))]
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     if a.pictures:
-        for projection in PROJECTIONS:
+        for projection in projections:
             stage.frame_ms(projection, 0)
             write_picture(vtk, stage.window, f"{a.pictures}.{projection}.png")
     print(json.dumps({"version": vtk.vtkVersion().GetVTKVersion(), "first_frame_ms": warm_up[0], "latency_ms": times,

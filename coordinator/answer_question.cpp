@@ -26,7 +26,9 @@ Result<AnyMessage> Answer(const SummaryQuery& query, const Dataset& dataset) {
                      .histogram = {summary.histogram.begin(), summary.histogram.end()},
                      .non_finite = std::uint64_t(summary.non_finite),
                      .percentiles = {},
-                     .transfer = *std::move(transfer)};
+                     .transfer = *std::move(transfer),
+                     .labels = {}};
+  if (summary.label_table != nullptr) reply.labels = summary.label_table->labels;
   for (const double percent : kPercents) reply.percentiles.push_back({percent, PercentileOf(summary, percent)});
   return AnyMessage(std::move(reply));
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <span>
+#include <string>
 #include <string_view>
 
 namespace slabstream {
@@ -15,5 +16,7 @@ struct Asset {
 std::span<const Asset> Assets();
 // "/" is "/index.html". Null: there is none.
 const Asset* FindAsset(std::string_view path);
+// The bytes of one of Assets(), compressed when any of them is first asked for.
+const std::string& GzippedBytes(const Asset& asset);
 
 }  // namespace slabstream

@@ -4,9 +4,12 @@
 //   Gateway               who may ask; routes                                        io thread
 //   ViewSession           one view of one page                                       io thread
 //   ServiceLink           a client of the service: one for all requests over HTTP,   one each
-//                         and one for each session
+//                         one for each session, one for each movie
+//   PictureRequests, QuestionRequests, MovieRequests                               io thread
+//                         what is asked for over HTTP
 //   ServiceMonitor        asks how the service is, once a second                     its own
 //   encoders              compress pictures                                          one a core
+//   makers                make movies (turntable_movie.h)                            one for each movie
 //
 // Threads hand results over by posting them to the io thread, which alone changes the state of the gateway and its sessions.
 #pragma once

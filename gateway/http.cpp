@@ -86,6 +86,7 @@ HttpRequest RequestOf(const http::request<http::string_body>& message) {
   };
   request.origin = optional(http::field::origin);
   request.authorization = optional(http::field::authorization);
+  request.accept_encoding = View(message[http::field::accept_encoding]);
   request.subprotocols = Items(View(message[http::field::sec_websocket_protocol]));
   return request;
 }
@@ -95,8 +96,13 @@ http::response<http::string_body> ResponseOf(HttpReply reply, unsigned version, 
   response.set(http::field::content_type, reply.type);
   for (const auto& [name, value] : shared.application.CommonHeaders()) response.set(name, value);
   for (const auto& [name, value] : reply.headers) response.set(name, value);
-  response.body() = std::move(reply.body);
   response.keep_alive(keep_alive);
+  if (reply.rest != nullptr) {  // WritePart sends it; the end of an HTTP/1.0 body is the connection's
+    if (version < 11) response.keep_alive(false);
+    response.chunked(version >= 11);
+    return response;
+  }
+  response.body() = std::move(reply.body);
   response.prepare_payload();
   return response;
 }
@@ -258,7 +264,10 @@ class HttpConnection final : public Registered, public std::enable_shared_from_t
     }
   }
 
-  void CloseNow() override { Lowest().close(); }
+  void CloseNow() override {
+    if (rest_ != nullptr) std::exchange(rest_, nullptr)->Abandon();
+    Lowest().close();
+  }
 
  private:
   PlainStream& Lowest() { return beast::get_lowest_layer(stream_); }
@@ -292,8 +301,8 @@ class HttpConnection final : public Registered, public std::enable_shared_from_t
     if (gone_ != nullptr && *gone_) Watch();
   }
 
-  // Looks now and then whether the other end is still there, while the application works on the reply. A read would tell sooner, but it
-  // would also take what belongs to the next request, or to TLS.
+  // Looks now and then whether the other end is still there, while the application works on the reply or its next part. A read would
+  // tell sooner, but it would also take what belongs to the next request, or to TLS.
   void Watch() {
     watch_.expires_after(kWatchInterval);
     watch_.async_wait([self = this->shared_from_this()](Error error) {
@@ -325,22 +334,64 @@ class HttpConnection final : public Registered, public std::enable_shared_from_t
 
   void Write(HttpReply reply, bool keep_alive) {
     const bool head = message_.method() == http::verb::head;
+    if (reply.rest != nullptr && head) {
+      reply.rest->Abandon();
+    } else if (reply.rest != nullptr) {
+      rest_ = reply.rest;
+      part_ = std::move(reply.body);
+    }
     response_.emplace(ResponseOf(std::move(reply), message_.version() == 0 ? 11 : message_.version(), keep_alive, *shared_));
     Lowest().expires_after(shared_->limits.writing);
     const auto written = [self = this->shared_from_this()](Error error, std::size_t) {
-      if (error == beast::error::timeout) {
-        self->shared_->application.CountRefusal("slow reader");
-        self->shared_->log.Warning("a connection was dropped: a response did not leave in time");
-      }
-      if (error) return;
-      self->response_->keep_alive() ? self->Read() : self->Shutdown();
+      if (error) return self->DropAfter(error);
+      if (self->rest_ == nullptr) return self->Next();
+      self->part_.empty() ? self->ReadPart() : self->WritePart();
     };
-    if (head) {  // the length of the body, but no body
+    if (head || rest_ != nullptr) {  // the length of the body, but no body
       head_.emplace(response_->base());
       header_.emplace(*head_);
       return http::async_write_header(stream_, *header_, written);
     }
     http::async_write(stream_, *response_, written);
+  }
+
+  void DropAfter(const Error& error) {
+    if (error == beast::error::timeout) {
+      shared_->application.CountRefusal("slow reader");
+      shared_->log.Warning("a connection was dropped: a response did not leave in time");
+    }
+    CloseNow();
+  }
+
+  // After a response.
+  void Next() { response_->keep_alive() ? Read() : Shutdown(); }
+
+  // The next part of a body that is made while it leaves. One of no bytes is the end.
+  void WritePart() {
+    Lowest().expires_after(shared_->limits.writing);
+    const bool last = part_.empty();
+    const auto written = [self = this->shared_from_this(), last](Error error, std::size_t) {
+      if (error || self->rest_ == nullptr) return self->DropAfter(error);
+      if (!last) return self->ReadPart();
+      self->rest_.reset();
+      self->Next();
+    };
+    if (!response_->chunked()) return asio::async_write(stream_, asio::buffer(part_), written);
+    if (last) return asio::async_write(stream_, http::make_chunk_last(), written);
+    asio::async_write(stream_, http::make_chunk(asio::buffer(part_)), written);
+  }
+
+  void ReadPart() {
+    Lowest().expires_never();
+    gone_ = std::make_shared<std::function<void()>>([] {});  // CloseNow tells the stream
+    Watch();
+    rest_->Read([self = this->shared_from_this()](Result<std::string> part) {
+      self->gone_.reset();
+      self->watch_.cancel();
+      if (!part.ok()) return self->CloseNow();
+      self->part_ = *std::move(part);
+      self->WritePart();
+    });
   }
 
   void Shutdown() {
@@ -376,6 +427,8 @@ class HttpConnection final : public Registered, public std::enable_shared_from_t
   std::optional<http::response<http::string_body>> response_;
   std::optional<http::response<http::empty_body>> head_;
   std::optional<http::response_serializer<http::empty_body>> header_;
+  std::shared_ptr<BodyStream> rest_;  // of the body that is being sent
+  std::string part_;                  // of it, that is being sent
   std::array<char, 4096> waste_{};
   std::size_t drained_ = 0;
 };

@@ -31,22 +31,36 @@ struct HttpLimits {
   Duration silence = std::chrono::seconds(30);       // of a WebSocket, pings and their answers included
 };
 
+using Gone = std::shared_ptr<std::function<void()>>;
+
 struct HttpRequest {
   std::string method, target;
   std::string host;  // empty: there is none
   std::optional<std::string> origin, authorization;
+  std::string accept_encoding;            // empty: there is none
   std::vector<std::string> subprotocols;  // that a WebSocket offers
   std::string body;
   // Never null. An application that works on the reply for long may put a function there: it is called, on the io thread, if the
   // connection closes before the reply.
-  std::shared_ptr<std::function<void()>> gone = std::make_shared<std::function<void()>>();
+  Gone gone = std::make_shared<std::function<void()>>();
+};
+
+// A body that is made while it leaves. All calls on the io thread.
+class BodyStream {
+ public:
+  virtual ~BodyStream() = default;
+  // Calls `next` once, later: with the next bytes; with none, at the end; or with an error, which cuts the connection off.
+  virtual void Read(std::function<void(Result<std::string>)> next) = 0;
+  // Nobody reads it any more. Drops `next`.
+  virtual void Abandon() = 0;
 };
 
 struct HttpReply {
   unsigned status = 200;
   std::string type = "application/json";
   std::string body;
-  std::vector<std::pair<std::string, std::string>> headers;  // more of them
+  std::vector<std::pair<std::string, std::string>> headers = {};  // more of them
+  std::shared_ptr<BodyStream> rest = nullptr;                     // of the body, if it is not all there; HTTP/1.1 sends it in chunks
 };
 
 // The other end of a WebSocket.

@@ -1,13 +1,17 @@
 #include "gateway/openapi.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <initializer_list>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "client/movie/turntable.h"
 #include "client/request/picture_fields.h"
 #include "common/base/version.h"
+#include "gateway/movie_requests.h"
 
 namespace slabstream {
 namespace {
@@ -62,6 +66,7 @@ Json Responses(const char* type, bool open, const Json& schema, bool takes_optio
   if (takes_options) responses["404"] = failure("There is no such dataset");
   if (takes_options) responses["429"] = failure("Too many pictures or questions are under way");
   responses["503"] = failure("The service does not answer, has no worker, or not enough memory");
+  if (std::string_view(type) == "video/mp4") responses["501"] = failure("The gateway's host lacks the program ffmpeg");
   if (takes_options) responses["504"] = failure("The answer was not ready in time");
   return responses;
 }
@@ -88,9 +93,9 @@ std::vector<FieldDescription> With(std::vector<FieldDescription> fields, const s
 }
 
 Json Describe(const Operation& operation) {
-  const bool picture = std::string_view(operation.type) == "image/png";
-  const Json schema = picture ? Json{{"type", "string"}, {"format", "binary"}}
-                              : Json{{"type", std::string_view(operation.type) == "application/json" ? "object" : "string"}};
+  const bool binary = std::string_view(operation.type) == "image/png" || std::string_view(operation.type) == "video/mp4";
+  const Json schema = binary ? Json{{"type", "string"}, {"format", "binary"}}
+                             : Json{{"type", std::string_view(operation.type) == "application/json" ? "object" : "string"}};
   const bool options = !operation.fields.empty();
   Json get = {{"summary", operation.summary}, {"responses", Responses(operation.type, operation.open, schema, options)}};
   if (operation.open) get["security"] = Json::array();
@@ -106,8 +111,8 @@ Json Describe(const Operation& operation) {
 
 Json OpenApi() {
   const std::vector<FieldDescription> render = RenderFields(), dataset = Named(render, {"dataset"});
-  const auto field = [](const char* name, const char* purpose, const char* value) {
-    return FieldDescription{.name = name, .group = "Options", .purpose = purpose, .value = value, .standard = ""};
+  const auto field = [](const char* name, const char* purpose, const char* value, const std::string& standard = "") {
+    return FieldDescription{.name = name, .group = "Options", .purpose = purpose, .value = value, .standard = standard};
   };
   const Operation operations[] = {
       {"/livez", "The gateway runs", "text/plain", true},
@@ -118,8 +123,13 @@ Json OpenApi() {
       {"/api/v1/datasets", "The datasets of the service", "application/json"},
       {"/api/v1/render.png", "A picture, as `slabstream render` makes it", "image/png", false, render, true},
       {"/api/v1/slice.png", "Planes through a volume, as `slabstream slice` makes them", "image/png", false, SliceFields(), true},
+      {"/api/v1/turntable.mp4", "A movie, as `slabstream turntable` makes it, sent while it is made", "video/mp4", false,
+       With(render, {field("frames", kFramesHelp, "NUMBER", fmt::format("{}", kMovieFrames)), field("turns", kTurnsHelp, "NUMBER", "1"),
+                     field("fps", kFramesPerSecondHelp, "NUMBER", fmt::format("{:g}", MovieShape().frames_per_second))}),
+       true},
       {"/api/v1/command", "The command line that makes a picture", "application/json", false, render, true},
       {"/api/v1/histogram", "The histogram of a dataset, its range and percentiles", "application/json", false, dataset},
+      {"/api/v1/labels", "The labels of a dataset, with their names and colours", "application/json", false, dataset},
       {"/api/v1/value", "What a dataset holds at a point", "application/json", false, With(dataset, {field("at", kPointHelp, "X,Y,Z")})},
       {"/api/v1/pick", "The point that a pixel of a picture shows", "application/json", false,
        With(render, {field("x", kPixelXHelp, "NUMBER"), field("y", kPixelYHelp, "NUMBER")}), true},

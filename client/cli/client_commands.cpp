@@ -6,9 +6,10 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/cores.h"
-#include "client/cli/movie.h"
 #include "client/cli/option_groups.h"
 #include "client/cli/value.h"
+#include "client/movie/movie_format.h"
+#include "client/movie/turntable.h"
 #include "client/request/layer_options.h"
 #include "common/base/find_named.h"
 #include "common/cli/program.h"
@@ -52,7 +53,7 @@ void DeclareTurntable(const CommandLine& line) {
       "How many frames, which are spread evenly over turns and times")
       ->type_name("N")
       ->default_str("one for each time, if there are several");
-  AddInteger(*sub, "--turns", options->turns, 0, kMaxTurns, "How many full turns; 0: the view stands still");
+  AddInteger(*sub, "--turns", options->turns, 0, kMaxTurns, kTurnsHelp);
   AddParsed(*sub, "--time", options->times, ParseTimeRange,
             "Which of the volumes in a file of several, such as a time series; counted from 0, FIRST and LAST included")
       ->type_name("T|FIRST:LAST");
@@ -61,9 +62,9 @@ void DeclareTurntable(const CommandLine& line) {
       [](const std::string& option, const std::string& text) {
         return ParseNumber(option, text, {kMinFramesPerSecond, kMaxFramesPerSecond});
       },
-      "Frames per second of a movie")
+      kFramesPerSecondHelp)
       ->type_name("NUMBER")
-      ->default_str(fmt::format("{:g}", MovieOptions().frames_per_second));
+      ->default_str(fmt::format("{:g}", MovieShape().frames_per_second));
   AddInteger(*sub, "--in-flight", options->in_flight, 1, kMaxInFlight, "How many frames are requested at the same time");
   AddFrameOptions(*sub, options->frame, {"time"});
   RunWith(*sub, line.run, options, RunTurntable);

@@ -50,14 +50,12 @@ struct RenderOptions {
   std::string output;
 };
 
-inline constexpr int kMaxTurntableFrames = 100000;
-inline constexpr int kMaxTurns = 1000;
 inline constexpr int kMaxInFlight = 64;
 
 struct TurntableOptions {
   FrameOptions frame;
   TurntableOutput output;
-  std::optional<double> frames_per_second;  // of a movie, [kMinFramesPerSecond, kMaxFramesPerSecond]; none: MovieOptions' own
+  std::optional<double> frames_per_second;  // of a movie, [kMinFramesPerSecond, kMaxFramesPerSecond]; none: MovieShape's own
   std::optional<TimeRange> times;           // of the volumes in SOURCE; none: it is one volume
   std::optional<int> frames;                // [1, kMaxTurntableFrames], spread evenly over turns and times; none: one for each time
   int turns = 1;                            // [0, kMaxTurns], which begin at the request's azimuth

@@ -18,6 +18,7 @@
 #include "client/cli/session.h"
 #include "client/cli/stats_json.h"
 #include "client/cli/trace_json.h"
+#include "client/movie/turntable.h"
 #include "client/request/camera_json.h"
 #include "common/base/files.h"
 #include "common/frame/dataset_name.h"
@@ -107,8 +108,8 @@ std::unique_ptr<PictureSink> FilesOf(const FrameOptions& options) {
 }
 
 MovieOptions MovieOf(const TurntableOptions& options) {
-  MovieOptions movie{.path = options.output.movie, .size = options.frame.request.size, .format = options.frame.format};
-  if (options.frames_per_second) movie.frames_per_second = *options.frames_per_second;
+  MovieOptions movie{.path = options.output.movie, .shape = {.size = options.frame.request.size}, .format = options.frame.format};
+  if (options.frames_per_second) movie.shape.frames_per_second = *options.frames_per_second;
   return movie;
 }
 
@@ -167,8 +168,7 @@ Result<std::vector<FrameJob>> TurntableJobs(const TurntableOptions& options) {
   for (int i = 0; i < frames; ++i) {
     const int time = times.first + int(std::int64_t{i} * times.count() / frames);
     FrameJob& job = jobs.emplace_back(FrameJob{request, FileOf(options, i), SourceAt(options, time)});
-    // Back into one turn, so that a start near the limit of angles stays valid.
-    job.request.view.azimuth_degrees = std::fmod(request.view.azimuth_degrees + 360.0 * options.turns * i / frames, 360.0);
+    job.request.view.azimuth_degrees = TurntableAzimuth(request.view.azimuth_degrees, options.turns, i, frames);
   }
   return jobs;
 }

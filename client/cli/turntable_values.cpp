@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "client/cli/movie.h"
+#include "client/movie/movie_format.h"
 #include "common/cli/parse.h"
 
 namespace slabstream {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -25,6 +26,16 @@ Json HistogramJson(const std::string& dataset, const SummaryReply& summary) {
           {"counts", summary.histogram},
           {"non_finite", summary.non_finite},
           {"percentiles", std::move(percentiles)}};
+}
+
+Json LabelsJson(const std::string& dataset, const SummaryReply& summary) {
+  const auto channel = [](float share) { return int(std::lround(share * 255)); };
+  Json labels = Json::array();
+  for (const auto& [value, color, name] : summary.labels) {
+    const std::string shown = fmt::format("#{:02x}{:02x}{:02x}", channel(color[0]), channel(color[1]), channel(color[2]));
+    labels.push_back({{"value", value}, {"name", name}, {"color", shown}});
+  }
+  return {{"dataset", dataset}, {"labels", std::move(labels)}};
 }
 
 Json SampleJson(const VolumeSample& sample) {

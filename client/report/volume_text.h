@@ -11,6 +11,9 @@ namespace slabstream {
 // {"dataset", "range", "counts", "non_finite", "percentiles": {"50": value, ...}}
 nlohmann::ordered_json HistogramJson(const std::string& dataset, const SummaryReply& summary);
 
+// {"dataset", "labels": [{"value", "name", "color": "#rrggbb"}, ...]}
+nlohmann::ordered_json LabelsJson(const std::string& dataset, const SummaryReply& summary);
+
 // {"at", "inside", "voxel", "value", and, if there are such layers, "label": {"value", "name"}, "overlay"}. Null: there is none.
 nlohmann::ordered_json SampleJson(const VolumeSample& sample);
 // The same with "hit", and "depth"; {"hit": false} if there is none.

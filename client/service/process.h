@@ -53,6 +53,7 @@ class Child {
   ~Child();
 
   pid_t pid() const { return pid_; }
+  int output() const { return output_; }  // the reading end of its stdout, which stays this object's
 
   // The first line of its stdout. Unavailable if it ends before that; DeadlineExceeded.
   Result<std::string> ReadLine(Duration timeout);

@@ -13,6 +13,7 @@
 #include <string>
 
 #include "common/base/check.h"
+#include "common/base/file_descriptor.h"
 
 namespace slabstream {
 namespace {
@@ -30,21 +31,6 @@ std::uint64_t RandomNumber() {
 }
 
 std::size_t RoundedUp(std::size_t bytes) { return (bytes + kBlockAlignment - 1) / kBlockAlignment * kBlockAlignment; }
-
-class FileDescriptor {
- public:
-  explicit FileDescriptor(int number) : number_(number) {}
-  ~FileDescriptor() {
-    if (number_ >= 0) ::close(number_);
-  }
-  FileDescriptor(const FileDescriptor&) = delete;
-  FileDescriptor& operator=(const FileDescriptor&) = delete;
-  int number() const { return number_; }
-  int Release() { return std::exchange(number_, -1); }
-
- private:
-  int number_;
-};
 
 }  // namespace
 

@@ -232,6 +232,19 @@ void Fields(auto& io, Is<Percentile> auto& m) {
   io.Finite("value", m.value, &P::value, &P::set_value);
 }
 
+void Fields(auto& io, Is<Label> auto& m) {
+  using P = v1::Label;
+  auto& [red, green, blue] = m.color;
+  io.Range("value", m.value, &P::value, &P::set_value, 1, kMaxLabelValue);
+  io.Text("name", m.name, &P::name, &P::mutable_name, 0, kMaxLabelNameBytes);
+  io.Finite("red", red, &P::red, &P::set_red);
+  io.Finite("green", green, &P::green, &P::set_green);
+  io.Finite("blue", blue, &P::blue, &P::set_blue);
+  io.Check([&](Checker& check) {
+    for (const float share : m.color) check.That(share >= 0 && share <= 1, "", "a colour that is not in [0, 1]");
+  });
+}
+
 void Fields(auto& io, Is<SummaryReply> auto& m) {
   using P = v1::SummaryReply;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
@@ -241,8 +254,10 @@ void Fields(auto& io, Is<SummaryReply> auto& m) {
   io.Any(m.non_finite, &P::non_finite, &P::set_non_finite);
   io.Messages("percentiles", m.percentiles, &P::percentiles, &P::mutable_percentiles, kMaxPercentiles);
   io.Message("transfer", m.transfer, &P::transfer, &P::mutable_transfer);
+  io.Messages("labels", m.labels, &P::labels, &P::mutable_labels, kMaxLabels);
   io.Check([&](Checker& check) {
     check.That(m.histogram.size() == kHistogramBins, "histogram", "not as many bins as expected");
+    for (std::size_t i = 1; i < m.labels.size(); ++i) check.That(m.labels[i - 1].value < m.labels[i].value, "labels", "values do not rise");
     if (check.ok()) check.Adopt(Validate(m.transfer));
   });
 }

@@ -242,6 +242,7 @@ struct SummaryReply {
   std::uint64_t non_finite = 0;                                                       // voxels
   std::vector<Percentile> percentiles;                                                // at most kMaxPercentiles
   TransferFunction transfer;                                                          // of the query, for this dataset
+  std::vector<Label> labels;                                                          // as LabelTable; at most kMaxLabels
   friend bool operator==(const SummaryReply&, const SummaryReply&) = default;
 };
 

@@ -12,6 +12,7 @@
 #include <string_view>
 
 #include "client/cli/option_groups.h"
+#include "client/movie/turntable.h"
 #include "common/renderers/registry.h"
 #include "laboratory/bench/bench.h"
 #include "laboratory/experiments/experiment.h"

@@ -27,7 +27,7 @@ from .frame import Frame, Progress
 from .image import Geometry, Image, Statistics
 from .loading import Volume, load, render, show
 from .local import shutdown
-from .probe import Histogram, Sample
+from .probe import Histogram, Label, Sample
 from .service import Service, connect
 from .status import Dataset, Status, Worker
 from .transfer import TransferFunction
@@ -46,6 +46,7 @@ __all__ = [
     "Image",
     "Internal",
     "InvalidArgument",
+    "Label",
     "NotFound",
     "Progress",
     "ResourceExhausted",

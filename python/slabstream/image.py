@@ -10,7 +10,7 @@ from typing import Any
 import numpy
 import numpy.typing
 
-from . import png, schema
+from . import exr, png, schema
 from .errors import InvalidArgument, Unavailable
 from .runs import Floats, Rectangle
 
@@ -150,12 +150,22 @@ class Image:
             raise InvalidArgument(f"bits is {bits}, must be 8 or 16")
         return png.encode(_codes(self.rgba, bits or self.format.png_bits), {"Software": "slabstream"})
 
+    def exr(self) -> bytes:
+        """The picture as an OpenEXR file: `rgba` as the channels R, G, B and A, and `depth`, if there is one, as Z."""
+        channels = {name: self.rgba[..., number] for number, name in enumerate("RGBA")}
+        if self.depth is not None:
+            channels["Z"] = self.depth
+        return exr.encode(channels, {"software": "slabstream"})
+
     def save(self, path: str | os.PathLike[str], bits: int | None = None) -> None:
-        """Writes a PNG file, whole or not at all."""
+        """Writes a PNG or OpenEXR file, as its name ends, whole or not at all. `bits` is for PNG."""
         file = pathlib.Path(path)
-        if file.suffix.lower() != ".png":
-            raise InvalidArgument(f"'{file}' must end in .png; numpy.asarray(image) and image.rgba hold the pixels for other formats")
-        content = self.png(bits)
+        kind = file.suffix.lower()
+        if kind not in (".png", ".exr"):
+            raise InvalidArgument(f"'{file}' must end in .png or .exr; numpy.asarray(image) and image.rgba hold the pixels for other formats")
+        if kind == ".exr" and bits is not None:
+            raise InvalidArgument(f"bits is {bits}, but samples of .exr are floats")
+        content = self.exr() if kind == ".exr" else self.png(bits)
         try:
             with tempfile.NamedTemporaryFile(dir=file.parent, prefix=f".{file.name}.", delete=False) as temporary:
                 try:

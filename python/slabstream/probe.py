@@ -22,6 +22,15 @@ class Histogram:
 
 
 @dataclasses.dataclass(frozen=True)
+class Label:
+    """A label that a dataset holds."""
+
+    value: int                         # as in the file, from 1
+    name: str                          # "": none is known
+    color: tuple[float, float, float]  # straight red, green, blue, from 0 to 1
+
+
+@dataclasses.dataclass(frozen=True)
 class Sample:
     """The voxel that holds a point."""
 
@@ -44,6 +53,10 @@ def histogram_of(message: Any) -> Histogram:
         percentiles={each.percent: each.value for each in message.percentiles},
         non_finite=message.non_finite,
     )
+
+
+def labels_of(message: Any) -> list[Label]:
+    return [Label(label.value, label.name, (label.red, label.green, label.blue)) for label in message.labels]
 
 
 def sample_of(message: Any, depth: float | None = None) -> Sample | None:

@@ -16,7 +16,7 @@ from .errors import InvalidArgument
 from .frame import Frame, Progress
 from .image import Image, side_by_side
 from .options import takes_options_of
-from .probe import Histogram, Sample, histogram_of, sample_of
+from .probe import Histogram, Label, Sample, histogram_of, labels_of, sample_of
 from .status import Dataset, Status, dataset_of, status_of
 from .uploads import upload_of
 from .values import integer, number, point
@@ -108,8 +108,11 @@ class Service:
 
     def histogram(self, dataset: str, *, timeout: float = _QUESTION_SECONDS) -> Histogram:
         """How often which value occurs in a dataset."""
-        transfer = schema.TransferChoice(preset="auto", opacity_distance=1)
-        return histogram_of(self._connection.ask("summary_query", schema.SummaryQuery(dataset=dataset, transfer=transfer), timeout))
+        return histogram_of(self._summary(dataset, timeout))
+
+    def labels(self, dataset: str, *, timeout: float = _QUESTION_SECONDS) -> list[Label]:
+        """The labels that occur in a dataset, by value; empty: it has no labels."""
+        return labels_of(self._summary(dataset, timeout))
 
     def value(self, dataset: str, at: Any, *, timeout: float = _QUESTION_SECONDS) -> Sample | None:
         """The voxel that holds a point: x, y, z of the world, as in all options. None: the point lies outside the volume."""
@@ -175,6 +178,10 @@ class Service:
 
     def __repr__(self) -> str:
         return f"<slabstream.Service at {self.endpoint}>"
+
+    def _summary(self, dataset: str, timeout: float) -> Any:
+        transfer = schema.TransferChoice(preset="auto", opacity_distance=1)
+        return self._connection.ask("summary_query", schema.SummaryQuery(dataset=dataset, transfer=transfer), timeout)
 
     def _order(self, action: int, items: Any, timeout: float) -> list[Dataset]:
         if len(items) > _MOST_ITEMS:

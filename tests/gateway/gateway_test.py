@@ -3,6 +3,7 @@
 
     gateway_test.py FOLDER_OF_PROGRAMS [unittest arguments]
 """
+import gzip
 import http.client
 import json
 import os
@@ -89,6 +90,13 @@ class Programs:
         shutil.rmtree(self.folder)
 
 
+def write_labels(folder):
+    """labels.nrrd, on the grid of a sphere of 20 voxels a side: 3 and 70 in two of its corners; and names.txt, colours for them."""
+    voxels = bytes(3 if max(x, y, z) < 4 else 70 if min(x, y, z) > 15 else 0 for z in range(20) for y in range(20) for x in range(20))
+    (folder / "labels.nrrd").write_bytes(b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 20 20 20\nspacings: 1 1 1\nencoding: raw\n\n" + voxels)
+    (folder / "names.txt").write_text("3 1 0.5 0 Corner \"low\"\n5 1 1 1 Nowhere\n70 0 0 1 Größte Ecke\n", encoding="utf-8")
+
+
 class WithService(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -96,7 +104,8 @@ class WithService(unittest.TestCase):
         cls.addClassCleanup(cls.programs.close)
         cls.programs.run("sphere", "--class", 1, "--size", 24, "--occupancy", 0.2, "-o", "a.nrrd")
         cls.programs.run("sphere", "--class", 2, "--size", 20, "--occupancy", 0.3, "-o", "b.nrrd")
-        _, cls.endpoint = cls.programs.up("--data", "a=a.nrrd", "--data", "b=b.nrrd")
+        write_labels(cls.programs.folder)
+        _, cls.endpoint = cls.programs.up("--data", "a=a.nrrd", "--data", "b=b.nrrd", "--data", "c=b.nrrd,labels=labels.nrrd:names.txt")
         cls.process, cls.gateway = cls.programs.gateway("--endpoint", cls.endpoint)
         wait_until(lambda: cls.gateway.request("/readyz")[0] == 200, "ready")
 
@@ -179,7 +188,7 @@ class HttpTest(WithService):
         self.get("/api/v1/render.png", dataset="a", size=16)
         wait_until(lambda: any(d["state"] == "ready" for d in self.gateway.json("/api/v1/datasets")[1]["datasets"]), "a is loaded")
         datasets = {d["name"]: d for d in self.gateway.json("/api/v1/datasets")[1]["datasets"]}
-        self.assertEqual(set(datasets), {"a", "b"})
+        self.assertEqual(set(datasets), {"a", "b", "c"})
         self.assertEqual(datasets["a"]["size"], [24, 24, 24])
         status, service = self.gateway.json("/api/v1/status")
         self.assertEqual((status, len(service["workers"])), (200, 2))
@@ -202,6 +211,12 @@ class HttpTest(WithService):
         self.assertEqual(values, sorted(values))
         info = json.loads(self.programs.run("info", "a.nrrd", "--json").stdout)
         self.assertEqual(histogram["counts"], info["histogram"])
+
+    def test_labels_have_their_names_and_colours(self):
+        self.assertEqual(self.ask("labels", dataset="c"), {"dataset": "c", "labels": [
+            {"value": 3, "name": "Corner \"low\"", "color": "#ff8000"}, {"value": 70, "name": "Größte Ecke", "color": "#0000ff"}]})
+        self.assertEqual(self.ask("labels", dataset="a"), {"dataset": "a", "labels": []})
+        self.assertEqual(self.ask("value", dataset="c", at="19,19,19")["label"], {"value": 70, "name": "Größte Ecke"})
 
     def test_values_at_points(self):
         centre = self.ask("value", dataset="b", at="9.5,9.5,9.5")
@@ -246,6 +261,8 @@ class HttpTest(WithService):
             ("histogram", {}, 400, "dataset is missing"),
             ("histogram", {"dataset": "none"}, 404, "none"),
             ("histogram", {"dataset": "a", "size": 3}, 400, "no option 'size'"),
+            ("labels", {"dataset": "none"}, 404, "none"),
+            ("labels", {"dataset": "a", "value": 3}, 400, "no option 'value'"),
             ("value", {"dataset": "a"}, 400, "at is missing"),
             ("value", {"dataset": "a", "at": "1,2"}, 400, "1,2"),
             ("value", {"dataset": "a", "at": "1,2,nan"}, 400, "nan"),
@@ -290,6 +307,23 @@ class HttpTest(WithService):
         path = "/api/v1/datasets?token="
         self.assertEqual(self.gateway.request(path + self.gateway.token, token=False)[0], 200)
         self.assertEqual(self.gateway.request(path + self.gateway.token[:-1], token=False)[0], 401)
+
+    def test_the_page_is_compressed_for_those_who_take_that(self):
+        for path in ("/", "/assets/page.js", "/assets/page.css", "/assets/icon.svg"):
+            whole_file = self.gateway.request(path, headers={"Accept-Encoding": "identity"})[2]
+            for accepted, packed in (("gzip", True), ("deflate, gzip;q=1.0, *;q=0.5", True), ("GZIP", True), ("*", True), ("br", False), ("identity", False),
+                                     ("gzip;q=0", False), ("*, gzip ; q=0.000", False), ("", False), ("gzip;q=0.001", True)):
+                for method in ("GET", "HEAD"):
+                    status, headers, body = self.gateway.request(path, method=method, headers={"Accept-Encoding": accepted})
+                    self.assertEqual((status, headers["Vary"], headers["Content-Encoding"]), (200, "Accept-Encoding", "gzip" if packed else None), accepted)
+                    if method == "GET":
+                        self.assertEqual(len(body), int(headers["Content-Length"]))
+                        self.assertEqual(gzip.decompress(body) if packed else body, whole_file)
+                        length = len(body)
+                    else:
+                        self.assertEqual((body, int(headers["Content-Length"])), (b"", length))
+        total = sum(len(self.gateway.request(path, headers={"Accept-Encoding": "gzip"})[2]) for path in ("/", "/assets/page.js", "/assets/page.css"))
+        self.assertLess(total, 150_000)
 
     def test_the_page_uses_relative_addresses_only(self):
         for path in ("/", "/assets/page.js", "/assets/page.css"):
@@ -470,6 +504,173 @@ class ViewTest(WithService):
             header, data, _ = page.final(seq)
             self.assertEqual(whole(header, data), png_pixels(self.get("/api/v1/render.png", dataset="aba"[i], size=40, azimuth=7 * i)[2]))
         self.assertIn(b"slabstream_gateway_sessions 3\n", self.gateway.request("/metrics")[2])
+
+
+def movie_pixels(picture):
+    """A frame of a movie: a picture's red, green and blue, before black."""
+    width, height, rgba = picture
+    return b"".join(bytes((c * rgba[i + 3] + 127) // 255 for c in rgba[i:i + 3]) for i in range(0, 4 * width * height, 4))
+
+
+class TurntableTest(unittest.TestCase):
+    """Scripts stand in for ffmpeg: what it reads and writes is what matters here."""
+
+    def setUp(self):
+        self.programs = Programs()
+        self.addCleanup(self.programs.close)
+        self.programs.run("sphere", "--class", 1, "--size", 16, "--occupancy", 0.2, "-o", "a.nrrd")
+        self.programs.environment["PATH"] = f"{self.programs.folder}/bin:{os.environ['PATH']}"
+        (self.programs.folder / "bin").mkdir()
+        self.service, self.endpoint = self.programs.up("--data", "a=a.nrrd")
+
+    def gateway(self, script):
+        if script:
+            program = self.programs.folder / "bin" / "ffmpeg"
+            program.write_text("#!/bin/sh\n" + script + "\n")
+            program.chmod(0o755)
+        else:
+            self.programs.environment["PATH"] = str(self.programs.folder / "bin")
+        self.process, gateway = self.programs.gateway("--endpoint", self.endpoint)
+        wait_until(lambda: gateway.request("/readyz")[0] == 200, "ready")
+        return gateway
+
+    def opened(self, gateway, **fields):
+        """A connection that has asked for a movie, and read its first bytes."""
+        connection = gateway.connect()
+        self.addCleanup(connection.close)
+        target = "/api/v1/turntable.mp4?" + urllib.parse.urlencode({"dataset": "a", "size": 64, **fields})
+        connection.sendall(f"GET {target} HTTP/1.1\r\nHost: {gateway.authority}\r\nAuthorization: Bearer {gateway.token}\r\n\r\n".encode())
+        self.assertIn(b" 200 ", connection.recv(13))
+        return connection
+
+    def encoders(self):
+        """Processes that the gateway has started."""
+        found = []
+        for stat in Path("/proc").glob("[0-9]*/stat"):
+            try:
+                state, parent = stat.read_text().rsplit(")", 1)[1].split()[:2]
+            except OSError:
+                continue
+            if int(parent) == self.process.pid and state not in "ZX":
+                found.append(stat.parent.name)
+        return found
+
+    def test_its_frames_are_pictures_all_around(self):
+        gateway = self.gateway('echo "$@" > arguments; exec cat')
+        fields = {"dataset": "a", "size": "24x16", "azimuth": 350, "background": "#204060", "renderer": "mip"}
+        status, headers, body = gateway.request("/api/v1/turntable.mp4?" + urllib.parse.urlencode({**fields, "frames": 5, "turns": 2, "fps": 12.5}))
+        self.assertEqual((status, headers["Content-Type"], headers["Transfer-Encoding"]), (200, "video/mp4", "chunked"))
+        frames = [movie_pixels(png_pixels(gateway.request("/api/v1/render.png?" + urllib.parse.urlencode({**fields, "azimuth": (350 + 144 * i) % 360}))[2]))
+                  for i in range(5)]
+        self.assertEqual(len(body), 5 * 24 * 16 * 3)
+        self.assertEqual(body, b"".join(frames))
+        arguments = (self.programs.folder / "arguments").read_text()
+        for part in (" -video_size 24x16 -framerate 12.5 ", "+frag_every_frame", " pipe:1"):
+            self.assertIn(part, arguments)
+        posted = gateway.request("/api/v1/turntable.mp4", method="POST", body=json.dumps({**fields, "frames": 5, "turns": 2}))
+        self.assertEqual(posted[2], body)
+        # To clients of HTTP/1.0 the end of the connection is the movie's.
+        old = gateway.raw(f"GET /api/v1/turntable.mp4?dataset=a&size=16&frames=2&token={gateway.token} HTTP/1.0\r\nHost: {gateway.authority}\r\n\r\n".encode())
+        self.assertEqual(len(old.split(b"\r\n\r\n", 1)[1]), 2 * 16 * 16 * 3)
+        head = gateway.request("/api/v1/turntable.mp4?dataset=a&size=16&frames=2", method="HEAD")
+        self.assertEqual((head[0], head[2]), (200, b""))
+
+    def test_wrong_ones_are_refused_before_they_begin(self):
+        gateway = self.gateway("exec cat")
+        for fields, status, why in [
+            ({}, 400, "dataset is missing"), ({"dataset": "none"}, 404, "none"), ({"dataset": "a", "frames": 0}, 400, "[1, 1000]"),
+            ({"dataset": "a", "frames": 1001}, 400, "[1, 1000]"), ({"dataset": "a", "turns": -1}, 400, "turns"), ({"dataset": "a", "fps": "nan"}, 400, "fps"),
+            ({"dataset": "a", "size": "33x32"}, 400, "must be even"), ({"dataset": "a", "size": "4096x2048"}, 400, "at most 4194304"),
+            ({"dataset": "a", "eye": "1,2,3"}, 400, "--eye"), ({"dataset": "a", "what": 1}, 400, "no option 'what'")]:
+            got, body = gateway.json("/api/v1/turntable.mp4?" + urllib.parse.urlencode(fields))
+            self.assertEqual((got, list(body)), (status, ["error"]), fields)
+            self.assertIn(why, body["error"])
+        wait_until(lambda: not self.encoders(), "no encoder is left")
+
+    def test_without_ffmpeg_it_says_what_to_install(self):
+        status, body = self.gateway(None).json("/api/v1/turntable.mp4?dataset=a")
+        self.assertEqual(status, 501)
+        self.assertIn("the program ffmpeg, which makes movies, is not in $PATH (Debian package ffmpeg)", body["error"])
+
+    def test_an_encoder_that_fails_cuts_the_movie_off(self):
+        gateway = self.gateway("echo 'no luck' >&2; exit 3")
+        status, body = gateway.json("/api/v1/turntable.mp4?dataset=a&size=64&frames=50")
+        self.assertEqual((status, body["error"]), (503, "ffmpeg exited with status 3: no luck"))
+        self.programs.end(self.process)
+        gateway = self.gateway("head -c 20000; exit 1")
+        with self.assertRaises(http.client.HTTPException):  # no last chunk
+            gateway.request("/api/v1/turntable.mp4?dataset=a&size=64&frames=50")
+        self.assertEqual(gateway.request("/livez")[0], 200)
+
+    def test_closed_connections_end_their_movies(self):
+        gateway = self.gateway("exec cat")
+        def status():
+            return json.loads(self.programs.run("status", "--endpoint", self.endpoint, "--json").stdout)
+
+        first, second = self.opened(gateway, size=256, frames=1000), self.opened(gateway, size=256, frames=1000)
+        refused = gateway.json("/api/v1/turntable.mp4?dataset=a&size=16")
+        self.assertEqual((refused[0], refused[1]["error"]), (429, "2 movies are under way, which is the limit"))
+        # Nobody reads them, so rendering waits: what lies between is a few frames.
+        wait_until(lambda: status()["running"] + status()["queued"] == 0, "nothing runs")
+        done = status()["frames_done"]
+        self.assertLess(done, 200)
+        for connection in (first, second):
+            connection.close()
+        wait_until(lambda: not self.encoders(), "the encoders have ended")
+        wait_until(lambda: gateway.request("/api/v1/turntable.mp4?dataset=a&size=16&frames=2")[0] == 200, "there is room again")
+        # One more runs when the gateway ends.
+        self.opened(gateway, size=256, frames=1000)
+        self.assertEqual(self.programs.end(self.process), 0)
+
+    @unittest.skipUnless(shutil.which("ffmpeg"), "ffmpeg is not installed")
+    def test_ffmpeg_makes_a_movie_of_it(self):
+        os.symlink(shutil.which("ffmpeg"), self.programs.folder / "bin" / "ffmpeg")
+        self.programs.environment["PATH"] = str(self.programs.folder / "bin")
+        self.process, gateway = self.programs.gateway("--endpoint", self.endpoint)
+        status, _, body = gateway.request("/api/v1/turntable.mp4?dataset=a&size=64&frames=30")
+        self.assertEqual(status, 200)
+        self.assertEqual((body[4:8], body.count(b"moof")), (b"ftyp", 30))
+
+
+class SlowReaderTest(WithService):
+    """Those who ask and do not read."""
+
+    def memory(self):
+        """What the gateway has in memory now, in bytes."""
+        lines = dict(line.split(":", 1) for line in Path(f"/proc/{self.process.pid}/status").read_text().splitlines())
+        return 1024 * int(lines["VmRSS"].split()[0])
+
+    def test_they_are_dropped_and_memory_stays(self):
+        # Noise: a lossless picture of some megabytes, which no buffer of a socket takes.
+        side = 48
+        noise = random.Random(5).randbytes(side ** 3)
+        header = f"NRRD0004\ntype: uint8\ndimension: 3\nsizes: {side} {side} {side}\nspacings: 1 1 1\nencoding: raw\n\n".encode()
+        (self.programs.folder / "noise.nrrd").write_bytes(header + noise)
+        self.programs.run("data", "add", f"noise={self.programs.folder}/noise.nrrd", "--endpoint", self.endpoint)
+        view = {"dataset": "noise", "size": 1200, "renderer": "mip", "background": "#000000"}
+        warm = self.page()
+        warm.final(warm.view(view))
+        warm.close()
+        before = self.memory()
+        pages = [self.page(receive_bytes=4096) for _ in range(3)]
+        for turn in range(400):
+            for page in pages:
+                page.view({**view, "azimuth": turn})
+        with self.gateway.connect(receive_bytes=4096) as connection:
+            target = "/api/v1/render.png?" + urllib.parse.urlencode({**view, "size": 2000, "depth": 16})
+            connection.sendall(f"GET {target} HTTP/1.1\r\nHost: {self.gateway.authority}\r\nAuthorization: Bearer {self.gateway.token}\r\n\r\n".encode())
+            most = before
+
+            def dropped():
+                nonlocal most
+                most = max(most, self.memory())
+                metrics = self.gateway.request("/metrics")[2]
+                return b"slabstream_gateway_sessions 0\n" in metrics and b'refusals_total{reason="slow reader"}' in metrics
+
+            wait_until(dropped, "all are dropped")
+        # The largest picture is 64 MB of floats, the others 23: a few are on their way, but not 1200.
+        self.assertLess(most - before, 400 << 20)
+        self.assertEqual(self.get("/api/v1/render.png", dataset="a", size=16)[0], 200)
 
 
 class ServiceLossTest(unittest.TestCase):

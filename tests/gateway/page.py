@@ -20,8 +20,13 @@ class Gateway:
         self.host, self.port = host.strip("[]"), int(port)
         self.context = context
 
-    def connect(self):
-        raw = socket.create_connection((self.host, self.port), timeout=60)
+    def connect(self, receive_bytes=0):
+        """With `receive_bytes` the system keeps about so many for a reader that is slow."""
+        raw = socket.socket(socket.AF_INET)
+        raw.settimeout(60)
+        if receive_bytes:
+            raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_bytes)
+        raw.connect((self.host, self.port))
         return self.context.wrap_socket(raw, server_hostname=self.host) if self.context else raw
 
     def request(self, target, method="GET", body=None, token=True, headers=None):
@@ -66,8 +71,8 @@ class Closed(Exception):
 class Page:
     """One WebSocket with one view."""
 
-    def __init__(self, gateway, protocols=None, headers=None, target="/api/v1/view"):
-        self.socket = gateway.connect()
+    def __init__(self, gateway, protocols=None, headers=None, target="/api/v1/view", receive_bytes=0):
+        self.socket = gateway.connect(receive_bytes)
         self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.buffer = b""
         self.seq = 0

@@ -17,6 +17,7 @@ import unittest.mock
 import numpy as np
 
 from client_support import PROGRAM, PROGRAMS, InAFolder, RunningService, WithAService, volume_arrays, write_volumes
+from exr_reader import exr_channels
 
 import slabstream as ss  # noqa: E402
 
@@ -54,6 +55,11 @@ class AtAService(WithAService):
         self.assertEqual((low, high), (values.min(), values.max()))
         np.testing.assert_array_equal(histogram.counts, np.histogram(values, bins=256, range=(low, high))[0])
         self.assertEqual(histogram.edges.shape, (257,))
+        found = self.service.labels("head")
+        self.assertEqual([(label.value, label.name) for label in found], [(value, "") for value in np.unique(labels[labels > 0])])
+        self.assertTrue(all(0 <= share <= 1 for label in found for share in label.color))
+        with self.assertRaisesRegex(ss.NotFound, 'no dataset "nothing"'):
+            self.service.labels("nothing")
         for percent, value in histogram.percentiles.items():
             below = np.mean(values <= value + (high - low) / 256)
             self.assertGreaterEqual(below, percent / 100)
@@ -89,10 +95,24 @@ class AtAService(WithAService):
         image = self.service.render("head", size=20)
         image.save(self.folder / "a.PNG")
         self.assertEqual((self.folder / "a.PNG").read_bytes(), image.png())
-        with self.assertRaisesRegex(ss.InvalidArgument, "must end in .png"):
+        with self.assertRaisesRegex(ss.InvalidArgument, "must end in .png or .exr"):
             image.save("a.gif")
         with self.assertRaisesRegex(ss.Unavailable, "cannot write '.*none/a.png': No such file"):
             image.save(self.folder / "none" / "a.png")
+
+    def test_openexr_has_the_samples_of_the_command_line(self) -> None:
+        for renderer, size in (("zbuffer", (37, 21)), ("raycast", (50, 33))):
+            image = self.service.render("head", size=size, renderer=renderer, azimuth=30)
+            image.save(self.folder / "a.exr")
+            self.running.run("render", "head", "-o", "b.exr", "--endpoint", self.running.endpoint, "--size", "x".join(map(str, size)),
+                             "--renderer", renderer, "--azimuth", "30")
+            ours, theirs = (exr_channels((self.folder / name).read_bytes()) for name in ("a.exr", "b.exr"))
+            self.assertEqual(list(ours), ["A", "B", "G", "R"] + (["Z"] if renderer == "zbuffer" else []))
+            self.assertEqual(list(ours), list(theirs))
+            for name, samples in ours.items():
+                np.testing.assert_array_equal(samples, theirs[name], err_msg=name)
+        with self.assertRaisesRegex(ss.InvalidArgument, "bits is 16, but samples of .exr are floats"):
+            image.save("a.exr", bits=16)
 
     def test_previews_and_progress_come_before_the_picture(self) -> None:
         told, previews = [], []

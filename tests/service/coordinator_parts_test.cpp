@@ -15,6 +15,7 @@
 #include "common/volume/sphere.h"
 #include "common/volume_io/volume_reader.h"
 #include "common/wire/payload.h"
+#include "coordinator/answer_question.h"
 #include "coordinator/box_samples.h"
 #include "coordinator/catalogue.h"
 #include "coordinator/dataset_id.h"
@@ -27,6 +28,22 @@ namespace slabstream {
 namespace {
 
 using testing::HasSubstr;
+
+TEST(AnswerTo, ASummaryHasTheLabelsOfTheDataset) {
+  const auto sphere = std::make_shared<const Volume>(MakeSphere({.size = 8}).value());
+  VolumeSummary summary = Summarize(*sphere);
+  AnswerQuestion asked{.question = SummaryQuery{.nonce = 7, .dataset = "ball", .transfer = {}}};
+  const auto answer = [&](const VolumeSummary& of) {
+    asked.summary = std::make_shared<const VolumeSummary>(of);
+    return std::get<SummaryReply>(AnswerTo(asked, {.volume = sphere}).value());
+  };
+  EXPECT_EQ(answer(summary).labels, std::vector<Label>());
+  EXPECT_EQ(answer(summary).nonce, 7U);
+  const std::vector<Label> labels = {{3, {1, 0.5F, 0}, "Corner"}, {70, {0, 0, 1}, ""}};
+  summary.label_table = std::make_shared<const LabelTable>(LabelTable{labels});
+  EXPECT_EQ(answer(summary).labels, labels);
+  EXPECT_EQ(AnswerTo(asked, {}).status().code(), StatusCode::kUnavailable) << "it was unloaded meanwhile";
+}
 
 TEST(PeerTable, TokensAreNeverReused) {
   PeerTable peers;

@@ -6,6 +6,7 @@
 import json
 import os
 import re
+import shutil
 import signal
 import sys
 import unittest
@@ -50,8 +51,9 @@ class PageTest(unittest.TestCase):
         cls.addClassCleanup(cls.programs.close)
         write_nrrd(cls.programs.folder / "p.nrrd", SIZE, ball)
         write_nrrd(cls.programs.folder / "l.nrrd", SIZE, lambda i, j, k: 0 if ball(i, j, k) == 0 else 1 + i // 8)
+        (cls.programs.folder / "names.txt").write_text("1 1 0.2 0.1 left\n2 0.25 0.75 0.5 middle\n3 0.2 0.4 1 right\n")
         cls.programs.run("sphere", "--class", 1, "--size", 24, "--occupancy", 0.2, "-o", "s.nrrd")
-        cls.data = ("--data", "patient=p.nrrd,labels=l.nrrd", "--data", "sphere=s.nrrd")
+        cls.data = ("--data", "patient=p.nrrd,labels=l.nrrd:names.txt", "--data", "sphere=s.nrrd")
         cls.service, cls.endpoint = cls.programs.up(*cls.data)
         cls.process, cls.gateway = cls.programs.gateway("--endpoint", cls.endpoint)
         wait_until(lambda: cls.gateway.request("/readyz")[0] == 200, "ready")
@@ -67,8 +69,8 @@ class PageTest(unittest.TestCase):
         self.addCleanup(viewer.close)
         return viewer
 
-    def proxy(self, delay=0.0, answers=None):
-        proxy = Proxy(self.gateway.host, self.gateway.port, delay, answers)
+    def proxy(self, delay=0.0, answers=None, prefix=""):
+        proxy = Proxy(self.gateway.host, self.gateway.port, delay, answers, prefix)
         self.addCleanup(proxy.close)
         return proxy
 
@@ -307,15 +309,50 @@ class PageTest(unittest.TestCase):
         self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
         viewer.save(SHOTS, "clip")
 
+    def test_opacity_by_the_gradient(self):
+        viewer = self.viewer()
+        viewer.settled()
+        viewer.until("document.querySelector('.facts dd') !== null")
+        viewer.find(".by-gradient input[role=switch]").click()
+        # The values span 220 over voxels of 2: a steep gradient is a quarter of that, and the curve reaches 1 at 0.4 of it.
+        drawn = viewer.final("o['gradient-opacity'] !== undefined && o.renderer === 'raycast'")
+        first, steep = drawn["options"]["gradient-opacity"].split(",")
+        self.assertEqual((first.split(":")[1], steep.split(":")[1]), ("0", "1"))
+        self.assertAlmostEqual(float(steep.split(":")[0]), 0.4 * 0.25 * 220 / 2, delta=0.3)
+        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        viewer.js("document.querySelector('.by-gradient circle[data-index=\"1\"]').focus()")
+        viewer.driver.switch_to.active_element.send_keys(Keys.ARROW_DOWN * 20, Keys.INSERT)
+        viewer.final("/^[0-9.]+:0,[0-9.]+:0.8,[0-9.]+:0.8$/.test(o['gradient-opacity'])")
+        box = viewer.js("(b => [b.left, b.top, b.width, b.height])(document.querySelector('.by-gradient .plot').getBoundingClientRect())")
+        x, y = box[0] + box[2] * 0.9, box[1] + 20
+        for kind, dy in (("mousePressed", 0), ("mouseMoved", 10), ("mouseMoved", 30), ("mouseReleased", 30)):
+            viewer.command("Input.dispatchMouseEvent", type=kind, x=x, y=y + dy, button="left", buttons=1, clickCount=1)
+        drawn = viewer.final("o['gradient-opacity'].split(',').length === 4")
+        opacity = float(drawn["options"]["gradient-opacity"].split(",")[-1].split(":")[1])
+        self.assertTrue(0.3 < opacity < 0.7, opacity)
+        viewer.save(SHOTS, "gradient")
+        viewer.until("location.hash.includes('gradient-opacity=')")
+        other = Viewer(self.driver, viewer.js("location.href").replace("#", f"#token={self.gateway.token}&"))
+        self.assertEqual(other.final("o['gradient-opacity'] !== undefined")["options"], drawn["options"])
+        other.close()
+        viewer.focus()
+        viewer.keys("k")
+        self.assertIn(" --gradient-opacity ", viewer.until("document.querySelector('dialog pre')?.textContent"))
+        viewer.find("dialog [aria-label=Close]").click()
+        viewer.find(".by-gradient input[role=switch]").click()
+        viewer.final("o['gradient-opacity'] === undefined")
+        viewer.keys(Keys.CONTROL, "z")
+        viewer.final(f"o['gradient-opacity'] === '{drawn['options']['gradient-opacity']}'")
+
     def test_labels_surfaces_lights_and_renderers(self):
-        names = {"/api/v1/labels": lambda fields, body: {"labels": [{"value": 1, "name": "left"}, {"value": 2, "name": "middle", "color": "#40c080"}, {"value": 3, "name": "right"}]}}
-        viewer = self.viewer(self.proxy(answers=names).port)
+        viewer = self.viewer()
         viewer.settled()
         viewer.until("document.querySelector('.facts dd') !== null")
         viewer.open_section("Layers")
         viewer.driver.find_element(By.XPATH, "//input[@value = 'tint']").click()
         viewer.final("o.renderer === 'raycast' && o['label-mode'] === 'tint'")
         tinted = viewer.pixels()
+        self.assertEqual(viewer.js("[...document.querySelectorAll('[data-label]')].map(row => row.dataset.label + ' ' + row.querySelector('.label-name').textContent)"), ["1 left", "2 middle", "3 right"])
         viewer.find("[data-label='2'] input[type=checkbox]").click()
         drawn = viewer.final("o['label-opacity'] === '2=0'")
         self.assertNotEqual(viewer.pixels(), tinted)
@@ -334,6 +371,78 @@ class PageTest(unittest.TestCase):
             viewer.js("(s => { s.value = arguments[0]; s.dispatchEvent(new Event('change')); return true; })([...document.querySelectorAll('select')].find(s => s.value === 'raycast' || s.value === 'mip' || s.value === 'zbuffer'))", renderer)
             drawn = viewer.final(f"o.renderer === '{renderer}'")
             self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+
+    # ---- behind a proxy
+
+    def test_everything_works_below_a_path(self):
+        proxy = self.proxy(prefix="/user/me/proxy/8080")
+        viewer = Viewer(self.driver, self.url(proxy.port).replace("/#", "/user/me/proxy/8080/#"))
+        self.addCleanup(viewer.close)
+        viewer.settled()
+        viewer.drag(40, 10)
+        drawn = viewer.final("o.azimuth !== 150")
+        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        viewer.until("document.querySelector('.facts dd') !== null")
+        viewer.until("document.querySelector('.editor .histogram').getAttribute('d') !== ''")
+        viewer.open_section("Layers")
+        viewer.driver.find_element(By.XPATH, "//input[@value = 'tint']").click()
+        viewer.until("document.querySelectorAll('[data-label]').length === 3")
+        viewer.keys("c")
+        link = viewer.until("window.copied[0]")
+        self.assertTrue(link.startswith(f"http://127.0.0.1:{proxy.port}/user/me/proxy/8080/#"), link)
+        viewer.js("(window.saved = [], URL.createObjectURL = blob => { window.saved.push(blob); return '#'; }, true)")
+        viewer.keys("s")
+        viewer.find("dialog .primary").click()
+        viewer.until("window.saved.length === 1 && window.saved[0].type === 'image/png'")
+        viewer.find("dialog [aria-label=Close]").click()
+        viewer.keys("k")
+        self.assertIn("slabstream render patient", viewer.until("document.querySelector('dialog pre')?.textContent"))
+        viewer.find("dialog [aria-label=Close]").click()
+        viewer.driver.refresh()
+        viewer.settled()  # the token is kept for this tab, at this path
+        viewer.until("document.querySelector('.facts dd') !== null && document.querySelectorAll('[data-label]').length === 3")
+        viewer.until("document.querySelector('.editor .histogram').getAttribute('d') !== ''")
+        viewer.until("performance.getEntriesByType('resource').some(entry => entry.name.includes('api/v1/transfer'))")
+        proxy.cut()
+        viewer.until("document.querySelector('.banner:not([hidden])') === null && document.querySelector('[data-pane=\"3d\"] canvas') !== null")
+        viewer.drag(40, 10)
+        viewer.final("o.azimuth < 130")
+        self.assertEqual([target for target in proxy.strays if target != "/favicon.ico"], [])
+
+    # ---- movies
+
+    @unittest.skipUnless(shutil.which("ffmpeg"), "ffmpeg is not installed")
+    def test_a_movie_is_made_and_can_be_cancelled(self):
+        viewer = self.viewer()
+        viewer.settled()
+        viewer.js("(window.saved = [], URL.createObjectURL = blob => { window.saved.push(blob); return '#'; }, true)")
+        viewer.keys("v")
+        frames = viewer.find("dialog input[aria-label=Frames]")
+        frames.clear()
+        frames.send_keys("1000")
+        viewer.find("dialog .primary").click()
+        viewer.until("/^Frame [0-9]+ of 1000/.test(document.querySelector('dialog [role=status]').textContent)")
+        self.assertGreater(viewer.js("document.querySelector('dialog progress').value"), 0)
+        viewer.save(SHOTS, "movie")
+        viewer.driver.find_element(By.XPATH, "//dialog//button[. = 'Cancel']").click()
+        viewer.until("document.querySelector('dialog [role=status]').textContent === 'Cancelled.'")
+        self.assertEqual(viewer.js("window.saved.length"), 0)
+        frames.clear()
+        frames.send_keys("12")
+        viewer.find("dialog .primary").click()
+        viewer.until("/^Saved: 12 frames, 0.5 s/.test(document.querySelector('dialog [role=status]').textContent)")
+        kind, size = viewer.js("(b => [b.type, b.size])(window.saved[0])")
+        self.assertEqual(kind, "video/mp4")
+        self.assertGreater(size, 1000)
+
+    def test_without_ffmpeg_the_command_is_offered(self):
+        viewer = self.viewer(self.proxy(answers={"/api/v1/turntable.mp4": lambda fields, body: 501}).port)
+        viewer.settled()
+        viewer.keys("v")
+        viewer.find("dialog .primary").click()
+        line = viewer.until("document.querySelector('dialog pre')?.textContent")
+        self.assertRegex(line, r"^slabstream turntable patient .* --frames 120 --fps 25 -o turntable.mp4$")
+        viewer.save(SHOTS, "movie-elsewhere")
 
     # ---- slices and what lies below the pointer
 
@@ -396,12 +505,12 @@ class PageTest(unittest.TestCase):
         for pane in ("3d", "coronal"):
             viewer.settled(pane)
             viewer.hover((12, -7), pane=pane)
-            text = viewer.until("/value[^]*label/.test(document.querySelector('.readout').innerText) && document.querySelector('.readout').innerText.replaceAll('\u2212', '-')")
-            r, value, label = re.match(r"R (\S+) .* mm\s*value (\S+)\s*label (\d)", text, re.DOTALL).groups()
+            text = viewer.until("/value[^]*(left|middle|right)/.test(document.querySelector('.readout').innerText) && document.querySelector('.readout').innerText.replaceAll('\u2212', '-')")
+            r, value, label = re.match(r"R (\S+) .* mm\s*value (\S+)\s*(\w+)", text, re.DOTALL).groups()
             i = round((float(r) + 20) / 2)  # the volume begins at -20, a voxel has 2 mm
-            self.assertEqual((float(value), int(label)), (60 + 8 * i, 1 + i // 8), text)
+            self.assertEqual((float(value), label), (60 + 8 * i, ("left", "middle", "right")[i // 8]), text)
             viewer.hover((-150, -90), pane=pane)
-            viewer.until("!/label/.test(document.querySelector('.readout').innerText)")
+            viewer.until("!/left|middle|right/.test(document.querySelector('.readout').innerText)")
 
     # ---- the page
 

@@ -9,10 +9,12 @@ import urllib.parse
 
 
 class Proxy:
-    """Listens at 127.0.0.1:port. `answers` maps paths to functions of (fields, body) that return JSON, or the status of an error."""
+    """Listens at 127.0.0.1:port. `answers` maps paths to functions of (fields, body) that return JSON, or the status of an error. With
+    a `prefix` the gateway lies below that path, which the proxy takes away; `strays` are requests that lie elsewhere."""
 
-    def __init__(self, host, port, delay=0.0, answers=None):
-        self.upstream, self.delay, self.answers = (host, port), delay, answers or {}
+    def __init__(self, host, port, delay=0.0, answers=None, prefix=""):
+        self.upstream, self.delay, self.answers, self.prefix = (host, port), delay, answers or {}, prefix
+        self.strays = []
         self.listener = socket.create_server(("127.0.0.1", 0))
         self.port = self.listener.getsockname()[1]
         self.open = set()
@@ -58,6 +60,11 @@ class Proxy:
             lines = head.decode("latin-1").split("\r\n")
             method, target, _ = lines[0].split(" ")
             fields = {name.lower(): value.strip() for name, value in (line.split(":", 1) for line in lines[1:])}
+            if not target.startswith(self.prefix + "/"):
+                self.strays.append(target)
+                return connection.sendall(b"HTTP/1.1 404 .\r\nContent-Length: 0\r\nConnection: close\r\n\r\n")
+            target = target[len(self.prefix):]
+            head = b" ".join([method.encode(), target.encode("latin-1"), head.split(b" ", 2)[2]])
             if fields.get("upgrade", "").lower() == "websocket":
                 self._relay(connection, head + b"\r\n\r\n" + rest)
             else:

@@ -229,8 +229,8 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       [&](const Place& place, const std::string& error) {
         EXPECT_THAT(error, StartsWith(place.path + ": " + std::to_string(limits.at(place.field->name()) + 1)));
       });
-  EXPECT_EQ(seen.size(), limits.size() + 8)
-      << "reports are in four messages; parameters, datasets, isosurfaces, gradients and opacities in two";
+  EXPECT_EQ(seen.size(), limits.size() + 9)
+      << "reports are in four messages; parameters, datasets, isosurfaces, gradients, opacities and labels in two";
 }
 
 TEST(Malformed, MissingFieldsAreNoCrash) {

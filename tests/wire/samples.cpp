@@ -408,14 +408,15 @@ std::vector<SummaryQuery> SamplesOf() {
 template <>
 std::vector<SummaryReply> SamplesOf() {
   const TransferFunction flat{.colors = {{0, {1, 1, 1}}}, .opacities = {{0, 0.5}}};
-  return {{.description = Description(), .range = {}, .percentiles = {}, .transfer = flat},
+  return {{.description = Description(), .range = {}, .percentiles = {}, .transfer = flat, .labels = {}},
           {kMax64,
            Description(),
            {-1e30F, 1e30F},
            std::vector<std::uint64_t>(kHistogramBins, kMax64),
            kMax64,
            std::vector<Percentile>(kMaxPercentiles, {100, -1e300}),
-           Curve()}};
+           Curve(),
+           {{1, {0, 0.5F, 1}, std::string(kMaxLabelNameBytes, 'n')}, {kMaxLabelValue, {}, ""}}}};
 }
 
 template <>

@@ -37,6 +37,13 @@ export class Api {
   picture = async (options: Options): Promise<Blob> => (await this.ask("render.png", {}, options)).blob();
   command = async (options: Options): Promise<{ command: string; files: Record<string, string> }> => (await this.ask("command", {}, options)).json();
 
+  // A movie, while it is made.
+  turntable = async (options: Options, signal: AbortSignal): Promise<ReadableStreamDefaultReader<Uint8Array>> => {
+    const { body } = await this.ask("turntable.mp4", {}, options, signal);
+    if (!body) throw new Error("the movie is empty");
+    return body.getReader();
+  };
+
   // Older gateways lack these: null.
   histogram = (dataset: string): Promise<Histogram | null> => this.maybe("histogram", { dataset });
   transfer = (dataset: string, transfer: string): Promise<unknown> => this.maybe("transfer", { dataset, transfer });

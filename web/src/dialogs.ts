@@ -6,7 +6,7 @@ import type { KeyGroup } from "./keys";
 import { type Options, renderOptions } from "./options";
 import type { State } from "./state";
 
-function dialog(title: string, ...content: (HTMLElement | null)[]): HTMLDialogElement {
+export function dialog(title: string, ...content: (HTMLElement | null)[]): HTMLDialogElement {
   const element: HTMLDialogElement = h("dialog", { "aria-label": title, onclose: () => element.remove(), onclick: (event: MouseEvent) => { if (event.target === element) element.close(); } },
     h("div", { class: "dialog-body" }, h("header", {}, h("h2", {}, title), iconButton("Close", "close", () => element.close(), "Esc")), ...content));
   document.body.append(element);

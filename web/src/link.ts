@@ -1,6 +1,6 @@
 // The link: the page's whole state behind the address's '#', in the names of the command line where there are such.
 // The token comes in the link that the gateway prints, and stays out of the address and of copied links.
-import { type Bounds, type ClipBox, type ClipPlane, INITIAL, type State, type Surface } from "./state";
+import { type Bounds, type ClipBox, type ClipPlane, INITIAL, type SlopePoint, type State, type Surface } from "./state";
 import type { ColorMap } from "./transfer";
 import type { Vec3 } from "./vec";
 
@@ -36,6 +36,17 @@ const surfaces: Field<readonly Surface[]> = {
     const [v, color, opacity] = item.split(":"), at = number(v), o = number(opacity);
     return at !== undefined && color && COLOR.test(color) && o !== undefined ? { value: at, color, opacity: o } : undefined;
   }),
+};
+export const slopeText = (points: readonly SlopePoint[]): string => points.map(p => `${p.slope}:${p.opacity}`).join(",");
+const slopes: Field<readonly SlopePoint[]> = {
+  name: "gradient-opacity", write: slopeText,
+  read: value => {
+    const points = list(value, ",", (item): SlopePoint | undefined => {
+      const [slope, opacity] = item.split(":").map(number);
+      return slope !== undefined && slope >= 0 && opacity !== undefined && opacity >= 0 && opacity <= 1 ? { slope, opacity } : undefined;
+    });
+    return points?.every((p, i) => p.slope >= (points[i - 1]?.slope ?? 0)) ? points : undefined;
+  },
 };
 export const boxText = (box: ClipBox): string => box.map(([low, high]) => `${low ?? ""}:${high ?? ""}`).join(",");
 const clipBox: Field<ClipBox> = {
@@ -80,7 +91,7 @@ const FIELDS: { [K in keyof State]: Field<State[K]> } = {
   zoom: real("zoom", 0.01, 1000), lookAt: nullable(point("look-at")), projection: oneOf("projection", "orthographic", "perspective"),
   renderer: text("renderer", NAME), samplingRate: real("sampling-rate", 0.1, 16), projectionMode: text("projection-mode", NAME),
   shading: text("shading", NAME), lights: many<Vec3>("light", 3), background: text("background", COLOR),
-  preset: text("transfer", NAME), map: nullable(map), range: nullable(range("scalar-range")), opacityDistance: real("opacity-distance", 1e-6, 1e6),
+  preset: text("transfer", NAME), map: nullable(map), range: nullable(range("scalar-range")), opacityDistance: real("opacity-distance", 1e-6, 1e6), slopes,
   surfaces, surfacesAlone: flag("surfaces-alone"), clipBox: nullable(clipBox), clipPlanes: many<ClipPlane>("clip-plane", 4),
   clipMode: oneOf("clip-mode", "keep", "cut-away"),
   labels: oneOf("label-mode", "off", "tint", "surface"), labelTint: real("label-tint", 0, 1), labelsShown: text("labels-shown", /^[\d,-]*$/), labelOpacities: opacities,

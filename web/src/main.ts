@@ -7,10 +7,12 @@ import { section } from "./controls";
 import { commandDialog, helpDialog, screenshotDialog, tokenDialog } from "./dialogs";
 import { copyText, h } from "./dom";
 import { FunctionSource } from "./function_source";
+import { GradientEditor } from "./gradient_editor";
 import { type KeyGroup, listenToKeys } from "./keys";
 import { linkOf, showInAddress, stateOf, takeToken } from "./link";
 import { LabelsSection, lightSection, renderingSection, surfacesSection } from "./look_sections";
 import { Machine } from "./machine";
+import { movieDialog } from "./movie_dialog";
 import { Notices } from "./notices";
 import { Pointed } from "./pointed";
 import { applyTheme, Shell, switchTheme } from "./shell";
@@ -49,7 +51,7 @@ class Page {
     this.pointed = new Pointed(context, label => labels.note(label));
     this.shell = new Shell(this.actions(), notices.status, notices.banner, notices.progress, notices.messages, this.pointed.element, this.machine.element);
     const editor = new TransferEditor(context, source);
-    this.shell.panel.append(section("Transfer function", true, editor.element), slicesSection(context), renderingSection(context), surfacesSection(context), clipSection(context), labels.element, lightSection(context), this.facts());
+    this.shell.panel.append(section("Transfer function", true, editor.element, new GradientEditor(context).element), slicesSection(context), renderingSection(context), surfacesSection(context), clipSection(context), labels.element, lightSection(context), this.facts());
     this.viewer = new Viewer(context, source, this.pointed, {
       drawn: ({ frame: { header } }) => { notices.onFrame(); this.machine.onFrame(header.statistics); this.know(); },
       status: status => this.onStatus(status), progress: progress => notices.onProgress(progress), error: message => notices.onError(message),
@@ -166,7 +168,7 @@ class Page {
       panel: () => this.shell.setPanel(!this.shell.panelOpen), theme: switchTheme, help: () => helpDialog(this.keyGroups()),
       projection: () => store.update({ projection: store.state.projection === "orthographic" ? "perspective" : "orthographic" }),
       copyLink: withToken => this.copyLink(withToken), command: () => void commandDialog(store.state, this.api, ...this.pictureSize(), (message, kind) => this.notices.say(message, kind)),
-      screenshot: () => screenshotDialog(store.state, this.api, ...this.pictureSize()),
+      screenshot: () => screenshotDialog(store.state, this.api, ...this.pictureSize()), movie: () => movieDialog(store.state, this.api, ...this.pictureSize()),
     };
   }
 
@@ -195,8 +197,8 @@ class Page {
         { keys: ["l"], label: "L", does: "Slices beside the picture", run: () => actions.layout(store.state.layout === "single") }, { keys: ["m"], label: "M", does: "Machine panel", run: actions.machine },
         { keys: ["p"], label: "P", does: "Settings", run: actions.panel }, { keys: ["b"], label: "B", does: "Clip box", run: () => store.update({ clipBox: store.state.clipBox ? null : [[null, null], [null, null], [null, null]] }, "box") },
         { keys: ["a"], label: "A", does: "Axes and scale bar", run: () => store.update({ marker: !store.state.marker, scaleBar: !store.state.marker }) },
-        { keys: ["c"], label: "C", does: "Copy link", run: () => actions.copyLink(false) }, { keys: ["k"], label: "K", does: "Command and movie", run: actions.command },
-        { keys: ["s"], label: "S", does: "Save picture", run: actions.screenshot }, { keys: ["?", "h"], label: "?", does: "This help", run: actions.help },
+        { keys: ["c"], label: "C", does: "Copy link", run: () => actions.copyLink(false) }, { keys: ["k"], label: "K", does: "Command", run: actions.command },
+        { keys: ["s"], label: "S", does: "Save picture", run: actions.screenshot }, { keys: ["v"], label: "V", does: "Save movie", run: actions.movie }, { keys: ["?", "h"], label: "?", does: "This help", run: actions.help },
         { keys: [], label: "Ctrl+Z", does: "Undo", run: () => undefined }, { keys: [], label: "Ctrl+Y", does: "Redo", run: () => undefined },
       ] },
     ];

@@ -1,5 +1,5 @@
 // The state as options of the gateway, which are those of the command line.
-import { boxText } from "./link";
+import { boxText, slopeText } from "./link";
 import type { State } from "./state";
 import { toParaView } from "./transfer";
 import type { Vec3 } from "./vec";
@@ -8,7 +8,7 @@ export type Options = Record<string, unknown>;
 
 // What which renderer can do; the service refuses the rest.
 const CAN = {
-  surfaces: ["raycast", "zbuffer"], labels: ["raycast", "zbuffer"], overlay: ["raycast"], sampling: ["raycast"], projection: ["mip"], depthShading: ["zbuffer"], lit: ["splat", "raycast", "zbuffer"],
+  surfaces: ["raycast", "zbuffer"], labels: ["raycast", "zbuffer"], overlay: ["raycast"], sampling: ["raycast"], gradient: ["raycast"], projection: ["mip"], depthShading: ["zbuffer"], lit: ["splat", "raycast", "zbuffer"],
 };
 export const can = (what: keyof typeof CAN, renderer: string): boolean => CAN[what].includes(renderer);
 
@@ -16,6 +16,7 @@ function transferOptions(state: State): Options {
   const options: Options = { transfer: state.map ? toParaView(state.map) : state.preset };
   if (state.range) options["scalar-range"] = state.range.join(":");
   if (state.opacityDistance !== 1) options["opacity-distance"] = state.opacityDistance;
+  if (state.slopes.length > 0 && can("gradient", state.renderer)) options["gradient-opacity"] = slopeText(state.slopes);
   return options;
 }
 

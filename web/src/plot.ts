@@ -8,11 +8,11 @@ export const PLOT = { height: 148, top: 11, bottom: 8, side: 11, strip: 14, stri
 const CURVE_STEPS = 160;
 
 export class Scale {
-  constructor(readonly domain: readonly [number, number], readonly width: number) {}
+  constructor(readonly domain: readonly [number, number], readonly width: number, readonly height: number = PLOT.height) {}
   x(value: number): number { return PLOT.side + ((value - this.domain[0]) / (this.domain[1] - this.domain[0])) * (this.width - 2 * PLOT.side); }
   value(x: number): number { return rounded(this.domain[0] + (clamp((x - PLOT.side) / (this.width - 2 * PLOT.side), 0, 1)) * (this.domain[1] - this.domain[0])); }
-  y(opacity: number): number { return PLOT.height - PLOT.bottom - opacity * (PLOT.height - PLOT.top - PLOT.bottom); }
-  opacity(y: number): number { return rounded(clamp((PLOT.height - PLOT.bottom - y) / (PLOT.height - PLOT.top - PLOT.bottom), 0, 1), 3); }
+  y(opacity: number): number { return this.height - PLOT.bottom - opacity * (this.height - PLOT.top - PLOT.bottom); }
+  opacity(y: number): number { return rounded(clamp((this.height - PLOT.bottom - y) / (this.height - PLOT.top - PLOT.bottom), 0, 1), 3); }
 }
 
 // Fewer whole numbers than bins leave bins empty between them, like the teeth of a comb: these get the counts of their left neighbours.

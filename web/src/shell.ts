@@ -4,7 +4,7 @@ import { h } from "./dom";
 
 export interface Actions {
   dataset(name: string): void; view(index: number): void; sides(): readonly string[]; reset(): void; layout(quad: boolean): void; machine(): void; panel(): void; theme(): void; help(): void;
-  copyLink(withToken: boolean): void; command(): void; screenshot(): void; projection(): void;
+  copyLink(withToken: boolean): void; command(): void; screenshot(): void; movie(): void; projection(): void;
 }
 
 export class Shell {
@@ -31,7 +31,7 @@ export class Shell {
       h("div", { class: "group", role: "group", "aria-label": "Layout" }, ...this.layoutButtons, this.machineButton),
       h("span", { class: "space" }), readout, status,
       h("div", { class: "group", role: "group", "aria-label": "Page" },
-        menu(share, "Share", () => [menuItem("Copy link", "C", () => actions.copyLink(false)), menuItem("Copy link with access", "", () => actions.copyLink(true)), menuItem("Command and movie…", "K", actions.command), menuItem("Save picture…", "S", actions.screenshot)]),
+        menu(share, "Share", () => [menuItem("Copy link", "C", () => actions.copyLink(false)), menuItem("Copy link with access", "", () => actions.copyLink(true)), menuItem("Command…", "K", actions.command), menuItem("Save picture…", "S", actions.screenshot), menuItem("Save movie…", "V", actions.movie)]),
         iconButton("Light or dark", "theme", actions.theme), iconButton("Help", "help", actions.help, "?"), this.panelButton));
     this.datasets.element.classList.add("dataset");
     this.stage.append(h("div", { class: "canvas-area" }, progress, this.panes, banner, messages), machine);

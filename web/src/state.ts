@@ -3,6 +3,7 @@ import type { ColorMap } from "./transfer";
 import type { Vec3 } from "./vec";
 
 export interface Surface { value: number; color: string; opacity: number }
+export interface SlopePoint { slope: number; opacity: number } // slopes are data values per unit of the world, and rise
 export type Bounds = readonly [number | null, number | null]; // null: not clipped
 export type ClipBox = readonly [Bounds, Bounds, Bounds];
 export type ClipPlane = readonly [number, number, number, number]; // keeps n . p + d >= 0
@@ -27,6 +28,7 @@ export interface State {
   map: ColorMap | null; // instead of the preset
   range: readonly [number, number] | null; // the function is stretched over these values
   opacityDistance: number;
+  slopes: readonly SlopePoint[]; // none: opacity does not depend on the gradient
   surfaces: readonly Surface[];
   surfacesAlone: boolean;
   clipBox: ClipBox | null;
@@ -55,7 +57,7 @@ export const INITIAL: State = {
   dataset: "",
   azimuth: 150, elevation: 15, roll: 0, zoom: 1.15, lookAt: null, projection: "orthographic",
   renderer: "splat", samplingRate: 1, projectionMode: "maximum", shading: "phong", lights: [], background: "#0d1014",
-  preset: "auto", map: null, range: null, opacityDistance: 1, surfaces: [], surfacesAlone: true,
+  preset: "auto", map: null, range: null, opacityDistance: 1, slopes: [], surfaces: [], surfacesAlone: true,
   clipBox: null, clipPlanes: [], clipMode: "keep",
   labels: "off", labelTint: 0.5, labelsShown: "", labelOpacities: {},
   overlay: false, overlayPreset: "auto", overlayRange: null, overlayWeight: 1,
@@ -64,7 +66,7 @@ export const INITIAL: State = {
 };
 
 // What undo brings back: the look, not the place from which one looks.
-export const LOOK = ["renderer", "samplingRate", "projectionMode", "shading", "lights", "background", "preset", "map", "range", "opacityDistance",
+export const LOOK = ["renderer", "samplingRate", "projectionMode", "shading", "lights", "background", "preset", "map", "range", "opacityDistance", "slopes",
   "surfaces", "surfacesAlone", "clipBox", "clipPlanes", "clipMode", "labels", "labelTint", "labelsShown", "labelOpacities", "overlay",
   "overlayPreset", "overlayRange", "overlayWeight", "window", "level"] as const;
 const UNDO_STEPS = 200;

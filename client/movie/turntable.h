@@ -1,0 +1,18 @@
+// Turntables: frames that are spread evenly over full turns about the volume's z axis.
+#pragma once
+
+#include <cmath>
+
+namespace slabstream {
+
+inline constexpr int kMaxTurntableFrames = 100000;
+inline constexpr int kMaxTurns = 1000;
+inline constexpr char kTurnsHelp[] = "How many full turns; 0: the view stands still";
+inline constexpr char kFramesPerSecondHelp[] = "Frames per second of a movie";
+
+// Of the frame with this index in [0, frames), in degrees. In one turn, so that a start near the limit of angles stays valid.
+inline double TurntableAzimuth(double begin_degrees, int turns, int index, int frames) {
+  return std::fmod(begin_degrees + 360.0 * turns * index / frames, 360.0);
+}
+
+}  // namespace slabstream

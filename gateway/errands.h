@@ -1,0 +1,41 @@
+// Errands: what requests over HTTP have under way at the service, so many at a time and no more. An errand ends once: by its reply, or
+// because its connection has closed. All calls on the io thread, unless it says otherwise.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "gateway/metrics.h"
+#include "gateway/reply.h"
+#include "gateway/service_link.h"
+
+namespace boost::asio {
+class io_context;
+}
+
+namespace slabstream {
+
+inline constexpr Duration kAnswerDeadline = std::chrono::minutes(2);  // of the service
+
+class Errands {
+ public:
+  // `what` is the plural of one, and the reason of refusals. All must outlive this.
+  Errands(boost::asio::io_context& io, Metrics& metrics, ServiceLink& link, std::string what, int most)
+      : io_(io), metrics_(metrics), link_(link), what_(std::move(what)), most_(most) {}
+
+  // Any thread: makes the reply on the io thread, if somebody still waits for it.
+  using Finish = std::function<void(std::function<HttpReply()>)>;
+  using Start = std::function<ServiceLink::Ticket(Finish)>;
+  // Replies 429 if there are too many; else starts one, and cancels its ticket if `request.gone` says so.
+  void Begin(ReplyFunction reply, const Gone& gone, const Start& start);
+
+ private:
+  boost::asio::io_context& io_;
+  Metrics& metrics_;
+  ServiceLink& link_;
+  const std::string what_;
+  const int most_;
+  int open_ = 0;
+};
+
+}  // namespace slabstream

@@ -1,0 +1,84 @@
+#include "gateway/picture_requests.h"
+
+#include <boost/asio/post.hpp>
+#include <boost/asio/thread_pool.hpp>
+#include <memory>
+#include <utility>
+
+#include "client/image_io/image_writer.h"
+#include "client/request/picture_record.h"
+#include "common/classification/transfer_function.h"
+
+namespace slabstream {
+namespace {
+
+HttpReply PngReply(const Result<std::vector<std::byte>>& png) {
+  if (!png.ok()) return Failure(png.status());
+  return {.type = "image/png",
+          .body = std::string(reinterpret_cast<const char*>(png->data()), png->size()),
+          .headers = {{"Cache-Control", "no-store"}}};
+}
+
+}  // namespace
+
+void PictureRequests::MakePng(std::vector<FrameRequest> frames, EncodeFunction encode, ReplyFunction reply, const Gone& gone) {
+  errands_.Begin(std::move(reply), gone, [&](const Errands::Finish& finish) {
+    const auto done = [this, encode = std::move(encode), finish](Result<std::vector<Picture>> pictures) {
+      if (!pictures.ok()) return finish([status = pictures.status()] { return Failure(status); });
+      metrics_.CountFrame(pictures->front().statistics, pictures->front().latency);
+      // Handlers of asio are copied nowhere, but std::function would copy the pictures.
+      auto held = std::make_shared<std::vector<Picture>>(*std::move(pictures));
+      boost::asio::post(encoders_, [this, encode, finish, held] {
+        const Time begin = MonotonicNow();
+        auto png = std::make_shared<const Result<std::vector<std::byte>>>(encode(std::move(*held)));
+        if (png->ok()) metrics_.CountPicture("file", (*png)->size(), MonotonicNow() - begin);
+        finish([png] { return PngReply(*png); });
+      });
+    };
+    return link_.Render(std::move(frames), kAnswerDeadline, {.progress = {}, .done = done});
+  });
+}
+
+void PictureRequests::Render(PictureFields fields, ReplyFunction reply, const Gone& gone) {
+  Result<RenderRequest> render = ParseRenderFields(fields);
+  if (!render.ok()) return reply(Failure(render.status()));
+  const auto encode = [request = *render](std::vector<Picture> pictures) {
+    const Picture& picture = pictures.front();
+    const PictureNotes notes{.geometry = picture.geometry,
+                             .record = RecordText(request.frame.dataset, request.frame, request.format, picture.geometry)};
+    return PngFile(picture.image, picture.size, request.format, notes);
+  };
+  MakePng({render->frame}, encode, std::move(reply), gone);
+}
+
+void PictureRequests::Slice(PictureFields fields, ReplyFunction reply, const Gone& gone) {
+  Result<SliceRequest> slice = ParseSliceFields(fields);
+  if (!slice.ok()) return reply(Failure(slice.status()));
+  Result<std::vector<FrameRequest>> frames = FramesOf(*slice);
+  if (!frames.ok()) return reply(Failure(frames.status()));
+  const auto encode = [request = *slice](std::vector<Picture> pictures) {
+    std::vector<LocalImage> images;
+    for (Picture& picture : pictures) images.push_back(std::move(picture.image));
+    return PngFile(SideBySide(images, request.frame.size), request.size(), request.format);
+  };
+  MakePng(*std::move(frames), encode, std::move(reply), gone);
+}
+
+void PictureRequests::Command(PictureFields fields, ReplyFunction reply, const Gone&) {
+  const Result<RenderRequest> render = ParseRenderFields(fields);
+  if (!render.ok()) return reply(Failure(render.status()));
+  PictureRecord record;
+  record.source = render->frame.dataset;
+  record.request = render->frame;
+  record.format = render->format;
+  Json files = Json::object();  // those that the line names
+  const auto add = [&files](const TransferChoice& transfer, const char* name) {
+    const auto* function = std::get_if<TransferFunction>(&transfer.choice);
+    if (function != nullptr) files[name] = FormatParaViewColorMap(*function, name);
+  };
+  add(render->frame.transfer, kColorMapFile);
+  if (render->frame.overlay) add(render->frame.overlay->transfer, kOverlayMapFile);
+  reply(JsonReply({{"command", CommandText(record, "picture.png")}, {"files", std::move(files)}}));
+}
+
+}  // namespace slabstream

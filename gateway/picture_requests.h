@@ -1,0 +1,34 @@
+// Requests for pictures, and for the command that makes one. All calls on the io thread.
+#pragma once
+
+#include "client/request/picture_fields.h"
+#include "gateway/errands.h"
+
+namespace boost::asio {
+class thread_pool;
+}
+
+namespace slabstream {
+
+class PictureRequests {
+ public:
+  // All must outlive this. `encoders` compress pictures; at most `most` pictures are under way.
+  PictureRequests(boost::asio::io_context& io, boost::asio::thread_pool& encoders, Metrics& metrics, ServiceLink& link, int most)
+      : encoders_(encoders), metrics_(metrics), link_(link), errands_(io, metrics, link, "pictures", most) {}
+
+  void Render(PictureFields fields, ReplyFunction reply, const Gone& gone);
+  void Slice(PictureFields fields, ReplyFunction reply, const Gone& gone);
+  void Command(PictureFields fields, ReplyFunction reply, const Gone& gone);
+
+ private:
+  // Renders the frames, has `encode` make a PNG of the pictures on an encoder's thread, and replies with it.
+  using EncodeFunction = std::function<Result<std::vector<std::byte>>(std::vector<Picture>)>;
+  void MakePng(std::vector<FrameRequest> frames, EncodeFunction encode, ReplyFunction reply, const Gone& gone);
+
+  boost::asio::thread_pool& encoders_;
+  Metrics& metrics_;
+  ServiceLink& link_;
+  Errands errands_;
+};
+
+}  // namespace slabstream

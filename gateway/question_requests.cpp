@@ -1,0 +1,102 @@
+#include "gateway/question_requests.h"
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "client/report/volume_text.h"
+#include "client/request/values.h"
+#include "common/base/printable.h"
+#include "common/classification/transfer_function.h"
+#include "gateway/openapi.h"
+#include "gateway/request_fields.h"
+
+namespace slabstream {
+namespace {
+
+constexpr int kMaxQuestions = 32;  // under way: fewer than a client may have
+static_assert(kMaxQuestions < int(kMaxOpenQuestions));
+
+}  // namespace
+
+QuestionRequests::QuestionRequests(boost::asio::io_context& io, Metrics& metrics, ServiceLink& link)
+    : metrics_(metrics), link_(link), errands_(io, metrics, link, "questions", kMaxQuestions) {}
+
+void QuestionRequests::Ask(std::string_view name, Question question, const MakeFunction& make, ReplyFunction reply, const Gone& gone) {
+  errands_.Begin(std::move(reply), gone, [&](const Errands::Finish& finish) {
+    const auto done = [this, name, make, finish, begin = MonotonicNow()](Result<QuestionReply> answer) {
+      finish([this, name, make, begin, held = std::make_shared<const Result<QuestionReply>>(std::move(answer))] {
+        if (!held->ok()) return Failure(held->status());
+        metrics_.CountAnswer(name, MonotonicNow() - begin);
+        HttpReply made = make(**held);
+        made.headers.emplace_back("Cache-Control", "no-store");
+        return made;
+      });
+    };
+    return link_.Ask(std::move(question), kAnswerDeadline, done);
+  });
+}
+
+void QuestionRequests::Histogram(PictureFields fields, ReplyFunction reply, const Gone& gone) {
+  Result<std::string> dataset = OnlyDataset(std::move(fields));
+  if (!dataset.ok()) return reply(Failure(dataset.status()));
+  const auto make = [name = *dataset](const QuestionReply& answer) {
+    return JsonReply(HistogramJson(name, std::get<SummaryReply>(answer)));
+  };
+  Ask("histogram", SummaryQuery{.dataset = *dataset, .transfer = {}}, make, std::move(reply), gone);
+}
+
+void QuestionRequests::Labels(PictureFields fields, ReplyFunction reply, const Gone& gone) {
+  Result<std::string> dataset = OnlyDataset(std::move(fields));
+  if (!dataset.ok()) return reply(Failure(dataset.status()));
+  const auto make = [name = *dataset](const QuestionReply& answer) { return JsonReply(LabelsJson(name, std::get<SummaryReply>(answer))); };
+  Ask("labels", SummaryQuery{.dataset = *dataset, .transfer = {}}, make, std::move(reply), gone);
+}
+
+void QuestionRequests::Value(PictureFields fields, ReplyFunction reply, const Gone& gone) {
+  const Result<std::string> at = Take(fields, "at", kPointHelp);
+  if (!at.ok()) return reply(Failure(at.status()));
+  const Result<Vec3> point = ParsePoint("at", *at);
+  if (!point.ok()) return reply(Failure(Printable(point.status())));
+  const Result<std::string> dataset = OnlyDataset(std::move(fields));
+  if (!dataset.ok()) return reply(Failure(dataset.status()));
+  const auto make = [](const QuestionReply& answer) { return JsonReply(SampleJson(std::get<SampleReply>(answer).samples.at(0))); };
+  Ask("value", SampleQuery{.dataset = *dataset, .points = {*point}}, make, std::move(reply), gone);
+}
+
+void QuestionRequests::Pick(PictureFields fields, ReplyFunction reply, const Gone& gone) {
+  const Result<std::string> x_text = Take(fields, "x", kPixelXHelp), y_text = Take(fields, "y", kPixelYHelp);
+  for (const Result<std::string>* text : {&x_text, &y_text}) {
+    if (!text->ok()) return reply(Failure(text->status()));
+  }
+  const Result<RenderRequest> render = ParseRenderFields(fields);
+  if (!render.ok()) return reply(Failure(render.status()));
+  const Result<double> x = ParseNumber("x", *x_text, {0, double(render->frame.size.width)});
+  const Result<double> y = ParseNumber("y", *y_text, {0, double(render->frame.size.height)});
+  for (const Result<double>* number : {&x, &y}) {
+    if (!number->ok()) return reply(Failure(Printable(number->status())));
+  }
+  const auto make = [](const QuestionReply& answer) { return JsonReply(PickJson(std::get<PickReply>(answer))); };
+  Ask("pick", PickQuery{.frame = render->frame, .x = *x, .y = *y}, make, std::move(reply), gone);
+}
+
+void QuestionRequests::Transfer(PictureFields fields, ReplyFunction reply, const Gone& gone) {
+  for (const PictureField& field : fields) {
+    if (field.name != "dataset" && field.name != "transfer" && field.name != "scalar-range") {
+      return reply(Failure(
+          400, fmt::format("there is no option '{}': dataset, transfer and scalar-range are taken", Printable(field.name).substr(0, 128))));
+    }
+  }
+  const Result<RenderRequest> render = ParseRenderFields(fields);
+  if (!render.ok()) return reply(Failure(render.status()));
+  const auto* preset = std::get_if<std::string>(&render->frame.transfer.choice);
+  const auto make = [name = preset != nullptr ? *preset : "function"](const QuestionReply& answer) {
+    return HttpReply{.body = FormatParaViewColorMap(std::get<SummaryReply>(answer).transfer, name)};
+  };
+  Ask("transfer", SummaryQuery{.dataset = render->frame.dataset, .transfer = render->frame.transfer}, make, std::move(reply), gone);
+}
+
+}  // namespace slabstream

@@ -1,0 +1,31 @@
+// Requests for what datasets hold. All calls on the io thread.
+#pragma once
+
+#include <string_view>
+
+#include "client/request/picture_fields.h"
+#include "gateway/errands.h"
+
+namespace slabstream {
+
+class QuestionRequests {
+ public:
+  // All must outlive this.
+  QuestionRequests(boost::asio::io_context& io, Metrics& metrics, ServiceLink& link);
+
+  void Histogram(PictureFields fields, ReplyFunction reply, const Gone& gone);
+  void Labels(PictureFields fields, ReplyFunction reply, const Gone& gone);
+  void Value(PictureFields fields, ReplyFunction reply, const Gone& gone);
+  void Pick(PictureFields fields, ReplyFunction reply, const Gone& gone);
+  void Transfer(PictureFields fields, ReplyFunction reply, const Gone& gone);
+
+ private:
+  using MakeFunction = std::function<HttpReply(const QuestionReply&)>;
+  void Ask(std::string_view name, Question question, const MakeFunction& make, ReplyFunction reply, const Gone& gone);
+
+  Metrics& metrics_;
+  ServiceLink& link_;
+  Errands errands_;
+};
+
+}  // namespace slabstream

@@ -1,0 +1,29 @@
+#include "gateway/reply.h"
+
+namespace slabstream {
+namespace {
+
+unsigned HttpStatus(StatusCode code) {
+  switch (code) {
+    case StatusCode::kOk: return 200;
+    case StatusCode::kInvalidArgument: return 400;
+    case StatusCode::kNotFound: return 404;
+    case StatusCode::kUnavailable:
+    case StatusCode::kResourceExhausted:
+    case StatusCode::kCancelled: return 503;
+    case StatusCode::kDeadlineExceeded: return 504;
+    case StatusCode::kDataLoss:
+    case StatusCode::kInternal: break;
+  }
+  return 500;
+}
+
+}  // namespace
+
+std::string JsonText(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n"; }
+
+HttpReply JsonReply(const Json& json) { return {.body = JsonText(json)}; }
+HttpReply Failure(unsigned status, std::string_view message) { return {.status = status, .body = JsonText({{"error", message}})}; }
+HttpReply Failure(const Status& status) { return Failure(HttpStatus(status.code()), status.message()); }
+
+}  // namespace slabstream

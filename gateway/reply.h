@@ -1,0 +1,21 @@
+// Replies of the gateway: JSON, and errors as {"error": "..."}.
+#pragma once
+
+#include <functional>
+#include <string_view>
+
+#include "client/request/json_value.h"
+#include "common/base/status.h"
+#include "gateway/http.h"
+
+namespace slabstream {
+
+using ReplyFunction = std::function<void(HttpReply)>;
+
+// Text that is not UTF-8 is repaired.
+std::string JsonText(const Json& json);
+HttpReply JsonReply(const Json& json);
+HttpReply Failure(unsigned status, std::string_view message);
+HttpReply Failure(const Status& status);  // never of Ok
+
+}  // namespace slabstream

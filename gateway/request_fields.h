@@ -1,0 +1,25 @@
+// The fields of a request: of its address, and of a POST's body.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "client/request/picture_fields.h"
+#include "common/base/status.h"
+#include "gateway/http.h"
+#include "gateway/target.h"
+
+namespace slabstream {
+
+// All but the token. InvalidArgument: the body.
+Result<PictureFields> FieldsOf(const Target& target, const HttpRequest& request);
+
+// Takes the field out. InvalidArgument: it is missing, or there are several.
+Result<std::string> Take(PictureFields& fields, const std::string& name, std::string_view purpose);
+// The same, but `usual` if it is missing.
+Result<std::string> TakeOr(PictureFields& fields, const std::string& name, std::string_view usual);
+
+// Of fields that name a dataset and nothing else.
+Result<std::string> OnlyDataset(PictureFields fields);
+
+}  // namespace slabstream

@@ -1,0 +1,133 @@
+#include "gateway/turntable_movie.h"
+
+#include <fcntl.h>
+
+#include <algorithm>
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/post.hpp>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include "client/image_io/composed_picture.h"
+#include "client/movie/turntable.h"
+#include "gateway/errands.h"
+#include "gateway/service_link.h"
+
+namespace slabstream {
+namespace {
+
+constexpr int kInFlight = 2;  // frames requested and not yet taken
+constexpr std::size_t kPartBytes = std::size_t{1} << 16;
+
+}  // namespace
+
+TurntableMovie::TurntableMovie(boost::asio::io_context& io, Context& context, ServiceAddress service, Metrics& metrics,
+                               TurntableRequest request)
+    : io_(io), context_(context), service_(std::move(service)), metrics_(metrics), request_(std::move(request)), output_(io) {}
+
+// ---- Make's thread
+
+void TurntableMovie::Make() {
+  Status status = RenderAndEncode();
+  // The encoder has ended, well or not: what it wrote before is still read.
+  std::unique_ptr<MovieEncoder> encoder;
+  {
+    const std::lock_guard lock(mutex_);
+    encoder = std::move(encoder_);
+  }
+  encoder.reset();
+  boost::asio::post(io_, [self = shared_from_this(), status = std::move(status)] {
+    self->end_ = status;
+    if (self->next_ && !self->output_.is_open()) self->ReadSome();
+  });
+}
+
+Status TurntableMovie::RenderAndEncode() {
+  ServiceLink link(context_, service_);  // a client of its own, so that others get their share
+  const auto request = [&](int index) {
+    FrameRequest frame = request_.render.frame;
+    frame.view.azimuth_degrees = TurntableAzimuth(frame.view.azimuth_degrees, request_.turns, index, request_.frames);
+    const auto done = [this, index](Result<std::vector<Picture>> pictures) {
+      const std::lock_guard lock(mutex_);
+      pictures_.emplace(index, pictures.ok() ? Result<Picture>(std::move(pictures->front())) : pictures.status());
+      changed_.notify_one();
+    };
+    link.Render({std::move(frame)}, kAnswerDeadline, {.progress = {}, .done = done});
+  };
+  for (int i = 0, requested = 0; i < request_.frames; ++i) {
+    while (requested < std::min(i + kInFlight, request_.frames)) request(requested++);
+    const Result<Picture> picture = Take(i);
+    if (!picture.ok()) return picture.status();
+    metrics_.CountFrame(picture->statistics, picture->latency);
+    const auto composed = ComposedPicture::Make(picture->image, picture->size, request_.render.format, picture->geometry);
+    if (!composed.ok()) return composed.status();
+    const std::vector<std::byte> frame = MovieFrame(*composed);
+    // Not before there is a frame: so an error of the service comes before the first byte.
+    if (encoder_ == nullptr) {
+      if (Status status = StartEncoder(); !status.ok()) return status;
+    }
+    if (Status status = encoder_->Put(frame); !status.ok()) return status;
+  }
+  return encoder_->Finish();
+}
+
+Status TurntableMovie::StartEncoder() {
+  const MovieShape shape{.size = request_.render.frame.size, .frames_per_second = request_.frames_per_second};
+  Result<std::unique_ptr<MovieEncoder>> encoder = MovieEncoder::Start(StreamFormat(), shape, "");
+  if (!encoder.ok()) return encoder.status();
+  FileDescriptor output(::fcntl((*encoder)->output(), F_DUPFD_CLOEXEC, 0));
+  if (output.number() < 0) return Status::Unavailable(std::string("cannot read a movie: ") + std::strerror(errno));
+  {
+    const std::lock_guard lock(mutex_);
+    if (abandoned_) return Status::Cancelled("nobody reads it");
+    encoder_ = *std::move(encoder);
+  }
+  boost::asio::post(io_, [self = shared_from_this(), output = std::make_shared<FileDescriptor>(std::move(output))] {
+    self->output_.assign(output->Release());
+    if (self->next_) self->ReadSome();
+  });
+  return Status::Ok();
+}
+
+Result<Picture> TurntableMovie::Take(int index) {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [&] { return abandoned_ || pictures_.contains(index); });
+  if (abandoned_) return Status::Cancelled("nobody reads it");
+  return std::move(pictures_.extract(index).mapped());
+}
+
+// ---- the io thread
+
+void TurntableMovie::Read(std::function<void(Result<std::string>)> next) {
+  next_ = std::move(next);
+  if (output_.is_open() || end_) ReadSome();
+}
+
+void TurntableMovie::ReadSome() {
+  if (!output_.is_open()) return Answer(end_->ok() ? Result<std::string>(std::string()) : *end_);
+  part_.resize(kPartBytes);
+  output_.async_read_some(boost::asio::buffer(part_), [self = shared_from_this()](boost::system::error_code error, std::size_t size) {
+    if (!self->next_) return;
+    if (!error) {
+      self->part_.resize(size);
+      return self->Answer(std::move(self->part_));
+    }
+    self->output_.close(error);
+    if (self->end_) self->ReadSome();  // else the encoder has closed its output, and Make says soon how it ended
+  });
+}
+
+void TurntableMovie::Answer(Result<std::string> part) { std::exchange(next_, nullptr)(std::move(part)); }
+
+void TurntableMovie::Abandon() {
+  next_ = nullptr;
+  boost::system::error_code ignored;
+  output_.close(ignored);
+  const std::lock_guard lock(mutex_);
+  abandoned_ = true;
+  if (encoder_ != nullptr) encoder_->Abandon();
+  changed_.notify_one();
+}
+
+}  // namespace slabstream

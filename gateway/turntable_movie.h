@@ -1,0 +1,69 @@
+// TurntableMovie: a movie that is rendered, encoded and sent at the same time. Whoever reads it slowly slows down the rest.
+#pragma once
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/posix/stream_descriptor.hpp>
+#include <condition_variable>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/client.h"
+#include "client/movie/movie_encoder.h"
+#include "client/request/picture_fields.h"
+#include "common/transport/context.h"
+#include "gateway/http.h"
+#include "gateway/metrics.h"
+
+namespace slabstream {
+
+struct TurntableRequest {
+  RenderRequest render;  // of the first frame
+  int frames = 0;
+  int turns = 1;
+  double frames_per_second = 25;
+};
+
+class TurntableMovie final : public BodyStream, public std::enable_shared_from_this<TurntableMovie> {
+ public:
+  // `io`, `context` and `metrics` must outlive it.
+  TurntableMovie(boost::asio::io_context& io, Context& context, ServiceAddress service, Metrics& metrics, TurntableRequest request);
+
+  // On a thread that stays as long as the process (Child): makes the movie, until it is done or abandoned.
+  void Make();
+
+  // BodyStream. Read's errors: those of the service before the first bytes, and of the encoder.
+  void Read(std::function<void(Result<std::string>)> next) override;
+  void Abandon() override;
+
+ private:
+  Status RenderAndEncode();
+  Status StartEncoder();
+  // Waits for the frame. Errors are the service's; Cancelled: nobody reads any more.
+  Result<Picture> Take(int index);
+  void ReadSome();
+  void Answer(Result<std::string> part);
+
+  boost::asio::io_context& io_;
+  Context& context_;
+  const ServiceAddress service_;
+  Metrics& metrics_;
+  const TurntableRequest request_;
+  // Of the io thread.
+  boost::asio::posix::stream_descriptor output_;  // of the encoder, while it is open
+  std::function<void(Result<std::string>)> next_;
+  std::optional<Status> end_;  // how Make ended
+  std::string part_;
+  // Shared.
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::unique_ptr<MovieEncoder> encoder_;    // made and ended by Make's thread
+  std::map<int, Result<Picture>> pictures_;  // that have come, and were not taken yet
+  bool abandoned_ = false;
+};
+
+}  // namespace slabstream
