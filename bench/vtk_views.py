@@ -2,7 +2,7 @@
 """Draws a scene of `slabstream bench --export` with one of VTK's volume mappers and times it; bench/against_vtk runs it.
 
 Needs python3-vtk9, python3-numpy and an X display (run it under xvfb-run). One frame is: move the camera, Render(), read the RGBA pixels
-back. Two frames warm up, then both turntables turn after turn, as `slabstream bench` does it. Prints one JSON object: milliseconds of
+back. A frame of each projection warms up, then their turntables turn after turn, as `slabstream bench` does it. Prints one JSON object: milliseconds of
 each frame in order, of the first one, and the peak of this process's memory.
 """
 import argparse
@@ -11,8 +11,6 @@ import math
 import os
 import resource
 import time
-
-PROJECTIONS = ("orthographic", "perspective")
 
 
 def read_volume(vtk, path):
@@ -143,14 +141,15 @@ def main():
     with open(a.scene, encoding="utf-8") as stream:
         scene = json.load(stream)
     stage = Stage(vtk, scene, os.path.dirname(a.scene), a.mapper, a.threads)
-    warm_up = [stage.frame_ms(projection, 0) for projection in PROJECTIONS]
-    times = {projection: [] for projection in PROJECTIONS}
+    projections = scene["views"]["projections"]
+    warm_up = [stage.frame_ms(projection, 0) for projection in projections]
+    times = {projection: [] for projection in projections}
     for _ in range(scene["views"]["turns"]):
-        for projection in PROJECTIONS:
+        for projection in projections:
             times[projection] += [stage.frame_ms(projection, i) for i in range(scene["views"]["frames"])]
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     if a.pictures:
-        for projection in PROJECTIONS:
+        for projection in projections:
             stage.frame_ms(projection, 0)
             write_picture(vtk, stage.window, f"{a.pictures}.{projection}.png")
     print(json.dumps({"version": vtk.vtkVersion().GetVTKVersion(), "first_frame_ms": warm_up[0], "latency_ms": times,
