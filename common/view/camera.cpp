@@ -195,7 +195,7 @@ Status Validate(const ImageSize& size) {
   return InRange("size.width * size.height", double(size.width) * size.height, 1, double(kMaxImagePixels));
 }
 
-Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry, double most_voxels) {
+Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry, bool supersampled) {
   const bool perspective = view.projection == Projection::kPerspective;
   const Vec3 spacing = geometry.spacing;
   const double radius = RadiusOf(geometry);
@@ -211,7 +211,7 @@ Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeomet
   const double pixel_width = (perspective ? distance + Length(target) + radius : 1.0) / scale;
   const double voxel_width = Least(spacing);
   int supersample = 1;
-  while (supersample < kMaxSupersample && pixel_width > most_voxels * voxel_width * supersample) supersample *= 2;
+  while (supersampled && supersample < kMaxSupersample && pixel_width > kMaxVoxelsPerPixel * voxel_width * supersample) supersample *= 2;
   scale *= supersample;
 
   Camera camera;

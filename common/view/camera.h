@@ -21,7 +21,6 @@
 
 #include <array>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <string_view>
 
@@ -106,12 +105,10 @@ struct Camera {
 // shorter side of the picture at zoom 1. The eye's distance stays. Not `fit` any more.
 ViewParameters FitView(const ViewParameters& view, const VolumeGeometry& geometry, const Vec3& centre, double radius);
 
-// `view` and `size` valid, and CheckView is ok. Where more than `most_voxels` would fall on a pixel's width the camera is supersampled, at
-// most kMaxSupersample times.
-Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry,
-                  double most_voxels = std::numeric_limits<double>::infinity());
+// `view` and `size` valid, and CheckView is ok. Not `supersampled`: supersample is 1.
+Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry, bool supersampled = false);
 inline Camera MakeSupersampledCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry) {
-  return MakeCamera(view, size, geometry, kMaxVoxelsPerPixel);
+  return MakeCamera(view, size, geometry, true);
 }
 
 }  // namespace slabstream

@@ -96,14 +96,14 @@ class Reference {
     if (!(opacity > 0)) return;
     PhongFactors light;
     if (setup_.shading.model == ShadingModel::kPhong) {
-      const auto difference = [&](auto&& at) {  // over two lattice points of a slice
+      const auto between = [&](auto&& at) {  // over two samples
         const int n = int(floor);
         return ((1 - t) * at(n) + t * at(n + 1)) / 2;
       };
-      const double along_u = difference([&](int n) { return AtLattice(u + 1, v, n) - AtLattice(u - 1, v, n); });
-      const double along_v = difference([&](int n) { return AtLattice(u, v + 1, n) - AtLattice(u, v - 1, n); });
-      const double along_z = difference([&](int n) { return AtLattice(u, v, n + 1) - AtLattice(u, v, n - 1); }) * scale_;
-      const Vec3 in_passes = passes_.SlopesInVolume(along_u, along_v, along_z);
+      const double along_x = between([&](int n) { return SlopesAt(u, v, n)[0]; });
+      const double along_y = between([&](int n) { return SlopesAt(u, v, n)[1]; }) * scale_;
+      const double along_z = between([&](int n) { return AtLattice(u, v, n + 1) - AtLattice(u, v, n - 1); }) * scale_;
+      const Vec3 in_passes = passes_.SlopesInVolume(along_x, along_y, along_z);
       Vec3 slopes;
       for (int i = 0; i < 3; ++i) slopes[passes_.axes[std::size_t(i)]] = in_passes[i];
       const Vec3 gradient = slopes / setup_.description.geometry.spacing;
@@ -119,15 +119,32 @@ class Reference {
 
   // After pass 2: of slice n / scale.
   double AtLattice(double u, double v, int n) const {
-    const double z = double(n) / scale_, y = passes_.y_0 + passes_.y_u * u + passes_.y_v * v + passes_.y_z * z;
-    return Reconstruct(kernel_, y * scale_, [&](int beam) {
-      const double x = passes_.x_0 + passes_.x_u * u + passes_.x_y * beam / scale_ + passes_.x_z * z;
-      return Reconstruct(kernel_, x, [&](int i) { return OnBeam(i, beam, n); });
-    });
+    return Reconstruct(kernel_, YOf(u, v, n) * scale_, [&](int beam) { return OnBeam(u, beam, n); });
+  }
+  // Central differences there, over two voxels along x and two beams along y.
+  std::array<double, 2> SlopesAt(double u, double v, int n) const {
+    const auto between = [](double place, auto&& at) {
+      const double floor = std::floor(place);
+      return (1 - (place - floor)) * at(int(floor)) + (place - floor) * at(int(floor) + 1);
+    };
+    const double beam = YOf(u, v, n) * scale_;
+    const auto along_x = [&](int m) { return between(XOf(u, m, n), [&](int i) { return Sample(i + 1, m, n) - Sample(i - 1, m, n); }); };
+    const auto along_y = [&](int m) { return OnBeam(u, m + 1, n) - OnBeam(u, m - 1, n); };
+    return {between(beam, along_x), between(beam, along_y)};
+  }
+
+  double YOf(double u, double v, int n) const { return passes_.y_0 + passes_.y_u * u + passes_.y_v * v + passes_.y_z * n / scale_; }
+  double XOf(double u, int beam, int n) const {
+    return passes_.x_0 + passes_.x_u * u + passes_.x_y * beam / scale_ + passes_.x_z * n / scale_;
+  }
+
+  // After pass 1.
+  double OnBeam(double u, int beam, int n) const {
+    return Reconstruct(kernel_, XOf(u, beam, n), [&](int i) { return Sample(i, beam, n); });
   }
 
   // Sample i of a beam that may lie between those of the volume.
-  double OnBeam(int i, int beam, int n) const {
+  double Sample(int i, int beam, int n) const {
     if (scale_ == 1) return At(i, beam, n);
     return Reconstruct(kernel_, double(n) / scale_,
                        [&](int slice) { return Reconstruct(kernel_, double(beam) / scale_, [&](int row) { return At(i, row, slice); }); });

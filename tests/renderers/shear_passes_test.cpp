@@ -127,14 +127,9 @@ TEST(ShearPasses, FindSlopesInTheVolume) {
     const View view = RandomRotation(random);
     const ShearPasses passes = MakeShearPasses(view.start, view.right, view.down, view.forward);
     const Vec3 slopes = {normal(random), normal(random), normal(random)};  // of a linear function, by place in passes.axes
-    const auto along = [&](const Vec3& p) {
-      return slopes.x * p[passes.axes[0]] + slopes.y * p[passes.axes[1]] + slopes.z * p[passes.axes[2]];
-    };
-    const auto in_slice = [&](const Vec3& d) { return d - (d[passes.axes[2]] / passes.z_k) * view.forward; };
-    const Vec3 found =
-        passes.SlopesInVolume(along(in_slice(passes.turned ? view.down : view.right)),
-                              along(in_slice(passes.turned ? view.right : view.down)), along((1 / passes.z_k) * view.forward));
-    EXPECT_LT(Length(found - slopes), 1e-9) << "seed " << kSeed << " rotation " << i;
+    // The next beam at the same u lies x_y farther along x, the next slice of a ray slide_x and slide_y farther.
+    const double along_y = Dot(slopes, {passes.x_y, 1, 0}), along_z = Dot(slopes, {passes.slide_x, passes.slide_y, 1});
+    EXPECT_LT(Length(passes.SlopesInVolume(slopes.x, along_y, along_z) - slopes), 1e-12) << "seed " << kSeed << " rotation " << i;
   }
 }
 

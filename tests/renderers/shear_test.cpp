@@ -128,12 +128,12 @@ TEST(Shear, LinearFieldsAreReproduced) {
       SetupOptions options;
       options.view = RandomView(Projection::kOrthographic, random);
       options.view.zoom = 1;
-      options.size = {128, 128};                                                       // neither frame is supersampled
+      options.size = {128, 128};                                                     
       options.clipping.box = ClipBox{{25, 25, 25}, {75, 75, 75}, ClipUnit::kPercent};  // the border's nearest voxels are not linear
       options.transfer = Ramp(0.3);
       const FrameSetup cast = RaycastSetup(volume, options, 1);
       const LocalImage expected = RenderPicture(volume, cast);
-      EXPECT_GT(PixelOf(expected, 64, 64)[3], 0.3F);
+      EXPECT_GT(PixelOf(expected, options.size.width / 2, options.size.height / 2)[3], 0.3F);
       const LocalImage sheared = RenderPicture(volume, ShearSetup(volume, options, {.kernel = kernel, .supersampling = 1 + view % 4}));
       EXPECT_LT(LargestDifference(sheared, expected), 2e-3F);
     }
@@ -293,17 +293,6 @@ TEST(Shear, ValuesThatAreNotFiniteAreEmpty) {
     EXPECT_GT(less, 0);
     EXPECT_LT(less, 200);
   }
-}
-
-TEST(Shear, RefusesViewsOfPixelsThatAreTooWide) {
-  const Volume volume = MakeBlock({{64, 64, 64}, {1, 1, 1}});
-  FrameSetup setup;
-  setup.description = volume.description;
-  SetRenderer(*FindRenderer("shear"), setup);
-  EXPECT_TRUE(setup.renderer->SetView({.zoom = 0.1}, {64, 64}, setup).ok());
-  const Status status = setup.renderer->SetView({.zoom = 1e-3}, {64, 64}, setup);
-  ASSERT_FALSE(status.ok());
-  EXPECT_EQ(status.message(), "zoom is 0.001, so a pixel is 1732 voxels wide, but shear draws at most 1024");
 }
 
 }  // namespace

@@ -1,7 +1,4 @@
-// The planning half of multi-pass shears: the frame is the picture, supersampled where pixels are wider than a voxel; images blend front to
-// back.
-#include <fmt/format.h>
-
+// The planning half of multi-pass shears: the frame is the picture, supersampled where it is minified; images blend front to back.
 #include <algorithm>
 #include <cmath>
 
@@ -71,15 +68,6 @@ class ShearKind : public RendererKind {
                                       .purpose = "Beams and slices that are resampled for each one of the volume",
                                       .standard = 0,
                                       .choices = {"1", "2", "3", "4"}}}}) {}
-
-  Status SetView(const ViewParameters& view, ImageSize size, FrameSetup& setup) const override {
-    const VolumeGeometry& geometry = setup.description.geometry;
-    setup.camera = MakeCamera(view, size, geometry, kMostVoxelsPerPixel);
-    const double voxels = setup.camera.PixelSizeAt(1) / setup.camera.supersample / Least(geometry.spacing);
-    if (voxels <= kMostVoxelsPerPixel) return Status::Ok();
-    return Status::InvalidArgument(fmt::format("zoom is {:g}, so a pixel is {:.0f} voxels wide, but shear draws at most {}", view.zoom,
-                                               voxels * setup.camera.supersample, kMaxSupersample));
-  }
 
   ClassificationTable DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const override {
     return InterpolatedTable(transfer, summary);

@@ -15,7 +15,4 @@ inline constexpr std::size_t kKernel = 1, kSupersampling = 2;  // places among t
 inline constexpr int kMostSupersampling = 4;
 inline int SupersamplingOf(std::span<const double> parameters) { return 1 + int(parameters[kSupersampling]); }
 
-// Data voxels that a pixel's width may have at most: columns of the picture and differences of pixels stay near their samples.
-inline constexpr double kMostVoxelsPerPixel = 1;
-
 }  // namespace slabstream::shear

@@ -94,8 +94,8 @@ bool ActiveCells::Any(float x_low, float x_high, float y_low, float y_high, floa
 }
 
 ActiveCells FindActiveCells(const VoxelRanges& ranges, const VisibleSamples& visible, const std::array<Axis, 3>& axes) {
-  // In cubes, by place in `axes`: samples reach 6, 4 and 2 voxels; those that matter for a visible one lie 4, 4 and 2 beside it.
-  constexpr std::int32_t kReach[3] = {3, 2, 1};
+  // In cubes, by place in `axes`: samples reach 6, 4 and 2 voxels; lattice points that make one lie less than 2 slices away on its ray.
+  constexpr std::int32_t kReach[3] = {2, 2, 1};
   const Index3& counts = ranges.counts;
   std::vector<std::uint8_t> near(ranges.ranges.size());
   tbb::parallel_for(std::size_t{0}, std::size_t(counts.z), [&](std::size_t z) {

@@ -69,7 +69,7 @@ std::uint64_t RenderTiles(const ShearWork& work, LocalImage& image, const std::a
   const std::int32_t u_begin = turned ? bounds.y_begin : bounds.x_begin, u_end = turned ? bounds.y_end : bounds.x_end;
   const std::int32_t v_begin = turned ? bounds.x_begin : bounds.y_begin, v_end = turned ? bounds.x_end : bounds.y_end;
   const std::ptrdiff_t column = 4, row = 4 * std::ptrdiff_t{bounds.width()};
-  const std::int32_t across = (u_end - u_begin - 1) / kTileWidth + 1, down = (v_end - v_begin - 1) / kTileHeight + 1;
+  const std::int32_t across = (u_end - u_begin - 1) / kTileColumns + 1, down = (v_end - v_begin - 1) / kTileRows + 1;
   std::atomic<std::int64_t> ns = 0;
   std::atomic<std::uint64_t> shaded = 0;
   tbb::enumerable_thread_specific<TileRoomPtr> rooms(MakeTileRoom);
@@ -77,10 +77,10 @@ std::uint64_t RenderTiles(const ShearWork& work, LocalImage& image, const std::a
     if (cancelled.load(std::memory_order_relaxed)) return;
     const Time begin = MonotonicNow();
     TilePixels tile;
-    tile.u_begin = u_begin + number % across * kTileWidth;
-    tile.v_begin = v_begin + number / across * kTileHeight;
-    tile.u_end = std::min(tile.u_begin + kTileWidth, u_end);
-    tile.v_end = std::min(tile.v_begin + kTileHeight, v_end);
+    tile.u_begin = u_begin + number % across * kTileColumns;
+    tile.v_begin = v_begin + number / across * kTileRows;
+    tile.u_end = std::min(tile.u_begin + kTileColumns, u_end);
+    tile.v_end = std::min(tile.v_begin + kTileRows, v_end);
     tile.along_u = turned ? row : column;
     tile.along_v = turned ? column : row;
     tile.first = image.rgba.data() + (tile.u_begin - u_begin) * tile.along_u + (tile.v_begin - v_begin) * tile.along_v;

@@ -5,15 +5,6 @@
 
 namespace slabstream::shear {
 
-Vec3 ShearPasses::SlopesInVolume(double along_u, double along_v, double along_z) const {
-  // Along v in a slice one moves x_v and y_v voxels, along u x_in_slice and y_u: solve for the slopes along x and y.
-  const double x_in_slice = x_u + x_y * y_u;  // voxels along x from u to u + 1 in a slice
-  const double determinant = x_in_slice * y_v - x_v * y_u;
-  const double along_x = (along_u * y_v - along_v * y_u) / determinant;
-  const double along_y = (along_v * x_in_slice - along_u * x_v) / determinant;
-  return {along_x, along_y, along_z - slide_x * along_x - slide_y * along_y};
-}
-
 ShearPasses MakeShearPasses(const Vec3& start, const Vec3& right, const Vec3& down, const Vec3& forward) {
   ShearPasses passes;
   Axis z = Axis::kX;
@@ -45,8 +36,7 @@ ShearPasses MakeShearPasses(const Vec3& start, const Vec3& right, const Vec3& do
   passes.y_0 = start[y] - passes.slide_y * start[z];
 
   // x in a slice, with v expressed by y.
-  passes.x_v = in_slice(along_v, x);
-  passes.x_y = passes.x_v / passes.y_v;
+  passes.x_y = in_slice(along_v, x) / passes.y_v;
   passes.x_u = in_slice(along_u, x) - passes.x_y * passes.y_u;
   passes.x_z = passes.slide_x - passes.x_y * passes.slide_y;
   passes.x_0 = start[x] - passes.slide_x * start[z] - passes.x_y * passes.y_0;

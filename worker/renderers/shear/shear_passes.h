@@ -20,8 +20,7 @@
 //   |x_y| <= 1
 //
 // Reach. A kernel that reaches h voxels makes sample (u, v, k) at (x, y, z) from voxels less than h (1 + |x_y| + |slide_x|) <= 3 h away
-// along x, h (1 + |slide_y|) <= 2 h along y and h along z. With h = 2 these are 6, 4 and 2. Gradients come from neighbours in a slice,
-// which are less than 2 voxels away, since pixels are at most a voxel wide. So a halo of 8 suffices.
+// along x, h (1 + |slide_y|) <= 2 h along y and h along z. With h = 2 these are 6, 4 and 2, whatever the view.
 #pragma once
 
 #include <array>
@@ -37,11 +36,14 @@ struct ShearPasses {
   double x_u = 0, x_y = 0, x_z = 0, x_0 = 0;
   double y_u = 0, y_v = 0, y_z = 0, y_0 = 0;
   double z_k = 0;                   // voxels along z from sample to sample of a ray; not 0
-  double slide_x = 0, slide_y = 0;  // y_z is slide_y
-  double x_v = 0;                   // voxels along x from v to v + 1 in a slice: x_y y_v
+  double slide_x = 0, slide_y = 0;  // voxels along x and y from slice to slice on a ray; y_z is slide_y
 
-  // The slope along x, y and z of a function with these slopes along u and v in a slice and along z on a ray.
-  Vec3 SlopesInVolume(double along_u, double along_v, double along_z) const;
+  // The slopes along x, y and z of a function of the volume that has these slopes along x at fixed (y, z), along y at fixed (u, z), and
+  // along z at fixed (u, v).
+  Vec3 SlopesInVolume(double along_x, double along_y, double along_z) const {
+    const double y = along_y - x_y * along_x;
+    return {along_x, y, along_z - slide_x * along_x - slide_y * y};
+  }
 };
 
 // `start`: the place of (0, 0, 0) in voxels. `right`, `down` and `forward`: movements along a row and a column of the picture, and along a

@@ -16,10 +16,8 @@
 #define SLABSTREAM_WORKER_RENDERERS_SHEAR_TILE_ROOM
 namespace slabstream::shear {
 
-inline constexpr std::int32_t kSlots = 4;                            // slices that a kernel reads
-inline constexpr std::int32_t kSlotRow = kTileColumns + 2 * kChunk;  // floats, with room at both ends
+inline constexpr std::int32_t kSlots = 4;  // slices that a kernel reads
 inline constexpr std::int32_t kBlockRows = 8, kBlocks = kTileRows / kBlockRows;
-inline constexpr std::int32_t kMostBeams = 512;  // that a chunk of a slice reads
 
 // One part of each ray that clipping leaves.
 struct PartRoom {
@@ -36,10 +34,17 @@ struct BlockState {
   bool resampled[kSlots] = {};
 };
 
+// Lattice points of a slice.
+struct SliceRoom {
+  alignas(64) float values[kTileRows][kTileColumns];
+  alignas(64) float along_x[kTileRows][kTileColumns], along_y[kTileRows][kTileColumns];  // central differences, over two voxels along x,
+                                                                                         // two beams along y; if gradients are wanted
+  alignas(64) float low[kTileRows][kChunks], high[kTileRows][kChunks];                   // of the chunk's values
+};
+
 struct TileRoom {
-  alignas(64) float slots[kSlots][kTileRows][kSlotRow];
-  alignas(64) float low[kSlots][kTileRows][kChunks], high[kSlots][kTileRows][kChunks];  // of the chunk's samples
-  alignas(64) float beams[kMostBeams][kChunk];                                          // after pass 1
+  SliceRoom slots[kSlots];
+  AlignedVector<float> beams, beams_along_x;  // [beam][column]: a chunk after pass 1, values and differences
   std::int32_t slot_z[kSlots];
   BlockState blocks[kBlocks][kChunks];
   alignas(64) float z_of_first[kTileRows][kTileColumns];  // z of sample 0 of each ray
@@ -124,13 +129,13 @@ class TilePasses {
         centre_v_(passes_.turned ? rays_.centre_x : rays_.centre_y),
         scale_(work.supersampling),
         clipped_(!rays_.clip.empty()),
-        parts_(rays_.clip.cut_away ? 2 : 1) {
+        parts_(rays_.clip.cut_away ? 2 : 1),
+        gradients_(work.look->phong || !work.look->gradient_factors.empty()) {
     const std::size_t z_axis = std::size_t(Number(passes_.axes[2]));
     z_move_ = rays_.step * rays_.forward[z_axis];
     z_inverse_ = 1 / z_move_;
-    // Gradients are differences over two lattice points along each of u, v and z.
     for (std::size_t i = 0; i < 3; ++i) {
-      const Vec3 slopes = passes_.SlopesInVolume(i == 0 ? 1 : 0, i == 1 ? 1 : 0, i == 2 ? scale_ : 0);
+      const Vec3 slopes = passes_.SlopesInVolume(i == 0 ? 1 : 0, i == 1 ? scale_ : 0, i == 2 ? scale_ : 0);
       for (int place = 0; place < 3; ++place) slopes_[std::size_t(Number(passes_.axes[std::size_t(place)]))][i] = float(slopes[place]);
     }
   }
@@ -161,8 +166,8 @@ class TilePasses {
  private:
   static constexpr float kFar = 1e9F;
 
-  float U(std::int32_t column) const { return float(tile_.u_begin - 1 + column) - centre_u_; }
-  float V(std::int32_t row) const { return float(tile_.v_begin - 1 + row) - centre_v_; }
+  float U(std::int32_t column) const { return float(tile_.u_begin + column) - centre_u_; }
+  float V(std::int32_t row) const { return float(tile_.v_begin + row) - centre_v_; }
   static HWY_INLINE Floats Columns(float first) { return hn::Add(Set(first), hn::ConvertTo(FloatTag(), hn::Iota(IntTag(), 0))); }
 
   // The rays of lattice points, and which samples of them the box owns. False: none.
@@ -198,14 +203,13 @@ class TilePasses {
   // Pixels of the tile that are not hidden.
   Mask ValidPixels(std::int32_t row, std::int32_t column) const {
     const FloatTag df;
-    const std::int32_t v = tile_.v_begin - 1 + row;
-    if (v < tile_.v_begin || v >= tile_.v_end) return hn::Lt(Set(1), hn::Zero(df));
-    const auto u = Columns(float(tile_.u_begin - 1 + column));
-    auto valid = hn::And(hn::Ge(u, Set(float(tile_.u_begin))), hn::Lt(u, Set(float(tile_.u_end))));
+    const std::int32_t v = tile_.v_begin + row;
+    if (v >= tile_.v_end) return hn::Lt(Set(1), hn::Zero(df));
+    const auto valid = hn::Lt(Columns(float(tile_.u_begin + column)), Set(float(tile_.u_end)));
     if (work_.hidden->empty()) return valid;
     alignas(64) float seen[kLanes];
     for (std::int32_t lane = 0; lane < kVector; ++lane) {
-      const std::int32_t at = std::clamp(tile_.u_begin - 1 + column + lane, tile_.u_begin, tile_.u_end - 1);
+      const std::int32_t at = std::min(tile_.u_begin + column + lane, tile_.u_end - 1);
       seen[lane] = work_.hidden->Hides(passes_.turned ? v : at, passes_.turned ? at : v) ? 0.0F : 1.0F;
     }
     return hn::And(valid, hn::Gt(hn::Load(df, seen), hn::Zero(df)));
@@ -278,17 +282,6 @@ class TilePasses {
     return false;
   }
 
-  // Whether the block, or one beside it, composes samples next to this slice.
-  bool Wanted(std::int32_t block, std::int32_t chunk, std::int32_t slice) const {
-    for (std::int32_t b = std::max(block - 1, 0); b <= std::min(block + 1, kBlocks - 1); ++b) {
-      for (std::int32_t c = std::max(chunk - 1, 0); c <= std::min(chunk + 1, kChunks - 1); ++c) {
-        const BlockState& state = room_.blocks[b][c];
-        if (state.alive && state.z_first - 1 <= slice && slice <= state.z_last + 2) return true;
-      }
-    }
-    return false;
-  }
-
   // Passes 1 and 2, of a slice that is not there yet.
   void ResampleSlice(std::int32_t slice) {
     const auto slot = std::size_t(slice & (kSlots - 1));
@@ -298,8 +291,10 @@ class TilePasses {
     for (std::int32_t chunk = 0; chunk < kChunks; ++chunk) {
       std::int32_t first = kBlocks, last = -1;
       for (std::int32_t block = 0; block < kBlocks; ++block) {
-        room_.blocks[block][chunk].resampled[slot] = false;
-        if (!Wanted(block, chunk, slice) || !IsActive(block, chunk, z)) continue;
+        BlockState& state = room_.blocks[block][chunk];
+        state.resampled[slot] = false;
+        const bool wanted = state.alive && state.z_first - 1 <= slice && slice <= state.z_last + 2;
+        if (!wanted || !IsActive(block, chunk, z)) continue;
         first = std::min(first, block);
         last = block;
       }
@@ -341,36 +336,62 @@ class TilePasses {
       low = std::min({low, a, b});
       high = std::max({high, a, b});
     }
-    const std::int32_t beam_begin = std::int32_t(std::floor(low)) - 1, beam_end = std::int32_t(std::floor(high)) + 3;
-    HWY_DASSERT(beam_end - beam_begin <= kMostBeams);
+    // No sample of the box reads a beam farther outside.
+    constexpr std::int32_t kBeyond = 8;  // voxels
+    const TurnedVoxels& voxels = *work_.voxels;
+    const std::int32_t beam_begin = std::int32_t(std::max(std::floor(low) - 1, float(scale_ * (voxels.begin[1] - kBeyond))));
+    const std::int32_t beam_end = std::int32_t(std::min(std::floor(high) + 3, float(scale_ * (voxels.end[1] + kBeyond))));
+    if (beam_end - beam_begin < kSlots) return;
+    const std::size_t room = std::size_t(beam_end - beam_begin) * kChunk;
+    if (room_.beams.size() < room) {
+      room_.beams.resize(room);
+      room_.beams_along_x.resize(room);
+    }
 
     // Pass 1: beams of x.
-    const float x_step = float(passes_.x_u);
+    const auto x_step = float(passes_.x_u);
     for (std::int32_t beam = beam_begin; beam < beam_end; ++beam) {
       const auto x_0 = float(passes_.x_0 + passes_.x_y * (double(beam) / scale_) + passes_.x_z * z);
-      ResampleBeam(beam, slice, x_0, x_step, u_first, room_.beams[beam - beam_begin]);
+      ResampleBeam(beam, slice, x_0, x_step, u_first, (beam - beam_begin) * kChunk);
     }
 
     // Pass 2: across beams, along y.
+    SliceRoom& to = room_.slots[slot];
+    const auto lowest = Set(float(beam_begin + 1)), highest = Set(float(beam_end - 3));
     for (std::int32_t row = row_begin; row < row_end; ++row) {
       auto least = Set(kLargest), greatest = Set(-kLargest);
       for (std::int32_t column = 0; column < kChunk; column += kVector) {
         const auto y = hn::Add(Set(y_rows[row]), hn::Mul(Columns(u_first + float(column)), Set(y_step)));
-        const auto floor = hn::Floor(y);
-        const float begin = hn::GetLane(hn::MinOfLanes(df, floor)), last = hn::GetLane(hn::MaxOfLanes(df, floor));
-        const float* from = room_.beams[std::int32_t(begin) - 1 - beam_begin] + column;
-        auto a = hn::Load(df, from), b = hn::Load(df, from + kChunk), c = hn::Load(df, from + 2 * kChunk),
-             d = hn::Load(df, from + 3 * kChunk);
-        for (float at = begin + 1; at <= last; ++at) {
-          from += kChunk;
-          const auto here = hn::Eq(floor, Set(at));
-          a = hn::IfThenElse(here, hn::Load(df, from), a);
-          b = hn::IfThenElse(here, hn::Load(df, from + kChunk), b);
-          c = hn::IfThenElse(here, hn::Load(df, from + 2 * kChunk), c);
-          d = hn::IfThenElse(here, hn::Load(df, from + 3 * kChunk), d);
+        const auto floor = hn::Floor(y), beam = hn::Min(hn::Max(floor, lowest), highest), t = hn::Sub(y, floor);
+        const float first = hn::GetLane(hn::MinOfLanes(df, beam)), last = hn::GetLane(hn::MaxOfLanes(df, beam));
+        // The beams of each lane: those of the first place, then of the others in turn.
+        std::ptrdiff_t from = (std::int32_t(first) - 1 - beam_begin) * kChunk + column;
+        const auto load = [&](std::int32_t i) SLABSTREAM_INLINED { return hn::Load(df, room_.beams.data() + from + i * kChunk); };
+        const auto load_x = [&](std::int32_t i) SLABSTREAM_INLINED { return hn::Load(df, room_.beams_along_x.data() + from + i * kChunk); };
+        auto a = load(0), b = load(1), c = load(2), d = load(3);
+        auto x_b = hn::Zero(df), x_c = hn::Zero(df);
+        if (gradients_) {
+          x_b = load_x(1);
+          x_c = load_x(2);
         }
-        const auto value = Reconstruct(WeightsAt(work_.kernel, hn::Sub(y, floor)), a, b, c, d);
-        hn::Store(value, df, &room_.slots[slot][row][kChunk + chunk * kChunk + column]);
+        for (float at = first + 1; at <= last; ++at) {
+          from += kChunk;
+          const auto here = hn::Eq(beam, Set(at));
+          a = hn::IfThenElse(here, load(0), a);
+          b = hn::IfThenElse(here, load(1), b);
+          c = hn::IfThenElse(here, load(2), c);
+          d = hn::IfThenElse(here, load(3), d);
+          if (!gradients_) continue;
+          x_b = hn::IfThenElse(here, load_x(1), x_b);
+          x_c = hn::IfThenElse(here, load_x(2), x_c);
+        }
+        const auto value = Reconstruct(WeightsAt(work_.kernel, t), a, b, c, d);
+        const std::int32_t at = chunk * kChunk + column;
+        hn::Store(value, df, &to.values[row][at]);
+        if (gradients_) {
+          hn::Store(Lerp(t, x_b, x_c), df, &to.along_x[row][at]);
+          hn::Store(Lerp(t, hn::Sub(c, a), hn::Sub(d, b)), df, &to.along_y[row][at]);
+        }
         if constexpr (std::is_same_v<T, float>) {  // values that are not finite tell nothing of their range
           const auto finite = hn::Le(hn::Abs(value), Set(kLargest));
           least = hn::Min(least, hn::IfThenElse(finite, value, Set(-kLargest)));
@@ -380,13 +401,13 @@ class TilePasses {
           greatest = hn::Max(greatest, value);
         }
       }
-      room_.low[slot][row][chunk] = hn::GetLane(hn::MinOfLanes(df, least));
-      room_.high[slot][row][chunk] = hn::GetLane(hn::MaxOfLanes(df, greatest));
+      to.low[row][chunk] = hn::GetLane(hn::MinOfLanes(df, least));
+      to.high[row][chunk] = hn::GetLane(hn::MaxOfLanes(df, greatest));
     }
   }
 
-  // A chunk of one beam: the points u_first + i at x_0 + x_step u.
-  HWY_INLINE void ResampleBeam(std::int32_t beam, std::int32_t slice, float x_0, float x_step, float u_first, float* HWY_RESTRICT to) {
+  // A chunk of one beam: the points u_first + i at x_0 + x_step u. `to`: in TileRoom::beams.
+  HWY_INLINE void ResampleBeam(std::int32_t beam, std::int32_t slice, float x_0, float x_step, float u_first, std::ptrdiff_t to) {
     if (scale_ == 1) {
       ResampleSamples(work_.voxels->Beam<T>(beam, slice), x_0, x_step, u_first, to);
     } else {
@@ -443,15 +464,18 @@ class TilePasses {
   float HighestFloor() const { return float(work_.voxels->end[0] + kBeamPad - 3); }
 
   template <class Sample>
-  HWY_INLINE void ResampleSamples(const Sample* samples, float x_0, float x_step, float u_first, float* HWY_RESTRICT to) {
+  HWY_INLINE void ResampleSamples(const Sample* samples, float x_0, float x_step, float u_first, std::ptrdiff_t to) {
     const FloatTag df;
     const auto lowest = Set(LowestFloor()), highest = Set(HighestFloor());
     for (std::int32_t column = 0; column < kChunk; column += kVector) {
       const auto x = hn::Add(Set(x_0), hn::Mul(Columns(u_first + float(column)), Set(x_step)));
-      const auto floor = hn::Floor(x);
+      const auto floor = hn::Floor(x), t = hn::Sub(x, floor);
       const auto from = hn::ConvertTo(IntTag(), hn::Sub(hn::Min(hn::Max(floor, lowest), highest), lowest));
       const Four four = LoadFour(samples, from);
-      hn::Store(Reconstruct(WeightsAt(work_.kernel, hn::Sub(x, floor)), four.a, four.b, four.c, four.d), df, to + column);
+      hn::Store(Reconstruct(WeightsAt(work_.kernel, t), four.a, four.b, four.c, four.d), df, room_.beams.data() + to + column);
+      if (gradients_) {
+        hn::Store(Lerp(t, hn::Sub(four.c, four.a), hn::Sub(four.d, four.b)), df, room_.beams_along_x.data() + to + column);
+      }
     }
   }
 
@@ -474,11 +498,11 @@ class TilePasses {
     std::uint64_t shaded = 0;
     bool alive = false;
     const auto opaque = Set(1 - work_.termination);
-    for (std::int32_t row = std::max(block * kBlockRows, 1); row < std::min((block + 1) * kBlockRows, kTileRows - 1); ++row) {
-      float low = room_.low[0][row][chunk], high = room_.high[0][row][chunk];
+    for (std::int32_t row = block * kBlockRows; row < (block + 1) * kBlockRows; ++row) {
+      float low = room_.slots[0].low[row][chunk], high = room_.slots[0].high[row][chunk];
       for (std::size_t slot = 1; slot < kSlots; ++slot) {
-        low = std::min(low, room_.low[slot][row][chunk]);
-        high = std::max(high, room_.high[slot][row][chunk]);
+        low = std::min(low, room_.slots[slot].low[row][chunk]);
+        high = std::max(high, room_.slots[slot].high[row][chunk]);
       }
       const bool shows = work_.visible->AnyBetween(low, high);
       for (std::int32_t column = chunk * kChunk; column < (chunk + 1) * kChunk; column += kVector) {
@@ -513,8 +537,9 @@ class TilePasses {
       const auto floor = hn::Floor(SliceOf(z_of_first, k));
       k = hn::Add(k, hn::IfThenElseZero(ascending ? hn::Lt(floor, z_floor) : hn::Gt(floor, z_floor), one));
     }
-    const float* slots[kSlots];  // slices z - 1 to z + 2
-    for (std::int32_t i = 0; i < kSlots; ++i) slots[i] = &room_.slots[(z - 1 + i) & (kSlots - 1)][row][kChunk + column];
+    const SliceRoom* slots[kSlots];  // slices z - 1 to z + 2
+    for (std::int32_t i = 0; i < kSlots; ++i) slots[i] = &room_.slots[(z - 1 + i) & (kSlots - 1)];
+    const auto load = [&](std::size_t i) SLABSTREAM_INLINED { return hn::Load(df, &slots[i]->values[row][column]); };
 
     std::uint64_t shaded = 0;
     for (;; k = hn::Add(k, one)) {
@@ -522,7 +547,7 @@ class TilePasses {
       const auto sampled = hn::And(hn::And(hn::Lt(k, end), hn::Eq(hn::Floor(at), z_floor)), hn::Lt(sums.alpha, opaque));
       if (hn::AllFalse(df, sampled)) break;
       const auto t = hn::Sub(at, z_floor);
-      const auto s0 = hn::Load(df, slots[0]), s1 = hn::Load(df, slots[1]), s2 = hn::Load(df, slots[2]), s3 = hn::Load(df, slots[3]);
+      const auto s0 = load(0), s1 = load(1), s2 = load(2), s3 = load(3);
       const auto value = Reconstruct(WeightsAt(work_.kernel, t), s0, s1, s2, s3);
       const auto finite = hn::Le(hn::Abs(value), Set(kLargest));
       const auto entry = EntryOf(look, value, finite);
@@ -531,15 +556,12 @@ class TilePasses {
       if (hn::AllFalse(df, visible)) continue;
 
       Gradient gradient = {zero, zero, zero};
-      if (look.phong || !look.gradient_factors.empty()) {
-        const auto slope = [&](std::ptrdiff_t stride) SLABSTREAM_INLINED {
-          const auto near = hn::Sub(hn::LoadU(df, slots[1] + stride), hn::LoadU(df, slots[1] - stride));
-          const auto far = hn::Sub(hn::LoadU(df, slots[2] + stride), hn::LoadU(df, slots[2] - stride));
-          return Lerp(t, near, far);
-        };
-        const auto along_u = slope(1), along_v = slope(kSlotRow), along_z = Lerp(t, hn::Sub(s2, s0), hn::Sub(s3, s1));
+      if (gradients_) {
+        const auto along_x = Lerp(t, hn::Load(df, &slots[1]->along_x[row][column]), hn::Load(df, &slots[2]->along_x[row][column]));
+        const auto along_y = Lerp(t, hn::Load(df, &slots[1]->along_y[row][column]), hn::Load(df, &slots[2]->along_y[row][column]));
+        const auto along_z = Lerp(t, hn::Sub(s2, s0), hn::Sub(s3, s1));
         const auto component = [&](std::size_t axis) SLABSTREAM_INLINED {
-          const auto in_slice = hn::Add(hn::Mul(Set(slopes_[axis][0]), along_u), hn::Mul(Set(slopes_[axis][1]), along_v));
+          const auto in_slice = hn::Add(hn::Mul(Set(slopes_[axis][0]), along_x), hn::Mul(Set(slopes_[axis][1]), along_y));
           return hn::Add(in_slice, hn::Mul(Set(slopes_[axis][2]), along_z));
         };
         gradient = {component(0), component(1), component(2)};
@@ -581,9 +603,9 @@ class TilePasses {
 
   void Write() const {
     for (std::int32_t v = tile_.v_begin; v < tile_.v_end; ++v) {
-      const std::int32_t row = v - tile_.v_begin + 1;
+      const std::int32_t row = v - tile_.v_begin;
       float* to = tile_.first + (v - tile_.v_begin) * tile_.along_v;
-      for (std::int32_t column = 1; column <= tile_.u_end - tile_.u_begin; ++column, to += tile_.along_u) {
+      for (std::int32_t column = 0; column < tile_.u_end - tile_.u_begin; ++column, to += tile_.along_u) {
         to[0] = room_.red[row][column];
         to[1] = room_.green[row][column];
         to[2] = room_.blue[row][column];
@@ -601,8 +623,9 @@ class TilePasses {
   const int scale_;  // beams, and slices, for each of the volume
   const bool clipped_;
   const int parts_;
+  const bool gradients_;
   float z_move_ = 1, z_inverse_ = 1;  // voxels along z from sample to sample
-  float slopes_[3][3] = {};           // gradient by axis of the volume from differences along u, v and z
+  float slopes_[3][3] = {};           // gradient by axis of the volume from differences along x, y and z
 };
 
 std::uint64_t ShearAny(const ShearWork& work, const TilePixels& tile, TileRoom& room) {

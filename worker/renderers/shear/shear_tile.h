@@ -4,8 +4,9 @@
 //
 //   1. reconstruct and view: passes 1 and 2 resample a slice onto the tile's lattice points (u, v, z), in chunks of kChunk columns
 //   2. the last four slices are kept; pass 3 resamples between the middle two, at the samples (u, v, k) of rays there
-//   3. shade: a sample is classified by RayLook; its gradient comes from differences of lattice points, along u and v in the slices and
-//      along z on the ray, interpolated linearly between slices
+//   3. shade: a sample is classified by RayLook; its gradient is made of central differences, which each pass finds along its own axis
+//   among
+//      the samples that it reads anyway
 //   4. compose: samples blend front to back
 //
 // Chunks of slices without active cells, and those whose rays are opaque or elsewhere, are not resampled.
@@ -27,9 +28,8 @@
 
 namespace slabstream::shear {
 
-// A tile has kTileColumns x kTileRows lattice points, of which those at its rim are neighbours for gradients alone.
+// Lattice points of a tile, along u and v.
 inline constexpr std::int32_t kChunk = 16, kChunks = 4, kTileColumns = kChunk * kChunks, kTileRows = 32;
-inline constexpr std::int32_t kTileWidth = kTileColumns - 2, kTileHeight = kTileRows - 2;  // pixels, along u and v
 
 struct ShearWork {
   const ViewRays* rays = nullptr;  // orthographic
@@ -48,7 +48,7 @@ struct ShearWork {
 
 // Where a tile's pixels are stored: four floats each.
 struct TilePixels {
-  std::int32_t u_begin = 0, v_begin = 0, u_end = 0, v_end = 0;  // at most kTileWidth x kTileHeight
+  std::int32_t u_begin = 0, v_begin = 0, u_end = 0, v_end = 0;  // at most kTileColumns x kTileRows
   float* first = nullptr;
   std::ptrdiff_t along_u = 0, along_v = 0;  // floats
 };
