@@ -88,7 +88,7 @@ class Reference {
 
  private:
   void Add(double u, double v, double z, double steps, std::array<double, 4>& sum) const {
-    const double slice = z * scale_, floor = std::floor(slice), t = slice - floor;
+    const double slice = z * scale_;
     const double value = Reconstruct(kernel_, slice, [&](int n) { return AtLattice(u, v, n); });
     const double entry = std::clamp((value - double(look_.origin)) * double(look_.scale) + double(look_.rounding), 0.0, double(look_.last));
     const float* const look = &look_.entries[4 * std::size_t(entry)];
@@ -96,16 +96,7 @@ class Reference {
     if (!(opacity > 0)) return;
     PhongFactors light;
     if (setup_.shading.model == ShadingModel::kPhong) {
-      const auto between = [&](auto&& at) {  // over two samples
-        const int n = int(floor);
-        return ((1 - t) * at(n) + t * at(n + 1)) / 2;
-      };
-      const double along_x = between([&](int n) { return SlopesAt(u, v, n)[0]; });
-      const double along_y = between([&](int n) { return SlopesAt(u, v, n)[1]; }) * scale_;
-      const double along_z = between([&](int n) { return AtLattice(u, v, n + 1) - AtLattice(u, v, n - 1); }) * scale_;
-      const Vec3 in_passes = passes_.SlopesInVolume(along_x, along_y, along_z);
-      Vec3 slopes;
-      for (int i = 0; i < 3; ++i) slopes[passes_.axes[std::size_t(i)]] = in_passes[i];
+      const Vec3 slopes = SlopesAt(u, v, z);
       const Vec3 gradient = slopes / setup_.description.geometry.spacing;
       const double length = Length(gradient);
       light = length > 0 ? phong_.AtNormal((1 / length) * gradient) : phong_.WithoutGradient();
@@ -121,16 +112,23 @@ class Reference {
   double AtLattice(double u, double v, int n) const {
     return Reconstruct(kernel_, YOf(u, v, n) * scale_, [&](int beam) { return OnBeam(u, beam, n); });
   }
-  // Central differences there, over two voxels along x and two beams along y.
-  std::array<double, 2> SlopesAt(double u, double v, int n) const {
+  // Central differences of the volume's samples, through the same passes by linear interpolation.
+  Vec3 SlopesAt(double u, double v, double z) const {
     const auto between = [](double place, auto&& at) {
       const double floor = std::floor(place);
       return (1 - (place - floor)) * at(int(floor)) + (place - floor) * at(int(floor) + 1);
     };
-    const double beam = YOf(u, v, n) * scale_;
-    const auto along_x = [&](int m) { return between(XOf(u, m, n), [&](int i) { return Sample(i + 1, m, n) - Sample(i - 1, m, n); }); };
-    const auto along_y = [&](int m) { return OnBeam(u, m + 1, n) - OnBeam(u, m - 1, n); };
-    return {between(beam, along_x), between(beam, along_y)};
+    Vec3 slopes;
+    for (int i = 0; i < 3; ++i) {
+      const int dx = i == 0 ? 1 : 0, dy = i == 1 ? 1 : 0, dz = i == 2 ? 1 : 0;
+      slopes[passes_.axes[std::size_t(i)]] = between(z, [&](int slice) {
+        return between(passes_.y_0 + passes_.y_u * u + passes_.y_v * v + passes_.y_z * slice, [&](int row) {
+          return between(passes_.x_0 + passes_.x_u * u + passes_.x_y * row + passes_.x_z * slice,
+                         [&](int x) { return (At(x + dx, row + dy, slice + dz) - At(x - dx, row - dy, slice - dz)) / 2; });
+        });
+      });
+    }
+    return slopes;
   }
 
   double YOf(double u, double v, int n) const { return passes_.y_0 + passes_.y_u * u + passes_.y_v * v + passes_.y_z * n / scale_; }

@@ -120,19 +120,6 @@ TEST(ShearPasses, HaveNoBottleneckNearDegenerateRotations) {
   }
 }
 
-TEST(ShearPasses, FindSlopesInTheVolume) {
-  std::mt19937 random(kSeed);
-  std::normal_distribution<double> normal;
-  for (int i = 0; i < 100; ++i) {
-    const View view = RandomRotation(random);
-    const ShearPasses passes = MakeShearPasses(view.start, view.right, view.down, view.forward);
-    const Vec3 slopes = {normal(random), normal(random), normal(random)};  // of a linear function, by place in passes.axes
-    // The next beam at the same u lies x_y farther along x, the next slice of a ray slide_x and slide_y farther.
-    const double along_y = Dot(slopes, {passes.x_y, 1, 0}), along_z = Dot(slopes, {passes.slide_x, passes.slide_y, 1});
-    EXPECT_LT(Length(passes.SlopesInVolume(slopes.x, along_y, along_z) - slopes), 1e-12) << "seed " << kSeed << " rotation " << i;
-  }
-}
-
 TEST(CubicKernel, ReconstructsPolynomials) {
   const auto weights = [](const CubicKernel& kernel, double t) {
     const auto at = [&](const std::array<float, 4>& c) {

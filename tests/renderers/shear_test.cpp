@@ -128,7 +128,7 @@ TEST(Shear, LinearFieldsAreReproduced) {
       SetupOptions options;
       options.view = RandomView(Projection::kOrthographic, random);
       options.view.zoom = 1;
-      options.size = {128, 128};                                                     
+      options.size = {128, 128};
       options.clipping.box = ClipBox{{25, 25, 25}, {75, 75, 75}, ClipUnit::kPercent};  // the border's nearest voxels are not linear
       options.transfer = Ramp(0.3);
       const FrameSetup cast = RaycastSetup(volume, options, 1);

@@ -37,13 +37,6 @@ struct ShearPasses {
   double y_u = 0, y_v = 0, y_z = 0, y_0 = 0;
   double z_k = 0;                   // voxels along z from sample to sample of a ray; not 0
   double slide_x = 0, slide_y = 0;  // voxels along x and y from slice to slice on a ray; y_z is slide_y
-
-  // The slopes along x, y and z of a function of the volume that has these slopes along x at fixed (y, z), along y at fixed (u, z), and
-  // along z at fixed (u, v).
-  Vec3 SlopesInVolume(double along_x, double along_y, double along_z) const {
-    const double y = along_y - x_y * along_x;
-    return {along_x, y, along_z - slide_x * along_x - slide_y * y};
-  }
 };
 
 // `start`: the place of (0, 0, 0) in voxels. `right`, `down` and `forward`: movements along a row and a column of the picture, and along a

@@ -19,6 +19,8 @@ namespace slabstream::shear {
 inline constexpr std::int32_t kSlots = 4;  // slices that a kernel reads
 inline constexpr std::int32_t kBlockRows = 8, kBlocks = kTileRows / kBlockRows;
 
+inline constexpr std::int32_t kNoSlice = std::numeric_limits<std::int32_t>::max();
+
 // One part of each ray that clipping leaves.
 struct PartRoom {
   alignas(64) float begin[kTileRows][kTileColumns], end[kTileRows][kTileColumns];   // samples that the box owns
@@ -32,19 +34,24 @@ struct BlockState {
   bool alive = false;                    // a ray may have samples left
   std::int32_t z_first = 0, z_last = 0;  // intervals between slices that hold its samples, if it was ever alive
   bool resampled[kSlots] = {};
+  std::int32_t gradients_of[2] = {kNoSlice, kNoSlice};  // slices of the volume whose gradients are there
 };
 
 // Lattice points of a slice.
 struct SliceRoom {
   alignas(64) float values[kTileRows][kTileColumns];
-  alignas(64) float along_x[kTileRows][kTileColumns], along_y[kTileRows][kTileColumns];  // central differences, over two voxels along x,
-                                                                                         // two beams along y; if gradients are wanted
-  alignas(64) float low[kTileRows][kChunks], high[kTileRows][kChunks];                   // of the chunk's values
+  alignas(64) float low[kTileRows][kChunks], high[kTileRows][kChunks];  // of the chunk's values
+};
+
+// Central differences of the volume's samples, over two voxels, at lattice points of a slice of the volume.
+struct GradientRoom {
+  alignas(64) float along[3][kTileRows][kTileColumns];  // x, y and z
 };
 
 struct TileRoom {
   SliceRoom slots[kSlots];
-  AlignedVector<float> beams, beams_along_x;  // [beam][column]: a chunk after pass 1, values and differences
+  GradientRoom gradients[2];
+  AlignedVector<float> beams;  // after pass 1, of a chunk: [beam][column], or [beam][x, y, z][column] of gradients
   std::int32_t slot_z[kSlots];
   BlockState blocks[kBlocks][kChunks];
   alignas(64) float z_of_first[kTileRows][kTileColumns];  // z of sample 0 of each ray
@@ -134,10 +141,7 @@ class TilePasses {
     const std::size_t z_axis = std::size_t(Number(passes_.axes[2]));
     z_move_ = rays_.step * rays_.forward[z_axis];
     z_inverse_ = 1 / z_move_;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const Vec3 slopes = passes_.SlopesInVolume(i == 0 ? 1 : 0, i == 1 ? scale_ : 0, i == 2 ? scale_ : 0);
-      for (int place = 0; place < 3; ++place) slopes_[std::size_t(Number(passes_.axes[std::size_t(place)]))][i] = float(slopes[place]);
-    }
+    for (std::size_t place = 0; place < 3; ++place) places_[std::size_t(Number(passes_.axes[place]))] = place;
   }
 
   std::uint64_t Run() {
@@ -151,7 +155,7 @@ class TilePasses {
         z_last = std::max(z_last, block.z_last);
       }
     }
-    std::fill_n(room_.slot_z, kSlots, std::numeric_limits<std::int32_t>::max());
+    std::fill_n(room_.slot_z, kSlots, kNoSlice);
     std::uint64_t shaded = 0;
     for (std::int32_t n = 0; n <= z_last - z_first; ++n) {
       const std::int32_t z = ascending ? z_first + n : z_last - n;
@@ -299,7 +303,7 @@ class TilePasses {
         last = block;
       }
       if (last < 0) continue;
-      ResampleChunk(slot, slice, chunk, first * kBlockRows, (last + 1) * kBlockRows);
+      ResampleValues(slot, slice, chunk, first * kBlockRows, (last + 1) * kBlockRows);
       for (std::int32_t block = first; block <= last; ++block) room_.blocks[block][chunk].resampled[slot] = true;
     }
   }
@@ -321,77 +325,101 @@ class TilePasses {
     return work_.active->Any(x_low, x_high, y_low, y_high, float(z));
   }
 
-  // Rows [row_begin, row_end) of a chunk of columns.
-  void ResampleChunk(std::size_t slot, std::int32_t slice, std::int32_t chunk, std::int32_t row_begin, std::int32_t row_end) {
-    const FloatTag df;
-    const double z = double(slice) / scale_;
-    // y of lattice points, in beams: y_row + y_step u.
-    const auto y_step = float(scale_ * passes_.y_u);
-    const float u_first = U(chunk * kChunk), u_last = U((chunk + 1) * kChunk - 1);
-    float y_rows[kTileRows];
+  // The places of rows [row_begin, row_end) of a chunk of columns, in a slice.
+  struct Strip {
+    float u_first = 0;                          // of the chunk
+    double z = 0;                               // of the slice
+    int scale = 1;                              // beams for each of the volume
+    float y_rows[kTileRows], y_step = 0;        // lattice points lie at y_rows + y_step u, in beams
+    std::int32_t beam_begin = 0, beam_end = 0;  // beams that they are made from
+  };
+
+  // Lattice points are made from beams `before` ... `behind` of that at or before them.
+  Strip StripOf(std::int32_t slice, int scale, std::int32_t chunk, std::int32_t row_begin, std::int32_t row_end, std::int32_t before,
+                std::int32_t behind) const {
+    Strip strip;
+    strip.u_first = U(chunk * kChunk);
+    strip.z = double(slice) / scale;
+    strip.scale = scale;
+    strip.y_step = float(scale * passes_.y_u);
     float low = kFar, high = -kFar;
     for (std::int32_t row = row_begin; row < row_end; ++row) {
-      y_rows[row] = float(scale_ * (passes_.y_0 + passes_.y_z * z + passes_.y_v * double(V(row))));
-      const float a = y_rows[row] + u_first * y_step, b = y_rows[row] + u_last * y_step;
-      low = std::min({low, a, b});
-      high = std::max({high, a, b});
+      const auto y = float(scale * (passes_.y_0 + passes_.y_z * strip.z + passes_.y_v * double(V(row))));
+      const float first = y + strip.u_first * strip.y_step, last = y + (strip.u_first + float(kChunk - 1)) * strip.y_step;
+      strip.y_rows[row] = y;
+      low = std::min({low, first, last});
+      high = std::max({high, first, last});
     }
     // No sample of the box reads a beam farther outside.
     constexpr std::int32_t kBeyond = 8;  // voxels
-    const TurnedVoxels& voxels = *work_.voxels;
-    const std::int32_t beam_begin = std::int32_t(std::max(std::floor(low) - 1, float(scale_ * (voxels.begin[1] - kBeyond))));
-    const std::int32_t beam_end = std::int32_t(std::min(std::floor(high) + 3, float(scale_ * (voxels.end[1] + kBeyond))));
-    if (beam_end - beam_begin < kSlots) return;
-    const std::size_t room = std::size_t(beam_end - beam_begin) * kChunk;
-    if (room_.beams.size() < room) {
-      room_.beams.resize(room);
-      room_.beams_along_x.resize(room);
-    }
+    const auto begin = float(scale * (work_.voxels->begin[1] - kBeyond)), end = float(scale * (work_.voxels->end[1] + kBeyond));
+    strip.beam_begin = std::int32_t(std::clamp(std::floor(low) - float(before), begin, end - kSlots));
+    strip.beam_end = std::int32_t(std::clamp(std::floor(high) + float(behind + 1), float(strip.beam_begin + kSlots), end));
+    return strip;
+  }
+
+  // The lattice points of a vector of columns in a row: the first beam that each is made from, and how far behind beam `before` it lies.
+  struct Places {
+    Floats beam, t;
+    float first, last;  // of the beams
+  };
+  HWY_INLINE Places PlacesOf(const Strip& strip, std::int32_t row, std::int32_t column, std::int32_t before, std::int32_t behind) const {
+    const FloatTag df;
+    const auto y = hn::Add(Set(strip.y_rows[row]), hn::Mul(Columns(strip.u_first + float(column)), Set(strip.y_step)));
+    const auto floor = hn::Floor(y);
+    const auto lowest = Set(float(strip.beam_begin)), highest = Set(float(strip.beam_end - 1 - before - behind));
+    const auto beam = hn::Min(hn::Max(hn::Sub(floor, Set(float(before))), lowest), highest);
+    return {beam, hn::Sub(y, floor), hn::GetLane(hn::MinOfLanes(df, beam)), hn::GetLane(hn::MaxOfLanes(df, beam))};
+  }
+
+  // Lattice points u_first + column ... at x along a beam, in samples of TurnedVoxels::Beam from a lattice point's first one on.
+  struct XPlaces {
+    Ints from;
+    Floats t;
+  };
+  HWY_INLINE XPlaces XPlacesOf(const Strip& strip, double beam, std::int32_t column) const {
+    const auto x_0 = float(passes_.x_0 + passes_.x_y * (beam / strip.scale) + passes_.x_z * strip.z);
+    const auto x = hn::Add(Set(x_0), hn::Mul(Columns(strip.u_first + float(column)), Set(float(passes_.x_u))));
+    const auto floor = hn::Floor(x), lowest = Set(LowestFloor());
+    return {hn::ConvertTo(IntTag(), hn::Sub(hn::Min(hn::Max(floor, lowest), Set(HighestFloor())), lowest)), hn::Sub(x, floor)};
+  }
+
+  // Rows [row_begin, row_end) of a chunk of columns.
+  void ResampleValues(std::size_t slot, std::int32_t slice, std::int32_t chunk, std::int32_t row_begin, std::int32_t row_end) {
+    const FloatTag df;
+    const Strip strip = StripOf(slice, scale_, chunk, row_begin, row_end, 1, 2);
+    Reserve(std::size_t(strip.beam_end - strip.beam_begin) * kChunk);
 
     // Pass 1: beams of x.
-    const auto x_step = float(passes_.x_u);
-    for (std::int32_t beam = beam_begin; beam < beam_end; ++beam) {
-      const auto x_0 = float(passes_.x_0 + passes_.x_y * (double(beam) / scale_) + passes_.x_z * z);
-      ResampleBeam(beam, slice, x_0, x_step, u_first, (beam - beam_begin) * kChunk);
+    float* beams = room_.beams.data();
+    for (std::int32_t beam = strip.beam_begin; beam < strip.beam_end; ++beam, beams += kChunk) {
+      if (scale_ == 1) {
+        ResampleBeam(work_.voxels->Beam<T>(beam, slice), strip, beam, beams);
+      } else {
+        ResampleBeam(BeamBetween(beam, slice, strip), strip, beam, beams);
+      }
     }
 
     // Pass 2: across beams, along y.
     SliceRoom& to = room_.slots[slot];
-    const auto lowest = Set(float(beam_begin + 1)), highest = Set(float(beam_end - 3));
     for (std::int32_t row = row_begin; row < row_end; ++row) {
       auto least = Set(kLargest), greatest = Set(-kLargest);
       for (std::int32_t column = 0; column < kChunk; column += kVector) {
-        const auto y = hn::Add(Set(y_rows[row]), hn::Mul(Columns(u_first + float(column)), Set(y_step)));
-        const auto floor = hn::Floor(y), beam = hn::Min(hn::Max(floor, lowest), highest), t = hn::Sub(y, floor);
-        const float first = hn::GetLane(hn::MinOfLanes(df, beam)), last = hn::GetLane(hn::MaxOfLanes(df, beam));
-        // The beams of each lane: those of the first place, then of the others in turn.
-        std::ptrdiff_t from = (std::int32_t(first) - 1 - beam_begin) * kChunk + column;
-        const auto load = [&](std::int32_t i) SLABSTREAM_INLINED { return hn::Load(df, room_.beams.data() + from + i * kChunk); };
-        const auto load_x = [&](std::int32_t i) SLABSTREAM_INLINED { return hn::Load(df, room_.beams_along_x.data() + from + i * kChunk); };
-        auto a = load(0), b = load(1), c = load(2), d = load(3);
-        auto x_b = hn::Zero(df), x_c = hn::Zero(df);
-        if (gradients_) {
-          x_b = load_x(1);
-          x_c = load_x(2);
-        }
-        for (float at = first + 1; at <= last; ++at) {
+        const Places places = PlacesOf(strip, row, column, 1, 2);
+        // Of each lane: the beams of the first place, then of the others in turn.
+        const float* from = room_.beams.data() + (std::int32_t(places.first) - strip.beam_begin) * kChunk + column;
+        auto a = hn::Load(df, from), b = hn::Load(df, from + kChunk), c = hn::Load(df, from + 2 * kChunk),
+             d = hn::Load(df, from + 3 * kChunk);
+        for (float at = places.first + 1; at <= places.last; ++at) {
           from += kChunk;
-          const auto here = hn::Eq(beam, Set(at));
-          a = hn::IfThenElse(here, load(0), a);
-          b = hn::IfThenElse(here, load(1), b);
-          c = hn::IfThenElse(here, load(2), c);
-          d = hn::IfThenElse(here, load(3), d);
-          if (!gradients_) continue;
-          x_b = hn::IfThenElse(here, load_x(1), x_b);
-          x_c = hn::IfThenElse(here, load_x(2), x_c);
+          const auto here = hn::Eq(places.beam, Set(at));
+          a = hn::IfThenElse(here, hn::Load(df, from), a);
+          b = hn::IfThenElse(here, hn::Load(df, from + kChunk), b);
+          c = hn::IfThenElse(here, hn::Load(df, from + 2 * kChunk), c);
+          d = hn::IfThenElse(here, hn::Load(df, from + 3 * kChunk), d);
         }
-        const auto value = Reconstruct(WeightsAt(work_.kernel, t), a, b, c, d);
-        const std::int32_t at = chunk * kChunk + column;
-        hn::Store(value, df, &to.values[row][at]);
-        if (gradients_) {
-          hn::Store(Lerp(t, x_b, x_c), df, &to.along_x[row][at]);
-          hn::Store(Lerp(t, hn::Sub(c, a), hn::Sub(d, b)), df, &to.along_y[row][at]);
-        }
+        const auto value = Reconstruct(WeightsAt(work_.kernel, places.t), a, b, c, d);
+        hn::Store(value, df, &to.values[row][chunk * kChunk + column]);
         if constexpr (std::is_same_v<T, float>) {  // values that are not finite tell nothing of their range
           const auto finite = hn::Le(hn::Abs(value), Set(kLargest));
           least = hn::Min(least, hn::IfThenElse(finite, value, Set(-kLargest)));
@@ -406,23 +434,68 @@ class TilePasses {
     }
   }
 
-  // A chunk of one beam: the points u_first + i at x_0 + x_step u. `to`: in TileRoom::beams.
-  HWY_INLINE void ResampleBeam(std::int32_t beam, std::int32_t slice, float x_0, float x_step, float u_first, std::ptrdiff_t to) {
-    if (scale_ == 1) {
-      ResampleSamples(work_.voxels->Beam<T>(beam, slice), x_0, x_step, u_first, to);
-    } else {
-      const float a = x_0 + x_step * u_first, b = x_0 + x_step * (u_first + float(kChunk - 1));
-      ResampleSamples(BeamBetween(beam, slice, std::floor(std::min(a, b)), std::floor(std::max(a, b))), x_0, x_step, u_first, to);
+  // The same of gradients, by linear interpolation. `slice`: of the volume.
+  void ResampleGradients(std::int32_t slice, std::int32_t chunk, std::int32_t row_begin, std::int32_t row_end) {
+    const FloatTag df;
+    const Strip strip = StripOf(slice, 1, chunk, row_begin, row_end, 0, 1);
+    Reserve(3 * std::size_t(strip.beam_end - strip.beam_begin) * kChunk);
+    float* beams = room_.beams.data();
+    const TurnedVoxels& voxels = *work_.voxels;
+    for (std::int32_t beam = strip.beam_begin; beam < strip.beam_end; ++beam, beams += 3 * kChunk) {
+      const T* const here = voxels.Beam<T>(beam, slice);
+      const T* const sides[2][2] = {{voxels.Beam<T>(beam - 1, slice), voxels.Beam<T>(beam + 1, slice)},
+                                    {voxels.Beam<T>(beam, slice - 1), voxels.Beam<T>(beam, slice + 1)}};
+      for (std::int32_t column = 0; column < kChunk; column += kVector) {
+        const XPlaces places = XPlacesOf(strip, beam, column);
+        const Four four = LoadFour(here, places.from);
+        hn::Store(Lerp(places.t, hn::Sub(four.c, four.a), hn::Sub(four.d, four.b)), df, beams + column);
+        for (std::int32_t side = 0; side < 2; ++side) {
+          const Four low = LoadFour(sides[side][0], places.from), high = LoadFour(sides[side][1], places.from);
+          hn::Store(Lerp(places.t, hn::Sub(high.b, low.b), hn::Sub(high.c, low.c)), df, beams + (side + 1) * kChunk + column);
+        }
+      }
     }
+    GradientRoom& to = room_.gradients[slice & 1];
+    for (std::int32_t row = row_begin; row < row_end; ++row) {
+      for (std::int32_t column = 0; column < kChunk; column += kVector) {
+        const Places places = PlacesOf(strip, row, column, 0, 1);
+        const float* from = room_.beams.data() + 3 * (std::int32_t(places.first) - strip.beam_begin) * kChunk + column;
+        Floats a[3], b[3];
+        const auto load = [&](std::int32_t i) SLABSTREAM_INLINED { return hn::Load(df, from + i * kChunk); };
+        for (std::int32_t i = 0; i < 3; ++i) {
+          a[i] = load(i);
+          b[i] = load(3 + i);
+        }
+        for (float at = places.first + 1; at <= places.last; ++at) {
+          from += 3 * kChunk;
+          const auto here = hn::Eq(places.beam, Set(at));
+          for (std::int32_t i = 0; i < 3; ++i) {
+            a[i] = hn::IfThenElse(here, load(i), a[i]);
+            b[i] = hn::IfThenElse(here, load(3 + i), b[i]);
+          }
+        }
+        for (std::int32_t i = 0; i < 3; ++i) hn::Store(Lerp(places.t, a[i], b[i]), df, &to.along[i][row][chunk * kChunk + column]);
+      }
+    }
+  }
+
+  void Reserve(std::size_t floats) {
+    if (room_.beams.size() < floats) room_.beams.resize(floats);
   }
 
   // A beam between those of the volume, interpolated along y and then along z. Only what lattice points from `low` to `high` need is
   // written.
-  const float* BeamBetween(std::int32_t beam, std::int32_t slice, float low, float high) {
+  const float* BeamBetween(std::int32_t beam, std::int32_t slice, const Strip& strip) {
     const TurnedVoxels& voxels = *work_.voxels;
     // Of the beam, as numbers of its samples.
-    const auto first = [&](float x) { return std::int32_t(std::clamp(x, LowestFloor(), HighestFloor()) - LowestFloor()); };
-    const std::int32_t begin = first(low), end = first(high) + kSlots;
+    const double x_0 = passes_.x_0 + passes_.x_y * (double(beam) / scale_) + passes_.x_z * strip.z;
+    const auto sample = [&](float u, double slack) {
+      const double floor = std::floor(x_0 + passes_.x_u * double(u)) + slack;
+      return std::int32_t(std::clamp(float(floor), LowestFloor(), HighestFloor()) - LowestFloor());
+    };
+    const float ends[2] = {strip.u_first, strip.u_first + float(kChunk - 1)};
+    const bool rises = passes_.x_u > 0;
+    const std::int32_t begin = sample(ends[rises ? 0 : 1], -1), end = sample(ends[rises ? 1 : 0], 1) + kSlots;  // rounding: one more
     if (room_.between.size() < std::size_t(voxels.beam) + kChunk) {
       for (auto* line :
            {&room_.between, &room_.between_slices[0], &room_.between_slices[1], &room_.between_slices[2], &room_.between_slices[3]}) {
@@ -463,59 +536,95 @@ class TilePasses {
   float LowestFloor() const { return float(work_.voxels->begin[0] - (kBeamPad - 1)); }
   float HighestFloor() const { return float(work_.voxels->end[0] + kBeamPad - 3); }
 
+  // A chunk of one beam. `samples`: of that beam.
   template <class Sample>
-  HWY_INLINE void ResampleSamples(const Sample* samples, float x_0, float x_step, float u_first, std::ptrdiff_t to) {
+  HWY_INLINE void ResampleBeam(const Sample* samples, const Strip& strip, double beam, float* HWY_RESTRICT to) const {
     const FloatTag df;
-    const auto lowest = Set(LowestFloor()), highest = Set(HighestFloor());
     for (std::int32_t column = 0; column < kChunk; column += kVector) {
-      const auto x = hn::Add(Set(x_0), hn::Mul(Columns(u_first + float(column)), Set(x_step)));
-      const auto floor = hn::Floor(x), t = hn::Sub(x, floor);
-      const auto from = hn::ConvertTo(IntTag(), hn::Sub(hn::Min(hn::Max(floor, lowest), highest), lowest));
-      const Four four = LoadFour(samples, from);
-      hn::Store(Reconstruct(WeightsAt(work_.kernel, t), four.a, four.b, four.c, four.d), df, room_.beams.data() + to + column);
-      if (gradients_) {
-        hn::Store(Lerp(t, hn::Sub(four.c, four.a), hn::Sub(four.d, four.b)), df, room_.beams_along_x.data() + to + column);
-      }
+      const XPlaces places = XPlacesOf(strip, beam, column);
+      const Four four = LoadFour(samples, places.from);
+      hn::Store(Reconstruct(WeightsAt(work_.kernel, places.t), four.a, four.b, four.c, four.d), df, to + column);
     }
   }
 
   // Samples between slices z and z + 1.
   std::uint64_t ComposeInterval(std::int32_t z, bool ascending) {
     std::uint64_t shaded = 0;
-    for (std::int32_t block = 0; block < kBlocks; ++block) {
-      for (std::int32_t chunk = 0; chunk < kChunks; ++chunk) {
+    for (std::int32_t chunk = 0; chunk < kChunks; ++chunk) {
+      bool shows[kTileRows];  // a sample in the row may be visible
+      bool any = false;
+      for (std::int32_t block = 0; block < kBlocks; ++block) {
         BlockState& state = room_.blocks[block][chunk];
-        if (!state.alive || z < state.z_first || z > state.z_last) continue;
-        if (std::ranges::all_of(state.resampled, [](bool is) { return is; })) shaded += ComposeBlock(z, block, chunk, state);
+        const bool here =
+            state.alive && state.z_first <= z && z <= state.z_last && std::ranges::all_of(state.resampled, [](bool is) { return is; });
+        for (std::int32_t row = block * kBlockRows; row < (block + 1) * kBlockRows; ++row) {
+          shows[row] = here && Shows(row, chunk);
+          any = any || shows[row];
+        }
+      }
+      if (any) {
+        if (gradients_) {
+          for (std::int32_t slice = FloorDiv(z, scale_); slice <= FloorDiv(z, scale_) + 1; ++slice) FindGradients(slice, chunk, shows);
+        }
+        for (std::int32_t row = 0; row < kTileRows; ++row) {
+          if (shows[row]) shaded += ComposeRow(z, row, chunk);
+        }
+      }
+      for (std::int32_t block = 0; block < kBlocks; ++block) {
+        BlockState& state = room_.blocks[block][chunk];
+        const bool* const rows = shows + block * kBlockRows;
+        if (std::any_of(rows, rows + kBlockRows, [](bool is) { return is; })) state.alive = Transmits(block, chunk);
         if (z == (ascending ? state.z_last : state.z_first)) state.alive = false;
       }
     }
     return shaded;
   }
 
-  std::uint64_t ComposeBlock(std::int32_t z, std::int32_t block, std::int32_t chunk, BlockState& state) {
+  // Whether values between the four slices that are there may be visible.
+  bool Shows(std::int32_t row, std::int32_t chunk) const {
+    float low = kLargest, high = -kLargest;
+    for (const SliceRoom& slice : room_.slots) {
+      low = std::min(low, slice.low[row][chunk]);
+      high = std::max(high, slice.high[row][chunk]);
+    }
+    return work_.visible->AnyBetween(low, high);
+  }
+
+  // Gradients of the blocks with rows that show.
+  void FindGradients(std::int32_t slice, std::int32_t chunk, const bool* shows) {
+    std::int32_t first = kBlocks, last = -1;
+    for (std::int32_t block = 0; block < kBlocks; ++block) {
+      const bool* const rows = shows + block * kBlockRows;
+      if (room_.blocks[block][chunk].gradients_of[slice & 1] == slice) continue;
+      if (std::none_of(rows, rows + kBlockRows, [](bool is) { return is; })) continue;
+      first = std::min(first, block);
+      last = block;
+    }
+    if (last < 0) return;
+    ResampleGradients(slice, chunk, first * kBlockRows, (last + 1) * kBlockRows);
+    for (std::int32_t block = first; block <= last; ++block) room_.blocks[block][chunk].gradients_of[slice & 1] = slice;
+  }
+
+  // Whether a ray of the block transmits enough to go on.
+  bool Transmits(std::int32_t block, std::int32_t chunk) const {
     const FloatTag df;
-    std::uint64_t shaded = 0;
-    bool alive = false;
     const auto opaque = Set(1 - work_.termination);
     for (std::int32_t row = block * kBlockRows; row < (block + 1) * kBlockRows; ++row) {
-      float low = room_.slots[0].low[row][chunk], high = room_.slots[0].high[row][chunk];
-      for (std::size_t slot = 1; slot < kSlots; ++slot) {
-        low = std::min(low, room_.slots[slot].low[row][chunk]);
-        high = std::max(high, room_.slots[slot].high[row][chunk]);
-      }
-      const bool shows = work_.visible->AnyBetween(low, high);
       for (std::int32_t column = chunk * kChunk; column < (chunk + 1) * kChunk; column += kVector) {
-        if (shows) {
-          for (int part = 0; part < parts_; ++part) {
-            shaded +=
-                clipped_ ? ComposeVector<true>(z, row, column, room_.parts[part]) : ComposeVector<false>(z, row, column, room_.parts[part]);
-          }
-        }
-        alive = alive || !hn::AllFalse(df, hn::Lt(hn::Load(df, &room_.alpha[row][column]), opaque));
+        if (!hn::AllFalse(df, hn::Lt(hn::Load(df, &room_.alpha[row][column]), opaque))) return true;
       }
     }
-    state.alive = alive;
+    return false;
+  }
+
+  std::uint64_t ComposeRow(std::int32_t z, std::int32_t row, std::int32_t chunk) {
+    std::uint64_t shaded = 0;
+    for (std::int32_t column = chunk * kChunk; column < (chunk + 1) * kChunk; column += kVector) {
+      for (int i = 0; i < parts_; ++i) {
+        const PartRoom& part = room_.parts[i];
+        shaded += clipped_ ? ComposeVector<true>(z, row, column, part) : ComposeVector<false>(z, row, column, part);
+      }
+    }
     return shaded;
   }
 
@@ -540,6 +649,8 @@ class TilePasses {
     const SliceRoom* slots[kSlots];  // slices z - 1 to z + 2
     for (std::int32_t i = 0; i < kSlots; ++i) slots[i] = &room_.slots[(z - 1 + i) & (kSlots - 1)];
     const auto load = [&](std::size_t i) SLABSTREAM_INLINED { return hn::Load(df, &slots[i]->values[row][column]); };
+    const std::int32_t slice = FloorDiv(z, scale_);
+    const GradientRoom &near = room_.gradients[slice & 1], &far = room_.gradients[(slice + 1) & 1];
 
     std::uint64_t shaded = 0;
     for (;; k = hn::Add(k, one)) {
@@ -557,14 +668,11 @@ class TilePasses {
 
       Gradient gradient = {zero, zero, zero};
       if (gradients_) {
-        const auto along_x = Lerp(t, hn::Load(df, &slots[1]->along_x[row][column]), hn::Load(df, &slots[2]->along_x[row][column]));
-        const auto along_y = Lerp(t, hn::Load(df, &slots[1]->along_y[row][column]), hn::Load(df, &slots[2]->along_y[row][column]));
-        const auto along_z = Lerp(t, hn::Sub(s2, s0), hn::Sub(s3, s1));
-        const auto component = [&](std::size_t axis) SLABSTREAM_INLINED {
-          const auto in_slice = hn::Add(hn::Mul(Set(slopes_[axis][0]), along_x), hn::Mul(Set(slopes_[axis][1]), along_y));
-          return hn::Add(in_slice, hn::Mul(Set(slopes_[axis][2]), along_z));
+        const auto between = scale_ == 1 ? t : hn::Sub(hn::Mul(at, Set(1 / float(scale_))), Set(float(slice)));
+        const auto component = [&](std::size_t place) SLABSTREAM_INLINED {
+          return Lerp(between, hn::Load(df, &near.along[place][row][column]), hn::Load(df, &far.along[place][row][column]));
         };
-        gradient = {component(0), component(1), component(2)};
+        gradient = {component(places_[0]), component(places_[1]), component(places_[2])};
         if (!look.gradient_factors.empty()) {
           opacity = OpacityByGradient(look, opacity, gradient);
           visible = hn::And(visible, hn::Gt(opacity, zero));
@@ -625,7 +733,7 @@ class TilePasses {
   const int parts_;
   const bool gradients_;
   float z_move_ = 1, z_inverse_ = 1;  // voxels along z from sample to sample
-  float slopes_[3][3] = {};           // gradient by axis of the volume from differences along x, y and z
+  std::size_t places_[3] = {};        // in GradientRoom, by axis of the volume
 };
 
 std::uint64_t ShearAny(const ShearWork& work, const TilePixels& tile, TileRoom& room) {
