@@ -274,8 +274,10 @@ _PUT: dict[str, Put] = {
     # Look
     "renderer": _text("renderer"),
     "interpolation": _parameter,
+    "kernel": _parameter,
     "projection_mode": _parameter,
     "sampling_rate": _parameter,
+    "supersampling": _parameter,
     "transfer": _transfer("transfer"),
     "scalar_range": _scalar_range("transfer.scalar_range"),
     "opacity_distance": _number("transfer.opacity_distance"),

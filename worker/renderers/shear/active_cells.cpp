@@ -128,6 +128,8 @@ ActiveCells FindActiveCells(const VoxelRanges& ranges, const VisibleSamples& vis
     for (cube.y = 0; cube.y < counts.y; ++cube.y) {
       for (cube.x = 0; cube.x < counts.x; ++cube.x, ++number) {
         if (near[number] == 0) continue;
+        const Index3 place = cube + ranges.first;
+        result.hull = Hull(result.hull, {kRangeSide * place, kRangeSide * (place + Uniform(1))});
         result.active[(cell_of(2) * std::size_t(result.counts[1]) + cell_of(1)) * std::size_t(result.counts[0]) + cell_of(0)] = 1;
       }
     }

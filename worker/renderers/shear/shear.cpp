@@ -118,10 +118,12 @@ class ShearRenderer : public Renderer {
                       .termination = float(setup.termination)};
     clock.Charge(Stage::kPrepare);
 
-    const Vec3 low = ToVec3(box.begin) - Vec3{0.5, 0.5, 0.5}, high = ToVec3(box.end) - Vec3{0.5, 0.5, 0.5};
+    const Vec3 half = {0.5, 0.5, 0.5}, low = ToVec3(box.begin) - half, high = ToVec3(box.end) - half;
     work.low = {float(low.x), float(low.y), float(low.z)};
     work.high = {float(high.x), float(high.y), float(high.z)};
-    const RayReach reach = ReachOfBox(rays, setup.camera, low, high);
+    const Box active = Intersection(box, work.active->hull);
+    RayReach reach;
+    if (!active.empty()) reach = ReachOfBox(rays, setup.camera, ToVec3(active.begin) - half, ToVec3(active.end) - half);
     work.k_begin = reach.begin;
     work.k_end = reach.end;
     LocalImage image = MakeLocalImage(setup.format, reach.pixels);
