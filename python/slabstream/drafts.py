@@ -216,7 +216,7 @@ def _gradient_opacity(draft: Draft, option: Option, value: Any) -> None:
 def _parameter(draft: Draft, option: Option, value: Any) -> None:
     if option.choices:
         values.choice(option.name, value, option.choices)
-        draft.frame.parameters.add(name=option.text_name, text=value)
+        draft.frame.parameters.add(name=option.text_name, text=str(value))
     else:
         number = values.number(option.name, value, option.least, option.most, option.above)
         draft.frame.parameters.add(name=option.text_name, text=values.text_of(number))

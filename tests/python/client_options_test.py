@@ -67,7 +67,7 @@ RENDER_CASES: list[tuple[dict, list[str]]] = [
     ({"renderer": "splat", "background": "#1020fe80", "depth": 16}, ["--renderer", "splat", "--background", "#1020fe80", "--depth", "16"]),
     ({"renderer": "zbuffer", "shading": "depth-gradient"}, [*Z, "--shading", "depth-gradient"]),
     ({"renderer": "zbuffer", "isovalue": 90, "transfer": "auto"}, [*Z, "--isovalue", "90", "--transfer", "auto"]),
-    ({"renderer": "shear", "kernel": "mitchell", "supersampling": "2"}, ["--renderer", "shear", "--kernel", "mitchell", "--supersampling", "2"]),
+    ({"renderer": "shear", "kernel": "mitchell", "supersampling": 2}, ["--renderer", "shear", "--kernel", "mitchell", "--supersampling", "2"]),
     ({"renderer": "mip", "interpolation": "nearest", "projection_mode": "mean", "sampling_rate": 2},
      ["--renderer", "mip", "--interpolation", "nearest", "--projection-mode", "mean", "--sampling-rate", "2"]),
     ({"transfer": COLOR_MAP, "opacity_distance": 3.5}, ["--transfer", "map.json", "--opacity-distance", "3.5"]),
