@@ -27,14 +27,6 @@ double KernelAt(Kernel kernel, double x) {
   return 0;
 }
 
-template <class Value>
-double Blended(Kernel kernel, double x, Value&& value) {
-  const double floor = std::floor(x);
-  double sum = 0;
-  for (int i = -1; i <= 2; ++i) sum += KernelAt(kernel, x - floor - i) * value(int(floor) + i);
-  return sum;
-}
-
 // Reconstruction at x from value(n) at whole n.
 template <class Value>
 double Reconstruct(Kernel kernel, double x, Value&& value) {
@@ -120,14 +112,18 @@ class Reference {
   double AtLattice(double u, double v, int n) const {
     return Reconstruct(kernel_, YOf(u, v, n) * scale_, [&](int beam) { return OnBeam(u, beam, n); });
   }
-  // Central differences of the volume's samples, through the same passes.
+  // Central differences of the volume's samples, through the same passes by linear interpolation.
   Vec3 SlopesAt(double u, double v, double z) const {
+    const auto between = [](double place, auto&& at) {
+      const double floor = std::floor(place);
+      return (1 - (place - floor)) * at(int(floor)) + (place - floor) * at(int(floor) + 1);
+    };
     Vec3 slopes;
     for (int i = 0; i < 3; ++i) {
       const int dx = i == 0 ? 1 : 0, dy = i == 1 ? 1 : 0, dz = i == 2 ? 1 : 0;
-      slopes[passes_.axes[std::size_t(i)]] = Blended(kernel_, z, [&](int slice) {
-        return Blended(kernel_, passes_.y_0 + passes_.y_u * u + passes_.y_v * v + passes_.y_z * slice, [&](int row) {
-          return Blended(kernel_, passes_.x_0 + passes_.x_u * u + passes_.x_y * row + passes_.x_z * slice,
+      slopes[passes_.axes[std::size_t(i)]] = between(z, [&](int slice) {
+        return between(passes_.y_0 + passes_.y_u * u + passes_.y_v * v + passes_.y_z * slice, [&](int row) {
+          return between(passes_.x_0 + passes_.x_u * u + passes_.x_y * row + passes_.x_z * slice,
                          [&](int x) { return (At(x + dx, row + dy, slice + dz) - At(x - dx, row - dy, slice - dz)) / 2; });
         });
       });

@@ -20,8 +20,7 @@
 //   |x_y| <= 1
 //
 // Reach. A kernel that reaches h voxels makes sample (u, v, k) at (x, y, z) from voxels less than h (1 + |x_y| + |slide_x|) <= 3 h away
-// along x, h (1 + |slide_y|) <= 2 h along y and h along z. With h = 2 these are 6, 4 and 2, whatever the view, and one more for
-// gradients: a halo of 8 suffices.
+// along x, h (1 + |slide_y|) <= 2 h along y and h along z. With h = 2 these are 6, 4 and 2, whatever the view.
 #pragma once
 
 #include <array>

@@ -34,7 +34,7 @@ struct BlockState {
   bool alive = false;                    // a ray may have samples left
   std::int32_t z_first = 0, z_last = 0;  // intervals between slices that hold its samples, if it was ever alive
   bool resampled[kSlots] = {};
-  std::int32_t gradients_of[kSlots] = {kNoSlice, kNoSlice, kNoSlice, kNoSlice};  // slices of the volume whose gradients are there
+  std::int32_t gradients_of[2] = {kNoSlice, kNoSlice};  // slices of the volume whose gradients are there
 };
 
 // Lattice points of a slice.
@@ -50,7 +50,7 @@ struct GradientRoom {
 
 struct TileRoom {
   SliceRoom slots[kSlots];
-  GradientRoom gradients[kSlots];
+  GradientRoom gradients[2];
   AlignedVector<float> beams;  // after pass 1, of a chunk: [beam][column], or [beam][x, y, z][column] of gradients
   std::int32_t slot_z[kSlots];
   BlockState blocks[kBlocks][kChunks];
@@ -90,13 +90,9 @@ HWY_INLINE Weights WeightsAt(const CubicKernel& kernel, Floats t) {
   return w;
 }
 
-HWY_INLINE Floats Blended(const Weights& w, Floats a, Floats b, Floats c, Floats d) {
-  return hn::Add(hn::Add(hn::Mul(w.before, a), hn::Mul(w.at, b)), hn::Add(hn::Mul(w.next, c), hn::Mul(w.behind, d)));
-}
-
 // Not finite if one of the samples is not.
 HWY_INLINE Floats Reconstruct(const Weights& w, Floats a, Floats b, Floats c, Floats d) {
-  const auto sum = Blended(w, a, b, c, d);
+  const auto sum = hn::Add(hn::Add(hn::Mul(w.before, a), hn::Mul(w.at, b)), hn::Add(hn::Mul(w.next, c), hn::Mul(w.behind, d)));
   const auto low = hn::Min(hn::Min(a, b), hn::Min(c, d)), high = hn::Max(hn::Max(a, b), hn::Max(c, d));
   const auto finite = hn::Le(hn::Abs(sum), Set(kLargest));
   return hn::IfThenElse(finite, hn::Min(hn::Max(sum, low), high), sum);
@@ -384,8 +380,8 @@ class TilePasses {
   HWY_INLINE XPlaces XPlacesOf(const Strip& strip, double beam, std::int32_t column) const {
     const auto x_0 = float(passes_.x_0 + passes_.x_y * (beam / strip.scale) + passes_.x_z * strip.z);
     const auto x = hn::Add(Set(x_0), hn::Mul(Columns(strip.u_first + float(column)), Set(float(passes_.x_u))));
-    const auto floor = hn::Floor(x), inside = hn::Min(hn::Max(floor, Set(LowestFloor())), Set(HighestFloor()));
-    return {hn::ConvertTo(IntTag(), hn::Sub(inside, Set(FirstFloor()))), hn::Sub(x, floor)};
+    const auto floor = hn::Floor(x), lowest = Set(LowestFloor());
+    return {hn::ConvertTo(IntTag(), hn::Sub(hn::Min(hn::Max(floor, lowest), Set(HighestFloor())), lowest)), hn::Sub(x, floor)};
   }
 
   // Rows [row_begin, row_end) of a chunk of columns.
@@ -438,49 +434,47 @@ class TilePasses {
     }
   }
 
-  // The same of gradients. `slice`: of the volume.
+  // The same of gradients, by linear interpolation. `slice`: of the volume.
   void ResampleGradients(std::int32_t slice, std::int32_t chunk, std::int32_t row_begin, std::int32_t row_end) {
     const FloatTag df;
-    const Strip strip = StripOf(slice, 1, chunk, row_begin, row_end, 1, 2);
+    const Strip strip = StripOf(slice, 1, chunk, row_begin, row_end, 0, 1);
     Reserve(3 * std::size_t(strip.beam_end - strip.beam_begin) * kChunk);
     float* beams = room_.beams.data();
     const TurnedVoxels& voxels = *work_.voxels;
     for (std::int32_t beam = strip.beam_begin; beam < strip.beam_end; ++beam, beams += 3 * kChunk) {
-      // The samples before and behind, along each axis.
       const T* const here = voxels.Beam<T>(beam, slice);
-      const T* const sides[3][2] = {{here - 1, here + 1},
-                                    {voxels.Beam<T>(beam - 1, slice), voxels.Beam<T>(beam + 1, slice)},
+      const T* const sides[2][2] = {{voxels.Beam<T>(beam - 1, slice), voxels.Beam<T>(beam + 1, slice)},
                                     {voxels.Beam<T>(beam, slice - 1), voxels.Beam<T>(beam, slice + 1)}};
       for (std::int32_t column = 0; column < kChunk; column += kVector) {
         const XPlaces places = XPlacesOf(strip, beam, column);
-        const Weights weights = WeightsAt(work_.kernel, places.t);
-        for (std::int32_t i = 0; i < 3; ++i) {
-          const Four low = LoadFour(sides[i][0], places.from), high = LoadFour(sides[i][1], places.from);
-          const auto slope =
-              Blended(weights, hn::Sub(high.a, low.a), hn::Sub(high.b, low.b), hn::Sub(high.c, low.c), hn::Sub(high.d, low.d));
-          hn::Store(slope, df, beams + i * kChunk + column);
+        const Four four = LoadFour(here, places.from);
+        hn::Store(Lerp(places.t, hn::Sub(four.c, four.a), hn::Sub(four.d, four.b)), df, beams + column);
+        for (std::int32_t side = 0; side < 2; ++side) {
+          const Four low = LoadFour(sides[side][0], places.from), high = LoadFour(sides[side][1], places.from);
+          hn::Store(Lerp(places.t, hn::Sub(high.b, low.b), hn::Sub(high.c, low.c)), df, beams + (side + 1) * kChunk + column);
         }
       }
     }
-    GradientRoom& to = room_.gradients[slice & (kSlots - 1)];
+    GradientRoom& to = room_.gradients[slice & 1];
     for (std::int32_t row = row_begin; row < row_end; ++row) {
       for (std::int32_t column = 0; column < kChunk; column += kVector) {
-        const Places places = PlacesOf(strip, row, column, 1, 2);
-        const Weights weights = WeightsAt(work_.kernel, places.t);
+        const Places places = PlacesOf(strip, row, column, 0, 1);
+        const float* from = room_.beams.data() + 3 * (std::int32_t(places.first) - strip.beam_begin) * kChunk + column;
+        Floats a[3], b[3];
+        const auto load = [&](std::int32_t i) SLABSTREAM_INLINED { return hn::Load(df, from + i * kChunk); };
         for (std::int32_t i = 0; i < 3; ++i) {
-          const float* from = room_.beams.data() + (3 * (std::int32_t(places.first) - strip.beam_begin) + i) * kChunk + column;
-          const auto load = [&](std::int32_t n) SLABSTREAM_INLINED { return hn::Load(df, from + 3 * n * kChunk); };
-          auto a = load(0), b = load(1), c = load(2), d = load(3);
-          for (float at = places.first + 1; at <= places.last; ++at) {
-            from += 3 * kChunk;
-            const auto lanes = hn::Eq(places.beam, Set(at));
-            a = hn::IfThenElse(lanes, load(0), a);
-            b = hn::IfThenElse(lanes, load(1), b);
-            c = hn::IfThenElse(lanes, load(2), c);
-            d = hn::IfThenElse(lanes, load(3), d);
-          }
-          hn::Store(Blended(weights, a, b, c, d), df, &to.along[i][row][chunk * kChunk + column]);
+          a[i] = load(i);
+          b[i] = load(3 + i);
         }
+        for (float at = places.first + 1; at <= places.last; ++at) {
+          from += 3 * kChunk;
+          const auto here = hn::Eq(places.beam, Set(at));
+          for (std::int32_t i = 0; i < 3; ++i) {
+            a[i] = hn::IfThenElse(here, load(i), a[i]);
+            b[i] = hn::IfThenElse(here, load(3 + i), b[i]);
+          }
+        }
+        for (std::int32_t i = 0; i < 3; ++i) hn::Store(Lerp(places.t, a[i], b[i]), df, &to.along[i][row][chunk * kChunk + column]);
       }
     }
   }
@@ -497,7 +491,7 @@ class TilePasses {
     const double x_0 = passes_.x_0 + passes_.x_y * (double(beam) / scale_) + passes_.x_z * strip.z;
     const auto sample = [&](float u, double slack) {
       const double floor = std::floor(x_0 + passes_.x_u * double(u)) + slack;
-      return std::int32_t(std::clamp(float(floor), LowestFloor(), HighestFloor()) - FirstFloor());
+      return std::int32_t(std::clamp(float(floor), LowestFloor(), HighestFloor()) - LowestFloor());
     };
     const float ends[2] = {strip.u_first, strip.u_first + float(kChunk - 1)};
     const bool rises = passes_.x_u > 0;
@@ -538,11 +532,9 @@ class TilePasses {
 
   static std::int32_t FloorDiv(std::int32_t a, std::int32_t b) { return a >= 0 ? a / b : -((b - 1 - a) / b); }
 
-  // Places whose kernel lies within a beam, and still does a sample farther on. Farther out all samples are the same.
-  float LowestFloor() const { return float(work_.voxels->begin[0] - (kBeamPad - 2)); }
-  float HighestFloor() const { return float(work_.voxels->end[0] + kBeamPad - 4); }
-  // Of the place whose kernel begins with the beam's first sample.
-  float FirstFloor() const { return float(work_.voxels->begin[0] - (kBeamPad - 1)); }
+  // Places whose kernel lies within a beam. Farther out all samples are the same.
+  float LowestFloor() const { return float(work_.voxels->begin[0] - (kBeamPad - 1)); }
+  float HighestFloor() const { return float(work_.voxels->end[0] + kBeamPad - 3); }
 
   // A chunk of one beam. `samples`: of that beam.
   template <class Sample>
@@ -572,8 +564,7 @@ class TilePasses {
       }
       if (any) {
         if (gradients_) {
-          const std::int32_t slice = FloorDiv(z, scale_);
-          for (std::int32_t i = -1; i <= 2; ++i) FindGradients(slice + i, chunk, shows);
+          for (std::int32_t slice = FloorDiv(z, scale_); slice <= FloorDiv(z, scale_) + 1; ++slice) FindGradients(slice, chunk, shows);
         }
         for (std::int32_t row = 0; row < kTileRows; ++row) {
           if (shows[row]) shaded += ComposeRow(z, row, chunk);
@@ -604,14 +595,14 @@ class TilePasses {
     std::int32_t first = kBlocks, last = -1;
     for (std::int32_t block = 0; block < kBlocks; ++block) {
       const bool* const rows = shows + block * kBlockRows;
-      if (room_.blocks[block][chunk].gradients_of[slice & (kSlots - 1)] == slice) continue;
+      if (room_.blocks[block][chunk].gradients_of[slice & 1] == slice) continue;
       if (std::none_of(rows, rows + kBlockRows, [](bool is) { return is; })) continue;
       first = std::min(first, block);
       last = block;
     }
     if (last < 0) return;
     ResampleGradients(slice, chunk, first * kBlockRows, (last + 1) * kBlockRows);
-    for (std::int32_t block = first; block <= last; ++block) room_.blocks[block][chunk].gradients_of[slice & (kSlots - 1)] = slice;
+    for (std::int32_t block = first; block <= last; ++block) room_.blocks[block][chunk].gradients_of[slice & 1] = slice;
   }
 
   // Whether a ray of the block transmits enough to go on.
@@ -659,8 +650,7 @@ class TilePasses {
     for (std::int32_t i = 0; i < kSlots; ++i) slots[i] = &room_.slots[(z - 1 + i) & (kSlots - 1)];
     const auto load = [&](std::size_t i) SLABSTREAM_INLINED { return hn::Load(df, &slots[i]->values[row][column]); };
     const std::int32_t slice = FloorDiv(z, scale_);
-    const GradientRoom* gradients[kSlots];
-    for (std::int32_t i = 0; i < kSlots; ++i) gradients[i] = &room_.gradients[(slice - 1 + i) & (kSlots - 1)];
+    const GradientRoom &near = room_.gradients[slice & 1], &far = room_.gradients[(slice + 1) & 1];
 
     std::uint64_t shaded = 0;
     for (;; k = hn::Add(k, one)) {
@@ -679,10 +669,8 @@ class TilePasses {
       Gradient gradient = {zero, zero, zero};
       if (gradients_) {
         const auto between = scale_ == 1 ? t : hn::Sub(hn::Mul(at, Set(1 / float(scale_))), Set(float(slice)));
-        const Weights weights = WeightsAt(work_.kernel, between);
         const auto component = [&](std::size_t place) SLABSTREAM_INLINED {
-          const auto from = [&](std::size_t i) SLABSTREAM_INLINED { return hn::Load(df, &gradients[i]->along[place][row][column]); };
-          return Blended(weights, from(0), from(1), from(2), from(3));
+          return Lerp(between, hn::Load(df, &near.along[place][row][column]), hn::Load(df, &far.along[place][row][column]));
         };
         gradient = {component(places_[0]), component(places_[1]), component(places_[2])};
         if (!look.gradient_factors.empty()) {

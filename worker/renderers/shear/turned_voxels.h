@@ -12,9 +12,8 @@
 
 namespace slabstream::shear {
 
-// Samples beyond each end of a beam, which repeat its last one: a kernel needs no more to see the same value farther out, nor does one that
-// reads differences of neighbours.
-inline constexpr std::int32_t kBeamPad = 4;
+// Samples beyond each end of a beam, which repeat its last one: a kernel needs no more to see the same value farther out.
+inline constexpr std::int32_t kBeamPad = 3;
 
 struct TurnedVoxels {
   std::array<Axis, 3> axes{};
