@@ -11,8 +11,6 @@ import time
 
 from paraview import servermanager, simple
 
-PROJECTIONS = ("orthographic", "perspective")
-
 
 def show(view, scene, directory, mode):
     """The volume in the view; its radius and centre in space."""
@@ -99,14 +97,15 @@ def main():
     light.Position, light.FocalPoint = [0, 0, 1], [0, 0, 0]
     radius, centre = show(view, scene, os.path.dirname(a.scene), a.mode)
 
-    warm_up = [frame_ms(view, scene, radius, centre, projection, 0) for projection in PROJECTIONS]
-    times = {projection: [] for projection in PROJECTIONS}
+    projections = scene["views"]["projections"]
+    warm_up = [frame_ms(view, scene, radius, centre, projection, 0) for projection in projections]
+    times = {projection: [] for projection in projections}
     for _ in range(scene["views"]["turns"]):
-        for projection in PROJECTIONS:
+        for projection in projections:
             times[projection] += [frame_ms(view, scene, radius, centre, projection, i) for i in range(scene["views"]["frames"])]
     peak = peak_rss_bytes("pvserver")
     if a.pictures:
-        for projection in PROJECTIONS:
+        for projection in projections:
             frame_ms(view, scene, radius, centre, projection, 0)
             simple.SaveScreenshot(f"{a.pictures}.{projection}.png", view, ImageResolution=[scene["size"], scene["size"]])
     version = f"{simple.GetParaViewVersion().major}.{simple.GetParaViewVersion().minor}"

@@ -90,6 +90,10 @@ void Boxes(benchmark::State& state) {
 BENCHMARK(Boxes)->ArgNames({"class", "p", "renderer"})->ArgsProduct({{1, 2}, {1, 2}, EveryRenderer()})->Unit(benchmark::kMillisecond);
 
 void Turn(benchmark::State& state) {
+  if (Projection(state.range(1)) == Projection::kPerspective && !KindAt(state.range(3)).perspective()) {
+    state.SkipWithError("draws no perspective");
+    return;
+  }
   std::vector<ViewParameters> views;
   for (int i = 0; i < kAzimuths; ++i) views.push_back(BenchView(Projection(state.range(1)), i, kAzimuths));
   const Volume volume = MakeSphere({SphereClass::kHollow, int(state.range(0)), 0.05}).value();

@@ -2,9 +2,9 @@
 """Draws a scene of `slabstream bench --export` with one of VTK's volume mappers and times it; bench/against_vtk and bench/viewer run it.
 
 Needs python3-vtk9, python3-numpy and an X display (run it under xvfb-run). One frame is: move the camera, Render(), read the RGBA pixels
-back. Two frames warm up, then both turntables turn after turn, as `slabstream bench` does it. Prints one JSON object: milliseconds of
-each frame in order, of the first one, and the peak of this process's memory. With --jpeg a frame ends with its JPEG file in memory instead,
-as a server sends it. A scene whose views have "azimuths" shows these, in degrees, instead of a full turn.
+back. A frame of each projection warms up, then their turntables turn after turn, as `slabstream bench` does it. Prints one JSON object:
+milliseconds of each frame in order, of the first one, and the peak of this process's memory. With --jpeg a frame ends with its JPEG file
+in memory instead, as a server sends it. A scene whose views have "azimuths" shows these, in degrees, instead of a full turn.
 """
 import argparse
 import json
@@ -12,8 +12,6 @@ import math
 import os
 import resource
 import time
-
-PROJECTIONS = ("orthographic", "perspective")
 
 
 def read_volume(vtk, path):
@@ -151,7 +149,7 @@ def main():
     p.add_argument("--mapper", choices=["fixedpoint", "gpu"], default="fixedpoint")
     p.add_argument("--threads", type=int, default=2)
     p.add_argument("--jpeg", type=int, default=0, metavar="QUALITY", help="encode each frame")
-    p.add_argument("--projection", choices=PROJECTIONS, help="only this one")
+    p.add_argument("--projection", choices=["orthographic", "perspective"], help="only this one")
     p.add_argument("--pictures", metavar="PREFIX", help="write the first view of each projection to PREFIX.PROJECTION.png")
     a = p.parse_args()
     os.environ["LP_NUM_THREADS"] = str(a.threads)  # of Mesa's software rasteriser, which draws for the gpu mapper; read when VTK is loaded
@@ -161,7 +159,7 @@ def main():
     with open(a.scene, encoding="utf-8") as stream:
         scene = json.load(stream)
     stage = Stage(vtk, scene, os.path.dirname(a.scene), a.mapper, a.threads, a.jpeg)
-    projections = [a.projection] if a.projection else PROJECTIONS
+    projections = [a.projection] if a.projection else scene["views"]["projections"]
     warm_up = [stage.frame_ms(projection, 0) for projection in projections]
     times = {projection: [] for projection in projections}
     for _ in range(scene["views"]["turns"]):

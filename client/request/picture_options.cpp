@@ -210,7 +210,7 @@ void AddSurfaceOptions(CLI::App& app, TransferChoice& transfer) {
       app, "--gradient-opacity", transfer.gradient_opacities,
       [](const std::string& option, const std::string& text) { return ParseGradientOpacities(option, text); },
       "Multiply opacities by a factor O that depends on the gradient's magnitude G, in data values per unit of the world (mm of a "
-      "patient); linear between the points, which ascend; for --renderer raycast")
+      "patient); linear between the points, which ascend; for --renderer raycast and shear")
       ->type_name("G:O,...");
 }
 

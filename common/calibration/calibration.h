@@ -39,6 +39,14 @@ inline constexpr double kPixel = 60e-9;   // that the box covers
 inline constexpr double kSample = 11e-9;  // that is shaded
 }  // namespace raycast
 
+// Multi-pass shears (common/renderers/shear).
+//   balance_bench VOLUME --renderer shear --decomposition kd-tree --split occupied
+namespace shear {
+inline constexpr double kBox = 50e-6;
+inline constexpr double kResample = 4e-9;  // a voxel of a cell that is drawn, at a pixel a voxel
+inline constexpr double kSample = 6e-9;    // that is shaded
+}  // namespace shear
+
 // Intensity projections (common/renderers/mip).
 //   balance_bench VOLUME --renderer mip --decomposition kd-tree --split voxels
 namespace mip {

@@ -111,6 +111,9 @@ Status Validate(const FrameRequest& request) {
     return Status::InvalidArgument("shading 'depth-gradient' needs a renderer with depths, such as zbuffer, not '" + request.renderer +
                                    "'");
   }
+  if (request.view.projection == Projection::kPerspective) {
+    if (Status s = RequireAbility("projection 'perspective'", **renderer, &RendererKind::perspective); !s.ok()) return s;
+  }
   if (!request.transfer.isosurfaces.empty()) {
     if (Status s = RequireAbility("isovalue", **renderer, &RendererKind::isosurfaces); !s.ok()) return s;
   }

@@ -77,6 +77,7 @@ class RendererKind {
     PixelFormat format = PixelFormat::kRgba;  // of local images with default parameters; says how they combine (common/kernels/combine.h)
     std::int32_t reach = kHalo;               // voxels outside a box that its samples depend on, [0, kHalo]
     bool along_slices = false;                // the frame is an image along the slices (SheetGrid), else the camera's
+    bool perspective = true;                  // draws perspective views, too
     bool shows_labels = false;
     bool shows_overlays = false;
     bool isosurfaces = false;       // draws TransferFunction::isosurfaces
@@ -97,6 +98,12 @@ class RendererKind {
   PixelFormat format() const { return facts_.format; }
   std::int32_t reach() const { return facts_.reach; }
   bool along_slices() const { return facts_.along_slices; }
+  bool perspective() const { return facts_.perspective; }
+  // Those that it draws.
+  std::span<const Projection> projections() const {
+    static constexpr Projection kProjections[] = {Projection::kOrthographic, Projection::kPerspective};
+    return std::span(kProjections).first(facts_.perspective ? 2 : 1);
+  }
   bool shows_labels() const { return facts_.shows_labels; }
   bool shows_overlays() const { return facts_.shows_overlays; }
   bool isosurfaces() const { return facts_.isosurfaces; }

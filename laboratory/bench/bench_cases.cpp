@@ -81,6 +81,8 @@ const std::vector<BenchCase>& StandardBenchCases() {
       StandardSphere(SphereClass::kHollow, 256, FindRenderer("zbuffer")),
       StandardSphere(SphereClass::kHollow, 256, FindRenderer("raycast")),
       StandardSphere(SphereClass::kFilled, 256, FindRenderer("raycast")),
+      StandardSphere(SphereClass::kHollow, 256, FindRenderer("shear")),
+      StandardSphere(SphereClass::kFilled, 256, FindRenderer("shear")),
       StandardSphere(SphereClass::kHollow, 256, FindRenderer("mip")),
       StandardSphere(SphereClass::kFilled, 256, FindRenderer("mip")),
       BrainCase(),

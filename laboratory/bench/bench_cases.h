@@ -42,7 +42,7 @@ Result<BenchCase> ParseBenchCase(const std::string& text, bool at_service);
 Result<std::shared_ptr<const Volume>> LoadBenchVolume(const BenchCase& bench_case);
 
 // The turntable of every case: frame `index` of `frames` of one turn. Orthographic: the side of a cube fills the picture's side.
-// Perspective: the eye is where the bounding sphere fits a cone of 30 degrees.
+// Perspective, if the renderer draws it: the eye is where the bounding sphere fits a cone of 30 degrees.
 inline constexpr double kBenchElevationDegrees = 20, kBenchZoom = 1.732, kBenchFovDegrees = 30;
 ViewParameters BenchView(Projection projection, int index, int frames);
 

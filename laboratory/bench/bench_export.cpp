@@ -12,6 +12,8 @@ using Json = nlohmann::ordered_json;
 
 std::string SceneJson(const BenchCase& c, const BenchOptions& options) {
   const Shading shading;
+  Json projections = Json::array();
+  for (const Projection projection : c.renderer->projections()) projections.push_back(NameOf(projection));
   const Json json = {
       {"case", c.name},
       {"volume", c.dataset + ".mha"},
@@ -20,7 +22,8 @@ std::string SceneJson(const BenchCase& c, const BenchOptions& options) {
       {"renderer", c.renderer->name()},
       {"size", options.size},
       {"views",
-       {{"frames", options.frames},
+       {{"projections", projections},
+        {"frames", options.frames},
         {"turns", options.turns},
         {"elevation_degrees", kBenchElevationDegrees},
         {"zoom", kBenchZoom},

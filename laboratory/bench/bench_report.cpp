@@ -96,11 +96,11 @@ std::string BenchRow(const BenchResult& result, std::size_t name_width) {
   const Index3& size = result.description.geometry.size;
   const Spread both = SpreadOf(BothProjections(result));
   const auto mebibytes = [](std::int64_t bytes) { return double(bytes) / (1 << 20); };
-  return fmt::format("{:<{}} {:>15} {:>8} {:>8.2f} {:>8.2f} {:>8.2f} {:>8.2f} {:>8.2f} {:>8.2f} {:>8.2f} {:>8.1f} {:>7.1f} {:>7.1f}\n",
-                     c.name, name_width, fmt::format("{}x{}x{}", size.x, size.y, size.z), c.renderer->name(),
-                     MedianOf(result.orthographic_ms).median, MedianOf(result.perspective_ms).median, both.median, both.p05, both.p95,
-                     both.min, both.max, result.first_frame_ms, mebibytes(result.description.voxel_bytes()),
-                     mebibytes(result.peak_rss_bytes));
+  const auto median = [](const std::vector<double>& times) { return times.empty() ? "-" : fmt::format("{:.2f}", MedianOf(times).median); };
+  return fmt::format("{:<{}} {:>15} {:>8} {:>8} {:>8} {:>8.2f} {:>8.2f} {:>8.2f} {:>8.2f} {:>8.2f} {:>8.1f} {:>7.1f} {:>7.1f}\n", c.name,
+                     name_width, fmt::format("{}x{}x{}", size.x, size.y, size.z), c.renderer->name(), median(result.orthographic_ms),
+                     median(result.perspective_ms), both.median, both.p05, both.p95, both.min, both.max, result.first_frame_ms,
+                     mebibytes(result.description.voxel_bytes()), mebibytes(result.peak_rss_bytes));
 }
 
 std::string BenchJson(const BenchRun& run, const std::vector<BenchResult>& results) {

@@ -27,7 +27,7 @@ struct BenchResult {
   std::string skipped;            // why nothing was measured; then the rest is empty
   VolumeDescription description;  // of the volume
   double first_frame_ms = 0;      // an embedded service is empty then, so this includes reading a file
-  // Request to last byte of each frame after the warm-up, in order of rendering.
+  // Request to last byte of each frame after the warm-up, in order of rendering; of projections that the renderer draws.
   std::vector<double> orthographic_ms, perspective_ms;
   std::array<double, kStageCount> stage_median_ms{};  // worker time, summed over workers
   std::int64_t peak_rss_bytes = 0;                    // of this process: all of the service if it is embedded

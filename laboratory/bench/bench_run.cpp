@@ -13,9 +13,6 @@
 namespace slabstream {
 namespace {
 
-constexpr std::size_t kWarmUpFrames = 2;  // one of each projection
-constexpr Projection kProjections[] = {Projection::kOrthographic, Projection::kPerspective};
-
 Result<Session> OpenSession(const BenchCase& c, const ConnectionOptions& connection) {
   if (connection.local_workers == 0) return Session::Open(connection, c.dataset);
   if (const auto* path = std::get_if<std::string>(&c.volume)) return Session::Open(connection, *path);
@@ -34,12 +31,12 @@ FrameJob MakeJob(const BenchCase& c, const BenchOptions& options, const std::str
   return job;
 }
 
-// One frame of each projection to warm up, then both turntables turn after turn.
+// One frame of each projection to warm up, then their turntables turn after turn.
 std::vector<FrameJob> MeasuredJobs(const BenchCase& c, const BenchOptions& options, const std::string& dataset) {
   std::vector<FrameJob> jobs;
-  for (const Projection projection : kProjections) jobs.push_back(MakeJob(c, options, dataset, projection, 0));
+  for (const Projection projection : c.renderer->projections()) jobs.push_back(MakeJob(c, options, dataset, projection, 0));
   for (int turn = 0; turn < options.turns; ++turn) {
-    for (const Projection projection : kProjections) {
+    for (const Projection projection : c.renderer->projections()) {
       for (int i = 0; i < options.frames; ++i) jobs.push_back(MakeJob(c, options, dataset, projection, i));
     }
   }
@@ -48,7 +45,7 @@ std::vector<FrameJob> MeasuredJobs(const BenchCase& c, const BenchOptions& optio
 
 Status WritePictures(Client& client, const BenchCase& c, const BenchOptions& options, const std::string& dataset) {
   std::vector<FrameJob> jobs;
-  for (const Projection projection : kProjections) {
+  for (const Projection projection : c.renderer->projections()) {
     jobs.push_back(MakeJob(c, options, dataset, projection, 0));
     jobs.back().output = fmt::format("{}/{}.{}.png", options.pictures_directory, c.name, NameOf(projection));
   }
@@ -80,7 +77,8 @@ Result<BenchResult> RunBenchCase(const BenchCase& bench_case, const BenchOptions
   result.bench_case = bench_case;
   result.peak_rss_bytes = PeakMemoryBytes();
   result.first_frame_ms = double(records->front().latency.count()) / 1e6;
-  SetFrames(result, std::span(jobs).subspan(kWarmUpFrames), std::span(*records).subspan(kWarmUpFrames));
+  const std::size_t warm_up = bench_case.renderer->projections().size();
+  SetFrames(result, std::span(jobs).subspan(warm_up), std::span(*records).subspan(warm_up));
   const Result<StatusReply> status = session->client().QueryStatus();
   if (!status.ok()) return status.status();
   for (const DatasetStatus& dataset : status->datasets) {

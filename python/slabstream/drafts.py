@@ -216,7 +216,7 @@ def _gradient_opacity(draft: Draft, option: Option, value: Any) -> None:
 def _parameter(draft: Draft, option: Option, value: Any) -> None:
     if option.choices:
         values.choice(option.name, value, option.choices)
-        draft.frame.parameters.add(name=option.text_name, text=value)
+        draft.frame.parameters.add(name=option.text_name, text=str(value))
     else:
         number = values.number(option.name, value, option.least, option.most, option.above)
         draft.frame.parameters.add(name=option.text_name, text=values.text_of(number))
@@ -274,8 +274,10 @@ _PUT: dict[str, Put] = {
     # Look
     "renderer": _text("renderer"),
     "interpolation": _parameter,
+    "kernel": _parameter,
     "projection_mode": _parameter,
     "sampling_rate": _parameter,
+    "supersampling": _parameter,
     "transfer": _transfer("transfer"),
     "scalar_range": _scalar_range("transfer.scalar_range"),
     "opacity_distance": _number("transfer.opacity_distance"),

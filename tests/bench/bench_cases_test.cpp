@@ -19,14 +19,16 @@ TEST(BenchCases, NamesAreStableUniqueAndFitForFiles) {
   std::vector<std::string> names;
   for (const BenchCase& c : StandardBenchCases()) names.push_back(c.name);
   EXPECT_EQ(names, (std::vector<std::string>{"class1-256", "class2-256", "class1-256-opaque", "class2-256-opaque", "class1-512",
-                                             "zbuffer-class1-256", "raycast-class1-256", "raycast-class2-256", "mip-class1-256",
-                                             "mip-class2-256", "brain"}));
+                                             "zbuffer-class1-256", "raycast-class1-256", "raycast-class2-256", "shear-class1-256",
+                                             "shear-class2-256", "mip-class1-256", "mip-class2-256", "brain"}));
 }
 
 TEST(BenchCases, AllTransferFunctionsAndRequestsAreValid) {
   for (const BenchCase& c : StandardBenchCases()) {
     EXPECT_TRUE(Validate(std::get<TransferFunction>(c.transfer.choice)).ok()) << c.name;
-    EXPECT_TRUE(Validate(BenchRequest(c, BenchView(Projection::kPerspective, 11, 12), {})).ok()) << c.name;
+    for (const Projection projection : c.renderer->projections()) {
+      EXPECT_TRUE(Validate(BenchRequest(c, BenchView(projection, 11, 12), {})).ok()) << c.name;
+    }
   }
 }
 

@@ -43,6 +43,11 @@ TEST(ValidateFrameRequest, NamesFieldValueAndLimit) {
       {[](auto& r) { r.transfer.opacity_distance = 0; }, "transfer.opacity_distance is 0, but must lie in (0, 1000000] voxel lengths"},
       {[](auto& r) { r.transfer.opacity_distance = kNan; }, "transfer.opacity_distance is nan"},
       {[](auto& r) { r.shading.ambient = 7; }, "shading.ambient is 7"},
+      {[](auto& r) {
+         r.renderer = "shear";
+         r.view.projection = Projection::kPerspective;
+       },
+       "renderer is 'shear', but projection 'perspective' needs one of: splat, zbuffer, raycast, mip"},
       {[](auto& r) { r.labels.emplace(); }, "renderer is 'splat', but labels needs one of: zbuffer, raycast"},
       {[](auto& r) {
          r.renderer = "zbuffer";

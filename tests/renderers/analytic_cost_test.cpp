@@ -169,7 +169,9 @@ TEST(AnalyticCost, FollowsTheSamplingRate) {
       return renderer->MakeCost({&grid, &summary, &transfer, parameters})->Seconds({{0, 0, 0}, grid.size}, {});
     };
     EXPECT_EQ(at_rate(1), renderer->MakeCost({&grid, &summary, &transfer})->Seconds({{0, 0, 0}, grid.size}, {})) << "the default";
-    EXPECT_NEAR(at_rate(2) / at_rate(1), 2, 0.2);
+    // Shears resample slices once, whatever the rate.
+    EXPECT_GT(at_rate(2) / at_rate(1), 1.3);
+    EXPECT_LT(at_rate(2) / at_rate(1), 2.2);
     EXPECT_NEAR((at_rate(4) - at_rate(2)) / (at_rate(2) - at_rate(1)), 2, 1e-9) << "what is left is done once a box and once a pixel";
   }
   EXPECT_GE(with_rate, 2);

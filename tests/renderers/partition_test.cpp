@@ -48,7 +48,7 @@ class Partitions : public ::testing::TestWithParam<const RendererKind*> {};
 TEST_P(Partitions, SlabsAlongEveryAxisMakeOnePicture) {
   const unsigned seed = 11;
   std::mt19937 random(seed);
-  for (Projection projection : kProjections) {
+  for (Projection projection : GetParam()->projections()) {
     for (int view = 0; view < 3; ++view) {
       const Volume volume = MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed + unsigned(view));
       SetupOptions options;
@@ -70,7 +70,7 @@ TEST_P(Partitions, SlabsAlongEveryAxisMakeOnePicture) {
 TEST_P(Partitions, BoxesOfAnyKindMakeOnePicture) {
   const unsigned seed = 12;
   std::mt19937 random(seed);
-  for (Projection projection : kProjections) {
+  for (Projection projection : GetParam()->projections()) {
     for (ScalarType type : {ScalarType::kUint8, ScalarType::kUint16, ScalarType::kFloat32}) {
       for (double zoom : {0.3, 1.0, 6.0}) {
         const Volume volume = MakeBlobs({{70, 40, 45}, {1, 1, 1}}, type, seed);
@@ -93,7 +93,7 @@ TEST_P(Partitions, LookingBesideTheCentreMakesOnePicture) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> uniform(-1, 1);
   const Volume volume = MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed);
-  for (Projection projection : kProjections) {
+  for (Projection projection : GetParam()->projections()) {
     int seen = 0;
     for (int view = 0; seen < 6; ++view) {
       SetupOptions options;
@@ -118,7 +118,7 @@ TEST_P(Partitions, ClippedVolumesMakeOnePicture) {
   const unsigned seed = 15;
   std::mt19937 random(seed);
   const Volume volume = MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed);
-  for (Projection projection : kProjections) {
+  for (Projection projection : GetParam()->projections()) {
     for (int view = 0; view < 8; ++view) {
       SetupOptions options;
       options.renderer = GetParam();
@@ -139,7 +139,7 @@ TEST_P(Partitions, IsosurfacesMakeOnePicture) {
   const unsigned seed = 16;
   std::mt19937 random(seed);
   const Volume volume = MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed);
-  for (Projection projection : kProjections) {
+  for (Projection projection : GetParam()->projections()) {
     for (int view = 0; view < 12; ++view) {
       SetupOptions options;
       options.renderer = GetParam();
@@ -166,7 +166,7 @@ TEST_P(Partitions, GradientOpacityMakesOnePicture) {
   const unsigned seed = 17;
   std::mt19937 random(seed);
   const Volume volume = MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed);
-  for (Projection projection : kProjections) {
+  for (Projection projection : GetParam()->projections()) {
     for (int view = 0; view < 4; ++view) {
       SetupOptions options;
       options.renderer = GetParam();
@@ -183,7 +183,7 @@ TEST_P(Partitions, GradientOpacityMakesOnePicture) {
 // Axis-parallel views put rays, faces and planes on top of each other.
 TEST_P(Partitions, AxisParallelViewsHaveNoSeams) {
   const Volume volume = MakeBlobs({{32, 32, 32}, {1, 1, 1}}, ScalarType::kUint8, 5);
-  for (Projection projection : kProjections) {
+  for (Projection projection : GetParam()->projections()) {
     for (auto [azimuth, elevation] : {std::pair(0.0, 0.0), std::pair(90.0, 0.0), std::pair(0.0, 90.0), std::pair(45.0, 0.0)}) {
       SetupOptions options;
       options.renderer = GetParam();
@@ -202,11 +202,11 @@ TEST_P(Partitions, EveryInstructionSetMakesOnePicture) {
   const unsigned seed = 13;
   std::mt19937 random(seed);
   const Volume volume = MakeBlobs({{45, 45, 45}, {1, 1, 1}}, ScalarType::kUint8, seed);
-  for (Projection projection : kProjections) {
+  for (Projection projection : GetParam()->projections()) {
     SetupOptions options;
     options.renderer = GetParam();
     options.view = RandomView(projection, random);
-    if (projection == Projection::kPerspective) {
+    if (projection == GetParam()->projections().back()) {
       options.clipping = RandomClipping(volume.description.geometry, random);
       if (GetParam()->isosurfaces()) options.transfer.isosurfaces = {{60, {0.9F, 0.4F, 0.2F}, 0.3}};
       if (GetParam()->gradient_opacity()) options.transfer.gradient_opacities = {{3, 0.2}, {20, 1}};

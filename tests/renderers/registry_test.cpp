@@ -75,7 +75,7 @@ TEST(Renderers, RefuseParametersWithTheirNameValueAndLimits) {
 // A frame of any renderer, whatever the view, has pixels, and no box reaches beyond it.
 TEST(Renderers, MakeFrames) {
   for (const RendererKind* kind : Renderers()) {
-    for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
+    for (const Projection projection : kind->projections()) {
       FrameRequest request = SomeRequest();
       request.renderer = kind->name();
       request.view.projection = projection;

@@ -58,7 +58,7 @@ class PoliciesTest : public testing::TestWithParam<int> {
 TEST_P(PoliciesTest, NeverChangeThePicture) {
   std::size_t frame = 0;
   for (const RendererKind* renderer : Renderers()) {
-    for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
+    for (const Projection projection : renderer->projections()) {
       FrameRequest request = TestRequest(renderer, 120, 1);
       request.view.projection = projection;
       const LocalImage expected = RenderDirectly(request, *volume_);

@@ -367,8 +367,8 @@ class PageTest(unittest.TestCase):
         viewer.open_section("Light")
         viewer.driver.find_element(By.XPATH, "//div[@class='button-row']/button[. = 'Left']").click()
         viewer.final("o.light && o.light.length === 1")
-        for renderer in ("mip", "zbuffer", "splat"):
-            viewer.js("(s => { s.value = arguments[0]; s.dispatchEvent(new Event('change')); return true; })([...document.querySelectorAll('select')].find(s => s.value === 'raycast' || s.value === 'mip' || s.value === 'zbuffer'))", renderer)
+        for renderer in ("mip", "zbuffer", "splat", "shear"):
+            viewer.js("(s => { s.value = arguments[0]; s.dispatchEvent(new Event('change')); return true; })([...document.querySelectorAll('select')].find(s => s.value === 'raycast' || s.value === 'mip' || s.value === 'zbuffer' || s.value === 'splat'))", renderer)
             drawn = viewer.final(f"o.renderer === '{renderer}'")
             self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
 

@@ -4,7 +4,7 @@ import { axesOf } from "./camera";
 import type { Context } from "./context";
 import { button, choice, colorField, iconButton, numberField, row, section, segmented, slider, textField, toggle } from "./controls";
 import { h, shown } from "./dom";
-import { can } from "./options";
+import { can, projectionOf } from "./options";
 import { LOOK, type Surface } from "./state";
 import { PRESETS } from "./transfer_editor";
 import { add, normalized, rounded, scale, type Vec3 } from "./vec";
@@ -12,7 +12,7 @@ import { add, normalized, rounded, scale, type Vec3 } from "./vec";
 const MOST_SURFACES = 8, MOST_LIGHTS = 4;
 
 export function renderingSection({ store }: Context): HTMLElement {
-  const renderer = choice("Renderer", [["splat", "Splatting"], ["raycast", "Ray casting"], ["mip", "Intensity projection"], ["zbuffer", "Z-buffer"]], value => store.update({ renderer: value }, "renderer"));
+  const renderer = choice("Renderer", [["splat", "Splatting"], ["raycast", "Ray casting"], ["shear", "Shears"], ["mip", "Intensity projection"], ["zbuffer", "Z-buffer"]], value => store.update({ renderer: value }, "renderer"));
   const mode = choice("Show", [["maximum", "Largest value"], ["minimum", "Least value"], ["mean", "Mean value"]], value => store.update({ projectionMode: value }, "mode"));
   const sampling = slider("Samples a voxel", 0.5, 4, 0.5, v => shown(v, 2), value => store.update({ samplingRate: value }, "sampling"));
   const shading = segmented("Shading", [["phong", "Lit"], ["none", "Plain"], ["depth-gradient", "By depth"]], value => store.update({ shading: value }, "shading"));
@@ -26,7 +26,8 @@ export function renderingSection({ store }: Context): HTMLElement {
     sampling.set(state.samplingRate);
     shading.set(state.shading);
     shading.enable("depth-gradient", can("depthShading", state.renderer));
-    projection.set(state.projection);
+    projection.set(projectionOf(state));
+    projection.enable("perspective", can("perspective", state.renderer));
     background.set(state.background);
     mode.element.hidden = !can("projection", state.renderer);
     sampling.element.hidden = !can("sampling", state.renderer);

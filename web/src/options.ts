@@ -8,7 +8,8 @@ export type Options = Record<string, unknown>;
 
 // What which renderer can do; the service refuses the rest.
 const CAN = {
-  surfaces: ["raycast", "zbuffer"], labels: ["raycast", "zbuffer"], overlay: ["raycast"], sampling: ["raycast"], gradient: ["raycast"], projection: ["mip"], depthShading: ["zbuffer"], lit: ["splat", "raycast", "zbuffer"],
+  surfaces: ["raycast", "zbuffer"], labels: ["raycast", "zbuffer"], overlay: ["raycast"], sampling: ["raycast", "shear"], gradient: ["raycast", "shear"], projection: ["mip"],
+  depthShading: ["zbuffer"], lit: ["splat", "raycast", "shear", "zbuffer"], perspective: ["splat", "raycast", "mip", "zbuffer"],
 };
 export const can = (what: keyof typeof CAN, renderer: string): boolean => CAN[what].includes(renderer);
 
@@ -35,11 +36,14 @@ function overlayOptions(state: State): Options {
   return options;
 }
 
+// That the renderer draws.
+export const projectionOf = ({ projection, renderer }: State): State["projection"] => (can("perspective", renderer) ? projection : "orthographic");
+
 // Of the picture, without its size.
 export function renderOptions(state: State): Options {
   const { renderer } = state;
   const options: Options = {
-    dataset: state.dataset, renderer, background: state.background, projection: state.projection,
+    dataset: state.dataset, renderer, background: state.background, projection: projectionOf(state),
     azimuth: state.azimuth, elevation: state.elevation, roll: state.roll, zoom: state.zoom,
     shading: state.shading === "depth-gradient" && !can("depthShading", renderer) ? "phong" : state.shading,
   };

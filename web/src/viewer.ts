@@ -5,7 +5,7 @@ import { ClipHandles } from "./clip_handles";
 import type { Context } from "./context";
 import type { FunctionSource } from "./function_source";
 import { listenToGestures } from "./gestures";
-import { renderOptions } from "./options";
+import { projectionOf, renderOptions } from "./options";
 import { Pane, type PaneEvents, type Shown } from "./pane";
 import type { Pointed } from "./pointed";
 import type { State } from "./state";
@@ -93,7 +93,7 @@ export class Viewer {
   private resolveFit({ frame: { header, view } }: Shown): void {
     const { state } = this.context.store, volume = this.context.volume();
     if (state.lookAt || !volume || view.options["fit"] !== true || view.options["dataset"] !== state.dataset || volume.name !== state.dataset) return;
-    if (view.options["projection"] !== state.projection) return;
+    if (view.options["projection"] !== projectionOf(state)) return;
     const made = Number(view.options["zoom"] ?? 1);
     this.context.store.update({ lookAt: roundedPoint(header.geometry.target), zoom: rounded((zoomOf(header.geometry, header.size[0], header.size[1], volume.extent) * state.zoom) / made) });
   }

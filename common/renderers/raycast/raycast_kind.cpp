@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "common/calibration/calibration.h"
+#include "common/renderers/interpolated_table.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/renderers/sampling_rate.h"
 #include "common/volume/cells_along.h"
@@ -83,17 +84,8 @@ class RaycastKind : public RendererKind {
                       .stages = {Stage::kSample},
                       .parameters = {SamplingRate()}}) {}
 
-  // Interpolation gives all values between those of two voxels, so a sample between two clear voxels may be visible. A voxel counts as
-  // drawn if it is at least the lowest visible value or isovalue: without such a voxel, nothing in its reach shows.
   ClassificationTable DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const override {
-    ClassificationTable table = Classify(transfer, summary.description, summary.range);
-    auto first = std::ranges::find_if(table.opacity, [](float opacity) { return opacity > 0; });
-    for (const Isosurface& surface : transfer.isosurfaces) {
-      first = std::min(first, table.opacity.begin() + table.BinOf(double(StoredIsovalue(surface.value, summary.description.mapping))));
-    }
-    if (!transfer.isosurfaces.empty()) table.max_opacity = 1;
-    std::for_each(first, table.opacity.end(), [&](float& opacity) { opacity = opacity > 0 ? opacity : table.max_opacity; });
-    return table;
+    return InterpolatedTable(transfer, summary);
   }
   std::unique_ptr<AnalyticCost> MakeCost(const CostBasis& basis) const override { return std::make_unique<RaycastCost>(basis); }
 };

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "worker/rays/cell_ranges.h"
-#include "worker/renderers/raycast/ray_look.h"
+#include "worker/rays/ray_look.h"
 
 namespace slabstream {
 

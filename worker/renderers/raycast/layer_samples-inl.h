@@ -3,8 +3,8 @@
 #include <limits>
 
 #include "worker/kernels/power-inl.h"
+#include "worker/rays/sample_look-inl.h"
 #include "worker/renderers/raycast/ray_layers.h"
-#include "worker/renderers/raycast/sample_look-inl.h"
 
 #if defined(SLABSTREAM_WORKER_RENDERERS_RAYCAST_LAYER_SAMPLES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SLABSTREAM_WORKER_RENDERERS_RAYCAST_LAYER_SAMPLES_INL_H_

@@ -17,8 +17,8 @@
 #include <cstdint>
 
 #include "worker/rays/ray_box.h"
+#include "worker/rays/ray_look.h"
 #include "worker/renderers/raycast/ray_layers.h"
-#include "worker/renderers/raycast/ray_look.h"
 
 namespace slabstream {
 

@@ -8,7 +8,7 @@
 #include "common/base/aligned_buffer.h"
 #include "common/frame/layer_look.h"
 #include "common/volume/volume.h"
-#include "worker/renderers/raycast/ray_look.h"
+#include "worker/rays/ray_look.h"
 
 namespace slabstream {
 

@@ -1,4 +1,4 @@
-#include "worker/renderers/raycast/ray_look.h"
+#include "worker/rays/ray_look.h"
 
 #include <algorithm>
 #include <cmath>

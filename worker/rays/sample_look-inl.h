@@ -3,14 +3,14 @@
 #include <limits>
 
 #include "worker/kernels/power-inl.h"
+#include "worker/rays/ray_look.h"
 #include "worker/rays/ray_packet-inl.h"
-#include "worker/renderers/raycast/ray_look.h"
 
-#if defined(SLABSTREAM_WORKER_RENDERERS_RAYCAST_SAMPLE_LOOK_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef SLABSTREAM_WORKER_RENDERERS_RAYCAST_SAMPLE_LOOK_INL_H_
-#undef SLABSTREAM_WORKER_RENDERERS_RAYCAST_SAMPLE_LOOK_INL_H_
+#if defined(SLABSTREAM_WORKER_RAYS_SAMPLE_LOOK_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SLABSTREAM_WORKER_RAYS_SAMPLE_LOOK_INL_H_
+#undef SLABSTREAM_WORKER_RAYS_SAMPLE_LOOK_INL_H_
 #else
-#define SLABSTREAM_WORKER_RENDERERS_RAYCAST_SAMPLE_LOOK_INL_H_
+#define SLABSTREAM_WORKER_RAYS_SAMPLE_LOOK_INL_H_
 #endif
 
 HWY_BEFORE_NAMESPACE();

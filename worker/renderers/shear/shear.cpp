@@ -1,0 +1,144 @@
+// The pixel half of multi-pass shears (Hanrahan 1990; the pipeline of Figure 4b in Yagel and Machiraju 1995). docs/rendering.md defines
+// what it computes.
+//
+//   1. once a slab: find the range of each small cube of voxels (VoxelRanges)
+//   2. once an order of the axes: store the voxels so that beams of the first pass are contiguous (TurnedVoxels)
+//   3. once a transfer function, too: find where anything can be visible (ActiveCells)
+//   4. once a frame: tiles of the picture are separate tasks (ShearTile)
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <tuple>
+#include <utility>
+
+#include "common/base/time.h"
+#include "worker/renderers/renderer.h"
+#include "worker/renderers/shear/shear_tile.h"
+#include "worker/renderers/stage_clock.h"
+
+namespace slabstream::shear {
+namespace {
+
+using AxisOrder = std::array<Axis, 3>;
+
+class ShearCache : public SlabCache {
+ public:
+  const TurnedVoxels& TurnedTo(const AxisOrder& axes, const SlabData& slab) {
+    if (turned_.samples == nullptr || turned_.axes != axes) {
+      turned_ = {};  // first, so that there are never two
+      turned_ = Turn(slab.bricks(), axes);
+    }
+    return turned_;
+  }
+
+  const ActiveCells& ActiveFor(const VisibleSamples& visible, const AxisOrder& axes, const SlabData& slab) {
+    if (!ranges_) ranges_ = FindVoxelRanges(slab.bricks());
+    if (!active_for_ || active_for_ != std::tuple(visible, axes)) {
+      active_ = FindActiveCells(*ranges_, visible, axes);
+      active_for_.emplace(visible, axes);
+    }
+    return active_;
+  }
+
+  std::size_t bytes() const override {
+    return turned_.bytes() + active_.active.capacity() + (ranges_ ? ranges_->ranges.capacity() * sizeof(CellRange) : 0);
+  }
+
+ private:
+  TurnedVoxels turned_;
+  std::optional<VoxelRanges> ranges_;
+  std::optional<std::tuple<VisibleSamples, AxisOrder>> active_for_;
+  ActiveCells active_;
+};
+
+ShearPasses PassesOf(const ViewRays& rays) {
+  const auto vector = [](const Float3& v, double scale = 1) {
+    return Vec3{scale * double(v[0]), scale * double(v[1]), scale * double(v[2])};
+  };
+  return MakeShearPasses(vector(rays.start), vector(rays.right), vector(rays.down), vector(rays.forward, double(rays.step)));
+}
+
+// Renders the tiles of an image.
+std::uint64_t RenderTiles(const ShearWork& work, LocalImage& image, const std::atomic<bool>& cancelled, RankReport& report) {
+  const PixelBounds& bounds = image.bounds;
+  if (bounds.empty()) return 0;
+  const bool turned = work.passes->turned;
+  const std::int32_t u_begin = turned ? bounds.y_begin : bounds.x_begin, u_end = turned ? bounds.y_end : bounds.x_end;
+  const std::int32_t v_begin = turned ? bounds.x_begin : bounds.y_begin, v_end = turned ? bounds.x_end : bounds.y_end;
+  const std::ptrdiff_t column = 4, row = 4 * std::ptrdiff_t{bounds.width()};
+  const std::int32_t across = (u_end - u_begin - 1) / kTileColumns + 1, down = (v_end - v_begin - 1) / kTileRows + 1;
+  std::atomic<std::int64_t> ns = 0;
+  std::atomic<std::uint64_t> shaded = 0;
+  tbb::enumerable_thread_specific<TileRoomPtr> rooms(MakeTileRoom);
+  tbb::parallel_for(0, across * down, [&](std::int32_t number) {
+    if (cancelled.load(std::memory_order_relaxed)) return;
+    const Time begin = MonotonicNow();
+    TilePixels tile;
+    tile.u_begin = u_begin + number % across * kTileColumns;
+    tile.v_begin = v_begin + number / across * kTileRows;
+    tile.u_end = std::min(tile.u_begin + kTileColumns, u_end);
+    tile.v_end = std::min(tile.v_begin + kTileRows, v_end);
+    tile.along_u = turned ? row : column;
+    tile.along_v = turned ? column : row;
+    tile.first = image.rgba.data() + (tile.u_begin - u_begin) * tile.along_u + (tile.v_begin - v_begin) * tile.along_v;
+    const PixelBounds pixels = turned ? PixelBounds{tile.v_begin, tile.u_begin, tile.v_end, tile.u_end}
+                                      : PixelBounds{tile.u_begin, tile.v_begin, tile.u_end, tile.v_end};
+    if (!work.hidden->HidesAll(pixels)) shaded += ShearTile(work, tile, *rooms.local());
+    ns += (MonotonicNow() - begin).count();
+  });
+  report.stage_ns[std::size_t(Stage::kSample)] += ns;
+  return shaded;
+}
+
+class ShearRenderer : public Renderer {
+ public:
+  Result<LocalImage> Render(SlabData& slab, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
+                            const std::atomic<bool>& cancelled, RankReport& report) override {
+    StageClock clock(report);
+    const double samples_per_voxel = setup.parameters.at(0);
+    const VolumeGeometry& geometry = setup.description.geometry;
+    const ViewRays rays = MakeViewRays(setup.camera, geometry, samples_per_voxel, setup.clip);
+    const ShearPasses passes = PassesOf(rays);
+    const RayLook look =
+        MakeRayLook(slab.Classification(setup), setup.transfer, setup.description, setup.camera, setup.shading, samples_per_voxel);
+    const VisibleSamples visible(look);
+    ShearCache& cache = slab.CacheOf<ShearCache>();
+    ShearWork work = {.rays = &rays,
+                      .passes = &passes,
+                      .kernel = MakeCubicKernel(Kernel(int(setup.parameters.at(kKernel)))),
+                      .supersampling = SupersamplingOf(setup.parameters),
+                      .voxels = &cache.TurnedTo(passes.axes, slab),
+                      .active = &cache.ActiveFor(visible, passes.axes, slab),
+                      .look = &look,
+                      .visible = &visible,
+                      .hidden = &hidden,
+                      .termination = float(setup.termination)};
+    clock.Charge(Stage::kPrepare);
+
+    const Vec3 half = {0.5, 0.5, 0.5}, low = ToVec3(box.begin) - half, high = ToVec3(box.end) - half;
+    work.low = {float(low.x), float(low.y), float(low.z)};
+    work.high = {float(high.x), float(high.y), float(high.z)};
+    const Box active = Intersection(box, work.active->hull);
+    RayReach reach;
+    if (!active.empty()) reach = ReachOfBox(rays, setup.camera, ToVec3(active.begin) - half, ToVec3(active.end) - half);
+    work.k_begin = reach.begin;
+    work.k_end = reach.end;
+    LocalImage image = MakeLocalImage(setup.format, reach.pixels);
+    const std::uint64_t shaded = RenderTiles(work, image, cancelled, report);
+
+    const double voxel = geometry.spacing.x * geometry.spacing.y * geometry.spacing.z;
+    report.drawn_voxels += std::uint64_t(std::ceil(double(shaded) * double(rays.pixel_squared) * double(rays.step) / voxel));
+    clock.Finish(Stage::kRender);
+    if (cancelled) return Status::Cancelled("rendering was cancelled");
+    return image;
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Renderer> MakePixelHalf() { return std::make_unique<ShearRenderer>(); }
+
+}  // namespace slabstream::shear
