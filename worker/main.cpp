@@ -36,7 +36,7 @@ int Run(int argc, char** argv) {
   int cache_mib = 0;
   std::string compress = "auto", service;
   bool frames_only = false;
-  constexpr Duration kLongestDrain = std::chrono::hours(24);
+  static constexpr Duration kLongestDrain = std::chrono::hours(24);
 
   CLI::App app("Slabstream worker: renders slabs and combines images for a coordinator.", "slabstream-worker");
   SetUp(app, std::string(Version()));

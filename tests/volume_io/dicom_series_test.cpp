@@ -37,6 +37,19 @@ DicomValues SeriesNumbered(const std::string& uid, const std::string& number, co
   return {{kTagSeriesUid, uid}, {kTagSeriesNumber, number}, {kTagSeriesDescription, description}};
 }
 
+TEST(DicomSeries, TextsWithControlCharactersAreShownInOneLine) {
+  const TemporaryDirectory directory;
+  DicomSpec report{.values = {{0x00080016, "1.2.840.10008.5.1.4.1.1.88.11"},
+                              {kTagSeriesUid, "1.2\n7"},
+                              {kTagModality, "S\nR\x1b[2J"},
+                              {kTagSeriesNumber, "1\r"},
+                              {kTagSeriesDescription, "two\nlines"}}};
+  WriteDicom(directory / "report", report);
+  const Result<LoadedVolume> loaded = ReadVolume(directory.path());
+  ASSERT_FALSE(loaded.ok());
+  EXPECT_THAT(loaded.status().message(), AllOf(HasSubstr("S?R?[2J"), testing::Not(testing::ContainsRegex("[\x01-\x1f]"))));
+}
+
 TEST(DicomSeries, TheOnlyVolumeIsChosenAmongOtherThings) {
   const TemporaryDirectory directory;
   WriteSlices(directory, "ct", {SliceAt(0), SliceAt(2), SliceAt(4)});
