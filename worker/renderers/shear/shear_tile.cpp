@@ -155,6 +155,7 @@ class TilePasses {
         z_last = std::max(z_last, block.z_last);
       }
     }
+    if (z_first > z_last) return 0;  // all is clipped away
     std::fill_n(room_.slot_z, kSlots, kNoSlice);
     std::uint64_t shaded = 0;
     for (std::int32_t n = 0; n <= z_last - z_first; ++n) {
