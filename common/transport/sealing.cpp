@@ -267,7 +267,7 @@ bool Unsealer::Begin(std::span<const std::byte> plain, Place place) {
   if (header_bytes > plain.size() || payload_bytes > max_payload_bytes_) return false;
   const std::span<const std::byte> rest = plain.subspan(header_bytes);
   if (rest.size() != std::min<std::uint64_t>(payload_bytes, kMaxSealedHeaderBytes - header_bytes)) return false;
-  Partial& partial = partial_.emplace(Partial{}); // clang 14 refuses emplace() for a struct whose members have defaults
+  Partial& partial = partial_.emplace(Partial{});  // clang 14 refuses emplace() for a struct whose members have defaults
   partial.header = Bytes(std::vector<std::byte>(plain.begin(), plain.begin() + std::ptrdiff_t(header_bytes)));
   partial.payload.resize(payload_bytes);
   std::ranges::copy(rest, partial.payload.begin());

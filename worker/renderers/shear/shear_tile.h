@@ -5,8 +5,7 @@
 //   1. reconstruct and view: passes 1 and 2 resample a slice onto the tile's lattice points (u, v, z), in chunks of kChunk columns
 //   2. the last four slices are kept; pass 3 resamples between the middle two, at the samples (u, v, k) of rays there
 //   3. shade: a sample is classified by RayLook; its gradient is made of central differences, which each pass finds along its own axis
-//   among
-//      the samples that it reads anyway
+//      among the samples that it reads anyway
 //   4. compose: samples blend front to back
 //
 // Chunks of slices without active cells, and those whose rays are opaque or elsewhere, are not resampled.
