@@ -1,9 +1,8 @@
 // CutFaces: clipping in the Z-buffer. A face of the surface is drawn where its depth is not clipped. Where a ray comes out of what is
 // clipped away inside an opaque voxel, the cut through the voxel is seen: a flat face in the plane of the clip region's side.
 //
-// Cuts go into the keys of a band like faces, so that they hide what lies behind them, and bricks there are not drawn. Instead of a face's
-// number, a cut's key holds kCut, its bin and its label. Before a row is shaded, its cuts are taken out (TakeSeen); after it, they are lit
-// by the plane of their side (Shade).
+// Cuts go into the keys of a band like faces, so that they hide what lies behind them, and bricks there are not drawn. Before the band is
+// shaded, they are taken out again (TakeSeen) and lit by the plane of their side (Shade).
 //
 // A face in the plane of a cut lies within kSlack of it and is not drawn: the cut stands for it.
 #pragma once
@@ -12,7 +11,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
 #include "common/frame/frame_setup.h"
 #include "common/image/local_image.h"
 #include "common/view/phong.h"
@@ -25,11 +23,13 @@
 
 namespace slabstream {
 
-// The cuts that are seen in a row of a band, by column from `begin` on.
-struct SeenCuts {
-  std::int32_t begin = 0, end = 0;
-  AlignedVector<float> depth;        // 0: no cut is seen; kRowPadding elements more
-  std::vector<std::uint32_t> looks;  // where one is: bin << 16 | label
+// One pixel of a cut.
+struct CutPixel {
+  std::int32_t x = 0, y = 0;
+  float depth = 0;
+  std::uint32_t voxel = 0;  // FaceIndex
+  std::uint16_t bin = 0, label = 0;
+  std::uint16_t side = 0;  // of the clip region
 };
 
 class CutFaces {
@@ -50,19 +50,17 @@ class CutFaces {
 
   // Bricks nearer than this are best drawn before the cuts, others after them.
   float turn() const { return keep_ ? 0 : least_depth_; }
-  // Puts those cuts through voxels of the box into the band that nothing in it hides yet.
-  void Draw(const KeyBand& band) const;
-  // Takes the cuts out of a row of the band.
-  void TakeSeen(const KeyBand& band, std::int32_t y, SeenCuts& seen) const;
-  // Fills in the row's pixels of `image` (kDepth) where cuts are seen. Of `shading`: the colours.
-  void Shade(const SeenCuts& seen, std::int32_t y, const FaceShading& shading, LocalImage& image) const;
+  // Puts those cuts through voxels of the box into the band that nothing in it hides yet. Their face numbers are kFirstCut + their place in
+  // `cuts`.
+  static constexpr std::uint32_t kFirstCut = 0x80000000;  // surfaces have fewer faces
+  void Draw(const KeyBand& band, std::vector<CutPixel>& cuts) const;
+  // Takes the cuts out of the band again, and leaves those in `cuts` that are seen.
+  static void TakeSeen(const KeyBand& band, std::vector<CutPixel>& cuts);
+  // Fills in pixels of `image` (kDepth), after the others. Of `shading`: the colours.
+  void Shade(const std::vector<CutPixel>& cuts, const FaceShading& shading, LocalImage& image) const;
 
  private:
-  RayRow RaysOf(std::int32_t y) const;
-  void DrawRow(const KeyBand& band, std::int32_t y, ClipRays::Columns columns) const;
-  // The low half of the key of a cut through the voxel; kNoCut: it is not opaque.
-  template <class T, class VoxelAt>
-  std::uint32_t LookOf(T sample, VoxelAt&& voxel_at) const;
+  void DrawRow(const KeyBand& band, std::int32_t y, ClipRays::Columns columns, std::vector<CutPixel>& cuts) const;
 
   const ClipRegion& region_;
   const ClipRays rays_;

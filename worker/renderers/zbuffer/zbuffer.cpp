@@ -116,10 +116,10 @@ void FetchSites(const Surface& surface, std::uint32_t brick, std::uint32_t sides
 struct Scratch {
   AlignedVector<std::uint64_t> keys;
   AlignedVector<float> from, to;  // DepthLimits
-  SeenCuts cuts;                  // of a row
+  std::vector<CutPixel> cuts;
 };
 
-// The keys of a band of the scene. `cuts` may be null.
+// The keys of a band of the scene, and the cuts in it. `cuts` may be null.
 std::size_t DrawBand(const Surface& surface, const Scene& scene, const BrickProjection& projection, Projection kind, const CutFaces* cuts,
                      const std::atomic<bool>& cancelled, const KeyBand& band, Scratch& scratch) {
   const std::size_t pixels = band.stride * std::size_t(band.bounds.height());
@@ -135,7 +135,8 @@ std::size_t DrawBand(const Surface& surface, const Scene& scene, const BrickProj
   KeyBand limited = band;
   bool cuts_drawn = cuts == nullptr;
   const auto draw_cuts = [&] {
-    cuts->Draw(band);
+    scratch.cuts.clear();
+    cuts->Draw(band, scratch.cuts);
     cuts_drawn = true;
   };
   constexpr std::size_t kAhead = 2;  // bricks
@@ -213,14 +214,14 @@ class ZBufferRenderer : public Renderer {
       band.keys = scratch.keys.data();
       drawn += DrawBand(surface, scene, projection, setup.camera.projection, drawn_cuts, cancelled, band, scratch);
       const Time middle = MonotonicNow();
+      if (cuts) CutFaces::TakeSeen(band, scratch.cuts);
       for (std::int32_t y = band.bounds.y_begin; y < band.bounds.y_end && !cancelled.load(std::memory_order_relaxed); ++y) {
         const auto width = std::size_t(band.bounds.width()), pixel = std::size_t(y - scene.bounds.y_begin) * width;
         const std::size_t row = std::size_t(y - band.bounds.y_begin) * band.stride;
-        if (cuts) cuts->TakeSeen(band, y, scratch.cuts);
         ShadeFaceRow(shading, band.keys + row, band.bounds.x_begin, y, width, &image.rgba[4 * pixel], &image.depth[pixel],
                      &image.voxel[pixel]);
-        if (cuts) cuts->Shade(scratch.cuts, y, shading, image);
       }
+      if (cuts) cuts->Shade(scratch.cuts, shading, image);
       draw_ns += (middle - begin).count();
       shade_ns += (MonotonicNow() - middle).count();
     });
