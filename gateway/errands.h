@@ -1,5 +1,5 @@
 // Errands: what requests over HTTP have under way at the service, so many at a time and no more. An errand ends once: by its reply, or
-// because its connection has closed. All calls on the io thread, unless it says otherwise.
+// because its connection has closed. Functions are called on the io thread, unless their comment names another.
 #pragma once
 
 #include <functional>

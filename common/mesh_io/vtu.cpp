@@ -11,6 +11,7 @@
 #include "common/base/parse_number.h"
 #include "common/mesh_io/mesh_reader.h"
 #include "common/volume/memory_budget.h"
+#include "common/volume_io/text_header.h"
 #include "common/volume_io/vtk_xml.h"
 
 namespace slabstream {
@@ -288,11 +289,7 @@ Result<LoadedMesh> Reader::Read() {
 
 }  // namespace
 
-bool LooksLikeMesh(const std::string& path) {
-  std::string ending = std::filesystem::path(path).extension().string();
-  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return char(std::tolower(c)); });
-  return ending == ".vtu";
-}
+bool LooksLikeMesh(const std::string& path) { return ToLower(path).ends_with(".vtu"); }
 
 Result<LoadedMesh> ReadMesh(const std::string& path, const MeshOptions& options) {
   Result<VtkXmlFile> file = VtkXmlFile::Open(path, "UnstructuredGrid");

@@ -271,10 +271,7 @@ const DicomElements::Element* DicomElements::Find(DicomTag tag) const {
 
 std::string DicomElements::Text(DicomTag tag) const {
   const Element* const element = Find(tag);
-  std::string text(element == nullptr ? "" : WithoutBlanks(element->value));
-  std::ranges::replace_if(
-      text, [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
-  return text;
+  return element == nullptr ? "" : std::string(WithoutBlanks(element->value));
 }
 
 std::vector<std::string> DicomElements::Texts(DicomTag tag) const {

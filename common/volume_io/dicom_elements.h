@@ -35,8 +35,7 @@ class DicomElements {
 
   // The caller of these functions knows the value representation of a tag. Absent, empty and broken values are left out.
   bool Has(DicomTag tag) const { return Find(tag) != nullptr; }
-  // Without blanks around it. Control characters become '?': texts are shown to users.
-  std::string Text(DicomTag tag) const;
+  std::string Text(DicomTag tag) const;                // without blanks around it
   std::vector<std::string> Texts(DicomTag tag) const;  // values between backslashes
   std::vector<double> Decimals(DicomTag tag) const;    // DS, IS; one that is no number is NaN
   std::optional<double> Decimal(DicomTag tag) const;   // the first of them

@@ -8,6 +8,7 @@
 #include <map>
 
 #include "common/base/parse_number.h"
+#include "common/base/printable.h"
 #include "common/volume_io/dicom_frames.h"
 
 namespace slabstream {
@@ -161,6 +162,7 @@ Result<std::vector<DicomSeries>> ListDicomSeries(const std::string& path) {
     series.modality = first.modality;
     series.description = first.description;
     Judge(series);
+    series.trouble = Printable(series.trouble);  // it quotes texts of the file
     all.push_back(std::move(series));
   }
   std::ranges::stable_sort(all, {}, [](const DicomSeries& series) { return ParseNumber<double>(series.number).value_or(0); });

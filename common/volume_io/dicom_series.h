@@ -22,7 +22,7 @@ struct DicomSeries {
   std::vector<DicomImage> images;
   // What it is instead of a volume, such as "a localizer"; empty: it is chosen if it is the only one.
   std::string other;
-  Status trouble;    // not ok: why it cannot be read
+  Status trouble;    // not ok: why it cannot be read; Printable
   DicomStack stack;  // of all frames of all images, one image after the other; if there is no trouble
 
   std::size_t frame_count() const;

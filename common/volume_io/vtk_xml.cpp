@@ -57,8 +57,8 @@ class ByteSource {
     return c == '+' ? 62 : c == '/' ? 63 : -1;
   }
 
-  // Four letters are three bytes; each = at their end is one byte less. What was encoded by itself, like a header, ends so, and more
-  // follows.
+  // Four letters stand for three bytes. Each = at the end of the four stands for one byte less. A header is encoded by itself, so such an
+  // end may come before more letters.
   bool NextGroup() {
     unsigned bits = 0;
     std::size_t letters = 0, padding = 0;

@@ -31,7 +31,7 @@ const std::vector<Example>& Examples() {
   return examples;
 }
 
-double Volume(const Tetrahedron& t, const std::map<PointNumber, Vec3>& places) {
+double VolumeOf(const Tetrahedron& t, const std::map<PointNumber, Vec3>& places) {
   const Vec3 a = places.at(t[0]);
   return std::abs(Dot(places.at(t[1]) - a, Cross(places.at(t[2]) - a, places.at(t[3]) - a))) / 6;
 }
@@ -72,8 +72,8 @@ TEST(Cells, AreFilledByTheirTetrahedraHoweverTheirPointsAreNumbered) {
       SplitCell(kind, numbers, tetrahedra);
       double volume = 0;
       for (const Tetrahedron& t : tetrahedra) {
-        EXPECT_GT(Volume(t, places), 1e-9);
-        volume += Volume(t, places);
+        EXPECT_GT(VolumeOf(t, places), 1e-9);
+        volume += VolumeOf(t, places);
       }
       // Each part has a volume and all of them that of the cell: they cannot overlap, since all have the same point.
       EXPECT_NEAR(volume, example.volume, 1e-12);

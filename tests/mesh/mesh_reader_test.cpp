@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <limits>
 
@@ -174,8 +173,7 @@ TEST_F(MeshReader, FilesThatAreCutOffOrAlteredDoNoHarm) {
 }
 
 TEST(RealMeshes, BluntFinHasItsPointsAndCells) {
-  const char* folder = std::getenv("SLABSTREAM_SHARED_VOLUMES");
-  const std::string path = std::string(folder != nullptr ? folder : SLABSTREAM_SHARED_VOLUMES_DEFAULT) + "/ug_bluntfin.vtu";
+  const std::string path = SharedVolumes() + "/ug_bluntfin.vtu";
   if (!std::filesystem::exists(path)) GTEST_SKIP() << "no file " << path << ": set SLABSTREAM_SHARED_VOLUMES";
   const Result<LoadedMesh> loaded = ReadMesh(path);
   ASSERT_TRUE(loaded.ok()) << loaded.status().message();

@@ -16,26 +16,6 @@ namespace {
 
 using namespace slabstream::testing;  // NOLINT(google-build-using-namespace): test support
 
-FrameSetup RaycastSetup(const Volume& volume, SetupOptions options, double samples_per_voxel = 1) {
-  options.renderer = FindRenderer("raycast");
-  FrameSetup setup = MakeSetup(volume, options);
-  setup.parameters = {samples_per_voxel};
-  return setup;
-}
-
-// Physical length of the ray of a pixel inside the volume.
-double LengthInside(const FrameSetup& setup, int x, int y) {
-  const Camera::Ray ray = setup.camera.RayAt(x + 0.5, y + 0.5);
-  double enter = -1e300, leave = 1e300;
-  for (const Axis axis : kAxes) {
-    const double low = (-0.5 - ray.origin[axis]) / ray.direction[axis];
-    const double high = (setup.description.geometry.size[axis] - 0.5 - ray.origin[axis]) / ray.direction[axis];
-    enter = std::max(enter, std::min(low, high));
-    leave = std::min(leave, std::max(low, high));
-  }
-  return std::max(leave - enter, 0.0) * Length(setup.camera.spacing * ray.direction);
-}
-
 TEST(Raycast, HomogeneousBlockLooksTheSameFromEverySide) {
   const unsigned seed = 7;
   std::mt19937 random(seed);

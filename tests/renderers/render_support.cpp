@@ -71,6 +71,25 @@ FrameSetup MakeSetup(const Volume& volume, const SetupOptions& options) {
   return setup;
 }
 
+FrameSetup RaycastSetup(const Volume& volume, SetupOptions options, double samples_per_voxel) {
+  options.renderer = FindRenderer("raycast");
+  FrameSetup setup = MakeSetup(volume, options);
+  setup.parameters = {samples_per_voxel};
+  return setup;
+}
+
+double LengthInside(const FrameSetup& setup, int x, int y) {
+  const Camera::Ray ray = setup.camera.RayAt(x + 0.5, y + 0.5);
+  double enter = -1e300, leave = 1e300;
+  for (const Axis axis : kAxes) {
+    const double low = (-0.5 - ray.origin[axis]) / ray.direction[axis];
+    const double high = (setup.description.geometry.size[axis] - 0.5 - ray.origin[axis]) / ray.direction[axis];
+    enter = std::max(enter, std::min(low, high));
+    leave = std::min(leave, std::max(low, high));
+  }
+  return std::max(leave - enter, 0.0) * Length(setup.camera.spacing * ray.direction);
+}
+
 ViewParameters RandomView(Projection projection, std::mt19937& random) {
   std::uniform_real_distribution<double> uniform(0, 1);
   ViewParameters view;

@@ -40,6 +40,10 @@ struct SetupOptions {
   double termination = 0;
 };
 FrameSetup MakeSetup(const Volume& volume, const SetupOptions& options);
+FrameSetup RaycastSetup(const Volume& volume, SetupOptions options, double samples_per_voxel = 1);
+
+// Physical length of the ray of a pixel inside the volume.
+double LengthInside(const FrameSetup& setup, int x, int y);
 
 ViewParameters RandomView(Projection projection, std::mt19937& random);
 // Planes through the volume, and a box in one in two; the mode is left to the caller.

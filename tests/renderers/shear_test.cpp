@@ -31,13 +31,6 @@ FrameSetup ShearSetup(const Volume& volume, SetupOptions options, const ShearOpt
   return setup;
 }
 
-FrameSetup RaycastSetup(const Volume& volume, SetupOptions options, double rate) {
-  options.renderer = FindRenderer("raycast");
-  FrameSetup setup = MakeSetup(volume, options);
-  setup.parameters = {rate};
-  return setup;
-}
-
 double RootMeanSquare(const LocalImage& a, const LocalImage& b) {
   const PixelBounds bounds = Union(a.bounds, b.bounds);
   double sum = 0;
@@ -67,15 +60,7 @@ TEST(Shear, HomogeneousBlockLooksTheSameFromEverySide) {
         const LocalImage image = RenderPicture(block, setup);
         for (int y = 0; y < setup.camera.height; ++y) {
           for (int x = 0; x < setup.camera.width; ++x) {
-            const Camera::Ray ray = setup.camera.RayAt(x + 0.5, y + 0.5);
-            double enter = -1e300, leave = 1e300;
-            for (const Axis axis : kAxes) {
-              const double low = (-0.5 - ray.origin[axis]) / ray.direction[axis];
-              const double high = (setup.description.geometry.size[axis] - 0.5 - ray.origin[axis]) / ray.direction[axis];
-              enter = std::max(enter, std::min(low, high));
-              leave = std::min(leave, std::max(low, high));
-            }
-            const double length = std::max(leave - enter, 0.0) * Length(setup.camera.spacing * ray.direction) / voxel_length;
+            const double length = LengthInside(setup, x, y) / voxel_length;
             if (length < 1.1 / rate) continue;  // shorter rays may pass between samples
             ++pixels;
             const double expected = 1 - std::pow(1 - kOpacity, length);

@@ -45,6 +45,11 @@ TEST(DicomSeries, TextsWithControlCharactersAreShownInOneLine) {
                               {kTagSeriesNumber, "1\r"},
                               {kTagSeriesDescription, "two\nlines"}}};
   WriteDicom(directory / "report", report);
+  const Result<std::vector<DicomSeries>> all = ListDicomSeries(directory.path());
+  ASSERT_TRUE(all.ok()) << all.status().message();
+  ASSERT_EQ(all->size(), 1U);
+  EXPECT_EQ(all->front().modality, "S\nR\x1b[2J");  // as in the file
+  EXPECT_EQ(all->front().trouble.message(), "no images: its modality is 'S?R?[2J'");
   const Result<LoadedVolume> loaded = ReadVolume(directory.path());
   ASSERT_FALSE(loaded.ok());
   EXPECT_THAT(loaded.status().message(), AllOf(HasSubstr("S?R?[2J"), testing::Not(testing::ContainsRegex("[\x01-\x1f]"))));

@@ -2,19 +2,14 @@
 // the MRI brain of Debian's mricron-data.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <filesystem>
 
 #include "common/volume/summary.h"
 #include "common/volume_io/volume_reader.h"
+#include "tests/volume_io/volume_files.h"
 
 namespace slabstream {
 namespace {
-
-std::string SharedVolumes() {
-  const char* path = std::getenv("SLABSTREAM_SHARED_VOLUMES");
-  return path != nullptr ? path : SLABSTREAM_SHARED_VOLUMES_DEFAULT;
-}
 
 TEST(RealVolumes, HaveTheSizesRangesAndOccupanciesThatAreKnown) {
   const std::string folder = SharedVolumes();

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <iterator>
@@ -173,6 +174,11 @@ void WriteTiff(const std::string& path, const FileSpec& spec, const FileBytes& s
     CHECK_EQ(TIFFWriteDirectory(tiff), 1);
   }
   TIFFClose(tiff);
+}
+
+std::string SharedVolumes() {
+  const char* path = std::getenv("SLABSTREAM_SHARED_VOLUMES");
+  return path != nullptr ? path : SLABSTREAM_SHARED_VOLUMES_DEFAULT;
 }
 
 void Damage(char& byte, Random& random) {

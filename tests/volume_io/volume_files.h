@@ -53,6 +53,9 @@ struct TiffOptions {
 };
 void WriteTiff(const std::string& path, const FileSpec& spec, const FileBytes& samples, const TiffOptions& options = {});
 
+// The folder of real volumes: SLABSTREAM_SHARED_VOLUMES, or one beside the source tree. It may not be there.
+std::string SharedVolumes();
+
 // Does what may happen to a byte of a file: another value, or one bit of it.
 void Damage(char& byte, Random& random);
 

@@ -160,4 +160,10 @@ RayReach ReachOfBox(const ViewRays& rays, const Camera& camera, const Vec3& low,
   return reach;
 }
 
+double VoxelsASample(const ViewRays& rays, const Camera& camera, const VolumeGeometry& geometry) {
+  const double depth = rays.perspective ? camera.Project(geometry.centre()).depth : 1;
+  const double voxel = geometry.spacing.x * geometry.spacing.y * geometry.spacing.z;
+  return double(rays.pixel_squared) * depth * depth * double(rays.step) / voxel;
+}
+
 }  // namespace slabstream

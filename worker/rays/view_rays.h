@@ -80,4 +80,7 @@ struct RayReach {
 };
 RayReach ReachOfBox(const ViewRays& rays, const Camera& camera, const Vec3& low, const Vec3& high);
 
+// The share of a voxel's volume that a sample at the volume's centre represents: a pixel's area times a step.
+double VoxelsASample(const ViewRays& rays, const Camera& camera, const VolumeGeometry& geometry);
+
 }  // namespace slabstream

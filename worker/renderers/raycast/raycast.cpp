@@ -134,14 +134,6 @@ class VisibilityCache : public SlabCache {
   std::vector<Visibility> pieces_;
 };
 
-// The share of a voxel's volume that a sample at the volume's centre represents: a pixel's area times a step.
-double VoxelsASample(const ViewRays& rays, const FrameSetup& setup) {
-  const VolumeGeometry& geometry = setup.description.geometry;
-  const double depth = rays.perspective ? setup.camera.Project(geometry.centre()).depth : 1;
-  const double voxel = geometry.spacing.x * geometry.spacing.y * geometry.spacing.z;
-  return double(rays.pixel_squared) * depth * depth * double(rays.step) / voxel;
-}
-
 class RaycastRenderer : public Renderer {
  public:
   Result<LocalImage> Render(SlabData& slab, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
@@ -180,7 +172,7 @@ class RaycastRenderer : public Renderer {
         Combine(image, layer, Side::kBack);
       }
     }
-    report.drawn_voxels += std::uint64_t(std::ceil(double(shaded) * VoxelsASample(rays, setup)));
+    report.drawn_voxels += std::uint64_t(std::ceil(double(shaded) * VoxelsASample(rays, setup.camera, setup.description.geometry)));
     clock.Finish(Stage::kRender);
     if (cancelled) return Status::Cancelled("rendering was cancelled");
     return image;

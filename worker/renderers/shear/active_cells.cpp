@@ -94,7 +94,8 @@ bool ActiveCells::Any(float x_low, float x_high, float y_low, float y_high, floa
 }
 
 ActiveCells FindActiveCells(const VoxelRanges& ranges, const VisibleSamples& visible, const std::array<Axis, 3>& axes) {
-  // In cubes, by place in `axes`: samples reach 6, 4 and 2 voxels; lattice points that make one lie less than 2 slices away on its ray.
+  // In cubes, by place in `axes`. A sample is made from voxels up to 6, 4 and 2 away (ShearPasses: "Reach"), by way of lattice points on
+  // its ray that lie less than 2 slices away.
   constexpr std::int32_t kReach[3] = {2, 2, 1};
   const Index3& counts = ranges.counts;
   std::vector<std::uint8_t> near(ranges.ranges.size());

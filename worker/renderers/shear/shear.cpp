@@ -129,8 +129,7 @@ class ShearRenderer : public Renderer {
     LocalImage image = MakeLocalImage(setup.format, reach.pixels);
     const std::uint64_t shaded = RenderTiles(work, image, cancelled, report);
 
-    const double voxel = geometry.spacing.x * geometry.spacing.y * geometry.spacing.z;
-    report.drawn_voxels += std::uint64_t(std::ceil(double(shaded) * double(rays.pixel_squared) * double(rays.step) / voxel));
+    report.drawn_voxels += std::uint64_t(std::ceil(double(shaded) * VoxelsASample(rays, setup.camera, geometry)));
     clock.Finish(Stage::kRender);
     if (cancelled) return Status::Cancelled("rendering was cancelled");
     return image;

@@ -3,7 +3,7 @@
 // A tile goes through the box slice by slice of z, nearest first:
 //
 //   1. reconstruct and view: passes 1 and 2 resample a slice onto the tile's lattice points (u, v, z), in chunks of kChunk columns
-//   2. the last four slices are kept; pass 3 resamples between the middle two, at the samples (u, v, k) of rays there
+//   2. the last four resampled slices are kept; pass 3 makes the samples (u, v, k) that lie between the middle two
 //   3. shade: a sample is classified by RayLook; its gradient is made of central differences, which each pass finds along its own axis
 //      among the samples that it reads anyway
 //   4. compose: samples blend front to back
