@@ -61,8 +61,11 @@ void MovieRequests::Turntable(PictureFields fields, ReplyFunction reply, const G
   const auto movie = std::make_shared<TurntableMovie>(io_, context_, service_, metrics_, *std::move(request));
   movies_.insert(movie);
   boost::asio::post(makers_, [this, movie] {
-    movie->Make();
-    boost::asio::post(io_, [this, movie] { movies_.erase(movie); });
+    Status status = movie->Make();
+    boost::asio::post(io_, [this, movie, status = std::move(status)]() mutable {
+      movies_.erase(movie);  // first: whoever has read a movie to its end may ask for the next
+      movie->End(std::move(status));
+    });
   });
   *gone = [this, movie] {
     metrics_.CountRefusal("gone");

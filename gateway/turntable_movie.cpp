@@ -28,8 +28,8 @@ TurntableMovie::TurntableMovie(boost::asio::io_context& io, Context& context, Se
 
 // ---- Make's thread
 
-void TurntableMovie::Make() {
-  Status status = RenderAndEncode();
+Status TurntableMovie::Make() {
+  const Status status = RenderAndEncode();
   // The encoder has ended, well or not: what it wrote before is still read.
   std::unique_ptr<MovieEncoder> encoder;
   {
@@ -37,10 +37,7 @@ void TurntableMovie::Make() {
     encoder = std::move(encoder_);
   }
   encoder.reset();
-  boost::asio::post(io_, [self = shared_from_this(), status = std::move(status)] {
-    self->end_ = status;
-    if (self->next_ && !self->output_.is_open()) self->ReadSome();
-  });
+  return status;
 }
 
 Status TurntableMovie::RenderAndEncode() {
@@ -99,6 +96,11 @@ Result<Picture> TurntableMovie::Take(int index) {
 
 // ---- the io thread
 
+void TurntableMovie::End(Status status) {
+  end_ = std::move(status);
+  if (next_ && !output_.is_open()) ReadSome();
+}
+
 void TurntableMovie::Read(std::function<void(Result<std::string>)> next) {
   next_ = std::move(next);
   if (output_.is_open() || end_) ReadSome();
@@ -114,7 +116,7 @@ void TurntableMovie::ReadSome() {
       return self->Answer(std::move(self->part_));
     }
     self->output_.close(error);
-    if (self->end_) self->ReadSome();  // else the encoder has closed its output, and Make says soon how it ended
+    if (self->end_) self->ReadSome();  // else the encoder has closed its output, and End says soon how it went
   });
 }
 

@@ -33,8 +33,10 @@ class TurntableMovie final : public BodyStream, public std::enable_shared_from_t
   // `io`, `context` and `metrics` must outlive it.
   TurntableMovie(boost::asio::io_context& io, Context& context, ServiceAddress service, Metrics& metrics, TurntableRequest request);
 
-  // On a thread that stays as long as the process (Child): makes the movie, until it is done or abandoned.
-  void Make();
+  // On a thread that stays as long as the process (Child): makes the movie, until it is done or abandoned. Says how it went.
+  Status Make();
+  // What Make has returned, on the io thread: whoever reads the movie learns of its end by this.
+  void End(Status status);
 
   // BodyStream. Read's errors: those of the service before the first bytes, and of the encoder.
   void Read(std::function<void(Result<std::string>)> next) override;
@@ -56,7 +58,7 @@ class TurntableMovie final : public BodyStream, public std::enable_shared_from_t
   // Of the io thread.
   boost::asio::posix::stream_descriptor output_;  // of the encoder, while it is open
   std::function<void(Result<std::string>)> next_;
-  std::optional<Status> end_;  // how Make ended
+  std::optional<Status> end_;
   std::string part_;
   // Shared.
   std::mutex mutex_;
