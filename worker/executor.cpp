@@ -144,7 +144,7 @@ struct Executor::Slab {
       for (const Copy& copy : copies) copy.Perform(layer, to);
     }
     copies.clear();
-    data = std::make_unique<SlabData>(*std::move(voxels[0]), LayerVoxels{std::move(voxels[1]), std::move(voxels[2])});
+    data = std::make_unique<SlabData>(*std::move(voxels[0]), SlabLayers{std::move(voxels[1]), std::move(voxels[2])});
     voxels = {};
     unpacked = {};
     return *data;

@@ -17,9 +17,9 @@
 #include "client/cli/picture_info.h"
 #include "client/image_io/picture_header.h"
 #include "client/request/json_value.h"
-#include "common/mesh_io/mesh_reader.h"
 #include "common/planning/frame_plan.h"
 #include "common/volume/summary.h"
+#include "common/volume_io/mesh_reader.h"
 
 namespace slabstream {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "common/mesh_io/mesh_reader.h"
+#include "common/volume_io/mesh_reader.h"
 
 namespace slabstream {
 

@@ -10,8 +10,8 @@
 
 #include "client/cli/input_volume.h"
 #include "client/request/json_value.h"
-#include "common/mesh_io/mesh_reader.h"
 #include "common/volume/summary.h"
+#include "common/volume_io/mesh_reader.h"
 
 namespace slabstream {
 namespace {
@@ -28,7 +28,7 @@ ValueRange RangeOf(std::span<const float> values) {
 
 std::string MeshText(const LoadedMesh& loaded, const ValueRange& range) {
   const MeshFileInfo& info = loaded.info;
-  const Bounds3& bounds = loaded.mesh.bounds;
+  const Bounds3& bounds = loaded.bounds;
   const Vec3 extent = bounds.high - bounds.low;
   std::string text = fmt::format("format       {}\n", info.format);
   text += fmt::format("points       {}\n", info.points);
@@ -59,7 +59,7 @@ Json MeshJson(const LoadedMesh& loaded, const ValueRange& range) {
           {"cells", info.cells},
           {"kinds", kinds},
           {"tetrahedra", loaded.mesh.tetrahedra.size()},
-          {"bounds", {{"low", VectorJson(loaded.mesh.bounds.low)}, {"high", VectorJson(loaded.mesh.bounds.high)}}},
+          {"bounds", {{"low", VectorJson(loaded.bounds.low)}, {"high", VectorJson(loaded.bounds.high)}}},
           {"arrays", arrays},
           {"array", info.arrays[info.array].name},
           {"range", {{"min", range.min}, {"max", range.max}}}};

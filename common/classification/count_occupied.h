@@ -1,7 +1,8 @@
-// Counting occupied voxels: one pass over a volume.
+// Counting occupied voxels: one pass over a volume, or over the cells of a grid.
 #pragma once
 
 #include "common/classification/classification_table.h"
+#include "common/mesh/mesh.h"
 #include "common/volume/bricks.h"
 #include "common/volume/occupancy_grid.h"
 
@@ -10,5 +11,9 @@ namespace slabstream {
 // Occupied: the voxel's bin has an opacity above zero, as the renderers see it; samples that are not finite never are. `voxels` are those
 // of a whole volume, from voxel 0 on. Parallel, with the same result for any number of threads; bricks of one value cost next to nothing.
 OccupancyGrid CountOccupied(const VoxelBricks& voxels, const ClassificationTable& table);
+
+// Of an unstructured grid, on its lattice: a voxel is occupied if the space that it fills touches the bounding box of a cell that may be
+// visible, because an opacity between its least and its greatest value is above zero. Parallel.
+OccupancyGrid CountOccupied(const Mesh& mesh, const VolumeDescription& lattice, const ClassificationTable& table);
 
 }  // namespace slabstream

@@ -1,5 +1,5 @@
 // A mesh of tetrahedra with one value at each point, between which it is linear, or one in each tetrahedron. What every reader of
-// unstructured grids makes (common/mesh_io), and all that is drawn of them.
+// unstructured grids makes (common/volume_io), and all that is drawn of them.
 #pragma once
 
 #include <cstddef>
@@ -19,16 +19,13 @@ inline constexpr std::int64_t kMaxMeshPoints = std::int64_t{1} << 31, kMaxTetrah
 enum class ValuesAt : std::uint8_t { kPoints, kCells };
 constexpr std::string_view NameOf(ValuesAt at) { return at == ValuesAt::kPoints ? "points" : "cells"; }
 
-struct Bounds3 {
-  Vec3 low, high;
-};
-
+// Immutable once shared between threads.
 struct Mesh {
-  Bounds3 bounds;                        // of the points, in the world
-  AlignedVector<Vector3<float>> points;  // from bounds.low, finite
-  std::vector<Tetrahedron> tetrahedra;   // none has a point twice
+  AlignedVector<Vector3<float>> points;  // finite; in data space of the lattice under the grid (lattice.h), unless it says otherwise
+  std::vector<Tetrahedron> tetrahedra;   // of `points`; none has a point twice
   ValuesAt at = ValuesAt::kPoints;
   AlignedVector<float> values;  // by point or by tetrahedron; may not be finite: nothing is seen there
+
   std::size_t bytes() const {
     return points.capacity() * sizeof(points[0]) + tetrahedra.capacity() * sizeof(Tetrahedron) + values.capacity() * sizeof(float);
   }

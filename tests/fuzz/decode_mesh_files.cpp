@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <string>
 
-#include "common/mesh_io/mesh_reader.h"
+#include "common/volume_io/mesh_reader.h"
 #include "tests/fuzz/decoders.h"
 #include "tests/mesh/vtu_files.h"
 #include "tests/support/temporary_directory.h"

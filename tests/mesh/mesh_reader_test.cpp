@@ -1,4 +1,4 @@
-#include "common/mesh_io/mesh_reader.h"
+#include "common/volume_io/mesh_reader.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -66,7 +66,7 @@ TEST_F(MeshReader, ReadsEveryEncoding) {
       EXPECT_EQ(loaded->info.kinds[1].kind->name, "wedge");
       EXPECT_EQ(loaded->info.kinds[1].count, 2);
       EXPECT_EQ(mesh.tetrahedra.size(), 1U + 2 * 3 + 2);
-      EXPECT_EQ(mesh.bounds.high, (Vec3{2, 1, 2}));
+      EXPECT_EQ(loaded->bounds.high, (Vec3{2, 1, 2}));
       EXPECT_NEAR(VolumeOf(mesh), 1 + 1.0 / 3 + 1.0 / 6, 1e-6);
       for (std::size_t i = 0; i < mesh.points.size(); ++i) {
         EXPECT_EQ(mesh.values[i], mesh.points[i].x + 10 * mesh.points[i].y + 100 * mesh.points[i].z);
@@ -99,7 +99,7 @@ TEST_F(MeshReader, KeepsThePrecisionOfPointsFarFromTheOrigin) {
   for (double& place : spec.arrays[2].values) place = 4e6 + place / 1024;
   const Result<LoadedMesh> loaded = Read(VtuFile(spec));
   ASSERT_TRUE(loaded.ok()) << loaded.status().message();
-  EXPECT_EQ(loaded->mesh.bounds.low, (Vec3{4e6, 4e6, 4e6}));
+  EXPECT_EQ(loaded->bounds.low, (Vec3{4e6, 4e6, 4e6}));
   EXPECT_EQ(loaded->mesh.points[6].z, 1.0F / 1024);
 }
 

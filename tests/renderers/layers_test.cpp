@@ -27,7 +27,7 @@ const VolumeGeometry kGeometry = {{24, 20, 22}, {1, 1, 1}, {}};
 std::shared_ptr<const Volume> Shared(Volume volume) { return std::make_shared<const Volume>(std::move(volume)); }
 
 std::unique_ptr<SlabData> CutLayered(const LayeredVolume& volume, const Box& box) {
-  LayerVoxels layers;
+  SlabLayers layers;
   if (volume.layers.labels != nullptr) layers.labels.emplace(CutBlock(volume.layers.labels->block, box));
   if (volume.layers.overlay != nullptr) layers.overlay.emplace(CutBlock(volume.layers.overlay->block, box));
   return std::make_unique<SlabData>(CutBlock(volume.volume->block, box), std::move(layers));

@@ -20,7 +20,7 @@ struct Labelled {
 };
 
 std::unique_ptr<SlabData> CutLabelled(const Labelled& data, const Box& box) {
-  LayerVoxels layers;
+  SlabLayers layers;
   layers.labels.emplace(CutBlock(data.labels.block, box));
   return std::make_unique<SlabData>(CutBlock(data.volume.block, box), std::move(layers));
 }

@@ -98,7 +98,7 @@ TEST_F(DatasetsTest, LayersOfADatasetAreThoseOfTheirFiles) {
   const auto expected = [&] {
     const Layers layers = ReadLayers({.labels = labels.string(), .label_colors = table.string()}, volume_->description.geometry).value();
     const FramePlan plan = PlanFrame(request, 1, Summarize(LayeredVolume{volume_, layers}), Roster{{1}}).value();
-    SlabData slab(CutBlock(volume_->block, volume_->block.box), LayerVoxels{BrickedVoxels(layers.labels->block), {}});
+    SlabData slab(CutBlock(volume_->block, volume_->block.box), SlabLayers{BrickedVoxels(layers.labels->block), {}});
     RankReport report;
     LocalImage frame =
         MakeRenderer(*plan.setup.renderer)->Render(slab, volume_->block.box, plan.setup, {}, std::atomic<bool>(false), report).value();

@@ -39,6 +39,7 @@ const ClassificationTable& SlabData::Classification(const FrameSetup& setup) {
 std::size_t SlabData::bytes() const {
   std::size_t total = block_.bytes.capacity() + (bricks_ ? bricks_->bytes() : 0) + (ranges_ ? ranges_->bytes() : 0);
   for (const auto* layer : {&layers_.labels, &layers_.overlay}) total += *layer ? (*layer)->bytes() : 0;
+  if (layers_.cells != nullptr) total += layers_.cells->bytes();
   total += table_.opacity.capacity() * sizeof(float) + table_.color.capacity() * sizeof(Rgb);
   for (const auto& [type, cache] : caches_) total += cache->bytes();
   return total;

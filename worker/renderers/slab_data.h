@@ -1,4 +1,4 @@
-// SlabData: the voxels of one slab with its halo, those of its layers, and what renderers derived from them. One thread at a time uses it.
+// SlabData: the voxels of one slab with its halo, its layers, and what renderers derived from them. One thread at a time uses it.
 #pragma once
 
 #include <concepts>
@@ -12,6 +12,7 @@
 
 #include "common/classification/classification_table.h"
 #include "common/frame/frame_setup.h"
+#include "common/mesh/mesh.h"
 #include "common/volume/bricks.h"
 #include "worker/renderers/brick_ranges.h"
 
@@ -24,15 +25,16 @@ class SlabCache {
   virtual std::size_t bytes() const = 0;  // memory
 };
 
-// Of the slab's box. nullopt: the dataset has no such layer.
-struct LayerVoxels {
+// Of the slab's box. nullopt, null: the dataset has no such layer.
+struct SlabLayers {
   std::optional<BrickedVoxels> labels, overlay;
+  std::shared_ptr<const Mesh> cells;  // those that touch the box, in the order of the whole grid; perhaps others
 };
 
 class SlabData {
  public:
-  explicit SlabData(VoxelBlock voxels, LayerVoxels layers = {}) : block_(std::move(voxels)), layers_(std::move(layers)) {}
-  explicit SlabData(BrickedVoxels voxels, LayerVoxels layers = {}) : bricks_(std::move(voxels)), layers_(std::move(layers)) {}
+  explicit SlabData(VoxelBlock voxels, SlabLayers layers = {}) : block_(std::move(voxels)), layers_(std::move(layers)) {}
+  explicit SlabData(BrickedVoxels voxels, SlabLayers layers = {}) : bricks_(std::move(voxels)), layers_(std::move(layers)) {}
   SlabData(const SlabData&) = delete;
   SlabData& operator=(const SlabData&) = delete;
 
@@ -40,7 +42,7 @@ class SlabData {
   const VoxelBlock& voxels() const;
   VoxelBricks bricks() const { return bricks_ ? VoxelBricks(*bricks_) : VoxelBricks(block_); }
 
-  const LayerVoxels& layers() const { return layers_; }
+  const SlabLayers& layers() const { return layers_; }
   // Of volume and layers, the type whose samples take most.
   ScalarType widest_type() const;
 
@@ -66,7 +68,7 @@ class SlabData {
   mutable VoxelBlock block_;
   mutable std::optional<BrickedVoxels> bricks_;  // then block_ is empty
 
-  LayerVoxels layers_;
+  SlabLayers layers_;
   std::optional<BrickRanges> ranges_;
   std::optional<std::tuple<const RendererKind*, TransferFunction, ValueRange>> classified_;  // table_ was made from these
   ClassificationTable table_;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/mesh/lattice.h"
 #include "common/mesh/mesh.h"
 #include "common/volume_io/sample_type.h"
 
@@ -36,7 +37,8 @@ struct MeshFileInfo {
 
 struct LoadedMesh {
   MeshFileInfo info;
-  Mesh mesh;
+  Bounds3 bounds;  // of the points, in the world
+  Mesh mesh;       // its points are in the world, from bounds.low
 };
 
 struct MeshOptions {

@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "common/base/parse_number.h"
-#include "common/mesh_io/mesh_reader.h"
 #include "common/volume/memory_budget.h"
+#include "common/volume_io/mesh_reader.h"
 #include "common/volume_io/text_header.h"
 #include "common/volume_io/vtk_xml.h"
 
@@ -154,16 +154,16 @@ Status Reader::ReadPoints() {
   Mesh& mesh = result_.mesh;
   const auto place = [&](std::size_t i) { return Vec3{(*places)[3 * i], (*places)[3 * i + 1], (*places)[3 * i + 2]}; };
   mesh.points.resize(std::size_t(result_.info.points));
-  mesh.bounds = {place(0), place(0)};
+  result_.bounds = {place(0), place(0)};
   for (std::size_t i = 0; i < mesh.points.size(); ++i) {
     const Vec3 p = place(i);
     if (!(std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z))) return file_.Wrong(fmt::format("point {} is not finite", i));
     for (int axis = 0; axis < 3; ++axis) {
-      mesh.bounds.low[axis] = std::min(mesh.bounds.low[axis], p[axis]);
-      mesh.bounds.high[axis] = std::max(mesh.bounds.high[axis], p[axis]);
+      result_.bounds.low[axis] = std::min(result_.bounds.low[axis], p[axis]);
+      result_.bounds.high[axis] = std::max(result_.bounds.high[axis], p[axis]);
     }
   }
-  const Vec3 extent = mesh.bounds.high - mesh.bounds.low;
+  const Vec3 extent = result_.bounds.high - result_.bounds.low;
   constexpr double kMostExtent = 1e30;
   for (int axis = 0; axis < 3; ++axis) {
     if (!(extent[axis] > 0 && extent[axis] <= kMostExtent)) {
@@ -172,7 +172,7 @@ Status Reader::ReadPoints() {
     }
   }
   for (std::size_t i = 0; i < mesh.points.size(); ++i) {
-    const Vec3 p = place(i) - mesh.bounds.low;
+    const Vec3 p = place(i) - result_.bounds.low;
     mesh.points[i] = {float(p.x), float(p.y), float(p.z)};
   }
   return Status::Ok();

@@ -1,0 +1,42 @@
+// The lattice under an unstructured grid: a volume of float32 voxels that fills the grid's bounding box. Boxes, partitions and empty space
+// of the grid are counted in its voxels, and renderers of volumes draw it; the cells themselves are drawn by slicing.
+//
+// All functions may be called from any thread.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "common/mesh/mesh.h"
+#include "common/volume/summary.h"
+#include "common/volume/volume.h"
+
+namespace slabstream {
+
+inline constexpr std::int32_t kMaxLatticeSide = 1024;  // voxels
+
+// In the world.
+struct Bounds3 {
+  Vec3 low, high;
+};
+
+// A lattice whose volume is `bounds` exactly: the outer voxels' centres lie half a voxel inside its sides. Voxels are nearly cubes.
+// `longest_side`: voxels along the longest side, in [1, kMaxLatticeSide]; none: such that there are two voxels for each of `cells`, but at
+// least 32 and at most 256 along the longest side. The axes are those of the world. Expects a positive extent along each axis.
+VolumeGeometry LatticeOf(const Bounds3& bounds, std::int64_t cells, std::optional<std::int32_t> longest_side);
+
+// Moves points from the world, measured from bounds.low, to data space of the lattice: [-0.5, size - 0.5] along each axis.
+void MoveToLattice(const VolumeGeometry& lattice, Mesh& mesh);
+
+// Orders tetrahedra and points so that what is near in space is near in memory.
+void SortByPlace(const VolumeGeometry& lattice, Mesh& mesh);
+
+// The grid's value at each voxel's centre; NaN where there is no cell. Parallel.
+Volume Resample(const Mesh& mesh, const VolumeGeometry& lattice);
+
+// Makes the summary of the resampled volume (Summarize) one of the grid: the range is that of all finite values of the grid, the histogram
+// is counted again over it, and the range of each brick includes the values of all cells whose bounding boxes touch the brick's voxels.
+void SummarizeCells(const Mesh& mesh, const Volume& resampled, VolumeSummary& summary);
+
+}  // namespace slabstream

@@ -1,0 +1,40 @@
+// Parts of a grid: the cells that touch a box, as they are cut out and sent.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "common/base/status.h"
+#include "common/mesh/mesh.h"
+#include "common/volume/box.h"
+
+namespace slabstream {
+
+// Cuts out the cells of boxes. Any thread.
+class MeshCutter {
+ public:
+  explicit MeshCutter(std::shared_ptr<const Mesh> mesh);
+
+  // The cells whose bounding boxes touch the space of the box's voxels, [begin - 0.5, end - 0.5] along each axis, and their points. Both
+  // keep their order, so what depends on the order of points or cells is the same in every part.
+  Mesh Cut(const Box& box) const;
+
+  const Mesh& mesh() const { return *mesh_; }
+  std::size_t bytes() const;  // memory, with the mesh
+
+ private:
+  struct Run {  // of consecutive tetrahedra
+    Vector3<float> low, high;
+  };
+  std::shared_ptr<const Mesh> mesh_;
+  std::vector<Run> runs_;
+};
+
+// The mesh as bytes, little-endian, and back. DataLoss: they are not those of a mesh; a point is not finite; a tetrahedron has a point that
+// there is not, or one twice.
+std::vector<std::byte> EncodeMesh(const Mesh& mesh);
+Result<Mesh> DecodeMesh(std::span<const std::byte> bytes);
+
+}  // namespace slabstream
