@@ -36,7 +36,8 @@ void SortByPlace(const VolumeGeometry& lattice, Mesh& mesh);
 Volume Resample(const Mesh& mesh, const VolumeGeometry& lattice);
 
 // Makes the summary of the resampled volume (Summarize) one of the grid: the range is that of all finite values of the grid, the histogram
-// is counted again over it, and the range of each brick includes the values of all cells whose bounding boxes touch the brick's voxels.
+// is counted again over it, the range of each brick includes the values of all cells whose bounding boxes touch the brick's voxels, and the
+// cells of each brick are counted.
 void SummarizeCells(const Mesh& mesh, const Volume& resampled, VolumeSummary& summary);
 
 }  // namespace slabstream
