@@ -9,29 +9,12 @@
 #include <type_traits>
 
 #include "common/base/check.h"
+#include "common/classification/occupancy_layers.h"
 
 namespace slabstream {
 namespace {
 
 static_assert(kBrick % kOccupancyCell == 0, "a cell lies in one brick");
-
-// A layer of a cell: bit kOccupancyCell * y + x.
-using Layer = std::uint64_t;
-
-// The rows of a layer that hold any, bit y.
-constexpr std::uint32_t RowsOf(Layer layer) {
-  constexpr Layer kLow = 0x7F7F7F7F7F7F7F7F;
-  const Layer any = (((layer & kLow) + kLow) | layer) & ~kLow;  // the highest bit of each row
-  return std::uint32_t((any >> 7) * 0x0102040810204080 >> 56);
-}
-
-// The columns of a layer that hold any, bit x.
-constexpr std::uint32_t ColumnsOf(Layer layer) {
-  layer |= layer >> 32;
-  layer |= layer >> 16;
-  layer |= layer >> 8;
-  return std::uint32_t(layer & 0xFF);
-}
 
 // Whether a sample is occupied, 0 or 1: of integers by table.
 template <class T>
@@ -74,16 +57,12 @@ CellOccupancy CountCell(const BrickView<T>& brick, const Box& cell, const Occupi
   if (brick.y_stride == 0) return occupied(*brick.first) != 0 ? FullCell(cell) : CellOccupancy{};
   CellOccupancy counted;
   for (std::int32_t z = cell.begin.z; z < cell.end.z; ++z) {
-    Layer layer = 0;
+    OccupancyLayer layer = 0;
     for (std::int32_t y = cell.begin.y; y < cell.end.y; ++y) {
-      const Layer row = RowMask(brick.Row(y, z) + (cell.begin.x - brick.begin.x), cell.size().x, occupied);
+      const OccupancyLayer row = RowMask(brick.Row(y, z) + (cell.begin.x - brick.begin.x), cell.size().x, occupied);
       layer |= row << kOccupancyCell * (y - cell.begin.y);
     }
-    if (layer == 0) continue;
-    const std::int32_t first_line = kOccupancyCell * (z - cell.begin.z);
-    counted.lines_x |= LineSet{RowsOf(layer)} << first_line;
-    counted.lines_y |= LineSet{ColumnsOf(layer)} << first_line;
-    counted.voxels = std::uint16_t(counted.voxels + CountOf(layer));
+    AddLayer(counted, z - cell.begin.z, layer);
   }
   return counted;
 }

@@ -13,7 +13,8 @@ namespace slabstream {
 OccupancyGrid CountOccupied(const VoxelBricks& voxels, const ClassificationTable& table);
 
 // Of an unstructured grid, on its lattice: a voxel is occupied if the space that it fills touches the bounding box of a cell that may be
-// visible, because an opacity between its least and its greatest value is above zero. Parallel.
+// visible, because an opacity between its least and its greatest value is above zero. Nothing is visible of a cell with a value that is not
+// finite. Parallel, with the same result for any number of threads.
 OccupancyGrid CountOccupiedByCells(const Mesh& mesh, const VolumeDescription& lattice, const ClassificationTable& table);
 
 }  // namespace slabstream

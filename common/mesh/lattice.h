@@ -16,6 +16,9 @@ namespace slabstream {
 
 inline constexpr std::int32_t kMaxLatticeSide = 1024;  // voxels
 
+// Extents of a grid along each axis: its places, measured from a corner, keep their precision as floats.
+inline constexpr double kLeastExtent = 1e-30, kMostExtent = 1e30;
+
 // In the world.
 struct Bounds3 {
   Vec3 low, high;
@@ -23,21 +26,25 @@ struct Bounds3 {
 
 // A lattice whose volume is `bounds` exactly: the outer voxels' centres lie half a voxel inside its sides. Voxels are nearly cubes.
 // `longest_side`: voxels along the longest side, in [1, kMaxLatticeSide]; none: such that there are two voxels for each of `cells`, but at
-// least 32 and at most 256 along the longest side. The axes are those of the world. Expects a positive extent along each axis.
+// least 32 and at most 256 along the longest side. The axes are those of the world. Expects extents in [kLeastExtent, kMostExtent].
 VolumeGeometry LatticeOf(const Bounds3& bounds, std::int64_t cells, std::optional<std::int32_t> longest_side);
 
 // Moves points from the world, measured from bounds.low, to data space of the lattice: [-0.5, size - 0.5] along each axis.
 void MoveToLattice(const VolumeGeometry& lattice, Mesh& mesh);
 
-// Orders tetrahedra and points so that what is near in space is near in memory.
+// Orders tetrahedra and points so that what is near in space is near in memory. Points of no tetrahedron are dropped. Parallel, with the
+// same result for any number of threads.
 void SortByPlace(const VolumeGeometry& lattice, Mesh& mesh);
 
-// The grid's value at each voxel's centre; NaN where there is no cell. Parallel.
+// The grid's value at each voxel's centre; NaN where there is no cell, or one with a value that is not finite. Cells contain what lies on
+// their faces; of several cells that contain a centre it is the one with the highest number that counts. Flat cells contain nothing.
+// Parallel, with the same result for any number of threads.
 Volume Resample(const Mesh& mesh, const VolumeGeometry& lattice);
 
-// Makes the summary of the resampled volume (Summarize) one of the grid: the range is that of all finite values of the grid, the histogram
-// is counted again over it, the range of each brick includes the values of all cells whose bounding boxes touch the brick's voxels, and the
-// cells of each brick are counted.
+// Makes the summary of the resampled volume (Summarize) one of the grid: the range is that of the values of all cells, the histogram is
+// counted again over it, and the range of each brick is that of the values of all cells whose bounding boxes touch the brick's voxels.
+// Cells are counted in the brick in which their bounding boxes have their centres.
+// Cells with a value that is not finite do not count: nothing of them is seen. Parallel.
 void SummarizeCells(const Mesh& mesh, const Volume& resampled, VolumeSummary& summary);
 
 }  // namespace slabstream

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/mesh/cell_runs.h"
 #include "common/mesh/mesh.h"
 #include "common/volume/box.h"
 
@@ -22,18 +23,21 @@ class MeshCutter {
   Mesh Cut(const Box& box) const;
 
   const Mesh& mesh() const { return *mesh_; }
-  std::size_t bytes() const;  // memory, with the mesh
+  std::size_t bytes() const { return mesh_->bytes() + runs_.bytes(); }  // memory, with the mesh
 
  private:
-  struct Run {  // of consecutive tetrahedra
-    Vector3<float> low, high;
-  };
   std::shared_ptr<const Mesh> mesh_;
-  std::vector<Run> runs_;
+  CellRuns runs_;
 };
 
-// The mesh as bytes, little-endian, and back. DataLoss: they are not those of a mesh; a point is not finite; a tetrahedron has a point that
-// there is not, or one twice.
+// The mesh as bytes, little-endian, and back:
+//   uint64 points, uint64 tetrahedra     how many
+//   uint64 at                            0: a value for each point, 1: one for each tetrahedron
+//   float32 x, y, z                      of each point
+//   uint32 a, b, c, d                    the points of each tetrahedron
+//   float32 value                        of each point or tetrahedron
+// DataLoss: they are not those of a mesh; a point is not finite; a tetrahedron has a point that there is not, or one twice. Memory is taken
+// for what the bytes hold and no more.
 std::vector<std::byte> EncodeMesh(const Mesh& mesh);
 Result<Mesh> DecodeMesh(std::span<const std::byte> bytes);
 
