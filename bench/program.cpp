@@ -2,8 +2,9 @@
 
 #include "common/base/parse_number.h"
 #include "common/base/version.h"
-#include "common/classification/count_occupied.h"
 #include "common/cli/program.h"
+#include "common/mesh/lattice.h"
+#include "common/planning/count_drawn.h"
 
 namespace slabstream {
 namespace {
@@ -53,14 +54,14 @@ Result<Subject> LoadSubject(const SubjectOptions& options, const std::string& te
   if (!parsed.ok()) return parsed.status();
   const Result<std::shared_ptr<const Volume>> volume = LoadBenchVolume(*parsed);
   if (!volume.ok()) return volume.status();
-  Subject subject{.name = parsed->name, .volume = *volume, .summary = std::make_shared<const VolumeSummary>(Summarize(**volume))};
+  Subject subject{.name = parsed->name, .volume = *volume, .summary = std::make_shared<const VolumeSummary>(SummaryOf(**volume))};
   const ViewParameters view{.azimuth_degrees = options.azimuth, .elevation_degrees = options.elevation, .zoom = options.zoom};
   subject.request = BenchRequest(*parsed, view, {options.size, options.size});
   Result<FrameSetup> setup = MakeFrameSetup(subject.request, 1, *subject.summary);
   if (!setup.ok()) return setup.status();
   subject.setup = *std::move(setup);
-  subject.occupied = std::make_shared<const OccupancyGrid>(
-      CountOccupied(subject.volume->block, parsed->renderer->DrawnTable(subject.setup.transfer, *subject.summary)));
+  subject.occupied =
+      std::make_shared<const OccupancyGrid>(CountDrawn(*subject.volume, *subject.summary, *parsed->renderer, subject.setup.transfer));
   return subject;
 }
 

@@ -108,14 +108,11 @@ Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& actio
   if (!loaded.ok()) return loaded.status();
   const std::shared_ptr<const Volume>& volume = loaded->volume;
   const Layers& layers = loaded->layers;
-  VolumeSummary summary = Summarize(LayeredVolume{volume, layers});
+  auto summary = std::make_shared<const VolumeSummary>(SummaryOf(LayeredVolume{volume, layers}));
   SlabServer::Samples samples;
   const bool held = action.source.held_bytes > 0;  // as a whole, in any case
-  if (layers.cells != nullptr) {
-    SummarizeCells(*layers.cells, *volume, summary);
-    samples.cells = std::make_shared<const MeshCutter>(layers.cells);
-  }
-  if (!held && MostBricksAreEqual(summary)) {
+  if (volume->cells != nullptr) samples.cells = std::make_shared<const MeshCutter>(volume->cells);
+  if (!held && MostBricksAreEqual(*summary)) {
     samples.bricks = std::make_shared<const BrickedVoxels>(volume->block);
   } else {
     samples.volume = volume;
@@ -124,8 +121,7 @@ Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& actio
   if (layers.overlay != nullptr) samples.overlay = std::make_shared<const BrickedVoxels>(layers.overlay->block);
   const DatasetId id = IdOf(action.name, *volume, layers);
   const std::uint64_t bytes = samples.bytes() - (held ? volume->block.bytes.size() : 0);
-  return News{DatasetLoaded{action.name, action.load, id, std::make_shared<const VolumeSummary>(std::move(summary)), bytes, loaded->stamp},
-              id, std::move(samples)};
+  return News{DatasetLoaded{action.name, action.load, id, std::move(summary), bytes, loaded->stamp}, id, std::move(samples)};
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(LoadDataset& action) {

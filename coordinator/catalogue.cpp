@@ -147,7 +147,6 @@ Result<LayeredVolume> ReadSource(const DataSource& data) {
   if (!read.ok()) return read.status();
   Result<Layers> layers = ReadLayers(data.layers, read->volume->description.geometry);
   if (!layers.ok()) return layers.status();
-  layers->cells = read->cells;
   return LayeredVolume{.volume = read->volume, .layers = *std::move(layers)};
 }
 

@@ -36,7 +36,7 @@ DatasetId IdOf(const std::string& name, const Volume& volume, const Layers& laye
   }
   const std::string text = fmt::format("{} {} {} {} {} {} {} {} {} {:x} {}", size.x, size.y, size.z, numbers(spacing), place, int(type),
                                        mapping.scale, mapping.offset, volume.block.bytes.size(), Digest(volume.block.bytes), name) +
-                           (layers.types().any() ? of_layers : "") + (layers.cells == nullptr ? "" : OfCells(*layers.cells));
+                           (layers.types().any() ? of_layers : "") + (volume.cells == nullptr ? "" : OfCells(*volume.cells));
   return std::max<DatasetId>(Digest(std::as_bytes(std::span(text))), 1);
 }
 

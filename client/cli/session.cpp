@@ -19,7 +19,6 @@ Result<LayeredVolume> LoadInput(const std::string& path, const LayerFiles& files
   if (!loaded.ok()) return loaded.status();
   Result<Layers> layers = ReadLayers(files, loaded->volume->description.geometry);
   if (!layers.ok()) return AsInput(layers.status());
-  layers->cells = std::move(loaded->cells);
   return LayeredVolume{.volume = std::move(loaded->volume), .layers = *std::move(layers)};
 }
 

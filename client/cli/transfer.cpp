@@ -3,6 +3,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/input_volume.h"
+#include "common/mesh/lattice.h"
 #include "common/planning/frame_plan.h"
 
 namespace slabstream {
@@ -11,7 +12,7 @@ Status RunTransfer(const TransferOptions& options) {
   if (Status status = CheckInputVolume(options.path); !status.ok()) return status;
   const Result<LoadedVolume> loaded = ReadInputVolume(options.path);
   if (!loaded.ok()) return loaded.status();
-  const Result<TransferFunction> transfer = ResolveTransfer(options.transfer, Summarize(*loaded->volume));
+  const Result<TransferFunction> transfer = ResolveTransfer(options.transfer, SummaryOf(*loaded->volume));
   if (!transfer.ok()) return transfer.status();
   std::cout << FormatParaViewColorMap(*transfer, std::get<std::string>(options.transfer.choice));
   return Status::Ok();

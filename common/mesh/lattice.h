@@ -47,4 +47,8 @@ Volume Resample(const Mesh& mesh, const VolumeGeometry& lattice);
 // Cells with a value that is not finite do not count: nothing of them is seen. Parallel.
 void SummarizeCells(const Mesh& mesh, const Volume& resampled, VolumeSummary& summary);
 
+// Summarize, and SummarizeCells if the volume has cells.
+VolumeSummary SummaryOf(const Volume& volume);
+VolumeSummary SummaryOf(const LayeredVolume& volume);
+
 }  // namespace slabstream

@@ -93,4 +93,16 @@ void SummarizeCells(const Mesh& mesh, const Volume& resampled, VolumeSummary& su
   summary.histogram = HistogramOf(resampled, summary.range);
 }
 
+VolumeSummary SummaryOf(const Volume& volume) {
+  VolumeSummary summary = Summarize(volume);
+  if (volume.cells != nullptr) SummarizeCells(*volume.cells, volume, summary);
+  return summary;
+}
+
+VolumeSummary SummaryOf(const LayeredVolume& volume) {
+  VolumeSummary summary = Summarize(volume);
+  if (volume.volume->cells != nullptr) SummarizeCells(*volume.volume->cells, *volume.volume, summary);
+  return summary;
+}
+
 }  // namespace slabstream

@@ -4,7 +4,7 @@
 //   labels   which structure a voxel belongs to: a number of the dataset's LabelTable, 0: none. uint8 or uint16
 //   overlay  a second scalar value, NaN: none. float32, data values
 //
-// A dataset of an unstructured grid also has cells. These are no layer of voxels: a box of it has the cells that touch it.
+// The cells of an unstructured grid (Volume::cells) are no layer of voxels: a box of it has those that touch it.
 #pragma once
 
 #include <array>
@@ -18,8 +18,6 @@
 
 namespace slabstream {
 
-struct Mesh;  // common/mesh/mesh.h
-
 // kVolume: none of the layers, but the volume itself.
 enum class Layer : std::uint8_t { kVolume = 0, kLabels = 1, kOverlay = 2 };
 inline constexpr std::array kLayers = {Layer::kVolume, Layer::kLabels, Layer::kOverlay};
@@ -27,7 +25,7 @@ inline constexpr std::array kLayers = {Layer::kVolume, Layer::kLabels, Layer::kO
 // Of stored samples. nullopt: there is no such layer.
 struct LayerTypes {
   std::optional<ScalarType> labels = {}, overlay = {};
-  bool cells = false;
+  bool cells = false;  // the volume has cells
 
   bool any() const { return labels || overlay; }
   friend bool operator==(const LayerTypes&, const LayerTypes&) = default;
@@ -81,13 +79,11 @@ struct LabelTable {
 struct Layers {
   std::shared_ptr<const Volume> labels = nullptr, overlay = nullptr;
   std::shared_ptr<const LabelTable> table = nullptr;  // if there are labels
-  std::shared_ptr<const Mesh> cells = nullptr;        // in data space of the volume
 
   LayerTypes types() const {
     LayerTypes types;
     if (labels != nullptr) types.labels = labels->description.type;
     if (overlay != nullptr) types.overlay = overlay->description.type;
-    types.cells = cells != nullptr;
     return types;
   }
 };

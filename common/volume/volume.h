@@ -94,10 +94,13 @@ decltype(auto) VisitScalarType(ScalarType type, Function&& function) {
   return function(static_cast<const float*>(nullptr));
 }
 
+struct Mesh;  // common/mesh/mesh.h
+
 // A whole volume in memory: block.box is the geometry's bounds.
 struct Volume {
   VolumeDescription description;
   VoxelBlock block;
+  std::shared_ptr<const Mesh> cells = nullptr;  // of an unstructured grid, in data space; the voxels are its values on a lattice
 };
 
 }  // namespace slabstream

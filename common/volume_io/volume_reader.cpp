@@ -56,6 +56,7 @@ Result<LoadedVolume> Finish(RawVolume raw, const VolumeFormat& format, const std
   auto volume = std::make_shared<Volume>();
   volume->description = description;
   volume->block = {{{0, 0, 0}, raw.header.size}, kept.type, std::move(kept.bytes)};
+  volume->cells = std::move(raw.cells);
   if (placed->turn != AxisTurn{}) {
     if (Status status = CheckFitsMemory(std::int64_t(volume->block.bytes.size()), path); !status.ok()) return status;
     volume->block = TurnVoxels(volume->block, placed->turn);
@@ -66,7 +67,6 @@ Result<LoadedVolume> Finish(RawVolume raw, const VolumeFormat& format, const std
         StraightenVoxels(volume->block, *placed->slant, description.geometry.size, LowestSample(volume->block, description.mapping));
   }
   loaded.volume = std::move(volume);
-  loaded.cells = std::move(raw.cells);
   return loaded;
 }
 

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/files.h"
+#include "common/mesh/lattice.h"
 #include "common/volume_io/volume_reader.h"
 
 namespace slabstream {
@@ -40,7 +41,7 @@ Status ExportCase(const BenchCase& bench_case, const BenchOptions& options) {
   if (!volume.ok()) return volume.status();
   Result<TransferFunction> transfer = std::holds_alternative<TransferFunction>(bench_case.transfer.choice)
                                           ? Result<TransferFunction>(std::get<TransferFunction>(bench_case.transfer.choice))
-                                          : MakePreset(std::get<std::string>(bench_case.transfer.choice), Summarize(**volume));
+                                          : MakePreset(std::get<std::string>(bench_case.transfer.choice), SummaryOf(**volume));
   if (!transfer.ok()) return transfer.status();
   const std::string directory = options.export_directory + "/", base = directory + bench_case.name;
   if (Status status = WriteVolume(**volume, directory + bench_case.dataset + ".mha"); !status.ok()) return status;

@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <span>
 
-#include "common/classification/count_occupied.h"
+#include "common/mesh/lattice.h"
+#include "common/mesh/mesh_part.h"
+#include "common/planning/count_drawn.h"
 #include "common/planning/frame_plan.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/volume_io/read_options.h"
@@ -27,20 +30,24 @@ std::string CanonicalSource(const std::string& source) {
   return !parsed.ok() || error ? source : canonical.string() + source.substr(parsed->path.size());  // the reader reports the error
 }
 
+std::string DigestOf(std::span<const std::byte> bytes) { return DigestText({reinterpret_cast<const char*>(bytes.data()), bytes.size()}); }
+
 Json FileJson(const std::string& path, const Volume& volume) {
   const auto& [geometry, type, mapping] = volume.description;
   const auto& [size, spacing, orientation] = geometry;
   const auto& [scale, offset] = mapping;
   const auto numbers = [](const Vec3& v) { return Json::array({v.x, v.y, v.z}); };
   const AlignedVector<std::byte>& bytes = volume.block.bytes;
-  return {{"file", path},
-          {"voxels", Json::array({size.x, size.y, size.z})},
-          {"spacing", numbers(spacing)},
-          {"axes", Json::array({numbers(orientation.axes[0]), numbers(orientation.axes[1]), numbers(orientation.axes[2])})},
-          {"bytes", bytes.size()},
-          {"type", int(type)},
-          {"mapping", Json::array({scale, offset})},
-          {"digest", DigestText({reinterpret_cast<const char*>(bytes.data()), bytes.size()})}};
+  Json json = {{"file", path},
+               {"voxels", Json::array({size.x, size.y, size.z})},
+               {"spacing", numbers(spacing)},
+               {"axes", Json::array({numbers(orientation.axes[0]), numbers(orientation.axes[1]), numbers(orientation.axes[2])})},
+               {"bytes", bytes.size()},
+               {"type", int(type)},
+               {"mapping", Json::array({scale, offset})},
+               {"digest", DigestOf(bytes)}};
+  if (volume.cells != nullptr) json["cells"] = DigestOf(EncodeMesh(*volume.cells));
+  return json;
 }
 
 // What a case's volume is made or read from: cases of one source have one volume.
@@ -65,7 +72,7 @@ VolumeInUse VolumeCache::Get(const BenchCase& volume) {
       throw Failure(Status::InvalidArgument(fmt::format("'{}' has changed since this run began", source)));
     }
   }
-  auto summary = std::make_shared<const VolumeSummary>(Summarize(*loaded));
+  auto summary = std::make_shared<const VolumeSummary>(SummaryOf(*loaded));
   held_.push_front({std::move(source), {std::move(loaded), std::move(summary)}});
   std::size_t bytes = 0;
   const auto first_too_many = std::find_if(std::next(held_.begin()), held_.end(), [&](const Held& held) {
@@ -87,9 +94,13 @@ std::shared_ptr<const OccupancyGrid> VolumeCache::Occupied(const BenchCase& volu
   std::shared_ptr<const OccupancyGrid>& grid = occupied_[{Identity(volume).dump() + TransferJson(volume.transfer).dump(), volume.renderer}];
   if (grid != nullptr) return grid;
   const VolumeInUse in_use = Get(volume);
+  if (volume.renderer->draws_cells() && in_use.volume->cells == nullptr) {
+    throw Failure(Status::InvalidArgument(
+        fmt::format("renderer '{}' draws the cells of unstructured grids, and '{}' is a volume", volume.renderer->name(), volume.dataset)));
+  }
   const VolumeSummary& summary = *in_use.summary;
   const TransferFunction transfer = OrThrow(ResolveTransfer(volume.transfer, summary));
-  grid = std::make_shared<const OccupancyGrid>(CountOccupied(in_use.volume->block, volume.renderer->DrawnTable(transfer, summary)));
+  grid = std::make_shared<const OccupancyGrid>(CountDrawn(*in_use.volume, summary, *volume.renderer, transfer));
   return grid;
 }
 

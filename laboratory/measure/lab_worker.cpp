@@ -3,13 +3,16 @@
 #include <tbb/task_arena.h>
 
 #include <atomic>
+#include <utility>
 
 #include "common/base/time.h"
 #include "laboratory/measure/thread_time.h"
 
 namespace slabstream {
 
-LabWorker::LabWorker(const Volume& volume) : volume_(volume) {}
+LabWorker::LabWorker(const Volume& volume) : volume_(volume) {
+  if (volume.cells != nullptr) cells_ = std::make_unique<MeshCutter>(volume.cells);
+}
 LabWorker::~LabWorker() = default;
 
 BoxRendering LabWorker::Render(const Box& box, const FrameSetup& setup) {
@@ -17,7 +20,11 @@ BoxRendering LabWorker::Render(const Box& box, const FrameSetup& setup) {
   kind_ = setup.renderer;
   const Box slab_box = SlabBox(box, setup);
   std::unique_ptr<SlabData>& slab = slabs_[slab_box];
-  if (slab == nullptr) slab = std::make_unique<SlabData>(BrickedVoxels(CutBlock(volume_.block, slab_box)));
+  if (slab == nullptr) {
+    SlabLayers layers;
+    if (cells_ != nullptr) layers.cells = std::make_shared<const Mesh>(cells_->Cut(slab_box));
+    slab = std::make_unique<SlabData>(BrickedVoxels(CutBlock(volume_.block, slab_box)), std::move(layers));
+  }
   const std::atomic<bool> cancelled = false;
   BoxRendering rendering;
   tbb::task_arena one_thread(1);

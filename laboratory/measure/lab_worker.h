@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "common/image/local_image.h"
+#include "common/mesh/mesh_part.h"
 #include "common/planning/frame_plan.h"
 #include "common/stats/report.h"
 #include "common/volume/volume.h"
@@ -33,6 +34,7 @@ class LabWorker {
 
  private:
   const Volume& volume_;
+  std::unique_ptr<MeshCutter> cells_;  // of an unstructured grid
   const RendererKind* kind_ = nullptr;
   std::unique_ptr<Renderer> renderer_;
   std::map<Box, std::unique_ptr<SlabData>> slabs_;  // with halo

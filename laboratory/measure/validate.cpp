@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/base/check.h"
+#include "common/mesh/lattice.h"
 #include "common/planning/placement.h"
 #include "laboratory/measure/calibrate.h"
 #include "laboratory/measure/frame_costs.h"
@@ -63,7 +64,7 @@ struct View {
 
 Result<std::vector<View>> MakeViews(const ValidationCase& what, int count) {
   const Roster roster = RosterOf(std::uint32_t(what.workers));
-  const VolumeSummary summary = Summarize(*what.volume);
+  const VolumeSummary summary = SummaryOf(*what.volume);
   std::vector<View> views;
   for (int i = 0; i < count; ++i) {
     View& view = views.emplace_back(View{.request = what.request});
