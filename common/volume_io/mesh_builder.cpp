@@ -37,7 +37,9 @@ Result<std::size_t> MeshBuilder::ChooseArray(const MeshOptions& options) {
   if (active.empty() && scalars.size() > 1) {
     return Wrong(fmt::format("has several arrays and none is the active scalars; choose one by its name: {}", names));
   }
-  return info.array = active.empty() ? scalars.front() : active.front();
+  if (active.empty()) return info.array = scalars.front();
+  const auto of_points = std::ranges::find_if(active, [&](std::size_t i) { return info.arrays[i].at == ValuesAt::kPoints; });
+  return info.array = of_points == active.end() ? active.front() : *of_points;
 }
 
 Status MeshBuilder::SetPoints(const AlignedVector<double>& places) {

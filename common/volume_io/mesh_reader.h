@@ -43,7 +43,7 @@ struct LoadedMesh {
 };
 
 struct MeshOptions {
-  std::string array;  // "": the active scalars, else the only array with one component
+  std::string array;  // "": the active scalars, those of points first, else the only array with one component
 };
 
 // By its ending; a legacy VTK file by what it says of its dataset.

@@ -119,6 +119,10 @@ TEST_F(MeshReader, LegacyFilesMayHoldMoreThanIsRead) {
   EXPECT_EQ(loaded->info.arrays.size(), 6U);
   EXPECT_EQ(Read(grid + data, "u")->mesh.values, (AlignedVector<float>{4, 3, 2, 1}));
   EXPECT_EQ(Read(grid + data, "ids")->mesh.at, ValuesAt::kCells);
+  // Scalars of points come first, wherever they stand.
+  const std::string of_cells = "CELL_DATA 1\nSCALARS c float\nLOOKUP_TABLE default\n9\n";
+  EXPECT_EQ(Read(grid + of_cells)->mesh.values, AlignedVector<float>{9});
+  EXPECT_EQ(Read(grid + of_cells + data)->mesh.values, (AlignedVector<float>{1, 2, 3, 4}));
 }
 
 TEST_F(MeshReader, SaysWhatIsWrongWithALegacyFile) {
