@@ -12,6 +12,7 @@
 #include "common/base/guarded.h"
 #include "common/base/log.h"
 #include "common/base/printable.h"
+#include "common/mesh/lattice.h"
 #include "common/planning/layer_bricks.h"
 #include "common/renderers/renderer_kind.h"
 #include "coordinator/answer_question.h"
@@ -60,7 +61,9 @@ Result<FoundData> Find(const std::vector<std::string>& arguments) {
 Result<std::shared_ptr<const OccupancyGrid>> Count(const CountFunction& count, const SlabServer::Samples& samples,
                                                    const CountDataset& action) {
   const RendererKind& renderer = *action.volume.renderer();
-  OccupancyGrid grid = count(samples.view(), renderer.DrawnTable(action.volume.transfer(), *action.summary));
+  const ClassificationTable drawn = renderer.DrawnTable(action.volume.transfer(), *action.summary);
+  OccupancyGrid grid = renderer.draws_cells() ? CountOccupiedByCells(samples.cells->mesh(), action.summary->description, drawn)
+                                              : count(samples.view(), drawn);
   AddLayerBricks(LayerBricks(*action.summary, renderer, action.volume.looks()), *action.summary, grid);
   return std::make_shared<const OccupancyGrid>(std::move(grid));
 }
@@ -105,10 +108,14 @@ Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& actio
   if (!loaded.ok()) return loaded.status();
   const std::shared_ptr<const Volume>& volume = loaded->volume;
   const Layers& layers = loaded->layers;
-  auto summary = std::make_shared<const VolumeSummary>(Summarize(LayeredVolume{volume, layers}));
+  VolumeSummary summary = Summarize(LayeredVolume{volume, layers});
   SlabServer::Samples samples;
   const bool held = action.source.held_bytes > 0;  // as a whole, in any case
-  if (!held && MostBricksAreEqual(*summary)) {
+  if (layers.cells != nullptr) {
+    SummarizeCells(*layers.cells, *volume, summary);
+    samples.cells = std::make_shared<const MeshCutter>(layers.cells);
+  }
+  if (!held && MostBricksAreEqual(summary)) {
     samples.bricks = std::make_shared<const BrickedVoxels>(volume->block);
   } else {
     samples.volume = volume;
@@ -117,7 +124,8 @@ Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& actio
   if (layers.overlay != nullptr) samples.overlay = std::make_shared<const BrickedVoxels>(layers.overlay->block);
   const DatasetId id = IdOf(action.name, *volume, layers);
   const std::uint64_t bytes = samples.bytes() - (held ? volume->block.bytes.size() : 0);
-  return News{DatasetLoaded{action.name, action.load, id, std::move(summary), bytes, loaded->stamp}, id, std::move(samples)};
+  return News{DatasetLoaded{action.name, action.load, id, std::make_shared<const VolumeSummary>(std::move(summary)), bytes, loaded->stamp},
+              id, std::move(samples)};
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(LoadDataset& action) {

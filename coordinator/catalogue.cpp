@@ -145,12 +145,10 @@ Result<LayeredVolume> ReadSource(const DataSource& data) {
   if (!source.ok()) return source.status();
   const Result<LoadedVolume> read = ReadVolume(source->path, source->options);
   if (!read.ok()) return read.status();
-  LayeredVolume loaded{.volume = read->volume};
-  if (!data.layers.any()) return loaded;
   Result<Layers> layers = ReadLayers(data.layers, read->volume->description.geometry);
   if (!layers.ok()) return layers.status();
-  loaded.layers = *std::move(layers);
-  return loaded;
+  layers->cells = read->cells;
+  return LayeredVolume{.volume = read->volume, .layers = *std::move(layers)};
 }
 
 // Moves ",labels=..." and ",overlay=..." from the end of a named path to `layers`.

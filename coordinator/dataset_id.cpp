@@ -5,9 +5,20 @@
 #include <algorithm>
 #include <span>
 
+#include "common/mesh/mesh.h"
 #include "common/wire/digest.h"
 
 namespace slabstream {
+
+namespace {
+
+std::string OfCells(const Mesh& mesh) {
+  const auto digest = [](const auto& array) { return Digest(std::as_bytes(std::span(array))); };
+  return fmt::format(" cells {} {} {} {:x} {:x} {:x}", mesh.points.size(), mesh.tetrahedra.size(), int(mesh.at), digest(mesh.points),
+                     digest(mesh.tetrahedra), digest(mesh.values));
+}
+
+}  // namespace
 
 DatasetId IdOf(const std::string& name, const Volume& volume, const Layers& layers) {
   const auto& [geometry, type, mapping] = volume.description;
@@ -25,7 +36,7 @@ DatasetId IdOf(const std::string& name, const Volume& volume, const Layers& laye
   }
   const std::string text = fmt::format("{} {} {} {} {} {} {} {} {} {:x} {}", size.x, size.y, size.z, numbers(spacing), place, int(type),
                                        mapping.scale, mapping.offset, volume.block.bytes.size(), Digest(volume.block.bytes), name) +
-                           (layers.types().any() ? of_layers : "");
+                           (layers.types().any() ? of_layers : "") + (layers.cells == nullptr ? "" : OfCells(*layers.cells));
   return std::max<DatasetId>(Digest(std::as_bytes(std::span(text))), 1);
 }
 

@@ -93,11 +93,26 @@ Bytes SlabServer::Cut(const Samples& samples, const Box& box, const ChunkPart& p
   return {std::move(buffer), cut};
 }
 
+Result<Bytes> SlabServer::CutCells(const Samples& samples, const ChunkRequest& request, Chunk& chunk) {
+  const Bytes all = cell_bytes_.Of(samples.cells, request.box);
+  const std::uint64_t begin = BeginOfCellChunk(request.chunk);
+  if (begin >= all.size()) {
+    return Status::InvalidArgument(
+        fmt::format("chunk request: chunk {} of cells is not below {}", request.chunk - kFirstCellChunk, CellChunkCount(all.size())));
+  }
+  chunk.cell_bytes = all.size();
+  const auto owner = std::make_shared<const Bytes>(all);
+  return Bytes(owner, all.span().subspan(begin, BytesOfCellChunk(all.size(), request.chunk)));
+}
+
 Status SlabServer::Check(const ChunkRequest& request, const Samples& samples) {
   if (!samples.any()) return Status::NotFound(fmt::format("chunk request: no dataset {}", request.dataset));
   if (request.box.empty() || !samples.box().Contains(request.box)) {
     return Status::InvalidArgument(
         fmt::format("chunk request: box {} is not inside the volume {}", Text(request.box), Text(samples.box())));
+  }
+  if (IsCellChunk(request.chunk)) {
+    return samples.cells != nullptr ? Status::Ok() : Status::InvalidArgument("chunk request: cells of a dataset that has none");
   }
   if (const std::uint32_t count = ChunkCount(request.box, samples.types()); request.chunk >= count) {
     return Status::InvalidArgument(fmt::format("chunk request: chunk {} is not below {}", request.chunk, count));
@@ -130,9 +145,12 @@ void SlabServer::Answer(const Incoming& incoming) {
   const Status served = Guarded("chunk request", [&] {
     const Samples samples = Find(request->dataset);
     if (Status status = Check(*request, samples); !status.ok()) return status;
-    const ChunkPart part = PartOfChunk(request->box, samples.types(), request->chunk);
     Chunk chunk{.epoch = epoch_, .dataset = request->dataset, .box = request->box, .chunk = request->chunk};
-    const Bytes payload = PackChunk(Cut(samples, request->box, part), codec_, chunk);
+    Result<Bytes> cut = IsCellChunk(request->chunk)
+                            ? CutCells(samples, *request, chunk)
+                            : Cut(samples, request->box, PartOfChunk(request->box, samples.types(), request->chunk));
+    if (!cut.ok()) return cut.status();
+    const Bytes payload = PackChunk(*std::move(cut), codec_, chunk);
     const Status sent = socket_.Send(incoming.identity, Encode(chunk), payload);
     if (!sent.ok()) LogDebug("slabs plane: " + sent.message());  // it has gone, or asks again when its request times out
     return Status::Ok();

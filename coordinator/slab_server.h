@@ -20,6 +20,7 @@
 #include "common/volume/bricks.h"
 #include "common/volume/layers.h"
 #include "common/wire/any_message.h"
+#include "coordinator/cell_bytes.h"
 #include "coordinator/chunk_buffers.h"
 
 namespace slabstream {
@@ -28,11 +29,13 @@ inline constexpr int kMaxQueuedChunks = 64;  // several times what a worker's cr
 
 class SlabServer {
  public:
-  // The voxels of a dataset: a whole volume, or bricks if they take much less memory. One of the two, or neither. And those of its layers.
+  // The voxels of a dataset: a whole volume, or bricks if they take much less memory. One of the two, or neither. And those of its layers,
+  // and its cells.
   struct Samples {
     std::shared_ptr<const Volume> volume = nullptr;
     std::shared_ptr<const BrickedVoxels> bricks = nullptr;
     std::shared_ptr<const BrickedVoxels> labels = nullptr, overlay = nullptr;
+    std::shared_ptr<const MeshCutter> cells = nullptr;  // of an unstructured grid
 
     bool any() const { return volume != nullptr || bricks != nullptr; }
     // What follows needs any().
@@ -42,12 +45,14 @@ class SlabServer {
     }
     std::uint64_t bytes() const {
       const std::uint64_t of_layers = (labels == nullptr ? 0 : labels->bytes()) + (overlay == nullptr ? 0 : overlay->bytes());
-      return of_layers + (volume != nullptr ? volume->block.bytes.size() : bricks->bytes());
+      const std::uint64_t of_cells = cells == nullptr ? 0 : cells->bytes();
+      return of_layers + of_cells + (volume != nullptr ? volume->block.bytes.size() : bricks->bytes());
     }
     SampleTypes types() const {
       SampleTypes types(volume != nullptr ? volume->block.type : bricks->type());
       if (labels != nullptr) types.layers.labels = labels->type();
       if (overlay != nullptr) types.layers.overlay = overlay->type();
+      types.layers.cells = cells != nullptr;
       return types;
     }
     VoxelBricks view() const { return volume != nullptr ? VoxelBricks(volume->block) : VoxelBricks(*bricks); }
@@ -75,6 +80,8 @@ class SlabServer {
   std::vector<std::string> TakeUnwanted();
   void Answer(const Incoming& incoming);
   Bytes Cut(const Samples& samples, const Box& box, const ChunkPart& part);
+  // Those of the chunk that is asked for, whose cell_bytes it sets. InvalidArgument: there is no such chunk.
+  Result<Bytes> CutCells(const Samples& samples, const ChunkRequest& request, Chunk& chunk);
   static Status Check(const ChunkRequest& request, const Samples& samples);  // why it cannot be met, or ok
 
   const std::string endpoint_;
@@ -84,6 +91,7 @@ class SlabServer {
   std::map<DatasetId, Samples> samples_;  // guarded by mutex_
   std::vector<std::string> unwanted_;     // users whose connections are to end; guarded by mutex_
   ChunkBuffers buffers_;                  // the thread's
+  CellBytes cell_bytes_;                  // the thread's
   LimitedLog complaints_;                 // the thread's
   Wakeup wakeup_;
   Socket socket_;        // the thread's

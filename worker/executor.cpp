@@ -12,6 +12,7 @@
 #include "common/image/image_view.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/wire/payload.h"
+#include "worker/arriving_cells.h"
 
 namespace slabstream {
 namespace {
@@ -117,13 +118,16 @@ Status CombineBorrowed(LocalImage& image, bool fresh, const StartCombine& action
 
 }  // namespace
 
-// Voxels while they arrive (combining thread), then the data to render from (render thread, from the first StartRender on).
+// Voxels and cells while they arrive (combining thread), then the data to render from (render thread, from the first StartRender on).
 struct Executor::Slab {
   explicit Slab(const SlabKey& slab_key) : key(slab_key) {}
 
   Status Store(const Chunk& chunk, const Bytes& payload) {
     if (chunk.box.empty() || !key.box.Contains(chunk.box) || chunk.dataset != key.dataset) return Status::DataLoss("chunk of another slab");
     if (data != nullptr) return Status::Ok();  // a duplicate after the slab was complete
+    if (IsCellChunk(chunk.chunk)) {
+      return key.types.layers.cells ? cells.Store(chunk, payload.span()) : Status::DataLoss("cells of a dataset that has none");
+    }
     if (chunk.chunk >= ChunkCount(chunk.box, key.types) || chunk.raw_bytes != BytesOfChunk(chunk.box, key.types, chunk.chunk)) {
       return Status::DataLoss("chunk " + std::to_string(chunk.chunk) + " of " + std::to_string(chunk.raw_bytes) +
                               " bytes does not fit a box of " + std::to_string(chunk.box.voxel_count()) + " voxels");
@@ -144,8 +148,9 @@ struct Executor::Slab {
       for (const Copy& copy : copies) copy.Perform(layer, to);
     }
     copies.clear();
-    data = std::make_unique<SlabData>(*std::move(voxels[0]), SlabLayers{std::move(voxels[1]), std::move(voxels[2])});
+    data = std::make_unique<SlabData>(*std::move(voxels[0]), SlabLayers{std::move(voxels[1]), std::move(voxels[2]), cells.cells()});
     voxels = {};
+    cells = {};
     unpacked = {};
     return *data;
   }
@@ -182,7 +187,8 @@ struct Executor::Slab {
   const SlabKey key;
   std::vector<Copy> copies;
   std::array<std::optional<BrickedVoxels>, kLayers.size()> voxels;  // by layer
-  std::vector<std::byte> unpacked;                                  // a chunk's samples
+  ArrivingCells cells;
+  std::vector<std::byte> unpacked;  // a chunk's samples
   std::unique_ptr<SlabData> data;
 };
 

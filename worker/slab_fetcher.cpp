@@ -8,11 +8,11 @@
 #include "common/volume/box_assembly.h"
 
 namespace slabstream {
-namespace {
 
-std::uint64_t RawBytes(const SlabKey& key) { return std::uint64_t(key.box.voxel_count()) * key.types.bytes_per_voxel(); }
-
-}  // namespace
+std::uint32_t SlabFetcher::Slab::BytesOf(const ChunkPlace& chunk) const {
+  if (!IsCellChunk(chunk.chunk)) return BytesOfChunk(chunk.box, key.types, chunk.chunk);
+  return cell_bytes == 0 ? kChunkBytes : BytesOfCellChunk(cell_bytes, chunk.chunk);
+}
 
 SlabFetcher::Slab* SlabFetcher::Find(Generation slab) {
   const auto found = slabs_.find(slab);
@@ -38,7 +38,7 @@ SlabFetcher::Generation SlabFetcher::Acquire(DatasetId dataset, const Box& box, 
     const Generation generation = ++last_generation_;
     best = &slabs_[generation];
     best->key = {dataset, box, types, generation};
-    best->bytes = RawBytes(best->key);
+    best->bytes = best->RawBytes();
     cached_bytes_ += best->bytes;
     best->pins = 1;
     OpenSlab open = PlanSlab(*best);
@@ -56,9 +56,10 @@ SlabFetcher::Generation SlabFetcher::Acquire(DatasetId dataset, const Box& box, 
 OpenSlab SlabFetcher::PlanSlab(Slab& slab) {
   std::vector<Slab*> sources;
   std::vector<Box> at_hand;
-  const bool room = cached_bytes() <= most_cached();  // if not, everything that can be dropped must be
+  // If there is no room, everything that can be dropped must be. Cells are fetched for the whole slab.
+  const bool copies = cached_bytes() <= most_cached() && !slab.key.types.layers.cells;
   for (auto& [generation, other] : slabs_) {
-    if (!room || &other == &slab || other.retired || !other.is_complete()) continue;
+    if (!copies || &other == &slab || other.retired || !other.is_complete()) continue;
     if (other.key.dataset != slab.key.dataset || other.key.types != slab.key.types) continue;
     sources.push_back(&other);
     at_hand.push_back(other.key.box);
@@ -74,6 +75,7 @@ OpenSlab SlabFetcher::PlanSlab(Slab& slab) {
   for (const Box& box : assembly.missing) {
     for (std::uint32_t chunk = 0; chunk < ChunkCount(box, slab.key.types); ++chunk) slab.missing.push_back({box, chunk});
   }
+  if (slab.key.types.layers.cells) slab.missing.push_back({slab.key.box, kFirstCellChunk});
   std::ranges::reverse(slab.missing);
   slab.chunk_count = slab.missing.size();
   slab.begun = slab.is_complete();
@@ -102,7 +104,7 @@ SlabFetcher::FetchReport SlabFetcher::TakeReport(Generation slab) {
 void SlabFetcher::SetBytes(Generation slab, std::uint64_t bytes) {
   Slab& of_slab = slabs_.at(slab);
   cached_bytes_ -= of_slab.bytes;
-  of_slab.bytes = std::max(RawBytes(of_slab.key), bytes);
+  of_slab.bytes = std::max(of_slab.RawBytes(), bytes);
   cached_bytes_ += of_slab.bytes;
 }
 
@@ -115,7 +117,7 @@ void SlabFetcher::RequestChunks(std::span<const Generation> slabs, Epoch epoch, 
     slab.begun = true;
     while (!slab.retired && !slab.missing.empty()) {
       const ChunkPlace chunk = slab.missing.back();
-      const std::uint32_t bytes = BytesOfChunk(chunk.box, slab.key.types, chunk.chunk);
+      const std::uint32_t bytes = slab.BytesOf(chunk);
       if (!in_flight_.empty() && in_flight_bytes_ + bytes > config_.credit_bytes) return;
       slab.missing.pop_back();
       in_flight_[{generation, chunk}] = {bytes, now + config_.chunk_timeout, false};
@@ -138,13 +140,26 @@ void SlabFetcher::OnChunk(const Chunk& chunk, Bytes payload, WorkerActions& acti
   Slab* slab = FindRequested(chunk.dataset, place);
   if (slab == nullptr) return;  // a duplicate, or nobody waits for it any more
   InFlight& request = in_flight_.at({slab->key.generation, place});
-  if (chunk.raw_bytes != request.bytes) {
+  if (chunk.chunk == kFirstCellChunk) {
+    SetCellBytes(*slab, chunk.cell_bytes);
+    in_flight_bytes_ -= request.bytes - slab->BytesOf(place);
+    request.bytes = slab->BytesOf(place);
+  }
+  if (chunk.raw_bytes != request.bytes || (IsCellChunk(chunk.chunk) && chunk.cell_bytes != slab->cell_bytes)) {
     Retry(slab->key.generation, place,
           Status::DataLoss(fmt::format("chunk {} has {} bytes, expected {}", chunk.chunk, chunk.raw_bytes, request.bytes)));
     return;
   }
   request.storing = true;
   actions.push_back(StoreChunk{slab->key, chunk, std::move(payload)});
+}
+
+void SlabFetcher::SetCellBytes(Slab& slab, std::uint64_t bytes) {
+  const std::uint64_t before = slab.RawBytes();
+  slab.cell_bytes = bytes;
+  cached_bytes_ -= slab.bytes;
+  slab.bytes = slab.bytes - before + slab.RawBytes();
+  cached_bytes_ += slab.bytes;
 }
 
 void SlabFetcher::OnRefused(const ChunkRefused& refused) {
@@ -168,6 +183,11 @@ void SlabFetcher::OnStored(const ChunkStored& stored, Time now) {
   fetched_bytes_ += bytes;
   if (Slab* slab = Find(stored.slab.generation)) {
     ++slab->stored;
+    if (place.chunk == kFirstCellChunk) {
+      const std::uint32_t count = CellChunkCount(slab->cell_bytes);
+      for (std::uint32_t i = count - 1; i > 0; --i) slab->missing.push_back({place.box, kFirstCellChunk + i});
+      slab->chunk_count += count - 1;
+    }
     slab->report.voxel_bytes += bytes;
     slab->report.end = now;
     if (slab->is_complete()) RetireCovered(*slab);

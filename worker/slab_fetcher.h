@@ -48,7 +48,7 @@ class SlabFetcher {
   void Rendered(Generation slab);                                                 // the slab now holds all its voxels itself
   SlabKey key(Generation slab) const { return slabs_.at(slab).key; }
   FetchReport TakeReport(Generation slab);
-  // The slab's memory, with what was derived from its voxels; it may fall. Counts as at least the samples.
+  // The slab's memory, with what was derived from its voxels and cells; it may fall. Counts as at least the samples and cells.
   void SetBytes(Generation slab, std::uint64_t bytes);
 
   // Requests missing chunks of these slabs, which are in the order in which they are needed, within the credit (one chunk is always
@@ -86,6 +86,7 @@ class SlabFetcher {
     std::uint64_t last_use = 0;
     std::vector<Generation> sources;  // pinned
     std::vector<ChunkPlace> missing;  // chunks neither stored nor in flight; the next one to ask for is last
+    std::uint64_t cell_bytes = 0;     // of the slab's cells; 0: there are none, or no chunk of them has come yet
     std::size_t stored = 0, chunk_count = 0;
     std::map<ChunkPlace, int> failures;
     FetchReport report;
@@ -93,6 +94,10 @@ class SlabFetcher {
     bool begun = false;      // some of it was requested or copied: it takes memory
 
     bool is_complete() const { return stored == chunk_count; }
+    std::uint64_t RawBytes() const {  // of samples and cells
+      return std::uint64_t(key.box.voxel_count()) * key.types.bytes_per_voxel() + cell_bytes;
+    }
+    std::uint32_t BytesOf(const ChunkPlace& chunk) const;  // the most, if they are not known yet
   };
   struct InFlight {
     std::uint32_t bytes = 0;
@@ -107,6 +112,7 @@ class SlabFetcher {
   std::uint64_t BegunBytes() const;
   std::uint64_t most_cached() const { return std::min(config_.cache_bytes, room_); }
   void Unpin(std::span<const Generation> sources);
+  void SetCellBytes(Slab& slab, std::uint64_t bytes);
   void Retry(Generation slab, const ChunkPlace& chunk, const Status& why);
   void GiveUp(Slab& slab, Status status);
   void RetireCovered(Slab& complete);

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include "common/volume_io/mesh_reader.h"
-
 namespace slabstream {
 
 Status CheckInputVolume(const std::string& source) {
@@ -12,9 +10,6 @@ Status CheckInputVolume(const std::string& source) {
 }
 
 Status CheckInputVolume(const VolumeSource& source) {
-  if (LooksLikeMesh(source.path)) {
-    return Status::InvalidArgument(fmt::format("SOURCE {}: an unstructured grid, which only 'slabstream info' reads so far", source.path));
-  }
   const Status status = CheckVolume(source.path, source.options);
   return status.ok() ? status : Status(status.code(), "SOURCE " + status.message());
 }

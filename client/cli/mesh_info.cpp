@@ -72,7 +72,9 @@ Status RunMeshInfo(const InfoOptions& options) {
     return Status::InvalidArgument(
         fmt::format("SOURCE '{}' is an unstructured grid; transfer functions and layers are for volumes", options.path));
   }
-  const Result<LoadedMesh> loaded = ReadMesh(options.path);
+  const Result<VolumeSource> source = ParseVolumeSource(options.path);
+  if (!source.ok()) return source.status();
+  const Result<LoadedMesh> loaded = ReadMesh(source->path, {.array = source->options.array});
   if (!loaded.ok()) return AsInput(loaded.status());
   const ValueRange range = RangeOf(loaded->mesh.values);
   std::cout << (options.json ? MeshJson(*loaded, range).dump(2, ' ', false, Json::error_handler_t::replace) + "\n"

@@ -17,12 +17,10 @@ constexpr const char* kLocalDataset = "volume";
 Result<LayeredVolume> LoadInput(const std::string& path, const LayerFiles& files) {
   Result<LoadedVolume> loaded = ReadInputVolume(path);
   if (!loaded.ok()) return loaded.status();
-  LayeredVolume layered{.volume = std::move(loaded->volume)};
-  if (!files.any()) return layered;
-  Result<Layers> layers = ReadLayers(files, layered.volume->description.geometry);
+  Result<Layers> layers = ReadLayers(files, loaded->volume->description.geometry);
   if (!layers.ok()) return AsInput(layers.status());
-  layered.layers = *std::move(layers);
-  return layered;
+  layers->cells = std::move(loaded->cells);
+  return LayeredVolume{.volume = std::move(loaded->volume), .layers = *std::move(layers)};
 }
 
 }  // namespace

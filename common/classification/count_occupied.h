@@ -15,6 +15,6 @@ OccupancyGrid CountOccupied(const VoxelBricks& voxels, const ClassificationTable
 // Of an unstructured grid, on its lattice: a voxel is occupied if the space that it fills touches the bounding box of a cell that may be
 // visible, because an opacity between its least and its greatest value is above zero. Nothing is visible of a cell with a value that is not
 // finite. Parallel, with the same result for any number of threads.
-OccupancyGrid CountOccupied(const Mesh& mesh, const VolumeDescription& lattice, const ClassificationTable& table);
+OccupancyGrid CountOccupiedByCells(const Mesh& mesh, const VolumeDescription& lattice, const ClassificationTable& table);
 
 }  // namespace slabstream

@@ -63,7 +63,7 @@ class VoxelBits {
 
 }  // namespace
 
-OccupancyGrid CountOccupied(const Mesh& mesh, const VolumeDescription& lattice, const ClassificationTable& table) {
+OccupancyGrid CountOccupiedByCells(const Mesh& mesh, const VolumeDescription& lattice, const ClassificationTable& table) {
   CHECK(lattice.mapping == ValueMapping{});
   const VisibleRanges visible(table);
   VoxelBits voxels(lattice.geometry.size);

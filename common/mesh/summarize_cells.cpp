@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <utility>
 
 #include "common/base/check.h"
 #include "common/mesh/lattice.h"
@@ -24,18 +26,26 @@ void Widen(ValueRange& range, const ValueRange& by) {
 struct CellRanges {
   ValueRange whole = kUnmet;
   std::vector<ValueRange> bricks;
+  std::vector<std::uint32_t> cells;  // by brick
 };
 
 CellRanges RangesOf(const Mesh& mesh, const Index3& size) {
   const Index3 counts = CubesOver(size, kBrick);
-  tbb::enumerable_thread_specific<CellRanges> parts([&] { return CellRanges{kUnmet, std::vector<ValueRange>(CountIn(counts), kUnmet)}; });
+  const CellRanges none{kUnmet, std::vector<ValueRange>(CountIn(counts), kUnmet), std::vector<std::uint32_t>(CountIn(counts))};
+  tbb::enumerable_thread_specific<CellRanges> parts(none);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.tetrahedra.size()), [&](const tbb::blocked_range<std::size_t>& cells) {
     CellRanges& part = parts.local();
     for (std::size_t cell = cells.begin(); cell < cells.end(); ++cell) {
       const ValueRange values = ValuesIn(mesh, cell);
       if (values.min > values.max) continue;
       Widen(part.whole, values);
-      const Box voxels = VoxelsTouched(BoundsOf(mesh, cell), size);
+      const CellBounds bounds = BoundsOf(mesh, cell);
+      Index3 centre;
+      for (int axis = 0; axis < 3; ++axis) {
+        centre[axis] = std::clamp(std::int32_t(std::lround((double(bounds.low[axis]) + double(bounds.high[axis])) / 2)), 0, size[axis] - 1);
+      }
+      ++part.cells[NumberIn(counts, centre / kBrick)];
+      const Box voxels = VoxelsTouched(bounds, size);
       const Index3 first = voxels.begin / kBrick, end = CubesOver(voxels.end, kBrick);
       for (std::int32_t z = first.z; z < end.z; ++z) {
         for (std::int32_t y = first.y; y < end.y; ++y) {
@@ -44,10 +54,11 @@ CellRanges RangesOf(const Mesh& mesh, const Index3& size) {
       }
     }
   });
-  CellRanges all{kUnmet, std::vector<ValueRange>(CountIn(counts), kUnmet)};
+  CellRanges all = none;
   for (const CellRanges& part : parts) {
     Widen(all.whole, part.whole);
     for (std::size_t brick = 0; brick < all.bricks.size(); ++brick) Widen(all.bricks[brick], part.bricks[brick]);
+    std::ranges::transform(all.cells, part.cells, all.cells.begin(), std::plus<>());
   }
   return all;
 }
@@ -72,12 +83,13 @@ Histogram HistogramOf(const Volume& volume, const ValueRange& range) {
 
 void SummarizeCells(const Mesh& mesh, const Volume& resampled, VolumeSummary& summary) {
   CHECK(summary.description.type == ScalarType::kFloat32 && summary.description.mapping == ValueMapping{});
-  const CellRanges found = RangesOf(mesh, summary.description.geometry.size);
+  CellRanges found = RangesOf(mesh, summary.description.geometry.size);
   if (found.whole.min <= found.whole.max) summary.range = found.whole;
   for (std::size_t brick = 0; brick < found.bricks.size(); ++brick) {
     // All voxels have values of cells that touch them, between the values at the points.
     if (found.bricks[brick].min <= found.bricks[brick].max) summary.bricks[brick] = found.bricks[brick];
   }
+  summary.cells = std::move(found.cells);
   summary.histogram = HistogramOf(resampled, summary.range);
 }
 

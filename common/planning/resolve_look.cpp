@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "common/planning/frame_plan.h"
+#include "common/renderers/registry.h"
 
 namespace slabstream {
 namespace {
@@ -66,6 +67,10 @@ Result<LayerLooks> ResolveLayers(const FrameRequest& request, const VolumeSummar
 }  // namespace
 
 Result<VolumeLook> ResolveLook(const FrameRequest& request, const VolumeSummary& summary) {
+  if (FindRenderer(request.renderer)->draws_cells() && summary.cells.empty()) {
+    return Status::InvalidArgument(fmt::format("renderer '{}' draws the cells of unstructured grids, and dataset \"{}\" is a volume",
+                                               request.renderer, request.dataset));
+  }
   Result<TransferFunction> transfer = ResolveTransfer(request.transfer, summary);
   if (!transfer.ok()) return transfer.status();
   Result<ClipRegion> clip = MakeClipRegion(request.clipping, summary.description.geometry);

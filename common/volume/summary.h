@@ -44,11 +44,13 @@ struct VolumeSummary {
   // Of its layers; null: there is no such layer. Values of labels are their numbers.
   std::shared_ptr<const VolumeSummary> labels = nullptr, overlay = nullptr;
   std::shared_ptr<const LabelTable> label_table = nullptr;  // if there are labels
+  std::vector<std::uint32_t> cells;  // of an unstructured grid, by brick: cells with their centres there; empty: it is no grid
 
   LayerTypes layers() const {
     LayerTypes types;
     if (labels != nullptr) types.labels = labels->description.type;
     if (overlay != nullptr) types.overlay = overlay->description.type;
+    types.cells = !cells.empty();
     return types;
   }
   SampleTypes types() const { return {description.type, layers()}; }

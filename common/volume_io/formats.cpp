@@ -20,14 +20,15 @@ VolumeFormat Dicom();
 VolumeFormat Mrc();
 VolumeFormat VtkLegacy();
 VolumeFormat VtkImage();
+VolumeFormat UnstructuredGrid();
 VolumeFormat Npy();
 VolumeFormat Png();
 VolumeFormat Jpeg();
 VolumeFormat Raw();
 
 const std::vector<VolumeFormat>& VolumeFormats() {
-  static const std::vector<VolumeFormat> formats = {Nifti(),     Nrrd(),     MetaImage(), Tiff(), Dicom(), Mrc(),
-                                                    VtkLegacy(), VtkImage(), Npy(),       Png(),  Jpeg(),  Raw()};
+  static const std::vector<VolumeFormat> formats = {
+      Nifti(), Nrrd(), MetaImage(), Tiff(), Dicom(), Mrc(), VtkLegacy(), VtkImage(), UnstructuredGrid(), Npy(), Png(), Jpeg(), Raw()};
   return formats;
 }
 

@@ -107,7 +107,7 @@ Result<RawVolume> ReadSamples(const std::string& path, const RawHeader& header, 
 }
 
 Result<RawVolume> HalvesAsFloats(const std::string& path, RawVolume halves) {
-  RawVolume floats{halves.header, {}, std::move(halves.samples_file)};
+  RawVolume floats{.header = halves.header, .samples_file = std::move(halves.samples_file)};
   floats.header.type = SampleType::kFloat32;
   if (Status status = CheckFitsMemory(floats.header.sample_bytes(), path); !status.ok()) return status;
   floats.bytes.resize(2 * halves.bytes.size());

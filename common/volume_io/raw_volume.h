@@ -4,12 +4,14 @@
 #include <array>
 #include <cstddef>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "common/base/aligned_buffer.h"
 #include "common/base/status.h"
+#include "common/mesh/mesh.h"
 #include "common/volume/volume.h"
 #include "common/volume_io/payload.h"
 #include "common/volume_io/read_options.h"
@@ -43,6 +45,7 @@ struct RawHeader {
 struct RawVolume {
   RawHeader header;
   AlignedVector<std::byte> bytes;      // this machine's byte order; none if only headers were read
+  std::shared_ptr<const Mesh> cells;   // of an unstructured grid, in data space of the volume, which is not turned or straightened
   std::filesystem::path samples_file;  // or the folder of several; if that is not the header's file
 };
 

@@ -8,6 +8,7 @@
 
 #include "common/base/find_named.h"
 #include "common/base/parse_number.h"
+#include "common/mesh/lattice.h"
 
 namespace slabstream {
 namespace {
@@ -80,6 +81,17 @@ Status SetOffset(ReadOptions& options, std::string_view option, std::string_view
   return Wrong(option, text, "a whole number of bytes, at least 0");
 }
 
+Status SetArray(ReadOptions& options, std::string_view option, std::string_view text) {
+  options.array = text;
+  return text.empty() ? Wrong(option, text, "the name of an array") : Status::Ok();
+}
+
+Status SetLattice(ReadOptions& options, std::string_view option, std::string_view text) {
+  options.lattice = ParseNumber<std::int32_t>(text);
+  if (options.lattice && *options.lattice >= 1 && *options.lattice <= kMaxLatticeSide) return Status::Ok();
+  return Wrong(option, text, fmt::format("a whole number in [1, {}]", kMaxLatticeSide));
+}
+
 // Where the options of `source` begin, behind the question mark; npos: it has none.
 std::size_t OptionsBegin(const std::string& source) {
   const std::size_t mark = source.rfind('?');
@@ -134,6 +146,10 @@ const std::vector<ReadOption>& ReadOptionList() {
        [](const ReadOptions& given) { return given.offset.has_value(); }},
       {"series", "NUMBER|UID", "Which of the series of a DICOM folder; `slabstream info` lists them", SetSeries,
        [](const ReadOptions& given) { return !given.series.empty(); }},
+      {"array", "NAME", "Which array of an unstructured grid; `slabstream info` lists them", SetArray,
+       [](const ReadOptions& given) { return !given.array.empty(); }},
+      {"lattice", "VOXELS", "Voxels along the longest side of the lattice on which an unstructured grid is laid", SetLattice,
+       [](const ReadOptions& given) { return given.lattice.has_value(); }},
   };
   return options;
 }

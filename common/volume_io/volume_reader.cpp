@@ -66,6 +66,7 @@ Result<LoadedVolume> Finish(RawVolume raw, const VolumeFormat& format, const std
         StraightenVoxels(volume->block, *placed->slant, description.geometry.size, LowestSample(volume->block, description.mapping));
   }
   loaded.volume = std::move(volume);
+  loaded.cells = std::move(raw.cells);
   return loaded;
 }
 

@@ -24,6 +24,7 @@
 #include <string>
 
 #include "common/base/status.h"
+#include "common/mesh/mesh.h"
 #include "common/volume/volume.h"
 #include "common/volume_io/file_samples.h"
 #include "common/volume_io/read_options.h"
@@ -44,7 +45,8 @@ struct VolumeFileInfo {
 
 struct LoadedVolume {
   VolumeFileInfo info;
-  std::shared_ptr<const Volume> volume;
+  std::shared_ptr<const Volume> volume;         // of an unstructured grid: its values on a lattice (common/mesh/lattice.h)
+  std::shared_ptr<const Mesh> cells = nullptr;  // of an unstructured grid, in data space of the volume
 };
 
 // NotFound (no such file), InvalidArgument (not a volume, an option that its format does not take, more than three dimensions, several

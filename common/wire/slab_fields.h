@@ -15,13 +15,21 @@ inline std::uint32_t LastChunk(const Box& box) {
   return std::max(ChunkCount(box, widest), 1U) - 1;
 }
 
+void CheckChunkNumber(auto& io, const Box& box, std::uint32_t chunk) {
+  io.Check([&](Checker& check) {
+    const bool of_cells = IsCellChunk(chunk) && chunk - kFirstCellChunk < CellChunkCount(kMaxCellBytes);
+    if (!of_cells) check.Range("chunk", chunk, 0, LastChunk(box));
+  });
+}
+
 void Fields(auto& io, Is<ChunkRequest> auto& m) {
   using P = v1::ChunkRequest;
   io.Any(m.epoch, &P::epoch, &P::set_epoch);
   io.Any(m.worker, &P::worker, &P::set_worker);
   io.Any(m.dataset, &P::dataset, &P::set_dataset);
   io.Message("box", m.box, &P::box, &P::mutable_box);
-  io.Range("chunk", m.chunk, &P::chunk, &P::set_chunk, 0, LastChunk(m.box));
+  io.Any(m.chunk, &P::chunk, &P::set_chunk);
+  CheckChunkNumber(io, m.box, m.chunk);
 }
 
 void Fields(auto& io, Is<Chunk> auto& m) {
@@ -29,12 +37,24 @@ void Fields(auto& io, Is<Chunk> auto& m) {
   io.Any(m.epoch, &P::epoch, &P::set_epoch);
   io.Any(m.dataset, &P::dataset, &P::set_dataset);
   io.Message("box", m.box, &P::box, &P::mutable_box);
-  io.Range("chunk", m.chunk, &P::chunk, &P::set_chunk, 0, LastChunk(m.box));
+  io.Any(m.chunk, &P::chunk, &P::set_chunk);
+  CheckChunkNumber(io, m.box, m.chunk);
   io.OneOf("codec", m.codec, &P::codec, &P::set_codec, Codec::kRaw, Codec::kZstd);
   io.Range("raw_bytes", m.raw_bytes, &P::raw_bytes, &P::set_raw_bytes, 1, kChunkBytes);
   const std::uint32_t least = m.codec == Codec::kRaw ? m.raw_bytes : 1;
   io.Range("encoded_bytes", m.encoded_bytes, &P::encoded_bytes, &P::set_encoded_bytes, least, m.raw_bytes);
   io.Any(m.digest, &P::digest, &P::set_digest);
+  io.Any(m.cell_bytes, &P::cell_bytes, &P::set_cell_bytes);
+  io.Check([&](Checker& check) {
+    if (!IsCellChunk(m.chunk)) {
+      check.Range("cell_bytes", m.cell_bytes, 0, 0);
+    } else {
+      const std::uint64_t begin = BeginOfCellChunk(m.chunk);
+      check.Range("cell_bytes", m.cell_bytes, begin + 1, kMaxCellBytes);
+      if (check.ok())
+        check.Range("raw_bytes", m.raw_bytes, BytesOfCellChunk(m.cell_bytes, m.chunk), BytesOfCellChunk(m.cell_bytes, m.chunk));
+    }
+  });
 }
 
 void Fields(auto& io, Is<ChunkRefused> auto& m) {
@@ -42,7 +62,8 @@ void Fields(auto& io, Is<ChunkRefused> auto& m) {
   io.Any(m.epoch, &P::epoch, &P::set_epoch);
   io.Any(m.dataset, &P::dataset, &P::set_dataset);
   io.Message("box", m.box, &P::box, &P::mutable_box);
-  io.Range("chunk", m.chunk, &P::chunk, &P::set_chunk, 0, LastChunk(m.box));
+  io.Any(m.chunk, &P::chunk, &P::set_chunk);
+  CheckChunkNumber(io, m.box, m.chunk);
   io.Message("status", m.status, &P::status, &P::mutable_status);
 }
 

@@ -1,9 +1,12 @@
-// The slabs plane: voxels, from the coordinator (ROUTER) to workers (DEALER), pulled chunk by chunk.
+// The slabs plane: voxels and cells, from the coordinator (ROUTER) to workers (DEALER), pulled chunk by chunk.
 //
 // The samples of a box (x fastest) are cut into chunks of kChunkBytes; the last one is shorter. The samples of the volume come first, then
 // those of each layer of the dataset, in the order of kLayers; each begins with a new chunk. A worker requests chunks one by one and never
 // has more bytes outstanding than its credit. Each request is the credit for its answer, so bytes in flight are bounded at both ends,
 // and a lost message is requested again. The coordinator keeps no state about it.
+//
+// The cells of a box (EncodeMesh, common/mesh/mesh_part.h) have chunks of their own, numbered from kFirstCellChunk on. How many there are
+// is not known before one of them says it.
 #pragma once
 
 #include <algorithm>
@@ -18,6 +21,17 @@
 namespace slabstream {
 
 inline constexpr std::uint32_t kChunkBytes = 1U << 20;  // multiple of every sample size
+inline constexpr std::uint32_t kFirstCellChunk = 1U << 31;
+inline constexpr std::uint64_t kMaxCellBytes = std::uint64_t{1} << 40;
+
+constexpr bool IsCellChunk(std::uint32_t chunk) { return chunk >= kFirstCellChunk; }
+// Cells of a box that take so many bytes, in [1, kMaxCellBytes].
+constexpr std::uint32_t CellChunkCount(std::uint64_t cell_bytes) { return std::uint32_t((cell_bytes + kChunkBytes - 1) / kChunkBytes); }
+constexpr std::uint64_t BeginOfCellChunk(std::uint32_t chunk) { return std::uint64_t{chunk - kFirstCellChunk} * kChunkBytes; }
+// Of a chunk below kFirstCellChunk + CellChunkCount.
+constexpr std::uint32_t BytesOfCellChunk(std::uint64_t cell_bytes, std::uint32_t chunk) {
+  return std::uint32_t(std::min<std::uint64_t>(kChunkBytes, cell_bytes - BeginOfCellChunk(chunk)));
+}
 
 // Where the samples of a chunk belong: bytes [begin, begin + bytes) of the box's samples of one layer.
 struct ChunkPart {
@@ -26,6 +40,7 @@ struct ChunkPart {
   std::uint32_t bytes = 0;
 };
 
+// Of the samples.
 inline std::uint32_t ChunkCount(const Box& box, const SampleTypes& types) {
   std::uint64_t count = 0;
   for (const Layer layer : kLayers) {
@@ -57,11 +72,11 @@ struct ChunkRequest {
   WorkerId worker = 0;
   DatasetId dataset = 0;
   Box box;                  // not empty
-  std::uint32_t chunk = 0;  // [0, ChunkCount)
+  std::uint32_t chunk = 0;  // [0, ChunkCount), or from kFirstCellChunk on
   friend bool operator==(const ChunkRequest&, const ChunkRequest&) = default;
 };
 
-struct Chunk {  // payload: the packed samples
+struct Chunk {  // payload: the packed samples or cells
   Epoch epoch = 0;
   DatasetId dataset = 0;
   Box box;
@@ -70,6 +85,7 @@ struct Chunk {  // payload: the packed samples
   std::uint32_t raw_bytes = 0;      // after unpacking, [1, kChunkBytes]
   std::uint32_t encoded_bytes = 0;  // length of the payload frame
   std::uint64_t digest = 0;         // XXH3-64 of the unpacked bytes
+  std::uint64_t cell_bytes = 0;     // of a chunk of cells: of all cells of the box, [1, kMaxCellBytes]; else 0
   friend bool operator==(const Chunk&, const Chunk&) = default;
 };
 

@@ -127,11 +127,13 @@ void Fields(auto& io, Is<VolumeDescription> auto& m) {
 inline void Write(const LayerTypes& in, v1::LayerTypes& out) {
   if (in.labels) out.set_label_bytes(std::uint32_t(BytesPerSample(*in.labels)));
   out.set_overlay(in.overlay.has_value());
+  out.set_cells(in.cells);
 }
 inline void Read(const v1::LayerTypes& in, LayerTypes& out, Checker& check) {
   const std::uint32_t label_bytes = check.Range("label_bytes", in.label_bytes(), 0, 2);
   if (label_bytes > 0) out.labels = label_bytes == 1 ? ScalarType::kUint8 : ScalarType::kUint16;
   if (in.overlay()) out.overlay = ScalarType::kFloat32;
+  out.cells = in.cells();
 }
 
 // ---- Status, GroupKey

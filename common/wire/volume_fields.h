@@ -32,6 +32,7 @@ void Fields(auto& io, Is<AddVolume> auto& m) {
   io.Message("layers", m.layers, &P::layers, &P::mutable_layers);
   io.Messages("labels", m.labels, &P::labels, &P::mutable_labels, kMaxLabels);
   io.Check([&](Checker& check) {
+    if (m.layers.cells) check.Fail("layers.cells", "cells cannot be sent");
     const std::size_t most = !m.layers.labels ? 0 : *m.layers.labels == ScalarType::kUint8 ? 255 : kMaxLabels;
     if (m.labels.size() > most) check.Fail("labels", "more than numbers of the layer's samples");
     for (std::size_t i = 1; i < m.labels.size(); ++i) check.That(m.labels[i - 1].value < m.labels[i].value, "labels", "values do not rise");

@@ -84,7 +84,7 @@ TEST(CountOccupiedByCells, TakesTheVoxelsThatCellsOfVisibleValuesTouch) {
         if (touches) occupied[i] = true;
       }
     }
-    EXPECT_EQ(CountOccupied(mesh, subject.resampled.description, subject.table), GridOf(size, occupied));
+    EXPECT_EQ(CountOccupiedByCells(mesh, subject.resampled.description, subject.table), GridOf(size, occupied));
   }
 }
 
@@ -95,7 +95,7 @@ TEST(CountOccupiedByCells, HoldsWhateverIsSeenOfTheGridAndOfItsVolume) {
     const Subject subject = MakeSubject(random);
     const Mesh& mesh = subject.mesh;
     const Index3 size = subject.resampled.block.box.end;
-    const OccupancyGrid grid = CountOccupied(mesh, subject.resampled.description, subject.table);
+    const OccupancyGrid grid = CountOccupiedByCells(mesh, subject.resampled.description, subject.table);
     const auto line_is_occupied = [&](const Index3& v) {
       const CellOccupancy& cell = grid.cells[NumberIn(OccupancyCells(size), v / kOccupancyCell)];
       return (cell.lines_x >> (8 * (v.z % 8) + v.y % 8) & 1) != 0 && (cell.lines_y >> (8 * (v.z % 8) + v.x % 8) & 1) != 0;

@@ -300,6 +300,7 @@ TEST(SummarizeCells, BricksKnowTheValuesOfAllCellsThatTouchThem) {
     EXPECT_GT(non_finite, 0);
     EXPECT_EQ(summary.non_finite, non_finite);
     std::vector<ValueRange> bricks(summary.bricks.size(), kNoFiniteValue);
+    std::vector<std::uint32_t> cells(bricks.size());
     ValueRange whole = kNoFiniteValue;
     const auto include = [](ValueRange& range, float value) {
       range = range.min > range.max ? ValueRange{value, value} : ValueRange{std::min(range.min, value), std::max(range.max, value)};
@@ -317,11 +318,18 @@ TEST(SummarizeCells, BricksKnowTheValuesOfAllCellsThatTouchThem) {
         for (const auto& corner : content) {
           if (touches) include(bricks[brick], corner[3]);
         }
+        const auto centre_within = [&](int axis) {
+          const auto [low, high] = std::ranges::minmax(content, {}, [&](const auto& corner) { return corner[std::size_t(axis)]; });
+          const double centre = (double(low[std::size_t(axis)]) + double(high[std::size_t(axis)])) / 2;
+          return centre >= begin[axis] - 0.5 && centre < end[axis] - 0.5;
+        };
+        if (centre_within(0) && centre_within(1) && centre_within(2)) ++cells[brick];
       }
       for (const auto& corner : content) include(whole, corner[3]);
     }
     EXPECT_EQ(summary.bricks, bricks);
     EXPECT_EQ(summary.range, whole);
+    EXPECT_EQ(summary.cells, cells);
     std::array<std::uint64_t, kHistogramBins> histogram{};
     for (std::size_t i = 0; i < CountIn(size); ++i) {
       const float sample = volume.block.samples<float>()[i];

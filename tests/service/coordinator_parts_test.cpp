@@ -11,6 +11,7 @@
 #include <fstream>
 #include <thread>
 
+#include "common/mesh/mesh_part.h"
 #include "common/transport/socket.h"
 #include "common/volume/sphere.h"
 #include "common/volume_io/volume_reader.h"
@@ -21,6 +22,7 @@
 #include "coordinator/dataset_id.h"
 #include "coordinator/peer_table.h"
 #include "coordinator/slab_server.h"
+#include "tests/mesh/mesh_samples.h"
 #include "tests/support/random.h"
 #include "tests/support/temporary_directory.h"
 
@@ -234,6 +236,32 @@ TEST_F(SlabServerTest, ChunksOfLayersFollowThoseOfTheVolume) {
     ASSERT_EQ(samples.at(layer).size(), expected.at(layer)->bytes.size());
     EXPECT_EQ(std::memcmp(samples.at(layer).data(), expected.at(layer)->bytes.data(), samples.at(layer).size()), 0) << "layer " << layer;
   }
+}
+
+TEST_F(SlabServerTest, ChunksOfCellsAreTheCellsOfTheBox) {
+  const Box whole = volume_->block.box, part = {whole.begin, {whole.end.x / 2, whole.end.y / 3, whole.end.z}};
+  const auto cells = std::make_shared<const MeshCutter>(
+      std::make_shared<const Mesh>(MakeTetrahedralCube(whole.size(), 30, random_, 0.2, [](const Vec3& p) { return p.z; })));
+  server_->Publish(8, {.volume = volume_, .cells = cells});
+  for (const Box& box : {whole, part}) {
+    const std::vector<std::byte> expected = EncodeMesh(cells->Cut(box));
+    std::vector<std::byte> sent;
+    for (std::uint32_t i = 0; i < CellChunkCount(expected.size()); ++i) {
+      Bytes payload;
+      const AnyMessage answer = Ask({.epoch = kEpoch, .worker = 1, .dataset = 8, .box = box, .chunk = kFirstCellChunk + i}, &payload);
+      const auto* chunk = std::get_if<Chunk>(&answer);
+      ASSERT_NE(chunk, nullptr) << NameOf(answer);
+      EXPECT_EQ(chunk->cell_bytes, expected.size());
+      sent.resize(sent.size() + chunk->raw_bytes);
+      ASSERT_TRUE(UnpackChunk(*chunk, payload.span(), std::span(sent).last(chunk->raw_bytes)).ok());
+    }
+    EXPECT_EQ(sent, expected);
+    const std::uint32_t beyond = CellChunkCount(expected.size());
+    ExpectRefused({.epoch = kEpoch, .worker = 1, .dataset = 8, .box = box, .chunk = kFirstCellChunk + beyond}, StatusCode::kInvalidArgument,
+                  "of cells is not below");
+  }
+  ExpectRefused({.epoch = kEpoch, .worker = 1, .dataset = 5, .box = whole, .chunk = kFirstCellChunk}, StatusCode::kInvalidArgument,
+                "cells of a dataset that has none");
 }
 
 TEST_F(SlabServerTest, RequestsThatCannotBeMetAreRefusedWithTheReason) {

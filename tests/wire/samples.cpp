@@ -96,7 +96,7 @@ std::vector<Isosurface> ManySurfaces() {
 
 GroupAssignment WithLayers() {
   GroupAssignment message = Assignment(2, {}, FindRenderer("raycast"));
-  message.setup.layers = {.labels = ScalarType::kUint16, .overlay = ScalarType::kFloat32};
+  message.setup.layers = {.labels = ScalarType::kUint16, .overlay = ScalarType::kFloat32, .cells = true};
   message.setup.looks.labels = LabelLook{.mode = LabelMode::kSurface, .tint = 0, .entries = {{{0, 0.5F, 1}, 0.25F, false}, {{1, 1, 1}}}};
   message.setup.looks.overlay = OverlayLook{.transfer = Curve(), .range = {-2, 3}, .weight = 0.125};
   return message;
@@ -200,12 +200,16 @@ std::vector<Stop> SamplesOf() {
 
 template <>
 std::vector<ChunkRequest> SamplesOf() {
-  return {{1, 2, 3, kOneVoxel, 0}, {kMax64, kMax32, kMax32, kWholeBox, ChunkCount(kWholeBox, ScalarType::kFloat32) - 1}};
+  return {{1, 2, 3, kOneVoxel, 0},
+          {kMax64, kMax32, kMax32, kWholeBox, ChunkCount(kWholeBox, ScalarType::kFloat32) - 1},
+          {1, 2, 3, kOneVoxel, kFirstCellChunk}};
 }
 
 template <>
 std::vector<Chunk> SamplesOf() {
-  return {{1, 2, kOneVoxel, 0, Codec::kRaw, 1, 1, 0}, {kMax64, kMax32, kWholeBox, 1, Codec::kZstd, kChunkBytes, 9, kMax64}};
+  return {{1, 2, kOneVoxel, 0, Codec::kRaw, 1, 1, 0},
+          {kMax64, kMax32, kWholeBox, 1, Codec::kZstd, kChunkBytes, 9, kMax64},
+          {1, 2, kOneVoxel, kFirstCellChunk + 2, Codec::kZstd, 5, 4, 0, 2 * kChunkBytes + 5}};
 }
 
 template <>

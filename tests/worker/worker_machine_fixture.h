@@ -113,6 +113,10 @@ class WorkerMachineTest : public testing::Test {
     chunk.dataset = request.dataset;
     chunk.box = request.box;
     chunk.chunk = request.chunk;
+    if (IsCellChunk(request.chunk)) {
+      chunk.cell_bytes = chunk.raw_bytes = 100;
+      return chunk;
+    }
     const auto total = std::uint64_t(request.box.voxel_count());
     chunk.raw_bytes = std::uint32_t(std::min<std::uint64_t>(kChunkBytes, total - std::uint64_t(request.chunk) * kChunkBytes));
     return chunk;

@@ -67,6 +67,54 @@ TEST_F(WorkerSlabsTest, AsksAgainForWhatIsLostOrDamagedAndGivesUp) {
   EXPECT_THAT(All<OpenSlab>(Tell(Assignment(1, {kSelf}, 0, 1, 2))), SizeIs(1)) << "the next attempt begins from nothing";
 }
 
+// How many chunks the cells of a box have is known when the first one comes.
+TEST_F(WorkerSlabsTest, AsksForCellsAsTheirFirstChunkSays) {
+  GroupAssignment assignment = Assignment(1, {kSelf});
+  assignment.setup.layers.cells = true;
+  const auto first = All<SendChunkRequest>(Tell(assignment));
+  ASSERT_THAT(first, SizeIs(3));
+  EXPECT_EQ(first[2].request.chunk, kFirstCellChunk);
+  EXPECT_EQ(first[2].request.box, first[0].request.box);
+  const auto answer = [&](std::uint32_t chunk, std::uint64_t cell_bytes) {
+    Chunk cells = Answer(first[0].request);
+    cells.chunk = chunk;
+    cells.cell_bytes = cell_bytes;
+    cells.raw_bytes = BytesOfCellChunk(cell_bytes, chunk);
+    return cells;
+  };
+  const auto store = [&](const Chunk& chunk) {
+    const auto stores = All<StoreChunk>(Tell(chunk));
+    EXPECT_THAT(stores, SizeIs(1));
+    return Tell(ChunkStored{stores.at(0).slab, chunk.box, chunk.chunk, {}});
+  };
+  for (int chunk = 0; chunk < 2; ++chunk) {
+    EXPECT_THAT(All<StartRender>(store(Answer(first[std::size_t(chunk)].request))), IsEmpty()) << "the cells are missing";
+  }
+  constexpr std::uint64_t kBytes = 2 * kChunkBytes + 9;
+  const auto rest = All<SendChunkRequest>(store(answer(kFirstCellChunk, kBytes)));
+  ASSERT_THAT(rest, SizeIs(2));
+  EXPECT_EQ(rest[0].request.chunk, kFirstCellChunk + 1);
+  EXPECT_EQ(rest[1].request.chunk, kFirstCellChunk + 2);
+  EXPECT_THAT(All<StartRender>(store(answer(kFirstCellChunk + 2, kBytes))), IsEmpty());
+  const auto again = All<SendChunkRequest>(Tell(answer(kFirstCellChunk + 1, kBytes + 1)));
+  ASSERT_THAT(again, SizeIs(1)) << "a chunk of other cells is asked for again";
+  EXPECT_THAT(All<StartRender>(store(answer(kFirstCellChunk + 1, kBytes))), SizeIs(1));
+}
+
+TEST_F(WorkerSlabsTest, FetchesTheCellsOfAResizedBoxAnew) {
+  GroupAssignment assignment = Assignment(1, {kSelf});
+  assignment.setup.layers.cells = true;
+  Rendered(All<StartRender>(Feed(Tell(assignment))).at(0));
+  assignment.key.frame = 2;
+  EXPECT_THAT(All<SendChunkRequest>(Tell(assignment)), IsEmpty()) << "they are kept";
+  assignment.key.frame = 3;
+  assignment.group.placements[0].box = {{0, 0, 10}, {100, 128, 80}};
+  const Actions resized = Tell(assignment);
+  ASSERT_THAT(All<OpenSlab>(resized), SizeIs(1));
+  EXPECT_THAT(All<OpenSlab>(resized)[0].copies, IsEmpty());
+  EXPECT_EQ(All<SendChunkRequest>(resized).back().request.chunk, kFirstCellChunk);
+}
+
 TEST_F(WorkerSlabsTest, ReportsARefusedChunk) {
   const auto requests = All<SendChunkRequest>(Tell(Assignment(1, {kSelf})));
   ASSERT_FALSE(requests.empty());

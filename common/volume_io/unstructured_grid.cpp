@@ -1,0 +1,38 @@
+// Unstructured grids as volumes: their values on a lattice, and their cells beside them.
+#include <utility>
+
+#include "common/mesh/lattice.h"
+#include "common/volume/memory_budget.h"
+#include "common/volume_io/formats.h"
+#include "common/volume_io/mesh_reader.h"
+
+namespace slabstream {
+namespace {
+
+Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
+  Result<LoadedMesh> loaded = ReadMesh(path, {.array = options.array});
+  if (!loaded.ok()) return loaded.status();
+  const VolumeGeometry lattice = LatticeOf(loaded->bounds, std::int64_t(loaded->mesh.tetrahedra.size()), options.lattice);
+  RawVolume raw;
+  raw.header.size = lattice.size;
+  raw.header.world = lattice.orientation.world;
+  raw.header.steps = StepsOf(lattice.spacing);
+  raw.header.origin = lattice.orientation.origin;
+  raw.header.type = SampleType::kFloat32;
+  if (options.headers_only) return raw;
+  const auto bytes = std::int64_t(loaded->mesh.bytes()) + raw.header.sample_bytes();
+  if (Status status = CheckFitsMemory(bytes, path + ": its cells in order, and their lattice"); !status.ok()) return status;
+  MoveToLattice(lattice, loaded->mesh);
+  SortByPlace(lattice, loaded->mesh);
+  raw.bytes = std::move(Resample(loaded->mesh, lattice).block.bytes);
+  raw.cells = std::make_shared<const Mesh>(std::move(loaded->mesh));
+  return raw;
+}
+
+}  // namespace
+
+VolumeFormat UnstructuredGrid() {
+  return {.name = "VTK unstructured grid", .endings = {".vtu"}, .options = {"array", "lattice"}, .read = Read};
+}
+
+}  // namespace slabstream

@@ -1,0 +1,30 @@
+// CellBytes: the cells of boxes as bytes, as they are sent. Those that were cut last are kept, because a box is asked for chunk by chunk.
+// One thread uses it.
+#pragma once
+
+#include <cstddef>
+#include <list>
+#include <memory>
+
+#include "common/base/bytes.h"
+#include "common/mesh/mesh_part.h"
+#include "common/volume/box.h"
+
+namespace slabstream {
+
+class CellBytes {
+ public:
+  // Of `box`, not empty, as EncodeMesh has them.
+  Bytes Of(const std::shared_ptr<const MeshCutter>& cells, const Box& box);
+
+ private:
+  static constexpr std::size_t kMostKept = std::size_t{256} << 20;  // bytes; the last ones stay in any case
+  struct Piece {
+    std::weak_ptr<const MeshCutter> of;  // a dataset that is gone takes no memory
+    Box box;
+    Bytes bytes;
+  };
+  std::list<Piece> kept_;  // the last one that was asked for first
+};
+
+}  // namespace slabstream
