@@ -1,6 +1,7 @@
 // Files of unstructured grids to meshes: VTK's XML files (.vtu), of one piece; ASCII, base64 or appended, uncompressed or in blocks of
-// zlib. Tetrahedra, hexahedra, voxels, wedges and pyramids are read; cells without a volume are counted and left out. Hexahedra, wedges and
-// pyramids are split (common/mesh/cells.h), so that the value is linear in each part, not trilinear in the cell.
+// zlib; legacy VTK files (.vtk) of versions 1 to 5, ASCII or binary. Tetrahedra, hexahedra, voxels, wedges and pyramids are read; cells
+// without a volume are counted and left out. Hexahedra, wedges and pyramids are split (common/mesh/cells.h), so that the value is linear in
+// each part, not trilinear in the cell.
 //
 // All functions may be called from any thread.
 #pragma once
@@ -24,7 +25,7 @@ struct MeshArray {
 };
 
 struct MeshFileInfo {
-  std::string format;  // "VTK unstructured grid"
+  std::string format;  // "VTK unstructured grid", "VTK unstructured grid, legacy"
   std::int64_t points = 0, cells = 0;
   struct CellCount {
     const CellKind* kind = nullptr;
@@ -42,10 +43,11 @@ struct LoadedMesh {
 };
 
 struct MeshOptions {
-  std::string array;  // "": the active scalars, else the only array with one component
+  std::string array;  // "": the active scalars, those of points first, else the only array with one component
 };
 
-bool LooksLikeMesh(const std::string& path);  // by its ending
+// By its ending; a legacy VTK file by what it says of its dataset.
+bool LooksLikeMesh(const std::string& path);
 
 // NotFound (no such file), InvalidArgument (no unstructured grid, no such array, cells of another kind, a point that is not finite),
 // DataLoss (truncated, damaged, cells of points that there are not), ResourceExhausted (does not fit the memory). Messages name the path.

@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <string_view>
+#include <type_traits>
 
 #include "common/base/parse_number.h"
 
@@ -13,6 +16,18 @@ namespace {
 constexpr std::size_t kBlock = std::size_t{1} << 16;  // bytes
 
 bool IsBlank(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
+
+// Programs compute in double and print what they call float: a number that is too small for one is 0.
+template <class T>
+std::optional<T> ParseSample(std::string_view text) {
+  if constexpr (std::is_same_v<T, float>) {
+    const std::optional<double> number = ParseNumber<double>(text);
+    if (!number || (std::isfinite(*number) && std::abs(*number) > double{std::numeric_limits<float>::max()})) return std::nullopt;
+    return float(*number);
+  } else {
+    return ParseNumber<T>(text);
+  }
+}
 
 }  // namespace
 
@@ -87,7 +102,7 @@ Status ReadTextSamples(TextCursor& cursor, SampleType type, std::span<std::byte>
     for (std::size_t i = 0; i < samples.size(); ++i) {
       const std::optional<std::string> word = cursor.Word();
       if (!word) return Status::DataLoss(fmt::format("truncated: has {} of {} samples", i, samples.size()));
-      const std::optional<T> number = ParseNumber<T>(std::string_view(*word).substr(word->starts_with('+') ? 1 : 0));
+      const std::optional<T> number = ParseSample<T>(std::string_view(*word).substr(word->starts_with('+') ? 1 : 0));
       if (!number) return Status::DataLoss(fmt::format("sample {} is '{}', must be a number of type {}", i, *word, ToString(type)));
       samples[i] = *number;
     }

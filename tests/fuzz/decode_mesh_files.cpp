@@ -13,7 +13,7 @@ namespace slabstream {
 
 bool DecodeMeshFile(std::span<const std::byte> bytes) {
   static const TemporaryDirectory directory{PlaceOfFuzzFiles()};
-  const std::string path = directory / "grid.vtu";
+  const std::string path = directory / "grid";
   WriteFile(path, FileBytes(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
   const Result<LoadedMesh> loaded = ReadMesh(path);
   if (!loaded.ok()) {
@@ -36,6 +36,11 @@ std::vector<FuzzBytes> MeshFileSeeds() {
       VtuSpec spec = SmallGrid();
       spec.big_endian = big_endian;
       seeds.push_back(FuzzSeed().Put(std::string_view(VtuFile(spec, encoding))).bytes());
+    }
+  }
+  for (const bool binary : {false, true}) {
+    for (const bool offsets : {false, true}) {
+      seeds.push_back(FuzzSeed().Put(std::string_view(LegacyGridFile(SmallGrid(), {.binary = binary, .offsets = offsets}))).bytes());
     }
   }
   return seeds;

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cstddef>
+
 namespace slabstream {
 
 FileBytes VtuFile(const VtuSpec& spec, const VtiOptions& options) {
@@ -36,6 +38,101 @@ FileBytes VtuFile(const VtuSpec& spec, const VtiOptions& options) {
   text += "</Piece>\n</UnstructuredGrid>\n";
   if (appended) text += "<AppendedData encoding=\"" + options.encoding + "\">\n  _" + samples + "\n</AppendedData>\n";
   return text + "</VTKFile>\n";
+}
+
+namespace {
+
+class LegacyWriter {
+ public:
+  explicit LegacyWriter(const LegacyOptions& options) : options_(options) {
+    text_ = fmt::format("# vtk DataFile Version {}\nwritten by a test\n{}\nDATASET UNSTRUCTURED_GRID\n", options.offsets ? "5.1" : "3.0",
+                        options.binary ? "BINARY" : "ASCII");
+  }
+
+  void Line(const std::string& line) { text_ += line + "\n"; }
+  void Numbers(SampleType type, const std::vector<double>& values) {
+    text_ += (options_.binary ? EncodeSamples(type, values, true) : AsText(values)) + "\n";
+  }
+  void Metadata() {
+    if (options_.metadata) text_ += "METADATA\nINFORMATION 1\nNAME L2_NORM_RANGE LOCATION vtkDataArray\nDATA 2 1 2\n\n";
+  }
+
+  void Cells(const VtuSpec& spec) {
+    std::vector<double> corners, ends, kinds;
+    for (const VtuArray& array : spec.arrays) {
+      if (array.section == "Cells") (array.name == "connectivity" ? corners : array.name == "offsets" ? ends : kinds) = array.values;
+    }
+    ends.insert(ends.begin(), 0);
+    if (options_.offsets) {
+      Line(fmt::format("CELLS {} {}\nOFFSETS vtktypeint64", ends.size(), corners.size()));
+      Numbers(SampleType::kInt64, ends);
+      Line("CONNECTIVITY vtktypeint64");
+      Numbers(SampleType::kInt64, corners);
+    } else {
+      std::vector<double> counted;
+      for (std::size_t cell = 0; cell + 1 < ends.size(); ++cell) {
+        counted.push_back(ends[cell + 1] - ends[cell]);
+        counted.insert(counted.end(), corners.begin() + std::ptrdiff_t(ends[cell]), corners.begin() + std::ptrdiff_t(ends[cell + 1]));
+      }
+      Line(fmt::format("CELLS {} {}", ends.size() - 1, counted.size()));
+      Numbers(SampleType::kInt32, counted);
+    }
+    Line(fmt::format("CELL_TYPES {}", kinds.size()));
+    Numbers(SampleType::kInt32, kinds);
+  }
+
+  void Data(const VtuSpec& spec, bool of_points) {
+    std::vector<const VtuArray*> fields;
+    const int elements = of_points ? spec.points : spec.cells;
+    Line(fmt::format("{}_DATA {}", of_points ? "POINT" : "CELL", elements));
+    for (const VtuArray& array : spec.arrays) {
+      if (array.section != (of_points ? "PointData" : "CellData")) continue;
+      if (array.name == (of_points ? spec.point_scalars : spec.cell_scalars)) {
+        Line(fmt::format("SCALARS {} {} {}\nLOOKUP_TABLE default", array.name, LegacyType(array.type), array.components));
+      } else if (array.components == 3) {
+        Line(fmt::format("VECTORS {} {}", array.name, LegacyType(array.type)));
+      } else {
+        fields.push_back(&array);
+        continue;
+      }
+      Numbers(array.type, array.values);
+      Metadata();
+    }
+    if (!fields.empty()) Line(fmt::format("FIELD FieldData {}", fields.size()));
+    for (const VtuArray* array : fields) {
+      Line(fmt::format("{} {} {} {}", array->name, array->components, elements, LegacyType(array->type)));
+      Numbers(array->type, array->values);
+      Metadata();
+    }
+  }
+
+  static const char* LegacyType(SampleType type) {
+    constexpr const char* kTypes[] = {"char",         "unsigned_char", "short",         "unsigned_short", "int",
+                                      "unsigned_int", "vtktypeint64",  "vtktypeuint64", "float",          "double"};
+    return kTypes[int(type)];
+  }
+
+  const FileBytes& text() const { return text_; }
+
+ private:
+  LegacyOptions options_;
+  FileBytes text_;
+};
+
+}  // namespace
+
+FileBytes LegacyGridFile(const VtuSpec& spec, const LegacyOptions& options) {
+  LegacyWriter writer(options);
+  for (const VtuArray& array : spec.arrays) {
+    if (array.section != "Points") continue;
+    writer.Line(fmt::format("POINTS {} {}", spec.points, LegacyWriter::LegacyType(array.type)));
+    writer.Numbers(array.type, array.values);
+    writer.Metadata();
+  }
+  writer.Cells(spec);
+  writer.Data(spec, false);
+  writer.Data(spec, true);
+  return writer.text();
 }
 
 VtuSpec GridSpec(const std::vector<Vec3>& points, const std::vector<int>& types, const std::vector<std::vector<int>>& connectivity) {

@@ -209,7 +209,7 @@ TEST_F(ReadersTest, VtkFilesSayWhatTheyAreNot) {
   const std::pair<FileBytes, const char*> files[] = {
       {with(legacy, "STRUCTURED_POINTS", "POLYDATA"), "type POLYDATA, must be STRUCTURED_POINTS"},
       {with(legacy, "POINT_DATA", "CELL_DATA"), "belong to cells (CELL_DATA)"},
-      {with(legacy, "SCALARS", "VECTORS"), "VTK attribute VECTORS is not supported"},
+      {with(legacy, "SCALARS", "TRIANGLES"), "has 'TRIANGLES', must have a VTK keyword that is supported"},
       {with(legacy, "unsigned_char", "bit"), "type 'bit' is not supported"},
       {with(legacy, "LOOKUP_TABLE", "LOOKUP"), "LOOKUP_TABLE is missing"},
       {with(legacy, "POINT_DATA 24", "POINT_DATA 25"), "POINT_DATA has 25 points, DIMENSIONS 24"},
