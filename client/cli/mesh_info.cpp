@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iostream>
 #include <limits>
+#include <optional>
 #include <span>
 
 #include "client/cli/input_volume.h"
@@ -26,7 +27,8 @@ ValueRange RangeOf(std::span<const float> values) {
   return range.min <= range.max ? range : ValueRange{};
 }
 
-std::string MeshText(const LoadedMesh& loaded, const ValueRange& range) {
+// `longest_side`: ReadOptions::lattice.
+std::string MeshText(const LoadedMesh& loaded, const ValueRange& range, std::optional<std::int32_t> longest_side) {
   const MeshFileInfo& info = loaded.info;
   const Bounds3& bounds = loaded.bounds;
   const Vec3 extent = bounds.high - bounds.low;
@@ -39,6 +41,9 @@ std::string MeshText(const LoadedMesh& loaded, const ValueRange& range) {
   }
   text += fmt::format("low corner   {:.6g} {:.6g} {:.6g}\n", bounds.low.x, bounds.low.y, bounds.low.z);
   text += fmt::format("extent       {:.6g} x {:.6g} x {:.6g}\n", extent.x, extent.y, extent.z);
+  const Index3 lattice = LatticeOf(bounds, std::int64_t(loaded.mesh.tetrahedra.size()), longest_side).size;
+  text += fmt::format("lattice      {} x {} x {} voxels (--lattice): renderer 'slice' draws the cells, others draw values on the lattice\n",
+                      lattice.x, lattice.y, lattice.z);
   text += "arrays       name, of what, components, type\n";
   for (const MeshArray& array : info.arrays) {
     text += fmt::format("  {} {} {} {}\n", array.name, NameOf(array.at), array.components, ToString(array.type));
@@ -78,7 +83,7 @@ Status RunMeshInfo(const InfoOptions& options) {
   if (!loaded.ok()) return AsInput(loaded.status());
   const ValueRange range = RangeOf(loaded->mesh.values);
   std::cout << (options.json ? MeshJson(*loaded, range).dump(2, ' ', false, Json::error_handler_t::replace) + "\n"
-                             : MeshText(*loaded, range));
+                             : MeshText(*loaded, range, source->options.lattice));
   return Status::Ok();
 }
 

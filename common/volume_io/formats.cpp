@@ -27,8 +27,8 @@ VolumeFormat Jpeg();
 VolumeFormat Raw();
 
 const std::vector<VolumeFormat>& VolumeFormats() {
-  static const std::vector<VolumeFormat> formats = {
-      Nifti(), Nrrd(), MetaImage(), Tiff(), Dicom(), Mrc(), VtkLegacy(), VtkImage(), UnstructuredGrid(), Npy(), Png(), Jpeg(), Raw()};
+  static const std::vector<VolumeFormat> formats = {Nifti(),     Nrrd(),     MetaImage(), Tiff(), Dicom(), Mrc(), UnstructuredGrid(),
+                                                    VtkLegacy(), VtkImage(), Npy(),       Png(),  Jpeg(),  Raw()};
   return formats;
 }
 
@@ -48,7 +48,9 @@ const VolumeFormat* FindFormat(const std::string& path, const ReadOptions& optio
   const std::vector<VolumeFormat>& formats = VolumeFormats();
   auto found = formats.end();
   if (!std::filesystem::is_directory(path, error)) {
-    found = std::ranges::find_if(formats, [&](const VolumeFormat& format) { return EndsInOneOf(path, format.endings); });
+    found = std::ranges::find_if(formats, [&](const VolumeFormat& format) {
+      return EndsInOneOf(path, format.endings) && (format.claims == nullptr || format.claims(path));
+    });
   }
   if (found == formats.end()) {
     found = std::ranges::find_if(
@@ -66,7 +68,9 @@ const VolumeFormat* FindWritableFormat(const std::string& path) {
 std::string ReadableText() {
   std::vector<std::string_view> endings, others;
   for (const VolumeFormat& format : VolumeFormats()) {
-    endings.insert(endings.end(), format.endings.begin(), format.endings.end());
+    for (const std::string_view ending : format.endings) {
+      if (std::ranges::find(endings, ending) == endings.end()) endings.push_back(ending);
+    }
     if (!format.also.empty()) others.push_back(format.also);
   }
   return fmt::format("must end in {}, or be {}", Joined(endings), fmt::join(others, ", or "));

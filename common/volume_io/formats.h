@@ -24,7 +24,9 @@ struct KeptGeometry {
 struct VolumeFormat {
   std::string_view name;                  // "NIfTI"
   std::vector<std::string_view> endings;  // of files, in lower case: ".nii"
-  std::string_view also = {};             // what else is read, for error texts: "a folder of .tif slices"
+  // Whether a file with one of the endings is of this format, which shares the ending with another one. Null: it is.
+  bool (*claims)(const std::string& path) = nullptr;
+  std::string_view also = {};  // what else is read, for error texts: "a folder of .tif slices"
   // Whether this is of the format: a folder, or a file by its first bytes. Asked if no format claims the ending. Null: only endings count.
   bool (*recognises)(const std::string& path, const ReadOptions& options) = nullptr;
   std::vector<std::string_view> options = {};   // names of the options (ReadOptionList) that it takes

@@ -44,6 +44,8 @@ struct LoadedMesh {
 
 struct MeshOptions {
   std::string array;  // "": the active scalars, those of points first, else the only array with one component
+  // Checks what can be checked without points, cells and values; the mesh has none then, and no bounds.
+  bool headers_only = false;
 };
 
 // By its ending; a legacy VTK file by what it says of its dataset.

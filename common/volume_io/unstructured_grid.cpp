@@ -10,8 +10,9 @@ namespace slabstream {
 namespace {
 
 Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
-  Result<LoadedMesh> loaded = ReadMesh(path, {.array = options.array});
+  Result<LoadedMesh> loaded = ReadMesh(path, {.array = options.array, .headers_only = options.headers_only});
   if (!loaded.ok()) return loaded.status();
+  if (options.headers_only) return RawVolume{.header = {.size = {1, 1, 1}, .type = SampleType::kFloat32}};
   const VolumeGeometry lattice = LatticeOf(loaded->bounds, std::int64_t(loaded->mesh.tetrahedra.size()), options.lattice);
   RawVolume raw;
   raw.header.size = lattice.size;
@@ -19,7 +20,6 @@ Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
   raw.header.steps = StepsOf(lattice.spacing);
   raw.header.origin = lattice.orientation.origin;
   raw.header.type = SampleType::kFloat32;
-  if (options.headers_only) return raw;
   const auto bytes = std::int64_t(loaded->mesh.bytes()) + raw.header.sample_bytes();
   if (Status status = CheckFitsMemory(bytes, path + ": its cells in order, and their lattice"); !status.ok()) return status;
   MoveToLattice(lattice, loaded->mesh);
@@ -32,7 +32,8 @@ Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
 }  // namespace
 
 VolumeFormat UnstructuredGrid() {
-  return {.name = "VTK unstructured grid", .endings = {".vtu"}, .options = {"array", "lattice"}, .read = Read};
+  return {
+      .name = "VTK unstructured grid", .endings = {".vtu", ".vtk"}, .claims = LooksLikeMesh, .options = {"array", "lattice"}, .read = Read};
 }
 
 }  // namespace slabstream

@@ -134,6 +134,7 @@ Result<LoadedMesh> LegacyGridReader::Read(const MeshOptions& options) {
   }
   const Result<std::size_t> chosen = builder_.ChooseArray(options);
   if (!chosen.ok()) return chosen.status();
+  if (options.headers_only) return builder_.Take();
   const VtkLegacyArray& array = *listed[*chosen];
   if (Status status = ReadPoints(); !status.ok()) return status;
   if (Status status = ReadCells(); !status.ok()) return status;

@@ -111,6 +111,7 @@ Result<LoadedMesh> XmlGridReader::Read(const MeshOptions& options) {
   }
   const Result<std::size_t> chosen = builder_.ChooseArray(options);
   if (!chosen.ok()) return chosen.status();
+  if (options.headers_only) return builder_.Take();
   if (Status status = ReadPoints(*points); !status.ok()) return status;
   if (Status status = ReadCells(*cells); !status.ok()) return status;
   const VtkArray& array = *listed[*chosen];
