@@ -54,6 +54,13 @@ inline constexpr double kBox = 30e-6;
 inline constexpr double kSample = 4e-9;
 }  // namespace mip
 
+// Slicing of unstructured grids (common/renderers/slice).
+namespace slice {
+inline constexpr double kBox = 100e-6;
+inline constexpr double kCell = 15e-9;    // of the lattice, if it is drawn: there are two for each tetrahedron
+inline constexpr double kSample = 10e-9;  // that is drawn
+}  // namespace slice
+
 // Work of a cell that holds anything, in occupied voxels that take as long: rows are composited in segments, however little of them is
 // covered. Over five volumes and all decompositions (splatting).
 //   balance_bench VOLUME
