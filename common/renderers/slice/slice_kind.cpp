@@ -30,7 +30,7 @@ class SliceCost : public AnalyticCost {
     if (drawn <= 0) return 0;
     namespace cost = calibration::slice;
     const double pixels = view.pixels_per_voxel * view.pixels_per_voxel;
-    return cost::kBox + drawn * (cost::kCell + pixels * cost::kSample * sampling_rate_);
+    return cost::kBox + drawn * (cost::kVoxel + pixels * cost::kSample * sampling_rate_);
   }
 
  private:

@@ -3,34 +3,10 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <cmath>
+#include <utility>
 
 namespace slabstream::slice {
-namespace {
-
-constexpr double kSlack = 1e-6;  // covers the rounding of a face's place; without it a sample on a corner might get lost
-
-// Saturated; the limits are beyond all pixels and planes. NaN becomes the limit, too.
-std::int32_t ToWhole(double value, double limit) { return std::int32_t(value > -1e9 && value < 1e9 ? value : limit); }
-
-struct Interval {
-  std::int32_t begin, end;
-};
-Interval WholeNumbersIn(double a, double b, double c, double d) {
-  const double least = std::min(std::min(a, b), std::min(c, d)), greatest = std::max(std::max(a, b), std::max(c, d));
-  return {ToWhole(std::ceil(least - kSlack), least > 0 ? 1e9 : -1e9),
-          ToWhole(std::floor(greatest + kSlack) + 1, greatest > 0 ? 1e9 : -1e9)};
-}
-
-}  // namespace
-
-SampleBounds BoundsOf(const FramePoint& a, const FramePoint& b, const FramePoint& c, const FramePoint& d) {
-  if (!(a.k + b.k + c.k + d.k > -1e300)) return {0, 0, 0, 0, 0, 0};  // a point does not lie before the eye
-  const Interval x = WholeNumbersIn(a.x, b.x, c.x, d.x), y = WholeNumbersIn(a.y, b.y, c.y, d.y), k = WholeNumbersIn(a.k, b.k, c.k, d.k);
-  return {x.begin, y.begin, k.begin, x.end, y.end, k.end};
-}
-
-CellBins::CellBins(std::span<const FramePoint> points, std::span<const Tetrahedron> tetrahedra, std::span<const std::uint32_t> shown,
+CellBins::CellBins(std::span<const PointBounds> points, std::span<const Tetrahedron> tetrahedra, std::span<const std::uint32_t> shown,
                    const PixelBounds& pixels, std::int32_t k_begin, std::int32_t k_end,
                    const std::function<bool(const PixelBounds&)>& skips)
     : pixels_(pixels),
@@ -71,8 +47,7 @@ CellBins::CellBins(std::span<const FramePoint> points, std::span<const Tetrahedr
     const std::size_t begin = shown.size() * number / count, end = shown.size() * (number + 1) / count;
     block.found.reserve(end - begin);
     for (std::size_t i = begin; i < end; ++i) {
-      const Tetrahedron& t = tetrahedra[shown[i]];
-      SampleBounds at = BoundsOf(points[t[0]], points[t[1]], points[t[2]], points[t[3]]);
+      SampleBounds at = BoundsOf(points, tetrahedra[shown[i]]);
       const std::int32_t first_k = at.k_begin;
       at = {std::max(at.x_begin, pixels.x_begin), std::max(at.y_begin, pixels.y_begin), std::max(at.k_begin, k_begin),
             std::min(at.x_end, pixels.x_end),     std::min(at.y_end, pixels.y_end),     std::min(at.k_end, k_end)};

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace slabstream::slice {
 namespace {
@@ -17,6 +16,11 @@ Vec3 Linear(const std::array<double, 4>& row) { return {row[0], row[1], row[2]};
 // Parts of the distance by which samples are moved along x, y and depth. Neither they nor their sums and differences are nearly 0, so
 // samples also leave the planes of a grid that is seen along a diagonal.
 constexpr double kAlongX = 0.3517, kAlongY = 0.5561, kAlongDepth = 1.2943;
+
+constexpr double kSlack = 1e-6;  // covers the rounding of a face's place; without it a sample near a corner might get lost
+
+// The first whole number that is not less.
+float WholeFrom(double value) { return float(std::ceil(std::min(std::max(value, -0x1p23), 0x1p23))); }
 
 }  // namespace
 
@@ -44,20 +48,31 @@ FrameSpace::FrameSpace(const Camera& camera, const VolumeGeometry& geometry, dou
   if (perspective_) rays_.forward = ToFloat3(forward + across);
 }
 
-FramePoint FrameSpace::At(const Vec3& point) const {
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-  const Camera::ImagePoint at = camera_.Project(point);
-  if (perspective_ && !(at.depth > 0)) return {kNone, kNone, kNone, kNone};
+void FrameSpace::Place(const Vec3& point, FramePoint& at, PointBounds& bounds) const {
+  const Camera::ImagePoint image = camera_.Project(point);
+  bounds = {};
+  at = {};
+  if (perspective_ && !(image.depth > 0)) {
+    bounds.end[3] = 1;
+    return;
+  }
   // Relative to plane 0, so that nothing cancels if the eye is far away.
   const double k = Dot(Linear(camera_.depth_row), point - first_) / step_ - move_k_;
-  return {at.x - 0.5 - move_x_, at.y - 0.5 - move_y_, perspective_ ? numerator_ / at.depth : k, k};
+  at = {image.x - 0.5 - move_x_, image.y - 0.5 - move_y_, perspective_ ? numerator_ / image.depth : k};
+  const double places[3] = {at.x, at.y, k};
+  for (std::size_t i = 0; i < 3; ++i) {
+    bounds.begin[i] = WholeFrom(places[i] - kSlack);
+    bounds.end[i] = WholeFrom(places[i] + kSlack);
+  }
 }
 
-AlignedVector<FramePoint> FrameSpace::At(std::span<const Vector3<float>> points) const {
-  AlignedVector<FramePoint> result(points.size());
+FramePoints FrameSpace::At(std::span<const Vector3<float>> points) const {
+  FramePoints result;
+  result.points.resize(points.size());
+  result.bounds.resize(points.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 4096), [&](const tbb::blocked_range<std::size_t>& range) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      result[i] = At({double(points[i].x), double(points[i].y), double(points[i].z)});
+      Place({double(points[i].x), double(points[i].y), double(points[i].z)}, result.points[i], result.bounds[i]);
     }
   });
   return result;

@@ -21,10 +21,20 @@
 
 namespace slabstream::slice {
 
-// Double precision: errors are far smaller than what samples are moved by. All NaN: the point does not lie before the eye.
-struct FramePoint {
+// Double precision: errors are far smaller than what samples are moved by.
+struct alignas(32) FramePoint {
   double x, y, s;
-  double k;  // the plane through the point, a real number
+};
+
+// Whole numbers from a point on: x, y and k of samples in a cell are at least the least `begin` of its points, and less than the greatest
+// `end`. Saturated far beyond pixels and planes.
+struct alignas(32) PointBounds {
+  float begin[4], end[4];  // x, y, k; end[3]: 1 if the point does not lie before the eye, else 0
+};
+
+struct FramePoints {
+  AlignedVector<FramePoint> points;
+  AlignedVector<PointBounds> bounds;
 };
 
 class FrameSpace {
@@ -34,9 +44,8 @@ class FrameSpace {
 
   const ViewRays& rays() const { return rays_; }  // on planes; they run through the samples
 
-  // Of a point in data space.
-  FramePoint At(const Vec3& point) const;
-  AlignedVector<FramePoint> At(std::span<const Vector3<float>> points) const;  // parallel
+  // Of points in data space. Parallel.
+  FramePoints At(std::span<const Vector3<float>> points) const;
 
   double SOf(double k) const { return perspective_ ? numerator_ / DepthOf(k) : k; }
   // What the linear function of a cell is multiplied by on plane k, so that it is the value.
@@ -47,6 +56,7 @@ class FrameSpace {
   RayReach ReachOf(const Vec3& low, const Vec3& high) const;
 
  private:
+  void Place(const Vec3& point, FramePoint& at, PointBounds& bounds) const;
   double DepthOf(double k) const { return first_depth_ + k * step_; }
 
   Camera camera_;

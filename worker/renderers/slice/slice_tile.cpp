@@ -2,6 +2,7 @@
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "worker/renderers/slice/slice_tile.cpp"
+#include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -14,7 +15,7 @@
 
 #include "worker/kernels/power-inl.h"
 #include "worker/rays/ray_sums-inl.h"
-#include "worker/renderers/slice/cell_shape.h"
+#include "worker/renderers/slice/cell_shape-inl.h"
 
 #ifndef SLABSTREAM_WORKER_RENDERERS_SLICE_TILE_ROOM
 #define SLABSTREAM_WORKER_RENDERERS_SLICE_TILE_ROOM
@@ -55,63 +56,103 @@ namespace slabstream::slice::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 using namespace slabstream::HWY_NAMESPACE;  // NOLINT(google-build-using-namespace): the shared kernels of this instruction set
 
-// Rows of a plane, one to a lane.
-using RowTag = hn::CappedTag<double, 8>;
-using Rows = hn::Vec<RowTag>;
-constexpr std::int32_t kRowLanes = std::int32_t(hn::MaxLanes(RowTag()));
+using DoubleTag = hn::CappedTag<double, 8>;
+using Doubles = hn::Vec<DoubleTag>;
+constexpr std::int32_t kDoubles = std::int32_t(hn::MaxLanes(DoubleTag()));
+static_assert(kChunkPlanes % kDoubles == 0);
 
-// Writes the values of a cell's samples in planes [k_begin, k_end) of the chunk that begins at `chunk`.
-HWY_INLINE void CutCell(const ActiveCell& cell, const FrameSpace& space, std::int32_t chunk, std::int32_t k_begin, std::int32_t k_end,
-                        double tile_y, float* values) {
-  const RowTag dd;
+// The planes of a chunk, and where its values are written.
+struct Chunk {
+  std::int32_t begin = 0;
+  double s[kChunkPlanes], scale[kChunkPlanes];  // FrameSpace::SOf, ScaleOf
+  double tile_y = 0;                            // of the tile's first row
+  float* values = nullptr;                      // [plane][y][x]
+};
+
+// Rows of a plane, or planes of a row, one to a lane.
+struct Lanes {
+  Doubles s, scale;  // of the planes
+  Doubles root[4];   // places of the cell's faces where y is 0
+};
+HWY_INLINE Lanes LanesAt(const CellShape& shape, Doubles s, Doubles scale) {
+  const DoubleTag dd;
+  Lanes lanes;
+  lanes.s = s;
+  lanes.scale = scale;
+  for (std::size_t i = 0; i < 4; ++i) lanes.root[i] = hn::Add(hn::Set(dd, shape.at[i]), hn::Mul(s, hn::Set(dd, shape.per_s[i])));
+  return lanes;
+}
+
+// Writes the values of a cell's samples on the rows y of these lanes. A lane's row begins at `to` + lane * `stride`.
+HWY_INLINE void CutRows(const CellShape& shape, const Lanes& lanes, Doubles y, hn::Mask<DoubleTag> valid, float* to, std::size_t stride) {
+  const DoubleTag dd;
   const FloatTag df;
-  const hn::Rebind<std::int32_t, RowTag> di;
-  const hn::Rebind<float, RowTag> dv;
-  const CellShape& shape = cell.shape;
+  const hn::Rebind<std::int32_t, DoubleTag> di;
+  const hn::Rebind<float, DoubleTag> dv;
+  const auto set = [&](double value) HWY_ATTR { return hn::Set(dd, value); };
+  const auto root = [&](std::size_t i) HWY_ATTR { return hn::Add(lanes.root[i], hn::Mul(set(shape.per_y[i]), y)); };
+  const auto r1 = root(1), r2 = root(2);
+  const auto left =
+      hn::Ceil(hn::Max(hn::Max(root(0), hn::Zero(dd)), hn::Max(hn::Add(r1, set(shape.before[0])), hn::Add(r2, set(shape.before[1])))));
+  const auto right = hn::Ceil(
+      hn::Min(hn::Min(root(3), set(double(kTileWidth))), hn::Min(hn::Add(r1, set(shape.behind[0])), hn::Add(r2, set(shape.behind[1])))));
+  const auto any = hn::And(hn::Lt(left, right), valid);
+  std::uint8_t bits[8] = {};
+  hn::StoreMaskBits(dd, any, bits);
+  if (bits[0] == 0) return;
+
+  std::int32_t begins[8], ends[8];
+  float firsts[8], changes[8];
+  hn::StoreU(hn::DemoteTo(di, left), di, begins);
+  hn::StoreU(hn::DemoteTo(di, right), di, ends);
+  // Values far outside the range are cut off, so that none overflows.
+  const auto limited = [&](Doubles v, double limit) HWY_ATTR { return hn::DemoteTo(dv, hn::Min(hn::Max(v, set(-limit)), set(limit))); };
+  const auto at_zero = hn::Add(hn::Add(set(shape.value), hn::Mul(lanes.s, set(shape.value_s))), hn::Mul(set(shape.value_y), y));
+  hn::StoreU(limited(hn::Mul(at_zero, lanes.scale), 1e38), dv, firsts);
+  hn::StoreU(limited(hn::Mul(set(shape.value_x), lanes.scale), 1e36), dv, changes);
   const auto least = Set(shape.least), greatest = Set(shape.greatest);
-  for (std::int32_t k = k_begin; k < k_end; ++k) {
-    const double s = space.SOf(k), scale = space.ScaleOf(k);
-    double root[4];
-    for (std::size_t i = 0; i < 4; ++i) root[i] = shape.at[i] + s * shape.per_s[i];
-    // Values far outside the range are cut off, so that none overflows.
-    const double value = (shape.value + s * shape.value_s) * scale, value_y = shape.value_y * scale;
-    const auto value_x = Set(float(std::clamp(shape.value_x * scale, -1e36, 1e36)));
-    float* const plane = values + std::size_t(k - chunk) * kTilePixels;
-    for (std::int32_t row = cell.y_begin; row < cell.y_end; row += kRowLanes) {
-      const auto y = hn::Add(hn::Set(dd, tile_y + row), hn::Iota(dd, 0));
-      const auto root_of = [&](std::size_t i) HWY_ATTR { return hn::Add(hn::Set(dd, root[i]), hn::Mul(hn::Set(dd, shape.per_y[i]), y)); };
-      const auto r1 = root_of(1), r2 = root_of(2);
-      auto left = hn::Max(hn::Max(root_of(0), hn::Zero(dd)),
-                          hn::Max(hn::Add(r1, hn::Set(dd, shape.before[0])), hn::Add(r2, hn::Set(dd, shape.before[1]))));
-      auto right = hn::Min(hn::Min(root_of(3), hn::Set(dd, double(kTileWidth))),
-                           hn::Min(hn::Add(r1, hn::Set(dd, shape.behind[0])), hn::Add(r2, hn::Set(dd, shape.behind[1]))));
-      left = hn::Ceil(left);
-      right = hn::Ceil(right);
-      const auto any = hn::And(hn::Lt(left, right), hn::Lt(y, hn::Set(dd, tile_y + cell.y_end)));
-      if (hn::AllFalse(dd, any)) continue;
-      alignas(64) std::int32_t begins[8], ends[8];
-      alignas(64) float firsts[8];
-      hn::Store(hn::DemoteTo(di, left), di, begins);
-      hn::Store(hn::DemoteTo(di, right), di, ends);
-      const auto first = hn::Add(hn::Set(dd, value), hn::Mul(hn::Set(dd, value_y), y));
-      hn::Store(hn::DemoteTo(dv, hn::Min(hn::Max(first, hn::Set(dd, -1e38)), hn::Set(dd, 1e38))), dv, firsts);
-      std::uint8_t bits[8] = {};
-      hn::StoreMaskBits(dd, any, bits);
-      for (unsigned rest = bits[0]; rest != 0; rest &= rest - 1) {
-        const auto lane = std::size_t(std::countr_zero(rest));
-        float* const to = plane + (std::size_t(row) + lane) * kTileWidth;
-        for (std::int32_t x = begins[lane]; x < ends[lane]; x += std::int32_t(kLanes)) {
-          const auto column = hn::Iota(df, float(x));
-          const auto v = hn::Add(Set(firsts[lane]), hn::Mul(value_x, column));
-          hn::BlendedStore(hn::Min(hn::Max(v, least), greatest), hn::FirstN(df, std::size_t(ends[lane] - x)), df, to + x);
-        }
+  for (unsigned rest = bits[0]; rest != 0; rest &= rest - 1) {
+    const auto lane = std::size_t(std::countr_zero(rest));
+    const auto first = Set(firsts[lane]), change = Set(changes[lane]);
+    for (std::int32_t x = begins[lane]; x < ends[lane]; x += std::int32_t(kLanes)) {
+      const auto value = hn::Add(first, hn::Mul(change, hn::Iota(df, float(x))));
+      hn::BlendedStore(hn::Min(hn::Max(value, least), greatest), hn::FirstN(df, std::size_t(ends[lane] - x)), df, to + lane * stride + x);
+    }
+  }
+}
+
+// Writes the values of a cell's samples in the chunk's planes [k_begin, k_end). Rows or planes are taken to lanes, whichever needs fewer
+// vectors; every sample has the same bits either way.
+HWY_NOINLINE void CutCell(const ActiveCell& cell, const Chunk& chunk, std::int32_t k_begin, std::int32_t k_end) {
+  const DoubleTag dd;
+  const CellShape& shape = cell.shape;
+  const std::int32_t planes = k_end - k_begin, rows = cell.y_end - cell.y_begin;
+  const auto vectors = [](std::int32_t count) { return (count + kDoubles - 1) / kDoubles; };
+  const auto first_lanes = [&](std::int32_t count) HWY_ATTR { return hn::Lt(hn::Iota(dd, 0), hn::Set(dd, double(count))); };
+  const auto row_at = [&](std::int32_t k, std::int32_t row) {
+    return chunk.values + std::size_t(k) * kTilePixels + std::size_t(row) * kTileWidth;
+  };
+  if (planes * vectors(rows) <= rows * vectors(planes)) {
+    for (std::int32_t k = k_begin - chunk.begin; k < k_end - chunk.begin; ++k) {
+      const Lanes lanes = LanesAt(shape, hn::Set(dd, chunk.s[k]), hn::Set(dd, chunk.scale[k]));
+      for (std::int32_t row = cell.y_begin; row < cell.y_end; row += kDoubles) {
+        CutRows(shape, lanes, hn::Iota(dd, chunk.tile_y + row), first_lanes(cell.y_end - row), row_at(k, row), kTileWidth);
       }
+    }
+    return;
+  }
+  // Vectors begin at whole multiples of lanes, so that loads stay in the chunk.
+  for (std::int32_t k = (k_begin - chunk.begin) / kDoubles * kDoubles; k < k_end - chunk.begin; k += kDoubles) {
+    const Lanes lanes = LanesAt(shape, hn::LoadU(dd, chunk.s + k), hn::LoadU(dd, chunk.scale + k));
+    const auto valid = hn::AndNot(first_lanes(k_begin - chunk.begin - k), first_lanes(k_end - chunk.begin - k));
+    for (std::int32_t row = cell.y_begin; row < cell.y_end; ++row) {
+      CutRows(shape, lanes, hn::Set(dd, chunk.tile_y + row), valid, row_at(k, row), kTilePixels);
     }
   }
 }
 
 // Fills in the parts of the tile's rays and their lengths.
-HWY_INLINE void FindRays(const SliceWork& work, const PixelBounds& tile, TileRoom& room) {
+HWY_NOINLINE void FindRays(const SliceWork& work, const PixelBounds& tile, TileRoom& room) {
   const FloatTag df;
   const ViewRays& rays = work.space->rays();
   const std::int32_t x0 = tile.x_begin / kTileWidth * kTileWidth, y0 = tile.y_begin / kTileHeight * kTileHeight;
@@ -157,8 +198,8 @@ HWY_INLINE void FindRays(const SliceWork& work, const PixelBounds& tile, TileRoo
 
 // Adds the samples of the chunk's planes [k_begin, k_end). Returns how many were drawn; `alive`: whether a ray goes on.
 template <bool kClipped>
-HWY_INLINE std::uint64_t Compose(const SliceWork& work, std::int32_t chunk, std::int32_t k_begin, std::int32_t k_end, TileRoom& room,
-                                 bool& alive) {
+HWY_NOINLINE std::uint64_t Compose(const SliceWork& work, std::int32_t chunk, std::int32_t k_begin, std::int32_t k_end, TileRoom& room,
+                                   bool& alive) {
   const FloatTag df;
   const RayLook& look = *work.look;
   const float* const entries = look.entries.data();
@@ -240,14 +281,26 @@ std::int32_t OrderCells(std::span<const CellBins::Entry> cells, TileRoom& room) 
 }
 
 // Makes a cell active if it has samples in the tile.
-HWY_INLINE void Activate(const SliceWork& work, std::uint32_t cell, std::int32_t x0, std::int32_t y0, TileRoom& room) {
+HWY_NOINLINE void Activate(const SliceWork& work, std::uint32_t cell, std::int32_t x0, std::int32_t y0, TileRoom& room) {
   const Mesh& mesh = *work.mesh;
   Tetrahedron t = mesh.tetrahedra[cell];
-  std::ranges::sort(t);
-  const std::array<FramePoint, 4> points = {work.points[t[0]], work.points[t[1]], work.points[t[2]], work.points[t[3]]};
-  const SampleBounds bounds = BoundsOf(points[0], points[1], points[2], points[3]);
+  const SampleBounds bounds = BoundsOf(work.points->bounds, t);
+  const auto order = [&](std::size_t a, std::size_t b) {
+    const PointNumber low = std::min(t[a], t[b]), high = std::max(t[a], t[b]);
+    t[a] = low;
+    t[b] = high;
+  };
+  order(0, 1);
+  order(2, 3);
+  order(0, 2);
+  order(1, 3);
+  order(1, 2);
+  std::array<const FramePoint*, 4> points{};
   std::array<float, 4> values{};
-  for (std::size_t i = 0; i < 4; ++i) values[i] = mesh.values[mesh.at == ValuesAt::kCells ? cell : t[i]];
+  for (std::size_t i = 0; i < 4; ++i) {
+    points[i] = &work.points->points[t[i]];
+    values[i] = mesh.values[mesh.at == ValuesAt::kCells ? cell : t[i]];
+  }
   if (room.vacant.empty()) {
     room.vacant.push_back(std::uint32_t(room.cells.size()));
     room.cells.emplace_back();
@@ -260,6 +313,17 @@ HWY_INLINE void Activate(const SliceWork& work, std::uint32_t cell, std::int32_t
   active.y_end = std::min(bounds.y_end - y0, kTileHeight);
   room.active.push_back(room.vacant.back());
   room.vacant.pop_back();
+}
+
+// Cells and points lie anywhere in memory: has those of the next cells fetched.
+HWY_INLINE void FetchAhead(const SliceWork& work, const std::vector<std::uint32_t>& cells, std::size_t at) {
+  constexpr std::size_t kFar = 16, kNear = 6;
+  if (at + kFar >= cells.size()) return;
+  hwy::Prefetch(&work.mesh->tetrahedra[cells[at + kFar]]);
+  for (const PointNumber point : work.mesh->tetrahedra[cells[at + kNear]]) {
+    hwy::Prefetch(&work.points->points[point]);
+    hwy::Prefetch(&work.points->bounds[point]);
+  }
 }
 
 std::uint64_t Slice(const SliceWork& work, const PixelBounds& tile, std::span<const CellBins::Entry> cells, TileRoom& room, float* rgba,
@@ -276,6 +340,9 @@ std::uint64_t Slice(const SliceWork& work, const PixelBounds& tile, std::span<co
 
   std::uint64_t drawn = 0;
   bool alive = true;
+  Chunk planes;
+  planes.tile_y = y0;
+  planes.values = room.values;
   const bool clipped = !work.space->rays().clip.empty();
   const std::int32_t chunks = std::int32_t(room.chunk_first.size()) - 1;
   for (std::int32_t number = 0; alive && (number < chunks || !room.active.empty()); ++number) {
@@ -283,6 +350,7 @@ std::uint64_t Slice(const SliceWork& work, const PixelBounds& tile, std::span<co
     if (chunk >= work.k_end) break;
     if (number < chunks) {
       for (std::size_t i = room.chunk_first[std::size_t(number)]; i < room.chunk_first[std::size_t(number) + 1]; ++i) {
+        FetchAhead(work, room.ordered, i);
         Activate(work, room.ordered[i], x0, y0, room);
       }
     }
@@ -290,10 +358,15 @@ std::uint64_t Slice(const SliceWork& work, const PixelBounds& tile, std::span<co
     if (room.active.empty() || k_begin >= k_end) continue;
     const auto nothing = Set(std::numeric_limits<float>::quiet_NaN());
     for (std::size_t i = 0; i < kChunkPlanes * kTilePixels; i += kLanes) hn::Store(nothing, df, room.values + i);
+    planes.begin = chunk;
+    for (std::int32_t k = 0; k < kChunkPlanes; ++k) {
+      planes.s[k] = work.space->SOf(chunk + k);
+      planes.scale[k] = work.space->ScaleOf(chunk + k);
+    }
     std::size_t kept = 0;
     for (const std::uint32_t place : room.active) {
       const ActiveCell& cell = room.cells[place];
-      CutCell(cell, *work.space, chunk, std::max(cell.k_begin, k_begin), std::min(cell.k_end, k_end), y0, room.values);
+      CutCell(cell, planes, std::max(cell.k_begin, k_begin), std::min(cell.k_end, k_end));
       if (cell.k_end > k_end) {
         room.active[kept++] = place;
       } else {

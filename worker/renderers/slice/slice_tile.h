@@ -24,7 +24,7 @@ namespace slabstream::slice {
 struct SliceWork {
   const FrameSpace* space = nullptr;
   const Mesh* mesh = nullptr;
-  std::span<const FramePoint> points;  // of the mesh
+  const FramePoints* points = nullptr;  // of the mesh
   const RayLook* look = nullptr;
   Float3 low{}, high{};                 // the box owns the positions p with low <= p < high on every axis
   bool at_border = false;               // the box touches the volume's border
