@@ -11,6 +11,8 @@
 #include "tests/renderers/render_support.h"
 #include "tests/support/renderers.h"
 #include "tests/support/simd_targets.h"
+#include "worker/rays/ray_look.h"
+#include "worker/renderers/slice/frame_space.h"
 
 namespace slabstream {
 namespace {
@@ -104,6 +106,98 @@ TEST(Slice, HomogeneousCubeLooksTheSameFromEverySide) {
           }
         }
         EXPECT_GT(pixels, 1000);
+      }
+    }
+  }
+}
+
+// The definition (docs/rendering.md), sample by sample: the cell that holds the sample's position, wherever it is in the list.
+std::array<double, 4> ReferencePixel(const Mesh& mesh, const FrameSetup& setup, const RayLook& look, const ViewRays& rays, int x, int y) {
+  const PixelRay ray = RayOf(rays, x, y);
+  const auto at = [&](double k) {
+    return Vec3{double(ray.first[0]) + k * double(ray.move[0]), double(ray.first[1]) + k * double(ray.move[1]),
+                double(ray.first[2]) + k * double(ray.move[2])};
+  };
+  double enter = -1e300, leave = 1e300;  // in numbers of planes
+  for (const Axis axis : kAxes) {
+    const auto i = std::size_t(Number(axis));
+    const double a = (-0.5 - double(ray.first[i])) / double(ray.move[i]);
+    const double b = (setup.description.geometry.size[axis] - 0.5 - double(ray.first[i])) / double(ray.move[i]);
+    enter = std::max(enter, std::min(a, b));
+    leave = std::min(leave, std::max(a, b));
+  }
+  const double first = std::ceil(enter), last = std::floor(leave);
+  const Camera::Ray central = setup.camera.RayAt(x + 0.5, y + 0.5);
+  const double slant = setup.camera.projection == Projection::kPerspective ? Length(central.direction * setup.camera.spacing) : 1;
+  std::array<double, 4> sum{};
+  for (double k = first; k <= last; ++k) {
+    const Vec3 p = at(k);
+    double inside = -1e300, value = 0;  // the least barycentric coordinate, in the cell where that is the greatest
+    for (std::size_t i = 0; i < mesh.tetrahedra.size(); ++i) {
+      std::array<Vec3, 4> corner;
+      for (std::size_t c = 0; c < 4; ++c) {
+        const Vector3<float>& q = mesh.points[mesh.tetrahedra[i][c]];
+        corner[c] = {double(q.x), double(q.y), double(q.z)};
+      }
+      const Vec3 a = corner[1] - corner[0], b = corner[2] - corner[0], c = corner[3] - corner[0], d = p - corner[0];
+      const double volume = Dot(a, Cross(b, c));
+      const double u = Dot(d, Cross(b, c)) / volume, v = Dot(a, Cross(d, c)) / volume, w = Dot(a, Cross(b, d)) / volume;
+      const double weights[4] = {1 - u - v - w, u, v, w}, least = *std::ranges::min_element(weights);
+      if (!(least > inside)) continue;
+      inside = least;
+      value = 0;
+      for (std::size_t n = 0; n < 4; ++n)
+        value += weights[n] * double(mesh.values[mesh.at == ValuesAt::kCells ? i : mesh.tetrahedra[i][n]]);
+    }
+    if (inside < -1e-6) continue;
+    const auto entry =
+        std::size_t(std::clamp((value - double(look.origin)) * double(look.scale) + double(look.rounding), 0.0, double(look.last)));
+    double length = slant;
+    if (k == first) length += slant * std::clamp(first - enter - 0.5, -0.5, 0.5);
+    if (k == last) length += slant * std::clamp(leave - last - 0.5, -0.5, 0.5);
+    const double alpha = 1 - std::pow(1 - double(look.entries[4 * entry + 3]), length);
+    for (std::size_t c = 0; c < 3; ++c) sum[c] += (1 - sum[3]) * alpha * double(look.entries[4 * entry + c]);
+    sum[3] += (1 - sum[3]) * alpha;
+  }
+  return sum;
+}
+
+TEST(Slice, AgreesWithTheDefinition) {
+  std::mt19937 random(kSeed);
+  const Index3 size = {18, 14, 16};
+  const Volume lattice = Lattice(size, 200, {1, 1.3, 0.8});
+  for (const ValuesAt at : {ValuesAt::kPoints, ValuesAt::kCells}) {
+    const Cells cube = MakeCube(
+        size, 4, 0.35, [](const Vec3& p) { return 100 + 99 * std::sin(p.x + 2 * p.y - 0.7 * p.z); }, random, at);
+    for (const Projection projection : kProjections) {
+      for (int i = 0; i < 3; ++i) {
+        SetupOptions options;
+        options.view = RandomView(projection, random);
+        options.view.zoom = 1.5;
+        options.size = {90, 60};
+        options.transfer = Ramp(0.3);
+        const double rate = std::array{1.0, 0.5, 2.0}[std::size_t(i)];
+        const FrameSetup setup = SliceSetup(lattice, options, rate);
+        const LocalImage image = RenderWhole(lattice, setup, cube);
+        const RayLook look = MakeRayLook(Classify(setup.transfer, setup.description, setup.range), setup.transfer, setup.description,
+                                         setup.camera, setup.shading, rate);
+        const slice::FrameSpace space(setup.camera, setup.description.geometry, rate, {});
+        int different = 0, pixels = 0;
+        for (int y = 1; y < setup.camera.height; y += 3) {
+          for (int x = 1; x < setup.camera.width; x += 3) {
+            if (LengthInside(setup, x, y) < 1e-3) continue;
+            ++pixels;
+            const std::array<double, 4> expected = ReferencePixel(*cube, setup, look, space.rays(), x, y);
+            const auto found = PixelOf(image, x, y);
+            bool same = true;
+            for (std::size_t c = 0; c < 4; ++c) same = same && std::abs(double(found[c]) - expected[c]) < 2e-4;
+            different += same ? 0 : 1;
+          }
+        }
+        // Samples that lie within rounding of a border, of a face between values of cells, or of two entries.
+        EXPECT_LE(different, pixels / 100) << "seed " << kSeed << " view " << i << ' ' << NameOf(projection) << ' ' << NameOf(at) << " of "
+                                           << pixels;
+        EXPECT_GT(pixels, 200);
       }
     }
   }
