@@ -80,7 +80,12 @@ void Render(benchmark::State& state, const Volume& volume, const RendererKind& k
 
 const RendererKind& KindAt(std::int64_t index) { return *Renderers()[std::size_t(index)]; }
 
-std::vector<std::int64_t> EveryRenderer() { return benchmark::CreateDenseRange(0, std::int64_t(Renderers().size()) - 1, 1); }
+// That draws volumes.
+std::vector<std::int64_t> EveryRenderer() {
+  std::vector<std::int64_t> numbers = benchmark::CreateDenseRange(0, std::int64_t(Renderers().size()) - 1, 1);
+  std::erase_if(numbers, [](std::int64_t number) { return KindAt(number).draws_cells(); });
+  return numbers;
+}
 
 void Boxes(benchmark::State& state) {
   const auto sphere = SphereClass(state.range(0));

@@ -83,6 +83,7 @@ class RendererKind {
     bool shows_overlays = false;
     bool isosurfaces = false;       // draws TransferFunction::isosurfaces
     bool gradient_opacity = false;  // multiplies opacities by TransferFunction::gradient_opacities
+    bool draws_cells = false;       // the cells of unstructured grids; other datasets are refused
     double footprint = 1;           // pixels that a voxel fills, for each pixel of its cross-section
     std::vector<Stage> stages;      // stages that the pixel half charges time to, in order
     std::vector<RendererParameter> parameters;
@@ -110,6 +111,7 @@ class RendererKind {
   bool shows_overlays() const { return facts_.shows_overlays; }
   bool isosurfaces() const { return facts_.isosurfaces; }
   bool gradient_opacity() const { return facts_.gradient_opacity; }
+  bool draws_cells() const { return facts_.draws_cells; }
   double footprint() const { return facts_.footprint; }
   const std::vector<Stage>& stages() const { return facts_.stages; }
   const std::vector<RendererParameter>& parameters() const { return facts_.parameters; }

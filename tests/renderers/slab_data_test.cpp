@@ -198,7 +198,7 @@ TEST(Renderers, WhatLiesOutsideTheFrameIsNotDrawn) {
     options.renderer = kind;
     options.view.zoom = 100;
     const FrameSetup setup = MakeSetup(block, options);
-    const auto slab = CutSlab(block, block.block.box);
+    const auto slab = SlabFor(*kind, block, block.block.box);
     RankReport report;
     const LocalImage image = MakeRenderer(*kind)->Render(*slab, block.block.box, setup, {}, std::atomic<bool>(false), report).value();
     EXPECT_EQ(image.bounds, FrameBounds(setup));
@@ -211,7 +211,7 @@ TEST(Renderers, StopWhenCancelled) {
   for (const RendererKind* kind : Renderers()) {
     SetupOptions options;
     options.renderer = kind;
-    const auto slab = CutSlab(block, block.block.box);
+    const auto slab = SlabFor(*kind, block, block.block.box);
     RankReport report;
     const auto result = MakeRenderer(*kind)->Render(*slab, block.block.box, MakeSetup(block, options), {}, std::atomic<bool>(true), report);
     ASSERT_FALSE(result.ok());
@@ -224,7 +224,7 @@ TEST(Renderers, ReportTheirStages) {
   for (const RendererKind* kind : Renderers()) {
     SetupOptions options;
     options.renderer = kind;
-    const auto slab = CutSlab(block, block.block.box);
+    const auto slab = SlabFor(*kind, block, block.block.box);
     RankReport report;
     ASSERT_TRUE(MakeRenderer(*kind)->Render(*slab, block.block.box, MakeSetup(block, options), {}, std::atomic<bool>(false), report).ok());
     ASSERT_EQ(report.spans.size(), 1U);

@@ -58,7 +58,7 @@ HWY_INLINE RayPacket PacketAt(const ViewRays& view, std::int32_t x, std::int32_t
   RayPacket packet;
   packet.valid = hn::And(hn::Lt(px, Set(float(x_end))), hn::Lt(py, Set(float(y_end))));
   const auto one = Set(1);
-  const auto square = hn::Mul(hn::Add(hn::Mul(from_x, from_x), hn::Mul(from_y, from_y)), Set(view.pixel_squared));
+  const auto square = hn::Mul(hn::Add(hn::Mul(from_x, from_x), hn::Mul(from_y, from_y)), Set(view.bend));
   const auto length = hn::Sqrt(hn::Add(one, square));
   const auto lag = hn::Div(square, hn::Add(one, length)), scale = hn::Div(Set(view.step), length),
              shift = hn::Div(Set(view.start_distance), length);

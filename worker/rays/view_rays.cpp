@@ -51,6 +51,7 @@ ViewRays MakeViewRays(const Camera& camera, const VolumeGeometry& geometry, doub
   rays.forward = ToFloat3(centre.direction);
   rays.start = ToFloat3(centre.origin + first * step * centre.direction);
   rays.pixel_squared = float(Dot(right * spacing, right * spacing));
+  rays.bend = rays.pixel_squared;
   rays.start_distance = float(first * step);
   rays.step = float(step);
   // Under perspective samples lie at distances from the eye, which are larger than depths.
@@ -68,7 +69,7 @@ PixelRay RayOf(const ViewRays& rays, std::int32_t x, std::int32_t y) {
   PixelRay ray{};
   // Perspective: the unit vector along the ray is (forward + offset) / length. The first sample is written relative to that of the central
   // ray, so that nothing cancels if the eye is far away: 1 / length - 1 = -square / (length (1 + length)).
-  const float square = (from_x * from_x + from_y * from_y) * rays.pixel_squared;
+  const float square = (from_x * from_x + from_y * from_y) * rays.bend;
   const float length = std::sqrt(1 + square);
   const float lag = square / (1 + length), scale = rays.step / length, shift = rays.start_distance / length;
   for (std::size_t i = 0; i < 3; ++i) {

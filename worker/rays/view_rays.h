@@ -6,6 +6,8 @@
 // its middle instead, so that a thin one is a slice.) So samples depend only on the view and the volume's geometry, never on a box: boxes
 // that ask for the same sample compute the same position, bit for bit (SamplePosition and, lane by lane, ray_packet-inl.h).
 //
+// Slicing takes OnPlanes instead: the samples k of all rays lie on one plane of equal depth, also under perspective.
+//
 // Clipping leaves one part of a ray, or two if the region is cut away. Its ends depend on ray and region alone, so that boxes agree on
 // them.
 //
@@ -44,6 +46,7 @@ struct ViewRays {
   // unit of physical distance. `start`: the first sample of the central ray.
   Float3 right{}, down{}, forward{}, start{};
   float pixel_squared = 0;        // square of a pixel's physical size (perspective: at unit depth)
+  float bend = 0;                 // pixel_squared: samples of one k lie on a sphere round the eye (perspective); 0: on a plane
   float start_distance = 0;       // physical, from eye or eye plane to the first sample
   float step = 0;                 // physical
   std::int32_t sample_count = 0;  // k < sample_count holds for every sample within the volume
@@ -53,6 +56,12 @@ struct ViewRays {
 
 // `samples_per_voxel`: samples along a ray per least voxel spacing of the volume, > 0.
 ViewRays MakeViewRays(const Camera& camera, const VolumeGeometry& geometry, double samples_per_voxel, const ClipRegion& clip = {});
+
+// The same rays with samples on planes of equal depth, `step` apart.
+inline ViewRays OnPlanes(ViewRays rays) {
+  rays.bend = 0;
+  return rays;
+}
 
 // The ray of a pixel: sample k is at first + k * move in data space, by component.
 struct PixelRay {

@@ -1,0 +1,64 @@
+// The planning half of slicing: the frame is the picture, supersampled where it is minified; images blend front to back.
+#include <memory>
+
+#include "common/calibration/calibration.h"
+#include "common/renderers/renderer_kind.h"
+#include "common/renderers/sampling_rate.h"
+#include "common/volume/cells_along.h"
+
+namespace slabstream::slice {
+namespace {
+
+// Every cell that may show is cut, whatever lies before it: time grows with drawn voxels of the lattice, and with samples in them.
+class SliceCost : public AnalyticCost {
+ public:
+  explicit SliceCost(const CostBasis& basis) : drawn_(*basis.drawn), sampling_rate_(SamplingRateOf(basis.parameters)) {}
+
+  double Seconds(const Box& box, const CostView& view) const override {
+    double drawn = 0;  // voxels
+    const Index3 cells = OccupancyCells(drawn_.size);
+    const CellsAlong x(box, Axis::kX), y(box, Axis::kY), z(box, Axis::kZ);
+    Index3 cell;
+    for (cell.z = z.begin; cell.z < z.end; ++cell.z) {
+      for (cell.y = y.begin; cell.y < y.end; ++cell.y) {
+        for (cell.x = x.begin; cell.x < x.end; ++cell.x) {
+          const double inside = x.ShareInside(cell.x) * y.ShareInside(cell.y) * z.ShareInside(cell.z);
+          drawn += inside * drawn_.cells[NumberIn(cells, cell)].voxels;
+        }
+      }
+    }
+    if (drawn <= 0) return 0;
+    namespace cost = calibration::slice;
+    const double pixels = view.pixels_per_voxel * view.pixels_per_voxel;
+    return cost::kBox + drawn * (cost::kVoxel + pixels * cost::kSample * sampling_rate_);
+  }
+
+ private:
+  const OccupancyGrid& drawn_;
+  const double sampling_rate_;
+};
+
+class SliceKind : public RendererKind {
+ public:
+  SliceKind()
+      : RendererKind({.name = "slice",
+                      .title = "slicing",
+                      .purpose = "the cells of an unstructured grid, cut by planes parallel to the picture, without lights",
+                      .format = PixelFormat::kRgba,
+                      .reach = kHalo,  // 0 would do; like the other renderers, so that all use the same cached voxels
+                      .draws_cells = true,
+                      .footprint = 1,
+                      .stages = {Stage::kTransform, Stage::kSample},
+                      .parameters = {SamplingRate()}}) {}
+
+  std::unique_ptr<AnalyticCost> MakeCost(const CostBasis& basis) const override { return std::make_unique<SliceCost>(basis); }
+};
+
+}  // namespace
+
+const RendererKind& Kind() {
+  static const SliceKind kind;
+  return kind;
+}
+
+}  // namespace slabstream::slice

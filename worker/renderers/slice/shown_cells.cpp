@@ -1,0 +1,51 @@
+#include "worker/renderers/slice/shown_cells.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace slabstream::slice {
+
+std::span<const std::uint32_t> ShownCells::Of(const Mesh& mesh, const VisibleSamples& visible) {
+  if (visible_ == visible) return shown_;
+  const std::size_t count = mesh.tetrahedra.size();
+  constexpr std::size_t kBlock = 1 << 15;
+  const std::size_t blocks = (count + kBlock - 1) / kBlock;
+  const auto for_each_block = [&](auto&& work) {
+    tbb::parallel_for(std::size_t{0}, blocks,
+                      [&](std::size_t block) { work(block, block * kBlock, std::min((block + 1) * kBlock, count)); });
+  };
+
+  if (ranges_.size() != count) {
+    ranges_.resize(count);
+    for_each_block([&](std::size_t, std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        float values[4];
+        for (std::size_t p = 0; p < 4; ++p) values[p] = mesh.values[mesh.at == ValuesAt::kCells ? i : mesh.tetrahedra[i][p]];
+        const bool finite = std::ranges::all_of(values, [](float value) { return std::isfinite(value); });
+        ranges_[i] = finite ? Range{*std::ranges::min_element(values), *std::ranges::max_element(values)} : Range{1, 0};
+      }
+    });
+  }
+
+  // Each block's cells are counted, then written behind those of the blocks before it.
+  std::vector<std::size_t> first(blocks + 1, 0);
+  const auto shows = [&](std::size_t i) { return visible.AnyBetween(ranges_[i].least, ranges_[i].greatest); };
+  for_each_block([&](std::size_t block, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) first[block + 1] += shows(i) ? 1 : 0;
+  });
+  std::partial_sum(first.begin(), first.end(), first.begin());
+  shown_.resize(first.back());
+  for_each_block([&](std::size_t block, std::size_t begin, std::size_t end) {
+    std::size_t at = first[block];
+    for (std::size_t i = begin; i < end; ++i) {
+      if (shows(i)) shown_[at++] = std::uint32_t(i);
+    }
+  });
+  visible_ = visible;
+  return shown_;
+}
+
+}  // namespace slabstream::slice

@@ -1,0 +1,32 @@
+// ShownCells: the tetrahedra of a slab of which anything may be visible. Kept until other values are visible.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/mesh/mesh.h"
+#include "worker/rays/ray_look.h"
+#include "worker/renderers/slab_data.h"
+
+namespace slabstream::slice {
+
+class ShownCells : public SlabCache {
+ public:
+  // Numbers of tetrahedra, ascending. Those with a value that is not finite are not among them. `mesh` is the slab's. Parallel.
+  std::span<const std::uint32_t> Of(const Mesh& mesh, const VisibleSamples& visible);
+
+  std::size_t bytes() const override { return ranges_.capacity() * sizeof(ranges_[0]) + shown_.capacity() * sizeof(shown_[0]); }
+
+ private:
+  struct Range {
+    float least, greatest;  // least > greatest: a value is not finite
+  };
+  std::vector<Range> ranges_;  // by tetrahedron
+  std::optional<VisibleSamples> visible_;
+  std::vector<std::uint32_t> shown_;
+};
+
+}  // namespace slabstream::slice

@@ -1,0 +1,98 @@
+// The pixel half of slicing (Yagel, Reed, Law, Shih, Shareef 1996). docs/rendering.md defines what it computes.
+//
+//   1. once a transfer function: find the cells of which anything may be visible (ShownCells)
+//   2. once a frame: move the cells' points to frame space (FrameSpace), and find the cells of each tile of the picture (CellBins)
+//   3. tiles are separate tasks (SliceTile)
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <cmath>
+
+#include "common/base/time.h"
+#include "worker/renderers/renderer.h"
+#include "worker/renderers/slice/shown_cells.h"
+#include "worker/renderers/slice/slice_tile.h"
+#include "worker/renderers/stage_clock.h"
+
+namespace slabstream::slice {
+namespace {
+
+// The samples of the box, and pixels of the frame that they may lie in.
+RayReach SetBox(const Box& box, SliceWork& work) {
+  const Vec3 half = {0.5, 0.5, 0.5}, low = ToVec3(box.begin) - half, high = ToVec3(box.end) - half;
+  for (const Axis axis : kAxes) {
+    const auto i = std::size_t(Number(axis));
+    work.low[i] = float(low[axis]);
+    work.high[i] = float(high[axis]);
+    work.at_border = work.at_border || box.begin[axis] == 0 || work.high[i] >= work.space->rays().volume_end[i];
+  }
+  const RayReach reach = work.space->ReachOf(low, high);
+  work.k_begin = reach.begin;
+  work.k_end = reach.end;
+  return reach;
+}
+
+class SliceRenderer : public Renderer {
+ public:
+  Result<LocalImage> Render(SlabData& slab, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
+                            const std::atomic<bool>& cancelled, RankReport& report) override {
+    if (slab.layers().cells == nullptr) {
+      return Status::InvalidArgument("renderer slice draws the cells of unstructured grids, but the dataset has none");
+    }
+    StageClock clock(report);
+    const Mesh& mesh = *slab.layers().cells;
+    const double planes_per_voxel = setup.parameters.at(0);
+    const VolumeGeometry& geometry = setup.description.geometry;
+    const RayLook look =
+        MakeRayLook(slab.Classification(setup), setup.transfer, setup.description, setup.camera, setup.shading, planes_per_voxel);
+    const std::span<const std::uint32_t> shown = slab.CacheOf<ShownCells>().Of(mesh, VisibleSamples(look));
+    clock.Charge(Stage::kPrepare);
+    if (shown.empty()) {
+      clock.Finish(Stage::kRender);
+      return MakeLocalImage(setup.format, {});
+    }
+
+    const FrameSpace space(setup.camera, geometry, planes_per_voxel, setup.clip);
+    SliceWork work = {.space = &space, .mesh = &mesh, .look = &look, .termination = float(setup.termination)};
+    const RayReach reach = SetBox(box, work);
+    const FramePoints points = space.At(mesh.points);
+    work.points = &points;
+    const CellBins bins(points.bounds, mesh.tetrahedra, shown, reach.pixels, reach.begin, reach.end,
+                        [&](const PixelBounds& tile) { return hidden.HidesAll(tile); });
+    clock.Charge(Stage::kTransform);
+
+    LocalImage image = MakeLocalImage(setup.format, reach.pixels);
+    const std::uint64_t drawn = RenderTiles(work, bins, image, cancelled, report);
+    report.drawn_voxels += std::uint64_t(std::ceil(double(drawn) * VoxelsASample(space.rays(), setup.camera, geometry)));
+    clock.Finish(Stage::kRender);
+    if (cancelled) return Status::Cancelled("rendering was cancelled");
+    return image;
+  }
+
+ private:
+  // Returns how many samples were drawn.
+  static std::uint64_t RenderTiles(const SliceWork& work, const CellBins& bins, LocalImage& image, const std::atomic<bool>& cancelled,
+                                   RankReport& report) {
+    const auto width = std::size_t(image.bounds.width());
+    std::atomic<std::int64_t> ns = 0;
+    std::atomic<std::uint64_t> drawn = 0;
+    tbb::enumerable_thread_specific<TileRoomPtr> rooms(MakeTileRoom);
+    tbb::parallel_for(0, bins.tiles(), [&](std::int32_t number) {
+      const std::span<const CellBins::Entry> cells = bins.CellsOf(number);
+      if (cells.empty() || cancelled.load(std::memory_order_relaxed)) return;
+      const Time begin = MonotonicNow();
+      const PixelBounds tile = bins.TileAt(number);
+      const std::size_t pixel = std::size_t(tile.y_begin - image.bounds.y_begin) * width + std::size_t(tile.x_begin - image.bounds.x_begin);
+      drawn += SliceTile(work, tile, cells, *rooms.local(), &image.rgba[4 * pixel], 4 * width);
+      ns += (MonotonicNow() - begin).count();
+    });
+    report.stage_ns[std::size_t(Stage::kSample)] += ns;
+    return drawn;
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Renderer> MakePixelHalf() { return std::make_unique<SliceRenderer>(); }
+
+}  // namespace slabstream::slice
