@@ -78,7 +78,6 @@ class RendererKind {
     std::int32_t reach = kHalo;               // voxels outside a box that its samples depend on, [0, kHalo]
     bool along_slices = false;                // the frame is an image along the slices (SheetGrid), else the camera's
     bool perspective = true;                  // draws perspective views, too
-    bool draws_cells = false;                 // of unstructured grids; other datasets are refused
     bool shows_labels = false;
     bool shows_overlays = false;
     bool isosurfaces = false;       // draws TransferFunction::isosurfaces
@@ -106,7 +105,6 @@ class RendererKind {
     static constexpr Projection kProjections[] = {Projection::kOrthographic, Projection::kPerspective};
     return std::span(kProjections).first(facts_.perspective ? 2 : 1);
   }
-  bool draws_cells() const { return facts_.draws_cells; }
   bool shows_labels() const { return facts_.shows_labels; }
   bool shows_overlays() const { return facts_.shows_overlays; }
   bool isosurfaces() const { return facts_.isosurfaces; }
