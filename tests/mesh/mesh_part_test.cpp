@@ -4,7 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstring>
+#include <bit>
+#include <cstdint>
 #include <limits>
 
 #include "common/mesh/lattice.h"
@@ -38,8 +39,8 @@ Box SomeBox(Random& random, const Index3& size) {
 
 // Bit for bit, since a value may be NaN.
 bool Same(const Mesh& a, const Mesh& b) {
-  return a.points == b.points && a.tetrahedra == b.tetrahedra && a.at == b.at && a.values.size() == b.values.size() &&
-         std::memcmp(a.values.data(), b.values.data(), a.values.size() * sizeof(float)) == 0;
+  const auto bits = [](float value) { return std::bit_cast<std::uint32_t>(value); };
+  return a.points == b.points && a.tetrahedra == b.tetrahedra && a.at == b.at && std::ranges::equal(a.values, b.values, {}, bits, bits);
 }
 
 TEST(MeshCutter, CutsTheCellsThatTouchTheBoxInTheirOrder) {
