@@ -66,8 +66,7 @@ void FrameSpace::Place(const Vec3& point, FramePoint& at, PointBounds& bounds) c
   }
 }
 
-FramePoints FrameSpace::At(std::span<const Vector3<float>> points) const {
-  FramePoints result;
+void FrameSpace::Place(std::span<const Vector3<float>> points, FramePoints& result) const {
   result.points.resize(points.size());
   result.bounds.resize(points.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 4096), [&](const tbb::blocked_range<std::size_t>& range) {
@@ -75,7 +74,6 @@ FramePoints FrameSpace::At(std::span<const Vector3<float>> points) const {
       Place({double(points[i].x), double(points[i].y), double(points[i].z)}, result.points[i], result.bounds[i]);
     }
   });
-  return result;
 }
 
 RayReach FrameSpace::ReachOf(const Vec3& low, const Vec3& high) const {

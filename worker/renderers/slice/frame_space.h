@@ -18,6 +18,7 @@
 #include "common/view/camera.h"
 #include "common/view/clip.h"
 #include "worker/rays/view_rays.h"
+#include "worker/renderers/slab_data.h"
 
 namespace slabstream::slice {
 
@@ -32,9 +33,13 @@ struct alignas(32) PointBounds {
   float begin[4], end[4];  // x, y, k; end[3]: 1 if the point does not lie before the eye, else 0
 };
 
-struct FramePoints {
+// The points of a slab's cells. Their memory stays with the slab, since taking it anew costs more than finding the points.
+class FramePoints : public SlabCache {
+ public:
   AlignedVector<FramePoint> points;
   AlignedVector<PointBounds> bounds;
+
+  std::size_t bytes() const override { return points.capacity() * sizeof(FramePoint) + bounds.capacity() * sizeof(PointBounds); }
 };
 
 class FrameSpace {
@@ -45,7 +50,7 @@ class FrameSpace {
   const ViewRays& rays() const { return rays_; }  // on planes; they run through the samples
 
   // Of points in data space. Parallel.
-  FramePoints At(std::span<const Vector3<float>> points) const;
+  void Place(std::span<const Vector3<float>> points, FramePoints& result) const;
 
   double SOf(double k) const { return perspective_ ? numerator_ / DepthOf(k) : k; }
   // What the linear function of a cell is multiplied by on plane k, so that it is the value.

@@ -55,7 +55,8 @@ class SliceRenderer : public Renderer {
     const FrameSpace space(setup.camera, geometry, planes_per_voxel, setup.clip);
     SliceWork work = {.space = &space, .mesh = &mesh, .look = &look, .termination = float(setup.termination)};
     const RayReach reach = SetBox(box, work);
-    const FramePoints points = space.At(mesh.points);
+    FramePoints& points = slab.CacheOf<FramePoints>();
+    space.Place(mesh.points, points);
     work.points = &points;
     const CellBins bins(points.bounds, mesh.tetrahedra, shown, reach.pixels, reach.begin, reach.end,
                         [&](const PixelBounds& tile) { return hidden.HidesAll(tile); });

@@ -225,8 +225,9 @@ HWY_NOINLINE std::uint64_t Compose(const SliceWork& work, std::int32_t chunk, st
       auto present = hn::Eq(value, value);
       if (hn::AllFalse(df, present)) continue;
       const auto plane = Set(float(k));
-      auto mine = hn::And(hn::Ge(plane, owned[0].begin), hn::Lt(plane, owned[0].end));
-      if constexpr (kClipped) mine = hn::Or(mine, hn::And(hn::Ge(plane, owned[1].begin), hn::Lt(plane, owned[1].end)));
+      const auto in = [&](std::size_t i) HWY_ATTR { return hn::And(hn::Ge(plane, owned[i].begin), hn::Lt(plane, owned[i].end)); };
+      auto mine = in(0);
+      if constexpr (kClipped) mine = hn::Or(mine, in(1));
       present = hn::And(hn::And(present, mine), hn::Lt(sums.alpha, opaque));
       const auto entry = EntryOf(look, value, present);
       auto opacity = hn::GatherIndex(df, entries + 3, entry);
@@ -242,7 +243,7 @@ HWY_NOINLINE std::uint64_t Compose(const SliceWork& work, std::int32_t chunk, st
           const auto is_first = hn::Eq(plane, hn::Load(df, part.first + pixel)), is_last = hn::Eq(plane, hn::Load(df, part.last + pixel));
           const auto excess = hn::Add(hn::IfThenElseZero(is_first, hn::Load(df, part.first_excess + pixel)),
                                       hn::IfThenElseZero(is_last, hn::Load(df, part.last_excess + pixel)));
-          length = hn::Add(length, hn::Mul(length, excess));
+          length = hn::Add(length, hn::IfThenElseZero(in(i), hn::Mul(length, excess)));
         }
       }
       const auto uneven = hn::And(visible, hn::Ne(length, one));
