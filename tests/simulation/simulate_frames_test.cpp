@@ -243,6 +243,19 @@ TEST(SimulateFrames, VoxelsComeBeforeRendering) {
   EXPECT_EQ(result.voxel_bytes, 1000);
 }
 
+// What layers and cells weigh is in the boxes' bytes: their chunks are not simulated one by one.
+TEST(SimulateFrames, TheVoxelsOfABoxTravelAtOnceWhateverTheDatasetHas) {
+  for (const LayerTypes& layers : {LayerTypes{.labels = ScalarType::kUint16, .overlay = ScalarType::kFloat32}, LayerTypes{.cells = true}}) {
+    MadeFrame frame(2, 1, kSide, 0, 1, "fan-in");
+    for (RenderCost& cost : frame.costs()) cost.voxel_bytes = 500;
+    const double alone = Simulate({frame.input()}, WithoutDelays()).frames[0].latency();
+    frame.plan().setup.layers = layers;
+    const SimulatedFrame result = Simulate({frame.input()}, WithoutDelays()).frames[0];
+    EXPECT_EQ(result.latency(), alone);
+    EXPECT_EQ(result.voxel_bytes, 1000);
+  }
+}
+
 TEST(SimulateFrames, StragglersDependOnTheSeedAlone) {
   MachineModel machine = WithoutDelays();
   machine.stragglers = {0.2, 3, 1};

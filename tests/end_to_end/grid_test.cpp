@@ -1,0 +1,97 @@
+// Unstructured grids: from the file to the picture, alone and by a service.
+#include <gmock/gmock.h>
+#include <signal.h>
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "tests/end_to_end/picture_file.h"
+#include "tests/end_to_end/program.h"
+#include "tests/mesh/vtu_files.h"
+
+namespace slabstream {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+constexpr int kPixels = 64;
+
+class GridTest : public EndToEndTest {
+ protected:
+  GridTest() {
+    Write("grid.vtu", VtuFile(SmallGrid()));
+    Write("grid.vtk", LegacyGridFile(SmallGrid()));
+  }
+
+  void Write(const std::string& name, const FileBytes& bytes) const {
+    std::ofstream(Path(name), std::ios::binary).write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
+  }
+
+  PictureFile Render(const std::string& source, const std::string& output, const std::vector<std::string>& more) const {
+    std::vector<std::string> arguments = {"render", source, "-o", output, "--size", std::to_string(kPixels), "--renderer", "slice"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    MustRun(arguments);
+    return ReadPicture(Path(output));
+  }
+};
+
+double MeanAlpha(const PictureFile& picture) {
+  double sum = 0;
+  for (int y = 0; y < picture.height; ++y) {
+    for (int x = 0; x < picture.width; ++x) sum += double(picture.At(x, y, 3));
+  }
+  return sum / (kPixels * kPixels);
+}
+
+TEST_F(GridTest, InfoTellsCellsBoundsAndArrays) {
+  for (const char* file : {"grid.vtu", "grid.vtk"}) {
+    const json info = json::parse(MustRun({"info", file, "--json"}).out);
+    EXPECT_EQ(info["cells"], 4);
+    EXPECT_EQ(info["kinds"]["wedge"], 2);
+    EXPECT_EQ(info["bounds"]["high"], (json{2.0, 1.0, 2.0}));
+    EXPECT_GE(info["arrays"].size(), 1U);
+    EXPECT_THAT(MustRun({"info", file, "--lattice", "40"}).out, HasSubstr("40 x 20 x 40 voxels"));
+  }
+}
+
+TEST_F(GridTest, AnyNumberOfWorkersDrawsTheSameCells) {
+  const PictureFile alone = Render("grid.vtu", "alone.exr", {"--local=1", "--elevation", "20", "--azimuth", "30"});
+  EXPECT_GT(MeanAlpha(alone), 0.05);
+  const PictureFile legacy = Render("grid.vtk", "legacy.exr", {"--local=2", "--elevation", "20", "--azimuth", "30"});
+  EXPECT_LE(LargestDifference(alone, legacy), 2e-5 + 1.0 / 1024);
+  MustRun({"up", "--workers", "3", "--listen", "ipc://" + Path("s"), "--data", "g=" + Path("grid.vtu"), "--detach"});
+  const PictureFile served = Render("g", "served.exr", {"--elevation", "20", "--azimuth", "30", "--decomposition", "kd-tree"});
+  EXPECT_LE(LargestDifference(alone, served), 2e-5 + 1.0 / 1024);
+  // One worker less: the others fetch its cells.
+  const json status = json::parse(MustRun({"status", "--json"}).out);
+  ASSERT_EQ(::kill(status["workers"][0]["pid"].get<pid_t>(), SIGKILL), 0);
+  const PictureFile after = Render("g", "after.exr", {"--elevation", "20", "--azimuth", "30", "--decomposition", "kd-tree"});
+  EXPECT_LE(LargestDifference(alone, after), 2e-5 + 1.0 / 1024);
+  // The same service shows it on the lattice.
+  MustRun({"render", "g", "-o", "lattice.png", "--renderer", "raycast", "--size", "32"});
+  EXPECT_EQ(json::parse(MustRun({"value", "g", "--at", "0.5,0.5,0.5", "--json"}).out)[0]["inside"], true);
+  MustRun({"down"});
+}
+
+TEST_F(GridTest, WhatCannotBeDrawnIsRefused) {
+  MakeSphere("ball.nrrd", 2, 16);
+  ExpectEachRefused({"render", "-o", "x.png", "--local=1", "--renderer", "slice"},
+                    {{{"ball.nrrd"}, "draws the cells of unstructured grids"},
+                     {{"grid.vtu", "--array", "none"}, "has no array 'none'"},
+                     {{"grid.vtu", "--lattice", "2000"}, "[1, 1024]"},
+                     {{"grid.vtu", "--channel", "0"}, "channel is no option of VTK unstructured grid"},
+                     {{"grid.vtu", "--isovalue", "1"}, "isovalue"},
+                     {{"grid.vtu", "--sampling-rate", "0"}, "sampling-rate"}});
+}
+
+TEST_F(GridTest, ConvertWritesTheLattice) {
+  MustRun({"convert", "grid.vtu?lattice=30", "lattice.nrrd"});
+  const json info = json::parse(MustRun({"info", "lattice.nrrd", "--json"}).out);
+  EXPECT_EQ(info["size"], (json{30, 15, 30}));
+  EXPECT_GT(info["non_finite"], 0) << "outside the cells there is nothing";
+}
+
+}  // namespace
+}  // namespace slabstream
