@@ -58,7 +58,7 @@ inline constexpr double kSample = 4e-9;
 // voxel length: about 200 ns a tetrahedron, and 8 ns a sample.
 namespace slice {
 inline constexpr double kBox = 100e-6;
-inline constexpr double kVoxel = 100e-9;  // of the lattice, if it is drawn: there are two for each tetrahedron (common/mesh/lattice.h)
+inline constexpr double kTetrahedron = 200e-9;
 inline constexpr double kSample = 8e-9;
 }  // namespace slice
 

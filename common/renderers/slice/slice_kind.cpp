@@ -1,5 +1,6 @@
 // The planning half of slicing: the frame is the picture, supersampled where it is minified; images blend front to back.
 #include <memory>
+#include <vector>
 
 #include "common/calibration/calibration.h"
 #include "common/renderers/renderer_kind.h"
@@ -9,13 +10,25 @@
 namespace slabstream::slice {
 namespace {
 
-// Every cell that may show is cut, whatever lies before it: time grows with drawn voxels of the lattice, and with samples in them.
+// Every tetrahedron that may show is cut, whatever lies before it: time grows with their number and with samples in drawn voxels of the
+// lattice. Those of a brick lie evenly in its voxels, as far as is known.
 class SliceCost : public AnalyticCost {
  public:
-  explicit SliceCost(const CostBasis& basis) : drawn_(*basis.drawn), sampling_rate_(SamplingRateOf(basis.parameters)) {}
+  explicit SliceCost(const CostBasis& basis) : drawn_(*basis.drawn), sampling_rate_(SamplingRateOf(basis.parameters)) {
+    const VolumeSummary& summary = *basis.summary;
+    const Index3 cells = OccupancyCells(drawn_.size);
+    tetrahedra_.resize(drawn_.cells.size());
+    static_assert(kBrick % kOccupancyCell == 0, "a cell lies in one brick");
+    for (std::size_t i = 0; i < tetrahedra_.size() && !summary.cells.empty(); ++i) {
+      const Index3 brick = kOccupancyCell * PlaceIn(cells, i) / kBrick;
+      const Box voxels = Intersection({kBrick * brick, kBrick * (brick + Uniform(1))}, summary.description.geometry.bounds());
+      const double each = double(summary.cells[NumberIn(summary.brick_counts, brick)]) / double(voxels.voxel_count());
+      tetrahedra_[i] = float(each * drawn_.cells[i].voxels);
+    }
+  }
 
   double Seconds(const Box& box, const CostView& view) const override {
-    double drawn = 0;  // voxels
+    double drawn = 0, tetrahedra = 0;  // voxels of the lattice
     const Index3 cells = OccupancyCells(drawn_.size);
     const CellsAlong x(box, Axis::kX), y(box, Axis::kY), z(box, Axis::kZ);
     Index3 cell;
@@ -23,18 +36,21 @@ class SliceCost : public AnalyticCost {
       for (cell.y = y.begin; cell.y < y.end; ++cell.y) {
         for (cell.x = x.begin; cell.x < x.end; ++cell.x) {
           const double inside = x.ShareInside(cell.x) * y.ShareInside(cell.y) * z.ShareInside(cell.z);
-          drawn += inside * drawn_.cells[NumberIn(cells, cell)].voxels;
+          const std::size_t number = NumberIn(cells, cell);
+          drawn += inside * drawn_.cells[number].voxels;
+          tetrahedra += inside * double(tetrahedra_[number]);
         }
       }
     }
     if (drawn <= 0) return 0;
     namespace cost = calibration::slice;
     const double pixels = view.pixels_per_voxel * view.pixels_per_voxel;
-    return cost::kBox + drawn * (cost::kVoxel + pixels * cost::kSample * sampling_rate_);
+    return cost::kBox + tetrahedra * cost::kTetrahedron + drawn * pixels * cost::kSample * sampling_rate_;
   }
 
  private:
   const OccupancyGrid& drawn_;
+  std::vector<float> tetrahedra_;  // by cell of `drawn_`: those that may show
   const double sampling_rate_;
 };
 
