@@ -16,6 +16,9 @@ namespace slabstream {
 namespace {
 
 constexpr std::uint64_t kDerivedPerVoxel = 2;  // the voxels, and what renderers make from them
+// A tetrahedron and its share of points: 20 as it arrives, 20 as it is kept, and 40 for what slicing makes of it (64 bytes a point, 12 a
+// tetrahedron, 8 for each tile of the picture that it reaches into).
+constexpr std::uint64_t kBytesACell = 80;
 
 std::uint64_t ImageBytes(const PixelBounds& bounds, const FrameSetup& setup) {
   return std::uint64_t(bounds.pixel_count()) * BytesPerPixel(setup.format);
@@ -60,6 +63,20 @@ std::uint64_t PictureBytes(const FrameSetup& setup) {
   return std::uint64_t(FrameBytes(setup)) + copies * ImageBytes(picture, setup);
 }
 
+std::uint64_t CellBytes(const Box& slab, const VolumeSummary& summary) {
+  if (slab.empty() || summary.cells.empty()) return 0;
+  std::uint64_t cells = 0;
+  const BrickGrid grid(slab);
+  for (std::int32_t z = 0; z < grid.counts.z; ++z) {
+    for (std::int32_t y = 0; y < grid.counts.y; ++y) {
+      for (std::int32_t x = 0; x < grid.counts.x; ++x) {
+        cells += summary.cells[NumberIn(summary.brick_counts, grid.first + Index3{x, y, z})];
+      }
+    }
+  }
+  return kBytesACell * cells;
+}
+
 std::uint64_t VoxelBytes(const Box& slab, const VolumeSummary& summary) {
   if (slab.empty()) return 0;
   std::uint64_t voxels = 0;
@@ -77,7 +94,7 @@ std::uint64_t VoxelBytes(const Box& slab, const VolumeSummary& summary) {
   for (const VolumeSummary* layer : {summary.labels.get(), summary.overlay.get()}) {
     if (layer != nullptr) bytes += VoxelBytes(slab, *layer);
   }
-  return bytes;
+  return bytes + CellBytes(slab, summary);
 }
 
 Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, std::span<const WorkerLimit> workers) {
@@ -87,8 +104,9 @@ Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, s
   const std::uint64_t images = std::max<std::uint64_t>(group_bytes + PictureBytes(plan.setup), 1);
 
   constexpr std::uint64_t kEnough = kMostInWindow;  // more are never under way at a time
-  std::map<WorkerId, std::uint64_t> voxels = MostVoxels(
-      plan, [&](const Box& slab) { return kDerivedPerVoxel * std::uint64_t(slab.voxel_count()) * summary.types().bytes_per_voxel(); });
+  std::map<WorkerId, std::uint64_t> voxels = MostVoxels(plan, [&](const Box& slab) {
+    return kDerivedPerVoxel * std::uint64_t(slab.voxel_count()) * summary.types().bytes_per_voxel() + CellBytes(slab, summary);
+  });
   const auto needs = [&](WorkerId worker) { return kIdleMemoryBytes + voxels.at(worker) + images; };
   const auto has_part = [&](const WorkerLimit& limit) { return limit.bytes != 0 && voxels.contains(limit.worker); };
   const bool all_fit = std::ranges::all_of(

@@ -11,7 +11,8 @@
 //   the picture, twice                    resampled or averaged if it is not the frame itself; then encoded, until it is sent
 // Images count with all pixels that their boxes can reach (ReachOf). Runs and lent images take less. A group needs the voxels of its
 // worker's boxes, with their halo, and about as much again for what renderers derive from them (VoxelBytes). Bricks of one value take
-// nothing. A worker caches more voxels than a group needs as long as images leave room.
+// nothing. If the dataset is an unstructured grid, VoxelBytes has the cells in all bricks that the boxes touch, too. A worker caches more
+// voxels than a group needs as long as images leave room.
 #pragma once
 
 #include <cstdint>

@@ -40,6 +40,10 @@ TEST(WorkerMemory, BricksOfOneValueTakeNothing) {
   EXPECT_EQ(VoxelBytes(all, summary), 2U * (64 * 64 * 64 - 16 * 16 * 16));
   EXPECT_EQ(VoxelBytes({{8, 8, 8}, {24, 16, 16}}, summary), 2U * 8 * 8 * 8) << "half of the box lies in the brick of one value";
   EXPECT_EQ(VoxelBytes({}, summary), 0U);
+  const std::uint64_t without = VoxelBytes({{0, 0, 0}, {16, 64, 64}}, summary);
+  summary.cells.assign(summary.bricks.size(), 100);
+  EXPECT_EQ(VoxelBytes({{0, 0, 0}, {16, 64, 64}}, summary), without + std::uint64_t{80} * 100 * 16)
+      << "those of the bricks that it touches";
 }
 
 TEST(WorkerMemory, TheSmallestWorkerWithAPartDecides) {
