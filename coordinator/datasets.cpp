@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <numeric>
 #include <string>
 #include <utility>
 
@@ -176,6 +177,7 @@ std::vector<DatasetStatus> DatasetTable::Report(Time now) const {
       status.memory_bytes = entry.source.held_bytes + entry.bytes;
       if (entry.summary->label_table != nullptr) status.labels = std::uint32_t(entry.summary->label_table->labels.size());
       status.overlay = entry.summary->overlay != nullptr;
+      status.cells = std::accumulate(entry.summary->cells.begin(), entry.summary->cells.end(), std::uint64_t{0});
     }
     report.push_back(std::move(status));
   }

@@ -15,6 +15,7 @@ namespace {
 std::string LayersText(const DatasetStatus& dataset) {
   std::string text = dataset.labels > 0 ? fmt::format("{} label{}", dataset.labels, dataset.labels == 1 ? "" : "s") : "";
   if (dataset.overlay) text += text.empty() ? "overlay" : ", overlay";
+  if (dataset.cells > 0) text += fmt::format("{}{} cells", text.empty() ? "" : ", ", dataset.cells);
   return text.empty() ? "-" : text;
 }
 
@@ -46,6 +47,7 @@ nlohmann::ordered_json DatasetJson(const DatasetStatus& dataset) {
     entry["spacing"] = {geometry.spacing.x, geometry.spacing.y, geometry.spacing.z};
     entry["memory_bytes"] = dataset.memory_bytes;
     entry["layers"] = {{"labels", dataset.labels}, {"overlay", dataset.overlay}};
+    entry["cells"] = dataset.cells;
     entry["range"] = {{"min", dataset.range.min}, {"max", dataset.range.max}};
   }
   if (dataset.state == DatasetState::kFailed) entry["error"] = dataset.error;

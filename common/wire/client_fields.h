@@ -141,6 +141,7 @@ void Fields(auto& io, Is<DatasetStatus> auto& m) {
     io.Any(m.memory_bytes, &P::memory_bytes, &P::set_memory_bytes);
     io.Range("labels", m.labels, &P::labels, &P::set_labels, 0, kMaxLabels);
     io.Any(m.overlay, &P::overlay, &P::set_overlay);
+    io.Any(m.cells, &P::cells, &P::set_cells);
   }
   if (m.state == DatasetState::kFailed) io.Text("error", m.error, &P::error, &P::mutable_error, 0, kMaxTextBytes);
   io.Any(m.since_ms, &P::since_ms, &P::set_since_ms);

@@ -137,6 +137,7 @@ struct DatasetStatus {
   std::uint64_t since_ms = 0;      // how long it has been in this state
   std::uint32_t labels = 0;        // kReady only: different ones of its label volume; 0 if there is none
   bool overlay = false;            // kReady only: there is one
+  std::uint64_t cells = 0;         // kReady only: tetrahedra of an unstructured grid; 0: it is a volume
   friend bool operator==(const DatasetStatus&, const DatasetStatus&) = default;
 };
 

@@ -24,6 +24,7 @@ class Dataset:
     memory_bytes: int = 0                           # of the coordinator
     labels: int = 0                                 # different ones
     overlay: bool = False
+    cells: int = 0                                  # tetrahedra of an unstructured grid; 0: it is a volume
 
 
 @dataclasses.dataclass(frozen=True)
@@ -70,6 +71,7 @@ def dataset_of(message: Any) -> Dataset:
         memory_bytes=message.memory_bytes,
         labels=message.labels,
         overlay=message.overlay,
+        cells=message.cells,
     )
 
 

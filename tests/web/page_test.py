@@ -44,6 +44,15 @@ def ball(i, j, k):
     return 60 + 8 * i if r < 1 else 0
 
 
+def write_grid(path):
+    """A hexahedron with a pyramid on it: legacy VTK."""
+    points = [(0, 0, 0), (4, 0, 0), (4, 3, 0), (0, 3, 0), (0, 0, 2), (4, 0, 2), (4, 3, 2), (0, 3, 2), (2, 1, 5)]
+    lines = ["# vtk DataFile Version 3.0", "grid", "ASCII", "DATASET UNSTRUCTURED_GRID", f"POINTS {len(points)} float", *(" ".join(map(str, p)) for p in points),
+             "CELLS 2 15", "8 0 1 2 3 4 5 6 7", "5 4 5 6 7 8", "CELL_TYPES 2", "12", "14",
+             f"POINT_DATA {len(points)}", "SCALARS v float 1", "LOOKUP_TABLE default", *(str(x + 2 * z) for x, _, z in points)]
+    path.write_text("\n".join(lines) + "\n")
+
+
 class PageTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -53,7 +62,8 @@ class PageTest(unittest.TestCase):
         write_nrrd(cls.programs.folder / "l.nrrd", SIZE, lambda i, j, k: 0 if ball(i, j, k) == 0 else 1 + i // 8)
         (cls.programs.folder / "names.txt").write_text("1 1 0.2 0.1 left\n2 0.25 0.75 0.5 middle\n3 0.2 0.4 1 right\n")
         cls.programs.run("sphere", "--class", 1, "--size", 24, "--occupancy", 0.2, "-o", "s.nrrd")
-        cls.data = ("--data", "patient=p.nrrd,labels=l.nrrd:names.txt", "--data", "sphere=s.nrrd")
+        write_grid(cls.programs.folder / "g.vtk")
+        cls.data = ("--data", "patient=p.nrrd,labels=l.nrrd:names.txt", "--data", "sphere=s.nrrd", "--data", "grid=g.vtk")
         cls.service, cls.endpoint = cls.programs.up(*cls.data)
         cls.process, cls.gateway = cls.programs.gateway("--endpoint", cls.endpoint)
         wait_until(lambda: cls.gateway.request("/readyz")[0] == 200, "ready")
@@ -371,6 +381,20 @@ class PageTest(unittest.TestCase):
             viewer.js("(s => { s.value = arguments[0]; s.dispatchEvent(new Event('change')); return true; })([...document.querySelectorAll('select')].find(s => s.value === 'raycast' || s.value === 'mip' || s.value === 'zbuffer' || s.value === 'splat'))", renderer)
             drawn = viewer.final(f"o.renderer === '{renderer}'")
             self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+
+    def test_the_cells_of_a_grid_are_offered_where_there_are_any(self):
+        renderers = "[...[...document.querySelectorAll('select')].find(s => [...s.options].some(o => o.value === 'shear')).options].map(o => o.value)"
+        volume = self.viewer()
+        volume.settled()
+        volume.until("document.querySelector('.facts dd') !== null")
+        self.assertNotIn("slice", volume.js(renderers))
+        viewer = self.viewer(dataset="grid")
+        viewer.settled()
+        viewer.until(f"{renderers}.includes('slice')")
+        viewer.js("(s => { s.value = 'slice'; s.dispatchEvent(new Event('change')); return true; })([...document.querySelectorAll('select')].find(s => [...s.options].some(o => o.value === 'slice')))")
+        drawn = viewer.final("o.renderer === 'slice'")
+        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        viewer.save(SHOTS, "grid")
 
     # ---- behind a proxy
 

@@ -9,7 +9,7 @@ export class ApiError extends Error {
 export interface Dataset {
   name: string; state: "unloaded" | "loading" | "ready" | "failed"; error?: string;
   size?: [number, number, number]; type?: string; spacing?: [number, number, number]; memory_bytes?: number;
-  layers?: { labels: number; overlay: boolean }; range?: { min: number; max: number };
+  layers?: { labels: number; overlay: boolean }; cells?: number; range?: { min: number; max: number };
 }
 export interface Histogram { range: [number, number]; counts: number[]; percentiles: Record<string, number> }
 export interface LabelName { value: number; name: string; color?: string }

@@ -11,8 +11,11 @@ import { add, normalized, rounded, scale, type Vec3 } from "./vec";
 
 const MOST_SURFACES = 8, MOST_LIGHTS = 4;
 
-export function renderingSection({ store }: Context): HTMLElement {
-  const renderer = choice("Renderer", [["splat", "Splatting"], ["raycast", "Ray casting"], ["shear", "Shears"], ["mip", "Intensity projection"], ["zbuffer", "Z-buffer"]], value => store.update({ renderer: value }, "renderer"));
+const OF_VOLUMES = [["splat", "Splatting"], ["raycast", "Ray casting"], ["shear", "Shears"], ["mip", "Intensity projection"], ["zbuffer", "Z-buffer"]] as const;
+const OF_CELLS = [["slice", "Slicing of the cells"]] as const;
+
+export function renderingSection({ store, volume, onVolume }: Context): HTMLElement {
+  const renderer = choice("Renderer", OF_VOLUMES, value => store.update({ renderer: value }, "renderer"));
   const mode = choice("Show", [["maximum", "Largest value"], ["minimum", "Least value"], ["mean", "Mean value"]], value => store.update({ projectionMode: value }, "mode"));
   const sampling = slider("Samples a voxel", 0.5, 4, 0.5, v => shown(v, 2), value => store.update({ samplingRate: value }, "sampling"));
   const shading = segmented("Shading", [["phong", "Lit"], ["none", "Plain"], ["depth-gradient", "By depth"]], value => store.update({ shading: value }, "shading"));
@@ -21,6 +24,7 @@ export function renderingSection({ store }: Context): HTMLElement {
   const background = colorField("Background", value => store.update({ background: value }, "background"));
   const update = (): void => {
     const { state } = store;
+    renderer.fill((volume()?.cells ?? 0) > 0 || state.renderer === "slice" ? [...OF_CELLS, ...OF_VOLUMES] : OF_VOLUMES);
     renderer.set(state.renderer);
     mode.set(state.projectionMode);
     sampling.set(state.samplingRate);
@@ -34,6 +38,7 @@ export function renderingSection({ store }: Context): HTMLElement {
     shadingRow.hidden = !can("lit", state.renderer);
   };
   store.subscribe(update, [...LOOK, "projection"]);
+  onVolume(update);
   update();
   return section("Rendering", true, renderer.element, mode.element, sampling.element, shadingRow, row("Projection", projection.element), row("Background", background.element));
 }

@@ -8,8 +8,8 @@ export type Options = Record<string, unknown>;
 
 // What which renderer can do; the service refuses the rest.
 const CAN = {
-  surfaces: ["raycast", "zbuffer"], labels: ["raycast", "zbuffer"], overlay: ["raycast"], sampling: ["raycast", "shear"], gradient: ["raycast", "shear"], projection: ["mip"],
-  depthShading: ["zbuffer"], lit: ["splat", "raycast", "shear", "zbuffer"], perspective: ["splat", "raycast", "mip", "zbuffer"],
+  surfaces: ["raycast", "zbuffer"], labels: ["raycast", "zbuffer"], overlay: ["raycast"], sampling: ["raycast", "shear", "slice"], gradient: ["raycast", "shear"], projection: ["mip"],
+  depthShading: ["zbuffer"], lit: ["splat", "raycast", "shear", "zbuffer"], perspective: ["splat", "raycast", "mip", "zbuffer", "slice"],
 };
 export const can = (what: keyof typeof CAN, renderer: string): boolean => CAN[what].includes(renderer);
 
