@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "common/decomposition/decomposition.h"
+#include "tests/mesh/mesh_samples.h"
 #include "tests/renderers/render_support.h"
 #include "tests/support/renderers.h"
 
@@ -12,7 +13,7 @@ namespace {
 using namespace slabstream::testing;  // NOLINT(google-build-using-namespace): test support
 
 TEST(BoxCosts, CountsOfBoxesAddUpToThoseOfTheVolume) {
-  const Volume volume = MakeBlobs({{40, 32, 48}, {1, 1, 1}}, ScalarType::kUint8, 3);
+  const Volume volume = AsGrid(MakeBlobs({{40, 32, 48}, {1, 1, 1}}, ScalarType::kUint8, 3));
   for (const RendererKind* renderer : Renderers()) {
     const FrameSetup setup = MakeSetup(volume, {.renderer = renderer});
     const std::vector<BoxCost> whole = MeasureBoxCosts(volume, setup, std::vector{volume.block.box}, 1);
@@ -29,7 +30,7 @@ TEST(BoxCosts, CountsOfBoxesAddUpToThoseOfTheVolume) {
     std::uint64_t occupied = 0;
     for (std::size_t i = 0; i < costs.size(); ++i) {
       EXPECT_EQ(costs[i].box, slabs.boxes()[i]);
-      EXPECT_EQ(costs[i].voxel_bytes, std::uint64_t(SlabBox(costs[i].box, setup).voxel_count()));
+      EXPECT_EQ(costs[i].voxel_bytes, std::uint64_t(SlabBox(costs[i].box, setup).voxel_count()) * sizeof(float));
       EXPECT_TRUE(whole[0].bounds.Contains(costs[i].bounds));
       occupied += costs[i].occupied_voxels;
     }

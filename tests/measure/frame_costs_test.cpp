@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "common/mesh/lattice.h"
+#include "tests/mesh/mesh_samples.h"
 #include "tests/renderers/render_support.h"
 #include "tests/support/renderers.h"
 
@@ -12,14 +14,14 @@ using namespace slabstream::testing;  // NOLINT(google-build-using-namespace): t
 
 // Every box that the plan places has its cost, in the place where the simulation looks for it, and the simulation takes it.
 TEST(FrameCosts, FitTheirPlan) {
-  const Volume volume = MakeBlobs({{40, 32, 48}, {1, 1, 1}}, ScalarType::kUint8, 3);
+  const Volume volume = AsGrid(MakeBlobs({{40, 32, 48}, {1, 1, 1}}, ScalarType::kUint8, 3));
   for (const RendererKind* renderer : Renderers()) {
     FrameRequest request;
     request.dataset = "blobs";
     request.renderer = renderer->name();
     request.size = {64, 48};
     request.policy.groups = 2;
-    const FramePlan plan = PlanFrame(request, 1, Summarize(volume), Roster{{1, 2, 3}}).value();
+    const FramePlan plan = PlanFrame(request, 1, SummaryOf(volume), Roster{{1, 2, 3}}).value();
     const FrameCosts costs = MeasureFrameCosts(volume, plan, 1);
     EXPECT_GT(costs.picture.finish_seconds, 0);
     EXPECT_GT(costs.picture.receive_seconds, 0);

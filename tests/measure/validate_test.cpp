@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include "common/mesh/lattice.h"
 #include "common/planning/placement.h"
 #include "laboratory/measure/plan_renderings.h"
+#include "tests/mesh/mesh_samples.h"
 #include "tests/renderers/render_support.h"
 #include "tests/support/renderers.h"
 
@@ -14,7 +16,7 @@ using namespace slabstream::testing;  // NOLINT(google-build-using-namespace): t
 
 ValidationCase SmallCase(const RendererKind* renderer, int workers) {
   ValidationCase what{.name = "blobs", .workers = workers};
-  what.volume = std::make_shared<const Volume>(MakeBlobs({{40, 32, 48}, {1, 1, 1}}, ScalarType::kUint8, 3));
+  what.volume = std::make_shared<const Volume>(AsGrid(MakeBlobs({{40, 32, 48}, {1, 1, 1}}, ScalarType::kUint8, 3)));
   what.request.renderer = renderer->name();
   what.request.size = {64, 48};
   return what;
@@ -63,7 +65,7 @@ TEST(PlanRenderings, MeasureEveryBoxOfThePlan) {
   FrameRequest request = what.request;
   request.dataset = "blobs";
   request.policy.groups = 2;
-  const FramePlan plan = PlanFrame(request, 1, Summarize(*what.volume), Roster{{1, 2}}).value();
+  const FramePlan plan = PlanFrame(request, 1, SummaryOf(*what.volume), Roster{{1, 2}}).value();
   PlanRenderings renderings(*what.volume, 2);
   const PlanSeconds seconds = renderings.Measure(plan);
   ASSERT_EQ(seconds.boxes.size(), plan.layout->partition.boxes().size());

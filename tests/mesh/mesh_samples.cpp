@@ -1,7 +1,14 @@
 #include "tests/mesh/mesh_samples.h"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <memory>
+#include <type_traits>
 #include <utility>
+#include <vector>
+
+#include "common/mesh/lattice.h"
 
 namespace slabstream {
 namespace {
@@ -25,6 +32,11 @@ void AddPyramids(const Corners& c, Mesh& mesh) {
   for (const PointNumber corner : c) sum = sum + mesh.points[corner];
   mesh.points.push_back(sum / 8.0F);
   for (const auto& face : FindCellKind(12)->faces) Split(14, {c[face[0]], c[face[1]], c[face[2]], c[face[3]], centre}, mesh);
+}
+
+float StoredSample(const VoxelBlock& block, const Index3& voxel) {
+  return VisitScalarType(block.type,
+                         [&](auto* tag) { return float(block.samples<std::remove_cvref_t<decltype(*tag)>>()[block.Offset(voxel)]); });
 }
 
 }  // namespace
@@ -68,6 +80,44 @@ Mesh WithCellValues(Mesh mesh, const std::function<double(std::size_t)>& value) 
   mesh.values.clear();
   for (std::size_t cell = 0; cell < mesh.tetrahedra.size(); ++cell) mesh.values.push_back(float(value(cell)));
   return mesh;
+}
+
+Mesh GridOf(const Volume& volume, std::int32_t step) {
+  const Index3 size = volume.description.geometry.size;
+  std::array<std::vector<double>, 3> places;  // of points, by axis
+  for (const Axis axis : kAxes) {
+    std::vector<double>& along = places[std::size_t(Number(axis))];
+    along.push_back(-0.5);
+    for (std::int32_t i = 0; i < size[axis]; i += step) along.push_back(i);
+    along.push_back(size[axis] - 0.5);
+  }
+  Mesh mesh;
+  const auto number = [&](std::size_t x, std::size_t y, std::size_t z) {
+    return PointNumber((z * places[1].size() + y) * places[0].size() + x);
+  };
+  for (std::size_t z = 0; z < places[2].size(); ++z) {
+    for (std::size_t y = 0; y < places[1].size(); ++y) {
+      for (std::size_t x = 0; x < places[0].size(); ++x) {
+        const Vec3 at = {places[0][x], places[1][y], places[2][z]};
+        mesh.points.push_back({float(at.x), float(at.y), float(at.z)});
+        Index3 voxel;
+        for (const Axis axis : kAxes) voxel[axis] = std::clamp(std::int32_t(std::lround(at[axis])), 0, size[axis] - 1);
+        mesh.values.push_back(StoredSample(volume.block, voxel));
+        if (x == 0 || y == 0 || z == 0) continue;
+        const Corners c = {number(x - 1, y - 1, z - 1), number(x, y - 1, z - 1), number(x, y, z - 1), number(x - 1, y, z - 1),
+                           number(x - 1, y - 1, z),     number(x, y - 1, z),     number(x, y, z),     number(x - 1, y, z)};
+        Split(12, {c.begin(), c.end()}, mesh);
+      }
+    }
+  }
+  return mesh;
+}
+
+Volume AsGrid(const Volume& volume, std::int32_t step) {
+  const auto cells = std::make_shared<const Mesh>(GridOf(volume, step));
+  Volume grid = Resample(*cells, volume.description.geometry);
+  grid.cells = cells;
+  return grid;
 }
 
 Vec3 PlaceOfPoint(const Mesh& mesh, PointNumber point) {

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 
 #include "common/math/vec.h"
 #include "common/mesh/mesh.h"
+#include "common/volume/volume.h"
 #include "tests/support/random.h"
 
 namespace slabstream {
@@ -19,6 +21,13 @@ Mesh MakeTetrahedralCube(const Index3& size, int cells_per_side, Random& random,
 
 // The same mesh with values at its cells: value(cell).
 Mesh WithCellValues(Mesh mesh, const std::function<double(std::size_t)>& value);
+
+// A grid of hexahedra, each split into tetrahedra, that fills the volume. It has points at the centres of every `step`-th voxel along each
+// axis, with the voxel's stored sample as value, and on the volume's sides, with the samples nearest to them.
+Mesh GridOf(const Volume& volume, std::int32_t step);
+
+// The volume of such a grid as readers make it: the cells, and their values at the voxels of the same lattice.
+Volume AsGrid(const Volume& volume, std::int32_t step = 2);
 
 Vec3 PlaceOfPoint(const Mesh& mesh, PointNumber point);
 

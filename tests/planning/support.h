@@ -22,6 +22,13 @@ inline VolumeSummary FullSummary(const Index3& size) {
   return summary;
 }
 
+// That of a grid, so every renderer has something to draw.
+inline VolumeSummary FullGridSummary(const Index3& size) {
+  VolumeSummary summary = FullSummary(size);
+  summary.cells.assign(summary.bricks.size(), 100);
+  return summary;
+}
+
 // Workers 1 ... count, one a slot.
 inline Roster FullRoster(int count) {
   Roster roster;

@@ -50,7 +50,7 @@ TEST_P(Partitions, SlabsAlongEveryAxisMakeOnePicture) {
   std::mt19937 random(seed);
   for (Projection projection : GetParam()->projections()) {
     for (int view = 0; view < 3; ++view) {
-      const Volume volume = MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed + unsigned(view));
+      const Volume volume = VolumeFor(*GetParam(), MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed + unsigned(view)));
       SetupOptions options;
       options.renderer = GetParam();
       options.view = RandomView(projection, random);
@@ -73,7 +73,7 @@ TEST_P(Partitions, BoxesOfAnyKindMakeOnePicture) {
   for (Projection projection : GetParam()->projections()) {
     for (ScalarType type : {ScalarType::kUint8, ScalarType::kUint16, ScalarType::kFloat32}) {
       for (double zoom : {0.3, 1.0, 6.0}) {
-        const Volume volume = MakeBlobs({{70, 40, 45}, {1, 1, 1}}, type, seed);
+        const Volume volume = VolumeFor(*GetParam(), MakeBlobs({{70, 40, 45}, {1, 1, 1}}, type, seed));
         SetupOptions options;
         options.renderer = GetParam();
         options.view = RandomView(projection, random);
@@ -92,7 +92,7 @@ TEST_P(Partitions, LookingBesideTheCentreMakesOnePicture) {
   const unsigned seed = 14;
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> uniform(-1, 1);
-  const Volume volume = MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed);
+  const Volume volume = VolumeFor(*GetParam(), MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed));
   for (Projection projection : GetParam()->projections()) {
     int seen = 0;
     for (int view = 0; seen < 6; ++view) {
@@ -117,7 +117,7 @@ TEST_P(Partitions, LookingBesideTheCentreMakesOnePicture) {
 TEST_P(Partitions, ClippedVolumesMakeOnePicture) {
   const unsigned seed = 15;
   std::mt19937 random(seed);
-  const Volume volume = MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed);
+  const Volume volume = VolumeFor(*GetParam(), MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed));
   for (Projection projection : GetParam()->projections()) {
     for (int view = 0; view < 8; ++view) {
       SetupOptions options;
@@ -138,7 +138,7 @@ TEST_P(Partitions, IsosurfacesMakeOnePicture) {
   if (!GetParam()->isosurfaces()) GTEST_SKIP() << "draws none";
   const unsigned seed = 16;
   std::mt19937 random(seed);
-  const Volume volume = MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed);
+  const Volume volume = VolumeFor(*GetParam(), MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed));
   for (Projection projection : GetParam()->projections()) {
     for (int view = 0; view < 12; ++view) {
       SetupOptions options;
@@ -165,7 +165,7 @@ TEST_P(Partitions, GradientOpacityMakesOnePicture) {
   if (!GetParam()->gradient_opacity()) GTEST_SKIP() << "has none";
   const unsigned seed = 17;
   std::mt19937 random(seed);
-  const Volume volume = MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed);
+  const Volume volume = VolumeFor(*GetParam(), MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed));
   for (Projection projection : GetParam()->projections()) {
     for (int view = 0; view < 4; ++view) {
       SetupOptions options;
@@ -182,7 +182,7 @@ TEST_P(Partitions, GradientOpacityMakesOnePicture) {
 
 // Axis-parallel views put rays, faces and planes on top of each other.
 TEST_P(Partitions, AxisParallelViewsHaveNoSeams) {
-  const Volume volume = MakeBlobs({{32, 32, 32}, {1, 1, 1}}, ScalarType::kUint8, 5);
+  const Volume volume = VolumeFor(*GetParam(), MakeBlobs({{32, 32, 32}, {1, 1, 1}}, ScalarType::kUint8, 5));
   for (Projection projection : GetParam()->projections()) {
     for (auto [azimuth, elevation] : {std::pair(0.0, 0.0), std::pair(90.0, 0.0), std::pair(0.0, 90.0), std::pair(45.0, 0.0)}) {
       SetupOptions options;
@@ -201,7 +201,7 @@ TEST_P(Partitions, AxisParallelViewsHaveNoSeams) {
 TEST_P(Partitions, EveryInstructionSetMakesOnePicture) {
   const unsigned seed = 13;
   std::mt19937 random(seed);
-  const Volume volume = MakeBlobs({{45, 45, 45}, {1, 1, 1}}, ScalarType::kUint8, seed);
+  const Volume volume = VolumeFor(*GetParam(), MakeBlobs({{45, 45, 45}, {1, 1, 1}}, ScalarType::kUint8, seed));
   for (Projection projection : GetParam()->projections()) {
     SetupOptions options;
     options.renderer = GetParam();

@@ -80,7 +80,7 @@ TEST(Renderers, MakeFrames) {
       request.renderer = kind->name();
       request.view.projection = projection;
       request.view.azimuth_degrees = 33;
-      const VolumeSummary summary = FullSummary({40, 41, 42});
+      const VolumeSummary summary = FullGridSummary({40, 41, 42});
       const FrameSetup setup = MakeFrameSetup(request, 1, summary).value();
       EXPECT_EQ(setup.renderer, kind);
       EXPECT_EQ(setup.format, kind->format());

@@ -10,6 +10,8 @@
 #include "common/base/check.h"
 #include "common/decomposition/decomposition.h"
 #include "common/kernels/combine.h"
+#include "common/mesh/mesh_part.h"
+#include "tests/mesh/mesh_samples.h"
 #include "tests/support/renderers.h"
 
 namespace slabstream::testing {
@@ -122,114 +124,38 @@ Clipping RandomClipping(const VolumeGeometry& geometry, std::mt19937& random) {
 
 std::unique_ptr<SlabData> CutSlab(const Volume& volume, const Box& box) { return std::make_unique<SlabData>(CutBlock(volume.block, box)); }
 
-namespace {
+Volume VolumeFor(const RendererKind& kind, Volume volume) { return kind.draws_cells() ? AsGrid(volume) : std::move(volume); }
 
-float StoredValue(const VoxelBlock& block, const Index3& voxel) {
-  return VisitScalarType(block.type,
-                         [&](auto* tag) { return float(block.samples<std::remove_cvref_t<decltype(*tag)>>()[block.Offset(voxel)]); });
-}
-
-}  // namespace
-
-std::shared_ptr<const Mesh> GridOf(const Volume& volume, std::int32_t step) {
-  const Index3 size = volume.description.geometry.size;
-  std::array<std::vector<double>, 3> places;  // of points, by axis
-  for (const Axis axis : kAxes) {
-    std::vector<double>& along = places[std::size_t(Number(axis))];
-    along.push_back(-0.5);
-    for (std::int32_t i = 0; i < size[axis]; i += step) along.push_back(i);
-    along.push_back(size[axis] - 0.5);
-  }
-  auto mesh = std::make_shared<Mesh>();
-  const auto number = [&](std::size_t x, std::size_t y, std::size_t z) {
-    return PointNumber((z * places[1].size() + y) * places[0].size() + x);
-  };
-  for (std::size_t z = 0; z < places[2].size(); ++z) {
-    for (std::size_t y = 0; y < places[1].size(); ++y) {
-      for (std::size_t x = 0; x < places[0].size(); ++x) {
-        const Vec3 at = {places[0][x], places[1][y], places[2][z]};
-        mesh->points.push_back({float(at.x), float(at.y), float(at.z)});
-        Index3 voxel;
-        for (const Axis axis : kAxes) voxel[axis] = std::clamp(std::int32_t(std::lround(at[axis])), 0, size[axis] - 1);
-        mesh->values.push_back(StoredValue(volume.block, voxel));
-        if (x == 0 || y == 0 || z == 0) continue;
-        const PointNumber points[] = {number(x - 1, y - 1, z - 1), number(x, y - 1, z - 1), number(x, y, z - 1), number(x - 1, y, z - 1),
-                                      number(x - 1, y - 1, z),     number(x, y - 1, z),     number(x, y, z),     number(x - 1, y, z)};
-        SplitCell(*FindCellKind(12), points, mesh->tetrahedra);
-      }
-    }
-  }
-  return mesh;
-}
-
-std::shared_ptr<const Mesh> CutCells(const Mesh& cells, const Box& box) {
-  constexpr float kSlack = 0.01F;  // voxels: samples of the box lie so near to it at most
-  auto part = std::make_shared<Mesh>();
-  part->at = cells.at;
-  constexpr PointNumber kNone = 0xFFFFFFFF;
-  std::vector<PointNumber> numbers(cells.points.size(), kNone);
-  std::vector<std::size_t> kept;
-  for (std::size_t i = 0; i < cells.tetrahedra.size(); ++i) {
-    bool touches = true;
-    for (const Axis axis : kAxes) {
-      float low = 1e30F, high = -1e30F;
-      for (const PointNumber point : cells.tetrahedra[i]) {
-        low = std::min(low, cells.points[point][axis]);
-        high = std::max(high, cells.points[point][axis]);
-      }
-      touches = touches && high >= float(box.begin[axis]) - 0.5F - kSlack && low <= float(box.end[axis]) - 0.5F + kSlack;
-    }
-    if (!touches) continue;
-    kept.push_back(i);
-    for (const PointNumber point : cells.tetrahedra[i]) numbers[point] = 0;
-  }
-  for (std::size_t point = 0; point < numbers.size(); ++point) {
-    if (numbers[point] == kNone) continue;
-    numbers[point] = PointNumber(part->points.size());
-    part->points.push_back(cells.points[point]);
-    if (cells.at == ValuesAt::kPoints) part->values.push_back(cells.values[point]);
-  }
-  for (const std::size_t i : kept) {
-    Tetrahedron t = cells.tetrahedra[i];
-    for (PointNumber& point : t) point = numbers[point];
-    part->tetrahedra.push_back(t);
-    if (cells.at == ValuesAt::kCells) part->values.push_back(cells.values[i]);
-  }
-  return part;
-}
-
-std::unique_ptr<SlabData> SlabFor(const RendererKind& kind, const Volume& volume, const Box& box, std::int32_t halo, const Cells& cells) {
+std::unique_ptr<SlabData> SlabFor(const RendererKind& kind, const Volume& volume, const Box& box, std::int32_t halo) {
+  const Box slab_box = Grown(box, halo, volume.block.box);
   SlabLayers layers;
-  if (kind.draws_cells()) layers.cells = CutCells(cells != nullptr ? *cells : *GridOf(volume, 2), box);
-  return std::make_unique<SlabData>(CutBlock(volume.block, Grown(box, halo, volume.block.box)), std::move(layers));
+  if (kind.draws_cells() && volume.cells != nullptr) layers.cells = std::make_shared<const Mesh>(MeshCutter(volume.cells).Cut(slab_box));
+  return std::make_unique<SlabData>(CutBlock(volume.block, slab_box), std::move(layers));
 }
 
 namespace {
 
-LocalImage RenderBox(const Volume& volume, const FrameSetup& setup, const Box& box, const Cells& cells) {
-  const auto slab = SlabFor(*setup.renderer, volume, box, setup.halo, cells);
+LocalImage RenderBox(const Volume& volume, const FrameSetup& setup, const Box& box) {
+  const auto slab = SlabFor(*setup.renderer, volume, box, setup.halo);
   RankReport report;
   return MakeRenderer(*setup.renderer)->Render(*slab, box, setup, {}, std::atomic<bool>(false), report).value();
 }
 
 }  // namespace
 
-LocalImage RenderWhole(const Volume& volume, const FrameSetup& setup, const Cells& cells) {
-  return RenderBox(volume, setup, volume.description.geometry.bounds(), cells);
+LocalImage RenderWhole(const Volume& volume, const FrameSetup& setup) {
+  return RenderBox(volume, setup, volume.description.geometry.bounds());
 }
 
-LocalImage RenderByBoxes(const Volume& volume, const FrameSetup& setup, const Partition& partition, Cells cells) {
-  if (cells == nullptr && setup.renderer->draws_cells()) cells = GridOf(volume, 2);
+LocalImage RenderByBoxes(const Volume& volume, const FrameSetup& setup, const Partition& partition) {
   LocalImage frame = MakeLocalImage(setup.format, {});
   for (BoxId id : VisibilityOrder(partition, setup.camera)) {
-    Combine(frame, RenderBox(volume, setup, partition.boxes()[id], cells), Side::kBack);
+    Combine(frame, RenderBox(volume, setup, partition.boxes()[id]), Side::kBack);
   }
   return frame;
 }
 
-LocalImage RenderPicture(const Volume& volume, const FrameSetup& setup, const Cells& cells) {
-  return FinishPicture(RenderWhole(volume, setup, cells), setup);
-}
+LocalImage RenderPicture(const Volume& volume, const FrameSetup& setup) { return FinishPicture(RenderWhole(volume, setup), setup); }
 
 Partition CutIntoSlabs(const Volume& volume, int boxes, Axis axis) {
   const WorkField voxels = WorkField::Uniform(volume.description.geometry.size);

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "common/decomposition/partition.h"
-#include "common/mesh/mesh.h"
 #include "tests/support/renderers.h"
 #include "worker/renderers/renderer.h"
 
@@ -53,23 +52,16 @@ Clipping RandomClipping(const VolumeGeometry& geometry, std::mt19937& random);
 // The voxels of `box`, which lies in the volume.
 std::unique_ptr<SlabData> CutSlab(const Volume& volume, const Box& box);
 
-// A grid of hexahedra, each split into tetrahedra, that fills the volume. It has points at the centres of every `step`-th voxel along each
-// axis, with the voxel's value, and on the volume's sides, with the values nearest to them.
-std::shared_ptr<const Mesh> GridOf(const Volume& volume, std::int32_t step = 1);
-// The cells of a grid that touch a box of voxels, and their points, in the order of the grid.
-std::shared_ptr<const Mesh> CutCells(const Mesh& cells, const Box& box);
-
-// For renderers of cells, `cells` is the grid; null: one that stands for the volume.
-using Cells = std::shared_ptr<const Mesh>;
-// What `kind` renders `box` from.
-std::unique_ptr<SlabData> SlabFor(const RendererKind& kind, const Volume& volume, const Box& box, std::int32_t halo = kHalo,
-                                  const Cells& cells = nullptr);
+// The volume, or a grid that stands for it (AsGrid) if `kind` draws cells.
+Volume VolumeFor(const RendererKind& kind, Volume volume);
+// What `kind` renders `box` from: voxels, and the volume's cells if it draws cells.
+std::unique_ptr<SlabData> SlabFor(const RendererKind& kind, const Volume& volume, const Box& box, std::int32_t halo = kHalo);
 // The frame, of the whole volume as one box.
-LocalImage RenderWhole(const Volume& volume, const FrameSetup& setup, const Cells& cells = nullptr);
+LocalImage RenderWhole(const Volume& volume, const FrameSetup& setup);
 // Each box of the partition from its own slab, combined in visibility order.
-LocalImage RenderByBoxes(const Volume& volume, const FrameSetup& setup, const Partition& partition, Cells cells = nullptr);
+LocalImage RenderByBoxes(const Volume& volume, const FrameSetup& setup, const Partition& partition);
 // The picture, of the whole volume as one box.
-LocalImage RenderPicture(const Volume& volume, const FrameSetup& setup, const Cells& cells = nullptr);
+LocalImage RenderPicture(const Volume& volume, const FrameSetup& setup);
 
 // `boxes` slabs along an axis (fewer where there are not as many slices).
 Partition CutIntoSlabs(const Volume& volume, int boxes, Axis axis);

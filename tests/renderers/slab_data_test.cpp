@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "tests/mesh/mesh_samples.h"
 #include "tests/renderers/reference_splatting.h"
 #include "tests/renderers/render_support.h"
 #include "tests/support/renderers.h"
@@ -179,7 +180,7 @@ TEST(SlabData, KeepsWhatItMadeWhileTheSameVoxelsShow) {
 
 // A volume without a drawn voxel. Every finite voxel of an intensity projection is drawn.
 TEST(Renderers, EmptyVolumesMakeEmptyImages) {
-  const Volume empty = MakeVolume({{9, 8, 7}, {1, 1, 1}}, ScalarType::kUint8, [](const Index3&) { return 0; });
+  const Volume empty = AsGrid(MakeVolume({{9, 8, 7}, {1, 1, 1}}, ScalarType::kUint8, [](const Index3&) { return 0; }));
   for (const RendererKind* kind : Renderers()) {
     SetupOptions options;
     options.renderer = kind;
@@ -192,7 +193,7 @@ TEST(Renderers, EmptyVolumesMakeEmptyImages) {
 }
 
 TEST(Renderers, WhatLiesOutsideTheFrameIsNotDrawn) {
-  const Volume block = MakeBlock({{60, 60, 60}, {1, 1, 1}});
+  const Volume block = AsGrid(MakeBlock({{60, 60, 60}, {1, 1, 1}}));
   for (const RendererKind* kind : Renderers()) {
     SetupOptions options;
     options.renderer = kind;
@@ -207,7 +208,7 @@ TEST(Renderers, WhatLiesOutsideTheFrameIsNotDrawn) {
 }
 
 TEST(Renderers, StopWhenCancelled) {
-  const Volume block = MakeBlock({{20, 20, 20}, {1, 1, 1}});
+  const Volume block = AsGrid(MakeBlock({{20, 20, 20}, {1, 1, 1}}));
   for (const RendererKind* kind : Renderers()) {
     SetupOptions options;
     options.renderer = kind;
@@ -220,7 +221,7 @@ TEST(Renderers, StopWhenCancelled) {
 }
 
 TEST(Renderers, ReportTheirStages) {
-  const Volume block = MakeBlock({{20, 20, 20}, {1, 1, 1}});
+  const Volume block = AsGrid(MakeBlock({{20, 20, 20}, {1, 1, 1}}));
   for (const RendererKind* kind : Renderers()) {
     SetupOptions options;
     options.renderer = kind;

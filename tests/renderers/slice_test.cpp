@@ -8,6 +8,7 @@
 #include <functional>
 #include <limits>
 
+#include "tests/mesh/mesh_samples.h"
 #include "tests/renderers/render_support.h"
 #include "tests/support/renderers.h"
 #include "tests/support/simd_targets.h"
@@ -25,7 +26,8 @@ using Field = std::function<double(const Vec3&)>;
 
 // Tetrahedra that fill the volume [-0.5, size - 0.5): hexahedra, `side` along each axis, split. Inner points are moved by up to `jitter` of
 // a hexahedron's side.
-Cells MakeCube(const Index3& size, int side, double jitter, const Field& value, std::mt19937& random, ValuesAt at = ValuesAt::kPoints) {
+std::shared_ptr<const Mesh> MakeCube(const Index3& size, int side, double jitter, const Field& value, std::mt19937& random,
+                                     ValuesAt at = ValuesAt::kPoints) {
   std::uniform_real_distribution<double> uniform(-jitter, jitter);
   auto mesh = std::make_shared<Mesh>();
   mesh->at = at;
@@ -61,9 +63,11 @@ Cells MakeCube(const Index3& size, int side, double jitter, const Field& value, 
   return mesh;
 }
 
-// The lattice under a grid. Its voxels matter to the range of values alone.
-Volume Lattice(const Index3& size, double greatest, const Vec3& spacing = {1, 1, 1}) {
-  return MakeVolume({size, spacing}, ScalarType::kFloat32, [&](const Index3& v) { return v == Index3{0, 0, 0} ? 0 : greatest; });
+// The volume of a grid. Its voxels matter to the range of values alone.
+Volume GridVolume(const Index3& size, std::shared_ptr<const Mesh> cells, double greatest, const Vec3& spacing = {1, 1, 1}) {
+  Volume volume = MakeVolume({size, spacing}, ScalarType::kFloat32, [&](const Index3& v) { return v == Index3{0, 0, 0} ? 0 : greatest; });
+  volume.cells = std::move(cells);
+  return volume;
 }
 
 FrameSetup SliceSetup(const Volume& volume, SetupOptions options, double planes_per_voxel = 1) {
@@ -79,9 +83,8 @@ TEST(Slice, HomogeneousCubeLooksTheSameFromEverySide) {
   for (const Projection projection : kProjections) {
     for (const Vec3 spacing : {Vec3{1, 1, 1}, Vec3{1, 1.5, 0.7}}) {
       for (const double rate : {1.0, 0.5, 2.0}) {
-        const Volume lattice = Lattice({26, 20, 24}, 100, spacing);
-        const Cells cube = MakeCube(
-            {26, 20, 24}, 7, 0.3, [](const Vec3&) { return 100; }, random);
+        const Field field = [](const Vec3&) { return 100; };
+        const Volume grid = GridVolume({26, 20, 24}, MakeCube({26, 20, 24}, 7, 0.3, field, random), 100, spacing);
         int pixels = 0;
         for (int i = 0; i < 8; ++i) {
           SetupOptions options;
@@ -89,8 +92,8 @@ TEST(Slice, HomogeneousCubeLooksTheSameFromEverySide) {
               i < 6 ? RandomView(projection, random) : ViewParameters{.projection = projection, .azimuth_degrees = 90.0 * (i - 6)};
           options.view.zoom = 1.5;
           options.transfer = Uniform(kOpacity, {1, 1, 1});
-          const FrameSetup setup = SliceSetup(lattice, options, rate);
-          const LocalImage image = RenderPicture(lattice, setup, cube);
+          const FrameSetup setup = SliceSetup(grid, options, rate);
+          const LocalImage image = RenderPicture(grid, setup);
           for (int y = 0; y < setup.camera.height; ++y) {
             for (int x = 0; x < setup.camera.width; ++x) {
               const double length = LengthInside(setup, x, y) / Least(spacing);
@@ -165,10 +168,9 @@ std::array<double, 4> ReferencePixel(const Mesh& mesh, const FrameSetup& setup, 
 TEST(Slice, AgreesWithTheDefinition) {
   std::mt19937 random(kSeed);
   const Index3 size = {18, 14, 16};
-  const Volume lattice = Lattice(size, 200, {1, 1.3, 0.8});
   for (const ValuesAt at : {ValuesAt::kPoints, ValuesAt::kCells}) {
-    const Cells cube = MakeCube(
-        size, 4, 0.35, [](const Vec3& p) { return 100 + 99 * std::sin(p.x + 2 * p.y - 0.7 * p.z); }, random, at);
+    const Field field = [](const Vec3& p) { return 100 + 99 * std::sin(p.x + 2 * p.y - 0.7 * p.z); };
+    const Volume grid = GridVolume(size, MakeCube(size, 4, 0.35, field, random, at), 200, {1, 1.3, 0.8});
     for (const Projection projection : kProjections) {
       for (int i = 0; i < 3; ++i) {
         SetupOptions options;
@@ -177,8 +179,8 @@ TEST(Slice, AgreesWithTheDefinition) {
         options.size = {90, 60};
         options.transfer = Ramp(0.3);
         const double rate = std::array{1.0, 0.5, 2.0}[std::size_t(i)];
-        const FrameSetup setup = SliceSetup(lattice, options, rate);
-        const LocalImage image = RenderWhole(lattice, setup, cube);
+        const FrameSetup setup = SliceSetup(grid, options, rate);
+        const LocalImage image = RenderWhole(grid, setup);
         const RayLook look = MakeRayLook(Classify(setup.transfer, setup.description, setup.range), setup.transfer, setup.description,
                                          setup.camera, setup.shading, rate);
         const slice::FrameSpace space(setup.camera, setup.description.geometry, rate, {});
@@ -187,7 +189,7 @@ TEST(Slice, AgreesWithTheDefinition) {
           for (int x = 1; x < setup.camera.width; x += 3) {
             if (LengthInside(setup, x, y) < 1e-3) continue;
             ++pixels;
-            const std::array<double, 4> expected = ReferencePixel(*cube, setup, look, space.rays(), x, y);
+            const std::array<double, 4> expected = ReferencePixel(*grid.cells, setup, look, space.rays(), x, y);
             const auto found = PixelOf(image, x, y);
             bool same = true;
             for (std::size_t c = 0; c < 4; ++c) same = same && std::abs(double(found[c]) - expected[c]) < 2e-4;
@@ -209,16 +211,15 @@ TEST(Slice, LinearFieldHasTheAnalyticIntegral) {
   constexpr double kOpacity = 0.02;  // of a voxel length, at 200
   const Index3 size = {24, 24, 24};
   const Field field = [](const Vec3& p) { return 40 + 3 * p.x + 2 * p.y + 1.5 * p.z; };
-  const Volume lattice = Lattice(size, 200);
   for (const double jitter : {0.0, 0.3}) {
-    const Cells cube = MakeCube(size, 6, jitter, field, random);
+    const Volume grid = GridVolume(size, MakeCube(size, 6, jitter, field, random), 200);
     for (const Projection projection : kProjections) {
       for (int i = 0; i < 6; ++i) {
         SetupOptions options;
         options.view = RandomView(projection, random);
         options.transfer = Ramp(kOpacity);
-        const FrameSetup setup = SliceSetup(lattice, options, 2);
-        const LocalImage image = RenderPicture(lattice, setup, cube);
+        const FrameSetup setup = SliceSetup(grid, options, 2);
+        const LocalImage image = RenderPicture(grid, setup);
         for (int y = 0; y < setup.camera.height; ++y) {
           for (int x = 0; x < setup.camera.width; ++x) {
             const double length = LengthInside(setup, x, y);
@@ -248,12 +249,11 @@ TEST(Slice, CellsFitTogether) {
   std::mt19937 random(kSeed);
   constexpr double kOpacity = 0.001;
   const Index3 size = {20, 20, 20};
-  const Volume lattice = Lattice(size, 100);
   const std::pair<double, double> kAngles[] = {{0, 0}, {90, 0}, {180, 0}, {0, 90}, {0, -90}, {45, 0}, {45, 35.26438968}, {135, 45}};
   for (const double jitter : {0.0, 0.35}) {
     for (const int side : {10, 20}) {
-      const Cells cube = MakeCube(
-          size, side, jitter, [](const Vec3&) { return 100; }, random);
+      const Field field = [](const Vec3&) { return 100; };
+      const Volume grid = GridVolume(size, MakeCube(size, side, jitter, field, random), 100);
       for (int i = 0; i < 12; ++i) {
         SetupOptions options;
         options.size = {80, 80};
@@ -264,8 +264,8 @@ TEST(Slice, CellsFitTogether) {
           options.view = RandomView(Projection::kOrthographic, random);
         }
         options.transfer = Uniform(kOpacity, {1, 1, 1});
-        const FrameSetup setup = SliceSetup(lattice, options, 2);
-        const LocalImage image = RenderWhole(lattice, setup, cube);
+        const FrameSetup setup = SliceSetup(grid, options, 2);
+        const LocalImage image = RenderWhole(grid, setup);
         for (int y = 0; y < setup.camera.height; ++y) {
           for (int x = 0; x < setup.camera.width; ++x) {
             const double length = LengthInside(setup, x, y);
@@ -284,16 +284,15 @@ TEST(Slice, CellsFitTogether) {
 TEST(Slice, ValuesOfCellsAreConstantInThem) {
   std::mt19937 random(kSeed);
   const Index3 size = {16, 16, 16};
-  const Volume lattice = Lattice(size, 200);
   // Opaque: the picture shows the cells at the front.
-  const Cells cube = MakeCube(
-      size, 4, 0, [](const Vec3& p) { return p.x < 7.5 ? 50 : 150; }, random, ValuesAt::kCells);
+  const Field field = [](const Vec3& p) { return p.x < 7.5 ? 50 : 150; };
+  const Volume grid = GridVolume(size, MakeCube(size, 4, 0, field, random, ValuesAt::kCells), 200);
   SetupOptions options;
   options.view.zoom = 1.7;
   options.transfer = Ramp(0);
   options.transfer.opacities = {{0, 1, 0.5, 0}, {200, 1, 0.5, 0}};
-  const FrameSetup setup = SliceSetup(lattice, options);
-  const LocalImage image = RenderPicture(lattice, setup, cube);
+  const FrameSetup setup = SliceSetup(grid, options);
+  const LocalImage image = RenderPicture(grid, setup);
   const Rgb left = options.transfer.Color(50), right = options.transfer.Color(150);
   for (int x = 4; x < 60; ++x) {
     const auto pixel = PixelOf(image, x, 32);
@@ -305,10 +304,9 @@ TEST(Slice, ValuesOfCellsAreConstantInThem) {
 TEST(Slice, AnyBoxesMakeOnePicture) {
   std::mt19937 random(kSeed);
   const Index3 size = {30, 26, 34};
-  const Volume lattice = Lattice(size, 200);
   for (const ValuesAt at : {ValuesAt::kPoints, ValuesAt::kCells}) {
     const Field field = [](const Vec3& p) { return 100 + 99 * std::sin(0.5 * p.x) * std::cos(0.4 * p.y + 0.3 * p.z); };
-    const Cells cube = MakeCube(size, 9, 0.35, field, random, at);
+    const Volume grid = GridVolume(size, MakeCube(size, 9, 0.35, field, random, at), 200);
     for (const Projection projection : kProjections) {
       for (int i = 0; i < 6; ++i) {
         SetupOptions options;
@@ -318,16 +316,15 @@ TEST(Slice, AnyBoxesMakeOnePicture) {
         options.transfer = Ramp(0.5);
         options.termination = i % 2 == 0 ? 0 : 1.0 / 1024;
         if (i >= 3) {
-          options.clipping = RandomClipping(lattice.description.geometry, random);
+          options.clipping = RandomClipping(grid.description.geometry, random);
           options.clipping.mode = i == 4 ? ClipMode::kCutAway : ClipMode::kKeep;
         }
-        const FrameSetup setup = SliceSetup(lattice, options, std::array{1.0, 0.4, 3.0}[std::size_t(i / 2)]);
+        const FrameSetup setup = SliceSetup(grid, options, std::array{1.0, 0.4, 3.0}[std::size_t(i / 2)]);
         SCOPED_TRACE(::testing::Message() << "seed " << kSeed << " view " << i << ' ' << NameOf(projection));
-        const LocalImage one = RenderWhole(lattice, setup, cube);
+        const LocalImage one = RenderWhole(grid, setup);
         const float tolerance = 2e-5F + float(options.termination);
-        EXPECT_LE(LargestDifference(one, RenderByBoxes(lattice, setup, CutAtRandom(lattice.block.box, 11, random), cube)), tolerance);
-        EXPECT_LE(LargestDifference(one, RenderByBoxes(lattice, setup, CutIntoSlabs(lattice, 13, kAxes[std::size_t(i) % 3]), cube)),
-                  tolerance);
+        EXPECT_LE(LargestDifference(one, RenderByBoxes(grid, setup, CutAtRandom(grid.block.box, 11, random))), tolerance);
+        EXPECT_LE(LargestDifference(one, RenderByBoxes(grid, setup, CutIntoSlabs(grid, 13, kAxes[std::size_t(i) % 3]))), tolerance);
       }
     }
   }
@@ -337,22 +334,21 @@ TEST(Slice, AnyBoxesMakeOnePicture) {
 TEST(Slice, PixelsOfOneBoxHaveTheSameBits) {
   std::mt19937 random(kSeed);
   const Index3 size = {30, 30, 30};
-  const Volume lattice = Lattice(size, 200);
-  const Cells cube = MakeCube(
-      size, 9, 0.35, [](const Vec3& p) { return 100 + 99 * std::sin(0.5 * p.x + p.y - 0.7 * p.z); }, random);
+  const Field field = [](const Vec3& p) { return 100 + 99 * std::sin(0.5 * p.x + p.y - 0.7 * p.z); };
+  const Volume grid = GridVolume(size, MakeCube(size, 9, 0.35, field, random), 200);
   SetupOptions options;
   options.size = {150, 150};  // several tiles, and chunks of planes
   options.transfer = Ramp(0.1);
-  const FrameSetup setup = SliceSetup(lattice, options, 2);  // along y, so boxes along x are columns of pixels
-  const LocalImage one = RenderWhole(lattice, setup, cube);
-  EXPECT_EQ(LargestDifference(one, RenderByBoxes(lattice, setup, CutIntoSlabs(lattice, 7, Axis::kX), cube)), 0);
+  const FrameSetup setup = SliceSetup(grid, options, 2);  // along y, so boxes along x are columns of pixels
+  const LocalImage one = RenderWhole(grid, setup);
+  EXPECT_EQ(LargestDifference(one, RenderByBoxes(grid, setup, CutIntoSlabs(grid, 7, Axis::kX))), 0);
 }
 
 TEST(Slice, ClipsLikeRayCasting) {
   std::mt19937 random(kSeed);
   const VolumeGeometry geometry{{30, 26, 34}, {1, 1, 1}};
-  const Volume volume = MakeVolume(geometry, ScalarType::kFloat32, [](const Index3& v) { return 20 + 2 * v.x + 1.5 * v.y + v.z; });
-  const Cells cells = GridOf(volume, 1);
+  const auto value = [](const Index3& v) { return 20 + 2 * v.x + 1.5 * v.y + v.z; };
+  const Volume volume = AsGrid(MakeVolume(geometry, ScalarType::kFloat32, value), 1);
   for (const Projection projection : kProjections) {
     for (int i = 0; i < 8; ++i) {
       SetupOptions options;
@@ -363,7 +359,7 @@ TEST(Slice, ClipsLikeRayCasting) {
       options.transfer = Ramp(0.1);
       options.shading.model = ShadingModel::kNone;
       const LocalImage cast = RenderPicture(volume, RaycastSetup(volume, options, 2));
-      const LocalImage sliced = RenderPicture(volume, SliceSetup(volume, options, 2), cells);
+      const LocalImage sliced = RenderPicture(volume, SliceSetup(volume, options, 2));
       double sum = 0;
       for (int y = 0; y < 64; ++y) {
         for (int x = 0; x < 64; ++x) sum += std::pow(double(PixelOf(cast, x, y)[3] - PixelOf(sliced, x, y)[3]), 2);
@@ -375,10 +371,10 @@ TEST(Slice, ClipsLikeRayCasting) {
 
 TEST(Slice, IsNearRayCastingOfSmoothVolumes) {
   std::mt19937 random(kSeed);
-  const Volume volume = MakeVolume({{40, 36, 44}, {1, 1, 1}}, ScalarType::kFloat32, [](const Index3& v) {
+  const auto value = [](const Index3& v) {
     return 100 + 35 * std::sin(0.3 * v.x + 1) + 35 * std::sin(0.25 * v.y + 0.1 * v.z) + 30 * std::cos(0.28 * v.z);
-  });
-  const Cells cells = GridOf(volume, 1);
+  };
+  const Volume volume = AsGrid(MakeVolume({{40, 36, 44}, {1, 1, 1}}, ScalarType::kFloat32, value), 1);
   for (const Projection projection : kProjections) {
     for (int i = 0; i < 4; ++i) {
       SetupOptions options;
@@ -387,7 +383,7 @@ TEST(Slice, IsNearRayCastingOfSmoothVolumes) {
       options.size = {128, 128};
       options.shading.model = ShadingModel::kNone;
       const LocalImage cast = RenderPicture(volume, RaycastSetup(volume, options, 2));
-      const LocalImage sliced = RenderPicture(volume, SliceSetup(volume, options, 2), cells);
+      const LocalImage sliced = RenderPicture(volume, SliceSetup(volume, options, 2));
       double sum = 0;
       for (int y = 0; y < 128; ++y) {
         for (int x = 0; x < 128; ++x) {
@@ -403,38 +399,36 @@ TEST(Slice, IsNearRayCastingOfSmoothVolumes) {
 TEST(Slice, EveryInstructionSetMakesOnePicture) {
   std::mt19937 random(kSeed);
   const Index3 size = {30, 26, 34};
-  const Volume lattice = Lattice(size, 200);
-  const Cells cube = MakeCube(
-      size, 9, 0.35, [](const Vec3& p) { return 100 + 99 * std::sin(0.5 * p.x + p.y - 0.7 * p.z); }, random);
+  const Field field = [](const Vec3& p) { return 100 + 99 * std::sin(0.5 * p.x + p.y - 0.7 * p.z); };
+  const Volume grid = GridVolume(size, MakeCube(size, 9, 0.35, field, random), 200);
   for (const Projection projection : kProjections) {
     SetupOptions options;
     options.view = RandomView(projection, random);
-    if (projection == Projection::kPerspective) options.clipping = RandomClipping(lattice.description.geometry, random);
-    const FrameSetup setup = SliceSetup(lattice, options);
-    const LocalImage best = RenderWhole(lattice, setup, cube);
-    ForEachTarget([&] { EXPECT_LE(LargestDifference(best, RenderWhole(lattice, setup, cube)), 2e-5F) << "seed " << kSeed; });
+    if (projection == Projection::kPerspective) options.clipping = RandomClipping(grid.description.geometry, random);
+    const FrameSetup setup = SliceSetup(grid, options);
+    const LocalImage best = RenderWhole(grid, setup);
+    ForEachTarget([&] { EXPECT_LE(LargestDifference(best, RenderWhole(grid, setup)), 2e-5F) << "seed " << kSeed; });
   }
 }
 
 TEST(Slice, HiddenTilesChangeNothingElse) {
   std::mt19937 random(kSeed);
   const Index3 size = {30, 26, 34};
-  const Volume lattice = Lattice(size, 200);
-  const Cells cube = MakeCube(
-      size, 9, 0.35, [](const Vec3& p) { return 100 + 99 * std::sin(0.5 * p.x + p.y); }, random);
+  const Field field = [](const Vec3& p) { return 100 + 99 * std::sin(0.5 * p.x + p.y); };
+  const Volume grid = GridVolume(size, MakeCube(size, 9, 0.35, field, random), 200);
   for (const double part : {0.3, 1.0}) {
     SetupOptions options;
     options.view = RandomView(Projection::kPerspective, random);
     options.size = {200, 180};
-    const FrameSetup setup = SliceSetup(lattice, options);
+    const FrameSetup setup = SliceSetup(grid, options);
     OcclusionMask mask{OcclusionTiles(setup.camera.width), OcclusionTiles(setup.camera.height), {}};
     std::bernoulli_distribution hidden(part);
     for (std::int32_t i = 0; i < mask.tiles_x * mask.tiles_y; ++i) mask.hidden.push_back(hidden(random) ? 1 : 0);
-    const LocalImage whole = RenderWhole(lattice, setup, cube);
-    const auto slab = SlabFor(*setup.renderer, lattice, lattice.block.box, 0, cube);
+    const LocalImage whole = RenderWhole(grid, setup);
+    const auto slab = SlabFor(*setup.renderer, grid, grid.block.box, 0);
     RankReport report;
     const LocalImage masked =
-        MakeRenderer(*setup.renderer)->Render(*slab, lattice.block.box, setup, mask, std::atomic<bool>(false), report).value();
+        MakeRenderer(*setup.renderer)->Render(*slab, grid.block.box, setup, mask, std::atomic<bool>(false), report).value();
     for (int y = 0; y < setup.camera.height; ++y) {
       for (int x = 0; x < setup.camera.width; ++x) {
         if (!mask.Hides(x, y)) {
@@ -451,16 +445,15 @@ TEST(Slice, HiddenTilesChangeNothingElse) {
 TEST(Slice, TerminationChangesChannelsByNoMoreThanItself) {
   std::mt19937 random(kSeed);
   const Index3 size = {30, 30, 30};
-  const Volume lattice = Lattice(size, 200);
-  const Cells cube = MakeCube(
-      size, 9, 0.35, [](const Vec3& p) { return 100 + 99 * std::sin(0.5 * p.x + p.y); }, random);
+  const Field field = [](const Vec3& p) { return 100 + 99 * std::sin(0.5 * p.x + p.y); };
+  const Volume grid = GridVolume(size, MakeCube(size, 9, 0.35, field, random), 200);
   for (const Projection projection : kProjections) {
     SetupOptions options;
     options.view = RandomView(projection, random);
     options.transfer = Ramp(0.9);
-    const LocalImage all = RenderWhole(lattice, SliceSetup(lattice, options), cube);
+    const LocalImage all = RenderWhole(grid, SliceSetup(grid, options));
     options.termination = 0.01;
-    EXPECT_LE(LargestDifference(all, RenderWhole(lattice, SliceSetup(lattice, options), cube)), 0.01F + 1e-5F);
+    EXPECT_LE(LargestDifference(all, RenderWhole(grid, SliceSetup(grid, options))), 0.01F + 1e-5F);
   }
 }
 
@@ -468,14 +461,14 @@ TEST(Slice, TerminationChangesChannelsByNoMoreThanItself) {
 TEST(Slice, DrawsBadCellsWithoutHarm) {
   std::mt19937 random(kSeed);
   const Index3 size = {20, 20, 20};
-  const Volume lattice = Lattice(size, 200);
-  const Cells sound = MakeCube(
+  const auto sound = MakeCube(
       size, 5, 0.3, [](const Vec3& p) { return 100 + 5 * p.x; }, random);
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kInfinity = std::numeric_limits<float>::infinity();
   const auto draw = [&](const Mesh& mesh, const ViewParameters& view) {
     SetupOptions options;
     options.view = view;
-    const LocalImage image = RenderPicture(lattice, SliceSetup(lattice, options), std::make_shared<Mesh>(mesh));
+    const Volume grid = GridVolume(size, std::make_shared<Mesh>(mesh), 200);
+    const LocalImage image = RenderPicture(grid, SliceSetup(grid, options));
     float most = 0;
     for (int y = 0; y < 64; ++y) {
       for (int x = 0; x < 64; ++x) {
@@ -519,7 +512,7 @@ TEST(Slice, DrawsBadCellsWithoutHarm) {
 TEST(Slice, RefusesDatasetsWithoutCells) {
   const Volume volume = MakeBlock({{9, 8, 7}, {1, 1, 1}});
   const FrameSetup setup = SliceSetup(volume, {});
-  const auto slab = CutSlab(volume, volume.block.box);
+  const auto slab = SlabFor(*setup.renderer, volume, volume.block.box);
   RankReport report;
   const auto result = MakeRenderer(*setup.renderer)->Render(*slab, volume.block.box, setup, {}, std::atomic<bool>(false), report);
   EXPECT_EQ(result.status().code(), StatusCode::kInvalidArgument);

@@ -10,6 +10,7 @@
 #include <optional>
 #include <thread>
 
+#include "tests/mesh/mesh_samples.h"
 #include "tests/service/pictures.h"
 #include "tests/support/renderers.h"
 
@@ -51,7 +52,7 @@ class EmbeddedServiceTest : public testing::Test {
   }
 
   Context context_;
-  std::shared_ptr<const Volume> volume_ = TestSphere(40);
+  std::shared_ptr<const Volume> volume_ = std::make_shared<const Volume>(AsGrid(*TestSphere(40)));
   std::unique_ptr<EmbeddedService> service_;
 };
 

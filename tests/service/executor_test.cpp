@@ -8,7 +8,10 @@
 
 #include <array>
 
+#include "common/mesh/lattice.h"
+#include "common/mesh/mesh_part.h"
 #include "common/wire/payload.h"
+#include "tests/mesh/mesh_samples.h"
 #include "tests/service/outputs.h"
 #include "tests/service/pictures.h"
 
@@ -243,10 +246,10 @@ TEST_F(ExecutorTest, RenderIsAnsweredAlsoWhenItIsCancelled) {
 }
 
 TEST_F(ExecutorTest, WhatIsCopiedFromOtherSlabsIsWhatWouldHaveArrived) {
-  const std::shared_ptr<const Volume> volume = TestSphere(96);
+  const auto volume = std::make_shared<const Volume>(AsGrid(*TestSphere(60), 6));
   const Box whole = volume->block.box;
   for (const RendererKind* renderer : Renderers()) {
-    const FramePlan plan = PlanFrame(TestRequest(renderer, 20), 1, Summarize(*volume), Roster{{1}}).value();
+    const FramePlan plan = PlanFrame(TestRequest(renderer, 20), 1, SummaryOf(*volume), Roster{{1}}).value();
     const auto setup = std::make_shared<const FrameSetup>(plan.setup);
     const auto store = [&](const SlabKey& slab, const Box& box) {
       Chunk chunk{.epoch = 1, .dataset = 1, .box = box, .chunk = 0};
@@ -258,6 +261,16 @@ TEST_F(ExecutorTest, WhatIsCopiedFromOtherSlabsIsWhatWouldHaveArrived) {
       EXPECT_TRUE(stored.status.ok()) << stored.status.message();
       EXPECT_EQ(stored.box, box);
     };
+    // Cells are not copied: each slab that is rendered from gets its own.
+    const auto store_cells = [&](const SlabKey& slab) {
+      std::vector<std::byte> cells = EncodeMesh(MeshCutter(volume->cells).Cut(slab.box));
+      ASSERT_LE(cells.size(), kChunkBytes);
+      Chunk chunk{.epoch = 1, .dataset = 1, .box = slab.box, .chunk = kFirstCellChunk, .cell_bytes = cells.size()};
+      const Bytes payload = PackChunk(Bytes(std::move(cells)), Codec::kRaw, chunk);
+      executor_.Perform(StoreChunk{slab, chunk, payload});
+      const auto stored = outputs_.NextEvent<ChunkStored>();
+      EXPECT_TRUE(stored.status.ok()) << stored.status.message();
+    };
     const auto render = [&](const SlabKey& slab, ImageHandle image) {
       executor_.Perform(StartRender{.key = kKey, .slab = slab, .placement = {.box = whole, .worker = 1}, .setup = setup, .image = image});
       const auto done = outputs_.NextEvent<RenderDone>();
@@ -265,23 +278,25 @@ TEST_F(ExecutorTest, WhatIsCopiedFromOtherSlabsIsWhatWouldHaveArrived) {
       return done.report;
     };
     const auto key = [&](const Box& box, std::uint64_t generation) {
-      return SlabKey{.dataset = 1, .box = box, .types = volume->block.type, .generation = generation};
+      return SlabKey{.dataset = 1, .box = box, .types = {volume->block.type, plan.setup.layers}, .generation = generation};
     };
-    const SlabKey direct = key(whole, 1), lower = key({{0, 0, 0}, {96, 96, 50}}, 2), side = key({{20, 0, 0}, {96, 96, 80}}, 3),
+    const SlabKey direct = key(whole, 1), lower = key({{0, 0, 0}, {60, 60, 30}}, 2), side = key({{20, 0, 0}, {60, 60, 50}}, 3),
                   put_together = key(whole, 4);
     executor_.Perform(OpenSlab{direct, {}});
     store(direct, whole);
+    store_cells(direct);
     const RankReport expected = render(direct, 1);
     EXPECT_GT(expected.image_pixels, 0U);
 
     // One source is itself a copy in part and was not rendered from; both are dropped before the first render.
     executor_.Perform(OpenSlab{lower, {}});
     store(lower, lower.box);
-    executor_.Perform(OpenSlab{side, {{lower, {{20, 0, 0}, {96, 96, 50}}}}});
-    store(side, {{20, 0, 50}, {96, 96, 80}});
-    executor_.Perform(OpenSlab{put_together, {{lower, lower.box}, {side, {{20, 0, 50}, {96, 96, 80}}}}});
-    store(put_together, {{0, 0, 50}, {20, 96, 80}});
-    store(put_together, {{0, 0, 80}, {96, 96, 96}});
+    executor_.Perform(OpenSlab{side, {{lower, {{20, 0, 0}, {60, 60, 30}}}}});
+    store(side, {{20, 0, 30}, {60, 60, 50}});
+    executor_.Perform(OpenSlab{put_together, {{lower, lower.box}, {side, {{20, 0, 30}, {60, 60, 50}}}}});
+    store(put_together, {{0, 0, 30}, {20, 60, 50}});
+    store(put_together, {{0, 0, 50}, {60, 60, 60}});
+    store_cells(put_together);
     executor_.Perform(DropSlab{lower});
     executor_.Perform(DropSlab{side});
     const RankReport report = render(put_together, 2);

@@ -10,6 +10,8 @@
 #include <iterator>
 #include <random>
 
+#include "tests/mesh/mesh_samples.h"
+#include "tests/mesh/vtu_files.h"
 #include "tests/service/multi_process_fixture.h"
 #include "tests/service/pictures.h"
 #include "tests/support/random.h"
@@ -18,6 +20,20 @@
 
 namespace slabstream {
 namespace {
+
+// Writes a grid that fills the volume. The volume that readers make of the file.
+std::shared_ptr<const Volume> WriteGrid(const Volume& volume, const std::string& path) {
+  const Mesh mesh = GridOf(volume, 6);
+  std::vector<Vec3> points;
+  for (PointNumber point = 0; point < mesh.points.size(); ++point) points.push_back(PlaceOfPoint(mesh, point));
+  std::vector<std::vector<int>> connectivity;
+  for (const Tetrahedron& t : mesh.tetrahedra) connectivity.emplace_back(t.begin(), t.end());
+  VtuSpec spec = GridSpec(points, std::vector<int>(connectivity.size(), 10), connectivity);
+  spec.arrays[0].values.assign(mesh.values.begin(), mesh.values.end());
+  const FileBytes bytes = VtuFile(spec);
+  std::ofstream(path, std::ios::binary).write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
+  return ReadVolume(path).value().volume;
+}
 
 // Stopped for longer than the coordinator waits for it, and continued: it is a new worker, and nothing else happens.
 TEST_F(MultiProcessTest, StoppedWorkerComesBackAndCostsOneAttemptAtMost) {
@@ -116,7 +132,9 @@ TEST_F(MultiProcessTest, ManyFramesTakeNoMoreMemoryAndFilesThanAFew) {
 }
 
 TEST_F(MultiProcessTest, WorkersThatShareNoMemoryGiveTheSamePicture) {
-  StartCoordinator();
+  const std::string file = (directory_ / "grid.vtu").string();
+  const std::shared_ptr<const Volume> grid = WriteGrid(*volume_, file);
+  StartCoordinator("tcp://127.0.0.1:*", "tcp://127.0.0.1:*", {"--data", "grid=" + file});
   StartWorker();
   StartWorker({"--no-shared-memory"});
   StartWorker();
@@ -126,10 +144,12 @@ TEST_F(MultiProcessTest, WorkersThatShareNoMemoryGiveTheSamePicture) {
     for (const RendererKind* renderer : Renderers()) {
       FrameRequest request = TestRequest(renderer, 50, 1);
       request.size = {320, 300};
+      if (renderer->draws_cells()) request.dataset = "grid";
       request.policy.combine = scheme.name;
       const Result<Picture> picture = client.Render(request, seconds(60));
       ASSERT_TRUE(picture.ok()) << picture.status().message();
-      const LocalImage expected = RenderDirectly(request, *volume_);
+      const LocalImage expected = RenderDirectly(request, renderer->draws_cells() ? *grid : *volume_);
+      EXPECT_GT(HighestAlpha(expected), ExpectedAlpha(request));
       EXPECT_LE(LargestDifference(picture->image, expected, request.size), AllowedDifference(request)) << scheme.name;
 
       request.policy.pixel_error = 1.0 / 1024;

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "client/client.h"
+#include "common/mesh/lattice.h"
 #include "common/planning/frame_plan.h"
 #include "common/volume/sphere.h"
-#include "common/volume/summary.h"
 #include "tests/support/renderers.h"
 #include "worker/renderers/renderer.h"
 
@@ -38,11 +38,13 @@ inline FrameRequest TestRequest(const RendererKind* renderer, double azimuth_deg
 
 // The whole volume as one box, without planner's groups, combining or transport.
 inline LocalImage RenderDirectly(const FrameRequest& request, const Volume& volume) {
-  const Result<FramePlan> plan = PlanFrame(request, 1, Summarize(volume), Roster{{1}});
+  const Result<FramePlan> plan = PlanFrame(request, 1, SummaryOf(volume), Roster{{1}});
   CHECK(plan.ok()) << plan.status().message();
   VoxelBlock copy = MakeVoxelBlock(volume.block.box, volume.block.type);
   copy.bytes = volume.block.bytes;
-  SlabData slab(std::move(copy));
+  SlabLayers layers;
+  layers.cells = volume.cells;
+  SlabData slab(std::move(copy), std::move(layers));
   const std::atomic<bool> cancelled = false;
   RankReport report;
   Result<LocalImage> image = MakeRenderer(*plan->setup.renderer)->Render(slab, volume.block.box, plan->setup, {}, cancelled, report);

@@ -13,6 +13,7 @@
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
 #include "common/planning/policy_names.h"
+#include "tests/mesh/mesh_samples.h"
 #include "tests/service/pictures.h"
 #include "tests/support/random_volume.h"
 #include "tests/support/renderers.h"
@@ -20,12 +21,13 @@
 namespace slabstream {
 namespace {
 
-// Two small balls, far from each other, in a volume that is empty else.
+// Two small balls, far from each other, in a grid that is empty else.
 std::shared_ptr<const Volume> SparseVolume() {
-  return std::make_shared<const Volume>(MakeTestVolume({76, 60, 88}, ScalarType::kUint8, [](const Index3& v) {
+  const auto value = [](const Index3& v) {
     const auto distance = [&](const Vec3& center) { return Length(ToVec3(v) - center); };
     return std::max({0.0, 250 - 12 * distance({18, 16, 20}), 250 - 15 * distance({58, 40, 66})});
-  }));
+  };
+  return std::make_shared<const Volume>(AsGrid(MakeTestVolume({76, 60, 88}, ScalarType::kUint8, value), 4));
 }
 
 template <class Entries>

@@ -47,7 +47,8 @@ WorkerEvent ModelWorker::Answer(Job& job) {
 }
 
 void ModelWorker::OnRequest(const ChunkRequest& request) {
-  const std::uint32_t bytes = BytesOfChunk(request.box, kVoxelType, request.chunk);
+  const std::uint32_t bytes = IsCellChunk(request.chunk) ? BytesOfCellChunk(cells_.BytesOf(request.dataset, request.box), request.chunk)
+                                                         : BytesOfChunk(request.box, kVoxelType, request.chunk);
   requested_[{request.dataset, request.box, request.chunk}] = {bytes, service_.time()};
 }
 
@@ -74,6 +75,10 @@ void ModelWorker::Perform(const OpenSlab& action) {
 double ModelWorker::Begin(Job&, const StoreChunk& action) {
   EXPECT_EQ(slabs_.count(action.slab), 1U) << "a chunk is stored in a slab that is not open";
   EXPECT_TRUE(action.slab.box.Contains(action.chunk.box));
+  if (IsCellChunk(action.chunk.chunk)) {
+    EXPECT_TRUE(action.slab.types.layers.cells) << "cells of a dataset that has none";
+    EXPECT_EQ(action.chunk.box, action.slab.box) << "cells are those of the whole slab";
+  }
   return speed_.store;
 }
 
@@ -83,12 +88,15 @@ ChunkStored ModelWorker::Stored(const StoreChunk& store) {
   if (random_.Chance(faults_.damage_chunk)) {
     status = Status::DataLoss("digest of a chunk");
   } else if (const auto open = slabs_.find(store.slab); open != slabs_.end()) {
-    open->second.chunks[store.chunk.box].insert(store.chunk.chunk);
+    const bool of_cells = IsCellChunk(store.chunk.chunk);
+    if (of_cells) tally_.Add(Count::kCellChunks);
+    std::set<std::uint32_t>& stored = of_cells ? open->second.cell_chunks : open->second.chunks[store.chunk.box];
+    stored.insert(store.chunk.chunk);
   }
   return {store.slab, store.chunk.box, store.chunk.chunk, status};
 }
 
-// All chunks of the boxes that it has any of, and these with the copied ones tile it.
+// All chunks of the boxes that it has any of, and these with the copied ones tile it; and all chunks of its cells.
 bool ModelWorker::Complete(const SlabKey& key) const {
   const auto open = slabs_.find(key);
   if (open == slabs_.end()) return false;
@@ -98,6 +106,7 @@ bool ModelWorker::Complete(const SlabKey& key) const {
     boxes.push_back(box);
   }
   for (const OpenSlab::Copy& copy : open->second.copied) boxes.push_back(copy.box);
+  if (key.types.layers.cells && open->second.cell_chunks.size() != CellChunkCount(cells_.BytesOf(key.dataset, key.box))) return false;
   return Assemble(key.box, boxes).missing.empty();
 }
 

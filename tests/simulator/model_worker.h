@@ -10,6 +10,7 @@
 
 #include "simulator/simulated_service.h"
 #include "tests/simulator/faults.h"
+#include "tests/simulator/model_cells.h"
 #include "tests/simulator/tally.h"
 #include "tests/support/symbolic_images.h"
 #include "worker/worker_machine.h"
@@ -26,8 +27,15 @@ class ModelWorker {
  public:
   // `faults` may change: what they say at the time counts.
   ModelWorker(Node node, WorkerConfig config, const WorkerSpeed& speed, const Faults& faults, Random& random,
-              const SimulatedService& service, Tally& tally)
-      : node_(node), config_(std::move(config)), speed_(speed), faults_(faults), random_(random), service_(service), tally_(tally) {}
+              const SimulatedService& service, const ModelCells& cells, Tally& tally)
+      : node_(node),
+        config_(std::move(config)),
+        speed_(speed),
+        faults_(faults),
+        random_(random),
+        service_(service),
+        cells_(cells),
+        tally_(tally) {}
 
   void SlowDown(double slowness) { slowness_ = slowness; }
   void TakeMemory() { has_memory_ = false; }  // for large frames
@@ -54,7 +62,8 @@ class ModelWorker {
   };
   using ChunkName = std::tuple<DatasetId, Box, std::uint32_t>;
   struct ModelSlab {
-    std::map<Box, std::set<std::uint32_t>> chunks;  // stored, by box
+    std::map<Box, std::set<std::uint32_t>> chunks;  // of voxels, stored, by box
+    std::set<std::uint32_t> cell_chunks;            // stored
     std::vector<OpenSlab::Copy> copied;
     bool rendered = false;
   };
@@ -77,6 +86,7 @@ class ModelWorker {
   const Faults& faults_;
   Random& random_;
   const SimulatedService& service_;
+  const ModelCells& cells_;
   Tally& tally_;
   bool stopped_ = false;
   double slowness_ = 1;

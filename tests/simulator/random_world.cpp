@@ -29,7 +29,7 @@ TransferFunction StepTransfer() {
 }
 
 // Whole layers of bricks across x are empty, so that some slabs show nothing.
-void MakeVolume(Random& random, SimulatedWorld& world) {
+void MakeVolume(Random& random, const ModelCells& cells, SimulatedWorld& world) {
   auto summary = std::make_shared<VolumeSummary>();
   summary->description.geometry.size = kVolumeSize;
   summary->description.type = kVoxelType;
@@ -41,6 +41,7 @@ void MakeVolume(Random& random, SimulatedWorld& world) {
   for (int i = 0; i < summary->brick_counts.y * summary->brick_counts.z; ++i) {
     summary->bricks.insert(summary->bricks.end(), layers.begin(), layers.end());
   }
+  if (cells.present()) summary->cells.assign(summary->bricks.size(), 1000);
   world.occupied = std::make_shared<const OccupancyGrid>(
       BrickVisibility(*summary, Classify(StepTransfer(), summary->description, summary->range)).VisibleCells());
   world.summary = std::move(summary);
@@ -48,9 +49,9 @@ void MakeVolume(Random& random, SimulatedWorld& world) {
 
 }  // namespace
 
-SimulatedWorld RandomWorld(Random& random, const Faults& faults) {
+SimulatedWorld RandomWorld(Random& random, const Faults& faults, const ModelCells& cells) {
   SimulatedWorld world;
-  MakeVolume(random, world);
+  MakeVolume(random, cells, world);
   world.speed.render = random.Chance(0.1) ? 0.3 : random.Real(0.001, 0.04);
   world.speed.combine = random.Real(10e-6, 5e-3);
   world.speed.store = random.Real(10e-6, 1e-3);

@@ -1,5 +1,5 @@
-// What a simulated world is made of, by chance: a volume with empty parts, how fast and how large workers are, one policy for all frames;
-// and the frames that clients ask for in it.
+// What a simulated world is made of, by chance: a volume or grid with empty parts, how fast and how large workers are, one policy for all
+// frames; and the frames that clients ask for in it.
 #pragma once
 
 #include <cstdint>
@@ -10,6 +10,7 @@
 #include "common/volume/summary.h"
 #include "common/wire/client_messages.h"
 #include "tests/simulator/faults.h"
+#include "tests/simulator/model_cells.h"
 #include "tests/simulator/model_worker.h"
 #include "tests/support/random.h"
 
@@ -23,7 +24,8 @@ struct SimulatedWorld {
   Policy policy;
 };
 
-SimulatedWorld RandomWorld(Random& random, const Faults& faults);
+// `cells`: whether the volume is a grid's.
+SimulatedWorld RandomWorld(Random& random, const Faults& faults, const ModelCells& cells);
 
 // Of the world's volume, "volume".
 SubmitFrame RandomRequest(Random& random, const Policy& policy, RequestId id, std::uint32_t deadline_ms);

@@ -35,7 +35,8 @@ Simulation::Simulation(std::uint64_t seed, Tally& tally)
       current_(faults_),
       network_(random_, faults_, std::chrono::microseconds(random_.Integer(50, 5000)), tally),
       encode_messages_(random_.Chance(0.02)),
-      world_(RandomWorld(random_, faults_)),
+      cells_(seed),
+      world_(RandomWorld(random_, faults_, cells_)),
       witness_(faults_.none(), tally),
       service_(machine_, *this),
       words_(random_) {}
@@ -45,7 +46,7 @@ Simulation::Simulation(std::uint64_t seed, Tally& tally)
 Node Simulation::AddNode() {
   WorkerConfig config = world_.worker_config;
   config.incarnation = random_.Integer<Incarnation>(1, std::uint64_t{1} << 62);
-  workers_.emplace_back(Node(workers_.size()), config, world_.speed, current_, random_, service_, tally_);
+  workers_.emplace_back(Node(workers_.size()), config, world_.speed, current_, random_, service_, cells_, tally_);
   return service_.AddWorker(std::move(config));
 }
 
@@ -88,7 +89,9 @@ void Simulation::StartCoordinator() {
 
 void Simulation::Submit(ModelClient& client, RequestId request) {
   ++requests_made_;
-  client.Submit(RandomRequest(random_, world_.policy, request, kDeadlineMs));
+  SubmitFrame submit = RandomRequest(random_, world_.policy, request, kDeadlineMs);
+  if (cells_.present() && random_.Chance(0.5)) submit.frame.renderer = FindRenderer("slice")->name();
+  client.Submit(submit);
 }
 
 bool Simulation::Idle() const {
@@ -107,6 +110,7 @@ void Simulation::RunUntil(Duration from_now, bool until_idle) {
 
 void Simulation::Run() {
   tally_.Add(Count::kWorlds);
+  if (cells_.present()) tally_.Add(Count::kGrids);
   StartCoordinator();
   const int workers = random_.Integer(1, 8);
   for (int i = 0; i < workers; ++i) AddWorker(faults_.none() ? Duration{} : Duration(milliseconds(random_.Integer(0, 500))));
@@ -445,7 +449,13 @@ AnyMessage Simulation::AnswerOf(const ChunkRequest& request) {
   chunk.dataset = request.dataset;
   chunk.box = request.box;
   chunk.chunk = request.chunk;
-  chunk.raw_bytes = BytesOfChunk(request.box, kVoxelType, request.chunk);
+  if (IsCellChunk(request.chunk)) {
+    chunk.cell_bytes = cells_.BytesOf(request.dataset, request.box);
+    EXPECT_LT(request.chunk - kFirstCellChunk, CellChunkCount(chunk.cell_bytes)) << "a chunk of cells that there is not";
+    chunk.raw_bytes = BytesOfCellChunk(chunk.cell_bytes, request.chunk);
+  } else {
+    chunk.raw_bytes = BytesOfChunk(request.box, kVoxelType, request.chunk);
+  }
   chunk.encoded_bytes = chunk.raw_bytes;
   return chunk;
 }

@@ -33,6 +33,7 @@
 #include "tests/simulator/faults.h"
 #include "tests/simulator/frame_witness.h"
 #include "tests/simulator/hostile_words.h"
+#include "tests/simulator/model_cells.h"
 #include "tests/simulator/model_client.h"
 #include "tests/simulator/model_worker.h"
 #include "tests/simulator/network.h"
@@ -138,6 +139,7 @@ class Simulation : private Conditions {
   FaultyNetwork network_;
   const bool encode_messages_;  // in a few worlds messages are encoded and decoded on their way
   bool workerless_ = false;     // for a moment no worker was running
+  const ModelCells cells_;
   const SimulatedWorld world_;
   int most_teams_ = world_.policy.teams;  // that a client, which may be hostile, has asked for: each has a window of its own
   FrameWitness witness_;

@@ -10,6 +10,7 @@ namespace slabstream {
 
 enum class Count : std::size_t {
   kWorlds,
+  kGrids,
   kRequests,
   kPictures,
   kRetriedPictures,
@@ -60,6 +61,7 @@ enum class Count : std::size_t {
   kComplaints,
   kHandedOver,
   kCachedFrames,
+  kCellChunks,
   kMasks,
   kMasksOfRetries,
   kHiddenPixels,
@@ -78,6 +80,7 @@ struct CountRule {
 
 inline constexpr std::array<CountRule, std::size_t(Count::kEnd)> kCountRules{{
     {"worlds", 1000},
+    {"worlds with a grid", 200},
     {"requests", 4000},
     {"pictures", 3000},
     {"pictures after more than one attempt", 300},
@@ -126,6 +129,7 @@ inline constexpr std::array<CountRule, std::size_t(Count::kEnd)> kCountRules{{
     {"complaints about unreachable workers", 20},
     {"frames handed over without loss", 10},
     {"frames from cached voxels", 100},
+    {"chunks of cells", 5000},
     {"groups with hidden tiles", 1000},
     {"groups with hidden tiles after the first attempt", 20},
     {"pixels without hidden boxes", 1000},

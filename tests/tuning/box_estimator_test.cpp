@@ -31,12 +31,12 @@ FrameSetup SetupOf(const Index3& size, const RendererKind* renderer, const ViewP
   request.renderer = renderer->name();
   request.view = view;
   request.size = {side, side};
-  return MakeFrameSetup(request, 1, FullSummary(size)).value();
+  return MakeFrameSetup(request, 1, FullGridSummary(size)).value();
 }
 
 TEST(BoxEstimator, AnOpaqueBlockSeenFromTheFrontCoversItsRectangle) {
   const Index3 size = {128, 128, 128};
-  const VolumeSummary summary = FullSummary(size);
+  const VolumeSummary summary = FullGridSummary(size);
   const Box block = {{32, 0, 48}, {96, 128, 112}};
   const OccupancyGrid grid = FilledGrid(size, block);
   for (const RendererKind* renderer : Renderers()) {
