@@ -1,5 +1,6 @@
 #!/usr/bin/python3
 """Draws a scene of `slabstream bench --export` with one of VTK's volume mappers and times it; bench/against_vtk and bench/viewer run it.
+A scene of the renderer `slice` has an unstructured grid, which VTK's mappers of such grids draw (GRID_MAPPERS).
 
 Needs python3-vtk9, python3-numpy and an X display (run it under xvfb-run). One frame is: move the camera, Render(), read the RGBA pixels
 back. A frame of each projection warms up, then their turntables turn after turn, as `slabstream bench` does it. Prints one JSON object:
@@ -13,6 +14,32 @@ import os
 import resource
 import time
 
+# VTK's unstructured grid mappers that run on the processor: the class, and that of its ray integrator. "automatic" is VTK's own choice, which
+# is vtkUnstructuredGridPreIntegration for one value a point and vtkUnstructuredGridHomogeneousRayIntegrator for values of cells. The ray
+# caster's rays walk from face to face (Bunyk, Kaufman, Silva 1997). Only the ray caster has threads.
+GRID_MAPPERS = {
+    "raycast": ("vtkUnstructuredGridVolumeRayCastMapper", None),
+    "raycast-linear": ("vtkUnstructuredGridVolumeRayCastMapper", "vtkUnstructuredGridLinearRayIntegrator"),
+    "zsweep": ("vtkUnstructuredGridVolumeZSweepMapper", None),
+}
+
+
+def read_grid(vtk, grid):
+    """The grid with the array to draw as its scalars: the named one, or the active one, or else the first with one component."""
+    reader = vtk.vtkXMLUnstructuredGridReader()
+    reader.SetFileName(grid["file"])
+    reader.Update()
+    mesh = reader.GetOutput()
+    for data in (mesh.GetPointData(), mesh.GetCellData()):
+        names = [data.GetArrayName(i) for i in range(data.GetNumberOfArrays()) if data.GetArray(i).GetNumberOfComponents() == 1]
+        if grid["array"] in names:
+            data.SetActiveScalars(grid["array"])
+        elif not grid["array"] and data.GetScalars() is None and names:
+            data.SetActiveScalars(names[0])
+        if data.GetScalars() is not None and data.GetScalars().GetName() in names:
+            break
+    return mesh
+
 
 def read_volume(vtk, path):
     reader = vtk.vtkMetaImageReader()
@@ -24,8 +51,18 @@ def read_volume(vtk, path):
     return image
 
 
+def attenuations(points, pieces=8):
+    """What VTK's integrators of unstructured grids take for opacities: alpha of a unit distance is 1 - exp(-attenuation) there. The logarithm
+    of a linear piece is curved, hence as many pieces of it."""
+    curve = [points[0]]
+    for (v0, a0), (v1, a1) in zip(points, points[1:]):
+        curve += [(v0 + (v1 - v0) * i / pieces, a0 + (a1 - a0) * i / pieces) for i in range(1, pieces + 1)]
+    return [(value, -math.log1p(-min(alpha, 0.9999))) for value, alpha in curve]
+
+
 def make_property(vtk, scene, directory, smallest_spacing):
-    """Colours, opacities (of a distance, as ours are of voxel lengths) and lighting: two-sided Phong with a light at infinity, as ours."""
+    """Colours, opacities (of a distance, as ours are of voxel lengths) and lighting: two-sided Phong with a light at infinity, as ours.
+    Grids are drawn without lights, by us and by VTK."""
     with open(os.path.join(directory, scene["transfer"]), encoding="utf-8") as stream:
         preset = json.load(stream)[0]
     color, opacity = vtk.vtkColorTransferFunction(), vtk.vtkPiecewiseFunction()
@@ -33,14 +70,15 @@ def make_property(vtk, scene, directory, smallest_spacing):
     opacity.SetAllowDuplicateScalars(1)
     for i in range(0, len(preset["RGBPoints"]), 4):
         color.AddRGBPoint(*preset["RGBPoints"][i:i + 4])
-    for i in range(0, len(preset["Points"]), 4):
-        opacity.AddPoint(*preset["Points"][i:i + 4])
+    points = [preset["Points"][i:i + 2] for i in range(0, len(preset["Points"]), 4)]
+    for value, alpha in attenuations(points) if "grid" in scene else points:
+        opacity.AddPoint(value, alpha)
     prop = vtk.vtkVolumeProperty()
     prop.SetColor(color)
     prop.SetScalarOpacity(opacity)
     prop.SetScalarOpacityUnitDistance(scene["opacity_distance"] * smallest_spacing)
     prop.SetInterpolationTypeToLinear()
-    prop.SetShade(1)
+    prop.SetShade(0 if "grid" in scene else 1)
     prop.SetAmbient(scene["shading"]["ambient"])
     prop.SetDiffuse(scene["shading"]["diffuse"])
     prop.SetSpecular(scene["shading"]["specular"])
@@ -68,6 +106,19 @@ def make_mapper(vtk, kind, threads, sample_distance, renderer):
     return mapper
 
 
+def make_grid_mapper(vtk, kind, threads):
+    """One ray a pixel, and no trading of quality for speed."""
+    mapper_class, integrator = GRID_MAPPERS[kind]
+    mapper = getattr(vtk, mapper_class)()
+    if hasattr(mapper, "SetNumberOfThreads"):
+        mapper.SetNumberOfThreads(threads)
+    mapper.SetAutoAdjustSampleDistances(0)
+    mapper.SetImageSampleDistance(1.0)
+    if integrator:
+        mapper.SetRayIntegrator(getattr(vtk, integrator)())
+    return mapper
+
+
 class Stage:
     """The window with the volume in it, and the turntable's camera: Slabstream's views (common/view/camera.h), in VTK's terms."""
 
@@ -76,9 +127,15 @@ class Stage:
         dims, spacing = image.GetDimensions(), image.GetSpacing()
         self.views, self.size = scene["views"], scene["size"]
         self.radius = 0.5 * math.sqrt(sum((n * s) ** 2 for n, s in zip(dims, spacing)))
-        self.centre = [(n - 1) / 2 * s for n, s in zip(dims, spacing)]
-        mapper = make_mapper(vtk, mapper_kind, threads, min(spacing), scene["renderer"])
-        mapper.SetInputData(image)
+        if "grid" in scene:  # the volume is the lattice that fills its bounding box
+            grid = read_grid(vtk, scene["grid"])
+            self.centre = grid.GetCenter()
+            mapper = make_grid_mapper(vtk, mapper_kind, threads)
+            mapper.SetInputData(grid)
+        else:
+            self.centre = [(n - 1) / 2 * s for n, s in zip(dims, spacing)]
+            mapper = make_mapper(vtk, mapper_kind, threads, min(spacing), scene["renderer"])
+            mapper.SetInputData(image)
         volume = vtk.vtkVolume()
         volume.SetMapper(mapper)
         volume.SetProperty(make_property(vtk, scene, directory, min(spacing)))
@@ -146,8 +203,9 @@ def write_picture(vtk, window, path):
 def main():
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("scene", help="a .scene.json")
-    p.add_argument("--mapper", choices=["fixedpoint", "gpu"], default="fixedpoint")
+    p.add_argument("--mapper", choices=["fixedpoint", "gpu", *GRID_MAPPERS], help="default: fixedpoint, of grids raycast")
     p.add_argument("--threads", type=int, default=2)
+    p.add_argument("--views", type=int, metavar="N", help="a single turn of its first N views; 0: only pictures")
     p.add_argument("--jpeg", type=int, default=0, metavar="QUALITY", help="encode each frame")
     p.add_argument("--projection", choices=["orthographic", "perspective"], help="only this one")
     p.add_argument("--pictures", metavar="PREFIX", help="write the first view of each projection to PREFIX.PROJECTION.png")
@@ -158,20 +216,25 @@ def main():
 
     with open(a.scene, encoding="utf-8") as stream:
         scene = json.load(stream)
-    stage = Stage(vtk, scene, os.path.dirname(a.scene), a.mapper, a.threads, a.jpeg)
+    kinds = GRID_MAPPERS if "grid" in scene else ["fixedpoint", "gpu"]
+    if a.mapper and a.mapper not in kinds:
+        p.error(f"--mapper {a.mapper} does not draw this scene, but: {', '.join(kinds)}")
+    stage = Stage(vtk, scene, os.path.dirname(a.scene), a.mapper or next(iter(kinds)), a.threads, a.jpeg)
     projections = [a.projection] if a.projection else scene["views"]["projections"]
-    warm_up = [stage.frame_ms(projection, 0) for projection in projections]
+    warm_up = [stage.frame_ms(projection, 0) for projection in projections if a.views != 0]
     times = {projection: [] for projection in projections}
-    for _ in range(scene["views"]["turns"]):
+    wall, processor = time.perf_counter(), time.process_time()
+    for _ in range(scene["views"]["turns"] if a.views is None else 1):
         for projection in projections:
-            times[projection] += [stage.frame_ms(projection, i) for i in range(len(stage.azimuths))]
+            times[projection] += [stage.frame_ms(projection, i) for i in range(len(stage.azimuths[:a.views]))]
+    cores = (time.process_time() - processor) / (time.perf_counter() - wall)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     if a.pictures:
         for projection in projections:
             stage.frame_ms(projection, 0)
             write_picture(vtk, stage.window, f"{a.pictures}.{projection}.png")
-    print(json.dumps({"version": vtk.vtkVersion().GetVTKVersion(), "first_frame_ms": warm_up[0], "latency_ms": times,
-                      "peak_rss_bytes": peak}))
+    print(json.dumps({"version": vtk.vtkVersion().GetVTKVersion(), "first_frame_ms": next(iter(warm_up), None), "latency_ms": times,
+                      "cores_used": cores, "peak_rss_bytes": peak}))
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@
 #include <iostream>
 
 #include "common/base/files.h"
+#include "common/renderers/registry.h"
 #include "laboratory/bench/bench_cases.h"
 #include "laboratory/bench/bench_export.h"
 #include "laboratory/bench/bench_report.h"
@@ -39,7 +40,12 @@ Result<std::vector<BenchCase>> ChooseCases(const BenchOptions& options) {
     cases.push_back(*std::move(parsed));
   }
   if (cases.empty()) cases = StandardBenchCases();
-  for (BenchCase& c : cases) c.renderer = options.renderer.value_or(c.renderer);
+  for (BenchCase& c : cases) {
+    c.renderer = options.renderer.value_or(c.renderer);
+    if (const auto values = ParseParameters(*c.renderer, options.parameters); !values.ok()) {
+      return Status(values.status().code(), fmt::format("CASE '{}': {}", c.name, values.status().message()));
+    }
+  }
   return cases;
 }
 

@@ -1,9 +1,11 @@
 #include "laboratory/bench/bench_export.h"
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "common/base/files.h"
 #include "common/mesh/lattice.h"
+#include "common/volume_io/read_options.h"
 #include "common/volume_io/volume_reader.h"
 
 namespace slabstream {
@@ -11,11 +13,22 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string SceneJson(const BenchCase& c, const BenchOptions& options) {
+// The file that other programs read the cells from, and the array as the user named it ("": the file's own choice). Null: no grid is drawn.
+Result<Json> GridJson(const BenchCase& c, const Volume& volume) {
+  const auto* text = std::get_if<std::string>(&c.volume);
+  if (text == nullptr || volume.cells == nullptr || !c.renderer->draws_cells()) return Json();
+  const Result<VolumeSource> source = ParseVolumeSource(*text);
+  if (!source.ok()) return source.status();
+  std::error_code error;
+  const std::filesystem::path path = std::filesystem::absolute(source->path, error);
+  return Json{{"file", error ? source->path : path.string()}, {"array", source->options.array}};
+}
+
+std::string SceneJson(const BenchCase& c, const BenchOptions& options, const Json& grid) {
   const Shading shading;
   Json projections = Json::array();
   for (const Projection projection : c.renderer->projections()) projections.push_back(NameOf(projection));
-  const Json json = {
+  Json json = {
       {"case", c.name},
       {"volume", c.dataset + ".mha"},
       {"transfer", c.name + ".transfer.json"},
@@ -31,6 +44,7 @@ std::string SceneJson(const BenchCase& c, const BenchOptions& options) {
         {"fov_degrees", kBenchFovDegrees}}},
       {"shading",
        {{"ambient", shading.ambient}, {"diffuse", shading.diffuse}, {"specular", shading.specular}, {"shininess", shading.shininess}}}};
+  if (!grid.is_null()) json["grid"] = grid;
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
@@ -43,12 +57,14 @@ Status ExportCase(const BenchCase& bench_case, const BenchOptions& options) {
                                           ? Result<TransferFunction>(std::get<TransferFunction>(bench_case.transfer.choice))
                                           : MakePreset(std::get<std::string>(bench_case.transfer.choice), SummaryOf(**volume));
   if (!transfer.ok()) return transfer.status();
+  const Result<Json> grid = GridJson(bench_case, **volume);
+  if (!grid.ok()) return grid.status();
   const std::string directory = options.export_directory + "/", base = directory + bench_case.name;
   if (Status status = WriteVolume(**volume, directory + bench_case.dataset + ".mha"); !status.ok()) return status;
   if (Status status = WriteTextFile(base + ".transfer.json", FormatParaViewColorMap(*transfer, bench_case.name)); !status.ok()) {
     return status;
   }
-  return WriteTextFile(base + ".scene.json", SceneJson(bench_case, options));
+  return WriteTextFile(base + ".scene.json", SceneJson(bench_case, options, *grid));
 }
 
 }  // namespace slabstream

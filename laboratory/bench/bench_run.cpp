@@ -28,6 +28,7 @@ Result<Session> OpenSession(const BenchCase& c, const ConnectionOptions& connect
 FrameJob MakeJob(const BenchCase& c, const BenchOptions& options, const std::string& dataset, Projection projection, int index) {
   FrameJob job{BenchRequest(c, BenchView(projection, index, options.frames), {options.size, options.size}), {}, {}};
   job.request.dataset = dataset;
+  job.request.parameters = options.parameters;
   return job;
 }
 

@@ -14,6 +14,7 @@
 #include "client/cli/option_groups.h"
 #include "client/movie/turntable.h"
 #include "common/renderers/registry.h"
+#include "common/renderers/sampling_rate.h"
 #include "laboratory/bench/bench.h"
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/run_experiment.h"
@@ -49,6 +50,14 @@ void DeclareBench(const CommandLine& line) {
       },
       "Render every case by this renderer instead of its own")
       ->type_name("NAME");
+  const RendererParameter rate = SamplingRate();
+  NoteRange(sub->add_option_function<std::string>(
+                "--" + std::string(rate.name),
+                [options, name = std::string(rate.name)](const std::string& text) { options->parameters[name] = text; },
+                std::string(rate.purpose) + ", of every case; for renderers that take samples along rays"),
+            {rate.least, rate.most})
+      ->type_name("NUMBER")
+      ->default_str(fmt::format("{:g}", rate.standard));
   sub->add_option("--json", options->json_path, "Write all figures and the machine as JSON")->type_name("FILE");
   sub->add_option("--pictures", options->pictures_directory, "Write the first view of each projection there, after the measuring")
       ->type_name("DIR");

@@ -56,6 +56,24 @@ TEST_F(GridTest, InfoTellsCellsBoundsAndArrays) {
   }
 }
 
+TEST_F(GridTest, BenchMeasuresAndExportsIt) {
+  MustRun({"bench", "grid.vtu", "--renderer", "slice", "--sampling-rate", "2", "--size", "24", "--frames", "1", "--turns", "1", "--json",
+           "report.json"});
+  const json measured = json::parse(ReadFile("report.json"))["cases"][0];
+  EXPECT_EQ(measured["renderer"], "slice");
+  EXPECT_EQ(measured["parameters"], (json{{"sampling-rate", "2"}}));
+
+  MustRun({"bench", "grid.vtu", "--renderer", "slice", "--export", "scenes"});
+  const json scene = json::parse(ReadFile("scenes/grid-auto.scene.json"));
+  EXPECT_EQ(scene["grid"]["file"], Path("grid.vtu"));
+  EXPECT_EQ(scene["grid"]["array"], "");
+
+  const ProgramResult refused = Slabstream({"bench", "grid.vtu", "--renderer", "splat", "--sampling-rate", "2"});
+  EXPECT_EQ(refused.exit_status, 2);
+  EXPECT_EQ(refused.err_lines().size(), 1U) << refused.err;
+  EXPECT_THAT(refused.err, HasSubstr("sampling-rate"));
+}
+
 TEST_F(GridTest, AnyNumberOfWorkersDrawsTheSameCells) {
   const PictureFile alone = Render("grid.vtu", "alone.exr", {"--local=1", "--elevation", "20", "--azimuth", "30"});
   EXPECT_GT(MeanAlpha(alone), 0.05);
