@@ -110,22 +110,46 @@ SLICE_CASES: list[tuple[dict, list[str]]] = [
 ]
 
 
+# Of an unstructured grid.
+GRID_CASES: list[tuple[dict, list[str]]] = [
+    ({"renderer": "slice", "sampling_rate": 2, "azimuth": 30}, ["--renderer", "slice", "--sampling-rate", "2", "--azimuth", "30"]),
+]
+GRID = """# vtk DataFile Version 3.0
+a hexahedron
+ASCII
+DATASET UNSTRUCTURED_GRID
+POINTS 8 float
+0 0 0 4 0 0 4 3 0 0 3 0 0 0 2 4 0 2 4 3 2 0 3 2
+CELLS 1 9
+8 0 1 2 3 4 5 6 7
+CELL_TYPES 1
+12
+POINT_DATA 8
+SCALARS v float 1
+LOOKUP_TABLE default
+0 4 4 0 2 6 6 2
+"""
+
+
 class Pixels(WithAService):
     @classmethod
     def setUpClass(cls) -> None:
         super().setUpClass()
+        (cls.folder / "grid.vtk").write_text(GRID)
+        added = cls.running.run("data", "add", f"grid={cls.folder}/grid.vtk", "--endpoint", cls.running.endpoint)
+        assert added.returncode == 0, added.stderr
         (cls.folder / "map.json").write_text(json.dumps(COLOR_MAP))
         (cls.folder / "camera.json").write_text(json.dumps(CAMERA))
         cls.service = ss.connect(endpoint=cls.running.endpoint)
         cls.addClassCleanup(cls.service.close)
 
-    def compare(self, command: str, cases: list) -> None:
+    def compare(self, command: str, cases: list, dataset: str = "head") -> None:
         for python, arguments in cases:
             with self.subTest(command=command, python=python):
                 if "size" not in python:
                     python, arguments = {**python, "size": 48}, [*arguments, "--size", "48"]
-                image = getattr(self.service, "render" if command == "render" else "slice")("head", **python)
-                expected = self.running.picture(command, *arguments)
+                image = getattr(self.service, "render" if command == "render" else "slice")(dataset, **python)
+                expected = self.running.picture(command, *arguments, dataset=dataset)
                 found = client_support.read_png(image.png())
                 self.assertEqual(found.dtype, expected.dtype)
                 np.testing.assert_array_equal(found, expected)
@@ -135,12 +159,13 @@ class Pixels(WithAService):
 
     def test_render_makes_the_command_lines_pixels(self) -> None:
         self.compare("render", RENDER_CASES)
+        self.compare("render", GRID_CASES, "grid")
 
     def test_slice_makes_the_command_lines_pixels(self) -> None:
         self.compare("slice", SLICE_CASES)
 
     def test_every_option_is_compared(self) -> None:
-        for command, cases in (("render", RENDER_CASES), ("slice", SLICE_CASES)):
+        for command, cases in (("render", RENDER_CASES + GRID_CASES), ("slice", SLICE_CASES)):
             compared = {name for python, _ in cases for name in python}
             self.assertEqual(set(COMMANDS[command]) - compared, set())
             for name in ("view", "renderer", "plane"):

@@ -75,9 +75,9 @@ class RunningService:
     def run(self, *arguments: str) -> subprocess.CompletedProcess:
         return subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, env=self.environment, cwd=self.folder, timeout=300)
 
-    def picture(self, command: str, *arguments: str) -> np.ndarray:
+    def picture(self, command: str, *arguments: str, dataset: str = "head") -> np.ndarray:
         """The command line's PNG."""
-        done = self.run(command, "head", "-o", "picture.png", "--endpoint", self.endpoint, *arguments)
+        done = self.run(command, dataset, "-o", "picture.png", "--endpoint", self.endpoint, *arguments)
         if done.returncode != 0:
             raise RuntimeError(done.stderr)
         return read_png((self.folder / "picture.png").read_bytes())
