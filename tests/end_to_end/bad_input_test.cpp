@@ -270,7 +270,7 @@ TEST_F(BadInputTest, UnstructuredGrids) {
   for (const char* name : {"missing.vtu", "empty.vtu", "text.vtu", "image.vtu", "bare.vtu", "open.vtu"}) {
     ExpectRefused({"info", Path(name)}, name);
     ExpectRefused({"info", Path(name), "--json"}, name);
-    ExpectRefused({"render", Path(name), "--local=1", "-o", "x.png"}, "an unstructured grid");
+    ExpectRefused({"render", Path(name), "--local=1", "-o", "x.png"}, name);
   }
   ExpectRefused({"info", "bare.vtu", "--transfer", "opaque"}, "is an unstructured grid");
 }
