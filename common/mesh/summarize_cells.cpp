@@ -79,6 +79,11 @@ Histogram HistogramOf(const Volume& volume, const ValueRange& range) {
   return all;
 }
 
+VolumeSummary WithCells(VolumeSummary summary, const Volume& volume) {
+  if (volume.cells != nullptr) SummarizeCells(*volume.cells, volume, summary);
+  return summary;
+}
+
 }  // namespace
 
 void SummarizeCells(const Mesh& mesh, const Volume& resampled, VolumeSummary& summary) {
@@ -93,16 +98,7 @@ void SummarizeCells(const Mesh& mesh, const Volume& resampled, VolumeSummary& su
   summary.histogram = HistogramOf(resampled, summary.range);
 }
 
-VolumeSummary SummaryOf(const Volume& volume) {
-  VolumeSummary summary = Summarize(volume);
-  if (volume.cells != nullptr) SummarizeCells(*volume.cells, volume, summary);
-  return summary;
-}
-
-VolumeSummary SummaryOf(const LayeredVolume& volume) {
-  VolumeSummary summary = Summarize(volume);
-  if (volume.volume->cells != nullptr) SummarizeCells(*volume.volume->cells, *volume.volume, summary);
-  return summary;
-}
+VolumeSummary SummaryOf(const Volume& volume) { return WithCells(Summarize(volume), volume); }
+VolumeSummary SummaryOf(const LayeredVolume& volume) { return WithCells(Summarize(volume), *volume.volume); }
 
 }  // namespace slabstream

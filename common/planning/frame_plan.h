@@ -87,13 +87,17 @@ Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, cons
 // The function that a request names or holds, for this volume. NotFound: no such preset.
 Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const VolumeSummary& summary);
 
+// InvalidArgument: the renderer draws cells, and the dataset has none.
+Status CheckHasWhatIsDrawn(const RendererKind& renderer, const std::string& dataset, const VolumeSummary& summary);
+
 // How a request shows a dataset, whatever its view.
 struct VolumeLook {
   TransferFunction transfer;
   ClipRegion clip;
   LayerLooks layers;
 };
-// InvalidArgument: the volume has no slice with the slab's index, or no such layer, or there is no such label; NotFound: no such preset.
+// InvalidArgument: as CheckHasWhatIsDrawn; the volume has no slice with the slab's index, or no such layer, or there is no such label;
+// NotFound: no such preset.
 Result<VolumeLook> ResolveLook(const FrameRequest& request, const VolumeSummary& summary);
 
 // Plans the same frame for another roster with the same number of slots. Setup, layout and groups stay; workers of placements, schedules

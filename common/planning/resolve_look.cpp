@@ -66,11 +66,14 @@ Result<LayerLooks> ResolveLayers(const FrameRequest& request, const VolumeSummar
 
 }  // namespace
 
+Status CheckHasWhatIsDrawn(const RendererKind& renderer, const std::string& dataset, const VolumeSummary& summary) {
+  if (!renderer.draws_cells() || !summary.cells.empty()) return Status::Ok();
+  return Status::InvalidArgument(
+      fmt::format("renderer '{}' draws the cells of unstructured grids, and dataset \"{}\" is a volume", renderer.name(), dataset));
+}
+
 Result<VolumeLook> ResolveLook(const FrameRequest& request, const VolumeSummary& summary) {
-  if (FindRenderer(request.renderer)->draws_cells() && summary.cells.empty()) {
-    return Status::InvalidArgument(fmt::format("renderer '{}' draws the cells of unstructured grids, and dataset \"{}\" is a volume",
-                                               request.renderer, request.dataset));
-  }
+  if (Status status = CheckHasWhatIsDrawn(*FindRenderer(request.renderer), request.dataset, summary); !status.ok()) return status;
   Result<TransferFunction> transfer = ResolveTransfer(request.transfer, summary);
   if (!transfer.ok()) return transfer.status();
   Result<ClipRegion> clip = MakeClipRegion(request.clipping, summary.description.geometry);

@@ -24,6 +24,28 @@ std::uint64_t ImageBytes(const PixelBounds& bounds, const FrameSetup& setup) {
   return std::uint64_t(bounds.pixel_count()) * BytesPerPixel(setup.format);
 }
 
+// Calls function(number of the brick, its part in the slab) for the bricks that the slab, not empty, touches.
+template <class Function>
+void VisitBricks(const Box& slab, const VolumeSummary& summary, Function&& function) {
+  const BrickGrid grid(slab);
+  for (std::int32_t z = 0; z < grid.counts.z; ++z) {
+    for (std::int32_t y = 0; y < grid.counts.y; ++y) {
+      for (std::int32_t x = 0; x < grid.counts.x; ++x) {
+        const Index3 brick = grid.first + Index3{x, y, z};
+        function(NumberIn(summary.brick_counts, brick), grid.BoxOf(brick));
+      }
+    }
+  }
+}
+
+// Of the cells of an unstructured grid in the bricks that the slab touches.
+std::uint64_t BytesOfCells(const Box& slab, const VolumeSummary& summary) {
+  if (slab.empty() || summary.cells.empty()) return 0;
+  std::uint64_t cells = 0;
+  VisitBricks(slab, summary, [&](std::size_t brick, const Box&) { cells += summary.cells[brick]; });
+  return kBytesACell * cells;
+}
+
 // By worker with a part in the plan: the voxels of the group that needs most of them, if `bytes_of` tells what a slab takes.
 template <class BytesOf>
 std::map<WorkerId, std::uint64_t> MostVoxels(const FramePlan& plan, BytesOf&& bytes_of) {
@@ -63,38 +85,18 @@ std::uint64_t PictureBytes(const FrameSetup& setup) {
   return std::uint64_t(FrameBytes(setup)) + copies * ImageBytes(picture, setup);
 }
 
-std::uint64_t CellBytes(const Box& slab, const VolumeSummary& summary) {
-  if (slab.empty() || summary.cells.empty()) return 0;
-  std::uint64_t cells = 0;
-  const BrickGrid grid(slab);
-  for (std::int32_t z = 0; z < grid.counts.z; ++z) {
-    for (std::int32_t y = 0; y < grid.counts.y; ++y) {
-      for (std::int32_t x = 0; x < grid.counts.x; ++x) {
-        cells += summary.cells[NumberIn(summary.brick_counts, grid.first + Index3{x, y, z})];
-      }
-    }
-  }
-  return kBytesACell * cells;
-}
-
 std::uint64_t VoxelBytes(const Box& slab, const VolumeSummary& summary) {
   if (slab.empty()) return 0;
   std::uint64_t voxels = 0;
-  const BrickGrid grid(slab);
-  for (std::int32_t z = 0; z < grid.counts.z; ++z) {
-    for (std::int32_t y = 0; y < grid.counts.y; ++y) {
-      for (std::int32_t x = 0; x < grid.counts.x; ++x) {
-        const Index3 brick = grid.first + Index3{x, y, z};
-        const ValueRange& range = summary.bricks[NumberIn(summary.brick_counts, brick)];
-        if (range.min != range.max) voxels += std::uint64_t(grid.BoxOf(brick).voxel_count());
-      }
-    }
-  }
+  VisitBricks(slab, summary, [&](std::size_t brick, const Box& part) {
+    const ValueRange& range = summary.bricks[brick];
+    if (range.min != range.max) voxels += std::uint64_t(part.voxel_count());
+  });
   std::uint64_t bytes = kDerivedPerVoxel * voxels * BytesPerSample(summary.description.type);
   for (const VolumeSummary* layer : {summary.labels.get(), summary.overlay.get()}) {
     if (layer != nullptr) bytes += VoxelBytes(slab, *layer);
   }
-  return bytes + CellBytes(slab, summary);
+  return bytes + BytesOfCells(slab, summary);
 }
 
 Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, std::span<const WorkerLimit> workers) {
@@ -105,7 +107,7 @@ Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, s
 
   constexpr std::uint64_t kEnough = kMostInWindow;  // more are never under way at a time
   std::map<WorkerId, std::uint64_t> voxels = MostVoxels(plan, [&](const Box& slab) {
-    return kDerivedPerVoxel * std::uint64_t(slab.voxel_count()) * summary.types().bytes_per_voxel() + CellBytes(slab, summary);
+    return kDerivedPerVoxel * std::uint64_t(slab.voxel_count()) * summary.types().bytes_per_voxel() + BytesOfCells(slab, summary);
   });
   const auto needs = [&](WorkerId worker) { return kIdleMemoryBytes + voxels.at(worker) + images; };
   const auto has_part = [&](const WorkerLimit& limit) { return limit.bytes != 0 && voxels.contains(limit.worker); };

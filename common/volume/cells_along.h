@@ -1,4 +1,5 @@
-// CellsAlong: the cells of an OccupancyGrid that a box touches along one axis, and how much of each lies inside.
+// CellsAlong: the cells of an OccupancyGrid that a box touches along one axis, and how much of each lies inside. VisitCells: those that it
+// touches at all.
 #pragma once
 
 #include <algorithm>
@@ -28,5 +29,20 @@ class CellsAlong {
  private:
   const std::int32_t first_voxel_, end_voxel_;
 };
+
+// Calls function(place of the cell, its share inside) for each cell that `box`, not empty, touches; x fastest. Shares are of
+// kOccupancyCell^3 voxels.
+template <class Function>
+void VisitCells(const Box& box, Function&& function) {
+  const CellsAlong x(box, Axis::kX), y(box, Axis::kY), z(box, Axis::kZ);
+  Index3 cell;
+  for (cell.z = z.begin; cell.z < z.end; ++cell.z) {
+    for (cell.y = y.begin; cell.y < y.end; ++cell.y) {
+      for (cell.x = x.begin; cell.x < x.end; ++cell.x) {
+        function(cell, x.ShareInside(cell.x) * y.ShareInside(cell.y) * z.ShareInside(cell.z));
+      }
+    }
+  }
+}
 
 }  // namespace slabstream

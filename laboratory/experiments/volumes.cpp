@@ -94,11 +94,8 @@ std::shared_ptr<const OccupancyGrid> VolumeCache::Occupied(const BenchCase& volu
   std::shared_ptr<const OccupancyGrid>& grid = occupied_[{Identity(volume).dump() + TransferJson(volume.transfer).dump(), volume.renderer}];
   if (grid != nullptr) return grid;
   const VolumeInUse in_use = Get(volume);
-  if (volume.renderer->draws_cells() && in_use.volume->cells == nullptr) {
-    throw Failure(Status::InvalidArgument(
-        fmt::format("renderer '{}' draws the cells of unstructured grids, and '{}' is a volume", volume.renderer->name(), volume.dataset)));
-  }
   const VolumeSummary& summary = *in_use.summary;
+  if (Status status = CheckHasWhatIsDrawn(*volume.renderer, volume.dataset, summary); !status.ok()) throw Failure(std::move(status));
   const TransferFunction transfer = OrThrow(ResolveTransfer(volume.transfer, summary));
   grid = std::make_shared<const OccupancyGrid>(CountDrawn(*in_use.volume, summary, *volume.renderer, transfer));
   return grid;

@@ -66,30 +66,14 @@ TEST(Raycast, HiddenTilesChangeNothingElse) {
   const unsigned seed = 30;
   std::mt19937 random(seed);
   const Volume volume = MakeBlobs({{50, 45, 40}, {1, 1, 1}}, ScalarType::kUint8, seed);
-  const Box box = volume.block.box;
   for (const Projection projection : kProjections) {
     for (const double part : {0.3, 1.0}) {
       SetupOptions options;
       options.view = RandomView(projection, random);
       options.size = {90, 80};
       const FrameSetup setup = RaycastSetup(volume, options);
-      OcclusionMask mask{OcclusionTiles(setup.camera.width), OcclusionTiles(setup.camera.height), {}};
-      std::bernoulli_distribution hidden(part);
-      for (std::int32_t i = 0; i < mask.tiles_x * mask.tiles_y; ++i) mask.hidden.push_back(hidden(random) ? 1 : 0);
-      const LocalImage whole = RenderWhole(volume, setup);
-      const auto slab = CutSlab(volume, box);
-      RankReport report;
-      const LocalImage masked = MakeRenderer(*setup.renderer)->Render(*slab, box, setup, mask, std::atomic<bool>(false), report).value();
-      for (int y = 0; y < setup.camera.height; ++y) {
-        for (int x = 0; x < setup.camera.width; ++x) {
-          if (!mask.Hides(x, y)) {
-            ASSERT_EQ(PixelOf(masked, x, y), PixelOf(whole, x, y)) << "seed " << seed << " at " << x << ' ' << y;
-          }
-        }
-      }
-      if (part == 1) {
-        EXPECT_EQ(report.drawn_voxels, 0U);
-      }
+      SCOPED_TRACE(::testing::Message() << "seed " << seed << " part " << part);
+      ExpectHiddenTilesChangeNothingElse(volume, setup, part, random);
     }
   }
 }

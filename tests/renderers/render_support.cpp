@@ -212,4 +212,26 @@ float LargestDifference(const LocalImage& a, const LocalImage& b) {
   return largest;
 }
 
+void ExpectHiddenTilesChangeNothingElse(const Volume& volume, const FrameSetup& setup, double part, std::mt19937& random) {
+  const PixelBounds frame = FrameBounds(setup);
+  OcclusionMask mask{OcclusionTiles(frame.width()), OcclusionTiles(frame.height()), {}};
+  std::bernoulli_distribution hidden(part);
+  for (std::int32_t i = 0; i < mask.tiles_x * mask.tiles_y; ++i) mask.hidden.push_back(hidden(random) ? 1 : 0);
+  const LocalImage whole = RenderWhole(volume, setup);
+  const auto slab = SlabFor(*setup.renderer, volume, volume.block.box, 0);
+  RankReport report;
+  const LocalImage masked =
+      MakeRenderer(*setup.renderer)->Render(*slab, volume.block.box, setup, mask, std::atomic<bool>(false), report).value();
+  for (int y = 0; y < frame.height(); ++y) {
+    for (int x = 0; x < frame.width(); ++x) {
+      if (!mask.Hides(x, y)) {
+        ASSERT_EQ(PixelOf(masked, x, y), PixelOf(whole, x, y)) << "at " << x << ' ' << y;
+      }
+    }
+  }
+  if (part == 1) {
+    EXPECT_EQ(report.drawn_voxels, 0U);
+  }
+}
+
 }  // namespace slabstream::testing

@@ -58,6 +58,9 @@ Volume VolumeFor(const RendererKind& kind, Volume volume);
 std::unique_ptr<SlabData> SlabFor(const RendererKind& kind, const Volume& volume, const Box& box, std::int32_t halo = kHalo);
 // The frame, of the whole volume as one box.
 LocalImage RenderWhole(const Volume& volume, const FrameSetup& setup);
+// Hides each tile of the frame with probability `part`: every other pixel keeps its bits, and if all tiles are hidden
+// nothing is drawn.
+void ExpectHiddenTilesChangeNothingElse(const Volume& volume, const FrameSetup& setup, double part, std::mt19937& random);
 // Each box of the partition from its own slab, combined in visibility order.
 LocalImage RenderByBoxes(const Volume& volume, const FrameSetup& setup, const Partition& partition);
 // The picture, of the whole volume as one box.

@@ -212,24 +212,8 @@ TEST(Shear, HiddenTilesChangeNothingElse) {
     options.view = RandomView(Projection::kOrthographic, random);
     options.size = {90, 80};
     const FrameSetup setup = ShearSetup(volume, options);
-    OcclusionMask mask{OcclusionTiles(setup.camera.width), OcclusionTiles(setup.camera.height), {}};
-    std::bernoulli_distribution hidden(part);
-    for (std::int32_t i = 0; i < mask.tiles_x * mask.tiles_y; ++i) mask.hidden.push_back(hidden(random) ? 1 : 0);
-    const LocalImage whole = RenderWhole(volume, setup);
-    const auto slab = CutSlab(volume, volume.block.box);
-    RankReport report;
-    const LocalImage masked =
-        MakeRenderer(*setup.renderer)->Render(*slab, volume.block.box, setup, mask, std::atomic<bool>(false), report).value();
-    for (int y = 0; y < setup.camera.height; ++y) {
-      for (int x = 0; x < setup.camera.width; ++x) {
-        if (!mask.Hides(x, y)) {
-          ASSERT_EQ(PixelOf(masked, x, y), PixelOf(whole, x, y)) << "seed " << kSeed << " at " << x << ' ' << y;
-        }
-      }
-    }
-    if (part == 1) {
-      EXPECT_EQ(report.drawn_voxels, 0U);
-    }
+    SCOPED_TRACE(::testing::Message() << "seed " << kSeed << " part " << part);
+    ExpectHiddenTilesChangeNothingElse(volume, setup, part, random);
   }
 }
 

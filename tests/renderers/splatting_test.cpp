@@ -177,7 +177,6 @@ TEST(Splatting, HiddenTilesChangeNothingElse) {
   const unsigned seed = 30;
   std::mt19937 random(seed);
   const Volume volume = MakeBlobs({{50, 45, 40}, {1, 1, 1}}, ScalarType::kUint8, seed);
-  const Box box = volume.block.box;
   for (Projection projection : kProjections) {
     for (double part : {0.1, 0.6, 1.0}) {
       SCOPED_TRACE(::testing::Message() << "seed " << seed << " hidden " << part);
@@ -185,25 +184,7 @@ TEST(Splatting, HiddenTilesChangeNothingElse) {
       options.view = RandomView(projection, random);
       options.size = {90, 80};
       const FrameSetup setup = MakeSetup(volume, options);
-      OcclusionMask mask;
-      mask.tiles_x = (setup.sheets.width + kOcclusionTile - 1) / kOcclusionTile;
-      mask.tiles_y = (setup.sheets.height + kOcclusionTile - 1) / kOcclusionTile;
-      std::bernoulli_distribution hidden(part);
-      for (std::int32_t i = 0; i < mask.tiles_x * mask.tiles_y; ++i) mask.hidden.push_back(hidden(random) ? 1 : 0);
-      const LocalImage whole = RenderWhole(volume, setup);
-      const auto slab = CutSlab(volume, box);
-      RankReport report;
-      const LocalImage masked = MakeRenderer(*Splatting())->Render(*slab, box, setup, mask, std::atomic<bool>(false), report).value();
-      for (int y = 0; y < setup.sheets.height; ++y) {
-        for (int x = 0; x < setup.sheets.width; ++x) {
-          if (!mask.Hides(x, y)) {
-            ASSERT_EQ(PixelOf(masked, x, y), PixelOf(whole, x, y)) << x << ' ' << y;
-          }
-        }
-      }
-      if (part == 1) {
-        EXPECT_EQ(report.drawn_voxels, 0U);
-      }
+      ExpectHiddenTilesChangeNothingElse(volume, setup, part, random);
     }
   }
 }

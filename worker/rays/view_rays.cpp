@@ -7,8 +7,6 @@
 namespace slabstream {
 namespace {
 
-Float3 ToFloat3(const Vec3& v) { return {float(v.x), float(v.y), float(v.z)}; }
-
 // The depth in the middle of a slab that faces the view; its surfaces are two sides of the region. None: there is no slab.
 std::optional<double> MiddleOfSlab(const Camera& camera, const ClipRegion& clip) {
   if (camera.projection != Projection::kOrthographic || clip.mode != ClipMode::kKeep) return std::nullopt;

@@ -25,6 +25,7 @@
 namespace slabstream {
 
 using Float3 = std::array<float, 3>;
+inline Float3 ToFloat3(const Vec3& v) { return {float(v.x), float(v.y), float(v.z)}; }
 
 // ClipRegion in single precision.
 struct RayClip {

@@ -22,19 +22,12 @@ class ShearCost : public AnalyticCost {
   double Seconds(const Box& box, const CostView& view) const override {
     double resampled = 0, drawn = 0;  // voxels
     const Index3 cells = OccupancyCells(drawn_.size);
-    const CellsAlong x(box, Axis::kX), y(box, Axis::kY), z(box, Axis::kZ);
-    Index3 cell;
-    for (cell.z = z.begin; cell.z < z.end; ++cell.z) {
-      for (cell.y = y.begin; cell.y < y.end; ++cell.y) {
-        for (cell.x = x.begin; cell.x < x.end; ++cell.x) {
-          const std::uint32_t voxels = drawn_.cells[NumberIn(cells, cell)].voxels;
-          if (voxels == 0) continue;
-          const double inside = x.ShareInside(cell.x) * y.ShareInside(cell.y) * z.ShareInside(cell.z);
-          resampled += inside * double(OccupancyCellBox(cell, drawn_.size).voxel_count());
-          drawn += inside * voxels;
-        }
-      }
-    }
+    VisitCells(box, [&](const Index3& cell, double inside) {
+      const std::uint32_t voxels = drawn_.cells[NumberIn(cells, cell)].voxels;
+      if (voxels == 0) return;
+      resampled += inside * double(OccupancyCellBox(cell, drawn_.size).voxel_count());
+      drawn += inside * voxels;
+    });
     if (drawn <= 0) return 0;
     namespace cost = calibration::shear;
     const double pixels = view.pixels_per_voxel * view.pixels_per_voxel;

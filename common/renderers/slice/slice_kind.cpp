@@ -30,18 +30,11 @@ class SliceCost : public AnalyticCost {
   double Seconds(const Box& box, const CostView& view) const override {
     double drawn = 0, tetrahedra = 0;  // voxels of the lattice
     const Index3 cells = OccupancyCells(drawn_.size);
-    const CellsAlong x(box, Axis::kX), y(box, Axis::kY), z(box, Axis::kZ);
-    Index3 cell;
-    for (cell.z = z.begin; cell.z < z.end; ++cell.z) {
-      for (cell.y = y.begin; cell.y < y.end; ++cell.y) {
-        for (cell.x = x.begin; cell.x < x.end; ++cell.x) {
-          const double inside = x.ShareInside(cell.x) * y.ShareInside(cell.y) * z.ShareInside(cell.z);
-          const std::size_t number = NumberIn(cells, cell);
-          drawn += inside * drawn_.cells[number].voxels;
-          tetrahedra += inside * double(tetrahedra_[number]);
-        }
-      }
-    }
+    VisitCells(box, [&](const Index3& cell, double inside) {
+      const std::size_t number = NumberIn(cells, cell);
+      drawn += inside * drawn_.cells[number].voxels;
+      tetrahedra += inside * double(tetrahedra_[number]);
+    });
     if (drawn <= 0) return 0;
     namespace cost = calibration::slice;
     const double pixels = view.pixels_per_voxel * view.pixels_per_voxel;

@@ -15,22 +15,16 @@ class ZBufferCost : public AnalyticCost {
   explicit ZBufferCost(const OccupancyGrid& drawn) : drawn_(drawn) {}
 
   double Seconds(const Box& box, const CostView& view) const override {
-    const CellsAlong x(box, Axis::kX), y(box, Axis::kY), z(box, Axis::kZ);
     const Index3 cells = OccupancyCells(drawn_.size);
     double surface_cells = 0;
     Box hull;  // of the cells that hold anything
-    for (std::int32_t k = z.begin; k < z.end; ++k) {
-      for (std::int32_t j = y.begin; j < y.end; ++j) {
-        for (std::int32_t i = x.begin; i < x.end; ++i) {
-          const CellOccupancy& cell = drawn_.cells[NumberIn(cells, {i, j, k})];
-          if (cell.voxels == 0) continue;
-          const Box whole = OccupancyCellBox({i, j, k}, drawn_.size);
-          hull = Hull(hull, Intersection(whole, box));
-          if (cell.voxels == whole.voxel_count()) continue;  // no surface inside
-          surface_cells += x.ShareInside(i) * y.ShareInside(j) * z.ShareInside(k);
-        }
-      }
-    }
+    VisitCells(box, [&](const Index3& cell, double inside) {
+      const std::uint32_t voxels = drawn_.cells[NumberIn(cells, cell)].voxels;
+      if (voxels == 0) return;
+      const Box whole = OccupancyCellBox(cell, drawn_.size);
+      hull = Hull(hull, Intersection(whole, box));
+      if (voxels != whole.voxel_count()) surface_cells += inside;  // else no surface is inside
+    });
     if (hull.empty()) return 0;
     // The area of the hull's projection at a small elevation, on average over all azimuths: the mean of |cos| and |sin| is 2 / pi, and a
     // third of what lies flat is seen.

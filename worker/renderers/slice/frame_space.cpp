@@ -10,11 +10,10 @@ namespace slabstream::slice {
 namespace {
 
 Vec3 ToVec3(const Float3& v) { return {double(v[0]), double(v[1]), double(v[2])}; }
-Float3 ToFloat3(const Vec3& v) { return {float(v.x), float(v.y), float(v.z)}; }
 Vec3 Linear(const std::array<double, 4>& row) { return {row[0], row[1], row[2]}; }
 
-// Parts of the distance by which samples are moved along x, y and depth. Neither they nor their sums and differences are nearly 0, so
-// samples also leave the planes of a grid that is seen along a diagonal.
+// By which part of the distance samples are moved along x, y and depth. No sum or difference of them is near 0, so samples leave the
+// planes of a grid also if it is seen along a diagonal.
 constexpr double kAlongX = 0.3517, kAlongY = 0.5561, kAlongDepth = 1.2943;
 
 constexpr double kSlack = 1e-6;  // covers the rounding of a face's place; without it a sample near a corner might get lost

@@ -3,8 +3,9 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <cmath>
 #include <numeric>
+
+#include "common/mesh/mesh_cell.h"
 
 namespace slabstream::slice {
 
@@ -21,18 +22,13 @@ std::span<const std::uint32_t> ShownCells::Of(const Mesh& mesh, const VisibleSam
   if (ranges_.size() != count) {
     ranges_.resize(count);
     for_each_block([&](std::size_t, std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        float values[4];
-        for (std::size_t p = 0; p < 4; ++p) values[p] = mesh.values[mesh.at == ValuesAt::kCells ? i : mesh.tetrahedra[i][p]];
-        const bool finite = std::ranges::all_of(values, [](float value) { return std::isfinite(value); });
-        ranges_[i] = finite ? Range{*std::ranges::min_element(values), *std::ranges::max_element(values)} : Range{1, 0};
-      }
+      for (std::size_t i = begin; i < end; ++i) ranges_[i] = ValuesIn(mesh, i);
     });
   }
 
   // Each block's cells are counted, then written behind those of the blocks before it.
   std::vector<std::size_t> first(blocks + 1, 0);
-  const auto shows = [&](std::size_t i) { return visible.AnyBetween(ranges_[i].least, ranges_[i].greatest); };
+  const auto shows = [&](std::size_t i) { return visible.AnyBetween(ranges_[i].min, ranges_[i].max); };
   for_each_block([&](std::size_t block, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) first[block + 1] += shows(i) ? 1 : 0;
   });

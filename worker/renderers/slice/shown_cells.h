@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/mesh/mesh.h"
+#include "common/volume/summary.h"
 #include "worker/rays/ray_look.h"
 #include "worker/renderers/slab_data.h"
 
@@ -21,10 +22,7 @@ class ShownCells : public SlabCache {
   std::size_t bytes() const override { return ranges_.capacity() * sizeof(ranges_[0]) + shown_.capacity() * sizeof(shown_[0]); }
 
  private:
-  struct Range {
-    float least, greatest;  // least > greatest: a value is not finite
-  };
-  std::vector<Range> ranges_;  // by tetrahedron
+  std::vector<ValueRange> ranges_;  // by tetrahedron: ValuesIn
   std::optional<VisibleSamples> visible_;
   std::vector<std::uint32_t> shown_;
 };
