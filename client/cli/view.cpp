@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "client/cli/commands.h"
+#include "client/cli/cores.h"
 #include "client/cli/input_volume.h"
 #include "client/cli/session.h"
 #include "client/service/process.h"
@@ -47,6 +48,11 @@ std::string CatalogueEntry(const std::string& source) {
   const std::filesystem::path path = std::filesystem::absolute(source.substr(0, options));
   return fmt::format("{}={}{}", DatasetName(path), path.string(), options == std::string::npos ? "" : source.substr(options));
 }
+
+// Threads of one worker draw into one image; what several workers draw has to be combined first. Splatting gives a thread 64 rows of the
+// image at a time, so this many threads are busy.
+constexpr int kThreadsOfAWorker = 8;
+int WorkersForView() { return (CoreCount() + kThreadsOfAWorker - 1) / kThreadsOfAWorker; }
 
 // A child that ends with this process or with this object.
 class Helper {
@@ -139,7 +145,8 @@ Status RunView(const ViewOptions& options) {
   ServiceChoice choice = *named;
   if (file && choice.text().empty()) {
     if (Status status = CheckInputVolume(options.source); !status.ok()) return status;
-    Result<Helper> up = Helper::Start({*self, "up", "--listen", "tcp://127.0.0.1:*", "--data", CatalogueEntry(options.source)});
+    Result<Helper> up = Helper::Start({*self, "up", "--listen", "tcp://127.0.0.1:*", "--workers", std::to_string(WorkersForView()),
+                                       "--data", CatalogueEntry(options.source)});
     if (!up.ok()) return up.status();
     service.emplace(*std::move(up));
     Result<std::string> endpoint = EndpointOfUp(*service);

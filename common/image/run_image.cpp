@@ -100,6 +100,24 @@ void ForEachSpan(const float* plane, float empty, std::size_t begin, std::size_t
   }
 }
 
+// Cuts the bounds to the runs.
+void CutBounds(RunImage& image) {
+  PixelBounds& bounds = image.header.bounds;
+  PixelBounds cut;
+  std::vector<Run> runs(image.header.run_count);
+  std::memcpy(runs.data(), image.payload.data(), sizeof(Run) * runs.size());
+  for (const Run& run : runs) {
+    const auto x = std::int32_t(run.column) + bounds.x_begin, y = std::int32_t(run.row) + bounds.y_begin;
+    cut = Union(cut, {x, y, x + std::int32_t(run.pixel_count), y + 1});
+  }
+  for (Run& run : runs) {
+    run.row -= std::uint32_t(cut.y_begin - bounds.y_begin);
+    run.column -= std::uint32_t(cut.x_begin - bounds.x_begin);
+  }
+  std::memcpy(image.payload.data(), runs.data(), sizeof(Run) * runs.size());
+  bounds = cut;
+}
+
 constexpr std::uint32_t kRunsPerTask = 16;  // mostly a row each: their pixels stay in a core's cache
 
 // For each task the number of pixels of all runs in front of its first one. One task at least.
@@ -170,7 +188,9 @@ RunImage EncodeRuns(const LocalImage& image, PixelRange range, std::int32_t fram
 RunImage EncodePicture(const LocalImage& image) {
   ImageView view = ViewOf(image);
   if (HasVoxel(view.format)) view.format = PixelFormat::kRgbaDepth;
-  return EncodeRuns(view);
+  RunImage runs = EncodeRuns(view);
+  CutBounds(runs);
+  return runs;
 }
 
 Status ValidateRunHeader(const RunImageHeader& header, const PixelBounds& frame) {

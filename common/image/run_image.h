@@ -29,7 +29,7 @@ struct RunImage {
 // are encoded in parallel, within the caller's task arena.
 RunImage EncodeRuns(const LocalImage& image, PixelRange range, std::int32_t frame_width);
 
-// All pixels of a finished picture, for a client: without the voxel plane.
+// All pixels of a finished picture, for a client: without the voxel plane, and with bounds no larger than they must be.
 RunImage EncodePicture(const LocalImage& image);
 
 // Checks an image from outside and makes its dense form, in one pass over the payload. InvalidArgument unless header and payload agree,

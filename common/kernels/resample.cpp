@@ -29,6 +29,8 @@ using PixelTag = hn::FixedTag<float, 4>;  // one pixel
 // Up to four neighbouring pixels of a row.
 using PixelsTag = hn::FixedTag<float, HWY_HAVE_SCALABLE ? 4 : HWY_MIN(std::size_t{16}, HWY_MAX_BYTES / sizeof(float))>;
 
+constexpr double kSplineReach = 1.5;  // half of a narrow spline's width
+
 // Some neighbouring pixels of a row of the picture: where they lie in the frame, and, if none of their splines is wider than 3 pixels, the
 // first pixel and the weights of each.
 constexpr std::int32_t kBatch = 16;
@@ -36,6 +38,7 @@ struct Places {
   HWY_ALIGN double x[kBatch], y[kBatch];
   bool narrow = false;  // no spline is wider than 3 pixels; needed by the members below
   bool inside = false;  // all pixels of the frame that they read lie on the image
+  bool empty = false;   // none of the splines reaches the image
   HWY_ALIGN std::int32_t first_x[kBatch], first_y[kBatch];
   HWY_ALIGN float weight_x[4 * kBatch + 16];  // of the three pixels and a 0, pixel after pixel; then room to read beyond
   HWY_ALIGN float weight_y[3][kBatch];
@@ -57,6 +60,15 @@ HWY_INLINE void NarrowSpline(const double* HWY_RESTRICT at, Store&& store) {
   }
 }
 
+template <class D>
+HWY_INLINE double Least(D d, hn::Vec<D> values) {
+  return hn::GetLane(hn::MinOfLanes(d, values));
+}
+template <class D>
+HWY_INLINE double Largest(D d, hn::Vec<D> values) {
+  return hn::GetLane(hn::MaxOfLanes(d, values));
+}
+
 // Whether all pixels that a narrow spline reads lie on the image: three, and a fourth with weight 0.
 HWY_INLINE bool IsInside(const PixelBounds& image, const Places& places, std::int32_t i) {
   constexpr double kReach = 3;
@@ -70,7 +82,8 @@ HWY_INLINE void FindPlaces(const ProjectiveMap& map, const PixelBounds& image, s
   const hn::Rebind<float, decltype(d)> df;
   const hn::Rebind<std::int32_t, decltype(d)> di;
   const auto one = hn::Set(d, 1.0), zero = hn::Zero(d);
-  auto widest = zero, least_w = one;  // widest: the square of the steepest gradient
+  auto widest = zero, least_w = one;                                                          // widest: the square of the steepest gradient
+  auto left = hn::Set(d, kFarthestPlace), right = hn::Neg(left), top = left, bottom = right;  // of the places
   for (std::int32_t i = 0; i < kBatch; i += std::int32_t(hn::Lanes(d))) {
     const auto x = hn::Add(hn::Iota(d, double(i)), hn::Set(d, x_begin + 0.5));
     const auto row = [&](std::size_t r) HWY_ATTR {
@@ -88,10 +101,16 @@ HWY_INLINE void FindPlaces(const ProjectiveMap& map, const PixelBounds& image, s
     hn::Store(at_y, d, places.y + i);
     widest = hn::Max(widest, hn::Max(square(0, at_x), square(1, at_y)));
     least_w = hn::Min(least_w, w);
+    left = hn::Min(left, at_x), right = hn::Max(right, at_x);
+    top = hn::Min(top, at_y), bottom = hn::Max(bottom, at_y);
   }
   constexpr double kSteepest = (1 + kSkewSlack) * (1 + kSkewSlack);
-  places.narrow = hn::AllTrue(d, hn::Le(widest, hn::Set(d, kSteepest))) && hn::AllTrue(d, hn::Gt(least_w, zero));
-  if (!places.narrow) return;
+  const bool seen = hn::AllTrue(d, hn::Gt(least_w, zero));
+  places.narrow = seen && hn::AllTrue(d, hn::Le(widest, hn::Set(d, kSteepest)));
+  const double reach = kSplineReach * (places.narrow ? 1 : std::sqrt(std::max(1.0, Largest(d, widest))));
+  places.empty = seen && (Largest(d, right) + reach < image.x_begin || Least(d, left) - reach > image.x_end ||
+                          Largest(d, bottom) + reach < image.y_begin || Least(d, top) - reach > image.y_end);
+  if (places.empty || !places.narrow) return;
   places.inside = IsInside(image, places, 0) && IsInside(image, places, kBatch - 1);  // a line stays a line, so its ends suffice
   NarrowSpline(places.x, [&](std::int32_t i, auto first, auto left, auto middle, auto right) HWY_ATTR {
     hn::Store(first, di, places.first_x + i);
@@ -190,18 +209,17 @@ HWY_INLINE void ResampleNarrow(const LocalImage& frame, const Places& places, st
   }
 }
 
-// Prefetches about what the next batch of the row will read.
+// Prefetches about what the next batch of the row will read. The rows above and below fetch their own middle rows, and a line of the cache
+// holds four pixels.
 HWY_INLINE void FetchNext(const LocalImage& frame, const Places& places) {
   const PixelBounds& b = frame.bounds;
   constexpr double kBatchesPerSpan = double(kBatch) / (kBatch - 1);
   const auto step_x = std::int32_t((places.x[kBatch - 1] - places.x[0]) * kBatchesPerSpan),
              step_y = std::int32_t((places.y[kBatch - 1] - places.y[0]) * kBatchesPerSpan);
-  for (std::int32_t n = 0; n < kBatch; n += 2) {
-    const std::int32_t column = std::clamp(places.first_x[n] + 2 + step_x, b.x_begin, b.x_end - 1) - b.x_begin;
-    for (std::int32_t row = 0; row < 3; ++row) {
-      const std::int32_t y = std::clamp(places.first_y[n] + row + step_y, b.y_begin, b.y_end - 1) - b.y_begin;
-      hwy::Prefetch(&frame.rgba[4 * (std::size_t(y) * std::size_t(b.width()) + std::size_t(column))]);
-    }
+  for (std::int32_t n = 0; n < kBatch; n += 3) {
+    const std::int32_t column = std::clamp(places.first_x[n] + 1 + step_x, b.x_begin, b.x_end - 1) - b.x_begin;
+    const std::int32_t row = std::clamp(places.first_y[n] + 1 + step_y, b.y_begin, b.y_end - 1) - b.y_begin;
+    hwy::Prefetch(&frame.rgba[4 * (std::size_t(row) * std::size_t(b.width()) + std::size_t(column))]);
   }
 }
 
@@ -215,6 +233,7 @@ void ResampleRows(const LocalImage& frame, const ProjectiveMap& frame_from_pictu
     const std::int32_t count = std::min(kBatch, width - x);
     for (std::int32_t y = y_begin; y < y_end; ++y) {
       FindPlaces(frame_from_picture, frame.bounds, x, y, places);
+      if (places.empty) continue;
       float* out = &picture.rgba[4 * (std::size_t(y) * std::size_t(width) + std::size_t(x))];
       if (places.narrow && places.inside) {
         FetchNext(frame, places);

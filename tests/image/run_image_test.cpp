@@ -137,6 +137,22 @@ TEST(RunImage, PicturesLeaveTheVoxelsOut) {
   EXPECT_EQ(EncodePicture(MakeLocalImage(PixelFormat::kDepth, {})).header.format, PixelFormat::kRgbaDepth);
 }
 
+TEST(RunImage, BoundsOfPicturesEndWhereTheyShowNothing) {
+  Random random(36);
+  SCOPED_TRACE(random.trace());
+  const LocalImage content = RandomImage(random, PixelFormat::kRgba, {7, 4, 18, 13});
+  LocalImage image = MakeLocalImage(PixelFormat::kRgba, kFrame);
+  const PixelBounds& b = content.bounds;
+  for (std::int32_t y = b.y_begin; y < b.y_end; ++y) {
+    const std::int64_t from = 4 * std::int64_t{y - b.y_begin} * b.width();
+    std::copy_n(content.rgba.begin() + from, 4 * b.width(), image.rgba.begin() + 4 * std::int64_t(LinearIndex(b.x_begin, y)));
+  }
+  const RunImage whole = EncodePicture(image), alone = EncodePicture(content);
+  EXPECT_EQ(whole.header, alone.header);
+  EXPECT_EQ(whole.payload, alone.payload);
+  EXPECT_EQ(EncodePicture(MakeLocalImage(PixelFormat::kRgba, kFrame)).header.bounds, PixelBounds());
+}
+
 // ---- hostile input
 
 struct Corruption {

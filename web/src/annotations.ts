@@ -1,7 +1,7 @@
 // What the page draws over a picture, from the picture's geometry: scale bar, axes, a patient's sides, the cross-hair.
 // It lies over the picture, so the pixels below stay those of the service.
 import { project } from "./camera";
-import { shown as text, svg } from "./dom";
+import { put, shown as text, svg } from "./dom";
 import type { Shown } from "./pane";
 import type { Geometry } from "./session";
 import { AXES, AXIS_NAMES, dot, type Vec3 } from "./vec";
@@ -56,26 +56,53 @@ function sideName(direction: Vec3): string {
   return sides.filter(side => side.share > Math.sin(Math.PI / 18)).sort((a, b) => b.share - a.share).slice(0, 2).map(side => side.name).join("");
 }
 
-function patientSides(geometry: Geometry, width: number, height: number): SVGElement {
-  const { right, up } = geometry, opposite = (v: Vec3): Vec3 => [-v[0], -v[1], -v[2]];
-  const label = (x: number, y: number, anchor: string, direction: Vec3): SVGElement =>
-    svg("text", { x, y, "text-anchor": anchor, "dominant-baseline": "central" }, sideName(direction));
-  return svg("g", { class: "sides" }, label(14, height / 2, "start", opposite(right)), label(width - 14, height / 2, "end", right),
-    label(width / 2, 18, "middle", up), label(width / 2, height - 18, "middle", opposite(up)));
+// Of the left, right, upper and lower edge.
+function sideNames({ right, up }: Geometry): readonly string[] {
+  const opposite = (v: Vec3): Vec3 => [-v[0], -v[1], -v[2]];
+  return [opposite(right), right, up, opposite(up)].map(sideName);
 }
 
-export interface Annotations { marker: boolean; scaleBar: boolean; sides: boolean; crosshair: { at: Vec3; lines: boolean } | null }
+function patientSides(geometry: Geometry, width: number, height: number): SVGElement {
+  const places = [[14, height / 2, "start"], [width - 14, height / 2, "end"], [width / 2, 18, "middle"], [width / 2, height - 18, "middle"]] as const;
+  return svg("g", { class: "sides" }, ...sideNames(geometry).map((name, i) => {
+    const [x, y, anchor] = places[i] as (typeof places)[number];
+    return svg("text", { x, y, "text-anchor": anchor, "dominant-baseline": "central" }, name);
+  }));
+}
 
-export function drawAnnotations(drawing: SVGElement, shown: Shown, which: Annotations): void {
-  const { cssWidth: width, cssHeight: height } = shown, geometry = pageGeometry(shown);
-  const parts: SVGElement[] = [];
-  if (which.crosshair) {
-    const [x, y] = project(geometry, width, height, which.crosshair.at);
-    const gap = 8, reach = which.crosshair.lines ? Math.max(width, height) : 18;
-    parts.push(svg("path", { class: "crosshair", d: `M${x - reach} ${y}H${x - gap}M${x + gap} ${y}H${x + reach}M${x} ${y - reach}V${y - gap}M${x} ${y + gap}V${y + reach}` }));
+function crosshair(geometry: Geometry, width: number, height: number, { at, lines }: Crosshair): SVGElement {
+  const [x, y] = project(geometry, width, height, at), gap = 8, reach = lines ? Math.max(width, height) : 18;
+  return svg("path", { class: "crosshair", d: `M${x - reach} ${y}H${x - gap}M${x + gap} ${y}H${x + reach}M${x} ${y - reach}V${y - gap}M${x} ${y + gap}V${y + reach}` });
+}
+
+interface Crosshair { at: Vec3; lines: boolean }
+export interface Annotations { marker: boolean; scaleBar: boolean; sides: boolean; crosshair: Crosshair | null }
+
+// Lies over a pane. While a view turns, most of it stays; only the parts that change are made anew.
+export class Drawing {
+  readonly element = svg("svg", { class: "drawing", "aria-hidden": "true" });
+  private readonly parts = new Map<string, { of: string; place: SVGElement }>();
+
+  draw(shown: Shown, which: Annotations): void {
+    const { cssWidth: width, cssHeight: height } = shown, geometry = pageGeometry(shown), { right, up, forward, world, pixel_size, projection, unit } = geometry;
+    put(this.element, "viewBox", `0 0 ${width} ${height}`);
+    this.part("crosshair", which.crosshair && [project(geometry, width, height, which.crosshair.at), which.crosshair.lines, width, height], () => crosshair(geometry, width, height, which.crosshair as Crosshair));
+    this.part("sides", which.sides && world === "patient" && [sideNames(geometry), width, height], () => patientSides(geometry, width, height));
+    this.part("axes", which.marker && height > 160 && [right, up, forward, world, height], () => axesMarker(geometry, height));
+    this.part("scale", which.scaleBar && width > 160 && [pixel_size, projection, unit, width, height], () => scaleBar(geometry, width, height));
   }
-  if (which.sides && geometry.world === "patient") parts.push(patientSides(geometry, width, height));
-  if (which.marker && height > 160) parts.push(axesMarker(geometry, height));
-  if (which.scaleBar && width > 160) parts.push(scaleBar(geometry, width, height));
-  drawing.replaceChildren(...parts);
+
+  // `of`: what the part is made from; false or null: there is none.
+  private part(name: string, of: readonly unknown[] | false | null, make: () => SVGElement): void {
+    let part = this.parts.get(name);
+    if (!part) {
+      part = { of: "", place: svg("g") };
+      this.parts.set(name, part);
+      this.element.append(part.place);
+    }
+    const text = of ? JSON.stringify(of) : "";
+    if (part.of === text) return;
+    part.of = text;
+    part.place.replaceChildren(...(of ? [make()] : []));
+  }
 }

@@ -1,7 +1,7 @@
 // The clip box in the picture: its edges, and a handle on each face that moves it.
 import { pageGeometry } from "./annotations";
 import { project } from "./camera";
-import { svg } from "./dom";
+import { put, svg } from "./dom";
 import type { Shown } from "./pane";
 import type { Bounds, ClipBox } from "./state";
 import { AXES, type Axis, AXIS_NAMES, clamp, rounded, scale, add, type Vec3, withAxis } from "./vec";
@@ -56,7 +56,7 @@ export class ClipHandles {
     this.shown = shown;
     this.box = box;
     this.volume = volume;
-    this.element.toggleAttribute("hidden", !shown || !box || !volume);
+    put(this.element, "hidden", !shown || !box || !volume);
     if (!shown || !box || !volume) return;
     const { cssWidth: width, cssHeight: height } = shown, geometry = pageGeometry(shown);
     this.element.setAttribute("viewBox", `0 0 ${width} ${height}`);

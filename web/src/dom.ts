@@ -23,6 +23,15 @@ export function svg<K extends keyof SVGElementTagNameMap>(tag: K, attributes: At
   return element;
 }
 
+// Writes only what differs: the browser styles and lays out again after any write.
+export function put(element: Element, name: string, value: string | boolean): void {
+  if (typeof value === "boolean") { if (element.hasAttribute(name) !== value) element.toggleAttribute(name, value); }
+  else if (element.getAttribute(name) !== value) element.setAttribute(name, value);
+}
+export function putText(element: Element, text: string): void {
+  if (element.textContent !== text) element.textContent = text;
+}
+
 const ICONS = {
   help: "M8 11.8v.01M6.2 6.2a1.8 1.8 0 1 1 2.6 1.6c-.6.3-.8.7-.8 1.4M14 8A6 6 0 1 1 2 8a6 6 0 0 1 12 0z",
   link: "M6.7 9.3a2.6 2.6 0 0 0 3.7 0l2.3-2.3a2.6 2.6 0 0 0-3.7-3.7l-.8.8M9.3 6.7a2.6 2.6 0 0 0-3.7 0L3.3 9A2.6 2.6 0 0 0 7 12.7l.8-.8",

@@ -1,4 +1,6 @@
 // What keys do: one table, for the keyboard and for the help.
+import { put } from "./dom";
+
 export interface Key { keys: readonly string[]; label: string; does: string; run: (far: boolean, at: number) => void }
 export interface KeyGroup { title: string; keys: readonly Key[] }
 
@@ -9,7 +11,7 @@ function isForPictures(target: EventTarget | null): boolean {
 
 export function listenToKeys(groups: readonly KeyGroup[], undo: () => void, redo: () => void): void {
   // The picture has the focus from the start; its ring shows once keys are used.
-  document.addEventListener("keydown", () => { document.body.dataset["keys"] = "used"; }, true);
+  document.addEventListener("keydown", () => put(document.body, "data-keys", "used"), true);
   document.addEventListener("pointerdown", () => { delete document.body.dataset["keys"]; }, true);
   document.addEventListener("keydown", event => {
     const field = event.target instanceof HTMLElement && event.target.matches("input[type=text], input[type=number], textarea");

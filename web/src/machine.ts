@@ -30,6 +30,7 @@ export class Machine {
   }
 
   setOpen(open: boolean): void {
+    if (this.element.hidden === !open) return;
     this.element.hidden = !open;
     if (open) this.redraw();
   }

@@ -5,7 +5,7 @@ import { clipSection } from "./clip_section";
 import type { Context } from "./context";
 import { section } from "./controls";
 import { commandDialog, helpDialog, screenshotDialog, tokenDialog } from "./dialogs";
-import { copyText, h } from "./dom";
+import { copyText, h, putText } from "./dom";
 import { FunctionSource } from "./function_source";
 import { GradientEditor } from "./gradient_editor";
 import { type KeyGroup, listenToKeys } from "./keys";
@@ -81,7 +81,7 @@ class Page {
 
   private show(): void {
     const { state } = this.store;
-    document.title = state.dataset ? `${state.dataset} – Slabstream` : "Slabstream";
+    putText(document.querySelector("title") as Element, state.dataset ? `${state.dataset} – Slabstream` : "Slabstream");
     this.shell.showLayout(state.layout === "quad", state.machine);
     this.machine.setOpen(state.machine);
     this.slices.update();

@@ -1,8 +1,9 @@
 // What the page says over the picture: what is wrong, what is loading, and short messages.
-import { h } from "./dom";
+import { h, put, putText } from "./dom";
 import type { Connection, Progress, ServiceStatus } from "./session";
 
 const MESSAGE_MS = 5000;
+const SLOW_MS = 400;
 
 export class Notices {
   readonly banner = h("div", { class: "banner", role: "alert", hidden: true });
@@ -15,6 +16,9 @@ export class Notices {
   private service: ServiceStatus | null = null;
   private error = "";
   private phase = "";
+  private done = 0; // of the phase, as a share
+  private slow = 0; // the timer of a phase; it shows once it has lasted
+  private lasts = false;
 
   say(message: string, kind: "note" | "error" = "note"): void {
     const element = h("p", { class: `message ${kind}` }, message);
@@ -26,37 +30,48 @@ export class Notices {
     if (connection === "open") { this.everOpen = true; this.reason = ""; }
     else if (reason) this.reason = reason;
     if (connection !== "connecting" || this.connection === "open") this.connection = connection; // while it tries again it stays lost
-    if (connection === "lost") this.phase = "";
+    if (connection === "lost") this.setPhase("");
     this.draw();
   }
 
-  onStatus(status: ServiceStatus): void { this.service = status; if (status.service !== "ready") this.phase = ""; this.draw(); }
-  onError(message: string): void { this.error = message; this.phase = ""; this.draw(); }
+  onStatus(status: ServiceStatus): void { this.service = status; if (status.service !== "ready") this.setPhase(""); this.draw(); }
+  onError(message: string): void { this.error = message; this.setPhase(""); this.draw(); }
 
   onProgress(progress: Progress): void {
-    const done = progress.group_count > 0 ? progress.groups_done / progress.group_count : 0;
-    this.phase = progress.phase === "loading" ? "Loading" : progress.phase === "queued" && progress.queue_position > 0 ? `Waiting, place ${progress.queue_position}` : progress.phase === "running" ? "Rendering" : "";
-    this.progress.toggleAttribute("data-measured", done > 0);
-    (this.progress.firstElementChild as HTMLElement).style.width = done > 0 ? `${100 * done}%` : "";
+    this.done = progress.group_count > 0 ? progress.groups_done / progress.group_count : 0;
+    this.setPhase(progress.phase === "loading" ? "Loading" : progress.phase === "queued" && progress.queue_position > 0 ? `Waiting, place ${progress.queue_position}` : progress.phase === "running" ? "Rendering" : "");
     this.draw();
   }
 
   // A picture came: nothing is wrong with the view, and nothing is being waited for.
   onFrame(): void {
     if (this.error === "" && this.phase === "") return;
-    this.error = this.phase = "";
+    this.error = "";
+    this.setPhase("");
     this.draw();
+  }
+
+  private setPhase(phase: string): void {
+    this.phase = phase;
+    if (phase !== "") { this.slow ||= setTimeout(() => { this.lasts = true; this.draw(); }, SLOW_MS); return; }
+    clearTimeout(this.slow);
+    this.slow = 0;
+    this.lasts = false;
   }
 
   private draw(): void {
     const said = this.problem();
-    if (this.banner.textContent !== said) this.banner.textContent = said;
-    this.banner.hidden = said === "";
-    this.progress.hidden = this.phase === "" || said !== "";
+    putText(this.banner, said);
+    put(this.banner, "hidden", said === "");
+    put(this.progress, "hidden", !this.lasts || said !== "");
+    if (this.lasts) {
+      put(this.progress, "data-measured", this.done > 0);
+      (this.progress.firstElementChild as HTMLElement).style.width = this.done > 0 ? `${100 * this.done}%` : "";
+    }
     const workers = this.service?.workers.length ?? 0;
-    this.status.dataset["state"] = said ? "bad" : this.connection === "open" && this.service ? "good" : "wait";
-    this.status.value = this.connection === "lost" ? "Not connected" : this.connection === "connecting" ? "Connecting" : this.service?.service === "gone" ? "Service gone" : this.service?.service === "no-workers" ? "No workers"
-      : (this.phase !== "Rendering" && this.phase) || (this.service ? `${workers} worker${workers === 1 ? "" : "s"}` : "Connecting");
+    put(this.status, "data-state", said ? "bad" : this.connection === "open" && this.service ? "good" : "wait");
+    putText(this.status, this.connection === "lost" ? "Not connected" : this.connection === "connecting" ? "Connecting" : this.service?.service === "gone" ? "Service gone" : this.service?.service === "no-workers" ? "No workers"
+      : (this.phase !== "Rendering" && this.phase) || (this.service ? `${workers} worker${workers === 1 ? "" : "s"}` : "Connecting"));
   }
 
   private problem(): string {

@@ -1,5 +1,6 @@
 // A pane: a canvas with the pictures of one session, at the screen's own pixels, and a drawing over it.
-import { h, svg } from "./dom";
+import { Drawing } from "./annotations";
+import { h } from "./dom";
 import { type Connection, type Frame, type Progress, type ServiceStatus, Session, type View } from "./session";
 
 export interface Shown { frame: Frame; cssWidth: number; cssHeight: number } // cssWidth: what the picture's width is on the page
@@ -17,7 +18,7 @@ const LEAST_SIDE = 16, MOST_SIDE = 8192;
 
 export class Pane {
   readonly canvas = h("canvas", { width: LEAST_SIDE, height: LEAST_SIDE });
-  readonly drawing = svg("svg", { class: "drawing", "aria-hidden": "true" });
+  readonly drawing = new Drawing();
   readonly element: HTMLElement;
   shown: Shown | null = null;
   private readonly context = this.canvas.getContext("2d", { alpha: false }) as CanvasRenderingContext2D;
@@ -30,7 +31,7 @@ export class Pane {
     this.canvas.setAttribute("tabindex", "0");
     this.canvas.setAttribute("role", "application");
     this.canvas.setAttribute("aria-label", label);
-    this.element = h("section", { class: `pane pane-${name}`, "data-pane": name, "aria-label": name }, this.canvas, this.drawing);
+    this.element = h("section", { class: `pane pane-${name}`, "data-pane": name, "aria-label": name }, this.canvas, this.drawing.element);
     this.session = new Session(token, { ...events, frame: frame => this.draw(frame) });
     this.watcher = new ResizeObserver(entries => {
       const exact = entries[entries.length - 1]?.devicePixelContentBoxSize?.[0];
@@ -77,7 +78,6 @@ export class Pane {
     const up = 1 / header.scale, [x, y, w, h] = header.bounds;
     if (picture) this.context.drawImage(picture, x * up, y * up, w * up, h * up);
     this.shown = { frame, cssWidth: width / this.pixelRatio, cssHeight: height / this.pixelRatio };
-    this.drawing.setAttribute("viewBox", `0 0 ${this.shown.cssWidth} ${this.shown.cssHeight}`);
     this.events.drawn?.(this.shown);
     // For whoever embeds or measures the page.
     this.canvas.dispatchEvent(new CustomEvent("slabstream:drawn", {

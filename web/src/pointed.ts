@@ -67,6 +67,7 @@ export class Pointed {
   }
 
   private say(...parts: string[]): void {
+    if (parts.join("") === "" && !this.element.hasChildNodes()) return;
     this.element.replaceChildren(...parts.filter(part => part !== "").map(part => h("span", {}, part)));
   }
 }

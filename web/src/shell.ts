@@ -1,6 +1,6 @@
 // The frame of the page: the bar above, the stage with the pictures, the panel beside it.
 import { button, choice, iconButton, menu, menuItem } from "./controls";
-import { h } from "./dom";
+import { h, put } from "./dom";
 
 export interface Actions {
   dataset(name: string): void; view(index: number): void; sides(): readonly string[]; reset(): void; layout(quad: boolean): void; machine(): void; panel(): void; theme(): void; help(): void;
@@ -48,9 +48,9 @@ export class Shell {
   }
 
   showLayout(quad: boolean, machine: boolean): void {
-    this.panes.dataset["layout"] = quad ? "quad" : "single";
-    this.layoutButtons.forEach((each, i) => each.setAttribute("aria-pressed", String(quad === (i === 1))));
-    this.machineButton.setAttribute("aria-pressed", String(machine));
+    put(this.panes, "data-layout", quad ? "quad" : "single");
+    this.layoutButtons.forEach((each, i) => put(each, "aria-pressed", String(quad === (i === 1))));
+    put(this.machineButton, "aria-pressed", String(machine));
   }
 
   get panelOpen(): boolean { return !this.panel.hidden; }

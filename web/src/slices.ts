@@ -1,5 +1,5 @@
 // Three slices beside the 3-D picture. Their cross-hair is one point of the world.
-import { drawAnnotations, pageGeometry } from "./annotations";
+import { pageGeometry } from "./annotations";
 import { unproject } from "./camera";
 import type { Context } from "./context";
 import { h } from "./dom";
@@ -54,7 +54,7 @@ export class Slices {
   }
 
   private annotate({ pane }: Slice): void {
-    if (pane.shown) drawAnnotations(pane.drawing, pane.shown, { marker: false, scaleBar: this.context.store.state.scaleBar, sides: true, crosshair: { at: this.at(), lines: true } });
+    if (pane.shown) pane.drawing.draw(pane.shown, { marker: false, scaleBar: this.context.store.state.scaleBar, sides: true, crosshair: { at: this.at(), lines: true } });
   }
 
   // The point below the pointer, in the plane that is shown.

@@ -1,5 +1,5 @@
 // The 3-D picture: its view follows the state, gestures move it, the page's drawing lies over it.
-import { drawAnnotations, pageGeometry } from "./annotations";
+import { pageGeometry } from "./annotations";
 import { zoomOf } from "./camera";
 import { ClipHandles } from "./clip_handles";
 import type { Context } from "./context";
@@ -102,7 +102,7 @@ export class Viewer {
     const { shown } = this.pane, { state } = this.context.store;
     if (!shown) return;
     const crosshair = state.layout === "quad" && state.crosshair ? { at: state.crosshair, lines: false } : null;
-    drawAnnotations(this.pane.drawing, shown, { marker: state.marker, scaleBar: state.scaleBar, sides: state.marker, crosshair });
+    this.pane.drawing.draw(shown, { marker: state.marker, scaleBar: state.scaleBar, sides: state.marker, crosshair });
     this.handles.update(shown, state.clipBox, this.context.volume());
   }
 
