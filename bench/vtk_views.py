@@ -51,13 +51,21 @@ def read_volume(vtk, path):
     return image
 
 
-def attenuations(points, pieces=8):
-    """What VTK's integrators of unstructured grids take for opacities: alpha of a unit distance is 1 - exp(-attenuation) there. The logarithm
-    of a linear piece is curved, hence as many pieces of it."""
+def attenuation(alpha):
+    """What VTK's integrators of unstructured grids take for an opacity: alpha of a unit distance is 1 - exp(-attenuation) there. Between the
+    points of a function the attenuation is linear, so ours gets its curve (linear_attenuation)."""
+    return -math.log1p(-min(alpha, 0.9999))
+
+
+def linear_attenuation(preset, pieces=16):
+    """The preset with opacities between whose points the attenuation is linear, in as many linear pieces. VTK itself does worse with pieces:
+    its integrators, which cut rays at the points of a function, become brighter with each."""
+    points = [preset["Points"][i:i + 2] for i in range(0, len(preset["Points"]), 4)]
     curve = [points[0]]
     for (v0, a0), (v1, a1) in zip(points, points[1:]):
-        curve += [(v0 + (v1 - v0) * i / pieces, a0 + (a1 - a0) * i / pieces) for i in range(1, pieces + 1)]
-    return [(value, -math.log1p(-min(alpha, 0.9999))) for value, alpha in curve]
+        t0, t1 = attenuation(a0), attenuation(a1)
+        curve += [(v0 + (v1 - v0) * i / pieces, -math.expm1(-(t0 + (t1 - t0) * i / pieces))) for i in range(1, pieces + 1)]
+    return {**preset, "Points": [number for value, alpha in curve for number in (value, alpha, 0.5, 0)]}
 
 
 def make_property(vtk, scene, directory, smallest_spacing):
@@ -71,8 +79,8 @@ def make_property(vtk, scene, directory, smallest_spacing):
     for i in range(0, len(preset["RGBPoints"]), 4):
         color.AddRGBPoint(*preset["RGBPoints"][i:i + 4])
     points = [preset["Points"][i:i + 2] for i in range(0, len(preset["Points"]), 4)]
-    for value, alpha in attenuations(points) if "grid" in scene else points:
-        opacity.AddPoint(value, alpha)
+    for value, alpha in points:
+        opacity.AddPoint(value, attenuation(alpha) if "grid" in scene else alpha)
     prop = vtk.vtkVolumeProperty()
     prop.SetColor(color)
     prop.SetScalarOpacity(opacity)
@@ -126,6 +134,7 @@ class Stage:
         image = read_volume(vtk, os.path.join(directory, scene["volume"]))
         dims, spacing = image.GetDimensions(), image.GetSpacing()
         self.views, self.size = scene["views"], scene["size"]
+        self.rays_at_corners = "grid" in scene  # of pixels: where VTK's mappers of grids have them; ours, and its others, at their centres
         self.radius = 0.5 * math.sqrt(sum((n * s) ** 2 for n, s in zip(dims, spacing)))
         if "grid" in scene:  # the volume is the lattice that fills its bounding box
             grid = read_grid(vtk, scene["grid"])
@@ -180,6 +189,8 @@ class Stage:
                            self.centre[1] - distance * math.cos(azimuth) * math.cos(elevation),
                            self.centre[2] + distance * math.sin(elevation))
         camera.SetViewUp(0, 0, 1)
+        if self.rays_at_corners:
+            camera.SetWindowCenter(1 / self.size, 1 / self.size)  # half a pixel
         self.renderer.ResetCameraClippingRange()
         self.window.Render()
         if self.encoder:
