@@ -39,7 +39,7 @@ void PictureRequests::MakePng(std::vector<FrameRequest> frames, EncodeFunction e
   });
 }
 
-void PictureRequests::Render(PictureFields fields, ReplyFunction reply, const Gone& gone) {
+void PictureRequests::Render(const PictureFields& fields, ReplyFunction reply, const Gone& gone) {
   Result<RenderRequest> render = ParseRenderFields(fields);
   if (!render.ok()) return reply(Failure(render.status()));
   const auto encode = [request = *render](std::vector<Picture> pictures) {
@@ -51,20 +51,21 @@ void PictureRequests::Render(PictureFields fields, ReplyFunction reply, const Go
   MakePng({render->frame}, encode, std::move(reply), gone);
 }
 
-void PictureRequests::Slice(PictureFields fields, ReplyFunction reply, const Gone& gone) {
+void PictureRequests::Slice(const PictureFields& fields, ReplyFunction reply, const Gone& gone) {
   Result<SliceRequest> slice = ParseSliceFields(fields);
   if (!slice.ok()) return reply(Failure(slice.status()));
   Result<std::vector<FrameRequest>> frames = FramesOf(*slice);
   if (!frames.ok()) return reply(Failure(frames.status()));
   const auto encode = [request = *slice](std::vector<Picture> pictures) {
     std::vector<LocalImage> images;
+    images.reserve(pictures.size());
     for (Picture& picture : pictures) images.push_back(std::move(picture.image));
     return PngFile(SideBySide(images, request.frame.size), request.size(), request.format);
   };
   MakePng(*std::move(frames), encode, std::move(reply), gone);
 }
 
-void PictureRequests::Command(PictureFields fields, ReplyFunction reply, const Gone&) {
+void PictureRequests::Command(const PictureFields& fields, const ReplyFunction& reply, const Gone&) {
   const Result<RenderRequest> render = ParseRenderFields(fields);
   if (!render.ok()) return reply(Failure(render.status()));
   PictureRecord record;

@@ -16,9 +16,9 @@ class PictureRequests {
   PictureRequests(boost::asio::io_context& io, boost::asio::thread_pool& encoders, Metrics& metrics, ServiceLink& link, int most)
       : encoders_(encoders), metrics_(metrics), link_(link), errands_(io, metrics, link, "pictures", most) {}
 
-  void Render(PictureFields fields, ReplyFunction reply, const Gone& gone);
-  void Slice(PictureFields fields, ReplyFunction reply, const Gone& gone);
-  void Command(PictureFields fields, ReplyFunction reply, const Gone& gone);
+  void Render(const PictureFields& fields, ReplyFunction reply, const Gone& gone);
+  void Slice(const PictureFields& fields, ReplyFunction reply, const Gone& gone);
+  void Command(const PictureFields& fields, const ReplyFunction& reply, const Gone& gone);
 
  private:
   // Renders the frames, has `encode` make a PNG of the pictures on an encoder's thread, and replies with it.

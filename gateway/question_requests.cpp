@@ -83,7 +83,7 @@ void QuestionRequests::Pick(PictureFields fields, ReplyFunction reply, const Gon
   Ask("pick", PickQuery{.frame = render->frame, .x = *x, .y = *y}, make, std::move(reply), gone);
 }
 
-void QuestionRequests::Transfer(PictureFields fields, ReplyFunction reply, const Gone& gone) {
+void QuestionRequests::Transfer(const PictureFields& fields, ReplyFunction reply, const Gone& gone) {
   for (const PictureField& field : fields) {
     if (field.name != "dataset" && field.name != "transfer" && field.name != "scalar-range") {
       return reply(Failure(

@@ -17,7 +17,7 @@ class QuestionRequests {
   void Labels(PictureFields fields, ReplyFunction reply, const Gone& gone);
   void Value(PictureFields fields, ReplyFunction reply, const Gone& gone);
   void Pick(PictureFields fields, ReplyFunction reply, const Gone& gone);
-  void Transfer(PictureFields fields, ReplyFunction reply, const Gone& gone);
+  void Transfer(const PictureFields& fields, ReplyFunction reply, const Gone& gone);
 
  private:
   using MakeFunction = std::function<HttpReply(const QuestionReply&)>;
