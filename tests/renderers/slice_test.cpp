@@ -13,6 +13,7 @@
 #include "tests/support/renderers.h"
 #include "tests/support/simd_targets.h"
 #include "worker/rays/ray_look.h"
+#include "worker/renderers/slice/cell_bins.h"
 #include "worker/renderers/slice/frame_space.h"
 
 namespace slabstream {
@@ -499,6 +500,35 @@ TEST(Slice, TerminationChangesChannelsByNoMoreThanItself) {
 }
 
 // Whatever cells a peer sends, the picture is finite and opacities lie in [0, 1].
+// What a file of cells that lie over each other may take is bounded before it is taken.
+TEST(Slice, TilesOfCellsAreLimited) {
+  std::mt19937 random(kSeed);
+  const Index3 size = {20, 20, 20};
+  const auto cube = MakeCube(
+      size, 6, 0.2, [](const Vec3& p) { return 100 + 5 * p.x; }, random);
+  const Volume grid = GridVolume(size, cube, 200);
+  const FrameSetup setup = SliceSetup(grid, {});
+  const slice::FrameSpace space(setup.camera, setup.description.geometry, 1, {});
+  slice::FramePoints points;
+  space.Place(cube->points, points);
+  std::vector<std::uint32_t> cells;
+  const auto make = [&](std::size_t most) {
+    const RayReach reach = space.ReachOf({-0.5, -0.5, -0.5}, {19.5, 19.5, 19.5});
+    return slice::CellBins::Make(
+        points.bounds, cube->tetrahedra, cells, reach.pixels, reach.begin, reach.end, [](const PixelBounds&) { return false; }, most);
+  };
+  for (std::uint32_t cell = 0; cell < cube->tetrahedra.size(); ++cell) cells.push_back(cell);
+  const Result<slice::CellBins> bins = make(slice::CellBins::kMostEntries);
+  ASSERT_EQ(bins.status(), Status::Ok());
+  std::size_t entries = 0;
+  for (std::int32_t tile = 0; tile < bins->tiles(); ++tile) entries += bins->CellsOf(tile).size();
+  EXPECT_GE(entries, cells.size());
+  EXPECT_EQ(make(entries).status(), Status::Ok());
+  EXPECT_EQ(make(entries - 1).status().code(), StatusCode::kInvalidArgument);
+  for (int copy = 0; copy < 100; ++copy) cells.insert(cells.end(), cells.begin(), cells.begin() + std::ptrdiff_t(cube->tetrahedra.size()));
+  EXPECT_EQ(make(100 * entries).status().code(), StatusCode::kInvalidArgument);
+}
+
 TEST(Slice, DrawsBadCellsWithoutHarm) {
   std::mt19937 random(kSeed);
   const Index3 size = {20, 20, 20};

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "common/base/status.h"
 #include "common/image/pixel_bounds.h"
 #include "common/mesh/mesh.h"
 #include "worker/renderers/slice/frame_space.h"
@@ -41,11 +42,14 @@ class CellBins {
     std::uint32_t cell;
     std::int32_t chunk;  // where the cell begins
   };
+  static constexpr std::size_t kMostEntries = std::size_t{1} << 28;
 
   // `shown`: numbers of tetrahedra. Only cells with samples in `pixels` and [k_begin, k_end) count; `skips(tile)` leaves out a tile.
-  // Parallel.
-  CellBins(std::span<const PointBounds> points, std::span<const Tetrahedron> tetrahedra, std::span<const std::uint32_t> shown,
-           const PixelBounds& pixels, std::int32_t k_begin, std::int32_t k_end, const std::function<bool(const PixelBounds&)>& skips);
+  // InvalidArgument: they are in more than `most_entries` tiles, all together; in a grid that fills space once, ten million cells are in
+  // far fewer. Parallel.
+  static Result<CellBins> Make(std::span<const PointBounds> points, std::span<const Tetrahedron> tetrahedra,
+                               std::span<const std::uint32_t> shown, const PixelBounds& pixels, std::int32_t k_begin, std::int32_t k_end,
+                               const std::function<bool(const PixelBounds&)>& skips, std::size_t most_entries = kMostEntries);
 
   std::int32_t tiles() const { return columns_ * rows_; }
   // The part of a tile that lies in `pixels`.
@@ -56,6 +60,8 @@ class CellBins {
   }
 
  private:
+  explicit CellBins(const PixelBounds& pixels);
+
   PixelBounds pixels_;
   std::int32_t first_column_, first_row_, columns_, rows_;  // tiles
   std::vector<std::size_t> first_;                          // of entries_, by tile, and their number

@@ -58,12 +58,13 @@ class SliceRenderer : public Renderer {
     FramePoints& points = slab.CacheOf<FramePoints>();
     space.Place(mesh.points, points);
     work.points = &points;
-    const CellBins bins(points.bounds, mesh.tetrahedra, shown, reach.pixels, reach.begin, reach.end,
-                        [&](const PixelBounds& tile) { return hidden.HidesAll(tile); });
+    const Result<CellBins> bins = CellBins::Make(points.bounds, mesh.tetrahedra, shown, reach.pixels, reach.begin, reach.end,
+                                                 [&](const PixelBounds& tile) { return hidden.HidesAll(tile); });
+    if (!bins.ok()) return bins.status();
     clock.Charge(Stage::kTransform);
 
     LocalImage image = MakeLocalImage(setup.format, reach.pixels);
-    const std::uint64_t drawn = RenderTiles(work, bins, image, cancelled, report);
+    const std::uint64_t drawn = RenderTiles(work, *bins, image, cancelled, report);
     report.drawn_voxels += std::uint64_t(std::ceil(double(drawn) * VoxelsASample(space.rays(), setup.camera, geometry)));
     clock.Finish(Stage::kRender);
     if (cancelled) return Status::Cancelled("rendering was cancelled");
