@@ -11,6 +11,7 @@
 #include "common/planning/balance.h"
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
+#include "common/planning/validate_request.h"
 #include "coordinator/tuning/box_estimator.h"
 #include "laboratory/experiments/attachments.h"
 #include "laboratory/experiments/balanced_case.h"
@@ -79,17 +80,23 @@ Policy Combined(Policy policy, std::string_view combine, int groups = 1, std::st
   return policy;
 }
 
+std::vector<const ViewMotion*> MotionsOf(const ExperimentOptions& options) {
+  const std::vector<std::string>& named = options.own.views;
+  const std::size_t standard = options.quick ? 1 : 2;
+  std::vector<const ViewMotion*> motions;
+  for (const ViewMotion& motion : ViewMotions()) {
+    const bool wanted = named.empty() ? motions.size() < standard : std::ranges::find(named, motion.name) != named.end();
+    if (wanted) motions.push_back(&motion);
+  }
+  return motions;
+}
+
 Balance BalanceOf(const ExperimentContext& context) {
   const OwnOptions& own = context.options().own;
   Balance balance{.volumes = VolumesOf(context), .pixels = context.Scaled(512), .steps = context.quick() ? 4 : 8};
   balance.workers = !own.workers.empty() ? own.workers : context.quick() ? std::vector{2, 16} : std::vector{2, 16, 64};
   std::ranges::sort(balance.workers);
-  const std::size_t standard = context.quick() ? 1 : 2;
-  for (const ViewMotion& motion : ViewMotions()) {
-    const bool wanted =
-        own.views.empty() ? balance.motions.size() < standard : std::ranges::find(own.views, motion.name) != own.views.end();
-    if (wanted) balance.motions.push_back(&motion);
-  }
+  balance.motions = MotionsOf(context.options());
   if (!own.transfers.empty()) balance.later = own.transfers.back();
   for (const NamedPolicy& named : {EqualSlabs(), BalancedSlabs(), BalancedTree()}) {
     for (const NamedChoice& mode : BalanceModes()) {
@@ -356,6 +363,12 @@ void CheckBalance(const ExperimentOptions& options) {
   if (transfers != 0 && transfers != 2)
     throw Failure(
         Status::InvalidArgument(fmt::format("--transfer needs two transfer functions that differ, A,B; {} was given", transfers)));
+  for (const RendererKind* renderer : options.own.renderers) {
+    for (const ViewMotion* motion : MotionsOf(options)) {
+      const BenchCase volume = StandardSphere(SphereClass::kHollow, kLeastScaledSide, renderer);
+      OrThrow(Validate(RequestOf({.volume = volume, .size = {1, 1}, .view = motion->at(0), .policy = {}})));
+    }
+  }
 }
 
 void RunBalance(ExperimentContext& context, Results& results) {

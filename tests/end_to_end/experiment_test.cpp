@@ -169,6 +169,7 @@ TEST_F(ExperimentTest, WhatIsWrongIsToldInALine) {
       {{"experiment", "balance", "-o", "x", "--renderer", "crayon"}, "--renderer 'crayon'"},
       {{"experiment", "balance", "-o", "x", "--transfer", "opaque"}, "--transfer"},
       {{"experiment", "balance", "none.nrrd", "-o", "x"}, "none.nrrd"},
+      {{"experiment", "balance", "-o", "x", "--renderer", "shear", "--views", "perspective"}, "renderer is 'shear', but projection"},
       {{"experiment", "paper", "-o", "x", "--views", "turntable"}, "--views"},
       {{"experiment", "paper", "-o", "x", "--scale", "2"}, "--scale"},
       {{"experiment", "paper", "-o", "x", "--repeats", "0"}, "--repeats"},
