@@ -29,7 +29,7 @@ std::string Harmless(std::string text) {
 // are counted.
 void AddLines(const std::string& name, const Json& value, std::string& text) {
   if (value.is_object()) {
-    for (const auto& [field, inner] : value.items()) AddLines(name.empty() ? field : name + "." + field, inner, text);
+    for (const auto& [field, inner] : value.items()) AddLines(name.empty() ? field : fmt::format("{}.{}", name, field), inner, text);
     return;
   }
   std::string shown = value.is_string() ? value.get<std::string>() : JsonText(value, -1);

@@ -76,7 +76,8 @@ HWY_INLINE bool IsInside(const PixelBounds& image, const Places& places, std::in
          places.y[i] <= image.y_end - kReach;
 }
 
-// Finds the places of pixels x_begin, x_begin + 1, ... of row y, as ResampleAt does, in vectors.
+// Finds the places of pixels x_begin, x_begin + 1, ... of row y, as ResampleAt does, in vectors. Affine: W is the same everywhere.
+template <bool affine>
 HWY_INLINE void FindPlaces(const ProjectiveMap& map, const PixelBounds& image, std::int32_t x_begin, std::int32_t y, Places& places) {
   const hn::CappedTag<double, 8> d;
   const hn::Rebind<float, decltype(d)> df;
@@ -89,11 +90,12 @@ HWY_INLINE void FindPlaces(const ProjectiveMap& map, const PixelBounds& image, s
     const auto row = [&](std::size_t r) HWY_ATTR {
       return hn::MulAdd(hn::Set(d, map[3 * r]), x, hn::Set(d, map[3 * r + 1] * (y + 0.5) + map[3 * r + 2]));
     };
-    const auto w = row(2);
+    const auto w = affine ? hn::Set(d, map[8]) : row(2);
     const auto per_w = hn::Div(one, hn::IfThenElse(hn::Gt(w, zero), w, one));
     const auto square = [&](std::size_t r, auto at) HWY_ATTR {
-      const auto dx = hn::Mul(hn::NegMulAdd(at, hn::Set(d, map[6]), hn::Set(d, map[3 * r])), per_w);
-      const auto dy = hn::Mul(hn::NegMulAdd(at, hn::Set(d, map[7]), hn::Set(d, map[3 * r + 1])), per_w);
+      auto dx = hn::Set(d, map[3 * r]), dy = hn::Set(d, map[3 * r + 1]);
+      if constexpr (!affine) dx = hn::NegMulAdd(at, hn::Set(d, map[6]), dx), dy = hn::NegMulAdd(at, hn::Set(d, map[7]), dy);
+      dx = hn::Mul(dx, per_w), dy = hn::Mul(dy, per_w);
       return hn::MulAdd(dx, dx, hn::Mul(dy, dy));
     };
     const auto at_x = hn::Mul(row(0), per_w), at_y = hn::Mul(row(1), per_w);
@@ -223,8 +225,9 @@ HWY_INLINE void FetchNext(const LocalImage& frame, const Places& places) {
   }
 }
 
-void ResampleRows(const LocalImage& frame, const ProjectiveMap& frame_from_picture, std::int32_t y_begin, std::int32_t y_end,
-                  LocalImage& picture) {
+template <bool affine>
+void ResampleRowsAs(const LocalImage& frame, const ProjectiveMap& frame_from_picture, std::int32_t y_begin, std::int32_t y_end,
+                    LocalImage& picture) {
   const std::int32_t width = picture.bounds.x_end;
   Places places;
   Spline along_x, along_y;
@@ -232,7 +235,7 @@ void ResampleRows(const LocalImage& frame, const ProjectiveMap& frame_from_pictu
   for (std::int32_t x = 0; x < width; x += kBatch) {
     const std::int32_t count = std::min(kBatch, width - x);
     for (std::int32_t y = y_begin; y < y_end; ++y) {
-      FindPlaces(frame_from_picture, frame.bounds, x, y, places);
+      FindPlaces<affine>(frame_from_picture, frame.bounds, x, y, places);
       if (places.empty) continue;
       float* out = &picture.rgba[4 * (std::size_t(y) * std::size_t(width) + std::size_t(x))];
       if (places.narrow && places.inside) {
@@ -249,6 +252,12 @@ void ResampleRows(const LocalImage& frame, const ProjectiveMap& frame_from_pictu
       }
     }
   }
+}
+
+void ResampleRows(const LocalImage& frame, const ProjectiveMap& frame_from_picture, std::int32_t y_begin, std::int32_t y_end,
+                  LocalImage& picture) {
+  const bool affine = frame_from_picture[6] == 0 && frame_from_picture[7] == 0;  // of orthographic views
+  (affine ? ResampleRowsAs<true> : ResampleRowsAs<false>)(frame, frame_from_picture, y_begin, y_end, picture);
 }
 
 #endif
