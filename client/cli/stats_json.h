@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "client/cli/frame_loop.h"
+#include "client/cli/options.h"
 
 namespace slabstream {
 
