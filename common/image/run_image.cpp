@@ -104,6 +104,10 @@ void ForEachSpan(const float* plane, float empty, std::size_t begin, std::size_t
 void CutBounds(RunImage& image) {
   PixelBounds& bounds = image.header.bounds;
   PixelBounds cut;
+  if (image.header.run_count == 0) {
+    bounds = cut;
+    return;
+  }
   std::vector<Run> runs(image.header.run_count);
   std::memcpy(runs.data(), image.payload.data(), sizeof(Run) * runs.size());
   for (const Run& run : runs) {
