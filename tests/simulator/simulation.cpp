@@ -6,6 +6,8 @@
 #include <functional>
 #include <string>
 
+#include "common/renderers/registry.h"
+
 namespace slabstream {
 namespace {
 
