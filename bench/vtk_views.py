@@ -58,8 +58,8 @@ def attenuation(alpha):
 
 
 def linear_attenuation(preset, pieces=16):
-    """The preset with opacities between whose points the attenuation is linear, in as many linear pieces. VTK itself does worse with pieces:
-    its integrators, which cut rays at the points of a function, become brighter with each."""
+    """The preset with opacities between whose points the attenuation is linear, in as many linear pieces. VTK itself does worse with
+    pieces: its exact integrator becomes brighter, by 0.007 with 32 of them."""
     points = [preset["Points"][i:i + 2] for i in range(0, len(preset["Points"]), 4)]
     curve = [points[0]]
     for (v0, a0), (v1, a1) in zip(points, points[1:]):
