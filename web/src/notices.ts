@@ -78,7 +78,8 @@ export class Notices {
     if (this.connection === "lost") return `${this.everOpen ? "The gateway does not answer any more." : "The gateway does not answer."}${this.reason ? ` It said: ${this.reason}.` : ""} Trying again.`;
     if (this.connection === "open" && this.service && this.service.service !== "ready") {
       const { service, reason } = this.service;
-      return `${service === "gone" ? "The rendering service is gone" : "The service has no worker"}${reason ? `: ${reason}` : ""}. The picture stays; it moves again when the service is back.`;
+      const what = service === "gone" ? `The rendering service is gone${reason ? `: ${reason}` : ""}` : "The service has no worker";
+      return `${what}. The picture stays; it moves again when the service is back.`;
     }
     return this.error;
   }
